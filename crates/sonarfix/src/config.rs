@@ -1,0 +1,220 @@
+//! Everything that can be set, in one place, checked once.
+//!
+//! # Non-finite policy
+//! [`Config::check`] refuses NaN and infinity in every field;
+//! [`Localizer::new`](crate::localizer::Localizer::new) calls it.
+
+use crate::aim::Policy;
+use crate::motion::Drive;
+use crate::pose::Point;
+use crate::range::RangeNoise;
+use crate::units::{Metres, MetresPerSecond, PerRootMetre, Radians};
+
+/// The sonar and the servo that carries it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Sonar {
+    /// Where the sonar turns, in the robot frame.
+    pub mount: Point,
+    /// The rightmost and leftmost bearing that the servo reaches, relative to the robot's
+    /// heading; −π and π for one that turns all the way.
+    pub servo: (Radians, Radians),
+    /// Half of the cone in which a wall's perpendicular echo is heard.
+    pub cone: Radians,
+    /// The shortest range it reports.
+    pub min_range: Metres,
+    /// The longest range it reports.
+    pub max_range: Metres,
+    /// Noise of a range.
+    pub noise: RangeNoise,
+}
+
+/// How sure the filter is of the robot's calibration before the first range: standard deviations
+/// of the systematic errors, whose estimates start at zero.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct CalibrationPrior {
+    /// Of the right wheel's scale error, dimensionless.
+    pub scale_right: f32,
+    /// Of the left wheel's scale error, dimensionless.
+    pub scale_left: f32,
+    /// Of the track width's error.
+    pub track_width: Metres,
+    /// Of the ranger's scale error, dimensionless. Zero: not estimated (the paper's case).
+    pub range_scale: f32,
+}
+
+/// Which ranges are believed, and which walls are looked at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Trust {
+    /// The gate: a range is refused if its innovation exceeds this many standard deviations of
+    /// the innovation (ν² > gate² S). In standard deviations, not their square.
+    pub gate: f32,
+    /// A wall counts as one to look at only if it stays so when the pose is wrong by this many of
+    /// its standard deviations.
+    pub confidence: f32,
+}
+
+/// The configuration of a localizer.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Config {
+    /// The wheels.
+    pub drive: Drive,
+    /// The fastest a wheel can roll. A travel beyond it is a fault of an encoder.
+    pub max_wheel_speed: MetresPerSecond,
+    /// The sonar.
+    pub sonar: Sonar,
+    /// What is known of the robot's systematic errors.
+    pub prior: CalibrationPrior,
+    /// Gates and margins.
+    pub trust: Trust,
+    /// Which wall to look at.
+    pub policy: Policy,
+}
+
+/// A field that [`Config::check`] refused, and why.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ConfigError {
+    /// The field, as a path from [`Config`]: `"sonar.cone"`.
+    pub field: &'static str,
+    /// What it must be.
+    pub rule: &'static str,
+}
+
+impl core::fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{} must be {}", self.field, self.rule)
+    }
+}
+
+impl core::error::Error for ConfigError {}
+
+fn positive(field: &'static str, value: f32) -> Result<(), ConfigError> {
+    require(
+        field,
+        value > 0.0 && value.is_finite(),
+        "positive and finite",
+    )
+}
+
+fn not_negative(field: &'static str, value: f32) -> Result<(), ConfigError> {
+    require(
+        field,
+        value >= 0.0 && value.is_finite(),
+        "zero or positive, and finite",
+    )
+}
+
+fn require(field: &'static str, holds: bool, rule: &'static str) -> Result<(), ConfigError> {
+    if holds {
+        Ok(())
+    } else {
+        Err(ConfigError { field, rule })
+    }
+}
+
+impl Config {
+    /// A small differential-drive robot with an ideal ranger, as a start for one's own: every
+    /// noise is moderate, the range scale is not estimated, the servo turns all the way.
+    ///
+    /// ```
+    /// use sonarfix::config::Config;
+    /// use sonarfix::units::Metres;
+    /// let mut config = Config::for_track_width(Metres(0.16));
+    /// config.sonar.max_range = Metres(3.0);
+    /// assert!(config.check().is_ok());
+    /// config.sonar.max_range = Metres(f32::NAN);
+    /// assert_eq!(config.check().unwrap_err().field, "sonar.max_range");
+    /// ```
+    #[must_use]
+    pub fn for_track_width(track_width: Metres) -> Self {
+        let half_turn = Radians(core::f32::consts::PI);
+        Self {
+            drive: Drive {
+                track_width,
+                // A good robot on a hard floor: `0.5–20 mm/√m` is what recordings show.
+                wheel_noise: PerRootMetre(Metres(0.001)),
+                scale_walk: PerRootMetre(1e-5),
+                track_width_walk: PerRootMetre(Metres(1e-5)),
+            },
+            max_wheel_speed: MetresPerSecond(2.0),
+            sonar: Sonar {
+                mount: Point::new(0.0, 0.0),
+                servo: (-half_turn, half_turn),
+                cone: Radians::from_degrees(15.0),
+                min_range: Metres(0.05),
+                max_range: Metres(4.0),
+                noise: RangeNoise {
+                    floor: Metres(0.005),
+                    per_metre: 0.002,
+                },
+            },
+            prior: CalibrationPrior {
+                scale_right: 0.01,
+                scale_left: 0.01,
+                track_width: track_width * 0.03,
+                range_scale: 0.0,
+            },
+            trust: Trust {
+                gate: 4.0,
+                confidence: 3.0,
+            },
+            policy: Policy::Informative,
+        }
+    }
+
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// [`ConfigError`] with the first field that breaks its rule.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        self.check_drive()?;
+        self.check_sonar()?;
+        let prior = &self.prior;
+        not_negative("prior.scale_right", prior.scale_right)?;
+        not_negative("prior.scale_left", prior.scale_left)?;
+        not_negative("prior.track_width", prior.track_width.0)?;
+        let width = self.drive.track_width.0;
+        let below_width = prior.track_width.0 < 0.5 * width;
+        require(
+            "prior.track_width",
+            below_width,
+            "less than half the track width",
+        )?;
+        not_negative("prior.range_scale", prior.range_scale)?;
+        positive("trust.gate", self.trust.gate)?;
+        not_negative("trust.confidence", self.trust.confidence)
+    }
+
+    fn check_drive(&self) -> Result<(), ConfigError> {
+        positive("drive.track_width", self.drive.track_width.0)?;
+        not_negative("drive.wheel_noise", self.drive.wheel_noise.0.0)?;
+        not_negative("drive.scale_walk", self.drive.scale_walk.0)?;
+        not_negative("drive.track_width_walk", self.drive.track_width_walk.0.0)?;
+        positive("max_wheel_speed", self.max_wheel_speed.0)
+    }
+
+    fn check_sonar(&self) -> Result<(), ConfigError> {
+        let sonar = &self.sonar;
+        require("sonar.mount", sonar.mount.is_finite(), "finite")?;
+        let (right, left) = sonar.servo;
+        let half_turn = core::f32::consts::PI;
+        let in_order = right.0 >= -half_turn && right.0 < left.0 && left.0 <= half_turn;
+        require(
+            "sonar.servo",
+            in_order,
+            "a rightmost below a leftmost bearing, within ±180°",
+        )?;
+        let narrow = sonar.cone.0 > 0.0 && sonar.cone.0 < 0.5 * half_turn;
+        require("sonar.cone", narrow, "between 0 and 90° (half of the cone)")?;
+        not_negative("sonar.min_range", sonar.min_range.0)?;
+        positive("sonar.max_range", sonar.max_range.0)?;
+        let wide = sonar.max_range > sonar.min_range;
+        require("sonar.max_range", wide, "greater than sonar.min_range")?;
+        positive("sonar.noise.floor", sonar.noise.floor.0)?;
+        not_negative("sonar.noise.per_metre", sonar.noise.per_metre)
+    }
+}

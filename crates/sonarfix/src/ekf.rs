@@ -1,0 +1,462 @@
+//! The extended Kalman filter: seven states in `f32`, predicted from wheel travel, corrected by
+//! one range at a time (`docs/model.md`, eqs. 4–6 and 13–15).
+//!
+//! It holds numbers and equations only. Which wall a range belongs to, whether it may be
+//! believed and what time it is, others decide.
+//!
+//! # Form
+//! The covariance is kept as its upper triangle. Prediction multiplies out F P Fᵀ with F's zeros
+//! and ones left out; correction is Joseph's form in two passes, each a rank-one change: the first
+//! is the plain P − K H P, the second adds what the rounding of the first, and of K, left wrong.
+//! Variances stay positive in single precision even for a range a million times sharper than the
+//! prior, where the plain form reaches zero.
+//!
+//! # Non-finite policy
+//! NaN or infinity in an argument, or arising on the way, is an [`EkfError`], and not one bit of
+//! the filter has changed.
+
+use nalgebra::{SMatrix, SVector};
+
+use crate::covariance::{Covariance, Row, each_entry};
+use crate::motion::{Drive, Step, WheelTravel};
+use crate::pose::{Heading, Pose};
+use crate::range::ExpectedRange;
+use crate::units::{Metres, Radians, SquareMetres};
+
+/// Number of states.
+pub const STATES: usize = 7;
+
+/// The seven states, in the order of [`Ekf::state_vector`] and of the covariance.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct State {
+    /// Position along map x, metres.
+    pub x: f32,
+    /// Position along map y, metres.
+    pub y: f32,
+    /// Heading ψ, radians in (−π, π].
+    pub heading: f32,
+    /// Scale error of the right wheel, `S_R`: true travel is (1 + `S_R`) times the measured one.
+    pub scale_right: f32,
+    /// Scale error of the left wheel, `S_L`.
+    pub scale_left: f32,
+    /// Error of the track width δD, metres: the true one is D + δD.
+    pub track_width_error: f32,
+    /// Scale error of the ranger κ: a measured range is (1 + κ) times the true one.
+    pub range_scale: f32,
+}
+
+impl State {
+    /// Position and heading.
+    #[must_use]
+    pub fn pose(&self) -> Pose {
+        Pose::new(self.x, self.y, Radians(self.heading))
+    }
+
+    fn to_vector(self) -> SVector<f32, STATES> {
+        SVector::from([
+            self.x,
+            self.y,
+            self.heading,
+            self.scale_right,
+            self.scale_left,
+            self.track_width_error,
+            self.range_scale,
+        ])
+    }
+
+    fn is_finite(self) -> bool {
+        self.to_vector().iter().all(|v| v.is_finite())
+    }
+}
+
+/// What the filter refuses to compute with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum EkfError {
+    /// An argument is NaN or infinite, or the result would be.
+    NotFinite,
+    /// A variance or a standard deviation is negative.
+    Negative,
+    /// The noise of a range is zero: its correction could not be undone.
+    Noiseless,
+}
+
+impl core::fmt::Display for EkfError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::NotFinite => "a value is NaN or infinite, or the result would be",
+            Self::Negative => "a variance or a standard deviation is negative",
+            Self::Noiseless => "the variance of a range is zero",
+        })
+    }
+}
+
+impl core::error::Error for EkfError {}
+
+/// A measured range against the expected one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Innovation {
+    /// ν = z − h(X̂).
+    pub value: Metres,
+    /// S = H P Hᵀ + R.
+    pub variance: SquareMetres,
+}
+
+impl Innovation {
+    /// Normalised innovation squared ν²/S, dimensionless: 1 on average if the filter is
+    /// consistent.
+    ///
+    /// ```
+    /// use sonarfix::ekf::Innovation;
+    /// use sonarfix::units::{Metres, SquareMetres};
+    /// let innovation = Innovation { value: Metres(0.02), variance: SquareMetres(0.0001) };
+    /// assert!((innovation.nis() - 4.0).abs() < 1e-5);
+    /// ```
+    #[must_use]
+    pub fn nis(&self) -> f32 {
+        self.value.0 * self.value.0 / self.variance.0
+    }
+}
+
+/// The covariance of the position alone, m².
+pub(crate) struct PositionCovariance {
+    pub xx: f32,
+    pub xy: f32,
+    pub yy: f32,
+}
+
+/// The filter.
+///
+/// ```
+/// use sonarfix::ekf::{Ekf, State};
+/// use sonarfix::motion::{Drive, WheelTravel};
+/// use sonarfix::units::{Metres, PerRootMetre};
+///
+/// let drive = Drive {
+///     track_width: Metres(0.35),
+///     wheel_noise: PerRootMetre(Metres(0.0005)),
+///     scale_walk: PerRootMetre(5e-6),
+///     track_width_walk: PerRootMetre(Metres(5e-6)),
+/// };
+/// let deviation = State {
+///     x: 0.001, y: 0.001, heading: 0.001,
+///     scale_right: 0.01, scale_left: 0.01, track_width_error: 0.01, range_scale: 0.0,
+/// };
+/// let mut ekf = Ekf::new(drive, State::default(), deviation)?;
+/// for _ in 0..10 {
+///     ekf.predict(WheelTravel::new(0.04, 0.04))?;
+/// }
+/// assert!((ekf.state().x - 0.4).abs() < 1e-6);
+/// // The scale errors are unknown by 1 %, so 0.4 m of travel is uncertain by 2.8 mm.
+/// assert!((ekf.deviation().x - 0.0030).abs() < 0.0001);
+/// # Ok::<(), sonarfix::ekf::EkfError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ekf {
+    state: State,
+    p: Covariance,
+    drive: Drive,
+}
+
+impl Ekf {
+    /// A filter at `state`, whose errors are independent with the standard deviations in
+    /// `deviation` (each in the unit of its state). A deviation of zero means: known exactly, and
+    /// for the range scale: not estimated.
+    ///
+    /// # Errors
+    /// [`EkfError::NotFinite`] or [`EkfError::Negative`], by what is wrong with an argument.
+    pub fn new(drive: Drive, state: State, deviation: State) -> Result<Self, EkfError> {
+        if !state.is_finite() || !deviation.is_finite() {
+            return Err(EkfError::NotFinite);
+        }
+        if deviation.to_vector().iter().any(|&sigma| sigma < 0.0) {
+            return Err(EkfError::Negative);
+        }
+        let square = |sigma: f32| sigma * sigma;
+        let p = Covariance {
+            xx: square(deviation.x),
+            yy: square(deviation.y),
+            hh: square(deviation.heading),
+            rr: square(deviation.scale_right),
+            ll: square(deviation.scale_left),
+            ww: square(deviation.track_width_error),
+            kk: square(deviation.range_scale),
+            ..Covariance::default()
+        };
+        if !p.is_sound() {
+            return Err(EkfError::NotFinite);
+        }
+        let heading = Heading::new(Radians(state.heading)).radians().0;
+        Ok(Self {
+            state: State { heading, ..state },
+            p,
+            drive,
+        })
+    }
+
+    /// The estimate X̂.
+    #[must_use]
+    pub fn state(&self) -> State {
+        self.state
+    }
+
+    /// The estimate X̂ as a 7×1 vector: x, y, heading, right and left scale error, track-width
+    /// error, range scale error; metres, radians, dimensionless.
+    #[must_use]
+    pub fn state_vector(&self) -> SVector<f32, STATES> {
+        self.state.to_vector()
+    }
+
+    /// The covariance P, 7×7, exactly symmetric, in the order of [`Self::state_vector`].
+    #[must_use]
+    pub fn covariance(&self) -> SMatrix<f32, STATES, STATES> {
+        self.p.to_matrix()
+    }
+
+    /// One standard deviation of each state, in the state's own unit.
+    #[must_use]
+    pub fn deviation(&self) -> State {
+        let p = &self.p;
+        State {
+            x: libm::sqrtf(p.xx),
+            y: libm::sqrtf(p.yy),
+            heading: libm::sqrtf(p.hh),
+            scale_right: libm::sqrtf(p.rr),
+            scale_left: libm::sqrtf(p.ll),
+            track_width_error: libm::sqrtf(p.ww),
+            range_scale: libm::sqrtf(p.kk),
+        }
+    }
+
+    /// Variances and covariance of x and y, m².
+    pub(crate) fn position_covariance(&self) -> PositionCovariance {
+        PositionCovariance {
+            xx: self.p.xx,
+            xy: self.p.xy,
+            yy: self.p.yy,
+        }
+    }
+
+    /// Predicts the state over one step of the wheels: `X̂ ← f(X̂, U)`, `P ← F P Fᵀ + Q`
+    /// (`docs/model.md`, eqs. 4–5 and 7–9). Q grows with the distance rolled, never with time: a
+    /// step without travel changes nothing.
+    ///
+    /// # Errors
+    /// [`EkfError::NotFinite`] if a travel is NaN or infinite or the result would be; the filter
+    /// is unchanged.
+    ///
+    /// # Panics
+    /// Never.
+    pub fn predict(&mut self, travel: WheelTravel) -> Result<(), EkfError> {
+        if !travel.is_finite() {
+            return Err(EkfError::NotFinite);
+        }
+        if travel == WheelTravel::default() {
+            return Ok(());
+        }
+        let step = Step::new(&self.drive, &self.state, travel);
+        let state = State {
+            x: self.state.x + step.advance * step.cos,
+            y: self.state.y + step.advance * step.sin,
+            heading: Heading::new(Radians(self.state.heading + step.turn))
+                .radians()
+                .0,
+            ..self.state
+        };
+        let mut p = propagated(&self.p, &step);
+        let scale_walk = self.drive.scale_walk.0 * self.drive.scale_walk.0 * travel.distance().0;
+        let width_walk = self.drive.track_width_walk.0.0;
+        p.rr += scale_walk;
+        p.ll += scale_walk;
+        p.ww += width_walk * width_walk * travel.distance().0;
+        self.replace(state, p)
+    }
+
+    /// The innovation that a measured `range` would bring, with noise variance `noise`
+    /// (`docs/model.md`, eq. 13). Changes nothing.
+    #[must_use]
+    pub fn innovation(
+        &self,
+        range: Metres,
+        expected: &ExpectedRange,
+        noise: SquareMetres,
+    ) -> Innovation {
+        let m = self.cross_covariance(expected);
+        Innovation {
+            value: range - expected.range,
+            variance: SquareMetres(innovation_variance(expected, &m, noise)),
+        }
+    }
+
+    /// How much the position's variance (x's and y's together) would drop if this range were
+    /// measured, with noise variance `noise`; computed without trying the update
+    /// (`docs/model.md`, eq. 16).
+    #[must_use]
+    pub fn position_gain(&self, expected: &ExpectedRange, noise: SquareMetres) -> SquareMetres {
+        let m = self.cross_covariance(expected);
+        SquareMetres((m.x * m.x + m.y * m.y) / innovation_variance(expected, &m, noise))
+    }
+
+    /// Corrects the state by one measured `range` with noise variance `noise`
+    /// (`docs/model.md`, eqs. 6 and 13–15). There is no gate here: what is given is believed.
+    ///
+    /// # Errors
+    /// [`EkfError::NotFinite`], [`EkfError::Negative`] or [`EkfError::Noiseless`] by what is
+    /// wrong with an argument; the filter is unchanged.
+    ///
+    /// # Panics
+    /// Never.
+    pub fn update(
+        &mut self,
+        range: Metres,
+        expected: &ExpectedRange,
+        noise: SquareMetres,
+    ) -> Result<(), EkfError> {
+        if !range.is_finite() || !noise.0.is_finite() {
+            return Err(EkfError::NotFinite);
+        }
+        if noise.0 < 0.0 {
+            return Err(EkfError::Negative);
+        }
+        if noise.0 <= 0.0 {
+            return Err(EkfError::Noiseless);
+        }
+        let m = self.cross_covariance(expected);
+        let per_variance = 1.0 / innovation_variance(expected, &m, noise);
+        let gain = m.scaled(per_variance);
+        let innovation = (range - expected.range).0;
+        let s = &self.state;
+        let heading = s.heading + gain.h * innovation;
+        let state = State {
+            x: s.x + gain.x * innovation,
+            y: s.y + gain.y * innovation,
+            heading: Heading::new(Radians(heading)).radians().0,
+            scale_right: s.scale_right + gain.r * innovation,
+            scale_left: s.scale_left + gain.l * innovation,
+            track_width_error: s.track_width_error + gain.w * innovation,
+            range_scale: s.range_scale + gain.k * innovation,
+        };
+        self.replace(state, corrected(&self.p, &m, &gain, expected, noise))
+    }
+
+    /// P Hᵀ: the covariance of each state with the expected range.
+    fn cross_covariance(&self, expected: &ExpectedRange) -> Row {
+        let e = expected;
+        self.p.times(e.by_x, e.by_y, e.by_heading, e.by_range_scale)
+    }
+
+    /// Takes the new state and covariance if they are sound; changes nothing if not.
+    fn replace(&mut self, state: State, p: Covariance) -> Result<(), EkfError> {
+        if !state.is_finite() || !p.is_sound() {
+            return Err(EkfError::NotFinite);
+        }
+        self.state = state;
+        self.p = p;
+        Ok(())
+    }
+}
+
+/// S = H P Hᵀ + R, given m = P Hᵀ.
+fn innovation_variance(expected: &ExpectedRange, m: &Row, noise: SquareMetres) -> f32 {
+    let e = expected;
+    noise.0 + (e.by_x * m.x + e.by_y * m.y + e.by_heading * m.h + e.by_range_scale * m.k)
+}
+
+/// F P Fᵀ and the wheels' noise, multiplied out (`docs/model.md`, eq. 9).
+///
+/// The step is seen as three small movements: half the turn, the advance along the mid-heading,
+/// the other half. So the pose after it is linear in the pose before it, the turn t and the
+/// advance s, and all that is needed are the covariances of these: `ht` is that of heading and
+/// turn, `xm` that of x and the mid-heading m = h + t/2, and so on.
+fn propagated(p: &Covariance, step: &Step) -> Covariance {
+    let (sin, cos) = (step.sin, step.cos);
+    // ∂x/∂m and ∂y/∂m.
+    let (swing_x, swing_y) = (-step.advance * sin, step.advance * cos);
+
+    let turn_with = |r: f32, l: f32, w: f32| step.turn_r * r + step.turn_l * l + step.turn_w * w;
+    let advance_with = |r: f32, l: f32| step.advance_r * r + step.advance_l * l;
+    let (tr, tl) = (turn_with(p.rr, p.rl, p.rw), turn_with(p.rl, p.ll, p.lw));
+    let (tw, tk) = (turn_with(p.rw, p.lw, p.ww), turn_with(p.rk, p.lk, p.wk));
+    let (sr, sl) = (advance_with(p.rr, p.rl), advance_with(p.rl, p.ll));
+    let (sw, sk) = (advance_with(p.rw, p.lw), advance_with(p.rk, p.lk));
+    let (xt, xs) = (turn_with(p.xr, p.xl, p.xw), advance_with(p.xr, p.xl));
+    let (yt, ys) = (turn_with(p.yr, p.yl, p.yw), advance_with(p.yr, p.yl));
+    let (ht, hs) = (turn_with(p.hr, p.hl, p.hw), advance_with(p.hr, p.hl));
+    let tt = turn_with(tr, tl, tw) + step.turn_variance;
+    let ts = advance_with(tr, tl) + step.advance_turn;
+    let ss = advance_with(sr, sl) + step.advance_variance;
+
+    let (xm, ym, hm) = (p.xh + 0.5 * xt, p.yh + 0.5 * yt, p.hh + 0.5 * ht);
+    let mt = ht + 0.5 * tt;
+    let (mm, ms) = (hm + 0.5 * mt, hs + 0.5 * ts);
+    // Covariances of the way along x and y with the mid-heading, the advance and the new heading.
+    let (ways_xm, ways_ym) = (swing_x * mm + cos * ms, swing_y * mm + sin * ms);
+    let (ways_xs, ways_ys) = (swing_x * ms + cos * ss, swing_y * ms + sin * ss);
+    let (m_new, s_new) = (hm + mt, hs + ts);
+
+    let along_x = |of: f32, m: f32, s: f32| of + swing_x * m + cos * s;
+    let along_y = |of: f32, m: f32, s: f32| of + swing_y * m + sin * s;
+    let (rm, lm) = (p.hr + 0.5 * tr, p.hl + 0.5 * tl);
+    let (wm, km) = (p.hw + 0.5 * tw, p.hk + 0.5 * tk);
+    Covariance {
+        xx: along_x(p.xx + 2.0 * (swing_x * xm + cos * xs), ways_xm, ways_xs),
+        xy: along_y(along_x(p.xy, ym, ys), xm + ways_xm, xs + ways_xs),
+        xh: along_x(p.xh + xt, m_new, s_new),
+        xr: along_x(p.xr, rm, sr),
+        xl: along_x(p.xl, lm, sl),
+        xw: along_x(p.xw, wm, sw),
+        xk: along_x(p.xk, km, sk),
+        yy: along_y(p.yy + 2.0 * (swing_y * ym + sin * ys), ways_ym, ways_ys),
+        yh: along_y(p.yh + yt, m_new, s_new),
+        yr: along_y(p.yr, rm, sr),
+        yl: along_y(p.yl, lm, sl),
+        yw: along_y(p.yw, wm, sw),
+        yk: along_y(p.yk, km, sk),
+        hh: p.hh + ht + mt + 0.5 * tt,
+        hr: p.hr + tr,
+        hl: p.hl + tl,
+        hw: p.hw + tw,
+        hk: p.hk + tk,
+        ..*p
+    }
+}
+
+/// The covariance after a correction: Joseph's form in two passes (`docs/model.md`, eq. 15).
+fn corrected(
+    p: &Covariance,
+    m: &Row,
+    gain: &Row,
+    expected: &ExpectedRange,
+    noise: SquareMetres,
+) -> Covariance {
+    let mut p = *p;
+    macro_rules! subtract_gain_times_cross_covariance {
+        ($entry:ident $i:ident $j:ident) => {
+            p.$entry -= gain.$i * m.$j;
+        };
+    }
+    each_entry!(subtract_gain_times_cross_covariance);
+
+    // In exact arithmetic P₁ Hᵀ = K R, and the second pass adds nothing.
+    let e = expected;
+    let left_over = p.times(e.by_x, e.by_y, e.by_heading, e.by_range_scale);
+    let r = noise.0;
+    let d = Row {
+        x: gain.x * r - left_over.x,
+        y: gain.y * r - left_over.y,
+        h: gain.h * r - left_over.h,
+        r: gain.r * r - left_over.r,
+        l: gain.l * r - left_over.l,
+        w: gain.w * r - left_over.w,
+        k: gain.k * r - left_over.k,
+    };
+    macro_rules! add_what_rounding_left {
+        ($entry:ident $i:ident $j:ident) => {
+            p.$entry += d.$i * gain.$j;
+        };
+    }
+    each_entry!(add_what_rounding_left);
+    p
+}
