@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// Something wrong with a file: `paper.toml:12: robot.sonar.cone: must be …`.
+/// Something wrong with a file: `paper.toml:45: robot.sonar.cone: must be …`.
 ///
 /// One type for every kind of fault, because every reader does the same with it: shows it to the
 /// person who wrote the file.

