@@ -17,22 +17,12 @@ pub struct FileError {
 impl FileError {
     /// A fault of the value of `key` in `line`.
     pub(crate) fn new(file: &str, line: usize, key: &str, message: impl Into<String>) -> Self {
-        Self {
-            file: file.into(),
-            line: Some(line),
-            key: key.into(),
-            message: message.into(),
-        }
+        Self { file: file.into(), line: Some(line), key: key.into(), message: message.into() }
     }
 
     /// A fault of the file as a whole.
     pub(crate) fn of_file(file: &str, message: impl Into<String>) -> Self {
-        Self {
-            file: file.into(),
-            line: None,
-            key: String::new(),
-            message: message.into(),
-        }
+        Self { file: file.into(), line: None, key: String::new(), message: message.into() }
     }
 
     /// The file, as it was named by who asked for it.

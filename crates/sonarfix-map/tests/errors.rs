@@ -34,13 +34,7 @@ const fn case(
     key: &'static str,
     message: &'static str,
 ) -> Case {
-    Case {
-        old,
-        new,
-        line,
-        key,
-        message,
-    }
+    Case { old, new, line, key, message }
 }
 
 /// A changed value, reported where it stands.
@@ -56,25 +50,9 @@ const fn value(
 const FORMAT: [Case; 9] = [
     value("unit = \"m\"", "unit = \"m", "", "this is not TOML at `"),
     value("name = \"paper\"", "name = ", "", "this is not TOML at `"),
-    case(
-        "gate = 5.0",
-        "confidence = 1\ngate = 5.0",
-        "confidence = 3.0",
-        "",
-        "duplicate key",
-    ),
-    value(
-        "format = 1",
-        "format = 2",
-        "format",
-        "version 2 cannot be read, only version 1",
-    ),
-    value(
-        "format = 1",
-        "format = \"1\"",
-        "format",
-        "must be a whole number",
-    ),
+    case("gate = 5.0", "confidence = 1\ngate = 5.0", "confidence = 3.0", "", "duplicate key"),
+    value("format = 1", "format = 2", "format", "version 2 cannot be read, only version 1"),
+    value("format = 1", "format = \"1\"", "format", "must be a whole number"),
     case("format = 1\n", "", "# The ref", "format", "is missing"),
     value(
         "servo =",
@@ -82,12 +60,7 @@ const FORMAT: [Case; 9] = [
         "robot.sonar.srvo",
         "unknown key; possible here: mount, servo, cone",
     ),
-    value(
-        "[run]",
-        "[ran]",
-        "ran",
-        "unknown key; possible here: format, name",
-    ),
+    value("[run]", "[ran]", "ran", "unknown key; possible here: format, name"),
     value(
         "{ name = \"inner east\",",
         "{ name = \"inner east\", height = 2,",
@@ -97,27 +70,9 @@ const FORMAT: [Case; 9] = [
 ];
 
 const MISSING: [Case; 9] = [
-    case(
-        "[robot.schedule]\npolicy",
-        "# policy",
-        "[robot.drive]",
-        "robot.schedule",
-        "is missing",
-    ),
-    case(
-        "cone = \"15 deg\"",
-        "",
-        "[robot.sonar]",
-        "robot.sonar.cone",
-        "is missing",
-    ),
-    case(
-        "gate = 5.0",
-        "",
-        "[robot.trust]",
-        "robot.trust.gate",
-        "is missing",
-    ),
+    case("[robot.schedule]\npolicy", "# policy", "[robot.drive]", "robot.schedule", "is missing"),
+    case("cone = \"15 deg\"", "", "[robot.sonar]", "robot.sonar.cone", "is missing"),
+    case("gate = 5.0", "", "[robot.trust]", "robot.trust.gate", "is missing"),
     case(
         "[robot.prior]",
         "[robot.sonar.extra]",
@@ -126,28 +81,10 @@ const MISSING: [Case; 9] = [
         "unknown key",
     ),
     case("unit = \"m\"     #", "#", "[map]", "map.unit", "is missing"),
-    case(
-        "unit = \"m\"\nstart",
-        "start",
-        "[path]",
-        "path.unit",
-        "is missing",
-    ),
+    case("unit = \"m\"\nstart", "start", "[path]", "path.unit", "is missing"),
     case("runs = 50", "", "[run]", "run.runs", "is missing"),
-    case(
-        "name = \"inner west\", ",
-        "",
-        "{ from = [-17, 37]",
-        "map.wall[6].name",
-        "is missing",
-    ),
-    case(
-        "description =",
-        "# description =",
-        "# The ref",
-        "description",
-        "is missing",
-    ),
+    case("name = \"inner west\", ", "", "{ from = [-17, 37]", "map.wall[6].name", "is missing"),
+    case("description =", "# description =", "# The ref", "description", "is missing"),
 ];
 
 const UNITS: [Case; 9] = [
@@ -169,18 +106,8 @@ const UNITS: [Case; 9] = [
         "robot.sonar.max_range",
         "\"10 s\" is not a length: write a finite number with a unit (m, cm, mm)",
     ),
-    value(
-        "speed = \"0.4 m/s\"",
-        "speed = \"0.4 m\"",
-        "path.speed",
-        "is not a speed",
-    ),
-    value(
-        "heading = \"1 mrad\"",
-        "heading = \"1 mm\"",
-        "start.heading",
-        "is not an angle",
-    ),
+    value("speed = \"0.4 m/s\"", "speed = \"0.4 m\"", "path.speed", "is not a speed"),
+    value("heading = \"1 mrad\"", "heading = \"1 mm\"", "start.heading", "is not an angle"),
     value(
         "scale_right = \"1 %\"",
         "scale_right = \"1 mm\"",
@@ -193,12 +120,7 @@ const UNITS: [Case; 9] = [
         "robot.sonar.noise_per_metre",
         "is not a length per length",
     ),
-    value(
-        "unit = \"m\"",
-        "unit = \"ft\"",
-        "map.unit",
-        "must be one of m, cm, mm",
-    ),
+    value("unit = \"m\"", "unit = \"ft\"", "map.unit", "must be one of m, cm, mm"),
     value(
         "servo = [\"-180 deg\"",
         "servo = [-180",
@@ -208,60 +130,15 @@ const UNITS: [Case; 9] = [
 ];
 
 const TYPES: [Case; 10] = [
-    value(
-        "name = \"paper\"",
-        "name = 1",
-        "name",
-        "must be a string, but this is of type integer",
-    ),
-    value(
-        "drawn = true",
-        "drawn = \"yes\"",
-        "start.drawn",
-        "must be true or false",
-    ),
-    value(
-        "gate = 5.0",
-        "gate = \"5\"",
-        "robot.trust.gate",
-        "must be a number",
-    ),
-    value(
-        "gate = 5.0",
-        "gate = nan",
-        "robot.trust.gate",
-        "must be finite",
-    ),
-    value(
-        "seed = 0",
-        "seed = 0.5",
-        "run.seed",
-        "must be a whole number from 0",
-    ),
-    value(
-        "seed = 0",
-        "seed = -1",
-        "run.seed",
-        "must be a whole number from 0",
-    ),
-    value(
-        "start = [0, 0]",
-        "start = [0]",
-        "path.start",
-        "must be two values, but there are 1",
-    ),
-    value(
-        "start = [0, 0]",
-        "start = 0",
-        "path.start",
-        "must be an array",
-    ),
-    value(
-        "start = [0, 0]",
-        "start = [0, \"0 m\"]",
-        "path.start[1]",
-        "must be a number",
-    ),
+    value("name = \"paper\"", "name = 1", "name", "must be a string, but this is of type integer"),
+    value("drawn = true", "drawn = \"yes\"", "start.drawn", "must be true or false"),
+    value("gate = 5.0", "gate = \"5\"", "robot.trust.gate", "must be a number"),
+    value("gate = 5.0", "gate = nan", "robot.trust.gate", "must be finite"),
+    value("seed = 0", "seed = 0.5", "run.seed", "must be a whole number from 0"),
+    value("seed = 0", "seed = -1", "run.seed", "must be a whole number from 0"),
+    value("start = [0, 0]", "start = [0]", "path.start", "must be two values, but there are 1"),
+    value("start = [0, 0]", "start = 0", "path.start", "must be an array"),
+    value("start = [0, 0]", "start = [0, \"0 m\"]", "path.start[1]", "must be a number"),
     value(
         "mount = [\"0 mm\", \"0 mm\"]",
         "mount = \"0 mm\"",
@@ -271,43 +148,17 @@ const TYPES: [Case; 10] = [
 ];
 
 const MAP: [Case; 6] = [
-    value(
-        "to = [-3, 37]",
-        "to = [-3, 3]",
-        "map.wall[4].to",
-        "the wall has no length",
-    ),
+    value("to = [-3, 37]", "to = [-3, 3]", "map.wall[4].to", "the wall has no length"),
     value(
         "name = \"inner west\"",
         "name = \"outer west\", from = [-17, 37], to = [-17, 3] }, #",
         "map.wall[6].name",
         "another wall is already called \"outer west\"",
     ),
-    value(
-        "name = \"inner west\"",
-        "name = \"\"",
-        "map.wall[6].name",
-        "must be a name",
-    ),
-    value(
-        "from = [-3, 3]",
-        "from = [inf, 3]",
-        "map.wall[4].from[0]",
-        "must be finite",
-    ),
-    value(
-        "from = [-3, 3]",
-        "from = [-3, 1e6]",
-        "map.wall[4].from",
-        "within 100 km",
-    ),
-    case(
-        "wall = [",
-        "wall = []\nignored = [",
-        "ignored",
-        "map.ignored",
-        "unknown key",
-    ),
+    value("name = \"inner west\"", "name = \"\"", "map.wall[6].name", "must be a name"),
+    value("from = [-3, 3]", "from = [inf, 3]", "map.wall[4].from[0]", "must be finite"),
+    value("from = [-3, 3]", "from = [-3, 1e6]", "map.wall[4].from", "within 100 km"),
+    case("wall = [", "wall = []\nignored = [", "ignored", "map.ignored", "unknown key"),
 ];
 
 /// Every rule of the localizer's own check, at the key that the file has it under.
@@ -348,12 +199,7 @@ const CONFIG: [Case; 17] = [
         "robot.drive.max_wheel_speed",
         "must be positive",
     ),
-    value(
-        "mount = [\"0",
-        "mount = [\"1e60",
-        "robot.sonar.mount",
-        "must be finite",
-    ),
+    value("mount = [\"0", "mount = [\"1e60", "robot.sonar.mount", "must be finite"),
     value(
         "servo = [\"-180",
         "servo = [\"190",
@@ -378,12 +224,7 @@ const CONFIG: [Case; 17] = [
         "robot.sonar.max_range",
         "must be greater than sonar.min_range",
     ),
-    value(
-        "noise = \"2.4",
-        "noise = \"0.0",
-        "robot.sonar.noise",
-        "must be positive",
-    ),
+    value("noise = \"2.4", "noise = \"0.0", "robot.sonar.noise", "must be positive"),
     value(
         "noise_per_metre = \"0",
         "noise_per_metre = \"-1",
@@ -402,12 +243,7 @@ const CONFIG: [Case; 17] = [
         "robot.prior.scale_left",
         "must be zero or positive",
     ),
-    value(
-        "gate = 5.0",
-        "gate = 0",
-        "robot.trust.gate",
-        "must be positive",
-    ),
+    value("gate = 5.0", "gate = 0", "robot.trust.gate", "must be positive"),
     value(
         "confidence = 3.0",
         "confidence = -3.0",
@@ -458,25 +294,9 @@ const ROBOT: [Case; 6] = [
 ];
 
 const PATH: [Case; 13] = [
-    value(
-        "laps = 4",
-        "laps = 0",
-        "path.laps",
-        "must be a whole number from 1",
-    ),
-    value(
-        "laps = 4",
-        "laps = 20000",
-        "path.laps",
-        "must be from 1 to 10000",
-    ),
-    case(
-        ", [0, 0]]",
-        "]",
-        "laps = 4",
-        "path.laps",
-        "the last corner is not the start",
-    ),
+    value("laps = 4", "laps = 0", "path.laps", "must be a whole number from 1"),
+    value("laps = 4", "laps = 20000", "path.laps", "must be from 1 to 10000"),
+    case(", [0, 0]]", "]", "laps = 4", "path.laps", "the last corner is not the start"),
     value(
         "corners = [[0, 40]",
         "corners = [[0, 0]",
@@ -489,24 +309,9 @@ const PATH: [Case; 13] = [
         "path.corners[1]",
         "the robot is already there",
     ),
-    value(
-        "corners = [[0, 40]",
-        "corners = [[0, 4e9]",
-        "path.corners[0]",
-        "within 100 km",
-    ),
-    value(
-        "corners = [[0, 40]",
-        "corners = [] #",
-        "path.corners",
-        "at least one corner",
-    ),
-    value(
-        "speed = \"0.4 m/s\"",
-        "speed = \"0 m/s\"",
-        "path.speed",
-        "must be positive",
-    ),
+    value("corners = [[0, 40]", "corners = [[0, 4e9]", "path.corners[0]", "within 100 km"),
+    value("corners = [[0, 40]", "corners = [] #", "path.corners", "at least one corner"),
+    value("speed = \"0.4 m/s\"", "speed = \"0 m/s\"", "path.speed", "must be positive"),
     value(
         "speed = \"0.4 m/s\"",
         "speed = \"3 m/s\"",
@@ -577,26 +382,14 @@ const REST: [Case; 8] = [
         "truth.cone",
         "must be between 0 and 90°",
     ),
-    value(
-        "runs = 50",
-        "runs = 0",
-        "run.runs",
-        "must be a whole number from 1",
-    ),
-    case(
-        "[map]",
-        "map = \"nowhere.toml\"\n[was_map]",
-        "[was_map]",
-        "was_map",
-        "unknown key",
-    ),
+    value("runs = 50", "runs = 0", "run.runs", "must be a whole number from 1"),
+    case("[map]", "map = \"nowhere.toml\"\n[was_map]", "[was_map]", "was_map", "unknown key"),
 ];
 
 #[test]
 fn every_fault_has_its_line_and_key() {
-    let tables: [&[Case]; 9] = [
-        &FORMAT, &MISSING, &UNITS, &TYPES, &MAP, &CONFIG, &ROBOT, &PATH, &REST,
-    ];
+    let tables: [&[Case]; 9] =
+        [&FORMAT, &MISSING, &UNITS, &TYPES, &MAP, &CONFIG, &ROBOT, &PATH, &REST];
     let faults: Vec<_> = tables.into_iter().flatten().filter_map(fault).collect();
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
@@ -626,19 +419,12 @@ fn an_error_reads_as_a_compiler_writes_it() {
             map.to_owned(),
             "m.toml:14: map.wall[1].to: must differ from `from`: the wall has no length",
         ),
+        (map.replace("name = \"b\"\n", ""), "m.toml:11: map.wall[1].name: is missing"),
         (
-            map.replace("name = \"b\"\n", ""),
-            "m.toml:11: map.wall[1].name: is missing",
-        ),
-        (
-            map.replace("\"b\"", "\"a\"")
-                .replace("to = [0, 0]", "to = [0, 1]"),
+            map.replace("\"b\"", "\"a\"").replace("to = [0, 0]", "to = [0, 1]"),
             "m.toml:12: map.wall[1].name: another wall is already called \"a\"",
         ),
-        (
-            map.replace("unit = \"cm\"\n", ""),
-            "m.toml:3: map.unit: is missing",
-        ),
+        (map.replace("unit = \"cm\"\n", ""), "m.toml:3: map.unit: is missing"),
         (
             "format = 1\r\n[map]\r\nunit = \"m\"\r\nwall = []\r\n".into(),
             "m.toml:4: map.wall: must be at least one wall",
@@ -651,10 +437,7 @@ fn an_error_reads_as_a_compiler_writes_it() {
         ),
     ];
     for (text, shown) in cases {
-        assert_eq!(
-            Floor::parse(&text, "m.toml").unwrap_err().to_string(),
-            shown
-        );
+        assert_eq!(Floor::parse(&text, "m.toml").unwrap_err().to_string(), shown);
     }
     let good = map.replace("to = [0, 0]", "to = [0, 250]");
     let floor = Floor::parse(&good, "m.toml").unwrap();
@@ -711,25 +494,17 @@ fn map_and_robot_may_be_files_of_their_own() {
     assert_eq!(error.key(), "map");
     let scenario = fs::read_to_string(place("all.toml")).unwrap();
     assert_eq!(error.line(), line_of(&scenario, "map = "));
-    assert!(
-        error.message().contains("map.toml cannot be read"),
-        "{error}"
-    );
+    assert!(error.message().contains("map.toml cannot be read"), "{error}");
 
     // WHEN the scenario itself is not there, THEN there is no line.
     let error = Scenario::read(&place("none.toml")).unwrap_err();
     assert_eq!((error.line(), error.key()), (None, ""));
-    assert!(
-        error.to_string().contains("none.toml: cannot be read: "),
-        "{error}"
-    );
+    assert!(error.to_string().contains("none.toml: cannot be read: "), "{error}");
 }
 
 #[test]
 fn what_may_be_left_out_may_be() {
-    let text = PAPER
-        .replace("laps = 4", "")
-        .replace("clearance = \"20 cm\"", "");
+    let text = PAPER.replace("laps = 4", "").replace("clearance = \"20 cm\"", "");
     let scenario = parse(&text).unwrap();
     assert!((scenario.path.duration() - 312.0).abs() < 1e-9);
 }

@@ -11,9 +11,7 @@ const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/formats.md")
 /// The TOML examples of a page: what kind of file each is, and its text.
 fn examples(page: &str) -> Vec<(&str, &str)> {
     let blocks = page.split("```toml ").skip(1);
-    blocks
-        .filter_map(|block| block.split("```").next()?.split_once('\n'))
-        .collect()
+    blocks.filter_map(|block| block.split("```").next()?.split_once('\n')).collect()
 }
 
 fn read(kind: &str, text: &str) -> Result<(), FileError> {
@@ -45,17 +43,11 @@ fn every_key_is_explained() {
     let text: String = examples(&page).into_iter().map(|(_, text)| text).collect();
     let keys: BTreeSet<_> = text.lines().filter_map(key).collect();
     assert!(keys.len() > 35, "{keys:?}");
-    let rows: Vec<_> = page
-        .lines()
-        .filter(|line| line.starts_with("| `"))
-        .collect();
+    let rows: Vec<_> = page.lines().filter(|line| line.starts_with("| `")).collect();
     let is_explained = |key: &String| {
         let name = format!("`{key}`");
-        let explains = |row: &&str| {
-            row.split(" | ")
-                .next()
-                .is_some_and(|cell| cell.contains(&name))
-        };
+        let explains =
+            |row: &&str| row.split(" | ").next().is_some_and(|cell| cell.contains(&name));
         key == "format" || rows.iter().any(explains)
     };
     let missing: Vec<_> = keys.iter().filter(|key| !is_explained(key)).collect();

@@ -17,29 +17,17 @@ fn paper() -> Result<Scenario, FileError> {
 #[test]
 fn the_path_is_four_laps_in_1248_seconds() {
     let path = paper().unwrap().path;
-    assert!(
-        (path.duration() - 1248.0).abs() < 1e-9,
-        "{}",
-        path.duration()
-    );
+    assert!((path.duration() - 1248.0).abs() < 1e-9, "{}", path.duration());
     assert!((path.length() - 480.0).abs() < 1e-9);
     assert!(path.is_closed());
 
-    let start = PathPose {
-        x: 0.0,
-        y: 0.0,
-        heading: FRAC_PI_2,
-    };
+    let start = PathPose { x: 0.0, y: 0.0, heading: FRAC_PI_2 };
     assert_eq!(path.pose_at(0.0), start);
     assert_eq!(path.pose_at(1248.0), start);
     assert_eq!(path.pose_at(path.duration()), start);
 
     let is_straight = |movement| matches!(movement, Movement::Straight(_));
-    let straights = path
-        .legs()
-        .iter()
-        .filter(|leg| is_straight(leg.movement))
-        .count();
+    let straights = path.legs().iter().filter(|leg| is_straight(leg.movement)).count();
     assert_eq!((straights, path.legs().len()), (16, 32));
     for turn in path.legs().iter().filter(|leg| !is_straight(leg.movement)) {
         assert!(matches!(turn.movement, Movement::Turn(by) if (by - FRAC_PI_2).abs() < 1e-15));
@@ -71,11 +59,8 @@ fn the_path_is_the_rectangle_left_round() {
 #[test]
 fn the_walls_are_two_rectangles() {
     let floor = paper().unwrap().floor;
-    let mut found: Vec<_> = floor
-        .named_walls()
-        .iter()
-        .map(|wall| (wall.name(), [wall.from(), wall.to()]))
-        .collect();
+    let mut found: Vec<_> =
+        floor.named_walls().iter().map(|wall| (wall.name(), [wall.from(), wall.to()])).collect();
     for (_, ends) in &mut found {
         ends.sort_by(|a, b| a.partial_cmp(b).unwrap());
     }
@@ -95,10 +80,7 @@ fn the_walls_are_two_rectangles() {
     assert_eq!(walls.len(), 8);
     for (wall, named) in walls.iter().zip(floor.named_walls()) {
         let [x, y] = named.from();
-        assert_eq!(
-            (f64::from(wall.from().x.0), f64::from(wall.from().y.0)),
-            (x, y)
-        );
+        assert_eq!((f64::from(wall.from().x.0), f64::from(wall.from().y.0)), (x, y));
     }
 }
 
@@ -120,10 +102,7 @@ fn the_robot_is_that_of_the_paper() {
             cone: Radians(std::f32::consts::PI / 12.0),
             min_range: Metres(0.05),
             max_range: Metres(10.0),
-            noise: RangeNoise {
-                floor: Metres(0.0024),
-                per_metre: 0.0,
-            },
+            noise: RangeNoise { floor: Metres(0.0024), per_metre: 0.0 },
         },
         prior: CalibrationPrior {
             scale_right: 0.01,
@@ -131,10 +110,7 @@ fn the_robot_is_that_of_the_paper() {
             track_width: Metres(0.01),
             range_scale: 0.0,
         },
-        trust: Trust {
-            gate: 5.0,
-            confidence: 3.0,
-        },
+        trust: Trust { gate: 5.0, confidence: 3.0 },
         policy: Policy::Nearest,
     };
     assert_eq!(robot.config, config);
@@ -147,14 +123,7 @@ fn the_robot_is_that_of_the_paper() {
 fn start_truth_and_runs_are_those_of_the_paper() {
     let paper = paper().unwrap();
     assert_eq!(paper.name, "paper");
-    assert_eq!(
-        paper.start,
-        Start {
-            position: 0.001,
-            heading: 0.001,
-            drawn: true
-        }
-    );
+    assert_eq!(paper.start, Start { position: 0.001, heading: 0.001, drawn: true });
     let truth = Truth {
         track_width: 0.3488,
         scale_right: -0.0065,

@@ -9,13 +9,7 @@ use sonarfix_map::{Motion, Movement, Path, PathError, PathPlan, PathPose};
 const ROUNDING: f64 = 1e-9;
 
 fn plan(corners: &[[f64; 2]]) -> PathPlan {
-    PathPlan {
-        start: [0.0, 0.0],
-        corners: corners.to_vec(),
-        laps: 1,
-        speed: 0.5,
-        turn_rate: 0.25,
-    }
+    PathPlan { start: [0.0, 0.0], corners: corners.to_vec(), laps: 1, speed: 0.5, turn_rate: 0.25 }
 }
 
 /// The difference of two headings, the short way round.
@@ -43,11 +37,7 @@ fn a_leg_is_driven_then_turned_after() {
     let path = Path::new(plan(&[[2.0, 0.0], [2.0, -1.0]])).unwrap();
     assert!(!path.is_closed());
     let movements: Vec<_> = path.legs().iter().map(|leg| leg.movement).collect();
-    let expected = [
-        Movement::Straight(2.0),
-        Movement::Turn(-FRAC_PI_2),
-        Movement::Straight(1.0),
-    ];
+    let expected = [Movement::Straight(2.0), Movement::Turn(-FRAC_PI_2), Movement::Straight(1.0)];
     assert_eq!(movements, expected);
     let turned_at = 4.0 + FRAC_PI_2 / 0.25;
     let cases = [
@@ -63,10 +53,7 @@ fn a_leg_is_driven_then_turned_after() {
     ];
     for (time, [x, y, heading]) in cases {
         let pose = path.pose_at(time);
-        assert!(
-            is_near(pose, PathPose { x, y, heading }, ROUNDING),
-            "{time}: {pose:?}"
-        );
+        assert!(is_near(pose, PathPose { x, y, heading }, ROUNDING), "{time}: {pose:?}");
     }
     assert!((path.duration() - turned_at - 2.0).abs() < ROUNDING);
     assert!((path.length() - 3.0).abs() < ROUNDING);
@@ -87,10 +74,7 @@ fn a_turn_about_is_to_the_left_whatever_the_direction() {
             })
             .collect();
         assert_eq!(turns.len(), 2, "{step}°");
-        assert!(
-            turns.iter().all(|by| (by - PI).abs() < ROUNDING),
-            "{step}°: {turns:?}"
-        );
+        assert!(turns.iter().all(|by| (by - PI).abs() < ROUNDING), "{step}°: {turns:?}");
     }
 }
 
@@ -104,86 +88,29 @@ fn corners_in_a_line_are_passed_without_a_turn() {
 fn laps_do_not_add_up_rounding() {
     let triangle = [[7.3, 1.1], [3.7, 9.9], [0.0, 0.0]];
     let one = Path::new(plan(&triangle)).unwrap();
-    let many = Path::new(PathPlan {
-        laps: 1000,
-        ..plan(&triangle)
-    })
-    .unwrap();
+    let many = Path::new(PathPlan { laps: 1000, ..plan(&triangle) }).unwrap();
     assert_eq!(many.legs().len(), 1000 * one.legs().len());
     assert_eq!(many.pose_at(many.duration()), many.pose_at(0.0));
-    assert_eq!(
-        many.legs().last().unwrap().movement,
-        one.legs().last().unwrap().movement
-    );
+    assert_eq!(many.legs().last().unwrap().movement, one.legs().last().unwrap().movement);
 }
 
 #[test]
 fn what_is_not_a_path_is_refused() {
     let good = plan(&[[1.0, 0.0], [1.0, 1.0]]);
-    let with_corners = |corners: &[[f64; 2]]| PathPlan {
-        corners: corners.to_vec(),
-        ..good.clone()
-    };
+    let with_corners =
+        |corners: &[[f64; 2]]| PathPlan { corners: corners.to_vec(), ..good.clone() };
     let cases = [
-        (
-            PathPlan {
-                start: [f64::NAN, 0.0],
-                ..good.clone()
-            },
-            PathError::Start,
-        ),
+        (PathPlan { start: [f64::NAN, 0.0], ..good.clone() }, PathError::Start),
         (with_corners(&[]), PathError::NoCorner),
-        (
-            with_corners(&[[1.0, 0.0], [0.0, 1.1e5]]),
-            PathError::Corner(1),
-        ),
+        (with_corners(&[[1.0, 0.0], [0.0, 1.1e5]]), PathError::Corner(1)),
         (with_corners(&[[0.0, 0.0]]), PathError::SameCorner(0)),
-        (
-            with_corners(&[[1.0, 0.0], [1.0, 0.0]]),
-            PathError::SameCorner(1),
-        ),
-        (
-            PathPlan {
-                laps: 0,
-                ..good.clone()
-            },
-            PathError::Laps,
-        ),
-        (
-            PathPlan {
-                laps: 10_001,
-                ..good.clone()
-            },
-            PathError::Laps,
-        ),
-        (
-            PathPlan {
-                laps: 2,
-                ..good.clone()
-            },
-            PathError::OpenLaps,
-        ),
-        (
-            PathPlan {
-                speed: 0.0,
-                ..good.clone()
-            },
-            PathError::Speed,
-        ),
-        (
-            PathPlan {
-                speed: f64::NAN,
-                ..good.clone()
-            },
-            PathError::Speed,
-        ),
-        (
-            PathPlan {
-                turn_rate: f64::INFINITY,
-                ..good.clone()
-            },
-            PathError::TurnRate,
-        ),
+        (with_corners(&[[1.0, 0.0], [1.0, 0.0]]), PathError::SameCorner(1)),
+        (PathPlan { laps: 0, ..good.clone() }, PathError::Laps),
+        (PathPlan { laps: 10_001, ..good.clone() }, PathError::Laps),
+        (PathPlan { laps: 2, ..good.clone() }, PathError::OpenLaps),
+        (PathPlan { speed: 0.0, ..good.clone() }, PathError::Speed),
+        (PathPlan { speed: f64::NAN, ..good.clone() }, PathError::Speed),
+        (PathPlan { turn_rate: f64::INFINITY, ..good.clone() }, PathError::TurnRate),
     ];
     for (plan, error) in cases {
         assert_eq!(Path::new(plan), Err(error));
@@ -204,14 +131,7 @@ fn any_path() -> impl Strategy<Value = Path> {
                 corners.push(start);
             }
             let laps = if closed { laps } else { 1 };
-            Path::new(PathPlan {
-                start,
-                corners,
-                laps,
-                speed,
-                turn_rate,
-            })
-            .ok()
+            Path::new(PathPlan { start, corners, laps, speed, turn_rate }).ok()
         },
     )
 }
