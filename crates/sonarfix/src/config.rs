@@ -4,7 +4,6 @@
 //! [`Config::check`] refuses NaN and infinity in every field;
 //! [`Localizer::new`](crate::localizer::Localizer::new) calls it.
 
-use crate::aim::Policy;
 use crate::motion::Drive;
 use crate::pose::Point;
 use crate::range::RangeNoise;
@@ -54,6 +53,16 @@ pub struct Trust {
     /// A wall counts as one to look at only if it stays so when the pose is wrong by this many of
     /// its standard deviations.
     pub confidence: f32,
+}
+
+/// How the wall is chosen among those that count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Policy {
+    /// The nearest: the paper's choice, because a sonar's noise grows with range.
+    Nearest,
+    /// The one whose range lowers the variance of the position most.
+    Informative,
 }
 
 /// The configuration of a localizer.
