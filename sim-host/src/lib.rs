@@ -14,6 +14,7 @@ pub mod odometry;
 pub mod plant;
 pub mod report;
 pub mod simulate;
+pub mod sonar_model;
 pub mod statistics;
 pub mod trace;
 pub mod trace_csv;

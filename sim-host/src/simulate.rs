@@ -19,6 +19,7 @@ use crate::odometry::DeadReckoning;
 use crate::plant::Plant;
 use crate::statistics::{NisSum, RunResult};
 use crate::trace::{Recorder, Tick, Trace};
+use crate::world::sensor::SensorModel;
 use crate::world::{Ping, World};
 
 /// A scenario made ready to run any number of times.
@@ -29,6 +30,7 @@ pub struct Simulation {
     walls: Vec<Wall>,
     lines: Vec<Line>,
     world: World,
+    sensor: SensorModel,
     model: Model,
 }
 
@@ -57,6 +59,7 @@ struct Chance {
     start: ChaCha8Rng,
     wheels: ChaCha8Rng,
     ranges: ChaCha8Rng,
+    echoes: ChaCha8Rng,
 }
 
 impl Chance {
@@ -66,7 +69,7 @@ impl Chance {
             rng.set_stream(n);
             rng
         };
-        Self { start: stream(0), wheels: stream(1), ranges: stream(2) }
+        Self { start: stream(0), wheels: stream(1), ranges: stream(2), echoes: stream(3) }
     }
 }
 
@@ -78,8 +81,9 @@ impl Simulation {
         let line = |wall: &NamedWall| Line::through(wall.from(), wall.to());
         let lines = scenario.floor.named_walls().iter().map(line).collect();
         let world = World::new(&scenario.floor);
+        let sensor = SensorModel::ideal(&scenario);
         let model = Model::of(&scenario.robot.config);
-        Self { scenario, walls, lines, world, model }
+        Self { scenario, walls, lines, world, sensor, model }
     }
 
     /// A trace of this scenario with nothing in it yet.
@@ -205,19 +209,15 @@ impl<'a> Run<'a> {
     }
 
     fn ping(&mut self, from: [f64; 2], heading: f64, aim: &Aim) -> Option<f64> {
-        let truth = &self.simulation.scenario.truth;
-        let config = &self.simulation.scenario.robot.config.sonar;
-        let echo = self.simulation.world.first_echo(&Ping {
-            from,
+        let Simulation { world, sensor, .. } = self.simulation;
+        let ping = Ping {
+            time: self.time(),
+            // This sonar's sound takes no time.
+            sonar_after: &|_| from,
             direction: angle::wrap(heading + f64::from(aim.bearing.0)),
-            cone: truth.cone,
-            reach: (config.min_range.0.into(), config.max_range.0.into()),
-        });
-        // Drawn whether or not an echo came, so that runs stay comparable ping by ping.
-        let normal: f64 = self.chance.ranges.sample(StandardNormal);
-        let distance = echo?.distance;
-        let sigma = truth.range_noise.hypot(truth.range_noise_per_metre * distance);
-        Some((1.0 + truth.range_scale) * distance + sigma * normal)
+        };
+        let Chance { ranges, echoes, .. } = &mut self.chance;
+        Some(world.echo(&ping, sensor, ranges, echoes)?.range)
     }
 
     fn account(&mut self, aim: &Aim, fix: &Fix) {

@@ -3,6 +3,7 @@
 mod bound;
 mod paper;
 mod run;
+mod sonar_model;
 mod table;
 
 use clap::{Parser, Subcommand};
@@ -23,6 +24,8 @@ enum Command {
     Run(run::Args),
     /// Prints how well any estimator could know the robot's state, over time.
     Bound(bound::Args),
+    /// Prints how the simulated NXT sonar compares with recorded sweeps, as markdown.
+    SonarModel(sonar_model::Args),
 }
 
 impl Cli {
@@ -35,6 +38,7 @@ impl Cli {
             Command::Paper(args) => paper::execute(&args),
             Command::Run(args) => run::execute(&args),
             Command::Bound(args) => bound::execute(&args),
+            Command::SonarModel(args) => sonar_model::execute(&args),
         }
     }
 }
