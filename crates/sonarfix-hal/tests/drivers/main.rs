@@ -6,6 +6,7 @@
 )]
 
 mod pulse;
+mod quadrature;
 mod servo;
 mod srf;
 
