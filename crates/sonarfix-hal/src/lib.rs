@@ -19,6 +19,7 @@
 //! the left.
 //!
 //! # Features
+//! - `async`: the same drivers behind the waits of `embedded-hal-async` (module `asynch`).
 //! - `defmt`: derives `defmt::Format` for the public types that hold data.
 
 #![no_std]
@@ -27,6 +28,8 @@
 #[cfg(test)]
 extern crate std;
 
+#[cfg(feature = "async")]
+pub mod asynch;
 pub mod encoder;
 pub mod ranger;
 pub mod robot;

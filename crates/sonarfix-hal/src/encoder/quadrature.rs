@@ -123,6 +123,12 @@ where
         Ok(())
     }
 
+    /// The pins, to wait for their edges.
+    #[cfg(feature = "async")]
+    pub(crate) fn pins(&mut self) -> (&mut A, &mut B) {
+        (&mut self.a, &mut self.b)
+    }
+
     /// Gives the pins back.
     pub fn release(self) -> (A, B) {
         (self.a, self.b)

@@ -30,6 +30,12 @@ impl<P: InputPin> Polled<P> {
         }
     }
 
+    /// The pin and the level it had last, to wait for its edges.
+    #[cfg(feature = "async")]
+    pub(crate) fn pin(&mut self) -> (&mut P, bool) {
+        (&mut self.pin, self.level)
+    }
+
     /// Gives the pin back.
     pub fn release(self) -> P {
         self.pin

@@ -208,6 +208,12 @@ impl<T: OutputPin, L: EchoLine> PulseRanger<T, L> {
         &self.timing
     }
 
+    /// The echo line, to wait for its edges.
+    #[cfg(feature = "async")]
+    pub(crate) fn line(&mut self) -> &mut L {
+        &mut self.line
+    }
+
     /// Gives pin and line back.
     pub fn release(self) -> (T, L) {
         (self.trigger, self.line)

@@ -5,6 +5,8 @@
     reason = "microseconds below a second are exact in f32"
 )]
 
+#[cfg(feature = "async")]
+mod asynch;
 mod pulse;
 mod quadrature;
 mod servo;
