@@ -120,13 +120,13 @@ where
 
 /// Runs the loop, for ever: polls it every `step` while a ping is in flight and sleeps until
 /// something is due otherwise. `tell` gets every report that says anything.
-pub async fn run(
-    robot: &mut Robot<'_>,
+pub async fn run<'m>(
+    robot: &mut Robot<'m>,
     hardware: &mut impl Hardware,
     clock: &impl Clock,
     delay: &mut impl DelayNs,
     step: Duration,
-    mut tell: impl FnMut(&Robot<'_>, Report),
+    mut tell: impl FnMut(&Robot<'m>, Report),
 ) -> Infallible {
     loop {
         let report = robot.poll(clock.now(), hardware);

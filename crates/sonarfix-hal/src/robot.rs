@@ -20,8 +20,8 @@
 //! wheels' position at the reflection is interpolated between the two (their mean, if the echo
 //! is taken as it is heard), rounded to half a tick; the localizer is told the travel up to
 //! there, then the range, and with the next tick the rest. A tick that falls due while the sonar
-//! listens is held back until the ping is over, a few tens of milliseconds at most: so time never
-//! runs backwards for the localizer, and nothing has to be undone.
+//! listens is held back until the ping is over (32 ms with an HC-SR04, 65 ms with an SRF08): so
+//! time never runs backwards for the localizer, and nothing has to be undone.
 //!
 //! # Nothing lost
 //! The ledger of ticks is kept in whole half ticks. However polls are spread and steps are cut,
@@ -130,7 +130,7 @@ pub struct Robot<'m> {
     /// The dots of [`Rhythm::Every`]; unused with the other rhythm.
     looks: Schedule,
     cycle: Cycle,
-    /// The latest time it was polled with.
+    /// The time of the poll before.
     time: Instant,
     faults: Faults,
 }
@@ -177,12 +177,12 @@ impl<'m> Robot<'m> {
         if now < self.time {
             report.faults.clock = 1;
         } else {
-            self.time = now;
             self.odometer.begin(now, hardware, &mut report.faults);
             self.hear(now, hardware, &mut report);
             self.tick(now, hardware, &mut report);
             self.look(now, hardware, &mut report);
             self.ping(now, hardware, &mut report);
+            self.time = now;
         }
         self.faults = self.faults.plus(report.faults);
         report
@@ -281,15 +281,15 @@ impl<'m> Robot<'m> {
         let Some(due) = self.ticks.take(now) else {
             return;
         };
-        let lateness = since(now, due.due);
-        let held = report.heard.is_some();
-        let is_late = due.skipped > 0 || (lateness > self.settings.tolerance && !held);
-        report.faults.deadlines += u32::from(is_late);
+        // Up to the poll before, it was the sonar that held it back; from then on it is late.
+        let held = self.time >= due.due;
+        let late = since(now, due.due.max(self.time));
+        report.faults.deadlines += u32::from(late > self.settings.tolerance);
         let reading = self.odometer.read(now, hardware, &mut report.faults);
         let step = reading.map(|reading| self.advance(now, reading.position, &mut report.faults));
         report.tick = Some(Tick {
             step,
-            lateness,
+            lateness: since(now, due.due),
             held,
             skipped: due.skipped,
         });

@@ -26,7 +26,8 @@ pub struct Faults {
     pub ranger: u32,
     /// Steps of the wheels that the localizer could not believe, and that were written off.
     pub travel: u32,
-    /// Deadlines of the encoder tick that were missed.
+    /// Encoder ticks that were done late, because the loop was polled late
+    /// ([`Settings::tolerance`](super::Settings::tolerance)).
     pub deadlines: u32,
     /// Polls with a time before that of an earlier one; nothing was done in them.
     pub clock: u32,

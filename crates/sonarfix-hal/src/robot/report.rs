@@ -68,7 +68,8 @@ pub struct Tick {
     pub step: Option<Step>,
     /// How long after it was due it was done.
     pub lateness: Duration,
-    /// Whether it was due while the sonar listened, and so was held back on purpose.
+    /// Whether it would have been done earlier, had the sonar not listened. It is late only by
+    /// what went by since the poll before this.
     pub held: bool,
     /// Ticks that fell due after it and are not done, for this one covers them.
     pub skipped: u64,

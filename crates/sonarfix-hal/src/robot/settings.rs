@@ -31,7 +31,8 @@ pub enum Stamp {
 pub struct Settings {
     /// Period of the encoder tick.
     pub tick: Duration,
-    /// How late a tick may be done without counting as a missed deadline.
+    /// How late a tick may be done without counting as a missed deadline; the time for which the
+    /// sonar holds it back is not counted.
     pub tolerance: Duration,
     /// How often the sonar looks.
     pub rhythm: Rhythm,

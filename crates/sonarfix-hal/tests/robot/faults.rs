@@ -93,6 +93,29 @@ fn a_counter_that_cannot_be_read_brings_its_travel_later() {
 }
 
 #[test]
+fn a_counter_dead_at_first_begins_both_wheels_when_it_wakes() {
+    let walls = walls();
+    let world = World::new(SLOW, TICK, 0);
+    world.broken.set(Broken {
+        right_counter: true,
+        ..Broken::default()
+    });
+    let mut robot = robot(&walls, TICK, settings());
+    let mut pins = pins(&world, Pace::SG90);
+    run(&world, &mut robot, &mut pins, millis(0, 1_000));
+    world.broken.set(Broken::default());
+    run(&world, &mut robot, &mut pins, millis(1_000, 1_201));
+    // Not the left wheel's first second without the right one's: that would be a turn.
+    let pose = robot.localizer().pose();
+    assert!(pose.heading.radians().abs().0 < 1e-6, "{pose:?}");
+    let counted = (world.ticks(1_200_000) - world.ticks(1_000_000)) as f64 * f64::from(TICK);
+    assert!(
+        counted > 0.0 && (f64::from(pose.x.0) - counted).abs() < 1e-5,
+        "{pose:?}"
+    );
+}
+
+#[test]
 fn a_counter_that_jumps_is_written_off_once() {
     // Half a metre within 100 ms: its chip was reset, or it lies.
     let (reports, faults, world) = three_seconds(Broken {

@@ -7,6 +7,8 @@
     reason = "a few seconds and a few metres fit into any of these types"
 )]
 
+#[cfg(feature = "async")]
+mod asynch;
 mod faults;
 mod properties;
 mod rig;

@@ -27,8 +27,8 @@ fn as_fast_as_possible() -> Settings {
 }
 
 fn any_drive() -> impl Strategy<Value = Drive> {
-    let speed = prop_oneof![-0.25_f64..-0.05, 0.05_f64..0.25];
-    (speed, 0.0_f64..0.05).prop_map(|(speed, sway)| Drive { speed, sway })
+    let speed = prop_oneof![-0.2_f64..-0.05, 0.05_f64..0.2];
+    (speed, 0.0_f64..0.04).prop_map(|(speed, sway)| Drive { speed, sway })
 }
 
 /// Times of polls, µs; told by their number, for there are hundreds.
@@ -41,7 +41,7 @@ impl core::fmt::Debug for Polls {
     }
 }
 
-/// Times of polls from 0 to 3 s: mostly quick ones, some late, one very late; and in the end the
+/// Times of polls for about 4 s: mostly quick ones, some late, some very late; and in the end the
 /// quick ones that let everything come to its end.
 fn any_polls() -> impl Strategy<Value = Polls> {
     let step = prop_oneof![
@@ -58,14 +58,15 @@ fn any_polls() -> impl Strategy<Value = Polls> {
         let mut times: Vec<_> = times.take_while(|&time| time < 3_000_000).collect();
         let last = times.last().map_or(0, |&time| time);
         times.insert(0, 0);
+        // Two very late ones in a row: if the first finds a ping to begin with, the second cannot.
+        let last = last + 480_000;
+        times.extend([last - 240_000, last]);
         times.extend((1..400).map(|step| last + 1_000 * step));
         Polls(times)
     })
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
-
     /// The travel told to the localizer is what the counters counted: no tick lost, none twice,
     /// through their wrap-around, with echoes and without, however the polls jitter.
     #[test]
@@ -194,13 +195,14 @@ proptest! {
                 prop_assert_eq!(due, 100_000 * (dots + 1));
                 dots += 1 + tick.skipped;
                 prop_assert_eq!(dots, now / 100_000);
-                prop_assert!(tick.held || due > before, "{now}: {tick:?}");
-                let late = tick.lateness > Duration::from_ticks(10_000);
-                missed += u32::from(tick.skipped > 0 || late && !tick.held);
+                // Nothing but the sonar keeps a poll from doing what is due.
+                prop_assert_eq!(tick.held, due <= before);
+                prop_assert!(report.heard.is_some() || !tick.held);
+                missed += u32::from(now - due.max(before) > 10_000);
             }
             before = *now;
         }
-        prop_assert!(dots >= 30);
+        prop_assert!(dots >= 30 && missed > 0);
         prop_assert_eq!(robot.faults().deadlines, missed);
         prop_assert!(robot.faults().right == robot.faults().left);
     }
@@ -262,6 +264,33 @@ fn coarse_ticks_are_kept_not_written_off() {
     let counted = world.ticks(now) as f64 * 16.0 * f64::from(TICK);
     let (taken, _) = accounts(&reports[..=last]);
     assert!((taken - counted).abs() < 1e-9, "{taken} of {counted}");
+}
+
+/// Ticks faster than a ping is long are skipped while it is in flight; that is no fault.
+#[test]
+fn a_sonar_that_holds_ticks_back_misses_no_deadline() {
+    let drive = Drive {
+        speed: 0.1,
+        sway: 0.0,
+    };
+    let settings = Settings {
+        tick: Duration::from_ticks(5_000),
+        tolerance: Duration::from_ticks(1_000),
+        ..as_fast_as_possible()
+    };
+    let walls = walls();
+    let world = World::new(drive, TICK, 0);
+    let mut robot = robot(&walls, TICK, settings);
+    let mut pins = pins(&world, FAST);
+    let reports = run(
+        &world,
+        &mut robot,
+        &mut pins,
+        (0..4_000).map(|step| step * 250),
+    );
+    let skipped = reports.iter().filter_map(|(_, report)| report.tick);
+    assert!(skipped.filter(|tick| tick.held && tick.skipped > 0).count() > 10);
+    assert!(robot.faults().is_none(), "{:?}", robot.faults());
 }
 
 #[test]
