@@ -36,6 +36,24 @@ impl<F: Fn() -> Instant> Clock for F {
 /// Pings, and sleeps until the echo line moves. The edges get the time at which the executor
 /// woke this future, so its latency enters the range: 100 µs are 17 mm.
 ///
+/// ```
+/// use embedded_hal::digital::{InputPin, OutputPin};
+/// use embedded_hal_async::{delay::DelayNs, digital::Wait};
+/// use sonarfix::units::Metres;
+/// use sonarfix_hal::asynch::{Clock, ping};
+/// use sonarfix_hal::ranger::{Polled, PulseRanger};
+///
+/// /// How far it is to whatever is ahead, if anything.
+/// async fn clearance<T: OutputPin, P: InputPin + Wait>(
+///     ranger: &mut PulseRanger<T, Polled<P>>,
+///     clock: &impl Clock,
+///     delay: &mut impl DelayNs,
+/// ) -> Option<Metres> {
+///     let outcome = ping(ranger, clock, delay).await.ok()?;
+///     outcome.ok().map(|echo| echo.range)
+/// }
+/// ```
+///
 /// # Errors
 /// [`TriggerError`]; the ping is over.
 pub async fn ping<T: OutputPin, P: InputPin + Wait>(

@@ -193,11 +193,7 @@ impl<'m> Robot<'m> {
     pub fn idle_until(&self, hardware: &mut impl Hardware) -> Option<Instant> {
         let next_of_sonar = match self.cycle {
             Cycle::Idle { look_at } => look_at,
-            Cycle::Turning => {
-                let (settled, ready) =
-                    (hardware.servo().settles_at(), hardware.ranger().ready_at());
-                settled.max(ready)
-            }
+            Cycle::Turning => can_ping_at(hardware),
             Cycle::Listening { .. } => return None,
         };
         Some(next_of_sonar.min(self.ticks.next()))
@@ -324,10 +320,7 @@ impl<'m> Robot<'m> {
             self.rest(now, false);
             return;
         };
-        let ready_at = hardware
-            .servo()
-            .settles_at()
-            .max(hardware.ranger().ready_at());
+        let ready_at = can_ping_at(hardware);
         if now < ready_at {
             return;
         }
@@ -390,6 +383,12 @@ impl<'m> Robot<'m> {
         let limit = fastest + 2.0 * self.odometer.wheels().coarser_tick().0;
         travel.right.abs().0 <= limit && travel.left.abs().0 <= limit
     }
+}
+
+/// When the servo has settled and the last ping's echoes have died away.
+fn can_ping_at(hardware: &mut impl Hardware) -> Instant {
+    let settled_at = hardware.servo().settles_at();
+    settled_at.max(hardware.ranger().ready_at())
 }
 
 /// The echo, if its times lie between the trigger and now.

@@ -54,7 +54,8 @@ pub enum Taken {
     /// The localizer took it.
     Yes,
     /// The localizer refused it, for a reason that is the loop's and not the wheels' (a whole
-    /// tick in a time so short that it looks too fast). It comes again as part of the next step.
+    /// tick in a time so short that it looks too fast). It comes again as part of the next step;
+    /// a range that came with it met the pose before it, which is that much behind.
     Kept(OdometryError),
     /// The localizer refused it, and no wheel can have rolled so: it is given up.
     WrittenOff(OdometryError),

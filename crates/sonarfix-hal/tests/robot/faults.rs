@@ -225,6 +225,60 @@ fn silence_is_heard_and_is_no_fault() {
     assert!(faults.is_none(), "{faults:?}");
 }
 
+/// While it spins at 2.5 rad/s, a servo that needs a quarter of a second always comes too late to
+/// meet a wall squarely.
+#[test]
+fn a_robot_that_spins_aims_again_and_pings_nothing_in_vain() {
+    let walls = walls();
+    let fast = Drive {
+        speed: 0.2,
+        sway: 0.0,
+    };
+    let world = World::new(fast, TICK, 0);
+    world.broken.set(Broken {
+        spin: true,
+        deaf: true,
+        ..Broken::default()
+    });
+    let rhythm = Rhythm::AsFastAsPossible;
+    let mut robot = robot(
+        &walls,
+        TICK,
+        Settings {
+            rhythm,
+            ..settings()
+        },
+    );
+    let mut pins = pins(&world, Pace::SG90);
+    let reports = run(&world, &mut robot, &mut pins, millis(0, 5_001));
+    let aims = reports.iter().filter(|(_, report)| report.aimed.is_some());
+    let aims: Vec<_> = aims.map(|&(time, _)| time).collect();
+    // At most once a tick, for nothing is new between ticks; and again and again.
+    assert!(
+        aims.windows(2).all(|pair| pair[1] - pair[0] >= 99_000),
+        "{aims:?}"
+    );
+    assert!(aims.len() >= 10, "{aims:?}");
+    // By chance another wall may come square; then it is that one which is pinged. The cone is
+    // 15°, and the heading known is that of the last tick.
+    let tolerance = 0.262 + 0.1 * 2.5;
+    for (time, report) in &reports {
+        let Some(aim) = report.pinged else { continue };
+        let heading = 2.0 * world.x(*time) / 0.16;
+        let direction = core::f64::consts::FRAC_PI_2 * (f64::from(aim.wall.0) - 1.0);
+        let duties = world.duties.borrow();
+        let sent = duties.iter().rfind(|(sent, _)| sent <= time).unwrap();
+        let off = heading + world.degrees(sent.1).to_radians() - direction;
+        let off = off.sin().atan2(off.cos());
+        assert!(off.abs() < tolerance, "{off} at {time}");
+    }
+    assert!(
+        world.triggers.borrow().len() <= aims.len() / 3,
+        "{:?}",
+        world.triggers.borrow()
+    );
+}
+
 #[test]
 fn a_clock_that_runs_backwards_is_counted_and_harmless() {
     let walls = walls();

@@ -54,6 +54,9 @@ pub struct Broken {
     pub echo: bool,
     /// The ranger hears nothing: its pulse lasts 38 ms.
     pub deaf: bool,
+    /// The left wheel rolls backwards: the robot spins where it is. Its echoes are not those of a
+    /// spinning robot, so it should be deaf as well.
+    pub spin: bool,
     /// The right counter jumps by so many ticks, and stays there.
     pub jump: u32,
 }
@@ -192,6 +195,12 @@ impl Counter for WheelCounter<'_> {
             return Err("no word from the right counter");
         }
         let ticks = self.0.ticks(now.get()) as u32;
+        let backwards = !is_right && broken.spin;
+        let ticks = if backwards {
+            ticks.wrapping_neg()
+        } else {
+            ticks
+        };
         let jump = if is_right { broken.jump } else { 0 };
         Ok(ticks.wrapping_add(*first_count).wrapping_add(jump))
     }
