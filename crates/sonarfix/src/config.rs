@@ -178,7 +178,8 @@ impl Config {
 
     fn check_drive(&self) -> Result<(), ConfigError> {
         positive("drive.track_width", self.drive.track_width.0)?;
-        not_negative("drive.wheel_noise", self.drive.wheel_noise.0.0)?;
+        // Without any, P would be tied ever more sharply, and then by rounding alone.
+        positive("drive.wheel_noise", self.drive.wheel_noise.0.0)?;
         not_negative("drive.scale_walk", self.drive.scale_walk.0)?;
         not_negative("drive.track_width_walk", self.drive.track_width_walk.0.0)?;
         positive("max_wheel_speed", self.max_wheel_speed.0)

@@ -137,6 +137,19 @@ impl Covariance {
 }
 
 impl Row {
+    /// The sum of this and `factor` times `other`.
+    pub fn plus_scaled(self, other: &Self, factor: f32) -> Self {
+        Self {
+            x: self.x + factor * other.x,
+            y: self.y + factor * other.y,
+            h: self.h + factor * other.h,
+            c: self.c + factor * other.c,
+            d: self.d + factor * other.d,
+            w: self.w + factor * other.w,
+            k: self.k + factor * other.k,
+        }
+    }
+
     /// Every number times `factor`.
     pub fn scaled(self, factor: f32) -> Self {
         Self {
