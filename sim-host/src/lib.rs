@@ -11,6 +11,7 @@ pub mod dense;
 pub mod monte_carlo;
 pub mod observe;
 pub mod odometry;
+pub mod pins;
 pub mod plant;
 pub mod report;
 pub mod simulate;

@@ -86,6 +86,7 @@ fn fix(time: f64, outcome: Outcome, range: Option<f64>, reason: &str) -> FixReco
         direction: FRAC_PI_2,
         bearing: FRAC_PI_2,
         range,
+        met: None,
         outcome,
         reason: reason.into(),
         innovation: range.map(|range| range - 1.0),
