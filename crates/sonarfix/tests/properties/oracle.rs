@@ -134,8 +134,10 @@ impl Robot {
         for (axis, along) in [(X, 1.0), (Y, 1.0), (HEADING, 0.0)] {
             let by_heading = if axis == HEADING { 1.0 } else { advance };
             f[(axis, HEADING)] = by_heading;
-            f[(axis, SCALE_RIGHT)] = along * right / 2.0 + by_heading * turn[0];
-            f[(axis, SCALE_LEFT)] = along * left / 2.0 + by_heading * turn[1];
+            // The wheels' errors are held as mean and difference: each takes part in both.
+            let by_scale = along * advance + by_heading * (turn[0] + turn[1]);
+            f[(axis, SCALE_RIGHT)] = by_scale;
+            f[(axis, SCALE_LEFT)] = by_scale;
             f[(axis, TRACK_WIDTH)] = by_heading * turn[2];
         }
         let mut g = Wheels::zeros();
@@ -146,8 +148,19 @@ impl Robot {
         let per_metre = self.wheel_noise * self.wheel_noise;
         let wheels = SMatrix::<f64, 2, 2>::from_diagonal(&(travel.abs() * per_metre));
         let rolled = self.noise(state, travel);
-        f * p.abs() * f.transpose() + g * wheels * g.transpose() + rolled.abs()
+        f * size_by_both_wheels(&p.abs()) * f.transpose()
+            + g * wheels * g.transpose()
+            + rolled.abs()
     }
+}
+
+/// The size in which entries are rounded when the wheels' scale errors are held as mean and
+/// difference: what belongs to one wheel, in the size of both.
+pub fn size_by_both_wheels(size: &Matrix) -> Matrix {
+    let mut both = Matrix::identity();
+    both[(SCALE_RIGHT, SCALE_LEFT)] = 1.0;
+    both[(SCALE_LEFT, SCALE_RIGHT)] = 1.0;
+    both * size * both.transpose()
 }
 
 /// A wall by its two ends, and the sonar's place on the robot.
