@@ -1,5 +1,6 @@
 //! Prediction and correction against dense `f64`.
 
+use nalgebra::SVector;
 use proptest::prelude::*;
 use sonarfix::motion::WheelTravel;
 use sonarfix::pose::Point;
@@ -7,8 +8,8 @@ use sonarfix::range::ExpectedRange;
 use sonarfix::units::{Metres, SquareMetres};
 
 use crate::oracle::{
-    HEADING, Matrix, ROUNDING, Robot, SCALE_LEFT, SCALE_RIGHT, Vector, bearable, corrected,
-    covariance_of, jacobian_of, size_by_both_wheels, state_of, travel_of, turn_between,
+    HEADING, Matrix, ROUNDING, Robot, SCALE_LEFT, SCALE_RIGHT, TRACK_WIDTH, Vector, bearable,
+    corrected, covariance_of, jacobian_of, size_by_both_wheels, state_of, travel_of, turn_between,
     variance_along,
 };
 use crate::strategies::{any_ekf, any_filter, any_mount, any_sight, any_travel, bits};
@@ -44,7 +45,12 @@ proptest! {
         prop_assert_eq!(calibration(&state_of(&ekf)), calibration(&state));
 
         let exact = robot.predicted(&p, &state, &travel);
-        let size = robot.size_of_terms(&p, &state, &travel);
+        let mut size = robot.size_of_terms(&p, &state, &travel);
+        // What earlier additions to these variances rounded away, when they may have been as large
+        // as any prior, is added with this one.
+        for i in [SCALE_RIGHT, SCALE_LEFT, TRACK_WIDTH] {
+            size[(i, i)] += 0.03 * 0.03;
+        }
         let off = roundings(&covariance_of(&ekf), &exact, &size);
         prop_assert!(off <= 48.0, "off by {off} roundings");
     }
@@ -122,7 +128,7 @@ proptest! {
     /// Noise belongs to the way, not to the number of steps (so not to time): a way cut in a
     /// hundred adds what it adds in one, but for the rounding of a hundred sums.
     #[test]
-    fn noise_grows_with_distance_not_with_steps((_, ekf) in any_filter(), s in 0.1_f32..1.0, back in any::<bool>()) {
+    fn noise_grows_with_distance_not_with_steps((drive, ekf) in any_filter(), s in 0.1_f32..1.0, back in any::<bool>()) {
         let s = if back { -s } else { s };
         let (mut once, mut often) = (ekf, ekf);
         once.predict(WheelTravel::new(s, s)).unwrap();
@@ -131,9 +137,13 @@ proptest! {
         }
         // Between the wheels' noise and its turning of the way, ways of 1 cm and of 1 m differ in
         // x and y to second order; in heading and calibration they do not.
-        for i in [2, 3, 4, 5] {
+        let travel = SVector::<f64, 2>::new(s.into(), s.into());
+        let size = Robot::from(&drive).size_of_terms(&covariance_of(&ekf), &state_of(&ekf), &travel);
+        let size = size_by_both_wheels(&size);
+        for i in [HEADING, SCALE_RIGHT, SCALE_LEFT, TRACK_WIDTH] {
             let (one, many) = (covariance_of(&once)[(i, i)], covariance_of(&often)[(i, i)]);
-            prop_assert!((many / one - 1.0).abs() < 2e-3, "state {i}: {many} in steps, {one} at once");
+            let allowed = 2e-3 * one + 200.0 * ROUNDING * size[(i, i)];
+            prop_assert!((many - one).abs() < allowed, "state {i}: {many} in steps, {one} at once");
         }
     }
 }
