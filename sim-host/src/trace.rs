@@ -5,6 +5,8 @@
 //! frame is that of the scenario.
 
 use serde::Serialize;
+use sonarfix::units::Radians;
+use sonarfix_map::{Floor, NamedWall};
 
 /// A pose in the map frame: metres, metres, radians in (−π, π].
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
@@ -61,6 +63,8 @@ pub struct Tick {
     pub truth: Option<Truth>,
     /// The filter's estimate after everything that happened up to `time`.
     pub estimate: Estimate,
+    /// The bound on each state's standard deviation, in a simulation.
+    pub bound: Option<[f64; 7]>,
     /// The pose by the encoders alone, with the nominal robot.
     pub odometry: Pose,
 }
@@ -124,4 +128,47 @@ pub struct Trace {
     pub ticks: Vec<Tick>,
     /// Every turn of the sonar, in order of time.
     pub fixes: Vec<FixRecord>,
+}
+
+impl Trace {
+    /// A trace on a floor, with nothing in it yet.
+    #[must_use]
+    pub fn of(floor: &Floor, cone: Radians) -> Self {
+        let wall = |w: &NamedWall| Wall {
+            name: w.name.clone(),
+            from: w.from,
+            to: w.to,
+        };
+        let walls = floor.walls.iter().map(wall).collect();
+        Self {
+            walls,
+            cone: cone.0.into(),
+            ..Self::default()
+        }
+    }
+}
+
+/// Whatever wants to see a run as it happens. What is recorded is made only if it is wanted.
+pub trait Recorder {
+    /// An encoder tick is over.
+    fn tick(&mut self, make: impl FnOnce() -> Tick);
+    /// The sonar has had its turn.
+    fn fix(&mut self, make: impl FnOnce() -> FixRecord);
+}
+
+/// Records nothing.
+impl Recorder for () {
+    fn tick(&mut self, _: impl FnOnce() -> Tick) {}
+    fn fix(&mut self, _: impl FnOnce() -> FixRecord) {}
+}
+
+/// Records everything.
+impl Recorder for Trace {
+    fn tick(&mut self, make: impl FnOnce() -> Tick) {
+        self.ticks.push(make());
+    }
+
+    fn fix(&mut self, make: impl FnOnce() -> FixRecord) {
+        self.fixes.push(make());
+    }
 }

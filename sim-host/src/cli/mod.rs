@@ -1,0 +1,46 @@
+//! The command line: what can be asked, and where the answers go.
+
+mod bound;
+mod paper;
+mod run;
+mod table;
+
+use clap::{Parser, Subcommand};
+
+/// Tells a small wheeled robot where it is; here, in simulation and from recordings.
+#[derive(Debug, Parser)]
+#[command(name = "sonarfix", version, about)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Runs the paper's scenario many times and prints its Table 1 beside ours.
+    Paper(paper::Args),
+    /// Runs any scenario.
+    Run(run::Args),
+    /// Prints how well any estimator could know the robot's state, over time.
+    Bound(bound::Args),
+}
+
+impl Cli {
+    /// Does what was asked.
+    ///
+    /// # Errors
+    /// Whatever went wrong, in words for the person who asked.
+    pub fn execute(self) -> anyhow::Result<()> {
+        match self.command {
+            Command::Paper(args) => paper::execute(&args),
+            Command::Run(args) => run::execute(&args),
+            Command::Bound(args) => bound::execute(&args),
+        }
+    }
+}
+
+/// Prints a value as JSON.
+fn print_json(value: &impl serde::Serialize) -> anyhow::Result<()> {
+    println!("{}", serde_json::to_string_pretty(value)?);
+    Ok(())
+}

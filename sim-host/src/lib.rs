@@ -1,0 +1,31 @@
+//! Simulates, measures and replays the Sonarfix localizer on a PC.
+//!
+//! The localizer here is the one that a robot is flashed with; everything around it is simulated.
+//! [`simulate`] runs a scenario once, [`monte_carlo`] many times; [`bound`] is what no estimator
+//! could beat, [`dense`] the textbook filter that the shipped one is compared with.
+
+pub mod angle;
+pub mod bound;
+pub mod cli;
+pub mod dense;
+pub mod monte_carlo;
+pub mod observe;
+pub mod odometry;
+pub mod plant;
+pub mod report;
+pub mod simulate;
+pub mod statistics;
+pub mod trace;
+pub mod trace_csv;
+pub mod world;
+
+/// The names of the filter's states, in its order.
+pub const STATES: [&str; 7] = [
+    "x",
+    "y",
+    "heading",
+    "scale_right",
+    "scale_left",
+    "track_width",
+    "range_scale",
+];

@@ -1,0 +1,123 @@
+//! Reads the core's localizer into the `f64` of traces and statistics.
+
+use nalgebra::{DMatrix, DVector};
+use sonarfix::aim::{Aim, NoAim};
+use sonarfix::ekf::{Ekf, Innovation};
+use sonarfix::localizer::{Fix, Localizer};
+
+use crate::angle;
+use crate::dense::{Matrix, Vector};
+use crate::trace::{Calibration, Estimate, FixRecord, Outcome, Pose};
+
+/// The localizer's estimate.
+#[must_use]
+pub fn estimate(localizer: &Localizer) -> Estimate {
+    let ekf = localizer.filter();
+    let state = ekf.state();
+    let p = covariance(ekf);
+    let nominal = f64::from(localizer.config().drive.track_width.0);
+    Estimate {
+        pose: Pose {
+            x: state.x.into(),
+            y: state.y.into(),
+            heading: state.heading.into(),
+        },
+        calibration: Calibration {
+            scale_right: state.scale_right.into(),
+            scale_left: state.scale_left.into(),
+            track_width: nominal + f64::from(state.track_width_error),
+            range_scale: state.range_scale.into(),
+        },
+        deviation: p.diagonal().map(f64::sqrt).into(),
+        covariance_xy: p[(0, 1)],
+    }
+}
+
+/// The filter's state X̂.
+#[must_use]
+pub fn state(ekf: &Ekf) -> Vector {
+    ekf.state_vector().map(f64::from)
+}
+
+/// The filter's covariance P.
+#[must_use]
+pub fn covariance(ekf: &Ekf) -> Matrix {
+    ekf.covariance().map(f64::from)
+}
+
+/// The error of the filter's state, its heading wrapped.
+#[must_use]
+pub fn error(ekf: &Ekf, truth: &Vector) -> Vector {
+    let mut error = state(ekf) - truth;
+    error[2] = angle::wrap(error[2]);
+    error
+}
+
+/// Normalised estimation error squared, εᵀ P⁻¹ ε, over the states that are estimated (those whose
+/// variance is not zero), and their number. `None` if P is not positive definite.
+#[must_use]
+pub fn nees(error: &Vector, p: &Matrix) -> Option<(f64, usize)> {
+    let estimated: Vec<usize> = (0..7).filter(|&i| p[(i, i)] > 0.0).collect();
+    let n = estimated.len();
+    // Scaled to a correlation matrix first: metres and scale errors differ by ten powers of ten.
+    let deviation = DVector::from_fn(n, |i, _| p[(estimated[i], estimated[i])].sqrt());
+    let correlation = DMatrix::from_fn(n, n, |i, j| {
+        p[(estimated[i], estimated[j])] / (deviation[i] * deviation[j])
+    });
+    let scaled = DVector::from_fn(n, |i, _| error[estimated[i]] / deviation[i]);
+    let solved = correlation.cholesky()?.solve(&scaled);
+    Some((scaled.dot(&solved), n))
+}
+
+/// What a turn of the sonar did and heard, apart from what the filter made of it.
+#[derive(Debug, Clone, Copy)]
+pub struct Look {
+    /// Seconds since the run began.
+    pub time: f64,
+    /// Where the sonar was, metres.
+    pub sonar: [f64; 2],
+    /// The heading against which the bearing was turned, radians.
+    pub heading: f64,
+    /// The range heard, metres.
+    pub range: Option<f64>,
+}
+
+/// The record of a look at a wall, with its outcome.
+#[must_use]
+pub fn fix_record(look: Look, aim: &Aim, fix: &Fix) -> FixRecord {
+    let (outcome, innovation, reason) = match fix {
+        Fix::Accepted(innovation) => (Outcome::Accepted, Some(innovation), String::new()),
+        Fix::Gated(innovation) => (Outcome::Gated, Some(innovation), String::new()),
+        Fix::Refused(refusal) => (Outcome::Refused, None, refusal.to_string()),
+    };
+    let bearing = f64::from(aim.bearing.0);
+    FixRecord {
+        time: look.time,
+        wall: usize::try_from(aim.wall.0).ok(),
+        sonar: look.sonar,
+        direction: angle::wrap(look.heading + bearing),
+        bearing,
+        range: look.range,
+        outcome,
+        reason,
+        innovation: innovation.map(|i: &Innovation| i.value.0.into()),
+        innovation_variance: innovation.map(|i| i.variance.0.into()),
+    }
+}
+
+/// The record of a turn for which there was no wall to look at.
+#[must_use]
+pub fn no_aim_record(look: Look, no_aim: NoAim) -> FixRecord {
+    FixRecord {
+        time: look.time,
+        wall: None,
+        sonar: look.sonar,
+        direction: look.heading,
+        bearing: 0.0,
+        range: None,
+        outcome: Outcome::Refused,
+        reason: no_aim.to_string(),
+        innovation: None,
+        innovation_variance: None,
+    }
+}

@@ -1,0 +1,217 @@
+//! What many runs say together.
+
+use serde::Serialize;
+use sonarfix::health::Verdict;
+
+use crate::STATES;
+use crate::dense::Vector;
+
+/// How many turns of the sonar ended how.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct FixCounts {
+    /// Ranges that corrected the filter.
+    pub accepted: u64,
+    /// Ranges beyond the gate.
+    pub gated: u64,
+    /// Turns without a usable range.
+    pub refused: u64,
+}
+
+impl FixCounts {
+    fn add(&mut self, other: &Self) {
+        self.accepted += other.accepted;
+        self.gated += other.gated;
+        self.refused += other.refused;
+    }
+}
+
+/// Sum of the normalised innovations squared.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct NisSum {
+    sum: f64,
+    count: u64,
+}
+
+impl NisSum {
+    /// Takes one.
+    pub fn add(&mut self, nis: f64) {
+        self.sum += nis;
+        self.count += 1;
+    }
+}
+
+/// Sums of squared errors of x, y and heading along the way.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct PathSum {
+    squares: [f64; 3],
+    ticks: u64,
+}
+
+impl PathSum {
+    /// Takes the error at one tick.
+    pub fn add(&mut self, error: &Vector) {
+        for (sum, e) in self.squares.iter_mut().zip(error.iter()) {
+            *sum += e * e;
+        }
+        self.ticks += 1;
+    }
+}
+
+/// What one run leaves behind.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct RunResult {
+    /// Error of each state at the end.
+    pub error: Vector,
+    /// The bound on each state's variance at the end.
+    pub bound_variance: Vector,
+    /// εᵀ P⁻¹ ε at the end.
+    pub nees: f64,
+    /// How many states that counts.
+    pub estimated_states: usize,
+    /// Of all innovations of the run.
+    pub nis: NisSum,
+    /// Along the way.
+    pub path: PathSum,
+    /// The sonar's turns.
+    pub fixes: FixCounts,
+    /// Whether the robot was lost at the end.
+    pub lost: bool,
+}
+
+/// A robot is lost if it says so, or if it is further off than this: then it is in the wrong
+/// place, or looks the wrong way, for whoever sent it.
+const LOST_POSITION: f64 = 0.5;
+/// Half of the paper's cone: beyond it the sonar no longer meets a wall squarely.
+const LOST_HEADING: f64 = 0.26;
+
+impl RunResult {
+    /// Decides whether the run ended lost.
+    pub fn judge(&mut self, verdict: Verdict) {
+        let e = &self.error;
+        let astray = e[0].hypot(e[1]) > LOST_POSITION || e[2].abs() > LOST_HEADING;
+        self.lost = verdict == Verdict::Lost || astray;
+    }
+}
+
+/// One state over many runs, errors at the end in SI units.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StateSummary {
+    /// One of [`STATES`].
+    pub name: &'static str,
+    /// `m`, `rad` or `1`.
+    pub unit: &'static str,
+    /// Mean error.
+    pub mean_error: f64,
+    /// Standard deviation of the error about its mean.
+    pub std_error: f64,
+    /// Root mean square error.
+    pub rms_error: f64,
+    /// Root mean square of the runs' bounds.
+    pub bound: f64,
+    /// The quotient; `None` where the state is not estimated.
+    pub rms_over_bound: Option<f64>,
+}
+
+/// RMS errors over all ticks of all runs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct PathSummary {
+    /// Metres.
+    pub x: f64,
+    /// Metres.
+    pub y: f64,
+    /// Radians.
+    pub heading: f64,
+}
+
+/// Many runs together.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// How many.
+    pub runs: usize,
+    /// Each state.
+    pub states: Vec<StateSummary>,
+    /// Mean of εᵀ P⁻¹ ε at the end: `nees_states` for a consistent filter.
+    pub nees_mean: f64,
+    /// How many states the NEES counts.
+    pub nees_states: usize,
+    /// Mean of ν²/S over all innovations: 1 for a consistent filter.
+    pub nis_mean: f64,
+    /// Processor time of the runs, all cores together.
+    pub cpu_seconds: f64,
+    /// The sonar's turns, all runs together.
+    pub fixes: FixCounts,
+    /// Runs that ended lost.
+    pub lost_runs: usize,
+    /// Errors along the way.
+    pub rms_path: PathSummary,
+}
+
+const UNITS: [&str; 7] = ["m", "m", "rad", "1", "1", "m", "1"];
+
+impl Summary {
+    /// Sums up runs, in their order, so that the result does not depend on who ran them.
+    #[must_use]
+    pub fn of(results: &[RunResult], cpu_seconds: f64) -> Self {
+        let states = (0..STATES.len())
+            .map(|state| StateSummary::of(state, results))
+            .collect();
+        let mut fixes = FixCounts::default();
+        let (mut nis, mut path) = (NisSum::default(), PathSum::default());
+        for result in results {
+            fixes.add(&result.fixes);
+            nis.sum += result.nis.sum;
+            nis.count += result.nis.count;
+            path.ticks += result.path.ticks;
+            for (sum, squares) in path.squares.iter_mut().zip(result.path.squares) {
+                *sum += squares;
+            }
+        }
+        let rms = path.squares.map(|sum| (sum / as_f64(path.ticks)).sqrt());
+        Self {
+            runs: results.len(),
+            states,
+            nees_mean: mean(results, |result| result.nees),
+            nees_states: results.first().map_or(0, |result| result.estimated_states),
+            nis_mean: nis.sum / as_f64(nis.count),
+            cpu_seconds,
+            fixes,
+            lost_runs: results.iter().filter(|result| result.lost).count(),
+            rms_path: PathSummary {
+                x: rms[0],
+                y: rms[1],
+                heading: rms[2],
+            },
+        }
+    }
+}
+
+impl StateSummary {
+    fn of(state: usize, results: &[RunResult]) -> Self {
+        let mean_error = mean(results, |result| result.error[state]);
+        let mean_square = mean(results, |result| result.error[state].powi(2));
+        let spread = mean(results, |result| (result.error[state] - mean_error).powi(2));
+        // Of a sample: n − 1.
+        let n = as_f64(results.len() as u64);
+        let std_error = (spread * n / (n - 1.0)).sqrt();
+        let bound = mean(results, |result| result.bound_variance[state]).sqrt();
+        let rms_error = mean_square.sqrt();
+        Self {
+            name: STATES[state],
+            unit: UNITS[state],
+            mean_error,
+            std_error: if results.len() > 1 { std_error } else { 0.0 },
+            rms_error,
+            bound,
+            rms_over_bound: (bound > 0.0).then(|| rms_error / bound),
+        }
+    }
+}
+
+fn mean(results: &[RunResult], of: impl Fn(&RunResult) -> f64) -> f64 {
+    results.iter().map(of).sum::<f64>() / as_f64(results.len() as u64)
+}
+
+#[expect(clippy::cast_precision_loss, reason = "counts stay below 2^53")]
+fn as_f64(count: u64) -> f64 {
+    count as f64
+}
