@@ -1,0 +1,207 @@
+//! The robot: what its builder knows.
+
+use std::path::Path;
+
+use sonarfix::aim::Policy;
+use sonarfix::config::{CalibrationPrior, Config, ConfigError, Sonar, Trust};
+use sonarfix::motion::{Drive, WheelTravel};
+use sonarfix::pose::Point;
+use sonarfix::range::RangeNoise;
+use sonarfix::units::{Duration, Metres, MetresPerSecond, PerRootMetre, Radians};
+
+use crate::document::{Document, Node, Table};
+use crate::error::FileError;
+use crate::quantity::{
+    ANGLE, Dimension, LENGTH, LENGTH_PER_LENGTH, LENGTH_WALK, SCALE_WALK, SPEED, TIME,
+};
+use crate::{file, single};
+
+const TABLES: [&str; 5] = ["drive", "sonar", "prior", "trust", "schedule"];
+
+const DRIVE_KEYS: [&str; 7] = [
+    "track_width",
+    "wheel_noise",
+    "scale_walk",
+    "track_width_walk",
+    "max_wheel_speed",
+    "encoder_period",
+    "travel_per_tick",
+];
+
+const SONAR_KEYS: [&str; 8] = [
+    "mount",
+    "servo",
+    "cone",
+    "min_range",
+    "max_range",
+    "noise",
+    "noise_per_metre",
+    "fix_period",
+];
+
+/// A robot.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Robot {
+    /// The localizer's configuration; it has passed [`Config::check`].
+    pub config: Config,
+    /// From one reading of the encoders to the next.
+    pub encoder_period: Duration,
+    /// From one range to the next.
+    pub fix_period: Duration,
+    /// How far each wheel rolls from one encoder tick to the next, negative where the encoder
+    /// counts down as the robot drives ahead.
+    pub travel_per_tick: Option<WheelTravel>,
+}
+
+impl Robot {
+    /// Reads a robot file.
+    ///
+    /// # Errors
+    /// [`FileError`] with the first thing that is wrong.
+    pub fn read(path: &Path) -> Result<Self, FileError> {
+        Self::parse(&file::read(path)?, &file::name(path))
+    }
+
+    /// Reads the text of a robot file that errors call `file_name`.
+    ///
+    /// # Errors
+    /// [`FileError`] with the first thing that is wrong.
+    pub fn parse(text: &str, file_name: &str) -> Result<Self, FileError> {
+        let document = Document::parse(text, file_name)?;
+        Self::from_table(&document.root(&TABLES)?)
+    }
+
+    /// Reads a `[robot]` table.
+    pub(crate) fn from_node(node: Node<'_>) -> Result<Self, FileError> {
+        Self::from_table(&node.table(&TABLES)?)
+    }
+
+    fn from_table(robot: &Table<'_>) -> Result<Self, FileError> {
+        let drive = robot.table("drive", &DRIVE_KEYS)?;
+        let sonar = robot.table("sonar", &SONAR_KEYS)?;
+        let config = Config {
+            drive: read_drive(&drive)?,
+            max_wheel_speed: MetresPerSecond(quantity(&drive, "max_wheel_speed", &SPEED)?),
+            sonar: read_sonar(&sonar)?,
+            prior: read_prior(robot)?,
+            trust: read_trust(robot)?,
+            policy: read_policy(robot)?,
+        };
+        config.check().map_err(|error| {
+            let message = format!("must be {}", error.rule);
+            robot.error_at(key_of(error), message)
+        })?;
+        Ok(Self {
+            config,
+            encoder_period: period(&drive.require("encoder_period")?)?,
+            fix_period: period(&sonar.require("fix_period")?)?,
+            travel_per_tick: drive.get("travel_per_tick").map(per_tick).transpose()?,
+        })
+    }
+}
+
+/// Where the file has the field that the localizer refused.
+fn key_of(error: ConfigError) -> &'static str {
+    match error.field {
+        "max_wheel_speed" => "drive.max_wheel_speed",
+        "sonar.noise.floor" => "sonar.noise",
+        "sonar.noise.per_metre" => "sonar.noise_per_metre",
+        same => same,
+    }
+}
+
+fn quantity(table: &Table<'_>, key: &str, dimension: &Dimension) -> Result<f32, FileError> {
+    Ok(single(table.require(key)?.quantity(dimension)?))
+}
+
+fn fraction(table: &Table<'_>, key: &str) -> Result<f32, FileError> {
+    Ok(single(table.require(key)?.fraction()?))
+}
+
+fn read_drive(table: &Table<'_>) -> Result<Drive, FileError> {
+    let wheel_noise = quantity(table, "wheel_noise", &LENGTH_WALK)?;
+    let track_width_walk = quantity(table, "track_width_walk", &LENGTH_WALK)?;
+    Ok(Drive {
+        track_width: Metres(quantity(table, "track_width", &LENGTH)?),
+        wheel_noise: PerRootMetre(Metres(wheel_noise)),
+        scale_walk: PerRootMetre(quantity(table, "scale_walk", &SCALE_WALK)?),
+        track_width_walk: PerRootMetre(Metres(track_width_walk)),
+    })
+}
+
+fn read_sonar(table: &Table<'_>) -> Result<Sonar, FileError> {
+    let [ahead, left] = pair(table, "mount", &LENGTH)?;
+    let [rightmost, leftmost] = pair(table, "servo", &ANGLE)?;
+    Ok(Sonar {
+        mount: Point::new(ahead, left),
+        servo: (Radians(rightmost), Radians(leftmost)),
+        cone: Radians(quantity(table, "cone", &ANGLE)?),
+        min_range: Metres(quantity(table, "min_range", &LENGTH)?),
+        max_range: Metres(quantity(table, "max_range", &LENGTH)?),
+        noise: RangeNoise {
+            floor: Metres(quantity(table, "noise", &LENGTH)?),
+            per_metre: quantity(table, "noise_per_metre", &LENGTH_PER_LENGTH)?,
+        },
+    })
+}
+
+fn pair(table: &Table<'_>, key: &str, dimension: &Dimension) -> Result<[f32; 2], FileError> {
+    let [first, second] = table.require(key)?.pair()?;
+    let value = |node: Node<'_>| node.quantity(dimension).map(single);
+    Ok([value(first)?, value(second)?])
+}
+
+fn read_prior(robot: &Table<'_>) -> Result<CalibrationPrior, FileError> {
+    let keys = ["scale_right", "scale_left", "track_width", "range_scale"];
+    let table = robot.table("prior", &keys)?;
+    Ok(CalibrationPrior {
+        scale_right: fraction(&table, "scale_right")?,
+        scale_left: fraction(&table, "scale_left")?,
+        track_width: Metres(quantity(&table, "track_width", &LENGTH)?),
+        range_scale: fraction(&table, "range_scale")?,
+    })
+}
+
+fn read_trust(robot: &Table<'_>) -> Result<Trust, FileError> {
+    let table = robot.table("trust", &["gate", "confidence"])?;
+    let number = |key| Ok(single(table.require(key)?.number()?));
+    Ok(Trust {
+        gate: number("gate")?,
+        confidence: number("confidence")?,
+    })
+}
+
+fn read_policy(robot: &Table<'_>) -> Result<Policy, FileError> {
+    let policy = robot.table("schedule", &["policy"])?.require("policy")?;
+    match policy.text()? {
+        "nearest" => Ok(Policy::Nearest),
+        "informative" => Ok(Policy::Informative),
+        _ => Err(policy.error("must be \"nearest\" or \"informative\"")),
+    }
+}
+
+/// A period, in whole microseconds: the tick of the localizer's time.
+fn period(node: &Node<'_>) -> Result<Duration, FileError> {
+    const SHORTEST: f64 = 1e-6;
+    const LONGEST: f64 = 3600.0;
+    let seconds = node.quantity(&TIME)?;
+    let sensible = (SHORTEST..=LONGEST).contains(&seconds);
+    let seconds = node.check(seconds, sensible, "from 1 us to 1 hour")?;
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "rounded, and between 1 and 3.6e9"
+    )]
+    let microseconds = (seconds * 1e6).round() as u64;
+    Ok(Duration::micros(microseconds))
+}
+
+fn per_tick(node: Node<'_>) -> Result<WheelTravel, FileError> {
+    let table = node.table(&["right", "left"])?;
+    let travel = |key| {
+        let node = table.require(key)?;
+        let travel = single(node.quantity(&LENGTH)?);
+        node.check(travel, travel.is_normal(), "a length that is not zero")
+    };
+    Ok(WheelTravel::new(travel("right")?, travel("left")?))
+}

@@ -1,0 +1,326 @@
+//! The scenario: a floor, a robot on a path, and what is true of it.
+
+use std::path::Path as FilePath;
+
+use crate::document::{Document, Node, Table};
+use crate::error::FileError;
+use crate::file;
+use crate::floor::Floor;
+use crate::geometry::{Segment, TOUCH};
+use crate::path::{Path, PathPlan};
+use crate::quantity::{
+    ANGLE, Dimension, LENGTH, LENGTH_PER_LENGTH, LENGTH_WALK, SCALE_WALK, SPEED, TURN_RATE,
+};
+use crate::robot::Robot;
+
+const KEYS: [&str; 8] = [
+    "name",
+    "description",
+    "map",
+    "robot",
+    "path",
+    "start",
+    "truth",
+    "run",
+];
+
+const PATH_KEYS: [&str; 7] = [
+    "unit",
+    "start",
+    "corners",
+    "laps",
+    "speed",
+    "turn_rate",
+    "clearance",
+];
+
+const TRUTH_KEYS: [&str; 10] = [
+    "track_width",
+    "scale_right",
+    "scale_left",
+    "range_scale",
+    "wheel_noise",
+    "scale_walk",
+    "track_width_walk",
+    "range_noise",
+    "range_noise_per_metre",
+    "cone",
+];
+
+/// What the filter is told of its start: standard deviations.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Start {
+    /// Of x and of y, metres.
+    pub position: f64,
+    /// Of the heading, radians.
+    pub heading: f64,
+    /// Whether the estimate's start is drawn with these deviations around the truth; if not, it
+    /// starts on the truth.
+    pub drawn: bool,
+}
+
+/// What the simulator knows of the robot and the filter does not.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Truth {
+    /// Track width, metres.
+    pub track_width: f64,
+    /// Scale error of the right wheel, dimensionless.
+    pub scale_right: f64,
+    /// Scale error of the left wheel, dimensionless.
+    pub scale_left: f64,
+    /// Scale error of the ranger, dimensionless.
+    pub range_scale: f64,
+    /// White noise of each wheel's travel, m/√m.
+    pub wheel_noise: f64,
+    /// How far the wheels' scale errors wander, 1/√m.
+    pub scale_walk: f64,
+    /// How far the track width wanders, m/√m.
+    pub track_width_walk: f64,
+    /// Standard deviation of a range at no range, metres.
+    pub range_noise: f64,
+    /// Standard deviation of a range per metre of range, dimensionless.
+    pub range_noise_per_metre: f64,
+    /// Half of the sonar's cone, radians.
+    pub cone: f64,
+}
+
+/// How often the scenario is run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Run {
+    /// The number of Monte-Carlo runs.
+    pub runs: u32,
+    /// The seed of the first run; each further one has the next.
+    pub seed: u64,
+}
+
+/// A scenario.
+///
+/// ```
+/// use std::path::Path;
+/// use sonarfix_map::{PAPER, Scenario};
+/// let paper = Scenario::parse(PAPER, "paper.toml", Path::new(""))?;
+/// assert_eq!(paper.floor.walls().len(), 8);
+/// let wrong = PAPER.replace("cone = \"15 deg\"", "cone = 15");
+/// let error = Scenario::parse(&wrong, "paper.toml", Path::new("")).unwrap_err();
+/// assert_eq!(error.key(), "robot.sonar.cone");
+/// # Ok::<(), sonarfix_map::FileError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scenario {
+    /// What it is called.
+    pub name: String,
+    /// What it shows.
+    pub description: String,
+    /// The walls.
+    pub floor: Floor,
+    /// The robot, as its builder knows it.
+    pub robot: Robot,
+    /// What it drives.
+    pub path: Path,
+    /// What the filter is told of its start.
+    pub start: Start,
+    /// What the robot really is.
+    pub truth: Truth,
+    /// How often it is run.
+    pub run: Run,
+}
+
+impl Scenario {
+    /// Reads a scenario file, and the map and robot files it names.
+    ///
+    /// # Errors
+    /// [`FileError`] with the first thing that is wrong.
+    pub fn read(path: &FilePath) -> Result<Self, FileError> {
+        let base = path.parent().unwrap_or(FilePath::new(""));
+        Self::parse(&file::read(path)?, &file::name(path), base)
+    }
+
+    /// Reads the text of a scenario file that errors call `file_name`; the files it names are
+    /// relative to the directory `base`.
+    ///
+    /// # Errors
+    /// [`FileError`] with the first thing that is wrong.
+    pub fn parse(text: &str, file_name: &str, base: &FilePath) -> Result<Self, FileError> {
+        let document = Document::parse(text, file_name)?;
+        let root = document.root(&KEYS)?;
+        let floor = here_or_there(&root, "map", base, Floor::from_node, Floor::parse)?;
+        let robot = here_or_there(&root, "robot", base, Robot::from_node, Robot::parse)?;
+        let path = root.table("path", &PATH_KEYS)?;
+        Ok(Self {
+            name: root.require("name")?.text()?.into(),
+            description: root.require("description")?.text()?.into(),
+            path: read_path(&path, &floor, &robot)?,
+            floor,
+            robot,
+            start: read_start(&root)?,
+            truth: read_truth(&root)?,
+            run: read_run(&root)?,
+        })
+    }
+}
+
+/// Reads a table of the scenario, or the file that stands in its place.
+fn here_or_there<T>(
+    root: &Table<'_>,
+    key: &str,
+    base: &FilePath,
+    here: impl Fn(Node<'_>) -> Result<T, FileError>,
+    there: impl Fn(&str, &str) -> Result<T, FileError>,
+) -> Result<T, FileError> {
+    let node = root.require(key)?;
+    let Some(name) = node.as_text() else {
+        return here(node);
+    };
+    let path = base.join(name);
+    let text = file::read(&path).map_err(|error| {
+        let (file, message) = (error.file(), error.message());
+        node.error(format!("the file {file} {message}"))
+    })?;
+    there(&text, &file::name(&path))
+}
+
+fn quantity(table: &Table<'_>, key: &str, dimension: &Dimension) -> Result<f64, FileError> {
+    table.require(key)?.quantity(dimension)
+}
+
+fn deviation(table: &Table<'_>, key: &str, dimension: &Dimension) -> Result<f64, FileError> {
+    table.require(key)?.deviation(dimension)
+}
+
+fn read_path(table: &Table<'_>, floor: &Floor, robot: &Robot) -> Result<Path, FileError> {
+    let unit = table.require("unit")?.unit_of_length()?;
+    let corners = table.require("corners")?.items()?;
+    let laps = match table.get("laps") {
+        Some(node) => whole(&node)?,
+        None => 1,
+    };
+    let plan = PathPlan {
+        start: table.require("start")?.point(unit)?,
+        corners: corners
+            .iter()
+            .map(|node| node.point(unit))
+            .collect::<Result<_, _>>()?,
+        laps,
+        speed: quantity(table, "speed", &SPEED)?,
+        turn_rate: quantity(table, "turn_rate", &TURN_RATE)?,
+    };
+    let path = Path::new(plan).map_err(|error| {
+        let corner = error.corner().and_then(|index| corners.get(index));
+        match corner {
+            Some(node) => node.error(error.to_string()),
+            None => table.error_at(error.field(), error.to_string()),
+        }
+    })?;
+    check_speeds(table, &path, robot)?;
+    let clearance = match table.get("clearance") {
+        Some(node) => node.deviation(&LENGTH)?,
+        None => 0.0,
+    };
+    check_clearance(&path, &corners, floor, clearance)?;
+    Ok(path)
+}
+
+fn whole(node: &Node<'_>) -> Result<u32, FileError> {
+    let number = node.integer(1..=u64::from(u32::MAX))?;
+    u32::try_from(number).map_err(|_| node.error("must fit into 32 bits"))
+}
+
+/// The localizer takes a wheel that is faster than `max_wheel_speed` for a fault, so a path that
+/// asks for one would leave it deaf.
+fn check_speeds(table: &Table<'_>, path: &Path, robot: &Robot) -> Result<(), FileError> {
+    let fastest = f64::from(robot.config.max_wheel_speed.0);
+    let half_width = 0.5 * f64::from(robot.config.drive.track_width.0);
+    let plan = path.plan();
+    for (key, wheel) in [
+        ("speed", plan.speed),
+        ("turn_rate", plan.turn_rate * half_width),
+    ] {
+        if wheel > fastest {
+            let message = format!(
+                "rolls a wheel at {wheel:.3} m/s, faster than the robot's \
+                 drive.max_wheel_speed of {fastest:.3} m/s"
+            );
+            return Err(table.error_at(key, message));
+        }
+    }
+    Ok(())
+}
+
+/// The legs of the first lap are those of every lap.
+fn check_clearance(
+    path: &Path,
+    corners: &[Node<'_>],
+    floor: &Floor,
+    clearance: f64,
+) -> Result<(), FileError> {
+    let plan = path.plan();
+    let mut from = plan.start;
+    for (&to, node) in plan.corners.iter().zip(corners) {
+        let leg = Segment { from, to };
+        for wall in floor.named_walls() {
+            let (start, end, name) = (wall.from(), wall.to(), wall.name());
+            let distance = leg.distance(Segment {
+                from: start,
+                to: end,
+            });
+            let [[x0, y0], [x1, y1]] = [from, to];
+            let leg = format!("the leg from ({x0}, {y0}) to ({x1}, {y1}) m");
+            if distance < TOUCH {
+                return Err(node.error(format!("{leg} goes through the wall \"{name}\"")));
+            }
+            if distance < clearance - TOUCH {
+                return Err(node.error(format!(
+                    "{leg} comes within {distance:.3} m of the wall \"{name}\", \
+                     nearer than the clearance of {clearance:.3} m"
+                )));
+            }
+        }
+        from = to;
+    }
+    Ok(())
+}
+
+fn read_start(root: &Table<'_>) -> Result<Start, FileError> {
+    let table = root.table("start", &["position", "heading", "drawn"])?;
+    Ok(Start {
+        position: deviation(&table, "position", &LENGTH)?,
+        heading: deviation(&table, "heading", &ANGLE)?,
+        drawn: table.require("drawn")?.boolean()?,
+    })
+}
+
+fn read_truth(root: &Table<'_>) -> Result<Truth, FileError> {
+    let table = root.table("truth", &TRUTH_KEYS)?;
+    let width = table.require("track_width")?;
+    let track_width = width.quantity(&LENGTH)?;
+    let cone_node = table.require("cone")?;
+    let cone = cone_node.quantity(&ANGLE)?;
+    let narrow = cone > 0.0 && cone < std::f64::consts::FRAC_PI_2;
+    Ok(Truth {
+        track_width: width.check(track_width, track_width > 0.0, "positive")?,
+        scale_right: scale(&table, "scale_right")?,
+        scale_left: scale(&table, "scale_left")?,
+        range_scale: scale(&table, "range_scale")?,
+        wheel_noise: deviation(&table, "wheel_noise", &LENGTH_WALK)?,
+        scale_walk: deviation(&table, "scale_walk", &SCALE_WALK)?,
+        track_width_walk: deviation(&table, "track_width_walk", &LENGTH_WALK)?,
+        range_noise: deviation(&table, "range_noise", &LENGTH)?,
+        range_noise_per_metre: deviation(&table, "range_noise_per_metre", &LENGTH_PER_LENGTH)?,
+        cone: cone_node.check(cone, narrow, "between 0 and 90° (half of the cone)")?,
+    })
+}
+
+/// A scale error: at −1 and below, a wheel would stand still or roll backwards.
+fn scale(table: &Table<'_>, key: &str) -> Result<f64, FileError> {
+    let node = table.require(key)?;
+    let scale = node.fraction()?;
+    node.check(scale, scale > -1.0, "greater than -1")
+}
+
+fn read_run(root: &Table<'_>) -> Result<Run, FileError> {
+    let table = root.table("run", &["runs", "seed"])?;
+    Ok(Run {
+        runs: whole(&table.require("runs")?)?,
+        seed: table.require("seed")?.integer(0..=u64::MAX)?,
+    })
+}
