@@ -80,7 +80,7 @@ impl<'a> Plant<'a> {
     /// The truth now.
     #[must_use]
     pub fn truth(&self) -> Truth {
-        let (x, y, heading) = self.path.pose_at(self.time);
+        let pose = self.path.pose_at(self.time);
         let p = &self.parameters;
         let calibration = Calibration {
             scale_right: p.scale_right,
@@ -89,7 +89,11 @@ impl<'a> Plant<'a> {
             range_scale: p.range_scale,
         };
         Truth {
-            pose: Pose { x, y, heading },
+            pose: Pose {
+                x: pose.x,
+                y: pose.y,
+                heading: pose.heading,
+            },
             calibration: Some(calibration),
         }
     }
@@ -97,13 +101,13 @@ impl<'a> Plant<'a> {
     /// The truth now, as the states of the filter.
     #[must_use]
     pub fn state(&self) -> Vector {
-        let (x, y, heading) = self.path.pose_at(self.time);
+        let pose = self.path.pose_at(self.time);
         let p = &self.parameters;
         let width_error = p.track_width - self.nominal_track_width;
         Vector::from([
-            x,
-            y,
-            heading,
+            pose.x,
+            pose.y,
+            pose.heading,
             p.scale_right,
             p.scale_left,
             width_error,

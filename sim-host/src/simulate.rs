@@ -81,9 +81,9 @@ impl Simulation {
         let walls = scenario.floor.walls();
         let lines = scenario
             .floor
-            .walls
+            .named_walls()
             .iter()
-            .map(|w| Line::through(w.from, w.to))
+            .map(|w| Line::through(w.from(), w.to()))
             .collect();
         let world = World::new(&scenario.floor);
         let model = Model::of(&scenario.robot.config);
@@ -106,12 +106,12 @@ impl Simulation {
     /// parameters walk, those that they start from.
     #[must_use]
     pub fn truth_at_end(&self) -> [f64; 7] {
-        let (x, y, heading) = self.scenario.path.pose_at(self.scenario.path.duration());
+        let end = self.scenario.path.pose_at(self.scenario.path.duration());
         let t = &self.scenario.truth;
         [
-            x,
-            y,
-            heading,
+            end.x,
+            end.y,
+            end.heading,
             t.scale_right,
             t.scale_left,
             t.track_width,

@@ -135,11 +135,11 @@ impl Trace {
     #[must_use]
     pub fn of(floor: &Floor, cone: Radians) -> Self {
         let wall = |w: &NamedWall| Wall {
-            name: w.name.clone(),
-            from: w.from,
-            to: w.to,
+            name: w.name().to_owned(),
+            from: w.from(),
+            to: w.to(),
         };
-        let walls = floor.walls.iter().map(wall).collect();
+        let walls = floor.named_walls().iter().map(wall).collect();
         Self {
             walls,
             cone: cone.0.into(),

@@ -46,9 +46,9 @@ impl World {
     #[must_use]
     pub fn new(floor: &Floor) -> Self {
         let segments = floor
-            .walls
+            .named_walls()
             .iter()
-            .map(|w| Segment::new(w.from, w.to))
+            .map(|w| Segment::new(w.from(), w.to()))
             .collect();
         Self { segments }
     }

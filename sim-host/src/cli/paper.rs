@@ -44,11 +44,14 @@ impl From<PolicyName> for Policy {
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
-    let mut scenario = Scenario::paper()?;
+    let mut scenario =
+        Scenario::parse(sonarfix_map::PAPER, "paper.toml", std::path::Path::new(""))?;
     scenario.robot.config.policy = args.policy.into();
     if args.statistics {
         scenario.name = "paper-statistics".to_owned();
-        scenario.let_truth_walk_as_assumed();
+        let drive = scenario.robot.config.drive;
+        scenario.truth.scale_walk = drive.scale_walk.0.into();
+        scenario.truth.track_width_walk = drive.track_width_walk.0.0.into();
     }
     let experiment = Experiment {
         simulation: Simulation::new(scenario),

@@ -45,7 +45,10 @@ pub struct Output {
 pub fn execute(args: &Args) -> anyhow::Result<()> {
     let scenario = Scenario::read(&args.scenario)?;
     let experiment = Experiment {
-        runs: args.runs.unwrap_or(scenario.run.runs),
+        runs: match args.runs {
+            Some(runs) => runs,
+            None => usize::try_from(scenario.run.runs)?,
+        },
         seed: args.seed.unwrap_or(scenario.run.seed),
         simulation: Simulation::new(scenario),
         beside_paper: false,
