@@ -16,9 +16,7 @@ impl Bound {
     /// A bound at the true start, with the deviations that the filter is told of.
     #[must_use]
     pub fn new(model: Model, truth: Vector, deviation: &Vector) -> Self {
-        Self {
-            filter: DenseFilter::new(model, truth, deviation),
-        }
+        Self { filter: DenseFilter::new(model, truth, deviation) }
     }
 
     /// The robot moved: the encoders, were they without noise, would have read `travel`; `truth`

@@ -2,6 +2,11 @@
 //! `docs/model.md` and sharing no code with the core: the oracle that the `f32` filter is compared
 //! with, and the recursion behind the bound.
 
+#![expect(
+    clippy::indexing_slicing,
+    reason = "vectors and matrices of a fixed size, indexed by constants of the model"
+)]
+
 use nalgebra::{SMatrix, SVector};
 use sonarfix::config::Config;
 
@@ -27,10 +32,7 @@ impl Line {
     pub fn through(from: [f64; 2], to: [f64; 2]) -> Self {
         let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
         let length = dx.hypot(dy);
-        Self {
-            point: from,
-            normal: [-dy / length, dx / length],
-        }
+        Self { point: from, normal: [-dy / length, dx / length] }
     }
 }
 
@@ -75,7 +77,7 @@ impl Model {
         let (right, left) = (travel[0] * (1.0 + x[3]), travel[1] * (1.0 + x[4]));
         let turn = (right - left) / (self.track_width + x[5]);
         let (sin, cos) = (x[2] + turn / 2.0).sin_cos();
-        let advance = (right + left) / 2.0;
+        let advance = f64::midpoint(right, left);
         let mut next = *x;
         next[0] += advance * cos;
         next[1] += advance * sin;
@@ -89,7 +91,7 @@ impl Model {
         let factor = [1.0 + x[3], 1.0 + x[4]];
         let width = self.track_width + x[5];
         let turn = (travel[0] * factor[0] - travel[1] * factor[1]) / width;
-        let advance = (travel[0] * factor[0] + travel[1] * factor[1]) / 2.0;
+        let advance = f64::midpoint(travel[0] * factor[0], travel[1] * factor[1]);
         let (sin, cos) = (x[2] + turn / 2.0).sin_cos();
         // Rows x, y, heading of the derivative by anything that changes (advance, turn).
         let column = |by_advance: f64, by_turn: f64| {
@@ -166,7 +168,7 @@ impl DenseFilter {
         let (f, g) = self.model.motion_jacobians(&self.x, travel);
         let m = &self.model;
         let wheels = SVector::<f64, 2>::new(travel[0].abs(), travel[1].abs()) * m.wheel_variance;
-        let distance = (travel[0].abs() + travel[1].abs()) / 2.0;
+        let distance = f64::midpoint(travel[0].abs(), travel[1].abs());
         let mut walk = Vector::zeros();
         walk[3] = m.scale_variance * distance;
         walk[4] = m.scale_variance * distance;

@@ -20,12 +20,5 @@ pub mod trace_csv;
 pub mod world;
 
 /// The names of the filter's states, in its order.
-pub const STATES: [&str; 7] = [
-    "x",
-    "y",
-    "heading",
-    "scale_right",
-    "scale_left",
-    "track_width",
-    "range_scale",
-];
+pub const STATES: [&str; 7] =
+    ["x", "y", "heading", "scale_right", "scale_left", "track_width", "range_scale"];

@@ -12,10 +12,10 @@ use crate::statistics::Summary;
 ///
 /// # Errors
 /// The [`SimulationError`] of the first run that could not go on.
-pub fn run(simulation: &Simulation, seed: u64, runs: usize) -> Result<Summary, SimulationError> {
+pub fn run(simulation: &Simulation, seed: u64, runs: u32) -> Result<Summary, SimulationError> {
     let start = ProcessTime::now();
     let bar = progress_bar(runs);
-    let results = (0..runs as u64)
+    let results = (0..u64::from(runs))
         .into_par_iter()
         .map(|run| {
             let result = simulation.run(seed.wrapping_add(run), &mut ());
@@ -27,9 +27,9 @@ pub fn run(simulation: &Simulation, seed: u64, runs: usize) -> Result<Summary, S
     Ok(Summary::of(&results?, start.elapsed().as_secs_f64()))
 }
 
-fn progress_bar(runs: usize) -> ProgressBar {
+fn progress_bar(runs: u32) -> ProgressBar {
     // indicatif hides the bar by itself where standard error is not a terminal.
-    let bar = ProgressBar::with_draw_target(Some(runs as u64), ProgressDrawTarget::stderr());
+    let bar = ProgressBar::with_draw_target(Some(runs.into()), ProgressDrawTarget::stderr());
     match ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {eta} left") {
         Ok(style) => bar.with_style(style),
         Err(_) => bar,

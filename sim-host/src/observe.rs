@@ -1,5 +1,10 @@
 //! Reads the core's localizer into the `f64` of traces and statistics.
 
+#![expect(
+    clippy::indexing_slicing,
+    reason = "vectors and matrices of a fixed size, indexed by constants of the model"
+)]
+
 use nalgebra::{DMatrix, DVector};
 use sonarfix::aim::{Aim, NoAim};
 use sonarfix::ekf::{Ekf, Innovation};
@@ -17,11 +22,7 @@ pub fn estimate(localizer: &Localizer) -> Estimate {
     let p = covariance(ekf);
     let nominal = f64::from(localizer.config().drive.track_width.0);
     Estimate {
-        pose: Pose {
-            x: state.x.into(),
-            y: state.y.into(),
-            heading: state.heading.into(),
-        },
+        pose: Pose { x: state.x.into(), y: state.y.into(), heading: state.heading.into() },
         calibration: Calibration {
             scale_right: state.scale_right.into(),
             scale_left: state.scale_left.into(),

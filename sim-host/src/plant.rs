@@ -31,12 +31,7 @@ impl<'a> Plant<'a> {
     /// The robot at the start of its path.
     #[must_use]
     pub fn new(path: &'a Path, parameters: &TrueParameters, nominal_track_width: f64) -> Self {
-        Self {
-            path,
-            parameters: parameters.clone(),
-            nominal_track_width,
-            time: 0.0,
-        }
+        Self { path, parameters: *parameters, nominal_track_width, time: 0.0 }
     }
 
     /// Drives on to `time` seconds and reads the encoders.
@@ -48,20 +43,14 @@ impl<'a> Plant<'a> {
             rolled[0] += piece.advance + half_turn;
             rolled[1] += piece.advance - half_turn;
         }
-        let noiseless = [
-            rolled[0] / (1.0 + p.scale_right),
-            rolled[1] / (1.0 + p.scale_left),
-        ];
+        let noiseless = [rolled[0] / (1.0 + p.scale_right), rolled[1] / (1.0 + p.scale_left)];
         let measured = noiseless.map(|travel| {
             travel + p.wheel_noise * travel.abs().sqrt() * rng.sample::<f64, _>(StandardNormal)
         });
         let root_distance = (0.5 * (noiseless[0].abs() + noiseless[1].abs())).sqrt();
         self.let_parameters_walk(root_distance, rng);
         self.time = time;
-        Travel {
-            measured,
-            noiseless,
-        }
+        Travel { measured, noiseless }
     }
 
     fn let_parameters_walk(&mut self, root_distance: f64, rng: &mut ChaCha8Rng) {
@@ -88,14 +77,8 @@ impl<'a> Plant<'a> {
             track_width: p.track_width,
             range_scale: p.range_scale,
         };
-        Truth {
-            pose: Pose {
-                x: pose.x,
-                y: pose.y,
-                heading: pose.heading,
-            },
-            calibration: Some(calibration),
-        }
+        let pose = Pose { x: pose.x, y: pose.y, heading: pose.heading };
+        Truth { pose, calibration: Some(calibration) }
     }
 
     /// The truth now, as the states of the filter.

@@ -9,7 +9,7 @@ use sonarfix::map::{Map, Wall};
 use sonarfix::motion::WheelTravel;
 use sonarfix::pose::Pose;
 use sonarfix::units::{Instant, Metres, Radians};
-use sonarfix_map::Scenario;
+use sonarfix_map::{NamedWall, Scenario};
 
 use crate::angle;
 use crate::bound::Bound;
@@ -66,11 +66,7 @@ impl Chance {
             rng.set_stream(n);
             rng
         };
-        Self {
-            start: stream(0),
-            wheels: stream(1),
-            ranges: stream(2),
-        }
+        Self { start: stream(0), wheels: stream(1), ranges: stream(2) }
     }
 }
 
@@ -79,44 +75,17 @@ impl Simulation {
     #[must_use]
     pub fn new(scenario: Scenario) -> Self {
         let walls = scenario.floor.walls();
-        let lines = scenario
-            .floor
-            .named_walls()
-            .iter()
-            .map(|w| Line::through(w.from(), w.to()))
-            .collect();
+        let line = |wall: &NamedWall| Line::through(wall.from(), wall.to());
+        let lines = scenario.floor.named_walls().iter().map(line).collect();
         let world = World::new(&scenario.floor);
         let model = Model::of(&scenario.robot.config);
-        Self {
-            scenario,
-            walls,
-            lines,
-            world,
-            model,
-        }
+        Self { scenario, walls, lines, world, model }
     }
 
     /// A trace of this scenario with nothing in it yet.
     #[must_use]
     pub fn empty_trace(&self) -> Trace {
         Trace::of(&self.scenario.floor, self.scenario.robot.config.sonar.cone)
-    }
-
-    /// The true states when the path ends, SI units, the track width whole; where the true
-    /// parameters walk, those that they start from.
-    #[must_use]
-    pub fn truth_at_end(&self) -> [f64; 7] {
-        let end = self.scenario.path.pose_at(self.scenario.path.duration());
-        let t = &self.scenario.truth;
-        [
-            end.x,
-            end.y,
-            end.heading,
-            t.scale_right,
-            t.scale_left,
-            t.track_width,
-            t.range_scale,
-        ]
     }
 
     /// Runs once.
@@ -165,12 +134,7 @@ struct Run<'a> {
 
 impl<'a> Run<'a> {
     fn new(simulation: &'a Simulation, seed: u64) -> Result<Self, SimulationError> {
-        let Simulation {
-            scenario,
-            walls,
-            model,
-            ..
-        } = simulation;
+        let Simulation { scenario, walls, model, .. } = simulation;
         let mut chance = Chance::new(seed);
         let plant = Plant::new(&scenario.path, &scenario.truth, model.track_width);
         let start = estimated_start(scenario, &plant.state(), &mut chance.start);
@@ -222,16 +186,9 @@ impl<'a> Run<'a> {
         let truth = self.plant.truth().pose;
         let mount = self.simulation.model.mount;
         let (sin, cos) = truth.heading.sin_cos();
-        let sonar = [
-            truth.x + cos * mount[0] - sin * mount[1],
-            truth.y + sin * mount[0] + cos * mount[1],
-        ];
-        let mut look = Look {
-            time: self.time(),
-            sonar,
-            heading: truth.heading,
-            range: None,
-        };
+        let sonar =
+            [truth.x + cos * mount[0] - sin * mount[1], truth.y + sin * mount[0] + cos * mount[1]];
+        let mut look = Look { time: self.time(), sonar, heading: truth.heading, range: None };
         let aim = match self.localizer.aim() {
             Ok(aim) => aim,
             Err(no_aim) => {
@@ -242,9 +199,7 @@ impl<'a> Run<'a> {
         };
         look.range = self.ping(sonar, truth.heading, &aim);
         #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
-        let fix = self
-            .localizer
-            .fix(&aim, look.range.map(|range| Metres(range as f32)));
+        let fix = self.localizer.fix(&aim, look.range.map(|range| Metres(range as f32)));
         self.account(&aim, &fix);
         recorder.fix(|| observe::fix_record(look, &aim, &fix));
     }
@@ -261,9 +216,7 @@ impl<'a> Run<'a> {
         // Drawn whether or not an echo came, so that runs stay comparable ping by ping.
         let normal: f64 = self.chance.ranges.sample(StandardNormal);
         let distance = echo?.distance;
-        let sigma = truth
-            .range_noise
-            .hypot(truth.range_noise_per_metre * distance);
+        let sigma = truth.range_noise.hypot(truth.range_noise_per_metre * distance);
         Some((1.0 + truth.range_scale) * distance + sigma * normal)
     }
 

@@ -1,5 +1,10 @@
 //! What many runs say together.
 
+#![expect(
+    clippy::indexing_slicing,
+    reason = "vectors and matrices of a fixed size, indexed by constants of the model"
+)]
+
 use serde::Serialize;
 use sonarfix::health::Verdict;
 
@@ -152,9 +157,7 @@ impl Summary {
     /// Sums up runs, in their order, so that the result does not depend on who ran them.
     #[must_use]
     pub fn of(results: &[RunResult], cpu_seconds: f64) -> Self {
-        let states = (0..STATES.len())
-            .map(|state| StateSummary::of(state, results))
-            .collect();
+        let states = (0..STATES.len()).map(|state| StateSummary::of(state, results)).collect();
         let mut fixes = FixCounts::default();
         let (mut nis, mut path) = (NisSum::default(), PathSum::default());
         for result in results {
@@ -176,11 +179,7 @@ impl Summary {
             cpu_seconds,
             fixes,
             lost_runs: results.iter().filter(|result| result.lost).count(),
-            rms_path: PathSummary {
-                x: rms[0],
-                y: rms[1],
-                heading: rms[2],
-            },
+            rms_path: PathSummary { x: rms[0], y: rms[1], heading: rms[2] },
         }
     }
 }

@@ -134,17 +134,9 @@ impl Trace {
     /// A trace on a floor, with nothing in it yet.
     #[must_use]
     pub fn of(floor: &Floor, cone: Radians) -> Self {
-        let wall = |w: &NamedWall| Wall {
-            name: w.name().to_owned(),
-            from: w.from(),
-            to: w.to(),
-        };
+        let wall = |w: &NamedWall| Wall { name: w.name().to_owned(), from: w.from(), to: w.to() };
         let walls = floor.named_walls().iter().map(wall).collect();
-        Self {
-            walls,
-            cone: cone.0.into(),
-            ..Self::default()
-        }
+        Self { walls, cone: cone.0.into(), ..Self::default() }
     }
 }
 

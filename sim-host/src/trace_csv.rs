@@ -78,14 +78,7 @@ fn state_cells(tick: &Tick) -> Vec<String> {
     let calibration = tick.truth.and_then(|truth| truth.calibration);
     let estimate = &tick.estimate;
     let mut cells = vec![cell(tick.time)];
-    cells.extend(
-        [
-            truth.map(|p| p.x),
-            truth.map(|p| p.y),
-            truth.map(|p| p.heading),
-        ]
-        .map(optional),
-    );
+    cells.extend([truth.map(|p| p.x), truth.map(|p| p.y), truth.map(|p| p.heading)].map(optional));
     cells.extend(
         [
             calibration.map(|c| c.scale_right),
@@ -100,8 +93,8 @@ fn state_cells(tick: &Tick) -> Vec<String> {
     cells.extend([c.scale_right, c.scale_left, c.track_width, c.range_scale].map(cell));
     cells.extend(estimate.deviation.map(cell));
     cells.push(cell(estimate.covariance_xy));
-    let bound = tick.bound.map(|[x, y, heading, ..]| [x, y, heading]);
-    cells.extend([0, 1, 2].map(|i| optional(bound.map(|b| b[i]))));
+    let bound = tick.bound.map_or([None; 3], |[x, y, heading, ..]| [x, y, heading].map(Some));
+    cells.extend(bound.map(optional));
     cells.extend([tick.odometry.x, tick.odometry.y, tick.odometry.heading].map(cell));
     cells
 }
@@ -130,11 +123,7 @@ fn cell(value: f64) -> String {
     // Nine digits tell any two f32 apart.
     let text = format!("{value:.9}");
     let trimmed = text.trim_end_matches('0').trim_end_matches('.');
-    if value != 0.0 && value.abs() < 1e-4 {
-        format!("{value:.8e}")
-    } else {
-        trimmed.to_owned()
-    }
+    if value != 0.0 && value.abs() < 1e-4 { format!("{value:.8e}") } else { trimmed.to_owned() }
 }
 
 fn optional(value: Option<f64>) -> String {
@@ -183,10 +172,7 @@ mod tests {
         let mut reader = csv::Reader::from_reader(out.as_slice());
         assert_eq!(reader.headers().unwrap(), &COLUMNS[..]);
         let lines: Vec<_> = reader.records().map(Result::unwrap).collect();
-        let times: Vec<_> = lines
-            .iter()
-            .map(|l| (l[0].to_owned(), l[29].to_owned()))
-            .collect();
+        let times: Vec<_> = lines.iter().map(|l| (l[0].to_owned(), l[29].to_owned())).collect();
         let expected = [("0.1", ""), ("0.2", "0.15"), ("0.2", "0.2"), ("0.3", "0.3")];
         assert_eq!(times, expected.map(|(t, f)| (t.to_owned(), f.to_owned())));
         assert_eq!(&lines[1][35], "no wall, \"none\"");
@@ -194,10 +180,7 @@ mod tests {
 
     #[test]
     fn cells_keep_nine_digits_and_no_noise() {
-        assert_eq!(
-            [0.0, -20.0, 0.5, 2e-4].map(cell),
-            ["0", "-20", "0.5", "0.0002"]
-        );
+        assert_eq!([0.0, -20.0, 0.5, 2e-4].map(cell), ["0", "-20", "0.5", "0.0002"]);
         assert_eq!(cell(5.6e-5), "5.60000000e-5");
     }
 }

@@ -45,11 +45,7 @@ impl World {
     /// A world of a floor's walls, in the same order.
     #[must_use]
     pub fn new(floor: &Floor) -> Self {
-        let segments = floor
-            .named_walls()
-            .iter()
-            .map(|w| Segment::new(w.from(), w.to()))
-            .collect();
+        let segments = floor.named_walls().iter().map(|w| Segment::new(w.from(), w.to())).collect();
         Self { segments }
     }
 
@@ -76,11 +72,7 @@ impl World {
     }
 
     fn is_blocked(&self, target: usize, from: [f64; 2], to: [f64; 2]) -> bool {
-        let mut others = self
-            .segments
-            .iter()
-            .enumerate()
-            .filter(|(wall, _)| *wall != target);
+        let mut others = self.segments.iter().enumerate().filter(|(wall, _)| *wall != target);
         others.any(|(_, segment)| segment.crosses(from, to))
     }
 }
@@ -89,11 +81,7 @@ impl Segment {
     fn new(from: [f64; 2], to: [f64; 2]) -> Self {
         let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
         let length = dx.hypot(dy);
-        Self {
-            from,
-            tangent: [dx / length, dy / length],
-            length,
-        }
+        Self { from, tangent: [dx / length, dy / length], length }
     }
 
     /// Along the wall from its start, and signed distance from its line (left is positive).
@@ -108,12 +96,7 @@ impl Segment {
         let (along, off) = self.place(point);
         let on_wall = (0.0..=self.length).contains(&along);
         let [tx, ty] = self.tangent;
-        on_wall.then(|| {
-            (
-                [self.from[0] + along * tx, self.from[1] + along * ty],
-                off.abs(),
-            )
-        })
+        on_wall.then(|| ([self.from[0] + along * tx, self.from[1] + along * ty], off.abs()))
     }
 
     /// Whether the straight way between two points passes through the wall.
@@ -130,39 +113,21 @@ impl Segment {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sonarfix_map::NamedWall;
 
     fn room(walls: &[([f64; 2], [f64; 2])]) -> World {
-        let named = |(i, &(from, to)): (usize, &([f64; 2], [f64; 2]))| NamedWall {
-            name: format!("wall {i}"),
-            from,
-            to,
-        };
-        World::new(&Floor {
-            walls: walls.iter().enumerate().map(named).collect(),
-        })
+        let segments = walls.iter().map(|&(from, to)| Segment::new(from, to)).collect();
+        World { segments }
     }
 
     fn ping(direction: f64) -> Ping {
-        Ping {
-            from: [0.0, 0.0],
-            direction,
-            cone: 0.26,
-            reach: (0.05, 10.0),
-        }
+        Ping { from: [0.0, 0.0], direction, cone: 0.26, reach: (0.05, 10.0) }
     }
 
     #[test]
     fn an_oblique_beam_hears_the_perpendicular() {
         let world = room(&[([2.0, -5.0], [2.0, 5.0])]);
         for direction in [-0.25, 0.0, 0.25] {
-            assert_eq!(
-                world.first_echo(&ping(direction)),
-                Some(Echo {
-                    wall: 0,
-                    distance: 2.0
-                })
-            );
+            assert_eq!(world.first_echo(&ping(direction)), Some(Echo { wall: 0, distance: 2.0 }));
         }
         assert_eq!(world.first_echo(&ping(0.27)), None);
     }
@@ -170,13 +135,7 @@ mod tests {
     #[test]
     fn the_nearest_in_the_cone_answers() {
         let world = room(&[([2.0, -5.0], [2.0, 5.0]), ([1.0, -0.5], [1.0, 0.5])]);
-        assert_eq!(
-            world.first_echo(&ping(0.0)),
-            Some(Echo {
-                wall: 1,
-                distance: 1.0
-            })
-        );
+        assert_eq!(world.first_echo(&ping(0.0)), Some(Echo { wall: 1, distance: 1.0 }));
     }
 
     #[test]

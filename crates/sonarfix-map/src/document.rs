@@ -43,22 +43,14 @@ impl<'a> Document<'a> {
             let message = format!("this is not TOML at `{near}`: {}", error.message());
             file.error(span.start, "", message)
         })?;
-        Ok(Self {
-            file,
-            root: DeValue::Table(root.into_inner()),
-        })
+        Ok(Self { file, root: DeValue::Table(root.into_inner()) })
     }
 
     /// The whole file as a table that may hold `format` and `keys`. The version is checked before
     /// the keys, which another version may have others of.
     pub fn root(&self, keys: &[&str]) -> Result<Table<'_>, FileError> {
-        let root = Node {
-            file: self.file,
-            key: String::new(),
-            at: 0,
-            value: &self.root,
-        }
-        .any_table()?;
+        let root =
+            Node { file: self.file, key: String::new(), at: 0, value: &self.root }.any_table()?;
         let format = root.require("format")?;
         let version = format.integer(0..=u64::MAX)?;
         if version != FORMAT {
@@ -86,11 +78,7 @@ impl<'a> Node<'a> {
 
     /// Passes the value on if the rule holds; says that it must be `rule` if not.
     pub fn check<T>(&self, value: T, holds: bool, rule: &str) -> Result<T, FileError> {
-        if holds {
-            Ok(value)
-        } else {
-            Err(self.error(format!("must be {rule}")))
-        }
+        if holds { Ok(value) } else { Err(self.error(format!("must be {rule}"))) }
     }
 
     fn wrong_type(&self, expected: &str) -> FileError {
@@ -99,12 +87,7 @@ impl<'a> Node<'a> {
     }
 
     fn child(&self, key: String, value: &'a Spanned<DeValue<'a>>) -> Self {
-        Self {
-            file: self.file,
-            key,
-            at: value.span().start,
-            value: value.get_ref(),
-        }
+        Self { file: self.file, key, at: value.span().start, value: value.get_ref() }
     }
 
     /// A table with no other keys than these.
@@ -114,20 +97,14 @@ impl<'a> Node<'a> {
 
     fn any_table(self) -> Result<Table<'a>, FileError> {
         match self.value {
-            DeValue::Table(entries) => Ok(Table {
-                node: self,
-                entries,
-            }),
+            DeValue::Table(entries) => Ok(Table { node: self, entries }),
             _ => Err(self.wrong_type("a table")),
         }
     }
 
     /// The values of an array.
     pub fn items(&self) -> Result<Vec<Self>, FileError> {
-        let array = self
-            .value
-            .as_array()
-            .ok_or_else(|| self.wrong_type("an array"))?;
+        let array = self.value.as_array().ok_or_else(|| self.wrong_type("an array"))?;
         let item = |(index, value)| self.child(format!("{}[{index}]", self.key), value);
         Ok(array.iter().enumerate().map(item).collect())
     }
@@ -229,10 +206,7 @@ pub(crate) struct Table<'a> {
 
 impl<'a> Table<'a> {
     fn only(self, keys: &[&str]) -> Result<Self, FileError> {
-        let unknown = self
-            .entries
-            .keys()
-            .filter(|key| !keys.contains(&key.get_ref().as_ref()));
+        let unknown = self.entries.keys().filter(|key| !keys.contains(&key.get_ref().as_ref()));
         match unknown.min_by_key(|key| key.span().start) {
             None => Ok(self),
             Some(key) => {
@@ -244,11 +218,7 @@ impl<'a> Table<'a> {
     }
 
     fn key_of(&self, key: &str) -> String {
-        if self.node.key.is_empty() {
-            key.into()
-        } else {
-            format!("{}.{key}", self.node.key)
-        }
+        if self.node.key.is_empty() { key.into() } else { format!("{}.{key}", self.node.key) }
     }
 
     /// The value of a key that may be missing.

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// Something wrong with a file: `paper.toml:12: robot.sonar.cone: must be …`.
+/// Something wrong with a file: `paper.toml:45: robot.sonar.cone: must be …`.
 ///
 /// One type for every kind of fault, because every reader does the same with it: shows it to the
 /// person who wrote the file.
@@ -17,22 +17,12 @@ pub struct FileError {
 impl FileError {
     /// A fault of the value of `key` in `line`.
     pub(crate) fn new(file: &str, line: usize, key: &str, message: impl Into<String>) -> Self {
-        Self {
-            file: file.into(),
-            line: Some(line),
-            key: key.into(),
-            message: message.into(),
-        }
+        Self { file: file.into(), line: Some(line), key: key.into(), message: message.into() }
     }
 
     /// A fault of the file as a whole.
     pub(crate) fn of_file(file: &str, message: impl Into<String>) -> Self {
-        Self {
-            file: file.into(),
-            line: None,
-            key: String::new(),
-            message: message.into(),
-        }
+        Self { file: file.into(), line: None, key: String::new(), message: message.into() }
     }
 
     /// The file, as it was named by who asked for it.

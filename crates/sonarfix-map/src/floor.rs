@@ -32,12 +32,7 @@ impl NamedWall {
         }
         let point = |[x, y]: [f64; 2]| pose::Point::new(single(x), single(y));
         let wall = Wall::new(point(from), point(to))?;
-        Ok(Self {
-            name,
-            from,
-            to,
-            wall,
-        })
+        Ok(Self { name, from, to, wall })
     }
 
     /// Its name, which no other wall of the floor has.

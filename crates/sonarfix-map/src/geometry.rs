@@ -48,10 +48,7 @@ impl Segment {
         let from_ends = [other.from, other.to].map(|end| self.distance_to(end));
         let to_ends = [self.from, self.to].map(|end| other.distance_to(end));
         let least = f64::min;
-        from_ends
-            .into_iter()
-            .chain(to_ends)
-            .fold(f64::INFINITY, least)
+        from_ends.into_iter().chain(to_ends).fold(f64::INFINITY, least)
     }
 
     /// Whether the ends of `other` lie on different sides of this segment's line.
@@ -88,11 +85,7 @@ mod tests {
             ("lies on it", segment([1.0, 0.0], [2.0, 0.0]), 0.0),
             ("beside it", segment([1.0, 2.0], [2.0, 3.0]), 2.0),
             ("beyond it", segment([7.0, 4.0], [8.0, 4.0]), 5.0),
-            (
-                "over it, not through",
-                segment([-1.0, 3.0], [5.0, 3.0]),
-                3.0,
-            ),
+            ("over it, not through", segment([-1.0, 3.0], [5.0, 3.0]), 3.0),
             ("its line crosses", segment([4.5, -1.0], [4.5, 1.0]), 0.5),
         ];
         for (what, other, expected) in cases {

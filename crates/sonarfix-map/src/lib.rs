@@ -4,7 +4,7 @@
 //! Whatever is wrong with a file is a [`FileError`] with its file, line and key:
 //!
 //! ```text
-//! paper.toml:12: robot.sonar.cone: must be between 0 and 90° (half of the cone)
+//! paper.toml:45: robot.sonar.cone: must be between 0 and 90° (half of the cone)
 //! ```
 //!
 //! | file | is read by | gives |

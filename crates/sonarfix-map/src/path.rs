@@ -154,24 +154,15 @@ impl Leg {
                 y: from.y + done * (to.y - from.y),
                 heading: from.heading,
             },
-            Movement::Turn(by) => PathPose {
-                heading: wrap(from.heading + done * by),
-                ..from
-            },
+            Movement::Turn(by) => PathPose { heading: wrap(from.heading + done * by), ..from },
         }
     }
 
     fn motion_between(&self, from: f64, to: f64) -> Motion {
         let share = self.done(to) - self.done(from);
         match self.movement {
-            Movement::Straight(length) => Motion {
-                advance: share * length,
-                turn: 0.0,
-            },
-            Movement::Turn(by) => Motion {
-                advance: 0.0,
-                turn: share * by,
-            },
+            Movement::Straight(length) => Motion { advance: share * length, turn: 0.0 },
+            Movement::Turn(by) => Motion { advance: 0.0, turn: share * by },
         }
     }
 }
@@ -215,11 +206,8 @@ impl Path {
     pub fn new(plan: PathPlan) -> Result<Self, PathError> {
         check(&plan)?;
         let first = *plan.corners.first().ok_or(PathError::NoCorner)?;
-        let start = PathPose {
-            x: plan.start[0],
-            y: plan.start[1],
-            heading: direction(plan.start, first),
-        };
+        let start =
+            PathPose { x: plan.start[0], y: plan.start[1], heading: direction(plan.start, first) };
         let legs = Driver::new(&plan, start).drive();
         Ok(Self { plan, start, legs })
     }
@@ -328,13 +316,7 @@ struct Driver<'a> {
 
 impl<'a> Driver<'a> {
     fn new(plan: &'a PathPlan, start: PathPose) -> Self {
-        Self {
-            plan,
-            start,
-            here: start,
-            time: 0.0,
-            legs: Vec::new(),
-        }
+        Self { plan, start, here: start, time: 0.0, legs: Vec::new() }
     }
 
     fn drive(mut self) -> Vec<Leg> {
@@ -354,11 +336,7 @@ impl<'a> Driver<'a> {
         let heading = direction(here, corner);
         self.turn_to(heading);
         let length = distance(here, corner);
-        let to = PathPose {
-            x: corner[0],
-            y: corner[1],
-            heading,
-        };
+        let to = PathPose { x: corner[0], y: corner[1], heading };
         self.add(to, length / self.plan.speed, Movement::Straight(length));
     }
 
@@ -371,21 +349,12 @@ impl<'a> Driver<'a> {
         if by < NO_TURN - std::f64::consts::PI {
             by += std::f64::consts::TAU;
         }
-        let to = PathPose {
-            heading,
-            ..self.here
-        };
+        let to = PathPose { heading, ..self.here };
         self.add(to, by.abs() / self.plan.turn_rate, Movement::Turn(by));
     }
 
     fn add(&mut self, to: PathPose, duration: f64, movement: Movement) {
-        self.legs.push(Leg {
-            start_time: self.time,
-            duration,
-            from: self.here,
-            to,
-            movement,
-        });
+        self.legs.push(Leg { start_time: self.time, duration, from: self.here, to, movement });
         self.here = to;
         self.time += duration;
     }

@@ -28,16 +28,8 @@ const DRIVE_KEYS: [&str; 7] = [
     "travel_per_tick",
 ];
 
-const SONAR_KEYS: [&str; 8] = [
-    "mount",
-    "servo",
-    "cone",
-    "min_range",
-    "max_range",
-    "noise",
-    "noise_per_metre",
-    "fix_period",
-];
+const SONAR_KEYS: [&str; 8] =
+    ["mount", "servo", "cone", "min_range", "max_range", "noise", "noise_per_metre", "fix_period"];
 
 /// A robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -165,10 +157,7 @@ fn read_prior(robot: &Table<'_>) -> Result<CalibrationPrior, FileError> {
 fn read_trust(robot: &Table<'_>) -> Result<Trust, FileError> {
     let table = robot.table("trust", &["gate", "confidence"])?;
     let number = |key| Ok(single(table.require(key)?.number()?));
-    Ok(Trust {
-        gate: number("gate")?,
-        confidence: number("confidence")?,
-    })
+    Ok(Trust { gate: number("gate")?, confidence: number("confidence")? })
 }
 
 fn read_policy(robot: &Table<'_>) -> Result<Policy, FileError> {

@@ -13,26 +13,10 @@ use crate::quantity::{
 };
 use crate::robot::Robot;
 
-const KEYS: [&str; 8] = [
-    "name",
-    "description",
-    "map",
-    "robot",
-    "path",
-    "start",
-    "truth",
-    "run",
-];
+const KEYS: [&str; 8] = ["name", "description", "map", "robot", "path", "start", "truth", "run"];
 
-const PATH_KEYS: [&str; 7] = [
-    "unit",
-    "start",
-    "corners",
-    "laps",
-    "speed",
-    "turn_rate",
-    "clearance",
-];
+const PATH_KEYS: [&str; 7] =
+    ["unit", "start", "corners", "laps", "speed", "turn_rate", "clearance"];
 
 const TRUTH_KEYS: [&str; 10] = [
     "track_width",
@@ -157,6 +141,22 @@ impl Scenario {
             run: read_run(&root)?,
         })
     }
+
+    /// The reference scenario, [`crate::PAPER`].
+    ///
+    /// # Errors
+    /// [`FileError`], if this crate's own file were wrong.
+    pub fn paper() -> Result<Self, FileError> {
+        Self::parse(crate::PAPER, "paper.toml", FilePath::new(""))
+    }
+
+    /// Lets the true parameters walk as the filter assumes that they do: the variant of a scenario
+    /// in which the filter can be asked to be efficient and consistent.
+    pub fn let_truth_walk_as_assumed(&mut self) {
+        let drive = &self.robot.config.drive;
+        self.truth.scale_walk = drive.scale_walk.0.into();
+        self.truth.track_width_walk = drive.track_width_walk.0.0.into();
+    }
 }
 
 /// Reads a table of the scenario, or the file that stands in its place.
@@ -196,10 +196,7 @@ fn read_path(table: &Table<'_>, floor: &Floor, robot: &Robot) -> Result<Path, Fi
     };
     let plan = PathPlan {
         start: table.require("start")?.point(unit)?,
-        corners: corners
-            .iter()
-            .map(|node| node.point(unit))
-            .collect::<Result<_, _>>()?,
+        corners: corners.iter().map(|node| node.point(unit)).collect::<Result<_, _>>()?,
         laps,
         speed: quantity(table, "speed", &SPEED)?,
         turn_rate: quantity(table, "turn_rate", &TURN_RATE)?,
@@ -231,10 +228,7 @@ fn check_speeds(table: &Table<'_>, path: &Path, robot: &Robot) -> Result<(), Fil
     let fastest = f64::from(robot.config.max_wheel_speed.0);
     let half_width = 0.5 * f64::from(robot.config.drive.track_width.0);
     let plan = path.plan();
-    for (key, wheel) in [
-        ("speed", plan.speed),
-        ("turn_rate", plan.turn_rate * half_width),
-    ] {
+    for (key, wheel) in [("speed", plan.speed), ("turn_rate", plan.turn_rate * half_width)] {
         if wheel > fastest {
             let message = format!(
                 "rolls a wheel at {wheel:.3} m/s, faster than the robot's \
@@ -259,21 +253,20 @@ fn check_clearance(
         let leg = Segment { from, to };
         for wall in floor.named_walls() {
             let (start, end, name) = (wall.from(), wall.to(), wall.name());
-            let distance = leg.distance(Segment {
-                from: start,
-                to: end,
-            });
+            let distance = leg.distance(Segment { from: start, to: end });
+            let fault = if distance < TOUCH {
+                format!("goes through the wall \"{name}\"")
+            } else if distance < clearance - TOUCH {
+                format!(
+                    "comes within {distance:.3} m of the wall \"{name}\", \
+                     nearer than the clearance of {clearance:.3} m"
+                )
+            } else {
+                continue;
+            };
             let [[x0, y0], [x1, y1]] = [from, to];
             let leg = format!("the leg from ({x0}, {y0}) to ({x1}, {y1}) m");
-            if distance < TOUCH {
-                return Err(node.error(format!("{leg} goes through the wall \"{name}\"")));
-            }
-            if distance < clearance - TOUCH {
-                return Err(node.error(format!(
-                    "{leg} comes within {distance:.3} m of the wall \"{name}\", \
-                     nearer than the clearance of {clearance:.3} m"
-                )));
-            }
+            return Err(node.error(format!("{leg} {fault}")));
         }
         from = to;
     }

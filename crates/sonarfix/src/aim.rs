@@ -150,8 +150,7 @@ impl<'a> Viewpoint<'a> {
     /// standing before its foot, or by answering from nearer inside the cone.
     fn is_hidden(&self, map: &Map, target: WallId, expected: &ExpectedRange) -> bool {
         let view = View::new(self.position, expected, self.wide_cone);
-        map.walls()
-            .any(|(id, wall)| id != target && view.is_disturbed_by(wall))
+        map.walls().any(|(id, wall)| id != target && view.is_disturbed_by(wall))
     }
 }
 
@@ -217,10 +216,8 @@ impl View {
             return false;
         }
         let signed = wall.signed_distance(self.origin).0;
-        let foot = Point::new(
-            self.origin.x.0 - signed * wall.a(),
-            self.origin.y.0 - signed * wall.b(),
-        );
+        let foot =
+            Point::new(self.origin.x.0 - signed * wall.a(), self.origin.y.0 - signed * wall.b());
         self.answers_first(self.place(foot))
     }
 }
@@ -238,10 +235,7 @@ pub(crate) fn choose(config: &Config, map: &Map, ekf: &Ekf) -> Result<Aim, NoAim
         view.bearing(expected)?;
         Some(match config.policy {
             Policy::Nearest => -expected.range.0,
-            Policy::Informative => {
-                ekf.position_gain(expected, noise.variance(expected.range))
-                    .0
-            }
+            Policy::Informative => ekf.position_gain(expected, noise.variance(expected.range)).0,
         })
     })
 }
@@ -252,8 +246,7 @@ pub(crate) fn choose(config: &Config, map: &Map, ekf: &Ekf) -> Result<Aim, NoAim
 /// [`NoAim`], by why there is none.
 pub(crate) fn at(config: &Config, map: &Map, ekf: &Ekf, bearing: Radians) -> Result<Aim, NoAim> {
     let aim = best(config, map, ekf, |view, expected| {
-        view.is_square(bearing, expected)
-            .then_some(-expected.range.0)
+        view.is_square(bearing, expected).then_some(-expected.range.0)
     })?;
     Ok(Aim { bearing, ..aim })
 }
@@ -282,14 +275,7 @@ fn best(
         // Hiding costs a look at every wall, so it is asked last.
         if improves && !view.is_hidden(map, id, &expected) {
             let bearing = expected.direction.from(view.heading);
-            best = Some((
-                score,
-                Aim {
-                    wall: id,
-                    bearing,
-                    range: expected.range,
-                },
-            ));
+            best = Some((score, Aim { wall: id, bearing, range: expected.range }));
         }
     }
     best.map(|(_, aim)| aim).ok_or(NoAim::NoWall)

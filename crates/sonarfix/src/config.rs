@@ -93,27 +93,15 @@ impl core::fmt::Display for ConfigError {
 impl core::error::Error for ConfigError {}
 
 fn positive(field: &'static str, value: f32) -> Result<(), ConfigError> {
-    require(
-        field,
-        value > 0.0 && value.is_finite(),
-        "positive and finite",
-    )
+    require(field, value > 0.0 && value.is_finite(), "positive and finite")
 }
 
 fn not_negative(field: &'static str, value: f32) -> Result<(), ConfigError> {
-    require(
-        field,
-        value >= 0.0 && value.is_finite(),
-        "zero or positive, and finite",
-    )
+    require(field, value >= 0.0 && value.is_finite(), "zero or positive, and finite")
 }
 
 fn require(field: &'static str, holds: bool, rule: &'static str) -> Result<(), ConfigError> {
-    if holds {
-        Ok(())
-    } else {
-        Err(ConfigError { field, rule })
-    }
+    if holds { Ok(()) } else { Err(ConfigError { field, rule }) }
 }
 
 impl Config {
@@ -147,10 +135,7 @@ impl Config {
                 cone: Radians::from_degrees(15.0),
                 min_range: Metres(0.05),
                 max_range: Metres(4.0),
-                noise: RangeNoise {
-                    floor: Metres(0.005),
-                    per_metre: 0.002,
-                },
+                noise: RangeNoise { floor: Metres(0.005), per_metre: 0.002 },
             },
             prior: CalibrationPrior {
                 scale_right: 0.01,
@@ -158,10 +143,7 @@ impl Config {
                 track_width: track_width * 0.03,
                 range_scale: 0.0,
             },
-            trust: Trust {
-                gate: 4.0,
-                confidence: 3.0,
-            },
+            trust: Trust { gate: 4.0, confidence: 3.0 },
             policy: Policy::Informative,
         }
     }
@@ -179,11 +161,7 @@ impl Config {
         not_negative("prior.track_width", prior.track_width.0)?;
         let width = self.drive.track_width.0;
         let below_width = prior.track_width.0 < 0.5 * width;
-        require(
-            "prior.track_width",
-            below_width,
-            "less than half the track width",
-        )?;
+        require("prior.track_width", below_width, "less than half the track width")?;
         not_negative("prior.range_scale", prior.range_scale)?;
         positive("trust.gate", self.trust.gate)?;
         not_negative("trust.confidence", self.trust.confidence)
@@ -203,11 +181,7 @@ impl Config {
         let (right, left) = sonar.servo;
         let half_turn = core::f32::consts::PI;
         let in_order = right.0 >= -half_turn && right.0 < left.0 && left.0 <= half_turn;
-        require(
-            "sonar.servo",
-            in_order,
-            "a rightmost below a leftmost bearing, within ±180°",
-        )?;
+        require("sonar.servo", in_order, "a rightmost below a leftmost bearing, within ±180°")?;
         let narrow = sonar.cone.0 > 0.0 && sonar.cone.0 < 0.5 * half_turn;
         require("sonar.cone", narrow, "between 0 and 90° (half of the cone)")?;
         not_negative("sonar.min_range", sonar.min_range.0)?;

@@ -1,25 +1,37 @@
 //! The filter's covariance: 28 numbers, the upper triangle of a symmetric 7×7 matrix, by name.
 //!
 //! Named fields instead of indices keep the filter's equations readable, straight-line and free
-//! of bounds checks. The letters are those of the state, in its order: `x`, `y`, `h` (heading),
-//! `r` and `l` (scale errors of the right and left wheel), `w` (track-width error), `k` (range
-//! scale error).
+//! of bounds checks. The letters, in their order: `x`, `y`, `h` (heading), `c` and `d` (common part
+//! and difference of the wheels' scale errors), `w` (track-width error), `k` (range scale error).
+//!
+//! The paper's states are the scale errors of the right and the left wheel. Here they are held as
+//! `c = (S_R + S_L)/2` and `d = S_R − S_L`, because a robot on a straight leg learns d to 1e-4 from the
+//! first walls while c stays unknown to 1e-2: held wheel by wheel, the variance of d would be a
+//! difference of numbers 10⁴ times larger, and a step's process noise would vanish in their
+//! rounding. What the crate shows of itself is wheel by wheel.
 
 use nalgebra::SMatrix;
+
+use crate::ekf::State;
 
 /// Calls `$do!(entry row column)` for each entry of the upper triangle.
 macro_rules! each_entry {
     ($do:ident) => {
-        $do!(xx x x); $do!(xy x y); $do!(xh x h); $do!(xr x r); $do!(xl x l); $do!(xw x w); $do!(xk x k);
-        $do!(yy y y); $do!(yh y h); $do!(yr y r); $do!(yl y l); $do!(yw y w); $do!(yk y k);
-        $do!(hh h h); $do!(hr h r); $do!(hl h l); $do!(hw h w); $do!(hk h k);
-        $do!(rr r r); $do!(rl r l); $do!(rw r w); $do!(rk r k);
-        $do!(ll l l); $do!(lw l w); $do!(lk l k);
+        $do!(xx x x); $do!(xy x y); $do!(xh x h); $do!(xc x c); $do!(xd x d); $do!(xw x w); $do!(xk x k);
+        $do!(yy y y); $do!(yh y h); $do!(yc y c); $do!(yd y d); $do!(yw y w); $do!(yk y k);
+        $do!(hh h h); $do!(hc h c); $do!(hd h d); $do!(hw h w); $do!(hk h k);
+        $do!(cc c c); $do!(cd c d); $do!(cw c w); $do!(ck c k);
+        $do!(dd d d); $do!(dw d w); $do!(dk d k);
         $do!(ww w w); $do!(wk w k);
         $do!(kk k k);
     };
 }
 pub(crate) use each_entry;
+
+/// The values of the right and the left wheel, from those of the common part and the difference.
+pub(crate) fn wheels(common: f32, difference: f32) -> (f32, f32) {
+    (common + 0.5 * difference, common - 0.5 * difference)
+}
 
 /// One number for each state: a row of the covariance, a gain.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -27,8 +39,8 @@ pub(crate) struct Row {
     pub x: f32,
     pub y: f32,
     pub h: f32,
-    pub r: f32,
-    pub l: f32,
+    pub c: f32,
+    pub d: f32,
     pub w: f32,
     pub k: f32,
 }
@@ -37,29 +49,59 @@ pub(crate) struct Row {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[rustfmt::skip]
 pub(crate) struct Covariance {
-    pub xx: f32, pub xy: f32, pub xh: f32, pub xr: f32, pub xl: f32, pub xw: f32, pub xk: f32,
-    pub yy: f32, pub yh: f32, pub yr: f32, pub yl: f32, pub yw: f32, pub yk: f32,
-    pub hh: f32, pub hr: f32, pub hl: f32, pub hw: f32, pub hk: f32,
-    pub rr: f32, pub rl: f32, pub rw: f32, pub rk: f32,
-    pub ll: f32, pub lw: f32, pub lk: f32,
+    pub xx: f32, pub xy: f32, pub xh: f32, pub xc: f32, pub xd: f32, pub xw: f32, pub xk: f32,
+    pub yy: f32, pub yh: f32, pub yc: f32, pub yd: f32, pub yw: f32, pub yk: f32,
+    pub hh: f32, pub hc: f32, pub hd: f32, pub hw: f32, pub hk: f32,
+    pub cc: f32, pub cd: f32, pub cw: f32, pub ck: f32,
+    pub dd: f32, pub dw: f32, pub dk: f32,
     pub ww: f32, pub wk: f32,
     pub kk: f32,
 }
 
 impl Covariance {
-    /// The whole matrix, for whoever wants to compute with it.
+    /// Independent errors with these standard deviations.
+    pub fn independent(deviation: &State) -> Self {
+        let square = |sigma: f32| sigma * sigma;
+        let (rr, ll) = (square(deviation.scale_right), square(deviation.scale_left));
+        Self {
+            xx: square(deviation.x),
+            yy: square(deviation.y),
+            hh: square(deviation.heading),
+            cc: 0.25 * (rr + ll),
+            cd: 0.5 * (rr - ll),
+            dd: rr + ll,
+            ww: square(deviation.track_width_error),
+            kk: square(deviation.range_scale),
+            ..Self::default()
+        }
+    }
+
+    /// The whole matrix in the order of [`State`], with the scale errors wheel by wheel
+    /// (`docs/model.md`, eq. 9).
     #[rustfmt::skip]
     pub fn to_matrix(self) -> SMatrix<f32, 7, 7> {
         let p = self;
+        let (xr, xl) = wheels(p.xc, p.xd);
+        let (yr, yl) = wheels(p.yc, p.yd);
+        let (hr, hl) = wheels(p.hc, p.hd);
+        let (wr, wl) = wheels(p.cw, p.dw);
+        let (kr, kl) = wheels(p.ck, p.dk);
+        let (rr, ll) = self.wheel_variances();
+        let rl = p.cc - 0.25 * p.dd;
         SMatrix::<f32, 7, 7>::from_row_slice(&[
-            p.xx, p.xy, p.xh, p.xr, p.xl, p.xw, p.xk,
-            p.xy, p.yy, p.yh, p.yr, p.yl, p.yw, p.yk,
-            p.xh, p.yh, p.hh, p.hr, p.hl, p.hw, p.hk,
-            p.xr, p.yr, p.hr, p.rr, p.rl, p.rw, p.rk,
-            p.xl, p.yl, p.hl, p.rl, p.ll, p.lw, p.lk,
-            p.xw, p.yw, p.hw, p.rw, p.lw, p.ww, p.wk,
-            p.xk, p.yk, p.hk, p.rk, p.lk, p.wk, p.kk,
+            p.xx, p.xy, p.xh,   xr,   xl, p.xw, p.xk,
+            p.xy, p.yy, p.yh,   yr,   yl, p.yw, p.yk,
+            p.xh, p.yh, p.hh,   hr,   hl, p.hw, p.hk,
+              xr,   yr,   hr,   rr,   rl,   wr,   kr,
+              xl,   yl,   hl,   rl,   ll,   wl,   kl,
+            p.xw, p.yw, p.hw,   wr,   wl, p.ww, p.wk,
+            p.xk, p.yk, p.hk,   kr,   kl, p.wk, p.kk,
         ])
+    }
+
+    /// Variances of the right and the left wheel's scale error.
+    pub fn wheel_variances(&self) -> (f32, f32) {
+        wheels(self.cc + 0.25 * self.dd, 2.0 * self.cd)
     }
 
     /// P Hᵀ for a measurement that depends on x, y, heading and range scale alone.
@@ -70,8 +112,8 @@ impl Covariance {
             x: p.xx * x + p.xy * y + p.xh * h + p.xk * k,
             y: p.xy * x + p.yy * y + p.yh * h + p.yk * k,
             h: p.xh * x + p.yh * y + p.hh * h + p.hk * k,
-            r: p.xr * x + p.yr * y + p.hr * h + p.rk * k,
-            l: p.xl * x + p.yl * y + p.hl * h + p.lk * k,
+            c: p.xc * x + p.yc * y + p.hc * h + p.ck * k,
+            d: p.xd * x + p.yd * y + p.hd * h + p.dk * k,
             w: p.xw * x + p.yw * y + p.hw * h + p.wk * k,
             k: p.xk * x + p.yk * y + p.hk * h + p.kk * k,
         }
@@ -91,8 +133,8 @@ impl Covariance {
         let none_negative = p.xx >= 0.0
             && p.yy >= 0.0
             && p.hh >= 0.0
-            && p.rr >= 0.0
-            && p.ll >= 0.0
+            && p.cc >= 0.0
+            && p.dd >= 0.0
             && p.ww >= 0.0
             && p.kk >= 0.0;
         none_negative && f32::is_finite(sum)
@@ -106,8 +148,8 @@ impl Row {
             x: self.x * factor,
             y: self.y * factor,
             h: self.h * factor,
-            r: self.r * factor,
-            l: self.l * factor,
+            c: self.c * factor,
+            d: self.d * factor,
             w: self.w * factor,
             k: self.k * factor,
         }

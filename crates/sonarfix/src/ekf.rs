@@ -17,7 +17,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::covariance::{Covariance, Row, each_entry};
+use crate::covariance::{Covariance, Row, each_entry, wheels};
 use crate::motion::{Drive, Step, WheelTravel};
 use crate::pose::{Heading, Pose};
 use crate::range::ExpectedRange;
@@ -155,7 +155,8 @@ pub(crate) struct PositionCovariance {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ekf {
-    state: State,
+    mean: Mean,
+    rest: Rest,
     p: Covariance,
     drive: Drive,
 }
@@ -174,39 +175,24 @@ impl Ekf {
         if deviation.to_vector().iter().any(|&sigma| sigma < 0.0) {
             return Err(EkfError::Negative);
         }
-        let square = |sigma: f32| sigma * sigma;
-        let p = Covariance {
-            xx: square(deviation.x),
-            yy: square(deviation.y),
-            hh: square(deviation.heading),
-            rr: square(deviation.scale_right),
-            ll: square(deviation.scale_left),
-            ww: square(deviation.track_width_error),
-            kk: square(deviation.range_scale),
-            ..Covariance::default()
-        };
+        let p = Covariance::independent(&deviation);
         if !p.is_sound() {
             return Err(EkfError::NotFinite);
         }
-        let heading = Heading::new(Radians(state.heading)).radians().0;
-        Ok(Self {
-            state: State { heading, ..state },
-            p,
-            drive,
-        })
+        Ok(Self { mean: Mean::new(&state), rest: Rest::default(), p, drive })
     }
 
     /// The estimate X̂.
     #[must_use]
     pub fn state(&self) -> State {
-        self.state
+        self.mean.state()
     }
 
     /// The estimate X̂ as a 7×1 vector: x, y, heading, right and left scale error, track-width
     /// error, range scale error; metres, radians, dimensionless.
     #[must_use]
     pub fn state_vector(&self) -> SVector<f32, STATES> {
-        self.state.to_vector()
+        self.state().to_vector()
     }
 
     /// The covariance P, 7×7, exactly symmetric, in the order of [`Self::state_vector`].
@@ -219,12 +205,13 @@ impl Ekf {
     #[must_use]
     pub fn deviation(&self) -> State {
         let p = &self.p;
+        let (rr, ll) = p.wheel_variances();
         State {
             x: libm::sqrtf(p.xx),
             y: libm::sqrtf(p.yy),
             heading: libm::sqrtf(p.hh),
-            scale_right: libm::sqrtf(p.rr),
-            scale_left: libm::sqrtf(p.ll),
+            scale_right: libm::sqrtf(rr),
+            scale_left: libm::sqrtf(ll),
             track_width_error: libm::sqrtf(p.ww),
             range_scale: libm::sqrtf(p.kk),
         }
@@ -232,11 +219,7 @@ impl Ekf {
 
     /// Variances and covariance of x and y, m².
     pub(crate) fn position_covariance(&self) -> PositionCovariance {
-        PositionCovariance {
-            xx: self.p.xx,
-            xy: self.p.xy,
-            yy: self.p.yy,
-        }
+        PositionCovariance { xx: self.p.xx, xy: self.p.xy, yy: self.p.yy }
     }
 
     /// Predicts the state over one step of the wheels: `X̂ ← f(X̂, U)`, `P ← F P Fᵀ + Q`
@@ -256,22 +239,22 @@ impl Ekf {
         if travel == WheelTravel::default() {
             return Ok(());
         }
-        let step = Step::new(&self.drive, &self.state, travel);
-        let state = State {
-            x: self.state.x + step.advance * step.cos,
-            y: self.state.y + step.advance * step.sin,
-            heading: Heading::new(Radians(self.state.heading + step.turn))
-                .radians()
-                .0,
-            ..self.state
-        };
+        let step = Step::new(&self.drive, &self.mean, travel);
+        let (mut mean, mut rest) = (self.mean, self.rest);
+        add(&mut mean.x, &mut rest.x, step.advance * step.cos);
+        add(&mut mean.y, &mut rest.y, step.advance * step.sin);
+        add(&mut mean.heading, &mut rest.heading, step.turn);
+
         let mut p = propagated(&self.p, &step);
-        let scale_walk = self.drive.scale_walk.0 * self.drive.scale_walk.0 * travel.distance().0;
+        let scale_walk = self.drive.scale_walk.0;
         let width_walk = self.drive.track_width_walk.0.0;
-        p.rr += scale_walk;
-        p.ll += scale_walk;
-        p.ww += width_walk * width_walk * travel.distance().0;
-        self.replace(state, p)
+        let distance = travel.distance().0;
+        // Of two independent walks the mean has half the variance, the difference twice.
+        let scale_variance = scale_walk * scale_walk * distance;
+        add(&mut p.cc, &mut rest.cc, 0.5 * scale_variance);
+        add(&mut p.dd, &mut rest.dd, 2.0 * scale_variance);
+        add(&mut p.ww, &mut rest.ww, width_walk * width_walk * distance);
+        self.replace(mean, rest, p)
     }
 
     /// The innovation that a measured `range` would bring, with noise variance `noise`
@@ -327,18 +310,15 @@ impl Ekf {
         let per_variance = 1.0 / innovation_variance(expected, &m, noise);
         let gain = m.scaled(per_variance);
         let innovation = (range - expected.range).0;
-        let s = &self.state;
-        let heading = s.heading + gain.h * innovation;
-        let state = State {
-            x: s.x + gain.x * innovation,
-            y: s.y + gain.y * innovation,
-            heading: Heading::new(Radians(heading)).radians().0,
-            scale_right: s.scale_right + gain.r * innovation,
-            scale_left: s.scale_left + gain.l * innovation,
-            track_width_error: s.track_width_error + gain.w * innovation,
-            range_scale: s.range_scale + gain.k * innovation,
-        };
-        self.replace(state, corrected(&self.p, &m, &gain, expected, noise))
+        let (mut mean, mut rest) = (self.mean, self.rest);
+        add(&mut mean.x, &mut rest.x, gain.x * innovation);
+        add(&mut mean.y, &mut rest.y, gain.y * innovation);
+        add(&mut mean.heading, &mut rest.heading, gain.h * innovation);
+        mean.scale_common += gain.c * innovation;
+        mean.scale_difference += gain.d * innovation;
+        mean.track_width_error += gain.w * innovation;
+        mean.range_scale += gain.k * innovation;
+        self.replace(mean, rest, corrected(&self.p, &m, &gain, expected, noise))
     }
 
     /// P Hᵀ: the covariance of each state with the expected range.
@@ -347,15 +327,84 @@ impl Ekf {
         self.p.times(e.by_x, e.by_y, e.by_heading, e.by_range_scale)
     }
 
-    /// Takes the new state and covariance if they are sound; changes nothing if not.
-    fn replace(&mut self, state: State, p: Covariance) -> Result<(), EkfError> {
-        if !state.is_finite() || !p.is_sound() {
+    /// Takes the new numbers if they are sound; changes nothing if not.
+    fn replace(&mut self, mean: Mean, rest: Rest, p: Covariance) -> Result<(), EkfError> {
+        if !mean.state().is_finite() || !p.is_sound() {
             return Err(EkfError::NotFinite);
         }
-        self.state = state;
+        self.mean = mean.wrapped();
+        self.rest = rest;
         self.p = p;
         Ok(())
     }
+}
+
+/// The state as the filter holds it: the scale errors as their mean and their difference, for the
+/// covariance's sake ([`crate::covariance`] says why).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Mean {
+    pub x: f32,
+    pub y: f32,
+    pub heading: f32,
+    pub scale_common: f32,
+    pub scale_difference: f32,
+    pub track_width_error: f32,
+    pub range_scale: f32,
+}
+
+impl Mean {
+    fn new(state: &State) -> Self {
+        let mean = Self {
+            x: state.x,
+            y: state.y,
+            heading: state.heading,
+            scale_common: 0.5 * (state.scale_right + state.scale_left),
+            scale_difference: state.scale_right - state.scale_left,
+            track_width_error: state.track_width_error,
+            range_scale: state.range_scale,
+        };
+        mean.wrapped()
+    }
+
+    fn state(&self) -> State {
+        let (scale_right, scale_left) = wheels(self.scale_common, self.scale_difference);
+        State {
+            x: self.x,
+            y: self.y,
+            heading: self.heading,
+            scale_right,
+            scale_left,
+            track_width_error: self.track_width_error,
+            range_scale: self.range_scale,
+        }
+    }
+
+    fn wrapped(self) -> Self {
+        Self { heading: Heading::new(Radians(self.heading)).radians().0, ..self }
+    }
+}
+
+/// What rounding has left over of the sums that grow by small steps.
+///
+/// 40 m from the origin one step of an `f32` is 4 µm, and a leg is a thousand additions: the
+/// rounding alone would move the estimate by a fiftieth of its own deviation. And what a scale
+/// error walks in one step is too little to change its variance at all as long as that is wide.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Rest {
+    x: f32,
+    y: f32,
+    heading: f32,
+    cc: f32,
+    dd: f32,
+    ww: f32,
+}
+
+/// Adds a change to a sum together with what rounding left over of the earlier ones (Kahan).
+fn add(sum: &mut f32, rest: &mut f32, change: f32) {
+    let change = change + *rest;
+    let before = *sum;
+    *sum = before + change;
+    *rest = change - (*sum - before);
 }
 
 /// S = H P Hᵀ + R, given m = P Hᵀ.
@@ -375,18 +424,18 @@ fn propagated(p: &Covariance, step: &Step) -> Covariance {
     // ∂x/∂m and ∂y/∂m.
     let (swing_x, swing_y) = (-step.advance * sin, step.advance * cos);
 
-    let turn_with = |r: f32, l: f32, w: f32| step.turn_r * r + step.turn_l * l + step.turn_w * w;
-    let advance_with = |r: f32, l: f32| step.advance_r * r + step.advance_l * l;
-    let (tr, tl) = (turn_with(p.rr, p.rl, p.rw), turn_with(p.rl, p.ll, p.lw));
-    let (tw, tk) = (turn_with(p.rw, p.lw, p.ww), turn_with(p.rk, p.lk, p.wk));
-    let (sr, sl) = (advance_with(p.rr, p.rl), advance_with(p.rl, p.ll));
-    let (sw, sk) = (advance_with(p.rw, p.lw), advance_with(p.rk, p.lk));
-    let (xt, xs) = (turn_with(p.xr, p.xl, p.xw), advance_with(p.xr, p.xl));
-    let (yt, ys) = (turn_with(p.yr, p.yl, p.yw), advance_with(p.yr, p.yl));
-    let (ht, hs) = (turn_with(p.hr, p.hl, p.hw), advance_with(p.hr, p.hl));
-    let tt = turn_with(tr, tl, tw) + step.turn_variance;
-    let ts = advance_with(tr, tl) + step.advance_turn;
-    let ss = advance_with(sr, sl) + step.advance_variance;
+    let turn_with = |c: f32, d: f32, w: f32| step.turn_c * c + step.turn_d * d + step.turn_w * w;
+    let advance_with = |c: f32, d: f32| step.advance_c * c + step.advance_d * d;
+    let (tc, td) = (turn_with(p.cc, p.cd, p.cw), turn_with(p.cd, p.dd, p.dw));
+    let (tw, tk) = (turn_with(p.cw, p.dw, p.ww), turn_with(p.ck, p.dk, p.wk));
+    let (sc, sd) = (advance_with(p.cc, p.cd), advance_with(p.cd, p.dd));
+    let (sw, sk) = (advance_with(p.cw, p.dw), advance_with(p.ck, p.dk));
+    let (xt, xs) = (turn_with(p.xc, p.xd, p.xw), advance_with(p.xc, p.xd));
+    let (yt, ys) = (turn_with(p.yc, p.yd, p.yw), advance_with(p.yc, p.yd));
+    let (ht, hs) = (turn_with(p.hc, p.hd, p.hw), advance_with(p.hc, p.hd));
+    let tt = turn_with(tc, td, tw) + step.turn_variance;
+    let ts = advance_with(tc, td) + step.advance_turn;
+    let ss = advance_with(sc, sd) + step.advance_variance;
 
     let (xm, ym, hm) = (p.xh + 0.5 * xt, p.yh + 0.5 * yt, p.hh + 0.5 * ht);
     let mt = ht + 0.5 * tt;
@@ -396,27 +445,28 @@ fn propagated(p: &Covariance, step: &Step) -> Covariance {
     let (ways_xs, ways_ys) = (swing_x * ms + cos * ss, swing_y * ms + sin * ss);
     let (m_new, s_new) = (hm + mt, hs + ts);
 
-    let along_x = |of: f32, m: f32, s: f32| of + swing_x * m + cos * s;
-    let along_y = |of: f32, m: f32, s: f32| of + swing_y * m + sin * s;
-    let (rm, lm) = (p.hr + 0.5 * tr, p.hl + 0.5 * tl);
+    // Each entry is added to once, with its whole change: it may be far larger, and rounds.
+    let along_x = |m: f32, s: f32| swing_x * m + cos * s;
+    let along_y = |m: f32, s: f32| swing_y * m + sin * s;
+    let (cm, dm) = (p.hc + 0.5 * tc, p.hd + 0.5 * td);
     let (wm, km) = (p.hw + 0.5 * tw, p.hk + 0.5 * tk);
     Covariance {
-        xx: along_x(p.xx + 2.0 * (swing_x * xm + cos * xs), ways_xm, ways_xs),
-        xy: along_y(along_x(p.xy, ym, ys), xm + ways_xm, xs + ways_xs),
-        xh: along_x(p.xh + xt, m_new, s_new),
-        xr: along_x(p.xr, rm, sr),
-        xl: along_x(p.xl, lm, sl),
-        xw: along_x(p.xw, wm, sw),
-        xk: along_x(p.xk, km, sk),
-        yy: along_y(p.yy + 2.0 * (swing_y * ym + sin * ys), ways_ym, ways_ys),
-        yh: along_y(p.yh + yt, m_new, s_new),
-        yr: along_y(p.yr, rm, sr),
-        yl: along_y(p.yl, lm, sl),
-        yw: along_y(p.yw, wm, sw),
-        yk: along_y(p.yk, km, sk),
-        hh: p.hh + ht + mt + 0.5 * tt,
-        hr: p.hr + tr,
-        hl: p.hl + tl,
+        xx: p.xx + (2.0 * along_x(xm, xs) + along_x(ways_xm, ways_xs)),
+        xy: p.xy + (along_x(ym, ys) + along_y(xm + ways_xm, xs + ways_xs)),
+        xh: p.xh + (xt + along_x(m_new, s_new)),
+        xc: p.xc + along_x(cm, sc),
+        xd: p.xd + along_x(dm, sd),
+        xw: p.xw + along_x(wm, sw),
+        xk: p.xk + along_x(km, sk),
+        yy: p.yy + (2.0 * along_y(ym, ys) + along_y(ways_ym, ways_ys)),
+        yh: p.yh + (yt + along_y(m_new, s_new)),
+        yc: p.yc + along_y(cm, sc),
+        yd: p.yd + along_y(dm, sd),
+        yw: p.yw + along_y(wm, sw),
+        yk: p.yk + along_y(km, sk),
+        hh: p.hh + (ht + mt + 0.5 * tt),
+        hc: p.hc + tc,
+        hd: p.hd + td,
         hw: p.hw + tw,
         hk: p.hk + tk,
         ..*p
@@ -447,8 +497,8 @@ fn corrected(
         x: gain.x * r - left_over.x,
         y: gain.y * r - left_over.y,
         h: gain.h * r - left_over.h,
-        r: gain.r * r - left_over.r,
-        l: gain.l * r - left_over.l,
+        c: gain.c * r - left_over.c,
+        d: gain.d * r - left_over.d,
         w: gain.w * r - left_over.w,
         k: gain.k * r - left_over.k,
     };

@@ -199,13 +199,7 @@ impl<'m> Localizer<'m> {
             range_scale: prior.range_scale,
         };
         let ekf = Ekf::new(config.drive, state, deviation).map_err(StartError::Start)?;
-        Ok(Self {
-            config,
-            map,
-            ekf,
-            health: Health::default(),
-            time: now,
-        })
+        Ok(Self { config, map, ekf, health: Health::default(), time: now })
     }
 
     /// Takes the travel of both wheels since the last call, up to the time `now`: at every
@@ -215,17 +209,13 @@ impl<'m> Localizer<'m> {
     /// [`OdometryError`], by what is wrong with the travel or its time; nothing has changed, the
     /// time included.
     pub fn odometry(&mut self, now: Instant, travel: WheelTravel) -> Result<(), OdometryError> {
-        let elapsed = now
-            .checked_duration_since(self.time)
-            .ok_or(OdometryError::TimeRanBackwards)?;
+        let elapsed =
+            now.checked_duration_since(self.time).ok_or(OdometryError::TimeRanBackwards)?;
         if !travel.is_finite() {
             return Err(OdometryError::Filter(EkfError::NotFinite));
         }
-        let fastest = if travel.right.abs() > travel.left.abs() {
-            travel.right
-        } else {
-            travel.left
-        };
+        let fastest =
+            if travel.right.abs() > travel.left.abs() { travel.right } else { travel.left };
         if elapsed.is_zero() && fastest.abs() > Metres(0.0) {
             return Err(OdometryError::NoTimePassed);
         }

@@ -71,13 +71,7 @@ impl Wall {
         }
         let (tangent_x, tangent_y) = (dx / length, dy / length);
         let normal = Heading::new(Radians(libm::atan2f(tangent_x, -tangent_y)));
-        Ok(Self {
-            from,
-            tangent_x,
-            tangent_y,
-            length,
-            normal,
-        })
+        Ok(Self { from, tangent_x, tangent_y, length, normal })
     }
 
     /// The end the wall was drawn from.

@@ -9,7 +9,8 @@
 //! Nothing here refuses a value; [`Ekf::predict`](crate::ekf::Ekf::predict) checks the travel
 //! before and the state after.
 
-use crate::ekf::State;
+use crate::covariance::wheels;
+use crate::ekf::Mean;
 use crate::trig::sin_cos;
 use crate::units::{Metres, PerRootMetre, Radians};
 
@@ -28,10 +29,7 @@ impl WheelTravel {
     /// A travel from metres.
     #[must_use]
     pub const fn new(right: f32, left: f32) -> Self {
-        Self {
-            right: Metres(right),
-            left: Metres(left),
-        }
+        Self { right: Metres(right), left: Metres(left) }
     }
 
     /// Mean distance the wheels rolled, forwards or backwards: what process noise grows with.
@@ -71,12 +69,13 @@ pub(crate) struct Step {
     pub advance: f32,
     /// Turn, Δψ, radians.
     pub turn: f32,
-    /// Derivatives of Δs by the right and left scale error; Δs does not depend on δD.
-    pub advance_r: f32,
-    pub advance_l: f32,
-    /// Derivatives of Δψ by the right and left scale error and by the track-width error.
-    pub turn_r: f32,
-    pub turn_l: f32,
+    /// Derivatives of Δs by the common part and the difference of the scale errors; Δs does not
+    /// depend on the track width.
+    pub advance_c: f32,
+    pub advance_d: f32,
+    /// Derivatives of Δψ by the common part, the difference, and the track-width error.
+    pub turn_c: f32,
+    pub turn_d: f32,
     pub turn_w: f32,
     /// Noise of the pair (Δs, Δψ): variances and covariance.
     pub advance_variance: f32,
@@ -85,13 +84,13 @@ pub(crate) struct Step {
 }
 
 impl Step {
-    pub fn new(drive: &Drive, state: &State, travel: WheelTravel) -> Self {
+    pub fn new(drive: &Drive, at: &Mean, travel: WheelTravel) -> Self {
         let (right, left) = (travel.right.0, travel.left.0);
-        let (factor_r, factor_l) = (1.0 + state.scale_right, 1.0 + state.scale_left);
+        let (factor_r, factor_l) = wheels(1.0 + at.scale_common, at.scale_difference);
         let (rolled_r, rolled_l) = (right * factor_r, left * factor_l);
-        let per_width = 1.0 / (drive.track_width.0 + state.track_width_error);
+        let per_width = 1.0 / (drive.track_width.0 + at.track_width_error);
         let turn = (rolled_r - rolled_l) * per_width;
-        let (sin, cos) = sin_cos(Radians(state.heading + 0.5 * turn));
+        let (sin, cos) = sin_cos(Radians(at.heading + 0.5 * turn));
 
         let per_metre = drive.wheel_noise.0.0 * drive.wheel_noise.0.0;
         let noise_r = per_metre * right.abs() * factor_r * factor_r;
@@ -101,10 +100,10 @@ impl Step {
             cos,
             advance: 0.5 * (rolled_r + rolled_l),
             turn,
-            advance_r: 0.5 * right,
-            advance_l: 0.5 * left,
-            turn_r: right * per_width,
-            turn_l: -left * per_width,
+            advance_c: 0.5 * (right + left),
+            advance_d: 0.25 * (right - left),
+            turn_c: (right - left) * per_width,
+            turn_d: 0.5 * (right + left) * per_width,
             turn_w: -turn * per_width,
             advance_variance: 0.25 * (noise_r + noise_l),
             turn_variance: (noise_r + noise_l) * per_width * per_width,

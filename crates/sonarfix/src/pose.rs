@@ -26,10 +26,7 @@ impl Point {
     /// A point from its coordinates in metres.
     #[must_use]
     pub const fn new(x: f32, y: f32) -> Self {
-        Self {
-            x: Metres(x),
-            y: Metres(y),
-        }
+        Self { x: Metres(x), y: Metres(y) }
     }
 
     /// Whether both coordinates are finite.
@@ -112,20 +109,13 @@ impl Pose {
     /// A pose from metres and an angle, which is wrapped.
     #[must_use]
     pub fn new(x: f32, y: f32, heading: Radians) -> Self {
-        Self {
-            x: Metres(x),
-            y: Metres(y),
-            heading: Heading::new(heading),
-        }
+        Self { x: Metres(x), y: Metres(y), heading: Heading::new(heading) }
     }
 
     /// The position without the heading.
     #[must_use]
     pub fn position(self) -> Point {
-        Point {
-            x: self.x,
-            y: self.y,
-        }
+        Point { x: self.x, y: self.y }
     }
 
     /// Whether all three numbers are finite.

@@ -49,18 +49,12 @@ pub fn sin_cos(angle: Radians) -> (f32, f32) {
     }
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "a float-to-int cast saturates; NaN gives 0"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "a float-to-int cast saturates; NaN gives 0")]
 fn nearest_integer(x: f32) -> i32 {
     (if x < 0.0 { x - 0.5 } else { x + 0.5 }) as i32
 }
 
-#[expect(
-    clippy::cast_precision_loss,
-    reason = "exact within RANGE, where quadrants are below 2^7"
-)]
+#[expect(clippy::cast_precision_loss, reason = "exact within RANGE, where quadrants are below 2^7")]
 fn quadrant_as_float(quadrant: i32) -> f32 {
     quadrant as f32
 }

@@ -45,10 +45,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         return super::print_json(&ticks.filter_map(row).collect::<Vec<_>>());
     }
     let table = Table {
-        title: format!(
-            "The bound on each state's deviation ({})",
-            simulation.scenario.name
-        ),
+        title: format!("The bound on each state's deviation ({})", simulation.scenario.name),
         note: format!("for the fixes of the run with seed {seed}"),
         columns: [
             "t (s)",
@@ -83,10 +80,7 @@ fn spaced(ticks: &[Tick], every: f64) -> impl Iterator<Item = &Tick> {
 
 fn row(tick: &Tick) -> Option<Row> {
     let states = crate::STATES.into_iter().zip(tick.bound?).collect();
-    Some(Row {
-        time: tick.time,
-        states,
-    })
+    Some(Row { time: tick.time, states })
 }
 
 fn cells(tick: &Tick) -> Option<Vec<String>> {

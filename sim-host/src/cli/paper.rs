@@ -11,7 +11,7 @@ use crate::simulate::Simulation;
 pub struct Args {
     /// How many runs.
     #[arg(long, default_value_t = 50)]
-    runs: usize,
+    runs: u32,
     /// Seed of the first run; the others count up from it.
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -44,14 +44,11 @@ impl From<PolicyName> for Policy {
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
-    let mut scenario =
-        Scenario::parse(sonarfix_map::PAPER, "paper.toml", std::path::Path::new(""))?;
+    let mut scenario = Scenario::paper()?;
     scenario.robot.config.policy = args.policy.into();
     if args.statistics {
-        scenario.name = "paper-statistics".to_owned();
-        let drive = scenario.robot.config.drive;
-        scenario.truth.scale_walk = drive.scale_walk.0.into();
-        scenario.truth.track_width_walk = drive.track_width_walk.0.0.into();
+        scenario.name.push_str("-statistics");
+        scenario.let_truth_walk_as_assumed();
     }
     let experiment = Experiment {
         simulation: Simulation::new(scenario),

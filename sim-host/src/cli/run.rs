@@ -20,7 +20,7 @@ pub struct Args {
     scenario: PathBuf,
     /// How many runs; the scenario's own number if not given.
     #[arg(long)]
-    runs: Option<usize>,
+    runs: Option<u32>,
     /// Seed of the first run; the others count up from it.
     #[arg(long)]
     seed: Option<u64>,
@@ -45,10 +45,7 @@ pub struct Output {
 pub fn execute(args: &Args) -> anyhow::Result<()> {
     let scenario = Scenario::read(&args.scenario)?;
     let experiment = Experiment {
-        runs: match args.runs {
-            Some(runs) => runs,
-            None => usize::try_from(scenario.run.runs)?,
-        },
+        runs: args.runs.unwrap_or(scenario.run.runs),
         seed: args.seed.unwrap_or(scenario.run.seed),
         simulation: Simulation::new(scenario),
         beside_paper: false,
@@ -71,7 +68,7 @@ fn write_trace(trace: &Trace, file: &Path) -> anyhow::Result<()> {
 #[derive(Debug)]
 pub struct Experiment {
     pub simulation: Simulation,
-    pub runs: usize,
+    pub runs: u32,
     pub seed: u64,
     /// Whether the paper's figures belong beside ours.
     pub beside_paper: bool,
@@ -102,14 +99,9 @@ impl Experiment {
     }
 
     fn table(&self, summary: &Summary) -> crate::report::Table {
-        let truth = self.simulation.truth_at_end();
-        table::states(
-            summary,
-            &Beside {
-                truth,
-                paper: self.beside_paper,
-            },
-        )
+        let t = &self.simulation.scenario.truth;
+        let truth = [0.0, 0.0, 0.0, t.scale_right, t.scale_left, t.track_width, t.range_scale];
+        table::states(summary, &Beside { truth, paper: self.beside_paper })
     }
 
     fn report(&self, summary: &Summary, trace: &Trace, dir: &Path) -> anyhow::Result<PathBuf> {

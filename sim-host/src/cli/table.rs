@@ -12,30 +12,12 @@ pub struct PaperRow {
 
 /// Table 1 of the paper, in the order of the states.
 const TABLE_1: [PaperRow; 6] = [
-    PaperRow {
-        mean: "0.2",
-        deviation: "3.5",
-    },
-    PaperRow {
-        mean: "-0.02",
-        deviation: "0.2",
-    },
-    PaperRow {
-        mean: "-0.2",
-        deviation: "0.25",
-    },
-    PaperRow {
-        mean: "-0.0065",
-        deviation: "1.75e-4",
-    },
-    PaperRow {
-        mean: "7.9e-4",
-        deviation: "1.95e-4",
-    },
-    PaperRow {
-        mean: "349",
-        deviation: "0.7",
-    },
+    PaperRow { mean: "0.2", deviation: "3.5" },
+    PaperRow { mean: "-0.02", deviation: "0.2" },
+    PaperRow { mean: "-0.2", deviation: "0.25" },
+    PaperRow { mean: "-0.0065", deviation: "1.75e-4" },
+    PaperRow { mean: "7.9e-4", deviation: "1.95e-4" },
+    PaperRow { mean: "349", deviation: "0.7" },
 ];
 
 /// How a state is shown: its name, its unit, and how many of that unit make one of SI.
@@ -46,48 +28,21 @@ struct Shown {
 }
 
 const SHOWN: [Shown; 7] = [
-    Shown {
-        label: "X (mm)",
-        per_si: 1e3,
-        scientific: false,
-    },
-    Shown {
-        label: "Y (mm)",
-        per_si: 1e3,
-        scientific: false,
-    },
-    Shown {
-        label: "heading (deg)",
-        per_si: 180.0 / std::f64::consts::PI,
-        scientific: false,
-    },
-    Shown {
-        label: "S_R",
-        per_si: 1.0,
-        scientific: true,
-    },
-    Shown {
-        label: "S_L",
-        per_si: 1.0,
-        scientific: true,
-    },
-    Shown {
-        label: "track width (mm)",
-        per_si: 1e3,
-        scientific: false,
-    },
-    Shown {
-        label: "range scale",
-        per_si: 1.0,
-        scientific: true,
-    },
+    Shown { label: "X error (mm)", per_si: 1e3, scientific: false },
+    Shown { label: "Y error (mm)", per_si: 1e3, scientific: false },
+    Shown { label: "heading error (deg)", per_si: 180.0 / std::f64::consts::PI, scientific: false },
+    Shown { label: "S_R", per_si: 1.0, scientific: true },
+    Shown { label: "S_L", per_si: 1.0, scientific: true },
+    Shown { label: "track width (mm)", per_si: 1e3, scientific: false },
+    Shown { label: "range scale", per_si: 1.0, scientific: true },
 ];
 
 /// What a table of estimates is given beside the summary: the true values at the end and, for the
 /// paper's scenario, the paper's own figures.
 #[derive(Debug, Clone, Copy)]
 pub struct Beside {
-    /// True value of each state at the end, SI; the track width whole.
+    /// What each row's mean should be, SI: nothing for the errors of the pose, the true value for
+    /// a systematic error, the whole of the track width.
     pub truth: [f64; 7],
     /// Whether to show the paper's columns.
     pub paper: bool,
@@ -100,12 +55,7 @@ pub fn states(summary: &Summary, beside: &Beside) -> Table {
     if beside.paper {
         columns.extend(["paper's mean", "paper's deviation"]);
     }
-    let rows = summary
-        .states
-        .iter()
-        .zip(&SHOWN)
-        .zip(beside.truth)
-        .enumerate();
+    let rows = summary.states.iter().zip(&SHOWN).zip(beside.truth).enumerate();
     let rows = rows
         .filter(|(_, ((state, _), _))| state.rms_over_bound.is_some())
         .map(|(i, ((state, shown), truth))| {
@@ -129,23 +79,11 @@ pub fn states(summary: &Summary, beside: &Beside) -> Table {
 fn state_row(state: &StateSummary, shown: &Shown, truth: f64) -> Vec<String> {
     let in_unit = |si: f64| {
         let value = si * shown.per_si;
-        if shown.scientific {
-            format!("{value:.2e}")
-        } else {
-            format!("{value:.3}")
-        }
+        if shown.scientific { format!("{value:.3e}") } else { format!("{value:.3}") }
     };
-    let mut row = vec![
-        shown.label.to_owned(),
-        in_unit(truth),
-        in_unit(truth + state.mean_error),
-    ];
+    let mut row = vec![shown.label.to_owned(), in_unit(truth), in_unit(truth + state.mean_error)];
     row.extend([state.std_error, state.bound].map(in_unit));
-    row.push(
-        state
-            .rms_over_bound
-            .map_or_else(String::new, |ratio| format!("{ratio:.3}")),
-    );
+    row.push(state.rms_over_bound.map_or_else(String::new, |ratio| format!("{ratio:.3}")));
     row
 }
 
@@ -178,22 +116,15 @@ fn note(summary: &Summary) -> String {
 pub fn text(table: &Table) -> String {
     let lines: Vec<&Vec<String>> = std::iter::once(&table.columns).chain(&table.rows).collect();
     let width = |column: usize| {
-        lines
-            .iter()
-            .filter_map(|line| line.get(column))
-            .map(|cell| cell.chars().count())
-            .max()
+        lines.iter().filter_map(|line| line.get(column)).map(|cell| cell.chars().count()).max()
     };
     let mut text = format!("{}\n", table.title);
     for line in &lines {
         for (column, cell) in line.iter().enumerate() {
             let width = width(column).unwrap_or(0);
             // Names to the left, numbers to the right.
-            let cell = if column == 0 {
-                format!("{cell:<width$}")
-            } else {
-                format!("  {cell:>width$}")
-            };
+            let cell =
+                if column == 0 { format!("{cell:<width$}") } else { format!("  {cell:>width$}") };
             text.push_str(&cell);
         }
         text.push('\n');

@@ -1,0 +1,55 @@
+//! `docs/formats.md` is true: its examples are read, and every key they have is explained.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use sonarfix_map::{FileError, Floor, Robot, Scenario};
+
+// Outside the crate, and so read when the test runs: the packaged crate does not hold it.
+const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/formats.md");
+
+/// The TOML examples of a page: what kind of file each is, and its text.
+fn examples(page: &str) -> Vec<(&str, &str)> {
+    let blocks = page.split("```toml ").skip(1);
+    blocks.filter_map(|block| block.split("```").next()?.split_once('\n')).collect()
+}
+
+fn read(kind: &str, text: &str) -> Result<(), FileError> {
+    match kind {
+        "map" => Floor::parse(text, kind).map(drop),
+        "robot" => Robot::parse(text, kind).map(drop),
+        _ => Scenario::parse(text, kind, Path::new("")).map(drop),
+    }
+}
+
+#[test]
+fn every_example_is_read() {
+    let page = std::fs::read_to_string(PAGE).unwrap();
+    let examples = examples(&page);
+    let kinds: Vec<_> = examples.iter().map(|(kind, _)| *kind).collect();
+    assert_eq!(kinds, ["map", "robot", "scenario"]);
+    for (kind, text) in examples {
+        assert_eq!(read(kind, text), Ok(()));
+    }
+}
+
+#[test]
+fn every_key_is_explained() {
+    let page = std::fs::read_to_string(PAGE).unwrap();
+    let key = |line: &'_ str| {
+        let (key, _) = line.split_once(" = ")?;
+        Some(key.trim_start_matches(['{', ' ']).to_owned())
+    };
+    let text: String = examples(&page).into_iter().map(|(_, text)| text).collect();
+    let keys: BTreeSet<_> = text.lines().filter_map(key).collect();
+    assert!(keys.len() > 35, "{keys:?}");
+    let rows: Vec<_> = page.lines().filter(|line| line.starts_with("| `")).collect();
+    let is_explained = |key: &String| {
+        let name = format!("`{key}`");
+        let explains =
+            |row: &&str| row.split(" | ").next().is_some_and(|cell| cell.contains(&name));
+        key == "format" || rows.iter().any(explains)
+    };
+    let missing: Vec<_> = keys.iter().filter(|key| !is_explained(key)).collect();
+    assert!(missing.is_empty(), "{missing:?}");
+}
