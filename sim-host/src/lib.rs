@@ -12,6 +12,7 @@ pub mod monte_carlo;
 pub mod observe;
 pub mod odometry;
 pub mod plant;
+pub mod replay;
 pub mod report;
 pub mod simulate;
 pub mod statistics;

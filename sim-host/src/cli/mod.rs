@@ -2,6 +2,7 @@
 
 mod bound;
 mod paper;
+mod replay;
 mod run;
 mod table;
 
@@ -21,6 +22,8 @@ enum Command {
     Paper(paper::Args),
     /// Runs any scenario.
     Run(run::Args),
+    /// Replays the recording of a robot through the localizer.
+    Replay(replay::Args),
     /// Prints how well any estimator could know the robot's state, over time.
     Bound(bound::Args),
 }
@@ -34,6 +37,7 @@ impl Cli {
         match self.command {
             Command::Paper(args) => paper::execute(&args),
             Command::Run(args) => run::execute(&args),
+            Command::Replay(args) => replay::execute(&args),
             Command::Bound(args) => bound::execute(&args),
         }
     }
