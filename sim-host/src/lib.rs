@@ -7,6 +7,7 @@
 pub mod angle;
 pub mod bound;
 pub mod cli;
+pub mod convert;
 pub mod dense;
 pub mod monte_carlo;
 pub mod observe;

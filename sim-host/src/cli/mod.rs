@@ -1,6 +1,7 @@
 //! The command line: what can be asked, and where the answers go.
 
 mod bound;
+mod convert;
 mod paper;
 mod replay;
 mod run;
@@ -24,6 +25,8 @@ enum Command {
     Run(run::Args),
     /// Replays the recording of a robot through the localizer.
     Replay(replay::Args),
+    /// Converts recordings of other formats for `replay`.
+    Convert(convert::Args),
     /// Prints how well any estimator could know the robot's state, over time.
     Bound(bound::Args),
 }
@@ -38,6 +41,7 @@ impl Cli {
             Command::Paper(args) => paper::execute(&args),
             Command::Run(args) => run::execute(&args),
             Command::Replay(args) => replay::execute(&args),
+            Command::Convert(args) => convert::execute(&args),
             Command::Bound(args) => bound::execute(&args),
         }
     }
