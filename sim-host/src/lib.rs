@@ -24,3 +24,8 @@ pub mod world;
 /// The names of the filter's states, in its order.
 pub const STATES: [&str; 7] =
     ["x", "y", "heading", "scale_right", "scale_left", "track_width", "range_scale"];
+
+/// The README's example, so that the tests compile it.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+pub struct Readme;

@@ -179,7 +179,7 @@ const CONFIG: [Case; 17] = [
         "wheel_noise = \"0.5",
         "wheel_noise = \"-1",
         "robot.drive.wheel_noise",
-        "must be zero or positive",
+        "must be positive",
     ),
     value(
         "scale_walk = \"5",

@@ -20,15 +20,7 @@ use crate::pose::{Heading, Point};
 use crate::range::ExpectedRange;
 use crate::units::{Metres, Radians};
 
-/// How the wall is chosen among those that count.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Policy {
-    /// The nearest: the paper's choice, because a sonar's noise grows with range.
-    Nearest,
-    /// The one whose range lowers the variance of the position most.
-    Informative,
-}
+pub use crate::config::Policy;
 
 /// One look of the sonar at one wall.
 #[derive(Debug, Clone, Copy, PartialEq)]

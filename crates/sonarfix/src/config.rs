@@ -4,7 +4,6 @@
 //! [`Config::check`] refuses NaN and infinity in every field;
 //! [`Localizer::new`](crate::localizer::Localizer::new) calls it.
 
-use crate::aim::Policy;
 use crate::motion::Drive;
 use crate::pose::Point;
 use crate::range::RangeNoise;
@@ -54,6 +53,16 @@ pub struct Trust {
     /// A wall counts as one to look at only if it stays so when the pose is wrong by this many of
     /// its standard deviations.
     pub confidence: f32,
+}
+
+/// How the wall is chosen among those that count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Policy {
+    /// The nearest: the paper's choice, because a sonar's noise grows with range.
+    Nearest,
+    /// The one whose range lowers the variance of the position most.
+    Informative,
 }
 
 /// The configuration of a localizer.
@@ -169,7 +178,8 @@ impl Config {
 
     fn check_drive(&self) -> Result<(), ConfigError> {
         positive("drive.track_width", self.drive.track_width.0)?;
-        not_negative("drive.wheel_noise", self.drive.wheel_noise.0.0)?;
+        // Without any, P would be tied ever more sharply, and then by rounding alone.
+        positive("drive.wheel_noise", self.drive.wheel_noise.0.0)?;
         not_negative("drive.scale_walk", self.drive.scale_walk.0)?;
         not_negative("drive.track_width_walk", self.drive.track_width_walk.0.0)?;
         positive("max_wheel_speed", self.max_wheel_speed.0)

@@ -12,7 +12,7 @@
 
 use nalgebra::SMatrix;
 
-use crate::ekf::State;
+use crate::state::{State, wheels};
 
 /// Calls `$do!(entry row column)` for each entry of the upper triangle.
 macro_rules! each_entry {
@@ -27,11 +27,6 @@ macro_rules! each_entry {
     };
 }
 pub(crate) use each_entry;
-
-/// The values of the right and the left wheel, from those of the common part and the difference.
-pub(crate) fn wheels(common: f32, difference: f32) -> (f32, f32) {
-    (common + 0.5 * difference, common - 0.5 * difference)
-}
 
 /// One number for each state: a row of the covariance, a gain.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -142,6 +137,19 @@ impl Covariance {
 }
 
 impl Row {
+    /// The sum of this and `factor` times `other`.
+    pub fn plus_scaled(self, other: &Self, factor: f32) -> Self {
+        Self {
+            x: self.x + factor * other.x,
+            y: self.y + factor * other.y,
+            h: self.h + factor * other.h,
+            c: self.c + factor * other.c,
+            d: self.d + factor * other.d,
+            w: self.w + factor * other.w,
+            k: self.k + factor * other.k,
+        }
+    }
+
     /// Every number times `factor`.
     pub fn scaled(self, factor: f32) -> Self {
         Self {

@@ -1,5 +1,5 @@
 //! The extended Kalman filter: seven states in `f32`, predicted from wheel travel, corrected by
-//! one range at a time (`docs/model.md`, eqs. 4–6 and 13–15).
+//! one range at a time (`docs/model.md`, eqs. 4–6, 13–15 and 17).
 //!
 //! It holds numbers and equations only. Which wall a range belongs to, whether it may be
 //! believed and what time it is, others decide.
@@ -9,7 +9,8 @@
 //! and ones left out; correction is Joseph's form in two passes, each a rank-one change: the first
 //! is the plain P − K H P, the second adds what the rounding of the first, and of K, left wrong.
 //! Variances stay positive in single precision even for a range a million times sharper than the
-//! prior, where the plain form reaches zero.
+//! prior, where the plain form reaches zero. What two states know of each other can be sharper
+//! still than single precision holds; a range is then believed less than its noise allows (eq. 17).
 //!
 //! # Non-finite policy
 //! NaN or infinity in an argument, or arising on the way, is an [`EkfError`], and not one bit of
@@ -17,58 +18,23 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::covariance::{Covariance, Row, each_entry, wheels};
+use crate::covariance::{Covariance, Row, each_entry};
 use crate::motion::{Drive, Step, WheelTravel};
-use crate::pose::{Heading, Pose};
 use crate::range::ExpectedRange;
-use crate::units::{Metres, Radians, SquareMetres};
+use crate::state::Mean;
+use crate::units::{Metres, SquareMetres};
 
-/// Number of states.
-pub const STATES: usize = 7;
+pub use crate::state::{STATES, State};
 
-/// The seven states, in the order of [`Ekf::state_vector`] and of the covariance.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct State {
-    /// Position along map x, metres.
-    pub x: f32,
-    /// Position along map y, metres.
-    pub y: f32,
-    /// Heading ψ, radians in (−π, π].
-    pub heading: f32,
-    /// Scale error of the right wheel, `S_R`: true travel is (1 + `S_R`) times the measured one.
-    pub scale_right: f32,
-    /// Scale error of the left wheel, `S_L`.
-    pub scale_left: f32,
-    /// Error of the track width δD, metres: the true one is D + δD.
-    pub track_width_error: f32,
-    /// Scale error of the ranger κ: a measured range is (1 + κ) times the true one.
-    pub range_scale: f32,
-}
-
-impl State {
-    /// Position and heading.
-    #[must_use]
-    pub fn pose(&self) -> Pose {
-        Pose::new(self.x, self.y, Radians(self.heading))
-    }
-
-    fn to_vector(self) -> SVector<f32, STATES> {
-        SVector::from([
-            self.x,
-            self.y,
-            self.heading,
-            self.scale_right,
-            self.scale_left,
-            self.track_width_error,
-            self.range_scale,
-        ])
-    }
-
-    fn is_finite(self) -> bool {
-        self.to_vector().iter().all(|v| v.is_finite())
-    }
-}
+/// The sharpest that the covariance gets along a range's direction: this share of the variances
+/// that make it up.
+///
+/// A slanted wall ties x and y together. If each is uncertain by 100 m and the range by 0.1 mm, the
+/// tie is a difference of numbers 10¹² times larger, where an `f32` has seven digits: P would soon
+/// have a negative eigenvalue. 2⁻¹⁴ leaves ten bits for the rounding of the steps to come (measured
+/// by `tests/properties/covariance.rs`: at 2⁻¹⁶ it goes wrong within a few hundred runs of a parked
+/// robot, at 2⁻¹⁵ it does not).
+const SHARPEST: f32 = 1.0 / 16_384.0;
 
 /// What the filter refuses to compute with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -283,7 +249,8 @@ impl Ekf {
     }
 
     /// Corrects the state by one measured `range` with noise variance `noise`
-    /// (`docs/model.md`, eqs. 6 and 13–15). There is no gate here: what is given is believed.
+    /// (`docs/model.md`, eqs. 6, 13–15 and 17). There is no gate here: what is given is believed,
+    /// except that nothing is believed to be sharper than single precision can hold.
     ///
     /// # Errors
     /// [`EkfError::NotFinite`], [`EkfError::Negative`] or [`EkfError::Noiseless`] by what is
@@ -307,6 +274,9 @@ impl Ekf {
             return Err(EkfError::Noiseless);
         }
         let m = self.cross_covariance(expected);
+        let Some(noise) = self.bearable(noise, expected, &m) else {
+            return Ok(());
+        };
         let per_variance = 1.0 / innovation_variance(expected, &m, noise);
         let gain = m.scaled(per_variance);
         let innovation = (range - expected.range).0;
@@ -327,6 +297,30 @@ impl Ekf {
         self.p.times(e.by_x, e.by_y, e.by_heading, e.by_range_scale)
     }
 
+    /// The noise of a range, or more if the variance that it leaves along H would be less than
+    /// [`SHARPEST`] allows (`docs/model.md`, eq. 17); `None` if that variance is there already.
+    fn bearable(
+        &self,
+        noise: SquareMetres,
+        expected: &ExpectedRange,
+        m: &Row,
+    ) -> Option<SquareMetres> {
+        let (e, p) = (expected, &self.p);
+        let per_variance = 1.0 / innovation_variance(e, m, noise);
+        let left = |by: f32, variance: f32, m: f32| by * by * (variance - m * m * per_variance);
+        let terms = left(e.by_x, p.xx, m.x)
+            + left(e.by_y, p.yy, m.y)
+            + left(e.by_heading, p.hh, m.h)
+            + left(e.by_range_scale, p.kk, m.k);
+        let (along_h, least) = (along(e, m), SHARPEST * terms);
+        if along_h <= least {
+            return None;
+        }
+        // What leaves v r/(v + r) = least.
+        let bearable = along_h * least / (along_h - least);
+        Some(if bearable > noise.0 { SquareMetres(bearable) } else { noise })
+    }
+
     /// Takes the new numbers if they are sound; changes nothing if not.
     fn replace(&mut self, mean: Mean, rest: Rest, p: Covariance) -> Result<(), EkfError> {
         if !mean.state().is_finite() || !p.is_sound() {
@@ -336,51 +330,6 @@ impl Ekf {
         self.rest = rest;
         self.p = p;
         Ok(())
-    }
-}
-
-/// The state as the filter holds it: the scale errors as their mean and their difference, for the
-/// covariance's sake ([`crate::covariance`] says why).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Mean {
-    pub x: f32,
-    pub y: f32,
-    pub heading: f32,
-    pub scale_common: f32,
-    pub scale_difference: f32,
-    pub track_width_error: f32,
-    pub range_scale: f32,
-}
-
-impl Mean {
-    fn new(state: &State) -> Self {
-        let mean = Self {
-            x: state.x,
-            y: state.y,
-            heading: state.heading,
-            scale_common: 0.5 * (state.scale_right + state.scale_left),
-            scale_difference: state.scale_right - state.scale_left,
-            track_width_error: state.track_width_error,
-            range_scale: state.range_scale,
-        };
-        mean.wrapped()
-    }
-
-    fn state(&self) -> State {
-        let (scale_right, scale_left) = wheels(self.scale_common, self.scale_difference);
-        State {
-            x: self.x,
-            y: self.y,
-            heading: self.heading,
-            scale_right,
-            scale_left,
-            track_width_error: self.track_width_error,
-            range_scale: self.range_scale,
-        }
-    }
-
-    fn wrapped(self) -> Self {
-        Self { heading: Heading::new(Radians(self.heading)).radians().0, ..self }
     }
 }
 
@@ -409,8 +358,13 @@ fn add(sum: &mut f32, rest: &mut f32, change: f32) {
 
 /// S = H P Hᵀ + R, given m = P Hᵀ.
 fn innovation_variance(expected: &ExpectedRange, m: &Row, noise: SquareMetres) -> f32 {
+    noise.0 + along(expected, m)
+}
+
+/// H times a column.
+fn along(expected: &ExpectedRange, column: &Row) -> f32 {
     let e = expected;
-    noise.0 + (e.by_x * m.x + e.by_y * m.y + e.by_heading * m.h + e.by_range_scale * m.k)
+    e.by_x * column.x + e.by_y * column.y + e.by_heading * column.h + e.by_range_scale * column.k
 }
 
 /// F P Fᵀ and the wheels' noise, multiplied out (`docs/model.md`, eq. 9).
@@ -492,19 +446,12 @@ fn corrected(
     // In exact arithmetic P₁ Hᵀ = K R, and the second pass adds nothing.
     let e = expected;
     let left_over = p.times(e.by_x, e.by_y, e.by_heading, e.by_range_scale);
-    let r = noise.0;
-    let d = Row {
-        x: gain.x * r - left_over.x,
-        y: gain.y * r - left_over.y,
-        h: gain.h * r - left_over.h,
-        c: gain.c * r - left_over.c,
-        d: gain.d * r - left_over.d,
-        w: gain.w * r - left_over.w,
-        k: gain.k * r - left_over.k,
-    };
+    let d = gain.scaled(noise.0).plus_scaled(&left_over, -1.0);
+    // Half of it on either side, for K Hᵀ on the one is (K Hᵀ)ᵀ on the other.
+    let d = d.plus_scaled(gain, -0.5 * along(expected, &d));
     macro_rules! add_what_rounding_left {
         ($entry:ident $i:ident $j:ident) => {
-            p.$entry += d.$i * gain.$j;
+            p.$entry += d.$i * gain.$j + gain.$i * d.$j;
         };
     }
     each_entry!(add_what_rounding_left);

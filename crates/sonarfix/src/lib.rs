@@ -38,5 +38,6 @@ pub mod map;
 pub mod motion;
 pub mod pose;
 pub mod range;
+mod state;
 pub mod trig;
 pub mod units;

@@ -9,8 +9,7 @@
 //! Nothing here refuses a value; [`Ekf::predict`](crate::ekf::Ekf::predict) checks the travel
 //! before and the state after.
 
-use crate::covariance::wheels;
-use crate::ekf::Mean;
+use crate::state::{Mean, wheels};
 use crate::trig::sin_cos;
 use crate::units::{Metres, PerRootMetre, Radians};
 

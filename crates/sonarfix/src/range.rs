@@ -8,9 +8,9 @@
 //! The model computes with what it is given; [`Ekf`](crate::ekf::Ekf) refuses a result that is
 //! not finite.
 
-use crate::ekf::State;
 use crate::map::Wall;
 use crate::pose::{Heading, Point};
+use crate::state::State;
 use crate::trig::sin_cos;
 use crate::units::{Metres, Radians, SquareMetres};
 

@@ -109,8 +109,8 @@ impl Experiment {
         let report = Report {
             title: format!("Sonarfix: {}", scenario.name),
             subtitle: format!(
-                "{} The table is over {} runs; figures and player show the one with seed {}.",
-                scenario.description.trim(),
+                "{}. The table is over {} runs; figures and player show the one with seed {}.",
+                scenario.description.trim().trim_end_matches('.'),
                 self.runs,
                 self.seed
             ),

@@ -1,0 +1,298 @@
+//! Rangers that answer a trigger with a pulse as long as the sound's flight.
+//!
+//! ```text
+//!   trigger ──┐▔▔▔▔▔▔▔┌─────────────────────────────────────
+//!             │ 10 µs │ burst, 0.2–0.5 ms
+//!   echo    ──────────────┐▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔┌─────────────
+//!                         │ flight            │
+//!                        sent              heard
+//! ```
+//!
+//! HC-SR04 (Elecfreaks' datasheet): trigger of at least 10 µs; eight cycles of 40 kHz; the echo
+//! line goes up when they are out and down when they are back; 58 µs a centimetre; "over 60 ms
+//! measurement cycle"; no echo ends the pulse after 38 ms on paper, after 16–70 ms on real
+//! boards; some boards never end it until they are triggered again.
+//!
+//! LV-MaxSonar-EZ (datasheet PD11832): RX high for at least 20 µs; PW goes up after a burst of
+//! thirteen 42 kHz waves and down at the target, 147 µs an inch; 37.5 ms if there is none; 49 ms
+//! a reading. The pulse is the flight itself, not compensated for temperature.
+
+use embedded_hal::digital::OutputPin;
+use sonarfix::units::{Duration, Instant};
+
+use super::{Air, Echo, NoEcho, Outcome, Ranger, TriggerError};
+use crate::time::{after, since};
+
+/// A pulse of the echo line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Pulse {
+    /// When the line went high.
+    pub rise: Instant,
+    /// When it went low again.
+    pub fall: Instant,
+}
+
+/// Something that watches an echo line: [`Polled`](super::Polled) or
+/// [`Captured`](super::Captured).
+pub trait EchoLine {
+    /// What can go wrong in reading it.
+    type Error: core::fmt::Debug;
+
+    /// Whether the line is high.
+    ///
+    /// # Errors
+    /// The pin's.
+    fn is_high(&mut self) -> Result<bool, Self::Error>;
+
+    /// Forgets what was, and waits for the first pulse that lasts `shortest` or longer. A pulse
+    /// that began before this call does not count.
+    ///
+    /// # Errors
+    /// The pin's.
+    fn arm(&mut self, shortest: Duration) -> Result<(), Self::Error>;
+
+    /// That pulse, if it has ended.
+    ///
+    /// # Errors
+    /// The pin's.
+    fn pulse(&mut self, now: Instant) -> Result<Option<Pulse>, Self::Error>;
+
+    /// Whether the line has gone high since it was armed.
+    fn has_risen(&self) -> bool;
+}
+
+/// What a board does when.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct PulseTiming {
+    /// Shortest trigger pulse.
+    pub trigger: Duration,
+    /// Echo pulses shorter than this are the burst heard directly, or cross-talk between the
+    /// wires: they are overlooked, and the wait goes on.
+    pub blanking: Duration,
+    /// Longest flight that is believed. A longer pulse is [`NoEcho::OutOfRange`].
+    pub longest: Duration,
+    /// Pulses from this width on are the board's way to say that nothing came back. Measure
+    /// yours with nothing before it: a board that ends at 16 ms cannot tell a wall beyond 2.7 m
+    /// from none, so both `longest` and this belong below 16 ms there.
+    pub silence: Duration,
+    /// How long after the end of the trigger pulse to listen.
+    pub listen: Duration,
+    /// Least time from ping to ping, so that old echoes are not taken for new ones.
+    pub cycle: Duration,
+    /// How long after a trigger a line that is still high may be a board that just has not
+    /// given up yet. From then on it is stuck, and pinged again in the hope to free it.
+    pub stuck: Duration,
+}
+
+impl PulseTiming {
+    /// HC-SR04 and its kin: 4 m (23.3 ms at 20 °C). The bleed-through is 100 µs (1.7 cm);
+    /// `stuck` is beyond the slowest real board (70 ms).
+    pub const HC_SR04: Self = Self {
+        trigger: Duration::from_ticks(10),
+        blanking: Duration::from_ticks(100),
+        longest: Duration::from_ticks(23_500),
+        silence: Duration::from_ticks(30_000),
+        listen: Duration::from_ticks(32_000),
+        cycle: Duration::from_ticks(60_000),
+        stuck: Duration::from_ticks(100_000),
+    };
+
+    /// LV-MaxSonar-EZ by pulse width: 254 inches of 147 µs. Its shortest report is 6 inches, so
+    /// 100 µs of blanking take nothing away.
+    pub const LV_MAXSONAR: Self = Self {
+        trigger: Duration::from_ticks(20),
+        blanking: Duration::from_ticks(100),
+        longest: Duration::from_ticks(37_400),
+        silence: Duration::from_ticks(37_400),
+        listen: Duration::from_ticks(42_000),
+        cycle: Duration::from_ticks(50_000),
+        stuck: Duration::from_ticks(100_000),
+    };
+}
+
+/// The error of one of the two pins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum PulseError<T, L> {
+    /// The trigger pin's.
+    Trigger(T),
+    /// The echo line's.
+    Echo(L),
+}
+
+impl<T: core::fmt::Debug, L: core::fmt::Debug> core::fmt::Display for PulseError<T, L> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Trigger(error) => write!(f, "the trigger pin: {error:?}"),
+            Self::Echo(error) => write!(f, "the echo line: {error:?}"),
+        }
+    }
+}
+
+impl<T: core::fmt::Debug, L: core::fmt::Debug> core::error::Error for PulseError<T, L> {}
+
+/// Where a ping is.
+///
+/// ```text
+///          trigger: pin high          poll, 10 µs later: pin low, line armed
+///   Idle ───────────────────▶ Raised ──────────────────────────────────────▶ Listening
+///    ▲                          │ error                                        │
+///    └──────────────────────────┴── pulse, `listen` over, or error ────────────┘
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    Idle,
+    Raised,
+    Listening,
+}
+
+/// A ranger on two pins.
+///
+/// ```
+/// use embedded_hal_mock::eh1::digital::{Mock, State::{High, Low}, Transaction as Pin};
+/// use sonarfix::units::{Instant, Metres};
+/// use sonarfix_hal::ranger::{Air, Captured, EchoCapture, PulseRanger, PulseTiming, Ranger};
+///
+/// let mut trigger = Mock::new(&[Pin::set(High), Pin::set(Low)]);
+/// let capture = EchoCapture::new();
+/// let line = Captured::new(&capture);
+/// let mut ranger = PulseRanger::new(&mut trigger, line, PulseTiming::HC_SR04, Air::ROOM);
+///
+/// let at = Instant::from_ticks;
+/// ranger.trigger(at(0))?;
+/// assert_eq!(ranger.poll(at(10)), Ok(None)); // ends the trigger pulse
+/// capture.rose(at(470)); // the interrupt stamps both edges,
+/// capture.fell(at(6_470));
+/// let echo = ranger.poll(at(8_000))?.unwrap()?; // and the loop may come when it likes
+/// assert_eq!(echo.reflected(), at(3_470));
+/// assert!((echo.range - Metres(1.030)).abs() < Metres(0.001));
+/// # drop(ranger);
+/// # trigger.done();
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct PulseRanger<T, L> {
+    trigger: T,
+    line: L,
+    timing: PulseTiming,
+    air: Air,
+    state: State,
+    /// When the trigger pin last moved: up, or down, which is when the board starts.
+    triggered: Option<Instant>,
+}
+
+impl<T: OutputPin, L: EchoLine> PulseRanger<T, L> {
+    /// A ranger whose trigger pin is low.
+    #[must_use]
+    pub fn new(trigger: T, line: L, timing: PulseTiming, air: Air) -> Self {
+        Self { trigger, line, timing, air, state: State::Idle, triggered: None }
+    }
+
+    /// Sets the air, as the temperature changes.
+    pub fn set_air(&mut self, air: Air) {
+        self.air = air;
+    }
+
+    /// What this board does when.
+    #[must_use]
+    pub fn timing(&self) -> &PulseTiming {
+        &self.timing
+    }
+
+    /// The echo line, to wait for its edges.
+    #[cfg(feature = "async")]
+    pub(crate) fn line(&mut self) -> &mut L {
+        &mut self.line
+    }
+
+    /// Gives pin and line back.
+    pub fn release(self) -> (T, L) {
+        (self.trigger, self.line)
+    }
+
+    fn age(&self, now: Instant) -> Duration {
+        since(now, self.triggered.unwrap_or(now))
+    }
+
+    /// Ends the trigger pulse, on whose falling edge the board starts.
+    fn lower(&mut self) -> Result<(), PulseError<T::Error, L::Error>> {
+        // Armed first: no edge of the answer can be missed.
+        let armed = self.line.arm(self.timing.blanking);
+        self.trigger.set_low().map_err(PulseError::Trigger)?;
+        armed.map_err(PulseError::Echo)
+    }
+
+    fn listen(&mut self, now: Instant) -> Result<Option<Outcome>, L::Error> {
+        if let Some(pulse) = self.line.pulse(now)? {
+            return Ok(Some(self.judge(pulse)));
+        }
+        if self.age(now) < self.timing.listen {
+            return Ok(None);
+        }
+        let reason = if self.line.has_risen() {
+            NoEcho::Nothing
+        } else if self.line.is_high()? {
+            NoEcho::StuckHigh
+        } else {
+            NoEcho::NoResponse
+        };
+        Ok(Some(Err(reason)))
+    }
+
+    fn judge(&self, pulse: Pulse) -> Outcome {
+        let flight = since(pulse.fall, pulse.rise);
+        if flight >= self.timing.silence {
+            Err(NoEcho::Nothing)
+        } else if flight > self.timing.longest {
+            Err(NoEcho::OutOfRange)
+        } else {
+            Ok(Echo::new(pulse.rise, flight, self.air))
+        }
+    }
+}
+
+impl<T: OutputPin, L: EchoLine> Ranger for PulseRanger<T, L> {
+    type Error = PulseError<T::Error, L::Error>;
+
+    fn ready_at(&self) -> Instant {
+        self.triggered.map_or(Instant::from_ticks(0), |at| after(at, self.timing.cycle))
+    }
+
+    fn trigger(&mut self, now: Instant) -> Result<(), TriggerError<Self::Error>> {
+        // A ping that was forgotten in flight must not keep the next one away for ever.
+        let in_flight = self.state != State::Idle && self.age(now) < self.timing.listen;
+        if in_flight || now < self.ready_at() {
+            return Err(TriggerError::TooSoon);
+        }
+        let device = TriggerError::Device;
+        let is_high = self.line.is_high();
+        let is_high = is_high.map_err(|e| device(PulseError::Echo(e)))?;
+        if is_high && self.triggered.is_some() && self.age(now) < self.timing.stuck {
+            return Err(TriggerError::TooSoon);
+        }
+        let raised = self.trigger.set_high();
+        raised.map_err(|e| device(PulseError::Trigger(e)))?;
+        self.state = State::Raised;
+        self.triggered = Some(now);
+        Ok(())
+    }
+
+    fn poll(&mut self, now: Instant) -> Result<Option<Outcome>, Self::Error> {
+        let result = match self.state {
+            State::Idle => return Ok(None),
+            State::Raised if self.age(now) < self.timing.trigger => return Ok(None),
+            State::Raised => {
+                self.state = State::Listening;
+                self.triggered = Some(now);
+                self.lower().map(|()| None)
+            }
+            State::Listening => self.listen(now).map_err(PulseError::Echo),
+        };
+        if !matches!(result, Ok(None)) {
+            self.state = State::Idle;
+        }
+        result
+    }
+}

@@ -1,0 +1,20 @@
+//! The drivers against mocked pins and buses: every transaction is listed, and none is left over.
+#![cfg(test)]
+#![expect(clippy::cast_precision_loss, reason = "microseconds below a second are exact in f32")]
+
+#[cfg(feature = "async")]
+mod asynch;
+mod pulse;
+mod quadrature;
+mod servo;
+mod srf;
+
+use sonarfix::units::{Duration, Instant};
+
+fn at(micros: u64) -> Instant {
+    Instant::from_ticks(micros)
+}
+
+fn span(micros: u64) -> Duration {
+    Duration::from_ticks(micros)
+}

@@ -1,0 +1,279 @@
+//! What holds however polls are spread.
+
+use proptest::prelude::*;
+use sonarfix::localizer::Fix;
+use sonarfix::units::{Duration, Instant};
+use sonarfix_hal::ranger::NoEcho;
+use sonarfix_hal::robot::{Report, Rhythm, Settings, Stamp, Taken};
+use sonarfix_hal::servo::Pace;
+
+use super::rig::{Broken, Drive, World, accounts, pins, robot, run, steps, walls};
+
+/// 2⁻¹⁰ m: sums of such ticks are exact.
+const TICK: f32 = 1.0 / 1_024.0;
+
+/// A digital servo of 400 Hz that turns in no time: the ranger alone limits the pace.
+const FAST: Pace = Pace {
+    frame: Duration::from_ticks(2_500),
+    sixty_degrees: Duration::from_ticks(0),
+    settle: Duration::from_ticks(0),
+};
+
+fn as_fast_as_possible() -> Settings {
+    Settings { rhythm: Rhythm::AsFastAsPossible, ..Settings::default() }
+}
+
+fn any_drive() -> impl Strategy<Value = Drive> {
+    let speed = prop_oneof![-0.2_f64..-0.05, 0.05_f64..0.2];
+    (speed, 0.0_f64..0.04).prop_map(|(speed, sway)| Drive { speed, sway })
+}
+
+/// Times of polls, µs; told by their number, for there are hundreds.
+#[derive(Clone)]
+struct Polls(Vec<u64>);
+
+impl core::fmt::Debug for Polls {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{} polls from {:?}", self.0.len(), self.0.first())
+    }
+}
+
+/// Times of polls for about 4 s: mostly quick ones, some late, some very late; and in the end the
+/// quick ones that let everything come to its end.
+fn any_polls() -> impl Strategy<Value = Polls> {
+    let step = prop_oneof![
+        8 => 20_u64..3_000,
+        2 => 3_000_u64..40_000,
+        1 => 40_000_u64..250_000,
+    ];
+    prop::collection::vec(step, 800).prop_map(|steps| {
+        let mut now = 0;
+        let times = steps.iter().map(|step| {
+            now += step;
+            now
+        });
+        let mut times: Vec<_> = times.take_while(|&time| time < 3_000_000).collect();
+        let last = times.last().map_or(0, |&time| time);
+        times.insert(0, 0);
+        // Two very late ones in a row: if the first finds a ping to begin with, the second cannot.
+        let last = last + 480_000;
+        times.extend([last - 240_000, last]);
+        times.extend((1..400).map(|step| last + 1_000 * step));
+        Polls(times)
+    })
+}
+
+proptest! {
+    /// The travel told to the localizer is what the counters counted: no tick lost, none twice,
+    /// through their wrap-around, with echoes and without, however the polls jitter.
+    #[test]
+    fn travel_is_conserved(
+        drive in any_drive(),
+        first_count in 0_u32..=0xFFFF,
+        polls in any_polls(),
+        deaf: bool,
+        every in prop::option::of(100_000_u64..700_000),
+    ) {
+        let walls = walls();
+        let world = World::new(drive, TICK, first_count);
+        world.broken.set(Broken { deaf, ..Broken::default() });
+        let rhythm = every.map_or(Rhythm::AsFastAsPossible, |period| {
+            Rhythm::Every(Duration::from_ticks(period))
+        });
+        let mut robot = robot(&walls, TICK, Settings { rhythm, ..Settings::default() });
+        let mut pins = pins(&world, FAST);
+        let mut reports = run(&world, &mut robot, &mut pins, polls.0.iter().copied());
+
+        let first = polls.0[0];
+        let heard = reports.iter().filter_map(|(_, report)| report.heard);
+        let echoes = heard.filter(|heard| heard.outcome.is_ok() != deaf).count();
+        prop_assert!(echoes >= 2, "{echoes} pings came to an end");
+        // To the end of a tick, which is when the ledger is square. Between polls nothing is due.
+        let last = reports.iter().rposition(|(_, report)| report.tick.is_some()).unwrap();
+        reports.truncate(last + 1);
+        let counted = world.ticks(reports[last].0) - world.ticks(first);
+        let expected = counted as f64 * f64::from(TICK);
+        prop_assert_eq!(accounts(&reports), (expected, 0.0));
+        prop_assert!(counted != 0, "the robot has moved");
+    }
+
+    /// Every range meets the filter at the instant of its reflection, with the wheels where they
+    /// were then; and so the range agrees with the map.
+    #[test]
+    fn echoes_meet_the_filter_at_their_reflection(drive in any_drive(), polls in any_polls()) {
+        let walls = walls();
+        let world = World::new(drive, TICK, 0);
+        let mut robot = robot(&walls, TICK, as_fast_as_possible());
+        let mut pins = pins(&world, FAST);
+        let reports = run(&world, &mut robot, &mut pins, polls.0.iter().copied());
+
+        let flights = world.flights.borrow().clone();
+        let heard: Vec<_> = reports.iter().enumerate().filter_map(|(index, (_, report))| {
+            Some((index, report.heard.filter(|heard| heard.outcome.is_ok())?))
+        }).collect();
+        prop_assert!(heard.len() >= 3);
+        // The last burst's echo may still be on its way.
+        prop_assert!(flights.len() - heard.len() <= 1);
+        for ((index, heard), (sent, back)) in heard.into_iter().zip(flights) {
+            let reflected = sent.midpoint(back);
+            let step = heard.step.unwrap();
+            prop_assert_eq!(step.at, Instant::from_ticks(reflected));
+            prop_assert!(matches!(heard.fix, Some(Fix::Accepted(_))), "{heard:?}");
+            if step.taken != Taken::Yes {
+                continue;
+            }
+            // All up to this step, but not the tick that may follow in the same poll.
+            let mut upto = reports[..=index].to_vec();
+            upto[index].1.tick = None;
+            let (told, _) = accounts(&upto);
+            let truth = world.x(reflected) - world.x(polls.0[0]);
+            // A tick at either end, and what the sway bends between the two readings.
+            let pinged = reports[..index].iter().rfind(|(_, report)| report.pinged.is_some());
+            let gap = (reports[index].0 - pinged.unwrap().0) as f64 * 1e-6;
+            let bend = 9.0 * drive.sway * gap * gap / 8.0;
+            let close = (told - truth).abs() < 2.0 * f64::from(TICK) + bend;
+            prop_assert!(close, "told {told}, true {truth}");
+        }
+    }
+
+    /// No ping before the servo has settled, by what the PWM channel saw and the pace alone.
+    #[test]
+    fn no_ping_before_the_servo_has_settled(drive in any_drive(), polls in any_polls()) {
+        let walls = walls();
+        let world = World::new(drive, TICK, 0);
+        let mut robot = robot(&walls, TICK, as_fast_as_possible());
+        let mut pins = pins(&world, Pace::SG90);
+        run(&world, &mut robot, &mut pins, polls.0.iter().copied());
+
+        let degrees = |duty| world.degrees(duty);
+        let (triggers, duties) = (world.triggers.borrow(), world.duties.borrow());
+        prop_assert!(triggers.len() >= 2 && !duties.is_empty());
+        for &ping in triggers.iter() {
+            let turns: Vec<_> = duties.iter().filter(|&&(time, _)| time <= ping).collect();
+            let (sent, duty) = **turns.last().unwrap();
+            // Before its first turn it may be anywhere; 100° at least to go.
+            let from = turns.iter().rev().nth(1).map(|&&(_, duty)| degrees(duty));
+            let turn = from.map_or(100.0, |from| (degrees(duty) - from).abs());
+            let settled = sent as f64 + 20_000.0 + 120_000.0 * turn / 60.0 + 60_000.0;
+            prop_assert!(ping as f64 >= settled, "ping {ping}, settled {settled}");
+        }
+    }
+
+    /// Never two pings within the ranger's cycle, even where the servo is no limit.
+    #[test]
+    fn pings_keep_their_distance(drive in any_drive(), polls in any_polls()) {
+        let walls = walls();
+        let world = World::new(drive, TICK, 0);
+        let mut robot = robot(&walls, TICK, as_fast_as_possible());
+        let mut pins = pins(&world, FAST);
+        run(&world, &mut robot, &mut pins, polls.0.iter().copied());
+
+        let bursts = world.bursts.borrow();
+        let gaps: Vec<_> = bursts.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        prop_assert!(gaps.iter().all(|&gap| gap >= 60_000), "{gaps:?}");
+        // And the ranger is the limit: in the 400 ms of quick polls at the end it is used fully.
+        prop_assert!(gaps.iter().any(|&gap| gap <= 64_000), "{gaps:?}");
+    }
+
+    /// Every dot of the tick's grid is done once or reported as skipped, and a tick is late only
+    /// if its poll was, or the sonar listened.
+    #[test]
+    fn ticks_keep_to_their_grid(drive in any_drive(), polls in any_polls()) {
+        let walls = walls();
+        let world = World::new(drive, TICK, 0);
+        let mut robot = robot(&walls, TICK, as_fast_as_possible());
+        let mut pins = pins(&world, FAST);
+        let reports = run(&world, &mut robot, &mut pins, polls.0.iter().copied());
+
+        let (mut dots, mut missed, mut before) = (0, 0, 0);
+        for (now, report) in &reports {
+            if let Some(tick) = report.tick {
+                let due = now - tick.lateness.to_micros();
+                prop_assert_eq!(due, 100_000 * (dots + 1));
+                dots += 1 + tick.skipped;
+                prop_assert_eq!(dots, now / 100_000);
+                // Nothing but the sonar keeps a poll from doing what is due.
+                prop_assert_eq!(tick.held, due <= before);
+                prop_assert!(report.heard.is_some() || !tick.held);
+                missed += u32::from(now - due.max(before) > 10_000);
+            }
+            before = *now;
+        }
+        prop_assert!(dots >= 30 && missed > 0);
+        prop_assert_eq!(robot.faults().deadlines, missed);
+        prop_assert!(robot.faults().right == robot.faults().left);
+    }
+}
+
+fn reports_with(settings: Settings, drive: Drive, tick: f32) -> (Vec<(u64, Report)>, u32) {
+    let walls = walls();
+    let world = World::new(drive, tick, 0);
+    let mut robot = robot(&walls, tick, settings);
+    let mut pins = pins(&world, FAST);
+    let reports = run(&world, &mut robot, &mut pins, (0..12_000).map(|step| step * 250));
+    (reports, robot.faults().travel)
+}
+
+#[test]
+fn stamped_naively_an_echo_belongs_to_its_arrival() {
+    let drive = Drive { speed: 0.3, sway: 0.0 };
+    let naive = Settings { stamp: Stamp::Arrival, ..as_fast_as_possible() };
+    let (reports, _) = reports_with(naive, drive, TICK);
+    let mut heard = 0;
+    for (now, report) in &reports {
+        if let Some(step) = report.heard.and_then(|heard| heard.step) {
+            assert_eq!(step.at, Instant::from_ticks(*now));
+            heard += 1;
+        }
+    }
+    assert!(heard > 20, "{heard}");
+}
+
+/// 16 mm a tick, as of a disc with few holes: most steps to a reflection and from it to the next
+/// tick look far too fast. They are kept, and none is written off.
+#[test]
+fn coarse_ticks_are_kept_not_written_off() {
+    let drive = Drive { speed: 0.5, sway: 0.0 };
+    let (reports, written_off) = reports_with(as_fast_as_possible(), drive, 16.0 * TICK);
+    let kept = steps(&reports).filter(|step| matches!(step.taken, Taken::Kept(_)));
+    assert!(kept.count() > 0);
+    assert_eq!(written_off, 0);
+    let last = reports.iter().rposition(|(_, report)| report.tick.is_some()).unwrap();
+    let (now, _) = reports[last];
+    let world = World::new(drive, 16.0 * TICK, 0);
+    let counted = world.ticks(now) as f64 * 16.0 * f64::from(TICK);
+    let (taken, _) = accounts(&reports[..=last]);
+    assert!((taken - counted).abs() < 1e-9, "{taken} of {counted}");
+}
+
+/// Ticks faster than a ping is long are skipped while it is in flight; that is no fault.
+#[test]
+fn a_sonar_that_holds_ticks_back_misses_no_deadline() {
+    let drive = Drive { speed: 0.1, sway: 0.0 };
+    let settings = Settings {
+        tick: Duration::from_ticks(5_000),
+        tolerance: Duration::from_ticks(1_000),
+        ..as_fast_as_possible()
+    };
+    let walls = walls();
+    let world = World::new(drive, TICK, 0);
+    let mut robot = robot(&walls, TICK, settings);
+    let mut pins = pins(&world, FAST);
+    let reports = run(&world, &mut robot, &mut pins, (0..4_000).map(|step| step * 250));
+    let skipped = reports.iter().filter_map(|(_, report)| report.tick);
+    assert!(skipped.filter(|tick| tick.held && tick.skipped > 0).count() > 10);
+    assert!(robot.faults().is_none(), "{:?}", robot.faults());
+}
+
+#[test]
+fn fixes_keep_their_rhythm() {
+    let settings =
+        Settings { rhythm: Rhythm::Every(Duration::from_ticks(500_000)), ..Settings::default() };
+    let drive = Drive { speed: 0.1, sway: 0.0 };
+    let (reports, _) = reports_with(settings, drive, TICK);
+    let aims = reports.iter().filter(|(_, report)| report.aimed.is_some());
+    let aims: Vec<_> = aims.map(|&(time, _)| time).collect();
+    assert_eq!(aims, [500_000, 1_000_000, 1_500_000, 2_000_000, 2_500_000]);
+    let silent = reports.iter().filter_map(|(_, report)| report.heard);
+    assert!(silent.filter(|heard| heard.outcome == Err(NoEcho::Nothing)).count() == 0);
+}

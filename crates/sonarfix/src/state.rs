@@ -1,0 +1,103 @@
+//! The seven states: as the crate shows them, and as the filter holds them.
+
+use nalgebra::SVector;
+
+use crate::pose::{Heading, Pose};
+use crate::units::Radians;
+
+/// Number of states.
+pub const STATES: usize = 7;
+
+/// The seven states, in the order of the state vector and of the covariance.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct State {
+    /// Position along map x, metres.
+    pub x: f32,
+    /// Position along map y, metres.
+    pub y: f32,
+    /// Heading ψ, radians in (−π, π].
+    pub heading: f32,
+    /// Scale error of the right wheel, `S_R`: true travel is (1 + `S_R`) times the measured one.
+    pub scale_right: f32,
+    /// Scale error of the left wheel, `S_L`.
+    pub scale_left: f32,
+    /// Error of the track width δD, metres: the true one is D + δD.
+    pub track_width_error: f32,
+    /// Scale error of the ranger κ: a measured range is (1 + κ) times the true one.
+    pub range_scale: f32,
+}
+
+impl State {
+    /// Position and heading.
+    #[must_use]
+    pub fn pose(&self) -> Pose {
+        Pose::new(self.x, self.y, Radians(self.heading))
+    }
+
+    pub(crate) fn to_vector(self) -> SVector<f32, STATES> {
+        SVector::from([
+            self.x,
+            self.y,
+            self.heading,
+            self.scale_right,
+            self.scale_left,
+            self.track_width_error,
+            self.range_scale,
+        ])
+    }
+
+    pub(crate) fn is_finite(self) -> bool {
+        self.to_vector().iter().all(|v| v.is_finite())
+    }
+}
+
+/// The state as the filter holds it: the scale errors as their mean and their difference, for the
+/// covariance's sake ([`crate::covariance`] says why).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Mean {
+    pub x: f32,
+    pub y: f32,
+    pub heading: f32,
+    pub scale_common: f32,
+    pub scale_difference: f32,
+    pub track_width_error: f32,
+    pub range_scale: f32,
+}
+
+impl Mean {
+    pub fn new(state: &State) -> Self {
+        let mean = Self {
+            x: state.x,
+            y: state.y,
+            heading: state.heading,
+            scale_common: 0.5 * (state.scale_right + state.scale_left),
+            scale_difference: state.scale_right - state.scale_left,
+            track_width_error: state.track_width_error,
+            range_scale: state.range_scale,
+        };
+        mean.wrapped()
+    }
+
+    pub fn state(&self) -> State {
+        let (scale_right, scale_left) = wheels(self.scale_common, self.scale_difference);
+        State {
+            x: self.x,
+            y: self.y,
+            heading: self.heading,
+            scale_right,
+            scale_left,
+            track_width_error: self.track_width_error,
+            range_scale: self.range_scale,
+        }
+    }
+
+    pub fn wrapped(self) -> Self {
+        Self { heading: Heading::new(Radians(self.heading)).radians().0, ..self }
+    }
+}
+
+/// The values of the right and the left wheel, from those of the common part and the difference.
+pub(crate) fn wheels(common: f32, difference: f32) -> (f32, f32) {
+    (common + 0.5 * difference, common - 0.5 * difference)
+}
