@@ -168,8 +168,8 @@ pub struct Localizer<'m> {
     ekf: Ekf,
     health: Health,
     time: Instant,
-    /// The wall that the last turn brought no believable range from: something stands before it,
-    /// and will for a while.
+    /// The wall whose range was gated at the last turn: something stands before it, and will for
+    /// a while.
     spare: Option<WallId>,
 }
 
@@ -232,8 +232,8 @@ impl<'m> Localizer<'m> {
         Ok(())
     }
 
-    /// Where the sonar should look next, by the policy of the configuration. A wall whose last
-    /// range was gated or refused is passed over once, if another counts.
+    /// Where the sonar should look next, by the policy of the configuration. A wall whose
+    /// range was gated at the last turn is passed over once, if another counts.
     ///
     /// # Errors
     /// [`NoAim`], by why there is nothing to look at.
@@ -256,8 +256,8 @@ impl<'m> Localizer<'m> {
     /// Only [`Fix::Accepted`] changes the estimate; every outcome enters the health.
     pub fn fix(&mut self, aim: &Aim, range: Option<Metres>) -> Fix {
         let fix = self.try_fix(aim, range).unwrap_or_else(Fix::Refused);
-        let believed = matches!(fix, Fix::Accepted(_));
-        self.spare = (!believed).then_some(aim.wall);
+        // An echo that stays away may come next time; what stands before a wall stays.
+        self.spare = matches!(fix, Fix::Gated(_)).then_some(aim.wall);
         match fix {
             Fix::Accepted(_) => self.health.accepted(),
             Fix::Gated(_) => self.health.gated(),

@@ -1,5 +1,11 @@
 //! What the localizer does when a wall does not answer, or none can.
 
+#![expect(
+    clippy::unwrap_used,
+    clippy::indexing_slicing,
+    reason = "all of this file is a test, its helpers too"
+)]
+
 use sonarfix::aim::NoAim;
 use sonarfix::config::Config;
 use sonarfix::health::Verdict;
@@ -35,7 +41,7 @@ fn a_blocked_wall_is_passed_over_once() {
     let second = localizer.aim().unwrap();
     assert_ne!(second.wall, favourite.wall, "something stands before the first");
     // The second is blocked as well: the first has its turn again.
-    assert!(matches!(localizer.fix(&second, None), Fix::Refused(_)));
+    assert!(matches!(localizer.fix(&second, Some(Metres(0.3))), Fix::Gated(_)));
     assert_eq!(localizer.aim().unwrap().wall, favourite.wall);
 }
 
