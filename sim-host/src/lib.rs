@@ -7,11 +7,13 @@
 pub mod angle;
 pub mod bound;
 pub mod cli;
+pub mod convert;
 pub mod dense;
 pub mod monte_carlo;
 pub mod observe;
 pub mod odometry;
 pub mod plant;
+pub mod replay;
 pub mod report;
 pub mod simulate;
 pub mod statistics;
