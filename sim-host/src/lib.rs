@@ -7,12 +7,14 @@
 pub mod angle;
 pub mod bound;
 pub mod cli;
+pub mod convert;
 pub mod dense;
 pub mod monte_carlo;
 pub mod observe;
 pub mod odometry;
 pub mod pins;
 pub mod plant;
+pub mod replay;
 pub mod report;
 pub mod simulate;
 pub mod sonar_model;

@@ -214,22 +214,38 @@ impl View {
     }
 }
 
-/// Chooses the wall to look at.
+/// Chooses the wall to look at: not the one to `spare`, if there is another.
 ///
 /// # Errors
 /// [`NoAim`], by why there is none.
 ///
 /// # Panics
 /// Never.
-pub(crate) fn choose(config: &Config, map: &Map, ekf: &Ekf) -> Result<Aim, NoAim> {
+pub(crate) fn choose(
+    config: &Config,
+    map: &Map,
+    ekf: &Ekf,
+    spare: Option<WallId>,
+) -> Result<Aim, NoAim> {
     let noise = config.sonar.noise;
-    best(config, map, ekf, |view, expected| {
-        view.bearing(expected)?;
-        Some(match config.policy {
-            Policy::Nearest => -expected.range.0,
-            Policy::Informative => ekf.position_gain(expected, noise.variance(expected.range)).0,
+    let choose = |spare: Option<WallId>| {
+        best(config, map, ekf, |id, view, expected| {
+            view.bearing(expected)?;
+            if spare == Some(id) {
+                return None;
+            }
+            Some(match config.policy {
+                Policy::Nearest => -expected.range.0,
+                Policy::Informative => {
+                    ekf.position_gain(expected, noise.variance(expected.range)).0
+                }
+            })
         })
-    })
+    };
+    match choose(spare) {
+        Err(NoAim::NoWall) if spare.is_some() => choose(None),
+        found => found,
+    }
 }
 
 /// Finds the wall that a beam at `bearing` meets squarely: the nearest that counts.
@@ -237,7 +253,7 @@ pub(crate) fn choose(config: &Config, map: &Map, ekf: &Ekf) -> Result<Aim, NoAim
 /// # Errors
 /// [`NoAim`], by why there is none.
 pub(crate) fn at(config: &Config, map: &Map, ekf: &Ekf, bearing: Radians) -> Result<Aim, NoAim> {
-    let aim = best(config, map, ekf, |view, expected| {
+    let aim = best(config, map, ekf, |_, view, expected| {
         view.is_square(bearing, expected).then_some(-expected.range.0)
     })?;
     Ok(Aim { bearing, ..aim })
@@ -248,7 +264,7 @@ fn best(
     config: &Config,
     map: &Map,
     ekf: &Ekf,
-    score: impl Fn(&Viewpoint, &ExpectedRange) -> Option<f32>,
+    score: impl Fn(WallId, &Viewpoint, &ExpectedRange) -> Option<f32>,
 ) -> Result<Aim, NoAim> {
     let view = Viewpoint::new(config, ekf);
     let square_is_certain = view.clear_cone > Radians(0.0);
@@ -260,7 +276,7 @@ fn best(
         let Ok(expected) = view.expect(wall) else {
             continue;
         };
-        let Some(score) = score(&view, &expected) else {
+        let Some(score) = score(id, &view, &expected) else {
             continue;
         };
         let improves = best.is_none_or(|(highest, _)| score > highest);

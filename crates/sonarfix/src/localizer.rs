@@ -9,7 +9,7 @@ use crate::aim::{self, Aim, NoAim, Unfit, Viewpoint};
 use crate::config::{Config, ConfigError};
 use crate::ekf::{Ekf, EkfError, Innovation, State};
 use crate::health::Health;
-use crate::map::Map;
+use crate::map::{Map, WallId};
 use crate::motion::WheelTravel;
 use crate::pose::Pose;
 use crate::units::{Instant, Metres, Radians};
@@ -168,6 +168,9 @@ pub struct Localizer<'m> {
     ekf: Ekf,
     health: Health,
     time: Instant,
+    /// The wall whose range was gated at the last turn: something stands before it, and will for
+    /// a while.
+    spare: Option<WallId>,
 }
 
 impl<'m> Localizer<'m> {
@@ -199,7 +202,7 @@ impl<'m> Localizer<'m> {
             range_scale: prior.range_scale,
         };
         let ekf = Ekf::new(config.drive, state, deviation).map_err(StartError::Start)?;
-        Ok(Self { config, map, ekf, health: Health::default(), time: now })
+        Ok(Self { config, map, ekf, health: Health::default(), time: now, spare: None })
     }
 
     /// Takes the travel of both wheels since the last call, up to the time `now`: at every
@@ -229,12 +232,13 @@ impl<'m> Localizer<'m> {
         Ok(())
     }
 
-    /// Where the sonar should look next, by the policy of the configuration.
+    /// Where the sonar should look next, by the policy of the configuration. A wall whose
+    /// range was gated at the last turn is passed over once, if another counts.
     ///
     /// # Errors
     /// [`NoAim`], by why there is nothing to look at.
     pub fn aim(&self) -> Result<Aim, NoAim> {
-        aim::choose(&self.config, &self.map, &self.ekf)
+        aim::choose(&self.config, &self.map, &self.ekf, self.spare)
     }
 
     /// The wall that a sonar at `bearing` (relative to the heading) meets squarely, for a range
@@ -252,12 +256,20 @@ impl<'m> Localizer<'m> {
     /// Only [`Fix::Accepted`] changes the estimate; every outcome enters the health.
     pub fn fix(&mut self, aim: &Aim, range: Option<Metres>) -> Fix {
         let fix = self.try_fix(aim, range).unwrap_or_else(Fix::Refused);
+        // An echo that stays away may come next time; what stands before a wall stays.
+        self.spare = matches!(fix, Fix::Gated(_)).then_some(aim.wall);
         match fix {
             Fix::Accepted(_) => self.health.accepted(),
             Fix::Gated(_) => self.health.gated(),
             Fix::Refused(_) => self.health.silent(),
         }
         fix
+    }
+
+    /// Takes note that the sonar had its turn and [`Self::aim`] found no wall to look at, so that
+    /// a localizer that has gone blind does not keep saying that it is tracking.
+    pub fn skip(&mut self) {
+        self.health.silent();
     }
 
     fn try_fix(&mut self, aim: &Aim, range: Option<Metres>) -> Result<Fix, Refusal> {

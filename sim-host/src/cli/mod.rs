@@ -1,7 +1,9 @@
 //! The command line: what can be asked, and where the answers go.
 
 mod bound;
+mod convert;
 mod paper;
+mod replay;
 mod run;
 mod sonar_model;
 mod table;
@@ -22,6 +24,10 @@ enum Command {
     Paper(paper::Args),
     /// Runs any scenario.
     Run(run::Args),
+    /// Replays the recording of a robot through the localizer.
+    Replay(replay::Args),
+    /// Converts recordings of other formats for `replay`.
+    Convert(convert::Args),
     /// Prints how well any estimator could know the robot's state, over time.
     Bound(bound::Args),
     /// Prints how the simulated NXT sonar compares with recorded sweeps, as markdown.
@@ -37,6 +43,8 @@ impl Cli {
         match self.command {
             Command::Paper(args) => paper::execute(&args),
             Command::Run(args) => run::execute(&args),
+            Command::Replay(args) => replay::execute(&args),
+            Command::Convert(args) => convert::execute(&args),
             Command::Bound(args) => bound::execute(&args),
             Command::SonarModel(args) => sonar_model::execute(&args),
         }

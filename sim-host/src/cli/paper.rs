@@ -30,7 +30,7 @@ pub struct Args {
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum PolicyName {
+pub enum PolicyName {
     /// The nearest, as in the paper.
     Nearest,
     /// The one that lowers the variance of the position most.

@@ -58,10 +58,10 @@ impl From<FidelityName> for Fidelity {
 pub struct Output {
     /// Prints JSON instead of a table.
     #[arg(long)]
-    json: bool,
+    pub json: bool,
     /// Writes report.html and its figures into this folder.
     #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
+    pub out: Option<PathBuf>,
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {

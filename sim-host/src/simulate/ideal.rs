@@ -91,6 +91,7 @@ impl<'a> Run<'a> {
         let aim = match self.localizer.aim() {
             Ok(aim) => aim,
             Err(no_aim) => {
+                self.localizer.skip();
                 self.score.no_aim();
                 recorder.fix(|| observe::no_aim_record(look, no_aim));
                 return;

@@ -1,0 +1,314 @@
+//! The log format, one record a line (`docs/formats.md`, "Logs").
+
+use crate::replay::scan::Scan;
+use crate::trace::Pose;
+
+/// The first line of a log.
+pub const HEADER: &str = "sonarfix-log,1";
+
+/// Beyond this many seconds a time is no time: 300 years, and microseconds stay exact in `f64`.
+const TIME_LIMIT: f64 = 1e10;
+
+/// One line of a log. Times in seconds.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Record {
+    /// Encoder counts, cumulative.
+    Ticks {
+        /// When they were read.
+        time: f64,
+        /// Of the right wheel.
+        right: i64,
+        /// Of the left wheel.
+        left: i64,
+    },
+    /// Wheel travel, cumulative.
+    Wheels {
+        /// When it was read.
+        time: f64,
+        /// Of the right wheel, metres.
+        right: f64,
+        /// Of the left wheel, metres.
+        left: f64,
+    },
+    /// One range.
+    Range {
+        /// When the echo left the wall.
+        time: f64,
+        /// Where the sonar pointed, radians from the heading.
+        bearing: f64,
+        /// What came back, metres; `None` if no echo did.
+        range: Option<f64>,
+    },
+    /// One scan.
+    Scan {
+        /// When it was taken.
+        time: f64,
+        /// The scan.
+        scan: Scan,
+    },
+    /// What the localizer is told of its start.
+    Start {
+        /// When the robot was there.
+        time: f64,
+        /// Where.
+        pose: Pose,
+        /// Standard deviation of x and of y, metres.
+        position_deviation: f64,
+        /// Standard deviation of the heading, radians.
+        heading_deviation: f64,
+    },
+}
+
+/// What is wrong with a line.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Malformed {
+    /// The file ends inside the line.
+    #[error("the line is torn: the file ends before its newline")]
+    Torn,
+    /// It is longer than [`LONGEST`](crate::replay::lines::LONGEST).
+    #[error("the line is longer than 1 MiB")]
+    TooLong,
+    /// It is not text.
+    #[error("the line is not UTF-8 text")]
+    NotText,
+    /// It starts with none of the kinds.
+    #[error("`{0}` is none of ticks, wheels, range, scan, start")]
+    UnknownKind(String),
+    /// It ends too early.
+    #[error("the {0} is missing")]
+    Missing(&'static str),
+    /// It does not end where it should.
+    #[error("there are more fields than a record of this kind has")]
+    TooManyFields,
+    /// A field is not what it should be.
+    #[error("the {field} is `{text}`, which is not {rule}")]
+    Field {
+        /// Which.
+        field: &'static str,
+        /// What stands there, or its beginning.
+        text: String,
+        /// What should.
+        rule: &'static str,
+    },
+}
+
+/// Reads a line; `None` if it is empty or a comment.
+///
+/// # Errors
+/// [`Malformed`], by what is wrong with it.
+pub fn parse(line: &str) -> Result<Option<Record>, Malformed> {
+    let line = line.trim();
+    if line.is_empty() || line.starts_with('#') {
+        return Ok(None);
+    }
+    let mut fields = Fields::of(line);
+    let kind = fields.next("kind")?;
+    let record = match kind {
+        "ticks" => Record::Ticks {
+            time: fields.time()?,
+            right: fields.count("right count")?,
+            left: fields.count("left count")?,
+        },
+        "wheels" => Record::Wheels {
+            time: fields.time()?,
+            right: fields.number("right travel")?,
+            left: fields.number("left travel")?,
+        },
+        "range" => Record::Range {
+            time: fields.time()?,
+            bearing: fields.number("bearing")?,
+            range: fields.range()?,
+        },
+        "scan" => Record::Scan { time: fields.time()?, scan: fields.scan()? },
+        "start" => Record::Start {
+            time: fields.time()?,
+            pose: Pose {
+                x: fields.number("x")?,
+                y: fields.number("y")?,
+                heading: fields.number("heading")?,
+            },
+            position_deviation: fields.deviation("deviation of the position")?,
+            heading_deviation: fields.deviation("deviation of the heading")?,
+        },
+        other => return Err(Malformed::UnknownKind(beginning(other))),
+    };
+    fields.end()?;
+    Ok(Some(record))
+}
+
+/// The fields of a line, separated by commas.
+pub(crate) struct Fields<'a> {
+    fields: std::str::Split<'a, char>,
+}
+
+impl<'a> Fields<'a> {
+    pub fn of(line: &'a str) -> Self {
+        Self { fields: line.split(',') }
+    }
+
+    fn next(&mut self, field: &'static str) -> Result<&'a str, Malformed> {
+        let text = self.fields.next().ok_or(Malformed::Missing(field))?;
+        Ok(text.trim())
+    }
+
+    pub fn end(mut self) -> Result<(), Malformed> {
+        match self.fields.next() {
+            None => Ok(()),
+            Some(_) => Err(Malformed::TooManyFields),
+        }
+    }
+
+    pub fn number(&mut self, field: &'static str) -> Result<f64, Malformed> {
+        let text = self.next(field)?;
+        number(text).ok_or_else(|| not(field, text, "a finite number"))
+    }
+
+    pub fn time(&mut self) -> Result<f64, Malformed> {
+        let text = self.next("time")?;
+        number(text)
+            .filter(|time| time.abs() <= TIME_LIMIT)
+            .ok_or_else(|| not("time", text, "a number of seconds within 300 years"))
+    }
+
+    fn deviation(&mut self, field: &'static str) -> Result<f64, Malformed> {
+        let text = self.next(field)?;
+        number(text)
+            .filter(|&sigma| sigma >= 0.0)
+            .ok_or_else(|| not(field, text, "a finite number, zero or positive"))
+    }
+
+    fn count(&mut self, field: &'static str) -> Result<i64, Malformed> {
+        let text = self.next(field)?;
+        text.parse().map_err(|_| not(field, text, "a whole number"))
+    }
+
+    fn range(&mut self) -> Result<Option<f64>, Malformed> {
+        let text = self.next("range")?;
+        if text.is_empty() {
+            return Ok(None);
+        }
+        let range = number(text).filter(|&range| range > 0.0);
+        let rule = "a positive number, or empty for no echo";
+        range.map(Some).ok_or_else(|| not("range", text, rule))
+    }
+
+    fn scan(&mut self) -> Result<Scan, Malformed> {
+        let first = self.number("first bearing")?;
+        let step = self.number("step")?;
+        let beam = |text: &str| {
+            if text == "-" {
+                return Ok(0.0);
+            }
+            let range: Option<f32> = text.parse().ok();
+            range
+                .filter(|range| range.is_finite() && *range >= 0.0)
+                .ok_or_else(|| not("range of a beam", text, "a number, zero or positive, or -"))
+        };
+        let ranges = self.next("list of ranges")?.split_ascii_whitespace().map(beam);
+        let ranges: Vec<f32> = ranges.collect::<Result<_, _>>()?;
+        if ranges.is_empty() {
+            return Err(Malformed::Missing("list of ranges"));
+        }
+        Ok(Scan { first, step, ranges })
+    }
+}
+
+fn number(text: &str) -> Option<f64> {
+    text.parse().ok().filter(|number: &f64| number.is_finite())
+}
+
+fn not(field: &'static str, text: &str, rule: &'static str) -> Malformed {
+    Malformed::Field { field, text: beginning(text), rule }
+}
+
+/// Enough of a text to recognise it by, fit to be printed.
+fn beginning(text: &str) -> String {
+    const SHOWN: usize = 24;
+    let mut shown: String = text.chars().take(SHOWN).flat_map(char::escape_default).collect();
+    if text.chars().nth(SHOWN).is_some() {
+        shown.push('…');
+    }
+    shown
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kind_of_record_is_read() {
+        let cases = [
+            (
+                "ticks,0.25,-12,9007199254740993",
+                Record::Ticks { time: 0.25, right: -12, left: 9_007_199_254_740_993 },
+            ),
+            (
+                " wheels , 1e1 , 0.5 , -0.25 ",
+                Record::Wheels { time: 10.0, right: 0.5, left: -0.25 },
+            ),
+            ("range,3,-1.5,2.25", Record::Range { time: 3.0, bearing: -1.5, range: Some(2.25) }),
+            ("range,3,-1.5,", Record::Range { time: 3.0, bearing: -1.5, range: None }),
+            (
+                "scan,4,-0.5,0.25,1.5  - 0 2",
+                Record::Scan {
+                    time: 4.0,
+                    scan: Scan { first: -0.5, step: 0.25, ranges: vec![1.5, 0.0, 0.0, 2.0] },
+                },
+            ),
+            (
+                "start,0,1,-2,3,0.01,0.02",
+                Record::Start {
+                    time: 0.0,
+                    pose: Pose { x: 1.0, y: -2.0, heading: 3.0 },
+                    position_deviation: 0.01,
+                    heading_deviation: 0.02,
+                },
+            ),
+        ];
+        for (line, record) in cases {
+            assert_eq!(parse(line), Ok(Some(record)), "{line}");
+        }
+        for nothing in ["", "   ", "# ticks,1,2", "  #"] {
+            assert_eq!(parse(nothing), Ok(None), "{nothing:?}");
+        }
+    }
+
+    #[test]
+    fn every_malformed_line_says_what_is_wrong() {
+        let cases = [
+            ("tick,1,2,3", "`tick` is none of ticks, wheels, range, scan, start"),
+            ("ticks,1,2", "the left count is missing"),
+            ("ticks,1,2,3,4", "there are more fields than a record of this kind has"),
+            ("ticks,1,2.5,3", "the right count is `2.5`, which is not a whole number"),
+            ("ticks", "the time is missing"),
+            ("wheels,1,nan,0", "the right travel is `nan`, which is not a finite number"),
+            ("wheels,x,1,0", "the time is `x`, which is not a number of seconds within 300 years"),
+            (
+                "wheels,1e300,1,0",
+                "the time is `1e300`, which is not a number of seconds within 300 years",
+            ),
+            ("range,1,2", "the range is missing"),
+            (
+                "range,1,2,-3",
+                "the range is `-3`, which is not a positive number, or empty for no echo",
+            ),
+            ("range,1,inf,3", "the bearing is `inf`, which is not a finite number"),
+            ("scan,1,0,0.1", "the list of ranges is missing"),
+            ("scan,1,0,0.1,  ", "the list of ranges is missing"),
+            (
+                "scan,1,0,0.1,1 -2",
+                "the range of a beam is `-2`, which is not a number, zero or positive, or -",
+            ),
+            (
+                "start,0,0,0,0,-1,0",
+                "the deviation of the position is `-1`, which is not a finite number, zero or positive",
+            ),
+            ("start,0,0,0,0,1", "the deviation of the heading is missing"),
+            ("\u{1b}[31m,0", "`\\u{1b}[31m` is none of ticks, wheels, range, scan, start"),
+        ];
+        for (line, reason) in cases {
+            let malformed = parse(line).unwrap_err().to_string();
+            assert_eq!(malformed, reason, "{line}");
+        }
+    }
+}

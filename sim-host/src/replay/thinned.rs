@@ -1,0 +1,106 @@
+//! A trace that keeps its size: when it is full, every other instant is dropped, and from then on
+//! only every other one recorded.
+
+use sonarfix::units::Radians;
+use sonarfix_map::Floor;
+
+use crate::trace::{FixRecord, Recorder, Tick, Trace};
+
+/// More than a figure has pixels, and a player frames.
+pub const CAPACITY: usize = 16_384;
+
+/// Records a run of any length into a trace of a bounded one.
+#[derive(Debug)]
+pub struct Thinned {
+    trace: Trace,
+    ticks: Spacing,
+    fixes: Spacing,
+    capacity: usize,
+}
+
+/// Which of a sequence are kept: every `every`-th.
+#[derive(Debug)]
+struct Spacing {
+    every: u64,
+    seen: u64,
+}
+
+impl Spacing {
+    const ALL: Self = Self { every: 1, seen: 0 };
+
+    fn record<T>(&mut self, kept: &mut Vec<T>, capacity: usize, make: impl FnOnce() -> T) {
+        if self.seen.is_multiple_of(self.every) {
+            if kept.len() >= capacity {
+                let mut index = 0_u64;
+                kept.retain(|_| {
+                    index += 1;
+                    !index.is_multiple_of(2)
+                });
+                self.every *= 2;
+            }
+            if self.seen.is_multiple_of(self.every) {
+                kept.push(make());
+            }
+        }
+        self.seen += 1;
+    }
+}
+
+impl Thinned {
+    /// An empty trace on a floor, of at most `capacity` ticks and as many fixes.
+    #[must_use]
+    pub fn new(floor: &Floor, cone: Radians, capacity: usize) -> Self {
+        Self {
+            trace: Trace::of(floor, cone),
+            ticks: Spacing::ALL,
+            fixes: Spacing::ALL,
+            capacity: capacity.max(2),
+        }
+    }
+
+    /// What was kept.
+    #[must_use]
+    pub fn trace(&self) -> &Trace {
+        &self.trace
+    }
+
+    /// One in how many ticks was kept.
+    #[must_use]
+    pub fn every(&self) -> u64 {
+        self.ticks.every
+    }
+}
+
+impl Recorder for Thinned {
+    fn tick(&mut self, make: impl FnOnce() -> Tick) {
+        self.ticks.record(&mut self.trace.ticks, self.capacity, make);
+    }
+
+    fn fix(&mut self, make: impl FnOnce() -> FixRecord) {
+        self.fixes.record(&mut self.trace.fixes, self.capacity, make);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        /// However many there were: no more than fit, no less than half of that, evenly spaced
+        /// from the first.
+        #[test]
+        fn what_is_kept_is_bounded_and_even(count in 1_u64..5000, capacity in 2_usize..64) {
+            let mut spacing = Spacing::ALL;
+            let mut kept = Vec::new();
+            for value in 0..count {
+                spacing.record(&mut kept, capacity, || value);
+                prop_assert!(kept.len() <= capacity);
+            }
+            let even: Vec<u64> = (0..count).step_by(usize::try_from(spacing.every).unwrap()).collect();
+            prop_assert_eq!(&kept, &even);
+            prop_assert!(count <= capacity as u64 || 2 * kept.len() >= capacity);
+        }
+    }
+}

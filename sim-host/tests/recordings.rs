@@ -1,0 +1,105 @@
+//! Recordings of real robots. They are not part of the project: the tests read them from the folder
+//! that `SONARFIX_DATA` names, or from `../shared/data` beside the project, and say that they were
+//! skipped where there is none.
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "all of this file is a test, its helpers too"
+)]
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+fn recording(name: &str) -> Option<PathBuf> {
+    let usual = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
+    let data = std::env::var_os("SONARFIX_DATA").map_or_else(usual, PathBuf::from);
+    let path = data.join(name);
+    if !path.exists() {
+        eprintln!("SKIPPED: there is no recording {}", path.display());
+        return None;
+    }
+    Some(path)
+}
+
+fn sonarfix(args: &[&str]) -> Output {
+    let output = Command::new(env!("CARGO_BIN_EXE_sonarfix")).args(args).output().unwrap();
+    assert!(output.status.success(), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
+    output
+}
+
+fn replay(folder: &Path, robot: &str, policy: &str) -> Value {
+    let log = folder.join("log.csv");
+    let robot = folder.join(robot);
+    let (log, robot) = (log.to_str().unwrap(), robot.to_str().unwrap());
+    let args = ["replay", log, "--config", robot, "--policy", policy, "--strict", "--json"];
+    serde_json::from_slice(&sonarfix(&args).stdout).unwrap()
+}
+
+fn number(value: &Value, key: &str) -> f64 {
+    value[key].as_f64().unwrap_or_else(|| panic!("no number {key} in {value}"))
+}
+
+fn lego() -> Option<TempDir> {
+    let from = recording("lego_urg")?;
+    let dir = TempDir::new().unwrap();
+    let to = dir.path().to_str().unwrap();
+    sonarfix(&["convert", "lego", from.to_str().unwrap(), "--out", to]);
+    Some(dir)
+}
+
+#[test]
+fn lego_from_the_fitted_wheels() {
+    let Some(dir) = lego() else { return };
+    for policy in ["nearest", "informative"] {
+        let found = replay(dir.path(), "robot-fitted.toml", policy);
+        let rms = number(&found, "position_rms");
+        assert!(rms < 0.020, "{policy}: {rms}");
+        // The encoders alone are several times worse.
+        assert!(number(&found, "odometry_position_rms") > 5.0 * rms, "{found}");
+        // One range in 0.8 s; some meet a post that the map does not know, and are gated.
+        let fixes = |key| number(&found["fixes"], key);
+        let turns = fixes("accepted") + fixes("gated") + fixes("refused");
+        assert!(turns <= (number(&found, "duration") / 0.8).ceil(), "{found}");
+        assert!(fixes("gated") >= 5.0 && fixes("accepted") >= 0.4 * turns, "{found}");
+    }
+}
+
+#[test]
+fn lego_from_rounded_wheels_finds_the_fitted_ones() {
+    let Some(dir) = lego() else { return };
+    for policy in ["nearest", "informative"] {
+        let found = replay(dir.path(), "robot-rounded.toml", policy);
+        let rms = number(&found, "position_rms");
+        assert!(rms < 0.025, "{policy}: {rms}");
+        let end = &found["final"];
+        let fitted = [("scale_right", 0.3289 / 0.327 - 1.0), ("scale_left", 0.3255 / 0.327 - 1.0)];
+        for (state, fitted) in fitted {
+            let left = (number(end, state) - fitted).abs() / f64::abs(fitted);
+            assert!(left < 0.8, "{policy}: {state} keeps {left} of its error; {end}");
+        }
+    }
+}
+
+#[test]
+fn freiburg_knows_that_it_is_lost() {
+    let Some(folder) = recording("carmen") else { return };
+    let dir = TempDir::new().unwrap();
+    let to = dir.path().to_str().unwrap();
+    let log = folder.join("freiburg-079_rawodo.txt.gz");
+    let walls = folder.join("freiburg-079_walls.csv");
+    let (log, walls) = (log.to_str().unwrap(), walls.to_str().unwrap());
+    sonarfix(&["convert", "carmen", log, "--walls", walls, "--out", to]);
+    for policy in ["nearest", "informative"] {
+        let found = replay(dir.path(), "robot.toml", policy);
+        let astray = number(&found["honesty"], "astray_at");
+        // Longer than the encoders alone, which are half a metre off after 18 s.
+        assert!(astray > 120.0, "{policy}: half a metre off at {astray} s");
+        // It does not survive, and says so before anyone is misled.
+        let lost = number(&found["health"], "lost_at");
+        assert!(lost < astray, "{policy}: lost at {lost} s, half a metre off at {astray} s");
+        assert_eq!(found["health"]["lost_at_end"], true);
+    }
+}
