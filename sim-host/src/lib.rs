@@ -6,9 +6,11 @@
 
 pub mod angle;
 pub mod bound;
+pub mod claim;
 pub mod cli;
 pub mod convert;
 pub mod dense;
+pub mod fault_table;
 pub mod monte_carlo;
 pub mod observe;
 pub mod odometry;

@@ -20,6 +20,7 @@
 
 mod document;
 mod error;
+mod faults;
 mod fidelity;
 mod file;
 mod floor;
@@ -31,6 +32,7 @@ mod scenario;
 mod surroundings;
 
 pub use error::FileError;
+pub use faults::{Fault, FaultKind, Wheel};
 pub use fidelity::{Fidelity, Follow, Hardware, ServoName, SonarName, Upset, Upsets};
 pub use floor::{Floor, NamedWall};
 pub use path::{Leg, Motion, Movement, Path, PathError, PathPlan, PathPose};

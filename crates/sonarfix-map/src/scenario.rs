@@ -4,6 +4,7 @@ use std::path::Path as FilePath;
 
 use crate::document::{Document, Node, Table};
 use crate::error::FileError;
+use crate::faults::{self, Fault};
 use crate::fidelity::{self, Fidelity, Follow, Hardware, Upsets};
 use crate::file;
 use crate::floor::Floor;
@@ -15,7 +16,7 @@ use crate::quantity::{
 use crate::robot::Robot;
 use crate::surroundings::{self, Surroundings};
 
-const KEYS: [&str; 12] = [
+const KEYS: [&str; 13] = [
     "name",
     "description",
     "fidelity",
@@ -27,6 +28,7 @@ const KEYS: [&str; 12] = [
     "sensor",
     "servo",
     "world",
+    "faults",
     "run",
 ];
 
@@ -132,6 +134,8 @@ pub struct Scenario {
     pub hardware: Hardware,
     /// What is around it and on no map.
     pub surroundings: Surroundings,
+    /// What goes wrong with its hardware; seen at [`Fidelity::Pins`] only.
+    pub faults: Vec<Fault>,
     /// How often it is run.
     pub run: Run,
 }
@@ -171,6 +175,7 @@ impl Scenario {
             upsets: fidelity::read_upsets(&truth)?,
             hardware: fidelity::read_hardware(&root)?,
             surroundings: surroundings::read(&root)?,
+            faults: faults::read(&root)?,
             run: read_run(&root)?,
         })
     }

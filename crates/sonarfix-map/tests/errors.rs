@@ -5,7 +5,8 @@ use std::path::Path;
 
 use proptest::prelude::*;
 use sonarfix_map::{
-    CLASSROOM, Fidelity, FileError, Floor, Follow, PAPER, Robot, Scenario, ServoName, SonarName,
+    CLASSROOM, Fault, FaultKind, Fidelity, FileError, Floor, Follow, PAPER, Robot, Scenario,
+    ServoName, SonarName, Wheel,
 };
 
 fn parse(text: &str) -> Result<Scenario, FileError> {
@@ -632,4 +633,42 @@ fn the_paper_is_ideal_in_an_empty_room() {
     assert_eq!(scenario.hardware.servo, ServoName::Ideal);
     assert!(scenario.surroundings.obstacles.is_empty());
     assert!(scenario.upsets.slip.every.is_infinite() && scenario.upsets.bump.every.is_infinite());
+}
+
+#[test]
+fn a_wrong_fault_has_its_line_and_key() {
+    let of_fault = |fault: &str| {
+        let list = format!("format = 1\nfaults = [{{ {fault} }}]");
+        parse(&PAPER.replace("format = 1", &list)).unwrap_err()
+    };
+    let when = "from = \"1 s\", to = \"2 s\"";
+    let cases = [
+        ("kind = \"gremlins\"", "kind", "is none of the faults"),
+        ("kind = \"lost_echoes\"", "share", "is missing"),
+        ("kind = \"cross_talk\", share = 1.5", "share", "must be from 0 to 1"),
+        ("kind = \"dead_encoder\", wheel = \"front\"", "wheel", "must be \"right\" or"),
+        ("kind = \"slow_servo\", times = 0.5", "times", "must be at least 1"),
+        ("kind = \"clock_jitter\", late = 5", "late", "a unit is missing"),
+        ("kind = \"stuck_servo\", since = \"1 s\"", "since", "unknown key"),
+    ];
+    for (fault, key, message) in cases {
+        let error = of_fault(&format!("{fault}, {when}"));
+        assert_eq!(error.key(), format!("faults[0].{key}"), "{error}");
+        assert_eq!(error.line(), line_of(PAPER, "format = 1").map(|line| line + 1), "{error}");
+        assert!(error.message().contains(message), "{error}");
+    }
+    let error = of_fault("kind = \"brown_out\", from = \"2 s\", to = \"2 s\"");
+    assert_eq!((error.key(), error.message()), ("faults[0].to", "must be after `from`"));
+}
+
+#[test]
+fn faults_are_read_in_their_order() {
+    let list = "format = 1\nfaults = [
+        { kind = \"missing_ticks\", wheel = \"left\", share = \"1 %\", from = \"0 s\", to = \"1 s\" },
+        { kind = \"stuck_echo\", from = \"5 s\", to = \"7 s\" },
+    ]";
+    let faults = parse(&PAPER.replace("format = 1", list)).unwrap().faults;
+    let ticks = Fault { kind: FaultKind::MissingTicks(Wheel::Left, 0.01), from: 0.0, to: 1.0 };
+    let echo = Fault { kind: FaultKind::StuckEcho, from: 5.0, to: 7.0 };
+    assert_eq!(faults, [ticks, echo]);
 }

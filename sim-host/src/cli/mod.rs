@@ -2,6 +2,7 @@
 
 mod bound;
 mod convert;
+mod faults;
 mod paper;
 mod replay;
 mod run;
@@ -32,6 +33,8 @@ enum Command {
     Bound(bound::Args),
     /// Prints how the simulated NXT sonar compares with recorded sweeps, as markdown.
     SonarModel(sonar_model::Args),
+    /// Prints what every fault of the hardware does to a robot, as markdown.
+    Faults(faults::Args),
 }
 
 impl Cli {
@@ -47,6 +50,7 @@ impl Cli {
             Command::Convert(args) => convert::execute(&args),
             Command::Bound(args) => bound::execute(&args),
             Command::SonarModel(args) => sonar_model::execute(&args),
+            Command::Faults(args) => faults::execute(&args),
         }
     }
 }

@@ -16,8 +16,12 @@ pub struct SonarBoard {
 }
 
 impl SonarBoard {
-    /// The trigger fell at `now`, µs; the line will stay high for `pulse` µs.
+    /// The trigger fell at `now`, µs; the line will stay high for `pulse` µs. A board whose line
+    /// is still high from the last ping does not listen to its trigger.
     pub fn answer(&mut self, now: u64, pulse: u64) {
+        if !self.edges.is_empty() {
+            return;
+        }
         let sent = now + LATENCY;
         self.edges.extend([(sent, true), (sent + pulse.max(1), false)]);
     }

@@ -3,6 +3,7 @@
 
 use sonarfix_hal::encoder::Quadrature;
 
+use super::faults::{Edge, EncoderFaults};
 use super::wires::{ChannelPin, EncoderWires};
 
 /// Levels of A and B over the four ticks of a period, as the wheel rolls ahead (x4 decoding).
@@ -27,31 +28,36 @@ impl<'w> EncoderDisc<'w> {
         Self { wires, decoder, tick, travelled: 0.0, ticks: 0 }
     }
 
-    /// Rolls the wheel so many metres further.
-    pub fn roll(&mut self, metres: f64) {
+    /// Rolls the wheel so many metres further, up to `now`, µs.
+    pub fn roll(&mut self, metres: f64, now: u64, faults: &mut EncoderFaults) {
         self.travelled += metres;
         #[expect(clippy::cast_possible_truncation, reason = "2^63 ticks are light years")]
         let target = (self.travelled / self.tick).floor() as i64;
         let step = (target - self.ticks).signum();
         while self.ticks != target {
             self.ticks += step;
-            self.show();
+            self.show(now, faults);
         }
     }
 
     /// Puts the levels of the tick on the wires; both edges interrupt the controller.
-    fn show(&mut self) {
+    fn show(&mut self, now: u64, faults: &mut EncoderFaults) {
         let phase = usize::try_from(self.ticks.rem_euclid(4)).unwrap_or_default();
-        if let Some(&(a, b)) = LEVELS.get(phase) {
-            self.wires.a.set(a);
-            self.wires.b.set(b);
+        let Some(&honest) = LEVELS.get(phase) else {
+            return;
+        };
+        let Edge { levels: (a, b), is_served } = faults.edge(now, honest);
+        self.wires.a.set(a);
+        self.wires.b.set(b);
+        if is_served {
+            let Ok(()) = self.decoder.update();
         }
-        let Ok(()) = self.decoder.update();
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::faults::Faults;
     use super::*;
     use proptest::prelude::*;
     use sonarfix_hal::encoder::Counter;
@@ -66,9 +72,10 @@ mod tests {
             let wires = EncoderWires::default();
             let tick = if reversed { -0.001 } else { 0.001 };
             let mut disc = EncoderDisc::new(&wires, tick);
+            let [mut none, _] = Faults::new(&[], 0).encoders;
             let mut way = 0.0;
             for step in steps {
-                disc.roll(step);
+                disc.roll(step, 0, &mut none);
                 way += step;
                 let Ok(count) = (&wires.count).count();
                 let whole = (way / tick).floor();

@@ -12,9 +12,11 @@
 //! - [`wires`]: the pins, as the drivers see them;
 //! - [`disc`]: an encoder's disc, which makes the edges;
 //! - [`board`]: a sonar's board, which turns a trigger into the pulse of an echo;
-//! - [`devices`]: the drivers, set up for a scenario.
+//! - [`devices`]: the drivers, set up for a scenario;
+//! - [`faults`]: what goes wrong on the way.
 
 pub mod board;
 pub mod devices;
 pub mod disc;
+pub mod faults;
 pub mod wires;

@@ -74,8 +74,8 @@ impl ServoPlant {
         Self { model, turn: Turn { from: 0.0, to: 0.0, starts: 0.0, arrives: 0.0 } }
     }
 
-    /// Sends it to a bearing.
-    pub fn send(&mut self, now: f64, bearing: f64) {
+    /// Sends it to a bearing, for which it takes `slowness` times as long as it should.
+    pub fn send(&mut self, now: f64, bearing: f64, slowness: f64) {
         let ServoModel { frame, slew, dead_band, .. } = self.model;
         let starts = if frame > 0.0 { (now / frame).ceil() * frame } else { now };
         let from = self.shaft(starts);
@@ -84,7 +84,8 @@ impl ServoPlant {
             return;
         }
         let to = bearing - dead_band * way.signum();
-        self.turn = Turn { from, to, starts, arrives: starts + (to - from).abs() / slew };
+        self.turn =
+            Turn { from, to, starts, arrives: starts + slowness * (to - from).abs() / slew };
     }
 
     /// Where its shaft is, apart from ringing.
@@ -120,7 +121,7 @@ mod tests {
     fn an_ideal_one_is_there_at_once() {
         let mut servo = ServoPlant::new(ServoModel::ideal());
         for (time, bearing) in [(0.0, 1.0), (0.1, -2.0), (0.1, 3.0)] {
-            servo.send(time, bearing);
+            servo.send(time, bearing, 1.0);
             assert!((servo.bearing(time) - bearing).abs() < 1e-12, "{bearing}");
         }
     }
@@ -130,7 +131,7 @@ mod tests {
         let model = ServoModel::sg90();
         let mut servo = ServoPlant::new(model);
         let sixty = 60_f64.to_radians();
-        servo.send(0.005, sixty);
+        servo.send(0.005, sixty, 1.0);
         assert!(servo.bearing(0.0199).abs() <= 0.5 * model.backlash + 1e-12, "before the frame");
         // Half-way after 55 ms.
         let half = servo.bearing(0.020 + 0.055);
@@ -146,12 +147,12 @@ mod tests {
     fn it_stands_on_the_side_it_came_from_and_ignores_what_is_too_little() {
         let model = ServoModel::sg90();
         let mut servo = ServoPlant::new(model);
-        servo.send(0.0, 1.0);
+        servo.send(0.0, 1.0, 1.0);
         let from_the_right = servo.bearing(1.0);
-        servo.send(1.0, 1.0 - 0.5 * model.dead_band);
+        servo.send(1.0, 1.0 - 0.5 * model.dead_band, 1.0);
         assert!((servo.bearing(2.0) - from_the_right).abs() < 1e-12);
-        servo.send(2.0, 1.5);
-        servo.send(3.0, 1.0);
+        servo.send(2.0, 1.5, 1.0);
+        servo.send(3.0, 1.0, 1.0);
         let apart = servo.bearing(4.0) - from_the_right;
         assert!((apart - 2.0 * model.dead_band - model.backlash).abs() < 1e-9, "{apart}");
     }

@@ -150,14 +150,19 @@ impl Simulation {
         Plant::new(&self.scenario, self.range_scale)
     }
 
+    /// The localizer, from its start.
     fn localizer(
         &self,
         truth: &Vector,
         rng: &mut ChaCha8Rng,
     ) -> Result<Localizer<'_>, SimulationError> {
-        let start = estimated_start(&self.scenario, truth, rng);
+        self.localizer_from(estimated_start(&self.scenario, truth, rng), 0)
+    }
+
+    /// A localizer that starts at a time, µs.
+    fn localizer_from(&self, start: Start, now: u64) -> Result<Localizer<'_>, SimulationError> {
         let config = self.scenario.robot.config;
-        Ok(Localizer::new(config, Map::new(&self.walls), start, Instant::from_ticks(0))?)
+        Ok(Localizer::new(config, Map::new(&self.walls), start, Instant::from_ticks(now))?)
     }
 
     /// Who steers, if anybody must.
@@ -222,7 +227,7 @@ fn estimated_start(scenario: &Scenario, truth: &Vector, rng: &mut ChaCha8Rng) ->
     clippy::cast_sign_loss,
     reason = "a run's length is positive and far below 2^63 µs"
 )]
-fn micros(seconds: f64) -> u64 {
+pub(crate) fn micros(seconds: f64) -> u64 {
     (seconds * 1e6).round() as u64
 }
 

@@ -1,7 +1,8 @@
 //! A run through pins, drivers and the loop that a robot runs, on a virtual clock that jumps from
 //! event to event.
 
-use sonarfix::units::Instant;
+use sonarfix::localizer::{Localizer, Start};
+use sonarfix::units::{Instant, Metres, Radians};
 use sonarfix_hal::robot::{Heard, Report, Robot};
 
 use super::score::Score;
@@ -11,9 +12,10 @@ use crate::observe::{self, Look};
 use crate::pins::board::{LATENCY, SonarBoard};
 use crate::pins::devices::{self, PinDevices, ServoSetup, SetupError};
 use crate::pins::disc::EncoderDisc;
+use crate::pins::faults::Faults;
 use crate::pins::wires::Wires;
 use crate::plant::Plant;
-use crate::plant::follower::Follower;
+use crate::plant::follower::{Command, Follower};
 use crate::plant::servo::ServoPlant;
 use crate::statistics::RunResult;
 use crate::trace::Recorder;
@@ -36,9 +38,14 @@ pub fn run(
     let wires = Wires::default();
     let servo = ServoSetup::of(simulation.scenario.hardware.servo);
     let mut devices = devices::connect(&wires, &simulation.scenario, &servo)?;
-    let (mut side, mut robot) = WorldSide::new(simulation, seed, &wires, servo)?;
+    let (mut side, localizer) = WorldSide::new(simulation, seed, &wires, servo)?;
+    let mut robot = robot(simulation, localizer)?;
     let period = simulation.scenario.robot.encoder_period.to_micros();
     loop {
+        if let Some(back_at) = side.faults.controller.power_back_at(side.now) {
+            robot = side.reboot(back_at, &robot)?;
+            devices = devices::connect(&wires, &simulation.scenario, &servo)?;
+        }
         let report = robot.poll(Instant::from_ticks(side.now), &mut devices);
         side.obey();
         side.record(&report, &robot, recorder);
@@ -52,6 +59,15 @@ pub fn run(
     }
 }
 
+fn robot<'a>(
+    simulation: &Simulation,
+    localizer: Localizer<'a>,
+) -> Result<Robot<'a>, SimulationError> {
+    let settings = devices::settings(&simulation.scenario.robot, simulation.stamp);
+    let wheels = devices::wheels(&simulation.scenario.robot)?;
+    Ok(Robot::new(localizer, wheels, settings).map_err(SetupError::from)?)
+}
+
 /// Everything on the other side of the wires.
 struct WorldSide<'a> {
     simulation: &'a Simulation,
@@ -61,6 +77,9 @@ struct WorldSide<'a> {
     discs: [EncoderDisc<'a>; 2],
     setup: ServoSetup,
     servo: ServoPlant,
+    /// A bearing that the servo is told and has not taken up yet.
+    ordered: Option<f64>,
+    faults: Faults,
     board: SonarBoard,
     follower: Option<Follower>,
     score: Score<'a>,
@@ -78,7 +97,7 @@ impl<'a> WorldSide<'a> {
         seed: u64,
         wires: &'a Wires,
         setup: ServoSetup,
-    ) -> Result<(Self, Robot<'a>), SimulationError> {
+    ) -> Result<(Self, Localizer<'a>), SimulationError> {
         let scenario = &simulation.scenario;
         let mut chance = Chance::new(seed);
         let plant = simulation.plant();
@@ -93,6 +112,8 @@ impl<'a> WorldSide<'a> {
             discs: [EncoderDisc::new(&wires.right, right), EncoderDisc::new(&wires.left, left)],
             setup,
             servo: ServoPlant::new(setup.model),
+            ordered: None,
+            faults: Faults::new(&scenario.faults, seed),
             board: SonarBoard::default(),
             follower: simulation.follower(),
             score,
@@ -100,10 +121,7 @@ impl<'a> WorldSide<'a> {
             look: None,
             now: 0,
         };
-        let settings = devices::settings(&scenario.robot, simulation.stamp);
-        let wheels = devices::wheels(&scenario.robot)?;
-        let robot = Robot::new(localizer, wheels, settings).map_err(SetupError::from)?;
-        Ok((side, robot))
+        Ok((side, localizer))
     }
 
     fn time(&self) -> f64 {
@@ -115,20 +133,50 @@ impl<'a> WorldSide<'a> {
         self.now = now;
         let travel = self.plant.drive_to(seconds(now), &mut self.chance.wheels);
         self.score.rolled(travel);
-        for (disc, metres) in self.discs.iter_mut().zip(travel.measured) {
-            disc.roll(metres);
+        let encoders = self.discs.iter_mut().zip(&mut self.faults.encoders);
+        for ((disc, faults), metres) in encoders.zip(travel.measured) {
+            disc.roll(metres, now, faults);
         }
         self.board.deliver(now, &self.wires.echo);
+        self.turn_servo();
+    }
+
+    /// The servo takes up what its pulses say, over and over, unless it is stuck.
+    fn turn_servo(&mut self) {
+        if let Some(slowness) = self.faults.controller.servo_slowness(self.now)
+            && let Some(bearing) = self.ordered.take()
+        {
+            self.servo.send(seconds(self.now), bearing, slowness);
+        }
+    }
+
+    /// The power is gone, and comes back at `back_at`: the motors stop, and the robot starts again
+    /// from the pose that it kept, as sure of it as at its start, and of its calibration as new.
+    fn reboot(&mut self, back_at: u64, robot: &Robot) -> Result<Robot<'a>, SimulationError> {
+        let start = self.simulation.scenario.start;
+        #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
+        let start = Start {
+            pose: robot.localizer().pose(),
+            position_deviation: Metres(start.position as f32),
+            heading_deviation: Radians(start.heading as f32),
+        };
+        self.plant.steer(Command::default());
+        self.wires.trigger.set(false);
+        self.look = None;
+        self.advance(back_at);
+        let localizer = self.simulation.localizer_from(start, back_at)?;
+        self::robot(self.simulation, localizer)
     }
 
     /// Does what the robot did to its wires.
     fn obey(&mut self) {
         if let Some(duty) = self.wires.duty.take() {
-            let bearing = self.setup.bearing(duty, &self.simulation.scenario.robot.config);
-            self.servo.send(self.time(), bearing);
+            self.ordered = Some(self.setup.bearing(duty, &self.simulation.scenario.robot.config));
+            self.turn_servo();
         }
         if self.wires.triggered.take() {
-            let pulse = self.ping();
+            let honest = self.ping();
+            let pulse = self.faults.sonar.pulse(self.now, honest, self.silence);
             self.board.answer(self.now, pulse);
         }
     }
@@ -157,6 +205,7 @@ impl<'a> WorldSide<'a> {
     }
 
     fn record(&mut self, report: &Report, robot: &Robot, recorder: &mut impl Recorder) {
+        self.score.faults(report.faults);
         if report.tick.is_some() || report.heard.is_some() {
             self.score.arrive(self.plant.state());
         }
@@ -197,7 +246,7 @@ impl<'a> WorldSide<'a> {
 
     /// When the loop is to be polled next: when it says, or while it listens as often as a
     /// firmware would, and when its interrupt wakes it up.
-    fn next_poll(&self, robot: &Robot, devices: &mut PinDevices) -> u64 {
+    fn next_poll(&mut self, robot: &Robot, devices: &mut PinDevices) -> u64 {
         let at = match robot.idle_until(devices) {
             Some(idle_until) => idle_until.ticks(),
             None if self.wires.trigger.get() => self.now + TRIGGER,
@@ -206,6 +255,6 @@ impl<'a> WorldSide<'a> {
                 edge.min(self.now + LISTEN_POLL)
             }
         };
-        at.max(self.now + 1)
+        self.faults.controller.poll_at(self.now, at.max(self.now + 1))
     }
 }

@@ -2,6 +2,7 @@
 
 use sonarfix::aim::Aim;
 use sonarfix::localizer::{Fix, Localizer};
+use sonarfix_hal::robot::Faults;
 
 use super::{Simulation, SimulationError};
 use crate::bound::Bound;
@@ -19,6 +20,8 @@ pub struct Score<'a> {
     bound: Bound,
     /// Rolled since the bound was last brought up to date.
     rolled: Travel,
+    /// Time of the last tick, seconds.
+    ticked: f64,
     result: RunResult,
     nis: NisSum,
 }
@@ -42,6 +45,7 @@ impl<'a> Score<'a> {
             odometry: DeadReckoning::new(start, model.track_width),
             bound: Bound::new(model, truth, &deviation),
             rolled: Travel::default(),
+            ticked: 0.0,
             result: RunResult::default(),
             nis: NisSum::default(),
         }
@@ -89,6 +93,11 @@ impl<'a> Score<'a> {
         }
     }
 
+    /// The loop reported more faults.
+    pub fn faults(&mut self, more: Faults) {
+        self.result.faults = self.result.faults.plus(more);
+    }
+
     /// An encoder tick is over.
     pub fn tick(
         &mut self,
@@ -99,6 +108,10 @@ impl<'a> Score<'a> {
     ) {
         self.result.error = observe::error(localizer.filter(), &plant.state());
         self.result.path.add(&self.result.error);
+        let covariance = observe::covariance(localizer.filter());
+        let verdict = localizer.health().verdict;
+        self.result.claim.add(time - self.ticked, &self.result.error, &covariance, verdict);
+        self.ticked = time;
         recorder.tick(|| Tick {
             time,
             truth: Some(plant.truth()),
