@@ -192,6 +192,7 @@ impl<'a> Run<'a> {
         let aim = match self.localizer.aim() {
             Ok(aim) => aim,
             Err(no_aim) => {
+                self.localizer.skip();
                 self.result.fixes.refused += 1;
                 recorder.fix(|| observe::no_aim_record(look, no_aim));
                 return;

@@ -167,6 +167,9 @@ impl Config {
         let prior = &self.prior;
         not_negative("prior.scale_right", prior.scale_right)?;
         not_negative("prior.scale_left", prior.scale_left)?;
+        // They are held as mean and difference, which cannot say that one alone is exact.
+        let one_is_exact = (prior.scale_right > 0.0) != (prior.scale_left > 0.0);
+        require("prior.scale_left", !one_is_exact, "zero if prior.scale_right is, and only then")?;
         not_negative("prior.track_width", prior.track_width.0)?;
         let width = self.drive.track_width.0;
         let below_width = prior.track_width.0 < 0.5 * width;

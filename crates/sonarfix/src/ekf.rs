@@ -130,7 +130,8 @@ pub struct Ekf {
 impl Ekf {
     /// A filter at `state`, whose errors are independent with the standard deviations in
     /// `deviation` (each in the unit of its state). A deviation of zero means: known exactly, and
-    /// for the range scale: not estimated.
+    /// for the range scale: not estimated. Of the two scale errors either both are known exactly or
+    /// none; they are held as mean and difference.
     ///
     /// # Errors
     /// [`EkfError::NotFinite`] or [`EkfError::Negative`], by what is wrong with an argument.

@@ -3,7 +3,7 @@
 //!
 //! The paper's eq. (3) moves along the heading at the start of the step. This moves along the
 //! heading half-way through the turn, which is the same on a straight line and in a turn on the
-//! spot, and on a curve takes the error of a step from first to third order in its angle.
+//! spot, and on a curve takes the error of a step from Δs Δψ/2, sideways, to Δs Δψ²/24, ahead.
 //!
 //! # Non-finite policy
 //! Nothing here refuses a value; [`Ekf::predict`](crate::ekf::Ekf::predict) checks the travel

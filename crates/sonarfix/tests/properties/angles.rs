@@ -1,0 +1,156 @@
+//! Sine, cosine, and headings.
+
+use core::f32::consts::{PI, TAU};
+
+use proptest::prelude::*;
+use sonarfix::ekf::{Ekf, State};
+use sonarfix::map::Wall;
+use sonarfix::motion::WheelTravel;
+use sonarfix::pose::{Heading, Point};
+use sonarfix::range::ExpectedRange;
+use sonarfix::trig::{RANGE, sin_cos};
+use sonarfix::units::{Metres, Radians, SquareMetres};
+
+use crate::oracle::turn_between;
+use crate::strategies::any_drive;
+
+/// The larger error of sine and cosine, and how far sin² + cos² is from 1.
+fn errors(angle: f32) -> (f64, f64) {
+    let (sin, cos) = sin_cos(Radians(angle));
+    let (sin, cos) = (f64::from(sin), f64::from(cos));
+    let (true_sin, true_cos) = f64::from(angle).sin_cos();
+    let error = (sin - true_sin).abs().max((cos - true_cos).abs());
+    (error, (sin * sin + cos * cos - 1.0).abs())
+}
+
+fn worst(angles: impl Iterator<Item = f32>) -> (f64, f64) {
+    angles.map(errors).fold((0.0, 0.0), |(a, b), (c, d)| (a.max(c), b.max(d)))
+}
+
+/// Every `step`-th float from one to another, both positive, with both signs.
+fn floats(from: f32, to: f32, step: usize) -> impl Iterator<Item = f32> {
+    (from.to_bits()..to.to_bits())
+        .step_by(step)
+        .flat_map(|b| [f32::from_bits(b), -f32::from_bits(b)])
+}
+
+/// The bound in the documentation, over all magnitudes that an angle of the filter has.
+#[test]
+fn sine_and_cosine_are_within_their_bound() {
+    let headings = worst(floats(1e-4, 8.0, 97));
+    let range = worst(floats(8.0, RANGE.0, 97));
+    let tiny = worst(floats(0.0, 1e-4, 9_973));
+    // Where the reduction cancels most: the floats next to the multiples of π/2.
+    let crossings = worst((1_u16..=63).flat_map(|quadrant| {
+        let near = f32::from(quadrant) * core::f32::consts::FRAC_PI_2;
+        (0..200).map(move |n| f32::from_bits(near.to_bits() + n - 100))
+    }));
+    println!(
+        "worst: {headings:?} up to 8, {range:?} up to 100, {tiny:?} tiny, {crossings:?} at quadrants"
+    );
+    for (error, off_circle) in [headings, range, tiny, crossings] {
+        assert!(error < 8e-8 && off_circle < 2e-7, "{error:e}, {off_circle:e}");
+    }
+}
+
+#[test]
+fn sine_and_cosine_of_what_is_no_angle_are_nan() {
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        let (sin, cos) = sin_cos(Radians(bad));
+        assert!(sin.is_nan() && cos.is_nan());
+    }
+}
+
+proptest! {
+    /// Beyond the range what comes out is still a direction, and the angle's own to within the
+    /// spacing of floats of its size.
+    #[test]
+    fn sine_and_cosine_of_a_huge_angle_are_a_direction(
+        bits in RANGE.0.to_bits()..f32::INFINITY.to_bits(), negative in any::<bool>(), large in 100.0_f32..1e6,
+    ) {
+        let huge = f32::from_bits(bits);
+        for angle in [huge, large].map(|angle| if negative { -angle } else { angle }) {
+            let (error, off_circle) = errors(angle);
+            prop_assert!(off_circle < 2e-7, "{angle} is off the circle by {off_circle}");
+            let spacing = angle.abs().next_up() - angle.abs();
+            prop_assert!(error < f64::from(spacing) + 1e-7, "{angle}: {error}");
+        }
+    }
+
+    /// Any finite angle is wrapped into (−π, π], to the same direction; in constant time (a loop
+    /// of subtractions would not end for 1e30, nor leave 1e9 in the life of a robot).
+    #[test]
+    fn headings_are_wrapped(bits in any::<u32>(), few in -1000.0_f32..1000.0, turns in -20_i8..20) {
+        let edge = f32::from(turns) * PI;
+        for angle in [f32::from_bits(bits), few, edge, edge.next_up(), edge.next_down()] {
+            let wrapped = Heading::new(Radians(angle)).radians().0;
+            if !angle.is_finite() {
+                prop_assert!(wrapped.is_nan());
+                continue;
+            }
+            prop_assert!(wrapped > -PI && wrapped <= PI, "{angle} gives {wrapped}");
+            if angle.abs() < 1000.0 {
+                // 2π as `f32` is 1.7e-7 too long, 160 times in a thousand radians.
+                let off = turn_between(angle.into(), wrapped.into()).abs();
+                prop_assert!(off < 1e-6 + 160.0 * 1.8e-7, "{angle} gives {wrapped}");
+            }
+            if angle > -PI && angle <= PI {
+                prop_assert_eq!(wrapped.to_bits(), angle.to_bits());
+            }
+        }
+        let huge = Heading::new(Radians(1e30)).radians().0;
+        prop_assert!(huge > -PI && huge <= PI);
+    }
+
+    /// Headings of turns, and turns between headings, likewise.
+    #[test]
+    fn turning_there_and_back_is_no_turn(from in -PI..PI, by in -PI..PI) {
+        let start = Heading::new(Radians(from));
+        let end = start.turned(Radians(by));
+        let turn = end.from(start).0;
+        prop_assert!(turn > -PI && turn <= PI);
+        prop_assert!(turn_between(turn.into(), by.into()).abs() < 1e-6, "{turn} instead of {by}");
+    }
+
+    /// The filter's heading over any sequence of turns on the spot, a full turn and many among
+    /// them; the same direction as in `f64` as long as turns are small.
+    #[test]
+    fn the_filters_heading_stays_wrapped(
+        drive in any_drive(), start in -10.0_f32..10.0,
+        turns in proptest::collection::vec(prop_oneof![-1.0_f32..1.0, -4.0_f32..4.0, -1e4_f32..1e4], 1..100),
+    ) {
+        let state = State { heading: start, ..State::default() };
+        let mut ekf = Ekf::new(drive, state, State { heading: 0.01, ..State::default() }).unwrap();
+        let mut direction = f64::from(start);
+        let mut loss = 1e-6;
+        for turn in turns {
+            let way = 0.5 * turn * drive.track_width.0;
+            ekf.predict(WheelTravel::new(way, -way)).unwrap();
+            let heading = ekf.state().heading;
+            prop_assert!(heading > -PI && heading <= PI);
+            direction += 2.0 * f64::from(way) / f64::from(drive.track_width.0);
+            // The turn is rounded three times, the sum once; each 2π is 1.7e-7 too long.
+            loss += f64::from(turn.abs()) * (3e-7 + 1.8e-7 / f64::from(TAU)) + 5e-7;
+            prop_assert!(turn_between(heading.into(), direction).abs() < loss);
+        }
+    }
+
+    /// A correction, too, may turn the heading over ±π: here by the innovation of a sonar far ahead
+    /// of the axle, whose range depends on little else.
+    #[test]
+    fn a_correction_wraps_the_heading(drive in any_drive(), past in 0.01_f32..0.2, left in any::<bool>()) {
+        let side = if left { 1.0 } else { -1.0 };
+        let heading = side * (PI - 0.005);
+        let state = State { heading, ..State::default() };
+        let mut ekf = Ekf::new(drive, state, State { heading: 0.5, ..State::default() }).unwrap();
+        // The robot looks along −x, so the sonar 1 m ahead is at (−1, 0); the wall is y = −2.
+        let wall = Wall::new(Point::new(-5.0, -2.0), Point::new(5.0, -2.0)).unwrap();
+        let expected = ExpectedRange::new(&wall, Point::new(1.0, 0.0), &state);
+        // Turning left takes it towards the wall: ∂h/∂ψ is −1.
+        let range = Metres(expected.range.0 - side * past);
+        ekf.update(range, &expected, SquareMetres(1e-6)).unwrap();
+        let turned = ekf.state().heading;
+        prop_assert!(turned > -PI && turned <= PI, "{turned}");
+        prop_assert!((turned + side * (PI - past + 0.005)).abs() < 1e-3, "{turned}");
+    }
+}

@@ -1,0 +1,163 @@
+//! Prediction and correction against dense `f64`.
+
+use nalgebra::SVector;
+use proptest::prelude::*;
+use sonarfix::motion::WheelTravel;
+use sonarfix::pose::Point;
+use sonarfix::range::ExpectedRange;
+use sonarfix::units::{Metres, SquareMetres};
+
+use crate::oracle::{
+    HEADING, Matrix, ROUNDING, Robot, SCALE_LEFT, SCALE_RIGHT, TRACK_WIDTH, Vector, bearable,
+    corrected, covariance_of, jacobian_of, size_by_both_wheels, state_of, travel_of, turn_between,
+    variance_along,
+};
+use crate::strategies::{any_ekf, any_filter, any_mount, any_sight, any_travel, bits};
+
+/// The largest of |a − b| / size over all entries, in roundings of `f32`.
+fn roundings(a: &Matrix, b: &Matrix, size: &Matrix) -> f64 {
+    let size = size_by_both_wheels(size);
+    (a - b).abs().component_div(&size.add_scalar(1e-30)).max() / ROUNDING
+}
+
+fn distance(a: &Vector, b: &Vector) -> Vector {
+    let mut d = a - b;
+    d[HEADING] = turn_between(a[HEADING], b[HEADING]);
+    d.abs()
+}
+
+proptest! {
+    /// One prediction from any estimate equals eqs. (4)–(9) in dense `f64`. Each entry is a sum of
+    /// some forty products of rounded factors.
+    #[test]
+    fn prediction_equals_the_dense_one((drive, mut ekf) in any_filter(), travel in any_travel()) {
+        let (state, p) = (state_of(&ekf), covariance_of(&ekf));
+        let robot = Robot::from(&drive);
+        ekf.predict(travel).unwrap();
+        let travel = travel_of(travel);
+
+        let off = distance(&state_of(&ekf), &(state + robot.step(&state, &travel)));
+        // The position is rounded where it is; the way is some 0.1 m, an angle at most 2π.
+        for (i, size) in [state[0].abs() + 0.2, state[1].abs() + 0.2, 6.3].into_iter().enumerate() {
+            prop_assert!(off[i] <= 3.0 * ROUNDING * size, "state {i} is off by {}", off[i]);
+        }
+        let calibration = |state: &Vector| state.fixed_rows::<4>(3).into_owned();
+        prop_assert_eq!(calibration(&state_of(&ekf)), calibration(&state));
+
+        let exact = robot.predicted(&p, &state, &travel);
+        let mut size = robot.size_of_terms(&p, &state, &travel);
+        // What earlier additions to these variances rounded away, when they may have been as large
+        // as any prior, is added with this one.
+        for i in [SCALE_RIGHT, SCALE_LEFT, TRACK_WIDTH] {
+            size[(i, i)] += 0.03 * 0.03;
+        }
+        let off = roundings(&covariance_of(&ekf), &exact, &size);
+        prop_assert!(off <= 48.0, "off by {off} roundings");
+    }
+
+    /// One correction of any estimate equals Joseph's form, eq. (15), in dense `f64`, and the
+    /// state moves by the gain of eq. (14) times the innovation.
+    ///
+    /// The terms of an entry are at most |I − K H| |P| |I − K H|ᵀ, and those that the first pass
+    /// takes away.
+    #[test]
+    fn correction_equals_the_dense_joseph_form(
+        mut ekf in any_ekf(), sight in any_sight(), mount in any_mount(),
+        surprise in -0.2_f32..0.2, exponent in -4.0_f32..-2.0,
+    ) {
+        let (state, p) = (state_of(&ekf), covariance_of(&ekf));
+        let wall = sight.wall(Point::new(ekf.state().x, ekf.state().y));
+        let expected = ExpectedRange::new(&wall, mount, &ekf.state());
+        let noise = SquareMetres(10.0_f32.powf(exponent));
+        let range = Metres(expected.range.0 + surprise);
+        let innovation = ekf.innovation(range, &expected, noise);
+        let gain_of_position = ekf.position_gain(&expected, noise);
+        ekf.update(range, &expected, noise).unwrap();
+
+        let h = jacobian_of(&expected);
+        // Eq. (17) acts in one of some thousand; tests/properties/covariance.rs looks at it.
+        let r = f64::from(noise.0);
+        prop_assume!(bearable(&p, &h, r) == Some(r));
+        let (gain, exact) = corrected(&p, &h, r);
+        let kept = Matrix::identity() + gain.abs() * h.abs();
+        let taken = gain.abs() * (p.abs() * h.abs().transpose()).transpose();
+        let size = kept * p.abs() * kept.transpose() + taken + taken.transpose();
+        let off = roundings(&covariance_of(&ekf), &exact, &size);
+        prop_assert!(off <= 4.0, "off by {off} roundings");
+
+        // S is a sum of 16 terms; what they lose in cancelling, S and K have lost.
+        let s = variance_along(&p, &h) + r;
+        let terms = variance_along(&p.abs(), &h.abs()) + r;
+        let lost = 8.0 * ROUNDING * terms / s;
+        prop_assert!((f64::from(innovation.variance.0) / s - 1.0).abs() <= lost);
+        let nu = f64::from(range.0) - f64::from(expected.range.0);
+        prop_assert_eq!(innovation.value, range - expected.range);
+
+        let off = distance(&state_of(&ekf), &(state + gain * nu));
+        let column = p.abs() * h.abs().transpose();
+        for i in 0..7 {
+            // m = P Hᵀ is exact to the size of its terms.
+            let of_gain = of_both(i, &column) / s * 8.0 * ROUNDING + of_both(i, &gain) * lost;
+            let allowed = nu.abs() * (of_gain + of_both(i, &gain) * 4.0 * ROUNDING)
+                + range_of(i, &state) * 4.0 * ROUNDING
+                + of_both(i, &gain) * f64::from(range.0) * ROUNDING;
+            prop_assert!(off[i] <= allowed, "state {i} is off by {} > {allowed}", off[i]);
+        }
+
+        // Eq. (16): the drop of the position's variance, foreseen without trying.
+        let drop = p[(0, 0)] + p[(1, 1)] - exact[(0, 0)] - exact[(1, 1)];
+        let m = p.abs() * h.abs().transpose();
+        let terms = (m[0] * m[0] + m[1] * m[1]) / s;
+        prop_assert!((f64::from(gain_of_position.0) - drop).abs() <= terms * (20.0 * ROUNDING + lost));
+    }
+
+    /// A step without travel changes no bit, whatever the sign of its zeros; any other step does.
+    #[test]
+    fn zero_travel_changes_no_bit(mut ekf in any_ekf(), times in 1_usize..50) {
+        let before = bits(&ekf);
+        for _ in 0..times {
+            for travel in [(0.0, 0.0), (-0.0, 0.0), (0.0, -0.0), (-0.0, -0.0)] {
+                ekf.predict(WheelTravel::new(travel.0, travel.1)).unwrap();
+            }
+        }
+        prop_assert_eq!(&bits(&ekf), &before);
+        ekf.predict(WheelTravel::new(0.01, 0.01)).unwrap();
+        prop_assert_ne!(bits(&ekf), before);
+    }
+
+    /// Noise belongs to the way, not to the number of steps (so not to time): a way cut in a
+    /// hundred adds what it adds in one, but for the rounding of a hundred sums.
+    #[test]
+    fn noise_grows_with_distance_not_with_steps((drive, ekf) in any_filter(), s in 0.1_f32..1.0, back in any::<bool>()) {
+        let s = if back { -s } else { s };
+        let (mut once, mut often) = (ekf, ekf);
+        once.predict(WheelTravel::new(s, s)).unwrap();
+        for _ in 0..100 {
+            often.predict(WheelTravel::new(s / 100.0, s / 100.0)).unwrap();
+        }
+        // Between the wheels' noise and its turning of the way, ways of 1 cm and of 1 m differ in
+        // x and y to second order; in heading and calibration they do not.
+        let travel = SVector::<f64, 2>::new(s.into(), s.into());
+        let size = Robot::from(&drive).size_of_terms(&covariance_of(&ekf), &state_of(&ekf), &travel);
+        let size = size_by_both_wheels(&size);
+        for i in [HEADING, SCALE_RIGHT, SCALE_LEFT, TRACK_WIDTH] {
+            let (one, many) = (covariance_of(&once)[(i, i)], covariance_of(&often)[(i, i)]);
+            let allowed = 2e-3 * one + 200.0 * ROUNDING * size[(i, i)];
+            prop_assert!((many - one).abs() < allowed, "state {i}: {many} in steps, {one} at once");
+        }
+    }
+}
+
+/// The size of a state's entry; of either wheel's scale error, that of both.
+fn of_both(i: usize, v: &Vector) -> f64 {
+    if [SCALE_RIGHT, SCALE_LEFT].contains(&i) {
+        v[SCALE_RIGHT].abs() + v[SCALE_LEFT].abs()
+    } else {
+        v[i].abs()
+    }
+}
+
+/// The size of the numbers that a state is summed from.
+fn range_of(i: usize, state: &Vector) -> f64 {
+    if i == HEADING { 6.3 } else { of_both(i, state) }
+}

@@ -1,0 +1,27 @@
+//! Properties of the core crate, and its `f32` filter against a dense `f64` one.
+//!
+//! One binary, one module a subject. Every tolerance has its reason beside it; for every test
+//! the code was broken once to see it fail.
+
+#[cfg(test)]
+mod aim;
+#[cfg(test)]
+mod angles;
+#[cfg(test)]
+mod covariance;
+#[cfg(test)]
+mod filter;
+#[cfg(test)]
+mod health;
+#[cfg(test)]
+mod jacobians;
+#[cfg(test)]
+mod map;
+#[cfg(test)]
+mod oracle;
+#[cfg(test)]
+mod refusals;
+#[cfg(test)]
+mod six_states;
+#[cfg(test)]
+mod strategies;

@@ -1,0 +1,171 @@
+//! What is refused or gated changes no bit; the gate is where it is said to be.
+
+use proptest::prelude::*;
+use sonarfix::aim::Aim;
+use sonarfix::ekf::EkfError;
+use sonarfix::localizer::{Fix, Localizer, OdometryError, Refusal};
+use sonarfix::map::{Map, Wall, WallId};
+use sonarfix::motion::WheelTravel;
+use sonarfix::pose::{Heading, Point};
+use sonarfix::range::ExpectedRange;
+use sonarfix::units::{Instant, Metres, Radians, SquareMetres};
+
+use crate::strategies::{Room, any_ekf, any_mount, any_room, any_sight, bits, config_for_rooms};
+
+const BAD: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+
+/// Everything that a refusal must leave alone.
+fn estimate(localizer: &Localizer) -> (Vec<u32>, Instant) {
+    (bits(localizer.filter()), localizer.time())
+}
+
+/// A room's walls, and beyond the first of them, in line with it, one whose foot the robot never
+/// has: it begins 4 m past the corner.
+fn walls_and_one_aside(room: &Room) -> Vec<Wall> {
+    let mut walls = room.walls().to_vec();
+    let (wall, length) = (walls[0], walls[0].length().0);
+    let along = |s: f32| {
+        let (tx, ty) = (wall.b(), -wall.a());
+        Point::new(wall.from().x.0 + tx * s, wall.from().y.0 + ty * s)
+    };
+    walls.push(Wall::new(along(length + 4.0), along(length + 8.0)).unwrap());
+    walls
+}
+
+/// A localizer that has driven a little and taken a fix, so that no number in it is round.
+fn started<'m>(room: &Room, walls: &'m [Wall], mount: Point) -> Localizer<'m> {
+    let config = config_for_rooms(mount);
+    let start = Instant::from_ticks(1_000_000);
+    let mut localizer = Localizer::new(config, Map::new(walls), room.start(), start).unwrap();
+    localizer.odometry(Instant::from_ticks(1_500_000), WheelTravel::new(0.021, 0.017)).unwrap();
+    let aim = localizer.aim().unwrap();
+    let fix = localizer.fix(&aim, Some(aim.range + Metres(0.003)));
+    assert!(matches!(fix, Fix::Accepted(_)), "{fix:?}");
+    localizer
+}
+
+proptest! {
+    /// Wheel travels.
+    #[test]
+    fn a_refused_travel_changes_no_bit(room in any_room(), mount in any_mount(), good in -0.05_f32..0.05) {
+        let walls = walls_and_one_aside(&room);
+        let mut localizer = started(&room, &walls, mount);
+        let before = estimate(&localizer);
+        let (earlier, now, later) =
+            (Instant::from_ticks(1_499_999), Instant::from_ticks(1_500_000), Instant::from_ticks(1_600_000));
+        let still = WheelTravel::default();
+        let moved = WheelTravel::new(0.001, 0.0);
+        // 0.1 s at 2 m/s is 0.2 m.
+        let mut cases = vec![
+            (earlier, still, OdometryError::TimeRanBackwards),
+            (earlier, moved, OdometryError::TimeRanBackwards),
+            (Instant::from_ticks(0), WheelTravel::new(good, good), OdometryError::TimeRanBackwards),
+            (now, moved, OdometryError::NoTimePassed),
+            (now, WheelTravel::new(0.0, -0.001), OdometryError::NoTimePassed),
+            (later, WheelTravel::new(0.201, good), OdometryError::TooFast),
+            (later, WheelTravel::new(good, -0.201), OdometryError::TooFast),
+            (later, WheelTravel::new(f32::MAX, f32::MAX), OdometryError::TooFast),
+        ];
+        for bad in BAD {
+            let error = OdometryError::Filter(EkfError::NotFinite);
+            cases.push((later, WheelTravel::new(bad, good), error));
+            cases.push((later, WheelTravel::new(good, bad), error));
+        }
+        for (time, travel, error) in cases {
+            prop_assert_eq!(localizer.odometry(time, travel), Err(error), "{:?}", travel);
+            prop_assert_eq!(estimate(&localizer), before.clone(), "{:?}", travel);
+        }
+        // The next good one is taken as if nothing had been.
+        prop_assert_eq!(localizer.odometry(now, still), Ok(()));
+        prop_assert_eq!(localizer.odometry(later, WheelTravel::new(0.199, good)), Ok(()));
+        prop_assert_ne!(estimate(&localizer), before);
+    }
+
+    /// Ranges.
+    #[test]
+    fn a_refused_range_changes_no_bit(room in any_room(), mount in any_mount(), short in 0.0_f32..0.0499, long in 12.001_f32..1e6) {
+        let walls = walls_and_one_aside(&room);
+        let mut localizer = started(&room, &walls, mount);
+        let before = estimate(&localizer);
+        let aim = localizer.aim().unwrap();
+        let cone = localizer.config().sonar.cone;
+        let askew = |by: Radians| Aim { bearing: aim.bearing + by, ..aim };
+        let good = Some(aim.range);
+        let mut cases = vec![
+            (aim, None, Refusal::NoEcho),
+            (aim, Some(Metres(short)), Refusal::OutOfRange),
+            (aim, Some(Metres(-aim.range.0)), Refusal::OutOfRange),
+            (aim, Some(Metres(long)), Refusal::OutOfRange),
+            (Aim { wall: WallId(5), ..aim }, good, Refusal::UnknownWall),
+            (Aim { wall: WallId(u32::MAX), ..aim }, good, Refusal::UnknownWall),
+            (Aim { wall: WallId(4), ..aim }, good, Refusal::FootOffWall),
+            (askew(cone), good, Refusal::NotSquare),
+            (askew(-cone), good, Refusal::NotSquare),
+            (askew(Radians(f32::NAN)), good, Refusal::NotSquare),
+        ];
+        cases.extend(BAD.map(|bad| (aim, Some(Metres(bad)), Refusal::NotFinite)));
+        for (aim, range, refusal) in cases {
+            prop_assert_eq!(localizer.fix(&aim, range), Fix::Refused(refusal));
+            prop_assert_eq!(estimate(&localizer), before.clone(), "{:?} {:?}", aim, range);
+        }
+        prop_assert!(matches!(localizer.fix(&aim, good), Fix::Accepted(_)));
+        prop_assert_ne!(estimate(&localizer), before);
+    }
+
+    /// The gate is at `gate` standard deviations of the innovation: a thousandth inside, accepted;
+    /// a thousandth outside, gated, and no bit changed. (Ranges have 6 digits at the least.)
+    #[test]
+    fn the_gate_is_where_it_is_said_to_be(
+        room in any_room(), mount in any_mount(), gate in 1.0_f32..6.0, far in any::<bool>(), beyond in 1.001_f32..1.5,
+    ) {
+        let walls = walls_and_one_aside(&room);
+        let mut config = config_for_rooms(mount);
+        config.trust.gate = gate;
+        let localizer = Localizer::new(config, Map::new(&walls), room.start(), Instant::from_ticks(0)).unwrap();
+        let aim = localizer.aim().unwrap();
+        let ekf = localizer.filter();
+        let expected = ExpectedRange::new(&walls[aim.wall.0 as usize], mount, &ekf.state());
+        let innovation = ekf.innovation(aim.range, &expected, config.sonar.noise.variance(expected.range));
+        let sigma = innovation.variance.0.sqrt() * if far { 1.0 } else { -1.0 };
+
+        let mut inside = localizer.clone();
+        let fix = inside.fix(&aim, Some(aim.range + Metres(gate * 0.999 * sigma)));
+        prop_assert!(matches!(fix, Fix::Accepted(i) if i.nis() <= gate * gate), "{fix:?}");
+        prop_assert_ne!(estimate(&inside), estimate(&localizer));
+
+        let mut outside = localizer.clone();
+        let fix = outside.fix(&aim, Some(aim.range + Metres(gate * beyond * sigma)));
+        prop_assert!(matches!(fix, Fix::Gated(i) if i.nis() > gate * gate), "{fix:?}");
+        prop_assert_eq!(estimate(&outside), estimate(&localizer));
+    }
+
+    /// The filter itself, given what the localizer would have stopped.
+    #[test]
+    fn a_filter_refuses_what_it_cannot_compute_with(
+        ekf in any_ekf(), sight in any_sight(), mount in any_mount(), which in 0_usize..5,
+    ) {
+        let mut changed = ekf;
+        let state = ekf.state();
+        let expected = ExpectedRange::new(&sight.wall(Point::new(state.x, state.y)), mount, &state);
+        let (range, noise) = (expected.range, SquareMetres(1e-4));
+        for bad in BAD {
+            prop_assert_eq!(changed.update(Metres(bad), &expected, noise), Err(EkfError::NotFinite));
+            prop_assert_eq!(changed.update(range, &expected, SquareMetres(bad)), Err(EkfError::NotFinite));
+            let mut broken = expected;
+            *[&mut broken.range.0, &mut broken.by_x, &mut broken.by_y, &mut broken.by_heading, &mut broken.by_range_scale][which] = bad;
+            prop_assert_eq!(changed.update(range, &broken, noise), Err(EkfError::NotFinite));
+            prop_assert_eq!(changed.predict(WheelTravel::new(bad, 0.1)), Err(EkfError::NotFinite));
+            prop_assert_eq!(changed.predict(WheelTravel::new(0.0, bad)), Err(EkfError::NotFinite));
+        }
+        prop_assert_eq!(changed.update(range, &expected, SquareMetres(-1e-9)), Err(EkfError::Negative));
+        prop_assert_eq!(changed.update(range, &expected, SquareMetres(0.0)), Err(EkfError::Noiseless));
+        prop_assert_eq!(changed.update(range, &expected, SquareMetres(-0.0)), Err(EkfError::Noiseless));
+        // Finite, but its square is not.
+        prop_assert_eq!(changed.predict(WheelTravel::new(f32::MAX, f32::MAX)), Err(EkfError::NotFinite));
+        let steep = ExpectedRange { by_x: f32::MAX, direction: Heading::default(), ..expected };
+        prop_assert_eq!(changed.update(range, &steep, noise), Err(EkfError::NotFinite));
+        prop_assert_eq!(bits(&changed), bits(&ekf));
+        prop_assert_eq!(changed.update(range, &expected, noise), Ok(()));
+        prop_assert_ne!(bits(&changed), bits(&ekf));
+    }
+}

@@ -1,0 +1,276 @@
+//! Without a prior for the range scale, the filter is the paper's six-state one, bit for bit.
+
+use nalgebra::SMatrix;
+use proptest::prelude::*;
+use sonarfix::ekf::{Ekf, State};
+use sonarfix::map::Wall;
+use sonarfix::motion::{Drive, WheelTravel};
+use sonarfix::pose::{Heading, Point};
+use sonarfix::range::ExpectedRange;
+use sonarfix::trig::sin_cos;
+use sonarfix::units::{Metres, Radians, SquareMetres};
+
+use crate::strategies::{Event, any_deviation, any_drive, any_event, any_state, bits};
+
+/// The crate's own, eq. (17).
+const SHARPEST: f32 = 1.0 / 16_384.0;
+
+/// A filter that has never heard of a range scale: the equations of the crate, in the crate's
+/// order, with the seventh state left out. Indices: x, y, heading, mean and difference of the scale
+/// errors, width.
+#[derive(Debug, Clone, Copy)]
+struct SixStates {
+    x: [f32; 6],
+    /// What rounding left over of x, y, heading.
+    rest_of_x: [f32; 3],
+    /// Upper triangle; what is below the diagonal is not used.
+    p: [[f32; 6]; 6],
+    /// What rounding left over of the last three variances.
+    rest_of_p: [f32; 3],
+    drive: Drive,
+}
+
+/// Adds to a sum with what rounding left over.
+fn add(sum: &mut f32, rest: &mut f32, change: f32) {
+    let change = change + *rest;
+    let before = *sum;
+    *sum = before + change;
+    *rest = change - (*sum - before);
+}
+
+impl SixStates {
+    fn new(drive: Drive, state: State, deviation: State) -> Self {
+        let heading = Heading::new(Radians(state.heading)).radians().0;
+        let common = 0.5 * (state.scale_right + state.scale_left);
+        let difference = state.scale_right - state.scale_left;
+        let x = [state.x, state.y, heading, common, difference, state.track_width_error];
+        let square = |sigma: f32| sigma * sigma;
+        let (rr, ll) = (square(deviation.scale_right), square(deviation.scale_left));
+        let mut p = [[0.0; 6]; 6];
+        p[0][0] = square(deviation.x);
+        p[1][1] = square(deviation.y);
+        p[2][2] = square(deviation.heading);
+        p[3][3] = 0.25 * (rr + ll);
+        p[3][4] = 0.5 * (rr - ll);
+        p[4][4] = rr + ll;
+        p[5][5] = square(deviation.track_width_error);
+        Self { x, rest_of_x: [0.0; 3], p, rest_of_p: [0.0; 3], drive }
+    }
+
+    /// An entry, from the upper triangle.
+    fn at(&self, i: usize, j: usize) -> f32 {
+        if i <= j { self.p[i][j] } else { self.p[j][i] }
+    }
+
+    fn predict(&mut self, travel: WheelTravel) {
+        let (right, left) = (travel.right.0, travel.left.0);
+        let [_, _, heading, common, difference, width_error] = self.x;
+        let factor_r = (1.0 + common) + 0.5 * difference;
+        let factor_l = (1.0 + common) - 0.5 * difference;
+        let (rolled_r, rolled_l) = (right * factor_r, left * factor_l);
+        let per_width = 1.0 / (self.drive.track_width.0 + width_error);
+        let turn = (rolled_r - rolled_l) * per_width;
+        let advance = 0.5 * (rolled_r + rolled_l);
+        let (sin, cos) = sin_cos(Radians(heading + 0.5 * turn));
+        let per_metre = self.drive.wheel_noise.0.0 * self.drive.wheel_noise.0.0;
+        let noise_r = per_metre * right.abs() * factor_r * factor_r;
+        let noise_l = per_metre * left.abs() * factor_l * factor_l;
+
+        // Each a row of six: the covariance of turn, advance, mid-heading with every state.
+        let by_turn =
+            [(right - left) * per_width, 0.5 * (right + left) * per_width, -turn * per_width];
+        let by_advance = [0.5 * (right + left), 0.25 * (right - left)];
+        let row = |i: usize| core::array::from_fn::<f32, 6, _>(|j| self.at(i, j));
+        let (h, c, d, w) = (row(2), row(3), row(4), row(5));
+        let turn_with = |c: f32, d: f32, w: f32| by_turn[0] * c + by_turn[1] * d + by_turn[2] * w;
+        let advance_with = |c: f32, d: f32| by_advance[0] * c + by_advance[1] * d;
+        let t: [f32; 6] = core::array::from_fn(|j| turn_with(c[j], d[j], w[j]));
+        let s: [f32; 6] = core::array::from_fn(|j| advance_with(c[j], d[j]));
+        let m: [f32; 6] = core::array::from_fn(|j| h[j] + 0.5 * t[j]);
+        let tt = turn_with(t[3], t[4], t[5]) + (noise_r + noise_l) * per_width * per_width;
+        let ts = advance_with(t[3], t[4]) + 0.5 * (noise_r - noise_l) * per_width;
+        let ss = advance_with(s[3], s[4]) + 0.25 * (noise_r + noise_l);
+        let mt = t[2] + 0.5 * tt;
+        let (mm, ms) = (m[2] + 0.5 * mt, s[2] + 0.5 * ts);
+        let (m_new, s_new) = (m[2] + mt, s[2] + ts);
+
+        let swing = [-advance * sin, advance * cos];
+        let ahead = [cos, sin];
+        let along = |axis: usize, m: f32, s: f32| swing[axis] * m + ahead[axis] * s;
+        let mut new = self.p;
+        for axis in 0..2 {
+            let ways_m = along(axis, mm, ms);
+            let ways_s = swing[axis] * ms + ahead[axis] * ss;
+            new[axis][axis] += 2.0 * along(axis, m[axis], s[axis]) + along(axis, ways_m, ways_s);
+            if axis == 0 {
+                new[0][1] += along(0, m[1], s[1]) + along(1, m[0] + ways_m, s[0] + ways_s);
+            }
+            new[axis][2] += t[axis] + along(axis, m_new, s_new);
+            for j in 3..6 {
+                new[axis][j] += along(axis, m[j], s[j]);
+            }
+        }
+        new[2][2] += t[2] + mt + 0.5 * tt;
+        for j in 3..6 {
+            new[2][j] += t[j];
+        }
+        let rolled = 0.5 * (right.abs() + left.abs());
+        let scale_walk = self.drive.scale_walk.0 * self.drive.scale_walk.0 * rolled;
+        let width_walk = self.drive.track_width_walk.0.0;
+        let walks = [0.5 * scale_walk, 2.0 * scale_walk, width_walk * width_walk * rolled];
+        for (i, walk) in walks.into_iter().enumerate() {
+            add(&mut new[3 + i][3 + i], &mut self.rest_of_p[i], walk);
+        }
+
+        self.p = new;
+        self.moved(0, advance * cos);
+        self.moved(1, advance * sin);
+        self.moved(2, turn);
+    }
+
+    /// Moves x, y or heading.
+    fn moved(&mut self, i: usize, by: f32) {
+        add(&mut self.x[i], &mut self.rest_of_x[i], by);
+        self.x[2] = Heading::new(Radians(self.x[2])).radians().0;
+    }
+
+    /// The expected range, and its derivatives by x, y and heading.
+    fn expected(&self, wall: &Wall, mount: Point) -> (f32, [f32; 3]) {
+        let (sin, cos) = sin_cos(Radians(self.x[2]));
+        let lever_x = cos * mount.x.0 - sin * mount.y.0;
+        let lever_y = sin * mount.x.0 + cos * mount.y.0;
+        let sonar = Point::new(self.x[0] + lever_x, self.x[1] + lever_y);
+        let signed = wall.signed_distance(sonar).0;
+        let side = if signed < 0.0 { -1.0 } else { 1.0 };
+        let (by_x, by_y) = (side * wall.a(), side * wall.b());
+        (side * signed, [by_x, by_y, by_y * lever_x - by_x * lever_y])
+    }
+
+    /// P Hᵀ.
+    fn cross(&self, h: [f32; 3]) -> [f32; 6] {
+        core::array::from_fn(|i| self.at(i, 0) * h[0] + self.at(i, 1) * h[1] + self.at(i, 2) * h[2])
+    }
+
+    fn update(&mut self, range: f32, expected: f32, h: [f32; 3], noise: f32) {
+        let dot = |m: &[f32; 6]| h[0] * m[0] + h[1] * m[1] + h[2] * m[2];
+        let m = self.cross(h);
+        let Some(noise) = self.bearable(noise, h, &m) else { return };
+        let per_variance = 1.0 / (noise + dot(&m));
+        let gain = m.map(|m| m * per_variance);
+        let innovation = range - expected;
+        for i in 0..3 {
+            self.moved(i, gain[i] * innovation);
+        }
+        for i in 3..6 {
+            self.x[i] += gain[i] * innovation;
+        }
+        self.each(|i, j, p| p - gain[i] * m[j]);
+        let left_over = self.cross(h);
+        let d: [f32; 6] = core::array::from_fn(|i| gain[i] * noise - left_over[i]);
+        let half = -0.5 * dot(&d);
+        let d: [f32; 6] = core::array::from_fn(|i| d[i] + half * gain[i]);
+        self.each(|i, j, p| p + (d[i] * gain[j] + gain[i] * d[j]));
+    }
+
+    /// Eq. (17).
+    fn bearable(&self, noise: f32, h: [f32; 3], m: &[f32; 6]) -> Option<f32> {
+        let along = h[0] * m[0] + h[1] * m[1] + h[2] * m[2];
+        let per_variance = 1.0 / (noise + along);
+        let left = |i: usize| h[i] * h[i] * (self.p[i][i] - m[i] * m[i] * per_variance);
+        let least = SHARPEST * (left(0) + left(1) + left(2));
+        if along <= least {
+            return None;
+        }
+        let bearable = along * least / (along - least);
+        Some(if bearable > noise { bearable } else { noise })
+    }
+
+    fn each(&mut self, entry: impl Fn(usize, usize, f32) -> f32) {
+        for i in 0..6 {
+            for j in i..6 {
+                self.p[i][j] = entry(i, j, self.p[i][j]);
+            }
+        }
+    }
+
+    /// The bits of state and covariance, in the order of the seven-state filter's and wheel by
+    /// wheel as there, the seventh zero.
+    fn bits(&self) -> Vec<u32> {
+        let wheels =
+            |common: f32, difference: f32| [common + 0.5 * difference, common - 0.5 * difference];
+        let [x, y, heading, common, difference, width] = self.x;
+        let [right, left] = wheels(common, difference);
+        let mut p = SMatrix::<f32, 7, 7>::zeros();
+        for i in [0, 1, 2, 5] {
+            for j in [0, 1, 2, 5] {
+                p[(i, j)] = self.at(i, j);
+            }
+            for (j, v) in wheels(self.at(i, 3), self.at(i, 4)).into_iter().enumerate() {
+                p[(i, 3 + j)] = v;
+                p[(3 + j, i)] = v;
+            }
+        }
+        let own = wheels(self.at(3, 3) + 0.25 * self.at(4, 4), 2.0 * self.at(3, 4));
+        p[(3, 3)] = own[0];
+        p[(4, 4)] = own[1];
+        p[(3, 4)] = self.at(3, 3) - 0.25 * self.at(4, 4);
+        p[(4, 3)] = p[(3, 4)];
+        let state = [x, y, heading, right, left, width, 0.0];
+        state.into_iter().chain(p.iter().copied()).map(f32::to_bits).collect()
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(128))]
+
+    /// Over some 2,000 steps a run: same bits in every state and every entry of P after each, and
+    /// nothing in the seventh.
+    #[test]
+    fn a_known_range_scale_is_inert(
+        drive in any_drive(),
+        state in any_state(),
+        deviation in any_deviation(),
+        events in proptest::collection::vec(any_event(1e-6..1e-3), 200),
+    ) {
+        let state = State { range_scale: 0.0, ..state };
+        let deviation = State { range_scale: 0.0, ..deviation };
+        let mut seven = Ekf::new(drive, state, deviation).unwrap();
+        let mut six = SixStates::new(drive, state, deviation);
+        for event in events {
+            match event {
+                Event::Roll(travel, times) => {
+                    for _ in 0..times {
+                        seven.predict(travel).unwrap();
+                        six.predict(travel);
+                        prop_assert_eq!(bits(&seven), six.bits(), "after {:?}", travel);
+                    }
+                }
+                Event::Range { sight, mount, sigmas, noise } => {
+                    let state = seven.state();
+                    let wall = sight.wall(Point::new(state.x, state.y));
+                    let expected = ExpectedRange::new(&wall, mount, &state);
+                    let range = Metres(expected.range.0 + 0.02 * sigmas);
+                    seven.update(range, &expected, SquareMetres(noise)).unwrap();
+                    let (of_six, h) = six.expected(&wall, mount);
+                    six.update(range.0, of_six, h, noise);
+                    prop_assert_eq!(bits(&seven), six.bits(), "after {:?}", event);
+                }
+            }
+        }
+    }
+
+    /// With a prior for it, the same run differs: the test above compares something.
+    #[test]
+    fn an_unknown_range_scale_is_not(drive in any_drive(), state in any_state(), deviation in any_deviation()) {
+        let state = State { range_scale: 0.0, ..state };
+        let mut seven = Ekf::new(drive, state, deviation).unwrap();
+        let mut six = SixStates::new(drive, state, deviation);
+        let wall = Wall::new(Point::new(40.0, -40.0), Point::new(40.0, 40.0)).unwrap();
+        let expected = ExpectedRange::new(&wall, Point::default(), &state);
+        let range = expected.range + Metres(0.05);
+        seven.update(range, &expected, SquareMetres(1e-4)).unwrap();
+        let (of_six, h) = six.expected(&wall, Point::default());
+        six.update(range.0, of_six, h, 1e-4);
+        prop_assert_ne!(bits(&seven), six.bits());
+    }
+}
