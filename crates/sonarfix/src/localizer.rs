@@ -168,9 +168,10 @@ pub struct Localizer<'m> {
     ekf: Ekf,
     health: Health,
     time: Instant,
-    /// The wall whose range was gated at the last turn: something stands before it, and will for
-    /// a while.
+    /// The wall that something seems to stand before, by the last turn: passed over once.
     spare: Option<WallId>,
+    /// The wall that did not answer at the last turn.
+    silent: Option<WallId>,
 }
 
 impl<'m> Localizer<'m> {
@@ -202,7 +203,15 @@ impl<'m> Localizer<'m> {
             range_scale: prior.range_scale,
         };
         let ekf = Ekf::new(config.drive, state, deviation).map_err(StartError::Start)?;
-        Ok(Self { config, map, ekf, health: Health::default(), time: now, spare: None })
+        Ok(Self {
+            config,
+            map,
+            ekf,
+            health: Health::default(),
+            time: now,
+            spare: None,
+            silent: None,
+        })
     }
 
     /// Takes the travel of both wheels since the last call, up to the time `now`: at every
@@ -232,8 +241,8 @@ impl<'m> Localizer<'m> {
         Ok(())
     }
 
-    /// Where the sonar should look next, by the policy of the configuration. A wall whose
-    /// range was gated at the last turn is passed over once, if another counts.
+    /// Where the sonar should look next, by the policy of the configuration. A wall that
+    /// something seems to stand before is passed over once, if another counts.
     ///
     /// # Errors
     /// [`NoAim`], by why there is nothing to look at.
@@ -256,14 +265,25 @@ impl<'m> Localizer<'m> {
     /// Only [`Fix::Accepted`] changes the estimate; every outcome enters the health.
     pub fn fix(&mut self, aim: &Aim, range: Option<Metres>) -> Fix {
         let fix = self.try_fix(aim, range).unwrap_or_else(Fix::Refused);
-        // An echo that stays away may come next time; what stands before a wall stays.
-        self.spare = matches!(fix, Fix::Gated(_)).then_some(aim.wall);
+        self.spare = self.blocked(aim, &fix).then_some(aim.wall);
+        self.silent = matches!(fix, Fix::Refused(_)).then_some(aim.wall);
         match fix {
             Fix::Accepted(_) => self.health.accepted(),
-            Fix::Gated(_) => self.health.gated(),
+            Fix::Gated(innovation) => self.health.gated(innovation.value),
+            Fix::Refused(Refusal::NoEcho) => self.health.no_echo(),
             Fix::Refused(_) => self.health.silent(),
         }
         fix
+    }
+
+    /// Whether something seems to stand before the wall: a range that it shortened, or an echo that
+    /// stayed away twice; once is often chance.
+    fn blocked(&self, aim: &Aim, fix: &Fix) -> bool {
+        match fix {
+            Fix::Accepted(_) => false,
+            Fix::Gated(_) => true,
+            Fix::Refused(_) => self.silent == Some(aim.wall),
+        }
     }
 
     /// Takes note that the sonar had its turn and [`Self::aim`] found no wall to look at, so that

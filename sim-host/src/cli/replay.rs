@@ -167,7 +167,7 @@ fn errors_note(s: &Summary) -> String {
     };
     format!(
         "{reference}; {:.1} m in {:.1} s; ranges accepted {}, gated {}, refused {}; \
-         lines skipped {} of {}\n\
+         lines skipped {} of {};\n\
          the localizer said degraded {} ({:.1} s in all), lost {} ({:.1} s in all); \
          half a metre off {}, beyond 3σ {} ({} of the rows)",
         s.distance,
