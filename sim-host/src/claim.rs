@@ -29,7 +29,7 @@ impl Claim {
         self.silence = if is_silent { self.silence + seconds } else { 0.0 };
         self.longest_silence = self.longest_silence.max(self.silence);
         self.worst = self.worst.max(error[0].hypot(error[1]));
-        self.holds = is_inside && verdict == Verdict::Tracking;
+        self.holds = is_inside && verdict != Verdict::Lost;
     }
 
     /// Share of the ticks with the position outside the 99.9 % ellipse.
@@ -56,7 +56,7 @@ impl Claim {
         self.worst
     }
 
-    /// Whether at the last tick the error was inside and health said `Tracking`.
+    /// Whether at the last tick the error was inside, and health did not say `Lost`.
     #[must_use]
     pub fn holds_at_the_end(&self) -> bool {
         self.holds
@@ -104,6 +104,7 @@ mod tests {
         assert!((claim.worst() - 0.2).abs() < 1e-12);
         assert!(!claim.holds_at_the_end() && !claim.is_silent_at_the_end());
         assert!(taken(&[(0.08, Tracking)]).is_silent_at_the_end());
-        assert!(taken(&[(0.08, Lost), (0.01, Tracking)]).holds_at_the_end());
+        assert!(taken(&[(0.08, Lost), (0.01, Degraded)]).holds_at_the_end());
+        assert!(!taken(&[(0.01, Lost)]).holds_at_the_end());
     }
 }

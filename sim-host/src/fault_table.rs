@@ -37,7 +37,7 @@ Written by `sonarfix faults`; change the code, not this page.
 The scenario `classroom` (a cheap robot that steers by its own estimate) with one fault at a time, from 200 s to 230 s of
 616 s. *Reported* is what the loop counted, a run on average. *Outside* is the share of the run in which the position error
 left the filter's own claim (its 99.9 % ellipse); *silently* the longest stretch of that, over all runs, in which health
-still said `Tracking`. *Recovered*: at the end of the run the error is inside the claim and health says `Tracking`.
+still said `Tracking`. *Recovered*: at the end of the run the error is inside the claim, and health does not say `Lost`.
 
 ";
 
@@ -83,7 +83,7 @@ fn results(kind: Option<FaultKind>, runs: u64) -> Result<Vec<RunResult>, TableEr
 type Counter = (&'static str, fn(&Faults) -> u32);
 
 impl Row {
-    /// How many runs ended inside the filter's claim, with health saying so.
+    /// How many runs ended inside the filter's claim, with health not giving them up.
     #[must_use]
     pub fn recovered(&self) -> usize {
         self.results.iter().filter(|result| result.claim.holds_at_the_end()).count()
