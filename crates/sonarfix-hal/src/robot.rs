@@ -296,7 +296,10 @@ impl<'m> Robot<'m> {
                 report.faults.servo += u32::from(turned.is_err());
                 self.cycle = Cycle::Turning;
             }
-            Err(_) => self.rest(now, false),
+            Err(_) => {
+                self.localizer.skip();
+                self.rest(now, false);
+            }
         }
         report.aimed = Some(aimed);
     }
