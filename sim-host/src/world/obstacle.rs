@@ -100,7 +100,9 @@ mod tests {
         let outline = Outline::Circle { centre: [1.0, 0.0], radius: 0.2 };
         let walk = Some(Walk { by: [0.0, 2.0], takes: 4.0 });
         let obstacle = Obstacle { outline, walk };
-        for (time, y) in [(0.0, 0.0), (1.0, 0.5), (4.0, 2.0), (6.0, 1.0), (8.0, 0.0), (9.0, 0.5)] {
+        for (time, y) in
+            [(0.0, 0.0), (1.0, 0.5), (4.0, 2.0), (5.0, 1.5), (6.0, 1.0), (8.0, 0.0), (9.0, 0.5)]
+        {
             let expected = Outline::Circle { centre: [1.0, y], radius: 0.2 };
             assert_eq!(obstacle.outline_at(time), expected, "{time}");
         }

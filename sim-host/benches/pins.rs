@@ -1,0 +1,21 @@
+//! The paper's 1,248 s through pins, drivers and loop, beside the ideal run.
+#![expect(clippy::expect_used, reason = "a benchmark that cannot run should stop")]
+#![allow(missing_docs, reason = "criterion's macros make a public function")]
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use sonarfix_map::{Fidelity, Scenario};
+use sonarfix_sim::simulate::Simulation;
+
+fn run(criterion: &mut Criterion) {
+    for (name, fidelity) in [("ideal", Fidelity::Ideal), ("pins", Fidelity::Pins)] {
+        let mut scenario = Scenario::paper().expect("the reference scenario is read");
+        scenario.fidelity = fidelity;
+        let simulation = Simulation::new(scenario);
+        criterion.bench_function(&format!("1248 s, {name}"), |bencher| {
+            bencher.iter(|| simulation.run(0, &mut ()).expect("the run ends"));
+        });
+    }
+}
+
+criterion_group!(benches, run);
+criterion_main!(benches);
