@@ -6,16 +6,20 @@
 
 pub mod angle;
 pub mod bound;
+pub mod claim;
 pub mod cli;
 pub mod convert;
 pub mod dense;
+pub mod fault_table;
 pub mod monte_carlo;
 pub mod observe;
 pub mod odometry;
+pub mod pins;
 pub mod plant;
 pub mod replay;
 pub mod report;
 pub mod simulate;
+pub mod sonar_model;
 pub mod statistics;
 pub mod trace;
 pub mod trace_csv;

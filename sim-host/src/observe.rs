@@ -13,6 +13,7 @@ use sonarfix::localizer::{Fix, Localizer};
 use crate::angle;
 use crate::dense::{Matrix, Vector};
 use crate::trace::{Calibration, Estimate, FixRecord, Outcome, Pose};
+use crate::world::reflector::Source;
 
 /// The localizer's estimate.
 #[must_use]
@@ -81,6 +82,8 @@ pub struct Look {
     pub heading: f64,
     /// The range heard, metres.
     pub range: Option<f64>,
+    /// What the sound met, where that is known.
+    pub met: Option<Source>,
 }
 
 /// The record of a look at a wall, with its outcome.
@@ -99,6 +102,7 @@ pub fn fix_record(look: Look, aim: &Aim, fix: &Fix) -> FixRecord {
         direction: angle::wrap(look.heading + bearing),
         bearing,
         range: look.range,
+        met: look.met,
         outcome,
         reason,
         innovation: innovation.map(|i: &Innovation| i.value.0.into()),
@@ -116,6 +120,7 @@ pub fn no_aim_record(look: Look, no_aim: NoAim) -> FixRecord {
         direction: look.heading,
         bearing: 0.0,
         range: None,
+        met: None,
         outcome: Outcome::Refused,
         reason: no_aim.to_string(),
         innovation: None,

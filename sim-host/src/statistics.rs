@@ -7,8 +7,10 @@
 
 use serde::Serialize;
 use sonarfix::health::Verdict;
+use sonarfix_hal::robot::Faults;
 
 use crate::STATES;
+use crate::claim::Claim;
 use crate::dense::Vector;
 
 /// How many turns of the sonar ended how.
@@ -81,6 +83,10 @@ pub struct RunResult {
     pub fixes: FixCounts,
     /// Whether the robot was lost at the end.
     pub lost: bool,
+    /// How the errors along the way compare with what the filter claims.
+    pub claim: Claim,
+    /// What the robot's loop reported; nothing at the ideal fidelity, which has none.
+    pub faults: Faults,
 }
 
 /// A robot is lost if it says so, or if it is further off than this: then it is in the wrong

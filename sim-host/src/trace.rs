@@ -8,6 +8,8 @@ use serde::Serialize;
 use sonarfix::units::Radians;
 use sonarfix_map::{Floor, NamedWall};
 
+use crate::world::reflector::Source;
+
 /// A pose in the map frame: metres, metres, radians in (−π, π].
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Pose {
@@ -96,6 +98,8 @@ pub struct FixRecord {
     pub bearing: f64,
     /// The range heard, metres; `None` if no echo came.
     pub range: Option<f64>,
+    /// What the sound met; `None` where nothing was heard, or nobody knows.
+    pub met: Option<Source>,
     /// What became of it.
     pub outcome: Outcome,
     /// Why it was refused, in words; empty unless refused.

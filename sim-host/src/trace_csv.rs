@@ -153,6 +153,7 @@ mod tests {
             direction: 0.0,
             bearing: 0.5,
             range: Some(1.25),
+            met: None,
             outcome: Outcome::Refused,
             reason: "no wall, \"none\"".to_owned(),
             innovation: None,

@@ -9,6 +9,7 @@ use sonarfix_sim::report::{Report, Table};
 use sonarfix_sim::trace::{
     Calibration, Estimate, FixRecord, Outcome, Pose, Tick, Trace, Truth, Wall,
 };
+use sonarfix_sim::world::reflector::Source;
 
 /// The names Chromium goes by.
 const BROWSERS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "chrome"];
@@ -86,6 +87,7 @@ fn fix(time: f64, outcome: Outcome, range: Option<f64>, reason: &str) -> FixReco
         direction: FRAC_PI_2,
         bearing: FRAC_PI_2,
         range,
+        met: Some(Source::Obstacle),
         outcome,
         reason: reason.into(),
         innovation: range.map(|range| range - 1.0),
@@ -137,6 +139,7 @@ fn the_page_draws_without_an_error() {
         assert_eq!(dom.matches("<svg").count(), 5);
         assert!(dom.contains("<h1>A &lt;small&gt; room</h1>"));
         assert!(dom.contains("<td>0.125 deg</td>"));
+        assert!(dom.contains("\"met\":[\"obstacle\""), "the player does not know what was met");
         assert!(dom.contains("0.0 s of 19.9 s"), "the player shows no time");
     }
 }

@@ -20,6 +20,8 @@
 
 mod document;
 mod error;
+mod faults;
+mod fidelity;
 mod file;
 mod floor;
 mod geometry;
@@ -27,15 +29,22 @@ mod path;
 mod quantity;
 mod robot;
 mod scenario;
+mod surroundings;
 
 pub use error::FileError;
+pub use faults::{Fault, FaultKind, Wheel};
+pub use fidelity::{Fidelity, Follow, Hardware, ServoName, SonarName, Upset, Upsets};
 pub use floor::{Floor, NamedWall};
 pub use path::{Leg, Motion, Movement, Path, PathError, PathPlan, PathPose};
 pub use robot::Robot;
 pub use scenario::{Run, Scenario, Start, Truth};
+pub use surroundings::{Obstacle, Outline, Surroundings, Walk};
 
 /// The text of the reference scenario: the conditions of the paper that Sonarfix starts from.
 pub const PAPER: &str = include_str!("../scenarios/paper.toml");
+
+/// The text of the scenario `classroom`: a cheap robot in a furnished room, down to its pins.
+pub const CLASSROOM: &str = include_str!("../scenarios/classroom.toml");
 
 /// The localizer's number for one of a file.
 fn single(value: f64) -> f32 {

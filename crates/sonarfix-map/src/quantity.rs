@@ -45,6 +45,9 @@ pub(crate) const TIME: Dimension = Dimension {
     units: &[unit("s", 1.0, 1.0), unit("ms", 1.0, 1e3), unit("us", 1.0, 1e6)],
 };
 
+pub(crate) const TEMPERATURE: Dimension =
+    Dimension { name: "a temperature", units: &[unit("degC", 1.0, 1.0)] };
+
 pub(crate) const SPEED: Dimension = Dimension {
     name: "a speed",
     units: &[unit("m/s", 1.0, 1.0), unit("cm/s", 1.0, 100.0), unit("mm/s", 1.0, 1000.0)],
@@ -132,10 +135,11 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const ALL: [&Dimension; 9] = [
+    const ALL: [&Dimension; 10] = [
         &LENGTH,
         &ANGLE,
         &TIME,
+        &TEMPERATURE,
         &SPEED,
         &TURN_RATE,
         &FRACTION,

@@ -4,6 +4,8 @@ use std::path::Path as FilePath;
 
 use crate::document::{Document, Node, Table};
 use crate::error::FileError;
+use crate::faults::{self, Fault};
+use crate::fidelity::{self, Fidelity, Follow, Hardware, Upsets};
 use crate::file;
 use crate::floor::Floor;
 use crate::geometry::{Segment, TOUCH};
@@ -12,13 +14,28 @@ use crate::quantity::{
     ANGLE, Dimension, LENGTH, LENGTH_PER_LENGTH, LENGTH_WALK, SCALE_WALK, SPEED, TURN_RATE,
 };
 use crate::robot::Robot;
+use crate::surroundings::{self, Surroundings};
 
-const KEYS: [&str; 8] = ["name", "description", "map", "robot", "path", "start", "truth", "run"];
+const KEYS: [&str; 13] = [
+    "name",
+    "description",
+    "fidelity",
+    "map",
+    "robot",
+    "path",
+    "start",
+    "truth",
+    "sensor",
+    "servo",
+    "world",
+    "faults",
+    "run",
+];
 
-const PATH_KEYS: [&str; 7] =
-    ["unit", "start", "corners", "laps", "speed", "turn_rate", "clearance"];
+const PATH_KEYS: [&str; 8] =
+    ["unit", "start", "corners", "laps", "speed", "turn_rate", "clearance", "follow"];
 
-const TRUTH_KEYS: [&str; 10] = [
+const TRUTH_KEYS: [&str; 12] = [
     "track_width",
     "scale_right",
     "scale_left",
@@ -29,6 +46,8 @@ const TRUTH_KEYS: [&str; 10] = [
     "range_noise",
     "range_noise_per_metre",
     "cone",
+    "slip",
+    "bump",
 ];
 
 /// What the filter is told of its start: standard deviations.
@@ -95,16 +114,28 @@ pub struct Scenario {
     pub name: String,
     /// What it shows.
     pub description: String,
+    /// What is simulated between world and localizer.
+    pub fidelity: Fidelity,
     /// The walls.
     pub floor: Floor,
     /// The robot, as its builder knows it.
     pub robot: Robot,
     /// What it drives.
     pub path: Path,
+    /// Who keeps it on that.
+    pub follow: Follow,
     /// What the filter is told of its start.
     pub start: Start,
     /// What the robot really is.
     pub truth: Truth,
+    /// What happens to its wheels.
+    pub upsets: Upsets,
+    /// Its sonar and servo.
+    pub hardware: Hardware,
+    /// What is around it and on no map.
+    pub surroundings: Surroundings,
+    /// What goes wrong with its hardware; seen at [`Fidelity::Pins`] only.
+    pub faults: Vec<Fault>,
     /// How often it is run.
     pub run: Run,
 }
@@ -130,14 +161,21 @@ impl Scenario {
         let floor = here_or_there(&root, "map", base, Floor::from_node, Floor::parse)?;
         let robot = here_or_there(&root, "robot", base, Robot::from_node, Robot::parse)?;
         let path = root.table("path", &PATH_KEYS)?;
+        let truth = root.table("truth", &TRUTH_KEYS)?;
         Ok(Self {
             name: root.require("name")?.text()?.into(),
             description: root.require("description")?.text()?.into(),
+            fidelity: fidelity::read_fidelity(&root)?,
             path: read_path(&path, &floor, &robot)?,
+            follow: fidelity::read_follow(&path)?,
             floor,
             robot,
             start: read_start(&root)?,
-            truth: read_truth(&root)?,
+            truth: read_truth(&truth)?,
+            upsets: fidelity::read_upsets(&truth)?,
+            hardware: fidelity::read_hardware(&root)?,
+            surroundings: surroundings::read(&root)?,
+            faults: faults::read(&root)?,
             run: read_run(&root)?,
         })
     }
@@ -282,8 +320,7 @@ fn read_start(root: &Table<'_>) -> Result<Start, FileError> {
     })
 }
 
-fn read_truth(root: &Table<'_>) -> Result<Truth, FileError> {
-    let table = root.table("truth", &TRUTH_KEYS)?;
+fn read_truth(table: &Table<'_>) -> Result<Truth, FileError> {
     let width = table.require("track_width")?;
     let track_width = width.quantity(&LENGTH)?;
     let cone_node = table.require("cone")?;
@@ -291,14 +328,14 @@ fn read_truth(root: &Table<'_>) -> Result<Truth, FileError> {
     let narrow = cone > 0.0 && cone < std::f64::consts::FRAC_PI_2;
     Ok(Truth {
         track_width: width.check(track_width, track_width > 0.0, "positive")?,
-        scale_right: scale(&table, "scale_right")?,
-        scale_left: scale(&table, "scale_left")?,
-        range_scale: scale(&table, "range_scale")?,
-        wheel_noise: deviation(&table, "wheel_noise", &LENGTH_WALK)?,
-        scale_walk: deviation(&table, "scale_walk", &SCALE_WALK)?,
-        track_width_walk: deviation(&table, "track_width_walk", &LENGTH_WALK)?,
-        range_noise: deviation(&table, "range_noise", &LENGTH)?,
-        range_noise_per_metre: deviation(&table, "range_noise_per_metre", &LENGTH_PER_LENGTH)?,
+        scale_right: scale(table, "scale_right")?,
+        scale_left: scale(table, "scale_left")?,
+        range_scale: scale(table, "range_scale")?,
+        wheel_noise: deviation(table, "wheel_noise", &LENGTH_WALK)?,
+        scale_walk: deviation(table, "scale_walk", &SCALE_WALK)?,
+        track_width_walk: deviation(table, "track_width_walk", &LENGTH_WALK)?,
+        range_noise: deviation(table, "range_noise", &LENGTH)?,
+        range_noise_per_metre: deviation(table, "range_noise_per_metre", &LENGTH_PER_LENGTH)?,
         cone: cone_node.check(cone, narrow, "between 0 and 90° (half of the cone)")?,
     })
 }

@@ -4,7 +4,10 @@ use std::fs;
 use std::path::Path;
 
 use proptest::prelude::*;
-use sonarfix_map::{FileError, Floor, PAPER, Robot, Scenario};
+use sonarfix_map::{
+    CLASSROOM, Fault, FaultKind, Fidelity, FileError, Floor, Follow, PAPER, Robot, Scenario,
+    ServoName, SonarName, Wheel,
+};
 
 fn parse(text: &str) -> Result<Scenario, FileError> {
     Scenario::parse(text, "paper.toml", Path::new(""))
@@ -345,6 +348,77 @@ const PATH: [Case; 13] = [
     ),
 ];
 
+const HARDWARE: [Case; 12] = [
+    value(
+        "name = \"paper\"",
+        "fidelity = \"exact\"\nname = \"paper\"",
+        "fidelity",
+        "must be \"ideal\" or \"pins\"",
+    ),
+    value(
+        "clearance = \"20 cm\"",
+        "follow = \"me\"",
+        "path.follow",
+        "must be \"truth\" or \"estimate\"",
+    ),
+    case(
+        "[run]",
+        "[sensor]\nmodel = \"srf08\"\n[run]",
+        "model = ",
+        "sensor.model",
+        "must be \"ideal\" or \"hc_sr04\" or \"nxt\"",
+    ),
+    case("[run]", "[servo]\nmodle = 1\n[run]", "modle = ", "servo.modle", "unknown key"),
+    case(
+        "[run]",
+        "[sensor]\ntemperature = \"90 degC\"\n[run]",
+        "temperature = ",
+        "sensor.temperature",
+        "must be from -40 to 85 degC",
+    ),
+    case(
+        "[run]",
+        "[world]\ntemperature = 15\n[run]",
+        "temperature = ",
+        "world.temperature",
+        "a unit is missing: write \"15 degC\"",
+    ),
+    case("[run]", "[world]\nobstacle = []\n[run]", "[world]", "world.unit", "is missing"),
+    case(
+        "[run]",
+        "[world]\nunit = \"m\"\nobstacle = [{ centre = [0, 0], radius = \"0 m\" }]\n[run]",
+        "obstacle = ",
+        "world.obstacle[0].radius",
+        "must be positive",
+    ),
+    case(
+        "[run]",
+        "[world]\nunit = \"m\"\nobstacle = [{ from = [1, 2], to = [1, 2] }]\n[run]",
+        "obstacle = ",
+        "world.obstacle[0].to",
+        "must be different from `from`",
+    ),
+    case(
+        "[run]",
+        "[world]\nunit = \"m\"\nobstacle = [{ centre = [0, 0], radius = \"1 m\", walk = [1, 0] }]\n[run]",
+        "obstacle = ",
+        "world.obstacle[0].takes",
+        "is missing",
+    ),
+    value(
+        "track_width = \"348.8 mm\"",
+        "slip = { every = \"0 m\", by = \"1 mm\" }\ntrack_width = \"348.8 mm\"",
+        "truth.slip.every",
+        "must be positive",
+    ),
+    value(
+        "track_width = \"348.8 mm\"",
+        "bump = { every = \"1 m\" }\ntrack_width = \"348.8 mm\"",
+        "truth.bump.by",
+        "is missing",
+    ),
+];
+
 const REST: [Case; 8] = [
     value(
         "position = \"1 mm\"",
@@ -388,8 +462,8 @@ const REST: [Case; 8] = [
 
 #[test]
 fn every_fault_has_its_line_and_key() {
-    let tables: [&[Case]; 9] =
-        [&FORMAT, &MISSING, &UNITS, &TYPES, &MAP, &CONFIG, &ROBOT, &PATH, &REST];
+    let tables: [&[Case]; 10] =
+        [&FORMAT, &MISSING, &UNITS, &TYPES, &MAP, &CONFIG, &ROBOT, &PATH, &HARDWARE, &REST];
     let faults: Vec<_> = tables.into_iter().flatten().filter_map(fault).collect();
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
@@ -535,4 +609,66 @@ proptest! {
             prop_assert!(!error.message().is_empty());
         }
     }
+}
+
+#[test]
+fn the_classroom_is_read_with_all_that_it_holds() {
+    let scenario = Scenario::parse(CLASSROOM, "classroom.toml", Path::new("")).unwrap();
+    assert_eq!(scenario.fidelity, Fidelity::Pins);
+    assert_eq!(scenario.follow, Follow::Estimate);
+    assert!((scenario.upsets.slip.every - 20.0).abs() < 1e-12);
+    assert_eq!(scenario.hardware.sonar, SonarName::HcSr04);
+    assert_eq!(scenario.hardware.servo, ServoName::Sg90);
+    assert!((scenario.surroundings.temperature - 15.0).abs() < 1e-12);
+    let walking = scenario.surroundings.obstacles.iter().filter(|o| o.walk.is_some());
+    assert_eq!((scenario.surroundings.obstacles.len(), walking.count()), (6, 1));
+    assert!(scenario.path.duration() > 600.0);
+}
+
+#[test]
+fn the_paper_is_ideal_in_an_empty_room() {
+    let scenario = parse(PAPER).unwrap();
+    assert_eq!((scenario.fidelity, scenario.follow), (Fidelity::Ideal, Follow::Truth));
+    assert_eq!(scenario.hardware.sonar, SonarName::Ideal);
+    assert_eq!(scenario.hardware.servo, ServoName::Ideal);
+    assert!(scenario.surroundings.obstacles.is_empty());
+    assert!(scenario.upsets.slip.every.is_infinite() && scenario.upsets.bump.every.is_infinite());
+}
+
+#[test]
+fn a_wrong_fault_has_its_line_and_key() {
+    let of_fault = |fault: &str| {
+        let list = format!("format = 1\nfaults = [{{ {fault} }}]");
+        parse(&PAPER.replace("format = 1", &list)).unwrap_err()
+    };
+    let when = "from = \"1 s\", to = \"2 s\"";
+    let cases = [
+        ("kind = \"gremlins\"", "kind", "is none of the faults"),
+        ("kind = \"lost_echoes\"", "share", "is missing"),
+        ("kind = \"cross_talk\", share = 1.5", "share", "must be from 0 to 1"),
+        ("kind = \"dead_encoder\", wheel = \"front\"", "wheel", "must be \"right\" or"),
+        ("kind = \"slow_servo\", times = 0.5", "times", "must be at least 1"),
+        ("kind = \"clock_jitter\", late = 5", "late", "a unit is missing"),
+        ("kind = \"stuck_servo\", since = \"1 s\"", "since", "unknown key"),
+    ];
+    for (fault, key, message) in cases {
+        let error = of_fault(&format!("{fault}, {when}"));
+        assert_eq!(error.key(), format!("faults[0].{key}"), "{error}");
+        assert_eq!(error.line(), line_of(PAPER, "format = 1").map(|line| line + 1), "{error}");
+        assert!(error.message().contains(message), "{error}");
+    }
+    let error = of_fault("kind = \"brown_out\", from = \"2 s\", to = \"2 s\"");
+    assert_eq!((error.key(), error.message()), ("faults[0].to", "must be after `from`"));
+}
+
+#[test]
+fn faults_are_read_in_their_order() {
+    let list = "format = 1\nfaults = [
+        { kind = \"missing_ticks\", wheel = \"left\", share = \"1 %\", from = \"0 s\", to = \"1 s\" },
+        { kind = \"stuck_echo\", from = \"5 s\", to = \"7 s\" },
+    ]";
+    let faults = parse(&PAPER.replace("format = 1", list)).unwrap().faults;
+    let ticks = Fault { kind: FaultKind::MissingTicks(Wheel::Left, 0.01), from: 0.0, to: 1.0 };
+    let echo = Fault { kind: FaultKind::StuckEcho, from: 5.0, to: 7.0 };
+    assert_eq!(faults, [ticks, echo]);
 }

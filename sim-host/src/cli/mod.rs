@@ -2,9 +2,11 @@
 
 mod bound;
 mod convert;
+mod faults;
 mod paper;
 mod replay;
 mod run;
+mod sonar_model;
 mod table;
 
 use clap::{Parser, Subcommand};
@@ -29,6 +31,10 @@ enum Command {
     Convert(convert::Args),
     /// Prints how well any estimator could know the robot's state, over time.
     Bound(bound::Args),
+    /// Prints how the simulated NXT sonar compares with recorded sweeps, as markdown.
+    SonarModel(sonar_model::Args),
+    /// Prints what every fault of the hardware does to a robot, as markdown.
+    Faults(faults::Args),
 }
 
 impl Cli {
@@ -43,6 +49,8 @@ impl Cli {
             Command::Replay(args) => replay::execute(&args),
             Command::Convert(args) => convert::execute(&args),
             Command::Bound(args) => bound::execute(&args),
+            Command::SonarModel(args) => sonar_model::execute(&args),
+            Command::Faults(args) => faults::execute(&args),
         }
     }
 }

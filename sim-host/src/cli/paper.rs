@@ -4,7 +4,7 @@ use clap::ValueEnum;
 use sonarfix::aim::Policy;
 use sonarfix_map::Scenario;
 
-use super::run::{Experiment, Output};
+use super::run::{Experiment, FidelityName, Output};
 use crate::simulate::Simulation;
 
 #[derive(Debug, clap::Args)]
@@ -22,6 +22,9 @@ pub struct Args {
     /// asked to be efficient and consistent.
     #[arg(long)]
     statistics: bool,
+    /// What is simulated between world and localizer.
+    #[arg(long, value_enum, default_value_t = FidelityName::Ideal)]
+    fidelity: FidelityName,
     #[command(flatten)]
     output: Output,
 }
@@ -46,6 +49,7 @@ impl From<PolicyName> for Policy {
 pub fn execute(args: &Args) -> anyhow::Result<()> {
     let mut scenario = Scenario::paper()?;
     scenario.robot.config.policy = args.policy.into();
+    scenario.fidelity = args.fidelity.into();
     if args.statistics {
         scenario.name.push_str("-statistics");
         scenario.let_truth_walk_as_assumed();

@@ -5,7 +5,8 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use sonarfix_map::Scenario;
+use clap::ValueEnum;
+use sonarfix_map::{Fidelity, Scenario};
 
 use super::table::{self, Beside};
 use crate::report::Report;
@@ -24,11 +25,32 @@ pub struct Args {
     /// Seed of the first run; the others count up from it.
     #[arg(long)]
     seed: Option<u64>,
+    /// What is simulated between world and localizer; the scenario's own choice if not given.
+    #[arg(long, value_enum)]
+    fidelity: Option<FidelityName>,
     /// Writes the first run's trace here, as CSV (docs/formats.md).
     #[arg(long, value_name = "FILE.csv")]
     trace: Option<PathBuf>,
     #[command(flatten)]
     output: Output,
+}
+
+/// What is simulated between world and localizer.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum FidelityName {
+    /// Nothing: travels and ranges are told at once.
+    Ideal,
+    /// Pins, drivers and the robot's own loop.
+    Pins,
+}
+
+impl From<FidelityName> for Fidelity {
+    fn from(name: FidelityName) -> Self {
+        match name {
+            FidelityName::Ideal => Self::Ideal,
+            FidelityName::Pins => Self::Pins,
+        }
+    }
 }
 
 /// Where the answer goes.
@@ -43,7 +65,8 @@ pub struct Output {
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
-    let scenario = Scenario::read(&args.scenario)?;
+    let mut scenario = Scenario::read(&args.scenario)?;
+    scenario.fidelity = args.fidelity.map_or(scenario.fidelity, Fidelity::from);
     let experiment = Experiment {
         runs: args.runs.unwrap_or(scenario.run.runs),
         seed: args.seed.unwrap_or(scenario.run.seed),
@@ -100,7 +123,15 @@ impl Experiment {
 
     fn table(&self, summary: &Summary) -> crate::report::Table {
         let t = &self.simulation.scenario.truth;
-        let truth = [0.0, 0.0, 0.0, t.scale_right, t.scale_left, t.track_width, t.range_scale];
+        let truth = [
+            0.0,
+            0.0,
+            0.0,
+            t.scale_right,
+            t.scale_left,
+            t.track_width,
+            self.simulation.range_scale(),
+        ];
         table::states(summary, &Beside { truth, paper: self.beside_paper })
     }
 

@@ -411,6 +411,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
             sonar: [mount.x.0.into(), mount.y.0.into()],
             heading: pose.heading.radians().0.into(),
             range: None,
+            met: None,
         };
         #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
         let aim = match &held.echo {

@@ -177,6 +177,7 @@ mod tests {
                 direction: -1.57,
                 bearing: -1.57,
                 range: None,
+                met: None,
                 outcome: Outcome::Refused,
                 reason: HOSTILE.into(),
                 innovation: None,

@@ -255,7 +255,10 @@
     g.fill();
   }
 
-  // The cone the sonar heard within, and a dot where it heard the echo.
+  // Whether the sound met something else than a wall.
+  const isUnusual = (fix) => fix.met !== null && fix.met !== "wall";
+
+  // The cone the sonar heard within, and a dot where it heard the echo, with what it came from.
   function drawBeam(g, cam, fix, time) {
     if (fix.x === null || fix.y === null || fix.direction === null) return;
     const colour = state.colours[OUTCOMES[fix.outcome]];
@@ -272,8 +275,10 @@
     g.globalAlpha = 1;
     if (fix.range === null) return;
     g.beginPath();
-    g.arc(x + length * Math.cos(fix.direction), y - length * Math.sin(fix.direction), 4.5, 0, 2 * Math.PI);
+    const [dotX, dotY] = [x + length * Math.cos(fix.direction), y - length * Math.sin(fix.direction)];
+    g.arc(dotX, dotY, 4.5, 0, 2 * Math.PI);
     g.fill();
+    if (isUnusual(fix)) g.fillText(fix.met, dotX + 8, dotY - 8);
   }
 
   // The estimated robot and its ellipse, magnified; where the truth is known, a cross at its
@@ -375,7 +380,7 @@
       fix: `${(time - fix.time).toFixed(1)} s ago`,
       wall: fix.wall === null ? "none" : walls[fix.wall]?.name ?? `number ${fix.wall}`,
       outcome: OUTCOMES[fix.outcome] + (fix.reason ? `: ${fix.reason}` : ""),
-      range: fix.range === null ? "no echo" : `${fix.range.toFixed(3)} m`,
+      range: fix.range === null ? "no echo" : `${fix.range.toFixed(3)} m${isUnusual(fix) ? ` (${fix.met})` : ""}`,
       innovation: millimetres(fix.innovation) + (fix.innovation === null ? "" : sigmas),
     };
   }

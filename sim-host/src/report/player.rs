@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::trace::{FixRecord, Outcome, Pose, Tick, Trace};
+use crate::world::reflector::Source;
 
 /// The most ticks the player is given. It draws straight lines between them: over a run of
 /// 20 minutes that is one every 0.3 s, in which a robot at 0.4 m/s moves 0.12 m.
@@ -66,6 +67,8 @@ struct Fixes<'a> {
     y: Vec<Number>,
     direction: Vec<Number>,
     range: Vec<Number>,
+    /// What the sound met, in words; `null` where nothing was heard or nobody knows.
+    met: Vec<Option<&'static str>>,
     /// 0 accepted, 1 gated, 2 refused.
     outcome: Vec<u8>,
     reason: Vec<&'a str>,
@@ -144,6 +147,7 @@ impl<'a> Fixes<'a> {
         self.y.push(rounded(y, LENGTH));
         self.direction.push(rounded(fix.direction, ANGLE));
         self.range.push(fix.range.and_then(|range| rounded(range, LENGTH)));
+        self.met.push(fix.met.map(name));
         self.outcome.push(match fix.outcome {
             Outcome::Accepted => 0,
             Outcome::Gated => 1,
@@ -153,6 +157,17 @@ impl<'a> Fixes<'a> {
         self.innovation.push(fix.innovation.and_then(|length| rounded(length, LENGTH)));
         let spread = fix.innovation_variance.map(f64::sqrt);
         self.spread.push(spread.and_then(|length| rounded(length, LENGTH)));
+    }
+}
+
+fn name(met: Source) -> &'static str {
+    match met {
+        Source::Wall(_) => "wall",
+        Source::Corner => "corner",
+        Source::Edge => "edge",
+        Source::Obstacle => "obstacle",
+        Source::DoubleBounce => "double bounce",
+        Source::Outlier => "outlier",
     }
 }
 

@@ -1,0 +1,140 @@
+//! How true to the hardware a scenario is simulated, and with which hardware.
+
+use crate::document::{Node, Table};
+use crate::error::FileError;
+use crate::quantity::LENGTH;
+use crate::surroundings::temperature;
+
+/// What is simulated between the world and the localizer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Fidelity {
+    /// Nothing: the localizer is told travels and ranges, at once and on the dot. The paper's.
+    #[default]
+    Ideal,
+    /// Pins and counters, with the drivers and the loop that a robot runs.
+    Pins,
+}
+
+/// Which sonar the robot has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SonarName {
+    /// The paper's: hears the nearest wall in its cone, always. Noise and cone are in `[truth]`.
+    #[default]
+    Ideal,
+    /// HC-SR04.
+    HcSr04,
+    /// The LEGO NXT's.
+    Nxt,
+}
+
+/// Which servo turns it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ServoName {
+    /// Is at once where it is told to be.
+    #[default]
+    Ideal,
+    /// SG90.
+    Sg90,
+}
+
+/// Who keeps the robot on its path.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Follow {
+    /// Nobody needs to: it follows the path exactly, whatever the filter believes.
+    #[default]
+    Truth,
+    /// A follower that knows the estimate only.
+    Estimate,
+}
+
+/// Something that happens to a wheel now and then.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Upset {
+    /// Mean distance between two, metres; infinite: never.
+    pub every: f64,
+    /// How much an encoder counts too much each time (a bump: its deviation), metres.
+    pub by: f64,
+}
+
+impl Default for Upset {
+    fn default() -> Self {
+        Self { every: f64::INFINITY, by: 0.0 }
+    }
+}
+
+/// What happens to the wheels.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Upsets {
+    /// A wheel turns without rolling.
+    pub slip: Upset,
+    /// A wheel rolls over something.
+    pub bump: Upset,
+}
+
+/// The hardware of a scenario.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hardware {
+    /// The sonar.
+    pub sonar: SonarName,
+    /// Temperature that the sonar's driver is set to, °C.
+    pub set_temperature: f64,
+    /// The servo.
+    pub servo: ServoName,
+}
+
+/// Reads a key whose value is one of some names; the default where it is missing.
+fn named<T: Copy + Default>(node: Option<Node<'_>>, names: &[(&str, T)]) -> Result<T, FileError> {
+    let Some(node) = node else {
+        return Ok(T::default());
+    };
+    let text = node.text()?;
+    let found = names.iter().find(|(name, _)| *name == text);
+    found.map(|(_, value)| *value).ok_or_else(|| {
+        let known: Vec<String> = names.iter().map(|(name, _)| format!("\"{name}\"")).collect();
+        node.error(format!("must be {}", known.join(" or ")))
+    })
+}
+
+pub(crate) fn read_fidelity(root: &Table<'_>) -> Result<Fidelity, FileError> {
+    named(root.get("fidelity"), &[("ideal", Fidelity::Ideal), ("pins", Fidelity::Pins)])
+}
+
+pub(crate) fn read_follow(path: &Table<'_>) -> Result<Follow, FileError> {
+    named(path.get("follow"), &[("truth", Follow::Truth), ("estimate", Follow::Estimate)])
+}
+
+/// Reads `[sensor]` and `[servo]`; what is missing is ideal, and its driver set to a room's 20 °C.
+pub(crate) fn read_hardware(root: &Table<'_>) -> Result<Hardware, FileError> {
+    let optional = |key, keys: &[&str]| root.get(key).map(|node| node.table(keys)).transpose();
+    let sensor = optional("sensor", &["model", "temperature"])?;
+    let servo = optional("servo", &["model"])?;
+    let sonars =
+        [("ideal", SonarName::Ideal), ("hc_sr04", SonarName::HcSr04), ("nxt", SonarName::Nxt)];
+    let servos = [("ideal", ServoName::Ideal), ("sg90", ServoName::Sg90)];
+    Ok(Hardware {
+        sonar: named(model(sensor.as_ref()), &sonars)?,
+        set_temperature: temperature(sensor.as_ref())?,
+        servo: named(model(servo.as_ref()), &servos)?,
+    })
+}
+
+fn model<'a>(table: Option<&Table<'a>>) -> Option<Node<'a>> {
+    table.and_then(|table| table.get("model"))
+}
+
+pub(crate) fn read_upsets(truth: &Table<'_>) -> Result<Upsets, FileError> {
+    Ok(Upsets { slip: upset(truth, "slip")?, bump: upset(truth, "bump")? })
+}
+
+fn upset(truth: &Table<'_>, key: &str) -> Result<Upset, FileError> {
+    let Some(node) = truth.get(key) else {
+        return Ok(Upset::default());
+    };
+    let table = node.table(&["every", "by"])?;
+    let every_node = table.require("every")?;
+    let every = every_node.quantity(&LENGTH)?;
+    Ok(Upset {
+        every: every_node.check(every, every > 0.0, "positive")?,
+        by: table.require("by")?.deviation(&LENGTH)?,
+    })
+}

@@ -1,0 +1,110 @@
+//! Whether the error stays inside what the filter claims, or health says otherwise.
+
+use sonarfix::health::Verdict;
+
+use crate::dense::{Matrix, Vector};
+
+/// χ² of two degrees of freedom at 99.9 %.
+const ELLIPSE: f64 = 13.8;
+
+/// The books on a run's claims.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Claim {
+    ticks: u32,
+    outside: u32,
+    /// Seconds for which the error has been outside and health silent.
+    silence: f64,
+    longest_silence: f64,
+    worst: f64,
+    holds: bool,
+}
+
+impl Claim {
+    /// Takes the error and the covariance after a tick of so many seconds.
+    pub fn add(&mut self, seconds: f64, error: &Vector, p: &Matrix, verdict: Verdict) {
+        let is_inside = distance_squared(error, p) <= ELLIPSE;
+        self.ticks += 1;
+        self.outside += u32::from(!is_inside);
+        let is_silent = !is_inside && verdict == Verdict::Tracking;
+        self.silence = if is_silent { self.silence + seconds } else { 0.0 };
+        self.longest_silence = self.longest_silence.max(self.silence);
+        self.worst = self.worst.max(error[0].hypot(error[1]));
+        self.holds = is_inside && verdict != Verdict::Lost;
+    }
+
+    /// Share of the ticks with the position outside the 99.9 % ellipse.
+    #[must_use]
+    pub fn share_outside(&self) -> f64 {
+        f64::from(self.outside) / f64::from(self.ticks.max(1))
+    }
+
+    /// Longest time outside of it during which health said `Tracking`, seconds.
+    #[must_use]
+    pub fn longest_silence(&self) -> f64 {
+        self.longest_silence
+    }
+
+    /// Whether the run ended with the error outside and health saying `Tracking`.
+    #[must_use]
+    pub fn is_silent_at_the_end(&self) -> bool {
+        self.silence > 0.0
+    }
+
+    /// The largest error of the position, metres.
+    #[must_use]
+    pub fn worst(&self) -> f64 {
+        self.worst
+    }
+
+    /// Whether at the last tick the error was inside, and health did not say `Lost`.
+    #[must_use]
+    pub fn holds_at_the_end(&self) -> bool {
+        self.holds
+    }
+}
+
+/// Mahalanobis distance squared of x and y.
+fn distance_squared(error: &Vector, p: &Matrix) -> f64 {
+    let determinant = p[(0, 0)] * p[(1, 1)] - p[(0, 1)] * p[(1, 0)];
+    let (x, y) = (error[0], error[1]);
+    (p[(1, 1)] * x * x - 2.0 * p[(0, 1)] * x * y + p[(0, 0)] * y * y) / determinant
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn taken(steps: &[(f64, Verdict)]) -> Claim {
+        let mut p = Matrix::zeros();
+        p[(0, 0)] = 4e-4;
+        p[(1, 1)] = 1e-4;
+        let mut claim = Claim::default();
+        for &(x, verdict) in steps {
+            let mut error = Vector::zeros();
+            error[0] = x;
+            claim.add(0.5, &error, &p, verdict);
+        }
+        claim
+    }
+
+    #[test]
+    fn an_error_outside_counts_as_silent_only_while_health_says_nothing() {
+        use Verdict::{Degraded, Lost, Tracking};
+        // The ellipse reaches √13.8 · 2 cm = 7.4 cm along x.
+        let claim = taken(&[
+            (0.07, Tracking),
+            (0.08, Tracking),
+            (-0.09, Tracking),
+            (0.20, Degraded),
+            (0.08, Tracking),
+            (0.08, Lost),
+        ]);
+        assert!((claim.longest_silence() - 1.0).abs() < 1e-12, "{claim:?}");
+        assert!((claim.share_outside() - 5.0 / 6.0).abs() < 1e-12);
+        assert!((claim.worst() - 0.2).abs() < 1e-12);
+        assert!(!claim.holds_at_the_end() && !claim.is_silent_at_the_end());
+        assert!(taken(&[(0.08, Tracking)]).is_silent_at_the_end());
+        assert!(taken(&[(0.08, Lost), (0.01, Degraded)]).holds_at_the_end());
+        assert!(!taken(&[(0.01, Lost)]).holds_at_the_end());
+    }
+}

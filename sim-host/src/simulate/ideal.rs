@@ -1,0 +1,126 @@
+//! A run in which the localizer is told everything at once and on the dot.
+
+use sonarfix::aim::Aim;
+use sonarfix::localizer::Localizer;
+use sonarfix::motion::WheelTravel;
+use sonarfix::units::{Instant, Metres};
+
+use super::score::Score;
+use super::{Chance, Simulation, SimulationError, seconds};
+use crate::angle;
+use crate::observe::{self, Look};
+use crate::plant::Plant;
+use crate::plant::follower::Follower;
+use crate::statistics::RunResult;
+use crate::trace::Recorder;
+use crate::world::segment::Point;
+use crate::world::sensor::SensorModel;
+use crate::world::{Echo, Ping};
+
+pub fn run(
+    simulation: &Simulation,
+    seed: u64,
+    recorder: &mut impl Recorder,
+) -> Result<RunResult, SimulationError> {
+    let mut run = Run::new(simulation, seed)?;
+    let tick_period = simulation.scenario.robot.encoder_period.to_micros();
+    let fix_period = simulation.scenario.robot.fix_period.to_micros();
+    let (mut next_tick, mut next_fix) = (tick_period, fix_period);
+    while next_tick.min(next_fix) <= simulation.end() {
+        let now = next_tick.min(next_fix);
+        run.drive_to(now)?;
+        if now == next_fix {
+            run.take_fix(recorder);
+            next_fix += fix_period;
+        }
+        if now == next_tick {
+            run.end_tick(recorder);
+            next_tick += tick_period;
+        }
+    }
+    run.score.result(&run.localizer)
+}
+
+/// A run under way.
+struct Run<'a> {
+    simulation: &'a Simulation,
+    /// The scenario's sonar, and what the air makes of its ranges: here they fly no time.
+    sensor: SensorModel,
+    chance: Chance,
+    plant: Plant<'a>,
+    localizer: Localizer<'a>,
+    follower: Option<Follower>,
+    score: Score<'a>,
+    /// Microseconds since the run began.
+    now: u64,
+}
+
+impl<'a> Run<'a> {
+    fn new(simulation: &'a Simulation, seed: u64) -> Result<Self, SimulationError> {
+        let mut chance = Chance::new(seed);
+        let plant = simulation.plant();
+        let localizer = simulation.localizer(&plant.state(), &mut chance.start)?;
+        let score = Score::new(simulation, &localizer, plant.state());
+        let sensor = SensorModel { scale: simulation.range_scale, ..simulation.sensor.clone() };
+        let follower = simulation.follower();
+        Ok(Self { simulation, sensor, chance, plant, localizer, follower, score, now: 0 })
+    }
+
+    fn time(&self) -> f64 {
+        seconds(self.now)
+    }
+
+    fn drive_to(&mut self, now: u64) -> Result<(), SimulationError> {
+        self.now = now;
+        let time = seconds(now);
+        let travel = self.plant.drive_to(time, &mut self.chance.wheels);
+        self.score.rolled(travel);
+        self.score.arrive(self.plant.state());
+        #[expect(clippy::cast_possible_truncation, reason = "the robot counts in f32")]
+        let [right, left] = travel.measured.map(|metres| metres as f32);
+        self.localizer
+            .odometry(Instant::from_ticks(now), WheelTravel::new(right, left))
+            .map_err(|error| SimulationError::Odometry { time, error })
+    }
+
+    fn take_fix(&mut self, recorder: &mut impl Recorder) {
+        let truth = self.plant.pose();
+        let sonar = self.simulation.sonar_at(&truth);
+        let mut look =
+            Look { time: self.time(), sonar, heading: truth.heading, range: None, met: None };
+        let aim = match self.localizer.aim() {
+            Ok(aim) => aim,
+            Err(no_aim) => {
+                self.localizer.skip();
+                self.score.no_aim();
+                recorder.fix(|| observe::no_aim_record(look, no_aim));
+                return;
+            }
+        };
+        let echo = self.ping(sonar, truth.heading, &aim);
+        look.range = echo.map(|echo| echo.range);
+        look.met = echo.map(|echo| echo.source);
+        #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
+        let fix = self.localizer.fix(&aim, look.range.map(|range| Metres(range as f32)));
+        self.score.fix(&aim, &fix);
+        recorder.fix(|| observe::fix_record(look, &aim, &fix));
+    }
+
+    fn ping(&mut self, from: Point, heading: f64, aim: &Aim) -> Option<Echo> {
+        let ping = Ping {
+            time: self.time(),
+            sonar_after: &|_| from,
+            direction: angle::wrap(heading + f64::from(aim.bearing.0)),
+        };
+        let Chance { ranges, echoes, .. } = &mut self.chance;
+        self.simulation.world.echo(&ping, &self.sensor, ranges, echoes)
+    }
+
+    fn end_tick(&mut self, recorder: &mut impl Recorder) {
+        self.score.tick(self.time(), &self.localizer, &self.plant, recorder);
+        if let Some(follower) = &mut self.follower {
+            let command = follower.command(&observe::estimate(&self.localizer).pose);
+            self.plant.steer(command);
+        }
+    }
+}

@@ -1,0 +1,237 @@
+//! One simulated run: the shipped localizer in a true world.
+//!
+//! - [`Simulation`]: a scenario made ready to run;
+//! - `ideal`: a run in which the localizer is told everything at once and on the dot;
+//! - `pins`: a run through pins, drivers and the loop that a robot runs;
+//! - `score`: what is kept of either.
+
+mod ideal;
+mod pins;
+mod score;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+use sonarfix::localizer::{Localizer, Start, StartError};
+use sonarfix::map::{Map, Wall};
+use sonarfix::pose::Pose;
+use sonarfix::units::{Instant, Metres, Radians};
+use sonarfix_hal::robot::Stamp;
+use sonarfix_map::{Fidelity, Follow, NamedWall, Scenario, SonarName};
+
+use crate::dense::{Line, Model, Vector};
+use crate::pins::devices::SetupError;
+use crate::plant::Plant;
+use crate::plant::follower::Follower;
+use crate::statistics::RunResult;
+use crate::trace::{Recorder, Trace};
+use crate::world::obstacle::{Obstacle, Outline, Walk};
+use crate::world::segment::{Point, Segment};
+use crate::world::sensor::SensorModel;
+use crate::world::{World, air};
+
+/// A scenario made ready to run any number of times.
+#[derive(Debug, Clone)]
+pub struct Simulation {
+    /// The scenario.
+    pub scenario: Scenario,
+    /// To which instant the loop says that an echo belongs, at the fidelity of pins.
+    pub stamp: Stamp,
+    walls: Vec<Wall>,
+    lines: Vec<Line>,
+    world: World,
+    sensor: SensorModel,
+    /// By how much the ranger reads too long, air included.
+    range_scale: f64,
+    model: Model,
+}
+
+/// A run that could not go on.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum SimulationError {
+    /// The localizer could not be made.
+    #[error("the localizer refuses to start: {0}")]
+    Start(#[from] StartError),
+    /// The robot's devices could not be set up.
+    #[error("the robot cannot be set up: {0}")]
+    Setup(#[from] SetupError),
+    /// The localizer refused a travel of its own simulated wheels.
+    #[error("at {time:.1} s the localizer refuses the wheels' travel: {error}")]
+    Odometry {
+        /// Seconds since the run began.
+        time: f64,
+        /// Why.
+        error: sonarfix::localizer::OdometryError,
+    },
+    /// The filter's covariance is no longer positive definite.
+    #[error("at the end of the run the covariance is not positive definite")]
+    Covariance,
+}
+
+/// The independent sources of chance in a run. Each has a stream of its own, so that two policies
+/// with the same seed meet the same wheels.
+struct Chance {
+    start: ChaCha8Rng,
+    wheels: ChaCha8Rng,
+    ranges: ChaCha8Rng,
+    echoes: ChaCha8Rng,
+}
+
+impl Chance {
+    fn new(seed: u64) -> Self {
+        let stream = |n| {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            rng.set_stream(n);
+            rng
+        };
+        Self { start: stream(0), wheels: stream(1), ranges: stream(2), echoes: stream(3) }
+    }
+}
+
+impl Simulation {
+    /// Prepares a scenario.
+    #[must_use]
+    pub fn new(scenario: Scenario) -> Self {
+        let line = |wall: &NamedWall| Line::through(wall.from(), wall.to());
+        let around = &scenario.surroundings;
+        let world = World::new(&scenario.floor)
+            .with_obstacles(around.obstacles.iter().map(obstacle).collect())
+            .at_temperature(around.temperature);
+        let believed = air::speed_of_sound(scenario.hardware.set_temperature);
+        let stretch = believed / world.speed_of_sound();
+        Self {
+            stamp: Stamp::Reflection,
+            walls: scenario.floor.walls(),
+            lines: scenario.floor.named_walls().iter().map(line).collect(),
+            world,
+            sensor: sensor(&scenario),
+            // (1 + scale) · stretch − 1, written so that a stretch of one changes no bit.
+            range_scale: scenario.truth.range_scale * stretch + (stretch - 1.0),
+            model: Model::of(&scenario.robot.config),
+            scenario,
+        }
+    }
+
+    /// A trace of this scenario with nothing in it yet.
+    #[must_use]
+    pub fn empty_trace(&self) -> Trace {
+        Trace::of(&self.scenario.floor, self.scenario.robot.config.sonar.cone)
+    }
+
+    /// Runs once.
+    ///
+    /// # Errors
+    /// [`SimulationError`], if the localizer refuses its start or its wheels, or the hardware
+    /// cannot be set up.
+    pub fn run(
+        &self,
+        seed: u64,
+        recorder: &mut impl Recorder,
+    ) -> Result<RunResult, SimulationError> {
+        match self.scenario.fidelity {
+            Fidelity::Ideal => ideal::run(self, seed, recorder),
+            Fidelity::Pins => pins::run(self, seed, recorder),
+        }
+    }
+
+    /// By how much the ranger really reads too long: its own error and that of the temperature
+    /// that its driver is set to.
+    #[must_use]
+    pub fn range_scale(&self) -> f64 {
+        self.range_scale
+    }
+
+    /// When the run ends, microseconds.
+    fn end(&self) -> u64 {
+        micros(self.scenario.path.duration())
+    }
+
+    fn plant(&self) -> Plant<'_> {
+        Plant::new(&self.scenario, self.range_scale)
+    }
+
+    /// The localizer, from its start.
+    fn localizer(
+        &self,
+        truth: &Vector,
+        rng: &mut ChaCha8Rng,
+    ) -> Result<Localizer<'_>, SimulationError> {
+        self.localizer_from(estimated_start(&self.scenario, truth, rng), 0)
+    }
+
+    /// A localizer that starts at a time, µs.
+    fn localizer_from(&self, start: Start, now: u64) -> Result<Localizer<'_>, SimulationError> {
+        let config = self.scenario.robot.config;
+        Ok(Localizer::new(config, Map::new(&self.walls), start, Instant::from_ticks(now))?)
+    }
+
+    /// Who steers, if anybody must.
+    fn follower(&self) -> Option<Follower> {
+        let period = seconds(self.scenario.robot.encoder_period.to_micros());
+        match self.scenario.follow {
+            Follow::Truth => None,
+            Follow::Estimate => Some(Follower::new(&self.scenario.path, period)),
+        }
+    }
+
+    /// Where the sonar is on a robot at a pose.
+    fn sonar_at(&self, pose: &crate::trace::Pose) -> Point {
+        let mount = self.model.mount;
+        let (sin, cos) = pose.heading.sin_cos();
+        [pose.x + cos * mount[0] - sin * mount[1], pose.y + sin * mount[0] + cos * mount[1]]
+    }
+}
+
+fn sensor(scenario: &Scenario) -> SensorModel {
+    let model = match scenario.hardware.sonar {
+        SonarName::Ideal => SensorModel::ideal(scenario),
+        SonarName::HcSr04 => SensorModel::hc_sr04(),
+        SonarName::Nxt => SensorModel::nxt(),
+    };
+    SensorModel { scale: scenario.truth.range_scale, ..model }
+}
+
+fn obstacle(plan: &sonarfix_map::Obstacle) -> Obstacle {
+    let outline = match plan.outline {
+        sonarfix_map::Outline::Circle { centre, radius } => Outline::Circle { centre, radius },
+        sonarfix_map::Outline::Face { from, to } => Outline::Face(Segment::new(from, to)),
+    };
+    let walk = plan.walk.map(|walk| Walk { by: walk.by, takes: walk.takes });
+    Obstacle { outline, walk }
+}
+
+/// What the filter is told of its start: the truth, or a draw around it.
+fn estimated_start(scenario: &Scenario, truth: &Vector, rng: &mut ChaCha8Rng) -> Start {
+    let start = &scenario.start;
+    let mut draw = |sigma: f64| {
+        let normal: f64 = rng.sample(StandardNormal);
+        if start.drawn { sigma * normal } else { 0.0 }
+    };
+    let pose = [
+        truth[0] + draw(start.position),
+        truth[1] + draw(start.position),
+        truth[2] + draw(start.heading),
+    ];
+    #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
+    let [x, y, heading, position, doubt] =
+        [pose[0], pose[1], pose[2], start.position, start.heading].map(|v| v as f32);
+    Start {
+        pose: Pose::new(x, y, Radians(heading)),
+        position_deviation: Metres(position),
+        heading_deviation: Radians(doubt),
+    }
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a run's length is positive and far below 2^63 µs"
+)]
+pub(crate) fn micros(seconds: f64) -> u64 {
+    (seconds * 1e6).round() as u64
+}
+
+#[expect(clippy::cast_precision_loss, reason = "exact below 2^53 µs, 285 years")]
+fn seconds(micros: u64) -> f64 {
+    micros as f64 * 1e-6
+}

@@ -1,0 +1,232 @@
+//! What a sonar is able to hear, and how far off what it then says is: parameters, no chance.
+
+use sonarfix_map::Scenario;
+
+/// A number that depends on another: straight lines between points, level beyond the outermost.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curve(Vec<(f64, f64)>);
+
+impl Curve {
+    /// A curve through points, their first numbers rising.
+    #[must_use]
+    pub fn through(points: &[(f64, f64)]) -> Self {
+        Self(points.to_vec())
+    }
+
+    /// The same everywhere.
+    #[must_use]
+    pub fn level(value: f64) -> Self {
+        Self(vec![(0.0, value)])
+    }
+
+    /// The value at `x`; zero of a curve without points.
+    #[must_use]
+    pub fn at(&self, x: f64) -> f64 {
+        let after = self.0.partition_point(|&(from, _)| from <= x);
+        let left = after.checked_sub(1).and_then(|before| self.0.get(before));
+        match (left, self.0.get(after)) {
+            (Some(&(x0, y0)), Some(&(x1, y1))) => y0 + (y1 - y0) * (x - x0) / (x1 - x0),
+            (Some(&(_, y)), None) | (None, Some(&(_, y))) => y,
+            (None, None) => 0.0,
+        }
+    }
+}
+
+/// How likely a sound is heard that comes back along one direction, by its range (metres) and by
+/// its angle off the beam's axis (radians).
+///
+/// `share(r) / (1 + exp((|angle| − half_angle(r)) / blur(r)))`: a share that no alignment cures,
+/// and a cone with a soft rim.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sensitivity {
+    /// Share heard on the axis.
+    pub share: Curve,
+    /// Angle at which half of that is left, radians.
+    pub half_angle: Curve,
+    /// Width of the rim, radians.
+    pub blur: Curve,
+}
+
+impl Sensitivity {
+    /// Hears everything.
+    fn perfect() -> Self {
+        let everywhere = Curve::level(f64::INFINITY);
+        Self { share: Curve::level(1.0), half_angle: everywhere, blur: Curve::level(1.0) }
+    }
+
+    /// Hears nothing.
+    fn deaf() -> Self {
+        Self { share: Curve::level(0.0), ..Self::perfect() }
+    }
+
+    /// Probability that it is heard.
+    #[must_use]
+    pub fn at(&self, range: f64, off_axis: f64) -> f64 {
+        let rim = (off_axis.abs() - self.half_angle.at(range)) / self.blur.at(range);
+        self.share.at(range) / (1.0 + rim.exp())
+    }
+}
+
+/// A sonar.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SensorModel {
+    /// Half of the cone beyond which nothing is heard at all, radians.
+    pub cone: f64,
+    /// Shortest and longest distance that is reported, metres.
+    pub reach: (f64, f64),
+    /// Of the foot of the perpendicular on a smooth wall.
+    pub mirror: Sensitivity,
+    /// Of a corner, as a share of `mirror`.
+    pub corner: f64,
+    /// Of an edge, as a share of `mirror`.
+    pub edge: f64,
+    /// Of a sound that went over two walls and back, as a share of `mirror`.
+    pub double_bounce: f64,
+    /// Of a wall's roughness near the axis, by the angle between axis and normal.
+    pub scatter: Sensitivity,
+    /// Around which part of the angle from the normal to the axis roughness answers, and the
+    /// deviation of that, radians.
+    pub scatter_lean: f64,
+    /// See `scatter_lean`.
+    pub scatter_spread: f64,
+    /// What is added to a distance by the angle off the axis, metres.
+    pub bias: Curve,
+    /// Probability that a short outlier takes an echo's place, by its distance.
+    pub short: Curve,
+    /// Probability that a long one does.
+    pub long: Curve,
+    /// Probability that a cycle of the echo is missed, which costs half a wavelength.
+    pub skip: f64,
+    /// Deviation at no range, metres.
+    pub noise: f64,
+    /// Deviation per metre of range.
+    pub noise_per_metre: f64,
+    /// Scale error of what is reported, apart from the air's.
+    pub scale: f64,
+    /// What is reported is a whole number of these, metres; zero: as fine as may be.
+    pub quantum: f64,
+}
+
+/// Wavelength of 40 kHz sound in air at 20 °C, 343.4 m/s, metres.
+pub const WAVELENGTH: f64 = 343.4 / 40e3;
+
+impl SensorModel {
+    /// The paper's sonar, with the noise and the cone that a scenario says are true: smooth walls
+    /// answer from the foot of the perpendicular, the nearest inside the cone first, always.
+    #[must_use]
+    pub fn ideal(scenario: &Scenario) -> Self {
+        let (truth, sonar) = (&scenario.truth, &scenario.robot.config.sonar);
+        Self {
+            cone: truth.cone,
+            reach: (sonar.min_range.0.into(), sonar.max_range.0.into()),
+            mirror: Sensitivity::perfect(),
+            corner: 0.0,
+            edge: 0.0,
+            double_bounce: 0.0,
+            scatter: Sensitivity::deaf(),
+            scatter_lean: 1.0,
+            scatter_spread: 0.0,
+            bias: Curve::level(0.0),
+            short: Curve::level(0.0),
+            long: Curve::level(0.0),
+            skip: 0.0,
+            noise: truth.range_noise,
+            noise_per_metre: truth.range_noise_per_metre,
+            scale: truth.range_scale,
+            quantum: 0.0,
+        }
+    }
+
+    /// An HC-SR04. From `FIELD.md`, "Real hardware": 2–400 cm, about 3 m in practice, a half-angle
+    /// from 9–10° (the board parallel to a plate) to 23° (facing it), 3 mm steps, jumps of half a
+    /// wavelength and more. The shares of corners, edges and outliers are not in any datasheet:
+    /// chosen, between the ideal and the NXT's.
+    #[must_use]
+    pub fn hc_sr04() -> Self {
+        let degrees = f64::to_radians;
+        Self {
+            cone: degrees(30.0),
+            reach: (0.02, 4.0),
+            mirror: Sensitivity {
+                share: Curve::through(&[(0.1, 0.99), (2.0, 0.97), (3.0, 0.85), (4.0, 0.3)]),
+                half_angle: Curve::through(&[(0.3, degrees(23.0)), (3.0, degrees(14.0))]),
+                blur: Curve::level(degrees(1.5)),
+            },
+            corner: 0.9,
+            edge: 0.1,
+            double_bounce: 0.5,
+            scatter: Sensitivity::deaf(),
+            scatter_lean: 1.0,
+            scatter_spread: 0.0,
+            bias: Curve::through(&[(0.0, 0.0), (degrees(20.0), 0.005)]),
+            short: Curve::through(&[(1.0, 0.01), (3.0, 0.03)]),
+            long: Curve::through(&[(1.0, 0.005), (3.0, 0.01)]),
+            skip: 0.05,
+            noise: 0.0015,
+            noise_per_metre: 0.001,
+            scale: 0.0,
+            quantum: 0.003,
+        }
+    }
+
+    /// The LEGO NXT ultrasonic sensor, fitted to 20 sweeps of four robots
+    /// (`docs/sonar-model.md` shows the fit, and `sonarfix sonar-model` makes that page).
+    #[must_use]
+    pub fn nxt() -> Self {
+        let degrees = f64::to_radians;
+        Self {
+            cone: degrees(75.0),
+            reach: (0.03, 2.54),
+            mirror: Sensitivity {
+                share: Curve::through(&[(0.6, 0.98), (1.0, 0.99), (1.15, 0.75), (1.6, 0.6)]),
+                half_angle: Curve::through(&[(0.3, degrees(38.0)), (0.8, degrees(30.0))]),
+                blur: Curve::through(&[(0.3, degrees(6.0)), (0.8, degrees(2.5))]),
+            },
+            corner: 0.6,
+            edge: 0.1,
+            double_bounce: 0.2,
+            scatter: Sensitivity {
+                share: Curve::through(&[(0.4, 0.9), (0.9, 0.5), (1.3, 0.1)]),
+                half_angle: Curve::level(degrees(55.0)),
+                blur: Curve::level(degrees(5.0)),
+            },
+            scatter_lean: 0.8,
+            scatter_spread: degrees(7.0),
+            bias: Curve::through(&[(0.0, 0.0), (degrees(22.5), 0.014), (degrees(32.5), 0.021)]),
+            short: Curve::through(&[(0.5, 0.025), (0.7, 0.0), (1.0, 0.0), (1.2, 0.16)]),
+            long: Curve::through(&[(1.0, 0.005), (1.2, 0.08)]),
+            skip: 0.0,
+            noise: 0.013,
+            noise_per_metre: 0.0,
+            scale: 0.0,
+            quantum: 0.01,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_curve_is_straight_between_its_points_and_level_beyond() {
+        let curve = Curve::through(&[(1.0, 10.0), (3.0, 20.0)]);
+        for (x, y) in [(0.0, 10.0), (1.0, 10.0), (1.5, 12.5), (3.0, 20.0), (9.0, 20.0)] {
+            assert!((curve.at(x) - y).abs() < 1e-12, "{x}");
+        }
+    }
+
+    #[test]
+    fn half_is_heard_at_the_half_angle_and_all_by_a_perfect_one() {
+        let soft = Sensitivity {
+            share: Curve::level(0.8),
+            half_angle: Curve::level(0.3),
+            blur: Curve::level(0.05),
+        };
+        assert!((soft.at(1.0, -0.3) - 0.4).abs() < 1e-12);
+        assert!(soft.at(1.0, 0.0) > 0.79 && soft.at(1.0, 0.6) < 0.01);
+        // Exactly: no draw of chance must be needed.
+        assert_eq!(Sensitivity::perfect().at(3.0, 1.0).to_bits(), 1.0_f64.to_bits());
+        assert_eq!(Sensitivity::deaf().at(3.0, 0.0).to_bits(), 0.0_f64.to_bits());
+    }
+}

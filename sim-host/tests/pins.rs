@@ -1,0 +1,153 @@
+//! Runs through pins, drivers and the robot's own loop.
+#![expect(clippy::unwrap_used, reason = "all of this file is a test, its helpers too")]
+
+use std::path::Path;
+
+use cpu_time::ThreadTime;
+use sonarfix::aim::Policy;
+use sonarfix_hal::robot::Stamp;
+use sonarfix_map::{CLASSROOM, Fidelity, PAPER, Scenario, ServoName};
+use sonarfix_sim::monte_carlo;
+use sonarfix_sim::simulate::Simulation;
+use sonarfix_sim::statistics::Summary;
+use sonarfix_sim::trace::{Outcome, Trace};
+use sonarfix_sim::world::reflector::Source;
+
+fn scenario(text: &str) -> Scenario {
+    Scenario::parse(text, "test.toml", Path::new("")).unwrap()
+}
+
+/// The paper, with the true parameters walking as the filter assumes, at a fidelity.
+fn paper(fidelity: Fidelity) -> Scenario {
+    let mut scenario = scenario(PAPER);
+    scenario.let_truth_walk_as_assumed();
+    scenario.fidelity = fidelity;
+    scenario
+}
+
+fn summary(scenario: Scenario, runs: u32) -> Summary {
+    monte_carlo::run(&Simulation::new(scenario), 0, runs).unwrap()
+}
+
+/// An ideal sensor and servo and 1 mm ticks through pins give the statistics of the ideal run.
+///
+/// How equality is tested: for each state the errors at the end are divided by the run's own
+/// bound, for the pins have no fix at the very end, which the ideal run has. A deviation of n
+/// normal draws has a relative sampling error of 1/√(2n), so the logarithm of the quotient of two
+/// has 1/√n; the difference of two means has √2/√n deviations. Both must be within four of that,
+/// which 12 equal quantities all are with a probability of 0.9992. What the pins add to an ideal
+/// encoder is known, and added: each wheel's last tick is rounded, by 1 mm/√12.
+#[test]
+fn pins_with_ideal_hardware_have_the_statistics_of_the_ideal_run() {
+    const RUNS: u32 = 200;
+    let (ideal, pins) =
+        (summary(paper(Fidelity::Ideal), RUNS), summary(paper(Fidelity::Pins), RUNS));
+    let tolerance = 4.0 / f64::from(RUNS).sqrt();
+    let rounding = [0.0, 0.0, 1e-3 * (2.0_f64 / 12.0).sqrt() / 0.35, 0.0, 0.0, 0.0];
+    let states = ideal.states.iter().zip(&pins.states).zip(rounding);
+    for ((ideal, pins), rounding) in states {
+        let expected = ideal.std_error.hypot(rounding) / ideal.bound;
+        let spread = (pins.std_error / pins.bound) / expected;
+        assert!(spread.ln().abs() < tolerance, "{}: spread {spread}", ideal.name);
+        let shift = (pins.mean_error - ideal.mean_error) / ideal.std_error;
+        assert!(shift.abs() < 2.0_f64.sqrt() * tolerance, "{}: shift {shift}", ideal.name);
+    }
+    // NEES of six states: deviation √12 in each run.
+    let nees = (ideal.nees_mean - pins.nees_mean) / 12.0_f64.sqrt();
+    assert!(nees.abs() < 2.0_f64.sqrt() * tolerance, "NEES {} {}", ideal.nees_mean, pins.nees_mean);
+    assert_eq!((pins.lost_runs, pins.fixes.refused), (0, 0));
+}
+
+/// RMS error of x and y over the run, and NIS, with an SG90, looking at the walls ahead and behind.
+fn stamped(stamp: Stamp) -> (f64, f64) {
+    let mut scenario = paper(Fidelity::Pins);
+    scenario.hardware.servo = ServoName::Sg90;
+    scenario.robot.config.policy = Policy::Informative;
+    let mut simulation = Simulation::new(scenario);
+    simulation.stamp = stamp;
+    let summary = monte_carlo::run(&simulation, 0, 40).unwrap();
+    (summary.rms_path.x.hypot(summary.rms_path.y), summary.nis_mean)
+}
+
+/// With a real servo and flight time, an echo that is taken for news of the instant of its arrival
+/// costs; taken for that of its reflection, it does not.
+#[test]
+fn a_naive_stamp_costs_and_that_of_the_reflection_does_not() {
+    let (naive, naive_nis) = stamped(Stamp::Arrival);
+    let (reflection, nis) = stamped(Stamp::Reflection);
+    let mut ideal = paper(Fidelity::Ideal);
+    ideal.robot.config.policy = Policy::Informative;
+    let ideal = summary(ideal, 40).rms_path;
+    let ideal = ideal.x.hypot(ideal.y);
+    println!(
+        "RMS along the way: ideal {ideal:.5} m; pins, reflection {reflection:.5} m (NIS {nis:.3}), arrival {naive:.5} m (NIS {naive_nis:.3})"
+    );
+    assert!(reflection < 1.25 * ideal, "{reflection} {ideal}");
+    assert!(naive > 1.5 * reflection, "{naive} {reflection}");
+    assert!((nis - 1.0).abs() < 0.05 && naive_nis > 1.5, "{nis} {naive_nis}");
+}
+
+/// 20 minutes 48 seconds through pins take less than half a second of CPU. Measured 0.015 s
+/// (release); tests carry debug assertions.
+#[test]
+fn twenty_minutes_take_less_than_half_a_second() {
+    let simulation = Simulation::new(paper(Fidelity::Pins));
+    let start = ThreadTime::now();
+    simulation.run(0, &mut ()).unwrap();
+    assert!(start.elapsed().as_secs_f64() < 0.5, "{:?}", start.elapsed());
+}
+
+/// The classroom, with fewer seeds than `sonarfix run` has: none lost, position RMS below 30 mm,
+/// the filter consistent.
+#[test]
+fn the_classroom_is_crossed() {
+    const RUNS: u32 = 25;
+    let summary = summary(scenario(CLASSROOM), RUNS);
+    let position = summary.rms_path.x.hypot(summary.rms_path.y);
+    assert_eq!(summary.lost_runs, 0);
+    assert!(position < 0.030, "{position}");
+    // Seven states: deviation √14 of each run's NEES.
+    let sampling = (14.0 / f64::from(RUNS)).sqrt();
+    assert!((summary.nees_mean - 7.0).abs() < 4.0 * sampling, "{}", summary.nees_mean);
+}
+
+/// What the classroom is about does happen in it: every kind of echo is met, what is no wall is
+/// gated, and the temperature is found.
+#[test]
+fn the_classroom_holds_what_it_promises() {
+    let simulation = Simulation::new(scenario(CLASSROOM));
+    let mut trace = Trace::default();
+    simulation.run(1, &mut trace).unwrap();
+    let met = |is: fn(Source) -> bool| {
+        trace.fixes.iter().filter(move |fix| fix.met.is_some_and(is)).collect::<Vec<_>>()
+    };
+    assert!(met(|source| matches!(source, Source::Wall(_))).len() > 500);
+    let obstacles = met(|source| source == Source::Obstacle);
+    assert!(obstacles.len() > 30, "{}", obstacles.len());
+    let gated = obstacles.iter().filter(|fix| fix.outcome == Outcome::Gated).count();
+    assert!(2 * gated > obstacles.len(), "{gated} of {}", obstacles.len());
+    assert!(!met(|source| source == Source::Outlier).is_empty());
+    let last = trace.ticks.last().unwrap().estimate;
+    // 15 °C and not 20 °C: 0.89 % too long.
+    assert!((simulation.range_scale() - 0.0089).abs() < 1e-4);
+    let apart = (last.calibration.range_scale - simulation.range_scale()) / last.deviation[6];
+    assert!(apart.abs() < 4.0, "{apart}");
+}
+
+/// A closed loop steers by the estimate: the robot is where it believes its path to be.
+#[test]
+fn a_closed_loop_keeps_to_its_path() {
+    let simulation = Simulation::new(scenario(CLASSROOM));
+    let mut trace = Trace::default();
+    simulation.run(2, &mut trace).unwrap();
+    let plan = simulation.scenario.path.plan();
+    for corner in &plan.corners {
+        let nearest = trace
+            .ticks
+            .iter()
+            .filter_map(|tick| tick.truth)
+            .map(|truth| (truth.pose.x - corner[0]).hypot(truth.pose.y - corner[1]));
+        let nearest = nearest.fold(f64::INFINITY, f64::min);
+        assert!(nearest < 0.05, "{nearest} m off {corner:?}");
+    }
+}
