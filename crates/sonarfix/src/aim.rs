@@ -4,10 +4,11 @@
 //! A wall counts if
 //! - the foot of the perpendicular from the sonar lies on it, and its range within the sonar's,
 //! - the servo can turn to it,
-//! - nothing stands before it, and nothing nearer inside the cone would answer first,
+//! - nothing stands before it, and nothing nearer inside the cone would answer first.
 //!
-//! and if all that stays so when the pose is wrong by its own uncertainty
-//! ([`Trust::confidence`](crate::config::Trust::confidence) standard deviations).
+//! The first holds when the position is wrong by its own uncertainty
+//! ([`Trust::confidence`](crate::config::Trust::confidence) standard deviations), the cone when the
+//! heading is.
 //!
 //! # Non-finite policy
 //! The filter's state is finite, and every comparison here is written so that NaN would not
@@ -30,7 +31,7 @@ pub struct Aim {
     pub wall: WallId,
     /// Where the servo is to point, relative to the robot's heading.
     pub bearing: Radians,
-    /// The range to expect.
+    /// The range to expect now. A fix computes its own, at the pose it is taken from.
     pub range: Metres,
 }
 

@@ -47,7 +47,8 @@ impl core::fmt::Display for StartError {
 
 impl core::error::Error for StartError {}
 
-/// Why a wheel travel was refused.
+/// Why a wheel travel was refused. It is not part of the estimate then: a caller that believes in
+/// it adds it to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum OdometryError {

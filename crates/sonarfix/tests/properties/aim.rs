@@ -233,12 +233,20 @@ proptest! {
     #[test]
     fn the_best_wall_that_counts_is_chosen(
         config in any_config(), sights in proptest::collection::vec(any_sight(), 1..7), heading in -3.1_f32..3.1,
-        deviation in 0.005_f32..0.1, drive in (-0.05_f32..0.05, -0.05_f32..0.05, 0_u8..20), askew in -3.1_f32..3.1,
+        deviation in 0.005_f32..0.3, drive in (-0.05_f32..0.05, -0.05_f32..0.05, 0_u8..20), askew in -3.1_f32..3.1,
+        fixes in 0_u8..4,
     ) {
         let ends: Vec<_> = sights.iter().map(|s| s.ends(Point::default())).collect();
         let walls: Vec<_> = ends.iter().map(|e| Wall::new(e.0, e.1).unwrap()).collect();
         let pose = Pose::new(0.0, 0.0, Radians(heading));
-        let localizer = started(config, &walls, pose, deviation, drive);
+        let mut localizer = started(config, &walls, pose, deviation, drive);
+        // Fixes make the position sharp along one line and leave it blunt along the other.
+        for _ in 0..fixes {
+            if let Ok(aim) = localizer.aim() {
+                prop_assert!(matches!(localizer.fix(&aim, Some(aim.range)), Fix::Accepted(_)));
+            }
+        }
+        let localizer = localizer;
         let rules = Rules::new(&localizer, &ends);
         let sure = f64::from(config.sonar.cone.0) - rules.heading_doubt();
         prop_assume!(sure.abs() > 1e-4);
@@ -276,14 +284,18 @@ proptest! {
     #[test]
     fn in_a_room_the_policy_decides(
         room in any_room(), mount in any_mount(), policy in any_policy(), deviation in 0.005_f32..0.05,
-        drive in (-0.04_f32..0.04, -0.04_f32..0.04, 0_u8..10),
+        drive in (-0.04_f32..0.04, -0.04_f32..0.04, 0_u8..10), fixes in 0_u8..3,
     ) {
         let mut config = config_for_rooms(mount);
         config.policy = policy;
         // Turning on the spot must not make the heading less certain than the cone is wide.
         config.prior.track_width = Metres(0.002);
         let walls = room.walls();
-        let localizer = started(config, &walls, room.robot, deviation, drive);
+        let mut localizer = started(config, &walls, room.robot, deviation, drive);
+        for _ in 0..fixes {
+            let aim = localizer.aim().unwrap();
+            prop_assert!(matches!(localizer.fix(&aim, Some(aim.range)), Fix::Accepted(_)));
+        }
         let ends: Vec<_> = walls.iter().map(|w| (w.from(), w.to())).collect();
         let rules = Rules::new(&localizer, &ends);
         is_best(&rules, &[0, 1, 2, 3], |wall| rules.score(wall), localizer.aim())?;
@@ -350,6 +362,32 @@ proptest! {
         let aim = localizer.aim();
         prop_assert_eq!(aim.is_ok(), inward > 0.06, "{:?}", aim);
         prop_assert!(aim.is_ok() || aim == Err(NoAim::NoWall));
+    }
+
+    /// The uncertainty that counts is that along the wall for its ends, across it for its range.
+    /// After a fix of a slanted wall it is millimetres across that, and as before along it.
+    #[test]
+    fn the_uncertainty_along_and_across_a_wall_is_told_apart(direction in -3.1_f32..3.1, inward in 0.01_f32..0.6, deviation in 0.1_f32..0.15) {
+        let config = config_for_rooms(Point::default());
+        let sight = |direction, foot| Sight { direction, distance: 2.0, foot, length: 4.0, flipped: false };
+        // The second wall stands square to the first, which makes sharp what is along the second;
+        // the foot on it is `inward` metres from its end.
+        let square = direction + core::f32::consts::FRAC_PI_2;
+        let walls = [sight(direction, 0.5), sight(square, inward / 4.0)].map(|s| s.wall(Point::default()));
+        let blunt = started(config, &walls, Pose::default(), deviation, (0.0, 0.0, 0));
+        let mut sharp = blunt.clone();
+        let aim = sharp.aim_at(Radians(direction)).unwrap();
+        prop_assert_eq!(aim.wall, WallId(0));
+        prop_assert!(matches!(sharp.fix(&aim, Some(aim.range)), Fix::Accepted(_)));
+        // 3 σ: of the start, and of the noise of a range of 2 m (6 mm, and 1 % for its scale).
+        prop_assume!((inward - 3.0 * deviation).abs() > 1e-3 && (inward - 0.065).abs() > 0.01);
+        let bearing = Radians(square);
+        prop_assert_eq!(blunt.aim_at(bearing).is_ok(), inward > 3.0 * deviation);
+        prop_assert_eq!(sharp.aim_at(bearing).is_ok(), inward > 0.065);
+        // Along the first nothing was learnt.
+        let deviations = sharp.filter().covariance();
+        let trace = deviations[(0, 0)] + deviations[(1, 1)];
+        prop_assert!((trace - deviation * deviation) < 0.1 * deviation * deviation);
     }
 
     /// Out of range, with the uncertainty of the distance.

@@ -254,26 +254,24 @@ pub fn bearable(p: &Matrix, h: &Row, r: f64) -> Option<f64> {
     (along > least).then(|| r.max(along * least / (along - least)))
 }
 
-/// The smallest eigenvalue of the correlation matrix of those states that are not known exactly,
-/// or a variance that is not positive.
-pub fn least_correlation_eigenvalue(p: &Matrix) -> f64 {
-    let mut c = Matrix::identity();
-    for i in 0..7 {
-        for j in 0..7 {
-            let known = |i: usize| p.row(i).iter().all(|v| *v == 0.0);
-            if i == j || known(i) || known(j) {
-                continue;
-            }
-            c[(i, j)] = p[(i, j)] / (p[(i, i)] * p[(j, j)]).sqrt();
+/// The correlations of those states that are not known exactly; 1 on the diagonal of the others.
+pub fn correlations(p: &Matrix) -> Matrix {
+    let known = |i: usize| p.row(i).iter().all(|v| *v == 0.0);
+    Matrix::from_fn(|i, j| {
+        if i == j || known(i) || known(j) {
+            f64::from(u8::from(i == j))
+        } else {
+            p[(i, j)] / (p[(i, i)] * p[(j, j)]).sqrt()
         }
-        if p[(i, i)] < 0.0 {
-            return p[(i, i)];
-        }
-    }
-    if c.iter().any(|v| !v.is_finite()) {
-        return f64::NAN;
-    }
-    c.symmetric_eigenvalues().min()
+    })
+}
+
+/// Whether every eigenvalue of the correlations is positive: then, and only then, Cholesky's
+/// factorisation exists. In `f64` it tells from 1e-15 on, and unlike the eigenvalues themselves it
+/// takes no iteration that might not converge.
+pub fn is_positive_definite(p: &Matrix) -> bool {
+    let variances_are_sound = p.diagonal().iter().all(|v| *v >= 0.0);
+    variances_are_sound && correlations(p).cholesky().is_some()
 }
 
 /// H P Hᵀ.
