@@ -58,30 +58,32 @@ fn pins_with_ideal_hardware_have_the_statistics_of_the_ideal_run() {
     assert_eq!((pins.lost_runs, pins.fixes.refused), (0, 0));
 }
 
-/// RMS error of x and y over the run, and NIS, with an SG90, looking at the walls ahead and behind.
-fn stamped(stamp: Stamp) -> (f64, f64) {
+/// RMS error of x and y over the run, NIS and runs lost, with an SG90, looking at the walls ahead
+/// and behind.
+fn stamped(stamp: Stamp) -> (f64, f64, usize) {
     let mut scenario = paper(Fidelity::Pins);
     scenario.hardware.servo = ServoName::Sg90;
     scenario.robot.config.policy = Policy::Informative;
     let mut simulation = Simulation::new(scenario);
     simulation.stamp = stamp;
     let summary = monte_carlo::run(&simulation, 0, 40).unwrap();
-    (summary.rms_path.x.hypot(summary.rms_path.y), summary.nis_mean)
+    (summary.rms_path.x.hypot(summary.rms_path.y), summary.nis_mean, summary.lost_runs)
 }
 
 /// With a real servo and flight time, an echo that is taken for news of the instant of its arrival
 /// costs; taken for that of its reflection, it does not.
 #[test]
 fn a_naive_stamp_costs_and_that_of_the_reflection_does_not() {
-    let (naive, naive_nis) = stamped(Stamp::Arrival);
-    let (reflection, nis) = stamped(Stamp::Reflection);
+    let (naive, naive_nis, naive_lost) = stamped(Stamp::Arrival);
+    let (reflection, nis, lost) = stamped(Stamp::Reflection);
     let mut ideal = paper(Fidelity::Ideal);
     ideal.robot.config.policy = Policy::Informative;
     let ideal = summary(ideal, 40).rms_path;
     let ideal = ideal.x.hypot(ideal.y);
-    println!(
-        "RMS along the way: ideal {ideal:.5} m; pins, reflection {reflection:.5} m (NIS {nis:.3}), arrival {naive:.5} m (NIS {naive_nis:.3})"
-    );
+    println!("RMS along the way: ideal {ideal:.5} m");
+    println!("reflection {reflection:.5} m, NIS {nis:.3}, lost {lost}");
+    println!("arrival {naive:.5} m, NIS {naive_nis:.3}, lost {naive_lost}");
+    assert_eq!(lost, 0);
     assert!(reflection < 1.25 * ideal, "{reflection} {ideal}");
     assert!(naive > 1.5 * reflection, "{naive} {reflection}");
     assert!((nis - 1.0).abs() < 0.05 && naive_nis > 1.5, "{nis} {naive_nis}");
