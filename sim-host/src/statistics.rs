@@ -75,7 +75,7 @@ pub struct RunResult {
     pub nees: f64,
     /// How many states that counts.
     pub estimated_states: usize,
-    /// Of all innovations of the run.
+    /// Of the ranges accepted.
     pub nis: NisSum,
     /// Along the way.
     pub path: PathSum,
@@ -145,7 +145,7 @@ pub struct Summary {
     pub nees_mean: f64,
     /// How many states the NEES counts.
     pub nees_states: usize,
-    /// Mean of ν²/S over all innovations: 1 for a consistent filter.
+    /// Mean of ν²/S over the accepted ranges: 1 for a consistent filter with a wide gate.
     pub nis_mean: f64,
     /// Processor time of the runs, all cores together.
     pub cpu_seconds: f64,

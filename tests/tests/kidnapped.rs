@@ -2,7 +2,6 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::StandardNormal;
 use sonarfix::config::Config;
 use sonarfix::health::Verdict;
 use sonarfix::localizer::{Localizer, Start};
@@ -10,7 +9,8 @@ use sonarfix::map::Map;
 use sonarfix::motion::WheelTravel;
 use sonarfix::pose::Pose;
 use sonarfix::units::{Instant, Metres, Radians};
-use sonarfix_map::Floor;
+use sonarfix_map::{Floor, Scenario};
+use sonarfix_sim::world::sensor::SensorModel;
 use sonarfix_sim::world::{Ping, World};
 
 /// A room of 6 m × 8 m with a partition.
@@ -35,11 +35,13 @@ const SHARE: f64 = 0.95;
 /// A robot that turns on the spot so slowly that every look is square, for ease of the truth.
 struct Trial<'a> {
     world: &'a World,
+    sensor: &'a SensorModel,
     localizer: Localizer<'a>,
     /// x, y, heading.
     truth: [f64; 3],
     now: u64,
-    rng: ChaCha8Rng,
+    noise: ChaCha8Rng,
+    luck: ChaCha8Rng,
 }
 
 impl Trial<'_> {
@@ -60,14 +62,14 @@ impl Trial<'_> {
             self.localizer.skip();
             return self.localizer.health().verdict;
         };
-        let echo = self.world.first_echo(&Ping {
-            from: [self.truth[0], self.truth[1]],
-            direction: self.truth[2] + f64::from(aim.bearing.0),
-            cone: 15_f64.to_radians(),
-            reach: (0.05, 4.0),
-        });
-        let noise = 0.005 * self.rng.sample::<f64, _>(StandardNormal);
-        let range = echo.map(|echo| Metres((echo.distance + noise) as f32));
+        let [x, y, heading] = self.truth;
+        let ping = Ping {
+            time: 0.0,
+            sonar_after: &|_| [x, y],
+            direction: heading + f64::from(aim.bearing.0),
+        };
+        let echo = self.world.echo(&ping, self.sensor, &mut self.noise, &mut self.luck);
+        let range = echo.map(|echo| Metres(echo.range as f32));
         let _ = self.localizer.fix(&aim, range);
         self.localizer.health().verdict
     }
@@ -77,6 +79,11 @@ impl Trial<'_> {
 fn fixes_until_lost() -> Vec<usize> {
     let floor = Floor::parse(ROOM, "room.toml").unwrap();
     let (walls, world) = (floor.walls(), World::new(&floor));
+    // An ideal sonar with a noise of 5 mm, that hears up to 4 m.
+    let mut scenario = Scenario::paper().unwrap();
+    scenario.truth.range_noise = 0.005;
+    scenario.robot.config.sonar.max_range = Metres(4.0);
+    let sensor = SensorModel::ideal(&scenario);
     let trial = |seed| {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         // Anywhere in the southern part, so that a metre off still is inside the room.
@@ -90,11 +97,13 @@ fn fixes_until_lost() -> Vec<usize> {
         let config = Config::for_track_width(Metres(0.2));
         let map = Map::new(&walls);
         let localizer = Localizer::new(config, map, start, Instant::from_ticks(0)).unwrap();
-        let mut trial = Trial { world: &world, localizer, truth, now: 0, rng };
+        let away: f64 = rng.random_range(-3.0..3.0);
+        let luck = rng.clone();
+        let (world, sensor) = (&world, &sensor);
+        let mut trial = Trial { world, sensor, localizer, truth, now: 0, noise: rng, luck };
         for _ in 0..20 {
             assert_eq!(trial.go_on(), Verdict::Tracking, "before it is picked up");
         }
-        let away: f64 = trial.rng.random_range(-3.0..3.0);
         trial.truth[0] += away.cos();
         trial.truth[1] += away.sin();
         trial.truth[2] += std::f64::consts::FRAC_PI_2;

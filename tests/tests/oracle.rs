@@ -51,7 +51,7 @@ fn drive(policy: Policy, range_scale_prior: f32, seed: u64) -> Difference {
     let model = Model::of(&config);
     let walls = scenario.floor.walls();
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let mut plant = Plant::new(&scenario.path, &scenario.truth, model.track_width);
+    let mut plant = Plant::new(&scenario, 0.0);
 
     let start = Start {
         pose: Pose::new(0.001, -0.001, Radians(std::f32::consts::FRAC_PI_2)),

@@ -289,17 +289,14 @@ impl<'m> Robot<'m> {
             return;
         }
         let aimed = self.localizer.aim();
-        match aimed {
-            Ok(aim) => {
-                let turned = hardware.servo().point(now, aim.bearing);
-                // If it does not turn, its last bearing will do.
-                report.faults.servo += u32::from(turned.is_err());
-                self.cycle = Cycle::Turning;
-            }
-            Err(_) => {
-                self.localizer.skip();
-                self.rest(now, false);
-            }
+        if let Ok(aim) = aimed {
+            let turned = hardware.servo().point(now, aim.bearing);
+            // If it does not turn, its last bearing will do.
+            report.faults.servo += u32::from(turned.is_err());
+            self.cycle = Cycle::Turning;
+        } else {
+            self.localizer.skip();
+            self.rest(now, false);
         }
         report.aimed = Some(aimed);
     }

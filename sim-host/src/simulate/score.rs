@@ -85,10 +85,7 @@ impl<'a> Score<'a> {
                     self.bound.fixed(line);
                 }
             }
-            Fix::Gated(innovation) => {
-                counts.gated += 1;
-                self.nis.add(innovation.nis().into());
-            }
+            Fix::Gated(_) => counts.gated += 1,
             Fix::Refused(_) => counts.refused += 1,
         }
     }
