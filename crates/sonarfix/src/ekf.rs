@@ -36,6 +36,9 @@ pub use crate::state::{STATES, State};
 /// robot, at 2⁻¹⁵ it does not).
 const SHARPEST: f32 = 1.0 / 16_384.0;
 
+/// What the rounding of a sum of a few terms is worth, as a share of them: four times 2⁻²⁴.
+const ROUNDING: f32 = 1.0 / 4_194_304.0;
+
 /// What the filter refuses to compute with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -403,17 +406,20 @@ fn propagated(p: &Covariance, step: &Step) -> Covariance {
     // Each entry is added to once, with its whole change: it may be far larger, and rounds.
     let along_x = |m: f32, s: f32| swing_x * m + cos * s;
     let along_y = |m: f32, s: f32| swing_y * m + sin * s;
+    // A way's variance is a sum that may cancel to nothing, but must not round to less.
+    let rounding_x = ROUNDING * (swing_x * swing_x * mm + cos * cos * ss);
+    let rounding_y = ROUNDING * (swing_y * swing_y * mm + sin * sin * ss);
     let (cm, dm) = (p.hc + 0.5 * tc, p.hd + 0.5 * td);
     let (wm, km) = (p.hw + 0.5 * tw, p.hk + 0.5 * tk);
     Covariance {
-        xx: p.xx + (2.0 * along_x(xm, xs) + along_x(ways_xm, ways_xs)),
+        xx: p.xx + (2.0 * along_x(xm, xs) + along_x(ways_xm, ways_xs) + rounding_x),
         xy: p.xy + (along_x(ym, ys) + along_y(xm + ways_xm, xs + ways_xs)),
         xh: p.xh + (xt + along_x(m_new, s_new)),
         xc: p.xc + along_x(cm, sc),
         xd: p.xd + along_x(dm, sd),
         xw: p.xw + along_x(wm, sw),
         xk: p.xk + along_x(km, sk),
-        yy: p.yy + (2.0 * along_y(ym, ys) + along_y(ways_ym, ways_ys)),
+        yy: p.yy + (2.0 * along_y(ym, ys) + along_y(ways_ym, ways_ys) + rounding_y),
         yh: p.yh + (yt + along_y(m_new, s_new)),
         yc: p.yc + along_y(cm, sc),
         yd: p.yd + along_y(dm, sd),

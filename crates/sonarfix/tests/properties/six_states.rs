@@ -12,7 +12,8 @@ use sonarfix::units::{Metres, Radians, SquareMetres};
 
 use crate::strategies::{Event, any_deviation, any_drive, any_event, any_state, bits};
 
-/// The crate's own, eq. (17).
+/// The crate's own, eqs. (9) and (17).
+const ROUNDING: f32 = 1.0 / 4_194_304.0;
 const SHARPEST: f32 = 1.0 / 16_384.0;
 
 /// A filter that has never heard of a range scale: the equations of the crate, in the crate's
@@ -101,7 +102,10 @@ impl SixStates {
         for axis in 0..2 {
             let ways_m = along(axis, mm, ms);
             let ways_s = swing[axis] * ms + ahead[axis] * ss;
-            new[axis][axis] += 2.0 * along(axis, m[axis], s[axis]) + along(axis, ways_m, ways_s);
+            let rounding =
+                ROUNDING * (swing[axis] * swing[axis] * mm + ahead[axis] * ahead[axis] * ss);
+            new[axis][axis] +=
+                2.0 * along(axis, m[axis], s[axis]) + along(axis, ways_m, ways_s) + rounding;
             if axis == 0 {
                 new[0][1] += along(0, m[1], s[1]) + along(1, m[0] + ways_m, s[0] + ways_s);
             }
