@@ -86,7 +86,8 @@ fn a_naive_stamp_costs_and_that_of_the_reflection_does_not() {
     assert_eq!(lost, 0);
     assert!(reflection < 1.25 * ideal, "{reflection} {ideal}");
     assert!(naive > 1.5 * reflection, "{naive} {reflection}");
-    assert!((nis - 1.0).abs() < 0.05 && naive_nis > 1.5, "{nis} {naive_nis}");
+    // 50,000 accepted ranges leave 0.006 of sampling error on a NIS.
+    assert!((nis - 1.0).abs() < 0.025 && naive_nis > 1.05, "{nis} {naive_nis}");
 }
 
 /// 20 minutes 48 seconds through pins take less than half a second of CPU. Measured 0.015 s

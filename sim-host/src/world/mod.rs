@@ -147,7 +147,14 @@ impl World {
         }
         let (distance, off_axis) =
             (distance(from, met), angle::wrap(direction(from, met) - ping.direction));
-        Some(Reflector { source: Source::Wall(wall), distance, off_axis, audible: 1.0 })
+        let (nearest, farthest) = sensor.reach;
+        let in_reach = distance >= nearest && distance <= farthest;
+        in_reach.then_some(Reflector {
+            source: Source::Wall(wall),
+            distance,
+            off_axis,
+            audible: 1.0,
+        })
     }
 
     /// The wall that the beam's axis meets first, and where.

@@ -197,4 +197,22 @@ proptest! {
         let echo = heard(&room(&walls), &noiseless(), aside, 0);
         prop_assert_eq!(echo.map(|echo| echo.range.to_bits()), Some(nearest.to_bits()));
     }
+
+    /// Whatever stands where, a real sensor reports nothing from beyond its reach but by its noise
+    /// and its bias, and never stops the simulation.
+    #[test]
+    fn a_real_sonar_stays_within_its_reach(
+        x in 0.01_f64..4.0, length in 0.1_f64..9.0, axis in -3.1_f64..3.1, seed: u64,
+    ) {
+        let world = room(&[([x, -length], [x, 0.5 * length]), ([-4.0, 1.0], [4.0, 1.2])]);
+        for sensor in [SensorModel::nxt(), SensorModel::hc_sr04()] {
+            let (nearest, farthest) = sensor.reach;
+            for repeat in 0..20 {
+                if let Some(echo) = heard(&world, &sensor, axis, seed.wrapping_add(repeat)) {
+                    prop_assert!((nearest..=farthest).contains(&echo.distance), "{echo:?}");
+                    prop_assert!((echo.range - echo.distance).abs() < farthest, "{echo:?}");
+                }
+            }
+        }
+    }
 }
