@@ -44,10 +44,11 @@ impl Claim {
         self.longest_silence
     }
 
-    /// Whether the run ended with the error outside and health saying `Tracking`.
+    /// For how long, when the run ended, the error had been outside and health had said
+    /// `Tracking`, seconds.
     #[must_use]
-    pub fn is_silent_at_the_end(&self) -> bool {
-        self.silence > 0.0
+    pub fn silence_at_the_end(&self) -> f64 {
+        self.silence
     }
 
     /// The largest error of the position, metres.
@@ -102,8 +103,8 @@ mod tests {
         assert!((claim.longest_silence() - 1.0).abs() < 1e-12, "{claim:?}");
         assert!((claim.share_outside() - 5.0 / 6.0).abs() < 1e-12);
         assert!((claim.worst() - 0.2).abs() < 1e-12);
-        assert!(!claim.holds_at_the_end() && !claim.is_silent_at_the_end());
-        assert!(taken(&[(0.08, Tracking)]).is_silent_at_the_end());
+        assert!(!claim.holds_at_the_end() && claim.silence_at_the_end() == 0.0);
+        assert!(taken(&[(0.08, Tracking)]).silence_at_the_end() > 0.0);
         assert!(taken(&[(0.08, Lost), (0.01, Degraded)]).holds_at_the_end());
         assert!(!taken(&[(0.01, Lost)]).holds_at_the_end());
     }

@@ -51,13 +51,14 @@ fn the_robot_recovers_from_what_leaves_it_its_odometry() {
     }
 }
 
-/// Whatever fails, no run ends with the robot elsewhere than it claims and health content.
+/// Whatever fails, no run ends with the robot elsewhere than it claims and health content for longer
+/// than the 15 looks, one each half second, that health may need to judge (tests/kidnapped.rs).
 #[test]
 fn no_run_ends_in_a_silent_error() {
     for row in ROWS.iter() {
         for (seed, result) in row.results.iter().enumerate() {
-            let is_silent = result.claim.is_silent_at_the_end();
-            assert!(!is_silent, "{}, seed {seed}: {:?}", row.name, result.claim);
+            let silence = result.claim.silence_at_the_end();
+            assert!(silence <= 7.5, "{}, seed {seed}: {:?}", row.name, result.claim);
         }
     }
     // There is something to be silent about: these faults do lead the robot astray.
