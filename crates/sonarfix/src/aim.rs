@@ -8,7 +8,7 @@
 //!
 //! The first holds when the position is wrong by its own uncertainty
 //! ([`Trust::confidence`](crate::config::Trust::confidence) standard deviations), the cone when the
-//! heading is.
+//! heading is; where that leaves nothing of the cone, two standard deviations must do.
 //!
 //! # Non-finite policy
 //! The filter's state is finite, and every comparison here is written so that NaN would not
@@ -56,6 +56,14 @@ impl core::fmt::Display for NoAim {
 
 impl core::error::Error for NoAim {}
 
+/// Standard deviations of the heading that must lie inside the cone for a look to be worth it,
+/// however much confidence is asked for. 19 looks of 20 are square then, and the gate is there for
+/// the other; not to look has no way back. (A first turn of 180° with a track width known to 3 %
+/// leaves 5°, and three times that is more than most cones.)
+const LEAST_CONFIDENCE: f32 = 2.0;
+/// The share of the cone in which a beam counts as square then.
+const LEAST_CLEAR: f32 = 0.25;
+
 /// Why a wall cannot be measured, apart from what stands before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Unfit {
@@ -70,7 +78,8 @@ pub(crate) struct Viewpoint<'a> {
     /// Where the sonar is, by the estimate.
     position: Point,
     heading: Heading,
-    /// What of the cone is left when the heading is wrong by its uncertainty; negative if nothing.
+    /// What of the cone is left when the heading is wrong by its uncertainty; not positive if the
+    /// heading is too uncertain to look.
     clear_cone: Radians,
     /// The cone, widened by the heading's uncertainty: what may answer.
     wide_cone: Radians,
@@ -83,13 +92,17 @@ impl<'a> Viewpoint<'a> {
         let sonar = &config.sonar;
         let confidence = config.trust.confidence;
         let pose = ekf.state().pose();
-        let doubt = Radians(confidence * ekf.deviation().heading);
+        let sigma = Radians(ekf.deviation().heading);
+        let doubt = sigma * confidence;
+        let clear = sonar.cone - doubt;
+        let is_bearable = sigma * LEAST_CONFIDENCE < sonar.cone;
+        let least = sonar.cone * if is_bearable { LEAST_CLEAR } else { 0.0 };
         Self {
             ekf,
             sonar,
             position: pose.to_map(sonar.mount),
             heading: pose.heading,
-            clear_cone: sonar.cone - doubt,
+            clear_cone: if clear > least { clear } else { least },
             wide_cone: sonar.cone + doubt,
             confidence_squared: confidence * confidence,
             covariance: ekf.position_covariance(),

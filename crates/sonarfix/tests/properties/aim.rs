@@ -40,7 +40,19 @@ impl Rules {
     }
 
     fn heading_doubt(&self) -> f64 {
-        self.confidence() * self.p[(HEADING, HEADING)].sqrt()
+        self.confidence() * self.heading_deviation()
+    }
+
+    fn heading_deviation(&self) -> f64 {
+        self.p[(HEADING, HEADING)].sqrt()
+    }
+
+    /// What of the cone is left for a beam to be square in; negative if it is not to look.
+    fn clear_cone(&self) -> f64 {
+        let cone = f64::from(self.config.sonar.cone.0);
+        let clear = cone - self.heading_doubt();
+        // However much confidence is asked for, two standard deviations must do.
+        if 2.0 * self.heading_deviation() < cone { clear.max(0.25 * cone) } else { clear }
     }
 
     fn sonar(&self) -> (f64, f64) {
@@ -248,7 +260,7 @@ proptest! {
         }
         let localizer = localizer;
         let rules = Rules::new(&localizer, &ends);
-        let sure = f64::from(config.sonar.cone.0) - rules.heading_doubt();
+        let sure = rules.clear_cone();
         prop_assume!(sure.abs() > 1e-4);
         if sure < 0.0 {
             prop_assert_eq!(localizer.aim(), Err(NoAim::HeadingUncertain));
@@ -426,7 +438,8 @@ proptest! {
         let walls = room.walls();
         let start = Start { heading_deviation: Radians(deviation), ..room.start() };
         let mut localizer = Localizer::new(config, Map::new(&walls), start, Instant::from_ticks(0)).unwrap();
-        let sure = config.sonar.cone.0 - 3.0 * deviation;
+        // However much confidence is asked for (here 3), two standard deviations must do.
+        let sure = config.sonar.cone.0 - 2.0 * deviation;
         prop_assume!(sure.abs() > 1e-4);
         let aim = localizer.aim();
         prop_assert_eq!(aim.is_ok(), sure > 0.0);
