@@ -161,15 +161,22 @@ fn errors(s: &Summary) -> Table {
 fn errors_note(s: &Summary) -> String {
     let at = |time: Option<f64>| cell(time, |t| format!("at {t:.1} s"));
     let never = |time: Option<f64>| time.map_or("never".to_owned(), |_| at(time));
-    let reference = match s.reference_rows {
-        0 => "no reference".to_owned(),
-        rows => format!("{rows} rows of the reference"),
+    let (reference, honesty) = match s.reference_rows {
+        0 => ("no reference".to_owned(), String::new()),
+        rows => (
+            format!("{rows} rows of the reference"),
+            format!(
+                "; half a metre off {}, beyond 3σ {} ({} of the rows)",
+                never(s.honesty.astray_at),
+                never(s.honesty.beyond_three_sigma_at),
+                cell(s.honesty.beyond_three_sigma, |share| format!("{:.1} %", 100.0 * share)),
+            ),
+        ),
     };
     format!(
         "{reference}; {:.1} m in {:.1} s; ranges accepted {}, gated {}, refused {}; \
          lines skipped {} of {};\n\
-         the localizer said degraded {} ({:.1} s in all), lost {} ({:.1} s in all); \
-         half a metre off {}, beyond 3σ {} ({} of the rows)",
+         the localizer said degraded {} ({:.1} s in all), lost {} ({:.1} s in all){honesty}",
         s.distance,
         s.duration,
         s.fixes.accepted,
@@ -181,9 +188,6 @@ fn errors_note(s: &Summary) -> String {
         s.health.degraded_seconds,
         never(s.health.lost_at),
         s.health.lost_seconds,
-        never(s.honesty.astray_at),
-        never(s.honesty.beyond_three_sigma_at),
-        cell(s.honesty.beyond_three_sigma, |share| format!("{:.1} %", 100.0 * share)),
     )
 }
 
