@@ -7,6 +7,7 @@
 )]
 
 mod common;
+mod skipped;
 
 use common::{Endless, MAP, ROBOT, Sonar, second};
 use sonarfix_map::{Floor, Robot};
@@ -43,7 +44,7 @@ fn replay(seconds: u32) {
 fn seventy_five_minutes_take_no_more_memory_than_five() {
     replay(5 * 60);
     let Some(before) = peak() else {
-        eprintln!("SKIPPED the look at the memory: this system has no /proc/self/status");
+        skipped::because("the look at the memory: this system has no /proc/self/status");
         return;
     };
     replay(75 * 60);

@@ -7,22 +7,13 @@
     reason = "all of this file is a test, its helpers too"
 )]
 
-use std::path::{Path, PathBuf};
+mod skipped;
+
+use std::path::Path;
 use std::process::{Command, Output};
 
 use serde_json::Value;
 use tempfile::TempDir;
-
-fn recording(name: &str) -> Option<PathBuf> {
-    let usual = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
-    let data = std::env::var_os("SONARFIX_DATA").map_or_else(usual, PathBuf::from);
-    let path = data.join(name);
-    if !path.exists() {
-        eprintln!("SKIPPED: there is no recording {}", path.display());
-        return None;
-    }
-    Some(path)
-}
 
 fn sonarfix(args: &[&str]) -> Output {
     let output = Command::new(env!("CARGO_BIN_EXE_sonarfix")).args(args).output().unwrap();
@@ -43,7 +34,7 @@ fn number(value: &Value, key: &str) -> f64 {
 }
 
 fn lego() -> Option<TempDir> {
-    let from = recording("lego_urg")?;
+    let from = skipped::unless_recorded("lego_urg")?;
     let dir = TempDir::new().unwrap();
     let to = dir.path().to_str().unwrap();
     sonarfix(&["convert", "lego", from.to_str().unwrap(), "--out", to]);
@@ -85,7 +76,7 @@ fn lego_from_rounded_wheels_finds_the_fitted_ones() {
 
 #[test]
 fn freiburg_knows_that_it_is_lost() {
-    let Some(folder) = recording("carmen") else { return };
+    let Some(folder) = skipped::unless_recorded("carmen") else { return };
     let dir = TempDir::new().unwrap();
     let to = dir.path().to_str().unwrap();
     let log = folder.join("freiburg-079_rawodo.txt.gz");

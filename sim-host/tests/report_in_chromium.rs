@@ -1,6 +1,8 @@
 //! Opens a report in headless Chromium and asks the page whether it works.
 #![expect(clippy::unwrap_used, reason = "all of this file is a test, its helpers too")]
 
+mod skipped;
+
 use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 use std::process::Command;
@@ -98,7 +100,7 @@ fn fix(time: f64, outcome: Outcome, range: Option<f64>, reason: &str) -> FixReco
 /// Writes a report and opens it; `None`, with a word why, where there is no browser.
 fn report_opened(trace: &Trace) -> Option<String> {
     let Some(browser) = browser() else {
-        println!("skipped: none of {BROWSERS:?} is on the path");
+        skipped::because(&format!("none of {BROWSERS:?} is on the path"));
         return None;
     };
     let dir = tempfile::tempdir().unwrap();

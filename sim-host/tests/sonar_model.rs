@@ -1,25 +1,14 @@
 //! The simulated NXT sonar against the recorded one.
 #![expect(clippy::unwrap_used, reason = "all of this file is a test, its helpers too")]
 
-use std::path::{Path, PathBuf};
+mod skipped;
 
 use sonarfix_sim::sonar_model::{Comparison, compare, page};
 use sonarfix_sim::world::sensor::SensorModel;
 
-/// The folder of the recordings: `SONARFIX_DATA`, or `../shared/data` beside the repository.
-fn recordings() -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
-    let data = std::env::var_os("SONARFIX_DATA").map_or_else(beside, PathBuf::from);
-    let folder = data.join("nxt_rotating_sonar");
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    println!("skipped: there are no recordings in {}", folder.display());
-    None
-}
-
 fn nxt() -> Option<Comparison> {
-    recordings().map(|folder| compare(&folder, &SensorModel::nxt()).unwrap())
+    skipped::unless_recorded("nxt_rotating_sonar")
+        .map(|folder| compare(&folder, &SensorModel::nxt()).unwrap())
 }
 
 #[test]
@@ -43,7 +32,7 @@ fn the_nxt_model_does_what_the_sensor_did() {
 
 #[test]
 fn an_ideal_sonar_is_told_from_the_real_one() {
-    let Some(folder) = recordings() else {
+    let Some(folder) = skipped::unless_recorded("nxt_rotating_sonar") else {
         return;
     };
     let scenario = sonarfix_map::Scenario::paper().unwrap();
