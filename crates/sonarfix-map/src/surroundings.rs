@@ -32,7 +32,7 @@ pub enum Outline {
     },
 }
 
-/// A walk there and back, for ever.
+/// A walk there and back, for ever, at a steady speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Walk {
     /// From the place of the outline to where it turns, metres.

@@ -25,7 +25,7 @@ use crate::plant::Plant;
 use crate::plant::follower::Follower;
 use crate::statistics::RunResult;
 use crate::trace::{Recorder, Trace};
-use crate::world::obstacle::{Obstacle, Outline, Walk};
+use crate::world::obstacle::{Obstacle, Outline};
 use crate::world::segment::{Point, Segment};
 use crate::world::sensor::SensorModel;
 use crate::world::{World, air};
@@ -196,8 +196,7 @@ fn obstacle(plan: &sonarfix_map::Obstacle) -> Obstacle {
         sonarfix_map::Outline::Circle { centre, radius } => Outline::Circle { centre, radius },
         sonarfix_map::Outline::Face { from, to } => Outline::Face(Segment::new(from, to)),
     };
-    let walk = plan.walk.map(|walk| Walk { by: walk.by, takes: walk.takes });
-    Obstacle { outline, walk }
+    Obstacle { outline, walk: plan.walk }
 }
 
 /// What the filter is told of its start: the truth, or a draw around it.

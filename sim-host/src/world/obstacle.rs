@@ -1,5 +1,7 @@
 //! What stands or walks in the room and is on no map.
 
+use sonarfix_map::Walk;
+
 use super::segment::{Point, Segment, distance};
 
 /// The outline of an obstacle.
@@ -16,15 +18,6 @@ pub enum Outline {
     Face(Segment),
 }
 
-/// A walk there and back, for ever, at a steady speed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Walk {
-    /// From the outline's place to the turning point, metres.
-    pub by: [f64; 2],
-    /// Time for the way there, seconds.
-    pub takes: f64,
-}
-
 /// An obstacle that no map knows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Obstacle {
@@ -34,19 +27,18 @@ pub struct Obstacle {
     pub walk: Option<Walk>,
 }
 
-impl Walk {
-    fn shift(&self, time: f64) -> [f64; 2] {
-        let lap = (time / self.takes).rem_euclid(2.0);
-        let share = if lap <= 1.0 { lap } else { 2.0 - lap };
-        self.by.map(|component| share * component)
-    }
+/// How far a walk has led at a time, metres.
+fn shift(walk: Walk, time: f64) -> [f64; 2] {
+    let lap = (time / walk.takes).rem_euclid(2.0);
+    let share = if lap <= 1.0 { lap } else { 2.0 - lap };
+    walk.by.map(|component| share * component)
 }
 
 impl Obstacle {
     /// Its outline at a time, seconds since the run began.
     #[must_use]
     pub fn outline_at(&self, time: f64) -> Outline {
-        let by = self.walk.map_or([0.0, 0.0], |walk| walk.shift(time));
+        let by = self.walk.map_or([0.0, 0.0], |walk| shift(walk, time));
         match self.outline {
             Outline::Circle { centre: [x, y], radius } => {
                 Outline::Circle { centre: [x + by[0], y + by[1]], radius }

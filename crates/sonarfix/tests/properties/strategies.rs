@@ -30,6 +30,12 @@ pub fn silent(drive: Drive) -> Drive {
     }
 }
 
+/// A state from its seven numbers, in their order.
+fn state(numbers: (f32, f32, f32, f32, f32, f32, f32)) -> State {
+    let (x, y, heading, scale_right, scale_left, track_width_error, range_scale) = numbers;
+    State { x, y, heading, scale_right, scale_left, track_width_error, range_scale }
+}
+
 /// A state within 20 m of the origin, its heading away from ±π so that a step does not wrap it,
 /// with systematic errors of a few per cent.
 pub fn any_state() -> impl Strategy<Value = State> {
@@ -42,17 +48,7 @@ pub fn any_state() -> impl Strategy<Value = State> {
         -0.01_f32..0.01,
         -0.05_f32..0.05,
     )
-        .prop_map(
-            |(x, y, heading, scale_right, scale_left, track_width_error, range_scale)| State {
-                x,
-                y,
-                heading,
-                scale_right,
-                scale_left,
-                track_width_error,
-                range_scale,
-            },
-        )
+        .prop_map(state)
 }
 
 /// Deviations of a robot that knows roughly where it is.
@@ -66,17 +62,7 @@ pub fn any_deviation() -> impl Strategy<Value = State> {
         1e-4_f32..0.01,
         1e-4_f32..0.03,
     )
-        .prop_map(
-            |(x, y, heading, scale_right, scale_left, track_width_error, range_scale)| State {
-                x,
-                y,
-                heading,
-                scale_right,
-                scale_left,
-                track_width_error,
-                range_scale,
-            },
-        )
+        .prop_map(state)
 }
 
 /// Straight on, backwards, a curve, a turn on the spot, one wheel alone: what 100 ms may bring.
