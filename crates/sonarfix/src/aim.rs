@@ -156,7 +156,8 @@ impl<'a> Viewpoint<'a> {
     /// standing before its foot, or by answering from nearer inside the cone.
     fn is_hidden(&self, map: &Map, target: WallId, expected: &ExpectedRange) -> bool {
         let view = View::new(self.position, expected, self.wide_cone);
-        map.walls().any(|(id, wall)| id != target && view.is_disturbed_by(wall))
+        map.near(self.position, Metres(view.distance))
+            .any(|(id, wall)| id != target && view.is_disturbed_by(&wall))
     }
 }
 
@@ -286,8 +287,8 @@ fn best(
         return Err(NoAim::HeadingUncertain);
     }
     let mut best: Option<(f32, Aim)> = None;
-    for (id, wall) in map.walls() {
-        let Ok(expected) = view.expect(wall) else {
+    for (id, wall) in map.near(view.position, config.sonar.max_range) {
+        let Ok(expected) = view.expect(&wall) else {
             continue;
         };
         let Some(score) = score(id, &view, &expected) else {

@@ -304,7 +304,7 @@ impl<'m> Localizer<'m> {
         }
         let wall = self.map.wall(aim.wall).ok_or(Refusal::UnknownWall)?;
         let view = Viewpoint::new(&self.config, &self.ekf);
-        let expected = view.expect(wall)?;
+        let expected = view.expect(&wall)?;
         if !view.is_square(aim.bearing, &expected) {
             return Err(Refusal::NotSquare);
         }

@@ -163,12 +163,22 @@ impl<'a> Map<'a> {
 
     /// The wall with this id, if the map has it.
     #[must_use]
-    pub fn wall(&self, id: WallId) -> Option<&'a Wall> {
-        self.walls.get(usize::try_from(id.0).ok()?)
+    pub fn wall(&self, id: WallId) -> Option<Wall> {
+        self.walls.get(usize::try_from(id.0).ok()?).copied()
     }
 
     /// Every wall with its id.
-    pub fn walls(&self) -> impl Iterator<Item = (WallId, &'a Wall)> + use<'a> {
-        (0..).map(WallId).zip(self.walls)
+    pub fn walls(&self) -> impl Iterator<Item = (WallId, Wall)> + use<'a> {
+        (0..).map(WallId).zip(self.walls.iter().copied())
+    }
+
+    /// Every wall of which a part lies within `reach` of `point`, each once, with its id; it may
+    /// give others too.
+    pub fn near(
+        &self,
+        _point: Point,
+        _reach: Metres,
+    ) -> impl Iterator<Item = (WallId, Wall)> + use<'a> {
+        self.walls()
     }
 }
