@@ -16,11 +16,11 @@ pub fn rooms(count: usize) -> Vec<Wall> {
     rooms.flat_map(|(column, row)| room(corner(column, row))).take(count).collect()
 }
 
-/// The middle of a room in the middle of the building.
-pub fn middle(count: usize) -> Point {
+/// A place in a room in the middle of the building, before a wall on its left and one below.
+pub fn inside(count: usize) -> Point {
     let side = rooms_a_side(count);
     let Point { x, y } = corner(side / 2, (side - 1) / 2);
-    Point::new(x.0 + 0.5 * ROOM.0, y.0 + 0.5 * ROOM.1)
+    Point::new(x.0 + 1.0, y.0 + 1.2)
 }
 
 fn rooms_a_side(count: usize) -> u16 {

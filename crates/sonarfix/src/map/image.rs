@@ -14,7 +14,7 @@
 //! | 4 | size of a cell, metres, `f32` |
 //! | [20](WALL) W | the walls, each [as stored](super::Wall::stored): five `f32` |
 //! | 4 (cells + 1) | for each cell, row by row, where its references start; at last R |
-//! | 2 R or 4 R | the [references](Reference): two bytes each if W ≤ [`MOST_NARROW`], else four |
+//! | 2 R or 3 R | the [references](Reference): two bytes each if W ≤ [`MOST_NARROW`], else three |
 //! | 4 | [`checksum`] of all bytes before |
 //!
 //! Each cell refers to every wall whose bounding box touches it, in ascending order.
@@ -36,7 +36,7 @@ pub const WALL: usize = 20;
 /// The most walls that two-byte references can number.
 pub const MOST_NARROW: u32 = 1 << 14;
 /// The most walls that a baked map can have.
-pub const MOST: u32 = 1 << 30;
+pub const MOST: u32 = 1 << 22;
 
 const HEADER: usize = 32;
 
@@ -46,39 +46,27 @@ const HEADER: usize = 32;
 pub struct Reference(u32);
 
 impl Reference {
-    const FIRST_COLUMN: u32 = 1 << 31;
-    const FIRST_ROW: u32 = 1 << 30;
-    const WALL: u32 = Self::FIRST_ROW - 1;
+    const FIRST_COLUMN: u32 = 1;
+    const FIRST_ROW: u32 = 2;
 
-    /// The reference to a wall below [`MOST`] that touches `cells`, from the cell at this column and row.
+    /// The reference to a wall below [`MOST`] that touches `cells`, from the cell at this column and
+    /// row.
     #[must_use]
     pub fn new(wall: WallId, cells: &Cells, column: u16, row: u16) -> Self {
-        let flag = |is_set, flag| if is_set { flag } else { 0 };
-        let first_column = flag(column == cells.columns.0, Self::FIRST_COLUMN);
-        let first_row = flag(row == cells.rows.0, Self::FIRST_ROW);
-        Self(first_column | first_row | (wall.0 & Self::WALL))
+        let first_column = if column == cells.columns.0 { Self::FIRST_COLUMN } else { 0 };
+        let first_row = if row == cells.rows.0 { Self::FIRST_ROW } else { 0 };
+        Self((wall.0 << 2) | first_row | first_column)
     }
 
-    /// In four bytes: bit 31 first column, bit 30 first row, the rest the wall.
+    /// The number that it is stored as: four times the wall, plus two in its first row, plus one in
+    /// its first column. In two bytes if the map has no more than [`MOST_NARROW`] walls, else in three.
     #[must_use]
-    pub fn wide(self) -> [u8; 4] {
-        self.0.to_le_bytes()
-    }
-
-    /// In two bytes, for a wall below [`MOST_NARROW`]: bit 15 first column, bit 14 first row, the
-    /// rest the wall.
-    #[must_use]
-    pub fn narrow(self) -> [u8; 2] {
-        let [low, high, _, top] = self.0.to_le_bytes();
-        [low, (high & 0x3F) | (top & 0xC0)]
-    }
-
-    fn from_narrow([low, high]: [u8; 2]) -> Self {
-        Self(u32::from_le_bytes([low, high & 0x3F, 0, high & 0xC0]))
+    pub fn stored(self) -> u32 {
+        self.0
     }
 
     fn wall(self) -> WallId {
-        WallId(self.0 & Self::WALL)
+        WallId(self.0 >> 2)
     }
 
     fn has(self, flags: u32) -> bool {
@@ -114,7 +102,7 @@ pub(super) struct Image<'a> {
 #[derive(Debug, Clone, Copy)]
 enum References<'a> {
     Narrow(&'a [[u8; 2]]),
-    Wide(&'a [[u8; 4]]),
+    Wide(&'a [[u8; 3]]),
 }
 
 impl<'a> Image<'a> {
@@ -296,9 +284,13 @@ impl References<'_> {
     fn get(self, place: u32) -> Option<Reference> {
         let place = usize::try_from(place).ok()?;
         match self {
-            Self::Narrow(references) => references.get(place).copied().map(Reference::from_narrow),
+            Self::Narrow(references) => {
+                references.get(place).map(|&bytes| Reference(u16::from_le_bytes(bytes).into()))
+            }
             Self::Wide(references) => {
-                references.get(place).map(|&bytes| Reference(u32::from_le_bytes(bytes)))
+                let wide =
+                    |&[low, middle, high]: &[u8; 3]| u32::from_le_bytes([low, middle, high, 0]);
+                references.get(place).map(wide).map(Reference)
             }
         }
     }
@@ -327,7 +319,9 @@ pub(super) struct Window<'a> {
 }
 
 impl Window<'_> {
-    /// Goes on to the next run, if there is one.
+    /// Goes on to the next run, if there is one. Not inlined: what it needs would be fetched for
+    /// every wall.
+    #[inline(never)]
     fn turn(&mut self) -> Option<()> {
         if self.others.is_empty() {
             let row = self.rows.next()?;
