@@ -225,9 +225,9 @@ fn is_unreachable(walls: &Neighbours, wall: usize, segment: Segment, least: f64)
         .collect();
     let is_free = |foot: f64, side: f64| {
         let [x, y] = segment.at(foot);
-        // From just off the wall, as what touches it there does not stand before it.
+        // From just off the wall: what touches it there, or lies on it, does not stand before it.
         let way = |far: f64| [x - side * far * ty, y + side * far * tx];
-        let way = Segment { from: way(TOLERANCE), to: way(least) };
+        let way = Segment { from: way(3.0 * TOLERANCE), to: way(least) };
         beside.iter().all(|other| other.distance(way) > TOLERANCE)
     };
     let feet = std::iter::successors(Some(0.5 * FEET.min(length)), |foot| Some(foot + FEET));

@@ -92,8 +92,8 @@ impl<'a> Map<'a> {
         Self(Source::Walls(walls))
     }
 
-    /// Reads a baked map in place. Every length, number and reference is checked here, once (some
-    /// 40 instructions a byte), so that no later lookup can fail: a damaged map is refused.
+    /// Reads a baked map in place. Every length, number and reference is checked here, once, in a
+    /// time that grows with the map, so that no later lookup can fail: a damaged map is refused.
     ///
     /// The slice is the whole image and nothing else, at any address.
     ///

@@ -132,21 +132,23 @@ impl Frame {
         let (x, y) = (f64::from(grid.origin().x.0), f64::from(grid.origin().y.0));
         let line = |n: u16, from: f64| from + f64::from(n) * cell;
         let (right, top) = (line(grid.columns(), x), line(grid.rows(), y));
-        put(svg, format_args!("<g clip-path=\"path('{}')\">", self.outline()));
-        put(svg, format_args!("<path stroke=\"{}\" fill=\"none\" d=\"", hex(Role::Grid)));
+        let ((left, up), (wide, high)) = ((MARGIN.0, MARGIN.1), (self.width(), self.height()));
+        let frame = format!("x=\"{left}\" y=\"{up}\" width=\"{wide:.1}\" height=\"{high:.1}\"");
+        put(svg, format_args!("<clipPath id=\"frame\"><rect {frame}/></clipPath>\n"));
+        put(
+            svg,
+            format_args!(
+                "<path clip-path=\"url(#frame)\" stroke=\"{}\" fill=\"none\" d=\"",
+                hex(Role::Grid)
+            ),
+        );
         for column in 0..=grid.columns() {
             self.line(svg, [line(column, x), y], [line(column, x), top]);
         }
         for row in 0..=grid.rows() {
             self.line(svg, [x, line(row, y)], [right, line(row, y)]);
         }
-        svg.push_str("\"/></g>\n");
-    }
-
-    fn outline(&self) -> String {
-        let (left, top, ..) = MARGIN;
-        let (wide, high) = (self.width(), self.height());
-        format!("M{left} {top}h{wide:.1}v{high:.1}h-{wide:.1}z")
+        svg.push_str("\"/>\n");
     }
 
     /// All walls as one path, thinner where there are many.
@@ -194,8 +196,9 @@ impl Frame {
         put(
             svg,
             format_args!(
-                "<text text-anchor=\"middle\" fill=\"{}\" transform=\"translate({x:.1} {y:.1}) rotate({angle:.1})\" y=\"{off:.1}\">{}</text>\n",
+                "<text text-anchor=\"middle\" fill=\"{}\" stroke=\"{}\" stroke-width=\"3\" paint-order=\"stroke\" transform=\"translate({x:.1} {y:.1}) rotate({angle:.1})\" y=\"{off:.1}\">{}</text>\n",
                 hex(Role::Estimate),
+                hex(Role::Paper),
                 escape(wall.name())
             ),
         );
