@@ -6,7 +6,7 @@ mod rooms;
 
 use std::hint::black_box;
 
-use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, criterion_group, criterion_main};
 use rooms::{inside, rooms};
 use sonarfix::config::Config;
 use sonarfix::localizer::{Localizer, Start};
@@ -31,10 +31,10 @@ fn maps(criterion: &mut Criterion) {
         let config = Config::for_track_width(Metres(0.16));
         let localizer = Localizer::new(config, map, start, Instant::from_ticks(0)).unwrap();
         assert!(localizer.aim().is_ok());
-        criterion.bench_function(BenchmarkId::new("near", count), |bench| {
+        criterion.bench_function(&format!("near/{count}"), |bench| {
             bench.iter(|| map.near(black_box(here), REACH).count());
         });
-        criterion.bench_function(BenchmarkId::new("aim", count), |bench| {
+        criterion.bench_function(&format!("aim/{count}"), |bench| {
             bench.iter(|| black_box(&localizer).aim());
         });
     }

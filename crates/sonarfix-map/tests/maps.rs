@@ -1,6 +1,10 @@
 //! Maps from any file, what is found wrong with them, and what simplifying them may change.
 
-#![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "a test should stop")]
+#![expect(
+    clippy::unwrap_used,
+    clippy::float_cmp,
+    reason = "a test should stop, and compares what it wrote"
+)]
 
 use std::fs;
 use std::path::Path;
@@ -104,9 +108,8 @@ fn a_wall_between_walls_is_unreachable() {
     assert_eq!(findings(&walls(0.06)), []);
     // One side free is enough, and so is a hole in what stands before it.
     assert_eq!(findings(&walls(0.03)[..2]), []);
-    let [wall, before, behind] = walls(0.03);
+    let [wall, _, behind] = walls(0.03);
     let holed = [wall, [-0.1, 0.03, 0.8, 0.03], [1.0, 0.03, 2.1, 0.03], behind];
-    assert_ne!(before, behind);
     assert_eq!(findings(&holed), []);
 }
 
