@@ -3,6 +3,7 @@
 mod bound;
 mod convert;
 mod faults;
+mod overrides;
 mod paper;
 mod replay;
 mod run;
