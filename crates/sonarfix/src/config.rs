@@ -12,6 +12,7 @@ use crate::units::{Duration, Metres, MetresPerSecond, PerRootMetre, Radians};
 /// The sonar and the servo that carries it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Sonar {
     /// Where the sonar turns, in the robot frame.
     pub mount: Point,
@@ -103,6 +104,7 @@ impl Timing {
 /// of the systematic errors, whose estimates start at zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CalibrationPrior {
     /// Of the right wheel's scale error, dimensionless.
     pub scale_right: f32,
@@ -117,6 +119,7 @@ pub struct CalibrationPrior {
 /// Which ranges are believed, and which walls are looked at.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Trust {
     /// The gate: a range is refused if its innovation exceeds this many standard deviations of
     /// the innovation (ν² > gate² S). In standard deviations, not their square.
@@ -129,6 +132,7 @@ pub struct Trust {
 /// How the wall is chosen among those that count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Policy {
     /// The nearest: the paper's choice, because a sonar's noise grows with range.
     Nearest,
@@ -151,6 +155,7 @@ pub struct Weights {
 /// The configuration of a localizer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Config {
     /// The wheels.
     pub drive: Drive,
