@@ -64,6 +64,7 @@ pub struct Aim {
 /// Why a wall was chosen: what the choice reckoned with.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Reason {
     /// By how much its range is to lower the variance of the position, and of what else has a
     /// weight ([`Weights`](crate::config::Weights)).

@@ -34,6 +34,7 @@ pub struct Sonar {
 /// How often the sonar looks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Rhythm {
     /// Once every such period; the servo starts on the dot, the ping follows when it has
     /// settled. A look that takes longer than the period delays the next to the dot after it.
@@ -45,6 +46,7 @@ pub enum Rhythm {
 /// How fast a servo moves. Take the times from its datasheet or better from a film of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Pace {
     /// Period of the pulses. A new width takes effect with the next pulse, so up to one frame
     /// passes before the servo hears of it: a whole one is always reckoned with.
@@ -82,6 +84,7 @@ impl Pace {
 /// How long a look takes: what the choice of a wall reckons with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Timing {
     /// How often the sonar looks.
     pub rhythm: Rhythm,
@@ -145,6 +148,7 @@ pub enum Policy {
 /// an error of it is worth. Zero: nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Weights {
     /// Metres for each radian of heading: a lever arm.
     pub heading: Metres,
