@@ -583,6 +583,65 @@ proptest! {
         let led = square - f64::from(rate) * until_ping;
         prop_assert!((f64::from(aim.bearing.0) - led).abs() < 2e-3, "{:?} is not {led}", aim.bearing);
     }
+}
+
+#[test]
+fn an_empty_map_has_no_aim() {
+    let localizer =
+        started(config_for_rooms(Point::default()), &[], Pose::default(), 0.01, (0.0, 0.0, 0));
+    assert_eq!(localizer.aim(), Err(NoAim::NoWall));
+    assert_eq!(localizer.aim_at(Radians(0.0)), Err(NoAim::NoWall));
+}
+
+/// Two walls, to the right and to the left of a robot that looks along them.
+fn corridor(right: f32, left: f32) -> [Wall; 2] {
+    [-right, left].map(|y| Wall::new(Point::new(-20.0, y), Point::new(20.0, y)).unwrap())
+}
+
+/// A sonar that looks without pause, on a servo.
+fn with_servo(servo: Pace) -> Config {
+    let mut config = config_for_rooms(Point::default());
+    let cycle = Duration::from_ticks(60_000);
+    config.sonar.timing = Timing { rhythm: Rhythm::AsFastAsPossible, servo, cycle };
+    config
+}
+
+proptest! {
+    /// The wall looked at last is left only for one that is nearer by more than 2 %.
+    #[test]
+    fn the_servo_does_not_hunt(near in 1.0_f32..3.0, share in 0.0_f32..0.05, first_is_right in any::<bool>()) {
+        prop_assume!((share - 0.02).abs() > 1e-3);
+        let mut config = config_for_rooms(Point::default());
+        config.policy = Policy::Nearest;
+        let far = near * (1.0 + share);
+        let walls = if first_is_right { corridor(far, near) } else { corridor(near, far) };
+        let mut localizer = started(config, &walls, Pose::default(), 0.001, (0.0, 0.0, 0));
+        let nearer = localizer.aim().unwrap().wall;
+        // It looks at the farther one, whoever told it to.
+        let bearing = if first_is_right { -1.0 } else { 1.0 } * core::f32::consts::FRAC_PI_2;
+        let other = localizer.aim_at(Radians(bearing)).unwrap();
+        prop_assert_ne!(nearer, other.wall);
+        prop_assert!(matches!(localizer.fix(&other, Some(other.range)), Fix::Accepted(_)));
+        prop_assert_eq!(localizer.aim().unwrap().wall == other.wall, share < 0.02);
+    }
+
+    /// The bearing of a turning robot is square when the servo has come to rest, not now.
+    #[test]
+    fn a_turning_robot_is_led(rate in -0.8_f32..0.8, steps in 10_u8..40) {
+        let mut config = with_servo(Pace::MG996R);
+        config.prior.track_width = Metres(0.002);
+        let walls = [Wall::new(Point::new(2.0, -9.0), Point::new(2.0, 9.0)).unwrap()];
+        // A tenth of a second a step, on the spot, until the wall is a radian to the left.
+        let arc = 0.1 * rate * 0.5 * config.drive.track_width.0;
+        let start = Pose::new(0.0, 0.0, Radians(-1.0 - 0.1 * rate * f32::from(steps)));
+        let localizer = started(config, &walls, start, 0.001, (arc, -arc, steps));
+        let aim = localizer.aim().unwrap();
+        // 0.17 s for 60°, and 80 ms for a frame and to settle; the servo looks ahead at first.
+        let square = turn_between(0.0, localizer.pose().heading.radians().0.into());
+        let until_ping = 0.08 + 0.17 * square.abs() / 60_f64.to_radians();
+        let led = square - f64::from(rate) * until_ping;
+        prop_assert!((f64::from(aim.bearing.0) - led).abs() < 2e-3, "{:?} is not {led}", aim.bearing);
+    }
 
     /// In a room no direction is starved: of both pairs of walls one is looked at again and again,
     /// though the servo must turn for it.
