@@ -35,6 +35,8 @@ pub enum ServoName {
     Ideal,
     /// SG90.
     Sg90,
+    /// MG996R.
+    Mg996r,
 }
 
 /// Who keeps the robot on its path.
@@ -110,7 +112,8 @@ pub(crate) fn read_hardware(root: &Table<'_>) -> Result<Hardware, FileError> {
     let servo = optional("servo", &["model"])?;
     let sonars =
         [("ideal", SonarName::Ideal), ("hc_sr04", SonarName::HcSr04), ("nxt", SonarName::Nxt)];
-    let servos = [("ideal", ServoName::Ideal), ("sg90", ServoName::Sg90)];
+    let servos =
+        [("ideal", ServoName::Ideal), ("sg90", ServoName::Sg90), ("mg996r", ServoName::Mg996r)];
     Ok(Hardware {
         sonar: named(model(sensor.as_ref()), &sonars)?,
         set_temperature: temperature(sensor.as_ref())?,

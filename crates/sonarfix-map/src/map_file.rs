@@ -97,11 +97,12 @@ impl MapFile {
         let columns =
             Columns::of(&header, unit).map_err(|message| FileError::new(&name, 1, "", message))?;
         let (mut walls, mut lines) = (Vec::new(), Vec::new());
+        let mut counter = LineCounter::new(text);
         let mut names = HashSet::new();
         for (number, record) in (1_u32..).zip(reader.records()) {
             let record = record.map_err(|error| of_csv(&name, &error))?;
-            let line = record.position().map_or(0, csv::Position::line);
-            let line = usize::try_from(line).unwrap_or(usize::MAX);
+            let byte = record.position().and_then(|position| usize::try_from(position.byte()).ok());
+            let line = counter.advance_to(text.len().saturating_sub(byte.unwrap_or(0)));
             let wrong = |(key, message)| FileError::new(&name, line, key, message);
             let wall = columns.wall(&record, number).map_err(wrong)?;
             if !names.insert(wall.name().to_owned()) {
@@ -144,6 +145,30 @@ impl MapFile {
     #[must_use]
     pub fn line(&self, wall: usize) -> Option<usize> {
         self.lines.get(wall).copied()
+    }
+}
+
+/// Counts the lines of a text, onwards from record to record.
+struct LineCounter<'t> {
+    rest: &'t str,
+    line: usize,
+}
+
+impl<'t> LineCounter<'t> {
+    fn new(text: &'t str) -> Self {
+        Self { rest: text, line: 1 }
+    }
+
+    /// The line in which a record starts, given where the one before it ended: how far before the
+    /// text's `end`. Empty lines may lie between.
+    fn advance_to(&mut self, end: usize) -> usize {
+        let ended = self.rest.len().saturating_sub(end);
+        let after = self.rest.get(ended..).unwrap_or_default();
+        let start = after.trim_start_matches(['\r', '\n']);
+        let passed = self.rest.get(..self.rest.len() - start.len()).unwrap_or_default();
+        self.line += passed.matches('\n').count();
+        self.rest = start;
+        self.line
     }
 }
 

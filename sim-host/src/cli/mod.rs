@@ -4,6 +4,7 @@ mod bound;
 mod convert;
 mod faults;
 mod map;
+mod overrides;
 mod paper;
 mod replay;
 mod run;
