@@ -127,8 +127,8 @@ impl PoseRows {
     /// position (each axis) and heading (`docs/model.md`, eq. 9).
     #[inline(always)]
     pub fn rounding(&self, advance: f32, turn: f32) -> (f32, f32) {
-        let position = ROUNDING * (self.xx + self.yy) - advance;
-        let heading = ROUNDING * self.hh - turn;
+        let position = 0.5 * ROUNDING * (self.xx + self.yy) - advance;
+        let heading = 0.5 * ROUNDING * self.hh - turn;
         (if position > 0.0 { position } else { 0.0 }, if heading > 0.0 { heading } else { 0.0 })
     }
 

@@ -128,8 +128,8 @@ impl Robot {
         };
         let wheels = of(0, SCALE_RIGHT) + of(1, SCALE_LEFT);
         let width = self.track_width + state[TRACK_WIDTH];
-        let position = 4.0 * ROUNDING * (p[(X, X)] + p[(Y, Y)]) - wheels / 4.0;
-        let heading = 4.0 * ROUNDING * p[(HEADING, HEADING)] - wheels / (width * width);
+        let position = 2.0 * ROUNDING * (p[(X, X)] + p[(Y, Y)]) - wheels / 4.0;
+        let heading = 2.0 * ROUNDING * p[(HEADING, HEADING)] - wheels / (width * width);
         let mut q = Matrix::zeros();
         q[(X, X)] = position.max(0.0);
         q[(Y, Y)] = position.max(0.0);

@@ -79,7 +79,7 @@ impl SixStates {
         let noise_t = noise_s * per_half_width * per_half_width;
         let noise_st = 0.25 * per_metre * (of_r - of_l) * per_half_width;
         let lacking = |variance: f32, noise: f32| {
-            let lack = ROUNDING * variance - noise;
+            let lack = 0.5 * ROUNDING * variance - noise;
             if lack > 0.0 { lack } else { 0.0 }
         };
         let lack_of_position = lacking(self.p[0][0] + self.p[1][1], noise_s);
