@@ -12,7 +12,7 @@
 
 use nalgebra::SMatrix;
 
-use crate::motion::{Noise, Step};
+use crate::motion::{Noise, Step, Walk};
 use crate::state::{State, wheels};
 
 /// The largest variance that is computed with (m², rad², 1): a robot uncertain by a thousand
@@ -67,7 +67,8 @@ impl SixStates {
     /// heading and turn, `xm` that of x and the mid-heading m = h + t/2, and so on.
     #[inline(always)]
     pub fn propagate(&mut self, step: &Step, noise: &Noise) {
-        let (p, q) = (&mut self.pose, &mut self.calibration);
+        let (p, q) = (&mut self.pose, &self.calibration);
+        let (cc, dd, ww) = noise.walked.added_to(q);
         let (sin, cos) = (step.sin, step.cos);
         // ∂x/∂m and ∂y/∂m.
         let (swing_x, swing_y) = (-step.advance * sin, step.advance * cos);
@@ -75,15 +76,12 @@ impl SixStates {
             |c: f32, d: f32, w: f32| step.turn_c * c + step.turn_d * d + step.turn_w * w;
         let advance_with = |c: f32, d: f32| step.advance_c * c + step.advance_d * d;
 
-        let (tc, sc) = (turn_with(q.cc, q.cd, q.cw), advance_with(q.cc, q.cd));
-        let (td, sd) = (turn_with(q.cd, q.dd, q.dw), advance_with(q.cd, q.dd));
-        let (tw, sw) = (turn_with(q.cw, q.dw, q.ww), advance_with(q.cw, q.dw));
+        let (tc, sc) = (turn_with(cc, q.cd, q.cw), advance_with(cc, q.cd));
+        let (td, sd) = (turn_with(q.cd, dd, q.dw), advance_with(q.cd, dd));
+        let (tw, sw) = (turn_with(q.cw, q.dw, ww), advance_with(q.cw, q.dw));
         let tt = noise.turn + step.turn_c * tc + step.turn_d * td + step.turn_w * tw;
         let ts = noise.advance_turn + step.advance_c * tc + step.advance_d * td;
         let ss = noise.advance + step.advance_c * sc + step.advance_d * sd;
-        q.cc += noise.scale_common;
-        q.dd += noise.scale_difference;
-        q.ww += noise.track_width_error;
 
         let (ht, hs) = (turn_with(p.hc, p.hd, p.hw), advance_with(p.hc, p.hd));
         let (cm, dm, wm) = (p.hc + 0.5 * tc, p.hd + 0.5 * td, p.hw + 0.5 * tw);
@@ -107,7 +105,7 @@ impl SixStates {
         p.xh += xt + swing_x * m_new + cos * s_new;
         let x_m = xm + swing_x * mm + cos * ms;
         let x_s = xs + swing_x * ms + cos * ss;
-        p.xx += noise.position + swing_x * (xm + x_m) + cos * (xs + x_s);
+        p.xx += noise.x + swing_x * (xm + x_m) + cos * (xs + x_s);
 
         let (yt, ys) = (turn_with(p.yc, p.yd, p.yw), advance_with(p.yc, p.yd));
         p.yc = p.yc + swing_y * cm + sin * sc;
@@ -118,18 +116,20 @@ impl SixStates {
         p.xy += swing_y * x_m + sin * x_s + swing_x * ym + cos * ys;
         let y_m = ym + swing_y * mm + sin * ms;
         let y_s = ys + swing_y * ms + sin * ss;
-        p.yy += noise.position + swing_y * (ym + y_m) + sin * (ys + y_s);
+        p.yy += noise.y + swing_y * (ym + y_m) + sin * (ys + y_s);
     }
 }
 
 impl PoseRows {
-    /// What the wheels' noise lacks of the rounding that a step of this covariance may bring, for
-    /// position (each axis) and heading (`docs/model.md`, eq. 9).
+    /// What the wheels' noise lacks of the rounding that a step of this covariance may bring, for x,
+    /// y and heading (`docs/model.md`, eq. 9).
     #[inline(always)]
-    pub fn rounding(&self, advance: f32, turn: f32) -> (f32, f32) {
-        let position = 0.5 * ROUNDING * (self.xx + self.yy) - advance;
-        let heading = 0.5 * ROUNDING * self.hh - turn;
-        (if position > 0.0 { position } else { 0.0 }, if heading > 0.0 { heading } else { 0.0 })
+    pub fn rounding(&self, advance: f32, turn: f32) -> [f32; 3] {
+        let lacking = |variance: f32, noise: f32| {
+            let lack = 0.5 * ROUNDING * variance - noise;
+            if lack > 0.0 { lack } else { 0.0 }
+        };
+        [lacking(self.xx, advance), lacking(self.yy, advance), lacking(self.hh, turn)]
     }
 
     /// Whether the variances of the pose are sound.
@@ -396,6 +396,14 @@ impl Covariance {
     pub fn wheel_variances(&self) -> (f32, f32) {
         let p = &self.six.calibration;
         wheels(p.cc + 0.25 * p.dd, 2.0 * p.cd)
+    }
+
+    /// The same with the variances that the calibration has gained by walking.
+    #[inline(always)]
+    pub fn after(mut self, walk: &Walk) -> Self {
+        let q = &mut self.six.calibration;
+        (q.cc, q.dd, q.ww) = walk.added_to(q);
+        self
     }
 
     /// Whether a variance is negative: no covariance any more.

@@ -23,7 +23,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use crate::covariance::{Correction, Covariance, Derivatives, is_within};
-use crate::motion::{Drive, Noise, Rates, Step, WheelTravel};
+use crate::motion::{Drive, Noise, Rates, Step, Walk, WheelTravel};
 use crate::range::ExpectedRange;
 use crate::state::{Mean, Remainder};
 use crate::trig::sin_cos_within;
@@ -128,7 +128,10 @@ pub(crate) struct PositionCovariance {
 pub struct Ekf {
     mean: Mean,
     rest: Remainder,
+    /// P, but for what the calibration has walked since the last range.
     p: Covariance,
+    /// How far both wheels together have rolled since then, metres.
+    way: f32,
     rates: Rates,
 }
 
@@ -155,6 +158,7 @@ impl Ekf {
             mean: Mean::new(&state),
             rest: Remainder::default(),
             p,
+            way: 0.0,
             rates: Rates::new(&drive),
         })
     }
@@ -175,13 +179,13 @@ impl Ekf {
     /// The covariance P, 7×7, exactly symmetric, in the order of [`Self::state_vector`].
     #[must_use]
     pub fn covariance(&self) -> SMatrix<f32, STATES, STATES> {
-        self.p.to_matrix()
+        self.walked().to_matrix()
     }
 
     /// One standard deviation of each state, in the state's own unit.
     #[must_use]
     pub fn deviation(&self) -> State {
-        let p = &self.p;
+        let p = self.walked();
         let (rr, ll) = p.wheel_variances();
         State {
             x: libm::sqrtf(p.six.pose.xx),
@@ -192,6 +196,11 @@ impl Ekf {
             track_width_error: libm::sqrtf(p.six.calibration.ww),
             range_scale: libm::sqrtf(p.scale.kk),
         }
+    }
+
+    /// P.
+    fn walked(&self) -> Covariance {
+        self.p.after(&Walk::new(&self.rates, self.way))
     }
 
     /// Variances and covariance of x and y, m².
@@ -223,7 +232,7 @@ impl Ekf {
         if !is_within(step.turn.abs(), LARGEST_TURN) {
             return Err(EkfError::NotFinite);
         }
-        let noise = Noise::new(&self.rates, &self.mean, travel, &self.p.six.pose);
+        let noise = Noise::new(&self.rates, &self.mean, travel, self.way, &self.p.six.pose);
         let before = self.p.six.pose;
         self.p.six.propagate(&step, &noise);
         if !self.p.six.pose.is_sound() {
@@ -232,6 +241,7 @@ impl Ekf {
             return Err(error);
         }
         self.p.scale.propagate(&step);
+        self.way += rolled;
         self.mean.advance(&mut self.rest, &step);
         Ok(())
     }
@@ -284,22 +294,31 @@ impl Ekf {
         if !(noise_is_sound && innovation_is_sound) {
             return Err(what_is_wrong_with(noise));
         }
-        let (pose, calibration, scale) = (self.p.six.pose, self.p.six.calibration, self.p.scale);
+        let before = self.p;
+        self.p = self.walked();
         match self.p.correct(&row(expected), noise.0) {
             Correction::Taken(gain) => {
                 if !self.p.is_sound() {
                     let error = self.what_is_unsound();
-                    self.p.six.pose = pose;
-                    self.p.six.calibration = calibration;
-                    self.p.scale = scale;
+                    self.p = before;
                     return Err(error);
                 }
+                self.way = 0.0;
                 self.mean.take(&mut self.rest, &gain, innovation);
                 Ok(())
             }
-            Correction::Spare => Ok(()),
-            Correction::NotFinite => Err(EkfError::NotFinite),
-            Correction::Indefinite => Err(EkfError::Indefinite),
+            Correction::Spare => {
+                self.way = 0.0;
+                Ok(())
+            }
+            Correction::NotFinite => {
+                self.p = before;
+                Err(EkfError::NotFinite)
+            }
+            Correction::Indefinite => {
+                self.p = before;
+                Err(EkfError::Indefinite)
+            }
         }
     }
 
