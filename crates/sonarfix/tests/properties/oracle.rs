@@ -115,6 +115,28 @@ impl Robot {
         q
     }
 
+    /// `q_x`, `q_y` and `q_h` of eq. (9): what the wheels' noise lacks of a step's rounding.
+    pub fn making_up_for_rounding(
+        &self,
+        p: &Matrix,
+        state: &Vector,
+        travel: &SVector<f64, 2>,
+    ) -> Matrix {
+        let per_metre = self.wheel_noise * self.wheel_noise;
+        let of = |wheel: usize, scale: usize| {
+            per_metre * travel[wheel].abs() * (1.0 + state[scale]).powi(2)
+        };
+        let wheels = of(0, SCALE_RIGHT) + of(1, SCALE_LEFT);
+        let width = self.track_width + state[TRACK_WIDTH];
+        let mut q = Matrix::zeros();
+        for (state, noise) in
+            [(X, wheels / 4.0), (Y, wheels / 4.0), (HEADING, wheels / (width * width))]
+        {
+            q[(state, state)] = (2.0 * ROUNDING * p[(state, state)] - noise).max(0.0);
+        }
+        q
+    }
+
     /// Eq. (5).
     pub fn predicted(&self, p: &Matrix, state: &Vector, travel: &SVector<f64, 2>) -> Matrix {
         let f = self.by_state(state, travel);
