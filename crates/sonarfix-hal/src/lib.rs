@@ -21,6 +21,7 @@
 //! # Features
 //! - `async`: the same drivers behind the waits of `embedded-hal-async` (module `asynch`).
 //! - `defmt`: derives `defmt::Format` for the public types that hold data.
+//! - `serde`: derives `Serialize` and `Deserialize` for those that a robot tells of its loop.
 
 #![no_std]
 #![forbid(unsafe_code)]

@@ -26,6 +26,7 @@ pub use crate::config::Policy;
 /// One look of the sonar at one wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Aim {
     /// The wall.
     pub wall: WallId,
@@ -38,6 +39,7 @@ pub struct Aim {
 /// Why there is nothing to look at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum NoAim {
     /// The heading is less certain than the cone is wide: no echo could be told to be square.
     HeadingUncertain,

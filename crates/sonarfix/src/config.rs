@@ -12,6 +12,7 @@ use crate::units::{Metres, MetresPerSecond, PerRootMetre, Radians};
 /// The sonar and the servo that carries it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Sonar {
     /// Where the sonar turns, in the robot frame.
     pub mount: Point,
@@ -32,6 +33,7 @@ pub struct Sonar {
 /// of the systematic errors, whose estimates start at zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CalibrationPrior {
     /// Of the right wheel's scale error, dimensionless.
     pub scale_right: f32,
@@ -46,6 +48,7 @@ pub struct CalibrationPrior {
 /// Which ranges are believed, and which walls are looked at.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Trust {
     /// The gate: a range is refused if its innovation exceeds this many standard deviations of
     /// the innovation (ν² > gate² S). In standard deviations, not their square.
@@ -58,6 +61,7 @@ pub struct Trust {
 /// How the wall is chosen among those that count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Policy {
     /// The nearest: the paper's choice, because a sonar's noise grows with range.
     Nearest,
@@ -68,6 +72,7 @@ pub enum Policy {
 /// The configuration of a localizer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Config {
     /// The wheels.
     pub drive: Drive,

@@ -66,6 +66,7 @@ impl core::error::Error for EkfError {}
 /// A measured range against the expected one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Innovation {
     /// ν = z − h(X̂).
     pub value: Metres,

@@ -29,6 +29,7 @@ use crate::units::Metres;
 /// What the localizer thinks of its own estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Verdict {
     /// Ranges come and agree with the map.
     #[default]
@@ -66,6 +67,7 @@ const BETTER_AFTER: u16 = 3;
 /// The numbers behind the verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Health {
     /// The verdict.
     pub verdict: Verdict,

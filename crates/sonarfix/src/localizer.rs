@@ -17,6 +17,7 @@ use crate::units::{Instant, Metres, Radians};
 /// Where the robot starts, and how sure that is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Start {
     /// The pose.
     pub pose: Pose,
@@ -79,6 +80,7 @@ impl core::error::Error for OdometryError {}
 /// What became of a range.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[must_use]
 pub enum Fix {
     /// Inside the gate: state and covariance have moved.
@@ -92,6 +94,7 @@ pub enum Fix {
 /// Why a range was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Refusal {
     /// The range is NaN or infinite.
     NotFinite,

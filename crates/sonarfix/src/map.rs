@@ -137,6 +137,7 @@ impl Wall {
 /// A wall's place in its map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct WallId(pub u32);
 
 /// The walls of a place; it borrows them, so that they can stay in flash.

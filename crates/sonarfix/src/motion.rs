@@ -17,6 +17,7 @@ use crate::units::{Metres, PerRootMetre, Radians};
 /// is backwards.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct WheelTravel {
     /// ΔR of the paper.
     pub right: Metres,
@@ -47,6 +48,7 @@ impl WheelTravel {
 /// The drive, as its builder measured it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Drive {
     /// Nominal distance between the wheels' contact points (D).
     pub track_width: Metres,

@@ -15,6 +15,7 @@ use crate::units::{Metres, Radians};
 /// A point, in the map frame unless said otherwise.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Point {
     /// Along x.
     pub x: Metres,
@@ -46,6 +47,8 @@ impl Point {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(from = "Radians", into = "Radians"))]
 pub struct Heading(f32);
 
 impl Heading {
@@ -75,6 +78,18 @@ impl Heading {
     }
 }
 
+impl From<Radians> for Heading {
+    fn from(angle: Radians) -> Self {
+        Self::new(angle)
+    }
+}
+
+impl From<Heading> for Radians {
+    fn from(heading: Heading) -> Self {
+        heading.radians()
+    }
+}
+
 fn wrap(angle: f32) -> f32 {
     if angle > -PI && angle <= PI {
         return angle;
@@ -96,6 +111,7 @@ fn wrap(angle: f32) -> f32 {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Pose {
     /// Midpoint between the wheels, along map x.
     pub x: Metres,

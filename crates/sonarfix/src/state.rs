@@ -11,6 +11,7 @@ pub const STATES: usize = 7;
 /// The seven states, in the order of the state vector and of the covariance.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct State {
     /// Position along map x, metres.
     pub x: f32,
