@@ -62,7 +62,8 @@ struct Record {
 
 impl Record {
     fn plus(self, other: Self) -> Self {
-        let sharper = if other.smallest_eigenvalue < self.smallest_eigenvalue { other } else { self };
+        let sharper =
+            if other.smallest_eigenvalue < self.smallest_eigenvalue { other } else { self };
         Self {
             predicts: self.predicts + other.predicts,
             updates: self.updates + other.updates,
@@ -107,7 +108,11 @@ impl Life {
             scale_left: log_uniform(&mut rng, 1e-4, 0.03),
             track_width_error: track_width * log_uniform(&mut rng, 1e-4, 0.05),
             // In a third of the lives the ranger is known exactly.
-            range_scale: if rng.random_ratio(1, 3) { 0.0 } else { log_uniform(&mut rng, 1e-3, 0.03) },
+            range_scale: if rng.random_ratio(1, 3) {
+                0.0
+            } else {
+                log_uniform(&mut rng, 1e-3, 0.03)
+            },
         };
         let off = if rng.random_ratio(1, 4) { 0.0 } else { 0.2 };
         let mount = Point::new(rng.random_range(-off..=off), rng.random_range(-off..=off));
@@ -218,8 +223,9 @@ impl Life {
         if !state.iter().all(|v| v.is_finite()) || !p.iter().all(|v| v.is_finite()) {
             return Err(format!("not finite: {state} {p}"));
         }
-        let estimated: Vec<usize> =
-            (0..7).filter(|&i| i < 6 || p[(i, i)] != 0.0 || p.row(i).iter().any(|v| *v != 0.0)).collect();
+        let estimated: Vec<usize> = (0..7)
+            .filter(|&i| i < 6 || p[(i, i)] != 0.0 || p.row(i).iter().any(|v| *v != 0.0))
+            .collect();
         if let Some(&i) = estimated.iter().find(|&&i| p[(i, i)] <= 0.0) {
             return Err(format!("variance {i} is {:e}", p[(i, i)]));
         }

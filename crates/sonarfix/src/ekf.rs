@@ -22,7 +22,7 @@ use crate::covariance::{Covariance, Row, each_entry};
 use crate::motion::{Drive, Step, WheelTravel};
 use crate::range::ExpectedRange;
 use crate::state::Mean;
-use crate::units::{Metres, SquareMetres};
+use crate::units::{Metres, Radians, SquareMetres};
 
 pub use crate::state::{STATES, State};
 
@@ -95,6 +95,16 @@ pub(crate) struct PositionCovariance {
     pub xx: f32,
     pub xy: f32,
     pub yy: f32,
+}
+
+impl PositionCovariance {
+    /// Standard deviation in the direction in which it is largest, m: the root of the larger
+    /// eigenvalue.
+    pub fn worst_deviation(&self) -> f32 {
+        let half = 0.5 * (self.xx - self.yy);
+        let middle = 0.5 * (self.xx + self.yy);
+        libm::sqrtf(middle + libm::sqrtf(half * half + self.xy * self.xy))
+    }
 }
 
 /// The filter.
@@ -251,6 +261,29 @@ impl Ekf {
     pub fn position_gain(&self, expected: &ExpectedRange, noise: SquareMetres) -> SquareMetres {
         let m = self.cross_covariance(expected);
         SquareMetres((m.x * m.x + m.y * m.y) / innovation_variance(expected, &m, noise))
+    }
+
+    /// Admits more doubt of the pose: adds these standard deviations, independent of all else, to x
+    /// and y each and to the heading. The state stays; no entry but their three variances changes.
+    ///
+    /// # Errors
+    /// [`EkfError::NotFinite`] or [`EkfError::Negative`], by what is wrong with an argument; the
+    /// filter is unchanged.
+    ///
+    /// # Panics
+    /// Never.
+    pub fn loosen(&mut self, position: Metres, heading: Radians) -> Result<(), EkfError> {
+        if !position.is_finite() || !heading.is_finite() {
+            return Err(EkfError::NotFinite);
+        }
+        if position < Metres(0.0) || heading < Radians(0.0) {
+            return Err(EkfError::Negative);
+        }
+        let mut p = self.p;
+        p.xx += position.0 * position.0;
+        p.yy += position.0 * position.0;
+        p.hh += heading.0 * heading.0;
+        self.replace(self.mean, self.rest, p)
     }
 
     /// Corrects the state by one measured `range` with noise variance `noise`

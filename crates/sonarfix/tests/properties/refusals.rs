@@ -121,6 +121,7 @@ proptest! {
         let walls = walls_and_one_aside(&room);
         let mut config = config_for_rooms(mount);
         config.trust.gate = gate;
+        config.trust.short = 0.0;
         let localizer = Localizer::new(config, Map::new(&walls), room.start(), Instant::from_ticks(0)).unwrap();
         let aim = localizer.aim().unwrap();
         let ekf = localizer.filter();
