@@ -214,7 +214,7 @@ impl Health {
     }
 
     /// Takes note of a turn of the sonar.
-    pub(crate) fn turn(&mut self, turn: Turn, doubt: &Doubt, limits: &Limits) {
+    pub(crate) fn turn(&mut self, turn: Turn, doubt: Doubt, limits: &Limits) {
         self.position_deviation = doubt.position;
         self.heading_deviation = doubt.heading;
         self.weigh(turn.evidence());

@@ -321,7 +321,7 @@ impl<'m> Localizer<'m> {
 
     fn judge(&mut self, turn: Turn) {
         let (doubt, limits) = (self.doubt(), self.limits());
-        self.health.turn(turn, &doubt, &limits);
+        self.health.turn(turn, doubt, &limits);
     }
 
     fn limits(&self) -> Limits {
@@ -380,7 +380,7 @@ impl<'m> Localizer<'m> {
         }
         let noise = sonar.noise.variance(expected.range);
         let innovation = self.ekf.innovation(range, &expected, noise);
-        let Some(weakened) = self.weighed(&innovation, noise) else {
+        let Some(weakened) = self.weighed(innovation, noise) else {
             return Ok(Fix::Gated(innovation));
         };
         match self.ekf.update(range, &expected, weakened) {
@@ -395,7 +395,7 @@ impl<'m> Localizer<'m> {
 
     /// The noise with which a range is to be believed, at least its own; `None` if it is not
     /// believed at all (`docs/model.md`, eqs. 14 and 18).
-    fn weighed(&self, innovation: &Innovation, noise: SquareMetres) -> Option<SquareMetres> {
+    fn weighed(&self, innovation: Innovation, noise: SquareMetres) -> Option<SquareMetres> {
         let Trust { gate, outer_gate, short, .. } = self.config.trust;
         let square = innovation.value.0 * innovation.value.0;
         let is_inside = innovation.nis() <= gate * gate;
