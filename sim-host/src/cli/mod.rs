@@ -4,6 +4,7 @@ mod bound;
 mod convert;
 mod faults;
 mod health;
+mod map;
 mod paper;
 mod replay;
 mod run;
@@ -30,6 +31,8 @@ enum Command {
     Replay(replay::Args),
     /// Converts recordings of other formats for `replay`.
     Convert(convert::Args),
+    /// Checks, bakes, draws and simplifies maps.
+    Map(map::Args),
     /// Prints how well any estimator could know the robot's state, over time.
     Bound(bound::Args),
     /// Prints how the simulated NXT sonar compares with recorded sweeps, as markdown.
@@ -51,6 +54,7 @@ impl Cli {
             Command::Run(args) => run::execute(&args),
             Command::Replay(args) => replay::execute(&args),
             Command::Convert(args) => convert::execute(&args),
+            Command::Map(args) => map::execute(&args),
             Command::Bound(args) => bound::execute(&args),
             Command::SonarModel(args) => sonar_model::execute(&args),
             Command::Faults(args) => faults::execute(&args),
