@@ -26,7 +26,8 @@ pub fn localizer(bytes: &[u8]) {
         position_deviation: Metres(bytes.between(1e-3, 1.0)),
         heading_deviation: Radians(bytes.between(1e-3, 0.1)),
     };
-    let Ok(localizer) = Localizer::new(config, Map::new(&walls), start, Instant::from_ticks(1_000_000))
+    let Ok(localizer) =
+        Localizer::new(config, Map::new(&walls), start, Instant::from_ticks(1_000_000))
     else {
         return;
     };
@@ -91,7 +92,7 @@ fn config(bytes: &mut Bytes) -> Config {
 }
 
 fn walls(bytes: &mut Bytes) -> Vec<Wall> {
-    let mut corner = |bytes: &mut Bytes| Point::new(bytes.number(8.0), bytes.number(8.0));
+    let corner = |bytes: &mut Bytes| Point::new(bytes.number(8.0), bytes.number(8.0));
     let count = bytes.byte() % 8;
     (0..count).filter_map(|_| Wall::new(corner(bytes), corner(bytes)).ok()).collect()
 }

@@ -21,12 +21,16 @@ pub fn map_file(bytes: &[u8]) {
 pub fn scenario_file(bytes: &[u8]) {
     // Files that it names are looked for where there are none.
     let base = Path::new("/nonexistent");
-    parse(bytes, |text| Scenario::parse(text, "any.toml", base), |scenario| {
-        check_floor(&scenario.floor);
-        check_robot(&scenario.robot);
-        assert!(scenario.path.duration().is_finite() && scenario.path.duration() >= 0.0);
-        assert!(scenario.run.runs >= 1);
-    });
+    parse(
+        bytes,
+        |text| Scenario::parse(text, "any.toml", base),
+        |scenario| {
+            check_floor(&scenario.floor);
+            check_robot(&scenario.robot);
+            assert!(scenario.path.duration().is_finite() && scenario.path.duration() >= 0.0);
+            assert!(scenario.run.runs >= 1);
+        },
+    );
 }
 
 /// A robot file.
@@ -85,10 +89,9 @@ fn check_record(record: &Record) {
         Record::Wheels { time, right, left } => (time, vec![*right, *left]),
         Record::Range { time, bearing, range } => (time, vec![*bearing, range.unwrap_or(0.0)]),
         Record::Scan { time, .. } => (time, vec![]),
-        Record::Start { time, pose, position_deviation, heading_deviation } => (
-            time,
-            vec![pose.x, pose.y, pose.heading, *position_deviation, *heading_deviation],
-        ),
+        Record::Start { time, pose, position_deviation, heading_deviation } => {
+            (time, vec![pose.x, pose.y, pose.heading, *position_deviation, *heading_deviation])
+        }
     };
     assert!(time.is_finite() && time.abs() <= 1e10, "{record:?}");
     assert!(numbers.iter().all(|v| v.is_finite()), "{record:?}");

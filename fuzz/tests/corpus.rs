@@ -68,7 +68,7 @@ fn no_target_breaks() {
         corpus.iter().for_each(|input| target(input));
         let mut rng = SplitMix(1);
         for _ in 0..INPUTS {
-            let random = (0..rng.below(LONGEST)).map(|_| rng.byte()).collect();
+            let random: Vec<u8> = (0..rng.below(LONGEST)).map(|_| rng.byte()).collect();
             target(&random);
             let one = corpus[rng.below(corpus.len() as u64)].clone();
             target(&changed(one, &mut rng));

@@ -127,10 +127,9 @@ impl Model {
                 (Accepted, _) => (-1.0, false),
                 (TooLong, false) => (1.0, true),
                 (TooLong, true) => (0.7, true),
-                (TooShort, false) => (0.3, true),
                 (TooShort, true) => (0.05, true),
                 (NoEcho, false) => (0.5, true),
-                (NoEcho, true) => (0.3, true),
+                (TooShort, false) | (NoEcho, true) => (0.3, true),
                 (Skipped, again) => (0.0, again),
             };
             again = contradicts;
