@@ -11,6 +11,8 @@ pub mod cli;
 pub mod convert;
 pub mod dense;
 pub mod fault_table;
+pub mod health_page;
+pub mod kidnapped;
 pub mod monte_carlo;
 pub mod observe;
 pub mod odometry;

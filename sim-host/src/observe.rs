@@ -91,6 +91,9 @@ pub struct Look {
 pub fn fix_record(look: Look, aim: &Aim, fix: &Fix) -> FixRecord {
     let (outcome, innovation, reason) = match fix {
         Fix::Accepted(innovation) => (Outcome::Accepted, Some(innovation), String::new()),
+        Fix::Weakened(innovation) => {
+            (Outcome::Accepted, Some(innovation), "believed less than its noise allows".to_owned())
+        }
         Fix::Gated(innovation) => (Outcome::Gated, Some(innovation), String::new()),
         Fix::Refused(refusal) => (Outcome::Refused, None, refusal.to_string()),
     };

@@ -1,6 +1,11 @@
 //! What CI runs, by the same names: `cargo xtask ci` is every check, and each has a name of its
 //! own, so that whoever broke one can run just that.
 
+mod endurance;
+mod fuzz;
+mod miri;
+
+use std::path::PathBuf;
 use std::process::{Command, ExitCode};
 
 use anyhow::{Context, bail};
@@ -13,7 +18,7 @@ struct Xtask {
     task: Task,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Subcommand)]
+#[derive(Debug, Clone, PartialEq, Eq, Subcommand)]
 enum Task {
     /// Every check below, in order.
     Ci,
@@ -31,6 +36,12 @@ enum Task {
     Deny,
     /// The paper's statistics at full length: 5,000 seeds, both policies (minutes).
     Statistics,
+    /// Random lives of the filter, 10⁸ steps unless told otherwise (minutes).
+    Endurance(endurance::Args),
+    /// The fuzz targets, for a bounded time.
+    Fuzz(fuzz::Args),
+    /// The core under Miri, if there is one.
+    Miri,
 }
 
 /// The crates that run on a robot.
@@ -51,8 +62,17 @@ fn main() -> ExitCode {
 fn run(task: Task) -> anyhow::Result<()> {
     match task {
         Task::Ci => {
-            let checks =
-                [Task::Format, Task::Lint, Task::TestHost, Task::Docs, Task::Embedded, Task::Deny];
+            let checks = [
+                Task::Format,
+                Task::Lint,
+                Task::TestHost,
+                Task::Docs,
+                Task::Embedded,
+                Task::Deny,
+                Task::Endurance(endurance::Args::SHORT),
+                Task::Fuzz(fuzz::Args::short()),
+                Task::Miri,
+            ];
             checks.into_iter().try_for_each(run)
         }
         Task::Format => cargo("fmt --all --check"),
@@ -62,6 +82,9 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Embedded => embedded(),
         Task::Deny => deny(),
         Task::Statistics => statistics(),
+        Task::Endurance(args) => endurance::run(args),
+        Task::Fuzz(args) => fuzz::run(&args),
+        Task::Miri => miri::run(),
     }
 }
 
@@ -113,9 +136,16 @@ fn cargo_command(arguments: &str) -> Command {
     command
 }
 
+/// Where builds go.
+fn target_directory() -> anyhow::Result<PathBuf> {
+    let directory = std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into());
+    std::path::absolute(directory).context("the target directory has no path")
+}
+
 fn check(mut command: Command) -> anyhow::Result<()> {
     let shown: Vec<_> = command.get_args().map(|arg| arg.to_string_lossy()).collect();
-    let shown = format!("cargo {}", shown.join(" "));
+    let program = command.get_program().to_string_lossy();
+    let shown = format!("{program} {}", shown.join(" "));
     eprintln!("── {shown}");
     let status = command.status().with_context(|| format!("cannot start `{shown}`"))?;
     if !status.success() {

@@ -170,9 +170,20 @@ fn read_prior(robot: &Table<'_>) -> Result<CalibrationPrior, FileError> {
 }
 
 fn read_trust(robot: &Table<'_>) -> Result<Trust, FileError> {
-    let table = robot.table("trust", &["gate", "confidence"])?;
-    let number = |key| Ok(single(table.require(key)?.number()?));
-    Ok(Trust { gate: number("gate")?, confidence: number("confidence")? })
+    let keys = ["gate", "confidence", "outer_gate", "short", "reopen", "stale", "doubtful"];
+    let table = robot.table("trust", &keys)?;
+    let number = |node: Node<'_>| node.number().map(single);
+    let length = |node: Node<'_>| node.quantity(&LENGTH).map(single).map(Metres);
+    let default = Trust::default();
+    Ok(Trust {
+        gate: number(table.require("gate")?)?,
+        confidence: number(table.require("confidence")?)?,
+        outer_gate: table.get("outer_gate").map_or(Ok(default.outer_gate), number)?,
+        short: table.get("short").map_or(Ok(default.short), number)?,
+        reopen: table.get("reopen").map_or(Ok(default.reopen), length)?,
+        stale: table.get("stale").map_or(Ok(default.stale), length)?,
+        doubtful: table.get("doubtful").map_or(Ok(default.doubtful), length)?,
+    })
 }
 
 const SCHEDULE_KEYS: [&str; 3] = ["policy", "heading_weight", "wheels_weight"];

@@ -115,7 +115,7 @@ fn the_robot_is_that_of_the_paper() {
             track_width: Metres(0.01),
             range_scale: 0.0,
         },
-        trust: Trust { gate: 5.0, confidence: 3.0 },
+        trust: Trust { gate: 5.0, confidence: 3.0, short: 0.0, ..Trust::default() },
         policy: Policy::Nearest,
         weights: Weights::default(),
     };

@@ -44,7 +44,7 @@ use timing::Pacing;
 pub use crate::config::Policy;
 pub(crate) use memory::{Answer, Memory};
 pub(crate) use timing::seconds;
-pub(crate) use viewpoint::{Unfit, Viewpoint};
+pub(crate) use viewpoint::{LEAST_CONFIDENCE, Unfit, Viewpoint};
 
 /// One look of the sonar at one wall.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -130,7 +130,43 @@ pub struct Trust {
     /// A wall counts as one to look at only if it stays so when the pose is wrong by this many of
     /// its standard deviations.
     pub confidence: f32,
+    /// Down-weight instead of reject: a range beyond the gate, but within this many standard
+    /// deviations of the innovation, is taken with its noise raised until it lies at the gate.
+    /// Zero: none is, all beyond the gate are refused.
+    pub outer_gate: f32,
+    /// A range shorter than expected by more than this many standard deviations *of its own noise*
+    /// may come from something that the map does not know: it is taken with its noise raised until
+    /// it is that many. Zero: a short range is believed like a long one.
+    pub short: f32,
+    /// How much doubt of the pose a range beyond the gate adds while the verdict is
+    /// [`Lost`](crate::health::Verdict::Lost): this standard deviation to x and to y, up to
+    /// [`REOPENS`] times that, and as many radians to the heading, up to a quarter of the cone. Zero:
+    /// none.
+    pub reopen: Metres,
+    /// How far the robot may roll without a range taken and still be called tracking.
+    pub stale: Metres,
+    /// The deviation of the position, in its worst direction, above which the robot is not called
+    /// tracking.
+    pub doubtful: Metres,
 }
+
+impl Default for Trust {
+    /// What suits a robot in a room with things that its map does not know.
+    fn default() -> Self {
+        Self {
+            gate: 4.0,
+            confidence: 3.0,
+            outer_gate: 0.0,
+            short: 2.0,
+            reopen: Metres(0.02),
+            stale: Metres(5.0),
+            doubtful: Metres(0.5),
+        }
+    }
+}
+
+/// How many times [`Trust::reopen`] the position's deviation of a lost robot grows to.
+pub const REOPENS: f32 = 10.0;
 
 /// How the wall is chosen among those that count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -248,7 +284,7 @@ impl Config {
                 track_width: track_width * 0.03,
                 range_scale: 0.0,
             },
-            trust: Trust { gate: 4.0, confidence: 3.0 },
+            trust: Trust::default(),
             policy: Policy::Informative,
             weights: Weights::default(),
         }
@@ -272,10 +308,22 @@ impl Config {
         let below_width = prior.track_width.0 < 0.5 * width;
         require("prior.track_width", below_width, "less than half the track width")?;
         not_negative("prior.range_scale", prior.range_scale)?;
-        positive("trust.gate", self.trust.gate)?;
-        not_negative("trust.confidence", self.trust.confidence)?;
         not_negative("weights.heading", self.weights.heading.0)?;
-        not_negative("weights.wheels", self.weights.wheels.0)
+        not_negative("weights.wheels", self.weights.wheels.0)?;
+        self.check_trust()
+    }
+
+    fn check_trust(&self) -> Result<(), ConfigError> {
+        let trust = &self.trust;
+        positive("trust.gate", trust.gate)?;
+        not_negative("trust.confidence", trust.confidence)?;
+        not_negative("trust.outer_gate", trust.outer_gate)?;
+        let is_outer = trust.outer_gate <= 0.0 || trust.outer_gate >= trust.gate;
+        require("trust.outer_gate", is_outer, "zero, or not below trust.gate")?;
+        not_negative("trust.short", trust.short)?;
+        not_negative("trust.reopen", trust.reopen.0)?;
+        positive("trust.stale", trust.stale.0)?;
+        positive("trust.doubtful", trust.doubtful.0)
     }
 
     fn check_drive(&self) -> Result<(), ConfigError> {

@@ -27,7 +27,7 @@ use crate::motion::{Drive, Noise, Rates, Step, Walk, WheelTravel};
 use crate::range::ExpectedRange;
 use crate::state::{Mean, Remainder};
 use crate::trig::sin_cos_within;
-use crate::units::{Metres, SquareMetres};
+use crate::units::{Metres, Radians, SquareMetres};
 
 pub use crate::state::{STATES, State};
 
@@ -109,6 +109,16 @@ pub(crate) struct Prospect {
     pub with_wheels: (f32, f32),
     /// S: its variance about the expected one.
     pub variance: f32,
+}
+
+impl PoseCovariance {
+    /// The position's standard deviation in the direction in which it is largest, m: the root of the
+    /// larger eigenvalue.
+    pub fn worst_deviation(&self) -> f32 {
+        let half = 0.5 * (self.xx - self.yy);
+        let middle = 0.5 * (self.xx + self.yy);
+        libm::sqrtf(middle + libm::sqrtf(half * half + self.xy * self.xy))
+    }
 }
 
 /// The filter.
@@ -287,6 +297,34 @@ impl Ekf {
     pub fn position_gain(&self, expected: &ExpectedRange, noise: SquareMetres) -> SquareMetres {
         let m = self.cross_covariance(expected);
         SquareMetres((m.x * m.x + m.y * m.y) / innovation_variance(expected, &m, noise))
+    }
+
+    /// Admits more doubt of the pose: adds these standard deviations, independent of all else, to x
+    /// and y each and to the heading. The state stays; no entry but their three variances changes.
+    ///
+    /// # Errors
+    /// [`EkfError::NotFinite`] or [`EkfError::Negative`], by what is wrong with an argument; the
+    /// filter is unchanged.
+    ///
+    /// # Panics
+    /// Never.
+    pub fn loosen(&mut self, position: Metres, heading: Radians) -> Result<(), EkfError> {
+        if !position.is_finite() || !heading.is_finite() {
+            return Err(EkfError::NotFinite);
+        }
+        if position < Metres(0.0) || heading < Radians(0.0) {
+            return Err(EkfError::Negative);
+        }
+        let before = self.p.six.pose;
+        let p = &mut self.p.six.pose;
+        p.xx += position.0 * position.0;
+        p.yy += position.0 * position.0;
+        p.hh += heading.0 * heading.0;
+        if p.is_sound() {
+            return Ok(());
+        }
+        self.p.six.pose = before;
+        Err(EkfError::NotFinite)
     }
 
     /// Corrects the state by one measured `range` with noise variance `noise`

@@ -1,4 +1,7 @@
 //! The seven states: as the crate shows them, and as the filter holds them.
+//!
+//! # Non-finite policy
+//! Nothing here refuses a value; [`Ekf`](crate::ekf::Ekf) takes no state that is not finite.
 
 use nalgebra::SVector;
 

@@ -70,20 +70,6 @@ fn no_echo_is_half_as_bad_and_an_echo_mends_most_of_it() {
 }
 
 #[test]
-fn the_range_of_a_doubted_wall_counts_less() {
-    let walls = &room()[..1];
-    let (mut doubting, mut sure) = (localizer(walls, 0.01), localizer(walls, 0.01));
-    let aim = sure.aim().unwrap();
-    let _ = doubting.fix(&aim, None);
-    for localizer in [&mut doubting, &mut sure] {
-        assert!(matches!(localizer.fix(&aim, Some(aim.range)), Fix::Accepted(_)));
-    }
-    let left = |localizer: &Localizer| localizer.filter().deviation().y;
-    // The noise of 5.5 mm is doubled.
-    assert!(left(&doubting) > 1.5 * left(&sure), "{} {}", left(&doubting), left(&sure));
-}
-
-#[test]
 fn the_only_wall_is_looked_at_however_often_it_is_blocked() {
     let walls = &room()[..1];
     let mut localizer = localizer(walls, 0.01);

@@ -3,6 +3,7 @@
 mod bound;
 mod convert;
 mod faults;
+mod health;
 mod map;
 mod overrides;
 mod paper;
@@ -39,6 +40,8 @@ enum Command {
     SonarModel(sonar_model::Args),
     /// Prints what every fault of the hardware does to a robot, as markdown.
     Faults(faults::Args),
+    /// Prints how often the verdict is wrong, and how long it takes, as markdown.
+    Health(health::Args),
 }
 
 impl Cli {
@@ -56,6 +59,7 @@ impl Cli {
             Command::Bound(args) => bound::execute(&args),
             Command::SonarModel(args) => sonar_model::execute(&args),
             Command::Faults(args) => faults::execute(&args),
+            Command::Health(args) => health::execute(&args),
         }
     }
 }

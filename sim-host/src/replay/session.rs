@@ -451,7 +451,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         self.tally.verdicts.note(look.time, before, now);
         let fixes = &mut self.tally.fixes;
         match fix {
-            Fix::Accepted(_) => fixes.accepted += 1,
+            Fix::Accepted(_) | Fix::Weakened(_) => fixes.accepted += 1,
             Fix::Gated(_) => fixes.gated += 1,
             Fix::Refused(_) => fixes.refused += 1,
         }

@@ -10,6 +10,7 @@
 //! | module | what |
 //! |---|---|
 //! | `figures` | what each figure shows |
+//! | `called_lost` | the figure of `sonarfix health` |
 //! | `chart`, `axis`, `points` | how a figure is drawn |
 //! | `player` | the data of the player; its script is `player.js` |
 //! | `palette` | one colour for one thing, in figures and player |
@@ -17,6 +18,7 @@
 //! | `page` | tables, figures and data as HTML |
 
 mod axis;
+mod called_lost;
 mod chart;
 mod figures;
 pub mod map;
@@ -34,6 +36,8 @@ use thiserror::Error;
 
 use crate::trace::Trace;
 use figures::Figure;
+
+pub use called_lost::called_lost;
 
 /// The name of the report's file.
 const FILE: &str = "report.html";

@@ -13,8 +13,9 @@ use super::timing::seconds;
 const FAILURES: usize = 8;
 /// What is left of the belief in a wall after a range that is not its own.
 const AFTER_WRONG: f32 = 0.2;
-/// And after no echo, which is more often chance: a sonar misses some.
-const AFTER_SILENCE: f32 = 0.5;
+/// And after no echo, which is more often chance (a sonar misses some), or a range that may be its
+/// own.
+const AFTER_DOUBTFUL: f32 = 0.5;
 /// What is left of the doubt after a range of its own: at the end of a cupboard one may be right by
 /// chance, or half of it an echo off the edge.
 const AFTER_RIGHT: f32 = 0.3;
@@ -66,8 +67,8 @@ pub(crate) enum Answer {
     Right,
     /// Another.
     Wrong,
-    /// None.
-    Silence,
+    /// None, or one that may be another's.
+    Doubtful,
     /// One that says nothing of what stands before the wall.
     Unknown,
 }
@@ -101,7 +102,7 @@ impl Memory {
             Answer::Unknown => return,
             Answer::Right => AFTER_RIGHT * (1.0 - before),
             Answer::Wrong => 1.0 - AFTER_WRONG * before,
-            Answer::Silence => 1.0 - AFTER_SILENCE * before,
+            Answer::Doubtful => 1.0 - AFTER_DOUBTFUL * before,
         };
         let most = 1.0 - LEAST;
         let doubt = if doubt < most { doubt } else { most };

@@ -13,7 +13,7 @@ use crate::units::Radians;
 /// however much confidence is asked for. 19 looks of 20 are square then, and the gate is there for
 /// the other; not to look has no way back. (A first turn of 180° with a track width known to 3 %
 /// leaves 5°, and three times that is more than most cones.)
-const LEAST_CONFIDENCE: f32 = 2.0;
+pub(crate) const LEAST_CONFIDENCE: f32 = 2.0;
 /// The share of the cone in which a beam counts as square then.
 const LEAST_CLEAR: f32 = 0.25;
 
