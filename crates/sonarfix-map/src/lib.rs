@@ -18,6 +18,7 @@
 
 #![forbid(unsafe_code)]
 
+mod clearance;
 mod document;
 mod error;
 mod faults;
@@ -26,16 +27,19 @@ mod file;
 mod floor;
 mod geometry;
 mod path;
+mod place;
 mod quantity;
 mod robot;
 mod scenario;
 mod surroundings;
 
+pub use clearance::Collision;
 pub use error::FileError;
 pub use faults::{Fault, FaultKind, Wheel};
 pub use fidelity::{Fidelity, Follow, Hardware, ServoName, SonarName, Upset, Upsets};
 pub use floor::{Floor, NamedWall};
 pub use path::{Leg, Motion, Movement, Path, PathError, PathPlan, PathPose};
+pub use place::Place;
 pub use robot::Robot;
 pub use scenario::{Run, Scenario, Start, Truth};
 pub use surroundings::{Obstacle, Outline, Surroundings, Walk};

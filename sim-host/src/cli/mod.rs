@@ -3,6 +3,7 @@
 mod bound;
 mod convert;
 mod faults;
+mod floor_plans;
 mod paper;
 mod replay;
 mod run;
@@ -35,6 +36,8 @@ enum Command {
     SonarModel(sonar_model::Args),
     /// Prints what every fault of the hardware does to a robot, as markdown.
     Faults(faults::Args),
+    /// Compares two policies of the sonar in floor plans that nobody drew, as markdown.
+    FloorPlans(floor_plans::Args),
 }
 
 impl Cli {
@@ -51,6 +54,7 @@ impl Cli {
             Command::Bound(args) => bound::execute(&args),
             Command::SonarModel(args) => sonar_model::execute(&args),
             Command::Faults(args) => faults::execute(&args),
+            Command::FloorPlans(args) => floor_plans::execute(&args),
         }
     }
 }

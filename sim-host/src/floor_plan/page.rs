@@ -1,0 +1,1 @@
+//! What came out of the comparison, for the documentation.
