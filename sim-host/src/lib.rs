@@ -16,6 +16,7 @@ pub mod monte_carlo;
 pub mod observe;
 pub mod odometry;
 pub mod pins;
+pub mod plan;
 pub mod plant;
 pub mod replay;
 pub mod report;

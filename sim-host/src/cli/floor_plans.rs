@@ -1,8 +1,10 @@
 //! `sonarfix floor-plans`: two policies in floor plans that nobody drew.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use crate::floor_plan::{FloorPlan, compare};
+use anyhow::Context;
+
+use crate::floor_plan::{FloorPlan, compare, page, picture};
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -15,36 +17,52 @@ pub struct Args {
     /// Seed of the first plan; the others count up from it.
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    /// Where the pictures of the worst plan go.
+    #[arg(long, value_name = "DIR", conflicts_with = "draw")]
+    images: Option<PathBuf>,
     /// Draws the plan with this seed instead.
     #[arg(long, value_name = "SEED")]
     draw: Option<u64>,
     /// Where the drawing goes.
     #[arg(long, value_name = "FILE.svg", requires = "draw")]
     out: Option<PathBuf>,
-    /// Where its scenario goes, for `sonarfix run` and `sonarfix plan`.
+    /// Where the plan's scenario goes, for `sonarfix run` and `sonarfix plan`.
     #[arg(long, value_name = "FILE.toml", requires = "draw")]
     toml: Option<PathBuf>,
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
     if let Some(seed) = args.draw {
-        let plan = FloorPlan::new(seed);
-        println!("{}", plan.toml);
-        plan.scenario()?;
-        return Ok(());
+        return draw(seed, args);
     }
+    anyhow::ensure!(args.plans > 0, "--plans must be at least 1");
+    anyhow::ensure!(args.runs > 0, "--runs must be at least 1");
     let results = compare::run(args.seed, args.plans, args.runs)?;
-    for r in &results {
-        let i = r.ratio();
-        println!(
-            "{} {} rooms {} walls {} {:.0} m: nearest {:.1} mm lost {}, informative {:.1} mm lost {}: {:.3} ({:.3}..{:.3})",
-            r.plan.seed, r.plan.kind.name(), r.plan.rooms, r.walls, r.length,
-            1e3 * r.rms(compare::nearest), r.lost(compare::nearest),
-            1e3 * r.rms(compare::informative), r.lost(compare::informative),
-            i.value, i.from, i.to
-        );
+    let (text, pictures) = page::markdown(&results)?;
+    print!("{text}");
+    if let Some(dir) = &args.images {
+        std::fs::create_dir_all(dir).with_context(|| format!("cannot make {}", dir.display()))?;
+        for (name, map) in page::PICTURES.into_iter().zip(&pictures) {
+            write(&dir.join(name), &map.svg())?;
+        }
     }
-    let m = compare::median_ratio(&results);
-    println!("median {:.3} ({:.3}..{:.3})", m.value, m.from, m.to);
     Ok(())
+}
+
+fn draw(seed: u64, args: &Args) -> anyhow::Result<()> {
+    let both = [&args.out, &args.toml];
+    let somewhere = both.iter().any(|file| file.is_some());
+    anyhow::ensure!(somewhere, "--draw wants --out FILE.svg or --toml FILE.toml or both");
+    let plan = FloorPlan::new(seed);
+    if let Some(file) = &args.out {
+        write(file, &picture::place(&plan.scenario()?).svg())?;
+    }
+    if let Some(file) = &args.toml {
+        write(file, &plan.toml)?;
+    }
+    Ok(())
+}
+
+fn write(file: &Path, text: &str) -> anyhow::Result<()> {
+    std::fs::write(file, text).with_context(|| format!("cannot write {}", file.display()))
 }

@@ -5,6 +5,7 @@ mod convert;
 mod faults;
 mod floor_plans;
 mod paper;
+mod plan;
 mod replay;
 mod run;
 mod sonar_model;
@@ -32,6 +33,8 @@ enum Command {
     Convert(convert::Args),
     /// Prints how well any estimator could know the robot's state, over time.
     Bound(bound::Args),
+    /// Shows how well a robot would know where it is along a path, before it is built.
+    Plan(plan::Args),
     /// Prints how the simulated NXT sonar compares with recorded sweeps, as markdown.
     SonarModel(sonar_model::Args),
     /// Prints what every fault of the hardware does to a robot, as markdown.
@@ -52,6 +55,7 @@ impl Cli {
             Command::Replay(args) => replay::execute(&args),
             Command::Convert(args) => convert::execute(&args),
             Command::Bound(args) => bound::execute(&args),
+            Command::Plan(args) => plan::execute(&args),
             Command::SonarModel(args) => sonar_model::execute(&args),
             Command::Faults(args) => faults::execute(&args),
             Command::FloorPlans(args) => floor_plans::execute(&args),

@@ -139,7 +139,7 @@ impl PlanResult {
     #[must_use]
     pub fn ratio(&self) -> Interval {
         let mut rng = ChaCha8Rng::seed_from_u64(self.plan.seed);
-        bootstrap(&self.pairs, |pairs| ratio(pairs), &mut rng)
+        bootstrap(&self.pairs, ratio, &mut rng)
     }
 
     /// How many runs ended lost.

@@ -14,12 +14,14 @@
 //! | `clutter` | furniture beside the way, of which the map knows a part |
 //! | `text` | all that as a scenario |
 //! | [`compare`] | two policies on the same plans |
+//! | [`picture`] | plans drawn, and what happened on them |
 //! | [`page`] | what came out, for the documentation |
 
 mod clutter;
 pub mod compare;
 mod doors;
 pub mod page;
+pub mod picture;
 mod rooms;
 mod text;
 mod walk;

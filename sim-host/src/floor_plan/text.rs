@@ -79,7 +79,10 @@ impl Plan {
 
     fn write_world(&self, text: &mut String, rng: &mut ChaCha8Rng) -> std::fmt::Result {
         let celsius = ROOM + rng.random_range(-COLDER_OR_WARMER..COLDER_OR_WARMER);
-        writeln!(text, "[world]\ntemperature = \"{celsius:.1} degC\"\nunit = \"cm\"\nobstacle = [")?;
+        writeln!(
+            text,
+            "[world]\ntemperature = \"{celsius:.1} degC\"\nunit = \"cm\"\nobstacle = ["
+        )?;
         for face in &self.clutter.faces {
             writeln!(text, "    {{ {} }},", ends(face))?;
         }

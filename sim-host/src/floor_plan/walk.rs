@@ -8,9 +8,9 @@ use std::collections::VecDeque;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+use super::Point;
 use super::doors::Door;
 use super::rooms::{Room, Span};
-use super::Point;
 
 /// How far a corner is from the faces around it, centimetres.
 const MARGIN: i32 = 40;

@@ -69,6 +69,11 @@ impl Axis {
         }
     }
 
+    /// Where the ticks stand.
+    pub(super) fn ticks(&self) -> &[f64] {
+        &self.ticks
+    }
+
     /// What a tick says.
     pub(super) fn text(&self, tick: f64) -> String {
         let (value, decimals) = match self.scale {

@@ -11,6 +11,7 @@
 //! |---|---|
 //! | `figures` | what each figure shows |
 //! | `chart`, `axis`, `points` | how a figure is drawn |
+//! | [`heat_map`] | a map with a quantity along a path, a picture of its own |
 //! | `player` | the data of the player; its script is `player.js` |
 //! | `palette` | one colour for one thing, in figures and player |
 //! | `page` | tables, figures and data as HTML |
@@ -18,6 +19,7 @@
 mod axis;
 mod chart;
 mod figures;
+pub mod heat_map;
 mod page;
 mod palette;
 mod player;
