@@ -127,15 +127,15 @@ fn a_forecast_knows_only_what_can_be_known() {
     assert_eq!(Forecast::new(&honest, 2).unwrap(), Forecast::new(&wrong, 2).unwrap());
 }
 
-/// Missed echoes cost: the same sonar with half of its echoes knows less.
+/// Missed echoes cost: the same robot with a sonar that misses some knows less.
 #[test]
 fn a_sonar_that_hears_less_knows_less() {
     let mut scenario = paper();
     scenario.robot.config.sonar.max_range.0 = 3.5;
     let all = Forecast::new(&scenario, 4).unwrap();
+    let robot = scenario.robot;
     SonarPreset::HcSr04.fit(&mut scenario);
-    scenario.robot.config.sonar = paper().robot.config.sonar;
-    scenario.robot.config.sonar.max_range.0 = 3.5;
+    scenario.robot = robot;
     let some = Forecast::new(&scenario, 4).unwrap();
     assert!(some.ranges_per_second < all.ranges_per_second);
     let rms = |forecast: &Forecast| {
