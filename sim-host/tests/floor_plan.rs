@@ -1,7 +1,5 @@
 //! Floor plans out of a seed, and the sonar's policies on them.
 
-#![expect(clippy::unwrap_used, reason = "a test should stop")]
-
 use std::collections::HashSet;
 
 use sonarfix_map::{Outline, Scenario};
@@ -12,7 +10,6 @@ use sonarfix_sim::trace::Pose;
 
 /// As the plans' scenarios say, metres.
 const CLEARANCE: f64 = 0.2;
-/// What the generator leaves between the way and furniture, beside the clearance, is more.
 const SEEDS: std::ops::Range<u64> = 0..200;
 
 type Point = [f64; 2];
@@ -45,7 +42,7 @@ fn distance(a: Ends, b: Ends) -> f64 {
 fn legs(scenario: &Scenario) -> Vec<Ends> {
     let plan = scenario.path.plan();
     let corners: Vec<Point> = std::iter::once(plan.start).chain(plan.corners.clone()).collect();
-    corners.windows(2).map(|leg| [leg[0], leg[1]]).collect()
+    corners.iter().zip(corners.iter().skip(1)).map(|(&from, &to)| [from, to]).collect()
 }
 
 /// Every seed gives a scenario that its reader accepts (walls with names and lengths, the path

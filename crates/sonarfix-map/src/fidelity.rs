@@ -41,6 +41,8 @@ pub enum ServoName {
     Ideal,
     /// SG90.
     Sg90,
+    /// MG996R.
+    Mg996r,
 }
 
 /// Who keeps the robot on its path.
@@ -122,7 +124,8 @@ pub(crate) fn read_hardware(root: &Table<'_>) -> Result<Hardware, FileError> {
         ("srf08", SonarName::Srf08),
         ("polaroid_6500", SonarName::Polaroid6500),
     ];
-    let servos = [("ideal", ServoName::Ideal), ("sg90", ServoName::Sg90)];
+    let servos =
+        [("ideal", ServoName::Ideal), ("sg90", ServoName::Sg90), ("mg996r", ServoName::Mg996r)];
     Ok(Hardware {
         sonar: named(model(sensor.as_ref()), &sonars)?,
         set_temperature: temperature(sensor.as_ref())?,

@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI};
 
 use sonarfix::aim::Policy;
-use sonarfix::config::{CalibrationPrior, Config, Sonar, Trust};
+use sonarfix::config::{CalibrationPrior, Config, Pace, Rhythm, Sonar, Timing, Trust, Weights};
 use sonarfix::motion::Drive;
 use sonarfix::pose::Point;
 use sonarfix::range::RangeNoise;
@@ -115,7 +115,7 @@ fn the_robot_is_that_of_the_paper() {
     };
     assert_eq!(robot.config, config);
     assert_eq!(robot.encoder_period, Duration::millis(100));
-    assert_eq!(robot.fix_period, Duration::secs(1));
+    assert_eq!(robot.config.sonar.timing.rhythm, Rhythm::Every(Duration::secs(1)));
     assert_eq!(robot.travel_per_tick, None);
 }
 

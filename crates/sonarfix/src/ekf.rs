@@ -89,11 +89,21 @@ impl Innovation {
     }
 }
 
-/// The covariance of the position alone, m².
-pub(crate) struct PositionCovariance {
+/// The covariance of the position, m², and the variance of the heading, rad².
+pub(crate) struct PoseCovariance {
     pub xx: f32,
     pub xy: f32,
     pub yy: f32,
+    pub hh: f32,
+}
+
+/// What a range would tell if it were measured.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Prospect {
+    /// P Hᵀ: its covariance with each state.
+    pub with_states: Row,
+    /// S: its variance about the expected one.
+    pub variance: f32,
 }
 
 /// The filter.
@@ -187,9 +197,15 @@ impl Ekf {
         }
     }
 
-    /// Variances and covariance of x and y, m².
-    pub(crate) fn position_covariance(&self) -> PositionCovariance {
-        PositionCovariance { xx: self.p.xx, xy: self.p.xy, yy: self.p.yy }
+    /// Variances and covariance of x and y, and the heading's variance.
+    pub(crate) fn pose_covariance(&self) -> PoseCovariance {
+        PoseCovariance { xx: self.p.xx, xy: self.p.xy, yy: self.p.yy, hh: self.p.hh }
+    }
+
+    /// What this range would tell if it were measured, with noise variance `noise`.
+    pub(crate) fn prospect(&self, expected: &ExpectedRange, noise: SquareMetres) -> Prospect {
+        let with_states = self.cross_covariance(expected);
+        Prospect { with_states, variance: innovation_variance(expected, &with_states, noise) }
     }
 
     /// Predicts the state over one step of the wheels: `X̂ ← f(X̂, U)`, `P ← F P Fᵀ + Q`

@@ -5,14 +5,14 @@
 //! NaN or infinity in an argument is a typed error or a [`Fix::Refused`], and not one bit of the
 //! localizer's estimate has changed.
 
-use crate::aim::{self, Aim, NoAim, Unfit, Viewpoint};
+use crate::aim::{self, Aim, Answer, Memory, NoAim, Unfit, Viewpoint};
 use crate::config::{Config, ConfigError};
 use crate::ekf::{Ekf, EkfError, Innovation, State};
 use crate::health::Health;
-use crate::map::{Map, WallId};
+use crate::map::Map;
 use crate::motion::WheelTravel;
 use crate::pose::Pose;
-use crate::units::{Instant, Metres, Radians};
+use crate::units::{Instant, Metres, Radians, SquareMetres};
 
 /// Where the robot starts, and how sure that is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -169,10 +169,7 @@ pub struct Localizer<'m> {
     ekf: Ekf,
     health: Health,
     time: Instant,
-    /// The wall that something seems to stand before, by the last turn: passed over once.
-    spare: Option<WallId>,
-    /// The wall that did not answer at the last turn.
-    silent: Option<WallId>,
+    memory: Memory,
 }
 
 impl<'m> Localizer<'m> {
@@ -210,8 +207,7 @@ impl<'m> Localizer<'m> {
             ekf,
             health: Health::default(),
             time: now,
-            spare: None,
-            silent: None,
+            memory: Memory::default(),
         })
     }
 
@@ -232,23 +228,25 @@ impl<'m> Localizer<'m> {
         if elapsed.is_zero() && fastest.abs() > Metres(0.0) {
             return Err(OdometryError::NoTimePassed);
         }
-        #[expect(clippy::cast_precision_loss, reason = "a limit, not an equation")]
-        let seconds = elapsed.to_micros() as f32 * 1e-6;
+        let seconds = aim::seconds(elapsed);
         if fastest.abs().0 > self.config.max_wheel_speed.0 * seconds {
             return Err(OdometryError::TooFast);
         }
+        let before = self.pose().heading;
         self.ekf.predict(travel).map_err(OdometryError::Filter)?;
+        self.memory.turned(self.pose().heading.from(before), seconds);
         self.time = now;
         Ok(())
     }
 
-    /// Where the sonar should look next, by the policy of the configuration. A wall that
-    /// something seems to stand before is passed over once, if another counts.
+    /// Where the sonar should look next, by the policy of the configuration, and why. Where it
+    /// looked last, and which walls have lately not answered as they should, it knows from
+    /// [`Self::fix`].
     ///
     /// # Errors
     /// [`NoAim`], by why there is nothing to look at.
     pub fn aim(&self) -> Result<Aim, NoAim> {
-        aim::choose(&self.config, &self.map, &self.ekf, self.spare)
+        aim::choose(&self.config, &self.map, &self.ekf, &self.memory, self.time)
     }
 
     /// The wall that a sonar at `bearing` (relative to the heading) meets squarely, for a range
@@ -257,7 +255,7 @@ impl<'m> Localizer<'m> {
     /// # Errors
     /// [`NoAim`], by why there is none.
     pub fn aim_at(&self, bearing: Radians) -> Result<Aim, NoAim> {
-        aim::at(&self.config, &self.map, &self.ekf, bearing)
+        aim::at(&self.config, &self.map, &self.ekf, &self.memory, self.time, bearing)
     }
 
     /// Takes the range that came back from an aim, or `None` where no echo came. The pose must be
@@ -266,8 +264,7 @@ impl<'m> Localizer<'m> {
     /// Only [`Fix::Accepted`] changes the estimate; every outcome enters the health.
     pub fn fix(&mut self, aim: &Aim, range: Option<Metres>) -> Fix {
         let fix = self.try_fix(aim, range).unwrap_or_else(Fix::Refused);
-        self.spare = self.blocked(aim, &fix).then_some(aim.wall);
-        self.silent = matches!(fix, Fix::Refused(_)).then_some(aim.wall);
+        self.remember(aim, &fix);
         match fix {
             Fix::Accepted(_) => self.health.accepted(),
             Fix::Gated(innovation) => self.health.gated(innovation.value),
@@ -277,14 +274,19 @@ impl<'m> Localizer<'m> {
         fix
     }
 
-    /// Whether something seems to stand before the wall: a range that it shortened, or an echo that
-    /// stayed away twice; once is often chance.
-    fn blocked(&self, aim: &Aim, fix: &Fix) -> bool {
-        match fix {
-            Fix::Accepted(_) => false,
-            Fix::Gated(_) => true,
-            Fix::Refused(_) => self.silent == Some(aim.wall),
-        }
+    /// Takes note of how a look at a wall ended.
+    fn remember(&mut self, aim: &Aim, fix: &Fix) {
+        let Some(wall) = self.map.wall(aim.wall) else {
+            return;
+        };
+        let answer = match fix {
+            Fix::Accepted(_) => Answer::Right,
+            Fix::Gated(_) => Answer::Wrong,
+            Fix::Refused(Refusal::NoEcho) => Answer::Silence,
+            Fix::Refused(_) => Answer::Unknown,
+        };
+        let foot = wall.along(self.pose().to_map(self.config.sonar.mount));
+        self.memory.looked((aim.wall, foot), (aim.bearing, aim.range), answer, self.time);
     }
 
     /// Takes note that the sonar had its turn and [`Self::aim`] found no wall to look at, so that
@@ -305,15 +307,21 @@ impl<'m> Localizer<'m> {
         let wall = self.map.wall(aim.wall).ok_or(Refusal::UnknownWall)?;
         let view = Viewpoint::new(&self.config, &self.ekf);
         let expected = view.expect(&wall)?;
-        if !view.is_square(aim.bearing, &expected) {
+        let off = expected.direction.from(view.heading.turned(aim.bearing));
+        if !view.is_square(off) {
             return Err(Refusal::NotSquare);
         }
         let noise = sonar.noise.variance(expected.range);
         let innovation = self.ekf.innovation(range, &expected, noise);
         let gate = self.config.trust.gate;
+        let foot = wall.along(view.position);
+        let belief = self.memory.belief(aim.wall, foot, self.time);
         if innovation.nis() > gate * gate {
             return Ok(Fix::Gated(innovation));
         }
+        // Past the gate, but of a wall that something has stood before: half an echo of that, more
+        // likely than of another wall. It counts as if it were noisier (eq. 19).
+        let noise = SquareMetres(noise.0 / (belief * belief));
         match self.ekf.update(range, &expected, noise) {
             Ok(()) => Ok(Fix::Accepted(innovation)),
             Err(_) => Err(Refusal::NotFinite),

@@ -4,6 +4,7 @@ mod bound;
 mod convert;
 mod faults;
 mod floor_plans;
+mod overrides;
 mod paper;
 mod plan;
 mod replay;

@@ -202,12 +202,16 @@ fn write_worst_plan(
 
 /// Both policies' errors on one scale of colours.
 fn pictures(both: &[Runs; 2]) -> Vec<HeatMap> {
-    let mut maps: Vec<HeatMap> = both.iter().map(Runs::place).collect();
-    for ((map, runs), name) in maps.iter_mut().zip(both).zip(["nearest", "informative"]) {
-        map.title = format!("{}: {name}", map.title);
-        map.label = "position error, RMS (mm)".to_owned();
-        map.path = runs.errors();
-    }
+    let map = |(runs, name): (&Runs, &str)| {
+        let place = runs.place();
+        HeatMap {
+            title: format!("{}: {name}", place.title),
+            label: "position error, RMS (mm)".to_owned(),
+            path: runs.errors(),
+            ..place
+        }
+    };
+    let mut maps: Vec<HeatMap> = both.iter().zip(["nearest", "informative"]).map(map).collect();
     let values = maps.iter().filter_map(HeatMap::values);
     let range = values.reduce(|a, b| a.start.min(b.start)..a.end.max(b.end));
     for map in &mut maps {

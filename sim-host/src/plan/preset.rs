@@ -1,9 +1,10 @@
 //! Sonars and servos that one can buy, as the filter would be told of them.
 
 use clap::ValueEnum;
+use sonarfix::config::{Pace, Rhythm};
 use sonarfix::range::RangeNoise;
 use sonarfix::units::{Duration, Metres, Radians};
-use sonarfix_map::{Robot, Scenario, ServoName, SonarName};
+use sonarfix_map::{Scenario, ServoName, SonarName};
 
 /// A sonar by its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -82,7 +83,7 @@ impl SonarPreset {
         }
     }
 
-    /// Puts it on the robot of a scenario, in place of its own.
+    /// Puts it on the robot of a scenario, in place of its own, to look as fast as it can.
     pub fn fit(self, scenario: &mut Scenario) {
         let told = self.told();
         scenario.hardware.sonar = told.sonar;
@@ -91,13 +92,9 @@ impl SonarPreset {
         sonar.min_range = Metres(told.reach.0);
         sonar.max_range = Metres(told.reach.1);
         sonar.noise = RangeNoise { floor: Metres(told.noise.0), per_metre: told.noise.1 };
-        set_timing(&mut scenario.robot, Duration::from_ticks(told.cycle));
+        sonar.timing.rhythm = Rhythm::AsFastAsPossible;
+        sonar.timing.cycle = Duration::from_ticks(told.cycle);
     }
-}
-
-/// As fast as servo and sonar allow.
-fn set_timing(robot: &mut Robot, cycle: Duration) {
-    robot.fix_period = cycle;
 }
 
 /// A servo by its name.
@@ -107,14 +104,19 @@ pub enum ServoPreset {
     Ideal,
     /// SG90: 0.12 s/60°.
     Sg90,
+    /// MG996R: 0.17 s/60°.
+    Mg996r,
 }
 
 impl ServoPreset {
     /// Puts it under the sonar of a scenario's robot.
     pub fn fit(self, scenario: &mut Scenario) {
-        scenario.hardware.servo = match self {
-            Self::Ideal => ServoName::Ideal,
-            Self::Sg90 => ServoName::Sg90,
+        let (name, pace) = match self {
+            Self::Ideal => (ServoName::Ideal, Pace::INSTANT),
+            Self::Sg90 => (ServoName::Sg90, Pace::SG90),
+            Self::Mg996r => (ServoName::Mg996r, Pace::MG996R),
         };
+        scenario.hardware.servo = name;
+        scenario.robot.config.sonar.timing.servo = pace;
     }
 }

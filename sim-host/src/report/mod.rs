@@ -180,6 +180,7 @@ mod tests {
                 bearing: -1.57,
                 range: None,
                 met: None,
+                why: None,
                 outcome: Outcome::Refused,
                 reason: HOSTILE.into(),
                 innovation: None,

@@ -12,10 +12,11 @@ mod score;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
+use sonarfix::config::{Rhythm, Timing};
 use sonarfix::localizer::{Localizer, Start, StartError};
 use sonarfix::map::{Map, Wall};
 use sonarfix::pose::Pose;
-use sonarfix::units::{Instant, Metres, Radians};
+use sonarfix::units::{Duration, Instant, Metres, Radians};
 use sonarfix_hal::robot::Stamp;
 use sonarfix_map::{Fidelity, Follow, NamedWall, Scenario, SonarName};
 
@@ -168,8 +169,32 @@ impl Simulation {
 
     /// A localizer that starts at a time, µs.
     fn localizer_from(&self, start: Start, now: u64) -> Result<Localizer<'_>, SimulationError> {
-        let config = self.scenario.robot.config;
+        let mut config = self.scenario.robot.config;
+        config.sonar.timing = self.timing();
         Ok(Localizer::new(config, Map::new(&self.walls), start, Instant::from_ticks(now))?)
+    }
+
+    /// What the localizer is told that a look takes: at the ideal fidelity there is no servo.
+    fn timing(&self) -> Timing {
+        match self.scenario.fidelity {
+            Fidelity::Pins => self.scenario.robot.config.sonar.timing,
+            Fidelity::Ideal => {
+                Timing { rhythm: Rhythm::Every(self.ideal_period()), ..Timing::EVERY_SECOND }
+            }
+        }
+    }
+
+    /// From look to look at the ideal fidelity, where as fast as possible is once in a cycle of the
+    /// ranger, or with every encoder tick if that takes no time.
+    fn ideal_period(&self) -> Duration {
+        let timing = &self.scenario.robot.config.sonar.timing;
+        match timing.rhythm {
+            Rhythm::Every(period) => period,
+            Rhythm::AsFastAsPossible if timing.cycle.is_zero() => {
+                self.scenario.robot.encoder_period
+            }
+            Rhythm::AsFastAsPossible => timing.cycle,
+        }
     }
 
     /// Who steers, if anybody must.
