@@ -40,7 +40,8 @@ pub fn results(
     results
 }
 
-fn progress_bar(runs: u32) -> ProgressBar {
+/// A bar that counts runs.
+pub(crate) fn progress_bar(runs: u32) -> ProgressBar {
     // indicatif hides the bar by itself where standard error is not a terminal.
     let bar = ProgressBar::with_draw_target(Some(runs.into()), ProgressDrawTarget::stderr());
     match ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {eta} left") {

@@ -46,6 +46,11 @@ impl<'a> Document<'a> {
         Ok(Self { file, root: DeValue::Table(root.into_inner()) })
     }
 
+    /// Whether there is something at a key of the file.
+    pub fn has(&self, key: &str) -> bool {
+        self.root.as_table().is_some_and(|table| table.contains_key(key))
+    }
+
     /// The whole file as a table that may hold `format` and `keys`. The version is checked before
     /// the keys, which another version may have others of.
     pub fn root(&self, keys: &[&str]) -> Result<Table<'_>, FileError> {

@@ -23,6 +23,7 @@
 #![forbid(unsafe_code)]
 
 mod bake;
+mod clearance;
 mod document;
 mod error;
 mod faults;
@@ -33,6 +34,7 @@ mod geometry;
 mod map_file;
 mod neighbours;
 mod path;
+mod place;
 mod quantity;
 mod robot;
 mod scenario;
@@ -41,12 +43,14 @@ mod surroundings;
 mod survey;
 
 pub use bake::{BakeError, bake};
+pub use clearance::Collision;
 pub use error::FileError;
 pub use faults::{Fault, FaultKind, Wheel};
 pub use fidelity::{Fidelity, Follow, Hardware, ServoName, SonarName, Upset, Upsets};
 pub use floor::{Floor, NamedWall};
 pub use map_file::MapFile;
 pub use path::{Leg, Motion, Movement, Path, PathError, PathPlan, PathPose};
+pub use place::Place;
 pub use robot::Robot;
 pub use scenario::{Run, Scenario, Start, Truth};
 pub use simplify::{Limits, Simplified, simplify};

@@ -5,11 +5,11 @@
 //!
 //! | the turn | evidence | of the same wall again | because |
 //! |---|---|---|---|
-//! | taken | −1 | | down to 0 |
+//! | taken | −1.2 | | down to 0 |
 //! | taken, but weakened | 0 | | it may have been something else |
 //! | gated, too long | 1 | 0.7 | nothing that stands in a room makes a range longer |
-//! | no echo | 0.5 | 0.3 | a sonar misses some, and a wall that is not there all |
-//! | gated, too short | 0.3 | 0.05 | furniture does that, and stays while the robot passes it |
+//! | no echo | 0.6 | 0.3 | a sonar misses some, and a wall that is not there all |
+//! | gated, too short | 0.5 | 0.05 | furniture does that, and stays while the robot passes it |
 //! | not a range to compare, or no wall to look at | 0 | | it says nothing of the pose |
 //!
 //! It is Page's cumulative sum test: each number is about the logarithm of how much more often a turn
@@ -60,13 +60,13 @@ pub enum Verdict {
 }
 
 /// The evidence of a turn against the pose.
-const TAKEN: f32 = -1.0;
+const TAKEN: f32 = -1.2;
 const WEAKENED: f32 = 0.0;
 const TOO_LONG: f32 = 1.0;
 const TOO_LONG_AGAIN: f32 = 0.7;
-const NO_ECHO: f32 = 0.5;
+const NO_ECHO: f32 = 0.6;
 const NO_ECHO_AGAIN: f32 = 0.3;
-const TOO_SHORT: f32 = 0.3;
+const TOO_SHORT: f32 = 0.5;
 const TOO_SHORT_AGAIN: f32 = 0.05;
 
 /// One range that is too long reaches it, one that is short or missing does not.

@@ -148,8 +148,10 @@ fn limits(config: &Config) -> (f64, f64) {
 pub fn timing(scenario: &Scenario) -> PulseTiming {
     /// What an HC-SR04 is given after its longest flight, for its silence and its cycle.
     const SHORT: PulseTiming = PulseTiming::HC_SR04;
-    if scenario.hardware.sonar == SonarName::HcSr04 {
-        return SHORT;
+    match scenario.hardware.sonar {
+        SonarName::HcSr04 => return SHORT,
+        SonarName::LvMaxSonar => return PulseTiming::LV_MAXSONAR,
+        _ => {}
     }
     let reach = f64::from(scenario.robot.config.sonar.max_range.0);
     // A tenth more, for what is beyond the reach only by its noise or by the air.

@@ -12,6 +12,7 @@
 //! | `figures` | what each figure shows |
 //! | `called_lost` | the figure of `sonarfix health` |
 //! | `chart`, `axis`, `points` | how a figure is drawn |
+//! | [`heat_map`] | a map with a quantity along a path, a picture of its own |
 //! | `player` | the data of the player; its script is `player.js` |
 //! | `palette` | one colour for one thing, in figures and player |
 //! | [`map`] | the picture of a map alone |
@@ -21,6 +22,7 @@ mod axis;
 mod called_lost;
 mod chart;
 mod figures;
+pub mod heat_map;
 pub mod map;
 mod page;
 mod palette;

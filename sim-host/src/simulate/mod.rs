@@ -127,6 +127,13 @@ impl Simulation {
         Ok(Self { image: Some(sonarfix_map::bake(&self.walls)?), ..self })
     }
 
+    /// The same with a sonar that hears the walls that it hears, but never anything else, and says
+    /// what is true: what can be known of it before anything is built.
+    #[must_use]
+    pub fn undistorted(self) -> Self {
+        Self { sensor: self.sensor.undistorted(), ..self }
+    }
+
     /// A trace of this scenario with nothing in it yet.
     #[must_use]
     pub fn empty_trace(&self) -> Trace {
@@ -230,6 +237,9 @@ fn sensor(scenario: &Scenario) -> SensorModel {
         SonarName::Ideal => SensorModel::ideal(scenario),
         SonarName::HcSr04 => SensorModel::hc_sr04(),
         SonarName::Nxt => SensorModel::nxt(),
+        SonarName::LvMaxSonar => SensorModel::lv_maxsonar(),
+        SonarName::Srf08 => SensorModel::srf08(),
+        SonarName::Polaroid6500 => SensorModel::polaroid_6500(),
     };
     SensorModel { scale: scenario.truth.range_scale, ..model }
 }
