@@ -207,8 +207,9 @@ proptest! {
         prop_assert!(spread(&shorter) > spread(&longer));
     }
 
-    /// A robot that is lost lets its doubt grow by the stated rule with each range beyond the gate, up
-    /// to the stated bound, and says so; one that is not lost does not.
+    /// A robot that is lost lets its doubt grow by the stated rule with each range beyond the gate that
+    /// is not of the same wall again, up to the stated bound, and says so; one that is not lost does
+    /// not.
     #[test]
     fn the_gate_of_a_lost_robot_reopens(room in any_room(), mount in any_mount(), reopen in 0.005_f32..0.03) {
         let walls = walls_and_one_aside(&room);
@@ -216,6 +217,7 @@ proptest! {
         config.trust.reopen = Metres(reopen);
         let mut localizer = Localizer::new(config, Map::new(&walls), room.start(), Instant::from_ticks(0)).unwrap();
         let mut grown = 0_u16;
+        let mut looked_at = None;
         for _ in 0..200 {
             // 3 m beyond the wall: outside of the gate, however wide it grows.
             let Ok(aim) = localizer.aim() else { break };
@@ -224,7 +226,8 @@ proptest! {
             prop_assert!(matches!(fix, Fix::Gated(_)), "{fix:?}");
             let (before, after) = (was.covariance(), localizer.filter().covariance());
             let is_lost = localizer.health().verdict == Verdict::Lost;
-            prop_assert!(is_lost || before == after);
+            let again = looked_at.replace(aim.wall) == Some(aim.wall);
+            prop_assert!((is_lost && !again) || before == after);
             let added = after - before;
             let step = reopen * reopen;
             for i in [0, 1] {
@@ -235,7 +238,7 @@ proptest! {
             prop_assert_eq!(localizer.filter().state(), was.state());
             prop_assert_eq!(localizer.health().reopened, grown);
         }
-        prop_assert!(grown > 10, "{grown}");
+        prop_assert!(grown > 2, "{grown}");
         let doubt = localizer.health();
         prop_assert!(doubt.position_deviation.0 <= (reopen * 10.0).hypot(reopen).max(0.031) * 1.01, "{doubt:?}");
         prop_assert!(doubt.heading_deviation <= (config.sonar.cone * 0.25) + Radians(reopen));
