@@ -348,7 +348,7 @@ pub(crate) fn is_within(value: f32, limit: f32) -> bool {
 }
 
 /// Whether a variance is one to compute with.
-fn is_sound(variance: f32) -> bool {
+pub(crate) fn is_sound(variance: f32) -> bool {
     is_within(variance, WIDEST)
 }
 

@@ -337,3 +337,21 @@ fn a_refused_travel_does_not_count_for_health() {
     assert_eq!(refused, Err(OdometryError::TooFast));
     assert_eq!(localizer.health(), before);
 }
+
+/// A noise whose square is not finite would make NaN of no way at all.
+#[test]
+fn a_noise_too_large_to_square_is_refused() {
+    let sound = config_for_rooms(Point::default()).drive;
+    let started = |drive| Ekf::new(drive, State::default(), State::default());
+    assert!(started(sound).is_ok());
+    for large in [1e19, f32::MAX] {
+        let noise = PerRootMetre(Metres(large));
+        for drive in [
+            Drive { wheel_noise: noise, ..sound },
+            Drive { scale_walk: PerRootMetre(large), ..sound },
+            Drive { track_width_walk: noise, ..sound },
+        ] {
+            assert_eq!(started(drive).err(), Some(EkfError::NotFinite), "{drive:?}");
+        }
+    }
+}
