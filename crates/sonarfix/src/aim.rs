@@ -283,10 +283,11 @@ impl<'a> Chooser<'a> {
     /// to the wall at the time of the ping, when the robot will have turned on; if that is beyond
     /// its travel, to the end of it.
     fn point(&self, expected: &ExpectedRange) -> Pointing {
-        let (ahead, rest) = self
-            .memory
-            .last
-            .map_or((Radians(0.0), 0.0), |last| (last.bearing, self.pacing.rest_after(last.range)));
+        // The last bearing may be one that somebody else chose, beyond the servo's travel.
+        let last = self.memory.last;
+        let (ahead, rest) = last.map_or((Radians(0.0), 0.0), |last| {
+            (self.reach(last.bearing), self.pacing.rest_after(last.range))
+        });
         let bearing_after = |time: f32| expected.direction.from(self.heading_after(time));
         let now = self.reach(bearing_after(0.0));
         let turn = self.pacing.turn(now - ahead);
