@@ -44,7 +44,7 @@ macro_rules! measure_each {
     };
 }
 
-each_filter!(measure_each);
+each_filter!(measure_each ours: bench_ours::Ours;,);
 
 criterion_group!(benches, filters);
 criterion_main!(benches);

@@ -1,5 +1,5 @@
 //! Takes one filter, named on the command line, along the drive, for callgrind to count
-//! `bench_predict` or `bench_update`.
+//! `bench_predict` or `bench_update`; says how many of each there were.
 
 use std::env;
 use std::process::ExitCode;
@@ -19,13 +19,17 @@ fn bench_update<F: Filter>(filter: &mut F, range: &Range) {
 
 fn run<F: Filter>() {
     let mut filter = F::new(drive::START, drive::VARIANCES);
+    let mut updates = 0;
     for i in 0..drive::STEPS {
         let step = drive::step(&filter, i);
         bench_predict(&mut filter, &step);
         if let Some(range) = drive::range(&filter, i) {
             bench_update(&mut filter, &range);
+            updates += 1;
         }
     }
+    println!("predict {}", drive::STEPS);
+    println!("update {updates}");
 }
 
 macro_rules! run_named {
@@ -40,7 +44,7 @@ macro_rules! run_named {
     };
 }
 
-each_filter!(run_named);
+each_filter!(run_named ours: bench_ours::Ours;,);
 
 fn main() -> ExitCode {
     let name = env::args().nth(1).unwrap_or_default();

@@ -1,4 +1,4 @@
-//! The filters. Each is written as its library's own documentation would have it written for a
+//! The peers. Each is written as its library's own documentation would have it written for a
 //! robot, with the Jacobian of [`model`](crate::model) and what is constant set up once.
 
 #[cfg(feature = "adskalman")]
@@ -14,10 +14,11 @@ pub mod naive;
 #[cfg(feature = "numeris")]
 pub mod numeris;
 
-/// Calls `$do!(name: type;)` with every filter, by the name of its program in `bench-mcu`.
+/// Calls `$do!(name: type; …)` with every peer, by the name of its program in `bench-mcu`, and with
+/// what else is given.
 #[macro_export]
 macro_rules! each_filter {
-    ($do:ident) => {
+    ($do:ident, $($rest:tt)*) => {
         $do! {
             naive: $crate::filters::naive::Plain;
             naive_joseph: $crate::filters::naive::Joseph;
@@ -29,6 +30,7 @@ macro_rules! each_filter {
             numeris: $crate::filters::numeris::NumerisEkf;
             multicalc_passed_in: $crate::filters::multicalc::PassedIn;
             multicalc: $crate::filters::multicalc::OwnTrigonometry;
+            $($rest)*
         }
     };
 }

@@ -1,11 +1,12 @@
-//! The same work, done by Sonarfix and by its peers: a robot with two wheels and a sonar, six states
-//! in `f32`.
+//! The same work, done by the filters that would be picked instead of Sonarfix's: a robot with two
+//! wheels and a sonar, six states in `f32`.
 //!
 //! - [`model`]: the state, how a step of the wheels moves it, and what a range says of it.
 //! - [`drive`]: the drive that every filter is taken on.
-//! - [`filters`]: the filters, one file each.
+//! - [`filters`]: the peers, one file each. Ours is in `bench-ours`.
 //!
-//! A test holds every filter against an `f64` one, so that none does less work than another.
+//! A test of `bench-host` holds every filter against an `f64` one, so that none does less work than
+//! another.
 
 #![no_std]
 

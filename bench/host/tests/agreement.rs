@@ -1,6 +1,5 @@
 //! Every filter does the same work: after every step of the drive its state and covariance are
 //! those of an independent filter in `f64`.
-#![cfg(feature = "peers")]
 
 use bench_workload::model::{Range, STATES, Step, TRACK_WIDTH};
 use bench_workload::{Filter, drive};
@@ -125,4 +124,4 @@ macro_rules! agrees {
     };
 }
 
-bench_workload::each_filter!(agrees);
+bench_workload::each_filter!(agrees ours: bench_ours::Ours;,);
