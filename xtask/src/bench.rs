@@ -31,7 +31,7 @@ pub struct Subject {
 
 /// Ours first.
 const SUBJECTS: [Subject; 11] = [
-    subject("ours", "**Sonarfix**", "sonarfix", "Joseph, two passes"),
+    subject("shipped", "**Sonarfix as it ships**", "sonarfix", "Joseph, two passes"),
     subject("naive", "naive nalgebra", "nalgebra", "plain"),
     subject("naive_joseph", "naive nalgebra", "nalgebra", "Joseph"),
     subject("adskalman_symmetric", "adskalman", "adskalman", "symmetrised"),

@@ -34,13 +34,7 @@ struct Bar {
     why: &'static str,
 }
 
-const BARS: [Bar; 6] = [
-    Bar {
-        section: "cortex-m4f",
-        key: "six_states_instructions",
-        most: 2600,
-        why: "a sixth of what dense matrices cost at the same work",
-    },
+const BARS: [Bar; 5] = [
     Bar {
         section: "cortex-m4f",
         key: "predict_instructions",
@@ -80,7 +74,6 @@ const HEADER: &str = "\
 # What the shipped crate costs: `cargo xtask bless` writes this file, `cargo xtask budgets` compares.
 # Review a change of it like one of the code. `docs/benchmarks.md` says how each figure is measured.
 # Instructions and stack: of the worst call on an emulated board, without what calling costs.
-# Six states: ten predicts and one update of the work that `docs/benchmarks.md` compares.
 # Text: all functions that can be reached from the calls, in a linked program.
 ";
 
@@ -124,7 +117,6 @@ fn measure() -> anyhow::Result<Table> {
     let mut table = Table::new();
     for (section, target) in TARGETS {
         target.build("bench-probe", "")?;
-        target.build("bench-ours", "")?;
         table.insert(section.to_owned(), measure_on(&target)?);
     }
     Ok(table)
@@ -147,13 +139,6 @@ fn measure_on(target: &Target) -> anyhow::Result<BTreeMap<String, u32>> {
         let text = Program::read(&target.program(name))?.reach("probe_")?.bytes();
         figures.insert(format!("{code}_text_bytes"), u32::try_from(text)?);
     }
-    // The work that peers are compared at: ten predicts and one update of the six states.
-    let six = emulator::run(target, "ours")?;
-    let (predict, update) = (six.cost("predict")?, six.cost("update")?);
-    figures.insert(
-        "six_states_instructions".to_owned(),
-        10 * predict.most_instructions + update.most_instructions,
-    );
     Ok(figures)
 }
 

@@ -124,4 +124,4 @@ macro_rules! agrees {
     };
 }
 
-bench_workload::each_filter!(agrees ours: bench_ours::Ours;,);
+bench_workload::each_filter! { agrees, }
