@@ -12,45 +12,336 @@
 
 use nalgebra::SMatrix;
 
+use crate::motion::{Noise, Step};
 use crate::state::{State, wheels};
 
-/// Calls `$do!(entry row column)` for each entry of the upper triangle.
-macro_rules! each_entry {
-    ($do:ident) => {
-        $do!(xx x x); $do!(xy x y); $do!(xh x h); $do!(xc x c); $do!(xd x d); $do!(xw x w); $do!(xk x k);
-        $do!(yy y y); $do!(yh y h); $do!(yc y c); $do!(yd y d); $do!(yw y w); $do!(yk y k);
-        $do!(hh h h); $do!(hc h c); $do!(hd h d); $do!(hw h w); $do!(hk h k);
-        $do!(cc c c); $do!(cd c d); $do!(cw c w); $do!(ck c k);
-        $do!(dd d d); $do!(dw d w); $do!(dk d k);
-        $do!(ww w w); $do!(wk w k);
-        $do!(kk k k);
-    };
-}
-pub(crate) use each_entry;
+/// The largest variance that is computed with (m², rad², 1): a robot uncertain by a thousand
+/// kilometres.
+const WIDEST: f32 = 1e12;
 
-/// One number for each state: a row of the covariance, a gain.
+/// What the rounding of a sum of a few terms is worth, as a share of them: four times 2⁻²⁴.
+const ROUNDING: f32 = 1.0 / 4_194_304.0;
+
+/// Pose: the rows of heading, x and y, which every step changes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct Row {
+#[rustfmt::skip]
+pub struct PoseRows {
+    pub(crate) hc: f32, pub(crate) hd: f32, pub(crate) hw: f32, pub(crate) hh: f32,
+    pub(crate) xc: f32, pub(crate) xd: f32, pub(crate) xw: f32, pub(crate) xh: f32, pub(crate) xx: f32,
+    pub(crate) yc: f32, pub(crate) yd: f32, pub(crate) yw: f32, pub(crate) yh: f32, pub(crate) yy: f32,
+    pub(crate) xy: f32,
+}
+
+/// Calibration: scale errors and track-width error.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[rustfmt::skip]
+pub struct Calibration {
+    pub(crate) cc: f32, pub(crate) cd: f32, pub(crate) cw: f32,
+    pub(crate) dd: f32, pub(crate) dw: f32, pub(crate) ww: f32,
+}
+
+/// Upper triangle of the paper's six states.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SixStates {
+    /// Of the pose.
+    pub pose: PoseRows,
+    /// Of the calibration.
+    pub calibration: Calibration,
+}
+
+/// The covariances of the range scale.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[rustfmt::skip]
+pub struct RangeScale {
+    pub(crate) ck: f32, pub(crate) dk: f32, pub(crate) wk: f32,
+    pub(crate) xk: f32, pub(crate) yk: f32, pub(crate) hk: f32,
+    pub(crate) kk: f32,
+}
+
+impl SixStates {
+    /// F P Fᵀ + Q, multiplied out (`docs/model.md`, eq. 9).
+    ///
+    /// The step is seen as three small movements: half the turn, the advance along the
+    /// mid-heading, the other half. So the pose after it is linear in the pose before it, the turn
+    /// t and the advance s, and all that is needed are the covariances of these: `ht` is that of
+    /// heading and turn, `xm` that of x and the mid-heading m = h + t/2, and so on.
+    #[inline(always)]
+    pub fn propagate(&mut self, step: &Step, noise: &Noise) {
+        let (p, q) = (&mut self.pose, &mut self.calibration);
+        let (sin, cos) = (step.sin, step.cos);
+        // ∂x/∂m and ∂y/∂m.
+        let (swing_x, swing_y) = (-step.advance * sin, step.advance * cos);
+        let turn_with =
+            |c: f32, d: f32, w: f32| step.turn_c * c + step.turn_d * d + step.turn_w * w;
+        let advance_with = |c: f32, d: f32| step.advance_c * c + step.advance_d * d;
+
+        let (tc, sc) = (turn_with(q.cc, q.cd, q.cw), advance_with(q.cc, q.cd));
+        let (td, sd) = (turn_with(q.cd, q.dd, q.dw), advance_with(q.cd, q.dd));
+        let (tw, sw) = (turn_with(q.cw, q.dw, q.ww), advance_with(q.cw, q.dw));
+        let tt = noise.turn + step.turn_c * tc + step.turn_d * td + step.turn_w * tw;
+        let ts = noise.advance_turn + step.advance_c * tc + step.advance_d * td;
+        let ss = noise.advance + step.advance_c * sc + step.advance_d * sd;
+        q.cc += noise.scale_common;
+        q.dd += noise.scale_difference;
+        q.ww += noise.track_width_error;
+
+        let (ht, hs) = (turn_with(p.hc, p.hd, p.hw), advance_with(p.hc, p.hd));
+        let (cm, dm, wm) = (p.hc + 0.5 * tc, p.hd + 0.5 * td, p.hw + 0.5 * tw);
+        p.hc += tc;
+        p.hd += td;
+        p.hw += tw;
+        let hm = p.hh + 0.5 * ht;
+        let mt = ht + 0.5 * tt;
+        let (mm, ms) = (hm + 0.5 * mt, hs + 0.5 * ts);
+        let (m_new, s_new) = (hm + mt, hs + ts);
+        p.hh += mt + mt + noise.heading;
+        // A way's variance is a sum that may cancel to nothing, but must not round to less.
+        let (mm, ss) = (mm + ROUNDING * mm, ss + ROUNDING * ss);
+
+        // x_m is the covariance of the new x with the mid-heading, x_s that with the advance.
+        let (xt, xs) = (turn_with(p.xc, p.xd, p.xw), advance_with(p.xc, p.xd));
+        p.xc = p.xc + swing_x * cm + cos * sc;
+        p.xd = p.xd + swing_x * dm + cos * sd;
+        p.xw = p.xw + swing_x * wm + cos * sw;
+        let xm = p.xh + 0.5 * xt;
+        p.xh += xt + swing_x * m_new + cos * s_new;
+        let x_m = xm + swing_x * mm + cos * ms;
+        let x_s = xs + swing_x * ms + cos * ss;
+        p.xx += noise.position + swing_x * (xm + x_m) + cos * (xs + x_s);
+
+        let (yt, ys) = (turn_with(p.yc, p.yd, p.yw), advance_with(p.yc, p.yd));
+        p.yc = p.yc + swing_y * cm + sin * sc;
+        p.yd = p.yd + swing_y * dm + sin * sd;
+        p.yw = p.yw + swing_y * wm + sin * sw;
+        let ym = p.yh + 0.5 * yt;
+        p.yh += yt + swing_y * m_new + sin * s_new;
+        p.xy += swing_y * x_m + sin * x_s + swing_x * ym + cos * ys;
+        let y_m = ym + swing_y * mm + sin * ms;
+        let y_s = ys + swing_y * ms + sin * ss;
+        p.yy += noise.position + swing_y * (ym + y_m) + sin * (ys + y_s);
+    }
+}
+
+impl PoseRows {
+    /// What the wheels' noise lacks of the rounding that a step of this covariance may bring, for
+    /// position (each axis) and heading (`docs/model.md`, eq. 9).
+    #[inline(always)]
+    pub fn rounding(&self, advance: f32, turn: f32) -> (f32, f32) {
+        let position = ROUNDING * (self.xx + self.yy) - advance;
+        let heading = ROUNDING * self.hh - turn;
+        (if position > 0.0 { position } else { 0.0 }, if heading > 0.0 { heading } else { 0.0 })
+    }
+
+    /// Whether the variances of the pose are sound.
+    #[inline(always)]
+    pub fn is_sound(&self) -> bool {
+        is_sound(self.xx) && is_sound(self.yy) && is_sound(self.hh)
+    }
+}
+
+impl RangeScale {
+    /// The same for the range scale: its covariances turn as the states do, and it has no noise.
+    #[inline(always)]
+    pub fn propagate(&mut self, step: &Step) {
+        let p = &mut *self;
+        let tk = step.turn_c * p.ck + step.turn_d * p.dk + step.turn_w * p.wk;
+        let sk = step.advance_c * p.ck + step.advance_d * p.dk;
+        let km = p.hk + 0.5 * tk;
+        p.xk += step.cos * sk - step.advance * step.sin * km;
+        p.yk += step.sin * sk + step.advance * step.cos * km;
+        p.hk += tk;
+    }
+}
+
+/// The sharpest that the covariance gets along a range's direction: this share of the variances
+/// that make it up.
+///
+/// A slanted wall ties x and y together. If each is uncertain by 100 m and the range by 0.1 mm, the
+/// tie is a difference of numbers 10¹² times larger, where an `f32` has seven digits: P would soon
+/// have a negative eigenvalue. 2⁻¹⁴ leaves ten bits for the rounding of the steps to come (measured
+/// by `tests/properties/covariance.rs`: at 2⁻¹⁶ it goes wrong within a few hundred runs of a parked
+/// robot, at 2⁻¹⁵ it does not).
+const SHARPEST: f32 = 1.0 / 16_384.0;
+
+/// The largest sum of squares of a range's derivatives that is computed with.
+const STEEPEST: f32 = 1e6;
+
+/// H: how a range depends on x, y, heading and range scale; also P Hᵀ in these states.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Derivatives {
+    /// By x, dimensionless.
     pub x: f32,
+    /// By y, dimensionless.
     pub y: f32,
+    /// By heading, metres per radian.
     pub h: f32,
-    pub c: f32,
-    pub d: f32,
-    pub w: f32,
+    /// By range scale, metres.
     pub k: f32,
+}
+
+impl Derivatives {
+    /// H times a column.
+    pub fn times(&self, column: &Self) -> f32 {
+        self.x * column.x + self.y * column.y + self.h * column.h + self.k * column.k
+    }
+
+    fn scaled(&self, factor: f32) -> Self {
+        Self { x: self.x * factor, y: self.y * factor, h: self.h * factor, k: self.k * factor }
+    }
+}
+
+/// K: how much of an innovation each state takes.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Gain {
+    pub(crate) x: f32,
+    pub(crate) y: f32,
+    pub(crate) h: f32,
+    pub(crate) c: f32,
+    pub(crate) d: f32,
+    pub(crate) w: f32,
+    pub(crate) k: f32,
+}
+
+/// What a correction came to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Correction {
+    /// P has changed; the state is to change by this gain.
+    Taken(Gain),
+    /// The range adds nothing: P is as sharp along H as it can be held (eq. 17).
+    Spare,
+    /// A derivative is too large to compute with, or not a number; nothing has changed.
+    NotFinite,
+    /// The range's variance is not positive; nothing has changed.
+    Indefinite,
+}
+
+impl Covariance {
+    /// P Hᵀ, of the states that the range depends on.
+    #[inline(always)]
+    pub fn cross(&self, h: &Derivatives) -> Derivatives {
+        let (p, k) = (&self.six.pose, &self.scale);
+        Derivatives {
+            x: p.xx * h.x + p.xy * h.y + p.xh * h.h + k.xk * h.k,
+            y: p.xy * h.x + p.yy * h.y + p.yh * h.h + k.yk * h.k,
+            h: p.xh * h.x + p.yh * h.y + p.hh * h.h + k.hk * h.k,
+            k: k.xk * h.x + k.yk * h.y + k.hk * h.h + k.kk * h.k,
+        }
+    }
+
+    /// Joseph's form in two passes (`docs/model.md`, eqs. 15 and 17).
+    #[inline(always)]
+    pub fn correct(&mut self, h: &Derivatives, noise: f32) -> Correction {
+        let squares = Derivatives { x: h.x * h.x, y: h.y * h.y, h: h.h * h.h, k: h.k * h.k };
+        // Neither holds for NaN.
+        let gentle = squares.x + squares.y + squares.h + squares.k <= STEEPEST;
+        if !gentle {
+            return Correction::NotFinite;
+        }
+        let m = self.cross(h);
+        let along = h.times(&m);
+        let s = noise + along;
+        let positive = s >= f32::MIN_POSITIVE;
+        if !positive {
+            return Correction::Indefinite;
+        }
+        let (p, q, k) = (&mut self.six.pose, &mut self.six.calibration, &mut self.scale);
+        let mut noise = noise;
+        let mut per_variance = 1.0 / s;
+        let mut gain = m.scaled(per_variance);
+        let variances = |gain: &Derivatives| Derivatives {
+            x: p.xx - gain.x * m.x,
+            y: p.yy - gain.y * m.y,
+            h: p.hh - gain.h * m.h,
+            k: k.kk - gain.k * m.k,
+        };
+        let mut first = variances(&gain);
+        let least = SHARPEST * squares.times(&first);
+        if noise * along * per_variance < least {
+            if along <= least {
+                return Correction::Spare;
+            }
+            // What leaves v r/(v + r) = least.
+            noise = along * least / (along - least);
+            per_variance = 1.0 / (noise + along);
+            gain = m.scaled(per_variance);
+            first = variances(&gain);
+        }
+        // First pass.
+        let xy = p.xy - gain.x * m.y;
+        let xh = p.xh - gain.x * m.h;
+        let xk = k.xk - gain.x * m.k;
+        let yh = p.yh - gain.y * m.h;
+        let yk = k.yk - gain.y * m.k;
+        let hk = k.hk - gain.h * m.k;
+        // In exact arithmetic P₁ Hᵀ = K R, and the second pass adds nothing.
+        let d = Derivatives {
+            x: gain.x * noise - (first.x * h.x + xy * h.y + xh * h.h + xk * h.k),
+            y: gain.y * noise - (xy * h.x + first.y * h.y + yh * h.h + yk * h.k),
+            h: gain.h * noise - (xh * h.x + yh * h.y + first.h * h.h + hk * h.k),
+            k: gain.k * noise - (xk * h.x + yk * h.y + hk * h.h + first.k * h.k),
+        };
+        let half = 0.5 * h.times(&d);
+        let e = Derivatives {
+            x: d.x - half * gain.x,
+            y: d.y - half * gain.y,
+            h: d.h - half * gain.h,
+            k: d.k - half * gain.k,
+        };
+        p.xx = first.x + e.x * gain.x + e.x * gain.x;
+        p.xy = xy + e.x * gain.y + gain.x * e.y;
+        p.xh = xh + e.x * gain.h + gain.x * e.h;
+        k.xk = xk + e.x * gain.k + gain.x * e.k;
+        p.yy = first.y + e.y * gain.y + e.y * gain.y;
+        p.yh = yh + e.y * gain.h + gain.y * e.h;
+        k.yk = yk + e.y * gain.k + gain.y * e.k;
+        p.hh = first.h + e.h * gain.h + e.h * gain.h;
+        k.hk = hk + e.h * gain.k + gain.h * e.k;
+        k.kk = first.k + e.k * gain.k + e.k * gain.k;
+        macro_rules! column {
+            ($x:expr, $y:expr, $h:expr, $k:expr) => {{
+                let m = $x * h.x + $y * h.y + $h * h.h + $k * h.k;
+                let g = m * per_variance;
+                let (x, y) = ($x - gain.x * m, $y - gain.y * m);
+                let (h_, k_) = ($h - gain.h * m, $k - gain.k * m);
+                let e_j = g * noise - (x * h.x + y * h.y + h_ * h.h + k_ * h.k) - half * g;
+                $x = x + e.x * g + gain.x * e_j;
+                $y = y + e.y * g + gain.y * e_j;
+                $h = h_ + e.h * g + gain.h * e_j;
+                $k = k_ + e.k * g + gain.k * e_j;
+                (m, g, e_j)
+            }};
+        }
+        let (mc, gc, ec) = column!(p.xc, p.yc, p.hc, k.ck);
+        q.cc = q.cc - gc * mc + ec * gc + ec * gc;
+        let (md, gd, ed) = column!(p.xd, p.yd, p.hd, k.dk);
+        q.cd = q.cd - gc * md + ec * gd + gc * ed;
+        q.dd = q.dd - gd * md + ed * gd + ed * gd;
+        let (mw, gw, ew) = column!(p.xw, p.yw, p.hw, k.wk);
+        q.cw = q.cw - gc * mw + ec * gw + gc * ew;
+        q.dw = q.dw - gd * mw + ed * gw + gd * ew;
+        q.ww = q.ww - gw * mw + ew * gw + ew * gw;
+        Correction::Taken(Gain { x: gain.x, y: gain.y, h: gain.h, k: gain.k, c: gc, d: gd, w: gw })
+    }
+}
+
+/// Whether 0 ≤ `value` ≤ `limit`. As integers, the bits of negative numbers and of NaN are larger
+/// than those of any number in question.
+pub(crate) fn is_within(value: f32, limit: f32) -> bool {
+    value.to_bits() <= limit.to_bits()
+}
+
+/// Whether a variance is one to compute with.
+fn is_sound(variance: f32) -> bool {
+    is_within(variance, WIDEST)
 }
 
 /// Upper triangle of the covariance.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-#[rustfmt::skip]
-pub(crate) struct Covariance {
-    pub xx: f32, pub xy: f32, pub xh: f32, pub xc: f32, pub xd: f32, pub xw: f32, pub xk: f32,
-    pub yy: f32, pub yh: f32, pub yc: f32, pub yd: f32, pub yw: f32, pub yk: f32,
-    pub hh: f32, pub hc: f32, pub hd: f32, pub hw: f32, pub hk: f32,
-    pub cc: f32, pub cd: f32, pub cw: f32, pub ck: f32,
-    pub dd: f32, pub dw: f32, pub dk: f32,
-    pub ww: f32, pub wk: f32,
-    pub kk: f32,
+pub struct Covariance {
+    /// Of the paper's states.
+    pub six: SixStates,
+    /// Of the range scale.
+    pub scale: RangeScale,
 }
 
 impl Covariance {
@@ -59,15 +350,22 @@ impl Covariance {
         let square = |sigma: f32| sigma * sigma;
         let (rr, ll) = (square(deviation.scale_right), square(deviation.scale_left));
         Self {
-            xx: square(deviation.x),
-            yy: square(deviation.y),
-            hh: square(deviation.heading),
-            cc: 0.25 * (rr + ll),
-            cd: 0.5 * (rr - ll),
-            dd: rr + ll,
-            ww: square(deviation.track_width_error),
-            kk: square(deviation.range_scale),
-            ..Self::default()
+            six: SixStates {
+                pose: PoseRows {
+                    xx: square(deviation.x),
+                    yy: square(deviation.y),
+                    hh: square(deviation.heading),
+                    ..PoseRows::default()
+                },
+                calibration: Calibration {
+                    cc: 0.25 * (rr + ll),
+                    cd: 0.5 * (rr - ll),
+                    dd: rr + ll,
+                    ww: square(deviation.track_width_error),
+                    ..Calibration::default()
+                },
+            },
+            scale: RangeScale { kk: square(deviation.range_scale), ..RangeScale::default() },
         }
     }
 
@@ -75,91 +373,46 @@ impl Covariance {
     /// (`docs/model.md`, eq. 9).
     #[rustfmt::skip]
     pub fn to_matrix(self) -> SMatrix<f32, 7, 7> {
-        let p = self;
+        let (p, q, k) = (self.six.pose, self.six.calibration, self.scale);
         let (xr, xl) = wheels(p.xc, p.xd);
         let (yr, yl) = wheels(p.yc, p.yd);
         let (hr, hl) = wheels(p.hc, p.hd);
-        let (wr, wl) = wheels(p.cw, p.dw);
-        let (kr, kl) = wheels(p.ck, p.dk);
+        let (wr, wl) = wheels(q.cw, q.dw);
+        let (kr, kl) = wheels(k.ck, k.dk);
         let (rr, ll) = self.wheel_variances();
-        let rl = p.cc - 0.25 * p.dd;
+        let rl = q.cc - 0.25 * q.dd;
         SMatrix::<f32, 7, 7>::from_row_slice(&[
-            p.xx, p.xy, p.xh,   xr,   xl, p.xw, p.xk,
-            p.xy, p.yy, p.yh,   yr,   yl, p.yw, p.yk,
-            p.xh, p.yh, p.hh,   hr,   hl, p.hw, p.hk,
+            p.xx, p.xy, p.xh,   xr,   xl, p.xw, k.xk,
+            p.xy, p.yy, p.yh,   yr,   yl, p.yw, k.yk,
+            p.xh, p.yh, p.hh,   hr,   hl, p.hw, k.hk,
               xr,   yr,   hr,   rr,   rl,   wr,   kr,
               xl,   yl,   hl,   rl,   ll,   wl,   kl,
-            p.xw, p.yw, p.hw,   wr,   wl, p.ww, p.wk,
-            p.xk, p.yk, p.hk,   kr,   kl, p.wk, p.kk,
+            p.xw, p.yw, p.hw,   wr,   wl, q.ww, k.wk,
+            k.xk, k.yk, k.hk,   kr,   kl, k.wk, k.kk,
         ])
     }
 
     /// Variances of the right and the left wheel's scale error.
     pub fn wheel_variances(&self) -> (f32, f32) {
-        wheels(self.cc + 0.25 * self.dd, 2.0 * self.cd)
+        let p = &self.six.calibration;
+        wheels(p.cc + 0.25 * p.dd, 2.0 * p.cd)
     }
 
-    /// P Hᵀ for a measurement that depends on x, y, heading and range scale alone.
-    #[inline]
-    pub fn times(&self, x: f32, y: f32, h: f32, k: f32) -> Row {
-        let p = self;
-        Row {
-            x: p.xx * x + p.xy * y + p.xh * h + p.xk * k,
-            y: p.xy * x + p.yy * y + p.yh * h + p.yk * k,
-            h: p.xh * x + p.yh * y + p.hh * h + p.hk * k,
-            c: p.xc * x + p.yc * y + p.hc * h + p.ck * k,
-            d: p.xd * x + p.yd * y + p.hd * h + p.dk * k,
-            w: p.xw * x + p.yw * y + p.hw * h + p.wk * k,
-            k: p.xk * x + p.yk * y + p.hk * h + p.kk * k,
-        }
+    /// Whether a variance is negative: no covariance any more.
+    #[cold]
+    pub fn is_negative(&self) -> bool {
+        let (p, q, k) = (&self.six.pose, &self.six.calibration, &self.scale);
+        [p.xx, p.yy, p.hh, q.cc, q.dd, q.ww, k.kk].iter().any(|&variance| variance < 0.0)
     }
 
-    /// Whether every variance is finite and none is negative, and every covariance is finite.
+    /// Whether all variances are sound.
+    #[inline(always)]
     pub fn is_sound(&self) -> bool {
-        let p = self;
-        let mut sum = 0.0;
-        macro_rules! add {
-            ($entry:ident $i:ident $j:ident) => {
-                // 0·v is 0 for any finite v and NaN otherwise: one comparison for all 28.
-                sum += p.$entry * 0.0;
-            };
-        }
-        each_entry!(add);
-        let none_negative = p.xx >= 0.0
-            && p.yy >= 0.0
-            && p.hh >= 0.0
-            && p.cc >= 0.0
-            && p.dd >= 0.0
-            && p.ww >= 0.0
-            && p.kk >= 0.0;
-        none_negative && f32::is_finite(sum)
-    }
-}
-
-impl Row {
-    /// The sum of this and `factor` times `other`.
-    pub fn plus_scaled(self, other: &Self, factor: f32) -> Self {
-        Self {
-            x: self.x + factor * other.x,
-            y: self.y + factor * other.y,
-            h: self.h + factor * other.h,
-            c: self.c + factor * other.c,
-            d: self.d + factor * other.d,
-            w: self.w + factor * other.w,
-            k: self.k + factor * other.k,
-        }
-    }
-
-    /// Every number times `factor`.
-    pub fn scaled(self, factor: f32) -> Self {
-        Self {
-            x: self.x * factor,
-            y: self.y * factor,
-            h: self.h * factor,
-            c: self.c * factor,
-            d: self.d * factor,
-            w: self.w * factor,
-            k: self.k * factor,
-        }
+        let q = &self.six.calibration;
+        self.six.pose.is_sound()
+            && is_sound(q.cc)
+            && is_sound(q.dd)
+            && is_sound(q.ww)
+            && is_sound(self.scale.kk)
     }
 }

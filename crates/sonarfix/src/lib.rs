@@ -41,3 +41,13 @@ pub mod range;
 mod state;
 pub mod trig;
 pub mod units;
+
+/// The parts of the filter's kernel, as [`ekf::Ekf`] uses them: to be counted one by one. Outside
+/// semver.
+#[cfg(feature = "unstable-kernel")]
+#[doc(hidden)]
+pub mod kernel {
+    pub use crate::covariance::{Correction, Covariance, Derivatives, Gain, RangeScale, SixStates};
+    pub use crate::motion::{Noise, Rates, Step};
+    pub use crate::state::{Mean, Remainder};
+}

@@ -6,12 +6,12 @@
 //! spot, and on a curve takes the error of a step from Δs Δψ/2, sideways, to Δs Δψ²/24, ahead.
 //!
 //! # Non-finite policy
-//! Nothing here refuses a value; [`Ekf::predict`](crate::ekf::Ekf::predict) checks the travel
-//! before and the state after.
+//! Nothing here refuses a value; [`Ekf::predict`](crate::ekf::Ekf::predict) checks the turn and the
+//! covariance that come of it.
 
+use crate::covariance::PoseRows;
 use crate::state::{Mean, wheels};
-use crate::trig::sin_cos;
-use crate::units::{Metres, PerRootMetre, Radians};
+use crate::units::{Metres, PerRootMetre};
 
 /// How far each wheel rolled since the last step, by its encoder and nominal diameter. Negative
 /// is backwards.
@@ -58,55 +58,127 @@ pub struct Drive {
     pub track_width_walk: PerRootMetre<Metres>,
 }
 
+/// The drive as the filter computes with it: what [`Drive`] says, its noises as variances that grow
+/// with the ways of both wheels together, |ΔR| + |ΔL|.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rates {
+    track_width: f32,
+    /// Of the advance: `σ_w²`/4, m²/m.
+    advance: f32,
+    /// Of the common part and of the difference of the scale errors: `σ_S²`/4 and `σ_S²`, 1/m. Of two
+    /// independent walks the mean has half the variance, the difference twice.
+    scale_common: f32,
+    scale_difference: f32,
+    /// Of the track-width error: `σ_D²`/2, m²/m.
+    track_width_error: f32,
+}
+
+impl Rates {
+    /// The rates of a drive.
+    #[must_use]
+    pub fn new(drive: &Drive) -> Self {
+        let square = |sigma: f32| sigma * sigma;
+        let scale = square(drive.scale_walk.0);
+        Self {
+            track_width: drive.track_width.0,
+            advance: 0.25 * square(drive.wheel_noise.0.0),
+            scale_common: 0.25 * scale,
+            scale_difference: scale,
+            track_width_error: 0.5 * square(drive.track_width_walk.0.0),
+        }
+    }
+}
+
 /// One step of the motion model, linearised at the state before it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Step {
+pub struct Step {
     /// Sine and cosine of the mid-heading ψ + Δψ/2.
-    pub sin: f32,
-    pub cos: f32,
+    pub(crate) sin: f32,
+    pub(crate) cos: f32,
     /// Way of the midpoint between the wheels, Δs, metres.
-    pub advance: f32,
+    pub(crate) advance: f32,
     /// Turn, Δψ, radians.
-    pub turn: f32,
+    pub(crate) turn: f32,
     /// Derivatives of Δs by the common part and the difference of the scale errors; Δs does not
     /// depend on the track width.
-    pub advance_c: f32,
-    pub advance_d: f32,
+    pub(crate) advance_c: f32,
+    pub(crate) advance_d: f32,
     /// Derivatives of Δψ by the common part, the difference, and the track-width error.
-    pub turn_c: f32,
-    pub turn_d: f32,
-    pub turn_w: f32,
-    /// Noise of the pair (Δs, Δψ): variances and covariance.
-    pub advance_variance: f32,
-    pub turn_variance: f32,
-    pub advance_turn: f32,
+    pub(crate) turn_c: f32,
+    pub(crate) turn_d: f32,
+    pub(crate) turn_w: f32,
+}
+
+/// What one step adds: Q, but for F.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// Of the pair (Δs, Δψ): variances and covariance.
+    pub(crate) advance: f32,
+    pub(crate) turn: f32,
+    pub(crate) advance_turn: f32,
+    /// Of x and of y, and of the heading: what makes up for rounding.
+    pub(crate) position: f32,
+    pub(crate) heading: f32,
+    /// Of the common part and the difference of the scale errors, and of the track width.
+    pub(crate) scale_common: f32,
+    pub(crate) scale_difference: f32,
+    pub(crate) track_width_error: f32,
 }
 
 impl Step {
-    pub fn new(drive: &Drive, at: &Mean, travel: WheelTravel) -> Self {
+    /// The step that these travels make from `at`. `sin_cos` is told the mid-heading.
+    #[inline(always)]
+    pub fn new(
+        rates: &Rates,
+        at: &Mean,
+        travel: WheelTravel,
+        sin_cos: impl FnOnce(f32) -> (f32, f32),
+    ) -> Self {
         let (right, left) = (travel.right.0, travel.left.0);
         let (factor_r, factor_l) = wheels(1.0 + at.scale_common, at.scale_difference);
         let (rolled_r, rolled_l) = (right * factor_r, left * factor_l);
-        let per_width = 1.0 / (drive.track_width.0 + at.track_width_error);
+        let per_width = 1.0 / (rates.track_width + at.track_width_error);
         let turn = (rolled_r - rolled_l) * per_width;
-        let (sin, cos) = sin_cos(Radians(at.heading + 0.5 * turn));
-
-        let per_metre = drive.wheel_noise.0.0 * drive.wheel_noise.0.0;
-        let noise_r = per_metre * right.abs() * factor_r * factor_r;
-        let noise_l = per_metre * left.abs() * factor_l * factor_l;
+        let (sin, cos) = sin_cos(at.heading + 0.5 * turn);
+        let (mean, difference) = (0.5 * (right + left), right - left);
         Self {
             sin,
             cos,
             advance: 0.5 * (rolled_r + rolled_l),
             turn,
-            advance_c: 0.5 * (right + left),
-            advance_d: 0.25 * (right - left),
-            turn_c: (right - left) * per_width,
-            turn_d: 0.5 * (right + left) * per_width,
+            advance_c: mean,
+            advance_d: 0.25 * difference,
+            turn_c: difference * per_width,
+            turn_d: mean * per_width,
             turn_w: -turn * per_width,
-            advance_variance: 0.25 * (noise_r + noise_l),
-            turn_variance: (noise_r + noise_l) * per_width * per_width,
-            advance_turn: 0.5 * (noise_r - noise_l) * per_width,
+        }
+    }
+}
+
+impl Noise {
+    /// The noise of that step (`docs/model.md`, eq. 9).
+    #[inline(always)]
+    pub fn new(rates: &Rates, at: &Mean, travel: WheelTravel, p: &PoseRows) -> Self {
+        let (right, left) = (travel.right.0, travel.left.0);
+        let (factor_r, factor_l) = wheels(1.0 + at.scale_common, at.scale_difference);
+        let per_width = 1.0 / (rates.track_width + at.track_width_error);
+        // |Δ| (1 + S)² of each wheel.
+        let of_r = (right * factor_r * factor_r).abs();
+        let of_l = (left * factor_l * factor_l).abs();
+        let advance = rates.advance * (of_r + of_l);
+        let per_half_width = per_width + per_width;
+        let rolled = right.abs() + left.abs();
+        let turn = advance * per_half_width * per_half_width;
+        let (position, heading) = p.rounding(advance, turn);
+        Self {
+            advance,
+            turn,
+            position,
+            heading,
+            advance_turn: rates.advance * (of_r - of_l) * per_half_width,
+            scale_common: rolled * rates.scale_common,
+            scale_difference: rolled * rates.scale_difference,
+            track_width_error: rolled * rates.track_width_error,
         }
     }
 }

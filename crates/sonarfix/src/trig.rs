@@ -22,6 +22,9 @@ const HALF_PI_HIGH: f32 = 1.570_312_5;
 const HALF_PI_MIDDLE: f32 = 4.837_513e-4;
 const HALF_PI_LOW: f32 = 7.549_79e-8;
 
+/// 1.5·2²³: a float of this size has a last place of 1.
+const SHIFT: f32 = 12_582_912.0;
+
 /// Sine and cosine of an angle, within 1e-7 of the true values for |angle| ≤ [`RANGE`]
 /// (measured: 7.7e-8).
 ///
@@ -36,32 +39,29 @@ const HALF_PI_LOW: f32 = 7.549_79e-8;
 /// ```
 #[must_use]
 pub fn sin_cos(angle: Radians) -> (f32, f32) {
-    let x = if angle.abs() > RANGE {
-        libm::remainderf(angle.0, core::f32::consts::TAU)
-    } else {
-        angle.0
-    };
-    let quadrant = nearest_integer(x * core::f32::consts::FRAC_2_PI);
-    let q = quadrant_as_float(quadrant);
+    if angle.abs() <= RANGE { sin_cos_within(angle.0) } else { of_a_huge_angle(angle.0) }
+}
+
+/// Sine and cosine beyond [`RANGE`].
+#[cold]
+#[inline(never)]
+fn of_a_huge_angle(x: f32) -> (f32, f32) {
+    sin_cos_within(libm::remainderf(x, core::f32::consts::TAU))
+}
+
+/// Sine and cosine of |x| ≤ [`RANGE`].
+#[inline(always)]
+pub(crate) fn sin_cos_within(x: f32) -> (f32, f32) {
+    // Rounds to the nearest integer, which then is in the lowest bits.
+    let shifted = x * core::f32::consts::FRAC_2_PI + SHIFT;
+    let quadrant = shifted.to_bits();
+    let q = shifted - SHIFT;
     let r = ((x - q * HALF_PI_HIGH) - q * HALF_PI_MIDDLE) - q * HALF_PI_LOW;
     let r2 = r * r;
     let sin = ((-1.951_529_6e-4 * r2 + 8.332_161e-3) * r2 - 1.666_665_5e-1) * r2 * r + r;
     let cos =
         ((2.443_315_7e-5 * r2 - 1.388_731_6e-3) * r2 + 4.166_664_6e-2) * r2 * r2 - 0.5 * r2 + 1.0;
-    match quadrant & 3 {
-        0 => (sin, cos),
-        1 => (cos, -sin),
-        2 => (-sin, -cos),
-        _ => (-cos, sin),
-    }
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "a float-to-int cast saturates; NaN gives 0")]
-fn nearest_integer(x: f32) -> i32 {
-    (if x < 0.0 { x - 0.5 } else { x + 0.5 }) as i32
-}
-
-#[expect(clippy::cast_precision_loss, reason = "exact within RANGE, where quadrants are below 2^7")]
-fn quadrant_as_float(quadrant: i32) -> f32 {
-    quadrant as f32
+    let (s, c) = if quadrant & 1 == 0 { (sin, cos) } else { (cos, sin) };
+    let sign = |v: f32, bit: u32| f32::from_bits(v.to_bits() ^ ((bit & 2) << 30));
+    (sign(s, quadrant), sign(c, quadrant.wrapping_add(1)))
 }

@@ -115,6 +115,28 @@ impl Robot {
         q
     }
 
+    /// `q_p` and `q_h` of eq. (9): what the wheels' noise lacks of a step's rounding.
+    pub fn making_up_for_rounding(
+        &self,
+        p: &Matrix,
+        state: &Vector,
+        travel: &SVector<f64, 2>,
+    ) -> Matrix {
+        let per_metre = self.wheel_noise * self.wheel_noise;
+        let of = |wheel: usize, scale: usize| {
+            per_metre * travel[wheel].abs() * (1.0 + state[scale]).powi(2)
+        };
+        let wheels = of(0, SCALE_RIGHT) + of(1, SCALE_LEFT);
+        let width = self.track_width + state[TRACK_WIDTH];
+        let position = 4.0 * ROUNDING * (p[(X, X)] + p[(Y, Y)]) - wheels / 4.0;
+        let heading = 4.0 * ROUNDING * p[(HEADING, HEADING)] - wheels / (width * width);
+        let mut q = Matrix::zeros();
+        q[(X, X)] = position.max(0.0);
+        q[(Y, Y)] = position.max(0.0);
+        q[(HEADING, HEADING)] = heading.max(0.0);
+        q
+    }
+
     /// Eq. (5).
     pub fn predicted(&self, p: &Matrix, state: &Vector, travel: &SVector<f64, 2>) -> Matrix {
         let f = self.by_state(state, travel);

@@ -26,8 +26,6 @@ struct SixStates {
     rest_of_x: [f32; 3],
     /// Upper triangle; what is below the diagonal is not used.
     p: [[f32; 6]; 6],
-    /// What rounding left over of the last three variances.
-    rest_of_p: [f32; 3],
     drive: Drive,
 }
 
@@ -55,7 +53,7 @@ impl SixStates {
         p[3][4] = 0.5 * (rr - ll);
         p[4][4] = rr + ll;
         p[5][5] = square(deviation.track_width_error);
-        Self { x, rest_of_x: [0.0; 3], p, rest_of_p: [0.0; 3], drive }
+        Self { x, rest_of_x: [0.0; 3], p, drive }
     }
 
     /// An entry, from the upper triangle.
@@ -74,8 +72,18 @@ impl SixStates {
         let advance = 0.5 * (rolled_r + rolled_l);
         let (sin, cos) = sin_cos(Radians(heading + 0.5 * turn));
         let per_metre = self.drive.wheel_noise.0.0 * self.drive.wheel_noise.0.0;
-        let noise_r = per_metre * right.abs() * factor_r * factor_r;
-        let noise_l = per_metre * left.abs() * factor_l * factor_l;
+        let (of_r, of_l) =
+            ((right * factor_r * factor_r).abs(), (left * factor_l * factor_l).abs());
+        let noise_s = 0.25 * per_metre * (of_r + of_l);
+        let per_half_width = per_width + per_width;
+        let noise_t = noise_s * per_half_width * per_half_width;
+        let noise_st = 0.25 * per_metre * (of_r - of_l) * per_half_width;
+        let lacking = |variance: f32, noise: f32| {
+            let lack = ROUNDING * variance - noise;
+            if lack > 0.0 { lack } else { 0.0 }
+        };
+        let lack_of_position = lacking(self.p[0][0] + self.p[1][1], noise_s);
+        let lack_of_heading = lacking(self.p[2][2], noise_t);
 
         // Each a row of six: the covariance of turn, advance, mid-heading with every state.
         let by_turn =
@@ -88,42 +96,40 @@ impl SixStates {
         let t: [f32; 6] = core::array::from_fn(|j| turn_with(c[j], d[j], w[j]));
         let s: [f32; 6] = core::array::from_fn(|j| advance_with(c[j], d[j]));
         let m: [f32; 6] = core::array::from_fn(|j| h[j] + 0.5 * t[j]);
-        let tt = turn_with(t[3], t[4], t[5]) + (noise_r + noise_l) * per_width * per_width;
-        let ts = advance_with(t[3], t[4]) + 0.5 * (noise_r - noise_l) * per_width;
-        let ss = advance_with(s[3], s[4]) + 0.25 * (noise_r + noise_l);
+        let tt = noise_t + by_turn[0] * t[3] + by_turn[1] * t[4] + by_turn[2] * t[5];
+        let ts = noise_st + by_advance[0] * t[3] + by_advance[1] * t[4];
+        let ss = noise_s + by_advance[0] * s[3] + by_advance[1] * s[4];
         let mt = t[2] + 0.5 * tt;
         let (mm, ms) = (m[2] + 0.5 * mt, s[2] + 0.5 * ts);
         let (m_new, s_new) = (m[2] + mt, s[2] + ts);
+        let (mm, ss) = (mm + ROUNDING * mm, ss + ROUNDING * ss);
 
         let swing = [-advance * sin, advance * cos];
         let ahead = [cos, sin];
-        let along = |axis: usize, m: f32, s: f32| swing[axis] * m + ahead[axis] * s;
+        // Adds an axis' share of two covariances to a third.
+        let along = |to: f32, axis: usize, m: f32, s: f32| to + swing[axis] * m + ahead[axis] * s;
+        let new_m = [0, 1].map(|axis| along(m[axis], axis, mm, ms));
+        let new_s = [0, 1].map(|axis| along(s[axis], axis, ms, ss));
         let mut new = self.p;
         for axis in 0..2 {
-            let ways_m = along(axis, mm, ms);
-            let ways_s = swing[axis] * ms + ahead[axis] * ss;
-            let rounding =
-                ROUNDING * (swing[axis] * swing[axis] * mm + ahead[axis] * ahead[axis] * ss);
             new[axis][axis] +=
-                2.0 * along(axis, m[axis], s[axis]) + along(axis, ways_m, ways_s) + rounding;
-            if axis == 0 {
-                new[0][1] += along(0, m[1], s[1]) + along(1, m[0] + ways_m, s[0] + ways_s);
-            }
-            new[axis][2] += t[axis] + along(axis, m_new, s_new);
+                along(lack_of_position, axis, m[axis] + new_m[axis], s[axis] + new_s[axis]);
+            new[axis][2] += along(t[axis], axis, m_new, s_new);
             for j in 3..6 {
-                new[axis][j] += along(axis, m[j], s[j]);
+                new[axis][j] = along(new[axis][j], axis, m[j], s[j]);
             }
         }
-        new[2][2] += t[2] + mt + 0.5 * tt;
+        let across = swing[1] * new_m[0] + ahead[1] * new_s[0];
+        new[0][1] += along(across, 0, m[1], s[1]);
+        new[2][2] += mt + mt + lack_of_heading;
         for j in 3..6 {
             new[2][j] += t[j];
         }
-        let rolled = 0.5 * (right.abs() + left.abs());
-        let scale_walk = self.drive.scale_walk.0 * self.drive.scale_walk.0 * rolled;
-        let width_walk = self.drive.track_width_walk.0.0;
-        let walks = [0.5 * scale_walk, 2.0 * scale_walk, width_walk * width_walk * rolled];
-        for (i, walk) in walks.into_iter().enumerate() {
-            add(&mut new[3 + i][3 + i], &mut self.rest_of_p[i], walk);
+        let rolled = right.abs() + left.abs();
+        let scale_walk = self.drive.scale_walk.0 * self.drive.scale_walk.0;
+        let width_walk = self.drive.track_width_walk.0.0 * self.drive.track_width_walk.0.0;
+        for (i, walk) in [0.25 * scale_walk, scale_walk, 0.5 * width_walk].into_iter().enumerate() {
+            new[3 + i][3 + i] += rolled * walk;
         }
 
         self.p = new;
@@ -171,22 +177,21 @@ impl SixStates {
         self.each(|i, j, p| p - gain[i] * m[j]);
         let left_over = self.cross(h);
         let d: [f32; 6] = core::array::from_fn(|i| gain[i] * noise - left_over[i]);
-        let half = -0.5 * dot(&d);
-        let d: [f32; 6] = core::array::from_fn(|i| d[i] + half * gain[i]);
-        self.each(|i, j, p| p + (d[i] * gain[j] + gain[i] * d[j]));
+        let half = 0.5 * dot(&d);
+        let d: [f32; 6] = core::array::from_fn(|i| d[i] - half * gain[i]);
+        self.each(|i, j, p| p + d[i] * gain[j] + gain[i] * d[j]);
     }
 
     /// Eq. (17).
     fn bearable(&self, noise: f32, h: [f32; 3], m: &[f32; 6]) -> Option<f32> {
         let along = h[0] * m[0] + h[1] * m[1] + h[2] * m[2];
         let per_variance = 1.0 / (noise + along);
-        let left = |i: usize| h[i] * h[i] * (self.p[i][i] - m[i] * m[i] * per_variance);
+        let left = |i: usize| h[i] * h[i] * (self.p[i][i] - (m[i] * per_variance) * m[i]);
         let least = SHARPEST * (left(0) + left(1) + left(2));
-        if along <= least {
-            return None;
+        if noise * along * per_variance >= least {
+            return Some(noise);
         }
-        let bearable = along * least / (along - least);
-        Some(if bearable > noise { bearable } else { noise })
+        (along > least).then(|| along * least / (along - least))
     }
 
     fn each(&mut self, entry: impl Fn(usize, usize, f32) -> f32) {
