@@ -34,7 +34,7 @@ pub fn instructions(name: &str, call: &str) -> anyhow::Result<f64> {
 
 /// Nanoseconds of ten predicts and one update, by filter: criterion's median.
 pub fn times<'a>(names: impl Iterator<Item = &'a str>) -> anyhow::Result<BTreeMap<&'a str, f64>> {
-    let bench = "bench --package bench-host --bench filters -- --noplot";
+    let bench = "bench --package bench-host --bench filters -- --noplot --warm-up-time 1 --measurement-time 2";
     cargo::check(cargo::in_bench(bench))?;
     names.map(|name| Ok((name, median(name)?))).collect()
 }
