@@ -117,9 +117,13 @@ pub fn run() -> anyhow::Result<()> {
     Ok(())
 }
 
+/// What is called of a filter, and what kfilter calls through a pointer.
+const ROOTS: [&str; 3] =
+    ["bench_predict", "bench_update", "bench_workload::filters::kfilter::step"];
+
 fn on_target(target: &Target, name: &str) -> anyhow::Result<OnTarget> {
     let report = emulator::run(target, name)?;
-    let text = Program::read(&target.program(name))?.reach("bench_")?.bytes();
+    let text = Program::read(&target.program(name))?.reach(&ROOTS)?.bytes();
     Ok(OnTarget { predict: report.cost("predict")?, update: report.cost("update")?, text })
 }
 

@@ -136,7 +136,9 @@ fn measure_on(target: &Target) -> anyhow::Result<BTreeMap<String, u32>> {
             figures.insert(format!("{call}_stack_bytes"), cost.most_stack);
         }
         figures.insert(format!("{name}_bytes"), report.number("object")?);
-        let text = Program::read(&target.program(name))?.reach("probe_")?.bytes();
+        let roots: Vec<String> = calls.iter().map(|call| format!("probe_{call}")).collect();
+        let roots: Vec<&str> = roots.iter().map(String::as_str).collect();
+        let text = Program::read(&target.program(name))?.reach(&roots)?.bytes();
         figures.insert(format!("{code}_text_bytes"), u32::try_from(text)?);
     }
     Ok(figures)

@@ -74,12 +74,13 @@ impl Program {
         }
     }
 
-    /// What can be reached from the functions whose names start with `prefix`.
-    pub fn reach(&self, prefix: &str) -> anyhow::Result<Reach<'_>> {
-        let is_root = |function: &Function| function.names.iter().any(|n| n.starts_with(prefix));
+    /// What can be reached from the functions with these names.
+    pub fn reach(&self, roots: &[&str]) -> anyhow::Result<Reach<'_>> {
+        let names = roots;
+        let is_root = |f: &Function| f.names.iter().any(|n| names.contains(&n.as_str()));
         let roots = self.functions.iter().filter(|(_, function)| is_root(function));
         let mut from: BTreeMap<_, _> = roots.map(|(&root, _)| (root, None)).collect();
-        ensure!(!from.is_empty(), "no function is called `{prefix}…`");
+        ensure!(!from.is_empty(), "no function is called any of {names:?}");
         let mut next: VecDeque<u64> = from.keys().copied().collect();
         while let Some(at) = next.pop_front() {
             for &mention in self.functions.get(&at).into_iter().flat_map(|f| &f.mentions) {

@@ -27,7 +27,7 @@ fn check_program(target: &Target, name: &str) -> anyhow::Result<()> {
     let program = Program::read(&target.program(name))?;
     let is_sign = |symbol: &&str| SIGNS.iter().any(|sign| symbol.contains(sign));
     // Where every program starts.
-    let reach = program.reach("Reset")?;
+    let reach = program.reach(&["Reset"])?;
     let found: Vec<String> = program
         .names()
         .filter(is_sign)
