@@ -7,6 +7,10 @@ use crate::dense::{Matrix, Vector};
 /// χ² of two degrees of freedom at 99.9 %.
 const ELLIPSE: f64 = 13.8;
 
+/// A heading off by no more than this still finds its walls, rad: half of the cone of the narrowest
+/// sonar of the scenarios.
+const HEADING: f64 = 0.1;
+
 /// The books on a run's claims.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Claim {
@@ -17,6 +21,10 @@ pub struct Claim {
     longest_silence: f64,
     worst: f64,
     holds: bool,
+    verdict: Verdict,
+    degraded: u32,
+    called_lost: u32,
+    falsely_lost: u32,
 }
 
 impl Claim {
@@ -29,6 +37,12 @@ impl Claim {
         self.silence = if is_silent { self.silence + seconds } else { 0.0 };
         self.longest_silence = self.longest_silence.max(self.silence);
         self.worst = self.worst.max(error[0].hypot(error[1]));
+        self.degraded += u32::from(verdict == Verdict::Degraded);
+        if verdict == Verdict::Lost && self.verdict != Verdict::Lost {
+            self.called_lost += 1;
+            self.falsely_lost += u32::from(is_inside && error[2].abs() <= HEADING);
+        }
+        self.verdict = verdict;
         self.holds = is_inside && verdict != Verdict::Lost;
     }
 
@@ -49,6 +63,25 @@ impl Claim {
     #[must_use]
     pub fn silence_at_the_end(&self) -> f64 {
         self.silence
+    }
+
+    /// Share of the ticks that health called `Degraded`.
+    #[must_use]
+    pub fn share_degraded(&self) -> f64 {
+        f64::from(self.degraded) / f64::from(self.ticks.max(1))
+    }
+
+    /// How often health has begun to say `Lost`.
+    #[must_use]
+    pub fn called_lost(&self) -> u32 {
+        self.called_lost
+    }
+
+    /// How often it began to while the position was inside the 99.9 % ellipse and the heading off by
+    /// no more than 0.1 rad.
+    #[must_use]
+    pub fn falsely_lost(&self) -> u32 {
+        self.falsely_lost
     }
 
     /// The largest error of the position, metres.
@@ -86,6 +119,21 @@ mod tests {
             claim.add(0.5, &error, &p, verdict);
         }
         claim
+    }
+
+    #[test]
+    fn lost_is_false_where_the_claim_holds() {
+        use Verdict::{Degraded, Lost, Tracking};
+        let claim = taken(&[
+            (0.01, Tracking),
+            (0.01, Lost),
+            (0.20, Lost),
+            (0.20, Degraded),
+            (0.20, Lost),
+            (0.01, Degraded),
+        ]);
+        assert_eq!((claim.called_lost(), claim.falsely_lost()), (2, 1));
+        assert!((claim.share_degraded() - 2.0 / 6.0).abs() < 1e-12);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use rayon::prelude::*;
 
 use crate::simulate::{Simulation, SimulationError};
-use crate::statistics::Summary;
+use crate::statistics::{RunResult, Summary};
 
 /// Runs seeds `seed`, `seed + 1`, … and sums them up. On a terminal a bar shows how far it is; in
 /// a pipe there is none.
@@ -14,6 +14,19 @@ use crate::statistics::Summary;
 /// The [`SimulationError`] of the first run that could not go on.
 pub fn run(simulation: &Simulation, seed: u64, runs: u32) -> Result<Summary, SimulationError> {
     let start = ProcessTime::now();
+    let results = results(simulation, seed, runs)?;
+    Ok(Summary::of(&results, start.elapsed().as_secs_f64()))
+}
+
+/// The runs themselves, in the order of their seeds, with the same bar.
+///
+/// # Errors
+/// The [`SimulationError`] of the first run that could not go on.
+pub fn results(
+    simulation: &Simulation,
+    seed: u64,
+    runs: u32,
+) -> Result<Vec<RunResult>, SimulationError> {
     let bar = progress_bar(runs);
     let results = (0..u64::from(runs))
         .into_par_iter()
@@ -22,12 +35,13 @@ pub fn run(simulation: &Simulation, seed: u64, runs: u32) -> Result<Summary, Sim
             bar.inc(1);
             result
         })
-        .collect::<Result<Vec<_>, _>>();
+        .collect();
     bar.finish_and_clear();
-    Ok(Summary::of(&results?, start.elapsed().as_secs_f64()))
+    results
 }
 
-fn progress_bar(runs: u32) -> ProgressBar {
+/// A bar that counts runs.
+pub(crate) fn progress_bar(runs: u32) -> ProgressBar {
     // indicatif hides the bar by itself where standard error is not a terminal.
     let bar = ProgressBar::with_draw_target(Some(runs.into()), ProgressDrawTarget::stderr());
     match ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {eta} left") {

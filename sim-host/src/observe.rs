@@ -12,7 +12,7 @@ use sonarfix::localizer::{Fix, Localizer};
 
 use crate::angle;
 use crate::dense::{Matrix, Vector};
-use crate::trace::{Calibration, Estimate, FixRecord, Outcome, Pose};
+use crate::trace::{Calibration, Estimate, FixRecord, Outcome, Pose, Why};
 use crate::world::reflector::Source;
 
 /// The localizer's estimate.
@@ -91,6 +91,9 @@ pub struct Look {
 pub fn fix_record(look: Look, aim: &Aim, fix: &Fix) -> FixRecord {
     let (outcome, innovation, reason) = match fix {
         Fix::Accepted(innovation) => (Outcome::Accepted, Some(innovation), String::new()),
+        Fix::Weakened(innovation) => {
+            (Outcome::Accepted, Some(innovation), "believed less than its noise allows".to_owned())
+        }
         Fix::Gated(innovation) => (Outcome::Gated, Some(innovation), String::new()),
         Fix::Refused(refusal) => (Outcome::Refused, None, refusal.to_string()),
     };
@@ -103,10 +106,22 @@ pub fn fix_record(look: Look, aim: &Aim, fix: &Fix) -> FixRecord {
         bearing,
         range: look.range,
         met: look.met,
+        why: Some(why(aim)),
         outcome,
         reason,
         innovation: innovation.map(|i: &Innovation| i.value.0.into()),
         innovation_variance: innovation.map(|i| i.variance.0.into()),
+    }
+}
+
+fn why(aim: &Aim) -> Why {
+    #[expect(clippy::cast_precision_loss, reason = "some seconds")]
+    let micros = aim.why.time.to_micros() as f64;
+    Why {
+        gain: aim.why.gain.0.into(),
+        success: aim.why.success.into(),
+        seconds: micros * 1e-6,
+        candidates: aim.why.candidates,
     }
 }
 
@@ -121,6 +136,7 @@ pub fn no_aim_record(look: Look, no_aim: NoAim) -> FixRecord {
         bearing: 0.0,
         range: None,
         met: None,
+        why: None,
         outcome: Outcome::Refused,
         reason: no_aim.to_string(),
         innovation: None,

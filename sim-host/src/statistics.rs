@@ -62,6 +62,12 @@ impl PathSum {
         }
         self.ticks += 1;
     }
+
+    /// Mean square of the distance between estimated and true position, m².
+    #[must_use]
+    pub fn position_mean_square(&self) -> f64 {
+        (self.squares[0] + self.squares[1]) / as_f64(self.ticks)
+    }
 }
 
 /// What one run leaves behind.

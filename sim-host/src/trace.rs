@@ -83,6 +83,19 @@ pub enum Outcome {
     Refused,
 }
 
+/// Why a wall was chosen: what the choice reckoned with.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Why {
+    /// By how much the variance of the position (and of what else has a weight) was to drop, m².
+    pub gain: f64,
+    /// How likely the look was to succeed.
+    pub success: f64,
+    /// How long it was to take, seconds.
+    pub seconds: f64,
+    /// How many walls could be measured, before asking what hides them.
+    pub candidates: u16,
+}
+
 /// One turn of the sonar: where it looked, what it heard, what the filter made of it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FixRecord {
@@ -100,6 +113,8 @@ pub struct FixRecord {
     pub range: Option<f64>,
     /// What the sound met; `None` where nothing was heard, or nobody knows.
     pub met: Option<Source>,
+    /// Why this wall was looked at, if one was.
+    pub why: Option<Why>,
     /// What became of it.
     pub outcome: Outcome,
     /// Why it was refused, in words; empty unless refused.

@@ -5,7 +5,7 @@ use std::io::Write;
 
 use crate::trace::{FixRecord, Outcome, Tick, Trace};
 
-const COLUMNS: [&str; 38] = [
+const COLUMNS: [&str; 42] = [
     "time_s",
     "true_x_m",
     "true_y_m",
@@ -40,6 +40,10 @@ const COLUMNS: [&str; 38] = [
     "fix_bearing_rad",
     "fix_direction_rad",
     "fix_range_m",
+    "fix_gain_m2",
+    "fix_success",
+    "fix_seconds",
+    "fix_candidates",
     "fix_outcome",
     "fix_reason",
     "fix_innovation_m",
@@ -47,7 +51,7 @@ const COLUMNS: [&str; 38] = [
 ];
 
 /// How many of them belong to a fix.
-const FIX_COLUMNS: usize = 9;
+const FIX_COLUMNS: usize = 13;
 
 /// Writes a trace. A fix stands in the line of the first tick at or after it (more than one: a
 /// line each, with the same state); what is not known is an empty cell.
@@ -112,6 +116,10 @@ fn fix_cells(fix: &FixRecord, trace: &Trace) -> [String; FIX_COLUMNS] {
         cell(fix.bearing),
         cell(fix.direction),
         optional(fix.range),
+        optional(fix.why.map(|why| why.gain)),
+        optional(fix.why.map(|why| why.success)),
+        optional(fix.why.map(|why| why.seconds)),
+        optional(fix.why.map(|why| why.candidates.into())),
         outcome.to_owned(),
         fix.reason.clone(),
         optional(fix.innovation),
@@ -133,7 +141,7 @@ fn optional(value: Option<f64>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trace::{Estimate, Pose};
+    use crate::trace::{Estimate, Pose, Why};
 
     fn tick(time: f64) -> Tick {
         Tick {
@@ -154,6 +162,7 @@ mod tests {
             bearing: 0.5,
             range: Some(1.25),
             met: None,
+            why: Some(Why { gain: 2e-6, success: 0.75, seconds: 0.25, candidates: 3 }),
             outcome: Outcome::Refused,
             reason: "no wall, \"none\"".to_owned(),
             innovation: None,
@@ -176,7 +185,9 @@ mod tests {
         let times: Vec<_> = lines.iter().map(|l| (l[0].to_owned(), l[29].to_owned())).collect();
         let expected = [("0.1", ""), ("0.2", "0.15"), ("0.2", "0.2"), ("0.3", "0.3")];
         assert_eq!(times, expected.map(|(t, f)| (t.to_owned(), f.to_owned())));
-        assert_eq!(&lines[1][35], "no wall, \"none\"");
+        assert_eq!(&lines[1][39], "no wall, \"none\"");
+        let why = [34, 35, 36, 37].map(|column| &lines[1][column]);
+        assert_eq!(why, ["2.00000000e-6", "0.75", "0.25", "3"]);
     }
 
     #[test]

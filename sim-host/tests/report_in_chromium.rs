@@ -90,6 +90,7 @@ fn fix(time: f64, outcome: Outcome, range: Option<f64>, reason: &str) -> FixReco
         bearing: FRAC_PI_2,
         range,
         met: Some(Source::Obstacle),
+        why: None,
         outcome,
         reason: reason.into(),
         innovation: range.map(|range| range - 1.0),

@@ -25,10 +25,15 @@ pub fn in_bench(arguments: &str) -> Command {
     command
 }
 
+/// Where builds go, whatever folder they start in.
+pub fn target_directory() -> PathBuf {
+    let chosen = std::env::var_os("CARGO_TARGET_DIR");
+    chosen.map_or_else(|| root().join("target"), |chosen| root().join(chosen))
+}
+
 /// Where the workspace `bench` is built.
 pub fn bench_target() -> PathBuf {
-    let ours = std::env::var_os("CARGO_TARGET_DIR");
-    ours.map_or_else(|| root().join("target"), PathBuf::from).join("bench")
+    target_directory().join("bench")
 }
 
 /// The project's root.

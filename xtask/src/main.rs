@@ -11,6 +11,9 @@ mod cargo;
 mod checks;
 mod elf;
 mod emulator;
+mod endurance;
+mod fuzz;
+mod miri;
 mod panics;
 mod program;
 
@@ -21,7 +24,7 @@ struct Xtask {
     task: Task,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Subcommand)]
+#[derive(Debug, Clone, PartialEq, Eq, Subcommand)]
 enum Task {
     /// Every check below, in order.
     Ci,
@@ -51,21 +54,32 @@ enum Task {
     Bench,
     /// The paper's statistics at full length: 5,000 seeds, both policies (minutes).
     Statistics,
+    /// Random lives of the filter, 10⁸ steps unless told otherwise (minutes).
+    Endurance(endurance::Args),
+    /// The fuzz targets, for a bounded time.
+    Fuzz(fuzz::Args),
+    /// The core under Miri, if there is one.
+    Miri,
 }
 
 /// What `ci` runs.
-const CHECKS: [Task; 10] = [
-    Task::Format,
-    Task::Lint,
-    Task::TestHost,
-    Task::Docs,
-    Task::Embedded,
-    Task::Panics,
-    Task::Budgets,
-    Task::LintBench,
-    Task::Peers,
-    Task::Deny,
-];
+fn all() -> [Task; 13] {
+    [
+        Task::Format,
+        Task::Lint,
+        Task::TestHost,
+        Task::Docs,
+        Task::Embedded,
+        Task::Panics,
+        Task::Budgets,
+        Task::LintBench,
+        Task::Peers,
+        Task::Deny,
+        Task::Endurance(endurance::Args::SHORT),
+        Task::Fuzz(fuzz::Args::short()),
+        Task::Miri,
+    ]
+}
 
 fn main() -> ExitCode {
     match run(Xtask::parse().task) {
@@ -79,7 +93,7 @@ fn main() -> ExitCode {
 
 fn run(task: Task) -> anyhow::Result<()> {
     match task {
-        Task::Ci => CHECKS.into_iter().try_for_each(run),
+        Task::Ci => all().into_iter().try_for_each(run),
         Task::Format => cargo::run("fmt --all --check"),
         Task::Lint => cargo::run("clippy --workspace --all-targets --all-features -- -D warnings"),
         Task::TestHost => cargo::run("test"),
@@ -93,5 +107,8 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Bless => budgets::bless(),
         Task::Bench => bench::run(),
         Task::Statistics => checks::statistics(),
+        Task::Endurance(args) => endurance::run(args),
+        Task::Fuzz(args) => fuzz::run(&args),
+        Task::Miri => miri::run(),
     }
 }

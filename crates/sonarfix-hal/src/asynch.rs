@@ -3,6 +3,9 @@
 //! Nothing is implemented twice: each function here sleeps until there is something to do, and
 //! then polls the driver that is polled without it. Dropping one of its futures is safe; a ping
 //! dropped in flight is given up by the driver with the next trigger.
+//!
+//! # Non-finite policy
+//! That of the polled drivers: nothing is computed here.
 
 use core::convert::Infallible;
 use core::future::{Future, poll_fn};

@@ -8,6 +8,9 @@
 //!
 //! *Tick*: one count. A decoder that counts every edge of both channels (x4) makes four ticks of
 //! one period of a channel.
+//!
+//! # Non-finite policy
+//! Counts are integers; [`WheelGeometry`] refuses a diameter or a resolution that is not finite.
 
 mod counter;
 mod quadrature;

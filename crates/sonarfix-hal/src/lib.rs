@@ -18,9 +18,15 @@
 //! the stamps of interrupts included. *Bearing*: relative to the robot's heading, positive to
 //! the left.
 //!
+//! # Non-finite policy
+//! Counts, edges and times are integers here; what is made of them, travel and ranges, is finite.
+//! NaN and infinity in a calibration, a geometry, a temperature or a bearing to point at are typed
+//! errors, and nothing has moved (the modules say which).
+//!
 //! # Features
 //! - `async`: the same drivers behind the waits of `embedded-hal-async` (module `asynch`).
 //! - `defmt`: derives `defmt::Format` for the public types that hold data.
+//! - `serde`: derives `Serialize` and `Deserialize` for those that a robot tells of its loop.
 
 #![no_std]
 #![forbid(unsafe_code)]

@@ -64,6 +64,7 @@ pub type Outcome = Result<Echo, NoEcho>;
 /// An echo.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Echo {
     /// When the sound left.
     pub sent: Instant,
@@ -102,6 +103,7 @@ impl Echo {
 /// Why a ping has no echo.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum NoEcho {
     /// The ranger listened, and nothing came back.
     Nothing,

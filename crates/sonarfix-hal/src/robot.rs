@@ -193,7 +193,7 @@ impl<'m> Robot<'m> {
     pub fn idle_until(&self, hardware: &mut impl Hardware) -> Option<Instant> {
         let next_of_sonar = match self.cycle {
             Cycle::Idle { look_at } => look_at,
-            Cycle::Turning => can_ping_at(hardware),
+            Cycle::Turning { .. } => can_ping_at(hardware),
             Cycle::Listening { .. } => return None,
         };
         Some(next_of_sonar.min(self.ticks.next()))
@@ -293,7 +293,7 @@ impl<'m> Robot<'m> {
             let turned = hardware.servo().point(now, aim.bearing);
             // If it does not turn, its last bearing will do.
             report.faults.servo += u32::from(turned.is_err());
-            self.cycle = Cycle::Turning;
+            self.cycle = Cycle::Turning { why: aim.why };
         } else {
             self.localizer.skip();
             self.rest(now, false);
@@ -304,9 +304,9 @@ impl<'m> Robot<'m> {
     /// Pings, if the servo has settled, the ranger is ready and a wall is met squarely: the robot
     /// may have turned in the meantime.
     fn ping(&mut self, now: Instant, hardware: &mut impl Hardware, report: &mut Report) {
-        if self.cycle != Cycle::Turning {
+        let Cycle::Turning { why } = self.cycle else {
             return;
-        }
+        };
         let Some(bearing) = hardware.servo().target() else {
             self.rest(now, false);
             return;
@@ -325,7 +325,7 @@ impl<'m> Robot<'m> {
         };
         match hardware.ranger().trigger(now) {
             Ok(()) => {
-                let asked = None;
+                let (aim, asked) = (Aim { why, ..aim }, None);
                 self.cycle = Cycle::Listening { aim, from, asked };
                 report.pinged = Some(aim);
             }

@@ -23,7 +23,7 @@ use crate::time::micros;
 
 pub use calibration::{Calibration, MeasuredPulse};
 use motion::Motion;
-pub use motion::Pace;
+pub use sonarfix::config::Pace;
 
 /// What does not describe a servo.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,4 +1,7 @@
 //! Arithmetic of instants that cannot panic: `fugit`'s operators do on overflow, these saturate.
+//!
+//! # Non-finite policy
+//! Times are integers.
 
 use sonarfix::units::{Duration, Instant};
 

@@ -25,6 +25,12 @@ pub enum SonarName {
     HcSr04,
     /// The LEGO NXT's.
     Nxt,
+    /// LV-MaxSonar-EZ, by pulse width.
+    LvMaxSonar,
+    /// SRF08.
+    Srf08,
+    /// Polaroid 6500 with its electrostatic transducer.
+    Polaroid6500,
 }
 
 /// Which servo turns it.
@@ -35,6 +41,8 @@ pub enum ServoName {
     Ideal,
     /// SG90.
     Sg90,
+    /// MG996R.
+    Mg996r,
 }
 
 /// Who keeps the robot on its path.
@@ -108,9 +116,16 @@ pub(crate) fn read_hardware(root: &Table<'_>) -> Result<Hardware, FileError> {
     let optional = |key, keys: &[&str]| root.get(key).map(|node| node.table(keys)).transpose();
     let sensor = optional("sensor", &["model", "temperature"])?;
     let servo = optional("servo", &["model"])?;
-    let sonars =
-        [("ideal", SonarName::Ideal), ("hc_sr04", SonarName::HcSr04), ("nxt", SonarName::Nxt)];
-    let servos = [("ideal", ServoName::Ideal), ("sg90", ServoName::Sg90)];
+    let sonars = [
+        ("ideal", SonarName::Ideal),
+        ("hc_sr04", SonarName::HcSr04),
+        ("nxt", SonarName::Nxt),
+        ("lv_maxsonar", SonarName::LvMaxSonar),
+        ("srf08", SonarName::Srf08),
+        ("polaroid_6500", SonarName::Polaroid6500),
+    ];
+    let servos =
+        [("ideal", ServoName::Ideal), ("sg90", ServoName::Sg90), ("mg996r", ServoName::Mg996r)];
     Ok(Hardware {
         sonar: named(model(sensor.as_ref()), &sonars)?,
         set_temperature: temperature(sensor.as_ref())?,

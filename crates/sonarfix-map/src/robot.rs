@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use sonarfix::aim::Policy;
-use sonarfix::config::{CalibrationPrior, Config, ConfigError, Sonar, Trust};
+use sonarfix::config::{
+    CalibrationPrior, Config, ConfigError, Pace, Rhythm, Sonar, Timing, Trust, Weights,
+};
 use sonarfix::motion::{Drive, WheelTravel};
 use sonarfix::pose::Point;
 use sonarfix::range::RangeNoise;
@@ -28,8 +30,18 @@ const DRIVE_KEYS: [&str; 7] = [
     "travel_per_tick",
 ];
 
-const SONAR_KEYS: [&str; 8] =
-    ["mount", "servo", "cone", "min_range", "max_range", "noise", "noise_per_metre", "fix_period"];
+const SONAR_KEYS: [&str; 10] = [
+    "mount",
+    "servo",
+    "cone",
+    "min_range",
+    "max_range",
+    "noise",
+    "noise_per_metre",
+    "fix_period",
+    "servo_pace",
+    "cycle",
+];
 
 /// A robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,8 +50,6 @@ pub struct Robot {
     pub config: Config,
     /// From one reading of the encoders to the next.
     pub encoder_period: Duration,
-    /// From one range to the next.
-    pub fix_period: Duration,
     /// How far each wheel rolls from one encoder tick to the next, negative where the encoder
     /// counts down as the robot drives ahead.
     pub travel_per_tick: Option<WheelTravel>,
@@ -78,6 +88,7 @@ impl Robot {
             prior: read_prior(robot)?,
             trust: read_trust(robot)?,
             policy: read_policy(robot)?,
+            weights: read_weights(robot)?,
         };
         config.check().map_err(|error| {
             let message = format!("must be {}", error.rule);
@@ -86,7 +97,6 @@ impl Robot {
         Ok(Self {
             config,
             encoder_period: period(&drive.require("encoder_period")?)?,
-            fix_period: period(&sonar.require("fix_period")?)?,
             travel_per_tick: drive.get("travel_per_tick").map(per_tick).transpose()?,
         })
     }
@@ -134,6 +144,11 @@ fn read_sonar(table: &Table<'_>) -> Result<Sonar, FileError> {
             floor: Metres(quantity(table, "noise", &LENGTH)?),
             per_metre: quantity(table, "noise_per_metre", &LENGTH_PER_LENGTH)?,
         },
+        timing: Timing {
+            rhythm: read_rhythm(&table.require("fix_period")?)?,
+            servo: table.get("servo_pace").map_or(Ok(Pace::INSTANT), read_pace)?,
+            cycle: table.get("cycle").map_or(Ok(Duration::micros(0)), |node| span(&node))?,
+        },
     })
 }
 
@@ -155,13 +170,26 @@ fn read_prior(robot: &Table<'_>) -> Result<CalibrationPrior, FileError> {
 }
 
 fn read_trust(robot: &Table<'_>) -> Result<Trust, FileError> {
-    let table = robot.table("trust", &["gate", "confidence"])?;
-    let number = |key| Ok(single(table.require(key)?.number()?));
-    Ok(Trust { gate: number("gate")?, confidence: number("confidence")? })
+    let keys = ["gate", "confidence", "outer_gate", "short", "reopen", "stale", "doubtful"];
+    let table = robot.table("trust", &keys)?;
+    let number = |node: Node<'_>| node.number().map(single);
+    let length = |node: Node<'_>| node.quantity(&LENGTH).map(single).map(Metres);
+    let default = Trust::default();
+    Ok(Trust {
+        gate: number(table.require("gate")?)?,
+        confidence: number(table.require("confidence")?)?,
+        outer_gate: table.get("outer_gate").map_or(Ok(default.outer_gate), number)?,
+        short: table.get("short").map_or(Ok(default.short), number)?,
+        reopen: table.get("reopen").map_or(Ok(default.reopen), length)?,
+        stale: table.get("stale").map_or(Ok(default.stale), length)?,
+        doubtful: table.get("doubtful").map_or(Ok(default.doubtful), length)?,
+    })
 }
 
+const SCHEDULE_KEYS: [&str; 3] = ["policy", "heading_weight", "wheels_weight"];
+
 fn read_policy(robot: &Table<'_>) -> Result<Policy, FileError> {
-    let policy = robot.table("schedule", &["policy"])?.require("policy")?;
+    let policy = robot.table("schedule", &SCHEDULE_KEYS)?.require("policy")?;
     match policy.text()? {
         "nearest" => Ok(Policy::Nearest),
         "informative" => Ok(Policy::Informative),
@@ -169,17 +197,65 @@ fn read_policy(robot: &Table<'_>) -> Result<Policy, FileError> {
     }
 }
 
-/// A period, in whole microseconds: the tick of the localizer's time.
+/// What is missing weighs nothing.
+fn read_weights(robot: &Table<'_>) -> Result<Weights, FileError> {
+    let table = robot.table("schedule", &SCHEDULE_KEYS)?;
+    let weight = |key| {
+        let metres = table.get(key).map(|node| node.deviation(&LENGTH)).transpose()?;
+        Ok(Metres(metres.map_or(0.0, single)))
+    };
+    Ok(Weights { heading: weight("heading_weight")?, wheels: weight("wheels_weight")? })
+}
+
+fn read_rhythm(node: &Node<'_>) -> Result<Rhythm, FileError> {
+    if node.as_text() == Some(AS_FAST_AS_POSSIBLE) {
+        return Ok(Rhythm::AsFastAsPossible);
+    }
+    Ok(Rhythm::Every(period(node)?))
+}
+
+/// A servo by its name, or by its times.
+fn read_pace(node: Node<'_>) -> Result<Pace, FileError> {
+    match node.as_text() {
+        Some("instant") => return Ok(Pace::INSTANT),
+        Some("sg90") => return Ok(Pace::SG90),
+        Some("mg996r") => return Ok(Pace::MG996R),
+        Some(_) => {
+            let known = "must be \"instant\", \"sg90\", \"mg996r\", or a table of its times";
+            return Err(node.error(known));
+        }
+        None => {}
+    }
+    let table = node.table(&["frame", "sixty_degrees", "settle"])?;
+    let time = |key| span(&table.require(key)?);
+    Ok(Pace {
+        frame: time("frame")?,
+        sixty_degrees: time("sixty_degrees")?,
+        settle: time("settle")?,
+    })
+}
+
+/// What stands for the fix period of a sonar that is never kept waiting.
+const AS_FAST_AS_POSSIBLE: &str = "as fast as possible";
+
+const LONGEST: f64 = 3600.0;
+
+/// A period: a span that is not zero.
 fn period(node: &Node<'_>) -> Result<Duration, FileError> {
     const SHORTEST: f64 = 1e-6;
-    const LONGEST: f64 = 3600.0;
     let seconds = node.quantity(&TIME)?;
-    let sensible = (SHORTEST..=LONGEST).contains(&seconds);
-    let seconds = node.check(seconds, sensible, "from 1 us to 1 hour")?;
+    node.check(seconds, (SHORTEST..=LONGEST).contains(&seconds), "from 1 us to 1 hour")?;
+    span(node)
+}
+
+/// A span in whole microseconds: the tick of the localizer's time.
+fn span(node: &Node<'_>) -> Result<Duration, FileError> {
+    let seconds = node.quantity(&TIME)?;
+    let seconds = node.check(seconds, (0.0..=LONGEST).contains(&seconds), "from 0 s to 1 hour")?;
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "rounded, and between 1 and 3.6e9"
+        reason = "rounded, and between 0 and 3.6e9"
     )]
     let microseconds = (seconds * 1e6).round() as u64;
     Ok(Duration::micros(microseconds))

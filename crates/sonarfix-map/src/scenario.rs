@@ -2,13 +2,13 @@
 
 use std::path::Path as FilePath;
 
+use crate::clearance::Collision;
 use crate::document::{Document, Node, Table};
 use crate::error::FileError;
 use crate::faults::{self, Fault};
 use crate::fidelity::{self, Fidelity, Follow, Hardware, Upsets};
 use crate::file;
 use crate::floor::Floor;
-use crate::geometry::{Segment, TOUCH};
 use crate::path::{Path, PathPlan};
 use crate::quantity::{
     ANGLE, Dimension, LENGTH, LENGTH_PER_LENGTH, LENGTH_WALK, SCALE_WALK, SPEED, TURN_RATE,
@@ -16,7 +16,8 @@ use crate::quantity::{
 use crate::robot::Robot;
 use crate::surroundings::{self, Surroundings};
 
-const KEYS: [&str; 13] = [
+/// What a scenario file may hold, beside `format`.
+pub(crate) const KEYS: [&str; 13] = [
     "name",
     "description",
     "fidelity",
@@ -278,37 +279,17 @@ fn check_speeds(table: &Table<'_>, path: &Path, robot: &Robot) -> Result<(), Fil
     Ok(())
 }
 
-/// The legs of the first lap are those of every lap.
+/// A collision is the fault of the corner that the leg leads to.
 fn check_clearance(
     path: &Path,
     corners: &[Node<'_>],
     floor: &Floor,
     clearance: f64,
 ) -> Result<(), FileError> {
-    let plan = path.plan();
-    let mut from = plan.start;
-    for (&to, node) in plan.corners.iter().zip(corners) {
-        let leg = Segment { from, to };
-        for wall in floor.named_walls() {
-            let (start, end, name) = (wall.from(), wall.to(), wall.name());
-            let distance = leg.distance(Segment { from: start, to: end });
-            let fault = if distance < TOUCH {
-                format!("goes through the wall \"{name}\"")
-            } else if distance < clearance - TOUCH {
-                format!(
-                    "comes within {distance:.3} m of the wall \"{name}\", \
-                     nearer than the clearance of {clearance:.3} m"
-                )
-            } else {
-                continue;
-            };
-            let [[x0, y0], [x1, y1]] = [from, to];
-            let leg = format!("the leg from ({x0}, {y0}) to ({x1}, {y1}) m");
-            return Err(node.error(format!("{leg} {fault}")));
-        }
-        from = to;
-    }
-    Ok(())
+    let collision = Collision::first(path.plan(), floor, clearance);
+    let fault = collision
+        .and_then(|collision| Some(corners.get(collision.corner)?.error(collision.to_string())));
+    fault.map_or(Ok(()), Err)
 }
 
 fn read_start(root: &Table<'_>) -> Result<Start, FileError> {

@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI};
 
 use sonarfix::aim::Policy;
-use sonarfix::config::{CalibrationPrior, Config, Sonar, Trust};
+use sonarfix::config::{CalibrationPrior, Config, Pace, Rhythm, Sonar, Timing, Trust, Weights};
 use sonarfix::motion::Drive;
 use sonarfix::pose::Point;
 use sonarfix::range::RangeNoise;
@@ -103,6 +103,11 @@ fn the_robot_is_that_of_the_paper() {
             min_range: Metres(0.05),
             max_range: Metres(10.0),
             noise: RangeNoise { floor: Metres(0.0024), per_metre: 0.0 },
+            timing: Timing {
+                rhythm: Rhythm::Every(Duration::secs(1)),
+                servo: Pace::INSTANT,
+                cycle: Duration::millis(100),
+            },
         },
         prior: CalibrationPrior {
             scale_right: 0.01,
@@ -110,12 +115,12 @@ fn the_robot_is_that_of_the_paper() {
             track_width: Metres(0.01),
             range_scale: 0.0,
         },
-        trust: Trust { gate: 5.0, confidence: 3.0 },
+        trust: Trust { gate: 5.0, confidence: 3.0, short: 0.0, ..Trust::default() },
         policy: Policy::Nearest,
+        weights: Weights::default(),
     };
     assert_eq!(robot.config, config);
     assert_eq!(robot.encoder_period, Duration::millis(100));
-    assert_eq!(robot.fix_period, Duration::secs(1));
     assert_eq!(robot.travel_per_tick, None);
 }
 

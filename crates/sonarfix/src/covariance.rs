@@ -12,7 +12,7 @@
 
 use nalgebra::SMatrix;
 
-use crate::motion::{Noise, Step};
+use crate::motion::{Noise, Step, Walk};
 use crate::state::{State, wheels};
 
 /// The largest variance that is computed with (m², rad², 1): a robot uncertain by a thousand
@@ -65,9 +65,10 @@ impl SixStates {
     /// mid-heading, the other half. So the pose after it is linear in the pose before it, the turn
     /// t and the advance s, and all that is needed are the covariances of these: `ht` is that of
     /// heading and turn, `xm` that of x and the mid-heading m = h + t/2, and so on.
-    #[inline(always)]
+    #[inline]
     pub fn propagate(&mut self, step: &Step, noise: &Noise) {
-        let (p, q) = (&mut self.pose, &mut self.calibration);
+        let (p, q) = (&mut self.pose, &self.calibration);
+        let (cc, dd, ww) = noise.walked.added_to(q);
         let (sin, cos) = (step.sin, step.cos);
         // ∂x/∂m and ∂y/∂m.
         let (swing_x, swing_y) = (-step.advance * sin, step.advance * cos);
@@ -75,15 +76,12 @@ impl SixStates {
             |c: f32, d: f32, w: f32| step.turn_c * c + step.turn_d * d + step.turn_w * w;
         let advance_with = |c: f32, d: f32| step.advance_c * c + step.advance_d * d;
 
-        let (tc, sc) = (turn_with(q.cc, q.cd, q.cw), advance_with(q.cc, q.cd));
-        let (td, sd) = (turn_with(q.cd, q.dd, q.dw), advance_with(q.cd, q.dd));
-        let (tw, sw) = (turn_with(q.cw, q.dw, q.ww), advance_with(q.cw, q.dw));
+        let (tc, sc) = (turn_with(cc, q.cd, q.cw), advance_with(cc, q.cd));
+        let (td, sd) = (turn_with(q.cd, dd, q.dw), advance_with(q.cd, dd));
+        let (tw, sw) = (turn_with(q.cw, q.dw, ww), advance_with(q.cw, q.dw));
         let tt = noise.turn + step.turn_c * tc + step.turn_d * td + step.turn_w * tw;
         let ts = noise.advance_turn + step.advance_c * tc + step.advance_d * td;
         let ss = noise.advance + step.advance_c * sc + step.advance_d * sd;
-        q.cc += noise.scale_common;
-        q.dd += noise.scale_difference;
-        q.ww += noise.track_width_error;
 
         let (ht, hs) = (turn_with(p.hc, p.hd, p.hw), advance_with(p.hc, p.hd));
         let (cm, dm, wm) = (p.hc + 0.5 * tc, p.hd + 0.5 * td, p.hw + 0.5 * tw);
@@ -107,7 +105,7 @@ impl SixStates {
         p.xh += xt + swing_x * m_new + cos * s_new;
         let x_m = xm + swing_x * mm + cos * ms;
         let x_s = xs + swing_x * ms + cos * ss;
-        p.xx += noise.position + swing_x * (xm + x_m) + cos * (xs + x_s);
+        p.xx += noise.x + swing_x * (xm + x_m) + cos * (xs + x_s);
 
         let (yt, ys) = (turn_with(p.yc, p.yd, p.yw), advance_with(p.yc, p.yd));
         p.yc = p.yc + swing_y * cm + sin * sc;
@@ -118,22 +116,24 @@ impl SixStates {
         p.xy += swing_y * x_m + sin * x_s + swing_x * ym + cos * ys;
         let y_m = ym + swing_y * mm + sin * ms;
         let y_s = ys + swing_y * ms + sin * ss;
-        p.yy += noise.position + swing_y * (ym + y_m) + sin * (ys + y_s);
+        p.yy += noise.y + swing_y * (ym + y_m) + sin * (ys + y_s);
     }
 }
 
 impl PoseRows {
-    /// What the wheels' noise lacks of the rounding that a step of this covariance may bring, for
-    /// position (each axis) and heading (`docs/model.md`, eq. 9).
-    #[inline(always)]
-    pub fn rounding(&self, advance: f32, turn: f32) -> (f32, f32) {
-        let position = ROUNDING * (self.xx + self.yy) - advance;
-        let heading = ROUNDING * self.hh - turn;
-        (if position > 0.0 { position } else { 0.0 }, if heading > 0.0 { heading } else { 0.0 })
+    /// What the wheels' noise lacks of the rounding that a step of this covariance may bring, for x,
+    /// y and heading (`docs/model.md`, eq. 9).
+    #[inline]
+    pub fn rounding(&self, advance: f32, turn: f32) -> [f32; 3] {
+        let lacking = |variance: f32, noise: f32| {
+            let lack = 0.5 * ROUNDING * variance - noise;
+            if lack > 0.0 { lack } else { 0.0 }
+        };
+        [lacking(self.xx, advance), lacking(self.yy, advance), lacking(self.hh, turn)]
     }
 
     /// Whether the variances of the pose are sound.
-    #[inline(always)]
+    #[inline]
     pub fn is_sound(&self) -> bool {
         is_sound(self.xx) && is_sound(self.yy) && is_sound(self.hh)
     }
@@ -141,7 +141,7 @@ impl PoseRows {
 
 impl RangeScale {
     /// The same for the range scale: its covariances turn as the states do, and it has no noise.
-    #[inline(always)]
+    #[inline]
     pub fn propagate(&mut self, step: &Step) {
         let p = &mut *self;
         let tk = step.turn_c * p.ck + step.turn_d * p.dk + step.turn_w * p.wk;
@@ -181,6 +181,7 @@ pub struct Derivatives {
 
 impl Derivatives {
     /// H times a column.
+    #[must_use]
     pub fn times(&self, column: &Self) -> f32 {
         self.x * column.x + self.y * column.y + self.h * column.h + self.k * column.k
     }
@@ -217,7 +218,8 @@ pub enum Correction {
 
 impl Covariance {
     /// P Hᵀ, of the states that the range depends on.
-    #[inline(always)]
+    #[inline]
+    #[must_use]
     pub fn cross(&self, h: &Derivatives) -> Derivatives {
         let (p, k) = (&self.six.pose, &self.scale);
         Derivatives {
@@ -228,8 +230,18 @@ impl Covariance {
         }
     }
 
+    /// P Hᵀ, of the common part and the difference of the scale errors.
+    #[must_use]
+    pub fn cross_wheels(&self, h: &Derivatives) -> (f32, f32) {
+        let (p, k) = (&self.six.pose, &self.scale);
+        (
+            p.xc * h.x + p.yc * h.y + p.hc * h.h + k.ck * h.k,
+            p.xd * h.x + p.yd * h.y + p.hd * h.h + k.dk * h.k,
+        )
+    }
+
     /// Joseph's form in two passes (`docs/model.md`, eqs. 15 and 17).
-    #[inline(always)]
+    #[inline]
     pub fn correct(&mut self, h: &Derivatives, noise: f32) -> Correction {
         let squares = Derivatives { x: h.x * h.x, y: h.y * h.y, h: h.h * h.h, k: h.k * h.k };
         // Neither holds for NaN.
@@ -346,6 +358,7 @@ pub struct Covariance {
 
 impl Covariance {
     /// Independent errors with these standard deviations.
+    #[must_use]
     pub fn independent(deviation: &State) -> Self {
         let square = |sigma: f32| sigma * sigma;
         let (rr, ll) = (square(deviation.scale_right), square(deviation.scale_left));
@@ -372,6 +385,7 @@ impl Covariance {
     /// The whole matrix in the order of [`State`], with the scale errors wheel by wheel
     /// (`docs/model.md`, eq. 9).
     #[rustfmt::skip]
+    #[must_use]
     pub fn to_matrix(self) -> SMatrix<f32, 7, 7> {
         let (p, q, k) = (self.six.pose, self.six.calibration, self.scale);
         let (xr, xl) = wheels(p.xc, p.xd);
@@ -381,32 +395,44 @@ impl Covariance {
         let (kr, kl) = wheels(k.ck, k.dk);
         let (rr, ll) = self.wheel_variances();
         let rl = q.cc - 0.25 * q.dd;
-        SMatrix::<f32, 7, 7>::from_row_slice(&[
-            p.xx, p.xy, p.xh,   xr,   xl, p.xw, k.xk,
-            p.xy, p.yy, p.yh,   yr,   yl, p.yw, k.yk,
-            p.xh, p.yh, p.hh,   hr,   hl, p.hw, k.hk,
-              xr,   yr,   hr,   rr,   rl,   wr,   kr,
-              xl,   yl,   hl,   rl,   ll,   wl,   kl,
-            p.xw, p.yw, p.hw,   wr,   wl, q.ww, k.wk,
-            k.xk, k.yk, k.hk,   kr,   kl, k.wk, k.kk,
+        SMatrix::from([
+            [p.xx, p.xy, p.xh,   xr,   xl, p.xw, k.xk],
+            [p.xy, p.yy, p.yh,   yr,   yl, p.yw, k.yk],
+            [p.xh, p.yh, p.hh,   hr,   hl, p.hw, k.hk],
+            [  xr,   yr,   hr,   rr,   rl,   wr,   kr],
+            [  xl,   yl,   hl,   rl,   ll,   wl,   kl],
+            [p.xw, p.yw, p.hw,   wr,   wl, q.ww, k.wk],
+            [k.xk, k.yk, k.hk,   kr,   kl, k.wk, k.kk],
         ])
     }
 
     /// Variances of the right and the left wheel's scale error.
+    #[must_use]
     pub fn wheel_variances(&self) -> (f32, f32) {
         let p = &self.six.calibration;
         wheels(p.cc + 0.25 * p.dd, 2.0 * p.cd)
     }
 
+    /// The same with the variances that the calibration has gained by walking.
+    #[inline]
+    #[must_use]
+    pub fn after(mut self, walk: &Walk) -> Self {
+        let q = &mut self.six.calibration;
+        (q.cc, q.dd, q.ww) = walk.added_to(q);
+        self
+    }
+
     /// Whether a variance is negative: no covariance any more.
     #[cold]
+    #[must_use]
     pub fn is_negative(&self) -> bool {
         let (p, q, k) = (&self.six.pose, &self.six.calibration, &self.scale);
         [p.xx, p.yy, p.hh, q.cc, q.dd, q.ww, k.kk].iter().any(|&variance| variance < 0.0)
     }
 
     /// Whether all variances are sound.
-    #[inline(always)]
+    #[inline]
+    #[must_use]
     pub fn is_sound(&self) -> bool {
         let q = &self.six.calibration;
         self.six.pose.is_sound()

@@ -23,11 +23,11 @@
 use nalgebra::{SMatrix, SVector};
 
 use crate::covariance::{Correction, Covariance, Derivatives, is_within};
-use crate::motion::{Drive, Noise, Rates, Step, WheelTravel};
+use crate::motion::{Drive, Noise, Rates, Step, Walk, WheelTravel};
 use crate::range::ExpectedRange;
 use crate::state::{Mean, Remainder};
 use crate::trig::sin_cos_within;
-use crate::units::{Metres, SquareMetres};
+use crate::units::{Metres, Radians, SquareMetres};
 
 pub use crate::state::{STATES, State};
 
@@ -68,6 +68,7 @@ impl core::error::Error for EkfError {}
 /// A measured range against the expected one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Innovation {
     /// ν = z − h(X̂).
     pub value: Metres,
@@ -91,11 +92,33 @@ impl Innovation {
     }
 }
 
-/// The covariance of the position alone, m².
-pub(crate) struct PositionCovariance {
+/// The covariance of the position, m², and the variance of the heading, rad².
+pub(crate) struct PoseCovariance {
     pub xx: f32,
     pub xy: f32,
     pub yy: f32,
+    pub hh: f32,
+}
+
+/// What a range would tell if it were measured.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Prospect {
+    /// Its covariance with x, y, heading and range scale.
+    pub with_pose: Derivatives,
+    /// Its covariance with the common part and the difference of the scale errors.
+    pub with_wheels: (f32, f32),
+    /// S: its variance about the expected one.
+    pub variance: f32,
+}
+
+impl PoseCovariance {
+    /// The position's standard deviation in the direction in which it is largest, m: the root of the
+    /// larger eigenvalue.
+    pub fn worst_deviation(&self) -> f32 {
+        let half = 0.5 * (self.xx - self.yy);
+        let middle = 0.5 * (self.xx + self.yy);
+        libm::sqrtf(middle + libm::sqrtf(half * half + self.xy * self.xy))
+    }
 }
 
 /// The filter.
@@ -128,7 +151,10 @@ pub(crate) struct PositionCovariance {
 pub struct Ekf {
     mean: Mean,
     rest: Remainder,
+    /// P, but for what the calibration has walked since the last range.
     p: Covariance,
+    /// How far both wheels together have rolled since then, metres.
+    way: f32,
     rates: Rates,
 }
 
@@ -155,6 +181,7 @@ impl Ekf {
             mean: Mean::new(&state),
             rest: Remainder::default(),
             p,
+            way: 0.0,
             rates: Rates::new(&drive),
         })
     }
@@ -175,13 +202,13 @@ impl Ekf {
     /// The covariance P, 7×7, exactly symmetric, in the order of [`Self::state_vector`].
     #[must_use]
     pub fn covariance(&self) -> SMatrix<f32, STATES, STATES> {
-        self.p.to_matrix()
+        self.walked().to_matrix()
     }
 
     /// One standard deviation of each state, in the state's own unit.
     #[must_use]
     pub fn deviation(&self) -> State {
-        let p = &self.p;
+        let p = self.walked();
         let (rr, ll) = p.wheel_variances();
         State {
             x: libm::sqrtf(p.six.pose.xx),
@@ -194,13 +221,23 @@ impl Ekf {
         }
     }
 
-    /// Variances and covariance of x and y, m².
-    pub(crate) fn position_covariance(&self) -> PositionCovariance {
-        PositionCovariance {
-            xx: self.p.six.pose.xx,
-            xy: self.p.six.pose.xy,
-            yy: self.p.six.pose.yy,
-        }
+    /// P.
+    fn walked(&self) -> Covariance {
+        self.p.after(&Walk::new(&self.rates, self.way))
+    }
+
+    /// Variances and covariance of x and y, and the heading's variance.
+    pub(crate) fn pose_covariance(&self) -> PoseCovariance {
+        let p = &self.p.six.pose;
+        PoseCovariance { xx: p.xx, xy: p.xy, yy: p.yy, hh: p.hh }
+    }
+
+    /// What this range would tell if it were measured, with noise variance `noise`.
+    pub(crate) fn prospect(&self, expected: &ExpectedRange, noise: SquareMetres) -> Prospect {
+        let h = row(expected);
+        let with_pose = self.p.cross(&h);
+        let variance = noise.0 + h.times(&with_pose);
+        Prospect { with_pose, with_wheels: self.p.cross_wheels(&h), variance }
     }
 
     /// Predicts the state over one step of the wheels: `X̂ ← f(X̂, U)`, `P ← F P Fᵀ + Q`
@@ -223,7 +260,7 @@ impl Ekf {
         if !is_within(step.turn.abs(), LARGEST_TURN) {
             return Err(EkfError::NotFinite);
         }
-        let noise = Noise::new(&self.rates, &self.mean, travel, &self.p.six.pose);
+        let noise = Noise::new(&self.rates, &self.mean, travel, self.way, &self.p.six.pose);
         let before = self.p.six.pose;
         self.p.six.propagate(&step, &noise);
         if !self.p.six.pose.is_sound() {
@@ -232,6 +269,7 @@ impl Ekf {
             return Err(error);
         }
         self.p.scale.propagate(&step);
+        self.way += rolled;
         self.mean.advance(&mut self.rest, &step);
         Ok(())
     }
@@ -261,6 +299,34 @@ impl Ekf {
         SquareMetres((m.x * m.x + m.y * m.y) / innovation_variance(expected, &m, noise))
     }
 
+    /// Admits more doubt of the pose: adds these standard deviations, independent of all else, to x
+    /// and y each and to the heading. The state stays; no entry but their three variances changes.
+    ///
+    /// # Errors
+    /// [`EkfError::NotFinite`] or [`EkfError::Negative`], by what is wrong with an argument; the
+    /// filter is unchanged.
+    ///
+    /// # Panics
+    /// Never.
+    pub fn loosen(&mut self, position: Metres, heading: Radians) -> Result<(), EkfError> {
+        if !position.is_finite() || !heading.is_finite() {
+            return Err(EkfError::NotFinite);
+        }
+        if position < Metres(0.0) || heading < Radians(0.0) {
+            return Err(EkfError::Negative);
+        }
+        let before = self.p.six.pose;
+        let p = &mut self.p.six.pose;
+        p.xx += position.0 * position.0;
+        p.yy += position.0 * position.0;
+        p.hh += heading.0 * heading.0;
+        if p.is_sound() {
+            return Ok(());
+        }
+        self.p.six.pose = before;
+        Err(EkfError::NotFinite)
+    }
+
     /// Corrects the state by one measured `range` with noise variance `noise`
     /// (`docs/model.md`, eqs. 6, 13–15 and 17). There is no gate here: what is given is believed,
     /// except that nothing is believed to be sharper than single precision can hold.
@@ -284,22 +350,31 @@ impl Ekf {
         if !(noise_is_sound && innovation_is_sound) {
             return Err(what_is_wrong_with(noise));
         }
-        let (pose, calibration, scale) = (self.p.six.pose, self.p.six.calibration, self.p.scale);
+        let before = self.p;
+        self.p = self.walked();
         match self.p.correct(&row(expected), noise.0) {
             Correction::Taken(gain) => {
                 if !self.p.is_sound() {
                     let error = self.what_is_unsound();
-                    self.p.six.pose = pose;
-                    self.p.six.calibration = calibration;
-                    self.p.scale = scale;
+                    self.p = before;
                     return Err(error);
                 }
+                self.way = 0.0;
                 self.mean.take(&mut self.rest, &gain, innovation);
                 Ok(())
             }
-            Correction::Spare => Ok(()),
-            Correction::NotFinite => Err(EkfError::NotFinite),
-            Correction::Indefinite => Err(EkfError::Indefinite),
+            Correction::Spare => {
+                self.way = 0.0;
+                Ok(())
+            }
+            Correction::NotFinite => {
+                self.p = before;
+                Err(EkfError::NotFinite)
+            }
+            Correction::Indefinite => {
+                self.p = before;
+                Err(EkfError::Indefinite)
+            }
         }
     }
 

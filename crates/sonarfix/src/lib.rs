@@ -21,6 +21,7 @@
 //!
 //! # Features
 //! - `defmt`: derives `defmt::Format` for the public types.
+//! - `serde`: derives `Serialize` and `Deserialize` for those that a robot is told or tells.
 
 #![no_std]
 #![forbid(unsafe_code)]

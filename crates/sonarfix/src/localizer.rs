@@ -5,18 +5,19 @@
 //! NaN or infinity in an argument is a typed error or a [`Fix::Refused`], and not one bit of the
 //! localizer's estimate has changed.
 
-use crate::aim::{self, Aim, NoAim, Unfit, Viewpoint};
-use crate::config::{Config, ConfigError};
+use crate::aim::{self, Aim, Answer, LEAST_CONFIDENCE, Memory, NoAim, Unfit, Viewpoint};
+use crate::config::{Config, ConfigError, REOPENS, Trust};
 use crate::ekf::{Ekf, EkfError, Innovation, State};
-use crate::health::Health;
+use crate::health::{Doubt, Health, Limits, Turn, Verdict};
 use crate::map::{Map, WallId};
 use crate::motion::WheelTravel;
 use crate::pose::Pose;
-use crate::units::{Instant, Metres, Radians};
+use crate::units::{Instant, Metres, Radians, SquareMetres};
 
 /// Where the robot starts, and how sure that is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Start {
     /// The pose.
     pub pose: Pose,
@@ -79,19 +80,40 @@ impl core::error::Error for OdometryError {}
 /// What became of a range.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[must_use]
 pub enum Fix {
     /// Inside the gate: state and covariance have moved.
     Accepted(Innovation),
-    /// Outside the gate: the filter is unchanged.
+    /// Taken, but believed less than its noise allows: outside the gate and inside the
+    /// [`outer_gate`](crate::config::Trust::outer_gate), or shorter than what the wall itself
+    /// explains ([`short`](crate::config::Trust::short)). The innovation's variance is that with the
+    /// raised noise.
+    Weakened(Innovation),
+    /// Outside the gate: the range has not been taken. The filter is unchanged, but that while
+    /// [`Lost`](crate::health::Verdict::Lost) its doubt may have grown
+    /// ([`Health::reopened`](crate::health::Health::reopened)).
     Gated(Innovation),
-    /// Not a range to compare with anything: the filter is unchanged.
+    /// Not a range to compare with anything: the filter is unchanged; while lost, a missing echo
+    /// counts like a gated range.
     Refused(Refusal),
+}
+
+impl Fix {
+    /// The innovation of a range that has corrected the estimate; `None` for one that has not.
+    #[must_use]
+    pub fn taken(&self) -> Option<Innovation> {
+        match *self {
+            Self::Accepted(innovation) | Self::Weakened(innovation) => Some(innovation),
+            Self::Gated(_) | Self::Refused(_) => None,
+        }
+    }
 }
 
 /// Why a range was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Refusal {
     /// The range is NaN or infinite.
     NotFinite,
@@ -169,10 +191,9 @@ pub struct Localizer<'m> {
     ekf: Ekf,
     health: Health,
     time: Instant,
-    /// The wall that something seems to stand before, by the last turn: passed over once.
-    spare: Option<WallId>,
-    /// The wall that did not answer at the last turn.
-    silent: Option<WallId>,
+    memory: Memory,
+    /// The wall that contradicted the pose last, since the last range taken.
+    contradicted: Option<WallId>,
 }
 
 impl<'m> Localizer<'m> {
@@ -210,8 +231,8 @@ impl<'m> Localizer<'m> {
             ekf,
             health: Health::default(),
             time: now,
-            spare: None,
-            silent: None,
+            memory: Memory::default(),
+            contradicted: None,
         })
     }
 
@@ -232,23 +253,27 @@ impl<'m> Localizer<'m> {
         if elapsed.is_zero() && fastest.abs() > Metres(0.0) {
             return Err(OdometryError::NoTimePassed);
         }
-        #[expect(clippy::cast_precision_loss, reason = "a limit, not an equation")]
-        let seconds = elapsed.to_micros() as f32 * 1e-6;
+        let seconds = aim::seconds(elapsed);
         if fastest.abs().0 > self.config.max_wheel_speed.0 * seconds {
             return Err(OdometryError::TooFast);
         }
+        let before = self.pose().heading;
         self.ekf.predict(travel).map_err(OdometryError::Filter)?;
+        self.memory.turned(self.pose().heading.from(before), seconds);
         self.time = now;
+        let limits = self.limits();
+        self.health.rolled(travel.distance(), elapsed, &limits);
         Ok(())
     }
 
-    /// Where the sonar should look next, by the policy of the configuration. A wall that
-    /// something seems to stand before is passed over once, if another counts.
+    /// Where the sonar should look next, by the policy of the configuration, and why. Where it
+    /// looked last, and which walls have lately not answered as they should, it knows from
+    /// [`Self::fix`].
     ///
     /// # Errors
     /// [`NoAim`], by why there is nothing to look at.
     pub fn aim(&self) -> Result<Aim, NoAim> {
-        aim::choose(&self.config, &self.map, &self.ekf, self.spare)
+        aim::choose(&self.config, &self.map, &self.ekf, &self.memory, self.time)
     }
 
     /// The wall that a sonar at `bearing` (relative to the heading) meets squarely, for a range
@@ -257,40 +282,86 @@ impl<'m> Localizer<'m> {
     /// # Errors
     /// [`NoAim`], by why there is none.
     pub fn aim_at(&self, bearing: Radians) -> Result<Aim, NoAim> {
-        aim::at(&self.config, &self.map, &self.ekf, bearing)
+        aim::at(&self.config, &self.map, &self.ekf, &self.memory, self.time, bearing)
     }
 
     /// Takes the range that came back from an aim, or `None` where no echo came. The pose must be
     /// that of the instant when the echo left the wall: call [`Self::odometry`] up to it first.
     ///
-    /// Only [`Fix::Accepted`] changes the estimate; every outcome enters the health.
+    /// [`Fix::Accepted`] and [`Fix::Weakened`] correct the estimate; every outcome enters the health.
     pub fn fix(&mut self, aim: &Aim, range: Option<Metres>) -> Fix {
         let fix = self.try_fix(aim, range).unwrap_or_else(Fix::Refused);
-        self.spare = self.blocked(aim, &fix).then_some(aim.wall);
-        self.silent = matches!(fix, Fix::Refused(_)).then_some(aim.wall);
-        match fix {
-            Fix::Accepted(_) => self.health.accepted(),
-            Fix::Gated(innovation) => self.health.gated(innovation.value),
-            Fix::Refused(Refusal::NoEcho) => self.health.no_echo(),
-            Fix::Refused(_) => self.health.silent(),
-        }
+        self.remember(aim, &fix);
+        self.judge(Turn::of(&fix, self.contradicted == Some(aim.wall)));
+        self.contradicted = self.contradicted_by(aim, &fix);
+        self.reopen(&fix);
         fix
     }
 
-    /// Whether something seems to stand before the wall: a range that it shortened, or an echo that
-    /// stayed away twice; once is often chance.
-    fn blocked(&self, aim: &Aim, fix: &Fix) -> bool {
+    /// Lets the doubt of a lost robot grow with every range beyond the gate, so that later ones find
+    /// it wider (`docs/model.md`, eq. 19): the position's up to [`REOPENS`] steps, the heading's
+    /// while the sonar still has something to look at.
+    fn reopen(&mut self, fix: &Fix) {
+        if self.health.verdict != Verdict::Lost || !matches!(fix, Fix::Gated(_)) {
+            return;
+        }
+        let (doubt, limits) = (self.doubt(), self.limits());
+        let step = self.config.trust.reopen;
+        let position = if doubt.position < step * REOPENS { step } else { Metres(0.0) };
+        let heading = Radians(if doubt.heading < limits.heading { step.0 } else { 0.0 });
+        let grows = position > Metres(0.0) || heading > Radians(0.0);
+        if grows && self.ekf.loosen(position, heading).is_ok() {
+            self.health.reopened();
+        }
+    }
+
+    fn judge(&mut self, turn: Turn) {
+        let (doubt, limits) = (self.doubt(), self.limits());
+        self.health.turn(turn, doubt, &limits);
+    }
+
+    fn limits(&self) -> Limits {
+        let trust = &self.config.trust;
+        let heading = self.config.sonar.cone * (0.5 / LEAST_CONFIDENCE);
+        Limits { stale: trust.stale, position: trust.doubtful, heading }
+    }
+
+    /// How uncertain the pose is, by the filter itself.
+    fn doubt(&self) -> Doubt {
+        Doubt {
+            position: Metres(self.ekf.pose_covariance().worst_deviation()),
+            heading: Radians(self.ekf.deviation().heading),
+        }
+    }
+
+    /// Takes note of how a look at a wall ended.
+    fn remember(&mut self, aim: &Aim, fix: &Fix) {
+        let Some(wall) = self.map.wall(aim.wall) else {
+            return;
+        };
+        let answer = match fix {
+            Fix::Accepted(_) => Answer::Right,
+            Fix::Gated(_) => Answer::Wrong,
+            Fix::Weakened(_) | Fix::Refused(Refusal::NoEcho) => Answer::Doubtful,
+            Fix::Refused(_) => Answer::Unknown,
+        };
+        let foot = wall.along(self.pose().to_map(self.config.sonar.mount));
+        self.memory.looked((aim.wall, foot), (aim.bearing, aim.range), answer, self.time);
+    }
+
+    /// The wall that contradicts the pose, after this fix.
+    fn contradicted_by(&self, aim: &Aim, fix: &Fix) -> Option<WallId> {
         match fix {
-            Fix::Accepted(_) => false,
-            Fix::Gated(_) => true,
-            Fix::Refused(_) => self.silent == Some(aim.wall),
+            Fix::Accepted(_) | Fix::Weakened(_) => None,
+            Fix::Gated(_) | Fix::Refused(Refusal::NoEcho) => Some(aim.wall),
+            Fix::Refused(_) => self.contradicted,
         }
     }
 
     /// Takes note that the sonar had its turn and [`Self::aim`] found no wall to look at, so that
     /// a localizer that has gone blind does not keep saying that it is tracking.
     pub fn skip(&mut self) {
-        self.health.silent();
+        self.judge(Turn::Silent);
     }
 
     fn try_fix(&mut self, aim: &Aim, range: Option<Metres>) -> Result<Fix, Refusal> {
@@ -305,19 +376,40 @@ impl<'m> Localizer<'m> {
         let wall = self.map.wall(aim.wall).ok_or(Refusal::UnknownWall)?;
         let view = Viewpoint::new(&self.config, &self.ekf);
         let expected = view.expect(&wall)?;
-        if !view.is_square(aim.bearing, &expected) {
+        let off = expected.direction.from(view.heading.turned(aim.bearing));
+        if !view.is_square(off) {
             return Err(Refusal::NotSquare);
         }
         let noise = sonar.noise.variance(expected.range);
         let innovation = self.ekf.innovation(range, &expected, noise);
-        let gate = self.config.trust.gate;
-        if innovation.nis() > gate * gate {
+        let Some(weakened) = self.weighed(innovation, noise) else {
             return Ok(Fix::Gated(innovation));
-        }
-        match self.ekf.update(range, &expected, noise) {
+        };
+        match self.ekf.update(range, &expected, weakened) {
+            Ok(()) if weakened > noise => {
+                let raised = innovation.variance.0 + (weakened.0 - noise.0);
+                Ok(Fix::Weakened(Innovation { variance: SquareMetres(raised), ..innovation }))
+            }
             Ok(()) => Ok(Fix::Accepted(innovation)),
             Err(_) => Err(Refusal::NotFinite),
         }
+    }
+
+    /// The noise with which a range is to be believed, at least its own; `None` if it is not
+    /// believed at all (`docs/model.md`, eqs. 14 and 18).
+    fn weighed(&self, innovation: Innovation, noise: SquareMetres) -> Option<SquareMetres> {
+        let Trust { gate, outer_gate, short, .. } = self.config.trust;
+        let square = innovation.value.0 * innovation.value.0;
+        let is_inside = innovation.nis() <= gate * gate;
+        if !is_inside && innovation.nis() > outer_gate * outer_gate {
+            return None;
+        }
+        // What brings a range beyond the gate to it.
+        let at_gate = noise.0 + (square / (gate * gate) - innovation.variance.0);
+        let is_short = short > 0.0 && innovation.value < Metres(0.0);
+        let as_short = if is_short { square / (short * short) } else { 0.0 };
+        let least = if is_inside { noise.0 } else { at_gate };
+        Some(SquareMetres(if as_short > least { as_short } else { least }))
     }
 
     /// The time of the last travel taken.

@@ -9,7 +9,7 @@
 //! Nothing here refuses a value; [`Ekf::predict`](crate::ekf::Ekf::predict) checks the turn and the
 //! covariance that come of it.
 
-use crate::covariance::PoseRows;
+use crate::covariance::{Calibration, PoseRows};
 use crate::state::{Mean, wheels};
 use crate::units::{Metres, PerRootMetre};
 
@@ -17,6 +17,7 @@ use crate::units::{Metres, PerRootMetre};
 /// is backwards.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct WheelTravel {
     /// ΔR of the paper.
     pub right: Metres,
@@ -47,6 +48,7 @@ impl WheelTravel {
 /// The drive, as its builder measured it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Drive {
     /// Nominal distance between the wheels' contact points (D).
     pub track_width: Metres,
@@ -116,18 +118,48 @@ pub struct Noise {
     pub(crate) advance: f32,
     pub(crate) turn: f32,
     pub(crate) advance_turn: f32,
-    /// Of x and of y, and of the heading: what makes up for rounding.
-    pub(crate) position: f32,
+    /// Of x, y and heading: what makes up for rounding.
+    pub(crate) x: f32,
+    pub(crate) y: f32,
     pub(crate) heading: f32,
-    /// Of the common part and the difference of the scale errors, and of the track width.
-    pub(crate) scale_common: f32,
-    pub(crate) scale_difference: f32,
-    pub(crate) track_width_error: f32,
+    /// What the calibration has walked up to this step.
+    pub(crate) walked: Walk,
+}
+
+/// The variances that the calibration has gained by walking since the last range: of the common
+/// part and the difference of the scale errors, and of the track width.
+///
+/// They are added to P's when a range comes, not with every step: what a scale error walks in one
+/// step is less than the rounding of its own variance, and would be lost or doubled.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Walk {
+    scale_common: f32,
+    scale_difference: f32,
+    track_width_error: f32,
+}
+
+impl Walk {
+    /// The walk over a way of both wheels together, metres.
+    #[inline]
+    #[must_use]
+    pub fn new(rates: &Rates, way: f32) -> Self {
+        Self {
+            scale_common: way * rates.scale_common,
+            scale_difference: way * rates.scale_difference,
+            track_width_error: way * rates.track_width_error,
+        }
+    }
+
+    /// The variances cc, dd and ww with it.
+    #[inline]
+    pub(crate) fn added_to(&self, q: &Calibration) -> (f32, f32, f32) {
+        (q.cc + self.scale_common, q.dd + self.scale_difference, q.ww + self.track_width_error)
+    }
 }
 
 impl Step {
     /// The step that these travels make from `at`. `sin_cos` is told the mid-heading.
-    #[inline(always)]
+    #[inline]
     pub fn new(
         rates: &Rates,
         at: &Mean,
@@ -156,9 +188,10 @@ impl Step {
 }
 
 impl Noise {
-    /// The noise of that step (`docs/model.md`, eq. 9).
-    #[inline(always)]
-    pub fn new(rates: &Rates, at: &Mean, travel: WheelTravel, p: &PoseRows) -> Self {
+    /// The noise of that step (`docs/model.md`, eq. 9), `way` after the last range.
+    #[inline]
+    #[must_use]
+    pub fn new(rates: &Rates, at: &Mean, travel: WheelTravel, way: f32, p: &PoseRows) -> Self {
         let (right, left) = (travel.right.0, travel.left.0);
         let (factor_r, factor_l) = wheels(1.0 + at.scale_common, at.scale_difference);
         let per_width = 1.0 / (rates.track_width + at.track_width_error);
@@ -167,18 +200,16 @@ impl Noise {
         let of_l = (left * factor_l * factor_l).abs();
         let advance = rates.advance * (of_r + of_l);
         let per_half_width = per_width + per_width;
-        let rolled = right.abs() + left.abs();
         let turn = advance * per_half_width * per_half_width;
-        let (position, heading) = p.rounding(advance, turn);
+        let [x, y, heading] = p.rounding(advance, turn);
         Self {
             advance,
             turn,
-            position,
+            x,
+            y,
             heading,
             advance_turn: rates.advance * (of_r - of_l) * per_half_width,
-            scale_common: rolled * rates.scale_common,
-            scale_difference: rolled * rates.scale_difference,
-            track_width_error: rolled * rates.track_width_error,
+            walked: Walk::new(rates, way),
         }
     }
 }

@@ -15,6 +15,7 @@ use crate::units::{Metres, Radians};
 /// A point, in the map frame unless said otherwise.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Point {
     /// Along x.
     pub x: Metres,
@@ -46,6 +47,8 @@ impl Point {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(from = "Radians", into = "Radians"))]
 pub struct Heading(f32);
 
 impl Heading {
@@ -72,6 +75,18 @@ impl Heading {
     #[must_use]
     pub fn from(self, other: Self) -> Radians {
         Radians(wrap(self.0 - other.0))
+    }
+}
+
+impl From<Radians> for Heading {
+    fn from(angle: Radians) -> Self {
+        Self::new(angle)
+    }
+}
+
+impl From<Heading> for Radians {
+    fn from(heading: Heading) -> Self {
+        heading.radians()
     }
 }
 
@@ -104,6 +119,7 @@ fn wrap_far(angle: f32) -> f32 {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Pose {
     /// Midpoint between the wheels, along map x.
     pub x: Metres,

@@ -17,6 +17,7 @@ use crate::units::{Metres, Radians, SquareMetres};
 /// Noise of one range, growing with the range: variance σ₀² + (σ₁ d)².
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RangeNoise {
     /// σ₀, standard deviation at no range.
     pub floor: Metres,

@@ -1,4 +1,7 @@
 //! The seven states: as the crate shows them, and as the filter holds them.
+//!
+//! # Non-finite policy
+//! Nothing here refuses a value; [`Ekf`](crate::ekf::Ekf) takes no state that is not finite.
 
 use nalgebra::SVector;
 
@@ -13,6 +16,7 @@ pub const STATES: usize = 7;
 /// The seven states, in the order of the state vector and of the covariance.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct State {
     /// Position along map x, metres.
     pub x: f32,
@@ -69,6 +73,7 @@ pub struct Mean {
 
 impl Mean {
     /// From the state that the crate shows.
+    #[must_use]
     pub fn new(state: &State) -> Self {
         let mut mean = Self {
             x: state.x,
@@ -84,6 +89,7 @@ impl Mean {
     }
 
     /// The state that the crate shows.
+    #[must_use]
     pub fn state(&self) -> State {
         let (scale_right, scale_left) = wheels(self.scale_common, self.scale_difference);
         State {
@@ -98,7 +104,7 @@ impl Mean {
     }
 
     /// Moves along a step (`docs/model.md`, eq. 7).
-    #[inline(always)]
+    #[inline]
     pub fn advance(&mut self, rest: &mut Remainder, step: &Step) {
         add(&mut self.x, &mut rest.x, step.advance * step.cos);
         add(&mut self.y, &mut rest.y, step.advance * step.sin);
@@ -107,7 +113,7 @@ impl Mean {
     }
 
     /// X̂ + K ν (`docs/model.md`, eq. 14).
-    #[inline(always)]
+    #[inline]
     pub fn take(&mut self, rest: &mut Remainder, gain: &Gain, innovation: f32) {
         add(&mut self.x, &mut rest.x, gain.x * innovation);
         add(&mut self.y, &mut rest.y, gain.y * innovation);
@@ -119,7 +125,7 @@ impl Mean {
         self.wrap();
     }
 
-    #[inline(always)]
+    #[inline]
     fn wrap(&mut self) {
         self.heading = Heading::new(Radians(self.heading)).radians().0;
     }

@@ -50,7 +50,7 @@ fn of_a_huge_angle(x: f32) -> (f32, f32) {
 }
 
 /// Sine and cosine of |x| ≤ [`RANGE`].
-#[inline(always)]
+#[inline]
 pub(crate) fn sin_cos_within(x: f32) -> (f32, f32) {
     // Rounds to the nearest integer, which then is in the lowest bits.
     let shifted = x * core::f32::consts::FRAC_2_PI + SHIFT;

@@ -11,6 +11,7 @@ use sonarfix::config::Config;
 use sonarfix::health::Verdict;
 use sonarfix::localizer::{Fix, Localizer, Start};
 use sonarfix::map::{Map, Wall};
+use sonarfix::motion::WheelTravel;
 use sonarfix::pose::{Point, Pose};
 use sonarfix::units::{Instant, Metres, Radians};
 
@@ -33,16 +34,39 @@ fn localizer(walls: &[Wall], heading_deviation: f32) -> Localizer<'_> {
 }
 
 #[test]
-fn a_blocked_wall_is_passed_over_once() {
+fn a_blocked_wall_is_believed_less_and_regains_it_with_time() {
     let walls = room();
     let mut localizer = localizer(&walls, 0.01);
     let favourite = localizer.aim().unwrap();
     assert!(matches!(localizer.fix(&favourite, Some(Metres(0.3))), Fix::Gated(_)));
-    let second = localizer.aim().unwrap();
-    assert_ne!(second.wall, favourite.wall, "something stands before the first");
-    // The second is blocked as well: the first has its turn again.
-    assert!(matches!(localizer.fix(&second, Some(Metres(0.3))), Fix::Gated(_)));
-    assert_eq!(localizer.aim().unwrap().wall, favourite.wall);
+    assert_ne!(localizer.aim().unwrap().wall, favourite.wall, "something stands before the first");
+    // At the same bearing, it is the same wall, and is said to be less likely to answer.
+    let belief = |localizer: &Localizer| {
+        let why = localizer.aim_at(favourite.bearing).unwrap().why;
+        why.success / favourite.why.success
+    };
+    assert!((belief(&localizer) - 0.2).abs() < 1e-3);
+    let mut before = 0.0;
+    for seconds in [1, 5, 20, 100, 1_000] {
+        let now = Instant::from_ticks(seconds * 1_000_000);
+        localizer.odometry(now, WheelTravel::default()).unwrap();
+        assert!(belief(&localizer) > before, "after {seconds} s");
+        before = belief(&localizer);
+    }
+    assert!(before > 0.95);
+}
+
+#[test]
+fn no_echo_is_half_as_bad_and_an_echo_mends_most_of_it() {
+    let walls = &room()[..1];
+    let mut localizer = localizer(walls, 0.01);
+    let first = localizer.aim().unwrap();
+    let _ = localizer.fix(&first, None);
+    let silent = localizer.aim().unwrap();
+    assert!((silent.why.success / first.why.success - 0.5).abs() < 1e-3);
+    assert!(matches!(localizer.fix(&silent, Some(silent.range)), Fix::Accepted(_)));
+    let mended = localizer.aim().unwrap();
+    assert!((mended.why.success / first.why.success - 0.85).abs() < 1e-2);
 }
 
 #[test]

@@ -3,7 +3,12 @@
 mod bound;
 mod convert;
 mod faults;
+mod floor_plans;
+mod health;
+mod map;
+mod overrides;
 mod paper;
+mod plan;
 mod replay;
 mod run;
 mod sonar_model;
@@ -29,12 +34,20 @@ enum Command {
     Replay(replay::Args),
     /// Converts recordings of other formats for `replay`.
     Convert(convert::Args),
+    /// Checks, bakes, draws and simplifies maps.
+    Map(map::Args),
     /// Prints how well any estimator could know the robot's state, over time.
     Bound(bound::Args),
+    /// Shows how well a robot would know where it is along a path, before it is built.
+    Plan(plan::Args),
     /// Prints how the simulated NXT sonar compares with recorded sweeps, as markdown.
     SonarModel(sonar_model::Args),
     /// Prints what every fault of the hardware does to a robot, as markdown.
     Faults(faults::Args),
+    /// Prints how often the verdict is wrong, and how long it takes, as markdown.
+    Health(health::Args),
+    /// Compares two policies of the sonar in floor plans that nobody drew, as markdown.
+    FloorPlans(floor_plans::Args),
 }
 
 impl Cli {
@@ -48,9 +61,13 @@ impl Cli {
             Command::Run(args) => run::execute(&args),
             Command::Replay(args) => replay::execute(&args),
             Command::Convert(args) => convert::execute(&args),
+            Command::Map(args) => map::execute(&args),
             Command::Bound(args) => bound::execute(&args),
+            Command::Plan(args) => plan::execute(&args),
             Command::SonarModel(args) => sonar_model::execute(&args),
             Command::Faults(args) => faults::execute(&args),
+            Command::Health(args) => health::execute(&args),
+            Command::FloorPlans(args) => floor_plans::execute(&args),
         }
     }
 }

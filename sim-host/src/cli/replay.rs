@@ -8,7 +8,7 @@ use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 use sonarfix_map::{Floor, Robot};
 
-use super::paper::PolicyName;
+use super::overrides::PolicyName;
 use super::run::Output;
 use super::table;
 use crate::replay::fault::Complaint;

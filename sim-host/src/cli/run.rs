@@ -5,9 +5,9 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use clap::ValueEnum;
-use sonarfix_map::{Fidelity, Scenario};
+use sonarfix_map::Scenario;
 
+use super::overrides::Overrides;
 use super::table::{self, Beside};
 use crate::report::Report;
 use crate::simulate::Simulation;
@@ -25,32 +25,13 @@ pub struct Args {
     /// Seed of the first run; the others count up from it.
     #[arg(long)]
     seed: Option<u64>,
-    /// What is simulated between world and localizer; the scenario's own choice if not given.
-    #[arg(long, value_enum)]
-    fidelity: Option<FidelityName>,
     /// Writes the first run's trace here, as CSV (docs/formats.md).
     #[arg(long, value_name = "FILE.csv")]
     trace: Option<PathBuf>,
     #[command(flatten)]
+    overrides: Overrides,
+    #[command(flatten)]
     output: Output,
-}
-
-/// What is simulated between world and localizer.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub enum FidelityName {
-    /// Nothing: travels and ranges are told at once.
-    Ideal,
-    /// Pins, drivers and the robot's own loop.
-    Pins,
-}
-
-impl From<FidelityName> for Fidelity {
-    fn from(name: FidelityName) -> Self {
-        match name {
-            FidelityName::Ideal => Self::Ideal,
-            FidelityName::Pins => Self::Pins,
-        }
-    }
 }
 
 /// Where the answer goes.
@@ -66,7 +47,7 @@ pub struct Output {
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
     let mut scenario = Scenario::read(&args.scenario)?;
-    scenario.fidelity = args.fidelity.map_or(scenario.fidelity, Fidelity::from);
+    args.overrides.apply(&mut scenario)?;
     let experiment = Experiment {
         runs: args.runs.unwrap_or(scenario.run.runs),
         seed: args.seed.unwrap_or(scenario.run.seed),

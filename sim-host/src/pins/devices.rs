@@ -4,7 +4,7 @@ use sonarfix::config::Config;
 use sonarfix::units::{Duration, Metres};
 use sonarfix_hal::encoder::{GeometryError, TickCount, WheelGeometry, Wheels};
 use sonarfix_hal::ranger::{Air, Captured, Celsius, PulseRanger, PulseTiming, TemperatureError};
-use sonarfix_hal::robot::{Devices, Rhythm, Settings, SettingsError, Stamp};
+use sonarfix_hal::robot::{Devices, Settings, SettingsError, Stamp};
 use sonarfix_hal::servo::{Calibration, MeasuredPulse, Pace, Servo, SettingError};
 use sonarfix_map::{Robot, Scenario, ServoName, SonarName};
 
@@ -70,7 +70,7 @@ pub fn wheels(robot: &Robot) -> Result<Wheels, SetupError> {
 pub fn settings(robot: &Robot, stamp: Stamp) -> Settings {
     Settings {
         tick: robot.encoder_period,
-        rhythm: Rhythm::Every(robot.fix_period),
+        rhythm: robot.config.sonar.timing.rhythm,
         stamp,
         ..Settings::default()
     }
@@ -82,7 +82,7 @@ pub struct ServoSetup {
     /// How it moves.
     pub model: ServoModel,
     /// How the driver thinks it does.
-    pace: Pace,
+    pub pace: Pace,
     /// Pulses at its rightmost and its leftmost bearing, µs.
     pulses: (u16, u16),
 }
@@ -104,6 +104,9 @@ impl ServoSetup {
             },
             ServoName::Sg90 => {
                 Self { model: ServoModel::sg90(), pace: Pace::SG90, pulses: (500, 2_500) }
+            }
+            ServoName::Mg996r => {
+                Self { model: ServoModel::mg996r(), pace: Pace::MG996R, pulses: (500, 2_500) }
             }
         }
     }
@@ -145,8 +148,10 @@ fn limits(config: &Config) -> (f64, f64) {
 pub fn timing(scenario: &Scenario) -> PulseTiming {
     /// What an HC-SR04 is given after its longest flight, for its silence and its cycle.
     const SHORT: PulseTiming = PulseTiming::HC_SR04;
-    if scenario.hardware.sonar == SonarName::HcSr04 {
-        return SHORT;
+    match scenario.hardware.sonar {
+        SonarName::HcSr04 => return SHORT,
+        SonarName::LvMaxSonar => return PulseTiming::LV_MAXSONAR,
+        _ => {}
     }
     let reach = f64::from(scenario.robot.config.sonar.max_range.0);
     // A tenth more, for what is beyond the reach only by its noise or by the air.

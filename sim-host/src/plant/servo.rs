@@ -51,6 +51,14 @@ impl ServoModel {
     }
 }
 
+impl ServoModel {
+    /// MG996R, from `FIELD.md`: 0.13–0.17 s/60°; in all else taken to be like an SG90.
+    #[must_use]
+    pub fn mg996r() -> Self {
+        Self { slew: 60_f64.to_radians() / 0.15, ..Self::sg90() }
+    }
+}
+
 /// A turn from one bearing to another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Turn {

@@ -4,6 +4,7 @@ use std::io::BufRead;
 use std::iter::Peekable;
 use std::vec::IntoIter;
 
+use sonarfix::config::Rhythm;
 use sonarfix::localizer::{Fix, Localizer, OdometryError, Start};
 use sonarfix::map::{Map, Wall};
 use sonarfix::motion::WheelTravel;
@@ -207,7 +208,13 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
     }
 
     fn fix_period(&self) -> i64 {
-        i64::try_from(self.robot.fix_period.to_micros()).unwrap_or(i64::MAX)
+        let timing = &self.robot.config.sonar.timing;
+        let period = match timing.rhythm {
+            Rhythm::Every(period) => period,
+            // A recording has no servo to wait for.
+            Rhythm::AsFastAsPossible => timing.cycle,
+        };
+        i64::try_from(period.to_micros()).unwrap_or(i64::MAX).max(1)
     }
 
     /// The localizer starts where it is told, when both start and encoders are known.
@@ -444,7 +451,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         self.tally.verdicts.note(look.time, before, now);
         let fixes = &mut self.tally.fixes;
         match fix {
-            Fix::Accepted(_) => fixes.accepted += 1,
+            Fix::Accepted(_) | Fix::Weakened(_) => fixes.accepted += 1,
             Fix::Gated(_) => fixes.gated += 1,
             Fix::Refused(_) => fixes.refused += 1,
         }

@@ -49,7 +49,7 @@ pub(super) const LINE: u16 = 6;
 pub(super) const BROAD: u16 = 12;
 
 /// The error of a drawing that failed.
-pub(super) type DrawError = Box<dyn Error + Send + Sync>;
+pub type DrawError = Box<dyn Error + Send + Sync>;
 
 type Root<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Plot<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Axis, Axis>>;

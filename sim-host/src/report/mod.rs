@@ -10,14 +10,20 @@
 //! | module | what |
 //! |---|---|
 //! | `figures` | what each figure shows |
+//! | `called_lost` | the figure of `sonarfix health` |
 //! | `chart`, `axis`, `points` | how a figure is drawn |
+//! | [`heat_map`] | a map with a quantity along a path, a picture of its own |
 //! | `player` | the data of the player; its script is `player.js` |
 //! | `palette` | one colour for one thing, in figures and player |
+//! | [`map`] | the picture of a map alone |
 //! | `page` | tables, figures and data as HTML |
 
 mod axis;
+mod called_lost;
 mod chart;
 mod figures;
+pub mod heat_map;
+pub mod map;
 mod page;
 mod palette;
 mod player;
@@ -32,6 +38,8 @@ use thiserror::Error;
 
 use crate::trace::Trace;
 use figures::Figure;
+
+pub use called_lost::called_lost;
 
 /// The name of the report's file.
 const FILE: &str = "report.html";
@@ -178,6 +186,7 @@ mod tests {
                 bearing: -1.57,
                 range: None,
                 met: None,
+                why: None,
                 outcome: Outcome::Refused,
                 reason: HOSTILE.into(),
                 innovation: None,

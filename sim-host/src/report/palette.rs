@@ -145,7 +145,7 @@ fn variables(colour: fn(Role) -> Rgb) -> String {
     css
 }
 
-fn hex((red, green, blue): Rgb) -> String {
+pub(super) fn hex((red, green, blue): Rgb) -> String {
     format!("#{red:02x}{green:02x}{blue:02x}")
 }
 

@@ -24,7 +24,7 @@ pub fn run(
 ) -> Result<RunResult, SimulationError> {
     let mut run = Run::new(simulation, seed)?;
     let tick_period = simulation.scenario.robot.encoder_period.to_micros();
-    let fix_period = simulation.scenario.robot.fix_period.to_micros();
+    let fix_period = simulation.ideal_period().to_micros();
     let (mut next_tick, mut next_fix) = (tick_period, fix_period);
     while next_tick.min(next_fix) <= simulation.end() {
         let now = next_tick.min(next_fix);

@@ -12,12 +12,13 @@ mod score;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
+use sonarfix::config::{Rhythm, Timing};
 use sonarfix::localizer::{Localizer, Start, StartError};
-use sonarfix::map::{Map, Wall};
+use sonarfix::map::{Map, MapError, Wall};
 use sonarfix::pose::Pose;
-use sonarfix::units::{Instant, Metres, Radians};
+use sonarfix::units::{Duration, Instant, Metres, Radians};
 use sonarfix_hal::robot::Stamp;
-use sonarfix_map::{Fidelity, Follow, NamedWall, Scenario, SonarName};
+use sonarfix_map::{BakeError, Fidelity, Follow, NamedWall, Scenario, SonarName};
 
 use crate::dense::{Line, Model, Vector};
 use crate::pins::devices::SetupError;
@@ -38,6 +39,8 @@ pub struct Simulation {
     /// To which instant the loop says that an echo belongs, at the fidelity of pins.
     pub stamp: Stamp,
     walls: Vec<Wall>,
+    /// The walls as a baked map, if that is what the localizer is to read.
+    image: Option<Vec<u8>>,
     lines: Vec<Line>,
     world: World,
     sensor: SensorModel,
@@ -52,6 +55,9 @@ pub enum SimulationError {
     /// The localizer could not be made.
     #[error("the localizer refuses to start: {0}")]
     Start(#[from] StartError),
+    /// The localizer refused its baked map.
+    #[error("the localizer refuses its map: {0}")]
+    Map(#[from] MapError),
     /// The robot's devices could not be set up.
     #[error("the robot cannot be set up: {0}")]
     Setup(#[from] SetupError),
@@ -102,6 +108,7 @@ impl Simulation {
         Self {
             stamp: Stamp::Reflection,
             walls: scenario.floor.walls(),
+            image: None,
             lines: scenario.floor.named_walls().iter().map(line).collect(),
             world,
             sensor: sensor(&scenario),
@@ -110,6 +117,21 @@ impl Simulation {
             model: Model::of(&scenario.robot.config),
             scenario,
         }
+    }
+
+    /// The same, but the localizer reads its map as on a robot: baked.
+    ///
+    /// # Errors
+    /// [`BakeError`], if the walls cannot be baked.
+    pub fn on_baked_map(self) -> Result<Self, BakeError> {
+        Ok(Self { image: Some(sonarfix_map::bake(&self.walls)?), ..self })
+    }
+
+    /// The same with a sonar that hears the walls that it hears, but never anything else, and says
+    /// what is true: what can be known of it before anything is built.
+    #[must_use]
+    pub fn undistorted(self) -> Self {
+        Self { sensor: self.sensor.undistorted(), ..self }
     }
 
     /// A trace of this scenario with nothing in it yet.
@@ -161,8 +183,36 @@ impl Simulation {
 
     /// A localizer that starts at a time, µs.
     fn localizer_from(&self, start: Start, now: u64) -> Result<Localizer<'_>, SimulationError> {
-        let config = self.scenario.robot.config;
-        Ok(Localizer::new(config, Map::new(&self.walls), start, Instant::from_ticks(now))?)
+        let mut config = self.scenario.robot.config;
+        config.sonar.timing = self.timing();
+        let map = match &self.image {
+            None => Map::new(&self.walls),
+            Some(image) => Map::read(image)?,
+        };
+        Ok(Localizer::new(config, map, start, Instant::from_ticks(now))?)
+    }
+
+    /// What the localizer is told that a look takes: at the ideal fidelity there is no servo.
+    fn timing(&self) -> Timing {
+        match self.scenario.fidelity {
+            Fidelity::Pins => self.scenario.robot.config.sonar.timing,
+            Fidelity::Ideal => {
+                Timing { rhythm: Rhythm::Every(self.ideal_period()), ..Timing::EVERY_SECOND }
+            }
+        }
+    }
+
+    /// From look to look at the ideal fidelity, where as fast as possible is once in a cycle of the
+    /// ranger, or with every encoder tick if that takes no time.
+    fn ideal_period(&self) -> Duration {
+        let timing = &self.scenario.robot.config.sonar.timing;
+        match timing.rhythm {
+            Rhythm::Every(period) => period,
+            Rhythm::AsFastAsPossible if timing.cycle.is_zero() => {
+                self.scenario.robot.encoder_period
+            }
+            Rhythm::AsFastAsPossible => timing.cycle,
+        }
     }
 
     /// Who steers, if anybody must.
@@ -187,6 +237,9 @@ fn sensor(scenario: &Scenario) -> SensorModel {
         SonarName::Ideal => SensorModel::ideal(scenario),
         SonarName::HcSr04 => SensorModel::hc_sr04(),
         SonarName::Nxt => SensorModel::nxt(),
+        SonarName::LvMaxSonar => SensorModel::lv_maxsonar(),
+        SonarName::Srf08 => SensorModel::srf08(),
+        SonarName::Polaroid6500 => SensorModel::polaroid_6500(),
     };
     SensorModel { scale: scenario.truth.range_scale, ..model }
 }

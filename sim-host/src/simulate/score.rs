@@ -77,7 +77,7 @@ impl<'a> Score<'a> {
     pub fn fix(&mut self, aim: &Aim, fix: &Fix) {
         let counts = &mut self.result.fixes;
         match fix {
-            Fix::Accepted(innovation) => {
+            Fix::Accepted(innovation) | Fix::Weakened(innovation) => {
                 counts.accepted += 1;
                 self.nis.add(innovation.nis().into());
                 let wall = usize::try_from(aim.wall.0).ok();

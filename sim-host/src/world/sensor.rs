@@ -116,24 +116,12 @@ impl SensorModel {
     #[must_use]
     pub fn ideal(scenario: &Scenario) -> Self {
         let (truth, sonar) = (&scenario.truth, &scenario.robot.config.sonar);
+        let reach = (sonar.min_range.0.into(), sonar.max_range.0.into());
         Self {
-            cone: truth.cone,
-            reach: (sonar.min_range.0.into(), sonar.max_range.0.into()),
-            mirror: Sensitivity::perfect(),
-            corner: 0.0,
-            edge: 0.0,
-            double_bounce: 0.0,
-            scatter: Sensitivity::deaf(),
-            scatter_lean: 1.0,
-            scatter_spread: 0.0,
-            bias: Curve::level(0.0),
-            short: Curve::level(0.0),
-            long: Curve::level(0.0),
-            skip: 0.0,
             noise: truth.range_noise,
             noise_per_metre: truth.range_noise_per_metre,
             scale: truth.range_scale,
-            quantum: 0.0,
+            ..Self::of_mirrors(truth.cone, reach, Sensitivity::perfect())
         }
     }
 
@@ -166,6 +154,94 @@ impl SensorModel {
             noise_per_metre: 0.001,
             scale: 0.0,
             quantum: 0.003,
+        }
+    }
+
+    /// LV-MaxSonar-EZ. From `FIELD.md`: 0.15–6.45 m, steps of 25 mm. Its cone and its shares are
+    /// chosen: the datasheet's beam of an EZ on a large plate is about 15° to either side.
+    #[must_use]
+    pub fn lv_maxsonar() -> Self {
+        let degrees = f64::to_radians;
+        Self {
+            cone: degrees(25.0),
+            reach: (0.15, 6.45),
+            mirror: Sensitivity {
+                share: Curve::through(&[(3.0, 0.97), (5.0, 0.85), (6.45, 0.3)]),
+                half_angle: Curve::level(degrees(15.0)),
+                blur: Curve::level(degrees(1.5)),
+            },
+            noise: 0.005,
+            quantum: 0.0254,
+            ..Self::hc_sr04()
+        }
+    }
+
+    /// SRF08. From `FIELD.md`: 0.03–6 m, 55° at −6 dB, so 27.5° to either side. Steps of a
+    /// centimetre are what its register counts in; its shares are chosen.
+    #[must_use]
+    pub fn srf08() -> Self {
+        let degrees = f64::to_radians;
+        Self {
+            cone: degrees(40.0),
+            reach: (0.03, 6.0),
+            mirror: Sensitivity {
+                share: Curve::through(&[(3.0, 0.97), (4.5, 0.85), (6.0, 0.3)]),
+                half_angle: Curve::level(degrees(27.5)),
+                blur: Curve::level(degrees(2.0)),
+            },
+            noise: 0.003,
+            quantum: 0.01,
+            ..Self::hc_sr04()
+        }
+    }
+
+    /// Polaroid 6500. From `FIELD.md`: 0.26–10.7 m, 12° at −3 dB, 1 %. A plate is still heard
+    /// where the beam is weaker: 12° are taken to either side. Its shares are chosen.
+    #[must_use]
+    pub fn polaroid_6500() -> Self {
+        let degrees = f64::to_radians;
+        Self {
+            cone: degrees(20.0),
+            reach: (0.26, 10.7),
+            mirror: Sensitivity {
+                share: Curve::through(&[(6.0, 0.98), (9.0, 0.9), (10.7, 0.5)]),
+                half_angle: Curve::level(degrees(12.0)),
+                blur: Curve::level(degrees(1.5)),
+            },
+            noise: 0.003,
+            noise_per_metre: 0.005,
+            quantum: 0.0,
+            ..Self::hc_sr04()
+        }
+    }
+
+    /// The same sonar as far as it hears walls from their feet, with every way to be wrong taken
+    /// away.
+    #[must_use]
+    pub fn undistorted(&self) -> Self {
+        Self::of_mirrors(self.cone, self.reach, self.mirror.clone())
+    }
+
+    /// A sonar that hears the feet of perpendiculars on walls, nothing else, and says the truth.
+    fn of_mirrors(cone: f64, reach: (f64, f64), mirror: Sensitivity) -> Self {
+        Self {
+            cone,
+            reach,
+            mirror,
+            corner: 0.0,
+            edge: 0.0,
+            double_bounce: 0.0,
+            scatter: Sensitivity::deaf(),
+            scatter_lean: 1.0,
+            scatter_spread: 0.0,
+            bias: Curve::level(0.0),
+            short: Curve::level(0.0),
+            long: Curve::level(0.0),
+            skip: 0.0,
+            noise: 0.0,
+            noise_per_metre: 0.0,
+            scale: 0.0,
+            quantum: 0.0,
         }
     }
 

@@ -9,7 +9,7 @@ use bench_board::report;
 use bench_probe::{STEPS, STEPS_A_RANGE, room, travel};
 use sonarfix::aim::Aim;
 use sonarfix::config::Config;
-use sonarfix::localizer::{Fix, Localizer, Start};
+use sonarfix::localizer::{Localizer, Start};
 use sonarfix::map::Map;
 use sonarfix::motion::WheelTravel;
 use sonarfix::pose::Pose;
@@ -43,7 +43,7 @@ extern "C" fn probe_aim(robot: &mut Robot, _: &()) {
 extern "C" fn probe_fix(robot: &mut Robot, range: &Metres) {
     if let Some(aim) = robot.aim {
         let fix = robot.localizer.fix(&aim, Some(*range));
-        robot.all_well &= matches!(fix, Fix::Accepted(_));
+        robot.all_well &= fix.taken().is_some();
     }
 }
 
@@ -94,6 +94,10 @@ fn link_the_rest(localizer: &mut Localizer) {
     localizer.skip();
     black_box(localizer.health());
     black_box(localizer.pose());
+    black_box(localizer.time());
+    black_box(localizer.config());
+    black_box(localizer.map().count());
+    let _ = black_box(localizer.config().check());
     black_box(localizer.filter().state_vector());
     black_box(localizer.filter().covariance());
     black_box(localizer.filter().deviation());

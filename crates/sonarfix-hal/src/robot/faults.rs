@@ -3,6 +3,7 @@
 /// What went wrong with one encoder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct EncoderFaults {
     /// Readings that failed. The travel is not lost: the next reading that works brings it.
     pub errors: u32,
@@ -14,6 +15,7 @@ pub struct EncoderFaults {
 /// the loop. Counts stay at their ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Faults {
     /// The right encoder.
     pub right: EncoderFaults,

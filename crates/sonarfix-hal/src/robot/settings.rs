@@ -2,17 +2,7 @@
 
 use sonarfix::units::Duration;
 
-/// How often the sonar looks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Rhythm {
-    /// Once every such period; the servo starts on the dot, the ping follows when it has
-    /// settled. A cycle that takes longer than the period delays the next to the dot after it.
-    Every(Duration),
-    /// As fast as servo and ranger allow. Where there is nothing to look at, again at the next
-    /// encoder tick.
-    AsFastAsPossible,
-}
+pub use sonarfix::config::Rhythm;
 
 /// To which instant an echo belongs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,7 +24,10 @@ pub struct Settings {
     /// How late a tick may be done without counting as a missed deadline; the time for which the
     /// sonar holds it back is not counted.
     pub tolerance: Duration,
-    /// How often the sonar looks.
+    /// How often the sonar looks; the localizer plans with
+    /// [`Timing::rhythm`](sonarfix::config::Timing::rhythm), so both should say the same. Where
+    /// there is nothing to look at, [`Rhythm::AsFastAsPossible`] asks again at the next encoder
+    /// tick.
     pub rhythm: Rhythm,
     /// To which instant an echo belongs.
     pub stamp: Stamp,

@@ -1,6 +1,6 @@
 //! The sonar's cycle: where it is.
 
-use sonarfix::aim::Aim;
+use sonarfix::aim::{Aim, Reason};
 use sonarfix::units::Instant;
 
 use super::odometer::Reading;
@@ -25,7 +25,10 @@ pub(super) enum Cycle {
         look_at: Instant,
     },
     /// The servo is on its way, or stands and waits for the ranger to be ready.
-    Turning,
+    Turning {
+        /// Why it was sent there.
+        why: Reason,
+    },
     /// A ping is in flight.
     Listening {
         /// What it is for.

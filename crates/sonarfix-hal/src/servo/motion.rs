@@ -10,50 +10,22 @@
 //!       point   frame     slew
 //! ```
 
+use sonarfix::config::Pace;
 use sonarfix::units::{Duration, Instant, Radians};
 
 use crate::time::{after, micros, since};
 
-/// How fast a servo moves. Take the times from its datasheet or better from a film of it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Pace {
-    /// Period of the pulses. A new width takes effect with the next pulse, so up to one frame
-    /// passes before the servo hears of it: the model always waits a whole one.
-    pub frame: Duration,
-    /// Time for a turn of 60°, as datasheets give it.
-    pub sixty_degrees: Duration,
-    /// Time from its arrival until it has stopped shaking.
-    pub settle: Duration,
-}
-
-impl Pace {
-    /// SG90: 0.10–0.12 s/60° by its datasheets (4.8 V), 50 Hz frame; settling 30–60 ms is our
-    /// assumption.
-    pub const SG90: Self = Self {
-        frame: Duration::from_ticks(20_000),
-        sixty_degrees: Duration::from_ticks(120_000),
-        settle: Duration::from_ticks(60_000),
-    };
-
-    /// MG996R: 0.17 s/60° by its datasheet (4.8 V), 50 Hz frame; settling as assumed for SG90.
-    pub const MG996R: Self = Self {
-        frame: Duration::from_ticks(20_000),
-        sixty_degrees: Duration::from_ticks(170_000),
-        settle: Duration::from_ticks(60_000),
-    };
-
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "not negative; the cast saturates, and rounds NaN to zero"
-    )]
-    fn slew(&self, turn: Radians) -> Duration {
-        let sixty = core::f32::consts::FRAC_PI_3;
-        let time = micros(self.sixty_degrees) * (turn.abs().0 / sixty);
-        // Rounded up: never settled too early.
-        Duration::from_ticks((time + 1.0) as u64)
-    }
+/// How long a servo of this pace takes for a turn, once it has begun.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "not negative; the cast saturates, and rounds NaN to zero"
+)]
+fn slew(pace: &Pace, turn: Radians) -> Duration {
+    let sixty = core::f32::consts::FRAC_PI_3;
+    let time = micros(pace.sixty_degrees) * (turn.abs().0 / sixty);
+    // Rounded up: never settled too early.
+    Duration::from_ticks((time + 1.0) as u64)
 }
 
 /// One turn of the servo, from where it was to where it was sent.
@@ -86,7 +58,7 @@ impl Motion {
     pub fn start(&mut self, now: Instant, to: Radians, limits: (Radians, Radians)) {
         let from = self.bearing_or_worst(now, to, limits);
         let starts = after(now, self.pace.frame);
-        let arrives = after(starts, self.pace.slew(to - from));
+        let arrives = after(starts, slew(&self.pace, to - from));
         self.turn = Some(Turn { from, to, starts, arrives });
     }
 
@@ -121,7 +93,7 @@ impl Motion {
             return since(self.settles_at(), now);
         }
         let from = self.bearing_or_worst(now, bearing, limits);
-        let slew = self.pace.slew(bearing - from);
+        let slew = slew(&self.pace, bearing - from);
         let times = [self.pace.frame, slew, self.pace.settle];
         Duration::from_ticks(times.iter().fold(0, |sum, time| sum.saturating_add(time.ticks())))
     }

@@ -301,7 +301,7 @@ fn rangers_that_misbehave_are_counted_and_given_up() {
             ranger: Bad { kind, triggered },
         };
         let (mut heard, mut ticks) = (vec![], 0);
-        for time in millis(0, 2_950) {
+        for time in millis(0, 2_990) {
             world.advance(time);
             let report = robot.poll(Instant::from_ticks(time), &mut devices);
             heard.extend(report.heard.map(|heard| (heard.outcome, heard.step)));

@@ -30,7 +30,9 @@ fn started(walls: &[Wall]) -> Localizer<'_> {
         position_deviation: Metres(0.03),
         heading_deviation: Radians(0.01),
     };
-    let config = config_for_rooms(Point::new(0.0, 0.0));
+    let mut config = config_for_rooms(Point::new(0.0, 0.0));
+    // The doubt of a lost robot stays, so that what is to be gated is.
+    config.trust.reopen = Metres(0.0);
     Localizer::new(config, Map::new(walls), start, Instant::from_ticks(0)).unwrap()
 }
 
@@ -65,27 +67,29 @@ fn verdicts(outcomes: &[Outcome]) -> Vec<Verdict> {
 
 /// After how many turns of the same outcome the verdict is first this.
 fn turns_until(verdict: Verdict, outcome: Outcome) -> Option<usize> {
-    verdicts(&[outcome; 60]).iter().position(|v| *v == verdict).map(|turn| turn + 1)
+    verdicts(&[outcome; 90]).iter().position(|v| *v == verdict).map(|turn| turn + 1)
 }
 
 #[test]
 fn the_drawn_ways_are_taken() {
-    // m after n turns of weight w is w (1 − (5/6)ⁿ).
     assert_eq!(turns_until(Degraded, TooLong), Some(1));
-    assert_eq!(turns_until(Lost, TooLong), Some(4));
-    assert_eq!(turns_until(Degraded, TooShort), Some(2));
-    assert_eq!(turns_until(Lost, TooShort), Some(14));
-    assert_eq!(turns_until(Degraded, NoEcho), Some(2));
-    assert_eq!(turns_until(Lost, NoEcho), Some(14));
+    // 1 and 5 · 0.7.
+    assert_eq!(turns_until(Lost, TooLong), Some(6));
+    // 0.3 and 14 · 0.05; 0.3 and 74 · 0.05, give or take the rounding.
+    assert_eq!(turns_until(Degraded, TooShort), Some(15));
+    assert!((75..=76).contains(&turns_until(Lost, TooShort).unwrap()));
+    // 0.5 and 2 · 0.3; 0.5 and 12 · 0.3.
+    assert_eq!(turns_until(Degraded, NoEcho), Some(3));
+    assert_eq!(turns_until(Lost, NoEcho), Some(13));
     // A turn that says nothing of the pose does not make it lost, however often.
     assert_eq!(turns_until(Degraded, Skipped), Some(10));
     assert_eq!(turns_until(Lost, Skipped), None);
-    // Lost → Degraded → Tracking by accepted ranges: when the mean has faded, three each.
-    let mut recovery = vec![TooLong; 4];
+    // Lost → Degraded → Tracking by ranges taken: 4 − 4 is below 0.5, 4 − 3 is not.
+    let mut recovery = vec![TooLong; 6];
     recovery.extend([Accepted; 20]);
     let recovery = verdicts(&recovery);
-    let first = |verdict| recovery[4..].iter().position(|v| *v == verdict).unwrap() + 1;
-    assert_eq!((first(Degraded), first(Tracking)), (10, 13));
+    let first = |verdict| recovery[6..].iter().position(|v| *v == verdict).unwrap() + 1;
+    assert_eq!((first(Degraded), first(Tracking)), (4, 7));
 }
 
 #[test]
@@ -115,28 +119,39 @@ impl Model {
         latest.filter(|o| counts.contains(o)).count()
     }
 
-    fn contradiction(&self) -> f64 {
-        let weight = |o: &Outcome| match o {
-            Accepted => Some(0.0),
-            TooLong => Some(1.0),
-            TooShort | NoEcho => Some(0.55),
-            Skipped => None,
-        };
-        let weights = self.history.iter().filter_map(weight);
-        weights.fold(0.0, |mean, weight| mean + (weight - mean) / 6.0)
+    /// All turns are of the one wall.
+    fn evidence(&self) -> f64 {
+        let mut again = false;
+        self.history.iter().fold(0.0, |sum, outcome| {
+            let (weight, contradicts) = match (outcome, again) {
+                (Accepted, _) => (-1.0, false),
+                (TooLong, false) => (1.0, true),
+                (TooLong, true) => (0.7, true),
+                (TooShort, true) => (0.05, true),
+                (NoEcho, false) => (0.5, true),
+                (TooShort, false) | (NoEcho, true) => (0.3, true),
+                (Skipped, again) => (0.0, again),
+            };
+            again = contradicts;
+            (sum + weight).clamp(0.0_f64, 4.0)
+        })
     }
 
-    /// The verdict after a turn; `None` if the mean is too near a bound for `f32` to tell.
+    /// The verdict after a turn; `None` if the evidence is too near a bound for `f32` to tell.
     fn meet(&mut self, outcome: Outcome) -> Option<Verdict> {
+        let before = self.evidence();
         self.history.push(outcome);
-        let mean = self.contradiction();
-        if [0.1, 0.15, 0.5].iter().any(|bound| (mean - bound).abs() < 1e-5) {
+        let evidence = self.evidence();
+        // At the most it is clamped, to the same number.
+        let is_near = |bound: &f64| (evidence - bound).abs() < 1e-4;
+        // The first range that is too long adds 1 to 0, exactly.
+        let is_exact = outcome == TooLong && before <= 0.0;
+        if (!is_exact && [0.5, 1.0].iter().any(is_near)) || (is_near(&4.0) && evidence < 4.0) {
             return None;
         }
-        let gated = self.row(&[TooLong, TooShort], &[Accepted]);
         let silent = self.row(&[NoEcho, Skipped], &[Accepted, TooLong, TooShort]);
         let accepted = self.row(&[Accepted], &[TooLong, TooShort, NoEcho, Skipped]);
-        let better = accepted.min(self.history.len() - self.since) >= 3 && mean < 0.1;
+        let better = accepted.min(self.history.len() - self.since) >= 3 && evidence < 0.5;
         self.verdict = match (self.verdict, outcome) {
             (Lost, Accepted) if better => {
                 self.since = self.history.len();
@@ -144,8 +159,8 @@ impl Model {
             }
             (Degraded, Accepted) if better => Tracking,
             (verdict, Accepted) => verdict,
-            _ if mean > 0.5 || gated >= 20 => Lost,
-            (Tracking, _) if mean > 0.15 || silent >= 10 => Degraded,
+            _ if evidence >= 4.0 => Lost,
+            (Tracking, _) if evidence >= 1.0 || silent >= 10 => Degraded,
             (verdict, _) => verdict,
         };
         Some(self.verdict)

@@ -115,7 +115,7 @@ impl Robot {
         q
     }
 
-    /// `q_p` and `q_h` of eq. (9): what the wheels' noise lacks of a step's rounding.
+    /// `q_x`, `q_y` and `q_h` of eq. (9): what the wheels' noise lacks of a step's rounding.
     pub fn making_up_for_rounding(
         &self,
         p: &Matrix,
@@ -128,12 +128,12 @@ impl Robot {
         };
         let wheels = of(0, SCALE_RIGHT) + of(1, SCALE_LEFT);
         let width = self.track_width + state[TRACK_WIDTH];
-        let position = 4.0 * ROUNDING * (p[(X, X)] + p[(Y, Y)]) - wheels / 4.0;
-        let heading = 4.0 * ROUNDING * p[(HEADING, HEADING)] - wheels / (width * width);
         let mut q = Matrix::zeros();
-        q[(X, X)] = position.max(0.0);
-        q[(Y, Y)] = position.max(0.0);
-        q[(HEADING, HEADING)] = heading.max(0.0);
+        for (state, noise) in
+            [(X, wheels / 4.0), (Y, wheels / 4.0), (HEADING, wheels / (width * width))]
+        {
+            q[(state, state)] = (2.0 * ROUNDING * p[(state, state)] - noise).max(0.0);
+        }
         q
     }
 

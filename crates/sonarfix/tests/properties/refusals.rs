@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 use sonarfix::aim::Aim;
 use sonarfix::ekf::EkfError;
+use sonarfix::health::Verdict;
 use sonarfix::localizer::{Fix, Localizer, OdometryError, Refusal};
 use sonarfix::map::{Map, Wall, WallId};
 use sonarfix::motion::WheelTravel;
@@ -121,6 +122,7 @@ proptest! {
         let walls = walls_and_one_aside(&room);
         let mut config = config_for_rooms(mount);
         config.trust.gate = gate;
+        config.trust.short = 0.0;
         let localizer = Localizer::new(config, Map::new(&walls), room.start(), Instant::from_ticks(0)).unwrap();
         let aim = localizer.aim().unwrap();
         let ekf = localizer.filter();
@@ -137,6 +139,126 @@ proptest! {
         let fix = outside.fix(&aim, Some(aim.range + Metres(gate * beyond * sigma)));
         prop_assert!(matches!(fix, Fix::Gated(i) if i.nis() > gate * gate), "{fix:?}");
         prop_assert_eq!(estimate(&outside), estimate(&localizer));
+    }
+
+    /// Beyond the gate and inside the outer one a range is taken with the noise that brings it to the
+    /// gate; beyond the outer one it is gated, and no bit changes.
+    #[test]
+    fn beyond_the_gate_a_range_is_weakened_if_asked_for(
+        room in any_room(), mount in any_mount(), gate in 1.0_f32..4.0, times in 1.1_f32..3.0, inside in 0.1_f32..0.95,
+    ) {
+        let walls = walls_and_one_aside(&room);
+        let mut config = config_for_rooms(mount);
+        config.trust.gate = gate;
+        config.trust.outer_gate = gate * times;
+        config.trust.short = 0.0;
+        let localizer = Localizer::new(config, Map::new(&walls), room.start(), Instant::from_ticks(0)).unwrap();
+        let aim = localizer.aim().unwrap();
+        let ekf = localizer.filter();
+        let expected = ExpectedRange::new(&walls[aim.wall.0 as usize], mount, &ekf.state());
+        let noise = config.sonar.noise.variance(expected.range);
+        let innovation = ekf.innovation(aim.range, &expected, noise);
+        let sigma = innovation.variance.0.sqrt();
+        let sigmas = gate * (1.0 + inside * (times - 1.0));
+
+        let mut weakened = localizer.clone();
+        let fix = weakened.fix(&aim, Some(aim.range + Metres(sigmas * sigma)));
+        let Fix::Weakened(taken) = fix else { return Err(TestCaseError::fail(format!("{fix:?}"))) };
+        prop_assert!((taken.nis() / (gate * gate) - 1.0).abs() < 1e-3, "{taken:?}");
+        // The same as a filter that is told of that noise.
+        let mut told = *ekf;
+        let raised = noise.0 + taken.variance.0 - innovation.variance.0;
+        told.update(aim.range + Metres(sigmas * sigma), &expected, SquareMetres(raised)).unwrap();
+        let (ours, theirs) = (weakened.filter().deviation().x, told.deviation().x);
+        prop_assert!((ours - theirs).abs() <= 1e-3 * theirs, "{ours} {theirs}");
+
+        let mut beyond = localizer.clone();
+        let fix = beyond.fix(&aim, Some(aim.range + Metres(gate * times * 1.001 * sigma)));
+        prop_assert!(matches!(fix, Fix::Gated(_)), "{fix:?}");
+        prop_assert_eq!(estimate(&beyond), estimate(&localizer));
+    }
+
+    /// A short range is believed less than a long one that is as far off, and moves the filter less.
+    #[test]
+    fn a_short_range_is_believed_less(
+        room in any_room(), mount in any_mount(), short in 1.0_f32..3.0, off in 1.05_f32..3.0,
+    ) {
+        let walls = walls_and_one_aside(&room);
+        let mut config = config_for_rooms(mount);
+        config.trust.short = short;
+        // So that it is inside the gate.
+        config.trust.gate = 50.0;
+        let localizer = Localizer::new(config, Map::new(&walls), room.start(), Instant::from_ticks(0)).unwrap();
+        let aim = localizer.aim().unwrap();
+        let ekf = localizer.filter();
+        let expected = ExpectedRange::new(&walls[aim.wall.0 as usize], mount, &ekf.state());
+        let by = short * off * config.sonar.noise.variance(expected.range).0.sqrt();
+        let (mut longer, mut shorter) = (localizer.clone(), localizer.clone());
+        let long = longer.fix(&aim, Some(expected.range + Metres(by)));
+        let short_fix = shorter.fix(&aim, Some(expected.range - Metres(by)));
+        prop_assert!(matches!(long, Fix::Accepted(_)), "{long:?}");
+        prop_assert!(matches!(short_fix, Fix::Weakened(_)), "{short_fix:?}");
+        let moved = |l: &Localizer| {
+            let (now, was) = (l.filter().state(), ekf.state());
+            (now.x - was.x).hypot(now.y - was.y)
+        };
+        prop_assert!(moved(&shorter) < moved(&longer));
+        let spread = |l: &Localizer| l.filter().deviation().x.hypot(l.filter().deviation().y);
+        prop_assert!(spread(&shorter) > spread(&longer));
+    }
+
+    /// A robot that is lost lets its doubt grow by the stated rule with each range beyond the gate, up
+    /// to the stated bound, and says so; one that is not lost does not.
+    #[test]
+    fn the_gate_of_a_lost_robot_reopens(room in any_room(), mount in any_mount(), reopen in 0.005_f32..0.03) {
+        let walls = walls_and_one_aside(&room);
+        let mut config = config_for_rooms(mount);
+        config.trust.reopen = Metres(reopen);
+        let mut localizer = Localizer::new(config, Map::new(&walls), room.start(), Instant::from_ticks(0)).unwrap();
+        let mut grown = 0_u16;
+        for _ in 0..200 {
+            // 3 m beyond the wall: outside of the gate, however wide it grows.
+            let Ok(aim) = localizer.aim() else { break };
+            let was = *localizer.filter();
+            let fix = localizer.fix(&aim, Some(aim.range + Metres(3.0)));
+            prop_assert!(matches!(fix, Fix::Gated(_)), "{fix:?}");
+            let (before, after) = (was.covariance(), localizer.filter().covariance());
+            let is_lost = localizer.health().verdict == Verdict::Lost;
+            prop_assert!(is_lost || before == after);
+            let added = after - before;
+            let step = reopen * reopen;
+            for i in [0, 1] {
+                let is_step = (added[(i, i)] - step).abs() < 1e-5 * after[(i, i)] + 1e-9;
+                prop_assert!(added[(i, i)] == 0.0 || is_step, "{added}");
+            }
+            grown += u16::from(before != after);
+            prop_assert_eq!(localizer.filter().state(), was.state());
+            prop_assert_eq!(localizer.health().reopened, grown);
+        }
+        prop_assert!(grown > 10, "{grown}");
+        let doubt = localizer.health();
+        prop_assert!(doubt.position_deviation.0 <= (reopen * 10.0).hypot(reopen).max(0.031) * 1.01, "{doubt:?}");
+        prop_assert!(doubt.heading_deviation <= (config.sonar.cone * 0.25) + Radians(reopen));
+    }
+
+    /// What is no deviation is refused, and no bit changes; what is one is added.
+    #[test]
+    fn loosening_adds_what_it_says(ekf in any_ekf(), position in 0.0_f32..1.0, heading in 0.0_f32..0.5) {
+        let mut changed = ekf;
+        for bad in BAD {
+            prop_assert_eq!(changed.loosen(Metres(bad), Radians(heading)), Err(EkfError::NotFinite));
+            prop_assert_eq!(changed.loosen(Metres(position), Radians(bad)), Err(EkfError::NotFinite));
+        }
+        prop_assert_eq!(changed.loosen(Metres(-0.1), Radians(heading)), Err(EkfError::Negative));
+        prop_assert_eq!(changed.loosen(Metres(position), Radians(-0.1)), Err(EkfError::Negative));
+        prop_assert_eq!(changed.loosen(Metres(f32::MAX), Radians(heading)), Err(EkfError::NotFinite));
+        prop_assert_eq!(bits(&changed), bits(&ekf));
+        prop_assert_eq!(changed.loosen(Metres(position), Radians(heading)), Ok(()));
+        let (before, after) = (ekf.deviation(), changed.deviation());
+        prop_assert!((after.x - before.x.hypot(position)).abs() < 1e-5 * after.x);
+        prop_assert!((after.y - before.y.hypot(position)).abs() < 1e-5 * after.y);
+        prop_assert!((after.heading - before.heading.hypot(heading)).abs() < 1e-5 * after.heading);
+        prop_assert_eq!(changed.state(), ekf.state());
     }
 
     /// The filter itself, given what the localizer would have stopped.

@@ -27,6 +27,9 @@ struct SixStates {
     /// Upper triangle; what is below the diagonal is not used.
     p: [[f32; 6]; 6],
     drive: Drive,
+    /// How far both wheels have rolled since the last range; what the calibration has walked over it
+    /// is not in `p` yet.
+    way: f32,
 }
 
 /// Adds to a sum with what rounding left over.
@@ -53,7 +56,7 @@ impl SixStates {
         p[3][4] = 0.5 * (rr - ll);
         p[4][4] = rr + ll;
         p[5][5] = square(deviation.track_width_error);
-        Self { x, rest_of_x: [0.0; 3], p, drive }
+        Self { x, rest_of_x: [0.0; 3], p, drive, way: 0.0 }
     }
 
     /// An entry, from the upper triangle.
@@ -79,17 +82,18 @@ impl SixStates {
         let noise_t = noise_s * per_half_width * per_half_width;
         let noise_st = 0.25 * per_metre * (of_r - of_l) * per_half_width;
         let lacking = |variance: f32, noise: f32| {
-            let lack = ROUNDING * variance - noise;
+            let lack = 0.5 * ROUNDING * variance - noise;
             if lack > 0.0 { lack } else { 0.0 }
         };
-        let lack_of_position = lacking(self.p[0][0] + self.p[1][1], noise_s);
+        let lack_of_way = [0, 1].map(|axis: usize| lacking(self.p[axis][axis], noise_s));
         let lack_of_heading = lacking(self.p[2][2], noise_t);
 
         // Each a row of six: the covariance of turn, advance, mid-heading with every state.
         let by_turn =
             [(right - left) * per_width, 0.5 * (right + left) * per_width, -turn * per_width];
         let by_advance = [0.5 * (right + left), 0.25 * (right - left)];
-        let row = |i: usize| core::array::from_fn::<f32, 6, _>(|j| self.at(i, j));
+        let walked = Self { p: self.walked(), ..*self };
+        let row = |i: usize| core::array::from_fn::<f32, 6, _>(|j| walked.at(i, j));
         let (h, c, d, w) = (row(2), row(3), row(4), row(5));
         let turn_with = |c: f32, d: f32, w: f32| by_turn[0] * c + by_turn[1] * d + by_turn[2] * w;
         let advance_with = |c: f32, d: f32| by_advance[0] * c + by_advance[1] * d;
@@ -113,7 +117,7 @@ impl SixStates {
         let mut new = self.p;
         for axis in 0..2 {
             new[axis][axis] +=
-                along(lack_of_position, axis, m[axis] + new_m[axis], s[axis] + new_s[axis]);
+                along(lack_of_way[axis], axis, m[axis] + new_m[axis], s[axis] + new_s[axis]);
             new[axis][2] += along(t[axis], axis, m_new, s_new);
             for j in 3..6 {
                 new[axis][j] = along(new[axis][j], axis, m[j], s[j]);
@@ -125,17 +129,22 @@ impl SixStates {
         for j in 3..6 {
             new[2][j] += t[j];
         }
-        let rolled = right.abs() + left.abs();
-        let scale_walk = self.drive.scale_walk.0 * self.drive.scale_walk.0;
-        let width_walk = self.drive.track_width_walk.0.0 * self.drive.track_width_walk.0.0;
-        for (i, walk) in [0.25 * scale_walk, scale_walk, 0.5 * width_walk].into_iter().enumerate() {
-            new[3 + i][3 + i] += rolled * walk;
-        }
-
+        self.way += right.abs() + left.abs();
         self.p = new;
         self.moved(0, advance * cos);
         self.moved(1, advance * sin);
         self.moved(2, turn);
+    }
+
+    /// P, with what the calibration has walked.
+    fn walked(&self) -> [[f32; 6]; 6] {
+        let scale_walk = self.drive.scale_walk.0 * self.drive.scale_walk.0;
+        let width_walk = self.drive.track_width_walk.0.0 * self.drive.track_width_walk.0.0;
+        let mut p = self.p;
+        for (i, walk) in [0.25 * scale_walk, scale_walk, 0.5 * width_walk].into_iter().enumerate() {
+            p[3 + i][3 + i] += self.way * walk;
+        }
+        p
     }
 
     /// Moves x, y or heading.
@@ -162,6 +171,7 @@ impl SixStates {
     }
 
     fn update(&mut self, range: f32, expected: f32, h: [f32; 3], noise: f32) {
+        (self.p, self.way) = (self.walked(), 0.0);
         let dot = |m: &[f32; 6]| h[0] * m[0] + h[1] * m[1] + h[2] * m[2];
         let m = self.cross(h);
         let Some(noise) = self.bearable(noise, h, &m) else { return };
@@ -205,6 +215,7 @@ impl SixStates {
     /// The bits of state and covariance, in the order of the seven-state filter's and wheel by
     /// wheel as there, the seventh zero.
     fn bits(&self) -> Vec<u32> {
+        let shown = Self { p: self.walked(), ..*self };
         let wheels =
             |common: f32, difference: f32| [common + 0.5 * difference, common - 0.5 * difference];
         let [x, y, heading, common, difference, width] = self.x;
@@ -212,17 +223,17 @@ impl SixStates {
         let mut p = SMatrix::<f32, 7, 7>::zeros();
         for i in [0, 1, 2, 5] {
             for j in [0, 1, 2, 5] {
-                p[(i, j)] = self.at(i, j);
+                p[(i, j)] = shown.at(i, j);
             }
-            for (j, v) in wheels(self.at(i, 3), self.at(i, 4)).into_iter().enumerate() {
+            for (j, v) in wheels(shown.at(i, 3), shown.at(i, 4)).into_iter().enumerate() {
                 p[(i, 3 + j)] = v;
                 p[(3 + j, i)] = v;
             }
         }
-        let own = wheels(self.at(3, 3) + 0.25 * self.at(4, 4), 2.0 * self.at(3, 4));
+        let own = wheels(shown.at(3, 3) + 0.25 * shown.at(4, 4), 2.0 * shown.at(3, 4));
         p[(3, 3)] = own[0];
         p[(4, 4)] = own[1];
-        p[(3, 4)] = self.at(3, 3) - 0.25 * self.at(4, 4);
+        p[(3, 4)] = shown.at(3, 3) - 0.25 * shown.at(4, 4);
         p[(4, 3)] = p[(3, 4)];
         let state = [x, y, heading, right, left, width, 0.0];
         state.into_iter().chain(p.iter().copied()).map(f32::to_bits).collect()

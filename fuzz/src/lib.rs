@@ -1,0 +1,29 @@
+//! What is fuzzed, as plain functions: each takes any bytes, and panics if an invariant breaks.
+//!
+//! | target | what the bytes are |
+//! |---|---|
+//! | [`localizer`] | a configuration, a map, and calls in any order with hostile numbers and times |
+//! | [`map_file`], [`scenario_file`], [`robot_file`] | the text of such a file |
+//! | [`replay_log`] | the lines of a log |
+//!
+//! `cargo xtask fuzz` searches for a bounded time; `cargo fuzz run TARGET` for as long as you like;
+//! `cargo test --no-default-features` runs them over `corpus/` and seeded random bytes.
+
+mod bytes;
+mod calls;
+mod files;
+
+pub use calls::localizer;
+pub use files::{map_file, replay_log, robot_file, scenario_file};
+
+/// A target with its name, which is also that of its corpus.
+pub type Target = (&'static str, fn(&[u8]));
+
+/// Every target.
+pub const TARGETS: [Target; 5] = [
+    ("localizer", localizer),
+    ("map_file", map_file),
+    ("scenario_file", scenario_file),
+    ("robot_file", robot_file),
+    ("replay_log", replay_log),
+];
