@@ -31,7 +31,8 @@ pub fn embedded() -> anyhow::Result<()> {
 
 pub fn lint_bench() -> anyhow::Result<()> {
     cargo::check(cargo::in_bench("fmt --all --check"))?;
-    let packages = "--package bench-probe --package bench-mcu --package bench-ours";
+    let packages =
+        "--package bench-probe --package bench-building --package bench-mcu --package bench-ours";
     let target = "--target thumbv7em-none-eabihf";
     cargo::check(cargo::in_bench(&format!("clippy --release {packages} {target} -- -D warnings")))
 }

@@ -44,7 +44,7 @@ macro_rules! measure_each {
     };
 }
 
-each_filter! { measure_each, shipped: bench_ours::Shipped; }
+each_filter! { measure_each, kernel: bench_ours::kernel::Kernel; shipped: bench_ours::Shipped; }
 
 criterion_group!(benches, filters);
 criterion_main!(benches);

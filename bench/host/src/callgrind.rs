@@ -44,7 +44,7 @@ macro_rules! run_named {
     };
 }
 
-each_filter! { run_named, shipped: bench_ours::Shipped; }
+each_filter! { run_named, kernel: bench_ours::kernel::Kernel; shipped: bench_ours::Shipped; }
 
 fn main() -> ExitCode {
     let name = env::args().nth(1).unwrap_or_default();

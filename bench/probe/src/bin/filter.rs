@@ -41,7 +41,9 @@ struct Heard {
 
 #[unsafe(no_mangle)]
 extern "C" fn probe_predict(filter: &mut Filter, travel: &WheelTravel) {
-    filter.all_well &= filter.ekf.predict(*travel).is_ok();
+    if filter.ekf.predict(*travel).is_err() {
+        filter.all_well = false;
+    }
 }
 
 #[unsafe(no_mangle)]
@@ -52,12 +54,16 @@ extern "C" fn probe_expect(out: &mut Expectation, sight: &Sight) {
 #[unsafe(no_mangle)]
 extern "C" fn probe_gate(filter: &mut Filter, heard: &Heard) {
     let innovation = filter.ekf.innovation(heard.range, &heard.expected, heard.noise);
-    filter.all_well &= innovation.nis() <= heard.gate * heard.gate;
+    if innovation.nis() > heard.gate * heard.gate {
+        filter.all_well = false;
+    }
 }
 
 #[unsafe(no_mangle)]
 extern "C" fn probe_update(filter: &mut Filter, heard: &Heard) {
-    filter.all_well &= filter.ekf.update(heard.range, &heard.expected, heard.noise).is_ok();
+    if filter.ekf.update(heard.range, &heard.expected, heard.noise).is_err() {
+        filter.all_well = false;
+    }
 }
 
 #[bench_board::entry]
