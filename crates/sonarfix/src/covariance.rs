@@ -76,7 +76,7 @@ impl SixStates {
         let (cc, dd, ww) = noise.walked.added_to(q);
         let (sin, cos) = (step.sin, step.cos);
         // ∂x/∂m and ∂y/∂m.
-        let (swing_x, swing_y) = (-step.advance * sin, step.advance * cos);
+        let (swing_x, swing_y) = (-step.way_y, step.way_x);
         let turn_with =
             |c: f32, d: f32, w: f32| step.turn_c * c + step.turn_d * d + step.turn_w * w;
         let advance_with = |c: f32, d: f32| step.advance_c * c + step.advance_d * d;
@@ -99,7 +99,7 @@ impl SixStates {
         let (m_new, s_new) = (hm + mt, hs + ts);
         p.hh += mt + mt + noise.heading;
         // A way's variance is a sum that may cancel to nothing, but must not round to less.
-        let (mm, ss) = (mm + ROUNDING * mm, ss + ROUNDING * ss);
+        let (mm, ss) = (mm * (1.0 + ROUNDING), ss * (1.0 + ROUNDING));
 
         // x_m is the covariance of the new x with the mid-heading, x_s that with the advance.
         let (xt, xs) = (turn_with(p.xc, p.xd, p.xw), advance_with(p.xc, p.xd));
@@ -130,10 +130,7 @@ impl PoseRows {
     /// y and heading (`docs/model.md`, eq. 9).
     #[inline]
     pub fn rounding(&self, advance: f32, turn: f32) -> [f32; 3] {
-        let lacking = |variance: f32, noise: f32| {
-            let lack = 0.5 * ROUNDING * variance - noise;
-            if lack > 0.0 { lack } else { 0.0 }
-        };
+        let lacking = |variance: f32, noise: f32| positive_part(0.5 * ROUNDING * variance - noise);
         [lacking(self.xx, advance), lacking(self.yy, advance), lacking(self.hh, turn)]
     }
 
@@ -152,8 +149,8 @@ impl RangeScale {
         let tk = step.turn_c * p.ck + step.turn_d * p.dk + step.turn_w * p.wk;
         let sk = step.advance_c * p.ck + step.advance_d * p.dk;
         let km = p.hk + 0.5 * tk;
-        p.xk += step.cos * sk - step.advance * step.sin * km;
-        p.yk += step.sin * sk + step.advance * step.cos * km;
+        p.xk += step.cos * sk - step.way_y * km;
+        p.yk += step.sin * sk + step.way_x * km;
         p.hk += tk;
     }
 }
@@ -314,26 +311,26 @@ impl Covariance {
         p.hh = first.h + e.h * gain.h + e.h * gain.h;
         k.hk = hk + e.h * gain.k + gain.h * e.k;
         k.kk = first.k + e.k * gain.k + e.k * gain.k;
-        macro_rules! column {
-            ($x:expr, $y:expr, $h:expr, $k:expr) => {{
-                let m = $x * h.x + $y * h.y + $h * h.h + $k * h.k;
-                let g = m * per_variance;
-                let (x, y) = ($x - gain.x * m, $y - gain.y * m);
-                let (h_, k_) = ($h - gain.h * m, $k - gain.k * m);
-                let e_j = g * noise - (x * h.x + y * h.y + h_ * h.h + k_ * h.k) - half * g;
-                $x = x + e.x * g + gain.x * e_j;
-                $y = y + e.y * g + gain.y * e_j;
-                $h = h_ + e.h * g + gain.h * e_j;
-                $k = k_ + e.k * g + gain.k * e_j;
-                (m, g, e_j)
-            }};
-        }
-        let (mc, gc, ec) = column!(p.xc, p.yc, p.hc, k.ck);
+        // What is left of R for the rest of the columns, so that they need not carry both.
+        let scarce = noise - half;
+        let column = |x: &mut f32, y: &mut f32, h_: &mut f32, k: &mut f32| {
+            let m = *x * h.x + *y * h.y + *h_ * h.h + *k * h.k;
+            let g = m * per_variance;
+            let (x1, y1) = (*x - gain.x * m, *y - gain.y * m);
+            let (h1, k1) = (*h_ - gain.h * m, *k - gain.k * m);
+            let e_j = g * scarce - (x1 * h.x + y1 * h.y + h1 * h.h + k1 * h.k);
+            *x = x1 + e.x * g + gain.x * e_j;
+            *y = y1 + e.y * g + gain.y * e_j;
+            *h_ = h1 + e.h * g + gain.h * e_j;
+            *k = k1 + e.k * g + gain.k * e_j;
+            (m, g, e_j)
+        };
+        let (mc, gc, ec) = column(&mut p.xc, &mut p.yc, &mut p.hc, &mut k.ck);
         q.cc = q.cc - gc * mc + ec * gc + ec * gc;
-        let (md, gd, ed) = column!(p.xd, p.yd, p.hd, k.dk);
+        let (md, gd, ed) = column(&mut p.xd, &mut p.yd, &mut p.hd, &mut k.dk);
         q.cd = q.cd - gc * md + ec * gd + gc * ed;
         q.dd = q.dd - gd * md + ed * gd + ed * gd;
-        let (mw, gw, ew) = column!(p.xw, p.yw, p.hw, k.wk);
+        let (mw, gw, ew) = column(&mut p.xw, &mut p.yw, &mut p.hw, &mut k.wk);
         q.cw = q.cw - gc * mw + ec * gw + gc * ew;
         q.dw = q.dw - gd * mw + ed * gw + gd * ew;
         q.ww = q.ww - gw * mw + ew * gw + ew * gw;
@@ -345,6 +342,12 @@ impl Covariance {
 /// than those of any number in question.
 pub(crate) fn is_within(value: f32, limit: f32) -> bool {
     value.to_bits() <= limit.to_bits()
+}
+
+/// The value if it is positive, else zero: as integers, the bits of negative numbers are negative,
+/// and to compare integers takes no detour over the FPU's flags.
+fn positive_part(value: f32) -> f32 {
+    f32::from_bits(value.to_bits().cast_signed().max(0).cast_unsigned())
 }
 
 /// Whether a variance is one to compute with.
@@ -418,13 +421,11 @@ impl Covariance {
         wheels(p.cc + 0.25 * p.dd, 2.0 * p.cd)
     }
 
-    /// The same with the variances that the calibration has gained by walking.
+    /// Adds the variances that the calibration has gained by walking.
     #[inline]
-    #[must_use]
-    pub fn after(mut self, walk: &Walk) -> Self {
+    pub fn widen(&mut self, walk: &Walk) {
         let q = &mut self.six.calibration;
         (q.cc, q.dd, q.ww) = walk.added_to(q);
-        self
     }
 
     /// Whether a variance is negative: no covariance any more.

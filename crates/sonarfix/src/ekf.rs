@@ -22,7 +22,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::covariance::{Correction, Covariance, Derivatives, is_within};
+use crate::covariance::{Correction, Covariance, Derivatives, SixStates, is_within};
 use crate::motion::{Drive, Noise, Rates, Step, Walk, WheelTravel};
 use crate::range::ExpectedRange;
 use crate::state::{Mean, Remainder};
@@ -218,7 +218,9 @@ impl Ekf {
 
     /// P.
     fn walked(&self) -> Covariance {
-        self.p.after(&Walk::new(&self.rates, self.way))
+        let mut p = self.p;
+        p.widen(&Walk::new(&self.rates, self.way));
+        p
     }
 
     /// Variances and covariance of x and y, and the heading's variance.
@@ -345,32 +347,27 @@ impl Ekf {
         if !(noise_is_sound && innovation_is_sound) {
             return Err(what_is_wrong_with(noise));
         }
-        let before = self.p;
-        self.p = self.walked();
-        match self.p.correct(&row(expected), noise.0) {
-            Correction::Taken(gain) => {
-                if !self.p.is_sound() {
-                    let error = self.what_is_unsound();
-                    self.p = before;
-                    return Err(error);
-                }
+        // In three parts, each small enough to be copied without a call.
+        let Covariance { six: SixStates { pose, calibration }, scale } = self.p;
+        self.p.widen(&Walk::new(&self.rates, self.way));
+        let error = match self.p.correct(&row(expected), noise.0) {
+            Correction::Taken(gain) if self.p.is_sound() => {
                 self.way = 0.0;
                 self.mean.take(&mut self.rest, &gain, innovation);
-                Ok(())
+                return Ok(());
             }
             Correction::Spare => {
                 self.way = 0.0;
-                Ok(())
+                return Ok(());
             }
-            Correction::NotFinite => {
-                self.p = before;
-                Err(EkfError::NotFinite)
-            }
-            Correction::Indefinite => {
-                self.p = before;
-                Err(EkfError::Indefinite)
-            }
-        }
+            Correction::Taken(_) => self.what_is_unsound(),
+            Correction::NotFinite => EkfError::NotFinite,
+            Correction::Indefinite => EkfError::Indefinite,
+        };
+        self.p.six.pose = pose;
+        self.p.six.calibration = calibration;
+        self.p.scale = scale;
+        Err(error)
     }
 
     /// Why a result is refused.

@@ -105,8 +105,9 @@ pub struct Step {
     /// Sine and cosine of the mid-heading ψ + Δψ/2.
     pub(crate) sin: f32,
     pub(crate) cos: f32,
-    /// Way of the midpoint between the wheels, Δs, metres.
-    pub(crate) advance: f32,
+    /// Way of the midpoint between the wheels along map x and y, metres: Δs times cosine and sine.
+    pub(crate) way_x: f32,
+    pub(crate) way_y: f32,
     /// Turn, Δψ, radians.
     pub(crate) turn: f32,
     /// Derivatives of Δs by the common part and the difference of the scale errors; Δs does not
@@ -180,11 +181,13 @@ impl Step {
         let per_width = 1.0 / (rates.track_width + at.track_width_error);
         let turn = (rolled_r - rolled_l) * per_width;
         let (sin, cos) = sin_cos(at.heading + 0.5 * turn);
+        let advance = 0.5 * (rolled_r + rolled_l);
         let (mean, difference) = (0.5 * (right + left), right - left);
         Self {
             sin,
             cos,
-            advance: 0.5 * (rolled_r + rolled_l),
+            way_x: advance * cos,
+            way_y: advance * sin,
             turn,
             advance_c: mean,
             advance_d: 0.25 * difference,

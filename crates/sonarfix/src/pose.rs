@@ -91,17 +91,21 @@ impl From<Heading> for Radians {
 }
 
 fn wrap(angle: f32) -> f32 {
-    if angle > -PI && angle <= PI {
+    if angle.abs() < PI {
         return angle;
     }
     // One turn less, which is exact for an angle of up to two.
-    let turned = if angle > 0.0 { angle - TAU } else { angle + TAU };
-    if turned > -PI && turned <= PI { turned } else { wrap_far(angle) }
+    let turned = angle - TAU.copysign(angle);
+    if turned.abs() < PI { turned } else { wrap_far(angle) }
 }
 
 #[cold]
 #[inline(never)]
 fn wrap_far(angle: f32) -> f32 {
+    // The direction of many a wall: exactly half a turn.
+    if angle.abs() <= PI {
+        return PI;
+    }
     // remainderf, unlike repeated subtraction, ends for any angle.
     let wrapped = libm::remainderf(angle, TAU);
     if wrapped <= -PI { PI } else { wrapped }

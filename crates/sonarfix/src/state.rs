@@ -106,8 +106,8 @@ impl Mean {
     /// Moves along a step (`docs/model.md`, eq. 7).
     #[inline]
     pub fn advance(&mut self, rest: &mut Remainder, step: &Step) {
-        add(&mut self.x, &mut rest.x, step.advance * step.cos);
-        add(&mut self.y, &mut rest.y, step.advance * step.sin);
+        add(&mut self.x, &mut rest.x, step.way_x);
+        add(&mut self.y, &mut rest.y, step.way_y);
         add(&mut self.heading, &mut rest.heading, step.turn);
         self.wrap();
     }

@@ -188,7 +188,9 @@ impl SixStates {
         let left_over = self.cross(h);
         let d: [f32; 6] = core::array::from_fn(|i| gain[i] * noise - left_over[i]);
         let half = 0.5 * dot(&d);
-        let d: [f32; 6] = core::array::from_fn(|i| d[i] - half * gain[i]);
+        let d: [f32; 6] = core::array::from_fn(|i| {
+            if i < 3 { d[i] - half * gain[i] } else { gain[i] * (noise - half) - left_over[i] }
+        });
         self.each(|i, j, p| p + d[i] * gain[j] + gain[i] * d[j]);
     }
 
