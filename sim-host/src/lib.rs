@@ -11,6 +11,7 @@ pub mod cli;
 pub mod convert;
 pub mod dense;
 pub mod fault_table;
+pub mod monitor;
 pub mod monte_carlo;
 pub mod observe;
 pub mod odometry;

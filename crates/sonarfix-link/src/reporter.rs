@@ -1,5 +1,7 @@
 //! What a robot says when: one place for firmware, simulator and emulator.
 
+use sonarfix::ekf::State;
+use sonarfix::health::Health;
 use sonarfix::localizer::Localizer;
 use sonarfix::units::Instant;
 use sonarfix_hal::robot::{self, Heard, Report, Taken};
@@ -17,10 +19,23 @@ pub struct Reporter {
 
 impl Reporter {
     /// A reporter for a localizer that begins, and what it says of that.
+    ///
+    /// What the localizer was told is taken from the localizer itself, which gives it back bit for
+    /// bit if its calibration starts at zero and both wheels' scale errors are equally uncertain
+    /// (it holds them as mean and difference). Otherwise use [`Self::resume`].
     #[must_use]
     pub fn begin(localizer: &Localizer) -> (Self, Telemetry) {
-        let last = Step { at: localizer.time(), right_metres: 0.0, left_metres: 0.0 };
-        (Self { last }, Telemetry::Began(estimate(localizer)))
+        let Estimate { at, state, deviation, .. } = estimate(localizer);
+        Self::resume(at, state, deviation)
+    }
+
+    /// A reporter for a localizer that was made by [`Localizer::resume`] of the same arguments,
+    /// and what it says of that.
+    #[must_use]
+    pub fn resume(at: Instant, state: State, deviation: State) -> (Self, Telemetry) {
+        let last = Step { at, right_metres: 0.0, left_metres: 0.0 };
+        let began = Estimate { at, state, deviation, health: Health::default() };
+        (Self { last }, Telemetry::Began(began))
     }
 
     /// Says what a poll of the loop did, a message at a time; `localizer` is that of the loop,

@@ -1,8 +1,11 @@
 //! The command line: what can be asked, and where the answers go.
 
 mod bound;
+mod command;
+mod config;
 mod convert;
 mod faults;
+mod monitor;
 mod paper;
 mod replay;
 mod run;
@@ -29,6 +32,12 @@ enum Command {
     Replay(replay::Args),
     /// Converts recordings of other formats for `replay`.
     Convert(convert::Args),
+    /// Shows what a robot says, live, and records it for `replay`.
+    Monitor(monitor::Args),
+    /// Tells a robot to do something.
+    Command(command::Args),
+    /// Bakes a robot's configuration into the bytes that it reads from its flash.
+    Config(config::Args),
     /// Prints how well any estimator could know the robot's state, over time.
     Bound(bound::Args),
     /// Prints how the simulated NXT sonar compares with recorded sweeps, as markdown.
@@ -48,6 +57,9 @@ impl Cli {
             Command::Run(args) => run::execute(&args),
             Command::Replay(args) => replay::execute(&args),
             Command::Convert(args) => convert::execute(&args),
+            Command::Monitor(args) => monitor::execute(&args),
+            Command::Command(args) => command::execute(&args),
+            Command::Config(args) => config::execute(&args),
             Command::Bound(args) => bound::execute(&args),
             Command::SonarModel(args) => sonar_model::execute(&args),
             Command::Faults(args) => faults::execute(&args),

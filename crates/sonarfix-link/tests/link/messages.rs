@@ -278,12 +278,13 @@ fn reset(source: &mut impl Source) -> Reset {
     source.choose(&RESETS)
 }
 
-pub const REFUSED: [Refused; 5] = [
+pub const REFUSED: [Refused; 6] = [
     Refused::Configuration,
     Refused::Pose,
     Refused::NoMap,
     Refused::NoConfiguration,
     Refused::Storage,
+    Refused::NoPose,
 ];
 
 fn outcome(source: &mut impl Source) -> Outcome {
