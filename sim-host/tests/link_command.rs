@@ -1,6 +1,6 @@
 //! `sonarfix monitor`, `command` and `config`, as a person calls them.
 
-#![expect(clippy::unwrap_used, reason = "a test should stop")]
+#![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "a test should stop")]
 
 use std::fs;
 use std::io::{Read, Write};
@@ -74,7 +74,7 @@ fn a_command_is_sent_until_it_is_answered_and_done_once() {
     let done = robot.join().unwrap();
     let [Order::SetPose(start)] = done[..] else { panic!("{done:?}") };
     assert_eq!((start.pose.x, start.pose.y), (Metres(1.5), Metres(-2.0)));
-    assert!((start.pose.heading.radians().0 + 1.570_8).abs() < 1e-4);
+    assert_eq!(start.pose.heading.radians(), Radians::from_degrees(-90.0));
 }
 
 #[test]

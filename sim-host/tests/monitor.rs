@@ -1,7 +1,7 @@
 //! What a robot tells over the link, recorded and replayed: the same estimates. The robot is a
 //! simulated one, down to its pins, with the shipped drivers and loop.
 
-#![expect(clippy::unwrap_used, reason = "a test should stop")]
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a test should stop")]
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -88,7 +88,9 @@ fn log(said: &[Said]) -> Vec<u8> {
     let Telemetry::Began(began) = first.telemetry else { panic!("{first:?} first") };
     let mut text = Vec::new();
     let mut log = Log::begin(&mut text, &began).unwrap();
-    rest.iter().for_each(|said| log.take(said).unwrap());
+    for said in rest {
+        log.take(said).unwrap();
+    }
     text
 }
 
@@ -213,7 +215,9 @@ fn a_robot_that_begins_anew_begins_another_log() {
     let (dir, path) = folder();
     let mut recording = Recording::new(path.clone());
     let (said, _) = heard(&robot.frames.concat());
-    said.iter().for_each(|said| recording.take(said).unwrap());
+    for said in &said {
+        recording.take(said).unwrap();
+    }
     assert_eq!(recording.logs(), 2);
     let began = 62_000_000;
     let (first, second): (Vec<_>, Vec<_>) = robot.believed.iter().partition(|(at, _)| *at < began);
@@ -248,7 +252,9 @@ fn a_monitor_that_comes_late_records_from_an_estimate() {
     let mut recording = Recording::new(path.clone());
     let (_, late) = robot.frames.split_at(robot.frames.len() / 2);
     let (said, _) = heard(&late.concat());
-    said.iter().for_each(|said| recording.take(said).unwrap());
+    for said in &said {
+        recording.take(said).unwrap();
+    }
     assert_eq!(recording.logs(), 1);
     let log = fs::read(path).unwrap();
     assert!(String::from_utf8_lossy(&log).contains("# joined under way"));

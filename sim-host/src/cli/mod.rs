@@ -35,7 +35,8 @@ enum Command {
     /// Shows what a robot says, live, and records it for `replay`.
     Monitor(monitor::Args),
     /// Tells a robot to do something.
-    Command(command::Args),
+    #[command(name = "command")]
+    Tell(command::Args),
     /// Bakes a robot's configuration into the bytes that it reads from its flash.
     Config(config::Args),
     /// Prints how well any estimator could know the robot's state, over time.
@@ -58,7 +59,7 @@ impl Cli {
             Command::Replay(args) => replay::execute(&args),
             Command::Convert(args) => convert::execute(&args),
             Command::Monitor(args) => monitor::execute(&args),
-            Command::Command(args) => command::execute(&args),
+            Command::Tell(args) => command::execute(&args),
             Command::Config(args) => config::execute(&args),
             Command::Bound(args) => bound::execute(&args),
             Command::SonarModel(args) => sonar_model::execute(&args),

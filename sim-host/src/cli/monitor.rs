@@ -66,7 +66,8 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
             0 => eprintln!("nothing was recorded: the robot has not said where it is"),
             1 => eprintln!("recorded {}", path.display()),
             logs => {
-                eprintln!("recorded {} and {} more, one for each start", path.display(), logs - 1)
+                let more = logs - 1;
+                eprintln!("recorded {} and {more} more, one for each start", path.display());
             }
         }
     }
