@@ -61,6 +61,18 @@ impl<'a> Document<'a> {
     }
 }
 
+/// The line of each of some places in a text, both in ascending order; lines count from 1.
+pub(crate) fn lines(text: &str, places: &[usize]) -> Vec<usize> {
+    let mut line = 1;
+    let mut from = 0;
+    let mut line_at = |&place: &usize| {
+        line += text.get(from..place).unwrap_or_default().matches('\n').count();
+        from = place.max(from);
+        line
+    };
+    places.iter().map(&mut line_at).collect()
+}
+
 /// A value, with its place in the file.
 pub(crate) struct Node<'a> {
     file: File<'a>,
@@ -74,6 +86,11 @@ impl<'a> Node<'a> {
     /// Something wrong with this value.
     pub fn error(&self, message: impl Into<String>) -> FileError {
         self.file.error(self.at, &self.key, message)
+    }
+
+    /// Where the value starts in the text, a table at its header.
+    pub fn place(&self) -> usize {
+        self.at
     }
 
     /// Passes the value on if the rule holds; says that it must be `rule` if not.

@@ -8,7 +8,7 @@ use sonarfix::pose;
 
 use crate::document::{Document, Node, Table};
 use crate::error::FileError;
-use crate::geometry::{TOO_FAR, is_near_enough};
+use crate::geometry::{Segment, TOO_FAR, is_near_enough};
 use crate::quantity::Unit;
 use crate::{file, single};
 
@@ -52,6 +52,10 @@ impl NamedWall {
     pub fn to(&self) -> [f64; 2] {
         self.to
     }
+
+    pub(crate) fn segment(&self) -> Segment {
+        Segment { from: self.from, to: self.to }
+    }
 }
 
 /// The walls of a place.
@@ -81,12 +85,18 @@ impl Floor {
 
     /// Reads a `[map]` table.
     pub(crate) fn from_node(node: Node<'_>) -> Result<Self, FileError> {
+        Self::with_places(node).map(|(floor, _)| floor)
+    }
+
+    /// Reads a `[map]` table; also, where in the text each wall stands.
+    pub(crate) fn with_places(node: Node<'_>) -> Result<(Self, Vec<usize>), FileError> {
         let map = node.table(&["unit", "wall"])?;
         let unit = map.require("unit")?.unit_of_length()?;
         let array = map.require("wall")?;
-        let mut walls = Vec::new();
+        let (mut walls, mut places) = (Vec::new(), Vec::new());
         let mut names = HashSet::new();
         for item in array.items()? {
+            places.push(item.place());
             let table = item.table(&["name", "from", "to"])?;
             let wall = wall(&table, unit)?;
             if !names.insert(wall.name.clone()) {
@@ -96,7 +106,44 @@ impl Floor {
             walls.push(wall);
         }
         let has_walls = !walls.is_empty();
-        array.check(Self { walls }, has_walls, "at least one wall")
+        array.check((Self { walls }, places), has_walls, "at least one wall")
+    }
+
+    /// A floor of these walls.
+    ///
+    /// ```
+    /// use sonarfix_map::{Floor, NamedWall};
+    /// let wall = NamedWall::new("window".into(), [0.0, 0.0], [4.0, 0.0])?;
+    /// let floor = Floor::new(vec![wall]);
+    /// assert_eq!(Floor::parse(&floor.to_toml(), "floor.toml")?, floor);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn new(walls: Vec<NamedWall>) -> Self {
+        Self { walls }
+    }
+
+    /// The text of a map file with these walls, in metres.
+    #[must_use]
+    pub fn to_toml(&self) -> String {
+        let line = |wall: &NamedWall| {
+            let name = toml::Value::String(wall.name.clone());
+            let ([x1, y1], [x2, y2]) = (wall.from, wall.to);
+            format!("    {{ name = {name}, from = [{x1:?}, {y1:?}], to = [{x2:?}, {y2:?}] }},\n")
+        };
+        let walls: String = self.walls.iter().map(line).collect();
+        format!("format = 1\n\n[map]\nunit = \"m\"\nwall = [\n{walls}]\n")
+    }
+
+    /// The text of a CSV of these walls, in metres.
+    #[must_use]
+    pub fn to_csv(&self) -> String {
+        let line = |wall: &NamedWall| {
+            let ([x1, y1], [x2, y2]) = (wall.from, wall.to);
+            format!("{x1:?},{y1:?},{x2:?},{y2:?},\"{}\"\n", wall.name.replace('"', "\"\""))
+        };
+        let walls: String = self.walls.iter().map(line).collect();
+        format!("x1_m,y1_m,x2_m,y2_m,name\n{walls}")
     }
 
     /// The walls with their names, in the file's order.

@@ -40,6 +40,29 @@ pub(crate) struct Segment {
 }
 
 impl Segment {
+    pub fn length(self) -> f64 {
+        distance(self.from, self.to)
+    }
+
+    /// The unit vector from one end to the other.
+    pub fn tangent(self) -> Point {
+        let length = self.length();
+        [(self.to[0] - self.from[0]) / length, (self.to[1] - self.from[1]) / length]
+    }
+
+    /// The point so far from the start.
+    pub fn at(self, along: f64) -> Point {
+        let [x, y] = self.tangent();
+        [self.from[0] + along * x, self.from[1] + along * y]
+    }
+
+    /// Where a point lies: along the segment from its start, and to the left of it.
+    pub fn place(self, point: Point) -> Point {
+        let [x, y] = self.tangent();
+        let (dx, dy) = (point[0] - self.from[0], point[1] - self.from[1]);
+        [x * dx + y * dy, x * dy - y * dx]
+    }
+
     /// The least distance between two segments; zero if they cross.
     pub fn distance(self, other: Self) -> f64 {
         if self.separates(other) && other.separates(self) {
@@ -62,7 +85,8 @@ impl Segment {
         (ax * by - ay * bx).signum()
     }
 
-    fn distance_to(self, point: Point) -> f64 {
+    /// The least distance of a point from the segment.
+    pub fn distance_to(self, point: Point) -> f64 {
         let (ax, ay) = (self.to[0] - self.from[0], self.to[1] - self.from[1]);
         let (bx, by) = (point[0] - self.from[0], point[1] - self.from[1]);
         let foot = ((ax * bx + ay * by) / (ax * ax + ay * ay)).clamp(0.0, 1.0);

@@ -12,12 +12,17 @@
 //! | map | [`Floor::read`] | the walls |
 //! | robot | [`Robot::read`] | the localizer's configuration, and the periods of its loop |
 //! | scenario | [`Scenario::read`] | both, a path, and what is true |
+//! | any that holds a map | [`MapFile::read`] | the walls, and the line of each |
+//!
+//! [`survey`] finds what is wrong with walls that can each be read, [`simplify`] joins pieces, and
+//! [`bake`] makes the image that a robot reads in place.
 //!
 //! Numbers that the localizer takes are `f32` in the types of [`sonarfix`]; everything else is
 //! `f64` in metres, seconds and radians.
 
 #![forbid(unsafe_code)]
 
+mod bake;
 mod document;
 mod error;
 mod faults;
@@ -25,20 +30,28 @@ mod fidelity;
 mod file;
 mod floor;
 mod geometry;
+mod map_file;
+mod neighbours;
 mod path;
 mod quantity;
 mod robot;
 mod scenario;
+mod simplify;
 mod surroundings;
+mod survey;
 
+pub use bake::{BakeError, bake};
 pub use error::FileError;
 pub use faults::{Fault, FaultKind, Wheel};
 pub use fidelity::{Fidelity, Follow, Hardware, ServoName, SonarName, Upset, Upsets};
 pub use floor::{Floor, NamedWall};
+pub use map_file::MapFile;
 pub use path::{Leg, Motion, Movement, Path, PathError, PathPlan, PathPose};
 pub use robot::Robot;
 pub use scenario::{Run, Scenario, Start, Truth};
+pub use simplify::{Limits, Simplified, simplify};
 pub use surroundings::{Obstacle, Outline, Surroundings, Walk};
+pub use survey::{Finding, Flaw, Severity, survey};
 
 /// The text of the reference scenario: the conditions of the paper that Sonarfix starts from.
 pub const PAPER: &str = include_str!("../scenarios/paper.toml");

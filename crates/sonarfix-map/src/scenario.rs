@@ -16,7 +16,8 @@ use crate::quantity::{
 use crate::robot::Robot;
 use crate::surroundings::{self, Surroundings};
 
-const KEYS: [&str; 13] = [
+/// What a scenario file may hold, beside `format`.
+pub(crate) const KEYS: [&str; 13] = [
     "name",
     "description",
     "fidelity",

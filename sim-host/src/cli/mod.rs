@@ -5,6 +5,7 @@ mod command;
 mod config;
 mod convert;
 mod faults;
+mod map;
 mod monitor;
 mod paper;
 mod replay;
@@ -39,6 +40,8 @@ enum Command {
     Tell(command::Args),
     /// Bakes a robot's configuration into the bytes that it reads from its flash.
     Config(config::Args),
+    /// Checks, bakes, draws and simplifies maps.
+    Map(map::Args),
     /// Prints how well any estimator could know the robot's state, over time.
     Bound(bound::Args),
     /// Prints how the simulated NXT sonar compares with recorded sweeps, as markdown.
@@ -61,6 +64,7 @@ impl Cli {
             Command::Monitor(args) => monitor::execute(&args),
             Command::Tell(args) => command::execute(&args),
             Command::Config(args) => config::execute(&args),
+            Command::Map(args) => map::execute(&args),
             Command::Bound(args) => bound::execute(&args),
             Command::SonarModel(args) => sonar_model::execute(&args),
             Command::Faults(args) => faults::execute(&args),

@@ -60,6 +60,11 @@ impl Axis {
         Self { label: label.into(), range, ticks, scale: Scale::Logarithmic }
     }
 
+    /// Where the ticks stand.
+    pub(super) fn ticks(&self) -> &[f64] {
+        &self.ticks
+    }
+
     /// Where a value stands on the axis. On a logarithmic one zero has no place: what is below the
     /// axis by a decade or more stands a decade below.
     pub(super) fn place(&self, value: f64) -> f64 {

@@ -13,11 +13,13 @@
 //! | `chart`, `axis`, `points` | how a figure is drawn |
 //! | `player` | the data of the player; its script is `player.js` |
 //! | `palette` | one colour for one thing, in figures and player |
+//! | [`map`] | the picture of a map alone |
 //! | `page` | tables, figures and data as HTML |
 
 mod axis;
 mod chart;
 mod figures;
+pub mod map;
 mod page;
 mod palette;
 mod player;

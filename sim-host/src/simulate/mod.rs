@@ -13,11 +13,11 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use sonarfix::localizer::{Localizer, Start, StartError};
-use sonarfix::map::{Map, Wall};
+use sonarfix::map::{Map, MapError, Wall};
 use sonarfix::pose::Pose;
 use sonarfix::units::{Instant, Metres, Radians};
 use sonarfix_hal::robot::Stamp;
-use sonarfix_map::{Fidelity, Follow, NamedWall, Scenario, SonarName};
+use sonarfix_map::{BakeError, Fidelity, Follow, NamedWall, Scenario, SonarName};
 
 use crate::dense::{Line, Model, Vector};
 use crate::pins::devices::SetupError;
@@ -38,6 +38,8 @@ pub struct Simulation {
     /// To which instant the loop says that an echo belongs, at the fidelity of pins.
     pub stamp: Stamp,
     walls: Vec<Wall>,
+    /// The walls as a baked map, if that is what the localizer is to read.
+    image: Option<Vec<u8>>,
     lines: Vec<Line>,
     world: World,
     sensor: SensorModel,
@@ -52,6 +54,9 @@ pub enum SimulationError {
     /// The localizer could not be made.
     #[error("the localizer refuses to start: {0}")]
     Start(#[from] StartError),
+    /// The localizer refused its baked map.
+    #[error("the localizer refuses its map: {0}")]
+    Map(#[from] MapError),
     /// The robot's devices could not be set up.
     #[error("the robot cannot be set up: {0}")]
     Setup(#[from] SetupError),
@@ -102,6 +107,7 @@ impl Simulation {
         Self {
             stamp: Stamp::Reflection,
             walls: scenario.floor.walls(),
+            image: None,
             lines: scenario.floor.named_walls().iter().map(line).collect(),
             world,
             sensor: sensor(&scenario),
@@ -110,6 +116,14 @@ impl Simulation {
             model: Model::of(&scenario.robot.config),
             scenario,
         }
+    }
+
+    /// The same, but the localizer reads its map as on a robot: baked.
+    ///
+    /// # Errors
+    /// [`BakeError`], if the walls cannot be baked.
+    pub fn on_baked_map(self) -> Result<Self, BakeError> {
+        Ok(Self { image: Some(sonarfix_map::bake(&self.walls)?), ..self })
     }
 
     /// A trace of this scenario with nothing in it yet.
@@ -162,7 +176,11 @@ impl Simulation {
     /// A localizer that starts at a time, µs.
     fn localizer_from(&self, start: Start, now: u64) -> Result<Localizer<'_>, SimulationError> {
         let config = self.scenario.robot.config;
-        Ok(Localizer::new(config, Map::new(&self.walls), start, Instant::from_ticks(now))?)
+        let map = match &self.image {
+            None => Map::new(&self.walls),
+            Some(image) => Map::read(image)?,
+        };
+        Ok(Localizer::new(config, map, start, Instant::from_ticks(now))?)
     }
 
     /// Who steers, if anybody must.

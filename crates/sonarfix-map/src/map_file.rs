@@ -1,0 +1,228 @@
+//! A map from any file that holds one: a map file, a scenario, a CSV of segments, a baked map.
+
+use std::collections::HashSet;
+use std::path::Path;
+
+use sonarfix::config::Sonar;
+use sonarfix::map::{Map, WallError, image};
+use sonarfix::pose::Point;
+
+use crate::document::{self, Document};
+use crate::error::FileError;
+use crate::floor::{Floor, NamedWall};
+use crate::geometry::TOO_FAR;
+use crate::quantity::{LENGTH, Unit};
+use crate::scenario::{self, Scenario};
+use crate::{Robot, file};
+
+/// A map, and where in its file each wall stands.
+#[derive(Debug, Clone)]
+pub struct MapFile {
+    /// The walls.
+    pub floor: Floor,
+    /// The sonar of the robot, if the file is a scenario.
+    pub sonar: Option<Sonar>,
+    name: String,
+    /// The line of each wall; none in a baked map.
+    lines: Vec<usize>,
+}
+
+impl MapFile {
+    /// Reads a map: from a CSV of segments if the file's name ends in `.csv`, from a baked map if the file
+    /// starts as one, else from a map or a scenario in TOML. `unit` is that of a CSV whose header names none.
+    ///
+    /// # Errors
+    /// [`FileError`] with the first thing that is wrong.
+    pub fn read(path: &Path, unit: Option<&str>) -> Result<Self, FileError> {
+        let bytes = std::fs::read(path).map_err(|error| {
+            FileError::of_file(&file::name(path), format!("cannot be read: {error}"))
+        })?;
+        let name = file::name(path);
+        if bytes.starts_with(&image::MAGIC) {
+            return Self::from_image(&bytes, name);
+        }
+        let text = String::from_utf8(bytes)
+            .map_err(|_| FileError::of_file(&name, "is neither text nor a baked map"))?;
+        let is_csv =
+            path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
+        if is_csv {
+            return Self::from_csv(&text, name, unit);
+        }
+        let base = path.parent().unwrap_or(Path::new(""));
+        Self::from_toml(&text, name, base)
+    }
+
+    /// Reads the text of a map file or a scenario.
+    fn from_toml(text: &str, name: String, base: &Path) -> Result<Self, FileError> {
+        let document = Document::parse(text, &name)?;
+        let root = document.root(&scenario::KEYS)?;
+        let is_scenario = root.get("path").is_some();
+        if !is_scenario {
+            let map = document.root(&["map"])?.require("map")?;
+            let (floor, places) = Floor::with_places(map)?;
+            let lines = document::lines(text, &places);
+            return Ok(Self { floor, sonar: None, lines, name });
+        }
+        let Scenario { floor, robot: Robot { config, .. }, .. } =
+            Scenario::parse(text, &name, base)?;
+        let map = root.require("map")?;
+        if let Some(file) = map.as_text() {
+            let map = Self::read(&base.join(file), None)?;
+            return Ok(Self { sonar: Some(config.sonar), ..map });
+        }
+        let (_, places) = Floor::with_places(map)?;
+        let lines = document::lines(text, &places);
+        Ok(Self { floor, sonar: Some(config.sonar), lines, name })
+    }
+
+    /// The walls of a baked map, which has no names: they are called by their numbers.
+    fn from_image(bytes: &[u8], name: String) -> Result<Self, FileError> {
+        let refused = |message: String| FileError::of_file(&name, message);
+        let map = Map::read(bytes).map_err(|error| refused(error.to_string()))?;
+        let wall = |(id, wall): (sonarfix::map::WallId, sonarfix::map::Wall)| {
+            let place = |point: Point| [point.x.0.into(), point.y.0.into()];
+            let wall =
+                NamedWall::new(format!("wall {}", id.0), place(wall.from()), place(wall.to()));
+            wall.map_err(|error| refused(format!("wall {}: {error}", id.0)))
+        };
+        let walls = map.walls().map(wall).collect::<Result<_, _>>()?;
+        Ok(Self { floor: Floor::new(walls), sonar: None, lines: Vec::new(), name })
+    }
+
+    /// Reads the text of a CSV of segments.
+    fn from_csv(text: &str, name: String, unit: Option<&str>) -> Result<Self, FileError> {
+        let mut reader =
+            csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
+        let header = reader.headers().map_err(|error| of_csv(&name, &error))?.clone();
+        let columns =
+            Columns::of(&header, unit).map_err(|message| FileError::new(&name, 1, "", message))?;
+        let (mut walls, mut lines) = (Vec::new(), Vec::new());
+        let mut names = HashSet::new();
+        for (number, record) in (1_u32..).zip(reader.records()) {
+            let record = record.map_err(|error| of_csv(&name, &error))?;
+            let line = record.position().map_or(0, csv::Position::line);
+            let line = usize::try_from(line).unwrap_or(usize::MAX);
+            let wrong = |(key, message)| FileError::new(&name, line, key, message);
+            let wall = columns.wall(&record, number).map_err(wrong)?;
+            if !names.insert(wall.name().to_owned()) {
+                let message = format!("another wall is already called \"{}\"", wall.name());
+                return Err(wrong(("name", message)));
+            }
+            walls.push(wall);
+            lines.push(line);
+        }
+        if walls.is_empty() {
+            return Err(FileError::new(&name, 1, "", "there is no wall below the header"));
+        }
+        Ok(Self { floor: Floor::new(walls), sonar: None, lines, name })
+    }
+
+    /// What errors call the file.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What errors call the place of a wall: `map.toml:12: "window"`.
+    #[must_use]
+    pub fn place(&self, wall: usize) -> String {
+        let (file, name) = (&self.name, self.quoted(wall));
+        match self.line(wall) {
+            Some(line) => format!("{file}:{line}: {name}"),
+            None => format!("{file}: {name}"),
+        }
+    }
+
+    /// The name of a wall between quotes.
+    #[must_use]
+    pub fn quoted(&self, wall: usize) -> String {
+        let name = self.floor.named_walls().get(wall).map_or("", NamedWall::name);
+        format!("\"{name}\"")
+    }
+
+    /// The line in which a wall stands, if the file has lines.
+    #[must_use]
+    pub fn line(&self, wall: usize) -> Option<usize> {
+        self.lines.get(wall).copied()
+    }
+}
+
+fn of_csv(name: &str, error: &csv::Error) -> FileError {
+    let message = format!("cannot be read as CSV: {error}");
+    match error.position().and_then(|position| usize::try_from(position.line()).ok()) {
+        Some(line) => FileError::new(name, line, "", message),
+        None => FileError::of_file(name, message),
+    }
+}
+
+/// Which column of a CSV is what, and the unit of the coordinates.
+struct Columns {
+    coordinates: [usize; 4],
+    name: Option<usize>,
+    unit: &'static Unit,
+}
+
+const COORDINATES: [&str; 4] = ["x1", "y1", "x2", "y2"];
+
+impl Columns {
+    /// The columns `x1`, `y1`, `x2`, `y2` and, if there is one, `name`, in any order. The unit follows the
+    /// name, as in `x1_mm`.
+    fn of(header: &csv::StringRecord, unit: Option<&str>) -> Result<Self, String> {
+        let find = |wanted: &str| {
+            header.iter().position(|column| column.split('_').next() == Some(wanted))
+        };
+        let columns = COORDINATES.map(find);
+        let [Some(x1), Some(y1), Some(x2), Some(y2)] = columns else {
+            return Err(
+                "the columns must be named x1, y1, x2, y2 and, if there is one, name".into()
+            );
+        };
+        let coordinates = [x1, y1, x2, y2];
+        let units = coordinates.map(|at| header.get(at)?.split_once('_').map(|(_, unit)| unit));
+        let [first, rest @ ..] = units;
+        if rest.iter().any(|&unit| unit != first) {
+            return Err("the coordinates must all be in one unit".into());
+        }
+        let unit = match (first, unit) {
+            (Some(named), None) => named,
+            (None, Some(given)) => given,
+            (Some(named), Some(given)) if named == given => named,
+            (Some(named), Some(given)) => {
+                return Err(format!("the coordinates are in {named}, not in {given}"));
+            }
+            (None, None) => {
+                return Err(
+                    "the unit is missing: name the columns x1_m, y1_m, x2_m, y2_m (or _cm, _mm), \
+                            or give --unit"
+                        .into(),
+                );
+            }
+        };
+        let unit = LENGTH.unit(unit);
+        let unit =
+            unit.ok_or_else(|| format!("the unit must be one of {}", LENGTH.unit_names()))?;
+        Ok(Self { coordinates, name: find("name"), unit })
+    }
+
+    /// The wall of a record, or the column that is wrong and how.
+    fn wall(
+        &self,
+        record: &csv::StringRecord,
+        number: u32,
+    ) -> Result<NamedWall, (&'static str, String)> {
+        let mut ends = [0.0; 4];
+        for ((end, &at), key) in ends.iter_mut().zip(&self.coordinates).zip(COORDINATES) {
+            let text = record.get(at).unwrap_or_default();
+            let coordinate =
+                text.parse().map_err(|_| (key, format!("`{text}` is not a number")))?;
+            *end = self.unit.in_si(coordinate);
+        }
+        let [x1, y1, x2, y2] = ends;
+        let name = self.name.and_then(|at| record.get(at)).filter(|name| !name.is_empty());
+        let name = name.map_or_else(|| format!("wall {number}"), str::to_owned);
+        NamedWall::new(name, [x1, y1], [x2, y2]).map_err(|error| match error {
+            WallError::NotFinite => ("", format!("both ends must be {TOO_FAR}")),
+            WallError::ZeroLength => ("", "the wall has no length".into()),
+        })
+    }
+}
