@@ -8,11 +8,13 @@ use std::path::{Path, PathBuf};
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use sonarfix::aim::NoAim;
 use sonarfix::ekf::State;
-use sonarfix::localizer::Localizer;
+use sonarfix::localizer::{Fix, Localizer};
+use sonarfix::map::WallId;
 use sonarfix::units::Instant;
 use sonarfix_hal::robot::Report;
-use sonarfix_link::message::Step;
+use sonarfix_link::message::{Skip, Step};
 use sonarfix_link::{Reporter, Sender, Telemetry, frame};
 use sonarfix_map::{CLASSROOM, Fidelity, PAPER, Scenario};
 use sonarfix_sim::monitor::recording::{Log, Recording};
@@ -140,6 +142,28 @@ fn a_recording_replays_to_the_bit() {
             }
         }
     }
+}
+
+/// The first look of a run, taken for one at a wall that no map has, and ten turns without any:
+/// asked for itself, the replay would find the wall, and nothing to skip.
+#[test]
+fn the_robots_walls_and_skips_are_taken_and_not_the_replays_own() {
+    let scenario = scenario(CLASSROOM);
+    let mut robot = Robot::of(&scenario, 0);
+    let first = robot.sent.iter().position(|t| matches!(t, Telemetry::Look(_))).unwrap();
+    let next = robot.sent.iter().skip(first).find(|t| matches!(t, Telemetry::Step(_)));
+    let next = *next.unwrap();
+    robot.sent.truncate(first + 1);
+    let Some(Telemetry::Look(look)) = robot.sent.last_mut() else { panic!("a look") };
+    assert!(matches!(look.fix, Fix::Accepted(_)));
+    look.aim.wall = WallId(9_999);
+    let skip = Telemetry::Skip(Skip { at: look.at, reason: NoAim::NoWall });
+    robot.sent.extend([skip; 10]);
+    robot.sent.push(next);
+    let said: Vec<_> = robot.sent.iter().map(|&telemetry| Said { lost: 0, telemetry }).collect();
+    let (_, summary) = replay(&log(&said), &scenario);
+    assert_eq!((summary.fixes.accepted, summary.fixes.refused), (0, 11));
+    assert!(summary.health.degraded_at.is_some(), "ten turns without a range");
 }
 
 #[test]
