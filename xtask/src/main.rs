@@ -45,7 +45,7 @@ enum Task {
 }
 
 /// The crates that run on a robot.
-const NO_STD_CRATES: [&str; 2] = ["sonarfix", "sonarfix-hal"];
+const NO_STD_CRATES: [&str; 3] = ["sonarfix", "sonarfix-hal", "sonarfix-link"];
 /// Cortex-M4F, and Cortex-M0+ without FPU or atomics.
 const TARGETS: [&str; 2] = ["thumbv7em-none-eabihf", "thumbv6m-none-eabi"];
 
