@@ -363,7 +363,7 @@ const HARDWARE: [Case; 12] = [
     ),
     case(
         "[run]",
-        "[sensor]\nmodel = \"srf08\"\n[run]",
+        "[sensor]\nmodel = \"srf99\"\n[run]",
         "model = ",
         "sensor.model",
         "must be \"ideal\" or \"hc_sr04\" or \"nxt\"",

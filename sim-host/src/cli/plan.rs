@@ -31,7 +31,7 @@ pub struct Args {
     #[arg(long, conflicts_with = "sensor")]
     compare: bool,
     /// The deviation of the position that would do, millimetres: says which sonars keep it.
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     need: Option<f64>,
     /// How often the path is driven: detection is a matter of chance.
     #[arg(long, default_value_t = 10)]
