@@ -1,5 +1,7 @@
 //! `cargo xtask endurance`: random lives of the filter, by `tests/examples/endurance.rs`.
 
+use crate::cargo;
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::Args)]
 pub struct Args {
     /// How many steps of the filter at the least; CI takes a million.
@@ -18,5 +20,5 @@ impl Args {
 pub fn run(args: Args) -> anyhow::Result<()> {
     let Args { steps, seed } = args;
     let example = "run --release --package sonarfix-tests --example endurance --";
-    crate::cargo(&format!("{example} --steps {steps} --seed {seed}"))
+    cargo::run(&format!("{example} --steps {steps} --seed {seed}"))
 }

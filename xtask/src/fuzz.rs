@@ -7,6 +7,8 @@ use std::process::Command;
 
 use anyhow::Context;
 
+use crate::cargo;
+
 #[derive(Debug, Clone, PartialEq, Eq, clap::Args)]
 pub struct Args {
     /// How long to search, for each target.
@@ -33,19 +35,19 @@ const INSTRUMENTED: &str = "-Cpasses=sancov-module -Cllvm-args=-sanitizer-covera
 
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz");
-    let target_directory = crate::target_directory()?.join("fuzz");
-    let cargo = |arguments: &str| {
-        let mut command = crate::cargo_command(arguments);
+    let target_directory = cargo::target_directory().join("fuzz");
+    let in_fuzz = |arguments: &str| {
+        let mut command = cargo::command(arguments);
         command.current_dir(&folder).env("CARGO_TARGET_DIR", &target_directory);
         command
     };
-    crate::check(cargo("test --release --no-default-features"))?;
+    cargo::check(in_fuzz("test --release --no-default-features"))?;
 
     // A target of its own keeps the flags away from build scripts and macros.
     let host = host()?;
-    let mut build = cargo(&format!("build --release --bins --target {host}"));
+    let mut build = in_fuzz(&format!("build --release --bins --target {host}"));
     build.env("RUSTFLAGS", INSTRUMENTED);
-    crate::check(build)?;
+    cargo::check(build)?;
     let chosen: Vec<&str> = if args.targets.is_empty() {
         ALL.to_vec()
     } else {
@@ -61,7 +63,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         search.arg(format!("-max_total_time={}", args.seconds));
         search.args(["-timeout=10", "-print_final_stats=1", "-verbosity=0"]);
         search.current_dir(&found);
-        crate::check(search)?;
+        cargo::check(search)?;
     }
     Ok(())
 }

@@ -5,6 +5,8 @@
 
 use std::process::{Command, Stdio};
 
+use crate::cargo;
+
 /// libm has inline assembly for x86, which Miri cannot run; for this target it has none.
 const TARGET: &str = "armv7-unknown-linux-gnueabihf";
 
@@ -21,8 +23,8 @@ pub fn run() -> anyhow::Result<()> {
         command.args(["+nightly", "miri", "test", "--package", "sonarfix", "--target", TARGET]);
         command.args(what).env("MIRIFLAGS", "-Zmiri-tree-borrows");
         // Its build is another compiler's: apart from all others.
-        command.env("CARGO_TARGET_DIR", crate::target_directory()?.join("miri"));
-        crate::check(command)?;
+        command.env("CARGO_TARGET_DIR", cargo::target_directory().join("miri"));
+        cargo::check(command)?;
     }
     Ok(())
 }
