@@ -18,6 +18,7 @@
 
 #![forbid(unsafe_code)]
 
+mod bake;
 mod document;
 mod error;
 mod faults;
@@ -31,6 +32,7 @@ mod robot;
 mod scenario;
 mod surroundings;
 
+pub use bake::{BakeError, bake};
 pub use error::FileError;
 pub use faults::{Fault, FaultKind, Wheel};
 pub use fidelity::{Fidelity, Follow, Hardware, ServoName, SonarName, Upset, Upsets};

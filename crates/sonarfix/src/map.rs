@@ -1,144 +1,70 @@
 //! The map: walls as straight segments, fixed and known.
 //!
+//! A map is either walls in code ([`Map::new`]) or a baked image ([`Map::read`]): one byte slice,
+//! made on a PC by `sonarfix map bake`, read in place from flash and never copied. The image holds an
+//! index, so that what it costs to ask for the walls near a point does not depend on how many others
+//! there are.
+//!
 //! # Non-finite policy
-//! A [`Wall`] cannot be made from NaN or infinite coordinates, so a map holds none.
+//! A [`Wall`] cannot be made from NaN or infinite coordinates, so a map holds none. Near a point
+//! that is not finite are no walls, or all.
 
-use crate::pose::{Heading, Point};
-use crate::units::{Metres, Radians};
+mod grid;
+pub mod image;
+mod wall;
 
-/// Why a wall was refused.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum WallError {
-    /// A coordinate is NaN or infinite, or the wall is too long to measure.
-    NotFinite,
-    /// Both ends are the same point, or nearer than [`Wall::SHORTEST`].
-    ZeroLength,
-}
+pub use grid::{Cells, Grid};
+use image::{Image, Window};
+pub use wall::{Wall, WallError};
 
-impl core::fmt::Display for WallError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::NotFinite => "a coordinate of the wall is NaN or infinite",
-            Self::ZeroLength => "the wall has no length",
-        })
-    }
-}
-
-impl core::error::Error for WallError {}
-
-/// A wall segment, with its line in the paper's form a x + b y + c = 0, a² + b² = 1 (eq. 1).
-///
-/// The line is kept as a point and a unit tangent, not as c: far from the origin, c would cost
-/// the digits that a range is measured with.
-///
-/// ```
-/// use sonarfix::map::Wall;
-/// use sonarfix::pose::Point;
-/// let wall = Wall::new(Point::new(0.0, 0.0), Point::new(4.0, 0.0))?;
-/// // On the left of the way from one end to the other, the distance is positive.
-/// assert_eq!(wall.signed_distance(Point::new(1.0, 2.0)).0, 2.0);
-/// assert_eq!(wall.along(Point::new(1.0, 2.0)).0, 1.0);
-/// # Ok::<(), sonarfix::map::WallError>(())
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Wall {
-    from: Point,
-    tangent_x: f32,
-    tangent_y: f32,
-    length: f32,
-    /// Direction of the normal (a, b).
-    normal: Heading,
-}
-
-impl Wall {
-    /// The shortest wall: a tenth of a millimetre has no direction that a sonar could tell.
-    pub const SHORTEST: Metres = Metres(1e-4);
-
-    /// A wall between two points of the map.
-    ///
-    /// # Errors
-    /// [`WallError`], by what is wrong with the points.
-    pub fn new(from: Point, to: Point) -> Result<Self, WallError> {
-        let (dx, dy) = ((to.x - from.x).0, (to.y - from.y).0);
-        let length = libm::hypotf(dx, dy);
-        if !from.is_finite() || !to.is_finite() || !length.is_finite() {
-            return Err(WallError::NotFinite);
-        }
-        if length < Self::SHORTEST.0 {
-            return Err(WallError::ZeroLength);
-        }
-        let (tangent_x, tangent_y) = (dx / length, dy / length);
-        let normal = Heading::new(Radians(libm::atan2f(tangent_x, -tangent_y)));
-        Ok(Self { from, tangent_x, tangent_y, length, normal })
-    }
-
-    /// The end the wall was drawn from.
-    #[must_use]
-    pub fn from(&self) -> Point {
-        self.from
-    }
-
-    /// The end the wall was drawn to.
-    #[must_use]
-    pub fn to(&self) -> Point {
-        Point::new(
-            self.from.x.0 + self.tangent_x * self.length,
-            self.from.y.0 + self.tangent_y * self.length,
-        )
-    }
-
-    /// a of eq. (1): x component of the unit normal, which points to the left of the way from one
-    /// end to the other.
-    #[must_use]
-    pub fn a(&self) -> f32 {
-        -self.tangent_y
-    }
-
-    /// b of eq. (1): y component of the unit normal.
-    #[must_use]
-    pub fn b(&self) -> f32 {
-        self.tangent_x
-    }
-
-    /// Length of the segment.
-    #[must_use]
-    pub fn length(&self) -> Metres {
-        Metres(self.length)
-    }
-
-    /// d of eq. (1): the distance of `point` from the wall's line, negative on its right side.
-    #[must_use]
-    pub fn signed_distance(&self, point: Point) -> Metres {
-        let (dx, dy) = ((point.x - self.from.x).0, (point.y - self.from.y).0);
-        Metres(self.a() * dx + self.b() * dy)
-    }
-
-    /// Where along the wall the foot of the perpendicular from `point` lies, from the wall's
-    /// start; on the segment if between zero and its length.
-    #[must_use]
-    pub fn along(&self, point: Point) -> Metres {
-        let (dx, dy) = ((point.x - self.from.x).0, (point.y - self.from.y).0);
-        Metres(self.tangent_x * dx + self.tangent_y * dy)
-    }
-
-    /// The direction in which a point at the given signed distance sees the wall squarely.
-    #[must_use]
-    pub fn direction_from(&self, signed_distance: Metres) -> Heading {
-        if signed_distance.0 < 0.0 {
-            self.normal
-        } else {
-            self.normal.turned(Radians(core::f32::consts::PI))
-        }
-    }
-}
+use crate::pose::Point;
+use crate::units::Metres;
 
 /// A wall's place in its map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct WallId(pub u32);
+
+/// Why a baked map was refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum MapError {
+    /// The bytes do not start as a baked map does.
+    NotAMap,
+    /// The map was baked for another version of this crate: its format is this one.
+    Version(u32),
+    /// The checksum is wrong: bytes were changed, cut off or added.
+    Checksum,
+    /// The bytes are fewer or more than the header says.
+    Length,
+    /// The header describes no grid.
+    Grid,
+    /// This wall is none, or lies outside the grid.
+    Wall(WallId),
+    /// The index is not that of these walls.
+    Index,
+}
+
+impl core::fmt::Display for MapError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::NotAMap => f.write_str("this is not a baked map"),
+            Self::Version(version) => write!(
+                f,
+                "the map has format {version} and this reads format {}: bake it again",
+                image::VERSION
+            ),
+            Self::Checksum => f.write_str("the map is damaged or cut off: its checksum is wrong"),
+            Self::Length => f.write_str("the map is not as long as its header says"),
+            Self::Grid => f.write_str("the map's header describes no grid"),
+            Self::Wall(WallId(id)) => write!(f, "wall {id} of the map is not a wall of its grid"),
+            Self::Index => f.write_str("the map's index is not that of its walls"),
+        }
+    }
+}
+
+impl core::error::Error for MapError {}
 
 /// The walls of a place; it borrows them, so that they can stay in flash.
 ///
@@ -151,35 +77,99 @@ pub struct WallId(pub u32);
 /// # Ok::<(), sonarfix::map::WallError>(())
 /// ```
 #[derive(Debug, Clone, Copy)]
-pub struct Map<'a> {
-    walls: &'a [Wall],
+pub struct Map<'a>(Source<'a>);
+
+#[derive(Debug, Clone, Copy)]
+enum Source<'a> {
+    Walls(&'a [Wall]),
+    Image(Image<'a>),
 }
 
 impl<'a> Map<'a> {
-    /// A map of these walls. Walls beyond the 2³²-th have no [`WallId`] and are never looked at.
+    /// A map of these walls, without an index: [`Self::near`] gives them all, which suits a room.
+    /// Walls beyond the 2³²-th have no [`WallId`] and are never looked at.
     #[must_use]
     pub const fn new(walls: &'a [Wall]) -> Self {
-        Self { walls }
+        Self(Source::Walls(walls))
+    }
+
+    /// Reads a baked map in place. Every length, number and reference is checked here, once (some
+    /// 40 instructions a byte), so that no later lookup can fail: a damaged map is refused.
+    ///
+    /// The slice is the whole image and nothing else, at any address.
+    ///
+    /// # Errors
+    /// [`MapError`], by the first thing that is wrong.
+    ///
+    /// # Panics
+    /// Never.
+    pub fn read(image: &'a [u8]) -> Result<Self, MapError> {
+        Image::read(image).map(|image| Self(Source::Image(image)))
+    }
+
+    /// The number of walls; their ids are those below it.
+    #[must_use]
+    pub fn count(&self) -> u32 {
+        match self.0 {
+            Source::Walls(walls) => u32::try_from(walls.len()).unwrap_or(u32::MAX),
+            Source::Image(image) => image.count(),
+        }
     }
 
     /// The wall with this id, if the map has it.
     #[must_use]
     pub fn wall(&self, id: WallId) -> Option<Wall> {
-        self.walls.get(usize::try_from(id.0).ok()?).copied()
+        match self.0 {
+            Source::Walls(walls) => walls.get(usize::try_from(id.0).ok()?).copied(),
+            Source::Image(image) => image.wall(id),
+        }
     }
 
     /// Every wall with its id.
     pub fn walls(&self) -> impl Iterator<Item = (WallId, Wall)> + use<'a> {
-        (0..).map(WallId).zip(self.walls.iter().copied())
+        let map = *self;
+        (0..map.count()).map(WallId).filter_map(move |id| Some((id, map.wall(id)?)))
     }
 
-    /// Every wall of which a part lies within `reach` of `point`, each once, with its id; it may
-    /// give others too.
+    /// Every wall of which a part lies within `reach` of `point` (map frame), each once, with its id.
+    /// It gives others too: those in the same cells of a baked map's grid, or, without an index, all.
+    ///
+    /// If a coordinate or the reach is NaN, or the reach negative: no wall, or all of them. If the
+    /// reach is infinite and the point is not: all of them.
     pub fn near(
         &self,
-        _point: Point,
-        _reach: Metres,
+        point: Point,
+        reach: Metres,
     ) -> impl Iterator<Item = (WallId, Wall)> + use<'a> {
-        self.walls()
+        match self.0 {
+            Source::Walls(_) => Near::All(self.walls()),
+            Source::Image(image) => Near::Window(image.near(point, reach)),
+        }
+    }
+
+    /// The grid of a baked map's index.
+    #[must_use]
+    pub fn grid(&self) -> Option<Grid> {
+        match self.0 {
+            Source::Walls(_) => None,
+            Source::Image(image) => Some(image.grid()),
+        }
+    }
+}
+
+/// The walls near a point: all of a map without an index, or those of a window.
+enum Near<'a, I> {
+    All(I),
+    Window(Window<'a>),
+}
+
+impl<I: Iterator<Item = (WallId, Wall)>> Iterator for Near<'_, I> {
+    type Item = (WallId, Wall);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        match self {
+            Self::All(walls) => walls.next(),
+            Self::Window(window) => window.next(),
+        }
     }
 }

@@ -1,0 +1,158 @@
+//! The uniform grid over a baked map: which cells a wall lies in, and which are near a point.
+//!
+//! One function turns a coordinate into a cell, for the walls when the map is baked and for the
+//! point when it is asked. It is monotonic, so its rounding cannot lose a wall: what is not less
+//! stays not less.
+
+use super::wall::Wall;
+use crate::pose::Point;
+use crate::units::Metres;
+
+/// A grid of square cells, in rows along x.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Grid {
+    origin: Point,
+    cell: Metres,
+    /// One over the cell's size, 1/m.
+    cells_per_metre: f32,
+    columns: u16,
+    rows: u16,
+}
+
+/// A rectangle of cells; both ends are in it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Cells {
+    /// The first and the last column, counted along x.
+    pub columns: (u16, u16),
+    /// The first and the last row, counted along y.
+    pub rows: (u16, u16),
+}
+
+impl Cells {
+    /// How many cells there are.
+    #[must_use]
+    pub fn count(&self) -> u64 {
+        let across = |(first, last): (u16, u16)| u64::from(last.saturating_sub(first)) + 1;
+        across(self.columns) * across(self.rows)
+    }
+
+    /// Whether the cell at a column and a row is among them.
+    #[must_use]
+    pub fn contain(&self, column: u16, row: u16) -> bool {
+        let has = |(first, last), index| first <= index && index <= last;
+        has(self.columns, column) && has(self.rows, row)
+    }
+}
+
+impl Grid {
+    /// A grid of `columns` × `rows` cells, `cell` wide and high, whose first cell has its least
+    /// corner at `origin`. `None` if a number is not finite, the size of a cell is not positive
+    /// (or its reciprocal not a normal number), or there is no cell.
+    ///
+    /// ```
+    /// use sonarfix::map::{Grid, Wall};
+    /// use sonarfix::pose::Point;
+    /// use sonarfix::units::Metres;
+    /// let grid = Grid::new(Point::new(0.0, 0.0), Metres(2.0), 3, 2).unwrap();
+    /// let cells = grid.cells_of(&Wall::new(Point::new(1.0, 3.0), Point::new(5.0, 3.0))?);
+    /// assert_eq!(cells.map(|cells| (cells.columns, cells.rows)), Some(((0, 2), (1, 1))));
+    /// # Ok::<(), sonarfix::map::WallError>(())
+    /// ```
+    #[must_use]
+    pub fn new(origin: Point, cell: Metres, columns: u16, rows: u16) -> Option<Self> {
+        let cells_per_metre = 1.0 / cell.0;
+        let has_cells = cells_per_metre.is_normal() && cell.0 > 0.0 && columns > 0 && rows > 0;
+        let is_grid = origin.is_finite() && cell.is_finite() && has_cells;
+        is_grid.then_some(Self { origin, cell, cells_per_metre, columns, rows })
+    }
+
+    /// The least corner of the first cell.
+    #[must_use]
+    pub fn origin(&self) -> Point {
+        self.origin
+    }
+
+    /// Width and height of a cell.
+    #[must_use]
+    pub fn cell_size(&self) -> Metres {
+        self.cell
+    }
+
+    /// How many cells there are along x.
+    #[must_use]
+    pub fn columns(&self) -> u16 {
+        self.columns
+    }
+
+    /// How many cells there are along y.
+    #[must_use]
+    pub fn rows(&self) -> u16 {
+        self.rows
+    }
+
+    /// How many cells there are.
+    #[must_use]
+    pub fn cells(&self) -> u32 {
+        u32::from(self.columns) * u32::from(self.rows)
+    }
+
+    /// Where a cell stands in the order of rows.
+    #[must_use]
+    pub fn place(&self, column: u16, row: u16) -> u32 {
+        u32::from(row) * u32::from(self.columns) + u32::from(column)
+    }
+
+    /// The cells that the wall's bounding box touches, or `None` if it is not inside the grid.
+    #[must_use]
+    pub fn cells_of(&self, wall: &Wall) -> Option<Cells> {
+        let (from, to) = (wall.from(), wall.to());
+        let columns = self.columns_of(ordered(from.x, to.x));
+        let rows = self.rows_of(ordered(from.y, to.y));
+        let inside = |(first, last), count| {
+            Some((u16::try_from(first).ok()?, u16::try_from(last).ok().filter(|&n| n < count)?))
+        };
+        Some(Cells { columns: inside(columns, self.columns)?, rows: inside(rows, self.rows)? })
+    }
+
+    /// The cells in which something within `reach` of `point` may lie. `None` if there are none,
+    /// and if a number is NaN or the reach negative.
+    #[must_use]
+    pub fn cells_near(&self, point: Point, reach: Metres) -> Option<Cells> {
+        let around = |middle: Metres| {
+            let (low, high) = (middle - reach, middle + reach);
+            (low <= high).then_some((low, high))
+        };
+        let columns = self.columns_of(around(point.x)?);
+        let rows = self.rows_of(around(point.y)?);
+        Some(Cells { columns: cut(columns, self.columns)?, rows: cut(rows, self.rows)? })
+    }
+
+    fn columns_of(&self, (low, high): (Metres, Metres)) -> (i32, i32) {
+        (self.index(low - self.origin.x), self.index(high - self.origin.x))
+    }
+
+    fn rows_of(&self, (low, high): (Metres, Metres)) -> (i32, i32) {
+        (self.index(low - self.origin.y), self.index(high - self.origin.y))
+    }
+
+    /// The column or row at a distance from the grid's edge. What lies less than a cell outside
+    /// counts as in the first, as a cast rounds towards zero.
+    #[expect(clippy::cast_possible_truncation, reason = "a float-to-int cast saturates")]
+    fn index(&self, distance: Metres) -> i32 {
+        (distance.0 * self.cells_per_metre) as i32
+    }
+}
+
+fn ordered(a: Metres, b: Metres) -> (Metres, Metres) {
+    if b < a { (b, a) } else { (a, b) }
+}
+
+/// The part of a span that is inside 0..count, if there is any.
+fn cut((first, last): (i32, i32), count: u16) -> Option<(u16, u16)> {
+    let first = if first < 0 { 0 } else { u16::try_from(first).ok()? };
+    let last = u16::try_from(last).unwrap_or(if last < 0 { return None } else { u16::MAX });
+    let last = if last < count { last } else { count.checked_sub(1)? };
+    (first <= last).then_some((first, last))
+}
