@@ -217,6 +217,8 @@ pub enum Refused {
     NoConfiguration,
     /// It could not be written to flash.
     Storage,
+    /// The robot does not know where it stands, and must be told first ([`Command::SetPose`]).
+    NoPose,
 }
 
 impl core::fmt::Display for Refused {
@@ -227,6 +229,7 @@ impl core::fmt::Display for Refused {
             Self::NoMap => "the robot has no valid map in its flash",
             Self::NoConfiguration => "the robot has no valid configuration in its flash",
             Self::Storage => "the robot could not write to its flash",
+            Self::NoPose => "the robot does not know where it stands: set its pose first",
         })
     }
 }

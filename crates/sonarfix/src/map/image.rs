@@ -90,6 +90,33 @@ pub fn checksum(bytes: &[u8]) -> u32 {
     })
 }
 
+/// How many bytes the image at the start of a region of flash has, by its own header; what follows
+/// it does not matter.
+///
+/// # Errors
+/// [`MapError`], if no image of this version starts there.
+pub fn length(region: &[u8]) -> Result<usize, MapError> {
+    let rest = region.strip_prefix(&MAGIC).ok_or(MapError::NotAMap)?;
+    let (words, _) = rest.as_chunks::<4>();
+    let &[version, walls, references, shape, ..] = words else {
+        return Err(MapError::Length);
+    };
+    match u32::from_le_bytes(version) {
+        VERSION => {}
+        other => return Err(MapError::Version(other)),
+    }
+    let walls = u32::from_le_bytes(walls);
+    let [columns, columns_high, rows, rows_high] = shape;
+    let cells = u64::from(u16::from_le_bytes([columns, columns_high]))
+        * u64::from(u16::from_le_bytes([rows, rows_high]));
+    let reference = if walls <= MOST_NARROW { 2 } else { 3 };
+    // Every part is below 2³⁸ bytes, so that no sum overflows; at the end stands the checksum.
+    let tables = WALL as u64 * u64::from(walls)
+        + 4 * (cells + 1)
+        + reference * u64::from(u32::from_le_bytes(references));
+    usize::try_from(HEADER as u64 + tables + 4).map_err(|_| MapError::Length)
+}
+
 /// A baked map whose every length, number and reference has been checked.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Image<'a> {
