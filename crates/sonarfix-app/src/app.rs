@@ -247,9 +247,9 @@ impl<'m, F: NorFlash> App<'m, F> {
 
     /// Reads the store; one that cannot be read is made anew, which is an error to tell.
     fn remember(&mut self) -> Result<(), StoreError> {
-        let read = self.recall();
+        let mut read = self.recall();
         if let Err(StoreError::Corrupt) = read {
-            self.store.format()?;
+            read = self.store.format().and(read);
         }
         self.run = self.stored.map_or(1, |saved| saved.run.saturating_add(1));
         let stored = self.stored;
