@@ -1,10 +1,19 @@
 //! What CI runs, by the same names: `cargo xtask ci` is every check, and each has a name of its
 //! own, so that whoever broke one can run just that.
 
-use std::process::{Command, ExitCode};
+use std::process::ExitCode;
 
-use anyhow::{Context, bail};
 use clap::{Parser, Subcommand};
+
+mod bench;
+mod budgets;
+mod cargo;
+mod checks;
+mod elf;
+mod emulator;
+mod firmware;
+mod panics;
+mod program;
 
 #[derive(Debug, Parser)]
 #[command(about = "The project's checks and chores")]
@@ -27,16 +36,42 @@ enum Task {
     Docs,
     /// The `no_std` crates for microcontrollers with and without FPU.
     Embedded,
+    /// The firmware: builds it, looks for panics in it, and runs it in an emulator.
+    TestFirmware,
+    /// Flash and RAM of the shipped firmware, by crate.
+    Size,
+    /// No panic is linked into a program for a microcontroller.
+    Panics,
+    /// Instructions, code, stack and memory against `budgets.toml`.
+    Budgets,
+    /// The programs in `bench` that link nothing of the peers: format, Clippy.
+    LintBench,
+    /// Ours and every peer do the same work.
+    Peers,
     /// Licences of all dependencies, and advisories if their database can be reached.
     Deny,
+    /// Measures again what `budgets` checks, and writes it to `budgets.toml`.
+    Bless,
+    /// Ours and its peers at the same work, to `docs/benchmarks.md` (ten minutes).
+    Bench,
     /// The paper's statistics at full length: 5,000 seeds, both policies (minutes).
     Statistics,
 }
 
-/// The crates that run on a robot.
-const NO_STD_CRATES: [&str; 3] = ["sonarfix", "sonarfix-hal", "sonarfix-link"];
-/// Cortex-M4F, and Cortex-M0+ without FPU or atomics.
-const TARGETS: [&str; 2] = ["thumbv7em-none-eabihf", "thumbv6m-none-eabi"];
+/// What `ci` runs.
+const CHECKS: [Task; 11] = [
+    Task::Format,
+    Task::Lint,
+    Task::TestHost,
+    Task::Docs,
+    Task::Embedded,
+    Task::TestFirmware,
+    Task::Panics,
+    Task::Budgets,
+    Task::LintBench,
+    Task::Peers,
+    Task::Deny,
+];
 
 fn main() -> ExitCode {
     match run(Xtask::parse().task) {
@@ -50,76 +85,21 @@ fn main() -> ExitCode {
 
 fn run(task: Task) -> anyhow::Result<()> {
     match task {
-        Task::Ci => {
-            let checks =
-                [Task::Format, Task::Lint, Task::TestHost, Task::Docs, Task::Embedded, Task::Deny];
-            checks.into_iter().try_for_each(run)
-        }
-        Task::Format => cargo("fmt --all --check"),
-        Task::Lint => cargo("clippy --workspace --all-targets --all-features -- -D warnings"),
-        Task::TestHost => cargo("test"),
-        Task::Docs => docs(),
-        Task::Embedded => embedded(),
-        Task::Deny => deny(),
-        Task::Statistics => statistics(),
+        Task::Ci => CHECKS.into_iter().try_for_each(run),
+        Task::Format => cargo::run("fmt --all --check"),
+        Task::Lint => cargo::run("clippy --workspace --all-targets --all-features -- -D warnings"),
+        Task::TestHost => cargo::run("test"),
+        Task::Docs => checks::docs(),
+        Task::Embedded => checks::embedded(),
+        Task::TestFirmware => firmware::test(),
+        Task::Size => firmware::size(),
+        Task::Panics => panics::check(),
+        Task::Budgets => budgets::check(),
+        Task::LintBench => checks::lint_bench(),
+        Task::Peers => checks::peers(),
+        Task::Deny => checks::deny(),
+        Task::Bless => budgets::bless(),
+        Task::Bench => bench::run(),
+        Task::Statistics => checks::statistics(),
     }
-}
-
-fn docs() -> anyhow::Result<()> {
-    let mut command = cargo_command("doc --workspace --no-deps --all-features");
-    command.env("RUSTDOCFLAGS", "-D warnings");
-    check(command)
-}
-
-fn embedded() -> anyhow::Result<()> {
-    for target in TARGETS {
-        for name in NO_STD_CRATES {
-            cargo(&format!("build --release --package {name} --target {target}"))?;
-            cargo(&format!("build --release --package {name} --target {target} --all-features"))?;
-        }
-    }
-    Ok(())
-}
-
-fn deny() -> anyhow::Result<()> {
-    if Command::new("cargo").args(["deny", "--version"]).output().is_ok_and(|o| !o.status.success())
-    {
-        bail!("cargo-deny is missing: install it with `cargo install cargo-deny --locked`");
-    }
-    cargo("deny --log-level error check licenses bans sources")?;
-    // The advisory database lives on the network; without it, say so and go on.
-    if cargo("deny fetch db").is_err() {
-        eprintln!("advisories: not checked, their database cannot be reached");
-        return Ok(());
-    }
-    cargo("deny --log-level error check advisories")
-}
-
-fn statistics() -> anyhow::Result<()> {
-    for policy in ["nearest", "informative"] {
-        let paper = "run --release --package sonarfix-sim --bin sonarfix -- paper";
-        cargo(&format!("{paper} --statistics --runs 5000 --policy {policy}"))?;
-    }
-    Ok(())
-}
-
-fn cargo(arguments: &str) -> anyhow::Result<()> {
-    check(cargo_command(arguments))
-}
-
-fn cargo_command(arguments: &str) -> Command {
-    let mut command = Command::new("cargo");
-    command.args(arguments.split_whitespace());
-    command
-}
-
-fn check(mut command: Command) -> anyhow::Result<()> {
-    let shown: Vec<_> = command.get_args().map(|arg| arg.to_string_lossy()).collect();
-    let shown = format!("cargo {}", shown.join(" "));
-    eprintln!("── {shown}");
-    let status = command.status().with_context(|| format!("cannot start `{shown}`"))?;
-    if !status.success() {
-        bail!("`{shown}` failed");
-    }
-    Ok(())
 }

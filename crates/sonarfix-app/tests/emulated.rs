@@ -9,6 +9,7 @@
 
 use std::collections::VecDeque;
 use std::io::{ErrorKind, Read, Write};
+use std::net::Shutdown;
 use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::process::{Child, Command as Process, Stdio};
@@ -19,13 +20,17 @@ use sonarfix::localizer::Start;
 use sonarfix::map::Wall;
 use sonarfix::pose::{Point, Pose};
 use sonarfix::units::{Metres, Radians};
-use sonarfix_link::message::{Flashed, Loop, Outcome, Refused, Reset};
+use sonarfix_link::message::{Flashed, Loop, Outcome, Refused};
 use sonarfix_link::{Ack, Command, Hello, Receiver, Sender, Telemetry, baked, frame};
 use tempfile::TempDir;
 
 /// Where `memory.x` has the regions.
 const CONFIG_AT: &str = "0x08004000";
 const MAP_AT: &str = "0x080E0000";
+/// Flash, which starts with the stack's top, and memory of the board.
+const FLASH_AT: u32 = 0x0800_0000;
+const RAM_AT: u32 = 0x2000_0000;
+const RAM: usize = 128 * 1_024;
 /// On this computer, for anything that is waited for; the emulator is ended after it as well.
 const PATIENCE: Duration = Duration::from_secs(100);
 
@@ -38,7 +43,7 @@ struct Robot {
     /// What was told and not yet looked at, the latest last.
     told: VecDeque<Telemetry>,
     since: Instant,
-    _files: TempDir,
+    files: TempDir,
 }
 
 impl Robot {
@@ -53,7 +58,9 @@ impl Robot {
         // 16 MHz, so the firmware's microsecond is 16 instructions: those of a core at 16 MHz that
         // does one in a cycle. While it sleeps no time of this computer passes.
         command.args(["-machine", "netduinoplus2", "-icount", "shift=0,sleep=off"]);
-        command.args(["-display", "none", "-monitor", "none", "-kernel", &elf]);
+        let monitor = path("monitor");
+        command.args(["-display", "none", "-kernel", &elf, "-monitor"]);
+        command.arg(format!("unix:{},server=on,wait=off", monitor.display()));
         for (name, bytes, at) in [("map", map, MAP_AT), ("config", config, CONFIG_AT)] {
             if !bytes.is_empty() {
                 std::fs::write(path(name), bytes).unwrap();
@@ -76,7 +83,7 @@ impl Robot {
             sender: Sender::starting_at(100),
             told: VecDeque::new(),
             since: Instant::now(),
-            _files: files,
+            files,
         }
     }
 
@@ -91,7 +98,9 @@ impl Robot {
             let count = match self.line.read(&mut bytes) {
                 Ok(0) => panic!("the emulator has ended"),
                 Ok(count) => count,
-                Err(error) if error.kind() == ErrorKind::WouldBlock => panic!("the robot is silent"),
+                Err(error) if error.kind() == ErrorKind::WouldBlock => {
+                    panic!("the robot is silent")
+                }
                 Err(error) => panic!("the link: {error}"),
             };
             let receiver = &mut self.receiver;
@@ -133,6 +142,25 @@ impl Robot {
         })
     }
 
+    /// The board's memory from an address on.
+    fn memory(&mut self, from: u32, length: usize) -> Vec<u8> {
+        let file = self.files.path().join("memory");
+        let mut monitor = connected(&self.files.path().join("monitor"));
+        let order = format!("pmemsave {from:#x} {length} \"{}\"\n", file.display());
+        monitor.write_all(order.as_bytes()).unwrap();
+        loop {
+            match std::fs::read(&file) {
+                Ok(bytes) if bytes.len() == length => {
+                    std::fs::remove_file(&file).unwrap();
+                    return bytes;
+                }
+                _ => assert!(self.since.elapsed() < PATIENCE, "the emulator shows no memory"),
+            }
+            // An emulator that waits for somebody to read does not listen to its monitor.
+            let _ = self.line.read(&mut [0; 4_096]).unwrap();
+        }
+    }
+
     fn send(&mut self, bytes: &[u8]) {
         self.line.write_all(bytes).unwrap();
     }
@@ -140,6 +168,8 @@ impl Robot {
 
 impl Drop for Robot {
     fn drop(&mut self) {
+        // An emulator that waits for somebody to read does not listen to signals.
+        let _ = self.line.shutdown(Shutdown::Both);
         // `timeout` hands it on to the emulator; both may have ended by themselves.
         let _ = Process::new("kill").arg(self.emulator.id().to_string()).status();
         let _ = self.emulator.wait();
@@ -190,9 +220,7 @@ fn without_map_and_configuration_it_stays_still_and_says_so() {
     let hello = robot.hello();
     assert_eq!((hello.map, hello.configuration), (Flashed::Missing, Flashed::Missing));
     assert_eq!(robot.order(&Command::Start), Outcome::Refused(Refused::NoMap));
-    let fares = robot.how_it_fares();
-    assert!(!fares.running);
-    println!("reset: {:?}", matches!(hello.reset, Reset::Unknown));
+    assert!(!robot.how_it_fares().running);
 }
 
 #[test]
@@ -261,6 +289,20 @@ fn a_minute_of_ticks_and_no_deadline_missed() {
     assert_eq!(fares.faults.clock, 0);
     assert_eq!(robot.receiver.counters().skipped(), 0);
     println!("{ticks} ticks in a minute, none late; worst poll {worst} µs; {:?}", fares.faults);
+    check_memory(&mut robot);
+}
+
+/// The stack lies below everything else (`flip-link`) and grows down; the emulator's memory begins
+/// as zeros, so the lowest byte that is none is as deep as it went.
+fn check_memory(robot: &mut Robot) {
+    let ram = robot.memory(RAM_AT, RAM);
+    let deepest = ram.iter().position(|byte| *byte != 0).unwrap();
+    let top = robot.memory(FLASH_AT, 4);
+    let top = u32::from_le_bytes(*top.first_chunk().unwrap()) - RAM_AT;
+    let (stack, rest) = (top as usize - deepest, RAM - top as usize);
+    println!("stack {stack} bytes at the deepest, everything else {rest}");
+    assert!(rest < 6_000, "flip-link has not put the stack below: {rest}");
+    assert!(stack + rest <= 8 * 1_024, "{} bytes of RAM", stack + rest);
 }
 
 #[test]
@@ -288,7 +330,7 @@ fn garbage_is_counted_and_commands_after_it_are_done_once() {
     robot.how_it_fares();
     let fares = robot.how_it_fares();
     assert!(!fares.running, "garbage has started the loop");
-    assert!(fares.commands.corrupt >= before.corrupt + 3, "{:?}", fares.commands);
+    assert!(fares.commands.skipped() >= before.skipped() + 3, "{:?}", fares.commands);
 
     // A frame that is sent twice, because its answer was lost, is answered twice and done once.
     robot.send(&whole);

@@ -469,7 +469,9 @@ mod app {
             }
             log::polled(&polled);
             let done = context.shared.clock.lock(|clock| advanced(now, clock.cnt().read().bits()));
-            app.took(done - now);
+            if let Some(took) = done.checked_duration_since(now) {
+                app.took(took);
+            }
         }
     }
 

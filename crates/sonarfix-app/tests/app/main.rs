@@ -6,5 +6,7 @@
     reason = "a few metres, seconds and sectors fit into any of these types"
 )]
 
+mod commands;
 mod flash;
 mod power_cut;
+mod rig;

@@ -1,0 +1,36 @@
+//! The peers. Each is written as its library's own documentation would have it written for a
+//! robot, with the Jacobian of [`model`](crate::model) and what is constant set up once.
+
+#[cfg(feature = "adskalman")]
+pub mod adskalman;
+#[cfg(feature = "kfilter")]
+pub mod kfilter;
+#[cfg(feature = "minikalman")]
+pub mod minikalman;
+#[cfg(feature = "multicalc")]
+pub mod multicalc;
+#[cfg(feature = "naive")]
+pub mod naive;
+#[cfg(feature = "numeris")]
+pub mod numeris;
+
+/// Calls `$do!(name: type; …)` with every peer, by the name of its program in `bench-mcu`, and with
+/// what else is given.
+#[macro_export]
+macro_rules! each_filter {
+    ($do:ident, $($rest:tt)*) => {
+        $do! {
+            naive: $crate::filters::naive::Plain;
+            naive_joseph: $crate::filters::naive::Joseph;
+            adskalman_symmetric: $crate::filters::adskalman::Symmetric;
+            adskalman: $crate::filters::adskalman::Joseph;
+            kfilter: $crate::filters::kfilter::Kfilter;
+            minikalman: $crate::filters::minikalman::Minikalman;
+            minikalman_boxed: $crate::filters::minikalman::Boxed;
+            numeris: $crate::filters::numeris::NumerisEkf;
+            multicalc_passed_in: $crate::filters::multicalc::PassedIn;
+            multicalc: $crate::filters::multicalc::OwnTrigonometry;
+            $($rest)*
+        }
+    };
+}

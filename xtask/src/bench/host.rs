@@ -1,0 +1,48 @@
+//! The filters on this machine: instructions by callgrind, time by criterion.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::process::Command;
+
+use anyhow::Context;
+
+use crate::cargo;
+
+/// The optimiser's vectorisers are off: they make of dense matrices what no microcontroller can.
+const SCALAR: &str = "-C no-vectorize-loops -C no-vectorize-slp";
+
+/// Builds the program that callgrind looks into.
+pub fn build() -> anyhow::Result<()> {
+    let mut command = cargo::in_bench("build --release --package bench-host --bin callgrind");
+    command.env("RUSTFLAGS", SCALAR);
+    cargo::check(command)
+}
+
+/// Instructions of a call, on average over the drive.
+pub fn instructions(name: &str, call: &str) -> anyhow::Result<f64> {
+    let mut command = Command::new("valgrind");
+    command.args(["--tool=callgrind", "--callgrind-out-file=/dev/null"]);
+    command.arg(format!("--toggle-collect=*bench_{call}*"));
+    command.arg(cargo::bench_target().join("release/callgrind")).arg(name);
+    let said = cargo::output(command).context("is `valgrind` installed?")?;
+    let number = |key: &str| -> anyhow::Result<f64> {
+        let (_, rest) = said.split_once(key).with_context(|| format!("no `{key}` in: {said}"))?;
+        Ok(rest.lines().next().unwrap_or_default().trim().parse()?)
+    };
+    Ok(number("Collected : ")? / number(&format!("{call} "))?)
+}
+
+/// Nanoseconds of ten predicts and one update, by filter: criterion's median.
+pub fn times<'a>(names: impl Iterator<Item = &'a str>) -> anyhow::Result<BTreeMap<&'a str, f64>> {
+    let bench = "bench --package bench-host --bench filters -- --noplot";
+    cargo::check(cargo::in_bench(bench))?;
+    names.map(|name| Ok((name, median(name)?))).collect()
+}
+
+fn median(name: &str) -> anyhow::Result<f64> {
+    let path = cargo::bench_target().join("criterion").join(name).join("new/estimates.json");
+    let text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+    let estimates: serde_json::Value = serde_json::from_str(&text)?;
+    let median = estimates.pointer("/median/point_estimate").and_then(serde_json::Value::as_f64);
+    median.context("criterion wrote no median")
+}

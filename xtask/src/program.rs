@@ -1,0 +1,53 @@
+//! Building the programs of `bench` for a microcontroller.
+
+use std::path::PathBuf;
+
+use crate::cargo;
+
+/// What a program is built for, and where it runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Target {
+    /// As people call it.
+    pub name: &'static str,
+    /// As rustc calls it.
+    pub triple: &'static str,
+    /// The board of QEMU that runs its instructions.
+    pub board: &'static str,
+    /// The profile of cargo, which chooses the optimisation level.
+    pub profile: &'static str,
+}
+
+/// Cortex-M4 with an FPU, optimised for speed.
+pub const M4F: Target = Target {
+    name: "Cortex-M4F",
+    triple: "thumbv7em-none-eabihf",
+    board: "mps2-an386",
+    profile: "release",
+};
+/// The same, optimised for size.
+pub const M4F_SMALL: Target = Target { name: "Cortex-M4F at `s`", profile: "small", ..M4F };
+/// Cortex-M3, in soft float.
+pub const M3: Target = Target {
+    name: "Cortex-M3",
+    triple: "thumbv7m-none-eabi",
+    board: "mps2-an385",
+    profile: "release",
+};
+/// Cortex-M0+, in soft float. QEMU has no M0+ with enough memory and a counter; a Cortex-M3 runs
+/// the instructions of the smaller one as they are.
+pub const M0PLUS: Target = Target { name: "Cortex-M0+", triple: "thumbv6m-none-eabi", ..M3 };
+
+impl Target {
+    /// Builds all programs of a package; then they are at [`Self::program`].
+    pub fn build(&self, package: &str, arguments: &str) -> anyhow::Result<()> {
+        let Self { triple, profile, .. } = self;
+        cargo::check(cargo::in_bench(&format!(
+            "build --package {package} --bins --target {triple} --profile {profile} {arguments}"
+        )))
+    }
+
+    /// Where a built program is.
+    pub fn program(&self, name: &str) -> PathBuf {
+        cargo::bench_target().join(self.triple).join(self.profile).join(name)
+    }
+}
