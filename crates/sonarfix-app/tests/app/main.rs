@@ -8,5 +8,6 @@
 
 mod commands;
 mod flash;
+mod habit;
 mod power_cut;
 mod rig;
