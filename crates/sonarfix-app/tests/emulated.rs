@@ -301,7 +301,7 @@ fn check_memory(robot: &mut Robot) {
     let top = u32::from_le_bytes(*top.first_chunk().unwrap()) - RAM_AT;
     let (stack, rest) = (top as usize - deepest, RAM - top as usize);
     println!("stack {stack} bytes at the deepest, everything else {rest}");
-    assert!(rest < 6_000, "flip-link has not put the stack below: {rest}");
+    assert!(rest > 1_000, "flip-link has not put the stack below everything else");
     assert!(stack + rest <= 8 * 1_024, "{} bytes of RAM", stack + rest);
 }
 
