@@ -88,8 +88,9 @@ pub struct App<'m, F: NorFlash> {
     faults: Faults,
     worst_poll: Duration,
     time: Instant,
-    /// What the store said at the start.
-    trouble: Option<StoreError>,
+    /// Whether the store has been read: by the first poll, not while the app is being made and
+    /// the stack holds copies of it.
+    has_remembered: bool,
 }
 
 #[expect(clippy::large_enum_variant, reason = "there is one of it, and no heap")]
@@ -141,7 +142,7 @@ impl<'m, F: NorFlash> App<'m, F> {
         now: Instant,
     ) -> Result<Self, SettingsError> {
         body.settings.check()?;
-        let mut app = Self {
+        let app = Self {
             body,
             flashed,
             config: flashed.config.ok(),
@@ -154,9 +155,8 @@ impl<'m, F: NorFlash> App<'m, F> {
             faults: Faults::default(),
             worst_poll: Duration::from_ticks(0),
             time: now,
-            trouble: None,
+            has_remembered: false,
         };
-        app.trouble = app.remember().err();
         Ok(app)
     }
 
@@ -172,7 +172,11 @@ impl<'m, F: NorFlash> App<'m, F> {
         link: &mut impl Link,
     ) -> Polled {
         let was_running = self.is_running();
-        let mut polled = Polled { saved: self.trouble.take().map(Err), ..Polled::default() };
+        let mut polled = Polled::default();
+        if !self.has_remembered {
+            self.has_remembered = true;
+            polled.saved = self.remember().err().map(Err);
+        }
         if let Some(frame) = self.wire.next(link) {
             self.answer(now, &frame, link, &mut polled);
         }
@@ -246,6 +250,7 @@ impl<'m, F: NorFlash> App<'m, F> {
     }
 
     /// Reads the store; one that cannot be read is made anew, which is an error to tell.
+    #[inline(never)]
     fn remember(&mut self) -> Result<(), StoreError> {
         let mut read = self.recall();
         if let Err(StoreError::Corrupt) = read {

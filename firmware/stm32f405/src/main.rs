@@ -163,8 +163,8 @@ struct Uart {
 }
 
 /// What came in between two turns of the loop is 12 bytes; what goes out at one is 400.
-type Received = Queue<u8, 128>;
-type ToSend = Queue<u8, 1_024>;
+type Received = Queue<u8, 64>;
+type ToSend = Queue<u8, 512>;
 
 impl Link for Uart {
     fn receive(&mut self) -> Option<u8> {
@@ -392,6 +392,8 @@ mod app {
     }
 
     #[init(local = [received: Received = Received::new(), to_send: ToSend = ToSend::new()])]
+    // Its frame would stay below the loop's for ever.
+    #[inline(never)]
     fn init(context: init::Context) -> (Shared, Local) {
         let board = context.device;
         let reset = reset(&board.RCC);
@@ -456,6 +458,7 @@ mod app {
 
     /// A turn of the loop at every millisecond's interrupt.
     #[idle(shared = [clock], local = [app, hardware, link, drive, watchdog])]
+    #[inline(never)]
     fn idle(mut context: idle::Context) -> ! {
         let idle::LocalResources { app, hardware, link, drive, watchdog, .. } = context.local;
         let mut now = Instant::from_ticks(0);

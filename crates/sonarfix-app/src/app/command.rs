@@ -19,7 +19,9 @@ enum Done {
 }
 
 impl<F: NorFlash> App<'_, F> {
-    /// Does what a command says, unless it is a repeat, and answers it.
+    /// Does what a command says, unless it is a repeat, and answers it. Not part of the loop's own
+    /// frame on the stack, which would be twice as large.
+    #[inline(never)]
     pub(super) fn answer(
         &mut self,
         now: Instant,

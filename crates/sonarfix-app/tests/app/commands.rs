@@ -78,7 +78,7 @@ fn every_missing_device_is_counted_and_no_other() {
         let release = pwm.release();
         pwm = servo_of(crate::rig::Pwm(has(2) && release.0));
         bench.hardware.servo = pwm;
-        let faults = fares(&bench.wait(1_500)).faults;
+        let faults = fares(&bench.wait(2_500)).faults;
         let found = [faults.right.errors, faults.left.errors, faults.servo, faults.ranger];
         for (bit, count) in (0..).zip(found) {
             assert_eq!(count > 0, !has(bit), "{missing:04b}: {faults:?}");

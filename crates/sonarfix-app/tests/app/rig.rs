@@ -172,7 +172,9 @@ impl<'m> Bench<'m> {
             ranger: Sonar { is_there: true, is_pinging: false },
         };
         let (receiver, sender) = (Receiver::new(), Sender::starting_at(1));
-        Self { app, hardware, line: Line::default(), now: 0, receiver, sender }
+        let mut bench = Self { app, hardware, line: Line::default(), now: 0, receiver, sender };
+        let _ = bench.turn();
+        bench
     }
 
     /// Switches it off; the flash keeps what it has.
