@@ -107,6 +107,7 @@ struct Running<'m> {
 
 impl Running<'_> {
     /// Polls the loop and reports it; whether something is worth writing down.
+    #[inline(never)]
     fn poll(
         &mut self,
         now: Instant,

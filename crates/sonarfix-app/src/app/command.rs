@@ -173,6 +173,7 @@ impl<F: NorFlash> App<'_, F> {
     }
 
     /// Begins the loop; gives what to tell of it.
+    #[inline(never)]
     fn begin(&mut self, now: Instant, known: &Resumed) -> Result<Telemetry, Refused> {
         let (map, _) = self.flashed.map.map_err(|_| Refused::NoMap)?;
         let (config, _) = self.config.ok_or(Refused::NoConfiguration)?;
