@@ -92,7 +92,7 @@ pub enum Fix {
     Weakened(Innovation),
     /// Outside the gate: the range has not been taken. The filter is unchanged, but that while
     /// [`Lost`](crate::health::Verdict::Lost) its doubt may have grown
-    /// ([`Health::reopened`](crate::health::Health::reopened)).
+    /// ([`Health::reopened`](field@crate::health::Health::reopened)).
     Gated(Innovation),
     /// Not a range to compare with anything: the filter is unchanged; while lost, a missing echo
     /// counts like a gated range.
