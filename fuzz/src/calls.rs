@@ -1,7 +1,7 @@
 //! The localizer, called in any order with any arguments.
 
-use sonarfix::aim::{Aim, Policy};
-use sonarfix::config::{CalibrationPrior, Config, Sonar, Trust};
+use sonarfix::aim::{Aim, Policy, Reason};
+use sonarfix::config::{CalibrationPrior, Config, Pace, Rhythm, Sonar, Timing, Trust, Weights};
 use sonarfix::ekf::Ekf;
 use sonarfix::health::{Health, LOST_AT, MOST_NIS, Verdict};
 use sonarfix::localizer::{Fix, Localizer, Refusal, Start};
@@ -9,7 +9,9 @@ use sonarfix::map::{Map, Wall, WallId};
 use sonarfix::motion::{Drive, WheelTravel};
 use sonarfix::pose::{Point, Pose};
 use sonarfix::range::RangeNoise;
-use sonarfix::units::{Instant, Metres, MetresPerSecond, PerRootMetre, Radians};
+use sonarfix::units::{
+    Duration, Instant, Metres, MetresPerSecond, PerRootMetre, Radians, SquareMetres,
+};
 
 use crate::bytes::Bytes;
 
@@ -71,6 +73,7 @@ fn config(bytes: &mut Bytes) -> Config {
                 floor: Metres(bytes.between(1e-4, 0.05)),
                 per_metre: bytes.between(0.0, 0.02),
             },
+            timing: timing(bytes),
         },
         prior: CalibrationPrior {
             scale_right: bytes.between(1e-4, 0.05),
@@ -88,7 +91,22 @@ fn config(bytes: &mut Bytes) -> Config {
             doubtful: Metres(bytes.between(0.01, 1.0)),
         },
         policy: if bytes.byte() < 128 { Policy::Nearest } else { Policy::Informative },
+        weights: Weights {
+            heading: Metres(bytes.between(0.0, 1.0)),
+            wheels: Metres(bytes.between(0.0, 10.0)),
+        },
     }
+}
+
+/// Up to 65 ms for each part; a look every so often, or as fast as can be.
+fn timing(bytes: &mut Bytes) -> Timing {
+    let span = |bytes: &mut Bytes| {
+        Duration::from_ticks(u16::from_le_bytes([bytes.byte(), bytes.byte()]).into())
+    };
+    let rhythm =
+        if bytes.byte() < 128 { Rhythm::Every(span(bytes)) } else { Rhythm::AsFastAsPossible };
+    let servo = Pace { frame: span(bytes), sixty_degrees: span(bytes), settle: span(bytes) };
+    Timing { rhythm, servo, cycle: span(bytes) }
 }
 
 fn walls(bytes: &mut Bytes) -> Vec<Wall> {
@@ -120,6 +138,12 @@ impl Session<'_> {
                     wall: WallId(bytes.word()),
                     bearing: Radians(bytes.number(4.0)),
                     range: Metres(bytes.number(5.0)),
+                    why: Reason {
+                        gain: SquareMetres(bytes.number(1.0)),
+                        success: bytes.number(1.0),
+                        time: Duration::from_ticks(bytes.word().into()),
+                        candidates: 0,
+                    },
                 };
                 self.fix(&aim, Some(Metres(bytes.number(5.0))));
             }

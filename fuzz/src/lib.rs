@@ -3,16 +3,19 @@
 //! | target | what the bytes are |
 //! |---|---|
 //! | [`localizer`] | a configuration, a map, and calls in any order with hostile numbers and times |
+//! | [`baked_map`] | a baked map, whole or damaged, or walls to bake |
 //! | [`map_file`], [`scenario_file`], [`robot_file`] | the text of such a file |
 //! | [`replay_log`] | the lines of a log |
 //!
 //! `cargo xtask fuzz` searches for a bounded time; `cargo fuzz run TARGET` for as long as you like;
 //! `cargo test --no-default-features` runs them over `corpus/` and seeded random bytes.
 
+mod baked;
 mod bytes;
 mod calls;
 mod files;
 
+pub use baked::baked_map;
 pub use calls::localizer;
 pub use files::{map_file, replay_log, robot_file, scenario_file};
 
@@ -20,8 +23,9 @@ pub use files::{map_file, replay_log, robot_file, scenario_file};
 pub type Target = (&'static str, fn(&[u8]));
 
 /// Every target.
-pub const TARGETS: [Target; 5] = [
+pub const TARGETS: [Target; 6] = [
     ("localizer", localizer),
+    ("baked_map", baked_map),
     ("map_file", map_file),
     ("scenario_file", scenario_file),
     ("robot_file", robot_file),

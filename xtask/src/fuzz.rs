@@ -25,7 +25,8 @@ impl Args {
     }
 }
 
-const ALL: [&str; 5] = ["localizer", "map_file", "scenario_file", "robot_file", "replay_log"];
+const ALL: [&str; 6] =
+    ["localizer", "baked_map", "map_file", "scenario_file", "robot_file", "replay_log"];
 
 /// The coverage that libFuzzer is guided by: counters and comparisons.
 const INSTRUMENTED: &str = "-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \

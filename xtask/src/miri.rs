@@ -13,7 +13,7 @@ const TARGET: &str = "armv7-unknown-linux-gnueabihf";
 pub fn run() -> anyhow::Result<()> {
     if !is_there() {
         eprintln!(
-            "miri: SKIPPED. It needs a nightly toolchain: \
+            "miri: SKIPPED, nothing was looked at. It needs a nightly toolchain: \
              `rustup toolchain install nightly --profile minimal --component miri,rust-src`"
         );
         return Ok(());
@@ -29,8 +29,12 @@ pub fn run() -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Whether Miri and the library it interprets can be had, without fetching another toolchain: on some
+/// machines that would fail, or hang.
 fn is_there() -> bool {
-    let mut version = Command::new("cargo");
-    version.args(["+nightly", "miri", "--version"]).stdout(Stdio::null()).stderr(Stdio::null());
-    version.status().is_ok_and(|status| status.success())
+    // Makes the library from its sources, `rust-src`, if that has not been done.
+    let mut setup = Command::new("cargo");
+    setup.args(["+nightly", "miri", "setup", "--target", TARGET]).env("RUSTUP_AUTO_INSTALL", "0");
+    setup.stdin(Stdio::null()).stdout(Stdio::null());
+    setup.status().is_ok_and(|status| status.success())
 }

@@ -9,6 +9,11 @@
 //! first walls while c stays unknown to 1e-2: held wheel by wheel, the variance of d would be a
 //! difference of numbers 10⁴ times larger, and a step's process noise would vanish in their
 //! rounding. What the crate shows of itself is wheel by wheel.
+//!
+//! # Non-finite policy
+//! Nothing here refuses a value but [`Covariance::correct`], which tells of derivatives that are NaN or too
+//! large before it changes anything. What a step makes of P, [`Covariance::is_sound`] judges by the
+//! variances: NaN, infinity, negative and too large are all unsound. Whoever steps puts back what was.
 
 use nalgebra::SMatrix;
 
@@ -343,7 +348,7 @@ pub(crate) fn is_within(value: f32, limit: f32) -> bool {
 }
 
 /// Whether a variance is one to compute with.
-fn is_sound(variance: f32) -> bool {
+pub(crate) fn is_sound(variance: f32) -> bool {
     is_within(variance, WIDEST)
 }
 

@@ -174,16 +174,11 @@ impl Ekf {
             return Err(EkfError::Negative);
         }
         let p = Covariance::independent(&deviation);
-        if !p.is_sound() {
+        let rates = Rates::new(&drive);
+        if !p.is_sound() || !rates.is_sound() {
             return Err(EkfError::NotFinite);
         }
-        Ok(Self {
-            mean: Mean::new(&state),
-            rest: Remainder::default(),
-            p,
-            way: 0.0,
-            rates: Rates::new(&drive),
-        })
+        Ok(Self { mean: Mean::new(&state), rest: Remainder::default(), p, way: 0.0, rates })
     }
 
     /// The estimate X̂.

@@ -9,7 +9,7 @@
 //! | taken, but weakened | 0 | | it may have been something else |
 //! | gated, too long | 1 | 0.7 | nothing that stands in a room makes a range longer |
 //! | no echo | 0.6 | 0.3 | a sonar misses some, and a wall that is not there all |
-//! | gated, too short | 0.5 | 0.05 | furniture does that, and stays while the robot passes it |
+//! | gated, too short | 0.5 | 0 | furniture does that, and stays while the robot passes it |
 //! | not a range to compare, or no wall to look at | 0 | | it says nothing of the pose |
 //!
 //! It is Page's cumulative sum test: each number is about the logarithm of how much more often a turn
@@ -67,7 +67,7 @@ const TOO_LONG_AGAIN: f32 = 0.7;
 const NO_ECHO: f32 = 0.6;
 const NO_ECHO_AGAIN: f32 = 0.3;
 const TOO_SHORT: f32 = 0.5;
-const TOO_SHORT_AGAIN: f32 = 0.05;
+const TOO_SHORT_AGAIN: f32 = 0.0;
 
 /// One range that is too long reaches it, one that is short or missing does not.
 const DEGRADED_AT: f32 = 1.0;

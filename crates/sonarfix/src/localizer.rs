@@ -309,15 +309,19 @@ impl<'m> Localizer<'m> {
     pub fn fix(&mut self, aim: &Aim, range: Option<Metres>) -> Fix {
         let fix = self.try_fix(aim, range).unwrap_or_else(Fix::Refused);
         self.remember(aim, &fix);
-        self.judge(Turn::of(&fix, self.contradicted == Some(aim.wall)));
+        let again = self.contradicted == Some(aim.wall);
+        self.judge(Turn::of(&fix, again));
         self.contradicted = self.contradicted_by(aim, &fix);
-        self.reopen(&fix);
+        if !again {
+            self.reopen(&fix);
+        }
         fix
     }
 
-    /// Lets the doubt of a lost robot grow with every range beyond the gate, so that later ones find
-    /// it wider (`docs/model.md`, eq. 19): the position's up to [`REOPENS`] steps, the heading's
-    /// while the sonar still has something to look at.
+    /// Lets the doubt of a lost robot grow with every range beyond the gate that is not of the same
+    /// wall again, so that later ones find it wider (`docs/model.md`, eq. 19): the position's up to
+    /// [`REOPENS`] steps, the heading's while the sonar still has something to look at. Of the same wall
+    /// again it would open to the furniture before it.
     fn reopen(&mut self, fix: &Fix) {
         if self.health.verdict != Verdict::Lost || !matches!(fix, Fix::Gated(_)) {
             return;

@@ -9,7 +9,7 @@
 //! Nothing here refuses a value; [`Ekf::predict`](crate::ekf::Ekf::predict) checks the turn and the
 //! covariance that come of it.
 
-use crate::covariance::{Calibration, PoseRows};
+use crate::covariance::{Calibration, PoseRows, is_sound};
 use crate::state::{Mean, wheels};
 use crate::units::{Metres, PerRootMetre};
 
@@ -88,6 +88,14 @@ impl Rates {
             scale_difference: scale,
             track_width_error: 0.5 * square(drive.track_width_walk.0.0),
         }
+    }
+
+    /// Whether what a metre adds is a variance to compute with.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        let noises =
+            [self.advance, self.scale_common, self.scale_difference, self.track_width_error];
+        noises.into_iter().all(is_sound)
     }
 }
 

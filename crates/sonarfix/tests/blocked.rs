@@ -6,7 +6,7 @@
     reason = "all of this file is a test, its helpers too"
 )]
 
-use sonarfix::aim::NoAim;
+use sonarfix::aim::{NoAim, Policy};
 use sonarfix::config::Config;
 use sonarfix::health::Verdict;
 use sonarfix::localizer::{Fix, Localizer, Start};
@@ -23,14 +23,19 @@ fn room() -> Vec<Wall> {
     corners.windows(2).map(wall).collect()
 }
 
-fn localizer(walls: &[Wall], heading_deviation: f32) -> Localizer<'_> {
-    let start = Start {
+const START: Instant = Instant::from_ticks(0);
+
+fn start(heading_deviation: f32) -> Start {
+    Start {
         pose: Pose::new(1.0, 1.2, Radians(0.0)),
         position_deviation: Metres(0.02),
         heading_deviation: Radians(heading_deviation),
-    };
+    }
+}
+
+fn localizer(walls: &[Wall], heading_deviation: f32) -> Localizer<'_> {
     let config = Config::for_track_width(Metres(0.16));
-    Localizer::new(config, Map::new(walls), start, Instant::from_ticks(0)).unwrap()
+    Localizer::new(config, Map::new(walls), start(heading_deviation), START).unwrap()
 }
 
 #[test]
@@ -54,6 +59,36 @@ fn a_blocked_wall_is_believed_less_and_regains_it_with_time() {
         before = belief(&localizer);
     }
     assert!(before > 0.95);
+}
+
+#[test]
+fn whatever_the_policy_a_blocked_wall_is_left() {
+    let walls = room();
+    for policy in [Policy::Nearest, Policy::Informative] {
+        let config = Config { policy, ..*localizer(&walls, 0.01).config() };
+        let mut localizer = Localizer::new(config, Map::new(&walls), start(0.01), START).unwrap();
+        let favourite = localizer.aim().unwrap();
+        assert!(matches!(localizer.fix(&favourite, Some(Metres(0.3))), Fix::Gated(_)));
+        assert_ne!(localizer.aim().unwrap().wall, favourite.wall, "{policy:?}");
+    }
+}
+
+#[test]
+fn past_what_stands_there_a_wall_is_believed_again() {
+    // One wall, along the robot's way.
+    let walls = &room()[..1];
+    let mut stays = localizer(walls, 0.001);
+    let first = stays.aim().unwrap();
+    assert!(matches!(stays.fix(&first, Some(Metres(0.3))), Fix::Gated(_)));
+    let mut passes = stays.clone();
+    let now = Instant::from_ticks(1_000_000);
+    stays.odometry(now, WheelTravel::default()).unwrap();
+    passes.odometry(now, WheelTravel::new(0.25, 0.25)).unwrap();
+    let doubt =
+        |localizer: &Localizer| 1.0 - localizer.aim().unwrap().why.success / first.why.success;
+    // Half the doubt where the foot is 0.25 m away.
+    assert!(doubt(&stays) > 0.5);
+    assert!((doubt(&passes) - 0.5 * doubt(&stays)).abs() < 1e-2);
 }
 
 #[test]

@@ -4,6 +4,9 @@
 //! The frame is that of the beam from the sonar to the foot: *ahead* along it, *aside* to its left.
 //! When the position is wrong, everything moves in that frame together; so what matters is asked
 //! for the worst position within the uncertainty.
+//!
+//! # Non-finite policy
+//! The filter's state and the walls are finite, and so is what is computed from them here.
 
 use super::viewpoint::Viewpoint;
 use crate::map::Wall;

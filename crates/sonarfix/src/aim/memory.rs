@@ -3,6 +3,10 @@
 //!
 //! A wall that keeps failing has something before it that the map does not know. It is believed
 //! less from thereabouts, and believed again as the robot passes on and time goes by.
+//!
+//! # Non-finite policy
+//! Bearing, range and foot come from a finite state. A wall far beyond any reach is believed in full:
+//! the square of its way may be infinite, and a doubt divided by that is none.
 
 use crate::map::WallId;
 use crate::units::{Instant, Metres, Radians};

@@ -1,5 +1,9 @@
 //! What a look is worth, computed from P alone, without trying the correction (`docs/model.md`,
 //! eq. 16).
+//!
+//! # Non-finite policy
+//! None of its own: what comes of a covariance that is sound is finite, and the choice is written so
+//! that NaN would be worth nothing.
 
 use crate::config::Weights;
 use crate::ekf::Prospect;

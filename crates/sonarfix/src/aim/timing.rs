@@ -1,4 +1,8 @@
 //! How long a look takes, and where the servo is to point.
+//!
+//! # Non-finite policy
+//! Times are whole ticks and ranges those of a sonar, so nothing here is not finite; a span made from NaN
+//! or from less than nothing is zero.
 
 use crate::config::{Rhythm, Timing};
 use crate::units::{Duration, Metres, Radians};

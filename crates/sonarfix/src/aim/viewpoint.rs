@@ -1,5 +1,8 @@
 //! Which walls can be measured from where the robot believes to be (`docs/model.md`, "Which walls
 //! count"), apart from what stands before them.
+//!
+//! # Non-finite policy
+//! Comparisons are written so that NaN leaves no slack: a wall with one cannot be measured.
 
 use crate::config::{Config, Sonar};
 use crate::ekf::{Ekf, PoseCovariance};

@@ -3,6 +3,10 @@
 //! One function turns a coordinate into a cell, for the walls when the map is baked and for the
 //! point when it is asked. It is monotonic, so its rounding cannot lose a wall: what is not less
 //! stays not less.
+//!
+//! # Non-finite policy
+//! A grid with a number that is not finite cannot be made. Around a point that is not finite, or within a
+//! reach that is NaN, are no cells, or all; a coordinate too far to count is beyond the last cell.
 
 use super::wall::Wall;
 use crate::pose::Point;

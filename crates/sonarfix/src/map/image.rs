@@ -18,6 +18,10 @@
 //! | 4 | [`checksum`] of all bytes before |
 //!
 //! Each cell refers to every wall whose bounding box touches it, in ascending order.
+//!
+//! # Non-finite policy
+//! A NaN or an infinity in the header is [`MapError::Grid`], in a wall [`MapError::Wall`]: what has been
+//! read holds none.
 
 use core::ops::Range;
 

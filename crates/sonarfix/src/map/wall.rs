@@ -1,4 +1,8 @@
 //! One wall, and its line.
+//!
+//! # Non-finite policy
+//! [`Wall::new`] refuses NaN, infinity and what is too long to measure. Asked for a point that is not
+//! finite, a wall answers with NaN or infinity.
 
 use crate::pose::{Heading, Point};
 use crate::units::{Metres, Radians};

@@ -2,10 +2,11 @@
 
 use nalgebra::SVector;
 use proptest::prelude::*;
-use sonarfix::motion::WheelTravel;
+use sonarfix::ekf::{Ekf, State};
+use sonarfix::motion::{Drive, WheelTravel};
 use sonarfix::pose::Point;
 use sonarfix::range::ExpectedRange;
-use sonarfix::units::{Metres, SquareMetres};
+use sonarfix::units::{Metres, PerRootMetre, SquareMetres};
 
 use crate::oracle::{
     HEADING, Matrix, ROUNDING, Robot, SCALE_LEFT, SCALE_RIGHT, TRACK_WIDTH, Vector, bearable,
@@ -160,4 +161,25 @@ fn of_both(i: usize, v: &Vector) -> f64 {
 /// The size of the numbers that a state is summed from.
 fn range_of(i: usize, state: &Vector) -> f64 {
     if i == HEADING { 6.3 } else { of_both(i, state) }
+}
+
+/// Where the wheels' noise is less than a rounding of the variance, a rounding is added in its
+/// place (eq. 9): else many small steps could leave less variance than there was.
+#[test]
+fn less_noise_than_a_rounding_counts_as_one() {
+    let drive = Drive {
+        track_width: Metres(0.2),
+        wheel_noise: PerRootMetre(Metres(1e-9)),
+        scale_walk: PerRootMetre(0.0),
+        track_width_walk: PerRootMetre(Metres(0.0)),
+    };
+    let deviation = State { x: 1.0, y: 1.0, heading: 1.0, ..State::default() };
+    for (heading, across) in [(0.0, 0), (core::f32::consts::FRAC_PI_2, 1)] {
+        let state = State { heading, ..State::default() };
+        let mut ekf = Ekf::new(drive, state, deviation).unwrap();
+        ekf.predict(WheelTravel::new(1e-5, 1e-5)).unwrap();
+        let p = ekf.covariance();
+        assert!(p[(across, across)] > 1.0, "along a heading of {heading}: {p}");
+        assert!(p[(2, 2)] > 1.0, "{p}");
+    }
 }

@@ -1,10 +1,12 @@
 //! The verdict's transitions, as drawn in `health.rs`.
 
 use proptest::prelude::*;
+use sonarfix::config::{Config, Trust};
 use sonarfix::health::Verdict::{self, Degraded, Lost, Tracking};
 use sonarfix::localizer::Start;
 use sonarfix::localizer::{Fix, Localizer};
 use sonarfix::map::{Map, Wall};
+use sonarfix::motion::WheelTravel;
 use sonarfix::pose::{Point, Pose};
 use sonarfix::units::{Instant, Metres, Radians};
 
@@ -75,9 +77,8 @@ fn the_drawn_ways_are_taken() {
     assert_eq!(turns_until(Degraded, TooLong), Some(1));
     // 1 and 5 · 0.7.
     assert_eq!(turns_until(Lost, TooLong), Some(6));
-    // 0.5 and 10 · 0.05; 0.5 and 70 · 0.05, give or take the rounding.
-    assert!((11..=12).contains(&turns_until(Degraded, TooShort).unwrap()));
-    assert!((71..=72).contains(&turns_until(Lost, TooShort).unwrap()));
+    // 0.5 once: what stands before a wall says no more than that, however often.
+    assert_eq!(turns_until(Degraded, TooShort), None);
     // 0.6 and 2 · 0.3; 0.6 and 12 · 0.3.
     assert_eq!(turns_until(Degraded, NoEcho), Some(3));
     assert_eq!(turns_until(Lost, NoEcho), Some(13));
@@ -127,7 +128,7 @@ impl Model {
                 (Accepted, _) => (-1.2, false),
                 (TooLong, false) => (1.0, true),
                 (TooLong, true) => (0.7, true),
-                (TooShort, true) => (0.05, true),
+                (TooShort, true) => (0.0, true),
                 (NoEcho, false) => (0.6, true),
                 (TooShort, false) => (0.5, true),
                 (NoEcho, true) => (0.3, true),
@@ -187,4 +188,74 @@ proptest! {
             }
         }
     }
+}
+
+/// A robot of this trust before one wall.
+fn trusting(trust: Trust, walls: &[Wall], heading_deviation: f32) -> Localizer<'_> {
+    let start = Start {
+        pose: Pose::default(),
+        position_deviation: Metres(0.03),
+        heading_deviation: Radians(heading_deviation),
+    };
+    let config = Config { trust, ..config_for_rooms(Point::new(0.0, 0.0)) };
+    Localizer::new(config, Map::new(walls), start, Instant::from_ticks(0)).unwrap()
+}
+
+/// The trust of a robot that nothing but the ranges can degrade.
+fn easy() -> Trust {
+    Trust { stale: Metres(1e3), doubtful: Metres(1e3), ..config_for_rooms(Point::default()).trust }
+}
+
+#[test]
+fn a_way_without_a_range_degrades() {
+    let walls = one_wall();
+    let mut localizer = trusting(Trust { stale: Metres(0.1), ..easy() }, &walls, 0.01);
+    let mut after = |tenths: u64, way| {
+        let now = Instant::from_ticks(100_000 * tenths);
+        localizer.odometry(now, WheelTravel::new(way, way)).unwrap();
+        localizer.health().verdict
+    };
+    assert_eq!((after(1, 0.09), after(2, 0.02)), (Tracking, Degraded));
+}
+
+#[test]
+fn doubt_of_position_or_heading_degrades() {
+    let walls = one_wall();
+    let skipped = |trust, heading| {
+        let mut localizer = trusting(trust, &walls, heading);
+        localizer.skip();
+        localizer.health().verdict
+    };
+    // The position's deviation is 0.03 m.
+    let doubtful = |limit| Trust { doubtful: Metres(limit), ..easy() };
+    assert_eq!(
+        (skipped(doubtful(0.031), 0.01), skipped(doubtful(0.029), 0.01)),
+        (Tracking, Degraded)
+    );
+    // The heading's limit is a quarter of the cone.
+    let limit = 0.25 * config_for_rooms(Point::default()).sonar.cone.0;
+    assert_eq!(
+        (skipped(easy(), 0.99 * limit), skipped(easy(), 1.01 * limit)),
+        (Tracking, Degraded)
+    );
+}
+
+/// Ranges that are all inside the gate, but all too far out.
+#[test]
+fn ranges_too_far_out_on_average_degrade() {
+    let walls = one_wall();
+    let mut localizer = trusting(easy(), &walls, 0.01);
+    let mut degraded = false;
+    for _ in 0..20 {
+        let aim = localizer.aim().unwrap();
+        let Fix::Accepted(expected) = localizer.clone().fix(&aim, Some(aim.range)) else {
+            panic!()
+        };
+        let out = 2.4 * expected.variance.0.sqrt();
+        let fix = localizer.fix(&aim, Some(aim.range + Metres(out)));
+        assert!(matches!(fix, Fix::Accepted(_)), "{fix:?}");
+        degraded |= localizer.health().nis > 3.0;
+        assert_eq!(localizer.health().verdict, if degraded { Degraded } else { Tracking });
+    }
+    assert!(degraded);
 }
