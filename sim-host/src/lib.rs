@@ -14,6 +14,7 @@ pub mod fault_table;
 pub mod floor_plan;
 pub mod health_page;
 pub mod kidnapped;
+pub mod monitor;
 pub mod monte_carlo;
 pub mod observe;
 pub mod odometry;

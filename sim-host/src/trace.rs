@@ -5,7 +5,9 @@
 //! frame is that of the scenario.
 
 use serde::Serialize;
+use sonarfix::localizer::Localizer;
 use sonarfix::units::Radians;
+use sonarfix_hal::robot::Report;
 use sonarfix_map::{Floor, NamedWall};
 
 use crate::world::reflector::Source;
@@ -165,6 +167,10 @@ pub trait Recorder {
     fn tick(&mut self, make: impl FnOnce() -> Tick);
     /// The sonar has had its turn.
     fn fix(&mut self, make: impl FnOnce() -> FixRecord);
+    /// A robot's localizer has begun, at the fidelity of pins.
+    fn began(&mut self, _localizer: &Localizer) {}
+    /// The robot's loop was polled, at the fidelity of pins.
+    fn polled(&mut self, _report: &Report, _localizer: &Localizer) {}
 }
 
 /// Records nothing.

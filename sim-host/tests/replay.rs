@@ -106,7 +106,7 @@ fn what_cannot_be_in_order_is_skipped_and_told_by_its_line() {
         "log line 8: the log has a start record already",
         "log line 9: the log has both ticks and wheels",
         "log line 10: a wheel rolled faster than max_wheel_speed",
-        "log line 12: `tocks` is none of ticks, wheels, range, scan, start",
+        "log line 12: `tocks` is none of ticks, wheels, range, scan, skip, start, resume",
         "log line 13: the left count is missing",
     ];
     assert_eq!(told, expected);

@@ -7,7 +7,7 @@ use anyhow::bail;
 use crate::cargo;
 
 /// The crates that run on a robot.
-const NO_STD_CRATES: [&str; 2] = ["sonarfix", "sonarfix-hal"];
+const NO_STD_CRATES: [&str; 4] = ["sonarfix", "sonarfix-hal", "sonarfix-link", "sonarfix-app"];
 /// Cortex-M4F, and Cortex-M0+ without FPU or atomics.
 const TARGETS: [&str; 2] = ["thumbv7em-none-eabihf", "thumbv6m-none-eabi"];
 

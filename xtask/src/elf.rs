@@ -93,6 +93,15 @@ impl Program {
         Ok(Reach { program: self, from })
     }
 
+    /// Names of the functions that name one whose own name contains `part`.
+    pub fn callers_of(&self, part: &str) -> impl Iterator<Item = &str> {
+        let is_it = |function: &Function| function.names.iter().any(|name| name.contains(part));
+        let wanted: BTreeSet<u64> =
+            self.functions.iter().filter(|(_, f)| is_it(f)).map(|(&at, _)| at).collect();
+        let callers = self.functions.values().filter(move |f| !f.mentions.is_disjoint(&wanted));
+        callers.flat_map(|function| &function.names).map(String::as_str)
+    }
+
     /// Names of all functions.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.functions.values().flat_map(|function| &function.names).map(String::as_str)
@@ -118,6 +127,23 @@ impl Reach<'_> {
         path.reverse();
         Some(path.join(" → "))
     }
+}
+
+/// Every place that names a function, with that function's name.
+pub fn calls(path: &Path) -> anyhow::Result<Vec<(u64, String)>> {
+    let bytes = fs::read(path).with_context(|| path.display().to_string())?;
+    let file = object::File::parse(&*bytes)?;
+    let mut calls = Vec::new();
+    for section in file.sections().filter(|section| section.kind() == SectionKind::Text) {
+        for (place, relocation) in section.relocations() {
+            let RelocationTarget::Symbol(target) = relocation.target() else { continue };
+            let target = file.symbol_by_index(target)?;
+            if target.kind() == SymbolKind::Text {
+                calls.push((place, format!("{:#}", rustc_demangle::demangle(target.name()?))));
+            }
+        }
+    }
+    Ok(calls)
 }
 
 /// The lowest bit of a function's address says that it is in Thumb code.

@@ -12,6 +12,7 @@ mod checks;
 mod elf;
 mod emulator;
 mod endurance;
+mod firmware;
 mod fuzz;
 mod miri;
 mod panics;
@@ -38,6 +39,10 @@ enum Task {
     Docs,
     /// The `no_std` crates for microcontrollers with and without FPU.
     Embedded,
+    /// The firmware: builds it, looks for panics in it, and runs it in an emulator.
+    TestFirmware,
+    /// Flash and RAM of the shipped firmware, by crate.
+    Size,
     /// No panic is linked into a program for a microcontroller.
     Panics,
     /// Instructions, code, stack and memory against `budgets.toml`.
@@ -58,7 +63,7 @@ enum Task {
     Endurance(endurance::Args),
     /// The fuzz targets, for a bounded time.
     Fuzz(fuzz::Args),
-    /// The core under Miri, if there is one.
+    /// The core under Miri, if there is one (long: it builds a standard library first).
     Miri,
 }
 
@@ -70,6 +75,7 @@ fn all() -> [Task; 13] {
         Task::TestHost,
         Task::Docs,
         Task::Embedded,
+        Task::TestFirmware,
         Task::Panics,
         Task::Budgets,
         Task::LintBench,
@@ -77,7 +83,6 @@ fn all() -> [Task; 13] {
         Task::Deny,
         Task::Endurance(endurance::Args::SHORT),
         Task::Fuzz(fuzz::Args::short()),
-        Task::Miri,
     ]
 }
 
@@ -99,6 +104,8 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::TestHost => cargo::run("test"),
         Task::Docs => checks::docs(),
         Task::Embedded => checks::embedded(),
+        Task::TestFirmware => firmware::test(),
+        Task::Size => firmware::size(),
         Task::Panics => panics::check(),
         Task::Budgets => budgets::check(),
         Task::LintBench => checks::lint_bench(),

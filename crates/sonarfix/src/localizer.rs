@@ -92,7 +92,7 @@ pub enum Fix {
     Weakened(Innovation),
     /// Outside the gate: the range has not been taken. The filter is unchanged, but that while
     /// [`Lost`](crate::health::Verdict::Lost) its doubt may have grown
-    /// ([`Health::reopened`](crate::health::Health::reopened)).
+    /// ([`Health::reopened`](field@crate::health::Health::reopened)).
     Gated(Innovation),
     /// Not a range to compare with anything: the filter is unchanged; while lost, a missing echo
     /// counts like a gated range.
@@ -207,14 +207,13 @@ impl<'m> Localizer<'m> {
         start: Start,
         now: Instant,
     ) -> Result<Self, StartError> {
-        config.check().map_err(StartError::Config)?;
-        let prior = config.prior;
         let state = State {
             x: start.pose.x.0,
             y: start.pose.y.0,
             heading: start.pose.heading.radians().0,
             ..State::default()
         };
+        let prior = config.prior;
         let deviation = State {
             x: start.position_deviation.0,
             y: start.position_deviation.0,
@@ -224,6 +223,24 @@ impl<'m> Localizer<'m> {
             track_width_error: prior.track_width.0,
             range_scale: prior.range_scale,
         };
+        Self::resume(config, map, state, deviation, now)
+    }
+
+    /// A localizer that goes on from what an earlier one had learned, its calibration included.
+    /// `deviation` holds the standard deviations of `state`, as far as they still hold after
+    /// whatever happened since; the errors are taken as independent of each other. The prior of
+    /// the configuration is not used.
+    ///
+    /// # Errors
+    /// [`StartError`], by what is wrong with an argument.
+    pub fn resume(
+        config: Config,
+        map: Map<'m>,
+        state: State,
+        deviation: State,
+        now: Instant,
+    ) -> Result<Self, StartError> {
+        config.check().map_err(StartError::Config)?;
         let ekf = Ekf::new(config.drive, state, deviation).map_err(StartError::Start)?;
         Ok(Self {
             config,

@@ -59,7 +59,7 @@ impl State {
 }
 
 /// The state as the filter holds it: the scale errors as their mean and their difference, for the
-/// covariance's sake ([`crate::covariance`] says why).
+/// covariance's sake (`covariance.rs` says why).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mean {
     pub(crate) x: f32,

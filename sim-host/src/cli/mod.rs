@@ -1,11 +1,14 @@
 //! The command line: what can be asked, and where the answers go.
 
 mod bound;
+mod command;
+mod config;
 mod convert;
 mod faults;
 mod floor_plans;
 mod health;
 mod map;
+mod monitor;
 mod overrides;
 mod paper;
 mod plan;
@@ -34,6 +37,13 @@ enum Command {
     Replay(replay::Args),
     /// Converts recordings of other formats for `replay`.
     Convert(convert::Args),
+    /// Shows what a robot says, live, and records it for `replay`.
+    Monitor(monitor::Args),
+    /// Tells a robot to do something.
+    #[command(name = "command")]
+    Tell(command::Args),
+    /// Bakes a robot's configuration into the bytes that it reads from its flash.
+    Config(config::Args),
     /// Checks, bakes, draws and simplifies maps.
     Map(map::Args),
     /// Prints how well any estimator could know the robot's state, over time.
@@ -61,6 +71,9 @@ impl Cli {
             Command::Run(args) => run::execute(&args),
             Command::Replay(args) => replay::execute(&args),
             Command::Convert(args) => convert::execute(&args),
+            Command::Monitor(args) => monitor::execute(&args),
+            Command::Tell(args) => command::execute(&args),
+            Command::Config(args) => config::execute(&args),
             Command::Map(args) => map::execute(&args),
             Command::Bound(args) => bound::execute(&args),
             Command::Plan(args) => plan::execute(&args),

@@ -38,6 +38,13 @@ pub enum Record {
         bearing: f64,
         /// What came back, metres; `None` if no echo did.
         range: Option<f64>,
+        /// The wall that the robot looked at, as the map counts them; `None` if it did not say.
+        wall: Option<u32>,
+    },
+    /// A turn of the sonar for which the robot found nothing to look at.
+    Skip {
+        /// When.
+        time: f64,
     },
     /// One scan.
     Scan {
@@ -57,6 +64,15 @@ pub enum Record {
         /// Standard deviation of the heading, radians.
         heading_deviation: f64,
     },
+    /// What the localizer is told of its start, its calibration included.
+    Resume {
+        /// When the robot was there.
+        time: f64,
+        /// All states, in the filter's order.
+        state: [f64; 7],
+        /// Their standard deviations.
+        deviation: [f64; 7],
+    },
 }
 
 /// What is wrong with a line.
@@ -72,7 +88,7 @@ pub enum Malformed {
     #[error("the line is not UTF-8 text")]
     NotText,
     /// It starts with none of the kinds.
-    #[error("`{0}` is none of ticks, wheels, range, scan, start")]
+    #[error("`{0}` is none of ticks, wheels, range, scan, skip, start, resume")]
     UnknownKind(String),
     /// It ends too early.
     #[error("the {0} is missing")]
@@ -118,7 +134,9 @@ pub fn parse(line: &str) -> Result<Option<Record>, Malformed> {
             time: fields.time()?,
             bearing: fields.number("bearing")?,
             range: fields.range()?,
+            wall: fields.wall()?,
         },
+        "skip" => Record::Skip { time: fields.time()? },
         "scan" => Record::Scan { time: fields.time()?, scan: fields.scan()? },
         "start" => Record::Start {
             time: fields.time()?,
@@ -129,6 +147,11 @@ pub fn parse(line: &str) -> Result<Option<Record>, Malformed> {
             },
             position_deviation: fields.deviation("deviation of the position")?,
             heading_deviation: fields.deviation("deviation of the heading")?,
+        },
+        "resume" => Record::Resume {
+            time: fields.time()?,
+            state: fields.states(Fields::number)?,
+            deviation: fields.states(Fields::deviation)?,
         },
         other => return Err(Malformed::UnknownKind(beginning(other))),
     };
@@ -192,6 +215,27 @@ impl<'a> Fields<'a> {
         range.map(Some).ok_or_else(|| not("range", text, rule))
     }
 
+    /// The wall that was looked at, if there is such a field.
+    fn wall(&mut self) -> Result<Option<u32>, Malformed> {
+        let Some(text) = self.fields.next() else {
+            return Ok(None);
+        };
+        let text = text.trim();
+        text.parse().map(Some).map_err(|_| not("wall", text, "a whole number, from 0"))
+    }
+
+    /// A number for each state.
+    fn states(
+        &mut self,
+        mut field: impl FnMut(&mut Self, &'static str) -> Result<f64, Malformed>,
+    ) -> Result<[f64; 7], Malformed> {
+        let mut values = [0.0; 7];
+        for (value, state) in values.iter_mut().zip(crate::STATES) {
+            *value = field(self, state)?;
+        }
+        Ok(values)
+    }
+
     fn scan(&mut self) -> Result<Scan, Malformed> {
         let first = self.number("first bearing")?;
         let step = self.number("step")?;
@@ -246,8 +290,24 @@ mod tests {
                 " wheels , 1e1 , 0.5 , -0.25 ",
                 Record::Wheels { time: 10.0, right: 0.5, left: -0.25 },
             ),
-            ("range,3,-1.5,2.25", Record::Range { time: 3.0, bearing: -1.5, range: Some(2.25) }),
-            ("range,3,-1.5,", Record::Range { time: 3.0, bearing: -1.5, range: None }),
+            (
+                "range,3,-1.5,2.25",
+                Record::Range { time: 3.0, bearing: -1.5, range: Some(2.25), wall: None },
+            ),
+            ("range,3,-1.5,", Record::Range { time: 3.0, bearing: -1.5, range: None, wall: None }),
+            (
+                "range,3,-1.5,,7",
+                Record::Range { time: 3.0, bearing: -1.5, range: None, wall: Some(7) },
+            ),
+            ("skip,3.5", Record::Skip { time: 3.5 }),
+            (
+                "resume,2,1,2,3,4,5,6,7,8,9,10,11,12,13,0",
+                Record::Resume {
+                    time: 2.0,
+                    state: [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0],
+                    deviation: [8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 0.0],
+                },
+            ),
             (
                 "scan,4,-0.5,0.25,1.5  - 0 2",
                 Record::Scan {
@@ -276,7 +336,14 @@ mod tests {
     #[test]
     fn every_malformed_line_says_what_is_wrong() {
         let cases = [
-            ("tick,1,2,3", "`tick` is none of ticks, wheels, range, scan, start"),
+            ("tick,1,2,3", "`tick` is none of ticks, wheels, range, scan, skip, start, resume"),
+            ("range,1,2,3,x", "the wall is `x`, which is not a whole number, from 0"),
+            ("range,1,2,3,4,5", "there are more fields than a record of this kind has"),
+            ("resume,1,2,3,4,5,6,7,8", "the x is missing"),
+            (
+                "resume,2,1,2,3,4,5,6,7,8,9,-10,11,12,13,0",
+                "the heading is `-10`, which is not a finite number, zero or positive",
+            ),
             ("ticks,1,2", "the left count is missing"),
             ("ticks,1,2,3,4", "there are more fields than a record of this kind has"),
             ("ticks,1,2.5,3", "the right count is `2.5`, which is not a whole number"),
@@ -304,7 +371,10 @@ mod tests {
                 "the deviation of the position is `-1`, which is not a finite number, zero or positive",
             ),
             ("start,0,0,0,0,1", "the deviation of the heading is missing"),
-            ("\u{1b}[31m,0", "`\\u{1b}[31m` is none of ticks, wheels, range, scan, start"),
+            (
+                "\u{1b}[31m,0",
+                "`\\u{1b}[31m` is none of ticks, wheels, range, scan, skip, start, resume",
+            ),
         ];
         for (line, reason) in cases {
             let malformed = parse(line).unwrap_err().to_string();

@@ -4,11 +4,13 @@ use std::io::BufRead;
 use std::iter::Peekable;
 use std::vec::IntoIter;
 
+use sonarfix::aim::{Aim, NoAim, Reason};
 use sonarfix::config::Rhythm;
-use sonarfix::localizer::{Fix, Localizer, OdometryError, Start};
-use sonarfix::map::{Map, Wall};
+use sonarfix::ekf::State;
+use sonarfix::localizer::{Fix, Localizer, OdometryError};
+use sonarfix::map::{Map, Wall, WallId};
 use sonarfix::motion::WheelTravel;
-use sonarfix::units::{Instant, Metres, Radians};
+use sonarfix::units::{Duration, Instant, Metres, Radians, SquareMetres};
 use sonarfix_map::Robot;
 
 use crate::observe::{self, Look};
@@ -20,12 +22,16 @@ use crate::replay::scan::{Listening, Scan};
 use crate::replay::score::{Score, Verdicts};
 use crate::replay::wheels::Reading;
 use crate::statistics::FixCounts;
-use crate::trace::{Pose, Recorder, Tick, Truth};
+use crate::trace::{FixRecord, Pose, Recorder, Tick, Truth};
 
 /// Ranges that may wait for the next encoder record: a sonar that pings for a minute.
 const MOST_HELD: usize = 1024;
 /// And their beams, all together: 4 MiB.
 const MOST_BEAMS: usize = 1 << 20;
+
+/// Why the robot looked where it did, which a log does not say.
+const UNKNOWN: Reason =
+    Reason { gain: SquareMetres(0.0), success: 0.0, time: Duration::from_ticks(0), candidates: 0 };
 
 /// What went wrong with a record.
 pub enum Trouble {
@@ -54,17 +60,23 @@ struct Held {
 }
 
 enum Echo {
-    At { bearing: f64, range: Option<f64> },
+    At {
+        bearing: f64,
+        range: Option<f64>,
+        wall: Option<u32>,
+    },
     Scan(Scan),
+    /// The robot found nothing to look at.
+    Skip,
 }
 
-/// The start record.
+/// The start record, whichever it was.
 #[derive(Clone, Copy)]
 struct Begin {
     time: i64,
     pose: Pose,
-    position_deviation: f64,
-    heading_deviation: f64,
+    state: State,
+    deviation: State,
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -169,10 +181,25 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
     /// Takes the next record of the log.
     pub fn take(&mut self, record: Record, complain: &mut Complain) -> Result<(), Trouble> {
         match record {
-            Record::Start { time, pose, position_deviation, heading_deviation } => self.take_start(
-                Begin { time: micros(time), pose, position_deviation, heading_deviation },
-                complain,
-            ),
+            Record::Start { time, pose, position_deviation, heading_deviation } => {
+                let (sigma, heading) = (position_deviation, heading_deviation);
+                let state = state_of_pose([pose.x, pose.y, pose.heading]);
+                let prior = self.robot.config.prior;
+                let deviation = State {
+                    scale_right: prior.scale_right,
+                    scale_left: prior.scale_left,
+                    track_width_error: prior.track_width.0,
+                    range_scale: prior.range_scale,
+                    ..state_of_pose([sigma, sigma, heading])
+                };
+                self.take_start(Begin { time: micros(time), pose, state, deviation }, complain)
+            }
+            Record::Resume { time, state: told, deviation } => {
+                let [x, y, heading, ..] = told;
+                let pose = Pose { x, y, heading };
+                let (state, deviation) = (state(told), state(deviation));
+                self.take_start(Begin { time: micros(time), pose, state, deviation }, complain)
+            }
             Record::Ticks { time, right, left } => {
                 let wheels = self.rolled([right, left])?;
                 self.take_wheels(micros(time), wheels, Encoder::Ticks, complain)
@@ -180,9 +207,10 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
             Record::Wheels { time, right, left } => {
                 self.take_wheels(micros(time), [right, left], Encoder::Wheels, complain)
             }
-            Record::Range { time, bearing, range } => {
-                self.hold(micros(time), Echo::At { bearing, range })
+            Record::Range { time, bearing, range, wall } => {
+                self.hold(micros(time), Echo::At { bearing, range, wall })
             }
+            Record::Skip { time } => self.hold(micros(time), Echo::Skip),
             Record::Scan { time, scan } => self.hold(micros(time), Echo::Scan(scan)),
         }
     }
@@ -224,22 +252,11 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         reading: Reading,
         complain: &mut Complain,
     ) -> Result<(), ReplayError> {
-        #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
-        let single = |value: f64| value as f32;
-        let pose = sonarfix::pose::Pose::new(
-            single(begin.pose.x),
-            single(begin.pose.y),
-            Radians(single(begin.pose.heading)),
-        );
-        let start = Start {
-            pose,
-            position_deviation: Metres(single(begin.position_deviation)),
-            heading_deviation: Radians(single(begin.heading_deviation)),
-        };
         let config = self.robot.config;
         let track_width = config.drive.track_width.0.into();
         let map = Map::new(self.walls);
-        let localizer = Localizer::new(config, map, start, Instant::from_ticks(0))?;
+        let Begin { state, deviation, .. } = begin;
+        let localizer = Localizer::resume(config, map, state, deviation, Instant::from_ticks(0))?;
         self.pilot = Some(Pilot {
             localizer,
             odometry: DeadReckoning::new(begin.pose, track_width),
@@ -322,7 +339,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
             return Err(Fault::TimeWentBack.into());
         }
         let beams = match &echo {
-            Echo::At { .. } => 0,
+            Echo::At { .. } | Echo::Skip => 0,
             Echo::Scan(scan) => {
                 if time < self.next_fix {
                     return Ok(());
@@ -422,8 +439,17 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         };
         #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
         let aim = match &held.echo {
-            Echo::At { bearing, .. } => localizer.aim_at(Radians(*bearing as f32)),
+            Echo::At { bearing, wall: None, .. } => localizer.aim_at(Radians(*bearing as f32)),
+            // The robot chose the wall as it pinged, and not as it heard. What range it expected
+            // then and why it looked there, a fix does not ask.
+            Echo::At { bearing, wall: Some(wall), .. } => Ok(Aim {
+                wall: WallId(*wall),
+                bearing: Radians(*bearing as f32),
+                range: Metres(0.0),
+                why: UNKNOWN,
+            }),
             Echo::Scan(_) => localizer.aim(),
+            Echo::Skip => Err(localizer.aim().err().unwrap_or(NoAim::NoWall)),
         };
         let before = localizer.health().verdict;
         let aim = match aim {
@@ -438,6 +464,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         };
         look.range = match &held.echo {
             Echo::At { range, .. } => *range,
+            Echo::Skip => None,
             Echo::Scan(scan) => scan.earliest(&Listening {
                 bearing: aim.bearing.0.into(),
                 cone: sonar.cone.0.into(),
@@ -455,7 +482,10 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
             Fix::Gated(_) => fixes.gated += 1,
             Fix::Refused(_) => fixes.refused += 1,
         }
-        self.recorder.fix(|| observe::fix_record(look, &aim, &fix));
+        self.recorder.fix(|| {
+            let record = observe::fix_record(look, &aim, &fix);
+            FixRecord { why: record.why.filter(|_| aim.why != UNKNOWN), ..record }
+        });
     }
 
     /// Ends the replay.
@@ -479,10 +509,22 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
 impl Held {
     fn beams(&self) -> usize {
         match &self.echo {
-            Echo::At { .. } => 0,
+            Echo::At { .. } | Echo::Skip => 0,
             Echo::Scan(scan) => scan.ranges.len(),
         }
     }
+}
+
+/// A number for each state, as the robot computes.
+fn state(values: [f64; 7]) -> State {
+    #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
+    let [x, y, heading, scale_right, scale_left, track_width_error, range_scale] =
+        values.map(|value| value as f32);
+    State { x, y, heading, scale_right, scale_left, track_width_error, range_scale }
+}
+
+fn state_of_pose([x, y, heading]: [f64; 3]) -> State {
+    state([x, y, heading, 0.0, 0.0, 0.0, 0.0])
 }
 
 /// What is left when a replay has ended.

@@ -40,13 +40,16 @@ pub fn run(
     let mut devices = devices::connect(&wires, &simulation.scenario, &servo)?;
     let (mut side, localizer) = WorldSide::new(simulation, seed, &wires, servo)?;
     let mut robot = robot(simulation, localizer)?;
+    recorder.began(robot.localizer());
     let period = simulation.scenario.robot.encoder_period.to_micros();
     loop {
         if let Some(back_at) = side.faults.controller.power_back_at(side.now) {
             robot = side.reboot(back_at, &robot)?;
+            recorder.began(robot.localizer());
             devices = devices::connect(&wires, &simulation.scenario, &servo)?;
         }
         let report = robot.poll(Instant::from_ticks(side.now), &mut devices);
+        recorder.polled(&report, robot.localizer());
         side.obey();
         side.record(&report, &robot, recorder);
         // A tick may be held back by a ping, but not for as long as a period.

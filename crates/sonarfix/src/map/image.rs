@@ -94,6 +94,64 @@ pub fn checksum(bytes: &[u8]) -> u32 {
     })
 }
 
+/// How many bytes the image at the start of a region of flash has, by its own header; what follows
+/// it does not matter.
+///
+/// ```
+/// use sonarfix::map::{MapError, image};
+/// assert_eq!(image::length(&[0xff; 256]), Err(MapError::NotAMap)); // erased flash
+/// ```
+///
+/// # Errors
+/// [`MapError`], if no image of this version starts there.
+pub fn length(region: &[u8]) -> Result<usize, MapError> {
+    check_version(region)?;
+    let (header, _) = Header::split(region)?;
+    let cells = u64::from(header.columns) * u64::from(header.rows);
+    let reference = if header.is_narrow() { 2 } else { 3 };
+    // Every part is below 2³⁸ bytes, so that no sum overflows; at the end stands the checksum.
+    let tables = WALL as u64 * u64::from(header.walls)
+        + 4 * (cells + 1)
+        + reference * u64::from(header.references);
+    usize::try_from(HEADER as u64 + tables + 4).map_err(|_| MapError::Length)
+}
+
+/// What a header says, before any of it is believed.
+struct Header {
+    walls: u32,
+    references: u32,
+    columns: u16,
+    rows: u16,
+    origin: Point,
+    cell: Metres,
+}
+
+impl Header {
+    /// The header, and what follows it.
+    fn split(bytes: &[u8]) -> Result<(Self, &[u8]), MapError> {
+        let (header, rest) = bytes.split_first_chunk::<HEADER>().ok_or(MapError::Length)?;
+        let (words, _) = header.as_chunks::<4>();
+        let &[_, _, walls, references, shape, x, y, cell] = words else {
+            return Err(MapError::Length);
+        };
+        let [columns, columns_high, rows, rows_high] = shape;
+        let header = Self {
+            walls: u32::from_le_bytes(walls),
+            references: u32::from_le_bytes(references),
+            columns: u16::from_le_bytes([columns, columns_high]),
+            rows: u16::from_le_bytes([rows, rows_high]),
+            origin: Point::new(f32::from_le_bytes(x), f32::from_le_bytes(y)),
+            cell: Metres(f32::from_le_bytes(cell)),
+        };
+        Ok((header, rest))
+    }
+
+    /// Whether two bytes do for a reference.
+    fn is_narrow(&self) -> bool {
+        self.walls <= MOST_NARROW
+    }
+}
+
 /// A baked map whose every length, number and reference has been checked.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Image<'a> {
@@ -119,34 +177,21 @@ impl<'a> Image<'a> {
 
     /// Cuts the bytes into their parts, by the numbers in the header.
     fn split(bytes: &'a [u8]) -> Result<Self, MapError> {
-        let content = sealed(bytes)?;
-        let (header, rest) = content.split_first_chunk::<HEADER>().ok_or(MapError::Length)?;
-        let (words, _) = header.as_chunks::<4>();
-        let &[_, _, walls, references, shape, x, y, cell] = words else {
-            return Err(MapError::Length);
-        };
-        let [columns, columns_high, rows, rows_high] = shape;
-        let grid = Grid::new(
-            Point::new(f32::from_le_bytes(x), f32::from_le_bytes(y)),
-            Metres(f32::from_le_bytes(cell)),
-            u16::from_le_bytes([columns, columns_high]),
-            u16::from_le_bytes([rows, rows_high]),
-        );
+        let (header, rest) = Header::split(sealed(bytes)?)?;
+        let grid = Grid::new(header.origin, header.cell, header.columns, header.rows);
         let grid = grid.ok_or(MapError::Grid)?;
-        let walls = u32::from_le_bytes(walls);
-        let references = u32::from_le_bytes(references).into();
         let mut rest = Rest(rest);
         let image = Self {
             grid,
-            walls: rest.take(walls.into())?,
+            walls: rest.take(header.walls.into())?,
             starts: rest.take(u64::from(grid.cells()) + 1)?,
-            references: if walls <= MOST_NARROW {
-                References::Narrow(rest.take(references)?)
+            references: if header.is_narrow() {
+                References::Narrow(rest.take(header.references.into())?)
             } else {
-                References::Wide(rest.take(references)?)
+                References::Wide(rest.take(header.references.into())?)
             },
         };
-        let is_whole = rest.0.is_empty() && walls <= MOST;
+        let is_whole = rest.0.is_empty() && header.walls <= MOST;
         if is_whole { Ok(image) } else { Err(MapError::Length) }
     }
 
@@ -247,14 +292,19 @@ impl<'a> Image<'a> {
     }
 }
 
-/// The bytes of an image of this version without their checksum, if that is right.
-fn sealed(bytes: &[u8]) -> Result<&[u8], MapError> {
+/// Whether these are the bytes of a map, and of this version.
+fn check_version(bytes: &[u8]) -> Result<(), MapError> {
     let rest = bytes.strip_prefix(&MAGIC).ok_or(MapError::NotAMap)?;
     let version = rest.first_chunk().map(|&version| u32::from_le_bytes(version));
     match version.ok_or(MapError::Length)? {
-        VERSION => {}
-        other => return Err(MapError::Version(other)),
+        VERSION => Ok(()),
+        other => Err(MapError::Version(other)),
     }
+}
+
+/// The bytes of an image of this version without their checksum, if that is right.
+fn sealed(bytes: &[u8]) -> Result<&[u8], MapError> {
+    check_version(bytes)?;
     let (content, stated) = bytes.split_last_chunk().ok_or(MapError::Length)?;
     if checksum(content) == u32::from_le_bytes(*stated) {
         Ok(content)

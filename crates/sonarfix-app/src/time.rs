@@ -1,0 +1,13 @@
+//! Arithmetic of instants that cannot panic: `fugit`'s operators do on overflow, these saturate.
+
+use sonarfix::units::{Duration, Instant};
+
+/// The time from `then` to `now`; zero if `then` lies ahead.
+pub(crate) fn since(now: Instant, then: Instant) -> Duration {
+    now.checked_duration_since(then).unwrap_or(Duration::from_ticks(0))
+}
+
+/// The instant `span` after `instant`; at the end of time if that is beyond it.
+pub(crate) fn after(instant: Instant, span: Duration) -> Instant {
+    instant.checked_add_duration(span).unwrap_or(Instant::from_ticks(u64::MAX))
+}

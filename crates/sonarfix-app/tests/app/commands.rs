@@ -1,0 +1,282 @@
+//! What commands do, and what is left of it when the power comes back.
+
+use sonarfix::config::Config;
+use sonarfix::ekf::State;
+use sonarfix::localizer::Start;
+use sonarfix::units::{Metres, Radians};
+use sonarfix_link::message::{Flashed, Outcome, Refused};
+use sonarfix_link::{Command, Telemetry, baked};
+
+use crate::flash::SimFlash;
+use crate::rig::{Baked, Bench, config, fares, start};
+
+const DONE: Outcome = Outcome::Done;
+
+fn refused(reason: Refused) -> Outcome {
+    Outcome::Refused(reason)
+}
+
+#[test]
+fn it_stays_still_until_it_has_all_it_needs_and_is_told_to_go() {
+    let whole = Baked::new(&config());
+    let nothing = || vec![0xFF; 64];
+    let no_map = Baked { map: nothing(), ..Baked::new(&config()) };
+    let no_config = Baked { config: nothing(), ..Baked::new(&config()) };
+    let cases = [
+        (&no_map, Refused::NoMap),
+        (&no_config, Refused::NoConfiguration),
+        (&whole, Refused::NoPose),
+    ];
+    for (baked, reason) in cases {
+        let mut bench = Bench::switched_on(baked, SimFlash::new());
+        assert_eq!(bench.order(&Command::Start), refused(reason));
+        let said = bench.wait(3_000);
+        assert!(!fares(&said).running && bench.app.localizer().is_none());
+        assert!(!said.iter().any(|told| matches!(told, Telemetry::Estimate(_))));
+    }
+    let mut bench = Bench::switched_on(&whole, SimFlash::new());
+    assert_eq!(bench.order(&Command::SetPose(start())), DONE);
+    assert!(!bench.turn().is_running);
+    assert_eq!(bench.order(&Command::Start), DONE);
+    let said = bench.wait(3_000);
+    let ticks = said.iter().filter(|told| matches!(told, Telemetry::Estimate(_))).count();
+    // The sonar holds none back for long: it answers at once here.
+    assert_eq!(ticks, 30);
+    assert!(fares(&said).running);
+    assert_eq!(bench.order(&Command::Stop), DONE);
+    assert!(!bench.turn().is_running);
+}
+
+#[test]
+fn what_it_has_is_said_with_its_checksums() {
+    let baked = Baked::new(&config());
+    let mut bench = Bench::switched_on(&baked, SimFlash::new());
+    let said = bench.wait(1);
+    let Some(Telemetry::Hello(hello)) = said.first() else { panic!("no word of who it is") };
+    assert_eq!(hello.configuration, Flashed::Valid(baked::checksum(&config())));
+    assert_eq!(bench.order(&Command::MapChecksum), Outcome::Map(hello.map));
+    assert!(matches!(hello.map, Flashed::Valid(_)));
+
+    let mut broken = Baked::new(&config());
+    broken.map[50] ^= 4;
+    broken.config[20] ^= 4;
+    let said = Bench::switched_on(&broken, SimFlash::new()).wait(1);
+    let Some(Telemetry::Hello(hello)) = said.first() else { panic!("no word of who it is") };
+    assert_eq!((hello.map, hello.configuration), (Flashed::Corrupt, Flashed::Corrupt));
+}
+
+#[test]
+fn every_missing_device_is_counted_and_no_other() {
+    let baked = Baked::new(&config());
+    for missing in 0..16_u32 {
+        let has = |bit: u32| missing & (1 << bit) == 0;
+        let mut bench = Bench::switched_on(&baked, SimFlash::new());
+        bench.hardware.right.0 = has(0).then_some(7);
+        bench.hardware.left.0 = has(1).then_some(7);
+        let mut pwm = bench.hardware.servo;
+        bench.hardware.ranger.is_there = has(3);
+        // The PWM is the servo's: it is taken out to be broken.
+        let release = pwm.release();
+        pwm = servo_of(crate::rig::Pwm(has(2) && release.0));
+        bench.hardware.servo = pwm;
+        let faults = fares(&bench.wait(2_500)).faults;
+        let found = [faults.right.errors, faults.left.errors, faults.servo, faults.ranger];
+        for (bit, count) in (0..).zip(found) {
+            assert_eq!(count > 0, !has(bit), "{missing:04b}: {faults:?}");
+        }
+    }
+}
+
+fn servo_of(pwm: crate::rig::Pwm) -> sonarfix_hal::servo::Servo<crate::rig::Pwm> {
+    use sonarfix::units::Duration;
+    use sonarfix_hal::servo::{Calibration, MeasuredPulse, Pace, Servo};
+    let pulse = |width, degrees| MeasuredPulse {
+        width: Duration::from_ticks(width),
+        bearing: Radians::from_degrees(degrees),
+    };
+    let calibration = Calibration::new(pulse(1_000, -45.0), pulse(2_000, 45.0)).unwrap();
+    let limits = (Radians::from_degrees(-90.0), Radians::from_degrees(90.0));
+    Servo::new(pwm, calibration, limits, Pace::SG90).unwrap()
+}
+
+/// Stopped, switched off and on: the pose is there, surer than nothing and less sure than it was.
+#[test]
+fn a_parked_robot_goes_on_from_where_it_stood() {
+    let baked = Baked::new(&config());
+    let mut bench = Bench::switched_on(&baked, SimFlash::new());
+    assert_eq!(bench.order(&Command::SetPose(start())), DONE);
+    assert_eq!(bench.order(&Command::Start), DONE);
+    bench.wait(500);
+    // 100 ticks of 0.2 mm: 2 cm ahead.
+    (bench.hardware.right.0, bench.hardware.left.0) = (Some(100), Some(100));
+    bench.wait(500);
+    let before = bench.estimate();
+    assert!(before.state.x > 1.01);
+    assert_eq!(bench.order(&Command::Stop), DONE);
+
+    let mut bench = Bench::switched_on(&baked, bench.switched_off());
+    assert_eq!(bench.order(&Command::Start), DONE);
+    let after = bench.estimate();
+    assert_eq!(after.state, before.state);
+    let (was, is) = (before.deviation, after.deviation);
+    assert!(is.x > 0.10 && is.x < 0.12 && is.heading > 0.087 && is.heading < 0.1, "{is:?}");
+    // A calibration as good as its prior is not made worse than it, nor better.
+    assert!((is.scale_right - was.scale_right).abs() < 1e-4, "{is:?} {was:?}");
+    // The air may have changed: by as much as the prior says.
+    assert!(is.range_scale > 0.02, "{is:?}");
+}
+
+/// What a replay begins with: the very numbers that the localizer was told. It does not give them
+/// back to the bit where one wheel is less certain than the other.
+#[test]
+fn what_it_began_from_is_said_to_the_bit() {
+    let mut config = config();
+    (config.prior.scale_right, config.prior.scale_left) = (0.013, 0.007);
+    let baked = Baked::new(&config);
+    let mut bench = Bench::switched_on(&baked, SimFlash::new());
+    assert_eq!(bench.order(&Command::SetPose(start())), DONE);
+    assert_eq!(bench.order(&Command::Start), DONE);
+    let began = bench.said().into_iter().find_map(|said| match said {
+        Telemetry::Began(began) => Some(began.deviation),
+        _ => None,
+    });
+    let began = began.expect("it says that it began");
+    let bits = |deviation: State| {
+        let State { scale_right, scale_left, track_width_error, .. } = deviation;
+        [scale_right, scale_left, track_width_error].map(f32::to_bits)
+    };
+    let told = [0.013, 0.007, config.prior.track_width.0].map(f32::to_bits);
+    assert_eq!(bits(began), told);
+    assert_ne!(bits(bench.estimate().deviation), told);
+}
+
+/// Switched off while it might drive: nobody knows where it stands now, and it says so.
+#[test]
+fn a_robot_that_was_driving_must_be_told_where_it_is() {
+    let baked = Baked::new(&config());
+    let mut bench = Bench::switched_on(&baked, SimFlash::new());
+    assert_eq!(bench.order(&Command::SetPose(start())), DONE);
+    assert_eq!(bench.order(&Command::Start), DONE);
+    bench.wait(1_000);
+    let mut bench = Bench::switched_on(&baked, bench.switched_off());
+    assert_eq!(bench.order(&Command::Start), refused(Refused::NoPose));
+    assert!(bench.app.known().is_some_and(|known| known.has_calibration && !known.has_pose));
+    assert_eq!(bench.order(&Command::SetPose(start())), DONE);
+    assert_eq!(bench.order(&Command::Start), DONE);
+}
+
+#[test]
+fn a_pose_that_is_set_outlives_the_power_even_if_it_never_drove() {
+    let baked = Baked::new(&config());
+    let mut bench = Bench::switched_on(&baked, SimFlash::new());
+    assert_eq!(bench.order(&Command::SetPose(start())), DONE);
+    let bench = Bench::switched_on(&baked, bench.switched_off());
+    let known = bench.app.known().copied().unwrap();
+    assert!(known.has_pose && (known.state.y - 1.5).abs() < 1e-6);
+}
+
+#[test]
+fn a_pose_that_is_none_is_refused_and_changes_nothing() {
+    let baked = Baked::new(&config());
+    let mut bench = Bench::switched_on(&baked, SimFlash::new());
+    assert_eq!(bench.order(&Command::SetPose(start())), DONE);
+    let known = bench.app.known().copied();
+    let bad = [
+        Start { position_deviation: Metres(-0.1), ..start() },
+        Start { position_deviation: Metres(f32::NAN), ..start() },
+        Start { heading_deviation: Radians(f32::INFINITY), ..start() },
+    ];
+    for start in bad {
+        assert_eq!(bench.order(&Command::SetPose(start)), refused(Refused::Pose));
+        assert_eq!(bench.app.known().copied(), known);
+    }
+}
+
+/// A configuration that was sent counts from then on, until another is baked.
+#[test]
+fn a_configuration_outlives_the_power_but_not_the_next_baked_one() {
+    let baked = Baked::new(&config());
+    let sent = Config { max_wheel_speed: sonarfix::units::MetresPerSecond(0.7), ..config() };
+    let mut bench = Bench::switched_on(&baked, SimFlash::new());
+    assert_eq!(bench.order(&Command::SetConfiguration(sent)), DONE);
+    let flash = bench.switched_off();
+
+    let told = |bench: &mut Bench| match bench.wait(1).first() {
+        Some(Telemetry::Hello(hello)) => hello.configuration,
+        other => panic!("{other:?}"),
+    };
+    let mut bench = Bench::switched_on(&baked, flash.clone());
+    assert_eq!(told(&mut bench), Flashed::Valid(baked::checksum(&sent)));
+
+    let newer = Config { max_wheel_speed: sonarfix::units::MetresPerSecond(0.9), ..config() };
+    let rebaked = Baked::new(&newer);
+    let mut bench = Bench::switched_on(&rebaked, flash);
+    assert_eq!(told(&mut bench), Flashed::Valid(baked::checksum(&newer)));
+
+    let wrong = Config { max_wheel_speed: sonarfix::units::MetresPerSecond(-1.0), ..config() };
+    assert_eq!(bench.order(&Command::SetConfiguration(wrong)), refused(Refused::Configuration));
+}
+
+/// A flash that fails costs the memory; but one that would go on saying something untrue keeps the
+/// robot where it is.
+#[test]
+fn a_flash_that_fails() {
+    let baked = Baked::new(&config());
+    let mut never = SimFlash::new();
+    never.is_read_only = true;
+    let mut bench = Bench::switched_on(&baked, never);
+    assert_eq!(bench.order(&Command::SetPose(start())), DONE);
+    assert_eq!(bench.order(&Command::Start), DONE);
+
+    let mut bench = Bench::switched_on(&baked, SimFlash::new());
+    assert_eq!(bench.order(&Command::SetPose(start())), DONE);
+    let mut worn_out = bench.switched_off();
+    worn_out.is_read_only = true;
+    let mut bench = Bench::switched_on(&baked, worn_out);
+    assert_eq!(bench.order(&Command::Start), refused(Refused::Storage));
+    assert!(!bench.turn().is_running);
+}
+
+#[test]
+fn a_calibration_can_be_forgotten() {
+    let baked = Baked::new(&config());
+    let mut bench = Bench::switched_on(&baked, SimFlash::new());
+    assert_eq!(bench.order(&Command::SetPose(start())), DONE);
+    assert_eq!(bench.order(&Command::ResetCalibration), DONE);
+    let bench = Bench::switched_on(&baked, bench.switched_off());
+    let known = bench.app.known().copied().unwrap();
+    assert!(known.has_pose && known.state.scale_right.abs() < 1e-9);
+    assert!((known.deviation.scale_right - config().prior.scale_right).abs() < 1e-6);
+}
+
+/// A deadline that is met is the only reason to feed the watchdog.
+#[test]
+fn a_loop_that_comes_too_late_is_not_on_time() {
+    let baked = Baked::new(&config());
+    let mut bench = Bench::switched_on(&baked, SimFlash::new());
+    assert!(bench.turn().is_on_time);
+    bench.now += 50_000;
+    assert!(!bench.turn().is_on_time);
+    assert_eq!(bench.order(&Command::SetPose(start())), DONE);
+    assert_eq!(bench.order(&Command::Start), DONE);
+    let on_time = (0..1_000).filter(|_| bench.turn().is_on_time).count();
+    assert_eq!(on_time, 10);
+    // 115 ms without a turn: the tick in it is late.
+    bench.now += 115_000;
+    let late = bench.turn();
+    assert!(late.report.tick.is_some() && !late.is_on_time, "{late:?}");
+}
+
+/// What is said fits the line: half of 115,200 baud at most.
+#[test]
+fn what_is_said_leaves_half_the_line_free() {
+    let baked = Baked::new(&config());
+    let mut bench = Bench::switched_on(&baked, SimFlash::new());
+    assert_eq!(bench.order(&Command::SetPose(start())), DONE);
+    assert_eq!(bench.order(&Command::Start), DONE);
+    let before = bench.line.sent;
+    bench.wait(60_000);
+    let a_second = (bench.line.sent - before) / 60;
+    println!("{a_second} bytes a second");
+    assert!(a_second > 500 && a_second < 11_520 / 2, "{a_second} bytes a second");
+}

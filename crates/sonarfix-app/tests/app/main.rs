@@ -1,0 +1,13 @@
+//! The application on simulated hardware: flash whose power can be cut, pins of a small room.
+#![cfg(test)]
+#![expect(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    reason = "a few metres, seconds and sectors fit into any of these types"
+)]
+
+mod commands;
+mod flash;
+mod habit;
+mod power_cut;
+mod rig;

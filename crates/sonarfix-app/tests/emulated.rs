@@ -1,0 +1,348 @@
+//! The shipped firmware of the reference board, in an emulator, over its UART.
+//!
+//! `cargo xtask test-firmware` builds it and runs these. The emulator has the core, the clock,
+//! the interrupts and the UART; encoders, servo and echo read zero there, and its flash cannot be
+//! written. So what is shown is that the very ELF that is flashed boots, keeps its deadlines, says
+//! what is missing, obeys, and is not led astray by garbage.
+
+#![cfg(test)]
+
+use std::collections::VecDeque;
+use std::io::{ErrorKind, Read, Write};
+use std::net::Shutdown;
+use std::os::unix::net::UnixStream;
+use std::path::Path;
+use std::process::{Child, Command as Process, Stdio};
+use std::time::{Duration, Instant};
+
+use sonarfix::config::Config;
+use sonarfix::localizer::Start;
+use sonarfix::map::Wall;
+use sonarfix::pose::{Point, Pose};
+use sonarfix::units::{Metres, Radians};
+use sonarfix_link::message::{Flashed, Loop, Outcome, Refused};
+use sonarfix_link::{Ack, Command, Hello, Receiver, Sender, Telemetry, baked, frame};
+use tempfile::TempDir;
+
+/// Where `memory.x` has the regions.
+const CONFIG_AT: &str = "0x08004000";
+const MAP_AT: &str = "0x080E0000";
+/// Flash, which starts with the stack's top, and memory of the board.
+const FLASH_AT: u32 = 0x0800_0000;
+const RAM_AT: u32 = 0x2000_0000;
+const RAM: usize = 128 * 1_024;
+/// On this computer, for anything that is waited for; the emulator is ended after it as well.
+const PATIENCE: Duration = Duration::from_secs(100);
+
+/// The board, and the PC at the other end of its link.
+struct Robot {
+    emulator: Child,
+    line: UnixStream,
+    receiver: Receiver<Telemetry>,
+    sender: Sender<Command>,
+    /// What was told and not yet looked at, the latest last.
+    told: VecDeque<Telemetry>,
+    since: Instant,
+    files: TempDir,
+}
+
+impl Robot {
+    /// Switches the board on, with these bytes in its regions.
+    fn switched_on(map: &[u8], config: &[u8]) -> Self {
+        let elf = std::env::var("SONARFIX_FIRMWARE").expect("run `cargo xtask test-firmware`");
+        let files = TempDir::new().unwrap();
+        let path = |name: &str| files.path().join(name);
+        let mut command = Process::new("timeout");
+        command.args([PATIENCE.as_secs().to_string().as_str(), "qemu-system-arm"]);
+        // 1 ns passes with every instruction. The emulator's timers run at 1 GHz in place of
+        // 16 MHz, so the firmware's microsecond is 16 instructions: those of a core at 16 MHz that
+        // does one in a cycle. While it sleeps no time of this computer passes.
+        command.args(["-machine", "netduinoplus2", "-icount", "shift=0,sleep=off"]);
+        let monitor = path("monitor");
+        command.args(["-display", "none", "-kernel", &elf, "-monitor"]);
+        command.arg(format!("unix:{},server=on,wait=off", monitor.display()));
+        for (name, bytes, at) in [("map", map, MAP_AT), ("config", config, CONFIG_AT)] {
+            if !bytes.is_empty() {
+                std::fs::write(path(name), bytes).unwrap();
+                let file = path(name).display().to_string();
+                command.args(["-device", &format!("loader,file={file},addr={at},force-raw=on")]);
+            }
+        }
+        let socket = path("uart");
+        // USART1 is not connected; the link is USART2. It waits for us, so nothing is lost.
+        command.args(["-serial", "null", "-serial"]);
+        command.arg(format!("unix:{},server=on,wait=on", socket.display()));
+        command.stdin(Stdio::null()).stderr(Stdio::null());
+        let emulator = command.spawn().expect("is qemu-system-arm installed?");
+        let line = connected(&socket);
+        line.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
+        Self {
+            emulator,
+            line,
+            receiver: Receiver::new(),
+            sender: Sender::starting_at(100),
+            told: VecDeque::new(),
+            since: Instant::now(),
+            files,
+        }
+    }
+
+    /// The next thing that the robot says.
+    fn next(&mut self) -> Telemetry {
+        loop {
+            if let Some(told) = self.told.pop_front() {
+                return told;
+            }
+            assert!(self.since.elapsed() < PATIENCE, "the robot did not say what was waited for");
+            let mut bytes = [0; 4_096];
+            let count = match self.line.read(&mut bytes) {
+                Ok(0) => panic!("the emulator has ended"),
+                Ok(count) => count,
+                Err(error) if error.kind() == ErrorKind::WouldBlock => {
+                    panic!("the robot is silent")
+                }
+                Err(error) => panic!("the link: {error}"),
+            };
+            let receiver = &mut self.receiver;
+            let frames = bytes[..count].iter().filter_map(|byte| receiver.push(*byte));
+            self.told.extend(frames.map(|frame| frame.message));
+        }
+    }
+
+    /// The first thing said that this finds.
+    fn wait_for<T>(&mut self, find: impl Fn(&Telemetry) -> Option<T>) -> T {
+        loop {
+            if let Some(found) = find(&self.next()) {
+                return found;
+            }
+        }
+    }
+
+    fn hello(&mut self) -> Hello {
+        self.wait_for(|told| if let Telemetry::Hello(hello) = told { Some(*hello) } else { None })
+    }
+
+    fn how_it_fares(&mut self) -> Loop {
+        self.wait_for(|told| if let Telemetry::Loop(told) = told { Some(*told) } else { None })
+    }
+
+    /// Sends a command and waits for its answer.
+    fn order(&mut self, command: &Command) -> Outcome {
+        let sequence = self.sender.next();
+        let mut buffer = frame::EMPTY;
+        let bytes = self.sender.frame(command, &mut buffer).to_vec();
+        self.send(&bytes);
+        self.answer_to(sequence)
+    }
+
+    fn answer_to(&mut self, asked: u16) -> Outcome {
+        self.wait_for(|told| match told {
+            Telemetry::Ack(Ack { sequence, outcome }) if *sequence == asked => Some(*outcome),
+            _ => None,
+        })
+    }
+
+    /// The board's memory from an address on.
+    fn memory(&mut self, from: u32, length: usize) -> Vec<u8> {
+        let file = self.files.path().join("memory");
+        let mut monitor = connected(&self.files.path().join("monitor"));
+        let order = format!("pmemsave {from:#x} {length} \"{}\"\n", file.display());
+        monitor.write_all(order.as_bytes()).unwrap();
+        loop {
+            match std::fs::read(&file) {
+                Ok(bytes) if bytes.len() == length => {
+                    std::fs::remove_file(&file).unwrap();
+                    return bytes;
+                }
+                _ => assert!(self.since.elapsed() < PATIENCE, "the emulator shows no memory"),
+            }
+            // An emulator that waits for somebody to read does not listen to its monitor.
+            let _ = self.line.read(&mut [0; 4_096]).unwrap();
+        }
+    }
+
+    fn send(&mut self, bytes: &[u8]) {
+        self.line.write_all(bytes).unwrap();
+    }
+}
+
+impl Drop for Robot {
+    fn drop(&mut self) {
+        // An emulator that waits for somebody to read does not listen to signals.
+        let _ = self.line.shutdown(Shutdown::Both);
+        // `timeout` hands it on to the emulator; both may have ended by themselves.
+        let _ = Process::new("kill").arg(self.emulator.id().to_string()).status();
+        let _ = self.emulator.wait();
+    }
+}
+
+fn connected(socket: &Path) -> UnixStream {
+    let since = Instant::now();
+    loop {
+        match UnixStream::connect(socket) {
+            Ok(line) => return line,
+            Err(_) if since.elapsed() < PATIENCE => std::thread::sleep(Duration::from_millis(20)),
+            Err(error) => panic!("the emulator opens no link: {error}"),
+        }
+    }
+}
+
+fn walls() -> Vec<Wall> {
+    let corners = [(0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (0.0, 3.0), (0.0, 0.0)];
+    let point = |(x, y): (f32, f32)| Point::new(x, y);
+    corners.windows(2).map(|ends| Wall::new(point(ends[0]), point(ends[1])).unwrap()).collect()
+}
+
+fn map() -> Vec<u8> {
+    sonarfix_map::bake(&walls()).unwrap()
+}
+
+fn configuration() -> Config {
+    Config::for_track_width(Metres(0.16))
+}
+
+fn config() -> Vec<u8> {
+    baked::write(&configuration(), &mut [0; baked::LENGTH_MAX]).unwrap().to_vec()
+}
+
+fn pose() -> Start {
+    Start {
+        pose: Pose::new(1.0, 1.0, Radians(0.0)),
+        position_deviation: Metres(0.05),
+        heading_deviation: Radians(0.02),
+    }
+}
+
+#[test]
+#[ignore = "cargo xtask test-firmware"]
+fn without_map_and_configuration_it_stays_still_and_says_so() {
+    let mut robot = Robot::switched_on(&[], &[]);
+    let hello = robot.hello();
+    assert_eq!((hello.map, hello.configuration), (Flashed::Missing, Flashed::Missing));
+    assert_eq!(robot.order(&Command::Start), Outcome::Refused(Refused::NoMap));
+    assert!(!robot.how_it_fares().running);
+}
+
+#[test]
+#[ignore = "cargo xtask test-firmware"]
+fn a_damaged_map_or_configuration_is_said_to_be_damaged() {
+    let damaged = |mut bytes: Vec<u8>| {
+        bytes[40] ^= 1;
+        bytes
+    };
+    let mut robot = Robot::switched_on(&damaged(map()), &config());
+    let hello = robot.hello();
+    assert_eq!(hello.map, Flashed::Corrupt);
+    assert_eq!(hello.configuration, Flashed::Valid(baked::checksum(&configuration())));
+    assert_eq!(robot.order(&Command::SetPose(pose())), Outcome::Done);
+    assert_eq!(robot.order(&Command::Start), Outcome::Refused(Refused::NoMap));
+
+    let mut robot = Robot::switched_on(&map(), &damaged(config()));
+    let hello = robot.hello();
+    assert_eq!(hello.configuration, Flashed::Corrupt);
+    assert_eq!(robot.order(&Command::Start), Outcome::Refused(Refused::NoConfiguration));
+    assert!(!robot.how_it_fares().running);
+}
+
+/// Every sensor is missing in the emulator, and every one is reported, before the loop runs and
+/// while it does; it runs all the same.
+#[test]
+#[ignore = "cargo xtask test-firmware"]
+fn a_minute_of_ticks_and_no_deadline_missed() {
+    let mut robot = Robot::switched_on(&map(), &config());
+    let image = map();
+    let checksum = u32::from_le_bytes(*image.last_chunk().unwrap());
+    assert_eq!(robot.hello().map, Flashed::Valid(checksum));
+    robot.how_it_fares();
+    let fares = robot.how_it_fares();
+    let faults = fares.faults;
+    assert!(faults.right.errors > 0 && faults.left.errors > 0, "encoders: {faults:?}");
+    assert!(faults.servo > 0 && faults.ranger > 0, "servo and ranger: {faults:?}");
+
+    assert_eq!(robot.order(&Command::MapChecksum), Outcome::Map(Flashed::Valid(checksum)));
+    assert_eq!(robot.order(&Command::Start), Outcome::Refused(Refused::NoPose));
+    assert_eq!(robot.order(&Command::SetPose(pose())), Outcome::Done);
+    assert_eq!(robot.order(&Command::Start), Outcome::Done);
+    let began = robot.wait_for(|told| match told {
+        Telemetry::Began(estimate) => Some(*estimate),
+        _ => None,
+    });
+    assert_eq!(began.state.x.to_bits(), 1.0_f32.to_bits());
+
+    // A minute by the robot's clock.
+    let (mut ticks, mut worst) = (0, 0);
+    let fares = loop {
+        match robot.next() {
+            Telemetry::Estimate(_) => ticks += 1,
+            Telemetry::Loop(fares) => {
+                assert!(fares.running && fares.faults.deadlines == 0, "{fares:?}");
+                worst = worst.max(fares.worst_poll.to_micros());
+                if fares.at > began.at + sonarfix::units::Duration::secs(60) {
+                    break fares;
+                }
+            }
+            _ => {}
+        }
+    };
+    assert!(ticks >= 600, "{ticks} ticks in a minute");
+    assert!(fares.faults.right.errors >= 600, "encoders go on being missed: {fares:?}");
+    assert_eq!(fares.faults.clock, 0);
+    assert_eq!(robot.receiver.counters().skipped(), 0);
+    println!("{ticks} ticks in a minute, none late; worst poll {worst} µs; {:?}", fares.faults);
+    check_memory(&mut robot);
+}
+
+/// The stack lies below everything else (`flip-link`) and grows down; the emulator's memory begins
+/// as zeros, so the lowest byte that is none is as deep as it went.
+fn check_memory(robot: &mut Robot) {
+    let ram = robot.memory(RAM_AT, RAM);
+    let deepest = ram.iter().position(|byte| *byte != 0).unwrap();
+    let top = robot.memory(FLASH_AT, 4);
+    let top = u32::from_le_bytes(*top.first_chunk().unwrap()) - RAM_AT;
+    let (stack, rest) = (top as usize - deepest, RAM - top as usize);
+    println!("stack {stack} bytes at the deepest, everything else {rest}");
+    assert!(rest > 1_000, "flip-link has not put the stack below everything else");
+    assert!(stack + rest <= 8 * 1_024, "{} bytes of RAM", stack + rest);
+}
+
+#[test]
+#[ignore = "cargo xtask test-firmware"]
+fn garbage_is_counted_and_commands_after_it_are_done_once() {
+    let mut robot = Robot::switched_on(&map(), &config());
+    robot.hello();
+    assert_eq!(robot.order(&Command::SetPose(pose())), Outcome::Done);
+    let before = robot.how_it_fares().commands;
+
+    // Noise, a cut frame, and a damaged one.
+    let mut buffer = frame::EMPTY;
+    let whole = Sender::starting_at(7).frame(&Command::Start, &mut buffer).to_vec();
+    let mut damaged = whole.clone();
+    damaged[5] ^= 0x10;
+    let noise: Vec<u8> = (1..200_u8).map(|n| n.wrapping_mul(113)).collect();
+    for garbage in [&noise[..], &whole[..whole.len() / 2], &damaged] {
+        robot.send(garbage);
+    }
+    // What follows is done all the same, and garbage was not taken for a start.
+    assert_eq!(robot.order(&Command::MapChecksum), {
+        let image = map();
+        Outcome::Map(Flashed::Valid(u32::from_le_bytes(*image.last_chunk().unwrap())))
+    });
+    robot.how_it_fares();
+    let fares = robot.how_it_fares();
+    assert!(!fares.running, "garbage has started the loop");
+    assert!(fares.commands.skipped() >= before.skipped() + 3, "{:?}", fares.commands);
+
+    // A frame that is sent twice, because its answer was lost, is answered twice and done once.
+    robot.send(&whole);
+    assert_eq!(robot.answer_to(7), Outcome::Done);
+    assert_eq!(robot.order(&Command::Stop), Outcome::Done);
+    assert!(!robot.how_it_fares().running);
+    let again = Sender::starting_at(8).frame(&Command::Start, &mut buffer).to_vec();
+    robot.send(&again);
+    robot.send(&again);
+    let began = |told: &Telemetry| matches!(told, Telemetry::Began(_)).then_some(());
+    assert_eq!(robot.answer_to(8), Outcome::Done);
+    robot.wait_for(began);
+    assert_eq!(robot.answer_to(8), Outcome::Done);
+    assert!(robot.how_it_fares().running);
+}

@@ -1,0 +1,138 @@
+//! The configuration in flash: what `sonarfix config bake` writes and a robot reads at its start.
+//!
+//! ```text
+//! "SFXC" | version u16 | length u16 | configuration (postcard) | CRC-32 u32 of all before it
+//! ```
+//!
+//! Numbers are little-endian. What follows in the flash does not matter.
+
+use sonarfix::config::{Config, ConfigError};
+use sonarfix::map::image::checksum as crc32;
+
+/// The version of the bytes. It goes up whenever a configuration's bytes change.
+pub const VERSION: u16 = 1;
+/// How many bytes a baked configuration has at most.
+pub const LENGTH_MAX: usize = HEADER + POSTCARD_MAX + CHECKSUM;
+
+const MAGIC: [u8; 4] = *b"SFXC";
+const HEADER: usize = 8;
+const POSTCARD_MAX: usize = 160;
+const CHECKSUM: usize = 4;
+
+/// Why bytes are no configuration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum BakedError {
+    /// They do not start as a configuration does: nothing was baked there.
+    Missing,
+    /// They are of another version, which is told.
+    Version(u16),
+    /// They end too early.
+    Cut,
+    /// They are damaged.
+    Checksum,
+    /// They are whole and yet no configuration: whoever baked them was wrong.
+    Layout,
+    /// They are a configuration that breaks a rule.
+    Rule(ConfigError),
+}
+
+impl core::fmt::Display for BakedError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Missing => f.write_str("no configuration was baked there"),
+            Self::Version(found) => {
+                write!(f, "the configuration is of version {found}, and version {VERSION} is read")
+            }
+            Self::Cut => f.write_str("the configuration is cut off"),
+            Self::Checksum => f.write_str("the configuration is damaged: its checksum is wrong"),
+            Self::Layout => f.write_str("the configuration's bytes are not those of one"),
+            Self::Rule(error) => write!(f, "the configuration is wrong: {error}"),
+        }
+    }
+}
+
+impl core::error::Error for BakedError {}
+
+/// Bakes a configuration into `buffer`; gives the bytes.
+///
+/// # Errors
+/// [`BakedError::Rule`] if it breaks a rule: no robot should be given it.
+///
+/// # Panics
+/// Never.
+pub fn write<'b>(
+    config: &Config,
+    buffer: &'b mut [u8; LENGTH_MAX],
+) -> Result<&'b [u8], BakedError> {
+    config.check().map_err(BakedError::Rule)?;
+    fill(config, buffer).ok_or(BakedError::Layout)
+}
+
+fn fill<'b>(config: &Config, buffer: &'b mut [u8; LENGTH_MAX]) -> Option<&'b [u8]> {
+    let (header, rest) = buffer.split_first_chunk_mut::<HEADER>()?;
+    let (space, _) = rest.split_at_mut_checked(POSTCARD_MAX)?;
+    let length = postcard::to_slice(config, space).ok()?.len();
+    let [v0, v1] = VERSION.to_le_bytes();
+    let [l0, l1] = u16::try_from(length).ok()?.to_le_bytes();
+    let [m0, m1, m2, m3] = MAGIC;
+    *header = [m0, m1, m2, m3, v0, v1, l0, l1];
+    let end = HEADER + length;
+    let checksum = crc32(buffer.get(..end)?);
+    buffer.get_mut(end..end + CHECKSUM)?.copy_from_slice(&checksum.to_le_bytes());
+    buffer.get(..end + CHECKSUM)
+}
+
+/// Reads and checks the configuration at the start of `bytes`.
+///
+/// ```
+/// use sonarfix::{config::Config, units::Metres};
+/// use sonarfix_link::baked::{self, BakedError};
+/// let config = Config::for_track_width(Metres(0.16));
+/// let mut buffer = [0xff; baked::LENGTH_MAX];
+/// let bytes = baked::write(&config, &mut buffer)?;
+/// assert_eq!(baked::read(bytes), Ok(config));
+/// // Flash that was erased and never written:
+/// assert_eq!(baked::read(&[0xff; 256]), Err(BakedError::Missing));
+/// # Ok::<(), BakedError>(())
+/// ```
+///
+/// # Errors
+/// [`BakedError`], by what is wrong with them.
+///
+/// # Panics
+/// Never.
+pub fn read(bytes: &[u8]) -> Result<Config, BakedError> {
+    let Some((header, rest)) = bytes.split_first_chunk::<HEADER>() else {
+        let begins = !bytes.is_empty() && bytes.iter().zip(MAGIC).all(|(&byte, m)| byte == m);
+        return Err(if begins { BakedError::Cut } else { BakedError::Missing });
+    };
+    let [m0, m1, m2, m3, v0, v1, l0, l1] = *header;
+    if [m0, m1, m2, m3] != MAGIC {
+        return Err(BakedError::Missing);
+    }
+    let version = u16::from_le_bytes([v0, v1]);
+    if version != VERSION {
+        return Err(BakedError::Version(version));
+    }
+    let length = usize::from(u16::from_le_bytes([l0, l1]));
+    let (postcard, rest) = rest.split_at_checked(length).ok_or(BakedError::Cut)?;
+    let checksum = rest.first_chunk::<CHECKSUM>().ok_or(BakedError::Cut)?;
+    let covered = bytes.get(..HEADER + length).ok_or(BakedError::Cut)?;
+    if crc32(covered) != u32::from_le_bytes(*checksum) {
+        return Err(BakedError::Checksum);
+    }
+    match postcard::take_from_bytes::<Config>(postcard) {
+        Ok((config, [])) => config.check().map(|()| config).map_err(BakedError::Rule),
+        _ => Err(BakedError::Layout),
+    }
+}
+
+/// The checksum by which a robot says which configuration it has
+/// ([`Hello`](crate::message::Hello::configuration)): CRC-32 of its postcard.
+#[must_use]
+pub fn checksum(config: &Config) -> u32 {
+    let mut space = [0; POSTCARD_MAX];
+    let bytes = postcard::to_slice(config, &mut space);
+    crc32(bytes.as_deref().unwrap_or_default())
+}

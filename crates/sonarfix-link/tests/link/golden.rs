@@ -1,0 +1,105 @@
+//! The bytes of every message. If one of these fails, the layout has changed: raise
+//! [`sonarfix_link::VERSION`] (and [`sonarfix_link::baked::VERSION`], if it was a configuration's),
+//! and only then the bytes here.
+
+use sonarfix::aim::NoAim;
+use sonarfix::config::{Config, Policy, Rhythm};
+use sonarfix::ekf::Innovation;
+use sonarfix::health::Verdict;
+use sonarfix::localizer::Fix;
+use sonarfix::units::{Duration, Metres, SquareMetres};
+use sonarfix_link::message::Flashed;
+use sonarfix_link::{Command, Outcome, Telemetry, VERSION, baked};
+
+use crate::messages::{
+    COMMANDS, Counting, NO_ECHO, REFUSALS, REFUSED, RESETS, TELEMETRY, command, telemetry,
+};
+use crate::wire::to_stdvec;
+
+/// What the bytes below are of.
+const OF_VERSION: u8 = 1;
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |hex, byte| format!("{hex}{byte:02x}"))
+}
+
+fn name_of_telemetry(message: &Telemetry) -> &'static str {
+    // No wildcard: a new message wants a line here, and bytes below.
+    match message {
+        Telemetry::Hello(_) => "hello",
+        Telemetry::Began(_) => "began",
+        Telemetry::Step(_) => "step",
+        Telemetry::Look(_) => "look",
+        Telemetry::Skip(_) => "skip",
+        Telemetry::Estimate(_) => "estimate",
+        Telemetry::Loop(_) => "loop",
+        Telemetry::Ack(_) => "ack",
+    }
+}
+
+fn name_of_command(message: &Command) -> &'static str {
+    match message {
+        Command::SetPose(_) => "set pose",
+        Command::SetConfiguration(_) => "set configuration",
+        Command::Start => "start",
+        Command::Stop => "stop",
+        Command::ResetCalibration => "reset calibration",
+        Command::MapChecksum => "map checksum",
+    }
+}
+
+/// One of each: numbers counted up field by field, and of every choice between variants the first.
+fn all() -> Vec<(&'static str, String)> {
+    let numbers = || Counting { next: 0, variant: 0 };
+    let telemetry = (0..TELEMETRY).map(|kind| telemetry(kind, &mut numbers()));
+    let commands = (0..COMMANDS).map(|kind| command(kind, &mut numbers()));
+    let telemetry =
+        telemetry.map(|message| (name_of_telemetry(&message), hex(&to_stdvec(&message))));
+    telemetry
+        .chain(commands.map(|message| (name_of_command(&message), hex(&to_stdvec(&message)))))
+        .collect()
+}
+
+#[test]
+fn every_message_has_the_bytes_of_its_version() {
+    assert_eq!(VERSION, OF_VERSION);
+    let golden: Vec<_> = include_str!("golden.txt").lines().collect();
+    let now: Vec<_> = all().into_iter().map(|(name, hex)| format!("{name}: {hex}")).collect();
+    assert_eq!(now, golden);
+}
+
+/// The numbers of variants, which are bytes as well.
+#[test]
+fn every_variant_has_the_number_of_its_version() {
+    fn numbered<T: serde::Serialize>(variants: &[T]) {
+        for (number, variant) in (0_u8..).zip(variants) {
+            assert_eq!(to_stdvec(variant)[0], number);
+        }
+    }
+    numbered(&NO_ECHO);
+    numbered(&REFUSALS);
+    numbered(&RESETS);
+    numbered(&REFUSED);
+    numbered(&[NoAim::HeadingUncertain, NoAim::NoWall]);
+    numbered(&[Verdict::Tracking, Verdict::Degraded, Verdict::Lost]);
+    let innovation = Innovation { value: Metres(0.0), variance: SquareMetres(0.0) };
+    numbered(&[
+        Fix::Accepted(innovation),
+        Fix::Weakened(innovation),
+        Fix::Gated(innovation),
+        Fix::Refused(REFUSALS[0]),
+    ]);
+    numbered(&[Policy::Nearest, Policy::Informative]);
+    numbered(&[Rhythm::Every(Duration::from_ticks(0)), Rhythm::AsFastAsPossible]);
+    numbered(&[Flashed::Valid(0), Flashed::Missing, Flashed::Corrupt]);
+    numbered(&[Outcome::Done, Outcome::Map(Flashed::Missing), Outcome::Refused(REFUSED[0])]);
+}
+
+#[test]
+fn a_baked_configuration_has_the_bytes_of_its_version() {
+    assert_eq!(baked::VERSION, 1);
+    let config = Config::for_track_width(Metres(0.35));
+    let mut buffer = [0; baked::LENGTH_MAX];
+    let bytes = baked::write(&config, &mut buffer).unwrap();
+    assert_eq!(hex(bytes), include_str!("baked.txt").trim());
+}

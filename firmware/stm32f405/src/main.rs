@@ -1,0 +1,583 @@
+//! The reference board: an STM32F405 with two encoders, a servo, a pulse-width sonar and a UART.
+//!
+//! This file is the board, and the robot on it; what the robot does is in `sonarfix-app`. The
+//! wiring is drawn in `docs/firmware.md`.
+//!
+//! | | for | pins |
+//! |---|---|---|
+//! | TIM1, TIM8 | right and left encoder, counted by hardware | PA8 PA9, PC6 PC7 |
+//! | TIM10 | the servo's pulses | PB8 |
+//! | TIM5 | the clock, 1 µs in 32 bits, and the stamps of the echo's edges | PA0 |
+//! | TIM2 | a turn of the loop every millisecond | |
+//! | USART2 | the link, 115,200 baud | PA2 PA3 |
+//! | | the sonar's trigger; high while the robot may drive | PA1; PB7 |
+//!
+//! RTIC gives each interrupt the peripherals and queues that it uses and nothing else has: only
+//! lock-free queues and the echo's stamps are shared, no lock is taken, and no interrupt waits for
+//! another. The loop is RTIC's idle task: however long it takes, edges are stamped by hardware and
+//! bytes taken by interrupt.
+
+#![no_std]
+#![no_main]
+
+use core::ops::Deref;
+
+use defmt_rtt as _;
+use embedded_hal::pwm::{self, SetDutyCycle};
+use embedded_storage::nor_flash::{
+    ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
+};
+use heapless::spsc::{Consumer, Producer, Queue};
+use panic_probe as _;
+use sonarfix::units::{Duration, Metres, Radians};
+use sonarfix_app::{Body, Link};
+use sonarfix_hal::encoder::{Counter, WheelGeometry, Wheels};
+use sonarfix_hal::ranger::EchoCapture;
+use sonarfix_hal::robot::Settings;
+use sonarfix_hal::servo::{Calibration, MeasuredPulse, Pace, Servo};
+use sonarfix_link::message::Reset;
+use stm32f4xx_hal::pac::{self, tim1};
+use stm32f4xx_hal::rcc;
+
+/// Where TIM5's interrupt leaves the edges of the echo.
+static ECHO: EchoCapture = EchoCapture::new();
+
+/// The robot on the board: 65 mm wheels on gear motors with 11 lines, an SG90, an HC-SR04. Measure
+/// yours; what the configuration holds is not here.
+fn body(reset: Reset) -> Option<Body> {
+    // 11 lines × 4 edges × 34.014 turns of the motor.
+    let wheel = WheelGeometry::new(Metres(0.065), 1_496.6).ok()?;
+    let wheels = Wheels { right: wheel, left: wheel.reversed() };
+    Some(Body { wheels, settings: Settings::default(), firmware: version(), reset })
+}
+
+/// The servo's two pulses that were tried on the bench, and how far it may turn.
+fn servo(pwm: ServoPwm) -> Option<Servo<ServoPwm>> {
+    let tried = |width, degrees| MeasuredPulse {
+        width: Duration::from_ticks(width),
+        bearing: Radians::from_degrees(degrees),
+    };
+    let calibration = Calibration::new(tried(1_000, -45.0), tried(2_000, 45.0)).ok()?;
+    let limits = (Radians::from_degrees(-90.0), Radians::from_degrees(90.0));
+    Servo::new(pwm, calibration, limits, Pace::SG90).ok()
+}
+
+/// The clocks: the internal oscillator at 16 MHz, which is exact to 1 %, and so are the ranges'
+/// times; the filter's range scale finds that. With a crystal of 8 MHz: 48 MHz.
+fn clocks() -> rcc::Config {
+    if cfg!(feature = "crystal") {
+        rcc::Config::hse(fugit::HertzU32::MHz(8)).sysclk(fugit::HertzU32::MHz(48))
+    } else {
+        rcc::Config::hsi()
+    }
+}
+
+fn version() -> [u8; 3] {
+    let number = |text: &str| text.parse().unwrap_or(0);
+    [
+        number(env!("CARGO_PKG_VERSION_MAJOR")),
+        number(env!("CARGO_PKG_VERSION_MINOR")),
+        number(env!("CARGO_PKG_VERSION_PATCH")),
+    ]
+}
+
+/// What divides a timer's clock down to microseconds.
+fn microseconds(timer: fugit::HertzU32) -> u16 {
+    u16::try_from(timer.to_MHz()).unwrap_or(u16::MAX).saturating_sub(1)
+}
+
+/// Something of the chip that does not hold what was written to it: it has no clock, or an
+/// emulator does not have it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct NotThere;
+
+/// A timer of the kind of TIM1 as a quadrature counter: every edge of both channels.
+struct Encoder<T>(T);
+
+impl<T: Deref<Target = tim1::RegisterBlock>> Encoder<T> {
+    fn new(timer: T) -> Self {
+        timer
+            .ccmr1_input()
+            .write(|w| w.cc1s().ti1().cc2s().ti2().ic1f().set(0b11).ic2f().set(0b11));
+        timer.smcr().write(|w| w.sms().encoder_mode_3());
+        timer.arr().write(|w| w.arr().set(u16::MAX));
+        timer.cr1().write(|w| w.cen().set_bit());
+        Self(timer)
+    }
+}
+
+impl<T: Deref<Target = tim1::RegisterBlock>> Counter for Encoder<T> {
+    type Error = NotThere;
+    const BITS: u32 = 16;
+
+    fn count(&mut self) -> Result<u32, NotThere> {
+        let counts = self.0.smcr().read().sms().is_encoder_mode_3();
+        if counts { Ok(u32::from(self.0.cnt().read().cnt().bits())) } else { Err(NotThere) }
+    }
+}
+
+/// TIM10's only channel: pulses of half a microsecond's resolution every 20 ms.
+struct ServoPwm(pac::TIM10);
+
+impl ServoPwm {
+    /// Counts of a 20 ms frame.
+    const FRAME: u16 = 40_000;
+
+    fn new(timer: pac::TIM10, clock: fugit::HertzU32) -> Self {
+        let divider = u16::try_from(clock.to_MHz() / 2).unwrap_or(u16::MAX).saturating_sub(1);
+        timer.psc().write(|w| w.psc().set(divider));
+        timer.arr().write(|w| w.arr().set(Self::FRAME - 1));
+        timer.ccmr1_output().write(|w| w.oc1m().pwm_mode1().oc1pe().set_bit());
+        timer.ccer().write(|w| w.cc1e().set_bit());
+        timer.egr().write(|w| w.ug().set_bit());
+        timer.cr1().write(|w| w.cen().set_bit());
+        Self(timer)
+    }
+}
+
+impl pwm::Error for NotThere {
+    fn kind(&self) -> pwm::ErrorKind {
+        pwm::ErrorKind::Other
+    }
+}
+
+impl pwm::ErrorType for ServoPwm {
+    type Error = NotThere;
+}
+
+impl SetDutyCycle for ServoPwm {
+    fn max_duty_cycle(&self) -> u16 {
+        Self::FRAME
+    }
+
+    fn set_duty_cycle(&mut self, duty: u16) -> Result<(), NotThere> {
+        self.0.ccr1().write(|w| w.ccr().set(duty));
+        if self.0.cr1().read().cen().bit_is_set() { Ok(()) } else { Err(NotThere) }
+    }
+}
+
+/// The link: what the loop has of it.
+struct Uart {
+    received: Consumer<'static, u8>,
+    to_send: Producer<'static, u8>,
+}
+
+/// What came in between two turns of the loop is 12 bytes; what goes out at one is 400.
+type Received = Queue<u8, 64>;
+type ToSend = Queue<u8, 512>;
+
+impl Link for Uart {
+    fn receive(&mut self) -> Option<u8> {
+        self.received.dequeue()
+    }
+
+    fn send(&mut self, frame: &[u8]) {
+        if self.to_send.capacity() - self.to_send.len() < frame.len() {
+            return;
+        }
+        for byte in frame {
+            // There is room.
+            let _ = self.to_send.enqueue(*byte);
+        }
+        rtic::pend(pac::Interrupt::USART2);
+    }
+}
+
+/// Sectors 2 and 3 of the flash, 16 KiB each, in addresses from the flash's start on.
+struct Sectors(pac::FLASH);
+
+/// The flash's controller refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct FlashError;
+
+impl NorFlashError for FlashError {
+    fn kind(&self) -> NorFlashErrorKind {
+        NorFlashErrorKind::Other
+    }
+}
+
+impl ErrorType for Sectors {
+    type Error = FlashError;
+}
+
+impl Sectors {
+    const BASE: u32 = 0x0800_0000;
+    const SECTOR: u32 = 16 * 1024;
+
+    /// Lets a command write, and locks the controller again.
+    fn unlocked(
+        &mut self,
+        work: impl FnOnce(&mut pac::FLASH) -> Result<(), FlashError>,
+    ) -> Result<(), FlashError> {
+        // A controller that is not locked after reset is none.
+        if self.0.cr().read().lock().bit_is_clear() {
+            return Err(FlashError);
+        }
+        for key in [0x4567_0123, 0xCDEF_89AB] {
+            self.0.keyr().write(|w| w.key().set(key));
+        }
+        let done = work(&mut self.0);
+        self.0.cr().write(|w| w.lock().set_bit());
+        done
+    }
+
+    /// Waits for the flash, during which the core stands still: it runs from there.
+    fn finish(flash: &pac::FLASH) -> Result<(), FlashError> {
+        while flash.sr().read().bsy().bit_is_set() {}
+        let status = flash.sr().read();
+        let failed = status.pgserr().bit_is_set()
+            || status.pgperr().bit_is_set()
+            || status.pgaerr().bit_is_set()
+            || status.wrperr().bit_is_set();
+        if failed { Err(FlashError) } else { Ok(()) }
+    }
+}
+
+impl ReadNorFlash for Sectors {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
+        for (address, byte) in (Self::BASE + offset..).zip(bytes) {
+            *byte = memory::read(address);
+        }
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        memory::store().end as usize
+    }
+}
+
+impl NorFlash for Sectors {
+    const WRITE_SIZE: usize = 4;
+    const ERASE_SIZE: usize = Self::SECTOR as usize;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
+        for sector in from / Self::SECTOR..to / Self::SECTOR {
+            let number = u8::try_from(sector).map_err(|_| FlashError)?;
+            self.unlocked(|flash| {
+                memory::select(flash, number);
+                flash.cr().modify(|_, w| w.strt().set_bit());
+                Self::finish(flash)
+            })?;
+        }
+        Ok(())
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
+        self.unlocked(|flash| {
+            flash.cr().write(|w| w.psize().psize32().pg().set_bit());
+            let (words, _) = bytes.as_chunks::<4>();
+            for (address, word) in (Self::BASE + offset..).step_by(4).zip(words) {
+                memory::write(flash, address, u32::from_le_bytes(*word));
+                Self::finish(flash)?;
+            }
+            Ok(())
+        })
+    }
+}
+
+/// The flash's memory, as `memory.x` divides it.
+#[expect(unsafe_code, reason = "memory that the linker script names and Rust does not know")]
+mod memory {
+    use core::ops::Range;
+
+    use stm32f4xx_hal::pac;
+
+    unsafe extern "C" {
+        static __map_start: u8;
+        static __map_length: u8;
+        static __config_start: u8;
+        static __config_length: u8;
+        static __store_start: u8;
+        static __store_length: u8;
+    }
+
+    /// The baked map's region.
+    pub fn map() -> &'static [u8] {
+        // SAFETY: a region of flash of this length, where nothing is linked to and nothing written.
+        unsafe {
+            core::slice::from_raw_parts(&raw const __map_start, (&raw const __map_length).addr())
+        }
+    }
+
+    /// The baked configuration's region.
+    pub fn config() -> &'static [u8] {
+        // SAFETY: as above.
+        unsafe {
+            core::slice::from_raw_parts(
+                &raw const __config_start,
+                (&raw const __config_length).addr(),
+            )
+        }
+    }
+
+    /// The store's region, in addresses from the flash's start on.
+    pub fn store() -> Range<u32> {
+        let number = |address: usize| u32::try_from(address).unwrap_or(u32::MAX);
+        let start = number((&raw const __store_start).addr()) - super::Sectors::BASE;
+        start..start + number((&raw const __store_length).addr())
+    }
+
+    /// Reads a byte of the store.
+    pub fn read(address: u32) -> u8 {
+        // SAFETY: `Store` keeps to the region, which is readable; volatile, because it is written.
+        unsafe { core::ptr::with_exposed_provenance::<u8>(address as usize).read_volatile() }
+    }
+
+    /// Tells the flash's controller which sector to erase.
+    pub fn select(controller: &mut pac::FLASH, sector: u8) {
+        // SAFETY: `Store` keeps to its region, whose sectors hold neither code nor constants.
+        controller
+            .cr()
+            .write(|w| unsafe { w.psize().psize32().ser().set_bit().snb().bits(sector) });
+    }
+
+    /// Writes a word of the store; the controller, which whoever calls this has, is ready for it.
+    pub fn write(_controller: &mut pac::FLASH, address: u32, word: u32) {
+        // SAFETY: `Store` keeps to the region, in whole words; no reference to it exists.
+        unsafe {
+            core::ptr::with_exposed_provenance_mut::<u32>(address as usize).write_volatile(word);
+        }
+    }
+}
+
+#[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
+mod app {
+    use heapless::spsc::{Consumer, Producer};
+    use sonarfix::units::Instant;
+    use sonarfix_app::store::Store;
+    use sonarfix_app::{App, Flashed, log};
+    use sonarfix_hal::ranger::{Air, Captured, PulseRanger, PulseTiming};
+    use sonarfix_hal::robot::Devices;
+    use sonarfix_link::message::Reset;
+    use stm32f4xx_hal::gpio::{GpioExt, Output, Pin};
+    use stm32f4xx_hal::hal_02::serial::{Read, Write};
+    use stm32f4xx_hal::pac::{self, TIM1, TIM2, TIM5, TIM8, TIM10, USART2};
+    use stm32f4xx_hal::rcc::{Enable, RccExt};
+    use stm32f4xx_hal::serial::{self, Rx, RxListen, SerialExt, Tx, TxISR, TxListen};
+    use stm32f4xx_hal::time::Bps;
+    use stm32f4xx_hal::watchdog::IndependentWatchdog;
+
+    use super::{ECHO, Encoder, Received, Sectors, ServoPwm, ToSend, Uart, memory, microseconds};
+
+    /// A turn of the loop, µs.
+    const TURN: u32 = 1_000;
+    /// Longer than the erasing of a sector (at most 0.5 s), which keeps the loop from its
+    /// deadlines.
+    const WATCHDOG: fugit::MillisDurationU32 = fugit::MillisDurationU32::from_ticks(2_000);
+
+    type Hardware = Devices<
+        Encoder<TIM1>,
+        Encoder<TIM8>,
+        ServoPwm,
+        PulseRanger<Pin<'A', 1, Output>, Captured<'static>>,
+    >;
+
+    #[shared]
+    struct Shared {
+        clock: TIM5,
+    }
+
+    #[local]
+    struct Local {
+        app: App<'static, Sectors>,
+        hardware: Hardware,
+        link: Uart,
+        drive: Pin<'B', 7, Output>,
+        watchdog: IndependentWatchdog,
+        turn: TIM2,
+        rx: (Rx<USART2>, Producer<'static, u8>),
+        tx: (Tx<USART2>, Consumer<'static, u8>),
+    }
+
+    #[init(local = [received: Received = Received::new(), to_send: ToSend = ToSend::new()])]
+    // Its frame would stay below the loop's for ever.
+    #[inline(never)]
+    fn init(context: init::Context) -> (Shared, Local) {
+        let board = context.device;
+        let reset = reset(&board.RCC);
+        // So that the log can be read while the core sleeps.
+        board.DBGMCU.cr().modify(|_, w| w.dbg_sleep().set_bit());
+        let mut rcc = board.RCC.freeze(super::clocks());
+        TIM1::enable(&mut rcc);
+        TIM2::enable(&mut rcc);
+        TIM5::enable(&mut rcc);
+        TIM8::enable(&mut rcc);
+        TIM10::enable(&mut rcc);
+        let a = board.GPIOA.split(&mut rcc);
+        let b = board.GPIOB.split(&mut rcc);
+        let c = board.GPIOC.split(&mut rcc);
+        // The pins of encoders, echo and servo are the timers' from here on.
+        let _ = (a.pa8.into_alternate::<1>(), a.pa9.into_alternate::<1>());
+        let _ = (c.pc6.into_alternate::<3>(), c.pc7.into_alternate::<3>());
+        let _ = (a.pa0.into_alternate::<2>(), b.pb8.into_alternate::<3>());
+        let timer_clock = rcc.clocks.timclk1();
+        start_clock(&board.TIM5, microseconds(timer_clock));
+        start_turns(&board.TIM2, microseconds(timer_clock));
+
+        let uart = serial::Config::default().baudrate(Bps(115_200));
+        let uart = board.USART2.serial((a.pa2, a.pa3), uart, &mut rcc);
+        let pwm = ServoPwm::new(board.TIM10, rcc.clocks.timclk2());
+        let flashed = Flashed::read(memory::map(), memory::config());
+        log::flashed(&flashed);
+        let store = Store::new(Sectors(board.FLASH), memory::store());
+        let parts = (uart.ok(), super::servo(pwm), super::body(reset), store.ok());
+        let (Some(uart), Some(servo), Some(body), Some(store)) = parts else {
+            stop();
+        };
+        let Ok(app) = App::new(body, flashed, store, Instant::from_ticks(0)) else {
+            stop();
+        };
+        let trigger = a.pa1.into_push_pull_output();
+        let timing = PulseTiming::HC_SR04;
+        let hardware = Devices {
+            right: Encoder::new(board.TIM1),
+            left: Encoder::new(board.TIM8),
+            servo,
+            ranger: PulseRanger::new(trigger, Captured::new(&ECHO), timing, Air::ROOM),
+        };
+        let (tx, mut rx) = uart.split();
+        rx.listen();
+        let (received, incoming) = context.local.received.split();
+        let (to_send, outgoing) = context.local.to_send.split();
+        let mut watchdog = IndependentWatchdog::new(board.IWDG);
+        watchdog.start(WATCHDOG);
+        let local = Local {
+            app,
+            hardware,
+            link: Uart { received: incoming, to_send },
+            drive: b.pb7.into_push_pull_output(),
+            watchdog,
+            turn: board.TIM2,
+            rx: (rx, received),
+            tx: (tx, outgoing),
+        };
+        (Shared { clock: board.TIM5 }, local)
+    }
+
+    /// A turn of the loop at every millisecond's interrupt.
+    #[idle(shared = [clock], local = [app, hardware, link, drive, watchdog])]
+    #[inline(never)]
+    fn idle(mut context: idle::Context) -> ! {
+        let idle::LocalResources { app, hardware, link, drive, watchdog, .. } = context.local;
+        let mut now = Instant::from_ticks(0);
+        loop {
+            rtic::export::wfi();
+            now = context.shared.clock.lock(|clock| advanced(now, clock.cnt().read().bits()));
+            let polled = app.poll(now, hardware, link);
+            drive.set_state(polled.is_running.into());
+            if polled.is_on_time {
+                watchdog.feed();
+            }
+            log::polled(&polled);
+            let done = context.shared.clock.lock(|clock| advanced(now, clock.cnt().read().bits()));
+            if let Some(took) = done.checked_duration_since(now) {
+                app.took(took);
+            }
+        }
+    }
+
+    /// The edges of the echo: the timer has stamped them.
+    #[task(binds = TIM5, shared = [clock], priority = 2)]
+    fn echo(mut context: echo::Context) {
+        context.shared.clock.lock(|clock| {
+            let status = clock.sr().read();
+            let rise = clock.ccr1().read().bits();
+            let fall = clock.ccr2().read().bits();
+            clock.sr().write(|w| w.cc1if().clear_bit().cc2if().clear_bit());
+            if status.cc1if().bit_is_set() {
+                ECHO.rose(Instant::from_ticks(rise.into()));
+            }
+            if status.cc2if().bit_is_set() {
+                ECHO.fell(Instant::from_ticks(fall.into()));
+            }
+        });
+    }
+
+    /// Wakes the loop.
+    #[task(binds = TIM2, local = [turn])]
+    fn turn(context: turn::Context) {
+        context.local.turn.sr().write(|w| w.uif().clear_bit());
+    }
+
+    /// A byte has come, can go, or is to go: the loop asks for this interrupt when it has one.
+    #[task(binds = USART2, local = [rx, tx])]
+    fn uart(context: uart::Context) {
+        let uart::LocalResources { rx: (rx, received), tx: (tx, outgoing), .. } = context.local;
+        if let Ok(byte) = rx.read() {
+            // The loop empties the queue ten times faster than the line can fill it.
+            let _ = received.enqueue(byte);
+        }
+        while tx.is_tx_empty() {
+            let Some(byte) = outgoing.dequeue() else {
+                tx.unlisten();
+                return;
+            };
+            let _ = tx.write(byte);
+        }
+        tx.listen();
+    }
+
+    /// Lets TIM5 count microseconds, and stamp both edges at its first pin.
+    fn start_clock(timer: &TIM5, divider: u16) {
+        timer.psc().write(|w| w.psc().set(divider));
+        timer.arr().write(|w| w.arr().set(u32::MAX));
+        timer.egr().write(|w| w.ug().set_bit());
+        // Both channels listen to the first pin, through a filter of eight clocks.
+        timer.ccmr1_input().write(|w| {
+            w.cc1s().ti1().ic1f().fck_int_n8();
+            w.cc2s().ti1().ic2f().set(0b11)
+        });
+        timer.ccer().write(|w| {
+            w.cc1e().set_bit().cc1p().clear_bit();
+            w.cc2e().set_bit().cc2p().set_bit()
+        });
+        timer.dier().write(|w| w.cc1ie().set_bit().cc2ie().set_bit());
+        timer.cr1().write(|w| w.cen().set_bit());
+    }
+
+    /// Lets TIM2 interrupt every [`TURN`].
+    fn start_turns(timer: &TIM2, divider: u16) {
+        timer.psc().write(|w| w.psc().set(divider));
+        timer.arr().write(|w| w.arr().set(TURN - 1));
+        timer.egr().write(|w| w.ug().set_bit());
+        timer.sr().write(|w| w.uif().clear_bit());
+        timer.dier().write(|w| w.uie().set_bit());
+        timer.cr1().write(|w| w.cen().set_bit());
+    }
+
+    /// The time, by a counter that shows the low 32 bits of it, soon after `then`.
+    fn advanced(then: Instant, count: u32) -> Instant {
+        #[expect(clippy::cast_possible_truncation, reason = "the low bits are what is asked for")]
+        let elapsed = count.wrapping_sub(then.ticks() as u32);
+        Instant::from_ticks(then.ticks().saturating_add(elapsed.into()))
+    }
+
+    /// Why the chip was reset; the flags are cleared for the next time.
+    fn reset(rcc: &pac::RCC) -> Reset {
+        let flags = rcc.csr().read();
+        rcc.csr().modify(|_, w| w.rmvf().set_bit());
+        if flags.wdgrstf().bit_is_set() || flags.wwdgrstf().bit_is_set() {
+            Reset::Watchdog
+        } else if flags.sftrstf().bit_is_set() {
+            Reset::Software
+        } else if flags.porrstf().bit_is_set() {
+            Reset::PowerOn
+        } else if flags.borrstf().bit_is_set() {
+            Reset::BrownOut
+        } else if flags.padrstf().bit_is_set() {
+            Reset::Pin
+        } else {
+            Reset::Unknown
+        }
+    }
+
+    /// The constants at the top of this file contradict each other.
+    fn stop() -> ! {
+        defmt::error!("the board's constants are no robot: see `body` and `servo`");
+        loop {
+            rtic::export::wfi();
+        }
+    }
+}
