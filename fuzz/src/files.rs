@@ -87,8 +87,11 @@ fn check_record(record: &Record) {
     let (time, numbers) = match record {
         Record::Ticks { time, .. } => (time, vec![]),
         Record::Wheels { time, right, left } => (time, vec![*right, *left]),
-        Record::Range { time, bearing, range } => (time, vec![*bearing, range.unwrap_or(0.0)]),
-        Record::Scan { time, .. } => (time, vec![]),
+        Record::Range { time, bearing, range, .. } => (time, vec![*bearing, range.unwrap_or(0.0)]),
+        Record::Scan { time, .. } | Record::Skip { time } => (time, vec![]),
+        Record::Resume { time, state, deviation } => {
+            (time, state.iter().chain(deviation).copied().collect())
+        }
         Record::Start { time, pose, position_deviation, heading_deviation } => {
             (time, vec![pose.x, pose.y, pose.heading, *position_deviation, *heading_deviation])
         }
