@@ -41,6 +41,7 @@ const LARGEST_TURN: f32 = 64.0;
 /// What the filter refuses to compute with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum EkfError {
     /// An argument is NaN, infinite or larger than is computed with, or the result would be.
     NotFinite,

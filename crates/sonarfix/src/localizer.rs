@@ -52,6 +52,7 @@ impl core::error::Error for StartError {}
 /// it adds it to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum OdometryError {
     /// The time is before that of an earlier call.
     TimeRanBackwards,

@@ -3,7 +3,6 @@
 use std::collections::VecDeque;
 
 use sonarfix::units::Instant;
-use sonarfix_hal::ranger::EchoCapture;
 
 /// From the end of the trigger to the rise of the echo line, µs: an HC-SR04 sends its eight
 /// cycles first (`sonarfix-hal`'s `PulseRanger` has the picture).
@@ -32,11 +31,13 @@ impl SonarBoard {
         self.edges.front().map(|&(at, _)| at)
     }
 
-    /// Lets every edge up to `now` interrupt the controller.
-    pub fn deliver(&mut self, now: u64, capture: &EchoCapture) {
+    /// The edges up to `now`: when the line rose, and when it then fell.
+    pub fn edges(&mut self, now: u64) -> (Option<Instant>, Option<Instant>) {
+        let mut edges = (None, None);
         while let Some((at, is_high)) = self.edges.pop_front_if(|&mut (at, _)| at <= now) {
-            let at = Instant::from_ticks(at);
-            if is_high { capture.rose(at) } else { capture.fell(at) }
+            let edge = if is_high { &mut edges.0 } else { &mut edges.1 };
+            *edge = Some(Instant::from_ticks(at));
         }
+        edges
     }
 }

@@ -1,41 +1,17 @@
-//! The drivers and the loop of `sonarfix-hal`, set up for a scenario as its builder would.
+//! The devices of a scenario: what its robot's drivers must know of them, and what they are.
 
 use sonarfix::config::Config;
 use sonarfix::units::{Duration, Metres};
-use sonarfix_hal::encoder::{GeometryError, TickCount, WheelGeometry, Wheels};
-use sonarfix_hal::ranger::{Air, Captured, Celsius, PulseRanger, PulseTiming, TemperatureError};
-use sonarfix_hal::robot::{Devices, Settings, SettingsError, Stamp};
-use sonarfix_hal::servo::{Calibration, MeasuredPulse, Pace, Servo, SettingError};
+use sonarfix_hal::ranger::{Celsius, PulseTiming};
+use sonarfix_hal::robot::{Settings, Stamp};
+use sonarfix_hal::servo::{MeasuredPulse, Pace};
 use sonarfix_map::{Robot, Scenario, ServoName, SonarName};
+use sonarfix_pil::Board;
+use sonarfix_pil::board::{ServoBuild, Wheel};
+use sonarfix_pil::wires::FULL_DUTY;
 
-use super::wires::{FULL_DUTY, ServoChannel, TriggerPin, Wires};
 use crate::plant::servo::ServoModel;
 use crate::world::air;
-
-/// The devices of a simulated robot.
-pub type PinDevices<'w> = Devices<
-    &'w TickCount,
-    &'w TickCount,
-    ServoChannel<'w>,
-    PulseRanger<TriggerPin<'w>, Captured<'w>>,
->;
-
-/// Why a scenario's hardware cannot be driven.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum SetupError {
-    /// An encoder.
-    #[error("encoder: {0}")]
-    Wheel(#[from] GeometryError),
-    /// The servo.
-    #[error("servo: {0}")]
-    Servo(#[from] SettingError),
-    /// The air.
-    #[error("sensor: {0}")]
-    Air(#[from] TemperatureError),
-    /// The loop.
-    #[error("loop: {0}")]
-    Loop(#[from] SettingsError),
-}
 
 /// Where a robot file does not say how long a tick is: 1 mm, of the 0.05 to 1 mm that encoders of
 /// small robots have (`FIELD.md`).
@@ -47,27 +23,18 @@ pub fn ticks(robot: &Robot) -> [f64; 2] {
     robot.travel_per_tick.map_or([TICK; 2], |per| [per.right.0.into(), per.left.0.into()])
 }
 
-/// Both wheels, as the loop knows them.
-///
-/// # Errors
-/// [`SetupError::Wheel`].
-pub fn wheels(robot: &Robot) -> Result<Wheels, SetupError> {
+/// A wheel, as the loop knows it.
+fn wheel(tick: f64) -> Wheel {
     /// Any number of ticks will do: only their length counts here.
     const PER_TURN: f32 = 1024.0;
-    let wheel = |tick: f64| {
-        #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
-        let tick = tick as f32;
-        let diameter = Metres(tick.abs() * PER_TURN / std::f32::consts::PI);
-        let wheel = WheelGeometry::new(diameter, PER_TURN)?;
-        Ok::<_, SetupError>(if tick < 0.0 { wheel.reversed() } else { wheel })
-    };
-    let [right, left] = ticks(robot);
-    Ok(Wheels { right: wheel(right)?, left: wheel(left)? })
+    #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
+    let tick = tick as f32;
+    let diameter = Metres(tick.abs() * PER_TURN / std::f32::consts::PI);
+    Wheel { diameter, ticks_per_revolution: PER_TURN, is_reversed: tick < 0.0 }
 }
 
 /// The loop's settings.
-#[must_use]
-pub fn settings(robot: &Robot, stamp: Stamp) -> Settings {
+fn settings(robot: &Robot, stamp: Stamp) -> Settings {
     Settings {
         tick: robot.encoder_period,
         rhythm: robot.config.sonar.timing.rhythm,
@@ -122,19 +89,19 @@ impl ServoSetup {
         rightmost + (leftmost - rightmost) * (pulse - shortest) / (longest - shortest)
     }
 
-    fn driver<'w>(
-        &self,
-        wires: &'w Wires,
-        config: &Config,
-    ) -> Result<Servo<ServoChannel<'w>>, SettingError> {
-        let point = |width: u16, bearing| MeasuredPulse {
+    /// What its driver is told of it.
+    fn build(&self, config: &Config) -> ServoBuild {
+        let tried = |width: u16, bearing| MeasuredPulse {
             width: Duration::from_ticks(width.into()),
             bearing,
         };
         let (rightmost, leftmost) = config.sonar.servo;
-        let calibration =
-            Calibration::new(point(self.pulses.0, rightmost), point(self.pulses.1, leftmost))?;
-        Servo::new(ServoChannel(&wires.duty), calibration, (rightmost, leftmost), self.pace)
+        let (shortest, longest) = self.pulses;
+        ServoBuild {
+            tried: (tried(shortest, rightmost), tried(longest, leftmost)),
+            limits: (rightmost, leftmost),
+            pace: self.pace,
+        }
     }
 }
 
@@ -168,22 +135,18 @@ pub fn timing(scenario: &Scenario) -> PulseTiming {
     }
 }
 
-/// The devices on a robot's wires.
-///
-/// # Errors
-/// [`SetupError`], by the device that cannot be driven.
-pub fn connect<'w>(
-    wires: &'w Wires,
-    scenario: &Scenario,
-    servo: &ServoSetup,
-) -> Result<PinDevices<'w>, SetupError> {
+/// What the drivers of a scenario's robot are told of its devices.
+#[must_use]
+pub fn board(scenario: &Scenario, stamp: Stamp) -> Board {
+    let [right, left] = ticks(&scenario.robot).map(wheel);
     #[expect(clippy::cast_possible_truncation, reason = "the driver computes in f32")]
-    let air = Air::at(Celsius(scenario.hardware.set_temperature as f32))?;
-    let line = Captured::new(&wires.echo);
-    Ok(Devices {
-        right: &wires.right.count,
-        left: &wires.left.count,
-        servo: servo.driver(wires, &scenario.robot.config)?,
-        ranger: PulseRanger::new(TriggerPin(wires), line, timing(scenario), air),
-    })
+    let air = Celsius(scenario.hardware.set_temperature as f32);
+    Board {
+        right,
+        left,
+        servo: ServoSetup::of(scenario.hardware.servo).build(&scenario.robot.config),
+        sonar: timing(scenario),
+        air,
+        settings: settings(&scenario.robot, stamp),
+    }
 }

@@ -2,17 +2,17 @@
 //! `sonarfix-hal`, which run on it unmodified.
 //!
 //! ```text
-//!   drivers and loop          wires                     the world's side
-//!   Quadrature ◀── A, B ───────────────────────────── EncoderDisc ◀── wheel
-//!   Servo ─────── duty ──────────────────────────────▶ ServoPlant
-//!   PulseRanger ── trigger ───────────────────────────▶ SonarBoard ──▶ ping
-//!   EchoCapture ◀─ edges, stamped by an "interrupt" ─── SonarBoard ◀── echo
+//!   drivers and loop     sonarfix-pil's wires            the world's side
+//!   Counter     ◀──────── Sensors ◀── Quadrature ◀── A, B ── EncoderDisc ◀── wheel
+//!   Servo       ────────▶ Actuators ── duty ────────────────▶ ServoPlant
+//!   PulseRanger ────────▶ Actuators ── trigger ─────────────▶ SonarBoard ──▶ ping
+//!   EchoCapture ◀──────── Sensors ◀─── edges, stamped ─────── SonarBoard ◀── echo
 //! ```
 //!
-//! - [`wires`]: the pins, as the drivers see them;
+//! - [`wires`]: the channels of an encoder, and the shipped decoder's count of them;
 //! - [`disc`]: an encoder's disc, which makes the edges;
 //! - [`board`]: a sonar's board, which turns a trigger into the pulse of an echo;
-//! - [`devices`]: the drivers, set up for a scenario;
+//! - [`devices`]: what the drivers are told of a scenario's devices;
 //! - [`faults`]: what goes wrong on the way.
 
 pub mod board;

@@ -1,12 +1,11 @@
-//! What runs between the robot's controller and its devices.
+//! What runs between an encoder's disc and the controller.
 
 use std::cell::Cell;
 use std::convert::Infallible;
 
-use embedded_hal::digital::{ErrorType as DigitalError, InputPin, OutputPin};
-use embedded_hal::pwm::{ErrorType as PwmError, SetDutyCycle};
-use sonarfix_hal::encoder::TickCount;
-use sonarfix_hal::ranger::EchoCapture;
+use embedded_hal::digital::{ErrorType, InputPin};
+use sonarfix_hal::encoder::{Counter, TickCount};
+use sonarfix_pil::Counted;
 
 /// The two channels of an encoder, and the count that is made of them.
 #[derive(Debug, Default)]
@@ -19,28 +18,21 @@ pub struct EncoderWires {
     pub count: TickCount,
 }
 
-/// All wires of a robot.
-#[derive(Debug, Default)]
-pub struct Wires {
-    /// The right wheel's encoder.
-    pub right: EncoderWires,
-    /// The left wheel's encoder.
-    pub left: EncoderWires,
-    /// A duty that was set and not yet taken note of.
-    pub duty: Cell<Option<u16>>,
-    /// Level of the sonar's trigger.
-    pub trigger: Cell<bool>,
-    /// Whether the trigger fell since that was last looked at.
-    pub triggered: Cell<bool>,
-    /// The echo line's edges.
-    pub echo: EchoCapture,
+impl EncoderWires {
+    /// What the counter shows.
+    #[must_use]
+    pub fn counted(&self) -> Counted {
+        let mut counter = &self.count;
+        let Ok(ticks) = counter.count();
+        Counted { ticks, illegal: counter.illegal() }
+    }
 }
 
 /// A channel of an encoder, at the controller.
 #[derive(Debug)]
 pub struct ChannelPin<'w>(pub &'w Cell<bool>);
 
-impl DigitalError for ChannelPin<'_> {
+impl ErrorType for ChannelPin<'_> {
     type Error = Infallible;
 }
 
@@ -51,49 +43,5 @@ impl InputPin for ChannelPin<'_> {
 
     fn is_low(&mut self) -> Result<bool, Infallible> {
         Ok(!self.0.get())
-    }
-}
-
-/// The sonar's trigger, at the controller.
-#[derive(Debug)]
-pub struct TriggerPin<'w>(pub &'w Wires);
-
-impl DigitalError for TriggerPin<'_> {
-    type Error = Infallible;
-}
-
-impl OutputPin for TriggerPin<'_> {
-    fn set_low(&mut self) -> Result<(), Infallible> {
-        if self.0.trigger.replace(false) {
-            self.0.triggered.set(true);
-        }
-        Ok(())
-    }
-
-    fn set_high(&mut self) -> Result<(), Infallible> {
-        self.0.trigger.set(true);
-        Ok(())
-    }
-}
-
-/// The servo's PWM channel, at the controller.
-#[derive(Debug)]
-pub struct ServoChannel<'w>(pub &'w Cell<Option<u16>>);
-
-/// Counts of a frame: a 16-bit timer.
-pub const FULL_DUTY: u16 = u16::MAX;
-
-impl PwmError for ServoChannel<'_> {
-    type Error = Infallible;
-}
-
-impl SetDutyCycle for ServoChannel<'_> {
-    fn max_duty_cycle(&self) -> u16 {
-        FULL_DUTY
-    }
-
-    fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Infallible> {
-        self.0.set(Some(duty));
-        Ok(())
     }
 }

@@ -1,10 +1,10 @@
 //! A run in which the localizer is told everything at once and on the dot.
 
 use sonarfix::aim::Aim;
-use sonarfix::localizer::Localizer;
 use sonarfix::motion::WheelTravel;
 use sonarfix::units::{Instant, Metres};
 
+use super::computer::{Computer, Told};
 use super::score::Score;
 use super::{Chance, Simulation, SimulationError, seconds};
 use crate::angle;
@@ -21,8 +21,17 @@ pub fn run(
     simulation: &Simulation,
     seed: u64,
     recorder: &mut impl Recorder,
+    computer: &mut impl Computer,
 ) -> Result<RunResult, SimulationError> {
-    let mut run = Run::new(simulation, seed)?;
+    let mut chance = Chance::new(seed);
+    let plant = simulation.plant();
+    let start = simulation.start(&plant.state(), &mut chance.start);
+    let localizer = computer.localizer(start, Instant::from_ticks(0))?;
+    let score = Score::new(simulation, start, plant.state())?;
+    // Here ranges fly no time.
+    let sensor = SensorModel { scale: simulation.range_scale, ..simulation.sensor.clone() };
+    let follower = simulation.follower();
+    let mut run = Run { simulation, sensor, chance, plant, localizer, follower, score, now: 0 };
     let tick_period = simulation.scenario.robot.encoder_period.to_micros();
     let fix_period = simulation.ideal_period().to_micros();
     let (mut next_tick, mut next_fix) = (tick_period, fix_period);
@@ -30,42 +39,32 @@ pub fn run(
         let now = next_tick.min(next_fix);
         run.drive_to(now)?;
         if now == next_fix {
-            run.take_fix(recorder);
+            run.take_fix(recorder)?;
             next_fix += fix_period;
         }
         if now == next_tick {
-            run.end_tick(recorder);
+            run.end_tick(recorder)?;
             next_tick += tick_period;
         }
     }
-    run.score.result(&run.localizer)
+    run.score.result(run.localizer.localizer()?)
 }
 
 /// A run under way.
-struct Run<'a> {
+struct Run<'a, T> {
     simulation: &'a Simulation,
     /// The scenario's sonar, and what the air makes of its ranges: here they fly no time.
     sensor: SensorModel,
     chance: Chance,
     plant: Plant<'a>,
-    localizer: Localizer<'a>,
+    localizer: T,
     follower: Option<Follower>,
     score: Score<'a>,
     /// Microseconds since the run began.
     now: u64,
 }
 
-impl<'a> Run<'a> {
-    fn new(simulation: &'a Simulation, seed: u64) -> Result<Self, SimulationError> {
-        let mut chance = Chance::new(seed);
-        let plant = simulation.plant();
-        let localizer = simulation.localizer(&plant.state(), &mut chance.start)?;
-        let score = Score::new(simulation, &localizer, plant.state());
-        let sensor = SensorModel { scale: simulation.range_scale, ..simulation.sensor.clone() };
-        let follower = simulation.follower();
-        Ok(Self { simulation, sensor, chance, plant, localizer, follower, score, now: 0 })
-    }
-
+impl<T: Told> Run<'_, T> {
     fn time(&self) -> f64 {
         seconds(self.now)
     }
@@ -79,31 +78,32 @@ impl<'a> Run<'a> {
         #[expect(clippy::cast_possible_truncation, reason = "the robot counts in f32")]
         let [right, left] = travel.measured.map(|metres| metres as f32);
         self.localizer
-            .odometry(Instant::from_ticks(now), WheelTravel::new(right, left))
+            .odometry(Instant::from_ticks(now), WheelTravel::new(right, left))?
             .map_err(|error| SimulationError::Odometry { time, error })
     }
 
-    fn take_fix(&mut self, recorder: &mut impl Recorder) {
+    fn take_fix(&mut self, recorder: &mut impl Recorder) -> Result<(), SimulationError> {
         let truth = self.plant.pose();
         let sonar = self.simulation.sonar_at(&truth);
         let mut look =
             Look { time: self.time(), sonar, heading: truth.heading, range: None, met: None };
-        let aim = match self.localizer.aim() {
+        let aim = match self.localizer.aim()? {
             Ok(aim) => aim,
             Err(no_aim) => {
-                self.localizer.skip();
+                self.localizer.skip()?;
                 self.score.no_aim();
                 recorder.fix(|| observe::no_aim_record(look, no_aim));
-                return;
+                return Ok(());
             }
         };
         let echo = self.ping(sonar, truth.heading, &aim);
         look.range = echo.map(|echo| echo.range);
         look.met = echo.map(|echo| echo.source);
         #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
-        let fix = self.localizer.fix(&aim, look.range.map(|range| Metres(range as f32)));
+        let fix = self.localizer.fix(&aim, look.range.map(|range| Metres(range as f32)))?;
         self.score.fix(&aim, &fix);
         recorder.fix(|| observe::fix_record(look, &aim, &fix));
+        Ok(())
     }
 
     fn ping(&mut self, from: Point, heading: f64, aim: &Aim) -> Option<Echo> {
@@ -116,11 +116,13 @@ impl<'a> Run<'a> {
         self.simulation.world.echo(&ping, &self.sensor, ranges, echoes)
     }
 
-    fn end_tick(&mut self, recorder: &mut impl Recorder) {
-        self.score.tick(self.time(), &self.localizer, &self.plant, recorder);
+    fn end_tick(&mut self, recorder: &mut impl Recorder) -> Result<(), SimulationError> {
+        let localizer = self.localizer.localizer()?;
+        self.score.tick(self.time(), localizer, &self.plant, recorder);
         if let Some(follower) = &mut self.follower {
-            let command = follower.command(&observe::estimate(&self.localizer).pose);
+            let command = follower.command(&observe::estimate(localizer).pose);
             self.plant.steer(command);
         }
+        Ok(())
     }
 }

@@ -3,8 +3,10 @@
 //! - [`Simulation`]: a scenario made ready to run;
 //! - `ideal`: a run in which the localizer is told everything at once and on the dot;
 //! - `pins`: a run through pins, drivers and the loop that a robot runs;
-//! - `score`: what is kept of either.
+//! - `score`: what is kept of either;
+//! - [`computer`]: what the robot's software runs on.
 
+pub mod computer;
 mod ideal;
 mod pins;
 mod score;
@@ -12,16 +14,17 @@ mod score;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
-use sonarfix::config::{Rhythm, Timing};
+use sonarfix::config::{Config, Rhythm, Timing};
 use sonarfix::localizer::{Localizer, Start, StartError};
 use sonarfix::map::{Map, MapError, Wall};
 use sonarfix::pose::Pose;
 use sonarfix::units::{Duration, Instant, Metres, Radians};
 use sonarfix_hal::robot::Stamp;
 use sonarfix_map::{BakeError, Fidelity, Follow, NamedWall, Scenario, SonarName};
+use sonarfix_pil::SetupError;
 
+use self::computer::{Computer, ThisProcess};
 use crate::dense::{Line, Model, Vector};
-use crate::pins::devices::SetupError;
 use crate::plant::Plant;
 use crate::plant::follower::Follower;
 use crate::statistics::RunResult;
@@ -150,9 +153,22 @@ impl Simulation {
         seed: u64,
         recorder: &mut impl Recorder,
     ) -> Result<RunResult, SimulationError> {
+        self.run_on(&mut ThisProcess(self), seed, recorder)
+    }
+
+    /// Runs once, with the robot's software on this computer.
+    ///
+    /// # Errors
+    /// [`SimulationError`], as [`Self::run`], or if the computer fails.
+    pub fn run_on(
+        &self,
+        computer: &mut impl Computer,
+        seed: u64,
+        recorder: &mut impl Recorder,
+    ) -> Result<RunResult, SimulationError> {
         match self.scenario.fidelity {
-            Fidelity::Ideal => ideal::run(self, seed, recorder),
-            Fidelity::Pins => pins::run(self, seed, recorder),
+            Fidelity::Ideal => ideal::run(self, seed, recorder, computer),
+            Fidelity::Pins => pins::run(self, seed, recorder, computer),
         }
     }
 
@@ -172,24 +188,26 @@ impl Simulation {
         Plant::new(&self.scenario, self.range_scale)
     }
 
-    /// The localizer, from its start.
-    fn localizer(
-        &self,
-        truth: &Vector,
-        rng: &mut ChaCha8Rng,
-    ) -> Result<Localizer<'_>, SimulationError> {
-        self.localizer_from(estimated_start(&self.scenario, truth, rng), 0)
+    /// What the localizer is told of its start.
+    fn start(&self, truth: &Vector, rng: &mut ChaCha8Rng) -> Start {
+        estimated_start(&self.scenario, truth, rng)
     }
 
-    /// A localizer that starts at a time, µs.
-    fn localizer_from(&self, start: Start, now: u64) -> Result<Localizer<'_>, SimulationError> {
-        let mut config = self.scenario.robot.config;
-        config.sonar.timing = self.timing();
+    /// A localizer in this process.
+    fn localizer(&self, start: Start, at: Instant) -> Result<Localizer<'_>, SimulationError> {
         let map = match &self.image {
             None => Map::new(&self.walls),
             Some(image) => Map::read(image)?,
         };
-        Ok(Localizer::new(config, map, start, Instant::from_ticks(now))?)
+        Ok(Localizer::new(self.config(), map, start, at)?)
+    }
+
+    /// The robot's configuration, with what a look takes at this fidelity.
+    #[must_use]
+    pub fn config(&self) -> Config {
+        let mut config = self.scenario.robot.config;
+        config.sonar.timing = self.timing();
+        config
     }
 
     /// What the localizer is told that a look takes: at the ideal fidelity there is no servo.

@@ -3,17 +3,19 @@
 
 use sonarfix::localizer::{Localizer, Start};
 use sonarfix::units::{Instant, Metres, Radians};
-use sonarfix_hal::robot::{Heard, Report, Robot};
+use sonarfix_hal::robot::{Heard, Report};
+use sonarfix_pil::{Actuators, Sensors, Wires};
 
+use super::computer::{Computer, Controller};
 use super::score::Score;
 use super::{Chance, Simulation, SimulationError, micros, seconds};
 use crate::angle;
 use crate::observe::{self, Look};
 use crate::pins::board::{LATENCY, SonarBoard};
-use crate::pins::devices::{self, PinDevices, ServoSetup, SetupError};
+use crate::pins::devices::{self, ServoSetup};
 use crate::pins::disc::EncoderDisc;
 use crate::pins::faults::Faults;
-use crate::pins::wires::Wires;
+use crate::pins::wires::EncoderWires;
 use crate::plant::Plant;
 use crate::plant::follower::{Command, Follower};
 use crate::plant::servo::ServoPlant;
@@ -34,47 +36,28 @@ pub fn run(
     simulation: &Simulation,
     seed: u64,
     recorder: &mut impl Recorder,
+    computer: &mut impl Computer,
 ) -> Result<RunResult, SimulationError> {
-    let wires = Wires::default();
-    let servo = ServoSetup::of(simulation.scenario.hardware.servo);
-    let mut devices = devices::connect(&wires, &simulation.scenario, &servo)?;
-    let (mut side, localizer) = WorldSide::new(simulation, seed, &wires, servo)?;
-    let mut robot = robot(simulation, localizer)?;
-    recorder.began(robot.localizer());
-    let period = simulation.scenario.robot.encoder_period.to_micros();
+    let encoders = Default::default();
+    let (mut side, mut start) = WorldSide::new(simulation, seed, &encoders)?;
     loop {
-        if let Some(back_at) = side.faults.controller.power_back_at(side.now) {
-            robot = side.reboot(back_at, &robot)?;
-            recorder.began(robot.localizer());
-            devices = devices::connect(&wires, &simulation.scenario, &servo)?;
-        }
-        let report = robot.poll(Instant::from_ticks(side.now), &mut devices);
-        recorder.polled(&report, robot.localizer());
-        side.obey();
-        side.record(&report, &robot, recorder);
-        // A tick may be held back by a ping, but not for as long as a period.
-        let is_last = report.tick.is_some() && side.now + period > simulation.end();
-        if is_last || side.now > simulation.end() + period {
-            return side.score.result(robot.localizer());
-        }
-        let next = side.next_poll(&robot, &mut devices);
-        side.advance(next);
+        // As the power comes.
+        let wires = Wires::default();
+        let now = Instant::from_ticks(side.now);
+        let (mut controller, actuators) = computer.controller(&wires, start, now)?;
+        side.obey(&actuators);
+        recorder.began(controller.localizer()?);
+        let Some(back_at) = side.live(&mut controller, recorder)? else {
+            return side.score.result(controller.localizer()?);
+        };
+        start = side.reboot(back_at, controller.localizer()?);
     }
-}
-
-fn robot<'a>(
-    simulation: &Simulation,
-    localizer: Localizer<'a>,
-) -> Result<Robot<'a>, SimulationError> {
-    let settings = devices::settings(&simulation.scenario.robot, simulation.stamp);
-    let wheels = devices::wheels(&simulation.scenario.robot)?;
-    Ok(Robot::new(localizer, wheels, settings).map_err(SetupError::from)?)
 }
 
 /// Everything on the other side of the wires.
 struct WorldSide<'a> {
     simulation: &'a Simulation,
-    wires: &'a Wires,
+    encoders: &'a [EncoderWires; 2],
     chance: Chance,
     plant: Plant<'a>,
     discs: [EncoderDisc<'a>; 2],
@@ -84,6 +67,10 @@ struct WorldSide<'a> {
     ordered: Option<f64>,
     faults: Faults,
     board: SonarBoard,
+    /// When the echo line rose and when it fell, since the loop was last polled.
+    edges: (Option<Instant>, Option<Instant>),
+    /// Whether the sonar's trigger is high.
+    is_raised: bool,
     follower: Option<Follower>,
     score: Score<'a>,
     /// How long the board's line stays up where nothing is heard, µs.
@@ -98,33 +85,71 @@ impl<'a> WorldSide<'a> {
     fn new(
         simulation: &'a Simulation,
         seed: u64,
-        wires: &'a Wires,
-        setup: ServoSetup,
-    ) -> Result<(Self, Localizer<'a>), SimulationError> {
+        encoders: &'a [EncoderWires; 2],
+    ) -> Result<(Self, Start), SimulationError> {
         let scenario = &simulation.scenario;
         let mut chance = Chance::new(seed);
         let plant = simulation.plant();
-        let localizer = simulation.localizer(&plant.state(), &mut chance.start)?;
-        let score = Score::new(simulation, &localizer, plant.state());
-        let [right, left] = devices::ticks(&scenario.robot);
+        let start = simulation.start(&plant.state(), &mut chance.start);
+        let score = Score::new(simulation, start, plant.state())?;
+        let [right, left] = encoders;
+        let [right_tick, left_tick] = devices::ticks(&scenario.robot);
+        let setup = ServoSetup::of(scenario.hardware.servo);
         let side = Self {
             simulation,
-            wires,
+            encoders,
             chance,
             plant,
-            discs: [EncoderDisc::new(&wires.right, right), EncoderDisc::new(&wires.left, left)],
+            discs: [EncoderDisc::new(right, right_tick), EncoderDisc::new(left, left_tick)],
             setup,
             servo: ServoPlant::new(setup.model),
             ordered: None,
             faults: Faults::new(&scenario.faults, seed),
             board: SonarBoard::default(),
+            edges: (None, None),
+            is_raised: false,
             follower: simulation.follower(),
             score,
             silence: devices::timing(scenario).listen.to_micros() + GIVES_UP_AFTER,
             look: None,
             now: 0,
         };
-        Ok((side, localizer))
+        Ok((side, start))
+    }
+
+    /// Goes on until the run is over, or the power fails: then until when, µs.
+    fn live(
+        &mut self,
+        controller: &mut impl Controller,
+        recorder: &mut impl Recorder,
+    ) -> Result<Option<u64>, SimulationError> {
+        let period = self.simulation.scenario.robot.encoder_period.to_micros();
+        let end = self.simulation.end();
+        loop {
+            if let Some(back_at) = self.faults.controller.power_back_at(self.now) {
+                return Ok(Some(back_at));
+            }
+            let sensors = self.sensors();
+            let (report, actuators) = controller.poll(&sensors)?;
+            let localizer = controller.localizer()?;
+            recorder.polled(&report, localizer);
+            self.obey(&actuators);
+            self.record(&report, localizer, recorder);
+            // A tick may be held back by a ping, but not for as long as a period.
+            let is_last = report.tick.is_some() && self.now + period > end;
+            if is_last || self.now > end + period {
+                return Ok(None);
+            }
+            let next = self.next_poll(controller);
+            self.advance(next);
+        }
+    }
+
+    /// What the devices have seen since the loop was last polled.
+    fn sensors(&mut self) -> Sensors {
+        let [right, left] = self.encoders.each_ref().map(EncoderWires::counted);
+        let (rose, fell) = std::mem::take(&mut self.edges);
+        Sensors { at: Instant::from_ticks(self.now), right, left, rose, fell }
     }
 
     fn time(&self) -> f64 {
@@ -140,7 +165,7 @@ impl<'a> WorldSide<'a> {
         for ((disc, faults), metres) in encoders.zip(travel.measured) {
             disc.roll(metres, now, faults);
         }
-        self.board.deliver(now, &self.wires.echo);
+        self.edges = self.board.edges(now);
         self.turn_servo();
     }
 
@@ -155,29 +180,28 @@ impl<'a> WorldSide<'a> {
 
     /// The power is gone, and comes back at `back_at`: the motors stop, and the robot starts again
     /// from the pose that it kept, as sure of it as at its start, and of its calibration as new.
-    fn reboot(&mut self, back_at: u64, robot: &Robot) -> Result<Robot<'a>, SimulationError> {
+    fn reboot(&mut self, back_at: u64, localizer: &Localizer) -> Start {
         let start = self.simulation.scenario.start;
         #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
         let start = Start {
-            pose: robot.localizer().pose(),
+            pose: localizer.pose(),
             position_deviation: Metres(start.position as f32),
             heading_deviation: Radians(start.heading as f32),
         };
         self.plant.steer(Command::default());
-        self.wires.trigger.set(false);
         self.look = None;
         self.advance(back_at);
-        let localizer = self.simulation.localizer_from(start, back_at)?;
-        self::robot(self.simulation, localizer)
+        start
     }
 
     /// Does what the robot did to its wires.
-    fn obey(&mut self) {
-        if let Some(duty) = self.wires.duty.take() {
+    fn obey(&mut self, actuators: &Actuators) {
+        if let Some(duty) = actuators.duty {
             self.ordered = Some(self.setup.bearing(duty, &self.simulation.scenario.robot.config));
             self.turn_servo();
         }
-        if self.wires.triggered.take() {
+        self.is_raised = actuators.is_raised;
+        if actuators.has_fallen {
             let honest = self.ping();
             let pulse = self.faults.sonar.pulse(self.now, honest, self.silence);
             self.board.answer(self.now, pulse);
@@ -207,7 +231,7 @@ impl<'a> WorldSide<'a> {
         echo.map_or(self.silence, |echo| flight(echo.range))
     }
 
-    fn record(&mut self, report: &Report, robot: &Robot, recorder: &mut impl Recorder) {
+    fn record(&mut self, report: &Report, localizer: &Localizer, recorder: &mut impl Recorder) {
         self.score.faults(report.faults);
         if report.tick.is_some() || report.heard.is_some() {
             self.score.arrive(self.plant.state());
@@ -216,8 +240,8 @@ impl<'a> WorldSide<'a> {
             self.record_fix(heard, recorder);
         }
         if report.tick.is_some() {
-            self.score.tick(self.time(), robot.localizer(), &self.plant, recorder);
-            self.steer(robot);
+            self.score.tick(self.time(), localizer, &self.plant, recorder);
+            self.steer(localizer);
         }
         if let Some(Err(no_aim)) = report.aimed {
             self.score.no_aim();
@@ -240,19 +264,19 @@ impl<'a> WorldSide<'a> {
         recorder.fix(|| observe::fix_record(Look { range, ..look }, &heard.aim, fix));
     }
 
-    fn steer(&mut self, robot: &Robot) {
+    fn steer(&mut self, localizer: &Localizer) {
         if let Some(follower) = &mut self.follower {
-            let command = follower.command(&observe::estimate(robot.localizer()).pose);
+            let command = follower.command(&observe::estimate(localizer).pose);
             self.plant.steer(command);
         }
     }
 
     /// When the loop is to be polled next: when it says, or while it listens as often as a
     /// firmware would, and when its interrupt wakes it up.
-    fn next_poll(&mut self, robot: &Robot, devices: &mut PinDevices) -> u64 {
-        let at = match robot.idle_until(devices) {
+    fn next_poll(&mut self, controller: &mut impl Controller) -> u64 {
+        let at = match controller.idle_until() {
             Some(idle_until) => idle_until.ticks(),
-            None if self.wires.trigger.get() => self.now + TRIGGER,
+            None if self.is_raised => self.now + TRIGGER,
             None => {
                 let edge = self.board.next_edge().unwrap_or(u64::MAX);
                 edge.min(self.now + LISTEN_POLL)

@@ -1,7 +1,8 @@
 //! What is kept of a run: the bound, dead reckoning, the counts, the errors.
 
 use sonarfix::aim::Aim;
-use sonarfix::localizer::{Fix, Localizer};
+use sonarfix::localizer::{Fix, Localizer, Start};
+use sonarfix::units::Instant;
 use sonarfix_hal::robot::Faults;
 
 use super::{Simulation, SimulationError};
@@ -27,8 +28,13 @@ pub struct Score<'a> {
 }
 
 impl<'a> Score<'a> {
-    pub fn new(simulation: &'a Simulation, localizer: &Localizer, truth: Vector) -> Self {
+    pub fn new(
+        simulation: &'a Simulation,
+        start: Start,
+        truth: Vector,
+    ) -> Result<Self, SimulationError> {
         let model = simulation.model;
+        let localizer = simulation.localizer(start, Instant::from_ticks(0))?;
         let deviation = localizer.filter().deviation();
         let deviation = Vector::from([
             deviation.x.into(),
@@ -39,8 +45,8 @@ impl<'a> Score<'a> {
             deviation.track_width_error.into(),
             deviation.range_scale.into(),
         ]);
-        let start = observe::estimate(localizer).pose;
-        Self {
+        let start = observe::estimate(&localizer).pose;
+        Ok(Self {
             simulation,
             odometry: DeadReckoning::new(start, model.track_width),
             bound: Bound::new(model, truth, &deviation),
@@ -48,7 +54,7 @@ impl<'a> Score<'a> {
             ticked: 0.0,
             result: RunResult::default(),
             nis: NisSum::default(),
-        }
+        })
     }
 
     /// The wheels have rolled.

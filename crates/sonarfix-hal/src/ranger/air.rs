@@ -7,6 +7,7 @@ use crate::time::micros;
 /// A temperature in degrees Celsius.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Celsius(pub f32);
 
 /// The temperature is not one at which a robot drives (−40 °C to 85 °C), or NaN.

@@ -65,6 +65,7 @@ pub trait EchoLine {
 /// What a board does when.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PulseTiming {
     /// Shortest trigger pulse.
     pub trigger: Duration,

@@ -7,6 +7,7 @@ pub use sonarfix::config::Rhythm;
 /// To which instant an echo belongs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Stamp {
     /// To that at which the sound met the wall (`DESIGN.md`, decision 4).
     Reflection,
@@ -18,6 +19,7 @@ pub enum Stamp {
 /// Settings of the loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Settings {
     /// Period of the encoder tick.
     pub tick: Duration,

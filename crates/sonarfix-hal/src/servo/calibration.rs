@@ -8,6 +8,7 @@ use crate::time::micros;
 /// A pulse tried on the bench, and where the sonar looked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MeasuredPulse {
     /// Width of the pulse.
     pub width: Duration,

@@ -1,0 +1,83 @@
+//! A flash in memory: what the loop remembers over a power loss is forgotten with the session.
+
+use embedded_storage::nor_flash::{
+    ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash, check_erase, check_read,
+    check_write,
+};
+
+/// Bytes of a sector.
+const SECTOR: usize = 512;
+/// Bytes of all.
+pub const CAPACITY: usize = 2 * SECTOR;
+
+/// Two small sectors.
+#[derive(Debug)]
+pub struct RamFlash([u8; CAPACITY]);
+
+impl Default for RamFlash {
+    /// As a flash leaves the factory.
+    fn default() -> Self {
+        Self([0xFF; CAPACITY])
+    }
+}
+
+/// It was asked for what no flash can do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Misused(NorFlashErrorKind);
+
+impl NorFlashError for Misused {
+    fn kind(&self) -> NorFlashErrorKind {
+        self.0
+    }
+}
+
+impl ErrorType for RamFlash {
+    type Error = Misused;
+}
+
+/// So many bytes from an address on; an address fits into a `usize` wherever this runs.
+fn range(from: u32, length: usize) -> core::ops::Range<usize> {
+    let from = from as usize;
+    from..from.saturating_add(length)
+}
+
+const BEYOND: Misused = Misused(NorFlashErrorKind::OutOfBounds);
+
+impl ReadNorFlash for RamFlash {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Misused> {
+        check_read(self, offset, bytes.len()).map_err(Misused)?;
+        let held = self.0.get(range(offset, bytes.len())).ok_or(BEYOND)?;
+        for (byte, held) in bytes.iter_mut().zip(held) {
+            *byte = *held;
+        }
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        CAPACITY
+    }
+}
+
+impl NorFlash for RamFlash {
+    const WRITE_SIZE: usize = 4;
+    const ERASE_SIZE: usize = SECTOR;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), Misused> {
+        check_erase(self, from, to).map_err(Misused)?;
+        let erased = self.0.get_mut(range(from, (to - from) as usize)).ok_or(BEYOND)?;
+        erased.fill(0xFF);
+        Ok(())
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Misused> {
+        check_write(self, offset, bytes.len()).map_err(Misused)?;
+        let written = self.0.get_mut(range(offset, bytes.len())).ok_or(BEYOND)?;
+        for (held, byte) in written.iter_mut().zip(bytes) {
+            // Writing clears bits and sets none.
+            *held &= byte;
+        }
+        Ok(())
+    }
+}

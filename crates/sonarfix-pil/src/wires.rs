@@ -1,0 +1,148 @@
+//! What stands at the pins of a robot's devices, and the pins as the drivers see them.
+
+use core::cell::Cell;
+use core::convert::Infallible;
+
+use embedded_hal::digital::{self, OutputPin};
+use embedded_hal::pwm::{self, SetDutyCycle};
+use serde::{Deserialize, Serialize};
+use sonarfix::units::Instant;
+use sonarfix_hal::encoder::Counter;
+use sonarfix_hal::ranger::EchoCapture;
+
+/// What the devices have seen up to a poll.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Sensors {
+    /// The time of the poll.
+    pub at: Instant,
+    /// The right wheel's encoder.
+    pub right: Counted,
+    /// The left wheel's encoder.
+    pub left: Counted,
+    /// When the echo line went high, if it did since the poll before.
+    pub rose: Option<Instant>,
+    /// When it then went low again.
+    pub fell: Option<Instant>,
+}
+
+/// What the counter of an encoder shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Counted {
+    /// Ticks; wraps around.
+    pub ticks: u32,
+    /// Transitions that no wheel can make; wraps around.
+    pub illegal: u32,
+}
+
+/// What the robot did to its devices in a poll.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Actuators {
+    /// The servo's duty, of [`FULL_DUTY`], if it was set.
+    pub duty: Option<u16>,
+    /// Whether the sonar's trigger is high.
+    pub is_raised: bool,
+    /// Whether the trigger has fallen, which sends a ping.
+    pub has_fallen: bool,
+}
+
+/// All wires of a robot, at the controller's end.
+#[derive(Debug, Default)]
+pub struct Wires {
+    /// The right encoder's counter.
+    pub right: CounterWire,
+    /// The left encoder's counter.
+    pub left: CounterWire,
+    /// The servo's PWM channel.
+    pub servo: ServoWire,
+    /// The sonar's trigger.
+    pub trigger: TriggerWire,
+    /// The edges of the echo line.
+    pub echo: EchoCapture,
+}
+
+impl Wires {
+    /// Shows the drivers what the devices have seen.
+    pub fn show(&self, sensors: &Sensors) {
+        self.right.0.set(sensors.right);
+        self.left.0.set(sensors.left);
+        if let Some(at) = sensors.rose {
+            self.echo.rose(at);
+        }
+        if let Some(at) = sensors.fell {
+            self.echo.fell(at);
+        }
+    }
+
+    /// What the drivers have done since this was last asked.
+    pub fn take(&self) -> Actuators {
+        Actuators {
+            duty: self.servo.0.take(),
+            is_raised: self.trigger.is_raised.get(),
+            has_fallen: self.trigger.has_fallen.take(),
+        }
+    }
+}
+
+/// A counter that shows what it is told to show.
+#[derive(Debug, Default)]
+pub struct CounterWire(Cell<Counted>);
+
+impl Counter for &CounterWire {
+    type Error = Infallible;
+    const BITS: u32 = 32;
+
+    fn count(&mut self) -> Result<u32, Infallible> {
+        Ok(self.0.get().ticks)
+    }
+
+    fn illegal(&mut self) -> u32 {
+        self.0.get().illegal
+    }
+}
+
+/// Counts of a frame of the servo's PWM: a 16-bit timer.
+pub const FULL_DUTY: u16 = u16::MAX;
+
+/// A PWM channel that remembers the duty it was set to.
+#[derive(Debug, Default)]
+pub struct ServoWire(Cell<Option<u16>>);
+
+impl pwm::ErrorType for &ServoWire {
+    type Error = Infallible;
+}
+
+impl SetDutyCycle for &ServoWire {
+    fn max_duty_cycle(&self) -> u16 {
+        FULL_DUTY
+    }
+
+    fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Infallible> {
+        self.0.set(Some(duty));
+        Ok(())
+    }
+}
+
+/// A trigger pin that remembers that it fell.
+#[derive(Debug, Default)]
+pub struct TriggerWire {
+    is_raised: Cell<bool>,
+    has_fallen: Cell<bool>,
+}
+
+impl digital::ErrorType for &TriggerWire {
+    type Error = Infallible;
+}
+
+impl OutputPin for &TriggerWire {
+    fn set_low(&mut self) -> Result<(), Infallible> {
+        if self.is_raised.replace(false) {
+            self.has_fallen.set(true);
+        }
+        Ok(())
+    }
+
+    fn set_high(&mut self) -> Result<(), Infallible> {
+        self.is_raised.set(true);
+        Ok(())
+    }
+}
