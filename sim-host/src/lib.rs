@@ -18,6 +18,7 @@ pub mod monitor;
 pub mod monte_carlo;
 pub mod observe;
 pub mod odometry;
+pub mod pil;
 pub mod pins;
 pub mod plan;
 pub mod plant;

@@ -53,6 +53,17 @@ pub fn check(mut command: Command) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// What a command printed; its errors are shown to whoever watches.
+pub fn printed(mut command: Command) -> anyhow::Result<String> {
+    let shown = shown(&command);
+    command.stderr(std::process::Stdio::inherit());
+    let output = command.output().with_context(|| format!("cannot start `{shown}`"))?;
+    if !output.status.success() {
+        bail!("`{shown}` failed");
+    }
+    Ok(String::from_utf8(output.stdout)?)
+}
+
 /// What a command wrote, both to its output and to its errors.
 pub fn output(mut command: Command) -> anyhow::Result<String> {
     let shown = shown(&command);

@@ -7,7 +7,8 @@ use anyhow::bail;
 use crate::cargo;
 
 /// The crates that run on a robot.
-const NO_STD_CRATES: [&str; 4] = ["sonarfix", "sonarfix-hal", "sonarfix-link", "sonarfix-app"];
+const NO_STD_CRATES: [&str; 5] =
+    ["sonarfix", "sonarfix-hal", "sonarfix-link", "sonarfix-app", "sonarfix-pil"];
 /// Cortex-M4F, and Cortex-M0+ without FPU or atomics.
 const TARGETS: [&str; 2] = ["thumbv7em-none-eabihf", "thumbv6m-none-eabi"];
 
@@ -31,8 +32,8 @@ pub fn embedded() -> anyhow::Result<()> {
 
 pub fn lint_bench() -> anyhow::Result<()> {
     cargo::check(cargo::in_bench("fmt --all --check"))?;
-    let packages =
-        "--package bench-probe --package bench-building --package bench-mcu --package bench-ours";
+    let packages = "--package bench-probe --package bench-building --package bench-mcu --package bench-ours \
+         --package bench-pil";
     let target = "--target thumbv7em-none-eabihf";
     cargo::check(cargo::in_bench(&format!("clippy --release {packages} {target} -- -D warnings")))
 }

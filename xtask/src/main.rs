@@ -14,8 +14,10 @@ mod emulator;
 mod endurance;
 mod firmware;
 mod fuzz;
+mod golden;
 mod miri;
 mod panics;
+mod pil;
 mod program;
 
 #[derive(Debug, Parser)]
@@ -43,6 +45,10 @@ enum Task {
     TestFirmware,
     /// Flash and RAM of the shipped firmware, by crate.
     Size,
+    /// The shipped loop on emulated microcontrollers, against the PC bit by bit; what it costs them.
+    Pil,
+    /// The golden traces on this computer and every emulated microcontroller.
+    Golden,
     /// No panic is linked into a program for a microcontroller.
     Panics,
     /// Instructions, code, stack and memory against `budgets.toml`.
@@ -53,7 +59,8 @@ enum Task {
     Peers,
     /// Licences of all dependencies, and advisories if their database can be reached.
     Deny,
-    /// Measures again what `budgets` checks, and writes it to `budgets.toml`.
+    /// Measures again what `budgets` checks and writes it to `budgets.toml`; makes the golden traces
+    /// anew.
     Bless,
     /// Ours and its peers at the same work, to `docs/benchmarks.md` (ten minutes).
     Bench,
@@ -68,7 +75,7 @@ enum Task {
 }
 
 /// What `ci` runs.
-fn all() -> [Task; 13] {
+fn all() -> [Task; 15] {
     [
         Task::Format,
         Task::Lint,
@@ -76,6 +83,8 @@ fn all() -> [Task; 13] {
         Task::Docs,
         Task::Embedded,
         Task::TestFirmware,
+        Task::Golden,
+        Task::Pil,
         Task::Panics,
         Task::Budgets,
         Task::LintBench,
@@ -106,12 +115,14 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Embedded => checks::embedded(),
         Task::TestFirmware => firmware::test(),
         Task::Size => firmware::size(),
+        Task::Pil => pil::check(),
+        Task::Golden => golden::check(),
         Task::Panics => panics::check(),
         Task::Budgets => budgets::check(),
         Task::LintBench => checks::lint_bench(),
         Task::Peers => checks::peers(),
         Task::Deny => checks::deny(),
-        Task::Bless => budgets::bless(),
+        Task::Bless => golden::bless().and_then(|()| budgets::bless()),
         Task::Bench => bench::run(),
         Task::Statistics => checks::statistics(),
         Task::Endurance(args) => endurance::run(args),

@@ -7,6 +7,7 @@
 
 use core::arch::asm;
 use core::hint::black_box;
+use core::sync::atomic::{Ordering, compiler_fence};
 
 use cortex_m::Peripherals;
 use cortex_m::peripheral::SYST;
@@ -36,7 +37,15 @@ const PAINT: u32 = 0xCAFE_D00D;
 const WORDS: usize = 4 * 1024;
 
 /// Measures calls.
-pub struct Meter(SYST);
+pub struct Meter {
+    systick: SYST,
+    /// Ticks that [`Self::count`] counts of nothing.
+    empty: u32,
+    /// The stack pointer at the last call that was counted.
+    top: *const u32,
+    /// Where [`Self::paint`] began to paint downwards.
+    painted: *mut u32,
+}
 
 impl Meter {
     /// Starts SysTick.
@@ -48,15 +57,47 @@ impl Meter {
         systick.set_reload(LARGEST);
         systick.clear_current();
         systick.enable_counter();
-        Self(systick)
+        let mut meter =
+            Self { systick, empty: 0, top: core::ptr::null(), painted: core::ptr::null_mut() };
+        meter.empty = meter.timed(|| ());
+        meter
+    }
+
+    /// Makes a call, and counts its instructions.
+    pub fn count(&mut self, call: impl FnOnce()) -> u32 {
+        instructions(self.timed(call).saturating_sub(self.empty))
+    }
+
+    /// Begins to watch the stack.
+    #[inline(never)]
+    pub fn paint(&mut self) {
+        self.painted = stack_pointer();
+        paint_below(self.painted);
+    }
+
+    /// Bytes of stack below the counted calls that the deepest since [`Self::paint`] wrote to.
+    #[must_use]
+    pub fn deepest(&self) -> u32 {
+        let lowest = self.painted.wrapping_sub(used_below(self.painted)).addr();
+        u32::try_from(self.top.addr().saturating_sub(lowest)).unwrap_or(u32::MAX)
+    }
+
+    #[inline(never)]
+    fn timed(&mut self, call: impl FnOnce()) -> u32 {
+        self.top = stack_pointer();
+        self.systick.clear_current();
+        let before = SYST::get_current();
+        compiler_fence(Ordering::SeqCst);
+        call();
+        compiler_fence(Ordering::SeqCst);
+        before.wrapping_sub(SYST::get_current()) & LARGEST
     }
 
     /// Makes a call and adds to `cost` what it cost, without what calling costs.
     pub fn measure<A, B>(&mut self, cost: &mut Cost, call: Call<A, B>, a: &mut A, b: &B) {
         let (empty_ticks, empty_stack) = self.raw(nothing, a, b);
         let (ticks, stack) = self.raw(call, a, b);
-        // 128 ns an instruction, 40 ns a tick; rounded.
-        let instructions = ((ticks - empty_ticks) * 40 + 64) / 128;
+        let instructions = instructions(ticks - empty_ticks);
         let stack = stack - empty_stack;
         cost.calls += 1;
         cost.instructions += instructions;
@@ -68,24 +109,46 @@ impl Meter {
     #[inline(never)]
     fn raw<A, B>(&mut self, call: Call<A, B>, a: &mut A, b: &B) -> (u32, u32) {
         let call = black_box(call);
-        let top: *mut u32;
-        // SAFETY: reads a register.
-        unsafe { asm!("mov {}, sp", out(reg) top, options(nomem, nostack, preserves_flags)) };
-        for word in 1..=WORDS {
-            // SAFETY: the stack of these programs has megabytes; below its pointer nothing lives,
-            // and no interrupt is enabled that would push there.
-            unsafe { top.wrapping_sub(word).write_volatile(PAINT) };
-        }
-        self.0.clear_current();
+        let top = stack_pointer();
+        paint_below(top);
+        self.systick.clear_current();
         let before = SYST::get_current();
         call(a, b);
         let after = SYST::get_current();
-        // SAFETY: as above.
-        let is_paint = |word: &usize| unsafe { top.wrapping_sub(*word).read_volatile() } == PAINT;
-        let untouched = (1..=WORDS).rev().take_while(is_paint).count();
-        let used = (WORDS - untouched) * size_of::<u32>();
+        let used = used_below(top) * size_of::<u32>();
         (before.wrapping_sub(after) & LARGEST, u32::try_from(used).unwrap_or(u32::MAX))
     }
 }
 
 extern "C" fn nothing<A, B>(_: &mut A, _: &B) {}
+
+/// 128 ns an instruction, 40 ns a tick; rounded. In parts, so that it does not overflow.
+fn instructions(ticks: u32) -> u32 {
+    (ticks * 5 + 8) / 16
+}
+
+#[inline(always)]
+fn stack_pointer() -> *mut u32 {
+    let top;
+    // SAFETY: reads a register.
+    unsafe { asm!("mov {}, sp", out(reg) top, options(nomem, nostack, preserves_flags)) };
+    top
+}
+
+/// Paints the memory below the stack pointer.
+#[inline(always)]
+fn paint_below(top: *mut u32) {
+    for word in 1..=WORDS {
+        // SAFETY: the stack of these programs has megabytes; below its pointer nothing lives, and
+        // no interrupt is enabled that would push there.
+        unsafe { top.wrapping_sub(word).write_volatile(PAINT) };
+    }
+}
+
+/// Words below it that are no longer painted.
+#[inline(always)]
+fn used_below(top: *mut u32) -> usize {
+    // SAFETY: as in `paint_below`.
+    let is_paint = |word: &usize| unsafe { top.wrapping_sub(*word).read_volatile() } == PAINT;
+    WORDS - (1..=WORDS).rev().take_while(is_paint).count()
+}

@@ -24,7 +24,7 @@ use sonarfix::units::{Duration, Instant, Metres};
 use sonarfix_hal::encoder::Wheels;
 use sonarfix_hal::robot::{Faults, Hardware, Report, Robot, Settings, SettingsError, Step};
 use sonarfix_link::message::{self, Hello, Loop, Outcome, Reset};
-use sonarfix_link::{Reporter, baked};
+use sonarfix_link::{Reporter, Telemetry, baked};
 
 use crate::check::Check;
 use crate::flashed::Flashed;
@@ -117,16 +117,16 @@ impl Running<'_> {
         polled: &mut Polled,
     ) -> bool {
         let before = self.robot.localizer().health().verdict;
-        let report = self.robot.poll(now, hardware);
+        polled.report = self.robot.poll(now, hardware);
+        let report = &polled.report;
         let localizer = self.robot.localizer();
         let verdict = localizer.health().verdict;
         polled.verdict = (verdict != before).then_some(verdict);
-        self.reporter.report(&report, localizer, |said| wire.send(said, link));
-        if has_rolled(&report) {
+        self.reporter.report(report, localizer, |said| wire.send(said, link));
+        if has_rolled(report) {
             self.habit.rolled(now);
         }
         polled.is_on_time = report.tick.is_some() && report.faults.deadlines == 0;
-        polled.report = report;
         report.tick.is_some() && self.habit.is_due(now, localizer)
     }
 }
@@ -195,8 +195,14 @@ impl<'m, F: NorFlash> App<'m, F> {
                 }
             }
         }
-        let told = self.told(now);
-        self.wire.tell(now, &self.hello(), &told, link);
+        if self.wire.is_hello_due(now) {
+            let hello = self.hello();
+            self.wire.send(&Telemetry::Hello(hello), link);
+        }
+        if self.wire.is_loop_due(now) {
+            let told = self.told(now);
+            self.wire.send(&Telemetry::Loop(told), link);
+        }
         self.time = now;
         polled.is_running = self.is_running();
         polled.has_changed = polled.is_running != was_running;

@@ -1,12 +1,12 @@
 //! What answers: on a microcontroller, and on the PC that compares.
 
 use serde::{Deserialize, Serialize};
-use sonarfix::aim::Aim;
-use sonarfix::localizer::Localizer;
+use sonarfix::aim::{Aim, NoAim};
+use sonarfix::localizer::{self, Fix, Localizer};
 use sonarfix::map::{Map, image};
 use sonarfix::units::Instant;
 use sonarfix_app::store::Store;
-use sonarfix_app::{App, Body, Flashed, Link};
+use sonarfix_app::{App, Body, Flashed, Link, Polled};
 use sonarfix_hal::robot::Report;
 use sonarfix_link::message::Reset;
 use sonarfix_link::{Command, Outcome, Sender, baked, frame};
@@ -79,15 +79,22 @@ impl<'m> Device<'m> {
         map: &'m [u8],
         wires: &'m Wires,
     ) -> Result<(Self, Actuators), Refusal> {
-        let image = map;
-        let map = Map::read(image).map_err(|_| Refusal::Map)?;
-        if begin.board.is_some() {
-            let (robot, actuators) = LoopOnWires::begin(begin, map, image, wires)?;
-            return Ok((Self::Loop(robot), actuators));
+        if begin.board.is_none() {
+            return Ok((Self::localizer_only(begin, map)?, Actuators::default()));
         }
+        let (robot, actuators) = LoopOnWires::begin(begin, map, wires)?;
+        Ok((Self::Loop(robot), actuators))
+    }
+
+    /// Begins a session of a localizer alone.
+    ///
+    /// # Errors
+    /// [`Refusal`], by what is wrong with the request.
+    pub fn localizer_only(begin: &Begin, map: &'m [u8]) -> Result<Self, Refusal> {
+        let map = Map::read(map).map_err(|_| Refusal::Map)?;
         let localizer = Localizer::new(begin.config, map, begin.start, begin.at);
         let localizer = localizer.map_err(|_| Refusal::Start)?;
-        Ok((Self::Localizer { localizer, aim: None }, Actuators::default()))
+        Ok(Self::Localizer { localizer, aim: None })
     }
 
     /// Answers a request, and how many instructions that took.
@@ -126,21 +133,24 @@ fn tell(
 ) -> (Answer, u32) {
     match *request {
         Request::Odometry(at, travel) => {
-            let (taken, cost) = meter.measure(|| localizer.odometry(at, travel));
+            let mut taken = Ok(());
+            let cost = meter.measure(|| taken = localizer.odometry(at, travel));
             (Answer::Rolled(taken, Belief::of(localizer)), cost)
         }
         Request::Aim => {
-            let (aimed, cost) = meter.measure(|| localizer.aim());
+            let mut aimed = Err(NoAim::NoWall);
+            let cost = meter.measure(|| aimed = localizer.aim());
             *aim = aimed.ok();
             (Answer::Aimed(aimed), cost)
         }
         Request::Fix(range) => {
             let Some(aim) = aim else { return (Answer::Refused(Refusal::OutOfPlace), 0) };
-            let (fix, cost) = meter.measure(|| localizer.fix(aim, range));
+            let mut fix = Fix::Refused(localizer::Refusal::NoEcho);
+            let cost = meter.measure(|| fix = localizer.fix(aim, range));
             (Answer::Fixed(fix, Belief::of(localizer)), cost)
         }
         Request::Skip => {
-            let ((), cost) = meter.measure(|| localizer.skip());
+            let cost = meter.measure(|| localizer.skip());
             (Answer::Skipped(localizer.health()), cost)
         }
         Request::Begin(..) | Request::Poll(_) | Request::End => {
@@ -153,8 +163,7 @@ impl<'m> LoopOnWires<'m> {
     /// Switches the robot on, tells it where it stands, and lets the loop run.
     fn begin(
         begin: &Begin,
-        map: Map<'m>,
-        image: &[u8],
+        image: &'m [u8],
         wires: &'m Wires,
     ) -> Result<(Self, Actuators), Refusal> {
         let Begin { at, start, config, board } = *begin;
@@ -163,6 +172,7 @@ impl<'m> LoopOnWires<'m> {
         let devices = board.devices(wires).map_err(|_| Refusal::Board)?;
         let body =
             Body { wheels, settings: board.settings, firmware: [0; 3], reset: Reset::PowerOn };
+        let map = Map::read(image).map_err(|_| Refusal::Map)?;
         let seal = image.last_chunk().copied().ok_or(Refusal::Map)?;
         let flashed = Flashed {
             map: Ok((map, u32::from_le_bytes(seal))),
@@ -189,7 +199,8 @@ impl<'m> LoopOnWires<'m> {
         self.wires.show(sensors);
         let mut cable = Cable::bringing(&[]);
         let Self { app, devices, .. } = self;
-        let (polled, cost) = meter.measure(|| app.poll(sensors.at, devices, &mut cable));
+        let mut polled = Polled::default();
+        let cost = meter.measure(|| polled = app.poll(sensors.at, devices, &mut cable));
         self.report = polled.report;
         let localizer = self.app.localizer().filter(|_| !polled.report.is_empty());
         let belief = localizer.map(Belief::of);

@@ -9,11 +9,15 @@ use crate::wires::Wires;
 
 /// What the emulator, or a cycle counter, can tell of a call.
 pub trait Meter {
-    /// Makes the call, and counts its instructions: zero where nobody counts.
-    fn measure<T>(&mut self, call: impl FnOnce() -> T) -> (T, u32);
+    /// Makes the call, and counts its instructions: zero where nobody counts. What it gives it
+    /// leaves where it likes: a result that is handed on would be counted, too.
+    fn measure(&mut self, call: impl FnOnce()) -> u32;
 
-    /// Bytes of stack that the deepest call since the last time took: zero where nobody knows.
-    fn deepest(&mut self) -> u32;
+    /// Begins to watch how deep the stack goes.
+    fn watch_stack(&mut self);
+
+    /// Bytes of stack that the deepest call took since then: zero where nobody knows.
+    fn deepest(&self) -> u32;
 }
 
 /// Nobody counts: on the PC.
@@ -21,11 +25,14 @@ pub trait Meter {
 pub struct Unmetered;
 
 impl Meter for Unmetered {
-    fn measure<T>(&mut self, call: impl FnOnce() -> T) -> (T, u32) {
-        (call(), 0)
+    fn measure(&mut self, call: impl FnOnce()) -> u32 {
+        call();
+        0
     }
 
-    fn deepest(&mut self) -> u32 {
+    fn watch_stack(&mut self) {}
+
+    fn deepest(&self) -> u32 {
         0
     }
 }
@@ -63,7 +70,7 @@ fn session<S: Read + Write>(
         }
         Err(refusal) => return line.reply(&Answer::Refused(refusal), 0),
     };
-    meter.deepest();
+    meter.watch_stack();
     loop {
         let mut space = [0; REQUEST_MAX];
         let request = line.asked(&mut space)?;

@@ -11,6 +11,7 @@ mod map;
 mod monitor;
 mod overrides;
 mod paper;
+mod pil;
 mod plan;
 mod replay;
 mod run;
@@ -33,6 +34,8 @@ enum Command {
     Paper(paper::Args),
     /// Runs any scenario.
     Run(run::Args),
+    /// Runs a scenario with the robot's software on an emulated microcontroller.
+    Pil(pil::Args),
     /// Replays the recording of a robot through the localizer.
     Replay(replay::Args),
     /// Converts recordings of other formats for `replay`.
@@ -69,6 +72,7 @@ impl Cli {
         match self.command {
             Command::Paper(args) => paper::execute(&args),
             Command::Run(args) => run::execute(&args),
+            Command::Pil(args) => pil::execute(&args),
             Command::Replay(args) => replay::execute(&args),
             Command::Convert(args) => convert::execute(&args),
             Command::Monitor(args) => monitor::execute(&args),

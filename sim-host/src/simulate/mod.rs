@@ -25,6 +25,7 @@ use sonarfix_pil::SetupError;
 
 use self::computer::{Computer, ThisProcess};
 use crate::dense::{Line, Model, Vector};
+use crate::pil::pair::PilError;
 use crate::plant::Plant;
 use crate::plant::follower::Follower;
 use crate::statistics::RunResult;
@@ -50,10 +51,12 @@ pub struct Simulation {
     /// By how much the ranger reads too long, air included.
     range_scale: f64,
     model: Model,
+    /// When the run ends, microseconds.
+    end: u64,
 }
 
 /// A run that could not go on.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SimulationError {
     /// The localizer could not be made.
     #[error("the localizer refuses to start: {0}")]
@@ -72,6 +75,9 @@ pub enum SimulationError {
         /// Why.
         error: sonarfix::localizer::OdometryError,
     },
+    /// The microcontroller in the loop.
+    #[error(transparent)]
+    Emulated(#[from] PilError),
     /// The filter's covariance is no longer positive definite.
     #[error("at the end of the run the covariance is not positive definite")]
     Covariance,
@@ -118,6 +124,7 @@ impl Simulation {
             // (1 + scale) · stretch − 1, written so that a stretch of one changes no bit.
             range_scale: scenario.truth.range_scale * stretch + (stretch - 1.0),
             model: Model::of(&scenario.robot.config),
+            end: micros(scenario.path.duration()),
             scenario,
         }
     }
@@ -127,7 +134,21 @@ impl Simulation {
     /// # Errors
     /// [`BakeError`], if the walls cannot be baked.
     pub fn on_baked_map(self) -> Result<Self, BakeError> {
-        Ok(Self { image: Some(sonarfix_map::bake(&self.walls)?), ..self })
+        Ok(Self { image: Some(self.baked_map()?), ..self })
+    }
+
+    /// The same, but it ends after so many seconds, if not before.
+    #[must_use]
+    pub fn shortened(self, seconds: f64) -> Self {
+        Self { end: self.end.min(micros(seconds)), ..self }
+    }
+
+    /// The walls as a baked map.
+    ///
+    /// # Errors
+    /// [`BakeError`], if they cannot be baked.
+    pub fn baked_map(&self) -> Result<Vec<u8>, BakeError> {
+        sonarfix_map::bake(&self.walls)
     }
 
     /// The same with a sonar that hears the walls that it hears, but never anything else, and says
@@ -181,7 +202,13 @@ impl Simulation {
 
     /// When the run ends, microseconds.
     fn end(&self) -> u64 {
-        micros(self.scenario.path.duration())
+        self.end
+    }
+
+    /// How long the run lasts, simulated seconds.
+    #[must_use]
+    pub fn seconds(&self) -> f64 {
+        seconds(self.end)
     }
 
     fn plant(&self) -> Plant<'_> {

@@ -1,19 +1,18 @@
 //! Both directions of the link, and the rhythm of what is told.
 //!
-//! Every step and look is told at once, the estimate at every tick, [`Loop`] once a second,
-//! [`Hello`] every ten: at ten ticks and a look a second 1.4 kB/s of the 11.5 kB/s that a link at
+//! Every step and look is told at once, the estimate at every tick, [`Loop`](Telemetry::Loop) once a second,
+//! [`Hello`](Telemetry::Hello) every ten: at ten ticks and a look a second 1.4 kB/s of the 11.5 kB/s that a link at
 //! 115,200 baud carries (`docs/firmware.md`). A frame for which there is no room is dropped; the
 //! gap shows in the sequence numbers.
 
 use sonarfix::units::{Duration, Instant};
-use sonarfix_link::message::{Hello, Loop};
 use sonarfix_link::{Answered, Command, Counters, Frame, Receiver, Sender, Telemetry, frame};
 
 use crate::time::after;
 
-/// From one [`Hello`] to the next.
+/// From one [`Hello`](Telemetry::Hello) to the next.
 const HELLO: Duration = Duration::from_ticks(10_000_000);
-/// From one [`Loop`] to the next.
+/// From one [`Loop`](Telemetry::Loop) to the next.
 const LOOP: Duration = Duration::from_ticks(1_000_000);
 
 /// The link's bytes, as far as they are there.
@@ -53,14 +52,12 @@ impl Wire {
         link.send(self.sender.frame(message, &mut buffer));
     }
 
-    /// Tells what is due of what is told now and then.
-    pub fn tell(&mut self, now: Instant, hello: &Hello, told: &Loop, link: &mut impl Link) {
-        if is_due(&mut self.hello_at, now, HELLO) {
-            self.send(&Telemetry::Hello(*hello), link);
-        }
-        if is_due(&mut self.loop_at, now, LOOP) {
-            self.send(&Telemetry::Loop(*told), link);
-        }
+    pub fn is_hello_due(&mut self, now: Instant) -> bool {
+        is_due(&mut self.hello_at, now, HELLO)
+    }
+
+    pub fn is_loop_due(&mut self, now: Instant) -> bool {
+        is_due(&mut self.loop_at, now, LOOP)
     }
 
     pub fn counters(&self) -> Counters {

@@ -1,0 +1,39 @@
+//! Golden traces: every machine computes the bits that were computed when they were made.
+
+use crate::cargo;
+
+/// What the traces are of: a name, and what `sonarfix pil` is told. The second has ranges beyond
+/// the gate.
+const TRACES: [(&str, &str); 2] = [
+    ("localizer", "paper --policy informative --seconds 60"),
+    ("loop", "crates/sonarfix-map/scenarios/classroom.toml --seed 30 --seconds 10"),
+];
+
+/// The first is this computer.
+const MACHINES: [&str; 4] = ["host", "m4f", "m3", "m0plus"];
+
+/// Asks every machine all of every trace again.
+pub fn check() -> anyhow::Result<()> {
+    for (name, _) in TRACES {
+        for machine in MACHINES {
+            pil(&format!("{} --machine {machine}", path(name)))?;
+        }
+    }
+    Ok(())
+}
+
+/// Makes the traces anew, on this computer.
+pub fn bless() -> anyhow::Result<()> {
+    TRACES
+        .into_iter()
+        .try_for_each(|(name, run)| pil(&format!("{run} --machine host --record {}", path(name))))
+}
+
+fn path(name: &str) -> String {
+    format!("tests/golden/{name}.golden")
+}
+
+fn pil(arguments: &str) -> anyhow::Result<()> {
+    let run = "run --quiet --release --package sonarfix-sim --bin sonarfix -- pil";
+    cargo::run(&format!("{run} {arguments}"))
+}
