@@ -128,6 +128,7 @@ fn instructions(ticks: u32) -> u32 {
 }
 
 #[inline(always)]
+#[expect(clippy::inline_always, reason = "its own frame would lie where it looks or paints")]
 fn stack_pointer() -> *mut u32 {
     let top;
     // SAFETY: reads a register.
@@ -137,6 +138,7 @@ fn stack_pointer() -> *mut u32 {
 
 /// Paints the memory below the stack pointer.
 #[inline(always)]
+#[expect(clippy::inline_always, reason = "its own frame would lie where it looks or paints")]
 fn paint_below(top: *mut u32) {
     for word in 1..=WORDS {
         // SAFETY: the stack of these programs has megabytes; below its pointer nothing lives, and
@@ -147,6 +149,7 @@ fn paint_below(top: *mut u32) {
 
 /// Words below it that are no longer painted.
 #[inline(always)]
+#[expect(clippy::inline_always, reason = "its own frame would lie where it looks or paints")]
 fn used_below(top: *mut u32) -> usize {
     // SAFETY: as in `paint_below`.
     let is_paint = |word: &usize| unsafe { top.wrapping_sub(*word).read_volatile() } == PAINT;

@@ -116,7 +116,6 @@ impl<'m> Device<'m> {
     }
 
     /// What the last poll of a loop did.
-    #[must_use]
     pub fn report(&self) -> Report {
         match self {
             Self::Localizer { .. } => Report::default(),

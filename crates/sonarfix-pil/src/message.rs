@@ -15,6 +15,7 @@ use crate::wires::{Actuators, Sensors};
 
 /// What is asked.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[expect(clippy::large_enum_variant, reason = "there is one of it at a time, and no heap")]
 pub enum Request<'a> {
     /// Begin a session, with a baked map.
     Begin(Begin, &'a [u8]),

@@ -226,17 +226,16 @@ fn what_does_not_fit_is_refused_and_the_next_session_begins() {
         Answer::Refused(refusal) => Some(*refusal),
         _ => None,
     };
-    use Refusal::{Board as BadBoard, Map, OutOfPlace};
     let expected = [
-        Some(OutOfPlace),
-        Some(Map),
-        Some(BadBoard),
+        Some(Refusal::OutOfPlace),
+        Some(Refusal::Map),
+        Some(Refusal::Board),
         None,
-        Some(OutOfPlace),
-        Some(OutOfPlace),
+        Some(Refusal::OutOfPlace),
+        Some(Refusal::OutOfPlace),
         None,
         None,
-        Some(OutOfPlace),
+        Some(Refusal::OutOfPlace),
         None,
     ];
     assert_eq!(answers.iter().map(refused).collect::<Vec<_>>(), expected);

@@ -107,7 +107,7 @@ impl Build {
 }
 
 /// How long the emulator may be silent, on this computer's clock, before it is given up.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_mins(1);
 
 /// A running microcontroller.
 #[derive(Debug)]

@@ -82,6 +82,11 @@ impl Computer for Emulated<'_> {
     }
 }
 
+/// An answer to something else.
+fn unasked(answer: Answer) -> SimulationError {
+    PilError::Unasked(Box::new(answer)).into()
+}
+
 /// A session of both.
 pub struct Twins<'w> {
     device: Device<'w>,
@@ -108,28 +113,28 @@ impl Told for Twins<'_> {
     ) -> Result<Result<(), OdometryError>, SimulationError> {
         match self.ask(&Request::Odometry(at, travel))? {
             Answer::Rolled(taken, _) => Ok(taken),
-            other => Err(PilError::Unasked(other).into()),
+            other => Err(unasked(other)),
         }
     }
 
     fn aim(&mut self) -> Result<Result<Aim, NoAim>, SimulationError> {
         match self.ask(&Request::Aim)? {
             Answer::Aimed(aim) => Ok(aim),
-            other => Err(PilError::Unasked(other).into()),
+            other => Err(unasked(other)),
         }
     }
 
     fn fix(&mut self, _: &Aim, range: Option<Metres>) -> Result<Fix, SimulationError> {
         match self.ask(&Request::Fix(range))? {
             Answer::Fixed(fix, _) => Ok(fix),
-            other => Err(PilError::Unasked(other).into()),
+            other => Err(unasked(other)),
         }
     }
 
     fn skip(&mut self) -> Result<(), SimulationError> {
         match self.ask(&Request::Skip)? {
             Answer::Skipped(_) => Ok(()),
-            other => Err(PilError::Unasked(other).into()),
+            other => Err(unasked(other)),
         }
     }
 
@@ -143,7 +148,7 @@ impl Controller for Twins<'_> {
         self.polled = sensors.at;
         match self.ask(&Request::Poll(*sensors))? {
             Answer::Polled { actuators, .. } => Ok((self.device.report(), actuators)),
-            other => Err(PilError::Unasked(other).into()),
+            other => Err(unasked(other)),
         }
     }
 

@@ -33,7 +33,7 @@ pub enum PilError {
     Stopped,
     /// Something else was answered than was asked.
     #[error("the answer does not belong to the question: {0:?}")]
-    Unasked(Answer),
+    Unasked(Box<Answer>),
     /// They are not the same.
     #[error("at {seconds:.3} s the microcontroller and the PC do not agree: {what}")]
     Differs {
@@ -184,7 +184,7 @@ impl Pair {
         let (answer, _) = emulator.replied(&mut space)?;
         match line::answer(answer) {
             Some(Answer::Ended(stack)) => self.tally.stack = self.tally.stack.max(stack),
-            Some(other) => return Err(PilError::Unasked(other)),
+            Some(other) => return Err(PilError::Unasked(Box::new(other))),
             None => return Err(PilError::Emulator("what came is no answer".to_owned())),
         }
         Ok(())
@@ -192,6 +192,7 @@ impl Pair {
 }
 
 /// In what two answers differ, in words; the second cannot always be read.
+#[must_use]
 pub fn difference(own: &Answer, theirs: Option<&Answer>) -> String {
     let Some(theirs) = theirs else {
         return "the answer cannot be read".to_owned();

@@ -41,23 +41,35 @@ pub trait Computer {
 }
 
 /// A localizer that is told everything at once and on the dot.
-///
-/// # Errors
-/// Every call fails with [`SimulationError`] if the computer does.
 pub trait Told {
     /// The wheels rolled.
+    ///
+    /// # Errors
+    /// [`SimulationError`], if the computer fails.
     fn odometry(
         &mut self,
         at: Instant,
         travel: WheelTravel,
     ) -> Result<Result<(), OdometryError>, SimulationError>;
     /// Where the sonar should look.
+    ///
+    /// # Errors
+    /// [`SimulationError`], if the computer fails.
     fn aim(&mut self) -> Result<Result<Aim, NoAim>, SimulationError>;
     /// What came back from the last aim.
+    ///
+    /// # Errors
+    /// [`SimulationError`], if the computer fails.
     fn fix(&mut self, aim: &Aim, range: Option<Metres>) -> Result<Fix, SimulationError>;
     /// There was nothing to look at.
+    ///
+    /// # Errors
+    /// [`SimulationError`], if the computer fails.
     fn skip(&mut self) -> Result<(), SimulationError>;
     /// What it knows.
+    ///
+    /// # Errors
+    /// [`SimulationError`], if the computer fails.
     fn localizer(&self) -> Result<&Localizer<'_>, SimulationError>;
 }
 

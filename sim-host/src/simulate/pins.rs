@@ -45,7 +45,7 @@ pub fn run(
         let wires = Wires::default();
         let now = Instant::from_ticks(side.now);
         let (mut controller, actuators) = computer.controller(&wires, start, now)?;
-        side.obey(&actuators);
+        side.obey(actuators);
         recorder.began(controller.localizer()?);
         let Some(back_at) = side.live(&mut controller, recorder)? else {
             return side.score.result(controller.localizer()?);
@@ -133,7 +133,7 @@ impl<'a> WorldSide<'a> {
             let (report, actuators) = controller.poll(&sensors)?;
             let localizer = controller.localizer()?;
             recorder.polled(&report, localizer);
-            self.obey(&actuators);
+            self.obey(actuators);
             self.record(&report, localizer, recorder);
             // A tick may be held back by a ping, but not for as long as a period.
             let is_last = report.tick.is_some() && self.now + period > end;
@@ -195,7 +195,7 @@ impl<'a> WorldSide<'a> {
     }
 
     /// Does what the robot did to its wires.
-    fn obey(&mut self, actuators: &Actuators) {
+    fn obey(&mut self, actuators: Actuators) {
         if let Some(duty) = actuators.duty {
             self.ordered = Some(self.setup.bearing(duty, &self.simulation.scenario.robot.config));
             self.turn_servo();
