@@ -16,6 +16,7 @@ mod firmware;
 mod fuzz;
 mod miri;
 mod panics;
+mod pico;
 mod program;
 
 #[derive(Debug, Parser)]

@@ -1,0 +1,282 @@
+//! The second board: a Raspberry Pi Pico 2 with two encoders, a servo, a pulse-width sonar and a
+//! UART.
+//!
+//! This file is the board; the robot on it is in `sonarfix-robot`, what it does in `sonarfix-app`.
+//! The wiring is a table in `docs/firmware.md`.
+//!
+//! | | for | pins |
+//! |---|---|---|
+//! | PIO0 | right and left encoder, a state machine each | GP2 GP3, GP4 GP5 |
+//! | PWM slice 3, channel A | the servo's pulses | GP6 |
+//! | TIMER0 | the clock, 1 µs, and a turn of the loop every millisecond | |
+//! | an interrupt | the echo's edges | GP8 |
+//! | UART0 | the link, 115,200 baud | GP0 GP1 |
+//! | | the sonar's trigger; high while the robot may drive | GP7; GP9 |
+//!
+//! Two executors: one in the thread, for the loop, and one in an interrupt above it, for the echo.
+//! However long a turn of the loop takes, edges are stamped within microseconds; only writing to
+//! flash, for which the processor stands still, keeps them waiting.
+
+#![no_std]
+#![no_main]
+
+use core::convert::Infallible;
+
+use defmt_rtt as _;
+use embassy_executor::{Executor, InterruptExecutor};
+use embassy_rp::flash::{self, Flash};
+use embassy_rp::gpio::{Input, Level, Output, Pull};
+use embassy_rp::interrupt::{self, InterruptExt, Priority};
+use embassy_rp::peripherals::{FLASH, PIO0};
+use embassy_rp::pio::{self, FifoJoin, LoadedProgram, Pio, PioPin, ShiftDirection, StateMachine};
+use embassy_rp::pwm::{self, Pwm};
+use embassy_rp::uart::{self, Uart};
+use embassy_rp::watchdog::{ResetReason, Watchdog};
+use embassy_rp::{Peri, bind_interrupts, pac};
+use embassy_time::{Duration, Ticker};
+use embedded_hal_02::serial::{Read, Write};
+use heapless::Deque;
+use panic_probe as _;
+use sonarfix::units::Instant;
+use sonarfix_app::store::Store;
+use sonarfix_app::{App, Flashed, Link, log};
+use sonarfix_hal::encoder::Counter;
+use sonarfix_hal::ranger::{Captured, EchoCapture, PulseRanger};
+use sonarfix_hal::robot::Devices;
+use sonarfix_link::message::Reset;
+use sonarfix_robot::memory;
+
+/// A turn of the loop.
+const TURN: Duration = Duration::from_millis(1);
+/// Longer than the erasing of a sector (at most 0.4 s), which keeps the loop from its deadlines.
+const WATCHDOG: Duration = Duration::from_secs(2);
+
+/// Where the flash lies in memory, and how large it is.
+const FLASH_BASE: u32 = 0x1000_0000;
+const FLASH_SIZE: usize = 4 * 1024 * 1024;
+
+type Hardware =
+    Devices<Encoder<0>, Encoder<1>, Pwm<'static>, PulseRanger<Output<'static>, Captured<'static>>>;
+
+/// Where [`echo`] leaves the edges.
+static ECHO: EchoCapture = EchoCapture::new();
+/// What must not wait for the loop.
+static URGENT: InterruptExecutor = InterruptExecutor::new();
+
+bind_interrupts!(struct Interrupts {
+    PIO0_IRQ_0 => pio::InterruptHandler<PIO0>;
+});
+
+/// The time since the start.
+fn now() -> Instant {
+    Instant::from_ticks(embassy_time::Instant::now().as_micros())
+}
+
+/// A state machine that counts every edge of both channels.
+struct Encoder<const SM: usize>(StateMachine<'static, PIO0, SM>);
+
+impl<const SM: usize> Encoder<SM> {
+    // Two copies in one function would share the panics of embassy's checks, which then belong to no
+    // line.
+    #[inline(never)]
+    fn new(
+        mut machine: StateMachine<'static, PIO0, SM>,
+        pio: &mut pio::Common<'static, PIO0>,
+        program: &LoadedProgram<'static, PIO0>,
+        a: Peri<'static, impl PioPin>,
+        b: Peri<'static, impl PioPin>,
+    ) -> Self {
+        let (a, b) = (pio.make_pio_pin(a), pio.make_pio_pin(b));
+        let mut config = pio::Config::default();
+        config.use_program(program, &[]);
+        config.set_in_pins(&[&a, &b]);
+        config.shift_in.direction = ShiftDirection::Left;
+        config.fifo_join = FifoJoin::RxAsStatus;
+        machine.set_config(&config);
+        machine.set_enable(true);
+        Self(machine)
+    }
+}
+
+impl<const SM: usize> Counter for Encoder<SM> {
+    type Error = Infallible;
+    const BITS: u32 = 32;
+
+    fn count(&mut self) -> Result<u32, Infallible> {
+        Ok(self.0.get_rxf_entry(0))
+    }
+}
+
+/// The servo's pulses: half a microsecond's resolution, every 20 ms.
+fn servo_pulses() -> pwm::Config {
+    let mut config = pwm::Config::default();
+    let divider = embassy_rp::clocks::clk_sys_freq() / 2_000_000;
+    config.divider = u8::try_from(divider).unwrap_or(u8::MAX).into();
+    config.top = 40_000 - 1;
+    config
+}
+
+/// The link. The UART's queues of 32 bytes last 2.8 ms, and the loop comes by every millisecond:
+/// no interrupt is needed.
+struct Serial {
+    uart: Uart<'static, uart::Blocking>,
+    /// What goes out at one turn is 400 bytes.
+    to_send: Deque<u8, 512>,
+}
+
+impl Serial {
+    /// Hands the UART what it has room for.
+    fn transmit(&mut self) {
+        while let Some(byte) = self.to_send.front()
+            && self.uart.write(*byte).is_ok()
+        {
+            self.to_send.pop_front();
+        }
+    }
+}
+
+impl Link for Serial {
+    fn receive(&mut self) -> Option<u8> {
+        loop {
+            match self.uart.read() {
+                Ok(byte) => return Some(byte),
+                Err(nb::Error::WouldBlock) => return None,
+                // A byte that came damaged is gone; its frame's checksum will tell.
+                Err(nb::Error::Other(_)) => {}
+            }
+        }
+    }
+
+    fn send(&mut self, frame: &[u8]) {
+        if self.to_send.capacity() - self.to_send.len() >= frame.len() {
+            self.to_send.extend(frame.iter().copied());
+        }
+    }
+}
+
+/// The executor of [`echo`].
+#[embassy_rp::interrupt]
+fn SWI_IRQ_0() {
+    #[expect(unsafe_code, reason = "only the handler of its interrupt may poll an executor")]
+    // SAFETY: this is that handler; the interrupt is enabled by starting the executor.
+    unsafe {
+        URGENT.on_interrupt();
+    }
+}
+
+/// Stamps the edges of the echo. It waits for levels: an edge that comes while the other is being
+/// stamped is not slept through.
+#[embassy_executor::task]
+async fn echo(mut line: Input<'static>) -> ! {
+    loop {
+        line.wait_for_high().await;
+        ECHO.rose(now());
+        line.wait_for_low().await;
+        ECHO.fell(now());
+    }
+}
+
+/// Why the chip was reset.
+fn reset(watchdog: &Watchdog) -> Reset {
+    let chip = pac::POWMAN.chip_reset().read();
+    match watchdog.reset_reason() {
+        Some(ResetReason::TimedOut) => Reset::Watchdog,
+        Some(ResetReason::Forced) => Reset::Software,
+        None if chip.had_por() => Reset::PowerOn,
+        None if chip.had_bor() => Reset::BrownOut,
+        None if chip.had_run_low() => Reset::Pin,
+        None => Reset::Unknown,
+    }
+}
+
+/// What the loop turns.
+struct Board {
+    app: App<'static, Flash<'static, FLASH, flash::Blocking, FLASH_SIZE>>,
+    hardware: Hardware,
+    link: Serial,
+    drive: Output<'static>,
+    watchdog: Watchdog,
+    turns: Ticker,
+}
+
+impl Board {
+    /// The board with everything started; `None` if the constants of `sonarfix-robot` contradict
+    /// each other.
+    // Its frame would stay below the loop's for ever.
+    #[inline(never)]
+    fn new() -> Option<Self> {
+        let board = embassy_rp::init(embassy_rp::config::Config::default());
+        let mut watchdog = Watchdog::new(board.WATCHDOG);
+        let reset = reset(&watchdog);
+        // A pin's interrupt and the executor that it wakes, above the clock's, which turns the loop.
+        interrupt::IO_IRQ_BANK0.set_priority(Priority::P0);
+        interrupt::SWI_IRQ_0.set_priority(Priority::P0);
+        interrupt::TIMER0_IRQ_0.set_priority(Priority::P1);
+        let urgent = URGENT.start(interrupt::SWI_IRQ_0);
+        urgent.spawn(echo(Input::new(board.PIN_8, Pull::None)).ok()?);
+
+        let mut pio = Pio::new(board.PIO0, Interrupts);
+        let program = ::pio::pio_file!("src/quadrature.pio");
+        let program = pio.common.load_program(&program.program);
+        let encoders = &mut pio.common;
+        let right = Encoder::new(pio.sm0, encoders, &program, board.PIN_2, board.PIN_3);
+        let left = Encoder::new(pio.sm1, encoders, &program, board.PIN_4, board.PIN_5);
+        let pulses = Pwm::new_output_a(board.PWM_SLICE3, board.PIN_6, servo_pulses());
+        let trigger = Output::new(board.PIN_7, Level::Low);
+        let servo = sonarfix_robot::servo(pulses)?;
+        let ranger = sonarfix_robot::sonar(trigger, &ECHO);
+
+        let flashed = Flashed::read(memory::map(), memory::config());
+        log::flashed(&flashed);
+        let store = Store::new(Flash::new_blocking(board.FLASH), memory::store(FLASH_BASE)).ok()?;
+        let app = App::new(sonarfix_robot::body(reset)?, flashed, store, now()).ok()?;
+        // Its default is 115,200 baud, 8N1.
+        let uart = uart::Config::default();
+        let uart = Uart::new_blocking(board.UART0, board.PIN_0, board.PIN_1, uart);
+        watchdog.start(WATCHDOG);
+        Some(Self {
+            app,
+            hardware: Devices { right, left, servo, ranger },
+            link: Serial { uart, to_send: Deque::new() },
+            drive: Output::new(board.PIN_9, Level::Low),
+            watchdog,
+            turns: Ticker::every(TURN),
+        })
+    }
+
+    /// A turn of the loop.
+    fn turn(&mut self) {
+        let start = now();
+        let polled = self.app.poll(start, &mut self.hardware, &mut self.link);
+        self.drive.set_level(polled.is_running.into());
+        if polled.is_on_time {
+            self.watchdog.feed(WATCHDOG);
+        }
+        self.link.transmit();
+        log::polled(&polled);
+        if let Some(took) = now().checked_duration_since(start) {
+            self.app.took(took);
+        }
+    }
+}
+
+/// A turn of the loop every millisecond.
+#[embassy_executor::task]
+async fn turns(mut board: Board) -> ! {
+    loop {
+        board.turns.next().await;
+        board.turn();
+    }
+}
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    static mut EXECUTOR: Option<Executor> = None;
+    EXECUTOR.get_or_insert_with(Executor::new).run(|spawner| {
+        if let Some(Ok(turns)) = Board::new().map(turns) {
+            spawner.spawn(turns);
+        } else {
+            defmt::error!("the constants of `sonarfix-robot` are no robot");
+        }
+    })
+}
