@@ -7,15 +7,14 @@
 //! | | for | pins |
 //! |---|---|---|
 //! | PIO0 | right and left encoder, a state machine each | GP2 GP3, GP4 GP5 |
+//! | PIO1 | the stamps of the echo's edges, 1 µs | GP8 |
 //! | PWM slice 3, channel A | the servo's pulses | GP6 |
 //! | TIMER0 | the clock, 1 µs, and a turn of the loop every millisecond | |
-//! | an interrupt | the echo's edges | GP8 |
 //! | UART0 | the link, 115,200 baud | GP0 GP1 |
 //! | | the sonar's trigger; high while the robot may drive | GP7; GP9 |
 //!
-//! Two executors: one in the thread, for the loop, and one in an interrupt above it, for the echo.
-//! However long a turn of the loop takes, edges are stamped within microseconds; only writing to
-//! flash, for which the processor stands still, keeps them waiting.
+//! Nothing here is in a hurry: however long a turn of the loop takes, or the flash, state machines
+//! count the wheels and stamp the edges. So there is one executor, and no interrupt but the clock's.
 
 #![no_std]
 #![no_main]
@@ -23,12 +22,14 @@
 use core::convert::Infallible;
 
 use defmt_rtt as _;
-use embassy_executor::{Executor, InterruptExecutor};
+use embassy_executor::Executor;
 use embassy_rp::flash::{self, Flash};
-use embassy_rp::gpio::{Input, Level, Output, Pull};
-use embassy_rp::interrupt::{self, InterruptExt, Priority};
-use embassy_rp::peripherals::{FLASH, PIO0};
-use embassy_rp::pio::{self, FifoJoin, LoadedProgram, Pio, PioPin, ShiftDirection, StateMachine};
+use embassy_rp::gpio::{Level, Output};
+use embassy_rp::peripherals::{FLASH, PIO0, PIO1};
+use embassy_rp::pio::{
+    Common, Config, FifoJoin, InterruptHandler, LoadedProgram, Pio, PioPin, ShiftDirection,
+    StateMachine,
+};
 use embassy_rp::pwm::{self, Pwm};
 use embassy_rp::uart::{self, Uart};
 use embassy_rp::watchdog::{ResetReason, Watchdog};
@@ -37,6 +38,7 @@ use embassy_time::{Duration, Ticker};
 use embedded_hal_02::serial::{Read, Write};
 use heapless::Deque;
 use panic_probe as _;
+use pio::pio_file;
 use sonarfix::units::Instant;
 use sonarfix_app::store::Store;
 use sonarfix_app::{App, Flashed, Link, log};
@@ -58,13 +60,12 @@ const FLASH_SIZE: usize = 4 * 1024 * 1024;
 type Hardware =
     Devices<Encoder<0>, Encoder<1>, Pwm<'static>, PulseRanger<Output<'static>, Captured<'static>>>;
 
-/// Where [`echo`] leaves the edges.
+/// Where [`Stamps`] leaves the edges.
 static ECHO: EchoCapture = EchoCapture::new();
-/// What must not wait for the loop.
-static URGENT: InterruptExecutor = InterruptExecutor::new();
 
 bind_interrupts!(struct Interrupts {
-    PIO0_IRQ_0 => pio::InterruptHandler<PIO0>;
+    PIO0_IRQ_0 => InterruptHandler<PIO0>;
+    PIO1_IRQ_0 => InterruptHandler<PIO1>;
 });
 
 /// The time since the start.
@@ -76,18 +77,18 @@ fn now() -> Instant {
 struct Encoder<const SM: usize>(StateMachine<'static, PIO0, SM>);
 
 impl<const SM: usize> Encoder<SM> {
-    // Two copies in one function would share the panics of embassy's checks, which then belong to no
-    // line.
+    // In one function with others it would share the panics of embassy's checks with them, and
+    // those would belong to no line.
     #[inline(never)]
     fn new(
         mut machine: StateMachine<'static, PIO0, SM>,
-        pio: &mut pio::Common<'static, PIO0>,
+        pio: &mut Common<'static, PIO0>,
         program: &LoadedProgram<'static, PIO0>,
         a: Peri<'static, impl PioPin>,
         b: Peri<'static, impl PioPin>,
     ) -> Self {
         let (a, b) = (pio.make_pio_pin(a), pio.make_pio_pin(b));
-        let mut config = pio::Config::default();
+        let mut config = Config::default();
         config.use_program(program, &[]);
         config.set_in_pins(&[&a, &b]);
         config.shift_in.direction = ShiftDirection::Left;
@@ -107,11 +108,61 @@ impl<const SM: usize> Counter for Encoder<SM> {
     }
 }
 
+/// A state machine that stamps the edges of the echo.
+struct Stamps {
+    machine: StateMachine<'static, PIO1, 0>,
+    /// The edges that [`ECHO`] knows.
+    rise: u32,
+    fall: u32,
+}
+
+impl Stamps {
+    // As above.
+    #[inline(never)]
+    fn new(pio: Peri<'static, PIO1>, echo: Peri<'static, impl PioPin>) -> Self {
+        let Pio { mut common, sm0: mut machine, .. } = Pio::new(pio, Interrupts);
+        let program = common.load_program(&pio_file!("src/echo.pio").program);
+        let echo = common.make_pio_pin(echo);
+        let mut config = Config::default();
+        config.use_program(&program, &[]);
+        config.set_jmp_pin(&echo);
+        config.fifo_join = FifoJoin::RxAsStatus;
+        config.clock_divider = clock_divider(5_000_000).into();
+        machine.set_config(&config);
+        machine.set_enable(true);
+        let (rise, fall) = (machine.get_rxf_entry(1), machine.get_rxf_entry(2));
+        Self { machine, rise, fall }
+    }
+
+    /// Tells [`ECHO`] the newest edge of each kind, the older of the two first.
+    fn tell(&mut self, now: Instant) {
+        let (rise, fall) = (self.machine.get_rxf_entry(1), self.machine.get_rxf_entry(2));
+        let count = self.machine.get_rxf_entry(0);
+        let age = |stamp| count.wrapping_sub(stamp);
+        let at = |stamp| Instant::from_ticks(now.ticks().saturating_sub(age(stamp).into()));
+        let has_fallen = fall != self.fall;
+        if has_fallen && age(fall) > age(rise) {
+            ECHO.fell(at(fall));
+        }
+        if rise != self.rise {
+            ECHO.rose(at(rise));
+        }
+        if has_fallen && age(fall) <= age(rise) {
+            ECHO.fell(at(fall));
+        }
+        (self.rise, self.fall) = (rise, fall);
+    }
+}
+
+/// What divides the system's clock down to this many Hz.
+fn clock_divider(frequency: u32) -> u8 {
+    u8::try_from(embassy_rp::clocks::clk_sys_freq() / frequency).unwrap_or(u8::MAX)
+}
+
 /// The servo's pulses: half a microsecond's resolution, every 20 ms.
 fn servo_pulses() -> pwm::Config {
     let mut config = pwm::Config::default();
-    let divider = embassy_rp::clocks::clk_sys_freq() / 2_000_000;
-    config.divider = u8::try_from(divider).unwrap_or(u8::MAX).into();
+    config.divider = clock_divider(2_000_000).into();
     config.top = 40_000 - 1;
     config
 }
@@ -154,28 +205,6 @@ impl Link for Serial {
     }
 }
 
-/// The executor of [`echo`].
-#[embassy_rp::interrupt]
-fn SWI_IRQ_0() {
-    #[expect(unsafe_code, reason = "only the handler of its interrupt may poll an executor")]
-    // SAFETY: this is that handler; the interrupt is enabled by starting the executor.
-    unsafe {
-        URGENT.on_interrupt();
-    }
-}
-
-/// Stamps the edges of the echo. It waits for levels: an edge that comes while the other is being
-/// stamped is not slept through.
-#[embassy_executor::task]
-async fn echo(mut line: Input<'static>) -> ! {
-    loop {
-        line.wait_for_high().await;
-        ECHO.rose(now());
-        line.wait_for_low().await;
-        ECHO.fell(now());
-    }
-}
-
 /// Why the chip was reset.
 fn reset(watchdog: &Watchdog) -> Reset {
     let chip = pac::POWMAN.chip_reset().read();
@@ -193,6 +222,7 @@ fn reset(watchdog: &Watchdog) -> Reset {
 struct Board {
     app: App<'static, Flash<'static, FLASH, flash::Blocking, FLASH_SIZE>>,
     hardware: Hardware,
+    stamps: Stamps,
     link: Serial,
     drive: Output<'static>,
     watchdog: Watchdog,
@@ -208,19 +238,11 @@ impl Board {
         let board = embassy_rp::init(embassy_rp::config::Config::default());
         let mut watchdog = Watchdog::new(board.WATCHDOG);
         let reset = reset(&watchdog);
-        // A pin's interrupt and the executor that it wakes, above the clock's, which turns the loop.
-        interrupt::IO_IRQ_BANK0.set_priority(Priority::P0);
-        interrupt::SWI_IRQ_0.set_priority(Priority::P0);
-        interrupt::TIMER0_IRQ_0.set_priority(Priority::P1);
-        let urgent = URGENT.start(interrupt::SWI_IRQ_0);
-        urgent.spawn(echo(Input::new(board.PIN_8, Pull::None)).ok()?);
-
-        let mut pio = Pio::new(board.PIO0, Interrupts);
-        let program = ::pio::pio_file!("src/quadrature.pio");
-        let program = pio.common.load_program(&program.program);
-        let encoders = &mut pio.common;
-        let right = Encoder::new(pio.sm0, encoders, &program, board.PIN_2, board.PIN_3);
-        let left = Encoder::new(pio.sm1, encoders, &program, board.PIN_4, board.PIN_5);
+        let Pio { common: mut pio, sm0, sm1, .. } = Pio::new(board.PIO0, Interrupts);
+        let program = pio.load_program(&pio_file!("src/quadrature.pio").program);
+        let right = Encoder::new(sm0, &mut pio, &program, board.PIN_2, board.PIN_3);
+        let left = Encoder::new(sm1, &mut pio, &program, board.PIN_4, board.PIN_5);
+        let stamps = Stamps::new(board.PIO1, board.PIN_8);
         let pulses = Pwm::new_output_a(board.PWM_SLICE3, board.PIN_6, servo_pulses());
         let trigger = Output::new(board.PIN_7, Level::Low);
         let servo = sonarfix_robot::servo(pulses)?;
@@ -237,6 +259,7 @@ impl Board {
         Some(Self {
             app,
             hardware: Devices { right, left, servo, ranger },
+            stamps,
             link: Serial { uart, to_send: Deque::new() },
             drive: Output::new(board.PIN_9, Level::Low),
             watchdog,
@@ -247,6 +270,7 @@ impl Board {
     /// A turn of the loop.
     fn turn(&mut self) {
         let start = now();
+        self.stamps.tell(start);
         let polled = self.app.poll(start, &mut self.hardware, &mut self.link);
         self.drive.set_level(polled.is_running.into());
         if polled.is_on_time {
