@@ -77,8 +77,8 @@ fn now() -> Instant {
 struct Encoder<const SM: usize>(StateMachine<'static, PIO0, SM>);
 
 impl<const SM: usize> Encoder<SM> {
-    // In one function with others it would share the panics of embassy's checks with them, and
-    // those would belong to no line.
+    // In one function with others its calls of embassy's panics would be merged with theirs, and
+    // belong to no line (`cargo xtask test-firmware` asks for each).
     #[inline(never)]
     fn new(
         mut machine: StateMachine<'static, PIO0, SM>,
@@ -159,7 +159,8 @@ fn clock_divider(frequency: u32) -> u8 {
     u8::try_from(embassy_rp::clocks::clk_sys_freq() / frequency).unwrap_or(u8::MAX)
 }
 
-/// The servo's pulses: half a microsecond's resolution, every 20 ms.
+/// The servo's pulses: half a microsecond's resolution, every 20 ms. That the driver is told 39,999
+/// counts for the 40,000 of a frame is less than a count of any pulse.
 fn servo_pulses() -> pwm::Config {
     let mut config = pwm::Config::default();
     config.divider = clock_divider(2_000_000).into();
