@@ -129,8 +129,8 @@ impl Stamps {
         config.fifo_join = FifoJoin::RxAsStatus;
         config.clock_divider = clock_divider(5_000_000).into();
         machine.set_config(&config);
-        machine.set_enable(true);
         let (rise, fall) = (machine.get_rxf_entry(1), machine.get_rxf_entry(2));
+        machine.set_enable(true);
         Self { machine, rise, fall }
     }
 
