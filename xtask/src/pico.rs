@@ -1,5 +1,5 @@
-//! The second board's firmware, which no emulator runs: that it builds, without warnings, and that
-//! it cannot panic through our code.
+//! The second board's firmware, whose chip QEMU does not have: that it builds, without warnings, and
+//! that it cannot panic through our code.
 
 use crate::{cargo, firmware};
 
