@@ -11,6 +11,7 @@ use object::{Object, ObjectSection};
 
 use crate::cargo;
 use crate::elf::{self, Program};
+use crate::pico;
 
 const TARGET: &str = "thumbv7em-none-eabihf";
 const NAME: &str = "sonarfix-stm32f405";
@@ -32,7 +33,8 @@ pub fn test() -> anyhow::Result<()> {
     let tests = "test --package sonarfix-app --test emulated -- --ignored --nocapture";
     let mut command = cargo::command(tests);
     command.env("SONARFIX_FIRMWARE", &program);
-    cargo::check(command)
+    cargo::check(command)?;
+    pico::check()
 }
 
 /// Flash and RAM of the linked file, by crate: an instruction belongs to the line that it was made
@@ -91,7 +93,7 @@ fn build() -> anyhow::Result<PathBuf> {
 }
 
 /// A cargo in the workspace `firmware`, whose own configuration holds what its linker needs.
-fn in_firmware(arguments: &str) -> Command {
+pub fn in_firmware(arguments: &str) -> Command {
     let mut command = cargo::command(arguments);
     command.current_dir(cargo::root().join("firmware")).env_remove("RUSTFLAGS");
     command.env("CARGO_TARGET_DIR", target());
@@ -99,12 +101,12 @@ fn in_firmware(arguments: &str) -> Command {
 }
 
 /// Where the workspace `firmware` is built.
-fn target() -> PathBuf {
+pub fn target() -> PathBuf {
     cargo::target_directory().join("firmware")
 }
 
 /// No line of ours panics. Lines of other people's crates that do are counted by crate.
-fn check_panics(program: &Path) -> anyhow::Result<()> {
+pub fn check_panics(program: &Path) -> anyhow::Result<()> {
     let mut theirs: BTreeMap<String, u32> = BTreeMap::new();
     let mut ours = Vec::new();
     for site in panic_sites(program)? {

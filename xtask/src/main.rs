@@ -17,6 +17,7 @@ mod fuzz;
 mod golden;
 mod miri;
 mod panics;
+mod pico;
 mod pil;
 mod program;
 

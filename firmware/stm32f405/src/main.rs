@@ -1,7 +1,7 @@
 //! The reference board: an STM32F405 with two encoders, a servo, a pulse-width sonar and a UART.
 //!
-//! This file is the board, and the robot on it; what the robot does is in `sonarfix-app`. The
-//! wiring is drawn in `docs/firmware.md`.
+//! This file is the board; the robot on it is in `sonarfix-robot`, what it does in `sonarfix-app`.
+//! The wiring is drawn in `docs/firmware.md`.
 //!
 //! | | for | pins |
 //! |---|---|---|
@@ -29,38 +29,15 @@ use embedded_storage::nor_flash::{
 };
 use heapless::spsc::{Consumer, Producer, Queue};
 use panic_probe as _;
-use sonarfix::units::{Duration, Metres, Radians};
-use sonarfix_app::{Body, Link};
-use sonarfix_hal::encoder::{Counter, WheelGeometry, Wheels};
+use sonarfix_app::Link;
+use sonarfix_hal::encoder::Counter;
 use sonarfix_hal::ranger::EchoCapture;
-use sonarfix_hal::robot::Settings;
-use sonarfix_hal::servo::{Calibration, MeasuredPulse, Pace, Servo};
-use sonarfix_link::message::Reset;
+use sonarfix_robot::memory;
 use stm32f4xx_hal::pac::{self, tim1};
 use stm32f4xx_hal::rcc;
 
 /// Where TIM5's interrupt leaves the edges of the echo.
 static ECHO: EchoCapture = EchoCapture::new();
-
-/// The robot on the board: 65 mm wheels on gear motors with 11 lines, an SG90, an HC-SR04. Measure
-/// yours; what the configuration holds is not here.
-fn body(reset: Reset) -> Option<Body> {
-    // 11 lines × 4 edges × 34.014 turns of the motor.
-    let wheel = WheelGeometry::new(Metres(0.065), 1_496.6).ok()?;
-    let wheels = Wheels { right: wheel, left: wheel.reversed() };
-    Some(Body { wheels, settings: Settings::default(), firmware: version(), reset })
-}
-
-/// The servo's two pulses that were tried on the bench, and how far it may turn.
-fn servo(pwm: ServoPwm) -> Option<Servo<ServoPwm>> {
-    let tried = |width, degrees| MeasuredPulse {
-        width: Duration::from_ticks(width),
-        bearing: Radians::from_degrees(degrees),
-    };
-    let calibration = Calibration::new(tried(1_000, -45.0), tried(2_000, 45.0)).ok()?;
-    let limits = (Radians::from_degrees(-90.0), Radians::from_degrees(90.0));
-    Servo::new(pwm, calibration, limits, Pace::SG90).ok()
-}
 
 /// The clocks: the internal oscillator at 16 MHz, which is exact to 1 %, and so are the ranges'
 /// times; the filter's range scale finds that. With a crystal of 8 MHz: 48 MHz.
@@ -70,15 +47,6 @@ fn clocks() -> rcc::Config {
     } else {
         rcc::Config::hsi()
     }
-}
-
-fn version() -> [u8; 3] {
-    let number = |text: &str| text.parse().unwrap_or(0);
-    [
-        number(env!("CARGO_PKG_VERSION_MAJOR")),
-        number(env!("CARGO_PKG_VERSION_MINOR")),
-        number(env!("CARGO_PKG_VERSION_PATCH")),
-    ]
 }
 
 /// What divides a timer's clock down to microseconds.
@@ -238,13 +206,13 @@ impl ReadNorFlash for Sectors {
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
         for (address, byte) in (Self::BASE + offset..).zip(bytes) {
-            *byte = memory::read(address);
+            *byte = sectors::read(address);
         }
         Ok(())
     }
 
     fn capacity(&self) -> usize {
-        memory::store().end as usize
+        memory::store(Self::BASE).end as usize
     }
 }
 
@@ -256,7 +224,7 @@ impl NorFlash for Sectors {
         for sector in from / Self::SECTOR..to / Self::SECTOR {
             let number = u8::try_from(sector).map_err(|_| FlashError)?;
             self.unlocked(|flash| {
-                memory::select(flash, number);
+                sectors::select(flash, number);
                 flash.cr().modify(|_, w| w.strt().set_bit());
                 Self::finish(flash)
             })?;
@@ -269,7 +237,7 @@ impl NorFlash for Sectors {
             flash.cr().write(|w| w.psize().psize32().pg().set_bit());
             let (words, _) = bytes.as_chunks::<4>();
             for (address, word) in (Self::BASE + offset..).step_by(4).zip(words) {
-                memory::write(flash, address, u32::from_le_bytes(*word));
+                sectors::write(flash, address, u32::from_le_bytes(*word));
                 Self::finish(flash)?;
             }
             Ok(())
@@ -277,47 +245,10 @@ impl NorFlash for Sectors {
     }
 }
 
-/// The flash's memory, as `memory.x` divides it.
-#[expect(unsafe_code, reason = "memory that the linker script names and Rust does not know")]
-mod memory {
-    use core::ops::Range;
-
+/// The store's region of the flash.
+#[expect(unsafe_code, reason = "memory that the chip writes and Rust does not know")]
+mod sectors {
     use stm32f4xx_hal::pac;
-
-    unsafe extern "C" {
-        static __map_start: u8;
-        static __map_length: u8;
-        static __config_start: u8;
-        static __config_length: u8;
-        static __store_start: u8;
-        static __store_length: u8;
-    }
-
-    /// The baked map's region.
-    pub fn map() -> &'static [u8] {
-        // SAFETY: a region of flash of this length, where nothing is linked to and nothing written.
-        unsafe {
-            core::slice::from_raw_parts(&raw const __map_start, (&raw const __map_length).addr())
-        }
-    }
-
-    /// The baked configuration's region.
-    pub fn config() -> &'static [u8] {
-        // SAFETY: as above.
-        unsafe {
-            core::slice::from_raw_parts(
-                &raw const __config_start,
-                (&raw const __config_length).addr(),
-            )
-        }
-    }
-
-    /// The store's region, in addresses from the flash's start on.
-    pub fn store() -> Range<u32> {
-        let number = |address: usize| u32::try_from(address).unwrap_or(u32::MAX);
-        let start = number((&raw const __store_start).addr()) - super::Sectors::BASE;
-        start..start + number((&raw const __store_length).addr())
-    }
 
     /// Reads a byte of the store.
     pub fn read(address: u32) -> u8 {
@@ -348,9 +279,10 @@ mod app {
     use sonarfix::units::Instant;
     use sonarfix_app::store::Store;
     use sonarfix_app::{App, Flashed, log};
-    use sonarfix_hal::ranger::{Air, Captured, PulseRanger, PulseTiming};
+    use sonarfix_hal::ranger::{Captured, PulseRanger};
     use sonarfix_hal::robot::Devices;
     use sonarfix_link::message::Reset;
+    use sonarfix_robot::memory;
     use stm32f4xx_hal::gpio::{GpioExt, Output, Pin};
     use stm32f4xx_hal::hal_02::serial::{Read, Write};
     use stm32f4xx_hal::pac::{self, TIM1, TIM2, TIM5, TIM8, TIM10, USART2};
@@ -359,7 +291,7 @@ mod app {
     use stm32f4xx_hal::time::Bps;
     use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
-    use super::{ECHO, Encoder, Received, Sectors, ServoPwm, ToSend, Uart, memory, microseconds};
+    use super::{ECHO, Encoder, Received, Sectors, ServoPwm, ToSend, Uart, microseconds};
 
     /// A turn of the loop, µs.
     const TURN: u32 = 1_000;
@@ -421,8 +353,9 @@ mod app {
         let pwm = ServoPwm::new(board.TIM10, rcc.clocks.timclk2());
         let flashed = Flashed::read(memory::map(), memory::config());
         log::flashed(&flashed);
-        let store = Store::new(Sectors(board.FLASH), memory::store());
-        let parts = (uart.ok(), super::servo(pwm), super::body(reset), store.ok());
+        let store = Store::new(Sectors(board.FLASH), memory::store(Sectors::BASE));
+        let parts =
+            (uart.ok(), sonarfix_robot::servo(pwm), sonarfix_robot::body(reset), store.ok());
         let (Some(uart), Some(servo), Some(body), Some(store)) = parts else {
             stop();
         };
@@ -430,12 +363,11 @@ mod app {
             stop();
         };
         let trigger = a.pa1.into_push_pull_output();
-        let timing = PulseTiming::HC_SR04;
         let hardware = Devices {
             right: Encoder::new(board.TIM1),
             left: Encoder::new(board.TIM8),
             servo,
-            ranger: PulseRanger::new(trigger, Captured::new(&ECHO), timing, Air::ROOM),
+            ranger: sonarfix_robot::sonar(trigger, &ECHO),
         };
         let (tx, mut rx) = uart.split();
         rx.listen();
@@ -573,9 +505,9 @@ mod app {
         }
     }
 
-    /// The constants at the top of this file contradict each other.
+    /// The robot's constants contradict each other.
     fn stop() -> ! {
-        defmt::error!("the board's constants are no robot: see `body` and `servo`");
+        defmt::error!("the constants of `sonarfix-robot` are no robot");
         loop {
             rtic::export::wfi();
         }

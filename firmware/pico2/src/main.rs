@@ -1,0 +1,307 @@
+//! The second board: a Raspberry Pi Pico 2 with two encoders, a servo, a pulse-width sonar and a
+//! UART.
+//!
+//! This file is the board; the robot on it is in `sonarfix-robot`, what it does in `sonarfix-app`.
+//! The wiring is a table in `docs/firmware.md`.
+//!
+//! | | for | pins |
+//! |---|---|---|
+//! | PIO0 | right and left encoder, a state machine each | GP2 GP3, GP4 GP5 |
+//! | PIO1 | the stamps of the echo's edges, 1 µs | GP8 |
+//! | PWM slice 3, channel A | the servo's pulses | GP6 |
+//! | TIMER0 | the clock, 1 µs, and a turn of the loop every millisecond | |
+//! | UART0 | the link, 115,200 baud | GP0 GP1 |
+//! | | the sonar's trigger; high while the robot may drive | GP7; GP9 |
+//!
+//! Nothing here is in a hurry: however long a turn of the loop takes, or the flash, state machines
+//! count the wheels and stamp the edges. So there is one executor, and no interrupt but the clock's.
+
+#![no_std]
+#![no_main]
+
+use core::convert::Infallible;
+
+use defmt_rtt as _;
+use embassy_executor::Executor;
+use embassy_rp::flash::{self, Flash};
+use embassy_rp::gpio::{Level, Output};
+use embassy_rp::peripherals::{FLASH, PIO0, PIO1};
+use embassy_rp::pio::{
+    Common, Config, FifoJoin, InterruptHandler, LoadedProgram, Pio, PioPin, ShiftDirection,
+    StateMachine,
+};
+use embassy_rp::pwm::{self, Pwm};
+use embassy_rp::uart::{self, Uart};
+use embassy_rp::watchdog::{ResetReason, Watchdog};
+use embassy_rp::{Peri, bind_interrupts, pac};
+use embassy_time::{Duration, Ticker};
+use embedded_hal_02::serial::{Read, Write};
+use heapless::Deque;
+use panic_probe as _;
+use pio::pio_file;
+use sonarfix::units::Instant;
+use sonarfix_app::store::Store;
+use sonarfix_app::{App, Flashed, Link, log};
+use sonarfix_hal::encoder::Counter;
+use sonarfix_hal::ranger::{Captured, EchoCapture, PulseRanger};
+use sonarfix_hal::robot::Devices;
+use sonarfix_link::message::Reset;
+use sonarfix_robot::memory;
+
+/// A turn of the loop.
+const TURN: Duration = Duration::from_millis(1);
+/// Longer than the erasing of a sector (at most 0.4 s), which keeps the loop from its deadlines.
+const WATCHDOG: Duration = Duration::from_secs(2);
+
+/// Where the flash lies in memory, and how large it is.
+const FLASH_BASE: u32 = 0x1000_0000;
+const FLASH_SIZE: usize = 4 * 1024 * 1024;
+
+type Hardware =
+    Devices<Encoder<0>, Encoder<1>, Pwm<'static>, PulseRanger<Output<'static>, Captured<'static>>>;
+
+/// Where [`Stamps`] leaves the edges.
+static ECHO: EchoCapture = EchoCapture::new();
+
+bind_interrupts!(struct Interrupts {
+    PIO0_IRQ_0 => InterruptHandler<PIO0>;
+    PIO1_IRQ_0 => InterruptHandler<PIO1>;
+});
+
+/// The time since the start.
+fn now() -> Instant {
+    Instant::from_ticks(embassy_time::Instant::now().as_micros())
+}
+
+/// A state machine that counts every edge of both channels.
+struct Encoder<const SM: usize>(StateMachine<'static, PIO0, SM>);
+
+impl<const SM: usize> Encoder<SM> {
+    // In one function with others its calls of embassy's panics would be merged with theirs, and
+    // belong to no line (`cargo xtask test-firmware` asks for each).
+    #[inline(never)]
+    fn new(
+        mut machine: StateMachine<'static, PIO0, SM>,
+        pio: &mut Common<'static, PIO0>,
+        program: &LoadedProgram<'static, PIO0>,
+        a: Peri<'static, impl PioPin>,
+        b: Peri<'static, impl PioPin>,
+    ) -> Self {
+        let (a, b) = (pio.make_pio_pin(a), pio.make_pio_pin(b));
+        let mut config = Config::default();
+        config.use_program(program, &[]);
+        config.set_in_pins(&[&a, &b]);
+        config.shift_in.direction = ShiftDirection::Left;
+        config.fifo_join = FifoJoin::RxAsStatus;
+        machine.set_config(&config);
+        machine.set_enable(true);
+        Self(machine)
+    }
+}
+
+impl<const SM: usize> Counter for Encoder<SM> {
+    type Error = Infallible;
+    const BITS: u32 = 32;
+
+    fn count(&mut self) -> Result<u32, Infallible> {
+        Ok(self.0.get_rxf_entry(0))
+    }
+}
+
+/// A state machine that stamps the edges of the echo.
+struct Stamps {
+    machine: StateMachine<'static, PIO1, 0>,
+    /// The edges that [`ECHO`] knows.
+    rise: u32,
+    fall: u32,
+}
+
+impl Stamps {
+    // As above.
+    #[inline(never)]
+    fn new(pio: Peri<'static, PIO1>, echo: Peri<'static, impl PioPin>) -> Self {
+        let Pio { mut common, sm0: mut machine, .. } = Pio::new(pio, Interrupts);
+        let program = common.load_program(&pio_file!("src/echo.pio").program);
+        let echo = common.make_pio_pin(echo);
+        let mut config = Config::default();
+        config.use_program(&program, &[]);
+        config.set_jmp_pin(&echo);
+        config.fifo_join = FifoJoin::RxAsStatus;
+        config.clock_divider = clock_divider(5_000_000).into();
+        machine.set_config(&config);
+        let (rise, fall) = (machine.get_rxf_entry(1), machine.get_rxf_entry(2));
+        machine.set_enable(true);
+        Self { machine, rise, fall }
+    }
+
+    /// Tells [`ECHO`] the newest edge of each kind, the older of the two first.
+    fn tell(&mut self, now: Instant) {
+        let (rise, fall) = (self.machine.get_rxf_entry(1), self.machine.get_rxf_entry(2));
+        let count = self.machine.get_rxf_entry(0);
+        let age = |stamp| count.wrapping_sub(stamp);
+        let at = |stamp| Instant::from_ticks(now.ticks().saturating_sub(age(stamp).into()));
+        let has_fallen = fall != self.fall;
+        if has_fallen && age(fall) > age(rise) {
+            ECHO.fell(at(fall));
+        }
+        if rise != self.rise {
+            ECHO.rose(at(rise));
+        }
+        if has_fallen && age(fall) <= age(rise) {
+            ECHO.fell(at(fall));
+        }
+        (self.rise, self.fall) = (rise, fall);
+    }
+}
+
+/// What divides the system's clock down to this many Hz.
+fn clock_divider(frequency: u32) -> u8 {
+    u8::try_from(embassy_rp::clocks::clk_sys_freq() / frequency).unwrap_or(u8::MAX)
+}
+
+/// The servo's pulses: half a microsecond's resolution, every 20 ms. That the driver is told 39,999
+/// counts for the 40,000 of a frame is less than a count of any pulse.
+fn servo_pulses() -> pwm::Config {
+    let mut config = pwm::Config::default();
+    config.divider = clock_divider(2_000_000).into();
+    config.top = 40_000 - 1;
+    config
+}
+
+/// The link. The UART's queues of 32 bytes last 2.8 ms, and the loop comes by every millisecond:
+/// no interrupt is needed.
+struct Serial {
+    uart: Uart<'static, uart::Blocking>,
+    /// What goes out at one turn is 400 bytes.
+    to_send: Deque<u8, 512>,
+}
+
+impl Serial {
+    /// Hands the UART what it has room for.
+    fn transmit(&mut self) {
+        while let Some(byte) = self.to_send.front()
+            && self.uart.write(*byte).is_ok()
+        {
+            self.to_send.pop_front();
+        }
+    }
+}
+
+impl Link for Serial {
+    fn receive(&mut self) -> Option<u8> {
+        loop {
+            match self.uart.read() {
+                Ok(byte) => return Some(byte),
+                Err(nb::Error::WouldBlock) => return None,
+                // A byte that came damaged is gone; its frame's checksum will tell.
+                Err(nb::Error::Other(_)) => {}
+            }
+        }
+    }
+
+    fn send(&mut self, frame: &[u8]) {
+        if self.to_send.capacity() - self.to_send.len() >= frame.len() {
+            self.to_send.extend(frame.iter().copied());
+        }
+    }
+}
+
+/// Why the chip was reset.
+fn reset(watchdog: &Watchdog) -> Reset {
+    let chip = pac::POWMAN.chip_reset().read();
+    match watchdog.reset_reason() {
+        Some(ResetReason::TimedOut) => Reset::Watchdog,
+        Some(ResetReason::Forced) => Reset::Software,
+        None if chip.had_por() => Reset::PowerOn,
+        None if chip.had_bor() => Reset::BrownOut,
+        None if chip.had_run_low() => Reset::Pin,
+        None => Reset::Unknown,
+    }
+}
+
+/// What the loop turns.
+struct Board {
+    app: App<'static, Flash<'static, FLASH, flash::Blocking, FLASH_SIZE>>,
+    hardware: Hardware,
+    stamps: Stamps,
+    link: Serial,
+    drive: Output<'static>,
+    watchdog: Watchdog,
+    turns: Ticker,
+}
+
+impl Board {
+    /// The board with everything started; `None` if the constants of `sonarfix-robot` contradict
+    /// each other.
+    // Its frame would stay below the loop's for ever.
+    #[inline(never)]
+    fn new() -> Option<Self> {
+        let board = embassy_rp::init(embassy_rp::config::Config::default());
+        let mut watchdog = Watchdog::new(board.WATCHDOG);
+        let reset = reset(&watchdog);
+        let Pio { common: mut pio, sm0, sm1, .. } = Pio::new(board.PIO0, Interrupts);
+        let program = pio.load_program(&pio_file!("src/quadrature.pio").program);
+        let right = Encoder::new(sm0, &mut pio, &program, board.PIN_2, board.PIN_3);
+        let left = Encoder::new(sm1, &mut pio, &program, board.PIN_4, board.PIN_5);
+        let stamps = Stamps::new(board.PIO1, board.PIN_8);
+        let pulses = Pwm::new_output_a(board.PWM_SLICE3, board.PIN_6, servo_pulses());
+        let trigger = Output::new(board.PIN_7, Level::Low);
+        let servo = sonarfix_robot::servo(pulses)?;
+        let ranger = sonarfix_robot::sonar(trigger, &ECHO);
+
+        let flashed = Flashed::read(memory::map(), memory::config());
+        log::flashed(&flashed);
+        let store = Store::new(Flash::new_blocking(board.FLASH), memory::store(FLASH_BASE)).ok()?;
+        let app = App::new(sonarfix_robot::body(reset)?, flashed, store, now()).ok()?;
+        // Its default is 115,200 baud, 8N1.
+        let uart = uart::Config::default();
+        let uart = Uart::new_blocking(board.UART0, board.PIN_0, board.PIN_1, uart);
+        watchdog.start(WATCHDOG);
+        Some(Self {
+            app,
+            hardware: Devices { right, left, servo, ranger },
+            stamps,
+            link: Serial { uart, to_send: Deque::new() },
+            drive: Output::new(board.PIN_9, Level::Low),
+            watchdog,
+            turns: Ticker::every(TURN),
+        })
+    }
+
+    /// A turn of the loop.
+    fn turn(&mut self) {
+        let start = now();
+        self.stamps.tell(start);
+        let polled = self.app.poll(start, &mut self.hardware, &mut self.link);
+        self.drive.set_level(polled.is_running.into());
+        if polled.is_on_time {
+            self.watchdog.feed(WATCHDOG);
+        }
+        self.link.transmit();
+        log::polled(&polled);
+        if let Some(took) = now().checked_duration_since(start) {
+            self.app.took(took);
+        }
+    }
+}
+
+/// A turn of the loop every millisecond.
+#[embassy_executor::task]
+async fn turns(mut board: Board) -> ! {
+    loop {
+        board.turns.next().await;
+        board.turn();
+    }
+}
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    static mut EXECUTOR: Option<Executor> = None;
+    EXECUTOR.get_or_insert_with(Executor::new).run(|spawner| {
+        if let Some(Ok(turns)) = Board::new().map(turns) {
+            spawner.spawn(turns);
+        } else {
+            defmt::error!("the constants of `sonarfix-robot` are no robot");
+        }
+    })
+}

@@ -1,0 +1,37 @@
+//! The regions of flash beside the program, as a board's `memory.x` names them.
+#![expect(unsafe_code, reason = "memory that the linker script names and Rust does not know")]
+
+use core::ops::Range;
+
+unsafe extern "C" {
+    static __map_start: u8;
+    static __map_length: u8;
+    static __config_start: u8;
+    static __config_length: u8;
+    static __store_start: u8;
+    static __store_length: u8;
+}
+
+/// The baked map's region.
+#[must_use]
+pub fn map() -> &'static [u8] {
+    // SAFETY: a region of flash of this length, where nothing is linked to and nothing written.
+    unsafe { core::slice::from_raw_parts(&raw const __map_start, (&raw const __map_length).addr()) }
+}
+
+/// The baked configuration's region.
+#[must_use]
+pub fn config() -> &'static [u8] {
+    // SAFETY: as above.
+    unsafe {
+        core::slice::from_raw_parts(&raw const __config_start, (&raw const __config_length).addr())
+    }
+}
+
+/// The store's region, in addresses from the flash's start on, which is at `base`.
+#[must_use]
+pub fn store(base: u32) -> Range<u32> {
+    let number = |address: usize| u32::try_from(address).unwrap_or(u32::MAX);
+    let start = number((&raw const __store_start).addr()).saturating_sub(base);
+    start..start.saturating_add(number((&raw const __store_length).addr()))
+}

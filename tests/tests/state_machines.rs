@@ -1,0 +1,180 @@
+//! What the state machines of the Pico 2 count and stamp: their programs on an interpreter, which was
+//! written from the RP2350's data sheet, section 11.4, and knows only the instructions that they
+//! use. Assembler and chip have not been asked.
+
+#![expect(clippy::panic, reason = "a test should stop")]
+
+use std::collections::HashMap;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+const QUADRATURE: &str = include_str!("../../firmware/pico2/src/quadrature.pio");
+const ECHO: &str = include_str!("../../firmware/pico2/src/echo.pio");
+
+/// A state machine whose shift registers shift to the left and whose receiving queue is four
+/// registers. Every instruction takes a clock.
+struct Machine {
+    code: Vec<Vec<&'static str>>,
+    labels: HashMap<&'static str, usize>,
+    pc: usize,
+    x: u32,
+    y: u32,
+    isr: u32,
+    osr: u32,
+    registers: [u32; 4],
+}
+
+impl Machine {
+    fn new(program: &'static str) -> Self {
+        let (mut code, mut labels) = (Vec::new(), HashMap::new());
+        for line in program.lines() {
+            let line = line.split(';').next().unwrap_or_default().trim();
+            if let Some(label) = line.strip_suffix(':') {
+                labels.insert(label, code.len());
+            } else if line.starts_with('.') {
+                labels.insert(line, code.len());
+            } else if !line.is_empty() {
+                let words = line.split([' ', ',']).filter(|word| !word.is_empty());
+                code.push(words.collect());
+            }
+        }
+        Self { code, labels, pc: 0, x: 0, y: 0, isr: 0, osr: 0, registers: [0; 4] }
+    }
+
+    /// Runs this many clocks with these levels at the pins; the first is also the one to jump by.
+    fn run(&mut self, clocks: u32, pins: u32) {
+        for _ in 0..clocks {
+            self.step(pins);
+        }
+    }
+
+    fn step(&mut self, pins: u32) {
+        let words = self.code[self.pc].clone();
+        self.pc += 1;
+        if self.pc == self.labels[".wrap"] {
+            self.pc = self.labels[".wrap_target"];
+        }
+        match words[..] {
+            ["jmp", label] => self.pc = self.labels[label],
+            ["jmp", condition, label] => {
+                if self.jumps(condition, pins) {
+                    self.pc = self.labels[label];
+                }
+            }
+            ["in", source, "2"] => self.isr = self.isr << 2 | self.value(source, pins) & 0b11,
+            ["mov", destination, source] => {
+                let value = self.value(source, pins);
+                match destination {
+                    "y" => self.y = value,
+                    "isr" => self.isr = value,
+                    "osr" => self.osr = value,
+                    "pc" => self.pc = value as usize & 31,
+                    "rxfifo[0]" => self.registers[0] = value,
+                    "rxfifo[1]" => self.registers[1] = value,
+                    "rxfifo[2]" => self.registers[2] = value,
+                    other => panic!("`{other}` is not known here"),
+                }
+            }
+            _ => panic!("`{words:?}` is not known here"),
+        }
+    }
+
+    /// Whether a jump is taken. `x--` and `y--` count down either way.
+    fn jumps(&mut self, condition: &str, pins: u32) -> bool {
+        let counted = |register: &mut u32| {
+            let before = *register;
+            *register = before.wrapping_sub(1);
+            before != 0
+        };
+        match condition {
+            "x--" => counted(&mut self.x),
+            "y--" => counted(&mut self.y),
+            "pin" => pins & 1 == 1,
+            other => panic!("`{other}` is not known here"),
+        }
+    }
+
+    fn value(&self, source: &str, pins: u32) -> u32 {
+        match source {
+            "null" => 0,
+            "pins" => pins,
+            "y" => self.y,
+            "isr" => self.isr,
+            "osr" => self.osr,
+            "~x" => !self.x,
+            "~y" => !self.y,
+            other => panic!("`{other}` is not known here"),
+        }
+    }
+}
+
+/// What the slowest way round takes of the state machine's clocks.
+const SLOWEST: u32 = 12;
+
+/// Any walk of a wheel, to both sides of zero, each level held just long enough to be seen or
+/// longer: no edge is lost, and after a second way round the count is there to be read. The
+/// channels are a Gray code, A below B.
+#[test]
+fn every_edge_of_an_encoder_is_counted() {
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    let mut machine = Machine::new(QUADRATURE);
+    let mut position = 0_i32;
+    let (mut lowest, mut highest) = (0, 0);
+    for _ in 0..10_000 {
+        let step = if random.random() { 1 } else { -1 };
+        let held = random.random_range(SLOWEST..2 * SLOWEST);
+        for _ in 0..random.random_range(1..40) {
+            position += step;
+            machine.run(held, levels(position));
+        }
+        machine.run(SLOWEST, levels(position));
+        assert_eq!(machine.registers[0].cast_signed(), position);
+        (lowest, highest) = (lowest.min(position), highest.max(position));
+    }
+    assert!(lowest < 0 && highest > 0, "{lowest} to {highest}: the walk kept to one side");
+}
+
+fn levels(position: i32) -> u32 {
+    [0b00, 0b01, 0b11, 0b10][position.rem_euclid(4) as usize]
+}
+
+/// Both channels at once is a transition that no wheel makes: it counts nothing, and what follows
+/// is counted from there.
+#[test]
+fn both_channels_at_once_count_nothing() {
+    for start in 0..4 {
+        let mut machine = Machine::new(QUADRATURE);
+        machine.run(2 * SLOWEST, levels(start));
+        let before = machine.registers[0];
+        machine.run(2 * SLOWEST, levels(start + 2));
+        assert_eq!(machine.registers[0], before);
+        machine.run(2 * SLOWEST, levels(start + 3));
+        assert_eq!(machine.registers[0], before.wrapping_add(1));
+    }
+}
+
+/// Clocks of the state machine in a microsecond.
+const MICROSECOND: u32 = 5;
+
+/// Pulses of any length at any time: the count keeps to the clock, whatever the line does, a pulse
+/// is as wide as it was, and it was when the stamps say.
+#[test]
+fn both_edges_of_an_echo_are_stamped() {
+    let mut random = ChaCha8Rng::seed_from_u64(2);
+    let mut machine = Machine::new(ECHO);
+    let mut clocks = 0;
+    for _ in 0..10_000 {
+        let [quiet, pulse, after] = [(); 3].map(|()| random.random_range(10..2_000));
+        machine.run(quiet, 0);
+        machine.run(pulse, 1);
+        machine.run(after, 0);
+        clocks += quiet + pulse + after;
+        let [count, rise, fall, _] = machine.registers;
+        // It begins at −1.
+        let in_clocks = |micros: u32| micros * MICROSECOND;
+        assert!(in_clocks(count.wrapping_add(1)).abs_diff(clocks) < 2 * MICROSECOND);
+        assert!(in_clocks(fall.wrapping_sub(rise)).abs_diff(pulse) < MICROSECOND);
+        assert!(in_clocks(count.wrapping_sub(fall)).abs_diff(after) < 2 * MICROSECOND);
+    }
+}
