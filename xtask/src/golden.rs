@@ -10,7 +10,7 @@ const TRACES: [(&str, &str); 2] = [
 ];
 
 /// The first is this computer.
-const MACHINES: [&str; 4] = ["host", "m4f", "m3", "m0plus"];
+const MACHINES: [&str; 5] = ["host", "m4f", "m33", "m3", "m0plus"];
 
 /// Asks every machine all of every trace again.
 pub fn check() -> anyhow::Result<()> {

@@ -19,8 +19,9 @@ struct Core {
     bar: Option<u64>,
 }
 
-const CORES: [Core; 3] = [
+const CORES: [Core; 4] = [
     Core { machine: "m4f", name: "Cortex-M4F", clock: 16, bar: Some(5) },
+    Core { machine: "m33", name: "Cortex-M33", clock: 150, bar: None },
     Core { machine: "m3", name: "Cortex-M3", clock: 72, bar: None },
     Core { machine: "m0plus", name: "Cortex-M0+", clock: 48, bar: Some(10) },
 ];
@@ -90,7 +91,7 @@ pub fn check() -> anyhow::Result<()> {
             missed.push(core.name);
         }
     }
-    println!("{table} |\n|---|---:|---:|---:|");
+    println!("{table} |\n|---|---:|---:|---:|---:|");
     for row in rows.iter().chain([&shares, &stacks]) {
         println!("{row} |");
     }

@@ -203,20 +203,28 @@ impl<'m> LoopOnWires<'m> {
         self.report = polled.report;
         let localizer = self.app.localizer().filter(|_| !polled.report.is_empty());
         let belief = localizer.map(Belief::of);
-        let (actuators, telemetry) = (self.wires.take(), cable.said);
+        let (actuators, telemetry) = (self.wires.take(), image::checksum(cable.said()));
         (Answer::Polled { actuators, belief, telemetry }, cost)
     }
 }
 
-/// The far end of the robot's link: what it brings, and a checksum over what is said.
+/// What is said in a poll: as much as the queue of a board takes.
+const ROOM: usize = 512;
+
+/// The far end of the robot's link: what it brings, and room for what is said in a poll.
 struct Cable<'b> {
     bytes: core::slice::Iter<'b, u8>,
-    said: u32,
+    said: [u8; ROOM],
+    length: usize,
 }
 
 impl<'b> Cable<'b> {
     fn bringing(bytes: &'b [u8]) -> Self {
-        Self { bytes: bytes.iter(), said: 0 }
+        Self { bytes: bytes.iter(), said: [0; ROOM], length: 0 }
+    }
+
+    fn said(&self) -> &[u8] {
+        self.said.get(..self.length).unwrap_or_default()
     }
 }
 
@@ -226,7 +234,10 @@ impl Link for Cable<'_> {
     }
 
     fn send(&mut self, frame: &[u8]) {
-        // A frame ends with its own checksum, whatever is chained to it here.
-        self.said = self.said.rotate_left(1) ^ image::checksum(frame);
+        let end = self.length + frame.len();
+        if let Some(room) = self.said.get_mut(self.length..end) {
+            room.copy_from_slice(frame);
+            self.length = end;
+        }
     }
 }
