@@ -85,7 +85,8 @@ pub fn check() -> anyhow::Result<()> {
             let _ = write!(row, " | {}", cost.shown());
         }
         let _ = write!(stacks, " | {}", classroom.stack);
-        let permille = 1_000 * classroom.poll.most / (core.clock * TICK);
+        let tick = core.clock * TICK;
+        let permille = (1_000 * classroom.poll.most + tick / 2) / tick;
         let _ = write!(shares, " | {}.{} % at {} MHz", permille / 10, permille % 10, core.clock);
         if core.bar.is_some_and(|bar| permille > 10 * bar) {
             missed.push(core.name);
