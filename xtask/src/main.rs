@@ -17,6 +17,7 @@ mod fuzz;
 mod miri;
 mod panics;
 mod program;
+mod thumb;
 
 #[derive(Debug, Parser)]
 #[command(about = "The project's checks and chores")]
@@ -43,6 +44,8 @@ enum Task {
     TestFirmware,
     /// Flash and RAM of the shipped firmware, by crate.
     Size,
+    /// The deepest that the stack of the shipped firmware can be, by the calls in it.
+    Stack(firmware::StackArgs),
     /// No panic is linked into a program for a microcontroller.
     Panics,
     /// Instructions, code, stack and memory against `budgets.toml`.
@@ -106,6 +109,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Embedded => checks::embedded(),
         Task::TestFirmware => firmware::test(),
         Task::Size => firmware::size(),
+        Task::Stack(args) => firmware::stack(&args),
         Task::Panics => panics::check(),
         Task::Budgets => budgets::check(),
         Task::LintBench => checks::lint_bench(),
