@@ -32,10 +32,10 @@ pub fn test() -> anyhow::Result<()> {
     memory::check(&bytes)?;
     panics::check(&bytes)?;
     size::check(&bytes)?;
-    stack::check(&bytes)?;
+    let deepest = stack::check(&bytes)?;
     let tests = "test --package sonarfix-app --test emulated -- --ignored --nocapture";
     let mut command = cargo::command(tests);
-    command.env("SONARFIX_FIRMWARE", &program);
+    command.env("SONARFIX_FIRMWARE", &program).env("SONARFIX_STACK", deepest.to_string());
     cargo::check(command)
 }
 
@@ -58,7 +58,7 @@ pub fn stack(args: &StackArgs) -> anyhow::Result<()> {
     if args.ask_compiler {
         return frames::check(&read(&build_with_stack_sizes()?)?);
     }
-    stack::check(&read(&build()?)?)
+    stack::check(&read(&build()?)?).map(drop)
 }
 
 fn read(program: &Path) -> anyhow::Result<Vec<u8>> {

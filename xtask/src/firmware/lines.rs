@@ -46,7 +46,7 @@ impl<'a> Lines<'a> {
 }
 
 /// Of which the debug information knows no line, or only the standard library's.
-pub const OTHER: &str = "compiler and standard library";
+pub const OTHER: &str = "compiler, standard library";
 
 /// The crate in whose source a line is, without its version.
 pub fn owner(line: &str) -> &str {

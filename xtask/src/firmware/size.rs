@@ -13,15 +13,28 @@ use crate::elf;
 const FLASH_BAR: u64 = 32 * 1024;
 /// The crates that they are.
 const CORE: [&str; 4] = ["sonarfix", "sonarfix-hal", "libm", "nalgebra"];
+/// A crate, or a variable, of this many bytes has a row of its own.
+const LARGE_CRATE: u64 = 500;
+const LARGE_VARIABLE: u64 = 64;
 
-/// A variable of this many bytes has a row of its own.
-const LARGE: u64 = 64;
-
-/// What one crate takes of the flash.
+/// What is taken of the flash.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 struct Flash {
     code: u64,
     constants: u64,
+}
+
+impl Flash {
+    fn bytes(self) -> u64 {
+        self.code + self.constants
+    }
+
+    fn sum<'a>(all: impl IntoIterator<Item = &'a (String, Self)>) -> Self {
+        all.into_iter().fold(Self::default(), |sum, (_, flash)| Self {
+            code: sum.code + flash.code,
+            constants: sum.constants + flash.constants,
+        })
+    }
 }
 
 /// Prints both tables, and holds core, loop and drivers to the bar.
@@ -32,6 +45,41 @@ pub fn check(bytes: &[u8]) -> anyhow::Result<()> {
 }
 
 fn print_flash(file: &object::File) -> anyhow::Result<()> {
+    let (core, others) = by_crate(file)?;
+    println!("\n| flash | code | constants |\n|---|---|---|");
+    let row = |name: &str, Flash { code, constants }| {
+        println!("| {name} | {code} | {constants} |");
+    };
+    for (name, flash) in &core {
+        row(name, *flash);
+    }
+    let sum = Flash::sum(&core);
+    let bytes = sum.bytes();
+    println!(
+        "| **core, loop and drivers: {bytes}** (bar: {FLASH_BAR}) | **{}** | **{}** |",
+        sum.code, sum.constants
+    );
+    let (large, small): (Vec<_>, Vec<_>) =
+        others.into_iter().partition(|(_, flash)| flash.bytes() >= LARGE_CRATE);
+    for (name, flash) in &large {
+        row(name, *flash);
+    }
+    row(&format!("{} smaller crates", small.len()), Flash::sum(&small));
+    let size = |name| file.section_by_name(name).map_or(0, |section| section.size());
+    let rest = Flash { code: 0, constants: size(".vector_table") + size(".data") };
+    row("interrupt vectors, first values of variables", rest);
+    let mut all = Flash::sum(core.iter().chain(&large).chain(&small));
+    all.constants += rest.constants;
+    println!("| **all** | **{}** | **{}** |", all.code, all.constants);
+    ensure!(bytes <= FLASH_BAR, "core, loop and drivers take more flash than they may");
+    Ok(())
+}
+
+/// Crates by what they take of the flash, most first.
+type Crates = Vec<(String, Flash)>;
+
+/// Those of core, loop and drivers, and the others.
+fn by_crate(file: &object::File) -> anyhow::Result<(Crates, Crates)> {
     let lines = Lines::read(file)?;
     let mut crates: BTreeMap<String, Flash> = BTreeMap::new();
     let text = file.section_by_name(".text").context("the program has no code")?;
@@ -42,27 +90,9 @@ fn print_flash(file: &object::File) -> anyhow::Result<()> {
     for (owner, bytes) in constants(file, &lines)? {
         crates.entry(owner).or_default().constants += bytes;
     }
-    let mut rows: Vec<_> = crates.into_iter().collect();
-    rows.sort_by_key(|(_, flash)| std::cmp::Reverse(flash.code + flash.constants));
-    println!("\n| flash | code | constants |\n|---|---|---|");
-    for (name, Flash { code, constants }) in &rows {
-        println!("| {name} | {code} | {constants} |");
-    }
-    let sum = |rows: &[(String, Flash)]| {
-        rows.iter().fold(Flash::default(), |sum, (_, flash)| Flash {
-            code: sum.code + flash.code,
-            constants: sum.constants + flash.constants,
-        })
-    };
-    let all = sum(&rows);
-    println!("| **all** | **{}** | **{}** |", all.code, all.constants);
-    rows.retain(|(name, _)| CORE.contains(&name.as_str()));
-    let core = sum(&rows);
-    println!("| **core, loop and drivers** | **{}** | **{}** |", core.code, core.constants);
-    let core = core.code + core.constants;
-    println!("\nFlash: core, loop and drivers take {core} of {FLASH_BAR}");
-    ensure!(core <= FLASH_BAR, "core, loop and drivers take more flash than they may");
-    Ok(())
+    let mut crates: Crates = crates.into_iter().collect();
+    crates.sort_by_key(|(_, flash)| std::cmp::Reverse(flash.bytes()));
+    Ok(crates.into_iter().partition(|(name, _)| CORE.contains(&name.as_str())))
 }
 
 /// The constants, by crate: each belongs to the code that names it, or to the constant that does.
@@ -136,9 +166,9 @@ fn print_ram(file: &object::File) -> anyhow::Result<()> {
         }
     }
     rows.sort_by_key(|(_, bytes)| std::cmp::Reverse(*bytes));
-    println!("\n| variable | of | bytes |\n|---|---|---|");
+    println!("\n| variable in RAM | of | bytes |\n|---|---|---|");
     let mut rest = all;
-    for (path, bytes) in rows.iter().filter(|(_, bytes)| *bytes >= LARGE) {
+    for (path, bytes) in rows.iter().filter(|(_, bytes)| *bytes >= LARGE_VARIABLE) {
         let (owner, name) = path.split_once("::").unwrap_or((OTHER, path));
         let name = name.rsplit("::").next().unwrap_or(name);
         let name = name.trim_start_matches("__rtic_internal_");

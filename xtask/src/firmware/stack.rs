@@ -31,8 +31,8 @@ const BAR: u64 = 8 * 1024;
 /// only. As long as nobody else calls one of them, none of them is called.
 const FORMATTING: &str = "core::fmt::";
 
-/// Prints the deepest paths, and holds the RAM to the bar.
-pub fn check(bytes: &[u8]) -> anyhow::Result<()> {
+/// Prints the deepest paths, and holds the RAM to the bar; gives how deep it is in all.
+pub fn check(bytes: &[u8]) -> anyhow::Result<u64> {
     let program = Program::parse(bytes)?;
     let roots = roots(&program, bytes)?;
     let mut depths = Depths::of(&program, &roots)?;
@@ -42,20 +42,21 @@ pub fn check(bytes: &[u8]) -> anyhow::Result<()> {
         let name = depths.name(root);
         let saved = if name == START { 0 } else { EXCEPTION };
         let depth = saved + depths.depth(root)?;
-        println!("| **{name}** | **{depth}** |");
+        println!("| **`{name}`** | **{depth}** |");
         if saved > 0 {
             println!("| saved by the core | {saved} |");
         }
-        for (name, bytes) in depths.deepest_path(root) {
-            println!("| {name} | {bytes} |");
+        for (name, bytes) in depths.deepest_path(root).into_iter().filter(|(_, bytes)| *bytes > 0) {
+            println!("| `{name}` | {bytes} |");
         }
         all += depth;
     }
     let variables = memory::variables(bytes)?;
-    println!("| **all, one in another** | **{all}** |");
-    println!("\nRAM: {variables} of variables, {all} of stack, {} of {BAR}", variables + all);
+    println!("| **all stack, one in another** | **{all}** |");
+    println!("| all variables | {variables} |");
+    println!("| **all RAM** (bar: {BAR}) | **{}** |", variables + all);
     ensure!(variables + all <= BAR, "more RAM than there may be");
-    Ok(())
+    Ok(all)
 }
 
 /// The start, and the handlers of all interrupts.
