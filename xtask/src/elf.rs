@@ -12,10 +12,11 @@ use std::path::Path;
 use anyhow::{Context, ensure};
 use object::elf::{
     R_ARM_ABS32, R_ARM_THM_JUMP19, R_ARM_THM_JUMP24, R_ARM_THM_MOVW_ABS_NC, R_ARM_THM_PC22,
+    SHF_ALLOC,
 };
 use object::{
     Object, ObjectSection, ObjectSymbol, Relocation, RelocationFlags, RelocationTarget, Section,
-    SectionKind, SymbolKind,
+    SectionFlags, SectionKind, SymbolKind,
 };
 
 use crate::thumb::{self, Stack};
@@ -70,26 +71,27 @@ impl Program {
                 program.data.entry(symbol.address()).or_default();
             }
         }
-        program.read_stacks(&file)?;
+        program.read_code(&file)?;
         let mut relocations = 0;
-        for section in file.sections() {
+        for section in file.sections().filter(is_linked) {
             for (place, relocation) in section.relocations() {
                 let Some(target) = target(&file, &section, place, &relocation)? else { continue };
-                match section.kind() {
-                    SectionKind::Text => program.mention(place, target, is_call(&relocation)),
-                    SectionKind::ReadOnlyData | SectionKind::Data => program.list(place, target),
-                    _ => continue,
+                if section.kind() == SectionKind::Text {
+                    program.mention(place, target, is_call(&relocation));
+                    relocations += 1;
+                } else {
+                    program.list(place, target);
                 }
-                relocations += 1;
             }
         }
         ensure!(relocations > 0, "it was linked without `--emit-relocs`");
         Ok(program)
     }
 
-    /// Reads what each function does with the stack, wherever there is code and not data: symbols
-    /// of their own, `$t` and `$d`, say which.
-    fn read_stacks(&mut self, file: &object::File) -> anyhow::Result<()> {
+    /// Reads what each function does with the stack, and the calls that the linker does not list,
+    /// for an assembler knew where they lead: those of a function to itself. It is read wherever
+    /// there is code and not data: symbols of their own, `$t` and `$d`, say which.
+    fn read_code(&mut self, file: &object::File) -> anyhow::Result<()> {
         let mut marks: BTreeMap<u64, Option<bool>> = BTreeMap::new();
         for symbol in file.symbols() {
             match symbol.name()? {
@@ -98,7 +100,8 @@ impl Program {
                 _ => {}
             }
         }
-        for &start in self.functions.keys() {
+        let functions: BTreeSet<u64> = self.functions.keys().copied().collect();
+        for &start in &functions {
             marks.entry(start).or_default();
         }
         for section in file.sections().filter(|section| section.kind() == SectionKind::Text) {
@@ -115,6 +118,8 @@ impl Program {
                     && is_code
                 {
                     function.stack = function.stack.and(Stack::of(stretch));
+                    let calls = thumb::calls(stretch, from);
+                    function.calls.extend(calls.filter(|to| functions.contains(to)));
                 }
             }
         }
@@ -238,16 +243,23 @@ impl Reach<'_> {
     }
 }
 
-/// Every place in sections of this kind that names something, with the address of that.
-pub fn mentions(file: &object::File, kind: SectionKind) -> anyhow::Result<Vec<(u64, u64)>> {
+/// Every place, in code or in data, that names something, with the address of that.
+pub fn mentions(file: &object::File, in_code: bool) -> anyhow::Result<Vec<(u64, u64)>> {
     let mut mentions = Vec::new();
-    for section in file.sections().filter(|section| section.kind() == kind) {
+    let is_asked = |section: &Section| (section.kind() == SectionKind::Text) == in_code;
+    for section in file.sections().filter(is_linked).filter(is_asked) {
         for (place, relocation) in section.relocations() {
             let target = target(file, &section, place, &relocation)?;
             mentions.extend(target.map(|target| (place, target)));
         }
     }
     Ok(mentions)
+}
+
+/// Whether a section is part of the program, and not about it.
+fn is_linked(section: &Section) -> bool {
+    let SectionFlags::Elf { sh_flags } = section.flags() else { return false };
+    sh_flags & u64::from(SHF_ALLOC) != 0
 }
 
 /// Address of what a relocation names: a function, or somewhere in data.
@@ -264,10 +276,9 @@ fn target(
         let bytes = section.data_range(place, 4)?.and_then(|bytes| bytes.first_chunk());
         Ok(u32::from_le_bytes(*bytes.context("a relocation of nothing")?).into())
     };
-    Ok(match symbol.kind() {
-        SymbolKind::Text => Some(address(symbol.address())),
-        SymbolKind::Data => Some(symbol.address()),
-        // Of data without a symbol its section is named, and the linked place says where in it.
+    let found = match symbol.kind() {
+        SymbolKind::Text | SymbolKind::Data => Some(symbol.address()),
+        // Of what has no symbol its section is named, and the linked place says where in it.
         SymbolKind::Section if r_type == R_ARM_ABS32 => Some(word()?),
         SymbolKind::Section if r_type == R_ARM_THM_MOVW_ABS_NC => {
             let low = u64::from(thumb::moved(word()?));
@@ -275,7 +286,10 @@ fn target(
             Some(from + (low.wrapping_sub(from) & 0xffff))
         }
         _ => None,
-    })
+    };
+    let named = symbol.section_index().map(|index| file.section_by_index(index)).transpose()?;
+    let is_code = named.is_some_and(|section| section.kind() == SectionKind::Text);
+    Ok(found.map(|found| if is_code { address(found) } else { found }))
 }
 
 /// Whether a relocation is of an instruction that goes to its target, with or without coming back.

@@ -18,14 +18,11 @@ impl Stack {
     /// Every instruction counts as if it were run once: too much where the stack is lowered on two
     /// branches, never too little, for compilers lower it in no loop.
     pub fn of(code: &[u8]) -> Self {
-        let (words, _) = code.as_chunks::<2>();
-        let mut words = words.iter().map(|bytes| u16::from_le_bytes(*bytes));
         let mut stack = Self::default();
-        while let Some(first) = words.next() {
-            if first >> 11 >= 0b11101 {
-                stack.long(first, words.next().unwrap_or_default());
-            } else {
-                stack.short(first);
+        for (_, instruction) in instructions(code) {
+            match instruction {
+                Instruction::Short(word) => stack.short(word),
+                Instruction::Long(first, second) => stack.long(first, second),
             }
         }
         stack
@@ -77,6 +74,44 @@ impl Stack {
     }
 }
 
+/// Where the instructions BL of a stretch of code at this address lead.
+pub fn calls(code: &[u8], at: u64) -> impl Iterator<Item = u64> {
+    instructions(code).filter_map(move |(offset, instruction)| {
+        let Instruction::Long(first, second) = instruction else { return None };
+        let is_call = first >> 11 == 0b11110 && second & 0xd000 == 0xd000;
+        is_call.then(|| (at + offset + 4).wrapping_add_signed(distance(first, second)))
+    })
+}
+
+/// How far a BL leads, in bytes: S:I1:I2:imm10:imm11:0, where I1 and I2 are J1 and J2, turned
+/// round if S is zero.
+fn distance(first: u16, second: u16) -> i64 {
+    let [first, second] = [first, second].map(i64::from);
+    let sign = first >> 10 & 1;
+    let [i1, i2] = [second >> 13, second >> 11].map(|j| j & 1 ^ sign ^ 1);
+    i1 << 23 | i2 << 22 | (first & 0x3ff) << 12 | (second & 0x7ff) << 1 | -sign << 24
+}
+
+/// An instruction has one half word or two.
+enum Instruction {
+    Short(u16),
+    Long(u16, u16),
+}
+
+/// The instructions of a stretch of code, each with its offset.
+fn instructions(code: &[u8]) -> impl Iterator<Item = (u64, Instruction)> {
+    let (words, _) = code.as_chunks::<2>();
+    let mut words = (0..).step_by(2).zip(words.iter().map(|bytes| u16::from_le_bytes(*bytes)));
+    std::iter::from_fn(move || {
+        let (offset, first) = words.next()?;
+        if first >> 11 < 0b11101 {
+            return Some((offset, Instruction::Short(first)));
+        }
+        let (_, second) = words.next()?;
+        Some((offset, Instruction::Long(first, second)))
+    })
+}
+
 /// The sixteen bits that a MOVW moves into a register; of the instruction's four bytes, the first
 /// lowest.
 pub fn moved(instruction: u64) -> u16 {
@@ -126,6 +161,20 @@ mod tests {
         for (code, bytes) in known {
             assert_eq!(Stack::of(code), Stack { bytes, ..Stack::default() }, "{code:x?}");
         }
+    }
+
+    #[test]
+    fn calls_lead_where_they_lead() {
+        let place = 0x0801_6934;
+        // From a function to itself, 18 bytes back, and one 59,212 bytes on, as a disassembler says.
+        let cases: [(&[u8], i64); 2] =
+            [(&[0xff, 0xf7, 0xf7, 0xff], -18), (&[0x0e, 0xf0, 0xa6, 0xfb], 59_212)];
+        for (code, distance) in cases {
+            let to = (place + 4_u64).wrapping_add_signed(distance);
+            assert_eq!(calls(code, place).collect::<Vec<_>>(), [to], "{code:x?}");
+        }
+        // bl and movw, of which just one is a call.
+        assert_eq!(calls(&[0xff, 0xf7, 0xf7, 0xff, 0x41, 0xf6, 0x2f, 0x40], place).count(), 1);
     }
 
     #[test]

@@ -3,7 +3,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::{bail, ensure};
-use object::SectionKind;
 
 use super::lines::{self, Lines};
 use crate::elf::{self, Program};
@@ -63,7 +62,7 @@ fn sites(bytes: &[u8]) -> anyhow::Result<BTreeSet<Site>> {
     let panics = |name: &&String| name.contains(PANIC) || helpers.contains(name.as_str());
     let lines = Lines::read(&file)?;
     let mut sites = BTreeSet::new();
-    for (place, target) in elf::mentions(&file, SectionKind::Text)? {
+    for (place, target) in elf::mentions(&file, true)? {
         let Some(function) = program.function(target) else { continue };
         let Some(name) = function.names.iter().find(panics) else { continue };
         if let Some(line) = lines.at(place)? {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use anyhow::{Context, ensure};
-use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
+use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
 
 use super::lines::{Lines, OTHER};
 use super::memory;
@@ -104,12 +104,12 @@ fn constants(file: &object::File, lines: &Lines) -> anyhow::Result<Vec<(String, 
         (address < start + bytes).then_some(start)
     };
     let mut owners: BTreeMap<u64, String> = BTreeMap::new();
-    for (place, target) in elf::mentions(file, SectionKind::Text)? {
+    for (place, target) in elf::mentions(file, true)? {
         if let Some(object) = around(target) {
             owners.entry(object).or_insert_with(|| lines.owner(place));
         }
     }
-    let lists = elf::mentions(file, SectionKind::ReadOnlyData)?;
+    let lists = elf::mentions(file, false)?;
     // A constant that is named by one that is named by …: as often as it takes.
     loop {
         let known = owners.len();
