@@ -171,7 +171,9 @@ fn print_ram(file: &object::File) -> anyhow::Result<()> {
     for (path, bytes) in rows.iter().filter(|(_, bytes)| *bytes >= LARGE_VARIABLE) {
         let (owner, name) = path.split_once("::").unwrap_or((OTHER, path));
         let name = name.rsplit("::").next().unwrap_or(name);
-        let name = name.trim_start_matches("__rtic_internal_");
+        // What RTIC makes of the names of a task's resources.
+        let rtic = ["__rtic_internal_local_resource_", "__rtic_internal_local_init_"];
+        let name = rtic.iter().find_map(|prefix| name.strip_prefix(prefix)).unwrap_or(name);
         println!("| `{name}` | {} | {bytes} |", owner.replace('_', "-"));
         rest -= bytes;
     }
