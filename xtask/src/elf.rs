@@ -215,6 +215,15 @@ impl Program {
     }
 }
 
+#[cfg(test)]
+impl Program {
+    /// A program of these functions and data, which name one another by address.
+    pub fn made_of(functions: Vec<(u64, Function)>, data: Vec<(u64, Vec<u64>)>) -> Self {
+        let data = data.into_iter().map(|(at, listed)| (at, listed.into_iter().collect()));
+        Self { functions: functions.into_iter().collect(), data: data.collect() }
+    }
+}
+
 impl Function {
     /// The first of its names.
     pub fn name(&self) -> &str {

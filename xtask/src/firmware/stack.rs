@@ -2,8 +2,8 @@
 //! its start and from each interrupt.
 //!
 //! - **Frames** are what a function's instructions lower the stack by.
-//! - **Calls** are what the linker had to fill in. A call by register may lead to any function
-//!   whose address somebody has taken who can be reached.
+//! - **Calls** are what the linker had to fill in, and those of a function to itself. A call by
+//!   register may lead to any function whose address somebody has taken who can be reached.
 //! - **Recursion** is an error.
 //! - **Interrupts** are taken to come all at once, one in another, each once, whatever their
 //!   priorities, and each on top of a core that saves its floating-point registers.
@@ -177,5 +177,87 @@ impl<'a> Depths<'a> {
 
     fn name(&self, at: u64) -> &'a str {
         self.program.function(at).map_or("(no function)", Function::name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::thumb::Stack;
+
+    /// A function with this frame, which calls and takes what is at these addresses.
+    fn function(name: &str, bytes: u64, calls: &[u64], takes: &[u64]) -> Function {
+        Function {
+            names: vec![name.to_owned()],
+            stack: Stack { bytes, ..Stack::default() },
+            calls: calls.iter().copied().collect(),
+            takes: takes.iter().copied().collect(),
+            ..Function::default()
+        }
+    }
+
+    fn by_register(mut function: Function) -> Function {
+        function.stack.calls_by_register = true;
+        function
+    }
+
+    fn depth(functions: Vec<(u64, Function)>, data: Vec<(u64, Vec<u64>)>) -> anyhow::Result<u64> {
+        let program = Program::made_of(functions, data);
+        Depths::of(&program, &[1])?.depth(1)
+    }
+
+    #[test]
+    fn the_deepest_path_counts_and_not_the_longest() {
+        let functions = vec![
+            (1, function("start", 8, &[2, 4], &[])),
+            (2, function("a", 16, &[3], &[])),
+            (3, function("b", 16, &[], &[])),
+            (4, function("c", 100, &[], &[])),
+        ];
+        assert_eq!(depth(functions, Vec::new()).unwrap(), 108);
+    }
+
+    #[test]
+    fn a_call_by_register_leads_to_what_a_table_lists() {
+        let functions = |start| vec![(1, start), (2, function("listed", 50, &[], &[]))];
+        // A table at 20 that names another, at 30, in which the function is.
+        let data = || vec![(20, vec![30]), (30, vec![2])];
+        let taken = function("start", 8, &[], &[20]);
+        assert_eq!(depth(functions(by_register(taken)), data()).unwrap(), 58);
+        let not_taken = function("start", 8, &[], &[]);
+        assert_eq!(depth(functions(by_register(not_taken)), data()).unwrap(), 8);
+        let not_called = function("start", 8, &[], &[20]);
+        assert_eq!(depth(functions(not_called), data()).unwrap(), 8);
+    }
+
+    #[test]
+    fn recursion_is_an_error_by_whatever_way() {
+        let itself = vec![(1, function("start", 8, &[1], &[]))];
+        let one_another =
+            vec![(1, function("start", 8, &[2], &[])), (2, function("a", 8, &[1], &[]))];
+        let by_pointer = vec![(1, by_register(function("start", 8, &[], &[1])))];
+        for functions in [itself, one_another, by_pointer] {
+            let error = depth(functions, Vec::new()).unwrap_err().to_string();
+            assert!(error.contains("recursion: start → "), "{error}");
+        }
+    }
+
+    #[test]
+    fn panics_are_cut_off_and_printing_is_not_expected_elsewhere() {
+        let that_calls = |calls: &[u64]| {
+            let panic = function("core::panicking::panic_fmt", 500, &[3], &[]);
+            let print = function("core::fmt::write", 500, &[], &[]);
+            vec![(1, function("start", 8, calls, &[3])), (2, panic), (3, print)]
+        };
+        assert_eq!(depth(that_calls(&[2]), Vec::new()).unwrap(), 8);
+        let error = depth(that_calls(&[2, 3]), Vec::new()).unwrap_err().to_string();
+        assert!(error.contains("core::fmt::write is called"), "{error}");
+    }
+
+    #[test]
+    fn a_frame_that_nobody_knows_is_an_error() {
+        let mut start = function("start", 8, &[], &[]);
+        start.stack.is_unbounded = true;
+        assert!(depth(vec![(1, start)], Vec::new()).is_err());
     }
 }
