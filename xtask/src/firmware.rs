@@ -1,9 +1,13 @@
 //! The shipped firmware: that it cannot panic through our code, that it boots and obeys, how
 //! large it is and how deep its stack can go.
 //!
-//! All of it is read from the very file that is flashed. One file each: `frames`, whether frames are
-//! read rightly; `lines`, from which line an instruction was made; `memory`, what it must not hold
-//! and where its stack is; `panics`; `size`; `stack`.
+//! All of it is read from the very file that is flashed. One file each:
+//! - `frames`: whether the frames of the stack are read rightly;
+//! - `lines`: from which line an instruction was made;
+//! - `memory`: that there is no allocator, and where the stack is;
+//! - `panics`: which lines can panic;
+//! - `size`: flash and RAM;
+//! - `stack`: how deep it can be.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -166,7 +166,7 @@ mod tests {
     #[test]
     fn calls_lead_where_they_lead() {
         let place = 0x0801_6934;
-        // From a function to itself, 18 bytes back, and one 59,212 bytes on, as a disassembler says.
+        // As a disassembler says: 18 bytes back, and 59,212 bytes on.
         let cases: [(&[u8], i64); 2] =
             [(&[0xff, 0xf7, 0xf7, 0xff], -18), (&[0x0e, 0xf0, 0xa6, 0xfb], 59_212)];
         for (code, distance) in cases {
