@@ -6,6 +6,7 @@
 //! | [`baked_map`] | a baked map, whole or damaged, or walls to bake |
 //! | [`map_file`], [`scenario_file`], [`robot_file`] | the text of such a file |
 //! | [`replay_log`] | the lines of a log |
+//! | [`link`] | a message, and garbage that comes in before it |
 //!
 //! `cargo xtask fuzz` searches for a bounded time; `cargo fuzz run TARGET` for as long as you like;
 //! `cargo test --no-default-features` runs them over `corpus/` and seeded random bytes.
@@ -14,20 +15,23 @@ mod baked;
 mod bytes;
 mod calls;
 mod files;
+mod link;
 
 pub use baked::baked_map;
 pub use calls::localizer;
 pub use files::{map_file, replay_log, robot_file, scenario_file};
+pub use link::link;
 
 /// A target with its name, which is also that of its corpus.
 pub type Target = (&'static str, fn(&[u8]));
 
 /// Every target.
-pub const TARGETS: [Target; 6] = [
+pub const TARGETS: [Target; 7] = [
     ("localizer", localizer),
     ("baked_map", baked_map),
     ("map_file", map_file),
     ("scenario_file", scenario_file),
     ("robot_file", robot_file),
     ("replay_log", replay_log),
+    ("link", link),
 ];

@@ -1,6 +1,7 @@
-//! Reads from a linked program which function calls which, and how large each is.
+//! Reads from a linked program which function calls which, how large each is, and what it does with
+//! the stack.
 //!
-//! The programs of `bench` are linked with `--emit-relocs`: every place that names another function,
+//! The programs are linked with `--emit-relocs`: every place that names a function or a constant,
 //! be it a call or an address, is still listed. What a set of functions needs to run is what can be
 //! reached from it.
 
@@ -9,22 +10,36 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, ensure};
-use object::{Object, ObjectSection, ObjectSymbol, RelocationTarget, SectionKind, SymbolKind};
+use object::elf::{
+    R_ARM_ABS32, R_ARM_THM_JUMP19, R_ARM_THM_JUMP24, R_ARM_THM_MOVW_ABS_NC, R_ARM_THM_PC22,
+    SHF_ALLOC,
+};
+use object::{
+    Object, ObjectSection, ObjectSymbol, Relocation, RelocationFlags, RelocationTarget, Section,
+    SectionFlags, SectionKind, SymbolKind,
+};
 
-/// The functions of a program.
+use crate::thumb::{self, Stack};
+
+/// The functions of a program, and the data that names some of them.
 #[derive(Debug, Default)]
 pub struct Program {
     /// By address.
     functions: BTreeMap<u64, Function>,
+    /// By address: tables of functions, and all other constants and variables.
+    data: BTreeMap<u64, BTreeSet<u64>>,
 }
 
 #[derive(Debug, Default)]
-struct Function {
+pub struct Function {
     /// More than one where functions were found to be the same.
-    names: Vec<String>,
-    bytes: u64,
-    /// Addresses of the functions that it names.
-    mentions: BTreeSet<u64>,
+    pub names: Vec<String>,
+    pub bytes: u64,
+    pub stack: Stack,
+    /// Addresses of the functions that it calls by their names.
+    pub calls: BTreeSet<u64>,
+    /// Addresses of functions and data that it names otherwise.
+    pub takes: BTreeSet<u64>,
 }
 
 /// What can be reached from a set of functions.
@@ -43,23 +58,29 @@ impl Program {
         Self::parse(&bytes).with_context(whose)
     }
 
-    fn parse(bytes: &[u8]) -> anyhow::Result<Self> {
+    /// Reads the bytes of one.
+    pub fn parse(bytes: &[u8]) -> anyhow::Result<Self> {
         let file = object::File::parse(bytes)?;
         let mut program = Self::default();
-        for symbol in file.symbols().filter(|symbol| symbol.kind() == SymbolKind::Text) {
-            let name = format!("{:#}", rustc_demangle::demangle(symbol.name()?));
-            let function = program.functions.entry(address(symbol.address())).or_default();
-            function.bytes = function.bytes.max(symbol.size());
-            function.names.push(name);
+        for symbol in file.symbols() {
+            if symbol.kind() == SymbolKind::Text {
+                let function = program.functions.entry(address(symbol.address())).or_default();
+                function.bytes = function.bytes.max(symbol.size());
+                function.names.push(name(&symbol)?);
+            } else if symbol.kind() == SymbolKind::Data {
+                program.data.entry(symbol.address()).or_default();
+            }
         }
+        program.read_code(&file)?;
         let mut relocations = 0;
-        for section in file.sections().filter(|section| section.kind() == SectionKind::Text) {
+        for section in file.sections().filter(is_linked) {
             for (place, relocation) in section.relocations() {
-                relocations += 1;
-                let RelocationTarget::Symbol(target) = relocation.target() else { continue };
-                let target = file.symbol_by_index(target)?;
-                if target.kind() == SymbolKind::Text {
-                    program.mention(place, address(target.address()));
+                let Some(target) = target(&file, &section, place, &relocation)? else { continue };
+                if section.kind() == SectionKind::Text {
+                    program.mention(place, target, is_call(&relocation));
+                    relocations += 1;
+                } else {
+                    program.list(place, target);
                 }
             }
         }
@@ -67,11 +88,89 @@ impl Program {
         Ok(program)
     }
 
-    /// Notes that the function around `place` names the one at `target`.
-    fn mention(&mut self, place: u64, target: u64) {
-        if let Some((_, function)) = self.functions.range_mut(..=place).next_back() {
-            function.mentions.insert(target);
+    /// Reads what each function does with the stack, and the calls that the linker does not list,
+    /// for an assembler knew where they lead: those of a function to itself. It is read wherever
+    /// there is code and not data: symbols of their own, `$t` and `$d`, say which.
+    fn read_code(&mut self, file: &object::File) -> anyhow::Result<()> {
+        let mut marks: BTreeMap<u64, Option<bool>> = BTreeMap::new();
+        for symbol in file.symbols() {
+            match symbol.name()? {
+                "$t" => _ = marks.insert(symbol.address(), Some(true)),
+                "$d" => _ = marks.insert(symbol.address(), Some(false)),
+                _ => {}
+            }
         }
+        let functions: BTreeSet<u64> = self.functions.keys().copied().collect();
+        for &start in &functions {
+            marks.entry(start).or_default();
+        }
+        for section in file.sections().filter(|section| section.kind() == SectionKind::Text) {
+            let (start, code) = (section.address(), section.data()?);
+            let end = start + section.size();
+            let mut is_code = true;
+            let starts: Vec<_> = marks.range(start..end).collect();
+            for (n, &(&from, mark)) in starts.iter().enumerate() {
+                is_code = mark.unwrap_or(is_code);
+                let to = starts.get(n + 1).map_or(end, |&(&next, _)| next);
+                let offset = |at: u64| usize::try_from(at - start);
+                let stretch = code.get(offset(from)?..offset(to)?).unwrap_or_default();
+                if let Some((_, function)) = self.functions.range_mut(..=from).next_back()
+                    && is_code
+                {
+                    function.stack = function.stack.and(Stack::of(stretch));
+                    let calls = thumb::calls(stretch, from);
+                    function.calls.extend(calls.filter(|to| functions.contains(to)));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Notes that the function around `place` names what is at `target`.
+    fn mention(&mut self, place: u64, target: u64, is_call: bool) {
+        if let Some((_, function)) = self.functions.range_mut(..=place).next_back() {
+            let mentions = if is_call { &mut function.calls } else { &mut function.takes };
+            mentions.insert(target);
+        }
+    }
+
+    /// Notes that the data around `place` names what is at `target`.
+    fn list(&mut self, place: u64, target: u64) {
+        if let Some((_, names)) = self.data.range_mut(..=place).next_back() {
+            names.insert(target);
+        }
+    }
+
+    /// The function at an address.
+    pub fn function(&self, at: u64) -> Option<&Function> {
+        self.functions.get(&at)
+    }
+
+    /// All functions, by address.
+    pub fn functions(&self) -> impl Iterator<Item = (u64, &Function)> {
+        self.functions.iter().map(|(&at, function)| (at, function))
+    }
+
+    /// Address of the function with this name.
+    pub fn address_of(&self, name: &str) -> Option<u64> {
+        self.functions().find(|(_, f)| f.names.iter().any(|n| n == name)).map(|(at, _)| at)
+    }
+
+    /// The functions that somebody can call who has this address: the one at it, or those that the
+    /// data around it lists, or data that is listed there.
+    pub fn callable_through(&self, address: u64) -> BTreeSet<u64> {
+        let mut seen = BTreeSet::from([address]);
+        let mut next = vec![address];
+        while let Some(at) = next.pop() {
+            if self.functions.contains_key(&at) {
+                continue;
+            }
+            let data = self.data.range(..=at).next_back();
+            let listed = data.into_iter().flat_map(|(_, listed)| listed).copied();
+            next.extend(listed.filter(|&listed| seen.insert(listed)));
+        }
+        seen.retain(|at| self.functions.contains_key(at));
+        seen
     }
 
     /// What can be reached from the functions with these names.
@@ -83,7 +182,7 @@ impl Program {
         ensure!(!from.is_empty(), "no function is called any of {names:?}");
         let mut next: VecDeque<u64> = from.keys().copied().collect();
         while let Some(at) = next.pop_front() {
-            for &mention in self.functions.get(&at).into_iter().flat_map(|f| &f.mentions) {
+            for mention in self.mentions(at) {
                 from.entry(mention).or_insert_with(|| {
                     next.push_back(mention);
                     Some(at)
@@ -93,18 +192,42 @@ impl Program {
         Ok(Reach { program: self, from })
     }
 
+    /// Functions that the one at `at` names.
+    fn mentions(&self, at: u64) -> impl Iterator<Item = u64> {
+        let function = self.functions.get(&at);
+        let named = function.into_iter().flat_map(|f| f.calls.iter().chain(&f.takes)).copied();
+        named.filter(|named| self.functions.contains_key(named))
+    }
+
     /// Names of the functions that name one whose own name contains `part`.
     pub fn callers_of(&self, part: &str) -> impl Iterator<Item = &str> {
         let is_it = |function: &Function| function.names.iter().any(|name| name.contains(part));
         let wanted: BTreeSet<u64> =
             self.functions.iter().filter(|(_, f)| is_it(f)).map(|(&at, _)| at).collect();
-        let callers = self.functions.values().filter(move |f| !f.mentions.is_disjoint(&wanted));
-        callers.flat_map(|function| &function.names).map(String::as_str)
+        let names_it = move |at: u64| self.mentions(at).any(|named| wanted.contains(&named));
+        let callers = self.functions().filter(move |&(at, _)| names_it(at));
+        callers.flat_map(|(_, function)| &function.names).map(String::as_str)
     }
 
     /// Names of all functions.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.functions.values().flat_map(|function| &function.names).map(String::as_str)
+    }
+}
+
+#[cfg(test)]
+impl Program {
+    /// A program of these functions and data, which name one another by address.
+    pub fn made_of(functions: Vec<(u64, Function)>, data: Vec<(u64, Vec<u64>)>) -> Self {
+        let data = data.into_iter().map(|(at, listed)| (at, listed.into_iter().collect()));
+        Self { functions: functions.into_iter().collect(), data: data.collect() }
+    }
+}
+
+impl Function {
+    /// The first of its names.
+    pub fn name(&self) -> &str {
+        self.names.first().map_or("(no name)", String::as_str)
     }
 }
 
@@ -129,21 +252,64 @@ impl Reach<'_> {
     }
 }
 
-/// Every place that names a function, with that function's name.
-pub fn calls(path: &Path) -> anyhow::Result<Vec<(u64, String)>> {
-    let bytes = fs::read(path).with_context(|| path.display().to_string())?;
-    let file = object::File::parse(&*bytes)?;
-    let mut calls = Vec::new();
-    for section in file.sections().filter(|section| section.kind() == SectionKind::Text) {
+/// Every place, in code or in data, that names something, with the address of that.
+pub fn mentions(file: &object::File, in_code: bool) -> anyhow::Result<Vec<(u64, u64)>> {
+    let mut mentions = Vec::new();
+    let is_asked = |section: &Section| (section.kind() == SectionKind::Text) == in_code;
+    for section in file.sections().filter(is_linked).filter(is_asked) {
         for (place, relocation) in section.relocations() {
-            let RelocationTarget::Symbol(target) = relocation.target() else { continue };
-            let target = file.symbol_by_index(target)?;
-            if target.kind() == SymbolKind::Text {
-                calls.push((place, format!("{:#}", rustc_demangle::demangle(target.name()?))));
-            }
+            let target = target(file, &section, place, &relocation)?;
+            mentions.extend(target.map(|target| (place, target)));
         }
     }
-    Ok(calls)
+    Ok(mentions)
+}
+
+/// Whether a section is part of the program, and not about it.
+fn is_linked(section: &Section) -> bool {
+    let SectionFlags::Elf { sh_flags } = section.flags() else { return false };
+    sh_flags & u64::from(SHF_ALLOC) != 0
+}
+
+/// Address of what a relocation names: a function, or somewhere in data.
+fn target(
+    file: &object::File,
+    section: &Section,
+    place: u64,
+    relocation: &Relocation,
+) -> anyhow::Result<Option<u64>> {
+    let RelocationTarget::Symbol(target) = relocation.target() else { return Ok(None) };
+    let symbol = file.symbol_by_index(target)?;
+    let RelocationFlags::Elf { r_type } = relocation.flags() else { return Ok(None) };
+    let word = || -> anyhow::Result<u64> {
+        let bytes = section.data_range(place, 4)?.and_then(|bytes| bytes.first_chunk());
+        Ok(u32::from_le_bytes(*bytes.context("a relocation of nothing")?).into())
+    };
+    let found = match symbol.kind() {
+        SymbolKind::Text | SymbolKind::Data => Some(symbol.address()),
+        // Of what has no symbol its section is named, and the linked place says where in it.
+        SymbolKind::Section if r_type == R_ARM_ABS32 => Some(word()?),
+        SymbolKind::Section if r_type == R_ARM_THM_MOVW_ABS_NC => {
+            let low = u64::from(thumb::moved(word()?));
+            let from = symbol.address();
+            Some(from + (low.wrapping_sub(from) & 0xffff))
+        }
+        _ => None,
+    };
+    let named = symbol.section_index().map(|index| file.section_by_index(index)).transpose()?;
+    let is_code = named.is_some_and(|section| section.kind() == SectionKind::Text);
+    Ok(found.map(|found| if is_code { address(found) } else { found }))
+}
+
+/// Whether a relocation is of an instruction that goes to its target, with or without coming back.
+fn is_call(relocation: &Relocation) -> bool {
+    let RelocationFlags::Elf { r_type } = relocation.flags() else { return false };
+    [R_ARM_THM_PC22, R_ARM_THM_JUMP19, R_ARM_THM_JUMP24].contains(&r_type)
+}
+
+/// The name of a symbol, as it is written in Rust.
+pub fn name<'a>(symbol: &impl ObjectSymbol<'a>) -> anyhow::Result<String> {
+    Ok(format!("{:#}", rustc_demangle::demangle(symbol.name()?)))
 }
 
 /// The lowest bit of a function's address says that it is in Thumb code.

@@ -28,8 +28,8 @@ impl Args {
     }
 }
 
-const ALL: [&str; 6] =
-    ["localizer", "baked_map", "map_file", "scenario_file", "robot_file", "replay_log"];
+const ALL: [&str; 7] =
+    ["localizer", "baked_map", "map_file", "scenario_file", "robot_file", "replay_log", "link"];
 
 /// The coverage that libFuzzer is guided by: counters and comparisons.
 const INSTRUMENTED: &str = "-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \

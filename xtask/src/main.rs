@@ -20,6 +20,7 @@ mod panics;
 mod pico;
 mod pil;
 mod program;
+mod thumb;
 
 #[derive(Debug, Parser)]
 #[command(about = "The project's checks and chores")]
@@ -46,6 +47,8 @@ enum Task {
     TestFirmware,
     /// Flash and RAM of the shipped firmware, by crate.
     Size,
+    /// The deepest that the stack of the shipped firmware can be, by the calls in it.
+    Stack(firmware::StackArgs),
     /// The shipped loop on emulated microcontrollers, against the PC bit by bit; what it costs them.
     Pil,
     /// The golden traces on this computer and every emulated microcontroller.
@@ -116,6 +119,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Embedded => checks::embedded(),
         Task::TestFirmware => firmware::test(),
         Task::Size => firmware::size(),
+        Task::Stack(args) => firmware::stack(&args),
         Task::Pil => pil::check(),
         Task::Golden => golden::check(),
         Task::Panics => panics::check(),

@@ -22,7 +22,8 @@ pub fn flashed(flashed: &Flashed) {
     }
 }
 
-/// Logs what a poll did.
+/// Logs what a poll did. Not part of the frame of whoever calls it, which lies below every poll's.
+#[inline(never)]
 pub fn polled(polled: &Polled) {
     if polled.has_changed {
         info!("{}", if polled.is_running { "the loop runs" } else { "the loop waits" });

@@ -174,21 +174,31 @@ impl<F: NorFlash> Store<F> {
         self.write(KEPT, kept)
     }
 
+    #[inline(never)]
     fn read<T: Serialize + DeserializeOwned>(&mut self, key: u8) -> Result<Option<T>, StoreError> {
         let mut buffer = [0; LONGEST];
         let found = at_once(self.map.fetch_item(&mut buffer, &key)).ok_or(StoreError::Flash)?;
         Ok(found?.map(|Record(record)| record))
     }
 
+    /// Two calls one after the other, whose large frames do not lie on the stack together.
     fn write<T>(&mut self, key: u8, record: &T) -> Result<(), StoreError>
     where
         T: PartialEq + Copy + Serialize + DeserializeOwned,
     {
-        let mut buffer = [0; LONGEST];
-        let written = at_once(self.map.store_item(&mut buffer, &key, &Record(*record)));
-        written.ok_or(StoreError::Flash)??;
+        self.append(key, record)?;
         let is_there = self.read::<T>(key)?.is_some_and(|found| found == *record);
         if is_there { Ok(()) } else { Err(StoreError::NotWritten) }
+    }
+
+    #[inline(never)]
+    fn append<T>(&mut self, key: u8, record: &T) -> Result<(), StoreError>
+    where
+        T: Copy + Serialize + DeserializeOwned,
+    {
+        let mut buffer = [0; LONGEST];
+        let written = at_once(self.map.store_item(&mut buffer, &key, &Record(*record)));
+        Ok(written.ok_or(StoreError::Flash)??)
     }
 
     /// Erases everything: for a region that holds no store.

@@ -293,16 +293,18 @@ fn a_minute_of_ticks_and_no_deadline_missed() {
 }
 
 /// The stack lies below everything else (`flip-link`) and grows down; the emulator's memory begins
-/// as zeros, so the lowest byte that is none is as deep as it went.
+/// as zeros, so the lowest byte that is none is as deep as it went. That is never deeper than what
+/// `cargo xtask stack` finds, which holds its figure to the bar.
 fn check_memory(robot: &mut Robot) {
     let ram = robot.memory(RAM_AT, RAM);
     let deepest = ram.iter().position(|byte| *byte != 0).unwrap();
     let top = robot.memory(FLASH_AT, 4);
     let top = u32::from_le_bytes(*top.first_chunk().unwrap()) - RAM_AT;
     let (stack, rest) = (top as usize - deepest, RAM - top as usize);
-    println!("stack {stack} bytes at the deepest, everything else {rest}");
+    let bound: usize = std::env::var("SONARFIX_STACK").unwrap().parse().unwrap();
+    println!("stack {stack} bytes at the deepest, of at most {bound}; everything else {rest}");
     assert!(rest > 1_000, "flip-link has not put the stack below everything else");
-    assert!(stack + rest <= 8 * 1_024, "{} bytes of RAM", stack + rest);
+    assert!(stack <= bound, "the stack is deeper than it can be");
 }
 
 #[test]

@@ -140,7 +140,9 @@ impl Link for Uart {
     }
 
     fn send(&mut self, frame: &[u8]) {
-        if self.to_send.capacity() - self.to_send.len() < frame.len() {
+        // A queue has places; unless told, the compiler guards its divisions with a panic.
+        let Some(places) = self.to_send.capacity().checked_add(1) else { return };
+        if places - self.to_send.len() <= frame.len() {
             return;
         }
         for byte in frame {

@@ -86,6 +86,8 @@ impl<F: NorFlash> App<'_, F> {
         self.go_on_from(now, known.at(start), polled)
     }
 
+    /// Not part of the frame that lies below every other command's.
+    #[inline(never)]
     fn set_configuration(&mut self, now: Instant, config: &Config) -> Result<Done, Refused> {
         config.check().map_err(|_| Refused::Configuration)?;
         let kept = Kept { replaces: self.baked(), config: *config };

@@ -73,6 +73,11 @@ impl SimFlash {
         (self.power, self.torn) = (Some(bytes), torn);
     }
 
+    /// Overwrites one byte, as no flash would of its own.
+    pub fn damage(&mut self, at: usize, to: u8) {
+        self.bytes[at] = to;
+    }
+
     /// Switches the power on again.
     pub fn power_up(&mut self) {
         self.power = None;

@@ -110,6 +110,32 @@ proptest! {
     }
 }
 
+proptest! {
+    /// Bytes changed anywhere: what is read was once written, or nothing is, and the robot can
+    /// write again; nothing panics on the way.
+    #[test]
+    fn a_damaged_store_gives_only_what_was_written(
+        count in 0_u32..14,
+        damage in prop::collection::vec((0..SECTOR * SECTORS, any::<u8>()), 1..40),
+    ) {
+        let (mut flash, _) = worn(count);
+        for (at, to) in damage {
+            flash.damage(at, to);
+        }
+        let mut store = store(flash);
+        match store.load() {
+            Ok(Some(found)) => prop_assert!((0..count).map(record).any(|old| old == found)),
+            Ok(None) | Err(StoreError::Corrupt) => {}
+            Err(error) => prop_assert!(false, "{error:?}"),
+        }
+        if store.save(&record(99)).is_err() {
+            store.format().unwrap();
+            store.save(&record(99)).unwrap();
+        }
+        prop_assert_eq!(store.load(), Ok(Some(record(99))));
+    }
+}
+
 #[test]
 fn a_new_flash_holds_nothing() {
     assert_eq!(store(SimFlash::new()).load(), Ok(None));

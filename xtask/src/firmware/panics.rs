@@ -1,0 +1,84 @@
+//! Which lines can panic: none of ours, and of others' those that are known.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use anyhow::{bail, ensure};
+
+use super::lines::{self, Lines};
+use crate::elf::{self, Program};
+
+/// Where a call that ends in a panic leads.
+pub const PANIC: &str = "core::panicking";
+
+/// Lines of other people's crates that can panic: the crate, how they panic, how many.
+/// `docs/firmware.md` says why none is reached. A change is to be looked at, and committed.
+const KNOWN: [(&str, &str, usize); 5] = [
+    ("defmt-rtt", "panic_fmt", 2),
+    ("sequential-storage", "assert_failed", 1),
+    ("sequential-storage", "panic_const_async_fn_resumed", 22),
+    ("sequential-storage", "slice_index_fail", 8),
+    ("sequential-storage", "unwrap_failed", 2),
+];
+
+/// A line that can panic.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Site {
+    /// `file:line`
+    line: String,
+    /// The function of the standard library that it calls for it.
+    how: String,
+}
+
+/// No line of ours panics, and of others' those that are known to, no more and no fewer.
+pub fn check(program: &[u8]) -> anyhow::Result<()> {
+    let theirs = others(program)?;
+    let counts = counts(&theirs);
+    ensure!(counts == KNOWN, "these lines can panic, and others are known:{}", listed(&theirs));
+    Ok(())
+}
+
+/// No line of ours panics; those of others are printed, counted by crate.
+pub fn others(program: &[u8]) -> anyhow::Result<Vec<Site>> {
+    let (theirs, ours): (Vec<_>, Vec<_>) =
+        sites(program)?.into_iter().partition(|site| site.line.contains("/registry/src/"));
+    if !ours.is_empty() {
+        bail!("lines of ours can panic:{}", listed(&ours));
+    }
+    println!("\n| lines that can panic, of | how | |\n|---|---|---|");
+    for (name, how, lines) in counts(&theirs) {
+        println!("| {name} | `{how}` | {lines} |");
+    }
+    Ok(theirs)
+}
+
+fn counts(sites: &[Site]) -> Vec<(&str, &str, usize)> {
+    let mut counts: BTreeMap<(&str, &str), usize> = BTreeMap::new();
+    for Site { line, how } in sites {
+        *counts.entry((lines::owner(line), how)).or_default() += 1;
+    }
+    counts.into_iter().map(|((name, how), lines)| (name, how, lines)).collect()
+}
+
+fn listed(sites: &[Site]) -> String {
+    sites.iter().fold(String::new(), |text, Site { line, how }| format!("{text}\n  {line}: {how}"))
+}
+
+/// Where a panic is called from.
+fn sites(bytes: &[u8]) -> anyhow::Result<BTreeSet<Site>> {
+    let program = Program::parse(bytes)?;
+    let file = object::File::parse(bytes)?;
+    let is_core = |name: &&str| name.starts_with("core::");
+    let helpers: BTreeSet<&str> = program.callers_of(PANIC).filter(is_core).collect();
+    let panics = |name: &&String| name.contains(PANIC) || helpers.contains(name.as_str());
+    let lines = Lines::read(&file)?;
+    let mut sites = BTreeSet::new();
+    for (place, target) in elf::mentions(&file, true)? {
+        let Some(function) = program.function(target) else { continue };
+        let Some(name) = function.names.iter().find(panics) else { continue };
+        if let Some(line) = lines.at(place)? {
+            let how = name.rsplit("::").next().unwrap_or(name).to_owned();
+            sites.insert(Site { line, how });
+        }
+    }
+    Ok(sites)
+}

@@ -1,0 +1,183 @@
+//! Flash and RAM of the linked file, by crate.
+
+use std::collections::BTreeMap;
+
+use anyhow::{Context, ensure};
+use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
+
+use super::lines::{Lines, OTHER};
+use super::memory;
+use crate::elf;
+
+/// What core, loop and drivers may take of the flash.
+const FLASH_BAR: u64 = 32 * 1024;
+/// The crates that they are.
+const CORE: [&str; 4] = ["sonarfix", "sonarfix-hal", "libm", "nalgebra"];
+/// A crate, or a variable, of this many bytes has a row of its own.
+const LARGE_CRATE: u64 = 500;
+const LARGE_VARIABLE: u64 = 64;
+
+/// What is taken of the flash.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+struct Flash {
+    code: u64,
+    constants: u64,
+}
+
+impl Flash {
+    fn bytes(self) -> u64 {
+        self.code + self.constants
+    }
+
+    fn sum<'a>(all: impl IntoIterator<Item = &'a (String, Self)>) -> Self {
+        all.into_iter().fold(Self::default(), |sum, (_, flash)| Self {
+            code: sum.code + flash.code,
+            constants: sum.constants + flash.constants,
+        })
+    }
+}
+
+/// Prints both tables, and holds core, loop and drivers to the bar.
+pub fn check(bytes: &[u8]) -> anyhow::Result<()> {
+    let file = object::File::parse(bytes)?;
+    print_flash(&file)?;
+    print_ram(&file)
+}
+
+fn print_flash(file: &object::File) -> anyhow::Result<()> {
+    let (core, others) = by_crate(file)?;
+    println!("\n| flash | code | constants |\n|---|---|---|");
+    let row = |name: &str, Flash { code, constants }| {
+        println!("| {name} | {code} | {constants} |");
+    };
+    for (name, flash) in &core {
+        row(name, *flash);
+    }
+    let sum = Flash::sum(&core);
+    let bytes = sum.bytes();
+    println!(
+        "| **core, loop and drivers: {bytes}** (bar: {FLASH_BAR}) | **{}** | **{}** |",
+        sum.code, sum.constants
+    );
+    let (large, small): (Vec<_>, Vec<_>) =
+        others.into_iter().partition(|(_, flash)| flash.bytes() >= LARGE_CRATE);
+    for (name, flash) in &large {
+        row(name, *flash);
+    }
+    row(&format!("{} smaller crates", small.len()), Flash::sum(&small));
+    let size = |name| file.section_by_name(name).map_or(0, |section| section.size());
+    let rest = Flash { code: 0, constants: size(".vector_table") + size(".data") };
+    row("interrupt vectors, first values of variables", rest);
+    let mut all = Flash::sum(core.iter().chain(&large).chain(&small));
+    all.constants += rest.constants;
+    println!("| **all** | **{}** | **{}** |", all.code, all.constants);
+    ensure!(bytes <= FLASH_BAR, "core, loop and drivers take more flash than they may");
+    Ok(())
+}
+
+/// Crates by what they take of the flash, most first.
+type Crates = Vec<(String, Flash)>;
+
+/// Those of core, loop and drivers, and the others.
+fn by_crate(file: &object::File) -> anyhow::Result<(Crates, Crates)> {
+    let lines = Lines::read(file)?;
+    let mut crates: BTreeMap<String, Flash> = BTreeMap::new();
+    let text = file.section_by_name(".text").context("the program has no code")?;
+    // Thumb instructions are made of half words. Constants among them count as code.
+    for address in (text.address()..text.address() + text.size()).step_by(2) {
+        crates.entry(lines.owner(address)).or_default().code += 2;
+    }
+    for (owner, bytes) in constants(file, &lines)? {
+        crates.entry(owner).or_default().constants += bytes;
+    }
+    let mut crates: Crates = crates.into_iter().collect();
+    crates.sort_by_key(|(_, flash)| std::cmp::Reverse(flash.bytes()));
+    Ok(crates.into_iter().partition(|(name, _)| CORE.contains(&name.as_str())))
+}
+
+/// The constants, by crate: each belongs to the code that names it, or to the constant that does.
+fn constants(file: &object::File, lines: &Lines) -> anyhow::Result<Vec<(String, u64)>> {
+    let section = file.section_by_name(".rodata").context("the program has no constants")?;
+    let objects = objects(file, &section);
+    let around = |address: u64| {
+        let (&start, &bytes) = objects.range(..=address).next_back()?;
+        (address < start + bytes).then_some(start)
+    };
+    let mut owners: BTreeMap<u64, String> = BTreeMap::new();
+    for (place, target) in elf::mentions(file, true)? {
+        if let Some(object) = around(target) {
+            owners.entry(object).or_insert_with(|| lines.owner(place));
+        }
+    }
+    let lists = elf::mentions(file, false)?;
+    // A constant that is named by one that is named by …: as often as it takes.
+    loop {
+        let known = owners.len();
+        for &(place, target) in &lists {
+            let owner = around(place).and_then(|object| owners.get(&object)).cloned();
+            if let (Some(owner), Some(object)) = (owner, around(target)) {
+                owners.entry(object).or_insert(owner);
+            }
+        }
+        if owners.len() == known {
+            break;
+        }
+    }
+    let mut rest = section.size();
+    let mut constants = Vec::new();
+    for (object, bytes) in &objects {
+        if let Some(owner) = owners.remove(object) {
+            constants.push((owner, *bytes));
+            rest -= bytes;
+        }
+    }
+    constants.push((OTHER.to_owned(), rest));
+    Ok(constants)
+}
+
+/// What lies in a section: addresses and bytes. Of two that overlap, the first counts.
+fn objects(file: &object::File, section: &object::Section) -> BTreeMap<u64, u64> {
+    let range = section.address()..section.address() + section.size();
+    let is_there = |symbol: &object::Symbol| {
+        symbol.kind() == SymbolKind::Data && range.contains(&symbol.address()) && symbol.size() > 0
+    };
+    let mut all: BTreeMap<u64, u64> = BTreeMap::new();
+    for symbol in file.symbols().filter(is_there) {
+        let bytes = all.entry(symbol.address()).or_default();
+        *bytes = symbol.size().max(*bytes);
+    }
+    let mut end = 0;
+    all.retain(|&start, bytes| {
+        let is_next = start >= end;
+        end = end.max(start + *bytes);
+        is_next
+    });
+    all
+}
+
+fn print_ram(file: &object::File) -> anyhow::Result<()> {
+    let mut rows = Vec::new();
+    let mut all = 0;
+    for section in memory::variables_of(file) {
+        all += section.size();
+        for (at, bytes) in objects(file, &section) {
+            let symbol = file.symbols().find(|s| s.address() == at && s.size() == bytes);
+            rows.push((elf::name(&symbol.context("a variable without a name")?)?, bytes));
+        }
+    }
+    rows.sort_by_key(|(_, bytes)| std::cmp::Reverse(*bytes));
+    println!("\n| variable in RAM | of | bytes |\n|---|---|---|");
+    let mut rest = all;
+    for (path, bytes) in rows.iter().filter(|(_, bytes)| *bytes >= LARGE_VARIABLE) {
+        let (owner, name) = path.split_once("::").unwrap_or((OTHER, path));
+        let name = name.rsplit("::").next().unwrap_or(name);
+        // What RTIC makes of the names of a task's resources.
+        let rtic = ["__rtic_internal_local_resource_", "__rtic_internal_local_init_"];
+        let name = rtic.iter().find_map(|prefix| name.strip_prefix(prefix)).unwrap_or(name);
+        println!("| `{name}` | {} | {bytes} |", owner.replace('_', "-"));
+        rest -= bytes;
+    }
+    println!("| smaller ones | | {rest} |");
+    println!("| **all variables** | | **{all}** |");
+    Ok(())
+}

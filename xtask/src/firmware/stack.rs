@@ -1,0 +1,263 @@
+//! The deepest that the stack can be: of all paths through the calls of the linked program, from
+//! its start and from each interrupt.
+//!
+//! - **Frames** are what a function's instructions lower the stack by.
+//! - **Calls** are what the linker had to fill in, and those of a function to itself. A call by
+//!   register may lead to any function whose address somebody has taken who can be reached.
+//! - **Recursion** is an error.
+//! - **Interrupts** are taken to come all at once, one in another, each once, whatever their
+//!   priorities, and each on top of a core that saves its floating-point registers.
+//! - **Panics** are cut off: nothing runs after one but the message, and the stack below it is
+//!   that of a program that has ended. So is a fault's handler.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use anyhow::{Context, bail, ensure};
+
+use super::memory;
+use super::panics::PANIC;
+use crate::elf::{Function, Program};
+
+/// Where the program starts.
+const START: &str = "Reset";
+/// Handlers from which nothing goes on.
+const ENDS: [&str; 3] = [START, "HardFault", "DefaultHandler"];
+/// What the core saves when an interrupt comes: 26 words with the floating-point registers, and one
+/// to a multiple of eight bytes (`ARMv7-M Architecture Reference Manual`, B1.5.7).
+const EXCEPTION: u64 = 4 * 27;
+/// All RAM, without the map, which stays in flash.
+const BAR: u64 = 8 * 1024;
+/// Printing: its functions are taken by address, for panics' messages, and called by one another
+/// only. As long as nobody else calls one of them, none of them is called.
+const FORMATTING: &str = "core::fmt::";
+
+/// Prints the deepest paths, and holds the RAM to the bar; gives how deep it is in all.
+pub fn check(bytes: &[u8]) -> anyhow::Result<u64> {
+    let program = Program::parse(bytes)?;
+    let roots = roots(&program, bytes)?;
+    let mut depths = Depths::of(&program, &roots)?;
+    let mut all = 0;
+    println!("\n| stack at its deepest, down from | bytes |\n|---|---|");
+    for root in roots {
+        let name = depths.name(root);
+        let saved = if name == START { 0 } else { EXCEPTION };
+        let depth = saved + depths.depth(root)?;
+        println!("| **`{name}`** | **{depth}** |");
+        if saved > 0 {
+            println!("| saved by the core | {saved} |");
+        }
+        for (name, bytes) in depths.deepest_path(root).into_iter().filter(|(_, bytes)| *bytes > 0) {
+            println!("| `{name}` | {bytes} |");
+        }
+        all += depth;
+    }
+    let variables = memory::variables(bytes)?;
+    println!("| **all stack, one in another** | **{all}** |");
+    println!("| all variables | {variables} |");
+    println!("| **all RAM** (bar: {BAR}) | **{}** |", variables + all);
+    ensure!(variables + all <= BAR, "more RAM than there may be");
+    Ok(all)
+}
+
+/// The start, and the handlers of all interrupts.
+fn roots(program: &Program, bytes: &[u8]) -> anyhow::Result<Vec<u64>> {
+    let start = program.address_of(START).context("the program has no start")?;
+    let mut roots = vec![start];
+    for at in memory::handlers(bytes)? {
+        let handler = program.function(at).context("a handler that is no function")?;
+        if !handler.names.iter().any(|name| ENDS.contains(&name.as_str())) {
+            roots.push(at);
+        }
+    }
+    Ok(roots)
+}
+
+/// How deep the stack is below each function.
+struct Depths<'a> {
+    program: &'a Program,
+    /// What a call by register may lead to.
+    taken: BTreeSet<u64>,
+    /// By address: how deep, and through whom.
+    known: BTreeMap<u64, (u64, Option<u64>)>,
+    /// Whose depth is being looked for, each called by the one before.
+    under_way: Vec<u64>,
+}
+
+impl<'a> Depths<'a> {
+    fn of(program: &'a Program, roots: &[u64]) -> anyhow::Result<Self> {
+        let (taken, known, under_way) = Default::default();
+        let mut depths = Self { program, taken, known, under_way };
+        // What is called by register may take further addresses.
+        loop {
+            let reached = depths.reached(roots);
+            let taken = depths.taken_by(&reached);
+            if taken == depths.taken {
+                depths.check(&reached)?;
+                return Ok(depths);
+            }
+            depths.taken = taken;
+        }
+    }
+
+    /// All functions that can be called.
+    fn reached(&self, roots: &[u64]) -> BTreeSet<u64> {
+        let mut reached: BTreeSet<u64> = roots.iter().copied().collect();
+        let mut next = roots.to_vec();
+        while let Some(at) = next.pop() {
+            next.extend(self.called_by(at).into_iter().filter(|&called| reached.insert(called)));
+        }
+        reached
+    }
+
+    /// What a function may call, but for panics.
+    fn called_by(&self, at: u64) -> BTreeSet<u64> {
+        let Some(function) = self.program.function(at) else { return BTreeSet::new() };
+        let mut called = function.calls.clone();
+        if function.stack.calls_by_register {
+            called.extend(&self.taken);
+        }
+        called.retain(|&called| !self.name(called).contains(PANIC));
+        called
+    }
+
+    /// The functions whose address one of these takes, but for those that only print.
+    fn taken_by(&self, reached: &BTreeSet<u64>) -> BTreeSet<u64> {
+        let functions = reached.iter().filter_map(|&at| self.program.function(at));
+        let addresses = functions.flat_map(|function| &function.takes);
+        let mut taken: BTreeSet<u64> =
+            addresses.flat_map(|&address| self.program.callable_through(address)).collect();
+        taken.retain(|&at| !self.name(at).contains(FORMATTING));
+        taken
+    }
+
+    /// Nobody prints, and every frame is known.
+    fn check(&self, reached: &BTreeSet<u64>) -> anyhow::Result<()> {
+        for &at in reached {
+            let name = self.name(at);
+            ensure!(!name.contains(FORMATTING), "{name} is called, and not only by panics");
+            let is_unbounded = self.program.function(at).is_some_and(|f| f.stack.is_unbounded);
+            ensure!(!is_unbounded, "{name} lowers the stack by what nobody knows beforehand");
+        }
+        Ok(())
+    }
+
+    fn depth(&mut self, at: u64) -> anyhow::Result<u64> {
+        if let Some((depth, _)) = self.known.get(&at) {
+            return Ok(*depth);
+        }
+        if self.under_way.contains(&at) {
+            let names: Vec<&str> = self.under_way.iter().map(|&at| self.name(at)).collect();
+            bail!("recursion: {} → {}", names.join(" → "), self.name(at));
+        }
+        self.under_way.push(at);
+        let (mut below, mut through) = (0, None);
+        for called in self.called_by(at) {
+            let depth = self.depth(called)?;
+            if depth > below {
+                (below, through) = (depth, Some(called));
+            }
+        }
+        self.under_way.pop();
+        let depth = self.frame(at) + below;
+        self.known.insert(at, (depth, through));
+        Ok(depth)
+    }
+
+    /// The functions of the deepest path down from one of which the depth is known, each with its
+    /// frame.
+    fn deepest_path(&self, from: u64) -> Vec<(&'a str, u64)> {
+        let through = |at: &u64| self.known.get(at).and_then(|(_, through)| *through);
+        let path = std::iter::successors(Some(from), through);
+        path.map(|at| (self.name(at), self.frame(at))).collect()
+    }
+
+    fn frame(&self, at: u64) -> u64 {
+        self.program.function(at).map_or(0, |function| function.stack.bytes)
+    }
+
+    fn name(&self, at: u64) -> &'a str {
+        self.program.function(at).map_or("(no function)", Function::name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::thumb::Stack;
+
+    /// A function with this frame, which calls and takes what is at these addresses.
+    fn function(name: &str, bytes: u64, calls: &[u64], takes: &[u64]) -> Function {
+        Function {
+            names: vec![name.to_owned()],
+            stack: Stack { bytes, ..Stack::default() },
+            calls: calls.iter().copied().collect(),
+            takes: takes.iter().copied().collect(),
+            ..Function::default()
+        }
+    }
+
+    fn by_register(mut function: Function) -> Function {
+        function.stack.calls_by_register = true;
+        function
+    }
+
+    fn depth(functions: Vec<(u64, Function)>, data: Vec<(u64, Vec<u64>)>) -> anyhow::Result<u64> {
+        let program = Program::made_of(functions, data);
+        Depths::of(&program, &[1])?.depth(1)
+    }
+
+    #[test]
+    fn the_deepest_path_counts_and_not_the_longest() {
+        let functions = vec![
+            (1, function("start", 8, &[2, 4], &[])),
+            (2, function("a", 16, &[3], &[])),
+            (3, function("b", 16, &[], &[])),
+            (4, function("c", 100, &[], &[])),
+        ];
+        assert_eq!(depth(functions, Vec::new()).unwrap(), 108);
+    }
+
+    #[test]
+    fn a_call_by_register_leads_to_what_a_table_lists() {
+        let functions = |start| vec![(1, start), (2, function("listed", 50, &[], &[]))];
+        // A table at 20 that names another, at 30, in which the function is.
+        let data = || vec![(20, vec![30]), (30, vec![2])];
+        let taken = function("start", 8, &[], &[20]);
+        assert_eq!(depth(functions(by_register(taken)), data()).unwrap(), 58);
+        let not_taken = function("start", 8, &[], &[]);
+        assert_eq!(depth(functions(by_register(not_taken)), data()).unwrap(), 8);
+        let not_called = function("start", 8, &[], &[20]);
+        assert_eq!(depth(functions(not_called), data()).unwrap(), 8);
+    }
+
+    #[test]
+    fn recursion_is_an_error_by_whatever_way() {
+        let itself = vec![(1, function("start", 8, &[1], &[]))];
+        let one_another =
+            vec![(1, function("start", 8, &[2], &[])), (2, function("a", 8, &[1], &[]))];
+        let by_pointer = vec![(1, by_register(function("start", 8, &[], &[1])))];
+        for functions in [itself, one_another, by_pointer] {
+            let error = depth(functions, Vec::new()).unwrap_err().to_string();
+            assert!(error.contains("recursion: start → "), "{error}");
+        }
+    }
+
+    #[test]
+    fn panics_are_cut_off_and_printing_is_not_expected_elsewhere() {
+        let that_calls = |calls: &[u64]| {
+            let panic = function("core::panicking::panic_fmt", 500, &[3], &[]);
+            let print = function("core::fmt::write", 500, &[], &[]);
+            vec![(1, function("start", 8, calls, &[3])), (2, panic), (3, print)]
+        };
+        assert_eq!(depth(that_calls(&[2]), Vec::new()).unwrap(), 8);
+        let error = depth(that_calls(&[2, 3]), Vec::new()).unwrap_err().to_string();
+        assert!(error.contains("core::fmt::write is called"), "{error}");
+    }
+
+    #[test]
+    fn a_frame_that_nobody_knows_is_an_error() {
+        let mut start = function("start", 8, &[], &[]);
+        start.stack.is_unbounded = true;
+        assert!(depth(vec![(1, start)], Vec::new()).is_err());
+    }
+}
