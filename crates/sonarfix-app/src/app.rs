@@ -47,13 +47,11 @@ pub struct Body {
     pub reset: Reset,
 }
 
-/// What one poll did.
+/// What one poll did, beside what [`App::report`] tells of the loop.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use]
 pub struct Polled {
-    /// What the loop did, if it runs.
-    pub report: Report,
     /// What the check of the devices found wrong, while the loop does not run.
     pub missing: Faults,
     /// A command was answered so.
@@ -103,6 +101,8 @@ struct Running<'m> {
     robot: Robot<'m>,
     reporter: Reporter,
     habit: Habit,
+    /// What the last poll did: here, and not handed on, for it is half a kilobyte.
+    report: Report,
 }
 
 impl Running<'_> {
@@ -117,8 +117,8 @@ impl Running<'_> {
         polled: &mut Polled,
     ) -> bool {
         let before = self.robot.localizer().health().verdict;
-        polled.report = self.robot.poll(now, hardware);
-        let report = &polled.report;
+        self.report = self.robot.poll(now, hardware);
+        let report = &self.report;
         let localizer = self.robot.localizer();
         let verdict = localizer.health().verdict;
         polled.verdict = (verdict != before).then_some(verdict);
@@ -225,6 +225,15 @@ impl<'m, F: NorFlash> App<'m, F> {
     pub fn localizer(&self) -> Option<&Localizer<'m>> {
         match &self.mode {
             Mode::Running(running) => Some(running.robot.localizer()),
+            Mode::Waiting(_) => None,
+        }
+    }
+
+    /// What the last poll of the loop did, while it runs.
+    #[must_use]
+    pub fn report(&self) -> Option<&Report> {
+        match &self.mode {
+            Mode::Running(running) => Some(&running.report),
             Mode::Waiting(_) => None,
         }
     }

@@ -22,9 +22,9 @@ pub fn flashed(flashed: &Flashed) {
     }
 }
 
-/// Logs what a poll did. Not part of the frame of whoever calls it, which lies below every poll's.
+/// Logs what a poll did, and in it the loop, if it runs. Not part of the frame of whoever calls it, which lies below every poll's.
 #[inline(never)]
-pub fn polled(polled: &Polled) {
+pub fn polled(polled: &Polled, of_loop: Option<&Report>) {
     if polled.has_changed {
         info!("{}", if polled.is_running { "the loop runs" } else { "the loop waits" });
     }
@@ -44,7 +44,9 @@ pub fn polled(polled: &Polled) {
     if !polled.missing.is_none() {
         warn!("missing: {}", polled.missing);
     }
-    report(&polled.report);
+    if let Some(of_loop) = of_loop {
+        report(of_loop);
+    }
 }
 
 fn report(report: &Report) {

@@ -6,7 +6,7 @@ use sonarfix::localizer::{self, Fix, Localizer};
 use sonarfix::map::{Map, image};
 use sonarfix::units::Instant;
 use sonarfix_app::store::Store;
-use sonarfix_app::{App, Body, Flashed, Link, Polled};
+use sonarfix_app::{App, Body, Flashed, Link};
 use sonarfix_hal::robot::Report;
 use sonarfix_link::message::Reset;
 use sonarfix_link::{Command, Outcome, Sender, baked, frame};
@@ -65,8 +65,6 @@ pub struct LoopOnWires<'m> {
     app: App<'m, RamFlash>,
     wires: &'m Wires,
     devices: WiredDevices<'m>,
-    /// What the last poll did.
-    report: Report,
 }
 
 impl<'m> Device<'m> {
@@ -119,7 +117,7 @@ impl<'m> Device<'m> {
     pub fn report(&self) -> Report {
         match self {
             Self::Localizer { .. } => Report::default(),
-            Self::Loop(robot) => robot.report,
+            Self::Loop(robot) => robot.app.report().copied().unwrap_or_default(),
         }
     }
 }
@@ -180,7 +178,7 @@ impl<'m> LoopOnWires<'m> {
         let region = 0..u32::try_from(CAPACITY).unwrap_or(0);
         let store = Store::new(RamFlash::default(), region).map_err(|_| Refusal::Board)?;
         let app = App::new(body, flashed, store, at).map_err(|_| Refusal::Board)?;
-        let mut robot = Self { app, wires, devices, report: Report::default() };
+        let mut robot = Self { app, wires, devices };
         robot.order(at, &Command::SetPose(start))?;
         robot.order(at, &Command::Start)?;
         Ok((robot, wires.take()))
@@ -198,11 +196,12 @@ impl<'m> LoopOnWires<'m> {
         self.wires.show(sensors);
         let mut cable = Cable::bringing(&[]);
         let Self { app, devices, .. } = self;
-        let mut polled = Polled::default();
-        let cost = meter.measure(|| polled = app.poll(sensors.at, devices, &mut cable));
-        self.report = polled.report;
-        let localizer = self.app.localizer().filter(|_| !polled.report.is_empty());
-        let belief = localizer.map(Belief::of);
+        let cost = meter.measure(|| {
+            // What it did beside the loop shows in the telemetry.
+            let _ = app.poll(sensors.at, devices, &mut cable);
+        });
+        let has_worked = self.app.report().is_some_and(|report| !report.is_empty());
+        let belief = self.app.localizer().filter(|_| has_worked).map(Belief::of);
         let (actuators, telemetry) = (self.wires.take(), image::checksum(cable.said()));
         (Answer::Polled { actuators, belief, telemetry }, cost)
     }

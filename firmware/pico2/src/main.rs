@@ -278,7 +278,7 @@ impl Board {
             self.watchdog.feed(WATCHDOG);
         }
         self.link.transmit();
-        log::polled(&polled);
+        log::polled(&polled, self.app.report());
         if let Some(took) = now().checked_duration_since(start) {
             self.app.took(took);
         }

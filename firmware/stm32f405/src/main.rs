@@ -404,7 +404,7 @@ mod app {
             if polled.is_on_time {
                 watchdog.feed();
             }
-            log::polled(&polled);
+            log::polled(&polled, app.report());
             let done = context.shared.clock.lock(|clock| advanced(now, clock.cnt().read().bits()));
             if let Some(took) = done.checked_duration_since(now) {
                 app.took(took);

@@ -4,7 +4,7 @@ use embedded_storage::nor_flash::NorFlash;
 use sonarfix::config::Config;
 use sonarfix::localizer::{Localizer, Start};
 use sonarfix::units::{Instant, Metres, Radians};
-use sonarfix_hal::robot::Robot;
+use sonarfix_hal::robot::{Report, Robot};
 use sonarfix_link::message::{Outcome, Refused};
 use sonarfix_link::{Command, Frame, Reporter, Telemetry, baked};
 
@@ -188,7 +188,7 @@ impl<F: NorFlash> App<'_, F> {
         self.faults = self.faults();
         let written = self.stored.map_or(deviation, |stored| stored.deviation);
         let habit = Habit::new(now, written);
-        self.mode = Mode::Running(Running { robot, reporter, habit });
+        self.mode = Mode::Running(Running { robot, reporter, habit, report: Report::default() });
         Ok(began)
     }
 }
