@@ -102,4 +102,12 @@ impl Belief {
         }
         Self { state: filter.state(), covariance, health: localizer.health() }
     }
+
+    /// All its numbers but the health's: the states, then the covariance.
+    pub fn numbers(&self) -> impl Iterator<Item = f32> {
+        let State { x, y, heading, scale_right, scale_left, track_width_error, range_scale } =
+            self.state;
+        let states = [x, y, heading, scale_right, scale_left, track_width_error, range_scale];
+        states.into_iter().chain(self.covariance)
+    }
 }

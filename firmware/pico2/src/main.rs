@@ -53,6 +53,9 @@ const TURN: Duration = Duration::from_millis(1);
 /// Longer than the erasing of a sector (at most 0.4 s), which keeps the loop from its deadlines.
 const WATCHDOG: Duration = Duration::from_secs(2);
 
+/// Number of the pin that is high while the robot may drive.
+const DRIVE: u32 = 9;
+
 /// Where the flash lies in memory, and how large it is.
 const FLASH_BASE: u32 = 0x1000_0000;
 const FLASH_SIZE: usize = 4 * 1024 * 1024;
@@ -203,6 +206,17 @@ impl Link for Serial {
         if self.to_send.capacity() - self.to_send.len() >= frame.len() {
             self.to_send.extend(frame.iter().copied());
         }
+    }
+}
+
+/// The end of the program, by a panic or another fault. Until the watchdog restarts it, nothing
+/// steers, so the robot must not drive.
+#[cortex_m_rt::exception(trampoline = false)]
+#[expect(unsafe_code, reason = "the vector table calls it; it does nothing that is unsafe")]
+unsafe fn HardFault() -> ! {
+    pac::SIO.gpio_out(0).value_clr().write_value(1 << DRIVE);
+    loop {
+        cortex_m::asm::nop();
     }
 }
 

@@ -275,6 +275,19 @@ mod sectors {
     }
 }
 
+/// The end of the program, by a panic or another fault. Until the watchdog restarts it, nothing
+/// steers, so the robot must not drive.
+#[cortex_m_rt::exception(trampoline = false)]
+#[expect(unsafe_code, reason = "nobody else is left to hand over the port")]
+unsafe fn HardFault() -> ! {
+    // SAFETY: nothing else runs any more.
+    let port = unsafe { &*pac::GPIOB::ptr() };
+    port.bsrr().write(|w| w.br7().set_bit());
+    loop {
+        cortex_m::asm::nop();
+    }
+}
+
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod app {
     use heapless::spsc::{Consumer, Producer};

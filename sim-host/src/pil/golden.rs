@@ -14,7 +14,8 @@ use std::path::Path;
 use anyhow::{Context, bail, ensure};
 use sonarfix_pil::{Answer, Begin, Device, Request, Wires, line};
 
-use super::pair::{Pair, difference};
+use super::difference::difference;
+use super::pair::Pair;
 
 /// A question and its answer, as postcard writes them.
 #[derive(Debug, Clone, PartialEq, Eq)]

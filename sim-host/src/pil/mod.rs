@@ -8,10 +8,12 @@
 //!
 //! - [`machine`]: which microcontrollers there are, and how one is started;
 //! - [`pair`]: asks both and compares;
-//! - [`tally`]: what the emulator counted;
+//! - [`difference`](mod@difference): in what two answers differ;
+//! - [`tally`]: what the emulator counted; [`progress`]: how far it is;
 //! - [`golden`]: questions and answers as a file, to be asked again;
 //! - this file: the pair as the [`Computer`] of a simulated robot.
 
+pub mod difference;
 pub mod golden;
 pub mod machine;
 pub mod pair;

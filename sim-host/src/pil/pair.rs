@@ -5,13 +5,13 @@ use sonarfix::units::Instant;
 use sonarfix_map::BakeError;
 use sonarfix_pil::line::{self, ANSWER_MAX};
 use sonarfix_pil::serve::Unmetered;
-use sonarfix_pil::{Actuators, Answer, Begin, Belief, Device, Refusal, Request, Wires};
+use sonarfix_pil::{Actuators, Answer, Begin, Device, Refusal, Request, Wires};
 
+use super::difference::difference;
 use super::golden::Exchange;
 use super::machine::Emulator;
 use super::progress::Progress;
 use super::tally::Tally;
-use crate::STATES;
 
 /// What keeps a microcontroller from the loop.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -189,51 +189,4 @@ impl Pair {
         }
         Ok(())
     }
-}
-
-/// In what two answers differ, in words; the second cannot always be read.
-#[must_use]
-pub fn difference(own: &Answer, theirs: Option<&Answer>) -> String {
-    let Some(theirs) = theirs else {
-        return "the answer cannot be read".to_owned();
-    };
-    match (belief(own), belief(theirs)) {
-        (Some(own), Some(theirs)) => {
-            first_bit(own, theirs).unwrap_or_else(|| format!("{own:?} here, {theirs:?} there"))
-        }
-        _ => format!("{own:?} here, {theirs:?} there"),
-    }
-}
-
-fn belief(answer: &Answer) -> Option<&Belief> {
-    match answer {
-        Answer::Rolled(_, belief) | Answer::Fixed(_, belief) => Some(belief),
-        Answer::Polled { belief, .. } => belief.as_ref(),
-        _ => None,
-    }
-}
-
-/// The first number of two estimates that is not the same.
-fn first_bit(own: &Belief, theirs: &Belief) -> Option<String> {
-    let states = |belief: &Belief| {
-        let s = &belief.state;
-        [s.x, s.y, s.heading, s.scale_right, s.scale_left, s.track_width_error, s.range_scale]
-    };
-    let names = STATES.iter().map(|name| (*name).to_owned());
-    let entries = (0..STATES.len()).flat_map(|row| {
-        (row..STATES.len()).map(move |column| format!("covariance ({row}, {column})"))
-    });
-    let numbers = |belief: &Belief| {
-        let mut numbers = states(belief).to_vec();
-        numbers.extend(belief.covariance);
-        numbers
-    };
-    let pairs = numbers(own).into_iter().zip(numbers(theirs));
-    let mut named = names.chain(entries).zip(pairs);
-    named.find(|(_, (own, theirs))| own.to_bits() != theirs.to_bits()).map(
-        |(name, (own, theirs))| {
-            let (a, b) = (own.to_bits(), theirs.to_bits());
-            format!("{name} is {own:e} ({a:#010x}) here and {theirs:e} ({b:#010x}) there")
-        },
-    )
 }
