@@ -5,7 +5,7 @@
 //! - [`Air`]: the speed of sound, from a set temperature;
 //! - [`PulseRanger`]: rangers that answer with a pulse as long as the flight (HC-SR04 and its
 //!   kin, SRF04/05, LV-MaxSonar by pulse width), over an [`EchoLine`]: [`Polled`] or
-//!   [`Captured`] by an interrupt;
+//!   [`Captured`] by an interrupt, or by hardware that stamps ([`StampedEdges`]);
 //! - [`Srf`]: SRF02 and SRF08 on I²C.
 //!
 //! Not supported: rangers whose pulse only represents the range after it was measured
@@ -20,6 +20,7 @@ mod capture;
 mod polled;
 mod pulse;
 mod srf;
+mod stamps;
 
 use sonarfix::units::{Duration, Instant, Metres};
 
@@ -30,6 +31,7 @@ pub use capture::{Captured, EchoCapture};
 pub use polled::Polled;
 pub use pulse::{EchoLine, Pulse, PulseError, PulseRanger, PulseTiming};
 pub use srf::Srf;
+pub use stamps::{StampedEdges, Stamps};
 
 /// An ultrasonic ranger that never waits: it is triggered, and then polled until it has an
 /// outcome.

@@ -43,7 +43,7 @@ use sonarfix::units::Instant;
 use sonarfix_app::store::Store;
 use sonarfix_app::{App, Flashed, Link, log};
 use sonarfix_hal::encoder::Counter;
-use sonarfix_hal::ranger::{Captured, EchoCapture, PulseRanger};
+use sonarfix_hal::ranger::{Captured, EchoCapture, PulseRanger, StampedEdges, Stamps};
 use sonarfix_hal::robot::Devices;
 use sonarfix_link::message::Reset;
 use sonarfix_robot::memory;
@@ -63,7 +63,7 @@ const FLASH_SIZE: usize = 4 * 1024 * 1024;
 type Hardware =
     Devices<Encoder<0>, Encoder<1>, Pwm<'static>, PulseRanger<Output<'static>, Captured<'static>>>;
 
-/// Where [`Stamps`] leaves the edges.
+/// Where [`Stamper`] leaves the edges.
 static ECHO: EchoCapture = EchoCapture::new();
 
 bind_interrupts!(struct Interrupts {
@@ -112,14 +112,12 @@ impl<const SM: usize> Counter for Encoder<SM> {
 }
 
 /// A state machine that stamps the edges of the echo.
-struct Stamps {
+struct Stamper {
     machine: StateMachine<'static, PIO1, 0>,
-    /// The edges that [`ECHO`] knows.
-    rise: u32,
-    fall: u32,
+    edges: StampedEdges,
 }
 
-impl Stamps {
+impl Stamper {
     // As above.
     #[inline(never)]
     fn new(pio: Peri<'static, PIO1>, echo: Peri<'static, impl PioPin>) -> Self {
@@ -132,29 +130,20 @@ impl Stamps {
         config.fifo_join = FifoJoin::RxAsStatus;
         config.clock_divider = clock_divider(5_000_000).into();
         machine.set_config(&config);
-        let (rise, fall) = (machine.get_rxf_entry(1), machine.get_rxf_entry(2));
+        let edges = StampedEdges::since(stamps(&mut machine));
         machine.set_enable(true);
-        Self { machine, rise, fall }
+        Self { machine, edges }
     }
 
-    /// Tells [`ECHO`] the newest edge of each kind, the older of the two first.
+    /// Tells [`ECHO`] the newest edges.
     fn tell(&mut self, now: Instant) {
-        let (rise, fall) = (self.machine.get_rxf_entry(1), self.machine.get_rxf_entry(2));
-        let count = self.machine.get_rxf_entry(0);
-        let age = |stamp| count.wrapping_sub(stamp);
-        let at = |stamp| Instant::from_ticks(now.ticks().saturating_sub(age(stamp).into()));
-        let has_fallen = fall != self.fall;
-        if has_fallen && age(fall) > age(rise) {
-            ECHO.fell(at(fall));
-        }
-        if rise != self.rise {
-            ECHO.rose(at(rise));
-        }
-        if has_fallen && age(fall) <= age(rise) {
-            ECHO.fell(at(fall));
-        }
-        (self.rise, self.fall) = (rise, fall);
+        let stamps = stamps(&mut self.machine);
+        self.edges.tell(&ECHO, now, self.machine.get_rxf_entry(0), stamps);
     }
+}
+
+fn stamps(machine: &mut StateMachine<'static, PIO1, 0>) -> Stamps {
+    Stamps { rise: machine.get_rxf_entry(1), fall: machine.get_rxf_entry(2) }
 }
 
 /// What divides the system's clock down to this many Hz.
@@ -237,7 +226,7 @@ fn reset(watchdog: &Watchdog) -> Reset {
 struct Board {
     app: App<'static, Flash<'static, FLASH, flash::Blocking, FLASH_SIZE>>,
     hardware: Hardware,
-    stamps: Stamps,
+    stamper: Stamper,
     link: Serial,
     drive: Output<'static>,
     watchdog: Watchdog,
@@ -257,7 +246,7 @@ impl Board {
         let program = pio.load_program(&pio_file!("src/quadrature.pio").program);
         let right = Encoder::new(sm0, &mut pio, &program, board.PIN_2, board.PIN_3);
         let left = Encoder::new(sm1, &mut pio, &program, board.PIN_4, board.PIN_5);
-        let stamps = Stamps::new(board.PIO1, board.PIN_8);
+        let stamper = Stamper::new(board.PIO1, board.PIN_8);
         let pulses = Pwm::new_output_a(board.PWM_SLICE3, board.PIN_6, servo_pulses());
         let trigger = Output::new(board.PIN_7, Level::Low);
         let servo = sonarfix_robot::servo(pulses)?;
@@ -274,7 +263,7 @@ impl Board {
         Some(Self {
             app,
             hardware: Devices { right, left, servo, ranger },
-            stamps,
+            stamper,
             link: Serial { uart, to_send: Deque::new() },
             drive: Output::new(board.PIN_9, Level::Low),
             watchdog,
@@ -285,7 +274,7 @@ impl Board {
     /// A turn of the loop.
     fn turn(&mut self) {
         let start = now();
-        self.stamps.tell(start);
+        self.stamper.tell(start);
         let polled = self.app.poll(start, &mut self.hardware, &mut self.link);
         self.drive.set_level(polled.is_running.into());
         if polled.is_on_time {
