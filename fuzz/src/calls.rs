@@ -65,7 +65,7 @@ fn config(bytes: &mut Bytes) -> Config {
         max_wheel_speed: MetresPerSecond(bytes.between(0.1, 5.0)),
         sonar: Sonar {
             mount: Point::new(bytes.number(0.2), bytes.number(0.2)),
-            servo: (Radians(bytes.between(-3.14, 0.0)), Radians(bytes.between(0.0, 3.14))),
+            servo: (Radians(bytes.between(-3.1, 0.0)), Radians(bytes.between(0.0, 3.1))),
             cone: Radians(bytes.between(0.05, 1.5)),
             min_range: Metres(bytes.between(0.0, 0.2)),
             max_range: Metres(bytes.between(1.0, 10.0)),
@@ -242,7 +242,8 @@ impl Session<'_> {
             }
             Fix::Gated(innovation) => {
                 // NaN is not inside.
-                assert!(!(innovation.nis() <= trust.gate * trust.gate));
+                let is_inside = innovation.nis() <= trust.gate * trust.gate;
+                assert!(!is_inside);
                 assert!(is_same || may_reopen, "{fix:?} changed the filter");
             }
             Fix::Refused(refusal) => {

@@ -45,6 +45,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         command.current_dir(&folder).env("CARGO_TARGET_DIR", &target_directory);
         command
     };
+    cargo::check(in_fuzz("fmt --check"))?;
+    cargo::check(in_fuzz("clippy --no-default-features --all-targets -- -D warnings"))?;
     cargo::check(in_fuzz("test --release --no-default-features"))?;
 
     // A target of its own keeps the flags away from build scripts and macros.
