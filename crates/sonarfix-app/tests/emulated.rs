@@ -58,6 +58,9 @@ impl Robot {
         // 16 MHz, so the firmware's microsecond is 16 instructions: those of a core at 16 MHz that
         // does one in a cycle. While it sleeps no time of this computer passes.
         command.args(["-machine", "netduinoplus2", "-icount", "shift=0,sleep=off"]);
+        // What is written to devices that the emulator has not, among them the ports.
+        command.args(["-d", "unimp", "-D"]).arg(path("writes"));
+        command.arg("-gdb").arg(format!("unix:{},server=on,wait=off", path("debugger").display()));
         let monitor = path("monitor");
         command.args(["-display", "none", "-kernel", &elf, "-monitor"]);
         command.arg(format!("unix:{},server=on,wait=off", monitor.display()));
@@ -159,6 +162,57 @@ impl Robot {
             // An emulator that waits for somebody to read does not listen to its monitor.
             let _ = self.line.read(&mut [0; 4_096]).unwrap();
         }
+    }
+
+    /// Lets the program go on at another address, as a debugger would.
+    fn sent_astray(&mut self, to: u32) {
+        let mut debugger = connected(&self.files.path().join("debugger"));
+        debugger.set_nonblocking(true).unwrap();
+        // Registers can be written once their description was read; 15 is the program counter, in the
+        // order of its bytes. Then let go.
+        let address = format!("Pf={:08x}", to.swap_bytes());
+        for order in ["qXfer:features:read:target.xml:0,ffb", &address, "D"] {
+            self.debug(&mut debugger, order);
+        }
+    }
+
+    /// Gives the emulator's debugger an order, and waits until it is done.
+    fn debug(&mut self, debugger: &mut UnixStream, order: &str) {
+        let sum = order.bytes().fold(0_u8, u8::wrapping_add);
+        debugger.write_all(format!("${order}#{sum:02x}").as_bytes()).unwrap();
+        // An answer ends with its checksum.
+        let mut answer = Vec::new();
+        while answer.iter().rev().nth(2).is_none_or(|byte| *byte != b'#') {
+            let mut byte = [0];
+            match debugger.read(&mut byte) {
+                Ok(0) => panic!("the emulator has ended"),
+                Ok(_) => answer.extend(byte),
+                Err(_) => self.listen(),
+            }
+        }
+        debugger.write_all(b"+").unwrap();
+    }
+
+    /// Takes what is on the line: an emulator that waits for somebody to read does nothing else.
+    fn listen(&mut self) {
+        assert!(self.since.elapsed() < PATIENCE, "the emulator is silent");
+        self.line.set_read_timeout(Some(Duration::from_millis(100))).unwrap();
+        let _ = self.line.read(&mut [0; 4_096]);
+    }
+
+    /// Whether the last that was written to the motor driver's pin, PB7, switched it on.
+    fn may_drive(&self) -> Option<bool> {
+        let log = std::fs::read_to_string(self.files.path().join("writes")).ok()?;
+        // The port's register that sets pins by its lower half and clears them by its upper.
+        let mut writes = log.lines().rev().filter(|line| line.contains("GPIOB: unimplemented"));
+        writes.find_map(|line| {
+            let (_, value) = line.split_once("write (size 4, offset 0x018, value 0x")?;
+            match value {
+                "00000080)" => Some(true),
+                "00800000)" => Some(false),
+                _ => None,
+            }
+        })
     }
 
     fn send(&mut self, bytes: &[u8]) {
@@ -347,4 +401,23 @@ fn garbage_is_counted_and_commands_after_it_are_done_once() {
     robot.wait_for(began);
     assert_eq!(robot.answer_to(8), Outcome::Done);
     assert!(robot.how_it_fares().running);
+}
+
+/// Where nobody steers any more the motors are off: a program that has come to its end pulls the pin
+/// down, and only then ends.
+#[test]
+#[ignore = "cargo xtask test-firmware"]
+fn a_fault_stops_the_motors() {
+    let mut robot = Robot::switched_on(&map(), &config());
+    robot.hello();
+    assert_eq!(robot.may_drive(), Some(false));
+    assert_eq!(robot.order(&Command::SetPose(pose())), Outcome::Done);
+    assert_eq!(robot.order(&Command::Start), Outcome::Done);
+    robot.how_it_fares();
+    assert_eq!(robot.may_drive(), Some(true));
+    // Where there is nothing.
+    robot.sent_astray(0x3000_0000);
+    while robot.may_drive() == Some(true) {
+        robot.listen();
+    }
 }
