@@ -1,7 +1,7 @@
 //! The reference board: an STM32F405 with two encoders, a servo, a pulse-width sonar and a UART.
 //!
 //! This file is the board; the robot on it is in `sonarfix-robot`, what it does in `sonarfix-app`.
-//! The wiring is drawn in `docs/firmware.md`.
+//! The wiring is drawn in the README.
 //!
 //! | | for | pins |
 //! |---|---|---|
