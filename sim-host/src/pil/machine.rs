@@ -181,10 +181,7 @@ impl Drop for Emulator {
     }
 }
 
-fn broken(error: &LineError<io::Error>) -> PilError
-where
-    io::Error: std::fmt::Debug,
-{
+fn broken(error: &LineError<io::Error>) -> PilError {
     let hint = match error {
         LineError::Closed => " (it ended, or said nothing for a minute)",
         _ => "",
