@@ -169,12 +169,10 @@ impl<'m> LoopOnWires<'m> {
         let devices = board.devices(wires).map_err(|_| Refusal::Board)?;
         let body =
             Body { wheels, settings: board.settings, firmware: [0; 3], reset: Reset::PowerOn };
-        let map = Map::read(image).map_err(|_| Refusal::Map)?;
-        let seal = image.last_chunk().copied().ok_or(Refusal::Map)?;
-        let flashed = Flashed {
-            map: Ok((map, u32::from_le_bytes(seal))),
-            config: Ok((config, baked::checksum(&config))),
-        };
+        let mut buffer = [0; baked::LENGTH_MAX];
+        let config = baked::write(&config, &mut buffer).map_err(|_| Refusal::Start)?;
+        let flashed = Flashed::read(image, config);
+        flashed.map.map_err(|_| Refusal::Map)?;
         let region = 0..u32::try_from(CAPACITY).unwrap_or(0);
         let store = Store::new(RamFlash::default(), region).map_err(|_| Refusal::Board)?;
         let app = App::new(body, flashed, store, at).map_err(|_| Refusal::Board)?;
