@@ -1,4 +1,4 @@
-//! A baked map: what [`Map::read`] believes must answer every question soundly.
+//! A baked map: one that [`Map::read`] accepts must answer every query correctly.
 
 use sonarfix::map::image::{MAGIC, VERSION, checksum};
 use sonarfix::map::{Map, MapError, Wall, WallId};
@@ -8,11 +8,11 @@ use sonarfix_map::{BakeError, bake};
 
 use crate::bytes::Bytes;
 
-/// The bytes as they are, the same with the start and the checksum that they should have, and the
-/// walls that they spell, baked and then damaged.
+/// Reads the bytes as they are, the same with a valid header and checksum, and a map that is baked from walls in the bytes and then
+/// damaged.
 ///
 /// # Panics
-/// If an invariant breaks.
+/// If an invariant is violated.
 pub fn baked_map(bytes: &[u8]) {
     let _ = ask(bytes, bytes);
     if let Some(content) = bytes.len().checked_sub(4).and_then(|end| bytes.get(8..end)) {
@@ -21,8 +21,7 @@ pub fn baked_map(bytes: &[u8]) {
     baked_walls(bytes);
 }
 
-/// Walls from the bytes, baked. That must be believed; what is left after some bytes of it are
-/// changed may be.
+/// Bakes walls from the bytes. The image must be accepted; with some bytes changed it may be.
 fn baked_walls(bytes: &[u8]) {
     let mut drawn = Bytes::new(bytes);
     let walls = walls(&mut drawn);
@@ -43,7 +42,7 @@ fn baked_walls(bytes: &[u8]) {
     let _ = ask(&sealed(&content), bytes);
 }
 
-/// Up to 32 walls, most of them in one house, some of them the same.
+/// Up to 32 walls, most of them in one house, some of them equal.
 fn walls(bytes: &mut Bytes) -> Vec<Wall> {
     let count = bytes.byte() % 33;
     let size = if bytes.byte() < 128 { 6.0 } else { 60.0 };
@@ -58,7 +57,7 @@ fn sealed(content: &[u8]) -> Vec<u8> {
     image
 }
 
-/// Asks everything that can be asked of a map, at places that `bytes` say and at its edges.
+/// Runs every query of a map, at places from `bytes` and at its edges.
 fn ask(image: &[u8], bytes: &[u8]) -> Result<(), MapError> {
     let map = Map::read(image)?;
     let walls: Vec<_> = map.walls().collect();
@@ -81,25 +80,25 @@ fn ask(image: &[u8], bytes: &[u8]) -> Result<(), MapError> {
     Ok(())
 }
 
-/// What is given is of the map, and each once; what is surely within reach is given.
+/// Every returned wall is in the map and is returned once; every wall within reach is returned.
 fn check_near(map: &Map, walls: &[(WallId, Wall)], point: Point, reach: f32) {
     let mut given = vec![false; walls.len()];
     for (id, wall) in map.near(point, Metres(reach)) {
         let place = id.0 as usize;
         assert_eq!(walls.get(place), Some(&(id, wall)), "not of the map");
-        assert!(!std::mem::replace(&mut given[place], true), "{id:?} comes twice");
+        assert!(!std::mem::replace(&mut given[place], true), "{id:?} is returned twice");
     }
     if !point.is_finite() {
         return;
     }
     for (&(id, wall), given) in walls.iter().zip(given) {
-        // A millionth is far more than the rounding of the distance.
+        // A millionth exceeds the rounding of the distance by far.
         let is_within = distance(&wall, point) < f64::from(reach) * (1.0 - 1e-6);
         assert!(given || !is_within, "{id:?} is within {reach} m of {point:?}");
     }
 }
 
-/// From a point to the nearest of a wall between its ends.
+/// The distance of a point from a wall, between its ends.
 fn distance(wall: &Wall, point: Point) -> f64 {
     let from = |end: Point| {
         let difference = |a: Metres, b: Metres| f64::from(a.0) - f64::from(b.0);

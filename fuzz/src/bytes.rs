@@ -1,9 +1,9 @@
-//! Numbers from bytes: mostly such as a robot meets, now and then such as it never should.
+//! Numbers from bytes: mostly usual ones, sometimes hostile ones.
 
-/// What remains of the input; zeros once it is used up.
+/// The rest of the input; zeros after its end.
 pub struct Bytes<'a>(&'a [u8]);
 
-/// What arithmetic trips over.
+/// Hostile numbers.
 const HOSTILE: [f32; 12] = [
     f32::NAN,
     f32::INFINITY,
@@ -38,7 +38,7 @@ impl<'a> Bytes<'a> {
         u32::from_le_bytes([self.byte(), self.byte(), self.byte(), self.byte()])
     }
 
-    /// A number in ±`size` as a rule; one of 16 is hostile, another any bits at all.
+    /// Usually a number in ±`size`; one of 16 is hostile, another has arbitrary bits.
     pub fn number(&mut self, size: f32) -> f32 {
         match self.byte() {
             0..16 => HOSTILE[usize::from(self.byte()) % HOSTILE.len()],
@@ -47,7 +47,7 @@ impl<'a> Bytes<'a> {
         }
     }
 
-    /// A number from `low` to `high` as a rule.
+    /// Usually a number from `low` to `high`.
     pub fn between(&mut self, low: f32, high: f32) -> f32 {
         match self.byte() {
             0..8 => HOSTILE[usize::from(self.byte()) % HOSTILE.len()],

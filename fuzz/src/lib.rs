@@ -1,15 +1,15 @@
-//! What is fuzzed, as plain functions: each takes any bytes, and panics if an invariant breaks.
+//! The fuzz targets as functions: each accepts any bytes, and panics if an invariant is violated.
 //!
-//! | target | what the bytes are |
+//! | target | meaning of the bytes |
 //! |---|---|
 //! | [`localizer`] | a configuration, a map, and calls in any order with hostile numbers and times |
 //! | [`baked_map`] | a baked map, whole or damaged, or walls to bake |
 //! | [`map_file`], [`scenario_file`], [`robot_file`] | the text of such a file |
 //! | [`replay_log`] | the lines of a log |
-//! | [`link`] | a message, and garbage that comes in before it |
+//! | [`link`] | a message, and line noise before it |
 //!
-//! `cargo xtask fuzz` searches for a bounded time; `cargo fuzz run TARGET` for as long as you like;
-//! `cargo test --no-default-features` runs them over `corpus/` and seeded random bytes.
+//! `cargo xtask fuzz` searches for a bounded time, `cargo fuzz run TARGET` without limit; `cargo test --no-default-features` runs
+//! them on `corpus/` and on seeded random bytes.
 
 mod baked;
 mod bytes;

@@ -1,15 +1,14 @@
-//! The link's receiver: whatever comes in, it counts, and what comes next it hears.
+//! The link's receiver: it counts any input, and receives the frame after it.
 
 use sonarfix::map::image::checksum as crc32;
 use sonarfix_link::message::Message;
 use sonarfix_link::{Command, Frame, Receiver, Sender, Telemetry, VERSION, frame};
 
-/// Garbage, the same sealed as a frame, a damaged frame, and a whole one, which must be heard; for
-/// a receiver of either kind. The bytes are a sequence number, a bit to flip, the message's length,
-/// the message and the garbage.
+/// Sends noise, the noise as the content of a frame, a damaged frame, and a valid one, which must be received; for a receiver of either kind.
+/// The bytes are a sequence number, a bit to flip, the message's length, the message and the noise.
 ///
 /// # Panics
-/// If an invariant breaks.
+/// If an invariant is violated.
 pub fn link(bytes: &[u8]) {
     let &[low, high, bit, length, ref rest @ ..] = bytes else { return };
     let (message, garbage) = rest.split_at(rest.len().min(length.into()));
@@ -21,10 +20,10 @@ pub fn link(bytes: &[u8]) {
 fn hear<M: Message>(sequence: u16, bit: u8, message: &[u8], garbage: &[u8]) {
     let mut line = Line::<M>::default();
     line.push(garbage);
-    // Ends whatever the garbage began, so that what follows is not the end of that.
+    // Terminates the noise, so that the next frame is separate from it.
     line.push(&[0]);
     line.push(&sealed::<M>(sequence, garbage));
-    // What was cut off counts as zeros. Not all bytes are a message.
+    // Missing bytes are zeros. Not all bytes are a valid message.
     let Ok((message, _)) = postcard::take_from_bytes::<M>(&[message, &[0; 256]].concat()) else {
         return;
     };
@@ -34,19 +33,19 @@ fn hear<M: Message>(sequence: u16, bit: u8, message: &[u8], garbage: &[u8]) {
     let mut damaged = whole.to_vec();
     let place = usize::from(bit) % damaged.len();
     damaged[place] ^= 1 << (bit % 8);
-    assert!(line.push(&damaged).is_none(), "a damaged frame is heard: {damaged:02x?}");
+    assert!(line.push(&damaged).is_none(), "a damaged frame is received: {damaged:02x?}");
 
     let heard = line.push(whole).expect("a whole frame is not heard");
     assert_eq!(heard.sequence, sequence);
-    // As bytes: a NaN is not equal to itself, and must come through as well.
+    // Compared as bytes, because a NaN does not equal itself.
     assert_eq!(spelled(&heard.message), spelled(&message));
 }
 
-/// A receiver, and what it must have counted.
+/// A receiver with its expected counts.
 struct Line<M> {
     receiver: Receiver<M>,
     heard: u32,
-    /// Stretches between zeros that are not empty.
+    /// Non-empty sequences of bytes between zeros.
     ended: u32,
     is_empty: bool,
 }
@@ -58,7 +57,7 @@ impl<M: Message> Default for Line<M> {
 }
 
 impl<M: Message> Line<M> {
-    /// Lets these bytes come in; gives what is heard as the last of them does.
+    /// Passes these bytes to the receiver; returns the frame that the last one completes.
     fn push(&mut self, bytes: &[u8]) -> Option<Frame<M>> {
         let mut last = None;
         for &byte in bytes {
@@ -70,9 +69,9 @@ impl<M: Message> Line<M> {
             if let Some(frame) = &last {
                 self.heard += 1;
                 assert!(byte == 0, "a frame before its end");
-                let said = spelled(&frame.message);
-                let again = postcard::from_bytes::<M>(&said).map(|message| spelled(&message));
-                assert_eq!(again, Ok(said), "said once more it is another");
+                let encoded = spelled(&frame.message);
+                let again = postcard::from_bytes::<M>(&encoded).map(|message| spelled(&message));
+                assert_eq!(again, Ok(encoded), "encoded again it differs");
             }
         }
         let counters = self.receiver.counters();
@@ -90,7 +89,7 @@ fn sealed<M: Message>(sequence: u16, content: &[u8]) -> Vec<u8> {
     [&[0], &stuffed(&body)[..], &[0]].concat()
 }
 
-/// Consistent overhead byte stuffing: each zero becomes the distance to the next.
+/// Consistent overhead byte stuffing: replaces each zero by the distance to the next.
 fn stuffed(body: &[u8]) -> Vec<u8> {
     let mut stuffed = Vec::new();
     for run in body.split(|&byte| byte == 0) {

@@ -1,13 +1,12 @@
-//! Random lives of a filter, as many steps as are asked for, on all cores: no variance may reach
-//! zero, no number may stop being finite, and the correlation matrix must stay positive definite.
+//! Random runs of a filter, for a given number of steps, on all cores: no variance may reach zero,
+//! every number must stay finite, and the correlation matrix must stay positive definite.
 //!
-//! A life is a robot, a prior from 0.1 m to 100 m and some 20,000 steps: ways of every kind, long
-//! silences, ranges sharp to 0.1 mm from slanted and from straight walls, single or of the same
-//! few walls over and over. A step is one `predict` or one `update`. After every update and every
-//! 16th predict the whole of P is looked at, in `f64`.
+//! A run is a robot, a prior from 0.1 m to 100 m and about 20,000 steps: motions of every kind, long
+//! intervals without ranges, ranges with deviations down to 0.1 mm to slanted and to straight walls,
+//! single or repeated at the same few walls. A step is one `predict` or one `update`. After every
+//! update and every 16th predict all of P is checked, in `f64`.
 //!
-//! `cargo xtask endurance` runs it. A life is known by its seed: `--seed N --steps 1` lives that
-//! one again.
+//! `cargo xtask endurance` runs it. A seed determines a run: `--seed N --steps 1` repeats it.
 
 use std::process::ExitCode;
 
@@ -17,30 +16,30 @@ use nalgebra::{DMatrix, SMatrix};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use sonarfix::ekf::{Ekf, State};
+use sonarfix::ekf::{Ekf, StandardDeviations, StateEstimate};
 use sonarfix::map::Wall;
 use sonarfix::motion::{Drive, WheelTravel};
 use sonarfix::pose::Point;
 use sonarfix::range::ExpectedRange;
-use sonarfix::units::{Metres, PerRootMetre, SquareMetres};
+use sonarfix::units::{Metres, PerRootMetre, Radians, SquareMetres};
 
 #[derive(Debug, Parser)]
-#[command(about = "Random lives of a filter")]
+#[command(about = "Random runs of a filter")]
 struct Args {
-    /// How many steps at the least; the last life is lived to its end.
+    /// Minimum number of steps; the last run is completed.
     #[arg(long, default_value_t = 1_000_000)]
     steps: u64,
-    /// Seed of the first life; the others count up from it.
+    /// Seed of the first run; the others count up from it.
     #[arg(long, default_value_t = 0)]
     seed: u64,
 }
 
-/// Steps of one life; its last leg may go a little beyond.
-const LIFE: u64 = 20_000;
-/// Predictions from one look at P to the next.
+/// Steps of one run; its last leg may exceed it slightly.
+const RUN: u64 = 20_000;
+/// Predictions between checks of P.
 const LOOK_EVERY: u64 = 16;
 
-/// What went wrong, and when.
+/// A failure, and its step.
 #[derive(Debug)]
 struct Failure {
     seed: u64,
@@ -49,14 +48,14 @@ struct Failure {
     what: String,
 }
 
-/// What a life leaves behind.
+/// The result of a run.
 #[derive(Debug, Clone, Copy)]
 struct Record {
     predicts: u64,
     updates: u64,
-    /// Of the correlation matrix, over all looks.
+    /// Smallest eigenvalue of the correlation matrix over all checks.
     smallest_eigenvalue: f64,
-    /// In whose life.
+    /// Seed of the run with this eigenvalue.
     seed: u64,
 }
 
@@ -72,14 +71,14 @@ impl Record {
     }
 }
 
-struct Life {
+struct Run {
     rng: ChaCha8Rng,
     ekf: Ekf,
     mount: Point,
     record: Record,
 }
 
-impl Life {
+impl Run {
     fn new(seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let track_width = rng.random_range(0.1..0.6);
@@ -90,24 +89,24 @@ impl Life {
             track_width_walk: PerRootMetre(Metres(log_uniform(&mut rng, 1e-7, 1e-5))),
         };
         let mut within = |limit: f32| rng.random_range(-limit..limit);
-        let state = State {
-            x: within(20.0),
-            y: within(20.0),
-            heading: within(3.1),
+        let state = StateEstimate {
+            x: Metres(within(20.0)),
+            y: Metres(within(20.0)),
+            heading: Radians(within(3.1)),
             scale_right: within(0.02),
             scale_left: within(0.02),
-            track_width_error: within(0.03 * track_width),
+            track_width_error: Metres(within(0.03 * track_width)),
             range_scale: within(0.02),
         };
-        let position = log_uniform(&mut rng, 0.1, 100.0);
-        let deviation = State {
+        let position = Metres(log_uniform(&mut rng, 0.1, 100.0));
+        let deviation = StandardDeviations {
             x: position,
             y: position,
-            heading: log_uniform(&mut rng, 1e-3, 0.5),
+            heading: Radians(log_uniform(&mut rng, 1e-3, 0.5)),
             scale_right: log_uniform(&mut rng, 1e-4, 0.03),
             scale_left: log_uniform(&mut rng, 1e-4, 0.03),
-            track_width_error: track_width * log_uniform(&mut rng, 1e-4, 0.05),
-            // In a third of the lives the ranger is known exactly.
+            track_width_error: Metres(track_width * log_uniform(&mut rng, 1e-4, 0.05)),
+            // In a third of the runs the range scale is known exactly.
             range_scale: if rng.random_ratio(1, 3) {
                 0.0
             } else {
@@ -125,18 +124,18 @@ impl Life {
         self.record.predicts + self.record.updates
     }
 
-    fn live(mut self) -> Result<Record, Failure> {
-        while self.steps() < LIFE {
+    fn execute(mut self) -> Result<Record, Failure> {
+        while self.steps() < RUN {
             let leg = match self.rng.random_range(0..8_u8) {
                 0..4 => {
                     let travel = self.any_travel();
                     self.roll(travel, 1..40)
                 }
-                // A long silence: nothing but the wheels, for up to 100 m.
+                // A long interval with odometry only, for up to 100 m.
                 4 => {
-                    let way = log_uniform(&mut self.rng, 1e-4, 0.1);
+                    let distance = log_uniform(&mut self.rng, 1e-4, 0.1);
                     let curve = self.rng.random_range(0.99..1.01);
-                    self.roll(WheelTravel::new(way, curve * way), 200..1_000)
+                    self.roll(WheelTravel::new(distance, curve * distance), 200..1_000)
                 }
                 5 => self.listen(1..4, 1..60),
                 6 => self.listen(1..3, 100..500),
@@ -148,12 +147,12 @@ impl Life {
         Ok(self.record)
     }
 
-    /// Ahead, back, on the spot, about one wheel, on any curve: what 100 ms may bring.
+    /// Any travel of 100 ms: ahead, back, on the spot, about one wheel, on any curve.
     fn any_travel(&mut self) -> WheelTravel {
         let rng = &mut self.rng;
         let mut wheel = || {
-            let way = log_uniform(rng, 1e-5, 0.1);
-            if rng.random() { way } else { -way }
+            let distance = log_uniform(rng, 1e-5, 0.1);
+            if rng.random() { distance } else { -distance }
         };
         let (one, other) = (wheel(), wheel());
         match self.rng.random_range(0..4_u8) {
@@ -170,13 +169,13 @@ impl Life {
             self.ekf.predict(travel).map_err(|error| format!("predict({travel:?}): {error}"))?;
             self.record.predicts += 1;
             if self.record.predicts.is_multiple_of(LOOK_EVERY) {
-                self.look()?;
+                self.check()?;
             }
         }
         Ok(())
     }
 
-    /// Some ranges of the same few walls, wrong by up to 2.5 of their deviations.
+    /// Some ranges to the same few walls, with errors up to 2.5 of their deviations.
     fn listen(
         &mut self,
         walls: std::ops::Range<usize>,
@@ -190,19 +189,19 @@ impl Life {
             let expected = ExpectedRange::new(wall, self.mount, &self.ekf.state());
             let noise = SquareMetres(noise);
             let variance = self.ekf.innovation(expected.range, &expected, noise).variance.0;
-            // A range metres off would throw the calibration off the road of real robots.
+            // A range error of metres would drive the calibration out of the realistic region.
             let surprise = self.rng.random_range(-2.5..2.5) * variance.max(0.0).sqrt();
             let range = expected.range + Metres(surprise.clamp(-0.3, 0.3));
             self.ekf
                 .update(range, &expected, noise)
                 .map_err(|error| format!("update({range:?}, {expected:?}, {noise:?}): {error}"))?;
             self.record.updates += 1;
-            self.look()?;
+            self.check()?;
         }
         Ok(())
     }
 
-    /// A wall 0.3 m to 12 m away, slanted in two cases of three.
+    /// A wall at a distance of 0.3 m to 12 m, slanted in two of three cases.
     fn any_wall(&mut self) -> Wall {
         let state = self.ekf.state();
         let quarter = f32::from(self.rng.random_range(0..4_u8)) * core::f32::consts::FRAC_PI_2;
@@ -210,14 +209,14 @@ impl Life {
             if self.rng.random_ratio(1, 3) { quarter } else { self.rng.random_range(-3.1..3.1) };
         let (sin, cos) = direction.sin_cos();
         let distance = log_uniform(&mut self.rng, 0.3, 12.0);
-        let foot = (state.x + cos * distance, state.y + sin * distance);
+        let foot = (state.x.0 + cos * distance, state.y.0 + sin * distance);
         let half = self.rng.random_range(0.5..5.0);
         let end = |along: f32| Point::new(foot.0 - sin * along, foot.1 + cos * along);
         Wall::new(end(-half), end(half)).expect("a wall of a metre or more")
     }
 
-    /// Whether P is a covariance.
-    fn look(&mut self) -> Result<(), String> {
+    /// Checks that P is a covariance.
+    fn check(&mut self) -> Result<(), String> {
         let p = self.ekf.covariance().map(f64::from);
         let state = self.ekf.state_vector();
         if !state.iter().all(|v| v.is_finite()) || !p.iter().all(|v| v.is_finite()) {
@@ -249,32 +248,32 @@ fn smallest_eigenvalue(p: &SMatrix<f64, 7, 7>, estimated: &[usize]) -> f64 {
     correlation.symmetric_eigenvalues().min()
 }
 
-/// The exponent is uniform: small ones come as often as large ones.
+/// A number with a uniformly distributed exponent.
 fn log_uniform(rng: &mut ChaCha8Rng, from: f32, to: f32) -> f32 {
     rng.random_range(from.ln()..to.ln()).exp()
 }
 
 fn main() -> ExitCode {
     let args = Args::parse();
-    let lives = args.steps.div_ceil(LIFE).max(1);
-    let bar = ProgressBar::new(lives).with_style(
-        ProgressStyle::with_template("{bar:40} {pos}/{len} lives, {eta} left").expect("a template"),
+    let runs = args.steps.div_ceil(RUN).max(1);
+    let bar = ProgressBar::new(runs).with_style(
+        ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {eta} left").expect("a template"),
     );
-    let live = |life: u64| {
-        let record = Life::new(args.seed + life).live();
+    let execute = |run: u64| {
+        let record = Run::new(args.seed + run).execute();
         bar.inc(1);
         record
     };
-    let total = (0..lives).into_par_iter().map(live).try_reduce_with(|a, b| Ok(a.plus(b)));
+    let total = (0..runs).into_par_iter().map(execute).try_reduce_with(|a, b| Ok(a.plus(b)));
     bar.finish_and_clear();
     match total {
         Some(Ok(record)) => {
             println!(
-                "{} lives, seeds {}–{}: {} predicts and {} updates; smallest eigenvalue of the \
+                "{} runs, seeds {}–{}: {} predicts and {} updates; smallest eigenvalue of the \
                  correlation {:.2e} (seed {})",
-                lives,
+                runs,
                 args.seed,
-                args.seed + lives - 1,
+                args.seed + runs - 1,
                 record.predicts,
                 record.updates,
                 record.smallest_eigenvalue,

@@ -1,4 +1,4 @@
-//! The localizer on a baked map is the localizer on plain walls.
+//! The localizer gives the same results on a baked map and on plain walls.
 
 #![expect(clippy::unwrap_used, reason = "a test should stop")]
 
@@ -16,8 +16,8 @@ fn trace(simulation: &Simulation) -> Trace {
     trace
 }
 
-/// Over the whole paper, under both policies: every look at the same wall, every estimate the same
-/// number. At the start the index already leaves walls out.
+/// For the whole paper scenario and both policies, every ping aims at the same wall and every estimate
+/// is the same. Already at the start the index leaves walls out.
 #[test]
 fn the_paper_on_a_baked_map_is_the_same_run() {
     let image = sonarfix_map::bake(&Scenario::paper().unwrap().floor.walls()).unwrap();
@@ -25,7 +25,7 @@ fn the_paper_on_a_baked_map_is_the_same_run() {
     assert!(map.near(Point::new(0.0, 0.0), Metres(10.0)).count() < 8);
     for policy in [Policy::Nearest, Policy::Informative] {
         let mut scenario = Scenario::paper().unwrap();
-        scenario.robot.config.policy = policy;
+        scenario.robot.localizer.policy = policy;
         let plain = Simulation::new(scenario.clone());
         let baked = Simulation::new(scenario).on_baked_map().unwrap();
         let (plain, baked) = (trace(&plain), trace(&baked));

@@ -1,5 +1,5 @@
-//! The paper's statistics, short: the bars are those of the full length (`cargo xtask statistics`)
-//! widened by the sampling error of the runs that fit here, at four of its standard deviations.
+//! The paper's statistics with few runs: the limits are those of the full number of runs (`cargo xtask
+//! statistics`), widened by four standard deviations of the sampling error.
 
 use sonarfix::aim::Policy;
 use sonarfix_map::Scenario;
@@ -8,12 +8,16 @@ use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::statistics::Summary;
 
 const RUNS: u32 = 200;
-/// Of an RMS over n runs: 1/√(2n); four of them.
+/// Four standard deviations of an RMS over n runs: 4/√(2n).
 const RMS_NOISE: f64 = 4.0 / 20.0;
+
+fn many(simulation: &Simulation, seed: u64, runs: u32) -> Summary {
+    Summary::of(&monte_carlo::results(simulation, seed, runs, || ()).unwrap())
+}
 
 fn paper(policy: Policy, statistics: bool) -> Simulation {
     let mut scenario = Scenario::paper().unwrap();
-    scenario.robot.config.policy = policy;
+    scenario.robot.localizer.policy = policy;
     if statistics {
         scenario.let_truth_walk_as_assumed();
     }
@@ -21,7 +25,7 @@ fn paper(policy: Policy, statistics: bool) -> Simulation {
 }
 
 fn check_consistency(policy: Policy) {
-    let summary = monte_carlo::run(&paper(policy, true), 10_000, RUNS).unwrap();
+    let summary = many(&paper(policy, true), 10_000, RUNS);
     assert_eq!((summary.lost_runs, summary.fixes.gated, summary.fixes.refused), (0, 0, 0));
     assert_eq!(summary.fixes.accepted, 1_248 * u64::from(RUNS));
     let estimated: Vec<_> = summary.states.iter().filter(|s| s.bound > 0.0).collect();
@@ -29,7 +33,7 @@ fn check_consistency(policy: Policy) {
     for state in estimated {
         let ratio = state.rms_error / state.bound;
         assert!((ratio - 1.0).abs() < 0.05 + RMS_NOISE, "{policy:?} {}: {ratio}", state.name);
-        // A mean over n runs is off by σ/√n.
+        // The standard error of a mean over n runs is σ/√n.
         let bias = (state.mean_error / state.std_error).abs();
         assert!(bias < 0.1 + 4.0 / f64::from(RUNS).sqrt(), "{policy:?} {}: {bias}", state.name);
     }
@@ -54,7 +58,7 @@ fn informative_is_efficient_and_consistent() {
 /// The seeds of Table 1.
 #[test]
 fn table_1_is_within_the_papers_figures() {
-    let summary = monte_carlo::run(&paper(Policy::Nearest, false), 0, 50).unwrap();
+    let summary = many(&paper(Policy::Nearest, false), 0, 50);
     let deviation = |name| {
         let state = summary.states.iter().find(|state| state.name == name).unwrap();
         println!("{name}: {:e}", state.std_error);
@@ -68,7 +72,7 @@ fn table_1_is_within_the_papers_figures() {
     assert!(deviation("scale_left") <= 8e-5);
     assert!(deviation("track_width") <= 0.25e-3);
     let left = summary.states.iter().find(|state| state.name == "scale_left").unwrap();
-    // The paper's is biased by three of its deviations.
+    // In the paper it is biased by three standard deviations.
     assert!((left.mean_error / left.std_error).abs() < 4.0 / 50_f64.sqrt());
 }
 
@@ -77,8 +81,7 @@ fn results_do_not_depend_on_the_number_of_threads() {
     let on = |threads| -> Summary {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let simulation = paper(Policy::Informative, true);
-        let summary = pool.install(|| monte_carlo::run(&simulation, 7, 6).unwrap());
-        Summary { cpu_seconds: 0.0, ..summary }
+        pool.install(|| many(&simulation, 7, 6))
     };
     assert_eq!(on(1), on(5));
 }

@@ -1,12 +1,12 @@
-//! The golden traces on this computer. `cargo xtask golden` has the emulated ones.
+//! The golden traces on this computer. `cargo xtask golden` runs them on emulated ones.
 #![cfg(test)]
 
 use std::path::PathBuf;
 
 use sonarfix_pil::{Answer, line};
-use sonarfix_sim::pil::golden::{self, Exchange};
-use sonarfix_sim::pil::pair::Pair;
-use sonarfix_sim::pil::progress::Progress;
+use sonarfix_pil_host::pair::Pair;
+use sonarfix_pil_host::progress::Progress;
+use sonarfix_pil_host::{Exchange, golden};
 
 fn trace(name: &str) -> Vec<Exchange> {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("golden").join(name);
@@ -22,17 +22,17 @@ fn this_computer_computes_the_bits_of_every_trace() {
     for (name, least) in [("localizer.golden", 700), ("loop.golden", 10_000)] {
         let mut pair = alone();
         golden::replay(&trace(name), &mut pair).unwrap();
-        assert!(pair.questions() > least, "{name}: {} questions", pair.questions());
+        assert!(pair.requests() > least, "{name}: {} requests", pair.requests());
     }
 }
 
-/// A trace that could not fail would show nothing: any bit of any estimate counts, the last of the
-/// covariance too.
+/// The comparison detects any changed bit of an estimate, including the last of the covariance.
 #[test]
-fn a_bit_that_is_another_is_found_and_named() {
+fn a_changed_bit_is_found_and_named() {
     let exchanges = trace("localizer.golden");
-    let is_estimate =
-        |exchange: &&Exchange| matches!(line::answer(&exchange.answer), Some(Answer::Rolled(..)));
+    let is_estimate = |exchange: &&Exchange| {
+        matches!(line::decode_answer(&exchange.answer), Some(Answer::Odometry(..)))
+    };
     let at = exchanges.iter().rposition(|exchange| is_estimate(&exchange)).unwrap();
     for (byte, bit) in [(2, 0), (30, 3), (141, 7)] {
         let mut changed = exchanges.clone();

@@ -41,13 +41,13 @@ impl Difference {
     }
 }
 
-/// Drives the paper's path with both filters; the oracle is given what the localizer was given:
-/// the same travels and ranges, rounded to `f32`, and the same choice of walls.
+/// Drives the paper's path with both filters. The oracle has the same inputs as the localizer: travel
+/// and ranges, rounded to `f32`, and the choice of walls.
 fn drive(policy: Policy, range_scale_prior: f32, seed: u64) -> Difference {
     let mut scenario = Scenario::paper().unwrap();
-    scenario.robot.config.policy = policy;
-    scenario.robot.config.prior.range_scale = range_scale_prior;
-    let config = scenario.robot.config;
+    scenario.robot.localizer.policy = policy;
+    scenario.robot.localizer.prior.range_scale = range_scale_prior;
+    let config = scenario.robot.localizer;
     let model = Model::of(&config);
     let walls = scenario.floor.walls();
     let mut rng = ChaCha8Rng::seed_from_u64(seed);

@@ -1,6 +1,6 @@
-//! What the state machines of the Pico 2 count and stamp: their programs on an interpreter, which was
-//! written from the RP2350's data sheet, section 11.4, and knows only the instructions that they
-//! use. Assembler and chip have not been asked.
+//! The counts and time stamps of the Pico 2's state machines: their programs on an interpreter of the
+//! instructions that they use, written from the RP2350's data sheet, section 11.4. Neither the
+//! assembler nor the chip is part of this test.
 
 #![expect(clippy::panic, reason = "a test should stop")]
 
@@ -12,8 +12,8 @@ use rand_chacha::ChaCha8Rng;
 const QUADRATURE: &str = include_str!("../../firmware/pico2/src/quadrature.pio");
 const ECHO: &str = include_str!("../../firmware/pico2/src/echo.pio");
 
-/// A state machine whose shift registers shift to the left and whose receiving queue is four
-/// registers. Every instruction takes a clock.
+/// A state machine whose shift registers shift to the left, with a receive queue of four registers.
+/// Every instruction takes a clock cycle.
 struct Machine {
     code: Vec<Vec<&'static str>>,
     labels: HashMap<&'static str, usize>,
@@ -42,7 +42,7 @@ impl Machine {
         Self { code, labels, pc: 0, x: 0, y: 0, isr: 0, osr: 0, registers: [0; 4] }
     }
 
-    /// Runs this many clocks with these levels at the pins; the first is also the one to jump by.
+    /// Runs a number of clock cycles with these levels at the pins; the first is also the jump pin.
     fn run(&mut self, clocks: u32, pins: u32) {
         for _ in 0..clocks {
             self.step(pins);
@@ -80,7 +80,7 @@ impl Machine {
         }
     }
 
-    /// Whether a jump is taken. `x--` and `y--` count down either way.
+    /// Whether a jump is taken. `x--` and `y--` count down in both cases.
     fn jumps(&mut self, condition: &str, pins: u32) -> bool {
         let counted = |register: &mut u32| {
             let before = *register;
@@ -109,12 +109,11 @@ impl Machine {
     }
 }
 
-/// What the slowest way round takes of the state machine's clocks.
+/// The longest loop, clock cycles of the state machine.
 const SLOWEST: u32 = 12;
 
-/// Any walk of a wheel, to both sides of zero, each level held just long enough to be seen or
-/// longer: no edge is lost, and after a second way round the count is there to be read. The
-/// channels are a Gray code, A below B.
+/// For any motion of a wheel, with each level held at least long enough to be sampled, no edge is
+/// lost, and after a second loop the count can be read. The channels are a Gray code, A below B.
 #[test]
 fn every_edge_of_an_encoder_is_counted() {
     let mut random = ChaCha8Rng::seed_from_u64(1);
@@ -139,8 +138,7 @@ fn levels(position: i32) -> u32 {
     [0b00, 0b01, 0b11, 0b10][position.rem_euclid(4) as usize]
 }
 
-/// Both channels at once is a transition that no wheel makes: it counts nothing, and what follows
-/// is counted from there.
+/// An edge of both channels at once is illegal: it counts nothing, and counting continues from there.
 #[test]
 fn both_channels_at_once_count_nothing() {
     for start in 0..4 {
@@ -154,11 +152,11 @@ fn both_channels_at_once_count_nothing() {
     }
 }
 
-/// Clocks of the state machine in a microsecond.
+/// Clock cycles of the state machine per microsecond.
 const MICROSECOND: u32 = 5;
 
-/// Pulses of any length at any time: the count keeps to the clock, whatever the line does, a pulse
-/// is as wide as it was, and it was when the stamps say.
+/// For pulses of any length at any time, the counter keeps the time, and the stamps give the start
+/// and the width of the pulse.
 #[test]
 fn both_edges_of_an_echo_are_stamped() {
     let mut random = ChaCha8Rng::seed_from_u64(2);
@@ -171,7 +169,7 @@ fn both_edges_of_an_echo_are_stamped() {
         machine.run(after, 0);
         clocks += quiet + pulse + after;
         let [count, rise, fall, _] = machine.registers;
-        // It begins at −1.
+        // It starts at −1.
         let in_clocks = |micros: u32| micros * MICROSECOND;
         assert!(in_clocks(count.wrapping_add(1)).abs_diff(clocks) < 2 * MICROSECOND);
         assert!(in_clocks(fall.wrapping_sub(rise)).abs_diff(pulse) < MICROSECOND);

@@ -1,5 +1,4 @@
-//! Sonarfix and its peers at the same work, measured on this machine and written to
-//! `docs/benchmarks.md`.
+//! Measures Sonarfix and its peers on the same task, on this machine, and writes `docs/benchmarks.md`.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -10,82 +9,21 @@ use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::elf::Program;
-use crate::emulator::{self, Cost};
+use crate::emulator;
 use crate::program::{M0PLUS, M3, M4F, M4F_SMALL, Target};
+use crate::workspace::Workspace;
 use crate::{budgets, cargo};
 
 mod host;
 mod page;
+mod subjects;
 
-/// One filter of the table.
-pub struct Subject {
-    /// Its program in `bench-mcu`; that of ours in `bench-ours`.
-    pub name: &'static str,
-    /// As the table calls it.
-    pub label: &'static str,
-    /// The crate whose version is named.
-    pub package: &'static str,
-    /// How it corrects P.
-    pub form: &'static str,
-}
-
-/// Ours first.
-const SUBJECTS: [Subject; 12] = [
-    subject("shipped", "**Sonarfix as it ships**", "sonarfix", "Joseph, two passes"),
-    subject("kernel", "**Sonarfix's kernel alone**", "sonarfix", "Joseph, two passes"),
-    subject("naive", "naive nalgebra", "nalgebra", "plain"),
-    subject("naive_joseph", "naive nalgebra", "nalgebra", "Joseph"),
-    subject("adskalman_symmetric", "adskalman", "adskalman", "symmetrised"),
-    subject("adskalman", "adskalman", "adskalman", "Joseph"),
-    subject("kfilter", "kfilter", "kfilter", "symmetrised"),
-    subject("minikalman", "minikalman, arrays", "minikalman", "plain"),
-    subject("minikalman_boxed", "minikalman, boxes", "minikalman", "plain"),
-    subject("numeris", "numeris", "numeris", "Joseph"),
-    subject("multicalc_passed_in", "multicalc, no trigonometry", "multicalc", "Joseph"),
-    subject("multicalc", "multicalc, its own trigonometry", "multicalc", "Joseph"),
-];
-
-const fn subject(
-    name: &'static str,
-    label: &'static str,
-    package: &'static str,
-    form: &'static str,
-) -> Subject {
-    Subject { name, label, package, form }
-}
-
-/// What a filter costs on a microcontroller.
-pub struct OnTarget {
-    pub predict: Cost,
-    pub update: Cost,
-    /// Bytes of all functions that predict and update reach.
-    pub text: u64,
-}
-
-impl OnTarget {
-    /// Instructions of ten predicts and one update.
-    pub fn ten_and_one(&self) -> f64 {
-        10.0 * self.predict.mean() + self.update.mean()
-    }
-}
-
-/// What a filter costs.
-pub struct Figures {
-    pub version: String,
-    pub m4f: OnTarget,
-    pub m4f_small: OnTarget,
-    pub m3: OnTarget,
-    pub m0plus: OnTarget,
-    /// Instructions of ten predicts and one update on this machine.
-    pub x86: f64,
-    /// Nanoseconds of the same.
-    pub nanoseconds: f64,
-}
+use subjects::{Figures, OnTarget, SUBJECTS};
 
 pub fn run() -> anyhow::Result<()> {
     for target in [M4F, M4F_SMALL, M3, M0PLUS] {
-        target.build("bench-mcu", "--features peers")?;
-        target.build("bench-ours", "")?;
+        target.build(Workspace::Bench, "bench-mcu --features peers")?;
+        target.build(Workspace::Bench, "bench-ours")?;
     }
     host::build()?;
     let times = host::times(SUBJECTS.iter().map(|subject| subject.name))?;
@@ -118,17 +56,17 @@ pub fn run() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What is called of a filter, and what kfilter calls through a pointer.
+/// The entry points of a filter, and the function that kfilter calls through a pointer.
 const ROOTS: [&str; 3] =
     ["bench_predict", "bench_update", "bench_workload::filters::kfilter::step"];
 
 fn on_target(target: &Target, name: &str) -> anyhow::Result<OnTarget> {
-    let report = emulator::run(target, name)?;
-    let text = Program::read(&target.program(name))?.reach(&ROOTS)?.bytes();
+    let report = emulator::run(target, Workspace::Bench, name)?;
+    let text = Program::read(&target.program(Workspace::Bench, name))?.reach(&ROOTS)?.bytes();
     Ok(OnTarget { predict: report.cost("predict")?, update: report.cost("update")?, text })
 }
 
-/// Versions by package, from the lock file; where a package is there twice, the newer one.
+/// Versions by package, from the lock file; of several versions the newest.
 fn versions() -> anyhow::Result<BTreeMap<String, String>> {
     let text = fs::read_to_string(cargo::root().join("bench/Cargo.lock"))?;
     let lock: toml::Table = toml::from_str(&text)?;
@@ -138,13 +76,13 @@ fn versions() -> anyhow::Result<BTreeMap<String, String>> {
     Ok(packages.filter_map(|p| Some((text_of(p, "name")?, text_of(p, "version")?))).collect())
 }
 
-/// What it was measured with.
+/// The versions of the tools.
 fn tools() -> anyhow::Result<Vec<String>> {
     let first_line = |program: &str| -> anyhow::Result<String> {
         let mut command = Command::new(program);
         command.arg("--version");
-        let said = cargo::output(command)?;
-        Ok(said.lines().next().unwrap_or_default().to_owned())
+        let text = cargo::output(command)?;
+        Ok(text.lines().next().unwrap_or_default().to_owned())
     };
     ["rustc", "qemu-system-arm", "valgrind"].into_iter().map(first_line).collect()
 }

@@ -1,9 +1,8 @@
-//! What the shipped crate costs a microcontroller, against the committed table `budgets.toml` and
-//! against bars: one that the table keeps may not be lost again.
+//! Compares the cost of the shipped crate on a microcontroller with the committed table `budgets.toml` and with fixed limits.
 //!
-//! A figure that differs from the committed one by more than 2 % fails, to either side: what got
-//! worse must be wanted, and what got better must be kept. Both are said by committing what
-//! [`bless`] writes.
+//! A figure that differs from the committed one by more than 2 % fails, in either direction: an increase must be intended,
+//! and a decrease must not be lost again. [`bless`] writes the new table, which is then committed. A limit that the
+//! committed table meets must stay met.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -14,19 +13,20 @@ use anyhow::{Context, bail};
 
 use crate::elf::Program;
 use crate::program::{M0PLUS, M4F, M4F_SMALL, Target};
+use crate::workspace::Workspace;
 use crate::{cargo, emulator};
 
-/// How much a figure may differ from the committed one, as a share of it.
+/// Largest relative difference of a figure from the committed one.
 const TOLERANCE: f64 = 0.02;
 
 /// Figures by section and key.
 type Table = BTreeMap<String, BTreeMap<String, u32>>;
 
-/// What is measured for each, under the name of its section.
+/// The targets, with the names of their sections.
 const TARGETS: [(&str, Target); 3] =
     [("cortex-m4f", M4F), ("cortex-m4f-small", M4F_SMALL), ("cortex-m0plus", M0PLUS)];
 
-/// The most that a figure may be, whatever is committed.
+/// A limit of a figure, whatever is committed.
 struct Bar {
     section: &'static str,
     key: &'static str,
@@ -75,15 +75,15 @@ const BARS: [Bar; 6] = [
 
 /// The section of the aims in buildings.
 const BUILDING: &str = "cortex-m4f-building";
-/// An aim among 100,000 walls may take so many times the instructions of one among 100.
+/// Largest ratio of the instructions of an aim among 100,000 walls to those among 100.
 const LARGE_PER_SMALL: f64 = 1.2;
-/// Optimised for size a call may take so many times the instructions of one optimised for speed.
+/// Largest ratio of the instructions of a call optimised for size to those optimised for speed.
 const SMALL_PER_FAST: f64 = 1.5;
 
 const HEADER: &str = "\
-# What the shipped crate costs: `cargo xtask bless` writes this file, `cargo xtask budgets` compares.
-# Review a change of it like one of the code. `docs/benchmarks.md` says how each figure is measured.
-# Instructions and stack: of the worst call on an emulated board, without what calling costs.
+# The cost of the shipped crate: `cargo xtask bless` writes this file, `cargo xtask budgets` compares.
+# Its changes are reviewed like code. `docs/benchmarks.md` describes the measurement.
+# Instructions and stack: of the worst call on an emulated board, without the overhead of the call.
 # Text: all functions that can be reached from the calls, in a linked program.
 ";
 
@@ -95,35 +95,35 @@ pub fn check() -> anyhow::Result<()> {
     faults.extend(lost_bars(&committed, &measured));
     if !faults.is_empty() {
         bail!(
-            "{} past budget:\n  {}\nIf that is wanted, run `cargo xtask bless` and commit budgets.toml.",
+            "{} past budget:\n  {}\nIf that is intended, run `cargo xtask bless` and commit budgets.toml.",
             if faults.len() == 1 { "one figure" } else { "figures" },
             faults.join("\n  ")
         );
     }
-    say_not_reached(&measured);
+    print_not_reached(&measured);
     eprintln!("within budget");
     Ok(())
 }
 
-/// Measures and commits to it, unless a bar would be lost that the committed table keeps.
+/// Measures and writes the table, unless a limit would be lost that the committed table meets.
 pub fn bless() -> anyhow::Result<()> {
     let measured = measure()?;
     let lost = lost_bars(&committed().unwrap_or_default(), &measured);
     if !lost.is_empty() {
         bail!(
-            "budgets.toml is not written, for no commit makes this right:\n  {}",
+            "budgets.toml is not written, because these limits are no longer met:\n  {}",
             lost.join("\n  ")
         );
     }
     fs::write(path(), format!("{HEADER}{}", written(&measured)))?;
-    say_not_reached(&measured);
+    print_not_reached(&measured);
     Ok(())
 }
 
-/// Where the committed table stands against the bars: a table for the page.
+/// The committed figures against their limits, as a table for the page.
 pub fn standing() -> anyhow::Result<String> {
     let committed = committed()?;
-    let mut text = "| | bar | committed | |\n|---|---:|---:|---|\n".to_owned();
+    let mut text = "| | limit | committed | |\n|---|---:|---:|---|\n".to_owned();
     for Bar { section, key, most, .. } in BARS {
         let is = figure(&committed, section, key).context("a bar's figure is not committed")?;
         let verdict = if is <= most { "reached" } else { "**not reached**" };
@@ -142,7 +142,7 @@ fn figure(table: &Table, section: &str, key: &str) -> Option<u32> {
     table.get(section)?.get(key).copied()
 }
 
-/// The bars that the committed table keeps and the figures break.
+/// The limits that the committed table meets and the figures exceed.
 fn lost_bars(committed: &Table, measured: &Table) -> Vec<String> {
     let already = broken_bars(committed);
     let is_new = |name: &String| already.iter().all(|(other, _)| other != name);
@@ -153,7 +153,7 @@ fn lost_bars(committed: &Table, measured: &Table) -> Vec<String> {
         .collect()
 }
 
-fn say_not_reached(measured: &Table) {
+fn print_not_reached(measured: &Table) {
     for (name, fault) in broken_bars(measured) {
         eprintln!("not reached: {name}: {fault}");
     }
@@ -166,11 +166,11 @@ fn path() -> PathBuf {
 fn measure() -> anyhow::Result<Table> {
     let mut table = Table::new();
     for (section, target) in TARGETS {
-        target.build("bench-probe", "")?;
+        target.build(Workspace::Emulated, "emulated-probe")?;
         table.insert(section.to_owned(), measure_on(&target)?);
     }
-    M4F.build("bench-building", "")?;
-    let report = emulator::run(&M4F, "building")?;
+    M4F.build(Workspace::Emulated, "emulated-building")?;
+    let report = emulator::run(&M4F, Workspace::Emulated, "building")?;
     let figures = ["100", "1000", "10000", "100000"].into_iter().map(|walls| {
         let key = format!("aim_{walls}_walls");
         let most = report.cost(&key)?.most_instructions;
@@ -187,14 +187,14 @@ fn measure_on(target: &Target) -> anyhow::Result<BTreeMap<String, u32>> {
         ("localizer", "localizer", &["odometry", "aim", "fix"][..]),
     ];
     for (name, code, calls) in programs {
-        let report = emulator::run(target, name)?;
+        let report = emulator::run(target, Workspace::Emulated, name)?;
         for call in calls {
             let cost = report.cost(call)?;
             figures.insert(format!("{call}_instructions"), cost.most_instructions);
             figures.insert(format!("{call}_stack_bytes"), cost.most_stack);
         }
         figures.insert(format!("{name}_bytes"), report.number("object")?);
-        let program = Program::read(&target.program(name))?;
+        let program = Program::read(&target.program(Workspace::Emulated, name))?;
         let mut text = |code: &str, calls: &[&str]| -> anyhow::Result<()> {
             let roots: Vec<String> = calls.iter().map(|call| format!("probe_{call}")).collect();
             let roots: Vec<&str> = roots.iter().map(String::as_str).collect();
@@ -210,7 +210,7 @@ fn measure_on(target: &Target) -> anyhow::Result<BTreeMap<String, u32>> {
     Ok(figures)
 }
 
-/// What differs by more than the tolerance, or is on one side only, one line each.
+/// The figures that differ by more than the tolerance or exist on one side only, one line each.
 fn differences(committed: &Table, measured: &Table) -> Vec<String> {
     let keys = |table: &Table| -> Vec<(String, String)> {
         let key_of = |section: &String, key: &String| (section.clone(), key.clone());
@@ -243,7 +243,7 @@ fn difference(was: u32, is: u32) -> Option<String> {
         .then(|| format!("committed {was}, measured {is} ({:+.1} %: {verdict})", 100.0 * share))
 }
 
-/// The bars that the figures break: which, and how.
+/// The limits that the figures exceed, with the figures.
 fn broken_bars(figures: &Table) -> Vec<(String, String)> {
     let mut broken = Vec::new();
     for Bar { section, key, most, why } in BARS {
@@ -331,7 +331,7 @@ mod tests {
         assert_eq!(toml::from_str::<Table>(&text).unwrap(), table);
     }
 
-    /// A table that keeps every bar, and only just.
+    /// A table that just meets every limit.
     fn on_the_bars() -> Table {
         let mut table = Table::new();
         for Bar { section, key, most, .. } in BARS {

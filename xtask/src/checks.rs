@@ -1,10 +1,9 @@
-//! The checks that are a few calls of cargo.
+//! Checks that are a few calls of cargo.
 
-use std::process::Command;
-
-use anyhow::bail;
+use anyhow::Context;
 
 use crate::cargo;
+use crate::workspace::Workspace;
 
 /// The crates that run on a robot.
 const NO_STD_CRATES: [&str; 5] =
@@ -12,43 +11,53 @@ const NO_STD_CRATES: [&str; 5] =
 /// Cortex-M4F, and Cortex-M0+ without FPU or atomics.
 const TARGETS: [&str; 2] = ["thumbv7em-none-eabihf", "thumbv6m-none-eabi"];
 
+/// Builds the documentation.
 pub fn docs() -> anyhow::Result<()> {
     let mut command = cargo::command("doc --workspace --no-deps --all-features");
     command.env("RUSTDOCFLAGS", "-D warnings");
     cargo::check(command)
 }
 
+/// Builds the `no_std` crates for microcontrollers, without features and with all; checks that the
+/// simulator compiles for WebAssembly, without terminal and processes.
 pub fn embedded() -> anyhow::Result<()> {
+    let packages: Vec<String> =
+        NO_STD_CRATES.iter().map(|name| format!("--package {name}")).collect();
+    let packages = packages.join(" ");
     for target in TARGETS {
-        for name in NO_STD_CRATES {
-            cargo::run(&format!("build --release --package {name} --target {target}"))?;
-            cargo::run(&format!(
-                "build --release --package {name} --target {target} --all-features"
-            ))?;
+        for features in ["", "--all-features"] {
+            cargo::run(&format!("build --release {packages} --target {target} {features}"))?;
         }
+    }
+    cargo::run("check --package sonarfix-sim --target wasm32-unknown-unknown")
+}
+
+/// Formatting and Clippy of the programs for emulated boards, and of those of `bench` that link no peer.
+pub fn lint_emulated() -> anyhow::Result<()> {
+    let target = "--target thumbv7em-none-eabihf";
+    let programs = [
+        (Workspace::Emulated, "--workspace"),
+        (Workspace::Bench, "--package bench-mcu --package bench-ours"),
+    ];
+    for (workspace, packages) in programs {
+        cargo::check(workspace.cargo("fmt --all --check"))?;
+        let clippy = format!("clippy --release {packages} {target} -- -D warnings");
+        cargo::check(workspace.cargo(&clippy))?;
     }
     Ok(())
 }
 
-pub fn lint_bench() -> anyhow::Result<()> {
-    cargo::check(cargo::in_bench("fmt --all --check"))?;
-    let packages = "--package bench-probe --package bench-building --package bench-mcu --package bench-ours \
-         --package bench-pil";
-    let target = "--target thumbv7em-none-eabihf";
-    cargo::check(cargo::in_bench(&format!("clippy --release {packages} {target} -- -D warnings")))
-}
-
+/// Compares the result of every peer with that of an independent filter.
 pub fn peers() -> anyhow::Result<()> {
-    cargo::check(cargo::in_bench("test --package bench-host --test agreement"))
+    cargo::check(Workspace::Bench.cargo("test --package bench-host --test agreement"))
 }
 
+/// Checks licences and sources; advisories too if their database can be reached.
 pub fn deny() -> anyhow::Result<()> {
-    if Command::new("cargo").args(["deny", "--version"]).output().is_ok_and(|o| !o.status.success())
-    {
-        bail!("cargo-deny is missing: install it with `cargo install cargo-deny --locked`");
-    }
+    cargo::output(cargo::command("deny --version"))
+        .context("cargo-deny is missing: install it with `cargo install cargo-deny --locked`")?;
     cargo::run("deny --log-level error check licenses bans sources")?;
-    // The advisory database lives on the network; without it, say so and go on.
+    // The advisory database is on the network.
     if cargo::run("deny fetch db").is_err() {
         eprintln!("advisories: not checked, their database cannot be reached");
         return Ok(());
@@ -56,9 +65,10 @@ pub fn deny() -> anyhow::Result<()> {
     cargo::run("deny --log-level error check advisories")
 }
 
+/// The paper's statistics at full length.
 pub fn statistics() -> anyhow::Result<()> {
     for policy in ["nearest", "informative"] {
-        let paper = "run --release --package sonarfix-sim --bin sonarfix -- paper";
+        let paper = "run --release --bin sonarfix -- paper";
         cargo::run(&format!("{paper} --statistics --runs 5000 --policy {policy}"))?;
     }
     Ok(())

@@ -1,9 +1,7 @@
-//! Reads from a linked program which function calls which, how large each is, and what it does with
-//! the stack.
+//! Reads the call graph of a linked program, the size of each function, and its use of the stack.
 //!
-//! The programs are linked with `--emit-relocs`: every place that names a function or a constant,
-//! be it a call or an address, is still listed. What a set of functions needs to run is what can be
-//! reached from it.
+//! The programs are linked with `--emit-relocs`, so that every reference to a function or a constant is still listed, in a call
+//! or as an address. The code of a set of functions is everything that can be reached from it.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fs;
@@ -21,7 +19,7 @@ use object::{
 
 use crate::thumb::{self, Stack};
 
-/// The functions of a program, and the data that names some of them.
+/// The functions of a program, and the data that refers to them.
 #[derive(Debug, Default)]
 pub struct Program {
     /// By address.
@@ -32,21 +30,21 @@ pub struct Program {
 
 #[derive(Debug, Default)]
 pub struct Function {
-    /// More than one where functions were found to be the same.
+    /// More than one if the linker has merged identical functions.
     pub names: Vec<String>,
     pub bytes: u64,
     pub stack: Stack,
-    /// Addresses of the functions that it calls by their names.
+    /// Addresses of the functions that it calls directly.
     pub calls: BTreeSet<u64>,
-    /// Addresses of functions and data that it names otherwise.
+    /// Addresses of functions and data that it refers to otherwise.
     pub takes: BTreeSet<u64>,
 }
 
-/// What can be reached from a set of functions.
+/// The functions that can be reached from a set of functions.
 #[derive(Debug)]
 pub struct Reach<'a> {
     program: &'a Program,
-    /// Addresses, each with the one that it was reached from.
+    /// Addresses, each with the predecessor on the path.
     from: BTreeMap<u64, Option<u64>>,
 }
 
@@ -58,7 +56,7 @@ impl Program {
         Self::parse(&bytes).with_context(whose)
     }
 
-    /// Reads the bytes of one.
+    /// Parses the bytes of a linked program.
     pub fn parse(bytes: &[u8]) -> anyhow::Result<Self> {
         let file = object::File::parse(bytes)?;
         let mut program = Self::default();
@@ -88,9 +86,8 @@ impl Program {
         Ok(program)
     }
 
-    /// Reads what each function does with the stack, and the calls that the linker does not list,
-    /// for an assembler knew where they lead: those of a function to itself. It is read wherever
-    /// there is code and not data: symbols of their own, `$t` and `$d`, say which.
+    /// Reads the stack use of each function, and the calls without a relocation: those of a function to itself, which the
+    /// assembler resolves. The mapping symbols `$t` and `$d` separate code from data.
     fn read_code(&mut self, file: &object::File) -> anyhow::Result<()> {
         let mut marks: BTreeMap<u64, Option<bool>> = BTreeMap::new();
         for symbol in file.symbols() {
@@ -126,7 +123,7 @@ impl Program {
         Ok(())
     }
 
-    /// Notes that the function around `place` names what is at `target`.
+    /// Records a reference from the function around `place` to `target`.
     fn mention(&mut self, place: u64, target: u64, is_call: bool) {
         if let Some((_, function)) = self.functions.range_mut(..=place).next_back() {
             let mentions = if is_call { &mut function.calls } else { &mut function.takes };
@@ -134,7 +131,7 @@ impl Program {
         }
     }
 
-    /// Notes that the data around `place` names what is at `target`.
+    /// Records a reference from the data around `place` to `target`.
     fn list(&mut self, place: u64, target: u64) {
         if let Some((_, names)) = self.data.range_mut(..=place).next_back() {
             names.insert(target);
@@ -156,8 +153,8 @@ impl Program {
         self.functions().find(|(_, f)| f.names.iter().any(|n| n == name)).map(|(at, _)| at)
     }
 
-    /// The functions that somebody can call who has this address: the one at it, or those that the
-    /// data around it lists, or data that is listed there.
+    /// The functions that can be called through this address: the one at it, or those in the data around it, or in data
+    /// that this data refers to.
     pub fn callable_through(&self, address: u64) -> BTreeSet<u64> {
         let mut seen = BTreeSet::from([address]);
         let mut next = vec![address];
@@ -173,13 +170,13 @@ impl Program {
         seen
     }
 
-    /// What can be reached from the functions with these names.
+    /// All functions that can be reached from those with these names.
     pub fn reach(&self, roots: &[&str]) -> anyhow::Result<Reach<'_>> {
         let names = roots;
         let is_root = |f: &Function| f.names.iter().any(|n| names.contains(&n.as_str()));
         let roots = self.functions.iter().filter(|(_, function)| is_root(function));
         let mut from: BTreeMap<_, _> = roots.map(|(&root, _)| (root, None)).collect();
-        ensure!(!from.is_empty(), "no function is called any of {names:?}");
+        ensure!(!from.is_empty(), "no function has one of the names {names:?}");
         let mut next: VecDeque<u64> = from.keys().copied().collect();
         while let Some(at) = next.pop_front() {
             for mention in self.mentions(at) {
@@ -192,14 +189,14 @@ impl Program {
         Ok(Reach { program: self, from })
     }
 
-    /// Functions that the one at `at` names.
+    /// The functions that the one at `at` refers to.
     fn mentions(&self, at: u64) -> impl Iterator<Item = u64> {
         let function = self.functions.get(&at);
         let named = function.into_iter().flat_map(|f| f.calls.iter().chain(&f.takes)).copied();
         named.filter(|named| self.functions.contains_key(named))
     }
 
-    /// Names of the functions that name one whose own name contains `part`.
+    /// Names of the functions that refer to one whose name contains `part`.
     pub fn callers_of(&self, part: &str) -> impl Iterator<Item = &str> {
         let is_it = |function: &Function| function.names.iter().any(|name| name.contains(part));
         let wanted: BTreeSet<u64> =
@@ -217,7 +214,7 @@ impl Program {
 
 #[cfg(test)]
 impl Program {
-    /// A program of these functions and data, which name one another by address.
+    /// A program of these functions and data.
     pub fn made_of(functions: Vec<(u64, Function)>, data: Vec<(u64, Vec<u64>)>) -> Self {
         let data = data.into_iter().map(|(at, listed)| (at, listed.into_iter().collect()));
         Self { functions: functions.into_iter().collect(), data: data.collect() }
@@ -237,7 +234,7 @@ impl Reach<'_> {
         self.from.keys().filter_map(|at| self.program.functions.get(at)).map(|f| f.bytes).sum()
     }
 
-    /// How a function is reached, `a → b → c`, if it is.
+    /// The path to a function, `a → b → c`, if it can be reached.
     pub fn path_to(&self, name: &str) -> Option<String> {
         let names = |at: u64| self.program.functions.get(&at).map(|function| &function.names);
         let is_it = |at: u64| names(at).is_some_and(|names| names.iter().any(|n| n == name));
@@ -252,7 +249,7 @@ impl Reach<'_> {
     }
 }
 
-/// Every place, in code or in data, that names something, with the address of that.
+/// Every reference in code or in data, with its target.
 pub fn mentions(file: &object::File, in_code: bool) -> anyhow::Result<Vec<(u64, u64)>> {
     let mut mentions = Vec::new();
     let is_asked = |section: &Section| (section.kind() == SectionKind::Text) == in_code;
@@ -265,13 +262,13 @@ pub fn mentions(file: &object::File, in_code: bool) -> anyhow::Result<Vec<(u64, 
     Ok(mentions)
 }
 
-/// Whether a section is part of the program, and not about it.
+/// Whether a section is loaded: part of the program, not debug information.
 fn is_linked(section: &Section) -> bool {
     let SectionFlags::Elf { sh_flags } = section.flags() else { return false };
     sh_flags & u64::from(SHF_ALLOC) != 0
 }
 
-/// Address of what a relocation names: a function, or somewhere in data.
+/// The target of a relocation: a function, or a place in data.
 fn target(
     file: &object::File,
     section: &Section,
@@ -287,7 +284,7 @@ fn target(
     };
     let found = match symbol.kind() {
         SymbolKind::Text | SymbolKind::Data => Some(symbol.address()),
-        // Of what has no symbol its section is named, and the linked place says where in it.
+        // A target without a symbol is given by its section; the linked word contains the offset.
         SymbolKind::Section if r_type == R_ARM_ABS32 => Some(word()?),
         SymbolKind::Section if r_type == R_ARM_THM_MOVW_ABS_NC => {
             let low = u64::from(thumb::moved(word()?));
@@ -301,18 +298,18 @@ fn target(
     Ok(found.map(|found| if is_code { address(found) } else { found }))
 }
 
-/// Whether a relocation is of an instruction that goes to its target, with or without coming back.
+/// Whether a relocation belongs to a call or a branch.
 fn is_call(relocation: &Relocation) -> bool {
     let RelocationFlags::Elf { r_type } = relocation.flags() else { return false };
     [R_ARM_THM_PC22, R_ARM_THM_JUMP19, R_ARM_THM_JUMP24].contains(&r_type)
 }
 
-/// The name of a symbol, as it is written in Rust.
+/// The demangled name of a symbol.
 pub fn name<'a>(symbol: &impl ObjectSymbol<'a>) -> anyhow::Result<String> {
     Ok(format!("{:#}", rustc_demangle::demangle(symbol.name()?)))
 }
 
-/// The lowest bit of a function's address says that it is in Thumb code.
+/// The lowest bit of a function's address marks Thumb code.
 fn address(value: u64) -> u64 {
     value & !1
 }

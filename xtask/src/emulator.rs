@@ -1,4 +1,4 @@
-//! Runs a program of `bench` under QEMU and reads what it reports.
+//! Runs a program for an emulated board under QEMU and reads its report.
 
 use std::collections::BTreeMap;
 use std::process::Command;
@@ -7,20 +7,21 @@ use anyhow::{Context, ensure};
 
 use crate::cargo;
 use crate::program::Target;
+use crate::workspace::Workspace;
 
-/// Seconds until a program that does not end is ended; the longest takes three.
-const PATIENCE: &str = "120";
+/// Seconds after which a program is killed; the longest takes three.
+const TIME_OUT: &str = "120";
 
-/// What calls of one kind cost, without what calling costs.
+/// The cost of all calls of one kind, without the overhead of the call itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Cost {
-    /// How many there were.
+    /// Number of calls.
     pub calls: u32,
-    /// Instructions of all.
+    /// Instructions of all calls.
     pub instructions: u32,
-    /// Instructions of the one with most.
+    /// Instructions of the most expensive call.
     pub most_instructions: u32,
-    /// Bytes of stack of the one with most.
+    /// Bytes of stack of the deepest call.
     pub most_stack: u32,
 }
 
@@ -31,15 +32,15 @@ impl Cost {
     }
 }
 
-/// What a program reported: numbers by key.
+/// A program's report: numbers by key.
 #[derive(Debug)]
 pub struct Report(BTreeMap<String, Vec<u32>>);
 
 impl Report {
-    /// What calls of this kind cost.
+    /// The cost of the calls of this kind.
     pub fn cost(&self, key: &str) -> anyhow::Result<Cost> {
         let &[calls, instructions, most_instructions, most_stack] = self.numbers(key)? else {
-            anyhow::bail!("the program's line `{key}` is not what a cost looks like");
+            anyhow::bail!("the program's line `{key}` is not a cost");
         };
         ensure!(calls > 0, "the program measured no call of `{key}`");
         Ok(Cost { calls, instructions, most_instructions, most_stack })
@@ -59,22 +60,22 @@ impl Report {
 }
 
 /// Runs a built program to its end.
-pub fn run(target: &Target, name: &str) -> anyhow::Result<Report> {
+pub fn run(target: &Target, workspace: Workspace, name: &str) -> anyhow::Result<Report> {
     let mut command = Command::new("timeout");
-    command.args([PATIENCE, "qemu-system-arm", "-machine", target.board]);
+    command.args([TIME_OUT, "qemu-system-arm", "-machine", target.board]);
     // 2⁷ ns pass with every instruction.
     command.args(["-icount", "shift=7", "-display", "none", "-monitor", "none", "-serial", "none"]);
     command.args(["-semihosting-config", "enable=on,target=native", "-kernel"]);
-    command.arg(target.program(name));
-    let said = cargo::output(command).with_context(|| {
+    command.arg(target.program(workspace, name));
+    let text = cargo::output(command).with_context(|| {
         format!("{name} on {}: is `qemu-system-arm` installed? (124 is a time-out)", target.name)
     })?;
-    parse(&said).with_context(|| format!("{name} on {}", target.name))
+    parse(&text).with_context(|| format!("{name} on {}", target.name))
 }
 
-fn parse(said: &str) -> anyhow::Result<Report> {
+fn parse(text: &str) -> anyhow::Result<Report> {
     let mut report = BTreeMap::new();
-    for line in said.lines() {
+    for line in text.lines() {
         let mut words = line.split_whitespace();
         let Some(key) = words.next() else { continue };
         let numbers: Result<Vec<u32>, _> = words.map(str::parse).collect();
@@ -98,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_a_report_is_refused() {
+    fn other_output_is_refused() {
         assert!(parse("panicked\n").unwrap().number("panicked").is_err());
         assert!(parse("qemu: no such machine\n").is_err());
         assert!(parse("predict 0 0 0 0\n").unwrap().cost("predict").is_err());

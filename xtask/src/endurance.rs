@@ -1,13 +1,13 @@
-//! `cargo xtask endurance`: random lives of the filter, by `tests/examples/endurance.rs`.
+//! `cargo xtask endurance`: random runs of the filter, by `tests/examples/endurance.rs`.
 
 use crate::cargo;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::Args)]
 pub struct Args {
-    /// How many steps of the filter at the least; CI takes a million.
+    /// Smallest number of steps of the filter; CI runs a million.
     #[arg(long, default_value_t = 100_000_000)]
     steps: u64,
-    /// Seed of the first life.
+    /// Seed of the first run.
     #[arg(long, default_value_t = 0)]
     seed: u64,
 }

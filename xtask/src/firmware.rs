@@ -1,38 +1,38 @@
-//! The shipped firmware: that it cannot panic through our code, that it boots and obeys, how
-//! large it is and how deep its stack can go.
+//! Checks of the shipped firmware: it cannot panic through the project's code, it boots and obeys commands in an
+//! emulator; how large it is and how deep its stack can be.
 //!
-//! All of it is read from the very file that is flashed. One file each:
-//! - `frames`: whether the frames of the stack are read rightly;
-//! - `lines`: from which line an instruction was made;
-//! - `memory`: that there is no allocator, and where the stack is;
-//! - `panics`: which lines can panic;
-//! - `size`: flash and RAM;
-//! - `stack`: how deep it can be.
+//! All figures are read from the linked file that is flashed.
+//!
+//! | module | |
+//! |---|---|
+//! | `build` | builds the file |
+//! | `frames` | compares the stack frames read from instructions with the compiler's own |
+//! | `lines` | the source line that an instruction was compiled from |
+//! | `memory` | there is no allocator, and the stack is below all variables |
+//! | `panics` | lines that can panic |
+//! | `pico2` | the second board |
+//! | `size` | flash and RAM |
+//! | `stack` | the deepest stack |
 
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use crate::cargo;
+use crate::workspace::Workspace;
 
-use anyhow::{Context, ensure};
-
-use crate::{cargo, pico};
-
+mod build;
 mod frames;
 mod lines;
 mod memory;
-pub mod panics;
+mod panics;
+mod pico2;
 mod size;
 mod stack;
-
-const TARGET: &str = "thumbv7em-none-eabihf";
-const NAME: &str = "sonarfix-stm32f405";
 
 /// Builds the firmware, checks the linked file, and runs it in an emulator.
 pub fn test() -> anyhow::Result<()> {
     for check in ["fmt --all --check", "clippy --release -- -D warnings"] {
-        cargo::check(in_firmware(check))?;
+        cargo::check(Workspace::Firmware.cargo(check))?;
     }
-    let program = build()?;
-    let bytes = read(&program)?;
+    let program = build::release()?;
+    let bytes = build::read(&program)?;
     memory::check(&bytes)?;
     panics::check(&bytes)?;
     size::check(&bytes)?;
@@ -41,19 +41,19 @@ pub fn test() -> anyhow::Result<()> {
     let mut command = cargo::command(tests);
     command.env("SONARFIX_FIRMWARE", &program).env("SONARFIX_STACK", deepest.to_string());
     cargo::check(command)?;
-    pico::check()
+    pico2::check()
 }
 
 /// Flash and RAM of the linked file, by crate.
 pub fn size() -> anyhow::Result<()> {
-    size::check(&read(&build()?)?)
+    size::check(&build::read(&build::release()?)?)
 }
 
-/// How the stack is looked at.
+/// How the stack is examined.
 #[derive(Debug, Clone, PartialEq, Eq, clap::Args)]
 pub struct StackArgs {
-    /// Compares the frames that are read from instructions with those that a compiler says it
-    /// made, in a build of its own (a minute).
+    /// Compare the frames that are read from instructions with those that the compiler reports, in
+    /// a separate build (a minute).
     #[arg(long)]
     ask_compiler: bool,
 }
@@ -61,46 +61,7 @@ pub struct StackArgs {
 /// The deepest that the stack of the linked file can be.
 pub fn stack(args: &StackArgs) -> anyhow::Result<()> {
     if args.ask_compiler {
-        return frames::check(&read(&build_with_stack_sizes()?)?);
+        return frames::check(&build::read(&build::with_stack_sizes()?)?);
     }
-    stack::check(&read(&build()?)?).map(drop)
-}
-
-pub fn read(program: &Path) -> anyhow::Result<Vec<u8>> {
-    std::fs::read(program).with_context(|| program.display().to_string())
-}
-
-/// Builds the firmware; gives the linked file.
-fn build() -> anyhow::Result<PathBuf> {
-    let found = Command::new("flip-link").arg("--version").output();
-    ensure!(
-        found.is_ok(),
-        "flip-link is missing: install it with `cargo install flip-link --locked`"
-    );
-    cargo::check(in_firmware("build --release"))?;
-    Ok(target().join(TARGET).join("release").join(NAME))
-}
-
-/// Builds the firmware, together with the stack sizes that its compiler says; gives the linked
-/// file, which is not the one that ships.
-fn build_with_stack_sizes() -> anyhow::Result<PathBuf> {
-    let target = cargo::target_directory().join("firmware-stack-sizes");
-    let mut command = in_firmware("build --release --config");
-    command.arg(format!("target.{TARGET}.rustflags = ['{}']", frames::FLAG));
-    command.env("CARGO_TARGET_DIR", &target).env("RUSTC_BOOTSTRAP", "1");
-    cargo::check(command)?;
-    Ok(target.join(TARGET).join("release").join(NAME))
-}
-
-/// A cargo in the workspace `firmware`, whose own configuration holds what its linker needs.
-pub fn in_firmware(arguments: &str) -> Command {
-    let mut command = cargo::command(arguments);
-    command.current_dir(cargo::root().join("firmware")).env_remove("RUSTFLAGS");
-    command.env("CARGO_TARGET_DIR", target());
-    command
-}
-
-/// Where the workspace `firmware` is built.
-pub fn target() -> PathBuf {
-    cargo::target_directory().join("firmware")
+    stack::check(&build::read(&build::release()?)?).map(drop)
 }

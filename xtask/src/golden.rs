@@ -1,9 +1,8 @@
-//! Golden traces: every machine computes the bits that were computed when they were made.
+//! Golden traces: every machine reproduces the recorded answers bit by bit.
 
 use crate::cargo;
 
-/// What the traces are of: a name, and what `sonarfix pil` is told. The second has ranges beyond
-/// the gate.
+/// The traces: a name, and the arguments of `sonarfix pil`. The second contains gated ranges.
 const TRACES: [(&str, &str); 2] = [
     ("localizer", "paper --policy informative --seconds 60"),
     ("loop", "crates/sonarfix-map/scenarios/classroom.toml --seed 30 --seconds 10"),
@@ -12,7 +11,7 @@ const TRACES: [(&str, &str); 2] = [
 /// The first is this computer.
 const MACHINES: [&str; 5] = ["host", "m4f", "m33", "m3", "m0plus"];
 
-/// Asks every machine all of every trace again.
+/// Replays every trace on every machine.
 pub fn check() -> anyhow::Result<()> {
     for (name, _) in TRACES {
         for machine in MACHINES {
@@ -22,7 +21,7 @@ pub fn check() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Makes the traces anew, on this computer.
+/// Records the traces on this computer.
 pub fn bless() -> anyhow::Result<()> {
     TRACES
         .into_iter()
@@ -34,6 +33,6 @@ fn path(name: &str) -> String {
 }
 
 fn pil(arguments: &str) -> anyhow::Result<()> {
-    let run = "run --quiet --release --package sonarfix-sim --bin sonarfix -- pil";
+    let run = "run --quiet --release --bin sonarfix -- pil";
     cargo::run(&format!("{run} {arguments}"))
 }

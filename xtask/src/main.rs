@@ -1,5 +1,4 @@
-//! What CI runs, by the same names: `cargo xtask ci` is every check, and each has a name of its
-//! own, so that whoever broke one can run just that.
+//! The project's checks and chores. `cargo xtask ci` runs every check; each is a command of its own, too.
 
 use std::process::ExitCode;
 
@@ -9,6 +8,8 @@ mod bench;
 mod budgets;
 mod cargo;
 mod checks;
+mod ci;
+mod circles;
 mod elf;
 mod emulator;
 mod endurance;
@@ -17,39 +18,49 @@ mod fuzz;
 mod golden;
 mod miri;
 mod panics;
-mod pico;
 mod pil;
 mod program;
+mod publish;
 mod thumb;
+mod words;
+mod workspace;
 
 #[derive(Debug, Parser)]
 #[command(about = "The project's checks and chores")]
 struct Xtask {
     #[command(subcommand)]
-    task: Task,
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Every check of CI; a failure does not keep the following ones from running.
+    Ci,
+    #[command(flatten)]
+    Task(Task),
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Subcommand)]
 enum Task {
-    /// Every check below, in order.
-    Ci,
     /// Formatting.
     Format,
     /// Clippy, warnings are errors.
     Lint,
+    /// No circle of imports between the modules of a crate.
+    Circles,
     /// The tests, as the README runs them.
     TestHost,
     /// The documentation, warnings are errors.
     Docs,
     /// The `no_std` crates for microcontrollers with and without FPU.
     Embedded,
-    /// The firmware: builds it, looks for panics in it, and runs it in an emulator.
+    /// The firmware: builds it, searches it for panics, and runs it in an emulator.
     TestFirmware,
     /// Flash and RAM of the shipped firmware, by crate.
     Size,
     /// The deepest that the stack of the shipped firmware can be, by the calls in it.
     Stack(firmware::StackArgs),
-    /// The shipped loop on emulated microcontrollers, against the PC bit by bit; what it costs them.
+    /// The shipped loop on emulated microcontrollers, bit by bit as on the PC; its cost.
     Pil,
     /// The golden traces on this computer and every emulated microcontroller.
     Golden,
@@ -57,50 +68,62 @@ enum Task {
     Panics,
     /// Instructions, code, stack and memory against `budgets.toml`.
     Budgets,
-    /// The programs in `bench` that link nothing of the peers: format, Clippy.
-    LintBench,
-    /// Ours and every peer do the same work.
+    /// Programs for emulated boards: formatting, Clippy.
+    LintEmulated,
+    /// Sonarfix and every peer compute the same.
     Peers,
+    /// The published crates compile with the oldest Rust that they declare.
+    Msrv,
+    /// The packages of the published crates build from their own files.
+    Package,
     /// Licences of all dependencies, and advisories if their database can be reached.
     Deny,
-    /// Measures again what `budgets` checks and writes it to `budgets.toml`; makes the golden traces
-    /// anew.
+    /// Records the golden traces, and measures and writes `budgets.toml`.
     Bless,
-    /// Ours and its peers at the same work, to `docs/benchmarks.md` (ten minutes).
+    /// Measures Sonarfix and its peers, and writes `docs/benchmarks.md` (ten minutes).
     Bench,
     /// The paper's statistics at full length: 5,000 seeds, both policies (minutes).
     Statistics,
-    /// Random lives of the filter, 10⁸ steps unless told otherwise (minutes).
+    /// Lines with words that `docs/glossary.md` avoids.
+    Words(words::Args),
+    /// Random runs of the filter, 10⁸ steps by default (minutes).
     Endurance(endurance::Args),
-    /// The fuzz targets, for a bounded time.
+    /// Fuzzing for a bounded time.
     Fuzz(fuzz::Args),
-    /// The core under Miri, if there is one (long: it builds a standard library first).
+    /// The core under Miri if it is installed (long: it builds a standard library first).
     Miri,
 }
 
-/// What `ci` runs.
-fn all() -> [Task; 15] {
+/// The steps of CI, the fast ones first.
+fn ci_steps() -> [(&'static str, Task); 18] {
     [
-        Task::Format,
-        Task::Lint,
-        Task::TestHost,
-        Task::Docs,
-        Task::Embedded,
-        Task::TestFirmware,
-        Task::Golden,
-        Task::Pil,
-        Task::Panics,
-        Task::Budgets,
-        Task::LintBench,
-        Task::Peers,
-        Task::Deny,
-        Task::Endurance(endurance::Args::SHORT),
-        Task::Fuzz(fuzz::Args::short()),
+        ("format", Task::Format),
+        ("circles", Task::Circles),
+        ("lint", Task::Lint),
+        ("test-host", Task::TestHost),
+        ("docs", Task::Docs),
+        ("embedded", Task::Embedded),
+        ("test-firmware", Task::TestFirmware),
+        ("golden", Task::Golden),
+        ("pil", Task::Pil),
+        ("panics", Task::Panics),
+        ("budgets", Task::Budgets),
+        ("lint-emulated", Task::LintEmulated),
+        ("peers", Task::Peers),
+        ("msrv", Task::Msrv),
+        ("package", Task::Package),
+        ("deny", Task::Deny),
+        ("endurance", Task::Endurance(endurance::Args::SHORT)),
+        ("fuzz", Task::Fuzz(fuzz::Args::short())),
     ]
 }
 
 fn main() -> ExitCode {
-    match run(Xtask::parse().task) {
+    let result = match Xtask::parse().command {
+        Command::Ci => return ci::run(&ci_steps(), |task| run(task.clone())),
+        Command::Task(task) => run(task),
+    };
+    match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error:#}");
@@ -111,9 +134,9 @@ fn main() -> ExitCode {
 
 fn run(task: Task) -> anyhow::Result<()> {
     match task {
-        Task::Ci => all().into_iter().try_for_each(run),
         Task::Format => cargo::run("fmt --all --check"),
         Task::Lint => cargo::run("clippy --workspace --all-targets --all-features -- -D warnings"),
+        Task::Circles => circles::check(),
         Task::TestHost => cargo::run("test"),
         Task::Docs => checks::docs(),
         Task::Embedded => checks::embedded(),
@@ -124,12 +147,15 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Golden => golden::check(),
         Task::Panics => panics::check(),
         Task::Budgets => budgets::check(),
-        Task::LintBench => checks::lint_bench(),
+        Task::LintEmulated => checks::lint_emulated(),
         Task::Peers => checks::peers(),
+        Task::Msrv => publish::msrv(),
+        Task::Package => publish::package(),
         Task::Deny => checks::deny(),
         Task::Bless => golden::bless().and_then(|()| budgets::bless()),
         Task::Bench => bench::run(),
         Task::Statistics => checks::statistics(),
+        Task::Words(args) => words::count(&args),
         Task::Endurance(args) => endurance::run(args),
         Task::Fuzz(args) => fuzz::run(&args),
         Task::Miri => miri::run(),

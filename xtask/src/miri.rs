@@ -1,7 +1,7 @@
-//! `cargo xtask miri`: the core's unit tests and examples under Miri, which finds undefined
-//! behaviour. It needs a nightly toolchain with the component `miri`; where there is none, that is
-//! said aloud, and nothing fails. (The core forbids `unsafe`; what is looked at are its
-//! dependencies, as far as it calls them.)
+//! `cargo xtask miri`: runs the core's unit tests and examples under Miri, which finds undefined behaviour.
+//!
+//! It needs a nightly toolchain with the component `miri`; without it, it prints that it was skipped and does not fail. The
+//! core forbids `unsafe`, so Miri checks the parts of its dependencies that it calls.
 
 use std::process::{Command, Stdio};
 
@@ -13,7 +13,7 @@ const TARGET: &str = "armv7-unknown-linux-gnueabihf";
 pub fn run() -> anyhow::Result<()> {
     if !is_there() {
         eprintln!(
-            "miri: SKIPPED, nothing was looked at. It needs a nightly toolchain: \
+            "miri: SKIPPED. It needs a nightly toolchain: \
              `rustup toolchain install nightly --profile minimal --component miri,rust-src`"
         );
         return Ok(());
@@ -22,17 +22,16 @@ pub fn run() -> anyhow::Result<()> {
         let mut command = Command::new("cargo");
         command.args(["+nightly", "miri", "test", "--package", "sonarfix", "--target", TARGET]);
         command.args(what).env("MIRIFLAGS", "-Zmiri-tree-borrows");
-        // Its build is another compiler's: apart from all others.
-        command.env("CARGO_TARGET_DIR", cargo::target_directory().join("miri"));
+        // Another compiler: a separate folder for its builds.
+        command.env("CARGO_TARGET_DIR", cargo::target_folder().join("miri"));
         cargo::check(command)?;
     }
     Ok(())
 }
 
-/// Whether Miri and the library it interprets can be had, without fetching another toolchain: on some
-/// machines that would fail, or hang.
+/// Whether Miri and its standard library are installed. No toolchain is downloaded: on some machines that fails or hangs.
 fn is_there() -> bool {
-    // Makes the library from its sources, `rust-src`, if that has not been done.
+    // Builds the standard library from `rust-src` if necessary.
     let mut setup = Command::new("cargo");
     setup.args(["+nightly", "miri", "setup", "--target", TARGET]).env("RUSTUP_AUTO_INSTALL", "0");
     setup.stdin(Stdio::null()).stdout(Stdio::null());

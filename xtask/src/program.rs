@@ -1,15 +1,16 @@
-//! Building the programs of `bench` for a microcontroller.
+//! Builds programs for emulated boards.
 
 use std::path::PathBuf;
 
 use crate::cargo;
+use crate::workspace::Workspace;
 
-/// What a program is built for, and where it runs.
+/// The target that a program is built for, and the board that it runs on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Target {
-    /// As people call it.
+    /// The name in tables.
     pub name: &'static str,
-    /// As rustc calls it.
+    /// The target of rustc.
     pub triple: &'static str,
     /// The board of QEMU that runs its instructions.
     pub board: &'static str,
@@ -33,21 +34,21 @@ pub const M3: Target = Target {
     board: "mps2-an385",
     profile: "release",
 };
-/// Cortex-M0+, in soft float. QEMU has no M0+ with enough memory and a counter; a Cortex-M3 runs
-/// the instructions of the smaller one as they are.
+/// Cortex-M0+, in soft float. QEMU has no M0+ with enough memory and a counter; an emulated
+/// Cortex-M3 runs the program, because its instruction set contains that of the M0+.
 pub const M0PLUS: Target = Target { name: "Cortex-M0+", triple: "thumbv6m-none-eabi", ..M3 };
 
 impl Target {
     /// Builds all programs of a package; then they are at [`Self::program`].
-    pub fn build(&self, package: &str, arguments: &str) -> anyhow::Result<()> {
+    pub fn build(&self, workspace: Workspace, arguments: &str) -> anyhow::Result<()> {
         let Self { triple, profile, .. } = self;
-        cargo::check(cargo::in_bench(&format!(
-            "build --package {package} --bins --target {triple} --profile {profile} {arguments}"
+        cargo::check(workspace.cargo(&format!(
+            "build --package {arguments} --bins --target {triple} --profile {profile}"
         )))
     }
 
     /// Where a built program is.
-    pub fn program(&self, name: &str) -> PathBuf {
-        cargo::bench_target().join(self.triple).join(self.profile).join(name)
+    pub fn program(&self, workspace: Workspace, name: &str) -> PathBuf {
+        workspace.target_folder().join(self.triple).join(self.profile).join(name)
     }
 }

@@ -1,22 +1,22 @@
-//! Thumb instructions, as far as the stack goes: by how much they lower it, and whether they call
-//! what a register holds (Arm's *ARMv7-M Architecture Reference Manual*, chapter A7).
+//! Decodes the Thumb instructions that change the stack pointer or call through a register (Arm, *ARMv7-M Architecture
+//! Reference Manual*, chapter A7).
 
-/// What a stretch of code does with the stack.
+/// The use of the stack by a block of code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Stack {
-    /// Bytes that its instructions lower the stack by, all taken together.
+    /// Bytes by which all its instructions lower the stack.
     pub bytes: u64,
-    /// Whether one of them goes where a register says.
+    /// Whether one of them calls through a register.
     pub calls_by_register: bool,
-    /// Whether one of them sets the stack to what cannot be known beforehand.
+    /// Whether one of them sets the stack pointer to an unknown value.
     pub is_unbounded: bool,
 }
 
 impl Stack {
-    /// Reads a stretch of code that holds no data.
+    /// Decodes a block of code without data.
     ///
-    /// Every instruction counts as if it were run once: too much where the stack is lowered on two
-    /// branches, never too little, for compilers lower it in no loop.
+    /// Every instruction counts once. This is an upper bound: the stack may be lowered on two branches, but compilers do
+    /// not lower it in a loop.
     pub fn of(code: &[u8]) -> Self {
         let mut stack = Self::default();
         for (_, instruction) in instructions(code) {
@@ -28,7 +28,7 @@ impl Stack {
         stack
     }
 
-    /// Two such stretches of one function.
+    /// Joins two blocks of one function.
     pub fn and(self, other: Self) -> Self {
         Self {
             bytes: self.bytes + other.bytes,
@@ -74,7 +74,7 @@ impl Stack {
     }
 }
 
-/// Where the instructions BL of a stretch of code at this address lead.
+/// The targets of the BL instructions in a block of code at this address.
 pub fn calls(code: &[u8], at: u64) -> impl Iterator<Item = u64> {
     instructions(code).filter_map(move |(offset, instruction)| {
         let Instruction::Long(first, second) = instruction else { return None };
@@ -83,8 +83,7 @@ pub fn calls(code: &[u8], at: u64) -> impl Iterator<Item = u64> {
     })
 }
 
-/// How far a BL leads, in bytes: S:I1:I2:imm10:imm11:0, where I1 and I2 are J1 and J2, turned
-/// round if S is zero.
+/// The offset of a BL in bytes: S:I1:I2:imm10:imm11:0, where I1 and I2 are J1 and J2, inverted if S is zero.
 fn distance(first: u16, second: u16) -> i64 {
     let [first, second] = [first, second].map(i64::from);
     let sign = first >> 10 & 1;
@@ -98,7 +97,7 @@ enum Instruction {
     Long(u16, u16),
 }
 
-/// The instructions of a stretch of code, each with its offset.
+/// The instructions of a block of code, each with its offset.
 fn instructions(code: &[u8]) -> impl Iterator<Item = (u64, Instruction)> {
     let (words, _) = code.as_chunks::<2>();
     let mut words = (0..).step_by(2).zip(words.iter().map(|bytes| u16::from_le_bytes(*bytes)));
@@ -112,8 +111,7 @@ fn instructions(code: &[u8]) -> impl Iterator<Item = (u64, Instruction)> {
     })
 }
 
-/// The sixteen bits that a MOVW moves into a register; of the instruction's four bytes, the first
-/// lowest.
+/// The immediate of a MOVW. The first byte of the instruction is the lowest.
 pub fn moved(instruction: u64) -> u16 {
     let [first, second] = [instruction & 0xffff, instruction >> 16 & 0xffff];
     let bits = (first & 0xf) << 12 | (first >> 10 & 1) << 11 | (second >> 12 & 7) << 8;
@@ -125,7 +123,7 @@ fn immediate(first: u16, second: u16) -> u16 {
     (first >> 10 & 1) << 11 | (second >> 12 & 0b111) << 8 | second & 0xff
 }
 
-/// The constant that twelve bits stand for (`ThumbExpandImm`): a byte, repeated or turned.
+/// The constant encoded in twelve bits (`ThumbExpandImm`): a byte, repeated or rotated.
 fn modified(bits: u16) -> u64 {
     let byte = u32::from(bits & 0xff);
     let constant = match bits >> 8 {
@@ -142,7 +140,7 @@ fn modified(bits: u16) -> u64 {
 mod tests {
     use super::*;
 
-    /// As an assembler wrote them (`llvm-mc --triple=thumbv7em-none-eabihf --show-encoding`).
+    /// Encoded by an assembler (`llvm-mc --triple=thumbv7em-none-eabihf --show-encoding`).
     #[test]
     fn every_way_to_lower_the_stack_is_known() {
         let known: [(&[u8], u64); 11] = [
@@ -166,14 +164,14 @@ mod tests {
     #[test]
     fn calls_lead_where_they_lead() {
         let place = 0x0801_6934;
-        // As a disassembler says: 18 bytes back, and 59,212 bytes on.
+        // By a disassembler: 18 bytes back, and 59,212 bytes ahead.
         let cases: [(&[u8], i64); 2] =
             [(&[0xff, 0xf7, 0xf7, 0xff], -18), (&[0x0e, 0xf0, 0xa6, 0xfb], 59_212)];
         for (code, distance) in cases {
             let to = (place + 4_u64).wrapping_add_signed(distance);
             assert_eq!(calls(code, place).collect::<Vec<_>>(), [to], "{code:x?}");
         }
-        // bl and movw, of which just one is a call.
+        // bl and movw: only one is a call.
         assert_eq!(calls(&[0xff, 0xf7, 0xf7, 0xff, 0x41, 0xf6, 0x2f, 0x40], place).count(), 1);
     }
 

@@ -7,7 +7,7 @@ use bench_workload::model::{Range, Step};
 use bench_workload::{Filter, drive, each_filter};
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 
-/// The first ten steps of the drive and the range after them, as one filter would have them.
+/// The first ten travels of the drive and the range after them, at one filter's estimates.
 fn script() -> (Vec<Step>, Range) {
     let mut filter = naive::Joseph::new(drive::START, drive::VARIANCES);
     let mut steps = Vec::new();

@@ -1,5 +1,5 @@
-//! Takes one filter, named on the command line, along the drive, for callgrind to count
-//! `bench_predict` or `bench_update`; says how many of each there were.
+//! Runs the filter that is named on the command line over the drive, under callgrind, which counts the instructions of
+//! `bench_predict` or `bench_update`; prints the number of calls of each.
 
 use std::env;
 use std::process::ExitCode;

@@ -1,5 +1,4 @@
-//! Every filter does the same work: after every step of the drive its state and covariance are
-//! those of an independent filter in `f64`.
+//! Every filter computes the same: after every call its state and covariance equal those of an independent filter in `f64`.
 
 use bench_workload::model::{Range, STATES, Step, TRACK_WIDTH};
 use bench_workload::{Filter, drive};
@@ -7,13 +6,13 @@ use bench_workload::{Filter, drive};
 type Column = [f64; STATES];
 type Square = [Column; STATES];
 
-/// How far a state may be off, in its standard deviations: some 200 roundings of 2⁻²⁴, in numbers
-/// up to 10³ times larger than the deviation.
+/// Largest error of a state in its standard deviations: about 200 roundings of 2⁻²⁴, in numbers up to 10³ times larger than
+/// the deviation.
 const STATE_TOLERANCE: f64 = 0.01;
-/// How far an entry of P may be off, as a share of the two deviations that it belongs to.
+/// Largest error of an entry of P, relative to the product of its two deviations.
 const COVARIANCE_TOLERANCE: f64 = 0.001;
 
-/// The textbook in `f64`, its Jacobian by central differences.
+/// A textbook filter in `f64`, with a Jacobian by central differences.
 struct Reference {
     x: Column,
     p: Square,
@@ -28,7 +27,7 @@ impl Reference {
         Self { x: drive::START.map(f64::from), p }
     }
 
-    /// The paper's motion along the mid-heading, wheel by wheel.
+    /// Motion along the mid-heading, with a scale error per wheel.
     fn moved(state: &Column, step: &Step) -> Column {
         let [x, y, heading, mean, difference, width_error] = *state;
         let right = f64::from(step.right) * (1.0 + mean + 0.5 * difference);

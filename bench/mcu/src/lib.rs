@@ -1,5 +1,5 @@
-//! Takes a filter along the drive on an emulated Cortex-M and reports what each call cost: one
-//! program for each filter, so that no two share code.
+//! Runs a filter over the drive on an emulated Cortex-M and reports the cost of each call. Each filter has its own program, so
+//! that no two share code.
 
 #![no_std]
 
@@ -8,13 +8,13 @@ use core::cell::UnsafeCell;
 use core::ptr;
 use core::sync::atomic::{AtomicUsize, Ordering};
 
-use bench_board::meter::{Call, Cost, Meter};
-use bench_board::report;
 use bench_workload::model::{Range, Step};
 use bench_workload::{Filter, drive};
+use emulated_board::meter::{Call, Cost, Meter};
+use emulated_board::report;
 
-/// Makes a program of a filter. `bench_predict` and `bench_update` are the names by which
-/// `cargo xtask bench` finds the filter's code.
+/// Generates the program of a filter. `cargo xtask bench` finds the filter's code by the names `bench_predict` and
+/// `bench_update`.
 #[macro_export]
 macro_rules! measure {
     ($filter:ty) => {
@@ -31,14 +31,14 @@ macro_rules! measure {
             filter.update(range);
         }
 
-        #[bench_board::entry]
+        #[emulated_board::entry]
         fn main() -> ! {
             $crate::run(bench_predict, bench_update)
         }
     };
 }
 
-/// Takes a filter along the drive and reports.
+/// Runs a filter over the drive and reports its cost.
 pub fn run<F: Filter>(predict: Call<F, Step>, update: Call<F, Range>) -> ! {
     let mut meter = Meter::start();
     let mut filter = F::new(drive::START, drive::VARIANCES);
@@ -55,7 +55,7 @@ pub fn run<F: Filter>(predict: Call<F, Step>, update: Call<F, Range>) -> ! {
     report::done()
 }
 
-/// Memory for the peers that put their buffers on the heap: handed out once, never taken back.
+/// A heap for the peers that need one. Memory is never freed.
 struct Heap(AtomicUsize);
 
 #[global_allocator]
@@ -66,12 +66,12 @@ const HEAP_BYTES: usize = 16 * 1024;
 #[repr(align(8))]
 struct Memory(UnsafeCell<[u8; HEAP_BYTES]>);
 
-// SAFETY: there is one thread, and each byte is handed out once.
+// SAFETY: there is one thread, and each byte is allocated once.
 unsafe impl Sync for Memory {}
 
 static MEMORY: Memory = Memory(UnsafeCell::new([0; HEAP_BYTES]));
 
-// SAFETY: no two allocations overlap, each is aligned, and null says that there is no more.
+// SAFETY: allocations do not overlap and are aligned; null means that the memory is exhausted.
 unsafe impl GlobalAlloc for Heap {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         let from = self.0.load(Ordering::Relaxed).next_multiple_of(layout.align().max(8));
@@ -79,7 +79,7 @@ unsafe impl GlobalAlloc for Heap {
         if to > HEAP_BYTES || layout.align() > 8 {
             return ptr::null_mut();
         }
-        // Not one atomic step, which a Cortex-M0+ has none of.
+        // Not a single atomic operation, which a Cortex-M0+ lacks.
         self.0.store(to, Ordering::Relaxed);
         MEMORY.0.get().cast::<u8>().wrapping_add(from)
     }

@@ -1,6 +1,6 @@
-//! Our filter on the bench's drive. [`kernel`] is the arithmetic alone, at the peers' work. [`Shipped`]
-//! is what ships: seven states, sine and cosine of its own, and the noise of each wheel in full, where
-//! the peers have six, get them passed in, and add a diagonal Q.
+//! Sonarfix on the drive of the benchmark. [`kernel`] is the arithmetic alone, at the peers' task. [`Shipped`] is the shipped filter:
+//! seven states, its own sine and cosine, and the full noise of each wheel, where the peers have six states, sine and
+//! cosine as arguments, and a diagonal Q.
 
 #![no_std]
 
@@ -8,7 +8,7 @@ pub mod kernel;
 
 use bench_workload::Filter;
 use bench_workload::model::{Matrix, Range, Step, TRACK_WIDTH, Vector};
-use sonarfix::ekf::{Ekf, State};
+use sonarfix::ekf::{Ekf, StandardDeviations, StateEstimate};
 use sonarfix::motion::{Drive, WheelTravel};
 use sonarfix::pose::Heading;
 use sonarfix::range::ExpectedRange;
@@ -17,7 +17,7 @@ use sonarfix::units::{Metres, PerRootMetre, SquareMetres};
 /// The filter.
 pub struct Shipped {
     ekf: Ekf,
-    /// Where the wall is seen; the filter has no use for it.
+    /// The pose at which the wall is measured; the filter does not need it.
     direction: Heading,
 }
 
@@ -30,14 +30,14 @@ impl Filter for Shipped {
 
     #[inline]
     fn predict(&mut self, step: &Step) {
-        // It fails on numbers that are not finite, which here are none.
+        // It fails only for numbers that are not finite.
         let _ = self.ekf.predict(WheelTravel::new(step.right, step.left));
     }
 
     #[inline]
     fn update(&mut self, range: &Range) {
         let state = self.ekf.state();
-        let expected = range.expected(state.x, state.y);
+        let expected = range.expected(state.x.0, state.y.0);
         let expected = ExpectedRange {
             range: Metres(expected),
             by_x: range.by_x,
@@ -54,14 +54,14 @@ impl Filter for Shipped {
         scales(&self.ekf.state())
     }
 
-    /// The scale errors wheel by wheel, as the crate shows them.
+    /// The scale errors per wheel, as in the crate's public state.
     fn covariance(&self) -> Matrix {
         let p = self.ekf.covariance();
         core::array::from_fn(|i| core::array::from_fn(|j| p[(i, j)]))
     }
 }
 
-/// The bench's wheels.
+/// The wheels of the benchmark.
 fn drive() -> Drive {
     Drive {
         track_width: Metres(TRACK_WIDTH),
@@ -71,38 +71,23 @@ fn drive() -> Drive {
     }
 }
 
-/// The bench's six states, as the crate shows them.
-fn shown([x, y, heading, mean, difference, track_width_error]: Vector) -> State {
-    State {
-        x,
-        y,
-        heading,
-        scale_right: mean + 0.5 * difference,
-        scale_left: mean - 0.5 * difference,
-        track_width_error,
-        range_scale: 0.0,
-    }
+/// The six states of the benchmark in the crate's public state.
+fn shown([x, y, heading, mean, difference, track_width_error]: Vector) -> StateEstimate {
+    let (right, left) = (mean + 0.5 * difference, mean - 0.5 * difference);
+    StateEstimate::from_array([x, y, heading, right, left, track_width_error, 0.0])
 }
 
-/// The other way round.
-fn scales(state: &State) -> Vector {
+/// The inverse.
+fn scales(state: &StateEstimate) -> Vector {
     let (right, left) = (state.scale_right, state.scale_left);
     let (mean, difference) = (0.5 * (right + left), right - left);
-    [state.x, state.y, state.heading, mean, difference, state.track_width_error]
+    [state.x.0, state.y.0, state.heading.0, mean, difference, state.track_width_error.0]
 }
 
-/// Standard deviations, as the crate wants them.
-fn deviation(variances: Vector) -> State {
+/// Standard deviations in the crate's type.
+fn deviation(variances: Vector) -> StandardDeviations {
     let [x, y, heading, mean, _, width] = variances.map(libm::sqrtf);
     // Of two equal and independent errors the mean has half the variance.
     let scale = mean * core::f32::consts::SQRT_2;
-    State {
-        x,
-        y,
-        heading,
-        scale_right: scale,
-        scale_left: scale,
-        track_width_error: width,
-        range_scale: 0.01,
-    }
+    StandardDeviations::from_array([x, y, heading, scale, scale, width, 0.01])
 }

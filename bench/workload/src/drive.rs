@@ -1,26 +1,26 @@
-//! The drive that every filter is taken on: curves to both sides, a turn on the spot, and every
-//! tenth step a range to one of four walls.
+//! The drive of every filter: curves to both sides, a turn in place, and after every tenth travel a range to one of four
+//! walls.
 
 use crate::Filter;
 use crate::model::{Range, STATES, Step, Vector, turn};
 
-/// Steps of the drive.
+/// Wheel travels of the drive.
 pub const STEPS: usize = 200;
-/// A range comes after so many steps: a fix a second at ten steps a second.
+/// Wheel travels between two ranges: one range per second at ten samples per second.
 pub const STEPS_A_RANGE: usize = 10;
 
-/// Where it starts: 1 m from two walls, with a heading and small errors that are not zero.
+/// Start: 1 m from two walls, with a heading and small errors other than zero.
 pub const START: Vector = [1.0, 1.2, 0.3, 0.002, -0.003, 0.001];
 /// Variances at the start: 5 cm, 0.02 rad, 1 %, 2 %, 1 cm.
 pub const VARIANCES: Vector = [25e-4, 25e-4, 4e-4, 1e-4, 4e-4, 1e-4];
-/// The diagonal of Q of a step: 0.3 mm, 1 mrad, and 1e-6 of each parameter.
+/// The diagonal of Q of one travel: 0.3 mm, 1 mrad, and 1e-6 of each parameter.
 pub const NOISE: Vector = [1e-7, 1e-7, 1e-6, 1e-12, 1e-12, 1e-12];
 /// 5 mm, in m².
 const RANGE_VARIANCE: f32 = 25e-6;
-/// How far each range is off, metres, in turn.
+/// Errors of the ranges, metres, cyclically.
 const OFF: [f32; 5] = [0.004, -0.006, 0.001, 0.007, -0.003];
 
-/// How far right and left wheel roll in a step, metres.
+/// Travel of the right and the left wheel, metres.
 fn travel(step: usize) -> (f32, f32) {
     match step % 50 {
         0..20 => (0.04, 0.038),
@@ -30,8 +30,7 @@ fn travel(step: usize) -> (f32, f32) {
     }
 }
 
-/// The step, at a filter's own estimate of the heading: sine and cosine are computed here, outside
-/// of what is measured.
+/// One travel, at a filter's own estimate of the heading. Sine and cosine are computed here, outside of the measured calls.
 #[must_use]
 pub fn step(filter: &impl Filter, step: usize) -> Step {
     let (right, left) = travel(step);
@@ -41,7 +40,7 @@ pub fn step(filter: &impl Filter, step: usize) -> Step {
     Step { right, left, sin, cos, noise: NOISE }
 }
 
-/// The range after so many steps, if one is due: off by as many millimetres as the script says.
+/// The range after this number of travels, if one is due, with the error of the script.
 #[must_use]
 pub fn range(filter: &impl Filter, step: usize) -> Option<Range> {
     if !(step + 1).is_multiple_of(STEPS_A_RANGE) {
@@ -56,7 +55,7 @@ pub fn range(filter: &impl Filter, step: usize) -> Option<Range> {
     Some(range)
 }
 
-/// Takes a filter along the whole drive.
+/// Runs a filter over the whole drive.
 pub fn run(filter: &mut impl Filter) {
     for i in 0..STEPS {
         let step = step(filter, i);

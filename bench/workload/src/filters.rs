@@ -1,5 +1,5 @@
-//! The peers. Each is written as its library's own documentation would have it written for a
-//! robot, with the Jacobian of [`model`](crate::model) and what is constant set up once.
+//! The peers. Each follows its library's documentation, with the Jacobian of [`model`](crate::model) and constants that are set up
+//! once.
 
 #[cfg(feature = "adskalman")]
 pub mod adskalman;
@@ -14,8 +14,7 @@ pub mod naive;
 #[cfg(feature = "numeris")]
 pub mod numeris;
 
-/// Calls `$do!(name: type; …)` with every peer, by the name of its program in `bench-mcu`, and with
-/// what else is given.
+/// Calls `$do!(name: type; …)` with every peer, by the name of its program in `bench-mcu`, and with the further arguments.
 #[macro_export]
 macro_rules! each_filter {
     ($do:ident, $($rest:tt)*) => {

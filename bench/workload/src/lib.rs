@@ -1,12 +1,10 @@
-//! The same work, done by the filters that would be picked instead of Sonarfix's: a robot with two
-//! wheels and a sonar, six states in `f32`.
+//! One task for several filter libraries: a robot with two wheels and a sonar, six states in `f32`.
 //!
-//! - [`model`]: the state, how a step of the wheels moves it, and what a range says of it.
-//! - [`drive`]: the drive that every filter is taken on.
-//! - [`filters`]: the peers, one file each. Ours is in `bench-ours`.
+//! - [`model`]: the state, its motion by wheel travel, and the expected range.
+//! - [`drive`]: the drive of every filter.
+//! - [`filters`]: the peers, one file each. Sonarfix is in `bench-ours`.
 //!
-//! A test of `bench-host` holds every filter against an `f64` one, so that none does less work than
-//! another.
+//! A test of `bench-host` compares every filter with one in `f64`, so that all do the same work.
 
 #![no_std]
 
@@ -16,18 +14,18 @@ pub mod model;
 
 use model::{Matrix, STATES, Vector};
 
-/// A filter at work.
+/// A filter.
 pub trait Filter {
     /// A filter at a state, with independent errors of these variances.
     fn new(state: Vector, variances: Vector) -> Self;
 
-    /// State, Jacobian, P and diagonal Q over one step of the wheels.
+    /// Predicts over one wheel travel: state, Jacobian, P and diagonal Q.
     fn predict(&mut self, step: &model::Step);
 
-    /// State and P after one range.
+    /// Updates state and P by one range.
     fn update(&mut self, range: &model::Range);
 
-    /// The estimate.
+    /// The state estimate.
     fn state(&self) -> Vector;
 
     /// The covariance.

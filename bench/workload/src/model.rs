@@ -1,5 +1,5 @@
-//! The model that all filters share: the six states of the paper, the wheels' scale errors held as
-//! mean and difference, the robot moved along its mid-heading (`docs/model.md`, eqs. 7–9).
+//! The model of all filters: the six states of the paper, with the wheels' scale errors as mean and difference, and the
+//! motion along the mid-heading (`docs/model.md`).
 
 /// x, y, heading, mean and difference of the scale errors, track-width error.
 pub const STATES: usize = 6;
@@ -11,14 +11,14 @@ pub type Matrix = [Vector; STATES];
 /// Distance between the wheels, metres.
 pub const TRACK_WIDTH: f32 = 0.35;
 
-/// One step of the wheels.
+/// One wheel travel.
 #[derive(Debug, Clone, Copy)]
 pub struct Step {
-    /// How far the right wheel rolled, metres.
+    /// Travel of the right wheel, metres.
     pub right: f32,
-    /// How far the left wheel rolled, metres.
+    /// Travel of the left wheel, metres.
     pub left: f32,
-    /// Sine of the mid-heading, passed in: trigonometry is not what is compared here.
+    /// Sine of the mid-heading: an argument, because trigonometry is not compared.
     pub sin: f32,
     /// Cosine of the mid-heading.
     pub cos: f32,
@@ -35,14 +35,14 @@ pub struct Range {
     pub by_y: f32,
     /// c, metres.
     pub offset: f32,
-    /// The range measured, metres.
+    /// Measured range, metres.
     pub measured: f32,
     /// Its variance, m².
     pub variance: f32,
 }
 
 impl Range {
-    /// The range expected at a state, metres.
+    /// Expected range at a state, metres.
     #[must_use]
     #[inline]
     pub fn expected(&self, x: f32, y: f32) -> f32 {
@@ -50,10 +50,10 @@ impl Range {
     }
 }
 
-/// A step, and how it depends on the state.
+/// The motion of a wheel travel, with its derivatives by the state.
 #[derive(Debug, Clone, Copy)]
 pub struct Motion {
-    /// What is added to x, y and heading.
+    /// Increments of x, y and heading.
     pub by: [f32; 3],
     /// The derivative of the new x by heading, mean, difference and track width; that by x is one.
     pub x_by: [f32; 4],
@@ -64,7 +64,7 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// The motion of a step at a state.
+    /// The motion of a travel at a state.
     #[must_use]
     #[inline]
     pub fn new(state: &Vector, step: &Step) -> Self {
@@ -95,7 +95,7 @@ impl Motion {
         }
     }
 
-    /// The state after the step.
+    /// The state after the travel.
     #[must_use]
     #[inline]
     pub fn moved(&self, state: &Vector) -> Vector {
@@ -104,7 +104,7 @@ impl Motion {
         [x + dx, y + dy, heading + turn, mean, difference, width_error]
     }
 
-    /// The Jacobian F, dense, as a peer wants it.
+    /// The dense Jacobian F.
     #[must_use]
     #[inline]
     pub fn jacobian(&self) -> Matrix {
@@ -121,7 +121,7 @@ impl Motion {
     }
 }
 
-/// The turn of a step, radians, and one over the track width.
+/// The turn of a travel, radians, and the inverse of the track width.
 #[must_use]
 #[inline]
 pub fn turn(mean: f32, difference: f32, width_error: f32, right: f32, left: f32) -> (f32, f32) {

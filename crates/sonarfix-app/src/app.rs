@@ -1,4 +1,4 @@
-//! The application: when the loop runs, what commands do, what is told when.
+//! The application: starts and stops the robot's loop, executes commands, sends telemetry and stores state.
 //!
 //! ```text
 //!                Start, with map, configuration and pose
@@ -7,88 +7,107 @@
 //!     └──────────────────────── Stop ───────────────────────────────┘
 //! ```
 //!
-//! A robot that waits must stay still: [`Polled::is_running`] is what the board enables its motor
-//! driver with.
+//! A robot that waits, or whose encoders cannot be read, must not move: the board enables its motor driver by
+//! [`Polled::may_drive`].
 //!
-//! Responsibilities, one file each: this one joins; `command` does what the robot is told;
-//! `wire` says what is told when, and reads the link.
+//! This file composes; `command` executes commands; `wire` reads the link and schedules telemetry. The deadline check
+//! is [`Polled::is_on_time`].
 
 mod command;
 mod wire;
 
 use embedded_storage::nor_flash::NorFlash;
-use sonarfix::config::Config;
-use sonarfix::health::Verdict;
+use sonarfix::health::{self, Verdict};
 use sonarfix::localizer::Localizer;
+use sonarfix::map::{Map, MapError};
 use sonarfix::units::{Duration, Instant, Metres};
-use sonarfix_hal::encoder::Wheels;
-use sonarfix_hal::robot::{Faults, Hardware, Report, Robot, Settings, SettingsError, Step};
-use sonarfix_link::message::{self, Hello, Loop, Outcome, Reset};
-use sonarfix_link::{Reporter, Telemetry, baked};
+use sonarfix_hal::config::{RobotConfig, Unsupported};
+use sonarfix_hal::robot::{Faults, Hardware, Report, Robot, Settings, Step};
+use sonarfix_link::baked::{self, BakedError};
+use sonarfix_link::message::{self, CommandResult, Hello, LoopStatus, ResetCause};
+use sonarfix_link::{Reporter, Telemetry};
 
+use crate::boots;
 use crate::check::Check;
-use crate::flashed::Flashed;
-use crate::store::{Habit, Kept, Resumed, Saved, Store, StoreError};
+use crate::flash_contents::{self, FlashContents};
+use crate::store::{Resumed, SavePolicy, Saved, Store, StoreError, WriteLimit};
 use crate::time::since;
 
 pub use wire::Link;
 use wire::Wire;
 
-/// What does not change while the robot is on.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Body {
-    /// The wheels.
-    pub wheels: Wheels,
-    /// Settings of the loop.
-    pub settings: Settings,
+/// The facts of a board that are not in the configuration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Board {
     /// Version of the firmware.
     pub firmware: [u8; 3],
-    /// Why it started.
-    pub reset: Reset,
+    /// The cause of the last reset.
+    pub reset: ResetCause,
+    /// Resets in a row before this start ([`boots`](crate::boots)).
+    pub resets: u8,
 }
 
-/// What one poll did, beside what [`App::report`] tells of the loop.
+/// The result of one poll, without the loop's, which is [`App::report`].
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use]
+#[expect(clippy::struct_excessive_bools, reason = "independent facts, each with a name")]
 pub struct Polled {
-    /// What the check of the devices found wrong, while the loop does not run.
+    /// Faults that the device check has found, while the loop does not run.
     pub missing: Faults,
-    /// A command was answered so.
-    pub answered: Option<Outcome>,
-    /// The verdict on the estimate is another than before.
+    /// The result of the command that was executed.
+    pub answered: Option<CommandResult>,
+    /// At the start: why the board cannot be the robot that its configuration describes.
+    pub unsupported: Option<Unsupported>,
+    /// The new health verdict, if it has changed.
     pub verdict: Option<Verdict>,
-    /// The record was written, or was to be.
+    /// The result of a write to the store.
     pub saved: Option<Result<(), StoreError>>,
-    /// Whether the loop runs, so that the robot may drive.
+    /// Whether this start counts as a success: a reason to set the register of [`boots`] to zero.
+    pub is_settled: bool,
+    /// Whether the loop runs.
     pub is_running: bool,
-    /// Whether it has just begun or been stopped.
+    /// Whether the motors may be enabled: while the loop runs, and its encoders can be read.
+    pub may_drive: bool,
+    /// Whether the loop has been started or stopped in this poll.
     pub has_changed: bool,
-    /// A deadline was met: a reason to feed the watchdog, and the only one.
+    /// Whether a deadline was met: the only condition for feeding the watchdog.
     pub is_on_time: bool,
 }
 
 /// The application.
 pub struct App<'m, F: NorFlash> {
-    body: Body,
-    flashed: Flashed<'m>,
-    /// The configuration in use, with its checksum: the baked one, or one that was sent since.
-    config: Option<(Config, u32)>,
+    board: Board,
+    map: Result<(Map<'m>, u32), MapError>,
+    /// The checksum of the baked configuration.
+    baked: Result<u32, BakedError>,
+    /// The present configuration with its checksum: the baked one, or one that was sent later.
+    config: Option<(RobotConfig, u32)>,
     store: Store<F>,
-    /// What lies in the store, as far as it was read or written.
+    /// The record in the store, if it has been read or written.
     stored: Option<Saved>,
+    writes: WriteLimit,
+    /// When the app began.
+    started: Instant,
+    /// Whether the record in the store is not the newest state.
+    owes_record: bool,
+    /// Whether the configuration in use is to be written.
+    owes_config: bool,
     run: u32,
-    /// Where the loop would begin from.
+    /// The state from which the loop would start.
     known: Option<Resumed>,
     mode: Mode<'m>,
     wire: Wire,
-    /// What went wrong before the loop that runs now began.
+    /// Faults before the present run of the loop.
     faults: Faults,
     worst_poll: Duration,
     time: Instant,
-    /// Whether the store has been read: by the first poll, not while the app is being made and
-    /// the stack holds copies of it.
-    has_remembered: bool,
+    /// Why the board cannot be the robot that the configuration in use describes.
+    unsupported: Option<Unsupported>,
+    /// Whether the store has been read. The first poll does it, because during construction the stack holds copies of
+    /// the application.
+    is_store_loaded: bool,
 }
 
 #[expect(clippy::large_enum_variant, reason = "there is one of it, and no heap")]
@@ -100,13 +119,17 @@ enum Mode<'m> {
 struct Running<'m> {
     robot: Robot<'m>,
     reporter: Reporter,
-    habit: Habit,
-    /// What the last poll did: here, and not handed on, for it is half a kilobyte.
+    save_policy: SavePolicy,
+    /// The state from which it started.
+    origin: Resumed,
+    /// Whether a wheel has rolled since.
+    has_rolled: bool,
+    /// The report of the last poll. It is stored here and not returned, because it is half a kilobyte.
     report: Report,
 }
 
 impl Running<'_> {
-    /// Polls the loop and reports it; whether something is worth writing down.
+    /// Polls the loop and sends its telemetry; returns whether a record is due.
     #[inline(never)]
     fn poll(
         &mut self,
@@ -122,33 +145,31 @@ impl Running<'_> {
         let localizer = self.robot.localizer();
         let verdict = localizer.health().verdict;
         polled.verdict = (verdict != before).then_some(verdict);
-        self.reporter.report(report, localizer, |said| wire.send(said, link));
+        self.reporter.report(report, localizer, |message| wire.send(message, link));
         if has_rolled(report) {
-            self.habit.rolled(now);
+            self.save_policy.rolled(now);
+            self.has_rolled = true;
         }
         polled.is_on_time = report.tick.is_some() && report.faults.deadlines == 0;
-        report.tick.is_some() && self.habit.is_due(now, localizer)
+        report.tick.is_some() && self.save_policy.is_due(now, localizer)
     }
 }
 
 impl<'m, F: NorFlash> App<'m, F> {
-    /// An app that waits, at the time `now`, with what the flash holds.
-    ///
-    /// # Errors
-    /// [`SettingsError`], by which setting of the loop breaks its rule.
-    pub fn new(
-        body: Body,
-        flashed: Flashed<'m>,
-        store: Store<F>,
-        now: Instant,
-    ) -> Result<Self, SettingsError> {
-        body.settings.check()?;
-        let app = Self {
-            body,
-            flashed,
-            config: flashed.config.ok(),
+    /// A waiting application at the time `now`, with the contents of the flash.
+    #[must_use]
+    pub fn new(board: Board, flash: FlashContents<'m>, store: Store<F>, now: Instant) -> Self {
+        Self {
+            board,
+            map: flash.map,
+            baked: flash.config.map(|(_, checksum)| checksum),
+            config: flash.config.ok(),
             store,
             stored: None,
+            writes: WriteLimit::new(now),
+            started: now,
+            owes_record: false,
+            owes_config: false,
             run: 1,
             known: None,
             mode: Mode::Waiting(Check::new(now)),
@@ -156,13 +177,13 @@ impl<'m, F: NorFlash> App<'m, F> {
             faults: Faults::default(),
             worst_poll: Duration::from_ticks(0),
             time: now,
-            has_remembered: false,
-        };
-        Ok(app)
+            is_store_loaded: false,
+            unsupported: None,
+        }
     }
 
-    /// Does what is due at `now`: one command at most, one poll of the loop, and telemetry. It
-    /// never waits, but for the flash when a record is written.
+    /// Handles what is due at `now`: at most one command, one poll of the loop, and telemetry. It never waits, except
+    /// for the flash when a record is written.
     ///
     /// # Panics
     /// Never.
@@ -174,42 +195,46 @@ impl<'m, F: NorFlash> App<'m, F> {
     ) -> Polled {
         let was_running = self.is_running();
         let mut polled = Polled::default();
-        if !self.has_remembered {
-            self.has_remembered = true;
-            polled.saved = self.remember().err().map(Err);
+        if !self.is_store_loaded {
+            self.is_store_loaded = true;
+            polled.saved = self.load_store(now, hardware).err().map(Err);
+            polled.unsupported = self.unsupported;
         }
         if let Some(frame) = self.wire.next(link) {
-            self.answer(now, &frame, link, &mut polled);
+            self.answer(now, &frame, hardware, link, &mut polled);
         }
         match &mut self.mode {
             Mode::Waiting(check) => {
                 polled.missing = check.poll(now, hardware);
                 self.faults = self.faults.plus(polled.missing);
-                polled.is_on_time = since(now, self.time) <= self.body.settings.tolerance;
+                polled.is_on_time = since(now, self.time) <= Settings::default().tolerance;
             }
             Mode::Running(running) => {
                 let is_due = running.poll(now, hardware, &mut self.wire, link, &mut polled);
                 if is_due {
-                    let saved = self.record(now, false);
-                    polled.saved = saved.map(|saved| self.write(now, &saved));
+                    running.save_policy.wrote(now, running.robot.localizer().filter().deviation());
+                    self.owes_record = true;
                 }
             }
         }
+        self.write_pending(now, &mut polled);
         if self.wire.is_hello_due(now) {
             let hello = self.hello();
             self.wire.send(&Telemetry::Hello(hello), link);
         }
         if self.wire.is_loop_due(now) {
-            let told = self.told(now);
-            self.wire.send(&Telemetry::Loop(told), link);
+            let status = self.loop_status(now);
+            self.wire.send(&Telemetry::LoopStatus(status), link);
         }
         self.time = now;
+        polled.is_settled = since(now, self.started) >= boots::SETTLED_AFTER;
         polled.is_running = self.is_running();
+        polled.may_drive = self.may_drive(now);
         polled.has_changed = polled.is_running != was_running;
         polled
     }
 
-    /// Takes note of how long a poll has taken, which only the board's clock can tell.
+    /// Records the duration of a poll, which the board measures.
     pub fn took(&mut self, poll: Duration) {
         self.worst_poll = self.worst_poll.max(poll);
     }
@@ -218,6 +243,14 @@ impl<'m, F: NorFlash> App<'m, F> {
     #[must_use]
     pub fn is_running(&self) -> bool {
         matches!(self.mode, Mode::Running(_))
+    }
+
+    /// Whether the motors may be enabled.
+    fn may_drive(&self, now: Instant) -> bool {
+        let has_odometry = |localizer: &Localizer| {
+            since(now, localizer.time()) <= health::DEGRADED_WITHOUT_ODOMETRY
+        };
+        self.localizer().is_some_and(has_odometry)
     }
 
     /// The localizer, while the loop runs.
@@ -229,7 +262,7 @@ impl<'m, F: NorFlash> App<'m, F> {
         }
     }
 
-    /// What the last poll of the loop did, while it runs.
+    /// The report of the loop's last poll, while it runs.
     #[must_use]
     pub fn report(&self) -> Option<&Report> {
         match &self.mode {
@@ -238,7 +271,7 @@ impl<'m, F: NorFlash> App<'m, F> {
         }
     }
 
-    /// What went wrong since the start.
+    /// The faults since the start.
     #[must_use]
     pub fn faults(&self) -> Faults {
         match &self.mode {
@@ -247,95 +280,181 @@ impl<'m, F: NorFlash> App<'m, F> {
         }
     }
 
-    /// What the flash held at the start.
-    #[must_use]
-    pub fn flashed(&self) -> &Flashed<'m> {
-        &self.flashed
-    }
-
-    /// What the robot knows of its pose and calibration while the loop does not run; `None`
-    /// without a configuration.
+    /// Pose and calibration while the loop does not run; `None` without a configuration.
     #[must_use]
     pub fn known(&self) -> Option<&Resumed> {
         self.known.as_ref()
     }
 
-    /// Gives the store back.
+    /// The store.
+    #[must_use]
+    pub fn store(&self) -> &Store<F> {
+        &self.store
+    }
+
+    /// The store, for tests.
+    pub fn store_mut(&mut self) -> &mut Store<F> {
+        &mut self.store
+    }
+
+    /// Releases the store.
     pub fn release(self) -> Store<F> {
         self.store
     }
 
-    /// Reads the store; one that cannot be read is made anew, which is an error to tell.
-    #[inline(never)]
-    fn remember(&mut self) -> Result<(), StoreError> {
-        let mut read = self.recall();
-        if let Err(StoreError::Corrupt) = read {
-            read = self.store.format().and(read);
-        }
-        self.run = self.stored.map_or(1, |saved| saved.run.saturating_add(1));
-        let stored = self.stored;
-        self.known = self.config.map(|(config, checksum)| match stored {
-            Some(saved) => Resumed::from(&saved, &config, checksum),
-            None => Resumed::afresh(&config),
-        });
-        read
+    /// Configures the drivers for the present configuration, if there is one.
+    fn configure_devices(&mut self, hardware: &mut impl Hardware) {
+        self.unsupported = self.config.and_then(|(config, _)| hardware.configure(&config).err());
     }
 
-    fn recall(&mut self) -> Result<(), StoreError> {
-        self.stored = self.store.load()?;
+    /// Reads the store, and configures the drivers. A stored configuration with which the robot could not start is not
+    /// used.
+    #[inline(never)]
+    fn load_store(&mut self, now: Instant, hardware: &mut impl Hardware) -> Result<(), StoreError> {
+        if self.ignores_store() {
+            self.configure_devices(hardware);
+            self.known = self.known_at_start();
+            return Err(StoreError::Ignored);
+        }
+        let opened = self.store.open();
+        // A store that cannot be repaired can still be read.
+        let read = opened.and(self.load_record());
+        let sent = self.load_config();
+        let sent = match sent {
+            Ok(Some(config)) => self.take_config(now, &config, hardware),
+            Ok(None) => Ok(()),
+            Err(error) => Err(error),
+        };
+        if self.known.is_none() {
+            self.configure_devices(hardware);
+            self.known = self.known_at_start();
+        }
+        match sent {
+            Err(StoreError::Configuration) => sent,
+            _ => read.and(sent),
+        }
+    }
+
+    /// Uses a stored configuration, if the robot can start with it.
+    fn take_config(
+        &mut self,
+        now: Instant,
+        config: &RobotConfig,
+        hardware: &mut impl Hardware,
+    ) -> Result<(), StoreError> {
+        let checksum = baked::checksum(config);
+        let known = self.known_with(config, checksum);
+        let can_start = self.check_start_with(now, config, &known).is_ok();
+        if !can_start || hardware.configure(config).is_err() {
+            return Err(StoreError::Configuration);
+        }
+        self.config = Some((*config, checksum));
+        self.known = Some(known);
+        Ok(())
+    }
+
+    fn load_record(&mut self) -> Result<(), StoreError> {
+        let stored = self.store.load();
+        self.stored = stored.ok().flatten();
+        self.run = self.stored.map_or(1, |saved| saved.run.saturating_add(1));
+        stored.map(drop)
+    }
+
+    /// The configuration that was sent and replaces the baked one, if there is one.
+    fn load_config(&mut self) -> Result<Option<RobotConfig>, StoreError> {
         let replaced = self.baked();
         let kept = self.store.load_config()?.filter(|kept| kept.replaces == replaced);
-        if let Some(Kept { config, .. }) = kept.filter(|kept| kept.config.check().is_ok()) {
-            self.config = Some((config, baked::checksum(&config)));
+        Ok(kept.map(|kept| kept.config))
+    }
+
+    fn known_at_start(&self) -> Option<Resumed> {
+        let (config, checksum) = self.config.as_ref()?;
+        Some(self.known_with(config, *checksum))
+    }
+
+    /// The state at the start with this configuration.
+    fn known_with(&self, config: &RobotConfig, checksum: u32) -> Resumed {
+        match &self.stored {
+            Some(saved) => Resumed::from(saved, &config.localizer, checksum),
+            None => Resumed::afresh(&config.localizer),
         }
-        Ok(())
     }
 
     /// Checksum of the baked configuration, zero for none.
     fn baked(&self) -> u32 {
-        self.flashed.config.map_or(0, |(_, checksum)| checksum)
+        self.baked.unwrap_or(0)
     }
 
-    /// What would be written down now; `None` without a configuration.
-    fn record(&self, now: Instant, is_parked: bool) -> Option<Saved> {
-        let (_, configuration) = self.config?;
-        let (state, deviation, is_parked) = match &self.mode {
-            Mode::Running(running) => {
-                let filter = running.robot.localizer().filter();
-                (filter.state(), filter.deviation(), is_parked)
-            }
-            Mode::Waiting(_) => {
-                let known = self.known.as_ref()?;
-                (known.state, known.deviation, is_parked && known.has_pose)
-            }
-        };
+    /// The present state as a record; `None` without a configuration.
+    fn record(&self, now: Instant) -> Option<Saved> {
+        let known = self.known_now()?;
+        let is_parked = known.has_pose && !self.is_running();
+        Some(self.record_of(now, &known, is_parked))
+    }
+
+    fn record_of(&self, now: Instant, known: &Resumed, is_parked: bool) -> Saved {
+        let configuration = self.config.map_or(0, |(_, checksum)| checksum);
         let seconds = u32::try_from(now.ticks() / 1_000_000).unwrap_or(u32::MAX);
-        Some(Saved { run: self.run, seconds, configuration, is_parked, state, deviation })
+        let Resumed { state, deviation, .. } = *known;
+        Saved { run: self.run, seconds, configuration, is_parked, state, deviation }
     }
 
-    fn write(&mut self, now: Instant, saved: &Saved) -> Result<(), StoreError> {
+    /// The present state; while the loop runs, the state after it has stopped.
+    fn known_now(&self) -> Option<Resumed> {
+        match &self.mode {
+            Mode::Waiting(_) => self.known,
+            Mode::Running(running) if running.has_rolled => {
+                let filter = running.robot.localizer().filter();
+                Some(Resumed::interrupted(filter.state(), filter.deviation()))
+            }
+            Mode::Running(running) => Some(running.origin.interrupted_again()),
+        }
+    }
+
+    /// Whether the store is not used, because reading it may be what resets the robot.
+    pub(super) fn ignores_store(&self) -> bool {
+        self.board.resets >= boots::MAX_RESETS
+    }
+
+    /// Writes pending records to the flash, as far as the write limit permits.
+    fn write_pending(&mut self, now: Instant, polled: &mut Polled) {
+        if self.ignores_store() {
+            return;
+        }
+        if self.owes_record && self.writes.take(now, u8::from(!self.is_running())) {
+            if let Some(saved) = self.record(now) {
+                polled.saved = Some(self.write(&saved));
+            }
+        } else if self.owes_config && self.writes.take(now, 1) {
+            let replaces = self.baked();
+            let config = self.config.as_ref();
+            let written = config.map(|(config, _)| self.store.save_replacement(replaces, config));
+            self.owes_config = matches!(written, Some(Err(_)));
+            polled.saved = written;
+        }
+    }
+
+    /// Writes a record; after a failure it remains pending.
+    fn write(&mut self, saved: &Saved) -> Result<(), StoreError> {
         let written = self.store.save(saved);
+        self.owes_record = written.is_err();
         if written.is_ok() {
             self.stored = Some(*saved);
-        }
-        // Tried is done: a flash that fails is not tried again at every tick.
-        if let Mode::Running(running) = &mut self.mode {
-            running.habit.wrote(now, saved.deviation);
         }
         written
     }
 
     fn hello(&self) -> Hello {
         let configuration = match self.config {
-            Some((_, checksum)) => message::Flashed::Valid(checksum),
-            None => self.flashed.config_state(),
+            Some((_, checksum)) => message::ImageStatus::Valid(checksum),
+            None => flash_contents::status(self.baked),
         };
-        let Body { firmware, reset, .. } = self.body;
-        Hello { firmware, map: self.flashed.map_state(), configuration, reset }
+        let Board { firmware, reset, .. } = self.board;
+        Hello { firmware, map: flash_contents::map_status(&self.map), configuration, reset }
     }
 
-    fn told(&self, now: Instant) -> Loop {
-        Loop {
+    fn loop_status(&self, now: Instant) -> LoopStatus {
+        LoopStatus {
             at: now,
             running: self.is_running(),
             faults: self.faults(),
@@ -351,5 +470,6 @@ fn has_rolled(report: &Report) -> bool {
             travel.right.abs() > Metres(0.0) || travel.left.abs() > Metres(0.0)
         })
     };
-    rolled(report.tick.and_then(|tick| tick.step)) || rolled(report.heard.and_then(|h| h.step))
+    rolled(report.tick.and_then(|tick| tick.step))
+        || rolled(report.ping_result.and_then(|h| h.step))
 }

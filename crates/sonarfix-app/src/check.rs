@@ -1,5 +1,4 @@
-//! Whether the devices are there: asked while the loop does not run, for the loop itself finds
-//! out only of those that it comes to use.
+//! The check of the devices while the loop does not run. The running loop only detects faults of devices that it uses.
 
 use sonarfix::units::{Duration, Instant, Radians};
 use sonarfix_hal::encoder::Counter;
@@ -9,20 +8,21 @@ use sonarfix_hal::servo::PointError;
 
 use crate::time::after;
 
-/// From one check to the next.
+/// Period of the checks.
 const PERIOD: Duration = Duration::from_ticks(1_000_000);
-/// How long a ranger may take: longer than any of our drivers.
-const PATIENCE: Duration = Duration::from_ticks(150_000);
+/// The longest time of a ranger: longer than any driver of `sonarfix-hal` takes.
+const TIMEOUT: Duration = Duration::from_ticks(150_000);
 
-/// A check of all devices, once a second: reads both counters, sends the servo ahead, pings.
+/// A check of all devices, once a second: reads both counters, points the servo ahead, pings. Without a configuration
+/// the servo is not checked.
 ///
 /// ```text
-///            due: count, point, trigger           echo, or reason for none
+///            due: count, point, trigger           echo, or no echo        
 ///   Resting ─────────────────────────▶ Pinging ────────────────────────────▶ Resting
 /// ```
 ///
-/// What it cannot see: a quadrature encoder that is unplugged looks like a wheel that stands, and
-/// a hobby servo has no way to say that it does not turn.
+/// It cannot detect an unplugged quadrature encoder, which looks like a wheel at rest, nor a hobby servo that does not
+/// turn, which has no feedback.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Check {
     state: State,
@@ -41,14 +41,14 @@ impl Check {
         Self { state: State::Resting { until: now } }
     }
 
-    /// Does what is due; gives what was found to be wrong.
+    /// Handles what is due; returns the faults that were found.
     pub fn poll(&mut self, now: Instant, hardware: &mut impl Hardware) -> Faults {
         let mut faults = Faults::default();
         match self.state {
             State::Resting { until } if now < until => {}
             State::Resting { .. } => {
                 count(hardware, &mut faults);
-                faults.servo = u32::from(is_servo_dead(now, hardware));
+                faults.servo = u32::from(has_servo_failed(now, hardware));
                 self.trigger(now, hardware, &mut faults);
             }
             State::Pinging { since } => self.listen(now, since, hardware, &mut faults),
@@ -59,9 +59,9 @@ impl Check {
     fn trigger(&mut self, now: Instant, hardware: &mut impl Hardware, faults: &mut Faults) {
         match hardware.ranger().trigger(now) {
             Ok(()) => self.state = State::Pinging { since: now },
-            // Echoes of the loop's last ping: the next poll will do.
+            // The echoes of the loop's last ping have not decayed.
             Err(TriggerError::TooSoon) => {
-                self.state = State::Resting { until: after(now, PATIENCE) }
+                self.state = State::Resting { until: after(now, TIMEOUT) }
             }
             Err(TriggerError::Device(_)) => self.end(now, true, faults),
         }
@@ -77,24 +77,24 @@ impl Check {
         match hardware.ranger().poll(now) {
             Ok(Some(Ok(_))) => self.end(now, false, faults),
             Ok(Some(Err(reason))) => self.end(now, reason.is_fault(), faults),
-            Ok(None) if now < after(since, PATIENCE) => {}
+            Ok(None) if now < after(since, TIMEOUT) => {}
             Ok(None) | Err(_) => self.end(now, true, faults),
         }
     }
 
-    fn end(&mut self, now: Instant, is_ranger_dead: bool, faults: &mut Faults) {
-        faults.ranger = u32::from(is_ranger_dead);
+    fn end(&mut self, now: Instant, has_ranger_failed: bool, faults: &mut Faults) {
+        faults.ranger = u32::from(has_ranger_failed);
         self.state = State::Resting { until: after(now, PERIOD) };
     }
 }
 
 fn count(hardware: &mut impl Hardware, faults: &mut Faults) {
-    let found = |is_dead| EncoderFaults { errors: u32::from(is_dead), illegal: 0 };
-    faults.right = found(hardware.right().count().is_err());
-    faults.left = found(hardware.left().count().is_err());
+    let fault = |has_failed| EncoderFaults { errors: u32::from(has_failed), illegal: 0 };
+    faults.right = fault(hardware.right().count().is_err());
+    faults.left = fault(hardware.left().count().is_err());
 }
 
-fn is_servo_dead(now: Instant, hardware: &mut impl Hardware) -> bool {
-    // One that does not reach ahead is no dead one.
+fn has_servo_failed(now: Instant, hardware: &mut impl Hardware) -> bool {
+    // A servo whose limits exclude straight ahead has not failed.
     matches!(hardware.servo().point(now, Radians(0.0)), Err(PointError::Pwm(_)))
 }

@@ -1,31 +1,32 @@
-//! What a sonarfix robot runs, whatever its board: [`App`].
+//! The application of a sonarfix robot, independent of its board: [`App`].
 //!
-//! `no_std`, no allocation, no panic, no `unsafe`, no clock, no global, and never a wait. A board
-//! hands it its devices, its link's bytes, its flash and the time; everything else is here, and
-//! is tested on a PC.
+//! `no_std`, no allocation, no panic, no `unsafe`, no clock, no global; it never waits. A board provides its devices, the
+//! bytes of its link, its flash and the time. Everything else is in this crate and is tested on a PC.
 //!
-//! | module | what it is for |
+//! | module | |
 //! |---|---|
-//! | this one | [`App`]: when the robot's loop runs, what commands do, what is told when |
-//! | [`store`] | calibration and last pose, over a power loss |
-//! | [`Check`] | whether the sensors are there at all, while the loop does not run |
-//! | [`Flashed`] | map and configuration, as they lie in flash |
+//! | this one | [`App`]: starts and stops the loop, executes commands, sends telemetry |
+//! | [`store`] | calibration, last pose and a sent configuration in flash |
+//! | [`boots`] | resets in a row, after which the store is not used |
+//! | [`Check`] | the check of the devices while the loop does not run |
+//! | [`FlashContents`] | map and configuration in flash |
 //!
 //! # Features
-//! - `defmt`: derives `defmt::Format` for the public types that hold data, and logs what
-//!   happens (`log`).
+//! - `defmt`: derives `defmt::Format` for the public types that hold data, and logs
+//!   events (`log`).
 
 #![no_std]
 #![forbid(unsafe_code)]
 
 mod app;
+pub mod boots;
 mod check;
-mod flashed;
+mod flash_contents;
 #[cfg(feature = "defmt")]
 pub mod log;
 pub mod store;
 mod time;
 
-pub use app::{App, Body, Link, Polled};
+pub use app::{App, Board, Link, Polled};
 pub use check::Check;
-pub use flashed::Flashed;
+pub use flash_contents::FlashContents;

@@ -1,4 +1,4 @@
-//! What an app did, as lines of a `defmt` log.
+//! The application's events as lines of a `defmt` log.
 //!
 //! *error*: the estimate is lost. *warn*: a fault survived. *info*: a mode change. *debug*: each
 //! ping. *trace*: each tick.
@@ -8,21 +8,22 @@ use sonarfix::health::Verdict;
 use sonarfix_hal::robot::Report;
 
 use crate::app::Polled;
-use crate::flashed::Flashed;
+use crate::flash_contents::FlashContents;
 
-/// Logs what the flash holds, once at the start.
-pub fn flashed(flashed: &Flashed) {
-    match &flashed.map {
+/// Logs the contents of the flash, once at the start.
+pub fn flash_contents(flash: &FlashContents) {
+    match &flash.map {
         Ok((map, checksum)) => info!("map: {} walls, checksum {:08x}", map.count(), checksum),
-        Err(error) => warn!("no map, so the robot stays still: {}", error),
+        Err(error) => warn!("no map, so the loop cannot start: {}", error),
     }
-    match &flashed.config {
+    match &flash.config {
         Ok((_, checksum)) => info!("configuration: checksum {:08x}", checksum),
-        Err(error) => warn!("no configuration, so the robot stays still: {}", error),
+        Err(error) => warn!("no configuration, so the loop cannot start: {}", error),
     }
 }
 
-/// Logs what a poll did, and in it the loop, if it runs. Not part of the frame of whoever calls it, which lies below every poll's.
+/// Logs the result of a poll and the report of the loop, if it runs. It is not inlined, because the caller's stack frame
+/// is below that of every poll.
 #[inline(never)]
 pub fn polled(polled: &Polled, of_loop: Option<&Report>) {
     if polled.has_changed {
@@ -33,12 +34,15 @@ pub fn polled(polled: &Polled, of_loop: Option<&Report>) {
         Some(verdict) => info!("{}", verdict),
         None => {}
     }
+    if let Some(reason) = polled.unsupported {
+        warn!("the configuration is not for this board: {}", reason);
+    }
     if let Some(outcome) = polled.answered {
         info!("command: {}", outcome);
     }
     match polled.saved {
         Some(Ok(())) => info!("calibration and pose written"),
-        Some(Err(error)) => warn!("calibration and pose not kept: {}", error),
+        Some(Err(error)) => warn!("calibration and pose not written: {}", error),
         None => {}
     }
     if !polled.missing.is_none() {
@@ -53,13 +57,13 @@ fn report(report: &Report) {
     if !report.faults.is_none() {
         warn!("{}", report.faults);
     }
-    if let Some(heard) = &report.heard {
+    if let Some(heard) = &report.ping_result {
         debug!("{}", heard);
     }
     if let Some(tick) = &report.tick {
         trace!("{}", tick);
     }
     if let Some(Err(no_aim)) = &report.aimed {
-        debug!("nothing to look at: {}", no_aim);
+        debug!("no wall to measure: {}", no_aim);
     }
 }

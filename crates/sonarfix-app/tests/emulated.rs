@@ -15,12 +15,14 @@ use std::path::Path;
 use std::process::{Child, Command as Process, Stdio};
 use std::time::{Duration, Instant};
 
-use sonarfix::config::Config;
+use sonarfix::config::{Config, ServoTiming};
 use sonarfix::localizer::Start;
 use sonarfix::map::Wall;
 use sonarfix::pose::{Point, Pose};
 use sonarfix::units::{Metres, Radians};
-use sonarfix_link::message::{Flashed, Loop, Outcome, Refused};
+use sonarfix_hal::config::{RobotConfig, Unsupported};
+use sonarfix_hal::ranger::RangerKind;
+use sonarfix_link::message::{CommandError, CommandResult, ImageStatus, LoopStatus};
 use sonarfix_link::{Ack, Command, Hello, Receiver, Sender, Telemetry, baked, frame};
 use tempfile::TempDir;
 
@@ -30,6 +32,8 @@ const MAP_AT: &str = "0x080E0000";
 /// Flash, which starts with the stack's top, and memory of the board.
 const FLASH_AT: u32 = 0x0800_0000;
 const RAM_AT: u32 = 0x2000_0000;
+/// Memory that the program does not use.
+const CODE_AT: u32 = RAM_AT + 0x1_0000;
 const RAM: usize = 128 * 1_024;
 /// On this computer, for anything that is waited for; the emulator is ended after it as well.
 const PATIENCE: Duration = Duration::from_secs(100);
@@ -125,12 +129,14 @@ impl Robot {
         self.wait_for(|told| if let Telemetry::Hello(hello) = told { Some(*hello) } else { None })
     }
 
-    fn how_it_fares(&mut self) -> Loop {
-        self.wait_for(|told| if let Telemetry::Loop(told) = told { Some(*told) } else { None })
+    fn how_it_fares(&mut self) -> LoopStatus {
+        self.wait_for(
+            |told| if let Telemetry::LoopStatus(told) = told { Some(*told) } else { None },
+        )
     }
 
     /// Sends a command and waits for its answer.
-    fn order(&mut self, command: &Command) -> Outcome {
+    fn order(&mut self, command: &Command) -> CommandResult {
         let sequence = self.sender.next();
         let mut buffer = frame::EMPTY;
         let bytes = self.sender.frame(command, &mut buffer).to_vec();
@@ -138,9 +144,9 @@ impl Robot {
         self.answer_to(sequence)
     }
 
-    fn answer_to(&mut self, asked: u16) -> Outcome {
+    fn answer_to(&mut self, asked: u16) -> CommandResult {
         self.wait_for(|told| match told {
-            Telemetry::Ack(Ack { sequence, outcome }) if *sequence == asked => Some(*outcome),
+            Telemetry::Ack(Ack { sequence, result }) if *sequence == asked => Some(*result),
             _ => None,
         })
     }
@@ -164,14 +170,18 @@ impl Robot {
         }
     }
 
-    /// Lets the program go on at another address, as a debugger would.
-    fn sent_astray(&mut self, to: u32) {
+    /// Lets the program go on at code in its memory, as a debugger would. The code enables the motors, which the
+    /// program itself does not without encoders, and jumps to where there is nothing.
+    fn sent_astray(&mut self) {
+        // ldr r0, port; movs r1, #0x80; str r1, [r0]; ldr r0, nowhere; bx r0; nop; port; nowhere
+        let code = "0248802101600248004700bf1804024001000030";
         let mut debugger = connected(&self.files.path().join("debugger"));
         debugger.set_nonblocking(true).unwrap();
         // Registers can be written once their description was read; 15 is the program counter, in the
         // order of its bytes. Then let go.
-        let address = format!("Pf={:08x}", to.swap_bytes());
-        for order in ["qXfer:features:read:target.xml:0,ffb", &address, "D"] {
+        let address = format!("Pf={:08x}", CODE_AT.swap_bytes());
+        let memory = format!("M{CODE_AT:08x},14:{code}");
+        for order in ["qXfer:features:read:target.xml:0,ffb", &memory, &address, "D"] {
             self.debug(&mut debugger, order);
         }
     }
@@ -215,6 +225,12 @@ impl Robot {
         })
     }
 
+    /// Whether the motors have ever been enabled.
+    fn has_driven(&self) -> bool {
+        let log = std::fs::read_to_string(self.files.path().join("writes")).unwrap_or_default();
+        log.lines().any(|line| line.contains("GPIOB") && line.contains("value 0x00000080)"))
+    }
+
     fn send(&mut self, bytes: &[u8]) {
         self.line.write_all(bytes).unwrap();
     }
@@ -251,8 +267,11 @@ fn map() -> Vec<u8> {
     sonarfix_map::bake(&walls()).unwrap()
 }
 
-fn configuration() -> Config {
-    Config::for_track_width(Metres(0.16))
+fn configuration() -> RobotConfig {
+    let mut localizer = Config::for_track_width(Metres(0.16));
+    localizer.sonar.servo = (Radians::from_degrees(-90.0), Radians::from_degrees(90.0));
+    localizer.sonar.timing.servo = ServoTiming::SG90;
+    RobotConfig::with_common_parts(localizer)
 }
 
 fn config() -> Vec<u8> {
@@ -272,8 +291,8 @@ fn pose() -> Start {
 fn without_map_and_configuration_it_stays_still_and_says_so() {
     let mut robot = Robot::switched_on(&[], &[]);
     let hello = robot.hello();
-    assert_eq!((hello.map, hello.configuration), (Flashed::Missing, Flashed::Missing));
-    assert_eq!(robot.order(&Command::Start), Outcome::Refused(Refused::NoMap));
+    assert_eq!((hello.map, hello.configuration), (ImageStatus::Missing, ImageStatus::Missing));
+    assert_eq!(robot.order(&Command::Start), CommandResult::Refused(CommandError::NoMap));
     assert!(!robot.how_it_fares().running);
 }
 
@@ -286,16 +305,50 @@ fn a_damaged_map_or_configuration_is_said_to_be_damaged() {
     };
     let mut robot = Robot::switched_on(&damaged(map()), &config());
     let hello = robot.hello();
-    assert_eq!(hello.map, Flashed::Corrupt);
-    assert_eq!(hello.configuration, Flashed::Valid(baked::checksum(&configuration())));
-    assert_eq!(robot.order(&Command::SetPose(pose())), Outcome::Done);
-    assert_eq!(robot.order(&Command::Start), Outcome::Refused(Refused::NoMap));
+    assert_eq!(hello.map, ImageStatus::Corrupt);
+    assert_eq!(hello.configuration, ImageStatus::Valid(baked::checksum(&configuration())));
+    assert_eq!(robot.order(&Command::SetPose(pose())), CommandResult::Done);
+    assert_eq!(robot.order(&Command::Start), CommandResult::Refused(CommandError::NoMap));
 
     let mut robot = Robot::switched_on(&map(), &damaged(config()));
     let hello = robot.hello();
-    assert_eq!(hello.configuration, Flashed::Corrupt);
-    assert_eq!(robot.order(&Command::Start), Outcome::Refused(Refused::NoConfiguration));
+    assert_eq!(hello.configuration, ImageStatus::Corrupt);
+    assert_eq!(robot.order(&Command::Start), CommandResult::Refused(CommandError::NoConfiguration));
     assert!(!robot.how_it_fares().running);
+}
+
+/// The program that is flashed is another robot with another configuration, and refuses to be one that
+/// the board cannot be.
+#[test]
+#[ignore = "cargo xtask test-firmware"]
+fn the_configuration_alone_makes_another_robot() {
+    let baked =
+        |config: &RobotConfig| baked::write(config, &mut [0; baked::LENGTH_MAX]).unwrap().to_vec();
+    for (period, expected) in [(100_000, 50), (50_000, 100)] {
+        let encoder_period = sonarfix::units::Duration::from_ticks(period);
+        let config = RobotConfig { encoder_period, ..configuration() };
+        let mut robot = Robot::switched_on(&map(), &baked(&config));
+        assert_eq!(robot.hello().configuration, ImageStatus::Valid(baked::checksum(&config)));
+        assert_eq!(robot.order(&Command::SetPose(pose())), CommandResult::Done);
+        assert_eq!(robot.order(&Command::Start), CommandResult::Done);
+        robot.how_it_fares();
+        let (mut samples, mut seconds) = (0_u32, 0);
+        while seconds < 5 {
+            match robot.next() {
+                Telemetry::Estimate(_) => samples += 1,
+                Telemetry::LoopStatus(_) => seconds += 1,
+                _ => {}
+            }
+        }
+        assert!(samples.abs_diff(expected) <= 1, "{samples} samples in 5 s");
+    }
+    let mut srf = configuration();
+    srf.ranger.kind = RangerKind::Srf { address: 0x70 };
+    let mut robot = Robot::switched_on(&map(), &baked(&srf));
+    robot.hello();
+    assert_eq!(robot.order(&Command::SetPose(pose())), CommandResult::Done);
+    let refused = CommandError::Unsupported(Unsupported::Ranger);
+    assert_eq!(robot.order(&Command::Start), CommandResult::Refused(refused));
 }
 
 /// Every sensor is missing in the emulator, and every one is reported, before the loop runs and
@@ -306,29 +359,32 @@ fn a_minute_of_ticks_and_no_deadline_missed() {
     let mut robot = Robot::switched_on(&map(), &config());
     let image = map();
     let checksum = u32::from_le_bytes(*image.last_chunk().unwrap());
-    assert_eq!(robot.hello().map, Flashed::Valid(checksum));
+    assert_eq!(robot.hello().map, ImageStatus::Valid(checksum));
     robot.how_it_fares();
     let fares = robot.how_it_fares();
     let faults = fares.faults;
     assert!(faults.right.errors > 0 && faults.left.errors > 0, "encoders: {faults:?}");
     assert!(faults.servo > 0 && faults.ranger > 0, "servo and ranger: {faults:?}");
 
-    assert_eq!(robot.order(&Command::MapChecksum), Outcome::Map(Flashed::Valid(checksum)));
-    assert_eq!(robot.order(&Command::Start), Outcome::Refused(Refused::NoPose));
-    assert_eq!(robot.order(&Command::SetPose(pose())), Outcome::Done);
-    assert_eq!(robot.order(&Command::Start), Outcome::Done);
+    assert_eq!(
+        robot.order(&Command::MapChecksum),
+        CommandResult::Map(ImageStatus::Valid(checksum))
+    );
+    assert_eq!(robot.order(&Command::Start), CommandResult::Refused(CommandError::NoPose));
+    assert_eq!(robot.order(&Command::SetPose(pose())), CommandResult::Done);
+    assert_eq!(robot.order(&Command::Start), CommandResult::Done);
     let began = robot.wait_for(|told| match told {
-        Telemetry::Began(estimate) => Some(*estimate),
+        Telemetry::Initialized(estimate) => Some(*estimate),
         _ => None,
     });
-    assert_eq!(began.state.x.to_bits(), 1.0_f32.to_bits());
+    assert_eq!(began.state.x.0.to_bits(), 1.0_f32.to_bits());
 
     // A minute by the robot's clock.
     let (mut ticks, mut worst) = (0, 0);
     let fares = loop {
         match robot.next() {
             Telemetry::Estimate(_) => ticks += 1,
-            Telemetry::Loop(fares) => {
+            Telemetry::LoopStatus(fares) => {
                 assert!(fares.running && fares.faults.deadlines == 0, "{fares:?}");
                 worst = worst.max(fares.worst_poll.to_micros());
                 if fares.at > began.at + sonarfix::units::Duration::secs(60) {
@@ -366,7 +422,7 @@ fn check_memory(robot: &mut Robot) {
 fn garbage_is_counted_and_commands_after_it_are_done_once() {
     let mut robot = Robot::switched_on(&map(), &config());
     robot.hello();
-    assert_eq!(robot.order(&Command::SetPose(pose())), Outcome::Done);
+    assert_eq!(robot.order(&Command::SetPose(pose())), CommandResult::Done);
     let before = robot.how_it_fares().commands;
 
     // Noise, a cut frame, and a damaged one.
@@ -381,7 +437,7 @@ fn garbage_is_counted_and_commands_after_it_are_done_once() {
     // What follows is done all the same, and garbage was not taken for a start.
     assert_eq!(robot.order(&Command::MapChecksum), {
         let image = map();
-        Outcome::Map(Flashed::Valid(u32::from_le_bytes(*image.last_chunk().unwrap())))
+        CommandResult::Map(ImageStatus::Valid(u32::from_le_bytes(*image.last_chunk().unwrap())))
     });
     robot.how_it_fares();
     let fares = robot.how_it_fares();
@@ -390,16 +446,16 @@ fn garbage_is_counted_and_commands_after_it_are_done_once() {
 
     // A frame that is sent twice, because its answer was lost, is answered twice and done once.
     robot.send(&whole);
-    assert_eq!(robot.answer_to(7), Outcome::Done);
-    assert_eq!(robot.order(&Command::Stop), Outcome::Done);
+    assert_eq!(robot.answer_to(7), CommandResult::Done);
+    assert_eq!(robot.order(&Command::Stop), CommandResult::Done);
     assert!(!robot.how_it_fares().running);
     let again = Sender::starting_at(8).frame(&Command::Start, &mut buffer).to_vec();
     robot.send(&again);
     robot.send(&again);
-    let began = |told: &Telemetry| matches!(told, Telemetry::Began(_)).then_some(());
-    assert_eq!(robot.answer_to(8), Outcome::Done);
+    let began = |told: &Telemetry| matches!(told, Telemetry::Initialized(_)).then_some(());
+    assert_eq!(robot.answer_to(8), CommandResult::Done);
     robot.wait_for(began);
-    assert_eq!(robot.answer_to(8), Outcome::Done);
+    assert_eq!(robot.answer_to(8), CommandResult::Done);
     assert!(robot.how_it_fares().running);
 }
 
@@ -411,13 +467,13 @@ fn a_fault_stops_the_motors() {
     let mut robot = Robot::switched_on(&map(), &config());
     robot.hello();
     assert_eq!(robot.may_drive(), Some(false));
-    assert_eq!(robot.order(&Command::SetPose(pose())), Outcome::Done);
-    assert_eq!(robot.order(&Command::Start), Outcome::Done);
+    assert_eq!(robot.order(&Command::SetPose(pose())), CommandResult::Done);
+    assert_eq!(robot.order(&Command::Start), CommandResult::Done);
     robot.how_it_fares();
-    assert_eq!(robot.may_drive(), Some(true));
-    // Where there is nothing.
-    robot.sent_astray(0x3000_0000);
-    while robot.may_drive() == Some(true) {
+    // Its encoders cannot be read here.
+    assert_eq!(robot.may_drive(), Some(false));
+    robot.sent_astray();
+    while !robot.has_driven() || robot.may_drive() == Some(true) {
         robot.listen();
     }
 }

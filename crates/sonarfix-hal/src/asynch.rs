@@ -1,11 +1,10 @@
-//! The same drivers behind the waits of `embedded-hal-async`, for executors.
+//! `embedded-hal-async` functions over the same drivers, for executors.
 //!
-//! Nothing is implemented twice: each function here sleeps until there is something to do, and
-//! then polls the driver that is polled without it. Dropping one of its futures is safe; a ping
-//! dropped in flight is given up by the driver with the next trigger.
+//! Nothing is implemented twice: each function sleeps until there is something to do, and then polls the driver.
+//! Dropping a future is safe; the driver aborts a dropped ping with the next trigger.
 //!
 //! # Non-finite policy
-//! That of the polled drivers: nothing is computed here.
+//! That of the polled drivers.
 
 use core::convert::Infallible;
 use core::future::{Future, poll_fn};
@@ -24,9 +23,9 @@ use crate::robot::{Hardware, Report, Robot};
 use crate::servo::Servo;
 use crate::time::{after, since};
 
-/// A clock to read: the same for all of a robot.
+/// The clock of a robot, common to all of its devices.
 pub trait Clock {
-    /// The time now.
+    /// The present time.
     fn now(&self) -> Instant;
 }
 
@@ -36,8 +35,8 @@ impl<F: Fn() -> Instant> Clock for F {
     }
 }
 
-/// Pings, and sleeps until the echo line moves. The edges get the time at which the executor
-/// woke this future, so its latency enters the range: 100 µs are 17 mm.
+/// Pings, and sleeps until an edge of the echo line. An edge has the time at which the executor wakes this future, so
+/// that its latency enters the range: 100 µs are 17 mm.
 ///
 /// ```
 /// use embedded_hal::digital::{InputPin, OutputPin};
@@ -46,7 +45,7 @@ impl<F: Fn() -> Instant> Clock for F {
 /// use sonarfix_hal::asynch::{Clock, ping};
 /// use sonarfix_hal::ranger::{Polled, PulseRanger};
 ///
-/// /// How far it is to whatever is ahead, if anything.
+/// /// The distance to the nearest obstacle ahead, if there is one.
 /// async fn clearance<T: OutputPin, P: InputPin + Wait>(
 ///     ranger: &mut PulseRanger<T, Polled<P>>,
 ///     clock: &impl Clock,
@@ -75,7 +74,7 @@ pub async fn ping<T: OutputPin, P: InputPin + Wait>(
         }
         let left = since(after(start, timing.listen), now);
         let (pin, is_high) = ranger.line().pin();
-        // Levels, not edges: one that came between poll and wait is not slept through.
+        // Levels instead of edges: an edge between poll and wait is not missed.
         let edge =
             async { if is_high { pin.wait_for_low().await } else { pin.wait_for_high().await } };
         if let Some(Err(error)) = unless(edge, sleep(delay, left)).await {
@@ -84,8 +83,8 @@ pub async fn ping<T: OutputPin, P: InputPin + Wait>(
     }
 }
 
-/// Pings with any ranger, and asks for the outcome every `step`: for those on a bus, and those
-/// whose edges an interrupt stamps.
+/// Pings with any ranger, and polls the outcome every `step`: for rangers on a bus, and for those whose edges are
+/// stamped by an interrupt.
 ///
 /// # Errors
 /// [`TriggerError`]; the ping is over.
@@ -105,7 +104,7 @@ pub async fn measure<R: Ranger>(
     }
 }
 
-/// Sleeps until the servo stands still. At once for one that was never pointed.
+/// Sleeps until the servo has settled; not at all before its first command.
 pub async fn settle<P: SetDutyCycle>(
     servo: &Servo<P>,
     clock: &impl Clock,
@@ -116,10 +115,10 @@ pub async fn settle<P: SetDutyCycle>(
     }
 }
 
-/// Counts an encoder, for ever: sleeps until either channel moves, and decodes.
+/// Decodes an encoder forever: sleeps until an edge of either channel, and counts it.
 ///
 /// # Errors
-/// A pin's. Call it again to go on; an edge missed in between shows as illegal.
+/// A pin's. A further call continues; an edge missed in between counts as illegal.
 pub async fn count<A, B>(decoder: &mut Quadrature<'_, A, B>) -> Result<Infallible, A::Error>
 where
     A: InputPin + Wait,
@@ -134,20 +133,20 @@ where
     }
 }
 
-/// Runs the loop, for ever: polls it every `step` while a ping is in flight and sleeps until
-/// something is due otherwise. `tell` gets every report that says anything.
+/// Runs the loop forever: polls it every `step` while a ping is in flight, and otherwise sleeps until something is due.
+/// `on_report` receives every report that is not empty.
 pub async fn run<'m>(
     robot: &mut Robot<'m>,
     hardware: &mut impl Hardware,
     clock: &impl Clock,
     delay: &mut impl DelayNs,
     step: Duration,
-    mut tell: impl FnMut(&Robot<'m>, Report),
+    mut on_report: impl FnMut(&Robot<'m>, Report),
 ) -> Infallible {
     loop {
         let report = robot.poll(clock.now(), hardware);
         if !report.is_empty() {
-            tell(robot, report);
+            on_report(robot, report);
         }
         let now = clock.now();
         let idle = robot.idle_until(hardware).map_or(step, |until| since(until, now).max(step));
@@ -160,7 +159,7 @@ async fn sleep(delay: &mut impl DelayNs, span: Duration) {
     delay.delay_us(micros).await;
 }
 
-/// Which of two futures was ready.
+/// The future of two that was ready.
 enum Either<A, B> {
     First(A),
     Second(B),
@@ -181,7 +180,7 @@ async fn either<A, B>(
     .await
 }
 
-/// The output of `future`, unless `limit` is over before.
+/// The output of `future`, if it is ready before `limit`.
 async fn unless<A>(future: impl Future<Output = A>, limit: impl Future<Output = ()>) -> Option<A> {
     match either(future, limit).await {
         Either::First(value) => Some(value),

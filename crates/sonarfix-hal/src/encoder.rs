@@ -1,13 +1,12 @@
-//! Wheel encoders: from edges or a hardware counter to metres rolled.
+//! Wheel encoders: from edges or a hardware counter to travel in metres.
 //!
-//! Responsibilities, one file each:
-//! - [`Counter`]: what a position counter is, whoever counts (a timer in encoder mode, a chip on
-//!   a bus, or software), and how its wrap-around is undone;
-//! - [`Quadrature`]: counting in software, from two pins;
-//! - [`WheelGeometry`]: how far one tick rolls the wheel.
+//! - [`Counter`]: a position counter (a timer in encoder mode, a chip on a bus, or software), and the removal of its
+//!   wrap-around;
+//! - [`Quadrature`]: a decoder in software, from two pins;
+//! - [`WheelGeometry`]: the travel of the wheel from one tick to the next.
 //!
-//! *Tick*: one count. A decoder that counts every edge of both channels (x4) makes four ticks of
-//! one period of a channel.
+//! *Tick*: one count. A decoder that counts every edge of both channels (x4) counts four ticks in a period of a
+//! channel.
 //!
 //! # Non-finite policy
 //! Counts are integers; [`WheelGeometry`] refuses a diameter or a resolution that is not finite.

@@ -1,32 +1,31 @@
-//! Drivers for the sensors of a small wheeled robot, and the loop that joins them to the
+//! Drivers for the sensors of a small wheeled robot, and the loop that connects them to the
 //! [`sonarfix`] localizer.
 //!
-//! `no_std`, no allocation, no panic, no `unsafe`, no global, and never a wait: everything is
-//! polled with the time, by firmware, simulator and emulator alike. The hardware is reached
-//! through `embedded-hal` 1.0, so any board that has it will do.
+//! `no_std`, no allocation, no panic, no `unsafe`, no global. Nothing waits: firmware, simulator and emulator
+//! poll the same code with the time as an argument. The hardware is accessed through `embedded-hal` 1.0.
 //!
-//! | module | what it is for |
+//! | module | |
 //! |---|---|
-//! | [`encoder`] | counters of any width, a software quadrature decoder, ticks to metres |
-//! | [`servo`] | bearing to pulse, and a model of where the servo points now |
-//! | [`ranger`] | ultrasonic rangers: HC-SR04 and kin, LV-MaxSonar, SRF02, SRF08 |
-//! | [`robot`] | the loop: encoder ticks, and the sonar's aim, turn, settle, ping, listen, fuse |
+//! | [`config`] | the description of a robot: everything that its builder measures or chooses |
+//! | [`encoder`] | counters of any width, a software quadrature decoder, edges to metres |
+//! | [`servo`] | bearing to pulse, and a model of the servo's present bearing |
+//! | [`ranger`] | ultrasonic rangers: HC-SR04 and compatible ones, LV-MaxSonar, SRF02, SRF08 |
+//! | [`robot`] | the loop: encoder samples, and the measurement cycle of the sonar |
 //!
-//! [`robot::Robot`] is the way in; its example is a whole fix.
+//! Start with [`robot::Robot`], whose example is a complete fix.
 //!
-//! *Time* is a `fugit` instant in microseconds that the caller passes; one clock for everything,
-//! the stamps of interrupts included. *Bearing*: relative to the robot's heading, positive to
+//! *Time* is a `fugit` instant in microseconds that the caller passes; all times are of one clock, including the
+//! time stamps of interrupts. *Bearing*: relative to the robot's heading, positive to
 //! the left.
 //!
 //! # Non-finite policy
-//! Counts, edges and times are integers here; what is made of them, travel and ranges, is finite.
-//! NaN and infinity in a calibration, a geometry, a temperature or a bearing to point at are typed
-//! errors, and nothing has moved (the modules say which).
+//! Counts, edges and times are integers, so travel and ranges are finite. NaN and infinity in a calibration, a
+//! geometry, a temperature or a commanded bearing are typed errors without any other effect.
 //!
 //! # Features
-//! - `async`: the same drivers behind the waits of `embedded-hal-async` (module `asynch`).
+//! - `async`: `embedded-hal-async` functions over the same drivers (module `asynch`).
 //! - `defmt`: derives `defmt::Format` for the public types that hold data.
-//! - `serde`: derives `Serialize` and `Deserialize` for those that a robot tells of its loop.
+//! - `serde`: derives `Serialize` and `Deserialize` for configuration and telemetry.
 
 #![no_std]
 #![forbid(unsafe_code)]
@@ -36,6 +35,7 @@ extern crate std;
 
 #[cfg(feature = "async")]
 pub mod asynch;
+pub mod config;
 pub mod encoder;
 pub mod ranger;
 pub mod robot;

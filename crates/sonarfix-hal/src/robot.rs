@@ -1,43 +1,42 @@
-//! The loop of the robot: encoder ticks, and the sonar's cycle beside them.
+//! The robot's loop: encoder samples, and the measurement cycle of the sonar beside them.
 //!
-//! Responsibilities:
-//! - [`Robot`]: what is done when. It composes; it computes nothing itself.
-//! - [`Hardware`], [`Devices`]: what it is polled with.
-//! - [`Settings`], [`Rhythm`], [`Stamp`]: what can be set.
-//! - [`Report`] and its parts: what a poll did. [`Faults`]: what went wrong.
-//! - private: the ledger of ticks (`odometer`), the grid of due times (`schedule`), the sonar's
-//!   state machine (`sonar`).
+//! | item | responsibility |
+//! |---|---|
+//! | [`Robot`] | the order of the steps of a poll; it composes and computes nothing itself |
+//! | [`Hardware`], [`Devices`] | the devices that a poll uses, and their configuration |
+//! | [`Settings`], [`Stamp`] | the settings |
+//! | [`Report`] | what a poll did |
+//! | [`Faults`] | counts of faults |
+//! | `odometer` (private) | the ledger of encoder edges |
+//! | `schedule` (private) | periodic deadlines |
+//! | `sonar` (private) | the state machine of a measurement cycle |
 //!
-//! *Tick*: here, one round of reading both encoders (every 100 ms), and telling the localizer.
-//! *Look*: one cycle of the sonar: aim, turn, settle, ping, listen, fuse.
+//! *Tick*: one sample of both encoders (every 100 ms by default), passed to the localizer.
+//! *Measurement cycle*: choose a wall, turn the servo, wait until it has settled, ping, listen, fuse.
 //!
 //! # Time
-//! [`Robot::poll`] never waits and reads no clock. It may be called as often as you like, and
-//! late: due times stay on their grid, and a late one is done once.
+//! [`Robot::poll`] never waits and reads no clock. It may be called at any rate, and late: deadlines stay on their
+//! grid, and a late one is handled once.
 //!
-//! An echo belongs to the instant at which the sound met the wall, which is over when the echo
-//! is heard. So both counters are read at the trigger and again when the echo is taken; the
-//! wheels' position at the reflection is interpolated between the two (their mean, if the echo
-//! is taken as it is heard), rounded to half a tick; the localizer is told the travel up to
-//! there, then the range, and with the next tick the rest. A tick that falls due while the sonar
-//! listens is held back until the ping is over (32 ms with an HC-SR04, 65 ms with an SRF08): so
-//! time never runs backwards for the localizer, and nothing has to be undone.
+//! An echo belongs to the instant of its reflection, which has passed when the echo arrives. Both counters are
+//! therefore read at the trigger and again when the echo is read. The position of the wheels at the reflection is
+//! interpolated between the two readings, rounded to half an edge. The localizer takes the travel up to the
+//! reflection, then the range, and at the next tick the remaining travel. A tick that is due while a ping is in
+//! flight is delayed until the ping has ended (32 ms with an HC-SR04, 65 ms with an SRF08), so that time never runs
+//! backwards for the localizer.
 //!
-//! # Nothing lost
-//! The ledger of ticks is kept in whole half ticks. However polls are spread and steps are cut,
-//! what [`Step`]s report as taken and as written off adds up to what the counters counted from
-//! the first poll on.
+//! # Conservation of travel
+//! The ledger counts whole half edges. However the polls are spread and the steps are split, the travel that the
+//! [`Step`]s report as accepted or discarded adds up to what the counters have counted since the first poll.
 //!
 //! # Faults
-//! No fault stops the loop; each is counted in [`Faults`], and the robot goes on with what it
-//! has. An encoder that cannot be read: no step, until it can be, which then brings the whole
-//! travel; a ping waits. A servo that does not obey: the wall that its last bearing meets
-//! squarely, if there is one. A ranger that fails: odometry only. What a driver cannot notice
-//! (an encoder that stands still, a servo that is blocked) shows in the localizer's health.
+//! No fault stops the loop; each is counted in [`Faults`]. Without a readable encoder there is no step until it is
+//! readable again, and that step contains the whole travel; pings are suspended. If the servo does not move, the
+//! wall at its last bearing is measured, if there is one. Without a ranger, odometry continues. Faults that no
+//! driver can detect (an encoder that stands still, a blocked servo) are detected by the localizer's health.
 //!
 //! # Non-finite policy
-//! Nothing here computes with floats but travel from whole ticks and ranges from whole
-//! microseconds, which are finite; the localizer refuses what is not.
+//! Travel is computed from whole edges and ranges from whole microseconds, so both are finite.
 
 mod faults;
 mod hardware;
@@ -48,7 +47,9 @@ mod settings;
 mod sonar;
 
 use sonarfix::aim::Aim;
-use sonarfix::localizer::{Fix, Localizer};
+use sonarfix::config::PingSchedule;
+use sonarfix::ekf::EkfError;
+use sonarfix::localizer::{Fix, Localizer, Start};
 use sonarfix::motion::WheelTravel;
 use sonarfix::units::Instant;
 
@@ -59,9 +60,9 @@ use crate::time::{after, micros, since};
 pub use faults::{EncoderFaults, Faults};
 pub use hardware::{Devices, Hardware};
 use odometer::{Odometer, Position, Reading};
-pub use report::{Heard, Report, Step, Taken, Tick};
+pub use report::{PingResult, Report, Step, StepResult, Tick};
 use schedule::Schedule;
-pub use settings::{Rhythm, Settings, SettingsError, Stamp};
+pub use settings::{Settings, SettingsError, Stamp};
 use sonar::Cycle;
 
 /// The loop.
@@ -69,14 +70,14 @@ use sonar::Cycle;
 /// ```
 /// # use embedded_hal_mock::eh1::pwm::{Mock as Pwm, Transaction};
 /// # use embedded_hal_mock::eh1::digital::{Mock as Pin, State, Transaction as Level};
-/// use sonarfix::{config::Config, localizer::{Fix, Localizer, Start}, map::{Map, Wall}};
+/// use sonarfix::{config::{Config, PingSchedule}, localizer::{Fix, Localizer, Start}, map::{Map, Wall}};
 /// use sonarfix::{pose::{Point, Pose}, units::{Duration, Instant, Metres, Radians}};
 /// use sonarfix_hal::encoder::{Count16, WheelGeometry, Wheels};
-/// use sonarfix_hal::ranger::{Air, Captured, EchoCapture, PulseRanger, PulseTiming};
-/// use sonarfix_hal::robot::{Devices, Robot, Rhythm, Settings};
-/// use sonarfix_hal::servo::{Calibration, MeasuredPulse, Pace, Servo};
+/// use sonarfix_hal::ranger::{Captured, EchoCapture, PulseRanger};
+/// use sonarfix_hal::robot::{Devices, Robot, Settings};
+/// use sonarfix_hal::servo::{MeasuredPulse, Servo, ServoSettings, ServoTiming};
 ///
-/// // The robot stands 1.03 m before a wall and looks at it.
+/// // The robot stands 1.03 m in front of a wall.
 /// let walls = [Wall::new(Point::new(1.03, 2.0), Point::new(1.03, -2.0))?];
 /// let start = Start {
 ///     pose: Pose::new(0.0, 0.0, Radians(0.0)),
@@ -84,39 +85,42 @@ use sonar::Cycle;
 ///     heading_deviation: Radians(0.02),
 /// };
 /// let at = |millis: u64| Instant::from_ticks(millis * 1_000);
-/// let config = Config::for_track_width(Metres(0.16));
+/// let mut config = Config::for_track_width(Metres(0.16));
+/// config.sonar.timing.schedule = PingSchedule::AsFastAsPossible;
 /// let localizer = Localizer::new(config, Map::new(&walls), start, at(0))?;
 /// let wheel = WheelGeometry::new(Metres(0.065), 1_496.6)?;
-/// let settings = Settings { rhythm: Rhythm::AsFastAsPossible, ..Settings::default() };
-/// let mut robot = Robot::new(localizer, Wheels::alike(wheel), settings)?;
+/// let mut robot = Robot::new(localizer, Wheels::alike(wheel), Settings::default())?;
 ///
 /// # let max = Transaction::max_duty_cycle(40_000);
 /// # let mut channel = Pwm::new(&[max.clone(), Transaction::set_duty_cycle(3_000), max]);
 /// # let mut pin = Pin::new(&[Level::set(State::High), Level::set(State::Low)]);
 /// # let (pwm, trigger) = (channel.clone(), pin.clone());
-/// # let degrees = Radians::from_degrees;
-/// # let calibration = Calibration::new(
-/// #     MeasuredPulse { width: Duration::from_ticks(1_000), bearing: degrees(-45.0) },
-/// #     MeasuredPulse { width: Duration::from_ticks(2_000), bearing: degrees(45.0) },
-/// # )?;
+/// # let pulse = |width, degrees| MeasuredPulse {
+/// #     width: Duration::from_ticks(width),
+/// #     bearing: Radians::from_degrees(degrees),
+/// # };
+/// # let servo = ServoSettings {
+/// #     pulses: [pulse(1_000, -45.0), pulse(2_000, 45.0)],
+/// #     limits: (Radians::from_degrees(-80.0), Radians::from_degrees(80.0)),
+/// #     timing: ServoTiming::SG90,
+/// # };
 /// # let (timer_right, timer_left) = (7_u16, 9_u16);
 /// let echo = EchoCapture::new();
-/// let timing = PulseTiming::HC_SR04;
 /// let mut devices = Devices {
 ///     right: Count16(|| timer_right),
 ///     left: Count16(|| timer_left),
-///     servo: Servo::new(pwm, calibration, (degrees(-80.0), degrees(80.0)), Pace::SG90)?,
-///     ranger: PulseRanger::new(trigger, Captured::new(&echo), timing, Air::ROOM),
+///     servo: Servo::configured(pwm, servo)?,
+///     ranger: PulseRanger::new(trigger, Captured::new(&echo)),
 /// };
 ///
-/// // It aims, and 302 ms later the servo has settled, so it pings.
+/// // The loop chooses the wall; 302 ms later the servo has settled, and it pings.
 /// assert!(robot.poll(at(0), &mut devices).aimed.is_some());
 /// assert!(robot.poll(at(302), &mut devices).pinged.is_some());
-/// robot.poll(at(303), &mut devices); // ends the trigger's pulse
-/// echo.rose(at(304)); // the interrupt stamps the echo's edges,
+/// robot.poll(at(303), &mut devices); // ends the trigger pulse
+/// echo.rose(at(304)); // the interrupt stamps the edges of the echo,
 /// echo.fell(at(310));
-/// let heard = robot.poll(at(311), &mut devices).heard; // and the loop finds them
-/// assert!(matches!(heard.and_then(|heard| heard.fix), Some(Fix::Accepted(_))));
+/// let result = robot.poll(at(311), &mut devices).ping_result; // and the loop reads them
+/// assert!(matches!(result.and_then(|result| result.fix), Some(Fix::Accepted(_))));
 /// # channel.done();
 /// # pin.done();
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -127,18 +131,18 @@ pub struct Robot<'m> {
     settings: Settings,
     odometer: Odometer,
     ticks: Schedule,
-    /// The dots of [`Rhythm::Every`]; unused with the other rhythm.
-    looks: Schedule,
+    /// The deadlines of [`PingSchedule::Every`]; unused with the other schedule.
+    pings: Schedule,
     cycle: Cycle,
-    /// The time of the poll before.
+    /// The time of the previous poll.
     time: Instant,
     faults: Faults,
 }
 
 impl<'m> Robot<'m> {
-    /// A loop that begins at the localizer's time: ticks and looks fall due from there on.
+    /// A loop that starts at the localizer's time, from which the deadlines of ticks and pings are counted.
     ///
-    /// The counters' first reading, in the first poll, is where the wheels' travel begins.
+    /// The first poll reads the counters; the travel of the wheels is counted from there.
     ///
     /// # Errors
     /// [`SettingsError`], by which setting breaks its rule.
@@ -149,26 +153,75 @@ impl<'m> Robot<'m> {
     ) -> Result<Self, SettingsError> {
         settings.check()?;
         let start = localizer.time();
-        let (looks, look_at) = match settings.rhythm {
-            Rhythm::Every(period) => (Schedule::new(start, period), after(start, period)),
-            Rhythm::AsFastAsPossible => (Schedule::new(start, settings.tick), start),
+        let (pings, until) = match localizer.config().sonar.timing.schedule {
+            PingSchedule::Every(period) => (Schedule::new(start, period), after(start, period)),
+            PingSchedule::AsFastAsPossible => {
+                (Schedule::new(start, settings.encoder_period), start)
+            }
         };
         Ok(Self {
             localizer,
             settings,
             odometer: Odometer::new(wheels),
-            ticks: Schedule::new(start, settings.tick),
-            looks,
-            cycle: Cycle::Idle { look_at },
+            ticks: Schedule::new(start, settings.encoder_period),
+            pings,
+            cycle: Cycle::Idle { until },
             time: start,
             faults: Faults::default(),
         })
     }
 
-    /// Does what is due at `now`, which is one ping's end, one tick, one aim and one ping at
-    /// most, and says what it did. It never waits.
+    /// Continues with another localizer, other wheels and other settings. Ticks stay on their grid; a ping in
+    /// flight is aborted.
     ///
-    /// A `now` before that of an earlier call is counted as a fault, and nothing is done.
+    /// # Errors
+    /// [`SettingsError`], by which setting breaks its rule; nothing has changed.
+    pub fn restart(
+        &mut self,
+        localizer: Localizer<'m>,
+        wheels: Wheels,
+        settings: Settings,
+    ) -> Result<(), SettingsError> {
+        settings.check()?;
+        let now = localizer.time();
+        let pings = match localizer.config().sonar.timing.schedule {
+            PingSchedule::Every(period) => self.pings.continued(now, period),
+            PingSchedule::AsFastAsPossible => self.pings,
+        };
+        self.localizer = localizer;
+        self.odometer = Odometer::new(wheels);
+        self.ticks = self.ticks.continued(now, settings.encoder_period);
+        self.pings = pings;
+        self.settings = settings;
+        self.end_cycle(now, false);
+        Ok(())
+    }
+
+    /// Replaces the pose at the time `now`. The localizer first takes the travel of the wheels up to `now`; that
+    /// step is returned, `None` if a counter cannot be read. A ping in flight is aborted.
+    ///
+    /// # Errors
+    /// [`EkfError`], by what is wrong with the pose or its deviations.
+    pub fn set_pose(
+        &mut self,
+        now: Instant,
+        start: &Start,
+        hardware: &mut impl Hardware,
+    ) -> Result<Option<Step>, EkfError> {
+        let mut faults = Faults::default();
+        self.odometer.begin(now, hardware, &mut faults);
+        let reading = self.odometer.read(now, hardware, &mut faults);
+        let step = reading.map(|reading| self.advance(now, reading.position, &mut faults));
+        self.faults = self.faults.plus(faults);
+        self.localizer.set_pose(start)?;
+        self.end_cycle(now, false);
+        Ok(step)
+    }
+
+    /// Handles what is due at `now`: at most the end of one ping, one tick, the choice of one wall and the start of
+    /// one ping. It never waits.
+    ///
+    /// A `now` before that of an earlier call is counted as a fault and has no other effect.
     ///
     /// # Panics
     /// Never.
@@ -178,21 +231,21 @@ impl<'m> Robot<'m> {
             report.faults.clock = 1;
         } else {
             self.odometer.begin(now, hardware, &mut report.faults);
-            self.hear(now, hardware, &mut report);
-            self.tick(now, hardware, &mut report);
-            self.look(now, hardware, &mut report);
-            self.ping(now, hardware, &mut report);
+            self.finish_ping(now, hardware, &mut report);
+            self.sample_encoders(now, hardware, &mut report);
+            self.choose_wall(now, hardware, &mut report);
+            self.start_ping(now, hardware, &mut report);
             self.time = now;
         }
         self.faults = self.faults.plus(report.faults);
         report
     }
 
-    /// Until when polling it is of no use; `None` while a ping is in flight, when it should be
-    /// polled as often as its ranger wants. For a loop that sleeps, and for a simulator.
+    /// The next instant at which a poll has something to do; `None` while a ping is in flight, when the loop
+    /// should be polled at the rate that the ranger requires. For an executor that sleeps, and for a simulator.
     pub fn idle_until(&self, hardware: &mut impl Hardware) -> Option<Instant> {
         let next_of_sonar = match self.cycle {
-            Cycle::Idle { look_at } => look_at,
+            Cycle::Idle { until } => until,
             Cycle::Turning { .. } => can_ping_at(hardware),
             Cycle::Listening { .. } => return None,
         };
@@ -205,7 +258,7 @@ impl<'m> Robot<'m> {
         &self.localizer
     }
 
-    /// What went wrong since the start.
+    /// The faults since the start.
     #[must_use]
     pub fn faults(&self) -> Faults {
         self.faults
@@ -217,15 +270,15 @@ impl<'m> Robot<'m> {
         &self.settings
     }
 
-    /// Takes the outcome of the ping in flight.
-    fn hear(&mut self, now: Instant, hardware: &mut impl Hardware, report: &mut Report) {
-        let Cycle::Listening { aim, from, asked } = &mut self.cycle else {
+    /// Reads the outcome of the ping in flight.
+    fn finish_ping(&mut self, now: Instant, hardware: &mut impl Hardware, report: &mut Report) {
+        let Cycle::Listening { aim, from, polled } = &mut self.cycle else {
             return;
         };
-        let (aim, from, asked) = (*aim, *from, *asked.get_or_insert(now));
+        let (aim, from, polled) = (*aim, *from, *polled.get_or_insert(now));
         let outcome = match hardware.ranger().poll(now) {
             Ok(Some(outcome)) => outcome.and_then(|echo| in_time(echo, from.at, now)),
-            Ok(None) if since(now, asked) < self.settings.patience => return,
+            Ok(None) if since(now, polled) < self.settings.patience => return,
             Ok(None) => Err(NoEcho::NoResponse),
             Err(_) => Err(NoEcho::Failed),
         };
@@ -236,11 +289,11 @@ impl<'m> Robot<'m> {
                 (None, Some(self.localizer.fix(&aim, None)))
             }
         };
-        report.heard = Some(Heard { aim, outcome, step, fix });
-        self.rest(now, true);
+        report.ping_result = Some(PingResult { aim, outcome, step, fix });
+        self.end_cycle(now, true);
     }
 
-    /// Tells the localizer the wheels' travel up to the echo's instant, and the range.
+    /// Passes the travel up to the instant of the echo to the localizer, then the range.
     fn fuse(
         &mut self,
         now: Instant,
@@ -251,6 +304,7 @@ impl<'m> Robot<'m> {
         report: &mut Report,
     ) -> (Option<Step>, Option<Fix>) {
         let Some(reading) = self.odometer.read(now, hardware, &mut report.faults) else {
+            self.localizer.skip();
             return (None, None);
         };
         let (at, position) = match self.settings.stamp {
@@ -264,51 +318,54 @@ impl<'m> Robot<'m> {
         (Some(step), Some(self.localizer.fix(aim, Some(echo.range))))
     }
 
-    /// Does the encoder tick, if one is due and the sonar does not listen.
-    fn tick(&mut self, now: Instant, hardware: &mut impl Hardware, report: &mut Report) {
+    /// Samples the encoders, if a tick is due and no ping is in flight.
+    fn sample_encoders(&mut self, now: Instant, hardware: &mut impl Hardware, report: &mut Report) {
         if self.cycle.is_listening() {
             return;
         }
         let Some(due) = self.ticks.take(now) else {
             return;
         };
-        // Up to the poll before, it was the sonar that held it back; from then on it is late.
+        // Up to the previous poll a ping has delayed it; the time since then counts as late.
         let held = self.time >= due.due;
         let late = since(now, due.due.max(self.time));
         report.faults.deadlines += u32::from(late > self.settings.tolerance);
         let reading = self.odometer.read(now, hardware, &mut report.faults);
         let step = reading.map(|reading| self.advance(now, reading.position, &mut report.faults));
+        if step.is_none() {
+            self.localizer.no_odometry(now);
+        }
         report.tick =
             Some(Tick { step, lateness: since(now, due.due), held, skipped: due.skipped });
     }
 
-    /// Asks where to look, if it is time, and sends the servo there.
-    fn look(&mut self, now: Instant, hardware: &mut impl Hardware, report: &mut Report) {
-        let is_due = matches!(self.cycle, Cycle::Idle { look_at } if now >= look_at);
+    /// Chooses a wall, if a ping is due, and turns the servo.
+    fn choose_wall(&mut self, now: Instant, hardware: &mut impl Hardware, report: &mut Report) {
+        let is_due = matches!(self.cycle, Cycle::Idle { until } if now >= until);
         if !is_due {
             return;
         }
         let aimed = self.localizer.aim();
         if let Ok(aim) = aimed {
             let turned = hardware.servo().point(now, aim.bearing);
-            // If it does not turn, its last bearing will do.
+            // If it does not turn, the wall at its last bearing is measured.
             report.faults.servo += u32::from(turned.is_err());
             self.cycle = Cycle::Turning { why: aim.why };
         } else {
             self.localizer.skip();
-            self.rest(now, false);
+            self.end_cycle(now, false);
         }
         report.aimed = Some(aimed);
     }
 
-    /// Pings, if the servo has settled, the ranger is ready and a wall is met squarely: the robot
-    /// may have turned in the meantime.
-    fn ping(&mut self, now: Instant, hardware: &mut impl Hardware, report: &mut Report) {
+    /// Starts a ping once the servo has settled and the ranger is ready ([`can_ping_at`]), if a wall is square to
+    /// the sonar: the robot may have turned in the meantime.
+    fn start_ping(&mut self, now: Instant, hardware: &mut impl Hardware, report: &mut Report) {
         let Cycle::Turning { why } = self.cycle else {
             return;
         };
         let Some(bearing) = hardware.servo().target() else {
-            self.rest(now, false);
+            self.abort_cycle(now);
             return;
         };
         let ready_at = can_ping_at(hardware);
@@ -316,58 +373,63 @@ impl<'m> Robot<'m> {
             return;
         }
         let Ok(aim) = self.localizer.aim_at(bearing) else {
-            self.rest(now, false);
+            self.end_cycle(now, false);
             return;
         };
         let Some(from) = self.odometer.read(now, hardware, &mut report.faults) else {
-            self.rest(now, false);
+            self.abort_cycle(now);
             return;
         };
         match hardware.ranger().trigger(now) {
             Ok(()) => {
-                let (aim, asked) = (Aim { why, ..aim }, None);
-                self.cycle = Cycle::Listening { aim, from, asked };
+                let aim = Aim { why, ..aim };
+                self.cycle = Cycle::Listening { aim, from, polled: None };
                 report.pinged = Some(aim);
             }
             Err(TriggerError::TooSoon) if since(now, ready_at) < self.settings.patience => {}
             Err(_) => {
                 report.faults.ranger += 1;
-                self.rest(now, false);
+                self.abort_cycle(now);
             }
         }
     }
 
-    /// Ends the sonar's cycle. After one that did not come to a ping nothing is new before the
-    /// next tick.
-    fn rest(&mut self, now: Instant, pinged: bool) {
-        let look_at = match self.settings.rhythm {
-            Rhythm::Every(_) => {
-                self.looks.take(now);
-                self.looks.next()
-            }
-            Rhythm::AsFastAsPossible if pinged => now,
-            Rhythm::AsFastAsPossible => self.ticks.next(),
-        };
-        self.cycle = Cycle::Idle { look_at };
+    /// Ends a measurement cycle in which a device has prevented the ping.
+    fn abort_cycle(&mut self, now: Instant) {
+        self.localizer.skip();
+        self.end_cycle(now, false);
     }
 
-    /// Tells the localizer how far the wheels rolled up to `at`.
+    /// Ends the measurement cycle. If there was no ping, nothing changes before the next tick.
+    fn end_cycle(&mut self, now: Instant, pinged: bool) {
+        let until = match self.localizer.config().sonar.timing.schedule {
+            PingSchedule::Every(_) => {
+                self.pings.take(now);
+                self.pings.next()
+            }
+            PingSchedule::AsFastAsPossible if pinged => now,
+            PingSchedule::AsFastAsPossible => self.ticks.next(),
+        };
+        self.cycle = Cycle::Idle { until };
+    }
+
+    /// Passes the travel of the wheels up to `at` to the localizer.
     fn advance(&mut self, at: Instant, position: Position, faults: &mut Faults) -> Step {
         let travel = self.odometer.travel_to(position);
-        let taken = match self.localizer.odometry(at, travel) {
-            Ok(()) => Taken::Yes,
-            Err(error) if self.is_credible(at, travel) => Taken::Kept(error),
-            Err(error) => Taken::WrittenOff(error),
+        let result = match self.localizer.odometry(at, travel) {
+            Ok(()) => StepResult::Accepted,
+            Err(error) if self.is_credible(at, travel) => StepResult::Deferred(error),
+            Err(error) => StepResult::Discarded(error),
         };
-        if !matches!(taken, Taken::Kept(_)) {
+        if !matches!(result, StepResult::Deferred(_)) {
             self.odometer.settle(position);
         }
-        faults.travel += u32::from(matches!(taken, Taken::WrittenOff(_)));
-        Step { at, travel, taken }
+        faults.travel += u32::from(matches!(result, StepResult::Discarded(_)));
+        Step { at, travel, result }
     }
 
-    /// Whether wheels can have rolled so since the localizer's last step, were it not for ticks:
-    /// a position read is wrong by up to one, and so is the one before.
+    /// Whether the wheels can have travelled so far since the localizer's last step. Each of the two positions is
+    /// quantized to one edge.
     fn is_credible(&self, at: Instant, travel: WheelTravel) -> bool {
         let seconds = 1e-6 * micros(since(at, self.localizer.time()));
         let fastest = self.localizer.config().max_wheel_speed.0 * seconds;
@@ -376,13 +438,13 @@ impl<'m> Robot<'m> {
     }
 }
 
-/// When the servo has settled and the last ping's echoes have died away.
+/// The instant at which the servo has settled and the echoes of the last ping have decayed.
 fn can_ping_at(hardware: &mut impl Hardware) -> Instant {
     let settled_at = hardware.servo().settles_at();
     settled_at.max(hardware.ranger().ready_at())
 }
 
-/// The echo, if its times lie between the trigger and now.
+/// The echo, if its times are between the trigger and now.
 fn in_time(echo: Echo, triggered: Instant, now: Instant) -> Result<Echo, NoEcho> {
     let fits = triggered <= echo.sent && echo.sent <= echo.heard && echo.heard <= now;
     if fits { Ok(echo) } else { Err(NoEcho::Mistimed) }

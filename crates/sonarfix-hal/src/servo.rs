@@ -1,95 +1,55 @@
-//! The servo that turns the ranger: a bearing becomes a pulse, and a model says where the servo
-//! points while it follows.
+//! The servo that turns the ranger: converts a bearing to a pulse, and models the bearing while the servo turns.
 //!
-//! Responsibilities:
 //! - [`Calibration`]: pulse width ↔ bearing, from two measured points;
-//! - [`Pace`]: how fast it turns, and how long it shakes before it stands still;
-//! - [`Servo`]: the driver over [`SetDutyCycle`].
+//! - [`ServoTiming`]: speed and settling time; the model is [`sonarfix::servo::ServoMotion`];
+//! - [`ServoSettings`]: the settings of the driver; [`PwmFrame`]: the pulses that a channel can generate;
+//! - [`Servo`]: the driver over [`SetDutyCycle`]; [`Servo::settles_at`] is the end of the settle wait.
 //!
-//! A hobby servo has no feedback. Everything said here about where it points is the model's
-//! word: it holds for a servo that is alive and not blocked. That one is not, the localizer's
-//! gate finds out.
+//! A hobby servo has no feedback. The bearing is that of the model, which assumes a servo that is connected and not
+//! blocked; a stalled servo is only detected by innovation gating.
 //!
 //! # Non-finite policy
 //! A NaN or infinite calibration, limit or bearing is a typed error; the servo stays where it is.
 
 mod calibration;
+mod error;
 mod motion;
+mod settings;
 
 use embedded_hal::pwm::SetDutyCycle;
-use sonarfix::units::{Duration, Instant, Radians};
+use sonarfix::units::{Instant, Radians};
 
 use crate::time::micros;
 
 pub use calibration::{Calibration, MeasuredPulse};
-use motion::Motion;
-pub use sonarfix::config::Pace;
+pub use error::{PointError, SettingError};
+use settings::Setup;
+pub use settings::{PwmFrame, ServoSettings};
+pub use sonarfix::config::ServoTiming;
 
-/// What does not describe a servo.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum SettingError {
-    /// The two measured points are not finite, or share a pulse width or a bearing.
-    Calibration,
-    /// The limits are not finite, or not a rightmost bearing below a leftmost one.
-    Limits,
-    /// A pulse at one of the limits does not fit into the frame.
-    Pulse,
-}
-
-impl core::fmt::Display for SettingError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::Calibration => "a calibration needs two different, finite points",
-            Self::Limits => "the limits must be finite, the rightmost below the leftmost",
-            Self::Pulse => "a pulse at one of the limits does not fit into the frame",
-        })
-    }
-}
-
-impl core::error::Error for SettingError {}
-
-/// Why the servo was not turned. It stays where it was.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum PointError<E> {
-    /// The bearing is beyond a limit, or NaN.
-    OutOfReach,
-    /// The PWM channel's error.
-    Pwm(E),
-}
-
-impl<E: core::fmt::Debug> core::fmt::Display for PointError<E> {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::OutOfReach => f.write_str("the bearing is out of the servo's reach"),
-            Self::Pwm(error) => write!(f, "the PWM channel: {error:?}"),
-        }
-    }
-}
-
-impl<E: core::fmt::Debug> core::error::Error for PointError<E> {}
-
-/// A servo and what it is known to do.
+/// The driver of a servo.
 ///
 /// ```
 /// use embedded_hal_mock::eh1::pwm::{Mock, Transaction as Pwm};
 /// use sonarfix::units::{Duration, Instant, Radians};
-/// use sonarfix_hal::servo::{Calibration, MeasuredPulse, Pace, Servo};
+/// use sonarfix_hal::servo::{MeasuredPulse, Servo, ServoSettings, ServoTiming};
 ///
-/// // Two pulses tried on the bench, and where the sonar looked with each.
-/// let calibration = Calibration::new(
-///     MeasuredPulse { width: Duration::from_ticks(1_000), bearing: Radians::from_degrees(-45.0) },
-///     MeasuredPulse { width: Duration::from_ticks(2_000), bearing: Radians::from_degrees(45.0) },
-/// )?;
-/// let limits = (Radians::from_degrees(-80.0), Radians::from_degrees(80.0));
+/// // Two pulses, and the bearing that was measured with each.
+/// let settings = ServoSettings {
+///     pulses: [
+///         MeasuredPulse { width: Duration::from_ticks(1_000), bearing: Radians::from_degrees(-45.0) },
+///         MeasuredPulse { width: Duration::from_ticks(2_000), bearing: Radians::from_degrees(45.0) },
+///     ],
+///     limits: (Radians::from_degrees(-80.0), Radians::from_degrees(80.0)),
+///     timing: ServoTiming::SG90,
+/// };
 ///
 /// // A timer with a 20 ms period of 40,000 counts: half a microsecond each.
 /// let mut pwm = Mock::new(&[
 ///     Pwm::max_duty_cycle(40_000),
 ///     Pwm::set_duty_cycle(3_000), // 1,500 µs: straight ahead
 /// ]);
-/// let mut servo = Servo::new(&mut pwm, calibration, limits, Pace::SG90)?;
+/// let mut servo = Servo::configured(&mut pwm, settings)?;
 /// let now = Instant::from_ticks(0);
 /// servo.point(now, Radians(0.0))?;
 /// assert!(!servo.is_settled(now));
@@ -101,103 +61,117 @@ impl<E: core::fmt::Debug> core::error::Error for PointError<E> {}
 #[derive(Debug)]
 pub struct Servo<P> {
     pwm: P,
-    calibration: Calibration,
-    limits: (Radians, Radians),
-    motion: Motion,
-    /// The duty that stands at the pin; `None` before the first.
+    frame: PwmFrame,
+    setup: Option<Setup>,
+    /// The present duty; `None` before the first.
     duty: Option<u16>,
 }
 
-impl<P: SetDutyCycle> Servo<P> {
-    /// A servo that has not been pointed yet, so that nobody knows where it looks. `limits` are
-    /// the rightmost and the leftmost bearing that it may be sent to, relative to the robot's
-    /// heading; they should contain those of [`Sonar::servo`](sonarfix::config::Sonar::servo).
-    ///
-    /// # Errors
-    /// [`SettingError`], by what is wrong with an argument.
-    pub fn new(
-        pwm: P,
-        calibration: Calibration,
-        limits: (Radians, Radians),
-        pace: Pace,
-    ) -> Result<Self, SettingError> {
-        let (rightmost, leftmost) = limits;
-        let in_order = rightmost < leftmost && rightmost.is_finite() && leftmost.is_finite();
-        if !in_order {
-            return Err(SettingError::Limits);
-        }
-        let frame = micros(pace.frame);
-        let fits = |bearing| (0.0..=frame).contains(&calibration.pulse(bearing));
-        if !fits(rightmost) || !fits(leftmost) {
-            return Err(SettingError::Pulse);
-        }
-        Ok(Self { pwm, calibration, limits, motion: Motion::unknown(pace), duty: None })
+impl<P> Servo<P> {
+    /// A driver without settings, on a channel with these pulses.
+    #[must_use]
+    pub const fn new(pwm: P, frame: PwmFrame) -> Self {
+        Self { pwm, frame, setup: None, duty: None }
     }
 
-    /// Sends the servo to `bearing` (relative to the robot's heading) and returns at once.
-    /// Pointing again to where it is already sent changes nothing, and costs no settling.
-    ///
-    /// The PWM's counts round the pulse, so the servo is sent to the nearest bearing they can
-    /// make: [`Self::target`].
+    /// A configured driver whose bearing is unknown before the first [`Self::point`], on a channel that generates
+    /// any pulse within the servo's frame.
     ///
     /// # Errors
-    /// [`PointError`]; the servo stays where it was sent before.
-    pub fn point(&mut self, now: Instant, bearing: Radians) -> Result<(), PointError<P::Error>> {
-        let (rightmost, leftmost) = self.limits;
-        let in_reach = bearing >= rightmost && bearing <= leftmost;
-        if !in_reach {
-            return Err(PointError::OutOfReach);
+    /// [`SettingError`], by what is wrong with the settings.
+    pub fn configured(pwm: P, settings: ServoSettings) -> Result<Self, SettingError> {
+        let mut servo = Self::new(pwm, PwmFrame::of(settings.timing.frame));
+        servo.configure(&settings)?;
+        Ok(servo)
+    }
+
+    /// Checks settings without applying them.
+    ///
+    /// # Errors
+    /// [`SettingError`], by what is wrong with them.
+    pub fn check(&self, settings: &ServoSettings) -> Result<(), SettingError> {
+        Setup::of(settings, &self.frame).map(|_| ())
+    }
+
+    /// Applies settings. If they differ from the present ones, the bearing is unknown until the next
+    /// [`Self::point`].
+    ///
+    /// # Errors
+    /// [`SettingError`], by what is wrong with them; nothing has changed.
+    pub fn configure(&mut self, settings: &ServoSettings) -> Result<(), SettingError> {
+        let setup = Setup::of(settings, &self.frame)?;
+        if self.setup.as_ref().is_none_or(|before| before.settings != *settings) {
+            (self.setup, self.duty) = (Some(setup), None);
         }
-        let frame = micros(self.motion.pace().frame);
-        let counts = f32::from(self.pwm.max_duty_cycle());
-        let duty = to_duty(self.calibration.pulse(bearing) / frame * counts);
-        if self.duty == Some(duty) {
-            return Ok(());
-        }
-        self.pwm.set_duty_cycle(duty).map_err(PointError::Pwm)?;
-        self.duty = Some(duty);
-        let reached = self.calibration.bearing(f32::from(duty) / counts * frame);
-        self.motion.start(now, reached, self.limits);
         Ok(())
     }
 
-    /// The bearing it was sent to; `None` before the first [`Self::point`].
-    #[must_use]
-    pub fn target(&self) -> Option<Radians> {
-        self.motion.target()
-    }
-
-    /// Where it points at `now`, by the model; `None` before the first [`Self::point`].
-    #[must_use]
-    pub fn bearing(&self, now: Instant) -> Option<Radians> {
-        self.motion.bearing(now)
-    }
-
-    /// Whether it stands still at its target. Never before the first [`Self::point`].
-    #[must_use]
-    pub fn is_settled(&self, now: Instant) -> bool {
-        self.target().is_some() && now >= self.settles_at()
-    }
-
-    /// When it stands still at its target; the end of time before the first [`Self::point`].
-    #[must_use]
-    pub fn settles_at(&self) -> Instant {
-        self.motion.settles_at()
-    }
-
-    /// How long it would take, pointed to `bearing` at `now`, to stand still there.
-    #[must_use]
-    pub fn time_to(&self, now: Instant, bearing: Radians) -> Duration {
-        self.motion.time_to(now, bearing, self.limits)
-    }
-
-    /// Gives the PWM channel back.
+    /// Releases the PWM channel.
     pub fn release(self) -> P {
         self.pwm
     }
 }
 
-/// The nearest duty; the pulse was checked to lie inside the frame, so it fits.
+impl<P: SetDutyCycle> Servo<P> {
+    /// Turns the servo to `bearing` (relative to the robot's heading) and returns at once. A repeated command to the
+    /// same bearing has no effect and needs no settling.
+    ///
+    /// The pulse is quantized by the counts of the PWM; [`Self::target`] is the resulting bearing.
+    ///
+    /// # Errors
+    /// [`PointError`]; the servo keeps its target.
+    pub fn point(&mut self, now: Instant, bearing: Radians) -> Result<(), PointError<P::Error>> {
+        let Some(setup) = &mut self.setup else {
+            return Err(PointError::NotConfigured);
+        };
+        let ServoSettings { limits, timing, .. } = setup.settings;
+        let (rightmost, leftmost) = limits;
+        let in_reach = bearing >= rightmost && bearing <= leftmost;
+        if !in_reach {
+            return Err(PointError::OutOfReach);
+        }
+        let frame = micros(timing.frame);
+        let counts = f32::from(self.pwm.max_duty_cycle());
+        let duty = to_duty(setup.calibration.pulse(bearing) / frame * counts);
+        if self.duty == Some(duty) {
+            return Ok(());
+        }
+        self.pwm.set_duty_cycle(duty).map_err(PointError::Pwm)?;
+        self.duty = Some(duty);
+        let reached = setup.calibration.bearing(f32::from(duty) / counts * frame);
+        setup.motion.start(now, reached, limits);
+        Ok(())
+    }
+}
+
+impl<P> Servo<P> {
+    /// The target bearing; `None` before the first [`Self::point`].
+    #[must_use]
+    pub fn target(&self) -> Option<Radians> {
+        self.setup.as_ref()?.motion.target()
+    }
+
+    /// The bearing at `now` by the model; `None` before the first [`Self::point`].
+    #[must_use]
+    pub fn bearing(&self, now: Instant) -> Option<Radians> {
+        self.setup.as_ref()?.motion.bearing(now)
+    }
+
+    /// Whether it has settled at its target. False before the first [`Self::point`].
+    #[must_use]
+    pub fn is_settled(&self, now: Instant) -> bool {
+        self.target().is_some() && now >= self.settles_at()
+    }
+
+    /// The instant at which it has settled at its target; the greatest instant before the first [`Self::point`].
+    #[must_use]
+    pub fn settles_at(&self) -> Instant {
+        let never = Instant::from_ticks(u64::MAX);
+        self.setup.as_ref().map_or(never, |setup| setup.motion.settles_at())
+    }
+}
+
+/// The nearest duty. The pulse has been checked to be within the frame.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

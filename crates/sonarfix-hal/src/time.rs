@@ -5,18 +5,17 @@
 
 use sonarfix::units::{Duration, Instant};
 
-/// The time from `then` to `now`; zero if `then` lies ahead.
+/// The time from `then` to `now`; zero if `then` is later.
 pub(crate) fn since(now: Instant, then: Instant) -> Duration {
     now.checked_duration_since(then).unwrap_or(Duration::from_ticks(0))
 }
 
-/// The instant `span` after `instant`; at the end of time if that is beyond it.
+/// The instant `span` after `instant`; the greatest instant on overflow.
 pub(crate) fn after(instant: Instant, span: Duration) -> Instant {
     instant.checked_add_duration(span).unwrap_or(Instant::from_ticks(u64::MAX))
 }
 
-/// Microseconds as a number to compute with. Exact below 16 s, which no flight, pulse or turn
-/// of a servo reaches.
+/// Microseconds as a float. Exact below 16 s, which no time of flight, pulse or servo turn reaches.
 #[expect(clippy::cast_precision_loss, reason = "exact for the spans it is used on")]
 pub(crate) fn micros(span: Duration) -> f32 {
     span.ticks() as f32

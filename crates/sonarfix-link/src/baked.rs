@@ -1,40 +1,40 @@
-//! The configuration in flash: what `sonarfix config bake` writes and a robot reads at its start.
+//! The configuration image in flash, which `sonarfix config bake` writes and a robot reads at its start.
 //!
 //! ```text
 //! "SFXC" | version u16 | length u16 | configuration (postcard) | CRC-32 u32 of all before it
 //! ```
 //!
-//! Numbers are little-endian. What follows in the flash does not matter.
+//! Numbers are little-endian. Bytes after the image are ignored.
 
-use sonarfix::config::{Config, ConfigError};
 use sonarfix::map::image::checksum as crc32;
+use sonarfix_hal::config::{RobotConfig, RobotConfigError};
 
-/// The version of the bytes. It goes up whenever a configuration's bytes change.
-pub const VERSION: u16 = 1;
-/// How many bytes a baked configuration has at most.
+/// The version of the image. It is raised whenever the bytes of a configuration change.
+pub const VERSION: u16 = 2;
+/// Largest size of an image, bytes.
 pub const LENGTH_MAX: usize = HEADER + POSTCARD_MAX + CHECKSUM;
 
 const MAGIC: [u8; 4] = *b"SFXC";
 const HEADER: usize = 8;
-const POSTCARD_MAX: usize = 160;
+const POSTCARD_MAX: usize = 288;
 const CHECKSUM: usize = 4;
 
-/// Why bytes are no configuration.
+/// Why bytes are not a configuration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum BakedError {
-    /// They do not start as a configuration does: nothing was baked there.
+    /// The signature is missing: no image was written.
     Missing,
-    /// They are of another version, which is told.
+    /// The image has this other version.
     Version(u16),
-    /// They end too early.
+    /// The image is truncated.
     Cut,
-    /// They are damaged.
+    /// The image is damaged.
     Checksum,
-    /// They are whole and yet no configuration: whoever baked them was wrong.
+    /// The image is intact but not a configuration: a defect of its writer.
     Layout,
-    /// They are a configuration that breaks a rule.
-    Rule(ConfigError),
+    /// The configuration violates a rule.
+    Rule(RobotConfigError),
 }
 
 impl core::fmt::Display for BakedError {
@@ -54,22 +54,22 @@ impl core::fmt::Display for BakedError {
 
 impl core::error::Error for BakedError {}
 
-/// Bakes a configuration into `buffer`; gives the bytes.
+/// Writes the image of a configuration into `buffer`; returns its bytes.
 ///
 /// # Errors
-/// [`BakedError::Rule`] if it breaks a rule: no robot should be given it.
+/// [`BakedError::Rule`] if the configuration violates a rule.
 ///
 /// # Panics
 /// Never.
 pub fn write<'b>(
-    config: &Config,
+    config: &RobotConfig,
     buffer: &'b mut [u8; LENGTH_MAX],
 ) -> Result<&'b [u8], BakedError> {
     config.check().map_err(BakedError::Rule)?;
     fill(config, buffer).ok_or(BakedError::Layout)
 }
 
-fn fill<'b>(config: &Config, buffer: &'b mut [u8; LENGTH_MAX]) -> Option<&'b [u8]> {
+fn fill<'b>(config: &RobotConfig, buffer: &'b mut [u8; LENGTH_MAX]) -> Option<&'b [u8]> {
     let (header, rest) = buffer.split_first_chunk_mut::<HEADER>()?;
     let (space, _) = rest.split_at_mut_checked(POSTCARD_MAX)?;
     let length = postcard::to_slice(config, space).ok()?.len();
@@ -86,9 +86,13 @@ fn fill<'b>(config: &Config, buffer: &'b mut [u8; LENGTH_MAX]) -> Option<&'b [u8
 /// Reads and checks the configuration at the start of `bytes`.
 ///
 /// ```
-/// use sonarfix::{config::Config, units::Metres};
+/// use sonarfix::{config::{Config, ServoTiming}, units::{Metres, Radians}};
+/// use sonarfix_hal::config::RobotConfig;
 /// use sonarfix_link::baked::{self, BakedError};
-/// let config = Config::for_track_width(Metres(0.16));
+/// let mut localizer = Config::for_track_width(Metres(0.16));
+/// localizer.sonar.servo = (Radians(-1.5), Radians(1.5));
+/// localizer.sonar.timing.servo = ServoTiming::SG90;
+/// let config = RobotConfig::with_common_parts(localizer);
 /// let mut buffer = [0xff; baked::LENGTH_MAX];
 /// let bytes = baked::write(&config, &mut buffer)?;
 /// assert_eq!(baked::read(bytes), Ok(config));
@@ -98,11 +102,11 @@ fn fill<'b>(config: &Config, buffer: &'b mut [u8; LENGTH_MAX]) -> Option<&'b [u8
 /// ```
 ///
 /// # Errors
-/// [`BakedError`], by what is wrong with them.
+/// [`BakedError`], by the cause.
 ///
 /// # Panics
 /// Never.
-pub fn read(bytes: &[u8]) -> Result<Config, BakedError> {
+pub fn read(bytes: &[u8]) -> Result<RobotConfig, BakedError> {
     let Some((header, rest)) = bytes.split_first_chunk::<HEADER>() else {
         let begins = !bytes.is_empty() && bytes.iter().zip(MAGIC).all(|(&byte, m)| byte == m);
         return Err(if begins { BakedError::Cut } else { BakedError::Missing });
@@ -122,16 +126,16 @@ pub fn read(bytes: &[u8]) -> Result<Config, BakedError> {
     if crc32(covered) != u32::from_le_bytes(*checksum) {
         return Err(BakedError::Checksum);
     }
-    match postcard::take_from_bytes::<Config>(postcard) {
+    match postcard::take_from_bytes::<RobotConfig>(postcard) {
         Ok((config, [])) => config.check().map(|()| config).map_err(BakedError::Rule),
         _ => Err(BakedError::Layout),
     }
 }
 
-/// The checksum by which a robot says which configuration it has
-/// ([`Hello`](crate::message::Hello::configuration)): CRC-32 of its postcard.
+/// The checksum by which a robot identifies its configuration
+/// ([`Hello`](crate::message::Hello::configuration)): CRC-32 of its postcard encoding.
 #[must_use]
-pub fn checksum(config: &Config) -> u32 {
+pub fn checksum(config: &RobotConfig) -> u32 {
     let mut space = [0; POSTCARD_MAX];
     let bytes = postcard::to_slice(config, &mut space);
     crc32(bytes.as_deref().unwrap_or_default())

@@ -1,57 +1,58 @@
-//! Frames: how a message is sent.
+//! The frame around a message.
 //!
 //! ```text
 //! 00  COBS( version u8 | kind u8 | sequence u16 | message (postcard) | CRC-32 u32 )  00
 //! ```
 //!
-//! Numbers are little-endian. COBS leaves no zero inside, so a zero is always an end. There is
-//! one on both sides: the one behind completes the frame at once, the one before it ends whatever
-//! garbage the line has picked up, which then costs that frame nothing. What stands between two
-//! zeros and is empty is ignored.
+//! Numbers are little-endian. COBS removes all zeros from the content, so a zero always delimits a frame. The zero
+//! after a frame completes it at once. The zero before it terminates line noise received since the previous frame,
+//! which would otherwise corrupt this one. Empty frames are ignored.
 
 use core::marker::PhantomData;
 
 use sonarfix::map::image::checksum as crc32;
 
-use crate::VERSION;
 use crate::message::Message;
 
-/// The longest message, in bytes. A test makes the largest of each.
-pub const MESSAGE_MAX: usize = 164;
-/// What stands before the message: version, kind, sequence.
+/// The version of the frame's content. It is raised whenever the bytes of any message change (`docs/link.md`).
+/// The encoding around the content never changes.
+pub const VERSION: u8 = 2;
+/// The longest message, in bytes. A test encodes the largest value of each.
+pub const MESSAGE_MAX: usize = 288;
+/// Bytes before the message: version, kind, sequence number.
 pub(crate) const HEADER: usize = 4;
-/// What stands behind it.
+/// Bytes after it.
 pub(crate) const CHECKSUM: usize = 4;
 /// The longest frame before COBS.
 pub(crate) const BODY_MAX: usize = HEADER + MESSAGE_MAX + CHECKSUM;
-/// The longest frame on the wire.
+/// The longest frame after COBS, with its delimiters.
 pub const FRAME_MAX: usize = cobs::max_encoding_length(BODY_MAX) + 2;
 
-/// Where a [`Sender`] puts a frame.
+/// A buffer for the frames of a [`Sender`].
 pub type Buffer = [u8; FRAME_MAX];
-/// A buffer to begin with.
+/// The initial value of a buffer.
 pub const EMPTY: Buffer = [0; FRAME_MAX];
 
-/// A message that came in.
+/// A received message.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Frame<M> {
-    /// Its number in the sender's count.
+    /// The sender's sequence number.
     pub sequence: u16,
-    /// The frame's CRC-32: two frames that agree in it and in the sequence are the same.
+    /// The frame's CRC-32. Frames with equal checksum and sequence number are the same frame.
     pub checksum: u32,
-    /// What it says.
+    /// The content.
     pub message: M,
 }
 
-/// Numbers messages and makes frames of them.
+/// Encodes messages into numbered frames.
 ///
-/// The first frame after a start has the sequence number 0, and no later one has: after 65,535
-/// comes 1. So a receiver can tell a sender that has started anew from frames that were lost.
+/// The first frame after a start has the sequence number 0, which is not used again: 65,535 is followed by 1. A
+/// receiver can therefore distinguish a restarted sender from lost frames.
 #[derive(Debug, Clone)]
 pub struct Sender<M> {
     next: u16,
-    says: PhantomData<M>,
+    message: PhantomData<M>,
 }
 
 impl<M: Message> Default for Sender<M> {
@@ -67,12 +68,11 @@ impl<M: Message> Sender<M> {
         Self::starting_at(0)
     }
 
-    /// A sender whose first frame has this sequence number. One that sends commands starts
-    /// anywhere, so that it does not repeat the number of the sender before it
-    /// ([`Answered`](crate::Answered)).
+    /// A sender whose first frame has this sequence number. A sender of commands starts at an arbitrary number, so
+    /// that it does not repeat the last number of a previous sender ([`Deduplicator`](crate::Deduplicator)).
     #[must_use]
     pub const fn starting_at(sequence: u16) -> Self {
-        Self { next: sequence, says: PhantomData }
+        Self { next: sequence, message: PhantomData }
     }
 
     /// The sequence number of the next frame.
@@ -81,8 +81,8 @@ impl<M: Message> Sender<M> {
         self.next
     }
 
-    /// The frame of the next message, zeros included, in `buffer`. Every message fits (a test
-    /// makes the largest of each); of one that did not, nothing would be sent.
+    /// Encodes the next message into `buffer`; returns the frame with its delimiters. Every message fits (a test
+    /// encodes the largest value of each); of one that did not, the frame would be empty.
     ///
     /// # Panics
     /// Never.

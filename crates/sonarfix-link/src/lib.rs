@@ -1,37 +1,39 @@
-//! The wire between a robot and a PC: telemetry one way, commands the other, one definition for
-//! both ends; and the robot's configuration as the bytes that it reads from its flash.
+//! The link between a robot and a PC: telemetry in one direction, commands in the other; and the robot's
+//! configuration as an image in its flash.
 //!
-//! `no_std`, no allocation, no panic, no `unsafe`, no clock, no global. Nothing here knows what
-//! carries the bytes: a UART, a socket, a file.
+//! Both ends use the same definitions. `no_std`, no allocation, no panic, no `unsafe`, no clock, no global. The crate
+//! is independent of the transport: a UART, a socket or a file.
 //!
-//! | module | what it is for |
+//! | module | |
 //! |---|---|
-//! | [`message`] | what is said: [`Telemetry`], [`Command`] |
-//! | [`frame`] | how it is sent: [`Sender`] |
-//! | [`receiver`] | how it is found again in whatever comes in: [`Receiver`], [`Gaps`] |
-//! | [`answered`] | that a command sent twice is not done twice: [`Answered`] |
-//! | [`reporter`] | what a robot says when: [`Reporter`] |
-//! | [`baked`] | the configuration in flash |
+//! | [`message`] | the messages: [`Telemetry`], [`Command`] |
+//! | [`frame`] | the frame around a message: [`Sender`] |
+//! | [`receiver`] | finds the frames in a stream of bytes: [`Receiver`] |
+//! | [`counters`] | counts what a receiver has read and skipped: [`ReceiverCounters`] |
+//! | [`gaps`] | counts lost frames by their sequence numbers: [`Gaps`] |
+//! | [`deduplicator`] | executes a repeated command once: [`Deduplicator`] |
+//! | [`reporter`] | turns a poll of the robot's loop into telemetry: [`Reporter`] |
+//! | [`baked`] | the configuration image |
 //!
-//! The frame and the rule for versions are in `docs/link.md`.
+//! The frame format and the rule for versions are in `docs/link.md`.
 //!
 //! ```
-//! use sonarfix_link::{Command, Outcome, Receiver, Sender, Telemetry, answered::Answered, frame};
+//! use sonarfix_link::{Command, CommandResult, Deduplicator, Receiver, Sender, Telemetry, frame};
 //!
-//! // The PC sends a command; the line picks up a spark before it.
+//! // The PC sends a command. Line noise precedes the frame.
 //! let mut buffer = frame::EMPTY;
 //! let mut wire = vec![0x17, 0x2a];
 //! wire.extend_from_slice(Sender::<Command>::starting_at(7).frame(&Command::Stop, &mut buffer));
 //!
-//! // The robot finds it, does it, and answers.
+//! // The robot receives, executes and acknowledges it.
 //! let mut receiver = Receiver::<Command>::new();
-//! let mut answered = Answered::default();
+//! let mut deduplicator = Deduplicator::default();
 //! let mut answers = Vec::new();
 //! for byte in wire {
 //!     if let Some(frame) = receiver.push(byte) {
-//!         answers.push(answered.answer(&frame, |command| {
+//!         answers.push(deduplicator.answer(&frame, |command| {
 //!             assert_eq!(*command, Command::Stop);
-//!             Outcome::Done
+//!             CommandResult::Done
 //!         }));
 //!     }
 //! }
@@ -45,19 +47,19 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-pub mod answered;
 pub mod baked;
+pub mod counters;
+pub mod deduplicator;
 pub mod frame;
+pub mod gaps;
 pub mod message;
 pub mod receiver;
 pub mod reporter;
 
-pub use answered::Answered;
-pub use frame::{Frame, Sender};
-pub use message::{Ack, Command, Estimate, Hello, Look, Outcome, Telemetry};
-pub use receiver::{Counters, Gaps, Receiver};
+pub use counters::ReceiverCounters;
+pub use deduplicator::Deduplicator;
+pub use frame::{Frame, Sender, VERSION};
+pub use gaps::Gaps;
+pub use message::{Ack, Command, CommandResult, Estimate, Hello, Ping, Telemetry};
+pub use receiver::Receiver;
 pub use reporter::Reporter;
-
-/// The version of the link: of the frame's contents, not of its outside, which never changes. It
-/// goes up whenever the bytes of any message change (`docs/link.md`).
-pub const VERSION: u8 = 1;

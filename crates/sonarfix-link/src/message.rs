@@ -1,111 +1,115 @@
-//! What is said: telemetry by the robot, commands by the PC.
+//! The messages: telemetry from the robot, commands from the PC.
 //!
-//! The parts are the core's and the loop's own types: there is no second definition that could
-//! drift from them. The price is that a change of theirs may change bytes here; a test over the
-//! bytes of every message notices, and then [`VERSION`](crate::VERSION) goes up.
+//! They consist of the types of the localizer and of the robot's loop, so that no second definition can diverge from
+//! them. A change of such a type may change the bytes of a message; a test over the bytes of every message
+//! detects it, and [`VERSION`](crate::VERSION) is raised.
 //!
 //! # Non-finite policy
-//! Nothing here computes. A NaN is carried as it is; whoever acts on a command gives it to the
-//! localizer, which refuses what is not finite.
+//! A NaN is transmitted unchanged. The localizer refuses values that are not finite when a command is executed.
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sonarfix::aim::{Aim, NoAim};
-use sonarfix::config::Config;
+use sonarfix::ekf::{StandardDeviations, StateEstimate};
 use sonarfix::health::Health;
 use sonarfix::localizer::{Fix, Start};
 use sonarfix::units::{Duration, Instant};
+use sonarfix_hal::config::{RobotConfig, Unsupported};
 use sonarfix_hal::ranger;
 use sonarfix_hal::robot::Faults;
 
-use sonarfix::ekf::State;
+use crate::counters::ReceiverCounters;
 
-use crate::receiver::Counters;
-
-/// Either of [`Telemetry`] and [`Command`].
+/// [`Telemetry`] or [`Command`].
 pub trait Message: Serialize + DeserializeOwned + sealed::Sealed {
-    /// What the frame says of itself, so that a receiver knows its own from the other's echo.
+    /// The kind in the frame, by which a receiver rejects an echo of its own frames.
     const KIND: u8;
 }
 
 mod sealed {
     pub trait Sealed {}
-    impl Sealed for super::Telemetry {}
-    impl Sealed for super::Command {}
 }
+
+impl sealed::Sealed for Telemetry {}
 
 impl Message for Telemetry {
     const KIND: u8 = 0;
 }
 
+impl sealed::Sealed for Command {}
+
 impl Message for Command {
     const KIND: u8 = 1;
 }
 
-/// What a robot says. Times are its own clock's.
+/// A message from the robot. Times are those of its own clock.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Telemetry {
-    /// Who it is: at its start, and now and then for whoever listens since.
+    /// Identification, at the start and periodically.
     Hello(Hello),
-    /// The localizer begins, at its start and after every command that begins it anew. What was
-    /// rolled is counted from here.
-    Began(Estimate),
-    /// The localizer has taken a step of the wheels.
-    Step(Step),
-    /// The sonar has had its turn.
-    Look(Look),
-    /// The sonar's turn came and there was nothing to look at.
-    Skip(Skip),
-    /// The estimate, after every encoder tick.
+    /// The localizer was initialized, at the start or by a command. The wheel travel is counted from here.
+    Initialized(Estimate),
+    /// The localizer has taken wheel travel.
+    Odometry(Odometry),
+    /// A ping is complete.
+    Ping(Ping),
+    /// No wall could be measured when a ping was due.
+    SkippedPing(SkippedPing),
+    /// The estimate, after every encoder sample.
     Estimate(Estimate),
-    /// How the loop fares, now and then.
-    Loop(Loop),
-    /// The answer to a command.
+    /// The status of the loop, periodically.
+    LoopStatus(LoopStatus),
+    /// The acknowledgement of a command.
     Ack(Ack),
+    /// The pose of a running localizer was replaced; its calibration and the covariance of that are
+    /// what they were, and distances are still counted from [`Self::Initialized`].
+    PoseSet(Estimate),
 }
 
-/// Who the robot is.
+/// The identification of a robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Hello {
     /// Version of the firmware: major, minor, patch.
     pub firmware: [u8; 3],
-    /// The map in its flash.
-    pub map: Flashed,
-    /// The configuration in its flash.
-    pub configuration: Flashed,
-    /// Why it started.
-    pub reset: Reset,
+    /// The map in flash.
+    pub map: ImageStatus,
+    /// The configuration in flash.
+    pub configuration: ImageStatus,
+    /// The cause of the last reset.
+    pub reset: ResetCause,
 }
 
-/// What a robot found where something should be baked into its flash.
+/// The status of a baked image in flash.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Flashed {
-    /// It is there and whole; its checksum.
+pub enum ImageStatus {
+    /// Valid, with this checksum.
     Valid(u32),
-    /// Nothing was ever baked there.
+    /// No image was written.
     Missing,
-    /// What is there is damaged, or of a version that this firmware does not read.
+    /// Damaged.
     Corrupt,
+    /// Of this version, which the firmware does not read.
+    Version(u16),
 }
 
-/// Why a robot started.
+/// The cause of a reset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Reset {
-    /// The power came.
+pub enum ResetCause {
+    /// Power-on.
     PowerOn,
-    /// The power was too low for a while.
+    /// A supply voltage below the threshold.
     BrownOut,
     /// The reset pin.
     Pin,
-    /// The watchdog was not fed: the loop hung, or missed its deadlines.
+    /// The watchdog expired: the loop hung, or missed its deadlines.
     Watchdog,
-    /// The firmware itself.
+    /// The firmware.
     Software,
-    /// The chip does not say.
+    /// Not reported by the chip.
     Unknown,
 }
 
@@ -113,141 +117,145 @@ pub enum Reset {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Estimate {
-    /// The localizer's time: that of the last step it took.
+    /// The localizer's time: that of the last wheel travel it took.
     pub at: Instant,
     /// Pose and calibration.
-    pub state: State,
+    pub state: StateEstimate,
     /// Their standard deviations: the square roots of the covariance's diagonal.
-    pub deviation: State,
-    /// The verdict on it, and the numbers behind the verdict.
+    pub deviation: StandardDeviations,
+    /// The health verdict, and the quantities that it depends on.
     pub health: Health,
 }
 
-/// A step of the wheels that the localizer has taken.
+/// Wheel travel that the localizer has taken.
 ///
-/// It says how far the wheels have rolled in all and not since the step before, so that a frame
-/// that is lost costs its instant and no way. In `f64`, because the difference of two totals
-/// must be the very `f32` that the localizer was told (`docs/link.md` says why it is).
+/// Each value is the total since [`Telemetry::Initialized`], so that a lost frame costs one sample and no
+/// distance. The totals are `f64`, because the difference of two totals must be exactly the `f32` that the
+/// localizer took (`docs/link.md` derives the bound).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Step {
-    /// The time up to which the wheels rolled.
+pub struct Odometry {
+    /// The time of the encoder sample.
     pub at: Instant,
-    /// How far the right wheel has rolled since [`Telemetry::Began`], metres.
+    /// Distance that the right wheel has rolled since [`Telemetry::Initialized`], metres.
     pub right_metres: f64,
-    /// How far the left wheel has, metres.
+    /// Distance that the left wheel has rolled since then, metres.
     pub left_metres: f64,
 }
 
-/// The end of a ping, and what the localizer made of it.
+/// A complete ping and the localizer's response.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Look {
-    /// The localizer's time when it was told: an echo's reflection, or of one that did not come
-    /// the step before.
+pub struct Ping {
+    /// The localizer's time at the update: the instant of the echo's reflection, or without an echo that of the last
+    /// wheel travel.
     pub at: Instant,
-    /// What was looked at.
+    /// The wall and the bearing that were measured.
     pub aim: Aim,
     /// The echo, or why there is none.
     pub outcome: ranger::Outcome,
-    /// What the localizer made of it.
+    /// The localizer's response.
     pub fix: Fix,
 }
 
-/// A turn of the sonar without anything to look at.
+/// A ping that was due when no wall could be measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Skip {
+pub struct SkippedPing {
     /// The localizer's time.
     pub at: Instant,
-    /// Why.
+    /// Why no wall could be measured.
     pub reason: NoAim,
 }
 
-/// How the loop fares.
+/// The status of the loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Loop {
-    /// When.
+pub struct LoopStatus {
+    /// The time of the report.
     pub at: Instant,
-    /// Whether the loop runs, or waits: for a start, a map, a configuration.
+    /// Whether the loop runs. Otherwise it waits for [`Command::Start`], a map or a configuration.
     pub running: bool,
-    /// What went wrong since the start, missed deadlines included.
+    /// Faults since the start, missed deadlines included.
     pub faults: Faults,
-    /// The longest that a poll has taken.
+    /// The longest duration of a poll.
     pub worst_poll: Duration,
-    /// What the robot's receiver made of the commands.
-    pub commands: Counters,
+    /// The counters of the robot's receiver of commands.
+    pub commands: ReceiverCounters,
 }
 
-/// The answer to a command.
+/// The acknowledgement of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ack {
     /// The sequence number of the command's frame.
     pub sequence: u16,
-    /// What became of it.
-    pub outcome: Outcome,
+    /// The result of the command.
+    pub result: CommandResult,
 }
 
-/// What became of a command.
+/// The result of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use]
-pub enum Outcome {
-    /// It was done.
+pub enum CommandResult {
+    /// The command was executed.
     Done,
-    /// The answer to [`Command::MapChecksum`].
-    Map(Flashed),
-    /// It was not done, and nothing has changed.
-    Refused(Refused),
+    /// The result of [`Command::MapChecksum`].
+    Map(ImageStatus),
+    /// The command was refused and has changed nothing.
+    Refused(CommandError),
 }
 
-/// Why a command was not done.
+/// Why a command was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Refused {
-    /// The configuration breaks a rule; [`Config::check`] says which.
+pub enum CommandError {
+    /// The configuration violates a rule; [`RobotConfig::check`] names it.
     Configuration,
-    /// The pose or its deviations are not finite, or a deviation is negative.
+    /// The pose or a deviation is not finite, or a deviation is negative.
     Pose,
-    /// The robot has no map to do it with ([`Hello::map`]).
+    /// There is no valid map in flash ([`Hello::map`]).
     NoMap,
-    /// The robot has no configuration to do it with ([`Hello::configuration`]).
+    /// There is no valid configuration in flash ([`Hello::configuration`]).
     NoConfiguration,
-    /// It could not be written to flash.
+    /// Writing to flash failed.
     Storage,
-    /// The robot does not know where it stands, and must be told first ([`Command::SetPose`]).
+    /// The pose is unknown; set it first ([`Command::SetPose`]).
     NoPose,
+    /// The board cannot be the robot that the configuration describes.
+    Unsupported(Unsupported),
 }
 
-impl core::fmt::Display for Refused {
+impl core::fmt::Display for CommandError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
-            Self::Configuration => "the configuration breaks a rule",
-            Self::Pose => "the pose or its deviations are not finite, or one is negative",
+            Self::Configuration => "the configuration violates a rule",
+            Self::Pose => "the pose or a deviation is not finite, or a deviation is negative",
             Self::NoMap => "the robot has no valid map in its flash",
             Self::NoConfiguration => "the robot has no valid configuration in its flash",
             Self::Storage => "the robot could not write to its flash",
-            Self::NoPose => "the robot does not know where it stands: set its pose first",
+            Self::NoPose => "the robot's pose is unknown: set it first",
+            Self::Unsupported(reason) => return write!(f, "{reason}"),
         })
     }
 }
 
-/// What a robot is told to do. Each is answered with an [`Ack`].
+/// A message to the robot. Each is answered with an [`Ack`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[expect(clippy::large_enum_variant, reason = "there is one of it at a time, and no heap")]
 pub enum Command {
-    /// Begin anew from this pose.
+    /// Initializes the localizer at this pose.
     SetPose(Start),
-    /// Begin anew with this configuration, and keep it over the next start.
-    SetConfiguration(Config),
-    /// Run the loop.
+    /// Initializes the localizer with this configuration, and stores it for the next start.
+    SetConfiguration(RobotConfig),
+    /// Starts the loop.
     Start,
-    /// Stop the loop: no tick, no look, until [`Self::Start`].
+    /// Stops the loop: no encoder sample and no ping until [`Self::Start`].
     Stop,
-    /// Forget what was learned of wheels and ranger, and begin anew from the estimated pose.
+    /// Discards the learned calibration, and initializes the localizer at the estimated pose.
     ResetCalibration,
-    /// Say the checksum of the map in flash.
+    /// Requests the checksum of the map in flash.
     MapChecksum,
 }

@@ -1,57 +1,30 @@
-//! The receiver: finds frames in whatever comes in, byte by byte.
+//! Finds the frames in a stream of bytes.
 //!
-//! Whatever is not a whole frame of this version and kind, with the right checksum, is counted
-//! and skipped; the next frame is found in any case.
+//! Everything other than a complete frame of this version and kind with a valid checksum is counted and skipped. The
+//! receiver resynchronizes at the next delimiter.
 
 use core::marker::PhantomData;
 
 use cobs::{DecodeResult, DecoderState};
-use serde::{Deserialize, Serialize};
 use sonarfix::map::image::checksum as crc32;
 
-use crate::VERSION;
-use crate::frame::{BODY_MAX, CHECKSUM, Frame, HEADER};
+use crate::counters::ReceiverCounters;
+use crate::frame::{BODY_MAX, CHECKSUM, Frame, HEADER, VERSION};
 use crate::message::Message;
-
-/// What became of what came in. The counts stay at their ends.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Counters {
-    /// Frames that were read.
-    pub frames: u32,
-    /// Garbage, damaged and cut frames: no COBS, too short, or not of the checksum they claim.
-    pub corrupt: u32,
-    /// Longer than any frame.
-    pub too_long: u32,
-    /// Whole frames of another version or kind.
-    pub foreign: u32,
-    /// Whole frames of this version and kind that hold no message: a bug of the sender's.
-    pub undecodable: u32,
-}
-
-impl Counters {
-    /// How many were not read.
-    #[must_use]
-    pub fn skipped(&self) -> u32 {
-        [self.corrupt, self.too_long, self.foreign, self.undecodable]
-            .into_iter()
-            .fold(0, u32::saturating_add)
-    }
-}
 
 /// Finds the frames of one kind of message.
 #[derive(Debug)]
 pub struct Receiver<M> {
     cobs: DecoderState,
-    /// What has been decoded since the last zero.
+    /// The bytes decoded since the last delimiter.
     body: [u8; BODY_MAX],
-    /// How much of it there is; `None` if there was more than fits.
+    /// Their number; `None` if there were more than fit.
     length: Option<usize>,
-    counters: Counters,
-    hears: PhantomData<M>,
+    counters: ReceiverCounters,
+    message: PhantomData<M>,
 }
 
-/// Why what stands between two zeros is no frame.
+/// Why the bytes between two delimiters are not a frame.
 enum Skipped {
     Corrupt,
     Foreign,
@@ -65,19 +38,19 @@ impl<M: Message> Default for Receiver<M> {
 }
 
 impl<M: Message> Receiver<M> {
-    /// A receiver that has heard nothing.
+    /// A receiver that has received nothing.
     #[must_use]
     pub const fn new() -> Self {
         Self {
             cobs: DecoderState::Idle,
             body: [0; BODY_MAX],
             length: Some(0),
-            counters: COUNTERS,
-            hears: PhantomData,
+            counters: ReceiverCounters::ZERO,
+            message: PhantomData,
         }
     }
 
-    /// Takes a byte; gives the frame that it completes.
+    /// Takes one byte; returns the frame that it completes.
     ///
     /// # Panics
     /// Never.
@@ -85,45 +58,35 @@ impl<M: Message> Receiver<M> {
         let end = match self.cobs.feed(byte) {
             Ok(DecodeResult::NoData) => return None,
             Ok(DecodeResult::DataContinue(decoded)) => {
-                self.keep(decoded);
+                self.store(decoded);
                 return None;
             }
             Ok(DecodeResult::DataComplete) => Ok(()),
-            // The zero came too early. It may be the one before a frame: nothing else is lost.
+            // A premature zero. It may be the delimiter before a frame, which is not lost.
             Err(_) => Err(Skipped::Corrupt),
         };
         let Some(length) = self.length.replace(0) else {
-            count(&mut self.counters.too_long);
+            increment(&mut self.counters.too_long);
             return None;
         };
         let body = self.body.get(..length).unwrap_or_default();
-        match end.and_then(|()| read(body)) {
-            Ok(frame) => {
-                count(&mut self.counters.frames);
-                Some(frame)
-            }
-            Err(Skipped::Corrupt) => {
-                count(&mut self.counters.corrupt);
-                None
-            }
-            Err(Skipped::Foreign) => {
-                count(&mut self.counters.foreign);
-                None
-            }
-            Err(Skipped::Undecodable) => {
-                count(&mut self.counters.undecodable);
-                None
-            }
-        }
+        let result = end.and_then(|()| decode(body));
+        increment(match &result {
+            Ok(_) => &mut self.counters.frames,
+            Err(Skipped::Corrupt) => &mut self.counters.corrupt,
+            Err(Skipped::Foreign) => &mut self.counters.foreign,
+            Err(Skipped::Undecodable) => &mut self.counters.undecodable,
+        });
+        result.ok()
     }
 
-    /// What became of what came in.
+    /// The numbers of frames read and skipped.
     #[must_use]
-    pub fn counters(&self) -> Counters {
+    pub fn counters(&self) -> ReceiverCounters {
         self.counters
     }
 
-    fn keep(&mut self, decoded: u8) {
+    fn store(&mut self, decoded: u8) {
         self.length = self.length.and_then(|length| {
             *self.body.get_mut(length)? = decoded;
             Some(length + 1)
@@ -131,15 +94,12 @@ impl<M: Message> Receiver<M> {
     }
 }
 
-const COUNTERS: Counters =
-    Counters { frames: 0, corrupt: 0, too_long: 0, foreign: 0, undecodable: 0 };
-
-fn count(counter: &mut u32) {
+fn increment(counter: &mut u32) {
     *counter = counter.saturating_add(1);
 }
 
-/// Reads what stood between two zeros. The checksum comes first: nothing is believed without it.
-fn read<M: Message>(body: &[u8]) -> Result<Frame<M>, Skipped> {
+/// Decodes the bytes between two delimiters. The checksum is verified before any other field is used.
+fn decode<M: Message>(body: &[u8]) -> Result<Frame<M>, Skipped> {
     let (content, checksum) = body.split_last_chunk::<CHECKSUM>().ok_or(Skipped::Corrupt)?;
     let checksum = u32::from_le_bytes(*checksum);
     let (header, message) = content.split_first_chunk::<HEADER>().ok_or(Skipped::Corrupt)?;
@@ -156,62 +116,4 @@ fn read<M: Message>(body: &[u8]) -> Result<Frame<M>, Skipped> {
         }
         _ => Err(Skipped::Undecodable),
     }
-}
-
-/// Counts the frames of one sender that were lost, by the gaps in their sequence numbers.
-///
-/// Beside the receiver and not in it, because only telemetry is one sender's: commands may come
-/// from several, each with numbers of its own.
-///
-/// ```
-/// use sonarfix_link::Gaps;
-/// let mut gaps = Gaps::default();
-/// for sequence in [65_533, 65_535, 1, 2] {
-///     gaps.take(sequence);
-/// }
-/// assert_eq!(gaps.lost(), 1);
-/// gaps.take(0); // the sender has started anew
-/// assert_eq!((gaps.lost(), gaps.restarts()), (1, 1));
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Gaps {
-    last: Option<u16>,
-    lost: u32,
-    restarts: u32,
-}
-
-impl Gaps {
-    /// Takes note of a frame; gives the number of those lost before it.
-    pub fn take(&mut self, sequence: u16) -> u32 {
-        let lost = match self.last.replace(sequence) {
-            None => 0,
-            Some(_) if sequence == 0 => {
-                count(&mut self.restarts);
-                0
-            }
-            Some(last) => between(last, sequence),
-        };
-        self.lost = self.lost.saturating_add(lost);
-        lost
-    }
-
-    /// How many frames were lost in all.
-    #[must_use]
-    pub fn lost(&self) -> u32 {
-        self.lost
-    }
-
-    /// How often the sender has started anew.
-    #[must_use]
-    pub fn restarts(&self) -> u32 {
-        self.restarts
-    }
-}
-
-/// How many sequence numbers lie between two: they go from 1 to 65,535 and on to 1.
-fn between(last: u16, sequence: u16) -> u32 {
-    const PERIOD: u32 = u16::MAX as u32;
-    let ahead = (u32::from(sequence) + PERIOD - u32::from(last)) % PERIOD;
-    ahead.saturating_sub(1)
 }

@@ -1,92 +1,99 @@
-//! What a robot says when: one place for firmware, simulator and emulator.
+//! Turns the polls of the robot's loop into telemetry, for firmware, simulator and emulator.
 
-use sonarfix::ekf::State;
+use sonarfix::ekf::{StandardDeviations, StateEstimate};
 use sonarfix::health::Health;
 use sonarfix::localizer::Localizer;
 use sonarfix::units::Instant;
-use sonarfix_hal::robot::{self, Heard, Report, Taken};
+use sonarfix_hal::robot::{self, PingResult, Report, StepResult};
 
-use crate::message::{Estimate, Look, Skip, Step, Telemetry};
+use crate::message::{Estimate, Odometry, Ping, SkippedPing, Telemetry};
 
-/// Turns what the loop did into telemetry, in the order in which the localizer was told. What is
-/// said is all that it was told: replayed from [`Telemetry::Began`] on, it makes the same
-/// estimates bit for bit.
+/// Turns what the loop did into telemetry, in the order of the localizer's inputs. The telemetry contains all of
+/// its inputs: replayed from [`Telemetry::Initialized`] on, they reproduce the estimates bit for bit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reporter {
-    /// The last step taken, with what was rolled in all.
-    last: Step,
+    /// The last wheel travel taken, with the total distances.
+    last: Odometry,
 }
 
 impl Reporter {
-    /// A reporter for a localizer that begins, and what it says of that.
+    /// A reporter for a localizer that was just initialized, and the first message.
     ///
-    /// What the localizer was told is taken from the localizer itself, which gives it back bit for
-    /// bit if its calibration starts at zero and both wheels' scale errors are equally uncertain
-    /// (it holds them as mean and difference). Otherwise use [`Self::resume`].
+    /// The initial state is read from the localizer, which returns it bit for bit if the calibration starts at zero and both
+    /// wheels have the same scale-error deviation (it stores their mean and difference). Otherwise use [`Self::resume`].
     #[must_use]
     pub fn begin(localizer: &Localizer) -> (Self, Telemetry) {
         let Estimate { at, state, deviation, .. } = estimate(localizer);
         Self::resume(at, state, deviation)
     }
 
-    /// A reporter for a localizer that was made by [`Localizer::resume`] of the same arguments,
-    /// and what it says of that.
+    /// A reporter for a localizer that was created by [`Localizer::resume`] with the same arguments, and the first
+    /// message.
     #[must_use]
-    pub fn resume(at: Instant, state: State, deviation: State) -> (Self, Telemetry) {
-        let last = Step { at, right_metres: 0.0, left_metres: 0.0 };
+    pub fn resume(
+        at: Instant,
+        state: StateEstimate,
+        deviation: StandardDeviations,
+    ) -> (Self, Telemetry) {
+        let last = Odometry { at, right_metres: 0.0, left_metres: 0.0 };
         let began = Estimate { at, state, deviation, health: Health::default() };
-        (Self { last }, Telemetry::Began(began))
+        (Self { last }, Telemetry::Initialized(began))
     }
 
-    /// Says what a poll of the loop did, a message at a time; `localizer` is that of the loop,
-    /// after the poll.
+    /// Passes the messages of one poll of the loop to `send`. `localizer` is that of the loop, after the poll.
     pub fn report(
         &mut self,
         report: &Report,
         localizer: &Localizer,
-        mut say: impl FnMut(&Telemetry),
+        mut send: impl FnMut(&Telemetry),
     ) {
-        if let Some(heard) = &report.heard {
-            self.step(heard.step.as_ref(), &mut say);
-            self.look(heard, &mut say);
+        if let Some(heard) = &report.ping_result {
+            self.odometry(heard.step.as_ref(), &mut send);
+            self.ping(heard, &mut send);
         }
         if let Some(tick) = &report.tick {
-            self.step(tick.step.as_ref(), &mut say);
-            say(&Telemetry::Estimate(estimate(localizer)));
+            self.odometry(tick.step.as_ref(), &mut send);
+            send(&Telemetry::Estimate(estimate(localizer)));
         }
         if let Some(Err(reason)) = report.aimed {
-            say(&Telemetry::Skip(Skip { at: self.last.at, reason }));
+            send(&Telemetry::SkippedPing(SkippedPing { at: self.last.at, reason }));
         }
     }
 
-    /// The localizer's time, as far as it was reported.
+    /// The message after the pose of the localizer has been replaced.
+    #[must_use]
+    pub fn pose_set(&self, localizer: &Localizer) -> Telemetry {
+        Telemetry::PoseSet(estimate(localizer))
+    }
+
+    /// The localizer's time in the last message.
     #[must_use]
     pub fn time(&self) -> Instant {
         self.last.at
     }
 
-    fn step(&mut self, step: Option<&robot::Step>, say: &mut impl FnMut(&Telemetry)) {
-        // One that was not taken has changed nothing; it comes again, or is counted as a fault.
-        if let Some(step) = step.filter(|step| step.taken == Taken::Yes) {
-            self.last = Step {
+    fn odometry(&mut self, step: Option<&robot::Step>, send: &mut impl FnMut(&Telemetry)) {
+        // Travel that was not taken has changed nothing; it is repeated, or counted as a fault.
+        if let Some(step) = step.filter(|step| step.result == StepResult::Accepted) {
+            self.last = Odometry {
                 at: step.at,
                 right_metres: self.last.right_metres + f64::from(step.travel.right.0),
                 left_metres: self.last.left_metres + f64::from(step.travel.left.0),
             };
-            say(&Telemetry::Step(self.last));
+            send(&Telemetry::Odometry(self.last));
         }
     }
 
-    fn look(&mut self, heard: &Heard, say: &mut impl FnMut(&Telemetry)) {
-        // An echo without a reading of the encoders to go with it was told to nobody.
+    fn ping(&mut self, heard: &PingResult, send: &mut impl FnMut(&Telemetry)) {
+        // An echo without a matching encoder sample did not reach the localizer.
         if let Some(fix) = heard.fix {
-            let Heard { aim, outcome, .. } = *heard;
-            say(&Telemetry::Look(Look { at: self.last.at, aim, outcome, fix }));
+            let PingResult { aim, outcome, .. } = *heard;
+            send(&Telemetry::Ping(Ping { at: self.last.at, aim, outcome, fix }));
         }
     }
 }
 
-/// What the localizer believes.
+/// The localizer's estimate as a message.
 #[must_use]
 pub fn estimate(localizer: &Localizer) -> Estimate {
     let filter = localizer.filter();

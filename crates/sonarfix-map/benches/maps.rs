@@ -15,7 +15,7 @@ use sonarfix::pose::Pose;
 use sonarfix::units::{Instant, Metres, Radians};
 use sonarfix_map::bake;
 
-/// How far the usual sonar hears.
+/// The reach of a usual sonar.
 const REACH: Metres = Metres(4.0);
 
 fn maps(criterion: &mut Criterion) {

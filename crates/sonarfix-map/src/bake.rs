@@ -7,12 +7,12 @@ use sonarfix::map::{Cells, Grid, Map, MapError, Wall, WallId};
 use sonarfix::pose::Point;
 use sonarfix::units::Metres;
 
-/// The smallest cell, about half of what a cheap sonar reaches. Measured in rooms of 4 m × 5 m with a
-/// reach of 4 m, an aim takes as long with cells of 1 m and 40 % longer with cells of 4 m.
+/// The smallest cell, about half of the reach of a cheap sonar. Measured in rooms of 4 m × 5 m with a reach of 4 m: an
+/// aim takes the same time with cells of 1 m, and 40 % more with cells of 4 m.
 const SMALLEST_CELL: Metres = Metres(2.0);
 
-/// What the index may take for each wall, bytes: with the wall's own 20 and 36 for the whole,
-/// 100,000 walls fit in 3 MiB, whatever they are like.
+/// Largest size of the index per wall, bytes. With 20 bytes for the wall itself and 36 for the header, 100,000 walls
+/// fit in 3 MiB.
 const MOST_INDEX: usize = 11;
 
 /// Why walls could not be baked.
@@ -20,9 +20,9 @@ const MOST_INDEX: usize = 11;
 pub enum BakeError {
     /// There is no wall.
     NoWall,
-    /// There are more walls than references can number.
+    /// There are more walls than a reference can number.
     TooMany,
-    /// The robot would refuse the map: a wall reaches too far for the numbers of the format.
+    /// The robot would refuse the map: a wall is too long for the numbers of the format.
     Refused(MapError),
 }
 
@@ -44,7 +44,7 @@ impl std::error::Error for BakeError {}
 /// references) takes at most 11 bytes for each wall.
 ///
 /// # Errors
-/// [`BakeError`], by what is wrong.
+/// [`BakeError`], by the cause.
 ///
 /// ```
 /// use sonarfix::map::{Map, Wall, WallId};
@@ -73,8 +73,7 @@ struct Index {
 }
 
 impl Index {
-    /// The index with the smallest cells that does not take too much. `None` if a wall reaches so far
-    /// that no cell is large enough.
+    /// The index with the smallest cells that is not too large. `None` if no cell is large enough for the longest wall.
     fn of(walls: &[Wall]) -> Option<Self> {
         let sizes = std::iter::successors(Some(SMALLEST_CELL), |&cell| Some(cell * 2.0));
         sizes
@@ -83,7 +82,7 @@ impl Index {
             .find(|index| index.size() <= MOST_INDEX * walls.len())
     }
 
-    /// `None` if the grid would have more columns or rows than it can.
+    /// `None` if the grid would have too many columns or rows.
     fn with_cell(walls: &[Wall], cell: Metres) -> Option<Self> {
         let origin = least_corner(walls);
         let largest = Grid::new(origin, cell, u16::MAX, u16::MAX)?;
@@ -137,7 +136,7 @@ impl Index {
         image
     }
 
-    /// Where each cell's references start, and at last their number; and the references.
+    /// The index of each cell's first reference, then the number of references; and the references.
     fn by_cell(&self) -> (Vec<u32>, Vec<Reference>) {
         let mut references: Vec<(u32, Reference)> = Vec::new();
         for (id, cells) in (0..).map(WallId).zip(&self.cells) {
@@ -148,7 +147,7 @@ impl Index {
                 }
             }
         }
-        // A stable sort: within a cell, the walls stay in their order.
+        // A stable sort keeps the order of the walls within a cell.
         references.sort_by_key(|&(place, _)| place);
         let mut starts = Vec::new();
         let mut start = 0;

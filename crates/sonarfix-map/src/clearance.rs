@@ -1,4 +1,4 @@
-//! Whether a path keeps clear of the walls.
+//! Checks the clearance of a path from the walls.
 
 use std::fmt;
 
@@ -6,20 +6,20 @@ use crate::floor::{Floor, NamedWall};
 use crate::geometry::{Segment, TOUCH};
 use crate::path::PathPlan;
 
-/// A leg of a path that a wall is in the way of.
+/// A leg of a path that is too close to a wall.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Collision {
-    /// Which corner the leg leads to, by its index.
+    /// Index of the corner at the end of the leg.
     pub corner: usize,
-    /// Where the leg begins, metres.
+    /// Start of the leg, metres.
     pub from: [f64; 2],
-    /// Where it ends, metres.
+    /// End of the leg, metres.
     pub to: [f64; 2],
     /// The wall's name.
     pub wall: String,
-    /// How near the leg comes to the wall, metres; zero: it goes through it.
+    /// Distance of the leg from the wall, metres; zero if it crosses it.
     pub distance: f64,
-    /// How near it may come, metres.
+    /// Required clearance, metres.
     pub clearance: f64,
 }
 
@@ -39,8 +39,7 @@ impl fmt::Display for Collision {
 }
 
 impl Collision {
-    /// The first leg of a path that comes nearer to a wall than `clearance`, metres. The legs of
-    /// the first lap are those of every lap.
+    /// The first leg of a path that is closer to a wall than `clearance`, metres. Every lap has the same legs.
     #[must_use]
     pub fn first(plan: &PathPlan, floor: &Floor, clearance: f64) -> Option<Self> {
         let starts = std::iter::once(&plan.start).chain(&plan.corners);

@@ -1,16 +1,20 @@
-//! A TOML file as a tree in which every value knows its line and its whole key, so that whoever
-//! finds something wrong can say where.
+//! A TOML file as a tree in which every value has its line and its full key, for error messages.
 
 use std::ops::RangeInclusive;
 
+use sonarfix::units::Duration;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use crate::error::FileError;
-use crate::quantity::{Dimension, FRACTION, LENGTH, Unit};
+use crate::quantity::{Dimension, FRACTION, LENGTH, TIME, Unit};
+use crate::spelling::nearest;
 
 /// The version of the formats that this crate reads.
 const FORMAT: u64 = 1;
+
+/// The longest duration in a file, seconds.
+const LONGEST_SPAN: f64 = 3600.0;
 
 #[derive(Clone, Copy)]
 struct File<'a> {
@@ -46,13 +50,13 @@ impl<'a> Document<'a> {
         Ok(Self { file, root: DeValue::Table(root.into_inner()) })
     }
 
-    /// Whether there is something at a key of the file.
+    /// Whether the file has a value at this key.
     pub fn has(&self, key: &str) -> bool {
         self.root.as_table().is_some_and(|table| table.contains_key(key))
     }
 
-    /// The whole file as a table that may hold `format` and `keys`. The version is checked before
-    /// the keys, which another version may have others of.
+    /// The file as a table with the keys `format` and `keys`. The version is checked first, because another version may
+    /// have other keys.
     pub fn root(&self, keys: &[&str]) -> Result<Table<'_>, FileError> {
         let root =
             Node { file: self.file, key: String::new(), at: 0, value: &self.root }.any_table()?;
@@ -66,7 +70,7 @@ impl<'a> Document<'a> {
     }
 }
 
-/// The line of each of some places in a text, both in ascending order; lines count from 1.
+/// The line of each position in a text, both in ascending order; lines count from 1.
 pub(crate) fn lines(text: &str, places: &[usize]) -> Vec<usize> {
     let mut line = 1;
     let mut from = 0;
@@ -82,23 +86,23 @@ pub(crate) fn lines(text: &str, places: &[usize]) -> Vec<usize> {
 pub(crate) struct Node<'a> {
     file: File<'a>,
     key: String,
-    /// Where the value starts in the text, a table at its header.
+    /// Position of the value in the text; of a table, of its header.
     at: usize,
     value: &'a DeValue<'a>,
 }
 
 impl<'a> Node<'a> {
-    /// Something wrong with this value.
+    /// An error at this value.
     pub fn error(&self, message: impl Into<String>) -> FileError {
         self.file.error(self.at, &self.key, message)
     }
 
-    /// Where the value starts in the text, a table at its header.
+    /// Position of the value in the text; of a table, of its header.
     pub fn place(&self) -> usize {
         self.at
     }
 
-    /// Passes the value on if the rule holds; says that it must be `rule` if not.
+    /// Returns the value if the rule holds, otherwise an error with the rule.
     pub fn check<T>(&self, value: T, holds: bool, rule: &str) -> Result<T, FileError> {
         if holds { Ok(value) } else { Err(self.error(format!("must be {rule}"))) }
     }
@@ -112,7 +116,7 @@ impl<'a> Node<'a> {
         Self { file: self.file, key, at: value.span().start, value: value.get_ref() }
     }
 
-    /// A table with no other keys than these.
+    /// A table with these keys only.
     pub fn table(self, keys: &[&str]) -> Result<Table<'a>, FileError> {
         self.any_table()?.only(keys)
     }
@@ -140,7 +144,7 @@ impl<'a> Node<'a> {
             .map_err(|_| self.error(format!("must be two values, but there are {count}")))
     }
 
-    /// A string, if it is one.
+    /// A string; `None` for another type.
     pub fn as_text(&self) -> Option<&'a str> {
         self.value.as_str()
     }
@@ -168,7 +172,7 @@ impl<'a> Node<'a> {
             .ok_or_else(|| self.error(format!("must be {expected}")))
     }
 
-    /// The text of a number, if it is one.
+    /// The text of a number; `None` for another type.
     fn number_text(&self) -> Option<&'a str> {
         match self.value {
             DeValue::Integer(integer) if integer.radix() == 10 => Some(integer.as_str()),
@@ -184,7 +188,7 @@ impl<'a> Node<'a> {
         self.check(number, number.is_finite(), "finite")
     }
 
-    /// A number with its unit, in the SI unit.
+    /// A number with a unit, converted to the SI unit.
     pub fn quantity(&self, dimension: &Dimension) -> Result<f64, FileError> {
         if let Some(number) = self.number_text() {
             return Err(self.error(dimension.missing_unit(number)));
@@ -199,7 +203,7 @@ impl<'a> Node<'a> {
         self.check(value, value >= 0.0, "zero or positive")
     }
 
-    /// A bare fraction, or one in per cent.
+    /// A fraction, as a number or in per cent.
     pub fn fraction(&self) -> Result<f64, FileError> {
         if self.number_text().is_some() {
             return self.number();
@@ -207,7 +211,29 @@ impl<'a> Node<'a> {
         self.quantity(&FRACTION)
     }
 
-    /// The unit that a table's bare coordinates are in.
+    /// A duration in whole microseconds, the resolution of the localizer's time.
+    pub fn span(&self) -> Result<Duration, FileError> {
+        let seconds = self.quantity(&TIME)?;
+        let fits = (0.0..=LONGEST_SPAN).contains(&seconds);
+        let seconds = self.check(seconds, fits, "from 0 s to 1 hour")?;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "rounded, and between 0 and 3.6e9"
+        )]
+        let microseconds = (seconds * 1e6).round() as u64;
+        Ok(Duration::micros(microseconds))
+    }
+
+    /// A duration longer than zero.
+    pub fn period(&self) -> Result<Duration, FileError> {
+        const SHORTEST: f64 = 1e-6;
+        let seconds = self.quantity(&TIME)?;
+        self.check(seconds, (SHORTEST..=LONGEST_SPAN).contains(&seconds), "from 1 us to 1 hour")?;
+        self.span()
+    }
+
+    /// The unit of a table's coordinates.
     pub fn unit_of_length(&self) -> Result<&'static Unit, FileError> {
         let unit = LENGTH.unit(self.text()?);
         unit.ok_or_else(|| self.error(format!("must be one of {}", LENGTH.unit_names())))
@@ -232,7 +258,13 @@ impl<'a> Table<'a> {
         match unknown.min_by_key(|key| key.span().start) {
             None => Ok(self),
             Some(key) => {
-                let message = format!("unknown key; possible here: {}", keys.join(", "));
+                let known = keys.join(", ");
+                let message = match nearest(key.get_ref(), keys) {
+                    Some(meant) => {
+                        format!("unknown key: did you mean `{meant}`? possible here: {known}")
+                    }
+                    None => format!("unknown key; possible here: {known}"),
+                };
                 let whole_key = self.key_of(key.get_ref());
                 Err(self.node.file.error(key.span().start, &whole_key, message))
             }
@@ -243,13 +275,13 @@ impl<'a> Table<'a> {
         if self.node.key.is_empty() { key.into() } else { format!("{}.{key}", self.node.key) }
     }
 
-    /// The value of a key that may be missing.
+    /// The value of an optional key.
     pub fn get(&self, key: &str) -> Option<Node<'a>> {
         let value = self.entries.get(key)?;
         Some(self.node.child(self.key_of(key), value))
     }
 
-    /// The value of a key that must be there.
+    /// The value of a required key.
     pub fn require(&self, key: &str) -> Result<Node<'a>, FileError> {
         self.get(key).ok_or_else(|| {
             let node = &self.node;
@@ -257,13 +289,12 @@ impl<'a> Table<'a> {
         })
     }
 
-    /// A table that must be there, with no other keys than these.
+    /// A required table with these keys only.
     pub fn table(&self, key: &str, keys: &[&str]) -> Result<Table<'a>, FileError> {
         self.require(key)?.table(keys)
     }
 
-    /// Something wrong with the value at a dotted key of this table, or, where there is no such
-    /// value, with what would hold it.
+    /// An error at a dotted key of this table; at the innermost existing table if there is no such value.
     pub fn error_at(&self, dotted: &str, message: impl Into<String>) -> FileError {
         let (first, rest) = dotted.split_once('.').unwrap_or((dotted, ""));
         match self.get(first) {

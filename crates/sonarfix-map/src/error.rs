@@ -1,11 +1,10 @@
-//! What is wrong with a file, and where.
+//! An error in a file, with its position.
 
 use std::fmt;
 
-/// Something wrong with a file: `paper.toml:45: robot.sonar.cone: must be …`.
+/// An error in a file: `paper.toml:45: robot.sonar.cone: must be …`.
 ///
-/// One type for every kind of fault, because every reader does the same with it: shows it to the
-/// person who wrote the file.
+/// One type for every kind of error, because every caller only prints it for the author of the file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FileError {
     file: String,
@@ -15,17 +14,17 @@ pub struct FileError {
 }
 
 impl FileError {
-    /// A fault of the value of `key` in `line`.
+    /// An error of the value of `key` in `line`.
     pub(crate) fn new(file: &str, line: usize, key: &str, message: impl Into<String>) -> Self {
         Self { file: file.into(), line: Some(line), key: key.into(), message: message.into() }
     }
 
-    /// A fault of the file as a whole.
+    /// An error of the whole file.
     pub(crate) fn of_file(file: &str, message: impl Into<String>) -> Self {
         Self { file: file.into(), line: None, key: String::new(), message: message.into() }
     }
 
-    /// The file, as it was named by who asked for it.
+    /// The file, as named by the caller.
     #[must_use]
     pub fn file(&self) -> &str {
         &self.file
@@ -37,7 +36,7 @@ impl FileError {
         self.line
     }
 
-    /// The whole key, as in `map.wall[3].to`; empty where the text is not TOML.
+    /// The full key, as in `map.wall[3].to`; empty if the text is not TOML.
     #[must_use]
     pub fn key(&self) -> &str {
         &self.key

@@ -1,4 +1,4 @@
-//! What goes wrong with the hardware, and when.
+//! Faults of the hardware, with their times.
 
 use crate::document::{Node, Table};
 use crate::error::FileError;
@@ -9,49 +9,49 @@ const KEYS: [&str; 7] = ["kind", "from", "to", "wheel", "share", "times", "late"
 /// A wheel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Wheel {
-    /// The right one.
+    /// The right wheel.
     Right,
-    /// The left one.
+    /// The left wheel.
     Left,
 }
 
-/// What goes wrong.
+/// The kind of a fault.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum FaultKind {
-    /// This share of the echoes is not heard.
+    /// This fraction of the echoes is not detected.
     LostEchoes(f64),
-    /// In this share of the pings another robot's is heard first.
+    /// In this fraction of the pings the ping of another robot is detected first.
     CrossTalk(f64),
     /// The echo line stays high.
     StuckEcho,
-    /// Channel A of an encoder stands still.
+    /// Channel A of an encoder is stuck.
     DeadEncoder(Wheel),
     /// The channels of an encoder are swapped.
     ReversedEncoder(Wheel),
-    /// This share of an encoder's edges is missed.
+    /// This fraction of an encoder's edges is missed.
     MissingTicks(Wheel, f64),
     /// The servo does not move.
     StuckServo,
-    /// The servo takes this many times as long.
+    /// The servo is slower by this factor.
     SlowServo(f64),
-    /// The loop is polled late, by up to so many seconds.
+    /// The loop is polled late, by up to this time in seconds.
     ClockJitter(f64),
-    /// The controller has no power; then it starts again, from the pose it had.
+    /// The controller loses power and restarts at the stored pose.
     BrownOut,
 }
 
 /// A fault.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fault {
-    /// What goes wrong.
+    /// The kind of a fault.
     pub kind: FaultKind,
-    /// When it begins, seconds from the start of the run.
+    /// Start, seconds from the start of the run.
     pub from: f64,
-    /// When it ends, seconds.
+    /// End, seconds from the start of the run.
     pub to: f64,
 }
 
-/// Reads `faults`, an array of tables; none where it is missing.
+/// Reads `faults`, an optional array of tables.
 pub(crate) fn read(root: &Table<'_>) -> Result<Vec<Fault>, FileError> {
     match root.get("faults") {
         Some(list) => list.items()?.into_iter().map(fault).collect(),
@@ -80,7 +80,7 @@ fn kind(table: &Table<'_>) -> Result<FaultKind, FileError> {
         "slow_servo" => FaultKind::SlowServo(times(table)?),
         "clock_jitter" => FaultKind::ClockJitter(table.require("late")?.deviation(&TIME)?),
         "brown_out" => FaultKind::BrownOut,
-        _ => return Err(node.error("is none of the faults in docs/formats.md")),
+        _ => return Err(node.error("must be one of the faults in docs/formats.md")),
     })
 }
 

@@ -1,29 +1,28 @@
-//! How true to the hardware a scenario is simulated, and with which hardware.
+//! The fidelity of a simulation, and the simulated hardware.
 
 use crate::document::{Node, Table};
 use crate::error::FileError;
 use crate::quantity::LENGTH;
-use crate::surroundings::temperature;
 
-/// What is simulated between the world and the localizer.
+/// The part of the robot that is simulated between world and localizer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Fidelity {
-    /// Nothing: the localizer is told travels and ranges, at once and on the dot. The paper's.
+    /// None: the localizer receives travel and ranges without delay or jitter, as in the paper.
     #[default]
     Ideal,
-    /// Pins and counters, with the drivers and the loop that a robot runs.
+    /// Pins and counters, with the drivers and the loop of a robot.
     Pins,
 }
 
-/// Which sonar the robot has.
+/// The robot's sonar.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SonarName {
-    /// The paper's: hears the nearest wall in its cone, always. Noise and cone are in `[truth]`.
+    /// The paper's: always detects the nearest wall in its cone. Noise and cone are in `[truth]`.
     #[default]
     Ideal,
     /// HC-SR04.
     HcSr04,
-    /// The LEGO NXT's.
+    /// LEGO NXT.
     Nxt,
     /// LV-MaxSonar-EZ, by pulse width.
     LvMaxSonar,
@@ -33,10 +32,10 @@ pub enum SonarName {
     Polaroid6500,
 }
 
-/// Which servo turns it.
+/// The sonar's servo.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ServoName {
-    /// Is at once where it is told to be.
+    /// Reaches the commanded bearing at once.
     #[default]
     Ideal,
     /// SG90.
@@ -45,22 +44,22 @@ pub enum ServoName {
     Mg996r,
 }
 
-/// Who keeps the robot on its path.
+/// How the robot follows its path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Follow {
-    /// Nobody needs to: it follows the path exactly, whatever the filter believes.
+    /// Exactly, whatever the estimate.
     #[default]
     Truth,
-    /// A follower that knows the estimate only.
+    /// A controller steers by the estimate only.
     Estimate,
 }
 
-/// Something that happens to a wheel now and then.
+/// Disturbances of a wheel at random distances.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Upset {
-    /// Mean distance between two, metres; infinite: never.
+    /// Mean distance between two, metres; infinite for none.
     pub every: f64,
-    /// How much an encoder counts too much each time (a bump: its deviation), metres.
+    /// Excess travel that the encoder counts each time, metres; of a bump, its standard deviation.
     pub by: f64,
 }
 
@@ -70,7 +69,7 @@ impl Default for Upset {
     }
 }
 
-/// What happens to the wheels.
+/// Disturbances of the wheels.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Upsets {
     /// A wheel turns without rolling.
@@ -84,13 +83,11 @@ pub struct Upsets {
 pub struct Hardware {
     /// The sonar.
     pub sonar: SonarName,
-    /// Temperature that the sonar's driver is set to, °C.
-    pub set_temperature: f64,
     /// The servo.
     pub servo: ServoName,
 }
 
-/// Reads a key whose value is one of some names; the default where it is missing.
+/// Reads an optional key whose value is one of several names.
 fn named<T: Copy + Default>(node: Option<Node<'_>>, names: &[(&str, T)]) -> Result<T, FileError> {
     let Some(node) = node else {
         return Ok(T::default());
@@ -111,10 +108,10 @@ pub(crate) fn read_follow(path: &Table<'_>) -> Result<Follow, FileError> {
     named(path.get("follow"), &[("truth", Follow::Truth), ("estimate", Follow::Estimate)])
 }
 
-/// Reads `[sensor]` and `[servo]`; what is missing is ideal, and its driver set to a room's 20 °C.
+/// Reads `[sensor]` and `[servo]`; the default is ideal.
 pub(crate) fn read_hardware(root: &Table<'_>) -> Result<Hardware, FileError> {
     let optional = |key, keys: &[&str]| root.get(key).map(|node| node.table(keys)).transpose();
-    let sensor = optional("sensor", &["model", "temperature"])?;
+    let sensor = optional("sensor", &["model"])?;
     let servo = optional("servo", &["model"])?;
     let sonars = [
         ("ideal", SonarName::Ideal),
@@ -128,7 +125,6 @@ pub(crate) fn read_hardware(root: &Table<'_>) -> Result<Hardware, FileError> {
         [("ideal", ServoName::Ideal), ("sg90", ServoName::Sg90), ("mg996r", ServoName::Mg996r)];
     Ok(Hardware {
         sonar: named(model(sensor.as_ref()), &sonars)?,
-        set_temperature: temperature(sensor.as_ref())?,
         servo: named(model(servo.as_ref()), &servos)?,
     })
 }

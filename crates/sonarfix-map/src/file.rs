@@ -1,16 +1,45 @@
 //! Files on the disk.
 
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::Path;
 
 use crate::error::FileError;
 
-/// What errors call the file at a path.
+/// The largest file that is read: a baked map of the most walls has half of it. A device without an
+/// end is no file.
+pub const MAX_FILE_BYTES: u64 = 256 * 1024 * 1024;
+
+/// The name of a file in error messages.
 pub(crate) fn name(path: &Path) -> String {
     path.display().to_string()
 }
 
 /// The text of a file.
 pub(crate) fn read(path: &Path) -> Result<String, FileError> {
-    std::fs::read_to_string(path)
+    read_text(path)
         .map_err(|error| FileError::of_file(&name(path), format!("cannot be read: {error}")))
+}
+
+/// The bytes of a file of at most [`MAX_FILE_BYTES`].
+///
+/// # Errors
+/// Those of the file system; [`io::ErrorKind::FileTooLarge`].
+pub fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    File::open(path)?.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > MAX_FILE_BYTES {
+        let reason = format!("it has more than {} MiB", MAX_FILE_BYTES / (1024 * 1024));
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, reason));
+    }
+    Ok(bytes)
+}
+
+/// The text of a file of at most [`MAX_FILE_BYTES`].
+///
+/// # Errors
+/// Those of [`read_bytes`]; [`io::ErrorKind::InvalidData`] if it is not UTF-8.
+pub fn read_text(path: &Path) -> io::Result<String> {
+    String::from_utf8(read_bytes(path)?)
+        .map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is no text in UTF-8"))
 }

@@ -25,7 +25,7 @@ impl NamedWall {
     /// A wall between two points, metres.
     ///
     /// # Errors
-    /// [`WallError`], by what is wrong with the points.
+    /// [`WallError`], by the cause.
     pub fn new(name: String, from: [f64; 2], to: [f64; 2]) -> Result<Self, WallError> {
         if !is_near_enough(from) || !is_near_enough(to) {
             return Err(WallError::NotFinite);
@@ -35,19 +35,19 @@ impl NamedWall {
         Ok(Self { name, from, to, wall })
     }
 
-    /// Its name, which no other wall of the floor has.
+    /// Its unique name.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Where it starts, metres.
+    /// Start, metres.
     #[must_use]
     pub fn from(&self) -> [f64; 2] {
         self.from
     }
 
-    /// Where it ends, metres.
+    /// End, metres.
     #[must_use]
     pub fn to(&self) -> [f64; 2] {
         self.to
@@ -68,15 +68,15 @@ impl Floor {
     /// Reads a map file.
     ///
     /// # Errors
-    /// [`FileError`] with the first thing that is wrong.
+    /// [`FileError`] with the first error.
     pub fn read(path: &Path) -> Result<Self, FileError> {
         Self::parse(&file::read(path)?, &file::name(path))
     }
 
-    /// Reads the text of a map file that errors call `file_name`.
+    /// Parses the text of a map file. Errors name it `file_name`.
     ///
     /// # Errors
-    /// [`FileError`] with the first thing that is wrong.
+    /// [`FileError`] with the first error.
     pub fn parse(text: &str, file_name: &str) -> Result<Self, FileError> {
         let document = Document::parse(text, file_name)?;
         let root = document.root(&["map"])?;
@@ -88,7 +88,7 @@ impl Floor {
         Self::with_places(node).map(|(floor, _)| floor)
     }
 
-    /// Reads a `[map]` table; also, where in the text each wall stands.
+    /// Reads a `[map]` table; also returns the position of each wall in the text.
     pub(crate) fn with_places(node: Node<'_>) -> Result<(Self, Vec<usize>), FileError> {
         let map = node.table(&["unit", "wall"])?;
         let unit = map.require("unit")?.unit_of_length()?;
@@ -152,7 +152,7 @@ impl Floor {
         &self.walls
     }
 
-    /// The walls as the localizer takes them, in the same order.
+    /// The walls in the localizer's type, in the same order.
     #[must_use]
     pub fn walls(&self) -> Vec<Wall> {
         self.walls.iter().map(|named| named.wall).collect()
@@ -172,6 +172,7 @@ fn wall(table: &Table<'_>, unit: &Unit) -> Result<NamedWall, FileError> {
         let message = match error {
             WallError::NotFinite => format!("must be {TOO_FAR}"),
             WallError::ZeroLength => "must differ from `from`: the wall has no length".into(),
+            other => other.to_string(),
         };
         table.error_at("to", message)
     })

@@ -2,12 +2,10 @@
 
 use std::f64::consts::{PI, TAU};
 
-/// The farthest a coordinate may be from the origin, metres: beyond 100 km, the localizer's f32
-/// no longer tells a centimetre.
+/// The largest coordinate, metres: beyond 100 km, the resolution of `f32` exceeds a centimetre.
 pub(crate) const FARTHEST: f64 = 1e5;
 
-/// Nearer than this, two things touch: a nanometre, a thousand times what rounding leaves of a
-/// coordinate.
+/// The distance at which two objects touch: a nanometre, a thousand times the rounding of a coordinate.
 pub(crate) const TOUCH: f64 = 1e-9;
 
 /// Why a point was refused.
@@ -50,13 +48,13 @@ impl Segment {
         [(self.to[0] - self.from[0]) / length, (self.to[1] - self.from[1]) / length]
     }
 
-    /// The point so far from the start.
+    /// The point at this distance from the start.
     pub fn at(self, along: f64) -> Point {
         let [x, y] = self.tangent();
         [self.from[0] + along * x, self.from[1] + along * y]
     }
 
-    /// Where a point lies: along the segment from its start, and to the left of it.
+    /// Coordinates of a point: along the segment from its start, and to the left of it.
     pub fn place(self, point: Point) -> Point {
         let [x, y] = self.tangent();
         let (dx, dy) = (point[0] - self.from[0], point[1] - self.from[1]);

@@ -1,24 +1,23 @@
-//! Map, robot and scenario files: read, checked, and turned into what the localizer and the
-//! simulator take. The formats are described key by key in `docs/formats.md`.
+//! Reads and checks map, robot and scenario files for the localizer and the simulator. `docs/formats.md` describes the
+//! formats, key by key.
 //!
-//! Whatever is wrong with a file is a [`FileError`] with its file, line and key:
+//! Every error is a [`FileError`] with file, line and key:
 //!
 //! ```text
 //! paper.toml:45: robot.sonar.cone: must be between 0 and 90° (half of the cone)
 //! ```
 //!
-//! | file | is read by | gives |
+//! | file | read by | result |
 //! |---|---|---|
 //! | map | [`Floor::read`] | the walls |
-//! | robot | [`Robot::read`] | the localizer's configuration, and the periods of its loop |
-//! | scenario | [`Scenario::read`] | both, a path, and what is true |
-//! | any that holds a map | [`MapFile::read`] | the walls, and the line of each |
+//! | robot | [`robot_file::read`] | the [`RobotConfig`](sonarfix_hal::config::RobotConfig) |
+//! | scenario | [`Scenario::read`] | both, a path, and the true parameters |
+//! | any with a map | [`MapFile::read`] | the walls, and the line of each |
 //!
-//! [`survey`] finds what is wrong with walls that can each be read, [`simplify`] joins pieces, and
-//! [`bake`] makes the image that a robot reads in place.
+//! [`survey`] finds contradictions between walls, [`simplify`] joins collinear pieces, and [`bake`] creates the image that a
+//! robot reads in place.
 //!
-//! Numbers that the localizer takes are `f32` in the types of [`sonarfix`]; everything else is
-//! `f64` in metres, seconds and radians.
+//! Parameters of the localizer are `f32` in the types of [`sonarfix`]; all others are `f64` in metres, seconds and radians.
 
 #![forbid(unsafe_code)]
 
@@ -36,9 +35,12 @@ mod neighbours;
 mod path;
 mod place;
 mod quantity;
-mod robot;
+mod ranger_file;
+pub mod robot_file;
+mod robot_text;
 mod scenario;
 mod simplify;
+mod spelling;
 mod surroundings;
 mod survey;
 
@@ -47,28 +49,28 @@ pub use clearance::Collision;
 pub use error::FileError;
 pub use faults::{Fault, FaultKind, Wheel};
 pub use fidelity::{Fidelity, Follow, Hardware, ServoName, SonarName, Upset, Upsets};
+pub use file::{MAX_FILE_BYTES, read_bytes, read_text};
 pub use floor::{Floor, NamedWall};
 pub use map_file::MapFile;
 pub use path::{Leg, Motion, Movement, Path, PathError, PathPlan, PathPose};
 pub use place::Place;
-pub use robot::Robot;
+pub use robot_text::text as robot_text;
 pub use scenario::{Run, Scenario, Start, Truth};
 pub use simplify::{Limits, Simplified, simplify};
 pub use surroundings::{Obstacle, Outline, Surroundings, Walk};
 pub use survey::{Finding, Flaw, Severity, survey};
 
-/// The text of the reference scenario: the conditions of the paper that Sonarfix starts from.
+/// The text of the reference scenario, with the conditions of the paper.
 pub const PAPER: &str = include_str!("../scenarios/paper.toml");
 
-/// The text of the scenario `classroom`: a cheap robot in a furnished room, down to its pins.
+/// The text of the scenario `classroom`: a cheap robot in a furnished room, simulated at its pins.
 pub const CLASSROOM: &str = include_str!("../scenarios/classroom.toml");
 
-/// The localizer's number for one of a file.
+/// Converts a number of a file to the localizer's type.
 fn single(value: f64) -> f32 {
     #[expect(
         clippy::cast_possible_truncation,
-        reason = "the nearest f32 is what the localizer computes with; what becomes infinite is \
-                  refused by its own check"
+        reason = "the localizer computes with the nearest f32; its own check refuses an infinite one"
     )]
     let single = value as f32;
     single

@@ -1,4 +1,4 @@
-//! A map from any file that holds one: a map file, a scenario, a CSV of segments, a baked map.
+//! Reads a map from any file that contains one: a map file, a scenario, a CSV of segments, a baked map.
 
 use std::collections::HashSet;
 use std::path::Path;
@@ -7,15 +7,17 @@ use sonarfix::config::Sonar;
 use sonarfix::map::{Map, WallError, image};
 use sonarfix::pose::Point;
 
+use sonarfix_hal::config::RobotConfig;
+
 use crate::document::{self, Document};
 use crate::error::FileError;
+use crate::file;
 use crate::floor::{Floor, NamedWall};
 use crate::geometry::TOO_FAR;
 use crate::quantity::{LENGTH, Unit};
 use crate::scenario::{self, Scenario};
-use crate::{Robot, file};
 
-/// A map, and where in its file each wall stands.
+/// A map, with the position of each wall in its file.
 #[derive(Debug, Clone)]
 pub struct MapFile {
     /// The walls.
@@ -28,13 +30,13 @@ pub struct MapFile {
 }
 
 impl MapFile {
-    /// Reads a map: from a CSV of segments if the file's name ends in `.csv`, from a baked map if the file
-    /// starts as one, else from a map or a scenario in TOML. `unit` is that of a CSV whose header names none.
+    /// Reads a map: a CSV of segments if the file's name ends in `.csv`, a baked map if the file starts with its
+    /// signature, otherwise a map or a scenario in TOML. `unit` is that of a CSV without a unit in its header.
     ///
     /// # Errors
-    /// [`FileError`] with the first thing that is wrong.
+    /// [`FileError`] with the first error.
     pub fn read(path: &Path, unit: Option<&str>) -> Result<Self, FileError> {
-        let bytes = std::fs::read(path).map_err(|error| {
+        let bytes = file::read_bytes(path).map_err(|error| {
             FileError::of_file(&file::name(path), format!("cannot be read: {error}"))
         })?;
         let name = file::name(path);
@@ -52,7 +54,7 @@ impl MapFile {
         Self::from_toml(&text, name, base)
     }
 
-    /// Reads the text of a map file or a scenario.
+    /// Parses the text of a map file or a scenario.
     fn from_toml(text: &str, name: String, base: &Path) -> Result<Self, FileError> {
         let document = Document::parse(text, &name)?;
         let root = document.root(&scenario::KEYS)?;
@@ -63,7 +65,7 @@ impl MapFile {
             let lines = document::lines(text, &places);
             return Ok(Self { floor, sonar: None, lines, name });
         }
-        let Scenario { floor, robot: Robot { config, .. }, .. } =
+        let Scenario { floor, robot: RobotConfig { localizer: config, .. }, .. } =
             Scenario::parse(text, &name, base)?;
         let map = root.require("map")?;
         if let Some(file) = map.as_text() {
@@ -75,7 +77,7 @@ impl MapFile {
         Ok(Self { floor, sonar: Some(config.sonar), lines, name })
     }
 
-    /// The walls of a baked map, which has no names: they are called by their numbers.
+    /// Reads a baked map. Its walls are named by their numbers.
     fn from_image(bytes: &[u8], name: String) -> Result<Self, FileError> {
         let refused = |message: String| FileError::of_file(&name, message);
         let map = Map::read(bytes).map_err(|error| refused(error.to_string()))?;
@@ -89,7 +91,7 @@ impl MapFile {
         Ok(Self { floor: Floor::new(walls), sonar: None, lines: Vec::new(), name })
     }
 
-    /// Reads the text of a CSV of segments.
+    /// Parses the text of a CSV of segments.
     fn from_csv(text: &str, name: String, unit: Option<&str>) -> Result<Self, FileError> {
         let mut reader =
             csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
@@ -118,13 +120,13 @@ impl MapFile {
         Ok(Self { floor: Floor::new(walls), sonar: None, lines, name })
     }
 
-    /// What errors call the file.
+    /// The name of the file in error messages.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// What errors call the place of a wall: `map.toml:12: "window"`.
+    /// The position of a wall in error messages: `map.toml:12: "window"`.
     #[must_use]
     pub fn place(&self, wall: usize) -> String {
         let (file, name) = (&self.name, self.quoted(wall));
@@ -134,21 +136,21 @@ impl MapFile {
         }
     }
 
-    /// The name of a wall between quotes.
+    /// The name of a wall in quotes.
     #[must_use]
     pub fn quoted(&self, wall: usize) -> String {
         let name = self.floor.named_walls().get(wall).map_or("", NamedWall::name);
         format!("\"{name}\"")
     }
 
-    /// The line in which a wall stands, if the file has lines.
+    /// The line of a wall, if the file has lines.
     #[must_use]
     pub fn line(&self, wall: usize) -> Option<usize> {
         self.lines.get(wall).copied()
     }
 }
 
-/// Counts the lines of a text, onwards from record to record.
+/// Counts the lines of a text from record to record.
 struct LineCounter<'t> {
     rest: &'t str,
     line: usize,
@@ -159,8 +161,8 @@ impl<'t> LineCounter<'t> {
         Self { rest: text, line: 1 }
     }
 
-    /// The line in which a record starts, given where the one before it ended: how far before the
-    /// text's `end`. Empty lines may lie between.
+    /// The line at which a record starts, from the distance between the end of the previous one and the end of the text.
+    /// There may be empty lines between them.
     fn advance_to(&mut self, end: usize) -> usize {
         let ended = self.rest.len().saturating_sub(end);
         let after = self.rest.get(ended..).unwrap_or_default();
@@ -180,7 +182,7 @@ fn of_csv(name: &str, error: &csv::Error) -> FileError {
     }
 }
 
-/// Which column of a CSV is what, and the unit of the coordinates.
+/// The columns of a CSV, and the unit of its coordinates.
 struct Columns {
     coordinates: [usize; 4],
     name: Option<usize>,
@@ -190,8 +192,8 @@ struct Columns {
 const COORDINATES: [&str; 4] = ["x1", "y1", "x2", "y2"];
 
 impl Columns {
-    /// The columns `x1`, `y1`, `x2`, `y2` and, if there is one, `name`, in any order. The unit follows the
-    /// name, as in `x1_mm`.
+    /// Finds the columns `x1`, `y1`, `x2`, `y2` and the optional `name`, in any order. The unit follows the name, as in
+    /// `x1_mm`.
     fn of(header: &csv::StringRecord, unit: Option<&str>) -> Result<Self, String> {
         let find = |wanted: &str| {
             header.iter().position(|column| column.split('_').next() == Some(wanted))
@@ -229,7 +231,7 @@ impl Columns {
         Ok(Self { coordinates, name: find("name"), unit })
     }
 
-    /// The wall of a record, or the column that is wrong and how.
+    /// The wall of a record; otherwise the invalid column and the error.
     fn wall(
         &self,
         record: &csv::StringRecord,
@@ -248,6 +250,7 @@ impl Columns {
         NamedWall::new(name, [x1, y1], [x2, y2]).map_err(|error| match error {
             WallError::NotFinite => ("", format!("both ends must be {TOO_FAR}")),
             WallError::ZeroLength => ("", "the wall has no length".into()),
+            other => ("", other.to_string()),
         })
     }
 }

@@ -1,4 +1,4 @@
-//! Which walls are near which, by the index that the robot itself uses.
+//! Finds neighbouring walls by the index of the baked map.
 
 use sonarfix::map::{Map, MapError};
 use sonarfix::pose;
@@ -8,7 +8,7 @@ use crate::floor::{Floor, NamedWall};
 use crate::geometry::{Point, Segment};
 use crate::single;
 
-/// What the index may be off by, metres: 100 km out, coordinates in `f32` are rounded to 4 mm.
+/// The largest error of the index, metres: at 100 km, coordinates in `f32` are rounded to 4 mm.
 const ROUNDING: f64 = 0.02;
 
 /// The walls of a floor in `f64`, indexed.
@@ -18,7 +18,7 @@ pub(crate) struct Neighbours<'a> {
 }
 
 impl<'a> Neighbours<'a> {
-    /// `image` is the floor, baked.
+    /// Creates the index of a floor. `image` is the baked floor.
     pub fn new(floor: &Floor, image: &'a [u8]) -> Result<Self, MapError> {
         let segments = floor.named_walls().iter().map(NamedWall::segment).collect();
         Ok(Self { segments, map: Map::read(image)? })
@@ -28,7 +28,7 @@ impl<'a> Neighbours<'a> {
         &self.segments
     }
 
-    /// The walls of which a part may be within `reach` of a point, and some others.
+    /// All walls within `reach` of a point, and possibly others.
     pub fn near(&self, point: Point, reach: f64) -> impl Iterator<Item = (usize, Segment)> {
         let [x, y] = point.map(single);
         let near = self.map.near(pose::Point::new(x, y), Metres(single(reach + ROUNDING)));
@@ -38,7 +38,7 @@ impl<'a> Neighbours<'a> {
         })
     }
 
-    /// The walls of which a part may be within `reach` of a wall, and some others.
+    /// All walls within `reach` of a wall, and possibly others.
     pub fn beside(&self, wall: Segment, reach: f64) -> impl Iterator<Item = (usize, Segment)> {
         self.near(wall.at(0.5 * wall.length()), 0.5 * wall.length() + reach)
     }

@@ -1,16 +1,16 @@
-//! The path that a simulated robot drives: straight legs, and turns on the spot between them.
+//! The path of a simulated robot: straight legs, with turns in place between them.
 //!
-//! Everything is computed from the corners of the plan and never from an earlier step, so no
-//! rounding accumulates: after any number of laps the robot is where the corner is, to the bit.
+//! Every pose is computed from the corners of the plan and not from an earlier pose, so that rounding does not
+//! accumulate: after any number of laps the robot is exactly at the corner.
 
 use std::fmt;
 
 use crate::geometry::{self, TOUCH, distance, wrap};
 
-/// A smaller angle than this between two legs is what rounding leaves of their directions.
+/// The largest angle between two legs that is due to rounding.
 const NO_TURN: f64 = 1e-12;
 
-/// The most laps that a path may have; its legs are kept one by one.
+/// The largest number of laps. The legs of all laps are stored.
 const MOST_LAPS: u32 = 10_000;
 
 /// A pose in the map frame: metres, metres, radians.
@@ -24,35 +24,35 @@ pub struct PathPose {
     pub heading: f64,
 }
 
-/// What a path is made from. All in metres, seconds, radians.
+/// The definition of a path, in metres, seconds and radians.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PathPlan {
-    /// Where the robot starts, facing the first corner.
+    /// Start; the robot faces the first corner.
     pub start: [f64; 2],
-    /// Where it drives in turn, in straight lines.
+    /// The corners, connected by straight lines.
     pub corners: Vec<[f64; 2]>,
-    /// How often it drives all of it; more than once only if the last corner is the start.
+    /// Number of laps; more than one only if the last corner is the start.
     pub laps: u32,
     /// Speed on the straight legs, m/s.
     pub speed: f64,
-    /// Turn rate on the spot, rad/s.
+    /// Turn rate at the corners, rad/s.
     pub turn_rate: f64,
 }
 
-/// Why a plan is not a path.
+/// Why a plan is invalid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PathError {
-    /// The start is not finite, or too far out.
+    /// The start is not finite, or too far from the origin.
     Start,
-    /// There is nowhere to drive to.
+    /// There is no corner.
     NoCorner,
-    /// The corner with this index is not finite, or too far out.
+    /// The corner with this index is not finite, or too far from the origin.
     Corner(usize),
-    /// The corner with this index is where the robot already is.
+    /// The corner with this index equals the point before it.
     SameCorner(usize),
     /// There are too few or too many laps.
     Laps,
-    /// There are several laps, but the path does not end where it starts.
+    /// There are several laps, but the path is not closed.
     OpenLaps,
     /// The speed is not a positive number.
     Speed,
@@ -61,7 +61,7 @@ pub enum PathError {
 }
 
 impl PathError {
-    /// The field of the plan that is wrong.
+    /// The invalid field of the plan.
     #[must_use]
     pub fn field(self) -> &'static str {
         match self {
@@ -73,7 +73,7 @@ impl PathError {
         }
     }
 
-    /// The index of the corner that is wrong, if one is.
+    /// The index of the invalid corner, if any.
     #[must_use]
     pub fn corner(self) -> Option<usize> {
         match self {
@@ -102,39 +102,38 @@ impl fmt::Display for PathError {
 
 impl std::error::Error for PathError {}
 
-/// What the robot does on a leg.
+/// The movement on a leg.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Movement {
     /// Drives ahead by this many metres.
     Straight(f64),
-    /// Turns on the spot by this many radians, counter-clockwise, in (−π, π]: the shortest way,
-    /// and to the left where both are equally long.
+    /// Turns in place by this angle, counter-clockwise, in (−π, π]: the shorter direction, left if both are equal.
     Turn(f64),
 }
 
 /// One leg of a path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Leg {
-    /// When it begins, seconds from the start.
+    /// Start time, seconds from the start of the path.
     pub start_time: f64,
-    /// How long it takes, seconds.
+    /// Duration, seconds.
     pub duration: f64,
-    /// Where it begins.
+    /// Start pose.
     pub from: PathPose,
-    /// Where it ends.
+    /// End pose.
     pub to: PathPose,
-    /// How it gets there.
+    /// The movement.
     pub movement: Movement,
 }
 
 impl Leg {
-    /// When it ends, seconds from the start.
+    /// End time, seconds from the start of the path.
     #[must_use]
     pub fn end_time(&self) -> f64 {
         self.start_time + self.duration
     }
 
-    /// How much of the leg is done at a time, from 0 to 1.
+    /// The completed fraction of the leg at a time, from 0 to 1.
     fn done(&self, time: f64) -> f64 {
         if time >= self.end_time() {
             return 1.0;
@@ -167,7 +166,7 @@ impl Leg {
     }
 }
 
-/// A movement without its time: either straight ahead or on the spot.
+/// A movement without its time: straight ahead or in place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
     /// Metres ahead.
@@ -176,7 +175,7 @@ pub struct Motion {
     pub turn: f64,
 }
 
-/// A path that has been checked, with where the robot is at any time.
+/// A valid path, with the pose at every time.
 ///
 /// ```
 /// use sonarfix_map::{Path, PathPlan};
@@ -199,10 +198,10 @@ pub struct Path {
 }
 
 impl Path {
-    /// The path of a plan.
+    /// Creates the path of a plan.
     ///
     /// # Errors
-    /// [`PathError`], by what is wrong with the plan.
+    /// [`PathError`], by the cause.
     pub fn new(plan: PathPlan) -> Result<Self, PathError> {
         check(&plan)?;
         let first = *plan.corners.first().ok_or(PathError::NoCorner)?;
@@ -212,13 +211,13 @@ impl Path {
         Ok(Self { plan, start, legs })
     }
 
-    /// What the path was made from.
+    /// The definition of the path.
     #[must_use]
     pub fn plan(&self) -> &PathPlan {
         &self.plan
     }
 
-    /// The legs in the order they are driven, every lap with its own.
+    /// The legs of all laps in order.
     #[must_use]
     pub fn legs(&self) -> &[Leg] {
         &self.legs
@@ -230,13 +229,13 @@ impl Path {
         is_closed(&self.plan)
     }
 
-    /// How long it takes, seconds.
+    /// Duration, seconds.
     #[must_use]
     pub fn duration(&self) -> f64 {
         self.legs.last().map_or(0.0, Leg::end_time)
     }
 
-    /// How far it is, metres.
+    /// Length, metres.
     #[must_use]
     pub fn length(&self) -> f64 {
         let length = |leg: &Leg| match leg.movement {
@@ -246,8 +245,7 @@ impl Path {
         self.legs.iter().map(length).sum()
     }
 
-    /// Where the robot is at a time, seconds from the start; before the start it stands there,
-    /// after the end it stands at the end.
+    /// The pose at a time, seconds from the start. Before the start it is the start, after the end it is the end.
     #[must_use]
     pub fn pose_at(&self, time: f64) -> PathPose {
         let begun = self.legs.partition_point(|leg| leg.start_time <= time);
@@ -255,8 +253,7 @@ impl Path {
         current.map_or(self.start, |leg| leg.pose_at(time))
     }
 
-    /// How the robot moves from one time to a later one: a piece for each leg that it is on in
-    /// between, in their order, exact. No motion if `to` is not later.
+    /// The exact motion from one time to a later one: one piece per leg in between, in order. None if `to` is not later.
     pub fn motion_between(&self, from: f64, to: f64) -> impl Iterator<Item = Motion> + '_ {
         let to = to.max(from);
         let ended = self.legs.partition_point(|leg| leg.end_time() <= from);
@@ -305,7 +302,7 @@ fn check(plan: &PathPlan) -> Result<(), PathError> {
     }
 }
 
-/// Drives a plan once, to write down its legs.
+/// Generates the legs of a plan.
 struct Driver<'a> {
     plan: &'a PathPlan,
     start: PathPose,
@@ -345,7 +342,7 @@ impl<'a> Driver<'a> {
         if by.abs() < NO_TURN {
             return;
         }
-        // Which of ±π a turn-about comes out as is a matter of rounding; it is made to the left.
+        // A half turn is +π or −π by rounding; it is always made to the left.
         if by < NO_TURN - std::f64::consts::PI {
             by += std::f64::consts::TAU;
         }

@@ -1,4 +1,4 @@
-//! A file that is a map, or a scenario with one in it.
+//! A file that is a map, or a scenario that contains one.
 
 use std::path::Path;
 
@@ -8,12 +8,12 @@ use crate::file;
 use crate::floor::Floor;
 use crate::scenario::Scenario;
 
-/// What a file says of a place.
+/// The content of such a file.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Place {
-    /// Its walls.
+    /// The walls.
     Map(Floor),
-    /// Its walls, and who drives there.
+    /// The walls, and the robot.
     Scenario(Box<Scenario>),
 }
 
@@ -21,7 +21,7 @@ impl Place {
     /// Reads a map file or a scenario file; one with a `path` is a scenario.
     ///
     /// # Errors
-    /// [`FileError`] with the first thing that is wrong.
+    /// [`FileError`] with the first error.
     pub fn read(path: &Path) -> Result<Self, FileError> {
         let (text, name) = (file::read(path)?, file::name(path));
         if Document::parse(&text, &name)?.has("path") {

@@ -1,9 +1,9 @@
-//! Numbers with units, as they are written in a file: `"2.4 mm"`.
+//! Numbers with units in a file: `"2.4 mm"`.
 
-/// A unit, as the fraction of the SI unit that it is.
+/// A unit, as a fraction of the SI unit.
 ///
-/// A fraction, because dividing a whole number of millimetres by 1000 gives the same double as
-/// writing it in metres; multiplying by 0.001 does not.
+/// Numerator and denominator are separate, because dividing a whole number of millimetres by 1000 gives the same double
+/// as writing it in metres; multiplying by 0.001 does not.
 pub(crate) struct Unit {
     name: &'static str,
     times: f64,
@@ -67,12 +67,12 @@ pub(crate) const LENGTH_PER_LENGTH: Dimension = Dimension {
 };
 
 pub(crate) const LENGTH_WALK: Dimension = Dimension {
-    name: "a length per square root of the way",
+    name: "a length per square root of the distance",
     units: &[unit("m/sqrt(m)", 1.0, 1.0), unit("mm/sqrt(m)", 1.0, 1000.0)],
 };
 
 pub(crate) const SCALE_WALK: Dimension = Dimension {
-    name: "a fraction per square root of the way",
+    name: "a fraction per square root of the distance",
     units: &[unit("/sqrt(m)", 1.0, 1.0), unit("%/sqrt(m)", 1.0, 100.0)],
 };
 
@@ -91,11 +91,11 @@ impl Dimension {
     /// The quantity in its SI unit.
     ///
     /// # Errors
-    /// What is wrong with the text, and what it may be.
+    /// The error in the text, and what is allowed.
     pub fn parse(&self, text: &str) -> Result<f64, String> {
         let text = text.trim();
         let value = self.units.iter().find_map(|unit| {
-            // What stands before "m" in "2.4 mm" is no number, so the order does not matter.
+            // The text before "m" in "2.4 mm" is not a number, so the order of the units is irrelevant.
             let number = finite(text.strip_suffix(unit.name)?.trim_end())?;
             Some(unit.in_si(number)).filter(|value| value.is_finite())
         });

@@ -1,8 +1,10 @@
-//! The scenario: a floor, a robot on a path, and what is true of it.
+//! The scenario: a floor, a robot on a path, and its true parameters.
 
 use std::path::Path as FilePath;
 
 use crate::clearance::Collision;
+use sonarfix_hal::config::RobotConfig;
+
 use crate::document::{Document, Node, Table};
 use crate::error::FileError;
 use crate::faults::{self, Fault};
@@ -13,10 +15,10 @@ use crate::path::{Path, PathPlan};
 use crate::quantity::{
     ANGLE, Dimension, LENGTH, LENGTH_PER_LENGTH, LENGTH_WALK, SCALE_WALK, SPEED, TURN_RATE,
 };
-use crate::robot::Robot;
+use crate::robot_file;
 use crate::surroundings::{self, Surroundings};
 
-/// What a scenario file may hold, beside `format`.
+/// The keys of a scenario file, besides `format`.
 pub(crate) const KEYS: [&str; 13] = [
     "name",
     "description",
@@ -51,7 +53,7 @@ const TRUTH_KEYS: [&str; 12] = [
     "bump",
 ];
 
-/// What the filter is told of its start: standard deviations.
+/// The initial standard deviations of the filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Start {
     /// Of x and of y, metres.
@@ -63,7 +65,7 @@ pub struct Start {
     pub drawn: bool,
 }
 
-/// What the simulator knows of the robot and the filter does not.
+/// The true parameters of the robot, which the filter does not receive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Truth {
     /// Track width, metres.
@@ -76,11 +78,11 @@ pub struct Truth {
     pub range_scale: f64,
     /// White noise of each wheel's travel, m/√m.
     pub wheel_noise: f64,
-    /// How far the wheels' scale errors wander, 1/√m.
+    /// Random walk of the wheels' scale errors, 1/√m.
     pub scale_walk: f64,
-    /// How far the track width wanders, m/√m.
+    /// Random walk of the track width, m/√m.
     pub track_width_walk: f64,
-    /// Standard deviation of a range at no range, metres.
+    /// Standard deviation of a range, at range zero, metres.
     pub range_noise: f64,
     /// Standard deviation of a range per metre of range, dimensionless.
     pub range_noise_per_metre: f64,
@@ -88,12 +90,12 @@ pub struct Truth {
     pub cone: f64,
 }
 
-/// How often the scenario is run.
+/// The number of runs of the scenario.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Run {
     /// The number of Monte-Carlo runs.
     pub runs: u32,
-    /// The seed of the first run; each further one has the next.
+    /// The seed of the first run; each following run has the next seed.
     pub seed: u64,
 }
 
@@ -111,33 +113,33 @@ pub struct Run {
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
-    /// What it is called.
+    /// Name.
     pub name: String,
-    /// What it shows.
+    /// Description.
     pub description: String,
-    /// What is simulated between world and localizer.
+    /// The part that is simulated between world and localizer.
     pub fidelity: Fidelity,
     /// The walls.
     pub floor: Floor,
-    /// The robot, as its builder knows it.
-    pub robot: Robot,
-    /// What it drives.
+    /// The robot as configured.
+    pub robot: RobotConfig,
+    /// The path.
     pub path: Path,
-    /// Who keeps it on that.
+    /// How the robot follows the path.
     pub follow: Follow,
-    /// What the filter is told of its start.
+    /// Initial deviations of the filter.
     pub start: Start,
-    /// What the robot really is.
+    /// The true parameters.
     pub truth: Truth,
-    /// What happens to its wheels.
+    /// Disturbances of the wheels.
     pub upsets: Upsets,
-    /// Its sonar and servo.
+    /// Sonar and servo.
     pub hardware: Hardware,
-    /// What is around it and on no map.
+    /// The surroundings that are not in the map.
     pub surroundings: Surroundings,
-    /// What goes wrong with its hardware; seen at [`Fidelity::Pins`] only.
+    /// Faults of the hardware, at [`Fidelity::Pins`] only.
     pub faults: Vec<Fault>,
-    /// How often it is run.
+    /// Number of runs.
     pub run: Run,
 }
 
@@ -145,22 +147,22 @@ impl Scenario {
     /// Reads a scenario file, and the map and robot files it names.
     ///
     /// # Errors
-    /// [`FileError`] with the first thing that is wrong.
+    /// [`FileError`] with the first error.
     pub fn read(path: &FilePath) -> Result<Self, FileError> {
         let base = path.parent().unwrap_or(FilePath::new(""));
         Self::parse(&file::read(path)?, &file::name(path), base)
     }
 
-    /// Reads the text of a scenario file that errors call `file_name`; the files it names are
-    /// relative to the directory `base`.
+    /// Parses the text of a scenario file. Errors name it `file_name`; the files that it names are relative to the directory
+    /// `base`.
     ///
     /// # Errors
-    /// [`FileError`] with the first thing that is wrong.
+    /// [`FileError`] with the first error.
     pub fn parse(text: &str, file_name: &str, base: &FilePath) -> Result<Self, FileError> {
         let document = Document::parse(text, file_name)?;
         let root = document.root(&KEYS)?;
         let floor = here_or_there(&root, "map", base, Floor::from_node, Floor::parse)?;
-        let robot = here_or_there(&root, "robot", base, Robot::from_node, Robot::parse)?;
+        let robot = here_or_there(&root, "robot", base, robot_file::from_node, robot_file::parse)?;
         let path = root.table("path", &PATH_KEYS)?;
         let truth = root.table("truth", &TRUTH_KEYS)?;
         Ok(Self {
@@ -184,21 +186,21 @@ impl Scenario {
     /// The reference scenario, [`crate::PAPER`].
     ///
     /// # Errors
-    /// [`FileError`], if this crate's own file were wrong.
+    /// [`FileError`] if the built-in file were invalid.
     pub fn paper() -> Result<Self, FileError> {
         Self::parse(crate::PAPER, "paper.toml", FilePath::new(""))
     }
 
-    /// Lets the true parameters walk as the filter assumes that they do: the variant of a scenario
-    /// in which the filter can be asked to be efficient and consistent.
+    /// Sets the random walk of the true parameters to the filter's model. In this variant of a scenario the filter should
+    /// be efficient and consistent.
     pub fn let_truth_walk_as_assumed(&mut self) {
-        let drive = &self.robot.config.drive;
+        let drive = &self.robot.localizer.drive;
         self.truth.scale_walk = drive.scale_walk.0.into();
         self.truth.track_width_walk = drive.track_width_walk.0.0.into();
     }
 }
 
-/// Reads a table of the scenario, or the file that stands in its place.
+/// Reads a table of the scenario, or the file that replaces it.
 fn here_or_there<T>(
     root: &Table<'_>,
     key: &str,
@@ -226,7 +228,7 @@ fn deviation(table: &Table<'_>, key: &str, dimension: &Dimension) -> Result<f64,
     table.require(key)?.deviation(dimension)
 }
 
-fn read_path(table: &Table<'_>, floor: &Floor, robot: &Robot) -> Result<Path, FileError> {
+fn read_path(table: &Table<'_>, floor: &Floor, robot: &RobotConfig) -> Result<Path, FileError> {
     let unit = table.require("unit")?.unit_of_length()?;
     let corners = table.require("corners")?.items()?;
     let laps = match table.get("laps") {
@@ -261,11 +263,10 @@ fn whole(node: &Node<'_>) -> Result<u32, FileError> {
     u32::try_from(number).map_err(|_| node.error("must fit into 32 bits"))
 }
 
-/// The localizer takes a wheel that is faster than `max_wheel_speed` for a fault, so a path that
-/// asks for one would leave it deaf.
-fn check_speeds(table: &Table<'_>, path: &Path, robot: &Robot) -> Result<(), FileError> {
-    let fastest = f64::from(robot.config.max_wheel_speed.0);
-    let half_width = 0.5 * f64::from(robot.config.drive.track_width.0);
+/// Checks the wheel speed: the localizer refuses the travel of a wheel that is faster than `max_wheel_speed`.
+fn check_speeds(table: &Table<'_>, path: &Path, robot: &RobotConfig) -> Result<(), FileError> {
+    let fastest = f64::from(robot.localizer.max_wheel_speed.0);
+    let half_width = 0.5 * f64::from(robot.localizer.drive.track_width.0);
     let plan = path.plan();
     for (key, wheel) in [("speed", plan.speed), ("turn_rate", plan.turn_rate * half_width)] {
         if wheel > fastest {
@@ -279,7 +280,7 @@ fn check_speeds(table: &Table<'_>, path: &Path, robot: &Robot) -> Result<(), Fil
     Ok(())
 }
 
-/// A collision is the fault of the corner that the leg leads to.
+/// An error for a collision, at the corner at the end of the leg.
 fn check_clearance(
     path: &Path,
     corners: &[Node<'_>],
@@ -321,7 +322,7 @@ fn read_truth(table: &Table<'_>) -> Result<Truth, FileError> {
     })
 }
 
-/// A scale error: at −1 and below, a wheel would stand still or roll backwards.
+/// A scale error, greater than −1: the wheel would otherwise stand still or roll backwards.
 fn scale(table: &Table<'_>, key: &str) -> Result<f64, FileError> {
     let node = table.require(key)?;
     let scale = node.fraction()?;

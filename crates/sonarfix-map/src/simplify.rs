@@ -1,32 +1,31 @@
-//! Fewer walls for the same place: pieces in line become one, and what is too short goes.
+//! Reduces the number of walls: joins collinear pieces and removes short ones.
 
 use crate::bake::{BakeError, bake};
 use crate::floor::{Floor, NamedWall};
 use crate::geometry::{Point, Segment};
 use crate::neighbours::Neighbours;
 
-/// How far a simplified floor may be from the one it was made of, metres.
+/// The largest difference between a simplified floor and the original, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
-    /// No end of a piece lies farther than this from the wall that it became part of, and no gap wider
-    /// than this is closed.
+    /// Largest distance of an end of a piece from the joined wall, and largest gap that is closed.
     pub tolerance: f64,
-    /// Walls shorter than this are left out, after pieces are joined.
+    /// Walls shorter than this are removed after joining.
     pub shortest: f64,
 }
 
-/// What became of a floor; walls are numbered as in the floor it was made of, from 0.
+/// A simplified floor. Walls are numbered as in the original, from 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Simplified {
-    /// What is left.
+    /// The simplified floor.
     pub floor: Floor,
-    /// The pieces of each wall that was made of several; it has the name of the first.
+    /// The pieces of each joined wall, which has the name of the first.
     pub joined: Vec<Vec<usize>>,
-    /// The pieces of each wall that was too short.
+    /// The pieces of each removed wall.
     pub dropped: Vec<Vec<usize>>,
 }
 
-/// Joins walls that touch, overlap or lie on each other in one line, and leaves out short ones.
+/// Joins collinear walls that touch or overlap, and removes short ones.
 ///
 /// # Errors
 /// [`BakeError`], if the walls cannot be indexed, or none would be left.
@@ -64,12 +63,12 @@ pub fn simplify(floor: &Floor, limits: Limits) -> Result<Simplified, BakeError> 
 struct Line {
     pieces: Vec<usize>,
     ends: Vec<Point>,
-    /// Between the two ends that are farthest apart.
+    /// The segment between the two ends that are farthest apart.
     whole: Segment,
 }
 
 impl Line {
-    /// The line of all pieces that can be joined to a first one, which are taken.
+    /// Takes all pieces that can be joined to the first one; returns their line.
     fn from(walls: &Neighbours, first: usize, taken: &mut [bool], tolerance: f64) -> Self {
         let segment = |wall: usize| walls.segments().get(wall).copied();
         let none = Segment { from: [0.0; 2], to: [0.0; 2] };
@@ -91,7 +90,7 @@ impl Line {
         line
     }
 
-    /// Takes a piece in, if all ends are within the tolerance then.
+    /// Adds a piece if all ends stay within the tolerance.
     fn join(&mut self, wall: usize, piece: Segment, tolerance: f64) -> bool {
         let whole = farthest([self.whole.from, self.whole.to, piece.from, piece.to]);
         let fits = |&end: &Point| whole.distance_to(end) <= tolerance;
@@ -104,7 +103,7 @@ impl Line {
         in_line
     }
 
-    /// The line as a wall with the name of its first piece, drawn the same way as that.
+    /// The line as a wall with the name and the direction of its first piece.
     fn wall(&self, named: &NamedWall) -> Option<NamedWall> {
         let Segment { from, to } = self.whole;
         let [start, end] = [from, to].map(|end| named.segment().place(end)[0]);

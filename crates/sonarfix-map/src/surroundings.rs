@@ -1,4 +1,4 @@
-//! What is around the robot and on no map: the air, furniture, people.
+//! The surroundings that are not in the map: air, furniture, people.
 
 use crate::document::{Node, Table};
 use crate::error::FileError;
@@ -7,23 +7,23 @@ use crate::quantity::{LENGTH, TEMPERATURE, TIME, Unit};
 const KEYS: [&str; 3] = ["temperature", "unit", "obstacle"];
 const OBSTACLE_KEYS: [&str; 6] = ["centre", "radius", "from", "to", "walk", "takes"];
 
-/// Air of a room, °C.
+/// Temperature of a room, °C.
 const ROOM: f64 = 20.0;
-/// Where robots drive, °C: what the driver of a ranger takes.
+/// Temperatures that a ranger's driver accepts, °C.
 const COLDEST: f64 = -40.0;
 const HOTTEST: f64 = 85.0;
 
 /// The outline of an obstacle, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Outline {
-    /// A round one.
+    /// A circle.
     Circle {
-        /// Its centre.
+        /// Centre.
         centre: [f64; 2],
-        /// Its radius.
+        /// Radius.
         radius: f64,
     },
-    /// A flat one.
+    /// A segment.
     Face {
         /// One end.
         from: [f64; 2],
@@ -32,34 +32,34 @@ pub enum Outline {
     },
 }
 
-/// A walk there and back, for ever, at a steady speed.
+/// A movement back and forth at constant speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Walk {
-    /// From the place of the outline to where it turns, metres.
+    /// Displacement from the outline to the turning point, metres.
     pub by: [f64; 2],
-    /// How long one way takes, seconds.
+    /// Duration in one direction, seconds.
     pub takes: f64,
 }
 
-/// Something that no map knows.
+/// An object that is not in the map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Obstacle {
-    /// Its outline when the run begins.
+    /// Outline at the start of the run.
     pub outline: Outline,
-    /// How it moves, if it does.
+    /// Movement, if any.
     pub walk: Option<Walk>,
 }
 
-/// What is around the robot.
+/// The surroundings of the robot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Surroundings {
-    /// Of the air, °C.
+    /// Temperature of the air, °C.
     pub temperature: f64,
-    /// What stands or walks there.
+    /// Obstacles.
     pub obstacles: Vec<Obstacle>,
 }
 
-/// Reads `[world]`; a room of 20 °C with nothing in it where there is none.
+/// Reads `[world]`; the default is an empty room of 20 °C.
 pub(crate) fn read(root: &Table<'_>) -> Result<Surroundings, FileError> {
     let Some(node) = root.get("world") else {
         return Ok(Surroundings { temperature: ROOM, obstacles: Vec::new() });
@@ -75,7 +75,7 @@ pub(crate) fn read(root: &Table<'_>) -> Result<Surroundings, FileError> {
     Ok(Surroundings { temperature: temperature(Some(&table))?, obstacles })
 }
 
-/// The key `temperature` of a table, °C; that of a room where it or the table is missing.
+/// The optional key `temperature` of an optional table, °C; that of a room by default.
 pub(crate) fn temperature(table: Option<&Table<'_>>) -> Result<f64, FileError> {
     let Some(node) = table.and_then(|table| table.get("temperature")) else {
         return Ok(ROOM);

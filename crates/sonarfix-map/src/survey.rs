@@ -1,14 +1,14 @@
-//! What is wrong with walls that can each be read, but not be right together.
+//! Finds contradictions between walls that are valid each by itself.
 //!
 //! | finding | severity | when |
 //! |---|---|---|
 //! | duplicate | error | two walls have the same ends, in either order |
-//! | overlap | error | two walls lie on each other for more than [`TOLERANCE`] |
-//! | crossing | warning | two walls cut through each other; an end on another wall is no crossing |
-//! | narrow gap | warning | a gap in a line that fills less than the cone even from `min_range` |
-//! | unreachable | warning | at no foot, [`FEET`] apart, a sonar has `min_range` of free way before the wall |
+//! | overlap | error | two walls coincide for more than [`TOLERANCE`] |
+//! | crossing | warning | two walls cross; an end on another wall is not a crossing |
+//! | narrow gap | warning | a gap between collinear walls, narrower than the cone at `min_range` |
+//! | unreachable | warning | no foot, [`FEET`] apart, has `min_range` of free space before the wall |
 //!
-//! Errors make the localizer blind to a wall: each of two that lie on each other may hide the other.
+//! With an error the localizer may not measure a wall: of two that coincide each may occlude the other.
 
 use std::fmt;
 
@@ -19,21 +19,21 @@ use crate::floor::Floor;
 use crate::geometry::{Point, Segment, distance};
 use crate::neighbours::Neighbours;
 
-/// Nearer than this, ends meet and walls lie on each other, metres: finer than anybody draws.
+/// The distance at which ends meet and walls coincide, metres: finer than any drawing.
 pub const TOLERANCE: f64 = 1e-3;
-/// From one foot of a wall that is tried to the next, metres.
+/// Distance between the tested feet of a wall, metres.
 pub const FEET: f64 = 0.05;
 
-/// How bad a finding is.
+/// Severity of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
-    /// The localizer can use the map, but does not see what was drawn.
+    /// The localizer can use the map, but not all of it.
     Warning,
     /// The map misleads the localizer.
     Error,
 }
 
-/// What is wrong between walls; they are numbered as in the floor, from 0.
+/// A contradiction between walls, which are numbered as in the floor, from 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Flaw {
     /// The same wall twice.
@@ -41,47 +41,47 @@ pub enum Flaw {
         /// The first of the two.
         of: usize,
     },
-    /// Two walls lie on each other for so many metres.
+    /// Two walls coincide.
     Overlap {
         /// The first of the two.
         with: usize,
-        /// For how long, metres.
+        /// Length of the common part, metres.
         length: f64,
     },
-    /// Two walls cut through each other.
+    /// Two walls cross.
     Crossing {
         /// The first of the two.
         with: usize,
-        /// Where, metres.
+        /// The crossing, metres.
         at: Point,
     },
-    /// Between this wall and another in line is a gap that no sonar can see.
+    /// The gap between this wall and a collinear one is too narrow for a sonar.
     NarrowGap {
         /// The first of the two.
         to: usize,
-        /// How wide it is, metres.
+        /// Width of the gap, metres.
         width: f64,
-        /// The least width that is wider than the cone at `min_range`, metres.
+        /// Width of the cone at `min_range`, metres.
         least: f64,
     },
-    /// No sonar can stand before the wall.
+    /// No sonar can be placed before the wall.
     Unreachable {
-        /// The free way that it would need, metres.
+        /// The free distance that it needs, metres.
         needs: f64,
     },
 }
 
-/// A flaw, and the wall that has it: of two, the later.
+/// A flaw and its wall: of two walls, the later one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Finding {
     /// The wall.
     pub wall: usize,
-    /// What is wrong with it.
+    /// The flaw.
     pub flaw: Flaw,
 }
 
 impl Finding {
-    /// How bad it is.
+    /// Its severity.
     #[must_use]
     pub fn severity(&self) -> Severity {
         match self.flaw {
@@ -105,36 +105,36 @@ impl Finding {
     }
 }
 
-/// What is wrong, and what to do; the walls are named by who shows it.
+/// The problem and the remedy, without the names of the walls.
 impl fmt::Display for Flaw {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Duplicate { .. } => f.write_str("the same wall twice: delete one"),
             Self::Overlap { length, .. } => write!(
                 f,
-                "two walls lie on each other for {length:.3} m and would hide each other: join them \
+                "two walls coincide for {length:.3} m and occlude each other: join them \
                  (`map simplify` does)"
             ),
             Self::Crossing { at: [x, y], .. } => {
                 write!(
                     f,
-                    "two walls cross at ({x:.3}, {y:.3}) m: end one there, if that is what is meant"
+                    "two walls cross at ({x:.3}, {y:.3}) m: end one there, if that is intended"
                 )
             }
             Self::NarrowGap { width, least, .. } => write!(
                 f,
-                "between two walls in line is a gap of {width:.3} m, narrower than the cone even from \
+                "the gap of {width:.3} m between two collinear walls is narrower than the cone at \
                  the nearest range ({least:.3} m): the sonar hears its edges as a wall, so close it"
             ),
             Self::Unreachable { needs } => write!(
                 f,
-                "no sonar can measure this wall: nowhere before it are {needs:.3} m free, so it can go"
+                "no sonar can measure this wall: no place before it has {needs:.3} m of free space; remove it"
             ),
         }
     }
 }
 
-/// Everything that is wrong with a floor for a sonar, wall by wall.
+/// Finds all flaws of a floor, wall by wall.
 ///
 /// # Errors
 /// [`BakeError`], if the walls cannot be indexed.
@@ -154,7 +154,7 @@ pub fn survey(floor: &Floor, sonar: &Sonar) -> Result<Vec<Finding>, BakeError> {
             findings.push(Finding { wall, flaw: Flaw::Unreachable { needs: min_range } });
         }
     }
-    // A narrow gap with something in it is none.
+    // A gap that contains another wall does not count.
     findings.retain(|finding| match finding.flaw {
         Flaw::NarrowGap { to, .. } => is_open(&walls, finding.wall, to),
         _ => true,
@@ -162,7 +162,7 @@ pub fn survey(floor: &Floor, sonar: &Sonar) -> Result<Vec<Finding>, BakeError> {
     Ok(findings)
 }
 
-/// What is wrong between a wall and an earlier one.
+/// Finds the flaws between a wall and an earlier one.
 fn pair(other: usize, first: Segment, second: Segment, narrow: f64) -> Option<Flaw> {
     let meets = |a, b| distance(a, b) <= TOLERANCE;
     let is_same = meets(first.from, second.from) && meets(first.to, second.to);
@@ -185,7 +185,7 @@ fn pair(other: usize, first: Segment, second: Segment, narrow: f64) -> Option<Fl
     crossing(first, second).map(|at| Flaw::Crossing { with: other, at })
 }
 
-/// Where two walls cut through each other, if both go on for more than the tolerance on either side.
+/// The crossing of two walls, if both continue for more than the tolerance on either side.
 fn crossing(first: Segment, second: Segment) -> Option<Point> {
     let parts = |cut: Segment, other: Segment| {
         let [from, to] = [other.from, other.to].map(|end| cut.place(end));
@@ -197,7 +197,7 @@ fn crossing(first: Segment, second: Segment) -> Option<Point> {
     Some(second.at(share * second.length()))
 }
 
-/// Whether nothing touches the gap between two walls in line.
+/// Whether nothing touches the gap between two collinear walls.
 fn is_open(walls: &Neighbours, first: usize, second: usize) -> bool {
     let segment = |wall: usize| walls.segments().get(wall).copied();
     let (Some(a), Some(b)) = (segment(first), segment(second)) else {
@@ -214,7 +214,7 @@ fn is_open(walls: &Neighbours, first: usize, second: usize) -> bool {
         .any(|(wall, segment)| is_other(wall) && segment.distance(gap) <= TOLERANCE)
 }
 
-/// Whether at none of the wall's feet and on neither side there is a free way of `least` metres.
+/// Whether no foot of the wall has `least` metres of free space, on either side.
 fn is_unreachable(walls: &Neighbours, wall: usize, segment: Segment, least: f64) -> bool {
     let [tx, ty] = segment.tangent();
     let length = segment.length();
@@ -225,13 +225,13 @@ fn is_unreachable(walls: &Neighbours, wall: usize, segment: Segment, least: f64)
         .collect();
     let is_free = |foot: f64, side: f64| {
         let [x, y] = segment.at(foot);
-        // From just off the wall: what touches it there, or lies on it, does not stand before it.
-        let way = |far: f64| [x - side * far * ty, y + side * far * tx];
-        let way = Segment { from: way(3.0 * TOLERANCE), to: way(least) };
-        beside.iter().all(|other| other.distance(way) > TOLERANCE)
+        // Starts just off the wall, to skip walls that touch it or coincide with it.
+        let point = |far: f64| [x - side * far * ty, y + side * far * tx];
+        let free = Segment { from: point(3.0 * TOLERANCE), to: point(least) };
+        beside.iter().all(|other| other.distance(free) > TOLERANCE)
     };
     let feet = std::iter::successors(Some(0.5 * FEET.min(length)), |foot| Some(foot + FEET));
     let mut feet = feet.take_while(|&foot| foot < length);
-    // Most walls have nothing beside them but what they end at.
+    // Most walls have no neighbours except at their ends.
     !beside.is_empty() && !feet.any(|foot| is_free(foot, 1.0) || is_free(foot, -1.0))
 }

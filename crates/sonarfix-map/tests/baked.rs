@@ -1,4 +1,4 @@
-//! Baked maps: the same walls, found by place, and no damage that is believed.
+//! Baked maps: they contain the same walls, find them by place, and damaged ones are refused.
 
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "a test should stop")]
 
@@ -20,7 +20,7 @@ fn wall(x: f32, y: f32, dx: f32, dy: f32) -> Option<Wall> {
     Wall::new(Point::new(x, y), Point::new(x + dx, y + dy)).ok()
 }
 
-/// Walls of a few metres and long ones, at any angle, around a place that may be far off.
+/// Short and long walls, at any angle, around a place that may be far from the origin.
 fn any_walls() -> impl Strategy<Value = Vec<Wall>> {
     let origin = prop_oneof![Just((0.0, 0.0)), (-2e4_f32..2e4, -2e4_f32..2e4)];
     let length = prop_oneof![4 => 0.01_f32..5.0, 1 => 5.0_f32..80.0];
@@ -45,7 +45,7 @@ fn distance(wall: &Wall, point: Point) -> f64 {
     f64::hypot(px - fx - share * ax, py - fy - share * ay)
 }
 
-/// How far the bounding box of a wall is from a point, along the axis where it is farther.
+/// The Chebyshev distance of a point from the bounding box of a wall.
 fn box_distance(wall: &Wall, point: Point) -> f32 {
     let (from, to) = (wall.from(), wall.to());
     let gap = |p: f32, a: f32, b: f32| (a.min(b) - p).max(p - a.max(b)).max(0.0);
@@ -59,8 +59,7 @@ fn ids(map: &Map, point: Point, reach: f32) -> Vec<u32> {
 }
 
 proptest! {
-    /// Whatever is within reach is found, once, and nothing is given that is more than a cell
-    /// farther off than was asked for.
+    /// Every wall within reach is found once, and none that is farther than the reach by more than a cell.
     #[test]
     fn what_is_near_is_found_once(
         walls in any_walls(),
@@ -71,7 +70,7 @@ proptest! {
         prop_assume!(!walls.is_empty());
         let image = bake(&walls).unwrap();
         let map = Map::read(&image).unwrap();
-        // Reach as far as one of the walls at least, so that there is something to find.
+        // At least one wall is within reach.
         let chosen = &walls[which.index(walls.len())];
         let point = Point::new(chosen.from().x.0 + beside.0, chosen.from().y.0 + beside.1);
         #[expect(clippy::cast_possible_truncation, reason = "rounded up")]
@@ -93,7 +92,7 @@ proptest! {
         }
     }
 
-    /// A baked wall is the wall, bit for bit, under the same id.
+    /// A baked wall equals the wall bit for bit, with the same id.
     #[test]
     fn a_baked_wall_is_the_wall(walls in any_walls()) {
         prop_assume!(!walls.is_empty());
@@ -108,7 +107,7 @@ proptest! {
         prop_assert_eq!(map.wall(WallId(map.count())), None);
     }
 
-    /// Bytes that look like a map, down to a right checksum, are refused or can be used.
+    /// Bytes with the header and the checksum of a map are refused or usable.
     #[test]
     fn noise_is_refused_or_harmless(
         shape in (0..5_u32, 0..9_u32, 0..4_u16, 0..4_u16),
@@ -128,7 +127,7 @@ proptest! {
     }
 }
 
-/// The image with the checksum that it should have.
+/// The image with a valid checksum.
 fn sealed(mut content: Vec<u8>) -> Vec<u8> {
     let seal = checksum(&content);
     content.extend(seal.to_le_bytes());
@@ -139,7 +138,7 @@ fn resealed(image: &[u8]) -> Vec<u8> {
     sealed(image[..image.len() - 4].to_vec())
 }
 
-/// Reads an image; if it is taken for a map, everything that can be asked of it must be sound.
+/// Reads an image; if it is accepted, every query must be correct.
 fn use_or_refuse(image: &[u8]) -> Result<(), MapError> {
     let map = Map::read(image)?;
     let is_sound = |(id, wall): (WallId, Wall)| {
@@ -164,8 +163,7 @@ fn use_or_refuse(image: &[u8]) -> Result<(), MapError> {
     Ok(())
 }
 
-/// A map in which there is one of everything: walls in one cell and in several, cells with several
-/// walls and with none.
+/// A map with every case: walls in one cell and in several, cells with several walls and with none.
 fn small() -> Vec<u8> {
     const WALLS: [(f32, f32, f32, f32); 10] = [
         (0.0, 0.0, 4.5, 0.0),
@@ -190,26 +188,25 @@ fn every_flipped_bit_is_seen() {
     let grid = Map::read(&image).unwrap().grid().unwrap();
     assert!(grid.cells() > 4, "the map is to have several cells: {grid:?}");
     let walls = HEADER..HEADER + 10 * 20;
-    let mut believed = 0;
+    let mut accepted = 0;
     for at in 0..image.len() {
         for flip in (0..8).map(|bit| 1 << bit).chain([0xFF]) {
             let mut damaged = image.clone();
             damaged[at] ^= flip;
             let seen = use_or_refuse(&damaged);
-            assert!(seen.is_err(), "byte {at} ^ {flip:#x} is believed");
-            // As if the writer had meant it: then the rest must show it. What no check can know is
-            // where walls and grid are meant to be, as long as they fit together.
+            assert!(seen.is_err(), "byte {at} ^ {flip:#x} is accepted");
+            // With a valid checksum the other checks must find the damage. They cannot detect moved walls and grids that fit together.
             let is_number = walls.contains(&at) || (20..HEADER).contains(&at);
             let outcome = use_or_refuse(&resealed(&damaged));
             let in_seal = at >= image.len() - 4;
             if outcome.is_ok() && !in_seal {
-                assert!(is_number, "byte {at} ^ {flip:#x} is believed, resealed");
-                believed += 1;
+                assert!(is_number, "byte {at} ^ {flip:#x} is accepted with a new checksum");
+                accepted += 1;
             }
         }
     }
     // Mostly the low bits of coordinates.
-    assert!(believed > 100, "the resealed images never came to the structure: {believed}");
+    assert!(accepted > 100, "too few images with a new checksum are accepted: {accepted}");
 }
 
 #[test]
@@ -247,7 +244,7 @@ fn it_is_said_what_is_wrong() {
     assert_eq!(with(28, &(-1.0_f32).to_le_bytes()), MapError::Grid);
     assert_eq!(with(HEADER + 20, &f32::NAN.to_le_bytes()), MapError::Wall(WallId(1)));
     assert_eq!(with(HEADER + 48, &0.5_f32.to_le_bytes()), MapError::Wall(WallId(2)));
-    // The first wall, moved by a cell: its references are no longer the right ones.
+    // The first wall, moved by a cell: its references are wrong.
     assert_eq!(with(HEADER + 4, &2.5_f32.to_le_bytes()), MapError::Index);
     assert_eq!(with(HEADER + 4, &9.0_f32.to_le_bytes()), MapError::Wall(WallId(0)));
     let message = with(4, &[2]).to_string();
@@ -291,7 +288,7 @@ fn a_point_that_is_nowhere_has_no_wall_or_all() {
     }
 }
 
-/// On either side of the number of walls that two bytes can count, every wall is found where it is.
+/// Every wall is found, with fewer and with more walls than two bytes can count.
 #[test]
 fn references_are_as_wide_as_they_need_to_be() {
     for count in [16_384, 16_385] {
@@ -328,11 +325,11 @@ fn maps_are_as_small_as_promised() {
 #[test]
 fn what_cannot_be_baked_is_refused() {
     assert_eq!(bake(&[]), Err(BakeError::NoWall));
-    // Wherever its far end is, it is not within f32.
+    // Its far end exceeds the range of f32.
     let beyond = Wall::new(Point::new(3.4e38, 0.0), Point::new(3.0e38, 1e38)).unwrap();
     let far = Wall::new(Point::new(-3e38, 0.0), Point::new(0.0, 0.0)).unwrap();
     assert!(matches!(bake(&[beyond, far]), Err(BakeError::Refused(_))));
-    // Two walls on either end of the earth are fine.
+    // Two walls on opposite sides of the earth are valid.
     let here = wall(0.0, 0.0, 1.0, 0.0).unwrap();
     let there = wall(1e7, 1e7, 4.0, 0.0).unwrap();
     let image = bake(&[here, there]).unwrap();

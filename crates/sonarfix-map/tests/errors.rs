@@ -1,12 +1,17 @@
-//! Whatever is wrong with a file is reported with its file, line and key.
+//! Every error in a file is reported with its file, line and key.
 
 use std::fs;
 use std::path::Path;
 
 use proptest::prelude::*;
+use sonarfix::config::PingSchedule;
+use sonarfix::echo::EchoParameters;
+use sonarfix::units::{Duration, Metres, Radians};
+use sonarfix_hal::config::{RobotConfig, WheelConfig};
+use sonarfix_hal::ranger::{PulseTiming, RangerKind};
 use sonarfix_map::{
-    CLASSROOM, Fault, FaultKind, Fidelity, FileError, Floor, Follow, PAPER, Robot, Scenario,
-    ServoName, SonarName, Wheel,
+    CLASSROOM, Fault, FaultKind, Fidelity, FileError, Floor, Follow, PAPER, Scenario, ServoName,
+    SonarName, Wheel, robot_file, robot_text,
 };
 
 fn parse(text: &str) -> Result<Scenario, FileError> {
@@ -19,12 +24,12 @@ fn line_of(text: &str, marker: &str) -> Option<usize> {
     Some(text.get(..at)?.matches('\n').count() + 1)
 }
 
-/// The reference scenario with one thing changed, and what is then reported.
+/// The reference scenario with one change, and the expected report.
 struct Case {
-    /// What is replaced, the first time it occurs.
+    /// The replaced text, at its first occurrence.
     old: &'static str,
     new: &'static str,
-    /// What the line reported begins or contains, the first time it occurs after the change.
+    /// Text of the reported line, at its first occurrence after the change.
     line: &'static str,
     key: &'static str,
     message: &'static str,
@@ -40,7 +45,7 @@ const fn case(
     Case { old, new, line, key, message }
 }
 
-/// A changed value, reported where it stands.
+/// A changed value, reported at its position.
 const fn value(
     old: &'static str,
     new: &'static str,
@@ -53,7 +58,13 @@ const fn value(
 const FORMAT: [Case; 9] = [
     value("unit = \"m\"", "unit = \"m", "", "this is not TOML at `"),
     value("name = \"paper\"", "name = ", "", "this is not TOML at `"),
-    case("gate = 5.0", "confidence = 1\ngate = 5.0", "confidence = 3.0", "", "duplicate key"),
+    case(
+        "sensor = \"ideal\"",
+        "missed = 0\nsensor = \"ideal\"\nmissed = 1",
+        "missed = 1",
+        "",
+        "duplicate key",
+    ),
     value("format = 1", "format = 2", "format", "version 2 cannot be read, only version 1"),
     value("format = 1", "format = \"1\"", "format", "must be a whole number"),
     case("format = 1\n", "", "# The ref", "format", "is missing"),
@@ -61,9 +72,9 @@ const FORMAT: [Case; 9] = [
         "servo =",
         "srvo =",
         "robot.sonar.srvo",
-        "unknown key; possible here: mount, servo, cone",
+        "unknown key: did you mean `servo`? possible here: mount, servo, servo_pulses",
     ),
-    value("[run]", "[ran]", "ran", "unknown key; possible here: format, name"),
+    value("[run]", "[ran]", "ran", "unknown key: did you mean `run`? possible here: format, name"),
     value(
         "{ name = \"inner east\",",
         "{ name = \"inner east\", height = 2,",
@@ -75,7 +86,7 @@ const FORMAT: [Case; 9] = [
 const MISSING: [Case; 9] = [
     case("[robot.schedule]\npolicy", "# policy", "[robot.drive]", "robot.schedule", "is missing"),
     case("cone = \"15 deg\"", "", "[robot.sonar]", "robot.sonar.cone", "is missing"),
-    case("gate = 5.0", "", "[robot.trust]", "robot.trust.gate", "is missing"),
+    case("confidence = 3.0", "", "[robot.gating]", "robot.gating.confidence", "is missing"),
     case(
         "[robot.prior]",
         "[robot.sonar.extra]",
@@ -135,8 +146,8 @@ const UNITS: [Case; 9] = [
 const TYPES: [Case; 10] = [
     value("name = \"paper\"", "name = 1", "name", "must be a string, but this is of type integer"),
     value("drawn = true", "drawn = \"yes\"", "start.drawn", "must be true or false"),
-    value("gate = 5.0", "gate = \"5\"", "robot.trust.gate", "must be a number"),
-    value("gate = 5.0", "gate = nan", "robot.trust.gate", "must be finite"),
+    value("confidence = 3.0", "confidence = \"3\"", "robot.gating.confidence", "must be a number"),
+    value("confidence = 3.0", "confidence = nan", "robot.gating.confidence", "must be finite"),
     value("seed = 0", "seed = 0.5", "run.seed", "must be a whole number from 0"),
     value("seed = 0", "seed = -1", "run.seed", "must be a whole number from 0"),
     value("start = [0, 0]", "start = [0]", "path.start", "must be two values, but there are 1"),
@@ -164,7 +175,7 @@ const MAP: [Case; 6] = [
     case("wall = [", "wall = []\nignored = [", "ignored", "map.ignored", "unknown key"),
 ];
 
-/// Every rule of the localizer's own check, at the key that the file has it under.
+/// Every rule of the localizer's own check, at its key in the file.
 const CONFIG: [Case; 17] = [
     value(
         "track_width = \"350",
@@ -246,16 +257,21 @@ const CONFIG: [Case; 17] = [
         "robot.prior.scale_left",
         "must be zero or positive",
     ),
-    value("gate = 5.0", "gate = 0", "robot.trust.gate", "must be positive"),
+    value(
+        "sensor = \"ideal\"",
+        "missed = 0.6\nshort = 0.5",
+        "robot.echo.missed",
+        "must be below 1 together with echo.short and echo.long",
+    ),
     value(
         "confidence = 3.0",
         "confidence = -3.0",
-        "robot.trust.confidence",
+        "robot.gating.confidence",
         "must be zero or positive",
     ),
 ];
 
-const ROBOT: [Case; 6] = [
+const ROBOT: [Case; 12] = [
     value(
         "encoder_period = \"100",
         "encoder_period = \"0",
@@ -274,19 +290,54 @@ const ROBOT: [Case; 6] = [
         "robot.schedule.policy",
         "must be \"nearest\" or \"informative\"",
     ),
-    case(
-        "encoder_period = \"100 ms\"",
-        "encoder_period = \"100 ms\"\ntravel_per_tick = { right = \"0 mm\", left = \"1 mm\" }",
-        "travel_per_tick",
-        "robot.drive.travel_per_tick.right",
-        "must be a length that is not zero",
+    value(
+        "right_wheel = { travel_per_edge = \"1 mm\"",
+        "right_wheel = { travel_per_edge = \"0 mm\"",
+        "robot.drive.right_wheel.travel_per_edge",
+        "must be a positive length",
+    ),
+    value(
+        "left_wheel = {",
+        "left_wheel = { diameter = \"65 mm\",",
+        "robot.drive.left_wheel.diameter",
+        "contradicts travel_per_edge",
     ),
     case(
-        "encoder_period = \"100 ms\"",
-        "encoder_period = \"100 ms\"\ntravel_per_tick = { right = \"1 mm\" }",
-        "travel_per_tick",
-        "robot.drive.travel_per_tick.left",
+        "left_wheel = { travel_per_edge = \"1 mm\"",
+        "left_wheel = { diameter = \"65 mm\"",
+        "left_wheel",
+        "robot.drive.left_wheel.edges_per_revolution",
         "is missing",
+    ),
+    value(
+        "servo_pulses = [{ width = \"100 us\", bearing = \"-180",
+        "servo_pulses = [{ width = \"900 us\", bearing = \"-180",
+        "robot.sonar.servo_pulses",
+        "must be two pulses with two bearings",
+    ),
+    value(
+        "servo_pulses = [{ width = \"100 us\", bearing = \"-180",
+        "servo_pulses = [{ width = \"100 us\", bearing = \"-90",
+        "robot.sonar.servo_pulses",
+        "must be within the servo's frame at both limits of the servo",
+    ),
+    value(
+        "ranger = { kind = \"hc_sr04\",",
+        "ranger = { kind = \"hc_sr05\",",
+        "robot.sonar.ranger.kind",
+        "must be \"hc_sr04\", \"lv_maxsonar\", \"srf02\", \"srf08\", \"custom\"",
+    ),
+    value(
+        "ranger = { kind = \"hc_sr04\",",
+        "ranger = { kind = \"srf08\",",
+        "robot.sonar.ranger.longest",
+        "is no setting of this kind of ranger",
+    ),
+    value(
+        "ranger = { kind = \"hc_sr04\",",
+        "ranger = { kind = \"hc_sr04\", adress = 1,",
+        "robot.sonar.ranger.adress",
+        "unknown key: did you mean `address`?",
     ),
     value(
         "range_scale = \"0 %\"",
@@ -370,10 +421,10 @@ const HARDWARE: [Case; 12] = [
     ),
     case("[run]", "[servo]\nmodle = 1\n[run]", "modle = ", "servo.modle", "unknown key"),
     case(
-        "[run]",
-        "[sensor]\ntemperature = \"90 degC\"\n[run]",
+        "ranger = {",
+        "temperature = \"90 degC\"\nranger = {",
         "temperature = ",
-        "sensor.temperature",
+        "robot.sonar.temperature",
         "must be from -40 to 85 degC",
     ),
     case(
@@ -468,7 +519,7 @@ fn every_fault_has_its_line_and_key() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
-/// What is wrong with the report of a case.
+/// The error in the report of a case.
 fn fault(case: &Case) -> Option<String> {
     let text = PAPER.replacen(case.old, case.new, 1);
     if text == PAPER {
@@ -483,7 +534,7 @@ fn fault(case: &Case) -> Option<String> {
     (!is_right).then(|| format!("{}: expected {line:?}: {}: {error}", case.new, case.key))
 }
 
-/// Lines counted by hand, and the whole of what is shown.
+/// Complete messages, with lines counted by hand.
 #[test]
 fn an_error_reads_as_a_compiler_writes_it() {
     let map = "format = 1\n\n[map]\nunit = \"cm\"\n\n[[map.wall]]\nname = \"a\"\nfrom = [0, 0]\n\
@@ -548,13 +599,13 @@ fn map_and_robot_may_be_files_of_their_own() {
     fs::write(place("robot.toml"), &robot).unwrap();
     fs::write(place("all.toml"), rest.replace("format = 1\n", names)).unwrap();
 
-    // GIVEN the reference scenario in three files, THEN it is the one in one file.
+    // GIVEN the reference scenario in three files, THEN it equals that in one file.
     let paper = parse(PAPER).unwrap();
     assert_eq!(Scenario::read(&place("all.toml")).unwrap(), paper);
     assert_eq!(Floor::read(&place("map.toml")).unwrap(), paper.floor);
-    assert_eq!(Robot::read(&place("robot.toml")).unwrap(), paper.robot);
+    assert_eq!(robot_file::read(&place("robot.toml")).unwrap(), paper.robot);
 
-    // WHEN one of the files is wrong, THEN it is the one that is named, with its own keys.
+    // WHEN one of the files has an error, THEN the message names this file, with its own keys.
     let wrong = robot.replace("max_wheel_speed = \"2", "max_wheel_speed = \"0");
     fs::write(place("robot.toml"), &wrong).unwrap();
     let error = Scenario::read(&place("all.toml")).unwrap_err();
@@ -562,7 +613,7 @@ fn map_and_robot_may_be_files_of_their_own() {
     assert_eq!(error.key(), "drive.max_wheel_speed");
     assert_eq!(error.line(), line_of(&wrong, "max_wheel_speed"));
 
-    // WHEN one is not there, THEN the scenario's line that names it is.
+    // WHEN one is missing, THEN the message has the scenario's line that names it.
     fs::remove_file(place("map.toml")).unwrap();
     let error = Scenario::read(&place("all.toml")).unwrap_err();
     assert_eq!(error.key(), "map");
@@ -570,7 +621,7 @@ fn map_and_robot_may_be_files_of_their_own() {
     assert_eq!(error.line(), line_of(&scenario, "map = "));
     assert!(error.message().contains("map.toml cannot be read"), "{error}");
 
-    // WHEN the scenario itself is not there, THEN there is no line.
+    // WHEN the scenario itself is missing, THEN there is no line.
     let error = Scenario::read(&place("none.toml")).unwrap_err();
     assert_eq!((error.line(), error.key()), (None, ""));
     assert!(error.to_string().contains("none.toml: cannot be read: "), "{error}");
@@ -584,16 +635,69 @@ fn what_may_be_left_out_may_be() {
 }
 
 #[test]
-fn travel_per_tick_is_read_and_may_be_negative() {
-    let ticks = "\ntravel_per_tick = { right = \"0.3255 mm\", left = \"-0.3289 mm\" }\n";
-    let period = "encoder_period = \"100 ms\"";
-    let text = PAPER.replace(period, &[period, ticks].concat());
-    let travel = parse(&text).unwrap().robot.travel_per_tick.unwrap();
-    assert_eq!((travel.right.0, travel.left.0), (0.000_325_5, -0.000_328_9));
+fn a_wheel_is_read_in_either_way_and_may_be_mirrored() {
+    let (right, left) = ("right_wheel = {", "left_wheel = {");
+    let text = PAPER
+        .replace(right, "right_wheel = { diameter = \"65 mm\", edges_per_revolution = 1496.6 } #")
+        .replace(left, "left_wheel = { mirrored = true,");
+    let robot = parse(&text).unwrap().robot;
+    assert_eq!(robot.right_wheel, WheelConfig::of_diameter(Metres(0.065), 1_496.6));
+    assert_eq!(robot.left_wheel.signed_travel(), Metres(-0.001));
+}
+
+#[test]
+fn a_ranger_is_read_by_its_name_or_by_what_differs() {
+    let robot = |ranger: &str| {
+        let text = PAPER.replace("cycle = \"100 ms\"", "").replace("ranger = {", ranger);
+        parse(&text).unwrap().robot
+    };
+    let named = robot("ranger = \"lv_maxsonar\" #");
+    assert_eq!(named.ranger.kind, RangerKind::Pulse(PulseTiming::LV_MAXSONAR));
+    assert_eq!(named.localizer.sonar.timing.cycle, Duration::millis(50));
+    let blanking = Duration::micros(250);
+    let other = robot(
+        "temperature = \"12.5 degC\"\nranger = { kind = \"hc_sr04\", blanking = \"250 us\" } #",
+    );
+    let timing = PulseTiming { blanking, ..PulseTiming::HC_SR04 };
+    assert_eq!(other.ranger.kind, RangerKind::Pulse(timing));
+    assert!((other.ranger.temperature.0 - 12.5).abs() < 1e-6);
+    assert_eq!(other.localizer.sonar.timing.cycle, Duration::millis(60));
+    let srf = robot("ranger = { kind = \"srf02\", address = 0x72 } #");
+    assert_eq!(srf.ranger.kind, RangerKind::Srf { address: 0x72 });
+    let custom = robot("cycle = \"33 ms\"\nranger = \"custom\" #");
+    assert_eq!(custom.ranger.kind, RangerKind::Custom);
+}
+
+/// A written file is read back: every number, except for the last bits of angles, which are in degrees.
+#[test]
+fn a_robot_that_is_written_is_read_back() {
+    let classroom = Scenario::parse(CLASSROOM, "classroom.toml", Path::new("")).unwrap().robot;
+    let mut odd = classroom;
+    odd.left_wheel = odd.left_wheel.mirrored();
+    odd.ranger.kind = RangerKind::Srf { address: 0x31 };
+    odd.localizer.sonar.timing.schedule = PingSchedule::AsFastAsPossible;
+    odd.localizer.echo = EchoParameters::NXT;
+    odd.localizer.echo.short = 0.04;
+    for robot in [classroom, odd, parse(PAPER).unwrap().robot] {
+        let text = robot_text(&robot);
+        let mut read = robot_file::parse(&text, "written.toml").unwrap();
+        let near = |a: Radians, b: Radians| (a - b).abs() < Radians(1e-6);
+        let angles = |robot: &RobotConfig| {
+            let sonar = &robot.localizer.sonar;
+            let [one, other] = robot.servo_pulses;
+            [sonar.servo.0, sonar.servo.1, sonar.cone, one.bearing, other.bearing]
+        };
+        let pairs = angles(&read).into_iter().zip(angles(&robot));
+        assert!(pairs.into_iter().all(|(a, b)| near(a, b)), "{text}");
+        read.localizer.sonar.servo = robot.localizer.sonar.servo;
+        read.localizer.sonar.cone = robot.localizer.sonar.cone;
+        read.servo_pulses = robot.servo_pulses;
+        assert_eq!(read, robot, "{text}");
+    }
 }
 
 proptest! {
-    /// Whatever is cut out of a file or typed into it, it is read or refused at one of its lines.
+    /// A file with any text removed or inserted is read or refused at one of its lines.
     #[test]
     fn any_damage_is_survived(
         from in 0..PAPER.len(),
@@ -643,7 +747,7 @@ fn a_wrong_fault_has_its_line_and_key() {
     };
     let when = "from = \"1 s\", to = \"2 s\"";
     let cases = [
-        ("kind = \"gremlins\"", "kind", "is none of the faults"),
+        ("kind = \"gremlins\"", "kind", "must be one of the faults"),
         ("kind = \"lost_echoes\"", "share", "is missing"),
         ("kind = \"cross_talk\", share = 1.5", "share", "must be from 0 to 1"),
         ("kind = \"dead_encoder\", wheel = \"front\"", "wheel", "must be \"right\" or"),

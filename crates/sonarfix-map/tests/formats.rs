@@ -1,14 +1,14 @@
-//! `docs/formats.md` is true: its examples are read, and every key they have is explained.
+//! The examples of `docs/formats.md` are valid, and it explains every key in them.
 
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use sonarfix_map::{FileError, Floor, Robot, Scenario};
+use sonarfix_map::{FileError, Floor, Scenario, robot_file};
 
-// Outside the crate, and so read when the test runs: the packaged crate does not hold it.
+// Read at run time, because the page is outside of the crate and not in its package.
 const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/formats.md");
 
-/// The TOML examples of a page: what kind of file each is, and its text.
+/// The TOML examples of a page: the kind of file and the text of each.
 fn examples(page: &str) -> Vec<(&str, &str)> {
     let blocks = page.split("```toml ").skip(1);
     blocks.filter_map(|block| block.split("```").next()?.split_once('\n')).collect()
@@ -17,7 +17,7 @@ fn examples(page: &str) -> Vec<(&str, &str)> {
 fn read(kind: &str, text: &str) -> Result<(), FileError> {
     match kind {
         "map" => Floor::parse(text, kind).map(drop),
-        "robot" => Robot::parse(text, kind).map(drop),
+        "robot" => robot_file::parse(text, kind).map(drop),
         _ => Scenario::parse(text, kind, Path::new("")).map(drop),
     }
 }

@@ -1,4 +1,4 @@
-//! Maps from any file, what is found wrong with them, and what simplifying them may change.
+//! Maps from any file, the flaws found in them, and the changes by simplification.
 
 #![expect(
     clippy::unwrap_used,
@@ -92,7 +92,7 @@ fn a_gap_that_fills_less_than_the_cone_is_narrow() {
         assert_eq!(width.is_some(), is_narrow, "{gap}: {found:?}");
         assert!(width.is_none_or(|width| (width - gap).abs() < 1e-6));
     }
-    // Filled by a third wall, or with one that ends in it, it is none.
+    // A gap that is filled by a third wall, or that contains the end of one, does not count.
     let filled = findings(&[WALL, [4.02, 0.0, 8.0, 0.0], [4.0, 0.0, 4.02, 0.0]]);
     assert_eq!(filled, []);
 }
@@ -104,9 +104,9 @@ fn a_wall_between_walls_is_unreachable() {
     assert_eq!(found.len(), 1, "{found:?}");
     assert!(matches!(found[0], Finding { wall: 0, flaw: Flaw::Unreachable { .. } }));
     assert_eq!(found[0].severity(), Severity::Warning);
-    // Farther off than the nearest range there is room.
+    // Beyond the shortest range there is free space.
     assert_eq!(findings(&walls(0.06)), []);
-    // One side free is enough, and so is a hole in what stands before it.
+    // One free side is sufficient, and so is a hole in the wall before it.
     assert_eq!(findings(&walls(0.03)[..2]), []);
     let [wall, _, behind] = walls(0.03);
     let holed = [wall, [-0.1, 0.03, 0.8, 0.03], [1.0, 0.03, 2.1, 0.03], behind];
@@ -119,7 +119,7 @@ fn a_room_has_no_flaw() {
     assert_eq!(survey(&paper.floor, &paper.sonar.unwrap()).unwrap(), []);
 }
 
-/// A file in a folder of its own, which lasts as long as what is returned.
+/// A file in a temporary folder, which is removed with the returned value.
 fn written(name: &str, text: impl AsRef<[u8]>) -> (tempfile::TempDir, std::path::PathBuf) {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join(name);
@@ -150,7 +150,7 @@ fn every_kind_of_file_gives_the_same_walls_with_their_lines() {
     assert_eq!(from_csv.floor, map.floor);
     assert_eq!((from_csv.line(0), from_csv.line(1)), (Some(2), Some(4)));
     assert_eq!(read("m.csv", bare, Some("mm")).unwrap().floor, map.floor);
-    // What is written is read again, names and all.
+    // A written file is read back, with the names.
     assert_eq!(read("m.toml", map.floor.to_toml(), None).unwrap().floor, map.floor);
     assert_eq!(read("m.csv", map.floor.to_csv(), None).unwrap().floor, map.floor);
     // A baked map has no names and no lines.
@@ -162,7 +162,7 @@ fn every_kind_of_file_gives_the_same_walls_with_their_lines() {
     assert_eq!((baked.line(0), baked.floor.named_walls()[1].name()), (None, "wall 1"));
 }
 
-/// A scenario has a robot, whose sonar is the one to check for, and may name another file.
+/// A scenario has a robot, whose sonar is used for the check, and may name another file.
 #[test]
 fn a_scenario_gives_its_map_and_its_sonar() {
     let paper = read("paper.toml", PAPER, None).unwrap();
@@ -223,9 +223,9 @@ fn pieces_in_line_become_one() {
     let walls: Vec<_> = simple.floor.named_walls().iter().map(|w| (w.from(), w.to())).collect();
     let expected = [([0.0, 0.0], [4.0, 0.0]), ([0.0, 5.0], [1.0, 5.0]), ([4.0, 0.0], [4.0, 3.0])];
     assert_eq!(walls, expected);
-    // What is not simpler stays what it is.
+    // A floor that cannot be simplified is unchanged.
     assert_eq!(simplify(&simple.floor, limits(0.001, 0.0)).unwrap().floor, simple.floor);
-    // Pieces are joined before the short ones go.
+    // Pieces are joined before short ones are removed.
     let short = simplify(&pieces, limits(0.001, 1.5)).unwrap();
     assert_eq!((short.floor.named_walls().len(), short.dropped), (2, vec![vec![1]]));
     assert!(simplify(&pieces, limits(0.001, 9.0)).is_err());
@@ -239,8 +239,8 @@ fn distance([x, y]: [f64; 2], wall: &NamedWall) -> f64 {
 }
 
 proptest! {
-    /// However walls are broken into pieces, shaken by less than the tolerance: every point of the pieces
-    /// is within the tolerance of what they become, and every point of that is within it of a piece.
+    /// For walls broken into pieces that are displaced by less than the tolerance: every point of the pieces is within the
+    /// tolerance of the joined wall, and every point of that wall is within the tolerance of a piece.
     #[test]
     fn simplifying_keeps_the_tolerance(
         lines in prop::collection::vec((0.0_f64..6.0, 0.0_f64..6.0, -3.2_f64..3.2, 2..6_u8), 1..6),

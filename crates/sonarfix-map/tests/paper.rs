@@ -1,13 +1,14 @@
-//! The reference scenario is what DESIGN.md says.
+//! The reference scenario has the values of the paper.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI};
 
 use sonarfix::aim::Policy;
-use sonarfix::config::{CalibrationPrior, Config, Pace, Rhythm, Sonar, Timing, Trust, Weights};
-use sonarfix::motion::Drive;
+use sonarfix::config::{Config, PingSchedule, PingTiming};
+use sonarfix::echo::EchoParameters;
 use sonarfix::pose::Point;
 use sonarfix::range::RangeNoise;
 use sonarfix::units::{Duration, Metres, MetresPerSecond, PerRootMetre, Radians};
+use sonarfix_map::robot_file::INSTANT_SERVO;
 use sonarfix_map::{FileError, Movement, PAPER, PathPose, Run, Scenario, Start, Truth};
 
 fn paper() -> Result<Scenario, FileError> {
@@ -88,40 +89,33 @@ fn the_walls_are_two_rectangles() {
 fn the_robot_is_that_of_the_paper() {
     let robot = paper().unwrap().robot;
     let half_turn = Radians(std::f32::consts::PI);
-    let config = Config {
-        drive: Drive {
-            track_width: Metres(0.35),
-            wheel_noise: PerRootMetre(Metres(0.0005)),
-            scale_walk: PerRootMetre(5e-6),
-            track_width_walk: PerRootMetre(Metres(5e-6)),
-        },
-        max_wheel_speed: MetresPerSecond(2.0),
-        sonar: Sonar {
-            mount: Point::new(0.0, 0.0),
-            servo: (-half_turn, half_turn),
-            cone: Radians(std::f32::consts::PI / 12.0),
-            min_range: Metres(0.05),
-            max_range: Metres(10.0),
-            noise: RangeNoise { floor: Metres(0.0024), per_metre: 0.0 },
-            timing: Timing {
-                rhythm: Rhythm::Every(Duration::secs(1)),
-                servo: Pace::INSTANT,
-                cycle: Duration::millis(100),
-            },
-        },
-        prior: CalibrationPrior {
-            scale_right: 0.01,
-            scale_left: 0.01,
-            track_width: Metres(0.01),
-            range_scale: 0.0,
-        },
-        trust: Trust { gate: 5.0, confidence: 3.0, short: 0.0, ..Trust::default() },
-        policy: Policy::Nearest,
-        weights: Weights::default(),
+    let mut config = Config::for_track_width(Metres(0.35));
+    config.drive.wheel_noise = PerRootMetre(Metres(0.0005));
+    config.drive.scale_walk = PerRootMetre(5e-6);
+    config.drive.track_width_walk = PerRootMetre(Metres(5e-6));
+    config.max_wheel_speed = MetresPerSecond(2.0);
+    config.sonar.mount = Point::new(0.0, 0.0);
+    config.sonar.servo = (-half_turn, half_turn);
+    config.sonar.cone = Radians(std::f32::consts::PI / 12.0);
+    config.sonar.min_range = Metres(0.05);
+    config.sonar.max_range = Metres(10.0);
+    config.sonar.noise = RangeNoise { floor: Metres(0.0024), per_metre: 0.0 };
+    config.sonar.timing = PingTiming {
+        schedule: PingSchedule::Every(Duration::secs(1)),
+        servo: INSTANT_SERVO,
+        cycle: Duration::millis(100),
     };
-    assert_eq!(robot.config, config);
+    config.prior.scale_right = 0.01;
+    config.prior.scale_left = 0.01;
+    config.prior.track_width = Metres(0.01);
+    config.prior.range_scale = 0.0;
+    config.gating.confidence = 3.0;
+    config.echo = EchoParameters::NONE;
+    config.policy = Policy::Nearest;
+    assert_eq!(robot.localizer, config);
     assert_eq!(robot.encoder_period, Duration::millis(100));
-    assert_eq!(robot.travel_per_tick, None);
+    assert_eq!(robot.right_wheel.signed_travel(), Metres(0.001));
+    assert_eq!(robot.left_wheel.signed_travel(), Metres(0.001));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! The path: where the robot is at any time, and how it moves between two.
+//! The path: the pose at any time, and the motion between two times.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -12,7 +12,7 @@ fn plan(corners: &[[f64; 2]]) -> PathPlan {
     PathPlan { start: [0.0, 0.0], corners: corners.to_vec(), laps: 1, speed: 0.5, turn_rate: 0.25 }
 }
 
-/// The difference of two headings, the short way round.
+/// The difference of two headings, in (−π, π].
 fn angle_between(a: f64, b: f64) -> f64 {
     let difference = (a - b).rem_euclid(TAU);
     difference.min(TAU - difference)
@@ -23,7 +23,7 @@ fn is_near(a: PathPose, b: PathPose, tolerance: f64) -> bool {
         && angle_between(a.heading, b.heading) <= tolerance
 }
 
-/// Moves a pose: each motion is either straight or on the spot, so this is exact.
+/// Moves a pose. Each motion is either straight or in place, so this is exact.
 fn moved(pose: PathPose, motion: Motion) -> PathPose {
     PathPose {
         x: pose.x + motion.advance * pose.heading.cos(),
@@ -149,7 +149,7 @@ fn partition(path: &Path, shares: &[f64]) -> Vec<f64> {
 }
 
 proptest! {
-    /// Each leg begins when and where the one before it ended, and a closed path ends as it began.
+    /// Each leg starts at the time and the pose of the end of the previous one; a closed path ends at its start.
     #[test]
     fn legs_follow_on_each_other(path in any_path()) {
         for pair in path.legs().windows(2) {
@@ -161,20 +161,20 @@ proptest! {
         }
     }
 
-    /// In a short time the robot moves no farther than it can.
+    /// The speed never exceeds that of the plan.
     #[test]
     fn the_pose_is_continuous(path in any_path(), share in 0.0..1.0_f64, step in 0.0..0.01_f64) {
         let starts = path.legs().iter().map(|leg| leg.start_time - 0.5 * step);
         for time in starts.chain([share * path.duration()]) {
             let (before, after) = (path.pose_at(time), path.pose_at(time + step));
-            let way = f64::hypot(after.x - before.x, after.y - before.y);
+            let distance = f64::hypot(after.x - before.x, after.y - before.y);
             let turn = angle_between(after.heading, before.heading);
-            prop_assert!(way <= path.plan().speed * step + ROUNDING, "{} at {}", way, time);
+            prop_assert!(distance <= path.plan().speed * step + ROUNDING, "{} at {}", distance, time);
             prop_assert!(turn <= path.plan().turn_rate * step + ROUNDING, "{} at {}", turn, time);
         }
     }
 
-    /// However a path is cut, its pieces make up the whole, way and turn, back and forth.
+    /// The pieces of a path sum up to the whole, in distance and in angle, wherever it is divided.
     #[test]
     fn pieces_sum_to_the_whole(path in any_path(), shares in prop::collection::vec(0.0..1.0_f64, 0..30)) {
         let amounts = |from, to| {
@@ -194,7 +194,7 @@ proptest! {
         prop_assert!((whole.0 - path.length()).abs() < ROUNDING);
     }
 
-    /// Whoever follows the motions is where the path says.
+    /// Integrating the motions gives the pose of the path.
     #[test]
     fn motions_lead_to_the_poses(path in any_path(), shares in prop::collection::vec(0.0..1.0_f64, 1..30)) {
         let mut pose = path.pose_at(0.0);
@@ -205,7 +205,7 @@ proptest! {
         }
     }
 
-    /// No time passes, or it runs backwards: nothing moves.
+    /// Without time, or with time running backwards, there is no motion.
     #[test]
     fn no_time_is_no_motion(path in any_path(), share in -0.1..1.1_f64, back in 0.0..100.0_f64) {
         let time = share * path.duration();

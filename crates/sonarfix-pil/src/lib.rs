@@ -1,4 +1,4 @@
-//! Processor in the loop: the loop that ships, on a microcontroller whose devices are messages.
+//! Processor in the loop: the shipped loop runs on a microcontroller whose devices are messages.
 //!
 //! ```text
 //!   a PC simulates the world                      a microcontroller, emulated or real
@@ -6,35 +6,36 @@
 //!   servo, trigger ◀── Answer ────── Wires ◀── drivers ◀──┘   and every bit of the estimate
 //! ```
 //!
-//! Time is the PC's: nothing happens between two messages, so a run is the same however long the
-//! microcontroller takes. The same [`Device`] runs on the PC, so what both answer can be compared
-//! byte by byte.
+//! The PC provides the time, which stands still between two messages: a run does not depend on the speed of the
+//! microcontroller. The same [`Session`] runs on the PC, so that both answers can be compared byte by byte.
 //!
 //! `no_std`, no allocation, no panic, no `unsafe`, no clock, no global.
 //!
-//! | module | what it is for |
+//! | module | |
 //! |---|---|
-//! | [`message`] | what is asked and answered |
-//! | [`wires`] | what stands at the pins of the devices |
+//! | [`message`] | requests and answers |
+//! | [`wires`] | the signals at the pins of the devices |
 //! | [`board`] | the drivers of a robot on those wires |
-//! | [`device`] | what answers: a localizer alone, or the shipped loop |
-//! | [`line`](mod@line) | how messages are carried: frames over any byte stream |
-//! | [`serve`](mod@serve) | what the microcontroller's program does |
+//! | [`session`] | executes requests: a localizer alone, or the shipped loop |
+//! | [`meter`] | counts the instructions and the stack of a call |
+//! | [`line`](mod@line) | frames of messages over a stream of bytes |
+//! | [`serve`](mod@serve) | the microcontroller's program |
 
 #![no_std]
 #![forbid(unsafe_code)]
 
 pub mod board;
-pub mod device;
 pub mod line;
 pub mod message;
+pub mod meter;
 mod ram_flash;
 pub mod serve;
+pub mod session;
 pub mod wires;
 
-pub use board::{Board, SetupError};
-pub use device::{Device, Refusal};
 pub use line::{Line, LineError};
-pub use message::{Answer, Begin, Belief, Request};
-pub use serve::{Meter, serve};
+pub use message::{Answer, Begin, Request, RequestError, SessionKind, Snapshot};
+pub use meter::{Meter, Unmetered};
+pub use serve::serve;
+pub use session::Session;
 pub use wires::{Actuators, Counted, Sensors, Wires};

@@ -1,45 +1,45 @@
-//! How messages are carried: over any stream of bytes that loses none.
+//! Transfers messages over a lossless stream of bytes.
 //!
 //! ```text
 //! request   length u32 | Request (postcard)
 //! reply     length u32 | instructions u32 | Answer (postcard)
 //! ```
 //!
-//! Numbers are little-endian; the length is that of what follows it. This is no link to a robot
-//! that drives (`sonarfix-link` is): there is no checksum here and no way back from a lost byte.
+//! Numbers are little-endian; the length counts the bytes that follow it. There is no checksum, and no
+//! resynchronization after a lost byte: the link to a driving robot is `sonarfix-link`.
 
 use embedded_io::{Read, ReadExactError, Write};
 use serde::{Deserialize, Serialize};
 
 use crate::message::{Answer, Request};
 
-/// The longest request, but for [`Request::Begin`], which has a map in it.
+/// The longest request, except [`Request::Begin`], which contains a map.
 pub const REQUEST_MAX: usize = 64;
 /// The longest answer.
 pub const ANSWER_MAX: usize = 320;
 /// Bytes of a length, or of a count.
 const WORD: usize = 4;
 
-/// What went wrong on a line.
+/// An error of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LineError<E> {
-    /// The other end is gone.
+    /// The other end has closed the stream.
     Closed,
     /// The stream's own error.
     Stream(E),
-    /// A message is longer than there is room for.
+    /// A message is longer than its buffer.
     TooLong,
-    /// The bytes are no message.
+    /// The bytes are not a message.
     Unreadable,
 }
 
 impl<E: core::fmt::Debug> core::fmt::Display for LineError<E> {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Self::Closed => f.write_str("the other end is gone"),
+            Self::Closed => f.write_str("the other end has closed the stream"),
             Self::Stream(error) => write!(f, "the line: {error:?}"),
-            Self::TooLong => f.write_str("a message is longer than there is room for"),
-            Self::Unreadable => f.write_str("what came is no message"),
+            Self::TooLong => f.write_str("a message is longer than its buffer"),
+            Self::Unreadable => f.write_str("the received bytes are not a message"),
         }
     }
 }
@@ -60,42 +60,49 @@ impl<E> From<ReadExactError<E>> for LineError<E> {
 pub struct Line<S>(pub S);
 
 impl<S: Read + Write> Line<S> {
-    /// Sends what postcard has made of a request.
+    /// Sends an encoded request.
     ///
     /// # Errors
     /// [`LineError`].
-    pub fn ask(&mut self, request: &[u8]) -> Result<(), LineError<S::Error>> {
+    pub fn send_request(&mut self, request: &[u8]) -> Result<(), LineError<S::Error>> {
         self.send(&[], request)
     }
 
-    /// Takes a request; the bytes that it borrows are in `space`.
+    /// Receives a request, which borrows from `space`.
     ///
     /// # Errors
     /// [`LineError`].
-    pub fn asked<'b>(&mut self, space: &'b mut [u8]) -> Result<Request<'b>, LineError<S::Error>> {
-        let bytes = self.take(space)?;
-        parse(bytes)
+    pub fn receive_request<'b>(
+        &mut self,
+        space: &'b mut [u8],
+    ) -> Result<Request<'b>, LineError<S::Error>> {
+        let bytes = self.receive(space)?;
+        decode(bytes)
     }
 
-    /// Sends an answer, and what it took.
+    /// Sends an answer and the number of its instructions.
     ///
     /// # Errors
     /// [`LineError`].
-    pub fn reply(&mut self, answer: &Answer, instructions: u32) -> Result<(), LineError<S::Error>> {
+    pub fn send_reply(
+        &mut self,
+        answer: &Answer,
+        instructions: u32,
+    ) -> Result<(), LineError<S::Error>> {
         let mut space = [0; ANSWER_MAX];
         let bytes = postcard::to_slice(answer, &mut space).map_err(|_| LineError::TooLong)?;
         self.send(&instructions.to_le_bytes(), bytes)
     }
 
-    /// Takes a reply: what postcard has made of an answer, and what it took.
+    /// Receives a reply: an encoded answer and the number of its instructions.
     ///
     /// # Errors
     /// [`LineError`].
-    pub fn replied<'b>(
+    pub fn receive_reply<'b>(
         &mut self,
         space: &'b mut [u8],
     ) -> Result<(&'b [u8], u32), LineError<S::Error>> {
-        let bytes = self.take(space)?;
+        let bytes = self.receive(space)?;
         let (word, answer) = bytes.split_first_chunk::<WORD>().ok_or(LineError::Unreadable)?;
         Ok((answer, u32::from_le_bytes(*word)))
     }
@@ -108,7 +115,7 @@ impl<S: Read + Write> Line<S> {
         self.0.flush().map_err(LineError::Stream)
     }
 
-    fn take<'b>(&mut self, space: &'b mut [u8]) -> Result<&'b [u8], LineError<S::Error>> {
+    fn receive<'b>(&mut self, space: &'b mut [u8]) -> Result<&'b [u8], LineError<S::Error>> {
         let mut word = [0; WORD];
         self.0.read_exact(&mut word)?;
         let length = usize::try_from(u32::from_le_bytes(word)).map_err(|_| LineError::TooLong)?;
@@ -118,27 +125,27 @@ impl<S: Read + Write> Line<S> {
     }
 }
 
-/// A message of these bytes, and of no other.
-fn parse<'b, M: Deserialize<'b>, E>(bytes: &'b [u8]) -> Result<M, LineError<E>> {
+/// Decodes a message, which must use all bytes.
+fn decode<'b, M: Deserialize<'b>, E>(bytes: &'b [u8]) -> Result<M, LineError<E>> {
     match postcard::take_from_bytes(bytes) {
         Ok((message, [])) => Ok(message),
         _ => Err(LineError::Unreadable),
     }
 }
 
-/// What postcard makes of a message, in `space`; `None` if there is no room.
-pub fn bytes<'b>(message: &impl Serialize, space: &'b mut [u8]) -> Option<&'b [u8]> {
+/// Encodes a message into `space`; `None` if it does not fit.
+pub fn encode<'b>(message: &impl Serialize, space: &'b mut [u8]) -> Option<&'b [u8]> {
     postcard::to_slice(message, space).ok().map(|bytes| &*bytes)
 }
 
-/// The answer that these bytes are.
+/// Decodes an answer.
 #[must_use]
-pub fn answer(bytes: &[u8]) -> Option<Answer> {
-    parse::<Answer, ()>(bytes).ok()
+pub fn decode_answer(bytes: &[u8]) -> Option<Answer> {
+    decode::<Answer, ()>(bytes).ok()
 }
 
-/// The request that these bytes are.
+/// Decodes a request.
 #[must_use]
-pub fn request(bytes: &[u8]) -> Option<Request<'_>> {
-    parse::<Request, ()>(bytes).ok()
+pub fn decode_request(bytes: &[u8]) -> Option<Request<'_>> {
+    decode::<Request, ()>(bytes).ok()
 }

@@ -1,96 +1,131 @@
-//! What a PC asks and a microcontroller answers: postcard, one answer to each request.
+//! The messages: requests of the PC and answers of the microcontroller, one to each request, in postcard.
 
 use serde::{Deserialize, Serialize};
 use sonarfix::aim::{Aim, NoAim};
-use sonarfix::config::Config;
-use sonarfix::ekf::{STATES, State};
+use sonarfix::ekf::{STATES, StateEstimate};
 use sonarfix::health::Health;
 use sonarfix::localizer::{Fix, Localizer, OdometryError, Start};
 use sonarfix::motion::WheelTravel;
 use sonarfix::units::{Instant, Metres};
+use sonarfix_hal::config::RobotConfig;
 
-use crate::board::Board;
-use crate::device::Refusal;
 use crate::wires::{Actuators, Sensors};
 
-/// What is asked.
+/// A request.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[expect(clippy::large_enum_variant, reason = "there is one of it at a time, and no heap")]
 pub enum Request<'a> {
-    /// Begin a session, with a baked map.
+    /// Begins a session with a baked map.
     Begin(Begin, &'a [u8]),
-    /// Of a localizer: the wheels rolled.
+    /// Localizer session: wheel travel.
     Odometry(Instant, WheelTravel),
-    /// Of a localizer: where should the sonar look?
+    /// Localizer session: the bearing of the next ping.
     Aim,
-    /// Of a localizer: what came back from where it looked last.
+    /// Localizer session: the range at the last aim; none without an echo.
     Fix(Option<Metres>),
-    /// Of a localizer: the sonar had its turn and nothing to look at.
-    Skip,
-    /// Of a loop: poll it.
+    /// Localizer session: the due ping is skipped.
+    SkipPing,
+    /// Loop session: one poll.
     Poll(Sensors),
-    /// End the session.
+    /// Ends the session.
     End,
 }
 
-/// How a session begins.
+/// The parameters of a session.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Begin {
-    /// When.
+    /// Time of the start.
     pub at: Instant,
-    /// Where the robot stands.
+    /// Start pose.
     pub start: Start,
-    /// Its configuration.
-    pub config: Config,
-    /// What its loop drives; without it there is a localizer alone.
-    pub board: Option<Board>,
+    /// Configuration of the robot.
+    pub config: RobotConfig,
+    /// What the session runs.
+    pub kind: SessionKind,
 }
 
-/// What is answered.
+/// What a session runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum SessionKind {
+    /// A localizer alone.
+    Localizer,
+    /// The shipped loop with its drivers.
+    Loop,
+}
+
+/// Why a request was refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum RequestError {
+    /// The map image is invalid.
+    Map,
+    /// The localizer refuses its configuration or its start.
+    Start,
+    /// A device of the board has invalid parameters.
+    Board,
+    /// The request does not belong to this kind of session, or to its current state.
+    OutOfPlace,
+    /// The request could not be decoded.
+    Unreadable,
+}
+
+impl core::fmt::Display for RequestError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Map => "the map image is invalid",
+            Self::Start => "the localizer refuses its configuration or its start",
+            Self::Board => "a device of the board has invalid parameters",
+            Self::OutOfPlace => "the request does not belong to this session",
+            Self::Unreadable => "the request cannot be decoded",
+        })
+    }
+}
+
+impl core::error::Error for RequestError {}
+
+/// An answer.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Answer {
-    /// The session has begun; what the loop did to its devices in that.
-    Began(Actuators),
-    /// It has not, or what was asked does not belong to it.
-    Refused(Refusal),
-    /// What became of the wheels' travel.
-    Rolled(Result<(), OdometryError>, Belief),
-    /// Where to look.
-    Aimed(Result<Aim, NoAim>),
-    /// What became of the range.
-    Fixed(Fix, Belief),
-    /// The verdict after a turn for nothing.
+    /// The session has begun; what the loop did to its devices.
+    Started(Actuators),
+    /// The request was refused.
+    Refused(RequestError),
+    /// The result of the wheel travel.
+    Odometry(Result<(), OdometryError>, Snapshot),
+    /// The aim.
+    Aim(Result<Aim, NoAim>),
+    /// The result of the range.
+    Fix(Fix, Snapshot),
+    /// The health after a skipped ping.
     Skipped(Health),
-    /// What a poll did.
+    /// The result of a poll.
     Polled {
-        /// To the devices.
+        /// What it did to the devices.
         actuators: Actuators,
-        /// What the robot believes; told whenever the loop did anything.
-        belief: Option<Belief>,
+        /// The localizer, if the loop did anything.
+        snapshot: Option<Snapshot>,
         /// CRC-32 of the telemetry that was sent.
         telemetry: u32,
     },
-    /// The session is over; bytes of stack that the deepest of its answers took, as far as that
-    /// can be measured.
+    /// The session has ended; bytes of stack of its deepest call, zero if they are not measured.
     Ended(u32),
 }
 
 /// Entries of the covariance's upper triangle.
 pub const TRIANGLE: usize = STATES * (STATES + 1) / 2;
 
-/// What a robot believes, to the last bit.
+/// All bits of a localizer's estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Belief {
+pub struct Snapshot {
     /// Pose and calibration.
-    pub state: State,
+    pub state: StateEstimate,
     /// The covariance's upper triangle, row by row.
     pub covariance: [f32; TRIANGLE],
-    /// The verdict on it.
+    /// The health verdict.
     pub health: Health,
 }
 
-impl Belief {
-    /// What a localizer believes.
+impl Snapshot {
+    /// The estimate of a localizer.
     #[must_use]
     pub fn of(localizer: &Localizer) -> Self {
         let filter = localizer.filter();
@@ -103,11 +138,8 @@ impl Belief {
         Self { state: filter.state(), covariance, health: localizer.health() }
     }
 
-    /// All its numbers but the health's: the states, then the covariance.
+    /// The states, then the covariance.
     pub fn numbers(&self) -> impl Iterator<Item = f32> {
-        let State { x, y, heading, scale_right, scale_left, track_width_error, range_scale } =
-            self.state;
-        let states = [x, y, heading, scale_right, scale_left, track_width_error, range_scale];
-        states.into_iter().chain(self.covariance)
+        self.state.to_array().into_iter().chain(self.covariance)
     }
 }

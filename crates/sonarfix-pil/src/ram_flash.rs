@@ -1,4 +1,4 @@
-//! A flash in memory: what the loop remembers over a power loss is forgotten with the session.
+//! A flash in RAM: its content is lost at the end of a session.
 
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash, check_erase, check_read,
@@ -6,7 +6,7 @@ use embedded_storage::nor_flash::{
 };
 
 /// Bytes of a sector.
-const SECTOR: usize = 512;
+const SECTOR: usize = 2_048;
 /// Bytes of all.
 pub const CAPACITY: usize = 2 * SECTOR;
 
@@ -15,13 +15,13 @@ pub const CAPACITY: usize = 2 * SECTOR;
 pub struct RamFlash([u8; CAPACITY]);
 
 impl Default for RamFlash {
-    /// As a flash leaves the factory.
+    /// Erased.
     fn default() -> Self {
         Self([0xFF; CAPACITY])
     }
 }
 
-/// It was asked for what no flash can do.
+/// An operation that violates the rules of NOR flash.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Misused(NorFlashErrorKind);
 
@@ -35,7 +35,7 @@ impl ErrorType for RamFlash {
     type Error = Misused;
 }
 
-/// So many bytes from an address on; an address fits into a `usize` wherever this runs.
+/// `length` bytes from an address on. An address fits into a `usize` on every supported target.
 fn range(from: u32, length: usize) -> core::ops::Range<usize> {
     let from = from as usize;
     from..from.saturating_add(length)

@@ -1,61 +1,31 @@
-//! What the microcontroller's program does: it answers, session after session.
+//! The microcontroller's program: executes the requests of one session after another.
 
 use embedded_io::{Read, Write};
 
-use crate::device::{Device, Refusal};
 use crate::line::{Line, LineError, REQUEST_MAX};
-use crate::message::{Answer, Begin, Request};
+use crate::message::{Answer, Begin, Request, RequestError};
+use crate::meter::Meter;
+use crate::session::Session;
 use crate::wires::Wires;
 
-/// What the emulator, or a cycle counter, can tell of a call.
-pub trait Meter {
-    /// Makes the call, and counts its instructions: zero where nobody counts. What it gives it
-    /// leaves where it likes: a result that is handed on would be counted, too.
-    fn measure(&mut self, call: impl FnOnce()) -> u32;
-
-    /// Begins to watch how deep the stack goes.
-    fn watch_stack(&mut self);
-
-    /// Bytes of stack that the deepest call took since then: zero where nobody knows.
-    fn deepest(&self) -> u32;
-}
-
-/// Nobody counts: on the PC.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Unmetered;
-
-impl Meter for Unmetered {
-    fn measure(&mut self, call: impl FnOnce()) -> u32 {
-        call();
-        0
-    }
-
-    fn watch_stack(&mut self) {}
-
-    fn deepest(&self) -> u32 {
-        0
-    }
-}
-
-/// Answers whatever comes, for as long as the line lasts. `memory` must hold the longest
-/// [`Request::Begin`], which has a map in it.
+/// Executes requests until the line is closed. `memory` must hold the longest [`Request::Begin`], which contains a map.
 ///
 /// # Errors
-/// [`LineError`], when the line is at its end.
+/// [`LineError`]; [`LineError::Closed`] at the regular end.
 pub fn serve<S: Read + Write>(
     line: &mut Line<S>,
     meter: &mut impl Meter,
     memory: &mut [u8],
 ) -> Result<core::convert::Infallible, LineError<S::Error>> {
     loop {
-        match line.asked(memory)? {
+        match line.receive_request(memory)? {
             Request::Begin(begin, map) => session(line, meter, &begin, map)?,
-            _ => line.reply(&Answer::Refused(Refusal::OutOfPlace), 0)?,
+            _ => line.send_reply(&Answer::Refused(RequestError::OutOfPlace), 0)?,
         }
     }
 }
 
-/// A session, up to its end; one that is refused is over at once.
+/// Executes one session. A session that is refused ends at once.
 fn session<S: Read + Write>(
     line: &mut Line<S>,
     meter: &mut impl Meter,
@@ -63,21 +33,21 @@ fn session<S: Read + Write>(
     map: &[u8],
 ) -> Result<(), LineError<S::Error>> {
     let wires = Wires::default();
-    let mut device = match Device::begin(begin, map, &wires) {
-        Ok((device, actuators)) => {
-            line.reply(&Answer::Began(actuators), 0)?;
-            device
+    let mut running = match Session::begin(begin, map, &wires) {
+        Ok((session, actuators)) => {
+            line.send_reply(&Answer::Started(actuators), 0)?;
+            session
         }
-        Err(refusal) => return line.reply(&Answer::Refused(refusal), 0),
+        Err(error) => return line.send_reply(&Answer::Refused(error), 0),
     };
     meter.watch_stack();
     loop {
         let mut space = [0; REQUEST_MAX];
-        let request = line.asked(&mut space)?;
+        let request = line.receive_request(&mut space)?;
         if request == Request::End {
-            return line.reply(&Answer::Ended(meter.deepest()), 0);
+            return line.send_reply(&Answer::Ended(meter.deepest()), 0);
         }
-        let (answer, instructions) = device.answer(&request, meter);
-        line.reply(&answer, instructions)?;
+        let (answer, instructions) = running.execute(&request, meter);
+        line.send_reply(&answer, instructions)?;
     }
 }

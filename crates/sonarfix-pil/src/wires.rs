@@ -1,4 +1,4 @@
-//! What stands at the pins of a robot's devices, and the pins as the drivers see them.
+//! The simulated pins of a robot's devices.
 
 use core::cell::Cell;
 use core::convert::Infallible;
@@ -10,7 +10,7 @@ use sonarfix::units::Instant;
 use sonarfix_hal::encoder::Counter;
 use sonarfix_hal::ranger::EchoCapture;
 
-/// What the devices have seen up to a poll.
+/// The sensors' signals up to a poll.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Sensors {
     /// The time of the poll.
@@ -19,33 +19,33 @@ pub struct Sensors {
     pub right: Counted,
     /// The left wheel's encoder.
     pub left: Counted,
-    /// When the echo line went high, if it did since the poll before.
+    /// When the echo line went high since the last poll, if it did.
     pub rose: Option<Instant>,
-    /// When it then went low again.
+    /// When it went low after that, if it did.
     pub fell: Option<Instant>,
 }
 
-/// What the counter of an encoder shows.
+/// The counter of an encoder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Counted {
     /// Ticks; wraps around.
     pub ticks: u32,
-    /// Transitions that no wheel can make; wraps around.
+    /// Illegal quadrature transitions; wraps around.
     pub illegal: u32,
 }
 
-/// What the robot did to its devices in a poll.
+/// The actuators' signals of a poll.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Actuators {
     /// The servo's duty, of [`FULL_DUTY`], if it was set.
     pub duty: Option<u16>,
     /// Whether the sonar's trigger is high.
     pub is_raised: bool,
-    /// Whether the trigger has fallen, which sends a ping.
+    /// Whether the trigger has fallen, which starts a ping.
     pub has_fallen: bool,
 }
 
-/// All wires of a robot, at the controller's end.
+/// All wires of a robot, at the microcontroller.
 #[derive(Debug, Default)]
 pub struct Wires {
     /// The right encoder's counter.
@@ -61,8 +61,8 @@ pub struct Wires {
 }
 
 impl Wires {
-    /// Shows the drivers what the devices have seen.
-    pub fn show(&self, sensors: &Sensors) {
+    /// Applies the sensors' signals to the wires.
+    pub fn apply(&self, sensors: &Sensors) {
         self.right.0.set(sensors.right);
         self.left.0.set(sensors.left);
         if let Some(at) = sensors.rose {
@@ -73,7 +73,7 @@ impl Wires {
         }
     }
 
-    /// What the drivers have done since this was last asked.
+    /// Returns the actuators' signals since the last call.
     pub fn take(&self) -> Actuators {
         Actuators {
             duty: self.servo.0.take(),
@@ -83,7 +83,7 @@ impl Wires {
     }
 }
 
-/// A counter that shows what it is told to show.
+/// A counter with a value that the PC sets.
 #[derive(Debug, Default)]
 pub struct CounterWire(Cell<Counted>);
 
@@ -100,10 +100,10 @@ impl Counter for &CounterWire {
     }
 }
 
-/// Counts of a frame of the servo's PWM: a 16-bit timer.
+/// Timer counts in a period of the servo's PWM: a 16-bit timer.
 pub const FULL_DUTY: u16 = u16::MAX;
 
-/// A PWM channel that remembers the duty it was set to.
+/// A PWM channel that records its duty.
 #[derive(Debug, Default)]
 pub struct ServoWire(Cell<Option<u16>>);
 
@@ -122,7 +122,7 @@ impl SetDutyCycle for &ServoWire {
     }
 }
 
-/// A trigger pin that remembers that it fell.
+/// A trigger pin that records a falling edge.
 #[derive(Debug, Default)]
 pub struct TriggerWire {
     is_raised: Cell<bool>,

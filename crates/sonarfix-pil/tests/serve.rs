@@ -1,4 +1,4 @@
-//! What a microcontroller's program answers to a PC, whole and broken.
+//! The microcontroller's program, with valid and invalid requests.
 #![cfg(test)]
 #![expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some milliseconds")]
 
@@ -6,22 +6,21 @@ use std::collections::VecDeque;
 use std::convert::Infallible;
 
 use embedded_io::{ErrorType, Read, Write};
-use sonarfix::config::Config;
+use sonarfix::config::{Config, ServoTiming};
 use sonarfix::localizer::Start;
 use sonarfix::map::Wall;
 use sonarfix::motion::WheelTravel;
 use sonarfix::pose::{Point, Pose};
 use sonarfix::units::{Duration, Instant, Metres, Radians};
-use sonarfix_hal::ranger::{Celsius, PulseTiming};
-use sonarfix_hal::robot::Settings;
-use sonarfix_hal::servo::{MeasuredPulse, Pace};
-use sonarfix_pil::board::{ServoBuild, Wheel};
-use sonarfix_pil::serve::Unmetered;
+use sonarfix_hal::config::RobotConfig;
+use sonarfix_hal::ranger::RangerKind;
+use sonarfix_pil::Unmetered;
 use sonarfix_pil::{
-    Answer, Begin, Board, Counted, Line, LineError, Refusal, Request, Sensors, line, serve,
+    Answer, Begin, Counted, Line, LineError, Request, RequestError, Sensors, SessionKind, line,
+    serve,
 };
 
-/// A wire that brings what was written beforehand, and ends.
+/// A stream that delivers prepared bytes, then ends.
 #[derive(Default)]
 struct Wire {
     to: VecDeque<u8>,
@@ -34,7 +33,7 @@ impl ErrorType for Wire {
 
 impl Read for Wire {
     fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Infallible> {
-        // One at a time, as a UART does.
+        // One byte at a time, like a UART.
         let (Some(space), Some(byte)) = (bytes.first_mut(), self.to.pop_front()) else {
             return Ok(0);
         };
@@ -61,7 +60,7 @@ fn map() -> Vec<u8> {
     sonarfix_map::bake(&corners.windows(2).map(wall).collect::<Vec<_>>()).unwrap()
 }
 
-fn begin(board: Option<Board>) -> Begin {
+fn begin(kind: SessionKind) -> Begin {
     Begin {
         at: Instant::from_ticks(0),
         start: Start {
@@ -69,38 +68,25 @@ fn begin(board: Option<Board>) -> Begin {
             position_deviation: Metres(0.02),
             heading_deviation: Radians(0.01),
         },
-        config: Config::for_track_width(Metres(0.16)),
-        board,
+        config: config(),
+        kind,
     }
 }
 
-fn board() -> Board {
-    let wheel =
-        Wheel { diameter: Metres(0.065), ticks_per_revolution: 1_496.6, is_reversed: false };
-    let tried = |width, degrees| MeasuredPulse {
-        width: Duration::from_ticks(width),
-        bearing: Radians::from_degrees(degrees),
-    };
-    Board {
-        right: wheel,
-        left: Wheel { is_reversed: true, ..wheel },
-        servo: ServoBuild {
-            tried: (tried(1_000, -45.0), tried(2_000, 45.0)),
-            limits: (Radians::from_degrees(-90.0), Radians::from_degrees(90.0)),
-            pace: Pace::SG90,
-        },
-        sonar: PulseTiming::HC_SR04,
-        air: Celsius(20.0),
-        settings: Settings::default(),
-    }
+fn config() -> RobotConfig {
+    let mut localizer = Config::for_track_width(Metres(0.16));
+    localizer.sonar.servo = (Radians::from_degrees(-90.0), Radians::from_degrees(90.0));
+    localizer.sonar.timing.servo = ServoTiming::SG90;
+    let config = RobotConfig::with_common_parts(localizer);
+    RobotConfig { left_wheel: config.left_wheel.mirrored(), ..config }
 }
 
-/// Asks all this and takes the answers.
+/// Sends the requests and returns the answers.
 fn asked(requests: &[Request]) -> Vec<Answer> {
     let mut pc = Line(Wire::default());
     for request in requests {
         let mut space = vec![0; 4_096];
-        pc.ask(line::bytes(request, &mut space).unwrap()).unwrap();
+        pc.send_request(line::encode(request, &mut space).unwrap()).unwrap();
     }
     answered(pc.0.from)
 }
@@ -113,8 +99,8 @@ fn answered(bytes: Vec<u8>) -> Vec<Answer> {
     let mut pc = Line(Wire { to: robot.0.from.into(), from: Vec::new() });
     let mut answers = Vec::new();
     let mut space = [0; line::ANSWER_MAX];
-    while let Ok((answer, 0)) = pc.replied(&mut space) {
-        answers.push(line::answer(answer).unwrap());
+    while let Ok((answer, 0)) = pc.receive_reply(&mut space) {
+        answers.push(line::decode_answer(answer).unwrap());
     }
     answers
 }
@@ -134,31 +120,32 @@ fn sensors(millis: u64, ticks: i32) -> Sensors {
 fn a_localizer_is_asked_step_by_step() {
     let map = map();
     let answers = asked(&[
-        Request::Begin(begin(None), &map),
+        Request::Begin(begin(SessionKind::Localizer), &map),
         Request::Odometry(Instant::from_ticks(100_000), WheelTravel::new(0.02, 0.02)),
         Request::Aim,
         Request::Fix(Some(Metres(1.0))),
-        Request::Skip,
+        Request::SkipPing,
         Request::End,
     ]);
     let [
-        Answer::Began(_),
-        Answer::Rolled(Ok(()), belief),
-        Answer::Aimed(Ok(_)),
-        Answer::Fixed(_, after),
+        Answer::Started(_),
+        Answer::Odometry(Ok(()), snapshot),
+        Answer::Aim(Ok(_)),
+        Answer::Fix(_, after),
         Answer::Skipped(_),
         Answer::Ended(0),
     ] = answers[..]
     else {
         panic!("{answers:?}");
     };
-    assert!((belief.state.x - 1.02).abs() < 1e-6);
+    assert!((snapshot.state.x.0 - 1.02).abs() < 1e-6);
     assert!(
-        after.covariance[0] < belief.covariance[0] || after.covariance[7] < belief.covariance[7]
+        after.covariance[0] < snapshot.covariance[0]
+            || after.covariance[7] < snapshot.covariance[7]
     );
 }
 
-/// The loop ticks, aims, sends its trigger up and down, and takes the echo whose edges it is told.
+/// The loop samples the encoders, aims, triggers a ping, and processes the echo of the given edges.
 #[test]
 fn a_loop_drives_its_devices() {
     let map = map();
@@ -170,12 +157,16 @@ fn a_loop_drives_its_devices() {
         )
     };
     let ask = |polls: &[Sensors]| {
-        let begin = Request::Begin(begin(Some(board())), &map);
+        let mut begin = begin(SessionKind::Loop);
+        // Only the wall ahead is in reach of the servo.
+        begin.config.localizer.sonar.servo =
+            (Radians::from_degrees(-45.0), Radians::from_degrees(45.0));
+        let begin = Request::Begin(begin, &map);
         let polls = polls.iter().copied().map(Request::Poll);
         asked(&std::iter::once(begin).chain(polls).collect::<Vec<_>>())
     };
     let pinged = fallen(&ask(&polls)).expect("it pings");
-    // The wall ahead is 3 m away at the start, and the sonar a little in front of the wheels.
+    // The wall ahead is 3 m away at the start.
     let sent = polls[pinged].at + Duration::from_ticks(500);
     let rolled = f64::from(polls[pinged].right.ticks) * 0.065 * std::f64::consts::PI / 1_496.6;
     let flight = (2.0 * (3.0 - rolled) / 343.2 * 1e6) as u64;
@@ -183,24 +174,24 @@ fn a_loop_drives_its_devices() {
     polls[pinged + 18].fell = Some(sent + Duration::from_ticks(flight));
     let answers = ask(&polls);
     assert_eq!(answers.len(), polls.len() + 1);
-    let beliefs: Vec<_> = answers
+    let snapshots: Vec<_> = answers
         .iter()
         .filter_map(|answer| match answer {
-            Answer::Polled { belief, .. } => *belief,
+            Answer::Polled { snapshot, .. } => *snapshot,
             _ => None,
         })
         .collect();
-    let (first, last) = (beliefs.first().unwrap(), beliefs.last().unwrap());
-    assert!(last.state.x > first.state.x + 0.1, "it has rolled: {last:?}");
-    let looked = |belief: &sonarfix_pil::Belief| belief.health.accepted_in_a_row > 0;
-    assert!(beliefs.iter().any(looked), "a range was taken");
-    // Ahead, where it is sent as the robot is switched on, is also where the wall is.
+    let (first, last) = (snapshots.first().unwrap(), snapshots.last().unwrap());
+    assert!(last.state.x > first.state.x + Metres(0.1), "it has rolled: {last:?}");
+    let looked = |snapshot: &sonarfix_pil::Snapshot| snapshot.health.accepted_in_a_row > 0;
+    assert!(snapshots.iter().any(looked), "a range was taken");
+    // The wall is ahead, where the servo also points at the start.
     let duty = |answer: &Answer| match answer {
-        Answer::Began(actuators) | Answer::Polled { actuators, .. } => actuators.duty,
+        Answer::Started(actuators) | Answer::Polled { actuators, .. } => actuators.duty,
         _ => None,
     };
     let half_way = u16::try_from(u32::from(u16::MAX) * 1_500 / 20_000).unwrap();
-    let duty = answers.iter().rev().find_map(duty).expect("the servo is told where to point");
+    let duty = answers.iter().rev().find_map(duty).expect("the servo has a duty");
     assert!(duty.abs_diff(half_way) < 3, "{duty}");
 }
 
@@ -209,16 +200,17 @@ fn what_does_not_fit_is_refused_and_the_next_session_begins() {
     let map = map();
     let mut damaged = map.clone();
     damaged[40] ^= 1;
-    let bad = Board { air: Celsius(f32::NAN), ..board() };
+    let mut other = begin(SessionKind::Loop);
+    other.config.ranger.kind = RangerKind::Custom;
     let answers = asked(&[
         Request::Aim,
-        Request::Begin(begin(None), &damaged),
-        Request::Begin(begin(Some(bad)), &map),
-        Request::Begin(begin(None), &map),
+        Request::Begin(begin(SessionKind::Localizer), &damaged),
+        Request::Begin(other, &map),
+        Request::Begin(begin(SessionKind::Localizer), &map),
         Request::Fix(None),
         Request::Poll(sensors(1, 0)),
         Request::End,
-        Request::Begin(begin(Some(board())), &map),
+        Request::Begin(begin(SessionKind::Loop), &map),
         Request::Aim,
         Request::End,
     ]);
@@ -227,28 +219,28 @@ fn what_does_not_fit_is_refused_and_the_next_session_begins() {
         _ => None,
     };
     let expected = [
-        Some(Refusal::OutOfPlace),
-        Some(Refusal::Map),
-        Some(Refusal::Board),
+        Some(RequestError::OutOfPlace),
+        Some(RequestError::Map),
+        Some(RequestError::Board),
         None,
-        Some(Refusal::OutOfPlace),
-        Some(Refusal::OutOfPlace),
+        Some(RequestError::OutOfPlace),
+        Some(RequestError::OutOfPlace),
         None,
         None,
-        Some(Refusal::OutOfPlace),
+        Some(RequestError::OutOfPlace),
         None,
     ];
     assert_eq!(answers.iter().map(refused).collect::<Vec<_>>(), expected);
 }
 
-/// A line that ends, or brings what is no message, ends the program; nothing is answered to it.
+/// A closed line, or bytes that are not a message, end the program without an answer.
 #[test]
 fn a_broken_line_ends_it() {
     let mut pc = Line(Wire::default());
     let mut space = vec![0; 4_096];
     let map = map();
-    let request = Request::Begin(begin(None), &map);
-    pc.ask(line::bytes(&request, &mut space).unwrap()).unwrap();
+    let request = Request::Begin(begin(SessionKind::Localizer), &map);
+    pc.send_request(line::encode(&request, &mut space).unwrap()).unwrap();
     let whole = pc.0.from;
     assert_eq!(answered(whole.clone()).len(), 1);
     for length in 0..whole.len() {

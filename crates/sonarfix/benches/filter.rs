@@ -21,7 +21,7 @@ fn room() -> [Wall; 4] {
     [(a, b), (b, c), (c, d), (d, a)].map(|(from, to)| Wall::new(from, to).unwrap())
 }
 
-/// A localizer that has driven 2 m through the room, looking around.
+/// A localizer after 2 m through the room, with fixes.
 fn under_way(walls: &[Wall]) -> Localizer<'_> {
     let start = Start {
         pose: Pose::new(1.0, 1.0, Radians(0.1)),

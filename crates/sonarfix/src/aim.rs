@@ -1,35 +1,30 @@
-//! Where to look: the wall whose range is worth taking now, and the bearing that meets it
-//! squarely (`docs/model.md`, eqs. 16 and 18, and "Which walls count").
+//! The planner: the wall to measure next, and the bearing of the servo that is square to it
+//! (`docs/model.md`, eqs. 21 and 22).
 //!
-//! A wall counts if
-//! - the foot of the perpendicular from the sonar lies on it, and its range within the sonar's,
-//! - the servo can turn to it, or so near that the foot is inside the cone,
-//! - nothing stands before it, and nothing nearer inside the cone would answer first.
-//!
-//! All of it must hold when the position is wrong by its own uncertainty
-//! ([`Trust::confidence`](crate::config::Trust::confidence) standard deviations) and the cone when
-//! the heading is; where that leaves nothing of the cone, two standard deviations must do.
-//!
-//! Among those that count the policy chooses: [`Policy::Nearest`] the nearest, and
-//! [`Policy::Informative`] the one from which most is expected for the time it takes,
+//! Candidates are the walls that can be measured (module `visibility`) and that the servo
+//! reaches. Among them the policy chooses: [`Policy::Nearest`] the nearest, and
+//! [`Policy::Informative`] the one with the largest expected gain per time,
 //!
 //! ```text
-//! score = drop of the variance · probability that the look succeeds / seconds of the look
+//! score = decrease of the variance · probability of success / seconds of the ping
 //! ```
 //!
-//! Responsibilities, one file each: `viewpoint`, which walls can be measured; `hiding`, what stands
-//! before them; `prospect`, what a range is worth; `timing`, how long a look takes; `memory`, what
-//! earlier looks said of a wall; this one, the choice.
+//! | module | contents |
+//! |---|---|
+//! | `gain` | expected decrease of the variance |
+//! | `history` | occlusion of recent walls, last bearing, turn rate |
+//! | `ranking` | order of the candidates |
+//! | `timing` | duration of a ping |
+//! | this one | candidates, scores and the choice |
 //!
 //! # Non-finite policy
-//! The filter's state is finite, and every comparison here is written so that NaN would not
-//! count as a wall to look at.
+//! The state of the filter is finite. Comparisons are written so that a candidate whose numbers are
+//! NaN is not chosen.
 
-mod hiding;
-mod memory;
-mod prospect;
+mod gain;
+mod history;
+mod ranking;
 mod timing;
-mod viewpoint;
 
 use crate::config::Config;
 use crate::ekf::Ekf;
@@ -37,62 +32,61 @@ use crate::map::{Map, Wall, WallId};
 use crate::pose::Heading;
 use crate::range::ExpectedRange;
 use crate::units::{Duration, Instant, Metres, Radians, SquareMetres};
+use crate::visibility::{Beam, Viewpoint};
 
-use hiding::Beam;
-use timing::Pacing;
+use gain::expected_gain;
+use ranking::Ranked;
+use timing::PingDuration;
 
 pub use crate::config::Policy;
-pub(crate) use memory::{Answer, Memory};
-pub(crate) use timing::seconds;
-pub(crate) use viewpoint::{LEAST_CONFIDENCE, Unfit, Viewpoint};
+pub(crate) use history::History;
 
-/// One look of the sonar at one wall.
+/// One ping at one wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Aim {
     /// The wall.
     pub wall: WallId,
-    /// Where the servo is to point, relative to the robot's heading.
+    /// Bearing of the servo, relative to the robot's heading.
     pub bearing: Radians,
-    /// The range to expect now. A fix computes its own, at the pose it is taken from.
+    /// The range expected now. A fix computes its own at the pose of the echo.
     pub range: Metres,
-    /// Why this wall.
+    /// The numbers behind the choice.
     pub why: Reason,
 }
 
-/// Why a wall was chosen: what the choice reckoned with.
+/// The numbers behind the choice of a wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Reason {
-    /// By how much its range is to lower the variance of the position, and of what else has a
-    /// weight ([`Weights`](crate::config::Weights)).
+    /// Expected decrease of the variance of the position, and of the other weighted states
+    /// ([`Weights`](crate::config::Weights)).
     pub gain: SquareMetres,
-    /// How likely the look is to succeed: that the wall is in the cone, by the heading's
-    /// uncertainty, and that nothing unknown stands before it, by what earlier looks said.
+    /// Probability of success: the foot lies on the wall, its range is within the limits of the sonar and
+    /// the beam is square, given the uncertainty of the estimate, and no unmapped object occludes the
+    /// wall, given earlier pings.
     pub success: f32,
-    /// How long the look takes: servo, ranger and sound, or the period between looks.
+    /// Duration of the ping: servo, ranger and flight of sound, or the period of the schedule.
     pub time: Duration,
-    /// How many walls could be measured, before asking what hides them.
+    /// Number of walls that can be measured, before the test for occlusion.
     pub candidates: u16,
 }
 
-/// Why there is nothing to look at.
+/// Reason for which there is no wall to measure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub enum NoAim {
-    /// The heading is less certain than the cone is wide: no echo could be told to be square.
-    HeadingUncertain,
-    /// No wall counts.
+    /// No wall can be measured.
     NoWall,
 }
 
 impl core::fmt::Display for NoAim {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
-            Self::HeadingUncertain => "the heading is less certain than the cone is wide",
             Self::NoWall => "no wall can be measured from here",
         })
     }
@@ -100,24 +94,23 @@ impl core::fmt::Display for NoAim {
 
 impl core::error::Error for NoAim {}
 
-/// By how much another wall must be better for the sonar to turn away from the last one: as much
-/// as the estimate's own error may make it seem better. So between equal walls the servo does not
-/// hunt, and which of them is looked at does not depend on the error of the estimate, which would
-/// bias it (`docs/schedule.md`).
-const STAY: f32 = 1.02;
+/// Factor by which the score of another wall must exceed that of the last one: about what the error of
+/// the estimate may add to a score. The servo then does not alternate between equal walls, and the
+/// choice between them does not depend on the error of the estimate, which would bias it
+/// (`docs/schedule.md`).
+const HYSTERESIS: f32 = 1.02;
 
-/// The servo may stay where it is if that saves time and the foot is within this share of the cone
-/// from the beam.
-const NEAR_ENOUGH: f32 = 0.125;
+/// Share of the cone within which the servo stays where it is if that saves time.
+const DEAD_BAND: f32 = 0.125;
 
-/// How many candidates are kept at a time, best first. What hides them is asked in that order, and
-/// if all are hidden, the next so many are sought.
+/// Number of candidates that are kept at a time, best first. They are tested for occlusion in that
+/// order; if all are occluded, the next ones are searched.
 const SHORTLIST: usize = 8;
 
-/// Chooses the wall to look at.
+/// Chooses the wall to measure.
 ///
 /// # Errors
-/// [`NoAim`], by why there is none.
+/// [`NoAim`] if there is none.
 ///
 /// # Panics
 /// Never.
@@ -125,42 +118,48 @@ pub(crate) fn choose(
     config: &Config,
     map: &Map,
     ekf: &Ekf,
-    memory: &Memory,
+    history: &History,
     now: Instant,
 ) -> Result<Aim, NoAim> {
-    let chooser = Chooser::new(config, map, ekf, memory, now);
-    Ok(chooser.best(|id, wall| chooser.look(id, wall))?.aim())
+    let planner = Planner::new(config, map, ekf, history, now);
+    planner.best(|id, wall| planner.by_policy(id, wall)).or_else(|_| {
+        let planner = planner.without_margins();
+        planner.best(|id, wall| planner.by_policy(id, wall))
+    })
 }
 
-/// Finds the wall that a beam at `bearing` meets squarely: the nearest that counts.
+/// Finds the nearest wall to which a beam at `bearing` is square.
 ///
 /// # Errors
-/// [`NoAim`], by why there is none.
+/// [`NoAim`] if there is none.
 pub(crate) fn at(
     config: &Config,
     map: &Map,
     ekf: &Ekf,
-    memory: &Memory,
+    history: &History,
     now: Instant,
     bearing: Radians,
 ) -> Result<Aim, NoAim> {
-    let chooser = Chooser::new(config, map, ekf, memory, now);
-    Ok(chooser.best(|id, wall| chooser.look_at(id, wall, bearing))?.aim())
+    let planner = Planner::new(config, map, ekf, history, now);
+    planner.best(|id, wall| planner.at_bearing(id, wall, bearing)).or_else(|_| {
+        let planner = planner.without_margins();
+        planner.best(|id, wall| planner.at_bearing(id, wall, bearing))
+    })
 }
 
-/// What every candidate is weighed with.
-struct Chooser<'a> {
+/// Everything that the scores of the candidates depend on.
+struct Planner<'a> {
     config: &'a Config,
     map: &'a Map<'a>,
     ekf: &'a Ekf,
-    memory: &'a Memory,
+    history: &'a History,
     now: Instant,
     view: Viewpoint<'a>,
-    pacing: Pacing,
+    duration: PingDuration,
 }
 
-/// A look at a wall that can be measured, if nothing hides it.
-struct Look {
+/// A wall that can be measured unless it is occluded.
+struct Candidate {
     expected: ExpectedRange,
     bearing: Radians,
     gain: SquareMetres,
@@ -169,43 +168,46 @@ struct Look {
     score: f32,
 }
 
-/// Where the servo is to point for a wall.
+/// Bearing of the servo for a wall.
 struct Pointing {
     bearing: Radians,
-    /// How far off the perpendicular that will be at the ping.
+    /// Angle between beam and perpendicular at the ping.
     off: Radians,
     /// Seconds until the ping.
     until_ping: f32,
 }
 
-impl<'a> Chooser<'a> {
+impl<'a> Planner<'a> {
     fn new(
         config: &'a Config,
         map: &'a Map<'a>,
         ekf: &'a Ekf,
-        memory: &'a Memory,
+        history: &'a History,
         now: Instant,
     ) -> Self {
         let view = Viewpoint::new(config, ekf);
-        let pacing = Pacing::new(&config.sonar.timing);
-        Self { config, map, ekf, memory, now, view, pacing }
+        let duration = PingDuration::new(&config.sonar.timing);
+        Self { config, map, ekf, history, now, view, duration }
     }
 
-    /// The best look that nothing hides.
-    fn best(&self, look: impl Fn(WallId, &Wall) -> Option<Look>) -> Result<Pick, NoAim> {
-        if !self.view.can_be_square() {
-            return Err(NoAim::HeadingUncertain);
-        }
+    /// The same planner without the margins for the uncertainty of the estimate.
+    fn without_margins(self) -> Self {
+        Self { view: self.view.without_margins(), ..self }
+    }
+
+    /// The best candidate that is not occluded. `candidate` scores a wall, if it can be measured.
+    fn best(&self, candidate: impl Fn(WallId, &Wall) -> Option<Candidate>) -> Result<Aim, NoAim> {
         let mut after = None;
         loop {
-            let (shortlist, candidates) = self.shortlist(&look, after);
+            let (shortlist, count) = self.shortlist(&candidate, after);
             for ranked in shortlist.iter().flatten() {
-                let look = self.map.wall(ranked.wall).and_then(|wall| look(ranked.wall, &wall));
-                if let Some(look) = look.filter(|look| !self.is_hidden(ranked.wall, look)) {
-                    return Ok(Pick { wall: ranked.wall, look, candidates });
+                let best =
+                    self.map.wall(ranked.wall).and_then(|wall| candidate(ranked.wall, &wall));
+                if let Some(best) = best.filter(|best| !self.is_occluded(ranked.wall, best)) {
+                    return Ok(best.aim(ranked.wall, count));
                 }
             }
-            // Fewer than there is room for: there are no more.
+            // The list is not full: there are no more candidates.
             after = *shortlist.last().ok_or(NoAim::NoWall)?;
             if after.is_none() {
                 return Err(NoAim::NoWall);
@@ -213,104 +215,116 @@ impl<'a> Chooser<'a> {
         }
     }
 
-    /// The best candidates that rank after one, and how many there are in all.
+    /// The best candidates that rank after `after`, and the number of all candidates.
     fn shortlist(
         &self,
-        look: impl Fn(WallId, &Wall) -> Option<Look>,
+        candidate: impl Fn(WallId, &Wall) -> Option<Candidate>,
         after: Option<Ranked>,
     ) -> ([Option<Ranked>; SHORTLIST], u16) {
         let mut shortlist = [None; SHORTLIST];
-        let mut candidates = 0_u16;
+        let mut count = 0_u16;
         for (wall, segment) in self.map.near(self.view.position, self.config.sonar.max_range) {
-            let Some(look) = look(wall, &segment) else {
+            let Some(candidate) = candidate(wall, &segment) else {
                 continue;
             };
-            candidates = candidates.saturating_add(1);
-            let ranked = Ranked { wall, score: look.score };
+            count = count.saturating_add(1);
+            let ranked = Ranked { wall, score: candidate.score };
             if after.is_none_or(|after| after.is_before(ranked)) {
                 ranked.insert(&mut shortlist);
             }
         }
-        (shortlist, candidates)
+        (shortlist, count)
     }
 
-    /// A look at a wall with the servo turned to it.
-    fn look(&self, id: WallId, wall: &Wall) -> Option<Look> {
-        let expected = self.view.expect(wall).ok()?;
+    // ===== Eq. (22): score =====
+    /// A wall with the servo turned to it.
+    fn by_policy(&self, id: WallId, wall: &Wall) -> Option<Candidate> {
+        let (expected, on_wall) = self.view.expect(wall).ok()?;
         let pointing = self.point(&expected);
         if !self.view.is_square(pointing.off) {
             return None;
         }
-        let mut look = self.weigh(id, wall, expected, &pointing);
-        look.score = match self.config.policy {
-            Policy::Nearest => look.success / look.expected.range.0,
-            Policy::Informative => look.gain.0 * look.success / look.seconds,
+        let mut candidate = self.candidate(id, wall, (expected, on_wall), &pointing);
+        candidate.score = match self.config.policy {
+            Policy::Nearest => candidate.success / candidate.expected.range.0,
+            Policy::Informative => candidate.gain.0 * candidate.success / candidate.seconds,
         };
-        if self.memory.last.is_some_and(|last| last.wall == id) {
-            look.score *= STAY;
+        if self.history.last.is_some_and(|last| last.wall == id) {
+            candidate.score *= HYSTERESIS;
         }
-        Some(look)
+        Some(candidate)
     }
 
-    /// A look at a wall along a bearing that somebody else chose: the nearest is the best.
-    fn look_at(&self, id: WallId, wall: &Wall, bearing: Radians) -> Option<Look> {
-        let expected = self.view.expect(wall).ok()?;
-        let off = expected.direction.from(self.view.heading.turned(bearing));
+    /// A wall along a bearing that the planner does not choose: the nearest is the best.
+    fn at_bearing(&self, id: WallId, wall: &Wall, bearing: Radians) -> Option<Candidate> {
+        let (expected, on_wall) = self.view.expect(wall).ok()?;
+        let off = self.view.off_square(&expected, bearing);
         if !self.view.is_square(off) {
             return None;
         }
         let score = 1.0 / expected.range.0;
         let pointing = Pointing { bearing, off, until_ping: 0.0 };
-        Some(Look { score, ..self.weigh(id, wall, expected, &pointing) })
+        Some(Candidate { score, ..self.candidate(id, wall, (expected, on_wall), &pointing) })
     }
 
-    fn weigh(&self, id: WallId, wall: &Wall, expected: ExpectedRange, pointing: &Pointing) -> Look {
+    /// Everything but the score.
+    fn candidate(
+        &self,
+        id: WallId,
+        wall: &Wall,
+        (expected, on_wall): (ExpectedRange, f32),
+        pointing: &Pointing,
+    ) -> Candidate {
         let range = expected.range;
-        let prospect = self.ekf.prospect(&expected, self.config.sonar.noise.variance(range));
+        let echo = &self.config.echo;
+        let map_variance = echo.map_variance(self.history.travelled_since(id));
+        let noise = SquareMetres(self.config.sonar.noise.variance(range).0 + map_variance);
+        let prediction = self.ekf.predict_measurement(&expected);
+        let wheels = self.ekf.cross_covariance_of_wheels(&expected);
         let foot = wall.along(self.view.position);
-        let belief = self.memory.belief(id, foot, self.now);
-        Look {
+        let occlusion = self.history.occlusion(echo, id, foot, range, self.now);
+        Candidate {
             bearing: pointing.bearing,
-            gain: prospect::gain(&prospect, self.config.weights),
-            success: belief * self.view.share_inside(pointing.off),
-            seconds: self.pacing.look(pointing.until_ping, range),
+            gain: expected_gain(&prediction, wheels, noise, self.config.weights),
+            success: (1.0 - occlusion) * on_wall * self.view.probability_of_square(pointing.off),
+            seconds: self.duration.ping(pointing.until_ping, range),
             score: 0.0,
             expected,
         }
     }
 
-    /// Where to send the servo: where it stands, if that is near enough and saves time, or square
-    /// to the wall at the time of the ping, when the robot will have turned on; if that is beyond
-    /// its travel, to the end of it.
+    /// The bearing of the servo for a wall: where the servo stands, if the beam is then nearly square
+    /// and the ping earlier; otherwise square to the wall at the time of the ping, when the robot has
+    /// turned further; if that is beyond the travel of the servo, its limit.
     fn point(&self, expected: &ExpectedRange) -> Pointing {
-        // The last bearing may be one that somebody else chose, beyond the servo's travel.
-        let last = self.memory.last;
-        let (ahead, rest) = last.map_or((Radians(0.0), 0.0), |last| {
-            (self.reach(last.bearing), self.pacing.rest_after(last.range))
+        // The last bearing may be outside the travel of the servo if it was not planned.
+        let last = self.history.last;
+        let (current, rest) = last.map_or((Radians(0.0), 0.0), |last| {
+            (self.reachable(last.bearing), self.duration.rest_after(last.range))
         });
         let bearing_after = |time: f32| expected.direction.from(self.heading_after(time));
-        let now = self.reach(bearing_after(0.0));
-        let turn = self.pacing.turn(now - ahead);
+        let target = self.reachable(bearing_after(0.0));
+        let turn = self.duration.turn(target - current);
         let until_ping = if turn > rest { turn } else { rest };
-        let staying_off = bearing_after(rest) - ahead;
-        let is_faster =
-            self.pacing.look(rest, expected.range) < self.pacing.look(until_ping, expected.range);
-        if is_faster && staying_off.abs() <= self.config.sonar.cone * NEAR_ENOUGH {
-            return Pointing { bearing: ahead, off: staying_off, until_ping: rest };
+        let off_without_turn = bearing_after(rest) - current;
+        let range = expected.range;
+        let is_faster = self.duration.ping(rest, range) < self.duration.ping(until_ping, range);
+        if is_faster && off_without_turn.abs() <= self.config.sonar.cone * DEAD_BAND {
+            return Pointing { bearing: current, off: off_without_turn, until_ping: rest };
         }
         let square = bearing_after(until_ping);
-        let bearing = self.reach(square);
+        let bearing = self.reachable(square);
         let off = Heading::new(square).from(Heading::new(bearing));
         Pointing { bearing, off, until_ping }
     }
 
-    /// Where the robot will look if it turns on as it does.
+    /// The heading after a time in seconds at the present turn rate.
     fn heading_after(&self, seconds: f32) -> Heading {
-        self.view.heading.turned(Radians(self.memory.turn_rate * seconds))
+        self.view.heading.turned(Radians(self.history.turn_rate * seconds))
     }
 
-    /// The nearest bearing that the servo reaches.
-    fn reach(&self, bearing: Radians) -> Radians {
+    /// The nearest bearing within the travel of the servo.
+    fn reachable(&self, bearing: Radians) -> Radians {
         let (right, left) = self.config.sonar.servo;
         if bearing >= right && bearing <= left {
             return bearing;
@@ -319,59 +333,23 @@ impl<'a> Chooser<'a> {
         if beyond(right) < beyond(left) { right } else { left }
     }
 
-    /// Whether any wall of the map would keep the echo from being the first.
-    fn is_hidden(&self, target: WallId, look: &Look) -> bool {
-        let beam = Beam::new(&self.view, &look.expected);
+    /// Whether another wall of the map returns an earlier echo.
+    fn is_occluded(&self, target: WallId, candidate: &Candidate) -> bool {
+        let beam = Beam::new(&self.view, &candidate.expected);
         self.map
             .near(self.view.position, beam.reach())
-            .any(|(id, wall)| id != target && beam.is_disturbed_by(&wall))
+            .any(|(id, wall)| id != target && beam.is_occluded_by(&wall))
     }
 }
 
-/// The look that was chosen.
-struct Pick {
-    wall: WallId,
-    look: Look,
-    candidates: u16,
-}
-
-impl Pick {
-    fn aim(&self) -> Aim {
-        let look = &self.look;
+impl Candidate {
+    fn aim(&self, wall: WallId, candidates: u16) -> Aim {
         let why = Reason {
-            gain: look.gain,
-            success: look.success,
-            time: timing::span(look.seconds),
-            candidates: self.candidates,
+            gain: self.gain,
+            success: self.success,
+            time: timing::duration(self.seconds),
+            candidates,
         };
-        Aim { wall: self.wall, bearing: look.bearing, range: look.expected.range, why }
-    }
-}
-
-/// A candidate's place among the others: the higher its score the better, and of two equal ones
-/// the first in the map.
-#[derive(Clone, Copy)]
-struct Ranked {
-    wall: WallId,
-    score: f32,
-}
-
-impl Ranked {
-    fn is_before(self, other: Self) -> bool {
-        self.score > other.score || (self.score >= other.score && self.wall < other.wall)
-    }
-
-    /// Takes its place in a list that is in order; the last falls out of a full one.
-    fn insert(mut self, list: &mut [Option<Self>]) {
-        for slot in list {
-            match slot {
-                Some(held) if self.is_before(*held) => core::mem::swap(held, &mut self),
-                Some(_) => {}
-                None => {
-                    *slot = Some(self);
-                    return;
-                }
-            }
-        }
+        Aim { wall, bearing: self.bearing, range: self.expected.range, why }
     }
 }

@@ -1,79 +1,101 @@
-//! Everything that can be set, in one place, checked once.
+//! The parameters of a localizer, checked once.
+//!
+//! The structures are `#[non_exhaustive]`: start from [`Config::for_track_width`] or a `Default`, and
+//! set the public fields.
 //!
 //! # Non-finite policy
 //! [`Config::check`] refuses NaN and infinity in every field;
 //! [`Localizer::new`](crate::localizer::Localizer::new) calls it.
 
+use crate::echo::EchoParameters;
 use crate::motion::Drive;
 use crate::pose::Point;
 use crate::range::RangeNoise;
 use crate::units::{Duration, Metres, MetresPerSecond, PerRootMetre, Radians};
 
-/// The sonar and the servo that carries it.
+/// The sonar and its servo.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct Sonar {
-    /// Where the sonar turns, in the robot frame.
+    /// Position of the sonar's axis in the robot frame.
     pub mount: Point,
-    /// The rightmost and leftmost bearing that the servo reaches, relative to the robot's
-    /// heading; −π and π for one that turns all the way.
+    /// Rightmost and leftmost bearing of the servo, relative to the heading of the robot; −π and π
+    /// for one without limits.
     pub servo: (Radians, Radians),
-    /// Half of the cone in which a wall's perpendicular echo is heard.
+    /// Half of the cone within which the sonar receives the perpendicular echo of a wall.
     pub cone: Radians,
-    /// The shortest range it reports.
+    /// Shortest range that the sonar reports.
     pub min_range: Metres,
-    /// The longest range it reports.
+    /// Longest range that the sonar reports.
     pub max_range: Metres,
     /// Noise of a range.
     pub noise: RangeNoise,
-    /// How long a look takes.
-    pub timing: Timing,
+    /// Duration of a ping.
+    pub timing: PingTiming,
 }
 
-/// How often the sonar looks.
+impl Default for Sonar {
+    /// An ideal ranger at the centre of the robot, on a servo without limits or delay: one
+    /// ping per second.
+    fn default() -> Self {
+        let half_turn = Radians(core::f32::consts::PI);
+        Self {
+            mount: Point::new(0.0, 0.0),
+            servo: (-half_turn, half_turn),
+            cone: Radians::from_degrees(15.0),
+            min_range: Metres(0.05),
+            max_range: Metres(4.0),
+            noise: RangeNoise { floor: Metres(0.005), per_metre: 0.002 },
+            timing: PingTiming::EVERY_SECOND,
+        }
+    }
+}
+
+/// How often the sonar pings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Rhythm {
-    /// Once every such period; the servo starts on the dot, the ping follows when it has
-    /// settled. A look that takes longer than the period delays the next to the dot after it.
+pub enum PingSchedule {
+    /// Once per period. The servo starts at the beginning of the period, and the ping follows when it
+    /// has settled. A ping that takes longer than the period delays the next one to a later period.
     Every(Duration),
-    /// As fast as servo and ranger allow.
+    /// As often as servo and ranger allow.
     AsFastAsPossible,
 }
 
-/// How fast a servo moves. Take the times from its datasheet or better from a film of it.
+/// Timing of a servo. A video of the servo gives better values than its datasheet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Pace {
-    /// Period of the pulses. A new width takes effect with the next pulse, so up to one frame
-    /// passes before the servo hears of it: a whole one is always reckoned with.
+pub struct ServoTiming {
+    /// Period of the pulses. A new pulse width takes effect with the next pulse; a whole period of
+    /// delay is assumed.
     pub frame: Duration,
-    /// Time for a turn of 60°, as datasheets give it.
+    /// Time for a turn of 60°, as in datasheets.
     pub sixty_degrees: Duration,
-    /// Time from its arrival until it has stopped shaking.
+    /// Time from arrival until the oscillation has decayed.
     pub settle: Duration,
 }
 
-impl Pace {
-    /// A servo that is at once where it is told to be: the paper's.
+impl ServoTiming {
+    /// A servo without delay, as in the paper.
     pub const INSTANT: Self = Self {
         frame: Duration::from_ticks(0),
         sixty_degrees: Duration::from_ticks(0),
         settle: Duration::from_ticks(0),
     };
 
-    /// SG90: 0.10–0.12 s/60° by its datasheets (4.8 V), 50 Hz frame; settling 30–60 ms is our
-    /// assumption.
+    /// SG90: 0.10–0.12 s/60° by its datasheets (4.8 V), pulses at 50 Hz; settling of 30–60 ms is
+    /// assumed (`docs/hardware.md`).
     pub const SG90: Self = Self {
         frame: Duration::from_ticks(20_000),
         sixty_degrees: Duration::from_ticks(120_000),
         settle: Duration::from_ticks(60_000),
     };
 
-    /// MG996R: 0.17 s/60° by its datasheet (4.8 V), 50 Hz frame; settling as assumed for SG90.
+    /// MG996R: 0.17 s/60° by its datasheet (4.8 V), pulses at 50 Hz; settling as assumed for the SG90.
     pub const MG996R: Self = Self {
         frame: Duration::from_ticks(20_000),
         sixty_degrees: Duration::from_ticks(170_000),
@@ -81,33 +103,34 @@ impl Pace {
     };
 }
 
-/// How long a look takes: what the choice of a wall reckons with.
+/// Timing of pings, for the choice of the wall and for the loop of the robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Timing {
-    /// How often the sonar looks.
-    pub rhythm: Rhythm,
-    /// How fast the servo turns it.
-    pub servo: Pace,
-    /// Least time from ping to ping, so that old echoes are not taken for new ones.
+pub struct PingTiming {
+    /// How often the sonar pings.
+    pub schedule: PingSchedule,
+    /// Timing of the servo.
+    pub servo: ServoTiming,
+    /// Least time between two pings, so that echoes of the first have decayed.
     pub cycle: Duration,
 }
 
-impl Timing {
-    /// The paper's: a look a second, by a servo that takes no time.
+impl PingTiming {
+    /// One ping per second with a servo without delay, as in the paper.
     pub const EVERY_SECOND: Self = Self {
-        rhythm: Rhythm::Every(Duration::from_ticks(1_000_000)),
-        servo: Pace::INSTANT,
+        schedule: PingSchedule::Every(Duration::from_ticks(1_000_000)),
+        servo: ServoTiming::INSTANT,
         cycle: Duration::from_ticks(0),
     };
 }
 
-/// How sure the filter is of the robot's calibration before the first range: standard deviations
-/// of the systematic errors, whose estimates start at zero.
+/// Uncertainty of the calibration before the first range: standard deviations of the systematic
+/// errors, whose estimates start at zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct CalibrationPrior {
     /// Of the right wheel's scale error, dimensionless.
     pub scale_right: f32,
@@ -115,80 +138,81 @@ pub struct CalibrationPrior {
     pub scale_left: f32,
     /// Of the track width's error.
     pub track_width: Metres,
-    /// Of the ranger's scale error, dimensionless. Zero: not estimated (the paper's case).
+    /// Of the ranger's scale error, dimensionless. Zero: not estimated, as in the paper.
     pub range_scale: f32,
 }
 
-/// Which ranges are believed, and which walls are looked at.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Trust {
-    /// The gate: a range is refused if its innovation exceeds this many standard deviations of
-    /// the innovation (ν² > gate² S). In standard deviations, not their square.
-    pub gate: f32,
-    /// A wall counts as one to look at only if it stays so when the pose is wrong by this many of
-    /// its standard deviations.
-    pub confidence: f32,
-    /// Down-weight instead of reject: a range beyond the gate, but within this many standard
-    /// deviations of the innovation, is taken with its noise raised until it lies at the gate.
-    /// Zero: none is, all beyond the gate are refused.
-    pub outer_gate: f32,
-    /// A range shorter than expected by more than this many standard deviations *of its own noise*
-    /// may come from something that the map does not know: it is taken with its noise raised until
-    /// it is that many. Zero: a short range is believed like a long one.
-    pub short: f32,
-    /// How much doubt of the pose a range beyond the gate adds while the verdict is
-    /// [`Lost`](crate::health::Verdict::Lost): this standard deviation to x and to y, up to
-    /// [`REOPENS`] times that, and as many radians to the heading, up to a quarter of the cone. Zero:
-    /// none.
-    pub reopen: Metres,
-    /// How far the robot may roll without a range taken and still be called tracking.
-    pub stale: Metres,
-    /// The deviation of the position, in its worst direction, above which the robot is not called
-    /// tracking.
-    pub doubtful: Metres,
-}
-
-impl Default for Trust {
-    /// What suits a robot in a room with things that its map does not know.
-    fn default() -> Self {
+impl CalibrationPrior {
+    /// Wheels known to 1 %, a track width known to 3 %, an exact ranger.
+    #[must_use]
+    pub fn for_track_width(track_width: Metres) -> Self {
         Self {
-            gate: 4.0,
-            confidence: 3.0,
-            outer_gate: 0.0,
-            short: 2.0,
-            reopen: Metres(0.02),
-            stale: Metres(5.0),
-            doubtful: Metres(0.5),
+            scale_right: 0.01,
+            scale_left: 0.01,
+            track_width: track_width * 0.03,
+            range_scale: 0.0,
         }
     }
 }
 
-/// How many times [`Trust::reopen`] the position's deviation of a lost robot grows to.
-pub const REOPENS: f32 = 10.0;
+/// Which ranges are used with which noise, and which walls are measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct GatingParameters {
+    /// A wall is measured only if no other wall of the map can return an earlier echo, even if the
+    /// position and the heading are wrong by this many of their standard deviations. If no wall
+    /// passes, the margins are dropped.
+    pub confidence: f32,
+    /// Covariance inflation by a ping without an echo of its wall while the verdict is
+    /// [`Lost`](crate::health::Verdict::Lost): this standard deviation is added to x and to y, up to
+    /// [`MAX_INFLATION_STEPS`] times its value, and as many radians to the heading, up to 0.26. Zero: no
+    /// inflation.
+    pub inflation: Metres,
+    /// Distance without a range used above which the verdict is not `Tracking`.
+    pub max_distance_without_fix: Metres,
+    /// Standard deviation of the position, in its worst direction, above which the verdict is not
+    /// `Tracking`.
+    pub max_position_deviation: Metres,
+}
 
-/// How the wall is chosen among those that count.
+impl Default for GatingParameters {
+    /// For a robot in a room with unmapped objects.
+    fn default() -> Self {
+        Self {
+            confidence: 1.0,
+            inflation: Metres(0.1),
+            max_distance_without_fix: Metres(5.0),
+            max_position_deviation: Metres(0.5),
+        }
+    }
+}
+
+/// Largest position deviation of a lost robot, in units of [`GatingParameters::inflation`].
+pub const MAX_INFLATION_STEPS: f32 = 10.0;
+
+/// How the wall is chosen among those that can be measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Policy {
-    /// The nearest: the paper's choice, because a sonar's noise grows with range.
+    /// The nearest, as in the paper, because the noise of a sonar grows with the range.
     Nearest,
-    /// The one whose range is expected to lower the variance of the position most, for the time
-    /// that it takes.
+    /// The one with the largest expected decrease of the position variance per time.
     Informative,
 }
 
-/// What else than the position [`Policy::Informative`] wants to know: how many metres of position
-/// an error of it is worth. Zero: nothing.
+/// Weights of other states than the position for [`Policy::Informative`]: metres of position error that
+/// an error of the state is worth. Zero: not weighted.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct Weights {
-    /// Metres for each radian of heading: a lever arm.
+    /// Metres per radian of heading: a lever arm.
     pub heading: Metres,
-    /// Metres for each 100 % of a wheel's scale error: the way on which it will be felt.
+    /// Metres per unit of a wheel's scale error: the distance over which it takes effect.
     pub wheels: Metres,
 }
 
@@ -196,26 +220,30 @@ pub struct Weights {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct Config {
     /// The wheels.
     pub drive: Drive,
-    /// The fastest a wheel can roll. A travel beyond it is a fault of an encoder.
+    /// Fastest speed of a wheel; a faster travel is a fault of an encoder.
     pub max_wheel_speed: MetresPerSecond,
     /// The sonar.
     pub sonar: Sonar,
-    /// What is known of the robot's systematic errors.
+    /// Uncertainty of the robot's systematic errors.
     pub prior: CalibrationPrior,
     /// Gates and margins.
-    pub trust: Trust,
-    /// Which wall to look at.
+    pub gating: GatingParameters,
+    /// What a ping returns besides the range of its wall.
+    pub echo: EchoParameters,
+    /// Which wall is measured next.
     pub policy: Policy,
-    /// What else than the position is worth a look.
+    /// Weights of other states than the position.
     pub weights: Weights,
 }
 
-/// A field that [`Config::check`] refused, and why.
+/// A field that [`Config::check`] refused, and its rule.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct ConfigError {
     /// The field, as a path from [`Config`]: `"sonar.cone"`.
     pub field: &'static str,
@@ -244,9 +272,8 @@ fn require(field: &'static str, holds: bool, rule: &'static str) -> Result<(), C
 }
 
 impl Config {
-    /// A small differential-drive robot with an ideal ranger, as a start for one's own: every
-    /// noise is moderate, the range scale is not estimated, the servo turns all the way and takes
-    /// no time, a look is taken every second.
+    /// The configuration of a small differential-drive robot with an ideal ranger, to be adapted: moderate
+    /// noise, range scale not estimated, [`Sonar::default`].
     ///
     /// ```
     /// use sonarfix::config::Config;
@@ -259,32 +286,19 @@ impl Config {
     /// ```
     #[must_use]
     pub fn for_track_width(track_width: Metres) -> Self {
-        let half_turn = Radians(core::f32::consts::PI);
         Self {
             drive: Drive {
                 track_width,
-                // A good robot on a hard floor: `0.5–20 mm/√m` is what recordings show.
+                // A good robot on a hard floor; recordings show 0.5–20 mm/√m.
                 wheel_noise: PerRootMetre(Metres(0.001)),
                 scale_walk: PerRootMetre(1e-5),
                 track_width_walk: PerRootMetre(Metres(1e-5)),
             },
             max_wheel_speed: MetresPerSecond(2.0),
-            sonar: Sonar {
-                mount: Point::new(0.0, 0.0),
-                servo: (-half_turn, half_turn),
-                cone: Radians::from_degrees(15.0),
-                min_range: Metres(0.05),
-                max_range: Metres(4.0),
-                noise: RangeNoise { floor: Metres(0.005), per_metre: 0.002 },
-                timing: Timing::EVERY_SECOND,
-            },
-            prior: CalibrationPrior {
-                scale_right: 0.01,
-                scale_left: 0.01,
-                track_width: track_width * 0.03,
-                range_scale: 0.0,
-            },
-            trust: Trust::default(),
+            sonar: Sonar::default(),
+            prior: CalibrationPrior::for_track_width(track_width),
+            gating: GatingParameters::default(),
+            echo: EchoParameters::default(),
             policy: Policy::Informative,
             weights: Weights::default(),
         }
@@ -300,7 +314,7 @@ impl Config {
         let prior = &self.prior;
         not_negative("prior.scale_right", prior.scale_right)?;
         not_negative("prior.scale_left", prior.scale_left)?;
-        // They are held as mean and difference, which cannot say that one alone is exact.
+        // The filter holds mean and difference, which cannot represent that one alone is exact.
         let one_is_exact = (prior.scale_right > 0.0) != (prior.scale_left > 0.0);
         require("prior.scale_left", !one_is_exact, "zero if prior.scale_right is, and only then")?;
         not_negative("prior.track_width", prior.track_width.0)?;
@@ -310,25 +324,32 @@ impl Config {
         not_negative("prior.range_scale", prior.range_scale)?;
         not_negative("weights.heading", self.weights.heading.0)?;
         not_negative("weights.wheels", self.weights.wheels.0)?;
-        self.check_trust()
+        self.check_gating()?;
+        self.check_echo()
     }
 
-    fn check_trust(&self) -> Result<(), ConfigError> {
-        let trust = &self.trust;
-        positive("trust.gate", trust.gate)?;
-        not_negative("trust.confidence", trust.confidence)?;
-        not_negative("trust.outer_gate", trust.outer_gate)?;
-        let is_outer = trust.outer_gate <= 0.0 || trust.outer_gate >= trust.gate;
-        require("trust.outer_gate", is_outer, "zero, or not below trust.gate")?;
-        not_negative("trust.short", trust.short)?;
-        not_negative("trust.reopen", trust.reopen.0)?;
-        positive("trust.stale", trust.stale.0)?;
-        positive("trust.doubtful", trust.doubtful.0)
+    fn check_gating(&self) -> Result<(), ConfigError> {
+        let gating = &self.gating;
+        not_negative("gating.confidence", gating.confidence)?;
+        not_negative("gating.inflation", gating.inflation.0)?;
+        positive("gating.max_distance_without_fix", gating.max_distance_without_fix.0)?;
+        positive("gating.max_position_deviation", gating.max_position_deviation.0)
+    }
+
+    fn check_echo(&self) -> Result<(), ConfigError> {
+        let echo = &self.echo;
+        not_negative("echo.missed", echo.missed)?;
+        not_negative("echo.short", echo.short)?;
+        not_negative("echo.long", echo.long)?;
+        let some_are_right = echo.missed + echo.short + echo.long < 1.0;
+        require("echo.missed", some_are_right, "below 1 together with echo.short and echo.long")?;
+        not_negative("echo.free_path", echo.free_path.0)?;
+        not_negative("echo.map_accuracy", echo.map_accuracy.0)
     }
 
     fn check_drive(&self) -> Result<(), ConfigError> {
         positive("drive.track_width", self.drive.track_width.0)?;
-        // Without any, P would be tied ever more sharply, and then by rounding alone.
+        // Without noise, correlations in P would grow until rounding makes it indefinite.
         positive("drive.wheel_noise", self.drive.wheel_noise.0.0)?;
         not_negative("drive.scale_walk", self.drive.scale_walk.0)?;
         not_negative("drive.track_width_walk", self.drive.track_width_walk.0.0)?;
@@ -350,7 +371,7 @@ impl Config {
         require("sonar.max_range", wide, "greater than sonar.min_range")?;
         positive("sonar.noise.floor", sonar.noise.floor.0)?;
         not_negative("sonar.noise.per_metre", sonar.noise.per_metre)?;
-        let no_time = sonar.timing.rhythm == Rhythm::Every(Duration::from_ticks(0));
-        require("sonar.timing.rhythm", !no_time, "a period that is not zero")
+        let no_time = sonar.timing.schedule == PingSchedule::Every(Duration::from_ticks(0));
+        require("sonar.timing.schedule", !no_time, "a period that is not zero")
     }
 }

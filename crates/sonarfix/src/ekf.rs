@@ -1,99 +1,98 @@
-//! The extended Kalman filter: seven states in `f32`, predicted from wheel travel, corrected by
-//! one range at a time (`docs/model.md`, eqs. 4–6, 13–15 and 17).
+//! The extended Kalman filter: seven states in `f32`, predicted from wheel travel, corrected by one
+//! range at a time (`docs/model.md`, eqs. 4 to 6).
 //!
-//! It holds numbers and equations only. Which wall a range belongs to, whether it may be
-//! believed and what time it is, others decide.
+//! The filter holds numbers and equations only. Choosing the wall of a range, gating and time are
+//! the task of the [`localizer`](crate::localizer).
 //!
 //! # Form
-//! The covariance is kept as its upper triangle. Prediction multiplies out F P Fᵀ with F's zeros
-//! and ones left out; correction is Joseph's form in two passes, each a rank-one change: the first
-//! is the plain P − K H P, the second adds what the rounding of the first, and of K, left wrong.
-//! Variances stay positive in single precision even for a range a million times sharper than the
-//! prior, where the plain form reaches zero. What two states know of each other can be sharper
-//! still than single precision holds; a range is then believed less than its noise allows (eq. 17).
+//! The covariance is stored as its upper triangle. Prediction multiplies out F P Fᵀ without the zeros
+//! and ones of F, eq. (10). Correction is Joseph's form in two passes of rank one, eq. (19): the
+//! first is P − K H P, the second removes its rounding error and that of K. Variances stay positive
+//! in single precision even for a range with a variance 10⁶ times smaller than the prior, where the
+//! plain form reaches zero. The correlation of two states can exceed what single precision holds; the
+//! noise of the range is then raised, eq. (20).
 //!
 //! # Non-finite policy
-//! NaN or infinity in an argument, or arising on the way, is an [`EkfError`], and not one bit of
-//! the filter has changed. Only numbers within limits far beyond a robot's are computed with: a
-//! turn of 64 rad a step, innovations of 1,000 km, variances of (1,000 km)², derivatives of 1,000.
-//! Within them nothing overflows, and an entry of P is no larger than its row's and its column's
-//! variance allow: so after a step it is enough to look at the variances. What fails there is put
-//! back as it was.
+//! NaN or infinity in an argument or in an intermediate result is an [`EkfError`], and the filter is
+//! unchanged to the bit. Arguments are limited to values far beyond those of a robot: a turn of
+//! 64 rad per step, innovations of 1,000 km, variances of (1,000 km)², derivatives of 1,000. Within
+//! these limits nothing overflows, and the variances of its row and column bound every entry of P:
+//! after a step it is sufficient to check the variances. The previous values are restored if one is
+//! invalid.
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::covariance::{Correction, Covariance, Derivatives, SixStates, is_within};
-use crate::motion::{Drive, Noise, Rates, Step, Walk, WheelTravel};
+use crate::covariance::{Correction, Covariance, PoseBlock, PredictedMeasurement};
+use crate::estimate::FilterEstimate;
+use crate::motion::{Drive, LinearizedMotion, WheelTravel};
+use crate::numeric::is_within;
+use crate::pose::{Heading, Pose};
+use crate::process_noise::{AccumulatedRandomWalk, NoiseDensities, ProcessNoise};
 use crate::range::ExpectedRange;
-use crate::state::{Mean, Remainder};
 use crate::trig::sin_cos_within;
 use crate::units::{Metres, Radians, SquareMetres};
 
-pub use crate::state::{STATES, State};
+pub use crate::range::Innovation;
+pub use crate::state::{STATES, StandardDeviations, StateEstimate};
 
-/// The largest innovation (m) and noise (m²) that is computed with.
-const FURTHEST: f32 = 1e6;
+/// Largest magnitude of an innovation, m.
+const MAX_INNOVATION: f32 = 1e6;
 
-/// The largest turn of one step, radians: a heading and half of it stay where sine and cosine need
-/// no other reduction.
-const LARGEST_TURN: f32 = 64.0;
+/// Largest noise variance of a range, m².
+const MAX_NOISE: f32 = 1e6;
 
-/// What the filter refuses to compute with.
+/// Largest sum of squares of the derivatives of a range.
+const MAX_JACOBIAN_SQUARED: f32 = 1e6;
+
+/// Largest turn of one step, radians: the mid-heading stays in the range of the fast reduction of
+/// sine and cosine.
+const MAX_TURN: f32 = 64.0;
+
+/// Reason for which the filter refuses a call. The filter is unchanged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub enum EkfError {
-    /// An argument is NaN, infinite or larger than is computed with, or the result would be.
+    /// An argument is NaN or infinite.
     NotFinite,
     /// A variance or a standard deviation is negative.
-    Negative,
-    /// A variance would come out negative: P no longer is what a covariance is.
+    NegativeVariance,
+    /// A variance would become negative: P would no longer be a covariance.
     Indefinite,
-    /// The noise of a range is zero: its correction could not be undone.
-    Noiseless,
+    /// The noise variance of a range is zero: P would become singular.
+    ZeroNoise,
+    /// The turn of one step is larger than 64 rad.
+    TurnTooLarge,
+    /// The innovation is larger than 1,000 km.
+    InnovationTooLarge,
+    /// The noise variance of a range is larger than 1 km².
+    NoiseTooLarge,
+    /// The derivatives of the expected range are NaN or larger than 1,000.
+    JacobianTooLarge,
+    /// A variance would exceed (1,000 km)².
+    VarianceTooLarge,
 }
 
 impl core::fmt::Display for EkfError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
-            Self::NotFinite => "a value is NaN, infinite or too large, or the result would be",
-            Self::Negative => "a variance or a standard deviation is negative",
+            Self::NotFinite => "a value is NaN or infinite",
+            Self::NegativeVariance => "a variance or a standard deviation is negative",
             Self::Indefinite => "a variance would become negative",
-            Self::Noiseless => "the variance of a range is zero",
+            Self::ZeroNoise => "the noise variance of a range is zero",
+            Self::TurnTooLarge => "the turn of one step is larger than 64 rad",
+            Self::InnovationTooLarge => "the innovation is larger than 1,000 km",
+            Self::NoiseTooLarge => "the noise variance of a range is larger than 1 km²",
+            Self::JacobianTooLarge => "the derivatives of a range are NaN or larger than 1,000",
+            Self::VarianceTooLarge => "a variance would exceed (1,000 km)²",
         })
     }
 }
 
 impl core::error::Error for EkfError {}
 
-/// A measured range against the expected one.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Innovation {
-    /// ν = z − h(X̂).
-    pub value: Metres,
-    /// S = H P Hᵀ + R.
-    pub variance: SquareMetres,
-}
-
-impl Innovation {
-    /// Normalised innovation squared ν²/S, dimensionless: 1 on average if the filter is
-    /// consistent.
-    ///
-    /// ```
-    /// use sonarfix::ekf::Innovation;
-    /// use sonarfix::units::{Metres, SquareMetres};
-    /// let innovation = Innovation { value: Metres(0.02), variance: SquareMetres(0.0001) };
-    /// assert!((innovation.nis() - 4.0).abs() < 1e-5);
-    /// ```
-    #[must_use]
-    pub fn nis(&self) -> f32 {
-        self.value.0 * self.value.0 / self.variance.0
-    }
-}
-
-/// The covariance of the position, m², and the variance of the heading, rad².
+/// Covariance of the position, m², and variance of the heading, rad².
 pub(crate) struct PoseCovariance {
     pub xx: f32,
     pub xy: f32,
@@ -101,33 +100,21 @@ pub(crate) struct PoseCovariance {
     pub hh: f32,
 }
 
-/// What a range would tell if it were measured.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Prospect {
-    /// Its covariance with x, y, heading and range scale.
-    pub with_pose: Derivatives,
-    /// Its covariance with the common part and the difference of the scale errors.
-    pub with_wheels: (f32, f32),
-    /// S: its variance about the expected one.
-    pub variance: f32,
-}
-
-impl PoseCovariance {
-    /// The position's standard deviation in the direction in which it is largest, m: the root of the
-    /// larger eigenvalue.
-    pub fn worst_deviation(&self) -> f32 {
-        let half = 0.5 * (self.xx - self.yy);
-        let middle = 0.5 * (self.xx + self.yy);
-        libm::sqrtf(middle + libm::sqrtf(half * half + self.xy * self.xy))
-    }
+/// Uncertainty of the pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PoseUncertainty {
+    /// Standard deviation of the position in the direction in which it is largest.
+    pub position: Metres,
+    /// Standard deviation of the heading.
+    pub heading: Radians,
 }
 
 /// The filter.
 ///
 /// ```
-/// use sonarfix::ekf::{Ekf, State};
+/// use sonarfix::ekf::{Ekf, StandardDeviations, StateEstimate};
 /// use sonarfix::motion::{Drive, WheelTravel};
-/// use sonarfix::units::{Metres, PerRootMetre};
+/// use sonarfix::units::{Metres, PerRootMetre, Radians};
 ///
 /// let drive = Drive {
 ///     track_width: Metres(0.35),
@@ -135,145 +122,235 @@ impl PoseCovariance {
 ///     scale_walk: PerRootMetre(5e-6),
 ///     track_width_walk: PerRootMetre(Metres(5e-6)),
 /// };
-/// let deviation = State {
-///     x: 0.001, y: 0.001, heading: 0.001,
-///     scale_right: 0.01, scale_left: 0.01, track_width_error: 0.01, range_scale: 0.0,
+/// let deviations = StandardDeviations {
+///     x: Metres(0.001),
+///     y: Metres(0.001),
+///     heading: Radians(0.001),
+///     scale_right: 0.01,
+///     scale_left: 0.01,
+///     track_width_error: Metres(0.01),
+///     range_scale: 0.0,
 /// };
-/// let mut ekf = Ekf::new(drive, State::default(), deviation)?;
+/// let mut ekf = Ekf::new(drive, StateEstimate::default(), deviations)?;
 /// for _ in 0..10 {
 ///     ekf.predict(WheelTravel::new(0.04, 0.04))?;
 /// }
-/// assert!((ekf.state().x - 0.4).abs() < 1e-6);
-/// // The scale errors are unknown by 1 %, so 0.4 m of travel is uncertain by 2.8 mm.
-/// assert!((ekf.deviation().x - 0.0030).abs() < 0.0001);
+/// assert!((ekf.state().x.0 - 0.4).abs() < 1e-6);
+/// // The scale errors are uncertain by 1 %, so 0.4 m of travel is uncertain by 2.8 mm.
+/// assert!((ekf.deviation().x.0 - 0.0030).abs() < 0.0001);
 /// # Ok::<(), sonarfix::ekf::EkfError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ekf {
-    mean: Mean,
-    rest: Remainder,
-    /// P, but for what the calibration has walked since the last range.
-    p: Covariance,
-    /// How far both wheels together have rolled since then, metres.
-    way: f32,
-    rates: Rates,
+    estimate: FilterEstimate,
+    /// P without the random walk of the calibration since the last update; [`Self::p`] is P.
+    p_without_walk: Covariance,
+    /// Distance of both wheels together since the last update, metres.
+    distance_since_update: f32,
+    track_width: f32,
+    densities: NoiseDensities,
 }
 
 impl Ekf {
-    /// A filter at `state`, whose errors are independent with the standard deviations in
-    /// `deviation` (each in the unit of its state). A deviation of zero means: known exactly, and
-    /// for the range scale: not estimated. Of the two scale errors either both are known exactly or
-    /// none; they are held as mean and difference.
+    /// A filter at `state`, with independent errors of these standard deviations.
+    ///
+    /// A deviation of zero means that the state is known exactly; for the range scale, that it is not
+    /// estimated. The two scale errors are either both known exactly or both uncertain, because the
+    /// filter holds their mean and difference.
     ///
     /// # Errors
-    /// [`EkfError::NotFinite`] or [`EkfError::Negative`], by what is wrong with an argument.
-    pub fn new(drive: Drive, state: State, deviation: State) -> Result<Self, EkfError> {
-        if !state.is_finite() || !deviation.is_finite() {
+    /// [`EkfError::NotFinite`], [`EkfError::NegativeVariance`] or [`EkfError::VarianceTooLarge`] if
+    /// that is true of an argument.
+    pub fn new(
+        drive: Drive,
+        state: StateEstimate,
+        deviation: StandardDeviations,
+    ) -> Result<Self, EkfError> {
+        let deviations = deviation.to_array();
+        if !state.to_array().iter().chain(&deviations).all(|number| number.is_finite())
+            || !drive.is_finite()
+        {
             return Err(EkfError::NotFinite);
         }
-        if deviation.to_vector().iter().any(|&sigma| sigma < 0.0) {
-            return Err(EkfError::Negative);
+        if deviations.iter().any(|&sigma| sigma < 0.0) {
+            return Err(EkfError::NegativeVariance);
         }
         let p = Covariance::independent(&deviation);
-        let rates = Rates::new(&drive);
-        if !p.is_sound() || !rates.is_sound() {
-            return Err(EkfError::NotFinite);
+        let densities = NoiseDensities::new(&drive);
+        if !p.is_valid() || !densities.is_valid() {
+            return Err(EkfError::VarianceTooLarge);
         }
-        Ok(Self { mean: Mean::new(&state), rest: Remainder::default(), p, way: 0.0, rates })
+        Ok(Self {
+            estimate: FilterEstimate::new(&state),
+            p_without_walk: p,
+            distance_since_update: 0.0,
+            track_width: drive.track_width.0,
+            densities,
+        })
     }
 
     /// The estimate X̂.
     #[must_use]
-    pub fn state(&self) -> State {
-        self.mean.state()
+    pub fn state(&self) -> StateEstimate {
+        self.estimate.state()
     }
 
-    /// The estimate X̂ as a 7×1 vector: x, y, heading, right and left scale error, track-width
-    /// error, range scale error; metres, radians, dimensionless.
+    /// The estimated heading.
+    pub(crate) fn heading(&self) -> Heading {
+        Heading::new(Radians(self.estimate.heading))
+    }
+
+    /// The estimate X̂ as a 7×1 vector, in the order and units of [`StateEstimate::to_array`].
     #[must_use]
     pub fn state_vector(&self) -> SVector<f32, STATES> {
-        self.state().to_vector()
+        SVector::from(self.state().to_array())
     }
 
     /// The covariance P, 7×7, exactly symmetric, in the order of [`Self::state_vector`].
     #[must_use]
     pub fn covariance(&self) -> SMatrix<f32, STATES, STATES> {
-        self.walked().to_matrix()
+        self.p().to_matrix()
     }
 
-    /// One standard deviation of each state, in the state's own unit.
+    /// One standard deviation of each state.
     #[must_use]
-    pub fn deviation(&self) -> State {
-        let p = self.walked();
-        let (rr, ll) = p.wheel_variances();
-        State {
-            x: libm::sqrtf(p.six.pose.xx),
-            y: libm::sqrtf(p.six.pose.yy),
-            heading: libm::sqrtf(p.six.pose.hh),
-            scale_right: libm::sqrtf(rr),
-            scale_left: libm::sqrtf(ll),
-            track_width_error: libm::sqrtf(p.six.calibration.ww),
-            range_scale: libm::sqrtf(p.scale.kk),
-        }
+    pub fn deviation(&self) -> StandardDeviations {
+        self.p().standard_deviations()
     }
 
     /// P.
-    fn walked(&self) -> Covariance {
-        let mut p = self.p;
-        p.widen(&Walk::new(&self.rates, self.way));
+    fn p(&self) -> Covariance {
+        let mut p = self.p_without_walk;
+        p.add_random_walk(&self.walk());
         p
     }
 
-    /// Variances and covariance of x and y, and the heading's variance.
+    #[inline]
+    fn walk(&self) -> AccumulatedRandomWalk {
+        AccumulatedRandomWalk::new(&self.densities, self.distance_since_update)
+    }
+
+    /// Covariance of the position and variance of the heading, which contain no random walk.
     pub(crate) fn pose_covariance(&self) -> PoseCovariance {
-        let p = &self.p.six.pose;
+        let p = &self.p_without_walk.pose;
         PoseCovariance { xx: p.xx, xy: p.xy, yy: p.yy, hh: p.hh }
     }
 
-    /// What this range would tell if it were measured, with noise variance `noise`.
-    pub(crate) fn prospect(&self, expected: &ExpectedRange, noise: SquareMetres) -> Prospect {
-        let h = row(expected);
-        let with_pose = self.p.cross(&h);
-        let variance = noise.0 + h.times(&with_pose);
-        Prospect { with_pose, with_wheels: self.p.cross_wheels(&h), variance }
+    /// Uncertainty of the pose: root of the larger eigenvalue of the position's covariance, and
+    /// deviation of the heading.
+    pub(crate) fn pose_uncertainty(&self) -> PoseUncertainty {
+        let PoseCovariance { xx, xy, yy, hh } = self.pose_covariance();
+        let (half, middle) = (0.5 * (xx - yy), 0.5 * (xx + yy));
+        PoseUncertainty {
+            position: Metres(libm::sqrtf(middle + libm::sqrtf(half * half + xy * xy))),
+            heading: Radians(libm::sqrtf(hh)),
+        }
     }
 
-    /// Predicts the state over one step of the wheels: `X̂ ← f(X̂, U)`, `P ← F P Fᵀ + Q`
-    /// (`docs/model.md`, eqs. 4–5 and 7–9). Q grows with the distance rolled, never with time: a
-    /// step without travel changes nothing.
+    // ===== Eqs. (4) and (5): X̂ ← f(X̂, U), P ← F P Fᵀ + Q =====
+    /// Predicts the state over one odometry increment.
+    ///
+    /// X̂ moves by eq. (7) of `docs/model.md`, P changes by eqs. (8) to (10). Q grows with the
+    /// distance travelled, never with time: an increment without travel changes nothing.
     ///
     /// # Errors
-    /// [`EkfError::NotFinite`] if a travel is NaN, infinite or a turn of more than 64 rad, or the
-    /// result would be too large; [`EkfError::Indefinite`] if a variance would be negative. The
-    /// filter is unchanged.
+    /// [`EkfError::NotFinite`] if a travel is; [`EkfError::TurnTooLarge`] beyond 64 rad;
+    /// [`EkfError::VarianceTooLarge`] or [`EkfError::Indefinite`] if a variance would leave its
+    /// limits. The filter is unchanged.
     ///
     /// # Panics
     /// Never.
     pub fn predict(&mut self, travel: WheelTravel) -> Result<(), EkfError> {
-        let rolled = travel.right.abs().0 + travel.left.abs().0;
-        if rolled <= 0.0 {
+        let distance = travel.right.abs().0 + travel.left.abs().0;
+        if distance <= 0.0 {
             return Ok(());
         }
-        let step = Step::new(&self.rates, &self.mean, travel, sin_cos_within);
-        if !is_within(step.turn.abs(), LARGEST_TURN) {
-            return Err(EkfError::NotFinite);
+        let motion =
+            LinearizedMotion::new(self.track_width, &self.estimate, travel, sin_cos_within);
+        if !is_within(motion.turn.abs(), MAX_TURN) {
+            return Err(refused_travel(travel));
         }
-        let noise = Noise::new(&self.rates, &self.mean, travel, self.way, &self.p.six.pose);
-        let before = self.p.six.pose;
-        self.p.six.propagate(&step, &noise);
-        if !self.p.six.pose.is_sound() {
-            let error = self.what_is_unsound();
-            self.p.six.pose = before;
+        let noise = ProcessNoise::new(&self.densities, &motion, travel);
+        let walk = self.walk();
+        let p = &mut self.p_without_walk;
+        let before = p.pose;
+        let rounding = p.pose.rounding_noise(&noise);
+        p.pose.propagate(&p.calibration, &motion, &noise, &rounding, &walk);
+        if !p.pose.is_valid() {
+            let error = invalid(p);
+            p.pose = before;
             return Err(error);
         }
-        self.p.scale.propagate(&step);
-        self.way += rolled;
-        self.mean.advance(&mut self.rest, &step);
+        p.range_scale.propagate(&motion);
+        self.distance_since_update += distance;
+        motion.advance(&mut self.estimate);
         Ok(())
     }
 
-    /// The innovation that a measured `range` would bring, with noise variance `noise`
-    /// (`docs/model.md`, eq. 13). Changes nothing.
+    /// Adds independent errors with these standard deviations to x and y and to the heading.
+    ///
+    /// The state and all other entries of P are unchanged.
+    ///
+    /// # Errors
+    /// [`EkfError::NotFinite`] or [`EkfError::NegativeVariance`] if that is true of an argument;
+    /// [`EkfError::VarianceTooLarge`] if a variance would leave its limits. The filter is unchanged.
+    ///
+    /// # Panics
+    /// Never.
+    pub fn inflate_pose(&mut self, position: Metres, heading: Radians) -> Result<(), EkfError> {
+        if !position.is_finite() || !heading.is_finite() {
+            return Err(EkfError::NotFinite);
+        }
+        if position < Metres(0.0) || heading < Radians(0.0) {
+            return Err(EkfError::NegativeVariance);
+        }
+        let p = &mut self.p_without_walk.pose;
+        let before = *p;
+        p.xx += position.0 * position.0;
+        p.yy += position.0 * position.0;
+        p.hh += heading.0 * heading.0;
+        if p.is_valid() {
+            return Ok(());
+        }
+        *p = before;
+        Err(EkfError::VarianceTooLarge)
+    }
+
+    /// Replaces the pose by one that was measured independently, with independent errors of these
+    /// standard deviations. The calibration and its covariance are unchanged; their covariance with the
+    /// pose becomes zero.
+    ///
+    /// # Errors
+    /// [`EkfError::NotFinite`], [`EkfError::NegativeVariance`] or [`EkfError::VarianceTooLarge`] if that
+    /// is true of an argument. The filter is unchanged.
+    ///
+    /// # Panics
+    /// Never.
+    pub fn set_pose(
+        &mut self,
+        pose: Pose,
+        position: Metres,
+        heading: Radians,
+    ) -> Result<(), EkfError> {
+        if !pose.is_finite() || !position.is_finite() || !heading.is_finite() {
+            return Err(EkfError::NotFinite);
+        }
+        if position < Metres(0.0) || heading < Radians(0.0) {
+            return Err(EkfError::NegativeVariance);
+        }
+        let block = PoseBlock::independent(position, heading);
+        if !block.is_valid() {
+            return Err(EkfError::VarianceTooLarge);
+        }
+        let p = &mut self.p_without_walk;
+        p.pose = block;
+        p.range_scale.forget_pose();
+        self.estimate.set_pose(pose);
+        Ok(())
+    }
+
+    /// The innovation of a measured `range` with noise variance `noise`. The filter is unchanged.
+    #[inline]
     #[must_use]
     pub fn innovation(
         &self,
@@ -281,58 +358,32 @@ impl Ekf {
         expected: &ExpectedRange,
         noise: SquareMetres,
     ) -> Innovation {
-        let m = self.cross_covariance(expected);
-        Innovation {
-            value: range - expected.range,
-            variance: SquareMetres(innovation_variance(expected, &m, noise)),
-        }
+        self.predict_measurement(expected).innovation(range, noise)
     }
 
-    /// How much the position's variance (x's and y's together) would drop if this range were
-    /// measured, with noise variance `noise`; computed without trying the update
-    /// (`docs/model.md`, eq. 16).
-    #[must_use]
-    pub fn position_gain(&self, expected: &ExpectedRange, noise: SquareMetres) -> SquareMetres {
-        let m = self.cross_covariance(expected);
-        SquareMetres((m.x * m.x + m.y * m.y) / innovation_variance(expected, &m, noise))
+    /// H, P Hᵀ and H P Hᵀ of an expected range; none of them depends on the random walk.
+    #[inline]
+    pub(crate) fn predict_measurement<'e>(
+        &self,
+        expected: &'e ExpectedRange,
+    ) -> PredictedMeasurement<'e> {
+        self.p_without_walk.project(expected)
     }
 
-    /// Admits more doubt of the pose: adds these standard deviations, independent of all else, to x
-    /// and y each and to the heading. The state stays; no entry but their three variances changes.
+    /// Covariance of an expected range with the mean and the difference of the scale errors.
+    pub(crate) fn cross_covariance_of_wheels(&self, expected: &ExpectedRange) -> (f32, f32) {
+        self.p_without_walk.cross_covariance_of_wheels(expected)
+    }
+
+    // ===== Eq. (6): K, X̂ ← X̂ + K ν, P ← P − K H P =====
+    /// Corrects the state by one measured `range` with noise variance `noise`.
+    ///
+    /// There is no gate: the range is applied as given, except that its noise is raised where single
+    /// precision could not hold the result (`docs/model.md`, eq. 20).
     ///
     /// # Errors
-    /// [`EkfError::NotFinite`] or [`EkfError::Negative`], by what is wrong with an argument; the
-    /// filter is unchanged.
-    ///
-    /// # Panics
-    /// Never.
-    pub fn loosen(&mut self, position: Metres, heading: Radians) -> Result<(), EkfError> {
-        if !position.is_finite() || !heading.is_finite() {
-            return Err(EkfError::NotFinite);
-        }
-        if position < Metres(0.0) || heading < Radians(0.0) {
-            return Err(EkfError::Negative);
-        }
-        let before = self.p.six.pose;
-        let p = &mut self.p.six.pose;
-        p.xx += position.0 * position.0;
-        p.yy += position.0 * position.0;
-        p.hh += heading.0 * heading.0;
-        if p.is_sound() {
-            return Ok(());
-        }
-        self.p.six.pose = before;
-        Err(EkfError::NotFinite)
-    }
-
-    /// Corrects the state by one measured `range` with noise variance `noise`
-    /// (`docs/model.md`, eqs. 6, 13–15 and 17). There is no gate here: what is given is believed,
-    /// except that nothing is believed to be sharper than single precision can hold.
-    ///
-    /// # Errors
-    /// [`EkfError::NotFinite`], [`EkfError::Negative`] or [`EkfError::Noiseless`] by what is
-    /// wrong with an argument; [`EkfError::Indefinite`] if a variance would be negative. The filter
-    /// is unchanged.
+    /// [`EkfError`], by what is wrong with an argument, or [`EkfError::Indefinite`] or
+    /// [`EkfError::VarianceTooLarge`] if a variance would leave its limits. The filter is unchanged.
     ///
     /// # Panics
     /// Never.
@@ -342,64 +393,138 @@ impl Ekf {
         expected: &ExpectedRange,
         noise: SquareMetres,
     ) -> Result<(), EkfError> {
-        let innovation = (range - expected.range).0;
-        let noise_is_sound = noise.0 > 0.0 && noise.0 <= FURTHEST;
-        let innovation_is_sound = innovation.abs() <= FURTHEST;
-        if !(noise_is_sound && innovation_is_sound) {
-            return Err(what_is_wrong_with(noise));
+        let innovation = range - expected.range;
+        check_measurement(expected, innovation, noise)?;
+        let prediction = self.predict_measurement(expected);
+        self.correct(&prediction, innovation, noise, 1.0)
+    }
+
+    /// Corrects the state by a `range` that belongs to the expected wall with a probability of
+    /// `association`, by probabilistic data association (`docs/model.md`, eq. 16).
+    ///
+    /// The state takes that share of the correction. The covariance is that of a certain association,
+    /// plus the uncertainty of the association along the gain. At 1 this is [`Self::update`], bit for
+    /// bit; at 0 nothing changes.
+    ///
+    /// # Errors
+    /// As of [`Self::update`]; [`EkfError::NotFinite`] if `association` is not between 0 and 1.
+    ///
+    /// # Panics
+    /// Never.
+    pub fn update_associated(
+        &mut self,
+        range: Metres,
+        expected: &ExpectedRange,
+        noise: SquareMetres,
+        association: f32,
+    ) -> Result<(), EkfError> {
+        let prediction = self.predict_measurement(expected);
+        self.update_predicted(&prediction, range - expected.range, noise, association)
+    }
+
+    /// [`Self::update_associated`] with a measurement that was predicted from this filter, unchanged
+    /// since.
+    pub(crate) fn update_predicted(
+        &mut self,
+        prediction: &PredictedMeasurement,
+        innovation: Metres,
+        noise: SquareMetres,
+        association: f32,
+    ) -> Result<(), EkfError> {
+        if !is_within(association, 1.0) {
+            return Err(EkfError::NotFinite);
         }
+        if association <= 0.0 {
+            return Ok(());
+        }
+        check_measurement(prediction.expected, innovation, noise)?;
+        self.correct(prediction, innovation, noise, association)
+    }
+
+    // ===== Eq. (16): X̂ ← X̂ + β K ν, P ← P − K H P + (1 − β)(S + β ν²) K Kᵀ =====
+    #[inline]
+    fn correct(
+        &mut self,
+        prediction: &PredictedMeasurement,
+        innovation: Metres,
+        noise: SquareMetres,
+        association: f32,
+    ) -> Result<(), EkfError> {
         // In three parts, each small enough to be copied without a call.
-        let Covariance { six: SixStates { pose, calibration }, scale } = self.p;
-        self.p.widen(&Walk::new(&self.rates, self.way));
-        let error = match self.p.correct(&row(expected), noise.0) {
-            Correction::Taken(gain) if self.p.is_sound() => {
-                self.way = 0.0;
-                self.mean.take(&mut self.rest, &gain, innovation);
+        let Covariance { pose, calibration, range_scale } = self.p_without_walk;
+        let walk = self.walk();
+        let p = &mut self.p_without_walk;
+        p.add_random_walk(&walk);
+        let correction = p.correct(prediction, noise.0);
+        let clutter = 1.0 - association;
+        if let Correction::Applied(gain) = &correction
+            && clutter > 0.0
+        {
+            let s = noise.0 + prediction.variance;
+            let amount = clutter * (s + association * innovation.0 * innovation.0);
+            p.add_along_gain(gain, amount);
+        }
+        let error = match correction {
+            Correction::Applied(gain) if p.is_valid() => {
+                self.distance_since_update = 0.0;
+                gain.correct(&mut self.estimate, association * innovation.0);
                 return Ok(());
             }
-            Correction::Spare => {
-                self.way = 0.0;
+            Correction::Saturated => {
+                self.distance_since_update = 0.0;
                 return Ok(());
             }
-            Correction::Taken(_) => self.what_is_unsound(),
-            Correction::NotFinite => EkfError::NotFinite,
+            Correction::Applied(_) => invalid(p),
             Correction::Indefinite => EkfError::Indefinite,
         };
-        self.p.six.pose = pose;
-        self.p.six.calibration = calibration;
-        self.p.scale = scale;
+        p.pose = pose;
+        p.calibration = calibration;
+        p.range_scale = range_scale;
         Err(error)
     }
-
-    /// Why a result is refused.
-    #[cold]
-    fn what_is_unsound(&self) -> EkfError {
-        if self.p.is_negative() { EkfError::Indefinite } else { EkfError::NotFinite }
-    }
-
-    /// P Hᵀ: the covariance of each state with the expected range.
-    fn cross_covariance(&self, expected: &ExpectedRange) -> Derivatives {
-        self.p.cross(&row(expected))
-    }
 }
 
-fn row(e: &ExpectedRange) -> Derivatives {
-    Derivatives { x: e.by_x, y: e.by_y, h: e.by_heading, k: e.by_range_scale }
-}
-
-/// Why a range is refused.
+/// Why a covariance is not valid.
 #[cold]
-fn what_is_wrong_with(noise: SquareMetres) -> EkfError {
-    if noise.0 < 0.0 && noise.is_finite() {
-        EkfError::Negative
-    } else if noise.0.abs() <= 0.0 {
-        EkfError::Noiseless
-    } else {
-        EkfError::NotFinite
-    }
+fn invalid(p: &Covariance) -> EkfError {
+    if p.has_negative_variance() { EkfError::Indefinite } else { EkfError::VarianceTooLarge }
 }
 
-/// S = H P Hᵀ + R, given m = P Hᵀ.
-fn innovation_variance(expected: &ExpectedRange, m: &Derivatives, noise: SquareMetres) -> f32 {
-    noise.0 + row(expected).times(m)
+/// Why a travel is refused before P is propagated.
+#[cold]
+fn refused_travel(travel: WheelTravel) -> EkfError {
+    if travel.is_finite() { EkfError::TurnTooLarge } else { EkfError::NotFinite }
+}
+
+/// Whether the filter computes with a measurement.
+#[inline]
+fn check_measurement(
+    expected: &ExpectedRange,
+    innovation: Metres,
+    noise: SquareMetres,
+) -> Result<(), EkfError> {
+    let is_noise_valid = noise.0 > 0.0 && noise.0 <= MAX_NOISE;
+    let is_innovation_valid = innovation.0.abs() <= MAX_INNOVATION;
+    if !(is_noise_valid && is_innovation_valid) {
+        return Err(refused_range(innovation, noise));
+    }
+    // False for NaN.
+    let is_jacobian_valid = expected.jacobian().squared().sum() <= MAX_JACOBIAN_SQUARED;
+    if is_jacobian_valid { Ok(()) } else { Err(EkfError::JacobianTooLarge) }
+}
+
+/// Why a range is refused before P is corrected.
+#[cold]
+fn refused_range(innovation: Metres, noise: SquareMetres) -> EkfError {
+    if !innovation.is_finite() || !noise.is_finite() {
+        EkfError::NotFinite
+    } else if noise.0 < 0.0 {
+        EkfError::NegativeVariance
+    } else if noise.0 <= 0.0 {
+        EkfError::ZeroNoise
+    } else if noise.0 > MAX_NOISE {
+        EkfError::NoiseTooLarge
+    } else {
+        EkfError::InnovationTooLarge
+    }
 }

@@ -1,95 +1,99 @@
-//! A verdict on the estimate, from what the ranges said over time.
+//! Verdict on the estimate, from the measurement outcomes over time.
 //!
-//! The covariance is what the filter believes of itself; it cannot tell that it is wrong. The
-//! ranges can. Each turn of the sonar adds to the evidence against the pose, or takes from it:
+//! The covariance is the filter's own uncertainty; it does not show that the filter is wrong. The
+//! measurements do. The evidence of each ping is the logarithm of its likelihood at a wrong pose over
+//! that at the estimated one, by the [echo model](crate::echo). A ping that agrees counts at most −1.2,
+//! because a wrong pose agrees by chance in three of ten pings; one that contradicts counts between 1 and
+//! 4, less or nothing if the wall is already known to be occluded. That knowledge fades with the distance
+//! along the wall and with time, so that a wall that contradicts everywhere counts again.
 //!
-//! | the turn | evidence | of the same wall again | because |
-//! |---|---|---|---|
-//! | taken | −1.2 | | down to 0 |
-//! | taken, but weakened | 0 | | it may have been something else |
-//! | gated, too long | 1 | 0.7 | nothing that stands in a room makes a range longer |
-//! | no echo | 0.6 | 0.3 | a sonar misses some, and a wall that is not there all |
-//! | gated, too short | 0.5 | 0 | furniture does that, and stays while the robot passes it |
-//! | not a range to compare, or no wall to look at | 0 | | it says nothing of the pose |
-//!
-//! It is Page's cumulative sum test: each number is about the logarithm of how much more often a turn
-//! ends so with a wrong pose than with a good one (in `classroom` and of robots carried off, a third
-//! of it), and the sum, never below 0, decides:
+//! This is Page's cumulative sum test, eq. (23) of `docs/model.md`. The sum, never below 0, decides:
 //!
 //! ```text
-//!              1, or 10 turns without a usable
-//!              range, or NIS above 3, or stale,
-//!              or doubtful                                4
+//!              2.5, or 10 pings without a usable      7, or 30 pings without
+//!              range, or mean NIS above 3, or too     an accepted range while
+//!              far without a fix, or uncertain        uncertain
 //!   Tracking ────────────────────────────▶ Degraded ──────────────────────▶ Lost
 //!      ▲                                    │   ▲                             │
-//!      └── below 0.5, 3 taken in a row,  ───┘   └── below 0.5, 3 taken in a row
-//!          and none of the others holds
+//!      └── below 0.5, 3 accepted in a   ────┘   └── below 0.5, 3 accepted in a row
+//!          row, none of the others,
+//!          at most 3 inflations
 //! ```
 //!
-//! - *NIS* is the mean of ν²/S over the ranges taken, in which one counts for a sixteenth and fades:
-//!   1 if the filter is consistent, less if its noise is set too large. Ranges that pass the gate
-//!   one by one, but too far off together.
-//! - *Stale*: rolled farther than [`Trust::stale`] since the last range taken. A robot that stands
-//!   still does not grow stale, for its pose does not either; the time is told all the same.
-//! - *Doubtful*: a direction in which the position's deviation is beyond [`Trust::doubtful`], or a
-//!   heading less certain than half of what leaves the sonar anything to look at. It is the
-//!   filter's own covariance that says so: what the ranges have not let it observe.
+//! - *Mean NIS*: mean of ν²/S over the accepted ranges, with a weight of 1/16 for the latest. 1 if the
+//!   filter is consistent, less if its noise is set too large. Above 3 each range passes the gate, but
+//!   together they are too far off.
+//! - *Too far without a fix*: travelled farther than
+//!   [`max_distance_without_fix`](GatingParameters::max_distance_without_fix) since the last range
+//!   used. The uncertainty of a parked robot does not grow.
+//! - *Uncertain*: the deviation of the position in its worst direction exceeds
+//!   [`max_position_deviation`](GatingParameters::max_position_deviation), or that of the heading a
+//!   quarter of the cone.
+//!
+//! Whatever the outcomes, the verdict is not `Tracking` after [`DEGRADED_WITHOUT_FIX`] without a used
+//! range or [`DEGRADED_WITHOUT_ODOMETRY`] without odometry, and `Lost` after
+//! [`LOST_WITHOUT_ODOMETRY`].
 //!
 //! # Non-finite policy
-//! The evidence is made of constants and stays between 0 and [`LOST_AT`]; the mean NIS is made of
-//! ranges taken, which are finite, each counted as [`MOST_NIS`] at the most. The rest is counted,
-//! saturating.
+//! The evidence consists of constants and stays between 0 and [`LOST_AT`]. The mean NIS consists of
+//! finite values, each limited to [`MOST_NIS`]. Counts saturate.
 
-#[cfg(doc)]
-use crate::config::Trust;
-use crate::localizer::{Fix, Refusal};
+use crate::config::GatingParameters;
+use crate::ekf::PoseUncertainty;
+use crate::outcome::Fix;
 use crate::units::{Duration, Metres, Radians};
 
-/// What the localizer thinks of its own estimate.
+/// Verdict on the estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Verdict {
-    /// Ranges come and agree with the map.
+    /// Ranges arrive and agree with the map.
     #[default]
     Tracking,
-    /// Ranges have stopped coming, or have begun to disagree: the estimate lives on the encoders.
+    /// Ranges are missing or begin to disagree: the estimate depends on the encoders.
     Degraded,
-    /// Ranges disagree and keep disagreeing: the pose is likely wrong.
+    /// Ranges keep disagreeing: the pose is probably wrong.
     Lost,
 }
 
-/// The evidence of a turn against the pose.
-const TAKEN: f32 = -1.2;
-const WEAKENED: f32 = 0.0;
-const TOO_LONG: f32 = 1.0;
-const TOO_LONG_AGAIN: f32 = 0.7;
-const NO_ECHO: f32 = 0.6;
-const NO_ECHO_AGAIN: f32 = 0.3;
-const TOO_SHORT: f32 = 0.5;
-const TOO_SHORT_AGAIN: f32 = 0.0;
-
-/// One range that is too long reaches it, one that is short or missing does not.
-const DEGRADED_AT: f32 = 1.0;
-/// The evidence with which a pose is called lost, and the most there is. Chosen so that a robot put
-/// down 1 m and 90° away is called so within 15 turns in 95 % of trials, and one in its place among
-/// unmapped furniture in no run of 1,000 (`docs/health.md`).
-pub const LOST_AT: f32 = 4.0;
-/// What it must have fallen to before things are called better.
+/// Evidence at which the verdict is no longer [`Verdict::Tracking`]: two or three pings that contradict
+/// the pose.
+const DEGRADED_AT: f32 = 2.5;
+/// The evidence at which the verdict is [`Verdict::Lost`], and the maximum. Chosen so that a robot
+/// kidnapped by 1 m and 90° is lost within 15 pings in 97 % of trials, and one among unmapped
+/// furniture in no run of 1,000 (`docs/health.md`).
+pub const LOST_AT: f32 = 7.0;
+/// The evidence below which the verdict can improve.
 const BETTER_BELOW: f32 = 0.5;
 
-/// Turns of the sonar in a row without a usable range.
+/// Inflations of the covariance up to which the verdict can become [`Verdict::Tracking`] again. After
+/// more of them the filter may have converged to another place at which the ranges agree; only a new
+/// start can confirm the pose.
+const MAX_CONFIRMABLE_INFLATIONS: u16 = 3;
+/// Pings in a row without an accepted range after which the verdict is [`Verdict::Lost`], if the
+/// uncertainty of the pose exceeds its limits.
+const LOST_AFTER_UNUSED: u16 = 30;
+
+/// Pings in a row without a usable range.
 const DEGRADED_AFTER_SILENT: u16 = 10;
-/// Accepted ranges in a row that lead one step back up.
+/// Accepted ranges in a row that improve the verdict by one step.
 const BETTER_AFTER: u16 = 3;
 
-/// The share of the latest range in the mean NIS: sixteen ranges or so are remembered.
+/// Weight of the latest range in the mean NIS: a memory of about sixteen ranges.
 const LATEST_NIS: f32 = 1.0 / 16.0;
-/// Sixteen values of χ² with one degree of freedom scatter by 0.25 in this mean: eight of that above
-/// what a consistent filter has.
+/// The mean of sixteen χ² variables with one degree of freedom has a deviation of 0.25 with these
+/// weights: the limit is eight of them above the mean of a consistent filter.
 const DEGRADED_NIS: f32 = 3.0;
-/// The most that one range counts in the mean NIS, so that one alone does not decide.
+/// Limit of one range in the mean NIS, so that a single one does not decide.
 pub const MOST_NIS: f32 = 25.0;
+
+/// Time without odometry after which the verdict is not [`Verdict::Tracking`].
+pub const DEGRADED_WITHOUT_ODOMETRY: Duration = Duration::from_ticks(500_000);
+/// Time without odometry after which it is [`Verdict::Lost`]: at 0.5 m/s the robot may be 1.5 m away.
+pub const LOST_WITHOUT_ODOMETRY: Duration = Duration::from_ticks(3_000_000);
+/// Time without a used range after which the verdict is not [`Verdict::Tracking`], whatever the reason.
+pub const DEGRADED_WITHOUT_FIX: Duration = Duration::from_ticks(60_000_000);
 
 /// The numbers behind the verdict.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -98,27 +102,28 @@ pub const MOST_NIS: f32 = 25.0;
 pub struct Health {
     /// The verdict.
     pub verdict: Verdict,
-    /// The evidence against the pose: from 0, none, to [`LOST_AT`].
+    /// The evidence against the pose, from 0 to [`LOST_AT`].
     pub evidence: f32,
-    /// Mean of ν²/S over the latest ranges taken; 1 at the start.
+    /// Mean of ν²/S over the latest ranges used; 1 at the start.
     pub nis: f32,
-    /// Ranges taken since the last that was not, or since the verdict last rose.
+    /// Ranges used since the last one that was not, or since the verdict improved.
     pub accepted_in_a_row: u16,
-    /// Ranges gated since the last one taken; turns without a range do not interrupt.
+    /// Ranges gated or downweighted since the last one accepted; pings without a range do not interrupt
+    /// the count.
     pub gated_in_a_row: u16,
-    /// Turns without a usable range since the last one taken or gated.
+    /// Pings without a usable range since the last one used or gated.
     pub silent_in_a_row: u16,
-    /// Looks that let the doubt of a lost robot grow ([`Trust::reopen`]), since it was last called
-    /// tracking.
-    pub reopened: u16,
-    /// How far the robot has rolled since the last range taken.
+    /// Inflations of the covariance of a lost robot ([`GatingParameters::inflation`]) since the verdict
+    /// was last [`Verdict::Tracking`].
+    pub inflations: u16,
+    /// Distance travelled since the last range used.
     pub rolled_since_fix: Metres,
-    /// How long ago that was.
+    /// Time since the last range used.
     pub time_since_fix: Duration,
     /// Standard deviation of the position in the direction in which it is largest, after the last
-    /// turn of the sonar.
+    /// ping.
     pub position_deviation: Metres,
-    /// Standard deviation of the heading then.
+    /// Standard deviation of the heading after the last ping.
     pub heading_deviation: Radians,
 }
 
@@ -131,7 +136,7 @@ impl Default for Health {
             accepted_in_a_row: 0,
             gated_in_a_row: 0,
             silent_in_a_row: 0,
-            reopened: 0,
+            inflations: 0,
             rolled_since_fix: Metres(0.0),
             time_since_fix: Duration::from_ticks(0),
             position_deviation: Metres(0.0),
@@ -140,109 +145,103 @@ impl Default for Health {
     }
 }
 
-/// What a turn of the sonar says of the pose.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Turn {
-    /// A range that was taken, with its ν²/S.
-    Taken(f32),
-    /// The same of a range that was believed less than its noise allows.
-    Weakened(f32),
-    /// A range beyond the gate and too long; whether the same wall has been the last to contradict,
-    /// and no range has been taken since.
-    TooLong { again: bool },
-    /// A range beyond the gate and too short.
-    TooShort { again: bool },
-    /// A ping that brought no echo where one was to come.
-    NoEcho { again: bool },
-    /// Nothing of the pose.
-    Silent,
-}
-
-impl Turn {
-    pub fn of(fix: &Fix, again: bool) -> Self {
-        match *fix {
-            Fix::Accepted(innovation) => Self::Taken(innovation.nis()),
-            Fix::Weakened(innovation) => Self::Weakened(innovation.nis()),
-            Fix::Gated(innovation) if innovation.value > Metres(0.0) => Self::TooLong { again },
-            Fix::Gated(_) => Self::TooShort { again },
-            Fix::Refused(Refusal::NoEcho) => Self::NoEcho { again },
-            Fix::Refused(_) => Self::Silent,
-        }
-    }
-
-    fn evidence(self) -> f32 {
-        match self {
-            Self::Taken(_) => TAKEN,
-            Self::Weakened(_) => WEAKENED,
-            Self::TooLong { again: false } => TOO_LONG,
-            Self::TooLong { again: true } => TOO_LONG_AGAIN,
-            Self::TooShort { again: false } => TOO_SHORT,
-            Self::TooShort { again: true } => TOO_SHORT_AGAIN,
-            Self::NoEcho { again: false } => NO_ECHO,
-            Self::NoEcho { again: true } => NO_ECHO_AGAIN,
-            Self::Silent => 0.0,
-        }
-    }
-}
-
-/// How uncertain the filter is of the pose.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Doubt {
-    /// Standard deviation of the position in its worst direction.
-    pub position: Metres,
-    pub heading: Radians,
-}
-
-/// From where on the verdict is `Degraded` whatever the ranges say.
+/// Limits beyond which the verdict is not [`Verdict::Tracking`], whatever the outcomes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Limits {
-    /// [`Trust::stale`].
-    pub stale: Metres,
-    /// [`Trust::doubtful`].
-    pub position: Metres,
-    /// Deviation of the heading.
-    pub heading: Radians,
+    /// [`GatingParameters::max_distance_without_fix`].
+    distance: Metres,
+    /// [`GatingParameters::max_position_deviation`].
+    position: Metres,
+    /// Of the deviation of the heading.
+    heading: Radians,
+}
+
+impl Limits {
+    pub fn new(parameters: &GatingParameters, heading: Radians) -> Self {
+        Self {
+            distance: parameters.max_distance_without_fix,
+            position: parameters.max_position_deviation,
+            heading,
+        }
+    }
 }
 
 impl Health {
-    /// Takes note of the way and the time since the last call.
-    pub(crate) fn rolled(&mut self, way: Metres, time: Duration, limits: &Limits) {
-        self.rolled_since_fix = self.rolled_since_fix + way;
+    /// Records distance and time since the last call.
+    pub(crate) fn record_travel(&mut self, distance: Metres, time: Duration, limits: &Limits) {
+        self.rolled_since_fix = self.rolled_since_fix + distance;
         let ticks = self.time_since_fix.ticks().saturating_add(time.ticks());
         self.time_since_fix = Duration::from_ticks(ticks);
         self.degrade(limits);
     }
 
-    /// Takes note of a turn of the sonar.
-    pub(crate) fn turn(&mut self, turn: Turn, doubt: Doubt, limits: &Limits) {
-        self.position_deviation = doubt.position;
-        self.heading_deviation = doubt.heading;
-        self.weigh(turn.evidence());
-        match turn {
-            Turn::Taken(nis) | Turn::Weakened(nis) => self.taken(nis),
-            Turn::TooLong { .. } | Turn::TooShort { .. } => {
+    /// Records the outcome of a ping, its evidence against the pose, and the uncertainty after it.
+    pub(crate) fn record_fix(
+        &mut self,
+        fix: &Fix,
+        evidence: f32,
+        uncertainty: PoseUncertainty,
+        limits: &Limits,
+    ) {
+        self.record_uncertainty(uncertainty);
+        self.add_evidence(evidence);
+        match fix {
+            Fix::Accepted(innovation) => {
+                self.count_used(innovation.nis());
+                if self.can_improve(limits) {
+                    self.improve();
+                } else {
+                    self.degrade(limits);
+                }
+            }
+            Fix::Downweighted(_) | Fix::Gated(_) => {
                 self.accepted_in_a_row = 0;
                 self.silent_in_a_row = 0;
                 self.gated_in_a_row = self.gated_in_a_row.saturating_add(1);
+                self.worsen(limits);
             }
-            Turn::NoEcho { .. } | Turn::Silent => {
-                self.accepted_in_a_row = 0;
-                self.silent_in_a_row = self.silent_in_a_row.saturating_add(1);
-            }
-        }
-        match turn {
-            Turn::Taken(_) if self.is_better(limits) => self.rise(),
-            Turn::Taken(_) | Turn::Weakened(_) => self.degrade(limits),
-            _ => self.worsen(limits),
+            Fix::Refused(_) => self.count_silent(limits),
         }
     }
 
-    /// Takes note that the doubt of a lost robot has been let grow.
-    pub(crate) fn reopened(&mut self) {
-        self.reopened = self.reopened.saturating_add(1);
+    /// Records that there was no wall to measure.
+    pub(crate) fn record_no_aim(&mut self, uncertainty: PoseUncertainty, limits: &Limits) {
+        self.record_uncertainty(uncertainty);
+        self.count_silent(limits);
     }
 
-    fn taken(&mut self, nis: f32) {
+    /// Records that the wheels could not be observed: for `unseen` by now, in which they may have
+    /// rolled as far as `distance`, of which `time` since the last call.
+    pub(crate) fn record_unseen(
+        &mut self,
+        unseen: Duration,
+        distance: Metres,
+        time: Duration,
+        uncertainty: PoseUncertainty,
+        limits: &Limits,
+    ) {
+        self.record_uncertainty(uncertainty);
+        self.position_deviation = self.position_deviation + distance;
+        self.accepted_in_a_row = 0;
+        self.record_travel(Metres(0.0), time, limits);
+        if unseen > LOST_WITHOUT_ODOMETRY {
+            self.verdict = Verdict::Lost;
+        } else if unseen > DEGRADED_WITHOUT_ODOMETRY && self.verdict == Verdict::Tracking {
+            self.verdict = Verdict::Degraded;
+        }
+    }
+
+    /// Counts an inflation of the covariance.
+    pub(crate) fn record_inflation(&mut self) {
+        self.inflations = self.inflations.saturating_add(1);
+    }
+
+    fn record_uncertainty(&mut self, uncertainty: PoseUncertainty) {
+        self.position_deviation = uncertainty.position;
+        self.heading_deviation = uncertainty.heading;
+    }
+
+    fn count_used(&mut self, nis: f32) {
         self.gated_in_a_row = 0;
         self.silent_in_a_row = 0;
         self.accepted_in_a_row = self.accepted_in_a_row.saturating_add(1);
@@ -252,26 +251,38 @@ impl Health {
         self.nis += LATEST_NIS * (nis - self.nis);
     }
 
-    fn weigh(&mut self, evidence: f32) {
+    fn count_silent(&mut self, limits: &Limits) {
+        self.accepted_in_a_row = 0;
+        self.silent_in_a_row = self.silent_in_a_row.saturating_add(1);
+        self.worsen(limits);
+    }
+
+    // ===== Eq. (23): cumulative sum of the evidence =====
+    fn add_evidence(&mut self, evidence: f32) {
         let sum = self.evidence + evidence;
         let sum = if sum > 0.0 { sum } else { 0.0 };
         self.evidence = if sum < LOST_AT { sum } else { LOST_AT };
     }
 
-    /// Whether, apart from what the ranges contradict, the estimate has no ground to stand on.
-    fn is_groundless(&self, limits: &Limits) -> bool {
+    /// Whether the estimate is beyond a limit that does not depend on contradictions.
+    fn exceeds(&self, limits: &Limits) -> bool {
         self.nis > DEGRADED_NIS
-            || self.rolled_since_fix > limits.stale
-            || self.position_deviation > limits.position
-            || self.heading_deviation > limits.heading
+            || self.rolled_since_fix > limits.distance
+            || self.time_since_fix > DEGRADED_WITHOUT_FIX
+            || self.is_uncertain(limits)
     }
 
-    fn is_better(&self, limits: &Limits) -> bool {
+    fn is_uncertain(&self, limits: &Limits) -> bool {
+        self.position_deviation > limits.position || self.heading_deviation > limits.heading
+    }
+
+    fn can_improve(&self, limits: &Limits) -> bool {
         let agrees = self.evidence < BETTER_BELOW && self.accepted_in_a_row >= BETTER_AFTER;
-        agrees && (self.verdict == Verdict::Lost || !self.is_groundless(limits))
+        let is_confirmable = self.inflations <= MAX_CONFIRMABLE_INFLATIONS;
+        agrees && (self.verdict == Verdict::Lost || (is_confirmable && !self.exceeds(limits)))
     }
 
-    fn rise(&mut self) {
+    fn improve(&mut self) {
         match self.verdict {
             Verdict::Lost => {
                 self.verdict = Verdict::Degraded;
@@ -279,23 +290,25 @@ impl Health {
             }
             Verdict::Degraded => {
                 self.verdict = Verdict::Tracking;
-                self.reopened = 0;
+                self.inflations = 0;
             }
             Verdict::Tracking => {}
         }
     }
 
     fn degrade(&mut self, limits: &Limits) {
-        if self.verdict == Verdict::Tracking && self.is_groundless(limits) {
+        if self.verdict == Verdict::Tracking && self.exceeds(limits) {
             self.verdict = Verdict::Degraded;
         }
     }
 
     fn worsen(&mut self, limits: &Limits) {
-        let blind = self.silent_in_a_row >= DEGRADED_AFTER_SILENT;
-        if self.evidence >= LOST_AT {
+        let is_silent = self.silent_in_a_row >= DEGRADED_AFTER_SILENT;
+        let unused = self.silent_in_a_row.saturating_add(self.gated_in_a_row);
+        let is_blind = unused >= LOST_AFTER_UNUSED && self.is_uncertain(limits);
+        if self.evidence >= LOST_AT || is_blind {
             self.verdict = Verdict::Lost;
-        } else if self.verdict == Verdict::Tracking && (self.evidence >= DEGRADED_AT || blind) {
+        } else if self.verdict == Verdict::Tracking && (self.evidence >= DEGRADED_AT || is_silent) {
             self.verdict = Verdict::Degraded;
         }
         self.degrade(limits);

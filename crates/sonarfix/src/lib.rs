@@ -1,27 +1,37 @@
-//! Tells a small wheeled robot where it is: two wheel encoders, one ultrasonic ranger on a servo,
-//! a map of walls.
+//! Localization of a small wheeled robot: two wheel encoders, one ultrasonic ranger on a servo, a map
+//! of walls.
 //!
-//! `no_std`, no allocation, no panic, no `unsafe`, no clock, no global. The crate is only told
-//! things (wheel travels and ranges, each with its time) and answers with a pose, its covariance,
-//! the robot's own calibration, and the bearing where the sonar should look next.
+//! `no_std`; no allocation, panic, `unsafe`, clock or global. The crate receives wheel travels and
+//! ranges with their times, and returns the pose, its covariance, the calibration of the robot, and the
+//! bearing of the next ping.
 //!
-//! [`localizer::Localizer`] is the way in; its example is a whole fix. The parts, from the bottom:
+//! [`localizer::Localizer`] is the entry point. The modules, from the bottom; each uses only those
+//! above it:
 //!
-//! | module | what it is for |
+//! | module | contents |
 //! |---|---|
-//! | [`units`], [`pose`], [`trig`] | quantities, frames, sine and cosine with the same bits everywhere |
-//! | [`motion`] | how wheel travel moves the pose |
-//! | [`map`], [`range`] | walls, and what the sonar hears from one |
-//! | [`ekf`] | the filter: seven states, predicted and corrected |
-//! | [`aim`] | which wall to look at |
-//! | [`health`] | whether to believe the estimate |
-//! | [`config`] | everything that can be set |
+//! | [`units`], [`trig`], [`pose`] | quantities; sine and cosine with the same bits on every target; frames |
+//! | [`map`] | walls |
+//! | `state`, `estimate` | the seven states: public form and filter coordinates |
+//! | [`motion`], `process_noise` | motion model and its noise, eqs. (4) and (7) to (9) |
+//! | [`range`] | measurement model, eqs. (11) to (13) |
+//! | [`config`] | parameters |
+//! | `covariance` | P: eqs. (5), (6), (10), (14) and (18) to (20) |
+//! | [`ekf`] | the filter, eqs. (4) to (6) |
+//! | `outcome`, `odometry` | outcome of a measurement; plausibility of a travel |
+//! | `visibility` | which walls can be measured |
+//! | `gating` | gate, downweighting and covariance inflation, eqs. (15) to (17) |
+//! | [`health`] | verdict on the estimate, eq. (23) |
+//! | [`aim`] | planner: the wall to measure next, eqs. (21) and (22) |
+//! | [`localizer`] | all of them together |
+//! | [`search`] | global localization without a start pose |
 //!
-//! Equation numbers in the docs are those of `docs/model.md`.
+//! Equation numbers are those of `docs/model.md`; every function that implements one has a banner
+//! `===== Eq. (n)`.
 //!
 //! # Features
 //! - `defmt`: derives `defmt::Format` for the public types.
-//! - `serde`: derives `Serialize` and `Deserialize` for those that a robot is told or tells.
+//! - `serde`: derives `Serialize` and `Deserialize` for inputs and outputs of the localizer.
 
 #![no_std]
 #![forbid(unsafe_code)]
@@ -32,23 +42,34 @@ extern crate std;
 pub mod aim;
 pub mod config;
 mod covariance;
+pub mod echo;
 pub mod ekf;
+mod estimate;
+mod gating;
 pub mod health;
 pub mod localizer;
 pub mod map;
 pub mod motion;
+mod numeric;
+mod odometry;
+mod outcome;
 pub mod pose;
+mod process_noise;
 pub mod range;
+pub mod search;
+pub mod servo;
 mod state;
 pub mod trig;
 pub mod units;
+mod visibility;
 
-/// The parts of the filter's kernel, as [`ekf::Ekf`] uses them: to be counted one by one. Outside
-/// semver.
+/// The parts of the filter as [`ekf::Ekf`] uses them, for benchmarks that count them one by one.
+/// Exempt from semantic versioning.
 #[cfg(feature = "unstable-kernel")]
 #[doc(hidden)]
 pub mod kernel {
-    pub use crate::covariance::{Correction, Covariance, Derivatives, Gain, RangeScale, SixStates};
-    pub use crate::motion::{Noise, Rates, Step};
-    pub use crate::state::{Mean, Remainder};
+    pub use crate::covariance::{Correction, Covariance, RoundingNoise};
+    pub use crate::estimate::FilterEstimate;
+    pub use crate::motion::LinearizedMotion;
+    pub use crate::process_noise::{AccumulatedRandomWalk, NoiseDensities, ProcessNoise};
 }

@@ -1,72 +1,29 @@
-//! The map: walls as straight segments, fixed and known.
+//! The map: known, fixed walls as straight segments.
 //!
-//! A map is either walls in code ([`Map::new`]) or a baked image ([`Map::read`]): one byte slice,
-//! made on a PC by `sonarfix map bake`, read in place from flash and never copied. The image holds an
-//! index, so that what it costs to ask for the walls near a point does not depend on how many others
-//! there are.
+//! A map is either a slice of walls ([`Map::new`]) or a baked image ([`Map::read`]): one byte slice,
+//! written on a PC by `sonarfix map bake` and read in place from flash without a copy. The image contains
+//! an index, so that the cost of finding the walls near a point does not depend on the size of the map.
 //!
 //! # Non-finite policy
-//! A [`Wall`] cannot be made from NaN or infinite coordinates, so a map holds none. Near a point
-//! that is not finite are no walls, or all.
+//! A [`Wall`] cannot be constructed from NaN or infinite coordinates, so a map contains none. A query
+//! near a point that is not finite returns no wall or all walls.
 
 mod grid;
 pub mod image;
 mod wall;
+mod window;
+
+use image::Image;
+use window::Window;
 
 pub use grid::{Cells, Grid};
-use image::{Image, Window};
-pub use wall::{Wall, WallError};
+pub use image::MapError;
+pub use wall::{Wall, WallError, WallId};
 
 use crate::pose::Point;
 use crate::units::Metres;
 
-/// A wall's place in its map.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct WallId(pub u32);
-
-/// Why a baked map was refused.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum MapError {
-    /// The bytes do not start as a baked map does.
-    NotAMap,
-    /// The map was baked for another version of this crate: its format is this one.
-    Version(u32),
-    /// The checksum is wrong: bytes were changed, cut off or added.
-    Checksum,
-    /// The bytes are fewer or more than the header says.
-    Length,
-    /// The header describes no grid.
-    Grid,
-    /// This wall is none, or lies outside the grid.
-    Wall(WallId),
-    /// The index is not that of these walls.
-    Index,
-}
-
-impl core::fmt::Display for MapError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::NotAMap => f.write_str("this is not a baked map"),
-            Self::Version(version) => write!(
-                f,
-                "the map has format {version} and this reads format {}: bake it again",
-                image::VERSION
-            ),
-            Self::Checksum => f.write_str("the map is damaged or cut off: its checksum is wrong"),
-            Self::Length => f.write_str("the map is not as long as its header says"),
-            Self::Grid => f.write_str("the map's header describes no grid"),
-            Self::Wall(WallId(id)) => write!(f, "wall {id} of the map is not a wall of its grid"),
-            Self::Index => f.write_str("the map's index is not that of its walls"),
-        }
-    }
-}
-
-impl core::error::Error for MapError {}
-
-/// The walls of a place; it borrows them, so that they can stay in flash.
+/// The walls of a place. They are borrowed, so that they can stay in flash.
 ///
 /// ```
 /// use sonarfix::map::{Map, Wall, WallId};
@@ -86,20 +43,20 @@ enum Source<'a> {
 }
 
 impl<'a> Map<'a> {
-    /// A map of these walls, without an index: [`Self::near`] gives them all, which suits a room.
-    /// Walls beyond the 2³²-th have no [`WallId`] and are never looked at.
+    /// A map of these walls without an index, which is suitable for a room: [`Self::near`] returns all
+    /// of them. Walls beyond the 2³²-th have no [`WallId`] and are ignored.
     #[must_use]
     pub const fn new(walls: &'a [Wall]) -> Self {
         Self(Source::Walls(walls))
     }
 
-    /// Reads a baked map in place. Every length, number and reference is checked here, once, in a
-    /// time that grows with the map, so that no later lookup can fail: a damaged map is refused.
+    /// Reads a baked map in place.
     ///
-    /// The slice is the whole image and nothing else, at any address.
+    /// Every length, number and reference is checked once, in a time proportional to the size of the map,
+    /// so that no later access can fail. The slice is exactly the image, with any alignment.
     ///
     /// # Errors
-    /// [`MapError`], by the first thing that is wrong.
+    /// [`MapError`], by the first fault.
     ///
     /// # Panics
     /// Never.
@@ -107,7 +64,7 @@ impl<'a> Map<'a> {
         Image::read(image).map(|image| Self(Source::Image(image)))
     }
 
-    /// The number of walls; their ids are those below it.
+    /// The number of walls; ids are smaller than it.
     #[must_use]
     pub fn count(&self) -> u32 {
         match self.0 {
@@ -132,10 +89,10 @@ impl<'a> Map<'a> {
     }
 
     /// Every wall of which a part lies within `reach` of `point` (map frame), each once, with its id.
-    /// It gives others too: those in the same cells of a baked map's grid, or, without an index, all.
     ///
-    /// If a coordinate or the reach is NaN, or the reach negative: no wall, or all of them. If the
-    /// reach is infinite and the point is not: all of them.
+    /// Others may be included: those in the same cells of the grid of a baked map, or, without an index,
+    /// all. If a coordinate or the reach is NaN, or the reach is negative: no wall or all walls. If the
+    /// reach is infinite and the point is not: all walls.
     pub fn near(
         &self,
         point: Point,
@@ -143,11 +100,11 @@ impl<'a> Map<'a> {
     ) -> impl Iterator<Item = (WallId, Wall)> + use<'a> {
         match self.0 {
             Source::Walls(_) => Near::All(self.walls()),
-            Source::Image(image) => Near::Window(image.near(point, reach)),
+            Source::Image(image) => Near::Window(Window::new(image, point, reach)),
         }
     }
 
-    /// The grid of a baked map's index.
+    /// The grid of the index of a baked map.
     #[must_use]
     pub fn grid(&self) -> Option<Grid> {
         match self.0 {

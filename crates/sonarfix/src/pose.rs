@@ -1,18 +1,18 @@
-//! Where things are: points, headings, poses.
+//! Points, headings and poses.
 //!
-//! Two frames. *Map*: fixed, x and y as the map has them, angles counter-clockwise from x.
+//! There are two frames. *Map*: fixed, with the x and y of the map, angles counter-clockwise from x.
 //! *Robot*: x ahead along the heading, y to the left, origin midway between the wheels.
 //!
 //! # Non-finite policy
-//! A NaN or infinite coordinate stays what it is, a heading made from one is NaN;
-//! [`Pose::is_finite`] tells, and whatever takes a pose into the filter asks it.
+//! NaN and infinity propagate; a heading from either is NaN. [`Pose::is_finite`] detects them, and
+//! every function that passes a pose to the filter checks it.
 
 use core::f32::consts::{PI, TAU};
 
 use crate::trig::sin_cos;
 use crate::units::{Metres, Radians};
 
-/// A point, in the map frame unless said otherwise.
+/// A point, in the map frame unless stated otherwise.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -52,8 +52,7 @@ impl Point {
 pub struct Heading(f32);
 
 impl Heading {
-    /// Wraps any finite angle into (−π, π], in constant time whatever its size; NaN and infinity
-    /// give NaN.
+    /// Wraps any finite angle into (−π, π] in constant time; NaN and infinity become NaN.
     #[must_use]
     pub fn new(angle: Radians) -> Self {
         Self(wrap(angle.0))
@@ -94,7 +93,7 @@ fn wrap(angle: f32) -> f32 {
     if angle.abs() < PI {
         return angle;
     }
-    // One turn less, which is exact for an angle of up to two.
+    // Subtracting one turn is exact for an angle of up to two.
     let turned = angle - TAU.copysign(angle);
     if turned.abs() < PI { turned } else { wrap_far(angle) }
 }
@@ -102,11 +101,11 @@ fn wrap(angle: f32) -> f32 {
 #[cold]
 #[inline(never)]
 fn wrap_far(angle: f32) -> f32 {
-    // The direction of many a wall: exactly half a turn.
+    // Exactly half a turn is the direction of many walls.
     if angle.abs() <= PI {
         return PI;
     }
-    // remainderf, unlike repeated subtraction, ends for any angle.
+    // Unlike repeated subtraction, remainderf terminates for any angle.
     let wrapped = libm::remainderf(angle, TAU);
     if wrapped <= -PI { PI } else { wrapped }
 }
@@ -117,7 +116,7 @@ fn wrap_far(angle: f32) -> f32 {
 /// use sonarfix::pose::{Point, Pose};
 /// use sonarfix::units::Radians;
 /// let pose = Pose::new(2.0, 1.0, Radians::from_degrees(90.0));
-/// // A sonar 10 cm ahead of the axle of a robot that looks along y:
+/// // A sonar 10 cm ahead of the axle of a robot that faces along y:
 /// let sonar = pose.to_map(Point::new(0.1, 0.0));
 /// assert!((sonar.x.0 - 2.0).abs() < 1e-6 && (sonar.y.0 - 1.1).abs() < 1e-6);
 /// ```
@@ -129,7 +128,7 @@ pub struct Pose {
     pub x: Metres,
     /// Midpoint between the wheels, along map y.
     pub y: Metres,
-    /// Where the robot looks.
+    /// Direction of the robot.
     pub heading: Heading,
 }
 

@@ -1,31 +1,31 @@
-//! The range measurement model: what the sonar hears from a wall, and how that depends on the
-//! state (`docs/model.md`, eqs. 1 and 10–12).
+//! The measurement model: the range that a sonar measures to a wall, its derivatives and its noise
+//! (`docs/model.md`, eqs. 1 and 11 to 13).
 //!
-//! A wide cone and a smooth wall make the first echo come from the foot of the perpendicular,
-//! whatever the exact aim, so the range is the distance of the sonar from the wall's line.
+//! With a wide cone and a smooth wall the first echo comes from the foot of the perpendicular,
+//! whatever the exact bearing, so the range is the distance of the sonar from the line of the wall.
 //!
 //! # Non-finite policy
-//! The model computes with what it is given; [`Ekf`](crate::ekf::Ekf) refuses a result that is
-//! not finite.
+//! No value is refused here; [`Ekf`](crate::ekf::Ekf) refuses an expected range that is not finite.
 
 use crate::map::Wall;
 use crate::pose::{Heading, Point};
-use crate::state::State;
+use crate::state::StateEstimate;
 use crate::trig::sin_cos;
-use crate::units::{Metres, Radians, SquareMetres};
+use crate::units::{Metres, SquareMetres};
 
-/// Noise of one range, growing with the range: variance σ₀² + (σ₁ d)².
+/// Noise of one range, which grows with the range: variance σ₀² + (σ₁ h)².
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RangeNoise {
-    /// σ₀, standard deviation at no range.
+    /// σ₀, standard deviation at range zero.
     pub floor: Metres,
     /// σ₁, standard deviation per metre of range, dimensionless.
     pub per_metre: f32,
 }
 
 impl RangeNoise {
+    // ===== Eq. (13): R =====
     /// Variance of a range of `range` metres.
     ///
     /// ```
@@ -41,12 +41,12 @@ impl RangeNoise {
     }
 }
 
-/// The range expected from a wall, linearised at a state: `z = range + H (X − X̂)`, where H has
-/// four entries that are not zero.
+/// A range expected from a wall, linearized at an estimate: z ≈ h(X̂) + H (X − X̂). H has four
+/// entries that are not zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ExpectedRange {
-    /// h(X̂): the range that the sonar should report, its scale error included.
+    /// h(X̂): the range that the sonar is expected to report, its scale error included.
     pub range: Metres,
     /// ∂h/∂x, dimensionless.
     pub by_x: f32,
@@ -61,15 +61,15 @@ pub struct ExpectedRange {
 }
 
 impl ExpectedRange {
-    /// What a sonar at `mount` (robot frame) should hear from `wall` if the robot is as `state`
-    /// says.
+    // ===== Eqs. (11) and (12): h(X̂) and H =====
+    /// The range expected from `wall` by a sonar at `mount` (robot frame) at this estimate.
     #[must_use]
-    pub fn new(wall: &Wall, mount: Point, state: &State) -> Self {
-        let (sin, cos) = sin_cos(Radians(state.heading));
-        // The lever arm in map axes, and its derivative by the heading.
+    pub fn new(wall: &Wall, mount: Point, state: &StateEstimate) -> Self {
+        let (sin, cos) = sin_cos(state.heading);
+        // The lever arm in map axes; also its derivative by the heading.
         let lever_x = cos * mount.x.0 - sin * mount.y.0;
         let lever_y = sin * mount.x.0 + cos * mount.y.0;
-        let sonar = Point::new(state.x + lever_x, state.y + lever_y);
+        let sonar = Point::new(state.x.0 + lever_x, state.y.0 + lever_y);
 
         let signed = wall.signed_distance(sonar);
         let side = if signed.0 < 0.0 { -1.0 } else { 1.0 };
@@ -84,5 +84,64 @@ impl ExpectedRange {
             by_range_scale: distance,
             direction: wall.direction_from(signed),
         }
+    }
+
+    /// H.
+    #[inline]
+    pub(crate) fn jacobian(&self) -> MeasurementJacobian {
+        MeasurementJacobian {
+            x: self.by_x,
+            y: self.by_y,
+            h: self.by_heading,
+            k: self.by_range_scale,
+        }
+    }
+}
+
+/// H: the entries that are not zero, by the letters of P.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct MeasurementJacobian {
+    pub x: f32,
+    pub y: f32,
+    pub h: f32,
+    pub k: f32,
+}
+
+impl MeasurementJacobian {
+    /// The squares of the entries.
+    pub fn squared(&self) -> Self {
+        Self { x: self.x * self.x, y: self.y * self.y, h: self.h * self.h, k: self.k * self.k }
+    }
+
+    /// The sum of the entries.
+    pub fn sum(&self) -> f32 {
+        self.x + self.y + self.h + self.k
+    }
+}
+
+/// A measured range compared with the expected one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Innovation {
+    /// ν = z − h(X̂).
+    pub value: Metres,
+    /// S = H P Hᵀ + R.
+    pub variance: SquareMetres,
+}
+
+impl Innovation {
+    /// Normalised innovation squared ν²/S, dimensionless: 1 on average if the filter is
+    /// consistent.
+    ///
+    /// ```
+    /// use sonarfix::ekf::Innovation;
+    /// use sonarfix::units::{Metres, SquareMetres};
+    /// let innovation = Innovation { value: Metres(0.02), variance: SquareMetres(0.0001) };
+    /// assert!((innovation.nis() - 4.0).abs() < 1e-5);
+    /// ```
+    #[must_use]
+    pub fn nis(&self) -> f32 {
+        self.value.0 * self.value.0 / self.variance.0
     }
 }

@@ -1,28 +1,28 @@
-//! Sine and cosine in pure `f32`, the same bits on every machine.
+//! Sine and cosine in `f32`, with the same bits on every target.
 //!
-//! `libm::sincosf` computes in `f64`, which a Cortex-M4F does in software: about 2,100
-//! instructions, ten times the filter's prediction. This one reduces the angle to ±π/4 with π/2
-//! split in three parts (Cody and Waite) and evaluates the minimax polynomials of Cephes
+//! `libm::sincosf` computes in `f64`, which a Cortex-M4F emulates in software: about 2,100
+//! instructions, several times a prediction of the filter. This implementation reduces the angle to
+//! ±π/4 with π/2 split in three parts (Cody and Waite), and evaluates the minimax polynomials of Cephes
 //! (`sinf.c`, S. L. Moshier).
 //!
 //! # Non-finite policy
-//! NaN and infinity give NaN for both.
+//! Sine and cosine of NaN and of infinity are NaN.
 
 use crate::units::Radians;
 
-/// The largest |angle| for which the error bound holds; a wrapped heading plus a bearing stays far
-/// below. An angle beyond it is wrapped first, with 2π as an `f32`. That 2π is off by 2.8e-8 of
-/// itself, less than the angle by its own rounding (6e-8), so the result is a true direction, only
-/// as uncertain as so large an angle is.
+/// Largest |angle| for which the error bound holds; a wrapped heading plus a bearing is far below it.
+///
+/// A larger angle is wrapped first, with 2π as an `f32`. The relative error of that 2π is 2.8e-8, less
+/// than the rounding error of the angle (6e-8), so the wrapping adds no significant error.
 pub const RANGE: Radians = Radians(100.0);
 
-/// π/2 in three parts. The first two have at most 11 significant bits, so that their products
-/// with a quadrant number are exact.
+/// π/2 in three parts. The first two have at most 11 significant bits, so that their products with a
+/// quadrant number are exact.
 const HALF_PI_HIGH: f32 = 1.570_312_5;
 const HALF_PI_MIDDLE: f32 = 4.837_513e-4;
 const HALF_PI_LOW: f32 = 7.549_79e-8;
 
-/// 1.5·2²³: a float of this size has a last place of 1.
+/// 1.5·2²³: the spacing of `f32` at this value is 1.
 const SHIFT: f32 = 12_582_912.0;
 
 /// Sine and cosine of an angle, within 1e-7 of the true values for |angle| ≤ [`RANGE`]
@@ -52,7 +52,7 @@ fn of_a_huge_angle(x: f32) -> (f32, f32) {
 /// Sine and cosine of |x| ≤ [`RANGE`].
 #[inline]
 pub(crate) fn sin_cos_within(x: f32) -> (f32, f32) {
-    // Rounds to the nearest integer, which then is in the lowest bits.
+    // Rounds to the nearest integer, which is then in the lowest bits.
     let shifted = x * core::f32::consts::FRAC_2_PI + SHIFT;
     let quadrant = shifted.to_bits();
     let q = shifted - SHIFT;

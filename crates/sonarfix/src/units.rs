@@ -1,20 +1,29 @@
-//! Quantities with their units, so that a bare `f32` is always a dimensionless number.
+//! Quantities with their units. A bare `f32` in the interface is dimensionless.
 //!
-//! The types are thin: the field is public, because a length may be any number, and the checks
-//! are made where a length begins to mean something (a range, a wall, a travel).
+//! The fields are public: any number is a length. Checks are made where a length gets a meaning (a
+//! range, a wall, a travel).
 //!
 //! # Non-finite policy
-//! Arithmetic passes NaN and infinity on. Nothing here refuses them; every entry of the crate
-//! that changes state does.
+//! Arithmetic propagates NaN and infinity. No value is refused here; every function of the crate that
+//! changes state refuses them.
 
 use core::ops::{Add, Mul, Neg, Sub};
 
-/// Time since the robot was switched on, in microseconds. The core never reads a clock: every
-/// call that needs the time is told it.
+/// Time since the robot was switched on, in microseconds. The core never reads a clock: the time is an
+/// argument of every function that needs it.
 pub type Instant = fugit::Instant<u64, 1, 1_000_000>;
 
-/// A span of time, in microseconds.
+/// A duration in microseconds.
 pub type Duration = fugit::Duration<u64, 1, 1_000_000>;
+
+/// A duration in seconds.
+#[expect(
+    clippy::cast_precision_loss,
+    reason = "durations are a small part of an hour, where microseconds are negligible"
+)]
+pub(crate) fn seconds(duration: Duration) -> f32 {
+    duration.to_micros() as f32 * 1e-6
+}
 
 macro_rules! quantity {
     ($(#[$doc:meta])* $name:ident) => {
@@ -25,7 +34,7 @@ macro_rules! quantity {
         pub struct $name(pub f32);
 
         impl $name {
-            /// Whether the value is a number and not infinite.
+            /// Whether the value is neither NaN nor infinite.
             #[must_use]
             pub fn is_finite(self) -> bool {
                 self.0.is_finite()
@@ -111,12 +120,18 @@ impl Radians {
     pub fn from_degrees(degrees: f32) -> Self {
         Self(degrees.to_radians())
     }
+
+    /// The angle in degrees.
+    #[must_use]
+    pub fn to_degrees(self) -> f32 {
+        self.0.to_degrees()
+    }
 }
 
-/// The strength of a random walk along the way: the standard deviation that one metre of travel
-/// adds. It grows with the square root of the distance, so a parked robot keeps its certainty.
+/// Density of a random walk over distance: the standard deviation after one metre of travel. It grows
+/// with the square root of the distance, so the uncertainty of a parked robot does not grow.
 ///
-/// `PerRootMetre(Metres(0.0005))` reads "0.5 mm/√m".
+/// `PerRootMetre(Metres(0.0005))` is 0.5 mm/√m.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

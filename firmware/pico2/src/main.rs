@@ -1,7 +1,7 @@
 //! The second board: a Raspberry Pi Pico 2 with two encoders, a servo, a pulse-width sonar and a
 //! UART.
 //!
-//! This file is the board; the robot on it is in `sonarfix-robot`, what it does in `sonarfix-app`.
+//! This file is the board. The robot is described by the baked configuration, and its behaviour is in `sonarfix-app`.
 //! The wiring is a table in `docs/firmware.md`.
 //!
 //! | | for | pins |
@@ -9,12 +9,12 @@
 //! | PIO0 | right and left encoder, a state machine each | GP2 GP3, GP4 GP5 |
 //! | PIO1 | the stamps of the echo's edges, 1 µs | GP8 |
 //! | PWM slice 3, channel A | the servo's pulses | GP6 |
-//! | TIMER0 | the clock, 1 µs, and a turn of the loop every millisecond | |
+//! | TIMER0 | the clock, 1 µs, and a poll every millisecond | |
 //! | UART0 | the link, 115,200 baud | GP0 GP1 |
 //! | | the sonar's trigger; high while the robot may drive | GP7; GP9 |
 //!
-//! Nothing here is in a hurry: however long a turn of the loop takes, or the flash, state machines
-//! count the wheels and stamp the edges. So there is one executor, and no interrupt but the clock's.
+//! State machines count the wheels and stamp the edges, however long a poll or a write to flash takes. One executor is
+//! therefore sufficient, and no interrupt but that of the clock.
 
 #![no_std]
 #![no_main]
@@ -34,36 +34,36 @@ use embassy_rp::pwm::{self, Pwm};
 use embassy_rp::uart::{self, Uart};
 use embassy_rp::watchdog::{ResetReason, Watchdog};
 use embassy_rp::{Peri, bind_interrupts, pac};
-use embassy_time::{Duration, Ticker};
+use embassy_time::{Duration, Timer};
 use embedded_hal_02::serial::{Read, Write};
 use heapless::Deque;
 use panic_probe as _;
 use pio::pio_file;
 use sonarfix::units::Instant;
 use sonarfix_app::store::Store;
-use sonarfix_app::{App, Flashed, Link, log};
+use sonarfix_app::{App, FlashContents, Link, boots, log};
 use sonarfix_hal::encoder::Counter;
 use sonarfix_hal::ranger::{Captured, EchoCapture, PulseRanger, StampedEdges, Stamps};
 use sonarfix_hal::robot::Devices;
-use sonarfix_link::message::Reset;
+use sonarfix_link::message::ResetCause;
 use sonarfix_robot::memory;
 
-/// A turn of the loop.
-const TURN: Duration = Duration::from_millis(1);
-/// Longer than the erasing of a sector (at most 0.4 s), which keeps the loop from its deadlines.
+/// The poll period.
+const POLL: Duration = Duration::from_millis(1);
+/// Longer than the erasure of a sector (at most 0.4 s), which delays the loop.
 const WATCHDOG: Duration = Duration::from_secs(2);
 
 /// Number of the pin that is high while the robot may drive.
 const DRIVE: u32 = 9;
 
-/// Where the flash lies in memory, and how large it is.
+/// Address and size of the flash.
 const FLASH_BASE: u32 = 0x1000_0000;
 const FLASH_SIZE: usize = 4 * 1024 * 1024;
 
 type Hardware =
     Devices<Encoder<0>, Encoder<1>, Pwm<'static>, PulseRanger<Output<'static>, Captured<'static>>>;
 
-/// Where [`Stamper`] leaves the edges.
+/// The edges of the echo, from [`Stamper`].
 static ECHO: EchoCapture = EchoCapture::new();
 
 bind_interrupts!(struct Interrupts {
@@ -80,8 +80,8 @@ fn now() -> Instant {
 struct Encoder<const SM: usize>(StateMachine<'static, PIO0, SM>);
 
 impl<const SM: usize> Encoder<SM> {
-    // In one function with others its calls of embassy's panics would be merged with theirs, and
-    // belong to no line (`cargo xtask test-firmware` asks for each).
+    // Inlined, its calls of embassy's panics would be merged with others and belong to no line, which
+    // `cargo xtask test-firmware` checks.
     #[inline(never)]
     fn new(
         mut machine: StateMachine<'static, PIO0, SM>,
@@ -135,10 +135,10 @@ impl Stamper {
         Self { machine, edges }
     }
 
-    /// Tells [`ECHO`] the newest edges.
-    fn tell(&mut self, now: Instant) {
+    /// Passes the newest edges to [`ECHO`].
+    fn update(&mut self, now: Instant) {
         let stamps = stamps(&mut self.machine);
-        self.edges.tell(&ECHO, now, self.machine.get_rxf_entry(0), stamps);
+        self.edges.update(&ECHO, now, self.machine.get_rxf_entry(0), stamps);
     }
 }
 
@@ -146,13 +146,13 @@ fn stamps(machine: &mut StateMachine<'static, PIO1, 0>) -> Stamps {
     Stamps { rise: machine.get_rxf_entry(1), fall: machine.get_rxf_entry(2) }
 }
 
-/// What divides the system's clock down to this many Hz.
+/// The divider of the system clock for this frequency in Hz.
 fn clock_divider(frequency: u32) -> u8 {
     u8::try_from(embassy_rp::clocks::clk_sys_freq() / frequency).unwrap_or(u8::MAX)
 }
 
-/// The servo's pulses: half a microsecond's resolution, every 20 ms. That the driver is told 39,999
-/// counts for the 40,000 of a frame is less than a count of any pulse.
+/// The servo's pulses: a resolution of half a microsecond, every 20 ms. The driver reports 39,999 counts for the 40,000
+/// of a frame, which is an error of less than one count of any pulse.
 fn servo_pulses() -> pwm::Config {
     let mut config = pwm::Config::default();
     config.divider = clock_divider(2_000_000).into();
@@ -160,16 +160,15 @@ fn servo_pulses() -> pwm::Config {
     config
 }
 
-/// The link. The UART's queues of 32 bytes last 2.8 ms, and the loop comes by every millisecond:
-/// no interrupt is needed.
+/// The link. The UART's FIFOs of 32 bytes last 2.8 ms, and the loop polls every millisecond: no interrupt is needed.
 struct Serial {
     uart: Uart<'static, uart::Blocking>,
-    /// What goes out at one turn is 400 bytes.
+    /// A poll sends at most 400 bytes.
     to_send: Deque<u8, 512>,
 }
 
 impl Serial {
-    /// Hands the UART what it has room for.
+    /// Writes as many bytes as the UART accepts.
     fn transmit(&mut self) {
         while let Some(byte) = self.to_send.front()
             && self.uart.write(*byte).is_ok()
@@ -185,7 +184,7 @@ impl Link for Serial {
             match self.uart.read() {
                 Ok(byte) => return Some(byte),
                 Err(nb::Error::WouldBlock) => return None,
-                // A byte that came damaged is gone; its frame's checksum will tell.
+                // A damaged byte is discarded; the checksum of its frame detects it.
                 Err(nb::Error::Other(_)) => {}
             }
         }
@@ -198,8 +197,7 @@ impl Link for Serial {
     }
 }
 
-/// The end of the program, by a panic or another fault. Until the watchdog restarts it, nothing
-/// steers, so the robot must not drive.
+/// The end of the program by a panic or another fault. The motors are disabled until the watchdog restarts it.
 #[cortex_m_rt::exception(trampoline = false)]
 #[expect(unsafe_code, reason = "the vector table calls it; it does nothing that is unsafe")]
 unsafe fn HardFault() -> ! {
@@ -209,20 +207,20 @@ unsafe fn HardFault() -> ! {
     }
 }
 
-/// Why the chip was reset.
-fn reset(watchdog: &Watchdog) -> Reset {
+/// The cause of the reset.
+fn reset(watchdog: &Watchdog) -> ResetCause {
     let chip = pac::POWMAN.chip_reset().read();
     match watchdog.reset_reason() {
-        Some(ResetReason::TimedOut) => Reset::Watchdog,
-        Some(ResetReason::Forced) => Reset::Software,
-        None if chip.had_por() => Reset::PowerOn,
-        None if chip.had_bor() => Reset::BrownOut,
-        None if chip.had_run_low() => Reset::Pin,
-        None => Reset::Unknown,
+        Some(ResetReason::TimedOut) => ResetCause::Watchdog,
+        Some(ResetReason::Forced) => ResetCause::Software,
+        None if chip.had_por() => ResetCause::PowerOn,
+        None if chip.had_bor() => ResetCause::BrownOut,
+        None if chip.had_run_low() => ResetCause::Pin,
+        None => ResetCause::Unknown,
     }
 }
 
-/// What the loop turns.
+/// The state of the loop.
 struct Board {
     app: App<'static, Flash<'static, FLASH, flash::Blocking, FLASH_SIZE>>,
     hardware: Hardware,
@@ -230,18 +228,19 @@ struct Board {
     link: Serial,
     drive: Output<'static>,
     watchdog: Watchdog,
-    turns: Ticker,
+    next_poll: embassy_time::Instant,
 }
 
 impl Board {
-    /// The board with everything started; `None` if the constants of `sonarfix-robot` contradict
-    /// each other.
-    // Its frame would stay below the loop's for ever.
+    /// Initializes the board; `None` if the memory map has no store.
+    // Inlined, its stack frame would remain for the whole runtime.
     #[inline(never)]
     fn new() -> Option<Self> {
         let board = embassy_rp::init(embassy_rp::config::Config::default());
         let mut watchdog = Watchdog::new(board.WATCHDOG);
         let reset = reset(&watchdog);
+        let resets = boots::resets(watchdog.get_scratch(0));
+        watchdog.set_scratch(0, boots::register(resets.saturating_add(1)));
         let Pio { common: mut pio, sm0, sm1, .. } = Pio::new(board.PIO0, Interrupts);
         let program = pio.load_program(&pio_file!("src/quadrature.pio").program);
         let right = Encoder::new(sm0, &mut pio, &program, board.PIN_2, board.PIN_3);
@@ -249,14 +248,14 @@ impl Board {
         let stamper = Stamper::new(board.PIO1, board.PIN_8);
         let pulses = Pwm::new_output_a(board.PWM_SLICE3, board.PIN_6, servo_pulses());
         let trigger = Output::new(board.PIN_7, Level::Low);
-        let servo = sonarfix_robot::servo(pulses)?;
-        let ranger = sonarfix_robot::sonar(trigger, &ECHO);
+        let servo = sonarfix_robot::servo(pulses);
+        let ranger = sonarfix_robot::ranger(trigger, &ECHO);
 
-        let flashed = Flashed::read(memory::map(), memory::config());
-        log::flashed(&flashed);
+        let flash = FlashContents::read(memory::map(), memory::config());
+        log::flash_contents(&flash);
         let store = Store::new(Flash::new_blocking(board.FLASH), memory::store(FLASH_BASE)).ok()?;
-        let app = App::new(sonarfix_robot::body(reset)?, flashed, store, now()).ok()?;
-        // Its default is 115,200 baud, 8N1.
+        let app = App::new(sonarfix_robot::board(reset, resets), flash, store, now());
+        // The default is 115,200 baud, 8N1.
         let uart = uart::Config::default();
         let uart = Uart::new_blocking(board.UART0, board.PIN_0, board.PIN_1, uart);
         watchdog.start(WATCHDOG);
@@ -267,18 +266,21 @@ impl Board {
             link: Serial { uart, to_send: Deque::new() },
             drive: Output::new(board.PIN_9, Level::Low),
             watchdog,
-            turns: Ticker::every(TURN),
+            next_poll: embassy_time::Instant::now(),
         })
     }
 
-    /// A turn of the loop.
-    fn turn(&mut self) {
+    /// One poll.
+    fn poll(&mut self) {
         let start = now();
-        self.stamper.tell(start);
+        self.stamper.update(start);
         let polled = self.app.poll(start, &mut self.hardware, &mut self.link);
-        self.drive.set_level(polled.is_running.into());
+        self.drive.set_level(polled.may_drive.into());
         if polled.is_on_time {
             self.watchdog.feed(WATCHDOG);
+        }
+        if polled.is_settled {
+            self.watchdog.set_scratch(0, boots::register(0));
         }
         self.link.transmit();
         log::polled(&polled, self.app.report());
@@ -288,12 +290,14 @@ impl Board {
     }
 }
 
-/// A turn of the loop every millisecond.
+/// Polls every millisecond.
 #[embassy_executor::task]
-async fn turns(mut board: Board) -> ! {
+async fn polls(mut board: Board) -> ! {
     loop {
-        board.turns.next().await;
-        board.turn();
+        // `Ticker` panics when its sum overflows; this sum cannot, and has no panic to link.
+        board.next_poll = board.next_poll.saturating_add(POLL);
+        Timer::at(board.next_poll).await;
+        board.poll();
     }
 }
 
@@ -301,10 +305,10 @@ async fn turns(mut board: Board) -> ! {
 fn main() -> ! {
     static mut EXECUTOR: Option<Executor> = None;
     EXECUTOR.get_or_insert_with(Executor::new).run(|spawner| {
-        if let Some(Ok(turns)) = Board::new().map(turns) {
-            spawner.spawn(turns);
+        if let Some(Ok(polls)) = Board::new().map(polls) {
+            spawner.spawn(polls);
         } else {
-            defmt::error!("the constants of `sonarfix-robot` are no robot");
+            defmt::error!("the memory map has no store");
         }
     })
 }

@@ -1,50 +1,45 @@
-//! The robot that the boards here are built into, and the regions of flash that they all have.
+//! The common part of the boards: the drivers on a board's pins, and the regions of flash.
 //!
-//! Measure yours: wheels, servo and sonar are the functions below. What the configuration holds is
-//! not here.
+//! It contains no parameter of a robot: wheels, servo, ranger and loop are configured by the baked configuration
+//! ([`RobotConfig`](sonarfix_hal::config::RobotConfig)). It contains the capabilities of the boards: a servo at 50 Hz,
+//! and a ranger with a trigger and an echo pin.
 
 #![no_std]
 
 pub mod memory;
 
 use embedded_hal::digital::OutputPin;
-use embedded_hal::pwm::SetDutyCycle;
-use sonarfix::units::{Duration, Metres, Radians};
-use sonarfix_app::Body;
-use sonarfix_hal::encoder::{WheelGeometry, Wheels};
-use sonarfix_hal::ranger::{Air, Captured, EchoCapture, PulseRanger, PulseTiming};
-use sonarfix_hal::robot::Settings;
-use sonarfix_hal::servo::{Calibration, MeasuredPulse, Pace, Servo};
-use sonarfix_link::message::Reset;
+use sonarfix::units::Duration;
+use sonarfix_app::Board;
+use sonarfix_hal::ranger::{Captured, EchoCapture, PulseRanger};
+use sonarfix_hal::servo::{PwmFrame, Servo};
+use sonarfix_link::message::ResetCause;
 
-/// The wheels: 65 mm on gear motors with 11 lines. The left one's encoder is mounted as a mirror
-/// image. `None` if the constants are no wheel.
+/// The pulses of the boards' servo channels: 50 Hz, and the widths that hobby servos accept without running against
+/// their stops (0.5 to 2.5 ms by their datasheets).
+pub const SERVO_FRAME: PwmFrame = PwmFrame {
+    period: Duration::from_ticks(20_000),
+    shortest: Duration::from_ticks(450),
+    longest: Duration::from_ticks(2_550),
+};
+
+/// Firmware version, reset cause, and the number of resets in a row.
 #[must_use]
-pub fn body(reset: Reset) -> Option<Body> {
-    // 11 lines × 4 edges × 34.014 turns of the motor.
-    let wheel = WheelGeometry::new(Metres(0.065), 1_496.6).ok()?;
-    let wheels = Wheels { right: wheel, left: wheel.reversed() };
-    Some(Body { wheels, settings: Settings::default(), firmware: version(), reset })
+pub fn board(reset: ResetCause, resets: u8) -> Board {
+    Board { firmware: version(), reset, resets }
 }
 
-/// The servo, an SG90: two pulses that were tried on the bench, and how far it may turn. `None` if
-/// the constants are no servo.
-pub fn servo<P: SetDutyCycle>(pwm: P) -> Option<Servo<P>> {
-    let tried = |width, degrees| MeasuredPulse {
-        width: Duration::from_ticks(width),
-        bearing: Radians::from_degrees(degrees),
-    };
-    let calibration = Calibration::new(tried(1_000, -45.0), tried(2_000, 45.0)).ok()?;
-    let limits = (Radians::from_degrees(-90.0), Radians::from_degrees(90.0));
-    Servo::new(pwm, calibration, limits, Pace::SG90).ok()
+/// The servo's driver.
+pub const fn servo<P>(pwm: P) -> Servo<P> {
+    Servo::new(pwm, SERVO_FRAME)
 }
 
-/// The sonar, an HC-SR04.
-pub fn sonar<T: OutputPin>(
+/// The driver of a ranger with a trigger and an echo pin.
+pub fn ranger<T: OutputPin>(
     trigger: T,
     echo: &'static EchoCapture,
 ) -> PulseRanger<T, Captured<'static>> {
-    PulseRanger::new(trigger, Captured::new(echo), PulseTiming::HC_SR04, Air::ROOM)
+    PulseRanger::new(trigger, Captured::new(echo))
 }
 
 fn version() -> [u8; 3] {

@@ -1,4 +1,4 @@
-//! The regions of flash beside the program, as a board's `memory.x` names them.
+//! The regions of flash beside the program, defined by the board's `memory.x`.
 #![expect(unsafe_code, reason = "memory that the linker script names and Rust does not know")]
 
 use core::ops::Range;
@@ -15,7 +15,7 @@ unsafe extern "C" {
 /// The baked map's region.
 #[must_use]
 pub fn map() -> &'static [u8] {
-    // SAFETY: a region of flash of this length, where nothing is linked to and nothing written.
+    // SAFETY: a region of flash of this length, which contains no linked section and is never written.
     unsafe { core::slice::from_raw_parts(&raw const __map_start, (&raw const __map_length).addr()) }
 }
 
@@ -28,7 +28,7 @@ pub fn config() -> &'static [u8] {
     }
 }
 
-/// The store's region, in addresses from the flash's start on, which is at `base`.
+/// The store's region, in addresses relative to the start of the flash at `base`.
 #[must_use]
 pub fn store(base: u32) -> Range<u32> {
     let number = |address: usize| u32::try_from(address).unwrap_or(u32::MAX);

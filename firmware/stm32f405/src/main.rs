@@ -1,21 +1,20 @@
 //! The reference board: an STM32F405 with two encoders, a servo, a pulse-width sonar and a UART.
 //!
-//! This file is the board; the robot on it is in `sonarfix-robot`, what it does in `sonarfix-app`.
-//! The wiring is drawn in the README.
+//! This file is the board. The robot is described by the baked configuration, and its behaviour is in `sonarfix-app`.
+//! The wiring diagram is in the README.
 //!
 //! | | for | pins |
 //! |---|---|---|
 //! | TIM1, TIM8 | right and left encoder, counted by hardware | PA8 PA9, PC6 PC7 |
 //! | TIM10 | the servo's pulses | PB8 |
 //! | TIM5 | the clock, 1 µs in 32 bits, and the stamps of the echo's edges | PA0 |
-//! | TIM2 | a turn of the loop every millisecond | |
+//! | TIM2 | a poll every millisecond | |
 //! | USART2 | the link, 115,200 baud | PA2 PA3 |
 //! | | the sonar's trigger; high while the robot may drive | PA1; PB7 |
 //!
-//! RTIC gives each interrupt the peripherals and queues that it uses and nothing else has: only
-//! lock-free queues and the echo's stamps are shared, no lock is taken, and no interrupt waits for
-//! another. The loop is RTIC's idle task: however long it takes, edges are stamped by hardware and
-//! bytes taken by interrupt.
+//! RTIC gives each interrupt exclusive access to its peripherals and queues. Only lock-free queues and the stamps of the
+//! echo are shared, so that no interrupt waits for another. The loop is RTIC's idle task: however long it takes,
+//! hardware stamps the edges, and an interrupt receives the bytes.
 
 #![no_std]
 #![no_main]
@@ -36,11 +35,11 @@ use sonarfix_robot::memory;
 use stm32f4xx_hal::pac::{self, tim1};
 use stm32f4xx_hal::rcc;
 
-/// Where TIM5's interrupt leaves the edges of the echo.
+/// The edges of the echo, from TIM5's interrupt.
 static ECHO: EchoCapture = EchoCapture::new();
 
-/// The clocks: the internal oscillator at 16 MHz, which is exact to 1 %, and so are the ranges'
-/// times; the filter's range scale finds that. With a crystal of 8 MHz: 48 MHz.
+/// The clocks: the internal oscillator at 16 MHz with an error of 1 %, which scales all ranges and is estimated as the
+/// filter's range scale. With a crystal of 8 MHz: 48 MHz.
 fn clocks() -> rcc::Config {
     if cfg!(feature = "crystal") {
         rcc::Config::hse(fugit::HertzU32::MHz(8)).sysclk(fugit::HertzU32::MHz(48))
@@ -49,17 +48,16 @@ fn clocks() -> rcc::Config {
     }
 }
 
-/// What divides a timer's clock down to microseconds.
+/// The prescaler of a timer for microseconds.
 fn microseconds(timer: fugit::HertzU32) -> u16 {
     u16::try_from(timer.to_MHz()).unwrap_or(u16::MAX).saturating_sub(1)
 }
 
-/// Something of the chip that does not hold what was written to it: it has no clock, or an
-/// emulator does not have it.
+/// A peripheral that does not retain what was written to it: it has no clock, or is not emulated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct NotThere;
 
-/// A timer of the kind of TIM1 as a quadrature counter: every edge of both channels.
+/// An advanced timer as a quadrature counter of every edge of both channels.
 struct Encoder<T>(T);
 
 impl<T: Deref<Target = tim1::RegisterBlock>> Encoder<T> {
@@ -124,13 +122,13 @@ impl SetDutyCycle for ServoPwm {
     }
 }
 
-/// The link: what the loop has of it.
+/// The loop's side of the link.
 struct Uart {
     received: Consumer<'static, u8>,
     to_send: Producer<'static, u8>,
 }
 
-/// What came in between two turns of the loop is 12 bytes; what goes out at one is 400.
+/// Between two polls at most 12 bytes arrive; a poll sends at most 400.
 type Received = Queue<u8, 64>;
 type ToSend = Queue<u8, 512>;
 
@@ -140,13 +138,13 @@ impl Link for Uart {
     }
 
     fn send(&mut self, frame: &[u8]) {
-        // A queue has places; unless told, the compiler guards its divisions with a panic.
+        // Without this bound the compiler would guard the divisions by the capacity with a panic.
         let Some(places) = self.to_send.capacity().checked_add(1) else { return };
         if places - self.to_send.len() <= frame.len() {
             return;
         }
         for byte in frame {
-            // There is room.
+            // There is room for the frame.
             let _ = self.to_send.enqueue(*byte);
         }
         rtic::pend(pac::Interrupt::USART2);
@@ -156,7 +154,7 @@ impl Link for Uart {
 /// Sectors 2 and 3 of the flash, 16 KiB each, in addresses from the flash's start on.
 struct Sectors(pac::FLASH);
 
-/// The flash's controller refused.
+/// An error of the flash controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct FlashError;
 
@@ -174,32 +172,54 @@ impl Sectors {
     const BASE: u32 = 0x0800_0000;
     const SECTOR: u32 = 16 * 1024;
 
-    /// Lets a command write, and locks the controller again.
+    /// Unlocks the controller for a command, and locks it again. Errors of an earlier command would
+    /// count as its own.
     fn unlocked(
         &mut self,
         work: impl FnOnce(&mut pac::FLASH) -> Result<(), FlashError>,
     ) -> Result<(), FlashError> {
-        // A controller that is not locked after reset is none.
+        // A controller that is not locked after reset is not there.
         if self.0.cr().read().lock().bit_is_clear() {
             return Err(FlashError);
         }
         for key in [0x4567_0123, 0xCDEF_89AB] {
             self.0.keyr().write(|w| w.key().set(key));
         }
+        Self::clear_errors(&self.0);
         let done = work(&mut self.0);
         self.0.cr().write(|w| w.lock().set_bit());
         done
     }
 
-    /// Waits for the flash, during which the core stands still: it runs from there.
+    /// Clears the flags of errors, each of which is cleared by writing 1.
+    fn clear_errors(flash: &pac::FLASH) {
+        flash.sr().write(|w| {
+            w.pgserr().clear_bit_by_one().pgperr().clear_bit_by_one();
+            w.pgaerr().clear_bit_by_one().wrperr().clear_bit_by_one();
+            w.operr().clear_bit_by_one().eop().clear_bit_by_one()
+        });
+    }
+
+    /// Waits for the flash. The core, which runs from it, is stalled meanwhile.
     fn finish(flash: &pac::FLASH) -> Result<(), FlashError> {
         while flash.sr().read().bsy().bit_is_set() {}
         let status = flash.sr().read();
         let failed = status.pgserr().bit_is_set()
             || status.pgperr().bit_is_set()
             || status.pgaerr().bit_is_set()
-            || status.wrperr().bit_is_set();
+            || status.wrperr().bit_is_set()
+            || status.operr().bit_is_set();
         if failed { Err(FlashError) } else { Ok(()) }
+    }
+
+    /// Empties the data cache, which the HAL enables: it may hold lines of an erased sector (RM0090,
+    /// 3.5.4). It can only be reset while it is off. A write updates it.
+    fn flush_data_cache(flash: &pac::FLASH) {
+        let was_enabled = flash.acr().read().dcen().bit_is_set();
+        flash.acr().modify(|_, w| w.dcen().clear_bit());
+        flash.acr().modify(|_, w| w.dcrst().set_bit());
+        flash.acr().modify(|_, w| w.dcrst().clear_bit());
+        flash.acr().modify(|_, w| w.dcen().bit(was_enabled));
     }
 }
 
@@ -228,7 +248,9 @@ impl NorFlash for Sectors {
             self.unlocked(|flash| {
                 sectors::select(flash, number);
                 flash.cr().modify(|_, w| w.strt().set_bit());
-                Self::finish(flash)
+                let done = Self::finish(flash);
+                Self::flush_data_cache(flash);
+                done
             })?;
         }
         Ok(())
@@ -258,7 +280,7 @@ mod sectors {
         unsafe { core::ptr::with_exposed_provenance::<u8>(address as usize).read_volatile() }
     }
 
-    /// Tells the flash's controller which sector to erase.
+    /// Selects the sector to erase.
     pub fn select(controller: &mut pac::FLASH, sector: u8) {
         // SAFETY: `Store` keeps to its region, whose sectors hold neither code nor constants.
         controller
@@ -266,7 +288,7 @@ mod sectors {
             .write(|w| unsafe { w.psize().psize32().ser().set_bit().snb().bits(sector) });
     }
 
-    /// Writes a word of the store; the controller, which whoever calls this has, is ready for it.
+    /// Writes a word of the store. The caller has unlocked the controller.
     pub fn write(_controller: &mut pac::FLASH, address: u32, word: u32) {
         // SAFETY: `Store` keeps to the region, in whole words; no reference to it exists.
         unsafe {
@@ -275,12 +297,11 @@ mod sectors {
     }
 }
 
-/// The end of the program, by a panic or another fault. Until the watchdog restarts it, nothing
-/// steers, so the robot must not drive.
+/// The end of the program by a panic or another fault. The motors are disabled until the watchdog restarts it.
 #[cortex_m_rt::exception(trampoline = false)]
-#[expect(unsafe_code, reason = "nobody else is left to hand over the port")]
+#[expect(unsafe_code, reason = "after a fault the port has no owner")]
 unsafe fn HardFault() -> ! {
-    // SAFETY: nothing else runs any more.
+    // SAFETY: no other code runs after a fault.
     let port = unsafe { &*pac::GPIOB::ptr() };
     port.bsrr().write(|w| w.br7().set_bit());
     loop {
@@ -293,14 +314,14 @@ mod app {
     use heapless::spsc::{Consumer, Producer};
     use sonarfix::units::Instant;
     use sonarfix_app::store::Store;
-    use sonarfix_app::{App, Flashed, log};
+    use sonarfix_app::{App, FlashContents, boots, log};
     use sonarfix_hal::ranger::{Captured, PulseRanger};
     use sonarfix_hal::robot::Devices;
-    use sonarfix_link::message::Reset;
+    use sonarfix_link::message::ResetCause;
     use sonarfix_robot::memory;
     use stm32f4xx_hal::gpio::{GpioExt, Output, Pin};
     use stm32f4xx_hal::hal_02::serial::{Read, Write};
-    use stm32f4xx_hal::pac::{self, TIM1, TIM2, TIM5, TIM8, TIM10, USART2};
+    use stm32f4xx_hal::pac::{self, PWR, RTC, TIM1, TIM2, TIM5, TIM8, TIM10, USART2};
     use stm32f4xx_hal::rcc::{Enable, RccExt};
     use stm32f4xx_hal::serial::{self, Rx, RxListen, SerialExt, Tx, TxISR, TxListen};
     use stm32f4xx_hal::time::Bps;
@@ -308,10 +329,9 @@ mod app {
 
     use super::{ECHO, Encoder, Received, Sectors, ServoPwm, ToSend, Uart, microseconds};
 
-    /// A turn of the loop, µs.
-    const TURN: u32 = 1_000;
-    /// Longer than the erasing of a sector (at most 0.5 s), which keeps the loop from its
-    /// deadlines.
+    /// The poll period, µs.
+    const POLL: u32 = 1_000;
+    /// Longer than the erasure of a sector (at most 0.5 s), which delays the loop.
     const WATCHDOG: fugit::MillisDurationU32 = fugit::MillisDurationU32::from_ticks(2_000);
 
     type Hardware = Devices<
@@ -333,18 +353,19 @@ mod app {
         link: Uart,
         drive: Pin<'B', 7, Output>,
         watchdog: IndependentWatchdog,
-        turn: TIM2,
+        backup: RTC,
+        poll_timer: TIM2,
         rx: (Rx<USART2>, Producer<'static, u8>),
         tx: (Tx<USART2>, Consumer<'static, u8>),
     }
 
     #[init(local = [received: Received = Received::new(), to_send: ToSend = ToSend::new()])]
-    // Its frame would stay below the loop's for ever.
+    // Inlined, its stack frame would remain for the whole runtime.
     #[inline(never)]
     fn init(context: init::Context) -> (Shared, Local) {
         let board = context.device;
         let reset = reset(&board.RCC);
-        // So that the log can be read while the core sleeps.
+        // The log can be read while the core sleeps.
         board.DBGMCU.cr().modify(|_, w| w.dbg_sleep().set_bit());
         let mut rcc = board.RCC.freeze(super::clocks());
         TIM1::enable(&mut rcc);
@@ -355,34 +376,35 @@ mod app {
         let a = board.GPIOA.split(&mut rcc);
         let b = board.GPIOB.split(&mut rcc);
         let c = board.GPIOC.split(&mut rcc);
-        // The pins of encoders, echo and servo are the timers' from here on.
+        // The pins of encoders, echo and servo belong to the timers from here on.
         let _ = (a.pa8.into_alternate::<1>(), a.pa9.into_alternate::<1>());
         let _ = (c.pc6.into_alternate::<3>(), c.pc7.into_alternate::<3>());
         let _ = (a.pa0.into_alternate::<2>(), b.pb8.into_alternate::<3>());
         let timer_clock = rcc.clocks.timclk1();
         start_clock(&board.TIM5, microseconds(timer_clock));
-        start_turns(&board.TIM2, microseconds(timer_clock));
+        start_polls(&board.TIM2, microseconds(timer_clock));
 
         let uart = serial::Config::default().baudrate(Bps(115_200));
         let uart = board.USART2.serial((a.pa2, a.pa3), uart, &mut rcc);
         let pwm = ServoPwm::new(board.TIM10, rcc.clocks.timclk2());
-        let flashed = Flashed::read(memory::map(), memory::config());
-        log::flashed(&flashed);
+        let flash = FlashContents::read(memory::map(), memory::config());
+        log::flash_contents(&flash);
         let store = Store::new(Sectors(board.FLASH), memory::store(Sectors::BASE));
-        let parts =
-            (uart.ok(), sonarfix_robot::servo(pwm), sonarfix_robot::body(reset), store.ok());
-        let (Some(uart), Some(servo), Some(body), Some(store)) = parts else {
+        let (Ok(uart), Ok(store)) = (uart, store) else {
             stop();
         };
-        let Ok(app) = App::new(body, flashed, store, Instant::from_ticks(0)) else {
-            stop();
-        };
+        PWR::enable(&mut rcc);
+        board.PWR.cr().modify(|_, w| w.dbp().set_bit());
+        let resets = boots::resets(board.RTC.bkpr(0).read().bkp().bits());
+        set_resets(&board.RTC, resets.saturating_add(1));
+        let board_info = sonarfix_robot::board(reset, resets);
+        let app = App::new(board_info, flash, store, Instant::from_ticks(0));
         let trigger = a.pa1.into_push_pull_output();
         let hardware = Devices {
             right: Encoder::new(board.TIM1),
             left: Encoder::new(board.TIM8),
-            servo,
-            ranger: sonarfix_robot::sonar(trigger, &ECHO),
+            servo: sonarfix_robot::servo(pwm),
+            ranger: sonarfix_robot::ranger(trigger, &ECHO),
         };
         let (tx, mut rx) = uart.split();
         rx.listen();
@@ -396,24 +418,29 @@ mod app {
             link: Uart { received: incoming, to_send },
             drive: b.pb7.into_push_pull_output(),
             watchdog,
-            turn: board.TIM2,
+            backup: board.RTC,
+            poll_timer: board.TIM2,
             rx: (rx, received),
             tx: (tx, outgoing),
         };
         (Shared { clock: board.TIM5 }, local)
     }
 
-    /// A turn of the loop at every millisecond's interrupt.
-    #[idle(shared = [clock], local = [app, hardware, link, drive, watchdog])]
+    /// Polls at every interrupt of TIM2.
+    #[idle(shared = [clock], local = [app, hardware, link, drive, watchdog, backup])]
     #[inline(never)]
     fn idle(mut context: idle::Context) -> ! {
-        let idle::LocalResources { app, hardware, link, drive, watchdog, .. } = context.local;
+        let idle::LocalResources { app, hardware, link, drive, watchdog, backup, .. } =
+            context.local;
         let mut now = Instant::from_ticks(0);
         loop {
             rtic::export::wfi();
             now = context.shared.clock.lock(|clock| advanced(now, clock.cnt().read().bits()));
             let polled = app.poll(now, hardware, link);
-            drive.set_state(polled.is_running.into());
+            drive.set_state(polled.may_drive.into());
+            if polled.is_settled {
+                set_resets(backup, 0);
+            }
             if polled.is_on_time {
                 watchdog.feed();
             }
@@ -425,7 +452,7 @@ mod app {
         }
     }
 
-    /// The edges of the echo: the timer has stamped them.
+    /// Reads the edges of the echo, which the timer has stamped.
     #[task(binds = TIM5, shared = [clock], priority = 2)]
     fn echo(mut context: echo::Context) {
         context.shared.clock.lock(|clock| {
@@ -443,17 +470,17 @@ mod app {
     }
 
     /// Wakes the loop.
-    #[task(binds = TIM2, local = [turn])]
-    fn turn(context: turn::Context) {
-        context.local.turn.sr().write(|w| w.uif().clear_bit());
+    #[task(binds = TIM2, local = [poll_timer])]
+    fn wake(context: wake::Context) {
+        context.local.poll_timer.sr().write(|w| w.uif().clear_bit());
     }
 
-    /// A byte has come, can go, or is to go: the loop asks for this interrupt when it has one.
+    /// Receives a byte, or sends the next one; the loop pends this interrupt when it has bytes to send.
     #[task(binds = USART2, local = [rx, tx])]
     fn uart(context: uart::Context) {
         let uart::LocalResources { rx: (rx, received), tx: (tx, outgoing), .. } = context.local;
         if let Ok(byte) = rx.read() {
-            // The loop empties the queue ten times faster than the line can fill it.
+            // The loop empties the queue ten times faster than the line fills it.
             let _ = received.enqueue(byte);
         }
         while tx.is_tx_empty() {
@@ -466,12 +493,12 @@ mod app {
         tx.listen();
     }
 
-    /// Lets TIM5 count microseconds, and stamp both edges at its first pin.
+    /// Starts TIM5: it counts microseconds, and stamps both edges at its first pin.
     fn start_clock(timer: &TIM5, divider: u16) {
         timer.psc().write(|w| w.psc().set(divider));
         timer.arr().write(|w| w.arr().set(u32::MAX));
         timer.egr().write(|w| w.ug().set_bit());
-        // Both channels listen to the first pin, through a filter of eight clocks.
+        // Both channels capture the first pin, through a filter of eight clocks.
         timer.ccmr1_input().write(|w| {
             w.cc1s().ti1().ic1f().fck_int_n8();
             w.cc2s().ti1().ic2f().set(0b11)
@@ -484,45 +511,51 @@ mod app {
         timer.cr1().write(|w| w.cen().set_bit());
     }
 
-    /// Lets TIM2 interrupt every [`TURN`].
-    fn start_turns(timer: &TIM2, divider: u16) {
+    /// Starts TIM2, which interrupts every [`POLL`].
+    fn start_polls(timer: &TIM2, divider: u16) {
         timer.psc().write(|w| w.psc().set(divider));
-        timer.arr().write(|w| w.arr().set(TURN - 1));
+        timer.arr().write(|w| w.arr().set(POLL - 1));
         timer.egr().write(|w| w.ug().set_bit());
         timer.sr().write(|w| w.uif().clear_bit());
         timer.dier().write(|w| w.uie().set_bit());
         timer.cr1().write(|w| w.cen().set_bit());
     }
 
-    /// The time, by a counter that shows the low 32 bits of it, soon after `then`.
+    /// The time from its low 32 bits, shortly after `then`.
     fn advanced(then: Instant, count: u32) -> Instant {
         #[expect(clippy::cast_possible_truncation, reason = "the low bits are what is asked for")]
         let elapsed = count.wrapping_sub(then.ticks() as u32);
         Instant::from_ticks(then.ticks().saturating_add(elapsed.into()))
     }
 
-    /// Why the chip was reset; the flags are cleared for the next time.
-    fn reset(rcc: &pac::RCC) -> Reset {
+    /// Counts the resets in a row in a register of the backup domain, which survives them and not a
+    /// power loss.
+    fn set_resets(backup: &RTC, resets: u8) {
+        backup.bkpr(0).write(|w| w.bkp().set(boots::register(resets)));
+    }
+
+    /// The cause of the reset; clears the flags.
+    fn reset(rcc: &pac::RCC) -> ResetCause {
         let flags = rcc.csr().read();
         rcc.csr().modify(|_, w| w.rmvf().set_bit());
         if flags.wdgrstf().bit_is_set() || flags.wwdgrstf().bit_is_set() {
-            Reset::Watchdog
+            ResetCause::Watchdog
         } else if flags.sftrstf().bit_is_set() {
-            Reset::Software
+            ResetCause::Software
         } else if flags.porrstf().bit_is_set() {
-            Reset::PowerOn
+            ResetCause::PowerOn
         } else if flags.borrstf().bit_is_set() {
-            Reset::BrownOut
+            ResetCause::BrownOut
         } else if flags.padrstf().bit_is_set() {
-            Reset::Pin
+            ResetCause::Pin
         } else {
-            Reset::Unknown
+            ResetCause::Unknown
         }
     }
 
-    /// The robot's constants contradict each other.
+    /// Ends the program: the memory map has no store, or the UART no such speed.
     fn stop() -> ! {
-        defmt::error!("the constants of `sonarfix-robot` are no robot");
+        defmt::error!("the store's region or the UART cannot be set up");
         loop {
             rtic::export::wfi();
         }

@@ -7,13 +7,15 @@ use std::process::Command;
 use anyhow::Context;
 
 use crate::cargo;
+use crate::workspace::Workspace;
 
-/// The optimiser's vectorisers are off: they make of dense matrices what no microcontroller can.
+/// Vectorisation is off, because no microcontroller here has vector instructions.
 const SCALAR: &str = "-C no-vectorize-loops -C no-vectorize-slp";
 
-/// Builds the program that callgrind looks into.
+/// Builds the program that callgrind runs.
 pub fn build() -> anyhow::Result<()> {
-    let mut command = cargo::in_bench("build --release --package bench-host --bin callgrind");
+    let mut command =
+        Workspace::Bench.cargo("build --release --package bench-host --bin callgrind");
     command.env("RUSTFLAGS", SCALAR);
     cargo::check(command)
 }
@@ -23,10 +25,10 @@ pub fn instructions(name: &str, call: &str) -> anyhow::Result<f64> {
     let mut command = Command::new("valgrind");
     command.args(["--tool=callgrind", "--callgrind-out-file=/dev/null"]);
     command.arg(format!("--toggle-collect=*bench_{call}*"));
-    command.arg(cargo::bench_target().join("release/callgrind")).arg(name);
-    let said = cargo::output(command).context("is `valgrind` installed?")?;
+    command.arg(Workspace::Bench.target_folder().join("release/callgrind")).arg(name);
+    let text = cargo::output(command).context("is `valgrind` installed?")?;
     let number = |key: &str| -> anyhow::Result<f64> {
-        let (_, rest) = said.split_once(key).with_context(|| format!("no `{key}` in: {said}"))?;
+        let (_, rest) = text.split_once(key).with_context(|| format!("no `{key}` in: {text}"))?;
         Ok(rest.lines().next().unwrap_or_default().trim().parse()?)
     };
     Ok(number("Collected : ")? / number(&format!("{call} "))?)
@@ -35,12 +37,13 @@ pub fn instructions(name: &str, call: &str) -> anyhow::Result<f64> {
 /// Nanoseconds of ten predicts and one update, by filter: criterion's median.
 pub fn times<'a>(names: impl Iterator<Item = &'a str>) -> anyhow::Result<BTreeMap<&'a str, f64>> {
     let bench = "bench --package bench-host --bench filters -- --noplot --warm-up-time 1 --measurement-time 2";
-    cargo::check(cargo::in_bench(bench))?;
+    cargo::check(Workspace::Bench.cargo(bench))?;
     names.map(|name| Ok((name, median(name)?))).collect()
 }
 
 fn median(name: &str) -> anyhow::Result<f64> {
-    let path = cargo::bench_target().join("criterion").join(name).join("new/estimates.json");
+    let path =
+        Workspace::Bench.target_folder().join("criterion").join(name).join("new/estimates.json");
     let text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
     let estimates: serde_json::Value = serde_json::from_str(&text)?;
     let median = estimates.pointer("/median/point_estimate").and_then(serde_json::Value::as_f64);

@@ -4,94 +4,91 @@ use std::fmt::Write as _;
 
 use anyhow::Context;
 
-use super::{Figures, OnTarget, Subject};
+use super::subjects::{Figures, OnTarget, Subject};
 use crate::emulator::Cost;
 
 const HEAD: &str = "\
-# What the filter costs, and what its peers cost
+# Cost of the filter and of its peers
 
-`cargo xtask bench` measures and writes this page; `cargo xtask budgets` holds what ships against
-`budgets.toml` in CI, and `cargo xtask bless` rewrites that file when a change is wanted.
+`cargo xtask bench` measures and writes this page. `cargo xtask budgets` compares the shipped crate with `budgets.toml` in CI, and
+`cargo xtask bless` rewrites that file for an intended change.
 
-## The same work
+## The task
 
 Six states in `f32` (x, y, heading, mean and difference of the wheels' scale errors, track-width error).
-A *predict* is one step of the wheels: state, Jacobian, P ← F P Fᵀ + Q with a diagonal Q; sine and cosine of
-the mid-heading are passed in. An *update* is one scalar range with H = [a b 0 0 0 0]. Every filter
-takes the same drive of 200 steps and 20 ranges (`bench/workload/src/drive.rs`) and
-`bench/host/tests/agreement.rs` holds each, after every step, to the state and covariance of an independent filter in `f64`
-(0.01 σ, and 0.1 % of P): no peer does less work.
+A *predict* processes one wheel travel: state, Jacobian, P ← F P Fᵀ + Q with a diagonal Q; sine and cosine of
+the mid-heading are arguments. An *update* processes one scalar range with H = [a b 0 0 0 0]. Every filter
+processes the same drive of 200 travels and 20 ranges (`bench/workload/src/drive.rs`).
+`bench/host/tests/agreement.rs` compares each, after every call, with the state and covariance of an independent filter in `f64`
+(0.01 σ, and 0.1 % of P), so that every peer does the same work.
 
-Sonarfix has two rows, and neither is held to the same state and P, for its Q is another.
+Sonarfix has two rows. Its Q differs, so that neither is compared with that state and P.
 
-- *As it ships* does more than the peers: seven states, its own sine and cosine, the noise of each wheel in full, and the checks
-  that refuse bad input. It is no comparison of six states with six. The column *÷ ours* refers to it.
-- *Kernel alone* (`bench/ours/src/kernel.rs`) is the closest to the peers' work that there is: six states, sine and cosine passed
-  in, Q given. It leaves out what ships around it: the noise of the wheels, sine and cosine, the range scale's row in a
-  prediction, the checks and the copy that they go back to. It does more than the peers in its update, which is that of all
-  seven states, for there is no copy of it for six, and in compensated sums (Kahan). Its Q is the noise of advance and turn,
-  of which the peers' diagonal is a simpler form. The column *÷ kernel* refers to it; its bar is 2,600 for 10 + 1.
+- *As it ships* does more than the peers: seven states, its own sine and cosine, the full noise of each wheel, and the checks
+  of the input. This is not a comparison of six states with six. The column *÷ shipped* refers to it.
+- *Kernel alone* (`bench/ours/src/kernel.rs`) is closest to the peers' work: six states, with sine, cosine and Q as
+  arguments. It omits the noise of the wheels, sine and cosine, the range scale's row in a prediction, and the checks with the copy
+  for their rollback. Its update does more than the peers': it has all seven states, since no version for six exists, and
+  compensated sums (Kahan). Its Q is the noise of advance and turn, of which the peers' diagonal is a simpler form. The column
+  *÷ kernel* refers to it; its limit is 2,600 for 10 + 1.
 
 ";
 
 const NOTES: &str = "
-Instructions are the mean over the drive, in brackets those of the worst call where it is another. *10 + 1* is
-ten predicts and one update: a second of a robot that ticks ten times a second and looks once.
+Instructions are the mean over the drive, with the worst call in brackets if it differs. *10 + 1* is ten predicts and one update: one
+second of a robot with ten encoder samples and one ping per second.
 
-## What is counted, and how
+## Method
 
-- **Cortex-M4F, M3, M0+**: a program for each filter (`bench/mcu`), opt-level 3, fat LTO, one codegen unit, under QEMU
-  with `-icount shift=7`, by SysTick; the calls' own cost is measured on an empty function and taken off. These are
+- **Cortex-M4F, M3, M0+**: one program per filter (`bench/mcu`), opt-level 3, fat LTO, one codegen unit, under QEMU
+  with `-icount shift=7`, counted by SysTick; the overhead of a call is measured on an empty function and subtracted. The figures are
   *instructions*, not cycles: on an M4F a division takes 14 cycles and a load often 2. M3 and M0+ compute in soft
-  float. QEMU has no M0+ with enough memory, so an M3 runs the program built for the M0+, whose instructions are a
-  subset of its own.
+  float. QEMU has no M0+ with enough memory; an M3 runs the program built for the M0+, whose instruction set it contains.
 - **`s`**: the Cortex-M4F at opt-level `s`.
 - **Code**: bytes of all functions that can be reached from predict and update in the linked program for the
-  Cortex-M4F, library routines included, constants not.
-- **Stack**: of the worst call on the Cortex-M4F; the memory below was painted before it.
-- **x86-64**: `valgrind --tool=callgrind`, opt-level 3, the optimiser's vectorisers off
-  (`-C no-vectorize-loops -C no-vectorize-slp`), because no microcontroller has what they need.
-- **Time**: criterion's median of ten predicts and one update on the machine that wrote this page, vectorisers
-  on, as a multiple of ours: times alone say nothing about another machine.
+  Cortex-M4F, with library routines, without constants.
+- **Stack**: of the deepest call on the Cortex-M4F, by painting the memory below.
+- **x86-64**: `valgrind --tool=callgrind`, opt-level 3, without vectorisation (`-C no-vectorize-loops -C no-vectorize-slp`), because
+  these microcontrollers have no vector instructions.
+- **Time**: criterion's median of ten predicts and one update on the machine that wrote this page, with vectorisation, relative to the shipped
+  filter: absolute times do not transfer to another machine.
 
-## What to make of it
+## Discussion
 
-- A peer's figure depends on what the compiler can see. A filter whose matrices are arrays, inlined into the
-  place where its Jacobian is written, has the multiplications by the Jacobian's ones folded and those by its zeros
-  shared; behind a box or a function pointer none. That is the whole difference between the two rows of minikalman,
-  of which the boxed one is how the examples of its documentation build it. At `s` most of the difference is gone.
-- multicalc differentiates the model itself; sine and cosine of its own are computed in `f64`, which a Cortex-M4F
-  does in software. With them passed in (continued to first order, which gives the same derivatives) what is
-  left is the cost of the differentiation.
-- A plain or symmetrised form costs less than Joseph's and loses positive variances with a wide prior and a
-  sharp range. The rows are not of equal worth; the form says which are.
-- Six times less than a peer holds for some and not for others: the column *÷ kernel* says for which. minikalman over arrays
-  is the closest.
+- A peer's figure depends on what the compiler can inline. If the matrices are arrays and the filter is inlined where its Jacobian is
+  defined, multiplications by the Jacobian's ones and zeros are folded; behind a box or a function pointer they are not. This explains the
+  two rows of minikalman; the boxed one follows the examples of its documentation. At `s` most of the difference vanishes.
+- multicalc differentiates the model itself; its sine and cosine are computed in `f64`, which a Cortex-M4F
+  does in software. With sine and cosine as arguments (continued to first order, which gives the same derivatives) the cost of the
+  differentiation remains.
+- A plain or symmetrised form costs less than Joseph's, and its variances become negative with a wide prior and a
+  precise range. The rows are not equivalent; the column *form* tells them apart.
+- The column *÷ kernel* shows for which peers the cost is more than six times that of the kernel. minikalman over arrays is the closest.
 - numeris links an allocator and does not use it here.
 
-## The commands
+## Commands
 
 ```sh
 cargo xtask bench                      # all of it, ten minutes: writes this page
 cargo xtask peers                      # every filter does the same work
-cargo xtask budgets                    # what ships, against budgets.toml
+cargo xtask budgets                    # the shipped crate, against budgets.toml
 cargo xtask panics                     # no panic in the linked programs
 ```
 
 ## Budgets
 
-`budgets.toml` holds what the shipped crate costs, seven states, sine and cosine included: instructions and stack of
-the worst call over a drive of 200 steps and 20 ranges through a room of 8 walls (`bench/probe`), bytes of all functions that
-the calls reach, bytes of the objects. *core* is predict, gate and update, with their sine and cosine; the expected range is
-in *core_and_expect*; *localizer* is odometry, aim (the informative policy) and fix. *building* is the worst aim over 640 poses in
-a building of rooms of 4 m × 5 m, its map baked, the sonar's reach 4 m.
+`budgets.toml` contains the cost of the shipped crate, with seven states, sine and cosine: instructions and stack of
+the worst call over a drive of 200 travels and 20 ranges through a room of 8 walls (`firmware/emulated/probe`), bytes of all functions that can
+be reached from the calls, bytes of the objects. *core* is predict, gate and update, with their sine and cosine; *core_and_expect* adds the
+expected range; *localizer* is odometry, aim (the informative policy) and fix. *building* is the worst aim over 640 poses in
+a building of rooms of 4 m × 5 m, with a baked map and a reach of the sonar of 4 m.
 
-A figure more than 2 % from the committed one fails, with both, to either side: what got worse must be wanted, and what got
-better must be kept. `cargo xtask bless` measures again and rewrites the file; the change of it is reviewed like code. The stack
-is that of the calls made, not of every path there is.
+A figure that differs by more than 2 % from the committed one fails, in either direction: an increase must be intended, and a decrease must not be
+lost again. `cargo xtask bless` measures and rewrites the file; its change is reviewed like code. The stack is that of the measured calls, not
+of every possible path.
 
-There are bars besides (`xtask/src/budgets.rs`, with their reasons). One that the committed table keeps cannot be blessed away;
-one that it does not keep is said to be not reached, by `budgets` and by `bless`, each time. Where they stand:
+There are also limits (`xtask/src/budgets.rs`, with their reasons). A limit that the committed table meets cannot be exceeded by a new
+table; one that it does not meet is reported by `budgets` and by `bless` each time:
 
 ";
 
@@ -110,7 +107,7 @@ pub fn written(
     let mut page = HEAD.to_owned();
     writeln!(page, "Measured with {}.\n", tools.join("; "))?;
     page += "\
-| | form | M4F predict | M4F update | M4F 10 + 1 | ÷ ours | ÷ kernel | at `s` | M3 10 + 1 | M0+ 10 + 1 | code, bytes | stack, bytes | x86-64 10 + 1 | time ÷ ours |
+| | form | M4F predict | M4F update | M4F 10 + 1 | ÷ shipped | ÷ kernel | at `s` | M3 10 + 1 | M0+ 10 + 1 | code, bytes | stack, bytes | x86-64 10 + 1 | time ÷ shipped |
 |---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|
 ";
     for (subject, figures) in &rows {

@@ -1,14 +1,14 @@
-//! That the frames read from a program's instructions are those that its compiler meant.
+//! Compares the stack frames read from a program's instructions with those reported by the compiler.
 //!
-//! A stable compiler does not say how large it makes a frame. Told to be a nightly one it does, in
-//! a section of its own; with it the program's code is another, so it is not the one that ships.
+//! Only a nightly compiler reports them, in a separate section; `RUSTC_BOOTSTRAP` enables this on a stable one. The resulting program differs
+//! from the one that ships.
 
 use anyhow::{Context, bail, ensure};
 use object::{Object, ObjectSection};
 
 use crate::elf::Program;
 
-/// What makes the compiler write the section.
+/// The flag for the section.
 pub const FLAG: &str = "-Zemit-stack-sizes";
 
 /// Compares the frame of every function in the section.
@@ -19,26 +19,26 @@ pub fn check(bytes: &[u8]) -> anyhow::Result<()> {
     let mut rest = section.data()?;
     let (mut equal, mut other) = (0, Vec::new());
     while let Some((address, after)) = rest.split_first_chunk::<4>() {
-        let (said, after) = uleb128(after).context("the stack sizes are cut off")?;
+        let (reported, after) = uleb128(after).context("the stack sizes are cut off")?;
         rest = after;
         let address = u64::from(u32::from_le_bytes(*address)) & !1;
         let function = program.function(address).context("a stack size of no function")?;
         let read = function.stack.bytes;
-        if read == said {
+        if read == reported {
             equal += 1;
         } else {
-            other.push(format!("{}: {read} read, {said} said", function.name()));
+            other.push(format!("{}: {read} read, {reported} reported", function.name()));
         }
     }
-    println!("frames read from instructions as the compiler says: {equal}");
-    ensure!(equal > 0, "the compiler said nothing of any function");
+    println!("frames equal to those of the compiler: {equal}");
+    ensure!(equal > 0, "the compiler reported no frame");
     if !other.is_empty() {
-        bail!("frames that are not what the compiler says:\n  {}", other.join("\n  "));
+        bail!("frames that differ from those of the compiler:\n  {}", other.join("\n  "));
     }
     Ok(())
 }
 
-/// A number of seven bits a byte, the lowest first; and what follows it.
+/// Reads a number in ULEB128; returns it and the bytes after it.
 fn uleb128(bytes: &[u8]) -> Option<(u64, &[u8])> {
     let last = bytes.iter().position(|byte| byte & 0x80 == 0)?;
     let (number, rest) = bytes.split_at_checked(last + 1)?;

@@ -1,4 +1,4 @@
-//! From which line, and of whose crate, an instruction was made.
+//! The source line and the crate that an instruction was compiled from.
 
 use addr2line::gimli;
 use anyhow::ensure;
@@ -10,8 +10,7 @@ type Section<'a> = gimli::EndianSlice<'a, gimli::LittleEndian>;
 pub struct Lines<'a>(addr2line::Context<Section<'a>>);
 
 impl<'a> Lines<'a> {
-    /// The debug information as it lies in the file: it is linked, whatever relocations are left
-    /// in it.
+    /// Reads the debug information without applying relocations, since the file is linked.
     pub fn read(file: &object::File<'a>) -> anyhow::Result<Self> {
         let dwarf = gimli::Dwarf::load(|id| {
             let section = file.section_by_name(id.name()).and_then(|section| section.data().ok());
@@ -20,8 +19,8 @@ impl<'a> Lines<'a> {
         Ok(Self(addr2line::Context::from_dwarf(dwarf)?))
     }
 
-    /// The line at an address, `file:line`, inlined or not: the innermost that is not the standard
-    /// library's; none if all are.
+    /// The line at an address, `file:line`: of all inlined ones the innermost outside the standard library; none if all are
+    /// inside it.
     pub fn at(&self, address: u64) -> anyhow::Result<Option<String>> {
         let mut frames = self.0.find_frames(address).skip_all_loads()?;
         let mut found = 0;
@@ -33,22 +32,21 @@ impl<'a> Lines<'a> {
                 return Ok(Some(format!("{file}:{}", location.line.unwrap_or_default())));
             }
         }
-        ensure!(found > 0, "the debug information knows no line at {address:#x}");
+        ensure!(found > 0, "the debug information has no line at {address:#x}");
         Ok(None)
     }
 
-    /// The crate that the instruction at an address was made from; one of the standard library
-    /// belongs to whoever called it.
+    /// The crate that the instruction at an address was compiled from. The standard library counts for its caller.
     pub fn owner(&self, address: u64) -> String {
         let line = self.at(address).ok().flatten();
         line.as_deref().map_or(OTHER, owner).to_owned()
     }
 }
 
-/// Of which the debug information knows no line, or only the standard library's.
+/// Code without a line, or with lines of the standard library only.
 pub const OTHER: &str = "compiler, standard library";
 
-/// The crate in whose source a line is, without its version.
+/// The crate of a source line, without its version.
 pub fn owner(line: &str) -> &str {
     let after = |mark: &str, skip: usize| {
         line.split_once(mark).and_then(|(_, path)| path.split('/').nth(skip))

@@ -1,4 +1,4 @@
-//! Where the memory's parts are: the stack below everything else, nothing on a heap.
+//! Checks the layout of the memory: the stack is below all variables, and there is no heap.
 
 use std::collections::BTreeSet;
 
@@ -7,17 +7,17 @@ use object::{Object, ObjectSection, SectionKind};
 
 use crate::elf;
 
-/// What the names of an allocator's functions contain.
+/// Parts of the names of an allocator's functions.
 const ALLOCATORS: [&str; 4] = ["__rust_alloc", "__rg_alloc", "alloc::alloc", "alloc::raw_vec"];
 
-/// Nothing allocates; the stack ends below all variables, so that its overflow meets the end of the
-/// memory, which is a fault, and none of them.
+/// Checks that nothing allocates and that the stack is below all variables, so that its overflow reaches the end of the
+/// memory, which is a fault, and not a variable.
 pub fn check(bytes: &[u8]) -> anyhow::Result<()> {
     let file = object::File::parse(bytes)?;
     for symbol in file.symbols() {
         let name = elf::name(&symbol)?;
         if ALLOCATORS.iter().any(|part| name.contains(part)) || name.starts_with("alloc::") {
-            bail!("{name} is linked: something allocates");
+            bail!("{name} is linked: the program allocates");
         }
     }
     let (top, lowest) = (stack_top(&file)?, lowest_variable(&file)?);
@@ -38,11 +38,11 @@ pub fn variables(bytes: &[u8]) -> anyhow::Result<u64> {
 pub fn handlers(bytes: &[u8]) -> anyhow::Result<BTreeSet<u64>> {
     let file = object::File::parse(bytes)?;
     let words = vector_table(&file)?;
-    // The first is the stack's top; what is not used is zero; the lowest bit says Thumb.
+    // The first word is the top of the stack; unused ones are zero; the lowest bit marks Thumb code.
     Ok(words.into_iter().skip(1).filter(|&word| word != 0).map(|word| word & !1).collect())
 }
 
-/// Where the stack begins, which the core reads from the first word of the vector table.
+/// The top of the stack, from the first word of the vector table.
 fn stack_top(file: &object::File) -> anyhow::Result<u64> {
     vector_table(file)?.first().copied().context("the vector table is empty")
 }
@@ -58,7 +58,7 @@ fn lowest_variable(file: &object::File) -> anyhow::Result<u64> {
     lowest.context("the program has no variables")
 }
 
-/// The sections of what lies in RAM.
+/// The sections in RAM.
 pub fn variables_of<'f, 'd>(
     file: &'f object::File<'d>,
 ) -> impl Iterator<Item = object::Section<'d, 'f>> {

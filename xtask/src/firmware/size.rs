@@ -9,15 +9,17 @@ use super::lines::{Lines, OTHER};
 use super::memory;
 use crate::elf;
 
-/// What core, loop and drivers may take of the flash.
-const FLASH_BAR: u64 = 32 * 1024;
-/// The crates that they are.
+/// Largest flash size of core, loop and drivers. It was 32 KiB before the robot's hardware became part of the
+/// configuration (3 KiB in the drivers: every ranger, wheel and servo is set at run time) and before the
+/// echo model (3 KiB in the core, logarithm and exponential included).
+const FLASH_BAR: u64 = 36 * 1024;
+/// Their crates.
 const CORE: [&str; 4] = ["sonarfix", "sonarfix-hal", "libm", "nalgebra"];
-/// A crate, or a variable, of this many bytes has a row of its own.
+/// Smallest size of a crate or a variable with its own row, bytes.
 const LARGE_CRATE: u64 = 500;
 const LARGE_VARIABLE: u64 = 64;
 
-/// What is taken of the flash.
+/// Size in flash.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 struct Flash {
     code: u64,
@@ -37,7 +39,7 @@ impl Flash {
     }
 }
 
-/// Prints both tables, and holds core, loop and drivers to the bar.
+/// Prints both tables, and checks the size of core, loop and drivers.
 pub fn check(bytes: &[u8]) -> anyhow::Result<()> {
     let file = object::File::parse(bytes)?;
     print_flash(&file)?;
@@ -71,19 +73,19 @@ fn print_flash(file: &object::File) -> anyhow::Result<()> {
     let mut all = Flash::sum(core.iter().chain(&large).chain(&small));
     all.constants += rest.constants;
     println!("| **all** | **{}** | **{}** |", all.code, all.constants);
-    ensure!(bytes <= FLASH_BAR, "core, loop and drivers take more flash than they may");
+    ensure!(bytes <= FLASH_BAR, "core, loop and drivers exceed their limit of flash");
     Ok(())
 }
 
-/// Crates by what they take of the flash, most first.
+/// Crates by their size in flash, largest first.
 type Crates = Vec<(String, Flash)>;
 
-/// Those of core, loop and drivers, and the others.
+/// The crates of core, loop and drivers, and the others.
 fn by_crate(file: &object::File) -> anyhow::Result<(Crates, Crates)> {
     let lines = Lines::read(file)?;
     let mut crates: BTreeMap<String, Flash> = BTreeMap::new();
     let text = file.section_by_name(".text").context("the program has no code")?;
-    // Thumb instructions are made of half words. Constants among them count as code.
+    // Thumb instructions consist of half words. Constants between them count as code.
     for address in (text.address()..text.address() + text.size()).step_by(2) {
         crates.entry(lines.owner(address)).or_default().code += 2;
     }
@@ -95,7 +97,7 @@ fn by_crate(file: &object::File) -> anyhow::Result<(Crates, Crates)> {
     Ok(crates.into_iter().partition(|(name, _)| CORE.contains(&name.as_str())))
 }
 
-/// The constants, by crate: each belongs to the code that names it, or to the constant that does.
+/// The constants by crate. Each belongs to the code or to the constant that refers to it.
 fn constants(file: &object::File, lines: &Lines) -> anyhow::Result<Vec<(String, u64)>> {
     let section = file.section_by_name(".rodata").context("the program has no constants")?;
     let objects = objects(file, &section);
@@ -110,7 +112,7 @@ fn constants(file: &object::File, lines: &Lines) -> anyhow::Result<Vec<(String, 
         }
     }
     let lists = elf::mentions(file, false)?;
-    // A constant that is named by one that is named by …: as often as it takes.
+    // Constants that are referred to by constants, transitively.
     loop {
         let known = owners.len();
         for &(place, target) in &lists {
@@ -135,7 +137,7 @@ fn constants(file: &object::File, lines: &Lines) -> anyhow::Result<Vec<(String, 
     Ok(constants)
 }
 
-/// What lies in a section: addresses and bytes. Of two that overlap, the first counts.
+/// The objects in a section: addresses and bytes. Of two that overlap, the first counts.
 fn objects(file: &object::File, section: &object::Section) -> BTreeMap<u64, u64> {
     let range = section.address()..section.address() + section.size();
     let is_there = |symbol: &object::Symbol| {
@@ -171,7 +173,7 @@ fn print_ram(file: &object::File) -> anyhow::Result<()> {
     for (path, bytes) in rows.iter().filter(|(_, bytes)| *bytes >= LARGE_VARIABLE) {
         let (owner, name) = path.split_once("::").unwrap_or((OTHER, path));
         let name = name.rsplit("::").next().unwrap_or(name);
-        // What RTIC makes of the names of a task's resources.
+        // RTIC's prefixes of the names of a task's resources.
         let rtic = ["__rtic_internal_local_resource_", "__rtic_internal_local_init_"];
         let name = rtic.iter().find_map(|prefix| name.strip_prefix(prefix)).unwrap_or(name);
         println!("| `{name}` | {} | {bytes} |", owner.replace('_', "-"));

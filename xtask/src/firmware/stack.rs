@@ -1,14 +1,12 @@
-//! The deepest that the stack can be: of all paths through the calls of the linked program, from
-//! its start and from each interrupt.
+//! The deepest stack: the maximum over all paths through the call graph of the linked program, from its start and from
+//! each interrupt.
 //!
-//! - **Frames** are what a function's instructions lower the stack by.
-//! - **Calls** are what the linker had to fill in, and those of a function to itself. A call by
-//!   register may lead to any function whose address somebody has taken who can be reached.
+//! - **Frames** are the bytes by which a function's instructions lower the stack.
+//! - **Calls** are the relocations, and the calls of a function to itself. A call through a register may reach any function
+//!   whose address is taken by reachable code.
 //! - **Recursion** is an error.
-//! - **Interrupts** are taken to come all at once, one in another, each once, whatever their
-//!   priorities, and each on top of a core that saves its floating-point registers.
-//! - **Panics** are cut off: nothing runs after one but the message, and the stack below it is
-//!   that of a program that has ended. So is a fault's handler.
+//! - **Interrupts** are assumed to nest, each once, whatever their priorities, and each with a full floating-point context.
+//! - **Panics** and fault handlers are excluded: the program has ended.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -18,20 +16,20 @@ use super::memory;
 use super::panics::PANIC;
 use crate::elf::{Function, Program};
 
-/// Where the program starts.
+/// The entry point.
 const START: &str = "Reset";
-/// Handlers from which nothing goes on.
+/// Handlers that do not return.
 const ENDS: [&str; 3] = [START, "HardFault", "DefaultHandler"];
-/// What the core saves when an interrupt comes: 26 words with the floating-point registers, and one
-/// to a multiple of eight bytes (`ARMv7-M Architecture Reference Manual`, B1.5.7).
+/// The exception frame: 26 words with the floating-point registers, and one for alignment to eight bytes (`ARMv7-M
+/// Architecture Reference Manual`, B1.5.7).
 const EXCEPTION: u64 = 4 * 27;
-/// All RAM, without the map, which stays in flash.
+/// Limit of all RAM. The map stays in flash.
 const BAR: u64 = 8 * 1024;
-/// Printing: its functions are taken by address, for panics' messages, and called by one another
-/// only. As long as nobody else calls one of them, none of them is called.
+/// Formatting functions. Panic messages take their addresses, and they call each other. As long as no other function calls
+/// one of them, none is called.
 const FORMATTING: &str = "core::fmt::";
 
-/// Prints the deepest paths, and holds the RAM to the bar; gives how deep it is in all.
+/// Prints the deepest paths and checks the RAM; returns the total depth.
 pub fn check(bytes: &[u8]) -> anyhow::Result<u64> {
     let program = Program::parse(bytes)?;
     let roots = roots(&program, bytes)?;
@@ -55,7 +53,7 @@ pub fn check(bytes: &[u8]) -> anyhow::Result<u64> {
     println!("| **all stack, one in another** | **{all}** |");
     println!("| all variables | {variables} |");
     println!("| **all RAM** (bar: {BAR}) | **{}** |", variables + all);
-    ensure!(variables + all <= BAR, "more RAM than there may be");
+    ensure!(variables + all <= BAR, "the RAM exceeds its limit");
     Ok(all)
 }
 
@@ -75,11 +73,11 @@ fn roots(program: &Program, bytes: &[u8]) -> anyhow::Result<Vec<u64>> {
 /// How deep the stack is below each function.
 struct Depths<'a> {
     program: &'a Program,
-    /// What a call by register may lead to.
+    /// The possible targets of a call through a register.
     taken: BTreeSet<u64>,
-    /// By address: how deep, and through whom.
+    /// By address: the depth, and the next function on the deepest path.
     known: BTreeMap<u64, (u64, Option<u64>)>,
-    /// Whose depth is being looked for, each called by the one before.
+    /// The functions on the current path, each called by the one before.
     under_way: Vec<u64>,
 }
 
@@ -87,7 +85,7 @@ impl<'a> Depths<'a> {
     fn of(program: &'a Program, roots: &[u64]) -> anyhow::Result<Self> {
         let (taken, known, under_way) = Default::default();
         let mut depths = Self { program, taken, known, under_way };
-        // What is called by register may take further addresses.
+        // Functions that are called through a register may take further addresses.
         loop {
             let reached = depths.reached(roots);
             let taken = depths.taken_by(&reached);
@@ -109,7 +107,7 @@ impl<'a> Depths<'a> {
         reached
     }
 
-    /// What a function may call, but for panics.
+    /// The functions that a function may call, without panics.
     fn called_by(&self, at: u64) -> BTreeSet<u64> {
         let Some(function) = self.program.function(at) else { return BTreeSet::new() };
         let mut called = function.calls.clone();
@@ -120,7 +118,7 @@ impl<'a> Depths<'a> {
         called
     }
 
-    /// The functions whose address one of these takes, but for those that only print.
+    /// The functions whose address one of these takes, without formatting functions.
     fn taken_by(&self, reached: &BTreeSet<u64>) -> BTreeSet<u64> {
         let functions = reached.iter().filter_map(|&at| self.program.function(at));
         let addresses = functions.flat_map(|function| &function.takes);
@@ -130,13 +128,13 @@ impl<'a> Depths<'a> {
         taken
     }
 
-    /// Nobody prints, and every frame is known.
+    /// Checks that no formatting function is called and that every frame is known.
     fn check(&self, reached: &BTreeSet<u64>) -> anyhow::Result<()> {
         for &at in reached {
             let name = self.name(at);
-            ensure!(!name.contains(FORMATTING), "{name} is called, and not only by panics");
+            ensure!(!name.contains(FORMATTING), "{name} is called outside of panics");
             let is_unbounded = self.program.function(at).is_some_and(|f| f.stack.is_unbounded);
-            ensure!(!is_unbounded, "{name} lowers the stack by what nobody knows beforehand");
+            ensure!(!is_unbounded, "{name} lowers the stack by an unknown amount");
         }
         Ok(())
     }
@@ -163,8 +161,7 @@ impl<'a> Depths<'a> {
         Ok(depth)
     }
 
-    /// The functions of the deepest path down from one of which the depth is known, each with its
-    /// frame.
+    /// The functions of the deepest path from a function, each with its frame.
     fn deepest_path(&self, from: u64) -> Vec<(&'a str, u64)> {
         let through = |at: &u64| self.known.get(at).and_then(|(_, through)| *through);
         let path = std::iter::successors(Some(from), through);
@@ -220,7 +217,7 @@ mod tests {
     #[test]
     fn a_call_by_register_leads_to_what_a_table_lists() {
         let functions = |start| vec![(1, start), (2, function("listed", 50, &[], &[]))];
-        // A table at 20 that names another, at 30, in which the function is.
+        // A table at 20 refers to another at 30, which contains the function.
         let data = || vec![(20, vec![30]), (30, vec![2])];
         let taken = function("start", 8, &[], &[20]);
         assert_eq!(depth(functions(by_register(taken)), data()).unwrap(), 58);

@@ -9,7 +9,7 @@ use super::naive::{Column, Row, Square, observation, rows, square};
 use crate::model::{Matrix, Motion, Range, Step, Vector};
 use crate::{Filter, diagonal};
 
-/// Linearised at the state, as its documentation has it for models that are not linear.
+/// Linearised at the state, as its documentation describes for nonlinear models.
 struct Transition {
     moved: Column,
     f: Square,
@@ -30,7 +30,7 @@ impl TransitionModelLinearNoControl<f32, U6> for Transition {
         &self.q
     }
 
-    /// The library's own, which is F x for the state; here the state moves by the model.
+    /// The library's prediction is F x for the state; here the state moves by the model.
     #[inline]
     fn predict(&self, previous: &StateAndCovariance<f32, U6>) -> StateAndCovariance<f32, U6> {
         let covariance = ((self.F() * previous.covariance()) * self.FT()) + self.Q();

@@ -1,5 +1,5 @@
-//! kfilter: an `EKF` with a step function, and a linear measurement. It brings a nalgebra of its
-//! own version.
+//! kfilter: an `EKF` with a step function, and a linear measurement. It depends on another
+//! version of nalgebra.
 
 use kfilter::kalman::{EKF, KalmanFilter, KalmanPredictInput, KalmanUpdate};
 use kfilter::measurement::LinearMeasurement;
@@ -45,7 +45,7 @@ impl Filter for Kfilter {
     fn update(&mut self, range: &Range) {
         let h = SMatrix::<f32, 1, STATES>::new(range.by_x, range.by_y, 0.0, 0.0, 0.0, 0.0);
         let z = Vector1::new(range.measured - range.offset);
-        // It fails on a variance of the innovation that is zero, which here is none.
+        // It fails only for an innovation variance of zero.
         let _ = self.0.update(&LinearMeasurement::new(h, Matrix1::new(range.variance), z));
     }
 

@@ -1,5 +1,4 @@
-//! minikalman: an extended filter over buffers; arrays, the fastest it has, or boxes, as the
-//! examples of its documentation have it.
+//! minikalman: an extended filter over buffers: arrays, its fastest, or boxes, as in the examples of its documentation.
 
 use minikalman::buffers::types as buffer;
 use minikalman::extended::builder::{
@@ -79,7 +78,7 @@ impl Minikalman {
     }
 }
 
-/// A filter as the examples of its documentation build it: over buffers on the heap.
+/// A filter over buffers on the heap, as in the examples of its documentation.
 pub struct Boxed {
     system: KalmanFilterType<STATES, f32>,
     observation: KalmanFilterObservationType<STATES, 1, f32>,
@@ -92,7 +91,7 @@ impl Boxed {
     }
 }
 
-/// The two differ in their types alone, which have too many parameters to be generic over.
+/// The two differ in their types only, which have too many parameters for a generic function.
 macro_rules! filter {
     ($filter:ty) => {
         impl Filter for $filter {

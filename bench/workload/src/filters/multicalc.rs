@@ -1,6 +1,5 @@
-//! multicalc: the model once, in generic numbers; the library differentiates it. It has no other
-//! way, so the model is written twice here: with sine and cosine of its own, and with those passed
-//! in.
+//! multicalc: differentiates the model, which is written in generic numbers. There is a model with its own sine and cosine, and one with
+//! sine and cosine as arguments.
 
 use multicalc::estimation::ExtendedKalmanFilter;
 use multicalc::linear_algebra::{Matrix as Multicalc, Vector as Column};
@@ -9,9 +8,9 @@ use multicalc::scalar::{Numeric, VectorFn};
 use crate::model::{Matrix, Range, STATES, Step, TRACK_WIDTH, Vector, turn};
 use crate::{Filter, diagonal};
 
-/// The model with the library's sine and cosine, as its documentation would have it.
+/// The model with the library's sine and cosine, as in its documentation.
 pub type OwnTrigonometry = MulticalcEkf<true>;
-/// The model with sine and cosine of the mid-heading passed in, continued to first order.
+/// The model with sine and cosine of the mid-heading as arguments, continued to first order.
 pub type PassedIn = MulticalcEkf<false>;
 
 /// The filter.
@@ -19,7 +18,7 @@ pub struct MulticalcEkf<const OWN: bool>(ExtendedKalmanFilter<STATES, 1, f32>);
 
 struct Motion<'a, const OWN: bool> {
     step: &'a Step,
-    /// Where sine and cosine were taken.
+    /// The heading of sine and cosine.
     mid_heading: f32,
 }
 
@@ -73,7 +72,7 @@ impl<const OWN: bool> Filter for MulticalcEkf<OWN> {
         let (turned, _) = turn(mean, difference, width_error, step.right, step.left);
         let model = Motion::<OWN> { step, mid_heading: heading + 0.5 * turned };
         self.0.set_process_noise(Multicalc::from_diagonal(step.noise));
-        // It fails on numbers that are not finite, which here are none.
+        // It fails only for numbers that are not finite.
         let _ = self.0.predict(&model);
     }
 

@@ -1,4 +1,4 @@
-//! nalgebra with nothing between it and the textbook: what most people would write first.
+//! The textbook's equations directly in nalgebra.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -34,7 +34,7 @@ pub type Plain = Naive<false>;
 /// P ← (I − K H) P (I − K H)ᵀ + K R Kᵀ.
 pub type Joseph = Naive<true>;
 
-/// The textbook's filter.
+/// The filter.
 pub struct Naive<const JOSEPH: bool> {
     x: Column,
     p: Square,

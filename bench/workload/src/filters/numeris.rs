@@ -1,5 +1,5 @@
-//! numeris: models and Jacobians as closures; Joseph's form. Its `estimate` wants an allocator to
-//! link, though its `Ekf` allocates nothing.
+//! numeris: models and Jacobians as closures; Joseph's form. Its `estimate` needs an allocator to
+//! link, although its `Ekf` does not allocate.
 
 use numeris::Matrix as Numeris;
 use numeris::estimate::Ekf;
@@ -29,7 +29,7 @@ impl Filter for NumerisEkf {
 
     #[inline]
     fn update(&mut self, range: &Range) {
-        // It fails on a variance of the innovation that is not positive, which here is none.
+        // It fails only for an innovation variance that is not positive.
         let _ = self.0.update(
             &numeris::Vector::from_array([range.measured]),
             |x| numeris::Vector::from_array([range.expected(x[0], x[1])]),

@@ -1,49 +1,73 @@
-//! What commands do. One that is refused changes nothing.
+//! The execution of commands. A refused command changes nothing.
+//!
+//! [`App::startable`], of which [`App::check_start`] is the check, alone decides with what a robot can start. It refuses before anything is changed in memory or in
+//! flash, and whatever it accepts can start.
 
 use embedded_storage::nor_flash::NorFlash;
-use sonarfix::config::Config;
-use sonarfix::localizer::{Localizer, Start};
-use sonarfix::units::{Instant, Metres, Radians};
-use sonarfix_hal::robot::{Report, Robot};
-use sonarfix_link::message::{Outcome, Refused};
+use sonarfix::localizer::{Localizer, Start, StartError};
+use sonarfix::map::Map;
+use sonarfix::units::{Duration, Instant, Metres};
+use sonarfix_hal::config::RobotConfig;
+use sonarfix_hal::encoder::Wheels;
+use sonarfix_hal::robot::{Hardware, Report, Robot, Settings, Tick};
+use sonarfix_link::message::{CommandError, CommandResult};
 use sonarfix_link::{Command, Frame, Reporter, Telemetry, baked};
 
-use super::{App, Habit, Link, Mode, Polled, Running};
+use super::{App, Link, Mode, Polled, Running, SavePolicy};
 use crate::check::Check;
-use crate::store::{Kept, Resumed, Saved};
+use crate::flash_contents;
+use crate::store::{MAX_HEADING_DEVIATION, MAX_POSITION_DEVIATION, Resumed, Saved};
 
-/// What is done for a command: nothing more to do, or to begin (anew) from here.
-enum Done {
-    With(Outcome),
-    BeginFrom(Resumed),
+/// What follows a command that was executed. The loop begins in [`App::answer`], after the stack frame of the command
+/// has been released.
+#[expect(clippy::large_enum_variant, reason = "there is one of it at a time, and no heap")]
+enum Next {
+    Nothing,
+    Report(Telemetry),
+    /// Begin, or begin again, from here.
+    Begin(Resumed),
 }
 
-impl<F: NorFlash> App<'_, F> {
-    /// Does what a command says, unless it is a repeat, and answers it. Not part of the loop's own
-    /// frame on the stack, which would be twice as large.
+/// A localizer with the parameters of its loop.
+struct Startable<'m> {
+    localizer: Localizer<'m>,
+    wheels: Wheels,
+    settings: Settings,
+}
+
+impl<'m, F: NorFlash> App<'m, F> {
+    /// Executes a command, unless it is a repetition, and sends the acknowledgement. It is not inlined, because the
+    /// loop's stack frame would be twice as large.
     #[inline(never)]
     pub(super) fn answer(
         &mut self,
         now: Instant,
         frame: &Frame<Command>,
+        hardware: &mut impl Hardware,
         link: &mut impl Link,
         polled: &mut Polled,
     ) {
         let mut began = None;
         let mut answered = self.wire.answered;
         let answer = answered.answer(frame, |command| {
-            let done = self.act(now, command, polled).and_then(|done| match done {
-                Done::With(outcome) => Ok(outcome),
-                Done::BeginFrom(known) => {
-                    began = Some(self.begin(now, &known)?);
-                    Ok(Outcome::Done)
-                }
+            let next = self.act(now, command, hardware, link, polled);
+            let message = next.and_then(|next| match next {
+                Next::Nothing => Ok(None),
+                Next::Report(message) => Ok(Some(message)),
+                Next::Begin(known) => self.begin(now, &known).map(Some),
             });
-            done.unwrap_or_else(Outcome::Refused)
+            match message {
+                Ok(message) => began = message,
+                Err(error) => return CommandResult::Refused(error),
+            }
+            match command {
+                Command::MapChecksum => CommandResult::Map(flash_contents::map_status(&self.map)),
+                _ => CommandResult::Done,
+            }
         });
         self.wire.answered = answered;
         if let Telemetry::Ack(ack) = answer {
-            polled.answered = Some(ack.outcome);
+            polled.answered = Some(ack.result);
         }
         self.wire.send(&answer, link);
         if let Some(began) = began {
@@ -51,144 +75,259 @@ impl<F: NorFlash> App<'_, F> {
         }
     }
 
+    /// Executes a command; returns the telemetry of a loop that starts. The functions below are not inlined, because
+    /// the stack frame of each would be part of every other one's.
     fn act(
         &mut self,
         now: Instant,
         command: &Command,
+        hardware: &mut impl Hardware,
+        link: &mut impl Link,
         polled: &mut Polled,
-    ) -> Result<Done, Refused> {
+    ) -> Result<Next, CommandError> {
         match *command {
-            Command::SetPose(ref start) => self.set_pose(now, start, polled),
-            Command::SetConfiguration(ref config) => self.set_configuration(now, config),
+            Command::SetPose(ref start) => self.set_pose(now, start, hardware, link, polled),
+            Command::SetConfiguration(ref config) => self.set_configuration(now, config, hardware),
             Command::Start => self.start(now, polled),
             Command::Stop => {
-                self.stop(now, polled);
-                Ok(Done::With(Outcome::Done))
+                self.stop(now);
+                Ok(Next::Nothing)
             }
             Command::ResetCalibration => self.reset_calibration(now, polled),
-            Command::MapChecksum => Ok(Done::With(Outcome::Map(self.flashed.map_state()))),
+            Command::MapChecksum => Ok(Next::Nothing),
         }
     }
 
+    /// Whether the loop can start from here with the present configuration.
+    ///
+    /// # Errors
+    /// [`CommandError`], by what prevents the start; a map and a pose may be missing.
+    pub(super) fn check_start(&self, now: Instant, known: &Resumed) -> Result<(), CommandError> {
+        let (config, _) = self.config.as_ref().ok_or(CommandError::NoConfiguration)?;
+        self.check_start_with(now, config, known)
+    }
+
+    /// Not inlined, and the localizer dropped: it is large, and the stack of whoever goes on to the flash is short.
+    #[inline(never)]
+    pub(super) fn check_start_with(
+        &self,
+        now: Instant,
+        config: &RobotConfig,
+        known: &Resumed,
+    ) -> Result<(), CommandError> {
+        config.check().map_err(|_| CommandError::Configuration)?;
+        self.startable(now, config, known).map(drop)
+    }
+
+    fn startable(
+        &self,
+        now: Instant,
+        config: &RobotConfig,
+        known: &Resumed,
+    ) -> Result<Startable<'m>, CommandError> {
+        let map = self.map.map_or(Map::new(&[]), |(map, _)| map);
+        let deviation = known.deviation_at_start(&config.localizer);
+        let localizer = Localizer::resume(config.localizer, map, known.state, deviation, now);
+        let localizer = localizer.map_err(|error| match error {
+            StartError::Start(_) => CommandError::Pose,
+            _ => CommandError::Configuration,
+        })?;
+        let wheels = config.wheels().map_err(|_| CommandError::Configuration)?;
+        let settings = Settings { encoder_period: config.encoder_period, ..Settings::default() };
+        settings.check().map_err(|_| CommandError::Configuration)?;
+        Ok(Startable { localizer, wheels, settings })
+    }
+
+    #[inline(never)]
     fn set_pose(
         &mut self,
         now: Instant,
         start: &Start,
+        hardware: &mut impl Hardware,
+        link: &mut impl Link,
         polled: &mut Polled,
-    ) -> Result<Done, Refused> {
-        let known = self.known_now(now).ok_or(Refused::NoConfiguration)?;
-        let is_deviation = |d: f32| d >= 0.0 && d.is_finite();
-        let Start { pose, position_deviation: Metres(position), heading_deviation } = *start;
-        let Radians(heading) = heading_deviation;
-        if !(pose.is_finite() && is_deviation(position) && is_deviation(heading)) {
-            return Err(Refused::Pose);
+    ) -> Result<Next, CommandError> {
+        let Start { position_deviation: Metres(position), heading_deviation, .. } = *start;
+        // Neither comparison holds for NaN.
+        let is_known = (0.0..=MAX_POSITION_DEVIATION).contains(&position)
+            && (0.0..=MAX_HEADING_DEVIATION).contains(&heading_deviation.0);
+        if !is_known {
+            return Err(CommandError::Pose);
         }
-        self.go_on_from(now, known.at(start), polled)
+        let known = self.known_now().ok_or(CommandError::NoConfiguration)?.at(start);
+        self.check_start(now, &known)?;
+        let Mode::Running(running) = &mut self.mode else {
+            return self.replace(now, known, polled).map(|()| Next::Nothing);
+        };
+        let step = running.robot.set_pose(now, start, hardware).map_err(|_| CommandError::Pose)?;
+        running.origin = running.origin.at(start);
+        if step.is_some() {
+            let lateness = Duration::from_ticks(0);
+            let tick = Tick { step, lateness, held: false, skipped: 0 };
+            let report = Report { tick: Some(tick), ..Report::default() };
+            let localizer = running.robot.localizer();
+            running.reporter.report(&report, localizer, |message| self.wire.send(message, link));
+        }
+        Ok(Next::Report(running.reporter.pose_set(running.robot.localizer())))
     }
 
-    /// Not part of the frame that lies below every other command's.
     #[inline(never)]
-    fn set_configuration(&mut self, now: Instant, config: &Config) -> Result<Done, Refused> {
-        config.check().map_err(|_| Refused::Configuration)?;
-        let kept = Kept { replaces: self.baked(), config: *config };
-        let known = self.known_now(now);
-        self.store.save_config(&kept).map_err(|_| Refused::Storage)?;
-        self.config = Some((*config, baked::checksum(config)));
-        let afresh = Resumed::afresh(config);
-        let known = known.map_or(afresh, |known| known.calibrated_as(&afresh));
+    fn set_configuration(
+        &mut self,
+        now: Instant,
+        config: &RobotConfig,
+        hardware: &mut impl Hardware,
+    ) -> Result<Next, CommandError> {
+        let afresh = Resumed::afresh(&config.localizer);
+        let known = self.known_now().map_or(afresh, |known| known.calibrated_as(&afresh));
+        let known = self.where_it_is(known);
+        self.check_start_with(now, config, &known)?;
+        configure(hardware, config)?;
+        self.owes_config = self.ignores_store() || !self.writes.take(now, 1);
+        if !self.owes_config && self.store.save_replacement(self.baked(), config).is_err() {
+            self.configure_devices(hardware);
+            return Err(CommandError::Storage);
+        }
+        self.use_config(config);
+        self.owes_record = true;
         if self.is_running() {
-            return Ok(Done::BeginFrom(known));
+            return Ok(Next::Begin(known));
         }
         self.known = Some(known);
-        Ok(Done::With(Outcome::Done))
+        Ok(Next::Nothing)
     }
 
-    fn reset_calibration(&mut self, now: Instant, polled: &mut Polled) -> Result<Done, Refused> {
-        let (config, _) = self.config.ok_or(Refused::NoConfiguration)?;
-        let known = self.known_now(now).ok_or(Refused::NoConfiguration)?;
-        self.go_on_from(now, known.calibrated_as(&Resumed::afresh(&config)), polled)
+    /// Replaces the present configuration, which the devices support.
+    #[inline(never)]
+    fn use_config(&mut self, config: &RobotConfig) {
+        self.config = Some((*config, baked::checksum(config)));
+        self.unsupported = None;
     }
 
-    fn start(&mut self, now: Instant, polled: &mut Polled) -> Result<Done, Refused> {
+    #[inline(never)]
+    fn reset_calibration(
+        &mut self,
+        now: Instant,
+        polled: &mut Polled,
+    ) -> Result<Next, CommandError> {
+        let (config, _) = self.config.ok_or(CommandError::NoConfiguration)?;
+        let known = self.known_now().ok_or(CommandError::NoConfiguration)?;
+        let known = known.calibrated_as(&Resumed::afresh(&config.localizer));
+        if !self.is_running() {
+            return self.replace(now, known, polled).map(|()| Next::Nothing);
+        }
+        let known = self.where_it_is(known);
+        self.check_start(now, &known)?;
+        self.owes_record = true;
+        Ok(Next::Begin(known))
+    }
+
+    /// The same, at the pose of the localizer if the loop runs: nothing interrupts it.
+    fn where_it_is(&self, known: Resumed) -> Resumed {
+        let Some(localizer) = self.localizer() else { return known };
+        let filter = localizer.filter();
+        let here = Resumed::interrupted(filter.state(), filter.deviation());
+        Resumed { is_pose_interrupted: false, ..here.calibrated_as(&known) }
+    }
+
+    #[inline(never)]
+    fn start(&mut self, now: Instant, polled: &mut Polled) -> Result<Next, CommandError> {
         if self.is_running() {
-            return Ok(Done::With(Outcome::Done));
+            return Ok(Next::Nothing);
         }
-        self.flashed.map.map_err(|_| Refused::NoMap)?;
-        let known = self.known.ok_or(Refused::NoConfiguration)?;
+        self.map.map_err(|_| CommandError::NoMap)?;
+        let known = self.known.ok_or(CommandError::NoConfiguration)?;
+        if let Some(reason) = self.unsupported {
+            return Err(CommandError::Unsupported(reason));
+        }
         if !known.has_pose {
-            return Err(Refused::NoPose);
+            return Err(CommandError::NoPose);
         }
-        // From now on nobody knows where it will stand when the power goes.
-        let saved = self.record(now, false).ok_or(Refused::NoConfiguration)?;
-        self.replace(now, &saved, polled)?;
-        Ok(Done::BeginFrom(known))
+        self.check_start(now, &known)?;
+        if self.stored.is_some_and(|stored| stored.is_parked) {
+            // From now on the pose after a power loss is unknown.
+            self.writes.take(now, 0);
+            let saved = self.record_of(now, &known, false);
+            self.replace_stored(&saved, polled)?;
+        }
+        Ok(Next::Begin(known))
     }
 
-    fn stop(&mut self, now: Instant, polled: &mut Polled) {
+    fn stop(&mut self, now: Instant) {
         if !self.is_running() {
             return;
         }
-        self.known = self.known_now(now);
-        polled.saved = self.record(now, true).map(|saved| self.write(now, &saved));
+        self.known = self.known_now();
         self.faults = self.faults();
         self.mode = Mode::Waiting(Check::new(now));
+        self.owes_record = true;
     }
 
-    /// Writes down what is known now, and goes on from there.
-    fn go_on_from(
+    /// Replaces what is known while the loop does not run. A record of a parked robot is no longer true
+    /// then, and must not stay.
+    #[inline(never)]
+    fn replace(
         &mut self,
         now: Instant,
         known: Resumed,
         polled: &mut Polled,
-    ) -> Result<Done, Refused> {
-        let is_running = self.is_running();
-        let record = self.record(now, !is_running).ok_or(Refused::NoConfiguration)?;
-        let Resumed { state, deviation, has_pose, .. } = known;
-        let is_parked = !is_running && has_pose;
-        self.replace(now, &Saved { is_parked, state, deviation, ..record }, polled)?;
-        if is_running {
-            return Ok(Done::BeginFrom(known));
+    ) -> Result<(), CommandError> {
+        self.check_start(now, &known)?;
+        let mut is_owed = true;
+        if self.stored.is_some_and(|stored| stored.is_parked) {
+            is_owed = !self.writes.take(now, 1);
+            if is_owed {
+                self.writes.take(now, 0);
+            }
+            let saved = self.record_of(now, &known, known.has_pose && !is_owed);
+            self.replace_stored(&saved, polled)?;
         }
         self.known = Some(known);
-        Ok(Done::With(Outcome::Done))
+        self.owes_record = is_owed;
+        Ok(())
     }
 
-    /// Writes a record over one that is no longer true, which must not stay; where there is none,
-    /// a flash that fails costs the memory and no more.
-    fn replace(&mut self, now: Instant, saved: &Saved, polled: &mut Polled) -> Result<(), Refused> {
-        let written = self.write(now, saved);
+    /// Writes a record over one that is no longer true.
+    fn replace_stored(&mut self, saved: &Saved, polled: &mut Polled) -> Result<(), CommandError> {
+        let owed = self.owes_record;
+        let written = self.write(saved);
         polled.saved = Some(written);
-        let has_old = self.stored.is_some();
-        written.or(if has_old { Err(Refused::Storage) } else { Ok(()) })
+        self.owes_record = owed;
+        written.map_err(|_| CommandError::Storage)
     }
 
-    /// What would be known of a robot that was stopped now; `None` without a configuration.
-    fn known_now(&self, now: Instant) -> Option<Resumed> {
-        let (config, checksum) = self.config?;
-        match &self.mode {
-            Mode::Waiting(_) => self.known,
-            Mode::Running(_) => {
-                let saved = self.record(now, true)?;
-                Some(Resumed::from(&saved, &config, checksum))
-            }
-        }
-    }
-
-    /// Begins the loop; gives what to tell of it.
+    /// Starts the loop, or restarts a running one; returns its telemetry.
     #[inline(never)]
-    fn begin(&mut self, now: Instant, known: &Resumed) -> Result<Telemetry, Refused> {
-        let (map, _) = self.flashed.map.map_err(|_| Refused::NoMap)?;
-        let (config, _) = self.config.ok_or(Refused::NoConfiguration)?;
-        let Resumed { state, deviation, .. } = *known;
-        let localizer = Localizer::resume(config, map, state, deviation, now);
-        let localizer = localizer.map_err(|_| Refused::Pose)?;
-        let (reporter, began) = Reporter::resume(now, state, deviation);
-        let robot = Robot::new(localizer, self.body.wheels, self.body.settings);
-        let robot = robot.map_err(|_| Refused::Configuration)?;
-        self.faults = self.faults();
+    fn begin(&mut self, now: Instant, origin: &Resumed) -> Result<Telemetry, CommandError> {
+        let (config, _) = self.config.as_ref().ok_or(CommandError::NoConfiguration)?;
+        let Startable { localizer, wheels, settings } = self.startable(now, config, origin)?;
+        let origin = *origin;
+        let deviation = origin.deviation_at_start(localizer.config());
+        let (reporter, began) = Reporter::resume(now, origin.state, deviation);
         let written = self.stored.map_or(deviation, |stored| stored.deviation);
-        let habit = Habit::new(now, written);
-        self.mode = Mode::Running(Running { robot, reporter, habit, report: Report::default() });
+        if let Mode::Running(running) = &mut self.mode {
+            let restarted = running.robot.restart(localizer, wheels, settings);
+            restarted.map_err(|_| CommandError::Configuration)?;
+            running.reporter = reporter;
+            running.origin = origin;
+            return Ok(began);
+        }
+        let robot = Robot::new(localizer, wheels, settings);
+        let robot = robot.map_err(|_| CommandError::Configuration)?;
+        self.faults = self.faults();
+        self.mode = Mode::Running(Running {
+            robot,
+            reporter,
+            save_policy: SavePolicy::new(now, written),
+            origin,
+            has_rolled: false,
+            report: Report::default(),
+        });
         Ok(began)
     }
+}
+
+#[inline(never)]
+fn configure(hardware: &mut impl Hardware, config: &RobotConfig) -> Result<(), CommandError> {
+    hardware.configure(config).map_err(CommandError::Unsupported)
 }

@@ -1,26 +1,27 @@
-//! Both directions of the link, and the rhythm of what is told.
+//! Both directions of the link, and the schedule of telemetry.
 //!
-//! Every step and look is told at once, the estimate at every tick, [`Loop`](Telemetry::Loop) once a second,
-//! [`Hello`](Telemetry::Hello) every ten: at ten ticks and a look a second 1.4 kB/s of the 11.5 kB/s that a link at
-//! 115,200 baud carries (`docs/firmware.md`). A frame for which there is no room is dropped; the
-//! gap shows in the sequence numbers.
+//! Steps and pings are sent at once, the estimate at every tick, [`LoopStatus`](Telemetry::LoopStatus) once a second,
+//! [`Hello`](Telemetry::Hello) every ten: at ten ticks and a ping a second 1.4 kB/s of the 11.5 kB/s of a link at
+//! 115,200 baud (`docs/firmware.md`). A frame for which there is no room is dropped; the sequence numbers show the gap.
 
 use sonarfix::units::{Duration, Instant};
-use sonarfix_link::{Answered, Command, Counters, Frame, Receiver, Sender, Telemetry, frame};
+use sonarfix_link::{
+    Command, Deduplicator, Frame, Receiver, ReceiverCounters, Sender, Telemetry, frame,
+};
 
 use crate::time::after;
 
-/// From one [`Hello`](Telemetry::Hello) to the next.
+/// Period of [`Hello`](Telemetry::Hello).
 const HELLO: Duration = Duration::from_ticks(10_000_000);
-/// From one [`Loop`](Telemetry::Loop) to the next.
+/// Period of [`LoopStatus`](Telemetry::LoopStatus).
 const LOOP: Duration = Duration::from_ticks(1_000_000);
 
-/// The link's bytes, as far as they are there.
+/// The bytes of the link, without waiting.
 pub trait Link {
-    /// The next byte that came in, if any.
+    /// The next received byte, if any.
     fn receive(&mut self) -> Option<u8>;
 
-    /// Takes a frame to send: all of it, or none of it if there is no room.
+    /// Queues a whole frame, or nothing if there is no room for it.
     fn send(&mut self, frame: &[u8]);
 }
 
@@ -28,15 +29,16 @@ pub trait Link {
 #[derive(Default)]
 pub(super) struct Wire {
     receiver: Receiver<Command>,
-    pub answered: Answered,
+    pub answered: Deduplicator,
     sender: Sender<Telemetry>,
-    /// When to tell next; at once after the start.
+    /// The next deadlines; immediately after the start.
     hello_at: Option<Instant>,
     loop_at: Option<Instant>,
 }
 
 impl Wire {
-    /// Reads what has come in, up to the next command.
+    /// Reads the received bytes up to the next command.
+    #[inline(never)]
     pub fn next(&mut self, link: &mut impl Link) -> Option<Frame<Command>> {
         while let Some(byte) = link.receive() {
             let frame = self.receiver.push(byte);
@@ -47,6 +49,8 @@ impl Wire {
         None
     }
 
+    /// Sends a message. Not inlined, because of the buffers of a frame.
+    #[inline(never)]
     pub fn send(&mut self, message: &Telemetry, link: &mut impl Link) {
         let mut buffer = frame::EMPTY;
         link.send(self.sender.frame(message, &mut buffer));
@@ -60,7 +64,7 @@ impl Wire {
         is_due(&mut self.loop_at, now, LOOP)
     }
 
-    pub fn counters(&self) -> Counters {
+    pub fn counters(&self) -> ReceiverCounters {
         self.receiver.counters()
     }
 }

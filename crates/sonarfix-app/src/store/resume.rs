@@ -1,25 +1,30 @@
-//! What is still true of a record when the robot is switched on again.
+//! What an interruption leaves of what a robot knows: a Stop, or the power being switched off.
 //!
-//! | state | its deviation is |
+//! | state | deviation after it |
 //! |---|---|
-//! | scale errors, track width | twice the stored one, and with it a tenth of the prior (independent); at most the prior |
-//! | range scale | twice the stored one, and with it the whole prior: the air is that of another day |
-//! | position, if it was parked | the stored one, and with it 10 cm |
-//! | heading, if it was parked | the stored one, and with it 5° |
+//! | scale errors, track width | twice the one before, and a tenth of the prior (independent); at most the prior |
+//! | range scale | the prior: the air is that of another day |
+//! | position, if the robot was parked | the one before, and 10 cm; at most 1 km |
+//! | heading, if the robot was parked | the one before, and 5°; at most 180° |
 //!
-//! *Twice*, because a record holds deviations and not what the errors know of each other: no
-//! covariance of four errors exceeds four times its diagonal, so the robot never claims to know
-//! more than it did. The tenth is for tyres that are cleaned, warmed or pressed flat while it
-//! stands; the 10 cm and 5° for the hand that takes hold of the switch. Whoever carries the robot
-//! farther sets its pose; if not, the health finds out.
+//! *Twice*, because a record holds deviations and no correlations: no covariance of four errors
+//! exceeds four times its diagonal, so the robot never claims to know more than it did. The tenth is
+//! for tyres that are cleaned, warmed or pressed flat while the robot stands; the 10 cm and 5° for the
+//! hand that takes hold of the switch. Whoever carries the robot farther sets its pose; if not, the
+//! health finds out.
+//!
+//! **Any number of interruptions without driving equals one**: what is kept and written are the
+//! deviations *before* the interruption, and the rule above is applied when the loop starts. A loop
+//! in which no wheel has rolled leaves them as they were before it.
 //!
 //! A record that was written while the robot might drive says nothing of where it stands now:
 //! its pose is not used. A calibration belongs to the configuration that it corrects: with
 //! another, the prior counts.
 
 use sonarfix::config::Config;
-use sonarfix::ekf::State;
+use sonarfix::ekf::{StandardDeviations, StateEstimate};
 use sonarfix::localizer::Start;
+use sonarfix::units::{Metres, Radians};
 
 use super::Saved;
 
@@ -30,19 +35,28 @@ const TURNED: f32 = 5.0 * core::f32::consts::PI / 180.0;
 const AGED: f32 = 0.1;
 /// The square root of the number of correlated calibration errors.
 const DECORRELATED: f32 = 2.0;
+/// The largest deviation of a position, metres.
+pub const MAX_POSITION_DEVIATION: f32 = 1_000.0;
+/// The largest deviation of a heading, radians.
+pub const MAX_HEADING_DEVIATION: f32 = core::f32::consts::PI;
 
 /// Where a robot starts from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[expect(clippy::struct_excessive_bools, reason = "independent facts, each with a name")]
 pub struct Resumed {
     /// Pose and calibration; the pose is zero if it is not known.
-    pub state: State,
-    /// Their standard deviations.
-    pub deviation: State,
+    pub state: StateEstimate,
+    /// Their standard deviations before the interruption, if there was one.
+    pub deviation: StandardDeviations,
     /// Whether the pose is known.
     pub has_pose: bool,
     /// Whether the calibration is a learned one.
     pub has_calibration: bool,
+    /// Whether the pose was interrupted since it was known with its deviations.
+    pub is_pose_interrupted: bool,
+    /// Whether the calibration was.
+    pub is_calibration_interrupted: bool,
 }
 
 impl Resumed {
@@ -50,15 +64,21 @@ impl Resumed {
     #[must_use]
     pub fn afresh(config: &Config) -> Self {
         let prior = &config.prior;
-        let deviation = State {
+        let deviation = StandardDeviations {
             scale_right: prior.scale_right,
             scale_left: prior.scale_left,
-            track_width_error: prior.track_width.0,
+            track_width_error: prior.track_width,
             range_scale: prior.range_scale,
-            ..State::default()
+            ..StandardDeviations::default()
         };
-        let state = State::default();
-        Self { state, deviation, has_pose: false, has_calibration: false }
+        Self {
+            state: StateEstimate::default(),
+            deviation,
+            has_pose: false,
+            has_calibration: false,
+            is_pose_interrupted: false,
+            is_calibration_interrupted: false,
+        }
     }
 
     /// What remains of a record, for a robot of this configuration with this checksum.
@@ -68,22 +88,73 @@ impl Resumed {
         if !is_sound(saved) {
             return afresh;
         }
+        let whole = Self::interrupted(saved.state, saved.deviation);
         let has_calibration = saved.configuration == configuration;
-        let (state, deviation) = if has_calibration {
-            (saved.state, calibration(&saved.deviation, &afresh.deviation))
-        } else {
-            (afresh.state, afresh.deviation)
-        };
-        let mut resumed = Self { state, deviation, has_pose: saved.is_parked, has_calibration };
-        let pose = if saved.is_parked { saved.state } else { State::default() };
-        (resumed.state.x, resumed.state.y) = (pose.x, pose.y);
-        resumed.state.heading = pose.heading;
-        if saved.is_parked {
-            resumed.deviation.x = both(saved.deviation.x, PUSHED);
-            resumed.deviation.y = both(saved.deviation.y, PUSHED);
-            resumed.deviation.heading = both(saved.deviation.heading, TURNED);
+        let resumed = if has_calibration { whole } else { whole.calibrated_as(&afresh) };
+        if saved.is_parked { resumed } else { resumed.without_pose() }
+    }
+
+    /// What is known of a robot that was stopped with this estimate.
+    #[must_use]
+    pub fn interrupted(state: StateEstimate, deviation: StandardDeviations) -> Self {
+        Self {
+            state,
+            deviation,
+            has_pose: true,
+            has_calibration: true,
+            is_pose_interrupted: true,
+            is_calibration_interrupted: true,
         }
-        resumed
+    }
+
+    /// The same after another interruption.
+    #[must_use]
+    pub fn interrupted_again(self) -> Self {
+        Self { is_pose_interrupted: true, is_calibration_interrupted: true, ..self }
+    }
+
+    /// The deviations with which a robot of this configuration starts.
+    #[must_use]
+    pub fn deviation_at_start(&self, config: &Config) -> StandardDeviations {
+        let prior = Self::afresh(config).deviation;
+        let mut start = self.deviation;
+        if self.is_calibration_interrupted {
+            let wheel = |known: f32, prior: f32| both(DECORRELATED * known, AGED * prior);
+            start.scale_right = wheel(start.scale_right, prior.scale_right);
+            start.scale_left = wheel(start.scale_left, prior.scale_left);
+            start.track_width_error =
+                Metres(wheel(start.track_width_error.0, prior.track_width_error.0));
+            start.range_scale = prior.range_scale;
+        }
+        start.scale_right = least(start.scale_right, prior.scale_right);
+        start.scale_left = least(start.scale_left, prior.scale_left);
+        let track_width = least(start.track_width_error.0, prior.track_width_error.0);
+        start.track_width_error = Metres(track_width);
+        start.range_scale = least(start.range_scale, prior.range_scale);
+        if self.is_pose_interrupted {
+            let pushed =
+                |known: Metres| Metres(least(both(known.0, PUSHED), MAX_POSITION_DEVIATION));
+            (start.x, start.y) = (pushed(start.x), pushed(start.y));
+            let turned = both(start.heading.0, TURNED);
+            start.heading = Radians(least(turned, MAX_HEADING_DEVIATION));
+        }
+        start
+    }
+
+    fn without_pose(self) -> Self {
+        let none = StateEstimate::default();
+        let unknown = StandardDeviations::default();
+        Self {
+            state: StateEstimate { x: none.x, y: none.y, heading: none.heading, ..self.state },
+            deviation: StandardDeviations {
+                x: unknown.x,
+                y: unknown.y,
+                heading: unknown.heading,
+                ..self.deviation
+            },
+            has_pose: false,
+            ..self
+        }
     }
 
     /// The same calibration at another pose.
@@ -91,44 +162,32 @@ impl Resumed {
     pub fn at(self, start: &Start) -> Self {
         let mut known = self;
         let Start { pose, position_deviation, heading_deviation } = *start;
-        (known.state.x, known.state.y) = (pose.x.0, pose.y.0);
-        known.state.heading = pose.heading.radians().0;
-        (known.deviation.x, known.deviation.y) = (position_deviation.0, position_deviation.0);
-        known.deviation.heading = heading_deviation.0;
-        Self { has_pose: true, ..known }
+        (known.state.x, known.state.y) = (pose.x, pose.y);
+        known.state.heading = pose.heading.radians();
+        (known.deviation.x, known.deviation.y) = (position_deviation, position_deviation);
+        known.deviation.heading = heading_deviation;
+        Self { has_pose: true, is_pose_interrupted: false, ..known }
     }
 
     /// The same pose with another's calibration.
     #[must_use]
     pub fn calibrated_as(self, other: &Self) -> Self {
-        let at = |pose: State, calibration: State| State {
-            x: pose.x,
-            y: pose.y,
-            heading: pose.heading,
-            ..calibration
-        };
+        let StateEstimate { x, y, heading, .. } = self.state;
+        let state = StateEstimate { x, y, heading, ..other.state };
+        let StandardDeviations { x, y, heading, .. } = self.deviation;
+        let deviation = StandardDeviations { x, y, heading, ..other.deviation };
         Self {
-            state: at(self.state, other.state),
-            deviation: at(self.deviation, other.deviation),
-            has_pose: self.has_pose,
+            state,
+            deviation,
             has_calibration: other.has_calibration,
+            is_calibration_interrupted: other.is_calibration_interrupted,
+            ..self
         }
     }
 }
 
-/// Deviations of the calibration, from those stored and those of the prior; none of the pose.
-fn calibration(stored: &State, prior: &State) -> State {
-    let wheel = |stored: f32, prior: f32| {
-        let aged = both(DECORRELATED * stored, AGED * prior);
-        if aged < prior { aged } else { prior }
-    };
-    State {
-        scale_right: wheel(stored.scale_right, prior.scale_right),
-        scale_left: wheel(stored.scale_left, prior.scale_left),
-        track_width_error: wheel(stored.track_width_error, prior.track_width_error),
-        range_scale: both(DECORRELATED * stored.range_scale, prior.range_scale),
-        ..State::default()
-    }
+fn least(one: f32, other: f32) -> f32 {
+    if one < other { one } else { other }
 }
 
 /// The deviation of two independent errors together.
@@ -137,11 +196,6 @@ fn both(one: f32, other: f32) -> f32 {
 }
 
 fn is_sound(saved: &Saved) -> bool {
-    let values = numbers(&saved.state).into_iter().all(f32::is_finite);
-    values && numbers(&saved.deviation).into_iter().all(|d| d >= 0.0 && d.is_finite())
-}
-
-fn numbers(state: &State) -> [f32; sonarfix::ekf::STATES] {
-    let State { x, y, heading, scale_right, scale_left, track_width_error, range_scale } = *state;
-    [x, y, heading, scale_right, scale_left, track_width_error, range_scale]
+    let values = saved.state.to_array().into_iter().all(f32::is_finite);
+    values && saved.deviation.to_array().into_iter().all(|d| d >= 0.0 && d.is_finite())
 }

@@ -1,13 +1,23 @@
-//! A simulated NOR flash whose power can be cut at any byte.
+//! A simulated NOR flash whose power can be cut at any step of any write or erase.
+//!
+//! # What an interrupted operation leaves
+//! A cell that was being changed as the power went holds its old value, its new value, or a charge
+//! near the threshold, which reads as 0 or 1, differently each time. An erase works on all cells of
+//! a sector at once, and many chips first program them all to 0: so every bit of the sector may be
+//! old, 0, 1 or unstable. A write works on one word (STM32F405) or one page (flash of the RP2350)
+//! at a time: bits of it that were to become 0 may be 1, 0 or unstable; other bits do not change.
+//! An unstable bit stays so until it is programmed to 0 or erased, each time to the end.
 
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
 };
 
 /// Bytes of a sector.
-pub const SECTOR: usize = 256;
+pub const SECTOR: usize = 2_048;
 /// Sectors of the store.
 pub const SECTORS: usize = 2;
+/// Steps of an erase at which the power can be cut.
+const ERASE_STEPS: usize = 8;
 
 /// Why an operation failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,26 +34,79 @@ impl NorFlashError for FlashError {
     }
 }
 
-/// What a byte that was being written or erased as the power went holds afterwards.
+/// Numbers that look random, from a seed (`SplitMix64`).
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Random(u64);
+
+impl Random {
+    /// The sequence of this seed.
+    pub fn new(seed: u64) -> Self {
+        Self(seed.wrapping_mul(0xD1B5_4A32_D192_ED03))
+    }
+
+    /// The next number.
+    pub fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        mixed ^ (mixed >> 31)
+    }
+
+    /// A number below `end`.
+    pub fn below(&mut self, end: usize) -> usize {
+        (self.next() % end as u64) as usize
+    }
+}
+
+/// How many of 256 bits of an interrupted operation end in each state; the others are unstable.
+#[derive(Debug, Clone, Copy)]
+struct Mix {
+    old: usize,
+    zero: usize,
+    one: usize,
+}
+
+impl Mix {
+    /// All of one kind, all but a few of one kind, or any mix.
+    fn draw(random: &mut Random) -> Self {
+        let most = [256, 252, 240, 128][random.below(4)];
+        match random.below(6) {
+            0 | 1 => Self { old: most, zero: 0, one: 0 },
+            2 => Self { old: 0, zero: most, one: 0 },
+            3 => Self { old: 0, zero: 0, one: most },
+            4 => Self { old: 0, zero: 0, one: 0 },
+            _ => {
+                let old = random.below(257);
+                let zero = random.below(257 - old);
+                Self { old, zero, one: random.below(257 - old - zero) }
+            }
+        }
+    }
+}
+
+/// The supply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Torn {
-    /// What it held before.
-    Untouched,
-    /// Some of its bits have changed.
-    Half,
-    /// What it was to hold.
-    Done,
+enum Power {
+    On,
+    /// It goes in the step after so many more.
+    OnFor(usize),
+    Gone,
 }
 
 /// A flash of a few small sectors.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SimFlash {
     bytes: Vec<u8>,
-    /// Bytes that may still be written or erased before the power goes.
-    power: Option<usize>,
-    torn: Torn,
-    /// Bytes written or erased so far.
-    pub spent: usize,
+    /// Bits that read differently each time.
+    unstable: Vec<u8>,
+    random: Random,
+    /// Bytes that are written at once.
+    unit: usize,
+    power: Power,
+    /// Steps done so far: one for each unit written, [`ERASE_STEPS`] for each sector erased.
+    pub steps: usize,
+    /// Bytes written so far.
+    pub written: usize,
     /// Sectors erased so far.
     pub erased: usize,
     /// Whether writes are ignored, as by the flash of an emulator.
@@ -51,7 +114,7 @@ pub struct SimFlash {
 }
 
 impl SimFlash {
-    /// A flash as it leaves the factory.
+    /// A flash as it leaves the factory, which writes words.
     pub fn new() -> Self {
         Self::filled(0xFF)
     }
@@ -60,17 +123,32 @@ impl SimFlash {
     pub fn filled(byte: u8) -> Self {
         Self {
             bytes: vec![byte; SECTOR * SECTORS],
-            power: None,
-            torn: Torn::Done,
-            spent: 0,
+            unstable: vec![0; SECTOR * SECTORS],
+            random: Random::new(0),
+            unit: 4,
+            power: Power::On,
+            steps: 0,
+            written: 0,
             erased: 0,
             is_read_only: false,
         }
     }
 
-    /// Lets the power go after so many more bytes; the byte after them is left torn.
-    pub fn cut_after(&mut self, bytes: usize, torn: Torn) {
-        (self.power, self.torn) = (Some(bytes), torn);
+    /// A flash that writes so many bytes at once, within units of this length.
+    pub fn writing(self, unit: usize) -> Self {
+        Self { unit, ..self }
+    }
+
+    /// Lets the power go in the step after so many more. The seed decides what that leaves, and
+    /// how unstable bits read.
+    pub fn cut_after(&mut self, steps: usize, seed: u64) {
+        self.power = Power::OnFor(steps);
+        self.random = Random::new(seed);
+    }
+
+    /// Switches the power on again.
+    pub fn power_up(&mut self) {
+        self.power = Power::On;
     }
 
     /// Overwrites one byte, as no flash would of its own.
@@ -78,31 +156,74 @@ impl SimFlash {
         self.bytes[at] = to;
     }
 
-    /// Switches the power on again.
-    pub fn power_up(&mut self) {
-        self.power = None;
+    /// Counts one step; `false` if the power goes in it.
+    fn step(&mut self) -> Result<bool, FlashError> {
+        self.steps += 1;
+        match self.power {
+            Power::On => return Ok(true),
+            Power::OnFor(0) => self.power = Power::Gone,
+            Power::OnFor(steps) => {
+                self.power = Power::OnFor(steps - 1);
+                return Ok(true);
+            }
+            Power::Gone => return Err(FlashError::NoPower),
+        }
+        Ok(false)
     }
 
-    /// Changes one byte, if the power lasts.
-    fn change(&mut self, at: usize, to: u8) -> Result<(), FlashError> {
-        let byte = &mut self.bytes[at];
-        match &mut self.power {
-            Some(0) => {
-                *byte = match self.torn {
-                    Torn::Untouched => *byte,
-                    // Half of the bits that differ have gone over.
-                    Torn::Half => *byte ^ ((*byte ^ to) & 0x55),
-                    Torn::Done => to,
-                };
-                self.torn = Torn::Untouched;
+    /// Writes bytes within one unit, which only clears bits: that is what NOR flash is. A cut leaves
+    /// one bit unstable at least, if that bit was changing: it is single bits that are overlooked.
+    fn write_unit(&mut self, from: usize, bytes: &[u8]) -> Result<(), FlashError> {
+        if !self.step()? {
+            let mix = Mix { one: 0, ..Mix::draw(&mut self.random) };
+            let weak = self.random.below(8 * bytes.len());
+            for (index, byte) in bytes.iter().enumerate() {
+                let at = from + index;
+                let changing = !byte & (self.bytes[at] | self.unstable[at]);
+                self.tear(at, changing, mix);
+                let weak = if weak / 8 == index { 1 << (weak % 8) } else { 0 };
+                self.unstable[at] |= changing & weak;
+            }
+            return Err(FlashError::NoPower);
+        }
+        for (at, byte) in (from..).zip(bytes) {
+            self.bytes[at] &= byte;
+            self.unstable[at] &= byte;
+        }
+        self.written += bytes.len();
+        Ok(())
+    }
+
+    fn erase_sector(&mut self, from: usize) -> Result<(), FlashError> {
+        for _ in 0..ERASE_STEPS {
+            if !self.step()? {
+                let mix = Mix::draw(&mut self.random);
+                (from..from + SECTOR).for_each(|at| self.tear(at, 0xFF, mix));
                 return Err(FlashError::NoPower);
             }
-            Some(left) => *left -= 1,
-            None => {}
         }
-        *byte = to;
-        self.spent += 1;
+        self.bytes[from..from + SECTOR].fill(0xFF);
+        self.unstable[from..from + SECTOR].fill(0);
+        self.erased += 1;
         Ok(())
+    }
+
+    /// Leaves these bits of a byte in any state.
+    fn tear(&mut self, at: usize, bits: u8, mix: Mix) {
+        for bit in (0..8).map(|bit| 1 << bit).filter(|bit| bits & bit != 0) {
+            let drawn = self.random.below(256);
+            if drawn < mix.old {
+                continue;
+            }
+            self.unstable[at] &= !bit;
+            if drawn < mix.old + mix.zero {
+                self.bytes[at] &= !bit;
+            } else if drawn < mix.old + mix.zero + mix.one {
+                self.bytes[at] |= bit;
+            } else {
+                self.unstable[at] |= bit;
+            }
+        }
     }
 }
 
@@ -115,8 +236,14 @@ impl ReadNorFlash for SimFlash {
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
         let from = offset as usize;
-        let read = self.bytes.get(from..from + bytes.len()).ok_or(FlashError::Misused)?;
-        bytes.copy_from_slice(read);
+        if self.power == Power::Gone || from + bytes.len() > self.bytes.len() {
+            return Err(FlashError::Misused);
+        }
+        for (at, byte) in (from..).zip(bytes) {
+            let unstable = self.unstable[at];
+            let noise = if unstable == 0 { 0 } else { self.random.next() as u8 };
+            *byte = (self.bytes[at] & !unstable) | (noise & unstable);
+        }
         Ok(())
     }
 
@@ -137,19 +264,27 @@ impl NorFlash for SimFlash {
         if self.is_read_only {
             return Ok(());
         }
-        self.erased += (to - from) / SECTOR;
-        (from..to).try_for_each(|at| self.change(at, 0xFF))
+        (from..to).step_by(SECTOR).try_for_each(|from| self.erase_sector(from))
     }
 
     fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
-        let from = offset as usize;
-        if !from.is_multiple_of(Self::WRITE_SIZE) || !bytes.len().is_multiple_of(Self::WRITE_SIZE) {
+        let (from, end) = (offset as usize, offset as usize + bytes.len());
+        let is_whole = |at: usize| at.is_multiple_of(Self::WRITE_SIZE);
+        if !is_whole(from) || !is_whole(end) || end > self.bytes.len() {
             return Err(FlashError::Misused);
         }
         if self.is_read_only {
             return Ok(());
         }
-        // Writing only clears bits; that is what NOR flash is.
-        (from..).zip(bytes).try_for_each(|(at, byte)| self.change(at, self.bytes[at] & byte))
+        let mut rest = bytes;
+        let mut at = from;
+        while !rest.is_empty() {
+            let room = self.unit - at % self.unit;
+            let (unit, after) = rest.split_at(room.min(rest.len()));
+            self.write_unit(at, unit)?;
+            at += unit.len();
+            rest = after;
+        }
+        Ok(())
     }
 }

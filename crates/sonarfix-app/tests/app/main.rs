@@ -6,8 +6,11 @@
     reason = "a few metres, seconds and sectors fit into any of these types"
 )]
 
+mod attacks;
 mod commands;
 mod flash;
-mod habit;
 mod power_cut;
+mod random;
 mod rig;
+mod robot_file;
+mod save_policy;

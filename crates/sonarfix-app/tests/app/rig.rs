@@ -3,18 +3,21 @@
 use std::collections::VecDeque;
 
 use embedded_hal::pwm;
-use sonarfix::config::Config;
+use sonarfix::config::{Config, ServoTiming};
 use sonarfix::localizer::Start;
 use sonarfix::map::Wall;
 use sonarfix::pose::{Point, Pose};
 use sonarfix::units::{Duration, Instant, Metres, Radians};
 use sonarfix_app::store::Store;
-use sonarfix_app::{App, Body, Flashed, Link, Polled};
-use sonarfix_hal::encoder::{Counter, WheelGeometry, Wheels};
-use sonarfix_hal::ranger::{NoEcho, Outcome as Heard, Ranger, TriggerError};
-use sonarfix_hal::robot::{Devices, Settings};
-use sonarfix_hal::servo::{Calibration, MeasuredPulse, Pace, Servo};
-use sonarfix_link::message::{Estimate, Loop, Outcome, Reset};
+use sonarfix_app::{App, Board, FlashContents, Link, Polled};
+use sonarfix_hal::config::{RobotConfig, WheelConfig};
+use sonarfix_hal::encoder::Counter;
+use sonarfix_hal::ranger::{
+    NoEcho, Outcome, Ranger, RangerKind, RangerSettings, TriggerError, UnsupportedKind,
+};
+use sonarfix_hal::robot::Devices;
+use sonarfix_hal::servo::{PwmFrame, Servo};
+use sonarfix_link::message::{CommandResult, Estimate, LoopStatus, ResetCause};
 use sonarfix_link::{Command, Receiver, Sender, Telemetry, baked, frame};
 
 use crate::flash::{SECTOR, SECTORS, SimFlash};
@@ -41,8 +44,11 @@ impl Counter for Encoder {
     }
 }
 
-/// A servo's PWM, there or not.
-pub struct Pwm(pub bool);
+/// A servo's PWM, there or not, and the duty that it was last set to.
+pub struct Pwm {
+    pub is_there: bool,
+    pub duty: u16,
+}
 
 impl pwm::ErrorType for Pwm {
     type Error = Missing;
@@ -53,8 +59,9 @@ impl pwm::SetDutyCycle for Pwm {
         40_000
     }
 
-    fn set_duty_cycle(&mut self, _duty: u16) -> Result<(), Missing> {
-        if self.0 { Ok(()) } else { Err(Missing) }
+    fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Missing> {
+        self.duty = duty;
+        if self.is_there { Ok(()) } else { Err(Missing) }
     }
 }
 
@@ -76,9 +83,15 @@ impl Ranger for Sonar {
         Ok(())
     }
 
-    fn poll(&mut self, _now: Instant) -> Result<Option<Heard>, Missing> {
+    fn poll(&mut self, _now: Instant) -> Result<Option<Outcome>, Missing> {
         let silence = if self.is_there { NoEcho::Nothing } else { NoEcho::NoResponse };
         Ok(std::mem::take(&mut self.is_pinging).then_some(Err(silence)))
+    }
+
+    /// As a driver of a pulse ranger does.
+    fn configure(&mut self, settings: &RangerSettings) -> Result<(), UnsupportedKind> {
+        let is_pulse = matches!(settings.kind, RangerKind::Pulse(_));
+        if is_pulse { Ok(()) } else { Err(UnsupportedKind) }
     }
 }
 
@@ -111,7 +124,7 @@ pub struct Baked {
 
 impl Baked {
     /// A room and a robot; behind both, the flash is as it left the factory.
-    pub fn new(config: &Config) -> Self {
+    pub fn new(config: &RobotConfig) -> Self {
         let corners = [(0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (0.0, 3.0), (0.0, 0.0)];
         let point = |(x, y): (f32, f32)| Point::new(x, y);
         let wall = |ends: &[(f32, f32)]| Wall::new(point(ends[0]), point(ends[1])).unwrap();
@@ -125,10 +138,21 @@ impl Baked {
 }
 
 /// The configuration of most tests.
-pub fn config() -> Config {
-    let mut config = Config::for_track_width(Metres(0.16));
-    config.prior.range_scale = 0.02;
-    config
+pub fn config() -> RobotConfig {
+    let mut localizer = Config::for_track_width(Metres(0.16));
+    localizer.prior.range_scale = 0.02;
+    localizer.sonar.servo = (Radians::from_degrees(-90.0), Radians::from_degrees(90.0));
+    localizer.sonar.timing.servo = ServoTiming::SG90;
+    let wheel = WheelConfig::of_diameter(Metres(0.065), 1_024.0);
+    let config = RobotConfig::with_common_parts(localizer);
+    RobotConfig { right_wheel: wheel, left_wheel: wheel, ..config }
+}
+
+/// A PWM channel with a frame of 20 ms, which makes pulses of 400 to 2,600 µs.
+pub fn servo(is_there: bool) -> Servo<Pwm> {
+    let micros = Duration::from_ticks;
+    let frame = PwmFrame { period: micros(20_000), shortest: micros(400), longest: micros(2_600) };
+    Servo::new(Pwm { is_there, duty: 0 }, frame)
 }
 
 /// A start that is known well.
@@ -146,6 +170,8 @@ pub struct Bench<'m> {
     pub hardware: Hardware,
     pub line: Line,
     pub now: u64,
+    /// What its first poll did.
+    pub first: Polled,
     receiver: Receiver<Telemetry>,
     sender: Sender<Command>,
 }
@@ -153,27 +179,25 @@ pub struct Bench<'m> {
 impl<'m> Bench<'m> {
     /// Switches a robot on, with this in its flash.
     pub fn switched_on(baked: &'m Baked, flash: SimFlash) -> Self {
-        let wheel = WheelGeometry::new(Metres(0.065), 1_024.0).unwrap();
-        let (wheels, settings) = (Wheels::alike(wheel), Settings::default());
-        let body = Body { wheels, settings, firmware: [1, 2, 3], reset: Reset::PowerOn };
+        Self::reset(baked, flash, 0)
+    }
+
+    /// The same after so many resets in a row.
+    pub fn reset(baked: &'m Baked, flash: SimFlash, resets: u8) -> Self {
+        let board = Board { firmware: [1, 2, 3], reset: ResetCause::PowerOn, resets };
         let store = Store::new(flash, 0..(SECTOR * SECTORS) as u32).unwrap();
-        let flashed = Flashed::read(&baked.map, &baked.config);
-        let app = App::new(body, flashed, store, Instant::from_ticks(0)).unwrap();
-        let pulse = |width, degrees| MeasuredPulse {
-            width: Duration::from_ticks(width),
-            bearing: Radians::from_degrees(degrees),
-        };
-        let calibration = Calibration::new(pulse(1_000, -45.0), pulse(2_000, 45.0)).unwrap();
-        let limits = (Radians::from_degrees(-90.0), Radians::from_degrees(90.0));
+        let flash = FlashContents::read(&baked.map, &baked.config);
+        let app = App::new(board, flash, store, Instant::from_ticks(0));
         let hardware = Devices {
             right: Encoder(Some(0)),
             left: Encoder(Some(0)),
-            servo: Servo::new(Pwm(true), calibration, limits, Pace::SG90).unwrap(),
+            servo: servo(true),
             ranger: Sonar { is_there: true, is_pinging: false },
         };
         let (receiver, sender) = (Receiver::new(), Sender::starting_at(1));
-        let mut bench = Self { app, hardware, line: Line::default(), now: 0, receiver, sender };
-        let _ = bench.turn();
+        let (line, first) = (Line::default(), Polled::default());
+        let mut bench = Self { app, hardware, line, now: 0, first, receiver, sender };
+        bench.first = bench.turn();
         bench
     }
 
@@ -203,10 +227,28 @@ impl<'m> Bench<'m> {
         frames.map(|frame| frame.message).collect()
     }
 
-    /// Sends a command, and takes the answer.
-    pub fn order(&mut self, command: &Command) -> Outcome {
+    /// Puts a command on the line.
+    pub fn send(&mut self, command: &Command) {
         let mut buffer = frame::EMPTY;
         self.line.to_robot.extend(self.sender.frame(command, &mut buffer));
+    }
+
+    /// Puts these bytes on the line.
+    pub fn garble(&mut self, bytes: &[u8]) {
+        self.line.to_robot.extend(bytes);
+    }
+
+    /// Lets the robot read all that is on the line, and forgets what it said.
+    pub fn drain(&mut self) {
+        while !self.line.to_robot.is_empty() {
+            let _ = self.turn();
+        }
+        self.line.from_robot.clear();
+    }
+
+    /// Sends a command, and takes the answer.
+    pub fn order(&mut self, command: &Command) -> CommandResult {
+        self.send(command);
         self.turn().answered.expect("a command is answered at once")
     }
 
@@ -217,9 +259,9 @@ impl<'m> Bench<'m> {
 }
 
 /// How the loop fares, as said last.
-pub fn fares(said: &[Telemetry]) -> Loop {
+pub fn fares(said: &[Telemetry]) -> LoopStatus {
     let found = said.iter().rev().find_map(|told| match told {
-        Telemetry::Loop(told) => Some(*told),
+        Telemetry::LoopStatus(told) => Some(*told),
         _ => None,
     });
     found.expect("it is said once a second")

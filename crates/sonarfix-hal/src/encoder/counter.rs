@@ -13,22 +13,21 @@ use core::convert::Infallible;
 /// assert_eq!(right.count(), Ok(0));
 /// ```
 pub trait Counter {
-    /// What can go wrong in reading it.
+    /// The error of a reading.
     type Error: core::fmt::Debug;
 
-    /// Width of the counter in bits, 1 to 32. It must be read before it has moved by half its
-    /// range since the last reading: 32,767 ticks for 16 bits, which the robot loop's 100 ms
-    /// leave room for.
+    /// Width of the counter in bits, 1 to 32. Between two readings it must move by less than half its range
+    /// (32,767 ticks for 16 bits); [`Hardware::configure`](crate::robot::Hardware::configure) checks it.
     const BITS: u32;
 
     /// The count now, in the lowest [`Self::BITS`] bits; the others are ignored.
     ///
     /// # Errors
-    /// Whatever the hardware says.
+    /// The error of the hardware.
     fn count(&mut self) -> Result<u32, Self::Error>;
 
-    /// Transitions seen so far that no wheel can make (both channels changed at once): edges
-    /// were missed, or the wiring is noisy. Wraps around. Zero where the hardware cannot tell.
+    /// The number of illegal transitions (both channels changed at once): edges were missed, or the wiring is noisy.
+    /// Wraps around. Zero where the hardware does not detect them.
     fn illegal(&mut self) -> u32 {
         0
     }
@@ -73,7 +72,7 @@ impl<F: FnMut() -> u32> Counter for Count32<F> {
     }
 }
 
-/// Follows a counter through its wrap-around.
+/// Unwraps a counter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Unwrapped {
     last: Option<u32>,
@@ -84,8 +83,7 @@ impl Unwrapped {
     /// Ticks since the first reading.
     ///
     /// # Errors
-    /// The counter's; the position is then what it was, and the next reading brings it up to
-    /// date.
+    /// The counter's. The position is unchanged, and the next reading contains the whole travel.
     pub fn read<C: Counter>(&mut self, counter: &mut C) -> Result<i64, C::Error> {
         let count = counter.count()?;
         let moved = self.last.map_or(0, |last| difference(count, last, C::BITS));
@@ -108,7 +106,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// A counter `N` bits wide with rubbish above them.
+    /// A counter `N` bits wide with arbitrary bits above them.
     struct Narrow<const N: u32>(i64);
 
     impl<const N: u32> Counter for Narrow<N> {
@@ -122,7 +120,7 @@ mod tests {
         }
     }
 
-    /// Follows steps, each in 256ths of the counter's half range; returns how often it wrapped.
+    /// Moves by steps, each in 256ths of the counter's half range; returns the number of wraps.
     fn follow<const N: u32>(start: u32, steps: &[i64]) -> Result<u32, TestCaseError> {
         let (range, mut wraps) = (1_i64 << N, 0);
         let first = i64::from(start);

@@ -14,10 +14,10 @@ use embedded_hal::digital::{ErrorType, InputPin};
 
 use super::Counter;
 
-/// The count of a [`Quadrature`] decoder: the decoder writes it, from an interrupt if you like,
-/// and the loop reads it through a shared reference.
+/// The count of a [`Quadrature`] decoder: the decoder writes it, possibly from an interrupt, and the loop reads it
+/// through a shared reference.
 ///
-/// One decoder a count; with two, ticks get lost. No compare-and-swap is used, so it works on a
+/// Each count belongs to one decoder; with two, ticks are lost. No compare-and-swap is used, so it works on a
 /// Cortex-M0 too.
 #[derive(Debug, Default)]
 pub struct TickCount {
@@ -89,7 +89,7 @@ where
     A: InputPin,
     B: InputPin + ErrorType<Error = A::Error>,
 {
-    /// A decoder that starts from where the pins are now.
+    /// A decoder that starts from the present levels of the pins.
     ///
     /// # Errors
     /// A pin's, if it cannot be read.
@@ -102,7 +102,7 @@ where
     /// tick, for its direction is unknown, and one [`Counter::illegal`].
     ///
     /// # Errors
-    /// A pin's; nothing was counted, and the next call sees the change.
+    /// A pin's. Nothing is counted, and the next call detects the change.
     pub fn update(&mut self) -> Result<(), A::Error> {
         let levels = (self.a.is_high()?, self.b.is_high()?);
         match transition(self.levels, levels) {
@@ -120,13 +120,13 @@ where
         (&mut self.a, &mut self.b)
     }
 
-    /// Gives the pins back.
+    /// Releases the pins.
     pub fn release(self) -> (A, B) {
         (self.a, self.b)
     }
 }
 
-/// The tick from one pair of levels to the next; `None` if no wheel can do that.
+/// The tick from one pair of levels to the next; `None` for an illegal transition.
 fn transition(from: (bool, bool), to: (bool, bool)) -> Option<i32> {
     let (a_changed, b_changed) = (from.0 != to.0, from.1 != to.1);
     match (a_changed, b_changed) {

@@ -15,6 +15,8 @@ pub enum GeometryError {
     Diameter,
     /// The number of ticks is zero, negative, NaN or infinite, or makes a tick of no length.
     TicksPerRevolution,
+    /// The travel from one tick to the next is zero, negative, NaN or infinite.
+    Travel,
 }
 
 impl core::fmt::Display for GeometryError {
@@ -22,13 +24,14 @@ impl core::fmt::Display for GeometryError {
         f.write_str(match self {
             Self::Diameter => "the wheel's diameter must be positive and finite",
             Self::TicksPerRevolution => "the ticks per revolution must be positive and finite",
+            Self::Travel => "the travel from one tick to the next must be positive and finite",
         })
     }
 }
 
 impl core::error::Error for GeometryError {}
 
-/// How far a wheel rolls at one tick, by its nominal diameter.
+/// The travel of a wheel from one tick to the next, by its nominal diameter.
 ///
 /// ```
 /// use sonarfix::units::Metres;
@@ -46,8 +49,7 @@ pub struct WheelGeometry {
 }
 
 impl WheelGeometry {
-    /// A wheel of this diameter whose encoder counts so many ticks a turn. They need not be a
-    /// whole number: gears rarely make one.
+    /// A wheel of this diameter and number of ticks per revolution, which need not be a whole number.
     ///
     /// # Errors
     /// [`GeometryError`], by which argument is wrong.
@@ -56,11 +58,23 @@ impl WheelGeometry {
         if !positive(diameter.0) {
             return Err(GeometryError::Diameter);
         }
-        let metres_per_tick = core::f32::consts::PI * diameter.0 / ticks_per_revolution;
-        if !positive(ticks_per_revolution) || !positive(metres_per_tick) {
+        let travel = Metres(core::f32::consts::PI * diameter.0 / ticks_per_revolution);
+        if !positive(ticks_per_revolution) {
             return Err(GeometryError::TicksPerRevolution);
         }
-        Ok(Self { metres_per_tick })
+        Self::rolling(travel).map_err(|_| GeometryError::TicksPerRevolution)
+    }
+
+    /// A wheel with this travel from one tick to the next.
+    ///
+    /// # Errors
+    /// [`GeometryError::Travel`] if that is not a positive, finite length.
+    pub fn rolling(per_tick: Metres) -> Result<Self, GeometryError> {
+        if per_tick.0 > 0.0 && per_tick.is_finite() {
+            Ok(Self { metres_per_tick: per_tick.0 })
+        } else {
+            Err(GeometryError::Travel)
+        }
     }
 
     /// The same wheel with an encoder that counts down when it rolls forwards: one side of a
@@ -76,7 +90,7 @@ impl WheelGeometry {
         Metres(self.metres_per_tick.abs())
     }
 
-    /// How far the wheel rolled in `half_ticks` halves of a tick.
+    /// The travel of `half_ticks` halves of a tick.
     #[expect(clippy::cast_precision_loss, reason = "a travel of 2²⁴ half ticks is kilometres")]
     fn travel(self, half_ticks: i64) -> Metres {
         Metres(half_ticks as f32 * (0.5 * self.metres_per_tick))
@@ -100,7 +114,7 @@ impl Wheels {
         Self { right: wheel, left: wheel }
     }
 
-    /// How far both wheels rolled, from halves of ticks: the loop splits ticks in two
+    /// The travel of both wheels, from halves of ticks: the loop splits ticks in two
     /// (see [`robot`](crate::robot)).
     pub(crate) fn travel(self, right_halves: i64, left_halves: i64) -> WheelTravel {
         WheelTravel { right: self.right.travel(right_halves), left: self.left.travel(left_halves) }

@@ -10,7 +10,7 @@ use crate::time::micros;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Celsius(pub f32);
 
-/// The temperature is not one at which a robot drives (−40 °C to 85 °C), or NaN.
+/// The temperature is out of range (−40 °C to 85 °C), or NaN.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TemperatureError;
@@ -26,7 +26,7 @@ impl core::error::Error for TemperatureError {}
 /// The air that the sound crosses.
 ///
 /// The speed of sound in dry air is 331.3 + 0.606 T m/s for T in °C, so one degree is 0.18 % of
-/// every range. What the set temperature misses, the filter's range scale κ finds
+/// every range. The error of the configured temperature is estimated as the range scale κ
 /// (`docs/model.md`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -67,7 +67,7 @@ impl Air {
         self.speed
     }
 
-    /// How far away something is from which sound is back after `flight`.
+    /// The range for this time of flight.
     #[must_use]
     pub fn range(self, flight: Duration) -> Metres {
         Metres(0.5e-6 * self.speed.0 * micros(flight))
@@ -80,7 +80,7 @@ mod tests {
 
     #[test]
     fn the_datasheets_scales_are_those_of_ordinary_rooms() {
-        // LV-MaxSonar-EZ: 147 µs an inch, made for 22.5 °C by its maker's word.
+        // LV-MaxSonar-EZ: 147 µs an inch, specified for 22.5 °C.
         let inch = Air::at(Celsius(22.5)).unwrap().range(Duration::from_ticks(147));
         assert!((inch.0 - 0.0254).abs() < 0.0001, "{inch:?}");
         // HC-SR04: 58 µs a centimetre.
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn weather_that_is_none_is_refused() {
+    fn temperatures_out_of_range_are_refused() {
         for bad in [-40.1, 85.1, f32::NAN, f32::INFINITY, -f32::INFINITY] {
             assert_eq!(Air::at(Celsius(bad)), Err(TemperatureError), "{bad}");
         }

@@ -1,18 +1,17 @@
-//! An echo line whose edges an interrupt stamps.
+//! An echo line whose edges are time-stamped by an interrupt.
 //!
-//! One side writes, one side reads, and neither waits for the other:
+//! The interrupt writes and the loop reads; neither waits for the other:
 //!
 //! ```text
 //!   interrupt (or a timer's input capture)          loop
 //!     rose(at) ─▶ rise, rise_of ───┐
-//!     fell(at) ─▶ fall, heard ─────┴─▶ EchoCapture ◀──▶ Captured: arms a ping, takes its pulse
+//!     fell(at) ─▶ fall, heard ─────┴─▶ EchoCapture ◀──▶ Captured: arms a ping, reads its pulse
 //! ```
 //!
-//! The loop numbers its pings (`armed`). The interrupt keeps the first pulse of a ping that is
-//! long enough and then leaves the stamps alone until the next number comes, so the loop reads
-//! them in peace. Only loads and stores are used: a Cortex-M0 has no compare-and-swap. Stamps are
-//! kept as the low 32 bits of the microseconds, which a Cortex-M stores in one go; a pulse must be
-//! taken within 35 minutes.
+//! The loop numbers its pings (`armed`). The interrupt stores the first pulse of a ping that is long enough and does
+//! not change it until the number changes, so that the loop reads both stamps consistently. Only loads and stores
+//! are used, because a Cortex-M0 has no compare-and-swap. The stamps are the low 32 bits of the microseconds, which
+//! a Cortex-M stores atomically; a pulse must be read within 35 minutes.
 
 use core::convert::Infallible;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -21,8 +20,8 @@ use sonarfix::units::{Duration, Instant};
 
 use super::pulse::{EchoLine, Pulse};
 
-/// Where an interrupt leaves the edges of an echo line. It can be a `static`, or live wherever
-/// your framework lets interrupt and loop share a reference.
+/// The edges of an echo line, written by an interrupt. It may be a `static`, or a value to which interrupt and loop
+/// share a reference.
 ///
 /// Call [`Self::rose`] and [`Self::fell`] from one interrupt only, with times of the clock whose
 /// `now` the loop is polled with.
@@ -41,13 +40,13 @@ use super::pulse::{EchoLine, Pulse};
 /// ```
 #[derive(Debug, Default)]
 pub struct EchoCapture {
-    /// Number of the ping that the loop waits for, and the shortest pulse that it takes, µs.
+    /// Number of the present ping, and its shortest valid pulse, µs.
     armed: AtomicU32,
     shortest: AtomicU32,
-    /// The last rising edge, and the ping during which it came.
+    /// The last rising edge, and the number of its ping.
     rise: AtomicU32,
     rise_of: AtomicU32,
-    /// The falling edge of the pulse of ping `heard`.
+    /// The falling edge of the pulse of ping `heard`, the last one with a pulse.
     fall: AtomicU32,
     heard: AtomicU32,
     high: AtomicBool,
@@ -59,15 +58,15 @@ fn stamp(at: Instant) -> u32 {
     at.ticks() as u32
 }
 
-/// The instant nearest to `now` with this stamp. It may lie after `now`, if the interrupt came
-/// between the reading of the clock and this.
+/// The instant nearest to `now` with this stamp. It may be after `now`, if the interrupt occurred after the clock was
+/// read.
 fn instant(now: Instant, stamped: u32) -> Instant {
     let ahead = stamped.wrapping_sub(stamp(now)).cast_signed();
     Instant::from_ticks(now.ticks().saturating_add_signed(i64::from(ahead)))
 }
 
 impl EchoCapture {
-    /// A capture of nothing yet.
+    /// A capture without edges.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -81,7 +80,7 @@ impl EchoCapture {
         }
     }
 
-    /// The line went high at `at`.
+    /// Records a rising edge at `at`.
     pub fn rose(&self, at: Instant) {
         self.high.store(true, Ordering::Relaxed);
         let ping = self.armed.load(Ordering::Acquire);
@@ -91,7 +90,7 @@ impl EchoCapture {
         }
     }
 
-    /// The line went low at `at`.
+    /// Records a falling edge at `at`.
     pub fn fell(&self, at: Instant) {
         self.high.store(false, Ordering::Relaxed);
         let ping = self.armed.load(Ordering::Acquire);
@@ -109,12 +108,12 @@ impl EchoCapture {
     }
 }
 
-/// The loop's side of an [`EchoCapture`]. One only: the pings it numbers are its own.
+/// The loop's side of an [`EchoCapture`]. There must be only one, because it numbers the pings.
 #[derive(Debug)]
 pub struct Captured<'c>(&'c EchoCapture);
 
 impl<'c> Captured<'c> {
-    /// Takes pulses from this capture.
+    /// Reads the pulses of this capture.
     #[must_use]
     pub const fn new(capture: &'c EchoCapture) -> Self {
         Self(capture)
@@ -148,7 +147,7 @@ impl EchoLine for Captured<'_> {
             rise: instant(now, self.0.rise.load(Ordering::Relaxed)),
             fall: instant(now, self.0.fall.load(Ordering::Relaxed)),
         };
-        // One that ended after the clock was read belongs to the next poll.
+        // A pulse that ended after the clock was read belongs to the next poll.
         Ok(Some(pulse).filter(|pulse| pulse.fall <= now))
     }
 

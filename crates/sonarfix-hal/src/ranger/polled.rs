@@ -1,4 +1,4 @@
-//! An echo line watched by polling its pin.
+//! An echo line whose pin is polled.
 
 use embedded_hal::digital::InputPin;
 use sonarfix::units::{Duration, Instant};
@@ -19,7 +19,7 @@ pub struct Polled<P> {
 }
 
 impl<P: InputPin> Polled<P> {
-    /// Watches this pin.
+    /// An echo line on this pin.
     #[must_use]
     pub fn new(pin: P) -> Self {
         Self { pin, level: false, rise: None, shortest: Duration::from_ticks(0) }
@@ -31,7 +31,7 @@ impl<P: InputPin> Polled<P> {
         (&mut self.pin, self.level)
     }
 
-    /// Gives the pin back.
+    /// Releases the pin.
     pub fn release(self) -> P {
         self.pin
     }

@@ -1,11 +1,11 @@
-//! Rangers that answer a trigger with a pulse as long as the sound's flight.
+//! Rangers whose echo pulse is as long as the time of flight.
 //!
 //! ```text
 //!   trigger ──┐▔▔▔▔▔▔▔┌─────────────────────────────────────
 //!             │ 10 µs │ burst, 0.2–0.5 ms
 //!   echo    ──────────────┐▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔┌─────────────
 //!                         │ flight            │
-//!                        sent              heard
+//!                        sent              received
 //! ```
 //!
 //! HC-SR04 (Elecfreaks' datasheet): trigger of at least 10 µs; eight cycles of 40 kHz; the echo
@@ -20,7 +20,10 @@
 use embedded_hal::digital::OutputPin;
 use sonarfix::units::{Duration, Instant};
 
-use super::{Air, Echo, NoEcho, Outcome, Ranger, TriggerError};
+use super::air::Air;
+use super::driver::{Ranger, TriggerError, UnsupportedKind};
+use super::echo::{Echo, NoEcho, Outcome};
+use super::settings::{PulseTiming, RangerKind, RangerSettings};
 use crate::time::{after, since};
 
 /// A pulse of the echo line.
@@ -33,10 +36,9 @@ pub struct Pulse {
     pub fall: Instant,
 }
 
-/// Something that watches an echo line: [`Polled`](super::Polled) or
-/// [`Captured`](super::Captured).
+/// An echo line: [`Polled`](super::Polled) or [`Captured`](super::Captured).
 pub trait EchoLine {
-    /// What can go wrong in reading it.
+    /// The error of a reading.
     type Error: core::fmt::Debug;
 
     /// Whether the line is high.
@@ -45,8 +47,8 @@ pub trait EchoLine {
     /// The pin's.
     fn is_high(&mut self) -> Result<bool, Self::Error>;
 
-    /// Forgets what was, and waits for the first pulse that lasts `shortest` or longer. A pulse
-    /// that began before this call does not count.
+    /// Discards earlier edges, and waits for the first pulse that lasts `shortest` or longer. A pulse that began before
+    /// this call does not count.
     ///
     /// # Errors
     /// The pin's.
@@ -60,57 +62,6 @@ pub trait EchoLine {
 
     /// Whether the line has gone high since it was armed.
     fn has_risen(&self) -> bool;
-}
-
-/// What a board does when.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct PulseTiming {
-    /// Shortest trigger pulse.
-    pub trigger: Duration,
-    /// Echo pulses shorter than this are the burst heard directly, or cross-talk between the
-    /// wires: they are overlooked, and the wait goes on.
-    pub blanking: Duration,
-    /// Longest flight that is believed. A longer pulse is [`NoEcho::OutOfRange`].
-    pub longest: Duration,
-    /// Pulses from this width on are the board's way to say that nothing came back. Measure
-    /// yours with nothing before it: a board that ends at 16 ms cannot tell a wall beyond 2.7 m
-    /// from none, so both `longest` and this belong below 16 ms there.
-    pub silence: Duration,
-    /// How long after the end of the trigger pulse to listen.
-    pub listen: Duration,
-    /// Least time from ping to ping, so that old echoes are not taken for new ones.
-    pub cycle: Duration,
-    /// How long after a trigger a line that is still high may be a board that just has not
-    /// given up yet. From then on it is stuck, and pinged again in the hope to free it.
-    pub stuck: Duration,
-}
-
-impl PulseTiming {
-    /// HC-SR04 and its kin: 4 m (23.3 ms at 20 °C). The bleed-through is 100 µs (1.7 cm);
-    /// `stuck` is beyond the slowest real board (70 ms).
-    pub const HC_SR04: Self = Self {
-        trigger: Duration::from_ticks(10),
-        blanking: Duration::from_ticks(100),
-        longest: Duration::from_ticks(23_500),
-        silence: Duration::from_ticks(30_000),
-        listen: Duration::from_ticks(32_000),
-        cycle: Duration::from_ticks(60_000),
-        stuck: Duration::from_ticks(100_000),
-    };
-
-    /// LV-MaxSonar-EZ by pulse width: 254 inches of 147 µs. Its shortest report is 6 inches, so
-    /// 100 µs of blanking take nothing away.
-    pub const LV_MAXSONAR: Self = Self {
-        trigger: Duration::from_ticks(20),
-        blanking: Duration::from_ticks(100),
-        longest: Duration::from_ticks(37_400),
-        silence: Duration::from_ticks(37_400),
-        listen: Duration::from_ticks(42_000),
-        cycle: Duration::from_ticks(50_000),
-        stuck: Duration::from_ticks(100_000),
-    };
 }
 
 /// The error of one of the two pins.
@@ -134,7 +85,7 @@ impl<T: core::fmt::Debug, L: core::fmt::Debug> core::fmt::Display for PulseError
 
 impl<T: core::fmt::Debug, L: core::fmt::Debug> core::error::Error for PulseError<T, L> {}
 
-/// Where a ping is.
+/// The state of a ping.
 ///
 /// ```text
 ///          trigger: pin high          poll, 10 µs later: pin low, line armed
@@ -154,17 +105,17 @@ enum State {
 /// ```
 /// use embedded_hal_mock::eh1::digital::{Mock, State::{High, Low}, Transaction as Pin};
 /// use sonarfix::units::{Instant, Metres};
-/// use sonarfix_hal::ranger::{Air, Captured, EchoCapture, PulseRanger, PulseTiming, Ranger};
+/// use sonarfix_hal::ranger::{Captured, EchoCapture, PulseRanger, Ranger};
 ///
 /// let mut trigger = Mock::new(&[Pin::set(High), Pin::set(Low)]);
 /// let capture = EchoCapture::new();
 /// let line = Captured::new(&capture);
-/// let mut ranger = PulseRanger::new(&mut trigger, line, PulseTiming::HC_SR04, Air::ROOM);
+/// let mut ranger = PulseRanger::new(&mut trigger, line);
 ///
 /// let at = Instant::from_ticks;
 /// ranger.trigger(at(0))?;
 /// assert_eq!(ranger.poll(at(10)), Ok(None)); // ends the trigger pulse
-/// capture.rose(at(470)); // the interrupt stamps both edges,
+/// capture.rose(at(470)); // the interrupt stamps both edges
 /// capture.fell(at(6_470));
 /// let echo = ranger.poll(at(8_000))?.unwrap()?; // and the loop may come when it likes
 /// assert_eq!(echo.reflected(), at(3_470));
@@ -178,25 +129,30 @@ pub struct PulseRanger<T, L> {
     trigger: T,
     line: L,
     timing: PulseTiming,
+    /// Least time from ping to ping.
+    cycle: Duration,
     air: Air,
     state: State,
-    /// When the trigger pin last moved: up, or down, which is when the board starts.
+    /// The last edge of the trigger pin; the module starts at its falling edge.
     triggered: Option<Instant>,
 }
 
 impl<T: OutputPin, L: EchoLine> PulseRanger<T, L> {
-    /// A ranger whose trigger pin is low.
+    /// A ranger whose trigger pin is low. Until it is [configured](Ranger::configure), it has the timing of an HC-SR04 at
+    /// room temperature.
     #[must_use]
-    pub fn new(trigger: T, line: L, timing: PulseTiming, air: Air) -> Self {
-        Self { trigger, line, timing, air, state: State::Idle, triggered: None }
+    pub fn new(trigger: T, line: L) -> Self {
+        let RangerSettings { cycle, air, .. } = RangerSettings::HC_SR04;
+        let timing = PulseTiming::HC_SR04;
+        Self { trigger, line, timing, cycle, air, state: State::Idle, triggered: None }
     }
 
-    /// Sets the air, as the temperature changes.
+    /// Sets the air after a change of temperature.
     pub fn set_air(&mut self, air: Air) {
         self.air = air;
     }
 
-    /// What this board does when.
+    /// The timing.
     #[must_use]
     pub fn timing(&self) -> &PulseTiming {
         &self.timing
@@ -208,7 +164,7 @@ impl<T: OutputPin, L: EchoLine> PulseRanger<T, L> {
         &mut self.line
     }
 
-    /// Gives pin and line back.
+    /// Releases pin and line.
     pub fn release(self) -> (T, L) {
         (self.trigger, self.line)
     }
@@ -217,9 +173,9 @@ impl<T: OutputPin, L: EchoLine> PulseRanger<T, L> {
         since(now, self.triggered.unwrap_or(now))
     }
 
-    /// Ends the trigger pulse, on whose falling edge the board starts.
+    /// Ends the trigger pulse; the module starts at its falling edge.
     fn lower(&mut self) -> Result<(), PulseError<T::Error, L::Error>> {
-        // Armed first: no edge of the answer can be missed.
+        // Armed first, so that no edge of the echo is missed.
         let armed = self.line.arm(self.timing.blanking);
         self.trigger.set_low().map_err(PulseError::Trigger)?;
         armed.map_err(PulseError::Echo)
@@ -227,7 +183,7 @@ impl<T: OutputPin, L: EchoLine> PulseRanger<T, L> {
 
     fn listen(&mut self, now: Instant) -> Result<Option<Outcome>, L::Error> {
         if let Some(pulse) = self.line.pulse(now)? {
-            return Ok(Some(self.judge(pulse)));
+            return Ok(Some(self.outcome_of(pulse)));
         }
         if self.age(now) < self.timing.listen {
             return Ok(None);
@@ -242,7 +198,7 @@ impl<T: OutputPin, L: EchoLine> PulseRanger<T, L> {
         Ok(Some(Err(reason)))
     }
 
-    fn judge(&self, pulse: Pulse) -> Outcome {
+    fn outcome_of(&self, pulse: Pulse) -> Outcome {
         let flight = since(pulse.fall, pulse.rise);
         if flight >= self.timing.silence {
             Err(NoEcho::Nothing)
@@ -258,11 +214,11 @@ impl<T: OutputPin, L: EchoLine> Ranger for PulseRanger<T, L> {
     type Error = PulseError<T::Error, L::Error>;
 
     fn ready_at(&self) -> Instant {
-        self.triggered.map_or(Instant::from_ticks(0), |at| after(at, self.timing.cycle))
+        self.triggered.map_or(Instant::from_ticks(0), |at| after(at, self.cycle))
     }
 
     fn trigger(&mut self, now: Instant) -> Result<(), TriggerError<Self::Error>> {
-        // A ping that was forgotten in flight must not keep the next one away for ever.
+        // A ping that is no longer polled must not block the next one forever.
         let in_flight = self.state != State::Idle && self.age(now) < self.timing.listen;
         if in_flight || now < self.ready_at() {
             return Err(TriggerError::TooSoon);
@@ -295,5 +251,13 @@ impl<T: OutputPin, L: EchoLine> Ranger for PulseRanger<T, L> {
             self.state = State::Idle;
         }
         result
+    }
+
+    fn configure(&mut self, settings: &RangerSettings) -> Result<(), UnsupportedKind> {
+        let RangerSettings { kind: RangerKind::Pulse(timing), cycle, air } = *settings else {
+            return Err(UnsupportedKind);
+        };
+        (self.timing, self.cycle, self.air) = (timing, cycle, air);
+        Ok(())
     }
 }

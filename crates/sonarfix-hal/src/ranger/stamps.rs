@@ -1,14 +1,14 @@
-//! Edges that hardware has stamped with a counter of its own, handed on when the loop comes by.
+//! Edges that hardware has time-stamped with its own counter, passed on by the loop.
 //!
-//! A state machine, or a timer whose interrupt may come late, keeps the stamps of the last rising and
-//! the last falling edge. Of several pulses between two readings only the last is seen, which is one
-//! pulse for the boards of [`PulseRanger`](super::PulseRanger) and a loop that comes every few milliseconds.
+//! A state machine, or a timer with a slow interrupt, holds the stamps of the last rising and the last falling edge. Of
+//! several pulses between two readings only the last is detected; a [`PulseRanger`](super::PulseRanger) generates at
+//! most one pulse between two polls that are a few milliseconds apart.
 
 use sonarfix::units::{Duration, Instant};
 
 use super::EchoCapture;
 
-/// What the hardware shows, in microseconds of its counter, which wraps around.
+/// The stamps of the hardware, in microseconds of its counter, which wraps around.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Stamps {
@@ -18,7 +18,7 @@ pub struct Stamps {
     pub fall: u32,
 }
 
-/// Tells an [`EchoCapture`] of edges by their stamps, in place of an interrupt.
+/// Passes edges to an [`EchoCapture`] by their stamps, in place of an interrupt.
 ///
 /// ```
 /// use sonarfix::units::{Duration, Instant};
@@ -28,39 +28,39 @@ pub struct Stamps {
 /// let mut line = Captured::new(&capture);
 /// let mut edges = StampedEdges::since(Stamps { rise: 0, fall: 0 });
 /// let Ok(()) = line.arm(Duration::from_ticks(100));
-/// // The loop comes by at 9,000 µs of its own clock, which is 7,500 of the hardware's.
+/// // The loop is polled at 9,000 µs of its own clock, which is 7,500 of the hardware's.
 /// let now = Instant::from_ticks(9_000);
-/// edges.tell(&capture, now, 7_500, Stamps { rise: 1_000, fall: 7_000 });
+/// edges.update(&capture, now, 7_500, Stamps { rise: 1_000, fall: 7_000 });
 /// let Ok(pulse) = line.pulse(now);
 /// assert_eq!(pulse.map(|pulse| pulse.rise), Some(Instant::from_ticks(2_500)));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct StampedEdges {
-    /// The edges that were told.
-    told: Stamps,
+    /// The edges that have been passed on.
+    passed: Stamps,
 }
 
 impl StampedEdges {
-    /// Edges from now on: these are the stamps that the hardware shows before the first.
+    /// Starts with the stamps of the hardware before the first edge.
     #[must_use]
-    pub const fn since(told: Stamps) -> Self {
-        Self { told }
+    pub const fn since(passed: Stamps) -> Self {
+        Self { passed }
     }
 
-    /// Tells of the edges that are new, the older first. `counter` is what the hardware's counter shows
-    /// `now`, read after the stamps; stamps must be less than 71 minutes old.
+    /// Passes the new edges on, the older first. `counter` is the hardware's counter at `now`, read after the stamps;
+    /// stamps must be less than 71 minutes old.
     ///
     /// # Panics
     /// Never.
-    pub fn tell(&mut self, capture: &EchoCapture, now: Instant, counter: u32, stamps: Stamps) {
+    pub fn update(&mut self, capture: &EchoCapture, now: Instant, counter: u32, stamps: Stamps) {
         let age = |stamp: u32| counter.wrapping_sub(stamp);
         let at = |stamp| {
             let age = Duration::from_ticks(age(stamp).into());
             now.checked_sub_duration(age).unwrap_or(Instant::from_ticks(0))
         };
         let Stamps { rise, fall } = stamps;
-        let (has_risen, has_fallen) = (rise != self.told.rise, fall != self.told.fall);
+        let (has_risen, has_fallen) = (rise != self.passed.rise, fall != self.passed.fall);
         let falls_first = age(fall) > age(rise);
         if has_fallen && falls_first {
             capture.fell(at(fall));
@@ -71,7 +71,7 @@ impl StampedEdges {
         if has_fallen && !falls_first {
             capture.fell(at(fall));
         }
-        self.told = stamps;
+        self.passed = stamps;
     }
 }
 
@@ -82,19 +82,18 @@ mod tests {
     use proptest::prelude::*;
     use std::vec::Vec;
 
-    /// What a line does: after so many microseconds it rises, and stays high for so many; it may fall
-    /// and rise between two turns, and no more.
+    /// Pulses: the microseconds before each rising edge, and its width. Between two polls there is at most one falling and
+    /// one rising edge.
     fn any_pulses() -> impl Strategy<Value = Vec<(u32, u32)>> {
         prop::collection::vec((200..40_000_u32, 2_000..30_000_u32), 1..20)
     }
 
     proptest! {
-        /// Told by stamps, whenever the loop comes by, a capture knows the pulses that an interrupt
-        /// would have told it; and whether the line is high.
+        /// A capture that is updated by stamps at any polls has the pulses and the level that it has by an interrupt.
         #[test]
-        fn stamps_tell_what_an_interrupt_would(
+        fn stamps_give_the_pulses_of_an_interrupt(
             pulses in any_pulses(),
-            turns in prop::collection::vec(100..2_000_u64, 700..2_000),
+            polls in prop::collection::vec(100..2_000_u64, 700..2_000),
             offset: u32,
         ) {
             let shortest = Duration::from_ticks(100);
@@ -114,15 +113,15 @@ mod tests {
             let mut shown = Stamps { rise: offset, fall: offset };
             let mut stamped = StampedEdges::since(shown);
             let (mut now, mut seen, mut edges) = (0_u64, 0, edges.into_iter().peekable());
-            for turn in turns {
-                now += turn;
+            for poll in polls {
+                now += poll;
                 while let Some((at, is_high)) = edges.next_if(|&(at, _)| at <= now) {
                     let stamp = if is_high { &mut shown.rise } else { &mut shown.fall };
                     *stamp = counter(at);
                     let at = Instant::from_ticks(at);
                     if is_high { by_interrupt.rose(at) } else { by_interrupt.fell(at) }
                 }
-                stamped.tell(&by_stamps, Instant::from_ticks(now), counter(now), shown);
+                stamped.update(&by_stamps, Instant::from_ticks(now), counter(now), shown);
                 let at = Instant::from_ticks(now);
                 let [by_interrupt, by_stamps] = lines.each_mut();
                 prop_assert_eq!(by_interrupt.is_high(), by_stamps.is_high());
@@ -135,7 +134,7 @@ mod tests {
                     }
                 }
             }
-            // The first pulse ends within 70 ms, which 700 turns are at least.
+            // The first pulse ends within 70 ms, the least duration of 700 polls.
             prop_assert!(seen > 0);
         }
     }

@@ -1,18 +1,18 @@
-//! Counts of what went wrong.
+//! Counts of faults.
 
-/// What went wrong with one encoder.
+/// Faults of one encoder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct EncoderFaults {
-    /// Readings that failed. The travel is not lost: the next reading that works brings it.
+    /// Failed readings. No travel is lost: the next successful reading contains it.
     pub errors: u32,
-    /// Illegal transitions, each a tick or two lost or made up.
+    /// Illegal transitions. Each loses or adds one or two edges.
     pub illegal: u32,
 }
 
-/// What went wrong: in one [`poll`](super::Robot::poll), or since the start. Nothing here stops
-/// the loop. Counts stay at their ends.
+/// Counts of faults, in one [`poll`](super::Robot::poll) or since the start. None of them stops the loop. The
+/// counts saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -21,17 +21,17 @@ pub struct Faults {
     pub right: EncoderFaults,
     /// The left encoder.
     pub left: EncoderFaults,
-    /// The servo refused to turn, or its driver failed. Its last bearing is used.
+    /// The servo's driver refused or failed. The last bearing is used.
     pub servo: u32,
-    /// The ranger's driver failed, or the ranger never came to an end, or its line is stuck, it
-    /// does not respond, or its clock is not the loop's. Silence of a working one is no fault.
+    /// The ranger's driver failed or timed out, its echo line is stuck, it does not respond, or its clock differs
+    /// from the loop's. A ping without an echo is not a fault.
     pub ranger: u32,
-    /// Steps of the wheels that the localizer could not believe, and that were written off.
+    /// Implausible steps of the wheels, which were discarded.
     pub travel: u32,
-    /// Encoder ticks that were done late, because the loop was polled late
+    /// Late samples of the encoders, because the loop was polled late
     /// ([`Settings::tolerance`](super::Settings::tolerance)).
     pub deadlines: u32,
-    /// Polls with a time before that of an earlier one; nothing was done in them.
+    /// Polls with a time before that of an earlier poll, which have no other effect.
     pub clock: u32,
 }
 
@@ -45,7 +45,7 @@ impl EncoderFaults {
 }
 
 impl Faults {
-    /// Both counts together.
+    /// The sum of both counts.
     #[must_use]
     pub fn plus(self, other: Self) -> Self {
         Self {
@@ -59,7 +59,7 @@ impl Faults {
         }
     }
 
-    /// Whether nothing went wrong.
+    /// Whether there is no fault.
     #[must_use]
     pub fn is_none(&self) -> bool {
         *self == Self::default()

@@ -1,12 +1,17 @@
-//! What the loop is polled with.
+//! The devices that the loop uses.
 
 use embedded_hal::pwm::SetDutyCycle;
+use sonarfix::units::Metres;
 
+use crate::config::{RobotConfig, Unsupported};
 use crate::encoder::Counter;
 use crate::ranger::Ranger;
 use crate::servo::Servo;
+use crate::time::micros;
 
-/// A robot's devices. A board implements it for a struct of its own, or uses [`Devices`].
+use super::Settings;
+
+/// The devices of a robot. A board implements it for a type of its own, or uses [`Devices`].
 pub trait Hardware {
     /// Counter of the right wheel.
     type Right: Counter;
@@ -25,9 +30,37 @@ pub trait Hardware {
     fn servo(&mut self) -> &mut Servo<Self::Pwm>;
     /// The ranger.
     fn ranger(&mut self) -> &mut Self::Ranger;
+
+    /// Configures the drivers for this robot. The configuration has passed [`RobotConfig::check`].
+    ///
+    /// # Errors
+    /// [`Unsupported`], if these devices cannot do it; nothing has changed.
+    fn configure(&mut self, config: &RobotConfig) -> Result<(), Unsupported> {
+        let right = counts_unambiguously::<Self::Right>(config, config.right_wheel.travel_per_edge);
+        let left = counts_unambiguously::<Self::Left>(config, config.left_wheel.travel_per_edge);
+        if !(right && left) {
+            return Err(Unsupported::Counter);
+        }
+        let servo = config.servo_settings();
+        self.servo().check(&servo).map_err(Unsupported::Servo)?;
+        let ranger = self.ranger().configure(&config.ranger_settings());
+        ranger.map_err(|_| Unsupported::Ranger)?;
+        self.servo().configure(&servo).map_err(Unsupported::Servo)
+    }
 }
 
-/// The devices of a robot, side by side.
+#[expect(clippy::cast_precision_loss, reason = "a power of two")]
+/// Whether a wheel at full speed makes fewer edges between two readings than half of what its
+/// counter holds.
+fn counts_unambiguously<C: Counter>(config: &RobotConfig, travel_per_edge: Metres) -> bool {
+    // A ping delays a sample that is due while it is in flight.
+    let seconds = 1e-6 * (micros(config.encoder_period) + micros(Settings::default().patience));
+    let edges = config.localizer.max_wheel_speed.0 * seconds / travel_per_edge.0;
+    let range = (1_u64 << C::BITS.min(32)) as f32;
+    edges < 0.5 * range
+}
+
+/// The devices of a robot as a struct.
 #[derive(Debug)]
 pub struct Devices<R, L, P, S> {
     /// Counter of the right wheel.

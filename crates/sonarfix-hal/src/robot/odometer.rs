@@ -1,7 +1,7 @@
-//! The ledger of ticks: what the counters have counted, and how much of it the localizer knows.
+//! The ledger of encoder edges: what the counters have counted, and how much of it the localizer has taken.
 //!
-//! It is kept in whole halves of a tick, so that a step can end between two ticks (at a
-//! reflection) and yet none is lost, doubled or rounded, however the steps are cut.
+//! It counts whole half edges, so that a step can end between two edges (at a reflection) without losing,
+//! duplicating or rounding any.
 
 use sonarfix::motion::WheelTravel;
 use sonarfix::units::Instant;
@@ -10,14 +10,14 @@ use super::{EncoderFaults, Faults, Hardware};
 use crate::encoder::{Counter, Unwrapped, Wheels};
 use crate::time::since;
 
-/// Where both wheels are, in half ticks since the first reading.
+/// The position of both wheels, in half edges since the first reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Position {
     right: i64,
     left: i64,
 }
 
-/// A position and when it was read.
+/// A position and the time of its reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Reading {
     pub at: Instant,
@@ -25,8 +25,8 @@ pub(super) struct Reading {
 }
 
 impl Reading {
-    /// The position at a time between this reading and a later one, if the wheels rolled evenly;
-    /// to the nearest half tick. Half-way between two readings it is their mean, exactly.
+    /// The position at a time between this reading and a later one at constant speed, rounded to half an edge.
+    /// Half-way between two readings it is exactly their mean.
     pub fn between(&self, later: &Self, at: Instant) -> Position {
         let whole = since(later.at, self.at).ticks();
         let part = since(at, self.at).ticks().min(whole);
@@ -47,7 +47,7 @@ fn interpolate(from: i64, to: i64, part: u64, whole: u64) -> i64 {
     rounded.map_or(to, |moved| from.wrapping_add(moved))
 }
 
-/// One wheel's counter, followed.
+/// The unwrapped counter of one wheel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 struct Channel {
     ticks: Unwrapped,
@@ -55,7 +55,7 @@ struct Channel {
 }
 
 impl Channel {
-    /// Half ticks since the first reading, unless the counter fails.
+    /// Half edges since the first reading; `None` if the counter fails.
     fn read<C: Counter>(&mut self, counter: &mut C, faults: &mut EncoderFaults) -> Option<i64> {
         let illegal = counter.illegal();
         let more = illegal.wrapping_sub(self.illegal);
@@ -75,21 +75,21 @@ pub(super) struct Odometer {
     wheels: Wheels,
     right: Channel,
     left: Channel,
-    /// Up to where the localizer has been told; `None` before both counters were first read.
-    told: Option<Position>,
+    /// The position that the localizer has taken; `None` before the first reading of both counters.
+    taken: Option<Position>,
 }
 
 impl Odometer {
-    /// A ledger that begins with its first reading.
+    /// A ledger that starts with its first reading.
     pub fn new(wheels: Wheels) -> Self {
-        Self { wheels, right: Channel::default(), left: Channel::default(), told: None }
+        Self { wheels, right: Channel::default(), left: Channel::default(), taken: None }
     }
 
-    /// Begins the ledger, if that has not been possible yet.
+    /// Starts the ledger, if it has not started yet.
     pub fn begin(&mut self, now: Instant, hardware: &mut impl Hardware, faults: &mut Faults) {
-        if self.told.is_none() {
+        if self.taken.is_none() {
             let reading = self.read(now, hardware, faults);
-            self.told = reading.map(|reading| reading.position);
+            self.taken = reading.map(|reading| reading.position);
         }
     }
 
@@ -107,16 +107,18 @@ impl Odometer {
         Some(Reading { at: now, position })
     }
 
-    /// How far the wheels rolled since what the localizer was told.
+    /// The travel of the wheels since the position that the localizer has taken.
     pub fn travel_to(&self, position: Position) -> WheelTravel {
-        let told = self.told.unwrap_or(position);
-        self.wheels
-            .travel(position.right.wrapping_sub(told.right), position.left.wrapping_sub(told.left))
+        let taken = self.taken.unwrap_or(position);
+        self.wheels.travel(
+            position.right.wrapping_sub(taken.right),
+            position.left.wrapping_sub(taken.left),
+        )
     }
 
-    /// Settles the ledger up to here.
+    /// Records that the localizer has taken the travel up to this position.
     pub fn settle(&mut self, position: Position) {
-        self.told = Some(position);
+        self.taken = Some(position);
     }
 
     pub fn wheels(&self) -> &Wheels {
@@ -130,8 +132,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Half-way between two readings is their mean, whatever they are: in halves of a tick,
-        /// without rounding.
+        /// Half-way between two readings is exactly their mean.
         #[test]
         fn the_midpoint_is_the_mean(
             from in -1_000_000_000_i64..1_000_000_000,

@@ -1,4 +1,4 @@
-//! What one poll of the loop did.
+//! The report of one poll of the loop.
 
 use sonarfix::aim::{Aim, NoAim};
 use sonarfix::localizer::{Fix, OdometryError};
@@ -8,85 +8,84 @@ use sonarfix::units::{Duration, Instant};
 use super::Faults;
 use crate::ranger::Outcome;
 
-/// What one poll did, in the order in which it happened.
+/// The report of one poll, in the order of execution.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use]
 pub struct Report {
-    /// A ping came to its end.
-    pub heard: Option<Heard>,
-    /// An encoder tick was done.
+    /// The result of a ping that has ended.
+    pub ping_result: Option<PingResult>,
+    /// The encoders were sampled.
     pub tick: Option<Tick>,
-    /// The localizer was asked where to look, and the servo sent there.
+    /// The wall that the localizer has chosen; the servo turns there.
     pub aimed: Option<Result<Aim, NoAim>>,
-    /// A ping was started. Its bearing is the servo's, which is the aim's only within the PWM's
-    /// resolution.
+    /// A ping was started, at the bearing of the servo, which differs from that of the choice by the
+    /// resolution of the PWM.
     pub pinged: Option<Aim>,
-    /// What went wrong in this poll.
+    /// The faults of this poll.
     pub faults: Faults,
 }
 
 impl Report {
-    /// Whether anything is to be told.
+    /// Whether the poll did nothing and found no fault.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }
 }
 
-/// A step of both wheels, told to the localizer.
+/// Travel of both wheels, passed to the localizer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Step {
-    /// The time up to which the wheels rolled.
+    /// The end of the travel.
     pub at: Instant,
-    /// How far, since the last step that was not [`Taken::Kept`].
+    /// The travel since the last step that was not [`StepResult::Deferred`].
     pub travel: WheelTravel,
-    /// What became of it.
-    pub taken: Taken,
+    /// The localizer's response.
+    pub result: StepResult,
 }
 
-/// What became of a step. No tick is ever lost in silence: what a step holds is either taken,
-/// part of the next step, or written off here.
+/// The localizer's response to a step. No encoder edge is lost without a report: the travel of a step is
+/// accepted, part of the next step, or discarded here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Taken {
-    /// The localizer took it.
-    Yes,
-    /// The localizer refused it, for a reason that is the loop's and not the wheels' (a whole
-    /// tick in a time so short that it looks too fast). It comes again as part of the next step;
-    /// a range that came with it met the pose before it, which is that much behind.
-    Kept(OdometryError),
-    /// The localizer refused it, and no wheel can have rolled so: it is given up.
-    WrittenOff(OdometryError),
+pub enum StepResult {
+    /// Accepted.
+    Accepted,
+    /// Refused for a reason in the loop and not in the wheels: a whole edge in so short a time looks too
+    /// fast. The travel is part of the next step. A range that ended the step was fused with the pose
+    /// before it.
+    Deferred(OdometryError),
+    /// Refused, and no wheel can have rolled so: the travel is discarded.
+    Discarded(OdometryError),
 }
 
-/// An encoder tick.
+/// A sample of both encoders.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Tick {
-    /// The wheels' step; `None` if a counter could not be read (see [`Report::faults`]).
+    /// The step of the wheels; `None` if a counter could not be read (see [`Report::faults`]).
     pub step: Option<Step>,
-    /// How long after it was due it was done.
+    /// The delay after its deadline.
     pub lateness: Duration,
-    /// Whether it would have been done earlier, had the sonar not listened. It is late only by
-    /// what went by since the poll before this.
+    /// Whether a ping has delayed it. Only the time since the previous poll then counts as late.
     pub held: bool,
-    /// Ticks that fell due after it and are not done, for this one covers them.
+    /// Later samples that are covered by this one.
     pub skipped: u64,
 }
 
-/// The end of a ping.
+/// The result of a ping.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Heard {
-    /// What was looked at.
+pub struct PingResult {
+    /// The wall and the bearing.
     pub aim: Aim,
     /// The echo, or why there is none.
     pub outcome: Outcome,
-    /// The wheels' step up to the reflection; `None` without an echo, or if a counter could not
-    /// be read.
+    /// The step of the wheels up to the reflection; `None` without an echo, or if a counter could not be
+    /// read.
     pub step: Option<Step>,
-    /// What the localizer made of it; `None` if there was an echo but no step to go with it.
+    /// The localizer's response; `None` if there was an echo but no step.
     pub fix: Option<Fix>,
 }

@@ -1,19 +1,19 @@
-//! Dots on the time line, a period apart, whatever the delay with which each is noticed.
+//! Periodic deadlines that stay on their grid, however late each is noticed.
 
 use sonarfix::units::{Duration, Instant};
 
 use crate::time::{after, since};
 
-/// A dot that was reached.
+/// A deadline that was reached.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Dot {
-    /// When it should have been noticed.
+pub(super) struct Deadline {
+    /// When it was due.
     pub due: Instant,
-    /// Dots that have gone by since without being noticed; they are not made up for.
+    /// Deadlines that have passed since without being noticed; they are not made up for.
     pub skipped: u64,
 }
 
-/// The dots.
+/// Deadlines at a fixed period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Schedule {
     next: Instant,
@@ -21,17 +21,24 @@ pub(super) struct Schedule {
 }
 
 impl Schedule {
-    /// Dots every `period`, the first one `period` after `start`.
+    /// Deadlines every `period`, the first one `period` after `start`.
     pub fn new(start: Instant, period: Duration) -> Self {
         Self { next: after(start, period), period }
     }
 
+    /// The next deadline.
     pub fn next(&self) -> Instant {
         self.next
     }
 
-    /// The dot that `now` has reached, if any. The next stays on the grid.
-    pub fn take(&mut self, now: Instant) -> Option<Dot> {
+    /// Keeps the next deadline and continues with another period; the next one is at the latest a
+    /// `period` after `now`.
+    pub fn continued(&self, now: Instant, period: Duration) -> Self {
+        Self { next: self.next.min(after(now, period)), period }
+    }
+
+    /// The deadline that `now` has reached, if any. The following ones stay on the grid.
+    pub fn take(&mut self, now: Instant) -> Option<Deadline> {
         if now < self.next {
             return None;
         }
@@ -41,7 +48,7 @@ impl Schedule {
         let steps = skipped.saturating_add(1);
         let ahead = self.period.ticks().saturating_mul(steps);
         self.next = after(due, Duration::from_ticks(ahead));
-        Some(Dot { due, skipped })
+        Some(Deadline { due, skipped })
     }
 }
 
@@ -50,16 +57,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_late_dot_is_taken_once_and_the_grid_stays() {
+    fn a_late_deadline_is_taken_once_and_the_grid_stays() {
         let at = Instant::from_ticks;
         let mut schedule = Schedule::new(at(5), Duration::from_ticks(100));
         assert_eq!(schedule.take(at(104)), None);
-        let dot = |due, skipped| Some(Dot { due: at(due), skipped });
-        assert_eq!(schedule.take(at(105)), dot(105, 0));
+        let deadline = |due, skipped| Some(Deadline { due: at(due), skipped });
+        assert_eq!(schedule.take(at(105)), deadline(105, 0));
         assert_eq!(schedule.take(at(105)), None);
-        assert_eq!(schedule.take(at(304)), dot(205, 0));
-        assert_eq!(schedule.take(at(605)), dot(305, 3));
+        assert_eq!(schedule.take(at(304)), deadline(205, 0));
+        assert_eq!(schedule.take(at(605)), deadline(305, 3));
         assert_eq!(schedule.take(at(704)), None);
-        assert_eq!(schedule.take(at(705)), dot(705, 0));
+        assert_eq!(schedule.take(at(705)), deadline(705, 0));
     }
 }

@@ -1,51 +1,45 @@
-//! What can be set on the loop.
+//! The settings of the loop.
 
 use sonarfix::units::Duration;
 
-pub use sonarfix::config::Rhythm;
-
-/// To which instant an echo belongs.
+/// The instant to which an echo belongs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Stamp {
-    /// To that at which the sound met the wall (`DESIGN.md`, decision 4).
+    /// That of the reflection at the wall (`docs/hardware.md`).
     Reflection,
-    /// To that at which the loop gets to know of it: naive, and wrong by half the flight and the
-    /// loop's delay. It is here to show what that costs.
+    /// That of the poll which reads it: late by half the time of flight and the delay of the loop. For the
+    /// measurement of what that costs.
     Arrival,
 }
 
-/// Settings of the loop.
+/// Settings of the loop. The ping schedule is that of the localizer's configuration
+/// ([`PingTiming::schedule`](sonarfix::config::PingTiming::schedule)); where no wall can be
+/// measured, [`PingSchedule::AsFastAsPossible`](sonarfix::config::PingSchedule) tries again at the next
+/// tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Settings {
-    /// Period of the encoder tick.
-    pub tick: Duration,
-    /// How late a tick may be done without counting as a missed deadline; the time for which the
-    /// sonar holds it back is not counted.
+    /// Time from one sample of the encoders to the next.
+    pub encoder_period: Duration,
+    /// The greatest delay of a tick that does not count as a missed deadline, without the delay by a ping.
     pub tolerance: Duration,
-    /// How often the sonar looks; the localizer plans with
-    /// [`Timing::rhythm`](sonarfix::config::Timing::rhythm), so both should say the same. Where
-    /// there is nothing to look at, [`Rhythm::AsFastAsPossible`] asks again at the next encoder
-    /// tick.
-    pub rhythm: Rhythm,
-    /// To which instant an echo belongs.
+    /// The instant to which an echo belongs.
     pub stamp: Stamp,
-    /// How long a ranger may take, to accept a trigger or from the first time that it is asked
-    /// for the outcome, before the loop gives the ping up. Longer than any of our drivers takes; it guards the loop against a ranger that
-    /// never comes to an end.
+    /// The longest time that a ranger may take to accept a trigger, or from the first poll to the outcome, before
+    /// the loop aborts the ping. It is longer than any driver of this crate takes, and protects the loop from a
+    /// driver that never ends.
     pub patience: Duration,
 }
 
 impl Default for Settings {
-    /// The paper's: a tick every 100 ms and a fix every second.
+    /// A sample every 100 ms.
     fn default() -> Self {
         Self {
-            tick: Duration::from_ticks(100_000),
+            encoder_period: Duration::from_ticks(100_000),
             tolerance: Duration::from_ticks(10_000),
-            rhythm: Rhythm::Every(Duration::from_ticks(1_000_000)),
             stamp: Stamp::Reflection,
             patience: Duration::from_ticks(150_000),
         }
@@ -56,10 +50,8 @@ impl Default for Settings {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SettingsError {
-    /// [`Settings::tick`].
-    Tick,
-    /// The period of [`Rhythm::Every`].
-    Rhythm,
+    /// [`Settings::encoder_period`].
+    EncoderPeriod,
     /// [`Settings::patience`].
     Patience,
 }
@@ -67,9 +59,8 @@ pub enum SettingsError {
 impl core::fmt::Display for SettingsError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
-            Self::Tick => "the encoder tick's period must not be zero",
-            Self::Rhythm => "the period of the fixes must not be zero",
-            Self::Patience => "the patience with a ranger must not be zero",
+            Self::EncoderPeriod => "the encoder period must not be zero",
+            Self::Patience => "the ranger's timeout must not be zero",
         })
     }
 }
@@ -77,16 +68,13 @@ impl core::fmt::Display for SettingsError {
 impl core::error::Error for SettingsError {}
 
 impl Settings {
-    /// Checks every setting.
+    /// Checks all settings.
     ///
     /// # Errors
     /// [`SettingsError`] with the first that breaks its rule.
     pub fn check(&self) -> Result<(), SettingsError> {
-        if self.tick.is_zero() {
-            return Err(SettingsError::Tick);
-        }
-        if self.rhythm == Rhythm::Every(Duration::from_ticks(0)) {
-            return Err(SettingsError::Rhythm);
+        if self.encoder_period.is_zero() {
+            return Err(SettingsError::EncoderPeriod);
         }
         if self.patience.is_zero() {
             return Err(SettingsError::Patience);

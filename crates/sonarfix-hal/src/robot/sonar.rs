@@ -1,42 +1,42 @@
-//! The sonar's cycle: where it is.
+//! The state machine of a measurement cycle.
 
 use sonarfix::aim::{Aim, Reason};
 use sonarfix::units::Instant;
 
 use super::odometer::Reading;
 
-/// Where the sonar's cycle is.
+/// The state of a measurement cycle.
 ///
 /// ```text
-///          due: aim, send the servo           settled, ranger ready, a wall is square: ping
+///          due: choose, turn the servo        settled, ranger ready, a wall is square: ping
 ///   Idle ───────────────────────────▶ Turning ─────────────────────────────────▶ Listening
-///   ▲  ▲ │ nothing to look at            │                                           │
+///   ▲  ▲ │ no wall                       │                                           │
 ///   │  └─┘                               │ no wall is square any more,               │
 ///   ├────────────────────────────────────┘ or the ranger cannot be triggered         │
-///   └────────────────────────── echo, reason for none, failure, or patience over ────┘
+///   └────────────────────────── echo, no echo, failure, or timeout ──────────────────┘
 /// ```
 ///
-/// While it listens no encoder tick is done (see [`robot`](super)).
+/// While it listens the encoders are not sampled (see [`robot`](super)).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Cycle {
-    /// Waits for its time.
+    /// Waits for the next cycle.
     Idle {
-        /// When to aim.
-        look_at: Instant,
+        /// The start of the next cycle.
+        until: Instant,
     },
-    /// The servo is on its way, or stands and waits for the ranger to be ready.
+    /// The servo turns, or has settled and waits for the ranger.
     Turning {
-        /// Why it was sent there.
+        /// Why the wall was chosen.
         why: Reason,
     },
     /// A ping is in flight.
     Listening {
-        /// What it is for.
+        /// The wall and the bearing.
         aim: Aim,
-        /// The wheels at the trigger.
+        /// The position of the wheels at the trigger.
         from: Reading,
-        /// When the ranger was first asked for the outcome.
-        asked: Option<Instant>,
+        /// The first poll of the ranger.
+        polled: Option<Instant>,
     },
 }
 

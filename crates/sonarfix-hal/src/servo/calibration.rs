@@ -2,10 +2,10 @@
 
 use sonarfix::units::{Duration, Radians};
 
-use super::SettingError;
+use super::error::SettingError;
 use crate::time::micros;
 
-/// A pulse tried on the bench, and where the sonar looked.
+/// A pulse, and the bearing of the sonar that was measured with it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -16,8 +16,8 @@ pub struct MeasuredPulse {
     pub bearing: Radians,
 }
 
-/// The line through two measured points. Servos of one type differ by some degrees, so measure
-/// yours: at two bearings far apart, the wider the better.
+/// The line through two measured points. Servos of one type differ by some degrees, so each is measured, at two
+/// bearings as far apart as possible.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Calibration {
@@ -31,7 +31,7 @@ impl Calibration {
     /// The calibration through two points, in any order.
     ///
     /// # Errors
-    /// [`SettingError::Calibration`] if they do not make a line.
+    /// [`SettingError::Calibration`] if they do not define a line.
     pub fn new(one: MeasuredPulse, other: MeasuredPulse) -> Result<Self, SettingError> {
         let (from, to) = (micros(one.width), micros(other.width));
         let slope = (to - from) / (other.bearing - one.bearing).0;
@@ -40,12 +40,12 @@ impl Calibration {
         if is_line { Ok(Self { ahead, slope }) } else { Err(SettingError::Calibration) }
     }
 
-    /// Width of the pulse that points to `bearing`, µs.
+    /// Width of the pulse for `bearing`, µs.
     pub(super) fn pulse(self, bearing: Radians) -> f32 {
         self.ahead + self.slope * bearing.0
     }
 
-    /// Where a pulse of this width, in µs, points.
+    /// The bearing for a pulse of this width in µs.
     pub(super) fn bearing(self, pulse: f32) -> Radians {
         Radians((pulse - self.ahead) / self.slope)
     }

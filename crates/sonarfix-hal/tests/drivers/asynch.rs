@@ -14,7 +14,7 @@ use embedded_hal_mock::eh1::i2c::{Mock as Bus, Transaction as OnBus};
 use sonarfix::units::Instant;
 use sonarfix_hal::asynch::{count, measure, ping};
 use sonarfix_hal::encoder::{Counter, Quadrature, TickCount};
-use sonarfix_hal::ranger::{Air, NoEcho, Polled, PulseRanger, PulseTiming, Srf};
+use sonarfix_hal::ranger::{Air, NoEcho, Polled, PulseRanger, Srf};
 
 use super::{at, span};
 
@@ -48,7 +48,7 @@ fn a_ping_sleeps_until_the_line_moves() {
         Transaction::get(Low),
     ]);
     let echo = Polled::new(line.clone());
-    let mut ranger = PulseRanger::new(trigger.clone(), echo, PulseTiming::HC_SR04, Air::ROOM);
+    let mut ranger = PulseRanger::new(trigger.clone(), echo);
     let time = Cell::new(0);
     // Every look at the clock is 700 µs after the last.
     let clock = || -> Instant { at(time.replace(time.get() + 700)) };
@@ -69,7 +69,7 @@ fn a_pin_that_fails_to_wait_is_told() {
         Transaction::wait_for_state(High).with_error(broken),
     ]);
     let echo = Polled::new(line.clone());
-    let mut ranger = PulseRanger::new(trigger.clone(), echo, PulseTiming::HC_SR04, Air::ROOM);
+    let mut ranger = PulseRanger::new(trigger.clone(), echo);
     let time = Cell::new(0);
     assert!(now(ping(&mut ranger, &|| at(time.get()), &mut Timer(&time))).is_err());
     trigger.done();

@@ -8,7 +8,7 @@ use embedded_hal_mock::eh1::digital::{Mock, State, Transaction};
 use proptest::prelude::*;
 use sonarfix_hal::ranger::{
     Air, Captured, Celsius, EchoCapture, NoEcho, Outcome, Polled, PulseError, PulseRanger,
-    PulseTiming, Ranger, TriggerError,
+    PulseTiming, Ranger, RangerKind, RangerSettings, TriggerError, UnsupportedKind,
 };
 
 use super::{at, span};
@@ -29,7 +29,7 @@ fn levels(levels: &[State]) -> Mock {
 
 fn hc_sr04(trigger: &Mock, echo: &Mock) -> OnPins {
     let line = Polled::new(echo.clone());
-    PulseRanger::new(trigger.clone(), line, PulseTiming::HC_SR04, Air::ROOM)
+    PulseRanger::new(trigger.clone(), line)
 }
 
 /// Triggers at `start` and polls 10 µs later and at each of these times, until there is an
@@ -168,7 +168,7 @@ fn a_ping_forgotten_in_flight_does_not_block_the_next() {
     let mut trigger = Mock::new(&[Transaction::set(High), Transaction::set(High)]);
     let capture = EchoCapture::new();
     let line = Captured::new(&capture);
-    let mut ranger = PulseRanger::new(trigger.clone(), line, PulseTiming::HC_SR04, Air::ROOM);
+    let mut ranger = PulseRanger::new(trigger.clone(), line);
     ranger.trigger(at(0)).unwrap();
     assert_eq!(ranger.trigger(at(59_999)), Err(TriggerError::TooSoon));
     ranger.trigger(at(60_000)).unwrap();
@@ -181,7 +181,8 @@ fn an_lv_maxsonar_by_its_pulse_width() {
     let capture = EchoCapture::new();
     let air = Air::at(Celsius(22.5)).unwrap();
     let line = Captured::new(&capture);
-    let mut ranger = PulseRanger::new(trigger.clone(), line, PulseTiming::LV_MAXSONAR, air);
+    let mut ranger = PulseRanger::new(trigger.clone(), line);
+    ranger.configure(&RangerSettings { air, ..RangerSettings::LV_MAXSONAR }).unwrap();
     ranger.trigger(at(0)).unwrap();
     assert_eq!(ranger.poll(at(19)), Ok(None));
     assert_eq!(ranger.poll(at(20)), Ok(None));
@@ -207,8 +208,7 @@ proptest! {
         let capture = EchoCapture::new();
         let mut trigger = pulses(1);
         let line = Captured::new(&capture);
-        let timing = PulseTiming::HC_SR04;
-        let mut ranger = PulseRanger::new(trigger.clone(), line, timing, Air::ROOM);
+        let mut ranger = PulseRanger::new(trigger.clone(), line);
         ranger.trigger(at(boot)).unwrap();
         prop_assert_eq!(ranger.poll(at(boot + 10)), Ok(None));
         // The edges, in the order in which they reach the interrupt.
@@ -245,8 +245,7 @@ proptest! {
         let mut trigger = Mock::new(&vec![Transaction::set(High); steps.len()]);
         let capture = EchoCapture::new();
         let line = Captured::new(&capture);
-        let timing = PulseTiming::HC_SR04;
-        let mut ranger = PulseRanger::new(trigger.clone(), line, timing, Air::ROOM);
+        let mut ranger = PulseRanger::new(trigger.clone(), line);
         let (mut last, mut pings) = (None, 0);
         let count = steps.len() as u64;
         for step in steps {
@@ -274,9 +273,30 @@ proptest! {
 
 #[test]
 fn timings_are_consistent() {
-    for timing in [PulseTiming::HC_SR04, PulseTiming::LV_MAXSONAR] {
+    for settings in [RangerSettings::HC_SR04, RangerSettings::LV_MAXSONAR] {
+        let RangerKind::Pulse(timing) = settings.kind else { panic!("{settings:?}") };
         assert!(timing.blanking < timing.longest && timing.longest <= timing.silence);
-        assert!(timing.silence < timing.listen && timing.listen < timing.cycle);
-        assert!(timing.cycle < timing.stuck && timing.trigger > span(0));
+        assert!(timing.silence < timing.listen && timing.listen < settings.cycle);
+        assert!(settings.cycle < timing.stuck && timing.trigger > span(0));
     }
+}
+
+/// Settings of another kind of ranger are refused; those of this kind change every time.
+#[test]
+fn a_ranger_takes_the_settings_of_its_kind() {
+    let mut trigger = pulses(1);
+    let capture = EchoCapture::new();
+    let mut ranger = PulseRanger::new(trigger.clone(), Captured::new(&capture));
+    for kind in [RangerKind::Srf { address: 0x70 }, RangerKind::Custom] {
+        let other = RangerSettings { kind, ..RangerSettings::HC_SR04 };
+        assert_eq!(ranger.configure(&other), Err(UnsupportedKind));
+    }
+    assert_eq!(*ranger.timing(), PulseTiming::HC_SR04);
+    let slow = RangerSettings { cycle: span(90_000), ..RangerSettings::LV_MAXSONAR };
+    ranger.configure(&slow).unwrap();
+    assert_eq!(*ranger.timing(), PulseTiming::LV_MAXSONAR);
+    ranger.trigger(at(0)).unwrap();
+    let _ = ranger.poll(at(20)).unwrap();
+    assert_eq!(ranger.ready_at(), at(90_020));
+    trigger.done();
 }

@@ -6,17 +6,19 @@ use embedded_hal_mock::eh1::MockError;
 use embedded_hal_mock::eh1::pwm::{Mock, Transaction};
 use proptest::prelude::*;
 use sonarfix::units::Radians;
-use sonarfix_hal::servo::{Calibration, MeasuredPulse, Pace, PointError, Servo, SettingError};
+use sonarfix_hal::servo::{
+    MeasuredPulse, PointError, PwmFrame, Servo, ServoSettings, ServoTiming, SettingError,
+};
 
 use super::{at, span};
 
 /// 10 µs a degree, 1,500 µs ahead; longer pulses turn left.
-fn calibration() -> Calibration {
+fn settings(limits: (Radians, Radians), timing: ServoTiming) -> ServoSettings {
     let point = |width, degrees| MeasuredPulse {
         width: span(width),
         bearing: Radians::from_degrees(degrees),
     };
-    Calibration::new(point(600, -90.0), point(2_400, 90.0)).unwrap()
+    ServoSettings { pulses: [point(600, -90.0), point(2_400, 90.0)], limits, timing }
 }
 
 fn degrees(limit: f32) -> (Radians, Radians) {
@@ -24,7 +26,7 @@ fn degrees(limit: f32) -> (Radians, Radians) {
 }
 
 fn servo(pwm: &Mock) -> Servo<Mock> {
-    Servo::new(pwm.clone(), calibration(), degrees(80.0), Pace::SG90).unwrap()
+    Servo::configured(pwm.clone(), settings(degrees(80.0), ServoTiming::SG90)).unwrap()
 }
 
 #[test]
@@ -103,26 +105,47 @@ fn a_failing_channel_leaves_the_servo_where_it_was() {
 #[test]
 fn what_is_no_servo_is_refused() {
     let pwm = || Pwm { counts: 40_000 };
-    let new = |limits, pace| Servo::new(pwm(), calibration(), limits, pace).map(|_| ());
-    assert_eq!(new(degrees(80.0), Pace::SG90), Ok(()));
-    assert_eq!(new(degrees(-80.0), Pace::SG90), Err(SettingError::Limits));
-    assert_eq!(new(degrees(f32::NAN), Pace::SG90), Err(SettingError::Limits));
+    let new = |limits, timing| Servo::configured(pwm(), settings(limits, timing)).map(|_| ());
+    assert_eq!(new(degrees(80.0), ServoTiming::SG90), Ok(()));
+    assert_eq!(new(degrees(-80.0), ServoTiming::SG90), Err(SettingError::Limits));
+    assert_eq!(new(degrees(f32::NAN), ServoTiming::SG90), Err(SettingError::Limits));
     // 160° are −100 µs.
-    assert_eq!(new(degrees(160.0), Pace::SG90), Err(SettingError::Pulse));
-    let frameless = Pace { frame: span(0), ..Pace::SG90 };
+    assert_eq!(new(degrees(160.0), ServoTiming::SG90), Err(SettingError::Pulse));
+    let frameless = ServoTiming { frame: span(0), ..ServoTiming::SG90 };
     assert_eq!(new(degrees(80.0), frameless), Err(SettingError::Pulse));
+}
+
+/// A board says what its channel makes of a pulse, and the driver keeps to it.
+#[test]
+fn what_a_channel_cannot_do_is_refused_and_changes_nothing() {
+    let hobby = PwmFrame { period: span(20_000), shortest: span(500), longest: span(2_500) };
+    let mut servo = Servo::new(Pwm { counts: 40_000 }, hobby);
+    assert_eq!(servo.point(at(0), Radians(0.0)), Err(PointError::NotConfigured));
+    servo.configure(&settings(degrees(90.0), ServoTiming::SG90)).unwrap();
+    servo.point(at(0), Radians(1.0)).unwrap();
+    let target = servo.target();
+    // 110° are 2,600 µs.
+    let too_far = settings(degrees(110.0), ServoTiming::SG90);
+    assert_eq!(servo.configure(&too_far), Err(SettingError::Pulse));
+    let digital = ServoTiming { frame: span(3_000), ..ServoTiming::SG90 };
+    assert_eq!(servo.configure(&settings(degrees(90.0), digital)), Err(SettingError::Frame));
+    servo.configure(&settings(degrees(90.0), ServoTiming::SG90)).unwrap();
+    assert_eq!(servo.target(), target);
+    servo.configure(&settings(degrees(60.0), ServoTiming::SG90)).unwrap();
+    assert_eq!(servo.target(), None);
 }
 
 proptest! {
     /// Whatever the timer's resolution, the servo is sent to within half a count of where it was
-    /// told, and settles no earlier than its pace allows from where it was.
+    /// told, and settles no earlier than its timing allows from where it was.
     #[test]
     fn any_bearing_is_met_within_half_a_count(
         counts in 1_000_u16..=u16::MAX,
         bearings in prop::collection::vec(-80.0_f32..80.0, 2..8),
     ) {
         let pwm = Pwm { counts };
-        let mut servo = Servo::new(pwm, calibration(), degrees(80.0), Pace::SG90).unwrap();
+        let mut servo =
+            Servo::configured(pwm, settings(degrees(80.0), ServoTiming::SG90)).unwrap();
         let half_count = 0.5 * 20_000.0 / f32::from(counts) / 10.0 + 0.001;
         let (mut now, mut before) = (at(0), None);
         for bearing in bearings {

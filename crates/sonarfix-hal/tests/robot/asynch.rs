@@ -6,11 +6,12 @@ use core::pin::pin;
 use core::task::{Context, Waker};
 
 use embedded_hal_async::delay::DelayNs;
+use sonarfix::config::PingSchedule;
 use sonarfix::localizer::Fix;
 use sonarfix::units::{Duration, Instant, Radians};
 use sonarfix_hal::asynch;
-use sonarfix_hal::robot::{Rhythm, Settings};
-use sonarfix_hal::servo::Pace;
+use sonarfix_hal::robot::Settings;
+use sonarfix_hal::servo::ServoTiming;
 
 use super::rig::{Drive, World, pins, robot, servo, walls};
 
@@ -40,10 +41,9 @@ fn poll<T>(task: impl Future<Output = T>) -> bool {
 fn the_loop_runs_and_sleeps_between() {
     let walls = walls();
     let world = World::new(STILL, TICK, 0);
-    let settings =
-        Settings { rhythm: Rhythm::Every(Duration::from_ticks(500_000)), ..Settings::default() };
-    let mut robot = robot(&walls, TICK, settings);
-    let mut pins = pins(&world, Pace::SG90);
+    let schedule = PingSchedule::Every(Duration::from_ticks(500_000));
+    let mut robot = robot(&walls, TICK, schedule, Settings::default());
+    let mut pins = pins(&world, ServoTiming::SG90);
     let clock = || Instant::from_ticks(world.now.get());
     let reports = RefCell::new(vec![]);
     let polls = Cell::new(0);
@@ -53,12 +53,12 @@ fn the_loop_runs_and_sleeps_between() {
     };
     let step = Duration::from_ticks(500);
     let mut delay = Until(&world, 3_450_000);
-    let tell = |_: &_, report| reports.borrow_mut().push(report);
-    let task = asynch::run(&mut robot, &mut pins, &counted, &mut delay, step, tell);
+    let on_report = |_: &_, report| reports.borrow_mut().push(report);
+    let task = asynch::run(&mut robot, &mut pins, &counted, &mut delay, step, on_report);
     assert!(!poll(task), "it never ends");
 
     let reports = reports.into_inner();
-    let fixes = reports.iter().filter_map(|report| report.heard?.fix);
+    let fixes = reports.iter().filter_map(|report| report.ping_result?.fix);
     assert_eq!(fixes.filter(|fix| matches!(fix, Fix::Accepted(_))).count(), 6);
     assert_eq!(reports.iter().filter(|report| report.tick.is_some()).count(), 34);
     assert!(robot.faults().is_none(), "{:?}", robot.faults());
@@ -69,7 +69,7 @@ fn the_loop_runs_and_sleeps_between() {
 #[test]
 fn a_servo_is_waited_for() {
     let world = World::new(STILL, TICK, 0);
-    let mut servo = servo(&world, Pace::SG90);
+    let mut servo = servo(&world, ServoTiming::SG90);
     let clock = || Instant::from_ticks(world.now.get());
     let mut delay = Until(&world, 10_000_000);
     assert!(poll(asynch::settle(&servo, &clock, &mut delay)));

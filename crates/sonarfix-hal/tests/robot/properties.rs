@@ -1,27 +1,26 @@
 //! What holds however polls are spread.
 
 use proptest::prelude::*;
+use sonarfix::config::PingSchedule;
 use sonarfix::localizer::Fix;
 use sonarfix::units::{Duration, Instant};
 use sonarfix_hal::ranger::NoEcho;
-use sonarfix_hal::robot::{Report, Rhythm, Settings, Stamp, Taken};
-use sonarfix_hal::servo::Pace;
+use sonarfix_hal::robot::{Report, Settings, Stamp, StepResult};
+use sonarfix_hal::servo::ServoTiming;
 
 use super::rig::{Broken, Drive, World, accounts, pins, robot, run, steps, walls};
 
 /// 2⁻¹⁰ m: sums of such ticks are exact.
 const TICK: f32 = 1.0 / 1_024.0;
 
-/// A digital servo of 400 Hz that turns in no time: the ranger alone limits the pace.
-const FAST: Pace = Pace {
+/// A digital servo of 400 Hz that turns in no time: the ranger alone limits the rate.
+const FAST: ServoTiming = ServoTiming {
     frame: Duration::from_ticks(2_500),
     sixty_degrees: Duration::from_ticks(0),
     settle: Duration::from_ticks(0),
 };
 
-fn as_fast_as_possible() -> Settings {
-    Settings { rhythm: Rhythm::AsFastAsPossible, ..Settings::default() }
-}
+const UNPACED: PingSchedule = PingSchedule::AsFastAsPossible;
 
 fn any_drive() -> impl Strategy<Value = Drive> {
     let speed = prop_oneof![-0.2_f64..-0.05, 0.05_f64..0.2];
@@ -77,15 +76,15 @@ proptest! {
         let walls = walls();
         let world = World::new(drive, TICK, first_count);
         world.broken.set(Broken { deaf, ..Broken::default() });
-        let rhythm = every.map_or(Rhythm::AsFastAsPossible, |period| {
-            Rhythm::Every(Duration::from_ticks(period))
+        let schedule = every.map_or(PingSchedule::AsFastAsPossible, |period| {
+            PingSchedule::Every(Duration::from_ticks(period))
         });
-        let mut robot = robot(&walls, TICK, Settings { rhythm, ..Settings::default() });
+        let mut robot = robot(&walls, TICK, schedule, Settings::default());
         let mut pins = pins(&world, FAST);
         let mut reports = run(&world, &mut robot, &mut pins, polls.0.iter().copied());
 
         let first = polls.0[0];
-        let heard = reports.iter().filter_map(|(_, report)| report.heard);
+        let heard = reports.iter().filter_map(|(_, report)| report.ping_result);
         let echoes = heard.filter(|heard| heard.outcome.is_ok() != deaf).count();
         prop_assert!(echoes >= 2, "{echoes} pings came to an end");
         // To the end of a tick, which is when the ledger is square. Between polls nothing is due.
@@ -103,13 +102,13 @@ proptest! {
     fn echoes_meet_the_filter_at_their_reflection(drive in any_drive(), polls in any_polls()) {
         let walls = walls();
         let world = World::new(drive, TICK, 0);
-        let mut robot = robot(&walls, TICK, as_fast_as_possible());
+        let mut robot = robot(&walls, TICK, UNPACED, Settings::default());
         let mut pins = pins(&world, FAST);
         let reports = run(&world, &mut robot, &mut pins, polls.0.iter().copied());
 
         let flights = world.flights.borrow().clone();
         let heard: Vec<_> = reports.iter().enumerate().filter_map(|(index, (_, report))| {
-            Some((index, report.heard.filter(|heard| heard.outcome.is_ok())?))
+            Some((index, report.ping_result.filter(|heard| heard.outcome.is_ok())?))
         }).collect();
         prop_assert!(heard.len() >= 3);
         // The last burst's echo may still be on its way.
@@ -119,7 +118,7 @@ proptest! {
             let step = heard.step.unwrap();
             prop_assert_eq!(step.at, Instant::from_ticks(reflected));
             prop_assert!(matches!(heard.fix, Some(Fix::Accepted(_))), "{heard:?}");
-            if step.taken != Taken::Yes {
+            if step.result != StepResult::Accepted {
                 continue;
             }
             // All up to this step, but not the tick that may follow in the same poll.
@@ -136,13 +135,13 @@ proptest! {
         }
     }
 
-    /// No ping before the servo has settled, by what the PWM channel saw and the pace alone.
+    /// No ping before the servo has settled, by what the PWM channel saw and the timing alone.
     #[test]
     fn no_ping_before_the_servo_has_settled(drive in any_drive(), polls in any_polls()) {
         let walls = walls();
         let world = World::new(drive, TICK, 0);
-        let mut robot = robot(&walls, TICK, as_fast_as_possible());
-        let mut pins = pins(&world, Pace::SG90);
+        let mut robot = robot(&walls, TICK, UNPACED, Settings::default());
+        let mut pins = pins(&world, ServoTiming::SG90);
         run(&world, &mut robot, &mut pins, polls.0.iter().copied());
 
         let degrees = |duty| world.degrees(duty);
@@ -164,7 +163,7 @@ proptest! {
     fn pings_keep_their_distance(drive in any_drive(), polls in any_polls()) {
         let walls = walls();
         let world = World::new(drive, TICK, 0);
-        let mut robot = robot(&walls, TICK, as_fast_as_possible());
+        let mut robot = robot(&walls, TICK, UNPACED, Settings::default());
         let mut pins = pins(&world, FAST);
         run(&world, &mut robot, &mut pins, polls.0.iter().copied());
 
@@ -181,7 +180,7 @@ proptest! {
     fn ticks_keep_to_their_grid(drive in any_drive(), polls in any_polls()) {
         let walls = walls();
         let world = World::new(drive, TICK, 0);
-        let mut robot = robot(&walls, TICK, as_fast_as_possible());
+        let mut robot = robot(&walls, TICK, UNPACED, Settings::default());
         let mut pins = pins(&world, FAST);
         let reports = run(&world, &mut robot, &mut pins, polls.0.iter().copied());
 
@@ -194,7 +193,7 @@ proptest! {
                 prop_assert_eq!(dots, now / 100_000);
                 // Nothing but the sonar keeps a poll from doing what is due.
                 prop_assert_eq!(tick.held, due <= before);
-                prop_assert!(report.heard.is_some() || !tick.held);
+                prop_assert!(report.ping_result.is_some() || !tick.held);
                 missed += u32::from(now - due.max(before) > 10_000);
             }
             before = *now;
@@ -205,10 +204,15 @@ proptest! {
     }
 }
 
-fn reports_with(settings: Settings, drive: Drive, tick: f32) -> (Vec<(u64, Report)>, u32) {
+fn reports_with(
+    schedule: PingSchedule,
+    settings: Settings,
+    drive: Drive,
+    tick: f32,
+) -> (Vec<(u64, Report)>, u32) {
     let walls = walls();
     let world = World::new(drive, tick, 0);
-    let mut robot = robot(&walls, tick, settings);
+    let mut robot = robot(&walls, tick, schedule, settings);
     let mut pins = pins(&world, FAST);
     let reports = run(&world, &mut robot, &mut pins, (0..12_000).map(|step| step * 250));
     (reports, robot.faults().travel)
@@ -217,11 +221,11 @@ fn reports_with(settings: Settings, drive: Drive, tick: f32) -> (Vec<(u64, Repor
 #[test]
 fn stamped_naively_an_echo_belongs_to_its_arrival() {
     let drive = Drive { speed: 0.3, sway: 0.0 };
-    let naive = Settings { stamp: Stamp::Arrival, ..as_fast_as_possible() };
-    let (reports, _) = reports_with(naive, drive, TICK);
+    let naive = Settings { stamp: Stamp::Arrival, ..Settings::default() };
+    let (reports, _) = reports_with(UNPACED, naive, drive, TICK);
     let mut heard = 0;
     for (now, report) in &reports {
-        if let Some(step) = report.heard.and_then(|heard| heard.step) {
+        if let Some(step) = report.ping_result.and_then(|heard| heard.step) {
             assert_eq!(step.at, Instant::from_ticks(*now));
             heard += 1;
         }
@@ -233,17 +237,21 @@ fn stamped_naively_an_echo_belongs_to_its_arrival() {
 /// tick look far too fast. They are kept, and none is written off.
 #[test]
 fn coarse_ticks_are_kept_not_written_off() {
-    let drive = Drive { speed: 0.5, sway: 0.0 };
-    let (reports, written_off) = reports_with(as_fast_as_possible(), drive, 16.0 * TICK);
-    let kept = steps(&reports).filter(|step| matches!(step.taken, Taken::Kept(_)));
-    assert!(kept.count() > 0);
-    assert_eq!(written_off, 0);
-    let last = reports.iter().rposition(|(_, report)| report.tick.is_some()).unwrap();
-    let (now, _) = reports[last];
-    let world = World::new(drive, 16.0 * TICK, 0);
-    let counted = world.ticks(now) as f64 * 16.0 * f64::from(TICK);
-    let (taken, _) = accounts(&reports[..=last]);
-    assert!((taken - counted).abs() < 1e-9, "{taken} of {counted}");
+    let mut kept = 0;
+    for speed in [0.3, 0.4, 0.5, 0.6, 0.7, 0.8] {
+        let drive = Drive { speed, sway: 0.0 };
+        let (reports, written_off) = reports_with(UNPACED, Settings::default(), drive, 16.0 * TICK);
+        let steps = steps(&reports);
+        kept += steps.filter(|step| matches!(step.result, StepResult::Deferred(_))).count();
+        assert_eq!(written_off, 0);
+        let last = reports.iter().rposition(|(_, report)| report.tick.is_some()).unwrap();
+        let (now, _) = reports[last];
+        let world = World::new(drive, 16.0 * TICK, 0);
+        let counted = world.ticks(now) as f64 * 16.0 * f64::from(TICK);
+        let (taken, _) = accounts(&reports[..=last]);
+        assert!((taken - counted).abs() < 1e-9, "{taken} of {counted}");
+    }
+    assert!(kept > 0);
 }
 
 /// Ticks faster than a ping is long are skipped while it is in flight; that is no fault.
@@ -251,13 +259,13 @@ fn coarse_ticks_are_kept_not_written_off() {
 fn a_sonar_that_holds_ticks_back_misses_no_deadline() {
     let drive = Drive { speed: 0.1, sway: 0.0 };
     let settings = Settings {
-        tick: Duration::from_ticks(5_000),
+        encoder_period: Duration::from_ticks(5_000),
         tolerance: Duration::from_ticks(1_000),
-        ..as_fast_as_possible()
+        ..Settings::default()
     };
     let walls = walls();
     let world = World::new(drive, TICK, 0);
-    let mut robot = robot(&walls, TICK, settings);
+    let mut robot = robot(&walls, TICK, UNPACED, settings);
     let mut pins = pins(&world, FAST);
     let reports = run(&world, &mut robot, &mut pins, (0..4_000).map(|step| step * 250));
     let skipped = reports.iter().filter_map(|(_, report)| report.tick);
@@ -266,14 +274,13 @@ fn a_sonar_that_holds_ticks_back_misses_no_deadline() {
 }
 
 #[test]
-fn fixes_keep_their_rhythm() {
-    let settings =
-        Settings { rhythm: Rhythm::Every(Duration::from_ticks(500_000)), ..Settings::default() };
+fn fixes_keep_their_schedule() {
+    let schedule = PingSchedule::Every(Duration::from_ticks(500_000));
     let drive = Drive { speed: 0.1, sway: 0.0 };
-    let (reports, _) = reports_with(settings, drive, TICK);
+    let (reports, _) = reports_with(schedule, Settings::default(), drive, TICK);
     let aims = reports.iter().filter(|(_, report)| report.aimed.is_some());
     let aims: Vec<_> = aims.map(|&(time, _)| time).collect();
     assert_eq!(aims, [500_000, 1_000_000, 1_500_000, 2_000_000, 2_500_000]);
-    let silent = reports.iter().filter_map(|(_, report)| report.heard);
+    let silent = reports.iter().filter_map(|(_, report)| report.ping_result);
     assert!(silent.filter(|heard| heard.outcome == Err(NoEcho::Nothing)).count() == 0);
 }

@@ -8,15 +8,15 @@ use core::cell::{Cell, RefCell};
 use std::collections::VecDeque;
 
 use embedded_hal::{digital, pwm};
-use sonarfix::config::Config;
+use sonarfix::config::{Config, PingSchedule};
 use sonarfix::localizer::{Localizer, Start};
 use sonarfix::map::{Map, Wall};
 use sonarfix::pose::{Point, Pose};
 use sonarfix::units::{Duration, Instant, Metres, Radians};
 use sonarfix_hal::encoder::{Counter, WheelGeometry, Wheels};
-use sonarfix_hal::ranger::{Air, Captured, EchoCapture, PulseRanger, PulseTiming};
-use sonarfix_hal::robot::{Devices, Report, Robot, Settings, Step, Taken};
-use sonarfix_hal::servo::{Calibration, MeasuredPulse, Pace, Servo};
+use sonarfix_hal::ranger::{Air, Captured, EchoCapture, PulseRanger};
+use sonarfix_hal::robot::{Devices, Report, Robot, Settings, Step, StepResult};
+use sonarfix_hal::servo::{MeasuredPulse, Servo, ServoSettings, ServoTiming};
 
 /// The room: x from −3 to 3, y from −1.2 to 1.
 const CORNERS: [(f32, f32); 5] = [(-3.0, -1.2), (3.0, -1.2), (3.0, 1.0), (-3.0, 1.0), (-3.0, -1.2)];
@@ -251,25 +251,28 @@ pub type Pins<'w> = Devices<
 >;
 
 /// A servo that reaches 100° to either side: 10 µs a degree.
-pub fn servo(world: &World, pace: Pace) -> Servo<ServoPwm<'_>> {
-    world.frame.set(pace.frame.to_micros() as f64);
+pub fn servo(world: &World, timing: ServoTiming) -> Servo<ServoPwm<'_>> {
+    world.frame.set(timing.frame.to_micros() as f64);
     let degrees = Radians::from_degrees;
     let point = |width, bearing| MeasuredPulse {
         width: Duration::from_ticks(width),
         bearing: degrees(bearing),
     };
-    let calibration = Calibration::new(point(600, -90.0), point(2_400, 90.0)).unwrap();
-    let limits = (degrees(-100.0), degrees(100.0));
-    Servo::new(ServoPwm(world), calibration, limits, pace).unwrap()
+    let settings = ServoSettings {
+        pulses: [point(600, -90.0), point(2_400, 90.0)],
+        limits: (degrees(-100.0), degrees(100.0)),
+        timing,
+    };
+    Servo::configured(ServoPwm(world), settings).unwrap()
 }
 
-pub fn pins(world: &World, pace: Pace) -> Pins<'_> {
+pub fn pins(world: &World, timing: ServoTiming) -> Pins<'_> {
     let line = Captured::new(&world.capture);
     Devices {
         right: WheelCounter(world, true),
         left: WheelCounter(world, false),
-        servo: servo(world, pace),
-        ranger: PulseRanger::new(TriggerPin(world), line, PulseTiming::HC_SR04, Air::ROOM),
+        servo: servo(world, timing),
+        ranger: PulseRanger::new(TriggerPin(world), line),
     }
 }
 
@@ -281,8 +284,9 @@ pub fn walls() -> Vec<Wall> {
 }
 
 /// The loop, at the origin of the room at time zero. `tick` is the length of an encoder tick.
-pub fn robot(walls: &[Wall], tick: f32, settings: Settings) -> Robot<'_> {
+pub fn robot(walls: &[Wall], tick: f32, schedule: PingSchedule, settings: Settings) -> Robot<'_> {
     let mut config = Config::for_track_width(Metres(0.16));
+    config.sonar.timing.schedule = schedule;
     config.sonar.servo = (Radians::from_degrees(-95.0), Radians::from_degrees(95.0));
     let start = Start {
         pose: Pose::new(0.0, 0.0, Radians(0.0)),
@@ -317,7 +321,7 @@ pub fn run(
 /// Every step of the wheels.
 pub fn steps(reports: &[(u64, Report)]) -> impl Iterator<Item = Step> {
     reports.iter().flat_map(|(_, report)| {
-        let of_echo = report.heard.and_then(|heard| heard.step);
+        let of_echo = report.ping_result.and_then(|heard| heard.step);
         let of_tick = report.tick.and_then(|tick| tick.step);
         [of_echo, of_tick].into_iter().flatten()
     })
@@ -328,10 +332,10 @@ pub fn accounts(reports: &[(u64, Report)]) -> (f64, f64) {
     let (mut taken, mut written_off) = (0.0, 0.0);
     for step in steps(reports) {
         let metres = f64::from(step.travel.right.0);
-        match step.taken {
-            Taken::Yes => taken += metres,
-            Taken::WrittenOff(_) => written_off += metres,
-            Taken::Kept(_) => {}
+        match step.result {
+            StepResult::Accepted => taken += metres,
+            StepResult::Discarded(_) => written_off += metres,
+            StepResult::Deferred(_) => {}
         }
     }
     (taken, written_off)

@@ -3,21 +3,23 @@
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use sonarfix::config::{Config, Policy};
+use sonarfix::config::{Config, Policy, ServoTiming};
 use sonarfix::units::{Metres, Radians};
+use sonarfix_hal::config::RobotConfig;
 use sonarfix_link::baked::{self, BakedError, LENGTH_MAX};
 
 use crate::messages::{Largest, config};
 use crate::wire::{crc32, to_stdvec};
 
-fn example() -> Config {
-    let mut config = Config::for_track_width(Metres(0.35));
-    config.sonar.servo = (Radians(-1.5), Radians(1.75));
-    config.policy = Policy::Nearest;
-    config
+fn example() -> RobotConfig {
+    let mut localizer = Config::for_track_width(Metres(0.35));
+    localizer.sonar.servo = (Radians(-1.5), Radians(1.75));
+    localizer.sonar.timing.servo = ServoTiming::SG90;
+    localizer.policy = Policy::Nearest;
+    RobotConfig::with_common_parts(localizer)
 }
 
-fn bytes(config: &Config) -> Vec<u8> {
+fn bytes(config: &RobotConfig) -> Vec<u8> {
     baked::write(config, &mut [0; LENGTH_MAX]).unwrap().to_vec()
 }
 
@@ -32,7 +34,7 @@ fn sealed(version: u16, postcard: &[u8]) -> Vec<u8> {
 #[test]
 fn the_bytes_are_as_documented() {
     let config = example();
-    assert_eq!(bytes(&config), sealed(1, &to_stdvec(&config)));
+    assert_eq!(bytes(&config), sealed(baked::VERSION, &to_stdvec(&config)));
     assert_eq!(baked::checksum(&config), crc32(&to_stdvec(&config)));
     // The largest is refused, being no configuration, but would fit.
     assert!(8 + to_stdvec(&config_of_largest()).len() + 4 <= LENGTH_MAX);
@@ -42,7 +44,7 @@ fn the_bytes_are_as_documented() {
     ));
 }
 
-fn config_of_largest() -> Config {
+fn config_of_largest() -> RobotConfig {
     config(&mut Largest { variant: 0 })
 }
 
@@ -100,14 +102,18 @@ fn every_cut_length_is_refused() {
 fn what_is_whole_and_wrong_is_refused() {
     let config = example();
     let postcard = to_stdvec(&config);
-    assert_eq!(baked::read(&sealed(2, &postcard)), Err(BakedError::Version(2)));
-    assert_eq!(baked::read(&sealed(1, &postcard[1..])), Err(BakedError::Layout));
-    assert_eq!(baked::read(&sealed(1, &[&postcard[..], &[0]].concat())), Err(BakedError::Layout));
-    assert_eq!(baked::read(&sealed(1, &[])), Err(BakedError::Layout));
+    // A configuration of the version before, which held the localizer's part alone.
+    assert_eq!(baked::read(&sealed(1, &to_stdvec(&config.localizer))), Err(BakedError::Version(1)));
+    assert_eq!(baked::read(&sealed(baked::VERSION, &postcard[1..])), Err(BakedError::Layout));
+    assert_eq!(
+        baked::read(&sealed(baked::VERSION, &[&postcard[..], &[0]].concat())),
+        Err(BakedError::Layout)
+    );
+    assert_eq!(baked::read(&sealed(baked::VERSION, &[])), Err(BakedError::Layout));
     let mut wrong = config;
-    wrong.trust.gate = f32::NAN;
-    let error = baked::read(&sealed(1, &to_stdvec(&wrong))).unwrap_err();
-    assert!(error.to_string().contains("trust.gate must be positive"), "{error}");
+    wrong.localizer.gating.confidence = f32::NAN;
+    let error = baked::read(&sealed(baked::VERSION, &to_stdvec(&wrong))).unwrap_err();
+    assert!(error.to_string().contains("gating.confidence must be zero or positive"), "{error}");
     assert_eq!(baked::write(&wrong, &mut [0; LENGTH_MAX]).unwrap_err(), error);
 }
 
@@ -118,7 +124,7 @@ proptest! {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut bytes: Vec<u8> = (0..length).map(|_| rng.random()).collect();
         if rng.random() {
-            bytes.splice(..0, *b"SFXC\x01\x00\x7d\x00");
+            bytes.splice(..0, *b"SFXC\x02\x00\xff\x00");
         }
         prop_assert!(baked::read(&bytes).is_err());
     }

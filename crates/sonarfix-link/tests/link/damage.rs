@@ -1,7 +1,7 @@
-//! Frames that were damaged, cut, doubled, or are not for us.
+//! Damaged, truncated, repeated and foreign frames.
 
 use sonarfix_link::message::Message;
-use sonarfix_link::{Command, Counters, Gaps, Telemetry, VERSION};
+use sonarfix_link::{Command, Gaps, ReceiverCounters, Telemetry, VERSION};
 
 use crate::messages::{COMMANDS, Counting, TELEMETRY, command, telemetry};
 use crate::wire::{framed, received, sent, to_stdvec};
@@ -14,7 +14,7 @@ fn command_example(kind: u32) -> Command {
     command(kind, &mut Counting { next: 0, variant: 0 })
 }
 
-/// What comes through of a damaged frame with a whole one behind it, which must.
+/// The number of frames received from a damaged frame, followed by a valid one, which must be received.
 fn through<M: Message + PartialEq + core::fmt::Debug>(damaged: &[u8], message: &M) -> usize {
     let wire = [damaged, &sent(9, message)].concat();
     let (frames, receiver) = received::<M>(&wire);
@@ -24,7 +24,7 @@ fn through<M: Message + PartialEq + core::fmt::Debug>(damaged: &[u8], message: &
     frames.len() - 1
 }
 
-fn no_flip_is_believed<M: Message + PartialEq + core::fmt::Debug>(message: &M) {
+fn no_flip_is_accepted<M: Message + PartialEq + core::fmt::Debug>(message: &M) {
     let wire = sent(8, message);
     for bit in 0..8 * wire.len() {
         let mut flipped = wire.clone();
@@ -35,8 +35,8 @@ fn no_flip_is_believed<M: Message + PartialEq + core::fmt::Debug>(message: &M) {
 
 #[test]
 fn every_flipped_bit_costs_that_frame_and_no_other() {
-    (0..TELEMETRY).for_each(|kind| no_flip_is_believed(&telemetry_example(kind)));
-    (0..COMMANDS).for_each(|kind| no_flip_is_believed(&command_example(kind)));
+    (0..TELEMETRY).for_each(|kind| no_flip_is_accepted(&telemetry_example(kind)));
+    (0..COMMANDS).for_each(|kind| no_flip_is_accepted(&command_example(kind)));
 }
 
 #[test]
@@ -47,7 +47,7 @@ fn every_cut_costs_that_frame_and_no_other() {
         for length in 0..wire.len() - 1 {
             assert_eq!(through(&wire[..length], &message), 0, "{length} of {wire:02x?}");
         }
-        // Without its own, the zero before the next frame ends it.
+        // Without its own, the delimiter before the next frame terminates it.
         assert_eq!(through(&wire[..wire.len() - 1], &message), 1);
         for start in 2..wire.len() {
             assert_eq!(through(&wire[start..], &message), 0, "from {start} of {wire:02x?}");
@@ -76,18 +76,21 @@ fn what_is_skipped_is_counted_by_its_reason() {
         assert!(frames.is_empty(), "{wire:02x?}");
         receiver.counters()
     };
-    let none = Counters::default();
+    let none = ReceiverCounters::default();
     let (ours, theirs) = (Command::KIND, Telemetry::KIND);
     assert_eq!(count(&[0; 100]), none, "empty frames are no frames");
-    assert_eq!(count(&[0, 5, 1, 0]), Counters { corrupt: 1, ..none });
-    assert_eq!(count(&[0, 1, 1, 0]), Counters { corrupt: 1, ..none }, "too short");
-    assert_eq!(count(&[&[0], &[1; 200][..], &[0]].concat()), Counters { too_long: 1, ..none });
-    let foreign = Counters { foreign: 1, ..none };
+    assert_eq!(count(&[0, 5, 1, 0]), ReceiverCounters { corrupt: 1, ..none });
+    assert_eq!(count(&[0, 1, 1, 0]), ReceiverCounters { corrupt: 1, ..none }, "too short");
+    assert_eq!(
+        count(&[&[0], &[1; 400][..], &[0]].concat()),
+        ReceiverCounters { too_long: 1, ..none }
+    );
+    let foreign = ReceiverCounters { foreign: 1, ..none };
     assert_eq!(count(&framed(VERSION + 1, ours, 0, &message)), foreign);
     assert_eq!(count(&framed(VERSION, theirs, 0, &message)), foreign);
     assert_eq!(count(&framed(VERSION, 7, 0, &message)), foreign);
     assert_eq!(count(&sent(0, &telemetry_example(0))), foreign);
-    let undecodable = Counters { undecodable: 1, ..none };
+    let undecodable = ReceiverCounters { undecodable: 1, ..none };
     assert_eq!(count(&framed(VERSION, ours, 0, &[6])), undecodable, "no such command");
     assert_eq!(count(&framed(VERSION, ours, 0, &[])), undecodable, "nothing");
     assert_eq!(count(&framed(VERSION, ours, 0, &[&message[..], &[0]].concat())), undecodable);
@@ -120,6 +123,6 @@ fn gaps_are_the_frames_that_are_missing() {
     assert_eq!(lost(&[65_534, 65_535, 1, 2]), (0, 0));
     assert_eq!(lost(&[65_534, 2]), (2, 0), "65,535 and 1: none has the number 0 again");
     assert_eq!(lost(&[7, 7, 7, 8]), (0, 0), "a repeat is no loss");
-    assert_eq!(lost(&[500, 0, 1]), (0, 1), "it has started anew");
+    assert_eq!(lost(&[500, 0, 1]), (0, 1), "it has restarted");
     assert_eq!(lost(&[0, 2]), (1, 0));
 }

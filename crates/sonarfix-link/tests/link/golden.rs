@@ -3,37 +3,41 @@
 //! and only then the bytes here.
 
 use sonarfix::aim::NoAim;
-use sonarfix::config::{Config, Policy, Rhythm};
+use sonarfix::config::{Config, PingSchedule, Policy, ServoTiming};
 use sonarfix::ekf::Innovation;
 use sonarfix::health::Verdict;
 use sonarfix::localizer::Fix;
-use sonarfix::units::{Duration, Metres, SquareMetres};
-use sonarfix_link::message::Flashed;
-use sonarfix_link::{Command, Outcome, Telemetry, VERSION, baked};
+use sonarfix::units::{Duration, Metres, Radians, SquareMetres};
+use sonarfix_hal::config::{RobotConfig, Unsupported};
+use sonarfix_hal::ranger::{PulseTiming, RangerKind};
+use sonarfix_hal::servo::SettingError;
+use sonarfix_link::message::ImageStatus;
+use sonarfix_link::{Command, CommandResult, Telemetry, VERSION, baked};
 
 use crate::messages::{
     COMMANDS, Counting, NO_ECHO, REFUSALS, REFUSED, RESETS, TELEMETRY, command, telemetry,
 };
 use crate::wire::to_stdvec;
 
-/// What the bytes below are of.
-const OF_VERSION: u8 = 1;
+/// The version of the bytes below.
+const OF_VERSION: u8 = 2;
 
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().fold(String::new(), |hex, byte| format!("{hex}{byte:02x}"))
 }
 
 fn name_of_telemetry(message: &Telemetry) -> &'static str {
-    // No wildcard: a new message wants a line here, and bytes below.
+    // No wildcard: a new message needs a line here, and bytes below.
     match message {
         Telemetry::Hello(_) => "hello",
-        Telemetry::Began(_) => "began",
-        Telemetry::Step(_) => "step",
-        Telemetry::Look(_) => "look",
-        Telemetry::Skip(_) => "skip",
+        Telemetry::Initialized(_) => "initialized",
+        Telemetry::Odometry(_) => "odometry",
+        Telemetry::Ping(_) => "ping",
+        Telemetry::SkippedPing(_) => "skipped ping",
         Telemetry::Estimate(_) => "estimate",
-        Telemetry::Loop(_) => "loop",
+        Telemetry::LoopStatus(_) => "loop status",
         Telemetry::Ack(_) => "ack",
+        Telemetry::PoseSet(_) => "pose set",
     }
 }
 
@@ -48,7 +52,7 @@ fn name_of_command(message: &Command) -> &'static str {
     }
 }
 
-/// One of each: numbers counted up field by field, and of every choice between variants the first.
+/// One message of each kind: numbers count up field by field, and of all variants the first is chosen.
 fn all() -> Vec<(&'static str, String)> {
     let numbers = || Counting { next: 0, variant: 0 };
     let telemetry = (0..TELEMETRY).map(|kind| telemetry(kind, &mut numbers()));
@@ -68,7 +72,7 @@ fn every_message_has_the_bytes_of_its_version() {
     assert_eq!(now, golden);
 }
 
-/// The numbers of variants, which are bytes as well.
+/// The indices of variants, which are bytes as well.
 #[test]
 fn every_variant_has_the_number_of_its_version() {
     fn numbered<T: serde::Serialize>(variants: &[T]) {
@@ -80,25 +84,45 @@ fn every_variant_has_the_number_of_its_version() {
     numbered(&REFUSALS);
     numbered(&RESETS);
     numbered(&REFUSED);
-    numbered(&[NoAim::HeadingUncertain, NoAim::NoWall]);
+    numbered(&[NoAim::NoWall]);
     numbered(&[Verdict::Tracking, Verdict::Degraded, Verdict::Lost]);
     let innovation = Innovation { value: Metres(0.0), variance: SquareMetres(0.0) };
     numbered(&[
         Fix::Accepted(innovation),
-        Fix::Weakened(innovation),
+        Fix::Downweighted(innovation),
         Fix::Gated(innovation),
         Fix::Refused(REFUSALS[0]),
     ]);
     numbered(&[Policy::Nearest, Policy::Informative]);
-    numbered(&[Rhythm::Every(Duration::from_ticks(0)), Rhythm::AsFastAsPossible]);
-    numbered(&[Flashed::Valid(0), Flashed::Missing, Flashed::Corrupt]);
-    numbered(&[Outcome::Done, Outcome::Map(Flashed::Missing), Outcome::Refused(REFUSED[0])]);
+    numbered(&[PingSchedule::Every(Duration::from_ticks(0)), PingSchedule::AsFastAsPossible]);
+    numbered(&[
+        ImageStatus::Valid(0),
+        ImageStatus::Missing,
+        ImageStatus::Corrupt,
+        ImageStatus::Version(1),
+    ]);
+    numbered(&[
+        RangerKind::Pulse(PulseTiming::HC_SR04),
+        RangerKind::Srf { address: 0 },
+        RangerKind::Custom,
+    ]);
+    let limits = SettingError::Limits;
+    numbered(&[Unsupported::Ranger, Unsupported::Servo(limits), Unsupported::Counter]);
+    numbered(&[SettingError::Calibration, limits, SettingError::Pulse, SettingError::Frame]);
+    numbered(&[
+        CommandResult::Done,
+        CommandResult::Map(ImageStatus::Missing),
+        CommandResult::Refused(REFUSED[0]),
+    ]);
 }
 
 #[test]
 fn a_baked_configuration_has_the_bytes_of_its_version() {
-    assert_eq!(baked::VERSION, 1);
-    let config = Config::for_track_width(Metres(0.35));
+    assert_eq!(baked::VERSION, 2);
+    let mut localizer = Config::for_track_width(Metres(0.35));
+    localizer.sonar.servo = (Radians(-1.5), Radians(1.5));
+    localizer.sonar.timing.servo = ServoTiming::SG90;
+    let config = RobotConfig::with_common_parts(localizer);
     let mut buffer = [0; baked::LENGTH_MAX];
     let bytes = baked::write(&config, &mut buffer).unwrap();
     assert_eq!(hex(bytes), include_str!("baked.txt").trim());

@@ -1,10 +1,10 @@
-//! Tests of the link, by what they are about.
+//! Tests of the link, by topic.
 
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "a test should stop")]
 
-mod answered;
 mod baked;
 mod damage;
+mod deduplicator;
 mod golden;
 mod messages;
 mod sizes;

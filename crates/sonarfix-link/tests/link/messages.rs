@@ -1,10 +1,10 @@
-//! Messages to test with: any, one of each with numbers to be recognised by, the largest of each.
+//! Messages for tests: random ones, one of each kind with distinct numbers, the largest of each kind.
 
 use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
 use sonarfix::aim::{Aim, NoAim, Reason};
-use sonarfix::config::{Config, Pace, Policy, Rhythm, Timing, Weights};
-use sonarfix::ekf::{Innovation, State};
+use sonarfix::config::{Config, PingSchedule, PingTiming, Policy, ServoTiming};
+use sonarfix::ekf::{Innovation, STATES, StandardDeviations, StateEstimate};
 use sonarfix::health::{Health, Verdict};
 use sonarfix::localizer::{Fix, Refusal, Start};
 use sonarfix::map::WallId;
@@ -12,17 +12,23 @@ use sonarfix::pose::{Point, Pose};
 use sonarfix::units::{
     Duration, Instant, Metres, MetresPerSecond, PerRootMetre, Radians, SquareMetres,
 };
-use sonarfix_hal::ranger::{Echo, NoEcho};
+use sonarfix_hal::config::{RangerConfig, RobotConfig, Unsupported};
+use sonarfix_hal::ranger::{Celsius, Echo, NoEcho, PulseTiming, RangerKind};
 use sonarfix_hal::robot::{EncoderFaults, Faults};
-use sonarfix_link::message::{Flashed, Loop, Refused, Reset, Skip, Step};
-use sonarfix_link::{Ack, Command, Counters, Estimate, Hello, Look, Outcome, Telemetry};
+use sonarfix_hal::servo::{MeasuredPulse, SettingError};
+use sonarfix_link::message::{
+    CommandError, ImageStatus, LoopStatus, Odometry, ResetCause, SkippedPing,
+};
+use sonarfix_link::{
+    Ack, Command, CommandResult, Estimate, Hello, Ping, ReceiverCounters, Telemetry,
+};
 
-/// Where the numbers of a message come from.
+/// The source of the numbers of a message.
 pub trait Source {
     fn bits32(&mut self) -> u32;
     fn bits64(&mut self) -> u64;
     fn bits16(&mut self) -> u16;
-    /// One of so many variants.
+    /// Selects one of this number of variants.
     fn pick(&mut self, of: u32) -> u32;
 
     fn choose<T: Copy>(&mut self, variants: &[T]) -> T {
@@ -58,7 +64,7 @@ impl Source for ChaCha8Rng {
     }
 }
 
-/// The numbers 1, 2, 3 …, so that no two fields of a message are alike.
+/// The numbers 1, 2, 3 …, so that the fields of a message differ.
 pub struct Counting {
     pub next: u16,
     pub variant: u32,
@@ -83,7 +89,7 @@ impl Source for Counting {
     }
 }
 
-/// The numbers whose varints are longest. Of the variants the first, whichever they are.
+/// The numbers with the longest varints, and a fixed variant.
 pub struct Largest {
     pub variant: u32,
 }
@@ -106,8 +112,8 @@ impl Source for Largest {
     }
 }
 
-/// How many kinds of telemetry there are, and of commands.
-pub const TELEMETRY: u32 = 8;
+/// The numbers of kinds of telemetry and of commands.
+pub const TELEMETRY: u32 = 9;
 pub const COMMANDS: u32 = 6;
 
 pub fn any_telemetry(rng: &mut ChaCha8Rng) -> Telemetry {
@@ -129,20 +135,18 @@ pub fn telemetry(kind: u32, source: &mut impl Source) -> Telemetry {
             configuration: flashed(source),
             reset: reset(source),
         }),
-        1 => Telemetry::Began(estimate(source)),
-        2 => Telemetry::Step(Step {
+        1 => Telemetry::Initialized(estimate(source)),
+        2 => Telemetry::Odometry(Odometry {
             at: source.instant(),
             right_metres: source.single().into(),
             left_metres: source.single().into(),
         }),
-        3 => Telemetry::Look(look(source)),
-        4 => Telemetry::Skip(Skip {
-            at: source.instant(),
-            reason: if source.pick(2) == 0 { NoAim::HeadingUncertain } else { NoAim::NoWall },
-        }),
+        3 => Telemetry::Ping(look(source)),
+        4 => Telemetry::SkippedPing(SkippedPing { at: source.instant(), reason: NoAim::NoWall }),
         5 => Telemetry::Estimate(estimate(source)),
-        6 => Telemetry::Loop(state_of_loop(source)),
-        _ => Telemetry::Ack(Ack { sequence: source.bits16(), outcome: outcome(source) }),
+        6 => Telemetry::LoopStatus(state_of_loop(source)),
+        7 => Telemetry::Ack(Ack { sequence: source.bits16(), result: command_result(source) }),
+        _ => Telemetry::PoseSet(estimate(source)),
     }
 }
 
@@ -152,7 +156,7 @@ pub fn command(kind: u32, source: &mut impl Source) -> Command {
         0 => {
             let (x, y) = (source.single(), source.single());
             let heading = Radians(source.single());
-            // A heading is wrapped, so only a finite one comes through bit for bit.
+            // A heading is wrapped, so only a finite one is transmitted bit for bit.
             let heading = if heading.is_finite() { heading } else { Radians(1.0) };
             Command::SetPose(Start {
                 pose: Pose::new(x, y, heading),
@@ -168,23 +172,15 @@ pub fn command(kind: u32, source: &mut impl Source) -> Command {
     }
 }
 
-fn state(source: &mut impl Source) -> State {
-    State {
-        x: source.single(),
-        y: source.single(),
-        heading: source.single(),
-        scale_right: source.single(),
-        scale_left: source.single(),
-        track_width_error: source.single(),
-        range_scale: source.single(),
-    }
+fn numbers(source: &mut impl Source) -> [f32; STATES] {
+    core::array::from_fn(|_| source.single())
 }
 
 fn estimate(source: &mut impl Source) -> Estimate {
     Estimate {
         at: source.instant(),
-        state: state(source),
-        deviation: state(source),
+        state: StateEstimate::from_array(numbers(source)),
+        deviation: StandardDeviations::from_array(numbers(source)),
         health: Health {
             verdict: source.choose(&[Verdict::Tracking, Verdict::Degraded, Verdict::Lost]),
             evidence: source.single(),
@@ -192,7 +188,7 @@ fn estimate(source: &mut impl Source) -> Estimate {
             accepted_in_a_row: source.bits16(),
             gated_in_a_row: source.bits16(),
             silent_in_a_row: source.bits16(),
-            reopened: source.bits16(),
+            inflations: source.bits16(),
             rolled_since_fix: Metres(source.single()),
             time_since_fix: source.duration(),
             position_deviation: Metres(source.single()),
@@ -219,7 +215,7 @@ pub const REFUSALS: [Refusal; 6] = [
     Refusal::UnknownWall,
 ];
 
-fn look(source: &mut impl Source) -> Look {
+fn look(source: &mut impl Source) -> Ping {
     let at = source.instant();
     let aim = Aim {
         wall: WallId(source.bits32()),
@@ -244,19 +240,19 @@ fn look(source: &mut impl Source) -> Look {
         Innovation { value: Metres(source.single()), variance: SquareMetres(source.single()) };
     let fix = match source.pick(4) {
         0 => Fix::Accepted(innovation),
-        1 => Fix::Weakened(innovation),
+        1 => Fix::Downweighted(innovation),
         2 => Fix::Gated(innovation),
         _ => Fix::Refused(source.choose(&REFUSALS)),
     };
-    Look { at, aim, outcome, fix }
+    Ping { at, aim, outcome, fix }
 }
 
-fn state_of_loop(source: &mut impl Source) -> Loop {
+fn state_of_loop(source: &mut impl Source) -> LoopStatus {
     let at = source.instant();
     let running = source.pick(2) == 1;
     let mut encoder = || EncoderFaults { errors: source.bits32(), illegal: source.bits32() };
     let (right, left) = (encoder(), encoder());
-    Loop {
+    LoopStatus {
         at,
         running,
         faults: Faults {
@@ -269,7 +265,7 @@ fn state_of_loop(source: &mut impl Source) -> Loop {
             clock: source.bits32(),
         },
         worst_poll: source.duration(),
-        commands: Counters {
+        commands: ReceiverCounters {
             frames: source.bits32(),
             corrupt: source.bits32(),
             too_long: source.bits32(),
@@ -279,39 +275,74 @@ fn state_of_loop(source: &mut impl Source) -> Loop {
     }
 }
 
-fn flashed(source: &mut impl Source) -> Flashed {
-    match source.pick(3) {
-        0 => Flashed::Valid(source.bits32()),
-        1 => Flashed::Missing,
-        _ => Flashed::Corrupt,
+fn flashed(source: &mut impl Source) -> ImageStatus {
+    match source.pick(4) {
+        0 => ImageStatus::Valid(source.bits32()),
+        1 => ImageStatus::Missing,
+        2 => ImageStatus::Corrupt,
+        _ => ImageStatus::Version(source.bits16()),
     }
 }
 
-pub const RESETS: [Reset; 6] =
-    [Reset::PowerOn, Reset::BrownOut, Reset::Pin, Reset::Watchdog, Reset::Software, Reset::Unknown];
+pub const RESETS: [ResetCause; 6] = [
+    ResetCause::PowerOn,
+    ResetCause::BrownOut,
+    ResetCause::Pin,
+    ResetCause::Watchdog,
+    ResetCause::Software,
+    ResetCause::Unknown,
+];
 
-fn reset(source: &mut impl Source) -> Reset {
+fn reset(source: &mut impl Source) -> ResetCause {
     source.choose(&RESETS)
 }
 
-pub const REFUSED: [Refused; 6] = [
-    Refused::Configuration,
-    Refused::Pose,
-    Refused::NoMap,
-    Refused::NoConfiguration,
-    Refused::Storage,
-    Refused::NoPose,
+pub const REFUSED: [CommandError; 7] = [
+    CommandError::Configuration,
+    CommandError::Pose,
+    CommandError::NoMap,
+    CommandError::NoConfiguration,
+    CommandError::Storage,
+    CommandError::NoPose,
+    CommandError::Unsupported(Unsupported::Servo(SettingError::Frame)),
 ];
 
-fn outcome(source: &mut impl Source) -> Outcome {
+fn command_result(source: &mut impl Source) -> CommandResult {
     match source.pick(3) {
-        0 => Outcome::Map(flashed(source)),
-        1 => Outcome::Done,
-        _ => Outcome::Refused(source.choose(&REFUSED)),
+        0 => CommandResult::Map(flashed(source)),
+        1 => CommandResult::Done,
+        _ => CommandResult::Refused(source.choose(&REFUSED)),
     }
 }
 
-pub fn config(source: &mut impl Source) -> Config {
+pub fn config(source: &mut impl Source) -> RobotConfig {
+    let mut config = RobotConfig::with_common_parts(localizer(source));
+    for wheel in [&mut config.right_wheel, &mut config.left_wheel] {
+        wheel.travel_per_edge = Metres(source.single());
+        wheel.is_mirrored = source.pick(2) == 0;
+    }
+    config.encoder_period = source.duration();
+    config.servo_pulses = [0; 2]
+        .map(|_| MeasuredPulse { width: source.duration(), bearing: Radians(source.single()) });
+    config.ranger = RangerConfig {
+        kind: match source.pick(3) {
+            0 => RangerKind::Pulse(PulseTiming {
+                trigger: source.duration(),
+                blanking: source.duration(),
+                longest: source.duration(),
+                silence: source.duration(),
+                listen: source.duration(),
+                stuck: source.duration(),
+            }),
+            1 => RangerKind::Srf { address: source.bits16().to_le_bytes()[0] },
+            _ => RangerKind::Custom,
+        },
+        temperature: Celsius(source.single()),
+    };
+    config
+}
+
+fn localizer(source: &mut impl Source) -> Config {
     let mut config = Config::for_track_width(Metres(source.single()));
     config.drive.wheel_noise = PerRootMetre(Metres(source.single()));
     config.drive.scale_walk = PerRootMetre(source.single());
@@ -324,12 +355,12 @@ pub fn config(source: &mut impl Source) -> Config {
     config.sonar.max_range = Metres(source.single());
     config.sonar.noise.floor = Metres(source.single());
     config.sonar.noise.per_metre = source.single();
-    config.sonar.timing = Timing {
-        rhythm: match source.pick(2) {
-            0 => Rhythm::Every(source.duration()),
-            _ => Rhythm::AsFastAsPossible,
+    config.sonar.timing = PingTiming {
+        schedule: match source.pick(2) {
+            0 => PingSchedule::Every(source.duration()),
+            _ => PingSchedule::AsFastAsPossible,
         },
-        servo: Pace {
+        servo: ServoTiming {
             frame: source.duration(),
             sixty_degrees: source.duration(),
             settle: source.duration(),
@@ -340,14 +371,17 @@ pub fn config(source: &mut impl Source) -> Config {
     config.prior.scale_left = source.single();
     config.prior.track_width = Metres(source.single());
     config.prior.range_scale = source.single();
-    config.trust.gate = source.single();
-    config.trust.confidence = source.single();
-    config.trust.outer_gate = source.single();
-    config.trust.short = source.single();
-    config.trust.reopen = Metres(source.single());
-    config.trust.stale = Metres(source.single());
-    config.trust.doubtful = Metres(source.single());
+    config.gating.confidence = source.single();
+    config.gating.inflation = Metres(source.single());
+    config.gating.max_distance_without_fix = Metres(source.single());
+    config.gating.max_position_deviation = Metres(source.single());
+    config.echo.missed = source.single();
+    config.echo.short = source.single();
+    config.echo.long = source.single();
+    config.echo.free_path = Metres(source.single());
+    config.echo.map_accuracy = Metres(source.single());
     config.policy = if source.pick(2) == 0 { Policy::Nearest } else { Policy::Informative };
-    config.weights = Weights { heading: Metres(source.single()), wheels: Metres(source.single()) };
+    config.weights.heading = Metres(source.single());
+    config.weights.wheels = Metres(source.single());
     config
 }

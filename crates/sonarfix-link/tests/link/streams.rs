@@ -1,4 +1,4 @@
-//! Streams of frames and garbage, many of them. `SONARFIX_STREAMS=1000000` for a million.
+//! Random streams of frames and line noise. `SONARFIX_STREAMS=1000000` runs a million.
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -8,7 +8,7 @@ use sonarfix_link::{Command, Frame, Telemetry, VERSION};
 use crate::messages::{any_command, any_telemetry};
 use crate::wire::{framed, received, sent, to_stdvec};
 
-/// How many streams of each kind, where nobody says.
+/// The default number of streams of each kind.
 const STREAMS: u64 = 20_000;
 
 fn streams() -> u64 {
@@ -16,7 +16,7 @@ fn streams() -> u64 {
     asked.map_or(STREAMS, |count| count.parse().unwrap())
 }
 
-/// A stream, and the frames in it that must be found.
+/// A stream, and the frames in it that must be received.
 #[derive(Default)]
 struct Stream {
     wire: Vec<u8>,
@@ -29,7 +29,7 @@ impl Stream {
         for _ in 0..rng.random_range(1..12) {
             stream.piece(rng, any);
         }
-        // Whatever came before, this one must be found.
+        // This frame must be received, whatever precedes it.
         let last = any(rng);
         stream.whole_frame(rng, &last);
         stream
@@ -48,7 +48,7 @@ impl Stream {
             0 | 1 => self.whole_frame(rng, &message),
             2 => self.wire.extend(garbage(rng)),
             3 => self.wire.extend(damaged(rng, frame)),
-            // So much is missing that what comes next cannot make up for it by chance.
+            // Enough is missing that the following bytes cannot complete it by chance.
             4 => self.wire.extend(&frame[..rng.random_range(0..frame.len() - 5)]),
             5 => self.wire.extend(&frame[rng.random_range(6..frame.len())..]),
             6 => {
@@ -69,14 +69,14 @@ impl Stream {
     }
 }
 
-/// Random bytes; ends and starts of frames are among them more often than chance has it.
+/// Random bytes, with an increased probability of delimiters.
 fn garbage(rng: &mut ChaCha8Rng) -> Vec<u8> {
     let length = rng.random_range(1..60);
     let byte = |rng: &mut ChaCha8Rng| if rng.random_ratio(1, 8) { 0 } else { rng.random() };
     (0..length).map(|_| byte(rng)).collect()
 }
 
-/// A frame with up to four bits of it flipped, at least one.
+/// A frame with one to four flipped bits.
 fn damaged(rng: &mut ChaCha8Rng, mut frame: Vec<u8>) -> Vec<u8> {
     let whole = frame.clone();
     while frame == whole {

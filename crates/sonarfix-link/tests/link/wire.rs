@@ -1,5 +1,4 @@
-//! The frame, put together a second time from its description in `docs/link.md`, with a CRC and a
-//! COBS of its own.
+//! An independent implementation of the frame by its description in `docs/link.md`, with its own CRC and COBS.
 
 use proptest::prelude::*;
 use rand::SeedableRng;
@@ -25,7 +24,7 @@ pub fn crc32(bytes: &[u8]) -> u32 {
     !crc
 }
 
-/// Consistent overhead byte stuffing: each zero becomes the distance to the next.
+/// Consistent overhead byte stuffing: replaces each zero by the distance to the next.
 fn stuff(body: &[u8]) -> Vec<u8> {
     assert!(body.len() < 254);
     let runs = body.split(|&byte| byte == 0);
@@ -41,12 +40,12 @@ pub fn framed(version: u8, kind: u8, sequence: u16, message: &[u8]) -> Vec<u8> {
     [&[0], &stuff(&body)[..], &[0]].concat()
 }
 
-/// The frame that a sender makes.
+/// The frame from a sender.
 pub fn sent<M: Message>(sequence: u16, message: &M) -> Vec<u8> {
     Sender::starting_at(sequence).frame(message, &mut frame::EMPTY.clone()).to_vec()
 }
 
-/// Everything that a receiver finds.
+/// All frames that a receiver finds.
 pub fn received<M: Message>(wire: &[u8]) -> (Vec<Frame<M>>, Receiver<M>) {
     let mut receiver = Receiver::new();
     let frames = wire.iter().filter_map(|&byte| receiver.push(byte)).collect();
@@ -63,7 +62,7 @@ fn round_trip<M: Message>(sequence: u16, message: &M) {
         (1, 1, 0)
     );
     assert_eq!(frames[0].sequence, sequence);
-    // As bytes: a NaN is not equal to itself, and must come through as well.
+    // Compared as bytes, because a NaN does not equal itself.
     assert_eq!(postcard::to_stdvec(&frames[0].message), bytes);
 }
 
@@ -77,7 +76,7 @@ mod postcard {
 pub use self::postcard::to_stdvec;
 
 proptest! {
-    /// Whatever is sent comes through, in the frame that the documents describe.
+    /// Every message is received, and its frame is the documented one.
     #[test]
     fn every_message_comes_through(seed in any::<u64>(), sequence in any::<u16>()) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -86,10 +85,10 @@ proptest! {
     }
 }
 
-/// The example of `docs/link.md`, whose bytes were put together by hand.
+/// The example of `docs/link.md`, assembled by hand.
 #[test]
 fn the_documents_example_is_right() {
-    const STOP: [u8; 12] = [0x00, 0x04, 0x01, 0x01, 0x07, 0x06, 0x03, 0, 0, 0, 0, 0x00];
+    const STOP: [u8; 12] = [0x00, 0x04, 0x02, 0x01, 0x07, 0x06, 0x03, 0, 0, 0, 0, 0x00];
     let documents = include_str!("../../../../docs/link.md");
     let wire = sent(7, &Command::Stop);
     let hex: Vec<_> = wire.iter().map(|byte| format!("{byte:02x}")).collect();

@@ -1,9 +1,9 @@
-//! Buildings of any size and always the same density, for benchmarks and tests.
+//! Buildings of any size with constant density, for benchmarks and tests.
 
 use sonarfix::map::Wall;
 use sonarfix::pose::Point;
 
-/// Inside of a room from wall to wall, metres.
+/// Inner size of a room, metres.
 const ROOM: (f32, f32) = (4.0, 5.0);
 /// Width of a door, metres.
 const DOOR: f32 = 0.9;

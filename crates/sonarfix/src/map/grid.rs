@@ -1,12 +1,12 @@
-//! The uniform grid over a baked map: which cells a wall lies in, and which are near a point.
+//! The uniform grid over a baked map: the cells of a wall, and the cells near a point.
 //!
-//! One function turns a coordinate into a cell, for the walls when the map is baked and for the
-//! point when it is asked. It is monotonic, so its rounding cannot lose a wall: what is not less
-//! stays not less.
+//! One function converts a coordinate to a cell, for the walls when the map is baked and for the point of
+//! a query. It is monotonic, so its rounding cannot lose a wall.
 //!
 //! # Non-finite policy
-//! A grid with a number that is not finite cannot be made. Around a point that is not finite, or within a
-//! reach that is NaN, are no cells, or all; a coordinate too far to count is beyond the last cell.
+//! A grid with a number that is not finite cannot be constructed. Around a point that is not finite, or
+//! within a reach that is NaN, there are no cells or all; a coordinate that overflows is beyond the last
+//! cell.
 
 use super::wall::Wall;
 use crate::pose::Point;
@@ -18,13 +18,13 @@ use crate::units::Metres;
 pub struct Grid {
     origin: Point,
     cell: Metres,
-    /// One over the cell's size, 1/m.
+    /// Reciprocal of the cell size, 1/m.
     cells_per_metre: f32,
     columns: u16,
     rows: u16,
 }
 
-/// A rectangle of cells; both ends are in it.
+/// A rectangle of cells, both ends included.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Cells {
@@ -35,14 +35,14 @@ pub struct Cells {
 }
 
 impl Cells {
-    /// How many cells there are.
+    /// Number of cells.
     #[must_use]
     pub fn count(&self) -> u64 {
         let across = |(first, last): (u16, u16)| u64::from(last.saturating_sub(first)) + 1;
         across(self.columns) * across(self.rows)
     }
 
-    /// Whether the cell at a column and a row is among them.
+    /// Whether the cell at a column and a row is in the rectangle.
     #[must_use]
     pub fn contain(&self, column: u16, row: u16) -> bool {
         let has = |(first, last), index| first <= index && index <= last;
@@ -51,9 +51,9 @@ impl Cells {
 }
 
 impl Grid {
-    /// A grid of `columns` × `rows` cells, `cell` wide and high, whose first cell has its least
-    /// corner at `origin`. `None` if a number is not finite, the size of a cell is not positive
-    /// (or its reciprocal not a normal number), or there is no cell.
+    /// A grid of `columns` × `rows` cells, `cell` wide and high, with the lower left corner of the first
+    /// cell at `origin`. `None` if a number is not finite, the cell size is not positive (or its
+    /// reciprocal not a normal number), or there is no cell.
     ///
     /// ```
     /// use sonarfix::map::{Grid, Wall};
@@ -72,7 +72,7 @@ impl Grid {
         is_grid.then_some(Self { origin, cell, cells_per_metre, columns, rows })
     }
 
-    /// The least corner of the first cell.
+    /// Lower left corner of the first cell.
     #[must_use]
     pub fn origin(&self) -> Point {
         self.origin
@@ -84,31 +84,31 @@ impl Grid {
         self.cell
     }
 
-    /// How many cells there are along x.
+    /// Number of cells along x.
     #[must_use]
     pub fn columns(&self) -> u16 {
         self.columns
     }
 
-    /// How many cells there are along y.
+    /// Number of cells along y.
     #[must_use]
     pub fn rows(&self) -> u16 {
         self.rows
     }
 
-    /// How many cells there are.
+    /// Number of cells.
     #[must_use]
     pub fn cells(&self) -> u32 {
         u32::from(self.columns) * u32::from(self.rows)
     }
 
-    /// Where a cell stands in the order of rows.
+    /// Index of a cell, row by row.
     #[must_use]
     pub fn place(&self, column: u16, row: u16) -> u32 {
         u32::from(row) * u32::from(self.columns) + u32::from(column)
     }
 
-    /// The cells that the wall's bounding box touches, or `None` if it is not inside the grid.
+    /// The cells that the bounding box of the wall touches, or `None` if it is not inside the grid.
     #[must_use]
     pub fn cells_of(&self, wall: &Wall) -> Option<Cells> {
         let (from, to) = (wall.from(), wall.to());
@@ -120,8 +120,8 @@ impl Grid {
         Some(Cells { columns: inside(columns, self.columns)?, rows: inside(rows, self.rows)? })
     }
 
-    /// The cells in which something within `reach` of `point` may lie. `None` if there are none,
-    /// and if a number is NaN or the reach negative.
+    /// The cells that contain the points within `reach` of `point`. `None` if there are none, and if a
+    /// number is NaN or the reach is negative.
     #[must_use]
     pub fn cells_near(&self, point: Point, reach: Metres) -> Option<Cells> {
         let around = |middle: Metres| {
@@ -141,8 +141,8 @@ impl Grid {
         (self.index(low - self.origin.y), self.index(high - self.origin.y))
     }
 
-    /// The column or row at a distance from the grid's edge. What lies less than a cell outside
-    /// counts as in the first, as a cast rounds towards zero.
+    /// The column or row at a distance from the edge of the grid. Less than a cell outside counts as in
+    /// the first, because a cast rounds towards zero.
     #[expect(clippy::cast_possible_truncation, reason = "a float-to-int cast saturates")]
     fn index(&self, distance: Metres) -> i32 {
         (distance.0 * self.cells_per_metre) as i32
@@ -153,7 +153,7 @@ fn ordered(a: Metres, b: Metres) -> (Metres, Metres) {
     if b < a { (b, a) } else { (a, b) }
 }
 
-/// The part of a span that is inside 0..count, if there is any.
+/// The part of a range of indices that is inside 0..count, if any.
 fn cut((first, last): (i32, i32), count: u16) -> Option<(u16, u16)> {
     let first = if first < 0 { 0 } else { u16::try_from(first).ok()? };
     let last = u16::try_from(last).unwrap_or(if last < 0 { return None } else { u16::MAX });

@@ -1,9 +1,8 @@
-//! The baked map: one byte slice, written on a PC (`sonarfix map bake`) and read in place.
+//! The format of a baked map: one byte slice, written on a PC (`sonarfix map bake`) and read in place.
 //!
-//! Numbers are little endian; nothing needs to be aligned. `docs/formats.md` describes the same
-//! from a writer's side.
+//! Numbers are little endian, without alignment. `docs/formats.md` describes the format for writers.
 //!
-//! | bytes | what |
+//! | bytes | content |
 //! |---|---|
 //! | 4 | [`MAGIC`] |
 //! | 4 | [`VERSION`] |
@@ -13,45 +12,86 @@
 //! | 4, 4 | origin of the grid, x and y, metres, `f32` |
 //! | 4 | size of a cell, metres, `f32` |
 //! | [20](WALL) W | the walls, each [as stored](super::Wall::stored): five `f32` |
-//! | 4 (cells + 1) | for each cell, row by row, where its references start; at last R |
+//! | 4 (cells + 1) | for each cell, row by row, the index of its first reference; finally R |
 //! | 2 R or 3 R | the [references](Reference): two bytes each if W ≤ [`MOST_NARROW`], else three |
-//! | 4 | [`checksum`] of all bytes before |
+//! | 4 | [`checksum`] of all preceding bytes |
 //!
 //! Each cell refers to every wall whose bounding box touches it, in ascending order.
 //!
 //! # Non-finite policy
-//! A NaN or an infinity in the header is [`MapError::Grid`], in a wall [`MapError::Wall`]: what has been
-//! read holds none.
+//! A NaN or an infinity in the header is [`MapError::Grid`], in a wall [`MapError::Wall`]; a map that has
+//! been read contains none.
 
 use core::ops::Range;
 
 use super::grid::{Cells, Grid};
-use super::wall::Wall;
-use super::{MapError, WallId};
+use super::wall::{Wall, WallId};
 use crate::pose::Point;
 use crate::units::Metres;
 
-/// What every baked map starts with.
+/// First bytes of every baked map.
 pub const MAGIC: [u8; 4] = *b"SFXM";
-/// The version of the format that this crate reads.
+/// Version of the format that this crate reads.
 pub const VERSION: u32 = 1;
-/// What one wall takes, bytes.
+/// Size of a wall, bytes.
 pub const WALL: usize = 20;
-/// The most walls that two-byte references can number.
+/// Largest number of walls with two-byte references.
 pub const MOST_NARROW: u32 = 1 << 14;
-/// The most walls that a baked map can have.
+/// Largest number of walls of a baked map.
 pub const MOST: u32 = 1 << 22;
 
 const HEADER: usize = 32;
 
-/// A cell's reference to a wall: its number, and whether this is the first column and the first row
-/// of cells that it touches. Those two bits are all it takes to give each wall once.
+/// Reason for which a baked map is refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum MapError {
+    /// The bytes do not start with [`MAGIC`].
+    NotAMap,
+    /// The map has this format, which is not [`VERSION`].
+    Version(u32),
+    /// The checksum is wrong: bytes are changed, missing or added.
+    Checksum,
+    /// The length is not that of the header.
+    Length,
+    /// The header describes no valid grid.
+    Grid,
+    /// This wall is degenerate or lies outside the grid.
+    Wall(WallId),
+    /// The index does not belong to the walls.
+    Index,
+}
+
+impl core::fmt::Display for MapError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::NotAMap => f.write_str("this is not a baked map"),
+            Self::Version(version) => write!(
+                f,
+                "the map has format {version} and this reads format {VERSION}: bake it again"
+            ),
+            Self::Checksum => f.write_str("the map is damaged or cut off: its checksum is wrong"),
+            Self::Length => f.write_str("the length of the map is not that of its header"),
+            Self::Grid => f.write_str("the header of the map describes no valid grid"),
+            Self::Wall(WallId(id)) => {
+                write!(f, "wall {id} of the map is degenerate or outside the grid")
+            }
+            Self::Index => f.write_str("the index of the map does not belong to its walls"),
+        }
+    }
+}
+
+impl core::error::Error for MapError {}
+
+/// Reference of a cell to a wall: its number, and whether this is the first column and the first row of
+/// cells that the wall touches. With these two bits a query returns each wall once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Reference(u32);
 
 impl Reference {
-    const FIRST_COLUMN: u32 = 1;
-    const FIRST_ROW: u32 = 2;
+    pub(super) const FIRST_COLUMN: u32 = 1;
+    pub(super) const FIRST_ROW: u32 = 2;
 
     /// The reference to a wall below [`MOST`] that touches `cells`, from the cell at this column and
     /// row.
@@ -62,23 +102,23 @@ impl Reference {
         Self((wall.0 << 2) | first_row | first_column)
     }
 
-    /// The number that it is stored as: four times the wall, plus two in its first row, plus one in
-    /// its first column. In two bytes if the map has no more than [`MOST_NARROW`] walls, else in three.
+    /// The stored number: four times the wall, plus two in its first row, plus one in its first column. It
+    /// has two bytes if the map has at most [`MOST_NARROW`] walls, otherwise three.
     #[must_use]
     pub fn stored(self) -> u32 {
         self.0
     }
 
-    fn wall(self) -> WallId {
+    pub(super) fn wall(self) -> WallId {
         WallId(self.0 >> 2)
     }
 
-    fn has(self, flags: u32) -> bool {
+    pub(super) fn has(self, flags: u32) -> bool {
         self.0 & flags == flags
     }
 }
 
-/// What four bits of a CRC-32 add to the rest: the polynomial 0xEDB88320, shifted out bit by bit.
+/// Contribution of four bits to a CRC-32: the polynomial 0xEDB88320, shifted out bit by bit.
 const NIBBLES: [u32; 16] = [
     0x0000_0000,
     0x1DB7_1064,
@@ -98,8 +138,8 @@ const NIBBLES: [u32; 16] = [
     0xBDBD_F21C,
 ];
 
-/// CRC-32 (ISO 3309, the one of Ethernet, gzip and PNG), by nibbles: every frame on the link has one,
-/// so it is worth 64 bytes of table.
+/// CRC-32 (ISO 3309, as in Ethernet, gzip and PNG), by nibbles. Every frame on the link has one, so speed
+/// justifies a table of 64 bytes.
 ///
 /// ```
 /// assert_eq!(sonarfix::map::image::checksum(b"123456789"), 0xCBF4_3926);
@@ -113,8 +153,8 @@ pub fn checksum(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(u32::MAX, |crc, &byte| shift(shift(crc ^ u32::from(byte))))
 }
 
-/// How many bytes the image at the start of a region of flash has, by its own header; what follows
-/// it does not matter.
+/// Length in bytes of the image at the start of a region of flash, from its header. Bytes after the image
+/// are ignored.
 ///
 /// ```
 /// use sonarfix::map::{MapError, image};
@@ -122,20 +162,20 @@ pub fn checksum(bytes: &[u8]) -> u32 {
 /// ```
 ///
 /// # Errors
-/// [`MapError`], if no image of this version starts there.
+/// [`MapError`] if no image of this version starts there.
 pub fn length(region: &[u8]) -> Result<usize, MapError> {
     check_version(region)?;
     let (header, _) = Header::split(region)?;
     let cells = u64::from(header.columns) * u64::from(header.rows);
     let reference = if header.is_narrow() { 2 } else { 3 };
-    // Every part is below 2³⁸ bytes, so that no sum overflows; at the end stands the checksum.
+    // Every part is below 2³⁸ bytes, so no sum overflows. The last four bytes are the checksum.
     let tables = WALL as u64 * u64::from(header.walls)
         + 4 * (cells + 1)
         + reference * u64::from(header.references);
     usize::try_from(HEADER as u64 + tables + 4).map_err(|_| MapError::Length)
 }
 
-/// What a header says, before any of it is believed.
+/// A header, not yet checked.
 struct Header {
     walls: u32,
     references: u32,
@@ -146,7 +186,7 @@ struct Header {
 }
 
 impl Header {
-    /// The header, and what follows it.
+    /// The header, and the bytes after it.
     fn split(bytes: &[u8]) -> Result<(Self, &[u8]), MapError> {
         let (header, rest) = bytes.split_first_chunk::<HEADER>().ok_or(MapError::Length)?;
         let (words, _) = header.as_chunks::<4>();
@@ -165,13 +205,13 @@ impl Header {
         Ok((header, rest))
     }
 
-    /// Whether two bytes do for a reference.
+    /// Whether references have two bytes.
     fn is_narrow(&self) -> bool {
         self.walls <= MOST_NARROW
     }
 }
 
-/// A baked map whose every length, number and reference has been checked.
+/// A baked map in which every length, number and reference is checked.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Image<'a> {
     grid: Grid,
@@ -194,7 +234,7 @@ impl<'a> Image<'a> {
         Ok(image)
     }
 
-    /// Cuts the bytes into their parts, by the numbers in the header.
+    /// Splits the bytes into their parts, by the numbers in the header.
     fn split(bytes: &'a [u8]) -> Result<Self, MapError> {
         let (header, rest) = Header::split(sealed(bytes)?)?;
         let grid = Grid::new(header.origin, header.cell, header.columns, header.rows);
@@ -216,16 +256,17 @@ impl<'a> Image<'a> {
 
     fn check_walls(&self) -> Result<(), MapError> {
         for id in (0..self.count()).map(WallId) {
-            let is_sound = self.wall(id).is_some_and(|wall| wall.is_sound());
-            if !is_sound {
+            let is_valid = self.wall(id).is_some_and(|wall| wall.is_valid());
+            if !is_valid {
                 return Err(MapError::Wall(id));
             }
         }
         Ok(())
     }
 
-    /// Checks that the index is the one that belongs to these walls. A reference for each cell that
-    /// each wall touches, none twice and none else: then as many are there as should be.
+    /// Checks that the index belongs to these walls: one reference for each cell that each wall touches, and
+    /// no other. The references of each cell are valid and different, and their number is the expected
+    /// one.
     fn check_index(&self) -> Result<(), MapError> {
         let mut expected = 0_u64;
         for id in (0..self.count()).map(WallId) {
@@ -246,8 +287,8 @@ impl<'a> Image<'a> {
         if is_whole { Ok(()) } else { Err(MapError::Index) }
     }
 
-    /// Something, if the references of a cell are in ascending order, each of a wall that touches the
-    /// cell, and with the right flags.
+    /// `Some` if the references of a cell are in ascending order, each of a wall that touches the cell, and
+    /// with the right flags.
     fn check_cell(&self, column: u16, row: u16, run: Range<u32>) -> Option<()> {
         if run.start > run.end {
             return None;
@@ -257,10 +298,10 @@ impl<'a> Image<'a> {
             let reference = self.references.get(place)?;
             let id = reference.wall();
             let cells = self.grid.cells_of(&self.wall(id)?)?;
-            let is_right = id.0 >= least
+            let is_valid = id.0 >= least
                 && cells.contain(column, row)
                 && reference == Reference::new(id, &cells, column, row);
-            if !is_right {
+            if !is_valid {
                 return None;
             }
             least = id.0 + 1;
@@ -286,32 +327,18 @@ impl<'a> Image<'a> {
         Some(Wall::from_stored([x, y, tangent_x, tangent_y, length].map(f32::from_le_bytes)))
     }
 
-    /// Where the references of a cell start, by its place in the order of rows, and those of the cell
-    /// before end.
-    fn start(&self, cell: u32) -> Option<u32> {
-        self.starts.get(usize::try_from(cell).ok()?).map(|&start| u32::from_le_bytes(start))
+    /// The reference at an index.
+    pub fn reference(&self, index: u32) -> Option<Reference> {
+        self.references.get(index)
     }
 
-    pub fn near(self, point: Point, reach: Metres) -> Window<'a> {
-        let nothing = Window {
-            image: self,
-            columns: (0, 0),
-            rows: 0..0,
-            row_flags: 0,
-            run: 0..0,
-            others: 0..0,
-            flags: 0,
-        };
-        match self.grid.cells_near(point, reach) {
-            None => nothing,
-            Some(Cells { columns, rows: (first, last) }) => {
-                Window { columns, rows: first..last.saturating_add(1), ..nothing }
-            }
-        }
+    /// Index of the first reference of a cell, which is also the end of those of the cell before.
+    pub fn start(&self, cell: u32) -> Option<u32> {
+        self.starts.get(usize::try_from(cell).ok()?).map(|&start| u32::from_le_bytes(start))
     }
 }
 
-/// Whether these are the bytes of a map, and of this version.
+/// Checks that the bytes are a map of this version.
 fn check_version(bytes: &[u8]) -> Result<(), MapError> {
     let rest = bytes.strip_prefix(&MAGIC).ok_or(MapError::NotAMap)?;
     let version = rest.first_chunk().map(|&version| u32::from_le_bytes(version));
@@ -321,7 +348,7 @@ fn check_version(bytes: &[u8]) -> Result<(), MapError> {
     }
 }
 
-/// The bytes of an image of this version without their checksum, if that is right.
+/// The bytes of an image of this version without their checksum, if it is right.
 fn sealed(bytes: &[u8]) -> Result<&[u8], MapError> {
     check_version(bytes)?;
     let (content, stated) = bytes.split_last_chunk().ok_or(MapError::Length)?;
@@ -332,11 +359,11 @@ fn sealed(bytes: &[u8]) -> Result<&[u8], MapError> {
     }
 }
 
-/// What of the bytes is not yet taken.
+/// The bytes that are not yet read.
 struct Rest<'a>(&'a [u8]);
 
 impl<'a> Rest<'a> {
-    /// Takes so many chunks of N bytes.
+    /// Reads a number of chunks of N bytes.
     fn take<const N: usize>(&mut self, count: u64) -> Result<&'a [[u8; N]], MapError> {
         let length = usize::try_from(count).ok().and_then(|count| count.checked_mul(N));
         let parts = length.and_then(|length| self.0.split_at_checked(length));
@@ -347,6 +374,7 @@ impl<'a> Rest<'a> {
 }
 
 impl References<'_> {
+    /// Number of references.
     fn len(self) -> usize {
         match self {
             Self::Narrow(references) => references.len(),
@@ -365,66 +393,6 @@ impl References<'_> {
                     |&[low, middle, high]: &[u8; 3]| u32::from_le_bytes([low, middle, high, 0]);
                 references.get(place).map(wide).map(Reference)
             }
-        }
-    }
-}
-
-/// The walls of a rectangle of cells, each once: in the rectangle's first column (row) every one
-/// that the cell refers to, in the others those for which the column (row) is their first.
-///
-/// The references of neighbouring cells of a row lie one after the other, so a row is two runs: its
-/// first cell, and all others.
-#[derive(Debug, Clone)]
-pub(super) struct Window<'a> {
-    image: Image<'a>,
-    /// The first and the last column.
-    columns: (u16, u16),
-    /// The rows to come.
-    rows: Range<u16>,
-    /// The flags that a reference in the next row's first cell must have.
-    row_flags: u32,
-    /// The places of the references to come in this run.
-    run: Range<u32>,
-    /// Those of the row's other cells, until their run begins.
-    others: Range<u32>,
-    /// The flags that a reference in this run must have.
-    flags: u32,
-}
-
-impl Window<'_> {
-    /// Goes on to the next run, if there is one. Not inlined: what it needs would be fetched for
-    /// every wall.
-    #[inline(never)]
-    fn turn(&mut self) -> Option<()> {
-        if self.others.is_empty() {
-            let row = self.rows.next()?;
-            let (first, last) = self.columns;
-            let start = |column| self.image.start(self.image.grid.place(column, row));
-            let (start, middle, end) = (start(first)?, start(first + 1)?, start(last + 1)?);
-            (self.run, self.others) = (start..middle, middle..end);
-            self.flags = self.row_flags;
-            self.row_flags = Reference::FIRST_ROW;
-        } else {
-            self.run = core::mem::replace(&mut self.others, 0..0);
-            self.flags |= Reference::FIRST_COLUMN;
-        }
-        Some(())
-    }
-}
-
-impl Iterator for Window<'_> {
-    type Item = (WallId, Wall);
-
-    fn next(&mut self) -> Option<Self::Item> {
-        loop {
-            for place in self.run.by_ref() {
-                let reference = self.image.references.get(place)?;
-                if reference.has(self.flags) {
-                    let id = reference.wall();
-                    return Some((id, self.image.wall(id)?));
-                }
-            }
-            self.turn()?;
         }
     }
 }

@@ -1,19 +1,20 @@
 //! One wall, and its line.
 //!
 //! # Non-finite policy
-//! [`Wall::new`] refuses NaN, infinity and what is too long to measure. Asked for a point that is not
-//! finite, a wall answers with NaN or infinity.
+//! [`Wall::new`] refuses NaN, infinity and a length that overflows. For a point that is not finite the
+//! functions return NaN or infinity.
 
 use crate::pose::{Heading, Point};
 use crate::units::{Metres, Radians};
 
-/// Why a wall was refused.
+/// Reason for which a wall is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum WallError {
-    /// A coordinate is NaN or infinite, or the wall is too long to measure.
+    /// A coordinate is NaN or infinite, or the length overflows.
     NotFinite,
-    /// Both ends are the same point, or nearer than [`Wall::SHORTEST`].
+    /// The wall is degenerate: its ends are the same point, or nearer than [`Wall::SHORTEST`].
     ZeroLength,
 }
 
@@ -28,16 +29,22 @@ impl core::fmt::Display for WallError {
 
 impl core::error::Error for WallError {}
 
+/// Number of a wall in its map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct WallId(pub u32);
+
 /// A wall segment, with its line in the paper's form a x + b y + c = 0, a² + b² = 1 (eq. 1).
 ///
-/// The line is kept as a point and a unit tangent, not as c: far from the origin, c would cost
-/// the digits that a range is measured with.
+/// The line is stored as a point and a unit tangent, not as c: far from the origin, the range would lose
+/// digits to c.
 ///
 /// ```
 /// use sonarfix::map::Wall;
 /// use sonarfix::pose::Point;
 /// let wall = Wall::new(Point::new(0.0, 0.0), Point::new(4.0, 0.0))?;
-/// // On the left of the way from one end to the other, the distance is positive.
+/// // Left of the direction from one end to the other, the distance is positive.
 /// assert_eq!(wall.signed_distance(Point::new(1.0, 2.0)).0, 2.0);
 /// assert_eq!(wall.along(Point::new(1.0, 2.0)).0, 1.0);
 /// # Ok::<(), sonarfix::map::WallError>(())
@@ -52,7 +59,7 @@ pub struct Wall {
 }
 
 impl Wall {
-    /// The shortest wall: a tenth of a millimetre has no direction that a sonar could tell.
+    /// Length of the shortest wall. The direction of a shorter one is not significant.
     pub const SHORTEST: Metres = Metres(1e-4);
 
     /// A wall between two points of the map.
@@ -71,35 +78,34 @@ impl Wall {
         Ok(Self { from, tangent_x: dx / length, tangent_y: dy / length, length })
     }
 
-    /// A wall from what it is stored as: the coordinates of its start, its unit tangent, its length.
+    /// A wall from its stored form: coordinates of its start, unit tangent, length.
     pub(super) fn from_stored([x, y, tangent_x, tangent_y, length]: [f32; 5]) -> Self {
         Self { from: Point::new(x, y), tangent_x, tangent_y, length }
     }
 
-    /// What the wall is stored as in a [baked map](super::image): the coordinates of its start, its
-    /// unit tangent, its length.
+    /// The stored form in a [baked map](super::image): coordinates of its start, unit tangent, length.
     #[must_use]
     pub fn stored(&self) -> [f32; 5] {
         [self.from.x.0, self.from.y.0, self.tangent_x, self.tangent_y, self.length]
     }
 
-    /// Whether this could have come from [`Self::new`]: finite, long enough, and its tangent a
-    /// unit vector to the rounding of `f32`.
-    pub(super) fn is_sound(&self) -> bool {
+    /// Whether [`Self::new`] can return this wall: finite, long enough, and its tangent a unit vector to
+    /// the rounding of `f32`.
+    pub(super) fn is_valid(&self) -> bool {
         let norm = self.tangent_x * self.tangent_x + self.tangent_y * self.tangent_y;
-        // Two quotients and a hypotenuse, each rounded: 3e-7 at most.
+        // Two quotients and a hypotenuse, each rounded: at most 3e-7.
         let is_unit = (norm - 1.0).abs() < 1e-6;
         let is_long_enough = self.length >= Self::SHORTEST.0;
         is_unit && is_long_enough && self.from.is_finite() && self.to().is_finite()
     }
 
-    /// The end the wall was drawn from.
+    /// The first end.
     #[must_use]
     pub fn from(&self) -> Point {
         self.from
     }
 
-    /// The end the wall was drawn to.
+    /// The second end.
     #[must_use]
     pub fn to(&self) -> Point {
         Point::new(
@@ -108,8 +114,8 @@ impl Wall {
         )
     }
 
-    /// a of eq. (1): x component of the unit normal, which points to the left of the way from one
-    /// end to the other.
+    /// a of eq. (1): x component of the unit normal, which points to the left of the direction from the
+    /// first end to the second.
     #[must_use]
     pub fn a(&self) -> f32 {
         -self.tangent_y
@@ -127,22 +133,23 @@ impl Wall {
         Metres(self.length)
     }
 
-    /// d of eq. (1): the distance of `point` from the wall's line, negative on its right side.
+    // ===== Eq. (1): d =====
+    /// d of eq. (1): the distance of `point` from the line of the wall, negative on its right side.
     #[must_use]
     pub fn signed_distance(&self, point: Point) -> Metres {
         let (dx, dy) = ((point.x - self.from.x).0, (point.y - self.from.y).0);
         Metres(self.a() * dx + self.b() * dy)
     }
 
-    /// Where along the wall the foot of the perpendicular from `point` lies, from the wall's
-    /// start; on the segment if between zero and its length.
+    /// Distance of the foot of the perpendicular from `point` along the wall, from its start. The foot is
+    /// on the segment if the distance is between zero and the length.
     #[must_use]
     pub fn along(&self, point: Point) -> Metres {
         let (dx, dy) = ((point.x - self.from.x).0, (point.y - self.from.y).0);
         Metres(self.tangent_x * dx + self.tangent_y * dy)
     }
 
-    /// The direction in which a point at the given signed distance sees the wall squarely.
+    /// Direction of the perpendicular to the wall from a point at the given signed distance.
     #[must_use]
     pub fn direction_from(&self, signed_distance: Metres) -> Heading {
         let normal = Heading::new(Radians(libm::atan2f(self.b(), self.a())));

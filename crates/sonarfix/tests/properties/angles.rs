@@ -3,7 +3,7 @@
 use core::f32::consts::{PI, TAU};
 
 use proptest::prelude::*;
-use sonarfix::ekf::{Ekf, State};
+use sonarfix::ekf::{Ekf, StandardDeviations, StateEstimate};
 use sonarfix::map::Wall;
 use sonarfix::motion::WheelTravel;
 use sonarfix::pose::{Heading, Point};
@@ -27,20 +27,20 @@ fn worst(angles: impl Iterator<Item = f32>) -> (f64, f64) {
     angles.map(errors).fold((0.0, 0.0), |(a, b), (c, d)| (a.max(c), b.max(d)))
 }
 
-/// Every `step`-th float from one to another, both positive, with both signs.
+/// Every `step`-th float from one positive number to another, with both signs.
 fn floats(from: f32, to: f32, step: usize) -> impl Iterator<Item = f32> {
     (from.to_bits()..to.to_bits())
         .step_by(step)
         .flat_map(|b| [f32::from_bits(b), -f32::from_bits(b)])
 }
 
-/// The bound in the documentation, over all magnitudes that an angle of the filter has.
+/// The documented bound, over all magnitudes that an angle of the filter has.
 #[test]
 fn sine_and_cosine_are_within_their_bound() {
     let headings = worst(floats(1e-4, 8.0, 97));
     let range = worst(floats(8.0, RANGE.0, 97));
     let tiny = worst(floats(0.0, 1e-4, 9_973));
-    // Where the reduction cancels most: the floats next to the multiples of π/2.
+    // The reduction cancels most at the floats next to the multiples of π/2.
     let crossings = worst((1_u16..=63).flat_map(|quadrant| {
         let near = f32::from(quadrant) * core::f32::consts::FRAC_PI_2;
         (0..200).map(move |n| f32::from_bits(near.to_bits() + n - 100))
@@ -53,8 +53,8 @@ fn sine_and_cosine_are_within_their_bound() {
     }
 }
 
-/// Every float up to a heading and a bearing together, 2π, with both signs, on all cores: about
-/// 2·10⁹ values. `cargo test --release --package sonarfix --test properties -- --ignored every_float`
+/// Every float up to 2π, a heading plus a bearing, with both signs, on all cores: about 2·10⁹
+/// values. `cargo test --release --package sonarfix --test properties -- --ignored every_float`
 #[test]
 #[ignore = "takes minutes; run it in release"]
 fn sine_and_cosine_of_every_float_are_within_their_bound() {
@@ -78,7 +78,7 @@ fn sine_and_cosine_of_every_float_are_within_their_bound() {
 }
 
 #[test]
-fn sine_and_cosine_of_what_is_no_angle_are_nan() {
+fn sine_and_cosine_of_a_non_finite_angle_are_nan() {
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         let (sin, cos) = sin_cos(Radians(bad));
         assert!(sin.is_nan() && cos.is_nan());
@@ -86,7 +86,7 @@ fn sine_and_cosine_of_what_is_no_angle_are_nan() {
 }
 
 proptest! {
-    /// Beyond the range what comes out is still a direction, and the angle's own to within the
+    /// Beyond the range the result is a unit vector, in the direction of the angle to within the
     /// spacing of floats of its size.
     #[test]
     fn sine_and_cosine_of_a_huge_angle_are_a_direction(
@@ -101,8 +101,8 @@ proptest! {
         }
     }
 
-    /// Any finite angle is wrapped into (−π, π], to the same direction; in constant time (a loop
-    /// of subtractions would not end for 1e30, nor leave 1e9 in the life of a robot).
+    /// Any finite angle is wrapped into (−π, π], to the same direction, in constant time (repeated
+    /// subtraction would not terminate for 1e30).
     #[test]
     fn headings_are_wrapped(bits in any::<u32>(), few in -1000.0_f32..1000.0, turns in -20_i8..20) {
         let edge = f32::from(turns) * PI;
@@ -126,9 +126,9 @@ proptest! {
         prop_assert!(huge > -PI && huge <= PI);
     }
 
-    /// Headings of turns, and turns between headings, likewise.
+    /// The same for headings after a turn, and turns between headings.
     #[test]
-    fn turning_there_and_back_is_no_turn(from in -PI..PI, by in -PI..PI) {
+    fn a_turn_and_its_inverse_cancel(from in -PI..PI, by in -PI..PI) {
         let start = Heading::new(Radians(from));
         let end = start.turned(Radians(by));
         let turn = end.from(start).0;
@@ -136,44 +136,44 @@ proptest! {
         prop_assert!(turn_between(turn.into(), by.into()).abs() < 1e-6, "{turn} instead of {by}");
     }
 
-    /// The filter's heading over any sequence of turns on the spot, a full turn and many among
-    /// them; the same direction as in `f64` as long as turns are small.
+    /// The heading of the filter over any sequence of turns on the spot, full turns included; the
+    /// same direction as in `f64` as long as turns are small.
     #[test]
     fn the_filters_heading_stays_wrapped(
         drive in any_drive(), start in -10.0_f32..10.0,
         turns in proptest::collection::vec(prop_oneof![-1.0_f32..1.0, -4.0_f32..4.0, -60.0_f32..60.0], 1..100),
     ) {
-        let state = State { heading: start, ..State::default() };
-        let mut ekf = Ekf::new(drive, state, State { heading: 0.01, ..State::default() }).unwrap();
+        let state = StateEstimate { heading: Radians(start), ..StateEstimate::default() };
+        let mut ekf = Ekf::new(drive, state, StandardDeviations { heading: Radians(0.01), ..StandardDeviations::default() }).unwrap();
         let mut direction = f64::from(start);
         let mut loss = 1e-6;
         for turn in turns {
-            let way = 0.5 * turn * drive.track_width.0;
-            ekf.predict(WheelTravel::new(way, -way)).unwrap();
-            let heading = ekf.state().heading;
+            let distance = 0.5 * turn * drive.track_width.0;
+            ekf.predict(WheelTravel::new(distance, -distance)).unwrap();
+            let heading = ekf.state().heading.0;
             prop_assert!(heading > -PI && heading <= PI);
-            direction += 2.0 * f64::from(way) / f64::from(drive.track_width.0);
+            direction += 2.0 * f64::from(distance) / f64::from(drive.track_width.0);
             // The turn is rounded three times, the sum once; each 2π is 1.7e-7 too long.
             loss += f64::from(turn.abs()) * (3e-7 + 1.8e-7 / f64::from(TAU)) + 5e-7;
             prop_assert!(turn_between(heading.into(), direction).abs() < loss);
         }
     }
 
-    /// A correction, too, may turn the heading over ±π: here by the innovation of a sonar far ahead
+    /// A correction may also turn the heading over ±π: here by the innovation of a sonar far ahead
     /// of the axle, whose range depends on little else.
     #[test]
     fn a_correction_wraps_the_heading(drive in any_drive(), past in 0.01_f32..0.2, left in any::<bool>()) {
         let side = if left { 1.0 } else { -1.0 };
         let heading = side * (PI - 0.005);
-        let state = State { heading, ..State::default() };
-        let mut ekf = Ekf::new(drive, state, State { heading: 0.5, ..State::default() }).unwrap();
-        // The robot looks along −x, so the sonar 1 m ahead is at (−1, 0); the wall is y = −2.
+        let state = StateEstimate { heading: Radians(heading), ..StateEstimate::default() };
+        let mut ekf = Ekf::new(drive, state, StandardDeviations { heading: Radians(0.5), ..StandardDeviations::default() }).unwrap();
+        // The robot faces along −x, so the sonar 1 m ahead is at (−1, 0); the wall is y = −2.
         let wall = Wall::new(Point::new(-5.0, -2.0), Point::new(5.0, -2.0)).unwrap();
         let expected = ExpectedRange::new(&wall, Point::new(1.0, 0.0), &state);
-        // Turning left takes it towards the wall: ∂h/∂ψ is −1.
+        // A left turn moves it towards the wall: ∂h/∂ψ is −1.
         let range = Metres(expected.range.0 - side * past);
         ekf.update(range, &expected, SquareMetres(1e-6)).unwrap();
-        let turned = ekf.state().heading;
+        let turned = ekf.state().heading.0;
         prop_assert!(turned > -PI && turned <= PI, "{turned}");
         prop_assert!((turned + side * (PI - past + 0.005)).abs() < 1e-3, "{turned}");
     }

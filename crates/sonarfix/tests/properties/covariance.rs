@@ -1,27 +1,26 @@
-//! The covariance stays what a covariance is.
+//! The covariance stays positive definite.
 
 use proptest::prelude::*;
-use sonarfix::ekf::{Ekf, State};
+use sonarfix::ekf::{Ekf, StandardDeviations, StateEstimate};
 use sonarfix::motion::Drive;
-use sonarfix::pose::Point;
 use sonarfix::range::ExpectedRange;
-use sonarfix::units::SquareMetres;
+use sonarfix::units::{Metres, Radians, SquareMetres};
 
 use crate::oracle::{
-    ROUNDING, SCALE_LEFT, SCALE_RIGHT, SHARPEST, bearable, corrected, covariance_of,
-    is_positive_definite, jacobian_of, variance_along, variance_of_terms,
+    ROUNDING, SCALE_LEFT, SCALE_RIGHT, SHARPEST, corrected, covariance_of, is_positive_definite,
+    jacobian_of, limited_noise, variance_along, variance_of_terms,
 };
 use crate::strategies::{
     Event, any_deviation, any_drive, any_ekf, any_event, any_mount, any_sight, live,
 };
 
-/// Runs it all and checks every step.
+/// Runs all events and checks P after every step.
 fn stays_positive_definite(
     drive: Drive,
-    deviation: State,
+    deviation: StandardDeviations,
     events: &[Event],
 ) -> Result<(), TestCaseError> {
-    let mut ekf = Ekf::new(drive, State::default(), deviation).unwrap();
+    let mut ekf = Ekf::new(drive, StateEstimate::default(), deviation).unwrap();
     for event in events {
         let mut failed = None;
         live(&mut ekf, *event, |_, _, after| {
@@ -39,7 +38,7 @@ fn stays_positive_definite(
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(256))]
 
-    /// From a prior as a robot has it, over some 2,000 steps.
+    /// From a usual prior, over some 2,000 steps.
     #[test]
     fn p_stays_positive_definite(
         drive in any_drive(),
@@ -49,8 +48,8 @@ proptest! {
         stays_positive_definite(drive, deviation, &events)?;
     }
 
-    /// From a prior of 10 m to 100 m, with ranges sharp to 0.1–1 mm: a range is up to 10¹²
-    /// times sharper than the prior, where `f32` has 7 digits.
+    /// From a prior of 10 m to 100 m, with range noise of 0.1–1 mm: the variance of a range is up
+    /// to 10¹² times smaller than the prior, where `f32` has 7 digits.
     #[test]
     fn p_stays_positive_definite_from_a_wide_prior(
         drive in any_drive(),
@@ -58,11 +57,11 @@ proptest! {
         wide in 10.0_f32..100.0,
         events in proptest::collection::vec(any_event(1e-8..1e-6), 200),
     ) {
-        let deviation = State { x: wide, y: wide, ..deviation };
+        let deviation = StandardDeviations { x: Metres(wide), y: Metres(wide), ..deviation };
         stays_positive_definite(drive, deviation, &events)?;
     }
 
-    /// A parked robot with a wide prior takes 500 sharp ranges of the same few walls.
+    /// A parked robot with a wide prior and 500 precise ranges of the same few walls.
     #[test]
     fn p_stays_positive_definite_while_parked(
         drive in any_drive(),
@@ -71,7 +70,7 @@ proptest! {
         ranges in proptest::collection::vec((any_sight(), any_mount()), 1..4),
         noise in 1e-8_f32..1e-6,
     ) {
-        let deviation = State { x: wide, y: wide, ..deviation };
+        let deviation = StandardDeviations { x: Metres(wide), y: Metres(wide), ..deviation };
         let events: Vec<_> = ranges.iter().cycle().take(500).map(|&(sight, mount)| Event::Range {
             sight, mount, sigmas: 0.5, noise,
         }).collect();
@@ -80,29 +79,30 @@ proptest! {
 }
 
 proptest! {
-    /// A range lowers the variance along its own direction to what theory says, eq. (17)
-    /// included, and raises no state's variance beyond the rounding of four operations.
+    /// A range reduces the variance along its own direction to the theoretical value, eq. (20)
+    /// included, and raises no variance beyond the rounding of four operations.
     #[test]
-    fn fusing_never_raises_a_variance(
+    fn a_correction_never_raises_a_variance(
         mut ekf in any_ekf(), sight in any_sight(), mount in any_mount(), exponent in -8.0_f32..-2.0,
     ) {
         let before = covariance_of(&ekf);
         let state = ekf.state();
         let noise = 10.0_f32.powf(exponent);
-        let wall = sight.wall(Point::new(state.x, state.y));
+        let wall = sight.wall(state.pose().position());
         let expected = ExpectedRange::new(&wall, mount, &state);
         ekf.update(expected.range, &expected, SquareMetres(noise)).unwrap();
         let after = covariance_of(&ekf);
 
         let h = jacobian_of(&expected);
-        let r = bearable(&before, &h, noise.into()).unwrap();
+        let r = limited_noise(&before, &h, noise.into()).unwrap();
         let (_, exact) = corrected(&before, &h, r);
         let allowed = 16.0 * ROUNDING * variance_of_terms(&before, &h);
         let (was, is) = (variance_along(&before, &h), variance_along(&after, &h));
         prop_assert!(is < was + allowed);
         prop_assert!((is - variance_along(&exact, &h)).abs() <= allowed, "{is} after {was}");
         for i in 0..7 {
-            // A wheel's variance is rounded in the size of both: mean and difference are held.
+            // The variance of a wheel is rounded in the size of both, because mean and difference
+            // are held.
             let wheels = before[(SCALE_RIGHT, SCALE_RIGHT)] + before[(SCALE_LEFT, SCALE_LEFT)];
             let size = if [SCALE_RIGHT, SCALE_LEFT].contains(&i) { wheels } else { before[(i, i)] };
             let limit = before[(i, i)] + 4.0 * ROUNDING * size;
@@ -110,20 +110,19 @@ proptest! {
         }
     }
 
-    /// However wide the prior: after one sharp range of a wall parallel to an axis, the variance
-    /// along it is P R / (P + R) to 2 %, and what eq. (17) adds because it is computed in `f32`: two
-    /// passes square the rounding, which is 6e-8 of a P that is 10¹² R. The plain form gives zero
-    /// or less.
+    /// For any prior: after one precise range of a wall parallel to an axis, the variance along it
+    /// is P R / (P + R) to 2 %, plus the limit of eq. (20): two passes square the rounding, which
+    /// is 6e-8 of a P that is 10¹² R. The plain form returns zero or less.
     #[test]
-    fn a_sharp_range_leaves_its_own_variance(
+    fn a_precise_range_leaves_its_own_variance(
         drive in any_drive(), wide in 10.0_f32..100.0, exponent in -8.0_f32..-6.0, along_x in any::<bool>(),
         distance in 0.3_f32..8.0,
     ) {
-        let deviation = State { x: wide, y: wide, heading: 0.01, ..State::default() };
-        let mut ekf = Ekf::new(drive, State::default(), deviation).unwrap();
+        let deviation = StandardDeviations { x: Metres(wide), y: Metres(wide), heading: Radians(0.01), ..StandardDeviations::default() };
+        let mut ekf = Ekf::new(drive, StateEstimate::default(), deviation).unwrap();
         let noise = 10.0_f32.powf(exponent);
         let expected = ExpectedRange {
-            range: sonarfix::units::Metres(distance),
+            range: Metres(distance),
             by_x: if along_x { 1.0 } else { 0.0 },
             by_y: if along_x { 0.0 } else { 1.0 },
             by_heading: 0.0,
@@ -138,15 +137,16 @@ proptest! {
         prop_assert!(left > 0.98 * exact && left < 1.02 * (exact + by_rounding), "{left} instead of {exact}");
     }
 
-    /// Along a slanted wall the variance stops at what eq. (17) allows, after however many ranges.
+    /// Along a slanted wall the variance stops at the limit of eq. (20), after any number of
+    /// ranges.
     #[test]
     fn a_slanted_wall_is_known_no_sharper_than_f32_can_hold(
         drive in any_drive(), wide in 10.0_f32..100.0, direction in 0.2_f32..1.3,
     ) {
-        let deviation = State { x: wide, y: wide, ..State::default() };
-        let mut ekf = Ekf::new(drive, State::default(), deviation).unwrap();
+        let deviation = StandardDeviations { x: Metres(wide), y: Metres(wide), ..StandardDeviations::default() };
+        let mut ekf = Ekf::new(drive, StateEstimate::default(), deviation).unwrap();
         let expected = ExpectedRange {
-            range: sonarfix::units::Metres(1.0),
+            range: Metres(1.0),
             by_x: direction.cos(),
             by_y: direction.sin(),
             by_heading: 0.0,

@@ -2,16 +2,15 @@
 
 use nalgebra::SVector;
 use proptest::prelude::*;
-use sonarfix::ekf::{Ekf, State};
+use sonarfix::ekf::{Ekf, StandardDeviations, StateEstimate};
 use sonarfix::motion::{Drive, WheelTravel};
-use sonarfix::pose::Point;
 use sonarfix::range::ExpectedRange;
-use sonarfix::units::{Metres, PerRootMetre, SquareMetres};
+use sonarfix::units::{Metres, PerRootMetre, Radians, SquareMetres};
 
 use crate::oracle::{
-    HEADING, Matrix, ROUNDING, Robot, SCALE_LEFT, SCALE_RIGHT, TRACK_WIDTH, Vector, bearable,
-    corrected, covariance_of, jacobian_of, size_by_both_wheels, state_of, travel_of, turn_between,
-    variance_along,
+    HEADING, Matrix, ROUNDING, Robot, SCALE_LEFT, SCALE_RIGHT, TRACK_WIDTH, Vector, corrected,
+    covariance_of, jacobian_of, limited_noise, size_by_both_wheels, state_of, travel_of,
+    turn_between, variance_along,
 };
 use crate::strategies::{any_ekf, any_filter, any_mount, any_sight, any_travel, bits};
 
@@ -28,8 +27,8 @@ fn distance(a: &Vector, b: &Vector) -> Vector {
 }
 
 proptest! {
-    /// One prediction from any estimate equals eqs. (4)–(9) in dense `f64`. Each entry is a sum of
-    /// some forty products of rounded factors.
+    /// One prediction from any estimate equals eqs. (4) to (10) in dense `f64`. Each entry is a sum
+    /// of some forty products of rounded factors.
     #[test]
     fn prediction_equals_the_dense_one((drive, mut ekf) in any_filter(), travel in any_travel()) {
         let (state, p) = (state_of(&ekf), covariance_of(&ekf));
@@ -38,17 +37,18 @@ proptest! {
         let travel = travel_of(travel);
 
         let off = distance(&state_of(&ekf), &(state + robot.step(&state, &travel)));
-        // The position is rounded where it is; the way is some 0.1 m, an angle at most 2π.
+        // The position is rounded at its magnitude; the displacement is some 0.1 m, an angle at
+        // most 2π.
         for (i, size) in [state[0].abs() + 0.2, state[1].abs() + 0.2, 6.3].into_iter().enumerate() {
             prop_assert!(off[i] <= 3.0 * ROUNDING * size, "state {i} is off by {}", off[i]);
         }
         let calibration = |state: &Vector| state.fixed_rows::<4>(3).into_owned();
         prop_assert_eq!(calibration(&state_of(&ekf)), calibration(&state));
 
-        let exact = robot.predicted(&p, &state, &travel) + robot.making_up_for_rounding(&p, &state, &travel);
+        let exact = robot.predicted(&p, &state, &travel) + robot.rounding_noise(&p, &state, &travel);
         let mut size = robot.size_of_terms(&p, &state, &travel);
-        // What earlier additions to these variances rounded away, when they may have been as large
-        // as any prior, is added with this one.
+        // Rounding errors of earlier additions to these sums, when they may have been as large as
+        // any prior, are added with this one.
         for i in [SCALE_RIGHT, SCALE_LEFT, TRACK_WIDTH] {
             size[(i, i)] += 0.03 * 0.03;
         }
@@ -56,29 +56,26 @@ proptest! {
         prop_assert!(off <= 48.0, "off by {off} roundings");
     }
 
-    /// One correction of any estimate equals Joseph's form, eq. (15), in dense `f64`, and the
-    /// state moves by the gain of eq. (14) times the innovation.
-    ///
-    /// The terms of an entry are at most |I − K H| |P| |I − K H|ᵀ, and those that the first pass
-    /// takes away.
+    /// One correction of any estimate equals Joseph's form, eq. (19), in dense `f64`, and the state
+    /// changes by the gain of eq. (18) times the innovation. The terms of an entry are at most |I −
+    /// K H| |P| |I − K H|ᵀ, and those that the first pass subtracts.
     #[test]
     fn correction_equals_the_dense_joseph_form(
         mut ekf in any_ekf(), sight in any_sight(), mount in any_mount(),
         surprise in -0.2_f32..0.2, exponent in -4.0_f32..-2.0,
     ) {
         let (state, p) = (state_of(&ekf), covariance_of(&ekf));
-        let wall = sight.wall(Point::new(ekf.state().x, ekf.state().y));
+        let wall = sight.wall(ekf.state().pose().position());
         let expected = ExpectedRange::new(&wall, mount, &ekf.state());
         let noise = SquareMetres(10.0_f32.powf(exponent));
         let range = Metres(expected.range.0 + surprise);
         let innovation = ekf.innovation(range, &expected, noise);
-        let gain_of_position = ekf.position_gain(&expected, noise);
         ekf.update(range, &expected, noise).unwrap();
 
         let h = jacobian_of(&expected);
-        // Eq. (17) acts in one of some thousand; tests/properties/covariance.rs looks at it.
+        // Eq. (20) acts in one of some thousand cases; tests/properties/covariance.rs covers it.
         let r = f64::from(noise.0);
-        prop_assume!(bearable(&p, &h, r) == Some(r));
+        prop_assume!(limited_noise(&p, &h, r) == Some(r));
         let (gain, exact) = corrected(&p, &h, r);
         let kept = Matrix::identity() + gain.abs() * h.abs();
         let taken = gain.abs() * (p.abs() * h.abs().transpose()).transpose();
@@ -86,7 +83,7 @@ proptest! {
         let off = roundings(&covariance_of(&ekf), &exact, &size);
         prop_assert!(off <= 4.0, "off by {off} roundings");
 
-        // S is a sum of 16 terms; what they lose in cancelling, S and K have lost.
+        // S is a sum of 16 terms; S and K lose the digits that cancel in it.
         let s = variance_along(&p, &h) + r;
         let terms = variance_along(&p.abs(), &h.abs()) + r;
         let lost = 8.0 * ROUNDING * terms / s;
@@ -104,12 +101,6 @@ proptest! {
                 + of_both(i, &gain) * f64::from(range.0) * ROUNDING;
             prop_assert!(off[i] <= allowed, "state {i} is off by {} > {allowed}", off[i]);
         }
-
-        // Eq. (16): the drop of the position's variance, foreseen without trying.
-        let drop = p[(0, 0)] + p[(1, 1)] - exact[(0, 0)] - exact[(1, 1)];
-        let m = p.abs() * h.abs().transpose();
-        let terms = (m[0] * m[0] + m[1] * m[1]) / s;
-        prop_assert!((f64::from(gain_of_position.0) - drop).abs() <= terms * (20.0 * ROUNDING + lost));
     }
 
     /// A step without travel changes no bit, whatever the sign of its zeros; any other step does.
@@ -126,8 +117,9 @@ proptest! {
         prop_assert_ne!(bits(&ekf), before);
     }
 
-    /// Noise belongs to the way, not to the number of steps (so not to time): a way cut in a
-    /// hundred adds what it adds in one, but for the rounding of a hundred sums.
+    /// Process noise depends on the distance, not on the number of steps (so not on time): a
+    /// distance divided into a hundred steps adds what it adds in one, except for the rounding of a
+    /// hundred sums.
     #[test]
     fn noise_grows_with_distance_not_with_steps((drive, ekf) in any_filter(), s in 0.1_f32..1.0, back in any::<bool>()) {
         let s = if back { -s } else { s };
@@ -136,8 +128,8 @@ proptest! {
         for _ in 0..100 {
             often.predict(WheelTravel::new(s / 100.0, s / 100.0)).unwrap();
         }
-        // Between the wheels' noise and its turning of the way, ways of 1 cm and of 1 m differ in
-        // x and y to second order; in heading and calibration they do not.
+        // Because the noise also turns the displacement, 1 cm and 1 m differ in x and y to second
+        // order; in heading and calibration they do not.
         let travel = SVector::<f64, 2>::new(s.into(), s.into());
         let size = Robot::from(&drive).size_of_terms(&covariance_of(&ekf), &state_of(&ekf), &travel);
         let size = size_by_both_wheels(&size);
@@ -149,7 +141,7 @@ proptest! {
     }
 }
 
-/// The size of a state's entry; of either wheel's scale error, that of both.
+/// The magnitude of an entry of the state; for the scale error of either wheel, that of both.
 fn of_both(i: usize, v: &Vector) -> f64 {
     if [SCALE_RIGHT, SCALE_LEFT].contains(&i) {
         v[SCALE_RIGHT].abs() + v[SCALE_LEFT].abs()
@@ -158,24 +150,29 @@ fn of_both(i: usize, v: &Vector) -> f64 {
     }
 }
 
-/// The size of the numbers that a state is summed from.
+/// The magnitude of the numbers of which a state is the sum.
 fn range_of(i: usize, state: &Vector) -> f64 {
     if i == HEADING { 6.3 } else { of_both(i, state) }
 }
 
-/// Where the wheels' noise is less than a rounding of the variance, a rounding is added in its
-/// place (eq. 9): else many small steps could leave less variance than there was.
+/// Where the wheel noise is less than a rounding of the variance, a rounding is added instead (eq.
+/// 10): otherwise many small steps could reduce the variance.
 #[test]
-fn less_noise_than_a_rounding_counts_as_one() {
+fn rounding_noise_replaces_smaller_wheel_noise() {
     let drive = Drive {
         track_width: Metres(0.2),
         wheel_noise: PerRootMetre(Metres(1e-9)),
         scale_walk: PerRootMetre(0.0),
         track_width_walk: PerRootMetre(Metres(0.0)),
     };
-    let deviation = State { x: 1.0, y: 1.0, heading: 1.0, ..State::default() };
+    let deviation = StandardDeviations {
+        x: Metres(1.0),
+        y: Metres(1.0),
+        heading: Radians(1.0),
+        ..StandardDeviations::default()
+    };
     for (heading, across) in [(0.0, 0), (core::f32::consts::FRAC_PI_2, 1)] {
-        let state = State { heading, ..State::default() };
+        let state = StateEstimate { heading: Radians(heading), ..StateEstimate::default() };
         let mut ekf = Ekf::new(drive, state, deviation).unwrap();
         ekf.predict(WheelTravel::new(1e-5, 1e-5)).unwrap();
         let p = ekf.covariance();

@@ -1,10 +1,8 @@
-//! The derivatives that the crate multiplies out, against central differences of the model in
-//! `f64`.
+//! The analytic derivatives, against central differences of the model in `f64`.
 
 use proptest::prelude::*;
-use sonarfix::ekf::{Ekf, State};
+use sonarfix::ekf::{Ekf, StandardDeviations};
 use sonarfix::motion::{Drive, WheelTravel};
-use sonarfix::pose::Point;
 use sonarfix::range::ExpectedRange;
 use sonarfix::units::{Metres, PerRootMetre};
 
@@ -14,15 +12,14 @@ use crate::oracle::{
 };
 use crate::strategies::{any_drive, any_mount, any_sight, any_state, silent};
 
-/// A deviation in one state alone.
-fn only(state: usize, deviation: f32) -> State {
+/// A deviation in one state only.
+fn only(state: usize, deviation: f32) -> StandardDeviations {
     let mut all = [0.0; 7];
     all[state] = deviation;
-    let [x, y, heading, scale_right, scale_left, track_width_error, range_scale] = all;
-    State { x, y, heading, scale_right, scale_left, track_width_error, range_scale }
+    StandardDeviations::from_array(all)
 }
 
-/// Any step, up to a metre of each wheel: turns of many radians among them.
+/// Any step, up to a metre of each wheel, turns of many radians included.
 fn any_step() -> impl Strategy<Value = WheelTravel> {
     prop_oneof![
         (-0.1_f32..0.1, -0.1_f32..0.1),
@@ -34,9 +31,9 @@ fn any_step() -> impl Strategy<Value = WheelTravel> {
     .prop_map(|(r, l)| WheelTravel::new(r, l))
 }
 
-/// What an entry of F or G may be off by: the rounding of the angle at which sine and cosine are
-/// taken (an angle a is rounded to a ε, after sums of numbers of its size), times the way, times
-/// the derivative of the angle.
+/// Tolerance of an entry of F or G: the rounding of the angle of sine and cosine (an angle a is
+/// rounded to a ε, after sums of numbers of its magnitude), times the displacement, times the
+/// derivative of the angle.
 fn tolerance(angle: f64, value: f64, size: f64) -> f64 {
     8.0 * ROUNDING * (value.abs() + size * (1.0 + angle))
 }
@@ -58,10 +55,10 @@ proptest! {
         let exact = robot.by_state(&from, &travel).column(j).into_owned();
         let width = robot.track_width - 0.01;
         let angle = travel.abs().sum() / width;
-        let way = travel.abs().sum();
+        let roll = travel.abs().sum();
         let by_width = 1.0 + 1.0 / width + 1.0 / (width * width);
         for i in 0..7 {
-            let size = if i == j { 0.1 } else { way * by_width };
+            let size = if i == j { 0.1 } else { roll * by_width };
             let allowed = tolerance(angle, exact[i], size) + 1e-8;
             prop_assert!(
                 (column[i] - exact[i]).abs() <= allowed,
@@ -70,16 +67,16 @@ proptest! {
         }
     }
 
-    /// G of eq. (8): with a prior of zero and the noise of one wheel at a time (the other stands),
-    /// P⁻ = σ² |Δ| Gⱼ Gⱼᵀ. Random walks grow with the mean of both ways.
+    /// G of eq. (9): with a prior of zero and the noise of one wheel at a time (the other is at
+    /// rest), P⁻ = σ² |Δ| Gⱼ Gⱼᵀ. Random walks grow with the mean of both distances.
     #[test]
     fn noise_jacobian_equals_differences(
-        drive in any_drive(), state in any_state(), way in 0.01_f32..0.5, back in any::<bool>(), right in any::<bool>(),
+        drive in any_drive(), state in any_state(), roll in 0.01_f32..0.5, back in any::<bool>(), right in any::<bool>(),
     ) {
         let drive = Drive { wheel_noise: PerRootMetre(Metres(0.05)), ..drive };
-        let way = if back { -way } else { way };
-        let travel = if right { WheelTravel::new(way, 0.0) } else { WheelTravel::new(0.0, way) };
-        let mut ekf = Ekf::new(drive, state, State::default()).unwrap();
+        let roll = if back { -roll } else { roll };
+        let travel = if right { WheelTravel::new(roll, 0.0) } else { WheelTravel::new(0.0, roll) };
+        let mut ekf = Ekf::new(drive, state, StandardDeviations::default()).unwrap();
         let from = state_of(&ekf);
         ekf.predict(travel).unwrap();
         let p = covariance_of(&ekf);
@@ -111,29 +108,30 @@ proptest! {
         }
     }
 
-    /// H of eq. (11), and eq. (10) itself: from either side of a wall drawn either way, with any
-    /// lever arm, heading and range scale.
+    /// H of eq. (12), and eq. (11) itself: from either side of a wall with either order of its
+    /// ends, with any lever arm, heading and range scale.
     #[test]
     fn range_jacobian_equals_differences(
         sight in any_sight(), mount in any_mount(), state in any_state(),
     ) {
-        let at = Point::new(state.x, state.y);
+        let at = state.pose().position();
         let (from, to) = sight.ends(at);
         let expected = ExpectedRange::new(&sight.wall(at), mount, &state);
-        let ekf = Ekf::new(any_robot(), state, State::default()).unwrap();
+        let ekf = Ekf::new(any_robot(), state, StandardDeviations::default()).unwrap();
         let (view, state) = (View::new(from, to, mount), state_of(&ekf));
 
         // Coordinates of up to 30 m are rounded a few times.
         let of_lengths = 4.0 * ROUNDING * 40.0;
-        let off = (f64::from(expected.range.0) - view.heard(&state)).abs();
+        let off = (f64::from(expected.range.0) - view.expected_range(&state)).abs();
         prop_assert!(off <= of_lengths, "range off by {off}");
         let (h, exact) = (jacobian_of(&expected), view.by_state(&state));
         for i in 0..7 {
-            // By κ it is a length; else a unit vector, times a lever arm. 1e-8: the differences'.
+            // The derivative by κ is a length, the others a unit vector, times a lever arm. 1e-8:
+            // of the differences.
             let allowed = if i == RANGE_SCALE { of_lengths } else { 8.0 * ROUNDING } + 1e-8;
             prop_assert!((h[i] - exact[i]).abs() <= allowed, "d/d{i}: {} instead of {}", h[i], exact[i]);
         }
-        // The direction is the one in which the sonar, moved, meets the wall.
+        // From the sonar, the foot is in this direction.
         let direction = f64::from(expected.direction.radians().0);
         let sonar = view.sonar(&state);
         let distance = view.distance(sonar).abs();

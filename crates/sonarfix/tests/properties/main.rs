@@ -1,7 +1,6 @@
-//! Properties of the core crate, and its `f32` filter against a dense `f64` one.
-//!
-//! One binary, one module a subject. Every tolerance has its reason beside it; for every test
-//! the code was broken once to see it fail.
+//! Properties of the core crate, and its `f32` filter against a dense `f64` one. One binary, one
+//! module per subject. The reason for every tolerance is beside it; every test was seen to fail
+//! with a fault in the code.
 
 #[cfg(test)]
 mod aim;
@@ -21,6 +20,8 @@ mod map;
 mod oracle;
 #[cfg(test)]
 mod refusals;
+#[cfg(test)]
+mod search;
 #[cfg(test)]
 mod six_states;
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Walls: distances, directions, and how far from the origin they stay precise.
+//! Walls: distances, directions, and precision far from the origin.
 
 use proptest::prelude::*;
 use sonarfix::map::{Wall, WallError};
@@ -7,13 +7,13 @@ use sonarfix::pose::Point;
 use crate::oracle::{ROUNDING, View, coordinates};
 use crate::strategies::{Sight, any_sight};
 
-/// What the distance of a point may be off by: the ends' and the point's own coordinates are
-/// exact, their differences are rounded once, the unit vectors twice.
+/// Tolerance of the distance of a point: the coordinates are exact, their differences are rounded
+/// once, the unit vectors twice.
 fn allowed(reach: f64) -> f64 {
     8.0 * ROUNDING * reach
 }
 
-/// Compares a wall's distance and foot at a point with `f64`.
+/// Compares distance and foot of a wall at a point with `f64`.
 fn agrees(sight: Sight, origin: Point, beside: (f32, f32)) -> Result<(), TestCaseError> {
     let (from, to) = sight.ends(origin);
     prop_assume!(Wall::new(from, to).is_ok());
@@ -31,13 +31,13 @@ fn agrees(sight: Sight, origin: Point, beside: (f32, f32)) -> Result<(), TestCas
     let norm = f64::from(wall.a()).powi(2) + f64::from(wall.b()).powi(2);
     prop_assert!((norm - 1.0).abs() <= 8.0 * ROUNDING, "a² + b² = {norm}");
 
-    // The direction leads to the wall, from either side of it.
+    // The direction points to the wall, from either side of it.
     let direction = f64::from(wall.direction_from(wall.signed_distance(point)).radians().0);
     let d = exact.distance(at).abs();
     let foot = (at.0 + d * direction.cos(), at.1 + d * direction.sin());
     prop_assert!(exact.distance(foot).abs() <= allowed(reach) + 1e-6 * d);
 
-    // The far end is where it was drawn, to the rounding of its coordinates.
+    // The far end is at its given place, to the rounding of its coordinates.
     let (end, drawn) = (coordinates(wall.to()), exact.to);
     let size = drawn.0.abs().max(drawn.1.abs()) + length;
     prop_assert!((end.0 - drawn.0).abs().max((end.1 - drawn.1).abs()) <= 4.0 * ROUNDING * size);
@@ -46,17 +46,17 @@ fn agrees(sight: Sight, origin: Point, beside: (f32, f32)) -> Result<(), TestCas
 
 proptest! {
     #[test]
-    fn distances_equal_those_in_double(
+    fn distances_equal_those_in_f64(
         sight in any_sight(), x in -20.0_f32..20.0, y in -20.0_f32..20.0, aside in -8.0_f32..8.0, ahead in -8.0_f32..8.0,
     ) {
         agrees(sight, Point::new(x, y), (aside, ahead))?;
     }
 
-    /// A kilometre from the origin the distance of given points is as precise as beside it (some
-    /// micrometres): all that is lost is what the coordinates themselves cannot hold, 0.03 mm.
-    /// The form a x + b y + c would lose ten times more.
+    /// A kilometre from the origin the distance of given points is as precise as near it (some
+    /// micrometres); only the coordinates themselves lose 0.03 mm. The form a x + b y + c would
+    /// lose ten times more.
     #[test]
-    fn a_kilometre_away_they_still_do(
+    fn distances_are_precise_a_kilometre_away(
         sight in any_sight(), direction in -3.1_f32..3.1, aside in -8.0_f32..8.0, ahead in -8.0_f32..8.0,
     ) {
         let origin = Point::new(1000.0 * direction.cos(), 1000.0 * direction.sin());
@@ -72,14 +72,14 @@ proptest! {
         let beside = |d: f32| Point::new(middle.0 + wall.a() * d, middle.1 + wall.b() * d);
         prop_assert!((wall.signed_distance(beside(d)).0 - d).abs() < 1e-5);
         prop_assert!((wall.signed_distance(beside(-d)).0 + d).abs() < 1e-5);
-        // Drawn the other way, the sides change places.
+        // With the ends exchanged, the sides are exchanged.
         let back = Wall::new(to, from).unwrap();
         prop_assert!((back.signed_distance(beside(d)).0 + d).abs() < 1e-5);
     }
 }
 
 #[test]
-fn what_is_no_wall_is_refused() {
+fn a_degenerate_wall_is_refused() {
     let at = Point::new(1.0, 2.0);
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         for point in [Point::new(bad, 0.0), Point::new(0.0, bad)] {

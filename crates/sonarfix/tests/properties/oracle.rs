@@ -1,7 +1,6 @@
-//! The equations of `docs/model.md` in dense `f64`, written from the page and not from the crate.
-//!
-//! Equation (7) is coded here once as a function; its Jacobians are its central differences, so
-//! no derivative that the crate multiplies out is written down a second time.
+//! The equations of `docs/model.md` in dense `f64`, written from that page and not from the code.
+//! Equation (7) is implemented once as a function; its Jacobians are central differences, so no
+//! analytic derivative is written twice.
 
 use nalgebra::{RowSVector, SMatrix, SVector};
 use sonarfix::ekf::Ekf;
@@ -14,14 +13,13 @@ pub type Matrix = SMatrix<f64, 7, 7>;
 pub type Wheels = SMatrix<f64, 7, 2>;
 pub type Row = RowSVector<f64, 7>;
 
-/// One unit in the last place of 1, halved: the most that one rounding of `f32` moves a number of
-/// size 1.
+/// Half a unit in the last place of 1: the largest rounding error of an `f32` of magnitude 1.
 pub const ROUNDING: f64 = f32::EPSILON as f64 / 2.0;
 
-/// The sharpest that eq. (17) lets a variance become, as a share of those it is summed from.
+/// ε of eq. (20): the smallest variance as a share of its terms.
 pub const SHARPEST: f64 = 1.0 / 16_384.0;
 
-/// Position of a state in the vector.
+/// Index of a state in the vector.
 pub const X: usize = 0;
 pub const Y: usize = 1;
 pub const HEADING: usize = 2;
@@ -30,17 +28,17 @@ pub const SCALE_LEFT: usize = 4;
 pub const TRACK_WIDTH: usize = 5;
 pub const RANGE_SCALE: usize = 6;
 
-/// A filter's estimate, exactly.
+/// The estimate of a filter, exactly.
 pub fn state_of(ekf: &Ekf) -> Vector {
     ekf.state_vector().map(f64::from)
 }
 
-/// A filter's covariance, exactly.
+/// The covariance of a filter, exactly.
 pub fn covariance_of(ekf: &Ekf) -> Matrix {
     ekf.covariance().map(f64::from)
 }
 
-/// The drive's numbers.
+/// The parameters of the drive.
 #[derive(Debug, Clone, Copy)]
 pub struct Robot {
     pub track_width: f64,
@@ -66,7 +64,7 @@ pub fn travel_of(travel: WheelTravel) -> SVector<f64, 2> {
 }
 
 impl Robot {
-    /// Eq. (7): what a step adds to the state.
+    /// Eq. (7): the change of the state by a step.
     pub fn step(&self, state: &Vector, travel: &SVector<f64, 2>) -> Vector {
         let right = travel[0] * (1.0 + state[SCALE_RIGHT]);
         let left = travel[1] * (1.0 + state[SCALE_LEFT]);
@@ -80,9 +78,9 @@ impl Robot {
         step
     }
 
-    /// F: how the state after a step depends on the state before it.
+    /// F: derivative of the state after a step by the state before it.
     pub fn by_state(&self, state: &Vector, travel: &SVector<f64, 2>) -> Matrix {
-        // All are smooth over a tenth of a unit, the track width over a tenth of itself.
+        // All functions are smooth over a tenth of a unit, the track width over a tenth of itself.
         let h = 1e-5;
         let by = |j| {
             let mut d = Vector::zeros();
@@ -92,7 +90,7 @@ impl Robot {
         Matrix::identity() + Matrix::from_columns(&core::array::from_fn::<_, 7, _>(by))
     }
 
-    /// G: how it depends on the measured travels.
+    /// G: derivative by the measured travels.
     pub fn by_travel(&self, state: &Vector, travel: &SVector<f64, 2>) -> Wheels {
         let h = 1e-5;
         let (right, left) = (SVector::<f64, 2>::new(h, 0.0), SVector::<f64, 2>::new(0.0, h));
@@ -102,7 +100,7 @@ impl Robot {
         Wheels::from_columns(&[column(right), column(left)])
     }
 
-    /// Q: what a step's noise adds, eq. (8), last part.
+    /// Q of eq. (9): the process noise of a step.
     pub fn noise(&self, state: &Vector, travel: &SVector<f64, 2>) -> Matrix {
         let g = self.by_travel(state, travel);
         let per_metre = self.wheel_noise * self.wheel_noise;
@@ -115,13 +113,9 @@ impl Robot {
         q
     }
 
-    /// `q_x`, `q_y` and `q_h` of eq. (9): what the wheels' noise lacks of a step's rounding.
-    pub fn making_up_for_rounding(
-        &self,
-        p: &Matrix,
-        state: &Vector,
-        travel: &SVector<f64, 2>,
-    ) -> Matrix {
+    /// `q_x`, `q_y` and `q_h` of eq. (10): the part of the rounding that the wheel noise does not
+    /// cover.
+    pub fn rounding_noise(&self, p: &Matrix, state: &Vector, travel: &SVector<f64, 2>) -> Matrix {
         let per_metre = self.wheel_noise * self.wheel_noise;
         let of = |wheel: usize, scale: usize| {
             per_metre * travel[wheel].abs() * (1.0 + state[scale]).powi(2)
@@ -143,20 +137,21 @@ impl Robot {
         f * p * f.transpose() + self.noise(state, travel)
     }
 
-    /// How large the terms are that the entries of [`Self::predicted`] are summed from: the same
-    /// sums without cancellation, sine and cosine taken as 1 and the turn without the difference
-    /// of the wheels. Single precision is exact to a small multiple of this times [`ROUNDING`].
+    /// Magnitude of the terms of which the entries of [`Self::predicted`] are the sums: the same
+    /// sums without cancellation, with 1 for sine and cosine and without the difference of the
+    /// wheels in the turn. Single precision is exact to a small multiple of this times
+    /// [`ROUNDING`].
     pub fn size_of_terms(&self, p: &Matrix, state: &Vector, travel: &SVector<f64, 2>) -> Matrix {
         let width = self.track_width + state[TRACK_WIDTH];
         let (right, left) = (travel[0].abs() * 1.1, travel[1].abs() * 1.1);
         let advance = f64::midpoint(right, left);
-        // Of Δψ by S_R, S_L, δD; of x or y by ψ, S_R, S_L, δD.
+        // Derivatives of Δψ by S_R, S_L, δD; of x or y by ψ, S_R, S_L, δD.
         let turn = [right / width, left / width, (right + left) / width / width];
         let mut f = Matrix::identity();
         for (axis, along) in [(X, 1.0), (Y, 1.0), (HEADING, 0.0)] {
             let by_heading = if axis == HEADING { 1.0 } else { advance };
             f[(axis, HEADING)] = by_heading;
-            // The wheels' errors are held as mean and difference: each takes part in both.
+            // The scale errors are held as mean and difference: each wheel contributes to both.
             let by_scale = along * advance + by_heading * (turn[0] + turn[1]);
             f[(axis, SCALE_RIGHT)] = by_scale;
             f[(axis, SCALE_LEFT)] = by_scale;
@@ -176,8 +171,8 @@ impl Robot {
     }
 }
 
-/// The size in which entries are rounded when the wheels' scale errors are held as mean and
-/// difference: what belongs to one wheel, in the size of both.
+/// Magnitude at which entries are rounded when the scale errors are held as mean and difference:
+/// entries of one wheel are rounded at the magnitude of both.
 pub fn size_by_both_wheels(size: &Matrix) -> Matrix {
     let mut both = Matrix::identity();
     both[(SCALE_RIGHT, SCALE_LEFT)] = 1.0;
@@ -185,7 +180,7 @@ pub fn size_by_both_wheels(size: &Matrix) -> Matrix {
     both * size * both.transpose()
 }
 
-/// A wall by its two ends, and the sonar's place on the robot.
+/// A wall by its two ends, and the position of the sonar on the robot.
 #[derive(Debug, Clone, Copy)]
 pub struct View {
     pub from: (f64, f64),
@@ -193,7 +188,7 @@ pub struct View {
     pub mount: (f64, f64),
 }
 
-/// A point's coordinates, exactly.
+/// Coordinates of a point, exactly.
 pub fn coordinates(point: Point) -> (f64, f64) {
     (point.x.0.into(), point.y.0.into())
 }
@@ -210,7 +205,7 @@ impl View {
         (dx / length, dy / length, length)
     }
 
-    /// Where the sonar is.
+    /// Position of the sonar.
     pub fn sonar(&self, state: &Vector) -> (f64, f64) {
         let (sin, cos) = state[HEADING].sin_cos();
         (
@@ -225,29 +220,29 @@ impl View {
         -ty * (point.0 - self.from.0) + tx * (point.1 - self.from.1)
     }
 
-    /// Where along the wall a point's foot is.
+    /// Distance of the foot of a point along the wall.
     pub fn along(&self, point: (f64, f64)) -> f64 {
         let (tx, ty, _) = self.tangent();
         tx * (point.0 - self.from.0) + ty * (point.1 - self.from.1)
     }
 
-    /// Eq. (10).
-    pub fn heard(&self, state: &Vector) -> f64 {
+    /// Eq. (11).
+    pub fn expected_range(&self, state: &Vector) -> f64 {
         (1.0 + state[RANGE_SCALE]) * self.distance(self.sonar(state)).abs()
     }
 
-    /// H, by central differences of eq. (10).
+    /// H, by central differences of eq. (11).
     pub fn by_state(&self, state: &Vector) -> Row {
         let step = 1e-5;
         Row::from_fn(|_, j| {
             let mut h = Vector::zeros();
             h[j] = step;
-            (self.heard(&(state + h)) - self.heard(&(state - h))) / (2.0 * step)
+            (self.expected_range(&(state + h)) - self.expected_range(&(state - h))) / (2.0 * step)
         })
     }
 }
 
-/// The crate's H as a row.
+/// H of the crate as a row.
 pub fn jacobian_of(expected: &ExpectedRange) -> Row {
     Row::from([
         expected.by_x.into(),
@@ -260,7 +255,7 @@ pub fn jacobian_of(expected: &ExpectedRange) -> Row {
     ])
 }
 
-/// The gain, eq. (14), and Joseph's form, eq. (15), of a correction.
+/// The gain, eq. (18), and Joseph's form, eq. (19), of a correction.
 pub fn corrected(p: &Matrix, h: &Row, r: f64) -> (Vector, Matrix) {
     let s = (h * p * h.transpose())[0] + r;
     let gain = p * h.transpose() / s;
@@ -268,15 +263,15 @@ pub fn corrected(p: &Matrix, h: &Row, r: f64) -> (Vector, Matrix) {
     (gain, left * p * left.transpose() + gain * r * gain.transpose())
 }
 
-/// Eq. (17): the noise that a range is taken with, or `None` if it adds nothing.
-pub fn bearable(p: &Matrix, h: &Row, r: f64) -> Option<f64> {
+/// Eq. (20): the noise with which a range is used, or `None` if it is saturated.
+pub fn limited_noise(p: &Matrix, h: &Row, r: f64) -> Option<f64> {
     let (_, exact) = corrected(p, h, r);
     let least = SHARPEST * variance_of_terms(&exact, h);
     let along = variance_along(p, h);
     (along > least).then(|| r.max(along * least / (along - least)))
 }
 
-/// The correlations of those states that are not known exactly; 1 on the diagonal of the others.
+/// The correlations of the states that are not known exactly; 1 on the diagonal of the others.
 pub fn correlations(p: &Matrix) -> Matrix {
     let known = |i: usize| p.row(i).iter().all(|v| *v == 0.0);
     Matrix::from_fn(|i, j| {
@@ -288,9 +283,9 @@ pub fn correlations(p: &Matrix) -> Matrix {
     })
 }
 
-/// Whether every eigenvalue of the correlations is positive: then, and only then, Cholesky's
-/// factorisation exists. In `f64` it tells from 1e-15 on, and unlike the eigenvalues themselves it
-/// takes no iteration that might not converge.
+/// Whether every eigenvalue of the correlations is positive, which is equivalent to the existence
+/// of the Cholesky factorisation. In `f64` it resolves 1e-15, and needs no iteration that might not
+/// converge.
 pub fn is_positive_definite(p: &Matrix) -> bool {
     let variances_are_sound = p.diagonal().iter().all(|v| *v >= 0.0);
     variances_are_sound && correlations(p).cholesky().is_some()
@@ -301,7 +296,7 @@ pub fn variance_along(p: &Matrix, h: &Row) -> f64 {
     (h * p * h.transpose())[0]
 }
 
-/// What H P Hᵀ is summed from, without cancellation.
+/// Sum of the magnitudes of the terms of H P Hᵀ.
 pub fn variance_of_terms(p: &Matrix, h: &Row) -> f64 {
     (0..7).map(|i| h[i] * h[i] * p[(i, i)]).sum()
 }

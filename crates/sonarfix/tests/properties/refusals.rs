@@ -1,8 +1,9 @@
-//! What is refused or gated changes no bit; the gate is where it is said to be.
+//! What is refused or gated changes no bit; what is associated changes no more than it may.
 
 use proptest::prelude::*;
 use sonarfix::aim::Aim;
-use sonarfix::ekf::{Ekf, EkfError, State};
+use sonarfix::echo::EchoParameters;
+use sonarfix::ekf::{Ekf, EkfError, StandardDeviations, StateEstimate};
 use sonarfix::health::Verdict;
 use sonarfix::localizer::{Fix, Localizer, OdometryError, Refusal, Start};
 use sonarfix::map::{Map, Wall, WallId};
@@ -15,13 +16,13 @@ use crate::strategies::{Room, any_ekf, any_mount, any_room, any_sight, bits, con
 
 const BAD: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
 
-/// Everything that a refusal must leave alone.
+/// Everything that a refusal must not change.
 fn estimate(localizer: &Localizer) -> (Vec<u32>, Instant) {
     (bits(localizer.filter()), localizer.time())
 }
 
-/// A room's walls, and beyond the first of them, in line with it, one whose foot the robot never
-/// has: it begins 4 m past the corner.
+/// The walls of a room, and beyond the first of them, in line with it, one on which the foot never
+/// lies: it begins 4 m past the corner.
 fn walls_and_one_aside(room: &Room) -> Vec<Wall> {
     let mut walls = room.walls().to_vec();
     let (wall, length) = (walls[0], walls[0].length().0);
@@ -33,9 +34,11 @@ fn walls_and_one_aside(room: &Room) -> Vec<Wall> {
     walls
 }
 
-/// A localizer that has driven a little and taken a fix, so that no number in it is round.
+/// A localizer after some travel and a fix, so that no number in it is round.
 fn started<'m>(room: &Room, walls: &'m [Wall], mount: Point) -> Localizer<'m> {
-    let config = config_for_rooms(mount);
+    let mut config = config_for_rooms(mount);
+    // The covariance of a lost robot stays.
+    config.gating.inflation = Metres(0.0);
     let start = Instant::from_ticks(1_000_000);
     let mut localizer = Localizer::new(config, Map::new(walls), room.start(), start).unwrap();
     localizer.odometry(Instant::from_ticks(1_500_000), WheelTravel::new(0.021, 0.017)).unwrap();
@@ -76,7 +79,7 @@ proptest! {
             prop_assert_eq!(localizer.odometry(time, travel), Err(error), "{:?}", travel);
             prop_assert_eq!(estimate(&localizer), before.clone(), "{:?}", travel);
         }
-        // The next good one is taken as if nothing had been.
+        // The next valid one is accepted.
         prop_assert_eq!(localizer.odometry(now, still), Ok(()));
         prop_assert_eq!(localizer.odometry(later, WheelTravel::new(0.199, good)), Ok(()));
         prop_assert_ne!(estimate(&localizer), before);
@@ -100,8 +103,8 @@ proptest! {
             (Aim { wall: WallId(5), ..aim }, good, Refusal::UnknownWall),
             (Aim { wall: WallId(u32::MAX), ..aim }, good, Refusal::UnknownWall),
             (Aim { wall: WallId(4), ..aim }, good, Refusal::FootOffWall),
-            (askew(cone), good, Refusal::NotSquare),
-            (askew(-cone), good, Refusal::NotSquare),
+            (askew(cone + cone), good, Refusal::NotSquare),
+            (askew(-cone - cone), good, Refusal::NotSquare),
             (askew(Radians(f32::NAN)), good, Refusal::NotSquare),
         ];
         cases.extend(BAD.map(|bad| (aim, Some(Metres(bad)), Refusal::NotFinite)));
@@ -113,204 +116,174 @@ proptest! {
         prop_assert_ne!(estimate(&localizer), before);
     }
 
-    /// The gate is at `gate` standard deviations of the innovation: a thousandth inside, accepted;
-    /// a thousandth outside, gated, and no bit changed. (Ranges have 6 digits at the least.)
+    /// An echo that cannot be the wall's is gated and changes no bit; one of probability zero neither.
     #[test]
-    fn the_gate_is_where_it_is_said_to_be(
-        room in any_room(), mount in any_mount(), gate in 1.0_f32..6.0, far in any::<bool>(), beyond in 1.001_f32..1.5,
+    fn an_echo_of_probability_zero_changes_no_bit(
+        room in any_room(), mount in any_mount(), sigmas in 20.0_f32..60.0, far in any::<bool>(),
     ) {
         let walls = walls_and_one_aside(&room);
         let mut config = config_for_rooms(mount);
-        config.trust.gate = gate;
-        config.trust.short = 0.0;
-        let localizer = Localizer::new(config, Map::new(&walls), room.start(), Instant::from_ticks(0)).unwrap();
-        let aim = localizer.aim().unwrap();
-        let ekf = localizer.filter();
-        let expected = ExpectedRange::new(&walls[aim.wall.0 as usize], mount, &ekf.state());
-        let innovation = ekf.innovation(aim.range, &expected, config.sonar.noise.variance(expected.range));
-        let sigma = innovation.variance.0.sqrt() * if far { 1.0 } else { -1.0 };
-
-        let mut inside = localizer.clone();
-        let fix = inside.fix(&aim, Some(aim.range + Metres(gate * 0.999 * sigma)));
-        prop_assert!(matches!(fix, Fix::Accepted(i) if i.nis() <= gate * gate), "{fix:?}");
-        prop_assert_ne!(estimate(&inside), estimate(&localizer));
-
-        let mut outside = localizer.clone();
-        let fix = outside.fix(&aim, Some(aim.range + Metres(gate * beyond * sigma)));
-        prop_assert!(matches!(fix, Fix::Gated(i) if i.nis() > gate * gate), "{fix:?}");
-        prop_assert_eq!(estimate(&outside), estimate(&localizer));
-    }
-
-    /// Beyond the gate and inside the outer one a range is taken with the noise that brings it to the
-    /// gate; beyond the outer one it is gated, and no bit changes.
-    #[test]
-    fn beyond_the_gate_a_range_is_weakened_if_asked_for(
-        room in any_room(), mount in any_mount(), gate in 1.0_f32..4.0, times in 1.1_f32..3.0, inside in 0.1_f32..0.95,
-    ) {
-        let walls = walls_and_one_aside(&room);
-        let mut config = config_for_rooms(mount);
-        config.trust.gate = gate;
-        config.trust.outer_gate = gate * times;
-        config.trust.short = 0.0;
+        config.echo = EchoParameters::HC_SR04;
         let localizer = Localizer::new(config, Map::new(&walls), room.start(), Instant::from_ticks(0)).unwrap();
         let aim = localizer.aim().unwrap();
         let ekf = localizer.filter();
         let expected = ExpectedRange::new(&walls[aim.wall.0 as usize], mount, &ekf.state());
         let noise = config.sonar.noise.variance(expected.range);
         let innovation = ekf.innovation(aim.range, &expected, noise);
-        let sigma = innovation.variance.0.sqrt();
-        let sigmas = gate * (1.0 + inside * (times - 1.0));
-
-        let mut weakened = localizer.clone();
-        let fix = weakened.fix(&aim, Some(aim.range + Metres(sigmas * sigma)));
-        let Fix::Weakened(taken) = fix else { return Err(TestCaseError::fail(format!("{fix:?}"))) };
-        prop_assert!((taken.nis() / (gate * gate) - 1.0).abs() < 1e-3, "{taken:?}");
-        // The same as a filter that is told of that noise.
-        let mut told = *ekf;
-        let raised = noise.0 + taken.variance.0 - innovation.variance.0;
-        told.update(aim.range + Metres(sigmas * sigma), &expected, SquareMetres(raised)).unwrap();
-        let (ours, theirs) = (weakened.filter().deviation().x, told.deviation().x);
-        prop_assert!((ours - theirs).abs() <= 1e-3 * theirs, "{ours} {theirs}");
-
-        let mut beyond = localizer.clone();
-        let fix = beyond.fix(&aim, Some(aim.range + Metres(gate * times * 1.001 * sigma)));
+        let off = sigmas * innovation.variance.0.sqrt() * if far { 1.0 } else { -1.0 };
+        let range = aim.range + Metres(off);
+        prop_assume!(range > config.sonar.min_range && range < config.sonar.max_range);
+        let mut gated = localizer.clone();
+        let fix = gated.fix(&aim, Some(range));
         prop_assert!(matches!(fix, Fix::Gated(_)), "{fix:?}");
-        prop_assert_eq!(estimate(&beyond), estimate(&localizer));
+        prop_assert_eq!(estimate(&gated), estimate(&localizer));
+
+        let mut filter = *ekf;
+        filter.update_associated(range, &expected, noise, 0.0).unwrap();
+        prop_assert_eq!(bits(&filter), bits(ekf));
+        for bad in [f32::NAN, -0.1, 1.001] {
+            prop_assert_eq!(filter.update_associated(range, &expected, noise, bad), Err(EkfError::NotFinite));
+            prop_assert_eq!(bits(&filter), bits(ekf));
+        }
     }
 
-    /// A short range is believed less than a long one that is as far off, and moves the filter less.
+    /// The covariance after an echo of any probability is not smaller than after a certain one, in any
+    /// direction; the state moves by that share; and a certain echo has the bits of an update.
     #[test]
-    fn a_short_range_is_believed_less(
-        room in any_room(), mount in any_mount(), short in 1.0_f32..3.0, off in 1.05_f32..3.0,
+    fn an_uncertain_association_never_shrinks_the_covariance_more_than_a_certain_one(
+        ekf in any_ekf(), sight in any_sight(), mount in any_mount(), association in 0.01_f32..0.999, off in -0.3_f32..0.3,
+        direction in proptest::array::uniform7(-1.0_f64..1.0),
     ) {
-        let walls = walls_and_one_aside(&room);
-        let mut config = config_for_rooms(mount);
-        config.trust.short = short;
-        // So that it is inside the gate.
-        config.trust.gate = 50.0;
-        let localizer = Localizer::new(config, Map::new(&walls), room.start(), Instant::from_ticks(0)).unwrap();
-        let aim = localizer.aim().unwrap();
-        let ekf = localizer.filter();
-        let expected = ExpectedRange::new(&walls[aim.wall.0 as usize], mount, &ekf.state());
-        let by = short * off * config.sonar.noise.variance(expected.range).0.sqrt();
-        let (mut longer, mut shorter) = (localizer.clone(), localizer.clone());
-        let long = longer.fix(&aim, Some(expected.range + Metres(by)));
-        let short_fix = shorter.fix(&aim, Some(expected.range - Metres(by)));
-        prop_assert!(matches!(long, Fix::Accepted(_)), "{long:?}");
-        prop_assert!(matches!(short_fix, Fix::Weakened(_)), "{short_fix:?}");
-        let moved = |l: &Localizer| {
-            let (now, was) = (l.filter().state(), ekf.state());
-            (now.x - was.x).hypot(now.y - was.y)
-        };
-        prop_assert!(moved(&shorter) < moved(&longer));
-        let spread = |l: &Localizer| l.filter().deviation().x.hypot(l.filter().deviation().y);
-        prop_assert!(spread(&shorter) > spread(&longer));
+        let state = ekf.state();
+        let expected = ExpectedRange::new(&sight.wall(state.pose().position()), mount, &state);
+        let (range, noise) = (expected.range + Metres(off), SquareMetres(1e-4));
+        let (mut certain, mut same, mut uncertain) = (ekf, ekf, ekf);
+        certain.update(range, &expected, noise).unwrap();
+        same.update_associated(range, &expected, noise, 1.0).unwrap();
+        prop_assert_eq!(bits(&certain), bits(&same));
+        uncertain.update_associated(range, &expected, noise, association).unwrap();
+        let (small, large) = (certain.covariance().map(f64::from), uncertain.covariance().map(f64::from));
+        let scale = nalgebra::SVector::<f64, 7>::from_fn(|i, _| direction[i] / large[(i, i)].max(1e-30).sqrt());
+        let along = |p: &nalgebra::SMatrix<f64, 7, 7>| (scale.transpose() * p * scale)[(0, 0)];
+        prop_assert!(along(&large) >= along(&small) - 1e-4, "{} {}", along(&large), along(&small));
+        let moved = |to: &Ekf| (to.state().x.0 - state.x.0, to.state().y.0 - state.y.0);
+        let ((x, y), (cx, cy)) = (moved(&uncertain), moved(&certain));
+        prop_assert!((x - association * cx).abs() < 1e-5 && (y - association * cy).abs() < 1e-5);
     }
 
-    /// A robot that is lost lets its doubt grow by the stated rule with each range beyond the gate that
-    /// is not of the same wall again, up to the stated bound, and says so; one that is not lost does
-    /// not.
+    /// A lost robot inflates its covariance by the stated steps, with each ping that contradicts
+    /// independently, up to the stated bound; a robot that is not lost does not.
     #[test]
-    fn the_gate_of_a_lost_robot_reopens(room in any_room(), mount in any_mount(), reopen in 0.005_f32..0.03) {
+    fn a_lost_robot_inflates_its_pose_covariance(room in any_room(), mount in any_mount(), inflation in 0.005_f32..0.03) {
         let walls = walls_and_one_aside(&room);
         let mut config = config_for_rooms(mount);
-        config.trust.reopen = Metres(reopen);
+        config.gating.inflation = Metres(inflation);
+        config.echo = EchoParameters::HC_SR04;
         let mut localizer = Localizer::new(config, Map::new(&walls), room.start(), Instant::from_ticks(0)).unwrap();
         let mut grown = 0_u16;
-        let mut looked_at = None;
-        for _ in 0..200 {
-            // 3 m beyond the wall: outside of the gate, however wide it grows.
+        for step in 1..=200_u64 {
+            // Time passes, so that no wall stays occluded.
+            let now = Instant::from_ticks(step * 60_000_000);
+            localizer.odometry(now, WheelTravel::default()).unwrap();
+            // 3 m beyond the wall: clutter, however uncertain the pose.
             let Ok(aim) = localizer.aim() else { break };
-            let was = *localizer.filter();
+            let before = localizer.filter().covariance();
+            let state = localizer.filter().state();
             let fix = localizer.fix(&aim, Some(aim.range + Metres(3.0)));
             prop_assert!(matches!(fix, Fix::Gated(_)), "{fix:?}");
-            let (before, after) = (was.covariance(), localizer.filter().covariance());
-            let is_lost = localizer.health().verdict == Verdict::Lost;
-            let again = looked_at.replace(aim.wall) == Some(aim.wall);
-            prop_assert!((is_lost && !again) || before == after);
+            let after = localizer.filter().covariance();
+            prop_assert!(localizer.health().verdict == Verdict::Lost || before == after);
             let added = after - before;
-            let step = reopen * reopen;
             for i in [0, 1] {
-                let is_step = (added[(i, i)] - step).abs() < 1e-5 * after[(i, i)] + 1e-9;
+                let is_step = (added[(i, i)] - inflation * inflation).abs() < 1e-5 * after[(i, i)] + 1e-9;
                 prop_assert!(added[(i, i)] == 0.0 || is_step, "{added}");
             }
             grown += u16::from(before != after);
-            prop_assert_eq!(localizer.filter().state(), was.state());
-            prop_assert_eq!(localizer.health().reopened, grown);
+            prop_assert_eq!(localizer.filter().state(), state);
+            prop_assert_eq!(localizer.health().inflations, grown);
         }
         prop_assert!(grown > 2, "{grown}");
-        let doubt = localizer.health();
-        prop_assert!(doubt.position_deviation.0 <= (reopen * 10.0).hypot(reopen).max(0.031) * 1.01, "{doubt:?}");
-        prop_assert!(doubt.heading_deviation <= (config.sonar.cone * 0.25) + Radians(reopen));
+        let health = localizer.health();
+        prop_assert!(health.position_deviation.0 <= (inflation * 10.0).hypot(inflation).max(0.031) * 1.01, "{health:?}");
+        prop_assert!(health.heading_deviation.0 <= 0.26 + inflation);
     }
 
-    /// What is no deviation is refused, and no bit changes; what is one is added.
+    /// An invalid deviation is refused, and no bit changes; a valid one is added.
     #[test]
-    fn loosening_adds_what_it_says(ekf in any_ekf(), position in 0.0_f32..1.0, heading in 0.0_f32..0.5) {
+    fn inflate_pose_adds_the_given_variances(ekf in any_ekf(), position in 0.0_f32..1.0, heading in 0.0_f32..0.5) {
         let mut changed = ekf;
         for bad in BAD {
-            prop_assert_eq!(changed.loosen(Metres(bad), Radians(heading)), Err(EkfError::NotFinite));
-            prop_assert_eq!(changed.loosen(Metres(position), Radians(bad)), Err(EkfError::NotFinite));
+            prop_assert_eq!(changed.inflate_pose(Metres(bad), Radians(heading)), Err(EkfError::NotFinite));
+            prop_assert_eq!(changed.inflate_pose(Metres(position), Radians(bad)), Err(EkfError::NotFinite));
         }
-        prop_assert_eq!(changed.loosen(Metres(-0.1), Radians(heading)), Err(EkfError::Negative));
-        prop_assert_eq!(changed.loosen(Metres(position), Radians(-0.1)), Err(EkfError::Negative));
-        prop_assert_eq!(changed.loosen(Metres(f32::MAX), Radians(heading)), Err(EkfError::NotFinite));
+        prop_assert_eq!(changed.inflate_pose(Metres(-0.1), Radians(heading)), Err(EkfError::NegativeVariance));
+        prop_assert_eq!(changed.inflate_pose(Metres(position), Radians(-0.1)), Err(EkfError::NegativeVariance));
+        prop_assert_eq!(changed.inflate_pose(Metres(f32::MAX), Radians(heading)), Err(EkfError::VarianceTooLarge));
         prop_assert_eq!(bits(&changed), bits(&ekf));
-        prop_assert_eq!(changed.loosen(Metres(position), Radians(heading)), Ok(()));
+        prop_assert_eq!(changed.inflate_pose(Metres(position), Radians(heading)), Ok(()));
         let (before, after) = (ekf.deviation(), changed.deviation());
-        prop_assert!((after.x - before.x.hypot(position)).abs() < 1e-5 * after.x);
-        prop_assert!((after.y - before.y.hypot(position)).abs() < 1e-5 * after.y);
-        prop_assert!((after.heading - before.heading.hypot(heading)).abs() < 1e-5 * after.heading);
+        prop_assert!((after.x.0 - before.x.0.hypot(position)).abs() < 1e-5 * after.x.0);
+        prop_assert!((after.y.0 - before.y.0.hypot(position)).abs() < 1e-5 * after.y.0);
+        prop_assert!((after.heading.0 - before.heading.0.hypot(heading)).abs() < 1e-5 * after.heading.0);
         prop_assert_eq!(changed.state(), ekf.state());
     }
 
-    /// The filter itself, given what the localizer would have stopped.
+    /// The filter itself, with arguments that the localizer would refuse.
     #[test]
-    fn a_filter_refuses_what_it_cannot_compute_with(
+    fn a_filter_refuses_invalid_arguments(
         ekf in any_ekf(), sight in any_sight(), mount in any_mount(), which in 0_usize..5,
     ) {
         let mut changed = ekf;
         let state = ekf.state();
-        let expected = ExpectedRange::new(&sight.wall(Point::new(state.x, state.y)), mount, &state);
+        let expected = ExpectedRange::new(&sight.wall(state.pose().position()), mount, &state);
         let (range, noise) = (expected.range, SquareMetres(1e-4));
         for bad in BAD {
             prop_assert_eq!(changed.update(Metres(bad), &expected, noise), Err(EkfError::NotFinite));
             prop_assert_eq!(changed.update(range, &expected, SquareMetres(bad)), Err(EkfError::NotFinite));
             let mut broken = expected;
             *[&mut broken.range.0, &mut broken.by_x, &mut broken.by_y, &mut broken.by_heading, &mut broken.by_range_scale][which] = bad;
-            prop_assert_eq!(changed.update(range, &broken, noise), Err(EkfError::NotFinite));
+            let error = if which == 0 { EkfError::NotFinite } else { EkfError::JacobianTooLarge };
+            prop_assert_eq!(changed.update(range, &broken, noise), Err(error));
             prop_assert_eq!(changed.predict(WheelTravel::new(bad, 0.1)), Err(EkfError::NotFinite));
             prop_assert_eq!(changed.predict(WheelTravel::new(0.0, bad)), Err(EkfError::NotFinite));
         }
-        prop_assert_eq!(changed.update(range, &expected, SquareMetres(-1e-9)), Err(EkfError::Negative));
-        prop_assert_eq!(changed.update(range, &expected, SquareMetres(0.0)), Err(EkfError::Noiseless));
-        prop_assert_eq!(changed.update(range, &expected, SquareMetres(-0.0)), Err(EkfError::Noiseless));
-        // Finite, but its square is not.
-        prop_assert_eq!(changed.predict(WheelTravel::new(f32::MAX, f32::MAX)), Err(EkfError::NotFinite));
+        prop_assert_eq!(changed.update(range, &expected, SquareMetres(-1e-9)), Err(EkfError::NegativeVariance));
+        prop_assert_eq!(changed.update(range, &expected, SquareMetres(0.0)), Err(EkfError::ZeroNoise));
+        prop_assert_eq!(changed.update(range, &expected, SquareMetres(-0.0)), Err(EkfError::ZeroNoise));
+        prop_assert_eq!(changed.update(range, &expected, SquareMetres(1e7)), Err(EkfError::NoiseTooLarge));
+        prop_assert_eq!(changed.update(Metres(1e7), &expected, noise), Err(EkfError::InnovationTooLarge));
+        // A turn of more than 64 rad, or one that overflows.
+        prop_assert_eq!(changed.predict(WheelTravel::new(100.0, -100.0)), Err(EkfError::TurnTooLarge));
+        prop_assert_eq!(changed.predict(WheelTravel::new(f32::MAX, -f32::MAX)), Err(EkfError::TurnTooLarge));
         let steep = ExpectedRange { by_x: f32::MAX, direction: Heading::default(), ..expected };
-        prop_assert_eq!(changed.update(range, &steep, noise), Err(EkfError::NotFinite));
+        prop_assert_eq!(changed.update(range, &steep, noise), Err(EkfError::JacobianTooLarge));
         prop_assert_eq!(bits(&changed), bits(&ekf));
         prop_assert_eq!(changed.update(range, &expected, noise), Ok(()));
         prop_assert_ne!(bits(&changed), bits(&ekf));
     }
 }
 
-/// A variance that grows beyond what is computed with is found when it has been computed: then the
-/// filter is put back.
+/// A variance that exceeds its limit is detected after it has been computed; the filter is
+/// restored.
 #[test]
-fn what_grows_too_large_is_put_back() {
+fn a_filter_is_restored_if_a_variance_is_too_large() {
     let drive = Drive {
         track_width: Metres(0.2),
         wheel_noise: PerRootMetre(Metres(1e-3)),
         scale_walk: PerRootMetre(0.0),
-        // So wide that after 4 m of both wheels the track width's variance is beyond 1e12 m².
+        // So large that after 4 m of both wheels the variance of the track width exceeds 1e12 m².
         track_width_walk: PerRootMetre(Metres(1e6)),
     };
-    let deviation = State { x: 0.1, y: 0.1, heading: 1e5, ..State::default() };
-    let before = Ekf::new(drive, State::default(), deviation).unwrap();
+    let deviation = StandardDeviations {
+        x: Metres(0.1),
+        y: Metres(0.1),
+        heading: Radians(1e5),
+        ..StandardDeviations::default()
+    };
+    let before = Ekf::new(drive, StateEstimate::default(), deviation).unwrap();
     // 100 m along a heading uncertain by 1e5 rad: 1e14 m².
     let mut ekf = before;
-    assert_eq!(ekf.predict(WheelTravel::new(100.0, 100.0)), Err(EkfError::NotFinite));
+    assert_eq!(ekf.predict(WheelTravel::new(100.0, 100.0)), Err(EkfError::VarianceTooLarge));
     assert_eq!(ekf, before);
 
     assert_eq!(ekf.predict(WheelTravel::new(2.0, 2.0)), Ok(()));
@@ -318,11 +291,11 @@ fn what_grows_too_large_is_put_back() {
     let wall = Wall::new(Point::new(5.0, -5.0), Point::new(5.0, 5.0)).unwrap();
     let expected = ExpectedRange::new(&wall, Point::default(), &ekf.state());
     let noise = SquareMetres(1e-4);
-    assert_eq!(ekf.update(expected.range, &expected, noise), Err(EkfError::NotFinite));
+    assert_eq!(ekf.update(expected.range, &expected, noise), Err(EkfError::VarianceTooLarge));
     assert_eq!(ekf, before);
 }
 
-/// A travel that is refused is no way rolled and no time passed.
+/// A refused travel changes neither distance nor time of the health.
 #[test]
 fn a_refused_travel_does_not_count_for_health() {
     let walls = [Wall::new(Point::new(2.0, -5.0), Point::new(2.0, 5.0)).unwrap()];
@@ -341,11 +314,11 @@ fn a_refused_travel_does_not_count_for_health() {
     assert_eq!(localizer.health(), before);
 }
 
-/// A noise whose square is not finite would make NaN of no way at all.
+/// A noise whose square is infinite would result in NaN at zero distance.
 #[test]
 fn a_noise_too_large_to_square_is_refused() {
     let sound = config_for_rooms(Point::default()).drive;
-    let started = |drive| Ekf::new(drive, State::default(), State::default());
+    let started = |drive| Ekf::new(drive, StateEstimate::default(), StandardDeviations::default());
     assert!(started(sound).is_ok());
     for large in [1e19, f32::MAX] {
         let noise = PerRootMetre(Metres(large));
@@ -354,7 +327,7 @@ fn a_noise_too_large_to_square_is_refused() {
             Drive { scale_walk: PerRootMetre(large), ..sound },
             Drive { track_width_walk: noise, ..sound },
         ] {
-            assert_eq!(started(drive).err(), Some(EkfError::NotFinite), "{drive:?}");
+            assert_eq!(started(drive).err(), Some(EkfError::VarianceTooLarge), "{drive:?}");
         }
     }
 }

@@ -1,8 +1,9 @@
-//! Without a prior for the range scale, the filter is the paper's six-state one, bit for bit.
+//! Without a prior for the range scale, the filter equals the six-state one of the paper, bit for
+//! bit.
 
 use nalgebra::SMatrix;
 use proptest::prelude::*;
-use sonarfix::ekf::{Ekf, State};
+use sonarfix::ekf::{Ekf, StandardDeviations, StateEstimate};
 use sonarfix::map::Wall;
 use sonarfix::motion::{Drive, WheelTravel};
 use sonarfix::pose::{Heading, Point};
@@ -12,51 +13,48 @@ use sonarfix::units::{Metres, Radians, SquareMetres};
 
 use crate::strategies::{Event, any_deviation, any_drive, any_event, any_state, bits};
 
-/// The crate's own, eqs. (9) and (17).
+/// The constants of the crate, eqs. (10) and (20).
 const ROUNDING: f32 = 1.0 / 4_194_304.0;
 const SHARPEST: f32 = 1.0 / 16_384.0;
 
-/// A filter that has never heard of a range scale: the equations of the crate, in the crate's
-/// order, with the seventh state left out. Indices: x, y, heading, mean and difference of the scale
-/// errors, width.
+/// A filter without a range scale: the equations of the crate, in the same order, without the
+/// seventh state. Indices: x, y, heading, mean and difference of the scale errors, width.
 #[derive(Debug, Clone, Copy)]
-struct SixStates {
+struct SixStateFilter {
     x: [f32; 6],
-    /// What rounding left over of x, y, heading.
-    rest_of_x: [f32; 3],
-    /// Upper triangle; what is below the diagonal is not used.
+    /// Kahan compensation of x, y, heading.
+    compensation: [f32; 3],
+    /// Upper triangle; entries below the diagonal are not used.
     p: [[f32; 6]; 6],
     drive: Drive,
-    /// How far both wheels have rolled since the last range; what the calibration has walked over it
-    /// is not in `p` yet.
-    way: f32,
+    /// Distance of both wheels since the last update; the random walk of the calibration over it is
+    /// not in `p`.
+    distance_since_update: f32,
 }
 
-/// Adds to a sum with what rounding left over.
-fn add(sum: &mut f32, rest: &mut f32, change: f32) {
-    let change = change + *rest;
+/// Adds to a sum with Kahan compensation.
+fn add(sum: &mut f32, compensation: &mut f32, change: f32) {
+    let change = change + *compensation;
     let before = *sum;
     *sum = before + change;
-    *rest = change - (*sum - before);
+    *compensation = change - (*sum - before);
 }
 
-impl SixStates {
-    fn new(drive: Drive, state: State, deviation: State) -> Self {
-        let heading = Heading::new(Radians(state.heading)).radians().0;
-        let common = 0.5 * (state.scale_right + state.scale_left);
-        let difference = state.scale_right - state.scale_left;
-        let x = [state.x, state.y, heading, common, difference, state.track_width_error];
-        let square = |sigma: f32| sigma * sigma;
-        let (rr, ll) = (square(deviation.scale_right), square(deviation.scale_left));
+impl SixStateFilter {
+    fn new(drive: Drive, state: StateEstimate, deviation: StandardDeviations) -> Self {
+        let [x, y, heading, right, left, width, _] = state.to_array();
+        let heading = Heading::new(Radians(heading)).radians().0;
+        let x = [x, y, heading, 0.5 * (right + left), right - left, width];
+        let [xx, yy, hh, rr, ll, ww, _] = deviation.to_array().map(|sigma| sigma * sigma);
         let mut p = [[0.0; 6]; 6];
-        p[0][0] = square(deviation.x);
-        p[1][1] = square(deviation.y);
-        p[2][2] = square(deviation.heading);
+        p[0][0] = xx;
+        p[1][1] = yy;
+        p[2][2] = hh;
         p[3][3] = 0.25 * (rr + ll);
         p[3][4] = 0.5 * (rr - ll);
         p[4][4] = rr + ll;
-        p[5][5] = square(deviation.track_width_error);
-        Self { x, rest_of_x: [0.0; 3], p, drive, way: 0.0 }
+        p[5][5] = ww;
+        Self { x, compensation: [0.0; 3], p, drive, distance_since_update: 0.0 }
     }
 
     /// An entry, from the upper triangle.
@@ -88,12 +86,12 @@ impl SixStates {
         let lack_of_way = [0, 1].map(|axis: usize| lacking(self.p[axis][axis], noise_s));
         let lack_of_heading = lacking(self.p[2][2], noise_t);
 
-        // Each a row of six: the covariance of turn, advance, mid-heading with every state.
+        // Each is a row of six: the covariance of turn, advance or mid-heading with every state.
         let by_turn =
             [(right - left) * per_width, 0.5 * (right + left) * per_width, -turn * per_width];
         let by_advance = [0.5 * (right + left), 0.25 * (right - left)];
-        let walked = Self { p: self.walked(), ..*self };
-        let row = |i: usize| core::array::from_fn::<f32, 6, _>(|j| walked.at(i, j));
+        let with_random_walk = Self { p: self.with_random_walk(), ..*self };
+        let row = |i: usize| core::array::from_fn::<f32, 6, _>(|j| with_random_walk.at(i, j));
         let (h, c, d, w) = (row(2), row(3), row(4), row(5));
         let turn_with = |c: f32, d: f32, w: f32| by_turn[0] * c + by_turn[1] * d + by_turn[2] * w;
         let advance_with = |c: f32, d: f32| by_advance[0] * c + by_advance[1] * d;
@@ -110,7 +108,7 @@ impl SixStates {
 
         let swing = [-advance * sin, advance * cos];
         let ahead = [cos, sin];
-        // Adds an axis' share of two covariances to a third.
+        // Adds the share of an axis of two covariances to a third.
         let along = |to: f32, axis: usize, m: f32, s: f32| to + swing[axis] * m + ahead[axis] * s;
         let new_m = [0, 1].map(|axis| along(m[axis], axis, mm, ms));
         let new_s = [0, 1].map(|axis| along(s[axis], axis, ms, ss));
@@ -129,27 +127,27 @@ impl SixStates {
         for j in 3..6 {
             new[2][j] += t[j];
         }
-        self.way += right.abs() + left.abs();
+        self.distance_since_update += right.abs() + left.abs();
         self.p = new;
-        self.moved(0, advance * cos);
-        self.moved(1, advance * sin);
-        self.moved(2, turn);
+        self.add_to_pose(0, advance * cos);
+        self.add_to_pose(1, advance * sin);
+        self.add_to_pose(2, turn);
     }
 
-    /// P, with what the calibration has walked.
-    fn walked(&self) -> [[f32; 6]; 6] {
+    /// P, with the random walk of the calibration.
+    fn with_random_walk(&self) -> [[f32; 6]; 6] {
         let scale_walk = self.drive.scale_walk.0 * self.drive.scale_walk.0;
         let width_walk = self.drive.track_width_walk.0.0 * self.drive.track_width_walk.0.0;
         let mut p = self.p;
         for (i, walk) in [0.25 * scale_walk, scale_walk, 0.5 * width_walk].into_iter().enumerate() {
-            p[3 + i][3 + i] += self.way * walk;
+            p[3 + i][3 + i] += self.distance_since_update * walk;
         }
         p
     }
 
-    /// Moves x, y or heading.
-    fn moved(&mut self, i: usize, by: f32) {
-        add(&mut self.x[i], &mut self.rest_of_x[i], by);
+    /// Adds to x, y or heading.
+    fn add_to_pose(&mut self, i: usize, by: f32) {
+        add(&mut self.x[i], &mut self.compensation[i], by);
         self.x[2] = Heading::new(Radians(self.x[2])).radians().0;
     }
 
@@ -171,15 +169,15 @@ impl SixStates {
     }
 
     fn update(&mut self, range: f32, expected: f32, h: [f32; 3], noise: f32) {
-        (self.p, self.way) = (self.walked(), 0.0);
+        (self.p, self.distance_since_update) = (self.with_random_walk(), 0.0);
         let dot = |m: &[f32; 6]| h[0] * m[0] + h[1] * m[1] + h[2] * m[2];
         let m = self.cross(h);
-        let Some(noise) = self.bearable(noise, h, &m) else { return };
+        let Some(noise) = self.limited_noise(noise, h, &m) else { return };
         let per_variance = 1.0 / (noise + dot(&m));
         let gain = m.map(|m| m * per_variance);
         let innovation = range - expected;
         for i in 0..3 {
-            self.moved(i, gain[i] * innovation);
+            self.add_to_pose(i, gain[i] * innovation);
         }
         for i in 3..6 {
             self.x[i] += gain[i] * innovation;
@@ -194,8 +192,8 @@ impl SixStates {
         self.each(|i, j, p| p + d[i] * gain[j] + gain[i] * d[j]);
     }
 
-    /// Eq. (17).
-    fn bearable(&self, noise: f32, h: [f32; 3], m: &[f32; 6]) -> Option<f32> {
+    /// Eq. (20).
+    fn limited_noise(&self, noise: f32, h: [f32; 3], m: &[f32; 6]) -> Option<f32> {
         let along = h[0] * m[0] + h[1] * m[1] + h[2] * m[2];
         let per_variance = 1.0 / (noise + along);
         let left = |i: usize| h[i] * h[i] * (self.p[i][i] - (m[i] * per_variance) * m[i]);
@@ -214,10 +212,10 @@ impl SixStates {
         }
     }
 
-    /// The bits of state and covariance, in the order of the seven-state filter's and wheel by
-    /// wheel as there, the seventh zero.
+    /// The bits of state and covariance, in the order of the seven-state filter and wheel by wheel,
+    /// the seventh zero.
     fn bits(&self) -> Vec<u32> {
-        let shown = Self { p: self.walked(), ..*self };
+        let shown = Self { p: self.with_random_walk(), ..*self };
         let wheels =
             |common: f32, difference: f32| [common + 0.5 * difference, common - 0.5 * difference];
         let [x, y, heading, common, difference, width] = self.x;
@@ -245,19 +243,19 @@ impl SixStates {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(128))]
 
-    /// Over some 2,000 steps a run: same bits in every state and every entry of P after each, and
-    /// nothing in the seventh.
+    /// Over some 2,000 steps per run: the same bits in every state and every entry of P after each,
+    /// and zero in the seventh.
     #[test]
-    fn a_known_range_scale_is_inert(
+    fn a_known_range_scale_has_no_effect(
         drive in any_drive(),
         state in any_state(),
         deviation in any_deviation(),
         events in proptest::collection::vec(any_event(1e-6..1e-3), 200),
     ) {
-        let state = State { range_scale: 0.0, ..state };
-        let deviation = State { range_scale: 0.0, ..deviation };
+        let state = StateEstimate { range_scale: 0.0, ..state };
+        let deviation = StandardDeviations { range_scale: 0.0, ..deviation };
         let mut seven = Ekf::new(drive, state, deviation).unwrap();
-        let mut six = SixStates::new(drive, state, deviation);
+        let mut six = SixStateFilter::new(drive, state, deviation);
         for event in events {
             match event {
                 Event::Roll(travel, times) => {
@@ -269,7 +267,7 @@ proptest! {
                 }
                 Event::Range { sight, mount, sigmas, noise } => {
                     let state = seven.state();
-                    let wall = sight.wall(Point::new(state.x, state.y));
+                    let wall = sight.wall(state.pose().position());
                     let expected = ExpectedRange::new(&wall, mount, &state);
                     let range = Metres(expected.range.0 + 0.02 * sigmas);
                     seven.update(range, &expected, SquareMetres(noise)).unwrap();
@@ -281,12 +279,12 @@ proptest! {
         }
     }
 
-    /// With a prior for it, the same run differs: the test above compares something.
+    /// With a prior for the range scale the same run differs, so the test above can fail.
     #[test]
-    fn an_unknown_range_scale_is_not(drive in any_drive(), state in any_state(), deviation in any_deviation()) {
-        let state = State { range_scale: 0.0, ..state };
+    fn an_unknown_range_scale_has_an_effect(drive in any_drive(), state in any_state(), deviation in any_deviation()) {
+        let state = StateEstimate { range_scale: 0.0, ..state };
         let mut seven = Ekf::new(drive, state, deviation).unwrap();
-        let mut six = SixStates::new(drive, state, deviation);
+        let mut six = SixStateFilter::new(drive, state, deviation);
         let wall = Wall::new(Point::new(40.0, -40.0), Point::new(40.0, 40.0)).unwrap();
         let expected = ExpectedRange::new(&wall, Point::default(), &state);
         let range = expected.range + Metres(0.05);

@@ -1,8 +1,9 @@
-//! Random robots, walls and ways, and the runs made from them.
+//! Random robots, walls and travels, and the runs made from them.
 
 use proptest::prelude::*;
 use sonarfix::config::Config;
-use sonarfix::ekf::{Ekf, State};
+use sonarfix::echo::EchoParameters;
+use sonarfix::ekf::{Ekf, StandardDeviations, StateEstimate};
 use sonarfix::localizer::Start;
 use sonarfix::map::Wall;
 use sonarfix::motion::{Drive, WheelTravel};
@@ -10,7 +11,7 @@ use sonarfix::pose::{Point, Pose};
 use sonarfix::range::ExpectedRange;
 use sonarfix::units::{Metres, PerRootMetre, Radians, SquareMetres};
 
-/// A robot with a track of 10 cm to 60 cm and wheel noise from good to bad.
+/// A robot with a track width of 10 cm to 60 cm and low to high wheel noise.
 pub fn any_drive() -> impl Strategy<Value = Drive> {
     (0.1_f32..0.6, 1e-4_f32..5e-3, 1e-6_f32..1e-4).prop_map(|(track_width, noise, walk)| Drive {
         track_width: Metres(track_width),
@@ -20,7 +21,7 @@ pub fn any_drive() -> impl Strategy<Value = Drive> {
     })
 }
 
-/// A drive that adds no noise.
+/// A drive without noise.
 pub fn silent(drive: Drive) -> Drive {
     Drive {
         wheel_noise: PerRootMetre(Metres(0.0)),
@@ -30,15 +31,9 @@ pub fn silent(drive: Drive) -> Drive {
     }
 }
 
-/// A state from its seven numbers, in their order.
-fn state(numbers: (f32, f32, f32, f32, f32, f32, f32)) -> State {
-    let (x, y, heading, scale_right, scale_left, track_width_error, range_scale) = numbers;
-    State { x, y, heading, scale_right, scale_left, track_width_error, range_scale }
-}
-
-/// A state within 20 m of the origin, its heading away from ±π so that a step does not wrap it,
-/// with systematic errors of a few per cent.
-pub fn any_state() -> impl Strategy<Value = State> {
+/// A state within 20 m of the origin, with a heading away from ±π so that a step does not wrap it,
+/// and systematic errors of a few per cent.
+pub fn any_state() -> impl Strategy<Value = StateEstimate> {
     (
         -20.0_f32..20.0,
         -20.0_f32..20.0,
@@ -48,11 +43,11 @@ pub fn any_state() -> impl Strategy<Value = State> {
         -0.01_f32..0.01,
         -0.05_f32..0.05,
     )
-        .prop_map(state)
+        .prop_map(|numbers| StateEstimate::from_array(numbers.into()))
 }
 
-/// Deviations of a robot that knows roughly where it is.
-pub fn any_deviation() -> impl Strategy<Value = State> {
+/// Deviations of a robot whose pose is roughly known.
+pub fn any_deviation() -> impl Strategy<Value = StandardDeviations> {
     (
         1e-3_f32..0.5,
         1e-3_f32..0.5,
@@ -62,10 +57,10 @@ pub fn any_deviation() -> impl Strategy<Value = State> {
         1e-4_f32..0.01,
         1e-4_f32..0.03,
     )
-        .prop_map(state)
+        .prop_map(|numbers| StandardDeviations::from_array(numbers.into()))
 }
 
-/// Straight on, backwards, a curve, a turn on the spot, one wheel alone: what 100 ms may bring.
+/// Straight on, backwards, a curve, a turn on the spot, one wheel alone: travels of 100 ms.
 pub fn any_travel() -> impl Strategy<Value = WheelTravel> {
     let metres = || 0.002_f32..0.08;
     prop_oneof![
@@ -79,7 +74,7 @@ pub fn any_travel() -> impl Strategy<Value = WheelTravel> {
     ]
 }
 
-/// Where a sonar may sit: at the centre, or off it.
+/// Positions of a sonar: at the centre, or off it.
 pub fn any_mount() -> impl Strategy<Value = Point> {
     prop_oneof![
         1 => Just(Point::new(0.0, 0.0)),
@@ -87,8 +82,8 @@ pub fn any_mount() -> impl Strategy<Value = Point> {
     ]
 }
 
-/// A wall seen from about the origin: its foot's direction, its distance, where along it the foot
-/// is, its length, and which way it was drawn.
+/// A wall seen from near the origin: direction and distance of its foot, place of the foot along
+/// it, length, and order of its ends.
 #[derive(Debug, Clone, Copy)]
 pub struct Sight {
     pub direction: f32,
@@ -131,18 +126,19 @@ pub fn any_sight() -> impl Strategy<Value = Sight> {
     )
 }
 
-/// One thing that happens to a filter.
+/// One call of a filter.
 #[derive(Debug, Clone, Copy)]
 pub enum Event {
-    /// This travel, so many times.
+    /// This travel, a number of times.
     Roll(WheelTravel, u8),
-    /// A range of a wall, wrong by so many deviations of its innovation, with this noise variance.
+    /// A range of a wall with an error of so many deviations of its innovation, with this noise
+    /// variance.
     Range { sight: Sight, mount: Point, sigmas: f32, noise: f32 },
 }
 
 /// A travel repeated, or a range with noise variance in `noise`.
 pub fn any_event(noise: core::ops::Range<f32>) -> impl Strategy<Value = Event> {
-    // The exponent is uniform, not the variance: sharp ranges come as often as blunt ones.
+    // The exponent is uniform, not the variance: low and high noise are equally frequent.
     let exponent = noise.start.log10()..noise.end.log10();
     prop_oneof![
         (any_travel(), 1_u8..40).prop_map(|(travel, times)| Event::Roll(travel, times)),
@@ -157,7 +153,7 @@ pub fn any_event(noise: core::ops::Range<f32>) -> impl Strategy<Value = Event> {
     ]
 }
 
-/// Does it; `each` sees the filter before and after every single prediction and correction.
+/// Executes an event; `each` receives the filter before and after every prediction and correction.
 pub fn live(ekf: &mut Ekf, event: Event, mut each: impl FnMut(&Ekf, Option<&ExpectedRange>, &Ekf)) {
     match event {
         Event::Roll(travel, times) => {
@@ -170,11 +166,11 @@ pub fn live(ekf: &mut Ekf, event: Event, mut each: impl FnMut(&Ekf, Option<&Expe
         Event::Range { sight, mount, sigmas, noise } => {
             let before = *ekf;
             let state = ekf.state();
-            let wall = sight.wall(Point::new(state.x, state.y));
+            let wall = sight.wall(state.pose().position());
             let expected = ExpectedRange::new(&wall, mount, &state);
             let noise = SquareMetres(noise);
             let variance = ekf.innovation(expected.range, &expected, noise).variance.0;
-            // A range metres off would throw the calibration off the road of real robots.
+            // An error of metres would move the calibration away from values of real robots.
             let surprise = (sigmas * variance.abs().sqrt()).clamp(-0.3, 0.3);
             let range = Metres(expected.range.0 + surprise);
             ekf.update(range, &expected, noise).unwrap();
@@ -183,7 +179,7 @@ pub fn live(ekf: &mut Ekf, event: Event, mut each: impl FnMut(&Ekf, Option<&Expe
     }
 }
 
-/// A filter with a full covariance, after random ways and ranges from a random start; and its
+/// A filter with a full covariance, after random travels and ranges from a random start; and its
 /// drive.
 pub fn any_filter() -> impl Strategy<Value = (Drive, Ekf)> {
     (
@@ -212,11 +208,11 @@ pub fn bits(ekf: &Ekf) -> Vec<u32> {
     state.iter().chain(covariance.iter()).map(|v| v.to_bits()).collect()
 }
 
-/// A rectangular room, turned by any angle, with a robot somewhere inside at any heading.
+/// A rectangular room, rotated by any angle, with a robot somewhere inside at any heading.
 #[derive(Debug, Clone, Copy)]
 pub struct Room {
     pub angle: f32,
-    /// From the robot to the walls: ahead, left, behind, right in the room's own axes.
+    /// From the robot to the walls: ahead, left, behind, right in the axes of the room.
     pub distances: [f32; 4],
     pub robot: Pose,
 }
@@ -238,7 +234,7 @@ impl Room {
         ]
     }
 
-    /// The robot in it, known to a few centimetres.
+    /// The robot in it, with a deviation of a few centimetres.
     pub fn start(&self) -> Start {
         Start {
             pose: self.robot,
@@ -264,11 +260,14 @@ pub fn any_room() -> impl Strategy<Value = Room> {
         })
 }
 
-/// A configuration whose sonar sees all of such a room.
+/// A configuration whose sonar reaches every wall of such a room.
 pub fn config_for_rooms(mount: Point) -> Config {
     let mut config = Config::for_track_width(Metres(0.2));
     config.sonar.mount = mount;
     config.sonar.max_range = Metres(12.0);
     config.prior.range_scale = 0.01;
+    // No clutter: what is tested with it is tested by itself.
+    config.echo = EchoParameters::NONE;
+    config.gating.confidence = 1.0;
     config
 }

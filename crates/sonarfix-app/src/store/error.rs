@@ -1,0 +1,37 @@
+//! The errors of the store.
+
+/// Why the store could not be used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum StoreError {
+    /// The region is not two or more whole sectors.
+    Region,
+    /// The flash failed to read, write or erase.
+    Flash,
+    /// What lay in the region was not a store.
+    Corrupt,
+    /// What was written does not read back.
+    NotWritten,
+    /// A record is whole and does not have the layout that this firmware reads.
+    Layout,
+    /// The robot cannot start with the configuration that it was sent; the baked one is used.
+    Configuration,
+    /// The robot was reset several times in a row, and leaves the store alone until its next start.
+    Ignored,
+}
+
+impl core::fmt::Display for StoreError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Region => "the store's region is not two or more whole sectors of flash",
+            Self::Flash => "the flash failed to read, write or erase",
+            Self::Corrupt => "what lay in the store's region was not a store",
+            Self::NotWritten => "what was written to flash does not read back",
+            Self::Layout => "a record in flash has a layout that this firmware does not read",
+            Self::Configuration => "the robot cannot start with the configuration that it was sent",
+            Self::Ignored => "several resets in a row: the store is not used until the next start",
+        })
+    }
+}
+
+impl core::error::Error for StoreError {}

@@ -1,0 +1,47 @@
+//! How often the flash may be written, whatever commands arrive.
+//!
+//! A bucket of [`BURST`] writes, which gains one every [`PERIOD`]: a write that finds it empty is
+//! postponed, and the newest state is written then. So the worst rate of commands wears the flash like
+//! one write a minute (`docs/firmware.md` computes the years).
+//!
+//! One write is kept in reserve while a record says that the robot is parked, for the record that must
+//! replace it before the robot drives.
+
+use sonarfix::units::{Duration, Instant};
+
+use crate::time::{after, since};
+
+/// The most writes in a row.
+pub const BURST: u8 = 8;
+/// Time in which one more is gained.
+pub const PERIOD: Duration = Duration::from_ticks(60_000_000);
+
+/// The bucket.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WriteLimit {
+    writes: u8,
+    /// When the last write was gained, or the bucket was full.
+    since: Instant,
+}
+
+impl WriteLimit {
+    /// A full bucket.
+    #[must_use]
+    pub fn new(now: Instant) -> Self {
+        Self { writes: BURST, since: now }
+    }
+
+    /// Takes one write, if `reserve` remain after it.
+    pub fn take(&mut self, now: Instant, reserve: u8) -> bool {
+        while self.writes < BURST && since(now, self.since) >= PERIOD {
+            self.writes += 1;
+            self.since = after(self.since, PERIOD);
+        }
+        if self.writes == BURST {
+            self.since = now;
+        }
+        let is_permitted = self.writes > reserve;
+        self.writes = self.writes.saturating_sub(u8::from(is_permitted));
+        is_permitted
+    }
+}

@@ -1,0 +1,420 @@
+//! What has wedged a robot, or left it blind without a word: commands, interruptions and dead
+//! devices. `docs/faults.md` has a table of them.
+
+use sonarfix::config::CalibrationPrior;
+use sonarfix::ekf::StandardDeviations;
+use sonarfix::health::Verdict;
+use sonarfix::localizer::Start;
+use sonarfix::pose::Pose;
+use sonarfix::units::{Metres, Radians};
+use sonarfix_app::store::{Saved, Store, StoreError, StoredConfiguration};
+use sonarfix_hal::config::RobotConfig;
+use sonarfix_link::message::{CommandError, CommandResult, ImageStatus};
+use sonarfix_link::{Command, Telemetry, baked};
+
+use crate::flash::{SECTOR, SECTORS, SimFlash};
+use crate::rig::{Baked, Bench, config, fares, servo, start};
+
+const DONE: CommandResult = CommandResult::Done;
+
+/// A robot whose loop runs.
+fn running(baked: &Baked) -> Bench<'_> {
+    let mut bench = Bench::switched_on(baked, SimFlash::new());
+    assert_eq!(bench.order(&Command::SetPose(start())), DONE);
+    assert_eq!(bench.order(&Command::Start), DONE);
+    bench
+}
+
+/// Drives both wheels so many ticks ahead, at 0.2 m/s.
+fn drive(bench: &mut Bench, ticks: u16) {
+    for _ in 0..ticks {
+        for wheel in [&mut bench.hardware.right.0, &mut bench.hardware.left.0] {
+            *wheel = wheel.map(|count| count.wrapping_add(1));
+        }
+        let _ = bench.turn();
+    }
+}
+
+fn at_start(mut bench: Bench) -> (Bench, StandardDeviations) {
+    assert_eq!(bench.order(&Command::Start), DONE);
+    let deviation = bench.estimate().deviation;
+    (bench, deviation)
+}
+
+/// Whether no deviation of the calibration exceeds its prior, but for the random walk of a few metres.
+pub fn is_within_prior(deviation: &StandardDeviations, prior: &CalibrationPrior) -> bool {
+    let at_most = |is: f32, prior: f32| is <= 1.000_1 * prior + 1e-4;
+    at_most(deviation.scale_right, prior.scale_right)
+        && at_most(deviation.scale_left, prior.scale_left)
+        && at_most(deviation.track_width_error.0, prior.track_width.0)
+        && at_most(deviation.range_scale, prior.range_scale)
+}
+
+#[test]
+fn any_number_of_stops_equals_one() {
+    let baked = Baked::new(&config());
+    let mut bench = running(&baked);
+    drive(&mut bench, 1_000);
+    assert_eq!(bench.order(&Command::Stop), DONE);
+    let (mut bench, once) = at_start(bench);
+    for _ in 0..25 {
+        assert_eq!(bench.order(&Command::Stop), DONE);
+        let again;
+        (bench, again) = at_start(bench);
+        assert_eq!(again, once);
+    }
+    assert!(is_within_prior(&once, &config().localizer.prior), "{once:?}");
+}
+
+#[test]
+fn any_number_of_power_cycles_equals_one() {
+    let baked = Baked::new(&config());
+    let mut bench = running(&baked);
+    drive(&mut bench, 1_000);
+    assert_eq!(bench.order(&Command::Stop), DONE);
+    let mut flash = bench.switched_off();
+    let mut first = None;
+    for cycle in 0..30 {
+        let mut bench = Bench::switched_on(&baked, flash);
+        // A command while it waits writes what is known, and so does a start that goes nowhere.
+        if cycle % 3 == 1 {
+            assert_eq!(bench.order(&Command::MapChecksum), bench.order(&Command::MapChecksum));
+        }
+        let (mut bench, deviation) = at_start(bench);
+        assert_eq!(*first.get_or_insert(deviation), deviation, "cycle {cycle}");
+        assert!(is_within_prior(&deviation, &config().localizer.prior), "{deviation:?}");
+        assert_eq!(bench.order(&Command::Stop), DONE);
+        flash = bench.switched_off();
+    }
+}
+
+/// What was tried first: a pose while it runs, then everything again after the power.
+#[test]
+fn new_poses_never_add_up() {
+    let baked = Baked::new(&config());
+    let mut bench = running(&baked);
+    for _ in 0..40 {
+        assert_eq!(bench.order(&Command::SetPose(start())), DONE);
+        drive(&mut bench, 3);
+        let deviation = bench.estimate().deviation;
+        assert!(is_within_prior(&deviation, &config().localizer.prior), "{deviation:?}");
+    }
+    let mut bench = Bench::switched_on(&baked, bench.switched_off());
+    for _ in 0..40 {
+        assert_eq!(bench.order(&Command::SetPose(start())), DONE);
+    }
+    let (bench, deviation) = at_start(bench);
+    assert!(is_within_prior(&deviation, &config().localizer.prior), "{deviation:?}");
+    assert!(bench.app.is_running());
+}
+
+/// A running robot that gets a new pose keeps its calibration and the covariance of that, to the bit.
+#[test]
+fn a_new_pose_costs_no_calibration() {
+    let baked = Baked::new(&config());
+    let mut bench = running(&baked);
+    drive(&mut bench, 2_000);
+    bench.wait(200);
+    let before = *bench.app.localizer().unwrap().filter();
+    let there = Start { pose: Pose::new(2.0, 1.0, Radians(1.0)), ..start() };
+    assert_eq!(bench.order(&Command::SetPose(there)), DONE);
+    let after = *bench.app.localizer().unwrap().filter();
+    let (p, q) = (before.covariance(), after.covariance());
+    assert_eq!(p.fixed_view::<4, 4>(3, 3), q.fixed_view::<4, 4>(3, 3));
+    assert_eq!(before.state().to_array()[3..], after.state().to_array()[3..]);
+    assert_eq!(after.state().x, Metres(2.0));
+    assert!((after.deviation().x.0 - 0.02).abs() < 1e-6);
+    let crossed = q.fixed_view::<3, 4>(0, 3);
+    assert!(crossed.iter().all(|covariance| covariance.abs() <= 0.0), "{crossed}");
+}
+
+/// Ticks come on their grid, whatever commands come between them.
+#[test]
+fn commands_do_not_move_the_tick() {
+    let baked = Baked::new(&config());
+    let faster = config();
+    let commands =
+        [Command::SetPose(start()), Command::SetConfiguration(faster), Command::ResetCalibration];
+    for period in [20, 33, 50, 99] {
+        for command in &commands {
+            let mut bench = running(&baked);
+            let mut on_time = 0;
+            for milli in 0..10_000 {
+                let polled = if milli % period == 0 {
+                    bench.send(command);
+                    bench.turn()
+                } else {
+                    bench.turn()
+                };
+                on_time += u32::from(polled.is_on_time);
+            }
+            assert!(on_time >= 90, "every {period} ms {command:?}: {on_time} ticks in 10 s");
+        }
+    }
+}
+
+/// A command every 20 ms for ten minutes writes no more than the limit permits.
+#[test]
+fn commands_do_not_wear_the_flash_out() {
+    let baked = Baked::new(&config());
+    for is_running in [false, true] {
+        let mut bench = running(&baked);
+        if !is_running {
+            assert_eq!(bench.order(&Command::Stop), DONE);
+        }
+        let mut writes = 0;
+        for milli in 0_u32..600_000 {
+            if milli.is_multiple_of(20) {
+                let x = 1.0 + 1e-6 * milli as f32;
+                let pose = Pose::new(x, 1.5, Radians(0.5));
+                bench.send(&match milli / 20 % 4 {
+                    0 => Command::ResetCalibration,
+                    1 => Command::SetConfiguration(config()),
+                    _ => Command::SetPose(Start { pose, ..start() }),
+                });
+            }
+            writes += u32::from(bench.turn().saved.is_some());
+        }
+        assert!(writes <= 8 + 10 + 1, "{writes} writes in ten minutes, running: {is_running}");
+    }
+}
+
+/// What the limit has postponed is written when it permits: the newest state.
+#[test]
+fn the_newest_state_is_written_after_the_limit() {
+    let baked = Baked::new(&config());
+    let mut bench = Bench::switched_on(&baked, SimFlash::new());
+    let at = |x: f32| Start { pose: Pose::new(x, 1.5, Radians(0.5)), ..start() };
+    for pose in 0_u16..50 {
+        assert_eq!(bench.order(&Command::SetPose(at(0.01 * f32::from(pose)))), DONE);
+    }
+    bench.wait(121_000);
+    let bench = Bench::switched_on(&baked, bench.switched_off());
+    let known = bench.app.known().copied().unwrap();
+    assert!(known.has_pose && (known.state.x.0 - 0.49).abs() < 1e-6, "{known:?}");
+}
+
+/// A record never says that a robot is parked which may drive, whatever the limit.
+#[test]
+fn a_driving_robot_is_never_recorded_as_parked() {
+    let baked = Baked::new(&config());
+    let mut bench = running(&baked);
+    for times in 0..60 {
+        let commands: &[Command] = match times % 4 {
+            0 => &[Command::Stop, Command::Start],
+            1 => &[Command::Stop, Command::SetPose(start()), Command::Start],
+            2 => &[Command::Stop, Command::ResetCalibration, Command::Start],
+            _ => &[Command::Stop, Command::SetConfiguration(config()), Command::Start],
+        };
+        for command in commands {
+            assert_eq!(bench.order(command), DONE, "{command:?}");
+        }
+        drive(&mut bench, 10);
+        let flash = bench.app.store().flash().clone();
+        let mut store = Store::new(flash, 0..(SECTOR * SECTORS) as u32).unwrap();
+        let saved = store.load().unwrap();
+        assert!(saved.is_none_or(|saved| !saved.is_parked), "after {times}: {saved:?}");
+        bench.wait(if times % 10 == 0 { 70_000 } else { 100 });
+    }
+}
+
+/// What is refused changes neither memory nor flash, and does not keep the robot from starting.
+#[test]
+fn what_is_refused_changes_nothing() {
+    let baked = Baked::new(&config());
+    let wide = |position, heading| Start {
+        position_deviation: Metres(position),
+        heading_deviation: Radians(heading),
+        ..start()
+    };
+    let poses = [wide(1e7, 0.1), wide(0.1, 1e7), wide(f32::NAN, 0.1), wide(-1.0, 0.1)];
+    let mut bench = Bench::switched_on(&baked, SimFlash::new());
+    assert_eq!(bench.order(&Command::SetPose(start())), DONE);
+    let mut unstartable = config();
+    unstartable.localizer.prior.track_width = Metres(1e7);
+    let mut broken = config();
+    broken.localizer.max_wheel_speed = sonarfix::units::MetresPerSecond(-1.0);
+    let commands = poses
+        .map(Command::SetPose)
+        .into_iter()
+        .chain([Command::SetConfiguration(unstartable), Command::SetConfiguration(broken)]);
+    for is_running in [false, true] {
+        if is_running {
+            assert_eq!(bench.order(&Command::Start), DONE);
+        }
+        for command in commands.clone() {
+            let (known, flash) = (bench.app.known().copied(), bench.app.store().flash().clone());
+            let refused = bench.order(&command);
+            assert!(matches!(refused, CommandResult::Refused(_)), "{command:?}: {refused:?}");
+            assert_eq!(bench.app.known().copied(), known);
+            assert_eq!(bench.app.store().flash().clone(), flash, "{command:?} was written");
+            assert_eq!(bench.app.is_running(), is_running);
+        }
+    }
+    assert_eq!(bench.order(&Command::Stop), DONE);
+    let mut bench = Bench::switched_on(&baked, bench.switched_off());
+    assert_eq!(bench.order(&Command::Start), DONE);
+}
+
+/// A configuration in the store with which nothing can start: the baked one is used, and it is said.
+#[test]
+fn a_stored_configuration_that_cannot_start_is_not_used() {
+    let baked = Baked::new(&config());
+    let bad: [fn(&mut RobotConfig); 3] = [
+        |config| config.localizer.prior.track_width = Metres(1e7),
+        |config| config.localizer.max_wheel_speed = sonarfix::units::MetresPerSecond(-1.0),
+        |config| config.localizer.sonar.servo = (Radians(-3.0), Radians(3.0)),
+    ];
+    for make_bad in bad {
+        let mut sent = config();
+        make_bad(&mut sent);
+        let mut store = Store::new(SimFlash::new(), 0..(SECTOR * SECTORS) as u32).unwrap();
+        store
+            .save_config(&StoredConfiguration {
+                replaces: baked::checksum(&config()),
+                config: sent,
+            })
+            .unwrap();
+        let mut bench = Bench::switched_on(&baked, store.release());
+        assert!(bench.first.saved.is_some_and(|read| read.is_err()), "{:?}", bench.first);
+        let said = bench.wait(1);
+        let Some(Telemetry::Hello(hello)) = said.first() else { panic!("no word of who it is") };
+        assert_eq!(hello.configuration, ImageStatus::Valid(baked::checksum(&config())));
+        assert_eq!(bench.order(&Command::SetPose(start())), DONE);
+        assert_eq!(bench.order(&Command::Start), DONE);
+    }
+}
+
+/// A record with numbers as no robot writes them.
+#[test]
+fn a_strange_record_does_not_keep_the_robot_from_starting() {
+    let baked = Baked::new(&config());
+    let bench = running(&baked);
+    let mut flash = bench.switched_off();
+    for numbers in [[1e30; 7], [-1.0; 7], [f32::NAN; 7], [1e6; 7]] {
+        let mut store = Store::new(flash, 0..(SECTOR * SECTORS) as u32).unwrap();
+        let saved = store.load().unwrap().unwrap();
+        let deviation = StandardDeviations::from_array(numbers);
+        store.save(&Saved { is_parked: true, deviation, ..saved }).unwrap();
+        let mut bench = Bench::switched_on(&baked, store.release());
+        assert_eq!(bench.order(&Command::SetPose(start())), DONE);
+        assert_eq!(bench.order(&Command::Start), DONE);
+        flash = bench.switched_off();
+    }
+}
+
+fn verdict(bench: &Bench) -> Verdict {
+    bench.estimate().health.verdict
+}
+
+/// An encoder that cannot be read: `Degraded` within 0.7 s, `Lost` within 3.2 s, motors off.
+#[test]
+fn a_dead_encoder_is_noticed() {
+    let baked = Baked::new(&config());
+    for wheel in 0..3 {
+        let mut bench = running(&baked);
+        bench.wait(1_000);
+        let well = bench.estimate().health;
+        assert!(bench.turn().may_drive);
+        if wheel != 1 {
+            bench.hardware.right.0 = None;
+        }
+        if wheel != 0 {
+            bench.hardware.left.0 = None;
+        }
+        bench.wait(700);
+        assert_ne!(verdict(&bench), Verdict::Tracking);
+        assert!(!bench.turn().may_drive);
+        bench.wait(2_500);
+        assert_eq!(verdict(&bench), Verdict::Lost);
+        let unseen = bench.estimate().health.position_deviation.0 - well.position_deviation.0;
+        let fastest = config().localizer.max_wheel_speed.0;
+        assert!(unseen > 3.0 * fastest && unseen < 3.5 * fastest, "{unseen} m");
+        bench.wait(600_000);
+        assert_eq!(verdict(&bench), Verdict::Lost);
+        assert!(!bench.turn().may_drive);
+        assert!(fares(&bench.wait(1_000)).faults.right.errors > 0 || wheel == 1);
+    }
+}
+
+/// Read again, its counter brings the whole travel: nothing is lost, and the motors are enabled.
+#[test]
+fn an_encoder_that_can_be_read_again_brings_the_whole_travel() {
+    let baked = Baked::new(&config());
+    let mut bench = running(&baked);
+    bench.wait(1_000);
+    let x = bench.estimate().state.x.0;
+    let count = bench.hardware.right.0.take().unwrap();
+    bench.wait(1_000);
+    (bench.hardware.right.0, bench.hardware.left.0) = (Some(count + 100), Some(count + 100));
+    bench.wait(200);
+    let rolled = 100.0 * std::f32::consts::PI * 0.065 / 1_024.0;
+    assert!((bench.estimate().state.x.0 - x - rolled * 0.5_f32.cos()).abs() < 1e-4);
+    assert!(bench.turn().may_drive);
+}
+
+#[test]
+fn all_devices_dead_is_noticed() {
+    let baked = Baked::new(&config());
+    let mut bench = running(&baked);
+    bench.wait(1_000);
+    (bench.hardware.right.0, bench.hardware.left.0) = (None, None);
+    bench.hardware.servo = servo(false);
+    bench.hardware.ranger.is_there = false;
+    bench.wait(3_500);
+    assert_eq!(verdict(&bench), Verdict::Lost);
+    bench.wait(120_000);
+    assert_eq!(verdict(&bench), Verdict::Lost);
+    assert!(!bench.turn().may_drive);
+    // Given back, they are used again.
+    (bench.hardware.right.0, bench.hardware.left.0) = (Some(0), Some(0));
+    (bench.hardware.servo, bench.hardware.ranger.is_there) = (servo(true), true);
+    assert_eq!(bench.order(&Command::Stop), DONE);
+    assert_eq!(bench.order(&Command::SetPose(start())), DONE);
+    assert_eq!(bench.order(&Command::Start), DONE);
+    bench.wait(1_000);
+    assert_eq!(verdict(&bench), Verdict::Tracking);
+    assert!(bench.turn().may_drive);
+}
+
+/// No echo for a minute, whatever the reason, is not `Tracking`.
+#[test]
+fn a_ranger_that_never_answers_is_noticed() {
+    let baked = Baked::new(&config());
+    let mut bench = running(&baked);
+    bench.hardware.ranger.is_there = false;
+    bench.wait(61_000);
+    assert_ne!(verdict(&bench), Verdict::Tracking);
+    assert_eq!(bench.order(&Command::SetPose(start())), DONE);
+    assert_eq!(verdict(&bench), Verdict::Tracking);
+    assert_eq!(
+        bench.order(&Command::SetPose(Start { position_deviation: Metres(-1.0), ..start() })),
+        CommandResult::Refused(CommandError::Pose)
+    );
+}
+
+/// Whatever it is that resets the robot while it reads its store: it is left alone, and reported.
+#[test]
+fn after_three_resets_in_a_row_the_store_is_not_used() {
+    let baked = Baked::new(&config());
+    let mut bench = running(&baked);
+    assert_eq!(bench.order(&Command::Stop), DONE);
+    let flash = bench.switched_off();
+    for resets in 0..6 {
+        let mut bench = Bench::reset(&baked, flash.clone(), resets);
+        let is_used = resets < 3;
+        assert_eq!(bench.first.saved, (!is_used).then_some(Err(StoreError::Ignored)));
+        assert_eq!(bench.app.known().unwrap().has_pose, is_used);
+        assert_eq!(bench.order(&Command::SetPose(start())), DONE);
+        assert_eq!(bench.order(&Command::SetConfiguration(config())), DONE);
+        assert_eq!(bench.order(&Command::Start), DONE);
+        bench.wait(1_000);
+        assert_eq!(verdict(&bench), Verdict::Tracking);
+        assert!(!bench.turn().is_settled);
+        if !is_used {
+            assert_eq!(bench.app.store().flash(), &flash);
+        }
+        bench.wait(59_000);
+        assert!(bench.turn().is_settled);
+    }
+}

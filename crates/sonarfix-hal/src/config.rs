@@ -1,0 +1,235 @@
+//! The configuration of a robot in one structure: everything that its builder measures or chooses.
+//!
+//! [`RobotConfig`] is what `sonarfix config bake` writes into flash (`sonarfix-link`'s `baked`), and
+//! what loop, drivers, planner, simulator and replay read. No fact is in it twice: the servo's limits
+//! and timing, the ping schedule and the ranger's cycle are those of
+//! [`Sonar`](sonarfix::config::Sonar) inside [`RobotConfig::localizer`], which the planner uses as
+//! well; the other fields are what only the loop and the drivers need.
+//!
+//! [`Unsupported`] is the reason for which a board cannot be the robot that a configuration describes.
+//!
+//! # Adding a field
+//! A field is added to its structure here (or to the localizer's [`Config`]), to
+//! [`RobotConfig::check`], and in `sonarfix-map` to the reader and the writer of robot files; the
+//! version of the baked image rises (`sonarfix-link`, `baked::VERSION`).
+//!
+//! # Non-finite policy
+//! [`RobotConfig::check`] refuses NaN and infinity in every field.
+
+use sonarfix::config::{Config, ConfigError};
+use sonarfix::units::{Duration, Metres, Radians};
+
+use crate::encoder::{GeometryError, WheelGeometry, Wheels};
+use crate::ranger::{Air, Celsius, PulseTiming, RangerKind, RangerSettings};
+use crate::servo::{Calibration, MeasuredPulse, ServoSettings, SettingError};
+
+/// The configuration of a robot.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct RobotConfig {
+    /// The localizer's configuration. The servo's limits and timing, the ping schedule and the
+    /// ranger's cycle are in it.
+    pub localizer: Config,
+    /// The right wheel and its encoder.
+    pub right_wheel: WheelConfig,
+    /// The left wheel and its encoder.
+    pub left_wheel: WheelConfig,
+    /// Time from one reading of the encoders to the next.
+    pub encoder_period: Duration,
+    /// Two pulses of the servo, and the bearing of the sonar that was measured with each.
+    pub servo_pulses: [MeasuredPulse; 2],
+    /// The ranger.
+    pub ranger: RangerConfig,
+}
+
+/// A wheel and its encoder.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct WheelConfig {
+    /// The travel of the wheel from one edge of its encoder to the next: its circumference divided by the edges of a
+    /// revolution.
+    pub travel_per_edge: Metres,
+    /// Whether the encoder counts down while the robot drives ahead, because its motor is mounted as a mirror image
+    /// of the other.
+    pub is_mirrored: bool,
+}
+
+impl WheelConfig {
+    /// A wheel of this diameter, whose encoder has this many edges in a revolution of the wheel.
+    #[must_use]
+    pub fn of_diameter(diameter: Metres, edges_per_revolution: f32) -> Self {
+        let travel_per_edge = Metres(core::f32::consts::PI * diameter.0 / edges_per_revolution);
+        Self { travel_per_edge, is_mirrored: false }
+    }
+
+    /// The same wheel with an encoder that counts the other way.
+    #[must_use]
+    pub fn mirrored(self) -> Self {
+        Self { is_mirrored: !self.is_mirrored, ..self }
+    }
+
+    /// The geometry that the loop computes with.
+    ///
+    /// # Errors
+    /// [`GeometryError`] if the travel is not a positive finite length.
+    pub fn geometry(&self) -> Result<WheelGeometry, GeometryError> {
+        let wheel = WheelGeometry::rolling(self.travel_per_edge)?;
+        Ok(if self.is_mirrored { wheel.reversed() } else { wheel })
+    }
+
+    /// The travel ahead for a count of plus one: negative if the encoder is mirrored.
+    #[must_use]
+    pub fn signed_travel(&self) -> Metres {
+        if self.is_mirrored { -self.travel_per_edge } else { self.travel_per_edge }
+    }
+}
+
+/// A ranger.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct RangerConfig {
+    /// The kind, which determines the driver.
+    pub kind: RangerKind,
+    /// Temperature of the air that the driver computes ranges with.
+    pub temperature: Celsius,
+}
+
+/// A field that [`RobotConfig::check`] refused, and why.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct RobotConfigError {
+    /// The field: of the localizer's configuration as a path from [`Config`] (`"sonar.cone"`), of
+    /// another one as a path from [`RobotConfig`].
+    pub field: &'static str,
+    /// What it must be.
+    pub rule: &'static str,
+}
+
+impl core::fmt::Display for RobotConfigError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{} must be {}", self.field, self.rule)
+    }
+}
+
+impl core::error::Error for RobotConfigError {}
+
+impl From<ConfigError> for RobotConfigError {
+    fn from(error: ConfigError) -> Self {
+        Self { field: error.field, rule: error.rule }
+    }
+}
+
+/// Why a board cannot be the robot that a configuration describes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Unsupported {
+    /// The board has no driver for [`RobotConfig::ranger`].
+    Ranger,
+    /// The servo's driver or its PWM channel refuses limits, pulses or timing.
+    Servo(SettingError),
+    /// A wheel at full speed makes more edges from one reading to the next than half of what a
+    /// counter of the board holds, so that its direction would be ambiguous.
+    Counter,
+}
+
+impl core::fmt::Display for Unsupported {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Ranger => f.write_str("the board has no driver for the configured ranger"),
+            Self::Servo(error) => write!(f, "the board cannot drive the configured servo: {error}"),
+            Self::Counter => f.write_str(
+                "a wheel at max_wheel_speed overruns the board's edge counter within an encoder_period",
+            ),
+        }
+    }
+}
+
+impl core::error::Error for Unsupported {}
+
+impl RobotConfig {
+    /// A robot with this localizer and the parts that most small robots have: 65 mm wheels with
+    /// encoders of 1,496.6 edges a revolution, read every 100 ms, an HC-SR04, and a servo for which
+    /// 1 ms and 2 ms are −45° and 45°. A start for one's own; the parts must be measured.
+    ///
+    /// ```
+    /// use sonarfix::{config::{Config, ServoTiming}, units::{Metres, Radians}};
+    /// use sonarfix_hal::config::RobotConfig;
+    /// let mut config = RobotConfig::with_common_parts(Config::for_track_width(Metres(0.16)));
+    /// config.localizer.sonar.timing.servo = ServoTiming::SG90;
+    /// config.localizer.sonar.servo = (Radians(-1.5), Radians(1.5));
+    /// assert!(config.check().is_ok());
+    /// config.left_wheel.travel_per_edge = Metres(0.0);
+    /// assert_eq!(config.check().unwrap_err().field, "left_wheel.travel_per_edge");
+    /// ```
+    #[must_use]
+    pub fn with_common_parts(localizer: Config) -> Self {
+        // 11 lines × 4 edges × 34.014 revolutions of the motor.
+        let wheel = WheelConfig::of_diameter(Metres(0.065), 1_496.6);
+        let pulse = |width, degrees| MeasuredPulse {
+            width: Duration::from_ticks(width),
+            bearing: Radians::from_degrees(degrees),
+        };
+        Self {
+            localizer,
+            right_wheel: wheel,
+            left_wheel: wheel,
+            encoder_period: Duration::from_ticks(100_000),
+            servo_pulses: [pulse(1_000, -45.0), pulse(2_000, 45.0)],
+            ranger: RangerConfig {
+                kind: RangerKind::Pulse(PulseTiming::HC_SR04),
+                temperature: Celsius(20.0),
+            },
+        }
+    }
+
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// [`RobotConfigError`] with the first field that breaks its rule.
+    pub fn check(&self) -> Result<(), RobotConfigError> {
+        self.localizer.check()?;
+        let length = "a positive, finite length";
+        require("right_wheel.travel_per_edge", self.right_wheel.geometry().is_ok(), length)?;
+        require("left_wheel.travel_per_edge", self.left_wheel.geometry().is_ok(), length)?;
+        require("encoder_period", !self.encoder_period.is_zero(), "longer than zero")?;
+        let [one, other] = self.servo_pulses;
+        let calibration = Calibration::new(one, other);
+        require("servo_pulses", calibration.is_ok(), "two pulses with two bearings")?;
+        let fits = self.servo_settings().fits_its_frame();
+        require("servo_pulses", fits, "within the servo's frame at both limits of the servo")?;
+        let air = Air::at(self.ranger.temperature);
+        require("ranger.temperature", air.is_ok(), "between -40 and 85 degrees Celsius")
+    }
+
+    /// The geometry of both wheels.
+    ///
+    /// # Errors
+    /// [`GeometryError`], which [`Self::check`] rules out.
+    pub fn wheels(&self) -> Result<Wheels, GeometryError> {
+        Ok(Wheels { right: self.right_wheel.geometry()?, left: self.left_wheel.geometry()? })
+    }
+
+    /// The settings of the servo's driver.
+    #[must_use]
+    pub fn servo_settings(&self) -> ServoSettings {
+        let sonar = &self.localizer.sonar;
+        ServoSettings { pulses: self.servo_pulses, limits: sonar.servo, timing: sonar.timing.servo }
+    }
+
+    /// The settings of the ranger's driver.
+    #[must_use]
+    pub fn ranger_settings(&self) -> RangerSettings {
+        let RangerConfig { kind, temperature } = self.ranger;
+        // `check` refuses a temperature out of range; without it the driver uses room temperature.
+        let air = Air::at(temperature).unwrap_or(Air::ROOM);
+        RangerSettings { kind, air, cycle: self.localizer.sonar.timing.cycle }
+    }
+}
+
+fn require(field: &'static str, holds: bool, rule: &'static str) -> Result<(), RobotConfigError> {
+    if holds { Ok(()) } else { Err(RobotConfigError { field, rule }) }
+}

@@ -1,0 +1,176 @@
+//! A [`RobotConfig`] as the text of a robot file, which [`robot_file`](crate::robot_file) reads back.
+
+use sonarfix::aim::Policy;
+use sonarfix::config::PingSchedule;
+use sonarfix::units::{Duration, Radians};
+use sonarfix_hal::config::{RangerConfig, RobotConfig, WheelConfig};
+use sonarfix_hal::ranger::{PulseTiming, RangerKind};
+use sonarfix_hal::servo::MeasuredPulse;
+
+/// Writes the robot file of a configuration.
+#[must_use]
+pub fn text(config: &RobotConfig) -> String {
+    let tables = [drive(config), sonar(config), estimation(config)];
+    format!("format = 1\n{}", tables.concat())
+}
+
+fn drive(config: &RobotConfig) -> String {
+    let drive = &config.localizer.drive;
+    format!(
+        r#"
+[drive]
+track_width = "{} m"
+wheel_noise = "{} m/sqrt(m)"
+scale_walk = "{} /sqrt(m)"
+track_width_walk = "{} m/sqrt(m)"
+max_wheel_speed = "{} m/s"
+encoder_period = "{}"
+right_wheel = {}
+left_wheel = {}
+"#,
+        drive.track_width.0,
+        drive.wheel_noise.0.0,
+        drive.scale_walk.0,
+        drive.track_width_walk.0.0,
+        config.localizer.max_wheel_speed.0,
+        time(config.encoder_period),
+        wheel(config.right_wheel),
+        wheel(config.left_wheel),
+    )
+}
+
+fn sonar(config: &RobotConfig) -> String {
+    let sonar = &config.localizer.sonar;
+    let timing = &sonar.timing;
+    let schedule = match timing.schedule {
+        PingSchedule::Every(period) => time(period),
+        PingSchedule::AsFastAsPossible => "as fast as possible".to_owned(),
+    };
+    format!(
+        r#"
+[sonar]
+mount = ["{} m", "{} m"]
+servo = ["{} deg", "{} deg"]
+servo_pulses = [{}]
+servo_timing = {{ frame = "{}", sixty_degrees = "{}", settle = "{}" }}
+cone = "{} deg"
+min_range = "{} m"
+max_range = "{} m"
+noise = "{} m"
+noise_per_metre = "{} m/m"
+fix_period = "{schedule}"
+{}cycle = "{}"
+"#,
+        sonar.mount.x.0,
+        sonar.mount.y.0,
+        degrees(sonar.servo.0),
+        degrees(sonar.servo.1),
+        config.servo_pulses.map(pulse).join(", "),
+        time(timing.servo.frame),
+        time(timing.servo.sixty_degrees),
+        time(timing.servo.settle),
+        degrees(sonar.cone),
+        sonar.min_range.0,
+        sonar.max_range.0,
+        sonar.noise.floor.0,
+        sonar.noise.per_metre,
+        ranger(&config.ranger),
+        time(timing.cycle),
+    )
+}
+
+/// The tables of priors, gating and schedule.
+fn estimation(config: &RobotConfig) -> String {
+    let localizer = &config.localizer;
+    let (prior, gating, weights) = (&localizer.prior, &localizer.gating, &localizer.weights);
+    let echo = &localizer.echo;
+    let policy = match localizer.policy {
+        Policy::Nearest => "nearest",
+        Policy::Informative => "informative",
+    };
+    format!(
+        r#"
+[prior]
+scale_right = {}
+scale_left = {}
+track_width = "{} m"
+range_scale = {}
+
+[gating]
+confidence = {}
+inflation = "{} m"
+max_distance_without_fix = "{} m"
+max_position_deviation = "{} m"
+
+[echo]
+missed = {}
+short = {}
+long = {}
+free_path = "{} m"
+map_accuracy = "{} m"
+
+[schedule]
+policy = "{policy}"
+heading_weight = "{} m"
+wheels_weight = "{} m"
+"#,
+        prior.scale_right,
+        prior.scale_left,
+        prior.track_width.0,
+        prior.range_scale,
+        gating.confidence,
+        gating.inflation.0,
+        gating.max_distance_without_fix.0,
+        gating.max_position_deviation.0,
+        echo.missed,
+        echo.short,
+        echo.long,
+        echo.free_path.0,
+        echo.map_accuracy.0,
+        weights.heading.0,
+        weights.wheels.0,
+    )
+}
+
+fn wheel(wheel: WheelConfig) -> String {
+    let WheelConfig { travel_per_edge, is_mirrored } = wheel;
+    let mirrored = if is_mirrored { ", mirrored = true" } else { "" };
+    format!(r#"{{ travel_per_edge = "{} m"{mirrored} }}"#, travel_per_edge.0)
+}
+
+fn pulse(pulse: MeasuredPulse) -> String {
+    let MeasuredPulse { width, bearing } = pulse;
+    format!(r#"{{ width = "{}", bearing = "{} deg" }}"#, time(width), degrees(bearing))
+}
+
+/// The lines of the ranger's kind and its temperature.
+fn ranger(ranger: &RangerConfig) -> String {
+    let kind = match ranger.kind {
+        RangerKind::Pulse(timing) => pulse_ranger(&timing),
+        RangerKind::Srf { address } => format!(r#"{{ kind = "srf08", address = {address} }}"#),
+        RangerKind::Custom => r#""custom""#.to_owned(),
+    };
+    format!("ranger = {kind}\ntemperature = \"{} degC\"\n", ranger.temperature.0)
+}
+
+fn pulse_ranger(timing: &PulseTiming) -> String {
+    let PulseTiming { trigger, blanking, longest, silence, listen, stuck } = *timing;
+    let times = [
+        ("trigger", trigger),
+        ("blanking", blanking),
+        ("longest", longest),
+        ("silence", silence),
+        ("listen", listen),
+        ("stuck", stuck),
+    ];
+    let times = times.map(|(key, span)| format!(r#"{key} = "{}""#, time(span)));
+    format!(r#"{{ kind = "hc_sr04", {} }}"#, times.join(", "))
+}
+
+fn degrees(angle: Radians) -> f32 {
+    angle.0.to_degrees()
+}
+
+fn time(span: Duration) -> String {
+    format!("{} us", span.to_micros())
+}

@@ -1,0 +1,209 @@
+//! Executes requests: on a microcontroller, and on the PC for comparison.
+
+use sonarfix::aim::{Aim, NoAim};
+use sonarfix::localizer::{self, Fix, Localizer};
+use sonarfix::map::{Map, image};
+use sonarfix::units::Instant;
+use sonarfix_app::store::Store;
+use sonarfix_app::{App, Board, FlashContents, Link};
+use sonarfix_hal::robot::Report;
+use sonarfix_link::message::ResetCause;
+use sonarfix_link::{Command, CommandResult, Sender, baked, frame};
+
+use crate::board::{self, WiredDevices};
+use crate::message::{Answer, Begin, Request, RequestError, SessionKind, Snapshot};
+use crate::meter::Meter;
+use crate::ram_flash::{CAPACITY, RamFlash};
+use crate::wires::{Actuators, Sensors, Wires};
+
+/// A session: a localizer alone, or the shipped loop on simulated wires.
+#[expect(clippy::large_enum_variant, reason = "there is one of it, and no heap")]
+pub enum Session<'m> {
+    /// A localizer alone.
+    Localizer {
+        /// The localizer.
+        localizer: Localizer<'m>,
+        /// Its last aim.
+        aim: Option<Aim>,
+    },
+    /// The shipped loop and the drivers.
+    Loop(LoopSession<'m>),
+}
+
+/// The application with its devices.
+pub struct LoopSession<'m> {
+    app: App<'m, RamFlash>,
+    wires: &'m Wires,
+    devices: WiredDevices<'m>,
+}
+
+impl<'m> Session<'m> {
+    /// Begins a session; returns what the first polls of a loop did to the devices.
+    ///
+    /// # Errors
+    /// [`RequestError`], by the cause.
+    pub fn begin(
+        begin: &Begin,
+        map: &'m [u8],
+        wires: &'m Wires,
+    ) -> Result<(Self, Actuators), RequestError> {
+        if begin.kind == SessionKind::Localizer {
+            return Ok((Self::localizer_only(begin, map)?, Actuators::default()));
+        }
+        let (robot, actuators) = LoopSession::begin(begin, map, wires)?;
+        Ok((Self::Loop(robot), actuators))
+    }
+
+    /// Begins a session of a localizer alone.
+    ///
+    /// # Errors
+    /// [`RequestError`], by the cause.
+    pub fn localizer_only(begin: &Begin, map: &'m [u8]) -> Result<Self, RequestError> {
+        let map = Map::read(map).map_err(|_| RequestError::Map)?;
+        let localizer = Localizer::new(begin.config.localizer, map, begin.start, begin.at);
+        let localizer = localizer.map_err(|_| RequestError::Start)?;
+        Ok(Self::Localizer { localizer, aim: None })
+    }
+
+    /// Executes a request; returns the answer and the number of instructions.
+    pub fn execute(&mut self, request: &Request, meter: &mut impl Meter) -> (Answer, u32) {
+        match (self, request) {
+            (Self::Localizer { localizer, aim }, request) => call(localizer, aim, request, meter),
+            (Self::Loop(robot), Request::Poll(sensors)) => robot.poll(sensors, meter),
+            (Self::Loop(_), _) => (Answer::Refused(RequestError::OutOfPlace), 0),
+        }
+    }
+
+    /// The localizer; `None` if the loop does not run.
+    #[must_use]
+    pub fn localizer(&self) -> Option<&Localizer<'m>> {
+        match self {
+            Self::Localizer { localizer, .. } => Some(localizer),
+            Self::Loop(robot) => robot.app.localizer(),
+        }
+    }
+
+    /// What the last poll of a loop did.
+    pub fn report(&self) -> Report {
+        match self {
+            Self::Localizer { .. } => Report::default(),
+            Self::Loop(robot) => robot.app.report().copied().unwrap_or_default(),
+        }
+    }
+}
+
+/// Calls the localizer.
+fn call(
+    localizer: &mut Localizer,
+    aim: &mut Option<Aim>,
+    request: &Request,
+    meter: &mut impl Meter,
+) -> (Answer, u32) {
+    match *request {
+        Request::Odometry(at, travel) => {
+            let mut result = Ok(());
+            let cost = meter.measure(|| result = localizer.odometry(at, travel));
+            (Answer::Odometry(result, Snapshot::of(localizer)), cost)
+        }
+        Request::Aim => {
+            let mut result = Err(NoAim::NoWall);
+            let cost = meter.measure(|| result = localizer.aim());
+            *aim = result.ok();
+            (Answer::Aim(result), cost)
+        }
+        Request::Fix(range) => {
+            let Some(aim) = aim else { return (Answer::Refused(RequestError::OutOfPlace), 0) };
+            let mut fix = Fix::Refused(localizer::Refusal::NoEcho);
+            let cost = meter.measure(|| fix = localizer.fix(aim, range));
+            (Answer::Fix(fix, Snapshot::of(localizer)), cost)
+        }
+        Request::SkipPing => {
+            let cost = meter.measure(|| localizer.skip());
+            (Answer::Skipped(localizer.health()), cost)
+        }
+        Request::Begin(..) | Request::Poll(_) | Request::End => {
+            (Answer::Refused(RequestError::OutOfPlace), 0)
+        }
+    }
+}
+
+impl<'m> LoopSession<'m> {
+    /// Starts the application, sets its pose, and starts the loop.
+    fn begin(
+        begin: &Begin,
+        image: &'m [u8],
+        wires: &'m Wires,
+    ) -> Result<(Self, Actuators), RequestError> {
+        let Begin { at, start, config, .. } = *begin;
+        config.check().map_err(|_| RequestError::Start)?;
+        let devices = board::devices(&config, wires).map_err(|_| RequestError::Board)?;
+        let board = Board { firmware: [0; 3], reset: ResetCause::PowerOn, resets: 0 };
+        let mut buffer = [0; baked::LENGTH_MAX];
+        let config = baked::write(&config, &mut buffer).map_err(|_| RequestError::Start)?;
+        let flash = FlashContents::read(image, config);
+        flash.map.map_err(|_| RequestError::Map)?;
+        let region = 0..u32::try_from(CAPACITY).unwrap_or(0);
+        let store = Store::new(RamFlash::default(), region).map_err(|_| RequestError::Board)?;
+        let app = App::new(board, flash, store, at);
+        let mut robot = Self { app, wires, devices };
+        robot.send(at, &Command::SetPose(start))?;
+        robot.send(at, &Command::Start)?;
+        Ok((robot, wires.take()))
+    }
+
+    /// Sends a command over the link.
+    fn send(&mut self, at: Instant, command: &Command) -> Result<(), RequestError> {
+        let mut buffer = frame::EMPTY;
+        let mut link = LinkBuffer::new(Sender::new().frame(command, &mut buffer));
+        let polled = self.app.poll(at, &mut self.devices, &mut link);
+        if polled.answered == Some(CommandResult::Done) { Ok(()) } else { Err(RequestError::Start) }
+    }
+
+    fn poll(&mut self, sensors: &Sensors, meter: &mut impl Meter) -> (Answer, u32) {
+        self.wires.apply(sensors);
+        let mut link = LinkBuffer::new(&[]);
+        let Self { app, devices, .. } = self;
+        let cost = meter.measure(|| {
+            // What it did outside the loop is visible in the telemetry.
+            let _ = app.poll(sensors.at, devices, &mut link);
+        });
+        let is_active = self.app.report().is_some_and(|report| !report.is_empty());
+        let snapshot = self.app.localizer().filter(|_| is_active).map(Snapshot::of);
+        let (actuators, telemetry) = (self.wires.take(), image::checksum(link.sent()));
+        (Answer::Polled { actuators, snapshot, telemetry }, cost)
+    }
+}
+
+/// Bytes that one poll may send: the size of a board's queue.
+const CAPACITY_OF_LINK: usize = 512;
+
+/// The robot's link: the bytes to receive, and those that were sent.
+struct LinkBuffer<'b> {
+    bytes: core::slice::Iter<'b, u8>,
+    sent: [u8; CAPACITY_OF_LINK],
+    length: usize,
+}
+
+impl<'b> LinkBuffer<'b> {
+    fn new(bytes: &'b [u8]) -> Self {
+        Self { bytes: bytes.iter(), sent: [0; CAPACITY_OF_LINK], length: 0 }
+    }
+
+    fn sent(&self) -> &[u8] {
+        self.sent.get(..self.length).unwrap_or_default()
+    }
+}
+
+impl Link for LinkBuffer<'_> {
+    fn receive(&mut self) -> Option<u8> {
+        self.bytes.next().copied()
+    }
+
+    fn send(&mut self, frame: &[u8]) {
+        let end = self.length + frame.len();
+        if let Some(room) = self.sent.get_mut(self.length..end) {
+            room.copy_from_slice(frame);
+            self.length = end;
+        }
+    }
+}

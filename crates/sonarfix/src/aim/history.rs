@@ -1,0 +1,141 @@
+//! What previous pings revealed: the last bearing, the turn rate of the robot, and for each recent wall
+//! whether an unmapped object occludes it and when its range was last used.
+//!
+//! Occlusion is a hidden Markov state of a wall: each ping updates its probability by the
+//! [echo model](crate::echo), and it returns to the prior with the distance of the foot along the wall
+//! and with time.
+//!
+//! # Non-finite policy
+//! Bearing, range and foot come from a finite state. For a wall far beyond any range the square of the
+//! distance may be infinite; the probability is then the prior.
+
+use crate::echo::EchoParameters;
+use crate::map::WallId;
+use crate::units::{Instant, Metres, Radians, seconds};
+
+/// Number of walls that are stored; a further one replaces the one closest to the prior.
+const RECENT_WALLS: usize = 8;
+/// Share of the probability before a ping that remains after it: objects return echoes now and then,
+/// and at the end of a cupboard one range may be the wall's.
+const PERSISTENCE: f32 = 0.8;
+/// Limits of the probability: the only wall is measured however often it fails.
+const MAX_OCCLUSION: f32 = 0.95;
+/// Distance of the foot along the wall that halves the deviation from the prior: half the width of a
+/// chair.
+const HALVED_WITHIN: Metres = Metres(0.25);
+/// Time in seconds that halves the deviation from the prior: people and chairs move.
+const HALVED_AFTER: f32 = 5.0;
+
+/// Time constant of the turn rate, seconds: a single step between two close instants is quantised by
+/// whole encoder ticks.
+const TURN_RATE_TIME: f32 = 0.05;
+
+/// A wall at the last ping at it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct RecentWall {
+    wall: WallId,
+    /// Place of the foot along the wall.
+    foot: Metres,
+    at: Instant,
+    /// Probability that it was occluded, less the prior at its range.
+    above_prior: f32,
+    /// Reading of the odometer when a range of the wall was last used.
+    used_at: Option<Metres>,
+}
+
+impl RecentWall {
+    fn above_prior(&self, foot: Metres, now: Instant) -> f32 {
+        let distance = (foot - self.foot).0 / HALVED_WITHIN.0;
+        let age = now.checked_duration_since(self.at).map_or(0.0, seconds);
+        self.above_prior / ((1.0 + distance * distance) * (1.0 + age / HALVED_AFTER))
+    }
+}
+
+/// The previous ping.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct LastPing {
+    pub wall: WallId,
+    pub bearing: Radians,
+    pub range: Metres,
+}
+
+/// The history of pings.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct History {
+    pub(super) last: Option<LastPing>,
+    /// Radians per second.
+    pub(super) turn_rate: f32,
+    /// Distance travelled, metres.
+    odometer: Metres,
+    recent: [Option<RecentWall>; RECENT_WALLS],
+}
+
+impl History {
+    /// Records a turn of the robot over a time in seconds.
+    pub fn record_turn(&mut self, turn: Radians, seconds: f32) {
+        self.turn_rate = (self.turn_rate * TURN_RATE_TIME + turn.0) / (TURN_RATE_TIME + seconds);
+    }
+
+    /// Records a distance travelled.
+    pub fn record_distance(&mut self, distance: Metres) {
+        self.odometer = self.odometer + distance;
+    }
+
+    /// Records where the sonar pointed.
+    pub fn record_bearing(&mut self, wall: WallId, bearing: Radians, range: Metres) {
+        self.last = Some(LastPing { wall, bearing, range });
+    }
+
+    /// Records that a wall with its foot at `foot` and at `range` is occluded with this probability, and
+    /// whether its range was used.
+    pub fn record_echo(
+        &mut self,
+        parameters: &EchoParameters,
+        (wall, foot, range): (WallId, Metres, Metres),
+        (occluded, is_used): (f32, bool),
+        now: Instant,
+    ) {
+        let persistent = PERSISTENCE * self.occlusion(parameters, wall, foot, range, now);
+        let occluded = if occluded > persistent { occluded } else { persistent };
+        let occluded = if occluded < MAX_OCCLUSION { occluded } else { MAX_OCCLUSION };
+        let before = self.find(wall).and_then(|recent| recent.used_at);
+        let used_at = if is_used { Some(self.odometer) } else { before };
+        let above_prior = occluded - parameters.prior_occlusion(range);
+        if let Some(slot) = self.slot_for(wall, now) {
+            *slot = Some(RecentWall { wall, foot, at: now, above_prior, used_at });
+        }
+    }
+
+    /// Probability that an unmapped object occludes a wall with its foot at `foot` and at `range`.
+    pub fn occlusion(
+        &self,
+        parameters: &EchoParameters,
+        wall: WallId,
+        foot: Metres,
+        range: Metres,
+        now: Instant,
+    ) -> f32 {
+        let above = self.find(wall).map_or(0.0, |recent| recent.above_prior(foot, now));
+        let occlusion = parameters.prior_occlusion(range) + above;
+        if occlusion > 0.0 { occlusion } else { 0.0 }
+    }
+
+    /// Distance travelled since a range of the wall was last used.
+    pub fn travelled_since(&self, wall: WallId) -> Option<Metres> {
+        Some(self.odometer - self.find(wall)?.used_at?)
+    }
+
+    fn find(&self, wall: WallId) -> Option<&RecentWall> {
+        self.recent.iter().flatten().find(|recent| recent.wall == wall)
+    }
+
+    /// The slot of the wall, a free one, or the one closest to the prior now.
+    fn slot_for(&mut self, wall: WallId, now: Instant) -> Option<&mut Option<RecentWall>> {
+        let value = |slot: &Option<RecentWall>| match slot {
+            Some(recent) if recent.wall == wall => -2.0,
+            Some(recent) => recent.above_prior(recent.foot, now).abs(),
+            None => -1.0,
+        };
+        self.recent.iter_mut().reduce(|a, b| if value(b) < value(a) { b } else { a })
+    }
+}

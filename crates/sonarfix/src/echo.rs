@@ -1,0 +1,323 @@
+//! The echo model: the probability density p(z | pose, beam) of what one ping returns
+//! (`docs/model.md`, "Echo model", eqs. 15 and 16).
+//!
+//! A ping at a wall returns the range of the wall, or clutter: an object that is not in the map, a
+//! spurious short or long range, or no echo. The mixture has four users:
+//!
+//! | user | quantity |
+//! |---|---|
+//! | update ([`Ekf`](crate::ekf::Ekf)) | probability that the echo is the wall's |
+//! | planner ([`aim`](crate::aim)) | probability that the wall answers |
+//! | health ([`health`](crate::health)) | log-likelihood ratio of a wrong pose against the right one |
+//! | history of pings | probability that the wall is occluded by an unmapped object |
+//!
+//! # Non-finite policy
+//! The parameters are checked once; expected range and innovation variance come from a valid filter,
+//! the measured range is finite. The density of clutter is positive, so that no quotient is 0/0; if
+//! all clutter is configured away and the echo is too far off to be the wall's, it is not used.
+
+use crate::units::{Metres, SquareMetres};
+
+/// Parameters of clutter: of the sensor, of the unmapped objects around it, and of the map.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct EchoParameters {
+    /// Probability that a wall within range, square to the beam, returns no echo.
+    pub missed: f32,
+    /// Probability of a spurious range that is shorter than the wall's.
+    pub short: f32,
+    /// Probability of a spurious range that is longer: by way of two walls, or cross-talk.
+    pub long: f32,
+    /// Range at which every second beam meets an object that is not in the map. Zero: there are no
+    /// such objects.
+    pub free_path: Metres,
+    /// Standard deviation of the place of a wall in the map. It is common to all ranges to one wall
+    /// from one place, so that repeated pings do not average it away.
+    pub map_accuracy: Metres,
+}
+
+impl EchoParameters {
+    /// No clutter and an exact map: every echo is the wall's.
+    pub const NONE: Self = Self {
+        missed: 0.0,
+        short: 0.0,
+        long: 0.0,
+        free_path: Metres(0.0),
+        map_accuracy: Metres(0.0),
+    };
+
+    /// An HC-SR04 in a furnished room: assumed, no recordings.
+    pub const HC_SR04: Self = Self {
+        missed: 0.03,
+        short: 0.02,
+        long: 0.02,
+        free_path: Metres(10.0),
+        map_accuracy: Metres(0.0),
+    };
+
+    /// LEGO NXT: shares of its recorded sweeps within 20° of the normal (`docs/sonar-model.md`),
+    /// averaged over the ranges.
+    pub const NXT: Self = Self { missed: 0.08, short: 0.05, long: 0.03, ..Self::HC_SR04 };
+
+    /// Devantech SRF08: assumed like the HC-SR04.
+    pub const SRF08: Self = Self::HC_SR04;
+
+    /// `MaxBotix` LV-MaxSonar-EZ: assumed like the HC-SR04.
+    pub const LV_MAXSONAR: Self = Self::HC_SR04;
+
+    /// Polaroid 6500: assumed like the HC-SR04, with fewer misses.
+    pub const POLAROID_6500: Self = Self { missed: 0.02, ..Self::HC_SR04 };
+
+    /// Prior probability that an unmapped object stands before a wall at this range.
+    pub(crate) fn prior_occlusion(&self, range: Metres) -> f32 {
+        if self.free_path > Metres(0.0) { range.0 / (range.0 + self.free_path.0) } else { 0.0 }
+    }
+
+    /// Variance of the map error in a range, if the last range to the same wall was used `travelled`
+    /// metres ago; `None` if there was none.
+    ///
+    /// The error is a first-order Gauss–Markov process of the distance. A sequence of n ranges with
+    /// correlation ρ = exp(−s/L) holds as much information as n independent ones whose variance is
+    /// larger by (1 + ρ)/(1 − ρ) = coth(s/2L); √(1 + (2L/s)²) is within 10 % of it.
+    pub(crate) fn map_variance(&self, travelled: Option<Metres>) -> f32 {
+        let variance = self.map_accuracy.0 * self.map_accuracy.0;
+        let Some(travelled) = travelled else {
+            return variance;
+        };
+        let least = 2.0 * MAP_CORRELATION.0 / MAX_REPETITION;
+        let distance = if travelled.0 > least { travelled.0 } else { least };
+        let ratio = 2.0 * MAP_CORRELATION.0 / distance;
+        variance * libm::sqrtf(1.0 + ratio * ratio)
+    }
+}
+
+impl Default for EchoParameters {
+    fn default() -> Self {
+        Self::HC_SR04
+    }
+}
+
+/// Distance over which the error of a wall in the map is correlated. A wall fitted to a SLAM map
+/// deviates from a straight line over the width of doors and pillars.
+const MAP_CORRELATION: Metres = Metres(1.0);
+/// Limit of the factor on the variance of the map error.
+const MAX_REPETITION: f32 = 50.0;
+
+/// Share of pings without an echo if an unmapped object occludes the wall: it may absorb or deflect.
+const NO_ECHO_OCCLUDED: f32 = 0.2;
+/// Share of echoes from beyond the wall if it is occluded: by way of other walls.
+const BEYOND_OCCLUDED: f32 = 0.05;
+/// Share of pings without an echo if the beam is not square to the wall, or its foot not on it.
+const NO_ECHO_OFF_WALL: f32 = 0.4;
+/// Share of pings without an echo at a wrong pose.
+const NO_ECHO_WRONG_POSE: f32 = 0.3;
+/// Share of pings that agree with a wrong pose by chance: another wall at that range, or an error along
+/// the wall.
+const AGREEMENT_WRONG_POSE: f32 = 0.3;
+/// Smallest span of ranges over which clutter is distributed.
+const MIN_SPAN: f32 = 0.05;
+
+/// What is expected of one ping at a wall.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ExpectedEcho {
+    /// h, the range of the wall.
+    pub range: Metres,
+    /// S, the variance of the innovation.
+    pub variance: SquareMetres,
+    /// g: probability that the foot lies on the wall, its range is within the limits of the sonar and the
+    /// beam is square.
+    pub geometry: f32,
+    /// o: probability that an unmapped object occludes the wall.
+    pub occluded: f32,
+    /// The shortest and the longest range that the sonar reports.
+    pub limits: (Metres, Metres),
+}
+
+/// The explanation of what one ping returned.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Explanation {
+    /// β: probability that the echo is the wall's.
+    pub association: f32,
+    /// Probability that an unmapped object occluded the wall.
+    pub occluded: f32,
+    /// Logarithm of the likelihood of a wrong pose over that of the right one.
+    pub evidence: f32,
+}
+
+/// Densities of one echo, or probabilities of no echo, by hypothesis.
+struct Densities {
+    /// The echo of the wall.
+    wall: f32,
+    /// Clutter, with the wall visible.
+    clutter: f32,
+    /// Anything, with the wall occluded.
+    occluded: f32,
+    /// Anything, at a wrong pose.
+    wrong_pose: f32,
+}
+
+impl ExpectedEcho {
+    // ===== Eqs. (15) and (16): p(z) and β; eq. (23): the log-likelihood ratio =====
+    /// Explains an echo at this range, or that there was none.
+    pub fn explain(&self, parameters: &EchoParameters, echo: Option<Metres>) -> Explanation {
+        let d = match echo {
+            Some(range) => self.of_echo(parameters, range.0 - self.range.0),
+            None => self.of_silence(parameters),
+        };
+        let o = self.occluded;
+        let wall = (1.0 - o) * d.wall;
+        let occluded = o * d.occluded;
+        let total = wall + (1.0 - o) * d.clutter + occluded;
+        if total <= 0.0 {
+            // No clutter is configured, and the echo is too far off to be the wall's.
+            return Explanation { association: 0.0, occluded: o, evidence: MAX_EVIDENCE };
+        }
+        let ratio = AGREEMENT_WRONG_POSE + (1.0 - AGREEMENT_WRONG_POSE) * (d.wrong_pose / total);
+        let evidence = if ratio < MAX_RATIO { libm::logf(ratio) } else { MAX_EVIDENCE };
+        Explanation { association: wall / total, occluded: occluded / total, evidence }
+    }
+
+    fn of_echo(&self, parameters: &EchoParameters, innovation: f32) -> Densities {
+        let EchoParameters { missed, short, long, .. } = *parameters;
+        let (g, s) = (self.geometry, self.variance.0);
+        let normal =
+            ONE_OVER_ROOT_TWO_PI / libm::sqrtf(s) * libm::expf(-0.5 * innovation * innovation / s);
+        let (nearest, farthest) = (self.limits.0.0, self.limits.1.0);
+        let everywhere = 1.0 / (farthest - nearest);
+        let (spurious, by_object) = if innovation < 0.0 {
+            let per_metre = 1.0 / at_least(self.range.0 - nearest, MIN_SPAN);
+            (short * per_metre, (1.0 - NO_ECHO_OCCLUDED - BEYOND_OCCLUDED) * per_metre)
+        } else {
+            let per_metre = 1.0 / at_least(farthest - self.range.0, MIN_SPAN);
+            (long * per_metre, BEYOND_OCCLUDED * per_metre)
+        };
+        Densities {
+            wall: g * (1.0 - missed - short - long) * normal,
+            clutter: g * spurious + (1.0 - g) * (1.0 - NO_ECHO_OFF_WALL) * everywhere,
+            occluded: by_object,
+            wrong_pose: (1.0 - NO_ECHO_WRONG_POSE) * everywhere,
+        }
+    }
+
+    fn of_silence(&self, parameters: &EchoParameters) -> Densities {
+        let g = self.geometry;
+        Densities {
+            wall: 0.0,
+            clutter: g * parameters.missed + (1.0 - g) * NO_ECHO_OFF_WALL,
+            occluded: NO_ECHO_OCCLUDED,
+            wrong_pose: NO_ECHO_WRONG_POSE,
+        }
+    }
+}
+
+const ONE_OVER_ROOT_TWO_PI: f32 = 0.398_942_3;
+
+/// Largest evidence of one ping, so that a single one does not decide.
+const MAX_EVIDENCE: f32 = 4.0;
+/// exp([`MAX_EVIDENCE`]).
+const MAX_RATIO: f32 = 54.598_15;
+
+/// The larger of two numbers. `f32::max` treats +0 and −0 differently from build to build.
+fn at_least(value: f32, least: f32) -> f32 {
+    if value > least { value } else { least }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    prop_compose! {
+        fn any_parameters()(
+            missed in 0.0_f32..0.3, short in 0.0_f32..0.3, long in 0.0_f32..0.3, path in 0.5_f32..20.0,
+        ) -> EchoParameters {
+            let map_accuracy = Metres(0.01);
+            EchoParameters { missed, short, long, free_path: Metres(path), map_accuracy }
+        }
+    }
+
+    prop_compose! {
+        fn any_expectation()(
+            range in 0.3_f32..3.5, sigma in 0.003_f32..0.5, geometry in 0.05_f32..1.0, occluded in 0.0_f32..0.95,
+        ) -> ExpectedEcho {
+            let variance = SquareMetres(sigma * sigma);
+            let limits = (Metres(0.1), Metres(4.0));
+            ExpectedEcho { range: Metres(range), variance, geometry, occluded, limits }
+        }
+    }
+
+    /// Eq. (15) in `f64`: the shares of wall, clutter and occluding object, and the wrong pose.
+    fn densities(e: &ExpectedEcho, p: &EchoParameters, echo: Option<Metres>) -> [f64; 4] {
+        let (g, o) = (f64::from(e.geometry), f64::from(e.occluded));
+        let [missed, short, long] = [p.missed, p.short, p.long].map(f64::from);
+        let (h, s) = (f64::from(e.range.0), f64::from(e.variance.0));
+        let Some(z) = echo else {
+            return [0.0, (1.0 - o) * (g * missed + (1.0 - g) * 0.4), o * 0.2, 0.3];
+        };
+        let nu = f64::from(z.0) - h;
+        let normal = (-0.5 * nu * nu / s).exp() / (core::f64::consts::TAU * s).sqrt();
+        let span = if nu < 0.0 { h - 0.1 } else { 4.0 - h };
+        let (spurious, object) = if nu < 0.0 { (short, 0.75) } else { (long, 0.05) };
+        let everywhere = 1.0 / 3.9;
+        [
+            (1.0 - o) * g * (1.0 - missed - short - long) * normal,
+            (1.0 - o) * (g * spurious / span + (1.0 - g) * 0.6 * everywhere),
+            o * object / span,
+            0.7 * everywhere,
+        ]
+    }
+
+    proptest! {
+        /// The probabilities of wall, clutter and object sum to one, and are those of eq. (15).
+        #[test]
+        fn association_probabilities_sum_to_one(
+            expected in any_expectation(), parameters in any_parameters(), echo in proptest::option::of(0.11_f32..3.99),
+        ) {
+            let echo = echo.map(Metres);
+            let [wall, clutter, occluded, wrong] = densities(&expected, &parameters, echo);
+            let total = wall + clutter + occluded;
+            prop_assume!(total > 1e-6);
+            let found = expected.explain(&parameters, echo);
+            let rest = clutter / total;
+            let sum = f64::from(found.association) + f64::from(found.occluded) + rest;
+            prop_assert!((sum - 1.0).abs() < 1e-4, "{sum}");
+            prop_assert!((f64::from(found.association) - wall / total).abs() < 1e-4);
+            let evidence = (0.3 + 0.7 * wrong / total).ln().min(4.0);
+            prop_assert!((f64::from(found.evidence) - evidence).abs() < 1e-3);
+            prop_assert!(found.evidence >= -1.205 && found.evidence <= MAX_EVIDENCE);
+        }
+
+        /// The information of repeated ranges: n of them with correlation ρ hold as much as the batch.
+        #[test]
+        fn map_variance_is_that_of_a_correlated_sequence(spacing in 0.05_f32..5.0) {
+            let parameters = EchoParameters { map_accuracy: Metres(0.01), ..EchoParameters::NONE };
+            let rho = (-f64::from(spacing)).exp();
+            let exact = 1e-4 * (1.0 + rho) / (1.0 - rho);
+            let found = f64::from(parameters.map_variance(Some(Metres(spacing))));
+            prop_assert!((found / exact - 1.0).abs() < 0.1, "{found} {exact}");
+            prop_assert!(found >= f64::from(parameters.map_variance(None)) * 0.999);
+        }
+    }
+
+    #[test]
+    fn a_repeated_wall_contradicts_as_far_as_it_is_not_known_to_be_occluded() {
+        let parameters = EchoParameters::HC_SR04;
+        let expected = ExpectedEcho {
+            range: Metres(2.0),
+            variance: SquareMetres(1e-4),
+            geometry: 1.0,
+            occluded: parameters.prior_occlusion(Metres(2.0)),
+            limits: (Metres(0.05), Metres(4.0)),
+        };
+        let short = Some(Metres(1.0));
+        let first = expected.explain(&parameters, short);
+        assert!(first.evidence > 0.5 && first.occluded > 0.8, "{first:?}");
+        let again = ExpectedEcho { occluded: first.occluded, ..expected };
+        assert!(again.explain(&parameters, short).evidence < 0.2);
+        // A range that is too long is evidence, however well the wall is known to be occluded.
+        assert!(again.explain(&parameters, Some(Metres(3.0))).evidence > 0.5);
+    }
+}

@@ -1,0 +1,25 @@
+//! Limits of the numbers that the filter computes with, and branch-free comparisons.
+
+/// The largest variance (m², rad², dimensionless): the square of 1,000 km.
+const MAX_VARIANCE: f32 = 1e12;
+
+/// Whether 0 ≤ `value` ≤ `limit`; false for NaN.
+///
+/// Compared as integers, the bit patterns of negative numbers and of NaN exceed that of every
+/// limit in use.
+pub(crate) fn is_within(value: f32, limit: f32) -> bool {
+    value.to_bits() <= limit.to_bits()
+}
+
+/// Whether a variance is finite, not negative and at most [`MAX_VARIANCE`].
+pub(crate) fn is_valid_variance(variance: f32) -> bool {
+    is_within(variance, MAX_VARIANCE)
+}
+
+/// The larger of the value and zero.
+///
+/// Compared as integers, the bit patterns of negative numbers are negative; an integer comparison
+/// does not have to move the flags of the floating-point unit.
+pub(crate) fn positive_part(value: f32) -> f32 {
+    f32::from_bits(value.to_bits().cast_signed().max(0).cast_unsigned())
+}

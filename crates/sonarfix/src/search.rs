@@ -1,0 +1,568 @@
+//! Global localization: finds the pose of a robot that was set down anywhere, from what it measures
+//! while it drives (`docs/search.md`).
+//!
+//! A window of novel pings in the odometry frame holds a few straight lines. Pairs of lines against
+//! pairs of walls give pose candidates (Lim and Leonard 2000; Arras et al. 2002). Each is scored on all
+//! pings, refined by Gauss–Newton steps and kept in a bank of hypotheses, one per mode (Jensfelt and
+//! Kristensen 2001). A global check along every wall precedes every unique answer.
+//!
+//! The search is sans-IO and works in slices: [`Search::poll`] does as many evaluations as it is
+//! given. Memory is fixed.
+//!
+//! # Non-finite policy
+//! Travel, bearings and ranges that are not finite are refused and change nothing.
+
+mod bank;
+mod candidates;
+mod lines;
+mod refine;
+mod score;
+mod trial;
+mod vector;
+mod window;
+
+use bank::{Bank, Entry, moved};
+use candidates::{AlongWalls, Generated, Pairs, Placement, make_a_pair};
+use lines::{Line, Lines, TILTS};
+use score::EchoModel;
+use trial::{Trial, Verdict, count};
+use vector::Vector;
+use window::Window;
+
+use crate::config::Sonar;
+use crate::map::{Map, WallId};
+use crate::pose::Pose;
+use crate::trig::sin_cos;
+use crate::units::{Metres, Radians};
+
+/// What the search is tuned with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SearchParameters {
+    /// A ping is novel if none was sent from within 30 cm in a direction within this angle. The
+    /// plain sweep has steps of this angle.
+    pub novel_angle: Radians,
+    /// The same before the robot has driven 30 cm: with nothing else to measure, more pings help.
+    pub novel_angle_at_rest: Radians,
+    /// Deviation of the odometry's heading drift per metre of travel.
+    pub drift: Radians,
+    /// Hypotheses within this log-likelihood of the best are answers, too.
+    pub margin: f32,
+    /// The mean log-likelihood per ping, relative to echoes anywhere, of a hypothesis that fits.
+    pub least_fit: f32,
+    /// Novel pings during which one hypothesis must be the only answer before it is unique.
+    pub persistence: u16,
+}
+
+impl Default for SearchParameters {
+    fn default() -> Self {
+        Self {
+            novel_angle: Radians::from_degrees(20.0),
+            novel_angle_at_rest: Radians::from_degrees(3.8),
+            drift: Radians::from_degrees(2.0),
+            margin: 12.0,
+            least_fit: 0.3,
+            persistence: 40,
+        }
+    }
+}
+
+/// A pose that the pings fit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hypothesis {
+    /// The robot's pose now.
+    pub pose: Pose,
+    /// The larger axis of the position's error ellipse, one deviation.
+    pub position_deviation: Metres,
+    /// One deviation of the heading.
+    pub heading_deviation: Radians,
+    /// Mean log-likelihood per ping, relative to echoes anywhere.
+    pub fit: f32,
+    /// The share of the pings with an echo that a wall or corner of the map explains.
+    pub explained: f32,
+    /// Heading drift of the odometry, radians per metre of travel.
+    pub drift: f32,
+}
+
+/// What the search found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Answer {
+    /// No cycle is complete, or too few pings are in the window.
+    Searching,
+    /// So many hypotheses fit, the first ones of [`Search::hypotheses`].
+    Several(usize),
+    /// The position along this wall is undetermined.
+    Along {
+        /// The wall.
+        wall: WallId,
+        /// One deviation of the position along it.
+        extent: Metres,
+    },
+    /// No pose of the map fits.
+    Nowhere,
+    /// One pose fits, and the global check found no other.
+    Unique(Hypothesis),
+}
+
+/// The stage of a cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Phase {
+    /// Lines are fitted to the pings.
+    Lines,
+    /// The hypotheses of the bank are refined.
+    Bank,
+    /// Pairs of lines are compared with pairs of walls.
+    Pairs,
+    /// Lines are moved along every wall.
+    GlobalCheck,
+}
+
+/// Why an input is refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct NotFinite;
+
+impl core::fmt::Display for NotFinite {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("a travel, bearing or range is NaN or infinite")
+    }
+}
+
+impl core::error::Error for NotFinite {}
+
+/// Fewer pings than these are no window to search with.
+const LEAST_PINGS: usize = 12;
+/// Pairs of lines that every cycle tries, and those that take turns.
+const BEST_PAIRS: u8 = 4;
+const OTHER_PAIRS: u8 = 4;
+/// A global check is made when a hypothesis has persisted, and at least once in so many cycles.
+const CHECK_EVERY: u32 = 4;
+/// Lines that are moved along every wall.
+const CHECKED_LINES: u8 = 2;
+/// A position with a larger deviation than this is undetermined, metres.
+const UNDETERMINED: f32 = 0.3;
+
+/// Where a cycle stands.
+#[derive(Debug, Clone, Copy)]
+enum Task {
+    Vote { ping: u16, tilt: u8 },
+    Fit { line: u8 },
+    Bank,
+    Pairs { pair: u8, pairs: Pairs },
+    Along { line: u8, along: AlongWalls },
+}
+
+/// The search for the pose.
+///
+/// ```
+/// use sonarfix::config::Config;
+/// use sonarfix::map::{Map, Wall};
+/// use sonarfix::pose::Point;
+/// use sonarfix::search::{Answer, Search, SearchParameters};
+/// use sonarfix::units::{Metres, Radians};
+/// let walls = [Wall::new(Point::new(0.0, 0.0), Point::new(4.0, 0.0))?];
+/// let config = Config::for_track_width(Metres(0.16));
+/// let mut search: Search =
+///     Search::new(&config.sonar, Map::new(&walls), SearchParameters::default());
+/// search.odometry(Metres(0.01), Radians(0.0))?;
+/// search.ping(search.aim(), Some(Metres(1.0)))?;
+/// search.poll(100);
+/// assert_eq!(search.answer(), Answer::Searching);
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Search<'m, const PINGS: usize = 96, const HYPOTHESES: usize = 8> {
+    parameters: SearchParameters,
+    echoes: EchoModel<'m>,
+    mount: Vector,
+    servo: (f32, f32),
+    sweep: Sweep,
+    window: Window<PINGS>,
+    lines: Lines,
+    bank: Bank<HYPOTHESES>,
+    task: Task,
+    trial: Option<Trial>,
+    cycles: u32,
+    /// Novel pings when the last cycle ended.
+    taken: u16,
+    is_check_due: bool,
+    answer: Decision,
+}
+
+/// The plain sweep of the servo.
+#[derive(Debug, Clone, Copy)]
+struct Sweep {
+    bearing: f32,
+    step: f32,
+}
+
+/// The answer without the poses, which follow the odometry.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Decision {
+    Searching,
+    Several(usize),
+    Along(WallId, f32),
+    Nowhere,
+    Unique(Entry),
+}
+
+impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHESES> {
+    /// A search without a ping yet.
+    #[must_use]
+    pub fn new(sonar: &Sonar, map: Map<'m>, parameters: SearchParameters) -> Self {
+        let (right, left) = (sonar.servo.0.0, sonar.servo.1.0);
+        Self {
+            parameters,
+            echoes: EchoModel::new(map, sonar.cone, sonar.max_range),
+            mount: sonar.mount.into(),
+            servo: (right, left),
+            sweep: Sweep { bearing: right, step: parameters.novel_angle.0 },
+            window: Window::new(),
+            lines: Lines::new(sonar.cone),
+            bank: Bank::new(),
+            task: Task::Vote { ping: 0, tilt: 0 },
+            trial: None,
+            cycles: 0,
+            taken: 0,
+            is_check_due: true,
+            answer: Decision::Searching,
+        }
+    }
+
+    /// Moves the robot by a distance along its mid-heading and a turn.
+    ///
+    /// # Errors
+    /// [`NotFinite`]; nothing changes.
+    pub fn odometry(&mut self, advance: Metres, turn: Radians) -> Result<(), NotFinite> {
+        if !advance.is_finite() || !turn.is_finite() {
+            return Err(NotFinite);
+        }
+        self.window.drive(advance.0, turn.0);
+        Ok(())
+    }
+
+    /// The bearing for the next ping: a plain sweep.
+    #[must_use]
+    pub fn aim(&self) -> Radians {
+        Radians(self.sweep.bearing)
+    }
+
+    /// Takes the result of a ping; `None`: no echo. Returns whether it is novel.
+    ///
+    /// # Errors
+    /// [`NotFinite`]; nothing changes.
+    pub fn ping(&mut self, bearing: Radians, range: Option<Metres>) -> Result<bool, NotFinite> {
+        if !bearing.is_finite() || range.is_some_and(|range| !(range.is_finite() && range.0 >= 0.0))
+        {
+            return Err(NotFinite);
+        }
+        self.sweep.advance(self.servo);
+        let range = range.map(|range| range.0).filter(|range| *range <= self.echoes.max_range);
+        let novel = [self.parameters.novel_angle_at_rest, self.parameters.novel_angle];
+        Ok(self.window.ping(self.mount, bearing.0, range, novel))
+    }
+
+    /// Adds a pose of the robot, as it may be now, to the bank: the place where it was lost, or the
+    /// region where it starts. It is scored in the next cycle like any other hypothesis.
+    ///
+    /// # Errors
+    /// [`NotFinite`]; nothing changes.
+    pub fn propose(&mut self, pose: Pose) -> Result<(), NotFinite> {
+        if !pose.is_finite() {
+            return Err(NotFinite);
+        }
+        let turn = pose.heading.radians() - Radians(self.window.heading());
+        let (sin, cos) = sin_cos(turn);
+        let rotation = Vector::new(cos, sin);
+        let robot = self.window.robot().at.turned(rotation);
+        let at = Vector::from(pose.position()).minus(robot);
+        self.bank.offer(Entry::proposed(Placement { at, rotation, drift: 0.0 }));
+        Ok(())
+    }
+
+    /// Does so many evaluations, each a bounded slice of work, and returns the phase of the cycle.
+    pub fn poll(&mut self, evaluations: u16) -> Phase {
+        for _ in 0..evaluations {
+            self.evaluate();
+        }
+        match self.task {
+            Task::Vote { .. } | Task::Fit { .. } => Phase::Lines,
+            Task::Bank => Phase::Bank,
+            Task::Pairs { .. } => Phase::Pairs,
+            Task::Along { .. } => Phase::GlobalCheck,
+        }
+    }
+
+    /// How many cycles are complete.
+    #[must_use]
+    pub fn cycles(&self) -> u32 {
+        self.cycles
+    }
+
+    /// What the last complete cycle found.
+    #[must_use]
+    pub fn answer(&self) -> Answer {
+        match self.answer {
+            Decision::Searching => Answer::Searching,
+            Decision::Several(count) => Answer::Several(count),
+            Decision::Along(wall, extent) => Answer::Along { wall, extent: Metres(extent) },
+            Decision::Nowhere => Answer::Nowhere,
+            Decision::Unique(entry) => Answer::Unique(self.hypothesis(&entry)),
+        }
+    }
+
+    /// The bank, best hypothesis first, each as the robot's pose now.
+    pub fn hypotheses(&self) -> impl Iterator<Item = Hypothesis> {
+        self.bank.entries().iter().map(|entry| self.hypothesis(entry))
+    }
+
+    fn hypothesis(&self, entry: &Entry) -> Hypothesis {
+        let now = moved(&entry.placement, self.window.robot());
+        let rotation = libm::atan2f(now.rotation.y, now.rotation.x);
+        let spread = &entry.spread;
+        let pings = self.window.pings();
+        let echoes = pings.iter().filter(|ping| ping.range().is_some()).count();
+        Hypothesis {
+            pose: Pose::new(now.at.x, now.at.y, Radians(rotation + self.window.heading())),
+            position_deviation: Metres(libm::sqrtf(largest(spread.xx, spread.xy, spread.yy))),
+            heading_deviation: Radians(libm::sqrtf(spread.rotation)),
+            fit: entry.score / count(pings.len()),
+            explained: f32::from(entry.explained) / count(echoes),
+            drift: entry.placement.drift,
+        }
+    }
+
+    fn evaluate(&mut self) {
+        if self.window.pings().len() < LEAST_PINGS {
+            return;
+        }
+        if let Some(trial) = &mut self.trial {
+            let is_answer = trial.is_answer;
+            match trial.advance(&self.echoes, &self.window, self.parameters.drift.0) {
+                Verdict::Running => return,
+                Verdict::Rejected => self.bank.end_trial(),
+                Verdict::Scored(entry) if is_answer => self.answer = Decision::Unique(entry),
+                Verdict::Scored(entry) => {
+                    self.bank.end_trial();
+                    self.bank.offer(entry);
+                }
+            }
+            self.trial = None;
+            return;
+        }
+        self.task = match self.task {
+            Task::Vote { ping, tilt } => self.vote(ping, tilt),
+            Task::Fit { line } => self.fit(line),
+            Task::Bank => self.refine(),
+            Task::Pairs { pair, pairs } => self.try_pairs(pair, pairs),
+            Task::Along { line, along } => self.check(line, along),
+        };
+    }
+
+    fn vote(&mut self, ping: u16, tilt: u8) -> Task {
+        if ping == 0 && tilt == 0 {
+            let reference = self.window.rebase();
+            self.bank.rebase(&reference);
+            if let Decision::Unique(entry) = &mut self.answer {
+                entry.placement = moved(&entry.placement, &reference);
+            }
+            self.lines.clear();
+        }
+        let Some(part) = TILTS.get(usize::from(tilt)) else {
+            let next = ping + 1;
+            return if usize::from(next) < self.window.pings().len() {
+                Task::Vote { ping: next, tilt: 0 }
+            } else {
+                Task::Fit { line: 0 }
+            };
+        };
+        self.lines.vote(self.window.pings(), usize::from(ping), *part);
+        Task::Vote { ping, tilt: tilt + 1 }
+    }
+
+    fn fit(&mut self, line: u8) -> Task {
+        self.lines.fit(self.window.pings(), usize::from(line));
+        if usize::from(line) + 1 < self.lines.all().len() {
+            Task::Fit { line: line + 1 }
+        } else {
+            {
+                self.bank.begin_refinement();
+                Task::Bank
+            }
+        }
+    }
+
+    /// Tries the entries of the bank again, one after the other.
+    fn refine(&mut self) -> Task {
+        match self.bank.next_stale() {
+            Some(entry) => {
+                self.trial = Some(Trial::of_entry(&entry));
+                Task::Bank
+            }
+            None => Task::Pairs { pair: 0, pairs: Pairs::default() },
+        }
+    }
+
+    fn try_pairs(&mut self, pair: u8, mut pairs: Pairs) -> Task {
+        let Some((first, second)) = self.pair(pair) else {
+            if self.is_check_due {
+                return Task::Along { line: 0, along: AlongWalls::default() };
+            }
+            self.decide(false);
+            return Task::Vote { ping: 0, tilt: 0 };
+        };
+        let drift = self.likely_drift();
+        match pairs.next(&self.echoes.map, &first, &second, drift) {
+            Generated::Candidate(placement) => self.try_candidate(placement, 0.15, 0.25),
+            Generated::Nothing => {}
+            Generated::Done => return Task::Pairs { pair: pair + 1, pairs: Pairs::default() },
+        }
+        Task::Pairs { pair, pairs }
+    }
+
+    fn check(&mut self, line: u8, mut along: AlongWalls) -> Task {
+        let checked = self.lines.all().get(usize::from(line)).copied();
+        let Some(checked) = checked.filter(|_| line < CHECKED_LINES) else {
+            self.decide(true);
+            return Task::Vote { ping: 0, tilt: 0 };
+        };
+        let drift = self.likely_drift();
+        match along.next(&self.echoes.map, &checked, drift) {
+            Generated::Candidate(placement) => self.try_candidate(placement, 0.25, 0.6),
+            Generated::Nothing => {}
+            Generated::Done => {
+                return Task::Along { line: line + 1, along: AlongWalls::default() };
+            }
+        }
+        Task::Along { line, along }
+    }
+
+    fn try_candidate(&mut self, placement: Placement, near: f32, rivalry: f32) {
+        if self.bank.has_near(&placement, near) {
+            return;
+        }
+        let best = self.bank.entries().first().map_or(0.0, |entry| entry.score);
+        let full = self.bank.least_score().unwrap_or(0.0);
+        let least = if full > rivalry * best { full } else { rivalry * best };
+        let least = if least > 0.0 { least } else { 0.0 };
+        self.trial = Some(Trial::of_candidate(placement, least));
+    }
+
+    /// The drift of the best hypothesis, with which candidates start.
+    fn likely_drift(&self) -> f32 {
+        self.bank.entries().first().map_or(0.0, |entry| entry.placement.drift)
+    }
+
+    /// The pairs of this cycle: the best ones, then others that take turns.
+    fn pair(&self, number: u8) -> Option<(Line, Line)> {
+        let lines = self.lines.all();
+        let sums = 1..2 * lines.len();
+        let all = sums.flat_map(|sum| {
+            let half = sum.div_ceil(2);
+            (0..half).map(move |one| (one, sum - one))
+        });
+        let mut all = all.filter_map(|(one, other)| {
+            let (one, other) = (lines.get(one)?, lines.get(other)?);
+            make_a_pair(one, other).then_some((*one, *other))
+        });
+        if number < BEST_PAIRS {
+            return all.nth(usize::from(number));
+        }
+        let turn = number - BEST_PAIRS;
+        if turn >= OTHER_PAIRS {
+            return None;
+        }
+        let others = all.clone().count().checked_sub(usize::from(BEST_PAIRS))?;
+        let nth = usize::from(turn);
+        if nth >= others {
+            return None;
+        }
+        let first = (self.cycles as usize).wrapping_mul(usize::from(OTHER_PAIRS));
+        all.nth(usize::from(BEST_PAIRS) + (first + nth) % others)
+    }
+
+    /// Ends a cycle.
+    fn decide(&mut self, is_checked: bool) {
+        self.cycles = self.cycles.wrapping_add(1);
+        let taken = self.window.taken();
+        let fresh = taken.wrapping_sub(self.taken);
+        self.taken = taken;
+        let pings = count(self.window.pings().len());
+        let Some(best) = self.bank.entries().first().copied() else {
+            self.answer = Decision::Nowhere;
+            self.is_check_due = true;
+            return;
+        };
+        let least = best.score - self.parameters.margin;
+        let rivals = self.bank.entries().iter().filter(|entry| entry.score > least).count();
+        let spread = &best.spread;
+        let is_fit = best.score >= self.parameters.least_fit * pings;
+        let is_determined = largest(spread.xx, spread.xy, spread.yy) < UNDETERMINED * UNDETERMINED;
+        let has_lines = self.pair(0).is_some();
+        let is_sole = rivals == 1 && is_fit && is_determined && has_lines;
+        for (n, entry) in self.bank.entries_mut().iter_mut().enumerate() {
+            let streak = entry.streak.saturating_add(fresh);
+            entry.streak = if n == 0 && is_sole { streak } else { 0 };
+        }
+        let has_persisted =
+            is_sole && best.streak.saturating_add(fresh) >= self.parameters.persistence;
+        let was_unique = matches!(self.answer, Decision::Unique(_));
+        self.is_check_due =
+            has_persisted && !is_checked && !was_unique || self.cycles.is_multiple_of(CHECK_EVERY);
+        self.answer = if !is_fit {
+            Decision::Nowhere
+        } else if let Some(along) = self.along(&best).filter(|_| !is_determined) {
+            along
+        } else if has_persisted && (is_checked || was_unique) {
+            // The answer before stays until this one is refined.
+            self.trial = Some(Trial::of_answer(&best));
+            return;
+        } else {
+            Decision::Several(rivals)
+        };
+    }
+
+    /// The wall along which the position of an entry is undetermined: the nearest that is parallel to
+    /// the long axis of its error ellipse.
+    fn along(&self, entry: &Entry) -> Option<Decision> {
+        let spread = &entry.spread;
+        let most = largest(spread.xx, spread.xy, spread.yy);
+        let axis = if spread.xx > spread.yy {
+            Vector::new(most - spread.yy, spread.xy)
+        } else {
+            Vector::new(spread.xy, most - spread.xx)
+        };
+        let at = entry.placement.at.into();
+        let mut nearest: Option<(f32, WallId)> = None;
+        for (id, wall) in self.echoes.map.near(at, Metres(self.echoes.max_range)) {
+            let across = axis.dot(Vector::new(wall.a(), wall.b()));
+            let is_parallel = across * across < 0.1 * axis.length_squared();
+            let distance = wall.signed_distance(at).abs().0;
+            if is_parallel && nearest.is_none_or(|(least, _)| distance < least) {
+                nearest = Some((distance, id));
+            }
+        }
+        nearest.map(|(_, id)| Decision::Along(id, libm::sqrtf(most)))
+    }
+}
+
+impl Sweep {
+    /// Turns a step on, and back at the servo's limits, where the next sweep begins a part of a step
+    /// off: with the golden ratio, the bearings of many sweeps are spread evenly.
+    fn advance(&mut self, (right, left): (f32, f32)) {
+        const PART: f32 = 0.381_966;
+        let next = self.bearing + self.step;
+        if next >= right && next <= left {
+            self.bearing = next;
+            return;
+        }
+        self.step = -self.step;
+        let next = self.bearing + PART * self.step;
+        self.bearing = if next >= right && next <= left { next } else { right };
+    }
+}
+
+/// The larger eigenvalue of a symmetric matrix.
+fn largest(xx: f32, xy: f32, yy: f32) -> f32 {
+    let half = 0.5 * (xx - yy);
+    0.5 * (xx + yy) + libm::sqrtf(half * half + xy * xy)
+}

@@ -1,0 +1,148 @@
+//! The bank: the best placements, one per mode.
+
+use heapless::Vec;
+
+use super::candidates::Placement;
+use super::refine::Spread;
+use super::vector::Vector;
+use super::window::Station;
+use crate::trig::sin_cos;
+use crate::units::Radians;
+
+/// Placements within this distance, metres, and this cosine of rotation (25°) are one mode.
+const SAME_PLACE: f32 = 0.3;
+const SAME_ROTATION: f32 = 0.906;
+
+/// A placement with its score.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Entry {
+    pub placement: Placement,
+    /// Sum of the scores of all pings.
+    pub score: f32,
+    /// Pings that a reflector of the map explains.
+    pub explained: u16,
+    pub spread: Spread,
+    /// Novel pings while it was the only answer.
+    pub streak: u16,
+    pub state: State,
+}
+
+/// Where an entry stands in a cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum State {
+    /// Its score is that of an earlier cycle.
+    Stale,
+    /// It is being refined.
+    InTrial,
+    /// It was scored in this cycle.
+    Fresh,
+}
+
+impl Entry {
+    /// A placement that was not scored yet.
+    pub fn proposed(placement: Placement) -> Self {
+        Self {
+            placement,
+            score: f32::MIN,
+            explained: 0,
+            spread: Spread::default(),
+            streak: 0,
+            state: State::Stale,
+        }
+    }
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct Bank<const HYPOTHESES: usize> {
+    entries: Vec<Entry, HYPOTHESES>,
+}
+
+impl<const HYPOTHESES: usize> Bank<HYPOTHESES> {
+    pub const fn new() -> Self {
+        Self { entries: Vec::new() }
+    }
+
+    pub fn entries(&self) -> &[Entry] {
+        &self.entries
+    }
+
+    pub fn entries_mut(&mut self) -> &mut [Entry] {
+        &mut self.entries
+    }
+
+    /// Begins a refinement of all entries.
+    pub fn begin_refinement(&mut self) {
+        for entry in &mut self.entries {
+            entry.state = State::Stale;
+        }
+    }
+
+    /// An entry that was not refined since; it stays in the bank until its trial ends.
+    pub fn next_stale(&mut self) -> Option<Entry> {
+        let stale = self.entries.iter_mut().find(|entry| entry.state == State::Stale)?;
+        stale.state = State::InTrial;
+        Some(*stale)
+    }
+
+    /// Removes the entry in trial, if there is one.
+    pub fn end_trial(&mut self) {
+        self.entries.retain(|entry| entry.state != State::InTrial);
+    }
+
+    /// The score that a newcomer has to reach.
+    pub fn least_score(&self) -> Option<f32> {
+        if self.entries.is_full() { self.entries.last().map(|entry| entry.score) } else { None }
+    }
+
+    /// Whether a placement is near one of the bank, so that refining it leads there.
+    pub fn has_near(&self, placement: &Placement, distance: f32) -> bool {
+        self.entries.iter().any(|entry| is_near(&entry.placement, placement, distance))
+    }
+
+    /// Adds an entry, or lets it replace those of its mode if it is better.
+    pub fn offer(&mut self, mut entry: Entry) {
+        let is_same = |other: &Entry| is_near(&other.placement, &entry.placement, SAME_PLACE);
+        let better = self.entries.iter().any(|other| is_same(other) && other.score >= entry.score);
+        if better {
+            return;
+        }
+        let same = self.entries.iter().filter(|other| is_same(other));
+        let streak = same.map(|other| other.streak).max().unwrap_or(0);
+        let placement = entry.placement;
+        entry.streak = if streak > entry.streak { streak } else { entry.streak };
+        self.entries.retain(|other| !is_near(&other.placement, &placement, SAME_PLACE));
+        if self.entries.is_full() {
+            match self.entries.last() {
+                Some(last) if last.score < entry.score => {
+                    self.entries.pop();
+                }
+                _ => return,
+            }
+        }
+        let at = self.entries.iter().position(|other| other.score < entry.score);
+        // There is room: it was made above.
+        let _ = self.entries.insert(at.unwrap_or(self.entries.len()), entry);
+    }
+
+    /// Moves all placements to a new reference of the odometry frame.
+    pub fn rebase(&mut self, reference: &Station) {
+        for entry in &mut self.entries {
+            entry.placement = moved(&entry.placement, reference);
+        }
+    }
+}
+
+/// The placement of the odometry frame with the origin and the drift at another station.
+pub(super) fn moved(placement: &Placement, reference: &Station) -> Placement {
+    let (sin, cos) = sin_cos(Radians(placement.drift * reference.travelled));
+    Placement {
+        at: placement.to_map(reference.drifted(placement.drift)),
+        rotation: placement.rotation.turned(Vector::new(cos, sin)),
+        drift: placement.drift,
+    }
+}
+
+fn is_near(one: &Placement, other: &Placement, distance: f32) -> bool {
+    one.rotation.dot(other.rotation) > SAME_ROTATION
+        && one.at.minus(other.at).length_squared() < distance * distance
+}

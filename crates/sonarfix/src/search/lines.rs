@@ -1,0 +1,156 @@
+//! Straight lines among the pings, found by voting: a range from the foot of a perpendicular puts
+//! the wall on a tangent of a circle around the sonar, in a direction within the cone of the beam
+//! (Tardós, Neira, Newman, Leonard 2002; regions of constant depth: Leonard and Durrant-Whyte 1992).
+
+use heapless::Vec;
+
+use super::vector::Vector;
+use super::window::Ping;
+use crate::trig::sin_cos;
+use crate::units::Radians;
+
+/// Lines that are kept.
+pub(super) const LINES: usize = 10;
+/// Directions that are tried for each ping, as parts of the cone.
+pub(super) const TILTS: [f32; 5] = [0.0, -0.45, 0.45, -0.9, 0.9];
+/// A ping supports a line that its range meets within this, metres.
+const TOLERANCE: f32 = 0.05;
+/// Fewer pings than these are no line.
+const LEAST_SUPPORT: u16 = 3;
+/// Lines with normals within this cosine (15°) and this offset, metres, are the same.
+const SAME_DIRECTION: f32 = 0.966;
+const SAME_OFFSET: f32 = 0.15;
+
+/// A straight line in the odometry frame: `normal · point = offset`, the normal away from the robot.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Line {
+    pub normal: Vector,
+    pub offset: f32,
+    /// The stretch of the feet of its pings, along `normal.left()`.
+    pub stretch: (f32, f32),
+    pub support: u16,
+}
+
+/// The best lines, by their support.
+#[derive(Debug, Clone)]
+pub(super) struct Lines {
+    found: Vec<Line, LINES>,
+    /// Cosine and angle of the cone in which a ping may support a line.
+    cone: Radians,
+    cos_cone: f32,
+}
+
+impl Lines {
+    pub fn new(cone: Radians) -> Self {
+        Self { found: Vec::new(), cone, cos_cone: sin_cos(cone * 1.3).1 }
+    }
+
+    pub fn all(&self) -> &[Line] {
+        &self.found
+    }
+
+    pub fn clear(&mut self) {
+        self.found.clear();
+    }
+
+    /// Lets all pings vote on the line of one ping and one tilt.
+    pub fn vote(&mut self, pings: &[Ping], voter: usize, tilt: f32) {
+        let Some(ping) = pings.get(voter) else { return };
+        let Some(range) = ping.range() else { return };
+        let (sin, cos) = sin_cos(self.cone * tilt);
+        let normal = ping.axis.turned(Vector::new(cos, sin));
+        let offset = normal.dot(ping.station.at) + range;
+        let mut line = Line { normal, offset, stretch: (0.0, 0.0), support: 0 };
+        self.gather(pings, &mut line);
+        if line.support >= LEAST_SUPPORT {
+            self.keep(line);
+        }
+    }
+
+    /// Counts the pings that support a line, and finds the stretch that they cover.
+    fn gather(&self, pings: &[Ping], line: &mut Line) {
+        let (mut support, mut from, mut to) = (0, f32::INFINITY, f32::NEG_INFINITY);
+        for ping in pings.iter().filter(|ping| self.supports(ping, line)) {
+            let along = line.normal.left().dot(ping.station.at);
+            from = if along < from { along } else { from };
+            to = if along > to { along } else { to };
+            support += 1;
+        }
+        line.support = support;
+        line.stretch = (from, to);
+    }
+
+    fn supports(&self, ping: &Ping, line: &Line) -> bool {
+        ping.range().is_some_and(|range| {
+            let at = line.normal.dot(ping.station.at) + range;
+            (at - line.offset).abs() < TOLERANCE && line.normal.dot(ping.axis) >= self.cos_cone
+        })
+    }
+
+    /// Keeps a line unless a similar one has more support.
+    fn keep(&mut self, line: Line) {
+        let similar = self.found.iter().position(|other| {
+            other.normal.dot(line.normal) > SAME_DIRECTION
+                && (other.offset - line.offset).abs() < SAME_OFFSET
+        });
+        if let Some(at) = similar {
+            match self.found.get(at) {
+                Some(other) if other.support < line.support => {
+                    self.found.remove(at);
+                }
+                _ => return,
+            }
+        }
+        if self.found.is_full() {
+            match self.found.last() {
+                Some(last) if last.support < line.support => {
+                    self.found.pop();
+                }
+                _ => return,
+            }
+        }
+        let at = self.found.iter().position(|other| other.support < line.support);
+        // There is room: it was made above.
+        let _ = self.found.insert(at.unwrap_or(self.found.len()), line);
+    }
+
+    /// Fits a line to its pings by one Gauss–Newton step: ranges to 3 cm, and beams that on the mean
+    /// are square to it.
+    pub fn fit(&mut self, pings: &[Ping], number: usize) {
+        const RANGE_WEIGHT: f32 = 1.0 / (0.03 * 0.03);
+        let Some(&line) = self.found.get(number) else { return };
+        let beam = 0.7 * self.cone.0;
+        let beam_weight = 1.0 / (beam * beam);
+        // Normal equations of turn and offset.
+        let (mut aa, mut ab, mut bb, mut ga, mut gb) = (1e-3_f32, 0.0, 1e-3_f32, 0.0, 0.0);
+        for ping in pings.iter().filter(|ping| self.supports(ping, &line)) {
+            let Some(range) = ping.range() else { continue };
+            let residual = line.normal.dot(ping.station.at) + range - line.offset;
+            let by_turn = line.normal.left().dot(ping.station.at);
+            let off_axis = line.normal.left().dot(ping.axis);
+            aa += RANGE_WEIGHT * by_turn * by_turn + beam_weight;
+            ab -= RANGE_WEIGHT * by_turn;
+            bb += RANGE_WEIGHT;
+            ga += RANGE_WEIGHT * by_turn * residual - beam_weight * off_axis;
+            gb -= RANGE_WEIGHT * residual;
+        }
+        let determinant = aa * bb - ab * ab;
+        let turn = -(bb * ga - ab * gb) / determinant;
+        let shift = -(aa * gb - ab * ga) / determinant;
+        if !(turn.abs() < self.cone.0 && shift.is_finite()) {
+            return;
+        }
+        let (sin, cos) = sin_cos(Radians(turn));
+        let mut fitted = Line {
+            normal: line.normal.turned(Vector::new(cos, sin)),
+            offset: line.offset + shift,
+            ..line
+        };
+        self.gather(pings, &mut fitted);
+        if fitted.support >= line.support
+            && let Some(slot) = self.found.get_mut(number)
+        {
+            *slot = fitted;
+        }
+    }
+}

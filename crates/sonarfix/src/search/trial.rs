@@ -1,0 +1,157 @@
+//! The trial of one placement, ping by ping: a coarse score with early exit, three Gauss–Newton
+//! steps with falling tolerance, the final score.
+
+use super::bank::{Entry, State};
+use super::candidates::Placement;
+use super::refine::{Equations, Tolerance, beam};
+use super::score::{EchoModel, Sharpness};
+use super::window::Window;
+
+/// Gauss–Newton steps after the coarse one.
+const STEPS: u8 = 2;
+/// Deviation that a metre of odometry adds to an answer, metres per metre.
+const ODOMETRY: f32 = 0.03;
+/// By how much the running sum may fall short: scores deviate by 1.3 a ping.
+const LEAD: f32 = 8.0;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Stage {
+    Coarse,
+    Step(u8),
+    Fine,
+}
+
+/// What a step of a trial led to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Verdict {
+    Running,
+    Rejected,
+    Scored(Entry),
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct Trial {
+    placement: Placement,
+    stage: Stage,
+    /// Pings looked at in this stage.
+    seen: u16,
+    sum: f32,
+    /// The final score that must be within reach.
+    least: f32,
+    equations: Equations,
+    streak: u16,
+    /// Whether the placement becomes an answer: what was measured long ago then says less of where
+    /// the robot is now.
+    pub is_answer: bool,
+}
+
+impl Trial {
+    /// A new candidate that has to reach a final score.
+    pub fn of_candidate(placement: Placement, least: f32) -> Self {
+        Self {
+            placement,
+            stage: Stage::Coarse,
+            seen: 0,
+            sum: 0.0,
+            least,
+            equations: Equations::default(),
+            streak: 0,
+            is_answer: false,
+        }
+    }
+
+    /// A placement of the bank, refined again with the present pings.
+    pub fn of_entry(entry: &Entry) -> Self {
+        Self {
+            stage: Stage::Step(0),
+            streak: entry.streak,
+            ..Self::of_candidate(entry.placement, f32::NEG_INFINITY)
+        }
+    }
+
+    /// The entry that becomes the unique answer.
+    pub fn of_answer(entry: &Entry) -> Self {
+        Self { is_answer: true, ..Self::of_entry(entry) }
+    }
+
+    /// Looks at one ping.
+    pub fn advance<const PINGS: usize>(
+        &mut self,
+        echoes: &EchoModel,
+        window: &Window<PINGS>,
+        drift_deviation: f32,
+    ) -> Verdict {
+        let Some(ping) = window.in_order(usize::from(self.seen)) else {
+            return self.end_stage(drift_deviation);
+        };
+        self.seen += 1;
+        let sharpness = match self.stage {
+            Stage::Coarse => Sharpness::COARSE,
+            Stage::Step(0) => Sharpness::MEDIUM,
+            Stage::Step(_) | Stage::Fine => Sharpness::FINE,
+        };
+        let explanation = echoes.explain(&beam(ping, &self.placement), sharpness);
+        self.sum += explanation.score;
+        if let Some(target) = explanation.target {
+            let odometry = if self.is_answer { ODOMETRY } else { 0.0 };
+            let by =
+                Tolerance { deviation: sharpness.deviation, odometry, by_beam: echoes.by_beam };
+            self.equations.add(ping, &self.placement, &target, by);
+        }
+        if self.sum < self.least_sum(window.pings().len()) {
+            return Verdict::Rejected;
+        }
+        Verdict::Running
+    }
+
+    /// The sum below which the trial ends: a sequential test against the mean that a placement of the
+    /// wanted final score would have. Earlier stages are less sharp and ask for less.
+    fn least_sum(&self, pings: usize) -> f32 {
+        let (share, slack) = match self.stage {
+            Stage::Coarse => (0.5, 0.3),
+            Stage::Step(0) => (0.7, 0.15),
+            Stage::Step(_) | Stage::Fine => (0.9, 0.1),
+        };
+        let rate = share * self.least / count(pings) - slack;
+        rate * f32::from(self.seen) - LEAD
+    }
+
+    fn end_stage(&mut self, drift_deviation: f32) -> Verdict {
+        match self.stage {
+            Stage::Coarse => self.step(0, drift_deviation),
+            Stage::Step(number) => self.step(number + 1, drift_deviation),
+            Stage::Fine => Verdict::Scored(Entry {
+                placement: self.placement,
+                score: self.sum,
+                explained: self.equations.count,
+                spread: self.equations.spread(drift_deviation),
+                streak: self.streak,
+                state: State::Fresh,
+            }),
+        }
+    }
+
+    /// Takes the Gauss–Newton step of a stage and begins the next.
+    fn step(&mut self, next: u8, drift_deviation: f32) -> Verdict {
+        let Some(placement) = self.equations.step(&self.placement, drift_deviation) else {
+            return Verdict::Rejected;
+        };
+        self.placement = placement;
+        self.begin(if next < STEPS { Stage::Step(next) } else { Stage::Fine })
+    }
+
+    fn begin(&mut self, stage: Stage) -> Verdict {
+        self.stage = stage;
+        self.seen = 0;
+        self.sum = 0.0;
+        self.equations = Equations::default();
+        Verdict::Running
+    }
+}
+
+/// A number of pings as `f32`.
+pub fn count(of: usize) -> f32 {
+    #[expect(clippy::cast_precision_loss, reason = "a window holds far fewer than 2^24 pings")]
+    let count = of as f32;
+    count
+}

@@ -1,0 +1,57 @@
+//! Plane vectors, as the search computes with them: metres, or unit vectors.
+
+use crate::pose::Point;
+
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Vector {
+    pub x: f32,
+    pub y: f32,
+}
+
+impl Vector {
+    pub const fn new(x: f32, y: f32) -> Self {
+        Self { x, y }
+    }
+
+    pub fn dot(self, other: Self) -> f32 {
+        self.x * other.x + self.y * other.y
+    }
+
+    pub fn plus(self, other: Self) -> Self {
+        Self::new(self.x + other.x, self.y + other.y)
+    }
+
+    pub fn minus(self, other: Self) -> Self {
+        Self::new(self.x - other.x, self.y - other.y)
+    }
+
+    pub fn times(self, factor: f32) -> Self {
+        Self::new(self.x * factor, self.y * factor)
+    }
+
+    /// The vector turned by 90° to the left.
+    pub fn left(self) -> Self {
+        Self::new(-self.y, self.x)
+    }
+
+    /// The vector turned by the angle of which `by` holds cosine and sine.
+    pub fn turned(self, by: Self) -> Self {
+        Self::new(by.x * self.x - by.y * self.y, by.y * self.x + by.x * self.y)
+    }
+
+    pub fn length_squared(self) -> f32 {
+        self.dot(self)
+    }
+}
+
+impl From<Point> for Vector {
+    fn from(point: Point) -> Self {
+        Self::new(point.x.0, point.y.0)
+    }
+}
+
+impl From<Vector> for Point {
+    fn from(vector: Vector) -> Self {
+        Self::new(vector.x, vector.y)
+    }
+}

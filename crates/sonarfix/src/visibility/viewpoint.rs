@@ -1,0 +1,212 @@
+//! Which walls can be measured from the estimated pose, other walls aside.
+//!
+//! # Non-finite policy
+//! Comparisons are written so that a wall whose numbers are NaN cannot be measured.
+
+use crate::config::{Config, Sonar};
+use crate::ekf::{Ekf, PoseCovariance};
+use crate::map::Wall;
+use crate::numeric::positive_part;
+use crate::outcome::Refusal;
+use crate::pose::{Heading, Point};
+use crate::range::ExpectedRange;
+use crate::state::StateEstimate;
+use crate::units::{Metres, Radians};
+
+/// Least probability that the foot lies on the wall and its range within the limits of the sonar, for a
+/// wall that is measured while there are others.
+const SAFE: f32 = 0.7;
+/// The same if no wall is safe: to measure an unlikely wall is better than to measure none.
+const LIKELY: f32 = 0.2;
+/// The same when the echo has arrived.
+const POSSIBLE: f32 = 0.05;
+
+/// Share of the cone in which other walls occlude the target if no wall is safe.
+const CORE_OF_CONE: f32 = 0.7;
+/// Largest widening of the cone by the uncertainty of the heading: beyond that everything occludes
+/// everything.
+const MAX_WIDENING: Radians = Radians(0.3);
+
+/// Standard deviations of the foot along the wall, of the range and of the heading that the estimate
+/// does not contain: rounded ends of walls, limits of the sonar, dead band of the servo.
+const FOOT_MARGIN: f32 = 0.02;
+const RANGE_MARGIN: f32 = 0.001;
+const HEADING_MARGIN: f32 = 0.01;
+
+/// Largest deviation of the heading at which the estimate counts as tracking, as a share of the cone.
+const MAX_HEADING_DEVIATION: f32 = 0.25;
+
+/// The estimate of the filter as seen from the sonar: computed once for all walls.
+pub(crate) struct Viewpoint<'a> {
+    pub sonar: &'a Sonar,
+    state: StateEstimate,
+    /// Estimated position of the sonar.
+    pub position: Point,
+    pub heading: Heading,
+    /// One standard deviation of the heading.
+    heading_deviation: Radians,
+    /// The cone plus the uncertainty of the heading: where an echo may come from.
+    pub wide_cone: Radians,
+    confidence_squared: f32,
+    /// Least probability of foot and range.
+    least: f32,
+    covariance: PoseCovariance,
+}
+
+impl<'a> Viewpoint<'a> {
+    pub fn new(config: &'a Config, ekf: &Ekf) -> Self {
+        let sonar = &config.sonar;
+        let confidence = config.gating.confidence;
+        let state = ekf.state();
+        let pose = state.pose();
+        let covariance = ekf.pose_covariance();
+        let sigma = Radians(libm::sqrtf(covariance.hh));
+        let uncertainty = sigma * confidence;
+        let widening = if uncertainty < MAX_WIDENING { uncertainty } else { MAX_WIDENING };
+        Self {
+            sonar,
+            state,
+            position: pose.to_map(sonar.mount),
+            heading: pose.heading,
+            heading_deviation: sigma,
+            wide_cone: sonar.cone + widening,
+            confidence_squared: confidence * confidence,
+            least: SAFE,
+            covariance,
+        }
+    }
+
+    /// The same estimate without margins, for when no wall is safe.
+    pub fn without_margins(self) -> Self {
+        let wide_cone = self.sonar.cone * CORE_OF_CONE;
+        Self { wide_cone, confidence_squared: 0.0, least: LIKELY, ..self }
+    }
+
+    /// The same estimate for an echo that has arrived.
+    pub fn of_echo(self) -> Self {
+        Self { least: POSSIBLE, ..self }
+    }
+
+    /// Square of the position uncertainty along the unit vector (x, y), m².
+    pub fn uncertainty_squared(&self, x: f32, y: f32) -> f32 {
+        self.confidence_squared * self.variance(x, y)
+    }
+
+    /// Variance of the position along the unit vector (x, y), m².
+    fn variance(&self, x: f32, y: f32) -> f32 {
+        let p = &self.covariance;
+        positive_part(p.xx * x * x + 2.0 * p.xy * x * y + p.yy * y * y)
+    }
+
+    /// The range expected from a wall, and the probability that its foot lies on it and the range is
+    /// within the limits of the sonar.
+    ///
+    /// # Errors
+    /// [`Refusal::FootOffWall`] or [`Refusal::OutOfRange`] if that is too improbable.
+    pub fn expect(&self, wall: &Wall) -> Result<(ExpectedRange, f32), Refusal> {
+        let along = wall.along(self.position).0;
+        let sigma = libm::sqrtf(self.variance(wall.b(), -wall.a())) + FOOT_MARGIN;
+        let on_wall = probability_between(-along / sigma, (wall.length().0 - along) / sigma);
+        // Neither comparison holds for NaN.
+        let is_on_wall = on_wall >= self.least;
+        if !is_on_wall {
+            return Err(Refusal::FootOffWall);
+        }
+        let distance = wall.signed_distance(self.position).0.abs();
+        let range = (1.0 + self.state.range_scale) * distance;
+        let (nearest, farthest) = (self.sonar.min_range.0, self.sonar.max_range.0);
+        let sigma = libm::sqrtf(self.variance(wall.a(), wall.b())) + RANGE_MARGIN;
+        let in_range = probability_between((nearest - range) / sigma, (farthest - range) / sigma);
+        let is_in_range = in_range >= self.least;
+        if !is_in_range {
+            return Err(Refusal::OutOfRange);
+        }
+        Ok((ExpectedRange::new(wall, self.sonar.mount, &self.state), on_wall * in_range))
+    }
+
+    /// Angle between a beam at `bearing` and the perpendicular of the expected wall.
+    pub fn off_square(&self, expected: &ExpectedRange, bearing: Radians) -> Radians {
+        expected.direction.from(self.heading.turned(bearing))
+    }
+
+    /// Probability that a beam at `bearing` is square to the expected wall.
+    ///
+    /// # Errors
+    /// [`Refusal::NotSquare`] if that is too improbable.
+    pub fn of_square(&self, expected: &ExpectedRange, bearing: Radians) -> Result<f32, Refusal> {
+        let probability = self.probability_of_square(self.off_square(expected, bearing));
+        // Does not hold for NaN.
+        let is_possible = probability >= self.least;
+        if is_possible { Ok(probability) } else { Err(Refusal::NotSquare) }
+    }
+
+    /// Whether a beam at the angle `off` from the perpendicular is square to the expected wall.
+    pub fn is_square(&self, off: Radians) -> bool {
+        off.abs() <= self.sonar.cone
+    }
+
+    /// Probability that a beam at the angle `off` from the perpendicular is square, given the
+    /// uncertainty of the heading.
+    pub fn probability_of_square(&self, off: Radians) -> f32 {
+        let sigma = self.heading_deviation.0 + HEADING_MARGIN;
+        let cone = self.sonar.cone.0;
+        probability_between((-cone - off.0) / sigma, (cone - off.0) / sigma)
+    }
+}
+
+/// Largest deviation of the heading at which the estimate counts as tracking.
+pub(crate) fn max_heading_deviation(sonar: &Sonar) -> Radians {
+    sonar.cone * MAX_HEADING_DEVIATION
+}
+
+/// The range of an echo, if it is one that the sonar can report.
+///
+/// # Errors
+/// [`Refusal::NoEcho`], [`Refusal::NotFinite`] or [`Refusal::OutOfRange`].
+pub(crate) fn check_range(sonar: &Sonar, range: Option<Metres>) -> Result<Metres, Refusal> {
+    let range = range.ok_or(Refusal::NoEcho)?;
+    if !range.is_finite() {
+        return Err(Refusal::NotFinite);
+    }
+    if range < sonar.min_range || range > sonar.max_range {
+        return Err(Refusal::OutOfRange);
+    }
+    Ok(range)
+}
+
+/// Probability that a normal variable lies between two numbers of standard deviations.
+fn probability_between(from: f32, to: f32) -> f32 {
+    0.5 * (odd_probability(to) - odd_probability(from))
+}
+
+/// erf(x/√2) of a number of either sign.
+fn odd_probability(sigmas: f32) -> f32 {
+    if sigmas < 0.0 { -central_probability(-sigmas) } else { central_probability(sigmas) }
+}
+
+/// Probability that a normal variable lies within `sigmas` standard deviations: erf(x/√2) after
+/// Abramowitz and Stegun 7.1.27, error at most 5e-4; zero if `sigmas` is not positive.
+fn central_probability(sigmas: f32) -> f32 {
+    if sigmas > 0.0 {
+        let x = sigmas * core::f32::consts::FRAC_1_SQRT_2;
+        let sum = 1.0 + x * (0.278_393 + x * (0.230_389 + x * (0.000_972 + x * 0.078_108)));
+        let square = sum * sum;
+        1.0 - 1.0 / (square * square)
+    } else {
+        0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn central_probability_matches_the_tables() {
+        let table = [(-1.0, 0.0), (0.0, 0.0), (1.0, 0.682_689), (2.0, 0.954_500), (3.0, 0.997_300)];
+        for (sigmas, probability) in table {
+            assert!((central_probability(sigmas) - probability).abs() < 5e-4, "{sigmas}");
+        }
+        assert!((central_probability(1e9) - 1.0).abs() < 1e-6);
+    }
+}

@@ -1,0 +1,50 @@
+//! The room and the drive of the probes.
+//!
+//! Each probe is a program that links only the code of its calls. A call is a function named `probe_…`, by which `cargo xtask
+//! budgets` finds the code that it reaches.
+
+#![no_std]
+
+use sonarfix::map::{Wall, WallError};
+use sonarfix::motion::WheelTravel;
+use sonarfix::pose::Point;
+
+/// Walls of the room.
+pub const WALLS: usize = 8;
+/// Wheel travels of the drive.
+pub const STEPS: u32 = 200;
+/// Wheel travels between two ranges: one range per second at ten samples per second.
+pub const STEPS_A_RANGE: u32 = 10;
+
+/// A room of 6 m × 5 m with a block of 1 m × 1 m in its middle.
+///
+/// # Errors
+/// None: the corners are fixed.
+pub fn room() -> Result<[Wall; WALLS], WallError> {
+    let point = Point::new;
+    let outer = [point(0.0, 0.0), point(6.0, 0.0), point(6.0, 5.0), point(0.0, 5.0)];
+    let inner = [point(2.5, 2.0), point(2.5, 3.0), point(3.5, 3.0), point(3.5, 2.0)];
+    let [a, b, c, d] = outer;
+    let [e, f, g, h] = inner;
+    Ok([
+        Wall::new(a, b)?,
+        Wall::new(b, c)?,
+        Wall::new(c, d)?,
+        Wall::new(d, a)?,
+        Wall::new(e, f)?,
+        Wall::new(f, g)?,
+        Wall::new(g, h)?,
+        Wall::new(h, e)?,
+    ])
+}
+
+/// A drive of curves and a turn in place, which stays in the room.
+#[must_use]
+pub fn travel(step: u32) -> WheelTravel {
+    match step % 50 {
+        0..=19 => WheelTravel::new(0.02, 0.018),
+        20..=35 => WheelTravel::new(0.02, -0.02),
+        36..=44 => WheelTravel::new(0.018, 0.021),
+        _ => WheelTravel::new(-0.01, -0.012),
+    }
+}

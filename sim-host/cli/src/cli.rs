@@ -1,0 +1,81 @@
+//! The command line.
+
+use clap::{Parser, Subcommand};
+
+use crate::{
+    bound, command, config, convert, faults, find, floor_plans, health, map, monitor, paper, pil,
+    plan, replay, run, sonar_model,
+};
+
+/// Simulates, measures, replays and operates the Sonarfix localizer for small wheeled robots.
+#[derive(Debug, Parser)]
+#[command(name = "sonarfix", version, about)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Runs the paper's scenario and prints the results beside the paper's Table 1.
+    Paper(paper::Args),
+    /// Runs a scenario.
+    Run(run::Args),
+    /// Runs a scenario with the robot's software on an emulated microcontroller.
+    Pil(pil::Args),
+    /// Replays the recording of a robot through the localizer.
+    Replay(replay::Args),
+    /// Searches for the pose of a robot without a start pose, on a log or in simulation.
+    Find(find::Args),
+    /// Converts recordings of other formats for `replay`.
+    Convert(convert::Args),
+    /// Shows the telemetry of a robot and records it for `replay`.
+    Monitor(monitor::Args),
+    /// Sends a command to a robot.
+    /// Sends a command to a robot.
+    #[command(name = "command")]
+    Send(command::Args),
+    /// Bakes a robot file into the configuration image for the robot's flash.
+    Config(config::Args),
+    /// Checks, bakes, draws and simplifies maps.
+    Map(map::Args),
+    /// Prints the Cramér–Rao bound on each state over time.
+    Bound(bound::Args),
+    /// Forecasts the localization accuracy along a path, before a robot is built.
+    Plan(plan::Args),
+    /// Compares the simulated NXT sonar with recorded sweeps; prints markdown.
+    SonarModel(sonar_model::Args),
+    /// Measures the effects of hardware faults; prints markdown.
+    Faults(faults::Args),
+    /// Measures the reliability of the health verdict; prints markdown.
+    Health(health::Args),
+    /// Compares two measurement policies on random floor plans; prints markdown.
+    FloorPlans(floor_plans::Args),
+}
+
+impl Cli {
+    /// Executes the command.
+    ///
+    /// # Errors
+    /// Any error, with a message for the user.
+    pub fn execute(self) -> anyhow::Result<()> {
+        match self.command {
+            Command::Paper(args) => paper::execute(&args),
+            Command::Run(args) => run::execute(&args),
+            Command::Pil(args) => pil::execute(&args),
+            Command::Replay(args) => replay::execute(&args),
+            Command::Find(args) => find::execute(&args),
+            Command::Convert(args) => convert::execute(&args),
+            Command::Monitor(args) => monitor::execute(&args),
+            Command::Send(args) => command::execute(&args),
+            Command::Config(args) => config::execute(&args),
+            Command::Map(args) => map::execute(&args),
+            Command::Bound(args) => bound::execute(&args),
+            Command::Plan(args) => plan::execute(&args),
+            Command::SonarModel(args) => sonar_model::execute(&args),
+            Command::Faults(args) => faults::execute(&args),
+            Command::Health(args) => health::execute(&args),
+            Command::FloorPlans(args) => floor_plans::execute(&args),
+        }
+    }
+}

@@ -1,0 +1,41 @@
+//! The command `sonarfix`.
+
+#[macro_use]
+mod output;
+
+mod bound;
+mod cli;
+mod command;
+mod config;
+mod convert;
+mod faults;
+mod find;
+mod floor_plans;
+mod health;
+mod json;
+mod map;
+mod monitor;
+mod overrides;
+mod paper;
+mod pil;
+mod plan;
+mod progress;
+mod replay;
+mod run;
+mod sonar_model;
+mod table;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+use cli::Cli;
+
+fn main() -> ExitCode {
+    match Cli::parse().execute() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

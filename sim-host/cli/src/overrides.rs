@@ -1,0 +1,106 @@
+//! Changes of a scenario on the command line.
+
+use clap::ValueEnum;
+use sonarfix::aim::Policy;
+use sonarfix::config::PingSchedule;
+use sonarfix::units::Duration;
+use sonarfix_map::{Fidelity, Scenario, ServoName};
+use sonarfix_sim::pins::devices;
+
+/// Changes of a scenario; by default it stays as it is.
+#[derive(Debug, clap::Args)]
+pub struct Overrides {
+    /// The policy that chooses the wall to measure.
+    #[arg(long, value_enum)]
+    policy: Option<PolicyName>,
+    /// The level of simulation between world and localizer.
+    #[arg(long, value_enum)]
+    fidelity: Option<FidelityName>,
+    /// Seconds between ranges, or "as-fast-as-possible".
+    #[arg(long, value_name = "SECONDS", value_parser = schedule)]
+    fix_period: Option<PingSchedule>,
+    /// The servo of the sonar, in the simulation and in the ping schedule.
+    #[arg(long, value_enum)]
+    servo: Option<ServoChoice>,
+    /// Scale error of the ranges, as a fraction like 0.01; it is also the prior standard deviation
+    /// of the range scale in the filter.
+    #[arg(long, value_name = "FRACTION")]
+    range_error: Option<f32>,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum PolicyName {
+    /// The nearest wall, as in the paper.
+    Nearest,
+    /// The wall with the largest reduction of the position variance per time.
+    Informative,
+}
+
+impl From<PolicyName> for Policy {
+    fn from(name: PolicyName) -> Self {
+        match name {
+            PolicyName::Nearest => Self::Nearest,
+            PolicyName::Informative => Self::Informative,
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum FidelityName {
+    /// None: travel and ranges are passed directly.
+    Ideal,
+    /// Pins, drivers and the robot's loop.
+    Pins,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum ServoChoice {
+    /// Reaches the commanded bearing at once.
+    Ideal,
+    /// SG90, a small hobby servo.
+    Sg90,
+    /// MG996R, a large hobby servo.
+    Mg996r,
+}
+
+fn schedule(text: &str) -> Result<PingSchedule, String> {
+    if text == "as-fast-as-possible" {
+        return Ok(PingSchedule::AsFastAsPossible);
+    }
+    let seconds: f64 = text.parse().map_err(|_| "write 0.5, or as-fast-as-possible".to_owned())?;
+    if !(1e-6..=3600.0).contains(&seconds) {
+        return Err("must be from 1e-6 to 3600".to_owned());
+    }
+    Ok(PingSchedule::Every(Duration::from_ticks(sonarfix_sim::time::micros(seconds))))
+}
+
+impl Overrides {
+    /// Applies the changes to a scenario.
+    pub fn apply(&self, scenario: &mut Scenario) -> anyhow::Result<()> {
+        let config = &mut scenario.robot.localizer;
+        config.policy = self.policy.map_or(config.policy, Policy::from);
+        match self.fidelity {
+            Some(FidelityName::Ideal) => scenario.fidelity = Fidelity::Ideal,
+            Some(FidelityName::Pins) => scenario.fidelity = Fidelity::Pins,
+            None => {}
+        }
+        if let Some(schedule) = self.fix_period {
+            config.sonar.timing.schedule = schedule;
+        }
+        if let Some(servo) = self.servo {
+            let name = match servo {
+                ServoChoice::Ideal => ServoName::Ideal,
+                ServoChoice::Sg90 => ServoName::Sg90,
+                ServoChoice::Mg996r => ServoName::Mg996r,
+            };
+            devices::mount_servo(scenario, name);
+        }
+        if let Some(error) = self.range_error {
+            let sensible = error.abs() < 0.5;
+            anyhow::ensure!(sensible, "--range-error must be a fraction below 0.5, like 0.01");
+            scenario.robot.localizer.prior.range_scale = error.abs();
+            scenario.truth.range_scale = error.into();
+        }
+        Ok(())
+    }
+}

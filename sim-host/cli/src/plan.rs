@@ -1,0 +1,242 @@
+//! `sonarfix plan`: forecast of the localization accuracy along a path.
+
+use std::path::{Path as FilePath, PathBuf};
+
+use anyhow::Context;
+use sonarfix_map::{Place, Scenario, robot_file};
+use sonarfix_plan::preset::{ServoPreset, SonarPreset};
+use sonarfix_plan::{BLIND_AFTER, Forecast, Spread, route};
+use sonarfix_report::Table;
+use sonarfix_report::heat_map::{Heat, HeatMap};
+use sonarfix_studies::floor_plan::{FloorPlan, picture};
+
+use crate::table;
+
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A map or a scenario (docs/formats.md).
+    map: PathBuf,
+    /// The path, for a map or instead of the scenario's: "x,y x,y …" in metres, the start first,
+    /// or a file of x,y lines.
+    #[arg(long, value_name = "FILE|X,Y …")]
+    path: Option<String>,
+    /// The sonar: hc-sr04, lv-maxsonar, srf08, polaroid6500, or a robot file; by default the
+    /// scenario's.
+    #[arg(long, value_name = "NAME|ROBOT.toml")]
+    sensor: Option<String>,
+    /// The servo of the sonar; by default the scenario's.
+    #[arg(long, value_enum)]
+    servo: Option<ServoPreset>,
+    /// Compares all sonars.
+    #[arg(long, conflicts_with = "sensor")]
+    compare: bool,
+    /// The required position accuracy, one standard deviation, millimetres: marks the sonars that
+    /// meet it.
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    need: Option<f64>,
+    /// Number of runs: detection is random.
+    #[arg(long, default_value_t = 10)]
+    runs: u32,
+    /// Prints JSON instead of tables.
+    #[arg(long)]
+    json: bool,
+    /// Writes a drawing of the bound along the path; with --compare, for the best sonar.
+    #[arg(long, value_name = "FILE.svg")]
+    out: Option<PathBuf>,
+}
+
+/// The forecast for one sonar.
+#[derive(Debug, serde::Serialize)]
+struct Candidate {
+    sensor: String,
+    #[serde(flatten)]
+    forecast: Forecast,
+}
+
+pub fn execute(args: &Args) -> anyhow::Result<()> {
+    anyhow::ensure!(args.runs > 0, "--runs must be at least 1");
+    let is_sensible = args.need.is_none_or(|need| need > 0.0 && need.is_finite());
+    anyhow::ensure!(is_sensible, "--need must be a number of millimetres above zero");
+    let scenario = scenario(args)?;
+    let mut candidates = Vec::new();
+    for (sensor, scenario) in fitted(args, &scenario)? {
+        let forecast = Forecast::new(&scenario, args.runs)?;
+        candidates.push(Candidate { sensor, forecast });
+    }
+    candidates.sort_by(|a, b| a.forecast.position.rms.total_cmp(&b.forecast.position.rms));
+    if args.json {
+        crate::json::print(&candidates)?;
+    } else if args.compare {
+        println!("{}", table::text(&comparison(&candidates, args.need)));
+    } else {
+        for candidate in &candidates {
+            println!("{}", table::text(&legs(candidate)));
+        }
+    }
+    if let (Some(file), Some(best)) = (&args.out, candidates.first()) {
+        write(file, &picture(&scenario, best).svg())?;
+    }
+    Ok(())
+}
+
+fn write(file: &FilePath, svg: &str) -> anyhow::Result<()> {
+    std::fs::write(file, svg).with_context(|| format!("cannot write {}", file.display()))?;
+    eprintln!("open {}", file.display());
+    Ok(())
+}
+
+/// The scenario; a map gets the robot of the floor plans.
+fn scenario(args: &Args) -> anyhow::Result<Scenario> {
+    let corners = args.path.as_deref().map(route::corners).transpose()?;
+    let mut scenario = match Place::read(&args.map)? {
+        Place::Scenario(scenario) => *scenario,
+        Place::Map(floor) => {
+            let missing = "a map has no path: give one with --path \"x,y x,y …\"";
+            anyhow::ensure!(corners.is_some(), "{}: {missing}", args.map.display());
+            let name = args.map.display().to_string();
+            Scenario { floor, name, ..FloorPlan::new(0).scenario()? }
+        }
+    };
+    if let Some(corners) = corners {
+        scenario.path = route::path(&corners, &scenario.floor, &scenario.robot)?;
+    }
+    Ok(scenario)
+}
+
+/// The scenario with each requested sonar.
+fn fitted(args: &Args, scenario: &Scenario) -> anyhow::Result<Vec<(String, Scenario)>> {
+    let mut scenario = scenario.clone();
+    if let Some(servo) = args.servo {
+        servo.fit(&mut scenario);
+    }
+    if args.compare {
+        return Ok(SonarPreset::ALL.map(|preset| with(preset, &scenario)).to_vec());
+    }
+    let Some(sensor) = &args.sensor else {
+        return Ok(vec![("its own sonar".to_owned(), scenario)]);
+    };
+    if let Ok(preset) = <SonarPreset as clap::ValueEnum>::from_str(sensor, true) {
+        return Ok(vec![with(preset, &scenario)]);
+    }
+    let file = FilePath::new(sensor);
+    anyhow::ensure!(
+        file.exists(),
+        "--sensor: \"{sensor}\" is neither a file nor one of hc-sr04, lv-maxsonar, srf08, \
+         polaroid6500"
+    );
+    scenario.robot = robot_file::read(file)?;
+    Ok(vec![(sensor.clone(), scenario)])
+}
+
+fn with(preset: SonarPreset, scenario: &Scenario) -> (String, Scenario) {
+    let mut scenario = scenario.clone();
+    preset.fit(&mut scenario);
+    (preset.name().to_owned(), scenario)
+}
+
+fn millimetres(spread: Spread) -> String {
+    format!("{:.1} / {:.1}", 1e3 * spread.rms, 1e3 * spread.worst)
+}
+
+fn degrees(spread: Spread) -> String {
+    format!("{:.2} / {:.2}", spread.rms.to_degrees(), spread.worst.to_degrees())
+}
+
+fn point([x, y]: [f64; 2]) -> String {
+    format!("({x:.2}, {y:.2})")
+}
+
+fn blind_note(forecast: &Forecast) -> String {
+    match forecast.blind.first() {
+        None => format!("Never blind for more than {BLIND_AFTER:.0} s."),
+        Some(longest) => format!(
+            "Blind in {:.0} % of the time; the longest: {:.0} s from {} to {} m.",
+            100.0 * forecast.blind_share,
+            longest.seconds,
+            point(longest.from),
+            point(longest.to),
+        ),
+    }
+}
+
+/// Each leg of a path with one sonar.
+fn legs(Candidate { sensor, forecast }: &Candidate) -> Table {
+    let row = |leg: &sonarfix_plan::LegForecast| {
+        let length = (leg.to[0] - leg.from[0]).hypot(leg.to[1] - leg.from[1]);
+        vec![
+            format!("{} to {}", point(leg.from), point(leg.to)),
+            format!("{length:.1}"),
+            millimetres(leg.x),
+            millimetres(leg.y),
+            degrees(leg.heading),
+            format!("{:.0}", leg.blind),
+        ]
+    };
+    Table {
+        title: format!("Forecast with {sensor}: bound on the deviation, RMS / worst"),
+        note: format!(
+            "Whole path: position {} mm, worst at {}; heading {}°; {:.1} ranges per second. {}",
+            millimetres(forecast.position),
+            point(forecast.worst_at),
+            degrees(forecast.heading),
+            forecast.ranges_per_second,
+            blind_note(forecast),
+        ),
+        columns: ["leg (m)", "m", "x (mm)", "y (mm)", "heading (°)", "blind (s)"]
+            .map(str::to_owned)
+            .to_vec(),
+        rows: forecast.legs.iter().map(row).collect(),
+    }
+}
+
+/// One line per sonar.
+fn comparison(candidates: &[Candidate], need: Option<f64>) -> Table {
+    let mut columns =
+        vec!["sonar", "position (mm)", "worst at (m)", "heading (°)", "longest blind (s)"];
+    columns.extend(["blind (%)", "ranges/s"]);
+    columns.extend(need.map(|_| "would do"));
+    let row = |Candidate { sensor, forecast }: &Candidate| {
+        let mut row = vec![
+            sensor.clone(),
+            millimetres(forecast.position),
+            point(forecast.worst_at),
+            degrees(forecast.heading),
+            format!("{:.0}", forecast.blind.first().map_or(0.0, |blind| blind.seconds)),
+            format!("{:.0}", 100.0 * forecast.blind_share),
+            format!("{:.1}", forecast.ranges_per_second),
+        ];
+        let keeps = |need: f64| if 1e3 * forecast.position.worst <= need { "yes" } else { "no" };
+        row.extend(need.map(|need| keeps(need).to_owned()));
+        row
+    };
+    let note = match need {
+        Some(need) => {
+            format!("A sonar suffices if the bound on the position stays within {need} mm.")
+        }
+        None => {
+            format!("Blind: for more than {BLIND_AFTER:.0} s the worst-known direction unseen.")
+        }
+    };
+    Table {
+        title: "Bound along the path, RMS / worst, the best sonar first".to_owned(),
+        note,
+        columns: columns.into_iter().map(str::to_owned).collect(),
+        rows: candidates.iter().map(row).collect(),
+    }
+}
+
+fn picture(scenario: &Scenario, Candidate { sensor, forecast }: &Candidate) -> HeatMap {
+    let heat = |sample: &sonarfix_plan::Sample| Heat {
+        at: sample.at,
+        value: 1e3 * sample.position(),
+        marked: sample.blind,
+    };
+    HeatMap {
+        title: format!("{}: {sensor}", scenario.name),
+        label: "bound on the position error (mm)".to_owned(),
+        mark: format!("blind for more than {BLIND_AFTER:.0} s"),
+        unmapped: Vec::new(),
+        path: forecast.samples.iter().map(heat).collect(),
+        ..picture::place(scenario)
+    }
+}

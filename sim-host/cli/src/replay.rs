@@ -1,0 +1,238 @@
+//! `sonarfix replay`: replays the recording of a robot through the localizer.
+
+use std::fs::File;
+use std::io::{BufReader, BufWriter};
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use indicatif::{ProgressBar, ProgressStyle};
+use sonarfix_map::{Floor, robot_file};
+use sonarfix_replay::fault::Complaint;
+use sonarfix_replay::thinned::{CAPACITY, Thinned};
+use sonarfix_replay::{ByVerdict, Replay, Summary};
+use sonarfix_report::trace_csv;
+use sonarfix_report::{Report, Table};
+
+use crate::overrides::PolicyName;
+use crate::run::Output;
+use crate::table;
+
+/// Maximum number of skipped lines that are printed.
+const SHOWN: u64 = 10;
+
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The log (docs/formats.md).
+    log: PathBuf,
+    /// The map; by default map.toml beside the log.
+    #[arg(long, value_name = "MAP.toml")]
+    map: Option<PathBuf>,
+    /// The robot; by default robot.toml beside the log.
+    #[arg(long, value_name = "ROBOT.toml")]
+    config: Option<PathBuf>,
+    /// The true poses; by default reference.csv beside the log, if it exists.
+    #[arg(long, value_name = "REF.csv")]
+    reference: Option<PathBuf>,
+    /// The policy that chooses the wall to measure; by default that of the robot file.
+    #[arg(long, value_enum)]
+    policy: Option<PolicyName>,
+    /// Ends the replay at the first malformed line.
+    #[arg(long)]
+    strict: bool,
+    /// Writes the trace as CSV (docs/formats.md); a long one is thinned to about 10,000 instants.
+    #[arg(long, value_name = "FILE.csv")]
+    trace: Option<PathBuf>,
+    #[command(flatten)]
+    output: Output,
+}
+
+pub fn execute(args: &Args) -> anyhow::Result<()> {
+    let floor = Floor::read(&beside(&args.log, args.map.as_ref(), "map.toml"))?;
+    let mut robot = robot_file::read(&beside(&args.log, args.config.as_ref(), "robot.toml"))?;
+    if let Some(policy) = args.policy {
+        robot.localizer.policy = policy.into();
+    }
+    let walls = floor.walls();
+    let mut trace = Thinned::new(&floor, robot.localizer.sonar.cone, CAPACITY);
+    let summary =
+        replay(args, &Replay { robot: &robot, walls: &walls, strict: args.strict }, &mut trace)?;
+    if let Some(file) = &args.trace {
+        let out = File::create(file).map(BufWriter::new);
+        let out = out.with_context(|| format!("cannot write the trace {}", file.display()))?;
+        trace_csv::write(trace.trace(), out)?;
+    }
+    let tables = tables(&summary);
+    if args.output.json {
+        crate::json::print(&summary)?;
+    } else {
+        let texts: Vec<_> = tables.iter().map(table::text).collect();
+        println!("{}", texts.join("\n\n"));
+    }
+    if let Some(dir) = &args.output.out {
+        let report = Report {
+            title: format!("Sonarfix: {}", args.log.display()),
+            subtitle: subtitle(&summary, trace.every()),
+            tables,
+            trace: trace.trace(),
+        };
+        eprintln!("open {}", report.write(dir)?.display());
+    }
+    Ok(())
+}
+
+/// A given file, or the one with the default name beside the log.
+fn beside(log: &Path, given: Option<&PathBuf>, name: &str) -> PathBuf {
+    given.cloned().unwrap_or_else(|| log.with_file_name(name))
+}
+
+fn replay(args: &Args, replay: &Replay, trace: &mut Thinned) -> anyhow::Result<Summary> {
+    let open = |path: &Path| File::open(path).with_context(|| path.display().to_string());
+    let usual = args.log.with_file_name("reference.csv");
+    let reference = match &args.reference {
+        Some(given) => Some(open(given)?),
+        None if usual.exists() => Some(open(&usual)?),
+        None => None,
+    };
+    let log = open(&args.log)?;
+    let progress = progress(log.metadata().map_or(0, |metadata| metadata.len()));
+    let mut reported = 0_u64;
+    let mut report = |complaint: &Complaint| {
+        reported += 1;
+        if reported <= SHOWN {
+            progress.suspend(|| eprintln!("skipped: {complaint}"));
+        }
+    };
+    let summary = replay.run(
+        BufReader::new(progress.wrap_read(log)),
+        reference.map(BufReader::new),
+        trace,
+        &mut report,
+    );
+    progress.finish_and_clear();
+    if reported > SHOWN {
+        eprintln!("skipped: {} more lines", reported - SHOWN);
+    }
+    summary.with_context(|| args.log.display().to_string())
+}
+
+/// A progress bar of the bytes read; only on a terminal.
+fn progress(bytes: u64) -> ProgressBar {
+    let style = "{bar:40} {bytes} of {total_bytes}, {eta} left";
+    let bar = ProgressBar::new(bytes);
+    match ProgressStyle::with_template(style) {
+        Ok(style) => bar.with_style(style),
+        Err(_) => bar,
+    }
+}
+
+fn subtitle(summary: &Summary, every: u64) -> String {
+    let thinned = match every {
+        1 => String::new(),
+        _ => format!(" Figures and player show one encoder record in {every}."),
+    };
+    format!("A recording of {:.0} s and {:.0} m.{thinned}", summary.duration, summary.distance)
+}
+
+fn tables(summary: &Summary) -> Vec<Table> {
+    let mut tables = vec![errors(summary), calibration(summary)];
+    if summary.reference_rows > 0 {
+        tables.insert(1, verdicts(summary));
+    }
+    tables
+}
+
+fn errors(s: &Summary) -> Table {
+    let mm = |metres: Option<f64>| cell(metres, |m| format!("{:.1}", m * 1e3));
+    let degrees = |radians: Option<f64>| cell(radians, |r| format!("{:.2}", r.to_degrees()));
+    let rows = [
+        ("position RMS (mm)", mm(s.position_rms), mm(s.odometry_position_rms)),
+        ("position median (mm)", mm(s.position_median), mm(s.odometry_position_median)),
+        ("position worst (mm)", mm(s.position_max), mm(s.odometry_position_max)),
+        ("heading RMS (deg)", degrees(s.heading_rms), degrees(s.odometry_heading_rms)),
+        ("heading median (deg)", degrees(s.heading_median), degrees(s.odometry_heading_median)),
+        ("heading worst (deg)", degrees(s.heading_max), degrees(s.odometry_heading_max)),
+    ];
+    Table {
+        title: "Errors against the reference".to_owned(),
+        note: errors_note(s),
+        columns: ["", "localizer", "encoders alone"].map(str::to_owned).to_vec(),
+        rows: rows
+            .map(|(name, localizer, encoders)| vec![name.to_owned(), localizer, encoders])
+            .to_vec(),
+    }
+}
+
+fn errors_note(s: &Summary) -> String {
+    let at = |time: Option<f64>| cell(time, |t| format!("at {t:.1} s"));
+    let never = |time: Option<f64>| time.map_or("never".to_owned(), |_| at(time));
+    let (reference, consistency) = match s.reference_rows {
+        0 => ("no reference".to_owned(), String::new()),
+        rows => (
+            format!("{rows} rows of the reference"),
+            format!(
+                "; half a metre off {}, beyond 3σ {} ({} of the rows)",
+                never(s.consistency.diverged_at),
+                never(s.consistency.beyond_three_sigma_at),
+                cell(s.consistency.beyond_three_sigma, |share| format!("{:.1} %", 100.0 * share)),
+            ),
+        ),
+    };
+    format!(
+        "{reference}; {:.1} m in {:.1} s; ranges accepted {}, gated {}, refused {}; \
+         lines skipped {} of {};\n\
+         verdict degraded {} ({:.1} s in total), lost {} ({:.1} s in total){consistency}",
+        s.distance,
+        s.duration,
+        s.fixes.accepted,
+        s.fixes.gated,
+        s.fixes.refused,
+        s.lines_skipped,
+        s.lines,
+        never(s.health.degraded_at),
+        s.health.degraded_seconds,
+        never(s.health.lost_at),
+        s.health.lost_seconds,
+    )
+}
+
+fn verdicts(s: &Summary) -> Table {
+    let percent = |share: f64| format!("{:.1}", 100.0 * share);
+    let row = |name: &str, of: ByVerdict| {
+        let cells = [of.sum(), of.tracking, of.degraded, of.lost].map(percent);
+        [[name.to_owned()].as_slice(), cells.as_slice()].concat()
+    };
+    let refusals = s.refusals.iter().map(|(reason, count)| format!("{reason} {count}"));
+    Table {
+        title: "Share of the time by position error and verdict (%)".to_owned(),
+        note: format!("refused: {}", refusals.collect::<Vec<_>>().join(", ")),
+        columns: ["", "all", "tracking", "degraded", "lost"].map(str::to_owned).to_vec(),
+        rows: vec![
+            row("within 0.5 m", s.consistency.within_half_a_metre),
+            row("beyond 0.5 m", s.consistency.beyond_half_a_metre),
+        ],
+    }
+}
+
+fn calibration(s: &Summary) -> Table {
+    let (value, deviation) = (&s.calibration, &s.final_deviation);
+    let rows = [
+        ("S_R (%)", value.scale_right, deviation.scale_right, 100.0),
+        ("S_L (%)", value.scale_left, deviation.scale_left, 100.0),
+        ("track width (mm)", value.track_width, deviation.track_width, 1e3),
+        ("range scale (%)", value.range_scale, deviation.range_scale, 100.0),
+    ];
+    let row = |(name, value, deviation, unit): (&str, f64, f64, f64)| {
+        let cells = [value, deviation].map(|v| format!("{:.3}", v * unit));
+        [[name.to_owned()].as_slice(), cells.as_slice()].concat()
+    };
+    Table {
+        title: "Calibration at the end".to_owned(),
+        note: "scale errors are relative to the wheels of the robot file".to_owned(),
+        columns: ["state", "estimate", "deviation"].map(str::to_owned).to_vec(),
+        rows: rows.map(row).to_vec(),
+    }
+}
+
+fn cell(value: Option<f64>, show: impl Fn(f64) -> String) -> String {
+    value.map_or_else(|| "–".to_owned(), show)
+}

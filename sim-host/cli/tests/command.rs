@@ -1,0 +1,152 @@
+//! The command `sonarfix`.
+
+#![expect(clippy::unwrap_used, reason = "a test should stop")]
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+fn sonarfix(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sonarfix")).args(arguments).output().unwrap()
+}
+
+fn json(arguments: &[&str]) -> Value {
+    let output = sonarfix(arguments);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// The reference scenario, shortened to one lap of 2 m × 1 m around its start.
+fn short_scenario() -> String {
+    sonarfix_map::PAPER
+        .replace("[[0, 40], [-20, 40], [-20, 0], [0, 0]]", "[[0, 2], [-1, 2], [-1, 0], [0, 0]]")
+        .replace("laps = 4", "laps = 1")
+}
+
+fn write(dir: &Path, name: &str, text: &str) -> String {
+    let file = dir.join(name);
+    fs::write(&file, text).unwrap();
+    file.to_str().unwrap().to_owned()
+}
+
+/// Whether `docs/formats.md` has this column or key.
+pub fn documented(name: &str) -> bool {
+    include_str!("../../../docs/formats.md").contains(&format!("`{name}`"))
+}
+
+/// Asserts that every key of a JSON value is documented; the keys of maps by name are excepted.
+pub fn assert_documented(value: &Value) {
+    match value {
+        Value::Object(members) => {
+            for (key, member) in members {
+                assert!(documented(key), "docs/formats.md has no key {key}");
+                assert_documented(member);
+            }
+        }
+        Value::Array(elements) => elements.iter().for_each(assert_documented),
+        _ => {}
+    }
+}
+
+#[test]
+fn paper_answers_in_json_as_documented() {
+    let answer = json(&["paper", "--runs", "3", "--policy", "informative", "--json"]);
+    assert_documented(&answer);
+    let names: Vec<_> = answer["states"].as_array().unwrap().iter().map(|s| &s["name"]).collect();
+    assert_eq!(names, sonarfix_sim::STATES);
+    assert_eq!(answer["runs"], 3);
+    assert_eq!(answer["fixes"]["accepted"], 3 * 1_248);
+    assert_eq!(answer["lost_runs"], 0);
+    for key in ["nees_mean", "nis_mean", "cpu_seconds"] {
+        assert!(answer[key].as_f64().unwrap() > 0.0, "{key}");
+    }
+    for key in ["unit", "mean_error", "std_error", "rms_error", "bound", "rms_over_bound"] {
+        assert!(!answer["states"][0][key].is_null(), "{key}");
+    }
+    for key in ["x", "y", "heading"] {
+        assert!(answer["rms_path"][key].as_f64().unwrap() > 0.0, "{key}");
+    }
+    // Its prior variance is zero: it is not estimated.
+    assert!(answer["states"][6]["rms_over_bound"].is_null());
+}
+
+#[test]
+fn paper_prints_table_1_beside_the_papers() {
+    let output = sonarfix(&["paper", "--runs", "2"]);
+    let text = String::from_utf8(output.stdout).unwrap();
+    let row = text.lines().find(|line| line.starts_with("S_L")).unwrap();
+    assert!(row.ends_with("1.95e-4"), "{row}");
+    // Only the table: no progress bar, no notice.
+    assert!(output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn run_writes_trace_and_report() {
+    let dir = tempfile::tempdir().unwrap();
+    let scenario = write(dir.path(), "short.toml", &short_scenario());
+    let trace = dir.path().join("trace.csv");
+    let out = dir.path().join("report");
+    let arguments = ["run", &scenario, "--runs", "2", "--trace", trace.to_str().unwrap()];
+    let output = sonarfix(&[&arguments[..], &["--out", out.to_str().unwrap()]].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(out.join("report.html").exists());
+
+    let mut reader = csv::Reader::from_path(&trace).unwrap();
+    for column in reader.headers().unwrap() {
+        assert!(documented(column), "docs/formats.md has no column {column}");
+    }
+    let outcome = reader.headers().unwrap().iter().position(|name| name == "fix_outcome").unwrap();
+    let lines: Vec<_> = reader.records().map(Result::unwrap).collect();
+    // 6 m at 0.4 m/s and four turns of 3 s: 27 s, ten ticks and one fix a second.
+    assert_eq!(lines.len(), 270);
+    assert_eq!(lines.iter().filter(|line| !line[outcome].is_empty()).count(), 27);
+}
+
+#[test]
+fn a_seed_gives_the_same_run_again_and_another_seed_another() {
+    let dir = tempfile::tempdir().unwrap();
+    let scenario = write(dir.path(), "short.toml", &short_scenario());
+    let states =
+        |seed| json(&["run", &scenario, "--json", "--runs", "4", "--seed", seed])["states"].clone();
+    assert_eq!(states("5"), states("5"));
+    assert_ne!(states("5"), states("6"));
+}
+
+#[test]
+fn bound_grows_where_nothing_is_measured() {
+    let dir = tempfile::tempdir().unwrap();
+    let scenario = write(dir.path(), "paper.toml", sonarfix_map::PAPER);
+    let rows = json(&["bound", &scenario, "--every", "20", "--json"]);
+    let at = |time: f64| {
+        let rows = rows.as_array().unwrap();
+        rows.iter().find(|row| (row["time"].as_f64().unwrap() - time).abs() < 0.2).unwrap().clone()
+    };
+    let y = |time| at(time)["y"].as_f64().unwrap();
+    // The first leg runs along y, and only walls beside it are measured, until the corner.
+    assert!(y(40.1) < y(60.1) && y(60.1) < y(80.1) && y(80.1) > 0.08, "{}", y(80.1));
+    assert!(y(120.1) < 0.003, "{}", y(120.1));
+}
+
+#[test]
+fn a_wrong_scenario_is_refused_with_file_line_and_key() {
+    let dir = tempfile::tempdir().unwrap();
+    let wrong = short_scenario().replace("noise = \"2.4 mm\"  ", "noise = 2.4  ");
+    let line = 1 + wrong.lines().position(|line| line.starts_with("noise = 2.4")).unwrap();
+    let scenario = write(dir.path(), "wrong.toml", &wrong);
+    let output = sonarfix(&["run", &scenario]);
+    assert!(!output.status.success());
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(error.contains(&format!("wrong.toml:{line}: robot.sonar.noise: ")), "{error}");
+}
+
+#[test]
+fn zero_runs_and_a_missing_file_are_errors() {
+    let output = sonarfix(&["paper", "--runs", "0"]);
+    assert!(!output.status.success());
+    assert_eq!(String::from_utf8_lossy(&output.stderr), "error: --runs must be at least 1\n");
+    let output = sonarfix(&["run", "nowhere.toml"]);
+    assert!(!output.status.success());
+    assert!(String::from_utf8_lossy(&output.stderr).contains("nowhere.toml"));
+}

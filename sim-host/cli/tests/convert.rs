@@ -1,0 +1,220 @@
+//! Conversion of small handwritten recordings.
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "all of this file is a test, its helpers too"
+)]
+
+use std::fmt::Write;
+use std::fs;
+use std::path::Path;
+
+use sonarfix_map::{Floor, robot_file};
+use sonarfix_replay::Summary;
+use sonarfix_replay::convert::carmen::Carmen;
+use sonarfix_replay::convert::lego::{ENCODER_LAG, Lego, Nominal};
+use sonarfix_replay::convert::{ConvertError, Converted};
+use sonarfix_replay::fault::Complaint;
+use tempfile::TempDir;
+
+fn carmen(log: &str) -> (TempDir, Result<Converted, ConvertError>, Vec<String>) {
+    let dir = TempDir::new().unwrap();
+    let file = dir.path().join("made.log");
+    fs::write(&file, log).unwrap();
+    let walls = dir.path().join("walls.csv");
+    fs::write(&walls, "x1_m,y1_m,x2_m,y2_m,scan_support\n-9,2,9,2,7\n-9,-2,9,-2,7\n").unwrap();
+    let mut skipped_lines = Vec::new();
+    let out = dir.path().join("out");
+    let converted = Carmen { from: &file, walls: Some(&walls), to: &out }
+        .convert(&mut |line| skipped_lines.push(line.rsplit('/').next().unwrap().to_owned()));
+    (dir, converted, skipped_lines)
+}
+
+fn read(dir: &TempDir, name: &str) -> String {
+    fs::read_to_string(dir.path().join("out").join(name)).unwrap()
+}
+
+/// The lines of the log without comments, truncated to a length.
+fn records(dir: &TempDir) -> Vec<String> {
+    let log = read(dir, "log.csv");
+    log.lines().filter(|line| !line.starts_with('#')).map(str::to_owned).collect()
+}
+
+#[test]
+fn flaser_and_odom_of_a_corrected_log() {
+    // Ranges ahead and to both sides; one metre ahead, then 90° to the left.
+    let (dir, converted, skipped_lines) = carmen(
+        "# CARMEN Logfile\n\
+         PARAM robot_length 0.5 10.0 host 0.0\n\
+         ODOM 0 0 0 0.5 0 0 10.0 host 0.1\n\
+         FLASER 3 2.0 9.0 2.0 5.0 6.0 0.5 0.5 0 0 10.5 host 0.6\n\
+         ODOM 1 0 0 0.5 0 0 11.0 host 1.1\n\
+         FLASER 3 2.0 8.0 2.0 5.1 6.9 1.5 1 0 0 11.0 host 1.2\n\
+         ODOM 1 0 1.5707963 0.5 0 0 12.0 host 2.1\n",
+    );
+    assert_eq!(skipped_lines, [""; 0]);
+    let expected = Converted { encoders: 4, scans: 2, reference: 2, repeated: 1, skipped: 0 };
+    assert_eq!(converted.unwrap(), expected);
+    let scan = |time, ranges| format!("scan,{time},-1.570796327,1.570796326795,{ranges}");
+    // 90° with the assumed track width of 0.38 m: 0.298451 m per wheel.
+    let expected = [
+        "sonarfix-log,1".to_owned(),
+        "wheels,10.000000,0.000000,0.000000".to_owned(),
+        "start,10.500000,5.000000,6.000000,0.500000,0.05,0.03".to_owned(),
+        "wheels,10.500000,0.500000,0.500000".to_owned(),
+        scan("10.500000", "2.000 9.000 2.000"),
+        "wheels,11.000000,1.000000,1.000000".to_owned(),
+        scan("11.000000", "2.000 8.000 2.000"),
+        "wheels,12.000000,1.298451,0.701549".to_owned(),
+    ];
+    assert_eq!(records(&dir), expected);
+    let expected = "time_s,x_m,y_m,heading_rad\n\
+                    10.500000,5.000000,6.000000,0.500000\n11.000000,5.100000,6.900000,1.500000\n";
+    assert_eq!(read(&dir, "reference.csv"), expected);
+    let out = dir.path().join("out");
+    assert_eq!(Floor::read(&out.join("map.toml")).unwrap().named_walls()[1].name(), "wall 2");
+    let robot = robot_file::read(&out.join("robot.toml")).unwrap();
+    assert!((robot.localizer.sonar.servo.1.0 - std::f32::consts::FRAC_PI_2).abs() < 1e-3);
+}
+
+#[test]
+fn robotlaser_of_a_raw_log_gives_the_mount_and_no_reference() {
+    // The scanner is 0.2 m ahead of the axle; start −1, 0.5 rad from beam to beam; remissions.
+    let (dir, converted, skipped_lines) = carmen(
+        "ROBOTLASER1 0 -1.0 2.0 0.5 80 0.01 0 3 1.5 2.5 80.5 2 7 7 0.2 0 0 0 0 0 \
+         0 0 0.3 0.3 1000000 100.0 host 1.0\n\
+         ROBOTLASER1 0 -1.0 2.0 0.5 80 0.01 0 3 1.5 2.5 80.5 0 0 0.2 1.5707963 0 0 1.5707963 \
+         0 0 0.3 0.3 1000000 101.0 host 2.0\n",
+    );
+    assert_eq!(skipped_lines, [""; 0]);
+    let expected = Converted { encoders: 2, scans: 2, reference: 0, repeated: 0, skipped: 0 };
+    assert_eq!(converted.unwrap(), expected);
+    assert_eq!(records(&dir)[3], "scan,100.000000,-1.000000000,0.500000000000,1.500 2.500 80.500");
+    assert!(!dir.path().join("out/reference.csv").exists());
+    let robot = robot_file::read(&dir.path().join("out/robot.toml")).unwrap();
+    assert!((robot.localizer.sonar.mount.x.0 - 0.2).abs() < 1e-6);
+}
+
+#[test]
+fn the_short_form_and_what_is_wrong_with_it() {
+    let (dir, converted, skipped_lines) = carmen(
+        "O 1 0 0 0\n\
+         S 2 1 0 0 5 6 0.5 4 1 2 0 4\n\
+         O 1.5 9 9 9\n\
+         S 3 1 0 0 5 6 0.5 4 1 2 3\n\
+         O 3 1 0\n\
+         S 4 2 0 0 6 6 0.5 4 1 2 3 4 5\n\
+         S 5 2 0 0 6 6 0.6 4 1 2 3 x\n\
+         O 6 2 0 0",
+    );
+    let expected = [
+        "made.log line 3: goes back in time",
+        "made.log line 4: is no complete message",
+        "made.log line 5: is no complete message",
+        "made.log line 6: is no complete message",
+        "made.log line 7: is no complete message",
+        "made.log line 8: the line is truncated: the file ends before its newline",
+    ];
+    assert_eq!(skipped_lines, expected);
+    let converted = converted.unwrap();
+    assert_eq!((converted.encoders, converted.scans, converted.skipped), (2, 1, 6));
+    // Four beams over half a turn leave out the last one.
+    assert!(
+        records(&dir)[4].starts_with("scan,2.000000,-1.570796327,0.785398163397,1.000 2.000 - ")
+    );
+}
+
+#[test]
+fn a_log_without_scans_is_an_error() {
+    let (_dir, converted, _) = carmen("ODOM 0 0 0 0 0 0 1 host 1\n");
+    assert!(converted.unwrap_err().to_string().ends_with("made.log: has no scans"));
+}
+
+/// A recording of a robot that drives 0.3289 m ahead along the arena's south wall, at 1 m from it.
+fn lego(dir: &Path) {
+    let mut motors = String::new();
+    let mut scans = String::new();
+    let mut reference = "scan_index,t_s,x_mm,y_mm,th_rad,cam_x_mm,cam_y_mm\n".to_owned();
+    for n in 0_u32..=10 {
+        let ticks = n * 100;
+        // Stamped 0.415 s before the scan of the same instant; each poll twice.
+        let row = format!("M {} {ticks} 0 0 0 {ticks} 0 0 0 0 0 0 0\n", n * 1000 + 1000);
+        motors.push_str(&row);
+        motors.push_str(&row);
+        let time = n * 1000 + 1415;
+        let ranges: Vec<String> = (0..660)
+            .map(|beam| {
+                let angle = (f64::from(beam) - 330.0) * 0.006_135_923_151_543 - 0.069_813_17;
+                let range = if angle < -0.3 { 1000.0 / (-angle).sin() } else { 7.0 };
+                format!("{range:.0}")
+            })
+            .collect();
+        writeln!(scans, "S {time} 660 {}", ranges.join(" ")).unwrap();
+        let x = 500.0 + f64::from(ticks) * (0.3289 + 0.3255) / 2.0;
+        writeln!(reference, "{n},{},{x},1000,0,0,0", f64::from(time) / 1e3).unwrap();
+    }
+    scans.push_str("S 13000 660 1 2\nX\n");
+    fs::write(dir.join("a_motors.txt"), motors).unwrap();
+    fs::write(dir.join("a_scan.txt"), scans).unwrap();
+    fs::write(dir.join("derived_reference_laserframe.csv"), reference).unwrap();
+    let walls = "name,x1,y1,x2,y2\nsouth,-1000,0,3000,-0\nwest,-1000,0,-1000,2000\n";
+    fs::write(dir.join("derived_walls_mm.csv"), walls).unwrap();
+}
+
+#[test]
+fn lego_stamps_columns_and_angles() {
+    let dir = TempDir::new().unwrap();
+    lego(dir.path());
+    let out = dir.path().join("out");
+    let mut skipped_lines = Vec::new();
+    let lego =
+        Lego { from: dir.path(), to: &out, nominal: Nominal::Rounded, encoder_lag: ENCODER_LAG };
+    let converted = lego.convert(&mut |line| skipped_lines.push(line)).unwrap();
+    let expected = Converted { encoders: 11, scans: 11, reference: 11, repeated: 11, skipped: 2 };
+    assert_eq!(converted, expected);
+    assert!(
+        skipped_lines[0].ends_with("a_scan.txt line 12: is no `S` record"),
+        "{skipped_lines:?}"
+    );
+    let log = fs::read_to_string(out.join("log.csv")).unwrap();
+    // Encoders and scans of the same instant have the same time.
+    assert!(
+        log.contains("\nticks,2.415000,100,100\n") && log.contains("\nscan,2.415000,-2.094667")
+    );
+    assert!(log.contains("\nstart,1.415000,0.500000,1.000000,0.000000,0.01,0.02\n"));
+    assert!(log.contains(" - -\n"), "7 mm is no range");
+    for nominal in ["robot.toml", "robot-fitted.toml", "robot-rounded.toml", "robot-course.toml"] {
+        let robot = robot_file::read(&out.join(nominal)).unwrap();
+        let right = robot.right_wheel.travel_per_edge.0;
+        let expected = match nominal {
+            "robot-fitted.toml" => 0.3289e-3,
+            "robot-course.toml" => 0.349e-3,
+            _ => 0.327e-3,
+        };
+        assert!((right - expected).abs() < 1e-9, "{nominal}: {right}");
+    }
+    let summary = replay(&out);
+    assert_eq!(summary.lines_skipped, 0);
+    assert!(summary.fixes.accepted >= 8, "{:?}", summary.fixes);
+    // The left wheel is 0.5 % smaller than nominal: the path bends, and the wall corrects it.
+    assert!(summary.position_max.unwrap() < 0.01, "{summary:?}");
+}
+
+fn replay(folder: &Path) -> Summary {
+    let floor = Floor::read(&folder.join("map.toml")).unwrap();
+    let robot = robot_file::read(&folder.join("robot.toml")).unwrap();
+    let walls = floor.walls();
+    let open = |name: &str| std::io::BufReader::new(fs::File::open(folder.join(name)).unwrap());
+    let replay = sonarfix_replay::Replay { robot: &robot, walls: &walls, strict: true };
+    let mut report = |complaint: &Complaint| panic!("{complaint}");
+    replay.run(open("log.csv"), Some(open("reference.csv")), &mut (), &mut report).unwrap()
+}
+
+#[test]
+fn what_is_missing_is_named() {
+    let dir = TempDir::new().unwrap();
+    let out = dir.path().join("out");
+    let lego = Lego { from: dir.path(), to: &out, nominal: Nominal::Fitted, encoder_lag: 0.0 };
+    let error = lego.convert(&mut |_| {}).unwrap_err().to_string();
+    assert!(error.ends_with("has no *_motors.txt"), "{error}");
+}

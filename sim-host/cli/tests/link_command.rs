@@ -1,0 +1,203 @@
+//! The commands `sonarfix monitor`, `command` and `config`.
+
+#![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "a test should stop")]
+
+use std::fs;
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::path::Path;
+use std::process::{Command, Output};
+use std::thread::{self, JoinHandle};
+
+use sonarfix::config::Policy;
+use sonarfix::ekf::{StandardDeviations, StateEstimate};
+use sonarfix::units::{Instant, Metres, Radians};
+use sonarfix_link::message::{CommandError, ImageStatus, Odometry, ResetCause};
+use sonarfix_link::{
+    Command as Order, CommandResult, Deduplicator, Hello, Receiver, Reporter, Sender, Telemetry,
+    baked, frame,
+};
+use sonarfix_map::robot_file;
+
+fn sonarfix(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sonarfix")).args(arguments).output().unwrap()
+}
+
+fn printed(output: &Output) -> (String, String) {
+    let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
+    (text(&output.stdout), text(&output.stderr))
+}
+
+/// A robot on a socket: it ignores the first frames and then answers each command. Returns the
+/// executed commands.
+fn robot(deaf_for: usize, outcome: CommandResult) -> (String, JoinHandle<Vec<Order>>) {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = format!("tcp:{}", listener.local_addr().unwrap());
+    let run = move || {
+        let (mut stream, _) = listener.accept().unwrap();
+        let mut receiver = Receiver::<Order>::new();
+        let (mut answered, mut done) = (Deduplicator::default(), Vec::new());
+        let mut telemetry = Sender::<Telemetry>::new();
+        let (mut answers, mut buffer) = (0, [0; 256]);
+        while let Ok(count @ 1..) = stream.read(&mut buffer) {
+            for frame in buffer[..count].iter().filter_map(|&byte| receiver.push(byte)) {
+                let ack = answered.answer(&frame, |order| {
+                    done.push(*order);
+                    outcome
+                });
+                answers += 1;
+                send(&mut stream, &mut telemetry, &ack, answers > deaf_for);
+            }
+        }
+        done
+    };
+    (port, thread::spawn(run))
+}
+
+/// Sends an answer after some garbage, or only the garbage, as if the answer were lost.
+fn send(stream: &mut TcpStream, sender: &mut Sender<Telemetry>, ack: &Telemetry, whole: bool) {
+    let mut wire = vec![0x55; 20];
+    let mut buffer = frame::EMPTY;
+    let frame = sender.frame(ack, &mut buffer);
+    if whole {
+        wire.extend(frame);
+    }
+    // The other end may already be closed.
+    let _ = stream.write_all(&wire);
+}
+
+#[test]
+fn a_command_is_sent_until_it_is_answered_and_done_once() {
+    let (port, robot) = robot(2, CommandResult::Done);
+    let output = sonarfix(&["command", "--port", &port, "set-pose", "1.5", "-2", "-90"]);
+    let (stdout, stderr) = printed(&output);
+    assert!(output.status.success(), "{stderr}");
+    assert_eq!(stdout, "done\n");
+    let done = robot.join().unwrap();
+    let [Order::SetPose(start)] = done[..] else { panic!("{done:?}") };
+    assert_eq!((start.pose.x, start.pose.y), (Metres(1.5), Metres(-2.0)));
+    assert_eq!(start.pose.heading.radians(), Radians::from_degrees(-90.0));
+}
+
+#[test]
+fn answers_are_printed_in_words() {
+    let (port, robot) = robot(0, CommandResult::Refused(CommandError::NoMap));
+    let output = sonarfix(&["command", "--port", &port, "start"]);
+    assert!(!output.status.success());
+    let refused = "error: the robot refuses: the robot has no valid map in its flash\n";
+    assert_eq!(printed(&output).1, refused);
+    assert_eq!(robot.join().unwrap(), [Order::Start]);
+
+    let (port, robot) = self::robot(0, CommandResult::Map(ImageStatus::Valid(0xbeef)));
+    assert_eq!(
+        printed(&sonarfix(&["command", "--port", &port, "map-checksum"])).0,
+        "map 0000beef\n"
+    );
+    assert_eq!(robot.join().unwrap(), [Order::MapChecksum]);
+}
+
+#[test]
+fn a_robot_that_does_not_answer_is_an_error_in_words() {
+    let (port, robot) = robot(usize::MAX, CommandResult::Done);
+    let output = sonarfix(&["command", "--port", &port, "stop"]);
+    assert!(!output.status.success());
+    assert!(
+        printed(&output).1.starts_with("error: no answer after 10 attempts (0 frames received, ")
+    );
+    assert_eq!(robot.join().unwrap(), [Order::Stop], "ten frames received, one executed");
+    let output = sonarfix(&["command", "--port", "nowhere/at/all", "stop"]);
+    assert!(printed(&output).1.starts_with("error: cannot open the port nowhere/at/all: "));
+    let output = sonarfix(&["command", "--port", "-", "stop"]);
+    assert!(printed(&output).1.contains("this port can only be read"));
+}
+
+fn write(dir: &Path, name: &str, bytes: &[u8]) -> String {
+    let file = dir.join(name);
+    fs::write(&file, bytes).unwrap();
+    file.to_str().unwrap().to_owned()
+}
+
+#[test]
+fn the_monitor_shows_a_recorded_stream_and_records_its_log() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut sender = Sender::<Telemetry>::new();
+    let mut wire = b"boot: a line of text that no frame is\n".to_vec();
+    let mut send =
+        |telemetry| wire.extend(sender.frame(&telemetry, &mut frame::EMPTY.clone()).to_vec());
+    send(Telemetry::Hello(Hello {
+        firmware: [1, 2, 3],
+        map: ImageStatus::Missing,
+        configuration: ImageStatus::Valid(0x1234_5678),
+        reset: ResetCause::Watchdog,
+    }));
+    let at = Instant::from_ticks(2_500_000);
+    let state = StateEstimate {
+        x: Metres(1.25),
+        y: Metres(-0.5),
+        scale_left: 0.001,
+        ..StateEstimate::default()
+    };
+    let deviation = StandardDeviations {
+        x: Metres(0.01),
+        y: Metres(0.01),
+        heading: Radians(0.02),
+        ..StandardDeviations::default()
+    };
+    send(Reporter::resume(at, state, deviation).1);
+    let later = Instant::from_ticks(2_600_000);
+    send(Telemetry::Odometry(Odometry { at: later, right_metres: 0.1, left_metres: 0.0625 }));
+    let stream = write(dir.path(), "stream.bin", &wire);
+    let log = dir.path().join("log.csv");
+    let output = sonarfix(&["monitor", "--port", &stream, "--record", log.to_str().unwrap()]);
+    let (stdout, stderr) = printed(&output);
+    assert!(output.status.success(), "{stderr}");
+    let robot = "robot   1.2.3, started by the watchdog; map missing, configuration 12345678";
+    assert!(stdout.starts_with(robot), "{stdout}");
+    assert!(stdout.contains("pose    x 1.250 m ± 10.0 mm, y -0.500 m ± 10.0 mm"), "{stdout}");
+    let link = "link    3 frames, 0 lost, 0 restarts; skipped: 1 corrupt, 0 too long";
+    assert!(stdout.contains(link), "{stdout}");
+    let expected = "sonarfix-log,1\n\
+        resume,2.500000,1.25,-0.5,0,0,0.0010000000474974513,0,0,\
+        0.009999999776482582,0.009999999776482582,0.019999999552965164,0,0,0,0\n\
+        wheels,2.500000,0,0\n\
+        wheels,2.600000,0.1,0.0625\n";
+    assert_eq!(fs::read_to_string(log).unwrap(), expected);
+}
+
+/// A robot file.
+const ROBOT: &str = include_str!("robot.toml");
+
+#[test]
+fn a_configuration_is_baked_checked_and_shown() {
+    let dir = tempfile::tempdir().unwrap();
+    let robot = write(dir.path(), "robot.toml", ROBOT.as_bytes());
+    let baked_file = dir.path().join("config.bin");
+    let baked_name = baked_file.to_str().unwrap();
+    let output = sonarfix(&["config", "bake", &robot, "--out", baked_name]);
+    assert!(output.status.success(), "{}", printed(&output).1);
+    let config = baked::read(&fs::read(&baked_file).unwrap()).unwrap();
+    assert_eq!(config, robot_file::parse(ROBOT, "robot.toml").unwrap());
+    assert_eq!(config.localizer.policy, Policy::Nearest);
+
+    let checksum = format!("checksum {:08x}", baked::checksum(&config));
+    let check = sonarfix(&["config", "check", baked_name]);
+    assert!(printed(&check).0.contains(&checksum));
+    // The output is a robot file with the same checksum except for angles, which are in degrees.
+    let (shown, _) = printed(&sonarfix(&["config", "show", baked_name]));
+    assert!(shown.contains(&checksum), "{shown}");
+    let shown = robot_file::parse(&shown, "shown").unwrap();
+    assert_eq!(shown.left_wheel, config.left_wheel);
+    assert_eq!(shown.ranger, config.ranger);
+    assert_eq!(shown.localizer.gating, config.localizer.gating);
+
+    let mut damaged = fs::read(&baked_file).unwrap();
+    damaged[40] ^= 1;
+    let damaged = write(dir.path(), "damaged.bin", &damaged);
+    for what in ["check", "show"] {
+        let output = sonarfix(&["config", what, &damaged]);
+        assert!(!output.status.success());
+        let expected =
+            format!("error: {damaged}: the configuration is damaged: its checksum is wrong\n");
+        assert_eq!(printed(&output).1, expected);
+    }
+}

@@ -1,0 +1,19 @@
+//! Tests of the command and of the packages behind it, in one program, which links once.
+
+mod command;
+mod common;
+mod convert;
+mod endings;
+mod faults;
+mod find;
+mod floor_plan;
+mod link_command;
+mod map_command;
+mod monitor;
+mod plan;
+mod recordings;
+mod replay;
+mod replay_command;
+mod report_in_chromium;
+mod skipped;
+mod sonar_model;

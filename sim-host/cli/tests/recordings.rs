@@ -1,0 +1,101 @@
+//! Recordings of real robots. They are not part of the project: the tests read them from the folder
+//! `SONARFIX_DATA`, or from `../shared/data` beside the project, and are reported as skipped without
+//! it.
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "all of this file is a test, its helpers too"
+)]
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::skipped;
+
+fn sonarfix(args: &[&str]) -> Output {
+    let output = Command::new(env!("CARGO_BIN_EXE_sonarfix")).args(args).output().unwrap();
+    assert!(output.status.success(), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
+    output
+}
+
+fn replay(folder: &Path, robot: &str, policy: &str) -> Value {
+    let log = folder.join("log.csv");
+    let robot = folder.join(robot);
+    let (log, robot) = (log.to_str().unwrap(), robot.to_str().unwrap());
+    let args = ["replay", log, "--config", robot, "--policy", policy, "--strict", "--json"];
+    serde_json::from_slice(&sonarfix(&args).stdout).unwrap()
+}
+
+fn number(value: &Value, key: &str) -> f64 {
+    value[key].as_f64().unwrap_or_else(|| panic!("no number {key} in {value}"))
+}
+
+fn lego() -> Option<TempDir> {
+    let from = skipped::unless_recorded("lego_urg")?;
+    let dir = TempDir::new().unwrap();
+    let to = dir.path().to_str().unwrap();
+    sonarfix(&["convert", "lego", from.to_str().unwrap(), "--out", to]);
+    Some(dir)
+}
+
+#[test]
+fn lego_from_the_fitted_wheels() {
+    let Some(dir) = lego() else { return };
+    for policy in ["nearest", "informative"] {
+        let found = replay(dir.path(), "robot-fitted.toml", policy);
+        let rms = number(&found, "position_rms");
+        assert!(rms < 0.020, "{policy}: {rms}");
+        // Dead reckoning is several times worse.
+        assert!(number(&found, "odometry_position_rms") > 5.0 * rms, "{found}");
+        // One range in 0.8 s; some are echoes of an unmapped post, and gated.
+        let fixes = |key| number(&found["fixes"], key);
+        let turns = fixes("accepted") + fixes("gated") + fixes("refused");
+        assert!(turns <= (number(&found, "duration") / 0.8).ceil(), "{found}");
+        assert!(fixes("gated") >= 5.0 && fixes("accepted") >= 0.4 * turns, "{found}");
+    }
+}
+
+#[test]
+fn lego_from_rounded_wheels_estimates_the_fitted_ones() {
+    let Some(dir) = lego() else { return };
+    for policy in ["nearest", "informative"] {
+        let found = replay(dir.path(), "robot-rounded.toml", policy);
+        let rms = number(&found, "position_rms");
+        assert!(rms < 0.025, "{policy}: {rms}");
+        let end = &found["final"];
+        // In a minute each wheel is estimated to 0.4 %, and the observable difference more accurately.
+        let fitted = [("scale_right", 0.3289 / 0.327 - 1.0), ("scale_left", 0.3255 / 0.327 - 1.0)];
+        let [right, left] = fitted.map(|(state, fitted)| number(end, state) - fitted);
+        for error in [right, left] {
+            assert!(error.abs() < 0.008, "{policy}: off by {error}; {end}");
+        }
+        let kept = (right - left).abs() / (fitted[0].1 - fitted[1].1);
+        assert!(kept < 0.5, "{policy}: the difference keeps {kept} of its error; {end}");
+    }
+}
+
+#[test]
+fn the_verdict_on_freiburg_becomes_lost() {
+    let Some(folder) = skipped::unless_recorded("carmen") else { return };
+    let dir = TempDir::new().unwrap();
+    let to = dir.path().to_str().unwrap();
+    let log = folder.join("freiburg-079_rawodo.txt.gz");
+    let walls = folder.join("freiburg-079_walls.csv");
+    let (log, walls) = (log.to_str().unwrap(), walls.to_str().unwrap());
+    sonarfix(&["convert", "carmen", log, "--walls", walls, "--out", to]);
+    for policy in ["nearest", "informative"] {
+        let found = replay(dir.path(), "robot.toml", policy);
+        let diverged = number(&found["consistency"], "diverged_at");
+        // Longer than dead reckoning, whose error reaches half a metre after 18 s.
+        assert!(diverged > 120.0, "{policy}: diverged at {diverged} s");
+        // It diverges, which the verdict reports: at first `Degraded`, then `Lost`.
+        let undetected = number(&found["consistency"]["beyond_half_a_metre"], "tracking");
+        assert!(undetected < 0.01, "{policy}: {undetected}");
+        let lost = number(&found["health"], "lost_at");
+        assert!(lost < diverged + 40.0, "{policy}: lost at {lost} s, diverged at {diverged} s");
+        assert_eq!(found["health"]["lost_at_end"], true);
+    }
+}

@@ -1,0 +1,83 @@
+//! The command `sonarfix replay`.
+#![expect(clippy::unwrap_used, reason = "all of this file is a test, its helpers too")]
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::command::assert_documented;
+use crate::common::{MAP, ROBOT, Sonar, recording};
+
+/// A folder with a recording in it.
+fn folder(log: &str, reference: &str) -> TempDir {
+    let dir = TempDir::new().unwrap();
+    let files =
+        [("log.csv", log), ("reference.csv", reference), ("map.toml", MAP), ("robot.toml", ROBOT)];
+    for (name, text) in files {
+        fs::write(dir.path().join(name), text).unwrap();
+    }
+    dir
+}
+
+fn sonarfix(dir: &Path, args: &[&str]) -> Output {
+    let program = Path::new(env!("CARGO_BIN_EXE_sonarfix"));
+    Command::new(program).current_dir(dir).args(args).output().unwrap()
+}
+
+#[test]
+fn files_beside_the_log_are_found_and_the_json_has_its_keys() {
+    let (log, reference) = recording(20, Sonar::Scans);
+    let dir = folder(&log, &reference);
+    let args = ["replay", "log.csv", "--json", "--out", "report", "--trace", "trace.csv"];
+    let output = sonarfix(dir.path(), &args);
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{stderr}");
+    assert_eq!(stderr.lines().count(), 1, "no progress in a pipe: {stderr}");
+    let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_documented(&found);
+    let keys = ["position_rms", "position_median", "position_max", "heading_rms"];
+    for key in keys.into_iter().chain(["odometry_position_rms"]) {
+        assert!(found[key].as_f64().unwrap() > 0.0, "{key}");
+    }
+    for key in ["accepted", "gated", "refused"] {
+        assert!(found["fixes"][key].is_u64(), "{key}");
+    }
+    for key in ["scale_right", "scale_left", "track_width", "range_scale"] {
+        assert!(found["final"][key].is_f64(), "{key}");
+    }
+    let page = fs::read_to_string(dir.path().join("report/report.html")).unwrap();
+    assert!(page.contains("Errors against the reference"));
+    let trace = fs::read_to_string(dir.path().join("trace.csv")).unwrap();
+    assert!(trace.lines().count() >= 200);
+}
+
+#[test]
+fn without_a_reference_there_are_no_errors_to_print() {
+    let (log, _) = recording(20, Sonar::Ranges);
+    let dir = folder(&log, "");
+    fs::remove_file(dir.path().join("reference.csv")).unwrap();
+    let output = sonarfix(dir.path(), &["replay", "log.csv"]);
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success() && text.contains("no reference;"), "{text}");
+    let missing = sonarfix(dir.path(), &["replay", "log.csv", "--reference", "other.csv"]);
+    assert!(!missing.status.success(), "a reference that is asked for must be there");
+}
+
+#[test]
+fn ten_lines_are_printed_and_the_rest_counted() {
+    let (log, reference) = recording(20, Sonar::Ranges);
+    let dir = folder(&format!("{log}{}", "?\n".repeat(25)), &reference);
+    let output = sonarfix(dir.path(), &["replay", "log.csv"]);
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    let first = format!("skipped: log line {}: `?` is none of", log.lines().count() + 1);
+    assert!(stderr.starts_with(&first), "{stderr}");
+    assert_eq!(stderr.lines().count(), 11);
+    assert!(stderr.ends_with("skipped: 15 more lines\n"), "{stderr}");
+    assert!(String::from_utf8_lossy(&output.stdout).contains("lines skipped 25 of"));
+    let strict = sonarfix(dir.path(), &["replay", "log.csv", "--strict"]);
+    let stderr = String::from_utf8_lossy(&strict.stderr);
+    assert!(!strict.status.success() && stderr.contains("`?` is none of"), "{stderr}");
+}

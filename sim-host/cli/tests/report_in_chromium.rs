@@ -1,0 +1,157 @@
+//! Opens a report in headless Chromium and checks that the page works.
+#![expect(clippy::unwrap_used, reason = "all of this file is a test, its helpers too")]
+
+use std::f64::consts::FRAC_PI_2;
+use std::path::Path;
+use std::process::Command;
+
+use sonarfix_report::{Report, Table};
+use sonarfix_sim::trace::{
+    Calibration, Estimate, FixRecord, Outcome, Pose, Tick, Trace, Truth, Wall,
+};
+use sonarfix_sim::world::reflector::Source;
+
+use crate::skipped;
+
+/// Names of the Chromium executable.
+const BROWSERS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "chrome"];
+
+/// No window, network or services; virtual time, so that the page's five seconds pass at once.
+const FLAGS: [&str; 10] = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--virtual-time-budget=5000",
+    "--dump-dom",
+];
+
+/// A name that would end the script of a page without escapes.
+const HOSTILE: &str = "north </script><b>wall</b> & \"more\"";
+
+fn browser() -> Option<&'static str> {
+    let answers = |name: &&str| Command::new(name).arg("--version").output().is_ok();
+    BROWSERS.into_iter().find(answers)
+}
+
+/// The page after its scripts ran.
+fn opened(browser: &str, page: &Path) -> String {
+    let profile = tempfile::tempdir().unwrap();
+    let output = Command::new(browser)
+        .args(FLAGS)
+        .arg(format!("--user-data-dir={}", profile.path().display()))
+        .arg(format!("file://{}", page.display()))
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// A room 2 m wide, crossed in 20 s, with a cycle of every outcome.
+fn trace(truth_known: bool) -> Trace {
+    let wall = |name: &str, from, to| Wall { name: name.into(), from, to };
+    Trace {
+        walls: vec![wall(HOSTILE, [0.0, 2.0], [2.0, 2.0]), wall("south", [0.0, 0.0], [2.0, 0.0])],
+        cone: 0.26,
+        ticks: (0..200).map(|n| tick(f64::from(n) * 0.1, truth_known)).collect(),
+        fixes: vec![
+            fix(1.0, Outcome::Accepted, Some(1.0), ""),
+            fix(2.0, Outcome::Gated, Some(0.4), ""),
+            fix(3.0, Outcome::Refused, None, "no echo </script>"),
+        ],
+    }
+}
+
+fn tick(time: f64, truth_known: bool) -> Tick {
+    let pose = Pose { x: 0.2 + 0.05 * time, y: 1.0, heading: 0.0 };
+    let calibration = Calibration { track_width: 0.1, ..Calibration::default() };
+    let estimate = Estimate {
+        pose: Pose { x: pose.x + 0.002, ..pose },
+        calibration,
+        deviation: [0.003, 0.002, 0.01, 1e-3, 1e-3, 1e-3, 1e-3],
+        covariance_xy: 1e-6,
+    };
+    let truth = truth_known.then_some(Truth { pose, calibration: Some(calibration) });
+    let odometry = Pose { y: 1.0 + 0.01 * time, ..pose };
+    Tick { time, truth, estimate, odometry, bound: None }
+}
+
+fn fix(time: f64, outcome: Outcome, range: Option<f64>, reason: &str) -> FixRecord {
+    FixRecord {
+        time,
+        wall: Some(0),
+        sonar: [0.2 + 0.05 * time, 1.0],
+        direction: FRAC_PI_2,
+        bearing: FRAC_PI_2,
+        range,
+        source: Some(Source::Obstacle),
+        why: None,
+        outcome,
+        reason: reason.into(),
+        innovation: range.map(|range| range - 1.0),
+        innovation_variance: range.map(|_| 1e-5),
+    }
+}
+
+/// Writes a report and opens it; `None`, with a message, without a browser.
+fn report_opened(trace: &Trace) -> Option<String> {
+    let Some(browser) = browser() else {
+        skipped::because(&format!("none of {BROWSERS:?} is on the path"));
+        return None;
+    };
+    let dir = tempfile::tempdir().unwrap();
+    let table = Table {
+        title: "Errors".into(),
+        note: String::new(),
+        columns: vec!["state".into(), "mean".into()],
+        rows: vec![vec!["heading".into(), "0.125 deg".into()]],
+    };
+    let report = Report {
+        title: "A <small> room".into(),
+        subtitle: "seed 1".into(),
+        tables: vec![table],
+        trace,
+    };
+    Some(opened(browser, &report.write(dir.path()).unwrap()))
+}
+
+/// The opening tag of the page.
+fn root(dom: &str) -> &str {
+    let from = dom.find("<html").unwrap();
+    dom.get(from..from + dom.get(from..).unwrap().find('>').unwrap()).unwrap()
+}
+
+/// The player has drawn, and no script has failed.
+fn assert_ready(dom: &str) {
+    assert!(root(dom).contains("data-ready=\"true\""), "{}", root(dom));
+    assert!(!root(dom).contains("data-error"), "{}", root(dom));
+}
+
+#[test]
+fn the_page_draws_without_an_error() {
+    for truth_known in [true, false] {
+        let Some(dom) = report_opened(&trace(truth_known)) else {
+            return;
+        };
+        assert_ready(&dom);
+        assert_eq!(dom.matches("<svg").count(), 5);
+        assert!(dom.contains("<h1>A &lt;small&gt; room</h1>"));
+        assert!(dom.contains("<td>0.125 deg</td>"));
+        assert!(dom.contains("\"source\":[\"obstacle\""), "the player does not know what was met");
+        assert!(dom.contains("0.0 s of 19.9 s"), "the player shows no time");
+    }
+}
+
+#[test]
+fn the_page_of_a_run_without_ticks_has_a_placeholder() {
+    let Some(dom) = report_opened(&Trace::default()) else {
+        return;
+    };
+    assert_ready(&dom);
+    assert!(dom.contains("there is nothing to draw"));
+    assert!(!dom.contains("<svg"));
+}

@@ -1,0 +1,90 @@
+//! Telemetry of a robot on the PC: displayed live, and recorded as a log that can be replayed.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`port`] | serial ports, sockets and files |
+//! | this one | [`Monitor`]: the latest telemetry |
+//! | [`view`] | the latest telemetry as text |
+//! | [`recording`] | telemetry as a log |
+//! | [`request`] | a command, repeated until it is acknowledged |
+
+pub mod port;
+pub mod recording;
+pub mod request;
+pub mod view;
+
+use sonarfix::localizer::Fix;
+use sonarfix_link::message::{LoopStatus, Telemetry};
+use sonarfix_link::{Estimate, Gaps, Hello, Ping, Receiver, ReceiverCounters};
+
+use sonarfix_sim::statistics::FixCounts;
+
+/// The latest telemetry of a robot.
+#[derive(Debug, Default)]
+pub struct Monitor {
+    receiver: Receiver<Telemetry>,
+    gaps: Gaps,
+    hello: Option<Hello>,
+    estimate: Option<Estimate>,
+    ping: Option<Ping>,
+    fixes: FixCounts,
+    state: Option<LoopStatus>,
+}
+
+/// A telemetry message.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Received {
+    /// Number of frames lost before it.
+    pub lost: u32,
+    /// The message.
+    pub telemetry: Telemetry,
+}
+
+impl Monitor {
+    /// Processes a received byte; returns the message that it completes.
+    pub fn push(&mut self, byte: u8) -> Option<Received> {
+        let frame = self.receiver.push(byte)?;
+        let lost = self.gaps.take(frame.sequence);
+        match frame.message {
+            Telemetry::Hello(hello) => self.hello = Some(hello),
+            Telemetry::Initialized(estimate) => {
+                self.estimate = Some(estimate);
+                self.ping = None;
+                self.fixes = FixCounts::default();
+            }
+            Telemetry::Estimate(estimate) | Telemetry::PoseSet(estimate) => {
+                self.estimate = Some(estimate);
+            }
+            Telemetry::Ping(ping) => {
+                let fixes = &mut self.fixes;
+                *match ping.fix {
+                    Fix::Accepted(_) | Fix::Downweighted(_) => &mut fixes.accepted,
+                    Fix::Gated(_) => &mut fixes.gated,
+                    _ => &mut fixes.refused,
+                } += 1;
+                self.ping = Some(ping);
+            }
+            Telemetry::LoopStatus(state) => self.state = Some(state),
+            Telemetry::Odometry(_) | Telemetry::SkippedPing(_) | Telemetry::Ack(_) => {}
+        }
+        Some(Received { lost, telemetry: frame.message })
+    }
+
+    /// Counters of the receiver.
+    #[must_use]
+    pub fn counters(&self) -> ReceiverCounters {
+        self.receiver.counters()
+    }
+
+    /// Counters of lost frames.
+    #[must_use]
+    pub fn gaps(&self) -> Gaps {
+        self.gaps
+    }
+
+    /// The last estimate.
+    #[must_use]
+    pub fn estimate(&self) -> Option<&Estimate> {
+        self.estimate.as_ref()
+    }
+}

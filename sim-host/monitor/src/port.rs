@@ -1,0 +1,102 @@
+//! A connection to a robot: serial port, socket or file.
+
+use std::fs::File;
+use std::io::{self, ErrorKind, Read, Write};
+use std::net::TcpStream;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::time::Duration;
+
+use anyhow::Context;
+use serial2::SerialPort;
+
+/// Timeout of a read, so that the reader can check the time.
+const TIMEOUT: Duration = Duration::from_millis(100);
+
+/// A connection to a robot.
+pub struct Port {
+    reader: Box<dyn Read>,
+    writer: Option<Box<dyn Write>>,
+}
+
+impl Port {
+    /// Opens a port by its name: `-` for the standard input, `tcp:HOST:PORT` for a socket, else a
+    /// path, of a serial port (`/dev/ttyUSB0`, `COM3`), a FIFO or a recorded file.
+    ///
+    /// # Errors
+    /// If it cannot be opened; with the name.
+    pub fn open(name: &str, baud: u32) -> anyhow::Result<Self> {
+        let port = if name == "-" {
+            Ok(Self { reader: Box::new(io::stdin()), writer: None })
+        } else if let Some(address) = name.strip_prefix("tcp:") {
+            Self::socket(address)
+        } else if is_plain(Path::new(name)) {
+            File::open(name).map(|file| Self { reader: Box::new(file), writer: None })
+        } else {
+            Self::serial(name, baud)
+        };
+        port.with_context(|| format!("cannot open the port {name}"))
+    }
+
+    fn socket(address: &str) -> io::Result<Self> {
+        let stream = TcpStream::connect(address)?;
+        stream.set_read_timeout(Some(TIMEOUT))?;
+        let writer = stream.try_clone()?;
+        Ok(Self { reader: Box::new(stream), writer: Some(Box::new(writer)) })
+    }
+
+    fn serial(name: &str, baud: u32) -> io::Result<Self> {
+        let mut port = SerialPort::open(name, baud)?;
+        port.set_read_timeout(TIMEOUT)?;
+        let writer = port.try_clone()?;
+        Ok(Self { reader: Box::new(port), writer: Some(Box::new(writer)) })
+    }
+
+    /// Sends bytes.
+    ///
+    /// # Errors
+    /// Errors of the port, or if it is read-only.
+    pub fn send(&mut self, bytes: &[u8]) -> anyhow::Result<()> {
+        let writer = self.writer.as_mut();
+        let writer = writer.context("this port can only be read: give a serial port or tcp:…")?;
+        writer.write_all(bytes).and_then(|()| writer.flush()).context("cannot send to the port")
+    }
+
+    /// Reads bytes to the end, or until `take` breaks. After a timeout `take` gets an empty slice.
+    ///
+    /// # Errors
+    /// Errors of the port or of `take`.
+    pub fn read<B>(
+        &mut self,
+        mut take: impl FnMut(&[u8]) -> anyhow::Result<ControlFlow<B>>,
+    ) -> anyhow::Result<Option<B>> {
+        let mut buffer = [0; 4096];
+        loop {
+            let count = match self.reader.read(&mut buffer) {
+                Ok(0) => return Ok(None),
+                Ok(count) => count,
+                Err(error) if is_silence(error.kind()) => 0,
+                Err(error) => return Err(error).context("cannot read from the port"),
+            };
+            if let ControlFlow::Break(found) = take(buffer.get(..count).unwrap_or_default())? {
+                return Ok(Some(found));
+            }
+        }
+    }
+}
+
+fn is_silence(kind: ErrorKind) -> bool {
+    matches!(kind, ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted)
+}
+
+/// Whether a path is a file or a FIFO, not a device.
+fn is_plain(path: &Path) -> bool {
+    let Ok(metadata) = path.metadata() else {
+        return false;
+    };
+    #[cfg(unix)]
+    let is_fifo = std::os::unix::fs::FileTypeExt::is_fifo(&metadata.file_type());
+    #[cfg(not(unix))]
+    let is_fifo = false;
+    metadata.is_file() || is_fifo
+}

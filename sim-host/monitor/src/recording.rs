@@ -1,0 +1,184 @@
+//! Telemetry as a log that `sonarfix replay` reads (`docs/formats.md`, "Logs").
+//!
+//! The log has all inputs of the localizer, so a replay reproduces its estimates bit for bit if no
+//! frame was lost. A log has one start; when the robot restarts, a new log begins.
+
+use std::fs::File;
+use std::io::{self, LineWriter, Write};
+use std::path::PathBuf;
+
+use sonarfix::ekf::STATES;
+use sonarfix::units::Instant;
+use sonarfix_link::message::{Odometry, SkippedPing};
+use sonarfix_link::{Estimate, Ping, Telemetry};
+use sonarfix_replay::log::HEADER;
+
+use crate::Received;
+
+/// Writes logs to files: the first to the given path, further ones with a number in the name.
+#[derive(Debug)]
+pub struct Recording {
+    path: PathBuf,
+    written: u32,
+    log: Option<Log<LineWriter<File>>>,
+    /// The last odometry, for a log that begins during a run or after the pose has been set.
+    step: Option<Odometry>,
+}
+
+impl Recording {
+    /// A recording to `path`, which is created when the robot starts or its first estimate arrives.
+    #[must_use]
+    pub fn new(path: PathBuf) -> Self {
+        Self { path, written: 0, log: None, step: None }
+    }
+
+    /// Number of logs begun.
+    #[must_use]
+    pub fn logs(&self) -> u32 {
+        self.written
+    }
+
+    /// Records a message.
+    ///
+    /// # Errors
+    /// If a file cannot be written.
+    pub fn take(&mut self, received: &Received) -> io::Result<()> {
+        if let Telemetry::Odometry(step) = &received.telemetry {
+            // The robot has restarted, and the frame that reports it was lost.
+            self.log = self.log.take().filter(|log| step.at >= log.last);
+            self.step = Some(*step);
+        }
+        match (&received.telemetry, &mut self.log) {
+            (Telemetry::Initialized(began), _) => {
+                let file = self.next_file()?;
+                self.log = Some(Log::begin(file, began)?);
+            }
+            (Telemetry::PoseSet(estimate), _) => {
+                if let Some(step) = self.step.filter(|step| step.at == estimate.at) {
+                    let file = self.next_file()?;
+                    self.log = Some(Log::join(file, estimate, &step)?);
+                }
+            }
+            (_, Some(log)) => log.take(received)?,
+            (Telemetry::Estimate(estimate), None) => {
+                if let Some(step) = self.step.filter(|step| step.at == estimate.at) {
+                    let file = self.next_file()?;
+                    self.log = Some(Log::join(file, estimate, &step)?);
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn next_file(&mut self) -> io::Result<LineWriter<File>> {
+        self.written += 1;
+        let mut path = self.path.clone();
+        if self.written > 1 {
+            let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
+            path.set_file_name(format!("{stem}-{}", self.written));
+            if let Some(extension) = self.path.extension() {
+                path.set_extension(extension);
+            }
+        }
+        Ok(LineWriter::new(File::create(path)?))
+    }
+}
+
+/// One log.
+#[derive(Debug)]
+pub struct Log<W> {
+    out: W,
+    /// The time of the last encoder record.
+    last: Instant,
+}
+
+impl<W: Write> Log<W> {
+    /// A log from the start of a robot.
+    ///
+    /// # Errors
+    /// Errors of the writer.
+    pub fn begin(out: W, began: &Estimate) -> io::Result<Self> {
+        Self::of(out, "", began, [0.0, 0.0])
+    }
+
+    /// A log that begins during a run, from an estimate and the odometry before it. It lacks the
+    /// correlations of the estimate, so a replay approximates the robot's estimates.
+    ///
+    /// # Errors
+    /// Errors of the writer.
+    pub fn join(out: W, estimate: &Estimate, step: &Odometry) -> io::Result<Self> {
+        let note = "# recorded from the middle of a run: the replay starts from an estimate\n";
+        Self::of(out, note, estimate, [step.right_metres, step.left_metres])
+    }
+
+    fn of(mut out: W, note: &str, start: &Estimate, wheels: [f64; 2]) -> io::Result<Self> {
+        writeln!(
+            out,
+            "{HEADER}\n{note}resume,{}{}{}",
+            Time(start.at),
+            List(start.state.to_array()),
+            List(start.deviation.to_array())
+        )?;
+        let [right, left] = wheels;
+        writeln!(out, "wheels,{},{right},{left}", Time(start.at))?;
+        Ok(Self { out, last: start.at })
+    }
+
+    /// Records a message.
+    ///
+    /// # Errors
+    /// Errors of the writer.
+    pub fn take(&mut self, received: &Received) -> io::Result<()> {
+        if received.lost > 0 {
+            writeln!(self.out, "# {} frames were lost here", received.lost)?;
+        }
+        match &received.telemetry {
+            Telemetry::Odometry(step) => self.step(step),
+            Telemetry::Ping(ping) => self.ping(ping),
+            Telemetry::SkippedPing(SkippedPing { at, .. }) => {
+                writeln!(self.out, "skip,{}", Time(*at))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn step(&mut self, step: &Odometry) -> io::Result<()> {
+        // A step without duration has no travel, and a log has one encoder record per instant.
+        if step.at > self.last {
+            self.last = step.at;
+            let Odometry { at, right_metres, left_metres } = step;
+            writeln!(self.out, "wheels,{},{right_metres},{left_metres}", Time(*at))?;
+        }
+        Ok(())
+    }
+
+    fn ping(&mut self, ping: &Ping) -> io::Result<()> {
+        let range = ping.outcome.map_or(String::new(), |echo| f64::from(echo.range.0).to_string());
+        let (time, bearing) = (Time(ping.at), f64::from(ping.aim.bearing.0));
+        writeln!(self.out, "range,{time},{bearing},{range},{}", ping.aim.wall.0)
+    }
+}
+
+/// Seconds, to the microsecond.
+struct Time(Instant);
+
+impl std::fmt::Display for Time {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let micros = self.0.ticks();
+        write!(f, "{}.{:06}", micros / 1_000_000, micros % 1_000_000)
+    }
+}
+
+/// A comma and a number for each state. As `f64`, whose shortest decimals give the same `f32` again;
+/// those of an `f32` might not, because they are parsed as `f64` and rounded a second time.
+struct List([f32; STATES]);
+
+impl std::fmt::Display for List {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        for value in self.0 {
+            write!(f, ",{}", f64::from(value))?;
+        }
+        Ok(())
+    }
+}

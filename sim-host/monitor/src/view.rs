@@ -1,0 +1,196 @@
+//! The latest telemetry as text.
+
+use std::fmt::Write;
+
+use sonarfix::health::{LOST_AT, Verdict};
+use sonarfix::localizer::Fix;
+use sonarfix::units::Instant;
+use sonarfix_hal::robot::Faults;
+use sonarfix_link::message::{ImageStatus, LoopStatus, ResetCause};
+use sonarfix_link::{Estimate, Hello, Ping};
+
+use crate::Monitor;
+
+/// All telemetry, one line per subject, of at most 100 characters.
+#[must_use]
+pub fn page(monitor: &Monitor) -> String {
+    let lines = [
+        monitor.hello.as_ref().map_or("robot   none yet".to_owned(), hello),
+        monitor.estimate.as_ref().map_or("pose    none yet".to_owned(), estimate),
+        monitor.ping.as_ref().map_or("ping    none yet".to_owned(), |last| ping(monitor, last)),
+        monitor.state.as_ref().map_or("loop    none yet".to_owned(), state),
+        link(monitor),
+    ];
+    lines.join("\n")
+}
+
+/// The estimate in one line.
+#[must_use]
+pub fn line(monitor: &Monitor) -> String {
+    let lost = monitor.gaps.lost();
+    let link = format!("{} frames, {lost} lost", monitor.counters().frames);
+    match &monitor.estimate {
+        None => format!("no estimate yet; {link}"),
+        Some(e) => {
+            let (s, verdict) = (&e.state, verdict(e.health.verdict));
+            let heading = s.heading.to_degrees();
+            format!(
+                "{:.1} s: x {:.3} m, y {:.3} m, heading {heading:.1}°, {verdict}; {link}",
+                seconds(e.at),
+                s.x.0,
+                s.y.0
+            )
+        }
+    }
+}
+
+/// Firmware version, cause of the reset and images in flash.
+#[must_use]
+pub fn hello(hello: &Hello) -> String {
+    let [major, minor, patch] = hello.firmware;
+    let reset = match hello.reset {
+        ResetCause::PowerOn => "power on",
+        ResetCause::BrownOut => "a brown-out",
+        ResetCause::Pin => "the reset pin",
+        ResetCause::Watchdog => "the watchdog",
+        ResetCause::Software => "the firmware",
+        ResetCause::Unknown => "a reset of unknown cause",
+    };
+    let (map, configuration) = (flashed(hello.map), flashed(hello.configuration));
+    format!(
+        "robot   {major}.{minor}.{patch}, started by {reset}; map {map}, configuration {configuration}"
+    )
+}
+
+/// The status of an image in flash.
+#[must_use]
+pub fn flashed(flashed: ImageStatus) -> String {
+    match flashed {
+        ImageStatus::Valid(checksum) => format!("{checksum:08x}"),
+        ImageStatus::Missing => "missing".to_owned(),
+        ImageStatus::Corrupt => "corrupt".to_owned(),
+        ImageStatus::Version(found) => {
+            format!("of unsupported version {found}")
+        }
+    }
+}
+
+fn estimate(e: &Estimate) -> String {
+    let (s, d, h) = (&e.state, &e.deviation, &e.health);
+    let mm = |metres: f32| 1e3 * metres;
+    let percent = |fraction: f32| 100.0 * fraction;
+    format!(
+        "pose    x {:.3} m ± {:.1} mm, y {:.3} m ± {:.1} mm, heading {:.2}° ± {:.2}°, at {:.1} s\n\
+         wheels  S_R {:+.3} ± {:.3} %, S_L {:+.3} ± {:.3} %, track width {:+.2} ± {:.2} mm\n\
+         sonar   range scale {:+.3} ± {:.3} %\n\
+         health  {}: evidence {:.1} of {LOST_AT}, NIS {:.1}; last accepted range {:.1} m and {:.1} s ago\n\
+         cycles  in a row {} accepted, {} gated, {} silent; {} inflations",
+        s.x.0,
+        mm(d.x.0),
+        s.y.0,
+        mm(d.y.0),
+        s.heading.to_degrees(),
+        d.heading.to_degrees(),
+        seconds(e.at),
+        percent(s.scale_right),
+        percent(d.scale_right),
+        percent(s.scale_left),
+        percent(d.scale_left),
+        mm(s.track_width_error.0),
+        mm(d.track_width_error.0),
+        percent(s.range_scale),
+        percent(d.range_scale),
+        verdict(h.verdict),
+        h.evidence,
+        h.nis,
+        h.rolled_since_fix.0,
+        seconds(Instant::from_ticks(h.time_since_fix.ticks())),
+        h.accepted_in_a_row,
+        h.gated_in_a_row,
+        h.silent_in_a_row,
+        h.inflations,
+    )
+}
+
+fn ping(monitor: &Monitor, ping: &Ping) -> String {
+    let range = match ping.outcome {
+        Ok(echo) => format!("{:.3} m", echo.range.0),
+        Err(reason) => reason.to_string(),
+    };
+    let fix = match ping.fix {
+        Fix::Accepted(i) => format!("accepted, innovation {:+.1} mm", 1e3 * i.value.0),
+        Fix::Downweighted(i) => format!("downweighted, innovation {:+.1} mm", 1e3 * i.value.0),
+        Fix::Gated(i) => format!("gated, innovation {:+.1} mm", 1e3 * i.value.0),
+        Fix::Refused(reason) => format!("refused, {reason}"),
+        other => format!("{other:?}"),
+    };
+    let (wall, bearing) = (ping.aim.wall.0, ping.aim.bearing.0.to_degrees());
+    let f = &monitor.fixes;
+    format!(
+        "ping    wall {wall} at {bearing:.1}°: {range}; {fix}\n\
+         pings   {} accepted, {} gated, {} refused",
+        f.accepted, f.gated, f.refused
+    )
+}
+
+fn state(state: &LoopStatus) -> String {
+    let running = if state.running { "running" } else { "waiting" };
+    let f = &state.faults;
+    format!(
+        "loop    {running}, {} deadlines missed, longest poll {} µs; faults: {}",
+        f.deadlines,
+        state.worst_poll.to_micros(),
+        faults(f),
+    )
+}
+
+fn faults(f: &Faults) -> String {
+    let counts = [
+        ("right encoder", f.right.errors.saturating_add(f.right.illegal)),
+        ("left encoder", f.left.errors.saturating_add(f.left.illegal)),
+        ("servo", f.servo),
+        ("ranger", f.ranger),
+        ("travel", f.travel),
+        ("clock", f.clock),
+    ];
+    let nonzero: Vec<_> = counts
+        .into_iter()
+        .filter(|(_, count)| *count > 0)
+        .map(|(name, count)| format!("{name} {count}"))
+        .collect();
+    if nonzero.is_empty() { "none".to_owned() } else { nonzero.join(", ") }
+}
+
+fn link(monitor: &Monitor) -> String {
+    let (c, gaps) = (monitor.counters(), monitor.gaps);
+    let mut line = format!(
+        "link    {} frames, {} lost, {} restarts; skipped: {} corrupt, {} too long, {} foreign, {} undecodable",
+        c.frames,
+        gaps.lost(),
+        gaps.restarts(),
+        c.corrupt,
+        c.too_long,
+        c.foreign,
+        c.undecodable,
+    );
+    if c.frames == 0 && c.foreign > 0 {
+        let _ = write!(
+            line,
+            "\nonly foreign frames: flash robot and PC with the same version of the link"
+        );
+    }
+    line
+}
+
+fn verdict(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Tracking => "tracking",
+        Verdict::Degraded => "degraded",
+        Verdict::Lost => "lost",
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "exact below 2^53 µs, 285 years")]
+fn seconds(at: Instant) -> f64 {
+    at.ticks() as f64 * 1e-6
+}

@@ -1,0 +1,173 @@
+//! Processor in the loop: the robot's software runs on an emulated microcontroller, the simulation in
+//! this process.
+//!
+//! ```text
+//!   Simulation ── Request ──▶ Pair ──▶ Emulator: QEMU, firmware/emulated/pil, the shipped loop
+//!        ▲                     │  └──▶ Session: the same code in this process
+//!        └────── Answer ───────┘       both answers must be the same bytes
+//! ```
+//!
+//! - [`machine`]: the supported microcontrollers, and the start of one;
+//! - [`pair`]: sends each request to both and compares the answers;
+//! - [`difference`](mod@difference): the difference between two answers;
+//! - [`tally`]: instruction counts; [`progress`]: progress of a run;
+//! - [`golden`]: requests and answers in a file, to be replayed;
+//! - this file: the pair as the [`Computer`] of a simulated robot.
+
+pub mod difference;
+mod error;
+mod exchange;
+pub mod golden;
+pub mod machine;
+pub mod pair;
+pub mod progress;
+pub mod tally;
+
+use sonarfix::aim::{Aim, NoAim};
+use sonarfix::localizer::{Fix, Localizer, OdometryError, Start};
+use sonarfix::motion::WheelTravel;
+use sonarfix::units::{Duration, Instant, Metres};
+use sonarfix_hal::robot::Report;
+use sonarfix_pil::{Actuators, Answer, Begin, Request, Sensors, Session, SessionKind, Wires};
+
+use self::pair::Pair;
+
+pub use error::PilError;
+pub use exchange::Exchange;
+use sonarfix_sim::simulate::computer::{Computer, Controller, LocalizerInputs};
+use sonarfix_sim::simulate::{Simulation, SimulationError};
+
+/// Poll period of the firmware's loop.
+const POLL_PERIOD: Duration = Duration::from_ticks(1_000);
+
+/// An emulated microcontroller, compared with this process.
+#[derive(Debug)]
+pub struct Emulated<'s> {
+    simulation: &'s Simulation,
+    map: Vec<u8>,
+    pair: &'s mut Pair,
+}
+
+impl<'s> Emulated<'s> {
+    /// A computer for this scenario.
+    ///
+    /// # Errors
+    /// [`PilError::Map`], if its walls cannot be baked.
+    pub fn new(simulation: &'s Simulation, pair: &'s mut Pair) -> Result<Self, PilError> {
+        let map = simulation.baked_map().map_err(PilError::Map)?;
+        Ok(Self { simulation, map, pair })
+    }
+}
+
+impl Computer for Emulated<'_> {
+    type Inputs<'w>
+        = ComparedDevice<'w>
+    where
+        Self: 'w;
+    type Controller<'w>
+        = ComparedDevice<'w>
+    where
+        Self: 'w;
+
+    fn localizer(
+        &mut self,
+        start: Start,
+        at: Instant,
+    ) -> Result<ComparedDevice<'_>, SimulationError> {
+        let begin =
+            Begin { at, start, config: self.simulation.robot(), kind: SessionKind::Localizer };
+        let session = self.pair.begin_localizer(&begin, &self.map)?;
+        Ok(ComparedDevice { session, pair: self.pair, polled: at })
+    }
+
+    fn controller<'w>(
+        &'w mut self,
+        wires: &'w Wires,
+        start: Start,
+        at: Instant,
+    ) -> Result<(ComparedDevice<'w>, Actuators), SimulationError> {
+        let begin = Begin { at, start, config: self.simulation.robot(), kind: SessionKind::Loop };
+        let (session, actuators) = self.pair.begin_loop(&begin, &self.map, wires)?;
+        Ok((ComparedDevice { session, pair: self.pair, polled: at }, actuators))
+    }
+}
+
+/// The error for an answer of the wrong kind.
+fn mismatched(answer: Answer) -> SimulationError {
+    PilError::Mismatched(Box::new(answer)).into()
+}
+
+/// A session of both devices.
+pub struct ComparedDevice<'w> {
+    session: Session<'w>,
+    pair: &'w mut Pair,
+    /// The time of the last poll.
+    polled: Instant,
+}
+
+impl ComparedDevice<'_> {
+    fn execute(&mut self, request: &Request) -> Result<Answer, PilError> {
+        self.pair.execute(&mut self.session, request)
+    }
+
+    fn running(&self) -> Result<&Localizer<'_>, SimulationError> {
+        Ok(self.session.localizer().ok_or(PilError::Stopped)?)
+    }
+}
+
+impl LocalizerInputs for ComparedDevice<'_> {
+    fn odometry(
+        &mut self,
+        at: Instant,
+        travel: WheelTravel,
+    ) -> Result<Result<(), OdometryError>, SimulationError> {
+        match self.execute(&Request::Odometry(at, travel))? {
+            Answer::Odometry(taken, _) => Ok(taken),
+            other => Err(mismatched(other)),
+        }
+    }
+
+    fn aim(&mut self) -> Result<Result<Aim, NoAim>, SimulationError> {
+        match self.execute(&Request::Aim)? {
+            Answer::Aim(aim) => Ok(aim),
+            other => Err(mismatched(other)),
+        }
+    }
+
+    fn fix(&mut self, _: &Aim, range: Option<Metres>) -> Result<Fix, SimulationError> {
+        match self.execute(&Request::Fix(range))? {
+            Answer::Fix(fix, _) => Ok(fix),
+            other => Err(mismatched(other)),
+        }
+    }
+
+    fn skip(&mut self) -> Result<(), SimulationError> {
+        match self.execute(&Request::SkipPing)? {
+            Answer::Skipped(_) => Ok(()),
+            other => Err(mismatched(other)),
+        }
+    }
+
+    fn localizer(&self) -> Result<&Localizer<'_>, SimulationError> {
+        self.running()
+    }
+}
+
+impl Controller for ComparedDevice<'_> {
+    fn poll(&mut self, sensors: &Sensors) -> Result<(Report, Actuators), SimulationError> {
+        self.polled = sensors.at;
+        match self.execute(&Request::Poll(*sensors))? {
+            Answer::Polled { actuators, .. } => Ok((self.session.report(), actuators)),
+            other => Err(mismatched(other)),
+        }
+    }
+
+    fn localizer(&self) -> Result<&Localizer<'_>, SimulationError> {
+        self.running()
+    }
+
+    /// The firmware's loop polls periodically, whether or not there is work.
+    fn idle_until(&mut self) -> Option<Instant> {
+        self.polled.checked_add_duration(POLL_PERIOD)
+    }
+}

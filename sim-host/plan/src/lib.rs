@@ -1,0 +1,19 @@
+//! Forecast of the localization accuracy along a path, before a robot is built.
+//!
+//! The shipped localizer drives the path in simulation, through pins, drivers and loop, with the
+//! schedule of the real robot. All parameters are as the filter assumes: wheels, track width and
+//! ranges have no errors, so that the estimate stays on the truth. The forecast is the posterior
+//! Cramér–Rao bound (`bound`) of the measurements of this schedule. Detection is drawn from the
+//! sonar's probability of detection, so a forecast is the root mean square over several runs.
+//!
+//! | module | what |
+//! |---|---|
+//! | `forecast` | the runs, and the forecast at each point of the path |
+//! | [`preset`] | presets of common sonars and servos |
+//! | [`route`] | a path on the command line |
+
+mod forecast;
+pub mod preset;
+pub mod route;
+
+pub use forecast::{BLIND_AFTER, Blind, Forecast, LegForecast, Sample, Spread};

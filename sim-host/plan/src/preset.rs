@@ -1,0 +1,131 @@
+//! Presets of common sonars and servos, with their filter parameters.
+
+use clap::ValueEnum;
+use sonarfix::config::PingSchedule;
+use sonarfix::range::RangeNoise;
+use sonarfix::units::{Duration, Metres, Radians};
+use sonarfix_hal::ranger::{PulseTiming, RangerKind};
+use sonarfix_map::{Scenario, ServoName, SonarName};
+use sonarfix_sim::pins::devices;
+
+/// A sonar by its name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum SonarPreset {
+    /// HC-SR04: 0.02–3 m, a ping every 60 ms.
+    HcSr04,
+    /// LV-MaxSonar-EZ: 0.15–6 m in steps of 25 mm, a ping every 50 ms.
+    LvMaxsonar,
+    /// SRF08: 0.03–5.5 m, a wide cone.
+    Srf08,
+    /// Polaroid 6500: 0.26–10 m, a narrow cone.
+    Polaroid6500,
+}
+
+/// The filter parameters of a sonar.
+struct FilterParameters {
+    sonar: SonarName,
+    /// Half of the cone, degrees.
+    cone: f32,
+    /// Usable ranges, metres: most echoes are detected.
+    reach: (f32, f32),
+    /// Noise at zero range, metres, and per metre. It includes jumps of half a wavelength, the
+    /// resolution and the off-axis bias, so it exceeds the datasheet's.
+    noise: (f32, f32),
+    /// Ping period, µs.
+    cycle: u64,
+}
+
+impl SonarPreset {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::HcSr04, Self::LvMaxsonar, Self::Srf08, Self::Polaroid6500];
+
+    /// Product name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::HcSr04 => "HC-SR04",
+            Self::LvMaxsonar => "LV-MaxSonar",
+            Self::Srf08 => "SRF08",
+            Self::Polaroid6500 => "Polaroid 6500",
+        }
+    }
+
+    /// Reaches, resolutions and cycles are those of `docs/hardware.md`; cones and noise are chosen
+    /// conservatively from them, as documented in `sonarfix_sim::world::sensor`.
+    fn filter_parameters(self) -> FilterParameters {
+        match self {
+            Self::HcSr04 => FilterParameters {
+                sonar: SonarName::HcSr04,
+                cone: 12.0,
+                reach: (0.1, 3.5),
+                noise: (0.006, 0.002),
+                cycle: 60_000,
+            },
+            Self::LvMaxsonar => FilterParameters {
+                sonar: SonarName::LvMaxSonar,
+                cone: 13.0,
+                reach: (0.15, 6.0),
+                noise: (0.011, 0.002),
+                cycle: 50_000,
+            },
+            Self::Srf08 => FilterParameters {
+                sonar: SonarName::Srf08,
+                cone: 25.0,
+                reach: (0.1, 5.5),
+                noise: (0.007, 0.002),
+                cycle: 70_000,
+            },
+            Self::Polaroid6500 => FilterParameters {
+                sonar: SonarName::Polaroid6500,
+                cone: 10.0,
+                reach: (0.26, 10.0),
+                noise: (0.006, 0.005),
+                cycle: 110_000,
+            },
+        }
+    }
+
+    /// Replaces the sonar of a scenario's robot, with pings as fast as possible.
+    pub fn fit(self, scenario: &mut Scenario) {
+        let filter = self.filter_parameters();
+        scenario.hardware.sonar = filter.sonar;
+        let sonar = &mut scenario.robot.localizer.sonar;
+        sonar.cone = Radians::from_degrees(filter.cone);
+        sonar.min_range = Metres(filter.reach.0);
+        sonar.max_range = Metres(filter.reach.1);
+        sonar.noise = RangeNoise { floor: Metres(filter.noise.0), per_metre: filter.noise.1 };
+        sonar.timing.schedule = PingSchedule::AsFastAsPossible;
+        sonar.timing.cycle = Duration::from_ticks(filter.cycle);
+        let ranger = &mut scenario.robot.ranger;
+        ranger.kind = RangerKind::Pulse(match self {
+            Self::HcSr04 => PulseTiming::HC_SR04,
+            Self::LvMaxsonar => PulseTiming::LV_MAXSONAR,
+            Self::Srf08 | Self::Polaroid6500 => {
+                devices::timing_with_reach(filter.reach.1.into(), ranger.temperature.0.into())
+            }
+        });
+    }
+}
+
+/// A servo by its name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ServoPreset {
+    /// Reaches the commanded bearing at once.
+    Ideal,
+    /// SG90: 0.12 s/60°.
+    Sg90,
+    /// MG996R: 0.17 s/60°.
+    Mg996r,
+}
+
+impl ServoPreset {
+    /// Replaces the servo of a scenario's robot.
+    pub fn fit(self, scenario: &mut Scenario) {
+        let name = match self {
+            Self::Ideal => ServoName::Ideal,
+            Self::Sg90 => ServoName::Sg90,
+            Self::Mg996r => ServoName::Mg996r,
+        };
+        devices::mount_servo(scenario, name);
+    }
+}

@@ -1,0 +1,88 @@
+//! A scan, and the range of a sonar with a wide cone in its place.
+
+use sonarfix_sim::angle;
+
+/// Ranges over a full or partial circle, taken at one instant from the sonar's mount.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Scan {
+    /// Bearing of the first beam, radians from the heading.
+    pub first: f64,
+    /// Angle between beams, radians; negative for a clockwise scan.
+    pub step: f64,
+    /// Ranges, metres; 0 without a return.
+    pub ranges: Vec<f32>,
+}
+
+/// The direction and the limits of a sonar.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cone {
+    /// Bearing, radians from the heading.
+    pub bearing: f64,
+    /// Half of its cone, radians.
+    pub cone: f64,
+    /// The shortest and the longest range it reports, metres.
+    pub reach: (f64, f64),
+}
+
+impl Scan {
+    /// The earliest echo: the nearest return inside the cone and within reach.
+    #[must_use]
+    pub fn earliest(&self, sonar: &Cone) -> Option<f64> {
+        let Cone { bearing, cone, reach: (nearest, farthest) } = *sonar;
+        // The edge belongs to the cone, regardless of rounding.
+        let cone = cone + 1e-9;
+        let mut beam = self.first;
+        let mut earliest: Option<f64> = None;
+        for (count, range) in (1_u32..).zip(&self.ranges) {
+            let range = f64::from(*range);
+            let nearer = earliest.is_none_or(|earliest| range < earliest);
+            let is_detected = range > 0.0 && range >= nearest && range <= farthest;
+            if nearer && is_detected && angle::wrap(beam - bearing).abs() <= cone {
+                earliest = Some(range);
+            }
+            beam = self.first + f64::from(count) * self.step;
+        }
+        earliest
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use super::*;
+
+    fn is_detected(bearing: f64) -> Option<f64> {
+        let scan = Scan {
+            first: -1.0,
+            step: 0.5,
+            //           −1    −0.5 0    0.5  1
+            ranges: vec![0.01, 3.0, 2.0, 0.0, 9.0],
+        };
+        scan.earliest(&Cone { bearing, cone: 0.5, reach: (0.05, 5.0) })
+    }
+
+    #[test]
+    fn the_nearest_return_in_the_cone_is_heard() {
+        assert_eq!(is_detected(-0.5), Some(2.0), "both edges belong to the cone");
+        assert_eq!(is_detected(-0.6), Some(3.0), "a nearer one outside does not");
+        assert_eq!(is_detected(-1.0), Some(3.0), "nearer than the minimum range");
+    }
+
+    #[test]
+    fn no_return_is_no_echo() {
+        assert_eq!(is_detected(0.75), None, "no return, and 9 m is too far");
+        assert_eq!(is_detected(2.5), None, "no beam there");
+    }
+
+    #[test]
+    fn the_cone_reaches_across_the_back() {
+        let scan = Scan { first: PI - 0.1, step: 0.2, ranges: vec![2.0, 1.0] };
+        let mut sonar = Cone { bearing: PI, cone: 0.15, reach: (0.0, 5.0) };
+        assert_eq!(scan.earliest(&sonar), Some(1.0));
+        sonar.bearing = -PI + 0.12;
+        assert_eq!(scan.earliest(&sonar), Some(1.0));
+        sonar.bearing = PI - 0.12;
+        assert_eq!(scan.earliest(&sonar), Some(2.0));
+    }
+}

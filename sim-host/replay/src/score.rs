@@ -1,0 +1,301 @@
+//! Errors of the estimate against the reference, its consistency, and the health verdicts.
+
+use serde::Serialize;
+use sonarfix::health::Verdict;
+use sonarfix_sim::angle;
+use sonarfix_sim::trace::{Estimate, Pose};
+
+use crate::median::Median;
+
+/// Position error above which an estimate has diverged, metres.
+const ASTRAY: f64 = 0.5;
+/// The 99.73 % quantile of χ² with two degrees of freedom: "3σ" in the plane.
+const THREE_SIGMA: f64 = 11.829;
+
+/// Errors of positions and headings.
+#[derive(Debug, Clone, Default)]
+struct Errors {
+    count: u64,
+    position_squares: f64,
+    position_median: Median,
+    position_max: f64,
+    heading_squares: f64,
+    heading_median: Median,
+    heading_max: f64,
+}
+
+impl Errors {
+    fn add(&mut self, estimate: &Pose, truth: &Pose) {
+        let position = (estimate.x - truth.x).hypot(estimate.y - truth.y);
+        let heading = angle::wrap(estimate.heading - truth.heading).abs();
+        self.count += 1;
+        self.position_squares += position * position;
+        self.position_median.add(position);
+        self.position_max = self.position_max.max(position);
+        self.heading_squares += heading * heading;
+        self.heading_median.add(heading);
+        self.heading_max = self.heading_max.max(heading);
+    }
+
+    fn figures(&self) -> Option<Figures> {
+        #[expect(clippy::cast_precision_loss, reason = "counts stay below 2^53")]
+        let count = self.count as f64;
+        Some(Figures {
+            position_rms: (self.position_squares / count).sqrt(),
+            position_median: self.position_median.value()?,
+            position_max: self.position_max,
+            heading_rms: (self.heading_squares / count).sqrt(),
+            heading_median: self.heading_median.value()?,
+            heading_max: self.heading_max,
+        })
+    }
+}
+
+/// Errors against the reference, metres and radians. Medians are within half a per cent.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Figures {
+    /// Root mean square.
+    pub position_rms: f64,
+    /// Median.
+    pub position_median: f64,
+    /// Maximum.
+    pub position_max: f64,
+    /// Root mean square.
+    pub heading_rms: f64,
+    /// Median.
+    pub heading_median: f64,
+    /// Maximum.
+    pub heading_max: f64,
+}
+
+/// Compares the estimate with the reference.
+#[derive(Debug, Clone, Default)]
+pub struct Score {
+    localizer: Errors,
+    odometry: Errors,
+    beyond_three_sigma: u64,
+    beyond_three_sigma_at: Option<f64>,
+    diverged_at: Option<f64>,
+    /// Time of the latest row, seconds since the start.
+    latest: f64,
+    /// Seconds with the position error within half a metre, and beyond it.
+    within: ByVerdict,
+    beyond: ByVerdict,
+}
+
+impl Score {
+    /// Adds the estimate, with its verdict, and the true pose at a time.
+    pub fn add(
+        &mut self,
+        time: f64,
+        (estimate, verdict): (&Estimate, Verdict),
+        odometry: &Pose,
+        truth: &Pose,
+    ) {
+        self.localizer.add(&estimate.pose, truth);
+        self.odometry.add(odometry, truth);
+        let error = [estimate.pose.x - truth.x, estimate.pose.y - truth.y];
+        let seconds = time - self.latest;
+        self.latest = time;
+        if error[0].hypot(error[1]) > ASTRAY {
+            self.diverged_at.get_or_insert(time);
+            self.beyond.add(verdict, seconds);
+        } else {
+            self.within.add(verdict, seconds);
+        }
+        if distance_squared(estimate, error) > THREE_SIGMA {
+            self.beyond_three_sigma += 1;
+            self.beyond_three_sigma_at.get_or_insert(time);
+        }
+    }
+
+    /// How many rows of the reference were compared.
+    #[must_use]
+    pub fn rows(&self) -> u64 {
+        self.localizer.count
+    }
+
+    /// Errors of the localizer.
+    #[must_use]
+    pub fn localizer(&self) -> Option<Figures> {
+        self.localizer.figures()
+    }
+
+    /// Errors of dead reckoning.
+    #[must_use]
+    pub fn odometry(&self) -> Option<Figures> {
+        self.odometry.figures()
+    }
+
+    /// Consistency of the errors with the covariance.
+    #[must_use]
+    pub fn consistency(&self) -> Consistency {
+        #[expect(clippy::cast_precision_loss, reason = "counts stay below 2^53")]
+        let share = |count: u64| count as f64 / self.rows() as f64;
+        let all = self.within.sum() + self.beyond.sum();
+        Consistency {
+            within_half_a_metre: self.within.over(all),
+            beyond_half_a_metre: self.beyond.over(all),
+            diverged_at: self.diverged_at,
+            beyond_three_sigma_at: self.beyond_three_sigma_at,
+            beyond_three_sigma: (self.rows() > 0).then(|| share(self.beyond_three_sigma)),
+        }
+    }
+}
+
+/// Something by verdict.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct ByVerdict {
+    /// While `Tracking`.
+    pub tracking: f64,
+    /// While `Degraded`.
+    pub degraded: f64,
+    /// While `Lost`.
+    pub lost: f64,
+}
+
+impl ByVerdict {
+    fn add(&mut self, verdict: Verdict, amount: f64) {
+        match verdict {
+            Verdict::Tracking => self.tracking += amount,
+            Verdict::Degraded => self.degraded += amount,
+            Verdict::Lost => self.lost += amount,
+        }
+    }
+
+    /// The sum over the verdicts.
+    #[must_use]
+    pub fn sum(&self) -> f64 {
+        self.tracking + self.degraded + self.lost
+    }
+
+    fn over(&self, all: f64) -> Self {
+        let share = |part: f64| if all > 0.0 { part / all } else { 0.0 };
+        let Self { tracking, degraded, lost } = *self;
+        Self { tracking: share(tracking), degraded: share(degraded), lost: share(lost) }
+    }
+}
+
+/// Mahalanobis distance squared of a position error.
+fn distance_squared(estimate: &Estimate, [ex, ey]: [f64; 2]) -> f64 {
+    let [sx, sy, ..] = estimate.deviation;
+    let (xx, yy, xy) = (sx * sx, sy * sy, estimate.covariance_xy);
+    let determinant = xx * yy - xy * xy;
+    (yy * ex * ex - 2.0 * xy * ex * ey + xx * ey * ey) / determinant
+}
+
+/// Consistency of the estimate; times in seconds since the start.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Consistency {
+    /// Share of the time with a position error of up to half a metre, by verdict. The time before a row
+    /// of the reference counts as that row.
+    pub within_half_a_metre: ByVerdict,
+    /// Share of the time with a larger error.
+    pub beyond_half_a_metre: ByVerdict,
+    /// When the position error first exceeded half a metre.
+    pub diverged_at: Option<f64>,
+    /// When the position error first left the 99.73 % ellipse.
+    pub beyond_three_sigma_at: Option<f64>,
+    /// Share of the reference rows at which it was outside; 0.0027 is expected.
+    pub beyond_three_sigma: Option<f64>,
+}
+
+/// The health verdicts over time, seconds since the start.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Verdicts {
+    /// When the verdict first was `Degraded`.
+    pub degraded_at: Option<f64>,
+    /// When the verdict first was `Lost`.
+    pub lost_at: Option<f64>,
+    /// Time with the verdict `Degraded`.
+    pub degraded_seconds: f64,
+    /// Time with the verdict `Lost`.
+    pub lost_seconds: f64,
+    /// Whether the verdict was `Lost` at the end.
+    pub lost_at_end: bool,
+    #[serde(skip)]
+    until: f64,
+}
+
+impl Verdicts {
+    /// Adds the verdict from a time on.
+    pub fn note(&mut self, time: f64, before: Verdict, now: Verdict) {
+        let lasted = time - self.until;
+        self.until = time;
+        match before {
+            Verdict::Tracking => {}
+            Verdict::Degraded => self.degraded_seconds += lasted,
+            Verdict::Lost => self.lost_seconds += lasted,
+        }
+        match now {
+            Verdict::Tracking => {}
+            Verdict::Degraded => _ = self.degraded_at.get_or_insert(time),
+            Verdict::Lost => _ = self.lost_at.get_or_insert(time),
+        }
+        self.lost_at_end = now == Verdict::Lost;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn estimate(x: f64, y: f64) -> Estimate {
+        Estimate {
+            pose: Pose { x, y, heading: 0.1 },
+            deviation: [0.1, 0.2, 0.0, 0.0, 0.0, 0.0, 0.0],
+            covariance_xy: 0.01,
+            ..Estimate::default()
+        }
+    }
+
+    #[test]
+    fn errors_are_summed_up() {
+        let mut score = Score::default();
+        assert_eq!(score.localizer(), None);
+        let truth = Pose::default();
+        score.add(1.0, (&estimate(0.3, 0.4), Verdict::Tracking), &truth, &truth);
+        score.add(2.0, (&estimate(0.0, 0.1), Verdict::Tracking), &truth, &truth);
+        let figures = score.localizer().unwrap();
+        assert!((figures.position_rms - 0.13_f64.sqrt()).abs() < 1e-12);
+        assert!((figures.position_max - 0.5).abs() < 1e-12);
+        assert!((figures.position_median / 0.1 - 1.0).abs() < 0.0051);
+        assert!((figures.heading_rms - 0.1).abs() < 1e-12);
+        assert!(score.odometry().unwrap().position_rms < 1e-12);
+    }
+
+    #[test]
+    fn an_error_is_measured_by_the_ellipse_of_the_estimate() {
+        // det = 0.01·0.04 − 0.01² = 3e-4; e = (0.3, 0): 0.04·0.09/3e-4 = 12.
+        assert!((distance_squared(&estimate(0.0, 0.0), [0.3, 0.0]) - 12.0).abs() < 1e-9);
+        let mut score = Score::default();
+        let truth = Pose::default();
+        score.add(1.0, (&estimate(0.29, 0.0), Verdict::Tracking), &truth, &truth);
+        score.add(2.0, (&estimate(0.3, 0.0), Verdict::Tracking), &truth, &truth);
+        score.add(3.0, (&estimate(0.0, 0.6), Verdict::Tracking), &truth, &truth);
+        let consistency = score.consistency();
+        assert_eq!(consistency.beyond_three_sigma_at, Some(2.0));
+        assert_eq!(consistency.diverged_at, Some(3.0));
+        assert!((consistency.beyond_three_sigma.unwrap() - 2.0 / 3.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn verdicts_are_timed() {
+        use Verdict::{Degraded, Lost, Tracking};
+        let mut verdicts = Verdicts::default();
+        for (time, before, now) in [
+            (1.0, Tracking, Tracking),
+            (2.0, Tracking, Degraded),
+            (4.0, Degraded, Lost),
+            (5.0, Lost, Degraded),
+            (9.0, Degraded, Tracking),
+        ] {
+            verdicts.note(time, before, now);
+        }
+        assert_eq!(verdicts.degraded_at, Some(2.0));
+        assert_eq!(verdicts.lost_at, Some(4.0));
+        assert!((verdicts.degraded_seconds - 6.0).abs() < 1e-12);
+        assert!((verdicts.lost_seconds - 1.0).abs() < 1e-12);
+        assert!(!verdicts.lost_at_end);
+    }
+}

@@ -1,0 +1,553 @@
+//! One replay in progress: records in, fixes and scores out.
+
+use std::collections::BTreeMap;
+use std::io::BufRead;
+use std::iter::Peekable;
+use std::vec::IntoIter;
+
+use sonarfix::aim::{Aim, NoAim, Reason};
+use sonarfix::config::PingSchedule;
+use sonarfix::ekf::{STATES, StandardDeviations, StateEstimate};
+use sonarfix::localizer::{Fix, Localizer, OdometryError};
+use sonarfix::map::{Map, Wall, WallId};
+use sonarfix::motion::WheelTravel;
+use sonarfix::units::{Duration, Instant, Metres, Radians, SquareMetres};
+use sonarfix_hal::config::RobotConfig;
+use sonarfix_sim::observe::{self, Measurement};
+use sonarfix_sim::odometry::DeadReckoning;
+use sonarfix_sim::statistics::FixCounts;
+use sonarfix_sim::trace::{FixRecord, Pose, Recorder, Tick, Truth};
+
+use crate::fault::{Fault, ReplayError};
+use crate::log::Record;
+use crate::reference::{Reference, micros, seconds};
+use crate::scan::{Cone, Scan};
+use crate::score::{Score, Verdicts};
+use crate::wheels::Reading;
+
+/// Ranges that may wait for the next encoder record: a sonar that pings for a minute.
+const MOST_HELD: usize = 1024;
+/// Largest total number of their beams: 4 MiB.
+const MOST_BEAMS: usize = 1 << 20;
+
+/// The prediction behind an aim, which a log does not have.
+const UNKNOWN: Reason =
+    Reason { gain: SquareMetres(0.0), success: 0.0, time: Duration::from_ticks(0), candidates: 0 };
+
+/// What went wrong with a record.
+pub enum Trouble {
+    /// The record is skipped.
+    Skip(Fault),
+    /// The replay ends.
+    End(ReplayError),
+}
+
+impl<F: Into<Fault>> From<F> for Trouble {
+    fn from(fault: F) -> Self {
+        Self::Skip(fault.into())
+    }
+}
+
+impl From<ReplayError> for Trouble {
+    fn from(error: ReplayError) -> Self {
+        Self::End(error)
+    }
+}
+
+/// A range or a scan that waits for the encoder record after it.
+struct Pending {
+    time: i64,
+    echo: Echo,
+}
+
+enum Echo {
+    At {
+        bearing: f64,
+        range: Option<f64>,
+        wall: Option<u32>,
+    },
+    Scan(Scan),
+    /// There was no measurable wall.
+    Skip,
+}
+
+/// The start record, of either kind.
+#[derive(Clone, Copy)]
+struct Begin {
+    time: i64,
+    pose: Pose,
+    state: StateEstimate,
+    deviation: StandardDeviations,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Encoder {
+    Ticks,
+    Wheels,
+}
+
+/// Counts of a replay.
+#[derive(Debug, Clone, Default)]
+pub struct Tally {
+    pub fixes: FixCounts,
+    /// Refused measurement cycles, by reason.
+    pub refusals: BTreeMap<String, u64>,
+    pub encoder_records: u64,
+    /// Ranges and scans from before the start or after the last encoder record.
+    pub unused: u64,
+    /// Number of detected jumps of the encoder counts.
+    pub encoder_jumps: u64,
+    /// Distance travelled by the axle's centre according to the encoders, metres.
+    pub distance: f64,
+    pub verdicts: Verdicts,
+}
+
+/// The localizer, with dead reckoning beside it.
+struct Estimators<'a> {
+    localizer: Localizer<'a>,
+    odometry: DeadReckoning,
+    /// Start time of the localizer.
+    epoch: i64,
+    /// The encoder reading that the localizer has received.
+    received: Reading,
+}
+
+impl Estimators<'_> {
+    /// Seconds since the start.
+    fn since_start(&self, time: i64) -> f64 {
+        seconds(time - self.epoch)
+    }
+
+    /// Advances to a reading; returns the distance travelled.
+    fn drive_to(&mut self, reading: Reading) -> Result<f64, OdometryError> {
+        if reading.time <= self.received.time {
+            return Ok(0.0);
+        }
+        let ([right, left], received) = self.received.advanced_to(reading);
+        let now = Instant::from_ticks((reading.time - self.epoch).unsigned_abs());
+        self.localizer.odometry(now, WheelTravel::new(right, left))?;
+        self.odometry.moved([right.into(), left.into()]);
+        self.received = received;
+        Ok(f64::midpoint(right.into(), left.into()).abs())
+    }
+}
+
+/// A replay in progress.
+pub struct Session<'a, R, V> {
+    robot: &'a RobotConfig,
+    walls: &'a [Wall],
+    recorder: &'a mut V,
+    reference: Option<Reference<R>>,
+    begin: Option<Begin>,
+    encoder: Option<Encoder>,
+    estimators: Option<Estimators<'a>>,
+    /// The last encoder record.
+    last: Option<Reading>,
+    /// An encoder record that is implausibly far from the last one.
+    suspect: Option<Reading>,
+    pending: Vec<Pending>,
+    beams: usize,
+    /// Time from which the next scan is used.
+    next_fix: i64,
+    score: Score,
+    tally: Tally,
+}
+
+/// Reports a row of the reference that is skipped.
+pub type Complain<'c> = dyn FnMut(u64, Fault) -> Result<(), ReplayError> + 'c;
+
+impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
+    pub fn new(
+        robot: &'a RobotConfig,
+        walls: &'a [Wall],
+        reference: Option<Reference<R>>,
+        recorder: &'a mut V,
+    ) -> Self {
+        Self {
+            robot,
+            walls,
+            recorder,
+            reference,
+            begin: None,
+            encoder: None,
+            estimators: None,
+            last: None,
+            suspect: None,
+            pending: Vec::new(),
+            beams: 0,
+            next_fix: 0,
+            score: Score::default(),
+            tally: Tally::default(),
+        }
+    }
+
+    /// Processes the next record of the log.
+    pub fn take(&mut self, record: Record, complain: &mut Complain) -> Result<(), Trouble> {
+        match record {
+            Record::Start { time, pose, position_deviation, heading_deviation } => {
+                let (sigma, heading) = (position_deviation, heading_deviation);
+                let state = [pose.x, pose.y, pose.heading, 0.0, 0.0, 0.0, 0.0];
+                let prior = self.robot.localizer.prior;
+                let deviation = StandardDeviations {
+                    scale_right: prior.scale_right,
+                    scale_left: prior.scale_left,
+                    track_width_error: prior.track_width,
+                    range_scale: prior.range_scale,
+                    ..deviations([sigma, sigma, heading, 0.0, 0.0, 0.0, 0.0])
+                };
+                let state = estimate(state);
+                self.take_start(Begin { time: micros(time), pose, state, deviation }, complain)
+            }
+            Record::Resume { time, state: received, deviation } => {
+                let [x, y, heading, ..] = received;
+                let pose = Pose { x, y, heading };
+                let (state, deviation) = (estimate(received), deviations(deviation));
+                self.take_start(Begin { time: micros(time), pose, state, deviation }, complain)
+            }
+            Record::Ticks { time, right, left } => {
+                let wheels = self.rolled([right, left]);
+                self.take_wheels(micros(time), wheels, Encoder::Ticks, complain)
+            }
+            Record::Wheels { time, right, left } => {
+                self.take_wheels(micros(time), [right, left], Encoder::Wheels, complain)
+            }
+            Record::Range { time, bearing, range, wall } => {
+                self.hold(micros(time), Echo::At { bearing, range, wall })
+            }
+            Record::Skip { time } => self.hold(micros(time), Echo::Skip),
+            Record::Scan { time, scan } => self.hold(micros(time), Echo::Scan(scan)),
+        }
+    }
+
+    fn rolled(&self, ticks: [i64; 2]) -> [f64; 2] {
+        let (right_wheel, left_wheel) = (&self.robot.right_wheel, &self.robot.left_wheel);
+        #[expect(clippy::cast_precision_loss, reason = "counts stay below 2^53")]
+        let [right, left] = ticks.map(|count| count as f64);
+        [
+            right * f64::from(right_wheel.signed_travel().0),
+            left * f64::from(left_wheel.signed_travel().0),
+        ]
+    }
+
+    fn take_start(&mut self, begin: Begin, complain: &mut Complain) -> Result<(), Trouble> {
+        if self.begin.is_some() {
+            return Err(Fault::SecondStart.into());
+        }
+        self.begin = Some(begin);
+        self.next_fix = begin.time + self.fix_period();
+        match self.last {
+            Some(last) if last.time >= begin.time => Ok(self.begin_at(begin, last, complain)?),
+            _ => Ok(()),
+        }
+    }
+
+    fn fix_period(&self) -> i64 {
+        let timing = &self.robot.localizer.sonar.timing;
+        let period = match timing.schedule {
+            PingSchedule::Every(period) => period,
+            // A recording has no servo to wait for.
+            PingSchedule::AsFastAsPossible => timing.cycle,
+        };
+        i64::try_from(period.to_micros()).unwrap_or(i64::MAX).max(1)
+    }
+
+    /// Starts the localizer when both the start and the encoders are known.
+    fn begin_at(
+        &mut self,
+        begin: Begin,
+        reading: Reading,
+        complain: &mut Complain,
+    ) -> Result<(), ReplayError> {
+        let config = self.robot.localizer;
+        let track_width = config.drive.track_width.0.into();
+        let map = Map::new(self.walls);
+        let Begin { state, deviation, .. } = begin;
+        let localizer = Localizer::resume(config, map, state, deviation, Instant::from_ticks(0))?;
+        self.estimators = Some(Estimators {
+            localizer,
+            odometry: DeadReckoning::new(begin.pose, track_width),
+            epoch: reading.time,
+            received: reading,
+        });
+        let epoch = reading.time;
+        if let Some(reference) = &mut self.reference {
+            reference.read(&mut *complain)?;
+            while reference.next().is_some_and(|row| row.time < epoch) {
+                reference.read(&mut *complain)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn take_wheels(
+        &mut self,
+        time: i64,
+        wheels: [f64; 2],
+        encoder: Encoder,
+        complain: &mut Complain,
+    ) -> Result<(), Trouble> {
+        if *self.encoder.get_or_insert(encoder) != encoder {
+            return Err(Fault::BothEncoders.into());
+        }
+        let reading = Reading { time, wheels };
+        if let Some(last) = self.last {
+            if time == last.time {
+                return Err(Fault::Stale.into());
+            }
+            if time < last.time {
+                return Err(Fault::TimeWentBack.into());
+            }
+            if !self.is_plausible(last, reading) {
+                let suspect = self.suspect.replace(reading);
+                let suspect = suspect.filter(|s| s.time < time && self.is_plausible(*s, reading));
+                let suspect = suspect.ok_or(Fault::TooFast)?;
+                // Two records agree with each other, but not with those before: the counters have
+                // jumped. The speeds during the gap are assumed to be those after it.
+                self.tally.encoder_jumps += 1;
+                let jumped = last.rolling_on(suspect, reading);
+                self.advance(last, jumped, complain)?;
+                if let Some(estimators) = &mut self.estimators {
+                    estimators.received = suspect;
+                }
+                self.last = Some(suspect);
+            }
+        }
+        self.suspect = None;
+        self.tally.encoder_records += 1;
+        let last = self.last.replace(reading);
+        if self.estimators.is_none()
+            && let Some(begin) = self.begin
+            && time >= begin.time
+        {
+            let at = last.map_or(reading, |last| last.between(reading, begin.time));
+            self.begin_at(begin, at, complain)?;
+        }
+        match last {
+            Some(last) => self.advance(last, reading, complain),
+            None => Ok(()),
+        }
+    }
+
+    /// Whether a wheel speed is plausible.
+    fn is_plausible(&self, from: Reading, to: Reading) -> bool {
+        // Slightly below the limit of the localizer: the parts of a travel are rounded.
+        let fastest = 0.999 * f64::from(self.robot.localizer.max_wheel_speed.0);
+        from.speed_to(to) <= fastest
+    }
+
+    fn hold(&mut self, time: i64, echo: Echo) -> Result<(), Trouble> {
+        let Some(begin) = self.begin.filter(|begin| time >= begin.time) else {
+            self.tally.unused += 1;
+            return Ok(());
+        };
+        let earliest = self.last.map_or(begin.time, |last| last.time);
+        if time < earliest {
+            return Err(Fault::TimeWentBack.into());
+        }
+        let beams = match &echo {
+            Echo::At { .. } | Echo::Skip => 0,
+            Echo::Scan(scan) => {
+                if time < self.next_fix {
+                    return Ok(());
+                }
+                scan.ranges.len()
+            }
+        };
+        if self.pending.len() >= MOST_HELD || self.beams + beams > MOST_BEAMS {
+            return Err(Fault::TooManyRanges.into());
+        }
+        if matches!(echo, Echo::Scan(_)) {
+            let period = self.fix_period();
+            self.next_fix += ((time - self.next_fix) / period + 1) * period;
+        }
+        self.beams += beams;
+        self.pending.push(Pending { time, echo });
+        Ok(())
+    }
+
+    /// Processes the interval between two encoder records.
+    fn advance(
+        &mut self,
+        from: Reading,
+        to: Reading,
+        complain: &mut Complain,
+    ) -> Result<(), Trouble> {
+        let Some(mut estimators) = self.estimators.take() else {
+            return Ok(());
+        };
+        let mut pending = std::mem::take(&mut self.pending);
+        pending.sort_by_key(|pending| pending.time);
+        let mut pending = pending.into_iter().peekable();
+        let lived = self.live(&mut estimators, from, to, &mut pending, complain);
+        // Ranges later than the record, or after an error.
+        self.pending = pending.filter(|pending| pending.time > to.time).collect();
+        self.beams = self.pending.iter().map(Pending::beams).sum();
+        if lived.is_err() {
+            estimators.received.wheels = to.wheels;
+        }
+        self.estimators = Some(estimators);
+        lived
+    }
+
+    fn live(
+        &mut self,
+        estimators: &mut Estimators,
+        from: Reading,
+        to: Reading,
+        pending: &mut Peekable<IntoIter<Pending>>,
+        complain: &mut Complain,
+    ) -> Result<(), Trouble> {
+        loop {
+            let row = self.reference.as_ref().and_then(Reference::next);
+            let row = row.filter(|row| row.time <= to.time);
+            let measure_until = row.map_or(to.time, |row| row.time);
+            if let Some(measurement) = pending.next_if(|pending| pending.time <= measure_until) {
+                if measurement.time < estimators.epoch {
+                    self.tally.unused += 1;
+                    continue;
+                }
+                self.tally.distance += estimators.drive_to(from.between(to, measurement.time))?;
+                self.measure(estimators, &measurement);
+            } else if let (Some(row), Some(reference)) = (row, &mut self.reference) {
+                self.tally.distance += estimators.drive_to(from.between(to, row.time))?;
+                let estimate = observe::estimate(&estimators.localizer);
+                let time = estimators.since_start(row.time);
+                let verdict = estimators.localizer.health().verdict;
+                let odometry = estimators.odometry.pose();
+                self.score.add(time, (&estimate, verdict), &odometry, &row.pose);
+                reference.read(&mut *complain)?;
+            } else {
+                break;
+            }
+        }
+        self.tally.distance += estimators.drive_to(to)?;
+        let truth = self.reference.as_ref().and_then(|r| r.pose_at(to.time));
+        self.recorder.tick(|| Tick {
+            time: estimators.since_start(to.time),
+            truth: truth.map(|pose| Truth { pose, calibration: None }),
+            estimate: observe::estimate(&estimators.localizer),
+            bound: None,
+            odometry: estimators.odometry.pose(),
+        });
+        Ok(())
+    }
+
+    /// Measures as the robot would have, or with the recorded bearing.
+    fn measure(&mut self, estimators: &mut Estimators, pending: &Pending) {
+        let localizer = &mut estimators.localizer;
+        let pose = localizer.pose();
+        let sonar = &self.robot.localizer.sonar;
+        let mount = pose.to_map(sonar.mount);
+        let mut measurement = Measurement {
+            time: seconds(pending.time - estimators.epoch),
+            sonar: [mount.x.0.into(), mount.y.0.into()],
+            heading: pose.heading.radians().0.into(),
+            range: None,
+            source: None,
+        };
+        #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
+        let aim = match &pending.echo {
+            Echo::At { bearing, wall: None, .. } => localizer.aim_at(Radians(*bearing as f32)),
+            // The robot chose the wall at the time of the ping, not of the echo. A fix does not
+            // depend on the predicted range and gain of that choice.
+            Echo::At { bearing, wall: Some(wall), .. } => Ok(Aim {
+                wall: WallId(*wall),
+                bearing: Radians(*bearing as f32),
+                range: Metres(0.0),
+                why: UNKNOWN,
+            }),
+            Echo::Scan(_) => localizer.aim(),
+            Echo::Skip => Err(localizer.aim().err().unwrap_or(NoAim::NoWall)),
+        };
+        let before = localizer.health().verdict;
+        let aim = match aim {
+            Ok(aim) => aim,
+            Err(no_aim) => {
+                localizer.skip();
+                self.tally.verdicts.note(measurement.time, before, localizer.health().verdict);
+                self.tally.fixes.refused += 1;
+                *self.tally.refusals.entry(no_aim.to_string()).or_default() += 1;
+                self.recorder.fix(|| observe::no_aim_record(measurement, no_aim));
+                return;
+            }
+        };
+        measurement.range = match &pending.echo {
+            Echo::At { range, .. } => *range,
+            Echo::Skip => None,
+            Echo::Scan(scan) => scan.earliest(&Cone {
+                bearing: aim.bearing.0.into(),
+                cone: sonar.cone.0.into(),
+                reach: (sonar.min_range.0.into(), sonar.max_range.0.into()),
+            }),
+        };
+        #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
+        let range = measurement.range.map(|range| Metres(range as f32));
+        let fix = localizer.fix(&aim, range);
+        let now = localizer.health().verdict;
+        self.tally.verdicts.note(measurement.time, before, now);
+        let fixes = &mut self.tally.fixes;
+        match fix {
+            Fix::Accepted(_) | Fix::Downweighted(_) => fixes.accepted += 1,
+            Fix::Gated(_) => fixes.gated += 1,
+            Fix::Refused(refusal) => {
+                fixes.refused += 1;
+                *self.tally.refusals.entry(refusal.to_string()).or_default() += 1;
+            }
+            _ => fixes.refused += 1,
+        }
+        self.recorder.fix(|| {
+            let record = observe::fix_record(measurement, &aim, &fix);
+            FixRecord { why: record.why.filter(|_| aim.why != UNKNOWN), ..record }
+        });
+    }
+
+    /// Ends the replay.
+    pub fn end(mut self) -> Result<End<'a>, ReplayError> {
+        let estimators = self.estimators.ok_or(ReplayError::NoStart)?;
+        let last = self.last.unwrap_or(estimators.received);
+        let duration = estimators.since_start(last.time);
+        let verdict = estimators.localizer.health().verdict;
+        self.tally.verdicts.note(duration, verdict, verdict);
+        self.tally.unused += self.pending.len() as u64;
+        Ok(End {
+            started_at: seconds(estimators.epoch),
+            duration,
+            localizer: estimators.localizer,
+            score: self.score,
+            tally: self.tally,
+        })
+    }
+}
+
+impl Pending {
+    fn beams(&self) -> usize {
+        match &self.echo {
+            Echo::At { .. } | Echo::Skip => 0,
+            Echo::Scan(scan) => scan.ranges.len(),
+        }
+    }
+}
+
+fn estimate(values: [f64; STATES]) -> StateEstimate {
+    StateEstimate::from_array(single(values))
+}
+
+fn deviations(values: [f64; STATES]) -> StandardDeviations {
+    StandardDeviations::from_array(single(values))
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
+fn single(values: [f64; STATES]) -> [f32; STATES] {
+    values.map(|value| value as f32)
+}
+
+/// The result of a replay.
+pub struct End<'a> {
+    /// Start time on the log's clock, seconds.
+    pub started_at: f64,
+    /// From the start to the last encoder record, seconds.
+    pub duration: f64,
+    pub localizer: Localizer<'a>,
+    pub score: Score,
+    pub tally: Tally,
+}

@@ -1,0 +1,280 @@
+//! The report of a run: a self-contained HTML file with tables, figures and a player.
+//!
+//! The file loads no other resource, which its content security policy enforces, so it can be mailed,
+//! archived or opened from a disk. The figures are also written as separate files.
+//!
+//! A headless browser can test the page: once the player has drawn its first frame, the root element
+//! has `data-ready="true"`; the text of a script error is in `data-error`.
+//!
+//! | module | what |
+//! |---|---|
+//! | `figures` | the content of each figure |
+//! | `called_lost` | the figure of `sonarfix health` |
+//! | `chart`, `axis`, `points` | drawing of a figure |
+//! | [`heat_map`] | a map with a quantity along a path |
+//! | `player` | the data of the player; its script is `player.js` |
+//! | `palette` | one colour per role, in figures and player |
+//! | [`map`] | the drawing of a map |
+//! | `page`, `escape` | tables, figures and data as HTML |
+//! | [`Table`] | a table of numbers |
+//! | [`trace_csv`] | a run as a CSV file |
+
+mod axis;
+mod called_lost;
+mod chart;
+mod escape;
+mod figures;
+pub mod heat_map;
+pub mod map;
+mod page;
+mod palette;
+mod player;
+mod points;
+mod table;
+pub mod trace_csv;
+
+use std::borrow::Cow;
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::{fs, io};
+
+use sonarfix_sim::trace::Trace;
+use thiserror::Error;
+
+use escape::escape;
+use figures::Figure;
+
+pub use called_lost::called_lost;
+pub use table::Table;
+
+/// The name of the report's file.
+const FILE: &str = "report.html";
+
+const TEMPLATE: &str = include_str!("template.html");
+const STYLE: &str = include_str!("report.css");
+const SCRIPT: &str = include_str!("player.js");
+
+/// A report on one run.
+#[derive(Debug, Clone)]
+pub struct Report<'a> {
+    /// The title of the page.
+    pub title: String,
+    /// A line under the title.
+    pub subtitle: String,
+    /// Tables, shown before the figures.
+    pub tables: Vec<Table>,
+    /// The run. Without ticks the page has a placeholder.
+    pub trace: &'a Trace,
+}
+
+/// Why a report failed.
+#[derive(Debug, Error)]
+pub enum ReportError {
+    /// A figure cannot be drawn.
+    #[error("figure {file} cannot be drawn")]
+    Figure {
+        /// The file the figure was meant for.
+        file: &'static str,
+        /// The error of the drawing library.
+        source: Box<dyn Error + Send + Sync>,
+    },
+    /// The run cannot be written as JSON.
+    #[error("the data of {FILE} cannot be written as JSON")]
+    Data(#[from] serde_json::Error),
+    /// A file or the directory cannot be written.
+    #[error("{} cannot be written", path.display())]
+    Write {
+        /// The file or directory.
+        path: PathBuf,
+        /// The error of the operating system.
+        source: io::Error,
+    },
+}
+
+impl Report<'_> {
+    /// The page.
+    ///
+    /// # Errors
+    /// [`ReportError::Figure`] or [`ReportError::Data`].
+    pub fn html(&self) -> Result<String, ReportError> {
+        self.page(&self.figures()?)
+    }
+
+    /// Writes `report.html`, and each figure as an SVG file beside it, into a directory, which is
+    /// created if missing. Returns the path of the page.
+    ///
+    /// # Errors
+    /// As [`Report::html`], before anything is written; and [`ReportError::Write`].
+    pub fn write(&self, dir: &Path) -> Result<PathBuf, ReportError> {
+        let figures = self.figures()?;
+        let page = self.page(&figures)?;
+        fs::create_dir_all(dir)
+            .map_err(|source| ReportError::Write { path: dir.into(), source })?;
+        for Figure { file, svg, .. } in &figures {
+            write(dir.join(file), svg)?;
+        }
+        write(dir.join(FILE), &page)
+    }
+
+    fn figures(&self) -> Result<Vec<Figure>, ReportError> {
+        figures::draw(self.trace).map_err(|(file, source)| ReportError::Figure { file, source })
+    }
+
+    fn page(&self, figures: &[Figure]) -> Result<String, ReportError> {
+        let data = page::json_in_script(&player::json(self.trace)?);
+        let values: [(&str, Cow<'_, str>); 8] = [
+            ("title", escape(&self.title).into()),
+            ("subtitle", escape(&self.subtitle).into()),
+            ("palette", palette::css().into()),
+            ("style", STYLE.into()),
+            ("tables", page::tables(&self.tables).into()),
+            ("figures", page::figures(figures).into()),
+            ("data", data.into()),
+            ("script", SCRIPT.into()),
+        ];
+        Ok(page::fill(TEMPLATE, &values))
+    }
+}
+
+fn write(path: PathBuf, text: &str) -> Result<PathBuf, ReportError> {
+    match fs::write(&path, text) {
+        Ok(()) => Ok(path),
+        Err(source) => Err(ReportError::Write { path, source }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sonarfix_sim::trace::{Calibration, Estimate, FixRecord, Outcome, Pose, Tick, Truth, Wall};
+
+    const HOSTILE: &str = "</script><img src=x onerror=alert(1)>";
+
+    /// A robot that drives 10 m along a wall.
+    fn trace(ticks: u32) -> Trace {
+        let pose = |n: u32| Pose { x: f64::from(n) * 0.1, y: 1.0, heading: 0.0 };
+        let truth = |n| Truth { pose: pose(n), calibration: Some(Calibration::default()) };
+        let estimate = |n| Estimate {
+            pose: pose(n),
+            calibration: Calibration { track_width: 0.35, ..Calibration::default() },
+            deviation: [0.01; 7],
+            covariance_xy: 1e-5,
+        };
+        let tick = |n| Tick {
+            time: f64::from(n) * 0.25,
+            truth: Some(truth(n)),
+            estimate: estimate(n),
+            odometry: Pose { y: 1.5, ..pose(n) },
+            bound: None,
+        };
+        Trace {
+            walls: vec![Wall { name: HOSTILE.into(), from: [0.0, 0.0], to: [10.0, 0.0] }],
+            cone: 0.26,
+            ticks: (0..ticks).map(tick).collect(),
+            fixes: vec![FixRecord {
+                time: 0.5,
+                wall: None,
+                sonar: [0.2, 1.0],
+                direction: -1.57,
+                bearing: -1.57,
+                range: None,
+                source: None,
+                why: None,
+                outcome: Outcome::Refused,
+                reason: HOSTILE.into(),
+                innovation: None,
+                innovation_variance: None,
+            }],
+        }
+    }
+
+    fn html(trace: &Trace) -> String {
+        let table = Table {
+            title: "Errors".into(),
+            note: HOSTILE.into(),
+            columns: vec!["state".into(), HOSTILE.into()],
+            rows: vec![vec![HOSTILE.into(), "1.5".into()]],
+        };
+        let (title, subtitle) = (HOSTILE.to_owned(), HOSTILE.to_owned());
+        Report { title, subtitle, tables: vec![table], trace }.html().unwrap()
+    }
+
+    /// The page has three scripts of its own: the error handler, the data and the player.
+    #[test]
+    fn nothing_a_user_wrote_becomes_markup() {
+        let html = html(&trace(100));
+        assert!(!html.contains("<img"));
+        assert_eq!(html.matches("</script>").count(), 3);
+        assert!(html.contains("&lt;/script&gt;&lt;img src=x onerror=alert(1)&gt;</h1>"));
+        assert!(html.contains(r#""name":"\u003c/script>\u003cimg"#));
+    }
+
+    #[test]
+    fn every_figure_and_every_place_of_the_template_is_filled() {
+        let html = html(&trace(100));
+        assert_eq!(html.matches("<svg").count(), 5);
+        assert!(!html.contains("{{"));
+        for label in ["true", "estimated", "encoders alone", "walls", "X (m)", "heading (°)"] {
+            assert!(html.contains(&format!("\n{label}\n")), "{label} is missing");
+        }
+    }
+
+    #[test]
+    fn a_replay_without_truth_shows_what_there_is() {
+        let mut trace = trace(100);
+        for tick in &mut trace.ticks {
+            tick.truth = None;
+        }
+        let html = html(&trace);
+        assert_eq!(html.matches("<svg").count(), 5);
+        assert!(!html.contains("\ntrue\n"));
+        assert!(html.contains("\nestimated\n"));
+    }
+
+    #[test]
+    fn a_run_without_ticks_gives_a_report_that_says_so() {
+        let html = html(&Trace::default());
+        assert!(html.contains("there is nothing to draw"));
+        assert!(!html.contains("<svg"));
+        assert!(html.contains("Errors"));
+    }
+
+    /// Neither the figures nor the data contain NaN or infinity, and a run of a single tick does
+    /// not divide by its duration of zero.
+    #[test]
+    fn numbers_that_are_none_stay_out() {
+        let mut broken = trace(100);
+        broken.ticks[50].estimate.pose.x = f64::NAN;
+        broken.ticks[51].estimate.deviation = [f64::INFINITY; 7];
+        broken.ticks[52].odometry.y = f64::NEG_INFINITY;
+        broken.fixes[0].direction = f64::NAN;
+        broken.walls[0].to[1] = f64::NAN;
+        // Only the legend has a wall line: a wall with a NaN end is not drawn.
+        assert_eq!(html(&broken).matches("stroke=\"#6B7280\" stroke-width").count(), 1);
+        for html in [html(&broken), html(&trace(1))] {
+            let figures = html.split("<svg").skip(1).map(|svg| svg.split("</svg>").next().unwrap());
+            for figure in figures {
+                assert!(!figure.contains("NaN") && !figure.contains("inf"), "{figure}");
+                // For a NaN, plotters would write the limits of its integers.
+                assert!(!figure.contains("2147483"), "{figure}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_file_that_cannot_be_written_is_named() {
+        let dir = tempfile::tempdir().unwrap();
+        let taken = dir.path().join("taken");
+        fs::write(&taken, "a file, not a directory").unwrap();
+        let trace = trace(2);
+        let report =
+            Report { title: String::new(), subtitle: String::new(), tables: vec![], trace: &trace };
+        let error = report.write(&taken).unwrap_err();
+        assert!(error.to_string().contains("taken"), "{error}");
+        let page = report.write(&dir.path().join("made")).unwrap();
+        assert!(page.ends_with("made/report.html"));
+        assert!(
+            fs::read_to_string(page.with_file_name("trajectory.svg")).unwrap().contains("<svg")
+        );
+    }
+}

@@ -1,0 +1,106 @@
+//! The parts of the page, as safe HTML.
+
+use std::borrow::Cow;
+
+use super::escape::escape;
+use super::figures::Figure;
+use super::table::Table;
+
+/// Placeholder for the figures of an empty trace.
+const NOTHING: &str =
+    "<p class=\"nothing\">The trace holds no ticks: there is nothing to draw.</p>";
+
+/// Fills the placeholders of a template, written `{{name}}`, in one pass: inserted text is not
+/// searched again. A placeholder without a value becomes empty.
+pub(super) fn fill(template: &str, values: &[(&str, Cow<'_, str>)]) -> String {
+    let mut page = String::with_capacity(values.iter().map(|(_, value)| value.len()).sum());
+    let mut pieces = template.split("{{");
+    page.push_str(pieces.next().unwrap_or_default());
+    for piece in pieces {
+        let (name, rest) = piece.split_once("}}").unwrap_or((piece, ""));
+        let value = values.iter().find(|(place, _)| *place == name);
+        page.push_str(value.map_or("", |(_, value)| value));
+        page.push_str(rest);
+    }
+    page
+}
+
+/// JSON that is safe inside a script element: without `<` there is no `</script>` and no `<!--`. In
+/// JSON a `<` can only be part of a string, where its escape is equivalent.
+pub(super) fn json_in_script(json: &str) -> String {
+    json.replace('<', "\\u003c")
+}
+
+pub(super) fn tables(tables: &[Table]) -> String {
+    tables.iter().map(table).collect()
+}
+
+fn table(table: &Table) -> String {
+    let head: String =
+        table.columns.iter().map(|name| cell("th scope=\"col\"", "th", name)).collect();
+    let rows: String = table.rows.iter().map(|cells| row(cells)).collect();
+    let (title, note) = (escape(&table.title), escape(&table.note));
+    let note = if note.is_empty() { note } else { format!("<p class=\"note\">{note}</p>") };
+    format!(
+        "<section class=\"table\"><h2>{title}</h2>\n\
+         <div class=\"scroll\"><table><caption>{title}</caption>\n\
+         <thead><tr>{head}</tr></thead>\n<tbody>\n{rows}</tbody></table></div>{note}</section>\n"
+    )
+}
+
+/// A row with its first cell as header.
+fn row(cells: &[String]) -> String {
+    let mut cells = cells.iter();
+    let name = cells.next().map_or_else(String::new, |name| cell("th scope=\"row\"", "th", name));
+    let rest: String = cells.map(|text| cell("td", "td", text)).collect();
+    format!("<tr>{name}{rest}</tr>\n")
+}
+
+fn cell(open: &str, close: &str, text: &str) -> String {
+    format!("<{open}>{}</{close}>", escape(text))
+}
+
+pub(super) fn figures(figures: &[Figure]) -> String {
+    if figures.is_empty() {
+        return NOTHING.into();
+    }
+    let all: String = figures.iter().map(figure).collect();
+    format!("<div class=\"figures\">\n{all}</div>")
+}
+
+fn figure(Figure { number, caption, svg, .. }: &Figure) -> String {
+    let caption = escape(caption);
+    format!(
+        "<figure id=\"figure-{number}\">{svg}\
+         <figcaption><b>Figure {number}.</b> {caption}</figcaption></figure>\n"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_html_reads_as_markup_is_escaped() {
+        assert_eq!(
+            escape(r#"<a href="x" title='y'>Tom & Ann</a>"#),
+            "&lt;a href=&quot;x&quot; title=&#39;y&#39;&gt;Tom &amp; Ann&lt;/a&gt;"
+        );
+    }
+
+    #[test]
+    fn json_cannot_close_its_script_and_still_means_the_same() {
+        let walls = ["</script><script>alert(1)</script>", "<!-- x"];
+        let json = json_in_script(&serde_json::to_string(&walls).unwrap());
+        assert!(!json.contains('<'));
+        let back: Vec<String> = serde_json::from_str(&json).unwrap();
+        assert_eq!(back, walls);
+    }
+
+    /// A title that resembles a placeholder remains a title.
+    #[test]
+    fn what_is_filled_in_is_not_filled_again() {
+        let values = [("a", Cow::Borrowed("{{b}}")), ("b", Cow::Borrowed("B"))];
+        assert_eq!(fill("<{{a}}|{{b}}|{{c}}>", &values), "<{{b}}|B|>");
+    }
+}

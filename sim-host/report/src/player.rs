@@ -1,0 +1,208 @@
+//! The data of the player: columns of rounded numbers, as JSON.
+
+use serde::Serialize;
+
+use sonarfix_sim::trace::{FixRecord, Outcome, Pose, Tick, Trace};
+use sonarfix_sim::world::reflector::Source;
+
+/// Maximum number of ticks for the player, which interpolates between them: one every 0.3 s in a
+/// run of 20 minutes, in which a robot at 0.4 m/s moves 0.12 m.
+const MOST_TICKS: usize = 6_000;
+
+/// Decimals of metres and seconds (0.1 mm), of angles (0.006°) and of dimensionless fractions.
+const LENGTH: i32 = 4;
+const TIME: i32 = 3;
+const ANGLE: i32 = 4;
+const FRACTION: i32 = 3;
+/// Decimals of deviations, which the player may magnify (1 µm, 0.0006°).
+const DEVIATION: i32 = 6;
+
+/// Index of the deviation of the heading in [`sonarfix_sim::STATES`].
+const HEADING: usize = 2;
+
+/// A rounded number; `null` if it is not finite.
+type Number = Option<f64>;
+
+#[derive(Serialize)]
+struct Player<'a> {
+    /// Half of the sonar's cone, radians.
+    cone: Number,
+    /// Track width of the robot, metres.
+    track: Number,
+    walls: Vec<Wall<'a>>,
+    ticks: Ticks,
+    fixes: Fixes<'a>,
+}
+
+#[derive(Serialize)]
+struct Wall<'a> {
+    name: &'a str,
+    ends: [Number; 4],
+}
+
+#[derive(Serialize, Default)]
+struct Ticks {
+    time: Vec<Number>,
+    truth: Poses,
+    estimate: Poses,
+    encoders: Poses,
+    sigma_x: Vec<Number>,
+    sigma_y: Vec<Number>,
+    sigma_heading: Vec<Number>,
+    correlation: Vec<Number>,
+}
+
+#[derive(Serialize, Default)]
+struct Poses {
+    x: Vec<Number>,
+    y: Vec<Number>,
+    heading: Vec<Number>,
+}
+
+#[derive(Serialize, Default)]
+struct Fixes<'a> {
+    time: Vec<Number>,
+    wall: Vec<Option<usize>>,
+    x: Vec<Number>,
+    y: Vec<Number>,
+    direction: Vec<Number>,
+    range: Vec<Number>,
+    /// The source of the echo; `null` without an echo or where it is unknown.
+    source: Vec<Option<&'static str>>,
+    /// 0 accepted, 1 gated, 2 refused.
+    outcome: Vec<u8>,
+    reason: Vec<&'a str>,
+    innovation: Vec<Number>,
+    /// Standard deviation of the innovation, metres.
+    spread: Vec<Number>,
+}
+
+/// The data of the player as JSON, not yet escaped for HTML.
+pub(super) fn json(trace: &Trace) -> Result<String, serde_json::Error> {
+    let walls = trace.walls.iter().map(|wall| {
+        let [[x0, y0], [x1, y1]] = [wall.from, wall.to];
+        Wall { name: &wall.name, ends: [x0, y0, x1, y1].map(|end| rounded(end, LENGTH)) }
+    });
+    let track = trace.ticks.first().map(|tick| tick.estimate.calibration.track_width);
+    serde_json::to_string(&Player {
+        cone: rounded(trace.cone, ANGLE),
+        track: track.and_then(|track| rounded(track, LENGTH)),
+        walls: walls.collect(),
+        ticks: ticks(trace),
+        fixes: fixes(trace),
+    })
+}
+
+/// Every n-th tick, and the last.
+fn ticks(trace: &Trace) -> Ticks {
+    let step = trace.ticks.len().div_ceil(MOST_TICKS).max(1);
+    let last = trace.ticks.len().saturating_sub(1);
+    let mut columns = Ticks::default();
+    for (index, tick) in trace.ticks.iter().enumerate() {
+        if index % step == 0 || index == last {
+            columns.push(tick);
+        }
+    }
+    columns
+}
+
+impl Ticks {
+    fn push(&mut self, tick: &Tick) {
+        let [sigma_x, sigma_y, ..] = tick.estimate.deviation;
+        let sigma_heading = tick.estimate.deviation.get(HEADING).copied().unwrap_or(f64::NAN);
+        self.time.push(rounded(tick.time, TIME));
+        self.truth.push(tick.truth.map(|truth| truth.pose));
+        self.estimate.push(Some(tick.estimate.pose));
+        self.encoders.push(Some(tick.odometry));
+        self.sigma_x.push(rounded(sigma_x, DEVIATION));
+        self.sigma_y.push(rounded(sigma_y, DEVIATION));
+        self.sigma_heading.push(rounded(sigma_heading, DEVIATION));
+        let correlation = tick.estimate.covariance_xy / (sigma_x * sigma_y);
+        self.correlation.push(rounded(correlation, FRACTION));
+    }
+}
+
+impl Poses {
+    fn push(&mut self, pose: Option<Pose>) {
+        self.x.push(pose.and_then(|pose| rounded(pose.x, LENGTH)));
+        self.y.push(pose.and_then(|pose| rounded(pose.y, LENGTH)));
+        self.heading.push(pose.and_then(|pose| rounded(pose.heading, ANGLE)));
+    }
+}
+
+fn fixes(trace: &Trace) -> Fixes<'_> {
+    let mut columns = Fixes::default();
+    for fix in &trace.fixes {
+        columns.push(fix);
+    }
+    columns
+}
+
+impl<'a> Fixes<'a> {
+    fn push(&mut self, fix: &'a FixRecord) {
+        let [x, y] = fix.sonar;
+        self.time.push(rounded(fix.time, TIME));
+        self.wall.push(fix.wall);
+        self.x.push(rounded(x, LENGTH));
+        self.y.push(rounded(y, LENGTH));
+        self.direction.push(rounded(fix.direction, ANGLE));
+        self.range.push(fix.range.and_then(|range| rounded(range, LENGTH)));
+        self.source.push(fix.source.map(name));
+        self.outcome.push(match fix.outcome {
+            Outcome::Accepted => 0,
+            Outcome::Gated => 1,
+            Outcome::Refused => 2,
+        });
+        self.reason.push(&fix.reason);
+        self.innovation.push(fix.innovation.and_then(|length| rounded(length, LENGTH)));
+        let spread = fix.innovation_variance.map(f64::sqrt);
+        self.spread.push(spread.and_then(|length| rounded(length, LENGTH)));
+    }
+}
+
+fn name(source: Source) -> &'static str {
+    match source {
+        Source::Wall(_) => "wall",
+        Source::Corner => "corner",
+        Source::Edge => "edge",
+        Source::Obstacle => "obstacle",
+        Source::DoubleBounce => "double bounce",
+        Source::Outlier => "outlier",
+    }
+}
+
+fn rounded(value: f64, decimals: i32) -> Number {
+    let scale = 10.0_f64.powi(decimals);
+    // Adding zero turns −0 into 0.
+    let rounded = (value * scale).round() / scale + 0.0;
+    rounded.is_finite().then_some(rounded)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_rounded_and_what_is_not_a_number_is_null() {
+        let values = [0.123_456, -0.000_01, f64::NAN, f64::INFINITY].map(|v| rounded(v, LENGTH));
+        assert_eq!(serde_json::to_string(&values).unwrap(), "[0.1235,0.0,null,null]");
+    }
+
+    #[test]
+    fn a_long_run_is_thinned_and_keeps_both_ends() {
+        let tick = |n: u32| Tick {
+            time: f64::from(n) * 0.1,
+            truth: None,
+            estimate: sonarfix_sim::trace::Estimate::default(),
+            odometry: Pose::default(),
+            bound: None,
+        };
+        let trace = Trace { ticks: (0..12_480).map(tick).collect(), ..Trace::default() };
+        let columns = ticks(&trace);
+        assert!(columns.time.len() <= MOST_TICKS, "{}", columns.time.len());
+        assert_eq!(columns.time.first(), Some(&Some(0.0)));
+        assert_eq!(columns.time.last(), Some(&Some(1247.9)));
+        assert_eq!(columns.truth.x.first(), Some(&None));
+        assert_eq!(columns.truth.x.len(), columns.time.len());
+    }
+}

@@ -1,0 +1,198 @@
+//! The same estimation problem in `f64` and dense matrices, written from the equations of
+//! `docs/model.md` without code of the core: the oracle that the `f32` filter is compared with, and
+//! the recursion of the bound.
+
+#![expect(
+    clippy::indexing_slicing,
+    reason = "vectors and matrices of a fixed size, indexed by constants of the model"
+)]
+
+use nalgebra::{SMatrix, SVector};
+use sonarfix::config::Config;
+
+use crate::angle;
+
+/// x, y, heading, right and left scale error, track-width error, range scale error.
+pub type Vector = SVector<f64, 7>;
+/// 7×7, in the order of [`Vector`].
+pub type Matrix = SMatrix<f64, 7, 7>;
+
+/// A wall's line, as a point on it and its unit normal, metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Line {
+    /// A point on the line.
+    pub point: [f64; 2],
+    /// Unit normal (a, b) of eq. (1).
+    pub normal: [f64; 2],
+}
+
+impl Line {
+    /// The line through two points.
+    #[must_use]
+    pub fn through(from: [f64; 2], to: [f64; 2]) -> Self {
+        let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
+        let length = dx.hypot(dy);
+        Self { point: from, normal: [-dy / length, dx / length] }
+    }
+}
+
+/// The parameters of the filter's model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Model {
+    /// Nominal track width, metres.
+    pub track_width: f64,
+    /// Variance of a wheel's travel per metre, m²/m.
+    pub wheel_variance: f64,
+    /// Random walk of a scale error: variance per metre, 1/m.
+    pub scale_variance: f64,
+    /// Random walk of the track-width error: variance per metre, m²/m.
+    pub width_variance: f64,
+    /// Mounting position of the sonar: ahead and left, metres.
+    pub mount: [f64; 2],
+    /// Range noise at zero range, metres.
+    pub noise_floor: f64,
+    /// Range noise per metre of range.
+    pub noise_per_metre: f64,
+}
+
+impl Model {
+    /// The model of a filter's configuration.
+    #[must_use]
+    pub fn of(config: &Config) -> Self {
+        let square = |v: f32| f64::from(v) * f64::from(v);
+        Self {
+            track_width: config.drive.track_width.0.into(),
+            wheel_variance: square(config.drive.wheel_noise.0.0),
+            scale_variance: square(config.drive.scale_walk.0),
+            width_variance: square(config.drive.track_width_walk.0.0),
+            mount: [config.sonar.mount.x.0.into(), config.sonar.mount.y.0.into()],
+            noise_floor: config.sonar.noise.floor.0.into(),
+            noise_per_metre: config.sonar.noise.per_metre.into(),
+        }
+    }
+
+    /// f(x, u): the state after the encoders read `travel` (right, left), metres.
+    #[must_use]
+    pub fn moved(&self, x: &Vector, travel: [f64; 2]) -> Vector {
+        let (right, left) = (travel[0] * (1.0 + x[3]), travel[1] * (1.0 + x[4]));
+        let turn = (right - left) / (self.track_width + x[5]);
+        let (sin, cos) = (x[2] + turn / 2.0).sin_cos();
+        let advance = f64::midpoint(right, left);
+        let mut next = *x;
+        next[0] += advance * cos;
+        next[1] += advance * sin;
+        next[2] = angle::wrap(x[2] + turn);
+        next
+    }
+
+    /// ∂f/∂x and ∂f/∂u at a state and travel.
+    #[must_use]
+    pub fn motion_jacobians(&self, x: &Vector, travel: [f64; 2]) -> (Matrix, SMatrix<f64, 7, 2>) {
+        let factor = [1.0 + x[3], 1.0 + x[4]];
+        let width = self.track_width + x[5];
+        let turn = (travel[0] * factor[0] - travel[1] * factor[1]) / width;
+        let advance = f64::midpoint(travel[0] * factor[0], travel[1] * factor[1]);
+        let (sin, cos) = (x[2] + turn / 2.0).sin_cos();
+        // Rows x, y, heading of the derivative by anything that changes advance and turn.
+        let column = |by_advance: f64, by_turn: f64| {
+            [
+                by_advance * cos - advance * sin * by_turn / 2.0,
+                by_advance * sin + advance * cos * by_turn / 2.0,
+                by_turn,
+            ]
+        };
+        let mut f = Matrix::identity();
+        f[(0, 2)] = -advance * sin;
+        f[(1, 2)] = advance * cos;
+        let scale_right = column(travel[0] / 2.0, travel[0] / width);
+        let scale_left = column(travel[1] / 2.0, -travel[1] / width);
+        let track_width = column(0.0, -turn / width);
+        let mut g = SMatrix::<f64, 7, 2>::zeros();
+        let right = column(factor[0] / 2.0, factor[0] / width);
+        let left = column(factor[1] / 2.0, -factor[1] / width);
+        for row in 0..3 {
+            f[(row, 3)] = scale_right[row];
+            f[(row, 4)] = scale_left[row];
+            f[(row, 5)] = track_width[row];
+            g[(row, 0)] = right[row];
+            g[(row, 1)] = left[row];
+        }
+        (f, g)
+    }
+
+    /// h(x) for a wall's line, and its derivative H.
+    #[must_use]
+    pub fn range(&self, x: &Vector, line: &Line) -> (f64, Vector) {
+        let (sin, cos) = x[2].sin_cos();
+        let [ahead, aside] = self.mount;
+        let lever = [cos * ahead - sin * aside, sin * ahead + cos * aside];
+        let [a, b] = line.normal;
+        let signed = a * (x[0] + lever[0] - line.point[0]) + b * (x[1] + lever[1] - line.point[1]);
+        let slope = signed.signum() * (1.0 + x[6]);
+        let mut h = Vector::zeros();
+        h[0] = slope * a;
+        h[1] = slope * b;
+        h[2] = slope * (b * lever[0] - a * lever[1]);
+        h[6] = signed.abs();
+        ((1.0 + x[6]) * signed.abs(), h)
+    }
+
+    /// Variance of a range, m².
+    #[must_use]
+    pub fn range_variance(&self, range: f64) -> f64 {
+        self.noise_floor.powi(2) + (self.noise_per_metre * range).powi(2)
+    }
+}
+
+/// The textbook filter: state, covariance, dense products.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DenseFilter {
+    /// The model.
+    pub model: Model,
+    /// The state X̂, or, for the bound, the truth.
+    pub x: Vector,
+    /// The covariance P.
+    pub p: Matrix,
+}
+
+impl DenseFilter {
+    /// A filter at a state with independent errors of these standard deviations.
+    #[must_use]
+    pub fn new(model: Model, x: Vector, deviation: &Vector) -> Self {
+        let p = Matrix::from_diagonal(&deviation.component_mul(deviation));
+        Self { model, x, p }
+    }
+
+    /// Eqs. (4)–(5) and (7)–(8).
+    pub fn predict(&mut self, travel: [f64; 2]) {
+        let (f, g) = self.model.motion_jacobians(&self.x, travel);
+        let m = &self.model;
+        let wheels = SVector::<f64, 2>::new(travel[0].abs(), travel[1].abs()) * m.wheel_variance;
+        let distance = f64::midpoint(travel[0].abs(), travel[1].abs());
+        let mut walk = Vector::zeros();
+        walk[3] = m.scale_variance * distance;
+        walk[4] = m.scale_variance * distance;
+        walk[5] = m.width_variance * distance;
+        self.p = f * self.p * f.transpose()
+            + g * SMatrix::<f64, 2, 2>::from_diagonal(&wheels) * g.transpose()
+            + Matrix::from_diagonal(&walk);
+        self.x = m.moved(&self.x, travel);
+    }
+
+    /// Eqs. (6) and (10)–(14), in Joseph's form.
+    pub fn correct(&mut self, line: &Line, range: f64) {
+        let (expected, h) = self.model.range(&self.x, line);
+        let noise = self.model.range_variance(expected);
+        let gain = self.p * h / (h.dot(&(self.p * h)) + noise);
+        let keep = Matrix::identity() - gain * h.transpose();
+        self.p = keep * self.p * keep.transpose() + gain * gain.transpose() * noise;
+        self.x += gain * (range - expected);
+        self.x[2] = angle::wrap(self.x[2]);
+    }
+
+    /// One standard deviation of each state.
+    #[must_use]
+    pub fn deviation(&self) -> Vector {
+        self.p.diagonal().map(f64::sqrt)
+    }
+}

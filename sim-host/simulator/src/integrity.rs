@@ -1,0 +1,173 @@
+//! Integrity of a run: whether the error stays inside the filter's confidence ellipse, and if not,
+//! whether the health verdict reports it.
+
+use sonarfix::health::Verdict;
+
+use crate::dense::{Matrix, Vector};
+
+/// The 99.9 % quantile of χ² with two degrees of freedom.
+const ELLIPSE: f64 = 13.8;
+
+/// A heading error up to this is tolerable, rad: half of the cone of the narrowest sonar of the
+/// scenarios.
+const HEADING: f64 = 0.1;
+
+/// A position error beyond this is a failure that the verdict has to report, metres.
+const POSITION: f64 = 0.1;
+
+/// Integrity statistics of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Integrity {
+    ticks: u32,
+    outside: u32,
+    /// Current time outside the ellipse with the verdict `Tracking`, seconds.
+    undetected: f64,
+    longest_undetected: f64,
+    worst: f64,
+    holds: bool,
+    verdict: Verdict,
+    degraded: u32,
+    called_lost: u32,
+    false_alarms: u32,
+    /// Seconds.
+    undetected_error: f64,
+}
+
+impl Integrity {
+    /// Adds the error and the covariance after a tick of a length in seconds.
+    pub fn add(&mut self, seconds: f64, error: &Vector, p: &Matrix, verdict: Verdict) {
+        let is_inside = distance_squared(error, p) <= ELLIPSE;
+        self.ticks += 1;
+        if verdict == Verdict::Tracking && error[0].hypot(error[1]) > POSITION {
+            self.undetected_error += seconds;
+        }
+        self.outside += u32::from(!is_inside);
+        let is_undetected = !is_inside && verdict == Verdict::Tracking;
+        self.undetected = if is_undetected { self.undetected + seconds } else { 0.0 };
+        self.longest_undetected = self.longest_undetected.max(self.undetected);
+        self.worst = self.worst.max(error[0].hypot(error[1]));
+        self.degraded += u32::from(verdict == Verdict::Degraded);
+        if verdict == Verdict::Lost && self.verdict != Verdict::Lost {
+            self.called_lost += 1;
+            self.false_alarms += u32::from(is_inside && error[2].abs() <= HEADING);
+        }
+        self.verdict = verdict;
+        self.holds = is_inside && verdict != Verdict::Lost;
+    }
+
+    /// Share of the ticks with the position outside the 99.9 % ellipse.
+    #[must_use]
+    pub fn share_outside(&self) -> f64 {
+        f64::from(self.outside) / f64::from(self.ticks.max(1))
+    }
+
+    /// Time with a position error of more than 10 cm and the verdict `Tracking`, seconds.
+    #[must_use]
+    pub fn undetected_error(&self) -> f64 {
+        self.undetected_error
+    }
+
+    /// Longest time outside the ellipse with the verdict `Tracking`, seconds.
+    #[must_use]
+    pub fn longest_undetected(&self) -> f64 {
+        self.longest_undetected
+    }
+
+    /// Time up to the end of the run outside the ellipse with the verdict `Tracking`, seconds.
+    #[must_use]
+    pub fn undetected_at_end(&self) -> f64 {
+        self.undetected
+    }
+
+    /// Share of the ticks with the verdict `Degraded`.
+    #[must_use]
+    pub fn share_degraded(&self) -> f64 {
+        f64::from(self.degraded) / f64::from(self.ticks.max(1))
+    }
+
+    /// How often the verdict became `Lost`.
+    #[must_use]
+    pub fn called_lost(&self) -> u32 {
+        self.called_lost
+    }
+
+    /// How often it became `Lost` with the position inside the 99.9 % ellipse and a heading error of
+    /// at most 0.1 rad.
+    #[must_use]
+    pub fn false_alarms(&self) -> u32 {
+        self.false_alarms
+    }
+
+    /// The largest position error, metres.
+    #[must_use]
+    pub fn worst(&self) -> f64 {
+        self.worst
+    }
+
+    /// Whether at the last tick the error was inside the ellipse and the verdict was not `Lost`.
+    #[must_use]
+    pub fn holds_at_end(&self) -> bool {
+        self.holds
+    }
+}
+
+/// Mahalanobis distance squared of x and y.
+fn distance_squared(error: &Vector, p: &Matrix) -> f64 {
+    let determinant = p[(0, 0)] * p[(1, 1)] - p[(0, 1)] * p[(1, 0)];
+    let (x, y) = (error[0], error[1]);
+    (p[(1, 1)] * x * x - 2.0 * p[(0, 1)] * x * y + p[(0, 0)] * y * y) / determinant
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn taken(steps: &[(f64, Verdict)]) -> Integrity {
+        let mut p = Matrix::zeros();
+        p[(0, 0)] = 4e-4;
+        p[(1, 1)] = 1e-4;
+        let mut integrity = Integrity::default();
+        for &(x, verdict) in steps {
+            let mut error = Vector::zeros();
+            error[0] = x;
+            integrity.add(0.5, &error, &p, verdict);
+        }
+        integrity
+    }
+
+    #[test]
+    fn lost_inside_the_ellipse_is_a_false_alarm() {
+        use Verdict::{Degraded, Lost, Tracking};
+        let integrity = taken(&[
+            (0.01, Tracking),
+            (0.01, Lost),
+            (0.20, Lost),
+            (0.20, Degraded),
+            (0.20, Lost),
+            (0.01, Degraded),
+        ]);
+        assert_eq!((integrity.called_lost(), integrity.false_alarms()), (2, 1));
+        assert!((integrity.share_degraded() - 2.0 / 6.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn an_error_outside_counts_as_undetected_only_while_the_verdict_is_tracking() {
+        use Verdict::{Degraded, Lost, Tracking};
+        // The ellipse reaches √13.8 · 2 cm = 7.4 cm along x.
+        let integrity = taken(&[
+            (0.07, Tracking),
+            (0.08, Tracking),
+            (-0.09, Tracking),
+            (0.20, Degraded),
+            (0.08, Tracking),
+            (0.08, Lost),
+        ]);
+        assert!((integrity.longest_undetected() - 1.0).abs() < 1e-12, "{integrity:?}");
+        assert!((integrity.share_outside() - 5.0 / 6.0).abs() < 1e-12);
+        assert!((integrity.worst() - 0.2).abs() < 1e-12);
+        assert!(!integrity.holds_at_end() && integrity.undetected_at_end() == 0.0);
+        assert!(taken(&[(0.08, Tracking)]).undetected_at_end() > 0.0);
+        assert!(taken(&[(0.08, Lost), (0.01, Degraded)]).holds_at_end());
+        assert!(!taken(&[(0.01, Lost)]).holds_at_end());
+    }
+}

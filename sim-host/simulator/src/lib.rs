@@ -1,0 +1,30 @@
+//! Simulates a robot with the Sonarfix localizer, and measures the localizer.
+//!
+//! The localizer is the shipped one; everything around it is simulated. [`simulate`] runs a scenario
+//! once, [`monte_carlo`] many times. [`bound`] is the posterior Cramér–Rao bound, [`dense`] the
+//! textbook filter in `f64` that the shipped one is compared with. This package opens no file and
+//! uses no terminal.
+
+pub mod angle;
+pub mod bound;
+pub mod dense;
+pub mod integrity;
+pub mod monte_carlo;
+pub mod observe;
+pub mod odometry;
+pub mod pins;
+pub mod plant;
+pub mod simulate;
+pub mod statistics;
+pub mod time;
+pub mod trace;
+pub mod world;
+
+/// The names of the filter's states, in the order of the state vector.
+pub const STATES: [&str; 7] =
+    ["x", "y", "heading", "scale_right", "scale_left", "track_width", "range_scale"];
+
+/// The README's example, so that the tests compile it.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+pub struct Readme;

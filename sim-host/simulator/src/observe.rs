@@ -1,0 +1,146 @@
+//! Converts the state of the shipped localizer to the `f64` of traces and statistics.
+
+#![expect(
+    clippy::indexing_slicing,
+    reason = "vectors and matrices of a fixed size, indexed by constants of the model"
+)]
+
+use nalgebra::{DMatrix, DVector};
+use sonarfix::aim::{Aim, NoAim};
+use sonarfix::ekf::{Ekf, Innovation};
+use sonarfix::localizer::{Fix, Localizer};
+
+use crate::angle;
+use crate::dense::{Matrix, Vector};
+use crate::trace::{Calibration, Estimate, FixRecord, Outcome, Pose, Why};
+use crate::world::reflector::Source;
+
+/// The localizer's estimate.
+#[must_use]
+pub fn estimate(localizer: &Localizer) -> Estimate {
+    let ekf = localizer.filter();
+    let state = ekf.state();
+    let p = covariance(ekf);
+    let nominal = f64::from(localizer.config().drive.track_width.0);
+    Estimate {
+        pose: Pose { x: state.x.0.into(), y: state.y.0.into(), heading: state.heading.0.into() },
+        calibration: Calibration {
+            scale_right: state.scale_right.into(),
+            scale_left: state.scale_left.into(),
+            track_width: nominal + f64::from(state.track_width_error.0),
+            range_scale: state.range_scale.into(),
+        },
+        deviation: p.diagonal().map(f64::sqrt).into(),
+        covariance_xy: p[(0, 1)],
+    }
+}
+
+/// The filter's state X̂.
+#[must_use]
+pub fn state(ekf: &Ekf) -> Vector {
+    ekf.state_vector().map(f64::from)
+}
+
+/// The filter's covariance P.
+#[must_use]
+pub fn covariance(ekf: &Ekf) -> Matrix {
+    ekf.covariance().map(f64::from)
+}
+
+/// The error of the filter's state, its heading wrapped.
+#[must_use]
+pub fn error(ekf: &Ekf, truth: &Vector) -> Vector {
+    let mut error = state(ekf) - truth;
+    error[2] = angle::wrap(error[2]);
+    error
+}
+
+/// Normalized estimation error squared (NEES), εᵀ P⁻¹ ε, over the estimated states (those with a
+/// nonzero variance), and their number. `None` if P is not positive definite.
+#[must_use]
+pub fn nees(error: &Vector, p: &Matrix) -> Option<(f64, usize)> {
+    let estimated: Vec<usize> = (0..7).filter(|&i| p[(i, i)] > 0.0).collect();
+    let n = estimated.len();
+    // Scaled to a correlation matrix first: variances differ by ten orders of magnitude.
+    let deviation = DVector::from_fn(n, |i, _| p[(estimated[i], estimated[i])].sqrt());
+    let correlation = DMatrix::from_fn(n, n, |i, j| {
+        p[(estimated[i], estimated[j])] / (deviation[i] * deviation[j])
+    });
+    let scaled = DVector::from_fn(n, |i, _| error[estimated[i]] / deviation[i]);
+    let solved = correlation.cholesky()?.solve(&scaled);
+    Some((scaled.dot(&solved), n))
+}
+
+/// The measurement of one cycle, without its outcome in the filter.
+#[derive(Debug, Clone, Copy)]
+pub struct Measurement {
+    /// Seconds since the run began.
+    pub time: f64,
+    /// Position of the sonar, metres.
+    pub sonar: [f64; 2],
+    /// The heading that the bearing is relative to, radians.
+    pub heading: f64,
+    /// The measured range, metres.
+    pub range: Option<f64>,
+    /// The source of the echo, where it is known.
+    pub source: Option<Source>,
+}
+
+/// The record of a measurement of a wall, with its outcome.
+#[must_use]
+pub fn fix_record(measurement: Measurement, aim: &Aim, fix: &Fix) -> FixRecord {
+    let (outcome, innovation, reason) = match fix {
+        Fix::Accepted(innovation) => (Outcome::Accepted, Some(innovation), String::new()),
+        Fix::Downweighted(innovation) => {
+            (Outcome::Accepted, Some(innovation), "downweighted".to_owned())
+        }
+        Fix::Gated(innovation) => (Outcome::Gated, Some(innovation), String::new()),
+        Fix::Refused(refusal) => (Outcome::Refused, None, refusal.to_string()),
+        other => (Outcome::Refused, None, format!("{other:?}")),
+    };
+    let bearing = f64::from(aim.bearing.0);
+    FixRecord {
+        time: measurement.time,
+        wall: usize::try_from(aim.wall.0).ok(),
+        sonar: measurement.sonar,
+        direction: angle::wrap(measurement.heading + bearing),
+        bearing,
+        range: measurement.range,
+        source: measurement.source,
+        why: Some(why(aim)),
+        outcome,
+        reason,
+        innovation: innovation.map(|i: &Innovation| i.value.0.into()),
+        innovation_variance: innovation.map(|i| i.variance.0.into()),
+    }
+}
+
+fn why(aim: &Aim) -> Why {
+    #[expect(clippy::cast_precision_loss, reason = "some seconds")]
+    let micros = aim.why.time.to_micros() as f64;
+    Why {
+        gain: aim.why.gain.0.into(),
+        success: aim.why.success.into(),
+        seconds: micros * 1e-6,
+        candidates: aim.why.candidates,
+    }
+}
+
+/// The record of a cycle without a measurable wall.
+#[must_use]
+pub fn no_aim_record(measurement: Measurement, no_aim: NoAim) -> FixRecord {
+    FixRecord {
+        time: measurement.time,
+        wall: None,
+        sonar: measurement.sonar,
+        direction: measurement.heading,
+        bearing: 0.0,
+        range: None,
+        source: None,
+        why: None,
+        outcome: Outcome::Refused,
+        reason: no_aim.to_string(),
+        innovation: None,
+        innovation_variance: None,
+    }
+}

@@ -1,0 +1,47 @@
+//! The wires between an encoder disc and the controller.
+
+use std::cell::Cell;
+use std::convert::Infallible;
+
+use embedded_hal::digital::{ErrorType, InputPin};
+use sonarfix_hal::encoder::{Counter, TickCount};
+use sonarfix_pil::Counted;
+
+/// The two channels of an encoder, and the decoder's count.
+#[derive(Debug, Default)]
+pub struct EncoderWires {
+    /// Level of channel A.
+    pub a: Cell<bool>,
+    /// Level of channel B.
+    pub b: Cell<bool>,
+    /// The count of the decoder.
+    pub count: TickCount,
+}
+
+impl EncoderWires {
+    /// The counter reading.
+    #[must_use]
+    pub fn counted(&self) -> Counted {
+        let mut counter = &self.count;
+        let Ok(ticks) = counter.count();
+        Counted { ticks, illegal: counter.illegal() }
+    }
+}
+
+/// The controller pin of an encoder channel.
+#[derive(Debug)]
+pub struct ChannelPin<'w>(pub &'w Cell<bool>);
+
+impl ErrorType for ChannelPin<'_> {
+    type Error = Infallible;
+}
+
+impl InputPin for ChannelPin<'_> {
+    fn is_high(&mut self) -> Result<bool, Infallible> {
+        Ok(self.0.get())
+    }
+
+    fn is_low(&mut self) -> Result<bool, Infallible> {
+        Ok(!self.0.get())
+    }
+}

@@ -1,0 +1,105 @@
+//! The true robot.
+//!
+//! - [`wheels`]: the encoder readings of rolling wheels;
+//! - `course`: the motion of the robot: exactly along its path, or as commanded;
+//! - [`follower`]: the path follower, which steers by the estimate;
+//! - [`servo`]: the true bearing of the sonar.
+
+mod course;
+pub mod follower;
+pub mod servo;
+pub mod wheels;
+
+use rand_chacha::ChaCha8Rng;
+use sonarfix_map::{Follow, Scenario};
+
+use crate::dense::Vector;
+use crate::trace::{Calibration, Pose, Truth};
+use course::Course;
+use follower::Command;
+pub use wheels::Travel;
+use wheels::Wheels;
+
+/// The true robot in motion.
+#[derive(Debug, Clone)]
+pub struct Plant<'a> {
+    course: Course<'a>,
+    wheels: Wheels,
+    nominal_track_width: f64,
+    /// True scale error of the ranger, including that of the speed of sound.
+    range_scale: f64,
+    /// Seconds since the run began.
+    time: f64,
+}
+
+impl<'a> Plant<'a> {
+    /// The robot at the start of its path; `range_scale` includes the error of the speed of sound.
+    #[must_use]
+    pub fn new(scenario: &'a Scenario, range_scale: f64) -> Self {
+        let start = scenario.path.pose_at(0.0);
+        let start = Pose { x: start.x, y: start.y, heading: start.heading };
+        Self {
+            course: match scenario.follow {
+                Follow::Truth => Course::OnPath(&scenario.path),
+                Follow::Estimate => Course::steered(start),
+            },
+            wheels: Wheels::new(&scenario.truth, scenario.upsets),
+            nominal_track_width: scenario.robot.localizer.drive.track_width.0.into(),
+            range_scale,
+            time: 0.0,
+        }
+    }
+
+    /// Sets the command; without effect on a robot that follows its path exactly.
+    pub fn steer(&mut self, command: Command) {
+        self.course.steer(command, self.nominal_track_width);
+    }
+
+    /// Drives on to `time` seconds and reads the encoders.
+    pub fn drive_to(&mut self, time: f64, rng: &mut ChaCha8Rng) -> Travel {
+        let rolled = self.course.drive(self.time, time, self.wheels.parameters());
+        self.time = time;
+        self.wheels.roll(rolled, rng)
+    }
+
+    /// The pose now.
+    #[must_use]
+    pub fn pose(&self) -> Pose {
+        self.pose_after(0.0)
+    }
+
+    /// The pose a number of seconds from now, if the command does not change.
+    #[must_use]
+    pub fn pose_after(&self, seconds: f64) -> Pose {
+        self.course.pose_at(self.time, self.time + seconds, self.wheels.parameters())
+    }
+
+    /// The truth now.
+    #[must_use]
+    pub fn truth(&self) -> Truth {
+        let p = self.wheels.parameters();
+        let calibration = Calibration {
+            scale_right: p.scale_right,
+            scale_left: p.scale_left,
+            track_width: p.track_width,
+            range_scale: self.range_scale,
+        };
+        Truth { pose: self.pose(), calibration: Some(calibration) }
+    }
+
+    /// The truth now, as the states of the filter.
+    #[must_use]
+    pub fn state(&self) -> Vector {
+        let pose = self.pose();
+        let p = self.wheels.parameters();
+        Vector::from([
+            pose.x,
+            pose.y,
+            pose.heading,
+            p.scale_right,
+            p.scale_left,
+            p.track_width - self.nominal_track_width,
+            self.range_scale,
+        ])
+    }
+}

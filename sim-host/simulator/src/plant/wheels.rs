@@ -1,0 +1,114 @@
+//! Converts the distance that the wheels roll on the ground to encoder readings.
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+use sonarfix_map::{Truth as Parameters, Upsets};
+
+/// The travel of the wheels between two instants.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Travel {
+    /// The encoder readings, right and left, metres.
+    pub measured: [f64; 2],
+    /// The readings without noise, slip and bumps, metres.
+    pub noiseless: [f64; 2],
+}
+
+/// Two wheels with their systematic and random errors.
+#[derive(Debug, Clone)]
+pub struct Wheels {
+    parameters: Parameters,
+    upsets: Upsets,
+}
+
+impl Wheels {
+    /// Wheels with these true parameters.
+    #[must_use]
+    pub fn new(parameters: &Parameters, upsets: Upsets) -> Self {
+        Self { parameters: *parameters, upsets }
+    }
+
+    /// The true parameters now.
+    #[must_use]
+    pub fn parameters(&self) -> &Parameters {
+        &self.parameters
+    }
+
+    /// Rolls both wheels by these distances over the ground, metres, and reads the encoders.
+    pub fn roll(&mut self, rolled: [f64; 2], rng: &mut ChaCha8Rng) -> Travel {
+        let p = &self.parameters;
+        let noiseless = [rolled[0] / (1.0 + p.scale_right), rolled[1] / (1.0 + p.scale_left)];
+        let measured = noiseless.map(|travel| {
+            travel + p.wheel_noise * travel.abs().sqrt() * rng.sample::<f64, _>(StandardNormal)
+        });
+        let upsets = self.upsets;
+        let measured = measured.map(|travel| travel + upset(&upsets, travel, rng));
+        let root_distance = (0.5 * (noiseless[0].abs() + noiseless[1].abs())).sqrt();
+        self.let_parameters_walk(root_distance, rng);
+        Travel { measured, noiseless }
+    }
+
+    fn let_parameters_walk(&mut self, root_distance: f64, rng: &mut ChaCha8Rng) {
+        let p = &mut self.parameters;
+        // No draw without a random walk, so that the noise of a constant robot does not change.
+        if p.scale_walk > 0.0 {
+            p.scale_right += p.scale_walk * root_distance * rng.sample::<f64, _>(StandardNormal);
+            p.scale_left += p.scale_walk * root_distance * rng.sample::<f64, _>(StandardNormal);
+        }
+        if p.track_width_walk > 0.0 {
+            let step: f64 = rng.sample(StandardNormal);
+            p.track_width += p.track_width_walk * root_distance * step;
+        }
+    }
+}
+
+/// The error of slip and bumps in an encoder reading. A slipping wheel turns further than it rolls;
+/// a bump has either sign.
+fn upset(upsets: &Upsets, travel: f64, rng: &mut ChaCha8Rng) -> f64 {
+    let mut added = 0.0;
+    if happens(upsets.slip.every, travel, rng) {
+        added += upsets.slip.by * travel.signum();
+    }
+    if happens(upsets.bump.every, travel, rng) {
+        added += upsets.bump.by * rng.sample::<f64, _>(StandardNormal);
+    }
+    added
+}
+
+/// Whether an event with a mean distance of `every` metres happens on this travel. No draw for a
+/// probability of zero.
+fn happens(every: f64, travel: f64, rng: &mut ChaCha8Rng) -> bool {
+    every.is_finite() && rng.random::<f64>() < travel.abs() / every
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use sonarfix_map::{Scenario, Upset};
+
+    /// Rolls 400 m in steps of 4 cm; returns the excess of the right encoder.
+    fn excess(upsets: Upsets, seed: u64) -> f64 {
+        let scenario = Scenario::paper().unwrap();
+        let truth = Parameters { wheel_noise: 0.0, ..scenario.truth };
+        let mut wheels = Wheels::new(&truth, upsets);
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        (0..10_000)
+            .map(|_| wheels.roll([0.04, 0.04], &mut rng))
+            .map(|travel| travel.measured[0] - travel.noiseless[0])
+            .sum()
+    }
+
+    #[test]
+    fn slip_counts_too_much_and_bumps_either_way() {
+        let often = Upset { every: 2.0, by: 0.01 };
+        let slips = excess(Upsets { slip: often, ..Upsets::default() }, 1);
+        // About 200 slips (403 m / 2 m) of 1 cm, ± 4 deviations of 14.
+        assert!((1.45..2.6).contains(&slips), "{slips}");
+        let bumps = (0..8).map(|seed| excess(Upsets { bump: often, ..Upsets::default() }, seed));
+        let bumps: Vec<f64> = bumps.collect();
+        // 200 bumps of 1 cm with random signs: 14 cm.
+        assert!(bumps.iter().all(|sum| sum.abs() > 1e-6 && sum.abs() < 0.6), "{bumps:?}");
+        assert!(bumps.iter().any(|sum| *sum < 0.0) && bumps.iter().any(|sum| *sum > 0.0));
+    }
+}

@@ -1,0 +1,136 @@
+//! A run that passes travel and ranges directly and on time to the localizer.
+
+use sonarfix::aim::Aim;
+use sonarfix::motion::WheelTravel;
+use sonarfix::units::{Instant, Metres};
+
+use super::computer::{Computer, LocalizerInputs};
+use super::error::SimulationError;
+use super::score::Score;
+use super::simulation::Simulation;
+use super::streams::RandomStreams;
+use crate::angle;
+use crate::observe::{self, Measurement};
+use crate::plant::Plant;
+use crate::plant::follower::Follower;
+use crate::statistics::RunResult;
+use crate::time::seconds;
+use crate::trace::Recorder;
+use crate::world::segment::Point;
+use crate::world::sensor::SensorModel;
+use crate::world::{Echo, Ping};
+
+pub fn run(
+    simulation: &Simulation,
+    seed: u64,
+    recorder: &mut impl Recorder,
+    computer: &mut impl Computer,
+) -> Result<RunResult, SimulationError> {
+    let mut streams = RandomStreams::new(seed);
+    let plant = simulation.plant();
+    let start = simulation.start(&plant.state(), &mut streams.start);
+    let localizer = computer.localizer(start, Instant::from_ticks(0))?;
+    let score = Score::new(simulation, start, plant.state())?;
+    // At this fidelity the time of flight is zero.
+    let sensor = SensorModel { scale: simulation.range_scale, ..simulation.sensor.clone() };
+    let follower = simulation.follower();
+    let mut run = Run { simulation, sensor, streams, plant, localizer, follower, score, now: 0 };
+    let tick_period = simulation.scenario.robot.encoder_period.to_micros();
+    let fix_period = simulation.ideal_period().to_micros();
+    let (mut next_tick, mut next_fix) = (tick_period, fix_period);
+    while next_tick.min(next_fix) <= simulation.end() {
+        let now = next_tick.min(next_fix);
+        run.drive_to(now)?;
+        if now == next_fix {
+            run.take_fix(recorder)?;
+            next_fix += fix_period;
+        }
+        if now == next_tick {
+            run.end_tick(recorder)?;
+            next_tick += tick_period;
+        }
+    }
+    run.score.result(run.localizer.localizer()?)
+}
+
+/// A run in progress.
+struct Run<'a, T> {
+    simulation: &'a Simulation,
+    /// The scenario's sonar, with the range error of the speed of sound as a scale error.
+    sensor: SensorModel,
+    streams: RandomStreams,
+    plant: Plant<'a>,
+    localizer: T,
+    follower: Option<Follower>,
+    score: Score<'a>,
+    /// Microseconds since the run began.
+    now: u64,
+}
+
+impl<T: LocalizerInputs> Run<'_, T> {
+    fn time(&self) -> f64 {
+        seconds(self.now)
+    }
+
+    fn drive_to(&mut self, now: u64) -> Result<(), SimulationError> {
+        self.now = now;
+        let time = seconds(now);
+        let travel = self.plant.drive_to(time, &mut self.streams.wheels);
+        self.score.rolled(travel);
+        self.score.arrive(self.plant.state());
+        #[expect(clippy::cast_possible_truncation, reason = "the robot counts in f32")]
+        let [right, left] = travel.measured.map(|metres| metres as f32);
+        self.localizer
+            .odometry(Instant::from_ticks(now), WheelTravel::new(right, left))?
+            .map_err(|error| SimulationError::Odometry { time, error })
+    }
+
+    fn take_fix(&mut self, recorder: &mut impl Recorder) -> Result<(), SimulationError> {
+        let truth = self.plant.pose();
+        let sonar = self.simulation.sonar_at(&truth);
+        let mut measurement = Measurement {
+            time: self.time(),
+            sonar,
+            heading: truth.heading,
+            range: None,
+            source: None,
+        };
+        let aim = match self.localizer.aim()? {
+            Ok(aim) => aim,
+            Err(no_aim) => {
+                self.localizer.skip()?;
+                self.score.no_aim();
+                recorder.fix(|| observe::no_aim_record(measurement, no_aim));
+                return Ok(());
+            }
+        };
+        let echo = self.ping(sonar, truth.heading, &aim);
+        measurement.range = echo.map(|echo| echo.range);
+        measurement.source = echo.map(|echo| echo.source);
+        #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
+        let fix = self.localizer.fix(&aim, measurement.range.map(|range| Metres(range as f32)))?;
+        self.score.fix(&aim, &fix);
+        recorder.fix(|| observe::fix_record(measurement, &aim, &fix));
+        Ok(())
+    }
+
+    fn ping(&mut self, from: Point, heading: f64, aim: &Aim) -> Option<Echo> {
+        let ping = Ping {
+            time: self.time(),
+            sonar_after: &|_| from,
+            direction: angle::wrap(heading + f64::from(aim.bearing.0)),
+        };
+        let RandomStreams { ranges, echoes, .. } = &mut self.streams;
+        self.simulation.world.echo(&ping, &self.sensor, ranges, echoes)
+    }
+
+    fn end_tick(&mut self, recorder: &mut impl Recorder) -> Result<(), SimulationError> {
+        let localizer = self.localizer.localizer()?;
+        self.score.tick(self.time(), localizer, &self.plant, recorder);
+        if let Some(follower) = &mut self.follower {
+            let command = follower.command(&observe::estimate(localizer).pose);
+            self.plant.steer(command);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,132 @@
+//! The result of a run in progress: the bound, dead reckoning, counts and errors.
+
+use sonarfix::aim::Aim;
+use sonarfix::localizer::{Fix, Localizer, Start};
+use sonarfix::units::Instant;
+use sonarfix_hal::robot::Faults;
+
+use super::error::SimulationError;
+use super::simulation::Simulation;
+use crate::bound::Bound;
+use crate::dense::Vector;
+use crate::observe;
+use crate::odometry::DeadReckoning;
+use crate::plant::{Plant, Travel};
+use crate::statistics::{NisSum, RunResult};
+use crate::trace::{Recorder, Tick};
+
+/// Accumulates the result of a run.
+pub struct Score<'a> {
+    simulation: &'a Simulation,
+    odometry: DeadReckoning,
+    bound: Bound,
+    /// Travel since the bound was last updated.
+    rolled: Travel,
+    /// Time of the last tick, seconds.
+    last_tick: f64,
+    result: RunResult,
+    nis: NisSum,
+}
+
+impl<'a> Score<'a> {
+    pub fn new(
+        simulation: &'a Simulation,
+        start: Start,
+        truth: Vector,
+    ) -> Result<Self, SimulationError> {
+        let model = simulation.model;
+        let localizer = simulation.localizer(start, Instant::from_ticks(0))?;
+        let deviation = localizer.filter().deviation();
+        let deviation = Vector::from(deviation.to_array().map(f64::from));
+        let start = observe::estimate(&localizer).pose;
+        Ok(Self {
+            simulation,
+            odometry: DeadReckoning::new(start, model.track_width),
+            bound: Bound::new(model, truth, &deviation),
+            rolled: Travel::default(),
+            last_tick: 0.0,
+            result: RunResult::default(),
+            nis: NisSum::default(),
+        })
+    }
+
+    /// Adds wheel travel.
+    pub fn rolled(&mut self, travel: Travel) {
+        for (sum, more) in self.rolled.measured.iter_mut().zip(travel.measured) {
+            *sum += more;
+        }
+        for (sum, more) in self.rolled.noiseless.iter_mut().zip(travel.noiseless) {
+            *sum += more;
+        }
+    }
+
+    /// Updates bound and dead reckoning with the travel so far.
+    pub fn arrive(&mut self, truth: Vector) {
+        let travel = std::mem::take(&mut self.rolled);
+        self.bound.moved(travel.noiseless, truth);
+        self.odometry.moved(travel.measured);
+    }
+
+    /// Counts a cycle without a measurable wall.
+    pub fn no_aim(&mut self) {
+        self.result.fixes.refused += 1;
+    }
+
+    /// Adds the outcome of a measurement.
+    pub fn fix(&mut self, aim: &Aim, fix: &Fix) {
+        let counts = &mut self.result.fixes;
+        match fix {
+            Fix::Accepted(innovation) | Fix::Downweighted(innovation) => {
+                counts.accepted += 1;
+                self.nis.add(innovation.nis().into());
+                let wall = usize::try_from(aim.wall.0).ok();
+                if let Some(line) = wall.and_then(|wall| self.simulation.lines.get(wall)) {
+                    self.bound.fixed(line);
+                }
+            }
+            Fix::Gated(_) => counts.gated += 1,
+            _ => counts.refused += 1,
+        }
+    }
+
+    /// Adds faults that the loop reported.
+    pub fn faults(&mut self, more: Faults) {
+        self.result.faults = self.result.faults.plus(more);
+    }
+
+    /// Adds an encoder tick.
+    pub fn tick(
+        &mut self,
+        time: f64,
+        localizer: &Localizer,
+        plant: &Plant,
+        recorder: &mut impl Recorder,
+    ) {
+        self.result.error = observe::error(localizer.filter(), &plant.state());
+        self.result.path.add(&self.result.error);
+        let covariance = observe::covariance(localizer.filter());
+        let verdict = localizer.health().verdict;
+        self.result.integrity.add(time - self.last_tick, &self.result.error, &covariance, verdict);
+        self.last_tick = time;
+        recorder.tick(|| Tick {
+            time,
+            truth: Some(plant.truth()),
+            estimate: observe::estimate(localizer),
+            bound: Some(self.bound.deviation().into()),
+            odometry: self.odometry.pose(),
+        });
+    }
+
+    /// The result, after the last tick.
+    pub fn result(mut self, localizer: &Localizer) -> Result<RunResult, SimulationError> {
+        let covariance = observe::covariance(localizer.filter());
+        let (nees, estimated) =
+            observe::nees(&self.result.error, &covariance).ok_or(SimulationError::Covariance)?;
+        self.result.bound_variance = self.bound.variance();
+        self.result.nees = nees;
+        self.result.estimated_states = estimated;
+        self.result.nis = self.nis;
+        self.result.set_lost(localizer.health().verdict);
+        Ok(self.result)
+    }
+}

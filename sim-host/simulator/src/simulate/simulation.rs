@@ -1,0 +1,254 @@
+//! A scenario, prepared to be run.
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+use sonarfix::config::{Config, PingSchedule, PingTiming};
+use sonarfix::localizer::{Localizer, Start};
+use sonarfix::map::{Map, Wall};
+use sonarfix::pose::Pose;
+use sonarfix::units::{Duration, Instant, Metres, Radians};
+use sonarfix_hal::config::RobotConfig;
+use sonarfix_hal::robot::Stamp;
+use sonarfix_map::{BakeError, Fidelity, Follow, NamedWall, Scenario, SonarName};
+
+use super::error::SimulationError;
+use crate::dense::{Line, Model, Vector};
+use crate::plant::Plant;
+use crate::plant::follower::Follower;
+use crate::time::{micros, seconds};
+use crate::trace::Trace;
+use crate::world::obstacle::{Obstacle, Outline};
+use crate::world::segment::{Point, Segment};
+use crate::world::sensor::SensorModel;
+use crate::world::{World, air};
+
+/// A scenario, prepared to be run any number of times.
+#[derive(Debug, Clone)]
+pub struct Simulation {
+    /// The scenario.
+    pub scenario: Scenario,
+    /// The instant that the loop assigns to a range, at the fidelity of pins.
+    pub stamp: Stamp,
+    walls: Vec<Wall>,
+    /// The baked map, if the localizer reads one.
+    image: Option<Vec<u8>>,
+    pub(super) lines: Vec<Line>,
+    pub(super) world: World,
+    pub(super) sensor: SensorModel,
+    /// Scale error of the ranger, including that of the speed of sound.
+    pub(super) range_scale: f64,
+    pub(super) model: Model,
+    /// When the run ends, microseconds.
+    end: u64,
+}
+
+impl Simulation {
+    /// Prepares a scenario.
+    #[must_use]
+    pub fn new(scenario: Scenario) -> Self {
+        let line = |wall: &NamedWall| Line::through(wall.from(), wall.to());
+        let around = &scenario.surroundings;
+        let world = World::new(&scenario.floor)
+            .with_obstacles(around.obstacles.iter().map(obstacle).collect())
+            .at_temperature(around.temperature);
+        let assumed = air::speed_of_sound(scenario.robot.ranger.temperature.0.into());
+        let stretch = assumed / world.speed_of_sound();
+        Self {
+            stamp: Stamp::Reflection,
+            walls: scenario.floor.walls(),
+            image: None,
+            lines: scenario.floor.named_walls().iter().map(line).collect(),
+            world,
+            sensor: sensor(&scenario),
+            // (1 + scale) · stretch − 1, arranged so that a stretch of one changes no bit.
+            range_scale: scenario.truth.range_scale * stretch + (stretch - 1.0),
+            model: Model::of(&scenario.robot.localizer),
+            end: micros(scenario.path.duration()),
+            scenario,
+        }
+    }
+
+    /// The same with a baked map, as on a robot.
+    ///
+    /// # Errors
+    /// [`BakeError`], if the walls cannot be baked.
+    pub fn on_baked_map(self) -> Result<Self, BakeError> {
+        Ok(Self { image: Some(self.baked_map()?), ..self })
+    }
+
+    /// The same, limited to a duration in seconds.
+    #[must_use]
+    pub fn shortened(self, seconds: f64) -> Self {
+        Self { end: self.end.min(micros(seconds)), ..self }
+    }
+
+    /// The walls as a baked map.
+    ///
+    /// # Errors
+    /// [`BakeError`], if they cannot be baked.
+    pub fn baked_map(&self) -> Result<Vec<u8>, BakeError> {
+        sonarfix_map::bake(&self.walls)
+    }
+
+    /// The same with a sonar without errors that only detects walls: the basis of a forecast.
+    #[must_use]
+    pub fn undistorted(self) -> Self {
+        Self { sensor: self.sensor.undistorted(), ..self }
+    }
+
+    /// The true world.
+    #[must_use]
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// The true sonar.
+    #[must_use]
+    pub fn sensor(&self) -> &SensorModel {
+        &self.sensor
+    }
+
+    /// An empty trace of this scenario.
+    #[must_use]
+    pub fn empty_trace(&self) -> Trace {
+        Trace::of(&self.scenario.floor, self.scenario.robot.localizer.sonar.cone)
+    }
+
+    /// True scale error of the ranger: its own error and that of the air temperature that its driver
+    /// assumes.
+    #[must_use]
+    pub fn range_scale(&self) -> f64 {
+        self.range_scale
+    }
+
+    /// When the run ends, microseconds.
+    pub(super) fn end(&self) -> u64 {
+        self.end
+    }
+
+    /// How long the run lasts, simulated seconds.
+    #[must_use]
+    pub fn seconds(&self) -> f64 {
+        seconds(self.end)
+    }
+
+    pub(super) fn plant(&self) -> Plant<'_> {
+        Plant::new(&self.scenario, self.range_scale)
+    }
+
+    /// The initial estimate of the localizer.
+    pub(super) fn start(&self, truth: &Vector, rng: &mut ChaCha8Rng) -> Start {
+        estimated_start(&self.scenario, truth, rng)
+    }
+
+    /// A localizer in this process.
+    pub(super) fn localizer(
+        &self,
+        start: Start,
+        at: Instant,
+    ) -> Result<Localizer<'_>, SimulationError> {
+        let map = match &self.image {
+            None => Map::new(&self.walls),
+            Some(image) => Map::read(image)?,
+        };
+        Ok(Localizer::new(self.config(), map, start, at)?)
+    }
+
+    /// The robot's configuration, with the measurement timing of this fidelity.
+    #[must_use]
+    pub fn config(&self) -> Config {
+        let mut config = self.scenario.robot.localizer;
+        config.sonar.timing = self.timing();
+        config
+    }
+
+    /// The robot, with the measurement timing of this fidelity.
+    #[must_use]
+    pub fn robot(&self) -> RobotConfig {
+        RobotConfig { localizer: self.config(), ..self.scenario.robot }
+    }
+
+    /// The measurement timing: at the ideal fidelity there is no servo.
+    fn timing(&self) -> PingTiming {
+        match self.scenario.fidelity {
+            Fidelity::Pins => self.scenario.robot.localizer.sonar.timing,
+            Fidelity::Ideal => PingTiming {
+                schedule: PingSchedule::Every(self.ideal_period()),
+                ..PingTiming::EVERY_SECOND
+            },
+        }
+    }
+
+    /// Period of the measurements at the ideal fidelity. As fast as possible means once in a cycle of
+    /// the ranger, or with every encoder tick if the cycle is zero.
+    pub(super) fn ideal_period(&self) -> Duration {
+        let timing = &self.scenario.robot.localizer.sonar.timing;
+        match timing.schedule {
+            PingSchedule::Every(period) => period,
+            PingSchedule::AsFastAsPossible if timing.cycle.is_zero() => {
+                self.scenario.robot.encoder_period
+            }
+            PingSchedule::AsFastAsPossible => timing.cycle,
+        }
+    }
+
+    /// The path follower, if the robot steers by its estimate.
+    pub(super) fn follower(&self) -> Option<Follower> {
+        let period = seconds(self.scenario.robot.encoder_period.to_micros());
+        match self.scenario.follow {
+            Follow::Truth => None,
+            Follow::Estimate => Some(Follower::new(&self.scenario.path, period)),
+        }
+    }
+
+    /// Position of the sonar on a robot at a pose.
+    #[must_use]
+    pub fn sonar_at(&self, pose: &crate::trace::Pose) -> Point {
+        let mount = self.model.mount;
+        let (sin, cos) = pose.heading.sin_cos();
+        [pose.x + cos * mount[0] - sin * mount[1], pose.y + sin * mount[0] + cos * mount[1]]
+    }
+}
+
+fn sensor(scenario: &Scenario) -> SensorModel {
+    let model = match scenario.hardware.sonar {
+        SonarName::Ideal => SensorModel::ideal(scenario),
+        SonarName::HcSr04 => SensorModel::hc_sr04(),
+        SonarName::Nxt => SensorModel::nxt(),
+        SonarName::LvMaxSonar => SensorModel::lv_maxsonar(),
+        SonarName::Srf08 => SensorModel::srf08(),
+        SonarName::Polaroid6500 => SensorModel::polaroid_6500(),
+    };
+    SensorModel { scale: scenario.truth.range_scale, ..model }
+}
+
+fn obstacle(plan: &sonarfix_map::Obstacle) -> Obstacle {
+    let outline = match plan.outline {
+        sonarfix_map::Outline::Circle { centre, radius } => Outline::Circle { centre, radius },
+        sonarfix_map::Outline::Face { from, to } => Outline::Face(Segment::new(from, to)),
+    };
+    Obstacle { outline, walk: plan.walk }
+}
+
+/// The initial estimate: the truth, or a draw around it.
+fn estimated_start(scenario: &Scenario, truth: &Vector, rng: &mut ChaCha8Rng) -> Start {
+    let start = &scenario.start;
+    let mut draw = |sigma: f64| {
+        let normal: f64 = rng.sample(StandardNormal);
+        if start.drawn { sigma * normal } else { 0.0 }
+    };
+    let pose = [
+        truth[0] + draw(start.position),
+        truth[1] + draw(start.position),
+        truth[2] + draw(start.heading),
+    ];
+    #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
+    let [x, y, heading, position, doubt] =
+        [pose[0], pose[1], pose[2], start.position, start.heading].map(|v| v as f32);
+    Start {
+        pose: Pose::new(x, y, Radians(heading)),
+        position_deviation: Metres(position),
+        heading_deviation: Radians(doubt),
+    }
+}

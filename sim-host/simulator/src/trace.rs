@@ -1,0 +1,190 @@
+//! The record of one run: the truth, the estimate, and the outcome of every measurement cycle.
+//!
+//! Simulator and replay produce a trace; report, CSV file and tests read it. All values are `f64` in
+//! SI units (metres, radians, seconds), in the map frame of the scenario.
+
+use serde::Serialize;
+use sonarfix::localizer::Localizer;
+use sonarfix::units::Radians;
+use sonarfix_hal::robot::Report;
+use sonarfix_map::{Floor, NamedWall};
+
+use crate::world::reflector::Source;
+
+/// A pose in the map frame: metres, metres, radians in (−π, π].
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Pose {
+    /// Metres along the map's x axis.
+    pub x: f64,
+    /// Metres along the map's y axis.
+    pub y: f64,
+    /// Heading, radians counter-clockwise from the map's x axis.
+    pub heading: f64,
+}
+
+/// The systematic errors of a robot, true or estimated.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Calibration {
+    /// Scale error of the right wheel, dimensionless.
+    pub scale_right: f64,
+    /// Scale error of the left wheel, dimensionless.
+    pub scale_left: f64,
+    /// Track width, metres (the whole width, not its error).
+    pub track_width: f64,
+    /// Scale error of the ranger, dimensionless.
+    pub range_scale: f64,
+}
+
+/// The filter's estimate at one instant.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Estimate {
+    /// Estimated pose.
+    pub pose: Pose,
+    /// Estimated systematic errors.
+    pub calibration: Calibration,
+    /// One standard deviation of each state, in the order of [`crate::STATES`].
+    pub deviation: [f64; 7],
+    /// Covariance of x and y, m².
+    pub covariance_xy: f64,
+}
+
+/// The truth at one instant; the reference of a recording may have only the pose.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Truth {
+    /// True pose.
+    pub pose: Pose,
+    /// True systematic errors, where they are known.
+    pub calibration: Option<Calibration>,
+}
+
+/// One encoder tick.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Tick {
+    /// Seconds since the run began.
+    pub time: f64,
+    /// The truth, where it is known.
+    pub truth: Option<Truth>,
+    /// The filter's estimate after everything that happened up to `time`.
+    pub estimate: Estimate,
+    /// The bound on each state's standard deviation, in a simulation.
+    pub bound: Option<[f64; 7]>,
+    /// The pose by dead reckoning with the nominal robot.
+    pub odometry: Pose,
+}
+
+/// The outcome of one measurement cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// The range corrected the filter.
+    Accepted,
+    /// The range lay beyond the gate and changed nothing.
+    Gated,
+    /// There was no usable range, or no measurable wall.
+    Refused,
+}
+
+/// Why a wall was chosen: the predictions behind the choice.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Why {
+    /// Expected reduction of the weighted variance (position and every other weighted state), m².
+    pub gain: f64,
+    /// Predicted probability that the measurement succeeds.
+    pub success: f64,
+    /// Predicted duration, seconds.
+    pub seconds: f64,
+    /// How many walls could be measured, before occlusion is checked.
+    pub candidates: u16,
+}
+
+/// One measurement cycle: the bearing, the range, and the outcome.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FixRecord {
+    /// Seconds since the run began.
+    pub time: f64,
+    /// Index of the wall aimed at, if there was one.
+    pub wall: Option<usize>,
+    /// The true position of the sonar (in a replay, the estimated one), metres.
+    pub sonar: [f64; 2],
+    /// Direction of the beam, radians in the map frame.
+    pub direction: f64,
+    /// Direction of the beam relative to the robot's heading, radians.
+    pub bearing: f64,
+    /// The measured range, metres; `None` without an echo.
+    pub range: Option<f64>,
+    /// The source of the echo; `None` without an echo, or where it is unknown.
+    pub source: Option<Source>,
+    /// Why this wall was chosen, if one was.
+    pub why: Option<Why>,
+    /// The outcome.
+    pub outcome: Outcome,
+    /// Why it was refused or downweighted; empty otherwise.
+    pub reason: String,
+    /// Innovation, metres, where one was computed.
+    pub innovation: Option<f64>,
+    /// Innovation variance, m², where one was computed.
+    pub innovation_variance: Option<f64>,
+}
+
+/// A wall with its name.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Wall {
+    /// Its name in the map file.
+    pub name: String,
+    /// One end, metres.
+    pub from: [f64; 2],
+    /// The other end, metres.
+    pub to: [f64; 2],
+}
+
+/// The trace of one run.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Trace {
+    /// The map.
+    pub walls: Vec<Wall>,
+    /// Half of the sonar's cone, radians.
+    pub cone: f64,
+    /// Every encoder tick, in order of time.
+    pub ticks: Vec<Tick>,
+    /// Every measurement cycle, in order of time.
+    pub fixes: Vec<FixRecord>,
+}
+
+impl Trace {
+    /// An empty trace on a floor.
+    #[must_use]
+    pub fn of(floor: &Floor, cone: Radians) -> Self {
+        let wall = |w: &NamedWall| Wall { name: w.name().to_owned(), from: w.from(), to: w.to() };
+        let walls = floor.named_walls().iter().map(wall).collect();
+        Self { walls, cone: cone.0.into(), ..Self::default() }
+    }
+}
+
+/// Receives the records of a run as it proceeds. A record is only built if the recorder calls `make`.
+pub trait Recorder {
+    /// An encoder tick is over.
+    fn tick(&mut self, make: impl FnOnce() -> Tick);
+    /// A measurement cycle is over.
+    fn fix(&mut self, make: impl FnOnce() -> FixRecord);
+    /// The robot's localizer has started, at the fidelity of pins.
+    fn began(&mut self, _localizer: &Localizer) {}
+    /// The robot's loop was polled, at the fidelity of pins.
+    fn polled(&mut self, _report: &Report, _localizer: &Localizer) {}
+}
+
+/// Records nothing.
+impl Recorder for () {
+    fn tick(&mut self, _: impl FnOnce() -> Tick) {}
+    fn fix(&mut self, _: impl FnOnce() -> FixRecord) {}
+}
+
+/// Records everything.
+impl Recorder for Trace {
+    fn tick(&mut self, make: impl FnOnce() -> Tick) {
+        self.ticks.push(make());
+    }
+
+    fn fix(&mut self, make: impl FnOnce() -> FixRecord) {
+        self.fixes.push(make());
+    }
+}

@@ -1,0 +1,111 @@
+//! Obstacles that no map has, standing or walking.
+
+use sonarfix_map::Walk;
+
+use super::segment::{Point, Segment, distance};
+
+/// The outline of an obstacle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Outline {
+    /// A table's leg, a bin, a person: centre and radius, metres.
+    Circle {
+        /// Centre, metres.
+        centre: Point,
+        /// Radius, metres.
+        radius: f64,
+    },
+    /// The face of a box or a cupboard.
+    Face(Segment),
+}
+
+/// An unmapped obstacle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Obstacle {
+    /// Its outline at time zero.
+    pub outline: Outline,
+    /// Its motion; `None` if it stands.
+    pub walk: Option<Walk>,
+}
+
+/// The displacement of a walk at a time, metres.
+fn shift(walk: Walk, time: f64) -> [f64; 2] {
+    let lap = (time / walk.takes).rem_euclid(2.0);
+    let share = if lap <= 1.0 { lap } else { 2.0 - lap };
+    walk.by.map(|component| share * component)
+}
+
+impl Obstacle {
+    /// Its outline at a time, seconds since the run began.
+    #[must_use]
+    pub fn outline_at(&self, time: f64) -> Outline {
+        let by = self.walk.map_or([0.0, 0.0], |walk| shift(walk, time));
+        match self.outline {
+            Outline::Circle { centre: [x, y], radius } => {
+                Outline::Circle { centre: [x + by[0], y + by[1]], radius }
+            }
+            Outline::Face(face) => Outline::Face(face.moved(by)),
+        }
+    }
+}
+
+impl Outline {
+    /// The nearest point of the outline.
+    #[must_use]
+    pub fn nearest(&self, point: Point) -> Point {
+        match self {
+            Self::Circle { centre, radius } => {
+                let share = radius / distance(*centre, point);
+                let ([cx, cy], [px, py]) = (*centre, point);
+                [cx + share * (px - cx), cy + share * (py - cy)]
+            }
+            Self::Face(face) => face.nearest(point),
+        }
+    }
+
+    /// Whether it is perpendicular to the line of sight from a point, and so reflects back to it.
+    #[must_use]
+    pub fn faces(&self, point: Point) -> bool {
+        match self {
+            Self::Circle { .. } => true,
+            Self::Face(face) => face.foot(point).is_some(),
+        }
+    }
+
+    /// Whether it blocks the line between two points.
+    #[must_use]
+    pub fn blocks(&self, from: Point, to: Point) -> bool {
+        match self {
+            Self::Circle { centre, radius } => {
+                distance(Segment::new(from, to).nearest(*centre), *centre) < *radius
+            }
+            Self::Face(face) => face.crossing(from, to).is_some(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_walker_goes_there_and_back() {
+        let outline = Outline::Circle { centre: [1.0, 0.0], radius: 0.2 };
+        let walk = Some(Walk { by: [0.0, 2.0], takes: 4.0 });
+        let obstacle = Obstacle { outline, walk };
+        for (time, y) in
+            [(0.0, 0.0), (1.0, 0.5), (4.0, 2.0), (5.0, 1.5), (6.0, 1.0), (8.0, 0.0), (9.0, 0.5)]
+        {
+            let expected = Outline::Circle { centre: [1.0, y], radius: 0.2 };
+            assert_eq!(obstacle.outline_at(time), expected, "{time}");
+        }
+    }
+
+    #[test]
+    fn a_post_answers_from_its_near_side_and_hides_what_is_behind() {
+        let post = Outline::Circle { centre: [1.0, 0.0], radius: 0.2 };
+        assert!(distance(post.nearest([0.0, 0.0]), [0.8, 0.0]) < 1e-12);
+        assert!(post.blocks([0.0, 0.1], [2.0, 0.1]));
+        assert!(!post.blocks([0.0, 0.3], [2.0, 0.3]));
+        assert!(!post.blocks([0.0, 0.0], [0.7, 0.0]));
+    }
+}

@@ -1,0 +1,16 @@
+//! Studies that are pages of the documentation.
+//!
+//! | module | page |
+//! |---|---|
+//! | [`fault_table`] | `docs/faults.md` |
+//! | [`floor_plan`] | `docs/floor-plans.md` |
+//! | [`health_page`], [`kidnapped`] | `docs/health.md` |
+//! | [`search_study`] | `docs/search.md` |
+//! | [`sonar_model`] | `docs/sonar-model.md` |
+
+pub mod fault_table;
+pub mod floor_plan;
+pub mod health_page;
+pub mod kidnapped;
+pub mod search_study;
+pub mod sonar_model;

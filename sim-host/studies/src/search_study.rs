@@ -1,0 +1,269 @@
+//! Global localization in simulation: a robot that was set down anywhere on its path drives on, sweeps
+//! with its sonar and searches for its pose.
+//!
+//! World, sonar and wheels are those of the simulator. The measurement timing is simplified: a ping
+//! each [`PERIOD`] at exactly the requested bearing ± 1°, and the range belongs to its instant.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use serde::Serialize;
+use sonarfix::map::{Map, MapError};
+use sonarfix::search::{Answer, Hypothesis, Search, SearchParameters};
+use sonarfix::units::{Metres, Radians};
+use sonarfix_map::{BakeError, FileError, Scenario};
+use sonarfix_sim::angle;
+use sonarfix_sim::plant::Plant;
+use sonarfix_sim::simulate::Simulation;
+use sonarfix_sim::trace::Pose;
+use sonarfix_sim::world::Ping;
+
+use crate::floor_plan::FloorPlan;
+
+/// Time of one ping of an HC-SR04 on an SG90 with steps of 20°, seconds: a frame of the servo, the
+/// turn, settling and the cycle of the sonar.
+pub const PERIOD: f64 = 0.12;
+/// Evaluations between two pings: half of the time of a 168 MHz Cortex-M4F, 1,500 instructions each.
+const EVALUATIONS: u16 = 6_720;
+/// The largest systematic error of a wheel.
+const WHEEL_ERROR: f64 = 0.01;
+/// The largest deviation of the servo from the bearing, radians.
+const SERVO_ERROR: f64 = 0.02;
+/// A pose within these errors is right, metres and radians.
+const RIGHT: (f64, f64) = (0.3, 0.175);
+
+/// Why a trial cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum SearchStudyError {
+    /// The floor plan cannot be read.
+    #[error(transparent)]
+    Plan(#[from] FileError),
+    /// The map cannot be baked.
+    #[error(transparent)]
+    Bake(#[from] BakeError),
+    /// The baked map is refused.
+    #[error(transparent)]
+    Map(#[from] MapError),
+}
+
+/// The outcome of one trial.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Trial {
+    /// Seed of the trial.
+    pub seed: u64,
+    /// Walls of the map.
+    pub walls: usize,
+    /// Seconds until the first unique answer, if there was one; the trial ends with it.
+    pub unique_after: Option<f64>,
+    /// Whether the unique answer was right.
+    pub is_right: bool,
+    /// Position error of the unique answer, metres.
+    pub position_error: f64,
+    /// Heading error of the unique answer, radians.
+    pub heading_error: f64,
+    /// The place of the true pose in the bank at the end, from 0.
+    pub rank: Option<usize>,
+    /// How many hypotheses were answers at the end.
+    pub answers: usize,
+    /// Complete cycles of the search.
+    pub cycles: u32,
+}
+
+/// Simulates one trial of at most `seconds`: the seed chooses the wheel errors and the place on the
+/// path.
+///
+/// # Errors
+/// [`SearchStudyError`], if the map cannot be used.
+pub fn trial(mut scenario: Scenario, seed: u64, seconds: f64) -> Result<Trial, SearchStudyError> {
+    let mut rng = stream(seed, 0);
+    scenario.truth.scale_right = rng.random_range(-WHEEL_ERROR..WHEEL_ERROR);
+    scenario.truth.scale_left = rng.random_range(-WHEEL_ERROR..WHEEL_ERROR);
+    let spare = scenario.path.duration() - seconds;
+    let start = if spare > 1.0 { rng.random_range(0.0..spare) } else { 0.0 };
+    let simulation = Simulation::new(scenario);
+    let image = simulation.baked_map()?;
+    let config = simulation.config();
+    let mut drive = Drive {
+        search: Search::new(&config.sonar, Map::read(&image)?, SearchParameters::default()),
+        plant: Plant::new(&simulation.scenario, simulation.range_scale()),
+        track_width: config.drive.track_width.0.into(),
+        simulation: &simulation,
+        wheels: stream(seed, 1),
+        noise: stream(seed, 2),
+        luck: stream(seed, 3),
+    };
+    drive.plant.drive_to(start, &mut drive.wheels);
+    let end = simulation.scenario.path.duration().min(start + seconds);
+    let mut time = start + PERIOD;
+    let mut unique = None;
+    while time < end && unique.is_none() {
+        drive.ping(time);
+        if let Answer::Unique(hypothesis) = drive.search.answer() {
+            unique = Some((time - start, hypothesis));
+        }
+        time += PERIOD;
+    }
+    Ok(drive.result(seed, unique))
+}
+
+struct Drive<'a> {
+    simulation: &'a Simulation,
+    search: Search<'a>,
+    plant: Plant<'a>,
+    track_width: f64,
+    wheels: ChaCha8Rng,
+    noise: ChaCha8Rng,
+    luck: ChaCha8Rng,
+}
+
+impl Drive<'_> {
+    /// Drives on to a time, pings and searches.
+    #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
+    fn ping(&mut self, time: f64) {
+        let [right, left] = self.plant.drive_to(time, &mut self.wheels).measured;
+        let turn = (right - left) / self.track_width;
+        let advance = f64::midpoint(right, left);
+        // Simulated wheels are finite, and so are ranges.
+        _ = self.search.odometry(Metres(advance as f32), Radians(turn as f32));
+        let bearing = self.search.aim();
+        let pose = self.plant.pose();
+        let at = self.simulation.sonar_at(&pose);
+        let servo = self.noise.random_range(-SERVO_ERROR..SERVO_ERROR);
+        let direction = angle::wrap(pose.heading + f64::from(bearing.0) + servo);
+        let ping = Ping { time, sonar_after: &|_| at, direction };
+        let (world, sensor) = (self.simulation.world(), self.simulation.sensor());
+        let echo = world.echo(&ping, sensor, &mut self.noise, &mut self.luck);
+        let stretch = 1.0 + self.simulation.range_scale();
+        let range = echo.map(|echo| Metres((echo.range * stretch) as f32));
+        let shortest = self.simulation.config().sonar.min_range;
+        _ = self.search.ping(bearing, range.filter(|range| *range >= shortest));
+        self.search.poll(EVALUATIONS);
+    }
+
+    fn result(&self, seed: u64, unique: Option<(f64, Hypothesis)>) -> Trial {
+        let truth = self.plant.pose();
+        let errors = |hypothesis: &Hypothesis| errors(hypothesis, &truth);
+        let is_right = |hypothesis: &Hypothesis| {
+            let (position, heading) = errors(hypothesis);
+            position < RIGHT.0 && heading < RIGHT.1
+        };
+        let (position_error, heading_error) =
+            unique.as_ref().map_or((0.0, 0.0), |(_, found)| errors(found));
+        Trial {
+            seed,
+            walls: self.simulation.scenario.floor.named_walls().len(),
+            unique_after: unique.as_ref().map(|(after, _)| *after),
+            is_right: unique.as_ref().is_some_and(|(_, found)| is_right(found)),
+            position_error,
+            heading_error,
+            rank: self.search.hypotheses().position(|hypothesis| is_right(&hypothesis)),
+            answers: match self.search.answer() {
+                Answer::Several(count) => count,
+                Answer::Unique(_) => 1,
+                Answer::Searching | Answer::Nowhere | Answer::Along { .. } => 0,
+            },
+            cycles: self.search.cycles(),
+        }
+    }
+}
+
+fn errors(hypothesis: &Hypothesis, truth: &Pose) -> (f64, f64) {
+    let found = hypothesis.pose;
+    let position = (f64::from(found.x.0) - truth.x).hypot(f64::from(found.y.0) - truth.y);
+    (position, angle::wrap(f64::from(found.heading.radians().0) - truth.heading).abs())
+}
+
+/// Trials in floor plans: the plan, the wheels and the place on the path of each come from its seed.
+///
+/// # Errors
+/// [`SearchStudyError`] of the first plan that cannot be used.
+pub fn floor_plans(
+    first: u64,
+    trials: u32,
+    seconds: f64,
+    done: impl Fn() + Sync,
+) -> Result<Vec<Trial>, SearchStudyError> {
+    let seeds = (0..u64::from(trials)).into_par_iter().map(|n| first.wrapping_add(n));
+    let one = |seed| {
+        let trial = trial(FloorPlan::new(seed).scenario()?, seed, seconds);
+        done();
+        trial
+    };
+    seeds.map(one).collect()
+}
+
+/// Trials in one scenario.
+///
+/// # Errors
+/// [`SearchStudyError`], if its map cannot be used.
+pub fn scenario(
+    scenario: &Scenario,
+    first: u64,
+    trials: u32,
+    seconds: f64,
+    done: impl Fn() + Sync,
+) -> Result<Vec<Trial>, SearchStudyError> {
+    let seeds = (0..u64::from(trials)).into_par_iter().map(|n| first.wrapping_add(n));
+    let one = |seed| {
+        let trial = trial(scenario.clone(), seed, seconds);
+        done();
+        trial
+    };
+    seeds.map(one).collect()
+}
+
+/// Shares and errors over many trials.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Summary {
+    /// Trials.
+    pub trials: usize,
+    /// Share with a unique and right answer.
+    pub unique_and_right: f64,
+    /// Share with a unique and wrong answer.
+    pub unique_and_wrong: f64,
+    /// Share with the true pose in the bank at the end.
+    pub in_bank: f64,
+    /// Share with the true pose as the best hypothesis at the end.
+    pub best_is_right: f64,
+    /// Mean time to a unique answer, seconds.
+    pub mean_seconds: f64,
+    /// 95th percentile of the position error of right unique answers, metres.
+    pub position_error_95: f64,
+    /// 95th percentile of their heading error, radians.
+    pub heading_error_95: f64,
+}
+
+impl Summary {
+    /// The summary of some trials.
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "far fewer than 2^53 trials")]
+    pub fn new(trials: &[Trial]) -> Self {
+        let count = |is: &dyn Fn(&Trial) -> bool| trials.iter().filter(|t| is(t)).count() as f64;
+        let share = |is: &dyn Fn(&Trial) -> bool| count(is) / trials.len() as f64;
+        let is_unique = |trial: &Trial| trial.unique_after.is_some();
+        let right = || trials.iter().filter(|trial| trial.is_right);
+        Self {
+            trials: trials.len(),
+            unique_and_right: share(&|trial| trial.is_right),
+            unique_and_wrong: share(&|trial| is_unique(trial) && !trial.is_right),
+            in_bank: share(&|trial| trial.rank.is_some()),
+            best_is_right: share(&|trial| trial.rank == Some(0)),
+            mean_seconds: trials.iter().filter_map(|trial| trial.unique_after).sum::<f64>()
+                / count(&is_unique),
+            position_error_95: percentile_95(right().map(|trial| trial.position_error).collect()),
+            heading_error_95: percentile_95(right().map(|trial| trial.heading_error).collect()),
+        }
+    }
+}
+
+fn percentile_95(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() * 95 / 100).copied().unwrap_or(0.0)
+}
+
+fn stream(seed: u64, number: u64) -> ChaCha8Rng {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    // Apart from the streams of a run and of a floor plan.
+    rng.set_stream(100 + number);
+    rng
+}

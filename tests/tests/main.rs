@@ -1,0 +1,9 @@
+//! Tests across the crates, in one program, which links once.
+
+mod baked;
+mod consistency;
+mod kidnapped;
+mod oracle;
+mod pil;
+mod pins;
+mod state_machines;

@@ -1,0 +1,160 @@
+//! Runs through pins, drivers and the shipped loop.
+#![expect(clippy::unwrap_used, reason = "all of this file is a test, its helpers too")]
+
+use std::path::Path;
+
+use cpu_time::ThreadTime;
+use sonarfix::aim::Policy;
+use sonarfix::config::ServoTiming;
+use sonarfix_hal::robot::Stamp;
+use sonarfix_map::{CLASSROOM, Fidelity, PAPER, Scenario, ServoName};
+use sonarfix_sim::monte_carlo;
+use sonarfix_sim::simulate::Simulation;
+use sonarfix_sim::statistics::Summary;
+use sonarfix_sim::trace::{Outcome, Trace};
+use sonarfix_sim::world::reflector::Source;
+
+fn scenario(text: &str) -> Scenario {
+    Scenario::parse(text, "test.toml", Path::new("")).unwrap()
+}
+
+/// The paper's scenario at a fidelity, with the random walk of the parameters that the filter assumes.
+fn paper(fidelity: Fidelity) -> Scenario {
+    let mut scenario = scenario(PAPER);
+    scenario.let_truth_walk_as_assumed();
+    scenario.fidelity = fidelity;
+    scenario
+}
+
+fn summary(scenario: Scenario, runs: u32) -> Summary {
+    Summary::of(&monte_carlo::results(&Simulation::new(scenario), 0, runs, || ()).unwrap())
+}
+
+/// An ideal sensor and servo and 1 mm ticks through pins give the statistics of the ideal run.
+///
+/// Test of equality: for each state the errors at the end are divided by the bound of the run,
+/// because only the ideal run has a fix at the very end. The deviation of n normal draws has a
+/// relative sampling error of 1/√(2n), so the logarithm of the ratio of two has 1/√n; the difference
+/// of two means has √2/√n deviations. Both must be within four of these, which holds for 12 equal
+/// quantities with a probability of 0.9992. The known error of the pins is added: each wheel's last
+/// tick is rounded, with a deviation of 1 mm/√12.
+#[test]
+fn pins_with_ideal_hardware_have_the_statistics_of_the_ideal_run() {
+    const RUNS: u32 = 200;
+    let (ideal, pins) =
+        (summary(paper(Fidelity::Ideal), RUNS), summary(paper(Fidelity::Pins), RUNS));
+    let tolerance = 4.0 / f64::from(RUNS).sqrt();
+    let rounding = [0.0, 0.0, 1e-3 * (2.0_f64 / 12.0).sqrt() / 0.35, 0.0, 0.0, 0.0];
+    let states = ideal.states.iter().zip(&pins.states).zip(rounding);
+    for ((ideal, pins), rounding) in states {
+        let expected = ideal.std_error.hypot(rounding) / ideal.bound;
+        let spread = (pins.std_error / pins.bound) / expected;
+        assert!(spread.ln().abs() < tolerance, "{}: spread {spread}", ideal.name);
+        let shift = (pins.mean_error - ideal.mean_error) / ideal.std_error;
+        assert!(shift.abs() < 2.0_f64.sqrt() * tolerance, "{}: shift {shift}", ideal.name);
+    }
+    // NEES of six states: deviation √12 in each run.
+    let nees = (ideal.nees_mean - pins.nees_mean) / 12.0_f64.sqrt();
+    assert!(nees.abs() < 2.0_f64.sqrt() * tolerance, "NEES {} {}", ideal.nees_mean, pins.nees_mean);
+    assert_eq!((pins.lost_runs, pins.fixes.refused), (0, 0));
+}
+
+/// RMS error of x and y over the run, NIS and runs lost, with an SG90 that measures the walls ahead
+/// and behind.
+fn stamped(stamp: Stamp) -> (f64, f64, usize) {
+    let mut scenario = paper(Fidelity::Pins);
+    scenario.hardware.servo = ServoName::Sg90;
+    scenario.robot.localizer.sonar.timing.servo = ServoTiming::SG90;
+    scenario.robot.localizer.policy = Policy::Informative;
+    let mut simulation = Simulation::new(scenario);
+    simulation.stamp = stamp;
+    let summary = Summary::of(&monte_carlo::results(&simulation, 0, 40, || ()).unwrap());
+    (summary.rms_path.x.hypot(summary.rms_path.y), summary.nis_mean, summary.lost_runs)
+}
+
+/// With a real servo and time of flight, a range that is assigned to the instant of its arrival
+/// increases the error; a range assigned to that of its reflection does not.
+#[test]
+fn a_naive_stamp_increases_the_error_and_that_of_the_reflection_does_not() {
+    let (naive, naive_nis, naive_lost) = stamped(Stamp::Arrival);
+    let (reflection, nis, lost) = stamped(Stamp::Reflection);
+    let mut ideal = paper(Fidelity::Ideal);
+    ideal.robot.localizer.policy = Policy::Informative;
+    let ideal = summary(ideal, 40).rms_path;
+    let ideal = ideal.x.hypot(ideal.y);
+    println!("RMS along the path: ideal {ideal:.5} m");
+    println!("reflection {reflection:.5} m, NIS {nis:.3}, lost {lost}");
+    println!("arrival {naive:.5} m, NIS {naive_nis:.3}, lost {naive_lost}");
+    assert_eq!(lost, 0);
+    assert!(reflection < 1.25 * ideal, "{reflection} {ideal}");
+    assert!(naive > 1.5 * reflection, "{naive} {reflection}");
+    // 50,000 accepted ranges leave 0.006 of sampling error on a NIS.
+    assert!((nis - 1.0).abs() < 0.025 && naive_nis > 1.05, "{nis} {naive_nis}");
+}
+
+/// 20 minutes 48 seconds through pins take less than half a second of CPU time. Measured 0.015 s
+/// (release); tests have debug assertions.
+#[test]
+fn twenty_minutes_take_less_than_half_a_second() {
+    let simulation = Simulation::new(paper(Fidelity::Pins));
+    let start = ThreadTime::now();
+    simulation.run(0, &mut ()).unwrap();
+    assert!(start.elapsed().as_secs_f64() < 0.5, "{:?}", start.elapsed());
+}
+
+/// The classroom, with fewer seeds than `sonarfix run`: no run lost, position RMS below 30 mm, the
+/// filter consistent.
+#[test]
+fn the_classroom_is_crossed() {
+    const RUNS: u32 = 25;
+    let summary = summary(scenario(CLASSROOM), RUNS);
+    let position = summary.rms_path.x.hypot(summary.rms_path.y);
+    assert_eq!(summary.lost_runs, 0);
+    assert!(position < 0.030, "{position}");
+    // Seven states: deviation √14 of each run's NEES.
+    let sampling = (14.0 / f64::from(RUNS)).sqrt();
+    assert!((summary.nees_mean - 7.0).abs() < 4.0 * sampling, "{}", summary.nees_mean);
+}
+
+/// The features of the classroom occur: every kind of echo, gated echoes of obstacles, and the
+/// temperature is estimated.
+#[test]
+fn the_features_of_the_classroom_occur() {
+    let simulation = Simulation::new(scenario(CLASSROOM));
+    let mut trace = Trace::default();
+    simulation.run(1, &mut trace).unwrap();
+    let met = |is: fn(Source) -> bool| {
+        trace.fixes.iter().filter(move |fix| fix.source.is_some_and(is)).collect::<Vec<_>>()
+    };
+    assert!(met(|source| matches!(source, Source::Wall(_))).len() > 500);
+    let obstacles = met(|source| source == Source::Obstacle);
+    assert!(obstacles.len() > 30, "{}", obstacles.len());
+    let gated = obstacles.iter().filter(|fix| fix.outcome == Outcome::Gated).count();
+    assert!(2 * gated > obstacles.len(), "{gated} of {}", obstacles.len());
+    assert!(!met(|source| source == Source::Outlier).is_empty());
+    let last = trace.ticks.last().unwrap();
+    let truth = last.truth.and_then(|truth| truth.calibration).unwrap().range_scale;
+    let last = last.estimate;
+    // 15 °C and not 20 °C: 0.89 % too long.
+    assert!((truth - 0.0089).abs() < 1e-4, "{truth}");
+    let apart = (last.calibration.range_scale - truth) / last.deviation[6];
+    assert!(apart.abs() < 4.0, "{apart}");
+}
+
+/// In a closed loop, which steers by the estimate, the robot stays on its path.
+#[test]
+fn a_closed_loop_keeps_to_its_path() {
+    let simulation = Simulation::new(scenario(CLASSROOM));
+    let mut trace = Trace::default();
+    simulation.run(2, &mut trace).unwrap();
+    let plan = simulation.scenario.path.plan();
+    for corner in &plan.corners {
+        let nearest = trace
+            .ticks
+            .iter()
+            .filter_map(|tick| tick.truth)
+            .map(|truth| (truth.pose.x - corner[0]).hypot(truth.pose.y - corner[1]));
+        let nearest = nearest.fold(f64::INFINITY, f64::min);
+        assert!(nearest < 0.05, "{nearest} m off {corner:?}");
+    }
+}
