@@ -20,7 +20,6 @@ use crate::store::{MAX_HEADING_DEVIATION, MAX_POSITION_DEVIATION, Resumed, Saved
 
 /// What follows a command that was executed. The loop begins in [`App::answer`], after the stack frame of the command
 /// has been released.
-#[expect(clippy::large_enum_variant, reason = "there is one of it at a time, and no heap")]
 enum Next {
     Nothing,
     Report(Telemetry),
