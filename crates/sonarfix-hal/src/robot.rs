@@ -49,21 +49,23 @@ mod sonar;
 use sonarfix::aim::Aim;
 use sonarfix::config::PingSchedule;
 use sonarfix::ekf::EkfError;
-use sonarfix::localizer::{Fix, Localizer, Start};
+use sonarfix::localizer::{Localizer, Start};
 use sonarfix::motion::WheelTravel;
-use sonarfix::units::Instant;
+use sonarfix::navigator::{Mode, Navigator};
+use sonarfix::search::Search;
+use sonarfix::units::{Instant, Radians};
 
 use crate::encoder::Wheels;
-use crate::ranger::{Echo, NoEcho, Ranger, TriggerError};
+use crate::ranger::{Echo, NoEcho, Outcome, Ranger, TriggerError};
 use crate::time::{after, micros, since};
 
 pub use faults::{EncoderFaults, Faults};
 pub use hardware::{Devices, Hardware};
 use odometer::{Odometer, Position, Reading};
-pub use report::{PingResult, Report, Step, StepResult, Tick};
+pub use report::{PingResult, Report, Step, StepResult, SweepResult, Tick};
 use schedule::Schedule;
 pub use settings::{Settings, SettingsError, Stamp};
-use sonar::Cycle;
+use sonar::{Cycle, Target};
 
 /// The loop.
 ///
@@ -127,7 +129,7 @@ use sonar::Cycle;
 /// ```
 #[derive(Debug, Clone)]
 pub struct Robot<'m> {
-    localizer: Localizer<'m>,
+    navigator: Navigator<'m>,
     settings: Settings,
     odometer: Odometer,
     ticks: Schedule,
@@ -160,7 +162,7 @@ impl<'m> Robot<'m> {
             }
         };
         Ok(Self {
-            localizer,
+            navigator: Navigator::new(localizer),
             settings,
             odometer: Odometer::new(wheels),
             ticks: Schedule::new(start, settings.encoder_period),
@@ -188,7 +190,7 @@ impl<'m> Robot<'m> {
             PingSchedule::Every(period) => self.pings.continued(now, period),
             PingSchedule::AsFastAsPossible => self.pings,
         };
-        self.localizer = localizer;
+        self.navigator = Navigator::new(localizer);
         self.odometer = Odometer::new(wheels);
         self.ticks = self.ticks.continued(now, settings.encoder_period);
         self.pings = pings;
@@ -211,9 +213,9 @@ impl<'m> Robot<'m> {
         let mut faults = Faults::default();
         self.odometer.begin(now, hardware, &mut faults);
         let reading = self.odometer.read(now, hardware, &mut faults);
-        let step = reading.map(|reading| self.advance(now, reading.position, &mut faults));
+        let step = reading.map(|reading| self.advance(now, reading.position, &mut faults, None));
         self.faults = self.faults.plus(faults);
-        self.localizer.set_pose(start)?;
+        self.navigator.set_pose(start)?;
         self.end_cycle(now, false);
         Ok(step)
     }
@@ -226,19 +228,64 @@ impl<'m> Robot<'m> {
     /// # Panics
     /// Never.
     pub fn poll(&mut self, now: Instant, hardware: &mut impl Hardware) -> Report {
+        self.poll_with(now, hardware, None)
+    }
+
+    /// As [`Self::poll`], with a search: a robot whose pose is unknown sweeps with its sonar and looks for its pose
+    /// ([`Navigator`]). A poll with nothing else to do makes [`Settings::evaluations`] of the search.
+    ///
+    /// The search must be the same in every call.
+    ///
+    /// # Panics
+    /// Never.
+    pub fn poll_with_search(
+        &mut self,
+        now: Instant,
+        hardware: &mut impl Hardware,
+        search: &mut Search<'m>,
+    ) -> Report {
+        self.poll_with(now, hardware, Some(search))
+    }
+
+    fn poll_with(
+        &mut self,
+        now: Instant,
+        hardware: &mut impl Hardware,
+        mut search: Option<&mut Search<'m>>,
+    ) -> Report {
         let mut report = Report::default();
         if now < self.time {
             report.faults.clock = 1;
         } else {
             self.odometer.begin(now, hardware, &mut report.faults);
-            self.finish_ping(now, hardware, &mut report);
-            self.sample_encoders(now, hardware, &mut report);
-            self.choose_wall(now, hardware, &mut report);
+            self.finish_ping(now, hardware, &mut report, search.as_deref_mut());
+            self.sample_encoders(now, hardware, &mut report, search.as_deref_mut());
+            self.choose_bearing(now, hardware, &mut report, search.as_deref_mut());
             self.start_ping(now, hardware, &mut report);
+            if let Some(search) = search {
+                self.work_on(search, &mut report);
+            }
             self.time = now;
         }
         self.faults = self.faults.plus(report.faults);
         report
+    }
+
+    /// Declares the pose unknown and begins the search; a ping in flight is aborted. The robot's present pose is
+    /// proposed to the search, unless it has none.
+    pub fn search(&mut self, now: Instant, search: &mut Search<'m>, has_pose: bool) {
+        if has_pose {
+            self.navigator.search(search);
+        } else {
+            self.navigator.search_anywhere(search);
+        }
+        self.end_cycle(now, false);
+    }
+
+    /// What determines the pose.
+    #[must_use]
+    pub fn mode(&self) -> Mode {
+        self.navigator.mode()
     }
 
     /// The next instant at which a poll has something to do; `None` while a ping is in flight, when the loop
@@ -255,7 +302,7 @@ impl<'m> Robot<'m> {
     /// The localizer: pose, covariance, calibration, health.
     #[must_use]
     pub fn localizer(&self) -> &Localizer<'m> {
-        &self.localizer
+        self.navigator.localizer()
     }
 
     /// The faults since the start.
@@ -271,42 +318,101 @@ impl<'m> Robot<'m> {
     }
 
     /// Reads the outcome of the ping in flight.
-    fn finish_ping(&mut self, now: Instant, hardware: &mut impl Hardware, report: &mut Report) {
-        let Cycle::Listening { aim, from, polled } = &mut self.cycle else {
+    fn finish_ping(
+        &mut self,
+        now: Instant,
+        hardware: &mut impl Hardware,
+        report: &mut Report,
+        search: Option<&mut Search<'m>>,
+    ) {
+        let Cycle::Listening { target, from, polled } = &mut self.cycle else {
             return;
         };
-        let (aim, from, polled) = (*aim, *from, *polled.get_or_insert(now));
+        let (target, from, polled) = (*target, *from, *polled.get_or_insert(now));
         let outcome = match hardware.ranger().poll(now) {
             Ok(Some(outcome)) => outcome.and_then(|echo| in_time(echo, from.at, now)),
             Ok(None) if since(now, polled) < self.settings.patience => return,
             Ok(None) => Err(NoEcho::NoResponse),
             Err(_) => Err(NoEcho::Failed),
         };
-        let (step, fix) = match outcome {
-            Ok(echo) => self.fuse(now, &aim, &from, &echo, hardware, report),
-            Err(reason) => {
-                report.faults.ranger += u32::from(reason.is_fault());
-                (None, Some(self.localizer.fix(&aim, None)))
+        report.faults.ranger += u32::from(outcome.err().is_some_and(NoEcho::is_fault));
+        match target {
+            Target::Wall(aim) => {
+                let heard = self.fuse(now, &aim, &from, outcome, hardware, report, search);
+                report.ping_result = Some(heard);
             }
-        };
-        report.ping_result = Some(PingResult { aim, outcome, step, fix });
+            Target::Sweep(bearing) => {
+                let heard = self.sweep(now, bearing, &from, outcome, hardware, report, search);
+                report.swept = Some(heard);
+            }
+        }
         self.end_cycle(now, true);
     }
 
     /// Passes the travel up to the instant of the echo to the localizer, then the range.
+    #[expect(clippy::too_many_arguments, reason = "a ping, its echo, and what takes them")]
     fn fuse(
         &mut self,
         now: Instant,
         aim: &Aim,
         from: &Reading,
-        echo: &Echo,
+        outcome: Outcome,
         hardware: &mut impl Hardware,
         report: &mut Report,
-    ) -> (Option<Step>, Option<Fix>) {
-        let Some(reading) = self.odometer.read(now, hardware, &mut report.faults) else {
-            self.localizer.skip();
-            return (None, None);
+        mut search: Option<&mut Search<'m>>,
+    ) -> PingResult {
+        let (step, fix) = match outcome {
+            Ok(echo) => {
+                let faults = &mut report.faults;
+                let step = self.reach(now, from, &echo, hardware, faults, search.as_deref_mut());
+                if step.is_none() {
+                    self.navigator.skip();
+                }
+                (step, step.map(|_| self.navigator.fix(aim, Some(echo.range), search)))
+            }
+            Err(_) => (None, Some(self.navigator.fix(aim, None, search))),
         };
+        PingResult { aim: *aim, outcome, step, fix }
+    }
+
+    /// Passes the travel up to the instant of the echo to the localizer, then the range to the search.
+    #[expect(clippy::too_many_arguments, reason = "a ping, its echo, and what takes them")]
+    fn sweep(
+        &mut self,
+        now: Instant,
+        bearing: Radians,
+        from: &Reading,
+        outcome: Outcome,
+        hardware: &mut impl Hardware,
+        report: &mut Report,
+        mut search: Option<&mut Search<'m>>,
+    ) -> SweepResult {
+        let (step, range) = match outcome {
+            Ok(echo) => {
+                let faults = &mut report.faults;
+                let step = self.reach(now, from, &echo, hardware, faults, search.as_deref_mut());
+                (step, step.map(|_| Some(echo.range)))
+            }
+            Err(reason) => (None, (!reason.is_fault()).then_some(None)),
+        };
+        let taken = range.zip(search).map(|(range, search)| {
+            // A range of a driver is finite, and so is the bearing.
+            self.navigator.ping(bearing, range, search).unwrap_or(false)
+        });
+        SweepResult { bearing, outcome, step, is_novel: taken }
+    }
+
+    /// Passes the travel up to the instant of the echo to the localizer; `None` if a counter cannot be read.
+    fn reach(
+        &mut self,
+        now: Instant,
+        from: &Reading,
+        echo: &Echo,
+        hardware: &mut impl Hardware,
+        faults: &mut Faults,
+        search: Option<&mut Search<'m>>,
+    ) -> Option<Step> {
+        let reading = self.odometer.read(now, hardware, faults)?;
         let (at, position) = match self.settings.stamp {
             Stamp::Reflection => {
                 let at = echo.reflected();
@@ -314,12 +420,17 @@ impl<'m> Robot<'m> {
             }
             Stamp::Arrival => (now, reading.position),
         };
-        let step = self.advance(at, position, &mut report.faults);
-        (Some(step), Some(self.localizer.fix(aim, Some(echo.range))))
+        Some(self.advance(at, position, faults, search))
     }
 
     /// Samples the encoders, if a tick is due and no ping is in flight.
-    fn sample_encoders(&mut self, now: Instant, hardware: &mut impl Hardware, report: &mut Report) {
+    fn sample_encoders(
+        &mut self,
+        now: Instant,
+        hardware: &mut impl Hardware,
+        report: &mut Report,
+        search: Option<&mut Search<'m>>,
+    ) {
         if self.cycle.is_listening() {
             return;
         }
@@ -330,36 +441,49 @@ impl<'m> Robot<'m> {
         let held = self.time >= due.due;
         let late = since(now, due.due.max(self.time));
         report.faults.deadlines += u32::from(late > self.settings.tolerance);
-        let reading = self.odometer.read(now, hardware, &mut report.faults);
-        let step = reading.map(|reading| self.advance(now, reading.position, &mut report.faults));
+        let faults = &mut report.faults;
+        let reading = self.odometer.read(now, hardware, faults);
+        let step = reading.map(|reading| self.advance(now, reading.position, faults, search));
         if step.is_none() {
-            self.localizer.no_odometry(now);
+            self.navigator.no_odometry(now);
         }
         report.tick =
             Some(Tick { step, lateness: since(now, due.due), held, skipped: due.skipped });
     }
 
-    /// Chooses a wall, if a ping is due, and turns the servo.
-    fn choose_wall(&mut self, now: Instant, hardware: &mut impl Hardware, report: &mut Report) {
+    /// Chooses a wall, or the next bearing of the sweep, if a ping is due, and turns the servo.
+    fn choose_bearing(
+        &mut self,
+        now: Instant,
+        hardware: &mut impl Hardware,
+        report: &mut Report,
+        search: Option<&mut Search<'m>>,
+    ) {
         let is_due = matches!(self.cycle, Cycle::Idle { until } if now >= until);
         if !is_due {
             return;
         }
-        let aimed = self.localizer.aim();
+        if let (Mode::Searching, Some(search)) = (self.mode(), search) {
+            let turned = hardware.servo().point(now, search.aim());
+            report.faults.servo += u32::from(turned.is_err());
+            self.cycle = Cycle::Turning { why: None };
+            return;
+        }
+        let aimed = self.navigator.aim();
         if let Ok(aim) = aimed {
             let turned = hardware.servo().point(now, aim.bearing);
             // If it does not turn, the wall at its last bearing is measured.
             report.faults.servo += u32::from(turned.is_err());
-            self.cycle = Cycle::Turning { why: aim.why };
+            self.cycle = Cycle::Turning { why: Some(aim.why) };
         } else {
-            self.localizer.skip();
+            self.navigator.skip();
             self.end_cycle(now, false);
         }
         report.aimed = Some(aimed);
     }
 
     /// Starts a ping once the servo has settled and the ranger is ready ([`can_ping_at`]), if a wall is square to
-    /// the sonar: the robot may have turned in the meantime.
+    /// the sonar (the robot may have turned in the meantime) or the sonar sweeps.
     fn start_ping(&mut self, now: Instant, hardware: &mut impl Hardware, report: &mut Report) {
         let Cycle::Turning { why } = self.cycle else {
             return;
@@ -372,9 +496,15 @@ impl<'m> Robot<'m> {
         if now < ready_at {
             return;
         }
-        let Ok(aim) = self.localizer.aim_at(bearing) else {
-            self.end_cycle(now, false);
-            return;
+        let target = match why {
+            None => Target::Sweep(bearing),
+            Some(why) => {
+                let Ok(aim) = self.navigator.aim_at(bearing) else {
+                    self.end_cycle(now, false);
+                    return;
+                };
+                Target::Wall(Aim { why, ..aim })
+            }
         };
         let Some(from) = self.odometer.read(now, hardware, &mut report.faults) else {
             self.abort_cycle(now);
@@ -382,9 +512,10 @@ impl<'m> Robot<'m> {
         };
         match hardware.ranger().trigger(now) {
             Ok(()) => {
-                let aim = Aim { why, ..aim };
-                self.cycle = Cycle::Listening { aim, from, polled: None };
-                report.pinged = Some(aim);
+                self.cycle = Cycle::Listening { target, from, polled: None };
+                if let Target::Wall(aim) = target {
+                    report.pinged = Some(aim);
+                }
             }
             Err(TriggerError::TooSoon) if since(now, ready_at) < self.settings.patience => {}
             Err(_) => {
@@ -396,27 +527,44 @@ impl<'m> Robot<'m> {
 
     /// Ends a measurement cycle in which a device has prevented the ping.
     fn abort_cycle(&mut self, now: Instant) {
-        self.localizer.skip();
+        if self.mode() != Mode::Searching {
+            self.navigator.skip();
+        }
         self.end_cycle(now, false);
     }
 
     /// Ends the measurement cycle. If there was no ping, nothing changes before the next tick.
     fn end_cycle(&mut self, now: Instant, pinged: bool) {
-        let until = match self.localizer.config().sonar.timing.schedule {
-            PingSchedule::Every(_) => {
+        let is_sweeping = self.mode() == Mode::Searching;
+        let until = match self.localizer().config().sonar.timing.schedule {
+            PingSchedule::Every(_) if !is_sweeping => {
                 self.pings.take(now);
                 self.pings.next()
             }
-            PingSchedule::AsFastAsPossible if pinged => now,
-            PingSchedule::AsFastAsPossible => self.ticks.next(),
+            _ if pinged => now,
+            _ => self.ticks.next(),
         };
         self.cycle = Cycle::Idle { until };
     }
 
+    /// Works on the search if nothing else was done in this poll, and changes the mode when it is time.
+    fn work_on(&mut self, search: &mut Search<'m>, report: &mut Report) {
+        if self.mode() != Mode::Tracking && report.is_empty() {
+            search.poll(self.settings.evaluations);
+        }
+        report.mode = self.navigator.update(search);
+    }
+
     /// Passes the travel of the wheels up to `at` to the localizer.
-    fn advance(&mut self, at: Instant, position: Position, faults: &mut Faults) -> Step {
+    fn advance(
+        &mut self,
+        at: Instant,
+        position: Position,
+        faults: &mut Faults,
+        search: Option<&mut Search<'m>>,
+    ) -> Step {
         let travel = self.odometer.travel_to(position);
-        let result = match self.localizer.odometry(at, travel) {
+        let result = match self.navigator.odometry(at, travel, search) {
             Ok(()) => StepResult::Accepted,
             Err(error) if self.is_credible(at, travel) => StepResult::Deferred(error),
             Err(error) => StepResult::Discarded(error),
@@ -431,8 +579,8 @@ impl<'m> Robot<'m> {
     /// Whether the wheels can have travelled so far since the localizer's last step. Each of the two positions is
     /// quantized to one edge.
     fn is_credible(&self, at: Instant, travel: WheelTravel) -> bool {
-        let seconds = 1e-6 * micros(since(at, self.localizer.time()));
-        let fastest = self.localizer.config().max_wheel_speed.0 * seconds;
+        let seconds = 1e-6 * micros(since(at, self.localizer().time()));
+        let fastest = self.localizer().config().max_wheel_speed.0 * seconds;
         let limit = fastest + 2.0 * self.odometer.wheels().coarser_tick().0;
         travel.right.abs().0 <= limit && travel.left.abs().0 <= limit
     }

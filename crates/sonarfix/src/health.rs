@@ -167,6 +167,17 @@ impl Limits {
 }
 
 impl Health {
+    /// The health of a localizer whose pose is unknown.
+    pub(crate) fn lost(uncertainty: PoseUncertainty) -> Self {
+        Self {
+            verdict: Verdict::Lost,
+            evidence: LOST_AT,
+            position_deviation: uncertainty.position,
+            heading_deviation: uncertainty.heading,
+            ..Self::default()
+        }
+    }
+
     /// Records distance and time since the last call.
     pub(crate) fn record_travel(&mut self, distance: Metres, time: Duration, limits: &Limits) {
         self.rolled_since_fix = self.rolled_since_fix + distance;

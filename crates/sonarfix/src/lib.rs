@@ -25,6 +25,7 @@
 //! | [`aim`] | planner: the wall to measure next, eqs. (21) and (22) |
 //! | [`localizer`] | all of them together |
 //! | [`search`] | global localization without a start pose |
+//! | [`navigator`] | localizer and search together: tracking, searching, and the hand-over |
 //!
 //! Equation numbers are those of `docs/model.md`; every function that implements one has a banner
 //! `===== Eq. (n)`.
@@ -50,6 +51,7 @@ pub mod health;
 pub mod localizer;
 pub mod map;
 pub mod motion;
+pub mod navigator;
 mod numeric;
 mod odometry;
 mod outcome;

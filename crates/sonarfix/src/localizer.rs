@@ -221,6 +221,27 @@ impl<'m> Localizer<'m> {
         Ok(())
     }
 
+    /// Replaces pose and calibration with their standard deviations, as [`Self::resume`] does; the time
+    /// is unchanged, health and the outcomes of earlier pings are reset.
+    ///
+    /// # Errors
+    /// [`EkfError`], by what is wrong with the state or its deviations; nothing has changed.
+    pub fn restart(
+        &mut self,
+        state: StateEstimate,
+        deviation: StandardDeviations,
+    ) -> Result<(), EkfError> {
+        self.ekf = Ekf::new(self.config.drive, state, deviation)?;
+        self.health = Health::default();
+        self.history = History::default();
+        Ok(())
+    }
+
+    /// Declares the pose unknown: the verdict is `Lost`.
+    pub(crate) fn declare_lost(&mut self) {
+        self.health = Health::lost(self.ekf.pose_uncertainty());
+    }
+
     /// The bearing of the next ping by the policy of the configuration, and the reason.
     ///
     /// The outcomes of earlier pings, from [`Self::fix`], enter the choice.

@@ -228,6 +228,31 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         }
     }
 
+    /// Begins again, without a ping, a hypothesis or an answer; the parameters stay. It changes the
+    /// state in place, because a copy of it on a microcontroller's stack is large.
+    pub fn restart(&mut self, sonar: &Sonar, map: Map<'m>) {
+        let (right, left) = (sonar.servo.0.0, sonar.servo.1.0);
+        self.echoes = EchoModel::new(map, sonar.cone, sonar.max_range);
+        self.mount = sonar.mount.into();
+        self.servo = (right, left);
+        self.sweep = Sweep { bearing: right, step: self.parameters.novel_angle.0 };
+        self.window.restart();
+        self.lines.restart(sonar.cone);
+        self.bank.clear();
+        self.task = Task::Vote { ping: 0, tilt: 0 };
+        self.trial = None;
+        self.cycles = 0;
+        self.taken = 0;
+        self.is_check_due = true;
+        self.answer = Decision::Searching;
+    }
+
+    /// The pings in the window.
+    #[must_use]
+    pub fn pings(&self) -> usize {
+        self.window.pings().len()
+    }
+
     /// Moves the robot by a distance along its mid-heading and a turn.
     ///
     /// # Errors

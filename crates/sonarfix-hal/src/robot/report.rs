@@ -3,7 +3,8 @@
 use sonarfix::aim::{Aim, NoAim};
 use sonarfix::localizer::{Fix, OdometryError};
 use sonarfix::motion::WheelTravel;
-use sonarfix::units::{Duration, Instant};
+use sonarfix::navigator::Mode;
+use sonarfix::units::{Duration, Instant, Radians};
 
 use super::Faults;
 use crate::ranger::Outcome;
@@ -15,6 +16,8 @@ use crate::ranger::Outcome;
 pub struct Report {
     /// The result of a ping that has ended.
     pub ping_result: Option<PingResult>,
+    /// The result of a ping of the search's sweep that has ended.
+    pub swept: Option<SweepResult>,
     /// The encoders were sampled.
     pub tick: Option<Tick>,
     /// The wall that the localizer has chosen; the servo turns there.
@@ -22,6 +25,8 @@ pub struct Report {
     /// A ping was started, at the bearing of the servo, which differs from that of the choice by the
     /// resolution of the PWM.
     pub pinged: Option<Aim>,
+    /// The new mode, if it has changed.
+    pub mode: Option<Mode>,
     /// The faults of this poll.
     pub faults: Faults,
 }
@@ -88,4 +93,19 @@ pub struct PingResult {
     pub step: Option<Step>,
     /// The localizer's response; `None` if there was an echo but no step.
     pub fix: Option<Fix>,
+}
+
+/// The result of a ping of the search's sweep.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct SweepResult {
+    /// The bearing of the servo.
+    pub bearing: Radians,
+    /// The echo, or why there is none.
+    pub outcome: Outcome,
+    /// The step of the wheels up to the reflection; `None` without an echo, or if a counter could not be
+    /// read.
+    pub step: Option<Step>,
+    /// Whether the search took the ping as a novel one; `None` if it was not passed on, because of a fault.
+    pub is_novel: Option<bool>,
 }

@@ -32,6 +32,8 @@ pub struct Settings {
     /// the loop aborts the ping. It is longer than any driver of this crate takes, and protects the loop from a
     /// driver that never ends.
     pub patience: Duration,
+    /// Evaluations of the search in a poll that has nothing else to do ([`Robot::poll_with_search`](super::Robot)).
+    pub evaluations: u16,
 }
 
 impl Default for Settings {
@@ -42,6 +44,7 @@ impl Default for Settings {
             tolerance: Duration::from_ticks(10_000),
             stamp: Stamp::Reflection,
             patience: Duration::from_ticks(150_000),
+            evaluations: 2,
         }
     }
 }

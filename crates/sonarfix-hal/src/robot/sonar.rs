@@ -1,7 +1,7 @@
 //! The state machine of a measurement cycle.
 
 use sonarfix::aim::{Aim, Reason};
-use sonarfix::units::Instant;
+use sonarfix::units::{Instant, Radians};
 
 use super::odometer::Reading;
 
@@ -26,18 +26,27 @@ pub(super) enum Cycle {
     },
     /// The servo turns, or has settled and waits for the ranger.
     Turning {
-        /// Why the wall was chosen.
-        why: Reason,
+        /// Why the wall was chosen; `None` in a sweep.
+        why: Option<Reason>,
     },
     /// A ping is in flight.
     Listening {
-        /// The wall and the bearing.
-        aim: Aim,
+        /// What is measured.
+        target: Target,
         /// The position of the wheels at the trigger.
         from: Reading,
         /// The first poll of the ranger.
         polled: Option<Instant>,
     },
+}
+
+/// What a ping measures.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Target {
+    /// A wall.
+    Wall(Aim),
+    /// Whatever is at this bearing, for the search.
+    Sweep(Radians),
 }
 
 impl Cycle {

@@ -62,6 +62,10 @@ impl<const HYPOTHESES: usize> Bank<HYPOTHESES> {
         Self { entries: Vec::new() }
     }
 
+    pub fn clear(&mut self) {
+        self.entries.clear();
+    }
+
     pub fn entries(&self) -> &[Entry] {
         &self.entries
     }

@@ -42,7 +42,14 @@ pub(super) struct Lines {
 
 impl Lines {
     pub fn new(cone: Radians) -> Self {
-        Self { found: Vec::new(), cone, cos_cone: sin_cos(cone * 1.3).1 }
+        Self { found: Vec::new(), cone, cos_cone: cos_of_support(cone) }
+    }
+
+    /// Removes all lines, for a sonar with this cone.
+    pub fn restart(&mut self, cone: Radians) {
+        self.found.clear();
+        self.cone = cone;
+        self.cos_cone = cos_of_support(cone);
     }
 
     pub fn all(&self) -> &[Line] {
@@ -153,4 +160,9 @@ impl Lines {
             *slot = fitted;
         }
     }
+}
+
+/// Cosine of the angle between a ping's axis and a normal up to which the ping supports the line.
+fn cos_of_support(cone: Radians) -> f32 {
+    sin_cos(cone * 1.3).1
 }

@@ -78,6 +78,14 @@ impl<const PINGS: usize> Window<PINGS> {
         Self { pings: Vec::new(), robot: Station::default(), heading: 0.0, taken: 0 }
     }
 
+    /// Removes all pings and moves the origin to the robot.
+    pub fn restart(&mut self) {
+        self.pings.clear();
+        self.robot = Station::default();
+        self.heading = 0.0;
+        self.taken = 0;
+    }
+
     pub fn pings(&self) -> &[Ping] {
         &self.pings
     }

@@ -1,0 +1,363 @@
+//! Navigation with and without a pose: the [`Localizer`], the [`Search`] beside it, and the hand-over in both
+//! directions.
+//!
+//! ```text
+//!            Lost, or on demand                  unique answer
+//!   Tracking ─────────────────▶ Searching ─────────────────────▶ Provisional
+//!      ▲                            ▲   not Tracking any more         │
+//!      │                            └─────────────────────────────────┤
+//!      └──────────────────────────────────────────────────────────────┘
+//!                    2 m and 20 accepted ranges later
+//! ```
+//!
+//! - *Tracking*: the localizer alone.
+//! - *Searching*: the pose is unknown. The localizer's verdict is `Lost` and its pose has deviations of
+//!   [`UNKNOWN_POSITION`] and [`UNKNOWN_HEADING`]; it only dead-reckons. The search takes odometry and pings.
+//! - *Provisional*: the localizer has started from the search's unique answer. The search keeps its hypotheses and
+//!   takes the pings as well, so that a wrong answer leads back to them.
+//!
+//! The search is an argument of each call and not a field, because its state is larger than everything else: its owner
+//! decides where it lies. Without one the mode is always *Tracking*, and the navigator is the localizer.
+//!
+//! **Calibration.** Before a localizer is `Lost`, it has corrected its calibration by ranges from a wrong pose or with a
+//! faulty encoder. The search therefore uses the calibration of a [checkpoint](CHECKPOINT) that is 10 m of driving
+//! old or older, or that of the start.
+//!
+//! # Non-finite policy
+//! That of [`Localizer`] and [`Search`]: a NaN or infinity is refused and changes nothing.
+
+use crate::aim::{Aim, NoAim};
+use crate::ekf::{EkfError, StandardDeviations, StateEstimate};
+use crate::health::Verdict;
+use crate::localizer::{Fix, Localizer, OdometryError, Start};
+use crate::motion::WheelTravel;
+use crate::search::{Answer, Hypothesis, NotFinite, Search};
+use crate::units::{Instant, Metres, Radians};
+
+/// Standard deviation of x and of y of a pose that is unknown.
+pub const UNKNOWN_POSITION: Metres = Metres(1_000.0);
+/// Standard deviation of its heading.
+pub const UNKNOWN_HEADING: Radians = Radians(core::f32::consts::PI);
+
+/// Distance between two checkpoints of the calibration.
+pub const CHECKPOINT: Metres = Metres(10.0);
+/// Least standard deviations of the pose at the hand-over.
+const LEAST_POSITION: f32 = 0.03;
+const LEAST_HEADING: f32 = 2.0 * core::f32::consts::PI / 180.0;
+/// Deviations of the search's least squares are multiplied by this: its pings share the errors of map and odometry.
+const CAUTION: f32 = 3.0;
+/// Distance and accepted ranges after which a provisional pose is confirmed.
+const CONFIRMED_AFTER: Metres = Metres(2.0);
+const CONFIRMED_BY: u16 = 20;
+/// Cycles of the search after a failed hand-over before the next.
+const PAUSE: u32 = 2;
+/// A checkpoint holds deviations and no correlations. No covariance of four errors exceeds four times its diagonal.
+const DECORRELATED: f32 = 2.0;
+
+/// What determines the pose.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Mode {
+    /// The localizer tracks it.
+    #[default]
+    Tracking,
+    /// It is unknown, and the search looks for it.
+    Searching,
+    /// The localizer tracks the search's answer, which is not confirmed yet.
+    Provisional,
+}
+
+/// A localizer that searches for its pose when it has none.
+///
+/// ```
+/// # use sonarfix::{config::Config, map::{Map, Wall}, pose::{Point, Pose}};
+/// # use sonarfix::localizer::{Localizer, Start};
+/// # use sonarfix::units::{Instant, Metres, Radians};
+/// use sonarfix::health::Verdict;
+/// use sonarfix::navigator::{Mode, Navigator};
+/// use sonarfix::search::{Search, SearchParameters};
+/// # let walls = [Wall::new(Point::new(0.0, 0.0), Point::new(4.0, 0.0))?];
+/// # let config = Config::for_track_width(Metres(0.16));
+/// # let map = Map::new(&walls);
+/// # let start = Start {
+/// #     pose: Pose::new(1.0, 1.0, Radians(0.0)),
+/// #     position_deviation: Metres(0.05),
+/// #     heading_deviation: Radians(0.02),
+/// # };
+/// let mut search: Search = Search::new(&config.sonar, map, SearchParameters::default());
+/// let localizer = Localizer::new(config, map, start, Instant::from_ticks(0))?;
+/// let mut navigator = Navigator::new(localizer);
+/// navigator.search(&mut search);
+/// assert_eq!(navigator.mode(), Mode::Searching);
+/// assert_eq!(navigator.localizer().health().verdict, Verdict::Lost);
+/// let bearing = search.aim();
+/// navigator.ping(bearing, Some(Metres(1.2)), &mut search)?;
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Navigator<'m> {
+    localizer: Localizer<'m>,
+    mode: Mode,
+    /// Distance since the last checkpoint while *Tracking*, since the hand-over while *Provisional*.
+    driven: Metres,
+    /// Ranges accepted since the hand-over.
+    accepted: u16,
+    /// The search's cycles before which it hands nothing over.
+    not_before: u32,
+    checkpoints: [Calibration; 2],
+}
+
+/// A calibration with its deviations; the pose in it has no meaning.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Calibration {
+    state: StateEstimate,
+    deviation: StandardDeviations,
+}
+
+impl Calibration {
+    fn of(localizer: &Localizer) -> Self {
+        let filter = localizer.filter();
+        Self { state: filter.state(), deviation: filter.deviation() }
+    }
+
+    /// The calibration and its deviations as those of a localizer whose pose is unknown.
+    fn without_pose(&self, localizer: &Localizer) -> (StateEstimate, StandardDeviations) {
+        let StateEstimate { x, y, heading, .. } = localizer.filter().state();
+        let prior = &localizer.config().prior;
+        let known = &self.deviation;
+        let wider = |known: f32, prior: f32| {
+            let wider = DECORRELATED * known;
+            if wider < prior { wider } else { prior }
+        };
+        let deviation = StandardDeviations {
+            x: UNKNOWN_POSITION,
+            y: UNKNOWN_POSITION,
+            heading: UNKNOWN_HEADING,
+            scale_right: wider(known.scale_right, prior.scale_right),
+            scale_left: wider(known.scale_left, prior.scale_left),
+            track_width_error: Metres(wider(known.track_width_error.0, prior.track_width.0)),
+            range_scale: wider(known.range_scale, prior.range_scale),
+        };
+        (StateEstimate { x, y, heading, ..self.state }, deviation)
+    }
+}
+
+impl<'m> Navigator<'m> {
+    /// A navigator that tracks the pose of this localizer.
+    #[must_use]
+    pub fn new(localizer: Localizer<'m>) -> Self {
+        let checkpoint = Calibration::of(&localizer);
+        Self {
+            localizer,
+            mode: Mode::Tracking,
+            driven: Metres(0.0),
+            accepted: 0,
+            not_before: 0,
+            checkpoints: [checkpoint; 2],
+        }
+    }
+
+    /// The localizer: pose, covariance, calibration, health.
+    #[must_use]
+    pub fn localizer(&self) -> &Localizer<'m> {
+        &self.localizer
+    }
+
+    /// The mode.
+    #[must_use]
+    pub fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// Declares the pose unknown and begins the search. The pose of the localizer is proposed to it: if the robot was
+    /// lost, it is probably near.
+    pub fn search(&mut self, search: &mut Search<'m>) {
+        let proposal = self.localizer.pose();
+        self.begin(search);
+        // The localizer's pose is finite.
+        _ = search.propose(proposal);
+    }
+
+    /// Declares the pose unknown and begins the search without a proposal.
+    pub fn search_anywhere(&mut self, search: &mut Search<'m>) {
+        self.begin(search);
+    }
+
+    fn begin(&mut self, search: &mut Search<'m>) {
+        search.restart(&self.localizer.config().sonar, self.localizer.map());
+        self.not_before = 0;
+        self.forget_pose();
+    }
+
+    fn forget_pose(&mut self) {
+        let [_, older] = &self.checkpoints;
+        let (state, deviation) = older.without_pose(&self.localizer);
+        // The filter has held these numbers, and the deviations are finite: it takes them.
+        _ = self.localizer.restart(state, deviation);
+        self.localizer.declare_lost();
+        self.mode = Mode::Searching;
+    }
+
+    /// Predicts over the travel of both wheels up to the time `now`; the search takes it as well.
+    ///
+    /// # Errors
+    /// As [`Localizer::odometry`]; neither has changed.
+    pub fn odometry(
+        &mut self,
+        now: Instant,
+        travel: WheelTravel,
+        search: Option<&mut Search<'m>>,
+    ) -> Result<(), OdometryError> {
+        let before = self.localizer.pose().heading;
+        self.localizer.odometry(now, travel)?;
+        let Some(search) = search else { return Ok(()) };
+        self.driven = self.driven + travel.distance();
+        if self.mode == Mode::Tracking {
+            self.record_calibration();
+            return Ok(());
+        }
+        let state = self.localizer.filter().state();
+        let right = travel.right.0 * (1.0 + state.scale_right);
+        let left = travel.left.0 * (1.0 + state.scale_left);
+        let turn = self.localizer.pose().heading.from(before);
+        // Travel that the localizer has accepted is finite.
+        _ = search.odometry(Metres(0.5 * (right + left)), turn);
+        Ok(())
+    }
+
+    /// Takes a checkpoint of the calibration, if one is due and the ranges agree with the map.
+    fn record_calibration(&mut self) {
+        if self.driven < CHECKPOINT {
+            return;
+        }
+        self.driven = Metres(0.0);
+        let health = self.localizer.health();
+        if health.verdict == Verdict::Tracking {
+            let [newer, _] = self.checkpoints;
+            self.checkpoints = [Calibration::of(&self.localizer), newer];
+        }
+    }
+
+    /// As [`Localizer::no_odometry`].
+    pub fn no_odometry(&mut self, now: Instant) {
+        self.localizer.no_odometry(now);
+    }
+
+    /// As [`Localizer::aim`], while the mode is not [`Mode::Searching`].
+    ///
+    /// # Errors
+    /// [`NoAim`], by the reason.
+    pub fn aim(&self) -> Result<Aim, NoAim> {
+        self.localizer.aim()
+    }
+
+    /// As [`Localizer::aim_at`], while the mode is not [`Mode::Searching`].
+    ///
+    /// # Errors
+    /// [`NoAim`], by the reason.
+    pub fn aim_at(&self, bearing: Radians) -> Result<Aim, NoAim> {
+        self.localizer.aim_at(bearing)
+    }
+
+    /// As [`Localizer::fix`]; while the pose is provisional, the search takes the ping as well.
+    pub fn fix(
+        &mut self,
+        aim: &Aim,
+        range: Option<Metres>,
+        search: Option<&mut Search<'m>>,
+    ) -> Fix {
+        let fix = self.localizer.fix(aim, range);
+        if self.mode == Mode::Provisional {
+            self.accepted =
+                self.accepted.saturating_add(u16::from(matches!(fix, Fix::Accepted(_))));
+            if let Some(search) = search {
+                // What is not finite was refused above and is not taken here either.
+                _ = self.ping(aim.bearing, range, search);
+            }
+        }
+        fix
+    }
+
+    /// As [`Localizer::skip`].
+    pub fn skip(&mut self) {
+        self.localizer.skip();
+    }
+
+    /// Passes a ping in any direction to the search; `None`: no echo. An echo from nearer than the sonar's shortest
+    /// range counts as none. Returns whether the ping is novel.
+    ///
+    /// # Errors
+    /// [`NotFinite`]; nothing changes.
+    pub fn ping(
+        &mut self,
+        bearing: Radians,
+        range: Option<Metres>,
+        search: &mut Search<'m>,
+    ) -> Result<bool, NotFinite> {
+        let shortest = self.localizer.config().sonar.min_range;
+        // The search refuses what is not finite.
+        search.ping(bearing, range.filter(|range| *range >= shortest || !range.is_finite()))
+    }
+
+    /// Replaces the pose by one that was measured independently, as [`Localizer::set_pose`] does; it is tracked.
+    ///
+    /// # Errors
+    /// [`EkfError`], by what is wrong with it; nothing has changed.
+    pub fn set_pose(&mut self, start: &Start) -> Result<(), EkfError> {
+        self.localizer.set_pose(start)?;
+        self.track();
+        Ok(())
+    }
+
+    fn track(&mut self) {
+        self.mode = Mode::Tracking;
+        self.driven = Metres(0.0);
+    }
+
+    /// Changes the mode if verdict or answer require it; returns the new one.
+    pub fn update(&mut self, search: &mut Search<'m>) -> Option<Mode> {
+        let verdict = self.localizer.health().verdict;
+        match self.mode {
+            Mode::Tracking if verdict == Verdict::Lost => self.search(search),
+            Mode::Searching => self.hand_over(search)?,
+            Mode::Provisional if verdict != Verdict::Tracking => {
+                self.not_before = search.cycles().saturating_add(PAUSE);
+                self.forget_pose();
+            }
+            Mode::Provisional if self.is_confirmed() => self.track(),
+            Mode::Tracking | Mode::Provisional => return None,
+        }
+        Some(self.mode)
+    }
+
+    fn is_confirmed(&self) -> bool {
+        self.accepted >= CONFIRMED_BY && self.driven >= CONFIRMED_AFTER
+    }
+
+    /// Starts the localizer from the unique answer of the search, if there is one.
+    fn hand_over(&mut self, search: &Search<'m>) -> Option<()> {
+        if search.cycles() < self.not_before {
+            return None;
+        }
+        let Answer::Unique(found) = search.answer() else { return None };
+        self.localizer.set_pose(&start_of(&found)).ok()?;
+        self.mode = Mode::Provisional;
+        self.driven = Metres(0.0);
+        self.accepted = 0;
+        Some(())
+    }
+}
+
+/// The start from a hypothesis.
+fn start_of(found: &Hypothesis) -> Start {
+    let at_least = |deviation: f32, least: f32| {
+        let cautious = CAUTION * deviation;
+        if cautious > least { cautious } else { least }
+    };
+    Start {
+        pose: found.pose,
+        position_deviation: Metres(at_least(found.position_deviation.0, LEAST_POSITION)),
+        heading_deviation: Radians(at_least(found.heading_deviation.0, LEAST_HEADING)),
+    }
+}
