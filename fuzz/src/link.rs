@@ -2,7 +2,7 @@
 
 use sonarfix::map::image::checksum as crc32;
 use sonarfix_link::message::Message;
-use sonarfix_link::{Command, Frame, Receiver, Sender, Telemetry, VERSION, frame};
+use sonarfix_link::{Frame, Receiver, Sender, SessionCommand, Telemetry, VERSION, frame};
 
 /// Sends noise, the noise as the content of a frame, a damaged frame, and a valid one, which must be received; for a receiver of either kind.
 /// The bytes are a sequence number, a bit to flip, the message's length, the message and the noise.
@@ -14,7 +14,7 @@ pub fn link(bytes: &[u8]) {
     let (message, garbage) = rest.split_at(rest.len().min(length.into()));
     let sequence = u16::from_le_bytes([low, high]);
     hear::<Telemetry>(sequence, bit, message, garbage);
-    hear::<Command>(sequence, bit, message, garbage);
+    hear::<SessionCommand>(sequence, bit, message, garbage);
 }
 
 fn hear<M: Message>(sequence: u16, bit: u8, message: &[u8], garbage: &[u8]) {

@@ -23,7 +23,9 @@ use sonarfix::units::{Metres, Radians};
 use sonarfix_hal::config::{RobotConfig, Unsupported};
 use sonarfix_hal::ranger::RangerKind;
 use sonarfix_link::message::{CommandError, CommandResult, ImageStatus, LoopStatus};
-use sonarfix_link::{Ack, Command, Hello, Receiver, Sender, Telemetry, baked, frame};
+use sonarfix_link::{
+    Ack, Command, Hello, Receiver, Sender, SessionCommand, Telemetry, baked, frame,
+};
 use tempfile::TempDir;
 
 /// Where `memory.x` has the regions.
@@ -43,7 +45,8 @@ struct Robot {
     emulator: Child,
     line: UnixStream,
     receiver: Receiver<Telemetry>,
-    sender: Sender<Command>,
+    sender: Sender<SessionCommand>,
+    session: u32,
     /// What was told and not yet looked at, the latest last.
     told: VecDeque<Telemetry>,
     since: Instant,
@@ -88,6 +91,7 @@ impl Robot {
             line,
             receiver: Receiver::new(),
             sender: Sender::starting_at(100),
+            session: 0,
             told: VecDeque::new(),
             since: Instant::now(),
             files,
@@ -137,11 +141,27 @@ impl Robot {
 
     /// Sends a command and waits for its answer.
     fn order(&mut self, command: &Command) -> CommandResult {
+        if self.session == 0 {
+            let CommandResult::Session(session) = self.request(&Command::OpenSession) else {
+                panic!("a session is opened at any time")
+            };
+            self.session = session;
+        }
+        self.request(command)
+    }
+
+    fn request(&mut self, command: &Command) -> CommandResult {
         let sequence = self.sender.next();
-        let mut buffer = frame::EMPTY;
-        let bytes = self.sender.frame(command, &mut buffer).to_vec();
+        let bytes = self.frame(sequence, command);
+        self.sender = Sender::starting_at(sequence + 1);
         self.send(&bytes);
         self.answer_to(sequence)
+    }
+
+    /// A command's frame in the present session.
+    fn frame(&self, sequence: u16, command: &Command) -> Vec<u8> {
+        let command = SessionCommand { session: self.session, command: *command };
+        Sender::starting_at(sequence).frame(&command, &mut frame::EMPTY.clone()).to_vec()
     }
 
     fn answer_to(&mut self, asked: u16) -> CommandResult {
@@ -426,8 +446,7 @@ fn garbage_is_counted_and_commands_after_it_are_done_once() {
     let before = robot.how_it_fares().commands;
 
     // Noise, a cut frame, and a damaged one.
-    let mut buffer = frame::EMPTY;
-    let whole = Sender::starting_at(7).frame(&Command::Start, &mut buffer).to_vec();
+    let whole = robot.frame(200, &Command::Start);
     let mut damaged = whole.clone();
     damaged[5] ^= 0x10;
     let noise: Vec<u8> = (1..200_u8).map(|n| n.wrapping_mul(113)).collect();
@@ -446,16 +465,20 @@ fn garbage_is_counted_and_commands_after_it_are_done_once() {
 
     // A frame that is sent twice, because its answer was lost, is answered twice and done once.
     robot.send(&whole);
-    assert_eq!(robot.answer_to(7), CommandResult::Done);
+    assert_eq!(robot.answer_to(200), CommandResult::Done);
+    robot.sender = Sender::starting_at(201);
     assert_eq!(robot.order(&Command::Stop), CommandResult::Done);
     assert!(!robot.how_it_fares().running);
-    let again = Sender::starting_at(8).frame(&Command::Start, &mut buffer).to_vec();
+    // The same frame now is an old one.
+    robot.send(&whole);
+    assert_eq!(robot.answer_to(200), CommandResult::Refused(CommandError::Session));
+    let again = robot.frame(210, &Command::Start);
     robot.send(&again);
     robot.send(&again);
     let began = |told: &Telemetry| matches!(told, Telemetry::Initialized(_)).then_some(());
-    assert_eq!(robot.answer_to(8), CommandResult::Done);
+    assert_eq!(robot.answer_to(210), CommandResult::Done);
     robot.wait_for(began);
-    assert_eq!(robot.answer_to(8), CommandResult::Done);
+    assert_eq!(robot.answer_to(210), CommandResult::Done);
     assert!(robot.how_it_fares().running);
 }
 

@@ -16,9 +16,9 @@ use crate::message::Message;
 
 /// The version of the frame's content. It is raised whenever the bytes of any message change (`docs/link.md`).
 /// The encoding around the content never changes.
-pub const VERSION: u8 = 2;
+pub const VERSION: u8 = 3;
 /// The longest message, in bytes. A test encodes the largest value of each.
-pub const MESSAGE_MAX: usize = 288;
+pub const MESSAGE_MAX: usize = 296;
 /// Bytes before the message: version, kind, sequence number.
 pub(crate) const HEADER: usize = 4;
 /// Bytes after it.
@@ -69,7 +69,7 @@ impl<M: Message> Sender<M> {
     }
 
     /// A sender whose first frame has this sequence number. A sender of commands starts at an arbitrary number, so
-    /// that it does not repeat the last number of a previous sender ([`Deduplicator`](crate::Deduplicator)).
+    /// that it does not repeat the last number of a previous sender ([`Session`](crate::Session)).
     #[must_use]
     pub const fn starting_at(sequence: u16) -> Self {
         Self { next: sequence, message: PhantomData }

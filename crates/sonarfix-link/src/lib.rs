@@ -11,27 +11,31 @@
 //! | [`receiver`] | finds the frames in a stream of bytes: [`Receiver`] |
 //! | [`counters`] | counts what a receiver has read and skipped: [`ReceiverCounters`] |
 //! | [`gaps`] | counts lost frames by their sequence numbers: [`Gaps`] |
-//! | [`deduplicator`] | executes a repeated command once: [`Deduplicator`] |
+//! | [`session`] | admits a command once, in order, and only in the present session: [`Session`] |
 //! | [`reporter`] | turns a poll of the robot's loop into telemetry: [`Reporter`] |
 //! | [`baked`] | the configuration image |
 //!
 //! The frame format and the rule for versions are in `docs/link.md`.
 //!
 //! ```
-//! use sonarfix_link::{Command, CommandResult, Deduplicator, Receiver, Sender, Telemetry, frame};
+//! use sonarfix_link::{
+//!     Command, CommandResult, Receiver, Sender, Session, SessionCommand, Telemetry, frame,
+//! };
 //!
 //! // The PC sends a command. Line noise precedes the frame.
 //! let mut buffer = frame::EMPTY;
 //! let mut wire = vec![0x17, 0x2a];
-//! wire.extend_from_slice(Sender::<Command>::starting_at(7).frame(&Command::Stop, &mut buffer));
+//! let mut sender = Sender::starting_at(7);
+//! let stop = SessionCommand { session: 0, command: Command::Stop };
+//! wire.extend_from_slice(sender.frame(&stop, &mut buffer));
 //!
 //! // The robot receives, executes and acknowledges it.
-//! let mut receiver = Receiver::<Command>::new();
-//! let mut deduplicator = Deduplicator::default();
+//! let mut receiver = Receiver::<SessionCommand>::new();
+//! let mut session = Session::default();
 //! let mut answers = Vec::new();
 //! for byte in wire {
 //!     if let Some(frame) = receiver.push(byte) {
-//!         answers.push(deduplicator.answer(&frame, |command| {
+//!         answers.push(session.answer(&frame, 1, |command| {
 //!             assert_eq!(*command, Command::Stop);
 //!             CommandResult::Done
 //!         }));
@@ -49,17 +53,17 @@
 
 pub mod baked;
 pub mod counters;
-pub mod deduplicator;
 pub mod frame;
 pub mod gaps;
 pub mod message;
 pub mod receiver;
 pub mod reporter;
+pub mod session;
 
 pub use counters::ReceiverCounters;
-pub use deduplicator::Deduplicator;
 pub use frame::{Frame, Sender, VERSION};
 pub use gaps::Gaps;
-pub use message::{Ack, Command, CommandResult, Estimate, Hello, Ping, Telemetry};
+pub use message::{Ack, Command, CommandResult, Estimate, Hello, Ping, SessionCommand, Telemetry};
 pub use receiver::Receiver;
 pub use reporter::Reporter;
+pub use session::Session;

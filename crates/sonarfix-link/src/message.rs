@@ -20,7 +20,7 @@ use sonarfix_hal::robot::Faults;
 
 use crate::counters::ReceiverCounters;
 
-/// [`Telemetry`] or [`Command`].
+/// [`Telemetry`] or [`SessionCommand`].
 pub trait Message: Serialize + DeserializeOwned + sealed::Sealed {
     /// The kind in the frame, by which a receiver rejects an echo of its own frames.
     const KIND: u8;
@@ -36,9 +36,9 @@ impl Message for Telemetry {
     const KIND: u8 = 0;
 }
 
-impl sealed::Sealed for Command {}
+impl sealed::Sealed for SessionCommand {}
 
-impl Message for Command {
+impl Message for SessionCommand {
     const KIND: u8 = 1;
 }
 
@@ -205,6 +205,8 @@ pub enum CommandResult {
     Map(ImageStatus),
     /// The command was refused and has changed nothing.
     Refused(CommandError),
+    /// The result of [`Command::OpenSession`]: the number of the new session.
+    Session(u32),
 }
 
 /// Why a command was refused.
@@ -225,6 +227,8 @@ pub enum CommandError {
     NoPose,
     /// The board cannot be the robot that the configuration describes.
     Unsupported(Unsupported),
+    /// The frame is of another session, or earlier than the last one of this session.
+    Session,
 }
 
 impl core::fmt::Display for CommandError {
@@ -236,12 +240,23 @@ impl core::fmt::Display for CommandError {
             Self::NoConfiguration => "the robot has no valid configuration in its flash",
             Self::Storage => "the robot could not write to its flash",
             Self::NoPose => "the robot's pose is unknown: set it first",
+            Self::Session => "the command's session has ended: send it again in a new one",
             Self::Unsupported(reason) => return write!(f, "{reason}"),
         })
     }
 }
 
-/// A message to the robot. Each is answered with an [`Ack`].
+/// A message to the robot: a command in a session. Each is answered with an [`Ack`].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct SessionCommand {
+    /// The number of the session, from the answer to [`Command::OpenSession`]; any number for that command itself.
+    pub session: u32,
+    /// The command.
+    pub command: Command,
+}
+
+/// A command to the robot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(clippy::large_enum_variant, reason = "there is one of it at a time, and no heap")]
@@ -258,4 +273,6 @@ pub enum Command {
     ResetCalibration,
     /// Requests the checksum of the map in flash.
     MapChecksum,
+    /// Opens a session and ends the one before: its commands are refused from now on.
+    OpenSession,
 }

@@ -8,7 +8,7 @@ use sonarfix_app::store::Store;
 use sonarfix_app::{App, Board, FlashContents, Link};
 use sonarfix_hal::robot::Report;
 use sonarfix_link::message::ResetCause;
-use sonarfix_link::{Command, CommandResult, Sender, baked, frame};
+use sonarfix_link::{Command, CommandResult, Sender, SessionCommand, baked, frame};
 
 use crate::board::{self, WiredDevices};
 use crate::message::{Answer, Begin, Request, RequestError, SessionKind, Snapshot};
@@ -146,17 +146,31 @@ impl<'m> LoopSession<'m> {
         let store = Store::new(RamFlash::default(), region).map_err(|_| RequestError::Board)?;
         let app = App::new(board, flash, store, at);
         let mut robot = Self { app, wires, devices };
-        robot.send(at, &Command::SetPose(start))?;
-        robot.send(at, &Command::Start)?;
+        let open = SessionCommand { session: 0, command: Command::OpenSession };
+        let CommandResult::Session(session) = robot.send(at, 0, &open)? else {
+            return Err(RequestError::Start);
+        };
+        for (sequence, command) in [(1, Command::SetPose(start)), (2, Command::Start)] {
+            let _ = robot.send(at, sequence, &SessionCommand { session, command })?;
+        }
         Ok((robot, wires.take()))
     }
 
     /// Sends a command over the link.
-    fn send(&mut self, at: Instant, command: &Command) -> Result<(), RequestError> {
+    fn send(
+        &mut self,
+        at: Instant,
+        sequence: u16,
+        command: &SessionCommand,
+    ) -> Result<CommandResult, RequestError> {
         let mut buffer = frame::EMPTY;
-        let mut link = LinkBuffer::new(Sender::new().frame(command, &mut buffer));
+        let frame = Sender::starting_at(sequence).frame(command, &mut buffer);
+        let mut link = LinkBuffer::new(frame);
         let polled = self.app.poll(at, &mut self.devices, &mut link);
-        if polled.answered == Some(CommandResult::Done) { Ok(()) } else { Err(RequestError::Start) }
+        match polled.answered {
+            Some(result @ (CommandResult::Done | CommandResult::Session(_))) => Ok(result),
+            _ => Err(RequestError::Start),
+        }
     }
 
     fn poll(&mut self, sensors: &Sensors, meter: &mut impl Meter) -> (Answer, u32) {

@@ -76,6 +76,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let command = args.what.command()?;
     match request::ask(&mut args.port.open()?, &command)? {
         CommandResult::Done => println!("done"),
+        CommandResult::Session(number) => println!("session {number}"),
         CommandResult::Map(map) => println!("map {}", view::flashed(map)),
         CommandResult::Refused(reason) => anyhow::bail!("the robot refuses: {reason}"),
     }

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::Context;
-use sonarfix_link::{Command, CommandResult, Receiver, Sender, Telemetry, frame};
+use sonarfix_link::{Command, CommandResult, Receiver, Sender, SessionCommand, Telemetry, frame};
 
 use crate::port::Port;
 
@@ -13,16 +13,34 @@ const ATTEMPTS: u32 = 10;
 /// Timeout of an attempt.
 const TIMEOUT: Duration = Duration::from_millis(300);
 
-/// Sends a command repeatedly until the robot acknowledges it; the robot executes it once
-/// ([`Deduplicator`](sonarfix_link::Deduplicator)).
+/// Opens a session and sends a command in it, each repeatedly until the robot acknowledges it; the robot executes it
+/// once ([`Session`](sonarfix_link::Session)).
 ///
 /// # Errors
 /// Errors of the port, or if there is no answer.
 pub fn ask(port: &mut Port, command: &Command) -> anyhow::Result<CommandResult> {
-    let sequence = first_sequence();
+    let mut sender = Sender::starting_at(first_sequence());
+    let mut receiver = Receiver::new();
+    let open = SessionCommand { session: 0, command: Command::OpenSession };
+    match send(port, &mut sender, &mut receiver, &open)? {
+        CommandResult::Session(session) => {
+            let command = SessionCommand { session, command: *command };
+            send(port, &mut sender, &mut receiver, &command)
+        }
+        other => Ok(other),
+    }
+}
+
+/// Sends a frame repeatedly until it is acknowledged.
+fn send(
+    port: &mut Port,
+    sender: &mut Sender<SessionCommand>,
+    receiver: &mut Receiver<Telemetry>,
+    command: &SessionCommand,
+) -> anyhow::Result<CommandResult> {
+    let sequence = sender.next();
     let mut buffer = frame::EMPTY;
-    let frame = Sender::starting_at(sequence).frame(command, &mut buffer);
-    let mut receiver = Receiver::<Telemetry>::new();
+    let frame = sender.frame(command, &mut buffer);
     for _ in 0..ATTEMPTS {
         port.send(frame)?;
         let sent = Instant::now();
@@ -52,8 +70,8 @@ pub fn ask(port: &mut Port, command: &Command) -> anyhow::Result<CommandResult> 
 }
 
 /// First sequence number of this process; it differs from that of the previous process, except in
-/// one of 65,535 cases.
+/// one of 32,768 cases.
 fn first_sequence() -> u16 {
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-    u16::try_from(now.as_micros() % u128::from(u16::MAX)).unwrap_or(0).saturating_add(1)
+    u16::try_from(now.as_micros() % (1 << 15)).unwrap_or(0)
 }

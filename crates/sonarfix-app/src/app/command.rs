@@ -6,12 +6,13 @@
 use embedded_storage::nor_flash::NorFlash;
 use sonarfix::localizer::{Localizer, Start, StartError};
 use sonarfix::map::Map;
+use sonarfix::map::image::checksum as crc32;
 use sonarfix::units::{Duration, Instant, Metres};
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_hal::encoder::Wheels;
 use sonarfix_hal::robot::{Hardware, Report, Robot, Settings, Tick};
 use sonarfix_link::message::{CommandError, CommandResult};
-use sonarfix_link::{Command, Frame, Reporter, Telemetry, baked};
+use sonarfix_link::{Command, Frame, Reporter, SessionCommand, Telemetry, baked};
 
 use super::{App, Link, Mode, Polled, Running, SavePolicy};
 use crate::check::Check;
@@ -35,20 +36,20 @@ struct Startable<'m> {
 }
 
 impl<'m, F: NorFlash> App<'m, F> {
-    /// Executes a command, unless it is a repetition, and sends the acknowledgement. It is not inlined, because the
+    /// Executes a command, if it is admitted, and sends the acknowledgement. It is not inlined, because the
     /// loop's stack frame would be twice as large.
     #[inline(never)]
     pub(super) fn answer(
         &mut self,
         now: Instant,
-        frame: &Frame<Command>,
+        frame: &Frame<SessionCommand>,
         hardware: &mut impl Hardware,
         link: &mut impl Link,
         polled: &mut Polled,
     ) {
         let mut began = None;
-        let mut answered = self.wire.answered;
-        let answer = answered.answer(frame, |command| {
+        let mut session = self.wire.session;
+        let answer = session.answer(frame, self.next_session(now), |command| {
             let next = self.act(now, command, hardware, link, polled);
             let message = next.and_then(|next| match next {
                 Next::Nothing => Ok(None),
@@ -64,7 +65,7 @@ impl<'m, F: NorFlash> App<'m, F> {
                 _ => CommandResult::Done,
             }
         });
-        self.wire.answered = answered;
+        self.wire.session = session;
         if let Telemetry::Ack(ack) = answer {
             polled.answered = Some(ack.result);
         }
@@ -72,6 +73,14 @@ impl<'m, F: NorFlash> App<'m, F> {
         if let Some(began) = began {
             self.wire.send(&began, link);
         }
+    }
+
+    /// The number of the next session: a checksum of the number of this run and the time. It differs from that of any
+    /// session of an earlier run, because a run in which a command has changed anything leaves a record with its number.
+    fn next_session(&self, now: Instant) -> u32 {
+        let [r0, r1, r2, r3] = self.run.to_le_bytes();
+        let [t0, t1, t2, t3, t4, t5, t6, t7] = now.ticks().to_le_bytes();
+        crc32(&[r0, r1, r2, r3, t0, t1, t2, t3, t4, t5, t6, t7])
     }
 
     /// Executes a command; returns the telemetry of a loop that starts. The functions below are not inlined, because
@@ -93,7 +102,7 @@ impl<'m, F: NorFlash> App<'m, F> {
                 Ok(Next::Nothing)
             }
             Command::ResetCalibration => self.reset_calibration(now, polled),
-            Command::MapChecksum => Ok(Next::Nothing),
+            Command::MapChecksum | Command::OpenSession => Ok(Next::Nothing),
         }
     }
 

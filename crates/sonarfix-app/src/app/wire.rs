@@ -6,7 +6,7 @@
 
 use sonarfix::units::{Duration, Instant};
 use sonarfix_link::{
-    Command, Deduplicator, Frame, Receiver, ReceiverCounters, Sender, Telemetry, frame,
+    Frame, Receiver, ReceiverCounters, Sender, Session, SessionCommand, Telemetry, frame,
 };
 
 use crate::time::after;
@@ -28,8 +28,8 @@ pub trait Link {
 /// The link's state.
 #[derive(Default)]
 pub(super) struct Wire {
-    receiver: Receiver<Command>,
-    pub answered: Deduplicator,
+    receiver: Receiver<SessionCommand>,
+    pub session: Session,
     sender: Sender<Telemetry>,
     /// The next deadlines; immediately after the start.
     hello_at: Option<Instant>,
@@ -39,7 +39,7 @@ pub(super) struct Wire {
 impl Wire {
     /// Reads the received bytes up to the next command.
     #[inline(never)]
-    pub fn next(&mut self, link: &mut impl Link) -> Option<Frame<Command>> {
+    pub fn next(&mut self, link: &mut impl Link) -> Option<Frame<SessionCommand>> {
         while let Some(byte) = link.receive() {
             let frame = self.receiver.push(byte);
             if frame.is_some() {

@@ -285,6 +285,47 @@ fn a_stored_configuration_that_cannot_start_is_not_used() {
     }
 }
 
+/// A recorded conversation that is sent again, in the same run or after a power cycle, starts nothing.
+#[test]
+fn a_recorded_start_does_not_start_the_robot() {
+    let baked = Baked::new(&config());
+    let mut bench = Bench::switched_on(&baked, SimFlash::new());
+    let recording: Vec<Vec<u8>> = [Command::OpenSession, Command::SetPose(start()), Command::Start]
+        .map(|command| {
+            let frame = bench.frame(&command);
+            bench.garble(&frame);
+            let result = bench.turn().answered;
+            if let Some(CommandResult::Session(session)) = result {
+                bench.session = session;
+            }
+            frame
+        })
+        .to_vec();
+    assert!(bench.app.is_running());
+    assert_eq!(bench.order(&Command::Stop), DONE);
+    let old = CommandResult::Refused(CommandError::Session);
+    for run in 0..3 {
+        // The start alone, then the whole conversation.
+        bench.garble(&recording[2]);
+        assert_eq!(bench.turn().answered, Some(old), "run {run}");
+        for frame in &recording {
+            bench.garble(frame);
+            let answered = bench.turn().answered;
+            assert!(!matches!(answered, Some(CommandResult::Done)), "run {run}: {answered:?}");
+        }
+        bench.wait(100);
+        assert!(!bench.app.is_running() && !bench.turn().may_drive);
+        let flash = bench.switched_off();
+        bench = Bench::switched_on(&baked, flash);
+    }
+    // Whoever asks for a session is obeyed.
+    assert_eq!(bench.order(&Command::SetPose(start())), DONE);
+    assert_eq!(bench.order(&Command::Start), DONE);
+    // An old stop stops it.
+    bench.session = 0;
+    assert_eq!(bench.order(&Command::Stop), DONE);
+}
+
 /// A record with numbers as no robot writes them.
 #[test]
 fn a_strange_record_does_not_keep_the_robot_from_starting() {

@@ -18,7 +18,7 @@ use sonarfix_hal::ranger::{
 use sonarfix_hal::robot::Devices;
 use sonarfix_hal::servo::{PwmFrame, Servo};
 use sonarfix_link::message::{CommandResult, Estimate, LoopStatus, ResetCause};
-use sonarfix_link::{Command, Receiver, Sender, Telemetry, baked, frame};
+use sonarfix_link::{Command, Receiver, Sender, SessionCommand, Telemetry, baked, frame};
 
 use crate::flash::{SECTOR, SECTORS, SimFlash};
 
@@ -173,7 +173,8 @@ pub struct Bench<'m> {
     /// What its first poll did.
     pub first: Polled,
     receiver: Receiver<Telemetry>,
-    sender: Sender<Command>,
+    sender: Sender<SessionCommand>,
+    pub session: u32,
 }
 
 impl<'m> Bench<'m> {
@@ -196,8 +197,9 @@ impl<'m> Bench<'m> {
         };
         let (receiver, sender) = (Receiver::new(), Sender::starting_at(1));
         let (line, first) = (Line::default(), Polled::default());
-        let mut bench = Self { app, hardware, line, now: 0, first, receiver, sender };
+        let mut bench = Self { app, hardware, line, now: 0, first, receiver, sender, session: 0 };
         bench.first = bench.turn();
+        bench.open_session();
         bench
     }
 
@@ -227,10 +229,25 @@ impl<'m> Bench<'m> {
         frames.map(|frame| frame.message).collect()
     }
 
+    /// Opens a session, and begins its sequence numbers again.
+    pub fn open_session(&mut self) {
+        self.sender = Sender::starting_at(1);
+        let CommandResult::Session(session) = self.order(&Command::OpenSession) else {
+            panic!("a session is opened at any time")
+        };
+        self.session = session;
+    }
+
     /// Puts a command on the line.
     pub fn send(&mut self, command: &Command) {
-        let mut buffer = frame::EMPTY;
-        self.line.to_robot.extend(self.sender.frame(command, &mut buffer));
+        let frame = self.frame(command);
+        self.line.to_robot.extend(&frame);
+    }
+
+    /// The next frame, of this command.
+    pub fn frame(&mut self, command: &Command) -> Vec<u8> {
+        let command = SessionCommand { session: self.session, command: *command };
+        self.sender.frame(&command, &mut frame::EMPTY.clone()).to_vec()
     }
 
     /// Puts these bytes on the line.

@@ -1,16 +1,16 @@
 //! Damaged, truncated, repeated and foreign frames.
 
 use sonarfix_link::message::Message;
-use sonarfix_link::{Command, Gaps, ReceiverCounters, Telemetry, VERSION};
+use sonarfix_link::{Command, Gaps, ReceiverCounters, SessionCommand, Telemetry, VERSION};
 
 use crate::messages::{COMMANDS, Counting, TELEMETRY, command, telemetry};
-use crate::wire::{framed, received, sent, to_stdvec};
+use crate::wire::{framed, in_session, received, sent, to_stdvec};
 
 fn telemetry_example(kind: u32) -> Telemetry {
     telemetry(kind, &mut Counting { next: 0, variant: 0 })
 }
 
-fn command_example(kind: u32) -> Command {
+fn command_example(kind: u32) -> SessionCommand {
     command(kind, &mut Counting { next: 0, variant: 0 })
 }
 
@@ -59,8 +59,9 @@ fn every_cut_costs_that_frame_and_no_other() {
 fn garbage_before_a_frame_costs_nothing() {
     for byte in 1..=u8::MAX {
         for length in 1..300 {
-            let (frames, receiver) =
-                received::<Command>(&[vec![byte; length], sent(3, &Command::Stop)].concat());
+            let (frames, receiver) = received::<SessionCommand>(
+                &[vec![byte; length], sent(3, &in_session(Command::Stop))].concat(),
+            );
             assert_eq!(frames.len(), 1, "{length} times {byte}");
             let skipped = receiver.counters();
             assert_eq!((skipped.frames, skipped.skipped()), (1, 1), "{length} times {byte}");
@@ -70,14 +71,14 @@ fn garbage_before_a_frame_costs_nothing() {
 
 #[test]
 fn what_is_skipped_is_counted_by_its_reason() {
-    let message = to_stdvec(&Command::Stop);
+    let message = to_stdvec(&in_session(Command::Stop));
     let count = |wire: &[u8]| {
-        let (frames, receiver) = received::<Command>(wire);
+        let (frames, receiver) = received::<SessionCommand>(wire);
         assert!(frames.is_empty(), "{wire:02x?}");
         receiver.counters()
     };
     let none = ReceiverCounters::default();
-    let (ours, theirs) = (Command::KIND, Telemetry::KIND);
+    let (ours, theirs) = (SessionCommand::KIND, Telemetry::KIND);
     assert_eq!(count(&[0; 100]), none, "empty frames are no frames");
     assert_eq!(count(&[0, 5, 1, 0]), ReceiverCounters { corrupt: 1, ..none });
     assert_eq!(count(&[0, 1, 1, 0]), ReceiverCounters { corrupt: 1, ..none }, "too short");
@@ -91,7 +92,7 @@ fn what_is_skipped_is_counted_by_its_reason() {
     assert_eq!(count(&framed(VERSION, 7, 0, &message)), foreign);
     assert_eq!(count(&sent(0, &telemetry_example(0))), foreign);
     let undecodable = ReceiverCounters { undecodable: 1, ..none };
-    assert_eq!(count(&framed(VERSION, ours, 0, &[6])), undecodable, "no such command");
+    assert_eq!(count(&framed(VERSION, ours, 0, &[1, 9])), undecodable, "no such command");
     assert_eq!(count(&framed(VERSION, ours, 0, &[])), undecodable, "nothing");
     assert_eq!(count(&framed(VERSION, ours, 0, &[&message[..], &[0]].concat())), undecodable);
     let pose = to_stdvec(&command_example(0));
@@ -104,8 +105,8 @@ fn what_is_skipped_is_counted_by_its_reason() {
 
 #[test]
 fn a_frame_that_comes_twice_is_read_twice() {
-    let wire = sent(5, &Command::Start);
-    let (frames, _) = received::<Command>(&[&wire[..], &wire].concat());
+    let wire = sent(5, &in_session(Command::Start));
+    let (frames, _) = received::<SessionCommand>(&[&wire[..], &wire].concat());
     assert_eq!(frames.len(), 2);
     assert_eq!(frames[0], frames[1]);
 }

@@ -20,7 +20,7 @@ use crate::messages::{
 use crate::wire::to_stdvec;
 
 /// The version of the bytes below.
-const OF_VERSION: u8 = 2;
+const OF_VERSION: u8 = 3;
 
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().fold(String::new(), |hex, byte| format!("{hex}{byte:02x}"))
@@ -49,6 +49,7 @@ fn name_of_command(message: &Command) -> &'static str {
         Command::Stop => "stop",
         Command::ResetCalibration => "reset calibration",
         Command::MapChecksum => "map checksum",
+        Command::OpenSession => "open session",
     }
 }
 
@@ -60,7 +61,9 @@ fn all() -> Vec<(&'static str, String)> {
     let telemetry =
         telemetry.map(|message| (name_of_telemetry(&message), hex(&to_stdvec(&message))));
     telemetry
-        .chain(commands.map(|message| (name_of_command(&message), hex(&to_stdvec(&message)))))
+        .chain(
+            commands.map(|message| (name_of_command(&message.command), hex(&to_stdvec(&message)))),
+        )
         .collect()
 }
 
@@ -113,6 +116,7 @@ fn every_variant_has_the_number_of_its_version() {
         CommandResult::Done,
         CommandResult::Map(ImageStatus::Missing),
         CommandResult::Refused(REFUSED[0]),
+        CommandResult::Session(0),
     ]);
 }
 

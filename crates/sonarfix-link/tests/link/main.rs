@@ -4,9 +4,9 @@
 
 mod baked;
 mod damage;
-mod deduplicator;
 mod golden;
 mod messages;
+mod session;
 mod sizes;
 mod streams;
 mod wire;

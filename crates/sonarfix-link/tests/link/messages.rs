@@ -20,7 +20,7 @@ use sonarfix_link::message::{
     CommandError, ImageStatus, LoopStatus, Odometry, ResetCause, SkippedPing,
 };
 use sonarfix_link::{
-    Ack, Command, CommandResult, Estimate, Hello, Ping, ReceiverCounters, Telemetry,
+    Ack, Command, CommandResult, Estimate, Hello, Ping, ReceiverCounters, SessionCommand, Telemetry,
 };
 
 /// The source of the numbers of a message.
@@ -114,14 +114,14 @@ impl Source for Largest {
 
 /// The numbers of kinds of telemetry and of commands.
 pub const TELEMETRY: u32 = 9;
-pub const COMMANDS: u32 = 6;
+pub const COMMANDS: u32 = 7;
 
 pub fn any_telemetry(rng: &mut ChaCha8Rng) -> Telemetry {
     let kind = rng.pick(TELEMETRY);
     telemetry(kind, rng)
 }
 
-pub fn any_command(rng: &mut ChaCha8Rng) -> Command {
+pub fn any_command(rng: &mut ChaCha8Rng) -> SessionCommand {
     let kind = rng.pick(COMMANDS);
     command(kind, rng)
 }
@@ -151,8 +151,8 @@ pub fn telemetry(kind: u32, source: &mut impl Source) -> Telemetry {
 }
 
 /// A command of the `kind`-th kind.
-pub fn command(kind: u32, source: &mut impl Source) -> Command {
-    match kind {
+pub fn command(kind: u32, source: &mut impl Source) -> SessionCommand {
+    let command = match kind {
         0 => {
             let (x, y) = (source.single(), source.single());
             let heading = Radians(source.single());
@@ -168,8 +168,10 @@ pub fn command(kind: u32, source: &mut impl Source) -> Command {
         2 => Command::Start,
         3 => Command::Stop,
         4 => Command::ResetCalibration,
-        _ => Command::MapChecksum,
-    }
+        5 => Command::MapChecksum,
+        _ => Command::OpenSession,
+    };
+    SessionCommand { session: source.bits32(), command }
 }
 
 fn numbers(source: &mut impl Source) -> [f32; STATES] {
@@ -297,7 +299,7 @@ fn reset(source: &mut impl Source) -> ResetCause {
     source.choose(&RESETS)
 }
 
-pub const REFUSED: [CommandError; 7] = [
+pub const REFUSED: [CommandError; 8] = [
     CommandError::Configuration,
     CommandError::Pose,
     CommandError::NoMap,
@@ -305,12 +307,14 @@ pub const REFUSED: [CommandError; 7] = [
     CommandError::Storage,
     CommandError::NoPose,
     CommandError::Unsupported(Unsupported::Servo(SettingError::Frame)),
+    CommandError::Session,
 ];
 
 fn command_result(source: &mut impl Source) -> CommandResult {
-    match source.pick(3) {
+    match source.pick(4) {
         0 => CommandResult::Map(flashed(source)),
         1 => CommandResult::Done,
+        2 => CommandResult::Session(source.bits32()),
         _ => CommandResult::Refused(source.choose(&REFUSED)),
     }
 }

@@ -3,10 +3,10 @@
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use sonarfix_link::message::Message;
-use sonarfix_link::{Command, Frame, Telemetry, VERSION};
+use sonarfix_link::{Command, Frame, SessionCommand, Telemetry, VERSION};
 
 use crate::messages::{any_command, any_telemetry};
-use crate::wire::{framed, received, sent, to_stdvec};
+use crate::wire::{framed, in_session, received, sent, to_stdvec};
 
 /// The default number of streams of each kind.
 const STREAMS: u64 = 20_000;
@@ -109,7 +109,7 @@ fn every_whole_frame_is_found_and_nothing_else_in_telemetry() {
 
 #[test]
 fn every_whole_frame_is_found_and_nothing_else_in_commands() {
-    check::<Command>(any_command);
+    check::<SessionCommand>(any_command);
 }
 
 #[test]
@@ -118,9 +118,9 @@ fn random_bytes_say_nothing_and_hide_no_frame_behind_them() {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut bytes = vec![0; rng.random_range(0..300)];
         rng.fill_bytes(&mut bytes);
-        bytes.extend(sent(1, &Command::MapChecksum));
-        let (frames, _) = received::<Command>(&bytes);
+        bytes.extend(sent(1, &in_session(Command::MapChecksum)));
+        let (frames, _) = received::<SessionCommand>(&bytes);
         let commands: Vec<_> = frames.iter().map(|frame| frame.message).collect();
-        assert_eq!(commands, [Command::MapChecksum], "seed {seed}");
+        assert_eq!(commands, [in_session(Command::MapChecksum)], "seed {seed}");
     }
 }

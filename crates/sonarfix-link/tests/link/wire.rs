@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use sonarfix_link::message::Message;
-use sonarfix_link::{Command, Frame, Receiver, Sender, Telemetry, VERSION, frame};
+use sonarfix_link::{Command, Frame, Receiver, Sender, SessionCommand, Telemetry, VERSION, frame};
 
 use crate::messages::{any_command, any_telemetry};
 
@@ -24,11 +24,17 @@ pub fn crc32(bytes: &[u8]) -> u32 {
     !crc
 }
 
-/// Consistent overhead byte stuffing: replaces each zero by the distance to the next.
+/// Consistent overhead byte stuffing: replaces each zero by the distance to the next, and interrupts runs of 254 bytes
+/// without one.
 fn stuff(body: &[u8]) -> Vec<u8> {
-    assert!(body.len() < 254);
-    let runs = body.split(|&byte| byte == 0);
-    runs.flat_map(|run| [&[u8::try_from(run.len() + 1).unwrap()], run].concat()).collect()
+    let mut stuffed = Vec::new();
+    for run in body.split(|&byte| byte == 0) {
+        let whole = run.len() - run.len() % 254;
+        run[..whole].chunks(254).for_each(|chunk| stuffed.extend([&[0xff], chunk].concat()));
+        stuffed.push(u8::try_from(run.len() - whole + 1).unwrap());
+        stuffed.extend(&run[whole..]);
+    }
+    stuffed
 }
 
 /// A frame on the wire.
@@ -43,6 +49,11 @@ pub fn framed(version: u8, kind: u8, sequence: u16, message: &[u8]) -> Vec<u8> {
 /// The frame from a sender.
 pub fn sent<M: Message>(sequence: u16, message: &M) -> Vec<u8> {
     Sender::starting_at(sequence).frame(message, &mut frame::EMPTY.clone()).to_vec()
+}
+
+/// A command in session 5.
+pub fn in_session(command: Command) -> SessionCommand {
+    SessionCommand { session: 5, command }
 }
 
 /// All frames that a receiver finds.
@@ -88,21 +99,21 @@ proptest! {
 /// The example of `docs/link.md`, assembled by hand.
 #[test]
 fn the_documents_example_is_right() {
-    const STOP: [u8; 12] = [0x00, 0x04, 0x02, 0x01, 0x07, 0x06, 0x03, 0, 0, 0, 0, 0x00];
+    const STOP: [u8; 13] = [0x00, 0x04, 0x03, 0x01, 0x07, 0x07, 0x05, 0x03, 0, 0, 0, 0, 0x00];
     let documents = include_str!("../../../../docs/link.md");
-    let wire = sent(7, &Command::Stop);
+    let wire = sent(7, &in_session(Command::Stop));
     let hex: Vec<_> = wire.iter().map(|byte| format!("{byte:02x}")).collect();
     assert!(documents.contains(&hex.join(" ")), "{}", hex.join(" "));
-    assert_eq!(wire[..7], STOP[..7]);
-    assert_eq!(wire[11], STOP[11]);
+    assert_eq!(wire[..8], STOP[..8]);
+    assert_eq!(wire[12], STOP[12]);
 }
 
 #[test]
 fn sequence_numbers_start_at_0_and_never_come_back_to_it() {
     let mut sender = Sender::<Telemetry>::new();
     assert_eq!(sender.next(), 0);
-    let mut sender_late = Sender::<Command>::starting_at(65_535);
-    sender_late.frame(&Command::Stop, &mut frame::EMPTY.clone());
+    let mut sender_late = Sender::starting_at(65_535);
+    sender_late.frame(&in_session(Command::Stop), &mut frame::EMPTY.clone());
     assert_eq!(sender_late.next(), 1);
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     sender.frame(&any_telemetry(&mut rng), &mut frame::EMPTY.clone());
