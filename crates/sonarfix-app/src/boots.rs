@@ -1,8 +1,8 @@
-//! Resets in a row, counted in a register that survives a reset and not a power loss.
+//! Resets in a row, counted in a register that survives a reset but not a power loss.
 //!
-//! Should reading the store ever end in a reset, the robot would start over and over. So a board
-//! counts its starts; after [`MAX_RESETS`] resets, each less than [`SETTLED_AFTER`] after a start, the
-//! application leaves the store alone until the next start, and reports it: the robot works, and has no memory.
+//! If reading the store caused a reset, the robot would restart endlessly. Therefore a board
+//! counts its starts. After [`MAX_RESETS`] resets, each less than [`SETTLED_AFTER`] after a start, the
+//! application does not use the store until the next start, and reports this: the robot works without stored state.
 
 use sonarfix::units::Duration;
 
@@ -11,7 +11,7 @@ pub const MAX_RESETS: u8 = 3;
 /// Time after which a start counts as a success.
 pub const SETTLED_AFTER: Duration = Duration::from_ticks(60_000_000);
 
-/// Upper bits of a register that holds a count; after a power loss it holds anything.
+/// Upper bits of a register that holds a count; after a power loss its contents are arbitrary.
 const MARK: u32 = 0x50F1_B000;
 const MARK_BITS: u32 = 0xFFFF_FF00;
 

@@ -21,7 +21,7 @@ const TIMEOUT: Duration = Duration::from_ticks(150_000);
 ///   Resting ─────────────────────────▶ Pinging ────────────────────────────▶ Resting
 /// ```
 ///
-/// It cannot detect an unplugged quadrature encoder, which looks like a wheel at rest, nor a hobby servo that does not
+/// It cannot detect an unplugged quadrature encoder, which reads like a wheel at rest, nor a hobby servo that does not
 /// turn, which has no feedback.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Check {

@@ -1,17 +1,16 @@
-//! What a robot remembers while it is off: its calibration and its last pose, in two or more
-//! sectors of flash.
+//! Non-volatile storage of calibration, last pose and configuration, in two or more sectors of flash.
 //!
 //! Responsibilities, one file each:
-//! - this one: [`Store`], which writes and finds the records;
+//! - this one: [`Store`], which writes and reads the records;
 //! - `record`: the records, [`Saved`] and [`StoredConfiguration`]; `error`: [`StoreError`];
-//! - `journal`: where they lie in flash, and why a power cut costs none of them;
-//! - [`SavePolicy`]: when they are written;
-//! - [`WriteLimit`]: how often they are written, whatever commands arrive;
-//! - `resume`: what is still true of them when the robot is switched on again.
+//! - `journal`: the layout in flash, which survives power cuts;
+//! - [`SavePolicy`]: when records are written;
+//! - [`WriteLimit`]: how often records are written, whatever commands arrive;
+//! - `resume`: which part of a record is valid after a restart.
 //!
-//! A power cut at any step of a write, or of the erase that now and then goes before it, leaves the
-//! old record or the new one of each kind, and at every later start the same one; the next record
-//! can be written (`tests/app/power_cut.rs`).
+//! A power cut at any step of a write, or of the erase that sometimes precedes it, leaves the old or the new record of
+//! each kind. Every later start reads the same one, and the next record can be written
+//! (`tests/app/power_cut.rs`).
 //!
 //! # Non-finite policy
 //! A record with NaN, infinity or a negative deviation is not resumed from.
@@ -38,9 +37,9 @@ pub use record::{Saved, StoredConfiguration};
 pub use resume::{MAX_HEADING_DEVIATION, MAX_POSITION_DEVIATION, Resumed};
 pub use save_policy::SavePolicy;
 
-/// The records' place in flash.
+/// The records in flash.
 ///
-/// A write takes as long as the flash does: 2 ms for a record, and the erase of a sector once in
+/// A write blocks until the flash has finished: 2 ms for a record, and the erase of a sector once in
 /// some hundred records (`docs/firmware.md`).
 pub struct Store<F: NorFlash> {
     journal: Journal<F>,
@@ -59,13 +58,13 @@ impl<F: NorFlash> Store<F> {
     /// them. The other functions call it if it has not been called before.
     ///
     /// # Errors
-    /// [`StoreError::Corrupt`] of what was no store, and is an empty one now;
+    /// [`StoreError::Corrupt`] if the region held no store; it holds an empty one now.
     /// [`StoreError::Flash`], [`StoreError::NotWritten`].
     pub fn open(&mut self) -> Result<(), StoreError> {
         self.journal.open()
     }
 
-    /// What the robot knew when it was last written; `None` from a store that never held it.
+    /// The last record; `None` if there is none.
     ///
     /// # Errors
     /// [`StoreError`].
@@ -73,7 +72,7 @@ impl<F: NorFlash> Store<F> {
         self.read(SAVED)
     }
 
-    /// Writes what the robot knows, and reads it back.
+    /// Writes a record, and reads it back.
     ///
     /// # Errors
     /// [`StoreError`]; the record before still counts.
@@ -89,7 +88,7 @@ impl<F: NorFlash> Store<F> {
         self.read(STORED_CONFIGURATION)
     }
 
-    /// Writes a configuration that the robot was sent, and reads it back. One that lies there
+    /// Writes a configuration that the robot was sent, and reads it back. A configuration that is stored
     /// already is not written again.
     ///
     /// # Errors
@@ -146,7 +145,7 @@ impl<F: NorFlash> Store<F> {
         self.journal.flash_mut()
     }
 
-    /// Gives the flash back.
+    /// Returns the flash.
     pub fn release(self) -> F {
         self.journal.release()
     }

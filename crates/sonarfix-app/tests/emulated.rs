@@ -2,8 +2,8 @@
 //!
 //! `cargo xtask test-firmware` builds it and runs these. The emulator has the core, the clock,
 //! the interrupts and the UART; encoders, servo and echo read zero there, and its flash cannot be
-//! written. So what is shown is that the very ELF that is flashed boots, keeps its deadlines, says
-//! what is missing, obeys, and is not led astray by garbage.
+//! written. The tests show that the ELF that is flashed boots, meets its deadlines, reports missing devices, executes
+//! commands, and ignores garbage.
 
 #![cfg(test)]
 
@@ -37,8 +37,8 @@ const RAM_AT: u32 = 0x2000_0000;
 /// Memory that the program does not use.
 const CODE_AT: u32 = RAM_AT + 0x1_0000;
 const RAM: usize = 128 * 1_024;
-/// On this computer, for anything that is waited for; the emulator is ended after it as well.
-const PATIENCE: Duration = Duration::from_secs(100);
+/// Limit of each wait, by the clock of this computer; the emulator is ended after it as well.
+const TIMEOUT: Duration = Duration::from_secs(100);
 
 /// The board, and the PC at the other end of its link.
 struct Robot {
@@ -47,8 +47,8 @@ struct Robot {
     receiver: Receiver<Telemetry>,
     sender: Sender<SessionCommand>,
     session: u32,
-    /// What was told and not yet looked at, the latest last.
-    told: VecDeque<Telemetry>,
+    /// Messages received and not yet processed, oldest first.
+    pending: VecDeque<Telemetry>,
     since: Instant,
     files: TempDir,
 }
@@ -60,12 +60,12 @@ impl Robot {
         let files = TempDir::new().unwrap();
         let path = |name: &str| files.path().join(name);
         let mut command = Process::new("timeout");
-        command.args([PATIENCE.as_secs().to_string().as_str(), "qemu-system-arm"]);
+        command.args([TIMEOUT.as_secs().to_string().as_str(), "qemu-system-arm"]);
         // 1 ns passes with every instruction. The emulator's timers run at 1 GHz in place of
         // 16 MHz, so the firmware's microsecond is 16 instructions: those of a core at 16 MHz that
         // does one in a cycle. While it sleeps no time of this computer passes.
         command.args(["-machine", "netduinoplus2", "-icount", "shift=0,sleep=off"]);
-        // What is written to devices that the emulator has not, among them the ports.
+        // Log the writes to devices that are not emulated, among them the ports.
         command.args(["-d", "unimp", "-D"]).arg(path("writes"));
         command.arg("-gdb").arg(format!("unix:{},server=on,wait=off", path("debugger").display()));
         let monitor = path("monitor");
@@ -79,7 +79,7 @@ impl Robot {
             }
         }
         let socket = path("uart");
-        // USART1 is not connected; the link is USART2. It waits for us, so nothing is lost.
+        // USART1 is not connected; the link is USART2. The emulator waits for the connection, so nothing is lost.
         command.args(["-serial", "null", "-serial"]);
         command.arg(format!("unix:{},server=on,wait=on", socket.display()));
         command.stdin(Stdio::null()).stderr(Stdio::null());
@@ -92,35 +92,38 @@ impl Robot {
             receiver: Receiver::new(),
             sender: Sender::starting_at(100),
             session: 0,
-            told: VecDeque::new(),
+            pending: VecDeque::new(),
             since: Instant::now(),
             files,
         }
     }
 
-    /// The next thing that the robot says.
+    /// The next message.
     fn next(&mut self) -> Telemetry {
         loop {
-            if let Some(told) = self.told.pop_front() {
-                return told;
+            if let Some(message) = self.pending.pop_front() {
+                return message;
             }
-            assert!(self.since.elapsed() < PATIENCE, "the robot did not say what was waited for");
+            assert!(
+                self.since.elapsed() < TIMEOUT,
+                "timeout: the expected message has not arrived"
+            );
             let mut bytes = [0; 4_096];
             let count = match self.line.read(&mut bytes) {
                 Ok(0) => panic!("the emulator has ended"),
                 Ok(count) => count,
                 Err(error) if error.kind() == ErrorKind::WouldBlock => {
-                    panic!("the robot is silent")
+                    panic!("no bytes from the robot")
                 }
                 Err(error) => panic!("the link: {error}"),
             };
             let receiver = &mut self.receiver;
             let frames = bytes[..count].iter().filter_map(|byte| receiver.push(*byte));
-            self.told.extend(frames.map(|frame| frame.message));
+            self.pending.extend(frames.map(|frame| frame.message));
         }
     }
 
-    /// The first thing said that this finds.
+    /// Waits for the first message for which `find` returns something.
     fn wait_for<T>(&mut self, find: impl Fn(&Telemetry) -> Option<T>) -> T {
         loop {
             if let Some(found) = find(&self.next()) {
@@ -130,13 +133,15 @@ impl Robot {
     }
 
     fn hello(&mut self) -> Hello {
-        self.wait_for(|told| if let Telemetry::Hello(hello) = told { Some(*hello) } else { None })
+        self.wait_for(
+            |message| if let Telemetry::Hello(hello) = message { Some(*hello) } else { None },
+        )
     }
 
-    fn how_it_fares(&mut self) -> LoopStatus {
-        self.wait_for(
-            |told| if let Telemetry::LoopStatus(told) = told { Some(*told) } else { None },
-        )
+    fn loop_status(&mut self) -> LoopStatus {
+        self.wait_for(|message| {
+            if let Telemetry::LoopStatus(status) = message { Some(*status) } else { None }
+        })
     }
 
     /// Sends a command and waits for its answer.
@@ -165,7 +170,7 @@ impl Robot {
     }
 
     fn answer_to(&mut self, asked: u16) -> CommandResult {
-        self.wait_for(|told| match told {
+        self.wait_for(|message| match message {
             Telemetry::Ack(Ack { sequence, result }) if *sequence == asked => Some(*result),
             _ => None,
         })
@@ -183,22 +188,25 @@ impl Robot {
                     std::fs::remove_file(&file).unwrap();
                     return bytes;
                 }
-                _ => assert!(self.since.elapsed() < PATIENCE, "the emulator shows no memory"),
+                _ => assert!(
+                    self.since.elapsed() < TIMEOUT,
+                    "the emulator has not dumped its memory"
+                ),
             }
-            // An emulator that waits for somebody to read does not listen to its monitor.
+            // An emulator that is blocked by an unread line does not serve its monitor.
             let _ = self.line.read(&mut [0; 4_096]).unwrap();
         }
     }
 
-    /// Lets the program go on at code in its memory, as a debugger would. The code enables the motors, which the
-    /// program itself does not without encoders, and jumps to where there is nothing.
-    fn sent_astray(&mut self) {
+    /// Continues the program at other code, through the debugger. That code enables the motors, which the
+    /// program itself does not do without encoders, and jumps to an invalid address.
+    fn jump_to_invalid_code(&mut self) {
         // ldr r0, port; movs r1, #0x80; str r1, [r0]; ldr r0, nowhere; bx r0; nop; port; nowhere
         let code = "0248802101600248004700bf1804024001000030";
         let mut debugger = connected(&self.files.path().join("debugger"));
         debugger.set_nonblocking(true).unwrap();
-        // Registers can be written once their description was read; 15 is the program counter, in the
-        // order of its bytes. Then let go.
+        // Registers can be written once their description was read; 15 is the program counter, little-endian. Then
+        // detach.
         let address = format!("Pf={:08x}", CODE_AT.swap_bytes());
         let memory = format!("M{CODE_AT:08x},14:{code}");
         for order in ["qXfer:features:read:target.xml:0,ffb", &memory, &address, "D"] {
@@ -206,7 +214,7 @@ impl Robot {
         }
     }
 
-    /// Gives the emulator's debugger an order, and waits until it is done.
+    /// Sends a command to the emulator's debugger, and waits for its answer.
     fn debug(&mut self, debugger: &mut UnixStream, order: &str) {
         let sum = order.bytes().fold(0_u8, u8::wrapping_add);
         debugger.write_all(format!("${order}#{sum:02x}").as_bytes()).unwrap();
@@ -223,17 +231,17 @@ impl Robot {
         debugger.write_all(b"+").unwrap();
     }
 
-    /// Takes what is on the line: an emulator that waits for somebody to read does nothing else.
+    /// Reads the line: an emulator that is blocked by an unread line does not proceed.
     fn listen(&mut self) {
-        assert!(self.since.elapsed() < PATIENCE, "the emulator is silent");
+        assert!(self.since.elapsed() < TIMEOUT, "timeout: the emulator does not respond");
         self.line.set_read_timeout(Some(Duration::from_millis(100))).unwrap();
         let _ = self.line.read(&mut [0; 4_096]);
     }
 
-    /// Whether the last that was written to the motor driver's pin, PB7, switched it on.
+    /// Whether the last write to the motor driver's pin, PB7, enabled it.
     fn may_drive(&self) -> Option<bool> {
         let log = std::fs::read_to_string(self.files.path().join("writes")).ok()?;
-        // The port's register that sets pins by its lower half and clears them by its upper.
+        // The port's BSRR: the lower half sets pins, the upper half clears them.
         let mut writes = log.lines().rev().filter(|line| line.contains("GPIOB: unimplemented"));
         writes.find_map(|line| {
             let (_, value) = line.split_once("write (size 4, offset 0x018, value 0x")?;
@@ -258,9 +266,9 @@ impl Robot {
 
 impl Drop for Robot {
     fn drop(&mut self) {
-        // An emulator that waits for somebody to read does not listen to signals.
+        // An emulator that is blocked by an unread line does not react to signals.
         let _ = self.line.shutdown(Shutdown::Both);
-        // `timeout` hands it on to the emulator; both may have ended by themselves.
+        // `timeout` forwards the signal to the emulator; both may have ended already.
         let _ = Process::new("kill").arg(self.emulator.id().to_string()).status();
         let _ = self.emulator.wait();
     }
@@ -271,8 +279,8 @@ fn connected(socket: &Path) -> UnixStream {
     loop {
         match UnixStream::connect(socket) {
             Ok(line) => return line,
-            Err(_) if since.elapsed() < PATIENCE => std::thread::sleep(Duration::from_millis(20)),
-            Err(error) => panic!("the emulator opens no link: {error}"),
+            Err(_) if since.elapsed() < TIMEOUT => std::thread::sleep(Duration::from_millis(20)),
+            Err(error) => panic!("cannot connect to the emulator: {error}"),
         }
     }
 }
@@ -308,12 +316,12 @@ fn pose() -> Start {
 
 #[test]
 #[ignore = "cargo xtask test-firmware"]
-fn without_map_and_configuration_it_stays_still_and_says_so() {
+fn without_map_and_configuration_it_does_not_start_and_reports_why() {
     let mut robot = Robot::switched_on(&[], &[]);
     let hello = robot.hello();
     assert_eq!((hello.map, hello.configuration), (ImageStatus::Missing, ImageStatus::Missing));
     assert_eq!(robot.order(&Command::Start), CommandResult::Refused(CommandError::NoMap));
-    assert!(!robot.how_it_fares().running);
+    assert!(!robot.loop_status().running);
 }
 
 #[test]
@@ -334,14 +342,13 @@ fn a_damaged_map_or_configuration_is_said_to_be_damaged() {
     let hello = robot.hello();
     assert_eq!(hello.configuration, ImageStatus::Corrupt);
     assert_eq!(robot.order(&Command::Start), CommandResult::Refused(CommandError::NoConfiguration));
-    assert!(!robot.how_it_fares().running);
+    assert!(!robot.loop_status().running);
 }
 
-/// The program that is flashed is another robot with another configuration, and refuses to be one that
-/// the board cannot be.
+/// The same program follows another configuration, and refuses one that the board does not support.
 #[test]
 #[ignore = "cargo xtask test-firmware"]
-fn the_configuration_alone_makes_another_robot() {
+fn one_program_follows_different_configurations() {
     let baked =
         |config: &RobotConfig| baked::write(config, &mut [0; baked::LENGTH_MAX]).unwrap().to_vec();
     for (period, expected) in [(100_000, 50), (50_000, 100)] {
@@ -351,7 +358,7 @@ fn the_configuration_alone_makes_another_robot() {
         assert_eq!(robot.hello().configuration, ImageStatus::Valid(baked::checksum(&config)));
         assert_eq!(robot.order(&Command::SetPose(pose())), CommandResult::Done);
         assert_eq!(robot.order(&Command::Start), CommandResult::Done);
-        robot.how_it_fares();
+        robot.loop_status();
         let (mut samples, mut seconds) = (0_u32, 0);
         while seconds < 5 {
             match robot.next() {
@@ -371,18 +378,18 @@ fn the_configuration_alone_makes_another_robot() {
     assert_eq!(robot.order(&Command::Start), CommandResult::Refused(refused));
 }
 
-/// Every sensor is missing in the emulator, and every one is reported, before the loop runs and
-/// while it does; it runs all the same.
+/// The emulator has no sensor. Each is reported as missing, before the loop runs and while it does; the loop runs
+/// nevertheless.
 #[test]
 #[ignore = "cargo xtask test-firmware"]
-fn a_minute_of_ticks_and_no_deadline_missed() {
+fn a_minute_of_ticks_without_a_missed_deadline() {
     let mut robot = Robot::switched_on(&map(), &config());
     let image = map();
     let checksum = u32::from_le_bytes(*image.last_chunk().unwrap());
     assert_eq!(robot.hello().map, ImageStatus::Valid(checksum));
-    robot.how_it_fares();
-    let fares = robot.how_it_fares();
-    let faults = fares.faults;
+    robot.loop_status();
+    let status = robot.loop_status();
+    let faults = status.faults;
     assert!(faults.right.errors > 0 && faults.left.errors > 0, "encoders: {faults:?}");
     assert!(faults.servo > 0 && faults.ranger > 0, "servo and ranger: {faults:?}");
 
@@ -393,7 +400,7 @@ fn a_minute_of_ticks_and_no_deadline_missed() {
     assert_eq!(robot.order(&Command::Start), CommandResult::Refused(CommandError::NoPose));
     assert_eq!(robot.order(&Command::SetPose(pose())), CommandResult::Done);
     assert_eq!(robot.order(&Command::Start), CommandResult::Done);
-    let began = robot.wait_for(|told| match told {
+    let began = robot.wait_for(|message| match message {
         Telemetry::Initialized(estimate) => Some(*estimate),
         _ => None,
     });
@@ -401,30 +408,30 @@ fn a_minute_of_ticks_and_no_deadline_missed() {
 
     // A minute by the robot's clock.
     let (mut ticks, mut worst) = (0, 0);
-    let fares = loop {
+    let status = loop {
         match robot.next() {
             Telemetry::Estimate(_) => ticks += 1,
-            Telemetry::LoopStatus(fares) => {
-                assert!(fares.running && fares.faults.deadlines == 0, "{fares:?}");
-                worst = worst.max(fares.worst_poll.to_micros());
-                if fares.at > began.at + sonarfix::units::Duration::secs(60) {
-                    break fares;
+            Telemetry::LoopStatus(status) => {
+                assert!(status.running && status.faults.deadlines == 0, "{status:?}");
+                worst = worst.max(status.worst_poll.to_micros());
+                if status.at > began.at + sonarfix::units::Duration::secs(60) {
+                    break status;
                 }
             }
             _ => {}
         }
     };
     assert!(ticks >= 600, "{ticks} ticks in a minute");
-    assert!(fares.faults.right.errors >= 600, "encoders go on being missed: {fares:?}");
-    assert_eq!(fares.faults.clock, 0);
+    assert!(status.faults.right.errors >= 600, "missing encoders are not counted: {status:?}");
+    assert_eq!(status.faults.clock, 0);
     assert_eq!(robot.receiver.counters().skipped(), 0);
-    println!("{ticks} ticks in a minute, none late; worst poll {worst} µs; {:?}", fares.faults);
+    println!("{ticks} ticks in a minute, none late; worst poll {worst} µs; {:?}", status.faults);
     check_memory(&mut robot);
 }
 
-/// The stack lies below everything else (`flip-link`) and grows down; the emulator's memory begins
-/// as zeros, so the lowest byte that is none is as deep as it went. That is never deeper than what
-/// `cargo xtask stack` finds, which holds its figure to the bar.
+/// Checks the deepest stack against the bound of `cargo xtask stack`. The stack lies below everything else
+/// (`flip-link`) and grows down; the emulator's memory is zero at first, so the lowest byte that is not zero is the
+/// deepest point.
 fn check_memory(robot: &mut Robot) {
     let ram = robot.memory(RAM_AT, RAM);
     let deepest = ram.iter().position(|byte| *byte != 0).unwrap();
@@ -434,16 +441,16 @@ fn check_memory(robot: &mut Robot) {
     let bound: usize = std::env::var("SONARFIX_STACK").unwrap().parse().unwrap();
     println!("stack {stack} bytes at the deepest, of at most {bound}; everything else {rest}");
     assert!(rest > 1_000, "flip-link has not put the stack below everything else");
-    assert!(stack <= bound, "the stack is deeper than it can be");
+    assert!(stack <= bound, "the stack is deeper than its bound");
 }
 
 #[test]
 #[ignore = "cargo xtask test-firmware"]
-fn garbage_is_counted_and_commands_after_it_are_done_once() {
+fn garbage_is_counted_and_later_commands_are_executed_once() {
     let mut robot = Robot::switched_on(&map(), &config());
     robot.hello();
     assert_eq!(robot.order(&Command::SetPose(pose())), CommandResult::Done);
-    let before = robot.how_it_fares().commands;
+    let before = robot.loop_status().commands;
 
     // Noise, a cut frame, and a damaged one.
     let whole = robot.frame(200, &Command::Start);
@@ -453,37 +460,36 @@ fn garbage_is_counted_and_commands_after_it_are_done_once() {
     for garbage in [&noise[..], &whole[..whole.len() / 2], &damaged] {
         robot.send(garbage);
     }
-    // What follows is done all the same, and garbage was not taken for a start.
+    // Later commands are executed, and the garbage has not been taken for a start.
     assert_eq!(robot.order(&Command::MapChecksum), {
         let image = map();
         CommandResult::Map(ImageStatus::Valid(u32::from_le_bytes(*image.last_chunk().unwrap())))
     });
-    robot.how_it_fares();
-    let fares = robot.how_it_fares();
-    assert!(!fares.running, "garbage has started the loop");
-    assert!(fares.commands.skipped() >= before.skipped() + 3, "{:?}", fares.commands);
+    robot.loop_status();
+    let status = robot.loop_status();
+    assert!(!status.running, "garbage has started the loop");
+    assert!(status.commands.skipped() >= before.skipped() + 3, "{:?}", status.commands);
 
-    // A frame that is sent twice, because its answer was lost, is answered twice and done once.
+    // A frame that is sent twice, because its answer was lost, is answered twice and executed once.
     robot.send(&whole);
     assert_eq!(robot.answer_to(200), CommandResult::Done);
     robot.sender = Sender::starting_at(201);
     assert_eq!(robot.order(&Command::Stop), CommandResult::Done);
-    assert!(!robot.how_it_fares().running);
+    assert!(!robot.loop_status().running);
     // The same frame now is an old one.
     robot.send(&whole);
     assert_eq!(robot.answer_to(200), CommandResult::Refused(CommandError::Session));
     let again = robot.frame(210, &Command::Start);
     robot.send(&again);
     robot.send(&again);
-    let began = |told: &Telemetry| matches!(told, Telemetry::Initialized(_)).then_some(());
+    let began = |message: &Telemetry| matches!(message, Telemetry::Initialized(_)).then_some(());
     assert_eq!(robot.answer_to(210), CommandResult::Done);
     robot.wait_for(began);
     assert_eq!(robot.answer_to(210), CommandResult::Done);
-    assert!(robot.how_it_fares().running);
+    assert!(robot.loop_status().running);
 }
 
-/// Where nobody steers any more the motors are off: a program that has come to its end pulls the pin
-/// down, and only then ends.
+/// After a fault the program clears the motor pin before it ends.
 #[test]
 #[ignore = "cargo xtask test-firmware"]
 fn a_fault_stops_the_motors() {
@@ -492,10 +498,10 @@ fn a_fault_stops_the_motors() {
     assert_eq!(robot.may_drive(), Some(false));
     assert_eq!(robot.order(&Command::SetPose(pose())), CommandResult::Done);
     assert_eq!(robot.order(&Command::Start), CommandResult::Done);
-    robot.how_it_fares();
+    robot.loop_status();
     // Its encoders cannot be read here.
     assert_eq!(robot.may_drive(), Some(false));
-    robot.sent_astray();
+    robot.jump_to_invalid_code();
     while !robot.has_driven() || robot.may_drive() == Some(true) {
         robot.listen();
     }

@@ -8,15 +8,15 @@ pub enum StoreError {
     Region,
     /// The flash failed to read, write or erase.
     Flash,
-    /// What lay in the region was not a store.
+    /// The contents of the region were not a store.
     Corrupt,
-    /// What was written does not read back.
+    /// The written bytes do not read back.
     NotWritten,
-    /// A record is whole and does not have the layout that this firmware reads.
+    /// A record is valid, but has a layout that this firmware does not read.
     Layout,
     /// The robot cannot start with the configuration that it was sent; the baked one is used.
     Configuration,
-    /// The robot was reset several times in a row, and leaves the store alone until its next start.
+    /// The robot was reset several times in a row; the store is not used until the next start.
     Ignored,
 }
 
@@ -25,8 +25,8 @@ impl core::fmt::Display for StoreError {
         f.write_str(match self {
             Self::Region => "the store's region is not two or more whole sectors of flash",
             Self::Flash => "the flash failed to read, write or erase",
-            Self::Corrupt => "what lay in the store's region was not a store",
-            Self::NotWritten => "what was written to flash does not read back",
+            Self::Corrupt => "the contents of the store's region were not a store",
+            Self::NotWritten => "the bytes written to flash do not read back",
             Self::Layout => "a record in flash has a layout that this firmware does not read",
             Self::Configuration => "the robot cannot start with the configuration that it was sent",
             Self::Ignored => "several resets in a row: the store is not used until the next start",

@@ -19,29 +19,26 @@
 //! | 4 | *trusted* | written to 0 after *written* has been read back |
 //!
 //! # Power cuts
-//! A bit that was being written or erased as the power went may read differently each time. So what
-//! is read once proves nothing, and the order of the writes has to. A mark counts as soon as a single
-//! bit of it is 0:
+//! A bit whose write or erase was interrupted may read differently each time, so a single read proves nothing.
+//! The order of the writes makes the records safe. A mark counts as set as soon as a single bit of it is 0:
 //!
-//! - *Begun* is 1 throughout: nothing behind it was ever written, so the space can be used. A
-//!   *begun* of which only a part was written is written to 0 again by the next entry there, which
-//!   leaves no unstable bit.
+//! - *Begun* is all ones: nothing behind it was ever written, so the space can be used. A *begun* that was only
+//!   partly written is written to 0 again by the next entry there, which leaves no unstable bit.
 //! - *Trusted* has a 0: *written* is stable, and the entry before it. The entry counts, and will
 //!   count at every later start, whatever *trusted* reads then.
 //! - Only *written* has a 0: the entry is stable, but *written* itself may not be.
 //! - Neither has a 0: the entry may be whole, unstable or missing. It does not count.
 //!
 //! In the last two cases, and after an interrupted copy, [`Journal::open`] copies everything to the
-//! next sector before it returns, so that what a robot has read once it reads at every later start.
-//! A header of which only *written* has a 0 gets its *trusted* before that. A next sector whose
+//! next sector before it returns, so that every later start reads the same records.
+//! If only *written* has a 0 in a header, its *trusted* is written before that. A next sector whose
 //! header was begun and is not an older one counts as an interrupted copy.
 //!
-//! What this takes for granted: a write changes the bytes that are written and no others, and
-//! reading disturbs nothing.
+//! Assumptions: a write changes only the bytes that are written, and reading changes nothing.
 //!
 //! # Damage
-//! Bytes that change by themselves cost the records that they are in: the search goes on at the next
-//! word, and everything found is copied.
+//! A corrupt byte costs the record that contains it: the search continues at the next word, and all
+//! records found are copied.
 
 use core::ops::Range;
 
@@ -51,9 +48,9 @@ use sonarfix::map::image::checksum as crc32;
 use super::error::StoreError;
 use super::record::{KEYS, LONGEST};
 
-/// Unit of all lengths: no board writes longer words.
+/// Unit of all lengths: the longest word that a supported flash writes.
 const WORD: u32 = 4;
-/// What a mark holds once it is written.
+/// The contents of a mark that is set.
 const MARKED: [u8; 4] = [0; 4];
 const BLANK: u8 = 0xFF;
 
@@ -66,7 +63,7 @@ const ENTRY_MAX: usize = HEAD + LONGEST.next_multiple_of(4) + TAIL;
 const HEADER: u32 = 24;
 /// The key of a sector's header.
 const HEADER_KEY: u8 = 0;
-/// Bytes that are read at once where no entry is.
+/// Bytes that are read at once in blank space.
 const CHUNK: usize = 32;
 
 type Buffer = [u8; ENTRY_MAX];
@@ -103,7 +100,7 @@ fn size(length: usize) -> u32 {
     HEADER + length.next_multiple_of(WORD)
 }
 
-/// What a search of the flash found, kept up to date from then on.
+/// The result of a search of the flash, updated by every write.
 #[derive(Debug, Clone, Copy)]
 struct View {
     /// Address of the active sector.
@@ -116,15 +113,15 @@ struct View {
     end: u32,
     /// Addresses of the newest records, in the order of [`KEYS`].
     newest: [Option<u32>; KEYS.len()],
-    /// Whether something in it, or in the next sector, may read differently next time.
-    is_doubtful: bool,
+    /// Whether something in it, or in the next sector, may read differently at the next start.
+    is_unstable: bool,
 }
 
 /// The journal.
 pub(super) struct Journal<F> {
     flash: F,
     region: Range<u32>,
-    /// `None` before the first search, after an error, and where no journal is.
+    /// `None` before the first search, after an error, and without a journal.
     view: Option<View>,
 }
 
@@ -150,8 +147,8 @@ impl<F: NorFlash> Journal<F> {
         }
     }
 
-    /// Searches the flash, unless that has been done, and settles what a power cut has left. What
-    /// is no journal becomes an empty one.
+    /// Searches the flash, unless that has been done, and repairs the effects of a power cut. Contents that
+    /// are not a journal are replaced by an empty one.
     ///
     /// # Errors
     /// [`StoreError::Corrupt`] if it held no journal and was not new either; [`StoreError::Flash`],
@@ -163,7 +160,7 @@ impl<F: NorFlash> Journal<F> {
             Err(error) => return Err(error),
         }
         match self.view {
-            Some(view) if view.is_doubtful => self.settle(view),
+            Some(view) if view.is_unstable => self.settle(view),
             _ => Ok(()),
         }
     }
@@ -203,7 +200,7 @@ impl<F: NorFlash> Journal<F> {
         if self.append(key, payload).is_ok() {
             return Ok(());
         }
-        // The sector is full, or does not take it: the next one.
+        // The sector is full or cannot be written: use the next one.
         self.renew()?;
         self.append(key, payload)
     }
@@ -240,7 +237,7 @@ impl<F: NorFlash> Journal<F> {
         at - at % Self::sector_size()
     }
 
-    /// Finds the active sector and what lies in it, unless that is known.
+    /// Finds the active sector and its records, unless that has been done.
     fn search(&mut self) -> Result<(), StoreError> {
         if self.view.is_some() {
             return Ok(());
@@ -258,7 +255,7 @@ impl<F: NorFlash> Journal<F> {
         };
         let mut view = self.view_of(sector, &header)?;
         let next = self.next_sector(sector);
-        view.is_doubtful |= !self.is_older(next, header.sequence)?;
+        view.is_unstable |= !self.is_older(next, header.sequence)?;
         self.view = Some(view);
         Ok(())
     }
@@ -268,7 +265,7 @@ impl<F: NorFlash> Journal<F> {
         Ok(entry.filter(|entry| entry.key == HEADER_KEY && entry.mark > Mark::None))
     }
 
-    /// Whether nothing was ever written, or not more than the first header.
+    /// Whether nothing was ever written, except perhaps a part of the first header.
     fn is_new(&mut self) -> Result<bool, StoreError> {
         let Range { start, end } = self.region;
         self.is_blank(start + HEADER..end)
@@ -282,7 +279,7 @@ impl<F: NorFlash> Journal<F> {
         Ok(begun == [BLANK; 4] || header.is_some_and(|header| header.sequence < sequence))
     }
 
-    /// Goes through all entries of a sector.
+    /// Reads all entries of a sector.
     fn view_of(&mut self, sector: u32, header: &Entry) -> Result<View, StoreError> {
         let mut view = View {
             sector,
@@ -290,21 +287,21 @@ impl<F: NorFlash> Journal<F> {
             sequence: header.sequence,
             end: sector + HEADER,
             newest: [None; KEYS.len()],
-            is_doubtful: header.mark < Mark::Trusted,
+            is_unstable: header.mark < Mark::Trusted,
         };
         let sector_end = sector.saturating_add(Self::sector_size());
         let mut buffer = [0; ENTRY_MAX];
         let mut at = view.end;
         while at < sector_end && !self.is_blank(at..sector_end)? {
-            // An old entry among newer ones is a remainder of a sector that was not quite erased.
+            // An old entry among newer ones is left of an incomplete erase.
             let entry = self.entry(at, &mut buffer)?;
             let counts = |entry: &Entry| entry.mark > Mark::None && entry.sequence > view.sequence;
             let Some(entry) = entry.filter(counts) else {
-                view.is_doubtful = true;
+                view.is_unstable = true;
                 at += WORD;
                 continue;
             };
-            view.is_doubtful |= entry.mark < Mark::Trusted;
+            view.is_unstable |= entry.mark < Mark::Trusted;
             view.sequence = entry.sequence;
             note(&mut view.newest, entry.key, at);
             at += entry.size();
@@ -371,7 +368,7 @@ impl<F: NorFlash> Journal<F> {
     /// makes the first sector an empty one.
     #[inline(never)]
     fn renew(&mut self) -> Result<(), StoreError> {
-        // Until this is done, nothing is known: an error here leads to another search.
+        // The view is invalid until the copy is complete: an error leads to another search.
         let old = self.view.take();
         let (sector, sequence) = match old {
             Some(view) => (self.next_sector(view.sector), view.sequence.saturating_add(1)),
@@ -385,7 +382,7 @@ impl<F: NorFlash> Journal<F> {
             sequence,
             end: sector + HEADER,
             newest: [None; KEYS.len()],
-            is_doubtful: false,
+            is_unstable: false,
         };
         let mut buffer = [0; ENTRY_MAX];
         for at in old.iter().flat_map(|old| old.newest).flatten() {
@@ -428,12 +425,12 @@ impl<F: NorFlash> Journal<F> {
         note(&mut newest, key, view.end);
         self.view = Some(match written {
             Ok(()) => View { sequence: entry.sequence, end, newest, ..view },
-            Err(_) => View { is_doubtful: true, ..view },
+            Err(_) => View { is_unstable: true, ..view },
         });
         written
     }
 
-    /// Writes an entry whose payload is in `buffer`, in the order that a power cut asks for.
+    /// Writes an entry whose payload is in `buffer`, in the order that survives a power cut.
     fn put(&mut self, at: u32, entry: &Entry, buffer: &mut Buffer) -> Result<(), StoreError> {
         let body_end = HEAD + entry.length.next_multiple_of(4);
         fill(entry, buffer, body_end).ok_or(StoreError::NotWritten)?;
@@ -464,7 +461,7 @@ impl<F: NorFlash> Journal<F> {
     }
 }
 
-/// Takes note of a record; one with a key that this firmware does not use is not copied on.
+/// Records the address of a record. Records with a key that this firmware does not use are not copied.
 fn note(newest: &mut [Option<u32>; KEYS.len()], key: u8, at: u32) {
     for (known, newest) in KEYS.iter().zip(newest) {
         if *known == key {

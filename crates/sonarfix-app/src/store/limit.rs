@@ -1,10 +1,10 @@
 //! How often the flash may be written, whatever commands arrive.
 //!
-//! A bucket of [`BURST`] writes, which gains one every [`PERIOD`]: a write that finds it empty is
-//! postponed, and the newest state is written then. So the worst rate of commands wears the flash like
+//! A token bucket of [`BURST`] writes, which gains one every [`PERIOD`]. A write that finds it empty is
+//! postponed; the newest state is written later. The worst rate of commands therefore wears the flash like
 //! one write a minute (`docs/firmware.md` computes the years).
 //!
-//! One write is kept in reserve while a record says that the robot is parked, for the record that must
+//! One write is kept in reserve while the stored record is *parked*, for the record that must
 //! replace it before the robot drives.
 
 use sonarfix::units::{Duration, Instant};

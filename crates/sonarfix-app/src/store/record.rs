@@ -5,8 +5,8 @@ use sonarfix::ekf::{StandardDeviations, StateEstimate};
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_link::baked;
 
-/// Keys of the two records. Another layout gets another key, so that a robot with newer firmware
-/// never misreads what an older one wrote.
+/// Keys of the two records. A new layout gets a new key, so that newer firmware
+/// never misreads a record of older firmware.
 pub(super) const SAVED: u8 = 1;
 pub(super) const STORED_CONFIGURATION: u8 = 3;
 pub(super) const KEYS: [u8; 2] = [SAVED, STORED_CONFIGURATION];
@@ -14,17 +14,17 @@ pub(super) const KEYS: [u8; 2] = [SAVED, STORED_CONFIGURATION];
 /// Room for a record: the configuration is the longer one.
 pub(super) const LONGEST: usize = baked::LENGTH_MAX;
 
-/// What a robot knew when it was written.
+/// Pose and calibration at the time of the write.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Saved {
     /// How often the robot had been switched on.
     pub run: u32,
-    /// How long it had been on, seconds: with `run`, the age of the record.
+    /// Time since it was switched on, seconds. With `run` it gives the age of the record.
     pub seconds: u32,
     /// Checksum of the configuration that the calibration corrects.
     pub configuration: u32,
-    /// Whether the robot was parked, so that the pose holds until somebody moves it.
+    /// Whether the robot was parked, so that the pose is valid until the robot is moved.
     pub is_parked: bool,
     /// Pose and calibration.
     pub state: StateEstimate,
@@ -36,8 +36,8 @@ pub struct Saved {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct StoredConfiguration {
-    /// Checksum of the baked configuration that it replaces, zero for none: once another is
-    /// baked, that one counts.
+    /// Checksum of the baked configuration that it replaces, zero for none. With another baked
+    /// configuration this one is not used.
     pub replaces: u32,
     /// The configuration.
     pub config: RobotConfig,

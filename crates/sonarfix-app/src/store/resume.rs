@@ -1,25 +1,23 @@
-//! What an interruption leaves of what a robot knows: a Stop, or the power being switched off.
+//! Pose and calibration after an interruption: a `Stop`, or a power cycle.
 //!
 //! | state | deviation after it |
 //! |---|---|
 //! | scale errors, track width | twice the one before, and a tenth of the prior (independent); at most the prior |
-//! | range scale | the prior: the air is that of another day |
+//! | range scale | the prior: the temperature may have changed |
 //! | position, if the robot was parked | the one before, and 10 cm; at most 1 km |
 //! | heading, if the robot was parked | the one before, and 5°; at most 180° |
 //!
 //! *Twice*, because a record holds deviations and no correlations: no covariance of four errors
-//! exceeds four times its diagonal, so the robot never claims to know more than it did. The tenth is
-//! for tyres that are cleaned, warmed or pressed flat while the robot stands; the 10 cm and 5° for the
-//! hand that takes hold of the switch. Whoever carries the robot farther sets its pose; if not, the
-//! health finds out.
+//! exceeds four times its diagonal, so the restored covariance is never too small. The tenth is
+//! for tyres that are cleaned, warmed or pressed flat while the robot stands; the 10 cm and 5° for a robot that
+//! is pushed while it is switched. A robot that is carried farther needs a new pose; without one, the
+//! health verdict detects the error.
 //!
-//! **Any number of interruptions without driving equals one**: what is kept and written are the
-//! deviations *before* the interruption, and the rule above is applied when the loop starts. A loop
-//! in which no wheel has rolled leaves them as they were before it.
+//! **Any number of interruptions without driving equals one**: the deviations *before* the interruption are stored,
+//! and the rule above is applied when the loop starts. A loop in which no wheel has rolled leaves them unchanged.
 //!
-//! A record that was written while the robot might drive says nothing of where it stands now:
-//! its pose is not used. A calibration belongs to the configuration that it corrects: with
-//! another, the prior counts.
+//! The pose of a record that was written while the robot might drive is not used. A calibration belongs to the
+//! configuration that it corrects: with another one, the prior is used.
 
 use sonarfix::config::Config;
 use sonarfix::ekf::{StandardDeviations, StateEstimate};
@@ -28,10 +26,10 @@ use sonarfix::units::{Metres, Radians};
 
 use super::Saved;
 
-/// Standard deviations of what a hand at the switch does, metres and radians.
+/// Standard deviations of the displacement of a robot that is switched by hand, metres and radians.
 const PUSHED: f32 = 0.10;
 const TURNED: f32 = 5.0 * core::f32::consts::PI / 180.0;
-/// The share of the prior by which wheels differ from what they were.
+/// The share of the prior by which the wheels may have changed.
 const AGED: f32 = 0.1;
 /// The square root of the number of correlated calibration errors.
 const DECORRELATED: f32 = 2.0;
@@ -40,7 +38,7 @@ pub const MAX_POSITION_DEVIATION: f32 = 1_000.0;
 /// The largest deviation of a heading, radians.
 pub const MAX_HEADING_DEVIATION: f32 = core::f32::consts::PI;
 
-/// Where a robot starts from.
+/// The start state of a robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(clippy::struct_excessive_bools, reason = "independent facts, each with a name")]
@@ -60,7 +58,7 @@ pub struct Resumed {
 }
 
 impl Resumed {
-    /// A robot that knows nothing but its configuration.
+    /// The start state from the configuration alone.
     #[must_use]
     pub fn afresh(config: &Config) -> Self {
         let prior = &config.prior;
@@ -81,7 +79,7 @@ impl Resumed {
         }
     }
 
-    /// What remains of a record, for a robot of this configuration with this checksum.
+    /// The valid part of a record, for a robot of this configuration with this checksum.
     #[must_use]
     pub fn from(saved: &Saved, config: &Config, configuration: u32) -> Self {
         let afresh = Self::afresh(config);
@@ -94,7 +92,7 @@ impl Resumed {
         if saved.is_parked { resumed } else { resumed.without_pose() }
     }
 
-    /// What is known of a robot that was stopped with this estimate.
+    /// The start state of a robot that was stopped with this estimate.
     #[must_use]
     pub fn interrupted(state: StateEstimate, deviation: StandardDeviations) -> Self {
         Self {

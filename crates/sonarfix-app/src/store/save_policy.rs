@@ -1,13 +1,13 @@
-//! When a robot writes down what it knows.
+//! When pose and calibration are written to flash.
 //!
-//! - **When its owner starts or stops it**, so that a record says truly whether the robot was
-//!   parked: a pose is only worth keeping if nothing could drive away from it.
-//! - **While it pauses** (wheels unmoved for 2 s, so that nothing is lost while the flash is
+//! - **At `Start` and `Stop`**, so that a record is *parked* only if the robot could not drive: only then is its
+//!   pose valid later.
+//! - **While the robot pauses** (wheels unmoved for 2 s, so that nothing is lost while the flash is
 //!   busy) and tracks, if a deviation of its calibration has fallen by a fifth since the last
-//!   record, and that is a minute ago.
+//!   record, and that record is at least a minute old.
 //!
-//! A minute apart around the clock is 1,440 records a day; `docs/firmware.md` says how many years
-//! of it the flash stands.
+//! One record a minute is 1,440 records a day; `docs/firmware.md` states the life of the flash at
+//! this rate.
 
 use sonarfix::ekf::StandardDeviations;
 use sonarfix::health::Verdict;
@@ -16,20 +16,20 @@ use sonarfix::units::{Duration, Instant};
 
 use crate::time::since;
 
-/// How long the wheels must have stood.
+/// The time for which the wheels must have been at rest.
 const PAUSE: Duration = Duration::from_ticks(2_000_000);
 /// The least time between two records.
 const APART: Duration = Duration::from_ticks(60_000_000);
-/// What a deviation must have fallen to, of what is written.
+/// The ratio to the written deviation below which a deviation is written again.
 const BETTER: f32 = 0.8;
 
-/// Watches a localizer for what is worth writing.
+/// Decides when the state of a localizer is written.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SavePolicy {
     /// The calibration's deviations as written last.
     written: StandardDeviations,
     at: Instant,
-    /// Since when the wheels stand.
+    /// The time since which the wheels have been at rest.
     still_since: Instant,
 }
 
@@ -40,12 +40,12 @@ impl SavePolicy {
         Self { written, at: now, still_since: now }
     }
 
-    /// Takes note that a wheel rolled.
+    /// Records that a wheel rolled.
     pub fn rolled(&mut self, now: Instant) {
         self.still_since = now;
     }
 
-    /// Whether the localizer knows something that should be written now.
+    /// Whether the state of the localizer should be written now.
     #[must_use]
     pub fn is_due(&self, now: Instant, localizer: &Localizer) -> bool {
         localizer.health().verdict == Verdict::Tracking
@@ -54,7 +54,7 @@ impl SavePolicy {
             && is_better(&localizer.filter().deviation(), &self.written)
     }
 
-    /// Takes note that these deviations have been written, or that it was tried.
+    /// Records that these deviations have been written, or that the write has failed.
     pub fn wrote(&mut self, now: Instant, written: StandardDeviations) {
         self.at = now;
         self.written = written;

@@ -1,5 +1,5 @@
-//! What has wedged a robot, or left it blind without a word: commands, interruptions and dead
-//! devices. `docs/faults.md` has a table of them.
+//! Commands, interruptions and dead devices that once made a robot unusable, or let it run without measurements and
+//! without a report. `docs/faults.md` has a table of them.
 
 use sonarfix::config::CalibrationPrior;
 use sonarfix::ekf::StandardDeviations;
@@ -13,7 +13,7 @@ use sonarfix_link::message::{CommandError, CommandResult, ImageStatus};
 use sonarfix_link::{Command, Telemetry, baked};
 
 use crate::flash::{SECTOR, SECTORS, SimFlash};
-use crate::rig::{Baked, Bench, config, fares, servo, start};
+use crate::rig::{Baked, Bench, config, loop_status, servo, start};
 
 const DONE: CommandResult = CommandResult::Done;
 
@@ -31,7 +31,7 @@ fn drive(bench: &mut Bench, ticks: u16) {
         for wheel in [&mut bench.hardware.right.0, &mut bench.hardware.left.0] {
             *wheel = wheel.map(|count| count.wrapping_add(1));
         }
-        let _ = bench.turn();
+        let _ = bench.poll();
     }
 }
 
@@ -41,7 +41,7 @@ fn at_start(mut bench: Bench) -> (Bench, StandardDeviations) {
     (bench, deviation)
 }
 
-/// Whether no deviation of the calibration exceeds its prior, but for the random walk of a few metres.
+/// Whether no deviation of the calibration exceeds its prior, except by the random walk of a few metres.
 pub fn is_within_prior(deviation: &StandardDeviations, prior: &CalibrationPrior) -> bool {
     let at_most = |is: f32, prior: f32| is <= 1.000_1 * prior + 1e-4;
     at_most(deviation.scale_right, prior.scale_right)
@@ -76,7 +76,7 @@ fn any_number_of_power_cycles_equals_one() {
     let mut first = None;
     for cycle in 0..30 {
         let mut bench = Bench::switched_on(&baked, flash);
-        // A command while it waits writes what is known, and so does a start that goes nowhere.
+        // A command to a stopped robot writes a record, and so does a start without driving.
         if cycle % 3 == 1 {
             assert_eq!(bench.order(&Command::MapChecksum), bench.order(&Command::MapChecksum));
         }
@@ -88,7 +88,7 @@ fn any_number_of_power_cycles_equals_one() {
     }
 }
 
-/// What was tried first: a pose while it runs, then everything again after the power.
+/// New poses of a running robot, and again after a power cycle.
 #[test]
 fn new_poses_never_add_up() {
     let baked = Baked::new(&config());
@@ -108,7 +108,7 @@ fn new_poses_never_add_up() {
     assert!(bench.app.is_running());
 }
 
-/// A running robot that gets a new pose keeps its calibration and the covariance of that, to the bit.
+/// A running robot that gets a new pose keeps its calibration and the calibration's covariance bit for bit.
 #[test]
 fn a_new_pose_costs_no_calibration() {
     let baked = Baked::new(&config());
@@ -128,7 +128,7 @@ fn a_new_pose_costs_no_calibration() {
     assert!(crossed.iter().all(|covariance| covariance.abs() <= 0.0), "{crossed}");
 }
 
-/// Ticks come on their grid, whatever commands come between them.
+/// Ticks stay on their grid, whatever commands arrive between them.
 #[test]
 fn commands_do_not_move_the_tick() {
     let baked = Baked::new(&config());
@@ -142,9 +142,9 @@ fn commands_do_not_move_the_tick() {
             for milli in 0..10_000 {
                 let polled = if milli % period == 0 {
                     bench.send(command);
-                    bench.turn()
+                    bench.poll()
                 } else {
-                    bench.turn()
+                    bench.poll()
                 };
                 on_time += u32::from(polled.is_on_time);
             }
@@ -155,7 +155,7 @@ fn commands_do_not_move_the_tick() {
 
 /// A command every 20 ms for ten minutes writes no more than the limit permits.
 #[test]
-fn commands_do_not_wear_the_flash_out() {
+fn commands_write_the_flash_at_a_limited_rate() {
     let baked = Baked::new(&config());
     for is_running in [false, true] {
         let mut bench = running(&baked);
@@ -173,13 +173,13 @@ fn commands_do_not_wear_the_flash_out() {
                     _ => Command::SetPose(Start { pose, ..start() }),
                 });
             }
-            writes += u32::from(bench.turn().saved.is_some());
+            writes += u32::from(bench.poll().saved.is_some());
         }
         assert!(writes <= 8 + 10 + 1, "{writes} writes in ten minutes, running: {is_running}");
     }
 }
 
-/// What the limit has postponed is written when it permits: the newest state.
+/// When the limit permits a postponed write, the newest state is written.
 #[test]
 fn the_newest_state_is_written_after_the_limit() {
     let baked = Baked::new(&config());
@@ -194,7 +194,7 @@ fn the_newest_state_is_written_after_the_limit() {
     assert!(known.has_pose && (known.state.x.0 - 0.49).abs() < 1e-6, "{known:?}");
 }
 
-/// A record never says that a robot is parked which may drive, whatever the limit.
+/// While a robot may drive, its record is never *parked*, whatever the limit.
 #[test]
 fn a_driving_robot_is_never_recorded_as_parked() {
     let baked = Baked::new(&config());
@@ -218,9 +218,9 @@ fn a_driving_robot_is_never_recorded_as_parked() {
     }
 }
 
-/// What is refused changes neither memory nor flash, and does not keep the robot from starting.
+/// A refused command changes neither memory nor flash, and the robot can still start.
 #[test]
-fn what_is_refused_changes_nothing() {
+fn a_refused_command_changes_nothing() {
     let baked = Baked::new(&config());
     let wide = |position, heading| Start {
         position_deviation: Metres(position),
@@ -256,7 +256,7 @@ fn what_is_refused_changes_nothing() {
     assert_eq!(bench.order(&Command::Start), DONE);
 }
 
-/// A configuration in the store with which nothing can start: the baked one is used, and it is said.
+/// With a stored configuration that cannot start, the baked one is used, and this is reported.
 #[test]
 fn a_stored_configuration_that_cannot_start_is_not_used() {
     let baked = Baked::new(&config());
@@ -277,8 +277,8 @@ fn a_stored_configuration_that_cannot_start_is_not_used() {
             .unwrap();
         let mut bench = Bench::switched_on(&baked, store.release());
         assert!(bench.first.saved.is_some_and(|read| read.is_err()), "{:?}", bench.first);
-        let said = bench.wait(1);
-        let Some(Telemetry::Hello(hello)) = said.first() else { panic!("no word of who it is") };
+        let messages = bench.wait(1);
+        let Some(Telemetry::Hello(hello)) = messages.first() else { panic!("no Hello") };
         assert_eq!(hello.configuration, ImageStatus::Valid(baked::checksum(&config())));
         assert_eq!(bench.order(&Command::SetPose(start())), DONE);
         assert_eq!(bench.order(&Command::Start), DONE);
@@ -294,7 +294,7 @@ fn a_recorded_start_does_not_start_the_robot() {
         .map(|command| {
             let frame = bench.frame(&command);
             bench.garble(&frame);
-            let result = bench.turn().answered;
+            let result = bench.poll().answered;
             if let Some(CommandResult::Session(session)) = result {
                 bench.session = session;
             }
@@ -307,14 +307,14 @@ fn a_recorded_start_does_not_start_the_robot() {
     for run in 0..3 {
         // The start alone, then the whole conversation.
         bench.garble(&recording[2]);
-        assert_eq!(bench.turn().answered, Some(old), "run {run}");
+        assert_eq!(bench.poll().answered, Some(old), "run {run}");
         for frame in &recording {
             bench.garble(frame);
-            let answered = bench.turn().answered;
+            let answered = bench.poll().answered;
             assert!(!matches!(answered, Some(CommandResult::Done)), "run {run}: {answered:?}");
         }
         bench.wait(100);
-        assert!(!bench.app.is_running() && !bench.turn().may_drive);
+        assert!(!bench.app.is_running() && !bench.poll().may_drive);
         let flash = bench.switched_off();
         bench = Bench::switched_on(&baked, flash);
     }
@@ -326,9 +326,9 @@ fn a_recorded_start_does_not_start_the_robot() {
     assert_eq!(bench.order(&Command::Stop), DONE);
 }
 
-/// A record with numbers as no robot writes them.
+/// A record with implausible numbers.
 #[test]
-fn a_strange_record_does_not_keep_the_robot_from_starting() {
+fn an_implausible_record_does_not_prevent_a_start() {
     let baked = Baked::new(&config());
     let bench = running(&baked);
     let mut flash = bench.switched_off();
@@ -356,7 +356,7 @@ fn a_dead_encoder_is_noticed() {
         let mut bench = running(&baked);
         bench.wait(1_000);
         let well = bench.estimate().health;
-        assert!(bench.turn().may_drive);
+        assert!(bench.poll().may_drive);
         if wheel != 1 {
             bench.hardware.right.0 = None;
         }
@@ -365,7 +365,7 @@ fn a_dead_encoder_is_noticed() {
         }
         bench.wait(700);
         assert_ne!(verdict(&bench), Verdict::Tracking);
-        assert!(!bench.turn().may_drive);
+        assert!(!bench.poll().may_drive);
         bench.wait(2_500);
         assert_eq!(verdict(&bench), Verdict::Lost);
         let unseen = bench.estimate().health.position_deviation.0 - well.position_deviation.0;
@@ -373,14 +373,14 @@ fn a_dead_encoder_is_noticed() {
         assert!(unseen > 3.0 * fastest && unseen < 3.5 * fastest, "{unseen} m");
         bench.wait(600_000);
         assert_eq!(verdict(&bench), Verdict::Lost);
-        assert!(!bench.turn().may_drive);
-        assert!(fares(&bench.wait(1_000)).faults.right.errors > 0 || wheel == 1);
+        assert!(!bench.poll().may_drive);
+        assert!(loop_status(&bench.wait(1_000)).faults.right.errors > 0 || wheel == 1);
     }
 }
 
-/// Read again, its counter brings the whole travel: nothing is lost, and the motors are enabled.
+/// When an encoder can be read again, its counter contains the whole travel: nothing is lost, and the motors are enabled.
 #[test]
-fn an_encoder_that_can_be_read_again_brings_the_whole_travel() {
+fn an_encoder_that_can_be_read_again_returns_the_whole_travel() {
     let baked = Baked::new(&config());
     let mut bench = running(&baked);
     bench.wait(1_000);
@@ -391,7 +391,7 @@ fn an_encoder_that_can_be_read_again_brings_the_whole_travel() {
     bench.wait(200);
     let rolled = 100.0 * std::f32::consts::PI * 0.065 / 1_024.0;
     assert!((bench.estimate().state.x.0 - x - rolled * 0.5_f32.cos()).abs() < 1e-4);
-    assert!(bench.turn().may_drive);
+    assert!(bench.poll().may_drive);
 }
 
 #[test]
@@ -406,8 +406,8 @@ fn all_devices_dead_is_noticed() {
     assert_eq!(verdict(&bench), Verdict::Lost);
     bench.wait(120_000);
     assert_eq!(verdict(&bench), Verdict::Lost);
-    assert!(!bench.turn().may_drive);
-    // Given back, they are used again.
+    assert!(!bench.poll().may_drive);
+    // The devices work again.
     (bench.hardware.right.0, bench.hardware.left.0) = (Some(0), Some(0));
     (bench.hardware.servo, bench.hardware.ranger.is_there) = (servo(true), true);
     assert_eq!(bench.order(&Command::Stop), DONE);
@@ -415,7 +415,7 @@ fn all_devices_dead_is_noticed() {
     assert_eq!(bench.order(&Command::Start), DONE);
     bench.wait(1_000);
     assert_eq!(verdict(&bench), Verdict::Tracking);
-    assert!(bench.turn().may_drive);
+    assert!(bench.poll().may_drive);
 }
 
 /// No echo for a minute, whatever the reason, is not `Tracking`.
@@ -434,7 +434,7 @@ fn a_ranger_that_never_answers_is_noticed() {
     );
 }
 
-/// Whatever it is that resets the robot while it reads its store: it is left alone, and reported.
+/// After repeated resets the store, which may be their cause, is not used, and this is reported.
 #[test]
 fn after_three_resets_in_a_row_the_store_is_not_used() {
     let baked = Baked::new(&config());
@@ -451,11 +451,11 @@ fn after_three_resets_in_a_row_the_store_is_not_used() {
         assert_eq!(bench.order(&Command::Start), DONE);
         bench.wait(1_000);
         assert_eq!(verdict(&bench), Verdict::Tracking);
-        assert!(!bench.turn().is_settled);
+        assert!(!bench.poll().is_settled);
         if !is_used {
             assert_eq!(bench.app.store().flash(), &flash);
         }
         bench.wait(59_000);
-        assert!(bench.turn().is_settled);
+        assert!(bench.poll().is_settled);
     }
 }

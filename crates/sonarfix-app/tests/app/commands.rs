@@ -8,7 +8,7 @@ use sonarfix_link::message::{CommandError, CommandResult, ImageStatus};
 use sonarfix_link::{Command, Telemetry, baked};
 
 use crate::flash::SimFlash;
-use crate::rig::{Baked, Bench, config, fares, servo, start};
+use crate::rig::{Baked, Bench, config, loop_status, servo, start};
 
 const DONE: CommandResult = CommandResult::Done;
 
@@ -23,7 +23,7 @@ fn refused(reason: CommandError) -> CommandResult {
 }
 
 #[test]
-fn it_stays_still_until_it_has_all_it_needs_and_is_told_to_go() {
+fn it_starts_only_on_command_and_with_map_configuration_and_pose() {
     let whole = Baked::new(&config());
     let nothing = || vec![0xFF; 64];
     let no_map = Baked { map: nothing(), ..Baked::new(&config()) };
@@ -36,29 +36,29 @@ fn it_stays_still_until_it_has_all_it_needs_and_is_told_to_go() {
     for (baked, reason) in cases {
         let mut bench = Bench::switched_on(baked, SimFlash::new());
         assert_eq!(bench.order(&Command::Start), refused(reason));
-        let said = bench.wait(3_000);
-        assert!(!fares(&said).running && bench.app.localizer().is_none());
-        assert!(!said.iter().any(|told| matches!(told, Telemetry::Estimate(_))));
+        let messages = bench.wait(3_000);
+        assert!(!loop_status(&messages).running && bench.app.localizer().is_none());
+        assert!(!messages.iter().any(|message| matches!(message, Telemetry::Estimate(_))));
     }
     let mut bench = Bench::switched_on(&whole, SimFlash::new());
     assert_eq!(bench.order(&Command::SetPose(start())), DONE);
-    assert!(!bench.turn().is_running);
+    assert!(!bench.poll().is_running);
     assert_eq!(bench.order(&Command::Start), DONE);
-    let said = bench.wait(3_000);
-    let ticks = said.iter().filter(|told| matches!(told, Telemetry::Estimate(_))).count();
-    // The sonar holds none back for long: it answers at once here.
+    let messages = bench.wait(3_000);
+    let ticks = messages.iter().filter(|message| matches!(message, Telemetry::Estimate(_))).count();
+    // The simulated sonar answers at once, so it delays no tick.
     assert_eq!(ticks, 30);
-    assert!(fares(&said).running);
+    assert!(loop_status(&messages).running);
     assert_eq!(bench.order(&Command::Stop), DONE);
-    assert!(!bench.turn().is_running);
+    assert!(!bench.poll().is_running);
 }
 
 #[test]
-fn what_it_has_is_said_with_its_checksums() {
+fn hello_reports_the_checksums_of_map_and_configuration() {
     let baked = Baked::new(&config());
     let mut bench = Bench::switched_on(&baked, SimFlash::new());
-    let said = bench.wait(1);
-    let Some(Telemetry::Hello(hello)) = said.first() else { panic!("no word of who it is") };
+    let messages = bench.wait(1);
+    let Some(Telemetry::Hello(hello)) = messages.first() else { panic!("no Hello") };
     assert_eq!(hello.configuration, ImageStatus::Valid(baked::checksum(&config())));
     assert_eq!(bench.order(&Command::MapChecksum), CommandResult::Map(hello.map));
     assert!(matches!(hello.map, ImageStatus::Valid(_)));
@@ -66,8 +66,8 @@ fn what_it_has_is_said_with_its_checksums() {
     let mut broken = Baked::new(&config());
     broken.map[50] ^= 4;
     broken.config[20] ^= 4;
-    let said = Bench::switched_on(&broken, SimFlash::new()).wait(1);
-    let Some(Telemetry::Hello(hello)) = said.first() else { panic!("no word of who it is") };
+    let messages = Bench::switched_on(&broken, SimFlash::new()).wait(1);
+    let Some(Telemetry::Hello(hello)) = messages.first() else { panic!("no Hello") };
     assert_eq!((hello.map, hello.configuration), (ImageStatus::Corrupt, ImageStatus::Corrupt));
 }
 
@@ -82,7 +82,7 @@ fn every_missing_device_is_counted_and_no_other() {
         bench.hardware.ranger.is_there = has(3);
         bench.hardware.servo = servo(has(2));
         bench.hardware.servo.configure(&config().servo_settings()).unwrap();
-        let faults = fares(&bench.wait(2_500)).faults;
+        let faults = loop_status(&bench.wait(2_500)).faults;
         let found = [faults.right.errors, faults.left.errors, faults.servo, faults.ranger];
         for (bit, count) in (0..).zip(found) {
             assert_eq!(count > 0, !has(bit), "{missing:04b}: {faults:?}");
@@ -90,9 +90,9 @@ fn every_missing_device_is_counted_and_no_other() {
     }
 }
 
-/// Stopped, switched off and on: the pose is there, surer than nothing and less sure than it was.
+/// After `Stop` and a power cycle the pose is restored, with larger deviations than before.
 #[test]
-fn a_parked_robot_goes_on_from_where_it_stood() {
+fn a_parked_robot_resumes_its_pose() {
     let baked = Baked::new(&config());
     let mut bench = Bench::switched_on(&baked, SimFlash::new());
     assert_eq!(bench.order(&Command::SetPose(start())), DONE);
@@ -111,39 +111,39 @@ fn a_parked_robot_goes_on_from_where_it_stood() {
     assert_eq!(after.state, before.state);
     let (was, is) = (before.deviation, after.deviation);
     assert!(is.x.0 > 0.10 && is.x.0 < 0.12 && is.heading.0 > 0.087 && is.heading.0 < 0.1, "{is:?}");
-    // A calibration as good as its prior is not made worse than it, nor better.
+    // A calibration whose deviations equal the prior keeps them.
     assert!((is.scale_right - was.scale_right).abs() < 1e-4, "{is:?} {was:?}");
-    // The air may have changed: by as much as the prior allows, and no more.
+    // The temperature of the air may have changed: the range scale returns to its prior.
     assert!((is.range_scale - 0.02).abs() < 1e-6, "{is:?}");
 }
 
-/// What a replay begins with: the very numbers that the localizer was told. It does not give them
-/// back to the bit where one wheel is less certain than the other.
+/// `Initialized` carries the start values of the localizer, with which a replay begins, bit for bit. The estimate
+/// does not reproduce them exactly where the wheels' prior deviations differ.
 #[test]
-fn what_it_began_from_is_said_to_the_bit() {
+fn initialized_carries_the_exact_start_values() {
     let mut config = config();
     (config.localizer.prior.scale_right, config.localizer.prior.scale_left) = (0.013, 0.007);
     let baked = Baked::new(&config);
     let mut bench = Bench::switched_on(&baked, SimFlash::new());
     assert_eq!(bench.order(&Command::SetPose(start())), DONE);
     assert_eq!(bench.order(&Command::Start), DONE);
-    let began = bench.said().into_iter().find_map(|said| match said {
+    let began = bench.received().into_iter().find_map(|message| match message {
         Telemetry::Initialized(began) => Some(began.deviation),
         _ => None,
     });
-    let began = began.expect("it says that it began");
+    let began = began.expect("no Initialized");
     let bits = |deviation: StandardDeviations| {
         let StandardDeviations { scale_right, scale_left, track_width_error, .. } = deviation;
         [scale_right, scale_left, track_width_error.0].map(f32::to_bits)
     };
-    let told = [0.013, 0.007, config.localizer.prior.track_width.0].map(f32::to_bits);
-    assert_eq!(bits(began), told);
-    assert_ne!(bits(bench.estimate().deviation), told);
+    let given = [0.013, 0.007, config.localizer.prior.track_width.0].map(f32::to_bits);
+    assert_eq!(bits(began), given);
+    assert_ne!(bits(bench.estimate().deviation), given);
 }
 
-/// Switched off while it might drive: nobody knows where it stands now, and it says so.
+/// After a power loss while the loop ran, the pose is unknown, and `Start` is refused until a pose is set.
 #[test]
-fn a_robot_that_was_driving_must_be_told_where_it_is() {
+fn a_robot_that_was_driving_needs_a_new_pose() {
     let baked = Baked::new(&config());
     let mut bench = Bench::switched_on(&baked, SimFlash::new());
     assert_eq!(bench.order(&Command::SetPose(start())), DONE);
@@ -157,7 +157,7 @@ fn a_robot_that_was_driving_must_be_told_where_it_is() {
 }
 
 #[test]
-fn a_pose_that_is_set_outlives_the_power_even_if_it_never_drove() {
+fn a_pose_that_was_set_survives_a_power_cycle_without_driving() {
     let baked = Baked::new(&config());
     let mut bench = Bench::switched_on(&baked, SimFlash::new());
     assert_eq!(bench.order(&Command::SetPose(start())), DONE);
@@ -167,7 +167,7 @@ fn a_pose_that_is_set_outlives_the_power_even_if_it_never_drove() {
 }
 
 #[test]
-fn a_pose_that_is_none_is_refused_and_changes_nothing() {
+fn an_invalid_pose_is_refused_and_changes_nothing() {
     let baked = Baked::new(&config());
     let mut bench = Bench::switched_on(&baked, SimFlash::new());
     assert_eq!(bench.order(&Command::SetPose(start())), DONE);
@@ -183,26 +183,26 @@ fn a_pose_that_is_none_is_refused_and_changes_nothing() {
     }
 }
 
-/// A configuration that was sent counts from then on, until another is baked.
+/// A configuration that was sent is used until another one is baked.
 #[test]
-fn a_configuration_outlives_the_power_but_not_the_next_baked_one() {
+fn a_configuration_survives_a_power_cycle_but_not_the_next_baked_one() {
     let baked = Baked::new(&config());
     let sent = with_speed(0.7);
     let mut bench = Bench::switched_on(&baked, SimFlash::new());
     assert_eq!(bench.order(&Command::SetConfiguration(sent)), DONE);
     let flash = bench.switched_off();
 
-    let told = |bench: &mut Bench| match bench.wait(1).first() {
+    let configuration = |bench: &mut Bench| match bench.wait(1).first() {
         Some(Telemetry::Hello(hello)) => hello.configuration,
         other => panic!("{other:?}"),
     };
     let mut bench = Bench::switched_on(&baked, flash.clone());
-    assert_eq!(told(&mut bench), ImageStatus::Valid(baked::checksum(&sent)));
+    assert_eq!(configuration(&mut bench), ImageStatus::Valid(baked::checksum(&sent)));
 
     let newer = with_speed(0.9);
     let rebaked = Baked::new(&newer);
     let mut bench = Bench::switched_on(&rebaked, flash);
-    assert_eq!(told(&mut bench), ImageStatus::Valid(baked::checksum(&newer)));
+    assert_eq!(configuration(&mut bench), ImageStatus::Valid(baked::checksum(&newer)));
 
     let wrong = with_speed(-1.0);
     assert_eq!(
@@ -211,8 +211,8 @@ fn a_configuration_outlives_the_power_but_not_the_next_baked_one() {
     );
 }
 
-/// A flash that fails costs the memory; but one that would go on saying something untrue keeps the
-/// robot where it is.
+/// With a flash that cannot be written the robot still starts. If the flash holds a record *parked* that cannot be
+/// replaced, `Start` is refused.
 #[test]
 fn a_flash_that_fails() {
     let baked = Baked::new(&config());
@@ -228,7 +228,7 @@ fn a_flash_that_fails() {
     worn_out.is_read_only = true;
     let mut bench = Bench::switched_on(&baked, worn_out);
     assert_eq!(bench.order(&Command::Start), refused(CommandError::Storage));
-    assert!(!bench.turn().is_running);
+    assert!(!bench.poll().is_running);
 }
 
 #[test]
@@ -243,28 +243,28 @@ fn a_calibration_can_be_forgotten() {
     assert!((known.deviation.scale_right - config().localizer.prior.scale_right).abs() < 1e-6);
 }
 
-/// A deadline that is met is the only reason to feed the watchdog.
+/// The watchdog is fed only when a deadline is met.
 #[test]
-fn a_loop_that_comes_too_late_is_not_on_time() {
+fn a_late_poll_is_not_on_time() {
     let baked = Baked::new(&config());
     let mut bench = Bench::switched_on(&baked, SimFlash::new());
-    assert!(bench.turn().is_on_time);
+    assert!(bench.poll().is_on_time);
     bench.now += 50_000;
-    assert!(!bench.turn().is_on_time);
+    assert!(!bench.poll().is_on_time);
     assert_eq!(bench.order(&Command::SetPose(start())), DONE);
     assert_eq!(bench.order(&Command::Start), DONE);
-    let on_time = (0..1_000).filter(|_| bench.turn().is_on_time).count();
+    let on_time = (0..1_000).filter(|_| bench.poll().is_on_time).count();
     assert_eq!(on_time, 10);
-    // 115 ms without a turn: the tick in it is late.
+    // 115 ms without a poll: the tick in this interval is late.
     bench.now += 115_000;
-    let late = bench.turn();
+    let late = bench.poll();
     let report = bench.app.report().copied().unwrap_or_default();
     assert!(report.tick.is_some() && !late.is_on_time, "{late:?}");
 }
 
-/// What is said fits the line: half of 115,200 baud at most.
+/// Telemetry takes at most half of the capacity of the line at 115,200 baud.
 #[test]
-fn what_is_said_leaves_half_the_line_free() {
+fn telemetry_leaves_half_of_the_line_free() {
     let baked = Baked::new(&config());
     let mut bench = Bench::switched_on(&baked, SimFlash::new());
     assert_eq!(bench.order(&Command::SetPose(start())), DONE);

@@ -1,5 +1,5 @@
-//! The power may go at any step of a write or erase: the old record or the new one of each key is
-//! there, at every later start the same one, and the next record can be written.
+//! A power cut at any step of a write or erase leaves the old or the new record of each key. Every later start reads
+//! the same one, and the next record can be written.
 
 use proptest::prelude::*;
 use sonarfix::config::Config;
@@ -16,7 +16,7 @@ fn store(flash: SimFlash) -> Store<SimFlash> {
     Store::new(flash, REGION).unwrap()
 }
 
-/// The `run`-th record; no two are alike in any number.
+/// The `run`-th record; two records differ in every number.
 fn record(run: u32) -> Saved {
     let x = run as f32;
     let numbers = [x, -x, 0.01 * x, 1e-3 * x, -1e-3 * x, 1e-4 * x, 1e-2 * x];
@@ -40,7 +40,7 @@ fn kept(run: u32) -> StoredConfiguration {
     StoredConfiguration { replaces: !run, config: RobotConfig::with_common_parts(config) }
 }
 
-/// Both records, as far as they are there.
+/// Both records, if present.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Records {
     saved: Option<Saved>,
@@ -53,7 +53,7 @@ impl Records {
     }
 }
 
-/// What is written in the `run`-th run: now and then a configuration.
+/// The write of the `run`-th run: a record, every fifth time a configuration.
 #[derive(Debug, Clone, Copy)]
 struct Write(u32);
 
@@ -70,7 +70,7 @@ impl Write {
         }
     }
 
-    /// What is there when it has been written over what was there before.
+    /// The records after this write, if these were there before.
     fn over(self, old: &Records) -> Records {
         if self.is_config() {
             Records { kept: Some(kept(self.0)), ..*old }
@@ -80,24 +80,20 @@ impl Write {
     }
 }
 
-/// A robot that is switched on reads its store; so often, always the same.
+/// Opens and reads the store so many times; every start must read the same.
 fn start_again(mut flash: SimFlash, times: usize, what: &str) -> (SimFlash, Records) {
     let mut first = None;
     for _ in 0..times {
         let mut store = store(flash);
         assert_eq!(store.open(), Ok(()), "{what}");
         let read = Records::read(&mut store).unwrap();
-        assert_eq!(
-            *first.get_or_insert(read),
-            read,
-            "{what}: it reads differently at a later start"
-        );
+        assert_eq!(*first.get_or_insert(read), read, "{what}: a later start reads something else");
         flash = store.release();
     }
     (flash, first.unwrap_or_default())
 }
 
-/// Cuts the power at one step of a write, and looks what is there.
+/// Cuts the power at one step of a write, and checks the records.
 fn check_cut(before: &SimFlash, old: &Records, write: Write, at: usize, seed: u64) {
     let what = format!("write {}, step {at}, seed {seed}", write.0);
     let mut flash = before.clone();
@@ -108,7 +104,7 @@ fn check_cut(before: &SimFlash, old: &Records, write: Write, at: usize, seed: u6
     flash.power_up();
 
     if *old == Records::default() {
-        // The first erase of all may leave what is no store; it is reported, and nothing is lost.
+        // The very first erase may leave an invalid store; it is reported, and nothing is lost.
         let mut first = store(flash);
         let opened = first.open();
         assert!(matches!(opened, Ok(()) | Err(StoreError::Corrupt)), "{what}: {opened:?}");
@@ -130,7 +126,7 @@ fn check_cut(before: &SimFlash, old: &Records, write: Write, at: usize, seed: u6
 /// Every step of every write until both sectors have been erased twice over, on flash that writes
 /// bytes, words and pages at once.
 #[test]
-fn the_old_records_or_the_new_ones_wherever_the_power_goes() {
+fn a_power_cut_leaves_the_old_or_the_new_records() {
     let mut cuts = 0;
     for unit in [1, 4, 256] {
         let mut flash = SimFlash::new().writing(unit);
@@ -154,7 +150,7 @@ fn the_old_records_or_the_new_ones_wherever_the_power_goes() {
     assert!(cuts > 10_000, "{cuts} cuts");
 }
 
-/// What each cut leaves is drawn so often.
+/// Random outcomes tried for each cut.
 const SEEDS: u64 = 8;
 
 /// A flash before and after this write.
@@ -165,8 +161,8 @@ fn written(before: &SimFlash, write: Write) -> SimFlash {
     writer.release()
 }
 
-/// A flash in which the next configuration needs another sector and the next record does not, what
-/// lies in it, and that write.
+/// A flash in which the next configuration needs another sector and the next record does not; its records, and the
+/// write of that configuration.
 fn nearly_full() -> (SimFlash, Records, Write) {
     let (mut flash, mut old) = (SimFlash::new(), Records::default());
     let sent = Write(98);
@@ -182,10 +178,10 @@ fn nearly_full() -> (SimFlash, Records, Write) {
     panic!("no record is shorter than a configuration");
 }
 
-/// The copy to another sector, with what each cut leaves drawn far more often: what matters is
-/// single unstable bits of single marks.
+/// Cuts during the copy to another sector, with many more random outcomes: single unstable bits of single marks
+/// matter there.
 #[test]
-fn a_copy_that_is_cut() {
+fn a_cut_during_a_copy() {
     let (before, old, write) = nearly_full();
     for at in 0..written(&before, write).steps - before.steps {
         for seed in 0..300 {
@@ -194,9 +190,9 @@ fn a_copy_that_is_cut() {
     }
 }
 
-/// The power goes again while the store settles what the first cut has left.
+/// A second cut while the store is repaired after the first.
 #[test]
-fn a_copy_that_is_cut_and_cut_again_as_it_is_settled() {
+fn a_cut_during_a_copy_and_another_during_its_repair() {
     let (before, old, write) = nearly_full();
     let steps = written(&before, write).steps - before.steps;
     let mut settled = 0;
@@ -222,13 +218,13 @@ fn a_copy_that_is_cut_and_cut_again_as_it_is_settled() {
     assert!(settled > 5_000, "{settled} cuts");
 }
 
-/// What a start may read of one key.
+/// The values that a start may read of one key.
 #[derive(Debug, Clone)]
 struct Possible<T>(Vec<Option<T>>);
 
 impl<T: Copy + PartialEq + core::fmt::Debug> Possible<T> {
     fn reads(&mut self, found: Option<T>, what: &str) {
-        assert!(self.0.contains(&found), "{what}: {found:?} is none of {:?}", self.0);
+        assert!(self.0.contains(&found), "{what}: {found:?} is not among {:?}", self.0);
         self.0 = vec![found];
     }
 
@@ -240,9 +236,9 @@ impl<T: Copy + PartialEq + core::fmt::Debug> Possible<T> {
     }
 }
 
-/// Power that goes again and again, also while the store settles what the cut before has left.
+/// Repeated power cuts, also while the store is repaired after the last one.
 #[test]
-fn a_robot_whose_power_always_goes() {
+fn repeated_power_cuts() {
     for seed in 0..400 {
         let mut random = Random::new(seed);
         let mut flash = SimFlash::new().writing([1, 4, 256][random.below(3)]);
@@ -291,8 +287,8 @@ fn worn(count: u32) -> SimFlash {
 }
 
 proptest! {
-    /// Bytes changed anywhere: what is read was once written, or nothing is, and the robot can
-    /// write again; nothing panics on the way.
+    /// After changes of arbitrary bytes, each record read is one that was written, the next records can be written,
+    /// and nothing panics.
     #[test]
     fn a_damaged_store_gives_only_what_was_written(
         count in 0_u32..40,
@@ -315,7 +311,7 @@ proptest! {
     }
 }
 
-/// A byte that changes by itself costs the record that it is in, and no other.
+/// A corrupt byte costs the record that contains it, and no other.
 #[test]
 fn one_damaged_byte_costs_one_record() {
     let whole = worn(5);
@@ -339,7 +335,7 @@ fn a_new_flash_holds_nothing_and_is_not_written() {
 }
 
 #[test]
-fn what_is_no_store_is_reported_once_and_becomes_one() {
+fn an_invalid_store_is_reported_once_and_formatted() {
     let mut first = store(SimFlash::filled(0x5A));
     assert_eq!(first.load(), Err(StoreError::Corrupt));
     assert_eq!(first.open(), Err(StoreError::Corrupt));
@@ -351,16 +347,16 @@ fn what_is_no_store_is_reported_once_and_becomes_one() {
     assert_eq!(store.load(), Ok(Some(record(7))));
 }
 
-/// A store that its owner did not open opens itself.
+/// A store that was not opened opens at the first write.
 #[test]
-fn what_is_no_store_becomes_one_with_the_first_write() {
+fn an_invalid_store_is_formatted_by_the_first_write() {
     let mut store = store(SimFlash::filled(0x00));
     assert_eq!(store.save(&record(7)), Ok(()));
     assert_eq!(store.load(), Ok(Some(record(7))));
 }
 
 #[test]
-fn a_flash_that_takes_nothing_is_noticed() {
+fn a_read_only_flash_is_reported() {
     let mut flash = SimFlash::new();
     flash.is_read_only = true;
     assert_eq!(store(flash).save(&record(1)), Err(StoreError::NotWritten));
@@ -373,7 +369,7 @@ fn a_region_of_less_than_two_sectors_is_refused() {
     }
 }
 
-/// A configuration that lies there already costs no flash.
+/// A configuration that is already stored is not written again.
 #[test]
 fn the_same_configuration_is_written_once() {
     let mut store = store(SimFlash::new());
@@ -384,7 +380,7 @@ fn the_same_configuration_is_written_once() {
     assert!(store.release().written < 300);
 }
 
-/// What a record takes, with which `docs/firmware.md` computes the wear.
+/// The size of a record in flash, from which `docs/firmware.md` computes the wear.
 #[test]
 fn bytes_of_a_record() {
     let bytes = |write: Write| {

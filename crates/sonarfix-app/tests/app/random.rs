@@ -24,7 +24,7 @@ fn number(name: &str) -> Option<u64> {
     std::env::var(name).ok().map(|text| text.parse().expect("a whole number"))
 }
 
-/// A number that may be anything, and often is a usual one.
+/// An arbitrary number, often a usual one.
 fn any_number(random: &mut Random) -> f32 {
     match random.below(8) {
         0 => f32::from_bits(random.next() as u32),
@@ -85,7 +85,7 @@ fn pass(bench: &mut Bench, random: &mut Random) {
         for wheel in [&mut bench.hardware.right.0, &mut bench.hardware.left.0] {
             *wheel = wheel.map(|count| count.wrapping_add(rolls));
         }
-        let _ = bench.turn();
+        let _ = bench.poll();
     }
 }
 
@@ -104,13 +104,13 @@ fn mend_devices(bench: &mut Bench) {
     bench.hardware.servo = servo(true);
 }
 
-/// The power goes, perhaps within a write to come, and comes again.
+/// A power cycle, perhaps during a write.
 fn cycle<'m>(mut bench: Bench<'m>, baked: &'m Baked, random: &mut Random) -> Bench<'m> {
     if random.below(2) == 0 {
         bench.app.store_mut().flash_mut().cut_after(random.below(120), random.next());
         for _ in 0..3 {
             bench.send(&any_command(random));
-            let _ = bench.turn();
+            let _ = bench.poll();
         }
     }
     let mut flash = bench.switched_off();
@@ -119,7 +119,7 @@ fn cycle<'m>(mut bench: Bench<'m>, baked: &'m Baked, random: &mut Random) -> Ben
         flash.damage(random.below(4_096), random.next() as u8);
     }
     if random.below(4) == 0 {
-        // And again, while the store settles.
+        // Another one while the store is repaired.
         flash.cut_after(random.below(60), random.next());
         flash = Bench::switched_on(baked, flash).switched_off();
         flash.power_up();
@@ -159,11 +159,11 @@ fn sequence(baked: &Baked, seed: u64) {
     for command in [Command::SetPose(start()), Command::Start] {
         assert_eq!(bench.order(&command), CommandResult::Done, "seed {seed}: {command:?}");
     }
-    let on_time = (0..600).filter(|_| bench.turn().is_on_time).count();
+    let on_time = (0..600).filter(|_| bench.poll().is_on_time).count();
     assert!(on_time >= 1, "seed {seed}: no tick");
     let health = bench.estimate().health;
     assert_eq!(health.verdict, Verdict::Tracking, "seed {seed}: {health:?}");
-    assert!(bench.turn().may_drive, "seed {seed}");
+    assert!(bench.poll().may_drive, "seed {seed}");
 }
 
 #[test]

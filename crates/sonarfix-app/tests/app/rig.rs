@@ -1,4 +1,4 @@
-//! A robot on a bench: an app on devices that do what the test says, with a PC at its link.
+//! A simulated robot: an app on devices that the test controls, with a PC at its link.
 
 use std::collections::VecDeque;
 
@@ -22,7 +22,7 @@ use sonarfix_link::{Command, Receiver, Sender, SessionCommand, Telemetry, baked,
 
 use crate::flash::{SECTOR, SECTORS, SimFlash};
 
-/// A device that is not there.
+/// The error of a device that is missing.
 #[derive(Debug, Clone, Copy)]
 pub struct Missing;
 
@@ -32,7 +32,7 @@ impl pwm::Error for Missing {
     }
 }
 
-/// An encoder at some count, or none.
+/// An encoder at a count; `None` if it cannot be read.
 pub struct Encoder(pub Option<u16>);
 
 impl Counter for Encoder {
@@ -44,7 +44,7 @@ impl Counter for Encoder {
     }
 }
 
-/// A servo's PWM, there or not, and the duty that it was last set to.
+/// A servo's PWM channel, present or missing, and its last duty.
 pub struct Pwm {
     pub is_there: bool,
     pub duty: u16,
@@ -198,32 +198,32 @@ impl<'m> Bench<'m> {
         let (receiver, sender) = (Receiver::new(), Sender::starting_at(1));
         let (line, first) = (Line::default(), Polled::default());
         let mut bench = Self { app, hardware, line, now: 0, first, receiver, sender, session: 0 };
-        bench.first = bench.turn();
+        bench.first = bench.poll();
         bench.open_session();
         bench
     }
 
-    /// Switches it off; the flash keeps what it has.
+    /// Switches the robot off and returns its flash.
     pub fn switched_off(self) -> SimFlash {
         self.app.release().release()
     }
 
-    /// A turn of the loop, a millisecond after the one before.
-    pub fn turn(&mut self) -> Polled {
+    /// Polls the app, a millisecond after the last poll.
+    pub fn poll(&mut self) -> Polled {
         self.now += 1_000;
         self.app.poll(Instant::from_ticks(self.now), &mut self.hardware, &mut self.line)
     }
 
-    /// Lets time go by; gives what was said.
+    /// Polls for a time, and returns the messages received.
     pub fn wait(&mut self, millis: u64) -> Vec<Telemetry> {
         for _ in 0..millis {
-            let _ = self.turn();
+            let _ = self.poll();
         }
-        self.said()
+        self.received()
     }
 
-    /// What was said since it was last asked.
-    pub fn said(&mut self) -> Vec<Telemetry> {
+    /// The messages received since the last call.
+    pub fn received(&mut self) -> Vec<Telemetry> {
         let bytes = std::mem::take(&mut self.line.from_robot);
         let frames = bytes.into_iter().filter_map(|byte| self.receiver.push(byte));
         frames.map(|frame| frame.message).collect()
@@ -255,31 +255,31 @@ impl<'m> Bench<'m> {
         self.line.to_robot.extend(bytes);
     }
 
-    /// Lets the robot read all that is on the line, and forgets what it said.
+    /// Polls until the robot has read the whole line, and discards its messages.
     pub fn drain(&mut self) {
         while !self.line.to_robot.is_empty() {
-            let _ = self.turn();
+            let _ = self.poll();
         }
         self.line.from_robot.clear();
     }
 
-    /// Sends a command, and takes the answer.
+    /// Sends a command, and returns its answer.
     pub fn order(&mut self, command: &Command) -> CommandResult {
         self.send(command);
-        self.turn().answered.expect("a command is answered at once")
+        self.poll().answered.expect("a command is answered at once")
     }
 
-    /// What it knows while it runs.
+    /// The estimate of a running robot.
     pub fn estimate(&self) -> Estimate {
         sonarfix_link::reporter::estimate(self.app.localizer().expect("it runs"))
     }
 }
 
-/// How the loop fares, as said last.
-pub fn fares(said: &[Telemetry]) -> LoopStatus {
-    let found = said.iter().rev().find_map(|told| match told {
-        Telemetry::LoopStatus(told) => Some(*told),
+/// The last loop status among these messages.
+pub fn loop_status(messages: &[Telemetry]) -> LoopStatus {
+    let found = messages.iter().rev().find_map(|message| match message {
+        Telemetry::LoopStatus(status) => Some(*status),
         _ => None,
     });
-    found.expect("it is said once a second")
+    found.expect("no LoopStatus, which is sent once a second")
 }

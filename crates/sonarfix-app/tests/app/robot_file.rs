@@ -1,4 +1,4 @@
-//! A robot file, baked and flashed, is what the loop and its drivers do.
+//! The loop and its drivers follow the baked robot file.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use sonarfix_link::{Command, Telemetry, baked as image};
 use sonarfix_map::robot_file;
 
 use crate::flash::SimFlash;
-use crate::rig::{Baked, Bench, fares};
+use crate::rig::{Baked, Bench, loop_status};
 
 /// A robot file with these values.
 fn file(encoder_period: &str, fix_period: &str, wheel: &str, servo: &str) -> String {
@@ -68,8 +68,8 @@ fn started(baked: &Baked, heading: f32) -> Bench<'_> {
     bench
 }
 
-fn count(said: &[Telemetry], is: impl Fn(&Telemetry) -> bool) -> usize {
-    said.iter().filter(|told| is(told)).count()
+fn count(messages: &[Telemetry], is: impl Fn(&Telemetry) -> bool) -> usize {
+    messages.iter().filter(|message| is(message)).count()
 }
 
 const AROUND: &str = r#""-90 deg", "90 deg""#;
@@ -78,8 +78,8 @@ const AROUND: &str = r#""-90 deg", "90 deg""#;
 fn the_ping_schedule_of_the_robot_file_is_the_loops() {
     for (period, expected) in [("2 s", 5), ("1 s", 10), ("500 ms", 20)] {
         let baked = baked(&file("100 ms", period, "0.2 mm", AROUND));
-        let said = started(&baked, 170.0).wait(10_100);
-        let pings = count(&said, |told| matches!(told, Telemetry::Ping(_)));
+        let messages = started(&baked, 170.0).wait(10_100);
+        let pings = count(&messages, |message| matches!(message, Telemetry::Ping(_)));
         assert!(pings.abs_diff(expected) <= 1, "{period}: {pings} pings in 10 s");
     }
 }
@@ -88,8 +88,8 @@ fn the_ping_schedule_of_the_robot_file_is_the_loops() {
 fn the_encoder_period_of_the_robot_file_is_the_loops() {
     for (period, expected) in [("100 ms", 100), ("50 ms", 200), ("20 ms", 500)] {
         let baked = baked(&file(period, "1 s", "0.2 mm", AROUND));
-        let said = started(&baked, 0.0).wait(10_000);
-        let ticks = count(&said, |told| matches!(told, Telemetry::Estimate(_)));
+        let messages = started(&baked, 0.0).wait(10_000);
+        let ticks = count(&messages, |message| matches!(message, Telemetry::Estimate(_)));
         assert!(ticks.abs_diff(expected) <= 1, "{period}: {ticks} ticks in 10 s");
     }
 }
@@ -115,11 +115,11 @@ fn the_wheels_of_the_robot_file_are_the_loops() {
 fn the_servo_limits_of_the_robot_file_are_the_drivers() {
     let baked = baked(&file("100 ms", "1 s", "0.2 mm", r#""95 deg", "110 deg""#));
     let mut bench = started(&baked, 80.0);
-    let said = bench.wait(10_000);
-    assert_eq!(fares(&said).faults.servo, 0);
-    let bearings: Vec<f32> = said
+    let messages = bench.wait(10_000);
+    assert_eq!(loop_status(&messages).faults.servo, 0);
+    let bearings: Vec<f32> = messages
         .iter()
-        .filter_map(|told| match told {
+        .filter_map(|message| match message {
             Telemetry::Ping(ping) => Some(ping.aim.bearing.0.to_degrees()),
             _ => None,
         })
@@ -138,11 +138,11 @@ fn the_example_of_the_documentation_runs() {
     let (text, _) = rest.split_once("```").unwrap();
     let baked = baked(text);
     // Walls at 100° and −80°, both within the documented limits.
-    let said = started(&baked, 80.0).wait(10_000);
-    let looks = count(&said, |told| matches!(told, Telemetry::Ping(_)));
+    let messages = started(&baked, 80.0).wait(10_000);
+    let pings = count(&messages, |message| matches!(message, Telemetry::Ping(_)));
     // A ping every 200 ms unless servo and ranger take longer.
-    assert!(looks >= 24, "{looks} pings in 10 s");
-    assert_eq!(fares(&said).faults.servo, 0);
+    assert!(pings >= 24, "{pings} pings in 10 s");
+    assert_eq!(loop_status(&messages).faults.servo, 0);
 }
 
 /// The reasons for which a robot refuses a file, at `Start` and when it receives the file.
@@ -156,19 +156,19 @@ fn refusal(text: &str) -> CommandError {
     let mut bench = Bench::switched_on(&baked, SimFlash::new());
     assert_eq!(bench.order(&Command::SetPose(crate::rig::start())), CommandResult::Done);
     let at_start = refused(bench.order(&Command::Start));
-    assert!(!bench.turn().is_running);
+    assert!(!bench.poll().is_running);
 
     let good = Baked::new(&crate::rig::config());
     let mut bench = Bench::switched_on(&good, SimFlash::new());
     assert_eq!(bench.order(&Command::SetPose(crate::rig::start())), CommandResult::Done);
     assert_eq!(refused(bench.order(&Command::SetConfiguration(config))), at_start);
-    // What was refused has changed nothing.
+    // The refused configuration has changed nothing.
     assert_eq!(bench.order(&Command::Start), CommandResult::Done);
     at_start
 }
 
 #[test]
-fn what_the_board_cannot_do_is_refused_at_start_with_its_reason() {
+fn a_configuration_beyond_the_board_is_refused_at_start_with_its_reason() {
     let good = file("100 ms", "1 s", "0.2 mm", AROUND);
     let srf = good.replace("\"hc_sr04\"", "{ kind = \"srf08\", address = 0x70 }");
     assert_eq!(refusal(&srf), CommandError::Unsupported(Unsupported::Ranger));
@@ -195,24 +195,26 @@ fn an_image_of_an_older_version_is_refused_by_its_version() {
     baked.config[4] = 1;
     assert_eq!(image::read(&baked.config), Err(image::BakedError::Version(1)));
     let mut bench = Bench::switched_on(&baked, SimFlash::new());
-    let said = bench.wait(1);
-    let Some(Telemetry::Hello(hello)) = said.first() else { panic!("{said:?}") };
+    let messages = bench.wait(1);
+    let Some(Telemetry::Hello(hello)) = messages.first() else { panic!("{messages:?}") };
     assert_eq!(hello.configuration, ImageStatus::Version(1));
     assert_eq!(bench.order(&Command::Start), CommandResult::Refused(CommandError::NoConfiguration));
 }
 
-/// A configuration that is sent sets the drivers up as well.
+/// A configuration that is sent configures the drivers as well.
 #[test]
-fn a_configuration_that_is_sent_is_what_the_loop_and_its_drivers_do() {
+fn loop_and_drivers_follow_a_configuration_that_is_sent() {
     let before = baked(&file("100 ms", "1 s", "0.2 mm", AROUND));
     let mut bench = started(&before, 80.0);
     bench.wait(1_000);
     let text = file("50 ms", "500 ms", "0.2 mm", r#""95 deg", "110 deg""#);
     let config: RobotConfig = robot_file::parse(&text, "robot.toml").unwrap();
     assert_eq!(bench.order(&Command::SetConfiguration(config)), CommandResult::Done);
-    let _ = bench.said();
-    let said = bench.wait(10_000);
-    assert!(count(&said, |told| matches!(told, Telemetry::Estimate(_))).abs_diff(200) <= 1);
-    assert!(count(&said, |told| matches!(told, Telemetry::Ping(_))).abs_diff(20) <= 1);
+    let _ = bench.received();
+    let messages = bench.wait(10_000);
+    assert!(
+        count(&messages, |message| matches!(message, Telemetry::Estimate(_))).abs_diff(200) <= 1
+    );
+    assert!(count(&messages, |message| matches!(message, Telemetry::Ping(_))).abs_diff(20) <= 1);
     assert!(bench.hardware.servo.release().duty.abs_diff(4_800) < 5);
 }
