@@ -33,7 +33,7 @@ impl Difference {
         let mut apart = observe::state(localizer.filter()) - oracle.x;
         apart[2] = angle::wrap(apart[2]);
         let ours = observe::covariance(localizer.filter()).diagonal().map(f64::sqrt);
-        let theirs = oracle.deviation();
+        let theirs = oracle.standard_deviations();
         for i in (0..7).filter(|&i| theirs[i] > 0.0) {
             self.state = self.state.max((apart[i] / theirs[i]).abs());
             self.deviation = self.deviation.max((ours[i] / theirs[i] - 1.0).abs());

@@ -46,10 +46,10 @@ fn remove_stale_sources(crates: &[Crate]) -> anyhow::Result<()> {
             continue;
         }
         for Crate { name, version, .. } in crates {
-            let stale = registry.path().join(format!("{name}-{version}"));
-            if stale.exists() {
-                std::fs::remove_dir_all(&stale)
-                    .with_context(|| format!("cannot remove {}", stale.display()))?;
+            let unpacked = registry.path().join(format!("{name}-{version}"));
+            if unpacked.exists() {
+                std::fs::remove_dir_all(&unpacked)
+                    .with_context(|| format!("cannot remove {}", unpacked.display()))?;
             }
         }
     }

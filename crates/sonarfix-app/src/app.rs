@@ -212,7 +212,9 @@ impl<'m, F: NorFlash> App<'m, F> {
             Mode::Running(running) => {
                 let is_due = running.poll(now, hardware, &mut self.wire, link, &mut polled);
                 if is_due {
-                    running.save_policy.wrote(now, running.robot.localizer().filter().deviation());
+                    running
+                        .save_policy
+                        .wrote(now, running.robot.localizer().filter().standard_deviations());
                     self.owes_record = true;
                 }
             }
@@ -405,7 +407,7 @@ impl<'m, F: NorFlash> App<'m, F> {
             Mode::Waiting(_) => self.known,
             Mode::Running(running) if running.has_rolled => {
                 let filter = running.robot.localizer().filter();
-                Some(Resumed::interrupted(filter.state(), filter.deviation()))
+                Some(Resumed::interrupted(filter.state(), filter.standard_deviations()))
             }
             Mode::Running(running) => Some(running.origin.interrupted_again()),
         }

@@ -64,7 +64,7 @@ impl WheelConfig {
         Self { travel_per_edge, is_mirrored: false }
     }
 
-    /// The same wheel with an encoder that counts the other way.
+    /// The same wheel with an encoder that counts in the opposite direction.
     #[must_use]
     pub fn mirrored(self) -> Self {
         Self { is_mirrored: !self.is_mirrored, ..self }

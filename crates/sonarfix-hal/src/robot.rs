@@ -231,7 +231,7 @@ impl<'m> Robot<'m> {
         self.poll_with(now, hardware, None)
     }
 
-    /// As [`Self::poll`], with a search: a robot whose pose is unknown sweeps with its sonar and looks for its pose
+    /// As [`Self::poll`], with a search: a robot whose pose is unknown sweeps with its sonar and searches for its pose
     /// ([`Navigator`]). A poll with nothing else to do makes [`Settings::evaluations`] of the search.
     ///
     /// The search must be the same in every call.
@@ -445,7 +445,7 @@ impl<'m> Robot<'m> {
         let reading = self.odometer.read(now, hardware, faults);
         let step = reading.map(|reading| self.advance(now, reading.position, faults, search));
         if step.is_none() {
-            self.navigator.no_odometry(now);
+            self.navigator.odometry_missing(now);
         }
         report.tick =
             Some(Tick { step, lateness: since(now, due.due), held, skipped: due.skipped });

@@ -100,7 +100,7 @@ pub fn estimate(localizer: &Localizer) -> Estimate {
     Estimate {
         at: localizer.time(),
         state: filter.state(),
-        deviation: filter.deviation(),
+        deviation: filter.standard_deviations(),
         health: localizer.health(),
     }
 }

@@ -57,7 +57,7 @@ pub use place::Place;
 pub use robot_text::text as robot_text;
 pub use scenario::{Run, Scenario, Start, Truth};
 pub use simplify::{Limits, Simplified, simplify};
-pub use surroundings::{Obstacle, Outline, Surroundings, Walk};
+pub use surroundings::{Obstacle, Oscillation, Outline, Surroundings};
 pub use survey::{Finding, Flaw, Severity, survey};
 
 /// The text of the reference scenario, with the conditions of the paper.

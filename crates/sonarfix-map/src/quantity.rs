@@ -190,7 +190,7 @@ mod tests {
     }
 
     proptest! {
-        /// Every finite number is read in every unit, with or without a space, whichever way the
+        /// Every finite number is read in every unit, with or without a space, however the
         /// number is written.
         #[test]
         fn any_number_is_read(number in -1e12_f64..1e12, space in " {0,3}") {

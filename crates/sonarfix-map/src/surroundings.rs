@@ -34,7 +34,7 @@ pub enum Outline {
 
 /// A movement back and forth at constant speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Walk {
+pub struct Oscillation {
     /// Displacement from the outline to the turning point, metres.
     pub by: [f64; 2],
     /// Duration in one direction, seconds.
@@ -47,7 +47,7 @@ pub struct Obstacle {
     /// Outline at the start of the run.
     pub outline: Outline,
     /// Movement, if any.
-    pub walk: Option<Walk>,
+    pub walk: Option<Oscillation>,
 }
 
 /// The surroundings of the robot.
@@ -104,12 +104,12 @@ fn outline(table: &Table<'_>, unit: &Unit) -> Result<Outline, FileError> {
     Ok(Outline::Face { from, to })
 }
 
-fn walk(table: &Table<'_>, unit: &Unit) -> Result<Option<Walk>, FileError> {
+fn walk(table: &Table<'_>, unit: &Unit) -> Result<Option<Oscillation>, FileError> {
     let Some(by) = table.get("walk") else {
         return Ok(None);
     };
     let takes_node = table.require("takes")?;
     let takes = takes_node.quantity(&TIME)?;
     let takes = takes_node.check(takes, takes > 0.0, "positive")?;
-    Ok(Some(Walk { by: by.point(unit)?, takes }))
+    Ok(Some(Oscillation { by: by.point(unit)?, takes }))
 }

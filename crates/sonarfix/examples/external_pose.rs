@@ -52,7 +52,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 fn report(when: &str, localizer: &Localizer) {
-    let (state, deviation) = (localizer.filter().state(), localizer.filter().deviation());
+    let (state, deviation) = (localizer.filter().state(), localizer.filter().standard_deviations());
     println!(
         "{when:16}  x {:.3} m ± {:4.1} mm, y {:.3} m ± {:4.1} mm, heading {:5.1}° ± {:.2}°, \
          right wheel {:+.2} % ± {:.2} %",

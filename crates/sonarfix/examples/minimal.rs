@@ -57,7 +57,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         };
         if step % 20 == 0 {
             let pose = localizer.pose();
-            let deviation = localizer.filter().deviation();
+            let deviation = localizer.filter().standard_deviations();
             println!(
                 "{:4.0}   {:.3} m {:.3} m {:6.1}°    {:.3} m {:.3} m {:6.1}°   {:4.1} mm     {outcome}",
                 0.1 * f64::from(step),

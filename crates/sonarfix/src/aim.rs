@@ -239,7 +239,7 @@ impl<'a> Planner<'a> {
     // ===== Eq. (22): score =====
     /// A wall with the servo turned to it.
     fn by_policy(&self, id: WallId, wall: &Wall) -> Option<Candidate> {
-        let (expected, on_wall) = self.view.expect(wall).ok()?;
+        let (expected, on_wall) = self.view.expected_range(wall).ok()?;
         let pointing = self.point(&expected);
         if !self.view.is_square(pointing.off) {
             return None;
@@ -257,7 +257,7 @@ impl<'a> Planner<'a> {
 
     /// A wall along a bearing that the planner does not choose: the nearest is the best.
     fn at_bearing(&self, id: WallId, wall: &Wall, bearing: Radians) -> Option<Candidate> {
-        let (expected, on_wall) = self.view.expect(wall).ok()?;
+        let (expected, on_wall) = self.view.expected_range(wall).ok()?;
         let off = self.view.off_square(&expected, bearing);
         if !self.view.is_square(off) {
             return None;

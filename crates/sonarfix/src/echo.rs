@@ -28,7 +28,7 @@ pub struct EchoParameters {
     pub missed: f32,
     /// Probability of a spurious range that is shorter than the wall's.
     pub short: f32,
-    /// Probability of a spurious range that is longer: by way of two walls, or cross-talk.
+    /// Probability of a spurious range that is longer: a reflection by two walls, or cross-talk.
     pub long: f32,
     /// Range at which every second beam meets an object that is not in the map. Zero: there are no
     /// such objects.
@@ -107,7 +107,7 @@ const MAX_REPETITION: f32 = 50.0;
 
 /// Share of pings without an echo if an unmapped object occludes the wall: it may absorb or deflect.
 const NO_ECHO_OCCLUDED: f32 = 0.2;
-/// Share of echoes from beyond the wall if it is occluded: by way of other walls.
+/// Share of echoes from beyond the wall if it is occluded: reflections by other walls.
 const BEYOND_OCCLUDED: f32 = 0.05;
 /// Share of pings without an echo if the beam is not square to the wall, or its foot not on it.
 const NO_ECHO_OFF_WALL: f32 = 0.4;

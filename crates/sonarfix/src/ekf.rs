@@ -137,7 +137,7 @@ pub(crate) struct PoseUncertainty {
 /// }
 /// assert!((ekf.state().x.0 - 0.4).abs() < 1e-6);
 /// // The scale errors are uncertain by 1 %, so 0.4 m of travel is uncertain by 2.8 mm.
-/// assert!((ekf.deviation().x.0 - 0.0030).abs() < 0.0001);
+/// assert!((ekf.standard_deviations().x.0 - 0.0030).abs() < 0.0001);
 /// # Ok::<(), sonarfix::ekf::EkfError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -214,7 +214,7 @@ impl Ekf {
 
     /// One standard deviation of each state.
     #[must_use]
-    pub fn deviation(&self) -> StandardDeviations {
+    pub fn standard_deviations(&self) -> StandardDeviations {
         self.p().standard_deviations()
     }
 

@@ -106,7 +106,7 @@ pub struct Localizer<'m> {
     history: History,
 }
 
-/// The outcome of a ping, and what it says of the pose.
+/// The outcome of a ping, and its evidence against the pose.
 struct Explained {
     fix: Fix,
     evidence: f32,
@@ -199,10 +199,10 @@ impl<'m> Localizer<'m> {
     /// [3 s](crate::health::LOST_WITHOUT_ODOMETRY);
     /// [`Health::position_deviation`](field@crate::health::Health::position_deviation) grows by the
     /// distance that the wheels may have rolled at their maximum speed.
-    pub fn no_odometry(&mut self, now: Instant) {
+    pub fn odometry_missing(&mut self, now: Instant) {
         let since = |then: Instant| now.checked_duration_since(then).unwrap_or(NO_TIME);
         let (unseen, unrecorded) = (since(self.time), since(self.recorded));
-        let distance = Metres(self.config.max_wheel_speed.0 * seconds(unseen));
+        let distance = odometry::largest_travel(unseen, self.config.max_wheel_speed);
         let (uncertainty, limits) = (self.ekf.pose_uncertainty(), self.limits());
         self.health.record_unseen(unseen, distance, unrecorded, uncertainty, &limits);
         self.recorded = self.recorded.max(now);
@@ -295,7 +295,7 @@ impl<'m> Localizer<'m> {
         let refused = |geometry: Refusal| measured.err().unwrap_or(geometry);
         let wall = self.map.wall(aim.wall).ok_or_else(|| refused(Refusal::UnknownWall))?;
         let view = Viewpoint::new(&self.config, &self.ekf).of_echo();
-        let (expected, on_wall) = view.expect(&wall).map_err(refused)?;
+        let (expected, on_wall) = view.expected_range(&wall).map_err(refused)?;
         let square = view.of_square(&expected, aim.bearing).map_err(refused)?;
         let geometry = on_wall * square;
         let foot = wall.along(view.position);

@@ -62,7 +62,7 @@ pub enum Mode {
     /// The localizer tracks it.
     #[default]
     Tracking,
-    /// It is unknown, and the search looks for it.
+    /// It is unknown, and the search is running.
     Searching,
     /// The localizer tracks the search's answer, which is not confirmed yet.
     Provisional,
@@ -118,7 +118,7 @@ struct Calibration {
 impl Calibration {
     fn of(localizer: &Localizer) -> Self {
         let filter = localizer.filter();
-        Self { state: filter.state(), deviation: filter.deviation() }
+        Self { state: filter.state(), deviation: filter.standard_deviations() }
     }
 
     /// The calibration and its deviations as those of a localizer whose pose is unknown.
@@ -239,9 +239,9 @@ impl<'m> Navigator<'m> {
         }
     }
 
-    /// As [`Localizer::no_odometry`].
-    pub fn no_odometry(&mut self, now: Instant) {
-        self.localizer.no_odometry(now);
+    /// As [`Localizer::odometry_missing`].
+    pub fn odometry_missing(&mut self, now: Instant) {
+        self.localizer.odometry_missing(now);
     }
 
     /// As [`Localizer::aim`], while the mode is not [`Mode::Searching`].

@@ -34,6 +34,11 @@ impl core::fmt::Display for OdometryError {
 
 impl core::error::Error for OdometryError {}
 
+/// The distance that a wheel may have rolled in this time.
+pub(crate) fn largest_travel(elapsed: Duration, max_wheel_speed: MetresPerSecond) -> Metres {
+    Metres(max_wheel_speed.0 * seconds(elapsed))
+}
+
 /// The time since `last`, if the travel is plausible.
 ///
 /// # Errors
@@ -53,7 +58,7 @@ pub(crate) fn check(
     if elapsed.is_zero() && fastest > Metres(0.0) {
         return Err(OdometryError::NoTimePassed);
     }
-    if fastest.0 > max_wheel_speed.0 * seconds(elapsed) {
+    if fastest > largest_travel(elapsed, max_wheel_speed) {
         return Err(OdometryError::TooFast);
     }
     Ok(elapsed)

@@ -26,7 +26,7 @@ pub enum Fix {
 impl Fix {
     /// The innovation of a range that has corrected the estimate, otherwise `None`.
     #[must_use]
-    pub fn taken(&self) -> Option<Innovation> {
+    pub fn innovation_used(&self) -> Option<Innovation> {
         match *self {
             Self::Accepted(innovation) | Self::Downweighted(innovation) => Some(innovation),
             Self::Gated(_) | Self::Refused(_) => None,

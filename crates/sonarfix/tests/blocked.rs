@@ -76,7 +76,7 @@ fn another_wall_follows_a_gated_one_with_every_policy() {
 
 #[test]
 fn the_occlusion_of_a_wall_halves_within_a_quarter_of_a_metre() {
-    // One wall, along the robot's way.
+    // One wall, parallel to the path.
     let walls = &room()[..1];
     let mut stays = localizer(walls, 0.001);
     let first = stays.aim().unwrap();
@@ -150,7 +150,7 @@ fn an_uncertain_heading_recovers() {
         let true_range = [1.2, 4.0 - x, 1.8, x][aim.wall.0 as usize];
         let _ = localizer.fix(&aim, Some(Metres(true_range)));
     }
-    let deviation = localizer.filter().deviation().heading;
+    let deviation = localizer.filter().standard_deviations().heading;
     assert!(deviation < Radians(0.06), "{deviation:?}");
     assert!(localizer.pose().heading.radians().abs() < Radians(0.1));
     assert_ne!(localizer.health().verdict, Verdict::Lost);

@@ -103,7 +103,7 @@ fn note(Measured { summary: s, cpu_seconds }: &Measured) -> String {
     let runs = f64::from(u32::try_from(s.runs).unwrap_or(u32::MAX));
     format!(
         "{} runs, {:.0} % sampling error on a deviation; NEES/{} {:.3}, NIS {:.3}; \
-         along the way RMS x {:.1} mm, y {:.1} mm, heading {:.2}°; \
+         RMS along the path x {:.1} mm, y {:.1} mm, heading {:.2}°; \
          ranges accepted {}, gated {}, refused {}; runs lost {}; {cpu_seconds:.2} s of CPU time",
         s.runs,
         100.0 / (2.0 * (runs - 1.0).max(1.0)).sqrt(),

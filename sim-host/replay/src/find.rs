@@ -80,7 +80,7 @@ pub struct Found {
     pub lines_skipped: u64,
 }
 
-/// A search under way.
+/// A search in progress.
 struct Run<'a> {
     search: Search<'a>,
     track_width: f64,

@@ -4,7 +4,7 @@
 //! A range belongs to the instant of the measurement, between two encoder records. It therefore
 //! waits for the next encoder record. The travel between the two records is then interpolated
 //! linearly in time: the localizer receives the travel up to the range, the range, and the remaining
-//! travel. Rows of the reference are compared in the same way, each at its own time. Nothing else is
+//! travel. Rows of the reference are compared likewise, each at its own time. Nothing else is
 //! held, so memory does not grow with the log.
 //!
 //! From a scan, the replay simulates a rotating sonar: whenever a range is due, the localizer chooses

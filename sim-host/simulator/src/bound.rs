@@ -35,8 +35,8 @@ impl Bound {
 
     /// The bound on each state's standard deviation.
     #[must_use]
-    pub fn deviation(&self) -> Vector {
-        self.filter.deviation()
+    pub fn standard_deviations(&self) -> Vector {
+        self.filter.standard_deviations()
     }
 
     /// The bound on each state's variance.

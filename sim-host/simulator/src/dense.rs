@@ -192,7 +192,7 @@ impl DenseFilter {
 
     /// One standard deviation of each state.
     #[must_use]
-    pub fn deviation(&self) -> Vector {
+    pub fn standard_deviations(&self) -> Vector {
         self.p.diagonal().map(f64::sqrt)
     }
 }

@@ -62,7 +62,7 @@ second of a robot with ten encoder samples and one ping per second.
   does in software. With sine and cosine as arguments (continued to first order, which gives the same derivatives) the cost of the
   differentiation remains.
 - A plain or symmetrised form costs less than Joseph's, and its variances become negative with a wide prior and a
-  precise range. The rows are not equivalent; the column *form* tells them apart.
+  precise range. The rows are not equivalent; they are distinguished by the column *form*.
 - The column *÷ kernel* shows for which peers the cost is more than six times that of the kernel. minikalman over arrays is the closest.
 - numeris links an allocator and does not use it here.
 

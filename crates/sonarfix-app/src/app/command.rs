@@ -234,7 +234,7 @@ impl<'m, F: NorFlash> App<'m, F> {
     fn where_it_is(&self, known: Resumed) -> Resumed {
         let Some(localizer) = self.localizer() else { return known };
         let filter = localizer.filter();
-        let here = Resumed::interrupted(filter.state(), filter.deviation());
+        let here = Resumed::interrupted(filter.state(), filter.standard_deviations());
         Resumed { is_pose_interrupted: false, ..here.calibrated_as(&known) }
     }
 

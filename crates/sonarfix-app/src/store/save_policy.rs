@@ -51,7 +51,7 @@ impl SavePolicy {
         localizer.health().verdict == Verdict::Tracking
             && since(now, self.still_since) >= PAUSE
             && since(now, self.at) >= APART
-            && is_better(&localizer.filter().deviation(), &self.written)
+            && is_better(&localizer.filter().standard_deviations(), &self.written)
     }
 
     /// Records that these deviations have been written, or that the write has failed.

@@ -123,7 +123,7 @@ fn a_new_pose_costs_no_calibration() {
     assert_eq!(p.fixed_view::<4, 4>(3, 3), q.fixed_view::<4, 4>(3, 3));
     assert_eq!(before.state().to_array()[3..], after.state().to_array()[3..]);
     assert_eq!(after.state().x, Metres(2.0));
-    assert!((after.deviation().x.0 - 0.02).abs() < 1e-6);
+    assert!((after.standard_deviations().x.0 - 0.02).abs() < 1e-6);
     let crossed = q.fixed_view::<3, 4>(0, 3);
     assert!(crossed.iter().all(|covariance| covariance.abs() <= 0.0), "{crossed}");
 }

@@ -143,7 +143,7 @@ fn sequence(baked: &Baked, seed: u64) {
         }
         pass(&mut bench, &mut random);
         if let Some(localizer) = bench.app.localizer() {
-            let deviation = localizer.filter().deviation();
+            let deviation = localizer.filter().standard_deviations();
             let prior = localizer.config().prior;
             assert!(is_within_prior(&deviation, &prior), "seed {seed}: {deviation:?}");
         }

@@ -33,7 +33,7 @@ fn what_is_better_by_a_fifth_is_written_in_a_pause_a_minute_later() {
     save_policy.rolled(at(60));
     assert!(!save_policy.is_due(at(61), &localizer), "it has just rolled");
     assert!(save_policy.is_due(at(62), &localizer));
-    save_policy.wrote(at(62), localizer.filter().deviation());
+    save_policy.wrote(at(62), localizer.filter().standard_deviations());
     assert!(!save_policy.is_due(at(1_000), &localizer), "it has learned nothing since");
 }
 

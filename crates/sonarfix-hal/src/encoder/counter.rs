@@ -93,7 +93,7 @@ impl Unwrapped {
     }
 }
 
-/// `to − from` of a counter `bits` wide: the shorter way round.
+/// `to − from` of a counter with `bits` bits, modulo its range: the difference of the smallest magnitude.
 fn difference(to: u32, from: u32, bits: u32) -> i32 {
     let spare = 32_u32.saturating_sub(bits).min(31);
     // Shifted up, the counter's highest bit is the sign, and the shift back extends it.
@@ -143,7 +143,7 @@ mod tests {
             start: u32,
             mut steps in prop::collection::vec(-256_i64..=256, 1..60),
         ) {
-            // Five long steps the same way wrap every counter, whatever came before.
+            // Five long steps in the same direction overflow every counter, whatever came before.
             steps.extend([256; 5]);
             prop_assert!(follow::<4>(start, &steps)? > 0);
             prop_assert!(follow::<8>(start, &steps)? > 0);

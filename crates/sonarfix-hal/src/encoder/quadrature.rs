@@ -3,7 +3,7 @@
 //! ```text
 //!       ┌───┐   ┌───┐          forwards: A leads B; (A, B) goes 00 → 10 → 11 → 01 → 00,
 //!   A ──┘   └───┘   └──        and the count up at every step;
-//!         ┌───┐   ┌───┐        backwards: the other way round, and the count down;
+//!         ┌───┐   ┌───┐        backwards: in reverse order, and the count down;
 //!   B ────┘   └───┘   └        both at once: illegal, an edge was missed.
 //! ```
 

@@ -28,7 +28,7 @@ impl Echo {
         Self { sent, heard: after(sent, flight), range: air.range(flight) }
     }
 
-    /// The instant of the reflection: half-way through the flight. The range belongs to it (`docs/hardware.md`).
+    /// The instant of the reflection: the middle of the flight. The range belongs to it (`docs/hardware.md`).
     ///
     /// ```
     /// use sonarfix::units::{Duration, Instant};

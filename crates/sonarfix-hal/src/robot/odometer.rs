@@ -26,7 +26,7 @@ pub(super) struct Reading {
 
 impl Reading {
     /// The position at a time between this reading and a later one at constant speed, rounded to half an edge.
-    /// Half-way between two readings it is exactly their mean.
+    /// In the middle between two readings it is exactly their mean.
     pub fn between(&self, later: &Self, at: Instant) -> Position {
         let whole = since(later.at, self.at).ticks();
         let part = since(at, self.at).ticks().min(whole);
@@ -132,7 +132,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Half-way between two readings is exactly their mean.
+        /// The middle between two readings is exactly their mean.
         #[test]
         fn the_midpoint_is_the_mean(
             from in -1_000_000_000_i64..1_000_000_000,

@@ -58,7 +58,7 @@ pub struct Step {
 pub enum StepResult {
     /// Accepted.
     Accepted,
-    /// Refused for a reason in the loop and not in the wheels: a whole edge in so short a time looks too
+    /// Refused for a reason in the loop and not in the wheels: a whole edge in so short a time appears too
     /// fast. The travel is part of the next step. A range that ended the step was fused with the pose
     /// before it.
     Deferred(OdometryError),

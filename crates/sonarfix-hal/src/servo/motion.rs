@@ -81,10 +81,10 @@ mod tests {
     fn a_turn_waits_a_frame_slews_and_settles() {
         let mut motion = Motion::unknown(ServoTiming::SG90);
         assert_eq!(motion.bearing(at(0)), None);
-        // From nobody knows where: 1.5 + 1.047 rad at worst, 292 ms.
+        // From an unknown bearing: 1.5 + 1.047 rad at worst, 292 ms.
         motion.start(at(0), Radians::from_degrees(60.0), LIMITS);
         assert!(about(motion.settles_at(), 20 + 292 + 60), "{motion:?}");
-        // From 60° to 0°: 120 ms, half-way after 20 + 60.
+        // From 60° to 0°: 120 ms, 30° after 20 + 60.
         motion.start(at(1_000), Radians(0.0), LIMITS);
         assert_eq!(motion.bearing(at(1_010)), Some(Radians::from_degrees(60.0)));
         let half = motion.bearing(at(1_080)).unwrap();
@@ -98,7 +98,7 @@ mod tests {
         let mut motion = Motion::unknown(ServoTiming::SG90);
         motion.start(at(0), Radians::from_degrees(60.0), LIMITS);
         motion.start(at(1_000), Radians(0.0), LIMITS);
-        // Half-way back is 30° to go: 60 ms.
+        // Back from there are 30°: 60 ms.
         motion.start(at(1_080), Radians::from_degrees(60.0), LIMITS);
         assert!(about(motion.settles_at(), 1_080 + 20 + 60 + 60), "{motion:?}");
     }

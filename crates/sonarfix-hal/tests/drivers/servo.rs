@@ -59,7 +59,7 @@ fn the_same_duty_is_set_once_and_does_not_unsettle() {
     let mut servo = servo(&pwm);
     servo.point(at(0), Radians(0.0)).unwrap();
     let settles_at = servo.settles_at();
-    // Eight bits make steps of 7.8°: the target says where it really goes.
+    // Eight bits make steps of 7.8°: the target is the bearing that is really reached.
     assert!((servo.target().unwrap() - Radians::from_degrees(-0.98)).abs() < Radians(0.001));
     servo.point(at(900_000), Radians::from_degrees(2.0)).unwrap();
     assert_eq!(servo.settles_at(), settles_at);
@@ -115,9 +115,9 @@ fn what_is_no_servo_is_refused() {
     assert_eq!(new(degrees(80.0), frameless), Err(SettingError::Pulse));
 }
 
-/// A board says what its channel makes of a pulse, and the driver keeps to it.
+/// Settings beyond the limits of the board's PWM channel are refused.
 #[test]
-fn what_a_channel_cannot_do_is_refused_and_changes_nothing() {
+fn settings_beyond_the_channel_are_refused_and_change_nothing() {
     let hobby = PwmFrame { period: span(20_000), shortest: span(500), longest: span(2_500) };
     let mut servo = Servo::new(Pwm { counts: 40_000 }, hobby);
     assert_eq!(servo.point(at(0), Radians(0.0)), Err(PointError::NotConfigured));
@@ -136,8 +136,8 @@ fn what_a_channel_cannot_do_is_refused_and_changes_nothing() {
 }
 
 proptest! {
-    /// Whatever the timer's resolution, the servo is sent to within half a count of where it was
-    /// told, and settles no earlier than its timing allows from where it was.
+    /// At any resolution of the timer the target is within half a count of the commanded bearing, and the servo settles
+    /// no earlier than its timing allows from its last position.
     #[test]
     fn any_bearing_is_met_within_half_a_count(
         counts in 1_000_u16..=u16::MAX,

@@ -17,7 +17,7 @@ const SLOW: Drive = Drive { speed: 0.1, sway: 0.0 };
 
 const SCHEDULE: PingSchedule = PingSchedule::Every(Duration::from_ticks(500_000));
 
-/// Runs for 3.4 s, with a look every half second, two of which (1.5 and 2 s) this is broken.
+/// Runs for 3.4 s with a ping every half second; two of them (1.5 and 2 s) meet this fault.
 fn three_seconds(broken: Broken) -> (Vec<(u64, Report)>, Faults, World) {
     let walls = walls();
     let world = World::new(SLOW, TICK, 0);
@@ -105,7 +105,7 @@ fn a_counter_that_jumps_is_written_off_once() {
 fn a_servo_that_does_not_obey_is_used_where_it_is() {
     let walls = walls();
     let world = World::new(SLOW, TICK, 0);
-    // The aim wanders from wall to wall, so the servo is sent somewhere again and again.
+    // The aim alternates between walls, so the servo moves repeatedly.
     let mut robot = robot(&walls, TICK, SCHEDULE, Settings::default());
     let mut pins = pins(&world, ServoTiming::SG90);
     let mut reports = run(&world, &mut robot, &mut pins, millis(0, 1_001));
@@ -113,7 +113,7 @@ fn a_servo_that_does_not_obey_is_used_where_it_is() {
     reports.extend(run(&world, &mut robot, &mut pins, millis(1_001, 6_001)));
     assert!(robot.faults().servo > 0, "{:?}", robot.faults());
     assert_eq!(world.duties.borrow().iter().filter(|&&(time, _)| time > 1_000_000).count(), 0);
-    // It still looks at a wall squarely, and that wall is the one it is taken for.
+    // The beam is still square to a wall, and the ranges are assigned to that wall.
     assert!(accepted_after(&reports, 1_001_000) >= 8, "{:?}", fixes(&reports));
 }
 

@@ -1,4 +1,4 @@
-//! What holds however polls are spread.
+//! Properties for arbitrary times of polls.
 
 use proptest::prelude::*;
 use sonarfix::config::PingSchedule;
@@ -27,7 +27,7 @@ fn any_drive() -> impl Strategy<Value = Drive> {
     (speed, 0.0_f64..0.04).prop_map(|(speed, sway)| Drive { speed, sway })
 }
 
-/// Times of polls, µs; told by their number, for there are hundreds.
+/// Times of polls, µs. `Debug` prints only their number, because there are hundreds.
 #[derive(Clone)]
 struct Polls(Vec<u64>);
 
@@ -37,8 +37,8 @@ impl core::fmt::Debug for Polls {
     }
 }
 
-/// Times of polls for about 4 s: mostly quick ones, some late, some very late; and in the end the
-/// quick ones that let everything come to its end.
+/// Times of polls for about 4 s: mostly quick ones, some late, some very late; at the end quick ones, which complete
+/// the pending ping.
 fn any_polls() -> impl Strategy<Value = Polls> {
     let step = prop_oneof![
         8 => 20_u64..3_000,
@@ -54,7 +54,7 @@ fn any_polls() -> impl Strategy<Value = Polls> {
         let mut times: Vec<_> = times.take_while(|&time| time < 3_000_000).collect();
         let last = times.last().map_or(0, |&time| time);
         times.insert(0, 0);
-        // Two very late ones in a row: if the first finds a ping to begin with, the second cannot.
+        // Two very late ones in a row: if the first starts a ping, the second cannot start another.
         let last = last + 480_000;
         times.extend([last - 240_000, last]);
         times.extend((1..400).map(|step| last + 1_000 * step));
@@ -63,8 +63,8 @@ fn any_polls() -> impl Strategy<Value = Polls> {
 }
 
 proptest! {
-    /// The travel told to the localizer is what the counters counted: no tick lost, none twice,
-    /// through their wrap-around, with echoes and without, however the polls jitter.
+    /// The localizer's travel equals the counts: no tick is lost or counted twice, across counter overflow, with and
+    /// without echoes, with any jitter of the polls.
     #[test]
     fn travel_is_conserved(
         drive in any_drive(),
@@ -87,7 +87,7 @@ proptest! {
         let heard = reports.iter().filter_map(|(_, report)| report.ping_result);
         let echoes = heard.filter(|heard| heard.outcome.is_ok() != deaf).count();
         prop_assert!(echoes >= 2, "{echoes} pings came to an end");
-        // To the end of a tick, which is when the ledger is square. Between polls nothing is due.
+        // Up to the end of a tick, when all counts have been passed on.
         let last = reports.iter().rposition(|(_, report)| report.tick.is_some()).unwrap();
         reports.truncate(last + 1);
         let counted = world.ticks(reports[last].0) - world.ticks(first);
@@ -96,8 +96,8 @@ proptest! {
         prop_assert!(counted != 0, "the robot has moved");
     }
 
-    /// Every range meets the filter at the instant of its reflection, with the wheels where they
-    /// were then; and so the range agrees with the map.
+    /// Every range is used at the instant of its reflection, with the wheel travel at that instant, so that the range
+    /// agrees with the map.
     #[test]
     fn echoes_meet_the_filter_at_their_reflection(drive in any_drive(), polls in any_polls()) {
         let walls = walls();
@@ -111,7 +111,7 @@ proptest! {
             Some((index, report.ping_result.filter(|heard| heard.outcome.is_ok())?))
         }).collect();
         prop_assert!(heard.len() >= 3);
-        // The last burst's echo may still be on its way.
+        // The last echo may still be in flight.
         prop_assert!(flights.len() - heard.len() <= 1);
         for ((index, heard), (sent, back)) in heard.into_iter().zip(flights) {
             let reflected = sent.midpoint(back);
@@ -121,21 +121,21 @@ proptest! {
             if step.result != StepResult::Accepted {
                 continue;
             }
-            // All up to this step, but not the tick that may follow in the same poll.
+            // Everything up to this step, without the tick that may follow in the same poll.
             let mut upto = reports[..=index].to_vec();
             upto[index].1.tick = None;
-            let (told, _) = accounts(&upto);
+            let (travel, _) = accounts(&upto);
             let truth = world.x(reflected) - world.x(polls.0[0]);
-            // A tick at either end, and what the sway bends between the two readings.
+            // A tick at either end, and the curvature of the sway between the two readings.
             let pinged = reports[..index].iter().rfind(|(_, report)| report.pinged.is_some());
             let gap = (reports[index].0 - pinged.unwrap().0) as f64 * 1e-6;
             let bend = 9.0 * drive.sway * gap * gap / 8.0;
-            let close = (told - truth).abs() < 2.0 * f64::from(TICK) + bend;
-            prop_assert!(close, "told {told}, true {truth}");
+            let close = (travel - truth).abs() < 2.0 * f64::from(TICK) + bend;
+            prop_assert!(close, "travel {travel}, true {truth}");
         }
     }
 
-    /// No ping before the servo has settled, by what the PWM channel saw and the timing alone.
+    /// No ping before the servo has settled, computed from the PWM duties and the timing alone.
     #[test]
     fn no_ping_before_the_servo_has_settled(drive in any_drive(), polls in any_polls()) {
         let walls = walls();

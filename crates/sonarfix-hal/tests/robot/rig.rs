@@ -102,7 +102,7 @@ impl World {
         (self.x(micros) / self.tick).floor() as i64 - (self.x(0) / self.tick).floor() as i64
     }
 
-    /// Lets time go on, and every edge on the way reach the interrupt.
+    /// Advances the time, and passes every edge until then to the interrupt.
     pub fn advance(&self, to: u64) {
         self.now.set(to);
         while let Some((time, high)) = self.next_edge(to) {
@@ -144,7 +144,7 @@ impl World {
         (width - 1_500.0) / 10.0
     }
 
-    /// Flight to the wall at which the servo looks and back, µs: the range is that at the
+    /// Time of flight to the wall in the direction of the servo and back, µs: the range is that at the
     /// reflection.
     fn flight(&self, sent: u64, duty: u16) -> u64 {
         let degrees = self.degrees(duty);

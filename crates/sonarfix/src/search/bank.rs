@@ -83,9 +83,9 @@ impl<const HYPOTHESES: usize> Bank<HYPOTHESES> {
 
     /// An entry that was not refined since; it stays in the bank until its trial ends.
     pub fn next_stale(&mut self) -> Option<Entry> {
-        let stale = self.entries.iter_mut().find(|entry| entry.state == State::Stale)?;
-        stale.state = State::InTrial;
-        Some(*stale)
+        let entry = self.entries.iter_mut().find(|entry| entry.state == State::Stale)?;
+        entry.state = State::InTrial;
+        Some(*entry)
     }
 
     /// Removes the entry in trial, if there is one.

@@ -8,7 +8,7 @@ use super::window::Ping;
 use crate::trig::sin_cos;
 use crate::units::Radians;
 
-/// Longest step that is taken, metres and radians: beyond it the linearisation says nothing.
+/// Longest step that is taken, metres and radians: beyond it the linearization is invalid.
 const LONGEST_STEP: f32 = 0.6;
 const WIDEST_TURN: f32 = 0.35;
 /// Damping: the step is expected within these deviations, metres and radians.

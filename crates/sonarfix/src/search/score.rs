@@ -346,9 +346,9 @@ impl View {
     /// Distance at which the axis meets the wall.
     fn hit(&self) -> Option<f32> {
         let approach = self.axis.dot(self.tangent.left());
-        let way = self.ahead / approach;
-        let along = self.along + way * self.axis.dot(self.tangent);
-        (way > 0.0 && along >= 0.0 && along <= self.length).then_some(way)
+        let distance = self.ahead / approach;
+        let along = self.along + distance * self.axis.dot(self.tangent);
+        (distance > 0.0 && along >= 0.0 && along <= self.length).then_some(distance)
     }
 
     /// Both ends, each with the direction of the wall from there.

@@ -40,8 +40,8 @@ pub(super) struct Trial {
     least: f32,
     equations: Equations,
     streak: u16,
-    /// Whether the placement becomes an answer: what was measured long ago then says less of where
-    /// the robot is now.
+    /// Whether the placement becomes an answer. Old pings then have a lower weight, because the pose now is
+    /// required.
     pub is_answer: bool,
 }
 

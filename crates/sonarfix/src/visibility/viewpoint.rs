@@ -103,7 +103,7 @@ impl<'a> Viewpoint<'a> {
     ///
     /// # Errors
     /// [`Refusal::FootOffWall`] or [`Refusal::OutOfRange`] if that is too improbable.
-    pub fn expect(&self, wall: &Wall) -> Result<(ExpectedRange, f32), Refusal> {
+    pub fn expected_range(&self, wall: &Wall) -> Result<(ExpectedRange, f32), Refusal> {
         let along = wall.along(self.position).0;
         let sigma = libm::sqrtf(self.variance(wall.b(), -wall.a())) + FOOT_MARGIN;
         let on_wall = probability_between(-along / sigma, (wall.length().0 - along) / sigma);

@@ -31,7 +31,7 @@ struct Margins {
 impl Margins {
     fn safe(config: &Config, localizer: &Localizer) -> Self {
         let confidence = f64::from(config.gating.confidence);
-        let heading = f64::from(localizer.filter().deviation().heading.0);
+        let heading = f64::from(localizer.filter().standard_deviations().heading.0);
         let cone = f64::from(config.sonar.cone.0) + (confidence * heading).min(0.3);
         Self { least: 0.7, confidence, cone }
     }

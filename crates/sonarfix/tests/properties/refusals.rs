@@ -221,7 +221,7 @@ proptest! {
         prop_assert_eq!(changed.inflate_pose(Metres(f32::MAX), Radians(heading)), Err(EkfError::VarianceTooLarge));
         prop_assert_eq!(bits(&changed), bits(&ekf));
         prop_assert_eq!(changed.inflate_pose(Metres(position), Radians(heading)), Ok(()));
-        let (before, after) = (ekf.deviation(), changed.deviation());
+        let (before, after) = (ekf.standard_deviations(), changed.standard_deviations());
         prop_assert!((after.x.0 - before.x.0.hypot(position)).abs() < 1e-5 * after.x.0);
         prop_assert!((after.y.0 - before.y.0.hypot(position)).abs() < 1e-5 * after.y.0);
         prop_assert!((after.heading.0 - before.heading.0.hypot(heading)).abs() < 1e-5 * after.heading.0);

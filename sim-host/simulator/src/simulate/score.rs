@@ -36,7 +36,7 @@ impl<'a> Score<'a> {
     ) -> Result<Self, SimulationError> {
         let model = simulation.model;
         let localizer = simulation.localizer(start, Instant::from_ticks(0))?;
-        let deviation = localizer.filter().deviation();
+        let deviation = localizer.filter().standard_deviations();
         let deviation = Vector::from(deviation.to_array().map(f64::from));
         let start = observe::estimate(&localizer).pose;
         Ok(Self {
@@ -112,7 +112,7 @@ impl<'a> Score<'a> {
             time,
             truth: Some(plant.truth()),
             estimate: observe::estimate(localizer),
-            bound: Some(self.bound.deviation().into()),
+            bound: Some(self.bound.standard_deviations().into()),
             odometry: self.odometry.pose(),
         });
     }

@@ -1,6 +1,6 @@
 //! Obstacles that no map has, standing or walking.
 
-use sonarfix_map::Walk;
+use sonarfix_map::Oscillation;
 
 use super::segment::{Point, Segment, distance};
 
@@ -24,11 +24,11 @@ pub struct Obstacle {
     /// Its outline at time zero.
     pub outline: Outline,
     /// Its motion; `None` if it stands.
-    pub walk: Option<Walk>,
+    pub walk: Option<Oscillation>,
 }
 
 /// The displacement of a walk at a time, metres.
-fn shift(walk: Walk, time: f64) -> [f64; 2] {
+fn shift(walk: Oscillation, time: f64) -> [f64; 2] {
     let lap = (time / walk.takes).rem_euclid(2.0);
     let share = if lap <= 1.0 { lap } else { 2.0 - lap };
     walk.by.map(|component| share * component)
@@ -90,7 +90,7 @@ mod tests {
     #[test]
     fn a_walker_goes_there_and_back() {
         let outline = Outline::Circle { centre: [1.0, 0.0], radius: 0.2 };
-        let walk = Some(Walk { by: [0.0, 2.0], takes: 4.0 });
+        let walk = Some(Oscillation { by: [0.0, 2.0], takes: 4.0 });
         let obstacle = Obstacle { outline, walk };
         for (time, y) in
             [(0.0, 0.0), (1.0, 0.5), (4.0, 2.0), (5.0, 1.5), (6.0, 1.0), (8.0, 0.0), (9.0, 0.5)]

@@ -43,7 +43,7 @@ extern "C" fn probe_aim(robot: &mut Robot, _: &()) {
 extern "C" fn probe_fix(robot: &mut Robot, range: &Metres) {
     if let Some(aim) = robot.aim {
         let fix = robot.localizer.fix(&aim, Some(*range));
-        robot.all_well &= fix.taken().is_some();
+        robot.all_well &= fix.innovation_used().is_some();
     }
 }
 
@@ -100,5 +100,5 @@ fn link_the_rest(localizer: &mut Localizer) {
     let _ = black_box(localizer.config().check());
     black_box(localizer.filter().state_vector());
     black_box(localizer.filter().covariance());
-    black_box(localizer.filter().deviation());
+    black_box(localizer.filter().standard_deviations());
 }
