@@ -81,7 +81,7 @@ pub struct RunResult {
     pub nees: f64,
     /// Number of states in the NEES.
     pub estimated_states: usize,
-    /// NIS of the accepted ranges.
+    /// NIS of the ranges with the outcome `Accepted`, without the down-weighted ones.
     pub nis: NisSum,
     /// Errors along the path.
     pub path: PathSum,
@@ -151,7 +151,8 @@ pub struct Summary {
     pub nees_mean: f64,
     /// Number of states in the NEES.
     pub nees_states: usize,
-    /// Mean of ν²/S over the accepted ranges: 1 for a consistent filter with a wide gate.
+    /// Mean of ν²/S over the ranges with the outcome `Accepted`: 1 for a consistent filter, and a few
+    /// per cent less where the association rejects the tail of the distribution.
     pub nis_mean: f64,
     /// Outcomes of the measurement cycles of all runs.
     pub fixes: FixCounts,

@@ -78,7 +78,10 @@ impl<'a> Score<'a> {
         match fix {
             Fix::Accepted(innovation) | Fix::Downweighted(innovation) => {
                 counts.accepted += 1;
-                self.nis.add(innovation.nis().into());
+                // A down-weighted range is probably not the wall's: ν²/S is not its statistic.
+                if matches!(fix, Fix::Accepted(_)) {
+                    self.nis.add(innovation.nis().into());
+                }
                 let wall = usize::try_from(aim.wall.0).ok();
                 if let Some(line) = wall.and_then(|wall| self.simulation.lines.get(wall)) {
                     self.bound.fixed(line);
