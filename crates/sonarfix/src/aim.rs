@@ -223,7 +223,7 @@ impl<'a> Planner<'a> {
     ) -> ([Option<Ranked>; SHORTLIST], u16) {
         let mut shortlist = [None; SHORTLIST];
         let mut count = 0_u16;
-        for (wall, segment) in self.map.near(self.view.position, self.config.sonar.max_range) {
+        for (wall, segment) in self.map.near(self.view.position(), self.config.sonar.max_range) {
             let Some(candidate) = candidate(wall, &segment) else {
                 continue;
             };
@@ -277,16 +277,18 @@ impl<'a> Planner<'a> {
     ) -> Candidate {
         let range = expected.range;
         let echo = &self.config.echo;
-        let map_variance = echo.map_variance(self.history.travelled_since(id));
+        let foot = wall.along(self.view.position());
+        let entry = self.history.entry(echo, id, foot, range, self.now);
+        let map_variance = echo.map_variance(entry.travelled);
         let noise = SquareMetres(self.config.sonar.noise.variance(range).0 + map_variance);
         let prediction = self.ekf.predict_measurement(&expected);
         let wheels = self.ekf.cross_covariance_of_wheels(&expected);
-        let foot = wall.along(self.view.position);
-        let occlusion = self.history.occlusion(echo, id, foot, range, self.now);
         Candidate {
             bearing: pointing.bearing,
             gain: expected_gain(&prediction, wheels, noise, self.config.weights),
-            success: (1.0 - occlusion) * on_wall * self.view.probability_of_square(pointing.off),
+            success: (1.0 - entry.occlusion)
+                * on_wall
+                * self.view.probability_of_square(pointing.off),
             seconds: self.duration.ping(pointing.until_ping, range),
             score: 0.0,
             expected,
@@ -337,7 +339,7 @@ impl<'a> Planner<'a> {
     fn is_occluded(&self, target: WallId, candidate: &Candidate) -> bool {
         let beam = Beam::new(&self.view, &candidate.expected);
         self.map
-            .near(self.view.position, beam.reach())
+            .near(self.view.position(), beam.reach())
             .any(|(id, wall)| id != target && beam.is_occluded_by(&wall))
     }
 }

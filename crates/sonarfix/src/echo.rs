@@ -16,6 +16,7 @@
 //! the measured range is finite. The density of clutter is positive, so that no quotient is 0/0; if
 //! all clutter is configured away and the echo is too far off to be the wall's, it is not used.
 
+use crate::elementary::{exp, inverse_sqrt, ln, sqrt};
 use crate::units::{Metres, SquareMetres};
 
 /// Parameters of clutter: of the sensor, of the unmapped objects around it, and of the map.
@@ -89,7 +90,7 @@ impl EchoParameters {
         let least = 2.0 * MAP_CORRELATION.0 / MAX_REPETITION;
         let distance = if travelled.0 > least { travelled.0 } else { least };
         let ratio = 2.0 * MAP_CORRELATION.0 / distance;
-        variance * libm::sqrtf(1.0 + ratio * ratio)
+        variance * sqrt(1.0 + ratio * ratio)
     }
 }
 
@@ -175,15 +176,16 @@ impl ExpectedEcho {
             return Explanation { association: 0.0, occluded: o, evidence: MAX_EVIDENCE };
         }
         let ratio = AGREEMENT_WRONG_POSE + (1.0 - AGREEMENT_WRONG_POSE) * (d.wrong_pose / total);
-        let evidence = if ratio < MAX_RATIO { libm::logf(ratio) } else { MAX_EVIDENCE };
+        let evidence = if ratio < MAX_RATIO { ln(ratio) } else { MAX_EVIDENCE };
         Explanation { association: wall / total, occluded: occluded / total, evidence }
     }
 
     fn of_echo(&self, parameters: &EchoParameters, innovation: f32) -> Densities {
         let EchoParameters { missed, short, long, .. } = *parameters;
         let (g, s) = (self.geometry, self.variance.0);
-        let normal =
-            ONE_OVER_ROOT_TWO_PI / libm::sqrtf(s) * libm::expf(-0.5 * innovation * innovation / s);
+        let per_sigma = inverse_sqrt(s);
+        let ratio = innovation * per_sigma;
+        let normal = ONE_OVER_ROOT_TWO_PI * per_sigma * exp(-0.5 * ratio * ratio);
         let (nearest, farthest) = (self.limits.0.0, self.limits.1.0);
         let everywhere = 1.0 / (farthest - nearest);
         let (spurious, by_object) = if innovation < 0.0 {

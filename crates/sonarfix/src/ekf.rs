@@ -23,6 +23,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use crate::covariance::{Correction, Covariance, PoseBlock, PredictedMeasurement};
+use crate::elementary::sqrt;
 use crate::estimate::FilterEstimate;
 use crate::motion::{Drive, LinearizedMotion, WheelTravel};
 use crate::numeric::is_within;
@@ -242,8 +243,8 @@ impl Ekf {
         let PoseCovariance { xx, xy, yy, hh } = self.pose_covariance();
         let (half, middle) = (0.5 * (xx - yy), 0.5 * (xx + yy));
         PoseUncertainty {
-            position: Metres(libm::sqrtf(middle + libm::sqrtf(half * half + xy * xy))),
-            heading: Radians(libm::sqrtf(hh)),
+            position: Metres(sqrt(middle + sqrt(half * half + xy * xy))),
+            heading: Radians(sqrt(hh)),
         }
     }
 
@@ -441,7 +442,7 @@ impl Ekf {
         self.correct(prediction, innovation, noise, association)
     }
 
-    // ===== Eq. (16): X̂ ← X̂ + β K ν, P ← P − K H P + (1 − β)(S + β ν²) K Kᵀ =====
+    // ===== Eq. (16): X̂ ← X̂ + β K ν, P ← P − (1 − a) K mᵀ with a = (1 − β)(1 + β ν²/S) =====
     #[inline]
     fn correct(
         &mut self,
@@ -450,24 +451,65 @@ impl Ekf {
         noise: SquareMetres,
         association: f32,
     ) -> Result<(), EkfError> {
+        let clutter = 1.0 - association;
+        if clutter <= 0.0 {
+            return self.correct_certain(prediction, innovation, noise);
+        }
+        let s = noise.0 + prediction.variance;
+        let spread = clutter * (1.0 + association * innovation.0 * innovation.0 / s);
+        if spread >= 1.0 {
+            return self.spread(prediction, innovation * association, s, spread - 1.0);
+        }
+        // The same P and X̂ as of a certain association with S' = S/(1 − a) and ν' = β ν S'/S.
+        let factor = 1.0 / (1.0 - spread);
+        let noise = SquareMetres(noise.0 + s * (spread * factor));
+        self.correct_certain(prediction, innovation * (association * factor), noise)
+    }
+
+    /// Corrects the state by a range that probably is clutter and fits so badly that P grows by the share
+    /// `growth` of S along the gain.
+    #[cold]
+    fn spread(
+        &mut self,
+        prediction: &PredictedMeasurement,
+        innovation: Metres,
+        s: f32,
+        growth: f32,
+    ) -> Result<(), EkfError> {
+        let before = self.p_without_walk;
+        // False for NaN.
+        let is_positive = s >= f32::MIN_POSITIVE;
+        if !is_positive {
+            return Err(EkfError::Indefinite);
+        }
+        let p = &mut self.p_without_walk;
+        let gain = p.gain(prediction, s);
+        p.add_along_gain(&gain, growth * s);
+        if p.is_valid() {
+            gain.correct(&mut self.estimate, innovation.0);
+            return Ok(());
+        }
+        let error = invalid(p);
+        *p = before;
+        Err(error)
+    }
+
+    #[inline]
+    fn correct_certain(
+        &mut self,
+        prediction: &PredictedMeasurement,
+        innovation: Metres,
+        noise: SquareMetres,
+    ) -> Result<(), EkfError> {
         // In three parts, each small enough to be copied without a call.
         let Covariance { pose, calibration, range_scale } = self.p_without_walk;
         let walk = self.walk();
         let p = &mut self.p_without_walk;
         p.add_random_walk(&walk);
-        let correction = p.correct(prediction, noise.0);
-        let clutter = 1.0 - association;
-        if let Correction::Applied(gain) = &correction
-            && clutter > 0.0
-        {
-            let s = noise.0 + prediction.variance;
-            let amount = clutter * (s + association * innovation.0 * innovation.0);
-            p.add_along_gain(gain, amount);
-        }
-        let error = match correction {
+        let error = match p.correct(prediction, noise.0) {
             Correction::Applied(gain) if p.is_valid() => {
                 self.distance_since_update = 0.0;
-                gain.correct(&mut self.estimate, association * innovation.0);
+                gain.correct(&mut self.estimate, innovation.0);
                 return Ok(());
             }
             Correction::Saturated => {

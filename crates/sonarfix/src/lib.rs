@@ -45,6 +45,7 @@ pub mod config;
 mod covariance;
 pub mod echo;
 pub mod ekf;
+mod elementary;
 mod estimate;
 mod gating;
 pub mod health;

@@ -298,10 +298,10 @@ impl<'m> Localizer<'m> {
         let (expected, on_wall) = view.expected_range(&wall).map_err(refused)?;
         let square = view.of_square(&expected, aim.bearing).map_err(refused)?;
         let geometry = on_wall * square;
-        let foot = wall.along(view.position);
-        let place = (aim.wall, foot, expected.range);
-        let occluded = self.history.occlusion(echo, aim.wall, foot, expected.range, self.time);
-        let map_variance = echo.map_variance(self.history.travelled_since(aim.wall));
+        let foot = wall.along(view.position());
+        let entry = self.history.entry(echo, aim.wall, foot, expected.range, self.time);
+        let occluded = entry.occlusion;
+        let map_variance = echo.map_variance(entry.travelled);
         let noise = SquareMetres(sonar.noise.variance(expected.range).0 + map_variance);
         let prediction = self.ekf.predict_measurement(&expected);
         let innovation = prediction.innovation(measured.unwrap_or(expected.range), noise);
@@ -329,7 +329,7 @@ impl<'m> Localizer<'m> {
             }
         };
         let is_wall = association > 0.5;
-        self.history.record_echo(&self.config.echo, place, (now_occluded, is_wall), self.time);
+        self.history.record_echo(&entry, now_occluded, is_wall, self.time);
         Ok(Explained { fix, evidence, contradicts: gating::contradicts(association, occluded) })
     }
 

@@ -41,6 +41,29 @@ impl RangeNoise {
     }
 }
 
+/// The sonar at an estimate: what its expected ranges have in common.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SonarPosition {
+    /// Position in the map.
+    pub point: Point,
+    /// The lever arm in map axes, metres; also its derivative by the heading.
+    pub lever: (f32, f32),
+    /// 1 + κ.
+    pub stretch: f32,
+}
+
+impl SonarPosition {
+    /// A sonar at `mount` (robot frame) at this estimate.
+    #[inline]
+    pub fn new(mount: Point, state: &StateEstimate) -> Self {
+        let (sin, cos) = sin_cos(state.heading);
+        let x = cos * mount.x.0 - sin * mount.y.0;
+        let y = sin * mount.x.0 + cos * mount.y.0;
+        let point = Point::new(state.x.0 + x, state.y.0 + y);
+        Self { point, lever: (x, y), stretch: 1.0 + state.range_scale }
+    }
+}
+
 /// A range expected from a wall, linearized at an estimate: z ≈ h(X̂) + H (X − X̂). H has four
 /// entries that are not zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -65,16 +88,16 @@ impl ExpectedRange {
     /// The range expected from `wall` by a sonar at `mount` (robot frame) at this estimate.
     #[must_use]
     pub fn new(wall: &Wall, mount: Point, state: &StateEstimate) -> Self {
-        let (sin, cos) = sin_cos(state.heading);
-        // The lever arm in map axes; also its derivative by the heading.
-        let lever_x = cos * mount.x.0 - sin * mount.y.0;
-        let lever_y = sin * mount.x.0 + cos * mount.y.0;
-        let sonar = Point::new(state.x.0 + lever_x, state.y.0 + lever_y);
+        Self::from_sonar(wall, &SonarPosition::new(mount, state))
+    }
 
-        let signed = wall.signed_distance(sonar);
+    /// [`Self::new`] with the position of the sonar computed before.
+    #[inline]
+    pub(crate) fn from_sonar(wall: &Wall, sonar: &SonarPosition) -> Self {
+        let SonarPosition { point, lever: (lever_x, lever_y), stretch } = *sonar;
+        let signed = wall.signed_distance(point);
         let side = if signed.0 < 0.0 { -1.0 } else { 1.0 };
         let distance = side * signed.0;
-        let stretch = 1.0 + state.range_scale;
         let (by_x, by_y) = (side * stretch * wall.a(), side * stretch * wall.b());
         Self {
             range: Metres(stretch * distance),

@@ -16,13 +16,14 @@ pub type Instant = fugit::Instant<u64, 1, 1_000_000>;
 /// A duration in microseconds.
 pub type Duration = fugit::Duration<u64, 1, 1_000_000>;
 
-/// A duration in seconds.
+/// A duration in seconds, at most 4,295 s.
 #[expect(
     clippy::cast_precision_loss,
     reason = "durations are a small part of an hour, where microseconds are negligible"
 )]
 pub(crate) fn seconds(duration: Duration) -> f32 {
-    duration.to_micros() as f32 * 1e-6
+    // The conversion of 64 bits would be a call on a microcontroller.
+    u32::try_from(duration.to_micros()).unwrap_or(u32::MAX) as f32 * 1e-6
 }
 
 macro_rules! quantity {

@@ -13,7 +13,7 @@ use crate::echo::EchoParameters;
 use crate::map::WallId;
 use crate::units::{Instant, Metres, Radians, seconds};
 
-/// Number of walls that are stored; a further one replaces the one closest to the prior.
+/// Number of walls that are stored; a further one replaces the one that was stored first.
 const RECENT_WALLS: usize = 8;
 /// Share of the probability before a ping that remains after it: objects return echoes now and then,
 /// and at the end of a cupboard one range may be the wall's.
@@ -51,6 +51,28 @@ impl RecentWall {
     }
 }
 
+/// A wall seen from the sonar.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    wall: WallId,
+    /// Place of the foot along the wall.
+    foot: Metres,
+    /// Prior probability of occlusion at its range.
+    prior: f32,
+}
+
+/// What the history holds of one wall.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Entry {
+    slot: Option<usize>,
+    place: Place,
+    used_at: Option<Metres>,
+    /// Probability that an unmapped object occludes the wall.
+    pub occlusion: f32,
+    /// Distance travelled since a range of the wall was last used.
+    pub travelled: Option<Metres>,
+}
+
 /// The previous ping.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LastPing {
@@ -68,6 +90,8 @@ pub(crate) struct History {
     /// Distance travelled, metres.
     odometer: Metres,
     recent: [Option<RecentWall>; RECENT_WALLS],
+    /// The slot that was filled last.
+    newest: usize,
 }
 
 impl History {
@@ -86,56 +110,45 @@ impl History {
         self.last = Some(LastPing { wall, bearing, range });
     }
 
-    /// Records that a wall with its foot at `foot` and at `range` is occluded with this probability, and
-    /// whether its range was used.
-    pub fn record_echo(
-        &mut self,
-        parameters: &EchoParameters,
-        (wall, foot, range): (WallId, Metres, Metres),
-        (occluded, is_used): (f32, bool),
-        now: Instant,
-    ) {
-        let persistent = PERSISTENCE * self.occlusion(parameters, wall, foot, range, now);
-        let occluded = if occluded > persistent { occluded } else { persistent };
-        let occluded = if occluded < MAX_OCCLUSION { occluded } else { MAX_OCCLUSION };
-        let before = self.find(wall).and_then(|recent| recent.used_at);
-        let used_at = if is_used { Some(self.odometer) } else { before };
-        let above_prior = occluded - parameters.prior_occlusion(range);
-        if let Some(slot) = self.slot_for(wall, now) {
-            *slot = Some(RecentWall { wall, foot, at: now, above_prior, used_at });
-        }
-    }
-
-    /// Probability that an unmapped object occludes a wall with its foot at `foot` and at `range`.
-    pub fn occlusion(
+    /// What is known of a wall with its foot at `foot` and at `range`.
+    #[inline]
+    pub fn entry(
         &self,
         parameters: &EchoParameters,
         wall: WallId,
         foot: Metres,
         range: Metres,
         now: Instant,
-    ) -> f32 {
-        let above = self.find(wall).map_or(0.0, |recent| recent.above_prior(foot, now));
-        let occlusion = parameters.prior_occlusion(range) + above;
-        if occlusion > 0.0 { occlusion } else { 0.0 }
-    }
-
-    /// Distance travelled since a range of the wall was last used.
-    pub fn travelled_since(&self, wall: WallId) -> Option<Metres> {
-        Some(self.odometer - self.find(wall)?.used_at?)
-    }
-
-    fn find(&self, wall: WallId) -> Option<&RecentWall> {
-        self.recent.iter().flatten().find(|recent| recent.wall == wall)
-    }
-
-    /// The slot of the wall, a free one, or the one closest to the prior now.
-    fn slot_for(&mut self, wall: WallId, now: Instant) -> Option<&mut Option<RecentWall>> {
-        let value = |slot: &Option<RecentWall>| match slot {
-            Some(recent) if recent.wall == wall => -2.0,
-            Some(recent) => recent.above_prior(recent.foot, now).abs(),
-            None => -1.0,
+    ) -> Entry {
+        let prior = parameters.prior_occlusion(range);
+        let place = Place { wall, foot, prior };
+        let is_same =
+            |slot: &Option<RecentWall>| matches!(slot, Some(recent) if recent.wall == wall);
+        let slot = self.recent.iter().position(is_same);
+        let Some(recent) = slot.and_then(|slot| self.recent.get(slot)?.as_ref()) else {
+            return Entry { slot: None, place, occlusion: prior, used_at: None, travelled: None };
         };
-        self.recent.iter_mut().reduce(|a, b| if value(b) < value(a) { b } else { a })
+        let occlusion = prior + recent.above_prior(foot, now);
+        let occlusion = if occlusion > 0.0 { occlusion } else { 0.0 };
+        let travelled = recent.used_at.map(|used_at| self.odometer - used_at);
+        Entry { slot, place, occlusion, used_at: recent.used_at, travelled }
+    }
+
+    /// Records that the wall of this entry is occluded with a probability of `occluded`, and whether its
+    /// range was used.
+    pub fn record_echo(&mut self, entry: &Entry, occluded: f32, is_used: bool, now: Instant) {
+        let Place { wall, foot, prior } = entry.place;
+        let persistent = PERSISTENCE * entry.occlusion;
+        let occluded = if occluded > persistent { occluded } else { persistent };
+        let occluded = if occluded < MAX_OCCLUSION { occluded } else { MAX_OCCLUSION };
+        let used_at = if is_used { Some(self.odometer) } else { entry.used_at };
+        let slot = entry.slot.unwrap_or_else(|| {
+            self.newest = (self.newest + 1) % RECENT_WALLS;
+            self.newest
+        });
+        if let Some(slot) = self.recent.get_mut(slot) {
+            *slot =
+                Some(RecentWall { wall, foot, at: now, above_prior: occluded - prior, used_at });
+        }
     }
 }

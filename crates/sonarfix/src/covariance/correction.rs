@@ -218,6 +218,22 @@ impl Covariance {
 }
 
 impl Covariance {
+    // ===== Eq. (18): K = P Hᵀ/S, P unchanged =====
+    /// The gain of a measurement with innovation variance `s`.
+    pub fn gain(&self, prediction: &PredictedMeasurement, s: f32) -> Gain {
+        let h = &prediction.expected.jacobian();
+        let (p, r) = (&self.pose, &self.range_scale);
+        let per_variance = 1.0 / s;
+        let Column { x, y, h: hh, k } = scaled(&prediction.cross_covariance, per_variance);
+        let column = |x: f32, y: f32, hh: f32, k: f32| {
+            (x * h.x + y * h.y + hh * h.h + k * h.k) * per_variance
+        };
+        let c = column(p.xc, p.yc, p.hc, r.ck);
+        let d = column(p.xd, p.yd, p.hd, r.dk);
+        let w = column(p.xw, p.yw, p.hw, r.wk);
+        Gain { x, y, h: hh, c, d, w, k }
+    }
+
     // ===== Eq. (16): P ← P + a K Kᵀ =====
     /// Adds the variance `amount` of the innovation, mapped to the states by the gain: the uncertainty
     /// of the association of a measurement.

@@ -5,6 +5,7 @@
 //! functions return NaN or infinity.
 
 use crate::pose::{Heading, Point};
+use crate::trig::atan2;
 use crate::units::{Metres, Radians};
 
 /// Reason for which a wall is refused.
@@ -152,7 +153,7 @@ impl Wall {
     /// Direction of the perpendicular to the wall from a point at the given signed distance.
     #[must_use]
     pub fn direction_from(&self, signed_distance: Metres) -> Heading {
-        let normal = Heading::new(Radians(libm::atan2f(self.b(), self.a())));
-        if signed_distance.0 < 0.0 { normal } else { normal.turned(Radians(core::f32::consts::PI)) }
+        let side = if signed_distance.0 < 0.0 { -1.0 } else { 1.0 };
+        Heading::new(Radians(atan2(-side * self.b(), -side * self.a())))
     }
 }

@@ -9,6 +9,7 @@
 //! State and walls are finite, and so are the numbers computed from them here.
 
 use super::viewpoint::Viewpoint;
+use crate::elementary::sqrt;
 use crate::map::Wall;
 use crate::pose::Point;
 use crate::range::ExpectedRange;
@@ -41,15 +42,16 @@ struct Place {
 impl Beam {
     pub fn new(view: &Viewpoint, expected: &ExpectedRange) -> Self {
         let (sin, cos) = sin_cos(expected.direction.radians());
-        let cone = if view.wide_cone < MAX_CONE { view.wide_cone } else { MAX_CONE };
+        let wide = view.wide_cone();
+        let cone = if wide < MAX_CONE { wide } else { MAX_CONE };
         let (cone_sin, cone_cos) = sin_cos(cone);
         Self {
-            origin: view.position,
+            origin: view.position(),
             axis: (cos, sin),
             distance: expected.by_range_scale,
             tangent_of_cone: cone_sin / cone_cos,
-            uncertainty_ahead: libm::sqrtf(view.uncertainty_squared(cos, sin)),
-            uncertainty_aside: libm::sqrtf(view.uncertainty_squared(-sin, cos)),
+            uncertainty_ahead: sqrt(view.uncertainty_squared(cos, sin)),
+            uncertainty_aside: sqrt(view.uncertainty_squared(-sin, cos)),
         }
     }
 

@@ -5,12 +5,12 @@
 
 use crate::config::{Config, Sonar};
 use crate::ekf::{Ekf, PoseCovariance};
+use crate::elementary::{inverse_sqrt, sqrt};
 use crate::map::Wall;
 use crate::numeric::positive_part;
 use crate::outcome::Refusal;
 use crate::pose::{Heading, Point};
-use crate::range::ExpectedRange;
-use crate::state::StateEstimate;
+use crate::range::{ExpectedRange, SonarPosition};
 use crate::units::{Metres, Radians};
 
 /// Least probability that the foot lies on the wall and its range within the limits of the sonar, for a
@@ -39,15 +39,11 @@ const MAX_HEADING_DEVIATION: f32 = 0.25;
 /// The estimate of the filter as seen from the sonar: computed once for all walls.
 pub(crate) struct Viewpoint<'a> {
     pub sonar: &'a Sonar,
-    state: StateEstimate,
-    /// Estimated position of the sonar.
-    pub position: Point,
+    position: SonarPosition,
     pub heading: Heading,
-    /// One standard deviation of the heading.
-    heading_deviation: Radians,
-    /// The cone plus the uncertainty of the heading: where an echo may come from.
-    pub wide_cone: Radians,
-    confidence_squared: f32,
+    /// Cone in which other walls occlude the target, without the uncertainty of the heading.
+    cone: Radians,
+    confidence: f32,
     /// Least probability of foot and range.
     least: f32,
     covariance: PoseCovariance,
@@ -56,30 +52,22 @@ pub(crate) struct Viewpoint<'a> {
 impl<'a> Viewpoint<'a> {
     pub fn new(config: &'a Config, ekf: &Ekf) -> Self {
         let sonar = &config.sonar;
-        let confidence = config.gating.confidence;
         let state = ekf.state();
-        let pose = state.pose();
-        let covariance = ekf.pose_covariance();
-        let sigma = Radians(libm::sqrtf(covariance.hh));
-        let uncertainty = sigma * confidence;
-        let widening = if uncertainty < MAX_WIDENING { uncertainty } else { MAX_WIDENING };
         Self {
             sonar,
-            state,
-            position: pose.to_map(sonar.mount),
-            heading: pose.heading,
-            heading_deviation: sigma,
-            wide_cone: sonar.cone + widening,
-            confidence_squared: confidence * confidence,
+            position: SonarPosition::new(sonar.mount, &state),
+            heading: ekf.heading(),
+            cone: sonar.cone,
+            confidence: config.gating.confidence,
             least: SAFE,
-            covariance,
+            covariance: ekf.pose_covariance(),
         }
     }
 
     /// The same estimate without margins, for when no wall is safe.
     pub fn without_margins(self) -> Self {
-        let wide_cone = self.sonar.cone * CORE_OF_CONE;
-        Self { wide_cone, confidence_squared: 0.0, least: LIKELY, ..self }
+        let cone = self.sonar.cone * CORE_OF_CONE;
+        Self { cone, confidence: 0.0, least: LIKELY, ..self }
     }
 
     /// The same estimate for an echo that has arrived.
@@ -87,9 +75,20 @@ impl<'a> Viewpoint<'a> {
         Self { least: POSSIBLE, ..self }
     }
 
+    /// Estimated position of the sonar.
+    pub fn position(&self) -> Point {
+        self.position.point
+    }
+
+    /// The cone plus the uncertainty of the heading: where an echo may come from.
+    pub fn wide_cone(&self) -> Radians {
+        let uncertainty = Radians(sqrt(self.covariance.hh)) * self.confidence;
+        self.cone + if uncertainty < MAX_WIDENING { uncertainty } else { MAX_WIDENING }
+    }
+
     /// Square of the position uncertainty along the unit vector (x, y), m².
     pub fn uncertainty_squared(&self, x: f32, y: f32) -> f32 {
-        self.confidence_squared * self.variance(x, y)
+        self.confidence * self.confidence * self.variance(x, y)
     }
 
     /// Variance of the position along the unit vector (x, y), m².
@@ -104,24 +103,25 @@ impl<'a> Viewpoint<'a> {
     /// # Errors
     /// [`Refusal::FootOffWall`] or [`Refusal::OutOfRange`] if that is too improbable.
     pub fn expected_range(&self, wall: &Wall) -> Result<(ExpectedRange, f32), Refusal> {
-        let along = wall.along(self.position).0;
-        let sigma = libm::sqrtf(self.variance(wall.b(), -wall.a())) + FOOT_MARGIN;
-        let on_wall = probability_between(-along / sigma, (wall.length().0 - along) / sigma);
+        let position = self.position();
+        let along = wall.along(position).0;
+        let variance = self.variance(wall.b(), -wall.a()) + FOOT_MARGIN * FOOT_MARGIN;
+        let on_wall = probability_within(along, wall.length().0 - along, variance);
         // Neither comparison holds for NaN.
         let is_on_wall = on_wall >= self.least;
         if !is_on_wall {
             return Err(Refusal::FootOffWall);
         }
-        let distance = wall.signed_distance(self.position).0.abs();
-        let range = (1.0 + self.state.range_scale) * distance;
+        let distance = wall.signed_distance(position).0.abs();
+        let range = self.position.stretch * distance;
         let (nearest, farthest) = (self.sonar.min_range.0, self.sonar.max_range.0);
-        let sigma = libm::sqrtf(self.variance(wall.a(), wall.b())) + RANGE_MARGIN;
-        let in_range = probability_between((nearest - range) / sigma, (farthest - range) / sigma);
+        let variance = self.variance(wall.a(), wall.b()) + RANGE_MARGIN * RANGE_MARGIN;
+        let in_range = probability_within(range - nearest, farthest - range, variance);
         let is_in_range = in_range >= self.least;
         if !is_in_range {
             return Err(Refusal::OutOfRange);
         }
-        Ok((ExpectedRange::new(wall, self.sonar.mount, &self.state), on_wall * in_range))
+        Ok((ExpectedRange::from_sonar(wall, &self.position), on_wall * in_range))
     }
 
     /// Angle between a beam at `bearing` and the perpendicular of the expected wall.
@@ -148,9 +148,9 @@ impl<'a> Viewpoint<'a> {
     /// Probability that a beam at the angle `off` from the perpendicular is square, given the
     /// uncertainty of the heading.
     pub fn probability_of_square(&self, off: Radians) -> f32 {
-        let sigma = self.heading_deviation.0 + HEADING_MARGIN;
         let cone = self.sonar.cone.0;
-        probability_between((-cone - off.0) / sigma, (cone - off.0) / sigma)
+        let variance = self.covariance.hh + HEADING_MARGIN * HEADING_MARGIN;
+        probability_within(cone + off.0, cone - off.0, variance)
     }
 }
 
@@ -174,14 +174,29 @@ pub(crate) fn check_range(sonar: &Sonar, range: Option<Metres>) -> Result<Metres
     Ok(range)
 }
 
-/// Probability that a normal variable lies between two numbers of standard deviations.
-fn probability_between(from: f32, to: f32) -> f32 {
-    0.5 * (odd_probability(to) - odd_probability(from))
+/// Standard deviations beyond which a limit is certain to hold: the probability that it does not is 3e-5.
+const CERTAIN: f32 = 4.0;
+
+/// Probability that a normal variable with this variance lies less than `below` below its mean and less than
+/// `above` above it.
+#[inline]
+fn probability_within(below: f32, above: f32, variance: f32) -> f32 {
+    let least = if below < above { below } else { above };
+    if least > 0.0 && least * least >= CERTAIN * CERTAIN * variance {
+        return 1.0;
+    }
+    uncertain_probability(below, above, variance)
+}
+
+#[inline(never)]
+fn uncertain_probability(below: f32, above: f32, variance: f32) -> f32 {
+    let per_sigma = inverse_sqrt(variance);
+    0.5 * (odd_probability(above * per_sigma) + odd_probability(below * per_sigma))
 }
 
 /// erf(x/√2) of a number of either sign.
 fn odd_probability(sigmas: f32) -> f32 {
-    if sigmas < 0.0 { -central_probability(-sigmas) } else { central_probability(sigmas) }
+    central_probability(sigmas.abs()).copysign(sigmas)
 }
 
 /// Probability that a normal variable lies within `sigmas` standard deviations: erf(x/√2) after

@@ -106,11 +106,11 @@ impl Rules {
         let view = &self.views[wall];
         let (tx, ty, length) = view.tangent();
         let along = view.along(self.sonar());
-        let sigma = self.deviation_along(tx, ty) + 0.02;
+        let sigma = self.deviation_along(tx, ty).hypot(0.02);
         let foot = between(-along / sigma, (length - along) / sigma);
         let range = view.expected_range(&self.state);
         let sonar = &self.config.sonar;
-        let sigma = self.deviation_along(-ty, tx) + 0.001;
+        let sigma = self.deviation_along(-ty, tx).hypot(0.001);
         let (nearest, farthest) = (f64::from(sonar.min_range.0), f64::from(sonar.max_range.0));
         (foot, between((nearest - range) / sigma, (farthest - range) / sigma))
     }
@@ -213,7 +213,7 @@ impl Rules {
     /// Probability of foot, range and squareness.
     fn success(&self, wall: usize, off: f64) -> f64 {
         let cone = f64::from(self.config.sonar.cone.0);
-        let sigma = self.heading_deviation() + 0.01;
+        let sigma = self.heading_deviation().hypot(0.01);
         let (foot, range) = self.foot_and_range(wall);
         foot * range * between((-cone - off) / sigma, (cone - off) / sigma)
     }
@@ -462,7 +462,7 @@ proptest! {
         let deviation = 0.02_f32;
         // The end is `inward` metres past the foot, which is uncertain by 2 cm of the position and 2 cm
         // of the wall's end: in one of five cases it is on the wall at −0.84 standard deviations.
-        let least = -0.8416 * 0.04;
+        let least = -0.8416 * deviation.hypot(0.02);
         prop_assume!((inward - least).abs() > 1e-3);
         let sight = Sight { direction, distance, foot: inward / 4.0, length: 4.0, flipped: false };
         let walls = [sight.wall(Point::default())];
@@ -490,7 +490,7 @@ proptest! {
         // Whether the foot is on the wall is about certain of the second wall after the fix.
         let bearing = Radians(square);
         let success = |localizer: &Localizer| localizer.aim_at(bearing).map(|aim| aim.why.success);
-        let foot = |sigma: f32| between(f64::from(-inward / (sigma + 0.02)), 9.0);
+        let foot = |sigma: f32| between(f64::from(-inward / sigma.hypot(0.02)), 9.0);
         prop_assert!((f64::from(success(&blunt).unwrap()) - foot(deviation)).abs() < 3e-3);
         // The noise of a range of 2 m is 6 mm, and 1 % for its scale.
         prop_assert!((f64::from(success(&sharp).unwrap()) - foot(0.0215)).abs() < 2e-2);
@@ -543,7 +543,7 @@ proptest! {
         let start = Start { heading_deviation: Radians(deviation), ..room.start() };
         let localizer = Localizer::new(config, Map::new(&walls), start, Instant::from_ticks(0)).unwrap();
         let aim = localizer.aim().unwrap();
-        let sigma = f64::from(deviation) + 0.01;
+        let sigma = f64::from(deviation).hypot(0.01);
         let cone = f64::from(config.sonar.cone.0);
         let square = between(-cone / sigma, cone / sigma);
         prop_assert!((f64::from(aim.why.success) - square).abs() < 2e-2 * square, "{aim:?}");
