@@ -7,8 +7,8 @@
 //!     └──────────────────────── Stop ───────────────────────────────┘
 //! ```
 //!
-//! A robot that waits, or whose encoders cannot be read, must not move: the board enables its motor driver by
-//! [`Polled::may_drive`].
+//! A robot that waits must not move; when else it must not, the configuration says ([`MotorPolicy`]): the board enables
+//! its motor driver by [`Polled::may_drive`].
 //!
 //! This file composes; `command` executes commands; `wire` reads the link and schedules telemetry. The deadline check
 //! is [`Polled::is_on_time`].
@@ -21,7 +21,7 @@ use sonarfix::health::{self, Verdict};
 use sonarfix::localizer::Localizer;
 use sonarfix::map::{Map, MapError};
 use sonarfix::units::{Duration, Instant, Metres};
-use sonarfix_hal::config::{RobotConfig, Unsupported};
+use sonarfix_hal::config::{MotorPolicy, RobotConfig, Unsupported};
 use sonarfix_hal::robot::{Faults, Hardware, Report, Robot, Settings, Step};
 use sonarfix_link::baked::{self, BakedError};
 use sonarfix_link::message::{self, CommandResult, Hello, LoopStatus, ResetCause};
@@ -68,7 +68,7 @@ pub struct Polled {
     pub is_settled: bool,
     /// Whether the loop runs.
     pub is_running: bool,
-    /// Whether the motors may be enabled: while the loop runs, and its encoders can be read.
+    /// Whether the motors may be enabled: while the loop runs, by the [`MotorPolicy`] of the configuration.
     pub may_drive: bool,
     /// Whether the loop has been started or stopped in this poll.
     pub has_changed: bool,
@@ -99,6 +99,8 @@ pub struct App<'m, F: NorFlash> {
     known: Option<Resumed>,
     mode: Mode<'m>,
     wire: Wire,
+    /// When the last frame was received, or the app began.
+    heard: Instant,
     /// Faults before the present run of the loop.
     faults: Faults,
     worst_poll: Duration,
@@ -174,6 +176,7 @@ impl<'m, F: NorFlash> App<'m, F> {
             known: None,
             mode: Mode::Waiting(Check::new(now)),
             wire: Wire::default(),
+            heard: now,
             faults: Faults::default(),
             worst_poll: Duration::from_ticks(0),
             time: now,
@@ -201,6 +204,7 @@ impl<'m, F: NorFlash> App<'m, F> {
             polled.unsupported = self.unsupported;
         }
         if let Some(frame) = self.wire.next(link) {
+            self.heard = now;
             self.answer(now, &frame, hardware, link, &mut polled);
         }
         match &mut self.mode {
@@ -249,10 +253,14 @@ impl<'m, F: NorFlash> App<'m, F> {
 
     /// Whether the motors may be enabled.
     fn may_drive(&self, now: Instant) -> bool {
-        let has_odometry = |localizer: &Localizer| {
-            since(now, localizer.time()) <= health::DEGRADED_WITHOUT_ODOMETRY
+        let (Some(localizer), Some((config, _))) = (self.localizer(), &self.config) else {
+            return false;
         };
-        self.localizer().is_some_and(has_odometry)
+        let MotorPolicy { lost, dead_encoder, lost_link, link_timeout } = config.motors;
+        let has_odometry = since(now, localizer.time()) <= health::DEGRADED_WITHOUT_ODOMETRY;
+        let is_lost = localizer.health().verdict == Verdict::Lost;
+        let has_link = since(now, self.heard) <= link_timeout;
+        (dead_encoder || has_odometry) && (lost || !is_lost) && (lost_link || has_link)
     }
 
     /// The localizer, while the loop runs.

@@ -41,6 +41,8 @@ pub struct RobotConfig {
     pub servo_pulses: [MeasuredPulse; 2],
     /// The ranger.
     pub ranger: RangerConfig,
+    /// When the motors are enabled.
+    pub motors: MotorPolicy,
 }
 
 /// A wheel and its encoder.
@@ -95,6 +97,34 @@ pub struct RangerConfig {
     pub kind: RangerKind,
     /// Temperature of the air that the driver computes ranges with.
     pub temperature: Celsius,
+}
+
+/// In which of three situations the motor driver stays enabled while the loop runs. While it does not run, the motors
+/// are off.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct MotorPolicy {
+    /// With the verdict [`Lost`](sonarfix::health::Verdict::Lost).
+    pub lost: bool,
+    /// Without odometry for more than
+    /// [`DEGRADED_WITHOUT_ODOMETRY`](sonarfix::health::DEGRADED_WITHOUT_ODOMETRY).
+    pub dead_encoder: bool,
+    /// Without a frame over the link for [`Self::link_timeout`].
+    pub lost_link: bool,
+    /// Time without a frame after which the link counts as lost.
+    pub link_timeout: Duration,
+}
+
+impl MotorPolicy {
+    /// Off without odometry: how far the robot rolls is unknown, and so is when to stop. On with the verdict `Lost`,
+    /// because a robot relocalizes by driving, and without a link, because an autonomous robot has none.
+    pub const DEFAULT: Self = Self {
+        lost: true,
+        dead_encoder: false,
+        lost_link: true,
+        link_timeout: Duration::from_ticks(2_000_000),
+    };
 }
 
 /// A field that [`RobotConfig::check`] refused, and why.
@@ -183,6 +213,7 @@ impl RobotConfig {
                 kind: RangerKind::Pulse(PulseTiming::HC_SR04),
                 temperature: Celsius(20.0),
             },
+            motors: MotorPolicy::DEFAULT,
         }
     }
 
@@ -202,7 +233,8 @@ impl RobotConfig {
         let fits = self.servo_settings().fits_its_frame();
         require("servo_pulses", fits, "within the servo's frame at both limits of the servo")?;
         let air = Air::at(self.ranger.temperature);
-        require("ranger.temperature", air.is_ok(), "between -40 and 85 degrees Celsius")
+        require("ranger.temperature", air.is_ok(), "between -40 and 85 degrees Celsius")?;
+        require("motors.link_timeout", !self.motors.link_timeout.is_zero(), "longer than zero")
     }
 
     /// The geometry of both wheels.

@@ -10,7 +10,8 @@ use crate::message::{Ack, Command, CommandError, CommandResult, SessionCommand, 
 ///   checksum of the last one is such a repetition: it is acknowledged with the same result.
 /// - **An old frame is refused.** A command has the number of the present session, which [`Command::OpenSession`]
 ///   requests, and a sequence number above those of all commands before it in the session.
-/// - **[`Command::Stop`] is always executed**: to stop without need is safe, to refuse a stop is not.
+/// - **[`Command::Stop`] is always executed**: to stop without need is safe, to refuse a stop is not. So is
+///   [`Command::MapChecksum`], which changes nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Session {
     number: Option<u32>,
@@ -44,7 +45,8 @@ impl Session {
                 self.number = Some(next);
                 CommandResult::Session(next)
             }
-            (None, command) if is_present || *command == Command::Stop => execute(command),
+            (None, Command::Stop | Command::MapChecksum) => execute(command),
+            (None, command) if is_present => execute(command),
             (None, _) => CommandResult::Refused(CommandError::Session),
         };
         if is_present || *command == Command::OpenSession {

@@ -13,7 +13,7 @@ use sonarfix::pose::Point;
 use sonarfix::range::RangeNoise;
 use sonarfix::units::{Duration, Metres, MetresPerSecond, PerRootMetre, Radians};
 
-use sonarfix_hal::config::{RobotConfig, RobotConfigError, WheelConfig};
+use sonarfix_hal::config::{MotorPolicy, RobotConfig, RobotConfigError, WheelConfig};
 use sonarfix_hal::servo::MeasuredPulse;
 
 use crate::document::{Document, Node, Table};
@@ -23,7 +23,7 @@ use crate::quantity::{
 };
 use crate::{file, ranger_file, single};
 
-const TABLES: [&str; 6] = ["drive", "sonar", "prior", "gating", "echo", "schedule"];
+const TABLES: [&str; 7] = ["drive", "sonar", "prior", "gating", "echo", "schedule", "motors"];
 
 const DRIVE_KEYS: [&str; 8] = [
     "track_width",
@@ -101,6 +101,7 @@ fn from_table(robot: &Table<'_>) -> Result<RobotConfig, FileError> {
         encoder_period: drive.require("encoder_period")?.period()?,
         servo_pulses: read_pulses(&sonar)?,
         ranger: ranger.config,
+        motors: read_motors(robot)?,
     };
     config.check().map_err(|error| {
         let message = format!("must be {}", error.rule);
@@ -308,6 +309,29 @@ fn read_wheel(node: Node<'_>) -> Result<WheelConfig, FileError> {
     };
     let mirrored = table.get("mirrored").map(|node| node.boolean()).transpose()?.unwrap_or(false);
     Ok(if mirrored { wheel.mirrored() } else { wheel })
+}
+
+/// Missing keys keep the defaults.
+fn read_motors(robot: &Table<'_>) -> Result<MotorPolicy, FileError> {
+    let mut motors = MotorPolicy::DEFAULT;
+    let Some(node) = robot.get("motors") else { return Ok(motors) };
+    let table = node.table(&["lost", "dead_encoder", "lost_link", "link_timeout"])?;
+    for (key, is_on) in [
+        ("lost", &mut motors.lost),
+        ("dead_encoder", &mut motors.dead_encoder),
+        ("lost_link", &mut motors.lost_link),
+    ] {
+        let Some(node) = table.get(key) else { continue };
+        *is_on = match node.text()? {
+            "on" => true,
+            "off" => false,
+            _ => return Err(node.error("must be \"on\" or \"off\"")),
+        };
+    }
+    if let Some(node) = table.get("link_timeout") {
+        motors.link_timeout = node.period()?;
+    }
+    Ok(motors)
 }
 
 fn read_pulses(sonar: &Table<'_>) -> Result<[MeasuredPulse; 2], FileError> {

@@ -3,14 +3,14 @@
 use sonarfix::aim::Policy;
 use sonarfix::config::PingSchedule;
 use sonarfix::units::{Duration, Radians};
-use sonarfix_hal::config::{RangerConfig, RobotConfig, WheelConfig};
+use sonarfix_hal::config::{MotorPolicy, RangerConfig, RobotConfig, WheelConfig};
 use sonarfix_hal::ranger::{PulseTiming, RangerKind};
 use sonarfix_hal::servo::MeasuredPulse;
 
 /// Writes the robot file of a configuration.
 #[must_use]
 pub fn text(config: &RobotConfig) -> String {
-    let tables = [drive(config), sonar(config), estimation(config)];
+    let tables = [drive(config), sonar(config), estimation(config), motors(&config.motors)];
     format!("format = 1\n{}", tables.concat())
 }
 
@@ -129,6 +129,22 @@ wheels_weight = "{} m"
         echo.map_accuracy.0,
         weights.heading.0,
         weights.wheels.0,
+    )
+}
+
+fn motors(motors: &MotorPolicy) -> String {
+    let MotorPolicy { lost, dead_encoder, lost_link, link_timeout } = *motors;
+    let [lost, dead_encoder, lost_link] =
+        [lost, dead_encoder, lost_link].map(|is_on| if is_on { "on" } else { "off" });
+    format!(
+        r#"
+[motors]
+lost = "{lost}"
+dead_encoder = "{dead_encoder}"
+lost_link = "{lost_link}"
+link_timeout = "{}"
+"#,
+        time(link_timeout)
     )
 }
 

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use sonarfix::config::PingSchedule;
 use sonarfix::echo::EchoParameters;
 use sonarfix::units::{Duration, Metres, Radians};
-use sonarfix_hal::config::{RobotConfig, WheelConfig};
+use sonarfix_hal::config::{MotorPolicy, RobotConfig, WheelConfig};
 use sonarfix_hal::ranger::{PulseTiming, RangerKind};
 use sonarfix_map::{
     CLASSROOM, Fault, FaultKind, Fidelity, FileError, Floor, Follow, PAPER, Scenario, ServoName,
@@ -678,6 +678,12 @@ fn a_robot_that_is_written_is_read_back() {
     odd.localizer.sonar.timing.schedule = PingSchedule::AsFastAsPossible;
     odd.localizer.echo = EchoParameters::NXT;
     odd.localizer.echo.short = 0.04;
+    odd.motors = MotorPolicy {
+        lost: false,
+        dead_encoder: true,
+        lost_link: false,
+        link_timeout: Duration::millis(1_500),
+    };
     for robot in [classroom, odd, parse(PAPER).unwrap().robot] {
         let text = robot_text(&robot);
         let mut read = robot_file::parse(&text, "written.toml").unwrap();

@@ -8,7 +8,7 @@ use sonarfix_link::baked;
 /// Keys of the two records. A new layout gets a new key, so that newer firmware
 /// never misreads a record of older firmware.
 pub(super) const SAVED: u8 = 1;
-pub(super) const STORED_CONFIGURATION: u8 = 3;
+pub(super) const STORED_CONFIGURATION: u8 = 4;
 pub(super) const KEYS: [u8; 2] = [SAVED, STORED_CONFIGURATION];
 
 /// Room for a record: the configuration is the longer one.

@@ -9,6 +9,7 @@
 mod attacks;
 mod commands;
 mod flash;
+mod motors;
 mod power_cut;
 mod random;
 mod rig;

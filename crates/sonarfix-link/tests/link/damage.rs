@@ -60,7 +60,7 @@ fn garbage_before_a_frame_costs_nothing() {
     for byte in 1..=u8::MAX {
         for length in 1..300 {
             let (frames, receiver) = received::<SessionCommand>(
-                &[vec![byte; length], sent(3, &in_session(Command::Stop))].concat(),
+                &[vec![byte; length], sent(3, &in_session(&Command::Stop))].concat(),
             );
             assert_eq!(frames.len(), 1, "{length} times {byte}");
             let skipped = receiver.counters();
@@ -71,7 +71,7 @@ fn garbage_before_a_frame_costs_nothing() {
 
 #[test]
 fn what_is_skipped_is_counted_by_its_reason() {
-    let message = to_stdvec(&in_session(Command::Stop));
+    let message = to_stdvec(&in_session(&Command::Stop));
     let count = |wire: &[u8]| {
         let (frames, receiver) = received::<SessionCommand>(wire);
         assert!(frames.is_empty(), "{wire:02x?}");
@@ -105,7 +105,7 @@ fn what_is_skipped_is_counted_by_its_reason() {
 
 #[test]
 fn a_frame_that_comes_twice_is_read_twice() {
-    let wire = sent(5, &in_session(Command::Start));
+    let wire = sent(5, &in_session(&Command::Start));
     let (frames, _) = received::<SessionCommand>(&[&wire[..], &wire].concat());
     assert_eq!(frames.len(), 2);
     assert_eq!(frames[0], frames[1]);

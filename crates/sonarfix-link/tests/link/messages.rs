@@ -12,7 +12,7 @@ use sonarfix::pose::{Point, Pose};
 use sonarfix::units::{
     Duration, Instant, Metres, MetresPerSecond, PerRootMetre, Radians, SquareMetres,
 };
-use sonarfix_hal::config::{RangerConfig, RobotConfig, Unsupported};
+use sonarfix_hal::config::{MotorPolicy, RangerConfig, RobotConfig, Unsupported};
 use sonarfix_hal::ranger::{Celsius, Echo, NoEcho, PulseTiming, RangerKind};
 use sonarfix_hal::robot::{EncoderFaults, Faults};
 use sonarfix_hal::servo::{MeasuredPulse, SettingError};
@@ -343,6 +343,8 @@ pub fn config(source: &mut impl Source) -> RobotConfig {
         },
         temperature: Celsius(source.single()),
     };
+    let [lost, dead_encoder, lost_link] = [0; 3].map(|_| source.pick(2) == 0);
+    config.motors = MotorPolicy { lost, dead_encoder, lost_link, link_timeout: source.duration() };
     config
 }
 

@@ -118,9 +118,9 @@ fn random_bytes_say_nothing_and_hide_no_frame_behind_them() {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut bytes = vec![0; rng.random_range(0..300)];
         rng.fill_bytes(&mut bytes);
-        bytes.extend(sent(1, &in_session(Command::MapChecksum)));
+        bytes.extend(sent(1, &in_session(&Command::MapChecksum)));
         let (frames, _) = received::<SessionCommand>(&bytes);
         let commands: Vec<_> = frames.iter().map(|frame| frame.message).collect();
-        assert_eq!(commands, [in_session(Command::MapChecksum)], "seed {seed}");
+        assert_eq!(commands, [in_session(&Command::MapChecksum)], "seed {seed}");
     }
 }

@@ -52,8 +52,8 @@ pub fn sent<M: Message>(sequence: u16, message: &M) -> Vec<u8> {
 }
 
 /// A command in session 5.
-pub fn in_session(command: Command) -> SessionCommand {
-    SessionCommand { session: 5, command }
+pub fn in_session(command: &Command) -> SessionCommand {
+    SessionCommand { session: 5, command: *command }
 }
 
 /// All frames that a receiver finds.
@@ -101,7 +101,7 @@ proptest! {
 fn the_documents_example_is_right() {
     const STOP: [u8; 13] = [0x00, 0x04, 0x03, 0x01, 0x07, 0x07, 0x05, 0x03, 0, 0, 0, 0, 0x00];
     let documents = include_str!("../../../../docs/link.md");
-    let wire = sent(7, &in_session(Command::Stop));
+    let wire = sent(7, &in_session(&Command::Stop));
     let hex: Vec<_> = wire.iter().map(|byte| format!("{byte:02x}")).collect();
     assert!(documents.contains(&hex.join(" ")), "{}", hex.join(" "));
     assert_eq!(wire[..8], STOP[..8]);
@@ -113,7 +113,7 @@ fn sequence_numbers_start_at_0_and_never_come_back_to_it() {
     let mut sender = Sender::<Telemetry>::new();
     assert_eq!(sender.next(), 0);
     let mut sender_late = Sender::starting_at(65_535);
-    sender_late.frame(&in_session(Command::Stop), &mut frame::EMPTY.clone());
+    sender_late.frame(&in_session(&Command::Stop), &mut frame::EMPTY.clone());
     assert_eq!(sender_late.next(), 1);
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     sender.frame(&any_telemetry(&mut rng), &mut frame::EMPTY.clone());

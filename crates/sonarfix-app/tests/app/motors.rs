@@ -1,0 +1,81 @@
+//! The motor policy: when the motors are enabled.
+
+use sonarfix::health::Verdict;
+use sonarfix::units::Duration;
+use sonarfix_hal::config::MotorPolicy;
+use sonarfix_link::Command;
+use sonarfix_link::message::CommandResult;
+
+use crate::flash::SimFlash;
+use crate::rig::{Baked, Bench, config, start};
+
+/// A robot with this policy that has just been started.
+fn baked(motors: MotorPolicy) -> Baked {
+    let mut config = config();
+    config.motors = motors;
+    Baked::new(&config)
+}
+
+fn started(baked: &Baked) -> Bench<'_> {
+    let mut bench = Bench::switched_on(baked, SimFlash::new());
+    assert!(!bench.turn().may_drive);
+    for command in [Command::SetPose(start()), Command::Start] {
+        assert_eq!(bench.order(&command), CommandResult::Done);
+    }
+    bench.wait(200);
+    assert!(bench.turn().may_drive);
+    bench
+}
+
+/// Whether the motors are enabled with the encoders dead for 1 s, which is `Degraded`, and for 4 s, which is `Lost`.
+fn with_dead_encoders(motors: MotorPolicy) -> [bool; 2] {
+    let baked = baked(motors);
+    let mut bench = started(&baked);
+    let counts = (bench.hardware.right.0.take(), bench.hardware.left.0.take());
+    let enabled = [1_000, 3_000].map(|millis| {
+        bench.wait(millis);
+        bench.turn().may_drive
+    });
+    assert_eq!(bench.estimate().health.verdict, Verdict::Lost);
+    // The counters return all travel: what is left is the verdict.
+    (bench.hardware.right.0, bench.hardware.left.0) = counts;
+    bench.wait(200);
+    assert_eq!(bench.turn().may_drive, motors.lost);
+    assert_eq!(bench.order(&Command::SetPose(start())), CommandResult::Done);
+    assert!(bench.turn().may_drive);
+    assert_eq!(bench.order(&Command::Stop), CommandResult::Done);
+    assert!(!bench.turn().may_drive);
+    enabled
+}
+
+#[test]
+fn each_situation_has_its_own_switch() {
+    let on = MotorPolicy { dead_encoder: true, ..MotorPolicy::DEFAULT };
+    assert_eq!(with_dead_encoders(MotorPolicy::DEFAULT), [false, false]);
+    assert_eq!(with_dead_encoders(on), [true, true]);
+    assert_eq!(with_dead_encoders(MotorPolicy { lost: false, ..on }), [true, false]);
+}
+
+#[test]
+fn a_lost_link_stops_the_motors_if_the_policy_says_so() {
+    let link_timeout = Duration::from_ticks(500_000);
+    for lost_link in [true, false] {
+        let baked = baked(MotorPolicy { lost_link, link_timeout, ..MotorPolicy::DEFAULT });
+        let mut bench = started(&baked);
+        // Any command counts, and noise does not.
+        for _ in 0..10 {
+            bench.wait(400);
+            assert!(matches!(bench.order(&Command::MapChecksum), CommandResult::Map(_)));
+            assert!(bench.turn().may_drive);
+        }
+        bench.garble(&[0x55; 40]);
+        bench.wait(490);
+        assert!(bench.turn().may_drive);
+        bench.garble(&[0x55, 0]);
+        bench.wait(20);
+        assert_eq!(bench.turn().may_drive, lost_link);
+        assert!(bench.app.is_running());
+        bench.send(&Command::MapChecksum);
+        assert!(bench.turn().may_drive);
+    }
+}
