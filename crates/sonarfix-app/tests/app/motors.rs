@@ -18,12 +18,12 @@ fn baked(motors: MotorPolicy) -> Baked {
 
 fn started(baked: &Baked) -> Bench<'_> {
     let mut bench = Bench::switched_on(baked, SimFlash::new());
-    assert!(!bench.turn().may_drive);
+    assert!(!bench.poll().may_drive);
     for command in [Command::SetPose(start()), Command::Start] {
         assert_eq!(bench.order(&command), CommandResult::Done);
     }
     bench.wait(200);
-    assert!(bench.turn().may_drive);
+    assert!(bench.poll().may_drive);
     bench
 }
 
@@ -34,17 +34,17 @@ fn with_dead_encoders(motors: MotorPolicy) -> [bool; 2] {
     let counts = (bench.hardware.right.0.take(), bench.hardware.left.0.take());
     let enabled = [1_000, 3_000].map(|millis| {
         bench.wait(millis);
-        bench.turn().may_drive
+        bench.poll().may_drive
     });
     assert_eq!(bench.estimate().health.verdict, Verdict::Lost);
     // The counters return all travel: what is left is the verdict.
     (bench.hardware.right.0, bench.hardware.left.0) = counts;
     bench.wait(200);
-    assert_eq!(bench.turn().may_drive, motors.lost);
+    assert_eq!(bench.poll().may_drive, motors.lost);
     assert_eq!(bench.order(&Command::SetPose(start())), CommandResult::Done);
-    assert!(bench.turn().may_drive);
+    assert!(bench.poll().may_drive);
     assert_eq!(bench.order(&Command::Stop), CommandResult::Done);
-    assert!(!bench.turn().may_drive);
+    assert!(!bench.poll().may_drive);
     enabled
 }
 
@@ -66,16 +66,16 @@ fn a_lost_link_stops_the_motors_if_the_policy_says_so() {
         for _ in 0..10 {
             bench.wait(400);
             assert!(matches!(bench.order(&Command::MapChecksum), CommandResult::Map(_)));
-            assert!(bench.turn().may_drive);
+            assert!(bench.poll().may_drive);
         }
         bench.garble(&[0x55; 40]);
         bench.wait(490);
-        assert!(bench.turn().may_drive);
+        assert!(bench.poll().may_drive);
         bench.garble(&[0x55, 0]);
         bench.wait(20);
-        assert_eq!(bench.turn().may_drive, lost_link);
+        assert_eq!(bench.poll().may_drive, lost_link);
         assert!(bench.app.is_running());
         bench.send(&Command::MapChecksum);
-        assert!(bench.turn().may_drive);
+        assert!(bench.poll().may_drive);
     }
 }
