@@ -75,7 +75,7 @@ fn stamped(stamp: Stamp) -> (f64, f64, usize) {
 /// With a real servo and time of flight, a range that is assigned to the instant of its arrival
 /// increases the error; a range assigned to that of its reflection does not.
 #[test]
-fn a_naive_stamp_increases_the_error_and_that_of_the_reflection_does_not() {
+fn naive_arrival_times_increase_the_error() {
     let (naive, naive_nis, naive_lost) = stamped(Stamp::Arrival);
     let (reflection, nis, lost) = stamped(Stamp::Reflection);
     let mut ideal = paper(Fidelity::Ideal);
@@ -143,7 +143,7 @@ fn the_features_of_the_classroom_occur() {
 
 /// In a closed loop, which steers by the estimate, the robot stays on its path.
 #[test]
-fn a_closed_loop_keeps_to_its_path() {
+fn a_closed_loop_follows_its_path() {
     let simulation = Simulation::new(scenario(CLASSROOM));
     let mut trace = Trace::default();
     simulation.run(2, &mut trace).unwrap();

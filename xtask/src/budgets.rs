@@ -320,12 +320,12 @@ mod tests {
     }
 
     #[test]
-    fn what_grew_from_nothing_fails() {
+    fn an_increase_from_zero_fails() {
         assert!(difference(0, 8).is_some() && difference(0, 0).is_none());
     }
 
     #[test]
-    fn what_is_written_is_read_again() {
+    fn a_written_table_reads_back() {
         let table = table("cortex-m4f", &[("a", 1), ("b", 2)]);
         let text = format!("{HEADER}{}", written(&table));
         assert_eq!(toml::from_str::<Table>(&text).unwrap(), table);
@@ -345,7 +345,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bar_once_kept_cannot_be_lost() {
+    fn a_limit_once_met_stays_met() {
         let good = on_the_bars();
         assert!(broken_bars(&good).is_empty());
         for Bar { section, key, most, .. } in BARS {
@@ -355,7 +355,7 @@ mod tests {
             assert!(fault.contains(&most.to_string()) && fault.contains(&(most + 1).to_string()));
             assert!(lost_bars(&bad, &bad).is_empty(), "{key}, not reached before");
             bad.get_mut(section).unwrap().remove(key);
-            assert_eq!(lost_bars(&good, &bad).len(), 1, "{key} gone");
+            assert_eq!(lost_bars(&good, &bad).len(), 1, "{key} missing");
         }
     }
 

@@ -142,7 +142,7 @@ mod tests {
 
     /// Encoded by an assembler (`llvm-mc --triple=thumbv7em-none-eabihf --show-encoding`).
     #[test]
-    fn every_way_to_lower_the_stack_is_known() {
+    fn every_instruction_that_lowers_the_stack_is_recognized() {
         let known: [(&[u8], u64); 11] = [
             (&[0xf0, 0xb5], 20),                        // push {r4, r5, r6, r7, lr}
             (&[0x2d, 0xe9, 0x00, 0x0f], 16),            // push.w {r8, r9, r10, r11}
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn calls_lead_where_they_lead() {
+    fn calls_are_resolved() {
         let place = 0x0801_6934;
         // By a disassembler: 18 bytes back, and 59,212 bytes ahead.
         let cases: [(&[u8], i64); 2] =
@@ -176,13 +176,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_moved_is_put_together() {
+    fn a_moved_constant_is_assembled() {
         // movw r0, #0x1c2f
         assert_eq!(moved(0x402f_f641), 0x1c2f);
     }
 
     #[test]
-    fn calls_by_register_and_unknown_depths_are_seen() {
+    fn indirect_calls_and_unknown_depths_are_detected() {
         let calls: [&[u8]; 2] = [&[0xa8, 0x47], &[0x18, 0x47]]; // blx r5; bx r3
         for code in calls {
             assert!(Stack::of(code).calls_by_register, "{code:x?}");

@@ -2,7 +2,7 @@
 
 use sonarfix::units::{Duration, Instant};
 
-/// The time from `then` to `now`; zero if `then` lies ahead.
+/// The time from `then` to `now`; zero if `then` is in the future.
 pub(crate) fn since(now: Instant, then: Instant) -> Duration {
     now.checked_duration_since(then).unwrap_or(Duration::from_ticks(0))
 }

@@ -326,7 +326,7 @@ fn without_map_and_configuration_it_does_not_start_and_reports_why() {
 
 #[test]
 #[ignore = "cargo xtask test-firmware"]
-fn a_damaged_map_or_configuration_is_said_to_be_damaged() {
+fn a_damaged_map_or_configuration_is_reported() {
     let damaged = |mut bytes: Vec<u8>| {
         bytes[40] ^= 1;
         bytes

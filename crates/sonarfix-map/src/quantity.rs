@@ -149,7 +149,7 @@ mod tests {
     ];
 
     #[test]
-    fn a_quantity_is_the_double_that_one_would_write_in_si() {
+    fn a_quantity_is_the_nearest_double_in_si_units() {
         let cases = [
             (&LENGTH, "2.4 mm", 0.0024),
             (&LENGTH, "350 mm", 0.35),
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_a_quantity_is_told_what_it_may_be() {
+    fn an_invalid_quantity_is_refused_with_the_valid_units() {
         let unit_missing = "a unit is missing: write \"2.4 m\" or \"2.4 cm\" or \"2.4 mm\"";
         assert_eq!(LENGTH.parse("2.4").unwrap_err(), unit_missing);
         for text in
@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn what_overflows_is_refused() {
+    fn overflow_is_refused() {
         assert!(ANGLE.parse("1e308 deg").is_err());
     }
 

@@ -1,4 +1,4 @@
-//! Finds contradictions between walls that are valid each by itself.
+//! Finds contradictions between walls, each of which is valid.
 //!
 //! | finding | severity | when |
 //! |---|---|---|
@@ -124,7 +124,7 @@ impl fmt::Display for Flaw {
             Self::NarrowGap { width, least, .. } => write!(
                 f,
                 "the gap of {width:.3} m between two collinear walls is narrower than the cone at \
-                 the nearest range ({least:.3} m): the sonar hears its edges as a wall, so close it"
+                 the nearest range ({least:.3} m): the sonar measures its edges as a wall, so close it"
             ),
             Self::Unreachable { needs } => write!(
                 f,

@@ -2,17 +2,15 @@
 
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "a test should stop")]
 
-#[path = "../benches/rooms/mod.rs"]
-mod rooms;
-
 use proptest::collection::vec;
 use proptest::prelude::*;
-use rooms::{inside, rooms};
 use sonarfix::map::image::{MAGIC, VERSION, checksum};
 use sonarfix::map::{Map, MapError, Wall, WallId};
 use sonarfix::pose::Point;
 use sonarfix::units::Metres;
 use sonarfix_map::{BakeError, bake};
+
+use crate::rooms::{inside, rooms};
 
 const HEADER: usize = 32;
 
@@ -61,7 +59,7 @@ fn ids(map: &Map, point: Point, reach: f32) -> Vec<u32> {
 proptest! {
     /// Every wall within reach is found once, and none that is farther than the reach by more than a cell.
     #[test]
-    fn what_is_near_is_found_once(
+    fn near_walls_are_found_once(
         walls in any_walls(),
         which in any::<prop::sample::Index>(),
         beside in (-12.0_f32..12.0, -12.0_f32..12.0),
@@ -226,7 +224,7 @@ fn every_other_length_is_refused() {
 }
 
 #[test]
-fn it_is_said_what_is_wrong() {
+fn each_error_is_named() {
     let image = small();
     let with = |at: usize, bytes: &[u8]| {
         let mut image = image.clone();
@@ -262,7 +260,7 @@ fn alignment_does_not_matter() {
 }
 
 #[test]
-fn a_point_that_is_nowhere_has_no_wall_or_all() {
+fn a_point_that_is_not_finite_has_no_wall_or_all() {
     let walls = rooms(100);
     let image = bake(&walls).unwrap();
     let map = Map::read(&image).unwrap();
@@ -290,7 +288,7 @@ fn a_point_that_is_nowhere_has_no_wall_or_all() {
 
 /// Every wall is found, with fewer and with more walls than two bytes can count.
 #[test]
-fn references_are_as_wide_as_they_need_to_be() {
+fn references_have_the_smallest_width() {
     for count in [16_384, 16_385] {
         let walls = rooms(count);
         let image = bake(&walls).unwrap();
@@ -323,7 +321,7 @@ fn maps_are_as_small_as_promised() {
 }
 
 #[test]
-fn what_cannot_be_baked_is_refused() {
+fn an_invalid_map_is_not_baked() {
     assert_eq!(bake(&[]), Err(BakeError::NoWall));
     // Its far end exceeds the range of f32.
     let beyond = Wall::new(Point::new(3.4e38, 0.0), Point::new(3.0e38, 1e38)).unwrap();

@@ -512,7 +512,7 @@ const REST: [Case; 8] = [
 ];
 
 #[test]
-fn every_fault_has_its_line_and_key() {
+fn every_invalid_fault_has_its_line_and_key() {
     let tables: [&[Case]; 10] =
         [&FORMAT, &MISSING, &UNITS, &TYPES, &MAP, &CONFIG, &ROBOT, &PATH, &HARDWARE, &REST];
     let faults: Vec<_> = tables.into_iter().flatten().filter_map(fault).collect();
@@ -536,7 +536,7 @@ fn fault(case: &Case) -> Option<String> {
 
 /// Complete messages, with lines counted by hand.
 #[test]
-fn an_error_reads_as_a_compiler_writes_it() {
+fn an_error_has_the_format_of_a_compiler() {
     let map = "format = 1\n\n[map]\nunit = \"cm\"\n\n[[map.wall]]\nname = \"a\"\nfrom = [0, 0]\n\
                to = [100, 0]\n\n[[map.wall]]\nname = \"b\"\nfrom = [0, 0]\nto = [0, 0]\n";
     let cases = [
@@ -628,7 +628,7 @@ fn map_and_robot_may_be_files_of_their_own() {
 }
 
 #[test]
-fn what_may_be_left_out_may_be() {
+fn optional_keys_may_be_omitted() {
     let text = PAPER.replace("laps = 4", "").replace("clearance = \"20 cm\"", "");
     let scenario = parse(&text).unwrap();
     assert!((scenario.path.duration() - 312.0).abs() < 1e-9);
@@ -646,7 +646,7 @@ fn a_wheel_is_read_in_either_way_and_may_be_mirrored() {
 }
 
 #[test]
-fn a_ranger_is_read_by_its_name_or_by_what_differs() {
+fn a_ranger_is_a_name_or_a_table_of_differences() {
     let robot = |ranger: &str| {
         let text = PAPER.replace("cycle = \"100 ms\"", "").replace("ranger = {", ranger);
         parse(&text).unwrap().robot

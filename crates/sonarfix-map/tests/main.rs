@@ -6,3 +6,4 @@ mod formats;
 mod maps;
 mod paper;
 mod path;
+mod rooms;

@@ -44,7 +44,7 @@ fn flaw(first: [f64; 4], second: [f64; 4]) -> Option<Flaw> {
 const WALL: [f64; 4] = [0.0, 0.0, 4.0, 0.0];
 
 #[test]
-fn what_lies_on_a_wall_is_an_error() {
+fn a_point_on_a_wall_is_an_error() {
     assert_eq!(flaw(WALL, WALL), Some(Flaw::Duplicate { of: 0 }));
     assert_eq!(flaw(WALL, [4.0, 0.0, 0.0, 0.000_5]), Some(Flaw::Duplicate { of: 0 }));
     for (second, expected) in [
@@ -63,7 +63,7 @@ fn what_lies_on_a_wall_is_an_error() {
 }
 
 #[test]
-fn what_cuts_through_a_wall_is_told_with_the_place() {
+fn a_path_through_a_wall_is_refused_with_its_place() {
     let Some(Flaw::Crossing { with: 0, at: [x, y] }) = flaw(WALL, [1.0, -1.0, 3.0, 1.0]) else {
         panic!("no crossing");
     };
@@ -242,7 +242,7 @@ proptest! {
     /// For walls broken into pieces that are displaced by less than the tolerance: every point of the pieces is within the
     /// tolerance of the joined wall, and every point of that wall is within the tolerance of a piece.
     #[test]
-    fn simplifying_keeps_the_tolerance(
+    fn simplification_stays_within_the_tolerance(
         lines in prop::collection::vec((0.0_f64..6.0, 0.0_f64..6.0, -3.2_f64..3.2, 2..6_u8), 1..6),
         shakes in prop::collection::vec(-1.0_f64..1.0, 64),
         tolerance in 0.001_f64..0.05,

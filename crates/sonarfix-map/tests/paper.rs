@@ -37,7 +37,7 @@ fn the_path_is_four_laps_in_1248_seconds() {
 }
 
 #[test]
-fn the_path_is_the_rectangle_left_round() {
+fn the_path_is_the_rectangle_counter_clockwise() {
     let path = paper().unwrap().path;
     let lap = 312.0;
     let cases = [

@@ -95,7 +95,7 @@ fn laps_do_not_add_up_rounding() {
 }
 
 #[test]
-fn what_is_not_a_path_is_refused() {
+fn an_invalid_path_is_refused() {
     let good = plan(&[[1.0, 0.0], [1.0, 1.0]]);
     let with_corners =
         |corners: &[[f64; 2]]| PathPlan { corners: corners.to_vec(), ..good.clone() };

@@ -117,7 +117,7 @@ fn sensors(millis: u64, ticks: i32) -> Sensors {
 }
 
 #[test]
-fn a_localizer_is_asked_step_by_step() {
+fn a_localizer_is_driven_by_messages() {
     let map = map();
     let answers = asked(&[
         Request::Begin(begin(SessionKind::Localizer), &map),
@@ -196,7 +196,7 @@ fn a_loop_drives_its_devices() {
 }
 
 #[test]
-fn what_does_not_fit_is_refused_and_the_next_session_begins() {
+fn an_unsupported_session_is_refused_and_the_next_begins() {
     let map = map();
     let mut damaged = map.clone();
     damaged[40] ^= 1;
@@ -235,7 +235,7 @@ fn what_does_not_fit_is_refused_and_the_next_session_begins() {
 
 /// A closed line, or bytes that are not a message, end the program without an answer.
 #[test]
-fn a_broken_line_ends_it() {
+fn a_broken_connection_ends_the_session() {
     let mut pc = Line(Wire::default());
     let mut space = vec![0; 4_096];
     let map = map();

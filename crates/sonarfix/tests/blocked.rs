@@ -44,7 +44,7 @@ fn an_occluded_wall_is_avoided_and_returns_to_the_prior_with_time() {
     let mut localizer = localizer(&walls, 0.01);
     let favourite = localizer.aim().unwrap();
     assert!(matches!(localizer.fix(&favourite, Some(Metres(0.3))), Fix::Gated(_)));
-    assert_ne!(localizer.aim().unwrap().wall, favourite.wall, "something stands before the first");
+    assert_ne!(localizer.aim().unwrap().wall, favourite.wall, "the first wall is occluded");
     // At the same bearing it is the same wall, with a lower probability of success.
     let success = |localizer: &Localizer| {
         let why = localizer.aim_at(favourite.bearing).unwrap().why;

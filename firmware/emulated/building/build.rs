@@ -5,11 +5,11 @@
 use std::path::PathBuf;
 use std::{env, fs};
 
-#[path = "../../../crates/sonarfix-map/benches/rooms/mod.rs"]
+#[path = "../../../crates/sonarfix-map/tests/rooms/mod.rs"]
 mod rooms;
 
 fn main() {
-    println!("cargo:rerun-if-changed=../../../crates/sonarfix-map/benches/rooms/mod.rs");
+    println!("cargo:rerun-if-changed=../../../crates/sonarfix-map/tests/rooms/mod.rs");
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
     for count in [100, 1_000, 10_000, 100_000] {
         let image = sonarfix_map::bake(&rooms::rooms(count)).expect("the building can be baked");

@@ -1,7 +1,7 @@
 //! Standard output and error of the command. The macros of this module replace those of the standard
 //! library, which panic if the stream is closed or full.
 //!
-//! - A closed standard output (`sonarfix … | head -2`) ends the command quietly: nobody reads on.
+//! - A closed standard output (`sonarfix … | head -2`) ends the command quietly.
 //! - A full one ends it with an error message.
 //! - What cannot be written to standard error is dropped.
 

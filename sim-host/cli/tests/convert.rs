@@ -96,7 +96,7 @@ fn robotlaser_of_a_raw_log_gives_the_mount_and_no_reference() {
 }
 
 #[test]
-fn the_short_form_and_what_is_wrong_with_it() {
+fn the_short_form_and_its_errors() {
     let (dir, converted, skipped_lines) = carmen(
         "O 1 0 0 0\n\
          S 2 1 0 0 5 6 0.5 4 1 2 0 4\n\
@@ -211,7 +211,7 @@ fn replay(folder: &Path) -> Summary {
 }
 
 #[test]
-fn what_is_missing_is_named() {
+fn a_missing_key_is_named() {
     let dir = TempDir::new().unwrap();
     let out = dir.path().join("out");
     let lego = Lego { from: dir.path(), to: &out, nominal: Nominal::Fitted, encoder_lag: 0.0 };

@@ -81,7 +81,7 @@ fn a_long_line_is_not_echoed() {
 }
 
 #[test]
-fn a_directory_that_cannot_be_made_is_an_error_before_the_work() {
+fn a_directory_that_cannot_be_created_is_an_early_error() {
     let begun = std::time::Instant::now();
     let arguments = ["paper", "--runs", "100000", "--out", "tests/robot.toml/report"];
     let output = sonarfix(&arguments).output().unwrap();

@@ -68,7 +68,7 @@ fn every_seed_gives_a_plan_that_can_be_driven() {
 
 /// By an independent oracle: no wall and no unmapped object is closer to the path than the clearance.
 #[test]
-fn the_path_keeps_clear_of_walls_and_furniture() {
+fn the_path_has_clearance_from_walls_and_furniture() {
     for seed in SEEDS.step_by(5) {
         let scenario = FloorPlan::new(seed).scenario().unwrap();
         let walls = scenario.floor.named_walls().iter().map(|wall| ([wall.from(), wall.to()], 0.0));

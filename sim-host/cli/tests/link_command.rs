@@ -67,7 +67,7 @@ fn send(stream: &mut TcpStream, sender: &mut Sender<Telemetry>, ack: &Telemetry,
 }
 
 #[test]
-fn a_command_is_sent_until_it_is_answered_and_done_once() {
+fn a_command_is_repeated_until_answered_and_executed_once() {
     let (port, robot) = robot(2, CommandResult::Done);
     let output = sonarfix(&["command", "--port", &port, "set-pose", "1.5", "-2", "-90"]);
     let (stdout, stderr) = printed(&output);
@@ -80,7 +80,7 @@ fn a_command_is_sent_until_it_is_answered_and_done_once() {
 }
 
 #[test]
-fn answers_are_printed_in_words() {
+fn answers_are_printed_as_text() {
     let (port, robot) = robot(0, CommandResult::Refused(CommandError::NoMap));
     let output = sonarfix(&["command", "--port", &port, "start"]);
     assert!(!output.status.success());
@@ -97,7 +97,7 @@ fn answers_are_printed_in_words() {
 }
 
 #[test]
-fn a_robot_that_does_not_answer_is_an_error_in_words() {
+fn a_robot_that_does_not_answer_is_an_error() {
     let (port, robot) = robot(usize::MAX, CommandResult::Done);
     let output = sonarfix(&["command", "--port", &port, "stop"]);
     assert!(!output.status.success());

@@ -71,7 +71,7 @@ fn a_flawed_map_is_checked_simplified_baked_and_drawn() {
 }
 
 #[test]
-fn errors_are_printed_in_words() {
+fn errors_are_printed_as_text() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     fs::write(dir.join("room.csv"), FLAWED).unwrap();

@@ -276,7 +276,7 @@ fn a_restart_whose_first_frames_are_lost_begins_another_log() {
 }
 
 #[test]
-fn a_monitor_that_comes_late_records_from_an_estimate() {
+fn a_monitor_that_connects_late_records_from_an_estimate() {
     let scenario = scenario(CLASSROOM);
     let robot = Robot::of(&scenario, 1);
     let (_dir, path) = folder();

@@ -40,7 +40,7 @@ fn exact_scans_lead_to_the_exact_pose() {
 }
 
 #[test]
-fn without_ranges_the_localizer_is_the_encoders() {
+fn without_ranges_the_localizer_equals_dead_reckoning() {
     let (log, reference) = recording(SECONDS, Sonar::Silent);
     let s = replay(&log, &reference).summary;
     let difference = s.position_rms.unwrap() - s.odometry_position_rms.unwrap();
@@ -101,7 +101,7 @@ fn implausible_lines_are_skipped_and_reported() {
         "log line 8: the log has a start record already",
         "log line 9: the log has both ticks and wheels",
         "log line 10: a wheel rolled faster than max_wheel_speed",
-        "log line 12: `tocks` is none of ticks, wheels, range, scan, skip, start, resume",
+        "log line 12: `tocks` is not one of ticks, wheels, range, scan, skip, start, resume",
         "log line 13: the left count is missing",
     ];
     assert_eq!(reported, expected);
@@ -165,7 +165,7 @@ fn strict_ends_at_the_first_line_that_is_wrong() {
 }
 
 #[test]
-fn what_is_no_log_is_refused() {
+fn a_file_that_is_not_a_log_is_refused() {
     let error = |log: &str| try_replay(log.as_bytes(), "", false).err().unwrap().to_string();
     let header = "the log must start with the line `sonarfix-log,1`";
     assert_eq!(error(""), header);
@@ -244,7 +244,7 @@ proptest! {
 
     /// No text after the first line stops a replay.
     #[test]
-    fn nothing_stops_a_replay(
+    fn no_input_stops_a_replay(
         lines in prop::collection::vec(
             (
                 prop::sample::select(vec!["ticks", "wheels", "range", "scan", "start", "", "#", "x"]),

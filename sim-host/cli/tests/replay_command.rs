@@ -63,7 +63,7 @@ fn without_a_reference_there_are_no_errors_to_print() {
     let text = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success() && text.contains("no reference;"), "{text}");
     let missing = sonarfix(dir.path(), &["replay", "log.csv", "--reference", "other.csv"]);
-    assert!(!missing.status.success(), "a reference that is asked for must be there");
+    assert!(!missing.status.success(), "a requested reference must exist");
 }
 
 #[test]
@@ -72,12 +72,12 @@ fn ten_lines_are_printed_and_the_rest_counted() {
     let dir = folder(&format!("{log}{}", "?\n".repeat(25)), &reference);
     let output = sonarfix(dir.path(), &["replay", "log.csv"]);
     let stderr = String::from_utf8_lossy(&output.stderr);
-    let first = format!("skipped: log line {}: `?` is none of", log.lines().count() + 1);
+    let first = format!("skipped: log line {}: `?` is not one of", log.lines().count() + 1);
     assert!(stderr.starts_with(&first), "{stderr}");
     assert_eq!(stderr.lines().count(), 11);
     assert!(stderr.ends_with("skipped: 15 more lines\n"), "{stderr}");
     assert!(String::from_utf8_lossy(&output.stdout).contains("lines skipped 25 of"));
     let strict = sonarfix(dir.path(), &["replay", "log.csv", "--strict"]);
     let stderr = String::from_utf8_lossy(&strict.stderr);
-    assert!(!strict.status.success() && stderr.contains("`?` is none of"), "{stderr}");
+    assert!(!strict.status.success() && stderr.contains("`?` is not one of"), "{stderr}");
 }

@@ -141,7 +141,10 @@ fn the_page_draws_without_an_error() {
         assert_eq!(dom.matches("<svg").count(), 5);
         assert!(dom.contains("<h1>A &lt;small&gt; room</h1>"));
         assert!(dom.contains("<td>0.125 deg</td>"));
-        assert!(dom.contains("\"source\":[\"obstacle\""), "the player does not know what was met");
+        assert!(
+            dom.contains("\"source\":[\"obstacle\""),
+            "the player does not have the source of the echo"
+        );
         assert!(dom.contains("0.0 s of 19.9 s"), "the player shows no time");
     }
 }

@@ -38,11 +38,11 @@ fn an_ideal_sonar_differs_from_the_real_one() {
     let scenario = sonarfix_map::Scenario::paper().unwrap();
     let ideal = compare(&folder, &SensorModel::ideal(&scenario)).unwrap();
     let apart = page::mean_difference(&ideal);
-    assert!(apart > 0.1, "the comparison sees no difference: {apart}");
+    assert!(apart > 0.1, "the comparison finds no difference: {apart}");
 }
 
 #[test]
-fn the_committed_page_is_this_comparison() {
+fn the_committed_page_is_current() {
     let Some(comparison) = nxt() else {
         return;
     };

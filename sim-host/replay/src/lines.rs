@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_come_whole_whatever_the_buffer() {
+    fn lines_are_whole_with_any_buffer() {
         for buffer in [1, 2, 3, 100] {
             let lines = all(b"one\n\nthr\xc3\xa9e\r\n\xff\nfive", buffer);
             let expected = [
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_too_long_is_skipped_and_not_kept() {
+    fn an_overlong_line_is_skipped_and_not_stored() {
         let mut text = vec![b'x'; 3 * LONGEST];
         text.extend(b"\nnext\n");
         let lines = all(&text, 1 << 13);

@@ -89,7 +89,7 @@ pub enum Malformed {
     #[error("the line is not UTF-8 text")]
     NotText,
     /// Its kind is unknown.
-    #[error("`{0}` is none of ticks, wheels, range, scan, skip, start, resume")]
+    #[error("`{0}` is not one of ticks, wheels, range, scan, skip, start, resume")]
     UnknownKind(String),
     /// It ends too early.
     #[error("the {0} is missing")]
@@ -335,9 +335,9 @@ mod tests {
     }
 
     #[test]
-    fn every_malformed_line_says_what_is_wrong() {
+    fn every_malformed_line_has_its_error() {
         let cases = [
-            ("tick,1,2,3", "`tick` is none of ticks, wheels, range, scan, skip, start, resume"),
+            ("tick,1,2,3", "`tick` is not one of ticks, wheels, range, scan, skip, start, resume"),
             ("range,1,2,3,x", "the wall is `x`, which is not a whole number, from 0"),
             ("range,1,2,3,4,5", "there are more fields than a record of this kind has"),
             ("resume,1,2,3,4,5,6,7,8", "the x is missing"),
@@ -374,7 +374,7 @@ mod tests {
             ("start,0,0,0,0,1", "the deviation of the heading is missing"),
             (
                 "\u{1b}[31m,0",
-                "`\\u{1b}[31m` is none of ticks, wheels, range, scan, skip, start, resume",
+                "`\\u{1b}[31m` is not one of ticks, wheels, range, scan, skip, start, resume",
             ),
         ];
         for (line, reason) in cases {

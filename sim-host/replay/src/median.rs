@@ -74,7 +74,7 @@ mod tests {
     }
 
     #[test]
-    fn extremes_have_a_bin_too() {
+    fn extremes_have_a_bin() {
         let mut median = Median::default();
         assert_eq!(median.value(), None);
         for value in [0.0, 1e-30, 1e30] {

@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_come_one_by_one_and_what_is_wrong_is_told() {
+    fn rows_are_read_one_by_one_with_their_errors() {
         let text = format!("{HEADER}\n1,2,3,0.5\n\n# no row\n0.5,0,0,0\n2,x,0,0\n3,4,5\n4,5,6,7\n");
         let mut reference = open(&text);
         let mut complaints = Vec::new();
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn between_two_rows_the_pose_is_interpolated_the_short_way_round() {
+    fn the_heading_is_interpolated_along_the_smaller_angle() {
         let text = format!("{HEADER}\n0,0,0,3.1\n1,2,4,-3.1\n9,0,0,0\n");
         let mut reference = open(&text);
         reference.read(|_, _| Ok(())).unwrap();

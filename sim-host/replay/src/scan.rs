@@ -63,7 +63,7 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_return_in_the_cone_is_heard() {
+    fn the_nearest_return_in_the_cone_is_used() {
         assert_eq!(is_detected(-0.5), Some(2.0), "both edges belong to the cone");
         assert_eq!(is_detected(-0.6), Some(3.0), "a nearer one outside does not");
         assert_eq!(is_detected(-1.0), Some(3.0), "nearer than the minimum range");

@@ -91,7 +91,7 @@ mod tests {
         /// For any number of records: at most the capacity, at least half of it, evenly spaced
         /// from the first.
         #[test]
-        fn what_is_kept_is_bounded_and_even(count in 1_u64..5000, capacity in 2_usize..64) {
+        fn kept_samples_are_bounded_and_evenly_spaced(count in 1_u64..5000, capacity in 2_usize..64) {
             let mut spacing = Spacing::ALL;
             let mut kept = Vec::new();
             for value in 0..count {

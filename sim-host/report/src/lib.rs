@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn a_replay_without_truth_shows_what_there_is() {
+    fn a_replay_without_truth_omits_the_errors() {
         let mut trace = trace(100);
         for tick in &mut trace.ticks {
             tick.truth = None;
@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_without_ticks_gives_a_report_that_says_so() {
+    fn a_run_without_ticks_is_reported_as_such() {
         let html = html(&Trace::default());
         assert!(html.contains("there is nothing to draw"));
         assert!(!html.contains("<svg"));
@@ -242,7 +242,7 @@ mod tests {
     /// Neither the figures nor the data contain NaN or infinity, and a run of a single tick does
     /// not divide by its duration of zero.
     #[test]
-    fn numbers_that_are_none_stay_out() {
+    fn numbers_that_are_not_finite_are_omitted() {
         let mut broken = trace(100);
         broken.ticks[50].estimate.pose.x = f64::NAN;
         broken.ticks[51].estimate.deviation = [f64::INFINITY; 7];

@@ -81,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_html_reads_as_markup_is_escaped() {
+    fn markup_is_escaped() {
         assert_eq!(
             escape(r#"<a href="x" title='y'>Tom & Ann</a>"#),
             "&lt;a href=&quot;x&quot; title=&#39;y&#39;&gt;Tom &amp; Ann&lt;/a&gt;"
@@ -99,7 +99,7 @@ mod tests {
 
     /// A title that resembles a placeholder remains a title.
     #[test]
-    fn what_is_filled_in_is_not_filled_again() {
+    fn a_filled_placeholder_is_not_filled_again() {
         let values = [("a", Cow::Borrowed("{{b}}")), ("b", Cow::Borrowed("B"))];
         assert_eq!(fill("<{{a}}|{{b}}|{{c}}>", &values), "<{{b}}|B|>");
     }

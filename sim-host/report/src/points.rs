@@ -124,7 +124,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_short_series_is_left_alone() {
+    fn a_short_series_is_unchanged() {
         let points: Vec<Point> = (0..2_000).map(|n| (f64::from(n), 1.0)).collect();
         assert_eq!(decimate(&points), points);
     }
@@ -146,7 +146,7 @@ mod tests {
 
     /// A lap keeps its corners exactly, and no points between them.
     #[test]
-    fn a_path_keeps_its_corners_and_little_else() {
+    fn a_thinned_path_keeps_its_corners() {
         let along = |n: i32| f64::from(n) * 0.01;
         let east = (0..5_000).map(|n| (along(n), 0.0));
         let north = (0..5_000).map(|n| (along(5_000), along(n)));
@@ -167,13 +167,13 @@ mod tests {
     }
 
     #[test]
-    fn a_path_that_never_moved_is_its_ends() {
+    fn a_path_without_motion_is_reduced_to_its_ends() {
         assert_eq!(simplify(&vec![(1.0, 1.0); 5_000], 0.0), [(1.0, 1.0); 2]);
         assert!(simplify(&[], 0.1).is_empty());
     }
 
     #[test]
-    fn a_line_that_leaves_and_returns_becomes_two() {
+    fn a_line_that_leaves_the_area_and_returns_becomes_two() {
         let line = [(0.5, 0.5), (0.5, 2.0), (0.7, 2.0), (0.7, 0.5), (0.6, 0.5)];
         let pieces = clip(&line, &(0.0..1.0), &(0.0..1.0));
         let first = vec![(0.5, 0.5), (0.5, 1.0)];

@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_keep_nine_digits_and_no_noise() {
+    fn cells_have_nine_significant_digits() {
         assert_eq!([0.0, -20.0, 0.5, 2e-4].map(cell), ["0", "-20", "0.5", "0.0002"]);
         assert_eq!(cell(5.6e-5), "5.60000000e-5");
     }

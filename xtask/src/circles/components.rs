@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn a_graph_without_circles_has_none() {
+    fn an_acyclic_graph_has_no_circles() {
         assert!(circles(3, &[edge(0, 1, 1), edge(0, 2, 2), edge(1, 2, 3)]).is_empty());
     }
 

@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reexport_of_a_childs_items_is_a_declaration_unless_it_is_used() {
+    fn a_reexport_of_a_childs_items_counts_only_if_used() {
         let module = "mod child { pub struct C; pub fn f() {} } pub use child::C;";
         assert!(shown(module).is_empty());
         assert_eq!(shown(&format!("{module} pub struct P(C);")), [" → ::child"]);

@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn a_call_by_register_leads_to_what_a_table_lists() {
+    fn an_indirect_call_leads_to_the_entries_of_a_table() {
         let functions = |start| vec![(1, start), (2, function("listed", 50, &[], &[]))];
         // A table at 20 refers to another at 30, which contains the function.
         let data = || vec![(20, vec![30]), (30, vec![2])];
@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn recursion_is_an_error_by_whatever_way() {
+    fn recursion_by_any_call_is_an_error() {
         let itself = vec![(1, function("start", 8, &[1], &[]))];
         let one_another =
             vec![(1, function("start", 8, &[2], &[])), (2, function("a", 8, &[1], &[]))];
@@ -252,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_that_nobody_knows_is_an_error() {
+    fn an_unknown_frame_is_an_error() {
         let mut start = function("start", 8, &[], &[]);
         start.stack.is_unbounded = true;
         assert!(depth(vec![(1, start)], Vec::new()).is_err());

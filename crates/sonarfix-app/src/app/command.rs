@@ -115,7 +115,7 @@ impl<'m, F: NorFlash> App<'m, F> {
         self.check_start_with(now, config, known)
     }
 
-    /// Not inlined, and the localizer dropped: it is large, and the stack of whoever goes on to the flash is short.
+    /// Not inlined, and the localizer is dropped, because it is large and the callers that write to flash need little stack.
     #[inline(never)]
     pub(super) fn check_start_with(
         &self,

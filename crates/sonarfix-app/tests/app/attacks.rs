@@ -318,7 +318,7 @@ fn a_recorded_start_does_not_start_the_robot() {
         let flash = bench.switched_off();
         bench = Bench::switched_on(&baked, flash);
     }
-    // Whoever asks for a session is obeyed.
+    // A request for a session is always granted.
     assert_eq!(bench.order(&Command::SetPose(start())), DONE);
     assert_eq!(bench.order(&Command::Start), DONE);
     // An old stop stops it.

@@ -1,4 +1,4 @@
-//! What commands do, and what is left of it when the power comes back.
+//! Effects of commands, also after a power cycle.
 
 use sonarfix::ekf::StandardDeviations;
 use sonarfix::localizer::Start;

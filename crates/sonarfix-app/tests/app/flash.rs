@@ -1,12 +1,12 @@
 //! A simulated NOR flash whose power can be cut at any step of any write or erase.
 //!
 //! # What an interrupted operation leaves
-//! A cell that was being changed as the power went holds its old value, its new value, or a charge
-//! near the threshold, which reads as 0 or 1, differently each time. An erase works on all cells of
-//! a sector at once, and many chips first program them all to 0: so every bit of the sector may be
-//! old, 0, 1 or unstable. A write works on one word (STM32F405) or one page (flash of the RP2350)
-//! at a time: bits of it that were to become 0 may be 1, 0 or unstable; other bits do not change.
-//! An unstable bit stays so until it is programmed to 0 or erased, each time to the end.
+//! A cell whose change was interrupted holds its old value, its new value, or a charge
+//! near the threshold, which reads randomly as 0 or 1. An erase changes all cells of
+//! a sector at once, and many chips first program them all to 0, so every bit of the sector may be
+//! old, 0, 1 or unstable. A write changes one word (STM32F405) or one page (flash of the RP2350)
+//! at a time: its cleared bits may be 1, 0 or unstable; other bits do not change.
+//! A bit stays unstable until it is completely programmed to 0 or erased.
 
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
@@ -22,9 +22,9 @@ const ERASE_STEPS: usize = 8;
 /// Why an operation failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FlashError {
-    /// The power went in the middle of it, or is gone.
+    /// The power was cut during the operation or before it.
     NoPower,
-    /// It asked for what this flash cannot do.
+    /// The flash does not support the operation.
     Misused,
 }
 
@@ -34,7 +34,7 @@ impl NorFlashError for FlashError {
     }
 }
 
-/// Numbers that look random, from a seed (`SplitMix64`).
+/// Pseudo-random numbers from a seed (`SplitMix64`).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Random(u64);
 
@@ -58,7 +58,7 @@ impl Random {
     }
 }
 
-/// How many of 256 bits of an interrupted operation end in each state; the others are unstable.
+/// Numbers of bits, of 256 of an interrupted operation, that end in each state; the others are unstable.
 #[derive(Debug, Clone, Copy)]
 struct Mix {
     old: usize,
@@ -84,11 +84,11 @@ impl Mix {
     }
 }
 
-/// The supply.
+/// The power supply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Power {
     On,
-    /// It goes in the step after so many more.
+    /// It is cut after this number of further steps.
     OnFor(usize),
     Gone,
 }
@@ -109,17 +109,17 @@ pub struct SimFlash {
     pub written: usize,
     /// Sectors erased so far.
     pub erased: usize,
-    /// Whether writes are ignored, as by the flash of an emulator.
+    /// Whether writes are ignored, as in an emulator.
     pub is_read_only: bool,
 }
 
 impl SimFlash {
-    /// A flash as it leaves the factory, which writes words.
+    /// An erased flash that writes words.
     pub fn new() -> Self {
         Self::filled(0xFF)
     }
 
-    /// A flash in which every byte is this.
+    /// A flash filled with this byte.
     pub fn filled(byte: u8) -> Self {
         Self {
             bytes: vec![byte; SECTOR * SECTORS],
@@ -134,13 +134,13 @@ impl SimFlash {
         }
     }
 
-    /// A flash that writes so many bytes at once, within units of this length.
+    /// The same with write units of this length.
     pub fn writing(self, unit: usize) -> Self {
         Self { unit, ..self }
     }
 
-    /// Lets the power go in the step after so many more. The seed decides what that leaves, and
-    /// how unstable bits read.
+    /// Cuts the power after this number of further steps. The seed determines the contents after it, and
+    /// the values of unstable bits.
     pub fn cut_after(&mut self, steps: usize, seed: u64) {
         self.power = Power::OnFor(steps);
         self.random = Random::new(seed);
@@ -151,12 +151,12 @@ impl SimFlash {
         self.power = Power::On;
     }
 
-    /// Overwrites one byte, as no flash would of its own.
+    /// Overwrites one byte, which simulates damage.
     pub fn damage(&mut self, at: usize, to: u8) {
         self.bytes[at] = to;
     }
 
-    /// Counts one step; `false` if the power goes in it.
+    /// Counts one step; `false` if the power is cut in it.
     fn step(&mut self) -> Result<bool, FlashError> {
         self.steps += 1;
         match self.power {
@@ -171,8 +171,8 @@ impl SimFlash {
         Ok(false)
     }
 
-    /// Writes bytes within one unit, which only clears bits: that is what NOR flash is. A cut leaves
-    /// one bit unstable at least, if that bit was changing: it is single bits that are overlooked.
+    /// Writes bytes within one unit, which only clears bits, as NOR flash does. A cut leaves
+    /// at least one changing bit unstable, because single unstable bits are the hardest case.
     fn write_unit(&mut self, from: usize, bytes: &[u8]) -> Result<(), FlashError> {
         if !self.step()? {
             let mix = Mix { one: 0, ..Mix::draw(&mut self.random) };
@@ -208,7 +208,7 @@ impl SimFlash {
         Ok(())
     }
 
-    /// Leaves these bits of a byte in any state.
+    /// Leaves these bits of a byte in a random state.
     fn tear(&mut self, at: usize, bits: u8, mix: Mix) {
         for bit in (0..8).map(|bit| 1 << bit).filter(|bit| bits & bit != 0) {
             let drawn = self.random.below(256);

@@ -65,7 +65,7 @@ impl pwm::SetDutyCycle for Pwm {
     }
 }
 
-/// A ranger that hears nothing, or does not even listen.
+/// A ranger without echoes, or a missing one.
 pub struct Sonar {
     pub is_there: bool,
     is_pinging: bool,
@@ -88,7 +88,7 @@ impl Ranger for Sonar {
         Ok(std::mem::take(&mut self.is_pinging).then_some(Err(silence)))
     }
 
-    /// As a driver of a pulse ranger does.
+    /// The same check as the driver of a pulse ranger.
     fn configure(&mut self, settings: &RangerSettings) -> Result<(), UnsupportedKind> {
         let is_pulse = matches!(settings.kind, RangerKind::Pulse(_));
         if is_pulse { Ok(()) } else { Err(UnsupportedKind) }
@@ -116,14 +116,14 @@ impl Link for Line {
     }
 }
 
-/// What lies in the flash beside the store.
+/// The contents of the flash besides the store.
 pub struct Baked {
     pub map: Vec<u8>,
     pub config: Vec<u8>,
 }
 
 impl Baked {
-    /// A room and a robot; behind both, the flash is as it left the factory.
+    /// A room and a robot, each followed by erased flash.
     pub fn new(config: &RobotConfig) -> Self {
         let corners = [(0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (0.0, 3.0), (0.0, 0.0)];
         let point = |(x, y): (f32, f32)| Point::new(x, y);
@@ -155,7 +155,7 @@ pub fn servo(is_there: bool) -> Servo<Pwm> {
     Servo::new(Pwm { is_there, duty: 0 }, frame)
 }
 
-/// A start that is known well.
+/// A start pose with small deviations.
 pub fn start() -> Start {
     Start {
         pose: Pose::new(1.0, 1.5, Radians(0.5)),
@@ -170,7 +170,7 @@ pub struct Bench<'m> {
     pub hardware: Hardware,
     pub line: Line,
     pub now: u64,
-    /// What its first poll did.
+    /// The result of its first poll.
     pub first: Polled,
     receiver: Receiver<Telemetry>,
     sender: Sender<SessionCommand>,
@@ -229,7 +229,7 @@ impl<'m> Bench<'m> {
         frames.map(|frame| frame.message).collect()
     }
 
-    /// Opens a session, and begins its sequence numbers again.
+    /// Opens a session, and restarts the sequence numbers.
     pub fn open_session(&mut self) {
         self.sender = Sender::starting_at(1);
         let CommandResult::Session(session) = self.order(&Command::OpenSession) else {

@@ -1,4 +1,4 @@
-//! When a running robot writes down what it has learned.
+//! When a running robot writes its calibration.
 
 use sonarfix::config::Config;
 use sonarfix::ekf::{StandardDeviations, StateEstimate};
@@ -9,7 +9,7 @@ use sonarfix_app::store::{Resumed, SavePolicy};
 
 use crate::rig::config;
 
-/// A localizer whose track width is known this much better than what was written.
+/// A localizer whose track width has this ratio of its deviation to the written one.
 fn localizer(config: Config, share: f32) -> (Localizer<'static>, StandardDeviations) {
     let written = Resumed::afresh(&config).deviation;
     let track_width_error = written.track_width_error * share;
@@ -25,20 +25,20 @@ fn at(seconds: u64) -> Instant {
 }
 
 #[test]
-fn what_is_better_by_a_fifth_is_written_in_a_pause_a_minute_later() {
+fn an_improvement_by_a_fifth_is_written_in_a_pause_after_a_minute() {
     let (localizer, written) = localizer(config().localizer, 0.7);
     let mut save_policy = SavePolicy::new(at(0), written);
-    assert!(!save_policy.is_due(at(59), &localizer), "the last record is no minute old");
+    assert!(!save_policy.is_due(at(59), &localizer), "the last record is less than a minute old");
     assert!(save_policy.is_due(at(60), &localizer));
     save_policy.rolled(at(60));
-    assert!(!save_policy.is_due(at(61), &localizer), "it has just rolled");
+    assert!(!save_policy.is_due(at(61), &localizer), "the wheels have just rolled");
     assert!(save_policy.is_due(at(62), &localizer));
     save_policy.wrote(at(62), localizer.filter().standard_deviations());
-    assert!(!save_policy.is_due(at(1_000), &localizer), "it has learned nothing since");
+    assert!(!save_policy.is_due(at(1_000), &localizer), "the calibration has not improved");
 }
 
 #[test]
-fn what_is_hardly_better_is_not_written() {
+fn a_small_improvement_is_not_written() {
     let (localizer, written) = localizer(config().localizer, 0.9);
     assert!(!SavePolicy::new(at(0), written).is_due(at(1_000), &localizer));
 }

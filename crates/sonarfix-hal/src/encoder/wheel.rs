@@ -132,7 +132,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn travel_keeps_the_sign_and_the_halves() {
+    fn travel_keeps_its_sign_and_half_counts() {
         let wheel = WheelGeometry::new(Metres(1.0 / core::f32::consts::PI), 1000.0).unwrap();
         let wheels = Wheels { right: wheel, left: wheel.reversed() };
         let travel = wheels.travel(3, 2);
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_a_wheel_is_refused() {
+    fn an_invalid_wheel_is_refused() {
         for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
             let error = WheelGeometry::new(Metres(bad), 360.0);
             assert_eq!(error, Err(GeometryError::Diameter), "{bad}");

@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fall_without_a_rise_in_the_same_ping_is_no_pulse() {
+    fn a_falling_edge_without_a_rising_edge_is_not_a_pulse() {
         let capture = EchoCapture::new();
         let mut line = armed(&capture);
         capture.rose(at(0));
@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unarmed_capture_hears_nothing() {
+    fn an_unarmed_capture_records_nothing() {
         let capture = EchoCapture::new();
         capture.rose(at(0));
         capture.fell(at(1_000));

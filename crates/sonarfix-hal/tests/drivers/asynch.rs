@@ -1,4 +1,4 @@
-//! The waits: the same drivers, woken instead of polled.
+//! The asynchronous waits: the same drivers, woken instead of polled.
 
 use core::cell::Cell;
 use core::future::Future;
@@ -18,7 +18,7 @@ use sonarfix_hal::ranger::{Air, NoEcho, Polled, PulseRanger, Srf};
 
 use super::{at, span};
 
-/// A clock that a delay moves on. The mocked pins never make one wait.
+/// A clock that a delay advances. The mocked pins are always ready.
 struct Timer<'a>(&'a Cell<u64>);
 
 impl DelayNs for Timer<'_> {
@@ -27,7 +27,7 @@ impl DelayNs for Timer<'_> {
     }
 }
 
-/// Polls a future that the mocks never keep waiting.
+/// Polls a future that is never pending with these mocks.
 fn now<T>(future: impl Future<Output = T>) -> T {
     let mut future = pin!(future);
     match future.as_mut().poll(&mut Context::from_waker(Waker::noop())) {
@@ -37,7 +37,7 @@ fn now<T>(future: impl Future<Output = T>) -> T {
 }
 
 #[test]
-fn a_ping_sleeps_until_the_line_moves() {
+fn a_ping_sleeps_until_an_edge() {
     let mut trigger = Mock::new(&[Transaction::set(High), Transaction::set(Low)]);
     let mut line = Mock::new(&[
         Transaction::get(Low),
@@ -50,7 +50,7 @@ fn a_ping_sleeps_until_the_line_moves() {
     let echo = Polled::new(line.clone());
     let mut ranger = PulseRanger::new(trigger.clone(), echo);
     let time = Cell::new(0);
-    // Every look at the clock is 700 µs after the last.
+    // Every reading of the clock is 700 µs after the previous one.
     let clock = || -> Instant { at(time.replace(time.get() + 700)) };
     let outcome = now(ping(&mut ranger, &clock, &mut Timer(&time)));
     let echo = outcome.unwrap().unwrap();
@@ -60,7 +60,7 @@ fn a_ping_sleeps_until_the_line_moves() {
 }
 
 #[test]
-fn a_pin_that_fails_to_wait_is_told() {
+fn a_failed_wait_for_a_pin_is_reported() {
     let broken = MockError::Io(ErrorKind::NotConnected);
     let mut trigger = Mock::new(&[Transaction::set(High), Transaction::set(Low)]);
     let mut line = Mock::new(&[
@@ -77,7 +77,7 @@ fn a_pin_that_fails_to_wait_is_told() {
 }
 
 #[test]
-fn a_ranger_on_a_bus_is_asked_step_by_step() {
+fn a_ranger_on_a_bus_is_polled_step_by_step() {
     let mut bus = Bus::new(&[
         OnBus::write(0x70, vec![0x00, 0x52]),
         OnBus::write_read(0x70, vec![0x00], vec![6]),

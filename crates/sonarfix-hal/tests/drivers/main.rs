@@ -1,4 +1,4 @@
-//! The drivers against mocked pins and buses: every transaction is listed, and none is left over.
+//! The drivers against mocked pins and buses: all transactions are listed and must occur.
 #![cfg(test)]
 #![expect(clippy::cast_precision_loss, reason = "microseconds below a second are exact in f32")]
 

@@ -56,14 +56,14 @@ fn an_echo_by_polling() {
     assert_eq!((heard.sent, heard.heard), (at(500), at(6_500)));
     assert_eq!(heard.reflected(), at(3_500));
     assert!((heard.range.0 - 1.030).abs() < 0.001);
-    // The ping is over: nothing more comes, and no pin is touched.
+    // The ping is over: there is no further outcome, and no pin is accessed.
     assert_eq!(ranger.poll(at(7_000)), Ok(None));
     trigger.done();
     echo.done();
 }
 
 #[test]
-fn bleed_through_is_overlooked() {
+fn bleed_through_is_ignored() {
     let mut trigger = pulses(1);
     let mut echo = levels(&[Low, Low, High, Low, High, Low]);
     let mut ranger = hc_sr04(&trigger, &echo);
@@ -92,7 +92,7 @@ fn pulses_too_long_for_a_range() {
 }
 
 #[test]
-fn a_board_that_is_not_there() {
+fn a_missing_board() {
     let mut trigger = pulses(1);
     let mut echo = levels(&[Low, Low, Low, Low, Low]);
     let mut ranger = hc_sr04(&trigger, &echo);
@@ -103,13 +103,13 @@ fn a_board_that_is_not_there() {
 }
 
 #[test]
-fn a_line_stuck_high_is_waited_for_then_pinged_and_recovers() {
+fn a_line_stuck_high_recovers_after_a_timeout() {
     let mut trigger = pulses(3);
     let mut echo = levels(&[
-        // First ping: rises, and has not fallen when the listening ends.
-        Low, Low, High, High, // Still high when the next two are wanted, at 60 and 100 ms.
-        High, High, // Then it is stuck, and pinged all the same.
-        High, High, High, High, // It comes down in the end, and the third ping is a good one.
+        // First ping: rises, and has not fallen at the timeout.
+        Low, Low, High, High, // Still high when the next two are requested, at 60 and 100 ms.
+        High, High, // Then it counts as stuck, and a ping is triggered nevertheless.
+        High, High, High, High, // It falls at last, and the third ping is valid.
         Low, Low, High, Low,
     ]);
     let mut ranger = hc_sr04(&trigger, &echo);
@@ -164,7 +164,7 @@ fn pins_that_fail_end_the_ping_and_the_next_works() {
 }
 
 #[test]
-fn a_ping_forgotten_in_flight_does_not_block_the_next() {
+fn a_cancelled_ping_does_not_block_the_next() {
     let mut trigger = Mock::new(&[Transaction::set(High), Transaction::set(High)]);
     let capture = EchoCapture::new();
     let line = Captured::new(&capture);
@@ -186,7 +186,7 @@ fn an_lv_maxsonar_by_its_pulse_width() {
     ranger.trigger(at(0)).unwrap();
     assert_eq!(ranger.poll(at(19)), Ok(None));
     assert_eq!(ranger.poll(at(20)), Ok(None));
-    // 90 inches of 147 µs: the example of its maker.
+    // 90 inches of 147 µs: the example of the datasheet.
     capture.rose(at(900));
     capture.fell(at(900 + 90 * 147));
     let echo = ranger.poll(at(30_000)).unwrap().unwrap().unwrap();
@@ -195,8 +195,8 @@ fn an_lv_maxsonar_by_its_pulse_width() {
 }
 
 proptest! {
-    /// Every echo is stamped to the instant of its reflection, however late the loop asks, and
-    /// wherever the clock stands.
+    /// Every echo has the timestamp of its reflection, however late the loop polls, and at any state of
+    /// the clock.
     #[test]
     fn echoes_are_stamped_to_their_reflection(
         boot in 0_u64..1 << 40,
@@ -219,7 +219,7 @@ proptest! {
         }
         let mut edges = edges.into_iter().peekable();
         let mut now = boot + 10;
-        // The last poll comes after everything, so an echo must come out.
+        // The last poll is after all edges, so there must be an echo.
         let polls = polls.into_iter().chain([60_000]);
         let heard = polls.into_iter().find_map(|step| {
             now += step;
@@ -239,7 +239,7 @@ proptest! {
     /// Never two pings within the cycle, and never one later than the cycle allows.
     #[test]
     fn pings_keep_their_distance(mut steps in prop::collection::vec(1_u64..25_000, 1..120)) {
-        // At the end there is room for three pings, whatever came before.
+        // At the end there is time for three pings.
         steps.extend([20_000; 9]);
         let mut now = 0;
         let mut trigger = Mock::new(&vec![Transaction::set(High); steps.len()]);
@@ -263,9 +263,9 @@ proptest! {
                 }
             }
         }
-        // A ping is at most a cycle and a step after the one before.
+        // A ping is at most a cycle and a step after the previous one.
         prop_assert!(pings >= 3 && pings >= now / 85_000);
-        // One expectation a step was made, and one a ping was needed.
+        // The mock has one expectation per step; only one per ping was used.
         prop_assert_eq!(trigger.by_ref().count() as u64 + pings, count);
         trigger.done();
     }

@@ -86,7 +86,7 @@ fn a_failing_channel_leaves_the_servo_where_it_was() {
         Transaction::set_duty_cycle(3_000),
         Transaction::max_duty_cycle(40_000),
         Transaction::set_duty_cycle(4_000).with_error(error.clone()),
-        // The same bearing again is tried again.
+        // The same bearing is set again after a failure.
         Transaction::max_duty_cycle(40_000),
         Transaction::set_duty_cycle(4_000),
     ]);
@@ -103,7 +103,7 @@ fn a_failing_channel_leaves_the_servo_where_it_was() {
 }
 
 #[test]
-fn what_is_no_servo_is_refused() {
+fn invalid_servo_settings_are_refused() {
     let pwm = || Pwm { counts: 40_000 };
     let new = |limits, timing| Servo::configured(pwm(), settings(limits, timing)).map(|_| ());
     assert_eq!(new(degrees(80.0), ServoTiming::SG90), Ok(()));

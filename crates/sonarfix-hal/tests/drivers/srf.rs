@@ -31,7 +31,7 @@ fn ping(expected: &[Transaction], polls: &[u64]) -> Option<Outcome> {
 }
 
 #[test]
-fn while_it_ranges_it_is_not_asked_and_does_not_answer() {
+fn a_ranging_sensor_is_not_addressed() {
     let source = NoAcknowledgeSource::Address;
     let expected = [
         trigger(),
@@ -55,7 +55,7 @@ fn results_that_are_no_range() {
 }
 
 #[test]
-fn one_that_stays_silent_is_given_up() {
+fn a_ranger_without_an_answer_times_out() {
     let expected = [trigger(), revision(0xFF), revision(0xFF)];
     let outcome = ping(&expected, &[99_999, 100_000]);
     assert_eq!(outcome, Some(Err(NoEcho::NoResponse)));

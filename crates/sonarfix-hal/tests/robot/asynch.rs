@@ -18,7 +18,7 @@ use super::rig::{Drive, World, pins, robot, servo, walls};
 const TICK: f32 = 1.0 / 1_024.0;
 const STILL: Drive = Drive { speed: 0.0, sway: 0.0 };
 
-/// A delay that moves the world on, and never comes back from its end.
+/// A delay that advances the simulated time, and is pending forever at its end.
 struct Until<'w>(&'w World, u64);
 
 impl DelayNs for Until<'_> {
@@ -31,7 +31,7 @@ impl DelayNs for Until<'_> {
     }
 }
 
-/// Polls a task once: until the world is at its end.
+/// Polls a task once, which runs until the end of the simulated time.
 fn poll<T>(task: impl Future<Output = T>) -> bool {
     let mut context = Context::from_waker(Waker::noop());
     pin!(task).as_mut().poll(&mut context).is_ready()
@@ -62,12 +62,12 @@ fn the_loop_runs_and_sleeps_between() {
     assert_eq!(fixes.filter(|fix| matches!(fix, Fix::Accepted(_))).count(), 6);
     assert_eq!(reports.iter().filter(|report| report.tick.is_some()).count(), 34);
     assert!(robot.faults().is_none(), "{:?}", robot.faults());
-    // The clock is read twice a round. Polled every step, 6,900 rounds would be made.
+    // The clock is read twice per iteration. Polled at every step, the loop would take 6,900 iterations.
     assert!(polls.get() < 2 * 400, "{}", polls.get());
 }
 
 #[test]
-fn a_servo_is_waited_for() {
+fn a_ping_waits_for_the_servo() {
     let world = World::new(STILL, TICK, 0);
     let mut servo = servo(&world, ServoTiming::SG90);
     let clock = || Instant::from_ticks(world.now.get());

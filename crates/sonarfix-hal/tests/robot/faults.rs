@@ -49,14 +49,14 @@ fn outcomes(reports: &[(u64, Report)]) -> Vec<Outcome> {
 }
 
 #[test]
-fn nothing_broken_nothing_counted() {
+fn healthy_devices_count_no_faults() {
     let (reports, faults, _) = three_seconds(Broken::default());
     assert!(faults.is_none(), "{faults:?}");
     assert_eq!(accepted_after(&reports, 0), 6);
 }
 
 #[test]
-fn a_counter_that_cannot_be_read_brings_its_travel_later() {
+fn a_failed_counter_reading_delays_its_travel() {
     let (reports, faults, world) =
         three_seconds(Broken { right_counter: true, ..Broken::default() });
     // Ten ticks, and the ping's reading.
@@ -71,7 +71,7 @@ fn a_counter_that_cannot_be_read_brings_its_travel_later() {
 }
 
 #[test]
-fn a_counter_dead_at_first_begins_both_wheels_when_it_wakes() {
+fn a_counter_that_fails_at_first_starts_both_wheels_when_it_recovers() {
     let walls = walls();
     let world = World::new(SLOW, TICK, 0);
     world.broken.set(Broken { right_counter: true, ..Broken::default() });
@@ -80,7 +80,7 @@ fn a_counter_dead_at_first_begins_both_wheels_when_it_wakes() {
     run(&world, &mut robot, &mut pins, millis(0, 1_000));
     world.broken.set(Broken::default());
     run(&world, &mut robot, &mut pins, millis(1_000, 1_201));
-    // Not the left wheel's first second without the right one's: that would be a turn.
+    // The travel of the left wheel in the first second is not used without that of the right one: that would be a turn.
     let pose = robot.localizer().pose();
     assert!(pose.heading.radians().abs().0 < 1e-6, "{pose:?}");
     let counted = (world.ticks(1_200_000) - world.ticks(1_000_000)) as f64 * f64::from(TICK);
@@ -88,8 +88,8 @@ fn a_counter_dead_at_first_begins_both_wheels_when_it_wakes() {
 }
 
 #[test]
-fn a_counter_that_jumps_is_written_off_once() {
-    // Half a metre within 100 ms: its chip was reset, or it lies.
+fn a_jump_of_a_counter_is_discarded_once() {
+    // Half a metre within 100 ms: the counter was reset or is faulty.
     let (reports, faults, world) = three_seconds(Broken { jump: 512, ..Broken::default() });
     assert_eq!(faults.travel, 1);
     let refused = reports.iter().filter_map(|(_, report)| report.tick?.step);
@@ -102,7 +102,7 @@ fn a_counter_that_jumps_is_written_off_once() {
 }
 
 #[test]
-fn a_servo_that_does_not_obey_is_used_where_it_is() {
+fn a_stuck_servo_is_used_at_its_bearing() {
     let walls = walls();
     let world = World::new(SLOW, TICK, 0);
     // The aim alternates between walls, so the servo moves repeatedly.
@@ -148,17 +148,17 @@ fn a_trigger_pin_that_fails_leaves_odometry() {
 }
 
 #[test]
-fn silence_is_heard_and_is_no_fault() {
+fn a_missing_echo_is_not_a_fault() {
     let (reports, faults, _) = three_seconds(Broken { deaf: true, ..Broken::default() });
     let silent = outcomes(&reports).iter().filter(|&&o| o == Err(NoEcho::Nothing)).count();
     assert_eq!(silent, 2);
     assert!(faults.is_none(), "{faults:?}");
 }
 
-/// While it spins at 2.5 rad/s, a servo that needs a quarter of a second always comes too late to
-/// meet a wall squarely.
+/// While the robot spins at 2.5 rad/s, a servo that takes a quarter of a second always settles too late for a beam
+/// square to a wall.
 #[test]
-fn a_robot_that_spins_aims_again_and_pings_nothing_in_vain() {
+fn a_spinning_robot_aims_again_instead_of_pinging() {
     let walls = walls();
     let fast = Drive { speed: 0.2, sway: 0.0 };
     let world = World::new(fast, TICK, 0);
@@ -169,11 +169,11 @@ fn a_robot_that_spins_aims_again_and_pings_nothing_in_vain() {
     let reports = run(&world, &mut robot, &mut pins, millis(0, 5_001));
     let aims = reports.iter().filter(|(_, report)| report.aimed.is_some());
     let aims: Vec<_> = aims.map(|&(time, _)| time).collect();
-    // At most once a tick, for nothing is new between ticks; and again and again.
+    // At most once per tick, because nothing changes between ticks, and repeatedly.
     assert!(aims.windows(2).all(|pair| pair[1] - pair[0] >= 99_000), "{aims:?}");
     assert!(aims.len() >= 10, "{aims:?}");
-    // By chance another wall may come square; then it is that one which is pinged. The cone is
-    // 15°, and the heading known is that of the last tick.
+    // The beam may become square to another wall; then that wall is pinged. The cone is
+    // 15°, and the estimated heading is that of the last tick.
     let tolerance = 0.262 + 0.1 * 2.5;
     for (time, report) in &reports {
         let Some(aim) = report.pinged else { continue };
@@ -189,7 +189,7 @@ fn a_robot_that_spins_aims_again_and_pings_nothing_in_vain() {
 }
 
 #[test]
-fn a_clock_that_runs_backwards_is_counted_and_harmless() {
+fn a_clock_that_runs_backwards_is_counted() {
     let walls = walls();
     let world = World::new(SLOW, TICK, 0);
     let mut robot = robot(&walls, TICK, SCHEDULE, Settings::default());
@@ -206,7 +206,7 @@ fn a_clock_that_runs_backwards_is_counted_and_harmless() {
 }
 
 #[test]
-fn a_loop_that_sleeps_until_something_is_due_misses_nothing() {
+fn a_loop_that_sleeps_until_the_next_deadline_misses_nothing() {
     let walls = walls();
     let world = World::new(SLOW, TICK, 0);
     let mut robot = robot(&walls, TICK, SCHEDULE, Settings::default());
@@ -227,7 +227,7 @@ fn a_loop_that_sleeps_until_something_is_due_misses_nothing() {
     assert!(robot.faults().is_none(), "{:?}", robot.faults());
 }
 
-/// A ranger as bad as one can be.
+/// A ranger with one of several faults.
 struct Bad {
     kind: Kind,
     triggered: Option<Instant>,
@@ -238,9 +238,9 @@ enum Kind {
     NeverEnds,
     NeverReady,
     Fails,
-    /// Its echoes left before the trigger.
+    /// Its echoes were reflected before the trigger.
     Early,
-    /// Its echoes will be heard later.
+    /// Its echoes are received in the future.
     Late,
 }
 
@@ -278,7 +278,7 @@ impl Ranger for Bad {
 }
 
 #[test]
-fn rangers_that_misbehave_are_counted_and_given_up() {
+fn faulty_rangers_are_counted_and_time_out() {
     for (kind, reason) in [
         (Kind::NeverEnds, Some(NoEcho::NoResponse)),
         (Kind::NeverReady, None),

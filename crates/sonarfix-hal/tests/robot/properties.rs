@@ -13,7 +13,7 @@ use super::rig::{Broken, Drive, World, accounts, pins, robot, run, steps, walls}
 /// 2⁻¹⁰ m: sums of such ticks are exact.
 const TICK: f32 = 1.0 / 1_024.0;
 
-/// A digital servo of 400 Hz that turns in no time: the ranger alone limits the rate.
+/// A digital servo of 400 Hz that turns instantly: only the ranger limits the rate.
 const FAST: ServoTiming = ServoTiming {
     frame: Duration::from_ticks(2_500),
     sixty_degrees: Duration::from_ticks(0),
@@ -150,7 +150,7 @@ proptest! {
         for &ping in triggers.iter() {
             let turns: Vec<_> = duties.iter().filter(|&&(time, _)| time <= ping).collect();
             let (sent, duty) = **turns.last().unwrap();
-            // Before its first turn it may be anywhere; 100° at least to go.
+            // Before its first turn its bearing is unknown: at least 100° of travel.
             let from = turns.iter().rev().nth(1).map(|&&(_, duty)| degrees(duty));
             let turn = from.map_or(100.0, |from| (degrees(duty) - from).abs());
             let settled = sent as f64 + 20_000.0 + 120_000.0 * turn / 60.0 + 60_000.0;
@@ -158,7 +158,7 @@ proptest! {
         }
     }
 
-    /// Never two pings within the ranger's cycle, even where the servo is no limit.
+    /// Never two pings within the cycle of the ranger, even with an instant servo.
     #[test]
     fn pings_keep_their_distance(drive in any_drive(), polls in any_polls()) {
         let walls = walls();
@@ -170,14 +170,14 @@ proptest! {
         let bursts = world.bursts.borrow();
         let gaps: Vec<_> = bursts.windows(2).map(|pair| pair[1] - pair[0]).collect();
         prop_assert!(gaps.iter().all(|&gap| gap >= 60_000), "{gaps:?}");
-        // And the ranger is the limit: in the 400 ms of quick polls at the end it is used fully.
+        // During the 400 ms of quick polls at the end, the rate is that of the ranger.
         prop_assert!(gaps.iter().any(|&gap| gap <= 64_000), "{gaps:?}");
     }
 
-    /// Every dot of the tick's grid is done once or reported as skipped, and a tick is late only
-    /// if its poll was, or the sonar listened.
+    /// Every deadline of the tick's grid is processed once or reported as skipped, and a tick is late only
+    /// if its poll was late or a ping was in flight.
     #[test]
-    fn ticks_keep_to_their_grid(drive in any_drive(), polls in any_polls()) {
+    fn ticks_stay_on_their_grid(drive in any_drive(), polls in any_polls()) {
         let walls = walls();
         let world = World::new(drive, TICK, 0);
         let mut robot = robot(&walls, TICK, UNPACED, Settings::default());
@@ -191,7 +191,7 @@ proptest! {
                 prop_assert_eq!(due, 100_000 * (dots + 1));
                 dots += 1 + tick.skipped;
                 prop_assert_eq!(dots, now / 100_000);
-                // Nothing but the sonar keeps a poll from doing what is due.
+                // Only a ping in flight delays a tick that is due.
                 prop_assert_eq!(tick.held, due <= before);
                 prop_assert!(report.ping_result.is_some() || !tick.held);
                 missed += u32::from(now - due.max(before) > 10_000);
@@ -219,7 +219,7 @@ fn reports_with(
 }
 
 #[test]
-fn stamped_naively_an_echo_belongs_to_its_arrival() {
+fn naive_stamps_are_those_of_the_arrival() {
     let drive = Drive { speed: 0.3, sway: 0.0 };
     let naive = Settings { stamp: Stamp::Arrival, ..Settings::default() };
     let (reports, _) = reports_with(UNPACED, naive, drive, TICK);
@@ -233,10 +233,10 @@ fn stamped_naively_an_echo_belongs_to_its_arrival() {
     assert!(heard > 20, "{heard}");
 }
 
-/// 16 mm a tick, as of a disc with few holes: most steps to a reflection and from it to the next
-/// tick look far too fast. They are kept, and none is written off.
+/// 16 mm per tick, as of an encoder disc with few slots: most steps to a reflection and from it to the next
+/// tick appear far too fast. Their travel is deferred, and none is discarded.
 #[test]
-fn coarse_ticks_are_kept_not_written_off() {
+fn coarse_ticks_are_not_discarded() {
     let mut kept = 0;
     for speed in [0.3, 0.4, 0.5, 0.6, 0.7, 0.8] {
         let drive = Drive { speed, sway: 0.0 };
@@ -254,9 +254,9 @@ fn coarse_ticks_are_kept_not_written_off() {
     assert!(kept > 0);
 }
 
-/// Ticks faster than a ping is long are skipped while it is in flight; that is no fault.
+/// Ticks with a shorter period than a ping are skipped while it is in flight; this is not a fault.
 #[test]
-fn a_sonar_that_holds_ticks_back_misses_no_deadline() {
+fn ticks_delayed_by_a_ping_meet_their_deadlines() {
     let drive = Drive { speed: 0.1, sway: 0.0 };
     let settings = Settings {
         encoder_period: Duration::from_ticks(5_000),

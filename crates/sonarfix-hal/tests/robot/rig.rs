@@ -1,8 +1,7 @@
 //! A robot that drives along x in a room, down to its pins: two counters, a PWM channel, a
 //! trigger pin, and an echo line whose edges go into an [`EchoCapture`] as they happen.
 //!
-//! Two hands play here: the loop under test, which sees the pins only, and the test, which sees
-//! the [`World`].
+//! The loop under test accesses only the pins; the test accesses the [`World`].
 
 use core::cell::{Cell, RefCell};
 use std::collections::VecDeque;
@@ -34,7 +33,7 @@ pub struct Drive {
     pub sway: f64,
 }
 
-/// What is wrong with the hardware now.
+/// The present faults of the hardware.
 #[expect(clippy::struct_excessive_bools, reason = "any of them may be broken beside the others")]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Broken {
@@ -43,10 +42,10 @@ pub struct Broken {
     pub trigger: bool,
     /// No edges come from the echo line.
     pub echo: bool,
-    /// The ranger hears nothing: its pulse lasts 38 ms.
+    /// The ranger receives no echo: its pulse lasts 38 ms.
     pub deaf: bool,
-    /// The left wheel rolls backwards: the robot spins where it is. Its echoes are not those of a
-    /// spinning robot, so it should be deaf as well.
+    /// The left wheel rolls backwards: the robot spins on the spot. The simulated echoes do not model a
+    /// spinning robot, so `deaf` should be set as well.
     pub spin: bool,
     /// The right counter jumps by so many ticks, and stays there.
     pub jump: u32,
@@ -63,7 +62,7 @@ pub struct World {
     pub triggers: RefCell<Vec<u64>>,
     /// Times at which the trigger went low, which starts a burst.
     pub bursts: RefCell<Vec<u64>>,
-    /// When each sound left and when its echo was heard.
+    /// Times of each burst and of the reception of its echo.
     pub flights: RefCell<Vec<(u64, u64)>>,
     edges: RefCell<VecDeque<(u64, bool)>>,
     /// Period of the PWM, µs.
@@ -121,7 +120,7 @@ impl World {
         if is_past { edges.pop_front() } else { None }
     }
 
-    /// A burst leaves: its echo's edges will come.
+    /// Sends a burst, and schedules the edges of its echo.
     fn burst(&self) {
         self.bursts.borrow_mut().push(self.now.get());
         let sent = self.now.get() + LATENCY;
@@ -250,7 +249,7 @@ pub type Pins<'w> = Devices<
     PulseRanger<TriggerPin<'w>, Captured<'w>>,
 >;
 
-/// A servo that reaches 100° to either side: 10 µs a degree.
+/// A servo with limits of 100° to either side: 10 µs per degree.
 pub fn servo(world: &World, timing: ServoTiming) -> Servo<ServoPwm<'_>> {
     world.frame.set(timing.frame.to_micros() as f64);
     let degrees = Radians::from_degrees;
@@ -327,7 +326,7 @@ pub fn steps(reports: &[(u64, Report)]) -> impl Iterator<Item = Step> {
     })
 }
 
-/// Right wheel's metres that were taken and those that were written off.
+/// Accepted and discarded travel of the right wheel, metres.
 pub fn accounts(reports: &[(u64, Report)]) -> (f64, f64) {
     let (mut taken, mut written_off) = (0.0, 0.0);
     for step in steps(reports) {

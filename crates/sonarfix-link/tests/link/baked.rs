@@ -23,7 +23,7 @@ fn bytes(config: &RobotConfig) -> Vec<u8> {
     baked::write(config, &mut [0; LENGTH_MAX]).unwrap().to_vec()
 }
 
-/// Bytes that say they are a configuration, whole, whatever they hold.
+/// Bytes with a valid header and checksum of a configuration.
 fn sealed(version: u16, postcard: &[u8]) -> Vec<u8> {
     let length = u16::try_from(postcard.len()).unwrap();
     let mut bytes = [b"SFXC", &version.to_le_bytes()[..], &length.to_le_bytes(), postcard].concat();
@@ -36,7 +36,7 @@ fn the_bytes_are_as_documented() {
     let config = example();
     assert_eq!(bytes(&config), sealed(baked::VERSION, &to_stdvec(&config)));
     assert_eq!(baked::checksum(&config), crc32(&to_stdvec(&config)));
-    // The largest is refused, being no configuration, but would fit.
+    // The largest image would fit, but is refused because its content is not a configuration.
     assert!(8 + to_stdvec(&config_of_largest()).len() + 4 <= LENGTH_MAX);
     assert!(matches!(
         baked::write(&config_of_largest(), &mut [0; LENGTH_MAX]),
@@ -49,7 +49,7 @@ fn config_of_largest() -> RobotConfig {
 }
 
 #[test]
-fn it_is_read_from_a_flash_region_that_is_larger() {
+fn the_image_is_read_from_a_larger_region() {
     let config = example();
     for rest in [0x00, 0xff] {
         let region = [bytes(&config), vec![rest; 1000]].concat();
@@ -92,17 +92,17 @@ fn every_cut_length_is_refused() {
     assert_eq!(baked::read(&[]), Err(BakedError::Missing));
     for length in 1..baked.len() {
         assert_eq!(baked::read(&baked[..length]), Err(BakedError::Cut), "{length}");
-        // As flash has it, when the power went as it was written.
+        // As after a power cut during the write.
         let region = [&baked[..length], &vec![0xff; 400 - length]].concat();
         assert!(baked::read(&region).is_err(), "{length}");
     }
 }
 
 #[test]
-fn what_is_whole_and_wrong_is_refused() {
+fn a_valid_frame_with_an_invalid_message_is_refused() {
     let config = example();
     let postcard = to_stdvec(&config);
-    // A configuration of the version before, which held the localizer's part alone.
+    // A configuration of version 1, which contained only the localizer's part.
     assert_eq!(baked::read(&sealed(1, &to_stdvec(&config.localizer))), Err(BakedError::Version(1)));
     assert_eq!(baked::read(&sealed(baked::VERSION, &postcard[1..])), Err(BakedError::Layout));
     assert_eq!(

@@ -70,7 +70,7 @@ fn garbage_before_a_frame_costs_nothing() {
 }
 
 #[test]
-fn what_is_skipped_is_counted_by_its_reason() {
+fn skipped_frames_are_counted_by_reason() {
     let message = to_stdvec(&in_session(&Command::Stop));
     let count = |wire: &[u8]| {
         let (frames, receiver) = received::<SessionCommand>(wire);
@@ -104,7 +104,7 @@ fn what_is_skipped_is_counted_by_its_reason() {
 }
 
 #[test]
-fn a_frame_that_comes_twice_is_read_twice() {
+fn a_repeated_frame_is_read_twice() {
     let wire = sent(5, &in_session(&Command::Start));
     let (frames, _) = received::<SessionCommand>(&[&wire[..], &wire].concat());
     assert_eq!(frames.len(), 2);

@@ -69,7 +69,7 @@ fn old_frames_are_refused() {
     assert_eq!(robot.receive(&start), numbered(1));
     assert_eq!(robot.receive(&frame(first, 9, &Command::Stop)), numbered(2));
     assert_eq!(robot.receive(&start), OLD, "earlier in the same session");
-    // The whole conversation once more.
+    // All frames once more.
     assert_ne!(robot.open(7), first);
     assert_eq!(robot.receive(&start), OLD, "of an earlier session");
     // A refused frame displaces nothing.

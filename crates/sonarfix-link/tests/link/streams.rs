@@ -103,17 +103,17 @@ fn check<M: Message>(any: fn(&mut ChaCha8Rng) -> M) {
 }
 
 #[test]
-fn every_whole_frame_is_found_and_nothing_else_in_telemetry() {
+fn only_whole_frames_are_found_in_telemetry() {
     check::<Telemetry>(any_telemetry);
 }
 
 #[test]
-fn every_whole_frame_is_found_and_nothing_else_in_commands() {
+fn only_whole_frames_are_found_in_commands() {
     check::<SessionCommand>(any_command);
 }
 
 #[test]
-fn random_bytes_say_nothing_and_hide_no_frame_behind_them() {
+fn random_bytes_yield_no_frame_and_hide_none() {
     for seed in 0..streams() {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut bytes = vec![0; rng.random_range(0..300)];

@@ -89,7 +89,7 @@ pub use self::postcard::to_stdvec;
 proptest! {
     /// Every message is received, and its frame is the documented one.
     #[test]
-    fn every_message_comes_through(seed in any::<u64>(), sequence in any::<u16>()) {
+    fn every_message_is_received(seed in any::<u64>(), sequence in any::<u16>()) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         round_trip(sequence, &any_telemetry(&mut rng));
         round_trip(sequence, &any_command(&mut rng));

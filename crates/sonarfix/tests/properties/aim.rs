@@ -255,7 +255,7 @@ fn is_best(
         return Ok(());
     };
     let wall = aim.wall.0 as usize;
-    prop_assert!(counting.contains(&wall), "{wall} is none of {counting:?}");
+    prop_assert!(counting.contains(&wall), "{wall} is not among {counting:?}");
     let best = counting.iter().map(|&wall| score(wall)).fold(f64::NEG_INFINITY, f64::max);
     // The last wall has a bonus of 2 %.
     prop_assert!(score(wall) >= best - 2.2e-2 * best.abs(), "{} is less than {best}", score(wall));
@@ -353,7 +353,7 @@ proptest! {
             prop_assert!((f64::from(aim.why.success) - success).abs() < 2e-3);
         }
 
-        // At a bearing of somebody else's choice: towards a wall or anywhere.
+        // At a given bearing: towards a wall or anywhere.
         let bearings: Vec<_> =
             counting.iter().map(|&w| rules.bearing(w) + 0.1).chain([f64::from(askew)]).collect();
         for bearing in bearings {

@@ -140,7 +140,7 @@ proptest! {
     /// Along a slanted wall the variance stops at the limit of eq. (20), after any number of
     /// ranges.
     #[test]
-    fn a_slanted_wall_is_known_no_sharper_than_f32_can_hold(
+    fn a_slanted_wall_keeps_the_variance_that_f32_can_represent(
         drive in any_drive(), wide in 10.0_f32..100.0, direction in 0.2_f32..1.3,
     ) {
         let deviation = StandardDeviations { x: Metres(wide), y: Metres(wide), ..StandardDeviations::default() };

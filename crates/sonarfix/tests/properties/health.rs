@@ -36,7 +36,7 @@ fn new_localizer(walls: &[Wall]) -> Localizer<'_> {
     };
     let mut config = config_for_rooms(Point::new(0.0, 0.0));
     config.echo = EchoParameters::HC_SR04;
-    // The covariance of a lost robot stays, so that what is to be gated is.
+    // The covariance of a lost robot is not inflated, so that the ranges stay outside the gate.
     config.gating.inflation = Metres(0.0);
     Localizer::new(config, Map::new(walls), start, Instant::from_ticks(0)).unwrap()
 }
@@ -70,7 +70,7 @@ fn verdicts(outcomes: &[Outcome]) -> Vec<Verdict> {
     outcomes.iter().map(|&o| apply(&mut localizer, o)).collect()
 }
 
-/// Drives to and fro before the wall, so that the outcomes are independent.
+/// Drives back and forth in front of the wall, so that the outcomes are independent.
 fn verdicts_on_the_way(outcomes: &[Outcome]) -> Vec<Verdict> {
     let walls = one_wall();
     let mut localizer = new_localizer(&walls);
@@ -108,14 +108,14 @@ fn contradictions_lead_to_lost_and_agreement_leads_back() {
 }
 
 #[test]
-fn what_a_room_does_to_a_good_estimate_is_not_called_lost() {
+fn a_good_estimate_in_a_cluttered_room_is_not_lost() {
     // Every third range shortened by furniture; every fifth one long; every third one missed.
     let long = [TooLong, Accepted, Accepted, Accepted, Accepted];
     for pattern in [&[TooShort, Accepted, Accepted][..], &long, &[NoEcho, Accepted, Accepted]] {
         let turns = pattern.repeat(40);
         assert!(!verdicts(&turns).contains(&Lost), "{pattern:?}");
     }
-    // A cupboard that stays before the wall.
+    // A cupboard in front of the wall.
     assert!(!verdicts(&[TooShort; 90]).contains(&Lost));
 }
 

@@ -1,5 +1,5 @@
 //! Properties of the core crate, and its `f32` filter against a dense `f64` one. One binary, one
-//! module per subject. The reason for every tolerance is beside it; every test was seen to fail
+//! module per subject. Every tolerance has its reason in a comment; every test was seen to fail
 //! with a fault in the code.
 
 #[cfg(test)]

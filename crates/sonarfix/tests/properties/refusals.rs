@@ -1,4 +1,4 @@
-//! What is refused or gated changes no bit; what is associated changes no more than it may.
+//! A refused or gated range changes no bit; an associated one changes the estimate within bounds.
 
 use proptest::prelude::*;
 use sonarfix::aim::Aim;

@@ -1,4 +1,4 @@
-//! The search for the pose: constructed rooms, twins, and windows of nonsense.
+//! The search for the pose: constructed rooms, symmetric poses, and windows of random pings.
 
 use proptest::prelude::*;
 use sonarfix::config::{Config, Sonar};
@@ -107,9 +107,9 @@ fn a_robot_in_a_room_without_symmetry_is_found_once_it_has_driven() {
     }
 }
 
-/// A quarter of a lap in a rectangle fits as well half a turn about its centre further.
+/// In a rectangle the pings of a quarter lap also fit the pose that is rotated by 180° about the centre.
 #[test]
-fn a_room_that_is_itself_when_rotated_gives_both_poses_and_no_unique_one() {
+fn a_rotationally_symmetric_room_gives_both_poses_and_no_unique_one() {
     let room = Room::rectangle();
     for (x, y, degrees) in [(1.0, 0.8, 10.0), (3.0, 1.2, 95.0), (0.7, 2.2, -45.0)] {
         let mut search: Search =
@@ -150,7 +150,7 @@ fn a_proposed_pose_is_scored_like_any_other() {
 }
 
 #[test]
-fn what_is_not_finite_is_refused() {
+fn non_finite_input_is_refused() {
     let room = Room::rectangle();
     let mut search: Search =
         Search::new(&sonar(), Map::new(&room.walls), SearchParameters::default());
@@ -197,7 +197,7 @@ proptest! {
         }
     }
 
-    /// Pings that all meet one wall leave the place along it open.
+    /// Pings that are all of one wall do not determine the position along it.
     #[test]
     fn one_wall_is_never_a_unique_answer(
         distance in 1.0_f32..2.5, slant in -0.1_f32..0.1, steps in 50_usize..80,

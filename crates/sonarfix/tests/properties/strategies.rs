@@ -266,7 +266,7 @@ pub fn config_for_rooms(mount: Point) -> Config {
     config.sonar.mount = mount;
     config.sonar.max_range = Metres(12.0);
     config.prior.range_scale = 0.01;
-    // No clutter: what is tested with it is tested by itself.
+    // No clutter, which has its own tests.
     config.echo = EchoParameters::NONE;
     config.gating.confidence = 1.0;
     config

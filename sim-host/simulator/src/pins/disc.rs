@@ -66,7 +66,7 @@ mod tests {
         /// For any motion of the wheel the decoder counts the whole ticks of its travel, without
         /// an illegal edge.
         #[test]
-        fn the_decoder_counts_the_way(
+        fn the_decoder_counts_the_direction(
             steps in prop::collection::vec(-0.05_f64..0.05, 1..40), reversed: bool,
         ) {
             let wires = EncoderWires::default();

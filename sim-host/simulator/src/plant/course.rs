@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wheel_that_is_too_small_drives_a_bow() {
+    fn a_smaller_wheel_curves_the_path() {
         let mut course = Course::steered(Pose::default());
         course.steer(Command { speed: 0.4, turn_rate: 0.0 }, 0.35);
         drive(&mut course, 10.0, 10);

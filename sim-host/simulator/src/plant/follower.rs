@@ -69,7 +69,7 @@ mod tests {
     use sonarfix_map::PathPlan;
 
     #[test]
-    fn it_reaches_every_corner_and_stops() {
+    fn the_follower_reaches_every_corner_and_stops() {
         let path = Path::new(PathPlan {
             start: [0.0, 0.0],
             corners: vec![[2.0, 0.0], [2.0, 1.0], [0.0, 0.0]],

@@ -126,7 +126,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_ideal_one_is_there_at_once() {
+    fn an_ideal_servo_turns_instantly() {
         let mut servo = ServoPlant::new(ServoModel::ideal());
         for (time, bearing) in [(0.0, 1.0), (0.1, -2.0), (0.1, 3.0)] {
             servo.send(time, bearing, 1.0);
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn a_real_one_waits_for_the_frame_turns_and_rings() {
+    fn a_real_servo_waits_for_the_frame_turns_and_rings() {
         let model = ServoModel::sg90();
         let mut servo = ServoPlant::new(model);
         let sixty = 60_f64.to_radians();
@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn it_stands_on_the_side_it_came_from_and_ignores_what_is_too_little() {
+    fn the_servo_stops_within_backlash_and_ignores_the_dead_band() {
         let model = ServoModel::sg90();
         let mut servo = ServoPlant::new(model);
         servo.send(0.0, 1.0, 1.0);

@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn slip_counts_too_much_and_bumps_either_way() {
+    fn slips_add_counts_and_bumps_have_either_sign() {
         let often = Upset { every: 2.0, by: 0.01 };
         let slips = excess(Upsets { slip: often, ..Upsets::default() }, 1);
         // About 200 slips (403 m / 2 m) of 1 cm, ± 4 deviations of 14.

@@ -21,7 +21,7 @@ pub enum SimulationError {
     /// The simulated board cannot be this robot.
     #[error("the robot cannot be simulated down to its pins: {0}")]
     Unsupported(#[from] Unsupported),
-    /// A wheel of the robot is none.
+    /// A wheel of the robot is invalid.
     #[error("the robot's wheels: {0}")]
     Wheels(#[from] GeometryError),
     /// The loop refused its settings.

@@ -88,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_walker_goes_there_and_back() {
+    fn an_obstacle_moves_back_and_forth() {
         let outline = Outline::Circle { centre: [1.0, 0.0], radius: 0.2 };
         let walk = Some(Oscillation { by: [0.0, 2.0], takes: 4.0 });
         let obstacle = Obstacle { outline, walk };
@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn a_post_answers_from_its_near_side_and_hides_what_is_behind() {
+    fn a_post_reflects_from_its_near_side_and_occludes() {
         let post = Outline::Circle { centre: [1.0, 0.0], radius: 0.2 };
         assert!(distance(post.nearest([0.0, 0.0]), [0.8, 0.0]) < 1e-12);
         assert!(post.blocks([0.0, 0.1], [2.0, 0.1]));

@@ -136,7 +136,7 @@ mod tests {
         /// The path over a wall equals that to the mirror image, and without motion the
         /// perpendicular, to the bit: the ideal sonar's ranges depend on it.
         #[test]
-        fn the_way_over_a_wall_is_that_to_the_image(
+        fn the_path_of_a_reflection_ends_at_the_image(
             ends in [point(), point()], from in point(), to in point(),
         ) {
             prop_assume!(distance(ends[0], ends[1]) > 0.1);
@@ -151,7 +151,7 @@ mod tests {
 
         /// A ray towards a point of the wall meets the wall there, and its extension crosses it.
         #[test]
-        fn a_ray_meets_what_it_is_shot_at(
+        fn a_ray_hits_its_target(
             ends in [point(), point()], from in point(), share in 0.05..0.95,
         ) {
             prop_assume!(distance(ends[0], ends[1]) > 0.1);

@@ -282,7 +282,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_curve_is_straight_between_its_points_and_level_beyond() {
+    fn a_curve_is_linear_between_its_points_and_constant_beyond() {
         let curve = Curve::through(&[(1.0, 10.0), (3.0, 20.0)]);
         for (x, y) in [(0.0, 10.0), (1.0, 10.0), (1.5, 12.5), (3.0, 20.0), (9.0, 20.0)] {
             assert!((curve.at(x) - y).abs() < 1e-12, "{x}");
@@ -290,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn half_is_heard_at_the_half_angle_and_all_by_a_perfect_one() {
+    fn half_of_the_echoes_are_detected_at_the_half_angle() {
         let soft = Sensitivity {
             share: Curve::level(0.8),
             half_angle: Curve::level(0.3),

@@ -47,7 +47,7 @@ fn source_and_distance(echo: Option<Echo>) -> Option<(Source, f64)> {
 const FAR_WALL: (Point, Point) = ([2.0, -5.0], [2.0, 5.0]);
 
 #[test]
-fn an_oblique_beam_hears_the_perpendicular() {
+fn an_oblique_beam_detects_the_foot_of_the_perpendicular() {
     let world = room(&[FAR_WALL]);
     for direction in [-0.25, 0.0, 0.25] {
         let echo = echo_of(&world, &noiseless(), direction, 0).unwrap();
@@ -57,14 +57,14 @@ fn an_oblique_beam_hears_the_perpendicular() {
 }
 
 #[test]
-fn the_nearest_in_the_cone_answers() {
+fn the_nearest_reflector_in_the_cone_is_detected() {
     let world = room(&[FAR_WALL, ([1.0, -0.5], [1.0, 0.5])]);
     let echo = echo_of(&world, &noiseless(), 0.0, 0);
     assert_eq!(source_and_distance(echo), Some((Source::Wall(1), 1.0)));
 }
 
 #[test]
-fn a_wall_across_the_way_silences_the_one_behind() {
+fn a_wall_in_front_occludes_the_one_behind() {
     // The diagonal stands before the far wall, and reflects away.
     let world = room(&[FAR_WALL, ([1.0, -0.5], [1.6, 0.5])]);
     assert_eq!(echo_of(&world, &noiseless(), 0.0, 0), None);
@@ -94,7 +94,7 @@ fn a_corner_answers_from_inside_and_an_edge_from_outside() {
 }
 
 #[test]
-fn an_obstacle_answers_before_the_wall_and_hides_it() {
+fn an_obstacle_reflects_and_occludes_the_wall() {
     let post = |y| {
         let outline = Outline::Circle { centre: [1.0, y], radius: 0.2 };
         room(&[FAR_WALL]).with_obstacles(vec![Obstacle { outline, walk: None }])
@@ -111,7 +111,7 @@ fn an_obstacle_answers_before_the_wall_and_hides_it() {
 }
 
 #[test]
-fn a_sound_goes_over_two_walls_where_the_first_turns_it_away() {
+fn a_double_bounce_needs_a_first_wall_that_deflects_the_beam() {
     // The first wall stands at 45° before the sonar and turns the beam up, onto the second.
     let world = room(&[([0.5, -0.5], [1.5, 0.5]), ([-3.0, 2.0], [3.0, 2.0])]);
     let sensor = SensorModel { double_bounce: 1.0, ..noiseless() };
@@ -132,7 +132,7 @@ fn the_echo_of_a_moving_robot_is_that_of_the_middle_of_the_flight() {
 }
 
 #[test]
-fn what_is_half_heard_is_heard_half_of_the_time_and_then_the_next_wall_is() {
+fn a_wall_of_half_probability_is_detected_half_of_the_time() {
     let half = Sensitivity {
         share: Curve::through(&[(1.0, 0.5), (1.001, 1.0)]),
         half_angle: Curve::level(f64::INFINITY),
@@ -150,7 +150,7 @@ fn what_is_half_heard_is_heard_half_of_the_time_and_then_the_next_wall_is() {
 }
 
 #[test]
-fn outliers_come_as_often_as_they_should_and_say_so() {
+fn outliers_have_their_rate_and_their_source() {
     let sensor = SensorModel { short: Curve::level(0.2), long: Curve::level(0.25), ..noiseless() };
     let world = room(&[FAR_WALL]);
     let echoes: Vec<Echo> =
@@ -176,7 +176,7 @@ fn a_missed_cycle_costs_half_a_wavelength_and_a_step_is_whole() {
 }
 
 #[test]
-fn roughness_answers_between_normal_and_axis() {
+fn a_rough_wall_reflects_between_normal_and_axis() {
     let rough = SensorModel {
         scatter: Sensitivity { share: Curve::level(1.0), ..noiseless().mirror },
         scatter_lean: 0.5,
@@ -191,7 +191,7 @@ proptest! {
     /// Every echo lies within reach, and for a robot at rest the range of the ideal sensor is
     /// exactly the distance of the nearest wall.
     #[test]
-    fn the_ideal_sonar_hears_the_nearest_foot_in_its_cone(
+    fn the_ideal_sonar_detects_the_nearest_foot_in_its_cone(
         distances in prop::collection::vec(0.1_f64..9.0, 1..5), aside in -0.25_f64..0.25,
     ) {
         let walls: Vec<_> = distances.iter().map(|&x| ([x, -9.0 * x], [x, 9.0 * x])).collect();

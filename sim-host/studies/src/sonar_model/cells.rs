@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn a_beam_past_the_end_of_what_it_could_meet_squarely_is_not_sorted() {
+    fn a_beam_past_the_end_of_a_wall_is_not_assigned_to_it() {
         let world = World::of(vec![Segment::new([1.0, 0.2], [1.0, 5.0])]);
         let mut cells = Cells::default();
         let beam = Beam { world: &world, from: [0.0, 0.0], axis: 0.5, reading: Some(1.0) };

@@ -10,7 +10,7 @@ const DURING: u64 = 1_500_000;
 const AFTER: u64 = 2_000_000;
 
 #[test]
-fn an_echo_is_wrong_while_its_fault_lasts_and_only_then() {
+fn an_echo_fault_has_an_effect_only_while_it_lasts() {
     let pulse = |kind, now| faults(&[kind]).sonar.pulse(now, 9_000, 38_000);
     for now in [BEFORE, AFTER] {
         for kind in [FaultKind::LostEchoes(1.0), FaultKind::CrossTalk(1.0), FaultKind::StuckEcho] {

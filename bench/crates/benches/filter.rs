@@ -1,6 +1,4 @@
-//! Predict, update and aim on this machine: `cargo bench --package sonarfix`.
-
-#![expect(clippy::unwrap_used, reason = "a benchmark that cannot start should stop")]
+//! Predict, update and aim on this machine: `cargo bench --package bench-crates --bench filter`.
 
 use std::hint::black_box;
 

@@ -1,7 +1,6 @@
-//! The walls near a point, and a whole aim, in buildings of any size: `cargo bench --package sonarfix-map`.
+//! The walls near a point, and a whole aim, in buildings of any size: `cargo bench --package bench-crates --bench maps`.
 
-#![expect(clippy::unwrap_used, reason = "a benchmark that cannot start should stop")]
-
+#[path = "../../../crates/sonarfix-map/tests/rooms/mod.rs"]
 mod rooms;
 
 use std::hint::black_box;

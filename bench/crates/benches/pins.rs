@@ -1,6 +1,4 @@
-//! The paper's 1,248 s through pins, drivers and loop, beside the ideal run.
-#![expect(clippy::expect_used, reason = "a benchmark that cannot run should stop")]
-#![allow(missing_docs, reason = "criterion's macros make a public function")]
+//! The paper's 1,248 s at both fidelities: `cargo bench --package bench-crates --bench pins`.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use sonarfix_map::{Fidelity, Scenario};
