@@ -24,15 +24,15 @@ mod window;
 use bank::{Bank, Entry, moved};
 use candidates::{AlongWalls, Generated, Pairs, Placement, make_a_pair};
 use lines::{Line, Lines, TILTS};
+use refine::Prior;
 use score::EchoModel;
-use trial::{Trial, Verdict, count};
+use trial::{Odometry, Trial, Verdict, count};
 use vector::Vector;
 use window::Window;
 
 use crate::config::Sonar;
 use crate::map::{Map, WallId};
 use crate::pose::Pose;
-use crate::trig::sin_cos;
 use crate::units::{Metres, Radians};
 
 /// What the search is tuned with.
@@ -45,6 +45,10 @@ pub struct SearchParameters {
     pub novel_angle_at_rest: Radians,
     /// Deviation of the odometry's heading drift per metre of travel.
     pub drift: Radians,
+    /// Deviation of the relative error of turns by the odometry: track width and wheels.
+    pub turn_scale: f32,
+    /// Deviation that a metre of odometry adds to the place of a ping besides, metres.
+    pub odometry: f32,
     /// Hypotheses within this log-likelihood of the best are answers, too.
     pub margin: f32,
     /// The mean log-likelihood per ping, relative to echoes anywhere, of a hypothesis that fits.
@@ -59,6 +63,8 @@ impl Default for SearchParameters {
             novel_angle: Radians::from_degrees(20.0),
             novel_angle_at_rest: Radians::from_degrees(3.8),
             drift: Radians::from_degrees(2.0),
+            turn_scale: 0.02,
+            odometry: 0.015,
             margin: 12.0,
             least_fit: 0.3,
             persistence: 40,
@@ -81,6 +87,8 @@ pub struct Hypothesis {
     pub explained: f32,
     /// Heading drift of the odometry, radians per metre of travel.
     pub drift: f32,
+    /// Relative error of the odometry's turns.
+    pub turn_scale: f32,
 }
 
 /// What the search found.
@@ -173,7 +181,6 @@ enum Task {
 pub struct Search<'m, const PINGS: usize = 96, const HYPOTHESES: usize = 8> {
     parameters: SearchParameters,
     echoes: EchoModel<'m>,
-    mount: Vector,
     servo: (f32, f32),
     sweep: Sweep,
     window: Window<PINGS>,
@@ -213,10 +220,9 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         Self {
             parameters,
             echoes: EchoModel::new(map, sonar.cone, sonar.max_range),
-            mount: sonar.mount.into(),
             servo: (right, left),
             sweep: Sweep { bearing: right, step: parameters.novel_angle.0 },
-            window: Window::new(),
+            window: Window::new(sonar.mount.into()),
             lines: Lines::new(sonar.cone),
             bank: Bank::new(),
             task: Task::Vote { ping: 0, tilt: 0 },
@@ -233,10 +239,9 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
     pub fn restart(&mut self, sonar: &Sonar, map: Map<'m>) {
         let (right, left) = (sonar.servo.0.0, sonar.servo.1.0);
         self.echoes = EchoModel::new(map, sonar.cone, sonar.max_range);
-        self.mount = sonar.mount.into();
         self.servo = (right, left);
         self.sweep = Sweep { bearing: right, step: self.parameters.novel_angle.0 };
-        self.window.restart();
+        self.window.restart(sonar.mount.into());
         self.lines.restart(sonar.cone);
         self.bank.clear();
         self.task = Task::Vote { ping: 0, tilt: 0 };
@@ -250,7 +255,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
     /// The pings in the window.
     #[must_use]
     pub fn pings(&self) -> usize {
-        self.window.pings().len()
+        self.window.count()
     }
 
     /// Moves the robot by a distance along its mid-heading and a turn.
@@ -283,7 +288,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         self.sweep.advance(self.servo);
         let range = range.map(|range| range.0).filter(|range| *range <= self.echoes.max_range);
         let novel = [self.parameters.novel_angle_at_rest, self.parameters.novel_angle];
-        Ok(self.window.ping(self.mount, bearing.0, range, novel))
+        Ok(self.window.ping(bearing.0, range, novel))
     }
 
     /// Adds a pose of the robot, as it may be now, to the bank: the place where it was lost, or the
@@ -296,11 +301,11 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
             return Err(NotFinite);
         }
         let turn = pose.heading.radians() - Radians(self.window.heading());
-        let (sin, cos) = sin_cos(turn);
-        let rotation = Vector::new(cos, sin);
-        let robot = self.window.robot().at.turned(rotation);
-        let at = Vector::from(pose.position()).minus(robot);
-        self.bank.offer(Entry::proposed(Placement { at, rotation, drift: 0.0 }));
+        let bend = self.window.bend();
+        // Back from the robot's place to the reference.
+        let rotation = Vector::of_angle(turn.0);
+        let at = Vector::from(pose.position()).minus(self.window.robot().at.turned(rotation));
+        self.bank.offer(Entry::proposed(Placement { at, rotation, bend }));
         Ok(())
     }
 
@@ -341,28 +346,30 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
     }
 
     fn hypothesis(&self, entry: &Entry) -> Hypothesis {
-        let now = moved(&entry.placement, self.window.robot());
+        let now = moved(&entry.placement, self.window.robot(), self.window.bend());
         let rotation = libm::atan2f(now.rotation.y, now.rotation.x);
         let spread = &entry.spread;
-        let pings = self.window.pings();
-        let echoes = pings.iter().filter(|ping| ping.range().is_some()).count();
         Hypothesis {
             pose: Pose::new(now.at.x, now.at.y, Radians(rotation + self.window.heading())),
             position_deviation: Metres(libm::sqrtf(largest(spread.xx, spread.xy, spread.yy))),
             heading_deviation: Radians(libm::sqrtf(spread.rotation)),
-            fit: entry.score / count(pings.len()),
-            explained: f32::from(entry.explained) / count(echoes),
-            drift: entry.placement.drift,
+            fit: entry.score / at_least_one(entry.pings),
+            explained: f32::from(entry.explained) / at_least_one(entry.echoes),
+            drift: entry.placement.bend.drift,
+            turn_scale: entry.placement.bend.turn_scale,
         }
     }
 
     fn evaluate(&mut self) {
-        if self.window.pings().len() < LEAST_PINGS {
+        if self.window.count() < LEAST_PINGS {
             return;
         }
         if let Some(trial) = &mut self.trial {
             let is_answer = trial.is_answer;
-            match trial.advance(&self.echoes, &self.window, self.parameters.drift.0) {
+            let parameters = &self.parameters;
+            let prior = Prior { drift: parameters.drift.0, turn_scale: parameters.turn_scale };
+            let odometry = Odometry { prior, per_metre: parameters.odometry };
+            match trial.advance(&self.echoes, &self.window, &odometry) {
                 Verdict::Running => return,
                 Verdict::Rejected => self.bank.end_trial(),
                 Verdict::Scored(entry) if is_answer => self.answer = Decision::Unique(entry),
@@ -385,11 +392,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
 
     fn vote(&mut self, ping: u16, tilt: u8) -> Task {
         if ping == 0 && tilt == 0 {
-            let reference = self.window.rebase();
-            self.bank.rebase(&reference);
-            if let Decision::Unique(entry) = &mut self.answer {
-                entry.placement = moved(&entry.placement, &reference);
-            }
+            self.rebase();
             self.lines.clear();
         }
         let Some(part) = TILTS.get(usize::from(tilt)) else {
@@ -402,6 +405,19 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         };
         self.lines.vote(self.window.pings(), usize::from(ping), *part);
         Task::Vote { ping, tilt: tilt + 1 }
+    }
+
+    /// Moves the frame to the robot, and straightens the path by the best hypothesis.
+    fn rebase(&mut self) {
+        let bend = self.window.bend();
+        let reference = self.window.rebase();
+        self.bank.rebase(&reference, bend);
+        if let Decision::Unique(entry) = &mut self.answer {
+            entry.placement = moved(&entry.placement, &reference, bend);
+        }
+        if let Some(best) = self.bank.entries().first() {
+            self.window.straighten(best.placement.bend);
+        }
     }
 
     fn fit(&mut self, line: u8) -> Task {
@@ -435,8 +451,8 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
             self.decide(false);
             return Task::Vote { ping: 0, tilt: 0 };
         };
-        let drift = self.likely_drift();
-        match pairs.next(&self.echoes.map, &first, &second, drift) {
+        let bend = self.window.bend();
+        match pairs.next(&self.echoes.map, &first, &second, bend) {
             Generated::Candidate(placement) => self.try_candidate(placement, 0.15, 0.25),
             Generated::Nothing => {}
             Generated::Done => return Task::Pairs { pair: pair + 1, pairs: Pairs::default() },
@@ -450,8 +466,8 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
             self.decide(true);
             return Task::Vote { ping: 0, tilt: 0 };
         };
-        let drift = self.likely_drift();
-        match along.next(&self.echoes.map, &checked, drift) {
+        let bend = self.window.bend();
+        match along.next(&self.echoes.map, &checked, bend) {
             Generated::Candidate(placement) => self.try_candidate(placement, 0.25, 0.6),
             Generated::Nothing => {}
             Generated::Done => {
@@ -470,11 +486,6 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         let least = if full > rivalry * best { full } else { rivalry * best };
         let least = if least > 0.0 { least } else { 0.0 };
         self.trial = Some(Trial::of_candidate(placement, least));
-    }
-
-    /// The drift of the best hypothesis, with which candidates start.
-    fn likely_drift(&self) -> f32 {
-        self.bank.entries().first().map_or(0.0, |entry| entry.placement.drift)
     }
 
     /// The pairs of this cycle: the best ones, then others that take turns.
@@ -584,6 +595,11 @@ impl Sweep {
         let next = self.bearing + PART * self.step;
         self.bearing = if next >= right && next <= left { next } else { right };
     }
+}
+
+/// A count as a divisor.
+fn at_least_one(count: u16) -> f32 {
+    f32::from(if count > 0 { count } else { 1 })
 }
 
 /// The larger eigenvalue of a symmetric matrix.

@@ -5,9 +5,7 @@ use heapless::Vec;
 use super::candidates::Placement;
 use super::refine::Spread;
 use super::vector::Vector;
-use super::window::Station;
-use crate::trig::sin_cos;
-use crate::units::Radians;
+use super::window::{Bend, Station};
 
 /// Placements within this distance, metres, and this cosine of rotation (25°) are one mode.
 const SAME_PLACE: f32 = 0.3;
@@ -19,7 +17,10 @@ pub(super) struct Entry {
     pub placement: Placement,
     /// Sum of the scores of all pings.
     pub score: f32,
-    /// Pings that a reflector of the map explains.
+    /// Pings that were scored, those of them with an echo, and those that a reflector of the map
+    /// explains.
+    pub pings: u16,
+    pub echoes: u16,
     pub explained: u16,
     pub spread: Spread,
     /// Novel pings while it was the only answer.
@@ -44,6 +45,8 @@ impl Entry {
         Self {
             placement,
             score: f32::MIN,
+            pings: 0,
+            echoes: 0,
             explained: 0,
             spread: Spread::default(),
             streak: 0,
@@ -128,21 +131,23 @@ impl<const HYPOTHESES: usize> Bank<HYPOTHESES> {
         let _ = self.entries.insert(at.unwrap_or(self.entries.len()), entry);
     }
 
-    /// Moves all placements to a new reference of the odometry frame.
-    pub fn rebase(&mut self, reference: &Station) {
+    /// Moves all placements to a new reference of the odometry frame, of which `bend` is taken out.
+    pub fn rebase(&mut self, reference: &Station, bend: Bend) {
         for entry in &mut self.entries {
-            entry.placement = moved(&entry.placement, reference);
+            entry.placement = moved(&entry.placement, reference, bend);
         }
     }
 }
 
-/// The placement of the odometry frame with the origin and the drift at another station.
-pub(super) fn moved(placement: &Placement, reference: &Station) -> Placement {
-    let (sin, cos) = sin_cos(Radians(placement.drift * reference.travelled));
+/// The placement of the odometry frame, of which `bend` is taken out, with the origin at a station
+/// that is not far: the way there is turned by half of the remaining bend.
+pub(super) fn moved(placement: &Placement, station: &Station, bend: Bend) -> Placement {
+    let turn = placement.bend.minus(bend).at(station).0;
+    let middle = placement.rotation.turned(Vector::of_angle(0.5 * turn));
     Placement {
-        at: placement.to_map(reference.drifted(placement.drift)),
-        rotation: placement.rotation.turned(Vector::new(cos, sin)),
-        drift: placement.drift,
+        at: placement.at.plus(station.at.turned(middle)),
+        rotation: placement.rotation.turned(Vector::of_angle(turn)),
+        bend: placement.bend,
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::lines::Line;
 use super::vector::Vector;
+use super::window::Bend;
 use crate::map::{Map, Wall, WallId};
 use crate::units::Metres;
 
@@ -23,14 +24,8 @@ pub(super) struct Placement {
     pub at: Vector,
     /// Cosine and sine of its rotation.
     pub rotation: Vector,
-    /// Heading drift of the odometry, radians per metre.
-    pub drift: f32,
-}
-
-impl Placement {
-    pub fn to_map(self, point: Vector) -> Vector {
-        self.at.plus(point.turned(self.rotation))
-    }
+    /// How the odometry's heading errs.
+    pub bend: Bend,
 }
 
 /// A wall seen from one of its sides.
@@ -86,7 +81,7 @@ pub(super) fn make_a_pair(one: &Line, other: &Line) -> bool {
 
 impl Pairs {
     /// Compares a few walls and stops at the first candidate.
-    pub fn next(&mut self, map: &Map, first: &Line, second: &Line, drift: f32) -> Generated {
+    pub fn next(&mut self, map: &Map, first: &Line, second: &Line, bend: Bend) -> Generated {
         let Some(wall) = map.wall(WallId(self.wall)) else { return Generated::Done };
         let side = Side::new(&wall, self.is_left);
         let rotation =
@@ -103,7 +98,7 @@ impl Pairs {
                 continue;
             }
             if let Some(placement) = place(&side, first, rotation, &other, second) {
-                return Generated::Candidate(Placement { drift, ..placement });
+                return Generated::Candidate(Placement { bend, ..placement });
             }
         }
         if self.compared - before == WALLS_A_STEP {
@@ -155,7 +150,7 @@ fn place(
     );
     let fits = side.holds(first, side.toward.left().dot(at))
         && other.holds(second, other.toward.left().dot(at));
-    fits.then_some(Placement { at, rotation, drift: 0.0 })
+    fits.then_some(Placement { at, rotation, bend: Bend::NONE })
 }
 
 /// One line along every wall, in steps.
@@ -167,7 +162,7 @@ pub(super) struct AlongWalls {
 }
 
 impl AlongWalls {
-    pub fn next(&mut self, map: &Map, line: &Line, drift: f32) -> Generated {
+    pub fn next(&mut self, map: &Map, line: &Line, bend: Bend) -> Generated {
         let Some(wall) = map.wall(WallId(self.wall)) else { return Generated::Done };
         let side = Side::new(&wall, self.is_left);
         let rotation =
@@ -189,6 +184,6 @@ impl AlongWalls {
             .plus(line.normal.left().times(0.5 * (line.stretch.0 + line.stretch.1)));
         let on_wall = side.toward.times(side.offset).plus(side.toward.left().times(middle));
         let at = on_wall.minus(foot.turned(rotation));
-        Generated::Candidate(Placement { at, rotation, drift })
+        Generated::Candidate(Placement { at, rotation, bend })
     }
 }

@@ -1,12 +1,10 @@
-//! Gauss–Newton refinement of a placement: position, rotation and heading drift from the residuals
-//! of all pings that a reflector of the map explains.
+//! Gauss–Newton refinement of a placement: position, rotation and bend of the odometry from the
+//! residuals of all pings that a reflector of the map explains.
 
 use super::candidates::Placement;
 use super::score::{Beam, Target};
 use super::vector::Vector;
-use super::window::Ping;
-use crate::trig::sin_cos;
-use crate::units::Radians;
+use super::window::{Bend, Chain, Ping, Window};
 
 /// Longest step that is taken, metres and radians: beyond it the linearization is invalid.
 const LONGEST_STEP: f32 = 0.6;
@@ -15,12 +13,31 @@ const WIDEST_TURN: f32 = 0.35;
 const POSITION: f32 = 0.5;
 const ROTATION: f32 = 0.3;
 
-/// Symmetric normal equations of (x, y, rotation, drift), upper triangle by rows.
+/// Parameters: x, y, rotation, drift, turn scale.
+const PARAMETERS: usize = 5;
+
+/// Normal equations of the parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Equations {
-    rows: [[f32; 4]; 4],
-    right: [f32; 4],
+    rows: [[f32; PARAMETERS]; PARAMETERS],
+    right: [f32; PARAMETERS],
     pub count: u16,
+}
+
+/// What is expected of the odometry: prior deviations of a [`Bend`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Prior {
+    /// Radians per metre.
+    pub drift: f32,
+    pub turn_scale: f32,
+}
+
+impl Prior {
+    /// Inverse variances.
+    fn weights(self) -> Bend {
+        let weight = |deviation: f32| 1.0 / (deviation * deviation);
+        Bend { drift: weight(self.drift), turn_scale: weight(self.turn_scale) }
+    }
 }
 
 /// Variances of a placement, square metres and square radians.
@@ -32,115 +49,164 @@ pub(super) struct Spread {
     pub rotation: f32,
 }
 
-/// What a residual is weighed by.
+/// What a residual is weighted by.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Tolerance {
     /// Deviation of a range, metres.
     pub deviation: f32,
-    /// Deviation that a metre of odometry adds to a ping of long ago, apart from the estimated drift.
-    pub odometry: f32,
     /// Inverse of the deviation of the angle between a beam and what answers.
     pub by_beam: f32,
 }
 
-/// A ping placed on the map.
-pub(super) fn beam(ping: &Ping, placement: &Placement) -> Beam {
-    let from = placement.to_map(ping.station.drifted(placement.drift));
-    let (sin, cos) = sin_cos(Radians(placement.drift * ping.station.travelled));
-    let axis = ping.axis.turned(Vector::new(cos, sin)).turned(placement.rotation);
-    Beam { from, axis, range: ping.range() }
+/// A ping placed on the map, with the derivatives of its place by the parameters.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Placed {
+    pub beam: Beam,
+    /// From the reference to the sonar.
+    arm: Vector,
+    by_drift: Vector,
+    by_turn_scale: Vector,
+    /// Derivatives of the beam's direction.
+    travelled: f32,
+    turned: f32,
+}
+
+impl Placed {
+    /// Places the next ping of a chain that began at the reference.
+    pub fn new<const PINGS: usize>(
+        ping: &Ping,
+        placement: &Placement,
+        window: &Window<PINGS>,
+        chain: &mut Chain,
+    ) -> Self {
+        let link = window.link(ping, placement.bend.minus(window.bend()));
+        chain.add(&link);
+        let to_map = |vector: Vector| vector.turned(placement.rotation);
+        let arm = to_map(chain.sonar(&link));
+        let from = placement.at.plus(arm);
+        let axis = to_map(ping.axis.turned(link.bent));
+        Self {
+            beam: Beam { from, axis, range: ping.range() },
+            arm,
+            by_drift: to_map(chain.by_drift),
+            by_turn_scale: to_map(chain.by_turn_scale),
+            travelled: ping.station.travelled,
+            turned: ping.station.turned,
+        }
+    }
 }
 
 impl Equations {
-    pub fn add(&mut self, ping: &Ping, placement: &Placement, target: &Target, by: Tolerance) {
-        let arm = ping.station.drifted(placement.drift).turned(placement.rotation);
-        let swept = ping.station.moment.turned(placement.rotation);
+    pub fn add(&mut self, placed: &Placed, target: &Target, by: Tolerance) {
         let toward = target.toward;
-        let h = [toward.x, toward.y, toward.dot(arm.left()), toward.dot(swept.left())];
+        let by_turn = toward.dot(placed.arm.left());
+        let h = [
+            toward.x,
+            toward.y,
+            by_turn,
+            toward.dot(placed.by_drift),
+            toward.dot(placed.by_turn_scale),
+        ];
         // Of Cauchy's robust weight.
         let ratio = target.residual / by.deviation;
-        let odometry = by.odometry * ping.station.travelled;
-        let variance = by.deviation * by.deviation + odometry * odometry;
-        let weight = 1.0 / (variance * (1.0 + 0.5 * ratio * ratio));
-        for ((row, right), hi) in self.rows.iter_mut().zip(&mut self.right).zip(h) {
-            for (cell, hj) in row.iter_mut().zip(h) {
-                *cell += weight * hi * hj;
-            }
-            *right -= weight * hi * target.residual;
-        }
+        let weight = 1.0 / (by.deviation * by.deviation * (1.0 + 0.5 * ratio * ratio));
+        self.add_row(h, -target.residual, weight);
         // Beams are square to what answers, on the mean.
         let aside = by.by_beam * target.off_axis;
         let weight = by.by_beam * by.by_beam / (1.0 + 0.3 * aside * aside);
-        let [_, _, [.., turn, _], _] = &mut self.rows;
-        *turn += weight;
-        let [_, _, turn, _] = &mut self.right;
-        *turn += weight * target.off_axis;
+        self.add_row([0.0, 0.0, 1.0, placed.travelled, placed.turned], target.off_axis, weight);
         self.count += 1;
     }
 
+    fn add_row(&mut self, h: [f32; PARAMETERS], value: f32, weight: f32) {
+        for ((row, right), hi) in self.rows.iter_mut().zip(&mut self.right).zip(h) {
+            let weighted = weight * hi;
+            for (cell, hj) in row.iter_mut().zip(h) {
+                *cell += weighted * hj;
+            }
+            *right += weighted * value;
+        }
+    }
+
     /// The placement after a step, shortened if it leads too far.
-    pub fn step(&self, placement: &Placement, drift_deviation: f32) -> Option<Placement> {
-        let drift_weight = 1.0 / (drift_deviation * drift_deviation);
-        let damping = [
-            1.0 / (POSITION * POSITION),
-            1.0 / (POSITION * POSITION),
-            1.0 / (ROTATION * ROTATION),
-            drift_weight,
-        ];
+    pub fn step(&self, placement: &Placement, prior: Prior) -> Option<Placement> {
+        let by_prior = prior.weights();
+        let position = 1.0 / (POSITION * POSITION);
+        let damping =
+            [position, position, 1.0 / (ROTATION * ROTATION), by_prior.drift, by_prior.turn_scale];
         let mut right = self.right;
-        right[3] -= drift_weight * placement.drift;
-        let [dx, dy, turn, drift] = self.solve(damping, right)?;
+        let [.., by_drift, by_turn_scale] = &mut right;
+        *by_drift -= by_prior.drift * placement.bend.drift;
+        *by_turn_scale -= by_prior.turn_scale * placement.bend.turn_scale;
+        let [dx, dy, turn, drift, turn_scale] = self.solve(damping, right)?;
         let moved = libm::sqrtf(dx * dx + dy * dy);
         let turned = turn.abs() / WIDEST_TURN;
         let excess = if moved > turned * LONGEST_STEP { moved / LONGEST_STEP } else { turned };
         let share = if excess > 1.0 { 1.0 / excess } else { 1.0 };
-        let [dx, dy, turn, drift] = [dx, dy, turn, drift].map(|step| share * step);
-        let (sin, cos) = sin_cos(Radians(turn));
-        let rotation = placement.rotation.turned(Vector::new(cos, sin));
+        let rotation = placement.rotation.turned(Vector::of_angle(share * turn));
         let norm = 1.0 / libm::sqrtf(rotation.length_squared());
         Some(Placement {
-            at: placement.at.plus(Vector::new(dx, dy)),
+            at: placement.at.plus(Vector::new(share * dx, share * dy)),
             rotation: rotation.times(norm),
-            drift: placement.drift + drift,
+            bend: Bend {
+                drift: placement.bend.drift + share * drift,
+                turn_scale: placement.bend.turn_scale + share * turn_scale,
+            },
         })
     }
 
     /// The inverse of the information, with a prior of 10 m and π.
-    pub fn spread(&self, drift_deviation: f32) -> Spread {
-        let prior = [0.01, 0.01, 0.1, 1.0 / (drift_deviation * drift_deviation)];
-        let by = |unit: [f32; 4]| self.solve(prior, unit).unwrap_or([100.0, 100.0, 10.0, 1.0]);
-        let ([xx, xy, ..], [_, yy, ..]) = (by([1.0, 0.0, 0.0, 0.0]), by([0.0, 1.0, 0.0, 0.0]));
-        let [.., rotation, _] = by([0.0, 0.0, 1.0, 0.0]);
+    pub fn spread(&self, prior: Prior) -> Spread {
+        let by_prior = prior.weights();
+        let diagonal = [0.01, 0.01, 0.1, by_prior.drift, by_prior.turn_scale];
+        let by = |unit| self.solve(diagonal, unit).unwrap_or([100.0, 100.0, 10.0, 1.0, 1.0]);
+        let ([xx, xy, ..], [_, yy, ..]) =
+            (by([1.0, 0.0, 0.0, 0.0, 0.0]), by([0.0, 1.0, 0.0, 0.0, 0.0]));
+        let [_, _, rotation, ..] = by([0.0, 0.0, 1.0, 0.0, 0.0]);
         Spread { xx, xy, yy, rotation }
     }
 
     /// Elimination without pivoting: the matrix is positive definite by its diagonal.
-    fn solve(&self, diagonal: [f32; 4], right: [f32; 4]) -> Option<[f32; 4]> {
-        let [a, b, c, d] = self.rows;
-        let mut p = [a[0] + diagonal[0], a[1], a[2], a[3], right[0]];
-        let mut q = [b[0], b[1] + diagonal[1], b[2], b[3], right[1]];
-        let mut r = [c[0], c[1], c[2] + diagonal[2], c[3], right[2]];
-        let mut s = [d[0], d[1], d[2], d[3] + diagonal[3], right[3]];
-        let eliminate = |row: &mut [f32; 5], factor: f32, by: &[f32; 5]| {
+    fn solve(
+        &self,
+        diagonal: [f32; PARAMETERS],
+        right: [f32; PARAMETERS],
+    ) -> Option<[f32; PARAMETERS]> {
+        let mut rows = self.rows;
+        let [[a, ..], [_, b, ..], [_, _, c, ..], [.., d, _], [.., e]] = &mut rows;
+        for (cell, add) in [a, b, c, d, e].into_iter().zip(diagonal) {
+            *cell += add;
+        }
+        let [p, mut q, mut r, mut s, mut t] = rows;
+        let [rp, mut rq, mut rr, mut rs, mut rt] = right;
+        let eliminate = |row: &mut [f32; PARAMETERS], right: &mut f32, factor: f32, by, by_right| {
+            let by: &[f32; PARAMETERS] = by;
             for (cell, by) in row.iter_mut().zip(by) {
                 *cell -= factor * by;
             }
+            *right -= factor * by_right;
         };
-        for row in [&mut q, &mut r, &mut s] {
+        for (row, right) in [(&mut q, &mut rq), (&mut r, &mut rr), (&mut s, &mut rs), (&mut t, &mut rt)]
+        {
             let factor = row[0] / p[0];
-            eliminate(row, factor, &p);
+            eliminate(row, right, factor, &p, rp);
         }
-        for row in [&mut r, &mut s] {
+        for (row, right) in [(&mut r, &mut rr), (&mut s, &mut rs), (&mut t, &mut rt)] {
             let factor = row[1] / q[1];
-            eliminate(row, factor, &q);
+            eliminate(row, right, factor, &q, rq);
         }
-        let factor = s[2] / r[2];
-        eliminate(&mut s, factor, &r);
-        let w = s[4] / s[3];
-        let z = (r[4] - r[3] * w) / r[2];
-        let y = (q[4] - q[3] * w - q[2] * z) / q[1];
-        let x = (p[4] - p[3] * w - p[2] * z - p[1] * y) / p[0];
-        p = [x, y, z, w, 0.0];
-        p.iter().all(|value| value.is_finite()).then_some([x, y, z, w])
+        for (row, right) in [(&mut s, &mut rs), (&mut t, &mut rt)] {
+            let factor = row[2] / r[2];
+            eliminate(row, right, factor, &r, rr);
+        }
+        let factor = t[3] / s[3];
+        eliminate(&mut t, &mut rt, factor, &s, rs);
+        let v = rt / t[4];
+        let w = (rs - s[4] * v) / s[3];
+        let z = (rr - r[4] * v - r[3] * w) / r[2];
+        let y = (rq - q[4] * v - q[3] * w - q[2] * z) / q[1];
+        let x = (rp - p[4] * v - p[3] * w - p[2] * z - p[1] * y) / p[0];
+        let solution = [x, y, z, w, v];
+        solution.iter().all(|value| value.is_finite()).then_some(solution)
     }
 }

@@ -49,18 +49,27 @@ const LEAST_SILENCE: f32 = -1.2;
 pub(super) struct Sharpness {
     /// Metres.
     pub deviation: f32,
-    /// Logarithm of the normal distribution's peak density, 0.3989 over the deviation, over
-    /// 0.25 per metre: that of an echo anywhere, by which all scores are divided.
+    /// Logarithm of the normal distribution's peak density over [`ANYWHERE`].
     peak: f32,
 }
 
+/// Density of an echo anywhere, per metre, by which all scores are divided.
+const ANYWHERE: f32 = 0.25;
+const ONE_OVER_ROOT_TWO_PI: f32 = 0.398_942_3;
+
 impl Sharpness {
-    /// 15 cm: of candidates.
-    pub const COARSE: Self = Self { deviation: 0.15, peak: 2.364_47 };
-    /// 8 cm.
-    pub const MEDIUM: Self = Self { deviation: 0.08, peak: 2.993_08 };
-    /// 5 cm: map, odometry within the window and the sonar together.
-    pub const FINE: Self = Self { deviation: 0.05, peak: 3.463_09 };
+    /// Deviations, metres: of candidates, of placements that were refined once, and of map, sonar
+    /// and odometry nearby together.
+    pub const COARSE: f32 = 0.15;
+    pub const MEDIUM: f32 = 0.08;
+    pub const FINE: f32 = 0.05;
+
+    /// Of a ping that was sent so far from the reference that odometry adds a deviation of its own.
+    pub fn new(deviation: f32, odometry: f32) -> Self {
+        let deviation = libm::sqrtf(deviation * deviation + odometry * odometry);
+        let peak = libm::logf(ONE_OVER_ROOT_TWO_PI / ANYWHERE / deviation);
+        Self { deviation, peak }
+    }
 }
 
 /// A ping placed on the map.

@@ -3,14 +3,13 @@
 
 use super::bank::{Entry, State};
 use super::candidates::Placement;
-use super::refine::{Equations, Tolerance, beam};
+use super::refine::{Equations, Placed, Prior, Tolerance};
 use super::score::{EchoModel, Sharpness};
-use super::window::Window;
+use super::window::{Chain, Window};
+use super::vector::Vector;
 
 /// Gauss–Newton steps after the coarse one.
 const STEPS: u8 = 2;
-/// Deviation that a metre of odometry adds to an answer, metres per metre.
-const ODOMETRY: f32 = 0.03;
 /// By how much the running sum may fall short: scores deviate by 1.3 a ping.
 const LEAD: f32 = 8.0;
 
@@ -29,19 +28,29 @@ pub(super) enum Verdict {
     Scored(Entry),
 }
 
+/// What is expected of the odometry.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Odometry {
+    /// Of its bend.
+    pub prior: Prior,
+    /// Deviation that a metre adds to the place of a ping besides, metres.
+    pub per_metre: f32,
+}
+
 #[derive(Debug, Clone)]
 pub(super) struct Trial {
     placement: Placement,
     stage: Stage,
-    /// Pings looked at in this stage.
+    chain: Chain,
+    /// Pings looked at in this stage, and those of them with an echo.
     seen: u16,
+    echoes: u16,
     sum: f32,
     /// The final score that must be within reach.
     least: f32,
     equations: Equations,
     streak: u16,
-    /// Whether the placement becomes an answer. Old pings then have a lower weight, because the pose now is
-    /// required.
+    /// Whether the placement becomes an answer.
     pub is_answer: bool,
 }
 
@@ -51,7 +60,9 @@ impl Trial {
         Self {
             placement,
             stage: Stage::Coarse,
+            chain: Chain::new(Vector::default()),
             seen: 0,
+            echoes: 0,
             sum: 0.0,
             least,
             equations: Equations::default(),
@@ -79,24 +90,25 @@ impl Trial {
         &mut self,
         echoes: &EchoModel,
         window: &Window<PINGS>,
-        drift_deviation: f32,
+        odometry: &Odometry,
     ) -> Verdict {
-        let Some(ping) = window.in_order(usize::from(self.seen)) else {
-            return self.end_stage(drift_deviation);
+        let Some(ping) = window.newest(usize::from(self.seen)) else {
+            return self.end_stage(odometry.prior);
         };
         self.seen += 1;
-        let sharpness = match self.stage {
+        self.echoes += u16::from(ping.range().is_some());
+        let deviation = match self.stage {
             Stage::Coarse => Sharpness::COARSE,
             Stage::Step(0) => Sharpness::MEDIUM,
             Stage::Step(_) | Stage::Fine => Sharpness::FINE,
         };
-        let explanation = echoes.explain(&beam(ping, &self.placement), sharpness);
+        let sharpness = Sharpness::new(deviation, odometry.per_metre * ping.station.travelled);
+        let placed = Placed::new(ping, &self.placement, window, &mut self.chain);
+        let explanation = echoes.explain(&placed.beam, sharpness);
         self.sum += explanation.score;
         if let Some(target) = explanation.target {
-            let odometry = if self.is_answer { ODOMETRY } else { 0.0 };
-            let by =
-                Tolerance { deviation: sharpness.deviation, odometry, by_beam: echoes.by_beam };
-            self.equations.add(ping, &self.placement, &target, by);
+            let by = Tolerance { deviation: sharpness.deviation, by_beam: echoes.by_beam };
+            self.equations.add(&placed, &target, by);
         }
         if self.sum < self.least_sum(window.pings().len()) {
             return Verdict::Rejected;
@@ -116,15 +128,17 @@ impl Trial {
         rate * f32::from(self.seen) - LEAD
     }
 
-    fn end_stage(&mut self, drift_deviation: f32) -> Verdict {
+    fn end_stage(&mut self, prior: Prior) -> Verdict {
         match self.stage {
-            Stage::Coarse => self.step(0, drift_deviation),
-            Stage::Step(number) => self.step(number + 1, drift_deviation),
+            Stage::Coarse => self.step(0, prior),
+            Stage::Step(number) => self.step(number + 1, prior),
             Stage::Fine => Verdict::Scored(Entry {
                 placement: self.placement,
                 score: self.sum,
+                pings: self.seen,
+                echoes: self.echoes,
                 explained: self.equations.count,
-                spread: self.equations.spread(drift_deviation),
+                spread: self.equations.spread(prior),
                 streak: self.streak,
                 state: State::Fresh,
             }),
@@ -132,8 +146,8 @@ impl Trial {
     }
 
     /// Takes the Gauss–Newton step of a stage and begins the next.
-    fn step(&mut self, next: u8, drift_deviation: f32) -> Verdict {
-        let Some(placement) = self.equations.step(&self.placement, drift_deviation) else {
+    fn step(&mut self, next: u8, prior: Prior) -> Verdict {
+        let Some(placement) = self.equations.step(&self.placement, prior) else {
             return Verdict::Rejected;
         };
         self.placement = placement;
@@ -142,7 +156,9 @@ impl Trial {
 
     fn begin(&mut self, stage: Stage) -> Verdict {
         self.stage = stage;
+        self.chain = Chain::new(Vector::default());
         self.seen = 0;
+        self.echoes = 0;
         self.sum = 0.0;
         self.equations = Equations::default();
         Verdict::Running

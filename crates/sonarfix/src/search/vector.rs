@@ -1,6 +1,8 @@
 //! Plane vectors, as the search computes with them: metres, or unit vectors.
 
 use crate::pose::Point;
+use crate::trig::sin_cos;
+use crate::units::Radians;
 
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Vector {
@@ -11,6 +13,12 @@ pub(super) struct Vector {
 impl Vector {
     pub const fn new(x: f32, y: f32) -> Self {
         Self { x, y }
+    }
+
+    /// Cosine and sine of an angle, radians.
+    pub fn of_angle(angle: f32) -> Self {
+        let (sin, cos) = sin_cos(Radians(angle));
+        Self { x: cos, y: sin }
     }
 
     pub fn dot(self, other: Self) -> f32 {

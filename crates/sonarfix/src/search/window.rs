@@ -4,45 +4,65 @@
 //! The frame's origin is the *reference*: where the robot was when the current cycle began. Its
 //! axes keep the directions that they had when the search began.
 //!
+//! Odometry whose wheels are wrong bends the path. The stations are kept with the [`Bend`] of the
+//! best hypothesis taken out, so that a wall that was passed is a straight line in this frame.
+//!
 //! # Non-finite policy
 //! Travel and pings that are not finite are refused by [`super::Search`], so the window is finite.
 
 use heapless::Vec;
 
 use super::vector::Vector;
-use crate::trig::sin_cos;
+use crate::pose::Heading;
 use crate::units::Radians;
 
 /// A ping is novel if no ping of the window was sent from within this distance, metres, in the same direction.
 const NOVEL_DISTANCE: f32 = 0.3;
-/// Orders of scoring: a stride that does not divide the number of pings visits each once, and
-/// neighbours in the order differ in place and direction.
-const STRIDES: [usize; 4] = [37, 41, 43, 47];
 
-/// A place on the path by odometry. Distances are signed: negative before the reference.
+/// How the heading by odometry departs from the true one: by wheels of unequal size, and by an error
+/// of the track width.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Bend {
+    /// Radians per metre of travel.
+    pub drift: f32,
+    /// Radians per radian of turning.
+    pub turn_scale: f32,
+}
+
+impl Bend {
+    pub const NONE: Self = Self { drift: 0.0, turn_scale: 0.0 };
+
+    pub fn minus(self, other: Self) -> Self {
+        Self {
+            drift: self.drift - other.drift,
+            turn_scale: self.turn_scale - other.turn_scale,
+        }
+    }
+
+    /// The heading error at a station, relative to that at the reference.
+    pub fn at(self, station: &Station) -> Radians {
+        Radians(self.drift * station.travelled + self.turn_scale * station.turned)
+    }
+}
+
+/// A place on the path by odometry.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Station {
     /// Position of the robot's axle, or of the sonar of a ping.
     pub at: Vector,
-    /// Distance travelled since the reference, metres.
+    /// Distance travelled since the reference, metres; negative before it.
     pub travelled: f32,
-    /// ∫ travelled · d(position): what a heading drift of one radian per metre moves it to the right.
-    pub moment: Vector,
+    /// Angle turned since the reference by the encoders, radians, positive to the left, not wrapped.
+    pub turned: f32,
 }
 
 impl Station {
-    /// The position if the odometry's heading drifts by `drift` radians per metre, first order.
-    pub fn drifted(&self, drift: f32) -> Vector {
-        self.at.plus(self.moment.left().times(drift))
-    }
-
     /// The same place seen from another reference.
     fn seen_from(&self, reference: &Self) -> Self {
-        let back = self.at.minus(reference.at);
         Self {
-            at: back,
+            at: self.at.minus(reference.at),
             travelled: self.travelled - reference.travelled,
-            moment: self.moment.minus(reference.moment).minus(back.times(reference.travelled)),
+            turned: self.turned - reference.turned,
         }
     }
 }
@@ -50,6 +70,7 @@ impl Station {
 /// A ping of the window.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Ping {
+    /// Where the sonar was.
     pub station: Station,
     /// Unit vector along the beam.
     pub axis: Vector,
@@ -67,27 +88,54 @@ impl Ping {
 #[derive(Debug, Clone)]
 pub(super) struct Window<const PINGS: usize> {
     pings: Vec<Ping, PINGS>,
+    /// Where the sonar is in the robot frame.
+    mount: Vector,
     robot: Station,
     heading: f32,
-    /// Novel pings since the search began, wrapping.
+    /// Heading at the reference.
+    reference_heading: f32,
+    bend: Bend,
+    /// Novel pings since the search began, and those of them before the reference; wrapping.
     taken: u16,
+    referred: u16,
 }
 
 impl<const PINGS: usize> Window<PINGS> {
-    pub fn new() -> Self {
-        Self { pings: Vec::new(), robot: Station::default(), heading: 0.0, taken: 0 }
+    pub fn new(mount: Vector) -> Self {
+        Self {
+            pings: Vec::new(),
+            mount,
+            robot: Station::default(),
+            heading: 0.0,
+            reference_heading: 0.0,
+            bend: Bend::NONE,
+            taken: 0,
+            referred: 0,
+        }
     }
 
     /// Removes all pings and moves the origin to the robot.
-    pub fn restart(&mut self) {
+    pub fn restart(&mut self, mount: Vector) {
         self.pings.clear();
+        self.mount = mount;
         self.robot = Station::default();
         self.heading = 0.0;
+        self.reference_heading = 0.0;
+        self.bend = Bend::NONE;
         self.taken = 0;
+        self.referred = 0;
     }
 
+    /// The pings before the reference, the oldest first: those that the current cycle works with.
     pub fn pings(&self) -> &[Ping] {
-        &self.pings
+        let later = usize::from(self.taken.wrapping_sub(self.referred));
+        let count = self.pings.len().saturating_sub(later);
+        self.pings.get(..count).unwrap_or_default()
+    }
+
+    /// How many pings the window holds.
+    pub fn count(&self) -> usize {
+        self.pings.len()
     }
 
     pub fn taken(&self) -> u16 {
@@ -98,44 +146,40 @@ impl<const PINGS: usize> Window<PINGS> {
         &self.robot
     }
 
+    /// What is taken out of the odometry.
+    pub fn bend(&self) -> Bend {
+        self.bend
+    }
+
     /// Heading of the robot in the odometry frame, radians.
     pub fn heading(&self) -> f32 {
         self.heading
     }
 
-    /// Moves the robot by a distance and a turn, both finite.
+    /// Moves the robot by a distance and a turn by the encoders, both finite.
     pub fn drive(&mut self, advance: f32, turn: f32) {
-        let (sin, cos) = sin_cos(Radians(self.heading + 0.5 * turn));
-        let step = Vector::new(cos, sin).times(advance);
-        let middle = self.robot.travelled + 0.5 * advance.abs();
-        self.robot.at = self.robot.at.plus(step);
-        self.robot.travelled += advance.abs();
-        self.robot.moment = self.robot.moment.plus(step.times(middle));
-        self.heading = crate::pose::Heading::new(Radians(self.heading + turn)).radians().0;
+        let travelled = advance.abs();
+        let bent = self.bend.drift * travelled + self.bend.turn_scale * turn;
+        let heading = self.heading + turn + bent;
+        let middle = Vector::of_angle(0.5 * (self.heading + heading));
+        self.robot.at = self.robot.at.plus(middle.times(advance));
+        self.robot.travelled += travelled;
+        self.robot.turned += turn;
+        self.heading = Heading::new(Radians(heading)).radians().0;
     }
 
-    /// Takes a ping of the sonar mounted at `mount` of the robot frame, if it is novel.
+    /// Takes a ping, if it is novel.
     ///
     /// `novel` is the angle within which a ping from the same place is not novel: before the robot
     /// has left the first place, and after.
-    pub fn ping(
-        &mut self,
-        mount: Vector,
-        bearing: f32,
-        range: Option<f32>,
-        novel: [Radians; 2],
-    ) -> bool {
-        let (sin, cos) = sin_cos(Radians(self.heading));
-        let arm = mount.turned(Vector::new(cos, sin));
-        let (sin, cos) = sin_cos(Radians(self.heading + bearing));
-        let axis = Vector::new(cos, sin);
+    pub fn ping(&mut self, bearing: f32, range: Option<f32>, novel: [Radians; 2]) -> bool {
         let mut station = self.robot;
-        station.at = station.at.plus(arm);
-        station.moment = station.moment.plus(arm.times(station.travelled));
+        station.at = station.at.plus(self.mount.turned(Vector::of_angle(self.heading)));
+        let axis = Vector::of_angle(self.heading + bearing);
         let [at_rest, driving] = novel;
         let first = self.pings.first().map_or(station.travelled, |ping| ping.station.travelled);
         let novel = if station.travelled - first > NOVEL_DISTANCE { driving } else { at_rest };
-        let novel_cosine = sin_cos(novel).1;
+        let novel_cosine = Vector::of_angle(novel.0).x;
         let is_known = self.pings.iter().any(|ping| {
             ping.axis.dot(axis) > novel_cosine
                 && ping.station.at.minus(station.at).length_squared()
@@ -160,16 +204,99 @@ impl<const PINGS: usize> Window<PINGS> {
             ping.station = ping.station.seen_from(&reference);
         }
         self.robot = Station::default();
+        self.reference_heading = self.heading;
+        self.referred = self.taken;
         reference
     }
 
-    /// The `k`-th ping in the order of scoring.
-    pub fn in_order(&self, k: usize) -> Option<&Ping> {
-        let count = self.pings.len();
-        if k >= count {
-            return None;
+    /// Takes this bend out of the odometry instead of the one before. To be called at the reference.
+    pub fn straighten(&mut self, bend: Bend) {
+        let difference = bend.minus(self.bend);
+        let mut chain = Chain::new(Vector::default());
+        for n in (0..self.pings.len()).rev() {
+            let Some(ping) = self.pings.get(n) else { continue };
+            let link = self.link(ping, difference);
+            chain.add(&link);
+            let (at, axis) = (chain.sonar(&link), ping.axis.turned(link.bent));
+            if let Some(ping) = self.pings.get_mut(n) {
+                ping.station.at = at;
+                ping.axis = axis;
+            }
         }
-        let stride = STRIDES.into_iter().find(|stride| !count.is_multiple_of(*stride))?;
-        self.pings.get((k * stride) % count)
+        self.bend = bend;
+    }
+
+    /// The `k`-th ping before the reference, the newest first.
+    pub fn newest(&self, k: usize) -> Option<&Ping> {
+        self.pings().iter().nth_back(k)
+    }
+
+    /// A ping as a link of a chain that has another bend taken out.
+    pub fn link(&self, ping: &Ping, difference: Bend) -> Link {
+        let station = &ping.station;
+        let turned = self.reference_heading + station.turned + self.bend.at(station).0;
+        let arm = self.mount.turned(Vector::of_angle(turned));
+        Link {
+            axle: station.at.minus(arm),
+            arm,
+            travelled: station.travelled,
+            turned: station.turned,
+            bent: Vector::of_angle(difference.at(station).0),
+        }
+    }
+}
+
+/// A place of the path for a chain.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Link {
+    axle: Vector,
+    /// From the axle to the sonar.
+    arm: Vector,
+    travelled: f32,
+    turned: f32,
+    /// Cosine and sine of the bend.
+    pub bent: Vector,
+}
+
+/// The path from the reference backwards with another bend than that of the window, station by
+/// station: each step of it is turned by the mean of the bends at its ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Chain {
+    last: Link,
+    /// Where the robot's axle was.
+    at: Vector,
+    /// Derivatives of `at` by drift and by turn scale.
+    pub by_drift: Vector,
+    pub by_turn_scale: Vector,
+}
+
+impl Chain {
+    /// A chain that begins at the reference, which lies at `at`.
+    pub fn new(at: Vector) -> Self {
+        let last = Link {
+            axle: Vector::default(),
+            arm: Vector::default(),
+            travelled: 0.0,
+            turned: 0.0,
+            bent: Vector::new(1.0, 0.0),
+        };
+        Self { last, at, by_drift: Vector::default(), by_turn_scale: Vector::default() }
+    }
+
+    /// Goes on to the next place.
+    pub fn add(&mut self, link: &Link) {
+        let middle = self.last.bent.plus(link.bent).times(0.5);
+        let step = link.axle.minus(self.last.axle).turned(middle);
+        let travelled = 0.5 * (self.last.travelled + link.travelled);
+        let turned = 0.5 * (self.last.turned + link.turned);
+        self.at = self.at.plus(step);
+        self.by_drift = self.by_drift.plus(step.left().times(travelled));
+        self.by_turn_scale = self.by_turn_scale.plus(step.left().times(turned));
+        self.last = *link;
+    }
+
+    /// Where the sonar was at the last place.
+    pub fn sonar(&self, link: &Link) -> Vector {
+        self.at.plus(link.arm.turned(link.bent))
     }
 }
