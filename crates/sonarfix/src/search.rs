@@ -55,6 +55,8 @@ pub struct SearchParameters {
     pub least_fit: f32,
     /// Novel pings during which one hypothesis must be the only answer before it is unique.
     pub persistence: u16,
+    /// Largest deviation of the position of a unique answer.
+    pub sharpness: Metres,
 }
 
 impl Default for SearchParameters {
@@ -65,9 +67,10 @@ impl Default for SearchParameters {
             drift: Radians::from_degrees(2.0),
             turn_scale: 0.02,
             odometry: 0.015,
-            margin: 12.0,
+            margin: 10.0,
             least_fit: 0.3,
-            persistence: 40,
+            persistence: 20,
+            sharpness: Metres(0.04),
         }
     }
 }
@@ -516,6 +519,16 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         all.nth(usize::from(BEST_PAIRS) + (first + nth) % others)
     }
 
+    /// Whether the lines are more than one wall.
+    fn has_separate_lines(&self) -> bool {
+        let lines = self.lines.all();
+        let mut pairs = lines
+            .iter()
+            .enumerate()
+            .flat_map(|(n, one)| lines.iter().skip(n + 1).map(move |other| (one, other)));
+        pairs.any(|(one, other)| self.lines.are_separate(one, other))
+    }
+
     /// Ends a cycle.
     fn decide(&mut self, is_checked: bool) {
         self.cycles = self.cycles.wrapping_add(1);
@@ -532,15 +545,17 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         let rivals = self.bank.entries().iter().filter(|entry| entry.score > least).count();
         let spread = &best.spread;
         let is_fit = best.score >= self.parameters.least_fit * pings;
-        let is_determined = largest(spread.xx, spread.xy, spread.yy) < UNDETERMINED * UNDETERMINED;
-        let has_lines = self.pair(0).is_some();
+        let variance = largest(spread.xx, spread.xy, spread.yy);
+        let is_determined = variance < UNDETERMINED * UNDETERMINED;
+        let is_sharp = variance < self.parameters.sharpness.0 * self.parameters.sharpness.0;
+        let has_lines = self.has_separate_lines();
         let is_sole = rivals == 1 && is_fit && is_determined && has_lines;
         for (n, entry) in self.bank.entries_mut().iter_mut().enumerate() {
             let streak = entry.streak.saturating_add(fresh);
             entry.streak = if n == 0 && is_sole { streak } else { 0 };
         }
         let has_persisted =
-            is_sole && best.streak.saturating_add(fresh) >= self.parameters.persistence;
+            is_sole && best.streak.saturating_add(fresh) >= self.parameters.persistence && is_sharp;
         let was_unique = matches!(self.answer, Decision::Unique(_));
         self.is_check_due =
             has_persisted && !is_checked && !was_unique || self.cycles.is_multiple_of(CHECK_EVERY);

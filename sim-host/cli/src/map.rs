@@ -8,7 +8,7 @@ use clap::Subcommand;
 use sonarfix::config::{Config, Sonar};
 use sonarfix::map::Map;
 use sonarfix::units::Metres;
-use sonarfix_map::{Limits, MapFile, Severity, bake, robot_file, simplify, survey};
+use sonarfix_map::{Limits, MapFile, Severity, bake, robot_file, simplify, survey, symmetries};
 
 /// Maximum number of findings that are printed.
 const SHOWN: usize = 100;
@@ -122,8 +122,18 @@ fn check(map: &MapFile, robot: Option<&Path>) -> anyhow::Result<()> {
     if findings.len() > SHOWN {
         println!("and {} more", findings.len() - SHOWN);
     }
+    let symmetries = symmetries(&map.floor)?;
+    for symmetry in &symmetries {
+        println!("{}: warning: {symmetry}", map.name());
+    }
+    if let Some((wall, [x, y])) = symmetries.first().and_then(|symmetry| symmetry.remedy) {
+        let wall = map.quoted(wall);
+        println!(
+            "    a cabinet of 0.6 m × 0.4 m at ({x:.1}, {y:.1}) m on {wall}, mapped, ends that"
+        );
+    }
     let errors = count(&findings, Severity::Error);
-    let warnings = count(&findings, Severity::Warning);
+    let warnings = count(&findings, Severity::Warning) + symmetries.len();
     let walls = map.floor.named_walls().len();
     println!("{}: {walls} walls, {errors} errors, {warnings} warnings", map.name());
     anyhow::ensure!(errors == 0, "the map has errors");

@@ -3,6 +3,7 @@
 use std::io::BufRead;
 
 use serde::Serialize;
+use sonarfix::config::{PingSchedule, Sonar};
 use sonarfix::map::{Map, Wall};
 use sonarfix::search::{Answer, Hypothesis, Search, SearchParameters};
 use sonarfix::units::{Metres, Radians};
@@ -14,12 +15,17 @@ use crate::fault::{ReplayError, Source};
 use crate::lines::Lines;
 use crate::log::{self, Record};
 use crate::reference;
+use crate::scan::{Cone, Scan};
 use crate::wheels::Reading;
 
 /// Evaluations of the search for each second of the log: about those of a 168 MHz Cortex-M4F.
 const EVALUATIONS_PER_SECOND: f64 = 56_000.0;
 /// Cycles that the search makes after the end of the log.
 const CYCLES_AT_END: u32 = 6;
+/// Largest number of pings that one scan stands for: half a turn in steps of 20°.
+const PINGS_A_SCAN: f64 = 9.0;
+/// Duration of a measurement of a sonar that pings as fast as it can, seconds: an HC-SR04 on an SG90.
+const FASTEST: f64 = 0.12;
 
 /// The search on a log.
 pub struct Find<'a> {
@@ -80,6 +86,12 @@ pub struct Found {
     pub lines_skipped: u64,
 }
 
+/// What the log holds of one or more pings.
+enum Heard {
+    Range { bearing: f64, range: Option<f64> },
+    Scan(Scan),
+}
+
 /// A search in progress.
 struct Run<'a> {
     search: Search<'a>,
@@ -87,7 +99,11 @@ struct Run<'a> {
     travel_per_tick: [f64; 2],
     first: Option<i64>,
     last: Option<Reading>,
-    waiting: Vec<(i64, f64, Option<f64>)>,
+    waiting: Vec<(i64, Heard)>,
+    last_scan: Option<i64>,
+    sonar: Sonar,
+    /// Duration of a measurement, seconds.
+    period: f64,
     unique_after: Option<f64>,
     pings: u64,
 }
@@ -126,6 +142,9 @@ impl<'a> Run<'a> {
             first: None,
             last: None,
             waiting: Vec::new(),
+            last_scan: None,
+            sonar: *sonar,
+            period: period(sonar),
             unique_after: None,
             pings: 0,
         }
@@ -141,12 +160,27 @@ impl<'a> Run<'a> {
             }
             Record::Wheels { time, right, left } => self.roll(log_micros(time), [right, left]),
             Record::Range { time, bearing, range, .. } => {
-                self.waiting.push((log_micros(time), bearing, range));
+                self.waiting.push((log_micros(time), Heard::Range { bearing, range }));
             }
-            Record::Skip { .. }
-            | Record::Scan { .. }
-            | Record::Start { .. }
-            | Record::Resume { .. } => {}
+            Record::Scan { time, ref scan } => self.scan(log_micros(time), scan),
+            Record::Skip { .. } | Record::Start { .. } | Record::Resume { .. } => {}
+        }
+    }
+
+    /// Takes the ranges that a rotating sonar would measure in a scan: as many as it has time for
+    /// since the scan before, in the directions of its sweep.
+    fn scan(&mut self, time: i64, scan: &Scan) {
+        let before = self.last_scan.replace(time).unwrap_or(time);
+        #[expect(clippy::cast_precision_loss, reason = "exact below 2^53 µs")]
+        let elapsed = (time - before) as f64 * 1e-6;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "between 1 and a sweep"
+        )]
+        let pings = (elapsed / self.period).clamp(1.0, PINGS_A_SCAN) as u32;
+        for _ in 0..pings {
+            self.waiting.push((time, Heard::Scan(scan.clone())));
         }
     }
 
@@ -154,12 +188,12 @@ impl<'a> Run<'a> {
     fn roll(&mut self, time: i64, wheels: [f64; 2]) {
         let reading = Reading { time, wheels };
         self.first.get_or_insert(time);
-        for (at, bearing, range) in std::mem::take(&mut self.waiting) {
+        for (at, heard) in std::mem::take(&mut self.waiting) {
             let Some(last) = self.last.filter(|last| last.time <= at && at <= time) else {
                 continue;
             };
             self.drive_to(last.between(reading, at));
-            self.ping(bearing, range);
+            self.hear(&heard);
         }
         if self.last.is_none_or(|last| last.time < time) {
             self.drive_to(reading);
@@ -188,6 +222,19 @@ impl<'a> Run<'a> {
             #[expect(clippy::cast_precision_loss, reason = "exact below 2^53 µs")]
             let after = self.first.map(|first| (reading.time - first) as f64 * 1e-6);
             self.unique_after = after;
+        }
+    }
+
+    fn hear(&mut self, heard: &Heard) {
+        match heard {
+            Heard::Range { bearing, range } => self.ping(*bearing, *range),
+            Heard::Scan(scan) => {
+                let bearing = f64::from(self.search.aim().0);
+                let Sonar { cone, min_range, max_range, .. } = self.sonar;
+                let reach = (min_range.0.into(), max_range.0.into());
+                let range = scan.earliest(&Cone { bearing, cone: cone.0.into(), reach });
+                self.ping(bearing, range);
+            }
         }
     }
 
@@ -220,6 +267,14 @@ impl<'a> Run<'a> {
             cycles: self.search.cycles(),
             lines_skipped,
         }
+    }
+}
+
+fn period(sonar: &Sonar) -> f64 {
+    match sonar.timing.schedule {
+        #[expect(clippy::cast_precision_loss, reason = "exact below 2^53 µs")]
+        PingSchedule::Every(period) => (period.to_micros() as f64 * 1e-6).max(FASTEST),
+        PingSchedule::AsFastAsPossible => FASTEST,
     }
 }
 

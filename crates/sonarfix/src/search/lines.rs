@@ -31,6 +31,9 @@ pub(super) struct Line {
     pub support: u16,
 }
 
+/// The cosine of 75°: two lines at right angles are separate for any cone.
+const LARGEST_SEPARATION: f32 = 0.259;
+
 /// The best lines, by their support.
 #[derive(Debug, Clone)]
 pub(super) struct Lines {
@@ -58,6 +61,14 @@ impl Lines {
 
     pub fn clear(&mut self) {
         self.found.clear();
+    }
+
+    /// Whether two lines are at an angle at which no ping supports both, so that they are not one
+    /// wall twice: it may appear as two tangents of its echoes.
+    pub fn are_separate(&self, one: &Line, other: &Line) -> bool {
+        let twice = 2.0 * self.cos_cone * self.cos_cone - 1.0;
+        let limit = if twice > LARGEST_SEPARATION { twice } else { LARGEST_SEPARATION };
+        one.normal.dot(other.normal).abs() < limit
     }
 
     /// Lets all pings vote on the line of one ping and one tilt.

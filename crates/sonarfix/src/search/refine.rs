@@ -179,14 +179,16 @@ impl Equations {
         }
         let [p, mut q, mut r, mut s, mut t] = rows;
         let [rp, mut rq, mut rr, mut rs, mut rt] = right;
-        let eliminate = |row: &mut [f32; PARAMETERS], right: &mut f32, factor: f32, by, by_right| {
-            let by: &[f32; PARAMETERS] = by;
-            for (cell, by) in row.iter_mut().zip(by) {
-                *cell -= factor * by;
-            }
-            *right -= factor * by_right;
-        };
-        for (row, right) in [(&mut q, &mut rq), (&mut r, &mut rr), (&mut s, &mut rs), (&mut t, &mut rt)]
+        let eliminate =
+            |row: &mut [f32; PARAMETERS], right: &mut f32, factor: f32, by, by_right| {
+                let by: &[f32; PARAMETERS] = by;
+                for (cell, by) in row.iter_mut().zip(by) {
+                    *cell -= factor * by;
+                }
+                *right -= factor * by_right;
+            };
+        for (row, right) in
+            [(&mut q, &mut rq), (&mut r, &mut rr), (&mut s, &mut rs), (&mut t, &mut rt)]
         {
             let factor = row[0] / p[0];
             eliminate(row, right, factor, &p, rp);

@@ -33,10 +33,7 @@ impl Bend {
     pub const NONE: Self = Self { drift: 0.0, turn_scale: 0.0 };
 
     pub fn minus(self, other: Self) -> Self {
-        Self {
-            drift: self.drift - other.drift,
-            turn_scale: self.turn_scale - other.turn_scale,
-        }
+        Self { drift: self.drift - other.drift, turn_scale: self.turn_scale - other.turn_scale }
     }
 
     /// The heading error at a station, relative to that at the reference.
