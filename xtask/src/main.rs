@@ -21,6 +21,7 @@ mod panics;
 mod pil;
 mod program;
 mod publish;
+mod search_windows;
 mod thumb;
 mod words;
 mod workspace;
@@ -88,6 +89,8 @@ enum Task {
     Words(words::Args),
     /// Random runs of the filter, 10⁸ steps by default (minutes).
     Endurance(endurance::Args),
+    /// Random windows of pings for the search for the pose, 10⁶ by default (minutes).
+    SearchWindows(search_windows::Args),
     /// Fuzzing for a bounded time.
     Fuzz(fuzz::Args),
     /// The core under Miri if it is installed (long: it builds a standard library first).
@@ -95,7 +98,7 @@ enum Task {
 }
 
 /// The steps of CI, the fast ones first.
-fn ci_steps() -> [(&'static str, Task); 18] {
+fn ci_steps() -> [(&'static str, Task); 19] {
     [
         ("format", Task::Format),
         ("circles", Task::Circles),
@@ -114,6 +117,7 @@ fn ci_steps() -> [(&'static str, Task); 18] {
         ("package", Task::Package),
         ("deny", Task::Deny),
         ("endurance", Task::Endurance(endurance::Args::SHORT)),
+        ("search-windows", Task::SearchWindows(search_windows::Args::SHORT)),
         ("fuzz", Task::Fuzz(fuzz::Args::short())),
     ]
 }
@@ -157,6 +161,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Statistics => checks::statistics(),
         Task::Words(args) => words::count(&args),
         Task::Endurance(args) => endurance::run(args),
+        Task::SearchWindows(args) => search_windows::run(args),
         Task::Fuzz(args) => fuzz::run(&args),
         Task::Miri => miri::run(),
     }

@@ -7,3 +7,4 @@ mod maps;
 mod paper;
 mod path;
 mod rooms;
+mod symmetry;
