@@ -70,7 +70,7 @@ impl Default for SearchParameters {
             margin: 10.0,
             least_fit: 0.3,
             persistence: 20,
-            sharpness: Metres(0.04),
+            sharpness: Metres(0.05),
         }
     }
 }
