@@ -1,4 +1,9 @@
 //! Maps with known symmetry, at any place and in any direction.
+#![expect(
+    clippy::unwrap_used,
+    clippy::indexing_slicing,
+    reason = "all of this file is a test, its helpers too"
+)]
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
