@@ -37,10 +37,10 @@ fn start() -> Start {
 
 /// The messages by the names of their files.
 fn inputs() -> [(&'static str, Vec<u8>); 5] {
-    let wall = Wall::new(Point::new(0.0, 0.0), Point::new(4.0, 0.0)).unwrap();
+    let walls = [Wall::new(Point::new(0.0, 0.0), Point::new(4.0, 0.0)).unwrap()];
     let config = Config::for_track_width(Metres(0.16));
     let at = Instant::from_ticks(1_000_000);
-    let mut localizer = Localizer::new(config, Map::new(&[wall]), start(), at).unwrap();
+    let mut localizer = Localizer::new(config, Map::new(&walls), start(), at).unwrap();
     let aim = localizer.aim().unwrap();
     let fix = localizer.fix(&aim, Some(aim.range));
     assert!(matches!(fix, Fix::Accepted(_)), "{fix:?}");
@@ -58,7 +58,10 @@ fn inputs() -> [(&'static str, Vec<u8>); 5] {
         ("estimate", telemetry(Telemetry::Estimate(reporter::estimate(&localizer)))),
         ("loop-status", telemetry(Telemetry::LoopStatus(status))),
         ("ping", telemetry(Telemetry::Ping(ping))),
-        ("set-configuration", command(Command::SetConfiguration(RobotConfig::with_common_parts(config)))),
+        (
+            "set-configuration",
+            command(Command::SetConfiguration(RobotConfig::with_common_parts(config))),
+        ),
         ("set-pose", command(Command::SetPose(start()))),
     ]
 }
