@@ -7,7 +7,7 @@
 //!     └──────────────────────── Stop ───────────────────────────────┘
 //! ```
 //!
-//! A robot that waits must not move; when else it must not, the configuration says ([`MotorPolicy`]): the board enables
+//! A robot that waits must not move; the configuration defines the other cases ([`MotorPolicy`]): the board enables
 //! its motor driver by [`Polled::may_drive`].
 //!
 //! This file composes; `command` executes commands; `wire` reads the link and schedules telemetry. The deadline check

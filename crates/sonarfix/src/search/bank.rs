@@ -140,7 +140,7 @@ impl<const HYPOTHESES: usize> Bank<HYPOTHESES> {
 }
 
 /// The placement of the odometry frame, of which `bend` is taken out, with the origin at a station
-/// that is not far: the way there is turned by half of the remaining bend.
+/// that is not far: the path to it is rotated by half of the remaining bend.
 pub(super) fn moved(placement: &Placement, station: &Station, bend: Bend) -> Placement {
     let turn = placement.bend.minus(bend).at(station).0;
     let middle = placement.rotation.turned(Vector::of_angle(0.5 * turn));
