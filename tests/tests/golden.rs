@@ -19,7 +19,8 @@ fn alone() -> Pair {
 
 #[test]
 fn this_computer_computes_the_bits_of_every_trace() {
-    for (name, least) in [("localizer.golden", 700), ("loop.golden", 10_000)] {
+    let traces = [("localizer.golden", 700), ("loop.golden", 10_000), ("search.golden", 6_000)];
+    for (name, least) in traces {
         let mut pair = alone();
         golden::replay(&trace(name), &mut pair).unwrap();
         assert!(pair.requests() > least, "{name}: {} requests", pair.requests());

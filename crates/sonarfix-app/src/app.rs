@@ -20,6 +20,8 @@ use embedded_storage::nor_flash::NorFlash;
 use sonarfix::health::{self, Verdict};
 use sonarfix::localizer::Localizer;
 use sonarfix::map::{Map, MapError};
+use sonarfix::navigator;
+use sonarfix::search::Search;
 use sonarfix::units::{Duration, Instant, Metres};
 use sonarfix_hal::config::{MotorPolicy, RobotConfig, Unsupported};
 use sonarfix_hal::robot::{Faults, Hardware, Report, Robot, Settings, Step};
@@ -98,6 +100,8 @@ pub struct App<'m, F: NorFlash> {
     /// The state from which the loop would start.
     known: Option<Resumed>,
     mode: Mode<'m>,
+    /// The search for the pose. It is not part of the mode, because it is large and must not be moved.
+    search: Search<'m>,
     wire: Wire,
     /// When the last frame was received, or the app began.
     heard: Instant,
@@ -124,36 +128,54 @@ struct Running<'m> {
     save_policy: SavePolicy,
     /// The state from which it started.
     origin: Resumed,
+    /// Whether it searches for its pose if it does not have one.
+    searches: bool,
     /// Whether a wheel has rolled since.
     has_rolled: bool,
     /// The report of the last poll. It is stored here and not returned, because it is half a kilobyte.
     report: Report,
 }
 
-impl Running<'_> {
+impl<'m> Running<'m> {
     /// Polls the loop and sends its telemetry; returns whether a record is due.
     #[inline(never)]
     fn poll(
         &mut self,
         now: Instant,
         hardware: &mut impl Hardware,
+        search: &mut Search<'m>,
         wire: &mut Wire,
         link: &mut impl Link,
         polled: &mut Polled,
     ) -> bool {
         let before = self.robot.localizer().health().verdict;
-        self.report = self.robot.poll(now, hardware);
+        self.report = if self.searches {
+            self.robot.poll_with_search(now, hardware, search)
+        } else {
+            self.robot.poll(now, hardware)
+        };
         let report = &self.report;
         let localizer = self.robot.localizer();
         let verdict = localizer.health().verdict;
         polled.verdict = (verdict != before).then_some(verdict);
         self.reporter.report(report, localizer, |message| wire.send(message, link));
+        let mode = self.robot.mode();
+        if report.tick.is_some() && mode != navigator::Mode::Tracking {
+            self.reporter.search(mode, search, |message| wire.send(message, link));
+        }
         if has_rolled(report) {
             self.save_policy.rolled(now);
             self.has_rolled = true;
         }
+        let is_tracking = mode == navigator::Mode::Tracking;
         polled.is_on_time = report.tick.is_some() && report.faults.deadlines == 0;
-        report.tick.is_some() && self.save_policy.is_due(now, localizer)
+        report.tick.is_some() && is_tracking && self.save_policy.is_due(now, localizer)
+    }
+
+    /// Whether the state from which it started no longer holds.
+    fn has_left_origin(&self) -> bool {
+        let is_searching = self.robot.mode() == navigator::Mode::Searching;
+        self.has_rolled || is_searching || !self.origin.has_pose
     }
 }
 
@@ -175,6 +197,7 @@ impl<'m, F: NorFlash> App<'m, F> {
             run: 1,
             known: None,
             mode: Mode::Waiting(Check::new(now)),
+            search: Search::default(),
             wire: Wire::default(),
             heard: now,
             faults: Faults::default(),
@@ -214,7 +237,8 @@ impl<'m, F: NorFlash> App<'m, F> {
                 polled.is_on_time = since(now, self.time) <= Settings::default().tolerance;
             }
             Mode::Running(running) => {
-                let is_due = running.poll(now, hardware, &mut self.wire, link, &mut polled);
+                let (search, wire) = (&mut self.search, &mut self.wire);
+                let is_due = running.poll(now, hardware, search, wire, link, &mut polled);
                 if is_due {
                     running
                         .save_policy
@@ -270,6 +294,21 @@ impl<'m, F: NorFlash> App<'m, F> {
             Mode::Running(running) => Some(running.robot.localizer()),
             Mode::Waiting(_) => None,
         }
+    }
+
+    /// What determines the pose, while the loop runs.
+    #[must_use]
+    pub fn navigation_mode(&self) -> Option<navigator::Mode> {
+        match &self.mode {
+            Mode::Running(running) => Some(running.robot.mode()),
+            Mode::Waiting(_) => None,
+        }
+    }
+
+    /// The search for the pose; its state has a meaning while the mode is not `Tracking`.
+    #[must_use]
+    pub fn search(&self) -> &Search<'m> {
+        &self.search
     }
 
     /// The report of the loop's last poll, while it runs.
@@ -413,9 +452,11 @@ impl<'m, F: NorFlash> App<'m, F> {
     fn known_now(&self) -> Option<Resumed> {
         match &self.mode {
             Mode::Waiting(_) => self.known,
-            Mode::Running(running) if running.has_rolled => {
+            Mode::Running(running) if running.has_left_origin() => {
                 let filter = running.robot.localizer().filter();
-                Some(Resumed::interrupted(filter.state(), filter.standard_deviations()))
+                let known = Resumed::interrupted(filter.state(), filter.standard_deviations());
+                let has_pose = running.robot.mode() != navigator::Mode::Searching;
+                Some(if has_pose { known } else { known.without_pose() })
             }
             Mode::Running(running) => Some(running.origin.interrupted_again()),
         }

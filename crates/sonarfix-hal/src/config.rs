@@ -17,6 +17,7 @@
 //! [`RobotConfig::check`] refuses NaN and infinity in every field.
 
 use sonarfix::config::{Config, ConfigError};
+use sonarfix::search::Region;
 use sonarfix::units::{Duration, Metres, Radians};
 
 use crate::encoder::{GeometryError, WheelGeometry, Wheels};
@@ -43,6 +44,41 @@ pub struct RobotConfig {
     pub ranger: RangerConfig,
     /// When the motors are enabled.
     pub motors: MotorPolicy,
+    /// Whether the robot needs to know where it starts.
+    pub start: StartPose,
+}
+
+/// Whether a robot needs to know where it starts.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum StartPose {
+    /// The pose must be set before the start. A lost robot stays lost.
+    #[default]
+    Known,
+    /// It searches for its pose if it starts without one, and whenever it is lost
+    /// ([`Navigator`](sonarfix::navigator::Navigator)).
+    Unknown {
+        /// The region in which it starts without a pose; anywhere on the map if there is none.
+        region: Option<Region>,
+    },
+}
+
+impl StartPose {
+    /// Whether the robot searches for a pose that it does not have.
+    #[must_use]
+    pub fn is_unknown(&self) -> bool {
+        matches!(self, Self::Unknown { .. })
+    }
+
+    /// The region in which a robot without a pose starts, if it is limited.
+    #[must_use]
+    pub fn region(&self) -> Option<Region> {
+        match self {
+            Self::Known => None,
+            Self::Unknown { region } => *region,
+        }
+    }
 }
 
 /// A wheel and its encoder.
@@ -214,6 +250,7 @@ impl RobotConfig {
                 temperature: Celsius(20.0),
             },
             motors: MotorPolicy::DEFAULT,
+            start: StartPose::Known,
         }
     }
 
@@ -234,7 +271,9 @@ impl RobotConfig {
         require("servo_pulses", fits, "within the servo's frame at both limits of the servo")?;
         let air = Air::at(self.ranger.temperature);
         require("ranger.temperature", air.is_ok(), "between -40 and 85 degrees Celsius")?;
-        require("motors.link_timeout", !self.motors.link_timeout.is_zero(), "longer than zero")
+        require("motors.link_timeout", !self.motors.link_timeout.is_zero(), "longer than zero")?;
+        let region = self.start.region().is_none_or(|region| region.is_valid());
+        require("start.region", region, "a rectangle from its smaller to its larger coordinates")
     }
 
     /// The geometry of both wheels.

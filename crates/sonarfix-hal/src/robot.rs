@@ -52,7 +52,7 @@ use sonarfix::ekf::EkfError;
 use sonarfix::localizer::{Localizer, Start};
 use sonarfix::motion::WheelTravel;
 use sonarfix::navigator::{Mode, Navigator};
-use sonarfix::search::Search;
+use sonarfix::search::{Region, Search};
 use sonarfix::units::{Instant, Radians};
 
 use crate::encoder::Wheels;
@@ -271,14 +271,17 @@ impl<'m> Robot<'m> {
         report
     }
 
-    /// Declares the pose unknown and begins the search; a ping in flight is aborted. The robot's present pose is
-    /// proposed to the search, unless it has none.
-    pub fn search(&mut self, now: Instant, search: &mut Search<'m>, has_pose: bool) {
-        if has_pose {
-            self.navigator.search(search);
-        } else {
-            self.navigator.search_anywhere(search);
-        }
+    /// Declares the pose unknown and begins the search, to which the present pose is proposed; a ping in flight is
+    /// aborted.
+    pub fn search(&mut self, now: Instant, search: &mut Search<'m>) {
+        self.navigator.search(search);
+        self.end_cycle(now, false);
+    }
+
+    /// Begins the search of a robot that has been started without a pose ([`Navigator::search_in`]); a ping in flight
+    /// is aborted.
+    pub fn search_in(&mut self, now: Instant, region: Option<Region>, search: &mut Search<'m>) {
+        self.navigator.search_in(region, search);
         self.end_cycle(now, false);
     }
 

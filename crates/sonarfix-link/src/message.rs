@@ -13,7 +13,10 @@ use sonarfix::aim::{Aim, NoAim};
 use sonarfix::ekf::{StandardDeviations, StateEstimate};
 use sonarfix::health::Health;
 use sonarfix::localizer::{Fix, Start};
-use sonarfix::units::{Duration, Instant};
+use sonarfix::map::WallId;
+use sonarfix::navigator::Mode;
+use sonarfix::pose::Pose;
+use sonarfix::units::{Duration, Instant, Metres, Radians};
 use sonarfix_hal::config::{RobotConfig, Unsupported};
 use sonarfix_hal::ranger;
 use sonarfix_hal::robot::Faults;
@@ -65,6 +68,14 @@ pub enum Telemetry {
     /// The pose of a running localizer was replaced; its calibration and the covariance of that are
     /// what they were, and distances are still counted from [`Self::Initialized`].
     PoseSet(Estimate),
+    /// What determines the pose has changed.
+    ModeChanged(ModeChanged),
+    /// A ping of the search's sweep is complete.
+    Sweep(Sweep),
+    /// The progress of the search, once a second while it works.
+    Search(SearchStatus),
+    /// A hypothesis of the search, each once a second.
+    Hypothesis(RankedHypothesis),
 }
 
 /// The identification of a robot.
@@ -168,6 +179,80 @@ pub struct SkippedPing {
     pub reason: NoAim,
 }
 
+/// A change of what determines the pose.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ModeChanged {
+    /// The new mode.
+    pub mode: Mode,
+    /// The estimate after it. While searching its pose has no meaning.
+    pub estimate: Estimate,
+}
+
+/// A ping of the search's sweep.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Sweep {
+    /// The localizer's time: the instant of the echo's reflection, or without an echo that of the last wheel travel.
+    pub at: Instant,
+    /// The bearing of the sonar.
+    pub bearing: Radians,
+    /// The echo, or why there is none.
+    pub outcome: ranger::Outcome,
+}
+
+/// The progress of the search.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct SearchStatus {
+    /// The localizer's time.
+    pub at: Instant,
+    /// What determines the pose.
+    pub mode: Mode,
+    /// What the search has found so far.
+    pub answer: SearchAnswer,
+    /// Pings in its window.
+    pub pings: u16,
+    /// Complete cycles.
+    pub cycles: u32,
+}
+
+/// What the search has found ([`Answer`](sonarfix::search::Answer)).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum SearchAnswer {
+    /// Not enough for an answer.
+    Searching,
+    /// So many hypotheses fit.
+    Several(u8),
+    /// The position along this wall is undetermined.
+    Along(WallId),
+    /// No pose fits.
+    Nowhere,
+    /// One pose fits.
+    Unique,
+}
+
+/// A hypothesis of the search.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct RankedHypothesis {
+    /// The localizer's time.
+    pub at: Instant,
+    /// Its rank, from 0, the best.
+    pub rank: u8,
+    /// The robot's pose.
+    pub pose: Pose,
+    /// The larger axis of the position's error ellipse, one deviation.
+    pub position_deviation: Metres,
+    /// One deviation of the heading.
+    pub heading_deviation: Radians,
+    /// Mean log-likelihood per ping, relative to echoes anywhere.
+    pub fit: f32,
+    /// The share of the echoes that the map explains.
+    pub explained: f32,
+}
+
 /// The status of the loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -229,6 +314,8 @@ pub enum CommandError {
     Unsupported(Unsupported),
     /// The frame is of another session, or earlier than the last one of this session.
     Session,
+    /// The configuration does not let the robot search for its pose ([`RobotConfig::start`]).
+    NoSearch,
 }
 
 impl core::fmt::Display for CommandError {
@@ -241,6 +328,7 @@ impl core::fmt::Display for CommandError {
             Self::Storage => "the robot could not write to its flash",
             Self::NoPose => "the robot's pose is unknown: set it first",
             Self::Session => "the command's session has ended: send it again in a new one",
+            Self::NoSearch => "the robot does not search: its robot file needs start = \"unknown\"",
             Self::Unsupported(reason) => return write!(f, "{reason}"),
         })
     }
@@ -275,4 +363,6 @@ pub enum Command {
     MapChecksum,
     /// Opens a session and ends the one before: its commands are refused from now on.
     OpenSession,
+    /// Declares the pose unknown: a running robot searches for it, one that waits does so when it is started.
+    Search,
 }

@@ -3,10 +3,15 @@
 use sonarfix::ekf::{StandardDeviations, StateEstimate};
 use sonarfix::health::Health;
 use sonarfix::localizer::Localizer;
+use sonarfix::navigator::Mode;
+use sonarfix::search::{Answer, Hypothesis, Search};
 use sonarfix::units::Instant;
-use sonarfix_hal::robot::{self, PingResult, Report, StepResult};
+use sonarfix_hal::robot::{self, PingResult, Report, StepResult, SweepResult};
 
-use crate::message::{Estimate, Odometry, Ping, SkippedPing, Telemetry};
+use crate::message::{
+    Estimate, ModeChanged, Odometry, Ping, RankedHypothesis, SearchAnswer, SearchStatus,
+    SkippedPing, Sweep, Telemetry,
+};
 
 /// Turns what the loop did into telemetry, in the order of the localizer's inputs. The telemetry contains all of
 /// its inputs: replayed from [`Telemetry::Initialized`] on, they reproduce the estimates bit for bit.
@@ -14,7 +19,12 @@ use crate::message::{Estimate, Odometry, Ping, SkippedPing, Telemetry};
 pub struct Reporter {
     /// The last wheel travel taken, with the total distances.
     last: Odometry,
+    /// The next message on the search: its status, then one hypothesis after the other.
+    next: u8,
 }
+
+/// Messages on the search before they begin again. There is one at each tick: with ten ticks a second, each once a second.
+const SEARCH_MESSAGES: u8 = 10;
 
 impl Reporter {
     /// A reporter for a localizer that was just initialized, and the first message.
@@ -37,7 +47,7 @@ impl Reporter {
     ) -> (Self, Telemetry) {
         let last = Odometry { at, right_metres: 0.0, left_metres: 0.0 };
         let began = Estimate { at, state, deviation, health: Health::default() };
-        (Self { last }, Telemetry::Initialized(began))
+        (Self { last, next: 0 }, Telemetry::Initialized(began))
     }
 
     /// Passes the messages of one poll of the loop to `send`. `localizer` is that of the loop, after the poll.
@@ -51,12 +61,44 @@ impl Reporter {
             self.odometry(heard.step.as_ref(), &mut send);
             self.ping(heard, &mut send);
         }
+        if let Some(SweepResult { bearing, outcome, step, .. }) = report.swept {
+            self.odometry(step.as_ref(), &mut send);
+            send(&Telemetry::Sweep(Sweep { at: self.last.at, bearing, outcome }));
+        }
         if let Some(tick) = &report.tick {
             self.odometry(tick.step.as_ref(), &mut send);
             send(&Telemetry::Estimate(estimate(localizer)));
         }
         if let Some(Err(reason)) = report.aimed {
             send(&Telemetry::SkippedPing(SkippedPing { at: self.last.at, reason }));
+        }
+        if let Some(mode) = report.mode {
+            send(&mode_changed(mode, localizer));
+        }
+    }
+
+    /// Passes the next message on the search to `send`; to be called at a tick while the search works.
+    pub fn search(&mut self, mode: Mode, search: &Search, send: impl FnOnce(&Telemetry)) {
+        let (at, number) = (self.last.at, self.next);
+        self.next = (number + 1) % SEARCH_MESSAGES;
+        let Some(rank) = number.checked_sub(1) else {
+            let pings = u16::try_from(search.pings()).unwrap_or(u16::MAX);
+            let (answer, cycles) = (kind_of(&search.answer()), search.cycles());
+            send(&Telemetry::Search(SearchStatus { at, mode, answer, pings, cycles }));
+            return;
+        };
+        if let Some(hypothesis) = search.ranked(usize::from(rank)) {
+            let Hypothesis { pose, position_deviation, heading_deviation, fit, explained, .. } =
+                hypothesis;
+            send(&Telemetry::Hypothesis(RankedHypothesis {
+                at,
+                rank,
+                pose,
+                position_deviation,
+                heading_deviation,
+                fit,
+                explained,
+            }));
         }
     }
 
@@ -91,6 +133,22 @@ impl Reporter {
             send(&Telemetry::Ping(Ping { at: self.last.at, aim, outcome, fix }));
         }
     }
+}
+
+fn kind_of(answer: &Answer) -> SearchAnswer {
+    match *answer {
+        Answer::Searching => SearchAnswer::Searching,
+        Answer::Several(count) => SearchAnswer::Several(u8::try_from(count).unwrap_or(u8::MAX)),
+        Answer::Along { wall, .. } => SearchAnswer::Along(wall),
+        Answer::Nowhere => SearchAnswer::Nowhere,
+        Answer::Unique(_) => SearchAnswer::Unique,
+    }
+}
+
+/// The message after the mode of a robot has changed.
+#[must_use]
+pub fn mode_changed(mode: Mode, localizer: &Localizer) -> Telemetry {
+    Telemetry::ModeChanged(ModeChanged { mode, estimate: estimate(localizer) })
 }
 
 /// The localizer's estimate as a message.

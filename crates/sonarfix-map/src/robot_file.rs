@@ -13,7 +13,8 @@ use sonarfix::pose::Point;
 use sonarfix::range::RangeNoise;
 use sonarfix::units::{Duration, Metres, MetresPerSecond, PerRootMetre, Radians};
 
-use sonarfix_hal::config::{MotorPolicy, RobotConfig, RobotConfigError, WheelConfig};
+use sonarfix::search::Region;
+use sonarfix_hal::config::{MotorPolicy, RobotConfig, RobotConfigError, StartPose, WheelConfig};
 use sonarfix_hal::servo::MeasuredPulse;
 
 use crate::document::{Document, Node, Table};
@@ -23,7 +24,8 @@ use crate::quantity::{
 };
 use crate::{file, ranger_file, single};
 
-const TABLES: [&str; 7] = ["drive", "sonar", "prior", "gating", "echo", "schedule", "motors"];
+const KEYS: [&str; 9] =
+    ["start", "start_region", "drive", "sonar", "prior", "gating", "echo", "schedule", "motors"];
 
 const DRIVE_KEYS: [&str; 8] = [
     "track_width",
@@ -73,12 +75,12 @@ pub fn read(path: &Path) -> Result<RobotConfig, FileError> {
 /// [`FileError`] with the first error.
 pub fn parse(text: &str, file_name: &str) -> Result<RobotConfig, FileError> {
     let document = Document::parse(text, file_name)?;
-    from_table(&document.root(&TABLES)?)
+    from_table(&document.root(&KEYS)?)
 }
 
 /// Reads a `[robot]` table.
 pub(crate) fn from_node(node: Node<'_>) -> Result<RobotConfig, FileError> {
-    from_table(&node.table(&TABLES)?)
+    from_table(&node.table(&KEYS)?)
 }
 
 fn from_table(robot: &Table<'_>) -> Result<RobotConfig, FileError> {
@@ -102,6 +104,7 @@ fn from_table(robot: &Table<'_>) -> Result<RobotConfig, FileError> {
         servo_pulses: read_pulses(&sonar)?,
         ranger: ranger.config,
         motors: read_motors(robot)?,
+        start: read_start(robot)?,
     };
     config.check().map_err(|error| {
         let message = format!("must be {}", error.rule);
@@ -121,8 +124,37 @@ fn key_of(error: RobotConfigError) -> &'static str {
         "encoder_period" => "drive.encoder_period",
         "servo_pulses" => "sonar.servo_pulses",
         "ranger.temperature" => "sonar.temperature",
+        "start.region" => "start_region",
         same => same,
     }
+}
+
+/// A missing key means that the pose must be known.
+fn read_start(robot: &Table<'_>) -> Result<StartPose, FileError> {
+    let region = robot.get("start_region");
+    let is_unknown = match robot.get("start") {
+        None => false,
+        Some(node) => match node.text()? {
+            "known" => false,
+            "unknown" => true,
+            _ => return Err(node.error("must be \"known\" or \"unknown\"")),
+        },
+    };
+    if !is_unknown {
+        return match region {
+            Some(region) => Err(region.error("needs start = \"unknown\"")),
+            None => Ok(StartPose::Known),
+        };
+    }
+    let region = match region {
+        None => None,
+        Some(node) => {
+            let table = node.table(&["from", "to"])?;
+            let corner = |key| pair(&table, key, &LENGTH).map(|[x, y]| Point::new(x, y));
+            Some(Region { from: corner("from")?, to: corner("to")? })
+        }
+    };
+    Ok(StartPose::Unknown { region })
 }
 
 fn quantity(table: &Table<'_>, key: &str, dimension: &Dimension) -> Result<f32, FileError> {

@@ -2,8 +2,10 @@
 
 use sonarfix::aim::Policy;
 use sonarfix::config::PingSchedule;
+use sonarfix::pose::Point;
+use sonarfix::search::Region;
 use sonarfix::units::{Duration, Radians};
-use sonarfix_hal::config::{MotorPolicy, RangerConfig, RobotConfig, WheelConfig};
+use sonarfix_hal::config::{MotorPolicy, RangerConfig, RobotConfig, StartPose, WheelConfig};
 use sonarfix_hal::ranger::{PulseTiming, RangerKind};
 use sonarfix_hal::servo::MeasuredPulse;
 
@@ -11,7 +13,17 @@ use sonarfix_hal::servo::MeasuredPulse;
 #[must_use]
 pub fn text(config: &RobotConfig) -> String {
     let tables = [drive(config), sonar(config), estimation(config), motors(&config.motors)];
-    format!("format = 1\n{}", tables.concat())
+    format!("format = 1\n{}{}", start(config.start), tables.concat())
+}
+
+/// The keys of a robot that may start without a pose; nothing if it may not.
+fn start(start: StartPose) -> String {
+    let StartPose::Unknown { region } = start else { return String::new() };
+    let region = region.map(|Region { from, to }| {
+        let corner = |at: Point| format!(r#"["{} m", "{} m"]"#, at.x.0, at.y.0);
+        format!("start_region = {{ from = {}, to = {} }}\n", corner(from), corner(to))
+    });
+    format!("start = \"unknown\"\n{}", region.unwrap_or_default())
 }
 
 fn drive(config: &RobotConfig) -> String {

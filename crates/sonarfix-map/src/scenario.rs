@@ -3,6 +3,7 @@
 use std::path::Path as FilePath;
 
 use crate::clearance::Collision;
+use sonarfix::navigator::{UNKNOWN_HEADING, UNKNOWN_POSITION};
 use sonarfix_hal::config::RobotConfig;
 
 use crate::document::{Document, Node, Table};
@@ -63,6 +64,19 @@ pub struct Start {
     /// Whether the estimate's start is drawn with these deviations around the truth; if not, it
     /// starts on the truth.
     pub drawn: bool,
+    /// Whether the robot starts without a pose; the other fields then have no meaning.
+    pub is_unknown: bool,
+}
+
+impl Start {
+    fn unknown() -> Self {
+        Self {
+            position: UNKNOWN_POSITION.0.into(),
+            heading: UNKNOWN_HEADING.0.into(),
+            drawn: false,
+            is_unknown: true,
+        }
+    }
 }
 
 /// The true parameters of the robot, which the filter does not receive.
@@ -165,6 +179,7 @@ impl Scenario {
         let robot = here_or_there(&root, "robot", base, robot_file::from_node, robot_file::parse)?;
         let path = root.table("path", &PATH_KEYS)?;
         let truth = root.table("truth", &TRUTH_KEYS)?;
+        let start = read_start(&root, &robot)?;
         Ok(Self {
             name: root.require("name")?.text()?.into(),
             description: root.require("description")?.text()?.into(),
@@ -173,7 +188,7 @@ impl Scenario {
             follow: fidelity::read_follow(&path)?,
             floor,
             robot,
-            start: read_start(&root)?,
+            start,
             truth: read_truth(&truth)?,
             upsets: fidelity::read_upsets(&truth)?,
             hardware: fidelity::read_hardware(&root)?,
@@ -293,12 +308,19 @@ fn check_clearance(
     fault.map_or(Ok(()), Err)
 }
 
-fn read_start(root: &Table<'_>) -> Result<Start, FileError> {
+fn read_start(root: &Table<'_>, robot: &RobotConfig) -> Result<Start, FileError> {
+    let start = root.require("start")?;
+    if let Some(text) = start.as_text() {
+        start.check((), text == "unknown", "a table of deviations, or \"unknown\"")?;
+        let searches = robot.start.is_unknown();
+        return start.check(Start::unknown(), searches, "that of a robot with start = \"unknown\"");
+    }
     let table = root.table("start", &["position", "heading", "drawn"])?;
     Ok(Start {
         position: deviation(&table, "position", &LENGTH)?,
         heading: deviation(&table, "heading", &ANGLE)?,
         drawn: table.require("drawn")?.boolean()?,
+        is_unknown: false,
     })
 }
 

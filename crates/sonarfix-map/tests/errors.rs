@@ -6,8 +6,10 @@ use std::path::Path;
 use proptest::prelude::*;
 use sonarfix::config::PingSchedule;
 use sonarfix::echo::EchoParameters;
+use sonarfix::pose::Point;
+use sonarfix::search::Region;
 use sonarfix::units::{Duration, Metres, Radians};
-use sonarfix_hal::config::{MotorPolicy, RobotConfig, WheelConfig};
+use sonarfix_hal::config::{MotorPolicy, RobotConfig, StartPose, WheelConfig};
 use sonarfix_hal::ranger::{PulseTiming, RangerKind};
 use sonarfix_map::{
     CLASSROOM, Fault, FaultKind, Fidelity, FileError, Floor, Follow, PAPER, Scenario, ServoName,
@@ -684,6 +686,8 @@ fn a_robot_that_is_written_is_read_back() {
         lost_link: false,
         link_timeout: Duration::millis(1_500),
     };
+    let region = Region { from: Point::new(0.5, -1.0), to: Point::new(2.0, 3.25) };
+    odd.start = StartPose::Unknown { region: Some(region) };
     for robot in [classroom, odd, parse(PAPER).unwrap().robot] {
         let text = robot_text(&robot);
         let mut read = robot_file::parse(&text, "written.toml").unwrap();

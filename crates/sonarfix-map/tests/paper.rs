@@ -122,7 +122,10 @@ fn the_robot_is_that_of_the_paper() {
 fn start_truth_and_runs_are_those_of_the_paper() {
     let paper = paper().unwrap();
     assert_eq!(paper.name, "paper");
-    assert_eq!(paper.start, Start { position: 0.001, heading: 0.001, drawn: true });
+    assert_eq!(
+        paper.start,
+        Start { position: 0.001, heading: 0.001, drawn: true, is_unknown: false }
+    );
     let truth = Truth {
         track_width: 0.3488,
         scale_right: -0.0065,

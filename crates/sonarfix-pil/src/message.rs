@@ -36,8 +36,8 @@ pub enum Request<'a> {
 pub struct Begin {
     /// Time of the start.
     pub at: Instant,
-    /// Start pose.
-    pub start: Start,
+    /// Start pose; none for a loop that searches for it.
+    pub start: Option<Start>,
     /// Configuration of the robot.
     pub config: RobotConfig,
     /// What the session runs.

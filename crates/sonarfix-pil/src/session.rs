@@ -3,6 +3,8 @@
 use sonarfix::aim::{Aim, NoAim};
 use sonarfix::localizer::{self, Fix, Localizer};
 use sonarfix::map::{Map, image};
+use sonarfix::navigator::Mode;
+use sonarfix::search::Search;
 use sonarfix::units::Instant;
 use sonarfix_app::store::Store;
 use sonarfix_app::{App, Board, FlashContents, Link};
@@ -60,7 +62,8 @@ impl<'m> Session<'m> {
     /// [`RequestError`], by the cause.
     pub fn localizer_only(begin: &Begin, map: &'m [u8]) -> Result<Self, RequestError> {
         let map = Map::read(map).map_err(|_| RequestError::Map)?;
-        let localizer = Localizer::new(begin.config.localizer, map, begin.start, begin.at);
+        let start = begin.start.ok_or(RequestError::Start)?;
+        let localizer = Localizer::new(begin.config.localizer, map, start, begin.at);
         let localizer = localizer.map_err(|_| RequestError::Start)?;
         Ok(Self::Localizer { localizer, aim: None })
     }
@@ -80,6 +83,24 @@ impl<'m> Session<'m> {
         match self {
             Self::Localizer { localizer, .. } => Some(localizer),
             Self::Loop(robot) => robot.app.localizer(),
+        }
+    }
+
+    /// What determines the pose.
+    #[must_use]
+    pub fn mode(&self) -> Mode {
+        match self {
+            Self::Localizer { .. } => Mode::Tracking,
+            Self::Loop(robot) => robot.app.navigation_mode().unwrap_or_default(),
+        }
+    }
+
+    /// The search of a loop.
+    #[must_use]
+    pub fn search(&self) -> Option<&Search<'m>> {
+        match self {
+            Self::Localizer { .. } => None,
+            Self::Loop(robot) => Some(robot.app.search()),
         }
     }
 
@@ -150,7 +171,8 @@ impl<'m> LoopSession<'m> {
         let CommandResult::Session(session) = robot.send(at, 0, &open)? else {
             return Err(RequestError::Start);
         };
-        for (sequence, command) in [(1, Command::SetPose(start)), (2, Command::Start)] {
+        let set_pose = start.map(Command::SetPose);
+        for (sequence, command) in (1..).zip(set_pose.into_iter().chain([Command::Start])) {
             let _ = robot.send(at, sequence, &SessionCommand { session, command })?;
         }
         Ok((robot, wires.take()))

@@ -63,11 +63,11 @@ fn map() -> Vec<u8> {
 fn begin(kind: SessionKind) -> Begin {
     Begin {
         at: Instant::from_ticks(0),
-        start: Start {
+        start: Some(Start {
             pose: Pose::new(1.0, 1.0, Radians(0.0)),
             position_deviation: Metres(0.02),
             heading_deviation: Radians(0.01),
-        },
+        }),
         config: config(),
         kind,
     }

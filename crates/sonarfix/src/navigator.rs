@@ -4,10 +4,10 @@
 //! ```text
 //!            Lost, or on demand                  unique answer
 //!   Tracking ─────────────────▶ Searching ─────────────────────▶ Provisional
-//!      ▲                            ▲   not Tracking any more         │
+//!      ▲                            ▲             Lost                │
 //!      │                            └─────────────────────────────────┤
 //!      └──────────────────────────────────────────────────────────────┘
-//!                    2 m and 20 accepted ranges later
+//!          2 m and 20 accepted ranges with the verdict Tracking
 //! ```
 //!
 //! - *Tracking*: the localizer alone.
@@ -31,7 +31,7 @@ use crate::ekf::{EkfError, StandardDeviations, StateEstimate};
 use crate::health::Verdict;
 use crate::localizer::{Fix, Localizer, OdometryError, Start};
 use crate::motion::WheelTravel;
-use crate::search::{Answer, Hypothesis, NotFinite, Search};
+use crate::search::{Answer, Hypothesis, NotFinite, Region, Search};
 use crate::units::{Instant, Metres, Radians};
 
 /// Standard deviation of x and of y of a pose that is unknown.
@@ -174,20 +174,26 @@ impl<'m> Navigator<'m> {
     /// lost, it is probably near.
     pub fn search(&mut self, search: &mut Search<'m>) {
         let proposal = self.localizer.pose();
-        self.begin(search);
+        self.restart(search);
+        self.forget_pose();
         // The localizer's pose is finite.
         _ = search.propose(proposal);
     }
 
-    /// Declares the pose unknown and begins the search without a proposal.
-    pub fn search_anywhere(&mut self, search: &mut Search<'m>) {
-        self.begin(search);
+    /// Begins the search for a localizer that has been started without a pose, with deviations of [`UNKNOWN_POSITION`]
+    /// and [`UNKNOWN_HEADING`]: in this region, or anywhere.
+    pub fn search_in(&mut self, region: Option<Region>, search: &mut Search<'m>) {
+        self.restart(search);
+        self.localizer.declare_lost();
+        self.mode = Mode::Searching;
+        if let Some(region) = region {
+            search.begin_within(region);
+        }
     }
 
-    fn begin(&mut self, search: &mut Search<'m>) {
+    fn restart(&mut self, search: &mut Search<'m>) {
         search.restart(&self.localizer.config().sonar, self.localizer.map());
         self.not_before = 0;
-        self.forget_pose();
     }
 
     fn forget_pose(&mut self) {
@@ -321,14 +327,23 @@ impl<'m> Navigator<'m> {
         match self.mode {
             Mode::Tracking if verdict == Verdict::Lost => self.search(search),
             Mode::Searching => self.hand_over(search)?,
-            Mode::Provisional if verdict != Verdict::Tracking => {
+            Mode::Provisional if verdict == Verdict::Lost => {
                 self.not_before = search.cycles().saturating_add(PAUSE);
                 self.forget_pose();
+            }
+            Mode::Provisional if verdict == Verdict::Degraded => {
+                self.begin_confirmation();
+                return None;
             }
             Mode::Provisional if self.is_confirmed() => self.track(),
             Mode::Tracking | Mode::Provisional => return None,
         }
         Some(self.mode)
+    }
+
+    fn begin_confirmation(&mut self) {
+        self.driven = Metres(0.0);
+        self.accepted = 0;
     }
 
     fn is_confirmed(&self) -> bool {
@@ -343,8 +358,7 @@ impl<'m> Navigator<'m> {
         let Answer::Unique(found) = search.answer() else { return None };
         self.localizer.set_pose(&start_of(&found)).ok()?;
         self.mode = Mode::Provisional;
-        self.driven = Metres(0.0);
-        self.accepted = 0;
+        self.begin_confirmation();
         Some(())
     }
 }

@@ -30,9 +30,9 @@ use trial::{Odometry, Trial, Verdict, count};
 use vector::Vector;
 use window::Window;
 
-use crate::config::Sonar;
+use crate::config::{Config, Sonar};
 use crate::map::{Map, WallId};
-use crate::pose::Pose;
+use crate::pose::{Point, Pose};
 use crate::units::{Metres, Radians};
 
 /// What the search is tuned with.
@@ -72,6 +72,35 @@ impl Default for SearchParameters {
             persistence: 20,
             sharpness: Metres(0.05),
         }
+    }
+}
+
+/// A rectangle of the map, parallel to its axes, in which a robot starts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Region {
+    /// The corner of the smallest coordinates.
+    pub from: Point,
+    /// The corner of the largest coordinates.
+    pub to: Point,
+}
+
+impl Region {
+    /// Whether it is finite and not empty.
+    #[must_use]
+    pub fn is_valid(&self) -> bool {
+        let Self { from, to } = self;
+        from.is_finite() && to.is_finite() && from.x < to.x && from.y < to.y
+    }
+
+    /// Whether a place is in it or not farther than `margin` metres beside it.
+    fn contains(&self, at: Vector, margin: f32) -> bool {
+        let within = |value: f32, from: Metres, to: Metres| {
+            value >= from.0 - margin && value <= to.0 + margin
+        };
+        let Self { from, to } = self;
+        within(at.x, from.x, to.x) && within(at.y, from.y, to.y)
     }
 }
 
@@ -152,6 +181,9 @@ const CHECKED_LINES: u8 = 2;
 /// A position with a larger deviation than this is undetermined, metres.
 const UNDETERMINED: f32 = 0.3;
 
+/// How far beside its region a start may seem to lie: metres, and metres per metre travelled since.
+const REGION_MARGIN: f32 = 0.1;
+
 /// Where a cycle stands.
 #[derive(Debug, Clone, Copy)]
 enum Task {
@@ -196,6 +228,15 @@ pub struct Search<'m, const PINGS: usize = 96, const HYPOTHESES: usize = 8> {
     taken: u16,
     is_check_due: bool,
     answer: Decision,
+    region: Option<Region>,
+}
+
+impl<const PINGS: usize, const HYPOTHESES: usize> Default for Search<'_, PINGS, HYPOTHESES> {
+    /// A search without walls, to be begun by [`Self::restart`].
+    fn default() -> Self {
+        let sonar = Config::for_track_width(Metres(0.0)).sonar;
+        Self::new(&sonar, Map::new(&[]), SearchParameters::default())
+    }
 }
 
 /// The plain sweep of the servo.
@@ -234,6 +275,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
             taken: 0,
             is_check_due: true,
             answer: Decision::Searching,
+            region: None,
         }
     }
 
@@ -253,6 +295,12 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         self.taken = 0;
         self.is_check_due = true;
         self.answer = Decision::Searching;
+        self.region = None;
+    }
+
+    /// Considers only poses with which the search began in this region of the map.
+    pub fn begin_within(&mut self, region: Region) {
+        self.region = Some(region);
     }
 
     /// The pings in the window.
@@ -346,6 +394,12 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
     /// The bank, best hypothesis first, each as the robot's pose now.
     pub fn hypotheses(&self) -> impl Iterator<Item = Hypothesis> {
         self.bank.entries().iter().map(|entry| self.hypothesis(entry))
+    }
+
+    /// The hypothesis of this rank, from 0, the best.
+    #[must_use]
+    pub fn ranked(&self, rank: usize) -> Option<Hypothesis> {
+        self.bank.entries().get(rank).map(|entry| self.hypothesis(entry))
     }
 
     fn hypothesis(&self, entry: &Entry) -> Hypothesis {
@@ -481,7 +535,10 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
     }
 
     fn try_candidate(&mut self, placement: Placement, near: f32, rivalry: f32) {
-        if self.bank.has_near(&placement, near) {
+        let start = placement.at.plus(self.window.start().turned(placement.rotation));
+        let margin = REGION_MARGIN * (1.0 + self.window.since_start());
+        let is_outside = self.region.is_some_and(|region| !region.contains(start, margin));
+        if is_outside || self.bank.has_near(&placement, near) {
             return;
         }
         let best = self.bank.entries().first().map_or(0.0, |entry| entry.score);

@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 
 use crate::{
     bound, command, config, convert, faults, find, floor_plans, health, map, monitor, paper, pil,
-    plan, replay, run, sonar_model,
+    plan, relocalize, replay, run, sonar_model,
 };
 
 /// Simulates, measures, replays and operates the Sonarfix localizer for small wheeled robots.
@@ -27,6 +27,8 @@ enum Command {
     Replay(replay::Args),
     /// Searches for the pose of a robot without a start pose, on a log or in simulation.
     Find(find::Args),
+    /// Measures how robots that lose their pose, or start without one, find it in random floor plans.
+    Relocalize(relocalize::Args),
     /// Converts recordings of other formats for `replay`.
     Convert(convert::Args),
     /// Shows the telemetry of a robot and records it for `replay`.
@@ -65,6 +67,7 @@ impl Cli {
             Command::Pil(args) => pil::execute(&args),
             Command::Replay(args) => replay::execute(&args),
             Command::Find(args) => find::execute(&args),
+            Command::Relocalize(args) => relocalize::execute(&args),
             Command::Convert(args) => convert::execute(&args),
             Command::Monitor(args) => monitor::execute(&args),
             Command::Send(args) => command::execute(&args),

@@ -48,6 +48,8 @@ enum What {
     Stop,
     /// Discard the estimated calibration of wheels and ranger.
     ResetCalibration,
+    /// Declare the pose unknown and search for it.
+    Search,
     /// Print the checksum of the map in flash.
     MapChecksum,
 }
@@ -67,6 +69,7 @@ impl What {
             Self::Start => Command::Start,
             Self::Stop => Command::Stop,
             Self::ResetCalibration => Command::ResetCalibration,
+            Self::Search => Command::Search,
             Self::MapChecksum => Command::MapChecksum,
         })
     }

@@ -1,6 +1,6 @@
 //! `sonarfix faults`: the effects of hardware faults.
 
-use sonarfix_studies::fault_table;
+use sonarfix_studies::{fault_search, fault_table};
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -11,6 +11,7 @@ pub struct Args {
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
     anyhow::ensure!(args.runs > 0, "--runs must be at least 1");
-    print!("{}", fault_table::markdown(&fault_table::rows(args.runs)?));
+    let (rows, searching) = (fault_table::rows(args.runs)?, fault_search::rows(args.runs)?);
+    print!("{}", fault_table::markdown(&rows, &searching));
     Ok(())
 }

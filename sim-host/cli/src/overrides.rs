@@ -4,6 +4,7 @@ use clap::ValueEnum;
 use sonarfix::aim::Policy;
 use sonarfix::config::PingSchedule;
 use sonarfix::units::Duration;
+use sonarfix_hal::config::StartPose;
 use sonarfix_map::{Fidelity, Scenario, ServoName};
 use sonarfix_sim::pins::devices;
 
@@ -26,6 +27,17 @@ pub struct Overrides {
     /// of the range scale in the filter.
     #[arg(long, value_name = "FRACTION")]
     range_error: Option<f32>,
+    /// Whether the robot knows where it starts. One that does not searches for its pose, then and whenever it is lost.
+    #[arg(long, value_enum)]
+    start: Option<StartName>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum StartName {
+    /// It knows its start pose, as the scenario has it, but searches for its pose whenever it is lost.
+    Relocalize,
+    /// It starts without a pose.
+    Unknown,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -100,6 +112,10 @@ impl Overrides {
             anyhow::ensure!(sensible, "--range-error must be a fraction below 0.5, like 0.01");
             scenario.robot.localizer.prior.range_scale = error.abs();
             scenario.truth.range_scale = error.into();
+        }
+        if let Some(start) = self.start {
+            scenario.robot.start = StartPose::Unknown { region: None };
+            scenario.start.is_unknown |= start == StartName::Unknown;
         }
         Ok(())
     }

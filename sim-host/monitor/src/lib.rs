@@ -14,7 +14,8 @@ pub mod request;
 pub mod view;
 
 use sonarfix::localizer::Fix;
-use sonarfix_link::message::{LoopStatus, Telemetry};
+use sonarfix::navigator::Mode;
+use sonarfix_link::message::{LoopStatus, RankedHypothesis, SearchStatus, Telemetry};
 use sonarfix_link::{Estimate, Gaps, Hello, Ping, Receiver, ReceiverCounters};
 
 use sonarfix_sim::statistics::FixCounts;
@@ -29,7 +30,13 @@ pub struct Monitor {
     ping: Option<Ping>,
     fixes: FixCounts,
     state: Option<LoopStatus>,
+    mode: Mode,
+    search: Option<SearchStatus>,
+    hypotheses: Vec<RankedHypothesis>,
 }
+
+/// The most hypotheses that are shown.
+const MOST_HYPOTHESES: usize = 8;
 
 /// A telemetry message.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,10 +57,15 @@ impl Monitor {
             Telemetry::Initialized(estimate) => {
                 self.estimate = Some(estimate);
                 self.ping = None;
+                self.mode = Mode::Tracking;
+                self.search = None;
+                self.hypotheses.clear();
                 self.fixes = FixCounts::default();
             }
-            Telemetry::Estimate(estimate) | Telemetry::PoseSet(estimate) => {
+            Telemetry::Estimate(estimate) => self.estimate = Some(estimate),
+            Telemetry::PoseSet(estimate) => {
                 self.estimate = Some(estimate);
+                self.mode = Mode::Tracking;
             }
             Telemetry::Ping(ping) => {
                 let fixes = &mut self.fixes;
@@ -65,9 +77,32 @@ impl Monitor {
                 self.ping = Some(ping);
             }
             Telemetry::LoopStatus(state) => self.state = Some(state),
-            Telemetry::Odometry(_) | Telemetry::SkippedPing(_) | Telemetry::Ack(_) => {}
+            Telemetry::ModeChanged(change) => {
+                self.estimate = Some(change.estimate);
+                self.mode = change.mode;
+                self.hypotheses.clear();
+            }
+            Telemetry::Search(status) => {
+                self.mode = status.mode;
+                self.search = Some(status);
+            }
+            Telemetry::Hypothesis(hypothesis) => self.rank(hypothesis),
+            Telemetry::Odometry(_)
+            | Telemetry::SkippedPing(_)
+            | Telemetry::Sweep(_)
+            | Telemetry::Ack(_) => {}
         }
         Some(Received { lost, telemetry: frame.message })
+    }
+
+    /// Puts a hypothesis in its place; those behind the best one are of the round before until theirs arrive.
+    fn rank(&mut self, hypothesis: RankedHypothesis) {
+        let rank = usize::from(hypothesis.rank);
+        if let Some(place) = self.hypotheses.get_mut(rank) {
+            *place = hypothesis;
+        } else if rank < MOST_HYPOTHESES {
+            self.hypotheses.push(hypothesis);
+        }
     }
 
     /// Counters of the receiver.

@@ -8,8 +8,9 @@ use std::io::{self, LineWriter, Write};
 use std::path::PathBuf;
 
 use sonarfix::ekf::STATES;
+use sonarfix::navigator::Mode;
 use sonarfix::units::Instant;
-use sonarfix_link::message::{Odometry, SkippedPing};
+use sonarfix_link::message::{ModeChanged, Odometry, SkippedPing, Sweep};
 use sonarfix_link::{Estimate, Ping, Telemetry};
 use sonarfix_replay::log::HEADER;
 
@@ -53,7 +54,13 @@ impl Recording {
                 let file = self.next_file()?;
                 self.log = Some(Log::begin(file, began)?);
             }
-            (Telemetry::PoseSet(estimate), _) => {
+            (Telemetry::ModeChanged(change), Some(log)) if change.mode == Mode::Tracking => {
+                log.take(received)?;
+            }
+            (
+                Telemetry::PoseSet(estimate) | Telemetry::ModeChanged(ModeChanged { estimate, .. }),
+                _,
+            ) => {
                 if let Some(step) = self.step.filter(|step| step.at == estimate.at) {
                     let file = self.next_file()?;
                     self.log = Some(Log::join(file, estimate, &step)?);
@@ -136,6 +143,7 @@ impl<W: Write> Log<W> {
         match &received.telemetry {
             Telemetry::Odometry(step) => self.step(step),
             Telemetry::Ping(ping) => self.ping(ping),
+            Telemetry::Sweep(sweep) => self.sweep(sweep),
             Telemetry::SkippedPing(SkippedPing { at, .. }) => {
                 writeln!(self.out, "skip,{}", Time(*at))
             }
@@ -151,6 +159,12 @@ impl<W: Write> Log<W> {
             writeln!(self.out, "wheels,{},{right_metres},{left_metres}", Time(*at))?;
         }
         Ok(())
+    }
+
+    /// A range without a wall, for the search.
+    fn sweep(&mut self, sweep: &Sweep) -> io::Result<()> {
+        let range = sweep.outcome.map_or(String::new(), |echo| f64::from(echo.range.0).to_string());
+        writeln!(self.out, "range,{},{},{range}", Time(sweep.at), f64::from(sweep.bearing.0))
     }
 
     fn ping(&mut self, ping: &Ping) -> io::Result<()> {

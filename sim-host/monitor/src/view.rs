@@ -4,9 +4,12 @@ use std::fmt::Write;
 
 use sonarfix::health::{LOST_AT, Verdict};
 use sonarfix::localizer::Fix;
+use sonarfix::navigator::Mode;
 use sonarfix::units::Instant;
 use sonarfix_hal::robot::Faults;
-use sonarfix_link::message::{ImageStatus, LoopStatus, ResetCause};
+use sonarfix_link::message::{
+    ImageStatus, LoopStatus, RankedHypothesis, ResetCause, SearchAnswer, SearchStatus,
+};
 use sonarfix_link::{Estimate, Hello, Ping};
 
 use crate::Monitor;
@@ -14,13 +17,17 @@ use crate::Monitor;
 /// All telemetry, one line per subject, of at most 100 characters.
 #[must_use]
 pub fn page(monitor: &Monitor) -> String {
-    let lines = [
+    let mut lines = vec![
         monitor.hello.as_ref().map_or("robot   none yet".to_owned(), hello),
         monitor.estimate.as_ref().map_or("pose    none yet".to_owned(), estimate),
         monitor.ping.as_ref().map_or("ping    none yet".to_owned(), |last| ping(monitor, last)),
         monitor.state.as_ref().map_or("loop    none yet".to_owned(), state),
         link(monitor),
     ];
+    if monitor.mode != Mode::Tracking {
+        lines.extend(monitor.search.as_ref().map(search));
+        lines.extend(monitor.hypotheses.iter().map(hypothesis));
+    }
     lines.join("\n")
 }
 
@@ -31,6 +38,10 @@ pub fn line(monitor: &Monitor) -> String {
     let link = format!("{} frames, {lost} lost", monitor.counters().frames);
     match &monitor.estimate {
         None => format!("no estimate yet; {link}"),
+        Some(e) if monitor.mode == Mode::Searching => {
+            let answer = monitor.search.as_ref().map_or(String::new(), search);
+            format!("{:.1} s: pose unknown; {answer}; {link}", seconds(e.at))
+        }
         Some(e) => {
             let (s, verdict) = (&e.state, verdict(e.health.verdict));
             let heading = s.heading.to_degrees();
@@ -42,6 +53,36 @@ pub fn line(monitor: &Monitor) -> String {
             )
         }
     }
+}
+
+fn search(status: &SearchStatus) -> String {
+    let mode = match status.mode {
+        Mode::Tracking => "tracking",
+        Mode::Searching => "searching",
+        Mode::Provisional => "pose provisional",
+    };
+    let answer = match status.answer {
+        SearchAnswer::Searching => "no answer yet".to_owned(),
+        SearchAnswer::Several(count) => format!("{count} poses fit"),
+        SearchAnswer::Along(wall) => format!("somewhere along wall {}", wall.0),
+        SearchAnswer::Nowhere => "no pose fits".to_owned(),
+        SearchAnswer::Unique => "one pose fits".to_owned(),
+    };
+    format!("search  {mode}: {answer}; {} pings, {} cycles", status.pings, status.cycles)
+}
+
+fn hypothesis(hypothesis: &RankedHypothesis) -> String {
+    let (pose, fit) = (&hypothesis.pose, hypothesis.fit);
+    format!(
+        "   {}    x {:.2} m, y {:.2} m ± {:.2} m, heading {:.0}° ± {:.0}°, fit {fit:.2}, {:.0} % explained",
+        hypothesis.rank + 1,
+        pose.x.0,
+        pose.y.0,
+        hypothesis.position_deviation.0,
+        pose.heading.radians().to_degrees(),
+        hypothesis.heading_deviation.to_degrees(),
+        100.0 * hypothesis.explained,
+    )
 }
 
 /// Firmware version, cause of the reset and images in flash.

@@ -26,6 +26,8 @@ pub mod tally;
 use sonarfix::aim::{Aim, NoAim};
 use sonarfix::localizer::{Fix, Localizer, OdometryError, Start};
 use sonarfix::motion::WheelTravel;
+use sonarfix::navigator::Mode;
+use sonarfix::search::Search;
 use sonarfix::units::{Duration, Instant, Metres};
 use sonarfix_hal::robot::Report;
 use sonarfix_pil::{Actuators, Answer, Begin, Request, Sensors, Session, SessionKind, Wires};
@@ -74,8 +76,8 @@ impl Computer for Emulated<'_> {
         start: Start,
         at: Instant,
     ) -> Result<ComparedDevice<'_>, SimulationError> {
-        let begin =
-            Begin { at, start, config: self.simulation.robot(), kind: SessionKind::Localizer };
+        let (start, config) = (Some(start), self.simulation.robot());
+        let begin = Begin { at, start, config, kind: SessionKind::Localizer };
         let session = self.pair.begin_localizer(&begin, &self.map)?;
         Ok(ComparedDevice { session, pair: self.pair, polled: at })
     }
@@ -83,7 +85,7 @@ impl Computer for Emulated<'_> {
     fn controller<'w>(
         &'w mut self,
         wires: &'w Wires,
-        start: Start,
+        start: Option<Start>,
         at: Instant,
     ) -> Result<(ComparedDevice<'w>, Actuators), SimulationError> {
         let begin = Begin { at, start, config: self.simulation.robot(), kind: SessionKind::Loop };
@@ -169,5 +171,13 @@ impl Controller for ComparedDevice<'_> {
     /// The firmware's loop polls periodically, whether or not there is work.
     fn idle_until(&mut self) -> Option<Instant> {
         self.polled.checked_add_duration(POLL_PERIOD)
+    }
+
+    fn mode(&self) -> Result<Mode, SimulationError> {
+        Ok(self.session.mode())
+    }
+
+    fn search(&self) -> Option<&Search<'_>> {
+        self.session.search()
     }
 }

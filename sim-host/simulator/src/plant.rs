@@ -40,7 +40,7 @@ impl<'a> Plant<'a> {
         let start = Pose { x: start.x, y: start.y, heading: start.heading };
         Self {
             course: match scenario.follow {
-                Follow::Truth => Course::OnPath(&scenario.path),
+                Follow::Truth => Course::OnPath { path: &scenario.path, ahead: 0.0 },
                 Follow::Estimate => Course::steered(start),
             },
             wheels: Wheels::new(&scenario.truth, scenario.upsets),
@@ -53,6 +53,12 @@ impl<'a> Plant<'a> {
     /// Sets the command; without effect on a robot that follows its path exactly.
     pub fn steer(&mut self, command: Command) {
         self.course.steer(command, self.nominal_track_width);
+    }
+
+    /// Carries the robot along its path by this time of driving, seconds; its wheels do not roll. Without effect on a
+    /// robot that steers by its estimate.
+    pub fn carry(&mut self, seconds: f64) {
+        self.course.carry(seconds);
     }
 
     /// Drives on to `time` seconds and reads the encoders.

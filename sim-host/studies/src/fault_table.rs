@@ -11,9 +11,9 @@ use sonarfix_sim::simulate::{Simulation, SimulationError};
 use sonarfix_sim::statistics::RunResult;
 
 /// Start of the fault: after two laps, when the calibration has converged.
-const FROM: f64 = 200.0;
+pub(crate) const FROM: f64 = 200.0;
 /// End of the fault: five minutes remain to recover.
-const TO: f64 = 230.0;
+pub(crate) const TO: f64 = 230.0;
 
 /// All kinds of faults, with names.
 const CASES: [(&str, FaultKind); 11] = [
@@ -38,6 +38,16 @@ The scenario `classroom` (a cheap robot that steers by its own estimate) with on
 616 s. *Reported*: counters of the loop, mean per run. *Outside*: share of the run with the position error outside of the
 filter's 99.9 % ellipse. *Undetected*: the longest time outside of the ellipse with the verdict `Tracking`, over all runs.
 *Recovered*: number of runs that end with the error inside the ellipse and a verdict other than `Lost`.
+
+";
+
+/// The heading of the table of the robot that searches.
+const SEARCH_HEAD: &str = "
+## With the search
+
+The same with `start = \"unknown\"` in the robot file: a lost robot searches for its pose. The map has a cabinet in a corner,
+because a room that is itself when it is rotated never gives a unique pose. While the robot has no pose, a person steers it along
+its path.
 
 ";
 
@@ -134,10 +144,18 @@ impl Row {
     }
 }
 
-/// The page.
+/// The page, of the rows without and with the search.
 #[must_use]
-pub fn markdown(rows: &[Row]) -> String {
+pub fn markdown(rows: &[Row], searching: &[Row]) -> String {
     let mut page = HEAD.to_owned();
+    write_table(&mut page, rows);
+    page.push_str(SEARCH_HEAD);
+    write_table(&mut page, searching);
+    page.push_str(ATTACKS);
+    page
+}
+
+fn write_table(page: &mut String, rows: &[Row]) {
     page.push_str(
         "| fault | runs | reported | worst error, mm | outside | undetected, s | recovered |\n",
     );
@@ -156,6 +174,4 @@ pub fn markdown(rows: &[Row]) -> String {
             row.recovered(),
         );
     }
-    page.push_str(ATTACKS);
-    page
 }

@@ -8,9 +8,11 @@
 //! | [`search_study`] | `docs/search.md` |
 //! | [`sonar_model`] | `docs/sonar-model.md` |
 
+pub mod fault_search;
 pub mod fault_table;
 pub mod floor_plan;
 pub mod health_page;
 pub mod kidnapped;
+pub mod relocalization;
 pub mod search_study;
 pub mod sonar_model;

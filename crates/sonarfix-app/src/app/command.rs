@@ -7,11 +7,13 @@ use embedded_storage::nor_flash::NorFlash;
 use sonarfix::localizer::{Localizer, Start, StartError};
 use sonarfix::map::Map;
 use sonarfix::map::image::checksum as crc32;
+use sonarfix::navigator;
 use sonarfix::units::{Duration, Instant, Metres};
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_hal::encoder::Wheels;
 use sonarfix_hal::robot::{Hardware, Report, Robot, Settings, Tick};
 use sonarfix_link::message::{CommandError, CommandResult};
+use sonarfix_link::reporter;
 use sonarfix_link::{Command, Frame, Reporter, SessionCommand, Telemetry, baked};
 
 use super::{App, Link, Mode, Polled, Running, SavePolicy};
@@ -102,6 +104,7 @@ impl<'m, F: NorFlash> App<'m, F> {
                 Ok(Next::Nothing)
             }
             Command::ResetCalibration => self.reset_calibration(now, polled),
+            Command::Search => self.begin_search(now, polled),
             Command::MapChecksum | Command::OpenSession => Ok(Next::Nothing),
         }
     }
@@ -235,7 +238,9 @@ impl<'m, F: NorFlash> App<'m, F> {
         let Some(localizer) = self.localizer() else { return known };
         let filter = localizer.filter();
         let here = Resumed::interrupted(filter.state(), filter.standard_deviations());
-        Resumed { is_pose_interrupted: false, ..here.calibrated_as(&known) }
+        let here = Resumed { is_pose_interrupted: false, ..here.calibrated_as(&known) };
+        let has_pose = self.navigation_mode() != Some(navigator::Mode::Searching);
+        if has_pose { here } else { here.without_pose() }
     }
 
     #[inline(never)]
@@ -248,7 +253,8 @@ impl<'m, F: NorFlash> App<'m, F> {
         if let Some(reason) = self.unsupported {
             return Err(CommandError::Unsupported(reason));
         }
-        if !known.has_pose {
+        let searches = self.config.is_some_and(|(config, _)| config.start.is_unknown());
+        if !known.has_pose && !searches {
             return Err(CommandError::NoPose);
         }
         self.check_start(now, &known)?;
@@ -259,6 +265,22 @@ impl<'m, F: NorFlash> App<'m, F> {
             self.replace_stored(&saved, polled)?;
         }
         Ok(Next::Begin(known))
+    }
+
+    /// Declares the pose unknown. The search begins at once, or when the loop is started.
+    #[inline(never)]
+    fn begin_search(&mut self, now: Instant, polled: &mut Polled) -> Result<Next, CommandError> {
+        let (config, _) = self.config.as_ref().ok_or(CommandError::NoConfiguration)?;
+        if !config.start.is_unknown() {
+            return Err(CommandError::NoSearch);
+        }
+        let known = self.known_now().ok_or(CommandError::NoConfiguration)?.without_pose();
+        let Mode::Running(running) = &mut self.mode else {
+            return self.replace(now, known, polled).map(|()| Next::Nothing);
+        };
+        running.robot.search(now, &mut self.search);
+        let (mode, localizer) = (running.robot.mode(), running.robot.localizer());
+        Ok(Next::Report(reporter::mode_changed(mode, localizer)))
     }
 
     fn stop(&mut self, now: Instant) {
@@ -308,6 +330,7 @@ impl<'m, F: NorFlash> App<'m, F> {
     #[inline(never)]
     fn begin(&mut self, now: Instant, origin: &Resumed) -> Result<Telemetry, CommandError> {
         let (config, _) = self.config.as_ref().ok_or(CommandError::NoConfiguration)?;
+        let start = config.start;
         let Startable { localizer, wheels, settings } = self.startable(now, config, origin)?;
         let origin = *origin;
         let deviation = origin.deviation_at_start(localizer.config());
@@ -318,16 +341,24 @@ impl<'m, F: NorFlash> App<'m, F> {
             restarted.map_err(|_| CommandError::Configuration)?;
             running.reporter = reporter;
             running.origin = origin;
+            running.searches = start.is_unknown();
+            if !origin.has_pose {
+                running.robot.search_in(now, start.region(), &mut self.search);
+            }
             return Ok(began);
         }
         let robot = Robot::new(localizer, wheels, settings);
-        let robot = robot.map_err(|_| CommandError::Configuration)?;
+        let mut robot = robot.map_err(|_| CommandError::Configuration)?;
+        if !origin.has_pose {
+            robot.search_in(now, start.region(), &mut self.search);
+        }
         self.faults = self.faults();
         self.mode = Mode::Running(Running {
             robot,
             reporter,
             save_policy: SavePolicy::new(now, written),
             origin,
+            searches: start.is_unknown(),
             has_rolled: false,
             report: Report::default(),
         });

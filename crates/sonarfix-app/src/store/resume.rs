@@ -22,6 +22,7 @@
 use sonarfix::config::Config;
 use sonarfix::ekf::{StandardDeviations, StateEstimate};
 use sonarfix::localizer::Start;
+use sonarfix::navigator::{UNKNOWN_HEADING, UNKNOWN_POSITION};
 use sonarfix::units::{Metres, Radians};
 
 use super::Saved;
@@ -34,9 +35,9 @@ const AGED: f32 = 0.1;
 /// The square root of the number of correlated calibration errors.
 const DECORRELATED: f32 = 2.0;
 /// The largest deviation of a position, metres.
-pub const MAX_POSITION_DEVIATION: f32 = 1_000.0;
+pub const MAX_POSITION_DEVIATION: f32 = UNKNOWN_POSITION.0;
 /// The largest deviation of a heading, radians.
-pub const MAX_HEADING_DEVIATION: f32 = core::f32::consts::PI;
+pub const MAX_HEADING_DEVIATION: f32 = UNKNOWN_HEADING.0;
 
 /// The start state of a robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -129,7 +130,10 @@ impl Resumed {
         let track_width = least(start.track_width_error.0, prior.track_width_error.0);
         start.track_width_error = Metres(track_width);
         start.range_scale = least(start.range_scale, prior.range_scale);
-        if self.is_pose_interrupted {
+        if !self.has_pose {
+            (start.x, start.y) = (UNKNOWN_POSITION, UNKNOWN_POSITION);
+            start.heading = UNKNOWN_HEADING;
+        } else if self.is_pose_interrupted {
             let pushed =
                 |known: Metres| Metres(least(both(known.0, PUSHED), MAX_POSITION_DEVIATION));
             (start.x, start.y) = (pushed(start.x), pushed(start.y));
@@ -139,7 +143,9 @@ impl Resumed {
         start
     }
 
-    fn without_pose(self) -> Self {
+    /// The same calibration of a robot whose pose is not known.
+    #[must_use]
+    pub fn without_pose(self) -> Self {
         let none = StateEstimate::default();
         let unknown = StandardDeviations::default();
         Self {

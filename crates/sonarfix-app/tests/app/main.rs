@@ -15,3 +15,4 @@ mod random;
 mod rig;
 mod robot_file;
 mod save_policy;
+mod search;

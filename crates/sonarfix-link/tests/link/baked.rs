@@ -124,7 +124,7 @@ proptest! {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut bytes: Vec<u8> = (0..length).map(|_| rng.random()).collect();
         if rng.random() {
-            bytes.splice(..0, *b"SFXC\x02\x00\xff\x00");
+            bytes.splice(..0, *b"SFXC\x04\x00\xff\x00");
         }
         prop_assert!(baked::read(&bytes).is_err());
     }

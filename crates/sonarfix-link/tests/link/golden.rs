@@ -15,12 +15,13 @@ use sonarfix_link::message::ImageStatus;
 use sonarfix_link::{Command, CommandResult, Telemetry, VERSION, baked};
 
 use crate::messages::{
-    COMMANDS, Counting, NO_ECHO, REFUSALS, REFUSED, RESETS, TELEMETRY, command, telemetry,
+    ANSWERS, COMMANDS, Counting, MODES, NO_ECHO, REFUSALS, REFUSED, RESETS, TELEMETRY, command,
+    telemetry,
 };
 use crate::wire::to_stdvec;
 
 /// The version of the bytes below.
-const OF_VERSION: u8 = 3;
+const OF_VERSION: u8 = 4;
 
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().fold(String::new(), |hex, byte| format!("{hex}{byte:02x}"))
@@ -38,6 +39,10 @@ fn name_of_telemetry(message: &Telemetry) -> &'static str {
         Telemetry::LoopStatus(_) => "loop status",
         Telemetry::Ack(_) => "ack",
         Telemetry::PoseSet(_) => "pose set",
+        Telemetry::ModeChanged(_) => "mode changed",
+        Telemetry::Sweep(_) => "sweep",
+        Telemetry::Search(_) => "search status",
+        Telemetry::Hypothesis(_) => "hypothesis",
     }
 }
 
@@ -50,6 +55,7 @@ fn name_of_command(message: &Command) -> &'static str {
         Command::ResetCalibration => "reset calibration",
         Command::MapChecksum => "map checksum",
         Command::OpenSession => "open session",
+        Command::Search => "search",
     }
 }
 
@@ -96,6 +102,8 @@ fn every_variant_has_the_number_of_its_version() {
         Fix::Gated(innovation),
         Fix::Refused(REFUSALS[0]),
     ]);
+    numbered(&MODES);
+    numbered(&ANSWERS);
     numbered(&[Policy::Nearest, Policy::Informative]);
     numbered(&[PingSchedule::Every(Duration::from_ticks(0)), PingSchedule::AsFastAsPossible]);
     numbered(&[
@@ -122,7 +130,7 @@ fn every_variant_has_the_number_of_its_version() {
 
 #[test]
 fn a_baked_configuration_has_the_bytes_of_its_version() {
-    assert_eq!(baked::VERSION, 3);
+    assert_eq!(baked::VERSION, 4);
     let mut localizer = Config::for_track_width(Metres(0.35));
     localizer.sonar.servo = (Radians(-1.5), Radians(1.5));
     localizer.sonar.timing.servo = ServoTiming::SG90;

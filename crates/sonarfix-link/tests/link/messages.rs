@@ -8,16 +8,19 @@ use sonarfix::ekf::{Innovation, STATES, StandardDeviations, StateEstimate};
 use sonarfix::health::{Health, Verdict};
 use sonarfix::localizer::{Fix, Refusal, Start};
 use sonarfix::map::WallId;
+use sonarfix::navigator::Mode;
 use sonarfix::pose::{Point, Pose};
+use sonarfix::search::Region;
 use sonarfix::units::{
     Duration, Instant, Metres, MetresPerSecond, PerRootMetre, Radians, SquareMetres,
 };
-use sonarfix_hal::config::{MotorPolicy, RangerConfig, RobotConfig, Unsupported};
-use sonarfix_hal::ranger::{Celsius, Echo, NoEcho, PulseTiming, RangerKind};
+use sonarfix_hal::config::{MotorPolicy, RangerConfig, RobotConfig, StartPose, Unsupported};
+use sonarfix_hal::ranger::{Celsius, Echo, NoEcho, Outcome, PulseTiming, RangerKind};
 use sonarfix_hal::robot::{EncoderFaults, Faults};
 use sonarfix_hal::servo::{MeasuredPulse, SettingError};
 use sonarfix_link::message::{
-    CommandError, ImageStatus, LoopStatus, Odometry, ResetCause, SkippedPing,
+    CommandError, ImageStatus, LoopStatus, ModeChanged, Odometry, RankedHypothesis, ResetCause,
+    SearchAnswer, SearchStatus, SkippedPing, Sweep,
 };
 use sonarfix_link::{
     Ack, Command, CommandResult, Estimate, Hello, Ping, ReceiverCounters, SessionCommand, Telemetry,
@@ -113,8 +116,8 @@ impl Source for Largest {
 }
 
 /// The numbers of kinds of telemetry and of commands.
-pub const TELEMETRY: u32 = 9;
-pub const COMMANDS: u32 = 7;
+pub const TELEMETRY: u32 = 13;
+pub const COMMANDS: u32 = 8;
 
 pub fn any_telemetry(rng: &mut ChaCha8Rng) -> Telemetry {
     let kind = rng.pick(TELEMETRY);
@@ -146,7 +149,36 @@ pub fn telemetry(kind: u32, source: &mut impl Source) -> Telemetry {
         5 => Telemetry::Estimate(estimate(source)),
         6 => Telemetry::LoopStatus(state_of_loop(source)),
         7 => Telemetry::Ack(Ack { sequence: source.bits16(), result: command_result(source) }),
-        _ => Telemetry::PoseSet(estimate(source)),
+        8 => Telemetry::PoseSet(estimate(source)),
+        9 => Telemetry::ModeChanged(ModeChanged {
+            mode: source.choose(&MODES),
+            estimate: estimate(source),
+        }),
+        10 => Telemetry::Sweep(Sweep {
+            at: source.instant(),
+            bearing: Radians(source.single()),
+            outcome: outcome(source),
+        }),
+        11 => Telemetry::Search(SearchStatus {
+            at: source.instant(),
+            mode: source.choose(&MODES),
+            answer: source.choose(&ANSWERS),
+            pings: source.bits16(),
+            cycles: source.bits32(),
+        }),
+        _ => Telemetry::Hypothesis(RankedHypothesis {
+            at: source.instant(),
+            rank: source.bits16().to_le_bytes()[0],
+            pose: {
+                let (x, y, heading) = (source.single(), source.single(), source.single());
+                // A heading is wrapped, so only a finite one is transmitted bit for bit.
+                Pose::new(x, y, Radians(if heading.is_finite() { heading } else { 1.0 }))
+            },
+            position_deviation: Metres(source.single()),
+            heading_deviation: Radians(source.single()),
+            fit: source.single(),
+            explained: source.single(),
+        }),
     }
 }
 
@@ -169,7 +201,8 @@ pub fn command(kind: u32, source: &mut impl Source) -> SessionCommand {
         3 => Command::Stop,
         4 => Command::ResetCalibration,
         5 => Command::MapChecksum,
-        _ => Command::OpenSession,
+        6 => Command::OpenSession,
+        _ => Command::Search,
     };
     SessionCommand { session: source.bits32(), command }
 }
@@ -217,6 +250,27 @@ pub const REFUSALS: [Refusal; 6] = [
     Refusal::UnknownWall,
 ];
 
+pub const MODES: [Mode; 3] = [Mode::Tracking, Mode::Searching, Mode::Provisional];
+
+pub const ANSWERS: [SearchAnswer; 5] = [
+    SearchAnswer::Searching,
+    SearchAnswer::Several(u8::MAX),
+    SearchAnswer::Along(WallId(u32::MAX)),
+    SearchAnswer::Nowhere,
+    SearchAnswer::Unique,
+];
+
+fn outcome(source: &mut impl Source) -> Outcome {
+    match source.pick(4) {
+        1 => Err(source.choose(&NO_ECHO)),
+        _ => Ok(Echo {
+            sent: source.instant(),
+            heard: source.instant(),
+            range: Metres(source.single()),
+        }),
+    }
+}
+
 fn look(source: &mut impl Source) -> Ping {
     let at = source.instant();
     let aim = Aim {
@@ -230,14 +284,7 @@ fn look(source: &mut impl Source) -> Ping {
             candidates: source.bits16(),
         },
     };
-    let outcome = match source.pick(4) {
-        1 => Err(source.choose(&NO_ECHO)),
-        _ => Ok(Echo {
-            sent: source.instant(),
-            heard: source.instant(),
-            range: Metres(source.single()),
-        }),
-    };
+    let outcome = outcome(source);
     let innovation =
         Innovation { value: Metres(source.single()), variance: SquareMetres(source.single()) };
     let fix = match source.pick(4) {
@@ -299,7 +346,7 @@ fn reset(source: &mut impl Source) -> ResetCause {
     source.choose(&RESETS)
 }
 
-pub const REFUSED: [CommandError; 8] = [
+pub const REFUSED: [CommandError; 9] = [
     CommandError::Configuration,
     CommandError::Pose,
     CommandError::NoMap,
@@ -308,6 +355,7 @@ pub const REFUSED: [CommandError; 8] = [
     CommandError::NoPose,
     CommandError::Unsupported(Unsupported::Servo(SettingError::Frame)),
     CommandError::Session,
+    CommandError::NoSearch,
 ];
 
 fn command_result(source: &mut impl Source) -> CommandResult {
@@ -345,6 +393,13 @@ pub fn config(source: &mut impl Source) -> RobotConfig {
     };
     let [lost, dead_encoder, lost_link] = [0; 3].map(|_| source.pick(2) == 0);
     config.motors = MotorPolicy { lost, dead_encoder, lost_link, link_timeout: source.duration() };
+    let mut corner = || Point::new(source.single(), source.single());
+    let region = Region { from: corner(), to: corner() };
+    config.start = match source.pick(3) {
+        0 => StartPose::Unknown { region: Some(region) },
+        1 => StartPose::Unknown { region: None },
+        _ => StartPose::Known,
+    };
     config
 }
 

@@ -88,6 +88,9 @@ pub(super) struct Window<const PINGS: usize> {
     /// Where the sonar is in the robot frame.
     mount: Vector,
     robot: Station,
+    /// Where the search began, with the bends that were taken out on the way, and the distance since.
+    start: Vector,
+    since_start: f32,
     heading: f32,
     /// Heading at the reference.
     reference_heading: f32,
@@ -103,6 +106,8 @@ impl<const PINGS: usize> Window<PINGS> {
             pings: Vec::new(),
             mount,
             robot: Station::default(),
+            start: Vector::default(),
+            since_start: 0.0,
             heading: 0.0,
             reference_heading: 0.0,
             bend: Bend::NONE,
@@ -116,6 +121,8 @@ impl<const PINGS: usize> Window<PINGS> {
         self.pings.clear();
         self.mount = mount;
         self.robot = Station::default();
+        self.start = Vector::default();
+        self.since_start = 0.0;
         self.heading = 0.0;
         self.reference_heading = 0.0;
         self.bend = Bend::NONE;
@@ -143,6 +150,16 @@ impl<const PINGS: usize> Window<PINGS> {
         &self.robot
     }
 
+    /// Where the search began.
+    pub fn start(&self) -> Vector {
+        self.start
+    }
+
+    /// Distance travelled since the search began, metres.
+    pub fn since_start(&self) -> f32 {
+        self.since_start
+    }
+
     /// What is taken out of the odometry.
     pub fn bend(&self) -> Bend {
         self.bend
@@ -161,6 +178,7 @@ impl<const PINGS: usize> Window<PINGS> {
         let middle = Vector::of_angle(0.5 * (self.heading + heading));
         self.robot.at = self.robot.at.plus(middle.times(advance));
         self.robot.travelled += travelled;
+        self.since_start += travelled;
         self.robot.turned += turn;
         self.heading = Heading::new(Radians(heading)).radians().0;
     }
@@ -200,6 +218,7 @@ impl<const PINGS: usize> Window<PINGS> {
         for ping in &mut self.pings {
             ping.station = ping.station.seen_from(&reference);
         }
+        self.start = self.start.minus(reference.at);
         self.robot = Station::default();
         self.reference_heading = self.heading;
         self.referred = self.taken;

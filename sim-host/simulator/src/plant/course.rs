@@ -10,7 +10,12 @@ use crate::trace::Pose;
 #[derive(Debug, Clone)]
 pub enum Course<'a> {
     /// Exactly along a path.
-    OnPath(&'a Path),
+    OnPath {
+        /// The path.
+        path: &'a Path,
+        /// How far the robot is ahead of its schedule because it was carried along the path, seconds.
+        ahead: f64,
+    },
     /// As commanded.
     Steered {
         /// The current pose.
@@ -34,12 +39,20 @@ impl Course<'_> {
         }
     }
 
+    /// Carries the robot along its path by this time of driving, seconds; the wheels do not roll. Without effect on a
+    /// commanded motion.
+    pub fn carry(&mut self, seconds: f64) {
+        if let Self::OnPath { ahead, .. } = self {
+            *ahead += seconds;
+        }
+    }
+
     /// Drives from one time to another, seconds; returns how far the wheels rolled, metres.
     pub fn drive(&mut self, from: f64, to: f64, parameters: &Parameters) -> [f64; 2] {
         match self {
-            Self::OnPath(path) => {
+            Self::OnPath { path, ahead } => {
                 let mut rolled = [0.0, 0.0];
-                for piece in path.motion_between(from, to) {
+                for piece in path.motion_between(from + *ahead, to + *ahead) {
                     let half_turn = 0.5 * parameters.track_width * piece.turn;
                     rolled[0] += piece.advance + half_turn;
                     rolled[1] += piece.advance - half_turn;
@@ -57,8 +70,8 @@ impl Course<'_> {
     /// The pose at a time not before `now`, seconds, if the command does not change.
     pub fn pose_at(&self, now: f64, time: f64, parameters: &Parameters) -> Pose {
         match self {
-            Self::OnPath(path) => {
-                let pose = path.pose_at(time);
+            Self::OnPath { path, ahead } => {
+                let pose = path.pose_at(time + ahead);
                 Pose { x: pose.x, y: pose.y, heading: pose.heading }
             }
             Self::Steered { pose, speeds } => {

@@ -12,6 +12,9 @@ pub enum SimulationError {
     /// The localizer rejects its start.
     #[error("the localizer rejects its start: {0}")]
     Start(#[from] StartError),
+    /// At the ideal fidelity the robot has no loop, and so no search.
+    #[error("a robot without a start pose needs the fidelity \"pins\"")]
+    NoPose,
     /// The localizer rejects its baked map.
     #[error("the localizer rejects its map: {0}")]
     Map(#[from] MapError),

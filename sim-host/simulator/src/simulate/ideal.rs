@@ -29,8 +29,9 @@ pub fn run(
     let mut streams = RandomStreams::new(seed);
     let plant = simulation.plant();
     let start = simulation.start(&plant.state(), &mut streams.start);
+    let start = start.ok_or(SimulationError::NoPose)?;
     let localizer = computer.localizer(start, Instant::from_ticks(0))?;
-    let score = Score::new(simulation, start, plant.state())?;
+    let score = Score::new(simulation, Some(start), plant.state())?;
     // At this fidelity the time of flight is zero.
     let sensor = SensorModel { scale: simulation.range_scale, ..simulation.sensor.clone() };
     let follower = simulation.follower();

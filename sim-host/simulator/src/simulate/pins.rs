@@ -1,14 +1,16 @@
 //! A run through pins, drivers and the shipped loop, as a discrete-event simulation.
 
 use sonarfix::localizer::{Localizer, Start};
+use sonarfix::navigator::Mode;
 use sonarfix::units::{Instant, Metres, Radians};
 use sonarfix_hal::robot::{PingResult, Report};
+use sonarfix_map::Scenario;
 use sonarfix_pil::{Actuators, Sensors, Wires};
 
 use super::computer::{Computer, Controller};
 use super::error::SimulationError;
 use super::score::Score;
-use super::simulation::Simulation;
+use super::simulation::{Carried, Simulation};
 use super::streams::RandomStreams;
 use crate::angle;
 use crate::observe::{self, Measurement};
@@ -28,6 +30,8 @@ use crate::world::Ping;
 /// Poll period while a ping is in flight, µs. The interrupt stamps the edges, so this only delays
 /// their processing. A firmware's loop has a similar period.
 const LISTEN_POLL: u64 = 1_000;
+/// Poll period of a robot that searches for its pose, µs.
+const SEARCH_POLL: u64 = 1_000;
 /// Length of the trigger pulse, µs: the driver's minimum.
 const TRIGGER: u64 = 10;
 /// By how much the pulse of a board without an echo exceeds the driver's timeout, µs: 38 ms in the
@@ -76,6 +80,10 @@ struct SimulatedHardware<'a> {
     score: Score<'a>,
     /// Length of the board's pulse without an echo, µs.
     silence: u64,
+    /// When the robot will be carried, and how far.
+    carried: Option<Carried>,
+    /// What determines the robot's pose.
+    mode: Mode,
     /// The last ping, for the trace.
     measurement: Option<Measurement>,
     /// Microseconds since the run began.
@@ -87,7 +95,7 @@ impl<'a> SimulatedHardware<'a> {
         simulation: &'a Simulation,
         seed: u64,
         encoders: &'a [EncoderWires; 2],
-    ) -> Result<(Self, Start), SimulationError> {
+    ) -> Result<(Self, Option<Start>), SimulationError> {
         let scenario = &simulation.scenario;
         let mut streams = RandomStreams::new(seed);
         let plant = simulation.plant();
@@ -110,6 +118,8 @@ impl<'a> SimulatedHardware<'a> {
             follower: simulation.follower(),
             score,
             silence: devices::listening_time(&scenario.robot) + GIVES_UP_AFTER,
+            carried: simulation.carried,
+            mode: Mode::Tracking,
             measurement: None,
             now: 0,
         };
@@ -133,6 +143,7 @@ impl<'a> SimulatedHardware<'a> {
             let localizer = controller.localizer()?;
             recorder.polled(&report, localizer);
             self.obey(actuators);
+            self.mode = controller.mode()?;
             self.record(&report, localizer, recorder);
             // A ping may delay a tick, but by less than a period.
             let is_last = report.tick.is_some() && self.now + period > end;
@@ -158,6 +169,9 @@ impl<'a> SimulatedHardware<'a> {
     /// Advances the simulated hardware; its edges interrupt the robot.
     fn advance(&mut self, now: u64) {
         self.now = now;
+        if let Some(carried) = self.carried.take_if(|carried| carried.at <= now) {
+            self.plant.carry(carried.by);
+        }
         let travel = self.plant.drive_to(seconds(now), &mut self.streams.wheels);
         self.score.rolled(travel);
         let encoders = self.discs.iter_mut().zip(&mut self.faults.encoders);
@@ -178,9 +192,10 @@ impl<'a> SimulatedHardware<'a> {
     }
 
     /// Restarts after a power failure that ends at `back_at`: the motors stop, and the robot starts
-    /// again from its stored pose, with the deviations of its first start and the prior calibration.
-    fn reboot(&mut self, back_at: u64, localizer: &Localizer) -> Start {
-        let start = self.simulation.scenario.start;
+    /// again from its stored pose, with the deviations of its first start and the prior calibration. A robot that can
+    /// search starts without a pose: it may have rolled on.
+    fn reboot(&mut self, back_at: u64, localizer: &Localizer) -> Option<Start> {
+        let Scenario { start, robot, .. } = &self.simulation.scenario;
         #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
         let start = Start {
             pose: localizer.pose(),
@@ -190,7 +205,7 @@ impl<'a> SimulatedHardware<'a> {
         self.plant.steer(Command::default());
         self.measurement = None;
         self.advance(back_at);
-        start
+        (!robot.start.is_unknown()).then_some(start)
     }
 
     /// Applies the outputs of the loop.
@@ -232,7 +247,7 @@ impl<'a> SimulatedHardware<'a> {
 
     fn record(&mut self, report: &Report, localizer: &Localizer, recorder: &mut impl Recorder) {
         self.score.faults(report.faults);
-        if report.tick.is_some() || report.ping_result.is_some() {
+        if report.tick.is_some() || report.ping_result.is_some() || report.swept.is_some() {
             self.score.arrive(self.plant.state());
         }
         if let Some(heard) = &report.ping_result {
@@ -264,9 +279,14 @@ impl<'a> SimulatedHardware<'a> {
         recorder.fix(|| observe::fix_record(Measurement { range, ..measurement }, &heard.aim, fix));
     }
 
+    /// Steers by the estimate. While the robot has none, a person steers it along the path.
     fn steer(&mut self, localizer: &Localizer) {
         if let Some(follower) = &mut self.follower {
-            let command = follower.command(&observe::estimate(localizer).pose);
+            let pose = match self.mode {
+                Mode::Searching => self.plant.pose(),
+                _ => observe::estimate(localizer).pose,
+            };
+            let command = follower.command(&pose);
             self.plant.steer(command);
         }
     }
@@ -281,6 +301,10 @@ impl<'a> SimulatedHardware<'a> {
                 let edge = self.board.next_edge().unwrap_or(u64::MAX);
                 edge.min(self.now + LISTEN_POLL)
             }
+        };
+        let at = match self.mode {
+            Mode::Tracking => at,
+            _ => at.min(self.now + SEARCH_POLL),
         };
         self.faults.controller.poll_at(self.now, at.max(self.now + 1))
     }

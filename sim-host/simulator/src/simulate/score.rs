@@ -5,6 +5,7 @@ use sonarfix::localizer::{Fix, Localizer, Start};
 use sonarfix::units::Instant;
 use sonarfix_hal::robot::Faults;
 
+use super::computer::no_pose;
 use super::error::SimulationError;
 use super::simulation::Simulation;
 use crate::bound::Bound;
@@ -13,7 +14,7 @@ use crate::observe;
 use crate::odometry::DeadReckoning;
 use crate::plant::{Plant, Travel};
 use crate::statistics::{NisSum, RunResult};
-use crate::trace::{Recorder, Tick};
+use crate::trace::{Pose, Recorder, Tick};
 
 /// Accumulates the result of a run.
 pub struct Score<'a> {
@@ -31,14 +32,22 @@ pub struct Score<'a> {
 impl<'a> Score<'a> {
     pub fn new(
         simulation: &'a Simulation,
-        start: Start,
+        start: Option<Start>,
         truth: Vector,
     ) -> Result<Self, SimulationError> {
         let model = simulation.model;
-        let localizer = simulation.localizer(start, Instant::from_ticks(0))?;
+        let is_known = start.is_some();
+        let localizer =
+            simulation.localizer(start.unwrap_or_else(no_pose), Instant::from_ticks(0))?;
         let deviation = localizer.filter().standard_deviations();
         let deviation = Vector::from(deviation.to_array().map(f64::from));
-        let start = observe::estimate(&localizer).pose;
+        // Dead reckoning needs a start; without an estimate it is the true one.
+        let start = if is_known {
+            observe::estimate(&localizer).pose
+        } else {
+            let [x, y, heading, ..]: [f64; 7] = truth.into();
+            Pose { x, y, heading }
+        };
         Ok(Self {
             simulation,
             odometry: DeadReckoning::new(start, model.track_width),

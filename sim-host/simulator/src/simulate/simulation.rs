@@ -41,6 +41,17 @@ pub struct Simulation {
     pub(super) model: Model,
     /// When the run ends, microseconds.
     end: u64,
+    /// When the robot is carried along its path, and how far.
+    pub(super) carried: Option<Carried>,
+}
+
+/// A robot that is carried along its path.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Carried {
+    /// When, microseconds since the run began.
+    pub(super) at: u64,
+    /// How far, as the time in which it would drive there, seconds.
+    pub(super) by: f64,
 }
 
 impl Simulation {
@@ -65,6 +76,7 @@ impl Simulation {
             range_scale: scenario.truth.range_scale * stretch + (stretch - 1.0),
             model: Model::of(&scenario.robot.localizer),
             end: micros(scenario.path.duration()),
+            carried: None,
             scenario,
         }
     }
@@ -75,6 +87,15 @@ impl Simulation {
     /// [`BakeError`], if the walls cannot be baked.
     pub fn on_baked_map(self) -> Result<Self, BakeError> {
         Ok(Self { image: Some(self.baked_map()?), ..self })
+    }
+
+    /// The same, with the robot carried along its path: `at` seconds after the start, as far as it would drive in
+    /// `by` seconds. Only at the fidelity of pins, and if it follows the path exactly.
+    #[must_use]
+    pub fn carried(self, at: f64, by: f64) -> Self {
+        let left = micros((self.scenario.path.duration() - by).max(0.0));
+        let end = self.end.min(left);
+        Self { carried: Some(Carried { at: micros(at), by }), end, ..self }
     }
 
     /// The same, limited to a duration in seconds.
@@ -137,9 +158,10 @@ impl Simulation {
         Plant::new(&self.scenario, self.range_scale)
     }
 
-    /// The initial estimate of the localizer.
-    pub(super) fn start(&self, truth: &Vector, rng: &mut ChaCha8Rng) -> Start {
-        estimated_start(&self.scenario, truth, rng)
+    /// The initial estimate of the localizer; none if the robot starts without a pose.
+    pub(super) fn start(&self, truth: &Vector, rng: &mut ChaCha8Rng) -> Option<Start> {
+        let is_known = !self.scenario.start.is_unknown;
+        is_known.then(|| estimated_start(&self.scenario, truth, rng))
     }
 
     /// A localizer in this process.

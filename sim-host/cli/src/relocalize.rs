@@ -1,0 +1,104 @@
+//! `sonarfix relocalize`: robots that lose their pose, or start without one, in random floor plans.
+
+use sonarfix_report::Table;
+use sonarfix_studies::relocalization::{self, Summary, Trial, Upset};
+
+use crate::{progress, table};
+
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Number of trials, each in a floor plan of its own.
+    #[arg(long, default_value_t = 20)]
+    runs: u32,
+    /// Seed of the first trial; the others count up from it.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Duration after the start, or after the kidnapping.
+    #[arg(long, default_value_t = 60.0)]
+    seconds: f64,
+    /// Starts with a pose, and carries the robot so far after 30 s; without it the robot starts without a pose.
+    #[arg(long, value_name = "METRES")]
+    kidnapped: Option<f64>,
+    /// Prints every trial.
+    #[arg(long)]
+    trials: bool,
+    /// Prints JSON instead of a table.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn execute(args: &Args) -> anyhow::Result<()> {
+    anyhow::ensure!(args.seconds > 0.0, "--seconds must be positive");
+    let upset = args.kidnapped.map_or(Upset::UnknownStart, Upset::Kidnapped);
+    let bar = progress::runs(args.runs);
+    let trials = relocalization::trials(args.seed, args.runs, upset, args.seconds, || bar.inc(1))?;
+    anyhow::ensure!(!trials.is_empty(), "no floor plan of these seeds is large enough");
+    let summary = Summary::new(&trials);
+    if args.json {
+        return crate::json::print(&serde_json::json!({ "summary": summary, "trials": trials }));
+    }
+    if args.trials {
+        println!("{}\n", table::text(&trial_table(&trials)));
+    }
+    println!("{}", table::text(&summary_table(&summary, args.seconds)));
+    Ok(())
+}
+
+fn trial_table(trials: &[Trial]) -> Table {
+    let seconds = |time: Option<f64>| time.map_or("-".to_owned(), |time| format!("{time:.1}"));
+    let row = |trial: &Trial| {
+        let hand_overs = trial.hand_overs.iter().map(|hand_over| {
+            let word = if hand_over.is_right { "right" } else { "wrong" };
+            format!("{word} after {:.1} s", hand_over.after)
+        });
+        let end = match (trial.is_back, trial.is_wrong_and_tracking) {
+            (true, _) => "right",
+            (_, true) => "wrong and Tracking",
+            _ => "no pose",
+        };
+        let hand_overs: Vec<String> = hand_overs.collect();
+        vec![
+            trial.seed.to_string(),
+            trial.walls.to_string(),
+            seconds(trial.searched_after),
+            hand_overs.join(", "),
+            end.to_owned(),
+        ]
+    };
+    Table {
+        title: "Trials".to_owned(),
+        note: String::new(),
+        columns: ["seed", "walls", "searched after (s)", "hand-overs", "at the end"]
+            .map(str::to_owned)
+            .into(),
+        rows: trials.iter().map(row).collect(),
+    }
+}
+
+fn summary_table(summary: &Summary, seconds: f64) -> Table {
+    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+    let row = |name: &str, value: String| vec![name.to_owned(), value];
+    Table {
+        title: format!("{} trials of {seconds} s", summary.trials),
+        note: String::new(),
+        columns: ["", "value"].map(str::to_owned).into(),
+        rows: vec![
+            row("loss noticed", percent(summary.searched)),
+            row("first hand-over right", percent(summary.first_right)),
+            row("first hand-over wrong", percent(summary.first_wrong)),
+            row("right and Tracking 20 pings later", percent(summary.right_later)),
+            row("wrong pose confirmed", percent(summary.confirmed_wrong)),
+            row("right pose at the end", percent(summary.back)),
+            row("wrong and Tracking at the end", percent(summary.wrong_and_tracking)),
+            row("mean time to the first hand-over", format!("{:.1} s", summary.mean_seconds)),
+            row(
+                "position error, 95th percentile",
+                format!("{:.1} cm", 100.0 * summary.position_error_95),
+            ),
+            row(
+                "heading error, 95th percentile",
+                format!("{:.1} deg", summary.heading_error_95.to_degrees()),
+            ),
+        ],
+    }
+}
