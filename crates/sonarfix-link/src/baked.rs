@@ -6,6 +6,7 @@
 //!
 //! Numbers are little-endian. Bytes after the image are ignored.
 
+use serde::Deserialize;
 use sonarfix::map::image::checksum as crc32;
 use sonarfix_hal::config::{RobotConfig, RobotConfigError};
 
@@ -126,10 +127,13 @@ pub fn read(bytes: &[u8]) -> Result<RobotConfig, BakedError> {
     if crc32(covered) != u32::from_le_bytes(*checksum) {
         return Err(BakedError::Checksum);
     }
-    match postcard::take_from_bytes::<RobotConfig>(postcard) {
-        Ok((config, [])) => config.check().map(|()| config).map_err(BakedError::Rule),
-        _ => Err(BakedError::Layout),
+    // Without the tuple of `take_from_bytes`, the stack holds one copy less of the configuration.
+    let mut decoder = postcard::Deserializer::from_bytes(postcard);
+    let config = RobotConfig::deserialize(&mut decoder).map_err(|_| BakedError::Layout)?;
+    if !decoder.finalize().is_ok_and(<[u8]>::is_empty) {
+        return Err(BakedError::Layout);
     }
+    config.check().map(|()| config).map_err(BakedError::Rule)
 }
 
 /// The checksum by which a robot identifies its configuration

@@ -326,43 +326,62 @@ impl<'m, F: NorFlash> App<'m, F> {
         written.map_err(|_| CommandError::Storage)
     }
 
-    /// Starts the loop, or restarts a running one; returns its telemetry.
+    /// Starts the loop, or restarts a running one; returns its telemetry. The localizer is built before the stack holds
+    /// the loop.
     #[inline(never)]
     fn begin(&mut self, now: Instant, origin: &Resumed) -> Result<Telemetry, CommandError> {
         let (config, _) = self.config.as_ref().ok_or(CommandError::NoConfiguration)?;
         let start = config.start;
-        let Startable { localizer, wheels, settings } = self.startable(now, config, origin)?;
-        let origin = *origin;
-        let deviation = origin.deviation_at_start(localizer.config());
+        let startable = self.startable(now, config, origin)?;
+        let deviation = origin.deviation_at_start(startable.localizer.config());
         let (reporter, began) = Reporter::resume(now, origin.state, deviation);
-        let written = self.stored.map_or(deviation, |stored| stored.deviation);
+        if self.is_running() {
+            self.restart_loop(startable)?;
+        } else {
+            self.start_loop(now, startable, origin, reporter)?;
+        }
         if let Mode::Running(running) = &mut self.mode {
-            let restarted = running.robot.restart(localizer, wheels, settings);
-            restarted.map_err(|_| CommandError::Configuration)?;
             running.reporter = reporter;
-            running.origin = origin;
+            running.origin = *origin;
             running.searches = start.is_unknown();
             if !origin.has_pose {
                 running.robot.search_in(now, start.region(), &mut self.search);
             }
-            return Ok(began);
         }
+        Ok(began)
+    }
+
+    #[inline(never)]
+    fn restart_loop(&mut self, startable: Startable<'m>) -> Result<(), CommandError> {
+        let Startable { localizer, wheels, settings } = startable;
+        let Mode::Running(running) = &mut self.mode else { return Ok(()) };
+        running.robot.restart(localizer, wheels, settings).map_err(|_| CommandError::Configuration)
+    }
+
+    #[inline(never)]
+    fn start_loop(
+        &mut self,
+        now: Instant,
+        startable: Startable<'m>,
+        origin: &Resumed,
+        reporter: Reporter,
+    ) -> Result<(), CommandError> {
+        let Startable { localizer, wheels, settings } = startable;
+        let deviation = origin.deviation_at_start(localizer.config());
+        let written = self.stored.map_or(deviation, |stored| stored.deviation);
         let robot = Robot::new(localizer, wheels, settings);
-        let mut robot = robot.map_err(|_| CommandError::Configuration)?;
-        if !origin.has_pose {
-            robot.search_in(now, start.region(), &mut self.search);
-        }
+        let robot = robot.map_err(|_| CommandError::Configuration)?;
         self.faults = self.faults();
         self.mode = Mode::Running(Running {
             robot,
             reporter,
             save_policy: SavePolicy::new(now, written),
-            origin,
-            searches: start.is_unknown(),
+            origin: *origin,
+            searches: false,
             has_rolled: false,
             report: Report::default(),
         });
-        Ok(began)
+        Ok(())
     }
 }
 
