@@ -12,7 +12,7 @@ const RUNS: u32 = 200;
 const RMS_NOISE: f64 = 4.0 / 20.0;
 
 fn many(simulation: &Simulation, seed: u64, runs: u32) -> Summary {
-    Summary::of(&monte_carlo::results(simulation, seed, runs, || ()).unwrap())
+    Summary::of(&monte_carlo::results(simulation, seed, runs, &|| ()).unwrap())
 }
 
 fn paper(policy: Policy, statistics: bool) -> Simulation {

@@ -27,7 +27,7 @@ fn paper(fidelity: Fidelity) -> Scenario {
 }
 
 fn summary(scenario: Scenario, runs: u32) -> Summary {
-    Summary::of(&monte_carlo::results(&Simulation::new(scenario), 0, runs, || ()).unwrap())
+    Summary::of(&monte_carlo::results(&Simulation::new(scenario), 0, runs, &|| ()).unwrap())
 }
 
 /// An ideal sensor and servo and 1 mm ticks through pins give the statistics of the ideal run.
@@ -68,7 +68,7 @@ fn stamped(stamp: Stamp) -> (f64, f64, usize) {
     scenario.robot.localizer.policy = Policy::Informative;
     let mut simulation = Simulation::new(scenario);
     simulation.stamp = stamp;
-    let summary = Summary::of(&monte_carlo::results(&simulation, 0, 40, || ()).unwrap());
+    let summary = Summary::of(&monte_carlo::results(&simulation, 0, 40, &|| ()).unwrap());
     (summary.rms_path.x.hypot(summary.rms_path.y), summary.nis_mean, summary.lost_runs)
 }
 

@@ -2,16 +2,21 @@
 
 use sonarfix_studies::{fault_search, fault_table};
 
+use crate::progress::Runs;
+
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Number of runs per fault.
     #[arg(long, default_value_t = 20)]
-    runs: u64,
+    runs: u32,
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
     anyhow::ensure!(args.runs > 0, "--runs must be at least 1");
-    let (rows, searching) = (fault_table::rows(args.runs)?, fault_search::rows(args.runs)?);
+    let runs = Runs::new(args.runs.saturating_mul(fault_table::CASES + fault_search::CASES));
+    let rows = fault_table::rows(args.runs, &runs)?;
+    let searching = fault_search::rows(args.runs, &runs)?;
+    runs.end()?;
     print!("{}", fault_table::markdown(&rows, &searching));
     Ok(())
 }

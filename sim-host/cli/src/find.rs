@@ -10,7 +10,8 @@ use sonarfix_replay::find::{Find, Found};
 use sonarfix_report::Table;
 use sonarfix_studies::search_study::{self, Summary, Trial};
 
-use crate::{progress, table};
+use crate::progress::Runs;
+use crate::table;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -47,16 +48,21 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     anyhow::ensure!(args.seconds > 0.0, "--seconds must be positive");
     let trials = match (&args.file, args.floor_plans) {
         (_, Some(trials)) => {
-            let bar = progress::runs(trials);
-            search_study::floor_plans(args.seed, trials, args.seconds, || bar.inc(1))?
+            let runs = Runs::new(trials);
+            let found = search_study::floor_plans(args.seed, trials, args.seconds, &runs)?;
+            runs.end()?;
+            found
         }
         (Some(file), None) if file.extension().is_some_and(|end| end == "csv") => {
             return search_log(file, args);
         }
         (Some(file), None) => {
             let scenario = Scenario::read(file)?;
-            let bar = progress::runs(args.runs);
-            search_study::scenario(&scenario, args.seed, args.runs, args.seconds, || bar.inc(1))?
+            let runs = Runs::new(args.runs);
+            let found =
+                search_study::scenario(&scenario, args.seed, args.runs, args.seconds, &runs)?;
+            runs.end()?;
+            found
         }
         (None, None) => anyhow::bail!("a log or a scenario is needed"),
     };

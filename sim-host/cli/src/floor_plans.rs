@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use sonarfix_studies::floor_plan::{FloorPlan, compare, page, picture};
 
-use crate::progress;
+use crate::progress::Runs;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -42,9 +42,9 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         // Before the work: what cannot be written is not worth computing.
         std::fs::create_dir_all(dir).with_context(|| format!("cannot make {}", dir.display()))?;
     }
-    let bar = progress::runs(args.plans.saturating_mul(args.runs).saturating_mul(2));
-    let (results, errors) = compare::run(args.seed, args.plans, args.runs, || bar.inc(2));
-    bar.finish_and_clear();
+    let runs = Runs::weighted(args.plans.saturating_mul(args.runs).saturating_mul(2), 2);
+    let (results, errors) = compare::run(args.seed, args.plans, args.runs, &runs);
+    runs.end()?;
     for error in &errors {
         eprintln!("error: {error}");
     }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::Context;
 use sonarfix_studies::health_page;
 
-use crate::progress;
+use crate::progress::Runs;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -19,9 +19,9 @@ pub struct Args {
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
     anyhow::ensure!(args.runs > 0, "--runs must be at least 1");
-    let bar = progress::runs(args.runs.saturating_mul(health_page::SETS));
-    let findings = health_page::findings(args.runs, || bar.inc(1))?;
-    bar.finish_and_clear();
+    let runs = Runs::new(args.runs.saturating_mul(health_page::SETS));
+    let findings = health_page::findings(args.runs, &runs)?;
+    runs.end()?;
     if let Some(file) = &args.figure {
         let called_after: Vec<_> =
             findings.trials.iter().map(|outcome| outcome.called_after).collect();

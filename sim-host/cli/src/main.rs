@@ -33,7 +33,7 @@ use cli::Cli;
 
 fn main() -> ExitCode {
     match Cli::parse().execute() {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => progress::exit_code(),
         Err(error) => {
             eprintln!("error: {error:#}");
             ExitCode::FAILURE

@@ -3,7 +3,8 @@
 use sonarfix_report::Table;
 use sonarfix_studies::relocalization::{self, Summary, Trial, Upset};
 
-use crate::{progress, table};
+use crate::progress::Runs;
+use crate::table;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -30,8 +31,9 @@ pub struct Args {
 pub fn execute(args: &Args) -> anyhow::Result<()> {
     anyhow::ensure!(args.seconds > 0.0, "--seconds must be positive");
     let upset = args.kidnapped.map_or(Upset::UnknownStart, Upset::Kidnapped);
-    let bar = progress::runs(args.runs);
-    let trials = relocalization::trials(args.seed, args.runs, upset, args.seconds, || bar.inc(1))?;
+    let runs = Runs::new(args.runs);
+    let trials = relocalization::trials(args.seed, args.runs, upset, args.seconds, &runs)?;
+    runs.end()?;
     anyhow::ensure!(!trials.is_empty(), "no floor plan of these seeds is large enough");
     let summary = Summary::new(&trials);
     if args.json {

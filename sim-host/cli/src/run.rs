@@ -15,7 +15,7 @@ use sonarfix_sim::statistics::Summary;
 use sonarfix_sim::trace::Trace;
 
 use crate::overrides::Overrides;
-use crate::progress;
+use crate::progress::Runs;
 use crate::table::{self, Beside, Measured};
 
 #[derive(Debug, clap::Args)]
@@ -104,9 +104,9 @@ impl Experiment {
 
     fn measure(&self) -> anyhow::Result<Measured> {
         let start = ProcessTime::now();
-        let bar = progress::runs(self.runs);
-        let results = monte_carlo::results(&self.simulation, self.seed, self.runs, || bar.inc(1));
-        bar.finish_and_clear();
+        let runs = Runs::new(self.runs);
+        let results = monte_carlo::results(&self.simulation, self.seed, self.runs, &runs);
+        runs.end()?;
         let summary = Summary::of(&results?);
         Ok(Measured { summary, cpu_seconds: start.elapsed().as_secs_f64() })
     }
@@ -139,7 +139,7 @@ impl Experiment {
             subtitle: format!(
                 "{}. The table is for {} runs; figures and player show the run with seed {}.",
                 scenario.description.trim().trim_end_matches('.'),
-                self.runs,
+                measured.summary.runs,
                 self.seed
             ),
             tables: vec![self.table(measured)],

@@ -100,3 +100,44 @@ fn a_narrow_office_is_drawn() {
     assert!(output.status.success(), "{}", errors(&output));
     assert!(std::fs::read_to_string(file).unwrap().contains("<svg"));
 }
+
+/// Commands with more runs than anyone waits for, and what their output must begin with.
+#[cfg(unix)]
+const LONG: [(&[&str], &str); 5] = [
+    (&["paper", "--runs", "4000000"], "Estimates"),
+    (
+        &["run", "../../crates/sonarfix-map/scenarios/classroom.toml", "--runs", "4000000"],
+        "Estimates",
+    ),
+    (&["floor-plans", "--plans", "1000000", "--runs", "1"], "# "),
+    (&["faults", "--runs", "4000000"], "# Effects"),
+    (&["health", "--runs", "1000000"], "# Reliability"),
+];
+
+/// Interrupts a command after this time.
+#[cfg(unix)]
+fn interrupted_after(seconds: u64, arguments: &[&str]) -> Output {
+    let child = sonarfix(arguments).stdout(Stdio::piped()).spawn().unwrap();
+    std::thread::sleep(std::time::Duration::from_secs(seconds));
+    let id = child.id().to_string();
+    assert!(Command::new("kill").args(["-s", "INT", &id]).status().unwrap().success());
+    child.wait_with_output().unwrap()
+}
+
+/// Ctrl-C keeps the runs that are finished, and reports their number.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_command_reports_its_finished_runs() {
+    for (arguments, begins) in LONG {
+        // On a busy computer the first run may take longer.
+        let mut outputs =
+            [2, 8, 32].into_iter().map(|seconds| interrupted_after(seconds, arguments));
+        let output = outputs.find(|output| !errors(output).contains("before the first run"));
+        let output = output.unwrap();
+        let (text, errors) = (String::from_utf8_lossy(&output.stdout), errors(&output));
+        assert_eq!(output.status.code(), Some(130), "{arguments:?}: {errors}");
+        assert!(errors.contains("interrupted: the results are those of "), "{errors}");
+        assert!(text.trim_start().starts_with(begins), "{arguments:?}: {text}");
+        assert!(!text.contains("| NaN"), "{text}");
+    }
+}

@@ -6,9 +6,9 @@ use std::sync::LazyLock;
 use sonarfix_hal::robot::Faults;
 use sonarfix_studies::fault_table::{self, Row};
 
-const RUNS: u64 = 5;
+const RUNS: u32 = 5;
 
-static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| fault_table::rows(RUNS).unwrap());
+static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| fault_table::rows(RUNS, &|| ()).unwrap());
 
 fn row(name: &str) -> &'static Row {
     ROWS.iter().find(|row| row.name == name).unwrap()

@@ -166,7 +166,7 @@ fn a_follower_reaches_the_end() {
 /// A short comparison. The margins are for this number of runs: docs/floor-plans.md has more.
 #[test]
 fn informative_is_no_worse_in_the_median_plan() {
-    let results = compare::run(0, 24, 3, || ()).0;
+    let results = compare::run(0, 24, 3, &|| ()).0;
     let median = median_ratio(&results);
     assert!(median.value < 1.0 && median.to < 1.15, "{median:?}");
     let lost = |of| results.iter().map(|result| result.lost(of)).sum::<usize>();
@@ -176,8 +176,8 @@ fn informative_is_no_worse_in_the_median_plan() {
 /// Both policies have the same wheel errors, and the comparison is reproducible.
 #[test]
 fn a_comparison_can_be_repeated() {
-    let results = compare::run(5, 2, 2, || ()).0;
-    assert_eq!(results, compare::run(5, 2, 2, || ()).0);
+    let results = compare::run(5, 2, 2, &|| ()).0;
+    assert_eq!(results, compare::run(5, 2, 2, &|| ()).0);
     assert_eq!(results[1].plan.seed, 6);
     for result in &results {
         assert_eq!(result.pairs.len(), 2);

@@ -14,6 +14,7 @@ pub mod observe;
 pub mod odometry;
 pub mod pins;
 pub mod plant;
+pub mod progress;
 pub mod simulate;
 pub mod statistics;
 pub mod time;

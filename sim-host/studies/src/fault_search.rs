@@ -2,12 +2,11 @@
 
 use std::path::Path;
 
-use rayon::prelude::*;
 use sonarfix_hal::config::StartPose;
 use sonarfix_map::{CLASSROOM, Fault, FaultKind, Scenario, Wheel};
-use sonarfix_sim::simulate::Simulation;
+use sonarfix_sim::progress::Progress;
 
-use crate::fault_table::{FROM, Row, TO, TableError};
+use crate::fault_table::{self, FROM, Row, TO, TableError};
 
 /// A cabinet in a corner, in the map: without it the room is itself when it is rotated by 180°, and a lost robot cannot
 /// tell the two poses apart.
@@ -16,26 +15,24 @@ const CABINET: &str = r#"
     { name = "cabinet side", from = [0.9, 7], to = [0.9, 8] },
 ]"#;
 
-const CASES: [(&str, FaultKind); 4] = [
+const KINDS: [(&str, FaultKind); 4] = [
     ("an encoder channel dead", FaultKind::DeadEncoder(Wheel::Right)),
     ("an encoder's channels swapped", FaultKind::ReversedEncoder(Wheel::Right)),
     ("a tenth of an encoder's edges missed", FaultKind::MissingTicks(Wheel::Right, 0.1)),
     ("brown-out and restart", FaultKind::BrownOut),
 ];
 
-/// Runs the faults with the seeds 0 to `runs` − 1.
+/// Number of rows.
+#[expect(clippy::cast_possible_truncation, reason = "a dozen")]
+pub const CASES: u32 = KINDS.len() as u32;
+
+/// Runs the faults with the seeds 0 to `runs` − 1. After an interruption, rows without a finished run are missing.
 ///
 /// # Errors
 /// The [`TableError`] of the first run that fails.
-pub fn rows(runs: u64) -> Result<Vec<Row>, TableError> {
-    CASES
-        .into_iter()
-        .map(|(name, kind)| {
-            let simulation = Simulation::new(scenario(kind)?);
-            let results = (0..runs).into_par_iter().map(|seed| simulation.run(seed, &mut ()));
-            Ok(Row { name, results: results.collect::<Result<_, _>>()? })
-        })
-        .collect()
+pub fn rows(runs: u32, progress: &impl Progress) -> Result<Vec<Row>, TableError> {
+    let scenarios = KINDS.into_iter().map(|(name, kind)| Ok((name, scenario(kind)?)));
+    fault_table::finished(scenarios, runs, progress)
 }
 
 fn scenario(kind: FaultKind) -> Result<Scenario, TableError> {

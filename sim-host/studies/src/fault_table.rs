@@ -3,10 +3,11 @@
 
 use std::fmt::Write;
 
-use rayon::prelude::*;
 use sonarfix_hal::robot::Faults;
 use sonarfix_map::{CLASSROOM, Fault, FaultKind, FileError, Scenario, Wheel};
 
+use sonarfix_sim::monte_carlo;
+use sonarfix_sim::progress::Progress;
 use sonarfix_sim::simulate::{Simulation, SimulationError};
 use sonarfix_sim::statistics::RunResult;
 
@@ -16,7 +17,7 @@ pub(crate) const FROM: f64 = 200.0;
 pub(crate) const TO: f64 = 230.0;
 
 /// All kinds of faults, with names.
-const CASES: [(&str, FaultKind); 11] = [
+const KINDS: [(&str, FaultKind); 11] = [
     ("half of the echoes lost", FaultKind::LostEchoes(0.5)),
     ("all echoes lost", FaultKind::LostEchoes(1.0)),
     ("cross-talk in half of the pings", FaultKind::CrossTalk(0.5)),
@@ -54,6 +55,10 @@ its path.
 /// Attacks on the application, which its tests make.
 const ATTACKS: &str = include_str!("fault_table/attacks.md");
 
+/// Number of rows.
+#[expect(clippy::cast_possible_truncation, reason = "a dozen")]
+pub const CASES: u32 = KINDS.len() as u32 + 1;
+
 /// One row: a fault, and the runs with it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
@@ -74,22 +79,36 @@ pub enum TableError {
     Run(#[from] SimulationError),
 }
 
-/// Runs every fault, and no fault, with the seeds 0 to `runs` − 1.
+/// Runs every fault, and no fault, with the seeds 0 to `runs` − 1. After an interruption, rows without a finished run are
+/// missing.
 ///
 /// # Errors
 /// The [`TableError`] of the first run that fails.
-pub fn rows(runs: u64) -> Result<Vec<Row>, TableError> {
+pub fn rows(runs: u32, progress: &impl Progress) -> Result<Vec<Row>, TableError> {
     let none = std::iter::once(("none", None));
-    let cases = none.chain(CASES.iter().map(|&(name, kind)| (name, Some(kind))));
-    cases.map(|(name, kind)| Ok(Row { name, results: results(kind, runs)? })).collect()
+    let cases = none.chain(KINDS.iter().map(|&(name, kind)| (name, Some(kind))));
+    let classroom = Scenario::parse(CLASSROOM, "classroom.toml", std::path::Path::new(""))?;
+    let scenario = |(name, kind): (_, Option<_>)| {
+        let faults = kind.map(|kind| Fault { kind, from: FROM, to: TO }).into_iter().collect();
+        Ok((name, Scenario { faults, ..classroom.clone() }))
+    };
+    finished(cases.map(scenario), runs, progress)
 }
 
-fn results(kind: Option<FaultKind>, runs: u64) -> Result<Vec<RunResult>, TableError> {
-    let mut scenario = Scenario::parse(CLASSROOM, "classroom.toml", std::path::Path::new(""))?;
-    scenario.faults = kind.map(|kind| Fault { kind, from: FROM, to: TO }).into_iter().collect();
-    let simulation = Simulation::new(scenario);
-    let results = (0..runs).into_par_iter().map(|seed| simulation.run(seed, &mut ()));
-    Ok(results.collect::<Result<_, _>>()?)
+/// The rows of these scenarios that have a finished run.
+pub(crate) fn finished(
+    scenarios: impl Iterator<Item = Result<(&'static str, Scenario), TableError>>,
+    runs: u32,
+    progress: &impl Progress,
+) -> Result<Vec<Row>, TableError> {
+    let row = |scenario: Result<(_, Scenario), TableError>| {
+        let (name, scenario) = scenario?;
+        let results = monte_carlo::results(&Simulation::new(scenario), 0, runs, progress)?;
+        Ok(Row { name, results })
+    };
+    let mut rows = scenarios.map(row).collect::<Result<Vec<_>, TableError>>()?;
+    rows.retain(|row| !row.results.is_empty());
+    Ok(rows)
 }
 
 /// A counter of the loop, with its name.

@@ -5,6 +5,7 @@ use std::fmt::Write;
 
 use sonarfix_map::{CLASSROOM, FileError, Scenario};
 use sonarfix_sim::monte_carlo;
+use sonarfix_sim::progress::Progress;
 use sonarfix_sim::simulate::{Simulation, SimulationError};
 use sonarfix_sim::statistics::RunResult;
 
@@ -37,18 +38,21 @@ pub struct Findings {
 }
 
 /// Runs both scenarios, and trials with kidnapped robots, with the seeds 0 to `runs` − 1 each.
-/// Calls `done` after every run and every trial, [`SETS`] times `runs` in all.
+/// Reports every run and every trial, [`SETS`] times `runs` in all. After an interruption, sets without a finished run are
+/// missing.
 ///
 /// # Errors
 /// The [`PageError`] of the first run that fails.
-pub fn findings(runs: u32, done: impl Fn() + Sync) -> Result<Findings, PageError> {
+pub fn findings(runs: u32, progress: &impl Progress) -> Result<Findings, PageError> {
     let classroom = Scenario::parse(CLASSROOM, "classroom.toml", std::path::Path::new(""))?;
     let scenarios = [("paper", Scenario::paper()?), ("classroom", classroom)];
     let conduct = |(name, scenario)| {
-        Ok((name, monte_carlo::results(&Simulation::new(scenario), 0, runs, &done)?))
+        Ok((name, monte_carlo::results(&Simulation::new(scenario), 0, runs, progress)?))
     };
-    let scenarios = scenarios.into_iter().map(conduct).collect::<Result<_, PageError>>()?;
-    Ok(Findings { scenarios, trials: kidnapped::trials(runs.into(), &done)? })
+    let mut scenarios =
+        scenarios.into_iter().map(conduct).collect::<Result<Vec<_>, PageError>>()?;
+    scenarios.retain(|(_, results)| !results.is_empty());
+    Ok(Findings { scenarios, trials: kidnapped::trials(runs.into(), progress)? })
 }
 
 const HEAD: &str = "\
@@ -88,7 +92,9 @@ pub fn markdown(findings: &Findings) -> String {
             silence.fold(0.0, f64::max),
         );
     }
-    page.push_str(&kidnapped_section(&findings.trials));
+    if !findings.trials.is_empty() {
+        page.push_str(&kidnapped_section(&findings.trials));
+    }
     page
 }
 

@@ -13,6 +13,7 @@ use sonarfix::pose::Pose;
 use sonarfix::units::{Instant, Metres, Radians};
 use sonarfix_map::{FileError, Floor, Scenario};
 
+use sonarfix_sim::progress::Progress;
 use sonarfix_sim::world::sensor::SensorModel;
 use sonarfix_sim::world::{Ping, World};
 
@@ -69,11 +70,11 @@ pub struct Outcome {
     pub tracks_wrong_pose: bool,
 }
 
-/// Runs the seeds 0 to `trials` − 1; calls `done` after every trial.
+/// Runs the seeds 0 to `trials` − 1, unless it is interrupted.
 ///
 /// # Errors
 /// The [`TrialError`] of the first trial that fails.
-pub fn trials(trials: u64, done: impl Fn() + Sync) -> Result<Vec<Outcome>, TrialError> {
+pub fn trials(trials: u64, progress: &impl Progress) -> Result<Vec<Outcome>, TrialError> {
     let floor = Floor::parse(ROOM, "room.toml")?;
     // An ideal sonar with a noise of 5 mm and a maximum range of 4 m.
     let mut scenario = Scenario::paper()?;
@@ -83,9 +84,10 @@ pub fn trials(trials: u64, done: impl Fn() + Sync) -> Result<Vec<Outcome>, Trial
     let sensor = SensorModel::ideal(&scenario);
     (0..trials)
         .into_par_iter()
+        .filter(|_| !progress.is_interrupted())
         .map(|seed| {
             let outcome = Trial::new(seed, Map::new(&walls), &world, &sensor)?.watch();
-            done();
+            progress.finished();
             outcome
         })
         .collect()

@@ -15,6 +15,7 @@ use sonarfix_hal::config::StartPose;
 use sonarfix_hal::robot::Report;
 use sonarfix_map::{FileError, Path};
 use sonarfix_sim::angle;
+use sonarfix_sim::progress::Progress;
 use sonarfix_sim::simulate::{Simulation, SimulationError};
 use sonarfix_sim::trace::{FixRecord, Recorder, Tick};
 
@@ -217,7 +218,7 @@ impl Recorder for Watch {
     }
 }
 
-/// Makes the trials of the seeds from `first` on; calls `done` after each.
+/// Makes the trials of the seeds from `first` on; after an interruption those that have begun.
 ///
 /// # Errors
 /// [`RelocalizationError`] of the first plan that cannot be run.
@@ -226,12 +227,13 @@ pub fn trials(
     count: u32,
     upset: Upset,
     seconds: f64,
-    done: impl Fn() + Sync,
+    progress: &impl Progress,
 ) -> Result<Vec<Trial>, RelocalizationError> {
     let seeds = (0..u64::from(count)).into_par_iter().map(|n| first.wrapping_add(n));
+    let seeds = seeds.filter(|_| !progress.is_interrupted());
     let one = |seed| {
         let trial = trial(seed, upset, seconds);
-        done();
+        progress.finished();
         trial
     };
     let made: Result<Vec<_>, _> = seeds.map(one).collect();

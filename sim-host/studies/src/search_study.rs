@@ -14,6 +14,7 @@ use sonarfix::units::{Metres, Radians};
 use sonarfix_map::{BakeError, FileError, Scenario};
 use sonarfix_sim::angle;
 use sonarfix_sim::plant::Plant;
+use sonarfix_sim::progress::Progress;
 use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::trace::Pose;
 use sonarfix_sim::world::Ping;
@@ -181,15 +182,15 @@ pub fn floor_plans(
     first: u64,
     trials: u32,
     seconds: f64,
-    done: impl Fn() + Sync,
+    progress: &impl Progress,
 ) -> Result<Vec<Trial>, SearchStudyError> {
     let seeds = (0..u64::from(trials)).into_par_iter().map(|n| first.wrapping_add(n));
     let one = |seed| {
         let trial = trial(FloorPlan::new(seed).scenario()?, seed, seconds);
-        done();
+        progress.finished();
         trial
     };
-    seeds.map(one).collect()
+    seeds.filter(|_| !progress.is_interrupted()).map(one).collect()
 }
 
 /// Trials in one scenario.
@@ -201,15 +202,15 @@ pub fn scenario(
     first: u64,
     trials: u32,
     seconds: f64,
-    done: impl Fn() + Sync,
+    progress: &impl Progress,
 ) -> Result<Vec<Trial>, SearchStudyError> {
     let seeds = (0..u64::from(trials)).into_par_iter().map(|n| first.wrapping_add(n));
     let one = |seed| {
         let trial = trial(scenario.clone(), seed, seconds);
-        done();
+        progress.finished();
         trial
     };
-    seeds.map(one).collect()
+    seeds.filter(|_| !progress.is_interrupted()).map(one).collect()
 }
 
 /// Shares and errors over many trials.

@@ -5,6 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use sonarfix::aim::Policy;
 use sonarfix_map::FileError;
+use sonarfix_sim::progress::Progress;
 use sonarfix_sim::simulate::{Simulation, SimulationError};
 use sonarfix_sim::statistics::RunResult;
 
@@ -80,20 +81,21 @@ pub enum CompareError {
 }
 
 /// Runs the plans with the seeds from `first`, each `runs` times under either policy, with the
-/// seeds from 0. Calls `done` after every pair of runs. A plan that fails does not end the others:
+/// seeds from 0, and reports every pair of runs. After an interruption, plans without a finished pair are missing. A plan that fails does not end the others:
 /// its error is returned beside their results.
 pub fn run(
     first: u64,
     plans: u32,
     runs: u32,
-    done: impl Fn() + Sync,
+    progress: &impl Progress,
 ) -> (Vec<PlanResult>, Vec<CompareError>) {
-    let seeds = (0..u64::from(plans)).into_par_iter();
+    let seeds = (0..u64::from(plans)).into_par_iter().filter(|_| !progress.is_interrupted());
     let results: Vec<_> =
-        seeds.map(|plan| run_plan(first.wrapping_add(plan), runs, &done)).collect();
+        seeds.map(|plan| run_plan(first.wrapping_add(plan), runs, progress)).collect();
     let (mut plans, mut errors) = (Vec::new(), Vec::new());
     for result in results {
         match result {
+            Ok(plan) if plan.pairs.is_empty() => {}
             Ok(plan) => plans.push(plan),
             Err(error) => errors.push(error),
         }
@@ -111,7 +113,7 @@ pub fn simulation(plan: &FloorPlan, policy: Policy) -> Result<Simulation, FileEr
     Ok(Simulation::new(scenario))
 }
 
-fn run_plan(seed: u64, runs: u32, done: &(dyn Fn() + Sync)) -> Result<PlanResult, CompareError> {
+fn run_plan(seed: u64, runs: u32, progress: &impl Progress) -> Result<PlanResult, CompareError> {
     let plan = FloorPlan::new(seed);
     let nearest = simulation(&plan, Policy::Nearest)?;
     let informative = simulation(&plan, Policy::Informative)?;
@@ -121,10 +123,11 @@ fn run_plan(seed: u64, runs: u32, done: &(dyn Fn() + Sync)) -> Result<PlanResult
     };
     let pair = |run| {
         let pair = Pair { nearest: score(&nearest, run)?, informative: score(&informative, run)? };
-        done();
+        progress.finished();
         Ok::<_, CompareError>(pair)
     };
-    let pairs = (0..u64::from(runs)).into_par_iter().map(pair).collect::<Result<_, _>>()?;
+    let seeds = (0..u64::from(runs)).into_par_iter().filter(|_| !progress.is_interrupted());
+    let pairs = seeds.map(pair).collect::<Result<_, _>>()?;
     let scenario = &nearest.scenario;
     Ok(PlanResult {
         walls: scenario.floor.named_walls().len(),
