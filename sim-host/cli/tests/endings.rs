@@ -1,6 +1,8 @@
 //! How the command ends: endless input, a closed or a full standard output, a directory that cannot be
 //! made.
 
+#![expect(clippy::unwrap_used, reason = "all of this file is a test, its helpers too")]
+
 use std::process::{Command, Output, Stdio};
 
 fn sonarfix(arguments: &[&str]) -> Command {
