@@ -21,6 +21,7 @@ mod panics;
 mod pil;
 mod program;
 mod publish;
+mod reality;
 mod search_windows;
 mod thumb;
 mod words;
@@ -83,6 +84,8 @@ enum Task {
     Bless,
     /// Measures Sonarfix and its peers, and writes `docs/benchmarks.md` (ten minutes).
     Bench,
+    /// Replays the recordings of a folder, and writes `docs/reality.md` (minutes).
+    Reality(reality::Args),
     /// The paper's statistics at full length: 5,000 seeds, both policies (minutes).
     Statistics,
     /// Lines with words that `docs/glossary.md` avoids.
@@ -158,6 +161,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Deny => checks::deny(),
         Task::Bless => golden::bless().and_then(|()| budgets::bless()),
         Task::Bench => bench::run(),
+        Task::Reality(args) => reality::run(&args),
         Task::Statistics => checks::statistics(),
         Task::Words(args) => words::count(&args),
         Task::Endurance(args) => endurance::run(args),

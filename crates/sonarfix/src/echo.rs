@@ -60,7 +60,7 @@ impl EchoParameters {
 
     /// LEGO NXT: shares of its recorded sweeps within 20° of the normal (`docs/sonar-model.md`),
     /// averaged over the ranges.
-    pub const NXT: Self = Self { missed: 0.08, short: 0.05, long: 0.03, ..Self::HC_SR04 };
+    pub const NXT: Self = Self { missed: 0.08, short: 0.04, long: 0.03, ..Self::HC_SR04 };
 
     /// Devantech SRF08: assumed like the HC-SR04.
     pub const SRF08: Self = Self::HC_SR04;

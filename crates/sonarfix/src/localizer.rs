@@ -104,6 +104,8 @@ pub struct Localizer<'m> {
     /// Up to when time has entered the health.
     recorded: Instant,
     history: History,
+    /// Association probability of the latest ping.
+    association: f32,
 }
 
 /// The outcome of a ping, and its evidence against the pose.
@@ -169,6 +171,7 @@ impl<'m> Localizer<'m> {
             time: now,
             recorded: now,
             history: History::default(),
+            association: 0.0,
         })
     }
 
@@ -268,6 +271,7 @@ impl<'m> Localizer<'m> {
     /// enters the health.
     pub fn fix(&mut self, aim: &Aim, range: Option<Metres>) -> Fix {
         self.history.record_bearing(aim.wall, aim.bearing, aim.range);
+        self.association = 0.0;
         let Explained { fix, evidence, contradicts } =
             self.try_fix(aim, range).unwrap_or_else(Explained::refused);
         let limits = self.limits();
@@ -328,6 +332,7 @@ impl<'m> Localizer<'m> {
                 }
             }
         };
+        self.association = association;
         let is_wall = association > 0.5;
         self.history.record_echo(&entry, now_occluded, is_wall, self.time);
         Ok(Explained { fix, evidence, contradicts: gating::contradicts(association, occluded) })
@@ -373,6 +378,13 @@ impl<'m> Localizer<'m> {
     #[must_use]
     pub fn health(&self) -> Health {
         self.health
+    }
+
+    /// β, the probability that the echo of the latest ping was that of its wall (`docs/model.md`, eq. 16);
+    /// zero without an echo, or if the range was refused.
+    #[must_use]
+    pub fn association(&self) -> f32 {
+        self.association
     }
 
     /// The configuration.

@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 
 use crate::{
     bound, command, config, convert, faults, find, floor_plans, health, map, monitor, paper, pil,
-    plan, relocalize, replay, run, sonar_model,
+    plan, reality, relocalize, replay, run, sonar_model,
 };
 
 /// Simulates, measures, replays and operates the Sonarfix localizer for small wheeled robots.
@@ -45,6 +45,8 @@ enum Command {
     Bound(bound::Args),
     /// Forecasts the localization accuracy along a path, before a robot is built.
     Plan(plan::Args),
+    /// Replays all recordings of a folder; prints markdown.
+    Reality(reality::Args),
     /// Compares the simulated NXT sonar with recorded sweeps; prints markdown.
     SonarModel(sonar_model::Args),
     /// Measures the effects of hardware faults; prints markdown.
@@ -75,6 +77,7 @@ impl Cli {
             Command::Map(args) => map::execute(&args),
             Command::Bound(args) => bound::execute(&args),
             Command::Plan(args) => plan::execute(&args),
+            Command::Reality(args) => reality::execute(&args),
             Command::SonarModel(args) => sonar_model::execute(&args),
             Command::Faults(args) => faults::execute(&args),
             Command::Health(args) => health::execute(&args),

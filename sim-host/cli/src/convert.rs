@@ -9,7 +9,7 @@ use sonarfix_replay::convert::lego::{ENCODER_LAG, Lego, Nominal};
 use sonarfix_replay::convert::nxt::Nxt;
 use sonarfix_replay::convert::{ConvertError, Converted};
 
-/// Maximum number of skipped lines that are printed.
+/// Maximum number of skipped or implausible lines that are printed.
 const SHOWN: u64 = 10;
 
 #[derive(Debug, clap::Args)]
@@ -99,16 +99,17 @@ fn convert(
     let converted = run(&mut |complaint| {
         reported += 1;
         if reported <= SHOWN {
-            eprintln!("skipped: {complaint}");
+            eprintln!("{complaint}");
         }
     })?;
     if reported > SHOWN {
-        eprintln!("skipped: {} more lines", reported - SHOWN);
+        eprintln!("{} more such lines", reported - SHOWN);
     }
-    let Converted { encoders, scans, reference, repeated, skipped } = converted;
+    let Converted { encoders, scans, reference, repeated, skipped, restamped, bridged } = converted;
     eprintln!(
         "{}: {encoders} encoder records ({repeated} repeated ones left out), {scans} scans, \
-         {reference} rows of reference; {skipped} lines skipped",
+         {reference} rows of reference; {skipped} lines skipped, {restamped} stamps repaired, \
+         {bridged} steps of implausible odometry replaced",
         out.display()
     );
     Ok(())

@@ -20,6 +20,7 @@ mod paper;
 mod pil;
 mod plan;
 mod progress;
+mod reality;
 mod relocalize;
 mod replay;
 mod run;

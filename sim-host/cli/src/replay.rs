@@ -9,7 +9,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use sonarfix_map::{Floor, robot_file};
 use sonarfix_replay::fault::Complaint;
 use sonarfix_replay::thinned::{CAPACITY, Thinned};
-use sonarfix_replay::{ByVerdict, Replay, Summary};
+use sonarfix_replay::{ByVerdict, Figures, Replay, Summary};
 use sonarfix_report::trace_csv;
 use sonarfix_report::{Report, Table};
 
@@ -201,14 +201,35 @@ fn verdicts(s: &Summary) -> Table {
         let cells = [of.sum(), of.tracking, of.degraded, of.lost].map(percent);
         [[name.to_owned()].as_slice(), cells.as_slice()].concat()
     };
+    let consistency = &s.consistency;
+    let errors = consistency.errors;
+    let [tracking, degraded, lost] = [errors.tracking, errors.degraded, errors.lost];
+    let all = [s.position_rms, s.position_median, s.position_max];
+    let errors = |name: &str, all: Option<f64>, of: fn(Figures) -> f64| {
+        let by_verdict = [tracking, degraded, lost].map(|figures| figures.map(of));
+        let cells = [[all].as_slice(), &by_verdict].concat();
+        let cells = cells.into_iter().map(|m| cell(m, |m| format!("{:.0}", 1e3 * m)));
+        std::iter::once(name.to_owned()).chain(cells).collect()
+    };
+    let [all_rms, all_median, all_max] = all;
     let refusals = s.refusals.iter().map(|(reason, count)| format!("{reason} {count}"));
     Table {
-        title: "Share of the time by position error and verdict (%)".to_owned(),
-        note: format!("refused: {}", refusals.collect::<Vec<_>>().join(", ")),
+        title: "Position error by verdict".to_owned(),
+        note: format!(
+            "shares are of the time; first lost (half a metre off, or verdict lost) {}\nrefused: {}",
+            consistency.first_loss.map_or_else(
+                || "never".to_owned(),
+                |loss| format!("after {:.1} m, {:.1} s", loss.distance, loss.time)
+            ),
+            refusals.collect::<Vec<_>>().join(", ")
+        ),
         columns: ["", "all", "tracking", "degraded", "lost"].map(str::to_owned).to_vec(),
         rows: vec![
-            row("within 0.5 m", s.consistency.within_half_a_metre),
-            row("beyond 0.5 m", s.consistency.beyond_half_a_metre),
+            row("within 0.5 m (%)", consistency.within_half_a_metre),
+            row("beyond 0.5 m (%)", consistency.beyond_half_a_metre),
+            errors("RMS (mm)", all_rms, |figures| figures.position_rms),
+            errors("median (mm)", all_median, |figures| figures.position_median),
+            errors("worst (mm)", all_max, |figures| figures.position_max),
         ],
     }
 }

@@ -99,8 +99,8 @@ fn run_writes_trace_and_report() {
     }
     let outcome = reader.headers().unwrap().iter().position(|name| name == "fix_outcome").unwrap();
     let lines: Vec<_> = reader.records().map(Result::unwrap).collect();
-    // 6 m at 0.4 m/s and four turns of 3 s: 27 s, ten ticks and one fix a second.
-    assert_eq!(lines.len(), 270);
+    // The start; 6 m at 0.4 m/s and four turns of 3 s: 27 s, ten ticks and one fix a second.
+    assert_eq!(lines.len(), 1 + 270);
     assert_eq!(lines.iter().filter(|line| !line[outcome].is_empty()).count(), 27);
 }
 

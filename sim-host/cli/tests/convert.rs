@@ -53,7 +53,8 @@ fn flaser_and_odom_of_a_corrected_log() {
          ODOM 1 0 1.5707963 0.5 0 0 12.0 host 2.1\n",
     );
     assert_eq!(skipped_lines, [""; 0]);
-    let expected = Converted { encoders: 4, scans: 2, reference: 2, repeated: 1, skipped: 0 };
+    let expected =
+        Converted { encoders: 4, scans: 2, reference: 2, repeated: 1, ..Converted::default() };
     assert_eq!(converted.unwrap(), expected);
     let scan = |time, ranges| format!("scan,{time},-1.570796327,1.570796326795,{ranges}");
     // 90° with the assumed track width of 0.38 m: 0.298451 m per wheel.
@@ -87,7 +88,7 @@ fn robotlaser_of_a_raw_log_gives_the_mount_and_no_reference() {
          0 0 0.3 0.3 1000000 101.0 host 2.0\n",
     );
     assert_eq!(skipped_lines, [""; 0]);
-    let expected = Converted { encoders: 2, scans: 2, reference: 0, repeated: 0, skipped: 0 };
+    let expected = Converted { encoders: 2, scans: 2, ..Converted::default() };
     assert_eq!(converted.unwrap(), expected);
     assert_eq!(records(&dir)[3], "scan,100.000000,-1.000000000,0.500000000000,1.500 2.500 80.500");
     assert!(!dir.path().join("out/reference.csv").exists());
@@ -100,7 +101,7 @@ fn the_short_form_and_its_errors() {
     let (dir, converted, skipped_lines) = carmen(
         "O 1 0 0 0\n\
          S 2 1 0 0 5 6 0.5 4 1 2 0 4\n\
-         O 1.5 9 9 9\n\
+         O 0.5 9 9 9\n\
          S 3 1 0 0 5 6 0.5 4 1 2 3\n\
          O 3 1 0\n\
          S 4 2 0 0 6 6 0.5 4 1 2 3 4 5\n\
@@ -122,6 +123,137 @@ fn the_short_form_and_its_errors() {
     assert!(
         records(&dir)[4].starts_with("scan,2.000000,-1.570796327,0.785398163397,1.000 2.000 - ")
     );
+}
+
+/// A straight drive at 0.5 m/s with an `ODOM` record every 0.2 s and a scan every second. `odometry` makes the pose of a record,
+/// `scan` the corrected pose and the odometry fields of a scan, from the time and the number of scans so far.
+fn driven(
+    odometry: impl Fn(f64, f64) -> [f64; 3],
+    scan: impl Fn(f64, f64) -> ([f64; 3], [f64; 3]),
+) -> String {
+    let mut text = String::new();
+    let line = |[x, y, heading]: [f64; 3]| format!("{x:.6} {y:.6} {heading:.6}");
+    let mut scans = 0.0;
+    for tick in 0_u32..200 {
+        let time = f64::from(tick) * 0.2;
+        writeln!(text, "ODOM {} 0.5 0 0 {time:.3} host {time:.3}", line(odometry(time, scans)))
+            .unwrap();
+        if tick % 5 == 2 {
+            scans += 1.0;
+            let time = time + 0.1;
+            let (corrected, fields) = scan(time, scans);
+            let poses = format!("{} {}", line(corrected), line(fields));
+            writeln!(text, "FLASER 3 2 9 2 {poses} {time:.3} host {time:.3}").unwrap();
+        }
+    }
+    text
+}
+
+/// Total travel of both wheels in the log.
+fn travelled(dir: &TempDir) -> [f64; 2] {
+    let records = records(dir);
+    let last = records.iter().rfind(|line| line.starts_with("wheels")).unwrap();
+    let mut fields = last.split(',').skip(2).map(|field| field.parse().unwrap());
+    [fields.next().unwrap(), fields.next().unwrap()]
+}
+
+/// The corrections of SLAM: 3 cm aside and 1° at every scan, the turns in both directions.
+fn corrected(time: f64, scans: f64) -> [f64; 3] {
+    [0.5 * time, 0.03 * scans, 0.0175 * (scans % 2.0)]
+}
+
+const TRAVELLED: f64 = 0.5 * 39.8;
+
+#[test]
+fn corrected_poses_in_the_odometry_fields_of_scans_are_not_used() {
+    let log = driven(
+        |time, _| [0.5 * time, 0.0, 0.0],
+        |time, scans| (corrected(time, scans), corrected(time, scans)),
+    );
+    let (dir, converted, reported) = carmen(&log);
+    let converted = converted.unwrap();
+    assert_eq!((converted.scans, converted.reference, converted.bridged), (40, 40, 0));
+    assert_eq!(reported.len(), 1, "{reported:?}");
+    assert!(
+        reported[0].contains("line 4: the odometry fields of the scans contain another pose"),
+        "{reported:?}"
+    );
+    assert!(
+        travelled(&dir).iter().all(|wheel| (wheel - TRAVELLED).abs() < 1e-6),
+        "{:?}",
+        travelled(&dir)
+    );
+    assert!(read(&dir, "reference.csv").contains("\n2.500000,1.250000,0.090000,0.017500\n"));
+}
+
+#[test]
+fn odometry_that_is_corrected_at_every_scan_is_bridged() {
+    let log = driven(corrected, |time, scans| (corrected(time, scans), corrected(time, scans)));
+    let (dir, converted, reported) = carmen(&log);
+    let converted = converted.unwrap();
+    assert_eq!((converted.reference, converted.bridged), (40, 40));
+    assert!(reported[0].contains("the odometry jumps at the scans"), "{reported:?}");
+    // The corrections turned no wheel.
+    let [right, left] = travelled(&dir);
+    assert!((right - left).abs() < 0.01, "{right} {left}");
+    assert!((right - TRAVELLED).abs() < 0.05 * TRAVELLED, "{right}");
+}
+
+#[test]
+fn corrected_poses_without_odometry_are_refused() {
+    let log = driven(
+        |time, _| [0.5 * time, 0.0, 0.0],
+        |time, scans| (corrected(time, scans), corrected(time, scans)),
+    );
+    let scans: String = log
+        .lines()
+        .filter(|line| !line.starts_with('O'))
+        .fold(String::new(), |all, line| all + line + "\n");
+    let (dir, converted, _) = carmen(&scans);
+    let error = converted.unwrap_err().to_string();
+    assert!(error.contains("made.log: its odometry fields contain corrected poses"), "{error}");
+    assert!(!dir.path().join("out").exists());
+    // Odometry in the same fields is used.
+    let log =
+        driven(|_, _| [0.0; 3], |time, scans| (corrected(time, scans), [0.5 * time, 0.0, 0.0]));
+    let scans: String = log
+        .lines()
+        .filter(|line| !line.starts_with('O'))
+        .fold(String::new(), |all, line| all + line + "\n");
+    let (_dir, converted, reported) = carmen(&scans);
+    assert_eq!((converted.unwrap().reference, reported.len()), (40, 0));
+}
+
+#[test]
+fn jumps_are_reported_with_their_line_and_late_stamps_are_repaired() {
+    // From 20 s on, the odometry is 2 m further: a jump at one record, line 121.
+    let jumping = |time: f64, _: f64| [0.5 * time + if time > 19.9 { 2.0 } else { 0.0 }, 0.0, 0.0];
+    let log = driven(jumping, |time, scans| (corrected(time, scans), jumping(time, scans)));
+    let (dir, converted, reported) = carmen(&log);
+    assert_eq!(converted.unwrap().bridged, 1);
+    assert_eq!(reported.len(), 1, "{reported:?}");
+    assert!(
+        reported[0].starts_with("made.log line 121: the odometry is implausible: 2."),
+        "{reported:?}"
+    );
+    assert!((travelled(&dir)[0] - TRAVELLED).abs() < 0.2, "{:?}", travelled(&dir));
+
+    // Record 50 (10.0 s) is stamped 0.25 s late, after the next: both get the mean of their stamps.
+    let log = driven(
+        |time, _| [0.5 * time, 0.0, 0.0],
+        |time, scans| (corrected(time, scans), [0.5 * time, 0.0, 0.0]),
+    );
+    let late = log.replace(" 10.000 host 10.000", " 10.250 host 10.250");
+    let (dir, converted, reported) = carmen(&late);
+    let converted = converted.unwrap();
+    assert_eq!((converted.restamped, converted.skipped, reported.len()), (2, 0, 0), "{reported:?}");
+    assert!((travelled(&dir)[0] - TRAVELLED).abs() < 1e-6);
+    let times: Vec<f64> = records(&dir)
+        .iter()
+        .filter(|line| line.starts_with("wheels"))
+        .map(|line| line.split(',').nth(1).unwrap().parse().unwrap())
+        .collect();
+    assert!(times.windows(2).all(|pair| pair[0] < pair[1]));
 }
 
 #[test]
@@ -170,7 +302,14 @@ fn lego_stamps_columns_and_angles() {
     let lego =
         Lego { from: dir.path(), to: &out, nominal: Nominal::Rounded, encoder_lag: ENCODER_LAG };
     let converted = lego.convert(&mut |line| skipped_lines.push(line)).unwrap();
-    let expected = Converted { encoders: 11, scans: 11, reference: 11, repeated: 11, skipped: 2 };
+    let expected = Converted {
+        encoders: 11,
+        scans: 11,
+        reference: 11,
+        repeated: 11,
+        skipped: 2,
+        ..Converted::default()
+    };
     assert_eq!(converted, expected);
     assert!(
         skipped_lines[0].ends_with("a_scan.txt line 12: is no `S` record"),

@@ -10,12 +10,14 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use sonarfix::aim::NoAim;
 use sonarfix::ekf::{StandardDeviations, StateEstimate};
-use sonarfix::localizer::{Fix, Localizer};
-use sonarfix::map::WallId;
-use sonarfix::units::Instant;
+use sonarfix::localizer::{Fix, Localizer, Start};
+use sonarfix::map::{Map, WallId};
+use sonarfix::motion::WheelTravel;
+use sonarfix::pose::Pose;
+use sonarfix::units::{Instant, Metres, Radians};
 use sonarfix_hal::robot::Report;
 use sonarfix_link::message::{Odometry, SkippedPing};
-use sonarfix_link::{Reporter, Sender, Telemetry, frame};
+use sonarfix_link::{Ping, Reporter, Sender, Telemetry, frame};
 use sonarfix_map::{CLASSROOM, Fidelity, PAPER, Scenario};
 use sonarfix_monitor::recording::{Log, Recording};
 use sonarfix_monitor::{Monitor, Received};
@@ -143,6 +145,64 @@ fn a_recording_replays_to_the_bit() {
             }
         }
     }
+}
+
+/// A localizer whose pose is replaced twice while it runs, between pings: one log, which replays to the bit.
+#[test]
+fn a_pose_that_is_set_while_running_replays_to_the_bit() {
+    let scenario = scenario(CLASSROOM);
+    let walls = scenario.floor.walls();
+    let start = Start {
+        pose: Pose::new(1.5, 1.5, Radians(0.1)),
+        position_deviation: Metres(0.02),
+        heading_deviation: Radians(0.03),
+    };
+    let (config, map) = (scenario.robot.localizer, Map::new(&walls));
+    let mut localizer = Localizer::new(config, map, start, Instant::from_ticks(0)).unwrap();
+    let (reporter, began) = Reporter::begin(&localizer);
+    let mut robot = Robot::default();
+    robot.send(&began);
+    let (mut right_metres, mut left_metres) = (0.0, 0.0);
+    for tick in 1..=120_u16 {
+        let at = Instant::from_ticks(u64::from(tick) * 100_000);
+        let travel = WheelTravel::new(0.02, 0.0197 + 1e-5 * f32::from(tick % 7));
+        localizer.odometry(at, travel).unwrap();
+        right_metres += f64::from(travel.right.0);
+        left_metres += f64::from(travel.left.0);
+        robot.send(&Telemetry::Odometry(Odometry { at, right_metres, left_metres }));
+        if tick % 5 == 0
+            && let Ok(aim) = localizer.aim()
+        {
+            let range = aim.range + Metres(0.004);
+            let fix = localizer.fix(&aim, Some(range));
+            let outcome = Ok(sonarfix_hal::ranger::Echo { sent: at, heard: at, range });
+            robot.send(&Telemetry::Ping(Ping { at, aim, outcome, fix }));
+        }
+        if tick == 40 || tick == 75 {
+            let moved = localizer.pose();
+            let (x, y) = (moved.x.0 + 0.031, moved.y.0 - 0.017);
+            let pose = Pose::new(x, y, moved.heading.radians());
+            localizer.set_pose(&Start { pose, ..start }).unwrap();
+            robot.send(&reporter.pose_set(&localizer));
+        }
+        // A replay records the tick before the pings at its time.
+        if tick % 5 != 0 {
+            robot.estimates.push((at.ticks(), observe::estimate(&localizer)));
+        }
+    }
+    let (received, _) = received_from(&robot.frames.concat());
+    let (dir, path) = folder();
+    let mut recording = Recording::new(path.clone());
+    for received in &received {
+        recording.take(received).unwrap();
+    }
+    assert_eq!(recording.logs(), 1);
+    let text = fs::read_to_string(path).unwrap();
+    assert_eq!(text.lines().filter(|line| line.starts_with("pose,")).count(), 2);
+    let (trace, summary) = replay(text.as_bytes(), &scenario);
+    assert!(summary.fixes.accepted > 10, "{:?}", summary.fixes);
+    assert_same(&robot.estimates, &trace, 0);
+    drop(dir);
 }
 
 /// The first ping of a run, changed to a wall that is not in the map, and ten cycles without a

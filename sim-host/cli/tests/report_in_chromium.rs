@@ -57,6 +57,7 @@ fn trace(truth_known: bool) -> Trace {
     Trace {
         walls: vec![wall(HOSTILE, [0.0, 2.0], [2.0, 2.0]), wall("south", [0.0, 0.0], [2.0, 0.0])],
         cone: 0.26,
+        start: None,
         ticks: (0..200).map(|n| tick(f64::from(n) * 0.1, truth_known)).collect(),
         fixes: vec![
             fix(1.0, Outcome::Accepted, Some(1.0), ""),
@@ -74,6 +75,7 @@ fn tick(time: f64, truth_known: bool) -> Tick {
         calibration,
         deviation: [0.003, 0.002, 0.01, 1e-3, 1e-3, 1e-3, 1e-3],
         covariance_xy: 1e-6,
+        ..Estimate::default()
     };
     let truth = truth_known.then_some(Truth { pose, calibration: Some(calibration) });
     let odometry = Pose { y: 1.0 + 0.01 * time, ..pose };
@@ -91,6 +93,7 @@ fn fix(time: f64, outcome: Outcome, range: Option<f64>, reason: &str) -> FixReco
         source: Some(Source::Obstacle),
         why: None,
         outcome,
+        association: None,
         reason: reason.into(),
         innovation: range.map(|range| range - 1.0),
         innovation_variance: range.map(|_| 1e-5),

@@ -1,7 +1,9 @@
 //! The simulated NXT sonar against the recorded one.
 #![expect(clippy::unwrap_used, reason = "all of this file is a test, its helpers too")]
 
+use sonarfix::echo::EchoParameters;
 use sonarfix_sim::world::sensor::SensorModel;
+use sonarfix_studies::sonar_model::echo_fit::EchoFit;
 use sonarfix_studies::sonar_model::{Comparison, compare, page};
 
 use crate::skipped;
@@ -27,6 +29,20 @@ fn the_nxt_model_matches_the_sensor() {
             let perpendicular = (real[0] - ours[0]).abs();
             assert!(perpendicular < 0.1, "{real:?} {ours:?}");
         }
+    }
+}
+
+/// The preset of the core is the fit, rounded to 0.01.
+#[test]
+fn the_echo_parameters_of_the_nxt_are_fitted() {
+    let Some(comparison) = nxt() else {
+        return;
+    };
+    let fit = EchoFit::of(&comparison.measured).mean;
+    let preset = EchoParameters::NXT;
+    let preset = [preset.missed, preset.short, preset.long].map(f64::from);
+    for (fit, preset) in fit.into_iter().zip(preset) {
+        assert!((fit - preset).abs() <= 0.0051, "{fit} {preset}");
     }
 }
 

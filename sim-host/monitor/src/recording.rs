@@ -22,7 +22,7 @@ pub struct Recording {
     path: PathBuf,
     written: u32,
     log: Option<Log<LineWriter<File>>>,
-    /// The last odometry, for a log that begins during a run or after the pose has been set.
+    /// The last odometry, for a log that begins during a run or when the pose is set before one began.
     step: Option<Odometry>,
 }
 
@@ -56,6 +56,10 @@ impl Recording {
             }
             (Telemetry::ModeChanged(change), Some(log)) if change.mode == Mode::Tracking => {
                 log.take(received)?;
+            }
+            (Telemetry::PoseSet(estimate), Some(log)) if estimate.at >= log.last => {
+                log.lost(received.lost)?;
+                log.set_pose(estimate)?;
             }
             (
                 Telemetry::PoseSet(estimate) | Telemetry::ModeChanged(ModeChanged { estimate, .. }),
@@ -137,9 +141,7 @@ impl<W: Write> Log<W> {
     /// # Errors
     /// Errors of the writer.
     pub fn take(&mut self, received: &Received) -> io::Result<()> {
-        if received.lost > 0 {
-            writeln!(self.out, "# {} frames were lost here", received.lost)?;
-        }
+        self.lost(received.lost)?;
         match &received.telemetry {
             Telemetry::Odometry(step) => self.step(step),
             Telemetry::Ping(ping) => self.ping(ping),
@@ -149,6 +151,13 @@ impl<W: Write> Log<W> {
             }
             _ => Ok(()),
         }
+    }
+
+    fn lost(&mut self, frames: u32) -> io::Result<()> {
+        if frames == 0 {
+            return Ok(());
+        }
+        writeln!(self.out, "# {frames} frames were lost here")
     }
 
     fn step(&mut self, step: &Odometry) -> io::Result<()> {
@@ -165,6 +174,12 @@ impl<W: Write> Log<W> {
     fn sweep(&mut self, sweep: &Sweep) -> io::Result<()> {
         let range = sweep.outcome.map_or(String::new(), |echo| f64::from(echo.range.0).to_string());
         writeln!(self.out, "range,{},{},{range}", Time(sweep.at), f64::from(sweep.bearing.0))
+    }
+
+    fn set_pose(&mut self, estimate: &Estimate) -> io::Result<()> {
+        let [x, y, heading, ..] = estimate.state.to_array().map(f64::from);
+        let [position, _, turn, ..] = estimate.deviation.to_array().map(f64::from);
+        writeln!(self.out, "pose,{},{x},{y},{heading},{position},{turn}", Time(estimate.at))
     }
 
     fn ping(&mut self, ping: &Ping) -> io::Result<()> {

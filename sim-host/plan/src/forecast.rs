@@ -5,7 +5,7 @@ use sonarfix_map::{Fidelity, Follow, Leg, Movement, Scenario, Surroundings, Upse
 
 use sonarfix_sim::angle;
 use sonarfix_sim::simulate::{Simulation, SimulationError};
-use sonarfix_sim::trace::{Estimate, Outcome, Tick, Trace};
+use sonarfix_sim::trace::{Estimate, Tick, Trace};
 
 /// Sample period, seconds.
 const STEP: f64 = 0.1;
@@ -123,7 +123,7 @@ impl Forecast {
         let samples = samples(&simulation.scenario, &traces);
         let duration = simulation.scenario.path.duration();
         let accepted = traces.iter().flat_map(|trace| &trace.fixes);
-        let accepted = accepted.filter(|fix| fix.outcome == Outcome::Accepted).count();
+        let accepted = accepted.filter(|fix| fix.outcome.is_used()).count();
         let worst = samples.iter().max_by(|a, b| a.position().total_cmp(&b.position()));
         Ok(Self {
             position: Spread::of(&samples, Sample::position),
@@ -202,7 +202,7 @@ fn samples(scenario: &Scenario, traces: &[Trace]) -> Vec<Sample> {
 
 /// For each tick of a run, whether the robot is blind there.
 fn blindness(trace: &Trace) -> Vec<bool> {
-    let mut fixes = trace.fixes.iter().filter(|fix| fix.outcome == Outcome::Accepted).peekable();
+    let mut fixes = trace.fixes.iter().filter(|fix| fix.outcome.is_used()).peekable();
     let mut seen = 0.0;
     // For each tick, when a range last reduced the largest axis.
     let mut last_seen = Vec::with_capacity(trace.ticks.len());

@@ -2,15 +2,17 @@
 //! `map.toml`, `robot.toml` (`docs/formats.md`).
 
 pub mod carmen;
+pub mod given;
 pub mod lego;
 pub mod nxt;
 mod robot_file;
 
 use std::fmt::Write as _;
 use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufRead, BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
+use flate2::bufread::MultiGzDecoder;
 use sonarfix_map::NamedWall;
 use sonarfix_sim::trace::Pose;
 
@@ -74,6 +76,20 @@ pub struct Converted {
     pub repeated: u64,
     /// Lines left out because they could not be read, or went back in time.
     pub skipped: u64,
+    /// Records with a repaired time stamp.
+    pub restamped: u64,
+    /// Steps of implausible or corrected odometry, replaced by the speed before them.
+    pub bridged: u64,
+}
+
+/// Opens a recording; a file whose name ends in `.gz` is unpacked.
+///
+/// # Errors
+/// [`ConvertError::Read`].
+pub fn open(path: &Path) -> Result<Box<dyn BufRead>, ConvertError> {
+    let file = BufReader::new(File::open(path).map_err(ConvertError::read(path))?);
+    let packed = path.extension().is_some_and(|extension| extension == "gz");
+    Ok(if packed { Box::new(BufReader::new(MultiGzDecoder::new(file))) } else { Box::new(file) })
 }
 
 /// A file being written.

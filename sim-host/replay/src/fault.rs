@@ -3,6 +3,7 @@
 use std::fmt;
 use std::io;
 
+use sonarfix::ekf::EkfError;
 use sonarfix::localizer::{OdometryError, StartError};
 
 use crate::log::Malformed;
@@ -31,6 +32,9 @@ pub enum Fault {
     /// Too many ranges wait for an encoder record.
     #[error("too many ranges since the last encoder record")]
     TooManyRanges,
+    /// The localizer rejects a pose.
+    #[error("the localizer rejects the pose: {0}")]
+    Pose(#[from] EkfError),
     /// The localizer rejects the travel.
     #[error("the localizer rejects the travel of the wheels: {0}")]
     Odometry(#[from] OdometryError),

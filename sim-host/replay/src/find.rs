@@ -163,7 +163,10 @@ impl<'a> Run<'a> {
                 self.waiting.push((log_micros(time), Heard::Range { bearing, range }));
             }
             Record::Scan { time, ref scan } => self.scan(log_micros(time), scan),
-            Record::Skip { .. } | Record::Start { .. } | Record::Resume { .. } => {}
+            Record::Skip { .. }
+            | Record::Start { .. }
+            | Record::Pose { .. }
+            | Record::Resume { .. } => {}
         }
     }
 

@@ -40,4 +40,4 @@ mod wheels;
 pub use lines::LONGEST;
 pub use reference::HEADER as REFERENCE_HEADER;
 pub use replay::{Replay, Summary};
-pub use score::{ByVerdict, Consistency, Figures, Verdicts};
+pub use score::{ByVerdict, Consistency, Figures, FiguresByVerdict, Loss, Verdicts};

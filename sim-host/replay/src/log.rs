@@ -65,6 +65,17 @@ pub enum Record {
         /// Standard deviation of the heading, radians.
         heading_deviation: f64,
     },
+    /// A pose that replaces that of the running localizer; its calibration is unchanged.
+    Pose {
+        /// Time of the pose.
+        time: f64,
+        /// The pose.
+        pose: Pose,
+        /// Standard deviation of x and of y, metres.
+        position_deviation: f64,
+        /// Standard deviation of the heading, radians.
+        heading_deviation: f64,
+    },
     /// The initial estimate of the localizer, with its calibration.
     Resume {
         /// Time of this estimate.
@@ -89,7 +100,7 @@ pub enum Malformed {
     #[error("the line is not UTF-8 text")]
     NotText,
     /// Its kind is unknown.
-    #[error("`{0}` is not one of ticks, wheels, range, scan, skip, start, resume")]
+    #[error("`{0}` is not one of ticks, wheels, range, scan, skip, start, resume, pose")]
     UnknownKind(String),
     /// It ends too early.
     #[error("the {0} is missing")]
@@ -141,11 +152,13 @@ pub fn parse(line: &str) -> Result<Option<Record>, Malformed> {
         "scan" => Record::Scan { time: fields.time()?, scan: fields.scan()? },
         "start" => Record::Start {
             time: fields.time()?,
-            pose: Pose {
-                x: fields.number("x")?,
-                y: fields.number("y")?,
-                heading: fields.number("heading")?,
-            },
+            pose: fields.pose()?,
+            position_deviation: fields.deviation("deviation of the position")?,
+            heading_deviation: fields.deviation("deviation of the heading")?,
+        },
+        "pose" => Record::Pose {
+            time: fields.time()?,
+            pose: fields.pose()?,
             position_deviation: fields.deviation("deviation of the position")?,
             heading_deviation: fields.deviation("deviation of the heading")?,
         },
@@ -199,6 +212,10 @@ impl<'a> Fields<'a> {
         number(text)
             .filter(|&sigma| sigma >= 0.0)
             .ok_or_else(|| not(field, text, "a finite number, zero or positive"))
+    }
+
+    fn pose(&mut self) -> Result<Pose, Malformed> {
+        Ok(Pose { x: self.number("x")?, y: self.number("y")?, heading: self.number("heading")? })
     }
 
     fn count(&mut self, field: &'static str) -> Result<i64, Malformed> {
@@ -317,6 +334,15 @@ mod tests {
                 },
             ),
             (
+                "pose,7,1,-2,3,0.01,0.02",
+                Record::Pose {
+                    time: 7.0,
+                    pose: Pose { x: 1.0, y: -2.0, heading: 3.0 },
+                    position_deviation: 0.01,
+                    heading_deviation: 0.02,
+                },
+            ),
+            (
                 "start,0,1,-2,3,0.01,0.02",
                 Record::Start {
                     time: 0.0,
@@ -337,7 +363,10 @@ mod tests {
     #[test]
     fn every_malformed_line_has_its_error() {
         let cases = [
-            ("tick,1,2,3", "`tick` is not one of ticks, wheels, range, scan, skip, start, resume"),
+            (
+                "tick,1,2,3",
+                "`tick` is not one of ticks, wheels, range, scan, skip, start, resume, pose",
+            ),
             ("range,1,2,3,x", "the wall is `x`, which is not a whole number, from 0"),
             ("range,1,2,3,4,5", "there are more fields than a record of this kind has"),
             ("resume,1,2,3,4,5,6,7,8", "the x is missing"),
@@ -374,7 +403,7 @@ mod tests {
             ("start,0,0,0,0,1", "the deviation of the heading is missing"),
             (
                 "\u{1b}[31m,0",
-                "`\\u{1b}[31m` is not one of ticks, wheels, range, scan, skip, start, resume",
+                "`\\u{1b}[31m` is not one of ticks, wheels, range, scan, skip, start, resume, pose",
             ),
         ];
         for (line, reason) in cases {

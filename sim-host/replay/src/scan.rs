@@ -25,6 +25,13 @@ pub struct Cone {
 }
 
 impl Scan {
+    /// Bearings of the first and the last beam, radians.
+    #[must_use]
+    pub fn field_of_view(&self) -> [f64; 2] {
+        let last = (1..self.ranges.len()).fold(self.first, |bearing, _| bearing + self.step);
+        [self.first, last]
+    }
+
     /// The earliest echo: the nearest return inside the cone and within reach.
     #[must_use]
     pub fn earliest(&self, sonar: &Cone) -> Option<f64> {

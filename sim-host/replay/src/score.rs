@@ -76,6 +76,8 @@ pub struct Score {
     beyond_three_sigma: u64,
     beyond_three_sigma_at: Option<f64>,
     diverged_at: Option<f64>,
+    first_loss: Option<Loss>,
+    by_verdict: [Errors; 3],
     /// Time of the latest row, seconds since the start.
     latest: f64,
     /// Seconds with the position error within half a metre, and beyond it.
@@ -84,20 +86,33 @@ pub struct Score {
 }
 
 impl Score {
-    /// Adds the estimate, with its verdict, and the true pose at a time.
+    /// Adds the estimate and the true pose at a time, in seconds since the start, and after a distance
+    /// travelled, in metres.
     pub fn add(
         &mut self,
-        time: f64,
-        (estimate, verdict): (&Estimate, Verdict),
+        (time, distance): (f64, f64),
+        estimate: &Estimate,
         odometry: &Pose,
         truth: &Pose,
     ) {
+        let verdict = estimate.verdict;
         self.localizer.add(&estimate.pose, truth);
+        let [tracking, degraded, lost] = &mut self.by_verdict;
+        match verdict {
+            Verdict::Tracking => tracking,
+            Verdict::Degraded => degraded,
+            Verdict::Lost => lost,
+        }
+        .add(&estimate.pose, truth);
         self.odometry.add(odometry, truth);
         let error = [estimate.pose.x - truth.x, estimate.pose.y - truth.y];
         let seconds = time - self.latest;
         self.latest = time;
-        if error[0].hypot(error[1]) > ASTRAY {
+        let is_astray = error[0].hypot(error[1]) > ASTRAY;
+        if is_astray || verdict == Verdict::Lost {
+            self.first_loss.get_or_insert(Loss { time, distance });
+        }
+        if is_astray {
             self.diverged_at.get_or_insert(time);
             self.beyond.add(verdict, seconds);
         } else {
@@ -127,6 +142,11 @@ impl Score {
         self.odometry.figures()
     }
 
+    fn errors(&self) -> FiguresByVerdict {
+        let [tracking, degraded, lost] = self.by_verdict.each_ref().map(Errors::figures);
+        FiguresByVerdict { tracking, degraded, lost }
+    }
+
     /// Consistency of the errors with the covariance.
     #[must_use]
     pub fn consistency(&self) -> Consistency {
@@ -137,10 +157,32 @@ impl Score {
             within_half_a_metre: self.within.over(all),
             beyond_half_a_metre: self.beyond.over(all),
             diverged_at: self.diverged_at,
+            first_loss: self.first_loss,
+            errors: self.errors(),
             beyond_three_sigma_at: self.beyond_three_sigma_at,
             beyond_three_sigma: (self.rows() > 0).then(|| share(self.beyond_three_sigma)),
         }
     }
+}
+
+/// When an estimate was first lost: half a metre off, or with the verdict `Lost`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Loss {
+    /// Seconds since the start.
+    pub time: f64,
+    /// Distance travelled until then, metres.
+    pub distance: f64,
+}
+
+/// Errors at the rows of the reference by verdict; `None` where there was no such row.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct FiguresByVerdict {
+    /// While `Tracking`.
+    pub tracking: Option<Figures>,
+    /// While `Degraded`.
+    pub degraded: Option<Figures>,
+    /// While `Lost`.
+    pub lost: Option<Figures>,
 }
 
 /// Something by verdict.
@@ -194,6 +236,10 @@ pub struct Consistency {
     pub beyond_half_a_metre: ByVerdict,
     /// When the position error first exceeded half a metre.
     pub diverged_at: Option<f64>,
+    /// When the estimate was first lost.
+    pub first_loss: Option<Loss>,
+    /// Errors by verdict.
+    pub errors: FiguresByVerdict,
     /// When the position error first left the 99.73 % ellipse.
     pub beyond_three_sigma_at: Option<f64>,
     /// Share of the reference rows at which it was outside; 0.0027 is expected.
@@ -254,8 +300,8 @@ mod tests {
         let mut score = Score::default();
         assert_eq!(score.localizer(), None);
         let truth = Pose::default();
-        score.add(1.0, (&estimate(0.3, 0.4), Verdict::Tracking), &truth, &truth);
-        score.add(2.0, (&estimate(0.0, 0.1), Verdict::Tracking), &truth, &truth);
+        score.add((1.0, 0.5), &estimate(0.3, 0.4), &truth, &truth);
+        score.add((2.0, 1.0), &estimate(0.0, 0.1), &truth, &truth);
         let figures = score.localizer().unwrap();
         assert!((figures.position_rms - 0.13_f64.sqrt()).abs() < 1e-12);
         assert!((figures.position_max - 0.5).abs() < 1e-12);
@@ -270,13 +316,45 @@ mod tests {
         assert!((distance_squared(&estimate(0.0, 0.0), [0.3, 0.0]) - 12.0).abs() < 1e-9);
         let mut score = Score::default();
         let truth = Pose::default();
-        score.add(1.0, (&estimate(0.29, 0.0), Verdict::Tracking), &truth, &truth);
-        score.add(2.0, (&estimate(0.3, 0.0), Verdict::Tracking), &truth, &truth);
-        score.add(3.0, (&estimate(0.0, 0.6), Verdict::Tracking), &truth, &truth);
+        score.add((1.0, 0.5), &estimate(0.29, 0.0), &truth, &truth);
+        score.add((2.0, 1.0), &estimate(0.3, 0.0), &truth, &truth);
+        score.add((3.0, 1.5), &estimate(0.0, 0.6), &truth, &truth);
         let consistency = score.consistency();
         assert_eq!(consistency.beyond_three_sigma_at, Some(2.0));
         assert_eq!(consistency.diverged_at, Some(3.0));
         assert!((consistency.beyond_three_sigma.unwrap() - 2.0 / 3.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn errors_shares_and_the_first_loss_are_by_verdict() {
+        let mut score = Score::default();
+        let truth = Pose::default();
+        let mut add = |time, distance, error, verdict| {
+            let estimate = Estimate { verdict, ..estimate(error, 0.0) };
+            score.add((time, distance), &estimate, &truth, &truth);
+        };
+        // Rows 1 s apart, of which the third to fifth are wrong: one without being reported.
+        add(1.0, 0.25, 0.1, Verdict::Tracking);
+        add(2.0, 0.5, 0.3, Verdict::Tracking);
+        add(3.0, 0.75, 0.7, Verdict::Tracking);
+        add(4.0, 1.0, 0.9, Verdict::Degraded);
+        add(8.0, 2.0, 2.0, Verdict::Lost);
+        add(10.0, 2.5, 0.4, Verdict::Lost);
+        let found = score.consistency();
+        let shares = |of: ByVerdict| [of.tracking, of.degraded, of.lost];
+        assert_eq!(shares(found.within_half_a_metre), [0.2, 0.0, 0.2]);
+        assert_eq!(shares(found.beyond_half_a_metre), [0.1, 0.1, 0.4]);
+        assert_eq!(found.first_loss, Some(Loss { time: 3.0, distance: 0.75 }));
+        let rms = |figures: Option<Figures>| figures.unwrap().position_rms;
+        assert!((rms(found.errors.tracking) - (0.59_f64 / 3.0).sqrt()).abs() < 1e-12);
+        assert!((rms(found.errors.degraded) - 0.9).abs() < 1e-12);
+        assert!((found.errors.lost.unwrap().position_max - 2.0).abs() < 1e-12);
+        let mut only_the_verdict = Score::default();
+        let lost = Estimate { verdict: Verdict::Lost, ..estimate(0.1, 0.0) };
+        only_the_verdict.add((5.0, 3.0), &lost, &truth, &truth);
+        let found = only_the_verdict.consistency();
+        assert_eq!(found.first_loss, Some(Loss { time: 5.0, distance: 3.0 }));
+        assert_eq!((found.diverged_at, found.errors.tracking), (None, None));
     }
 
     #[test]

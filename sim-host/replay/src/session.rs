@@ -8,7 +8,7 @@ use std::vec::IntoIter;
 use sonarfix::aim::{Aim, NoAim, Reason};
 use sonarfix::config::PingSchedule;
 use sonarfix::ekf::{STATES, StandardDeviations, StateEstimate};
-use sonarfix::localizer::{Fix, Localizer, OdometryError};
+use sonarfix::localizer::{Fix, Localizer, OdometryError, Start};
 use sonarfix::map::{Map, Wall, WallId};
 use sonarfix::motion::WheelTravel;
 use sonarfix::units::{Duration, Instant, Metres, Radians, SquareMetres};
@@ -69,6 +69,8 @@ enum Echo {
     Scan(Scan),
     /// There was no measurable wall.
     Skip,
+    /// The pose was replaced.
+    Pose(Start),
 }
 
 /// The start record, of either kind.
@@ -113,6 +115,17 @@ struct Estimators<'a> {
 }
 
 impl Estimators<'_> {
+    /// The state at a time since the start.
+    fn tick(&self, time: f64, truth: Option<Pose>) -> Tick {
+        Tick {
+            time,
+            truth: truth.map(|pose| Truth { pose, calibration: None }),
+            estimate: observe::estimate(&self.localizer),
+            bound: None,
+            odometry: self.odometry.pose(),
+        }
+    }
+
     /// Seconds since the start.
     fn since_start(&self, time: i64) -> f64 {
         seconds(time - self.epoch)
@@ -216,6 +229,15 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
             }
             Record::Skip { time } => self.hold(micros(time), Echo::Skip),
             Record::Scan { time, scan } => self.hold(micros(time), Echo::Scan(scan)),
+            Record::Pose { time, pose, position_deviation, heading_deviation } => {
+                let [x, y, heading, position, deviation] =
+                    single([pose.x, pose.y, pose.heading, position_deviation, heading_deviation]);
+                let pose = sonarfix::pose::Pose::new(x, y, Radians(heading));
+                let position_deviation = Metres(position);
+                let heading_deviation = Radians(deviation);
+                let start = Start { pose, position_deviation, heading_deviation };
+                self.hold(micros(time), Echo::Pose(start))
+            }
         }
     }
 
@@ -263,12 +285,13 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         let map = Map::new(self.walls);
         let Begin { state, deviation, .. } = begin;
         let localizer = Localizer::resume(config, map, state, deviation, Instant::from_ticks(0))?;
-        self.estimators = Some(Estimators {
+        let estimators = self.estimators.insert(Estimators {
             localizer,
             odometry: DeadReckoning::new(begin.pose, track_width),
             epoch: reading.time,
             received: reading,
         });
+        self.recorder.started(|| estimators.tick(0.0, None));
         let epoch = reading.time;
         if let Some(reference) = &mut self.reference {
             reference.read(&mut *complain)?;
@@ -345,7 +368,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
             return Err(Fault::TimeWentBack.into());
         }
         let beams = match &echo {
-            Echo::At { .. } | Echo::Skip => 0,
+            Echo::At { .. } | Echo::Skip | Echo::Pose(_) => 0,
             Echo::Scan(scan) => {
                 if time < self.next_fix {
                     return Ok(());
@@ -407,14 +430,16 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
                     continue;
                 }
                 self.tally.distance += estimators.drive_to(from.between(to, measurement.time))?;
-                self.measure(estimators, &measurement);
+                match &measurement.echo {
+                    Echo::Pose(start) => estimators.localizer.set_pose(start)?,
+                    _ => self.measure(estimators, &measurement),
+                }
             } else if let (Some(row), Some(reference)) = (row, &mut self.reference) {
                 self.tally.distance += estimators.drive_to(from.between(to, row.time))?;
                 let estimate = observe::estimate(&estimators.localizer);
-                let time = estimators.since_start(row.time);
-                let verdict = estimators.localizer.health().verdict;
+                let at = (estimators.since_start(row.time), self.tally.distance);
                 let odometry = estimators.odometry.pose();
-                self.score.add(time, (&estimate, verdict), &odometry, &row.pose);
+                self.score.add(at, &estimate, &odometry, &row.pose);
                 reference.read(&mut *complain)?;
             } else {
                 break;
@@ -422,13 +447,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         }
         self.tally.distance += estimators.drive_to(to)?;
         let truth = self.reference.as_ref().and_then(|r| r.pose_at(to.time));
-        self.recorder.tick(|| Tick {
-            time: estimators.since_start(to.time),
-            truth: truth.map(|pose| Truth { pose, calibration: None }),
-            estimate: observe::estimate(&estimators.localizer),
-            bound: None,
-            odometry: estimators.odometry.pose(),
-        });
+        self.recorder.tick(|| estimators.tick(estimators.since_start(to.time), truth));
         Ok(())
     }
 
@@ -457,7 +476,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
                 why: UNKNOWN,
             }),
             Echo::Scan(_) => localizer.aim(),
-            Echo::Skip => Err(localizer.aim().err().unwrap_or(NoAim::NoWall)),
+            Echo::Skip | Echo::Pose(_) => Err(localizer.aim().err().unwrap_or(NoAim::NoWall)),
         };
         let before = localizer.health().verdict;
         let aim = match aim {
@@ -473,7 +492,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         };
         measurement.range = match &pending.echo {
             Echo::At { range, .. } => *range,
-            Echo::Skip => None,
+            Echo::Skip | Echo::Pose(_) => None,
             Echo::Scan(scan) => scan.earliest(&Cone {
                 bearing: aim.bearing.0.into(),
                 cone: sonar.cone.0.into(),
@@ -496,7 +515,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
             _ => fixes.refused += 1,
         }
         self.recorder.fix(|| {
-            let record = observe::fix_record(measurement, &aim, &fix);
+            let record = observe::fix_record(measurement, &aim, &fix, localizer);
             FixRecord { why: record.why.filter(|_| aim.why != UNKNOWN), ..record }
         });
     }
@@ -522,7 +541,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
 impl Pending {
     fn beams(&self) -> usize {
         match &self.echo {
-            Echo::At { .. } | Echo::Skip => 0,
+            Echo::At { .. } | Echo::Skip | Echo::Pose(_) => 0,
             Echo::Scan(scan) => scan.ranges.len(),
         }
     }
@@ -537,7 +556,7 @@ fn deviations(values: [f64; STATES]) -> StandardDeviations {
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
-fn single(values: [f64; STATES]) -> [f32; STATES] {
+fn single<const N: usize>(values: [f64; N]) -> [f32; N] {
     values.map(|value| value as f32)
 }
 

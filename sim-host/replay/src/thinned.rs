@@ -72,6 +72,10 @@ impl Thinned {
 }
 
 impl Recorder for Thinned {
+    fn started(&mut self, make: impl FnOnce() -> Tick) {
+        self.trace.started(make);
+    }
+
     fn tick(&mut self, make: impl FnOnce() -> Tick) {
         self.ticks.record(&mut self.trace.ticks, self.capacity, make);
     }

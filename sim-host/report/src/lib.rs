@@ -159,6 +159,7 @@ mod tests {
             calibration: Calibration { track_width: 0.35, ..Calibration::default() },
             deviation: [0.01; 7],
             covariance_xy: 1e-5,
+            ..Estimate::default()
         };
         let tick = |n| Tick {
             time: f64::from(n) * 0.25,
@@ -170,6 +171,7 @@ mod tests {
         Trace {
             walls: vec![Wall { name: HOSTILE.into(), from: [0.0, 0.0], to: [10.0, 0.0] }],
             cone: 0.26,
+            start: None,
             ticks: (0..ticks).map(tick).collect(),
             fixes: vec![FixRecord {
                 time: 0.5,
@@ -181,6 +183,7 @@ mod tests {
                 source: None,
                 why: None,
                 outcome: Outcome::Refused,
+                association: None,
                 reason: HOSTILE.into(),
                 innovation: None,
                 innovation_variance: None,

@@ -149,11 +149,14 @@ impl<'a> Fixes<'a> {
         self.range.push(fix.range.and_then(|range| rounded(range, LENGTH)));
         self.source.push(fix.source.map(name));
         self.outcome.push(match fix.outcome {
-            Outcome::Accepted => 0,
+            Outcome::Accepted | Outcome::Downweighted => 0,
             Outcome::Gated => 1,
             Outcome::Refused => 2,
         });
-        self.reason.push(&fix.reason);
+        self.reason.push(match fix.outcome {
+            Outcome::Downweighted => "with a lower weight",
+            _ => &fix.reason,
+        });
         self.innovation.push(fix.innovation.and_then(|length| rounded(length, LENGTH)));
         let spread = fix.innovation_variance.map(f64::sqrt);
         self.spread.push(spread.and_then(|length| rounded(length, LENGTH)));

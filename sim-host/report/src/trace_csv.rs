@@ -3,9 +3,10 @@
 
 use std::io::Write;
 
+use sonarfix::health::Verdict;
 use sonarfix_sim::trace::{FixRecord, Outcome, Tick, Trace};
 
-const COLUMNS: [&str; 42] = [
+const COLUMNS: [&str; 45] = [
     "time_s",
     "true_x_m",
     "true_y_m",
@@ -29,6 +30,8 @@ const COLUMNS: [&str; 42] = [
     "sigma_track_width_m",
     "sigma_range_scale",
     "covariance_xy_m2",
+    "verdict",
+    "inflations",
     "bound_x_m",
     "bound_y_m",
     "bound_heading_rad",
@@ -45,15 +48,16 @@ const COLUMNS: [&str; 42] = [
     "fix_seconds",
     "fix_candidates",
     "fix_outcome",
+    "fix_association",
     "fix_reason",
     "fix_innovation_m",
     "fix_innovation_variance_m2",
 ];
 
 /// Number of the columns that belong to a measurement cycle.
-const FIX_COLUMNS: usize = 13;
+const FIX_COLUMNS: usize = 14;
 
-/// Writes a trace. A measurement cycle is in the line of the first tick at or after it; several
+/// Writes a trace. The first line is the start, if it is known. A measurement cycle is in the line of the first tick at or after it; several
 /// cycles before one tick have a line each, with the same state. Unknown values are empty cells.
 ///
 /// # Errors
@@ -62,7 +66,7 @@ pub fn write(trace: &Trace, out: impl Write) -> csv::Result<()> {
     let mut csv = csv::Writer::from_writer(out);
     csv.write_record(COLUMNS)?;
     let mut fixes = trace.fixes.iter().peekable();
-    for tick in &trace.ticks {
+    for tick in trace.start.iter().chain(&trace.ticks) {
         let state = state_cells(tick);
         let mut written = false;
         while let Some(fix) = fixes.next_if(|fix| fix.time <= tick.time) {
@@ -97,6 +101,7 @@ fn state_cells(tick: &Tick) -> Vec<String> {
     cells.extend([c.scale_right, c.scale_left, c.track_width, c.range_scale].map(cell));
     cells.extend(estimate.deviation.map(cell));
     cells.push(cell(estimate.covariance_xy));
+    cells.extend([verdict(estimate.verdict).to_owned(), estimate.inflations.to_string()]);
     let bound = tick.bound.map_or([None; 3], |[x, y, heading, ..]| [x, y, heading].map(Some));
     cells.extend(bound.map(optional));
     cells.extend([tick.odometry.x, tick.odometry.y, tick.odometry.heading].map(cell));
@@ -107,6 +112,7 @@ fn fix_cells(fix: &FixRecord, trace: &Trace) -> [String; FIX_COLUMNS] {
     let wall = fix.wall.and_then(|wall| trace.walls.get(wall));
     let outcome = match fix.outcome {
         Outcome::Accepted => "accepted",
+        Outcome::Downweighted => "downweighted",
         Outcome::Gated => "gated",
         Outcome::Refused => "refused",
     };
@@ -121,10 +127,19 @@ fn fix_cells(fix: &FixRecord, trace: &Trace) -> [String; FIX_COLUMNS] {
         optional(fix.why.map(|why| why.seconds)),
         optional(fix.why.map(|why| why.candidates.into())),
         outcome.to_owned(),
+        optional(fix.association),
         fix.reason.clone(),
         optional(fix.innovation),
         optional(fix.innovation_variance),
     ]
+}
+
+fn verdict(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Tracking => "tracking",
+        Verdict::Degraded => "degraded",
+        Verdict::Lost => "lost",
+    }
 }
 
 fn cell(value: f64) -> String {
@@ -163,7 +178,8 @@ mod tests {
             range: Some(1.25),
             source: None,
             why: Some(Why { gain: 2e-6, success: 0.75, seconds: 0.25, candidates: 3 }),
-            outcome: Outcome::Refused,
+            outcome: Outcome::Downweighted,
+            association: Some(0.25),
             reason: "no wall, \"none\"".to_owned(),
             innovation: None,
             innovation_variance: None,
@@ -173,6 +189,7 @@ mod tests {
     #[test]
     fn every_tick_and_every_fix_has_its_line() {
         let trace = Trace {
+            start: Some(tick(0.0)),
             ticks: [0.1, 0.2, 0.3].map(tick).to_vec(),
             fixes: [0.15, 0.2, 0.3].map(fix).to_vec(),
             ..Trace::default()
@@ -182,11 +199,15 @@ mod tests {
         let mut reader = csv::Reader::from_reader(out.as_slice());
         assert_eq!(reader.headers().unwrap(), &COLUMNS[..]);
         let lines: Vec<_> = reader.records().map(Result::unwrap).collect();
-        let times: Vec<_> = lines.iter().map(|l| (l[0].to_owned(), l[29].to_owned())).collect();
-        let expected = [("0.1", ""), ("0.2", "0.15"), ("0.2", "0.2"), ("0.3", "0.3")];
+        let times: Vec<_> = lines.iter().map(|l| (l[0].to_owned(), l[31].to_owned())).collect();
+        let expected = [("0", ""), ("0.1", ""), ("0.2", "0.15"), ("0.2", "0.2"), ("0.3", "0.3")];
         assert_eq!(times, expected.map(|(t, f)| (t.to_owned(), f.to_owned())));
-        assert_eq!(&lines[1][39], "no wall, \"none\"");
-        let why = [34, 35, 36, 37].map(|column| &lines[1][column]);
+        assert_eq!([&lines[2][23], &lines[2][24]], ["tracking", "0"]);
+        assert_eq!(
+            [40, 41, 42].map(|c| &lines[2][c]),
+            ["downweighted", "0.25", "no wall, \"none\""]
+        );
+        let why = [36, 37, 38, 39].map(|column| &lines[2][column]);
         assert_eq!(why, ["2.00000000e-6", "0.75", "0.25", "3"]);
     }
 

@@ -32,6 +32,8 @@ pub fn estimate(localizer: &Localizer) -> Estimate {
         },
         deviation: p.diagonal().map(f64::sqrt).into(),
         covariance_xy: p[(0, 1)],
+        verdict: localizer.health().verdict,
+        inflations: localizer.health().inflations,
     }
 }
 
@@ -86,14 +88,17 @@ pub struct Measurement {
     pub source: Option<Source>,
 }
 
-/// The record of a measurement of a wall, with its outcome.
+/// The record of a measurement of a wall, with its outcome, immediately after the localizer received it.
 #[must_use]
-pub fn fix_record(measurement: Measurement, aim: &Aim, fix: &Fix) -> FixRecord {
+pub fn fix_record(
+    measurement: Measurement,
+    aim: &Aim,
+    fix: &Fix,
+    localizer: &Localizer,
+) -> FixRecord {
     let (outcome, innovation, reason) = match fix {
         Fix::Accepted(innovation) => (Outcome::Accepted, Some(innovation), String::new()),
-        Fix::Downweighted(innovation) => {
-            (Outcome::Accepted, Some(innovation), "downweighted".to_owned())
-        }
+        Fix::Downweighted(innovation) => (Outcome::Downweighted, Some(innovation), String::new()),
         Fix::Gated(innovation) => (Outcome::Gated, Some(innovation), String::new()),
         Fix::Refused(refusal) => (Outcome::Refused, None, refusal.to_string()),
         other => (Outcome::Refused, None, format!("{other:?}")),
@@ -109,6 +114,7 @@ pub fn fix_record(measurement: Measurement, aim: &Aim, fix: &Fix) -> FixRecord {
         source: measurement.source,
         why: Some(why(aim)),
         outcome,
+        association: innovation.map(|_| localizer.association().into()),
         reason,
         innovation: innovation.map(|i: &Innovation| i.value.0.into()),
         innovation_variance: innovation.map(|i| i.variance.0.into()),
@@ -139,6 +145,7 @@ pub fn no_aim_record(measurement: Measurement, no_aim: NoAim) -> FixRecord {
         source: None,
         why: None,
         outcome: Outcome::Refused,
+        association: None,
         reason: no_aim.to_string(),
         innovation: None,
         innovation_variance: None,

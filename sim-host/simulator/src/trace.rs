@@ -4,6 +4,7 @@
 //! SI units (metres, radians, seconds), in the map frame of the scenario.
 
 use serde::Serialize;
+use sonarfix::health::Verdict;
 use sonarfix::localizer::Localizer;
 use sonarfix::units::Radians;
 use sonarfix_hal::robot::Report;
@@ -46,6 +47,11 @@ pub struct Estimate {
     pub deviation: [f64; 7],
     /// Covariance of x and y, m².
     pub covariance_xy: f64,
+    /// The health verdict.
+    #[serde(skip)]
+    pub verdict: Verdict,
+    /// How often the covariance was inflated since the robot was last not lost.
+    pub inflations: u16,
 }
 
 /// The truth at one instant; the reference of a recording may have only the pose.
@@ -76,12 +82,22 @@ pub struct Tick {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// The range corrected the filter.
+    /// The range corrected the filter: it is probably the wall's.
     Accepted,
+    /// The range corrected the filter with a lower weight: it may be the wall's or clutter.
+    Downweighted,
     /// The range lay beyond the gate and changed nothing.
     Gated,
     /// There was no usable range, or no measurable wall.
     Refused,
+}
+
+impl Outcome {
+    /// Whether the range corrected the filter.
+    #[must_use]
+    pub fn is_used(self) -> bool {
+        matches!(self, Self::Accepted | Self::Downweighted)
+    }
 }
 
 /// Why a wall was chosen: the predictions behind the choice.
@@ -118,7 +134,9 @@ pub struct FixRecord {
     pub why: Option<Why>,
     /// The outcome.
     pub outcome: Outcome,
-    /// Why it was refused or downweighted; empty otherwise.
+    /// β, the probability that the echo was the wall's; `None` without an echo.
+    pub association: Option<f64>,
+    /// Why it was refused; empty otherwise.
     pub reason: String,
     /// Innovation, metres, where one was computed.
     pub innovation: Option<f64>,
@@ -144,6 +162,8 @@ pub struct Trace {
     pub walls: Vec<Wall>,
     /// Half of the sonar's cone, radians.
     pub cone: f64,
+    /// The state of the localizer before its first input.
+    pub start: Option<Tick>,
     /// Every encoder tick, in order of time.
     pub ticks: Vec<Tick>,
     /// Every measurement cycle, in order of time.
@@ -162,6 +182,8 @@ impl Trace {
 
 /// Receives the records of a run as it proceeds. A record is only built if the recorder calls `make`.
 pub trait Recorder {
+    /// The localizer has its start estimate, and no input yet. A restart after a power loss is another start.
+    fn started(&mut self, _make: impl FnOnce() -> Tick) {}
     /// An encoder tick is over.
     fn tick(&mut self, make: impl FnOnce() -> Tick);
     /// A measurement cycle is over.
@@ -180,6 +202,10 @@ impl Recorder for () {
 
 /// Records everything.
 impl Recorder for Trace {
+    fn started(&mut self, make: impl FnOnce() -> Tick) {
+        self.start.get_or_insert_with(make);
+    }
+
     fn tick(&mut self, make: impl FnOnce() -> Tick) {
         self.ticks.push(make());
     }

@@ -5,6 +5,7 @@
 //! | [`fault_table`] | `docs/faults.md` |
 //! | [`floor_plan`] | `docs/floor-plans.md` |
 //! | [`health_page`], [`kidnapped`] | `docs/health.md` |
+//! | [`reality`] | `docs/reality.md` |
 //! | [`search_study`] | `docs/search.md` |
 //! | [`sonar_model`] | `docs/sonar-model.md` |
 
@@ -13,6 +14,7 @@ pub mod fault_table;
 pub mod floor_plan;
 pub mod health_page;
 pub mod kidnapped;
+pub mod reality;
 pub mod relocalization;
 pub mod search_study;
 pub mod sonar_model;

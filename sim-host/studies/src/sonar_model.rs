@@ -3,9 +3,11 @@
 //!
 //! - [`recording`]: the recorded sweeps, from a folder outside of the project;
 //! - [`cells`]: the classification of pings, and the shares of the classes;
+//! - [`echo_fit`]: the parameters of the echo model of the core;
 //! - [`page`]: the comparison as `docs/sonar-model.md`.
 
 pub mod cells;
+pub mod echo_fit;
 pub mod page;
 pub mod recording;
 

@@ -15,27 +15,33 @@
 //! **Wheels.** These logs have odometry poses, no wheel travel. The travel between two poses is
 //! computed from the turn, the distance along the mean heading and [`TRACK_WIDTH`]. With any track
 //! width the odometry of the localizer reproduces the same poses. The estimated scale errors and
-//! track width are those of this virtual robot.
+//! track width are those of this virtual robot. [`odometry`] decides which poses are odometry, and which
+//! of their steps are plausible.
 //!
 //! **Reference.** In a corrected log the pose of the scanner is the result of SLAM and becomes the
 //! reference. In a raw log it is the odometry, displaced to the scanner: if the displacement is
 //! constant, it becomes the mount of the scanner, and there is no reference.
+//!
+//! **Stamps.** Messages are put in the order of their stamps. A stamp that is earlier than that of the message before it from the
+//! same device, by up to [`stamps::JITTER`], is repaired; a message that goes back farther is left out.
 
-use std::f64::consts::{FRAC_PI_2, PI};
-use std::fs::File;
-use std::io::{BufRead, BufReader};
+mod message;
+mod odometry;
+pub(super) mod robot;
+mod stamps;
+
 use std::path::Path;
 
-use flate2::bufread::MultiGzDecoder;
 use sonarfix_sim::angle;
 use sonarfix_sim::trace::Pose;
 
-use crate::convert::robot_file::{self, Value};
 use crate::convert::{
-    ConvertError, Converted, Log, ReferenceFile, make_dir, read_walls, write_map,
+    ConvertError, Converted, Log, ReferenceFile, make_dir, open, read_walls, write_map,
 };
 use crate::lines::Lines;
 use crate::scan::Scan;
+use message::Message;
+use odometry::{Sample, Source, Trail};
 
 /// Assumed track width, metres: that of a Pioneer, the robot of most of these logs.
 pub const TRACK_WIDTH: f64 = 0.38;
@@ -46,6 +52,25 @@ const START_SIGMA: [f64; 2] = [0.05, 0.03];
 /// A scanner displaced by less than this is fixed to the robot, metres and radians: numbers in these
 /// files have six digits.
 const FIXED: f64 = 2e-3;
+
+/// Whether a file is a CARMEN log, by the first thousand lines.
+///
+/// # Errors
+/// [`ConvertError`], if it cannot be read.
+pub fn is_log(path: &Path) -> Result<bool, ConvertError> {
+    let mut lines = Lines::of(open(path)?);
+    while lines.number() < 1_000 {
+        match lines.next().map_err(ConvertError::read(path))? {
+            None => break,
+            Some(Ok(line)) if matches!(message::parse(line), Some(message) if message != Message::Other) =>
+            {
+                return Ok(true);
+            }
+            Some(_) => {}
+        }
+    }
+    Ok(false)
+}
 
 /// A conversion.
 #[derive(Debug, Clone, Copy)]
@@ -58,364 +83,182 @@ pub struct Carmen<'a> {
     pub to: &'a Path,
 }
 
-/// A line of the log.
-#[derive(Debug, Clone, PartialEq)]
-enum Message {
-    Odometry { time: f64, robot: Pose },
-    Laser { time: f64, robot: Pose, laser: Pose, scan: Scan },
-    Other,
+/// A scan with the pose of its scanner.
+struct Scanned {
+    time: f64,
+    laser: Pose,
+    robot: Pose,
+    scan: Scan,
+}
+
+/// What the log contains, in the order of the stamps.
+#[derive(Default)]
+struct Content {
+    samples: Vec<Sample>,
+    scans: Vec<Scanned>,
 }
 
 impl Carmen<'_> {
-    /// Converts line by line. Skipped lines are reported to `report`.
+    /// Converts. What is left out or implausible is reported to `report`, line by line.
     ///
     /// # Errors
-    /// [`ConvertError`], if a file is missing, has no scans or cannot be written.
+    /// [`ConvertError`], if a file is missing, has no scans or no odometry, or cannot be written.
     pub fn convert(&self, report: &mut dyn FnMut(String)) -> Result<Converted, ConvertError> {
         let walls = self.walls.map(|path| read_walls(path, 1.0)).transpose()?;
-        let mut lines = Lines::of(open(self.from)?);
+        let mut converted = Converted::default();
+        let name = self.from.display();
+        let mut report = |line: u64, what: &str| report(format!("{name} line {line}: {what}"));
+        let content = self.read(&mut converted, &mut report)?;
+        let field_of_view = field_of_view(&content)
+            .ok_or_else(|| ConvertError::content(self.from, "has no scans"))?;
+        let trail = Trail::of(content.samples, &mut converted, &mut report)
+            .map_err(|why| ConvertError::content(self.from, why))?;
+        // Scans that contain another pose than the odometry contain the corrected one.
+        let mount = if trail.scans_are_corrected { None } else { mount(&content.scans) };
         make_dir(self.to)?;
-        let mut writer = Writer::create(self.to)?;
-        loop {
-            let line = lines.next().map_err(ConvertError::read(self.from))?;
-            let Some(line) = line else { break };
-            let taken = match line {
-                Err(malformed) => Err(malformed.to_string()),
-                Ok(line) => parse(line).ok_or_else(|| "is no complete message".to_owned()),
-            };
-            let skipped = match taken {
-                Ok(message) => writer.take(&message)?,
-                Err(reason) => Some(reason),
-            };
-            if let Some(reason) = skipped {
-                writer.converted.skipped += 1;
-                report(format!("{} line {}: {reason}", self.from.display(), lines.number()));
-            }
+        write_log(self.to, &trail, &content.scans, &mut converted)?;
+        if mount.is_none() {
+            converted.reference = write_reference(self.to, &content.scans)?;
         }
-        let field_of_view =
-            writer.field_of_view.ok_or_else(|| ConvertError::content(self.from, "has no scans"))?;
-        let mount = writer.mount.fixed();
-        let converted = writer.close(self.to)?;
         if let Some(walls) = walls {
             write_map(self.to, "Walls as given; furniture is not in them", &walls)?;
         }
-        write_robot(self.to, mount.unwrap_or([0.0, 0.0]), field_of_view)?;
+        robot::write(self.to, mount.unwrap_or([0.0, 0.0]), field_of_view)?;
         Ok(converted)
     }
-}
 
-fn open(path: &Path) -> Result<Box<dyn BufRead>, ConvertError> {
-    let file = BufReader::new(File::open(path).map_err(ConvertError::read(path))?);
-    let packed = path.extension().is_some_and(|extension| extension == "gz");
-    Ok(if packed { Box::new(BufReader::new(MultiGzDecoder::new(file))) } else { Box::new(file) })
-}
-
-/// Writes log and reference, message by message.
-struct Writer {
-    log: Log,
-    reference: ReferenceFile,
-    converted: Converted,
-    /// Time, odometry and wheel travel of the last encoder record.
-    last: Option<(f64, Pose)>,
-    wheels: [f64; 2],
-    started: bool,
-    mount: Mount,
-    /// Bearings of the first and the last beam.
-    field_of_view: Option<[f64; 2]>,
-}
-
-impl Writer {
-    fn create(dir: &Path) -> Result<Self, ConvertError> {
-        let mut log = Log::create(dir)?;
-        log.comment("converted from a CARMEN log; wheel travel from odometry poses,")?;
-        log.comment(&format!("track width assumed: {TRACK_WIDTH} m"))?;
-        Ok(Self {
-            log,
-            reference: ReferenceFile::create(dir)?,
-            converted: Converted::default(),
-            last: None,
-            wheels: [0.0, 0.0],
-            started: false,
-            mount: Mount::default(),
-            field_of_view: None,
-        })
-    }
-
-    /// Writes a message; returns the reason if it is skipped.
-    fn take(&mut self, message: &Message) -> Result<Option<String>, ConvertError> {
-        let (time, robot) = match message {
-            Message::Odometry { time, robot } | Message::Laser { time, robot, .. } => {
-                (*time, robot)
+    fn read(
+        &self,
+        converted: &mut Converted,
+        report: &mut dyn FnMut(u64, &str),
+    ) -> Result<Content, ConvertError> {
+        let mut lines = Lines::of(open(self.from)?);
+        let mut content = Content::default();
+        let mut clocks = [stamps::Clock::default(); 2];
+        loop {
+            let line = lines.next().map_err(ConvertError::read(self.from))?;
+            let Some(line) = line else { break };
+            let message = match line {
+                Err(malformed) => Err(malformed.to_string()),
+                Ok(line) => message::parse(line).ok_or_else(|| "is no complete message".to_owned()),
+            };
+            let line = lines.number();
+            let taken = message.and_then(|message| {
+                let [odometry, laser] = &mut clocks;
+                match message {
+                    Message::Other => {}
+                    Message::Odometry { time, robot } => {
+                        odometry.check(time)?;
+                        let source = Source::Odometry;
+                        content.samples.push(Sample { line, time, pose: robot, source });
+                    }
+                    Message::Laser { time, robot, laser: scanner, scan } => {
+                        laser.check(time)?;
+                        let source = Source::Scan;
+                        content.samples.push(Sample { line, time, pose: robot, source });
+                        content.scans.push(Scanned { time, laser: scanner, robot, scan });
+                    }
+                }
+                Ok(())
+            });
+            if let Err(reason) = taken {
+                converted.skipped += 1;
+                report(line, &reason);
             }
-            Message::Other => return Ok(None),
-        };
-        if self.last.is_some_and(|(last, _)| time < last) {
-            return Ok(Some("goes back in time".to_owned()));
         }
-        if let Message::Laser { laser, .. } = message
-            && !self.started
-        {
-            self.started = true;
-            self.log.start(time, laser, START_SIGMA)?;
-        }
-        self.roll(time, robot)?;
-        if let Message::Laser { robot, laser, scan, .. } = message {
-            self.log.scan(time, scan)?;
-            self.reference.row(time, laser)?;
-            self.converted.scans += 1;
-            self.converted.reference += 1;
-            self.mount.see(robot, laser);
-            let last = (1..scan.ranges.len()).fold(scan.first, |bearing, _| bearing + scan.step);
-            self.field_of_view = Some([scan.first, last]);
-        }
-        Ok(None)
+        content.in_order_of_time(converted);
+        Ok(content)
     }
+}
 
-    /// Writes the wheel travel up to an odometry pose.
-    fn roll(&mut self, time: f64, pose: &Pose) -> Result<(), ConvertError> {
-        match self.last {
-            // A scan has an odometry pose of its own time, often already written.
-            Some((last, _)) if time <= last => {
-                self.converted.repeated += 1;
-                return Ok(());
+impl Content {
+    /// Repairs the stamps of each device, and puts everything in their order.
+    fn in_order_of_time(&mut self, converted: &mut Converted) {
+        let scans = self.scans.iter_mut().map(|scan| &mut scan.time);
+        converted.restamped += stamps::repair(scans);
+        for source in [Source::Odometry, Source::Scan] {
+            let samples = self.samples.iter_mut().filter(|sample| sample.source == source);
+            let repaired = stamps::repair(samples.map(|sample| &mut sample.time));
+            if source == Source::Odometry {
+                converted.restamped += repaired;
             }
-            Some((_, from)) => {
-                let [right, left] = travel(&from, pose);
-                self.wheels[0] += right;
-                self.wheels[1] += left;
-            }
-            None => {}
         }
-        self.last = Some((time, *pose));
-        self.converted.encoders += 1;
-        self.log.wheels(time, self.wheels)
-    }
-
-    fn close(mut self, dir: &Path) -> Result<Converted, ConvertError> {
-        self.log.0.close()?;
-        let path = self.reference.0.path.clone();
-        self.reference.0.close()?;
-        if self.mount.fixed().is_some() {
-            std::fs::remove_file(&path).map_err(ConvertError::write(dir))?;
-            self.converted.reference = 0;
-        }
-        Ok(self.converted)
+        // Stable: of an odometry record and a scan at the same time the earlier line is first.
+        self.samples.sort_by(|one, other| one.time.total_cmp(&other.time));
     }
 }
 
-/// Travel of the right and the left wheel between two poses.
-fn travel(from: &Pose, to: &Pose) -> [f64; 2] {
-    let turn = angle::wrap(to.heading - from.heading);
-    let (sin, cos) = (from.heading + turn / 2.0).sin_cos();
-    let advance = cos * (to.x - from.x) + sin * (to.y - from.y);
-    let half = turn * TRACK_WIDTH / 2.0;
-    [advance + half, advance - half]
+/// Bearings of the first and the last beam of the last scan.
+fn field_of_view(content: &Content) -> Option<[f64; 2]> {
+    Some(content.scans.last()?.scan.field_of_view())
 }
 
-/// The mounting position of the scanner, and whether it is constant.
-#[derive(Debug, Clone, Copy, Default)]
-struct Mount {
-    lowest: Option<[f64; 3]>,
-    highest: [f64; 3],
+fn write_log(
+    dir: &Path,
+    trail: &Trail,
+    scans: &[Scanned],
+    converted: &mut Converted,
+) -> Result<(), ConvertError> {
+    let mut log = Log::create(dir)?;
+    log.comment("converted from a CARMEN log; wheel travel from odometry poses,")?;
+    log.comment(&format!("track width assumed: {TRACK_WIDTH} m"))?;
+    let mut scans = scans.iter().peekable();
+    let mut started = false;
+    for record in &trail.records {
+        // A scan at the time of a record follows it.
+        while let Some(scan) = scans.next_if(|scan| scan.time < record.time) {
+            write_scan(&mut log, scan, &mut started)?;
+            converted.scans += 1;
+        }
+        if let Some(scan) = scans.peek().filter(|scan| scan.time <= record.time && !started) {
+            log.start(scan.time, &scan.laser, START_SIGMA)?;
+            started = true;
+        }
+        log.wheels(record.time, record.wheels)?;
+        converted.encoders += 1;
+    }
+    for scan in scans {
+        write_scan(&mut log, scan, &mut started)?;
+        converted.scans += 1;
+    }
+    log.0.close()
 }
 
-impl Mount {
-    fn see(&mut self, robot: &Pose, laser: &Pose) {
-        let (sin, cos) = robot.heading.sin_cos();
-        let (dx, dy) = (laser.x - robot.x, laser.y - robot.y);
-        let turned = angle::wrap(laser.heading - robot.heading);
-        let seen = [cos * dx + sin * dy, cos * dy - sin * dx, turned];
-        let Some(lowest) = &mut self.lowest else {
-            (self.lowest, self.highest) = (Some(seen), seen);
-            return;
-        };
-        for ((lowest, highest), seen) in lowest.iter_mut().zip(&mut self.highest).zip(seen) {
+fn write_scan(log: &mut Log, scan: &Scanned, started: &mut bool) -> Result<(), ConvertError> {
+    if !*started {
+        log.start(scan.time, &scan.laser, START_SIGMA)?;
+        *started = true;
+    }
+    log.scan(scan.time, &scan.scan)
+}
+
+fn write_reference(dir: &Path, scans: &[Scanned]) -> Result<u64, ConvertError> {
+    let mut reference = ReferenceFile::create(dir)?;
+    for scan in scans {
+        reference.row(scan.time, &scan.laser)?;
+    }
+    reference.0.close()?;
+    Ok(scans.len() as u64)
+}
+
+/// The mounting position of the scanner, ahead and left, if it is the same in all scans.
+fn mount(scans: &[Scanned]) -> Option<[f64; 2]> {
+    let seen = |scan: &Scanned| {
+        let (sin, cos) = scan.robot.heading.sin_cos();
+        let (dx, dy) = (scan.laser.x - scan.robot.x, scan.laser.y - scan.robot.y);
+        let turned = angle::wrap(scan.laser.heading - scan.robot.heading);
+        [cos * dx + sin * dy, cos * dy - sin * dx, turned]
+    };
+    let first = scans.first().map(seen)?;
+    let (mut lowest, mut highest) = (first, first);
+    for seen in scans.iter().map(seen) {
+        for ((lowest, highest), seen) in lowest.iter_mut().zip(&mut highest).zip(seen) {
             *lowest = lowest.min(seen);
             *highest = highest.max(seen);
         }
     }
-
-    /// The mounting position, ahead and left, if it is constant.
-    fn fixed(&self) -> Option<[f64; 2]> {
-        let lowest = self.lowest?;
-        let fixed = lowest.iter().zip(self.highest).all(|(low, high)| high - low < FIXED);
-        let middle = |axis: [f64; 2]| f64::midpoint(axis[0], axis[1]);
-        fixed.then(|| [middle([lowest[0], self.highest[0]]), middle([lowest[1], self.highest[1]])])
-    }
-}
-
-/// Reads a line; `None` if it is a relevant message, but incomplete.
-fn parse(line: &str) -> Option<Message> {
-    let mut words = Words(line.split_ascii_whitespace());
-    let message = match words.0.next().unwrap_or("#") {
-        "O" => {
-            let time = words.number()?;
-            Message::Odometry { time, robot: words.pose()? }
-        }
-        "S" => {
-            let time = words.number()?;
-            let (robot, laser) = (words.pose()?, words.pose()?);
-            let scan = half_turn(words.ranges()?);
-            Message::Laser { time, robot, laser, scan }
-        }
-        "ODOM" => {
-            let robot = words.pose()?;
-            words.skip(3)?;
-            Message::Odometry { time: words.timestamp()?, robot }
-        }
-        "FLASER" => {
-            let scan = half_turn(words.ranges()?);
-            let (laser, robot) = (words.pose()?, words.pose()?);
-            Message::Laser { time: words.timestamp()?, robot, laser, scan }
-        }
-        "ROBOTLASER1" => {
-            words.skip(1)?;
-            let first = words.number()?;
-            words.skip(1)?;
-            let step = words.number()?;
-            words.skip(3)?;
-            let ranges = words.ranges()?;
-            let remissions = words.count()?;
-            words.skip(remissions)?;
-            let (laser, robot) = (words.pose()?, words.pose()?);
-            words.skip(5)?;
-            let scan = Scan { first, step, ranges };
-            Message::Laser { time: words.timestamp()?, robot, laser, scan }
-        }
-        _ => return Some(Message::Other),
-    };
-    words.0.next().is_none().then_some(message)
-}
-
-/// A scan over the half turn ahead, counter-clockwise: 180 or 360 beams leave out the last one,
-/// 181 or 361 have both ends.
-fn half_turn(ranges: Vec<f32>) -> Scan {
-    #[expect(clippy::cast_precision_loss, reason = "a scan has thousands of beams, not 2^53")]
-    let steps = (ranges.len() - ranges.len() % 2) as f64;
-    Scan { first: -FRAC_PI_2, step: PI / steps.max(1.0), ranges }
-}
-
-struct Words<'a>(std::str::SplitAsciiWhitespace<'a>);
-
-impl Words<'_> {
-    fn number(&mut self) -> Option<f64> {
-        self.0.next()?.parse().ok().filter(|number: &f64| number.is_finite())
-    }
-
-    fn count(&mut self) -> Option<usize> {
-        self.0.next()?.parse().ok()
-    }
-
-    fn skip(&mut self, count: usize) -> Option<()> {
-        (0..count).try_for_each(|_| self.0.next().map(|_| ()))
-    }
-
-    fn pose(&mut self) -> Option<Pose> {
-        let (x, y, heading) = (self.number()?, self.number()?, self.number()?);
-        Some(Pose { x, y, heading: angle::wrap(heading) })
-    }
-
-    fn ranges(&mut self) -> Option<Vec<f32>> {
-        let count = self.count()?;
-        let mut ranges = Vec::new();
-        for _ in 0..count {
-            let range = self.number()?;
-            #[expect(clippy::cast_possible_truncation, reason = "a scanner's millimetres")]
-            ranges.push(range.max(0.0) as f32);
-        }
-        (!ranges.is_empty()).then_some(ranges)
-    }
-
-    /// The end of every CARMEN message: time sent, host, time logged.
-    fn timestamp(&mut self) -> Option<f64> {
-        let sent = self.number()?;
-        self.skip(1)?;
-        self.number()?;
-        Some(sent)
-    }
-}
-
-fn write_robot(dir: &Path, mount: [f64; 2], field: [f64; 2]) -> Result<(), ConvertError> {
-    let [rightmost, leftmost] = field.map(f64::to_degrees);
-    let cone = 15.0;
-    let servo = format!("[\"{rightmost:.1} deg\", \"{leftmost:.1} deg\"]");
-    let mount = format!("[\"{:.3} m\", \"{:.3} m\"]", mount[0], mount[1]);
-    let wheel = "{ travel_per_edge = \"1 mm\" }";
-    let text = Value::text;
-    let tables = vec![
-        (
-            "drive",
-            vec![
-                (
-                    "track_width",
-                    text(
-                        &format!("{TRACK_WIDTH} m"),
-                        "assumed; the wheels were made from poses with it",
-                    ),
-                ),
-                (
-                    "wheel_noise",
-                    text("8 mm/sqrt(m)", "hard floors, thresholds and turns in place: 0.5 to 20"),
-                ),
-                (
-                    "scale_walk",
-                    text("0.02 %/sqrt(m)", "wheels drift by 0.1 to 0.5 % within a recording"),
-                ),
-                ("track_width_walk", text("0.1 mm/sqrt(m)", "likewise")),
-                ("max_wheel_speed", text("3 m/s", "above what such robots do")),
-                ("encoder_period", text("250 ms", "about what such logs have")),
-                ("right_wheel", Value(wheel.to_owned(), "made up: the log has no counts")),
-                ("left_wheel", Value(wheel.to_owned(), "likewise")),
-            ],
-        ),
-        (
-            "sonar",
-            [vec![
-                ("mount", Value(mount, "where the log has the scanner; 0 in a corrected log")),
-                (
-                    "servo",
-                    Value(
-                        servo,
-                        "the whole scan: half a cone at its ends, or the walls of a corridor would go unheard",
-                    ),
-                ),
-                ("cone", text(&format!("{cone} deg"), "half of it: a sonar's")),
-                ("min_range", text("10 cm", "the scanner's")),
-                ("max_range", text("8 m", "a sonar's at its best")),
-                ("noise", text("15 mm", "the scanner 10 mm, and its centimetres")),
-                ("noise_per_metre", text("5 mm/m", "walls are straight to a few mm a metre")),
-                ("fix_period", text("800 ms", "a slow sonar's")),
-            ], robot_file::no_servo(rightmost, leftmost).into()].into_iter().flatten().collect(),
-        ),
-        (
-            "prior",
-            vec![
-                ("scale_right", text("5 %", "odometry of unknown calibration: real ones are wrong by 3 to 5 %")),
-                ("scale_left", text("5 %", "likewise")),
-                ("track_width", text("20 mm", "likewise")),
-                ("range_scale", Value("0.0".to_owned(), "map and scanner share their metre")),
-            ],
-        ),
-        (
-            "gating",
-            vec![
-                (
-                    "confidence",
-                    Value(
-                        "0.5".to_owned(),
-                        "deviations; with more, few walls are left in a building",
-                    ),
-                ),
-            ],
-        ),
-        (
-            "echo",
-            vec![
-                ("free_path", text("7 m", "furniture and people that the map does not have")),
-                ("map_accuracy", text("40 mm", "walls fitted to SLAM: a few cm")),
-            ],
-        ),
-        ("schedule", vec![("policy", text("informative", "the default"))]),
-    ];
-    robot_file::write(dir, "robot.toml", "A robot from a CARMEN log", tables)
+    let fixed = lowest.iter().zip(highest).all(|(low, high)| high - low < FIXED);
+    let middle = |low: f64, high: f64| f64::midpoint(low, high);
+    let ([ahead, left, _], [ahead_high, left_high, _]) = (lowest, highest);
+    fixed.then(|| [middle(ahead, ahead_high), middle(left, left_high)])
 }

@@ -39,6 +39,7 @@ pub fn run(
     let tick_period = simulation.scenario.robot.encoder_period.to_micros();
     let fix_period = simulation.ideal_period().to_micros();
     let (mut next_tick, mut next_fix) = (tick_period, fix_period);
+    run.score.started(run.localizer.localizer()?, &run.plant, recorder);
     while next_tick.min(next_fix) <= simulation.end() {
         let now = next_tick.min(next_fix);
         run.drive_to(now)?;
@@ -111,7 +112,8 @@ impl<T: LocalizerInputs> Run<'_, T> {
         #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
         let fix = self.localizer.fix(&aim, measurement.range.map(|range| Metres(range as f32)))?;
         self.score.fix(&aim, &fix);
-        recorder.fix(|| observe::fix_record(measurement, &aim, &fix));
+        let localizer = self.localizer.localizer()?;
+        recorder.fix(|| observe::fix_record(measurement, &aim, &fix, localizer));
         Ok(())
     }
 

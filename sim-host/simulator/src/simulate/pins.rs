@@ -53,6 +53,7 @@ pub fn run(
         let (mut controller, actuators) = computer.controller(&wires, start, now)?;
         hardware.obey(actuators);
         recorder.began(controller.localizer()?);
+        hardware.score.started(controller.localizer()?, &hardware.plant, recorder);
         let Some(back_at) = hardware.live(&mut controller, recorder)? else {
             return hardware.score.result(controller.localizer()?);
         };
@@ -251,7 +252,7 @@ impl<'a> SimulatedHardware<'a> {
             self.score.arrive(self.plant.state());
         }
         if let Some(heard) = &report.ping_result {
-            self.record_fix(heard, recorder);
+            self.record_fix(heard, localizer, recorder);
         }
         if report.tick.is_some() {
             self.score.tick(self.time(), localizer, &self.plant, recorder);
@@ -270,13 +271,19 @@ impl<'a> SimulatedHardware<'a> {
         }
     }
 
-    fn record_fix(&mut self, heard: &PingResult, recorder: &mut impl Recorder) {
+    fn record_fix(
+        &mut self,
+        heard: &PingResult,
+        localizer: &Localizer,
+        recorder: &mut impl Recorder,
+    ) {
         let (Some(measurement), Some(fix)) = (self.measurement.take(), &heard.fix) else {
             return;
         };
         self.score.fix(&heard.aim, fix);
         let range = heard.outcome.ok().map(|echo| echo.range.0.into());
-        recorder.fix(|| observe::fix_record(Measurement { range, ..measurement }, &heard.aim, fix));
+        let measurement = Measurement { range, ..measurement };
+        recorder.fix(|| observe::fix_record(measurement, &heard.aim, fix, localizer));
     }
 
     /// Steers by the estimate. While the robot has none, a person steers it along the path.

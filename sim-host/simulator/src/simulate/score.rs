@@ -106,6 +106,21 @@ impl<'a> Score<'a> {
         self.result.faults = self.result.faults.plus(more);
     }
 
+    /// Records the start of the localizer.
+    pub fn started(&self, localizer: &Localizer, plant: &Plant, recorder: &mut impl Recorder) {
+        recorder.started(|| self.record(self.last_tick, localizer, plant));
+    }
+
+    fn record(&self, time: f64, localizer: &Localizer, plant: &Plant) -> Tick {
+        Tick {
+            time,
+            truth: Some(plant.truth()),
+            estimate: observe::estimate(localizer),
+            bound: Some(self.bound.standard_deviations().into()),
+            odometry: self.odometry.pose(),
+        }
+    }
+
     /// Adds an encoder tick.
     pub fn tick(
         &mut self,
@@ -120,13 +135,7 @@ impl<'a> Score<'a> {
         let verdict = localizer.health().verdict;
         self.result.integrity.add(time - self.last_tick, &self.result.error, &covariance, verdict);
         self.last_tick = time;
-        recorder.tick(|| Tick {
-            time,
-            truth: Some(plant.truth()),
-            estimate: observe::estimate(localizer),
-            bound: Some(self.bound.standard_deviations().into()),
-            odometry: self.odometry.pose(),
-        });
+        recorder.tick(|| self.record(time, localizer, plant));
     }
 
     /// The result, after the last tick.

@@ -94,7 +94,7 @@ impl Runs {
         let mut outcomes = Outcomes::default();
         for fix in self.fixes() {
             match fix.outcome {
-                Outcome::Accepted => outcomes.accepted += 1,
+                Outcome::Accepted | Outcome::Downweighted => outcomes.accepted += 1,
                 Outcome::Gated => outcomes.gated += 1,
                 Outcome::Refused => outcomes.refused += 1,
             }
@@ -144,5 +144,5 @@ impl Runs {
 
 /// Whether a range was accepted although its echo did not come from the wall that was aimed at.
 fn is_misled(fix: &FixRecord) -> bool {
-    fix.outcome == Outcome::Accepted && fix.source != fix.wall.map(Source::Wall)
+    fix.outcome.is_used() && fix.source != fix.wall.map(Source::Wall)
 }

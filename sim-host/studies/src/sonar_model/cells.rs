@@ -44,6 +44,8 @@ pub enum Outcome {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Cell {
     counts: [u32; 4],
+    /// Of the other ranges, those shorter than the perpendicular distance.
+    short: u32,
     bias: f64,
 }
 
@@ -59,6 +61,21 @@ impl Cell {
     pub fn shares(&self) -> Option<[f64; 4]> {
         let pings = f64::from(self.pings());
         (pings > 0.0).then(|| self.counts.map(|count| f64::from(count) / pings))
+    }
+
+    /// Number of perpendicular returns.
+    #[must_use]
+    pub fn perpendicular(&self) -> u32 {
+        let [perpendicular, ..] = self.counts;
+        perpendicular
+    }
+
+    /// Numbers of pings without an echo, with a shorter range than the wall's, and with a longer one that is not that along
+    /// the axis.
+    #[must_use]
+    pub fn clutter(&self) -> [u32; 3] {
+        let [_, _, silence, other] = self.counts;
+        [silence, self.short, other - self.short]
     }
 
     /// Mean error of the perpendicular returns, metres.
@@ -88,6 +105,9 @@ impl Cells {
         let outcome = outcome(beam.reading, perpendicular, along_axis);
         if let Some(count) = cell.counts.get_mut(outcome as usize) {
             *count += 1;
+        }
+        if outcome == Outcome::Other && beam.reading.is_some_and(|range| range < perpendicular) {
+            cell.short += 1;
         }
         if outcome == Outcome::Perpendicular {
             cell.bias += beam.reading.map_or(0.0, |reading| reading - perpendicular);
@@ -147,6 +167,7 @@ mod tests {
         assert_eq!(filled, [(6, 1)]);
         let cell = cells.rows()[6][1];
         assert_eq!(cell.counts, [2, 1, 1, 2]);
+        assert_eq!((cell.perpendicular(), cell.clutter()), (2, [1, 1, 1]));
         assert!((cell.bias().unwrap() - 0.01).abs() < 1e-12);
     }
 

@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use super::Comparison;
 use super::cells::{Cell, Cells, ROW};
+use super::echo_fit::EchoFit;
 
 /// The table in the recordings' README, for a larger set that includes these recordings (50 sweeps,
 /// 10,309 pings): row, and the shares per column.
@@ -70,6 +71,7 @@ pub fn markdown(comparison: &Comparison) -> String {
         section(&mut page, comparison, column, name);
     }
     summary(&mut page, comparison);
+    page.push_str(&echo_table(&EchoFit::of(&comparison.measured)));
     page
 }
 
@@ -147,4 +149,51 @@ pub fn mean_difference(comparison: &Comparison) -> f64 {
         }
     }
     sum / weight
+}
+
+const ECHO: &str = "
+## The parameters of the echo model
+The table `[echo]` of a robot file ([formats.md](formats.md#echo), [model.md](model.md#echo-model)), from the measured pings within 20° of the normal: the shares of
+pings without an echo, with a shorter and with a longer range than the wall's; a range along the axis counts as the wall's. The parameters
+are means over the three ranges with equal weights, because most pings of the sweeps are at short range. The room has no unmapped objects, so
+`free_path` and `map_accuracy` are not from this recording. For the other sensors there is no recording; their parameters are assumed.
+
+| range | pings | missed | short | long |
+|---|---|---|---|---|
+";
+
+/// The fit of the echo model, as tables and as the text for a robot file.
+fn echo_table(fit: &EchoFit) -> String {
+    let mut text = ECHO.to_owned();
+    let names = ["below 0.6 m", "0.6 m to 1.1 m", "1.1 m and more"];
+    let row = |name: &str, pings: &str, shares: [f64; 3]| {
+        let [missed, short, long] = shares.map(|share| format!("{share:.3}"));
+        format!("| {name} | {pings} | {missed} | {short} | {long} |\n")
+    };
+    for (name, (pings, shares)) in names.iter().zip(&fit.by_range) {
+        text.push_str(&row(name, &pings.to_string(), *shares));
+    }
+    text.push_str(&row("mean", "", fit.mean));
+    let [missed, short, long] = fit.mean;
+    let _ = write!(
+        text,
+        "\n```toml\n[echo]\nsensor = \"nxt\"\nmissed = {missed:.2}\nshort = {short:.2}\nlong = {long:.2}\n```\n\n\
+         Audibility of a wall by the angle between beam and normal: the share of pings that return its perpendicular distance, relative to that within \
+         15°, mean over the ranges. Half of it is left at {:.0}°; a `cone` of a robot file is the angle up to which a wall is measured, \
+         and should be smaller.\n\n| off normal |",
+        fit.half_angle
+    );
+    for (row, _) in fit.audible.iter().enumerate() {
+        let _ = write!(text, " {}–{}° |", degrees(row), degrees(row + 1));
+    }
+    let _ = write!(
+        text,
+        "\n|{}|\n| audible |",
+        "---|".repeat(fit.audible.len() + 1).trim_end_matches('|')
+    );
+    for share in &fit.audible {
+        let _ = write!(text, " {share:.2} |");
+    }
+    text.push('\n');
+    text
 }

@@ -1,0 +1,58 @@
+//! All recordings of a folder, replayed with both policies and one robot file per robot, as a page of the documentation.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`discover`] | the recordings in a folder, by their formats |
+//! | `replays` | conversion and replay of one recording |
+//! | [`page`] | the page |
+
+pub mod discover;
+pub mod page;
+mod replays;
+
+use std::io;
+use std::path::Path;
+
+use rayon::prelude::*;
+use sonarfix_replay::Summary;
+
+use discover::Recording;
+
+/// The replay of a recording, or why there is none.
+#[derive(Debug)]
+pub struct Row {
+    /// Name of the recording.
+    pub recording: String,
+    /// Robot file.
+    pub robot: String,
+    /// Policy.
+    pub policy: &'static str,
+    /// The result, or the error as text.
+    pub outcome: Result<Summary, String>,
+}
+
+/// The result of the study.
+#[derive(Debug)]
+pub struct Findings {
+    /// A row for each recording, robot file and policy, in the order of the names.
+    pub rows: Vec<Row>,
+    /// What conversions reported, with the name of the recording.
+    pub reports: Vec<(String, Vec<String>)>,
+    /// Files that contain no recording that can be replayed, and why.
+    pub others: Vec<(String, &'static str)>,
+}
+
+/// Replays all recordings of a folder. An error of one recording is a row.
+///
+/// # Errors
+/// If the folder cannot be read, or no temporary folder can be created.
+pub fn findings(data: &Path) -> io::Result<Findings> {
+    let found = discover::discover(data)?;
+    let replayed: Vec<(Vec<Row>, Vec<String>)> =
+        found.recordings.par_iter().map(replays::replay).collect::<io::Result<_>>()?;
+    let name = |recording: &Recording| recording.name.clone();
+    let reports = found.recordings.iter().map(name);
+    let (rows, reports_of): (Vec<_>, Vec<_>) = replayed.into_iter().unzip();
+    let reports = reports.zip(reports_of).filter(|(_, reports)| !reports.is_empty()).collect();
+    Ok(Findings { rows: rows.into_iter().flatten().collect(), reports, others: found.others })
+}

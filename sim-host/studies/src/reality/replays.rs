@@ -1,0 +1,108 @@
+//! Conversion and replay of one recording.
+
+use std::fs::File;
+use std::io::{self, BufReader};
+use std::path::Path;
+
+use sonarfix::config::Policy;
+use sonarfix_map::{Floor, robot_file};
+use sonarfix_replay::convert::carmen::Carmen;
+use sonarfix_replay::convert::given::Given;
+use sonarfix_replay::convert::lego::{ENCODER_LAG, Lego, Nominal};
+use sonarfix_replay::{Replay, Summary};
+
+use super::Row;
+use super::discover::{Format, Recording};
+
+/// The policies, and their names in the table.
+const POLICIES: [(Policy, &str); 2] =
+    [(Policy::Nearest, "nearest"), (Policy::Informative, "informative")];
+
+/// The robot files of a recording: name in the table, file.
+type Robots = &'static [(&'static str, &'static str)];
+
+const LEGO: Robots = &[
+    ("LEGO, fitted", "robot-fitted.toml"),
+    ("LEGO, rounded", "robot-rounded.toml"),
+    ("LEGO, course", "robot-course.toml"),
+];
+const CARMEN: Robots = &[("CARMEN", "robot.toml")];
+
+/// Reports of a conversion that are kept.
+const KEPT: usize = 5;
+
+/// Converts a recording into a temporary folder and replays it with each robot file and policy.
+///
+/// # Errors
+/// If no temporary folder can be created. What is wrong with the recording is in its rows.
+pub fn replay(recording: &Recording) -> io::Result<(Vec<Row>, Vec<String>)> {
+    let folder = tempfile::tempdir()?;
+    let mut reports = Vec::new();
+    let mut more = 0_u64;
+    let converted = convert(&recording.format, folder.path(), &mut |text| {
+        if reports.len() < KEPT {
+            // Without the path of the data, which differs from machine to machine.
+            let text = text.rsplit_once('/').map_or(text.as_str(), |(_, name)| name);
+            reports.push(text.to_owned());
+        } else {
+            more += 1;
+        }
+    });
+    if more > 0 {
+        reports.push(format!("{more} more lines"));
+    }
+    let row = |robot: &str, policy, outcome| Row {
+        recording: recording.name.clone(),
+        robot: robot.to_owned(),
+        policy,
+        outcome,
+    };
+    let robots = match converted {
+        Ok(robots) => robots,
+        Err(error) => return Ok((vec![row("–", "–", Err(error))], reports)),
+    };
+    let mut rows = Vec::new();
+    for (robot, file) in robots {
+        for (policy, name) in POLICIES {
+            rows.push(row(robot, name, replay_with(folder.path(), file, policy)));
+        }
+    }
+    Ok((rows, reports))
+}
+
+fn convert(format: &Format, to: &Path, report: &mut dyn FnMut(String)) -> Result<Robots, String> {
+    let converted = match format {
+        Format::Lego { folder } => {
+            let nominal = Nominal::Fitted;
+            let lego = Lego { from: folder, to, nominal, encoder_lag: ENCODER_LAG };
+            lego.convert(report).map(|_| LEGO)
+        }
+        Format::Carmen { log, walls } => {
+            let walls =
+                walls.as_deref().ok_or("no walls beside it (NAME_walls.csv or NAME_map.csv)")?;
+            Carmen { from: log, walls: Some(walls), to }.convert(report).map(|_| CARMEN)
+        }
+        Format::Given { log, reference, walls } => {
+            let walls =
+                walls.as_deref().ok_or("no walls beside it (NAME_walls.csv or NAME_map.csv)")?;
+            let reference =
+                reference.as_deref().ok_or("no reference beside it (NAME_reference.csv)")?;
+            Given { log, reference, walls, to }.prepare().map(|()| CARMEN)
+        }
+    };
+    converted.map_err(|error| error.to_string())
+}
+
+fn replay_with(folder: &Path, robot: &str, policy: Policy) -> Result<Summary, String> {
+    let text = |error: &dyn std::fmt::Display| error.to_string();
+    let floor = Floor::read(&folder.join("map.toml")).map_err(|error| text(&error))?;
+    let mut robot = robot_file::read(&folder.join(robot)).map_err(|error| text(&error))?;
+    robot.localizer.policy = policy;
+    let walls = floor.walls();
+    let replay = Replay { robot: &robot, walls: &walls, strict: false };
+    let open = |name: &str| File::open(folder.join(name)).map(BufReader::new);
+    let log = open("log.csv").map_err(|error| text(&error))?;
+    let reference = open("reference.csv")
+        .map_err(|_| "has no reference: its poses are raw odometry".to_owned())?;
+    replay.run(log, Some(reference), &mut (), &mut |_| {}).map_err(|error| text(&error))
+}
