@@ -69,7 +69,8 @@ fn audible(measured: &Cells, row: usize) -> f64 {
     let ratios = (0..3).filter_map(|of| Some(heard(row..row + 1, of)? / heard(0..FULLY, of)?));
     let ratios: Vec<f64> = ratios.collect();
     let sum: f64 = ratios.iter().sum();
-    sum / f64::from(u32::try_from(ratios.len()).unwrap_or(1).max(1))
+    // Not a number without pings.
+    sum / f64::from(u32::try_from(ratios.len()).unwrap_or(u32::MAX))
 }
 
 #[expect(clippy::cast_precision_loss, reason = "a dozen rows")]
@@ -118,6 +119,8 @@ mod tests {
                 count(f64::from(n % 4) * 5.0 + 2.0, reading);
             }
             for n in 0..10_u32 {
+                count(22.0, Some(distance));
+                count(27.0, Some(distance));
                 count(32.0, (n % 2 == 0).then_some(distance));
                 count(37.0, None);
             }
