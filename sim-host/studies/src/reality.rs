@@ -13,23 +13,10 @@ mod replays;
 use std::io;
 use std::path::Path;
 
-use rayon::prelude::*;
-use sonarfix_replay::Summary;
-
 use discover::Recording;
+use rayon::prelude::*;
 
-/// The replay of a recording, or why there is none.
-#[derive(Debug)]
-pub struct Row {
-    /// Name of the recording.
-    pub recording: String,
-    /// Robot file.
-    pub robot: String,
-    /// Policy.
-    pub policy: &'static str,
-    /// The result, or the error as text.
-    pub outcome: Result<Summary, String>,
-}
+pub use replays::Row;
 
 /// The result of the study.
 #[derive(Debug)]

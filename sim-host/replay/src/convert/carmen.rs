@@ -43,8 +43,7 @@ use crate::scan::Scan;
 use message::Message;
 use odometry::{Sample, Source, Trail};
 
-/// Assumed track width, metres: that of a Pioneer, the robot of most of these logs.
-pub const TRACK_WIDTH: f64 = 0.38;
+pub use odometry::TRACK_WIDTH;
 
 /// Deviations of the initial estimate, metres and radians: the accuracy of SLAM in the map frame.
 const START_SIGMA: [f64; 2] = [0.05, 0.03];

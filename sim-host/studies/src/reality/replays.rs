@@ -11,8 +11,20 @@ use sonarfix_replay::convert::given::Given;
 use sonarfix_replay::convert::lego::{ENCODER_LAG, Lego, Nominal};
 use sonarfix_replay::{Replay, Summary};
 
-use super::Row;
 use super::discover::{Format, Recording};
+
+/// The replay of a recording, or why there is none.
+#[derive(Debug)]
+pub struct Row {
+    /// Name of the recording.
+    pub recording: String,
+    /// Robot file.
+    pub robot: String,
+    /// Policy.
+    pub policy: &'static str,
+    /// The result, or the error as text.
+    pub outcome: Result<Summary, String>,
+}
 
 /// The policies, and their names in the table.
 const POLICIES: [(Policy, &str); 2] =

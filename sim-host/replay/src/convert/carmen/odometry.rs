@@ -9,9 +9,11 @@
 use sonarfix_sim::angle;
 use sonarfix_sim::trace::Pose;
 
-use super::TRACK_WIDTH;
 use super::stamps::JITTER;
 use crate::convert::Converted;
+
+/// Assumed track width, metres: that of a Pioneer, the robot of most of these logs.
+pub const TRACK_WIDTH: f64 = 0.38;
 
 /// A wheel speed above this is implausible, m/s: the `max_wheel_speed` of the robot file, less a rounding.
 const MAX_SPEED: f64 = 2.9;

@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::convert::ConvertError;
 use crate::convert::robot_file::{self, Value};
 
-use super::TRACK_WIDTH;
+use super::odometry::TRACK_WIDTH;
 
 /// Writes `robot.toml`, with the scanner at `mount` and the bearings of its first and last beam.
 pub fn write(dir: &Path, mount: [f64; 2], field: [f64; 2]) -> Result<(), ConvertError> {
