@@ -155,7 +155,7 @@ struct Densities {
     clutter: f32,
     /// Anything, with the wall occluded.
     occluded: f32,
-    /// Anything, at a wrong pose.
+    /// Anything, at a wrong pose. An object that occluded the wall before returns its echo there as well.
     wrong_pose: f32,
 }
 
@@ -199,7 +199,12 @@ impl ExpectedEcho {
             wall: g * (1.0 - missed - short - long) * normal,
             clutter: g * spurious + (1.0 - g) * (1.0 - NO_ECHO_OFF_WALL) * everywhere,
             occluded: by_object,
-            wrong_pose: (1.0 - NO_ECHO_WRONG_POSE) * everywhere,
+            wrong_pose: if innovation < 0.0 {
+                (1.0 - self.occluded) * (1.0 - NO_ECHO_WRONG_POSE) * everywhere
+                    + self.occluded * by_object
+            } else {
+                (1.0 - NO_ECHO_WRONG_POSE) * everywhere
+            },
         }
     }
 
@@ -209,7 +214,8 @@ impl ExpectedEcho {
             wall: 0.0,
             clutter: g * parameters.missed + (1.0 - g) * NO_ECHO_OFF_WALL,
             occluded: NO_ECHO_OCCLUDED,
-            wrong_pose: NO_ECHO_WRONG_POSE,
+            wrong_pose: (1.0 - self.occluded) * NO_ECHO_WRONG_POSE
+                + self.occluded * NO_ECHO_OCCLUDED,
         }
     }
 }
@@ -287,7 +293,10 @@ mod tests {
             let sum = f64::from(found.association) + f64::from(found.occluded) + rest;
             prop_assert!((sum - 1.0).abs() < 1e-4, "{sum}");
             prop_assert!((f64::from(found.association) - wall / total).abs() < 1e-4);
-            let evidence = (0.3 + 0.7 * wrong / total).ln().min(4.0);
+            let is_long = echo.is_some_and(|echo| echo >= expected.range);
+            let o = if is_long { 0.0 } else { f64::from(expected.occluded) };
+            let object = if is_long { 0.0 } else { occluded };
+            let evidence = (0.3 + 0.7 * ((1.0 - o) * wrong + object) / total).ln().min(4.0);
             prop_assert!((f64::from(found.evidence) - evidence).abs() < 1e-3);
             prop_assert!(found.evidence >= -1.205 && found.evidence <= MAX_EVIDENCE);
         }

@@ -4,15 +4,16 @@
 //! measurements do. The evidence of each ping is the logarithm of its likelihood at a wrong pose over
 //! that at the estimated one, by the [echo model](crate::echo). A ping that agrees counts at most −1.2,
 //! because a wrong pose agrees by chance in three of ten pings; one that contradicts counts between 1 and
-//! 4, less or nothing if the wall is already known to be occluded. That knowledge fades with the distance
+//! 4, less or nothing if the wall is already known to be occluded: the occluding object returns its echo at
+//! a wrong pose as well, so that such a ping is no evidence for the pose either. That knowledge fades with the distance
 //! along the wall and with time, so that a wall that contradicts everywhere counts again.
 //!
 //! This is Page's cumulative sum test, eq. (23) of `docs/model.md`. The sum, never below 0, decides:
 //!
 //! ```text
-//!              2.5, or 10 pings without a usable      7, or 30 pings without
-//!              range, or mean NIS above 3, or too     an accepted range while
-//!              far without a fix, or uncertain        uncertain
+//!              2.5, or 8 pings in a row without an    6.5, or 30 pings without
+//!              accepted range, or mean NIS above 3,   an accepted range while
+//!              or too far without a fix, or uncertain uncertain
 //!   Tracking ────────────────────────────▶ Degraded ──────────────────────▶ Lost
 //!      ▲                                    │   ▲                             │
 //!      └── below 0.5, 3 accepted in a   ────┘   └── below 0.5, 3 accepted in a row
@@ -62,8 +63,8 @@ pub enum Verdict {
 const DEGRADED_AT: f32 = 2.5;
 /// The evidence at which the verdict is [`Verdict::Lost`], and the maximum. Chosen so that a robot
 /// kidnapped by 1 m and 90° is lost within 15 pings in 97 % of trials, and one among unmapped
-/// furniture in no run of 1,000 (`docs/health.md`).
-pub const LOST_AT: f32 = 7.0;
+/// furniture in less than one run of 500 (`docs/health.md`).
+pub const LOST_AT: f32 = 6.5;
 /// The evidence below which the verdict can improve.
 const BETTER_BELOW: f32 = 0.5;
 
@@ -75,8 +76,8 @@ const MAX_CONFIRMABLE_INFLATIONS: u16 = 3;
 /// uncertainty of the pose exceeds its limits.
 const LOST_AFTER_UNUSED: u16 = 30;
 
-/// Pings in a row without a usable range.
-const DEGRADED_AFTER_SILENT: u16 = 10;
+/// Pings in a row without an accepted range, for whatever reason: the estimate then depends on the encoders.
+const DEGRADED_AFTER_UNUSED: u16 = 8;
 /// Accepted ranges in a row that improve the verdict by one step.
 const BETTER_AFTER: u16 = 3;
 
@@ -314,12 +315,13 @@ impl Health {
     }
 
     fn worsen(&mut self, limits: &Limits) {
-        let is_silent = self.silent_in_a_row >= DEGRADED_AFTER_SILENT;
         let unused = self.silent_in_a_row.saturating_add(self.gated_in_a_row);
+        let is_unaided = unused >= DEGRADED_AFTER_UNUSED;
         let is_blind = unused >= LOST_AFTER_UNUSED && self.is_uncertain(limits);
         if self.evidence >= LOST_AT || is_blind {
             self.verdict = Verdict::Lost;
-        } else if self.verdict == Verdict::Tracking && (self.evidence >= DEGRADED_AT || is_silent) {
+        } else if self.verdict == Verdict::Tracking && (self.evidence >= DEGRADED_AT || is_unaided)
+        {
             self.verdict = Verdict::Degraded;
         }
         self.degrade(limits);
