@@ -34,7 +34,7 @@ struct Bar {
     why: &'static str,
 }
 
-const BARS: [Bar; 6] = [
+const BARS: [Bar; 9] = [
     Bar {
         section: "cortex-m4f",
         key: "predict_instructions",
@@ -64,6 +64,24 @@ const BARS: [Bar; 6] = [
         key: "filter_bytes",
         most: 200,
         why: "a filter should be copied as a value",
+    },
+    Bar {
+        section: "cortex-m4f",
+        key: "slice_instructions",
+        most: 5_000,
+        why: "two evaluations of the search should delay a poll by less than a millisecond at 16 MHz",
+    },
+    Bar {
+        section: "cortex-m4f",
+        key: "search_bytes",
+        most: 4_096,
+        why: "the search should fit into the RAM of a small controller",
+    },
+    Bar {
+        section: "cortex-m4f",
+        key: "search_text_bytes",
+        most: 16_384,
+        why: "the search belongs in a quarter of a 64 KiB flash",
     },
     Bar {
         section: BUILDING,
@@ -185,6 +203,7 @@ fn measure_on(target: &Target) -> anyhow::Result<BTreeMap<String, u32>> {
     let programs = [
         ("filter", "core_and_expect", &["predict", "expect", "gate", "update"][..]),
         ("localizer", "localizer", &["odometry", "aim", "fix"][..]),
+        ("search", "search", &["slice", "ping"][..]),
     ];
     for (name, code, calls) in programs {
         let report = emulator::run(target, Workspace::Emulated, name)?;
@@ -203,6 +222,9 @@ fn measure_on(target: &Target) -> anyhow::Result<BTreeMap<String, u32>> {
             Ok(())
         };
         text(code, calls)?;
+        if name == "search" {
+            figures.insert("slice_mean_instructions".to_owned(), report.number("slice_mean")?);
+        }
         if name == "filter" {
             text("core", &["predict", "gate", "update"])?;
         }

@@ -44,7 +44,7 @@ impl Default for Settings {
             tolerance: Duration::from_ticks(10_000),
             stamp: Stamp::Reflection,
             patience: Duration::from_ticks(150_000),
-            evaluations: 2,
+            evaluations: 1,
         }
     }
 }
