@@ -396,6 +396,32 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         self.bank.entries().iter().map(|entry| self.hypothesis(entry))
     }
 
+    /// The pings of the window as the best hypothesis places them on the map: where the sonar was, and the point on
+    /// the beam's axis at the measured range; `None` without an echo. For pictures.
+    pub fn placed_pings(&self) -> impl Iterator<Item = (Point, Option<Point>)> {
+        let best = self.bank.entries().first();
+        let pings = self.window.pings().iter();
+        pings.filter_map(move |ping| {
+            let placement = &best?.placement;
+            let from = placed(placement, ping.station.at);
+            let echo = ping.range().map(|range| ping.axis.times(range));
+            let echo = echo.map(|way| placed(placement, ping.station.at.plus(way)));
+            Some((from.into(), echo.map(Point::from)))
+        })
+    }
+
+    /// The lines among the pings as the best hypothesis places them on the map, each from end to end. For pictures.
+    pub fn placed_lines(&self) -> impl Iterator<Item = [Point; 2]> {
+        let best = self.bank.entries().first();
+        self.lines.all().iter().filter_map(move |line| {
+            let placement = &best?.placement;
+            let (begin, end) = line.stretch;
+            let foot = line.normal.times(line.offset);
+            let at = |along: f32| placed(placement, foot.plus(line.normal.left().times(along)));
+            Some([at(begin).into(), at(end).into()])
+        })
+    }
+
     /// The hypothesis of this rank, from 0, the best.
     #[must_use]
     pub fn ranked(&self, rank: usize) -> Option<Hypothesis> {
@@ -678,4 +704,9 @@ fn at_least_one(count: u16) -> f32 {
 fn largest(xx: f32, xy: f32, yy: f32) -> f32 {
     let half = 0.5 * (xx - yy);
     0.5 * (xx + yy) + libm::sqrtf(half * half + xy * xy)
+}
+
+/// A point of the odometry frame on the map.
+fn placed(placement: &Placement, at: Vector) -> Vector {
+    placement.at.plus(at.turned(placement.rotation))
 }

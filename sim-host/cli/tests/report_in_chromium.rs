@@ -59,6 +59,7 @@ fn trace(truth_known: bool) -> Trace {
         cone: 0.26,
         start: None,
         ticks: (0..200).map(|n| tick(f64::from(n) * 0.1, truth_known)).collect(),
+        searches: Vec::new(),
         fixes: vec![
             fix(1.0, Outcome::Accepted, Some(1.0), ""),
             fix(2.0, Outcome::Gated, Some(0.4), ""),

@@ -173,6 +173,7 @@ mod tests {
             cone: 0.26,
             start: None,
             ticks: (0..ticks).map(tick).collect(),
+            searches: Vec::new(),
             fixes: vec![FixRecord {
                 time: 0.5,
                 wall: None,

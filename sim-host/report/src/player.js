@@ -5,6 +5,7 @@
 (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
   const { ticks, fixes, walls } = data;
+  const searches = data.searches ?? [];
   const root = document.documentElement;
   if (ticks.time.length === 0) { // the page has a placeholder
     root.dataset.ready = "true";
@@ -17,6 +18,7 @@
   const TRACK = 0.35;          // metres, where the run does not know
   const SILENT_BEAM = 1.5;     // metres: how far a beam is drawn that heard nothing
   const FADE = 1.5;            // seconds after which a beam has faded to its least
+  const SEARCH_LASTS = 1.5;    // seconds after which a record of the search no longer holds
   const FOLLOW = "8";          // the view that F follows with, metres across
 
   const element = (id) => document.getElementById(id);
@@ -164,14 +166,74 @@
     drawTrail(g, cam, ticks.truth, moment, "truth", 3);
     drawTrail(g, cam, ticks.estimate, moment, "estimate", 1.5);
     if (moment.fix) drawBeam(g, cam, moment.fix, moment.time);
+    const search = searchAt(moment.time);
+    if (search) drawSearch(g, cam, search);
     if (moment.encoders) drawRobot(g, cam, moment.encoders, "encoders", false);
     if (moment.truth) drawRobot(g, cam, moment.truth, "truth", true);
-    if (moment.estimate) drawEstimate(g, cam, moment, magnified);
+    if (moment.estimate && (!search || search.provisional)) drawEstimate(g, cam, moment, magnified);
     drawNotes(g, cam, magnified);
+    if (search) drawSearchNote(g, search);
     drawStrip();
     showNumbers(moment);
     scrub.value = state.time;
     scrub.setAttribute("aria-valuetext", `${state.time.toFixed(1)} seconds`);
+  }
+
+  // The search at a time; none if the robot has a confirmed pose.
+  function searchAt(time) {
+    const index = lastBefore(searches.map((search) => search.time), time);
+    return index >= 0 && time - searches[index].time < SEARCH_LASTS ? searches[index] : null;
+  }
+
+  // The window of pings and its lines, as the best hypothesis places them, and the hypotheses, fainter with less weight.
+  function drawSearch(g, cam, { hypotheses, pings, lines }) {
+    g.strokeStyle = g.fillStyle = state.colours.ink;
+    g.lineWidth = 1;
+    pings.forEach(([x, y, echoX, echoY]) => {
+      if (echoX === null) return;
+      g.globalAlpha = 0.12;
+      g.beginPath();
+      g.moveTo(...onScreen(cam, x, y)), g.lineTo(...onScreen(cam, echoX, echoY));
+      g.stroke();
+      g.globalAlpha = 0.6;
+      g.beginPath();
+      g.arc(...onScreen(cam, echoX, echoY), 2.5, 0, 2 * Math.PI);
+      g.fill();
+    });
+    g.strokeStyle = state.colours.accepted;
+    g.lineWidth = 4;
+    g.globalAlpha = 0.6;
+    lines.forEach(([x0, y0, x1, y1]) => {
+      g.beginPath();
+      g.moveTo(...onScreen(cam, x0, y0)), g.lineTo(...onScreen(cam, x1, y1));
+      g.stroke();
+    });
+    g.globalAlpha = 1;
+    g.font = "13px system-ui, sans-serif";
+    [...hypotheses].reverse().forEach(([x, y, heading, weight]) => {
+      g.globalAlpha = Math.max(0.25, Math.sqrt(weight));
+      drawRobot(g, cam, { x, y, heading }, "estimate", false);
+      const [left, top] = onScreen(cam, x, y);
+      g.fillText(weight >= 0.01 ? weight.toFixed(2) : "<0.01", left + radiusOnScreen(cam) + 8, top);
+      g.globalAlpha = 1;
+    });
+  }
+
+  // What the search knows, and when it decided.
+  function drawSearchNote(g, search) {
+    const decided = searches.find((other) => other.provisional && other.time <= search.time);
+    const count = search.hypotheses.length;
+    const text = search.provisional
+      ? `provisional pose${decided ? `, decided at ${decided.time.toFixed(1)} s` : ""}`
+      : `searching: ${count} ${count === 1 ? "hypothesis" : "hypotheses"}, ${search.pings.length} pings, ${search.lines.length} lines`;
+    g.font = "14px system-ui, sans-serif";
+    g.textBaseline = "middle";
+    g.globalAlpha = 0.85;
+    g.fillStyle = state.colours.paper;
+    g.fillRect(4, 6, g.measureText(text).width + 16, 26);
+    g.globalAlpha = 1;
+    g.fillStyle = state.colours.ink;
+    g.fillText(text, 12, 19);
   }
 
   // 1, 2 or 5 times a power of ten metres: the largest that fits into a length.
@@ -343,6 +405,13 @@
       fixes.time.forEach((time, index) => {
         if (fixes.outcome[index] === outcome) g.fillRect(x(time) - 0.75, top, 1.5, height - top);
       });
+    });
+    // When the robot has no pose, and the moments of decision.
+    g.fillStyle = state.colours.estimate;
+    searches.forEach((search, index) => {
+      const isDecision = search.provisional && !(searches[index - 1]?.provisional);
+      if (!search.provisional) g.fillRect(x(search.time) - 0.75, 0, 1.5, 4);
+      if (isDecision) g.fillRect(x(search.time) - 1.5, 0, 3, height);
     });
     g.fillStyle = state.colours.ink;
     g.fillRect(x(state.time) - 1, 0, 2, height);

@@ -2,12 +2,15 @@
 
 use serde::Serialize;
 
-use sonarfix_sim::trace::{FixRecord, Outcome, Pose, Tick, Trace};
+use sonarfix_sim::trace::{FixRecord, Hypothesis, Outcome, Pose, SearchRecord, Tick, Trace};
 use sonarfix_sim::world::reflector::Source;
 
 /// Maximum number of ticks for the player, which interpolates between them: one every 0.3 s in a
 /// run of 20 minutes, in which a robot at 0.4 m/s moves 0.12 m.
 const MOST_TICKS: usize = 6_000;
+
+/// Maximum number of records of the search.
+const MOST_SEARCHES: usize = 400;
 
 /// Decimals of metres and seconds (0.1 mm), of angles (0.006°) and of dimensionless fractions.
 const LENGTH: i32 = 4;
@@ -32,6 +35,20 @@ struct Player<'a> {
     walls: Vec<Wall<'a>>,
     ticks: Ticks,
     fixes: Fixes<'a>,
+    searches: Vec<Search>,
+}
+
+/// The search at one instant.
+#[derive(Serialize)]
+struct Search {
+    time: Number,
+    provisional: bool,
+    /// x, y, heading and weight of each hypothesis.
+    hypotheses: Vec<[Number; 4]>,
+    /// x and y of the sonar, and of the echo; `null` without one.
+    pings: Vec<[Number; 4]>,
+    /// x and y of both ends.
+    lines: Vec<[Number; 4]>,
 }
 
 #[derive(Serialize)]
@@ -90,7 +107,40 @@ pub(super) fn json(trace: &Trace) -> Result<String, serde_json::Error> {
         walls: walls.collect(),
         ticks: ticks(trace),
         fixes: fixes(trace),
+        searches: searches(trace),
     })
+}
+
+/// Every n-th record of the search, and those at which a pose is handed over.
+fn searches(trace: &Trace) -> Vec<Search> {
+    let step = trace.searches.len().div_ceil(MOST_SEARCHES).max(1);
+    let mut was_provisional = false;
+    let mut kept = Vec::new();
+    for (index, record) in trace.searches.iter().enumerate() {
+        let is_decision = record.is_provisional && !was_provisional;
+        was_provisional = record.is_provisional;
+        if index % step == 0 || is_decision {
+            kept.push(search(record));
+        }
+    }
+    kept
+}
+
+fn search(record: &SearchRecord) -> Search {
+    let four = |[a, b]: [f64; 2], [c, d]: [f64; 2]| [a, b, c, d].map(|v| rounded(v, LENGTH));
+    let hypothesis = |found: &Hypothesis| {
+        let Pose { x, y, heading } = found.pose;
+        let (x, y) = (rounded(x, LENGTH), rounded(y, LENGTH));
+        [x, y, rounded(heading, ANGLE), rounded(found.weight, FRACTION)]
+    };
+    let ping = |(at, echo): &([f64; 2], Option<[f64; 2]>)| four(*at, echo.unwrap_or([f64::NAN; 2]));
+    Search {
+        time: rounded(record.time, TIME),
+        provisional: record.is_provisional,
+        hypotheses: record.hypotheses.iter().map(hypothesis).collect(),
+        pings: record.pings.iter().map(ping).collect(),
+        lines: record.lines.iter().map(|[from, to]| four(*from, *to)).collect(),
+    }
 }
 
 /// Every n-th tick, and the last.

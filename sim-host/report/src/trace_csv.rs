@@ -191,6 +191,7 @@ mod tests {
         let trace = Trace {
             start: Some(tick(0.0)),
             ticks: [0.1, 0.2, 0.3].map(tick).to_vec(),
+            searches: Vec::new(),
             fixes: [0.15, 0.2, 0.3].map(fix).to_vec(),
             ..Trace::default()
         };

@@ -9,10 +9,14 @@ use nalgebra::{DMatrix, DVector};
 use sonarfix::aim::{Aim, NoAim};
 use sonarfix::ekf::{Ekf, Innovation};
 use sonarfix::localizer::{Fix, Localizer};
+use sonarfix::pose::Point;
+use sonarfix::search::Search;
 
 use crate::angle;
 use crate::dense::{Matrix, Vector};
-use crate::trace::{Calibration, Estimate, FixRecord, Outcome, Pose, Why};
+use crate::trace::{
+    Calibration, Estimate, FixRecord, Hypothesis, Outcome, Pose, SearchRecord, Why,
+};
 use crate::world::reflector::Source;
 
 /// The localizer's estimate.
@@ -149,5 +153,29 @@ pub fn no_aim_record(measurement: Measurement, no_aim: NoAim) -> FixRecord {
         reason: no_aim.to_string(),
         innovation: None,
         innovation_variance: None,
+    }
+}
+
+/// The state of a search.
+#[must_use]
+#[expect(clippy::cast_precision_loss, reason = "a window of pings")]
+pub fn search_record(time: f64, is_provisional: bool, search: &Search) -> SearchRecord {
+    let best = search.ranked(0).map_or(0.0, |best| f64::from(best.fit));
+    let pings = search.pings() as f64;
+    let point = |point: Point| [point.x.0.into(), point.y.0.into()];
+    let hypotheses = search.hypotheses().map(|found| Hypothesis {
+        pose: Pose {
+            x: found.pose.x.0.into(),
+            y: found.pose.y.0.into(),
+            heading: found.pose.heading.radians().0.into(),
+        },
+        weight: (pings * (f64::from(found.fit) - best)).exp(),
+    });
+    SearchRecord {
+        time,
+        is_provisional,
+        hypotheses: hypotheses.collect(),
+        pings: search.placed_pings().map(|(at, echo)| (point(at), echo.map(point))).collect(),
+        lines: search.placed_lines().map(|ends| ends.map(point)).collect(),
     }
 }

@@ -144,6 +144,30 @@ pub struct FixRecord {
     pub innovation_variance: Option<f64>,
 }
 
+/// A hypothesis of the search.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Hypothesis {
+    /// The robot's pose.
+    pub pose: Pose,
+    /// Its likelihood over that of the best one.
+    pub weight: f64,
+}
+
+/// The state of the search at one instant, while the robot has no confirmed pose.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SearchRecord {
+    /// Seconds since the run began.
+    pub time: f64,
+    /// Whether a pose has been handed over and is not confirmed yet.
+    pub is_provisional: bool,
+    /// The hypotheses, best first.
+    pub hypotheses: Vec<Hypothesis>,
+    /// The pings of the window as the best hypothesis places them: sonar, and echo if there was one.
+    pub pings: Vec<([f64; 2], Option<[f64; 2]>)>,
+    /// The lines among them.
+    pub lines: Vec<[[f64; 2]; 2]>,
+}
+
 /// A wall with its name.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Wall {
@@ -168,6 +192,8 @@ pub struct Trace {
     pub ticks: Vec<Tick>,
     /// Every measurement cycle, in order of time.
     pub fixes: Vec<FixRecord>,
+    /// The search, in order of time.
+    pub searches: Vec<SearchRecord>,
 }
 
 impl Trace {
@@ -188,6 +214,8 @@ pub trait Recorder {
     fn tick(&mut self, make: impl FnOnce() -> Tick);
     /// A measurement cycle is over.
     fn fix(&mut self, make: impl FnOnce() -> FixRecord);
+    /// The robot has no confirmed pose, twice a second.
+    fn search(&mut self, _make: impl FnOnce() -> SearchRecord) {}
     /// The robot's localizer has started, at the fidelity of pins.
     fn began(&mut self, _localizer: &Localizer) {}
     /// The robot's loop was polled, at the fidelity of pins.
@@ -212,5 +240,9 @@ impl Recorder for Trace {
 
     fn fix(&mut self, make: impl FnOnce() -> FixRecord) {
         self.fixes.push(make());
+    }
+
+    fn search(&mut self, make: impl FnOnce() -> SearchRecord) {
+        self.searches.push(make());
     }
 }

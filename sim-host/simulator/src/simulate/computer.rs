@@ -102,7 +102,7 @@ pub trait Controller {
 }
 
 /// Evaluations of the search in a poll. A robot that searches is polled every millisecond in the simulation, and
-/// continuously with two evaluations on a board: 40,000 a second take less than half of a 168 MHz Cortex-M4F.
+/// continuously with one evaluation on a board: 40,000 a second take less than half of a 168 MHz Cortex-M4F.
 const EVALUATIONS: u16 = 40;
 
 /// The start of a localizer without a pose.

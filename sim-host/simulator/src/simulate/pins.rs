@@ -2,6 +2,7 @@
 
 use sonarfix::localizer::{Localizer, Start};
 use sonarfix::navigator::Mode;
+use sonarfix::search::Search;
 use sonarfix::units::{Instant, Metres, Radians};
 use sonarfix_hal::robot::{PingResult, Report};
 use sonarfix_map::Scenario;
@@ -81,6 +82,8 @@ struct SimulatedHardware<'a> {
     score: Score<'a>,
     /// Length of the board's pulse without an echo, µs.
     silence: u64,
+    /// When the search was recorded last, µs.
+    search_recorded_at: u64,
     /// When the robot will be carried, and how far.
     carried: Option<Carried>,
     /// What determines the robot's pose.
@@ -119,6 +122,7 @@ impl<'a> SimulatedHardware<'a> {
             follower: simulation.follower(),
             score,
             silence: devices::listening_time(&scenario.robot) + GIVES_UP_AFTER,
+            search_recorded_at: 0,
             carried: simulation.carried,
             mode: Mode::Tracking,
             measurement: None,
@@ -146,6 +150,7 @@ impl<'a> SimulatedHardware<'a> {
             self.obey(actuators);
             self.mode = controller.mode()?;
             self.record(&report, localizer, recorder);
+            self.record_search(&report, controller.search(), recorder);
             // A ping may delay a tick, but by less than a period.
             let is_last = report.tick.is_some() && self.now + period > end;
             if is_last || self.now > end + period {
@@ -269,6 +274,23 @@ impl<'a> SimulatedHardware<'a> {
                 observe::no_aim_record(measurement, no_aim)
             });
         }
+    }
+
+    /// Records the search twice a second, and at every change of the mode.
+    fn record_search(
+        &mut self,
+        report: &Report,
+        search: Option<&Search>,
+        recorder: &mut impl Recorder,
+    ) {
+        const PERIOD: u64 = 500_000;
+        let is_due = report.mode.is_some() || self.now >= self.search_recorded_at + PERIOD;
+        let Some(search) = search.filter(|_| is_due && self.mode != Mode::Tracking) else {
+            return;
+        };
+        self.search_recorded_at = self.now;
+        let is_provisional = self.mode == Mode::Provisional;
+        recorder.search(|| observe::search_record(self.time(), is_provisional, search));
     }
 
     fn record_fix(
