@@ -213,6 +213,9 @@ fn measure_on(target: &Target) -> anyhow::Result<BTreeMap<String, u32>> {
             figures.insert(format!("{call}_stack_bytes"), cost.most_stack);
         }
         figures.insert(format!("{name}_bytes"), report.number("object")?);
+        if name == "search" {
+            figures.insert("slice_mean_instructions".to_owned(), report.number("slice_mean")?);
+        }
         let program = Program::read(&target.program(Workspace::Emulated, name))?;
         let mut text = |code: &str, calls: &[&str]| -> anyhow::Result<()> {
             let roots: Vec<String> = calls.iter().map(|call| format!("probe_{call}")).collect();
@@ -222,9 +225,6 @@ fn measure_on(target: &Target) -> anyhow::Result<BTreeMap<String, u32>> {
             Ok(())
         };
         text(code, calls)?;
-        if name == "search" {
-            figures.insert("slice_mean_instructions".to_owned(), report.number("slice_mean")?);
-        }
         if name == "filter" {
             text("core", &["predict", "gate", "update"])?;
         }
