@@ -9,6 +9,7 @@
 mod attacks;
 mod commands;
 mod flash;
+mod load;
 mod motors;
 mod power_cut;
 mod random;
