@@ -60,7 +60,7 @@ pub use scenario::{Run, Scenario, Start, Truth};
 pub use simplify::{Limits, Simplified, simplify};
 pub use surroundings::{Obstacle, Oscillation, Outline, Surroundings};
 pub use survey::{Finding, Flaw, Severity, survey};
-pub use symmetry::{Motion as SymmetryMotion, Symmetry, symmetries};
+pub use symmetry::{Motion as SymmetryMotion, Symmetry, symmetries, with_cabinet};
 
 /// The text of the reference scenario, with the conditions of the paper.
 pub const PAPER: &str = include_str!("../scenarios/paper.toml");

@@ -8,7 +8,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use std::fmt;
 
 use crate::bake::{BakeError, bake};
-use crate::floor::Floor;
+use crate::floor::{Floor, NamedWall};
 use crate::geometry::{Point, Segment, distance, wrap};
 use crate::neighbours::Neighbours;
 
@@ -29,8 +29,9 @@ const LEAST_DISPLACEMENT: f64 = 0.5;
 const FIRST: usize = 16;
 /// A stride through the points that visits neighbours late.
 const STRIDE: usize = 7_919;
-/// Depth of a cabinet, metres.
+/// Depth and width of a cabinet, metres.
 const CABINET: f64 = 0.4;
+const WIDTH: f64 = 0.6;
 
 /// A motion by which the map repeats itself.
 #[derive(Debug, Clone, PartialEq)]
@@ -64,6 +65,37 @@ impl Symmetry {
     pub fn is_whole(&self) -> bool {
         self.share >= WHOLE
     }
+}
+
+/// A floor with a cabinet in its map, at the place of a wall that is nearest to a point; `None` of a floor
+/// without walls.
+#[must_use]
+pub fn with_cabinet(floor: &Floor, near: [f64; 2]) -> Option<Floor> {
+    let segments = floor.named_walls().iter().map(NamedWall::segment);
+    let wall =
+        segments.min_by(|one, other| one.distance_to(near).total_cmp(&other.distance_to(near)))?;
+    let at = wall.at(wall.place(near)[0].clamp(0.0, wall.length()));
+    // On the side of the middle of the map.
+    let ends: Vec<Point> = floor.named_walls().iter().flat_map(|w| [w.from(), w.to()]).collect();
+    #[expect(clippy::cast_precision_loss, reason = "far fewer than 2^53 walls")]
+    let count = ends.len() as f64;
+    let sum = ends.iter().fold([0.0, 0.0], |sum: Point, end| [sum[0] + end[0], sum[1] + end[1]]);
+    let side = wall.place([sum[0] / count, sum[1] / count])[1].signum();
+    let [x, y] = wall.tangent();
+    let corner = |along: f64, depth: f64| {
+        [at[0] + along * x - side * depth * y, at[1] + along * y + side * depth * x]
+    };
+    let half = 0.5 * WIDTH;
+    let outline =
+        [corner(-half, 0.0), corner(-half, CABINET), corner(half, CABINET), corner(half, 0.0)];
+    let mut walls = floor.named_walls().to_vec();
+    for (n, ends) in outline.windows(2).enumerate() {
+        if let [from, to] = ends {
+            // Sides of a cabinet have a length and lie near the map.
+            walls.extend(NamedWall::new(format!("cabinet {n}"), *from, *to));
+        }
+    }
+    Some(Floor::new(walls))
 }
 
 impl fmt::Display for Symmetry {
@@ -191,6 +223,18 @@ fn turned([x, y]: Point, by: f64) -> Point {
 }
 
 impl Motion {
+    /// The images of a pose (x, y, heading) under the motion and under its inverse.
+    #[must_use]
+    pub fn images(&self, [x, y, heading]: [f64; 3]) -> [[f64; 3]; 2] {
+        match *self {
+            Self::Turn { by, about: [cx, cy] } => [by, -by].map(|by| {
+                let [dx, dy] = turned([x - cx, y - cy], by);
+                [cx + dx, cy + dy, wrap(heading + by)]
+            }),
+            Self::Shift([dx, dy]) => [[x + dx, y + dy, heading], [x - dx, y - dy, heading]],
+        }
+    }
+
     fn is_like(&self, other: &Self) -> bool {
         const NEAR: f64 = 2.0 * ALIKE;
         match (self, other) {

@@ -94,6 +94,43 @@ impl EchoParameters {
     }
 }
 
+/// Logarithms of probabilities and of densities over that of an echo anywhere, for a score of many
+/// pings. Those that depend on the range hold at half of the longest one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct LogShares {
+    /// A reflector answers, and it does not.
+    pub answers: f32,
+    pub misses: f32,
+    /// Clutter before a reflector, and behind it.
+    pub before: f32,
+    pub behind: f32,
+    /// No echo where a reflector answers.
+    pub silence: f32,
+}
+
+impl EchoParameters {
+    /// The shares of one reflector; `anywhere` is the density of an echo anywhere, per metre.
+    pub(crate) fn log_shares(&self, longest: Metres, anywhere: f32) -> LogShares {
+        let range = 0.5 * longest.0;
+        let occluded = self.prior_occlusion(Metres(range));
+        let per_metre = 1.0 / (range * anywhere);
+        let before = self.short + occluded * (1.0 - NO_ECHO_OCCLUDED - BEYOND_OCCLUDED);
+        let behind = self.long + occluded * BEYOND_OCCLUDED;
+        let silence = self.missed + occluded * NO_ECHO_OCCLUDED;
+        let log = |share: f32| ln(at_least(share, LEAST_SHARE));
+        LogShares {
+            answers: log(1.0 - self.missed - self.short - self.long),
+            misses: log(self.missed + self.short + self.long),
+            before: log(before * per_metre),
+            behind: log(behind * per_metre),
+            silence: log(silence / NO_ECHO_WRONG_POSE),
+        }
+    }
+}
+
+/// Least share of which a logarithm is taken: one ping does not decide.
+const LEAST_SHARE: f32 = 0.01;
+
 impl Default for EchoParameters {
     fn default() -> Self {
         Self::HC_SR04

@@ -192,7 +192,7 @@ impl<'m> Navigator<'m> {
     }
 
     fn restart(&mut self, search: &mut Search<'m>) {
-        search.restart(&self.localizer.config().sonar, self.localizer.map());
+        search.restart(self.localizer.config(), self.localizer.map());
         self.not_before = 0;
     }
 

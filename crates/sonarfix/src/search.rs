@@ -31,6 +31,7 @@ use vector::Vector;
 use window::Window;
 
 use crate::config::{Config, Sonar};
+use crate::echo::EchoParameters;
 use crate::map::{Map, WallId};
 use crate::pose::{Point, Pose};
 use crate::units::{Metres, Radians};
@@ -49,14 +50,16 @@ pub struct SearchParameters {
     pub turn_scale: f32,
     /// Deviation that a metre of odometry adds to the place of a ping besides, metres.
     pub odometry: f32,
+    /// What a ping returns besides the range of its wall.
+    pub echo: EchoParameters,
     /// Hypotheses within this log-likelihood of the best are answers, too.
     pub margin: f32,
     /// The mean log-likelihood per ping, relative to echoes anywhere, of a hypothesis that fits.
     pub least_fit: f32,
     /// Novel pings during which one hypothesis must be the only answer before it is unique.
     pub persistence: u16,
-    /// Largest deviation of the position of a unique answer.
-    pub sharpness: Metres,
+    /// Largest deviations of position and heading of a unique answer.
+    pub sharpness: (Metres, Radians),
 }
 
 impl Default for SearchParameters {
@@ -67,10 +70,11 @@ impl Default for SearchParameters {
             drift: Radians::from_degrees(2.0),
             turn_scale: 0.02,
             odometry: 0.015,
-            margin: 10.0,
+            echo: EchoParameters::HC_SR04,
+            margin: 8.0,
             least_fit: 0.3,
             persistence: 20,
-            sharpness: Metres(0.05),
+            sharpness: (Metres(0.045), Radians::from_degrees(3.0)),
         }
     }
 }
@@ -103,6 +107,33 @@ impl Region {
         within(at.x, from.x, to.x) && within(at.y, from.y, to.y)
     }
 }
+
+impl SearchParameters {
+    /// For the sonar, the wheels and the priors of a robot.
+    #[must_use]
+    pub fn of(config: &Config) -> Self {
+        let Config { drive, prior, .. } = config;
+        let width = drive.track_width.0;
+        let by_wheels = libm::hypotf(prior.scale_right, prior.scale_left);
+        let by_width = prior.track_width.0 / width;
+        // Heading noise after a metre: the deviation aside that it causes grows with the distance to the
+        // power 1.5, and is this many metres a metre at 4 m.
+        let per_root_metre = core::f32::consts::SQRT_2 * drive.wheel_noise.0.0 / width;
+        let at_least = |value: f32, least: f32| if value > least { value } else { least };
+        Self {
+            drift: Radians(at_least(by_wheels / width, LEAST_DRIFT.0)),
+            turn_scale: at_least(libm::hypotf(by_width, 0.5 * by_wheels), LEAST_TURN_SCALE),
+            odometry: at_least(1.2 * per_root_metre, LEAST_ODOMETRY),
+            echo: config.echo,
+            ..Self::default()
+        }
+    }
+}
+
+/// Least deviations: a prior of zero would fix what a slip changes.
+const LEAST_DRIFT: Radians = Radians(0.005);
+const LEAST_TURN_SCALE: f32 = 0.003;
+const LEAST_ODOMETRY: f32 = 0.005;
 
 /// A pose that the pings fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -263,7 +294,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         let (right, left) = (sonar.servo.0.0, sonar.servo.1.0);
         Self {
             parameters,
-            echoes: EchoModel::new(map, sonar.cone, sonar.max_range),
+            echoes: EchoModel::new(map, sonar, &parameters.echo),
             servo: (right, left),
             sweep: Sweep { bearing: right, step: parameters.novel_angle.0 },
             window: Window::new(sonar.mount.into()),
@@ -279,11 +310,13 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         }
     }
 
-    /// Begins again, without a ping, a hypothesis or an answer; the parameters stay. It changes the
-    /// state in place, because a copy of it on a microcontroller's stack is large.
-    pub fn restart(&mut self, sonar: &Sonar, map: Map<'m>) {
+    /// Begins again for a robot, without a ping, a hypothesis or an answer. It changes the state in
+    /// place, because a copy of it on a microcontroller's stack is large.
+    pub fn restart(&mut self, config: &Config, map: Map<'m>) {
+        let sonar = &config.sonar;
+        self.parameters = SearchParameters::of(config);
         let (right, left) = (sonar.servo.0.0, sonar.servo.1.0);
-        self.echoes = EchoModel::new(map, sonar.cone, sonar.max_range);
+        self.echoes = EchoModel::new(map, sonar, &self.parameters.echo);
         self.servo = (right, left);
         self.sweep = Sweep { bearing: right, step: self.parameters.novel_angle.0 };
         self.window.restart(sonar.mount.into());
@@ -630,7 +663,9 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         let is_fit = best.score >= self.parameters.least_fit * pings;
         let variance = largest(spread.xx, spread.xy, spread.yy);
         let is_determined = variance < UNDETERMINED * UNDETERMINED;
-        let is_sharp = variance < self.parameters.sharpness.0 * self.parameters.sharpness.0;
+        let (position, heading) = self.parameters.sharpness;
+        let is_sharp =
+            variance < position.0 * position.0 && spread.rotation < heading.0 * heading.0;
         let has_lines = self.has_separate_lines();
         let is_sole = rivals == 1 && is_fit && is_determined && has_lines;
         for (n, entry) in self.bank.entries_mut().iter_mut().enumerate() {

@@ -5,9 +5,10 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use sonarfix_map::{Floor, Scenario, robot_file};
+use sonarfix_map::{Floor, Scenario, robot_file, with_cabinet};
 use sonarfix_replay::find::{Find, Found};
 use sonarfix_report::Table;
+use sonarfix_studies::floor_plan::Kind;
 use sonarfix_studies::search_study::{self, Summary, Trial};
 
 use crate::progress::Runs;
@@ -36,6 +37,12 @@ pub struct Args {
     /// Makes so many trials in random floor plans instead.
     #[arg(long, value_name = "TRIALS", conflicts_with = "file")]
     floor_plans: Option<u32>,
+    /// Adds a mapped cabinet to a scenario, beside the wall that is nearest to this place.
+    #[arg(long, value_name = "X,Y")]
+    cabinet: Option<String>,
+    /// Takes only homes among the floor plans.
+    #[arg(long, requires = "floor_plans")]
+    homes: bool,
     /// Prints every trial.
     #[arg(long)]
     trials: bool,
@@ -48,8 +55,9 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     anyhow::ensure!(args.seconds > 0.0, "--seconds must be positive");
     let trials = match (&args.file, args.floor_plans) {
         (_, Some(trials)) => {
+            let kind = args.homes.then_some(Kind::Home);
             let runs = Runs::new(trials);
-            let found = search_study::floor_plans(args.seed, trials, args.seconds, &runs)?;
+            let found = search_study::floor_plans(args.seed, trials, args.seconds, kind, &runs)?;
             runs.end()?;
             found
         }
@@ -57,7 +65,11 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
             return search_log(file, args);
         }
         (Some(file), None) => {
-            let scenario = Scenario::read(file)?;
+            let mut scenario = Scenario::read(file)?;
+            if let Some(at) = &args.cabinet {
+                let floor = with_cabinet(&scenario.floor, point(at)?);
+                scenario.floor = floor.context("the map has no wall")?;
+            }
             let runs = Runs::new(args.runs);
             let found =
                 search_study::scenario(&scenario, args.seed, args.runs, args.seconds, &runs)?;
@@ -76,6 +88,13 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     }
     println!("{}", table::text(&summary_table(&summary, args.seconds)));
     Ok(())
+}
+
+/// A point as `X,Y`, metres.
+fn point(text: &str) -> anyhow::Result<[f64; 2]> {
+    let (x, y) = text.split_once(',').context("--cabinet must be X,Y in metres")?;
+    let number = |text: &str| text.trim().parse().context("--cabinet must be X,Y in metres");
+    Ok([number(x)?, number(y)?])
 }
 
 fn search_log(log: &Path, args: &Args) -> anyhow::Result<()> {
@@ -140,6 +159,7 @@ fn trial_table(trials: &[Trial]) -> Table {
 fn summary_table(summary: &Summary, seconds: f64) -> Table {
     let percent = |share: f64| format!("{:.1} %", 100.0 * share);
     let row = |name: &str, value: String| vec![name.to_owned(), value];
+    let twins = summary.with_all_twins.map_or("no symmetry".to_owned(), percent);
     Table {
         title: format!("{} trials of at most {seconds} s", summary.trials),
         note: String::new(),
@@ -147,7 +167,9 @@ fn summary_table(summary: &Summary, seconds: f64) -> Table {
         rows: vec![
             row("unique and right", percent(summary.unique_and_right)),
             row("unique and wrong", percent(summary.unique_and_wrong)),
+            row("the same within 45 s", percent(summary.right_within_45)),
             row("true pose in the bank at the end", percent(summary.in_bank)),
+            row("true pose and all twins among the answers", twins),
             row("true pose best at the end", percent(summary.best_is_right)),
             row("mean time to a unique answer", format!("{:.1} s", summary.mean_seconds)),
             row(

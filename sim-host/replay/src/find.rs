@@ -136,7 +136,7 @@ impl<'a> Run<'a> {
         let sonar = &robot.localizer.sonar;
         let signed = [robot.right_wheel.signed_travel(), robot.left_wheel.signed_travel()];
         Self {
-            search: Search::new(sonar, Map::new(walls), SearchParameters::default()),
+            search: Search::new(sonar, Map::new(walls), SearchParameters::of(&robot.localizer)),
             track_width: robot.localizer.drive.track_width.0.into(),
             travel_per_tick: signed.map(|travel| travel.0.into()),
             first: None,

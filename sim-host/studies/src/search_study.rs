@@ -11,7 +11,7 @@ use serde::Serialize;
 use sonarfix::map::{Map, MapError};
 use sonarfix::search::{Answer, Hypothesis, Search, SearchParameters};
 use sonarfix::units::{Metres, Radians};
-use sonarfix_map::{BakeError, FileError, Scenario};
+use sonarfix_map::{BakeError, FileError, Follow, Scenario, Symmetry, symmetries};
 use sonarfix_sim::angle;
 use sonarfix_sim::plant::Plant;
 use sonarfix_sim::progress::Progress;
@@ -19,7 +19,7 @@ use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::trace::Pose;
 use sonarfix_sim::world::Ping;
 
-use crate::floor_plan::FloorPlan;
+use crate::floor_plan::{FloorPlan, Kind};
 
 /// Time of one ping of an HC-SR04 on an SG90 with steps of 20°, seconds: a frame of the servo, the
 /// turn, settling and the cycle of the sonar.
@@ -66,6 +66,9 @@ pub struct Trial {
     pub rank: Option<usize>,
     /// How many hypotheses were answers at the end.
     pub answers: usize,
+    /// Whether the true pose and its images under the symmetries of the map were among the answers when
+    /// there last were several; `None` of a map without symmetry.
+    pub has_all_twins: Option<bool>,
     /// Complete cycles of the search.
     pub cycles: u32,
 }
@@ -79,20 +82,24 @@ pub fn trial(mut scenario: Scenario, seed: u64, seconds: f64) -> Result<Trial, S
     let mut rng = stream(seed, 0);
     scenario.truth.scale_right = rng.random_range(-WHEEL_ERROR..WHEEL_ERROR);
     scenario.truth.scale_left = rng.random_range(-WHEEL_ERROR..WHEEL_ERROR);
+    // There is no estimate to follow.
+    scenario.follow = Follow::Truth;
     let spare = scenario.path.duration() - seconds;
     let start = if spare > 1.0 { rng.random_range(0.0..spare) } else { 0.0 };
     let simulation = Simulation::new(scenario);
     let image = simulation.baked_map()?;
     let config = simulation.config();
     let mut drive = Drive {
-        search: Search::new(&config.sonar, Map::read(&image)?, SearchParameters::default()),
+        search: Search::new(&config.sonar, Map::read(&image)?, SearchParameters::of(&config)),
         plant: Plant::new(&simulation.scenario, simulation.range_scale()),
         track_width: config.drive.track_width.0.into(),
         simulation: &simulation,
         wheels: stream(seed, 1),
         noise: stream(seed, 2),
         luck: stream(seed, 3),
+        has_all_twins: None,
     };
+    let symmetries = symmetries(&simulation.scenario.floor)?;
     drive.plant.drive_to(start, &mut drive.wheels);
     let end = simulation.scenario.path.duration().min(start + seconds);
     let mut time = start + PERIOD;
@@ -102,6 +109,7 @@ pub fn trial(mut scenario: Scenario, seed: u64, seconds: f64) -> Result<Trial, S
         if let Answer::Unique(hypothesis) = drive.search.answer() {
             unique = Some((time - start, hypothesis));
         }
+        drive.note_twins(&symmetries);
         time += PERIOD;
     }
     Ok(drive.result(seed, unique))
@@ -115,6 +123,7 @@ struct Drive<'a> {
     wheels: ChaCha8Rng,
     noise: ChaCha8Rng,
     luck: ChaCha8Rng,
+    has_all_twins: Option<bool>,
 }
 
 impl Drive<'_> {
@@ -141,13 +150,26 @@ impl Drive<'_> {
         self.search.poll(EVALUATIONS);
     }
 
+    /// Notes whether the true pose and its images under every motion are among several answers.
+    fn note_twins(&mut self, symmetries: &[Symmetry]) {
+        let whole = || symmetries.iter().filter(|symmetry| symmetry.is_whole());
+        if whole().next().is_none() {
+            return;
+        }
+        let found = self.has_all_twins.get_or_insert(false);
+        let Answer::Several(count) = self.search.answer() else { return };
+        let truth = self.plant.pose();
+        let answers: Vec<Hypothesis> = self.search.hypotheses().take(count).collect();
+        let pose = [truth.x, truth.y, truth.heading];
+        let images = whole().flat_map(|symmetry| symmetry.motion.images(pose));
+        let mut wanted = images.chain([pose]).map(|[x, y, heading]| Pose { x, y, heading });
+        *found = wanted.all(|twin| answers.iter().any(|answer| is_right(answer, &twin)));
+    }
+
     fn result(&self, seed: u64, unique: Option<(f64, Hypothesis)>) -> Trial {
         let truth = self.plant.pose();
         let errors = |hypothesis: &Hypothesis| errors(hypothesis, &truth);
-        let is_right = |hypothesis: &Hypothesis| {
-            let (position, heading) = errors(hypothesis);
-            position < RIGHT.0 && heading < RIGHT.1
-        };
+        let is_right = |hypothesis: &Hypothesis| is_right(hypothesis, &truth);
         let (position_error, heading_error) =
             unique.as_ref().map_or((0.0, 0.0), |(_, found)| errors(found));
         Trial {
@@ -163,9 +185,15 @@ impl Drive<'_> {
                 Answer::Unique(_) => 1,
                 Answer::Searching | Answer::Nowhere | Answer::Along { .. } => 0,
             },
+            has_all_twins: self.has_all_twins,
             cycles: self.search.cycles(),
         }
     }
+}
+
+fn is_right(hypothesis: &Hypothesis, truth: &Pose) -> bool {
+    let (position, heading) = errors(hypothesis, truth);
+    position < RIGHT.0 && heading < RIGHT.1
 }
 
 fn errors(hypothesis: &Hypothesis, truth: &Pose) -> (f64, f64) {
@@ -174,7 +202,8 @@ fn errors(hypothesis: &Hypothesis, truth: &Pose) -> (f64, f64) {
     (position, angle::wrap(f64::from(found.heading.radians().0) - truth.heading).abs())
 }
 
-/// Trials in floor plans: the plan, the wheels and the place on the path of each come from its seed.
+/// Trials in floor plans, of one kind if given: the plan, the wheels and the place on the path of each
+/// come from its seed.
 ///
 /// # Errors
 /// [`SearchStudyError`] of the first plan that cannot be used.
@@ -182,15 +211,18 @@ pub fn floor_plans(
     first: u64,
     trials: u32,
     seconds: f64,
+    kind: Option<Kind>,
     progress: &impl Progress,
 ) -> Result<Vec<Trial>, SearchStudyError> {
-    let seeds = (0..u64::from(trials)).into_par_iter().map(|n| first.wrapping_add(n));
-    let one = |seed| {
-        let trial = trial(FloorPlan::new(seed).scenario()?, seed, seconds);
+    let seeds = (0..u64::MAX).map(|n| first.wrapping_add(n));
+    let plans = seeds.map(FloorPlan::new).filter(|plan| kind.is_none_or(|kind| plan.kind == kind));
+    let plans: Vec<FloorPlan> = plans.take(trials as usize).collect();
+    let one = |plan: &FloorPlan| {
+        let trial = trial(plan.scenario()?, plan.seed, seconds);
         progress.finished();
         trial
     };
-    seeds.filter(|_| !progress.is_interrupted()).map(one).collect()
+    plans.par_iter().filter(|_| !progress.is_interrupted()).map(one).collect()
 }
 
 /// Trials in one scenario.
@@ -220,12 +252,17 @@ pub struct Summary {
     pub trials: usize,
     /// Share with a unique and right answer.
     pub unique_and_right: f64,
+    /// The same within 45 seconds.
+    pub right_within_45: f64,
     /// Share with a unique and wrong answer.
     pub unique_and_wrong: f64,
     /// Share with the true pose in the bank at the end.
     pub in_bank: f64,
     /// Share with the true pose as the best hypothesis at the end.
     pub best_is_right: f64,
+    /// Share with the true pose and all its images among the last answers, of the trials in a
+    /// map with symmetry; `None` without such trials.
+    pub with_all_twins: Option<f64>,
     /// Mean time to a unique answer, seconds.
     pub mean_seconds: f64,
     /// 95th percentile of the position error of right unique answers, metres.
@@ -246,9 +283,16 @@ impl Summary {
         Self {
             trials: trials.len(),
             unique_and_right: share(&|trial| trial.is_right),
+            right_within_45: share(&|trial| {
+                trial.is_right && trial.unique_after.is_some_and(|after| after <= 45.0)
+            }),
             unique_and_wrong: share(&|trial| is_unique(trial) && !trial.is_right),
             in_bank: share(&|trial| trial.rank.is_some()),
             best_is_right: share(&|trial| trial.rank == Some(0)),
+            with_all_twins: trials.iter().any(|trial| trial.has_all_twins.is_some()).then(|| {
+                count(&|trial| trial.has_all_twins == Some(true))
+                    / count(&|trial| trial.has_all_twins.is_some())
+            }),
             mean_seconds: trials.iter().filter_map(|trial| trial.unique_after).sum::<f64>()
                 / count(&is_unique),
             position_error_95: percentile_95(right().map(|trial| trial.position_error).collect()),

@@ -8,8 +8,11 @@
 use heapless::Vec;
 
 use super::vector::Vector;
+use crate::config::Sonar;
+use crate::echo::{EchoParameters, LogShares};
+use crate::elementary::{ln, sqrt};
 use crate::map::{Map, Wall};
-use crate::units::{Metres, Radians};
+use crate::units::Metres;
 
 /// Nearest reflectors that are looked at.
 const REFLECTORS: usize = 6;
@@ -24,25 +27,22 @@ const SQUARE: f32 = 0.26;
 /// Residuals beyond so many deviations are no match.
 const MATCH: f32 = 3.0;
 /// Logarithms of the probability that a reflector answers, and that it does not.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy)]
 struct Audible {
     hit: f32,
     miss: f32,
 }
 
-/// 0.9, 0.75, 0.4 and 0.1. Chosen, between an HC-SR04 and the NXT's recorded shares.
-const STRONG: Audible = Audible { hit: -0.105, miss: -2.303 };
+/// Concave corners (0.75), reflectors at the rim of cone or range (0.4), and ends of walls (0.1).
+/// Chosen, between an HC-SR04 and the NXT's recorded shares.
 const CORNER: Audible = Audible { hit: -0.288, miss: -1.386 };
 const RIM: Audible = Audible { hit: -0.916, miss: -0.511 };
 const WEAK: Audible = Audible { hit: -2.303, miss: -0.105 };
 
-/// An echo from something that the map does not hold, before the wall on the axis and behind it.
-const CLUTTER: f32 = -0.9;
-const BEHIND: f32 = -2.2;
+/// The lowest score of an echo: a single one does not decide.
 const LEAST_ECHO: f32 = -3.5;
-/// No echo where nothing answers, and the worst where something should.
+/// No echo where nothing answers.
 const SILENCE: f32 = 0.7;
-const LEAST_SILENCE: f32 = -1.2;
 
 /// How sharp ranges are expected.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,8 +66,8 @@ impl Sharpness {
 
     /// Of a ping that was sent so far from the reference that odometry adds a deviation of its own.
     pub fn new(deviation: f32, odometry: f32) -> Self {
-        let deviation = libm::sqrtf(deviation * deviation + odometry * odometry);
-        let peak = libm::logf(ONE_OVER_ROOT_TWO_PI / ANYWHERE / deviation);
+        let deviation = sqrt(deviation * deviation + odometry * odometry);
+        let peak = ln(ONE_OVER_ROOT_TWO_PI / ANYWHERE / deviation);
         Self { deviation, peak }
     }
 }
@@ -106,6 +106,7 @@ pub(super) struct EchoModel<'m> {
     cos_cone: f32,
     cos_rim: f32,
     pub max_range: f32,
+    shares: LogShares,
     /// Inverse of the deviation of the angle between the axis and what answers.
     pub by_beam: f32,
 }
@@ -120,13 +121,15 @@ struct Reflector {
 }
 
 impl<'m> EchoModel<'m> {
-    pub fn new(map: Map<'m>, cone: Radians, max_range: Metres) -> Self {
+    pub fn new(map: Map<'m>, sonar: &Sonar, echo: &EchoParameters) -> Self {
+        let Sonar { cone, max_range, .. } = *sonar;
         let cos = |angle| crate::trig::sin_cos(angle).1;
         Self {
             map,
             cos_cone: cos(cone),
             cos_rim: cos(cone * 1.6),
             max_range: max_range.0,
+            shares: echo.log_shares(max_range, ANYWHERE),
             by_beam: 1.0 / (BEAM * cone.0),
         }
     }
@@ -164,9 +167,10 @@ impl<'m> EchoModel<'m> {
             }
         }
         let other = match beam.range {
-            None => at_least(SILENCE + missed, LEAST_SILENCE),
+            None => at_least(SILENCE + missed, self.shares.silence),
             Some(range) => {
-                let clutter = if range < free + margin { CLUTTER } else { BEHIND };
+                let is_before = range < free + margin;
+                let clutter = if is_before { self.shares.before } else { self.shares.behind };
                 at_least(clutter + missed, LEAST_ECHO)
             }
         };
@@ -211,7 +215,7 @@ impl<'m> EchoModel<'m> {
                 {
                     continue;
                 }
-                let distance = libm::sqrtf(square);
+                let distance = sqrt(square);
                 // An edge that cannot be the echo hardly matters.
                 let juts_out = to_end.dot(arm) >= 0.0;
                 if juts_out && (distance - range).abs() > margin {
@@ -269,7 +273,7 @@ impl<'m> EchoModel<'m> {
         } else if is_corner {
             CORNER
         } else {
-            STRONG
+            Audible { hit: self.shares.answers, miss: self.shares.misses }
         })
     }
 }
