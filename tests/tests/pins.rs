@@ -110,6 +110,8 @@ fn the_classroom_is_crossed() {
     let summary = summary(scenario(CLASSROOM), RUNS);
     let position = summary.rms_path.x.hypot(summary.rms_path.y);
     assert_eq!(summary.lost_runs, 0);
+    // The robot file claims the noise that there is.
+    assert!((0.8..1.2).contains(&summary.nis_mean), "{}", summary.nis_mean);
     assert!(position < 0.030, "{position}");
     // Seven states: deviation √14 of each run's NEES.
     let sampling = (14.0 / f64::from(RUNS)).sqrt();
