@@ -220,6 +220,7 @@ impl Covariance {
 impl Covariance {
     // ===== Eq. (18): K = P Hᵀ/S, P unchanged =====
     /// The gain of a measurement with innovation variance `s`.
+    #[must_use]
     pub fn gain(&self, prediction: &PredictedMeasurement, s: f32) -> Gain {
         let h = &prediction.expected.jacobian();
         let (p, r) = (&self.pose, &self.range_scale);
