@@ -341,9 +341,12 @@ mod tests {
         add(8.0, 2.0, 2.0, Verdict::Lost);
         add(10.0, 2.5, 0.4, Verdict::Lost);
         let found = score.consistency();
-        let shares = |of: ByVerdict| [of.tracking, of.degraded, of.lost];
-        assert_eq!(shares(found.within_half_a_metre), [0.2, 0.0, 0.2]);
-        assert_eq!(shares(found.beyond_half_a_metre), [0.1, 0.1, 0.4]);
+        let are_shares = |of: ByVerdict, expected: [f64; 3]| {
+            let found = [of.tracking, of.degraded, of.lost];
+            found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-12)
+        };
+        assert!(are_shares(found.within_half_a_metre, [0.2, 0.0, 0.2]));
+        assert!(are_shares(found.beyond_half_a_metre, [0.1, 0.1, 0.4]));
         assert_eq!(found.first_loss, Some(Loss { time: 3.0, distance: 0.75 }));
         let rms = |figures: Option<Figures>| figures.unwrap().position_rms;
         assert!((rms(found.errors.tracking) - (0.59_f64 / 3.0).sqrt()).abs() < 1e-12);

@@ -68,7 +68,10 @@ mod tests {
     fn late_stamps_are_averaged_and_others_stay() {
         let mut stamps = [1.0, 2.0, 3.5, 3.1, 4.0, 5.0];
         assert_eq!(repair(stamps.iter_mut()), 2);
-        assert_eq!(stamps, [1.0, 2.0, 3.3, 3.3, 4.0, 5.0]);
+        let expected = [1.0, 2.0, 3.3, 3.3, 4.0, 5.0];
+        assert!(
+            stamps.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-12)
+        );
         let mut clock = Clock::default();
         assert!([1.0, 2.0, 1.71, 2.5].iter().all(|&time| clock.check(time).is_ok()));
         assert_eq!(clock.check(2.19).unwrap_err(), "goes back in time");
