@@ -74,7 +74,7 @@ impl Default for SearchParameters {
             margin: 8.0,
             least_fit: 0.3,
             persistence: 20,
-            sharpness: (Metres(0.045), Radians::from_degrees(3.0)),
+            sharpness: (Metres(0.05), Radians::from_degrees(3.0)),
         }
     }
 }
