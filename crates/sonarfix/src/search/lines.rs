@@ -114,7 +114,8 @@ impl Lines {
         if let Some(at) = similar {
             match self.found.get(at) {
                 Some(other) if other.support < line.support => {
-                    self.found.remove(at);
+                    let mut index = 0..;
+                    self.found.retain(|_| index.next() != Some(at));
                 }
                 _ => return,
             }

@@ -205,7 +205,8 @@ impl<const PINGS: usize> Window<PINGS> {
         }
         if self.pings.is_full() {
             // The oldest; a shift of less than 4 KiB, once per novel ping.
-            self.pings.remove(0);
+            self.pings.rotate_left(1);
+            self.pings.pop();
         }
         // There is room now, unless there is room for none.
         self.taken = self.taken.wrapping_add(1);
