@@ -354,6 +354,7 @@ impl<'m> Robot<'m> {
 
     /// Passes the travel up to the instant of the echo to the localizer, then the range.
     #[expect(clippy::too_many_arguments, reason = "a ping, its echo, and what takes them")]
+    #[inline(never)]
     fn fuse(
         &mut self,
         now: Instant,
@@ -380,6 +381,7 @@ impl<'m> Robot<'m> {
 
     /// Passes the travel up to the instant of the echo to the localizer, then the range to the search.
     #[expect(clippy::too_many_arguments, reason = "a ping, its echo, and what takes them")]
+    #[inline(never)]
     fn sweep(
         &mut self,
         now: Instant,
@@ -455,6 +457,7 @@ impl<'m> Robot<'m> {
     }
 
     /// Chooses a wall, or the next bearing of the sweep, if a ping is due, and turns the servo.
+    #[inline(never)]
     fn choose_bearing(
         &mut self,
         now: Instant,

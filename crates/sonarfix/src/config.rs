@@ -259,10 +259,12 @@ impl core::fmt::Display for ConfigError {
 
 impl core::error::Error for ConfigError {}
 
+#[inline(never)]
 fn positive(field: &'static str, value: f32) -> Result<(), ConfigError> {
     require(field, value > 0.0 && value.is_finite(), "positive and finite")
 }
 
+#[inline(never)]
 fn not_negative(field: &'static str, value: f32) -> Result<(), ConfigError> {
     require(field, value >= 0.0 && value.is_finite(), "zero or positive, and finite")
 }

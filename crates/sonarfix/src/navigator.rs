@@ -196,6 +196,7 @@ impl<'m> Navigator<'m> {
         self.not_before = 0;
     }
 
+    #[inline(never)]
     fn forget_pose(&mut self) {
         let [_, older] = &self.checkpoints;
         let (state, deviation) = older.without_pose(&self.localizer);
@@ -322,6 +323,7 @@ impl<'m> Navigator<'m> {
     }
 
     /// Changes the mode if verdict or answer require it; returns the new one.
+    #[inline(never)]
     pub fn update(&mut self, search: &mut Search<'m>) -> Option<Mode> {
         let verdict = self.localizer.health().verdict;
         match self.mode {

@@ -264,6 +264,8 @@ pub struct Search<'m, const PINGS: usize = 96, const HYPOTHESES: usize = 8> {
 
 impl<const PINGS: usize, const HYPOTHESES: usize> Default for Search<'_, PINGS, HYPOTHESES> {
     /// A search without walls, to be begun by [`Self::restart`].
+    // Inlined, it is built in its place: a copy on a microcontroller's stack is large.
+    #[inline(always)]
     fn default() -> Self {
         let sonar = Config::for_track_width(Metres(0.0)).sonar;
         Self::new(&sonar, Map::new(&[]), SearchParameters::default())
@@ -289,6 +291,7 @@ enum Decision {
 
 impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHESES> {
     /// A search without a ping yet.
+    #[inline(always)]
     #[must_use]
     pub fn new(sonar: &Sonar, map: Map<'m>, parameters: SearchParameters) -> Self {
         let (right, left) = (sonar.servo.0.0, sonar.servo.1.0);
@@ -476,6 +479,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         }
     }
 
+    #[inline(never)]
     fn evaluate(&mut self) {
         if self.window.count() < LEAST_PINGS {
             return;
@@ -559,6 +563,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         }
     }
 
+    #[inline(never)]
     fn try_pairs(&mut self, pair: u8, mut pairs: Pairs) -> Task {
         let Some((first, second)) = self.pair(pair) else {
             if self.is_check_due {
@@ -576,6 +581,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         Task::Pairs { pair, pairs }
     }
 
+    #[inline(never)]
     fn check(&mut self, line: u8, mut along: AlongWalls) -> Task {
         let checked = self.lines.all().get(usize::from(line)).copied();
         let Some(checked) = checked.filter(|_| line < CHECKED_LINES) else {

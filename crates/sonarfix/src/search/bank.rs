@@ -107,6 +107,7 @@ impl<const HYPOTHESES: usize> Bank<HYPOTHESES> {
     }
 
     /// Adds an entry, or lets it replace those of its mode if it is better.
+    #[inline(never)]
     pub fn offer(&mut self, mut entry: Entry) {
         let is_same = |other: &Entry| is_near(&other.placement, &entry.placement, SAME_PLACE);
         let better = self.entries.iter().any(|other| is_same(other) && other.score >= entry.score);

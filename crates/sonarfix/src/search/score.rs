@@ -121,6 +121,7 @@ struct Reflector {
 }
 
 impl<'m> EchoModel<'m> {
+    #[inline(never)]
     pub fn new(map: Map<'m>, sonar: &Sonar, echo: &EchoParameters) -> Self {
         let Sonar { cone, max_range, .. } = *sonar;
         let cos = |angle| crate::trig::sin_cos(angle).1;

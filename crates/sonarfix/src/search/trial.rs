@@ -86,6 +86,7 @@ impl Trial {
     }
 
     /// Looks at one ping.
+    #[inline(never)]
     pub fn advance<const PINGS: usize>(
         &mut self,
         echoes: &EchoModel,

@@ -171,6 +171,7 @@ impl<const PINGS: usize> Window<PINGS> {
     }
 
     /// Moves the robot by a distance and a turn by the encoders, both finite.
+    #[inline(never)]
     pub fn drive(&mut self, advance: f32, turn: f32) {
         let travelled = advance.abs();
         let bent = self.bend.drift * travelled + self.bend.turn_scale * turn;
@@ -187,6 +188,7 @@ impl<const PINGS: usize> Window<PINGS> {
     ///
     /// `novel` is the angle within which a ping from the same place is not novel: before the robot
     /// has left the first place, and after.
+    #[inline(never)]
     pub fn ping(&mut self, bearing: f32, range: Option<f32>, novel: [Radians; 2]) -> bool {
         let mut station = self.robot;
         station.at = station.at.plus(self.mount.turned(Vector::of_angle(self.heading)));
@@ -214,6 +216,7 @@ impl<const PINGS: usize> Window<PINGS> {
     }
 
     /// Makes the robot's present place the reference and returns it in the old frame.
+    #[inline(never)]
     pub fn rebase(&mut self) -> Station {
         let reference = self.robot;
         for ping in &mut self.pings {
