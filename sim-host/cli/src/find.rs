@@ -157,6 +157,11 @@ fn trial_table(trials: &[Trial]) -> Table {
 }
 
 fn summary_table(summary: &Summary, seconds: f64) -> Table {
+    let mean_time = if summary.mean_seconds.is_nan() {
+        "none is unique".into()
+    } else {
+        format!("{:.1} s", summary.mean_seconds)
+    };
     let percent = |share: f64| format!("{:.1} %", 100.0 * share);
     let row = |name: &str, value: String| vec![name.to_owned(), value];
     let twins = summary.with_all_twins.map_or("no symmetry".to_owned(), percent);
@@ -166,12 +171,12 @@ fn summary_table(summary: &Summary, seconds: f64) -> Table {
         columns: ["", "value"].map(str::to_owned).into(),
         rows: vec![
             row("unique and right", percent(summary.unique_and_right)),
-            row("unique and wrong", percent(summary.unique_and_wrong)),
             row("the same within 45 s", percent(summary.right_within_45)),
+            row("unique and wrong", percent(summary.unique_and_wrong)),
             row("true pose in the bank at the end", percent(summary.in_bank)),
             row("true pose and all twins among the answers", twins),
             row("true pose best at the end", percent(summary.best_is_right)),
-            row("mean time to a unique answer", format!("{:.1} s", summary.mean_seconds)),
+            row("mean time to a unique answer", mean_time),
             row(
                 "position error, 95th percentile",
                 format!("{:.1} cm", 100.0 * summary.position_error_95),
