@@ -63,7 +63,7 @@ impl Check {
             Err(TriggerError::TooSoon) => {
                 self.state = State::Resting { until: after(now, TIMEOUT) }
             }
-            Err(TriggerError::Device(_)) => self.end(now, true, faults),
+            Err(_) => self.end(now, true, faults),
         }
     }
 

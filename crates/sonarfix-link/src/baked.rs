@@ -23,6 +23,7 @@ const CHECKSUM: usize = 4;
 /// Why bytes are not a configuration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum BakedError {
     /// The signature is missing: no image was written.
     Missing,

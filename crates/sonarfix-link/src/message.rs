@@ -297,6 +297,7 @@ pub enum CommandResult {
 /// Why a command was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum CommandError {
     /// The configuration violates a rule; [`RobotConfig::check`] names it.
     Configuration,

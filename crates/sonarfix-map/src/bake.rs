@@ -17,6 +17,7 @@ const MOST_INDEX: usize = 11;
 
 /// Why walls could not be baked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum BakeError {
     /// There is no wall.
     NoWall,

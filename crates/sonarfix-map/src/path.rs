@@ -41,6 +41,7 @@ pub struct PathPlan {
 
 /// Why a plan is invalid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum PathError {
     /// The start is not finite, or too far from the origin.
     Start,

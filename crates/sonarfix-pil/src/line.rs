@@ -22,6 +22,7 @@ const WORD: usize = 4;
 
 /// An error of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum LineError<E> {
     /// The other end has closed the stream.
     Closed,

@@ -55,6 +55,7 @@ pub enum SessionKind {
 
 /// Why a request was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub enum RequestError {
     /// The map image is invalid.
     Map,

@@ -264,7 +264,7 @@ pub struct Search<'m, const PINGS: usize = 96, const HYPOTHESES: usize = 8> {
 
 impl<const PINGS: usize, const HYPOTHESES: usize> Default for Search<'_, PINGS, HYPOTHESES> {
     /// A search without walls, to be begun by [`Self::restart`].
-    // Inlined, it is built in its place: a copy on a microcontroller's stack is large.
+    #[expect(clippy::inline_always, reason = "a copy on a microcontroller's stack is large")]
     #[inline(always)]
     fn default() -> Self {
         let sonar = Config::for_track_width(Metres(0.0)).sonar;
@@ -291,6 +291,7 @@ enum Decision {
 
 impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHESES> {
     /// A search without a ping yet.
+    #[expect(clippy::inline_always, reason = "a copy on a microcontroller's stack is large")]
     #[inline(always)]
     #[must_use]
     pub fn new(sonar: &Sonar, map: Map<'m>, parameters: SearchParameters) -> Self {

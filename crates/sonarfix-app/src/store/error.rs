@@ -3,6 +3,7 @@
 /// Why the store could not be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum StoreError {
     /// The region is not two or more whole sectors.
     Region,

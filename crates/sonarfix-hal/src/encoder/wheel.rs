@@ -10,6 +10,7 @@ use sonarfix::units::Metres;
 /// Why a wheel's geometry was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum GeometryError {
     /// The diameter is zero, negative, NaN or infinite.
     Diameter,

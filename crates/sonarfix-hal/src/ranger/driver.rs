@@ -41,6 +41,7 @@ pub trait Ranger {
 /// Why a ping was not started.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum TriggerError<E> {
     /// The last ping is in flight, its echoes have not decayed, or its pulse has not ended. This is not a fault; the
     /// trigger is repeated later.

@@ -67,6 +67,7 @@ pub trait EchoLine {
 /// The error of one of the two pins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum PulseError<T, L> {
     /// The trigger pin's.
     Trigger(T),

@@ -52,6 +52,7 @@ impl Default for Settings {
 /// A setting that is zero and must not be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum SettingsError {
     /// [`Settings::encoder_period`].
     EncoderPeriod,

@@ -4,6 +4,7 @@
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub enum SettingError {
     /// The two measured points are not finite, or share a pulse width or a bearing.
     Calibration,
@@ -31,6 +32,7 @@ impl core::error::Error for SettingError {}
 /// Why the servo was not turned. It keeps its target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum PointError<E> {
     /// The driver has no [`ServoSettings`](super::ServoSettings) yet.
     NotConfigured,
