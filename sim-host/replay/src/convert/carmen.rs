@@ -15,7 +15,7 @@
 //! **Wheels.** These logs have odometry poses, no wheel travel. The travel between two poses is
 //! computed from the turn, the distance along the mean heading and [`TRACK_WIDTH`]. With any track
 //! width the odometry of the localizer reproduces the same poses. The estimated scale errors and
-//! track width are those of this virtual robot. [`odometry`] decides which poses are odometry, and which
+//! track width are those of this virtual robot. `odometry` decides which poses are odometry, and which
 //! of their steps are plausible.
 //!
 //! **Reference.** In a corrected log the pose of the scanner is the result of SLAM and becomes the
@@ -23,7 +23,7 @@
 //! constant, it becomes the mount of the scanner, and there is no reference.
 //!
 //! **Stamps.** Messages are put in the order of their stamps. A stamp that is earlier than that of the message before it from the
-//! same device, by up to [`stamps::JITTER`], is repaired; a message that goes back farther is left out.
+//! same device, by up to `stamps::JITTER`, is repaired; a message that goes back farther is left out.
 
 mod message;
 mod odometry;
