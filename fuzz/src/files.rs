@@ -90,7 +90,8 @@ fn check_record(record: &Record) {
         Record::Resume { time, state, deviation } => {
             (time, state.iter().chain(deviation).copied().collect())
         }
-        Record::Start { time, pose, position_deviation, heading_deviation } => {
+        Record::Start { time, pose, position_deviation, heading_deviation }
+        | Record::Pose { time, pose, position_deviation, heading_deviation } => {
             (time, vec![pose.x, pose.y, pose.heading, *position_deviation, *heading_deviation])
         }
     };
