@@ -442,7 +442,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
             let placement = &best?.placement;
             let from = placed(placement, ping.station.at);
             let echo = ping.range().map(|range| ping.axis.times(range));
-            let echo = echo.map(|way| placed(placement, ping.station.at.plus(way)));
+            let echo = echo.map(|offset| placed(placement, ping.station.at.plus(offset)));
             Some((from.into(), echo.map(Point::from)))
         })
     }

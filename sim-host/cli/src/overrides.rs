@@ -27,14 +27,14 @@ pub struct Overrides {
     /// of the range scale in the filter.
     #[arg(long, value_name = "FRACTION")]
     range_error: Option<f32>,
-    /// Whether the robot knows where it starts. One that does not searches for its pose, then and whenever it is lost.
+    /// Whether the start pose is given to the robot. Without one it searches for its pose, at the start and whenever it is lost.
     #[arg(long, value_enum)]
     start: Option<StartName>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum StartName {
-    /// It knows its start pose, as the scenario has it, but searches for its pose whenever it is lost.
+    /// The start pose of the scenario is given, but the robot searches for its pose whenever it is lost.
     Relocalize,
     /// It starts without a pose.
     Unknown,

@@ -219,7 +219,7 @@
     });
   }
 
-  // What the search knows, and when it decided.
+  // The state of the search, and when it decided.
   function drawSearchNote(g, search) {
     const decided = searches.find((other) => other.provisional && other.time <= search.time);
     const count = search.hypotheses.length;
