@@ -3,18 +3,22 @@
 //! A ping can be reflected by walls (at the foot of the perpendicular), corners, edges, unmapped
 //! obstacles, and over two walls. The earliest echo that is detected is reported.
 //! - [`segment`], [`vertex`], [`obstacle`], [`air`], `scene`: the geometry of the world;
+//! - `index`, `grid`, `wedge`: the walls near the sonar, along a line, and in the cone;
 //! - [`reflector`]: the reflectors that can answer a ping (deterministic);
 //! - [`sensor`]: the parameters of a sonar (deterministic);
 //! - `detection`: which reflector is detected, and with what error (random).
 
 pub mod air;
 mod detection;
+mod grid;
+mod index;
 pub mod obstacle;
 pub mod reflector;
 mod scene;
 pub mod segment;
 pub mod sensor;
 pub mod vertex;
+mod wedge;
 
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -69,6 +73,9 @@ impl World {
         sensor: &SensorModel,
         rng: &mut impl Rng,
     ) -> Option<Reflector> {
+        if sensor.scatter.is_deaf() {
+            return None;
+        }
         let from = (ping.sonar_after)(0.0);
         let (wall, hit) = self.on_axis(from, ping.direction)?;
         let along_axis = distance(from, hit);
@@ -97,5 +104,7 @@ impl World {
     }
 }
 
+#[cfg(test)]
+mod exhaustive;
 #[cfg(test)]
 mod tests;

@@ -23,6 +23,9 @@ use crate::world::segment::{Point, Segment};
 use crate::world::sensor::SensorModel;
 use crate::world::{World, air};
 
+/// Above this number of walls the localizer reads a baked map, as on a robot: without its index an aim tests every wall.
+const MANY: usize = 128;
+
 /// A scenario, prepared to be run any number of times.
 #[derive(Debug, Clone)]
 pub struct Simulation {
@@ -31,7 +34,7 @@ pub struct Simulation {
     /// The instant that the loop assigns to a range, at the fidelity of pins.
     pub stamp: Stamp,
     walls: Vec<Wall>,
-    /// The baked map, if the localizer reads one.
+    /// The baked map, if the localizer reads one: as on a robot, or because there are many walls.
     image: Option<Vec<u8>>,
     pub(super) lines: Vec<Line>,
     pub(super) world: World,
@@ -65,10 +68,12 @@ impl Simulation {
             .at_temperature(around.temperature);
         let assumed = air::speed_of_sound(scenario.robot.ranger.temperature.0.into());
         let stretch = assumed / world.speed_of_sound();
+        let walls = scenario.floor.walls();
         Self {
             stamp: Stamp::Reflection,
-            walls: scenario.floor.walls(),
-            image: None,
+            // A map that cannot be baked is read without an index, which is slow.
+            image: (walls.len() > MANY).then(|| sonarfix_map::bake(&walls).ok()).flatten(),
+            walls,
             lines: scenario.floor.named_walls().iter().map(line).collect(),
             world,
             sensor: sensor(&scenario),

@@ -4,9 +4,10 @@ use serde::Serialize;
 
 use super::obstacle::Outline;
 use super::scene::{Ping, World};
-use super::segment::{Point, direction, distance};
+use super::segment::{Point, Segment, direction, distance};
 use super::sensor::SensorModel;
 use super::vertex::Shape;
+use super::wedge::Wedge;
 use crate::angle;
 
 /// The source of an echo.
@@ -44,6 +45,10 @@ pub struct Reflector {
 /// at 0.4 m/s, 1/860 of the speed of sound, and each iteration gains that factor.
 const FLIGHT_ROUNDS: usize = 2;
 
+/// A reflector within reach at the end of the flight is at most this many times as far away at the ping, as long as the
+/// robot is slower than a quarter of the speed of sound.
+const MOTION: f64 = 1.5;
+
 /// The search for the reflectors of one ping.
 pub(super) struct Search<'a> {
     world: &'a World,
@@ -51,13 +56,21 @@ pub(super) struct Search<'a> {
     ping: &'a Ping<'a>,
     obstacles: Vec<Outline>,
     from: Point,
+    /// Farthest place of a reflector within reach, metres.
+    radius: f64,
+    /// Walls within that distance, and others, in the order of the map.
+    near: Vec<usize>,
+    cone: Wedge,
 }
 
 impl<'a> Search<'a> {
     pub fn new(world: &'a World, sensor: &'a SensorModel, ping: &'a Ping<'a>) -> Self {
         let obstacles = world.obstacles.iter().map(|o| o.outline_at(ping.time)).collect();
         let from = (ping.sonar_after)(0.0);
-        Self { world, sensor, ping, obstacles, from }
+        let radius = MOTION * sensor.reach.1;
+        let near = world.walls_index.near(from, radius);
+        let cone = Wedge::new(from, ping.direction, sensor.cone);
+        Self { world, sensor, ping, obstacles, from, radius, near, cone }
     }
 
     /// All reflectors, the earliest first; ties in the order of the map.
@@ -74,15 +87,22 @@ impl<'a> Search<'a> {
     }
 
     fn walls(&self) -> impl Iterator<Item = Reflector> {
-        self.world.walls.iter().enumerate().filter_map(|(wall, segment)| {
+        self.near_walls().filter_map(|(wall, segment)| {
             let (foot, _) = segment.foot(self.from)?;
             let half_way = |to| segment.half_way_over(self.from, to);
             self.reflector_at(Source::Wall(wall), foot, 1.0, half_way, &[wall])
         })
     }
 
+    fn near_walls(&self) -> impl Iterator<Item = (usize, &'a Segment)> {
+        self.near.iter().filter_map(|&wall| Some((wall, self.world.walls.get(wall)?)))
+    }
+
     fn vertices(&self) -> impl Iterator<Item = Reflector> {
-        self.world.vertices.iter().filter_map(|vertex| {
+        let near = self.world.vertices_index.near(self.from, self.radius).into_iter();
+        let near = near.filter_map(|vertex| self.world.vertices.get(vertex));
+        let visible = near.filter(|vertex| !self.cone.is_beside(&[vertex.at]));
+        visible.filter_map(|vertex| {
             let (source, strength) = match vertex.shape_from(self.from)? {
                 Shape::Corner => (Source::Corner, self.sensor.corner),
                 Shape::Edge => (Source::Edge, self.sensor.edge),
@@ -103,21 +123,32 @@ impl<'a> Search<'a> {
         })
     }
 
+    /// Over a first wall in the cone onto a second one: the whole path is within reach, so both are near.
     fn double_bounces(&self) -> impl Iterator<Item = Reflector> {
-        let walls = 0..self.world.walls.len();
-        let pairs =
-            walls.clone().flat_map(move |first| walls.clone().map(move |next| (first, next)));
-        pairs.filter_map(|(first, next)| self.double_bounce(first, next))
+        let firsts = self.near_walls().filter(|(_, mirror)| !self.cone.is_beside(&mirror.ends()));
+        firsts.flat_map(move |(first, mirror)| {
+            let image = mirror.mirror(self.from);
+            let nexts = self.near_walls().filter(move |&(next, _)| next != first);
+            nexts.filter_map(move |(next, target)| {
+                self.double_bounce((first, mirror), (next, target), image)
+            })
+        })
     }
 
     /// The path over one wall, perpendicularly onto another, and back over the first: the second
     /// wall is seen from the mirror image of the sonar in the first.
-    fn double_bounce(&self, first: usize, next: usize) -> Option<Reflector> {
-        let (mirror, target) = (self.world.walls.get(first)?, self.world.walls.get(next)?);
-        let image = mirror.mirror(self.from);
-        let (foot, _) = target.foot(image).filter(|_| first != next)?;
+    fn double_bounce(
+        &self,
+        (first, mirror): (usize, &Segment),
+        (next, target): (usize, &Segment),
+        image: Point,
+    ) -> Option<Reflector> {
+        let (foot, path) = target.foot(image)?;
+        if path > self.radius {
+            return None;
+        }
         let turning = mirror.crossing(image, foot)?;
-        if self.is_hidden(turning, foot, &[first, next]) {
+        if self.cone.is_beside(&[turning]) || self.is_hidden(turning, foot, &[first, next]) {
             return None;
         }
         let half_way = |to| target.half_way_over(image, mirror.mirror(to));
@@ -135,15 +166,21 @@ impl<'a> Search<'a> {
         half_way: impl Fn(Point) -> f64,
         own: &[usize],
     ) -> Option<Reflector> {
+        if self.cone.is_beside(&[turning]) {
+            return None;
+        }
         let off_axis = angle::wrap(direction(self.from, turning) - self.ping.direction);
         if off_axis.abs() > self.sensor.cone {
             return None;
         }
         let distance = self.flown(half_way);
         let (nearest, farthest) = self.sensor.reach;
-        let in_reach = distance >= nearest && distance <= farthest;
+        let is_in_reach = distance >= nearest && distance <= farthest;
+        if !is_in_reach {
+            return None;
+        }
         let audible = strength * self.sensor.mirror.at(distance, off_axis);
-        let is_detectable = in_reach && audible > 0.0 && !self.is_hidden(self.from, turning, own);
+        let is_detectable = audible > 0.0 && !self.is_hidden(self.from, turning, own);
         is_detectable.then_some(Reflector { source, distance, off_axis, audible })
     }
 
@@ -158,8 +195,11 @@ impl<'a> Search<'a> {
     }
 
     fn is_hidden(&self, from: Point, to: Point, own: &[usize]) -> bool {
-        let mut walls = self.world.walls.iter().enumerate();
-        walls.any(|(wall, segment)| !own.contains(&wall) && segment.crossing(from, to).is_some())
+        let hides = |wall: usize| {
+            let segment = self.world.walls.get(wall).filter(|_| !own.contains(&wall));
+            segment.is_some_and(|segment| segment.crossing(from, to).is_some())
+        };
+        self.world.walls_index.along(from, to).any(hides)
             || self.obstacles.iter().any(|outline| outline.blocks(from, to))
     }
 }

@@ -3,12 +3,17 @@
 use sonarfix_map::Floor;
 
 use super::air;
+use super::index::Index;
 use super::obstacle::Obstacle;
 use super::segment::{Point, Segment, distance};
 use super::vertex::{self, Vertex};
 
 /// Default air temperature, °C.
 const ROOM: f64 = 20.0;
+
+/// Length of the beam in which the first wall on its axis is looked for at first, metres; then four times as far, up to the last.
+const FIRST_REACH: f64 = 4.0;
+const LAST_REACH: f64 = 1e6;
 
 /// A ping; metres, seconds and radians, map frame.
 pub struct Ping<'a> {
@@ -25,6 +30,8 @@ pub struct Ping<'a> {
 pub struct World {
     pub(super) walls: Vec<Segment>,
     pub(super) vertices: Vec<Vertex>,
+    pub(super) walls_index: Index,
+    pub(super) vertices_index: Index,
     pub(super) obstacles: Vec<Obstacle>,
     /// m/s.
     pub(super) speed_of_sound: f64,
@@ -40,8 +47,13 @@ impl World {
     /// A world with these walls.
     #[must_use]
     pub fn of(walls: Vec<Segment>) -> Self {
-        let vertices = vertex::all(&walls);
-        Self { walls, vertices, obstacles: Vec::new(), speed_of_sound: air::speed_of_sound(ROOM) }
+        let ends: Vec<_> = walls.iter().map(Segment::ends).map(|[from, to]| (from, to)).collect();
+        let walls_index = Index::new(&ends);
+        let vertices = vertex::all(&walls, &walls_index);
+        let places: Vec<_> = vertices.iter().map(|vertex| (vertex.at, vertex.at)).collect();
+        let vertices_index = Index::new(&places);
+        let speed_of_sound = air::speed_of_sound(ROOM);
+        Self { walls, vertices, walls_index, vertices_index, obstacles: Vec::new(), speed_of_sound }
     }
 
     /// The same world with unmapped obstacles.
@@ -71,8 +83,28 @@ impl World {
     /// The first wall on the beam's axis, and the point of intersection.
     #[must_use]
     pub fn on_axis(&self, from: Point, axis: f64) -> Option<(usize, Point)> {
-        let hits = self.walls.iter().enumerate();
-        let hits = hits.filter_map(|(wall, segment)| Some((wall, segment.hit(from, axis)?)));
-        hits.min_by(|(_, one), (_, other)| distance(from, *one).total_cmp(&distance(from, *other)))
+        let (sin, cos) = axis.sin_cos();
+        let mut reach = FIRST_REACH;
+        loop {
+            let end = [from[0] + reach * cos, from[1] + reach * sin];
+            let nearest = self.nearest_hit(from, axis, end);
+            // A wall that the index did not return is hit beyond `end`.
+            let found = nearest.filter(|&(_, hit)| distance(from, hit) < 0.999 * reach);
+            if found.is_some() || reach > LAST_REACH || self.walls_index.is_within(from, reach) {
+                return nearest;
+            }
+            reach *= 4.0;
+        }
+    }
+
+    /// The nearest intersection of the beam's axis with the walls along it up to `end`, and others; of two equally near
+    /// ones the first in the map.
+    fn nearest_hit(&self, from: Point, axis: f64, end: Point) -> Option<(usize, Point)> {
+        let walls = self.walls_index.along(from, end);
+        let hits = walls.filter_map(|wall| Some((wall, self.walls.get(wall)?.hit(from, axis)?)));
+        hits.min_by(|(wall, one), (other_wall, other)| {
+            let nearer = distance(from, *one).total_cmp(&distance(from, *other));
+            nearer.then(wall.cmp(other_wall))
+        })
     }
 }

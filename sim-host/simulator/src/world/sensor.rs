@@ -58,6 +58,12 @@ impl Sensitivity {
         Self { share: Curve::level(0.0), ..Self::perfect() }
     }
 
+    /// Whether it detects nothing, at any range.
+    #[must_use]
+    pub fn is_deaf(&self) -> bool {
+        self.share.0.iter().all(|&(_, share)| share <= 0.0)
+    }
+
     /// Probability of detection.
     #[must_use]
     pub fn at(&self, range: f64, off_axis: f64) -> f64 {
