@@ -21,7 +21,7 @@ impl Bound {
 
     /// Predicts over a motion; `travel` is the noiseless encoder reading, `truth` the state after it.
     pub fn moved(&mut self, travel: [f64; 2], truth: Vector) {
-        self.filter.predict(travel);
+        self.filter.propagate(travel);
         self.filter.x = truth;
     }
 

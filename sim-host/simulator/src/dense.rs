@@ -12,10 +12,32 @@ use sonarfix::config::Config;
 
 use crate::angle;
 
+/// Number of states.
+const STATES: usize = 7;
 /// x, y, heading, right and left scale error, track-width error, range scale error.
-pub type Vector = SVector<f64, 7>;
+pub type Vector = SVector<f64, STATES>;
 /// 7×7, in the order of [`Vector`].
-pub type Matrix = SMatrix<f64, 7, 7>;
+pub type Matrix = SMatrix<f64, STATES, STATES>;
+
+/// The states that a motion changes: x, y, heading.
+const MOVED: usize = 3;
+
+/// F P Fᵀ. The other rows of F are those of the identity, and the products with them are left out.
+fn congruent(f: &Matrix, p: &Matrix) -> Matrix {
+    let mut fp = *p;
+    for column in 0..STATES {
+        for row in 0..MOVED {
+            fp[(row, column)] = (0..STATES).map(|k| f[(row, k)] * p[(k, column)]).sum();
+        }
+    }
+    let mut result = fp;
+    for column in 0..MOVED {
+        for row in 0..STATES {
+            result[(row, column)] = (0..STATES).map(|k| fp[(row, k)] * f[(column, k)]).sum();
+        }
+    }
+    result
+}
 
 /// A wall's line, as a point on it and its unit normal, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -165,18 +187,26 @@ impl DenseFilter {
 
     /// Eqs. (4)–(5) and (7)–(8).
     pub fn predict(&mut self, travel: [f64; 2]) {
+        self.propagate(travel);
+        self.x = self.model.moved(&self.x, travel);
+    }
+
+    /// Eq. (5): the covariance after the encoders read `travel` (right, left), metres.
+    pub fn propagate(&mut self, travel: [f64; 2]) {
         let (f, g) = self.model.motion_jacobians(&self.x, travel);
         let m = &self.model;
-        let wheels = SVector::<f64, 2>::new(travel[0].abs(), travel[1].abs()) * m.wheel_variance;
+        let wheels = [travel[0].abs(), travel[1].abs()].map(|metres| metres * m.wheel_variance);
         let distance = f64::midpoint(travel[0].abs(), travel[1].abs());
-        let mut walk = Vector::zeros();
-        walk[3] = m.scale_variance * distance;
-        walk[4] = m.scale_variance * distance;
-        walk[5] = m.width_variance * distance;
-        self.p = f * self.p * f.transpose()
-            + g * SMatrix::<f64, 2, 2>::from_diagonal(&wheels) * g.transpose()
-            + Matrix::from_diagonal(&walk);
-        self.x = m.moved(&self.x, travel);
+        self.p = congruent(&f, &self.p);
+        for row in 0..MOVED {
+            for column in 0..MOVED {
+                self.p[(row, column)] += g[(row, 0)] * wheels[0] * g[(column, 0)]
+                    + g[(row, 1)] * wheels[1] * g[(column, 1)];
+            }
+        }
+        self.p[(3, 3)] += m.scale_variance * distance;
+        self.p[(4, 4)] += m.scale_variance * distance;
+        self.p[(5, 5)] += m.width_variance * distance;
     }
 
     /// Eqs. (6) and (10)–(14), in Joseph's form.

@@ -37,15 +37,16 @@ impl Integrity {
     /// Adds the error and the covariance after a tick of a length in seconds.
     pub fn add(&mut self, seconds: f64, error: &Vector, p: &Matrix, verdict: Verdict) {
         let is_inside = distance_squared(error, p) <= ELLIPSE;
+        let off = error[0].hypot(error[1]);
         self.ticks += 1;
-        if verdict == Verdict::Tracking && error[0].hypot(error[1]) > POSITION {
+        if verdict == Verdict::Tracking && off > POSITION {
             self.undetected_error += seconds;
         }
         self.outside += u32::from(!is_inside);
         let is_undetected = !is_inside && verdict == Verdict::Tracking;
         self.undetected = if is_undetected { self.undetected + seconds } else { 0.0 };
         self.longest_undetected = self.longest_undetected.max(self.undetected);
-        self.worst = self.worst.max(error[0].hypot(error[1]));
+        self.worst = self.worst.max(off);
         self.degraded += u32::from(verdict == Verdict::Degraded);
         if verdict == Verdict::Lost && self.verdict != Verdict::Lost {
             self.called_lost += 1;

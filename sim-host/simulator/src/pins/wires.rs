@@ -16,6 +16,8 @@ pub struct EncoderWires {
     pub b: Cell<bool>,
     /// The count of the decoder.
     pub count: TickCount,
+    /// Ticks of whole periods that the decoder was not shown.
+    pub skipped: Cell<i64>,
 }
 
 impl EncoderWires {
@@ -24,6 +26,8 @@ impl EncoderWires {
     pub fn counted(&self) -> Counted {
         let mut counter = &self.count;
         let Ok(ticks) = counter.count();
+        #[expect(clippy::cast_possible_truncation, reason = "the count wraps as the decoder's")]
+        let ticks = ticks.wrapping_add_signed(self.skipped.get() as i32);
         Counted { ticks, illegal: counter.illegal() }
     }
 }

@@ -74,6 +74,10 @@ impl Course<'_> {
                 let pose = path.pose_at(time + ahead);
                 Pose { x: pose.x, y: pose.y, heading: pose.heading }
             }
+            // As below with a chord of zero, without its sine and cosine.
+            Self::Steered { pose, .. } if time <= now => {
+                Pose { x: pose.x + 0.0, y: pose.y + 0.0, heading: angle::wrap(pose.heading + 0.0) }
+            }
             Self::Steered { pose, speeds } => {
                 moved(*pose, rolled(*speeds, time - now, parameters), parameters.track_width)
             }

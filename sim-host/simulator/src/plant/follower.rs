@@ -48,17 +48,21 @@ impl Follower {
     /// The command at an estimated pose; zero at the end of the path.
     pub fn command(&mut self, pose: &Pose) -> Command {
         let at = [pose.x, pose.y];
-        while self.corners.last().is_some_and(|&corner| distance(at, corner) <= REACHED) {
-            self.corners.pop();
-        }
-        let Some(&corner) = self.corners.last() else {
-            return Command::default();
+        let (corner, left) = loop {
+            let Some(&corner) = self.corners.last() else {
+                return Command::default();
+            };
+            let left = distance(at, corner);
+            if left <= REACHED {
+                self.corners.pop();
+            } else {
+                break (corner, left);
+            }
         };
         let off = angle::wrap(direction(at, corner) - pose.heading);
         let turn_rate = (GAIN * off).clamp(-self.turn_rate, self.turn_rate);
         let is_turning = off.abs() > TURN_FIRST;
-        let speed =
-            if is_turning { 0.0 } else { self.speed.min(distance(at, corner) / self.period) };
+        let speed = if is_turning { 0.0 } else { self.speed.min(left / self.period) };
         Command { speed, turn_rate }
     }
 }

@@ -34,7 +34,8 @@ impl Exhaustive<'_> {
         }
         if self.sensor.double_bounce > 0.0 {
             let walls = 0..self.world.walls.len();
-            let pairs = walls.clone().flat_map(|first| walls.clone().map(move |next| (first, next)));
+            let pairs =
+                walls.clone().flat_map(|first| walls.clone().map(move |next| (first, next)));
             found.extend(pairs.filter_map(|(first, next)| self.double_bounce(first, next)));
         }
         found.sort_by(|one, other| one.distance.total_cmp(&other.distance));
@@ -142,8 +143,8 @@ fn walls() -> impl Strategy<Value = Vec<Segment>> {
 
 fn obstacles() -> impl Strategy<Value = Vec<Obstacle>> {
     let point = || [-6.0..6.0_f64, -6.0..6.0];
-    let circle = (point(), 0.02..0.3_f64)
-        .prop_map(|(centre, radius)| Outline::Circle { centre, radius });
+    let circle =
+        (point(), 0.02..0.3_f64).prop_map(|(centre, radius)| Outline::Circle { centre, radius });
     let face = (point(), point()).prop_map(|(from, to)| Outline::Face(Segment::new(from, to)));
     let walk = prop::option::of(Just(Oscillation { by: [0.5, -1.0], takes: 3.0 }));
     let obstacle = (prop_oneof![circle, face], walk);

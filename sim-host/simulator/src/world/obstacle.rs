@@ -76,11 +76,26 @@ impl Outline {
     pub fn blocks(&self, from: Point, to: Point) -> bool {
         match self {
             Self::Circle { centre, radius } => {
-                distance(Segment::new(from, to).nearest(*centre), *centre) < *radius
+                // Most circles are far from the line.
+                !is_beside(*centre, radius + MARGIN, from, to)
+                    && distance(Segment::new(from, to).nearest(*centre), *centre) < *radius
             }
             Self::Face(face) => face.crossing(from, to).is_some(),
         }
     }
+}
+
+/// Far above the rounding of a distance, metres.
+const MARGIN: f64 = 1e-6;
+
+/// Whether the square around a centre is above, below, to the left or to the right of both points.
+fn is_beside(centre: Point, half_width: f64, from: Point, to: Point) -> bool {
+    (0..2).any(|axis| match (centre.get(axis), from.get(axis), to.get(axis)) {
+        (Some(centre), Some(from), Some(to)) => {
+            centre + half_width < from.min(*to) || centre - half_width > from.max(*to)
+        }
+        _ => false,
+    })
 }
 
 #[cfg(test)]

@@ -69,8 +69,9 @@ fn cells_around([x, y]: Point) -> Vec<[i64; 2]> {
 
 impl Vertex {
     fn new(at: Point, all: &[Segment], index: &Index) -> Self {
-        let touches =
-            |&wall: &usize| all.get(wall).is_some_and(|wall| distance(wall.nearest(at), at) <= TOUCH);
+        let touches = |&wall: &usize| {
+            all.get(wall).is_some_and(|wall| distance(wall.nearest(at), at) <= TOUCH)
+        };
         let walls: Vec<usize> = index.near(at, TOUCH).into_iter().filter(touches).collect();
         let ends = walls.iter().filter_map(|&wall| all.get(wall)).flat_map(Segment::ends);
         let mut arms: Vec<f64> =

@@ -19,8 +19,8 @@ impl Wedge {
     pub fn new(from: Point, direction: f64, half_angle: f64) -> Self {
         let normal = |angle: f64| [angle.cos(), angle.sin()];
         let (left, right) = (direction + half_angle, direction - half_angle);
-        let inwards = (half_angle < FRAC_PI_2)
-            .then(|| [normal(left - FRAC_PI_2), normal(right + FRAC_PI_2)]);
+        let inwards =
+            (half_angle < FRAC_PI_2).then(|| [normal(left - FRAC_PI_2), normal(right + FRAC_PI_2)]);
         Self { from, inwards }
     }
 

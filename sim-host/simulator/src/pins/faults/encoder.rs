@@ -44,6 +44,12 @@ impl EncoderFaults {
         Self { faults, rng }
     }
 
+    /// Whether any edge of the run may reach the controller otherwise than without faults.
+    #[must_use]
+    pub fn may_disturb(&self) -> bool {
+        !self.faults.is_empty()
+    }
+
     /// The edge at `now`, µs, that reaches the controller; `levels` are the levels without faults.
     pub fn edge(&mut self, now: u64, levels: (bool, bool)) -> Edge {
         let mut edge = Edge { levels, is_served: true };
