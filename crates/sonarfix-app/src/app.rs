@@ -132,6 +132,8 @@ struct Running<'m> {
     searches: bool,
     /// Whether a wheel has rolled since.
     has_rolled: bool,
+    /// Whether the wheels could not be observed at a time since, when they may have rolled.
+    has_been_blind: bool,
     /// The report of the last poll. It is stored here and not returned, because it is half a kilobyte.
     report: Report,
 }
@@ -167,15 +169,24 @@ impl<'m> Running<'m> {
             self.save_policy.rolled(now);
             self.has_rolled = true;
         }
+        self.has_been_blind |= localizer.is_odometry_missing();
         let is_tracking = mode == navigator::Mode::Tracking;
         polled.is_on_time = report.tick.is_some() && report.faults.deadlines == 0;
         report.tick.is_some() && is_tracking && self.save_policy.is_due(now, localizer)
     }
 
-    /// Whether the state from which it started no longer holds.
-    fn has_left_origin(&self) -> bool {
+    /// The state after it has stopped.
+    fn known(&self) -> Resumed {
         let is_searching = self.robot.mode() == navigator::Mode::Searching;
-        self.has_rolled || is_searching || !self.origin.has_pose
+        let is_calibrated = self.has_rolled || is_searching || !self.origin.has_pose;
+        let origin = self.origin.interrupted_again();
+        if !is_calibrated && !self.has_been_blind {
+            return origin;
+        }
+        let filter = self.robot.localizer().filter();
+        let known = Resumed::interrupted(filter.state(), filter.standard_deviations());
+        let known = if is_calibrated { known } else { known.calibrated_as(&origin) };
+        if is_searching { known.without_pose() } else { known }
     }
 }
 
@@ -452,13 +463,7 @@ impl<'m, F: NorFlash> App<'m, F> {
     fn known_now(&self) -> Option<Resumed> {
         match &self.mode {
             Mode::Waiting(_) => self.known,
-            Mode::Running(running) if running.has_left_origin() => {
-                let filter = running.robot.localizer().filter();
-                let known = Resumed::interrupted(filter.state(), filter.standard_deviations());
-                let has_pose = running.robot.mode() != navigator::Mode::Searching;
-                Some(if has_pose { known } else { known.without_pose() })
-            }
-            Mode::Running(running) => Some(running.origin.interrupted_again()),
+            Mode::Running(running) => Some(running.known()),
         }
     }
 

@@ -214,6 +214,11 @@ impl<'m> Robot<'m> {
         self.odometer.begin(now, hardware, &mut faults);
         let reading = self.odometer.read(now, hardware, &mut faults);
         let step = reading.map(|reading| self.advance(now, reading.position, &mut faults, None));
+        if step.is_none() {
+            // The travel up to now does not belong to the new pose.
+            self.odometer.forget();
+            self.navigator.odometry_missing(now);
+        }
         self.faults = self.faults.plus(faults);
         self.navigator.set_pose(start)?;
         self.end_cycle(now, false);
@@ -449,7 +454,7 @@ impl<'m> Robot<'m> {
         let faults = &mut report.faults;
         let reading = self.odometer.read(now, hardware, faults);
         let step = reading.map(|reading| self.advance(now, reading.position, faults, search));
-        if step.is_none() {
+        if step.is_none_or(|step| matches!(step.result, StepResult::Discarded(_))) {
             self.navigator.odometry_missing(now);
         }
         report.tick =
@@ -473,6 +478,10 @@ impl<'m> Robot<'m> {
             let turned = hardware.servo().point(now, search.aim());
             report.faults.servo += u32::from(turned.is_err());
             self.cycle = Cycle::Turning { why: None };
+            return;
+        }
+        if self.localizer().is_odometry_missing() {
+            self.end_cycle(now, false);
             return;
         }
         let aimed = self.navigator.aim();

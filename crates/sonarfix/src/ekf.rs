@@ -26,7 +26,7 @@ use crate::covariance::{Correction, Covariance, PoseBlock, PredictedMeasurement}
 use crate::elementary::sqrt;
 use crate::estimate::FilterEstimate;
 use crate::motion::{Drive, LinearizedMotion, WheelTravel};
-use crate::numeric::is_within;
+use crate::numeric::{at_most_max_variance, is_within};
 use crate::pose::{Heading, Pose};
 use crate::process_noise::{AccumulatedRandomWalk, NoiseDensities, ProcessNoise};
 use crate::range::ExpectedRange;
@@ -99,6 +99,22 @@ pub(crate) struct PoseCovariance {
     pub xy: f32,
     pub yy: f32,
     pub hh: f32,
+}
+
+/// Variances of x and y, m², and of the heading, rad².
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PoseVariances {
+    xx: f32,
+    yy: f32,
+    hh: f32,
+}
+
+impl PoseVariances {
+    /// With independent errors of these standard deviations, m and rad; at most the largest variance of a filter.
+    pub fn plus(self, position: f32, heading: f32) -> Self {
+        let sum = |variance: f32, sigma: f32| at_most_max_variance(variance + sigma * sigma);
+        Self { xx: sum(self.xx, position), yy: sum(self.yy, position), hh: sum(self.hh, heading) }
+    }
 }
 
 /// Uncertainty of the pose.
@@ -235,6 +251,18 @@ impl Ekf {
     pub(crate) fn pose_covariance(&self) -> PoseCovariance {
         let p = &self.p_without_walk.pose;
         PoseCovariance { xx: p.xx, xy: p.xy, yy: p.yy, hh: p.hh }
+    }
+
+    /// The variances of the pose.
+    pub(crate) fn pose_variances(&self) -> PoseVariances {
+        let p = &self.p_without_walk.pose;
+        PoseVariances { xx: p.xx, yy: p.yy, hh: p.hh }
+    }
+
+    /// Replaces the variances of the pose by valid ones, each not less than with which P was a covariance.
+    pub(crate) fn set_pose_variances(&mut self, variances: PoseVariances) {
+        let p = &mut self.p_without_walk.pose;
+        (p.xx, p.yy, p.hh) = (variances.xx, variances.yy, variances.hh);
     }
 
     /// Uncertainty of the pose: root of the larger eigenvalue of the position's covariance, and

@@ -182,9 +182,13 @@ impl Health {
     /// Records distance and time since the last call.
     pub(crate) fn record_travel(&mut self, distance: Metres, time: Duration, limits: &Limits) {
         self.rolled_since_fix = self.rolled_since_fix + distance;
+        self.add_time(time);
+        self.degrade(limits);
+    }
+
+    fn add_time(&mut self, time: Duration) {
         let ticks = self.time_since_fix.ticks().saturating_add(time.ticks());
         self.time_since_fix = Duration::from_ticks(ticks);
-        self.degrade(limits);
     }
 
     /// Records the outcome of a ping, its evidence against the pose, and the uncertainty after it.
@@ -222,24 +226,27 @@ impl Health {
         self.count_silent(limits);
     }
 
-    /// Records that the wheels could not be observed: for `unseen` by now, in which they may have
-    /// rolled as far as `distance`, of which `time` since the last call.
+    /// Records that the wheels could not be observed: for `unseen` by now, of which `time` since the last call.
+    ///
+    /// The uncertainty has grown by the largest possible travel, which a short failure of an encoder does not confirm: a
+    /// deviation beyond its limit counts from [`DEGRADED_WITHOUT_ODOMETRY`] on.
     pub(crate) fn record_unseen(
         &mut self,
         unseen: Duration,
-        distance: Metres,
         time: Duration,
         uncertainty: PoseUncertainty,
         limits: &Limits,
     ) {
-        self.record_uncertainty(uncertainty);
-        self.position_deviation = self.position_deviation + distance;
         self.accepted_in_a_row = 0;
-        self.record_travel(Metres(0.0), time, limits);
+        self.add_time(time);
+        self.record_uncertainty(uncertainty);
         if unseen > LOST_WITHOUT_ODOMETRY {
             self.verdict = Verdict::Lost;
         } else if unseen > DEGRADED_WITHOUT_ODOMETRY && self.verdict == Verdict::Tracking {
             self.verdict = Verdict::Degraded;
+        }
+        if self.time_since_fix > DEGRADED_WITHOUT_FIX {
+            self.degrade(limits);
         }
     }
 
@@ -248,7 +255,7 @@ impl Health {
         self.inflations = self.inflations.saturating_add(1);
     }
 
-    fn record_uncertainty(&mut self, uncertainty: PoseUncertainty) {
+    pub(crate) fn record_uncertainty(&mut self, uncertainty: PoseUncertainty) {
         self.position_deviation = uncertainty.position;
         self.heading_deviation = uncertainty.heading;
     }

@@ -22,6 +22,7 @@
 //! | `visibility` | which walls can be measured |
 //! | `gating` | gate, downweighting and covariance inflation, eqs. (15) to (17) |
 //! | [`health`] | verdict on the estimate, eq. (23) |
+//! | `unseen` | growth of P without odometry, eq. (24) |
 //! | [`aim`] | planner: the wall to measure next, eqs. (21) and (22) |
 //! | [`localizer`] | all of them together |
 //! | [`search`] | global localization without a start pose |
@@ -64,6 +65,7 @@ pub mod servo;
 mod state;
 pub mod trig;
 pub mod units;
+mod unseen;
 mod visibility;
 
 /// The parts of the filter as [`ekf::Ekf`] uses them, for benchmarks that count them one by one.

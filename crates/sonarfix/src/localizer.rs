@@ -18,6 +18,7 @@ use crate::motion::WheelTravel;
 use crate::odometry;
 use crate::pose::Pose;
 use crate::units::{Duration, Instant, Metres, Radians, SquareMetres, seconds};
+use crate::unseen::Unseen;
 use crate::visibility::{Viewpoint, check_range, max_heading_deviation};
 
 pub use crate::odometry::OdometryError;
@@ -103,6 +104,8 @@ pub struct Localizer<'m> {
     time: Instant,
     /// Up to when time has entered the health.
     recorded: Instant,
+    /// The period without odometry that has not ended.
+    unseen: Option<Unseen>,
     history: History,
     /// Association probability of the latest ping.
     association: f32,
@@ -170,6 +173,7 @@ impl<'m> Localizer<'m> {
             health: Health::default(),
             time: now,
             recorded: now,
+            unseen: None,
             history: History::default(),
             association: 0.0,
         })
@@ -182,10 +186,18 @@ impl<'m> Localizer<'m> {
     /// # Errors
     /// [`OdometryError`], by what is wrong with the travel or its time; estimate and time are unchanged.
     pub fn odometry(&mut self, now: Instant, travel: WheelTravel) -> Result<(), OdometryError> {
+        let result = self.predict(now, travel);
+        if let (Err(_), Some(unseen)) = (result, &mut self.unseen) {
+            unseen.refuse(now);
+        }
+        result
+    }
+
+    fn predict(&mut self, now: Instant, travel: WheelTravel) -> Result<(), OdometryError> {
         let elapsed = odometry::check(travel, self.time, now, self.config.max_wheel_speed)?;
         let unrecorded = now.checked_duration_since(self.recorded).unwrap_or(NO_TIME);
         let before = self.ekf.heading();
-        self.ekf.predict(travel).map_err(OdometryError::Filter)?;
+        self.predict_seen(now, travel).map_err(OdometryError::Filter)?;
         self.history.record_turn(self.ekf.heading().from(before), seconds(elapsed));
         self.history.record_distance(travel.distance());
         (self.time, self.recorded) = (now, now);
@@ -194,21 +206,43 @@ impl<'m> Localizer<'m> {
         Ok(())
     }
 
-    /// Records that the wheels could not be observed up to `now`, so that the verdict of a localizer
-    /// without odometry does not stay `Tracking`. To be called whenever an encoder sample is due and
-    /// fails; the estimate is unchanged, because the next sample may report the whole travel.
+    /// Predicts over a travel that ends a period without odometry, if there is one.
+    fn predict_seen(&mut self, now: Instant, travel: WheelTravel) -> Result<(), EkfError> {
+        let Some(unseen) = self.unseen else {
+            return self.ekf.predict(travel);
+        };
+        let grown = self.ekf.pose_variances();
+        unseen.end(&mut self.ekf, now, travel.distance(), &self.config);
+        let result = self.ekf.predict(travel);
+        if result.is_ok() {
+            self.unseen = None;
+            self.health.record_uncertainty(self.ekf.pose_uncertainty());
+        } else {
+            self.ekf.set_pose_variances(grown);
+        }
+        result
+    }
+
+    /// Records that the wheels could not be observed up to `now`. To be called whenever an encoder sample is due and
+    /// fails. The state is unchanged, because the next sample may report the whole travel; the deviations of the pose
+    /// grow with the distance that the wheels may have rolled at their maximum speed (`docs/model.md`, eq. 24).
     ///
     /// The verdict is `Degraded` after [0.5 s](crate::health::DEGRADED_WITHOUT_ODOMETRY), `Lost` after
-    /// [3 s](crate::health::LOST_WITHOUT_ODOMETRY);
-    /// [`Health::position_deviation`](field@crate::health::Health::position_deviation) grows by the
-    /// distance that the wheels may have rolled at their maximum speed.
+    /// [3 s](crate::health::LOST_WITHOUT_ODOMETRY).
     pub fn odometry_missing(&mut self, now: Instant) {
         let since = |then: Instant| now.checked_duration_since(then).unwrap_or(NO_TIME);
-        let (unseen, unrecorded) = (since(self.time), since(self.recorded));
-        let distance = odometry::largest_travel(unseen, self.config.max_wheel_speed);
+        let (unseen_for, unrecorded) = (since(self.time), since(self.recorded));
+        let unseen = *self.unseen.get_or_insert_with(|| Unseen::new(self.time, &self.ekf));
+        unseen.grow(&mut self.ekf, now, &self.config);
         let (uncertainty, limits) = (self.ekf.pose_uncertainty(), self.limits());
-        self.health.record_unseen(unseen, distance, unrecorded, uncertainty, &limits);
+        self.health.record_unseen(unseen_for, unrecorded, uncertainty, &limits);
         self.recorded = self.recorded.max(now);
+    }
+
+    /// Whether an encoder sample has failed since the last accepted travel.
+    #[must_use]
+    pub fn is_odometry_missing(&self) -> bool {
+        self.unseen.is_some()
     }
 
     /// Replaces the pose by one that was measured independently. The calibration and its covariance are
@@ -219,8 +253,7 @@ impl<'m> Localizer<'m> {
     pub fn set_pose(&mut self, start: &Start) -> Result<(), EkfError> {
         let Start { pose, position_deviation, heading_deviation } = *start;
         self.ekf.set_pose(pose, position_deviation, heading_deviation)?;
-        self.health = Health::default();
-        self.history = History::default();
+        self.pose_replaced();
         Ok(())
     }
 
@@ -235,9 +268,21 @@ impl<'m> Localizer<'m> {
         deviation: StandardDeviations,
     ) -> Result<(), EkfError> {
         self.ekf = Ekf::new(self.config.drive, state, deviation)?;
+        self.pose_replaced();
+        Ok(())
+    }
+
+    fn pose_replaced(&mut self) {
         self.health = Health::default();
         self.history = History::default();
-        Ok(())
+        self.pose_changed();
+    }
+
+    /// Begins the period without odometry again after a change of P by something else than odometry.
+    fn pose_changed(&mut self) {
+        if self.unseen.is_some() {
+            self.unseen = Some(Unseen::with_pose(&self.ekf, self.recorded));
+        }
     }
 
     /// Declares the pose unknown: the verdict is `Lost`.
@@ -326,6 +371,7 @@ impl<'m> Localizer<'m> {
                 self.ekf
                     .update_predicted(&prediction, innovation.value, noise, weight)
                     .map_err(Refusal::Filter)?;
+                self.pose_changed();
                 match used {
                     Use::Accept => Fix::Accepted(innovation),
                     _ => Fix::Downweighted(innovation),
@@ -349,6 +395,7 @@ impl<'m> Localizer<'m> {
             && self.ekf.inflate_pose(position, heading).is_ok()
         {
             self.health.record_inflation();
+            self.pose_changed();
         }
     }
 

@@ -34,10 +34,7 @@ use crate::motion::WheelTravel;
 use crate::search::{Answer, Hypothesis, NotFinite, Region, Search};
 use crate::units::{Instant, Metres, Radians};
 
-/// Standard deviation of x and of y of a pose that is unknown.
-pub const UNKNOWN_POSITION: Metres = Metres(1_000.0);
-/// Standard deviation of its heading.
-pub const UNKNOWN_HEADING: Radians = Radians(core::f32::consts::PI);
+pub use crate::unseen::{UNKNOWN_HEADING, UNKNOWN_POSITION};
 
 /// Distance between two checkpoints of the calibration.
 pub const CHECKPOINT: Metres = Metres(10.0);

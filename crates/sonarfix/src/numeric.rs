@@ -16,6 +16,11 @@ pub(crate) fn is_valid_variance(variance: f32) -> bool {
     is_within(variance, MAX_VARIANCE)
 }
 
+/// A variance, or [`MAX_VARIANCE`] if it is larger or not finite.
+pub(crate) fn at_most_max_variance(variance: f32) -> f32 {
+    if is_valid_variance(variance) { variance } else { MAX_VARIANCE }
+}
+
 /// The larger of the value and zero.
 ///
 /// Compared as integers, the bit patterns of negative numbers are negative; an integer comparison

@@ -379,6 +379,7 @@ impl<'m, F: NorFlash> App<'m, F> {
             origin: *origin,
             searches: false,
             has_rolled: false,
+            has_been_blind: false,
             report: Report::default(),
         });
         Ok(())

@@ -88,6 +88,83 @@ fn any_number_of_power_cycles_equals_one() {
     }
 }
 
+/// The pose's deviations over interruptions with driving: each adds 10 cm and 5° once, as independent errors, up to those of an
+/// unknown pose.
+#[test]
+fn interruptions_with_driving_add_as_independent_errors() {
+    let baked = Baked::new(&config());
+    let mut bench = running(&baked);
+    let (pushed, turned) = (0.1_f32, 5.0_f32.to_radians());
+    for interruption in 0..40 {
+        drive(&mut bench, 200);
+        bench.wait(150);
+        let before = bench.estimate().deviation;
+        assert_eq!(bench.order(&Command::Stop), DONE);
+        if interruption % 2 == 0 {
+            bench = Bench::switched_on(&baked, bench.switched_off());
+        }
+        let after;
+        (bench, after) = at_start(bench);
+        let expected = [before.x.0.hypot(pushed), before.heading.0.hypot(turned).min(3.141_592_7)];
+        for (is, expected) in [after.x.0, after.heading.0].into_iter().zip(expected) {
+            assert!((is - expected).abs() < 1e-5 * expected, "{interruption}: {is} {expected}");
+        }
+    }
+    let wide = Start {
+        position_deviation: Metres(1_000.0),
+        heading_deviation: Radians(std::f32::consts::PI),
+        ..start()
+    };
+    for _ in 0..3 {
+        assert_eq!(bench.order(&Command::SetPose(wide)), DONE);
+        drive(&mut bench, 200);
+        assert_eq!(bench.order(&Command::Stop), DONE);
+        let after;
+        (bench, after) = at_start(bench);
+        assert_eq!((after.x, after.heading), (Metres(1_000.0), Radians(std::f32::consts::PI)));
+    }
+}
+
+/// A stop while the wheels cannot be observed: the robot does not start from a pose that it may have left unseen.
+#[test]
+fn an_interruption_while_the_encoders_are_dead_keeps_their_growth() {
+    let baked = Baked::new(&config());
+    let mut bench = running(&baked);
+    bench.wait(1_000);
+    let calibration = bench.estimate().deviation;
+    (bench.hardware.right.0, bench.hardware.left.0) = (None, None);
+    bench.wait(2_000);
+    let blind = bench.estimate().deviation;
+    assert!(blind.x.0 > 1.9 * config().localizer.max_wheel_speed.0, "{blind:?}");
+    assert_eq!(bench.order(&Command::Stop), DONE);
+    (bench.hardware.right.0, bench.hardware.left.0) = (Some(0), Some(0));
+    let bench = Bench::switched_on(&baked, bench.switched_off());
+    let (bench, after) = at_start(bench);
+    assert!(after.x.0 >= blind.x.0, "{after:?}");
+    assert!((after.heading.0 - std::f32::consts::PI).abs() < 1e-3, "{after:?}");
+    assert!(is_within_prior(&after, &config().localizer.prior), "{after:?}");
+    assert!(after.scale_right >= calibration.scale_right);
+    assert!(bench.app.is_running());
+}
+
+/// A new pose while an encoder is dead: the travel before it, which the counter returns later, does not move it.
+#[test]
+fn a_new_pose_without_odometry_is_not_moved_by_earlier_travel() {
+    let baked = Baked::new(&config());
+    let mut bench = running(&baked);
+    bench.wait(1_000);
+    let (right, left) = (bench.hardware.right.0.take(), bench.hardware.left.0.take());
+    bench.wait(400);
+    assert_eq!(bench.order(&Command::SetPose(start())), DONE);
+    bench.wait(400);
+    let moved = |count: Option<u16>| count.map(|count| count.wrapping_add(300));
+    (bench.hardware.right.0, bench.hardware.left.0) = (moved(right), moved(left));
+    bench.wait(300);
+    let estimate = bench.estimate();
+    assert_eq!(estimate.state.x, start().pose.x);
+    assert!(estimate.deviation.x.0 > 0.4 * config().localizer.max_wheel_speed.0, "{estimate:?}");
+}
+
 /// New poses of a running robot, and again after a power cycle.
 #[test]
 fn new_poses_never_add_up() {

@@ -121,6 +121,11 @@ impl Odometer {
         self.taken = Some(position);
     }
 
+    /// Starts the ledger anew with the next reading.
+    pub fn forget(&mut self) {
+        self.taken = None;
+    }
+
     pub fn wheels(&self) -> &Wheels {
         &self.wheels
     }

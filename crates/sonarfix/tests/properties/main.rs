@@ -26,3 +26,5 @@ mod search;
 mod six_states;
 #[cfg(test)]
 mod strategies;
+#[cfg(test)]
+mod unseen;
