@@ -47,8 +47,8 @@ fn is_near(value: f64, expected: f64) -> bool {
 }
 
 /// What eq. (24) adds to the variances of position and heading after `ticks` without odometry.
-fn growth(ticks: u64, fastest: f32) -> (f64, f64) {
-    let rolled = f64::from(fastest) * 0.1 * ticks as f64;
+fn growth(ticks: u16, fastest: f32) -> (f64, f64) {
+    let rolled = f64::from(fastest) * 0.1 * f64::from(ticks);
     let turned = (2.0 * rolled / 0.2).min(f64::from(std::f32::consts::PI));
     (rolled.min(1_000.0).powi(2), turned.powi(2))
 }
@@ -63,13 +63,13 @@ proptest! {
     /// Position and heading grow by the distance at the maximum wheel speed; nothing else changes.
     #[test]
     fn deviations_grow_with_the_unseen_time(
-        room in any_room(), fastest in 0.15_f32..3.0, ticks in 1_u64..2_000,
+        room in any_room(), fastest in 0.15_f32..3.0, ticks in 1_u16..2_000,
     ) {
         let walls = room.walls();
         let (mut localizer, now) = driven(&walls, &room, fastest);
         let before = *localizer.filter();
         let mut last = 0.0;
-        for tick in 1..=ticks {
+        for tick in 1..=u64::from(ticks) {
             localizer.odometry_missing(at(now + tick));
             let x = variance(localizer.filter(), X);
             prop_assert!(x > last, "tick {tick}");
@@ -96,15 +96,16 @@ proptest! {
     /// Samples that fail for less than half a second leave no trace in the estimate.
     #[test]
     fn a_short_failure_changes_no_bit(
-        room in any_room(), ticks in 1_u64..5, right in -0.01_f32..0.01, left in -0.01_f32..0.01,
+        room in any_room(), ticks in 1_u16..5, right in -0.01_f32..0.01, left in -0.01_f32..0.01,
     ) {
         let walls = room.walls();
         let (mut without, now) = driven(&walls, &room, 1.0);
         let mut with = without.clone();
-        missing(&mut with, now + 1..=now + ticks - 1);
-        let travel = WheelTravel::new(right * ticks as f32, left * ticks as f32);
+        let end = now + u64::from(ticks);
+        missing(&mut with, now + 1..=end - 1);
+        let travel = WheelTravel::new(right * f32::from(ticks), left * f32::from(ticks));
         for localizer in [&mut with, &mut without] {
-            localizer.odometry(at(now + ticks), travel).unwrap();
+            localizer.odometry(at(end), travel).unwrap();
         }
         prop_assert_eq!(bits(with.filter()), bits(without.filter()));
         prop_assert_eq!(with.health().verdict, Verdict::Tracking);
@@ -115,15 +116,16 @@ proptest! {
     /// After a longer failure the turn is known, and the position to the distance rolled.
     #[test]
     fn after_a_long_failure_the_path_is_unknown(
-        room in any_room(), ticks in 7_u64..500, right in -0.01_f32..0.01, left in -0.01_f32..0.01,
+        room in any_room(), ticks in 7_u16..500, right in -0.01_f32..0.01, left in -0.01_f32..0.01,
     ) {
         let walls = room.walls();
         let (mut without, now) = driven(&walls, &room, 1.0);
         let mut with = without.clone();
-        missing(&mut with, now + 1..=now + ticks - 1);
-        let travel = WheelTravel::new(right * ticks as f32, left * ticks as f32);
+        let end = now + u64::from(ticks);
+        missing(&mut with, now + 1..=end - 1);
+        let travel = WheelTravel::new(right * f32::from(ticks), left * f32::from(ticks));
         for localizer in [&mut with, &mut without] {
-            localizer.odometry(at(now + ticks), travel).unwrap();
+            localizer.odometry(at(end), travel).unwrap();
         }
         let distance = f64::from(travel.distance().0).powi(2);
         for (state, added) in [(X, distance), (Y, distance), (HEADING, 0.0)] {
@@ -137,15 +139,16 @@ proptest! {
 
     /// A sample that was refused later may have been discarded: what it grew by remains.
     #[test]
-    fn after_a_refused_sample_the_growth_remains(room in any_room(), ticks in 7_u64..500) {
+    fn after_a_refused_sample_the_growth_remains(room in any_room(), ticks in 7_u16..500) {
         let walls = room.walls();
         let (mut localizer, now) = driven(&walls, &room, 1.0);
         let before = *localizer.filter();
-        missing(&mut localizer, now + 1..=now + ticks - 1);
+        let end = now + u64::from(ticks);
+        missing(&mut localizer, now + 1..=end - 1);
         let grown = bits(localizer.filter());
-        localizer.odometry(at(now + ticks), WheelTravel::new(1e3, 1e3)).unwrap_err();
+        localizer.odometry(at(end), WheelTravel::new(1e3, 1e3)).unwrap_err();
         prop_assert_eq!(bits(localizer.filter()), grown, "a refused sample changes no bit");
-        localizer.odometry(at(now + ticks + 1), WheelTravel::default()).unwrap();
+        localizer.odometry(at(end + 1), WheelTravel::default()).unwrap();
         let (position, heading) = growth(ticks + 1, 1.0);
         for (state, added) in [(X, position), (Y, position), (HEADING, heading)] {
             let expected = variance(&before, state) + added;
@@ -156,7 +159,7 @@ proptest! {
     /// A new pose has its deviations; they grow from then on, and that growth remains.
     #[test]
     fn a_new_pose_begins_the_growth_again(
-        room in any_room(), before in 1_u64..500, after in 1_u64..100,
+        room in any_room(), before in 1_u64..500, after in 1_u16..100,
     ) {
         let walls = room.walls();
         let (mut localizer, now) = driven(&walls, &room, 1.0);
@@ -166,8 +169,9 @@ proptest! {
         localizer.set_pose(&start).unwrap();
         let new = *localizer.filter();
         prop_assert_eq!(localizer.filter().standard_deviations().x, Metres(0.03));
-        missing(&mut localizer, now + 1..=now + after);
-        localizer.odometry(at(now + after + 1), WheelTravel::default()).unwrap();
+        let end = now + u64::from(after) + 1;
+        missing(&mut localizer, now + 1..=end - 1);
+        localizer.odometry(at(end), WheelTravel::default()).unwrap();
         let (position, heading) = growth(after + 1, 1.0);
         for (state, added) in [(X, position), (Y, position), (HEADING, heading)] {
             let expected = variance(&new, state) + added;
