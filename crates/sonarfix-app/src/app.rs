@@ -7,7 +7,8 @@
 //!     └──────────────────────── Stop ───────────────────────────────┘
 //! ```
 //!
-//! A robot that waits must not move; the configuration defines the other cases ([`MotorPolicy`]): the board enables
+//! A robot that waits must not move; the configuration defines the other cases
+//! ([`MotorPolicy`](sonarfix_hal::config::MotorPolicy)): the board enables
 //! its motor driver by [`Polled::may_drive`].
 //!
 //! This file composes; `command` executes commands; `wire` reads the link and schedules telemetry. The deadline check
@@ -17,13 +18,13 @@ mod command;
 mod wire;
 
 use embedded_storage::nor_flash::NorFlash;
-use sonarfix::health::{self, Verdict};
+use sonarfix::health::Verdict;
 use sonarfix::localizer::Localizer;
 use sonarfix::map::{Map, MapError};
 use sonarfix::navigator;
 use sonarfix::search::Search;
 use sonarfix::units::{Duration, Instant, Metres};
-use sonarfix_hal::config::{MotorPolicy, RobotConfig, Unsupported};
+use sonarfix_hal::config::{RobotConfig, Unsupported};
 use sonarfix_hal::robot::{Faults, Hardware, Report, Robot, Settings, Step};
 use sonarfix_link::baked::{self, BakedError};
 use sonarfix_link::message::{self, CommandResult, Hello, LoopStatus, ResetCause};
@@ -70,7 +71,8 @@ pub struct Polled {
     pub is_settled: bool,
     /// Whether the loop runs.
     pub is_running: bool,
-    /// Whether the motors may be enabled: while the loop runs, by the [`MotorPolicy`] of the configuration.
+    /// Whether the motors may be enabled: while the loop runs, by the
+    /// [`MotorPolicy`](sonarfix_hal::config::MotorPolicy) of the configuration.
     pub may_drive: bool,
     /// Whether the loop has been started or stopped in this poll.
     pub has_changed: bool,
@@ -291,11 +293,7 @@ impl<'m, F: NorFlash> App<'m, F> {
         let (Some(localizer), Some((config, _))) = (self.localizer(), &self.config) else {
             return false;
         };
-        let MotorPolicy { lost, dead_encoder, lost_link, link_timeout } = config.motors;
-        let has_odometry = since(now, localizer.time()) <= health::DEGRADED_WITHOUT_ODOMETRY;
-        let is_lost = localizer.health().verdict == Verdict::Lost;
-        let has_link = since(now, self.heard) <= link_timeout;
-        (dead_encoder || has_odometry) && (lost || !is_lost) && (lost_link || has_link)
+        config.motors.permits(localizer, now, self.heard)
     }
 
     /// The localizer, while the loop runs.

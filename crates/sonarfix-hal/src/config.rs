@@ -17,12 +17,15 @@
 //! [`RobotConfig::check`] refuses NaN and infinity in every field.
 
 use sonarfix::config::{Config, ConfigError};
+use sonarfix::health::{DEGRADED_WITHOUT_ODOMETRY, Verdict};
+use sonarfix::localizer::Localizer;
 use sonarfix::search::Region;
-use sonarfix::units::{Duration, Metres, Radians};
+use sonarfix::units::{Duration, Instant, Metres, Radians};
 
 use crate::encoder::{GeometryError, WheelGeometry, Wheels};
 use crate::ranger::{Air, Celsius, PulseTiming, RangerKind, RangerSettings};
 use crate::servo::{Calibration, MeasuredPulse, ServoSettings, SettingError};
+use crate::time::since;
 
 /// The configuration of a robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -161,6 +164,17 @@ impl MotorPolicy {
         lost_link: true,
         link_timeout: Duration::from_ticks(2_000_000),
     };
+
+    /// Whether the motors of a running robot are enabled at `now`. `heard`: when the last frame arrived over the link.
+    #[must_use]
+    pub fn permits(&self, localizer: &Localizer, now: Instant, heard: Instant) -> bool {
+        let has_odometry = since(now, localizer.time()) <= DEGRADED_WITHOUT_ODOMETRY;
+        let is_lost = localizer.health().verdict == Verdict::Lost;
+        let has_link = since(now, heard) <= self.link_timeout;
+        (self.dead_encoder || has_odometry)
+            && (self.lost || !is_lost)
+            && (self.lost_link || has_link)
+    }
 }
 
 /// A field that [`RobotConfig::check`] refused, and why.

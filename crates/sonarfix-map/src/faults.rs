@@ -24,12 +24,16 @@ pub enum FaultKind {
     CrossTalk(f64),
     /// The echo line stays high.
     StuckEcho,
+    /// The sonar does not answer.
+    DeadSonar,
     /// Channel A of an encoder is stuck.
     DeadEncoder(Wheel),
     /// The channels of an encoder are swapped.
     ReversedEncoder(Wheel),
     /// This fraction of an encoder's edges is missed.
     MissingTicks(Wheel, f64),
+    /// This fraction of the readings of an encoder's counter fail.
+    ReadErrors(Wheel, f64),
     /// The servo does not move.
     StuckServo,
     /// The servo is slower by this factor.
@@ -73,9 +77,11 @@ fn kind(table: &Table<'_>) -> Result<FaultKind, FileError> {
         "lost_echoes" => FaultKind::LostEchoes(share(table)?),
         "cross_talk" => FaultKind::CrossTalk(share(table)?),
         "stuck_echo" => FaultKind::StuckEcho,
+        "dead_sonar" => FaultKind::DeadSonar,
         "dead_encoder" => FaultKind::DeadEncoder(wheel(table)?),
         "reversed_encoder" => FaultKind::ReversedEncoder(wheel(table)?),
         "missing_ticks" => FaultKind::MissingTicks(wheel(table)?, share(table)?),
+        "read_errors" => FaultKind::ReadErrors(wheel(table)?, share(table)?),
         "stuck_servo" => FaultKind::StuckServo,
         "slow_servo" => FaultKind::SlowServo(times(table)?),
         "clock_jitter" => FaultKind::ClockJitter(table.require("late")?.deviation(&TIME)?),

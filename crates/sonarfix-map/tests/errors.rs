@@ -760,6 +760,7 @@ fn a_wrong_fault_has_its_line_and_key() {
         ("kind = \"gremlins\"", "kind", "must be one of the faults"),
         ("kind = \"lost_echoes\"", "share", "is missing"),
         ("kind = \"cross_talk\", share = 1.5", "share", "must be from 0 to 1"),
+        ("kind = \"read_errors\", wheel = \"left\"", "share", "is missing"),
         ("kind = \"dead_encoder\", wheel = \"front\"", "wheel", "must be \"right\" or"),
         ("kind = \"slow_servo\", times = 0.5", "times", "must be at least 1"),
         ("kind = \"clock_jitter\", late = 5", "late", "a unit is missing"),
@@ -780,9 +781,13 @@ fn faults_are_read_in_their_order() {
     let list = "format = 1\nfaults = [
         { kind = \"missing_ticks\", wheel = \"left\", share = \"1 %\", from = \"0 s\", to = \"1 s\" },
         { kind = \"stuck_echo\", from = \"5 s\", to = \"7 s\" },
+        { kind = \"read_errors\", wheel = \"right\", share = 1.0, from = \"1 s\", to = \"2 s\" },
+        { kind = \"dead_sonar\", from = \"1 s\", to = \"2 s\" },
     ]";
     let faults = parse(&PAPER.replace("format = 1", list)).unwrap().faults;
     let ticks = Fault { kind: FaultKind::MissingTicks(Wheel::Left, 0.01), from: 0.0, to: 1.0 };
     let echo = Fault { kind: FaultKind::StuckEcho, from: 5.0, to: 7.0 };
-    assert_eq!(faults, [ticks, echo]);
+    let read = Fault { kind: FaultKind::ReadErrors(Wheel::Right, 1.0), from: 1.0, to: 2.0 };
+    let sonar = Fault { kind: FaultKind::DeadSonar, ..read };
+    assert_eq!(faults, [ticks, echo, read, sonar]);
 }

@@ -32,6 +32,8 @@ pub struct Counted {
     pub ticks: u32,
     /// Illegal quadrature transitions; wraps around.
     pub illegal: u32,
+    /// Whether a reading of the counter fails.
+    pub has_failed: bool,
 }
 
 /// The actuators' signals of a poll.
@@ -87,12 +89,17 @@ impl Wires {
 #[derive(Debug, Default)]
 pub struct CounterWire(Cell<Counted>);
 
+/// The reading of a counter has failed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ReadError;
+
 impl Counter for &CounterWire {
-    type Error = Infallible;
+    type Error = ReadError;
     const BITS: u32 = 32;
 
-    fn count(&mut self) -> Result<u32, Infallible> {
-        Ok(self.0.get().ticks)
+    fn count(&mut self) -> Result<u32, ReadError> {
+        let Counted { ticks, has_failed, .. } = self.0.get();
+        if has_failed { Err(ReadError) } else { Ok(ticks) }
     }
 
     fn illegal(&mut self) -> u32 {

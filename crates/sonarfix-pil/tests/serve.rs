@@ -106,7 +106,8 @@ fn answered(bytes: Vec<u8>) -> Vec<Answer> {
 }
 
 fn sensors(millis: u64, ticks: i32) -> Sensors {
-    let counted = |ticks: i32| Counted { ticks: ticks.cast_unsigned(), illegal: 0 };
+    let counted =
+        |ticks: i32| Counted { ticks: ticks.cast_unsigned(), illegal: 0, has_failed: false };
     Sensors {
         at: Instant::from_ticks(millis * 1_000),
         right: counted(ticks),

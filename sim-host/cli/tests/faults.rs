@@ -46,8 +46,26 @@ fn the_robot_recovers_from_faults_other_than_of_odometry() {
         "servo stuck",
         "servo three times as slow",
         "polls up to 50 ms late",
+        "sonar dead",
+        "encoder read errors",
+        "all devices dead",
     ] {
         assert_eq!(row(name).recovered(), row(name).results.len(), "{name}");
+    }
+}
+
+/// Without odometry the verdict is `Tracking` for at most 0.5 s and a tick of 0.1 s that a ping may have delayed; each failed
+/// reading is counted.
+#[test]
+fn blindness_is_not_silent() {
+    for name in ["encoder read errors", "all devices dead"] {
+        let errors = counted(name, |faults| faults.right.errors + faults.left.errors);
+        assert!(errors.iter().all(|&n| n >= 300), "{name}: {errors:?}");
+        let none = row("none").longest_silence();
+        assert!(row(name).longest_silence() <= none.max(0.7), "{name}");
+    }
+    for row in ROWS.iter() {
+        assert!(row.longest_silence() <= 60.0, "{}: {}", row.name, row.longest_silence());
     }
 }
 

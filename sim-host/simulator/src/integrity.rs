@@ -23,6 +23,8 @@ pub struct Integrity {
     /// Current time outside the ellipse with the verdict `Tracking`, seconds.
     undetected: f64,
     longest_undetected: f64,
+    /// Seconds.
+    longest_blind: f64,
     worst: f64,
     holds: bool,
     verdict: Verdict,
@@ -34,6 +36,13 @@ pub struct Integrity {
 }
 
 impl Integrity {
+    /// Adds a time without odometry or without a used range, seconds, with the verdict at its end.
+    pub fn add_blindness(&mut self, seconds: f64, verdict: Verdict) {
+        if verdict == Verdict::Tracking {
+            self.longest_blind = self.longest_blind.max(seconds);
+        }
+    }
+
     /// Adds the error and the covariance after a tick of a length in seconds.
     pub fn add(&mut self, seconds: f64, error: &Vector, p: &Matrix, verdict: Verdict) {
         let is_inside = distance_squared(error, p) <= ELLIPSE;
@@ -72,6 +81,12 @@ impl Integrity {
     #[must_use]
     pub fn longest_undetected(&self) -> f64 {
         self.longest_undetected
+    }
+
+    /// Longest time without odometry or without a used range at whose end the verdict was `Tracking`, seconds.
+    #[must_use]
+    pub fn longest_blind(&self) -> f64 {
+        self.longest_blind
     }
 
     /// Time up to the end of the run outside the ellipse with the verdict `Tracking`, seconds.
@@ -134,6 +149,16 @@ mod tests {
             integrity.add(0.5, &error, &p, verdict);
         }
         integrity
+    }
+
+    #[test]
+    fn blindness_counts_while_the_verdict_is_tracking() {
+        let mut integrity = Integrity::default();
+        let times = [(2.0, Verdict::Tracking), (9.0, Verdict::Degraded), (1.0, Verdict::Tracking)];
+        for (seconds, verdict) in times {
+            integrity.add_blindness(seconds, verdict);
+        }
+        assert!((integrity.longest_blind() - 2.0).abs() < 1e-12);
     }
 
     #[test]

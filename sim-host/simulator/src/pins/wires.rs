@@ -21,14 +21,14 @@ pub struct EncoderWires {
 }
 
 impl EncoderWires {
-    /// The counter reading.
+    /// The counter reading, which may fail.
     #[must_use]
-    pub fn counted(&self) -> Counted {
+    pub fn counted(&self, has_failed: bool) -> Counted {
         let mut counter = &self.count;
         let Ok(ticks) = counter.count();
         #[expect(clippy::cast_possible_truncation, reason = "the count wraps as the decoder's")]
         let ticks = ticks.wrapping_add_signed(self.skipped.get() as i32);
-        Counted { ticks, illegal: counter.illegal() }
+        Counted { ticks, illegal: counter.illegal(), has_failed }
     }
 }
 

@@ -163,7 +163,12 @@ impl<'a> SimulatedHardware<'a> {
 
     /// The inputs of the devices since the last poll.
     fn sensors(&mut self) -> Sensors {
-        let [right, left] = self.encoders.each_ref().map(EncoderWires::counted);
+        let now = self.now;
+        let [right, left] = &mut self.faults.encoders;
+        let failed = [right, left].map(|faults| faults.read_fails(now));
+        let [right, left] = self.encoders;
+        let [right, left] = [(right, failed[0]), (left, failed[1])]
+            .map(|(wires, has_failed)| wires.counted(has_failed));
         let (rose, fell) = std::mem::take(&mut self.edges);
         Sensors { at: Instant::from_ticks(self.now), right, left, rose, fell }
     }
@@ -224,7 +229,9 @@ impl<'a> SimulatedHardware<'a> {
         if actuators.has_fallen {
             let undisturbed = self.ping();
             let pulse = self.faults.sonar.pulse(self.now, undisturbed, self.silence);
-            self.board.answer(self.now, pulse);
+            if !self.faults.sonar.is_dead(self.now) {
+                self.board.answer(self.now, pulse);
+            }
         }
     }
 
@@ -308,9 +315,16 @@ impl<'a> SimulatedHardware<'a> {
         recorder.fix(|| observe::fix_record(measurement, &heard.aim, fix, localizer));
     }
 
-    /// Steers by the estimate. While the robot has none, a person steers it along the path.
+    /// Steers by the estimate. While the robot has none, a person steers it along the path. The wheels stand while the
+    /// motor policy of the robot disables the motors; the link is never lost.
     fn steer(&mut self, localizer: &Localizer) {
+        let now = Instant::from_ticks(self.now);
+        let motors = &self.simulation.scenario.robot.motors;
         if let Some(follower) = &mut self.follower {
+            if !motors.permits(localizer, now, now) {
+                self.plant.steer(Command::default());
+                return;
+            }
             let pose = match self.mode {
                 Mode::Searching => self.plant.pose(),
                 _ => observe::estimate(localizer).pose,

@@ -14,6 +14,7 @@ use crate::observe;
 use crate::odometry::DeadReckoning;
 use crate::plant::{Plant, Travel};
 use crate::statistics::{NisSum, RunResult};
+use crate::time::seconds;
 use crate::trace::{Pose, Recorder, Tick};
 
 /// Accumulates the result of a run.
@@ -132,7 +133,11 @@ impl<'a> Score<'a> {
         self.result.error = observe::error(localizer.filter(), &plant.state());
         self.result.path.add(&self.result.error);
         let covariance = observe::covariance(localizer.filter());
-        let verdict = localizer.health().verdict;
+        let health = localizer.health();
+        let verdict = health.verdict;
+        let without_range = seconds(health.time_since_fix.to_micros());
+        let without_odometry = time - seconds(localizer.time().ticks());
+        self.result.integrity.add_blindness(without_range.max(without_odometry), verdict);
         self.result.integrity.add(time - self.last_tick, &self.result.error, &covariance, verdict);
         self.last_tick = time;
         recorder.tick(|| self.record(time, localizer, plant));

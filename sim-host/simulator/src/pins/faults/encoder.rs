@@ -1,4 +1,4 @@
-//! Faults of the channels of an encoder.
+//! Faults of the channels of an encoder and of its counter.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -12,6 +12,7 @@ pub(super) enum Wrong {
     Dead,
     Reversed,
     Missing(f64),
+    Unreadable(f64),
 }
 
 pub(super) fn of(kind: FaultKind, wheel: Wheel) -> Option<Wrong> {
@@ -19,6 +20,7 @@ pub(super) fn of(kind: FaultKind, wheel: Wheel) -> Option<Wrong> {
         FaultKind::DeadEncoder(of) if of == wheel => Some(Wrong::Dead),
         FaultKind::ReversedEncoder(of) if of == wheel => Some(Wrong::Reversed),
         FaultKind::MissingTicks(of, share) if of == wheel => Some(Wrong::Missing(share)),
+        FaultKind::ReadErrors(of, share) if of == wheel => Some(Wrong::Unreadable(share)),
         _ => None,
     }
 }
@@ -59,8 +61,20 @@ impl EncoderFaults {
                 Wrong::Dead => edge.levels = (false, b),
                 Wrong::Reversed => edge.levels = (b, a),
                 Wrong::Missing(share) => edge.is_served &= self.rng.random::<f64>() >= share,
+                Wrong::Unreadable(_) => {}
             }
         }
         edge
+    }
+
+    /// Whether a reading of the counter at `now`, µs, fails.
+    pub fn read_fails(&mut self, now: u64) -> bool {
+        let mut fails = false;
+        for fault in self.faults.iter().filter(|fault| fault.is_on(now)) {
+            if let Wrong::Unreadable(share) = fault.what {
+                fails |= self.rng.random::<f64>() < share;
+            }
+        }
+        fails
     }
 }

@@ -15,6 +15,7 @@ pub(super) enum Wrong {
     Lost(f64),
     CrossTalk(f64),
     Stuck,
+    Dead,
 }
 
 pub(super) fn of(kind: FaultKind) -> Option<Wrong> {
@@ -22,6 +23,7 @@ pub(super) fn of(kind: FaultKind) -> Option<Wrong> {
         FaultKind::LostEchoes(share) => Some(Wrong::Lost(share)),
         FaultKind::CrossTalk(share) => Some(Wrong::CrossTalk(share)),
         FaultKind::StuckEcho => Some(Wrong::Stuck),
+        FaultKind::DeadSonar => Some(Wrong::Dead),
         _ => None,
     }
 }
@@ -36,6 +38,12 @@ pub struct SonarFaults {
 impl SonarFaults {
     pub(super) fn new(faults: Vec<Timed<Wrong>>, rng: ChaCha8Rng) -> Self {
         Self { faults, rng }
+    }
+
+    /// Whether the sonar does not answer a trigger at `now`, µs.
+    #[must_use]
+    pub fn is_dead(&self, now: u64) -> bool {
+        self.faults.iter().any(|fault| fault.what == Wrong::Dead && fault.is_on(now))
     }
 
     /// Duration of the echo pulse, µs, after a trigger at `now`. `undisturbed` is the pulse without

@@ -66,3 +66,25 @@ fn the_controller_suffers_while_the_fault_lasts() {
     assert_eq!(power.power_back_at(DURING), Some(AFTER));
     assert_eq!(power.power_back_at(AFTER), None);
 }
+
+#[test]
+fn a_counter_cannot_be_read_while_the_fault_lasts() {
+    let kinds = [FaultKind::ReadErrors(Wheel::Right, 1.0), FaultKind::ReadErrors(Wheel::Left, 0.5)];
+    let [mut right, mut left] = faults(&kinds).encoders;
+    for now in [BEFORE, AFTER] {
+        assert!(!right.read_fails(now) && !left.read_fails(now));
+    }
+    assert!((0..100).all(|_| right.read_fails(DURING)));
+    // Half, ± 4 deviations of 16; the edges are not disturbed.
+    let failed = (0..1_000).filter(|_| left.read_fails(DURING)).count();
+    assert!((436..564).contains(&failed), "{failed}");
+    let whole = Edge { levels: (true, false), is_served: true };
+    assert_eq!(right.edge(DURING, whole.levels), whole);
+}
+
+#[test]
+fn a_dead_sonar_does_not_answer() {
+    let sonar = faults(&[FaultKind::DeadSonar]).sonar;
+    let dead = [BEFORE, DURING, AFTER].map(|now| sonar.is_dead(now));
+    assert_eq!(dead, [false, true, false]);
+}
