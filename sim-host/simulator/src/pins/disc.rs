@@ -94,12 +94,12 @@ mod tests {
             for step in steps {
                 disc.roll(step, 0, &mut none);
                 travelled += step;
-                let count = wires.counted().ticks;
+                let count = wires.counted(false).ticks;
                 let whole = (travelled / tick).floor();
                 let counted = f64::from(count.cast_signed());
                 prop_assert_eq!(counted.to_bits(), (whole + 0.0).to_bits());
             }
-            prop_assert_eq!(wires.counted().illegal, 0);
+            prop_assert_eq!(wires.counted(false).illegal, 0);
         }
     }
 }
