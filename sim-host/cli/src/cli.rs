@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::{
-    bound, command, config, convert, faults, find, floor_plans, health, map, monitor, paper, pil,
-    plan, reality, relocalize, replay, run, sonar_model,
+    bound, command, config, convert, faults, find, floor_plans, health, map, merge, monitor, paper,
+    pil, plan, reality, relocalize, replay, run, sonar_model,
 };
 
 /// Simulates, measures, replays and operates the Sonarfix localizer for small wheeled robots.
@@ -37,6 +37,8 @@ enum Command {
     /// Sends a command to a robot.
     #[command(name = "command")]
     Send(command::Args),
+    /// Joins the rows of `run --shard`.
+    Merge(merge::Args),
     /// Bakes a robot file into the configuration image for the robot's flash.
     Config(config::Args),
     /// Checks, bakes, draws and simplifies maps.
@@ -66,6 +68,7 @@ impl Cli {
         match self.command {
             Command::Paper(args) => paper::execute(&args),
             Command::Run(args) => run::execute(&args),
+            Command::Merge(args) => merge::execute(&args),
             Command::Pil(args) => pil::execute(&args),
             Command::Replay(args) => replay::execute(&args),
             Command::Find(args) => find::execute(&args),

@@ -14,6 +14,7 @@ mod floor_plans;
 mod health;
 mod json;
 mod map;
+mod merge;
 mod monitor;
 mod overrides;
 mod paper;
@@ -23,8 +24,10 @@ mod progress;
 mod reality;
 mod relocalize;
 mod replay;
+mod rows;
 mod run;
 mod sonar_model;
+mod sweep;
 mod table;
 
 use std::process::ExitCode;

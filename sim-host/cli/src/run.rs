@@ -9,32 +9,41 @@ use cpu_time::ProcessTime;
 use sonarfix_map::Scenario;
 use sonarfix_report::Report;
 use sonarfix_report::trace_csv;
+use sonarfix_rows::{Plan, Shard};
 use sonarfix_sim::monte_carlo;
+use sonarfix_sim::row::Row;
 use sonarfix_sim::simulate::Simulation;
-use sonarfix_sim::statistics::Summary;
 use sonarfix_sim::trace::Trace;
 
 use crate::overrides::Overrides;
 use crate::progress::Runs;
+use crate::rows::{self, Counted};
+use crate::sweep::{self, Sweep};
 use crate::table::{self, Beside, Measured};
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The scenario file (docs/formats.md).
-    scenario: PathBuf,
+    pub scenario: PathBuf,
     /// Number of runs; by default that of the scenario.
     #[arg(long)]
-    runs: Option<u32>,
+    pub runs: Option<u32>,
     /// Seed of the first run; the others count up from it.
     #[arg(long)]
-    seed: Option<u64>,
+    pub seed: Option<u64>,
     /// Writes the trace of the first run as CSV (docs/formats.md).
     #[arg(long, value_name = "FILE.csv")]
     trace: Option<PathBuf>,
+    /// Runs the scenario with several values of a key of the scenario or robot file: KEY=A,B,… or KEY=A..B:N, like
+    /// sonar.noise=2mm..10mm:5. With several sweeps, all combinations.
+    #[arg(long, value_name = "KEY=VALUES", conflicts_with_all = ["trace", "worst"])]
+    pub sweep: Vec<Sweep>,
     #[command(flatten)]
-    overrides: Overrides,
+    pub rows: rows::RowsArgs,
     #[command(flatten)]
-    output: Output,
+    pub overrides: Overrides,
+    #[command(flatten)]
+    pub output: Output,
 }
 
 /// The output.
@@ -49,6 +58,9 @@ pub struct Output {
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
+    if !args.sweep.is_empty() {
+        return sweep::execute(args);
+    }
     let mut scenario = Scenario::read(&args.scenario)?;
     args.overrides.apply(&mut scenario)?;
     let experiment = Experiment {
@@ -57,10 +69,13 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         simulation: Simulation::new(scenario),
         beside_paper: false,
     };
+    anyhow::ensure!(experiment.runs > 0, "--runs must be at least 1");
     if let Some(file) = &args.trace {
         write_trace(&experiment.trace()?, file)?;
     }
-    experiment.conduct(&args.output)
+    let counted = experiment.counted(&args.rows)?;
+    experiment.show(&counted.measured, &args.output)?;
+    experiment.show_worst(&counted.worst, args)
 }
 
 fn write_trace(trace: &Trace, file: &Path) -> anyhow::Result<()> {
@@ -89,32 +104,70 @@ impl Experiment {
             // Before the work: what cannot be written is not worth computing.
             std::fs::create_dir_all(dir).with_context(|| format!("--out {}", dir.display()))?;
         }
-        let measured = self.measure()?;
+        self.show(&self.measure(0)?.measured, output)
+    }
+
+    fn show(&self, measured: &Measured, output: &Output) -> anyhow::Result<()> {
         if output.json {
-            crate::json::print(&measured)?;
+            crate::json::print(measured)?;
         } else {
-            println!("{}", table::text(&self.table(&measured)));
+            println!("{}", table::text(&self.table(measured)));
         }
         if let Some(dir) = &output.out {
-            let page = self.report(&measured, &self.trace()?, dir)?;
+            let page = self.report(measured, &self.trace()?, dir)?;
             eprintln!("open {}", page.display());
         }
         Ok(())
     }
 
-    fn measure(&self) -> anyhow::Result<Measured> {
+    /// The runs, by way of a file of rows if one is requested.
+    fn counted(&self, args: &rows::RowsArgs) -> anyhow::Result<Counted> {
+        let most = args.worst.unwrap_or(0);
+        let Some(file) = &args.rows else {
+            return self.measure(most);
+        };
+        let shard = args.shard.unwrap_or(Shard::ALL);
+        let plan = Plan::new(&self.simulation.scenario, self.seed, self.runs, shard);
+        anyhow::ensure!(plan.part().1 > 0, "shard {shard} of {} runs has no run", self.runs);
+        rows::compute(&self.simulation, &plan, file, most)
+    }
+
+    fn measure(&self, most: usize) -> anyhow::Result<Counted> {
         let start = ProcessTime::now();
         let runs = Runs::new(self.runs);
-        let results = monte_carlo::results(&self.simulation, self.seed, self.runs, &runs);
+        let rows = monte_carlo::rows(&self.simulation, self.seed, self.runs, &runs);
         runs.end()?;
-        let summary = Summary::of(&results?);
-        Ok(Measured { summary, cpu_seconds: start.elapsed().as_secs_f64() })
+        let rows = rows?;
+        let (summary, worst) =
+            rows::summary(|| Ok(Box::new(rows.clone().into_iter().map(Ok))), most)?;
+        let measured = Measured { summary, cpu_seconds: start.elapsed().as_secs_f64() };
+        Ok(Counted { measured, worst })
+    }
+
+    /// Lists the runs with the largest errors, and writes their traces.
+    fn show_worst(&self, worst: &[Row], args: &Args) -> anyhow::Result<()> {
+        if !worst.is_empty() && !args.output.json {
+            println!("\n{}", table::text(&rows::worst_table(worst)));
+        }
+        let Some(dir) = &args.rows.traces else {
+            return Ok(());
+        };
+        std::fs::create_dir_all(dir).with_context(|| format!("--traces {}", dir.display()))?;
+        for row in worst {
+            let file = dir.join(format!("seed-{}.csv", row.seed));
+            write_trace(&self.trace_of(row.seed)?, &file)?;
+        }
+        Ok(())
     }
 
     /// The trace of the first run.
     fn trace(&self) -> anyhow::Result<Trace> {
+        self.trace_of(self.seed)
+    }
+
+    fn trace_of(&self, seed: u64) -> anyhow::Result<Trace> {
         let mut trace = self.simulation.empty_trace();
-        self.simulation.run(self.seed, &mut trace)?;
+        self.simulation.run(seed, &mut trace)?;
         Ok(trace)
     }
 

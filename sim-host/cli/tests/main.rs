@@ -15,5 +15,6 @@ mod recordings;
 mod replay;
 mod replay_command;
 mod report_in_chromium;
+mod rows;
 mod skipped;
 mod sonar_model;

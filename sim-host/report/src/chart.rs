@@ -55,7 +55,7 @@ type Root<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Plot<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Axis, Axis>>;
 
 /// A chart: axes, and layers from the bottom up.
-pub(super) struct Chart {
+pub(super) struct Chart<'l> {
     /// Title, also for screen readers.
     pub(super) title: String,
     /// The horizontal axis.
@@ -65,13 +65,13 @@ pub(super) struct Chart {
     /// Height of the whole figure, pixels.
     pub(super) height: u16,
     /// Layers, the lowest first.
-    pub(super) layers: Vec<Layer>,
+    pub(super) layers: Vec<Layer<'l>>,
 }
 
 /// One layer of a chart.
-pub(super) struct Layer {
+pub(super) struct Layer<'l> {
     /// Label in the legend; layers with the same label share an entry.
-    pub(super) label: &'static str,
+    pub(super) label: &'l str,
     /// Role, which determines the colour.
     pub(super) role: Role,
     /// Shape.
@@ -97,7 +97,7 @@ pub(super) fn plot_size(height: u16) -> (f64, f64) {
     (f64::from(WIDTH - LEFT - RIGHT), f64::from(height.saturating_sub(HEAD + BOTTOM)))
 }
 
-impl Chart {
+impl Chart<'_> {
     /// Draws the chart.
     pub(super) fn svg(&self) -> Result<String, DrawError> {
         let mut svg = String::new();
@@ -154,7 +154,7 @@ impl Chart {
         Ok(plot)
     }
 
-    fn draw_layer(&self, plot: &mut Plot<'_, '_>, layer: &Layer) -> Result<(), DrawError> {
+    fn draw_layer(&self, plot: &mut Plot<'_, '_>, layer: &Layer<'_>) -> Result<(), DrawError> {
         let colour = layer.role.rgb();
         match &layer.shape {
             Shape::Line(width, points) => {
@@ -243,7 +243,7 @@ impl Chart {
 }
 
 /// Draws one entry of the legend; returns the start of the next one.
-fn draw_legend(root: &Root<'_>, layer: &Layer, x: i32) -> Result<i32, DrawError> {
+fn draw_legend(root: &Root<'_>, layer: &Layer<'_>, x: i32) -> Result<i32, DrawError> {
     let (y, swatch, gap) = (scaled_i32(42), scaled_i32(22), scaled_i32(6));
     let colour = layer.role.rgb();
     let ends = vec![(x, y), (x + swatch, y)];

@@ -56,7 +56,7 @@ struct Plan {
     number: u8,
     file: &'static str,
     caption: &'static str,
-    chart: fn(&Trace) -> Chart,
+    chart: fn(&Trace) -> Chart<'static>,
 }
 
 /// The figures, in the order of the paper.
@@ -116,7 +116,7 @@ pub(super) fn draw(trace: &Trace) -> Result<Vec<Figure>, (&'static str, DrawErro
 }
 
 /// Figure 2.
-fn trajectory(trace: &Trace) -> Chart {
+fn trajectory(trace: &Trace) -> Chart<'static> {
     let truth = places(trace, |tick| tick.truth.map(|truth| truth.pose));
     let estimate = places(trace, |tick| Some(tick.estimate.pose));
     let encoders = places(trace, |tick| Some(tick.odometry));
@@ -125,7 +125,7 @@ fn trajectory(trace: &Trace) -> Chart {
     let (x, y) = equal_scale(bounds_x, bounds_y, plot_size(height));
     let start = truth.first().or(estimate.first()).copied();
 
-    let mut layers: Vec<Layer> = trace.walls.iter().map(wall).collect();
+    let mut layers: Vec<Layer<'static>> = trace.walls.iter().map(wall).collect();
     layers.push(path("encoders alone", Role::Encoders, LINE, encoders));
     layers.extend((!truth.is_empty()).then(|| path("true", Role::Truth, BROAD, truth)));
     layers.push(path("estimated", Role::Estimate, LINE, estimate));
@@ -141,7 +141,7 @@ fn trajectory(trace: &Trace) -> Chart {
 }
 
 /// Figure 3.
-fn heading(trace: &Trace) -> Chart {
+fn heading(trace: &Trace) -> Chart<'static> {
     let degrees = |tick: &Tick| {
         let truth = tick.truth?.pose.heading;
         Some(wrap(tick.estimate.pose.heading - truth).to_degrees())
@@ -159,7 +159,7 @@ fn heading(trace: &Trace) -> Chart {
 }
 
 /// Figures 4 and 5.
-fn position(trace: &Trace, name: &str, state: usize, along: fn(&Pose) -> f64) -> Chart {
+fn position(trace: &Trace, name: &str, state: usize, along: fn(&Pose) -> f64) -> Chart<'static> {
     let millimetres = |tick: &Tick| {
         let truth = along(&tick.truth?.pose);
         Some((along(&tick.estimate.pose) - truth).abs() * MM_PER_M)
@@ -177,7 +177,7 @@ fn position(trace: &Trace, name: &str, state: usize, along: fn(&Pose) -> f64) ->
 }
 
 /// Figure 6.
-fn scale_left(trace: &Trace) -> Chart {
+fn scale_left(trace: &Trace) -> Chart<'static> {
     let of = |calibration: Calibration| calibration.scale_left * PER_MILLE;
     let beside = |sigmas: f64| {
         move |tick: &Tick| {
@@ -199,26 +199,31 @@ fn scale_left(trace: &Trace) -> Chart {
     chart_over_time(trace, title.into(), Axis::linear("S_L (10⁻³)", y), layers)
 }
 
-fn chart_over_time(trace: &Trace, title: String, y: Axis, layers: Vec<Layer>) -> Chart {
+fn chart_over_time(
+    trace: &Trace,
+    title: String,
+    y: Axis,
+    layers: Vec<Layer<'static>>,
+) -> Chart<'static> {
     // From zero, the start of the run, even if the first tick is later.
     let times = span(trace.ticks.iter().map(|tick| tick.time).chain([0.0])).unwrap_or(0.0..0.0);
     let x = Axis::linear("time (s)", times.start..times.end.max(times.start + LEAST_TIME));
     Chart { title, x, y, height: TIME_HEIGHT, layers }
 }
 
-fn line(label: &'static str, role: Role, width: u16, points: Vec<Point>) -> Layer {
+fn line(label: &'static str, role: Role, width: u16, points: Vec<Point>) -> Layer<'static> {
     Layer { label, role, shape: Shape::Line(width, points) }
 }
 
-fn path(label: &'static str, role: Role, width: u16, points: Vec<Point>) -> Layer {
+fn path(label: &'static str, role: Role, width: u16, points: Vec<Point>) -> Layer<'static> {
     Layer { label, role, shape: Shape::Path(width, points) }
 }
 
-fn band(lower: Vec<Point>, upper: Vec<Point>) -> Layer {
+fn band(lower: Vec<Point>, upper: Vec<Point>) -> Layer<'static> {
     Layer { label: "±σ", role: Role::Band, shape: Shape::Band(lower, upper) }
 }
 
-fn wall(wall: &sonarfix_sim::trace::Wall) -> Layer {
+fn wall(wall: &sonarfix_sim::trace::Wall) -> Layer<'static> {
     line("walls", Role::Wall, BROAD, vec![wall.from.into(), wall.to.into()])
 }
 

@@ -17,6 +17,7 @@
 //! | [`map`] | the drawing of a map |
 //! | `page`, `escape` | tables, figures and data as HTML |
 //! | [`Table`] | a table of numbers |
+//! | [`sweep`] | the figure of a sweep |
 //! | [`trace_csv`] | a run as a CSV file |
 
 mod axis;
@@ -30,6 +31,7 @@ mod page;
 mod palette;
 mod player;
 mod points;
+pub mod sweep;
 mod table;
 pub mod trace_csv;
 

@@ -15,6 +15,7 @@ pub mod odometry;
 pub mod pins;
 pub mod plant;
 pub mod progress;
+pub mod row;
 pub mod simulate;
 pub mod statistics;
 pub mod time;

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use crate::progress::Progress;
+use crate::row::Row;
 use crate::simulate::{Simulation, SimulationError};
 use crate::statistics::RunResult;
 
@@ -26,4 +27,23 @@ pub fn results(
             result
         })
         .collect()
+}
+
+/// The rows of the seeds `first`, `first + 1`, … in their order; after an interruption those of the runs that were finished.
+///
+/// # Errors
+/// The [`SimulationError`] of the first run that fails.
+pub fn rows(
+    simulation: &Simulation,
+    first: u64,
+    runs: u32,
+    progress: &impl Progress,
+) -> Result<Vec<Row>, SimulationError> {
+    let seeds = (0..u64::from(runs)).into_par_iter().map(|run| first.wrapping_add(run));
+    let row = |seed| {
+        let result = simulation.run(seed, &mut ())?;
+        progress.finished();
+        Ok(Row::new(seed, &result))
+    };
+    seeds.filter(|_| !progress.is_interrupted()).map(row).collect()
 }

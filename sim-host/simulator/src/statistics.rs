@@ -12,6 +12,7 @@ use sonarfix_hal::robot::Faults;
 use crate::STATES;
 use crate::dense::Vector;
 use crate::integrity::Integrity;
+use crate::row::{COUNTS, REALS, Row, place};
 
 /// Number of measurement cycles by outcome.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
@@ -22,14 +23,6 @@ pub struct FixCounts {
     pub gated: u64,
     /// Cycles without a usable range.
     pub refused: u64,
-}
-
-impl FixCounts {
-    fn add(&mut self, other: &Self) {
-        self.accepted += other.accepted;
-        self.gated += other.gated;
-        self.refused += other.refused;
-    }
 }
 
 /// Sum of the normalised innovations squared.
@@ -44,6 +37,12 @@ impl NisSum {
     pub fn add(&mut self, nis: f64) {
         self.sum += nis;
         self.count += 1;
+    }
+
+    /// The sum, and the number of terms.
+    #[must_use]
+    pub fn parts(&self) -> (f64, u64) {
+        (self.sum, self.count)
     }
 }
 
@@ -61,6 +60,12 @@ impl PathSum {
             *sum += e * e;
         }
         self.ticks += 1;
+    }
+
+    /// The sums of squares of x, y (m²) and heading (rad²), and the number of ticks.
+    #[must_use]
+    pub fn parts(&self) -> ([f64; 3], u64) {
+        (self.squares, self.ticks)
     }
 
     /// Mean square of the distance between estimated and true position, m².
@@ -174,50 +179,83 @@ impl Summary {
     /// Sums up runs in their order, so that the result does not depend on the number of threads.
     #[must_use]
     pub fn of(results: &[RunResult]) -> Self {
-        let states = (0..STATES.len()).map(|state| StateSummary::of(state, results)).collect();
-        let mut fixes = FixCounts::default();
-        let (mut nis, mut path) = (NisSum::default(), PathSum::default());
-        for result in results {
-            fixes.add(&result.fixes);
-            nis.sum += result.nis.sum;
-            nis.count += result.nis.count;
-            path.ticks += result.path.ticks;
-            for (sum, squares) in path.squares.iter_mut().zip(result.path.squares) {
-                *sum += squares;
-            }
-        }
-        let rms = path.squares.map(|sum| (sum / as_f64(path.ticks)).sqrt());
+        let rows = || results.iter().map(|result| Row::new(0, result));
+        let mut totals = Totals::default();
+        rows().for_each(|row| totals.add(&row));
+        let mut deviations = totals.deviations();
+        rows().for_each(|row| deviations.add(&row));
+        deviations.summary()
+    }
+}
+
+/// The sums of many runs: the first of two passes over their rows, in the same order.
+#[derive(Debug, Clone)]
+pub struct Totals {
+    runs: usize,
+    estimated_states: u64,
+    reals: [f64; REALS.len()],
+    counts: [u64; COUNTS.len()],
+    squared_errors: [f64; STATES.len()],
+}
+
+impl Default for Totals {
+    fn default() -> Self {
+        // Minus zero is the neutral element of a sum.
         Self {
-            runs: results.len(),
-            states,
-            nees_mean: mean(results, |result| result.nees),
-            nees_states: results.first().map_or(0, |result| result.estimated_states),
-            nis_mean: nis.sum / as_f64(nis.count),
-            fixes,
-            lost_runs: results.iter().filter(|result| result.lost).count(),
-            undetected_error: results.iter().map(|run| run.integrity.undetected_error()).sum(),
-            called_lost: results.iter().map(|run| run.integrity.called_lost()).sum(),
-            false_alarms: results.iter().map(|run| run.integrity.false_alarms()).sum(),
-            rms_path: PathSummary { x: rms[0], y: rms[1], heading: rms[2] },
+            runs: 0,
+            estimated_states: 0,
+            reals: [-0.0; REALS.len()],
+            counts: [0; COUNTS.len()],
+            squared_errors: [-0.0; STATES.len()],
         }
     }
 }
 
-impl StateSummary {
-    fn of(state: usize, results: &[RunResult]) -> Self {
-        let mean_error = mean(results, |result| result.error[state]);
-        let mean_square = mean(results, |result| result.error[state].powi(2));
-        let spread = mean(results, |result| (result.error[state] - mean_error).powi(2));
+impl Totals {
+    /// Adds a run.
+    pub fn add(&mut self, row: &Row) {
+        if self.runs == 0 {
+            self.estimated_states = row.counts[place::ESTIMATED_STATES];
+        }
+        self.runs += 1;
+        for (sum, term) in self.reals.iter_mut().zip(row.reals) {
+            *sum += term;
+        }
+        for (sum, term) in self.counts.iter_mut().zip(row.counts) {
+            *sum += term;
+        }
+        for (sum, error) in self.squared_errors.iter_mut().zip(row.reals) {
+            *sum += error.powi(2);
+        }
+    }
+
+    /// Number of runs.
+    #[must_use]
+    pub fn runs(&self) -> usize {
+        self.runs
+    }
+
+    /// Ends the first pass.
+    #[must_use]
+    pub fn deviations(self) -> Deviations {
+        Deviations { totals: self, squares: [-0.0; STATES.len()] }
+    }
+
+    fn mean(&self, real: usize) -> f64 {
+        self.reals[real] / as_f64(self.runs as u64)
+    }
+
+    fn state(&self, state: usize, squares: f64) -> StateSummary {
+        let n = as_f64(self.runs as u64);
         // Sample variance: n − 1.
-        let n = as_f64(results.len() as u64);
-        let std_error = (spread * n / (n - 1.0)).sqrt();
-        let bound = mean(results, |result| result.bound_variance[state]).sqrt();
-        let rms_error = mean_square.sqrt();
-        Self {
+        let std_error = (squares / n * n / (n - 1.0)).sqrt();
+        let bound = self.mean(place::BOUND_VARIANCE + state).sqrt();
+        let rms_error = (self.squared_errors[state] / n).sqrt();
+        StateSummary {
             name: STATES[state],
             unit: UNITS[state],
-            mean_error,
-            std_error: if results.len() > 1 { std_error } else { 0.0 },
+            mean_error: self.mean(place::ERROR + state),
+            std_error: if self.runs > 1 { std_error } else { 0.0 },
             rms_error,
             bound,
             rms_over_bound: (bound > 0.0).then(|| rms_error / bound),
@@ -225,8 +263,50 @@ impl StateSummary {
     }
 }
 
-fn mean(results: &[RunResult], of: impl Fn(&RunResult) -> f64) -> f64 {
-    results.iter().map(of).sum::<f64>() / as_f64(results.len() as u64)
+/// The squared deviations from the mean errors: the second pass.
+#[derive(Debug, Clone)]
+pub struct Deviations {
+    totals: Totals,
+    squares: [f64; STATES.len()],
+}
+
+impl Deviations {
+    /// Adds a run.
+    pub fn add(&mut self, row: &Row) {
+        for (state, sum) in self.squares.iter_mut().enumerate() {
+            *sum +=
+                (row.reals[place::ERROR + state] - self.totals.mean(place::ERROR + state)).powi(2);
+        }
+    }
+
+    /// The statistics of all runs.
+    #[must_use]
+    pub fn summary(&self) -> Summary {
+        let Self { totals, squares } = self;
+        let states = squares.iter().enumerate();
+        let ticks = as_f64(totals.counts[place::PATH_TICKS]);
+        let rms = |of: usize| (totals.reals[place::PATH_SQUARES + of] / ticks).sqrt();
+        let count = |of: usize| totals.counts[of];
+        let small = |of: usize| u32::try_from(count(of)).unwrap_or(u32::MAX);
+        let whole = |number: u64| usize::try_from(number).unwrap_or(usize::MAX);
+        Summary {
+            runs: totals.runs,
+            states: states.map(|(state, &squares)| totals.state(state, squares)).collect(),
+            nees_mean: totals.mean(place::NEES),
+            nees_states: whole(totals.estimated_states),
+            nis_mean: totals.reals[place::NIS_SUM] / as_f64(count(place::NIS_COUNT)),
+            fixes: FixCounts {
+                accepted: count(place::FIXES),
+                gated: count(place::FIXES + 1),
+                refused: count(place::FIXES + 2),
+            },
+            lost_runs: whole(count(place::LOST)),
+            undetected_error: totals.reals[place::UNDETECTED_ERROR],
+            called_lost: small(place::CALLED_LOST),
+            false_alarms: small(place::FALSE_ALARMS),
+            rms_path: PathSummary { x: rms(0), y: rms(1), heading: rms(2) },
+        }
+    }
 }
 
 #[expect(clippy::cast_precision_loss, reason = "counts stay below 2^53")]

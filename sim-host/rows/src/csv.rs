@@ -1,0 +1,89 @@
+//! Rows as CSV: the plan in a comment, the names of the columns, a line per run. Numbers are written with the digits that
+//! identify them, so that they are read back to the bit.
+
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::{BufRead, BufReader, BufWriter, Write};
+use std::path::Path;
+
+use anyhow::{Context, ensure};
+use sonarfix_sim::row::{COUNTS, REALS, Row};
+
+use crate::Rows;
+use crate::plan::Plan;
+
+/// The names of the columns.
+#[must_use]
+pub fn names() -> String {
+    let names: Vec<&str> = std::iter::once("seed").chain(COUNTS).chain(REALS).collect();
+    names.join(",")
+}
+
+/// The line of a row, with its end.
+#[must_use]
+pub fn line(row: &Row) -> String {
+    let mut line = row.seed.to_string();
+    for count in row.counts {
+        // Writing to a string does not fail.
+        let _ = write!(line, ",{count}");
+    }
+    for real in row.reals {
+        let _ = write!(line, ",{real:?}");
+    }
+    line.push('\n');
+    line
+}
+
+/// Reads a line without its end.
+///
+/// # Errors
+/// If it is not a row.
+pub fn parse(line: &str) -> anyhow::Result<Row> {
+    let mut cells = line.split(',');
+    let mut cell = || cells.next().context("the line is too short");
+    let seed = cell()?.parse().context("seed")?;
+    let (mut counts, mut reals) = ([0; COUNTS.len()], [0.0; REALS.len()]);
+    for (count, name) in counts.iter_mut().zip(COUNTS) {
+        *count = cell()?.parse().context(name)?;
+    }
+    for (real, name) in reals.iter_mut().zip(REALS) {
+        *real = cell()?.parse().context(name)?;
+    }
+    ensure!(cells.next().is_none(), "the line is too long");
+    Ok(Row { seed, reals, counts })
+}
+
+/// Opens a file: its plan, and its rows.
+///
+/// # Errors
+/// If the file cannot be read or is no file of rows.
+pub fn open(file: &Path) -> anyhow::Result<(Plan, Rows)> {
+    let mut lines = BufReader::new(File::open(file)?).lines();
+    let mut line = || lines.next().context("the file ends too early");
+    let plan = Plan::parse(&line()??)?;
+    ensure!(line()?? == names(), "the columns are those of another version");
+    let rows = lines.enumerate().map(move |(run, line)| {
+        let run = u32::try_from(run)?;
+        let row = parse(&line?).with_context(|| format!("row {}", u64::from(run) + 1))?;
+        ensure!(row.seed == plan.seed_of(run), "row {} has another seed", u64::from(run) + 1);
+        Ok(row)
+    });
+    Ok((plan, Box::new(rows)))
+}
+
+/// Writes a file.
+///
+/// # Errors
+/// If the file cannot be written, or a row cannot be read.
+pub fn write(
+    file: &Path,
+    plan: &Plan,
+    rows: impl Iterator<Item = anyhow::Result<Row>>,
+) -> anyhow::Result<()> {
+    let mut out = BufWriter::new(File::create(file)?);
+    writeln!(out, "{}\n{}", plan.line(), names())?;
+    for row in rows {
+        out.write_all(line(&row?).as_bytes())?;
+    }
+    Ok(out.flush()?)
+}
