@@ -1,5 +1,7 @@
 //! Many runs in parts: shards, interruptions, sweeps.
 
+#![expect(clippy::unwrap_used, reason = "all of this file is a test, its helpers too")]
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
