@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 
 use crate::{
     bound, command, config, convert, faults, find, floor_plans, health, map, merge, monitor, paper,
-    pil, plan, reality, relocalize, replay, run, sonar_model,
+    pil, plan, reality, relocalize, replay, run, sonar_model, sweep,
 };
 
 /// Simulates, measures, replays and operates the Sonarfix localizer for small wheeled robots.
@@ -67,6 +67,7 @@ impl Cli {
     pub fn execute(self) -> anyhow::Result<()> {
         match self.command {
             Command::Paper(args) => paper::execute(&args),
+            Command::Run(args) if !args.sweep.is_empty() => sweep::execute(&args),
             Command::Run(args) => run::execute(&args),
             Command::Merge(args) => merge::execute(&args),
             Command::Pil(args) => pil::execute(&args),

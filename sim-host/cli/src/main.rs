@@ -28,6 +28,7 @@ mod rows;
 mod run;
 mod sonar_model;
 mod sweep;
+mod sweep_values;
 mod table;
 
 use std::process::ExitCode;

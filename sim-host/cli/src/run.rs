@@ -18,7 +18,7 @@ use sonarfix_sim::trace::Trace;
 use crate::overrides::Overrides;
 use crate::progress::Runs;
 use crate::rows::{self, Counted};
-use crate::sweep::{self, Sweep};
+use crate::sweep_values::Sweep;
 use crate::table::{self, Beside, Measured};
 
 #[derive(Debug, clap::Args)]
@@ -58,9 +58,6 @@ pub struct Output {
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
-    if !args.sweep.is_empty() {
-        return sweep::execute(args);
-    }
     let mut scenario = Scenario::read(&args.scenario)?;
     args.overrides.apply(&mut scenario)?;
     let experiment = Experiment {

@@ -1,7 +1,6 @@
 //! `sonarfix run --sweep`: a scenario with several values of some of its keys.
 
 mod edit;
-mod values;
 
 use std::path::{Path, PathBuf};
 
@@ -18,9 +17,8 @@ use sonarfix_sim::statistics::Summary;
 use crate::progress::Runs;
 use crate::rows;
 use crate::run::{Args, Output};
+use crate::sweep_values::{self, Sweep};
 use crate::table;
-
-pub use values::Sweep;
 
 /// The picture's file.
 const PICTURE: &str = "sweep.svg";
@@ -37,7 +35,7 @@ struct Point {
 pub fn execute(args: &Args) -> anyhow::Result<()> {
     let text = std::fs::read_to_string(&args.scenario)
         .with_context(|| format!("{} cannot be read", args.scenario.display()))?;
-    let combinations = values::combinations(&args.sweep);
+    let combinations = sweep_values::combinations(&args.sweep);
     // Before the work: a value that cannot be read is found at once.
     let scenarios = combinations.iter().map(|values| {
         let mut scenario = edit::scenario(&args.scenario, &text, values)?;

@@ -14,8 +14,7 @@ use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::{Type, TypePtr};
 use sonarfix_sim::row::{COUNTS, REALS, Row};
 
-use crate::Rows;
-use crate::plan::Plan;
+use crate::plan::{Plan, Rows};
 
 /// Rows that are in memory at once.
 const GROUP: usize = 8_192;

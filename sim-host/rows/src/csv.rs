@@ -9,8 +9,7 @@ use std::path::Path;
 use anyhow::{Context, ensure};
 use sonarfix_sim::row::{COUNTS, REALS, Row};
 
-use crate::Rows;
-use crate::plan::Plan;
+use crate::plan::{Plan, Rows};
 
 /// The names of the columns.
 #[must_use]

@@ -22,10 +22,7 @@ use std::path::Path;
 use anyhow::Context;
 use sonarfix_sim::row::Row;
 
-pub use plan::{Plan, Shard};
-
-/// The rows of a file, in the order of their seeds.
-pub type Rows = Box<dyn Iterator<Item = anyhow::Result<Row>>>;
+pub use plan::{Plan, Rows, Shard};
 
 /// Whether a file is Parquet, by its name; all others are CSV.
 #[must_use]
@@ -60,7 +57,6 @@ pub fn write(
 }
 
 #[cfg(test)]
-#[expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "a test should stop")]
 mod tests {
     use super::*;
     use sonarfix_map::Scenario;

@@ -5,6 +5,10 @@ use std::str::FromStr;
 
 use anyhow::{Context, bail, ensure};
 use sonarfix_map::Scenario;
+use sonarfix_sim::row::Row;
+
+/// The rows of a file, in the order of their seeds.
+pub type Rows = Box<dyn Iterator<Item = anyhow::Result<Row>>>;
 
 /// A part of all runs: the `index`-th of `of`, from 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -16,6 +16,7 @@ pub mod pins;
 pub mod plant;
 pub mod progress;
 pub mod row;
+mod run_result;
 pub mod simulate;
 pub mod statistics;
 pub mod time;

@@ -1,7 +1,7 @@
 //! The result of one run as a row of numbers, from which the statistics of any number of runs follow.
 
 use crate::dense::Vector;
-use crate::statistics::RunResult;
+use crate::run_result::RunResult;
 
 /// The real columns of a row, with their units.
 pub const REALS: [&str; 21] = [
