@@ -17,6 +17,7 @@
 //! all clutter is configured away and the echo is too far off to be the wall's, it is not used.
 
 use crate::elementary::{exp, inverse_sqrt, ln, sqrt};
+use crate::range::Innovation;
 use crate::units::{Metres, SquareMetres};
 
 /// Parameters of clutter: of the sensor, of the unmapped objects around it, and of the map.
@@ -70,6 +71,11 @@ impl EchoParameters {
 
     /// Polaroid 6500: assumed like the HC-SR04, with fewer misses.
     pub const POLAROID_6500: Self = Self { missed: 0.02, ..Self::HC_SR04 };
+
+    /// Probability that a wall within range, square to the beam and not occluded, returns its range.
+    pub(crate) fn heard(&self) -> f32 {
+        1.0 - self.missed - self.short - self.long
+    }
 
     /// Prior probability that an unmapped object stands before a wall at this range.
     pub(crate) fn prior_occlusion(&self, range: Metres) -> f32 {
@@ -146,7 +152,7 @@ const MAX_REPETITION: f32 = 50.0;
 /// Share of pings without an echo if an unmapped object occludes the wall: it may absorb or deflect.
 const NO_ECHO_OCCLUDED: f32 = 0.2;
 /// Share of echoes from beyond the wall if it is occluded: reflections by other walls.
-const BEYOND_OCCLUDED: f32 = 0.05;
+const BEYOND_OCCLUDED: f32 = 0.065;
 /// Share of pings without an echo if the beam is not square to the wall, or its foot not on it.
 const NO_ECHO_OFF_WALL: f32 = 0.4;
 /// Share of pings without an echo at a wrong pose.
@@ -154,6 +160,10 @@ const NO_ECHO_WRONG_POSE: f32 = 0.3;
 /// Share of pings that agree with a wrong pose by chance: another wall at that range, or an error along
 /// the wall.
 const AGREEMENT_WRONG_POSE: f32 = 0.3;
+/// Share of the density of a wall's echo for an estimate that is displaced, and its deviation over that
+/// of the innovation. Chosen on simulated runs (`docs/schedule.md`).
+const DISPLACED: f32 = 0.02;
+const WIDENING: f32 = 3.0;
 /// Smallest span of ranges over which clutter is distributed.
 const MIN_SPAN: f32 = 0.05;
 
@@ -180,8 +190,31 @@ pub(crate) struct Explanation {
     pub association: f32,
     /// Probability that an unmapped object occluded the wall.
     pub occluded: f32,
+    /// p(z): the density of the echo, or the probability of none.
+    pub likelihood: f32,
     /// Logarithm of the likelihood of a wrong pose over that of the right one.
     pub evidence: f32,
+}
+
+impl Explanation {
+    /// Probability of a hypothesis with this density.
+    pub fn share(&self, density: f32) -> f32 {
+        if self.likelihood > 0.0 { density / self.likelihood } else { 0.0 }
+    }
+}
+
+/// Reflectors of the map other than the target.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Others {
+    /// Density of their echo at the range that was measured.
+    pub density: f32,
+    /// Probability that none of those nearer than the target answers.
+    pub silent_before: f32,
+}
+
+impl Others {
+    /// There are none.
+    pub const NONE: Self = Self { density: 0.0, silent_before: 1.0 };
 }
 
 /// Densities of one echo, or probabilities of no echo, by hypothesis.
@@ -199,30 +232,41 @@ struct Densities {
 impl ExpectedEcho {
     // ===== Eqs. (15) and (16): p(z) and β; eq. (23): the log-likelihood ratio =====
     /// Explains an echo at this range, or that there was none.
-    pub fn explain(&self, parameters: &EchoParameters, echo: Option<Metres>) -> Explanation {
+    pub fn explain(
+        &self,
+        parameters: &EchoParameters,
+        echo: Option<Metres>,
+        others: &Others,
+    ) -> Explanation {
         let d = match echo {
             Some(range) => self.of_echo(parameters, range.0 - self.range.0),
             None => self.of_silence(parameters),
         };
         let o = self.occluded;
-        let wall = (1.0 - o) * d.wall;
-        let occluded = o * d.occluded;
-        let total = wall + (1.0 - o) * d.clutter + occluded;
+        let before = others.silent_before;
+        let wall = before * (1.0 - o) * d.wall;
+        let occluded = before * o * d.occluded;
+        let total = wall + before * (1.0 - o) * d.clutter + occluded + others.density;
         if total <= 0.0 {
             // No clutter is configured, and the echo is too far off to be the wall's.
-            return Explanation { association: 0.0, occluded: o, evidence: MAX_EVIDENCE };
+            let evidence = MAX_EVIDENCE;
+            return Explanation { association: 0.0, occluded: o, likelihood: 0.0, evidence };
         }
         let ratio = AGREEMENT_WRONG_POSE + (1.0 - AGREEMENT_WRONG_POSE) * (d.wrong_pose / total);
         let evidence = if ratio < MAX_RATIO { ln(ratio) } else { MAX_EVIDENCE };
-        Explanation { association: wall / total, occluded: occluded / total, evidence }
+        let (association, occluded) = (wall / total, occluded / total);
+        Explanation { association, occluded, likelihood: total, evidence }
+    }
+
+    /// Probability that the target answers.
+    pub fn answers(&self, parameters: &EchoParameters) -> f32 {
+        (1.0 - self.occluded) * self.geometry * parameters.heard()
     }
 
     fn of_echo(&self, parameters: &EchoParameters, innovation: f32) -> Densities {
         let EchoParameters { missed, short, long, .. } = *parameters;
         let (g, s) = (self.geometry, self.variance.0);
-        let per_sigma = inverse_sqrt(s);
-        let ratio = innovation * per_sigma;
-        let normal = ONE_OVER_ROOT_TWO_PI * per_sigma * exp(-0.5 * ratio * ratio);
+        let density = density(Innovation { value: Metres(innovation), variance: SquareMetres(s) });
         let (nearest, farthest) = (self.limits.0.0, self.limits.1.0);
         let everywhere = 1.0 / (farthest - nearest);
         let (spurious, by_object) = if innovation < 0.0 {
@@ -233,7 +277,7 @@ impl ExpectedEcho {
             (long * per_metre, BEYOND_OCCLUDED * per_metre)
         };
         Densities {
-            wall: g * (1.0 - missed - short - long) * normal,
+            wall: g * (1.0 - missed - short - long) * density,
             clutter: g * spurious + (1.0 - g) * (1.0 - NO_ECHO_OFF_WALL) * everywhere,
             occluded: by_object,
             wrong_pose: if innovation < 0.0 {
@@ -255,6 +299,17 @@ impl ExpectedEcho {
                 + self.occluded * NO_ECHO_OCCLUDED,
         }
     }
+}
+
+/// N'(ν; 0, S): the density of the echo of a wall. The error of an estimate that an outlier or a slip of the
+/// wheels has displaced exceeds its covariance, so that a share of the density is wider.
+pub(crate) fn density(innovation: Innovation) -> f32 {
+    let per_sigma = inverse_sqrt(innovation.variance.0);
+    let ratio = innovation.value.0 * per_sigma;
+    let exponent = -0.5 * ratio * ratio;
+    let narrow = (1.0 - DISPLACED) * exp(exponent);
+    let wide = DISPLACED / WIDENING * exp(exponent / (WIDENING * WIDENING));
+    ONE_OVER_ROOT_TWO_PI * per_sigma * (narrow + wide)
 }
 
 const ONE_OVER_ROOT_TWO_PI: f32 = 0.398_942_3;
@@ -303,9 +358,10 @@ mod tests {
             return [0.0, (1.0 - o) * (g * missed + (1.0 - g) * 0.4), o * 0.2, 0.3];
         };
         let nu = f64::from(z.0) - h;
-        let normal = (-0.5 * nu * nu / s).exp() / (core::f64::consts::TAU * s).sqrt();
+        let normal = |s: f64| (-0.5 * nu * nu / s).exp() / (core::f64::consts::TAU * s).sqrt();
+        let normal = 0.98 * normal(s) + 0.02 * normal(9.0 * s);
         let span = if nu < 0.0 { h - 0.1 } else { 4.0 - h };
-        let (spurious, object) = if nu < 0.0 { (short, 0.75) } else { (long, 0.05) };
+        let (spurious, object) = if nu < 0.0 { (short, 0.735) } else { (long, 0.065) };
         let everywhere = 1.0 / 3.9;
         [
             (1.0 - o) * g * (1.0 - missed - short - long) * normal,
@@ -325,7 +381,7 @@ mod tests {
             let [wall, clutter, occluded, wrong] = densities(&expected, &parameters, echo);
             let total = wall + clutter + occluded;
             prop_assume!(total > 1e-6);
-            let found = expected.explain(&parameters, echo);
+            let found = expected.explain(&parameters, echo, &Others::NONE);
             let rest = clutter / total;
             let sum = f64::from(found.association) + f64::from(found.occluded) + rest;
             prop_assert!((sum - 1.0).abs() < 1e-4, "{sum}");
@@ -361,11 +417,11 @@ mod tests {
             limits: (Metres(0.05), Metres(4.0)),
         };
         let short = Some(Metres(1.0));
-        let first = expected.explain(&parameters, short);
+        let first = expected.explain(&parameters, short, &Others::NONE);
         assert!(first.evidence > 0.5 && first.occluded > 0.8, "{first:?}");
         let again = ExpectedEcho { occluded: first.occluded, ..expected };
-        assert!(again.explain(&parameters, short).evidence < 0.2);
+        assert!(again.explain(&parameters, short, &Others::NONE).evidence < 0.2);
         // A range that is too long is evidence, however well the wall is known to be occluded.
-        assert!(again.explain(&parameters, Some(Metres(3.0))).evidence > 0.5);
+        assert!(again.explain(&parameters, Some(Metres(3.0)), &Others::NONE).evidence > 0.5);
     }
 }

@@ -20,10 +20,12 @@
 //! | [`ekf`] | the filter, eqs. (4) to (6) |
 //! | `outcome`, `odometry` | outcome of a measurement; plausibility of a travel |
 //! | `visibility` | which walls can be measured |
+//! | `reflector` | what of the map may answer a ping |
 //! | `gating` | gate, downweighting and covariance inflation, eqs. (15) to (17) |
 //! | [`health`] | verdict on the estimate, eq. (23) |
 //! | `unseen` | growth of P without odometry, eq. (24) |
 //! | [`aim`] | planner: the wall to measure next, eqs. (21) and (22) |
+//! | `alternatives` | other reflectors that may have returned an echo, eq. (25) |
 //! | [`localizer`] | all of them together |
 //! | [`search`] | global localization without a start pose |
 //! | [`navigator`] | localizer and search together: tracking, searching, and the hand-over |
@@ -42,6 +44,7 @@
 extern crate std;
 
 pub mod aim;
+mod alternatives;
 pub mod config;
 mod covariance;
 pub mod echo;
@@ -60,12 +63,14 @@ mod outcome;
 pub mod pose;
 mod process_noise;
 pub mod range;
+mod reflector;
 pub mod search;
 pub mod servo;
 mod state;
 pub mod trig;
 pub mod units;
 mod unseen;
+mod vector;
 mod visibility;
 
 /// The parts of the filter as [`ekf::Ekf`] uses them, for benchmarks that count them one by one.

@@ -8,8 +8,10 @@
 //! to the bit.
 
 use crate::aim::{self, Aim, History, NoAim};
+use crate::alternatives::{Alternative, Scene, Target};
 use crate::config::{Config, ConfigError};
-use crate::echo::{ExpectedEcho, Explanation};
+use crate::covariance::PredictedMeasurement;
+use crate::echo::{ExpectedEcho, Explanation, Others};
 use crate::ekf::{Ekf, EkfError, StandardDeviations, StateEstimate};
 use crate::gating::{self, Use};
 use crate::health::{Health, Limits, Verdict};
@@ -17,6 +19,7 @@ use crate::map::Map;
 use crate::motion::WheelTravel;
 use crate::odometry;
 use crate::pose::Pose;
+use crate::range::Innovation;
 use crate::units::{Duration, Instant, Metres, Radians, SquareMetres, seconds};
 use crate::unseen::Unseen;
 use crate::visibility::{Viewpoint, check_range, max_heading_deviation};
@@ -361,27 +364,46 @@ impl<'m> Localizer<'m> {
             occluded,
             limits: (sonar.min_range, sonar.max_range),
         };
-        let explanation = expected_echo.explain(echo, measured.ok());
-        let Explanation { association, occluded: now_occluded, evidence } = explanation;
-        let fix = match (measured, gating::use_of(association)) {
+        let alone = expected_echo.explain(echo, measured.ok(), &Others::NONE);
+        let unclear = measured.ok().filter(|_| gating::is_unclear(alone.association));
+        let (explanation, alternative) = if let Some(range) = unclear {
+            let (variance, answers) = (innovation.variance, expected_echo.answers(echo));
+            let target = Target { expected: &expected, variance, answers };
+            let scene = Scene {
+                config: &self.config,
+                map: self.map,
+                ekf: &self.ekf,
+                history: &self.history,
+            };
+            let (others, best) = scene.alternatives(&target, aim.bearing, range);
+            (expected_echo.explain(echo, Some(range), &others), best)
+        } else {
+            (alone, None)
+        };
+        let Explanation { association, occluded: now_occluded, evidence, .. } = explanation;
+        let other = alternative
+            .map(|other| (other, explanation.share(other.density)))
+            .filter(|(_, probability)| *probability > association);
+        let fix = match (measured, other) {
             (Err(refusal), _) => Fix::Refused(refusal),
-            (Ok(_), Use::Reject) => Fix::Gated(innovation),
-            (Ok(_), used) => {
-                let weight = gating::weight(association);
-                self.ekf
-                    .update_predicted(&prediction, innovation.value, noise, weight)
-                    .map_err(Refusal::Filter)?;
-                self.pose_changed();
-                match used {
-                    Use::Accept => Fix::Accepted(innovation),
-                    _ => Fix::Downweighted(innovation),
-                }
+            (Ok(_), None) => use_range(&mut self.ekf, &prediction, innovation, noise, association)?,
+            (Ok(range), Some((other, probability))) => {
+                let Alternative { expected, noise, wall, .. } = other;
+                let entry = self.history.entry(echo, wall, Metres(0.0), expected.range, self.time);
+                self.history.record_echo(&entry, 0.0, true, self.time);
+                let innovation = self.ekf.innovation(range, &expected, noise);
+                let prediction = self.ekf.predict_measurement(&expected);
+                use_range(&mut self.ekf, &prediction, innovation, noise, probability)?
             }
         };
+        if fix.innovation_used().is_some() {
+            self.pose_changed();
+        }
         self.association = association;
         let is_wall = association > 0.5;
         self.history.record_echo(&entry, now_occluded, is_wall, self.time);
-        Ok(Explained { fix, evidence, contradicts: gating::contradicts(association, occluded) })
+        let explained = other.map_or(association, |(_, probability)| probability);
+        Ok(Explained { fix, evidence, contradicts: gating::contradicts(explained, occluded) })
     }
 
     /// Inflates the covariance of the pose while the verdict is `Lost`, so that later echoes can be
@@ -445,4 +467,25 @@ impl<'m> Localizer<'m> {
     pub fn map(&self) -> Map<'m> {
         self.map
     }
+}
+
+/// Corrects the estimate by a range with this association probability.
+#[inline]
+fn use_range(
+    ekf: &mut Ekf,
+    prediction: &PredictedMeasurement,
+    innovation: Innovation,
+    noise: SquareMetres,
+    association: f32,
+) -> Result<Fix, Refusal> {
+    let used = gating::use_of(association);
+    if used == Use::Reject {
+        return Ok(Fix::Gated(innovation));
+    }
+    let weight = gating::weight(association);
+    ekf.update_predicted(prediction, innovation.value, noise, weight).map_err(Refusal::Filter)?;
+    Ok(match used {
+        Use::Accept => Fix::Accepted(innovation),
+        _ => Fix::Downweighted(innovation),
+    })
 }

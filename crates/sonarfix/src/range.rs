@@ -10,8 +10,9 @@
 use crate::map::Wall;
 use crate::pose::{Heading, Point};
 use crate::state::StateEstimate;
-use crate::trig::sin_cos;
-use crate::units::{Metres, SquareMetres};
+use crate::trig::{atan2, sin_cos};
+use crate::units::{Metres, Radians, SquareMetres};
+use crate::vector::Vector;
 
 /// Noise of one range, which grows with the range: variance σ₀² + (σ₁ h)².
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -106,6 +107,20 @@ impl ExpectedRange {
             by_heading: by_y * lever_x - by_x * lever_y,
             by_range_scale: distance,
             direction: wall.direction_from(signed),
+        }
+    }
+
+    /// The range expected from a point at `distance` along the unit vector `toward`.
+    pub(crate) fn from_point(toward: Vector, distance: f32, sonar: &SonarPosition) -> Self {
+        let SonarPosition { lever: (lever_x, lever_y), stretch, .. } = *sonar;
+        let (by_x, by_y) = (-stretch * toward.x, -stretch * toward.y);
+        Self {
+            range: Metres(stretch * distance),
+            by_x,
+            by_y,
+            by_heading: by_y * lever_x - by_x * lever_y,
+            by_range_scale: distance,
+            direction: Heading::new(Radians(atan2(toward.y, toward.x))),
         }
     }
 

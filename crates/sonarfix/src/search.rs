@@ -18,16 +18,15 @@ mod lines;
 mod refine;
 mod score;
 mod trial;
-mod vector;
 mod window;
 
+use crate::vector::Vector;
 use bank::{Bank, Entry, moved};
 use candidates::{AlongWalls, Generated, Pairs, Placement, make_a_pair};
 use lines::{Line, Lines, TILTS};
 use refine::Prior;
 use score::EchoModel;
 use trial::{Odometry, Trial, Verdict, count};
-use vector::Vector;
 use window::Window;
 
 use crate::config::{Config, Sonar};
@@ -374,7 +373,8 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
             return Err(NotFinite);
         }
         self.sweep.advance(self.servo);
-        let range = range.map(|range| range.0).filter(|range| *range <= self.echoes.max_range);
+        let range =
+            range.map(|range| range.0).filter(|range| *range <= self.echoes.reflectors.max_range);
         let novel = [self.parameters.novel_angle_at_rest, self.parameters.novel_angle];
         Ok(self.window.ping(bearing.0, range, novel))
     }
@@ -574,7 +574,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
             return Task::Vote { ping: 0, tilt: 0 };
         };
         let bend = self.window.bend();
-        match pairs.next(&self.echoes.map, &first, &second, bend) {
+        match pairs.next(&self.echoes.reflectors.map, &first, &second, bend) {
             Generated::Candidate(placement) => self.try_candidate(placement, 0.15, 0.25),
             Generated::Nothing => {}
             Generated::Done => return Task::Pairs { pair: pair + 1, pairs: Pairs::default() },
@@ -590,7 +590,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
             return Task::Vote { ping: 0, tilt: 0 };
         };
         let bend = self.window.bend();
-        match along.next(&self.echoes.map, &checked, bend) {
+        match along.next(&self.echoes.reflectors.map, &checked, bend) {
             Generated::Candidate(placement) => self.try_candidate(placement, 0.25, 0.6),
             Generated::Nothing => {}
             Generated::Done => {
@@ -709,7 +709,9 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         };
         let at = entry.placement.at.into();
         let mut nearest: Option<(f32, WallId)> = None;
-        for (id, wall) in self.echoes.map.near(at, Metres(self.echoes.max_range)) {
+        for (id, wall) in
+            self.echoes.reflectors.map.near(at, Metres(self.echoes.reflectors.max_range))
+        {
             let across = axis.dot(Vector::new(wall.a(), wall.b()));
             let is_parallel = across * across < 0.1 * axis.length_squared();
             let distance = wall.signed_distance(at).abs().0;

@@ -110,6 +110,12 @@ impl History {
         self.last = Some(LastPing { wall, bearing, range });
     }
 
+    /// Distance travelled since a range of the wall was last used.
+    pub fn travelled_since(&self, wall: WallId) -> Option<Metres> {
+        let recent = self.recent.iter().flatten().find(|recent| recent.wall == wall)?;
+        Some(self.odometer - recent.used_at?)
+    }
+
     /// What is known of a wall with its foot at `foot` and at `range`.
     #[inline]
     pub fn entry(

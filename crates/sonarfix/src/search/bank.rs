@@ -4,8 +4,8 @@ use heapless::Vec;
 
 use super::candidates::Placement;
 use super::refine::Spread;
-use super::vector::Vector;
 use super::window::{Bend, Station};
+use crate::vector::Vector;
 
 /// Placements within this distance, metres, and this cosine of rotation (25°) are one mode.
 const SAME_PLACE: f32 = 0.3;

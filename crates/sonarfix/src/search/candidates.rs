@@ -1,10 +1,10 @@
 //! Pose candidates: pairs of lines against pairs of walls, and one line along every wall.
 
 use super::lines::Line;
-use super::vector::Vector;
 use super::window::Bend;
 use crate::map::{Map, Wall, WallId};
 use crate::units::Metres;
+use crate::vector::Vector;
 
 /// Two normals fit together within this cosine: 10°.
 const SAME_ANGLE: f32 = 0.97;

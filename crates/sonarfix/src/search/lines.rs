@@ -4,10 +4,10 @@
 
 use heapless::Vec;
 
-use super::vector::Vector;
 use super::window::Ping;
 use crate::trig::sin_cos;
 use crate::units::Radians;
+use crate::vector::Vector;
 
 /// Lines that are kept.
 pub(super) const LINES: usize = 10;

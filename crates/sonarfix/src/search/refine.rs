@@ -2,9 +2,10 @@
 //! residuals of all pings that a reflector of the map explains.
 
 use super::candidates::Placement;
-use super::score::{Beam, Target};
-use super::vector::Vector;
+use super::score::Target;
 use super::window::{Bend, Chain, Ping, Window};
+use crate::reflector::Beam;
+use crate::vector::Vector;
 
 /// Longest step that is taken, metres and radians: beyond it the linearization is invalid.
 const LONGEST_STEP: f32 = 0.6;

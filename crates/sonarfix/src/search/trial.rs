@@ -5,8 +5,8 @@ use super::bank::{Entry, State};
 use super::candidates::Placement;
 use super::refine::{Equations, Placed, Prior, Tolerance};
 use super::score::{EchoModel, Sharpness};
-use super::vector::Vector;
 use super::window::{Chain, Window};
+use crate::vector::Vector;
 
 /// Gauss–Newton steps after the coarse one.
 const STEPS: u8 = 2;

@@ -12,9 +12,9 @@
 
 use heapless::Vec;
 
-use super::vector::Vector;
 use crate::pose::Heading;
 use crate::units::Radians;
+use crate::vector::Vector;
 
 /// A ping is novel if no ping of the window was sent from within this distance, metres, in the same direction.
 const NOVEL_DISTANCE: f32 = 0.3;

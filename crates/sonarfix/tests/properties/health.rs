@@ -141,11 +141,13 @@ impl PageOracle {
         let ((nearest, farthest), o) = (self.limits, self.occluded);
         let (seen, object, wrong) = match echo {
             Some((nu, s)) => {
-                let normal = (-0.5 * nu * nu / s).exp() / (std::f64::consts::TAU * s).sqrt();
+                let normal =
+                    |s: f64| (-0.5 * nu * nu / s).exp() / (std::f64::consts::TAU * s).sqrt();
+                let wall = 0.98 * normal(s) + 0.02 * normal(9.0 * s);
                 let below = nu < 0.0;
                 let span = if below { self.range - nearest } else { farthest - self.range };
-                let (clutter, object) = if below { (short, 0.75) } else { (long, 0.05) };
-                let seen = (1.0 - missed - short - long) * normal + clutter / span;
+                let (clutter, object) = if below { (short, 0.735) } else { (long, 0.065) };
+                let seen = (1.0 - missed - short - long) * wall + clutter / span;
                 (seen, object / span, 0.7 / (farthest - nearest))
             }
             None => (missed, 0.2, 0.3),

@@ -86,7 +86,7 @@ pub fn write(dir: &Path, mount: [f64; 2], field: [f64; 2]) -> Result<(), Convert
             "echo",
             vec![
                 ("free_path", text("7 m", "furniture and people that the map does not have")),
-                ("map_accuracy", text("40 mm", "walls fitted to SLAM: a few cm")),
+                ("map_accuracy", text("60 mm", "walls fitted to SLAM, and what stands along them: the robot is then least sensitive to the other values")),
             ],
         ),
         ("schedule", vec![("policy", text("informative", "the default"))]),

@@ -1,11 +1,11 @@
-//! Plane vectors, as the search computes with them: metres, or unit vectors.
+//! Plane vectors: metres, or unit vectors.
 
 use crate::pose::Point;
 use crate::trig::sin_cos;
 use crate::units::Radians;
 
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Vector {
+pub(crate) struct Vector {
     pub x: f32,
     pub y: f32,
 }

@@ -1,0 +1,301 @@
+//! What of the map may answer a ping, nearest first: feet of perpendiculars on walls, concave right-angled
+//! corners and, weakly, ends of walls (Kuc and Siegel 1987; Leonard and Durrant-Whyte 1992).
+//!
+//! The update explains an echo by it that is not the target's, and the search scores a pose by it.
+//!
+//! # Non-finite policy
+//! Poses and walls are finite. Comparisons are written so that a NaN is no reflector.
+
+use heapless::Vec;
+
+use crate::config::Sonar;
+use crate::elementary::sqrt;
+use crate::map::{Map, Wall, WallId};
+use crate::trig::sin_cos;
+use crate::units::Metres;
+use crate::vector::Vector;
+
+/// Nearest reflectors that are looked at.
+pub(crate) const REFLECTORS: usize = 6;
+/// Beyond this share of the longest range an echo is often missed.
+const FADES: f32 = 0.8;
+/// Two walls touch within this distance, metres.
+const TOUCH: f32 = 0.02;
+/// Cosine of the angle between two walls up to which they make a corner: 75°.
+const SQUARE: f32 = 0.26;
+/// Reflectors up to this multiple of the cone away from the axis may answer.
+const RIM: f32 = 1.6;
+
+/// A ping placed on the map.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Beam {
+    pub from: Vector,
+    /// Unit vector.
+    pub axis: Vector,
+    /// The range that was measured.
+    pub range: Option<f32>,
+}
+
+/// A place on the map that may answer.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Reflector {
+    /// Metres from the sonar.
+    pub distance: f32,
+    /// Unit vector from the sonar.
+    pub toward: Vector,
+    /// The direction of the wall from its end; `None`: the foot of a perpendicular.
+    pub arm: Option<Vector>,
+    pub wall: WallId,
+    is_central: bool,
+}
+
+/// How a reflector is heard.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Heard {
+    /// The foot of a perpendicular, in the cone.
+    Foot,
+    /// A concave corner, in the cone.
+    Corner,
+    /// One of both at the rim of cone or range.
+    Rim,
+    /// The end of a wall.
+    End,
+}
+
+impl Heard {
+    /// Probability that a reflector answers, if a foot in the cone answers with a probability of `foot`.
+    /// Chosen, between an HC-SR04 and the NXT's recorded shares.
+    pub const fn probability(self, foot: f32) -> f32 {
+        match self {
+            Self::Foot => foot,
+            Self::Corner => 0.75,
+            Self::Rim => 0.4,
+            Self::End => 0.1,
+        }
+    }
+}
+
+/// The sonar in its map.
+#[derive(Debug, Clone)]
+pub(crate) struct Reflectors<'m> {
+    pub map: Map<'m>,
+    cos_cone: f32,
+    cos_rim: f32,
+    pub max_range: f32,
+}
+
+impl<'m> Reflectors<'m> {
+    #[inline(never)]
+    pub fn new(map: Map<'m>, sonar: &Sonar) -> Self {
+        let Sonar { cone, max_range, .. } = *sonar;
+        let cos = |angle| sin_cos(angle).1;
+        Self { map, cos_cone: cos(cone), cos_rim: cos(cone * RIM), max_range: max_range.0 }
+    }
+
+    /// The reflectors in the cone up to `reach`, nearest first, and how far the axis is free.
+    pub fn in_beam(
+        &self,
+        beam: &Beam,
+        reach: f32,
+        margin: f32,
+    ) -> (Vec<Reflector, REFLECTORS>, f32) {
+        let mut found: Vec<Reflector, REFLECTORS> = Vec::new();
+        let mut free = f32::INFINITY;
+        let range = beam.range.unwrap_or(f32::INFINITY);
+        for (id, wall) in self.map.near(beam.from.into(), Metres(reach)) {
+            let view = View::new(&wall, beam);
+            if let Some(hit) = view.hit()
+                && hit < free
+            {
+                free = hit;
+            }
+            if let Some(foot) = view.foot(self.cos_rim)
+                && foot.distance <= reach
+            {
+                insert(
+                    &mut found,
+                    Reflector { is_central: foot.cosine >= self.cos_cone, ..foot.reflector(id) },
+                );
+            }
+            for (to_end, arm) in view.ends() {
+                let ahead = to_end.dot(beam.axis);
+                let square = to_end.length_squared();
+                if ahead <= 0.0
+                    || square > reach * reach
+                    || ahead * ahead < self.cos_rim * self.cos_rim * square
+                    || square < 1e-6
+                {
+                    continue;
+                }
+                let distance = sqrt(square);
+                // An edge that cannot be the echo hardly matters.
+                let juts_out = to_end.dot(arm) >= 0.0;
+                if juts_out && (distance - range).abs() > margin {
+                    continue;
+                }
+                let is_central = ahead >= self.cos_cone * distance;
+                let toward = to_end.times(1.0 / distance);
+                insert(
+                    &mut found,
+                    Reflector { distance, toward, arm: Some(arm), wall: id, is_central },
+                );
+            }
+        }
+        (found, free)
+    }
+
+    /// How a reflector is heard, `None` if a wall hides it.
+    pub fn heard(&self, beam: &Beam, reflector: &Reflector) -> Option<Heard> {
+        let at = beam.from.plus(reflector.toward.times(reflector.distance));
+        let mut is_corner = false;
+        for (_, wall) in self.map.near(beam.from.into(), Metres(reflector.distance)) {
+            let (from, tangent) = (Vector::from(wall.from()), Vector::new(wall.b(), -wall.a()));
+            let (there, here) = (at.minus(from), beam.from.minus(from));
+            let (off_there, off_here) = (there.dot(tangent.left()), here.dot(tangent.left()));
+            let along = there.dot(tangent);
+            let length = wall.length().0;
+            if off_there.abs() <= TOUCH {
+                if let Some(arm) = reflector.arm
+                    && along >= -TOUCH
+                    && along <= length + TOUCH
+                    && tangent.dot(arm).abs() < SQUARE
+                    && reflector.toward.dot(arm) < 0.0
+                {
+                    // Inside the angle of the two walls, wherever the other one leads.
+                    let back = -reflector.toward.dot(tangent);
+                    is_corner |= if along <= TOUCH {
+                        back > 0.0
+                    } else if along >= length - TOUCH {
+                        back < 0.0
+                    } else {
+                        true
+                    };
+                }
+            } else if (off_there > 0.0) != (off_here > 0.0) {
+                let share = off_here / (off_here - off_there);
+                let crossing = here.dot(tangent) * (1.0 - share) + along * share;
+                if crossing >= 0.0 && crossing <= length {
+                    return None;
+                }
+            }
+        }
+        let fades = reflector.distance > FADES * self.max_range;
+        let is_weak = reflector.arm.is_some() && !is_corner;
+        Some(if is_weak {
+            Heard::End
+        } else if fades || !reflector.is_central {
+            Heard::Rim
+        } else if is_corner {
+            Heard::Corner
+        } else {
+            Heard::Foot
+        })
+    }
+}
+
+/// Inserts by distance; the farthest drops out of a full list. An end that two walls share
+/// appears once. What is in the list does not depend on the order of the walls.
+fn insert(into: &mut Vec<Reflector, REFLECTORS>, reflector: Reflector) {
+    if let Some(arm) = reflector.arm {
+        let is_same_end = |other: &Reflector| {
+            other.arm.is_some()
+                && (other.distance - reflector.distance).abs() < TOUCH
+                && other.toward.dot(reflector.toward) > 0.999
+        };
+        if let Some(known) = into.iter_mut().find(|other| is_same_end(other)) {
+            if known.arm.is_some_and(|known| is_before(arm, known)) {
+                (known.arm, known.wall) = (reflector.arm, reflector.wall);
+            }
+            return;
+        }
+    }
+    if into.is_full() {
+        match into.last() {
+            Some(last) if reflector.is_before(last) => {
+                into.pop();
+            }
+            _ => return,
+        }
+    }
+    let at = into.iter().position(|other| reflector.is_before(other));
+    // There is room: it was made above.
+    let _ = into.insert(at.unwrap_or(into.len()), reflector);
+}
+
+impl Reflector {
+    /// Whether this one is nearer, or as near and first by its direction.
+    fn is_before(&self, other: &Self) -> bool {
+        self.distance < other.distance
+            || (self.distance <= other.distance && is_before(self.toward, other.toward))
+    }
+}
+
+/// An order of directions.
+fn is_before(one: Vector, other: Vector) -> bool {
+    one.x < other.x || (one.x <= other.x && one.y < other.y)
+}
+
+/// A wall in the frame of a beam's origin.
+struct View {
+    /// From the sonar to the wall's start.
+    to_start: Vector,
+    tangent: Vector,
+    length: f32,
+    /// The foot's place along the wall, and the signed distance to its line, positive along the
+    /// normal to the left of the tangent.
+    along: f32,
+    ahead: f32,
+    axis: Vector,
+}
+
+struct Foot {
+    distance: f32,
+    toward: Vector,
+    cosine: f32,
+}
+
+impl Foot {
+    fn reflector(&self, wall: WallId) -> Reflector {
+        let Self { distance, toward, .. } = *self;
+        Reflector { distance, toward, arm: None, wall, is_central: true }
+    }
+}
+
+impl View {
+    fn new(wall: &Wall, beam: &Beam) -> Self {
+        let tangent = Vector::new(wall.b(), -wall.a());
+        let to_start = Vector::from(wall.from()).minus(beam.from);
+        Self {
+            to_start,
+            tangent,
+            length: wall.length().0,
+            along: -to_start.dot(tangent),
+            ahead: to_start.dot(tangent.left()),
+            axis: beam.axis,
+        }
+    }
+
+    fn foot(&self, cos_rim: f32) -> Option<Foot> {
+        if !(self.along >= 0.0 && self.along <= self.length) {
+            return None;
+        }
+        let normal = self.tangent.left();
+        let toward = if self.ahead < 0.0 { normal.times(-1.0) } else { normal };
+        let cosine = toward.dot(self.axis);
+        (cosine >= cos_rim).then_some(Foot { distance: self.ahead.abs(), toward, cosine })
+    }
+
+    /// Distance at which the axis meets the wall.
+    fn hit(&self) -> Option<f32> {
+        let approach = self.axis.dot(self.tangent.left());
+        let distance = self.ahead / approach;
+        let along = self.along + distance * self.axis.dot(self.tangent);
+        (distance > 0.0 && along >= 0.0 && along <= self.length).then_some(distance)
+    }
+
+    /// Both ends, each with the direction of the wall from there.
+    fn ends(&self) -> [(Vector, Vector); 2] {
+        let to_end = self.to_start.plus(self.tangent.times(self.length));
+        [(self.to_start, self.tangent), (to_end, self.tangent.times(-1.0))]
+    }
+}
