@@ -22,6 +22,13 @@ processes the same drive of 200 travels and 20 ranges (`bench/workload/src/drive
 `bench/host/tests/agreement.rs` compares each, after every call, with the state and covariance of an independent filter in `f64`
 (0.01 σ, and 0.1 % of P), so that every peer does the same work.
 
+The peers are libraries, and code *derived by sympy*: the equations multiplied out stage by stage, each common subexpression
+computed once, P as its upper triangle (`bench/workload/generate/generate.py` writes `bench/workload/src/filters/derived/code.rs`).
+This is the least arithmetic for this task without a change of the method. In the rows *fused*, and in no other, sums of
+products use the fused multiply-add of the Cortex-M4F (`vfma`, `vfms`); on the other processors these rows compute as those that are not fused. The
+shipped crate never fuses, because it computes the same bits on every processor. The form of the Crazyflie's filter over CMSIS-DSP is not in the table: it
+is C, for which this repository has no compiler.
+
 Sonarfix has two rows. Its Q differs, so that neither is compared with that state and P.
 
 - *As it ships* does more than the peers: seven states, its own sine and cosine, the full noise of each wheel, and the checks
@@ -63,7 +70,9 @@ second of a robot with ten encoder samples and one ping per second.
   differentiation remains.
 - A plain or symmetrised form costs less than Joseph's, and its variances become negative with a wide prior and a
   precise range. The rows are not equivalent; they are distinguished by the column *form*.
-- The column *÷ kernel* shows for which peers the cost is more than six times that of the kernel. minikalman over arrays is the closest.
+- The rows *derived by sympy* show what the equations cost without a library. The kernel computes seven states in its update, keeps compensated
+  sums, and stays positive definite where the plain form does not. Fusing is cheaper by an amount that the kernel forgoes for equal bits.
+- Of the libraries minikalman over arrays is the closest.
 - numeris links an allocator and does not use it here.
 
 ## Commands
@@ -71,6 +80,8 @@ second of a robot with ten encoder samples and one ping per second.
 ```sh
 cargo xtask bench                      # all of it, ten minutes: writes this page
 cargo xtask peers                      # every filter does the same work
+pip install sympy==1.14.0              # for the code derived by sympy
+python bench/workload/generate/generate.py --check
 cargo xtask budgets                    # the shipped crate, against budgets.toml
 cargo xtask panics                     # no panic in the linked programs
 ```

@@ -1,0 +1,5 @@
+//! The cost of [`derived::PlainFused`](bench_workload::filters::derived::PlainFused).
+#![no_std]
+#![no_main]
+
+bench_mcu::measure!(bench_workload::filters::derived::PlainFused);
