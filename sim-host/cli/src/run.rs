@@ -117,7 +117,7 @@ impl Experiment {
         Ok(())
     }
 
-    /// The runs, by way of a file of rows if one is requested.
+    /// The runs, through a file of rows if one is requested.
     fn counted(&self, args: &rows::RowsArgs) -> anyhow::Result<Counted> {
         let most = args.worst.unwrap_or(0);
         let Some(file) = &args.rows else {

@@ -42,7 +42,7 @@ impl<'w> EncoderDisc<'w> {
         }
     }
 
-    /// Rolls over the whole periods on the way to a tick: each returns to the same levels and adds four ticks to the count.
+    /// Rolls over the whole periods up to a tick: each returns to the same levels and adds four ticks to the count.
     /// The decoder sees the edges of the rest.
     fn skip_periods(&mut self, target: i64) {
         let ticks = (target - self.ticks) / 4 * 4;
