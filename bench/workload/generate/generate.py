@@ -6,9 +6,11 @@ computed once (sympy.cse, stage by stage), for the 21 different entries of the s
     pip install sympy==1.14.0
     python bench/workload/generate/generate.py            # writes the file
     python bench/workload/generate/generate.py --check    # compares it
+    python bench/workload/generate/generate.py --fusable  # sums of products, which a fused multiply-add would compute at once
 """
 
 import pathlib
+import re
 import sys
 
 import sympy as sp
@@ -18,7 +20,6 @@ N = 6
 
 HEAD = """//! Code derived from the equations with all common subexpressions computed once. Written by `generate/generate.py`: do not edit.
 
-use super::{fused_add, fused_subtract};
 use crate::model::{Range, Step, TRACK_WIDTH, Vector};
 
 /// The entries of the upper triangle of P, row by row.
@@ -56,8 +57,7 @@ def rust(e):
             factors = term.args if term.is_Mul else None
             if factors and not any(f.is_Pow for f in factors):
                 a, b = atom(factors[0]), atom(sp.Mul(*factors[1:], evaluate=False) if len(factors) > 2 else factors[1])
-                call = "fused_subtract" if is_negative else "fused_add"
-                text = f"{call}::<FUSED>({bare(text)}, {bare(a)}, {bare(b)})"
+                text = f"({bare(text)} {'-' if is_negative else '+'} {a} * {b})"
             else:
                 text = f"({text} {'-' if is_negative else '+'} {atom(term)})"
         return text
@@ -82,7 +82,7 @@ def atom(e):
         below = power if abs(int(e.exp)) == 1 else f"({power})"
         return below if e.exp > 0 else f"(1.0 / {below})"
     text = rust(e)
-    return text if bare(text) != text or e.is_Add and text.startswith("fused") else f"({text})"
+    return text if bare(text) != text else f"({text})"
 
 
 class Code:
@@ -122,7 +122,17 @@ class Code:
         for name, values in (("state", self.stage(list(state))), ("p", self.stage(triangle(p)))):
             text = ", ".join(atom(e) for e in values)
             self.lines.append(f"    *{name} = [{text}];")
-        return "\n".join(self.lines)
+        return "\n".join(used(self.lines))
+
+
+def used(lines):
+    """The lines without those whose value no later line uses."""
+    kept = []
+    for line in reversed(lines):
+        name = re.match(r"    let (\w+) =", line)
+        if not name or any(re.search(rf"\b{name[1]}\b", later) for later in kept):
+            kept.append(line)
+    return kept[::-1]
 
 
 def bare(text):
@@ -190,7 +200,7 @@ def function(name, doc, argument, code):
     lines = [
         "",
         f"/// {doc}",
-        f"pub fn {name}<const FUSED: bool>(state: &mut Vector, p: &mut Triangle, {argument}) {{",
+        f"pub fn {name}(state: &mut Vector, p: &mut Triangle, {argument}) {{",
         "    let [x, y, heading, mean, difference, width_error] = *state;",
         f"    let [{entries}] = *p;",
     ]
@@ -211,6 +221,10 @@ def generated():
 
 if __name__ == "__main__":
     text = generated()
+    if "--fusable" in sys.argv:
+        for code in text.split("pub fn ")[1:]:
+            print(code.split("(")[0], len(re.findall(r"[+-] [^-+*;]+ \* ", code)))
+        sys.exit()
     if "--check" in sys.argv:
         sys.exit(0 if TARGET.read_text() == text else f"{TARGET} is not what this script writes")
     TARGET.write_text(text)

@@ -21,9 +21,7 @@ macro_rules! each_filter {
     ($do:ident, $($rest:tt)*) => {
         $do! {
             derived: $crate::filters::derived::Plain;
-            derived_fused: $crate::filters::derived::PlainFused;
             derived_stabilised: $crate::filters::derived::Stabilised;
-            derived_stabilised_fused: $crate::filters::derived::StabilisedFused;
             naive: $crate::filters::naive::Plain;
             naive_joseph: $crate::filters::naive::Joseph;
             adskalman_symmetric: $crate::filters::adskalman::Symmetric;

@@ -15,13 +15,11 @@ pub struct Subject {
 }
 
 /// The first two are Sonarfix's.
-pub const SUBJECTS: [Subject; 16] = [
+pub const SUBJECTS: [Subject; 14] = [
     subject("shipped", "**Sonarfix as it ships**", "sonarfix", "Joseph, two passes"),
     subject("kernel", "**Sonarfix's kernel alone**", "sonarfix", "Joseph, two passes"),
     subject("derived", "derived by sympy", "bench-workload", "plain"),
-    subject("derived_fused", "derived by sympy, fused", "bench-workload", "plain"),
     subject("derived_stabilised", "derived by sympy", "bench-workload", "Joseph"),
-    subject("derived_stabilised_fused", "derived by sympy, fused", "bench-workload", "Joseph"),
     subject("naive", "naive nalgebra", "nalgebra", "plain"),
     subject("naive_joseph", "naive nalgebra", "nalgebra", "Joseph"),
     subject("adskalman_symmetric", "adskalman", "adskalman", "symmetrised"),

@@ -1,7 +1,6 @@
 //! Code generated from the equations, as symforce and similar tools do it; [`code`] is the output of `generate/generate.py`.
 //!
-//! P is its upper triangle. In the fused filters every sum of a product uses the fused multiply-add of a Cortex-M4F; other
-//! processors of the table have none.
+//! P is its upper triangle.
 
 #[rustfmt::skip]
 mod code;
@@ -12,21 +11,17 @@ use crate::model::{Matrix, Range, STATES, Step, Vector};
 use code::Triangle;
 
 /// P ← P − K H P.
-pub type Plain = Derived<false, false>;
-/// The same with fused multiply-add.
-pub type PlainFused = Derived<false, true>;
+pub type Plain = Derived<false>;
 /// Joseph's form.
-pub type Stabilised = Derived<true, false>;
-/// The same with fused multiply-add.
-pub type StabilisedFused = Derived<true, true>;
+pub type Stabilised = Derived<true>;
 
 /// The filter.
-pub struct Derived<const STABILISED: bool, const FUSED: bool> {
+pub struct Derived<const STABILISED: bool> {
     state: Vector,
     p: Triangle,
 }
 
-impl<const STABILISED: bool, const FUSED: bool> Filter for Derived<STABILISED, FUSED> {
+impl<const STABILISED: bool> Filter for Derived<STABILISED> {
     fn new(state: Vector, variances: Vector) -> Self {
         let mut p = [0.0; 21];
         for (i, variance) in variances.into_iter().enumerate() {
@@ -37,15 +32,15 @@ impl<const STABILISED: bool, const FUSED: bool> Filter for Derived<STABILISED, F
 
     #[inline]
     fn predict(&mut self, step: &Step) {
-        code::predict::<FUSED>(&mut self.state, &mut self.p, step);
+        code::predict(&mut self.state, &mut self.p, step);
     }
 
     #[inline]
     fn update(&mut self, range: &Range) {
         if STABILISED {
-            code::update_stabilised::<FUSED>(&mut self.state, &mut self.p, range);
+            code::update_stabilised(&mut self.state, &mut self.p, range);
         } else {
-            code::update::<FUSED>(&mut self.state, &mut self.p, range);
+            code::update(&mut self.state, &mut self.p, range);
         }
     }
 
@@ -61,55 +56,4 @@ impl<const STABILISED: bool, const FUSED: bool> Filter for Derived<STABILISED, F
 /// The place of an entry of the upper triangle, row by row.
 fn place(row: usize, column: usize) -> usize {
     row * (2 * STATES + 1 - row) / 2 + column - row
-}
-
-/// `sum + a b`; if fused and the processor can, with one rounding.
-#[inline]
-fn fused_add<const FUSED: bool>(sum: f32, a: f32, b: f32) -> f32 {
-    if FUSED { hardware::add(sum, a, b) } else { sum + a * b }
-}
-
-/// `sum − a b`, likewise.
-#[inline]
-fn fused_subtract<const FUSED: bool>(sum: f32, a: f32, b: f32) -> f32 {
-    if FUSED { hardware::subtract(sum, a, b) } else { sum - a * b }
-}
-
-/// The instructions of the floating-point unit of a Cortex-M4F, which `core` has no function for.
-#[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
-mod hardware {
-    use core::arch::asm;
-
-    #[inline]
-    pub fn add(mut sum: f32, a: f32, b: f32) -> f32 {
-        // SAFETY: it changes the register of `sum` only.
-        unsafe {
-            asm!("vfma.f32 {0}, {1}, {2}", inout(sreg) sum, in(sreg) a, in(sreg) b,
-                options(pure, nomem, nostack, preserves_flags));
-        }
-        sum
-    }
-
-    #[inline]
-    pub fn subtract(mut sum: f32, a: f32, b: f32) -> f32 {
-        // SAFETY: as above.
-        unsafe {
-            asm!("vfms.f32 {0}, {1}, {2}", inout(sreg) sum, in(sreg) a, in(sreg) b,
-                options(pure, nomem, nostack, preserves_flags));
-        }
-        sum
-    }
-}
-
-#[cfg(not(all(target_arch = "arm", target_abi = "eabihf")))]
-mod hardware {
-    #[inline]
-    pub fn add(sum: f32, a: f32, b: f32) -> f32 {
-        sum + a * b
-    }
-
-    #[inline]
-    pub fn subtract(sum: f32, a: f32, b: f32) -> f32 {
-        sum - a * b
-    }
 }
