@@ -64,7 +64,7 @@ pub use hardware::{Devices, Hardware};
 use odometer::{Odometer, Position, Reading};
 pub use report::{PingResult, Report, Step, StepResult, SweepResult, Tick};
 use schedule::Schedule;
-pub use settings::{Settings, SettingsError, Stamp};
+pub use settings::{EVALUATIONS_PER_MILLISECOND, Settings, SettingsError, Stamp};
 use sonar::{Cycle, Target};
 
 /// The loop.
@@ -564,10 +564,8 @@ impl<'m> Robot<'m> {
 
     /// Works on the search if nothing else was done in this poll, and changes the mode when it is time.
     fn work_on(&mut self, search: &mut Search<'m>, report: &mut Report) {
-        if self.mode() != Mode::Tracking && report.is_empty() {
-            search.poll(self.settings.evaluations);
-        }
-        report.mode = self.navigator.update(search);
+        let evaluations = if report.is_empty() { self.settings.evaluations } else { 0 };
+        report.mode = self.navigator.work(evaluations, search);
     }
 
     /// Passes the travel of the wheels up to `at` to the localizer.

@@ -12,9 +12,11 @@
 //!
 //! - *Tracking*: the localizer alone.
 //! - *Searching*: the pose is unknown. The localizer's verdict is `Lost` and its pose has deviations of
-//!   [`UNKNOWN_POSITION`] and [`UNKNOWN_HEADING`]; it only dead-reckons. The search takes odometry and pings.
+//!   [`UNKNOWN_POSITION`] and [`UNKNOWN_HEADING`]: it is the best hypothesis of the search's last cycle, if the pings fit
+//!   one, and dead-reckons. The search takes odometry and pings.
 //! - *Provisional*: the localizer has started from the search's unique answer. The search keeps its hypotheses and
-//!   takes the pings as well, so that a wrong answer leads back to them.
+//!   takes the pings as well, so that a wrong answer leads back to them. If it finds another unique answer, that one becomes
+//!   the provisional pose.
 //!
 //! The search is an argument of each call and not a field, because its state is larger than everything else: its owner
 //! decides where it lies. Without one the mode is always *Tracking*, and the navigator is the localizer.
@@ -31,7 +33,7 @@ use crate::ekf::{EkfError, StandardDeviations, StateEstimate};
 use crate::health::Verdict;
 use crate::localizer::{Fix, Localizer, OdometryError, Start};
 use crate::motion::WheelTravel;
-use crate::search::{Answer, Hypothesis, NotFinite, Region, Search};
+use crate::search::{Answer, Hypothesis, NotFinite, Region, Search, SearchParameters};
 use crate::units::{Instant, Metres, Radians};
 
 pub use crate::unseen::{UNKNOWN_HEADING, UNKNOWN_POSITION};
@@ -41,11 +43,17 @@ pub const CHECKPOINT: Metres = Metres(10.0);
 /// Least standard deviations of the pose at the hand-over.
 const LEAST_POSITION: f32 = 0.03;
 const LEAST_HEADING: f32 = 2.0 * core::f32::consts::PI / 180.0;
-/// Deviations of the search's least squares are multiplied by this: its pings share the errors of map and odometry.
-const CAUTION: f32 = 3.0;
+/// Deviations of the search's least squares are multiplied by this: its pings share the errors of map and odometry. With
+/// 3, a pose that is right to 2° has a heading deviation above a quarter of the cone, and the verdict stays `Degraded`.
+const CAUTION: f32 = 1.5;
 /// Distance and accepted ranges after which a provisional pose is confirmed.
 const CONFIRMED_AFTER: Metres = Metres(2.0);
 const CONFIRMED_BY: u16 = 20;
+/// A unique answer of the search is another pose than a provisional one beyond this distance, metres, or turn, radians.
+const ELSEWHERE: f32 = 0.5;
+const TURNED: f32 = 0.35;
+/// Mean log-likelihood per ping from which the best hypothesis is a guess of an unknown pose.
+const LEAST_GUESS: f32 = 0.2;
 /// Cycles of the search after a failed hand-over before the next.
 const PAUSE: u32 = 2;
 /// A checkpoint holds deviations and no correlations. No covariance of four errors exceeds four times its diagonal.
@@ -100,6 +108,8 @@ pub struct Navigator<'m> {
     driven: Metres,
     /// Ranges accepted since the hand-over.
     accepted: u16,
+    /// The search's cycles when the unknown pose was last guessed.
+    guessed: u32,
     /// The search's cycles before which it hands nothing over.
     not_before: u32,
     checkpoints: [Calibration; 2],
@@ -150,6 +160,7 @@ impl<'m> Navigator<'m> {
             mode: Mode::Tracking,
             driven: Metres(0.0),
             accepted: 0,
+            guessed: 0,
             not_before: 0,
             checkpoints: [checkpoint; 2],
         }
@@ -171,8 +182,8 @@ impl<'m> Navigator<'m> {
     /// lost, it is probably near.
     pub fn search(&mut self, search: &mut Search<'m>) {
         let proposal = self.localizer.pose();
-        self.restart(search);
         self.forget_pose();
+        self.restart(search);
         // The localizer's pose is finite.
         _ = search.propose(proposal);
     }
@@ -189,8 +200,14 @@ impl<'m> Navigator<'m> {
     }
 
     fn restart(&mut self, search: &mut Search<'m>) {
-        search.restart(self.localizer.config(), self.localizer.map());
+        let localizer = &self.localizer;
+        let known = localizer.filter().standard_deviations();
+        let wheels = [known.scale_right, known.scale_left];
+        let config = localizer.config();
+        let parameters = SearchParameters::calibrated(config, wheels, known.track_width_error);
+        search.restart(config, parameters, localizer.map());
         self.not_before = 0;
+        self.guessed = 0;
     }
 
     #[inline(never)]
@@ -325,11 +342,17 @@ impl<'m> Navigator<'m> {
         let verdict = self.localizer.health().verdict;
         match self.mode {
             Mode::Tracking if verdict == Verdict::Lost => self.search(search),
-            Mode::Searching => self.hand_over(search)?,
+            Mode::Searching => {
+                if self.hand_over(search).is_none() {
+                    self.guess(search);
+                    return None;
+                }
+            }
             Mode::Provisional if verdict == Verdict::Lost => {
                 self.not_before = search.cycles().saturating_add(PAUSE);
                 self.forget_pose();
             }
+            Mode::Provisional if self.is_contradicted(search) => self.hand_over(search)?,
             Mode::Provisional if verdict == Verdict::Degraded => {
                 self.begin_confirmation();
                 return None;
@@ -340,6 +363,22 @@ impl<'m> Navigator<'m> {
         Some(self.mode)
     }
 
+    /// Makes so many evaluations of the search while the pose is not confirmed, each a bounded slice, and changes the
+    /// mode as soon as verdict or answer require it; returns the new one.
+    ///
+    /// The result depends on the number of evaluations between two inputs, and not on how they are divided into calls.
+    pub fn work(&mut self, evaluations: u16, search: &mut Search<'m>) -> Option<Mode> {
+        let mut changed = self.update(search);
+        for _ in 0..evaluations {
+            if self.mode == Mode::Tracking {
+                break;
+            }
+            search.poll(1);
+            changed = self.update(search).or(changed);
+        }
+        changed
+    }
+
     fn begin_confirmation(&mut self) {
         self.driven = Metres(0.0);
         self.accepted = 0;
@@ -347,6 +386,33 @@ impl<'m> Navigator<'m> {
 
     fn is_confirmed(&self) -> bool {
         self.accepted >= CONFIRMED_BY && self.driven >= CONFIRMED_AFTER
+    }
+
+    /// Takes the best hypothesis of each complete cycle as the pose that is unknown, if the pings fit it at all: only the
+    /// mean changes.
+    fn guess(&mut self, search: &Search<'m>) {
+        if search.cycles() == self.guessed {
+            return;
+        }
+        self.guessed = search.cycles();
+        let Some(best) = search.ranked(0).filter(|best| best.fit >= LEAST_GUESS) else { return };
+        let start = Start {
+            pose: best.pose,
+            position_deviation: UNKNOWN_POSITION,
+            heading_deviation: UNKNOWN_HEADING,
+        };
+        if self.localizer.set_pose(&start).is_ok() {
+            self.localizer.declare_lost();
+        }
+    }
+
+    /// Whether the search has a unique answer at another place.
+    fn is_contradicted(&self, search: &Search) -> bool {
+        let Answer::Unique(found) = search.answer() else { return false };
+        let pose = self.localizer.pose();
+        let (dx, dy) = (found.pose.x.0 - pose.x.0, found.pose.y.0 - pose.y.0);
+        dx * dx + dy * dy > ELSEWHERE * ELSEWHERE
+            || found.pose.heading.from(pose.heading).0.abs() > TURNED
     }
 
     /// Starts the localizer from the unique answer of the search, if there is one.

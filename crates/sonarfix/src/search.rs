@@ -26,7 +26,7 @@ use candidates::{AlongWalls, Generated, Pairs, Placement, make_a_pair};
 use lines::{Line, Lines, TILTS};
 use refine::Prior;
 use score::EchoModel;
-use trial::{Odometry, Trial, Verdict, count};
+use trial::{Odometry, Trial, Verdict};
 use window::Window;
 
 use crate::config::{Config, Sonar};
@@ -53,7 +53,7 @@ pub struct SearchParameters {
     pub echo: EchoParameters,
     /// Hypotheses within this log-likelihood of the best are answers, too.
     pub margin: f32,
-    /// The mean log-likelihood per ping, relative to echoes anywhere, of a hypothesis that fits.
+    /// The mean log-likelihood per ping, relative to a place without walls, of a hypothesis that fits.
     pub least_fit: f32,
     /// Novel pings during which one hypothesis must be the only answer before it is unique.
     pub persistence: u16,
@@ -71,7 +71,7 @@ impl Default for SearchParameters {
             odometry: 0.015,
             echo: EchoParameters::HC_SR04,
             margin: 8.0,
-            least_fit: 0.3,
+            least_fit: 0.5,
             persistence: 20,
             sharpness: (Metres(0.05), Radians::from_degrees(3.0)),
         }
@@ -111,24 +111,37 @@ impl SearchParameters {
     /// For the sonar, the wheels and the priors of a robot.
     #[must_use]
     pub fn of(config: &Config) -> Self {
-        let Config { drive, prior, .. } = config;
+        let Config { prior, .. } = config;
+        Self::calibrated(config, [prior.scale_right, prior.scale_left], prior.track_width)
+    }
+
+    /// As [`Self::of`] with the standard deviations that the scales of the right and of the left wheel and the track
+    /// width have after a calibration.
+    #[must_use]
+    pub fn calibrated(config: &Config, [right, left]: [f32; 2], track_width: Metres) -> Self {
+        let drive = &config.drive;
         let width = drive.track_width.0;
-        let by_wheels = libm::hypotf(prior.scale_right, prior.scale_left);
-        let by_width = prior.track_width.0 / width;
+        let by_wheels = libm::hypotf(right, left);
+        let by_width = track_width.0 / width;
         // Heading noise after a metre: the deviation aside that it causes grows with the distance to the
         // power 1.5, and is this many metres a metre at 4 m.
         let per_root_metre = core::f32::consts::SQRT_2 * drive.wheel_noise.0.0 / width;
         let at_least = |value: f32, least: f32| if value > least { value } else { least };
+        let odometry = at_least(1.2 * per_root_metre, LEAST_ODOMETRY);
+        let (position, heading) = Self::default().sharpness;
         Self {
             drift: Radians(at_least(by_wheels / width, LEAST_DRIFT.0)),
             turn_scale: at_least(libm::hypotf(by_width, 0.5 * by_wheels), LEAST_TURN_SCALE),
-            odometry: at_least(1.2 * per_root_metre, LEAST_ODOMETRY),
+            odometry,
             echo: config.echo,
+            sharpness: (Metres(at_least(SHARP_WITHIN * odometry, position.0)), heading),
             ..Self::default()
         }
     }
 }
 
+/// A unique answer need not be sharper than what the odometry adds within this distance, metres.
+const SHARP_WITHIN: f32 = 1.8;
 /// Least deviations: a prior of zero would fix what a slip changes.
 const LEAST_DRIFT: Radians = Radians(0.005);
 const LEAST_TURN_SCALE: f32 = 0.003;
@@ -143,7 +156,7 @@ pub struct Hypothesis {
     pub position_deviation: Metres,
     /// One deviation of the heading.
     pub heading_deviation: Radians,
-    /// Mean log-likelihood per ping, relative to echoes anywhere.
+    /// Mean log-likelihood per ping, relative to a place without walls.
     pub fit: f32,
     /// The share of the pings with an echo that a wall or corner of the map explains.
     pub explained: f32,
@@ -315,9 +328,9 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
 
     /// Begins again for a robot, without a ping, a hypothesis or an answer. It changes the state in
     /// place, because a copy of it on a microcontroller's stack is large.
-    pub fn restart(&mut self, config: &Config, map: Map<'m>) {
+    pub fn restart(&mut self, config: &Config, parameters: SearchParameters, map: Map<'m>) {
         let sonar = &config.sonar;
-        self.parameters = SearchParameters::of(config);
+        self.parameters = parameters;
         let (right, left) = (sonar.servo.0.0, sonar.servo.1.0);
         self.echoes = EchoModel::new(map, sonar, &self.parameters.echo);
         self.servo = (right, left);
@@ -473,11 +486,17 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
             pose: Pose::new(now.at.x, now.at.y, Radians(rotation + self.window.heading())),
             position_deviation: Metres(libm::sqrtf(largest(spread.xx, spread.xy, spread.yy))),
             heading_deviation: Radians(libm::sqrtf(spread.rotation)),
-            fit: entry.score / at_least_one(entry.pings),
+            fit: self.fit_of(entry),
             explained: f32::from(entry.explained) / at_least_one(entry.echoes),
             drift: entry.placement.bend.drift,
             turn_scale: entry.placement.bend.turn_scale,
         }
+    }
+
+    /// Mean log-likelihood per ping, relative to a place without walls.
+    fn fit_of(&self, entry: &Entry) -> f32 {
+        let nothing = self.echoes.nothing(entry.pings, entry.echoes);
+        (entry.score - nothing) / at_least_one(entry.pings)
     }
 
     #[inline(never)]
@@ -658,7 +677,6 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         let taken = self.window.taken();
         let fresh = taken.wrapping_sub(self.taken);
         self.taken = taken;
-        let pings = count(self.window.pings().len());
         let Some(best) = self.bank.entries().first().copied() else {
             self.answer = Decision::Nowhere;
             self.is_check_due = true;
@@ -667,7 +685,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         let least = best.score - self.parameters.margin;
         let rivals = self.bank.entries().iter().filter(|entry| entry.score > least).count();
         let spread = &best.spread;
-        let is_fit = best.score >= self.parameters.least_fit * pings;
+        let is_fit = self.fit_of(&best) >= self.parameters.least_fit;
         let variance = largest(spread.xx, spread.xy, spread.yy);
         let is_determined = variance < UNDETERMINED * UNDETERMINED;
         let (position, heading) = self.parameters.sharpness;

@@ -8,6 +8,7 @@ use sonarfix::map::{Map, Wall};
 use sonarfix::search::{Answer, Hypothesis, Search, SearchParameters};
 use sonarfix::units::{Metres, Radians};
 use sonarfix_hal::config::RobotConfig;
+use sonarfix_hal::robot::EVALUATIONS_PER_MILLISECOND;
 use sonarfix_sim::time::micros;
 use sonarfix_sim::trace::Pose;
 
@@ -18,8 +19,6 @@ use crate::reference;
 use crate::scan::{Cone, Scan};
 use crate::wheels::Reading;
 
-/// Evaluations of the search for each second of the log: about those of a 168 MHz Cortex-M4F.
-const EVALUATIONS_PER_SECOND: f64 = 56_000.0;
 /// Cycles that the search makes after the end of the log.
 const CYCLES_AT_END: u32 = 6;
 /// Largest number of pings that one scan stands for: half a turn in steps of 20°.
@@ -217,8 +216,9 @@ impl<'a> Run<'a> {
             reason = "between 0 and the largest u16"
         )]
         let evaluations = {
-            let seconds = (reading.time - last.time) as f64 * 1e-6;
-            (seconds * EVALUATIONS_PER_SECOND).min(f64::from(u16::MAX)) as u16
+            let milliseconds = (reading.time - last.time) as f64 * 1e-3;
+            let evaluations = milliseconds * f64::from(EVALUATIONS_PER_MILLISECOND);
+            evaluations.min(f64::from(u16::MAX)) as u16
         };
         self.search.poll(evaluations);
         if self.unique_after.is_none() && matches!(self.search.answer(), Answer::Unique(_)) {

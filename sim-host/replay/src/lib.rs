@@ -15,6 +15,7 @@
 //! | [`log`], `lines` | the log format, and lines that may be damaged |
 //! | `reference` | the true poses, read in step with the log |
 //! | `session` | the replay itself |
+//! | `estimators` | navigator, search and dead reckoning |
 //! | `wheels` | travel between two readings of the encoders |
 //! | [`scan`] | the range of a sonar cone in a scan |
 //! | `score`, `median` | errors, and the health verdicts over time |
@@ -24,6 +25,7 @@
 //! | [`convert`] | recordings of other formats |
 
 pub mod convert;
+mod estimators;
 pub mod fault;
 pub mod find;
 mod lines;
@@ -37,6 +39,7 @@ mod session;
 pub mod thinned;
 mod wheels;
 
+pub use estimators::Searches;
 pub use lines::LONGEST;
 pub use reference::HEADER as REFERENCE_HEADER;
 pub use replay::{Replay, Summary};

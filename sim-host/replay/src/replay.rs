@@ -10,6 +10,7 @@ use sonarfix_sim::observe;
 use sonarfix_sim::statistics::FixCounts;
 use sonarfix_sim::trace::{Calibration, Recorder};
 
+use crate::estimators::Searches;
 use crate::fault::{Complaint, ReplayError, Source};
 use crate::lines::Lines;
 use crate::reference::Reference;
@@ -66,6 +67,8 @@ pub struct Summary {
     pub final_deviation: Calibration,
     /// The health verdicts.
     pub health: Verdicts,
+    /// What the search did; `None` if the robot does not search.
+    pub search: Option<Searches>,
     /// Consistency of errors and covariance.
     pub consistency: Consistency,
     /// The start, on the log's clock.
@@ -181,6 +184,7 @@ impl Summary {
             calibration: estimate.calibration,
             final_deviation: Calibration { scale_right, scale_left, track_width, range_scale },
             health: end.tally.verdicts,
+            search: end.searches,
             consistency: end.score.consistency(),
             started_at: end.started_at,
             duration: end.duration,

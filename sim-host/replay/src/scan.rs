@@ -2,6 +2,15 @@
 
 use sonarfix_sim::angle;
 
+/// Duration of a measurement of a sonar that sweeps, microseconds: an HC-SR04 on an SG90.
+pub const PING_PERIOD: i64 = 120_000;
+/// Largest number of pings that one scan stands for: half a turn in steps of 20°.
+pub const PINGS_A_SCAN: i64 = 9;
+
+/// A return is that of a mirror if none within this angle beside it is nearer: 4°. At 4 m, the ranges of a wall differ
+/// by 10 mm over this angle beside the foot of the perpendicular, the noise of a scanner.
+const SQUARE: f64 = 0.07;
+
 /// Ranges over a full or partial circle, taken at one instant from the sonar's mount.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Scan {
@@ -30,6 +39,37 @@ impl Scan {
     pub fn field_of_view(&self) -> [f64; 2] {
         let last = (1..self.ranges.len()).fold(self.first, |bearing, _| bearing + self.step);
         [self.first, last]
+    }
+
+    /// The earliest echo of a sonar whose beam is reflected as by a mirror: the nearest return inside the cone and
+    /// within reach that no return within [`SQUARE`] beside it undercuts. The foot of a perpendicular and an edge are such
+    /// returns; a wall that is met at an angle has none, and a sonar does not hear it.
+    #[must_use]
+    pub fn specular(&self, sonar: &Cone) -> Option<f64> {
+        let Cone { bearing, cone, reach: (nearest, farthest) } = *sonar;
+        let cone = cone + 1e-9;
+        let is_heard = |range: f32| {
+            let range = f64::from(range);
+            range > 0.0 && range >= nearest && range <= farthest
+        };
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some beams")]
+        let beside = (SQUARE / self.step.abs()).clamp(1.0, 1e3) as usize;
+        let is_undercut = |at: usize, range: f32| {
+            let around = at.saturating_sub(beside)..self.ranges.len().min(at + beside + 1);
+            let around = self.ranges.get(around).unwrap_or_default();
+            around.iter().any(|&other| other < range && is_heard(other))
+        };
+        let mut beam = self.first;
+        let mut earliest: Option<f64> = None;
+        for (at, &range) in self.ranges.iter().enumerate() {
+            let is_nearer = earliest.is_none_or(|earliest| f64::from(range) < earliest);
+            let is_within = angle::wrap(beam - bearing).abs() <= cone;
+            if is_nearer && is_within && is_heard(range) && !is_undercut(at, range) {
+                earliest = Some(range.into());
+            }
+            beam += self.step;
+        }
+        earliest
     }
 
     /// The earliest echo: the nearest return inside the cone and within reach.

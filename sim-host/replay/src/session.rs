@@ -6,22 +6,24 @@ use std::iter::Peekable;
 use std::vec::IntoIter;
 
 use sonarfix::aim::{Aim, NoAim, Reason};
-use sonarfix::config::PingSchedule;
+use sonarfix::config::{PingSchedule, Sonar};
 use sonarfix::ekf::{STATES, StandardDeviations, StateEstimate};
-use sonarfix::localizer::{Fix, Localizer, OdometryError, Start};
+use sonarfix::localizer::{Fix, Localizer, Start};
 use sonarfix::map::{Map, Wall, WallId};
-use sonarfix::motion::WheelTravel;
+use sonarfix::navigator::{Navigator, UNKNOWN_HEADING, UNKNOWN_POSITION};
+use sonarfix::search::Search;
 use sonarfix::units::{Duration, Instant, Metres, Radians, SquareMetres};
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_sim::observe::{self, Measurement};
 use sonarfix_sim::odometry::DeadReckoning;
 use sonarfix_sim::statistics::FixCounts;
-use sonarfix_sim::trace::{FixRecord, Pose, Recorder, Tick, Truth};
+use sonarfix_sim::trace::{FixRecord, Pose, Recorder};
 
+use crate::estimators::{Estimators, Searches};
 use crate::fault::{Fault, ReplayError};
 use crate::log::Record;
 use crate::reference::{Reference, micros, seconds};
-use crate::scan::{Cone, Scan};
+use crate::scan::{Cone, PING_PERIOD, PINGS_A_SCAN, Scan};
 use crate::score::{Score, Verdicts};
 use crate::wheels::Reading;
 
@@ -66,7 +68,12 @@ enum Echo {
         range: Option<f64>,
         wall: Option<u32>,
     },
-    Scan(Scan),
+    /// Of a scan a robot that knows its pose takes one range, if one is due; one that searches takes some.
+    Scan {
+        scan: Scan,
+        is_due: bool,
+        swept: u32,
+    },
     /// There was no measurable wall.
     Skip,
     /// The pose was replaced.
@@ -80,6 +87,8 @@ struct Begin {
     pose: Pose,
     state: StateEstimate,
     deviation: StandardDeviations,
+    /// Whether the log has no start, and the robot searches for its pose.
+    is_unknown: bool,
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -104,47 +113,6 @@ pub struct Tally {
     pub verdicts: Verdicts,
 }
 
-/// The localizer, with dead reckoning beside it.
-struct Estimators<'a> {
-    localizer: Localizer<'a>,
-    odometry: DeadReckoning,
-    /// Start time of the localizer.
-    epoch: i64,
-    /// The encoder reading that the localizer has received.
-    received: Reading,
-}
-
-impl Estimators<'_> {
-    /// The state at a time since the start.
-    fn tick(&self, time: f64, truth: Option<Pose>) -> Tick {
-        Tick {
-            time,
-            truth: truth.map(|pose| Truth { pose, calibration: None }),
-            estimate: observe::estimate(&self.localizer),
-            bound: None,
-            odometry: self.odometry.pose(),
-        }
-    }
-
-    /// Seconds since the start.
-    fn since_start(&self, time: i64) -> f64 {
-        seconds(time - self.epoch)
-    }
-
-    /// Advances to a reading; returns the distance travelled.
-    fn drive_to(&mut self, reading: Reading) -> Result<f64, OdometryError> {
-        if reading.time <= self.received.time {
-            return Ok(0.0);
-        }
-        let ([right, left], received) = self.received.advanced_to(reading);
-        let now = Instant::from_ticks((reading.time - self.epoch).unsigned_abs());
-        self.localizer.odometry(now, WheelTravel::new(right, left))?;
-        self.odometry.moved([right.into(), left.into()]);
-        self.received = received;
-        Ok(f64::midpoint(right.into(), left.into()).abs())
-    }
-}
-
 /// A replay in progress.
 pub struct Session<'a, R, V> {
     robot: &'a RobotConfig,
@@ -162,6 +130,8 @@ pub struct Session<'a, R, V> {
     beams: usize,
     /// Time from which the next scan is used.
     next_fix: i64,
+    /// Time up to which a robot that searches has pinged.
+    swept_until: i64,
     score: Score,
     tally: Tally,
 }
@@ -189,6 +159,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
             pending: Vec::new(),
             beams: 0,
             next_fix: 0,
+            swept_until: 0,
             score: Score::default(),
             tally: Tally::default(),
         }
@@ -199,23 +170,19 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         match record {
             Record::Start { time, pose, position_deviation, heading_deviation } => {
                 let (sigma, heading) = (position_deviation, heading_deviation);
-                let state = [pose.x, pose.y, pose.heading, 0.0, 0.0, 0.0, 0.0];
-                let prior = self.robot.localizer.prior;
-                let deviation = StandardDeviations {
-                    scale_right: prior.scale_right,
-                    scale_left: prior.scale_left,
-                    track_width_error: prior.track_width,
-                    range_scale: prior.range_scale,
-                    ..deviations([sigma, sigma, heading, 0.0, 0.0, 0.0, 0.0])
-                };
-                let state = estimate(state);
-                self.take_start(Begin { time: micros(time), pose, state, deviation }, complain)
+                let deviation = self.with_prior([sigma, sigma, heading]);
+                let state = estimate([pose.x, pose.y, pose.heading, 0.0, 0.0, 0.0, 0.0]);
+                let time = micros(time);
+                let begin = Begin { time, pose, state, deviation, is_unknown: false };
+                self.take_start(begin, complain)
             }
             Record::Resume { time, state: received, deviation } => {
                 let [x, y, heading, ..] = received;
                 let pose = Pose { x, y, heading };
                 let (state, deviation) = (estimate(received), deviations(deviation));
-                self.take_start(Begin { time: micros(time), pose, state, deviation }, complain)
+                let time = micros(time);
+                let begin = Begin { time, pose, state, deviation, is_unknown: false };
+                self.take_start(begin, complain)
             }
             Record::Ticks { time, right, left } => {
                 let wheels = self.rolled([right, left]);
@@ -228,7 +195,9 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
                 self.hold(micros(time), Echo::At { bearing, range, wall })
             }
             Record::Skip { time } => self.hold(micros(time), Echo::Skip),
-            Record::Scan { time, scan } => self.hold(micros(time), Echo::Scan(scan)),
+            Record::Scan { time, scan } => {
+                self.hold(micros(time), Echo::Scan { scan, is_due: true, swept: 0 })
+            }
             Record::Pose { time, pose, position_deviation, heading_deviation } => {
                 let [x, y, heading, position, deviation] =
                     single([pose.x, pose.y, pose.heading, position_deviation, heading_deviation]);
@@ -239,6 +208,29 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
                 self.hold(micros(time), Echo::Pose(start))
             }
         }
+    }
+
+    /// Deviations of a pose, with those of the robot file for the calibration.
+    fn with_prior(&self, [x, y, heading]: [f64; 3]) -> StandardDeviations {
+        let prior = self.robot.localizer.prior;
+        StandardDeviations {
+            scale_right: prior.scale_right,
+            scale_left: prior.scale_left,
+            track_width_error: prior.track_width,
+            range_scale: prior.range_scale,
+            ..deviations([x, y, heading, 0.0, 0.0, 0.0, 0.0])
+        }
+    }
+
+    /// The start of a robot whose log has none: it searches for its pose.
+    fn without_start(&self, time: i64) -> Option<Begin> {
+        if !self.robot.start.is_unknown() {
+            return None;
+        }
+        let position = f64::from(UNKNOWN_POSITION.0);
+        let deviation = self.with_prior([position, position, UNKNOWN_HEADING.0.into()]);
+        let (pose, state) = (Pose::default(), estimate([0.0; STATES]));
+        Some(Begin { time, pose, state, deviation, is_unknown: true })
     }
 
     fn rolled(&self, ticks: [i64; 2]) -> [f64; 2] {
@@ -285,12 +277,14 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         let map = Map::new(self.walls);
         let Begin { state, deviation, .. } = begin;
         let localizer = Localizer::resume(config, map, state, deviation, Instant::from_ticks(0))?;
-        let estimators = self.estimators.insert(Estimators {
-            localizer,
-            odometry: DeadReckoning::new(begin.pose, track_width),
-            epoch: reading.time,
-            received: reading,
-        });
+        let mut navigator = Navigator::new(localizer);
+        let mut search = self.robot.start.is_unknown().then(Box::<Search>::default);
+        if let (true, Some(search)) = (begin.is_unknown, &mut search) {
+            navigator.search_in(self.robot.start.region(), search);
+        }
+        let odometry = DeadReckoning::new(begin.pose, track_width);
+        let estimators = Estimators::new(navigator, search, odometry, reading);
+        let estimators = self.estimators.insert(estimators);
         self.recorder.started(|| estimators.tick(0.0, None));
         let epoch = reading.time;
         if let Some(reference) = &mut self.reference {
@@ -358,7 +352,14 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         from.speed_to(to) <= fastest
     }
 
-    fn hold(&mut self, time: i64, echo: Echo) -> Result<(), Trouble> {
+    fn hold(&mut self, time: i64, mut echo: Echo) -> Result<(), Trouble> {
+        if self.begin.is_none()
+            && let Some(last) = self.last
+        {
+            // A measurement before any start.
+            self.begin = self.without_start(last.time);
+            self.next_fix = last.time + self.fix_period();
+        }
         let Some(begin) = self.begin.filter(|begin| time >= begin.time) else {
             self.tally.unused += 1;
             return Ok(());
@@ -369,23 +370,34 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         }
         let beams = match &echo {
             Echo::At { .. } | Echo::Skip | Echo::Pose(_) => 0,
-            Echo::Scan(scan) => {
-                if time < self.next_fix {
-                    return Ok(());
-                }
-                scan.ranges.len()
-            }
+            Echo::Scan { scan, .. } => scan.ranges.len(),
         };
+        let is_searching = self.estimators.as_ref().is_some_and(Estimators::is_searching);
+        if let Echo::Scan { is_due, swept, .. } = &mut echo {
+            *is_due = time >= self.next_fix;
+            *swept = if is_searching { self.pings_until(time) } else { 0 };
+            if !*is_due && *swept == 0 {
+                return Ok(());
+            }
+        }
         if self.pending.len() >= MOST_HELD || self.beams + beams > MOST_BEAMS {
             return Err(Fault::TooManyRanges.into());
         }
-        if matches!(echo, Echo::Scan(_)) {
+        if let Echo::Scan { is_due: true, .. } = echo {
             let period = self.fix_period();
             self.next_fix += ((time - self.next_fix) / period + 1) * period;
         }
         self.beams += beams;
         self.pending.push(Pending { time, echo });
         Ok(())
+    }
+
+    /// How many pings a sonar that sweeps has made since its last one.
+    fn pings_until(&mut self, time: i64) -> u32 {
+        let pings = ((time - self.swept_until) / PING_PERIOD).clamp(0, PINGS_A_SCAN);
+        self.swept_until =
+            if pings < PINGS_A_SCAN { self.swept_until + pings * PING_PERIOD } else { time };
+        u32::try_from(pings).unwrap_or(0)
     }
 
     /// Processes the interval between two encoder records.
@@ -431,12 +443,17 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
                 }
                 self.tally.distance += estimators.drive_to(from.between(to, measurement.time))?;
                 match &measurement.echo {
-                    Echo::Pose(start) => estimators.localizer.set_pose(start)?,
+                    Echo::Pose(start) => estimators.navigator.set_pose(start)?,
+                    echo if estimators.is_searching() => {
+                        sweep(estimators, echo, &self.robot.localizer.sonar);
+                    }
+                    Echo::Scan { is_due: false, .. } => {}
                     _ => self.measure(estimators, &measurement),
                 }
+                self.update(estimators, measurement.time);
             } else if let (Some(row), Some(reference)) = (row, &mut self.reference) {
                 self.tally.distance += estimators.drive_to(from.between(to, row.time))?;
-                let estimate = observe::estimate(&estimators.localizer);
+                let estimate = observe::estimate(estimators.localizer());
                 let at = (estimators.since_start(row.time), self.tally.distance);
                 let odometry = estimators.odometry.pose();
                 self.score.add(at, &estimate, &odometry, &row.pose);
@@ -451,9 +468,18 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         Ok(())
     }
 
+    /// Changes the mode if a measurement requires it.
+    fn update(&mut self, estimators: &mut Estimators, time: i64) {
+        let before = estimators.localizer().health().verdict;
+        estimators.update();
+        let now = estimators.localizer().health().verdict;
+        self.tally.verdicts.note(estimators.since_start(time), before, now);
+    }
+
     /// Measures as the robot would have, or with the recorded bearing.
     fn measure(&mut self, estimators: &mut Estimators, pending: &Pending) {
-        let localizer = &mut estimators.localizer;
+        let navigator = &mut estimators.navigator;
+        let localizer = navigator.localizer();
         let pose = localizer.pose();
         let sonar = &self.robot.localizer.sonar;
         let mount = pose.to_map(sonar.mount);
@@ -475,15 +501,16 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
                 range: Metres(0.0),
                 why: UNKNOWN,
             }),
-            Echo::Scan(_) => localizer.aim(),
+            Echo::Scan { .. } => localizer.aim(),
             Echo::Skip | Echo::Pose(_) => Err(localizer.aim().err().unwrap_or(NoAim::NoWall)),
         };
         let before = localizer.health().verdict;
         let aim = match aim {
             Ok(aim) => aim,
             Err(no_aim) => {
-                localizer.skip();
-                self.tally.verdicts.note(measurement.time, before, localizer.health().verdict);
+                navigator.skip();
+                let now = navigator.localizer().health().verdict;
+                self.tally.verdicts.note(measurement.time, before, now);
                 self.tally.fixes.refused += 1;
                 *self.tally.refusals.entry(no_aim.to_string()).or_default() += 1;
                 self.recorder.fix(|| observe::no_aim_record(measurement, no_aim));
@@ -493,15 +520,12 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         measurement.range = match &pending.echo {
             Echo::At { range, .. } => *range,
             Echo::Skip | Echo::Pose(_) => None,
-            Echo::Scan(scan) => scan.earliest(&Cone {
-                bearing: aim.bearing.0.into(),
-                cone: sonar.cone.0.into(),
-                reach: (sonar.min_range.0.into(), sonar.max_range.0.into()),
-            }),
+            Echo::Scan { scan, .. } => scan.earliest(&cone(aim.bearing, sonar)),
         };
         #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
         let range = measurement.range.map(|range| Metres(range as f32));
-        let fix = localizer.fix(&aim, range);
+        let fix = navigator.fix(&aim, range, estimators.search.as_deref_mut());
+        let localizer = navigator.localizer();
         let now = localizer.health().verdict;
         self.tally.verdicts.note(measurement.time, before, now);
         let fixes = &mut self.tally.fixes;
@@ -525,13 +549,14 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         let estimators = self.estimators.ok_or(ReplayError::NoStart)?;
         let last = self.last.unwrap_or(estimators.received);
         let duration = estimators.since_start(last.time);
-        let verdict = estimators.localizer.health().verdict;
+        let verdict = estimators.localizer().health().verdict;
         self.tally.verdicts.note(duration, verdict, verdict);
         self.tally.unused += self.pending.len() as u64;
         Ok(End {
             started_at: seconds(estimators.epoch),
             duration,
-            localizer: estimators.localizer,
+            localizer: estimators.localizer().clone(),
+            searches: estimators.search.is_some().then_some(estimators.searches),
             score: self.score,
             tally: self.tally,
         })
@@ -542,8 +567,36 @@ impl Pending {
     fn beams(&self) -> usize {
         match &self.echo {
             Echo::At { .. } | Echo::Skip | Echo::Pose(_) => 0,
-            Echo::Scan(scan) => scan.ranges.len(),
+            Echo::Scan { scan, .. } => scan.ranges.len(),
         }
+    }
+}
+
+/// The pings of a robot that searches.
+fn sweep(estimators: &mut Estimators, echo: &Echo, sonar: &Sonar) {
+    match echo {
+        Echo::At { bearing, range, .. } => {
+            let [bearing] = single([*bearing]);
+            let range = range.map(|range| single([range])).map(|[range]| Metres(range));
+            estimators.swept(Radians(bearing), range);
+        }
+        Echo::Scan { scan, swept, .. } => {
+            for _ in 0..*swept {
+                let Some(bearing) = estimators.sweep() else { return };
+                let range = scan.specular(&cone(bearing, sonar)).map(|range| single([range]));
+                estimators.swept(bearing, range.map(|[range]| Metres(range)));
+            }
+        }
+        Echo::Skip | Echo::Pose(_) => {}
+    }
+}
+
+/// The cone of a sonar with this bearing.
+fn cone(bearing: Radians, sonar: &Sonar) -> Cone {
+    Cone {
+        bearing: bearing.0.into(),
+        cone: sonar.cone.0.into(),
+        reach: (sonar.min_range.0.into(), sonar.max_range.0.into()),
     }
 }
 
@@ -567,6 +620,8 @@ pub struct End<'a> {
     /// From the start to the last encoder record, seconds.
     pub duration: f64,
     pub localizer: Localizer<'a>,
+    /// `None` if the robot does not search.
+    pub searches: Option<Searches>,
     pub score: Score,
     pub tally: Tally,
 }

@@ -11,6 +11,7 @@ use serde::Serialize;
 use sonarfix::map::{Map, MapError};
 use sonarfix::search::{Answer, Hypothesis, Search, SearchParameters};
 use sonarfix::units::{Metres, Radians};
+use sonarfix_hal::robot::EVALUATIONS_PER_MILLISECOND;
 use sonarfix_map::{BakeError, FileError, Follow, Scenario, Symmetry, symmetries};
 use sonarfix_sim::angle;
 use sonarfix_sim::plant::Plant;
@@ -24,8 +25,8 @@ use crate::floor_plan::{FloorPlan, Kind};
 /// Time of one ping of an HC-SR04 on an SG90 with steps of 20°, seconds: a frame of the servo, the
 /// turn, settling and the cycle of the sonar.
 pub const PERIOD: f64 = 0.12;
-/// Evaluations between two pings: half of the time of a 168 MHz Cortex-M4F, 1,500 instructions each.
-const EVALUATIONS: u16 = 6_720;
+/// Evaluations between two pings, which are 120 ms apart.
+const EVALUATIONS: u16 = 120 * EVALUATIONS_PER_MILLISECOND;
 /// The largest systematic error of a wheel.
 const WHEEL_ERROR: f64 = 0.01;
 /// The largest deviation of the servo from the bearing, radians.

@@ -14,6 +14,11 @@ pub enum Stamp {
     Arrival,
 }
 
+/// Evaluations of the search a millisecond: the computing time that simulation, replay and the STM32 firmware grant it.
+/// 40 evaluations of 1,290 instructions on average (`docs/search.md`) are some 52,000 of the 168,000 cycles that a
+/// Cortex-M4F at 168 MHz has in a millisecond, and leave half of it free at 1.6 cycles an instruction.
+pub const EVALUATIONS_PER_MILLISECOND: u16 = 40;
+
 /// Settings of the loop. The ping schedule is that of the localizer's configuration
 /// ([`PingTiming::schedule`](sonarfix::config::PingTiming::schedule)); where no wall can be
 /// measured, [`PingSchedule::AsFastAsPossible`](sonarfix::config::PingSchedule) tries again at the next

@@ -97,6 +97,13 @@ impl<'m> EchoModel<'m> {
         }
     }
 
+    /// The score of so many pings, some of them with an echo, where the map has no wall.
+    pub fn nothing(&self, pings: u16, echoes: u16) -> f32 {
+        let silent = f32::from(pings) - f32::from(echoes);
+        let echo = at_least(self.shares.before, LEAST_ECHO);
+        echo * f32::from(echoes) + at_least(SILENCE, self.shares.silence) * silent
+    }
+
     /// Scores a ping; one call is one evaluation.
     pub fn explain(&self, beam: &Beam, sharpness: Sharpness) -> Explanation {
         let margin = MATCH * sharpness.deviation;

@@ -36,6 +36,7 @@ pub fn no_servo(rightmost: f64, leftmost: f64) -> [(&'static str, Value); 3] {
 pub fn write(dir: &Path, name: &str, comment: &str, tables: Tables) -> Result<(), ConvertError> {
     let mut out = Out::create(dir.join(name))?;
     out.line(format_args!("# {comment}\nformat = 1"))?;
+    out.line("start = \"unknown\"  # where the log has a start it is used; a lost robot searches for its pose")?;
     for (table, values) in tables {
         out.line(format_args!("\n[{table}]"))?;
         for (key, Value(value, source)) in values {

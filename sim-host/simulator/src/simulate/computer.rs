@@ -8,7 +8,7 @@ use sonarfix::navigator::{Mode, UNKNOWN_HEADING, UNKNOWN_POSITION};
 use sonarfix::pose::Pose;
 use sonarfix::search::{Search, SearchParameters};
 use sonarfix::units::{Instant, Metres, Radians};
-use sonarfix_hal::robot::{Report, Robot, Settings};
+use sonarfix_hal::robot::{EVALUATIONS_PER_MILLISECOND, Report, Robot, Settings};
 use sonarfix_pil::board::{self, WiredDevices};
 use sonarfix_pil::{Actuators, Sensors, Wires};
 
@@ -101,10 +101,6 @@ pub trait Controller {
     fn search(&self) -> Option<&Search<'_>>;
 }
 
-/// Evaluations of the search in a poll. A robot that searches is polled every millisecond in the simulation, and
-/// continuously with one evaluation on a board: 40,000 a second take less than half of a 168 MHz Cortex-M4F.
-const EVALUATIONS: u16 = 40;
-
 /// The start of a localizer without a pose.
 pub(super) fn no_pose() -> Start {
     Start {
@@ -144,7 +140,8 @@ impl Computer for ThisProcess<'_> {
         let settings = Settings {
             encoder_period: config.encoder_period,
             stamp: simulation.stamp,
-            evaluations: EVALUATIONS,
+            // A robot that searches is polled every millisecond.
+            evaluations: EVALUATIONS_PER_MILLISECOND,
             ..Settings::default()
         };
         let localizer = simulation.localizer(start.unwrap_or_else(no_pose), at)?;

@@ -1,0 +1,153 @@
+//! The estimators of a replay: the navigator with its search, and dead reckoning beside it.
+
+use serde::Serialize;
+use sonarfix::localizer::{Localizer, OdometryError};
+use sonarfix::motion::WheelTravel;
+use sonarfix::navigator::{Mode, Navigator};
+use sonarfix::search::Search;
+use sonarfix::units::{Instant, Metres, Radians};
+use sonarfix_hal::robot::EVALUATIONS_PER_MILLISECOND;
+use sonarfix_sim::observe;
+use sonarfix_sim::odometry::DeadReckoning;
+use sonarfix_sim::trace::{Pose, Tick, Truth};
+
+use crate::reference::seconds;
+use crate::wheels::Reading;
+
+/// What the search did during a replay. Times in seconds.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Searches {
+    /// How often it began.
+    pub begun: u64,
+    /// How often its unique answer became the pose.
+    pub handed_over: u64,
+    /// How many of these poses were confirmed.
+    pub confirmed: u64,
+    /// Time with an unknown pose.
+    pub searching_seconds: f64,
+    /// Time with a pose that was not confirmed.
+    pub provisional_seconds: f64,
+}
+
+/// The navigator, with dead reckoning beside it.
+pub struct Estimators<'a> {
+    pub navigator: Navigator<'a>,
+    pub search: Option<Box<Search<'a>>>,
+    pub odometry: DeadReckoning,
+    /// Start time of the localizer.
+    pub epoch: i64,
+    /// The encoder reading that the localizer has received.
+    pub received: Reading,
+    pub searches: Searches,
+    /// Microseconds that are no whole evaluation yet.
+    spare: i64,
+}
+
+impl<'a> Estimators<'a> {
+    /// Estimators that start with a reading of the encoders.
+    pub fn new(
+        navigator: Navigator<'a>,
+        search: Option<Box<Search<'a>>>,
+        odometry: DeadReckoning,
+        reading: Reading,
+    ) -> Self {
+        Self {
+            navigator,
+            search,
+            odometry,
+            epoch: reading.time,
+            received: reading,
+            searches: Searches::default(),
+            spare: 0,
+        }
+    }
+
+    /// The localizer.
+    pub fn localizer(&self) -> &Localizer<'a> {
+        self.navigator.localizer()
+    }
+
+    /// Whether the pose is unknown.
+    pub fn is_searching(&self) -> bool {
+        self.navigator.mode() == Mode::Searching
+    }
+
+    /// The state at a time since the start.
+    pub fn tick(&self, time: f64, truth: Option<Pose>) -> Tick {
+        Tick {
+            time,
+            truth: truth.map(|pose| Truth { pose, calibration: None }),
+            estimate: observe::estimate(self.localizer()),
+            bound: None,
+            odometry: self.odometry.pose(),
+        }
+    }
+
+    /// Seconds since the start.
+    pub fn since_start(&self, time: i64) -> f64 {
+        seconds(time - self.epoch)
+    }
+
+    /// Advances to a reading; returns the distance travelled. The search works during that time.
+    pub fn drive_to(&mut self, reading: Reading) -> Result<f64, OdometryError> {
+        if reading.time <= self.received.time {
+            return Ok(0.0);
+        }
+        let elapsed = reading.time - self.received.time;
+        let ([right, left], received) = self.received.advanced_to(reading);
+        let now = Instant::from_ticks((reading.time - self.epoch).unsigned_abs());
+        let travel = WheelTravel::new(right, left);
+        self.navigator.odometry(now, travel, self.search.as_deref_mut())?;
+        self.odometry.moved([right.into(), left.into()]);
+        self.received = received;
+        self.work(elapsed);
+        Ok(f64::midpoint(right.into(), left.into()).abs())
+    }
+
+    /// Makes the evaluations of a time, microseconds, and changes the mode when it is due.
+    fn work(&mut self, elapsed: i64) {
+        let Some(search) = &mut self.search else { return };
+        match self.navigator.mode() {
+            Mode::Tracking => {}
+            Mode::Searching => self.searches.searching_seconds += seconds(elapsed),
+            Mode::Provisional => self.searches.provisional_seconds += seconds(elapsed),
+        }
+        let thousandths = self.spare + elapsed * i64::from(EVALUATIONS_PER_MILLISECOND);
+        self.spare = thousandths % 1_000;
+        // More than a whole search in a gap of the log would do nothing new.
+        let evaluations = u16::try_from(thousandths / 1_000).unwrap_or(u16::MAX);
+        let before = self.navigator.mode();
+        let changed = self.navigator.work(evaluations, search);
+        self.count(before, changed);
+    }
+
+    /// Changes the mode if a fix requires it.
+    pub fn update(&mut self) {
+        let Some(search) = &mut self.search else { return };
+        let before = self.navigator.mode();
+        let changed = self.navigator.update(search);
+        self.count(before, changed);
+    }
+
+    fn count(&mut self, before: Mode, changed: Option<Mode>) {
+        match changed {
+            Some(Mode::Searching) => self.searches.begun += 1,
+            Some(Mode::Provisional) => self.searches.handed_over += 1,
+            Some(Mode::Tracking) if before == Mode::Provisional => self.searches.confirmed += 1,
+            _ => {}
+        }
+    }
+
+    /// The bearing in which the search wants the next ping.
+    pub fn sweep(&self) -> Option<Radians> {
+        self.search.as_ref().map(|search| search.aim())
+    }
+
+    /// Passes the range of a ping in any direction to the search.
+    pub fn swept(&mut self, bearing: Radians, range: Option<Metres>) {
+        if let Some(search) = &mut self.search {
+            // The parser refuses what is not finite.
+            _ = self.navigator.ping(bearing, range, search);
+        }
+    }
+}
