@@ -320,6 +320,16 @@ impl<'m, F: NorFlash> App<'m, F> {
         &self.search
     }
 
+    /// Makes one evaluation of the search between two polls, for a board whose loop has time left; the next poll acts on
+    /// the answer. Returns whether the robot searches.
+    pub fn work(&mut self) -> bool {
+        let is_due = self.navigation_mode().is_some_and(|mode| mode != navigator::Mode::Tracking);
+        if is_due {
+            self.search.poll(1);
+        }
+        is_due
+    }
+
     /// The report of the loop's last poll, while it runs.
     #[must_use]
     pub fn report(&self) -> Option<&Report> {

@@ -331,6 +331,33 @@ impl<'m> Navigator<'m> {
         Ok(())
     }
 
+    /// Takes the mode that another navigator has changed to, with its state and standard deviations then: for the replay
+    /// of recorded changes.
+    ///
+    /// # Errors
+    /// [`EkfError`], by what is wrong with the state or its deviations; nothing has changed.
+    pub fn adopt(
+        &mut self,
+        mode: Mode,
+        state: StateEstimate,
+        deviation: StandardDeviations,
+    ) -> Result<(), EkfError> {
+        match mode {
+            Mode::Tracking => {}
+            Mode::Searching => {
+                self.localizer.restart(state, deviation)?;
+                self.localizer.declare_lost();
+            }
+            Mode::Provisional => self.localizer.set_pose(&Start {
+                pose: state.pose(),
+                position_deviation: deviation.x,
+                heading_deviation: deviation.heading,
+            })?,
+        }
+        self.mode = mode;
+        Ok(())
+    }
+
     fn track(&mut self) {
         self.mode = Mode::Tracking;
         self.driven = Metres(0.0);

@@ -8,7 +8,7 @@ use std::io::{self, LineWriter, Write};
 use std::path::PathBuf;
 
 use sonarfix::ekf::STATES;
-use sonarfix::navigator::Mode;
+use sonarfix::navigator::{Mode, UNKNOWN_POSITION};
 use sonarfix::units::Instant;
 use sonarfix_link::message::{ModeChanged, Odometry, SkippedPing, Sweep};
 use sonarfix_link::{Estimate, Ping, Telemetry};
@@ -54,8 +54,9 @@ impl Recording {
                 let file = self.next_file()?;
                 self.log = Some(Log::begin(file, began)?);
             }
-            (Telemetry::ModeChanged(change), Some(log)) if change.mode == Mode::Tracking => {
-                log.take(received)?;
+            (Telemetry::ModeChanged(change), Some(log)) if change.estimate.at >= log.last => {
+                log.lost(received.lost)?;
+                log.mode(change.mode, &change.estimate)?;
             }
             (Telemetry::PoseSet(estimate), Some(log)) if estimate.at >= log.last => {
                 log.lost(received.lost)?;
@@ -133,7 +134,11 @@ impl<W: Write> Log<W> {
         )?;
         let [right, left] = wheels;
         writeln!(out, "wheels,{},{right},{left}", Time(start.at))?;
-        Ok(Self { out, last: start.at })
+        let mut log = Self { out, last: start.at };
+        if start.deviation.x >= UNKNOWN_POSITION {
+            log.mode(Mode::Searching, start)?;
+        }
+        Ok(log)
     }
 
     /// Records a message.
@@ -180,6 +185,16 @@ impl<W: Write> Log<W> {
         let [x, y, heading, ..] = estimate.state.to_array().map(f64::from);
         let [position, _, turn, ..] = estimate.deviation.to_array().map(f64::from);
         writeln!(self.out, "pose,{},{x},{y},{heading},{position},{turn}", Time(estimate.at))
+    }
+
+    fn mode(&mut self, mode: Mode, estimate: &Estimate) -> io::Result<()> {
+        let name = match mode {
+            Mode::Tracking => "tracking",
+            Mode::Searching => "searching",
+            Mode::Provisional => "provisional",
+        };
+        let (state, deviation) = (estimate.state.to_array(), estimate.deviation.to_array());
+        writeln!(self.out, "mode,{},{name}{}{}", Time(estimate.at), List(state), List(deviation))
     }
 
     fn ping(&mut self, ping: &Ping) -> io::Result<()> {

@@ -1,6 +1,7 @@
 //! The estimators of a replay: the navigator with its search, and dead reckoning beside it.
 
 use serde::Serialize;
+use sonarfix::ekf::{EkfError, StandardDeviations, StateEstimate};
 use sonarfix::localizer::{Localizer, OdometryError};
 use sonarfix::motion::WheelTravel;
 use sonarfix::navigator::{Mode, Navigator};
@@ -119,6 +120,20 @@ impl<'a> Estimators<'a> {
         let before = self.navigator.mode();
         let changed = self.navigator.work(evaluations, search);
         self.count(before, changed);
+    }
+
+    /// Takes a recorded change of the mode. From then on the log decides about the mode, and the replay searches no more.
+    pub fn adopt(
+        &mut self,
+        mode: Mode,
+        state: StateEstimate,
+        deviation: StandardDeviations,
+    ) -> Result<(), EkfError> {
+        self.search = None;
+        let before = self.navigator.mode();
+        self.navigator.adopt(mode, state, deviation)?;
+        self.count(before, Some(mode).filter(|mode| *mode != before));
+        Ok(())
     }
 
     /// Changes the mode if a fix requires it.

@@ -165,6 +165,7 @@ impl<'a> Run<'a> {
             Record::Skip { .. }
             | Record::Start { .. }
             | Record::Pose { .. }
+            | Record::Mode { .. }
             | Record::Resume { .. } => {}
         }
     }

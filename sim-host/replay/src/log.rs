@@ -1,5 +1,6 @@
 //! The log format, one record a line (`docs/formats.md`, "Logs").
 
+use sonarfix::navigator::Mode;
 use sonarfix_sim::trace::Pose;
 
 use crate::scan::Scan;
@@ -76,6 +77,17 @@ pub enum Record {
         /// Standard deviation of the heading, radians.
         heading_deviation: f64,
     },
+    /// The robot's mode has changed; its estimate then.
+    Mode {
+        /// Time of the change.
+        time: f64,
+        /// The new mode.
+        mode: Mode,
+        /// All states, in the filter's order.
+        state: [f64; 7],
+        /// Their standard deviations.
+        deviation: [f64; 7],
+    },
     /// The initial estimate of the localizer, with its calibration.
     Resume {
         /// Time of this estimate.
@@ -100,7 +112,7 @@ pub enum Malformed {
     #[error("the line is not UTF-8 text")]
     NotText,
     /// Its kind is unknown.
-    #[error("`{0}` is not one of ticks, wheels, range, scan, skip, start, resume, pose")]
+    #[error("`{0}` is not one of ticks, wheels, range, scan, skip, start, resume, pose, mode")]
     UnknownKind(String),
     /// It ends too early.
     #[error("the {0} is missing")]
@@ -164,6 +176,12 @@ pub fn parse(line: &str) -> Result<Option<Record>, Malformed> {
         },
         "resume" => Record::Resume {
             time: fields.time()?,
+            state: fields.states(Fields::number)?,
+            deviation: fields.states(Fields::deviation)?,
+        },
+        "mode" => Record::Mode {
+            time: fields.time()?,
+            mode: fields.mode()?,
             state: fields.states(Fields::number)?,
             deviation: fields.states(Fields::deviation)?,
         },
@@ -240,6 +258,16 @@ impl<'a> Fields<'a> {
         };
         let text = text.trim();
         text.parse().map(Some).map_err(|_| not("wall", text, "a whole number, from 0"))
+    }
+
+    fn mode(&mut self) -> Result<Mode, Malformed> {
+        let text = self.next("mode")?;
+        match text {
+            "tracking" => Ok(Mode::Tracking),
+            "searching" => Ok(Mode::Searching),
+            "provisional" => Ok(Mode::Provisional),
+            _ => Err(not("mode", text, "one of tracking, searching, provisional")),
+        }
     }
 
     /// A number for each state.
@@ -365,7 +393,7 @@ mod tests {
         let cases = [
             (
                 "tick,1,2,3",
-                "`tick` is not one of ticks, wheels, range, scan, skip, start, resume, pose",
+                "`tick` is not one of ticks, wheels, range, scan, skip, start, resume, pose, mode",
             ),
             ("range,1,2,3,x", "the wall is `x`, which is not a whole number, from 0"),
             ("range,1,2,3,4,5", "there are more fields than a record of this kind has"),
@@ -403,7 +431,7 @@ mod tests {
             ("start,0,0,0,0,1", "the deviation of the heading is missing"),
             (
                 "\u{1b}[31m,0",
-                "`\\u{1b}[31m` is not one of ticks, wheels, range, scan, skip, start, resume, pose",
+                "`\\u{1b}[31m` is not one of ticks, wheels, range, scan, skip, start, resume, pose, mode",
             ),
         ];
         for (line, reason) in cases {

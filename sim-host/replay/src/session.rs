@@ -10,7 +10,7 @@ use sonarfix::config::{PingSchedule, Sonar};
 use sonarfix::ekf::{STATES, StandardDeviations, StateEstimate};
 use sonarfix::localizer::{Fix, Localizer, Start};
 use sonarfix::map::{Map, Wall, WallId};
-use sonarfix::navigator::{Navigator, UNKNOWN_HEADING, UNKNOWN_POSITION};
+use sonarfix::navigator::{Mode, Navigator, UNKNOWN_HEADING, UNKNOWN_POSITION};
 use sonarfix::search::Search;
 use sonarfix::units::{Duration, Instant, Metres, Radians, SquareMetres};
 use sonarfix_hal::config::RobotConfig;
@@ -78,6 +78,12 @@ enum Echo {
     Skip,
     /// The pose was replaced.
     Pose(Start),
+    /// The mode has changed.
+    Mode {
+        mode: Mode,
+        state: StateEstimate,
+        deviation: StandardDeviations,
+    },
 }
 
 /// The start record, of either kind.
@@ -175,6 +181,10 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
                 let time = micros(time);
                 let begin = Begin { time, pose, state, deviation, is_unknown: false };
                 self.take_start(begin, complain)
+            }
+            Record::Mode { time, mode, state, deviation } => {
+                let (state, deviation) = (estimate(state), deviations(deviation));
+                self.hold(micros(time), Echo::Mode { mode, state, deviation })
             }
             Record::Resume { time, state: received, deviation } => {
                 let [x, y, heading, ..] = received;
@@ -369,7 +379,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
             return Err(Fault::TimeWentBack.into());
         }
         let beams = match &echo {
-            Echo::At { .. } | Echo::Skip | Echo::Pose(_) => 0,
+            Echo::At { .. } | Echo::Skip | Echo::Pose(_) | Echo::Mode { .. } => 0,
             Echo::Scan { scan, .. } => scan.ranges.len(),
         };
         let is_searching = self.estimators.as_ref().is_some_and(Estimators::is_searching);
@@ -444,6 +454,9 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
                 self.tally.distance += estimators.drive_to(from.between(to, measurement.time))?;
                 match &measurement.echo {
                     Echo::Pose(start) => estimators.navigator.set_pose(start)?,
+                    Echo::Mode { mode, state, deviation } => {
+                        estimators.adopt(*mode, *state, *deviation)?;
+                    }
                     echo if estimators.is_searching() => {
                         sweep(estimators, echo, &self.robot.localizer.sonar);
                     }
@@ -502,7 +515,9 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
                 why: UNKNOWN,
             }),
             Echo::Scan { .. } => localizer.aim(),
-            Echo::Skip | Echo::Pose(_) => Err(localizer.aim().err().unwrap_or(NoAim::NoWall)),
+            Echo::Skip | Echo::Pose(_) | Echo::Mode { .. } => {
+                Err(localizer.aim().err().unwrap_or(NoAim::NoWall))
+            }
         };
         let before = localizer.health().verdict;
         let aim = match aim {
@@ -519,7 +534,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         };
         measurement.range = match &pending.echo {
             Echo::At { range, .. } => *range,
-            Echo::Skip | Echo::Pose(_) => None,
+            Echo::Skip | Echo::Pose(_) | Echo::Mode { .. } => None,
             Echo::Scan { scan, .. } => scan.earliest(&cone(aim.bearing, sonar)),
         };
         #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
@@ -566,7 +581,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
 impl Pending {
     fn beams(&self) -> usize {
         match &self.echo {
-            Echo::At { .. } | Echo::Skip | Echo::Pose(_) => 0,
+            Echo::At { .. } | Echo::Skip | Echo::Pose(_) | Echo::Mode { .. } => 0,
             Echo::Scan { scan, .. } => scan.ranges.len(),
         }
     }
@@ -587,7 +602,7 @@ fn sweep(estimators: &mut Estimators, echo: &Echo, sonar: &Sonar) {
                 estimators.swept(bearing, range.map(|[range]| Metres(range)));
             }
         }
-        Echo::Skip | Echo::Pose(_) => {}
+        Echo::Skip | Echo::Pose(_) | Echo::Mode { .. } => {}
     }
 }
 

@@ -14,17 +14,20 @@ further recordings in the folder: a LEGO folder (`*_motors.txt`, `*_scan.txt`), 
 it, a log of [formats.md](formats.md#logs) with `NAME_reference.csv` and the walls; packed (`.gz`) or not.
 
 Each recording is replayed through the shipped localizer with both policies. A scan gives one range per measurement cycle (0.8 s): the
-nearest return within the cone at the bearing that the localizer chooses, so a sonar is simulated by the scanner. Each robot has
+nearest return within the cone at the bearing that the localizer chooses, so a sonar is simulated by the scanner. A robot that is lost
+[searches](search.md#in-the-robots-loop) for its pose: it sweeps, takes the nearest return that is square to the beam or an edge, at most one
+each 120 ms and nine of a scan, and has the computing time of the STM32. Each robot has
 one robot file, which `sonarfix convert` writes with the source of each value; no value depends on a recording, except that a CARMEN log
 contains the place and the field of view of its scanner. The LEGO robot has three: wheels as fitted to the recording, as a ruler would
 measure them, and as its course states them (0.349 mm/tick, 150 mm).
 
 *Within*: share of the time with a position error of at most 0.5 m. *Wrong and tracking*: share of the time with a larger error and the verdict
 `Tracking`. *First loss*: distance and time until the error first exceeds 0.5 m or the verdict is `Lost`. *RMS by verdict*: at
-the rows of the reference, with the verdicts `Tracking`, `Degraded` and `Lost`.
+the rows of the reference, with the verdicts `Tracking`, `Degraded` and `Lost`. *Searches*: how often the search began, handed over a pose, and
+had it confirmed; the share of the time with an unknown pose.
 
-| recording | robot file | policy | length | within | wrong and tracking | RMS | median | RMS by verdict | first loss |
-|---|---|---|---|---|---|---|---|---|---|
+| recording | robot file | policy | length | within | wrong and tracking | RMS | median | RMS by verdict | first loss | searches |
+|---|---|---|---|---|---|---|---|---|---|---|
 ";
 
 /// The page.
@@ -37,7 +40,7 @@ pub fn markdown(findings: &Findings) -> String {
             Ok(summary) => writeln!(page, "{}", cells(row, summary)),
             Err(error) => writeln!(
                 page,
-                "| {} | {} | {} | not replayed: {} | | | | | | |",
+                "| {} | {} | {} | not replayed: {} | | | | | | | |",
                 row.recording,
                 row.robot,
                 row.policy,
@@ -76,8 +79,15 @@ fn cells(row: &Row, s: &Summary) -> String {
         || "never".to_owned(),
         |loss| format!("{:.0} m, {:.0} s", loss.distance, loss.time),
     );
+    let searches = s.search.map_or_else(
+        || "–".to_owned(),
+        |of| {
+            let share = 100.0 * of.searching_seconds / s.duration;
+            format!("{}, {}, {}; {share:.1} %", of.begun, of.handed_over, of.confirmed)
+        },
+    );
     format!(
-        "| {} | {} | {} | {:.0} m, {:.0} s | {:.1} % | {:.1} % | {} | {} | {} m | {loss} |",
+        "| {} | {} | {} | {:.0} m, {:.0} s | {:.1} % | {:.1} % | {} | {} | {} m | {loss} | {searches} |",
         row.recording,
         row.robot,
         row.policy,
