@@ -29,7 +29,7 @@
 //!   used. The uncertainty of a parked robot does not grow.
 //! - *Uncertain*: the deviation of the position in its worst direction exceeds
 //!   [`max_position_deviation`](GatingParameters::max_position_deviation), or that of the heading a
-//!   quarter of the cone. At four times these limits 8 pings without an accepted range are enough for `Lost`.
+//!   quarter of the cone.
 //!
 //! Whatever the outcomes, the verdict is not `Tracking` after [`DEGRADED_WITHOUT_FIX`] without a used
 //! range or [`DEGRADED_WITHOUT_ODOMETRY`] without odometry, and `Lost` after
@@ -75,10 +75,6 @@ const MAX_CONFIRMABLE_INFLATIONS: u16 = 3;
 /// Pings in a row without an accepted range after which the verdict is [`Verdict::Lost`], if the
 /// uncertainty of the pose exceeds its limits.
 const LOST_AFTER_UNUSED: u16 = 30;
-
-/// Uncertainty, in units of its limits, at which [`DEGRADED_AFTER_UNUSED`] pings without an accepted range are
-/// enough for [`Verdict::Lost`]: a heading as uncertain as the cone leaves no wall that is likely to answer.
-const HOPELESS: f32 = 4.0;
 
 /// Pings in a row without an accepted range, for whatever reason: the estimate then depends on the encoders.
 const DEGRADED_AFTER_UNUSED: u16 = 8;
@@ -299,11 +295,6 @@ impl Health {
         self.position_deviation > limits.position || self.heading_deviation > limits.heading
     }
 
-    fn is_hopeless(&self, limits: &Limits) -> bool {
-        self.position_deviation.0 > HOPELESS * limits.position.0
-            || self.heading_deviation.0 > HOPELESS * limits.heading.0
-    }
-
     fn can_improve(&self, limits: &Limits) -> bool {
         let agrees = self.evidence < BETTER_BELOW && self.accepted_in_a_row >= BETTER_AFTER;
         let is_confirmable = self.inflations <= MAX_CONFIRMABLE_INFLATIONS;
@@ -333,8 +324,7 @@ impl Health {
     fn worsen(&mut self, limits: &Limits) {
         let unused = self.silent_in_a_row.saturating_add(self.gated_in_a_row);
         let is_unaided = unused >= DEGRADED_AFTER_UNUSED;
-        let is_blind = (unused >= LOST_AFTER_UNUSED && self.is_uncertain(limits))
-            || (unused >= DEGRADED_AFTER_UNUSED && self.is_hopeless(limits));
+        let is_blind = unused >= LOST_AFTER_UNUSED && self.is_uncertain(limits);
         if self.evidence >= LOST_AT || is_blind {
             self.verdict = Verdict::Lost;
         } else if self.verdict == Verdict::Tracking && (self.evidence >= DEGRADED_AT || is_unaided)

@@ -124,6 +124,12 @@ impl<'a> Viewpoint<'a> {
         Ok((ExpectedRange::from_sonar(wall, &self.position), on_wall * in_range))
     }
 
+    /// Whether the heading is known well enough to tell what is in a beam.
+    pub fn is_heading_known(&self) -> bool {
+        let limit = max_heading_deviation(self.sonar).0;
+        self.covariance.hh <= limit * limit
+    }
+
     /// Angle between a beam at `bearing` and the perpendicular of the expected wall.
     pub fn off_square(&self, expected: &ExpectedRange, bearing: Radians) -> Radians {
         expected.direction.from(self.heading.turned(bearing))
