@@ -13,7 +13,7 @@ use sonarfix_link::message::{CommandError, CommandResult, ImageStatus};
 use sonarfix_link::{Command, Telemetry, baked};
 
 use crate::flash::{SECTOR, SECTORS, SimFlash};
-use crate::rig::{Baked, Bench, config, loop_status, servo, start};
+use crate::rig::{Baked, Bench, config, loop_status, start};
 
 const DONE: CommandResult = CommandResult::Done;
 
@@ -477,7 +477,7 @@ fn all_devices_dead_is_noticed() {
     let mut bench = running(&baked);
     bench.wait(1_000);
     (bench.hardware.right.0, bench.hardware.left.0) = (None, None);
-    bench.hardware.servo = servo(false);
+    bench.servo_is_there.set(false);
     bench.hardware.ranger.is_there = false;
     bench.wait(3_500);
     assert_eq!(verdict(&bench), Verdict::Lost);
@@ -485,8 +485,7 @@ fn all_devices_dead_is_noticed() {
     assert_eq!(verdict(&bench), Verdict::Lost);
     assert!(!bench.poll().may_drive);
     // The devices work again.
-    (bench.hardware.right.0, bench.hardware.left.0) = (Some(0), Some(0));
-    (bench.hardware.servo, bench.hardware.ranger.is_there) = (servo(true), true);
+    bench.mend();
     assert_eq!(bench.order(&Command::Stop), DONE);
     assert_eq!(bench.order(&Command::SetPose(start())), DONE);
     assert_eq!(bench.order(&Command::Start), DONE);

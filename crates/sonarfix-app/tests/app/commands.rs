@@ -80,7 +80,9 @@ fn every_missing_device_is_counted_and_no_other() {
         bench.hardware.right.0 = has(0).then_some(7);
         bench.hardware.left.0 = has(1).then_some(7);
         bench.hardware.ranger.is_there = has(3);
-        bench.hardware.servo = servo(has(2));
+        bench.servo_is_there.set(has(2));
+        // A driver that has never set its channel.
+        bench.hardware.servo = servo(&bench.servo_is_there);
         bench.hardware.servo.configure(&config().servo_settings()).unwrap();
         let faults = loop_status(&bench.wait(2_500)).faults;
         let found = [faults.right.errors, faults.left.errors, faults.servo, faults.ranger];

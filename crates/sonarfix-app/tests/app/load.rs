@@ -2,11 +2,15 @@
 //! `SONARFIX_SECONDS=3600` makes the first three of them an hour long instead of a minute.
 
 use sonarfix::health::Verdict;
+use sonarfix::localizer::{Fix, Start};
+use sonarfix::pose::Pose;
+use sonarfix::units::Radians;
 use sonarfix_link::message::CommandResult;
-use sonarfix_link::{Command, Telemetry};
+use sonarfix_link::{Command, Ping, Telemetry};
 
 use crate::flash::{Random, SECTOR, SECTORS, SimFlash};
-use crate::rig::{Baked, Bench, config, loop_status, servo, start};
+use crate::rig::{Baked, Bench, config, loop_status, start};
+use crate::room::Truth;
 
 /// Bytes in a millisecond at 115,200 baud, rounded up.
 const BYTES: usize = 12;
@@ -16,8 +20,10 @@ fn seconds() -> u64 {
     text.map_or(60, |text| text.parse().expect("a whole number"))
 }
 
+/// A robot whose sonar hears the room, with a running loop.
 fn running(baked: &Baked) -> Bench<'_> {
     let mut bench = Bench::switched_on(baked, SimFlash::new());
+    bench.truth = Some(Truth::at(&start()));
     for command in [Command::SetPose(start()), Command::Start] {
         assert_eq!(bench.order(&command), CommandResult::Done);
     }
@@ -25,23 +31,49 @@ fn running(baked: &Baked) -> Bench<'_> {
     bench
 }
 
-/// Polls for so many seconds, each poll after `load`; every tick is on time.
-fn stays_on_time(bench: &mut Bench, mut load: impl FnMut(&mut Bench, u64)) -> Vec<Telemetry> {
-    let mut messages = Vec::new();
-    let mut ticks = 0;
+/// What a minute under load has shown.
+struct Minute {
+    /// The messages of its last second.
+    last: Vec<Telemetry>,
+    /// Accepted ranges.
+    accepted: usize,
+    /// The largest error of the position with the verdict `Tracking`, metres.
+    worst: f64,
+}
+
+/// Drives in circles of 40 cm for so many seconds, while the motors are enabled; each poll comes after `load`. Every tick is
+/// on time, nothing resets the robot, and with the verdict `Tracking` the position is right within 10 cm.
+fn stays_on_time(bench: &mut Bench, mut load: impl FnMut(&mut Bench, u64)) -> Minute {
+    let mut minute = Minute { last: Vec::new(), accepted: 0, worst: 0.0 };
+    let (mut ticks, mut may_drive) = (0, true);
     for second in 0..seconds() {
         for milli in 0..1_000 {
+            if may_drive {
+                bench.roll(1, i16::from(milli % 3 > 0));
+            }
             load(bench, milli);
             let polled = bench.poll();
             assert!(polled.is_running, "second {second}");
-            ticks += u64::from(polled.is_on_time);
+            (ticks, may_drive) = (ticks + u64::from(polled.is_on_time), polled.may_drive);
+            if bench.estimate().health.verdict == Verdict::Tracking {
+                minute.worst = minute.worst.max(bench.error());
+                assert!(minute.worst < 0.1, "{} m at {second}.{milli:03} s", minute.worst);
+            }
         }
-        messages = bench.received();
+        minute.last = bench.received();
+        let is_accepted = |message: &&Telemetry| {
+            matches!(message, Telemetry::Ping(Ping { fix: Fix::Accepted(_), .. }))
+        };
+        minute.accepted += minute.last.iter().filter(is_accepted).count();
     }
-    let status = loop_status(&messages);
-    assert_eq!((status.faults.deadlines, status.faults.clock), (0, 0), "{status:?}");
+    let status = bench.app.faults();
+    assert_eq!((status.deadlines, status.clock), (0, 0), "{status:?}");
     assert!(ticks.abs_diff(10 * seconds()) <= 1 + seconds() / 100, "{ticks} ticks");
-    messages
+    println!(
+        "{ticks} ticks, {} ranges accepted, at most {:.4} m off",
+        minute.accepted, minute.worst
+    );
+    minute
 }
 
 #[test]
@@ -49,37 +81,74 @@ fn garbage_at_the_rate_of_the_line_costs_no_deadline() {
     let baked = Baked::new(&config());
     let mut bench = running(&baked);
     let mut random = Random::new(1);
-    let messages = stays_on_time(&mut bench, |bench, _| {
+    let minute = stays_on_time(&mut bench, |bench, _| {
         let garbage: [u8; BYTES] = std::array::from_fn(|_| random.next() as u8);
         bench.garble(&garbage);
     });
-    let counters = loop_status(&messages).commands;
+    let counters = loop_status(&minute.last).commands;
     assert!(u64::from(counters.skipped()) > 30 * seconds(), "{counters:?}");
+    assert!(minute.accepted as u64 >= seconds() * 9 / 10, "{} ranges", minute.accepted);
+    assert_eq!(bench.estimate().health.verdict, Verdict::Tracking);
     // The zero ends what is left of the garbage.
     bench.garble(&[0]);
     assert_eq!(bench.order(&Command::Stop), CommandResult::Done);
 }
 
-#[test]
-fn commands_at_the_rate_of_the_line_cost_no_deadline() {
+/// The true pose, as a person would measure it.
+fn measured(bench: &Bench) -> Start {
+    let Truth { x, y, heading } = bench.truth.expect("the robot is in the room");
+    Start { pose: Pose::new(x as f32, y as f32, Radians(heading as f32)), ..start() }
+}
+
+/// As many commands as a line has room for: a pose takes 40 bytes, a query 14. A new pose aborts the ping in flight;
+/// once in `period` milliseconds it leaves time for pings, every 12 ms it does not.
+fn flood(period: u64) -> Minute {
     let baked = Baked::new(&config());
     let mut bench = running(&baked);
     let mut sent = 0;
-    stays_on_time(&mut bench, |bench, milli| {
+    let minute = stays_on_time(&mut bench, |bench, milli| {
         sent += 1;
         // Before its sequence numbers are used up.
         if sent % 100_000 == 0 {
             bench.open_session();
         }
         match milli % 12 {
-            // As many bytes as a minute of line time holds: a pose takes 40, a query 14.
-            0 => bench.send(&Command::SetPose(start())),
-            4 | 6 | 8 => bench.send(&Command::MapChecksum),
+            0 if sent % period < 12 => bench.send(&Command::SetPose(measured(bench))),
+            0 | 4 | 6 | 8 => bench.send(&Command::MapChecksum),
             10 => bench.send(&Command::Start),
             _ => {}
         }
     });
     assert_eq!(bench.estimate().health.verdict, Verdict::Tracking);
+    minute
+}
+
+#[test]
+fn commands_at_the_rate_of_the_line_cost_no_deadline() {
+    flood(12);
+    let accepted = flood(5_000).accepted;
+    assert!(accepted as u64 >= seconds() / 2, "{accepted} ranges");
+}
+
+/// The link is unplugged in the middle of a frame and plugged again, every 5 s.
+#[test]
+fn an_unplugged_link_costs_no_deadline() {
+    let baked = Baked::new(&config());
+    let mut bench = running(&baked);
+    let mut polls = 0_u64;
+    let minute = stays_on_time(&mut bench, |bench, _| {
+        polls += 1;
+        bench.line.is_unplugged = polls % 10_000 >= 5_000;
+        if polls % 5_000 == 4_995 {
+            bench.send(&Command::MapChecksum);
+        }
+    });
+    bench.line.is_unplugged = false;
+    // Half of them are not heard of.
+    assert!(minute.accepted as u64 >= seconds() * 4 / 10, "{} ranges", minute.accepted);
+    assert_eq!(bench.estimate().health.verdict, Verdict::Tracking);
+    bench.wait(1_100);
+    assert_eq!(bench.order(&Command::Stop), CommandResult::Done);
 }
 
 /// Each device dead for 5 s, and all together, again and again: no deadline is missed, the verdict is never `Tracking` for
@@ -90,23 +159,26 @@ fn dead_devices_cost_no_deadline() {
     let mut bench = running(&baked);
     let mut polls = 0_u64;
     let mut blind = 0_u64;
-    stays_on_time(&mut bench, |bench, _| {
-        let (device, phase) = ((polls / 10_000) % 5, polls % 10_000);
-        let is_dead = |which| phase >= 5_000 && (device == which || device == 4);
-        bench.hardware.right.0 = (!is_dead(0)).then_some(7);
-        bench.hardware.left.0 = (!is_dead(1)).then_some(7);
-        if phase % 5_000 == 0 {
-            bench.hardware.servo = servo(!is_dead(2));
-        }
+    let mut recovered = 0_u64;
+    let minute = stays_on_time(&mut bench, |bench, _| {
+        let (device, phase) = ((polls / 20_000) % 5, polls % 20_000);
+        let is_dead = |which| phase >= 15_000 && (device == which || device == 4);
+        let [right, left] = bench.counted;
+        bench.hardware.right.0 = (!is_dead(0)).then_some(right);
+        bench.hardware.left.0 = (!is_dead(1)).then_some(left);
+        bench.servo_is_there.set(!is_dead(2));
         bench.hardware.ranger.is_there = !is_dead(3);
         blind = if is_dead(0) || is_dead(1) { blind + 1 } else { 0 };
         if blind > 700 {
             assert_ne!(bench.estimate().health.verdict, Verdict::Tracking, "poll {polls}");
-        } else if phase == 0 {
-            bench.send(&Command::SetPose(start()));
+        } else if phase == 14_999 {
+            // Healthy for 15 s.
+            recovered += u64::from(bench.estimate().health.verdict == Verdict::Tracking);
         }
         polls += 1;
     });
+    assert_eq!(recovered, seconds() / 20);
+    assert!(minute.accepted as u64 >= seconds() / 2, "{} ranges", minute.accepted);
 }
 
 /// The wear that `docs/firmware.md` computes with: at most one write a minute, and eight more.

@@ -15,5 +15,6 @@ mod power_cut;
 mod random;
 mod rig;
 mod robot_file;
+mod room;
 mod save_policy;
 mod search;

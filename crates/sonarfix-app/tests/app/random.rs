@@ -5,6 +5,7 @@
 //! runs a million; without the variable it is four thousand. A failure names the seed of its sequence,
 //! which `SONARFIX_SEED` runs alone.
 
+use sonarfix::config::PingSchedule;
 use sonarfix::health::Verdict;
 use sonarfix::localizer::Start;
 use sonarfix::pose::Pose;
@@ -15,7 +16,8 @@ use sonarfix_link::message::CommandResult;
 
 use crate::attacks::is_within_prior;
 use crate::flash::{Random, SimFlash};
-use crate::rig::{Baked, Bench, config, servo, start};
+use crate::rig::{Baked, Bench, config, start};
+use crate::room::Truth;
 
 /// Sequences without the variable.
 const SEQUENCES: u64 = 4_000;
@@ -79,29 +81,22 @@ fn any_command(random: &mut Random) -> Command {
 
 /// Lets time pass in uneven steps, while the wheels roll or not.
 fn pass(bench: &mut Bench, random: &mut Random) {
-    let rolls = random.below(3) as u16;
+    let rolls = random.below(3) as i16;
     for _ in 0..random.below(60) {
         bench.now += 1_000 * random.below(12) as u64;
-        for wheel in [&mut bench.hardware.right.0, &mut bench.hardware.left.0] {
-            *wheel = wheel.map(|count| count.wrapping_add(rolls));
-        }
+        bench.roll(rolls, rolls);
         let _ = bench.poll();
     }
 }
 
 fn break_devices(bench: &mut Bench, random: &mut Random) {
     let mut is_there = || random.below(3) > 0;
-    bench.hardware.right.0 = is_there().then_some(7);
-    bench.hardware.left.0 = is_there().then_some(7);
+    let [right, left] = bench.counted;
+    bench.hardware.right.0 = is_there().then_some(right);
+    bench.hardware.left.0 = is_there().then_some(left);
     bench.hardware.ranger.is_there = is_there();
     let servo_is_there = is_there();
-    bench.hardware.servo = servo(servo_is_there);
-}
-
-fn mend_devices(bench: &mut Bench) {
-    (bench.hardware.right.0, bench.hardware.left.0) = (Some(0), Some(0));
-    bench.hardware.ranger.is_there = true;
-    bench.hardware.servo = servo(true);
+    bench.servo_is_there.set(servo_is_there);
 }
 
 /// A power cycle, perhaps during a write.
@@ -148,7 +143,7 @@ fn sequence(baked: &Baked, seed: u64) {
             assert!(is_within_prior(&deviation, &prior), "seed {seed}: {deviation:?}");
         }
     }
-    mend_devices(&mut bench);
+    bench.mend();
     bench.drain();
     if random.below(2) == 0 {
         bench = cycle(bench, baked, &mut random);
@@ -156,14 +151,48 @@ fn sequence(baked: &Baked, seed: u64) {
     } else {
         let _ = bench.order(&Command::Stop);
     }
+    bench.truth = Some(Truth::at(&start()));
     for command in [Command::SetPose(start()), Command::Start] {
         assert_eq!(bench.order(&command), CommandResult::Done, "seed {seed}: {command:?}");
     }
     let on_time = (0..600).filter(|_| bench.poll().is_on_time).count();
     assert!(on_time >= 1, "seed {seed}: no tick");
-    let health = bench.estimate().health;
-    assert_eq!(health.verdict, Verdict::Tracking, "seed {seed}: {health:?}");
+    assert_eq!(bench.estimate().health.verdict, Verdict::Tracking, "seed {seed}");
     assert!(bench.poll().may_drive, "seed {seed}");
+    // Its configuration may be that of a robot with other wheels.
+    for command in [Command::SetConfiguration(tracking()), Command::SetPose(start())] {
+        assert_eq!(bench.order(&command), CommandResult::Done, "seed {seed}: {command:?}");
+    }
+    tracks(&mut bench, seed);
+}
+
+/// The configuration of the robot in the room, which pings as fast as it can.
+fn tracking() -> RobotConfig {
+    let mut config = config();
+    config.localizer.sonar.timing.schedule = PingSchedule::AsFastAsPossible;
+    config
+}
+
+/// Drives a curve of half a metre in 3 s with a poll each 5 ms: the estimate follows, with ranges, and all deviations are
+/// within their priors.
+fn tracks(bench: &mut Bench, seed: u64) {
+    let (mut ticks, mut most) = (0, 0);
+    for poll in 0..600 {
+        bench.now += 4_000;
+        bench.roll(4, 4 + i16::from(poll % 5 == 0));
+        let polled = bench.poll();
+        ticks += u32::from(polled.is_on_time);
+        assert!(polled.may_drive, "seed {seed}, poll {poll}");
+        most = most.max(bench.estimate().health.accepted_in_a_row);
+    }
+    let localizer = bench.app.localizer().expect("it runs");
+    let (health, filter) = (localizer.health(), localizer.filter());
+    assert!(ticks >= 5 && most >= 2, "seed {seed}: {ticks} ticks, {most} ranges");
+    assert_eq!(health.verdict, Verdict::Tracking, "seed {seed}: {health:?}");
+    let (error, deviation) = (bench.error(), filter.standard_deviations());
+    assert!(error < 0.05, "seed {seed}: {error} m, {deviation:?}");
+    let prior = localizer.config().prior;
+    assert!(is_within_prior(&deviation, &prior), "seed {seed}: {deviation:?}");
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! A simulated robot: an app on devices that the test controls, with a PC at its link.
 
+use std::cell::Cell;
 use std::collections::VecDeque;
+use std::rc::Rc;
 
 use embedded_hal::pwm;
 use sonarfix::config::{Config, ServoTiming};
@@ -13,7 +15,7 @@ use sonarfix_app::{App, Board, FlashContents, Link, Polled};
 use sonarfix_hal::config::{RobotConfig, WheelConfig};
 use sonarfix_hal::encoder::Counter;
 use sonarfix_hal::ranger::{
-    NoEcho, Outcome, Ranger, RangerKind, RangerSettings, TriggerError, UnsupportedKind,
+    Echo, NoEcho, Outcome, Ranger, RangerKind, RangerSettings, TriggerError, UnsupportedKind,
 };
 use sonarfix_hal::robot::Devices;
 use sonarfix_hal::servo::{PwmFrame, Servo};
@@ -21,6 +23,10 @@ use sonarfix_link::message::{CommandResult, Estimate, LoopStatus, ResetCause};
 use sonarfix_link::{Command, Receiver, Sender, SessionCommand, Telemetry, baked, frame};
 
 use crate::flash::{SECTOR, SECTORS, SimFlash};
+use crate::room::Truth;
+
+/// At 20 °C, m/s.
+const SPEED_OF_SOUND: f32 = 343.2;
 
 /// The error of a device that is missing.
 #[derive(Debug, Clone, Copy)]
@@ -46,7 +52,7 @@ impl Counter for Encoder {
 
 /// A servo's PWM channel, present or missing, and its last duty.
 pub struct Pwm {
-    pub is_there: bool,
+    is_there: Rc<Cell<bool>>,
     pub duty: u16,
 }
 
@@ -61,14 +67,22 @@ impl pwm::SetDutyCycle for Pwm {
 
     fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Missing> {
         self.duty = duty;
-        if self.is_there { Ok(()) } else { Err(Missing) }
+        if self.is_there.get() { Ok(()) } else { Err(Missing) }
     }
 }
 
-/// A ranger without echoes, or a missing one.
+/// A ranger in a room or without echoes, or a missing one.
 pub struct Sonar {
     pub is_there: bool,
-    is_pinging: bool,
+    /// The echo that a ping would have; none without a room.
+    echo: Option<Metres>,
+    /// The ping in flight.
+    ping: Option<Ping>,
+}
+
+struct Ping {
+    sent: Instant,
+    echo: Option<Metres>,
 }
 
 impl Ranger for Sonar {
@@ -78,14 +92,21 @@ impl Ranger for Sonar {
         Instant::from_ticks(0)
     }
 
-    fn trigger(&mut self, _now: Instant) -> Result<(), TriggerError<Missing>> {
-        self.is_pinging = true;
+    fn trigger(&mut self, now: Instant) -> Result<(), TriggerError<Missing>> {
+        self.ping = Some(Ping { sent: now, echo: self.echo });
         Ok(())
     }
 
-    fn poll(&mut self, _now: Instant) -> Result<Option<Outcome>, Missing> {
+    fn poll(&mut self, now: Instant) -> Result<Option<Outcome>, Missing> {
+        let Some(Ping { sent, echo }) = self.ping.take() else { return Ok(None) };
         let silence = if self.is_there { NoEcho::Nothing } else { NoEcho::NoResponse };
-        Ok(std::mem::take(&mut self.is_pinging).then_some(Err(silence)))
+        let Some(range) = echo.filter(|_| self.is_there) else { return Ok(Some(Err(silence))) };
+        let heard = sent + Duration::from_ticks((2e6 * range.0 / SPEED_OF_SOUND) as u64);
+        if now < heard {
+            self.ping = Some(Ping { sent, echo });
+            return Ok(None);
+        }
+        Ok(Some(Ok(Echo { sent, heard, range })))
     }
 
     /// The same check as the driver of a pulse ranger.
@@ -100,6 +121,7 @@ type Hardware = Devices<Encoder, Encoder, Pwm, Sonar>;
 /// The link, with its bytes counted.
 #[derive(Default)]
 pub struct Line {
+    pub is_unplugged: bool,
     to_robot: VecDeque<u8>,
     from_robot: Vec<u8>,
     pub sent: usize,
@@ -107,10 +129,14 @@ pub struct Line {
 
 impl Link for Line {
     fn receive(&mut self) -> Option<u8> {
-        self.to_robot.pop_front()
+        let byte = self.to_robot.pop_front();
+        byte.filter(|_| !self.is_unplugged)
     }
 
     fn send(&mut self, frame: &[u8]) {
+        if self.is_unplugged {
+            return;
+        }
         self.sent += frame.len();
         self.from_robot.extend(frame);
     }
@@ -149,10 +175,10 @@ pub fn config() -> RobotConfig {
 }
 
 /// A PWM channel with a frame of 20 ms, which makes pulses of 400 to 2,600 µs.
-pub fn servo(is_there: bool) -> Servo<Pwm> {
+pub fn servo(is_there: &Rc<Cell<bool>>) -> Servo<Pwm> {
     let micros = Duration::from_ticks;
     let frame = PwmFrame { period: micros(20_000), shortest: micros(400), longest: micros(2_600) };
-    Servo::new(Pwm { is_there, duty: 0 }, frame)
+    Servo::new(Pwm { is_there: Rc::clone(is_there), duty: 0 }, frame)
 }
 
 /// A start pose with small deviations.
@@ -170,6 +196,12 @@ pub struct Bench<'m> {
     pub hardware: Hardware,
     pub line: Line,
     pub now: u64,
+    /// Where the robot is, if its sonar hears the room.
+    pub truth: Option<Truth>,
+    /// Whether the servo can be commanded.
+    pub servo_is_there: Rc<Cell<bool>>,
+    /// Edges of the right and the left encoder, which go on while it is dead.
+    pub counted: [u16; 2],
     /// The result of its first poll.
     pub first: Polled,
     receiver: Receiver<Telemetry>,
@@ -189,15 +221,28 @@ impl<'m> Bench<'m> {
         let store = Store::new(flash, 0..(SECTOR * SECTORS) as u32).unwrap();
         let flash = FlashContents::read(&baked.map, &baked.config);
         let app = App::new(board, flash, store, Instant::from_ticks(0));
+        let servo_is_there = Rc::new(Cell::new(true));
         let hardware = Devices {
             right: Encoder(Some(0)),
             left: Encoder(Some(0)),
-            servo: servo(true),
-            ranger: Sonar { is_there: true, is_pinging: false },
+            servo: servo(&servo_is_there),
+            ranger: Sonar { is_there: true, echo: None, ping: None },
         };
         let (receiver, sender) = (Receiver::new(), Sender::starting_at(1));
         let (line, first) = (Line::default(), Polled::default());
-        let mut bench = Self { app, hardware, line, now: 0, first, receiver, sender, session: 0 };
+        let mut bench = Self {
+            app,
+            hardware,
+            line,
+            now: 0,
+            truth: None,
+            servo_is_there,
+            counted: [0; 2],
+            first,
+            receiver,
+            sender,
+            session: 0,
+        };
         bench.first = bench.poll();
         bench.open_session();
         bench
@@ -211,7 +256,41 @@ impl<'m> Bench<'m> {
     /// Polls the app, a millisecond after the last poll.
     pub fn poll(&mut self) -> Polled {
         self.now += 1_000;
+        if let Some(truth) = &self.truth {
+            let bearing = self.hardware.servo.target().unwrap_or(Radians(0.0));
+            let range = truth.range(bearing.0.into());
+            self.hardware.ranger.echo = range.map(|range| Metres(range as f32));
+        }
         self.app.poll(Instant::from_ticks(self.now), &mut self.hardware, &mut self.line)
+    }
+
+    /// Rolls both wheels, whose encoders count unless they are dead.
+    pub fn roll(&mut self, right: i16, left: i16) {
+        let count = |encoder: &mut Encoder, counted: &mut u16, edges: i16| {
+            *counted = counted.wrapping_add_signed(edges);
+            encoder.0 = encoder.0.and(Some(*counted));
+        };
+        let [counted_right, counted_left] = &mut self.counted;
+        count(&mut self.hardware.right, counted_right, right);
+        count(&mut self.hardware.left, counted_left, left);
+        if let Some(truth) = &mut self.truth {
+            truth.roll(right, left);
+        }
+    }
+
+    /// Makes encoders, servo and sonar work again; the encoders have gone on counting.
+    pub fn mend(&mut self) {
+        let [right, left] = self.counted;
+        (self.hardware.right.0, self.hardware.left.0) = (Some(right), Some(left));
+        self.servo_is_there.set(true);
+        self.hardware.ranger.is_there = true;
+    }
+
+    /// Distance of the estimated position from the true one, metres.
+    pub fn error(&self) -> f64 {
+        let truth = self.truth.expect("the robot is in the room");
+        let state = self.estimate().state;
+        (f64::from(state.x.0) - truth.x).hypot(f64::from(state.y.0) - truth.y)
     }
 
     /// Polls for a time, and returns the messages received.
