@@ -58,6 +58,47 @@ struct Tally {
     stack: u32,
 }
 
+/// Faults of every device in turn, then of all of them, within a minute of `classroom`.
+const DEAD_DEVICES: &str = r#"
+faults = [
+    { kind = "read_errors", wheel = "right", share = 1.0, from = "5 s", to = "8 s" },
+    { kind = "read_errors", wheel = "left", share = 1.0, from = "13 s", to = "16 s" },
+    { kind = "stuck_servo", from = "21 s", to = "24 s" },
+    { kind = "dead_sonar", from = "29 s", to = "32 s" },
+    { kind = "read_errors", wheel = "right", share = 1.0, from = "37 s", to = "41 s" },
+    { kind = "read_errors", wheel = "left", share = 1.0, from = "37 s", to = "41 s" },
+    { kind = "stuck_servo", from = "37 s", to = "41 s" },
+    { kind = "dead_sonar", from = "37 s", to = "41 s" },
+]
+"#;
+
+/// Runs the loop with fixes and telemetry under load: garbage and commands at the rate of the line, an unplugged link, dead
+/// devices.
+fn under_load() -> anyhow::Result<()> {
+    for load in ["garbage", "commands", "unplugged"] {
+        loaded(&format!("{CLASSROOM} --load {load}"))?;
+    }
+    let classroom = std::fs::read_to_string("crates/sonarfix-map/scenarios/classroom.toml")?;
+    let dead = "target/dead-devices.toml";
+    std::fs::write(
+        dead,
+        classroom.replacen("format = 1\n", &format!("format = 1\n{DEAD_DEVICES}"), 1),
+    )?;
+    for load in ["quiet", "garbage"] {
+        loaded(&format!("{dead} --seconds 60 --load {load}"))?;
+    }
+    Ok(())
+}
+
+/// Runs and prints a minute of the loop, in which no deadline may be missed.
+fn loaded(arguments: &str) -> anyhow::Result<()> {
+    let run = "run --quiet --release --bin sonarfix -- pil";
+    let text = cargo::printed(cargo::command(&format!("{run} {arguments}")))?;
+    println!("── sonarfix pil {arguments}\n{text}");
+    ensure!(text.contains("\n0 deadlines missed"), "a deadline was missed under load");
+    Ok(())
+}
+
 /// Runs the scenarios on every core, a short one over the UART, and the loop for the whole reference scenario on one
 /// core; prints the table of costs.
 pub fn check() -> anyhow::Result<()> {
@@ -67,6 +108,7 @@ pub fn check() -> anyhow::Result<()> {
     bake("tests/robots/coarse.toml", "target/coarse.bin")?;
     let robots = "--robot target/reference.bin --robot target/coarse.bin";
     sonarfix(&format!("{CLASSROOM} {robots}"))?;
+    under_load()?;
     // The shipped loop for the whole reference scenario: a million polls.
     sonarfix("paper --fidelity pins")?;
     let mut table = "| instructions, mean / worst".to_owned();

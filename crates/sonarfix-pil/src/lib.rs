@@ -16,6 +16,7 @@
 //! | [`message`] | requests and answers |
 //! | [`wires`] | the signals at the pins of the devices |
 //! | [`board`] | the drivers of a robot on those wires |
+//! | [`load`] | what arrives over the link |
 //! | [`session`] | executes requests: a localizer alone, or the shipped loop |
 //! | [`meter`] | counts the instructions and the stack of a call |
 //! | [`line`](mod@line) | frames of messages over a stream of bytes |
@@ -26,6 +27,7 @@
 
 pub mod board;
 pub mod line;
+pub mod load;
 pub mod message;
 pub mod meter;
 mod ram_flash;
@@ -34,6 +36,7 @@ pub mod session;
 pub mod wires;
 
 pub use line::{Line, LineError};
+pub use load::Load;
 pub use message::{Answer, Begin, Request, RequestError, SessionKind, Snapshot};
 pub use meter::{Meter, Unmetered};
 pub use serve::serve;

@@ -9,6 +9,7 @@ use sonarfix::motion::WheelTravel;
 use sonarfix::units::{Instant, Metres};
 use sonarfix_hal::config::RobotConfig;
 
+use crate::load::Load;
 use crate::wires::{Actuators, Sensors};
 
 /// A request.
@@ -42,6 +43,8 @@ pub struct Begin {
     pub config: RobotConfig,
     /// What the session runs.
     pub kind: SessionKind,
+    /// What arrives over the link of a loop.
+    pub load: Load,
 }
 
 /// What a session runs.

@@ -13,6 +13,7 @@ use sonarfix_link::message::ResetCause;
 use sonarfix_link::{Command, CommandResult, Sender, SessionCommand, baked, frame};
 
 use crate::board::{self, WiredDevices};
+use crate::load::{Load, Traffic};
 use crate::message::{Answer, Begin, Request, RequestError, SessionKind, Snapshot};
 use crate::meter::Meter;
 use crate::ram_flash::{CAPACITY, RamFlash};
@@ -37,6 +38,7 @@ pub struct LoopSession<'m> {
     app: App<'m, RamFlash>,
     wires: &'m Wires,
     devices: WiredDevices<'m>,
+    traffic: Traffic,
 }
 
 impl<'m> Session<'m> {
@@ -155,7 +157,7 @@ impl<'m> LoopSession<'m> {
         image: &'m [u8],
         wires: &'m Wires,
     ) -> Result<(Self, Actuators), RequestError> {
-        let Begin { at, start, config, .. } = *begin;
+        let Begin { at, start, config, load, .. } = *begin;
         config.check().map_err(|_| RequestError::Start)?;
         let devices = board::devices(&config, wires).map_err(|_| RequestError::Board)?;
         let board = Board { firmware: [0; 3], reset: ResetCause::PowerOn, resets: 0 };
@@ -166,7 +168,7 @@ impl<'m> LoopSession<'m> {
         let region = 0..u32::try_from(CAPACITY).unwrap_or(0);
         let store = Store::new(RamFlash::default(), region).map_err(|_| RequestError::Board)?;
         let app = App::new(board, flash, store, at);
-        let mut robot = Self { app, wires, devices };
+        let mut robot = Self { app, wires, devices, traffic: Traffic::new(load, 0, 0) };
         let open = SessionCommand { session: 0, command: Command::OpenSession };
         let CommandResult::Session(session) = robot.send(at, 0, &open)? else {
             return Err(RequestError::Start);
@@ -174,6 +176,7 @@ impl<'m> LoopSession<'m> {
         let set_pose = start.map(Command::SetPose);
         for (sequence, command) in (1..).zip(set_pose.into_iter().chain([Command::Start])) {
             let _ = robot.send(at, sequence, &SessionCommand { session, command })?;
+            robot.traffic = Traffic::new(load, session, sequence);
         }
         Ok((robot, wires.take()))
     }
@@ -197,15 +200,22 @@ impl<'m> LoopSession<'m> {
 
     fn poll(&mut self, sensors: &Sensors, meter: &mut impl Meter) -> (Answer, u32) {
         self.wires.apply(sensors);
-        let mut link = LinkBuffer::new(&[]);
-        let Self { app, devices, .. } = self;
+        let Self { app, devices, traffic, .. } = self;
+        let is_unplugged = traffic.load == Load::Unplugged;
+        let mut link = LinkBuffer::new(traffic.next(app.localizer()));
+        let mut answered = None;
         let cost = meter.measure(|| {
-            // What it did outside the loop is visible in the telemetry.
-            let _ = app.poll(sensors.at, devices, &mut link);
+            // What else it did outside the loop is visible in the telemetry.
+            answered = app.poll(sensors.at, devices, &mut link).answered;
         });
+        if is_unplugged {
+            link.length = 0;
+        }
+        let telemetry = image::checksum(link.sent());
+        self.traffic.answered(answered);
         let is_active = self.app.report().is_some_and(|report| !report.is_empty());
         let snapshot = self.app.localizer().filter(|_| is_active).map(Snapshot::of);
-        let (actuators, telemetry) = (self.wires.take(), image::checksum(link.sent()));
+        let actuators = self.wires.take();
         (Answer::Polled { actuators, snapshot, telemetry }, cost)
     }
 }

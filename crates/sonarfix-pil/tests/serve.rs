@@ -16,8 +16,8 @@ use sonarfix_hal::config::RobotConfig;
 use sonarfix_hal::ranger::RangerKind;
 use sonarfix_pil::Unmetered;
 use sonarfix_pil::{
-    Answer, Begin, Counted, Line, LineError, Request, RequestError, Sensors, SessionKind, line,
-    serve,
+    Answer, Begin, Counted, Line, LineError, Load, Request, RequestError, Sensors, SessionKind,
+    line, serve,
 };
 
 /// A stream that delivers prepared bytes, then ends.
@@ -70,6 +70,7 @@ fn begin(kind: SessionKind) -> Begin {
         }),
         config: config(),
         kind,
+        load: Load::Quiet,
     }
 }
 

@@ -4,12 +4,12 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use sonarfix_map::Scenario;
-use sonarfix_pil_host::Emulated;
 use sonarfix_pil_host::golden;
 use sonarfix_pil_host::machine::{Carrier, Machine};
 use sonarfix_pil_host::pair::Pair;
 use sonarfix_pil_host::progress::Progress;
 use sonarfix_pil_host::tally::Tally;
+use sonarfix_pil_host::{Emulated, Load};
 use sonarfix_sim::simulate::Simulation;
 
 use crate::overrides::Overrides;
@@ -37,6 +37,9 @@ pub struct Args {
     /// Seed of the run; by default that of the scenario.
     #[arg(long)]
     seed: Option<u64>,
+    /// What arrives over the robot's link, at the fidelity `pins`: bytes at the rate of 115,200 baud.
+    #[arg(long, value_enum, default_value_t = Traffic::Quiet)]
+    load: Traffic,
     /// Writes a golden trace here.
     #[arg(long, value_name = "FILE.golden")]
     record: Option<PathBuf>,
@@ -45,6 +48,30 @@ pub struct Args {
     json: bool,
     #[command(flatten)]
     overrides: Overrides,
+}
+
+/// A load on the link.
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum Traffic {
+    /// Nothing arrives.
+    Quiet,
+    /// Random bytes.
+    Garbage,
+    /// Valid commands.
+    Commands,
+    /// Nothing arrives, and telemetry is lost.
+    Unplugged,
+}
+
+impl From<Traffic> for Load {
+    fn from(traffic: Traffic) -> Self {
+        match traffic {
+            Traffic::Quiet => Self::Quiet,
+            Traffic::Garbage => Self::Garbage,
+            Traffic::Commands => Self::Commands,
+            Traffic::Unplugged => Self::Unplugged,
+        }
+    }
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
@@ -100,7 +127,7 @@ fn run(
     let simulation = prepared(args, scenario);
     let seconds = simulation.seconds();
     let before = pair.requests();
-    let mut computer = Emulated::new(&simulation, pair)?;
+    let mut computer = Emulated::new(&simulation, pair)?.under(args.load.into());
     let result = simulation.run_on(&mut computer, seed, &mut ())?;
     pair.end()?;
     if args.json {
@@ -112,6 +139,13 @@ fn run(
     println!(
         "{} ranges accepted, {} gated, {} refused",
         fixes.accepted, fixes.gated, fixes.refused
+    );
+    let (faults, integrity) = (&result.faults, &result.integrity);
+    println!(
+        "{} deadlines missed; outside of the ellipse and Tracking for at most {:.1} s, blind and Tracking for at most {:.1} s",
+        faults.deadlines,
+        integrity.longest_undetected(),
+        integrity.longest_blind()
     );
     Ok(())
 }

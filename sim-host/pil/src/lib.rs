@@ -36,6 +36,7 @@ use self::pair::Pair;
 
 pub use error::PilError;
 pub use exchange::Exchange;
+pub use sonarfix_pil::Load;
 use sonarfix_sim::simulate::computer::{Computer, Controller, LocalizerInputs};
 use sonarfix_sim::simulate::{Simulation, SimulationError};
 
@@ -48,6 +49,7 @@ pub struct Emulated<'s> {
     simulation: &'s Simulation,
     map: Vec<u8>,
     pair: &'s mut Pair,
+    load: Load,
 }
 
 impl<'s> Emulated<'s> {
@@ -57,7 +59,13 @@ impl<'s> Emulated<'s> {
     /// [`PilError::Map`], if its walls cannot be baked.
     pub fn new(simulation: &'s Simulation, pair: &'s mut Pair) -> Result<Self, PilError> {
         let map = simulation.baked_map().map_err(PilError::Map)?;
-        Ok(Self { simulation, map, pair })
+        Ok(Self { simulation, map, pair, load: Load::Quiet })
+    }
+
+    /// The same with this load on the link.
+    #[must_use]
+    pub fn under(self, load: Load) -> Self {
+        Self { load, ..self }
     }
 }
 
@@ -77,7 +85,7 @@ impl Computer for Emulated<'_> {
         at: Instant,
     ) -> Result<ComparedDevice<'_>, SimulationError> {
         let (start, config) = (Some(start), self.simulation.robot());
-        let begin = Begin { at, start, config, kind: SessionKind::Localizer };
+        let begin = Begin { at, start, config, kind: SessionKind::Localizer, load: self.load };
         let session = self.pair.begin_localizer(&begin, &self.map)?;
         Ok(ComparedDevice { session, pair: self.pair, polled: at })
     }
@@ -88,7 +96,8 @@ impl Computer for Emulated<'_> {
         start: Option<Start>,
         at: Instant,
     ) -> Result<(ComparedDevice<'w>, Actuators), SimulationError> {
-        let begin = Begin { at, start, config: self.simulation.robot(), kind: SessionKind::Loop };
+        let (config, load) = (self.simulation.robot(), self.load);
+        let begin = Begin { at, start, config, kind: SessionKind::Loop, load };
         let (session, actuators) = self.pair.begin_loop(&begin, &self.map, wires)?;
         Ok((ComparedDevice { session, pair: self.pair, polled: at }, actuators))
     }
