@@ -16,6 +16,7 @@ use std::process::{Child, Command as Process, Stdio};
 use std::time::{Duration, Instant};
 
 use sonarfix::config::{Config, ServoTiming};
+use sonarfix::health::Verdict;
 use sonarfix::localizer::Start;
 use sonarfix::map::Wall;
 use sonarfix::pose::{Point, Pose};
@@ -47,6 +48,8 @@ struct Robot {
     receiver: Receiver<Telemetry>,
     sender: Sender<SessionCommand>,
     session: u32,
+    /// Bytes for which the line had no room.
+    unsent: Vec<u8>,
     /// Messages received and not yet processed, oldest first.
     pending: VecDeque<Telemetry>,
     since: Instant,
@@ -92,6 +95,7 @@ impl Robot {
             receiver: Receiver::new(),
             sender: Sender::starting_at(100),
             session: 0,
+            unsent: Vec::new(),
             pending: VecDeque::new(),
             since: Instant::now(),
             files,
@@ -261,6 +265,18 @@ impl Robot {
 
     fn send(&mut self, bytes: &[u8]) {
         self.line.write_all(bytes).unwrap();
+    }
+
+    /// Sends as much of these bytes as the line has room for, after what is left of the last ones. It never waits: the emulator
+    /// may be waiting for this end to read.
+    fn offer(&mut self, bytes: impl FnOnce(&Self) -> Vec<u8>) {
+        if self.unsent.is_empty() {
+            self.unsent = bytes(self);
+        }
+        self.line.set_nonblocking(true).unwrap();
+        let sent = self.line.write(&self.unsent).unwrap_or(0);
+        self.line.set_nonblocking(false).unwrap();
+        self.unsent.drain(..sent);
     }
 }
 
@@ -487,6 +503,102 @@ fn garbage_is_counted_and_later_commands_are_executed_once() {
     robot.wait_for(began);
     assert_eq!(robot.answer_to(210), CommandResult::Done);
     assert!(robot.loop_status().running);
+}
+
+/// Bytes in 100 ms at 115,200 baud.
+const LINE_RATE: usize = 1_152;
+
+/// Runs the loop for a minute by the robot's clock. With each sample of the encoders, every 100 ms, `load` arrives. Nothing
+/// is late, the robot is not reset, and, because its encoders cannot be read here, it is not `Tracking` after 0.7 s.
+fn a_minute_under(robot: &mut Robot, mut load: impl FnMut(&Robot) -> Vec<u8>) -> LoopStatus {
+    assert_eq!(robot.order(&Command::SetPose(pose())), CommandResult::Done);
+    assert_eq!(robot.order(&Command::Start), CommandResult::Done);
+    let first = robot.loop_status();
+    let (mut ticks, mut blind) = (0, 0);
+    loop {
+        match robot.next() {
+            Telemetry::Estimate(estimate) => {
+                ticks += 1;
+                blind += 1;
+                let is_tracking = estimate.health.verdict == Verdict::Tracking;
+                assert!(blind < 7 || !is_tracking, "{blind} samples without odometry");
+                robot.offer(&mut load);
+            }
+            // The pose was set again.
+            Telemetry::PoseSet(_) => blind = 0,
+            Telemetry::LoopStatus(status) => {
+                assert!(status.running && status.faults.deadlines == 0, "{status:?}");
+                assert!(status.at > first.at, "the robot was reset: {status:?}");
+                if status.at > first.at + sonarfix::units::Duration::secs(60) {
+                    let worst = status.worst_poll.to_micros();
+                    println!("{ticks} ticks; worst poll {worst} µs; {:?}", status.commands);
+                    // Telemetry for which the line has no room is dropped.
+                    return status;
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+/// As much garbage as the line takes while the loop runs.
+#[test]
+#[ignore = "cargo xtask test-firmware"]
+fn a_minute_of_garbage_costs_no_deadline() {
+    let mut robot = Robot::switched_on(&map(), &config());
+    robot.hello();
+    let mut random = 1_u32;
+    let status = a_minute_under(&mut robot, |_| {
+        let mut byte = || {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (random >> 24) as u8
+        };
+        (0..LINE_RATE).map(|_| byte()).collect()
+    });
+    // Of the line rate the emulated UART accepts an eighth; `cargo xtask pil` loads the loop with all of it.
+    assert!(status.commands.skipped() > 60, "{:?}", status.commands);
+}
+
+/// As many valid commands as the line takes while the loop runs.
+#[test]
+#[ignore = "cargo xtask test-firmware"]
+fn a_minute_of_commands_costs_no_deadline() {
+    let mut robot = Robot::switched_on(&map(), &config());
+    robot.hello();
+    let mut sequence = 1_000;
+    let before = robot.receiver.counters();
+    let status = a_minute_under(&mut robot, |robot| {
+        let mut bytes = Vec::new();
+        while bytes.len() < LINE_RATE - 60 {
+            sequence += 1;
+            let command = match sequence % 40 {
+                0 => Command::SetPose(pose()),
+                odd if odd % 2 == 1 => Command::Start,
+                _ => Command::MapChecksum,
+            };
+            bytes.extend(robot.frame(sequence, &command));
+        }
+        bytes
+    });
+    assert!(status.commands.frames > 1_000, "{:?}", status.commands);
+    assert_eq!(robot.receiver.counters().corrupt, before.corrupt);
+}
+
+/// Nobody reads the link for a while in the middle of a frame, then commands are executed again.
+#[test]
+#[ignore = "cargo xtask test-firmware"]
+fn half_a_frame_and_silence_cost_no_deadline() {
+    let mut robot = Robot::switched_on(&map(), &config());
+    robot.hello();
+    let mut samples = 0;
+    a_minute_under(&mut robot, |robot| {
+        samples += 1;
+        let frame = robot.frame(500, &Command::Stop);
+        if samples % 50 == 0 { frame[..frame.len() / 2].to_vec() } else { Vec::new() }
+    });
+    robot.send(&[0]);
+    robot.sender = Sender::starting_at(600);
+    assert_eq!(robot.order(&Command::Stop), CommandResult::Done);
 }
 
 /// After a fault the program clears the motor pin before it ends.

@@ -29,7 +29,7 @@ const SESSION: u16 = 60_000;
 
 /// The bytes that arrive from one poll to the next, a millisecond later.
 #[derive(Debug, Clone, Copy)]
-pub struct Traffic {
+pub(crate) struct Traffic {
     /// What arrives.
     pub load: Load,
     session: u32,
@@ -53,7 +53,7 @@ impl Traffic {
             Load::Quiet | Load::Unplugged => &[],
             Load::Garbage => self.garbage(),
             Load::Commands => match self.command(localizer) {
-                Some(command) => self.framed(command),
+                Some(command) => self.framed(&command),
                 None => &[],
             },
         }
@@ -90,12 +90,12 @@ impl Traffic {
         }
     }
 
-    fn framed(&mut self, command: Command) -> &[u8] {
-        self.sequence = match command {
+    fn framed(&mut self, command: &Command) -> &[u8] {
+        self.sequence = match *command {
             Command::OpenSession => 1,
             _ => self.sequence.saturating_add(1),
         };
-        let command = SessionCommand { session: self.session, command };
+        let command = SessionCommand { session: self.session, command: *command };
         Sender::starting_at(self.sequence).frame(&command, &mut self.frame)
     }
 

@@ -8,6 +8,8 @@ use sonarfix_hal::config::RobotConfig;
 use sonarfix_link::baked;
 use sonarfix_map::{robot_file, robot_text};
 
+use crate::output::check_file;
+
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(subcommand)]
@@ -39,6 +41,7 @@ enum What {
 pub fn execute(args: &Args) -> anyhow::Result<()> {
     match &args.what {
         What::Bake { robot, out } => {
+            check_file("--out", out)?;
             let config = robot_file::read(robot)?;
             let mut buffer = [0; baked::LENGTH_MAX];
             let bytes = baked::write(&config, &mut buffer)?;

@@ -9,6 +9,8 @@ use sonarfix_replay::convert::lego::{ENCODER_LAG, Lego, Nominal};
 use sonarfix_replay::convert::nxt::Nxt;
 use sonarfix_replay::convert::{ConvertError, Converted};
 
+use crate::output::check_folder;
+
 /// Maximum number of skipped or implausible lines that are printed.
 const SHOWN: u64 = 10;
 
@@ -95,6 +97,7 @@ fn convert(
     out: &Path,
     run: impl FnOnce(&mut dyn FnMut(String)) -> Result<Converted, ConvertError>,
 ) -> anyhow::Result<()> {
+    check_folder("--out", out)?;
     let mut reported = 0_u64;
     let converted = run(&mut |complaint| {
         reported += 1;

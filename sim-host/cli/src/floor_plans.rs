@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use sonarfix_studies::floor_plan::{FloorPlan, compare, page, picture};
 
+use crate::output::{check_file, check_folder};
 use crate::progress::Runs;
 
 #[derive(Debug, clap::Args)]
@@ -39,8 +40,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     anyhow::ensure!(args.plans > 0, "--plans must be at least 1");
     anyhow::ensure!(args.runs > 0, "--runs must be at least 1");
     if let Some(dir) = &args.images {
-        // Before the work: what cannot be written is not worth computing.
-        std::fs::create_dir_all(dir).with_context(|| format!("cannot make {}", dir.display()))?;
+        check_folder("--images", dir)?;
     }
     let runs = Runs::weighted(args.plans.saturating_mul(args.runs).saturating_mul(2), 2);
     let (results, errors) = compare::run(args.seed, args.plans, args.runs, &runs);
@@ -64,6 +64,11 @@ fn draw(seed: u64, args: &Args) -> anyhow::Result<()> {
     let both = [&args.out, &args.toml];
     let somewhere = both.iter().any(|file| file.is_some());
     anyhow::ensure!(somewhere, "--draw needs --out FILE.svg or --toml FILE.toml or both");
+    for (option, file) in ["--out", "--toml"].into_iter().zip(both) {
+        if let Some(file) = file {
+            check_file(option, file)?;
+        }
+    }
     let plan = FloorPlan::new(seed);
     if let Some(file) = &args.out {
         write(file, &picture::place(&plan.scenario()?).svg())?;

@@ -10,6 +10,8 @@ use sonarfix::map::Map;
 use sonarfix::units::Metres;
 use sonarfix_map::{Limits, MapFile, Severity, bake, robot_file, simplify, survey, symmetries};
 
+use crate::output::check_file;
+
 /// Maximum number of findings that are printed.
 const SHOWN: usize = 100;
 
@@ -75,6 +77,10 @@ enum Task {
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
+    if let Task::Bake { out, .. } | Task::Draw { out, .. } | Task::Simplify { out, .. } = &args.task
+    {
+        check_file("--out", out)?;
+    }
     match &args.task {
         Task::Check { from, robot } => check(&from.read()?, robot.as_deref()),
         Task::Bake { from, out } => write_image(&from.read()?, out),

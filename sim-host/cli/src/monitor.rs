@@ -12,6 +12,8 @@ use sonarfix_monitor::port::Port;
 use sonarfix_monitor::recording::Recording;
 use sonarfix_monitor::{Monitor, Received, view};
 
+use crate::output::check_file;
+
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
@@ -44,6 +46,9 @@ impl PortArgs {
 const EVERY: u64 = 1_000_000;
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
+    if let Some(file) = &args.record {
+        check_file("--record", file)?;
+    }
     let mut port = args.port.open()?;
     let mut recording = args.record.clone().map(Recording::new);
     let mut monitor = Monitor::default();

@@ -6,8 +6,12 @@
 //! - What cannot be written to standard error is dropped.
 
 use std::fmt::Arguments;
+use std::fs::OpenOptions;
 use std::io::{self, ErrorKind, Write};
+use std::path::Path;
 use std::process::exit;
+
+use anyhow::Context;
 
 /// As the standard library's, without panic.
 macro_rules! println {
@@ -46,6 +50,29 @@ pub fn report(text: Arguments) {
     for line in text.to_string().lines() {
         let _ = writeln!(error, "{}", shortened(line));
     }
+}
+
+/// Checks that a file can be written, before the work whose result it is to hold; its contents stay.
+///
+/// # Errors
+/// If it cannot be, with the option that names it.
+pub fn check_file(option: &str, file: &Path) -> anyhow::Result<()> {
+    let existed = file.exists();
+    let opened = OpenOptions::new().append(true).create(true).open(file);
+    opened.with_context(|| format!("{option}: cannot write {}", file.display()))?;
+    if !existed {
+        // What follows may fail, and should then not leave an empty file.
+        let _ = std::fs::remove_file(file);
+    }
+    Ok(())
+}
+
+/// Makes a folder, before the work whose results it is to hold.
+///
+/// # Errors
+/// If it cannot be made, with the option that names it.
+pub fn check_folder(option: &str, folder: &Path) -> anyhow::Result<()> {
+    std::fs::create_dir_all(folder).with_context(|| format!("{option} {}", folder.display()))
 }
 
 fn shortened(line: &str) -> String {

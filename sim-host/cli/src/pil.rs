@@ -12,6 +12,7 @@ use sonarfix_pil_host::tally::Tally;
 use sonarfix_pil_host::{Emulated, Load};
 use sonarfix_sim::simulate::Simulation;
 
+use crate::output::check_file;
 use crate::overrides::Overrides;
 
 #[derive(Debug, clap::Args)]
@@ -75,6 +76,9 @@ impl From<Traffic> for Load {
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
+    if let Some(file) = &args.record {
+        check_file("--record", file)?;
+    }
     if args.scenario.extension().is_some_and(|extension| extension == "golden") {
         return replay(args);
     }

@@ -10,6 +10,8 @@ use sonarfix_report::Table;
 use sonarfix_report::heat_map::{Heat, HeatMap};
 use sonarfix_studies::floor_plan::{FloorPlan, picture};
 
+use crate::output::check_file;
+use crate::progress::Runs;
 use crate::table;
 
 #[derive(Debug, clap::Args)]
@@ -57,12 +59,20 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     anyhow::ensure!(args.runs > 0, "--runs must be at least 1");
     let is_sensible = args.need.is_none_or(|need| need > 0.0 && need.is_finite());
     anyhow::ensure!(is_sensible, "--need must be a number of millimetres above zero");
-    let scenario = scenario(args)?;
-    let mut candidates = Vec::new();
-    for (sensor, scenario) in fitted(args, &scenario)? {
-        let forecast = Forecast::new(&scenario, args.runs)?;
-        candidates.push(Candidate { sensor, forecast });
+    if let Some(file) = &args.out {
+        check_file("--out", file)?;
     }
+    let scenario = scenario(args)?;
+    let fitted = fitted(args, &scenario)?;
+    let count = u32::try_from(fitted.len()).unwrap_or(u32::MAX);
+    let runs = Runs::new(args.runs.saturating_mul(count));
+    let mut candidates = Vec::new();
+    for (sensor, scenario) in fitted {
+        if let Some(forecast) = Forecast::new(&scenario, args.runs, &runs)? {
+            candidates.push(Candidate { sensor, forecast });
+        }
+    }
+    runs.end()?;
     candidates.sort_by(|a, b| a.forecast.position.rms.total_cmp(&b.forecast.position.rms));
     if args.json {
         crate::json::print(&candidates)?;

@@ -13,6 +13,7 @@ use sonarfix_replay::{ByVerdict, Figures, Replay, Summary};
 use sonarfix_report::trace_csv;
 use sonarfix_report::{Report, Table};
 
+use crate::output::{check_file, check_folder};
 use crate::overrides::PolicyName;
 use crate::run::Output;
 use crate::table;
@@ -47,6 +48,12 @@ pub struct Args {
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
+    if let Some(dir) = &args.output.out {
+        check_folder("--out", dir)?;
+    }
+    if let Some(file) = &args.trace {
+        check_file("--trace", file)?;
+    }
     let floor = Floor::read(&beside(&args.log, args.map.as_ref(), "map.toml"))?;
     let mut robot = robot_file::read(&beside(&args.log, args.config.as_ref(), "robot.toml"))?;
     if let Some(policy) = args.policy {

@@ -15,6 +15,7 @@ use sonarfix_sim::row::Row;
 use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::trace::Trace;
 
+use crate::output::{check_file, check_folder};
 use crate::overrides::Overrides;
 use crate::progress::Runs;
 use crate::rows::{self, Counted};
@@ -67,7 +68,11 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         beside_paper: false,
     };
     anyhow::ensure!(experiment.runs > 0, "--runs must be at least 1");
+    if let Some(dir) = &args.output.out {
+        check_folder("--out", dir)?;
+    }
     if let Some(file) = &args.trace {
+        check_file("--trace", file)?;
         write_trace(&experiment.trace()?, file)?;
     }
     let counted = experiment.counted(&args.rows)?;
@@ -98,8 +103,7 @@ impl Experiment {
     pub fn conduct(&self, output: &Output) -> anyhow::Result<()> {
         anyhow::ensure!(self.runs > 0, "--runs must be at least 1");
         if let Some(dir) = &output.out {
-            // Before the work: what cannot be written is not worth computing.
-            std::fs::create_dir_all(dir).with_context(|| format!("--out {}", dir.display()))?;
+            check_folder("--out", dir)?;
         }
         self.show(&self.measure(0)?.measured, output)
     }

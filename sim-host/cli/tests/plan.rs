@@ -67,12 +67,16 @@ fn paper() -> Scenario {
     Scenario::parse(&laps, "paper.toml", FilePath::new("")).unwrap()
 }
 
+fn forecast(scenario: &Scenario, runs: u32) -> Forecast {
+    Forecast::new(scenario, runs, &|| ()).unwrap().expect("nothing interrupts it")
+}
+
 /// The forecast equals the error of runs: RMS over 40 noisy runs of the same lap, whose parameters are
 /// drawn and walk as the filter assumes. 40 runs along the same walls leave a sampling error of 20 %.
 #[test]
 fn a_forecast_equals_the_error_of_runs() {
     let mut scenario = paper();
-    let forecast = Forecast::new(&scenario, 2).unwrap();
+    let forecast = forecast(&scenario, 2);
     let config = scenario.robot.localizer;
     scenario.truth.range_noise = config.sonar.noise.floor.0.into();
     let (mut squares, runs) = (0.0, 40_u32);
@@ -125,7 +129,7 @@ fn wheel_errors_and_obstacles_do_not_enter_a_forecast() {
     wrong.truth.scale_right = 0.02;
     wrong.truth.wheel_noise = 0.01;
     wrong.start.drawn = true;
-    assert_eq!(Forecast::new(&honest, 2).unwrap(), Forecast::new(&wrong, 2).unwrap());
+    assert_eq!(forecast(&honest, 2), forecast(&wrong, 2));
 }
 
 /// Missed echoes increase the bound.
@@ -133,11 +137,11 @@ fn wheel_errors_and_obstacles_do_not_enter_a_forecast() {
 fn missed_echoes_increase_the_bound() {
     let mut scenario = paper();
     scenario.robot.localizer.sonar.max_range.0 = 3.5;
-    let all = Forecast::new(&scenario, 4).unwrap();
+    let all = forecast(&scenario, 4);
     let robot = scenario.robot;
     SonarPreset::HcSr04.fit(&mut scenario);
     scenario.robot = robot;
-    let some = Forecast::new(&scenario, 4).unwrap();
+    let some = forecast(&scenario, 4);
     assert!(some.ranges_per_second < all.ranges_per_second);
     let rms = |forecast: &Forecast| {
         let squares = forecast.samples.iter().map(|sample: &Sample| sample.position().powi(2));

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 use sonarfix_map::{Fidelity, Follow, Leg, Movement, Scenario, Surroundings, Upsets};
 
 use sonarfix_sim::angle;
+use sonarfix_sim::progress::Progress;
 use sonarfix_sim::simulate::{Simulation, SimulationError};
 use sonarfix_sim::trace::{Estimate, Tick, Trace};
 
@@ -108,24 +109,37 @@ pub struct Forecast {
 }
 
 impl Forecast {
-    /// Drives the path of a scenario a number of times without parameter errors.
+    /// Drives the path of a scenario a number of times without parameter errors. None if it was interrupted before the first
+    /// run was finished.
     ///
     /// # Errors
     /// [`SimulationError`], if the robot cannot start.
-    pub fn new(scenario: &Scenario, runs: u32) -> Result<Self, SimulationError> {
+    pub fn new(
+        scenario: &Scenario,
+        runs: u32,
+        progress: &impl Progress,
+    ) -> Result<Option<Self>, SimulationError> {
         let simulation = Simulation::new(as_told(scenario)).undistorted();
         let runs = (0..u64::from(runs)).into_par_iter().map(|seed| {
+            if progress.is_interrupted() {
+                return Ok(None);
+            }
             let mut trace = simulation.empty_trace();
             simulation.run(seed, &mut trace)?;
-            Ok(trace)
+            progress.finished();
+            Ok(Some(trace))
         });
-        let traces = runs.collect::<Result<Vec<_>, SimulationError>>()?;
+        let finished = runs.filter_map(Result::transpose);
+        let traces = finished.collect::<Result<Vec<Trace>, SimulationError>>()?;
+        if traces.is_empty() {
+            return Ok(None);
+        }
         let samples = samples(&simulation.scenario, &traces);
         let duration = simulation.scenario.path.duration();
         let accepted = traces.iter().flat_map(|trace| &trace.fixes);
         let accepted = accepted.filter(|fix| fix.outcome.is_used()).count();
         let worst = samples.iter().max_by(|a, b| a.position().total_cmp(&b.position()));
-        Ok(Self {
+        Ok(Some(Self {
             position: Spread::of(&samples, Sample::position),
             heading: Spread::of(&samples, |sample| sample.heading),
             worst_at: worst.map_or([0.0; 2], |sample| sample.at),
@@ -134,7 +148,7 @@ impl Forecast {
             blind_share: share(&samples, |sample| sample.blind),
             legs: legs(simulation.scenario.path.legs(), &samples),
             samples,
-        })
+        }))
     }
 }
 
