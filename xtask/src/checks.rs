@@ -49,7 +49,9 @@ pub fn lint_emulated() -> anyhow::Result<()> {
 
 /// Compares the result of every peer with that of an independent filter.
 pub fn peers() -> anyhow::Result<()> {
-    cargo::check(Workspace::Bench.cargo("test --package bench-host --test agreement --test derived"))
+    cargo::check(
+        Workspace::Bench.cargo("test --package bench-host --test agreement --test derived"),
+    )
 }
 
 /// Checks licences and sources; advisories too if their database can be reached.
