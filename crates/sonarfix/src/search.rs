@@ -140,9 +140,9 @@ impl SearchParameters {
     }
 }
 
-/// Below this mean log-likelihood per ping much that is around is not in the map: the answer has to persist for so many
-/// times longer.
-const DOUBTFUL_FIT: f32 = 1.5;
+/// Below this mean log-likelihood per ping, relative to echoes anywhere, much that is around is not in the map: the
+/// answer has to persist for so many times longer.
+const DOUBTFUL_SCORE: f32 = 0.3;
 const DOUBTFUL_FOR: u16 = 3;
 /// A unique answer need not be sharper than what the odometry adds within this distance, metres.
 const SHARP_WITHIN: f32 = 1.8;
@@ -701,7 +701,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
             let streak = entry.streak.saturating_add(fresh);
             entry.streak = if n == 0 && is_sole { streak } else { 0 };
         }
-        let is_doubtful = self.fit_of(&best) < DOUBTFUL_FIT;
+        let is_doubtful = best.score < DOUBTFUL_SCORE * f32::from(best.pings);
         let persistence = self.parameters.persistence * if is_doubtful { DOUBTFUL_FOR } else { 1 };
         let has_persisted = is_sole && best.streak.saturating_add(fresh) >= persistence && is_sharp;
         let was_unique = matches!(self.answer, Decision::Unique(_));

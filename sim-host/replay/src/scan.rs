@@ -116,6 +116,19 @@ mod tests {
         assert_eq!(is_detected(-1.0), Some(3.0), "nearer than the minimum range");
     }
 
+    /// A wall 2 m ahead, at right angles to the first beam's direction plus 0.5: only the foot of its perpendicular is heard.
+    #[test]
+    fn a_wall_met_at_an_angle_is_not_heard() {
+        let step = 0.01;
+        let beams = (0_u8..150).map(|beam| 2.0 / (f32::from(beam) * 0.01 - 0.5).cos());
+        let scan = Scan { first: 0.0, step, ranges: beams.collect() };
+        let heard = |bearing| scan.specular(&Cone { bearing, cone: 0.2, reach: (0.05, 8.0) });
+        assert_eq!(heard(0.5), Some(2.0));
+        assert_eq!(heard(0.65), Some(2.0));
+        assert_eq!(heard(0.9), None);
+        assert_eq!(heard(0.2), None);
+    }
+
     #[test]
     fn no_return_is_no_echo() {
         assert_eq!(is_detected(0.75), None, "no return, and 9 m is too far");
