@@ -87,7 +87,7 @@ fn check_record(record: &Record) {
         Record::Wheels { time, right, left } => (time, vec![*right, *left]),
         Record::Range { time, bearing, range, .. } => (time, vec![*bearing, range.unwrap_or(0.0)]),
         Record::Scan { time, .. } | Record::Skip { time } => (time, vec![]),
-        Record::Resume { time, state, deviation } => {
+        Record::Resume { time, state, deviation } | Record::Mode { time, state, deviation, .. } => {
             (time, state.iter().chain(deviation).copied().collect())
         }
         Record::Start { time, pose, position_deviation, heading_deviation }

@@ -236,7 +236,7 @@ impl ExpectedEcho {
         &self,
         parameters: &EchoParameters,
         echo: Option<Metres>,
-        others: &Others,
+        others: Others,
     ) -> Explanation {
         let d = match echo {
             Some(range) => self.of_echo(parameters, range.0 - self.range.0),
@@ -381,7 +381,7 @@ mod tests {
             let [wall, clutter, occluded, wrong] = densities(&expected, &parameters, echo);
             let total = wall + clutter + occluded;
             prop_assume!(total > 1e-6);
-            let found = expected.explain(&parameters, echo, &Others::NONE);
+            let found = expected.explain(&parameters, echo, Others::NONE);
             let rest = clutter / total;
             let sum = f64::from(found.association) + f64::from(found.occluded) + rest;
             prop_assert!((sum - 1.0).abs() < 1e-4, "{sum}");
@@ -417,11 +417,11 @@ mod tests {
             limits: (Metres(0.05), Metres(4.0)),
         };
         let short = Some(Metres(1.0));
-        let first = expected.explain(&parameters, short, &Others::NONE);
+        let first = expected.explain(&parameters, short, Others::NONE);
         assert!(first.evidence > 0.5 && first.occluded > 0.8, "{first:?}");
         let again = ExpectedEcho { occluded: first.occluded, ..expected };
-        assert!(again.explain(&parameters, short, &Others::NONE).evidence < 0.2);
+        assert!(again.explain(&parameters, short, Others::NONE).evidence < 0.2);
         // A range that is too long is evidence, however well the wall is known to be occluded.
-        assert!(again.explain(&parameters, Some(Metres(3.0)), &Others::NONE).evidence > 0.5);
+        assert!(again.explain(&parameters, Some(Metres(3.0)), Others::NONE).evidence > 0.5);
     }
 }

@@ -364,7 +364,7 @@ impl<'m> Localizer<'m> {
             occluded,
             limits: (sonar.min_range, sonar.max_range),
         };
-        let alone = expected_echo.explain(echo, measured.ok(), &Others::NONE);
+        let alone = expected_echo.explain(echo, measured.ok(), Others::NONE);
         let is_unclear = gating::is_unclear(alone.association) && view.is_heading_known();
         let unclear = measured.ok().filter(|_| is_unclear);
         let (explanation, alternative) = if let Some(range) = unclear {
@@ -377,7 +377,7 @@ impl<'m> Localizer<'m> {
                 history: &self.history,
             };
             let (others, best) = scene.alternatives(&target, aim.bearing, range);
-            (expected_echo.explain(echo, Some(range), &others), best)
+            (expected_echo.explain(echo, Some(range), others), best)
         } else {
             (alone, None)
         };

@@ -41,8 +41,8 @@ impl Unseen {
         Self { since, before: ekf.pose_variances(), is_lost: false }
     }
 
-    /// The same with the pose of this filter, which was measured at `now`. Travel before that time cannot be told from
-    /// travel after it.
+    /// The same with the pose of this filter, which was measured at `now`. Travel before and after
+    /// that time cannot be separated.
     pub fn with_pose(ekf: &Ekf, now: Instant) -> Self {
         Self { is_lost: true, ..Self::new(now, ekf) }
     }

@@ -68,7 +68,7 @@ fn paper() -> Scenario {
 }
 
 fn forecast(scenario: &Scenario, runs: u32) -> Forecast {
-    Forecast::new(scenario, runs, &|| ()).unwrap().expect("nothing interrupts it")
+    Forecast::new(scenario, runs, &|| ()).unwrap().unwrap()
 }
 
 /// The forecast equals the error of runs: RMS over 40 noisy runs of the same lap, whose parameters are

@@ -9,7 +9,7 @@ pub const PINGS_A_SCAN: i64 = 9;
 
 /// A return is that of a mirror if none within this angle beside it is nearer: 4°. At 4 m, the ranges of a wall differ
 /// by 10 mm over this angle beside the foot of the perpendicular, the noise of a scanner.
-const SQUARE: f64 = 0.07;
+const BESIDE: f64 = 0.07;
 
 /// Ranges over a full or partial circle, taken at one instant from the sonar's mount.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -42,7 +42,7 @@ impl Scan {
     }
 
     /// The earliest echo of a sonar whose beam is reflected as by a mirror: the nearest return inside the cone and
-    /// within reach that no return within [`SQUARE`] beside it undercuts. The foot of a perpendicular and an edge are such
+    /// within reach that no return within 4° beside it undercuts. The foot of a perpendicular and an edge are such
     /// returns; a wall that is met at an angle has none, and a sonar does not hear it.
     #[must_use]
     pub fn specular(&self, sonar: &Cone) -> Option<f64> {
@@ -53,7 +53,7 @@ impl Scan {
             range > 0.0 && range >= nearest && range <= farthest
         };
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some beams")]
-        let beside = (SQUARE / self.step.abs()).clamp(1.0, 1e3) as usize;
+        let beside = (BESIDE / self.step.abs()).clamp(1.0, 1e3) as usize;
         let is_undercut = |at: usize, range: f32| {
             let around = at.saturating_sub(beside)..self.ranges.len().min(at + beside + 1);
             let around = self.ranges.get(around).unwrap_or_default();

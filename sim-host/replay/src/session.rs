@@ -68,7 +68,7 @@ enum Echo {
         range: Option<f64>,
         wall: Option<u32>,
     },
-    /// Of a scan a robot that knows its pose takes one range, if one is due; one that searches takes some.
+    /// Of a scan one range is used, if one is due; during a search, several are.
     Scan {
         scan: Scan,
         is_due: bool,

@@ -81,7 +81,7 @@ fn any_command(random: &mut Random) -> Command {
 
 /// Lets time pass in uneven steps, while the wheels roll or not.
 fn pass(bench: &mut Bench, random: &mut Random) {
-    let rolls = random.below(3) as i16;
+    let rolls = i16::try_from(random.below(3)).unwrap();
     for _ in 0..random.below(60) {
         bench.now += 1_000 * random.below(12) as u64;
         bench.roll(rolls, rolls);

@@ -101,7 +101,13 @@ impl Ranger for Sonar {
         let Some(Ping { sent, echo }) = self.ping.take() else { return Ok(None) };
         let silence = if self.is_there { NoEcho::Nothing } else { NoEcho::NoResponse };
         let Some(range) = echo.filter(|_| self.is_there) else { return Ok(Some(Err(silence))) };
-        let heard = sent + Duration::from_ticks((2e6 * range.0 / SPEED_OF_SOUND) as u64);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "some milliseconds"
+        )]
+        let flight = Duration::from_ticks((2e6 * range.0 / SPEED_OF_SOUND) as u64);
+        let heard = sent + flight;
         if now < heard {
             self.ping = Some(Ping { sent, echo });
             return Ok(None);

@@ -121,7 +121,7 @@ impl Odometer {
         self.taken = Some(position);
     }
 
-    /// Starts the ledger anew with the next reading.
+    /// Starts the ledger again with the next reading.
     pub fn forget(&mut self) {
         self.taken = None;
     }

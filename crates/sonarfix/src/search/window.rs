@@ -88,7 +88,7 @@ pub(super) struct Window<const PINGS: usize> {
     /// Where the sonar is in the robot frame.
     mount: Vector,
     robot: Station,
-    /// Where the search began, with the bends that were taken out on the way, and the distance since.
+    /// Where the search began, with the bends that were taken out since, and the distance since.
     start: Vector,
     since_start: f32,
     heading: f32,
