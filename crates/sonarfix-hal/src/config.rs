@@ -147,7 +147,7 @@ pub struct MotorPolicy {
     /// With the verdict [`Lost`](sonarfix::health::Verdict::Lost).
     pub lost: bool,
     /// Without odometry for more than
-    /// [`DEGRADED_WITHOUT_ODOMETRY`](sonarfix::health::DEGRADED_WITHOUT_ODOMETRY).
+    /// [`DEGRADED_WITHOUT_ODOMETRY`].
     pub dead_encoder: bool,
     /// Without a frame over the link for [`Self::link_timeout`].
     pub lost_link: bool,
