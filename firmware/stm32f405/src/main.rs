@@ -453,7 +453,8 @@ mod app {
                 app.took(took);
             }
             for _ in 1..EVALUATIONS_PER_MILLISECOND {
-                let at = context.shared.clock.lock(|clock| advanced(now, clock.cnt().read().bits()));
+                let at =
+                    context.shared.clock.lock(|clock| advanced(now, clock.cnt().read().bits()));
                 let since = at.checked_duration_since(now);
                 if since.is_none_or(|since| since > SEARCH_UNTIL) || !app.work() {
                     break;
