@@ -78,7 +78,7 @@ fn lego_from_rounded_wheels_estimates_the_fitted_ones() {
 }
 
 #[test]
-fn the_verdict_on_freiburg_becomes_lost() {
+fn freiburg_is_lost_and_found_again() {
     let Some(folder) = skipped::unless_recorded("carmen") else { return };
     let dir = TempDir::new().unwrap();
     let to = dir.path().to_str().unwrap();
@@ -95,7 +95,12 @@ fn the_verdict_on_freiburg_becomes_lost() {
         let undetected = number(&found["consistency"]["beyond_half_a_metre"], "tracking");
         assert!(undetected < 0.01, "{policy}: {undetected}");
         let lost = number(&found["health"], "lost_at");
-        assert!(lost < diverged + 40.0, "{policy}: lost at {lost} s, diverged at {diverged} s");
-        assert_eq!(found["health"]["lost_at_end"], true);
+        assert!(lost < diverged + 60.0, "{policy}: lost at {lost} s, diverged at {diverged} s");
+        // The tracker alone is within half a metre for 16 to 18 % of the time.
+        let search = &found["search"];
+        assert!(search["handed_over"].as_u64().unwrap() > 0, "{policy}: {search}");
+        let within = &found["consistency"]["within_half_a_metre"];
+        let known = number(within, "tracking") + number(within, "degraded");
+        assert!(known > 0.25, "{policy}: {within}");
     }
 }
