@@ -25,7 +25,9 @@ use sonarfix::navigator;
 use sonarfix::search::Search;
 use sonarfix::units::{Duration, Instant, Metres};
 use sonarfix_hal::config::{RobotConfig, Unsupported};
-use sonarfix_hal::robot::{Faults, Hardware, Report, Robot, Settings, Step};
+use sonarfix_hal::robot::{
+    EVALUATIONS_PER_MILLISECOND, Faults, Hardware, Report, Robot, Settings, Step,
+};
 use sonarfix_link::baked::{self, BakedError};
 use sonarfix_link::message::{self, CommandResult, Hello, LoopStatus, ResetCause};
 use sonarfix_link::{Reporter, Telemetry};
@@ -38,6 +40,10 @@ use crate::time::since;
 
 pub use wire::Link;
 use wire::Wire;
+
+/// The search works up to this time after a poll has begun. Its longest slice takes 0.1 ms (`docs/search.md`), so that it
+/// has ended before the next poll is due.
+const SEARCH_UNTIL: Duration = Duration::from_ticks(800);
 
 /// The facts of a board that are not in the configuration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -320,14 +326,22 @@ impl<'m, F: NorFlash> App<'m, F> {
         &self.search
     }
 
-    /// Makes one evaluation of the search between two polls, for a board whose loop has time left; the next poll acts on
-    /// the answer. Returns whether the robot searches.
-    pub fn work(&mut self) -> bool {
-        let is_due = self.navigation_mode().is_some_and(|mode| mode != navigator::Mode::Tracking);
-        if is_due {
+    /// Makes evaluations of the search between two polls, for a board that polls every millisecond; the next poll acts on
+    /// the answer.
+    ///
+    /// They end 0.8 ms after the poll at `start`, or when there are as many as the simulation grants with
+    /// that of the poll ([`EVALUATIONS_PER_MILLISECOND`]). `now` reads the clock that polls are called with.
+    pub fn work(&mut self, start: Instant, mut now: impl FnMut() -> Instant) {
+        let is_searching = |mode| mode != navigator::Mode::Tracking;
+        if !self.navigation_mode().is_some_and(is_searching) {
+            return;
+        }
+        for _ in 1..EVALUATIONS_PER_MILLISECOND {
+            if since(now(), start) > SEARCH_UNTIL {
+                return;
+            }
             self.search.poll(1);
         }
-        is_due
     }
 
     /// The report of the loop's last poll, while it runs.

@@ -146,8 +146,7 @@ pub struct RangerConfig {
 pub struct MotorPolicy {
     /// With the verdict [`Lost`](sonarfix::health::Verdict::Lost).
     pub lost: bool,
-    /// Without odometry for more than
-    /// [`DEGRADED_WITHOUT_ODOMETRY`].
+    /// Without odometry for more than [`DEGRADED_WITHOUT_ODOMETRY`].
     pub dead_encoder: bool,
     /// Without a frame over the link for [`Self::link_timeout`].
     pub lost_link: bool,

@@ -56,7 +56,7 @@ pub use map_file::MapFile;
 pub use path::{Leg, Motion, Movement, Path, PathError, PathPlan, PathPose};
 pub use place::Place;
 pub use robot_text::text as robot_text;
-pub use scenario::{Run, Scenario, Start, Truth};
+pub use scenario::{KEYS as SCENARIO_KEYS, Run, Scenario, Start, Truth};
 pub use simplify::{Limits, Simplified, simplify};
 pub use surroundings::{Obstacle, Oscillation, Outline, Surroundings};
 pub use survey::{Finding, Flaw, Severity, survey};

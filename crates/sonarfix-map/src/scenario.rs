@@ -20,7 +20,7 @@ use crate::robot_file;
 use crate::surroundings::{self, Surroundings};
 
 /// The keys of a scenario file, besides `format`.
-pub(crate) const KEYS: [&str; 13] = [
+pub const KEYS: [&str; 13] = [
     "name",
     "description",
     "fidelity",

@@ -17,6 +17,7 @@
 //! all clutter is configured away and the echo is too far off to be the wall's, it is not used.
 
 use crate::elementary::{exp, inverse_sqrt, ln, sqrt};
+use crate::numeric::at_least;
 use crate::range::Innovation;
 use crate::units::{Metres, SquareMetres};
 
@@ -264,7 +265,7 @@ impl ExpectedEcho {
     }
 
     fn of_echo(&self, parameters: &EchoParameters, innovation: f32) -> Densities {
-        let EchoParameters { missed, short, long, .. } = *parameters;
+        let EchoParameters { short, long, .. } = *parameters;
         let (g, s) = (self.geometry, self.variance.0);
         let density = density(Innovation { value: Metres(innovation), variance: SquareMetres(s) });
         let (nearest, farthest) = (self.limits.0.0, self.limits.1.0);
@@ -277,7 +278,7 @@ impl ExpectedEcho {
             (long * per_metre, BEYOND_OCCLUDED * per_metre)
         };
         Densities {
-            wall: g * (1.0 - missed - short - long) * density,
+            wall: g * parameters.heard() * density,
             clutter: g * spurious + (1.0 - g) * (1.0 - NO_ECHO_OFF_WALL) * everywhere,
             occluded: by_object,
             wrong_pose: if innovation < 0.0 {
@@ -318,11 +319,6 @@ const ONE_OVER_ROOT_TWO_PI: f32 = 0.398_942_3;
 const MAX_EVIDENCE: f32 = 4.0;
 /// exp([`MAX_EVIDENCE`]).
 const MAX_RATIO: f32 = 54.598_15;
-
-/// The larger of two numbers. `f32::max` treats +0 and −0 differently from build to build.
-fn at_least(value: f32, least: f32) -> f32 {
-    if value > least { value } else { least }
-}
 
 #[cfg(test)]
 mod tests {

@@ -47,11 +47,6 @@ pub(crate) fn use_of(association: f32) -> Use {
     }
 }
 
-/// Whether it is worth while to ask which other reflector may have returned an echo.
-pub(crate) fn is_unclear(association: f32) -> bool {
-    association < ACCEPTED_FROM
-}
-
 /// The weight of a range with this association probability.
 pub(crate) fn weight(association: f32) -> f32 {
     if association >= CERTAIN_FROM { 1.0 } else { association }

@@ -365,8 +365,8 @@ impl<'m> Localizer<'m> {
             limits: (sonar.min_range, sonar.max_range),
         };
         let alone = expected_echo.explain(echo, measured.ok(), Others::NONE);
-        let is_unclear = gating::is_unclear(alone.association) && view.is_heading_known();
-        let unclear = measured.ok().filter(|_| is_unclear);
+        let is_clear = gating::use_of(alone.association) == Use::Accept;
+        let unclear = measured.ok().filter(|_| !is_clear && view.is_heading_known());
         let (explanation, alternative) = if let Some(range) = unclear {
             let (variance, answers) = (innovation.variance, expected_echo.answers(echo));
             let target = Target { expected: &expected, variance, answers };

@@ -33,6 +33,7 @@ use crate::ekf::{EkfError, StandardDeviations, StateEstimate};
 use crate::health::Verdict;
 use crate::localizer::{Fix, Localizer, OdometryError, Start};
 use crate::motion::WheelTravel;
+use crate::numeric::at_least;
 use crate::search::{Answer, Hypothesis, NotFinite, Region, Search, SearchParameters};
 use crate::units::{Instant, Metres, Radians};
 
@@ -457,13 +458,10 @@ impl<'m> Navigator<'m> {
 
 /// The start from a hypothesis.
 fn start_of(found: &Hypothesis) -> Start {
-    let at_least = |deviation: f32, least: f32| {
-        let cautious = CAUTION * deviation;
-        if cautious > least { cautious } else { least }
-    };
+    let cautious = |deviation: f32, least: f32| at_least(CAUTION * deviation, least);
     Start {
         pose: found.pose,
-        position_deviation: Metres(at_least(found.position_deviation.0, LEAST_POSITION)),
-        heading_deviation: Radians(at_least(found.heading_deviation.0, LEAST_HEADING)),
+        position_deviation: Metres(cautious(found.position_deviation.0, LEAST_POSITION)),
+        heading_deviation: Radians(cautious(found.heading_deviation.0, LEAST_HEADING)),
     }
 }

@@ -21,6 +21,16 @@ pub(crate) fn at_most_max_variance(variance: f32) -> f32 {
     if is_valid_variance(variance) { variance } else { MAX_VARIANCE }
 }
 
+/// The larger of two numbers, `least` for NaN. `f32::max` treats +0 and −0 differently from build to build.
+pub(crate) fn at_least(value: f32, least: f32) -> f32 {
+    if value > least { value } else { least }
+}
+
+/// The smaller of two numbers, `most` for NaN.
+pub(crate) fn at_most(value: f32, most: f32) -> f32 {
+    if value < most { value } else { most }
+}
+
 /// The larger of the value and zero.
 ///
 /// Compared as integers, the bit patterns of negative numbers are negative; an integer comparison

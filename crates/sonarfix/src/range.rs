@@ -95,32 +95,35 @@ impl ExpectedRange {
     /// [`Self::new`] with the position of the sonar computed before.
     #[inline]
     pub(crate) fn from_sonar(wall: &Wall, sonar: &SonarPosition) -> Self {
-        let SonarPosition { point, lever: (lever_x, lever_y), stretch } = *sonar;
-        let signed = wall.signed_distance(point);
+        let signed = wall.signed_distance(sonar.point);
         let side = if signed.0 < 0.0 { -1.0 } else { 1.0 };
-        let distance = side * signed.0;
-        let (by_x, by_y) = (side * stretch * wall.a(), side * stretch * wall.b());
-        Self {
-            range: Metres(stretch * distance),
-            by_x,
-            by_y,
-            by_heading: by_y * lever_x - by_x * lever_y,
-            by_range_scale: distance,
-            direction: wall.direction_from(signed),
-        }
+        let away = (side * sonar.stretch * wall.a(), side * sonar.stretch * wall.b());
+        Self::at(side * signed.0, away, wall.direction_from(signed), sonar)
     }
 
     /// The range expected from a point at `distance` along the unit vector `toward`.
     pub(crate) fn from_point(toward: Vector, distance: f32, sonar: &SonarPosition) -> Self {
+        let away = (-sonar.stretch * toward.x, -sonar.stretch * toward.y);
+        let direction = Heading::new(Radians(atan2(toward.y, toward.x)));
+        Self::at(distance, away, direction, sonar)
+    }
+
+    /// At a distance; `away` are the derivatives by x and y.
+    #[inline]
+    fn at(
+        distance: f32,
+        (by_x, by_y): (f32, f32),
+        direction: Heading,
+        sonar: &SonarPosition,
+    ) -> Self {
         let SonarPosition { lever: (lever_x, lever_y), stretch, .. } = *sonar;
-        let (by_x, by_y) = (-stretch * toward.x, -stretch * toward.y);
         Self {
             range: Metres(stretch * distance),
             by_x,
             by_y,
             by_heading: by_y * lever_x - by_x * lever_y,
             by_range_scale: distance,
-            direction: Heading::new(Radians(atan2(toward.y, toward.x))),
+            direction,
         }
     }
 

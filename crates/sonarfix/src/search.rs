@@ -32,6 +32,7 @@ use window::Window;
 use crate::config::{Config, Sonar};
 use crate::echo::EchoParameters;
 use crate::map::{Map, WallId};
+use crate::numeric::at_least;
 use crate::pose::{Point, Pose};
 use crate::units::{Metres, Radians};
 
@@ -126,7 +127,6 @@ impl SearchParameters {
         // Heading noise after a metre: the deviation aside that it causes grows with the distance to the
         // power 1.5, and is this many metres a metre at 4 m.
         let per_root_metre = core::f32::consts::SQRT_2 * drive.wheel_noise.0.0 / width;
-        let at_least = |value: f32, least: f32| if value > least { value } else { least };
         let odometry = at_least(1.2 * per_root_metre, LEAST_ODOMETRY);
         let (position, heading) = Self::default().sharpness;
         Self {

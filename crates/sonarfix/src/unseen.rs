@@ -16,6 +16,7 @@
 use crate::config::Config;
 use crate::ekf::{Ekf, PoseVariances};
 use crate::health::DEGRADED_WITHOUT_ODOMETRY;
+use crate::numeric::at_most;
 use crate::odometry::largest_travel;
 use crate::units::{Duration, Instant, Metres, Radians};
 
@@ -56,8 +57,8 @@ impl Unseen {
     pub fn grow(&self, ekf: &mut Ekf, now: Instant, config: &Config) {
         let distance = largest_travel(self.time(now), config.max_wheel_speed).0;
         let turn = 2.0 * distance / config.drive.track_width.0;
-        let position = within(distance, UNKNOWN_POSITION.0);
-        ekf.set_pose_variances(self.before.plus(position, within(turn, UNKNOWN_HEADING.0)));
+        let position = at_most(distance, UNKNOWN_POSITION.0);
+        ekf.set_pose_variances(self.before.plus(position, at_most(turn, UNKNOWN_HEADING.0)));
     }
 
     /// Records that a sample was refused at `now`. Its travel may have been discarded.
@@ -74,9 +75,4 @@ impl Unseen {
         let position = if is_path_unknown { distance.0 } else { 0.0 };
         ekf.set_pose_variances(self.before.plus(position, 0.0));
     }
-}
-
-fn within(value: f32, limit: f32) -> f32 {
-    // True for NaN.
-    if value < limit { value } else { limit }
 }

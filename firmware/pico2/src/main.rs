@@ -44,15 +44,12 @@ use sonarfix_app::store::Store;
 use sonarfix_app::{App, FlashContents, Link, boots, log};
 use sonarfix_hal::encoder::Counter;
 use sonarfix_hal::ranger::{Captured, EchoCapture, PulseRanger, StampedEdges, Stamps};
-use sonarfix_hal::robot::{Devices, EVALUATIONS_PER_MILLISECOND};
+use sonarfix_hal::robot::Devices;
 use sonarfix_link::message::ResetCause;
 use sonarfix_robot::memory;
 
 /// The poll period.
 const POLL: Duration = Duration::from_millis(1);
-/// The search works up to this time after a poll has begun. Its longest slice takes 0.1 ms (`docs/search.md`), so that it
-/// has ended before the next poll is due.
-const SEARCH_UNTIL: sonarfix::units::Duration = sonarfix::units::Duration::from_ticks(800);
 /// Longer than the erasure of a sector (at most 0.4 s), which delays the loop.
 const WATCHDOG: Duration = Duration::from_secs(2);
 
@@ -290,12 +287,7 @@ impl Board {
         if let Some(took) = now().checked_duration_since(start) {
             self.app.took(took);
         }
-        for _ in 1..EVALUATIONS_PER_MILLISECOND {
-            let since = now().checked_duration_since(start);
-            if since.is_none_or(|since| since > SEARCH_UNTIL) || !self.app.work() {
-                break;
-            }
-        }
+        self.app.work(start, now);
     }
 }
 

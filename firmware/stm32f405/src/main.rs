@@ -312,11 +312,11 @@ unsafe fn HardFault() -> ! {
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod app {
     use heapless::spsc::{Consumer, Producer};
-    use sonarfix::units::{Duration, Instant};
+    use sonarfix::units::Instant;
     use sonarfix_app::store::Store;
     use sonarfix_app::{App, FlashContents, boots, log};
     use sonarfix_hal::ranger::{Captured, PulseRanger};
-    use sonarfix_hal::robot::{Devices, EVALUATIONS_PER_MILLISECOND};
+    use sonarfix_hal::robot::Devices;
     use sonarfix_link::message::ResetCause;
     use sonarfix_robot::memory;
     use stm32f4xx_hal::gpio::{GpioExt, Output, Pin};
@@ -329,9 +329,6 @@ mod app {
 
     use super::{ECHO, Encoder, Received, Sectors, ServoPwm, ToSend, Uart, microseconds};
 
-    /// The search works up to this time after a poll has begun. Its longest slice takes 0.1 ms (`docs/search.md`), so
-    /// that it has ended before the next poll is due.
-    const SEARCH_UNTIL: Duration = Duration::from_ticks(800);
     /// The poll period, µs.
     const POLL: u32 = 1_000;
     /// Longer than the erasure of a sector (at most 0.5 s), which delays the loop.
@@ -448,18 +445,12 @@ mod app {
                 watchdog.feed();
             }
             log::polled(&polled, app.report());
-            let done = context.shared.clock.lock(|clock| advanced(now, clock.cnt().read().bits()));
-            if let Some(took) = done.checked_duration_since(now) {
+            let mut clock =
+                || context.shared.clock.lock(|clock| advanced(now, clock.cnt().read().bits()));
+            if let Some(took) = clock().checked_duration_since(now) {
                 app.took(took);
             }
-            for _ in 1..EVALUATIONS_PER_MILLISECOND {
-                let at =
-                    context.shared.clock.lock(|clock| advanced(now, clock.cnt().read().bits()));
-                let since = at.checked_duration_since(now);
-                if since.is_none_or(|since| since > SEARCH_UNTIL) || !app.work() {
-                    break;
-                }
-            }
+            app.work(now, clock);
         }
     }
 

@@ -54,6 +54,33 @@ fn files_beside_the_log_are_found_and_the_json_has_its_keys() {
     assert!(trace.lines().count() >= 200);
 }
 
+/// The log of a robot that searched decides about the mode; the summary has its searches and their times.
+#[test]
+fn recorded_changes_of_the_mode_are_counted() {
+    let (log, reference) = recording(20, Sonar::Silent);
+    let mut lines: Vec<String> = log.lines().map(str::to_owned).collect();
+    for (time, mode) in [(5, "searching"), (10, "provisional"), (12, "tracking")] {
+        let tick = format!("ticks,{time},");
+        let at = lines.iter().position(|line| line.starts_with(&tick)).unwrap();
+        let line = format!("mode,{time},{mode},1,1,0,0,0,0,0,0.1,0.1,0.05,0.01,0.01,0.004,0");
+        lines.insert(at + 1, line);
+    }
+    let dir = folder(&(lines.join("\n") + "\n"), &reference);
+    let robot = ROBOT.replacen("[drive]", "start = \"unknown\"\n[drive]", 1);
+    fs::write(dir.path().join("robot.toml"), robot).unwrap();
+    let output = sonarfix(dir.path(), &["replay", "log.csv", "--json"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let search = &found["search"];
+    for (key, count) in [("begun", 1), ("handed_over", 1), ("confirmed", 1)] {
+        assert_eq!(search[key].as_u64(), Some(count), "{key}: {search}");
+    }
+    for (key, seconds) in [("searching_seconds", 5.0), ("provisional_seconds", 2.0)] {
+        let found = search[key].as_f64().unwrap();
+        assert!((found - seconds).abs() < 0.01, "{key}: {found}");
+    }
+}
+
 #[test]
 fn without_a_reference_there_are_no_errors_to_print() {
     let (log, _) = recording(20, Sonar::Ranges);

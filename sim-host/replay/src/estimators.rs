@@ -30,6 +30,23 @@ pub struct Searches {
     pub provisional_seconds: f64,
 }
 
+/// The computing time that a recorded robot grants the search.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ComputingTime {
+    /// Thousandths of an evaluation.
+    spare: i64,
+}
+
+impl ComputingTime {
+    /// The evaluations of an interval, microseconds.
+    pub fn evaluations(&mut self, elapsed: i64) -> u16 {
+        let thousandths = self.spare + elapsed * i64::from(EVALUATIONS_PER_MILLISECOND);
+        self.spare = thousandths % 1_000;
+        // More than a whole search in a gap of the log would do nothing new.
+        u16::try_from(thousandths / 1_000).unwrap_or(u16::MAX)
+    }
+}
+
 /// The navigator, with dead reckoning beside it.
 pub struct Estimators<'a> {
     pub navigator: Navigator<'a>,
@@ -40,8 +57,7 @@ pub struct Estimators<'a> {
     /// The encoder reading that the localizer has received.
     pub received: Reading,
     pub searches: Searches,
-    /// Microseconds that are no whole evaluation yet.
-    spare: i64,
+    computing: ComputingTime,
 }
 
 impl<'a> Estimators<'a> {
@@ -59,7 +75,7 @@ impl<'a> Estimators<'a> {
             epoch: reading.time,
             received: reading,
             searches: Searches::default(),
-            spare: 0,
+            computing: ComputingTime::default(),
         }
     }
 
@@ -107,17 +123,14 @@ impl<'a> Estimators<'a> {
 
     /// Makes the evaluations of a time, microseconds, and changes the mode when it is due.
     fn work(&mut self, elapsed: i64) {
-        let Some(search) = &mut self.search else { return };
-        match self.navigator.mode() {
+        let before = self.navigator.mode();
+        match before {
             Mode::Tracking => {}
             Mode::Searching => self.searches.searching_seconds += seconds(elapsed),
             Mode::Provisional => self.searches.provisional_seconds += seconds(elapsed),
         }
-        let thousandths = self.spare + elapsed * i64::from(EVALUATIONS_PER_MILLISECOND);
-        self.spare = thousandths % 1_000;
-        // More than a whole search in a gap of the log would do nothing new.
-        let evaluations = u16::try_from(thousandths / 1_000).unwrap_or(u16::MAX);
-        let before = self.navigator.mode();
+        let Some(search) = &mut self.search else { return };
+        let evaluations = self.computing.evaluations(elapsed);
         let changed = self.navigator.work(evaluations, search);
         self.count(before, changed);
     }
@@ -129,9 +142,9 @@ impl<'a> Estimators<'a> {
         state: StateEstimate,
         deviation: StandardDeviations,
     ) -> Result<(), EkfError> {
-        self.search = None;
         let before = self.navigator.mode();
         self.navigator.adopt(mode, state, deviation)?;
+        self.search = None;
         self.count(before, Some(mode).filter(|mode| *mode != before));
         Ok(())
     }

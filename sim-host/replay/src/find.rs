@@ -3,29 +3,24 @@
 use std::io::BufRead;
 
 use serde::Serialize;
-use sonarfix::config::{PingSchedule, Sonar};
+use sonarfix::config::Sonar;
 use sonarfix::map::{Map, Wall};
 use sonarfix::search::{Answer, Hypothesis, Search, SearchParameters};
 use sonarfix::units::{Metres, Radians};
 use sonarfix_hal::config::RobotConfig;
-use sonarfix_hal::robot::EVALUATIONS_PER_MILLISECOND;
 use sonarfix_sim::time::micros;
 use sonarfix_sim::trace::Pose;
 
+use crate::estimators::ComputingTime;
 use crate::fault::{ReplayError, Source};
 use crate::lines::Lines;
 use crate::log::{self, Record};
 use crate::reference;
-use crate::scan::{Cone, Scan};
+use crate::scan::{Cone, Scan, Sweep};
 use crate::wheels::Reading;
 
 /// Cycles that the search makes after the end of the log.
 const CYCLES_AT_END: u32 = 6;
-/// Largest number of pings that one scan stands for: half a turn in steps of 20°.
-const PINGS_A_SCAN: f64 = 9.0;
-/// Duration of a measurement of a sonar that pings as fast as it can, seconds: an HC-SR04 on an SG90.
-const FASTEST: f64 = 0.12;
-
 /// The search on a log.
 pub struct Find<'a> {
     /// The robot that was recorded.
@@ -43,7 +38,7 @@ pub struct Candidate {
     pub position_deviation: f64,
     /// Standard deviation of the heading, radians.
     pub heading_deviation: f64,
-    /// Mean log-likelihood per ping, relative to echoes anywhere.
+    /// Mean log-likelihood per ping, relative to a place without walls.
     pub fit: f64,
     /// The share of the echoes that the map explains.
     pub explained: f64,
@@ -99,10 +94,9 @@ struct Run<'a> {
     first: Option<i64>,
     last: Option<Reading>,
     waiting: Vec<(i64, Heard)>,
-    last_scan: Option<i64>,
+    sweep: Sweep,
+    computing: ComputingTime,
     sonar: Sonar,
-    /// Duration of a measurement, seconds.
-    period: f64,
     unique_after: Option<f64>,
     pings: u64,
 }
@@ -141,9 +135,9 @@ impl<'a> Run<'a> {
             first: None,
             last: None,
             waiting: Vec::new(),
-            last_scan: None,
+            sweep: Sweep::default(),
+            computing: ComputingTime::default(),
             sonar: *sonar,
-            period: period(sonar),
             unique_after: None,
             pings: 0,
         }
@@ -170,19 +164,10 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Takes the ranges that a rotating sonar would measure in a scan: as many as it has time for
-    /// since the scan before, in the directions of its sweep.
+    /// Takes the ranges that a rotating sonar would measure in a scan: as many as it has time for since the scan before, in
+    /// the directions of its sweep, as the replay of a robot that searches does.
     fn scan(&mut self, time: i64, scan: &Scan) {
-        let before = self.last_scan.replace(time).unwrap_or(time);
-        #[expect(clippy::cast_precision_loss, reason = "exact below 2^53 µs")]
-        let elapsed = (time - before) as f64 * 1e-6;
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "between 1 and a sweep"
-        )]
-        let pings = (elapsed / self.period).clamp(1.0, PINGS_A_SCAN) as u32;
-        for _ in 0..pings {
+        for _ in 0..self.sweep.pings_until(time) {
             self.waiting.push((time, Heard::Scan(scan.clone())));
         }
     }
@@ -210,18 +195,7 @@ impl<'a> Run<'a> {
         let turn = (right - left) / self.track_width;
         // A jump of the encoders that is not finite is refused; the next reading counts again.
         _ = self.search.odometry(metres(f64::midpoint(right, left)), radians(turn));
-        #[expect(
-            clippy::cast_precision_loss,
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "between 0 and the largest u16"
-        )]
-        let evaluations = {
-            let milliseconds = (reading.time - last.time) as f64 * 1e-3;
-            let evaluations = milliseconds * f64::from(EVALUATIONS_PER_MILLISECOND);
-            evaluations.min(f64::from(u16::MAX)) as u16
-        };
-        self.search.poll(evaluations);
+        self.search.poll(self.computing.evaluations(reading.time - last.time));
         if self.unique_after.is_none() && matches!(self.search.answer(), Answer::Unique(_)) {
             #[expect(clippy::cast_precision_loss, reason = "exact below 2^53 µs")]
             let after = self.first.map(|first| (reading.time - first) as f64 * 1e-6);
@@ -233,11 +207,9 @@ impl<'a> Run<'a> {
         match heard {
             Heard::Range { bearing, range } => self.ping(*bearing, *range),
             Heard::Scan(scan) => {
-                let bearing = f64::from(self.search.aim().0);
-                let Sonar { cone, min_range, max_range, .. } = self.sonar;
-                let reach = (min_range.0.into(), max_range.0.into());
-                let range = scan.earliest(&Cone { bearing, cone: cone.0.into(), reach });
-                self.ping(bearing, range);
+                let bearing = self.search.aim();
+                let range = scan.specular(&Cone::of(&self.sonar, bearing));
+                self.ping(bearing.0.into(), range);
             }
         }
     }
@@ -271,14 +243,6 @@ impl<'a> Run<'a> {
             cycles: self.search.cycles(),
             lines_skipped,
         }
-    }
-}
-
-fn period(sonar: &Sonar) -> f64 {
-    match sonar.timing.schedule {
-        #[expect(clippy::cast_precision_loss, reason = "exact below 2^53 µs")]
-        PingSchedule::Every(period) => (period.to_micros() as f64 * 1e-6).max(FASTEST),
-        PingSchedule::AsFastAsPossible => FASTEST,
     }
 }
 

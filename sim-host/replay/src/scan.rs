@@ -1,11 +1,29 @@
 //! A scan, and the range of a sonar with a wide cone in its place.
 
+use sonarfix::config::Sonar;
+use sonarfix::units::Radians;
 use sonarfix_sim::angle;
 
 /// Duration of a measurement of a sonar that sweeps, microseconds: an HC-SR04 on an SG90.
-pub const PING_PERIOD: i64 = 120_000;
+const PING_PERIOD: i64 = 120_000;
 /// Largest number of pings that one scan stands for: half a turn in steps of 20°.
-pub const PINGS_A_SCAN: i64 = 9;
+const PINGS_A_SCAN: i64 = 9;
+
+/// The pings of a sonar that sweeps while scans are recorded.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Sweep {
+    /// Time of the last ping, microseconds.
+    until: i64,
+}
+
+impl Sweep {
+    /// How many pings a scan at this time stands for, microseconds: those since the last one.
+    pub fn pings_until(&mut self, time: i64) -> u32 {
+        let pings = ((time - self.until) / PING_PERIOD).clamp(0, PINGS_A_SCAN);
+        self.until = if pings < PINGS_A_SCAN { self.until + pings * PING_PERIOD } else { time };
+        u32::try_from(pings).unwrap_or(0)
+    }
+}
 
 /// A return is that of a mirror if none within this angle beside it is nearer: 4°. At 4 m, the ranges of a wall differ
 /// by 10 mm over this angle beside the foot of the perpendicular, the noise of a scanner.
@@ -46,50 +64,54 @@ impl Scan {
     /// returns; a wall that is met at an angle has none, and a sonar does not hear it.
     #[must_use]
     pub fn specular(&self, sonar: &Cone) -> Option<f64> {
-        let Cone { bearing, cone, reach: (nearest, farthest) } = *sonar;
-        let cone = cone + 1e-9;
-        let is_heard = |range: f32| {
-            let range = f64::from(range);
-            range > 0.0 && range >= nearest && range <= farthest
-        };
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some beams")]
         let beside = (BESIDE / self.step.abs()).clamp(1.0, 1e3) as usize;
-        let is_undercut = |at: usize, range: f32| {
+        self.nearest(sonar, |at, range| {
             let around = at.saturating_sub(beside)..self.ranges.len().min(at + beside + 1);
             let around = self.ranges.get(around).unwrap_or_default();
-            around.iter().any(|&other| other < range && is_heard(other))
-        };
-        let mut beam = self.first;
-        let mut earliest: Option<f64> = None;
-        for (at, &range) in self.ranges.iter().enumerate() {
-            let is_nearer = earliest.is_none_or(|earliest| f64::from(range) < earliest);
-            let is_within = angle::wrap(beam - bearing).abs() <= cone;
-            if is_nearer && is_within && is_heard(range) && !is_undercut(at, range) {
-                earliest = Some(range.into());
-            }
-            beam += self.step;
-        }
-        earliest
+            !around.iter().any(|&other| other < range && sonar.is_in_reach(other.into()))
+        })
     }
 
     /// The earliest echo: the nearest return inside the cone and within reach.
     #[must_use]
     pub fn earliest(&self, sonar: &Cone) -> Option<f64> {
-        let Cone { bearing, cone, reach: (nearest, farthest) } = *sonar;
+        self.nearest(sonar, |_, _| true)
+    }
+
+    /// The nearest return inside the cone and within reach that is heard, by its number and its range.
+    fn nearest(&self, sonar: &Cone, is_heard: impl Fn(usize, f32) -> bool) -> Option<f64> {
         // The edge belongs to the cone, regardless of rounding.
-        let cone = cone + 1e-9;
+        let cone = sonar.cone + 1e-9;
         let mut beam = self.first;
-        let mut earliest: Option<f64> = None;
-        for (count, range) in (1_u32..).zip(&self.ranges) {
-            let range = f64::from(*range);
-            let nearer = earliest.is_none_or(|earliest| range < earliest);
-            let is_detected = range > 0.0 && range >= nearest && range <= farthest;
-            if nearer && is_detected && angle::wrap(beam - bearing).abs() <= cone {
-                earliest = Some(range);
+        let mut nearest: Option<f64> = None;
+        for (at, (count, &range)) in (1_u32..).zip(&self.ranges).enumerate() {
+            let is_nearer = nearest.is_none_or(|nearest| f64::from(range) < nearest);
+            let is_detected =
+                sonar.is_in_reach(range.into()) && angle::wrap(beam - sonar.bearing).abs() <= cone;
+            if is_nearer && is_detected && is_heard(at, range) {
+                nearest = Some(range.into());
             }
             beam = self.first + f64::from(count) * self.step;
         }
-        earliest
+        nearest
+    }
+}
+
+impl Cone {
+    /// That of a robot's sonar at a bearing.
+    #[must_use]
+    pub fn of(sonar: &Sonar, bearing: Radians) -> Self {
+        Self {
+            bearing: bearing.0.into(),
+            cone: sonar.cone.0.into(),
+            reach: (sonar.min_range.0.into(), sonar.max_range.0.into()),
+        }
+    }
+
+    fn is_in_reach(&self, range: f64) -> bool {
+        let (nearest, farthest) = self.reach;
+        range > 0.0 && range >= nearest && range <= farthest
     }
 }
 

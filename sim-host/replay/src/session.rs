@@ -23,7 +23,7 @@ use crate::estimators::{Estimators, Searches};
 use crate::fault::{Fault, ReplayError};
 use crate::log::Record;
 use crate::reference::{Reference, micros, seconds};
-use crate::scan::{Cone, PING_PERIOD, PINGS_A_SCAN, Scan};
+use crate::scan::{Cone, Scan, Sweep};
 use crate::score::{Score, Verdicts};
 use crate::wheels::Reading;
 
@@ -136,8 +136,8 @@ pub struct Session<'a, R, V> {
     beams: usize,
     /// Time from which the next scan is used.
     next_fix: i64,
-    /// Time up to which a robot that searches has pinged.
-    swept_until: i64,
+    /// The pings of a robot that searches.
+    sweep: Sweep,
     score: Score,
     tally: Tally,
 }
@@ -165,7 +165,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
             pending: Vec::new(),
             beams: 0,
             next_fix: 0,
-            swept_until: 0,
+            sweep: Sweep::default(),
             score: Score::default(),
             tally: Tally::default(),
         }
@@ -378,14 +378,11 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         if time < earliest {
             return Err(Fault::TimeWentBack.into());
         }
-        let beams = match &echo {
-            Echo::At { .. } | Echo::Skip | Echo::Pose(_) | Echo::Mode { .. } => 0,
-            Echo::Scan { scan, .. } => scan.ranges.len(),
-        };
+        let beams = echo.beams();
         let is_searching = self.estimators.as_ref().is_some_and(Estimators::is_searching);
         if let Echo::Scan { is_due, swept, .. } = &mut echo {
             *is_due = time >= self.next_fix;
-            *swept = if is_searching { self.pings_until(time) } else { 0 };
+            *swept = if is_searching { self.sweep.pings_until(time) } else { 0 };
             if !*is_due && *swept == 0 {
                 return Ok(());
             }
@@ -400,14 +397,6 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         self.beams += beams;
         self.pending.push(Pending { time, echo });
         Ok(())
-    }
-
-    /// How many pings a sonar that sweeps has made since its last one.
-    fn pings_until(&mut self, time: i64) -> u32 {
-        let pings = ((time - self.swept_until) / PING_PERIOD).clamp(0, PINGS_A_SCAN);
-        self.swept_until =
-            if pings < PINGS_A_SCAN { self.swept_until + pings * PING_PERIOD } else { time };
-        u32::try_from(pings).unwrap_or(0)
     }
 
     /// Processes the interval between two encoder records.
@@ -426,7 +415,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         let lived = self.live(&mut estimators, from, to, &mut pending, complain);
         // Ranges later than the record, or after an error.
         self.pending = pending.filter(|pending| pending.time > to.time).collect();
-        self.beams = self.pending.iter().map(Pending::beams).sum();
+        self.beams = self.pending.iter().map(|pending| pending.echo.beams()).sum();
         if lived.is_err() {
             estimators.received.wheels = to.wheels;
         }
@@ -535,7 +524,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         measurement.range = match &pending.echo {
             Echo::At { range, .. } => *range,
             Echo::Skip | Echo::Pose(_) | Echo::Mode { .. } => None,
-            Echo::Scan { scan, .. } => scan.earliest(&cone(aim.bearing, sonar)),
+            Echo::Scan { scan, .. } => scan.earliest(&Cone::of(sonar, aim.bearing)),
         };
         #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
         let range = measurement.range.map(|range| Metres(range as f32));
@@ -571,16 +560,16 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
             started_at: seconds(estimators.epoch),
             duration,
             localizer: estimators.localizer().clone(),
-            searches: estimators.search.is_some().then_some(estimators.searches),
+            searches: self.robot.start.is_unknown().then_some(estimators.searches),
             score: self.score,
             tally: self.tally,
         })
     }
 }
 
-impl Pending {
+impl Echo {
     fn beams(&self) -> usize {
-        match &self.echo {
+        match self {
             Echo::At { .. } | Echo::Skip | Echo::Pose(_) | Echo::Mode { .. } => 0,
             Echo::Scan { scan, .. } => scan.ranges.len(),
         }
@@ -598,20 +587,11 @@ fn sweep(estimators: &mut Estimators, echo: &Echo, sonar: &Sonar) {
         Echo::Scan { scan, swept, .. } => {
             for _ in 0..*swept {
                 let Some(bearing) = estimators.sweep() else { return };
-                let range = scan.specular(&cone(bearing, sonar)).map(|range| single([range]));
+                let range = scan.specular(&Cone::of(sonar, bearing)).map(|range| single([range]));
                 estimators.swept(bearing, range.map(|[range]| Metres(range)));
             }
         }
         Echo::Skip | Echo::Pose(_) | Echo::Mode { .. } => {}
-    }
-}
-
-/// The cone of a sonar with this bearing.
-fn cone(bearing: Radians, sonar: &Sonar) -> Cone {
-    Cone {
-        bearing: bearing.0.into(),
-        cone: sonar.cone.0.into(),
-        reach: (sonar.min_range.0.into(), sonar.max_range.0.into()),
     }
 }
 

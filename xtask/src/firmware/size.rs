@@ -11,8 +11,9 @@ use crate::elf;
 
 /// Largest flash size of core, loop and drivers. It was 32 KiB before the robot's hardware became part of the
 /// configuration (3 KiB in the drivers: every ranger, wheel and servo is set at run time) and before the
-/// echo model (3 KiB in the core, logarithm and exponential included): 36 KiB. The search has 16 KiB more, and 4 KiB are for the association of an echo with other
-/// reflectors than its target and for the growth of the covariance without odometry.
+/// echo model (3 KiB in the core, logarithm and exponential included): 36 KiB. The search has 16 KiB more, and 4 KiB
+/// are for the association of an echo with other reflectors than its target and for the growth of the covariance
+/// without odometry.
 const FLASH_BAR: u64 = (36 + 16 + 4) * 1024;
 /// Their crates.
 const CORE: [&str; 4] = ["sonarfix", "sonarfix-hal", "libm", "nalgebra"];

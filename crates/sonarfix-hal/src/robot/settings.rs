@@ -15,7 +15,7 @@ pub enum Stamp {
 }
 
 /// Evaluations of the search a millisecond: the computing time that simulation, replay and the STM32 firmware grant it.
-/// 40 evaluations of 1,290 instructions on average (`docs/search.md`) are some 52,000 of the 168,000 cycles that a
+/// 40 evaluations of 1,380 instructions on average (`docs/search.md`) are some 55,000 of the 168,000 cycles that a
 /// Cortex-M4F at 168 MHz has in a millisecond, and leave half of it free at 1.6 cycles an instruction.
 pub const EVALUATIONS_PER_MILLISECOND: u16 = 40;
 

@@ -7,6 +7,7 @@ use crate::config::Sonar;
 use crate::echo::{EchoParameters, LogShares};
 use crate::elementary::{ln, sqrt};
 use crate::map::Map;
+use crate::numeric::at_least;
 use crate::reflector::{Beam, Heard, Reflector, Reflectors};
 use crate::vector::Vector;
 
@@ -159,8 +160,4 @@ impl<'m> EchoModel<'m> {
             Heard::Foot => Audible { hit: self.shares.answers, miss: self.shares.misses },
         })
     }
-}
-
-fn at_least(value: f32, least: f32) -> f32 {
-    if value > least { value } else { least }
 }

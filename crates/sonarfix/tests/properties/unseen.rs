@@ -57,6 +57,26 @@ fn missing(localizer: &mut Localizer, ticks: core::ops::RangeInclusive<u64>) {
     ticks.for_each(|tick| localizer.odometry_missing(at(tick)));
 }
 
+/// Two localizers after the same travel, which the encoders of the first reported after failures of so many ticks; and
+/// the travel, of this length a tick.
+fn after_a_failure<'m>(
+    walls: &'m [Wall],
+    room: &Room,
+    ticks: u16,
+    a_tick: [f32; 2],
+) -> (Localizer<'m>, Localizer<'m>, WheelTravel) {
+    let (mut without, now) = driven(walls, room, 1.0);
+    let mut with = without.clone();
+    let end = now + u64::from(ticks);
+    missing(&mut with, now + 1..=end - 1);
+    let [right, left] = a_tick.map(|metres| metres * f32::from(ticks));
+    let travel = WheelTravel::new(right, left);
+    for localizer in [&mut with, &mut without] {
+        localizer.odometry(at(end), travel).unwrap();
+    }
+    (with, without, travel)
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(256))]
 
@@ -99,14 +119,7 @@ proptest! {
         room in any_room(), ticks in 1_u16..5, right in -0.01_f32..0.01, left in -0.01_f32..0.01,
     ) {
         let walls = room.walls();
-        let (mut without, now) = driven(&walls, &room, 1.0);
-        let mut with = without.clone();
-        let end = now + u64::from(ticks);
-        missing(&mut with, now + 1..=end - 1);
-        let travel = WheelTravel::new(right * f32::from(ticks), left * f32::from(ticks));
-        for localizer in [&mut with, &mut without] {
-            localizer.odometry(at(end), travel).unwrap();
-        }
+        let (with, without, _) = after_a_failure(&walls, &room, ticks, [right, left]);
         prop_assert_eq!(bits(with.filter()), bits(without.filter()));
         prop_assert_eq!(with.health().verdict, Verdict::Tracking);
         prop_assert!(!with.is_odometry_missing());
@@ -119,14 +132,7 @@ proptest! {
         room in any_room(), ticks in 7_u16..500, right in -0.01_f32..0.01, left in -0.01_f32..0.01,
     ) {
         let walls = room.walls();
-        let (mut without, now) = driven(&walls, &room, 1.0);
-        let mut with = without.clone();
-        let end = now + u64::from(ticks);
-        missing(&mut with, now + 1..=end - 1);
-        let travel = WheelTravel::new(right * f32::from(ticks), left * f32::from(ticks));
-        for localizer in [&mut with, &mut without] {
-            localizer.odometry(at(end), travel).unwrap();
-        }
+        let (with, without, travel) = after_a_failure(&walls, &room, ticks, [right, left]);
         let distance = f64::from(travel.distance().0).powi(2);
         for (state, added) in [(X, distance), (Y, distance), (HEADING, 0.0)] {
             let expected = variance(without.filter(), state) + added;

@@ -3,25 +3,8 @@
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use sonarfix_map::Scenario;
+use sonarfix_map::{SCENARIO_KEYS, Scenario};
 use toml::{Table, Value};
-
-/// The keys of a scenario; any other key is one of the robot.
-const OF_SCENARIO: [&str; 13] = [
-    "name",
-    "description",
-    "fidelity",
-    "map",
-    "robot",
-    "path",
-    "start",
-    "truth",
-    "sensor",
-    "servo",
-    "world",
-    "faults",
-    "run",
-];
 
 /// The scenario of a file with these values of its keys.
 pub fn scenario(file: &Path, text: &str, values: &[(String, String)]) -> anyhow::Result<Scenario> {
@@ -29,7 +12,8 @@ pub fn scenario(file: &Path, text: &str, values: &[(String, String)]) -> anyhow:
     let mut root: Table = text.parse().with_context(|| file.display().to_string())?;
     for (key, value) in values {
         let mut path: Vec<&str> = key.split('.').collect();
-        if path.first().is_some_and(|first| !OF_SCENARIO.contains(first)) {
+        // Any other key is one of the robot.
+        if path.first().is_some_and(|first| !SCENARIO_KEYS.contains(first)) {
             path.insert(0, "robot");
         }
         if let Some(first) = path.first() {
