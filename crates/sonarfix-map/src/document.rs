@@ -1,14 +1,19 @@
-//! A TOML file as a tree in which every value has its line and its full key, for error messages.
+//! A TOML file as a tree in which every value has its line and its full key.
+//!
+//! A mistake in a value ends nothing: it is recorded, the reader goes on with a placeholder, and [`Document::read`] returns
+//! all mistakes at once.
 
+use std::cell::{Cell, RefCell};
 use std::ops::RangeInclusive;
 
 use sonarfix::units::Duration;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::error::FileError;
-use crate::quantity::{Dimension, FRACTION, LENGTH, TIME, Unit};
-use crate::spelling::nearest;
+use crate::error::{FileError, Mistake};
+use crate::example;
+use crate::quantity::{Dimension, FRACTION, LENGTH, METRE, TIME, Unit};
+use crate::spelling::{alternatives, nearest};
 
 /// The version of the formats that this crate reads.
 const FORMAT: u64 = 1;
@@ -16,38 +21,47 @@ const FORMAT: u64 = 1;
 /// The longest duration in a file, seconds.
 const LONGEST_SPAN: f64 = 3600.0;
 
+/// A number in place of one that cannot be read; every dimension permits it.
+const PLACEHOLDER: f64 = 1.0;
+
 #[derive(Clone, Copy)]
 struct File<'a> {
     name: &'a str,
     text: &'a str,
+    mistakes: &'a RefCell<Vec<Mistake>>,
 }
 
 impl File<'_> {
-    fn error(self, at: usize, key: &str, message: impl Into<String>) -> FileError {
-        let before = self.text.bytes().take(at);
-        let line = before.filter(|&byte| byte == b'\n').count() + 1;
-        FileError::new(self.name, line, key, message)
+    fn record(self, at: usize, key: &str, message: impl Into<String>) {
+        let mistake = Mistake::new(self.name, line(self.text, at), key, message);
+        self.mistakes.borrow_mut().push(mistake);
     }
+}
+
+fn line(text: &str, at: usize) -> usize {
+    text.bytes().take(at).filter(|&byte| byte == b'\n').count() + 1
 }
 
 /// A parsed file.
 pub(crate) struct Document<'a> {
-    file: File<'a>,
+    name: &'a str,
+    text: &'a str,
+    mistakes: RefCell<Vec<Mistake>>,
     root: DeValue<'a>,
 }
 
 impl<'a> Document<'a> {
     /// Parses the text of the file `name`.
     pub fn parse(text: &'a str, name: &'a str) -> Result<Self, FileError> {
-        let file = File { name, text };
         let root = DeTable::parse(text).map_err(|error| {
             let span = error.span().unwrap_or_default();
             let rest = text.get(span.start..).unwrap_or_default();
             let near = rest.lines().next().unwrap_or_default();
             let message = format!("this is not TOML at `{near}`: {}", error.message());
-            file.error(span.start, "", message)
+            FileError::from(Mistake::new(name, line(text, span.start), "", message))
         })?;
-        Ok(Self { file, root: DeValue::Table(root.into_inner()) })
+        let root = DeValue::Table(root.into_inner());
+        Ok(Self { name, text, mistakes: RefCell::default(), root })
     }
 
     /// Whether the file has a value at this key.
@@ -55,18 +69,25 @@ impl<'a> Document<'a> {
         self.root.as_table().is_some_and(|table| table.contains_key(key))
     }
 
-    /// The file as a table with the keys `format` and `keys`. The version is checked first, because another version may
-    /// have other keys.
-    pub fn root(&self, keys: &[&str]) -> Result<Table<'_>, FileError> {
-        let root =
-            Node { file: self.file, key: String::new(), at: 0, value: &self.root }.any_table()?;
-        let format = root.require("format")?;
-        let version = format.integer(0..=u64::MAX)?;
-        if version != FORMAT {
-            let message = format!("version {version} cannot be read, only version {FORMAT}");
-            return Err(format.error(message));
+    /// Reads the file as a table with the keys `format` and `keys`. The version is checked first, because another version
+    /// may have other keys.
+    ///
+    /// # Errors
+    /// All mistakes that were recorded, by line.
+    pub fn read<T>(
+        &self,
+        keys: &[&str],
+        read: impl FnOnce(&Table<'_>) -> Option<T>,
+    ) -> Result<T, FileError> {
+        let file = File { name: self.name, text: self.text, mistakes: &self.mistakes };
+        let root = Node::new(file, String::new(), 0, Some(&self.root)).any_table();
+        let value =
+            root.has_known_format().then(|| read(&root.only(&[&["format"], keys].concat())));
+        match (FileError::of(self.mistakes.take()), value.flatten()) {
+            (Some(error), _) => Err(error),
+            (None, Some(value)) => Ok(value),
+            (None, None) => Err(FileError::of_file(self.name, "cannot be read")),
         }
-        root.only(&[&["format"], keys].concat())
     }
 }
 
@@ -82,19 +103,34 @@ pub(crate) fn lines(text: &str, places: &[usize]) -> Vec<usize> {
     places.iter().map(&mut line_at).collect()
 }
 
-/// A value, with its place in the file.
+/// A value, with its place in the file; or the place where a value is missing.
 pub(crate) struct Node<'a> {
     file: File<'a>,
     key: String,
     /// Position of the value in the text; of a table, of its header.
     at: usize,
-    value: &'a DeValue<'a>,
+    /// None for a value that is missing, which is recorded where it was asked for.
+    value: Option<&'a DeValue<'a>>,
+    /// Whether a mistake in this value has been recorded. What follows from it is not.
+    is_reported: Cell<bool>,
 }
 
 impl<'a> Node<'a> {
-    /// An error at this value.
-    pub fn error(&self, message: impl Into<String>) -> FileError {
-        self.file.error(self.at, &self.key, message)
+    fn new(file: File<'a>, key: String, at: usize, value: Option<&'a DeValue<'a>>) -> Self {
+        Self { file, key, at, value, is_reported: Cell::new(value.is_none()) }
+    }
+
+    /// Records a mistake in this value, unless one has been recorded.
+    pub fn report(&self, message: impl Into<String>) {
+        if !self.is_reported.replace(true) {
+            self.file.record(self.at, &self.key, message);
+        }
+    }
+
+    /// Records the mistakes of another file, which this value names.
+    pub fn report_all(&self, error: FileError) {
+        self.is_reported.set(true);
+        self.file.mistakes.borrow_mut().extend(error);
     }
 
     /// Position of the value in the text; of a table, of its header.
@@ -102,79 +138,110 @@ impl<'a> Node<'a> {
         self.at
     }
 
-    /// Returns the value if the rule holds, otherwise an error with the rule.
-    pub fn check<T>(&self, value: T, holds: bool, rule: &str) -> Result<T, FileError> {
-        if holds { Ok(value) } else { Err(self.error(format!("must be {rule}"))) }
+    /// The value; records the rule if it does not hold.
+    pub fn check<T>(&self, value: T, holds: bool, rule: &str) -> T {
+        if !holds {
+            self.report(format!("must be {rule}"));
+        }
+        value
     }
 
-    fn wrong_type(&self, expected: &str) -> FileError {
-        let found = self.value.type_str();
-        self.error(format!("must be {expected}, but this is of type {found}"))
+    fn wrong_type(&self, expected: &str) {
+        let found = self.value.map_or("", DeValue::type_str);
+        self.report(format!("must be {expected}, but this is of type {found}"));
     }
 
     fn child(&self, key: String, value: &'a Spanned<DeValue<'a>>) -> Self {
-        Self { file: self.file, key, at: value.span().start, value: value.get_ref() }
+        Self::new(self.file, key, value.span().start, Some(value.get_ref()))
+    }
+
+    fn missing(&self, key: String) -> Self {
+        Self::new(self.file, key, self.at, None)
     }
 
     /// A table with these keys only.
-    pub fn table(self, keys: &[&str]) -> Result<Table<'a>, FileError> {
-        self.any_table()?.only(keys)
+    pub fn table(self, keys: &[&str]) -> Table<'a> {
+        self.any_table().only(keys)
     }
 
-    fn any_table(self) -> Result<Table<'a>, FileError> {
-        match self.value {
-            DeValue::Table(entries) => Ok(Table { node: self, entries }),
-            _ => Err(self.wrong_type("a table")),
+    fn any_table(self) -> Table<'a> {
+        let entries = self.value.and_then(DeValue::as_table);
+        if entries.is_none() {
+            self.wrong_type("a table");
         }
+        Table { node: self, entries, misspelt: Vec::new() }
     }
 
     /// The values of an array.
-    pub fn items(&self) -> Result<Vec<Self>, FileError> {
-        let array = self.value.as_array().ok_or_else(|| self.wrong_type("an array"))?;
+    pub fn items(&self) -> Vec<Self> {
+        let Some(array) = self.value.and_then(DeValue::as_array) else {
+            self.wrong_type("an array");
+            return Vec::new();
+        };
         let item = |(index, value)| self.child(format!("{}[{index}]", self.key), value);
-        Ok(array.iter().enumerate().map(item).collect())
+        array.iter().enumerate().map(item).collect()
     }
 
     /// The two values of an array of two.
-    pub fn pair(&self) -> Result<[Self; 2], FileError> {
-        let items = self.items()?;
+    pub fn pair(&self) -> [Self; 2] {
+        let items = self.items();
         let count = items.len();
-        items
-            .try_into()
-            .map_err(|_| self.error(format!("must be two values, but there are {count}")))
+        items.try_into().unwrap_or_else(|_| {
+            self.report(format!("must be two values, but there are {count}"));
+            [0, 1].map(|index| self.missing(format!("{}[{index}]", self.key)))
+        })
     }
 
     /// A string; `None` for another type.
     pub fn as_text(&self) -> Option<&'a str> {
-        self.value.as_str()
+        self.value?.as_str()
     }
 
     /// A string.
-    pub fn text(&self) -> Result<&'a str, FileError> {
-        self.as_text().ok_or_else(|| self.wrong_type("a string"))
+    pub fn text(&self) -> &'a str {
+        self.as_text().unwrap_or_else(|| {
+            self.wrong_type("a string");
+            ""
+        })
+    }
+
+    /// The meaning of one of several words; a placeholder for another text.
+    pub fn one_of<T: Copy>(&self, words: &[(&str, T)], placeholder: T) -> T {
+        let text = self.text();
+        let found = words.iter().find(|(word, _)| *word == text);
+        let Some((_, meaning)) = found else {
+            let known: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
+            self.report(format!("must be {}", alternatives(text, &known)));
+            return placeholder;
+        };
+        *meaning
     }
 
     /// `true` or `false`.
-    pub fn boolean(&self) -> Result<bool, FileError> {
-        let boolean = self.value.as_bool();
-        boolean.ok_or_else(|| self.wrong_type("true or false"))
+    pub fn boolean(&self) -> bool {
+        self.value.and_then(DeValue::as_bool).unwrap_or_else(|| {
+            self.wrong_type("true or false");
+            false
+        })
     }
 
     /// A whole number within these limits.
-    pub fn integer(&self, limits: RangeInclusive<u64>) -> Result<u64, FileError> {
+    pub fn integer(&self, limits: RangeInclusive<u64>) -> u64 {
         let expected = format!("a whole number from {} to {}", limits.start(), limits.end());
-        let Some(integer) = self.value.as_integer() else {
-            return Err(self.wrong_type(&expected));
+        let Some(integer) = self.value.and_then(DeValue::as_integer) else {
+            self.wrong_type(&expected);
+            return *limits.start();
         };
         let number = u64::from_str_radix(integer.as_str(), integer.radix()).ok();
-        number
-            .filter(|number| limits.contains(number))
-            .ok_or_else(|| self.error(format!("must be {expected}")))
+        number.filter(|number| limits.contains(number)).unwrap_or_else(|| {
+            self.report(format!("must be {expected}"));
+            *limits.start()
+        })
     }
 
     /// The text of a number; `None` for another type.
     fn number_text(&self) -> Option<&'a str> {
-        match self.value {
+        match self.value? {
             DeValue::Integer(integer) if integer.radix() == 10 => Some(integer.as_str()),
             DeValue::Float(float) => Some(float.as_str()),
             _ => None,
@@ -182,93 +249,116 @@ impl<'a> Node<'a> {
     }
 
     /// A finite number without a unit.
-    pub fn number(&self) -> Result<f64, FileError> {
-        let number = self.number_text().and_then(|text| text.parse().ok());
-        let number: f64 = number.ok_or_else(|| self.wrong_type("a number"))?;
-        self.check(number, number.is_finite(), "finite")
+    pub fn number(&self) -> f64 {
+        let number: Option<f64> = self.number_text().and_then(|text| text.parse().ok());
+        match number {
+            Some(number) if number.is_finite() => return number,
+            Some(_) => self.report("must be finite"),
+            None => self.wrong_type("a number"),
+        }
+        PLACEHOLDER
     }
 
     /// A number with a unit, converted to the SI unit.
-    pub fn quantity(&self, dimension: &Dimension) -> Result<f64, FileError> {
+    pub fn quantity(&self, dimension: &Dimension) -> f64 {
         if let Some(number) = self.number_text() {
-            return Err(self.error(dimension.missing_unit(number)));
+            self.report(dimension.missing_unit(number));
+            return PLACEHOLDER;
         }
-        let parsed = dimension.parse(self.text()?);
-        parsed.map_err(|message| self.error(message))
+        dimension.parse(self.text()).unwrap_or_else(|message| {
+            self.report(message);
+            PLACEHOLDER
+        })
     }
 
     /// A quantity that is not negative.
-    pub fn deviation(&self, dimension: &Dimension) -> Result<f64, FileError> {
-        let value = self.quantity(dimension)?;
+    pub fn deviation(&self, dimension: &Dimension) -> f64 {
+        let value = self.quantity(dimension);
         self.check(value, value >= 0.0, "zero or positive")
     }
 
     /// A fraction, as a number or in per cent.
-    pub fn fraction(&self) -> Result<f64, FileError> {
-        if self.number_text().is_some() {
-            return self.number();
-        }
-        self.quantity(&FRACTION)
+    pub fn fraction(&self) -> f64 {
+        if self.number_text().is_some() { self.number() } else { self.quantity(&FRACTION) }
     }
 
     /// A duration in whole microseconds, the resolution of the localizer's time.
-    pub fn span(&self) -> Result<Duration, FileError> {
-        let seconds = self.quantity(&TIME)?;
-        let fits = (0.0..=LONGEST_SPAN).contains(&seconds);
-        let seconds = self.check(seconds, fits, "from 0 s to 1 hour")?;
+    pub fn span(&self) -> Duration {
+        self.duration(0.0, "from 0 s to 1 hour")
+    }
+
+    /// A duration longer than zero.
+    pub fn period(&self) -> Duration {
+        self.duration(1e-6, "from 1 us to 1 hour")
+    }
+
+    fn duration(&self, shortest: f64, limits: &str) -> Duration {
+        let seconds = self.quantity(&TIME);
+        if !(shortest..=LONGEST_SPAN).contains(&seconds) {
+            self.report(format!("must be {limits}"));
+            return Duration::secs(1);
+        }
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             reason = "rounded, and between 0 and 3.6e9"
         )]
         let microseconds = (seconds * 1e6).round() as u64;
-        Ok(Duration::micros(microseconds))
-    }
-
-    /// A duration longer than zero.
-    pub fn period(&self) -> Result<Duration, FileError> {
-        const SHORTEST: f64 = 1e-6;
-        let seconds = self.quantity(&TIME)?;
-        self.check(seconds, (SHORTEST..=LONGEST_SPAN).contains(&seconds), "from 1 us to 1 hour")?;
-        self.span()
+        Duration::micros(microseconds)
     }
 
     /// The unit of a table's coordinates.
-    pub fn unit_of_length(&self) -> Result<&'static Unit, FileError> {
-        let unit = LENGTH.unit(self.text()?);
-        unit.ok_or_else(|| self.error(format!("must be one of {}", LENGTH.unit_names())))
+    pub fn unit_of_length(&self) -> &'static Unit {
+        LENGTH.unit(self.text()).unwrap_or_else(|| {
+            self.report(format!("must be one of {}", LENGTH.unit_names()));
+            &METRE
+        })
     }
 
     /// A point of two bare coordinates, in metres.
-    pub fn point(&self, unit: &Unit) -> Result<[f64; 2], FileError> {
-        let [x, y] = self.pair()?;
-        Ok([unit.in_si(x.number()?), unit.in_si(y.number()?)])
+    pub fn point(&self, unit: &Unit) -> [f64; 2] {
+        self.pair().map(|coordinate| unit.in_si(coordinate.number()))
     }
 }
 
 /// A table, with its place in the file.
 pub(crate) struct Table<'a> {
     node: Node<'a>,
-    entries: &'a DeTable<'a>,
+    /// None for a table that is missing: all its values are, too.
+    entries: Option<&'a DeTable<'a>>,
+    /// Known keys for which an unknown one was probably meant.
+    misspelt: Vec<String>,
 }
 
 impl<'a> Table<'a> {
-    fn only(self, keys: &[&str]) -> Result<Self, FileError> {
-        let unknown = self.entries.keys().filter(|key| !keys.contains(&key.get_ref().as_ref()));
-        match unknown.min_by_key(|key| key.span().start) {
-            None => Ok(self),
-            Some(key) => {
-                let known = keys.join(", ");
-                let message = match nearest(key.get_ref(), keys) {
-                    Some(meant) => {
-                        format!("unknown key: did you mean `{meant}`? possible here: {known}")
-                    }
-                    None => format!("unknown key; possible here: {known}"),
-                };
-                let whole_key = self.key_of(key.get_ref());
-                Err(self.node.file.error(key.span().start, &whole_key, message))
-            }
+    /// Whether the version of the format is one that can be read, or missing, which is recorded.
+    fn has_known_format(&self) -> bool {
+        let format = self.require("format");
+        let version = if format.value.is_some() { format.integer(0..=u64::MAX) } else { FORMAT };
+        if version != FORMAT {
+            format.report(format!("version {version} cannot be read, only version {FORMAT}"));
         }
+        version == FORMAT
+    }
+
+    /// The same table; records its keys that are not among these.
+    fn only(mut self, keys: &[&str]) -> Self {
+        let known = keys.join(", ");
+        for key in self.entries.into_iter().flat_map(DeTable::keys) {
+            let name: &str = key.get_ref();
+            if keys.contains(&name) {
+                continue;
+            }
+            let message = match nearest(name, keys) {
+                Some(meant) => {
+                    self.misspelt.push(meant.to_owned());
+                    format!("unknown key: did you mean `{meant}`? possible here: {known}")
+                }
+                None => format!("unknown key; possible here: {known}"),
+            };
+            self.node.file.record(key.span().start, &self.key_of(name), message);
+        }
+        self
     }
 
     fn key_of(&self, key: &str) -> String {
@@ -277,33 +367,44 @@ impl<'a> Table<'a> {
 
     /// The value of an optional key.
     pub fn get(&self, key: &str) -> Option<Node<'a>> {
-        let value = self.entries.get(key)?;
+        let value = self.entries?.get(key)?;
         Some(self.node.child(self.key_of(key), value))
     }
 
-    /// The value of a required key.
-    pub fn require(&self, key: &str) -> Result<Node<'a>, FileError> {
-        self.get(key).ok_or_else(|| {
-            let node = &self.node;
-            node.file.error(node.at, &self.key_of(key), "is missing")
+    /// The value of a required key. A missing one is recorded, unless the key is misspelt or its whole table is missing.
+    pub fn require(&self, key: &str) -> Node<'a> {
+        self.get(key).unwrap_or_else(|| {
+            let whole_key = self.key_of(key);
+            if self.entries.is_some() && !self.misspelt.iter().any(|misspelt| misspelt == key) {
+                self.node.file.record(self.node.at, &whole_key, example::missing(&whole_key));
+            }
+            self.node.missing(whole_key)
         })
     }
 
     /// A required table with these keys only.
-    pub fn table(&self, key: &str, keys: &[&str]) -> Result<Table<'a>, FileError> {
-        self.require(key)?.table(keys)
+    pub fn table(&self, key: &str, keys: &[&str]) -> Table<'a> {
+        self.require(key).table(keys)
     }
 
-    /// An error at a dotted key of this table; at the innermost existing table if there is no such value.
-    pub fn error_at(&self, dotted: &str, message: impl Into<String>) -> FileError {
+    /// What a reader returns, if it records no mistake: placeholders are no input for rules about several values.
+    pub fn faultless<T>(&self, read: impl FnOnce() -> Option<T>) -> Option<T> {
+        let mistakes = self.mistakes();
+        read().filter(|_| self.mistakes() == mistakes)
+    }
+
+    /// The number of mistakes so far. A rule about several values is checked only if their reading adds none.
+    pub fn mistakes(&self) -> usize {
+        self.node.file.mistakes.borrow().len()
+    }
+
+    /// Records a mistake at a dotted key of this table; at the innermost existing table if there is no such value.
+    pub fn report_at(&self, dotted: &str, message: impl Into<String>) {
         let (first, rest) = dotted.split_once('.').unwrap_or((dotted, ""));
         match self.get(first) {
-            None => self.node.error(message),
-            Some(node) if rest.is_empty() => node.error(message),
-            Some(node) => match node.any_table() {
-                Ok(table) => table.error_at(rest, message),
-                Err(error) => error,
-            },
+            None => self.node.report(message),
+            Some(node) if rest.is_empty() => node.report(message),
+            Some(node) => node.any_table().report_at(rest, message),
         }
     }
 }

@@ -1,27 +1,20 @@
-//! An error in a file, with its position.
+//! Errors in files, with their positions.
 
 use std::fmt;
 
-/// An error in a file: `paper.toml:45: robot.sonar.cone: must be …`.
-///
-/// One type for every kind of error, because every caller only prints it for the author of the file.
+/// One mistake in a file: `paper.toml:45: robot.sonar.cone: must be …`.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct FileError {
+pub struct Mistake {
     file: String,
     line: Option<usize>,
     key: String,
     message: String,
 }
 
-impl FileError {
-    /// An error of the value of `key` in `line`.
+impl Mistake {
+    /// A mistake in the value of `key` in `line`.
     pub(crate) fn new(file: &str, line: usize, key: &str, message: impl Into<String>) -> Self {
         Self { file: file.into(), line: Some(line), key: key.into(), message: message.into() }
-    }
-
-    /// An error of the whole file.
-    pub(crate) fn of_file(file: &str, message: impl Into<String>) -> Self {
-        Self { file: file.into(), line: None, key: String::new(), message: message.into() }
     }
 
     /// The file, as named by the caller.
@@ -49,7 +42,7 @@ impl FileError {
     }
 }
 
-impl fmt::Display for FileError {
+impl fmt::Display for Mistake {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.file)?;
         if let Some(line) = self.line {
@@ -59,6 +52,64 @@ impl fmt::Display for FileError {
             write!(f, ": {}", self.key)?;
         }
         write!(f, ": {}", self.message)
+    }
+}
+
+/// All mistakes in a file and in the files that it names; displayed one a line.
+///
+/// One type for every kind of error, because every caller only prints it for the author of the file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FileError {
+    first: Mistake,
+    others: Vec<Mistake>,
+}
+
+impl FileError {
+    /// An error of the whole file.
+    pub(crate) fn of_file(file: &str, message: impl Into<String>) -> Self {
+        let (file, message) = (file.into(), message.into());
+        Mistake { file, line: None, key: String::new(), message }.into()
+    }
+
+    /// These mistakes: file by file, in the order of the lines. `None` if there are none.
+    pub(crate) fn of(mut mistakes: Vec<Mistake>) -> Option<Self> {
+        mistakes.sort_by(|a, b| (&a.file, a.line).cmp(&(&b.file, b.line)));
+        let mut mistakes = mistakes.into_iter();
+        let first = mistakes.next()?;
+        Some(Self { first, others: mistakes.collect() })
+    }
+
+    /// All mistakes: file by file, in the order of the lines.
+    pub fn mistakes(&self) -> impl Iterator<Item = &Mistake> {
+        std::iter::once(&self.first).chain(&self.others)
+    }
+
+    /// The first mistake.
+    #[must_use]
+    pub fn first(&self) -> &Mistake {
+        &self.first
+    }
+}
+
+impl From<Mistake> for FileError {
+    fn from(first: Mistake) -> Self {
+        Self { first, others: Vec::new() }
+    }
+}
+
+impl IntoIterator for FileError {
+    type Item = Mistake;
+    type IntoIter = std::iter::Chain<std::iter::Once<Mistake>, std::vec::IntoIter<Mistake>>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        std::iter::once(self.first).chain(self.others)
+    }
+}
+
+impl fmt::Display for FileError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.first)?;
+        self.others.iter().try_for_each(|mistake| write!(f, "\n{mistake}"))
     }
 }
 

@@ -1,7 +1,6 @@
 //! Faults of the hardware, with their times.
 
 use crate::document::{Node, Table};
-use crate::error::FileError;
 use crate::quantity::TIME;
 
 const KEYS: [&str; 7] = ["kind", "from", "to", "wheel", "share", "times", "late"];
@@ -56,57 +55,55 @@ pub struct Fault {
 }
 
 /// Reads `faults`, an optional array of tables.
-pub(crate) fn read(root: &Table<'_>) -> Result<Vec<Fault>, FileError> {
-    match root.get("faults") {
-        Some(list) => list.items()?.into_iter().map(fault).collect(),
-        None => Ok(Vec::new()),
-    }
+pub(crate) fn read(root: &Table<'_>) -> Vec<Fault> {
+    let items = root.get("faults").map(|list| list.items());
+    items.into_iter().flatten().filter_map(fault).collect()
 }
 
-fn fault(node: Node<'_>) -> Result<Fault, FileError> {
-    let table = node.table(&KEYS)?;
-    let from = table.require("from")?.deviation(&TIME)?;
-    let to_node = table.require("to")?;
-    let to = to_node.quantity(&TIME)?;
-    Ok(Fault { kind: kind(&table)?, from, to: to_node.check(to, to > from, "after `from`")? })
+/// None if its kind is unknown.
+fn fault(node: Node<'_>) -> Option<Fault> {
+    let table = node.table(&KEYS);
+    let from = table.require("from").deviation(&TIME);
+    let to_node = table.require("to");
+    let to = to_node.quantity(&TIME);
+    let kind = kind(&table)?;
+    Some(Fault { kind, from, to: to_node.check(to, to > from, "after `from`") })
 }
 
-fn kind(table: &Table<'_>) -> Result<FaultKind, FileError> {
-    let node = table.require("kind")?;
-    Ok(match node.text()? {
-        "lost_echoes" => FaultKind::LostEchoes(share(table)?),
-        "cross_talk" => FaultKind::CrossTalk(share(table)?),
+fn kind(table: &Table<'_>) -> Option<FaultKind> {
+    let node = table.require("kind");
+    Some(match node.text() {
+        "lost_echoes" => FaultKind::LostEchoes(share(table)),
+        "cross_talk" => FaultKind::CrossTalk(share(table)),
         "stuck_echo" => FaultKind::StuckEcho,
         "dead_sonar" => FaultKind::DeadSonar,
-        "dead_encoder" => FaultKind::DeadEncoder(wheel(table)?),
-        "reversed_encoder" => FaultKind::ReversedEncoder(wheel(table)?),
-        "missing_ticks" => FaultKind::MissingTicks(wheel(table)?, share(table)?),
-        "read_errors" => FaultKind::ReadErrors(wheel(table)?, share(table)?),
+        "dead_encoder" => FaultKind::DeadEncoder(wheel(table)),
+        "reversed_encoder" => FaultKind::ReversedEncoder(wheel(table)),
+        "missing_ticks" => FaultKind::MissingTicks(wheel(table), share(table)),
+        "read_errors" => FaultKind::ReadErrors(wheel(table), share(table)),
         "stuck_servo" => FaultKind::StuckServo,
-        "slow_servo" => FaultKind::SlowServo(times(table)?),
-        "clock_jitter" => FaultKind::ClockJitter(table.require("late")?.deviation(&TIME)?),
+        "slow_servo" => FaultKind::SlowServo(times(table)),
+        "clock_jitter" => FaultKind::ClockJitter(table.require("late").deviation(&TIME)),
         "brown_out" => FaultKind::BrownOut,
-        _ => return Err(node.error("must be one of the faults in docs/formats.md")),
+        _ => {
+            node.report("must be one of the faults in docs/formats.md");
+            return None;
+        }
     })
 }
 
-fn share(table: &Table<'_>) -> Result<f64, FileError> {
-    let node = table.require("share")?;
-    let share = node.fraction()?;
+fn share(table: &Table<'_>) -> f64 {
+    let node = table.require("share");
+    let share = node.fraction();
     node.check(share, (0.0..=1.0).contains(&share), "from 0 to 1")
 }
 
-fn times(table: &Table<'_>) -> Result<f64, FileError> {
-    let node = table.require("times")?;
-    let times = node.number()?;
+fn times(table: &Table<'_>) -> f64 {
+    let node = table.require("times");
+    let times = node.number();
     node.check(times, times >= 1.0, "at least 1")
 }
 
-fn wheel(table: &Table<'_>) -> Result<Wheel, FileError> {
-    let node = table.require("wheel")?;
-    match node.text()? {
-        "right" => Ok(Wheel::Right),
-        "left" => Ok(Wheel::Left),
-        _ => Err(node.error("must be \"right\" or \"left\"")),
-    }
+fn wheel(table: &Table<'_>) -> Wheel {
+    table.require("wheel").one_of(&[("right", Wheel::Right), ("left", Wheel::Left)], Wheel::Right)
 }

@@ -1,8 +1,8 @@
 //! The fidelity of a simulation, and the simulated hardware.
 
 use crate::document::{Node, Table};
-use crate::error::FileError;
 use crate::quantity::LENGTH;
+use crate::sonar_model::{self, SonarName};
 
 /// The part of the robot that is simulated between world and localizer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -12,24 +12,6 @@ pub enum Fidelity {
     Ideal,
     /// Pins and counters, with the drivers and the loop of a robot.
     Pins,
-}
-
-/// The robot's sonar.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum SonarName {
-    /// The paper's: always detects the nearest wall in its cone. Noise and cone are in `[truth]`.
-    #[default]
-    Ideal,
-    /// HC-SR04.
-    HcSr04,
-    /// LEGO NXT.
-    Nxt,
-    /// LV-MaxSonar-EZ, by pulse width.
-    LvMaxSonar,
-    /// SRF08.
-    Srf08,
-    /// Polaroid 6500 with its electrostatic transducer.
-    Polaroid6500,
 }
 
 /// The sonar's servo.
@@ -88,64 +70,41 @@ pub struct Hardware {
 }
 
 /// Reads an optional key whose value is one of several names.
-fn named<T: Copy + Default>(node: Option<Node<'_>>, names: &[(&str, T)]) -> Result<T, FileError> {
-    let Some(node) = node else {
-        return Ok(T::default());
-    };
-    let text = node.text()?;
-    let found = names.iter().find(|(name, _)| *name == text);
-    found.map(|(_, value)| *value).ok_or_else(|| {
-        let known: Vec<String> = names.iter().map(|(name, _)| format!("\"{name}\"")).collect();
-        node.error(format!("must be {}", known.join(" or ")))
-    })
+fn named<T: Copy + Default>(node: Option<Node<'_>>, names: &[(&str, T)]) -> T {
+    node.map_or_else(T::default, |node| node.one_of(names, T::default()))
 }
 
-pub(crate) fn read_fidelity(root: &Table<'_>) -> Result<Fidelity, FileError> {
+pub(crate) fn read_fidelity(root: &Table<'_>) -> Fidelity {
     named(root.get("fidelity"), &[("ideal", Fidelity::Ideal), ("pins", Fidelity::Pins)])
 }
 
-pub(crate) fn read_follow(path: &Table<'_>) -> Result<Follow, FileError> {
+pub(crate) fn read_follow(path: &Table<'_>) -> Follow {
     named(path.get("follow"), &[("truth", Follow::Truth), ("estimate", Follow::Estimate)])
 }
 
-/// Reads `[sensor]` and `[servo]`; the default is ideal.
-pub(crate) fn read_hardware(root: &Table<'_>) -> Result<Hardware, FileError> {
-    let optional = |key, keys: &[&str]| root.get(key).map(|node| node.table(keys)).transpose();
-    let sensor = optional("sensor", &["model"])?;
-    let servo = optional("servo", &["model"])?;
-    let sonars = [
-        ("ideal", SonarName::Ideal),
-        ("hc_sr04", SonarName::HcSr04),
-        ("nxt", SonarName::Nxt),
-        ("lv_maxsonar", SonarName::LvMaxSonar),
-        ("srf08", SonarName::Srf08),
-        ("polaroid_6500", SonarName::Polaroid6500),
-    ];
+pub(crate) fn read_hardware(root: &Table<'_>) -> Hardware {
+    let model = |key| root.get(key)?.table(&["model"]).get("model");
     let servos =
         [("ideal", ServoName::Ideal), ("sg90", ServoName::Sg90), ("mg996r", ServoName::Mg996r)];
-    Ok(Hardware {
-        sonar: named(model(sensor.as_ref()), &sonars)?,
-        servo: named(model(servo.as_ref()), &servos)?,
-    })
+    let ideal = SonarName::default();
+    let sonar = model("sensor")
+        .map_or(ideal, |node| sonar_model::read(&node, &[], ideal, |model| model.simulated));
+    Hardware { sonar, servo: named(model("servo"), &servos) }
 }
 
-fn model<'a>(table: Option<&Table<'a>>) -> Option<Node<'a>> {
-    table.and_then(|table| table.get("model"))
+pub(crate) fn read_upsets(truth: &Table<'_>) -> Upsets {
+    Upsets { slip: upset(truth, "slip"), bump: upset(truth, "bump") }
 }
 
-pub(crate) fn read_upsets(truth: &Table<'_>) -> Result<Upsets, FileError> {
-    Ok(Upsets { slip: upset(truth, "slip")?, bump: upset(truth, "bump")? })
-}
-
-fn upset(truth: &Table<'_>, key: &str) -> Result<Upset, FileError> {
+fn upset(truth: &Table<'_>, key: &str) -> Upset {
     let Some(node) = truth.get(key) else {
-        return Ok(Upset::default());
+        return Upset::default();
     };
-    let table = node.table(&["every", "by"])?;
-    let every_node = table.require("every")?;
-    let every = every_node.quantity(&LENGTH)?;
-    Ok(Upset {
-        every: every_node.check(every, every > 0.0, "positive")?,
-        by: table.require("by")?.deviation(&LENGTH)?,
-    })
+    let table = node.table(&["every", "by"]);
+    let every_node = table.require("every");
+    let every = every_node.quantity(&LENGTH);
+    Upset {
+        every: every_node.check(every, every > 0.0, "positive"),
+        by: table.require("by").deviation(&LENGTH),
+    }
 }

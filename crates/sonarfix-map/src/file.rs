@@ -21,6 +21,12 @@ pub(crate) fn read(path: &Path) -> Result<String, FileError> {
         .map_err(|error| FileError::of_file(&name(path), format!("cannot be read: {error}")))
 }
 
+/// The bytes of a file.
+pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>, FileError> {
+    read_bytes(path)
+        .map_err(|error| FileError::of_file(&name(path), format!("cannot be read: {error}")))
+}
+
 /// The bytes of a file of at most [`MAX_FILE_BYTES`].
 ///
 /// # Errors

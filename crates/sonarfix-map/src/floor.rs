@@ -68,7 +68,7 @@ impl Floor {
     /// Reads a map file.
     ///
     /// # Errors
-    /// [`FileError`] with the first error.
+    /// [`FileError`] with all mistakes.
     pub fn read(path: &Path) -> Result<Self, FileError> {
         Self::parse(&file::read(path)?, &file::name(path))
     }
@@ -76,37 +76,33 @@ impl Floor {
     /// Parses the text of a map file. Errors name it `file_name`.
     ///
     /// # Errors
-    /// [`FileError`] with the first error.
+    /// [`FileError`] with all mistakes.
     pub fn parse(text: &str, file_name: &str) -> Result<Self, FileError> {
         let document = Document::parse(text, file_name)?;
-        let root = document.root(&["map"])?;
-        Self::from_node(root.require("map")?)
-    }
-
-    /// Reads a `[map]` table.
-    pub(crate) fn from_node(node: Node<'_>) -> Result<Self, FileError> {
-        Self::with_places(node).map(|(floor, _)| floor)
+        document.read(&["map"], |root| Some(Self::from_node(root.require("map")).0))
     }
 
     /// Reads a `[map]` table; also returns the position of each wall in the text.
-    pub(crate) fn with_places(node: Node<'_>) -> Result<(Self, Vec<usize>), FileError> {
-        let map = node.table(&["unit", "wall"])?;
-        let unit = map.require("unit")?.unit_of_length()?;
-        let array = map.require("wall")?;
+    pub(crate) fn from_node(node: Node<'_>) -> (Self, Vec<usize>) {
+        let map = node.table(&["unit", "wall"]);
+        let unit = map.require("unit").unit_of_length();
+        let array = map.require("wall");
         let (mut walls, mut places) = (Vec::new(), Vec::new());
         let mut names = HashSet::new();
-        for item in array.items()? {
-            places.push(item.place());
-            let table = item.table(&["name", "from", "to"])?;
-            let wall = wall(&table, unit)?;
+        for item in array.items() {
+            let place = item.place();
+            let table = item.table(&["name", "from", "to"]);
+            let Some(wall) = wall(&table, unit) else { continue };
             if !names.insert(wall.name.clone()) {
                 let message = format!("another wall is already called \"{}\"", wall.name);
-                return Err(table.error_at("name", message));
+                table.report_at("name", message);
             }
+            places.push(place);
             walls.push(wall);
         }
-        let has_walls = !walls.is_empty();
-        array.check((Self { walls }, places), has_walls, "at least one wall")
+        // Walls that cannot be read have been recorded.
+        let is_empty = array.items().is_empty();
+        array.check((Self { walls }, places), !is_empty, "at least one wall")
     }
 
     /// A floor of these walls.
@@ -159,21 +155,27 @@ impl Floor {
     }
 }
 
-fn wall(table: &Table<'_>, unit: &Unit) -> Result<NamedWall, FileError> {
-    let name = table.require("name")?;
-    let name = name.check(name.text()?, !name.text()?.is_empty(), "a name")?;
+/// None if it is no wall, which is recorded.
+fn wall(table: &Table<'_>, unit: &Unit) -> Option<NamedWall> {
+    let mistakes = table.mistakes();
+    let name = table.require("name");
+    let name = name.check(name.text(), !name.text().is_empty(), "a name");
     let point = |key| {
-        let node = table.require(key)?;
-        let point = node.point(unit)?;
+        let node = table.require(key);
+        let point = node.point(unit);
         node.check(point, is_near_enough(point), TOO_FAR)
     };
-    let (from, to) = (point("from")?, point("to")?);
-    NamedWall::new(name.into(), from, to).map_err(|error| {
+    let (from, to) = (point("from"), point("to"));
+    let wall = NamedWall::new(name.into(), from, to);
+    if let Err(error) = &wall
+        && table.mistakes() == mistakes
+    {
         let message = match error {
             WallError::NotFinite => format!("must be {TOO_FAR}"),
             WallError::ZeroLength => "must differ from `from`: the wall has no length".into(),
             other => other.to_string(),
         };
-        table.error_at("to", message)
-    })
+        table.report_at("to", message);
+    }
+    wall.ok()
 }

@@ -1,7 +1,7 @@
 //! Reads and checks map, robot and scenario files for the localizer and the simulator. `docs/formats.md` describes the
 //! formats, key by key.
 //!
-//! Every error is a [`FileError`] with file, line and key:
+//! A [`FileError`] has all mistakes in a file, each with its line, its key and what to do:
 //!
 //! ```text
 //! paper.toml:45: robot.sonar.cone: must be between 0 and 90° (half of the cone)
@@ -25,6 +25,7 @@ mod bake;
 mod clearance;
 mod document;
 mod error;
+mod example;
 mod faults;
 mod fidelity;
 mod file;
@@ -33,31 +34,32 @@ mod geometry;
 mod map_file;
 mod neighbours;
 mod path;
-mod place;
 mod quantity;
 mod ranger_file;
 pub mod robot_file;
 mod robot_text;
 mod scenario;
 mod simplify;
+mod sonar_model;
 mod spelling;
 mod surroundings;
 mod survey;
 mod symmetry;
+mod wall_file;
 
 pub use bake::{BakeError, bake};
 pub use clearance::Collision;
-pub use error::FileError;
+pub use error::{FileError, Mistake};
 pub use faults::{Fault, FaultKind, Wheel};
-pub use fidelity::{Fidelity, Follow, Hardware, ServoName, SonarName, Upset, Upsets};
+pub use fidelity::{Fidelity, Follow, Hardware, ServoName, Upset, Upsets};
 pub use file::{MAX_FILE_BYTES, read_bytes, read_text};
 pub use floor::{Floor, NamedWall};
 pub use map_file::MapFile;
 pub use path::{Leg, Motion, Movement, Path, PathError, PathPlan, PathPose};
-pub use place::Place;
 pub use robot_text::text as robot_text;
 pub use scenario::{KEYS as SCENARIO_KEYS, Run, Scenario, Start, Truth};
 pub use simplify::{Limits, Simplified, simplify};
+pub use sonar_model::{SonarModel, SonarName};
 pub use surroundings::{Obstacle, Oscillation, Outline, Surroundings};
 pub use survey::{Finding, Flaw, Severity, survey};
 pub use symmetry::{Motion as SymmetryMotion, Symmetry, symmetries, with_cabinet};

@@ -1,123 +1,73 @@
 //! Reads a map from any file that contains one: a map file, a scenario, a CSV of segments, a baked map.
 
-use std::collections::HashSet;
 use std::path::Path;
 
 use sonarfix::config::Sonar;
-use sonarfix::map::{Map, WallError, image};
-use sonarfix::pose::Point;
-
-use sonarfix_hal::config::RobotConfig;
 
 use crate::document::{self, Document};
 use crate::error::FileError;
 use crate::file;
 use crate::floor::{Floor, NamedWall};
-use crate::geometry::TOO_FAR;
-use crate::quantity::{LENGTH, Unit};
 use crate::scenario::{self, Scenario};
+use crate::wall_file::WallFile;
 
 /// A map, with the position of each wall in its file.
 #[derive(Debug, Clone)]
 pub struct MapFile {
     /// The walls.
     pub floor: Floor,
-    /// The sonar of the robot, if the file is a scenario.
-    pub sonar: Option<Sonar>,
+    /// The scenario, if the file is one.
+    pub scenario: Option<Box<Scenario>>,
     name: String,
     /// The line of each wall; none in a baked map.
     lines: Vec<usize>,
 }
 
 impl MapFile {
-    /// Reads a map: a CSV of segments if the file's name ends in `.csv`, a baked map if the file starts with its
-    /// signature, otherwise a map or a scenario in TOML. `unit` is that of a CSV without a unit in its header.
+    /// Reads a map: a baked map if the file starts with its signature, a CSV of segments if its name ends in `.csv`,
+    /// otherwise TOML, in which a file with a `path` is a scenario. `unit` is that of a CSV without a unit in its header.
     ///
     /// # Errors
-    /// [`FileError`] with the first error.
+    /// [`FileError`] with all mistakes.
     pub fn read(path: &Path, unit: Option<&str>) -> Result<Self, FileError> {
-        let bytes = file::read_bytes(path).map_err(|error| {
-            FileError::of_file(&file::name(path), format!("cannot be read: {error}"))
-        })?;
-        let name = file::name(path);
-        if bytes.starts_with(&image::MAGIC) {
-            return Self::from_image(&bytes, name);
+        let (name, bytes) = (file::name(path), file::bytes(path)?);
+        if let Ok(text) = str::from_utf8(&bytes)
+            && let Ok(document) = Document::parse(text, &name)
+            && document.has("path")
+        {
+            let base = path.parent().unwrap_or(Path::new(""));
+            return Self::of_scenario(text, &document, name.clone(), base);
         }
-        let text = String::from_utf8(bytes)
-            .map_err(|_| FileError::of_file(&name, "is neither text nor a baked map"))?;
-        let is_csv =
-            path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
-        if is_csv {
-            return Self::from_csv(&text, name, unit);
-        }
-        let base = path.parent().unwrap_or(Path::new(""));
-        Self::from_toml(&text, name, base)
+        let WallFile { floor, lines } = WallFile::parse(bytes, path, unit)?;
+        Ok(Self { floor, scenario: None, name, lines })
     }
 
-    /// Parses the text of a map file or a scenario.
-    fn from_toml(text: &str, name: String, base: &Path) -> Result<Self, FileError> {
-        let document = Document::parse(text, &name)?;
-        let root = document.root(&scenario::KEYS)?;
-        let is_scenario = root.get("path").is_some();
-        if !is_scenario {
-            let map = document.root(&["map"])?.require("map")?;
-            let (floor, places) = Floor::with_places(map)?;
-            let lines = document::lines(text, &places);
-            return Ok(Self { floor, sonar: None, lines, name });
-        }
-        let Scenario { floor, robot: RobotConfig { localizer: config, .. }, .. } =
-            Scenario::parse(text, &name, base)?;
-        let map = root.require("map")?;
-        if let Some(file) = map.as_text() {
-            let map = Self::read(&base.join(file), None)?;
-            return Ok(Self { sonar: Some(config.sonar), ..map });
-        }
-        let (_, places) = Floor::with_places(map)?;
-        let lines = document::lines(text, &places);
-        Ok(Self { floor, sonar: Some(config.sonar), lines, name })
-    }
-
-    /// Reads a baked map. Its walls are named by their numbers.
-    fn from_image(bytes: &[u8], name: String) -> Result<Self, FileError> {
-        let refused = |message: String| FileError::of_file(&name, message);
-        let map = Map::read(bytes).map_err(|error| refused(error.to_string()))?;
-        let wall = |(id, wall): (sonarfix::map::WallId, sonarfix::map::Wall)| {
-            let place = |point: Point| [point.x.0.into(), point.y.0.into()];
-            let wall =
-                NamedWall::new(format!("wall {}", id.0), place(wall.from()), place(wall.to()));
-            wall.map_err(|error| refused(format!("wall {}: {error}", id.0)))
+    fn of_scenario(
+        text: &str,
+        document: &Document<'_>,
+        name: String,
+        base: &Path,
+    ) -> Result<Self, FileError> {
+        let scenario = Box::new(Scenario::parse(text, &name, base)?);
+        let floor = scenario.floor.clone();
+        let map = document.read(&scenario::KEYS, |root| {
+            let map = root.require("map");
+            Some(match map.as_text() {
+                Some(file) => Err(base.join(file)),
+                None => Ok(Floor::from_node(map).1),
+            })
+        });
+        let (name, lines) = match map? {
+            Ok(places) => (name, document::lines(text, &places)),
+            Err(file) => (file::name(&file), WallFile::read(&file, None)?.lines),
         };
-        let walls = map.walls().map(wall).collect::<Result<_, _>>()?;
-        Ok(Self { floor: Floor::new(walls), sonar: None, lines: Vec::new(), name })
+        Ok(Self { floor, scenario: Some(scenario), name, lines })
     }
 
-    /// Parses the text of a CSV of segments.
-    fn from_csv(text: &str, name: String, unit: Option<&str>) -> Result<Self, FileError> {
-        let mut reader =
-            csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
-        let header = reader.headers().map_err(|error| of_csv(&name, &error))?.clone();
-        let columns =
-            Columns::of(&header, unit).map_err(|message| FileError::new(&name, 1, "", message))?;
-        let (mut walls, mut lines) = (Vec::new(), Vec::new());
-        let mut counter = LineCounter::new(text);
-        let mut names = HashSet::new();
-        for (number, record) in (1_u32..).zip(reader.records()) {
-            let record = record.map_err(|error| of_csv(&name, &error))?;
-            let byte = record.position().and_then(|position| usize::try_from(position.byte()).ok());
-            let line = counter.advance_to(text.len().saturating_sub(byte.unwrap_or(0)));
-            let wrong = |(key, message)| FileError::new(&name, line, key, message);
-            let wall = columns.wall(&record, number).map_err(wrong)?;
-            if !names.insert(wall.name().to_owned()) {
-                let message = format!("another wall is already called \"{}\"", wall.name());
-                return Err(wrong(("name", message)));
-            }
-            walls.push(wall);
-            lines.push(line);
-        }
-        if walls.is_empty() {
-            return Err(FileError::new(&name, 1, "", "there is no wall below the header"));
-        }
-        Ok(Self { floor: Floor::new(walls), sonar: None, lines, name })
+    /// The sonar of the robot, if the file is a scenario.
+    #[must_use]
+    pub fn sonar(&self) -> Option<Sonar> {
+        self.scenario.as_ref().map(|scenario| scenario.robot.localizer.sonar)
     }
 
     /// The name of the file in error messages.
@@ -147,110 +97,5 @@ impl MapFile {
     #[must_use]
     pub fn line(&self, wall: usize) -> Option<usize> {
         self.lines.get(wall).copied()
-    }
-}
-
-/// Counts the lines of a text from record to record.
-struct LineCounter<'t> {
-    rest: &'t str,
-    line: usize,
-}
-
-impl<'t> LineCounter<'t> {
-    fn new(text: &'t str) -> Self {
-        Self { rest: text, line: 1 }
-    }
-
-    /// The line at which a record starts, from the distance between the end of the previous one and the end of the text.
-    /// There may be empty lines between them.
-    fn advance_to(&mut self, end: usize) -> usize {
-        let ended = self.rest.len().saturating_sub(end);
-        let after = self.rest.get(ended..).unwrap_or_default();
-        let start = after.trim_start_matches(['\r', '\n']);
-        let passed = self.rest.get(..self.rest.len() - start.len()).unwrap_or_default();
-        self.line += passed.matches('\n').count();
-        self.rest = start;
-        self.line
-    }
-}
-
-fn of_csv(name: &str, error: &csv::Error) -> FileError {
-    let message = format!("cannot be read as CSV: {error}");
-    match error.position().and_then(|position| usize::try_from(position.line()).ok()) {
-        Some(line) => FileError::new(name, line, "", message),
-        None => FileError::of_file(name, message),
-    }
-}
-
-/// The columns of a CSV, and the unit of its coordinates.
-struct Columns {
-    coordinates: [usize; 4],
-    name: Option<usize>,
-    unit: &'static Unit,
-}
-
-const COORDINATES: [&str; 4] = ["x1", "y1", "x2", "y2"];
-
-impl Columns {
-    /// Finds the columns `x1`, `y1`, `x2`, `y2` and the optional `name`, in any order. The unit follows the name, as in
-    /// `x1_mm`.
-    fn of(header: &csv::StringRecord, unit: Option<&str>) -> Result<Self, String> {
-        let find = |wanted: &str| {
-            header.iter().position(|column| column.split('_').next() == Some(wanted))
-        };
-        let columns = COORDINATES.map(find);
-        let [Some(x1), Some(y1), Some(x2), Some(y2)] = columns else {
-            return Err(
-                "the columns must be named x1, y1, x2, y2 and, if there is one, name".into()
-            );
-        };
-        let coordinates = [x1, y1, x2, y2];
-        let units = coordinates.map(|at| header.get(at)?.split_once('_').map(|(_, unit)| unit));
-        let [first, rest @ ..] = units;
-        if rest.iter().any(|&unit| unit != first) {
-            return Err("the coordinates must all be in one unit".into());
-        }
-        let unit = match (first, unit) {
-            (Some(named), None) => named,
-            (None, Some(given)) => given,
-            (Some(named), Some(given)) if named == given => named,
-            (Some(named), Some(given)) => {
-                return Err(format!("the coordinates are in {named}, not in {given}"));
-            }
-            (None, None) => {
-                return Err(
-                    "the unit is missing: name the columns x1_m, y1_m, x2_m, y2_m (or _cm, _mm), \
-                            or give --unit"
-                        .into(),
-                );
-            }
-        };
-        let unit = LENGTH.unit(unit);
-        let unit =
-            unit.ok_or_else(|| format!("the unit must be one of {}", LENGTH.unit_names()))?;
-        Ok(Self { coordinates, name: find("name"), unit })
-    }
-
-    /// The wall of a record; otherwise the invalid column and the error.
-    fn wall(
-        &self,
-        record: &csv::StringRecord,
-        number: u32,
-    ) -> Result<NamedWall, (&'static str, String)> {
-        let mut ends = [0.0; 4];
-        for ((end, &at), key) in ends.iter_mut().zip(&self.coordinates).zip(COORDINATES) {
-            let text = record.get(at).unwrap_or_default();
-            let coordinate =
-                text.parse().map_err(|_| (key, format!("`{text}` is not a number")))?;
-            *end = self.unit.in_si(coordinate);
-        }
-        let [x1, y1, x2, y2] = ends;
-        let name = self.name.and_then(|at| record.get(at)).filter(|name| !name.is_empty());
-        let name = name.map_or_else(|| format!("wall {number}"), str::to_owned);
-        NamedWall::new(name, [x1, y1], [x2, y2]).map_err(|error| match error {
-            WallError::NotFinite => ("", format!("both ends must be {TOO_FAR}")),
-            WallError::ZeroLength => ("", "the wall has no length".into()),
-            other => ("", other.to_string()),
-        })
     }
 }

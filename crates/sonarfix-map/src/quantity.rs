@@ -30,6 +30,9 @@ pub(crate) struct Dimension {
 
 const HALF_TURN: f64 = std::f64::consts::PI;
 
+/// The unit in place of one that cannot be read.
+pub(crate) static METRE: Unit = unit("m", 1.0, 1.0);
+
 pub(crate) const LENGTH: Dimension = Dimension {
     name: "a length",
     units: &[unit("m", 1.0, 1.0), unit("cm", 1.0, 100.0), unit("mm", 1.0, 1000.0)],

@@ -1,6 +1,6 @@
 //! The scenario: a floor, a robot on a path, and its true parameters.
 
-use std::path::Path as FilePath;
+use std::path::{Path as FilePath, PathBuf};
 
 use crate::clearance::Collision;
 use sonarfix::navigator::{UNKNOWN_HEADING, UNKNOWN_POSITION};
@@ -18,6 +18,7 @@ use crate::quantity::{
 };
 use crate::robot_file;
 use crate::surroundings::{self, Surroundings};
+use crate::wall_file::WallFile;
 
 /// The keys of a scenario file, besides `format`.
 pub const KEYS: [&str; 13] = [
@@ -122,7 +123,7 @@ pub struct Run {
 /// assert_eq!(paper.floor.walls().len(), 8);
 /// let wrong = PAPER.replace("cone = \"15 deg\"", "cone = 15");
 /// let error = Scenario::parse(&wrong, "paper.toml", Path::new("")).unwrap_err();
-/// assert_eq!(error.key(), "robot.sonar.cone");
+/// assert_eq!(error.first().key(), "robot.sonar.cone");
 /// # Ok::<(), sonarfix_map::FileError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
@@ -161,7 +162,7 @@ impl Scenario {
     /// Reads a scenario file, and the map and robot files it names.
     ///
     /// # Errors
-    /// [`FileError`] with the first error.
+    /// [`FileError`] with all mistakes, also those in the files it names.
     pub fn read(path: &FilePath) -> Result<Self, FileError> {
         let base = path.parent().unwrap_or(FilePath::new(""));
         Self::parse(&file::read(path)?, &file::name(path), base)
@@ -171,31 +172,42 @@ impl Scenario {
     /// `base`.
     ///
     /// # Errors
-    /// [`FileError`] with the first error.
+    /// [`FileError`] with all mistakes, also those in the files it names.
     pub fn parse(text: &str, file_name: &str, base: &FilePath) -> Result<Self, FileError> {
-        let document = Document::parse(text, file_name)?;
-        let root = document.root(&KEYS)?;
-        let floor = here_or_there(&root, "map", base, Floor::from_node, Floor::parse)?;
-        let robot = here_or_there(&root, "robot", base, robot_file::from_node, robot_file::parse)?;
-        let path = root.table("path", &PATH_KEYS)?;
-        let truth = root.table("truth", &TRUTH_KEYS)?;
-        let start = read_start(&root, &robot)?;
-        Ok(Self {
-            name: root.require("name")?.text()?.into(),
-            description: root.require("description")?.text()?.into(),
-            fidelity: fidelity::read_fidelity(&root)?,
-            path: read_path(&path, &floor, &robot)?,
-            follow: fidelity::read_follow(&path)?,
-            floor,
-            robot,
-            start,
-            truth: read_truth(&truth)?,
-            upsets: fidelity::read_upsets(&truth)?,
-            hardware: fidelity::read_hardware(&root)?,
-            surroundings: surroundings::read(&root)?,
-            faults: faults::read(&root)?,
-            run: read_run(&root)?,
-        })
+        Document::parse(text, file_name)?.read(&KEYS, |root| Self::from_table(root, base))
+    }
+
+    /// None if there is no floor, robot or path, which is recorded.
+    fn from_table(root: &Table<'_>, base: &FilePath) -> Option<Self> {
+        let (map, robot) = (root.require("map"), root.require("robot"));
+        let floor = root.faultless(|| match beside(&map, base) {
+            Some(file) => Some(file_or_report(&map, WallFile::read(&file, None))?.floor),
+            None => Some(Floor::from_node(map).0),
+        });
+        let robot = root.faultless(|| match beside(&robot, base) {
+            Some(file) => file_or_report(&robot, robot_file::read(&file)),
+            None => Some(robot_file::from_node(robot)),
+        });
+        let path_table = root.table("path", &PATH_KEYS);
+        let truth = root.table("truth", &TRUTH_KEYS);
+        let path = read_path(&path_table, floor.as_ref(), robot.as_ref());
+        let scenario = Self {
+            name: root.require("name").text().into(),
+            description: root.require("description").text().into(),
+            fidelity: fidelity::read_fidelity(root),
+            follow: fidelity::read_follow(&path_table),
+            start: read_start(root, robot.as_ref()),
+            truth: read_truth(&truth),
+            upsets: fidelity::read_upsets(&truth),
+            hardware: fidelity::read_hardware(root),
+            surroundings: surroundings::read(root),
+            faults: faults::read(root),
+            run: read_run(root),
+            path: path?,
+            floor: floor?,
+            robot: robot?,
+        };
+        Some(scenario)
     }
 
     /// The reference scenario, [`crate::PAPER`].
@@ -215,71 +227,77 @@ impl Scenario {
     }
 }
 
-/// Reads a table of the scenario, or the file that replaces it.
-fn here_or_there<T>(
-    root: &Table<'_>,
-    key: &str,
-    base: &FilePath,
-    here: impl Fn(Node<'_>) -> Result<T, FileError>,
-    there: impl Fn(&str, &str) -> Result<T, FileError>,
-) -> Result<T, FileError> {
-    let node = root.require(key)?;
-    let Some(name) = node.as_text() else {
-        return here(node);
-    };
-    let path = base.join(name);
-    let text = file::read(&path).map_err(|error| {
-        let (file, message) = (error.file(), error.message());
-        node.error(format!("the file {file} {message}"))
-    })?;
-    there(&text, &file::name(&path))
+/// The file that replaces a table of the scenario, if one does.
+fn beside(node: &Node<'_>, base: &FilePath) -> Option<PathBuf> {
+    node.as_text().map(|name| base.join(name))
 }
 
-fn quantity(table: &Table<'_>, key: &str, dimension: &Dimension) -> Result<f64, FileError> {
-    table.require(key)?.quantity(dimension)
-}
-
-fn deviation(table: &Table<'_>, key: &str, dimension: &Dimension) -> Result<f64, FileError> {
-    table.require(key)?.deviation(dimension)
-}
-
-fn read_path(table: &Table<'_>, floor: &Floor, robot: &RobotConfig) -> Result<Path, FileError> {
-    let unit = table.require("unit")?.unit_of_length()?;
-    let corners = table.require("corners")?.items()?;
-    let laps = match table.get("laps") {
-        Some(node) => whole(&node)?,
-        None => 1,
-    };
-    let plan = PathPlan {
-        start: table.require("start")?.point(unit)?,
-        corners: corners.iter().map(|node| node.point(unit)).collect::<Result<_, _>>()?,
-        laps,
-        speed: quantity(table, "speed", &SPEED)?,
-        turn_rate: quantity(table, "turn_rate", &TURN_RATE)?,
-    };
-    let path = Path::new(plan).map_err(|error| {
-        let corner = error.corner().and_then(|index| corners.get(index));
-        match corner {
-            Some(node) => node.error(error.to_string()),
-            None => table.error_at(error.field(), error.to_string()),
+/// What was read from the file that a value names; otherwise its mistakes are recorded.
+fn file_or_report<T>(node: &Node<'_>, read: Result<T, FileError>) -> Option<T> {
+    read.map_err(|error| match error.first().line() {
+        Some(_) => node.report_all(error),
+        None => {
+            node.report(format!("the file {} {}", error.first().file(), error.first().message()));
         }
-    })?;
-    check_speeds(table, &path, robot)?;
-    let clearance = match table.get("clearance") {
-        Some(node) => node.deviation(&LENGTH)?,
-        None => 0.0,
-    };
-    check_clearance(&path, &corners, floor, clearance)?;
-    Ok(path)
+    })
+    .ok()
 }
 
-fn whole(node: &Node<'_>) -> Result<u32, FileError> {
-    let number = node.integer(1..=u64::from(u32::MAX))?;
-    u32::try_from(number).map_err(|_| node.error("must fit into 32 bits"))
+fn quantity(table: &Table<'_>, key: &str, dimension: &Dimension) -> f64 {
+    table.require(key).quantity(dimension)
+}
+
+fn deviation(table: &Table<'_>, key: &str, dimension: &Dimension) -> f64 {
+    table.require(key).deviation(dimension)
+}
+
+/// Rules that concern several values are checked only if all of them could be read.
+fn read_path(
+    table: &Table<'_>,
+    floor: Option<&Floor>,
+    robot: Option<&RobotConfig>,
+) -> Option<Path> {
+    let mistakes = table.mistakes();
+    let unit = table.require("unit").unit_of_length();
+    let corners = table.require("corners").items();
+    let plan = PathPlan {
+        start: table.require("start").point(unit),
+        corners: corners.iter().map(|node| node.point(unit)).collect(),
+        laps: table.get("laps").map_or(1, |node| whole(&node)),
+        speed: quantity(table, "speed", &SPEED),
+        turn_rate: quantity(table, "turn_rate", &TURN_RATE),
+    };
+    let clearance = table.get("clearance").map_or(0.0, |node| node.deviation(&LENGTH));
+    if table.mistakes() > mistakes {
+        return None;
+    }
+    let path = match Path::new(plan) {
+        Ok(path) => path,
+        Err(error) => {
+            let corner = error.corner().and_then(|index| corners.get(index));
+            match corner {
+                Some(node) => node.report(error.to_string()),
+                None => table.report_at(error.field(), error.to_string()),
+            }
+            return None;
+        }
+    };
+    if let Some(robot) = robot {
+        check_speeds(table, &path, robot);
+    }
+    if let Some(floor) = floor {
+        check_clearance(&path, &corners, floor, clearance);
+    }
+    Some(path)
+}
+
+fn whole(node: &Node<'_>) -> u32 {
+    let number = node.integer(1..=u64::from(u32::MAX));
+    u32::try_from(number).unwrap_or(u32::MAX)
 }
 
 /// Checks the wheel speed: the localizer refuses the travel of a wheel that is faster than `max_wheel_speed`.
-fn check_speeds(table: &Table<'_>, path: &Path, robot: &RobotConfig) -> Result<(), FileError> {
+fn check_speeds(table: &Table<'_>, path: &Path, robot: &RobotConfig) {
     let fastest = f64::from(robot.localizer.max_wheel_speed.0);
     let half_width = 0.5 * f64::from(robot.localizer.drive.track_width.0);
     let plan = path.plan();
@@ -289,72 +307,64 @@ fn check_speeds(table: &Table<'_>, path: &Path, robot: &RobotConfig) -> Result<(
                 "rolls a wheel at {wheel:.3} m/s, faster than the robot's \
                  drive.max_wheel_speed of {fastest:.3} m/s"
             );
-            return Err(table.error_at(key, message));
+            table.report_at(key, message);
         }
     }
-    Ok(())
 }
 
-/// An error for a collision, at the corner at the end of the leg.
-fn check_clearance(
-    path: &Path,
-    corners: &[Node<'_>],
-    floor: &Floor,
-    clearance: f64,
-) -> Result<(), FileError> {
-    let collision = Collision::first(path.plan(), floor, clearance);
-    let fault = collision
-        .and_then(|collision| Some(corners.get(collision.corner)?.error(collision.to_string())));
-    fault.map_or(Ok(()), Err)
+/// Records a collision, at the corner at the end of the leg.
+fn check_clearance(path: &Path, corners: &[Node<'_>], floor: &Floor, clearance: f64) {
+    if let Some(collision) = Collision::first(path.plan(), floor, clearance)
+        && let Some(corner) = corners.get(collision.corner)
+    {
+        corner.report(collision.to_string());
+    }
 }
 
-fn read_start(root: &Table<'_>, robot: &RobotConfig) -> Result<Start, FileError> {
-    let start = root.require("start")?;
+fn read_start(root: &Table<'_>, robot: Option<&RobotConfig>) -> Start {
+    let start = root.require("start");
     if let Some(text) = start.as_text() {
-        start.check((), text == "unknown", "a table of deviations, or \"unknown\"")?;
-        let searches = robot.start.is_unknown();
+        start.check((), text == "unknown", "a table of deviations, or \"unknown\"");
+        let searches = robot.is_none_or(|robot| robot.start.is_unknown());
         return start.check(Start::unknown(), searches, "that of a robot with start = \"unknown\"");
     }
-    let table = root.table("start", &["position", "heading", "drawn"])?;
-    Ok(Start {
-        position: deviation(&table, "position", &LENGTH)?,
-        heading: deviation(&table, "heading", &ANGLE)?,
-        drawn: table.require("drawn")?.boolean()?,
+    let table = start.table(&["position", "heading", "drawn"]);
+    Start {
+        position: deviation(&table, "position", &LENGTH),
+        heading: deviation(&table, "heading", &ANGLE),
+        drawn: table.require("drawn").boolean(),
         is_unknown: false,
-    })
+    }
 }
 
-fn read_truth(table: &Table<'_>) -> Result<Truth, FileError> {
-    let width = table.require("track_width")?;
-    let track_width = width.quantity(&LENGTH)?;
-    let cone_node = table.require("cone")?;
-    let cone = cone_node.quantity(&ANGLE)?;
+fn read_truth(table: &Table<'_>) -> Truth {
+    let width = table.require("track_width");
+    let track_width = width.quantity(&LENGTH);
+    let cone_node = table.require("cone");
+    let cone = cone_node.quantity(&ANGLE);
     let narrow = cone > 0.0 && cone < std::f64::consts::FRAC_PI_2;
-    Ok(Truth {
-        track_width: width.check(track_width, track_width > 0.0, "positive")?,
-        scale_right: scale(table, "scale_right")?,
-        scale_left: scale(table, "scale_left")?,
-        range_scale: scale(table, "range_scale")?,
-        wheel_noise: deviation(table, "wheel_noise", &LENGTH_WALK)?,
-        scale_walk: deviation(table, "scale_walk", &SCALE_WALK)?,
-        track_width_walk: deviation(table, "track_width_walk", &LENGTH_WALK)?,
-        range_noise: deviation(table, "range_noise", &LENGTH)?,
-        range_noise_per_metre: deviation(table, "range_noise_per_metre", &LENGTH_PER_LENGTH)?,
-        cone: cone_node.check(cone, narrow, "between 0 and 90° (half of the cone)")?,
-    })
+    Truth {
+        track_width: width.check(track_width, track_width > 0.0, "positive"),
+        scale_right: scale(table, "scale_right"),
+        scale_left: scale(table, "scale_left"),
+        range_scale: scale(table, "range_scale"),
+        wheel_noise: deviation(table, "wheel_noise", &LENGTH_WALK),
+        scale_walk: deviation(table, "scale_walk", &SCALE_WALK),
+        track_width_walk: deviation(table, "track_width_walk", &LENGTH_WALK),
+        range_noise: deviation(table, "range_noise", &LENGTH),
+        range_noise_per_metre: deviation(table, "range_noise_per_metre", &LENGTH_PER_LENGTH),
+        cone: cone_node.check(cone, narrow, "between 0 and 90° (half of the cone)"),
+    }
 }
 
 /// A scale error, greater than −1: the wheel would otherwise stand still or roll backwards.
-fn scale(table: &Table<'_>, key: &str) -> Result<f64, FileError> {
-    let node = table.require(key)?;
-    let scale = node.fraction()?;
+fn scale(table: &Table<'_>, key: &str) -> f64 {
+    let node = table.require(key);
+    let scale = node.fraction();
     node.check(scale, scale > -1.0, "greater than -1")
 }
 
-fn read_run(root: &Table<'_>) -> Result<Run, FileError> {
-    let table = root.table("run", &["runs", "seed"])?;
-    Ok(Run {
-        runs: whole(&table.require("runs")?)?,
-        seed: table.require("seed")?.integer(0..=u64::MAX)?,
-    })
+fn read_run(root: &Table<'_>) -> Run {
+    let table = root.table("run", &["runs", "seed"]);
+    Run { runs: whole(&table.require("runs")), seed: table.require("seed").integer(0..=u64::MAX) }
 }

@@ -1,10 +1,23 @@
-//! Suggests a known key for an unknown one.
+//! Suggests a known key or word for an unknown one.
 
 /// The key that is nearest to an unknown one, if a typing error is plausible: at most one edit per three letters.
 pub(crate) fn nearest<'k>(unknown: &str, keys: &[&'k str]) -> Option<&'k str> {
     let far = unknown.chars().count().div_ceil(3);
     let near = keys.iter().map(|key| (edit_distance(unknown, key), *key));
     near.filter(|(distance, _)| *distance <= far).min().map(|(_, key)| key)
+}
+
+/// The known words for a message, and the one that was probably meant: `"on" or "off"; did you mean "off"?`.
+pub(crate) fn alternatives(unknown: &str, known: &[&str]) -> String {
+    let quoted: Vec<String> = known.iter().map(|word| format!("\"{word}\"")).collect();
+    let list = match quoted.split_last() {
+        Some((last, others)) if !others.is_empty() => format!("{} or {last}", others.join(", ")),
+        _ => quoted.concat(),
+    };
+    match nearest(unknown, known) {
+        Some(meant) => format!("{list}; did you mean \"{meant}\"?"),
+        None => list,
+    }
 }
 
 /// The number of insertions, deletions and replacements of letters between two words (Levenshtein distance).

@@ -1,7 +1,6 @@
 //! The surroundings that are not in the map: air, furniture, people.
 
 use crate::document::{Node, Table};
-use crate::error::FileError;
 use crate::quantity::{LENGTH, TEMPERATURE, TIME, Unit};
 
 const KEYS: [&str; 3] = ["temperature", "unit", "obstacle"];
@@ -60,56 +59,53 @@ pub struct Surroundings {
 }
 
 /// Reads `[world]`; the default is an empty room of 20 °C.
-pub(crate) fn read(root: &Table<'_>) -> Result<Surroundings, FileError> {
+pub(crate) fn read(root: &Table<'_>) -> Surroundings {
     let Some(node) = root.get("world") else {
-        return Ok(Surroundings { temperature: ROOM, obstacles: Vec::new() });
+        return Surroundings { temperature: ROOM, obstacles: Vec::new() };
     };
-    let table = node.table(&KEYS)?;
-    let obstacles = match table.get("obstacle") {
-        Some(list) => {
-            let unit = table.require("unit")?.unit_of_length()?;
-            list.items()?.into_iter().map(|node| obstacle(node, unit)).collect::<Result<_, _>>()?
-        }
-        None => Vec::new(),
-    };
-    Ok(Surroundings { temperature: temperature(Some(&table))?, obstacles })
+    let table = node.table(&KEYS);
+    let obstacles = table.get("obstacle").map_or_else(Vec::new, |list| {
+        let unit = table.require("unit").unit_of_length();
+        list.items().into_iter().map(|node| obstacle(node, unit)).collect()
+    });
+    Surroundings { temperature: temperature(Some(&table)), obstacles }
 }
 
 /// The optional key `temperature` of an optional table, °C; that of a room by default.
-pub(crate) fn temperature(table: Option<&Table<'_>>) -> Result<f64, FileError> {
+pub(crate) fn temperature(table: Option<&Table<'_>>) -> f64 {
     let Some(node) = table.and_then(|table| table.get("temperature")) else {
-        return Ok(ROOM);
+        return ROOM;
     };
-    let celsius = node.quantity(&TEMPERATURE)?;
+    let celsius = node.quantity(&TEMPERATURE);
     node.check(celsius, (COLDEST..=HOTTEST).contains(&celsius), "from -40 to 85 degC")
 }
 
-fn obstacle(node: Node<'_>, unit: &Unit) -> Result<Obstacle, FileError> {
-    let table = node.table(&OBSTACLE_KEYS)?;
-    Ok(Obstacle { outline: outline(&table, unit)?, walk: walk(&table, unit)? })
+fn obstacle(node: Node<'_>, unit: &Unit) -> Obstacle {
+    let table = node.table(&OBSTACLE_KEYS);
+    Obstacle { outline: outline(&table, unit), walk: walk(&table, unit) }
 }
 
-fn outline(table: &Table<'_>, unit: &Unit) -> Result<Outline, FileError> {
+fn outline(table: &Table<'_>, unit: &Unit) -> Outline {
     if let Some(centre) = table.get("centre") {
-        let radius_node = table.require("radius")?;
-        let radius = radius_node.quantity(&LENGTH)?;
-        let radius = radius_node.check(radius, radius > 0.0, "positive")?;
-        return Ok(Outline::Circle { centre: centre.point(unit)?, radius });
+        let radius_node = table.require("radius");
+        let radius = radius_node.quantity(&LENGTH);
+        let radius = radius_node.check(radius, radius > 0.0, "positive");
+        return Outline::Circle { centre: centre.point(unit), radius };
     }
-    let from = table.require("from")?.point(unit)?;
-    let to_node = table.require("to")?;
-    let to = to_node.point(unit)?;
-    let length = (to[0] - from[0]).hypot(to[1] - from[1]);
-    to_node.check(length, length > 0.0, "different from `from`: the obstacle has no length")?;
-    Ok(Outline::Face { from, to })
+    let mistakes = table.mistakes();
+    let from = table.require("from").point(unit);
+    let to_node = table.require("to");
+    let to = to_node.point(unit);
+    let has_length = (to[0] - from[0]).hypot(to[1] - from[1]) > 0.0;
+    let rule = "different from `from`: the obstacle has no length";
+    to_node.check((), has_length || table.mistakes() > mistakes, rule);
+    Outline::Face { from, to }
 }
 
-fn walk(table: &Table<'_>, unit: &Unit) -> Result<Option<Oscillation>, FileError> {
-    let Some(by) = table.get("walk") else {
-        return Ok(None);
-    };
-    let takes_node = table.require("takes")?;
-    let takes = takes_node.quantity(&TIME)?;
-    let takes = takes_node.check(takes, takes > 0.0, "positive")?;
-    Ok(Some(Oscillation { by: by.point(unit)?, takes }))
+fn walk(table: &Table<'_>, unit: &Unit) -> Option<Oscillation> {
+    let by = table.get("walk")?;
+    let takes_node = table.require("takes");
+    let takes = takes_node.quantity(&TIME);
+    let takes = takes_node.check(takes, takes > 0.0, "positive");
+    Some(Oscillation { by: by.point(unit), takes })
 }

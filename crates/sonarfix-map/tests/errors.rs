@@ -12,8 +12,8 @@ use sonarfix::units::{Duration, Metres, Radians};
 use sonarfix_hal::config::{MotorPolicy, RobotConfig, StartPose, WheelConfig};
 use sonarfix_hal::ranger::{PulseTiming, RangerKind};
 use sonarfix_map::{
-    CLASSROOM, Fault, FaultKind, Fidelity, FileError, Floor, Follow, PAPER, Scenario, ServoName,
-    SonarName, Wheel, robot_file, robot_text,
+    CLASSROOM, Fault, FaultKind, Fidelity, FileError, Floor, Follow, Mistake, PAPER, Scenario,
+    ServoName, SonarName, Wheel, robot_file, robot_text,
 };
 
 fn parse(text: &str) -> Result<Scenario, FileError> {
@@ -35,6 +35,14 @@ struct Case {
     line: &'static str,
     key: &'static str,
     message: &'static str,
+    /// The number of mistakes in all.
+    mistakes: usize,
+}
+
+impl Case {
+    const fn among(self, mistakes: usize) -> Self {
+        Self { mistakes, ..self }
+    }
 }
 
 const fn case(
@@ -44,7 +52,7 @@ const fn case(
     key: &'static str,
     message: &'static str,
 ) -> Case {
-    Case { old, new, line, key, message }
+    Case { old, new, line, key, message, mistakes: 1 }
 }
 
 /// A changed value, reported at its position.
@@ -95,7 +103,8 @@ const MISSING: [Case; 9] = [
         "[robot.sonar.extra]",
         "robot.sonar.extra",
         "unknown key",
-    ),
+    )
+    .among(2),
     case("unit = \"m\"     #", "#", "[map]", "map.unit", "is missing"),
     case("unit = \"m\"\nstart", "start", "[path]", "path.unit", "is missing"),
     case("runs = 50", "", "[run]", "run.runs", "is missing"),
@@ -174,7 +183,7 @@ const MAP: [Case; 6] = [
     value("name = \"inner west\"", "name = \"\"", "map.wall[6].name", "must be a name"),
     value("from = [-3, 3]", "from = [inf, 3]", "map.wall[4].from[0]", "must be finite"),
     value("from = [-3, 3]", "from = [-3, 1e6]", "map.wall[4].from", "within 100 km"),
-    case("wall = [", "wall = []\nignored = [", "ignored", "map.ignored", "unknown key"),
+    case("wall = [", "wall = []\nignored = [", "ignored", "map.ignored", "unknown key").among(2),
 ];
 
 /// Every rule of the localizer's own check, at its key in the file.
@@ -327,14 +336,15 @@ const ROBOT: [Case; 12] = [
         "ranger = { kind = \"hc_sr04\",",
         "ranger = { kind = \"hc_sr05\",",
         "robot.sonar.ranger.kind",
-        "must be \"hc_sr04\", \"lv_maxsonar\", \"srf02\", \"srf08\", \"custom\"",
+        "must be \"hc_sr04\", \"lv_maxsonar\", \"srf02\", \"srf08\" or \"custom\"; did you mean \"hc_sr04\"?",
     ),
     value(
         "ranger = { kind = \"hc_sr04\",",
         "ranger = { kind = \"srf08\",",
         "robot.sonar.ranger.longest",
         "is no setting of this kind of ranger",
-    ),
+    )
+    .among(4),
     value(
         "ranger = { kind = \"hc_sr04\",",
         "ranger = { kind = \"hc_sr04\", adress = 1,",
@@ -419,7 +429,7 @@ const HARDWARE: [Case; 12] = [
         "[sensor]\nmodel = \"srf99\"\n[run]",
         "model = ",
         "sensor.model",
-        "must be \"ideal\" or \"hc_sr04\" or \"nxt\"",
+        "must be \"ideal\", \"hc_sr04\", \"nxt\", \"lv_maxsonar\", \"srf08\" or \"polaroid_6500\"",
     ),
     case("[run]", "[servo]\nmodle = 1\n[run]", "modle = ", "servo.modle", "unknown key"),
     case(
@@ -510,7 +520,8 @@ const REST: [Case; 8] = [
         "must be between 0 and 90°",
     ),
     value("runs = 50", "runs = 0", "run.runs", "must be a whole number from 1"),
-    case("[map]", "map = \"nowhere.toml\"\n[was_map]", "[was_map]", "was_map", "unknown key"),
+    case("[map]", "map = \"nowhere.toml\"\n[was_map]", "[was_map]", "was_map", "unknown key")
+        .among(2),
 ];
 
 #[test]
@@ -531,8 +542,12 @@ fn fault(case: &Case) -> Option<String> {
     let Err(error) = parse(&text) else {
         return Some(format!("{} is accepted", case.new));
     };
-    let is_right = (error.file(), error.line(), error.key()) == ("paper.toml", line, case.key)
-        && error.message().contains(case.message);
+    let is_it = |mistake: &Mistake| {
+        (mistake.file(), mistake.line(), mistake.key()) == ("paper.toml", line, case.key)
+            && mistake.message().contains(case.message)
+    };
+    let count = error.mistakes().count();
+    let is_right = error.mistakes().any(is_it) && count == case.mistakes;
     (!is_right).then(|| format!("{}: expected {line:?}: {}: {error}", case.new, case.key))
 }
 
@@ -546,18 +561,29 @@ fn an_error_has_the_format_of_a_compiler() {
             map.to_owned(),
             "m.toml:14: map.wall[1].to: must differ from `from`: the wall has no length",
         ),
-        (map.replace("name = \"b\"\n", ""), "m.toml:11: map.wall[1].name: is missing"),
+        (
+            map.replace("name = \"b\"\n", ""),
+            "m.toml:11: map.wall[1].name: is missing: write, for example, name = \"window\"",
+        ),
         (
             map.replace("\"b\"", "\"a\"").replace("to = [0, 0]", "to = [0, 1]"),
             "m.toml:12: map.wall[1].name: another wall is already called \"a\"",
         ),
-        (map.replace("unit = \"cm\"\n", ""), "m.toml:3: map.unit: is missing"),
+        (
+            map.replace("unit = \"cm\"\n", ""),
+            "m.toml:3: map.unit: is missing: write, for example, unit = \"m\"\n\
+             m.toml:13: map.wall[1].to: must differ from `from`: the wall has no length",
+        ),
         (
             "format = 1\r\n[map]\r\nunit = \"m\"\r\nwall = []\r\n".into(),
             "m.toml:4: map.wall: must be at least one wall",
         ),
-        ("format = 1".into(), "m.toml:1: map: is missing"),
-        (String::new(), "m.toml:1: format: is missing"),
+        ("format = 1".into(), "m.toml:1: map: is missing: a table with unit, wall"),
+        (
+            String::new(),
+            "m.toml:1: format: is missing: write, for example, format = 1\n\
+             m.toml:1: map: is missing: a table with unit, wall",
+        ),
         (
             "format = 1\nmap = \"x\"".into(),
             "m.toml:2: map: must be a table, but this is of type string",
@@ -570,6 +596,59 @@ fn an_error_has_the_format_of_a_compiler() {
     let floor = Floor::parse(&good, "m.toml").unwrap();
     let [x, y] = floor.named_walls()[1].to();
     assert!(x.abs() + (y - 2.5).abs() < 1e-12);
+}
+
+/// Ten typical mistakes of a first file, each with what to write instead.
+#[test]
+fn ten_mistakes_are_reported_at_once() {
+    let changes = [
+        ("fidelity = \"pins\"", "fidelity = \"pin\"", "did you mean \"pins\"?"),
+        ("from = [6, 0], to = [6, 8]", "from = [6, 0], to = [6, 0]", "must differ from `from`"),
+        (
+            "track_width = \"120 mm\"",
+            "track_width = 120",
+            "write \"120 m\" or \"120 cm\" or \"120 mm\"",
+        ),
+        ("encoder_period = \"100 ms\"", "", "write, for example, encoder_period = \"100 ms\""),
+        ("max_range = ", "maxrange = ", "did you mean `max_range`?"),
+        ("servo_timing = \"sg90\"", "servo_timing = \"SG90\"", "did you mean \"sg90\"?"),
+        ("ranger = \"hc_sr04\"", "ranger = \"hcsr04\"", "did you mean \"hc_sr04\"?"),
+        ("[robot.gating]\nconfidence = 2.0", "", "a table with confidence"),
+        ("speed = \"0.2 m/s\"", "speed = \"0.2 m\"", "is not a speed"),
+        ("laps = 7", "laps = 7.5", "must be a whole number"),
+    ];
+    let mut text = CLASSROOM.to_owned();
+    for (old, new, _) in changes {
+        assert!(text.contains(old), "{old}");
+        text = text.replacen(old, new, 1);
+    }
+    let error = Scenario::parse(&text, "first.toml", Path::new("")).unwrap_err();
+    let shown = error.to_string();
+    assert_eq!(error.mistakes().count(), changes.len(), "{shown}");
+    for (_, _, remedy) in changes {
+        assert!(shown.contains(remedy), "{remedy}: {shown}");
+    }
+    let lines: Vec<_> = error.mistakes().filter_map(Mistake::line).collect();
+    assert!(lines.is_sorted(), "{shown}");
+}
+
+/// No mistake follows from another: with one value damaged, there is one mistake.
+#[test]
+fn a_mistake_has_no_consequences() {
+    let values = PAPER.lines().filter_map(|line| line.split_once(" = ")).filter(|(key, value)| {
+        !key.contains(['[', '{', '#', ' ']) && !value.starts_with("[\n") && !value.ends_with('[')
+    });
+    let mut damaged = 0;
+    for (key, value) in values {
+        let value = value.split(" #").next().unwrap_or(value).trim_end();
+        let text = PAPER.replacen(&format!("{key} = {value}"), &format!("{key} = {{}}"), 1);
+        if let Err(error) = parse(&text) {
+            let keys = error.mistakes().filter(|mistake| !mistake.key().contains(key)).count();
+            assert_eq!(keys, 0, "{key}: {error}");
+            damaged += 1;
+        }
+    }
+    assert!(damaged > 40, "{damaged}");
 }
 
 /// The tables of the scenario that `[name]` and `[name.…]` begin, taken out of it.
@@ -611,21 +690,21 @@ fn map_and_robot_may_be_files_of_their_own() {
     let wrong = robot.replace("max_wheel_speed = \"2", "max_wheel_speed = \"0");
     fs::write(place("robot.toml"), &wrong).unwrap();
     let error = Scenario::read(&place("all.toml")).unwrap_err();
-    assert_eq!(error.file(), place("robot.toml").display().to_string());
-    assert_eq!(error.key(), "drive.max_wheel_speed");
-    assert_eq!(error.line(), line_of(&wrong, "max_wheel_speed"));
+    assert_eq!(error.first().file(), place("robot.toml").display().to_string());
+    assert_eq!(error.first().key(), "drive.max_wheel_speed");
+    assert_eq!(error.first().line(), line_of(&wrong, "max_wheel_speed"));
 
     // WHEN one is missing, THEN the message has the scenario's line that names it.
     fs::remove_file(place("map.toml")).unwrap();
     let error = Scenario::read(&place("all.toml")).unwrap_err();
-    assert_eq!(error.key(), "map");
+    assert_eq!(error.first().key(), "map");
     let scenario = fs::read_to_string(place("all.toml")).unwrap();
-    assert_eq!(error.line(), line_of(&scenario, "map = "));
-    assert!(error.message().contains("map.toml cannot be read"), "{error}");
+    assert_eq!(error.first().line(), line_of(&scenario, "map = "));
+    assert!(error.first().message().contains("map.toml cannot be read"), "{error}");
 
     // WHEN the scenario itself is missing, THEN there is no line.
     let error = Scenario::read(&place("none.toml")).unwrap_err();
-    assert_eq!((error.line(), error.key()), (None, ""));
+    assert_eq!((error.first().line(), error.first().key()), (None, ""));
     assert!(error.to_string().contains("none.toml: cannot be read: "), "{error}");
 }
 
@@ -719,8 +798,8 @@ proptest! {
         let text = [&PAPER[..from], &typed, &PAPER[to..]].concat();
         if let Err(error) = parse(&text) {
             let lines = text.matches('\n').count() + 1;
-            prop_assert!(error.line().is_some_and(|line| (1..=lines).contains(&line)), "{}", error);
-            prop_assert!(!error.message().is_empty());
+            prop_assert!(error.first().line().is_some_and(|line| (1..=lines).contains(&line)), "{}", error);
+            prop_assert!(!error.first().message().is_empty());
         }
     }
 }
@@ -768,12 +847,19 @@ fn a_wrong_fault_has_its_line_and_key() {
     ];
     for (fault, key, message) in cases {
         let error = of_fault(&format!("{fault}, {when}"));
-        assert_eq!(error.key(), format!("faults[0].{key}"), "{error}");
-        assert_eq!(error.line(), line_of(PAPER, "format = 1").map(|line| line + 1), "{error}");
-        assert!(error.message().contains(message), "{error}");
+        assert_eq!(error.first().key(), format!("faults[0].{key}"), "{error}");
+        assert_eq!(
+            error.first().line(),
+            line_of(PAPER, "format = 1").map(|line| line + 1),
+            "{error}"
+        );
+        assert!(error.first().message().contains(message), "{error}");
     }
     let error = of_fault("kind = \"brown_out\", from = \"2 s\", to = \"2 s\"");
-    assert_eq!((error.key(), error.message()), ("faults[0].to", "must be after `from`"));
+    assert_eq!(
+        (error.first().key(), error.first().message()),
+        ("faults[0].to", "must be after `from`")
+    );
 }
 
 #[test]

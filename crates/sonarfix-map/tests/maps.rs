@@ -116,7 +116,7 @@ fn a_wall_between_walls_is_unreachable() {
 #[test]
 fn a_room_has_no_flaw() {
     let paper = MapFile::read(&written("paper.toml", PAPER).1, None).unwrap();
-    assert_eq!(survey(&paper.floor, &paper.sonar.unwrap()).unwrap(), []);
+    assert_eq!(survey(&paper.floor, &paper.sonar().unwrap()).unwrap(), []);
 }
 
 /// A file in a temporary folder, which is removed with the returned value.
@@ -166,7 +166,7 @@ fn every_kind_of_file_gives_the_same_walls_with_their_lines() {
 #[test]
 fn a_scenario_gives_its_map_and_its_sonar() {
     let paper = read("paper.toml", PAPER, None).unwrap();
-    assert!(paper.sonar.is_some_and(|sonar| sonar.max_range == Metres(10.0)));
+    assert!(paper.sonar().is_some_and(|sonar| sonar.max_range == Metres(10.0)));
     let line = 1 + PAPER.lines().position(|line| line.contains("\"outer west\"")).unwrap();
     assert_eq!(paper.line(2), Some(line));
 }

@@ -5,7 +5,7 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use sonarfix_map::{Floor, Scenario, robot_file, with_cabinet};
+use sonarfix_map::{MapFile, Scenario, robot_file, with_cabinet};
 use sonarfix_replay::find::{Find, Found};
 use sonarfix_report::Table;
 use sonarfix_studies::floor_plan::Kind;
@@ -20,7 +20,7 @@ pub struct Args {
     #[arg(required_unless_present = "floor_plans")]
     file: Option<PathBuf>,
     /// The map of a log; by default map.toml beside the log.
-    #[arg(long, value_name = "MAP.toml")]
+    #[arg(long, value_name = "MAP")]
     map: Option<PathBuf>,
     /// The robot of a log; by default robot.toml beside the log.
     #[arg(long, value_name = "ROBOT.toml")]
@@ -101,7 +101,7 @@ fn search_log(log: &Path, args: &Args) -> anyhow::Result<()> {
     let beside = |given: &Option<PathBuf>, name: &str| {
         given.clone().unwrap_or_else(|| log.with_file_name(name))
     };
-    let floor = Floor::read(&beside(&args.map, "map.toml"))?;
+    let floor = MapFile::read(&beside(&args.map, "map.toml"), None)?.floor;
     let robot = robot_file::read(&beside(&args.config, "robot.toml"))?;
     let walls = floor.walls();
     let file = File::open(log).with_context(|| log.display().to_string())?;

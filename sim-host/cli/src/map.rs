@@ -110,7 +110,7 @@ impl Source {
 fn check(map: &MapFile, robot: Option<&Path>) -> anyhow::Result<()> {
     let sonar = match robot {
         Some(robot) => robot_file::read(robot)?.localizer.sonar,
-        None => map.sonar.unwrap_or_else(usual_sonar),
+        None => map.sonar().unwrap_or_else(usual_sonar),
     };
     let findings = survey(&map.floor, &sonar)?;
     for finding in findings.iter().take(SHOWN) {
@@ -155,7 +155,7 @@ fn usual_sonar() -> Sonar {
 }
 
 fn write_image(map: &MapFile, out: &Path) -> anyhow::Result<()> {
-    let findings = survey(&map.floor, &map.sonar.unwrap_or_else(usual_sonar))?;
+    let findings = survey(&map.floor, &map.sonar().unwrap_or_else(usual_sonar))?;
     let errors = count(&findings, Severity::Error);
     let name = map.name();
     anyhow::ensure!(errors == 0, "{name}: {errors} errors; run `sonarfix map check {name}`");

@@ -3,7 +3,7 @@
 use std::path::{Path as FilePath, PathBuf};
 
 use anyhow::Context;
-use sonarfix_map::{Place, Scenario, robot_file};
+use sonarfix_map::{MapFile, Scenario, SonarModel, robot_file};
 use sonarfix_plan::preset::{ServoPreset, SonarPreset};
 use sonarfix_plan::{BLIND_AFTER, Forecast, Spread, route};
 use sonarfix_report::Table;
@@ -16,14 +16,16 @@ use crate::table;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A map or a scenario (docs/formats.md).
+    /// A map or a scenario (.toml), segments (.csv), or a baked map (docs/formats.md).
     map: PathBuf,
+    /// The unit of a CSV whose header names none: m, cm or mm.
+    #[arg(long)]
+    unit: Option<String>,
     /// The path, for a map or instead of the scenario's: "x,y x,y …" in metres, the start first,
     /// or a file of x,y lines.
     #[arg(long, value_name = "FILE|X,Y …")]
     path: Option<String>,
-    /// The sonar: hc-sr04, lv-maxsonar, srf08, polaroid6500, or a robot file; by default the
-    /// scenario's.
+    /// The sonar by its name in files, like `hc_sr04`, or a robot file; by default the scenario's.
     #[arg(long, value_name = "NAME|ROBOT.toml")]
     sensor: Option<String>,
     /// The servo of the sonar; by default the scenario's.
@@ -33,7 +35,7 @@ pub struct Args {
     #[arg(long, conflicts_with = "sensor")]
     compare: bool,
     /// The required position accuracy, one standard deviation, millimetres: marks the sonars that
-    /// meet it.
+    /// meet it along the whole path from a start that is known to 1 mm and 0.1°.
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     need: Option<f64>,
     /// Number of runs: detection is random.
@@ -53,7 +55,21 @@ struct Candidate {
     sensor: String,
     #[serde(flatten)]
     forecast: Forecast,
+    /// With `--need`, the bound on the position from a known start, metres.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    from_known_start: Option<Spread>,
 }
+
+impl Candidate {
+    /// Whether the bound from a known start stays within this accuracy, millimetres.
+    fn suffices(&self, need: f64) -> bool {
+        self.from_known_start.is_some_and(|spread| 1e3 * spread.worst <= need)
+    }
+}
+
+/// The deviations of a known start, metres and radians.
+const KNOWN_POSITION: f64 = 1e-3;
+const KNOWN_HEADING: f64 = 0.1 * std::f64::consts::PI / 180.0;
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
     anyhow::ensure!(args.runs > 0, "--runs must be at least 1");
@@ -64,13 +80,17 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     }
     let scenario = scenario(args)?;
     let fitted = fitted(args, &scenario)?;
-    let count = u32::try_from(fitted.len()).unwrap_or(u32::MAX);
+    let forecasts = fitted.len() * if args.need.is_some() { 2 } else { 1 };
+    let count = u32::try_from(forecasts).unwrap_or(u32::MAX);
     let runs = Runs::new(args.runs.saturating_mul(count));
     let mut candidates = Vec::new();
-    for (sensor, scenario) in fitted {
-        if let Some(forecast) = Forecast::new(&scenario, args.runs, &runs)? {
-            candidates.push(Candidate { sensor, forecast });
-        }
+    for (sensor, mut scenario) in fitted {
+        let Some(forecast) = Forecast::new(&scenario, args.runs, &runs)? else { continue };
+        scenario.start.position = KNOWN_POSITION;
+        scenario.start.heading = KNOWN_HEADING;
+        let known = args.need.map(|_| Forecast::new(&scenario, args.runs, &runs)).transpose()?;
+        let from_known_start = known.flatten().map(|forecast| forecast.position);
+        candidates.push(Candidate { sensor, forecast, from_known_start });
     }
     runs.end()?;
     candidates.sort_by(|a, b| a.forecast.position.rms.total_cmp(&b.forecast.position.rms));
@@ -80,7 +100,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         println!("{}", table::text(&comparison(&candidates, args.need)));
     } else {
         for candidate in &candidates {
-            println!("{}", table::text(&legs(candidate)));
+            println!("{}", table::text(&legs(candidate, args.need)));
         }
     }
     if let (Some(file), Some(best)) = (&args.out, candidates.first()) {
@@ -98,14 +118,14 @@ fn write(file: &FilePath, svg: &str) -> anyhow::Result<()> {
 /// The scenario; a map gets the robot of the floor plans.
 fn scenario(args: &Args) -> anyhow::Result<Scenario> {
     let corners = args.path.as_deref().map(route::corners).transpose()?;
-    let mut scenario = match Place::read(&args.map)? {
-        Place::Scenario(scenario) => *scenario,
-        Place::Map(floor) => {
-            let missing = "a map has no path: give one with --path \"x,y x,y …\"";
-            anyhow::ensure!(corners.is_some(), "{}: {missing}", args.map.display());
-            let name = args.map.display().to_string();
-            Scenario { floor, name, ..FloorPlan::new(0).scenario()? }
-        }
+    let map = MapFile::read(&args.map, args.unit.as_deref())?;
+    let mut scenario = if let Some(scenario) = map.scenario {
+        *scenario
+    } else {
+        let missing = "a map has no path: give one with --path \"x,y x,y …\"";
+        anyhow::ensure!(corners.is_some(), "{}: {missing}", args.map.display());
+        let name = args.map.display().to_string();
+        Scenario { floor: map.floor, name, ..FloorPlan::new(0).scenario()? }
     };
     if let Some(corners) = corners {
         scenario.path = route::path(&corners, &scenario.floor, &scenario.robot)?;
@@ -125,15 +145,16 @@ fn fitted(args: &Args, scenario: &Scenario) -> anyhow::Result<Vec<(String, Scena
     let Some(sensor) = &args.sensor else {
         return Ok(vec![("its own sonar".to_owned(), scenario)]);
     };
-    if let Ok(preset) = <SonarPreset as clap::ValueEnum>::from_str(sensor, true) {
+    if let Some(preset) = SonarPreset::named(sensor) {
         return Ok(vec![with(preset, &scenario)]);
     }
     let file = FilePath::new(sensor);
+    let known = SonarPreset::ALL.map(SonarPreset::file_name).join(", ");
     anyhow::ensure!(
-        file.exists(),
-        "--sensor: \"{sensor}\" is neither a file nor one of hc-sr04, lv-maxsonar, srf08, \
-         polaroid6500"
+        SonarModel::named(sensor).is_none() || file.exists(),
+        "--sensor: no noise and cone are known for \"{sensor}\": give one of {known}, or a robot file"
     );
+    anyhow::ensure!(file.exists(), "--sensor: \"{sensor}\" is neither a file nor one of {known}");
     scenario.robot = robot_file::read(file)?;
     Ok(vec![(sensor.clone(), scenario)])
 }
@@ -169,8 +190,16 @@ fn blind_note(forecast: &Forecast) -> String {
     }
 }
 
+/// Whether one sonar suffices.
+fn verdict(candidate: &Candidate, need: f64) -> String {
+    let worst = candidate.from_known_start.map_or(f64::NAN, |spread| 1e3 * spread.worst);
+    let verdict = if candidate.suffices(need) { "suffices" } else { "does not suffice" };
+    format!("From a known start at worst {worst:.1} mm: {verdict} for {need} mm. ")
+}
+
 /// Each leg of a path with one sonar.
-fn legs(Candidate { sensor, forecast }: &Candidate) -> Table {
+fn legs(candidate: &Candidate, need: Option<f64>) -> Table {
+    let Candidate { sensor, forecast, .. } = candidate;
     let row = |leg: &sonarfix_plan::LegForecast| {
         let length = (leg.to[0] - leg.from[0]).hypot(leg.to[1] - leg.from[1]);
         vec![
@@ -185,11 +214,12 @@ fn legs(Candidate { sensor, forecast }: &Candidate) -> Table {
     Table {
         title: format!("Forecast with {sensor}: bound on the deviation, RMS / worst"),
         note: format!(
-            "Whole path: position {} mm, worst at {}; heading {}°; {:.1} ranges per second. {}",
+            "Whole path: position {} mm, worst at {}; heading {}°; {:.1} ranges per second. {}{}",
             millimetres(forecast.position),
             point(forecast.worst_at),
             degrees(forecast.heading),
             forecast.ranges_per_second,
+            need.map_or_else(String::new, |need| verdict(candidate, need)),
             blind_note(forecast),
         ),
         columns: ["leg (m)", "m", "x (mm)", "y (mm)", "heading (°)", "blind (s)"]
@@ -204,8 +234,9 @@ fn comparison(candidates: &[Candidate], need: Option<f64>) -> Table {
     let mut columns =
         vec!["sonar", "position (mm)", "worst at (m)", "heading (°)", "longest blind (s)"];
     columns.extend(["blind (%)", "ranges/s"]);
-    columns.extend(need.map(|_| "would do"));
-    let row = |Candidate { sensor, forecast }: &Candidate| {
+    columns.extend(need.into_iter().flat_map(|_| ["from a known start (mm)", "would do"]));
+    let row = |candidate: &Candidate| {
+        let Candidate { sensor, forecast, from_known_start } = candidate;
         let mut row = vec![
             sensor.clone(),
             millimetres(forecast.position),
@@ -215,13 +246,17 @@ fn comparison(candidates: &[Candidate], need: Option<f64>) -> Table {
             format!("{:.0}", 100.0 * forecast.blind_share),
             format!("{:.1}", forecast.ranges_per_second),
         ];
-        let keeps = |need: f64| if 1e3 * forecast.position.worst <= need { "yes" } else { "no" };
+        row.extend(from_known_start.map(millimetres));
+        let keeps = |need: f64| if candidate.suffices(need) { "yes" } else { "no" };
         row.extend(need.map(|need| keeps(need).to_owned()));
         row
     };
     let note = match need {
         Some(need) => {
-            format!("A sonar suffices if the bound on the position stays within {need} mm.")
+            format!(
+                "A sonar suffices if, from a start that is known to 1 mm and 0.1°, the bound on the \
+                 position stays within {need} mm; the second column includes the uncertainty of the start."
+            )
         }
         None => {
             format!("Blind: for more than {BLIND_AFTER:.0} s the worst-known direction unseen.")
@@ -235,7 +270,7 @@ fn comparison(candidates: &[Candidate], need: Option<f64>) -> Table {
     }
 }
 
-fn picture(scenario: &Scenario, Candidate { sensor, forecast }: &Candidate) -> HeatMap {
+fn picture(scenario: &Scenario, Candidate { sensor, forecast, .. }: &Candidate) -> HeatMap {
     let heat = |sample: &sonarfix_plan::Sample| Heat {
         at: sample.at,
         value: 1e3 * sample.position(),

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
-use sonarfix_map::{Floor, robot_file};
+use sonarfix_map::{MapFile, robot_file};
 use sonarfix_replay::fault::Complaint;
 use sonarfix_replay::thinned::{CAPACITY, Thinned};
 use sonarfix_replay::{ByVerdict, Figures, Replay, Summary};
@@ -26,7 +26,7 @@ pub struct Args {
     /// The log (docs/formats.md).
     log: PathBuf,
     /// The map; by default map.toml beside the log.
-    #[arg(long, value_name = "MAP.toml")]
+    #[arg(long, value_name = "MAP")]
     map: Option<PathBuf>,
     /// The robot; by default robot.toml beside the log.
     #[arg(long, value_name = "ROBOT.toml")]
@@ -54,7 +54,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     if let Some(file) = &args.trace {
         check_file("--trace", file)?;
     }
-    let floor = Floor::read(&beside(&args.log, args.map.as_ref(), "map.toml"))?;
+    let floor = MapFile::read(&beside(&args.log, args.map.as_ref(), "map.toml"), None)?.floor;
     let mut robot = robot_file::read(&beside(&args.log, args.config.as_ref(), "robot.toml"))?;
     if let Some(policy) = args.policy {
         robot.localizer.policy = policy.into();

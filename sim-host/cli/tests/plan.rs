@@ -175,13 +175,70 @@ fn sonars_are_compared_the_best_first() {
     assert!(rms.is_sorted(), "{rms:?}");
 }
 
+/// The start of a scenario may be less certain than what is needed; what the sonar does along the path is another matter.
+#[test]
+fn the_uncertainty_of_the_start_does_not_decide_what_suffices() {
+    let dir = tempfile::tempdir().unwrap();
+    let unsure = PAPER
+        .replace("laps = 4", "laps = 1")
+        .replace("position = \"1 mm\"", "position = \"300 mm\"");
+    let scenario = write(dir.path(), "unsure.toml", &unsure);
+    let json = sonarfix(&["plan", &scenario, "--runs", "1", "--need", "250", "--json"]);
+    let answer: Value = serde_json::from_str(&text(&json)).unwrap();
+    assert_documented(&answer);
+    let worst = |key: &str| number(&answer[0][key]["worst"]);
+    assert!(worst("position") > 0.3 && worst("from_known_start") < 0.25, "{answer}");
+    let table = text(&sonarfix(&["plan", &scenario, "--runs", "1", "--need", "250"]));
+    assert!(table.contains(": suffices for 250 mm"), "{table}");
+    let table = text(&sonarfix(&["plan", &scenario, "--runs", "1", "--need", "0.1"]));
+    assert!(table.contains(": does not suffice for 0.1 mm"), "{table}");
+}
+
+/// A map is the same to `plan` and `map` whether it is TOML, CSV, baked or that of a scenario.
+#[test]
+fn a_map_is_read_from_every_format() {
+    let dir = tempfile::tempdir().unwrap();
+    let map = write(dir.path(), "room.toml", ROOM);
+    let csv = dir.path().join("room.csv").display().to_string();
+    let baked = dir.path().join("room.bin").display().to_string();
+    text(&sonarfix(&["map", "simplify", &map, "--out", &csv]));
+    text(&sonarfix(&["map", "bake", &map, "--out", &baked]));
+    let named = |map: &str| {
+        let room = ROOM.split_once("[map]").unwrap().1;
+        assert!(PAPER.contains("[map]") && room.contains("wall"));
+        let (head, rest) = PAPER.split_once("[map]").unwrap();
+        let (_, tail) = rest.split_once("[robot.drive]").unwrap();
+        let start = tail.find("[path]").unwrap();
+        let end = tail.find("[start]").unwrap();
+        let path = "[path]\nunit = \"m\"\nstart = [1, 1]\ncorners = [[1, 3]]\nspeed = \"0.4 m/s\"\nturn_rate = \"30 deg/s\"\n\n";
+        let tail = [&tail[..start], path, &tail[end..]].concat();
+        let head = head.replace("format = 1", &format!("format = 1\nmap = {map:?}"));
+        format!("{head}[robot.drive]{tail}")
+    };
+    let scenarios = ["room.toml", "room.csv", "room.bin"].map(named);
+    let path = ["--path", "1,1 1,3", "--runs", "1", "--json"];
+    let plan = |map: &str| {
+        let arguments = [&["plan", map], &path[..]].concat();
+        serde_json::from_str::<Value>(&text(&sonarfix(&arguments))).unwrap()
+    };
+    let expected = plan(&map);
+    assert_eq!(plan(&csv), expected);
+    assert_eq!(plan(&baked), expected);
+    let [one, others @ ..] = scenarios.map(|text| plan(&write(dir.path(), "all.toml", &text)));
+    for other in others {
+        assert_eq!(one, other);
+    }
+    text(&sonarfix(&["map", "check", &write(dir.path(), "all.toml", &named("room.bin"))]));
+}
+
 #[test]
 fn errors_are_printed_with_their_place() {
     let dir = tempfile::tempdir().unwrap();
     let map = write(dir.path(), "room.toml", ROOM);
     let broken = write(dir.path(), "path.txt", "1,1\n1;3\n");
     let scenario = write(dir.path(), "paper.toml", PAPER);
-    let cases: [(&[&str], &[&str]); 9] = [
+    let cases: [(&[&str], &[&str]); 10] = [
+        (&["plan", &map, "--path", "1,1 1,3", "--sensor", "nxt"], &["\"nxt\"", "lv_maxsonar"]),
         (&["plan", &map, "--path", "1,1 4,1"], &["(1, 1) to (4, 1)", "\"partition\"", "gap"]),
         (&["plan", "nowhere.toml"], &["nowhere.toml", "cannot be read"]),
         (&["plan", &map], &["room.toml", "no path", "--path"]),
@@ -189,7 +246,7 @@ fn errors_are_printed_with_their_place() {
         (&["plan", &map, "--path", "1,1"], &["two points"]),
         (&["plan", &map, "--path", "1,1 1,1"], &["point 2", "already there"]),
         (&["plan", &map, "--path", &broken], &["path.txt:2", "x,y"]),
-        (&["plan", &map, "--path", "1,1 1,3", "--sensor", "bat"], &["\"bat\"", "hc-sr04"]),
+        (&["plan", &map, "--path", "1,1 1,3", "--sensor", "bat"], &["\"bat\"", "hc_sr04"]),
         (&["plan", &scenario, "--need", "-1"], &["--need", "above zero"]),
     ];
     for (arguments, words) in cases {

@@ -5,11 +5,11 @@ use sonarfix::config::PingSchedule;
 use sonarfix::range::RangeNoise;
 use sonarfix::units::{Duration, Metres, Radians};
 use sonarfix_hal::ranger::{PulseTiming, RangerKind};
-use sonarfix_map::{Scenario, ServoName, SonarName};
+use sonarfix_map::{Scenario, ServoName, SonarModel, SonarName};
 use sonarfix_sim::pins::devices;
 
-/// A sonar by its name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+/// A sonar whose filter parameters are known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SonarPreset {
     /// HC-SR04: 0.02–3 m, a ping every 60 ms.
     HcSr04,
@@ -38,6 +38,21 @@ struct FilterParameters {
 impl SonarPreset {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::HcSr04, Self::LvMaxsonar, Self::Srf08, Self::Polaroid6500];
+
+    /// The sonar with this name in files, with hyphens or without.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        let letters = |name: &str| name.to_lowercase().replace(['-', '_'], "");
+        Self::ALL.into_iter().find(|preset| letters(preset.file_name()) == letters(name))
+    }
+
+    /// Its name in robot and scenario files.
+    #[must_use]
+    pub fn file_name(self) -> &'static str {
+        let simulated = Some(self.filter_parameters().sonar);
+        let model = SonarModel::ALL.into_iter().find(|model| model.simulated == simulated);
+        model.map_or("", |model| model.name)
+    }
 
     /// Product name.
     #[must_use]
