@@ -481,7 +481,8 @@ impl<'m> Robot<'m> {
             return;
         }
         if self.localizer().is_odometry_missing() {
-            self.end_cycle(now, false);
+            // The next encoder sample ends the period, or the health records that it lasts.
+            self.cycle = Cycle::Idle { until: self.ticks.next() };
             return;
         }
         let aimed = self.navigator.aim();

@@ -72,3 +72,47 @@ pub(crate) fn inflation(
     let grows = position > Metres(0.0) || heading > Radians(0.0);
     grows.then_some((position, heading))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_association_decides_use_and_weight_from_its_limits_on() {
+        let used = [0.019_9, 0.02, 0.799_9, 0.8].map(use_of);
+        assert_eq!(used, [Use::Reject, Use::Downweight, Use::Downweight, Use::Accept]);
+        for (association, expected) in
+            [(0.5_f32, 0.5_f32), (0.998_9, 0.998_9), (0.999, 1.0), (0.999_5, 1.0)]
+        {
+            assert_eq!(weight(association).to_bits(), expected.to_bits());
+        }
+    }
+
+    /// An echo that is probably not the wall's contradicts the pose, unless the wall was probably occluded before.
+    #[test]
+    fn a_known_occlusion_explains_a_contradiction() {
+        let cases = [(0.49, 0.49), (0.5, 0.49), (0.49, 0.5), (0.5, 0.5)];
+        let expected = [true, false, false, false];
+        assert_eq!(cases.map(|(association, before)| contradicts(association, before)), expected);
+    }
+
+    #[test]
+    fn each_deviation_is_inflated_below_its_limit() {
+        let parameters =
+            GatingParameters { inflation: Metres(0.125), ..GatingParameters::default() };
+        let added = |position, heading| {
+            inflation(
+                &parameters,
+                PoseUncertainty { position: Metres(position), heading: Radians(heading) },
+            )
+        };
+        let (step, turn) = (Metres(0.125), Radians(0.125));
+        let (none, straight) = (Metres(0.0), Radians(0.0));
+        assert_eq!(added(1.249, 0.259), Some((step, turn)));
+        assert_eq!(added(0.01, 0.26), Some((step, straight)));
+        assert_eq!(added(0.01, 0.3), Some((step, straight)));
+        assert_eq!(added(1.25, 0.01), Some((none, turn)));
+        assert_eq!(added(2.0, 0.01), Some((none, turn)));
+        assert_eq!(added(1.25, 0.26), None);
+    }
+}

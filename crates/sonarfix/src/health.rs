@@ -334,3 +334,6 @@ impl Health {
         self.degrade(limits);
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -70,6 +70,24 @@ fn a_failed_counter_reading_delays_its_travel() {
     assert!(accepted_after(&reports, 2_401_000) >= 2);
 }
 
+/// A reading that fails when a ping is due delays the ping to the next encoder sample.
+#[test]
+fn a_failed_reading_delays_a_ping() {
+    let walls = walls();
+    let world = World::new(SLOW, TICK, 0);
+    let mut robot = robot(&walls, TICK, SCHEDULE, Settings::default());
+    let mut pins = pins(&world, ServoTiming::SG90);
+    let mut reports = vec![];
+    for time in millis(0, 5_001) {
+        let right_counter = time % 500_000 == 0;
+        world.broken.set(Broken { right_counter, ..Broken::default() });
+        reports.extend(run(&world, &mut robot, &mut pins, [time]));
+    }
+    // Of ten, the one that is due at 5 s comes later, and one while the servo turns for the first time is skipped.
+    assert_eq!(robot.faults().right.errors, 11);
+    assert_eq!(accepted_after(&reports, 0), 8, "{:?}", fixes(&reports));
+}
+
 #[test]
 fn a_counter_that_fails_at_first_starts_both_wheels_when_it_recovers() {
     let walls = walls();
