@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::{
-    bound, command, config, convert, faults, find, floor_plans, health, map, merge, monitor, paper,
-    pil, plan, reality, relocalize, replay, run, sonar_model, sweep,
+    bound, command, config, convert, export, faults, find, floor_plans, health, map, merge,
+    monitor, paper, pil, plan, reality, relocalize, replay, run, sonar_model, sweep,
 };
 
 /// Simulates, measures, replays and operates the Sonarfix localizer for small wheeled robots.
@@ -31,6 +31,8 @@ enum Command {
     Relocalize(relocalize::Args),
     /// Converts recordings of other formats for `replay`.
     Convert(convert::Args),
+    /// Writes logs, recordings and traces for other programs: MCAP and Parquet.
+    Export(export::Args),
     /// Shows the telemetry of a robot and records it for `replay`.
     Monitor(monitor::Args),
     /// Sends a command to a robot.
@@ -75,6 +77,7 @@ impl Cli {
             Command::Find(args) => find::execute(&args),
             Command::Relocalize(args) => relocalize::execute(&args),
             Command::Convert(args) => convert::execute(&args),
+            Command::Export(args) => export::execute(&args),
             Command::Monitor(args) => monitor::execute(&args),
             Command::Send(args) => command::execute(&args),
             Command::Config(args) => config::execute(&args),

@@ -8,6 +8,7 @@ mod cli;
 mod command;
 mod config;
 mod convert;
+mod export;
 mod faults;
 mod find;
 mod floor_plans;

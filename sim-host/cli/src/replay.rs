@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
+use sonarfix_exchange::trace_csv;
 use sonarfix_map::{MapFile, robot_file};
 use sonarfix_replay::fault::Complaint;
 use sonarfix_replay::thinned::{CAPACITY, Thinned};
 use sonarfix_replay::{ByVerdict, Figures, Replay, Summary};
-use sonarfix_report::trace_csv;
 use sonarfix_report::{Report, Table};
 
 use crate::output::{check_file, check_folder};

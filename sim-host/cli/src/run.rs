@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use cpu_time::ProcessTime;
+use sonarfix_exchange::trace_csv;
 use sonarfix_map::Scenario;
 use sonarfix_report::Report;
-use sonarfix_report::trace_csv;
 use sonarfix_rows::{Plan, Shard};
 use sonarfix_sim::monte_carlo;
 use sonarfix_sim::row::Row;
@@ -83,7 +83,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
 fn write_trace(trace: &Trace, file: &Path) -> anyhow::Result<()> {
     let create = || -> anyhow::Result<()> {
         let out = BufWriter::new(File::create(file)?);
-        Ok(trace_csv::write(trace, out)?)
+        trace_csv::write(trace, out)
     };
     create().with_context(|| format!("cannot write the trace {}", file.display()))
 }

@@ -4,6 +4,7 @@ mod command;
 mod common;
 mod convert;
 mod endings;
+mod export;
 mod faults;
 mod find;
 mod floor_plan;

@@ -40,7 +40,7 @@ pub mod thinned;
 mod wheels;
 
 pub use estimators::Searches;
-pub use lines::LONGEST;
+pub use lines::{LONGEST, Lines};
 pub use reference::HEADER as REFERENCE_HEADER;
 pub use replay::{Replay, Summary};
 pub use score::{ByVerdict, Consistency, Figures, FiguresByVerdict, Loss, Verdicts};

@@ -31,6 +31,7 @@ impl<R: BufRead> Lines<R> {
     /// # Errors
     /// Errors of the reader. A line that is not text is no error here: it is returned as
     /// [`Malformed`].
+    #[expect(clippy::should_implement_trait, reason = "the line is lent until the next one")]
     pub fn next(&mut self) -> io::Result<Option<Result<&str, Malformed>>> {
         let Some(end) = self.read_line()? else {
             return Ok(None);

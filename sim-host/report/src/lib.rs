@@ -18,7 +18,6 @@
 //! | `page`, `escape` | tables, figures and data as HTML |
 //! | [`Table`] | a table of numbers |
 //! | [`sweep`] | the figure of a sweep |
-//! | [`trace_csv`] | a run as a CSV file |
 
 mod axis;
 mod called_lost;
@@ -33,7 +32,6 @@ mod player;
 mod points;
 pub mod sweep;
 mod table;
-pub mod trace_csv;
 
 use std::borrow::Cow;
 use std::error::Error;

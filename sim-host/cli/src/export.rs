@@ -1,0 +1,151 @@
+//! `sonarfix export`: writes logs and traces for other programs.
+
+use std::fs::File;
+use std::io::{BufReader, BufWriter, Read};
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use sonarfix_exchange::row::{Rows, Sink};
+use sonarfix_exchange::{mcap_file, trace_csv, trace_parquet};
+use sonarfix_hal::config::RobotConfig;
+use sonarfix_map::{Floor, MapFile, robot_file};
+use sonarfix_replay::{Replay, Summary, log};
+use sonarfix_sim::trace::{Recorder, Wall};
+
+use crate::output::check_file;
+
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A log, a recording of `monitor --record`, or a trace (docs/formats.md). A log is replayed.
+    file: PathBuf,
+    /// The map, or a scenario; by default map.toml beside the file.
+    #[arg(long, value_name = "MAP.toml")]
+    map: Option<PathBuf>,
+    /// The robot of a log; by default robot.toml beside it.
+    #[arg(long, value_name = "ROBOT.toml")]
+    config: Option<PathBuf>,
+    /// The true poses of a log; by default reference.csv beside it, if it exists.
+    #[arg(long, value_name = "REF.csv")]
+    reference: Option<PathBuf>,
+    /// Writes MCAP, for Foxglove (docs/exchange.md).
+    #[arg(long, value_name = "FILE.mcap", required_unless_present = "parquet")]
+    mcap: Option<PathBuf>,
+    /// Writes the columns of a trace as Parquet, for pandas and polars (docs/exchange.md).
+    #[arg(long, value_name = "FILE.parquet")]
+    parquet: Option<PathBuf>,
+}
+
+type Mcap = mcap_file::File<BufWriter<File>>;
+type Parquet = trace_parquet::File<BufWriter<File>>;
+
+/// The files that are written.
+struct Outputs {
+    mcap: Option<Mcap>,
+    parquet: Option<Parquet>,
+}
+
+pub fn execute(args: &Args) -> anyhow::Result<()> {
+    for (option, file) in [("--mcap", &args.mcap), ("--parquet", &args.parquet)] {
+        if let Some(file) = file {
+            check_file(option, file)?;
+        }
+    }
+    let map = args.map.clone().unwrap_or_else(|| args.file.with_file_name("map.toml"));
+    let floor = MapFile::read(&map, None)?.floor;
+    if is_log(&args.file)? { export_log(args, &floor) } else { export_trace(args, &floor) }
+}
+
+/// Whether a file starts like a log.
+fn is_log(file: &Path) -> anyhow::Result<bool> {
+    let mut start = String::new();
+    let opened = open(file)?.take(log::HEADER.len() as u64).read_to_string(&mut start);
+    Ok(opened.is_ok() && start == log::HEADER)
+}
+
+fn open(file: &Path) -> anyhow::Result<BufReader<File>> {
+    Ok(BufReader::new(File::open(file).with_context(|| file.display().to_string())?))
+}
+
+fn walls(floor: &Floor) -> Vec<Wall> {
+    let wall = |wall: &sonarfix_map::NamedWall| Wall {
+        name: wall.name().to_owned(),
+        from: wall.from(),
+        to: wall.to(),
+    };
+    floor.named_walls().iter().map(wall).collect()
+}
+
+fn export_trace(args: &Args, floor: &Floor) -> anyhow::Result<()> {
+    let mut outputs = Outputs::new(args, 0.0, &walls(floor))?;
+    let rows = trace_csv::read(open(&args.file)?, &mut outputs.sinks());
+    let rows = rows.with_context(|| args.file.display().to_string())?;
+    outputs.end()?;
+    println!("{rows} rows");
+    Ok(())
+}
+
+fn export_log(args: &Args, floor: &Floor) -> anyhow::Result<()> {
+    let beside = args.file.with_file_name("robot.toml");
+    let robot = robot_file::read(args.config.as_ref().unwrap_or(&beside))?;
+    // The start is known after a replay: MCAP needs its time on the log's clock.
+    let start = replay(args, &robot, floor, &mut ())?.started_at;
+    let walls = walls(floor);
+    let mut outputs = Outputs::new(args, start, &walls)?;
+    let mut rows = Rows::new(&walls, outputs.sinks());
+    let summary = replay(args, &robot, floor, &mut rows)?;
+    rows.end()?;
+    let mount = robot.localizer.sonar.mount;
+    let mount = [mount.x.0.into(), mount.y.0.into()];
+    if let Some(mcap) = &mut outputs.mcap {
+        mcap.take_log(open(&args.file)?, mount)?;
+    }
+    outputs.end()?;
+    let (lines, skipped) = (summary.lines, summary.lines_skipped);
+    println!("{lines} lines, {skipped} of them skipped; {:.1} s", summary.duration);
+    Ok(())
+}
+
+fn replay(
+    args: &Args,
+    robot: &RobotConfig,
+    floor: &Floor,
+    recorder: &mut impl Recorder,
+) -> anyhow::Result<Summary> {
+    let usual = args.file.with_file_name("reference.csv");
+    let reference = args.reference.clone().or_else(|| usual.exists().then_some(usual));
+    let reference = reference.as_deref().map(open).transpose()?;
+    let walls = floor.walls();
+    let replay = Replay { robot, walls: &walls, strict: false };
+    let summary = replay.run(open(&args.file)?, reference, recorder, &mut |_| {});
+    summary.with_context(|| args.file.display().to_string())
+}
+
+impl Outputs {
+    fn new(args: &Args, epoch: f64, walls: &[Wall]) -> anyhow::Result<Self> {
+        let create = |file: &PathBuf| -> anyhow::Result<_> {
+            let created = File::create(file);
+            Ok(BufWriter::new(created.with_context(|| format!("cannot write {}", file.display()))?))
+        };
+        let metadata = [
+            ("sonarfix", env!("CARGO_PKG_VERSION").to_owned()),
+            ("source", args.file.display().to_string()),
+            ("start_s", epoch.to_string()),
+        ];
+        let mcap = args.mcap.as_ref().map(|file| Mcap::new(create(file)?, epoch, walls, &metadata));
+        let parquet = args.parquet.as_ref().map(|file| Parquet::new(create(file)?));
+        Ok(Self { mcap: mcap.transpose()?, parquet: parquet.transpose()? })
+    }
+
+    fn sinks(&mut self) -> Vec<&mut dyn Sink> {
+        let mcap = self.mcap.iter_mut().map(|file| file as &mut dyn Sink);
+        let parquet = self.parquet.iter_mut().map(|file| file as &mut dyn Sink);
+        mcap.chain(parquet).collect()
+    }
+
+    fn end(self) -> anyhow::Result<()> {
+        if let Some(file) = self.mcap {
+            file.end()?;
+        }
+        self.parquet.map_or(Ok(()), Parquet::end)
+    }
+}

@@ -1,0 +1,145 @@
+//! The records of a log as messages: one topic for each kind, with the fields of `docs/formats.md`.
+
+use serde_json::{Value, json};
+use sonarfix::navigator::Mode;
+use sonarfix_replay::log::Record;
+use sonarfix_sim::STATES;
+
+use crate::row::Kind;
+use crate::scene;
+use crate::schema::{self, Schema};
+
+const REAL: Kind = Kind::Real;
+const STATE_FIELDS: [&str; 14] = [
+    "x_m",
+    "y_m",
+    "heading_rad",
+    "scale_right",
+    "scale_left",
+    "track_width_error_m",
+    "range_scale",
+    "sigma_x_m",
+    "sigma_y_m",
+    "sigma_heading_rad",
+    "sigma_scale_right",
+    "sigma_scale_left",
+    "sigma_track_width_m",
+    "sigma_range_scale",
+];
+const POSE_FIELDS: [(&str, Kind); 6] = [
+    ("time_s", REAL),
+    ("x_m", REAL),
+    ("y_m", REAL),
+    ("heading_rad", REAL),
+    ("sigma_position_m", REAL),
+    ("sigma_heading_rad", REAL),
+];
+
+/// The topics and their schemas.
+pub fn topics() -> Vec<(&'static str, Schema)> {
+    let whole = Kind::Whole;
+    let states = || std::iter::once(("time_s", REAL)).chain(STATE_FIELDS.map(|name| (name, REAL)));
+    let ticks = [("time_s", REAL), ("right", whole), ("left", whole)];
+    let wheels = [("time_s", REAL), ("right_m", REAL), ("left_m", REAL)];
+    let range = [("time_s", REAL), ("bearing_rad", REAL), ("range_m", REAL), ("wall", whole)];
+    let mode = states().chain([("mode", Kind::Text)]);
+    vec![
+        ("/log/ticks", schema::columns("sonarfix.Ticks", ticks.into_iter())),
+        ("/log/wheels", schema::columns("sonarfix.Wheels", wheels.into_iter())),
+        ("/log/range", schema::columns("sonarfix.Range", range.into_iter())),
+        ("/log/skip", schema::columns("sonarfix.Skip", [("time_s", REAL)].into_iter())),
+        ("/log/scan", schema::laser_scan()),
+        ("/log/start", schema::columns("sonarfix.Start", POSE_FIELDS.into_iter())),
+        ("/log/pose", schema::columns("sonarfix.Pose", POSE_FIELDS.into_iter())),
+        ("/log/mode", schema::columns("sonarfix.Mode", mode)),
+        ("/log/resume", schema::columns("sonarfix.Resume", states())),
+    ]
+}
+
+/// The time of a record, seconds on the log's clock.
+pub fn time(record: &Record) -> f64 {
+    match record {
+        Record::Ticks { time, .. }
+        | Record::Wheels { time, .. }
+        | Record::Range { time, .. }
+        | Record::Skip { time }
+        | Record::Scan { time, .. }
+        | Record::Start { time, .. }
+        | Record::Pose { time, .. }
+        | Record::Mode { time, .. }
+        | Record::Resume { time, .. } => *time,
+    }
+}
+
+/// The topic and the message of a record. `mount` is the place of the sonar on the robot.
+pub fn message(record: &Record, stamp: u64, mount: [f64; 2]) -> (&'static str, Value) {
+    match record {
+        Record::Ticks { time, right, left } => {
+            ("/log/ticks", json!({ "time_s": time, "right": right, "left": left }))
+        }
+        Record::Wheels { time, right, left } => {
+            ("/log/wheels", json!({ "time_s": time, "right_m": right, "left_m": left }))
+        }
+        Record::Range { time, bearing, range, wall } => (
+            "/log/range",
+            json!({ "time_s": time, "bearing_rad": bearing, "range_m": range, "wall": wall }),
+        ),
+        Record::Skip { time } => ("/log/skip", json!({ "time_s": time })),
+        Record::Scan { scan, .. } => {
+            // Beams are counted in `u32`: a line of a log is shorter.
+            let steps = u32::try_from(scan.ranges.len().saturating_sub(1)).unwrap_or(u32::MAX);
+            let none: [f64; 0] = [];
+            let [x, y] = mount;
+            let message = json!({
+                "timestamp": scene::stamp(stamp),
+                "frame_id": scene::ROBOT,
+                "pose": scene::pose([x, y, 0.0]),
+                "start_angle": scan.first,
+                "end_angle": scan.first + f64::from(steps) * scan.step,
+                "ranges": scan.ranges,
+                "intensities": none,
+            });
+            ("/log/scan", message)
+        }
+        Record::Start { time, pose, position_deviation, heading_deviation } => {
+            let pose = [pose.x, pose.y, pose.heading];
+            ("/log/start", start(*time, pose, *position_deviation, *heading_deviation))
+        }
+        Record::Pose { time, pose, position_deviation, heading_deviation } => {
+            let pose = [pose.x, pose.y, pose.heading];
+            ("/log/pose", start(*time, pose, *position_deviation, *heading_deviation))
+        }
+        Record::Mode { time, mode, state, deviation } => {
+            let mut message = states(*time, state, deviation);
+            let mode = match mode {
+                Mode::Tracking => "tracking",
+                Mode::Searching => "searching",
+                Mode::Provisional => "provisional",
+            };
+            if let Some(fields) = message.as_object_mut() {
+                fields.insert("mode".to_owned(), mode.into());
+            }
+            ("/log/mode", message)
+        }
+        Record::Resume { time, state, deviation } => {
+            ("/log/resume", states(*time, state, deviation))
+        }
+    }
+}
+
+fn start(time: f64, [x, y, heading]: [f64; 3], position: f64, deviation: f64) -> Value {
+    json!({
+        "time_s": time,
+        "x_m": x,
+        "y_m": y,
+        "heading_rad": heading,
+        "sigma_position_m": position,
+        "sigma_heading_rad": deviation,
+    })
+}
+
+fn states(time: f64, state: &[f64; STATES.len()], deviation: &[f64; STATES.len()]) -> Value {
+    let fields = STATE_FIELDS.into_iter().zip(state.iter().chain(deviation));
+    let fields = fields.map(|(name, value)| (name.to_owned(), json!(value)));
+    std::iter::once(("time_s".to_owned(), json!(time))).chain(fields).collect()
+}
