@@ -141,9 +141,12 @@ impl SearchParameters {
 }
 
 /// Below this mean log-likelihood per ping, relative to echoes anywhere, much that is around is not in the map: the
-/// answer has to persist for so many times longer.
-const DOUBTFUL_SCORE: f32 = 0.3;
-const DOUBTFUL_FOR: u16 = 3;
+/// answer has to persist for so many times longer, unless it leads by so many margins.
+const UNCERTAIN_SCORE: f32 = 0.3;
+const UNCERTAIN_FOR: u16 = 3;
+const CLEAR_LEAD: f32 = 4.0;
+/// An answer that leads by so many margins need not persist longer than for half of the novel pings.
+const LARGE_LEAD: f32 = 8.0;
 /// A unique answer need not be sharper than what the odometry adds within this distance, metres.
 const SHARP_WITHIN: f32 = 1.8;
 /// Least deviations: a prior of zero would fix what a slip changes.
@@ -701,8 +704,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
             let streak = entry.streak.saturating_add(fresh);
             entry.streak = if n == 0 && is_sole { streak } else { 0 };
         }
-        let is_doubtful = best.score < DOUBTFUL_SCORE * f32::from(best.pings);
-        let persistence = self.parameters.persistence * if is_doubtful { DOUBTFUL_FOR } else { 1 };
+        let persistence = self.persistence(&best);
         let has_persisted = is_sole && best.streak.saturating_add(fresh) >= persistence && is_sharp;
         let was_unique = matches!(self.answer, Decision::Unique(_));
         self.is_check_due =
@@ -718,6 +720,22 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         } else {
             Decision::Several(rivals)
         };
+    }
+
+    /// Novel pings during which the best entry must be the only answer: the fewer, the farther it leads.
+    fn persistence(&self, best: &Entry) -> u16 {
+        let nothing = self.echoes.nothing(best.pings, best.echoes);
+        let second = self.bank.entries().get(1).map_or(nothing, |entry| entry.score);
+        let lead = (best.score - at_least(second, nothing)) / self.parameters.margin;
+        let is_low = best.score < UNCERTAIN_SCORE * f32::from(best.pings);
+        let persistence = self.parameters.persistence;
+        if lead >= LARGE_LEAD {
+            persistence / 2
+        } else if is_low && lead < CLEAR_LEAD {
+            persistence.saturating_mul(UNCERTAIN_FOR)
+        } else {
+            persistence
+        }
     }
 
     /// The wall along which the position of an entry is undetermined: the nearest that is parallel to

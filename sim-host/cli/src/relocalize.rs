@@ -88,6 +88,10 @@ fn summary_table(summary: &Summary, seconds: f64) -> Table {
             row("loss noticed", percent(summary.searched)),
             row("first hand-over right", percent(summary.first_right)),
             row("first hand-over wrong", percent(summary.first_wrong)),
+            row(
+                "right and Tracking before the kidnapping",
+                summary.was_tracking.map_or("-".to_owned(), percent),
+            ),
             row("right and Tracking 20 pings later", percent(summary.right_later)),
             row("wrong pose confirmed", percent(summary.confirmed_wrong)),
             row("right pose at the end", percent(summary.back)),

@@ -72,6 +72,8 @@ pub struct Trial {
     pub walls: usize,
     /// Seconds from the upset to the first search; `None` if the loss was not noticed.
     pub searched_after: Option<f64>,
+    /// Whether the pose was right and `Tracking` when the robot was kidnapped; `None` of a start without a pose.
+    pub was_tracking: Option<bool>,
     /// Every hand-over.
     pub hand_overs: Vec<HandOver>,
     /// Whether a provisional pose was confirmed that was wrong then.
@@ -134,6 +136,7 @@ struct Watch {
     /// Changes of the mode since the last tick, whose error is not known yet.
     changed: Option<(Mode, Mode)>,
     searched_after: Option<f64>,
+    was_tracking: Option<bool>,
     hand_overs: Vec<HandOver>,
     /// Pings since the last hand-over.
     pings: u32,
@@ -149,6 +152,7 @@ impl Watch {
             verdict: Verdict::Tracking,
             changed: None,
             searched_after: searches.then_some(0.0),
+            was_tracking: None,
             hand_overs: Vec::new(),
             pings: 0,
             confirmed_wrong: false,
@@ -162,6 +166,7 @@ impl Watch {
             seed,
             walls,
             searched_after: self.searched_after,
+            was_tracking: self.was_tracking,
             hand_overs: self.hand_overs,
             confirmed_wrong: self.confirmed_wrong,
             is_back: self.is_right && has_pose && self.verdict != Verdict::Lost,
@@ -197,6 +202,9 @@ impl Recorder for Watch {
             _ => {}
         }
         let is_tracking = self.mode != Mode::Searching && self.verdict == Verdict::Tracking;
+        if time < self.at {
+            self.was_tracking = Some(is_right && is_tracking);
+        }
         if let Some(last) = self.hand_overs.last_mut()
             && last.is_right_later.is_none()
             && (self.pings >= SETTLED || self.mode == Mode::Searching)
@@ -251,6 +259,8 @@ pub struct Summary {
     pub first_right: f64,
     /// Share with a hand-over of a wrong pose first.
     pub first_wrong: f64,
+    /// Share that was right and `Tracking` when it was kidnapped, to compare with; `None` of starts without a pose.
+    pub was_tracking: Option<f64>,
     /// Share of the right hand-overs after which the pose was right and `Tracking` 20 pings later.
     pub right_later: f64,
     /// Share in which a wrong pose was confirmed.
@@ -286,6 +296,10 @@ impl Summary {
             searched: share(&|trial| trial.searched_after.is_some()),
             first_right: share(&|trial| first(trial).is_some_and(|h| h.is_right)),
             first_wrong: share(&|trial| first(trial).is_some_and(|h| !h.is_right)),
+            was_tracking: trials
+                .iter()
+                .any(|trial| trial.was_tracking.is_some())
+                .then(|| share(&|trial| trial.was_tracking == Some(true))),
             right_later: held as f64 / later.len() as f64,
             confirmed_wrong: share(&|trial| trial.confirmed_wrong),
             back: share(&|trial| trial.is_back),

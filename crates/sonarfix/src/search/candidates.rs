@@ -123,6 +123,8 @@ fn gap(one: &Line, other: &Line) -> f32 {
     libm::sqrtf(least) + 0.5
 }
 
+// ===== Eq. (35): two lines on two walls =====
+/// The placement of two lines on two walls, if both stretches lie on their walls.
 fn place(
     side: &Side,
     first: &Line,

@@ -98,6 +98,8 @@ impl Placed {
 }
 
 impl Equations {
+    // ===== Eq. (34): rows of the least squares =====
+    /// Adds the two rows of a ping.
     pub fn add(&mut self, placed: &Placed, target: &Target, by: Tolerance) {
         let toward = target.toward;
         let by_turn = toward.dot(placed.arm.left());
@@ -129,6 +131,7 @@ impl Equations {
         }
     }
 
+    // ===== Eq. (34): Δ =====
     /// The placement after a step, shortened if it leads too far.
     pub fn step(&self, placement: &Placement, prior: Prior) -> Option<Placement> {
         let by_prior = prior.weights();

@@ -51,6 +51,8 @@ impl Sharpness {
     pub const COARSE: f32 = 0.15;
     pub const MEDIUM: f32 = 0.08;
     pub const FINE: f32 = 0.05;
+    /// Of an answer: the hand-over is as exact as the nearest pings.
+    pub const SHARP: f32 = 0.025;
 
     /// Of a ping that was sent so far from the reference that odometry adds a deviation of its own.
     pub fn new(deviation: f32, odometry: f32) -> Self {
@@ -105,6 +107,7 @@ impl<'m> EchoModel<'m> {
         echo * f32::from(echoes) + at_least(SILENCE, self.shares.silence) * silent
     }
 
+    // ===== Eq. (31): p(z) over the density of an echo anywhere =====
     /// Scores a ping; one call is one evaluation.
     pub fn explain(&self, beam: &Beam, sharpness: Sharpness) -> Explanation {
         let margin = MATCH * sharpness.deviation;

@@ -8,8 +8,9 @@ use super::score::{EchoModel, Sharpness};
 use super::window::{Chain, Window};
 use crate::vector::Vector;
 
-/// Gauss–Newton steps after the coarse one.
+/// Gauss–Newton steps after the coarse one, and those of an answer.
 const STEPS: u8 = 2;
+const STEPS_OF_ANSWER: u8 = 4;
 /// By how much the running sum may fall short: scores deviate by 1.3 a ping.
 const LEAD: f32 = 8.0;
 
@@ -101,7 +102,10 @@ impl Trial {
         let deviation = match self.stage {
             Stage::Coarse => Sharpness::COARSE,
             Stage::Step(0) => Sharpness::MEDIUM,
-            Stage::Step(_) | Stage::Fine => Sharpness::FINE,
+            Stage::Step(1) => Sharpness::FINE,
+            Stage::Step(_) => Sharpness::SHARP,
+            Stage::Fine if self.is_answer => Sharpness::SHARP,
+            Stage::Fine => Sharpness::FINE,
         };
         let sharpness = Sharpness::new(deviation, odometry.per_metre * ping.station.travelled);
         let placed = Placed::new(ping, &self.placement, window, &mut self.chain);
@@ -152,7 +156,8 @@ impl Trial {
             return Verdict::Rejected;
         };
         self.placement = placement;
-        self.begin(if next < STEPS { Stage::Step(next) } else { Stage::Fine })
+        let steps = if self.is_answer { STEPS_OF_ANSWER } else { STEPS };
+        self.begin(if next < steps { Stage::Step(next) } else { Stage::Fine })
     }
 
     fn begin(&mut self, stage: Stage) -> Verdict {

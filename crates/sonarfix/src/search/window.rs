@@ -303,6 +303,7 @@ impl Chain {
         Self { last, at, by_drift: Vector::default(), by_turn_scale: Vector::default() }
     }
 
+    // ===== Eqs. (32) and (33): P_i, ∂P_i/∂κ and ∂P_i/∂τ =====
     /// Goes on to the next place.
     pub fn add(&mut self, link: &Link) {
         let middle = self.last.bent.plus(link.bent).times(0.5);

@@ -17,6 +17,8 @@ mod jacobians;
 #[cfg(test)]
 mod map;
 #[cfg(test)]
+mod navigator;
+#[cfg(test)]
 mod oracle;
 #[cfg(test)]
 mod refusals;

@@ -4,13 +4,13 @@ use proptest::prelude::*;
 use sonarfix::config::{Config, Sonar};
 use sonarfix::map::{Map, Wall};
 use sonarfix::pose::{Heading, Point, Pose};
-use sonarfix::search::{Answer, Hypothesis, NotFinite, Search, SearchParameters};
+use sonarfix::search::{Answer, Hypothesis, NotFinite, Region, Search, SearchParameters};
 use sonarfix::units::{Metres, Radians};
 
 /// Evaluations after each ping: a cycle or two in a room of a few walls.
-const EVALUATIONS: u16 = 10_000;
+pub(crate) const EVALUATIONS: u16 = 10_000;
 
-fn sonar() -> Sonar {
+pub(crate) fn sonar() -> Sonar {
     let mut sonar = Config::for_track_width(Metres(0.2)).sonar;
     sonar.mount = Point::new(0.08, 0.0);
     sonar.servo = (Radians::from_degrees(-100.0), Radians::from_degrees(100.0));
@@ -20,8 +20,8 @@ fn sonar() -> Sonar {
 }
 
 /// A room by its outline, counter-clockwise.
-struct Room {
-    walls: Vec<Wall>,
+pub(crate) struct Room {
+    pub(crate) walls: Vec<Wall>,
     /// Corners that are concave from inside.
     corners: Vec<Point>,
 }
@@ -38,7 +38,7 @@ impl Room {
     }
 
     /// A room that no rotation maps to itself.
-    fn irregular() -> Self {
+    pub(crate) fn irregular() -> Self {
         Self::new(&[(0.0, 0.0), (5.0, 0.0), (5.0, 2.0), (3.2, 2.0), (3.2, 4.1), (0.0, 4.1)])
     }
 
@@ -48,7 +48,7 @@ impl Room {
 
     /// The nearest foot or corner in the cone, without noise. It is measured through walls, too: in
     /// these rooms a nearer one answers first.
-    fn echo(&self, pose: Pose, bearing: Radians) -> Option<Metres> {
+    pub(crate) fn echo(&self, pose: Pose, bearing: Radians) -> Option<Metres> {
         let sonar = sonar();
         let from = pose.to_map(sonar.mount);
         let axis = pose.heading.turned(bearing);
@@ -88,7 +88,7 @@ fn is_at(hypothesis: &Hypothesis, pose: Pose) -> bool {
     (found.x - pose.x).0.hypot((found.y - pose.y).0) < 0.1 && heading.abs().0 < 0.1
 }
 
-fn start(x: f32, y: f32, degrees: f32) -> Pose {
+pub(crate) fn start(x: f32, y: f32, degrees: f32) -> Pose {
     Pose::new(x, y, Radians::from_degrees(degrees))
 }
 
@@ -130,6 +130,22 @@ fn a_rotationally_symmetric_room_gives_both_poses_and_no_unique_one() {
             assert!(answers.iter().any(|answer| is_at(answer, one)), "{one:?} of {answers:?}");
         }
     }
+}
+
+/// A start region that holds one of the two poses makes it the only one.
+#[test]
+fn a_start_region_decides_between_the_poses_of_a_symmetric_room() {
+    let room = Room::rectangle();
+    let region = Region { from: Point::new(0.0, 0.0), to: Point::new(2.0, 1.5) };
+    let mut search: Search =
+        Search::new(&sonar(), Map::new(&room.walls), SearchParameters::default());
+    search.begin_within(region);
+    let mut pose = start(1.2, 0.8, 10.0);
+    let is_found = (0..200).any(|_| {
+        pose = drive(&mut search, &room, pose, 0.04, 1);
+        matches!(search.answer(), Answer::Unique(found) if is_at(&found, pose))
+    });
+    assert!(is_found, "{pose:?}: {:?}", search.answer());
 }
 
 #[test]
