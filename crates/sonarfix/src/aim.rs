@@ -39,7 +39,7 @@ use ranking::Ranked;
 use timing::PingDuration;
 
 pub use crate::config::Policy;
-pub(crate) use history::History;
+pub(crate) use history::{History, Origin};
 
 /// One ping at one wall.
 #[derive(Debug, Clone, Copy, PartialEq)]

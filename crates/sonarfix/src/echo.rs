@@ -165,8 +165,23 @@ const AGREEMENT_WRONG_POSE: f32 = 0.3;
 /// of the innovation. Chosen on simulated runs (`docs/schedule.md`).
 const DISPLACED: f32 = 0.02;
 const WIDENING: f32 = 3.0;
+/// Probability that the object which occludes a wall returns its echo again.
+const SAME_SOURCE: f32 = 0.7;
+/// Distance travelled that halves it, metres.
+const SOURCE_HALVED_WITHIN: f32 = 0.05;
+/// Standard deviation of that echo for a robot that stands still, metres.
+const SOURCE_DEVIATION: f32 = 0.015;
 /// Smallest span of ranges over which clutter is distributed.
 const MIN_SPAN: f32 = 0.05;
+
+/// What returned the latest echo of a ping at a wall that was probably not the wall's.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Source {
+    /// Its range at that ping.
+    pub range: Metres,
+    /// Distance travelled since.
+    pub travelled: Metres,
+}
 
 /// What is expected of one ping at a wall.
 #[derive(Debug, Clone, Copy)]
@@ -180,6 +195,8 @@ pub(crate) struct ExpectedEcho {
     pub geometry: f32,
     /// o: probability that an unmapped object occludes the wall.
     pub occluded: f32,
+    /// What returned an echo instead of the wall before.
+    pub source: Option<Source>,
     /// The shortest and the longest range that the sonar reports.
     pub limits: (Metres, Metres),
 }
@@ -277,16 +294,26 @@ impl ExpectedEcho {
             let per_metre = 1.0 / at_least(farthest - self.range.0, MIN_SPAN);
             (long * per_metre, BEYOND_OCCLUDED * per_metre)
         };
+        let is_short = innovation < 0.0;
+        let anywhere = (1.0 - NO_ECHO_WRONG_POSE) * everywhere;
+        let o = self.occluded;
+        let (occluded, at_any_pose) = match self.source {
+            None if is_short => (by_object, by_object),
+            None => (by_object, anywhere),
+            Some(source) => {
+                let same = source.probability();
+                let again =
+                    same * (1.0 - NO_ECHO_OCCLUDED) * source.density(self.range.0 + innovation);
+                let other = 1.0 - same;
+                let elsewhere = if is_short { by_object } else { anywhere };
+                (other * by_object + again, other * elsewhere + again)
+            }
+        };
         Densities {
             wall: g * parameters.heard() * density,
             clutter: g * spurious + (1.0 - g) * (1.0 - NO_ECHO_OFF_WALL) * everywhere,
-            occluded: by_object,
-            wrong_pose: if innovation < 0.0 {
-                (1.0 - self.occluded) * (1.0 - NO_ECHO_WRONG_POSE) * everywhere
-                    + self.occluded * by_object
-            } else {
-                (1.0 - NO_ECHO_WRONG_POSE) * everywhere
-            },
+            occluded,
+            wrong_pose: (1.0 - o) * anywhere + o * at_any_pose,
         }
     }
 
@@ -311,6 +338,23 @@ pub(crate) fn density(innovation: Innovation) -> f32 {
     let narrow = (1.0 - DISPLACED) * exp(exponent);
     let wide = DISPLACED / WIDENING * exp(exponent / (WIDENING * WIDENING));
     ONE_OVER_ROOT_TWO_PI * per_sigma * (narrow + wide)
+}
+
+impl Source {
+    /// Probability that it returns its echo again, if the wall is occluded.
+    fn probability(&self) -> f32 {
+        let ratio = self.travelled.0 / SOURCE_HALVED_WITHIN;
+        SAME_SOURCE / (1.0 + ratio * ratio)
+    }
+
+    /// Density of its echo at a range: the source stands still while the robot moves, in any direction.
+    fn density(&self, range: f32) -> f32 {
+        let travelled = self.travelled.0;
+        let variance = SOURCE_DEVIATION * SOURCE_DEVIATION + travelled * travelled;
+        let per_sigma = inverse_sqrt(variance);
+        let ratio = (range - self.range.0) * per_sigma;
+        ONE_OVER_ROOT_TWO_PI * per_sigma * exp(-0.5 * ratio * ratio)
+    }
 }
 
 const ONE_OVER_ROOT_TWO_PI: f32 = 0.398_942_3;
@@ -341,7 +385,7 @@ mod tests {
         ) -> ExpectedEcho {
             let variance = SquareMetres(sigma * sigma);
             let limits = (Metres(0.1), Metres(4.0));
-            ExpectedEcho { range: Metres(range), variance, geometry, occluded, limits }
+            ExpectedEcho { range: Metres(range), variance, geometry, occluded, source: None, limits }
         }
     }
 
@@ -410,6 +454,7 @@ mod tests {
             variance: SquareMetres(1e-4),
             geometry: 1.0,
             occluded: parameters.prior_occlusion(Metres(2.0)),
+            source: None,
             limits: (Metres(0.05), Metres(4.0)),
         };
         let short = Some(Metres(1.0));

@@ -7,7 +7,7 @@
 //! NaN or infinity in an argument is a typed error or a [`Fix::Refused`], and the estimate is unchanged
 //! to the bit.
 
-use crate::aim::{self, Aim, History, NoAim};
+use crate::aim::{self, Aim, History, NoAim, Origin};
 use crate::alternatives::{Alternative, Scene, Target};
 use crate::config::{Config, ConfigError};
 use crate::covariance::PredictedMeasurement;
@@ -362,6 +362,7 @@ impl<'m> Localizer<'m> {
             variance: innovation.variance,
             geometry,
             occluded,
+            source: entry.source,
             limits: (sonar.min_range, sonar.max_range),
         };
         let alone = expected_echo.explain(echo, measured.ok(), Others::NONE);
@@ -391,7 +392,7 @@ impl<'m> Localizer<'m> {
             (Ok(range), Some((other, probability))) => {
                 let Alternative { expected, noise, wall, .. } = other;
                 let entry = self.history.entry(echo, wall, Metres(0.0), expected.range, self.time);
-                self.history.record_echo(&entry, 0.0, true, self.time);
+                self.history.record_echo(&entry, 0.0, Origin::Wall, self.time);
                 let innovation = self.ekf.innovation(range, &expected, noise);
                 let prediction = self.ekf.predict_measurement(&expected);
                 use_range(&mut self.ekf, &prediction, innovation, noise, probability)?
@@ -401,8 +402,12 @@ impl<'m> Localizer<'m> {
             self.pose_changed();
         }
         self.association = association;
-        let is_wall = association > 0.5;
-        self.history.record_echo(&entry, now_occluded, is_wall, self.time);
+        let origin = match measured {
+            Ok(_) if association > 0.5 => Origin::Wall,
+            Ok(range) => Origin::Other(range),
+            Err(_) => Origin::Silence,
+        };
+        self.history.record_echo(&entry, now_occluded, origin, self.time);
         let explained = other.map_or(association, |(_, probability)| probability);
         Ok(Explained { fix, evidence, contradicts: gating::contradicts(explained, occluded) })
     }

@@ -9,7 +9,7 @@
 //! Bearing, range and foot come from a finite state. For a wall far beyond any range the square of the
 //! distance may be infinite; the probability is then the prior.
 
-use crate::echo::EchoParameters;
+use crate::echo::{EchoParameters, Source};
 use crate::map::WallId;
 use crate::units::{Instant, Metres, Radians, seconds};
 
@@ -41,6 +41,8 @@ struct RecentWall {
     above_prior: f32,
     /// Reading of the odometer when a range of the wall was last used.
     used_at: Option<Metres>,
+    /// The latest echo that was probably not the wall's, and the reading of the odometer at it.
+    other: Option<(Metres, Metres)>,
 }
 
 impl RecentWall {
@@ -67,10 +69,23 @@ pub(crate) struct Entry {
     slot: Option<usize>,
     place: Place,
     used_at: Option<Metres>,
+    other: Option<(Metres, Metres)>,
     /// Probability that an unmapped object occludes the wall.
     pub occlusion: f32,
+    /// What returned the latest echo that was probably not the wall's.
+    pub source: Option<Source>,
     /// Distance travelled since a range of the wall was last used.
     pub travelled: Option<Metres>,
+}
+
+/// What probably returned the echo of a ping at a wall.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Origin {
+    Wall,
+    /// Something else, at this range.
+    Other(Metres),
+    /// There was no echo.
+    Silence,
 }
 
 /// The previous ping.
@@ -132,29 +147,43 @@ impl History {
             |slot: &Option<RecentWall>| matches!(slot, Some(recent) if recent.wall == wall);
         let slot = self.recent.iter().position(is_same);
         let Some(recent) = slot.and_then(|slot| self.recent.get(slot)?.as_ref()) else {
-            return Entry { slot: None, place, occlusion: prior, used_at: None, travelled: None };
+            return Entry {
+                slot: None,
+                place,
+                occlusion: prior,
+                used_at: None,
+                other: None,
+                source: None,
+                travelled: None,
+            };
         };
         let occlusion = prior + recent.above_prior(foot, now);
         let occlusion = if occlusion > 0.0 { occlusion } else { 0.0 };
         let travelled = recent.used_at.map(|used_at| self.odometer - used_at);
-        Entry { slot, place, occlusion, used_at: recent.used_at, travelled }
+        let source = recent.other.map(|(range, at)| Source { range, travelled: self.odometer - at });
+        let RecentWall { used_at, other, .. } = *recent;
+        Entry { slot, place, occlusion, used_at, other, source, travelled }
     }
 
-    /// Records that the wall of this entry is occluded with a probability of `occluded`, and whether its
-    /// range was used.
-    pub fn record_echo(&mut self, entry: &Entry, occluded: f32, is_used: bool, now: Instant) {
+    /// Records that the wall of this entry is occluded with a probability of `occluded`, and what
+    /// returned the echo.
+    pub fn record_echo(&mut self, entry: &Entry, occluded: f32, echo: Origin, now: Instant) {
         let Place { wall, foot, prior } = entry.place;
         let persistent = PERSISTENCE * entry.occlusion;
         let occluded = if occluded > persistent { occluded } else { persistent };
         let occluded = if occluded < MAX_OCCLUSION { occluded } else { MAX_OCCLUSION };
-        let used_at = if is_used { Some(self.odometer) } else { entry.used_at };
+        let (used_at, other) = match echo {
+            Origin::Wall => (Some(self.odometer), entry.other),
+            Origin::Other(range) => (entry.used_at, Some((range, self.odometer))),
+            Origin::Silence => (entry.used_at, entry.other),
+        };
         let slot = entry.slot.unwrap_or_else(|| {
             self.newest = (self.newest + 1) % RECENT_WALLS;
             self.newest
         });
         if let Some(slot) = self.recent.get_mut(slot) {
             *slot =
-                Some(RecentWall { wall, foot, at: now, above_prior: occluded - prior, used_at });
+                Some(RecentWall { wall, foot, at: now, above_prior: occluded - prior, used_at, other });
         }
     }
 }
