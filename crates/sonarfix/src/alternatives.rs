@@ -1,16 +1,17 @@
-//! Which reflector of the map other than the target may have returned an echo: the foot on another wall,
-//! a concave corner or the end of a wall, each a hypothesis with its own probability (`docs/model.md`,
-//! "Other reflectors").
+//! Which reflectors of the map other than the target may have returned an echo: the foot on another wall,
+//! a concave corner or the end of a wall, each with its own probability (`docs/model.md`, "Other
+//! reflectors"). They explain an echo and do not correct the estimate: a corner or the end of a wall near
+//! an unmapped object would take the object's echoes as its own.
 //!
 //! # Non-finite policy
-//! State and walls are finite. A hypothesis whose density is NaN is not the best.
+//! State and walls are finite.
 
 use crate::aim::History;
 use crate::config::Config;
 use crate::echo::{Others, density};
 use crate::ekf::Ekf;
 use crate::elementary::sqrt;
-use crate::map::{Map, WallId};
+use crate::map::Map;
 use crate::range::{ExpectedRange, SonarPosition};
 use crate::reflector::{Beam, Reflector, Reflectors};
 use crate::units::{Metres, Radians, SquareMetres};
@@ -33,17 +34,6 @@ pub(crate) struct Target<'a> {
     pub answers: f32,
 }
 
-/// Another reflector.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Alternative {
-    pub expected: ExpectedRange,
-    pub wall: WallId,
-    /// Variance of its range, with that of the map.
-    pub noise: SquareMetres,
-    /// Density of its echo at the range that was measured.
-    pub density: f32,
-}
-
 /// The robot in its map.
 pub(crate) struct Scene<'a, 'm> {
     pub config: &'a Config,
@@ -54,14 +44,9 @@ pub(crate) struct Scene<'a, 'm> {
 
 impl Scene<'_, '_> {
     // ===== Eq. (25): the other reflectors, nearest first =====
-    /// The reflectors other than the target that may have returned the echo, and the most probable.
+    /// The reflectors other than the target that may have returned the echo.
     #[inline(never)]
-    pub fn alternatives(
-        &self,
-        target: &Target,
-        bearing: Radians,
-        range: Metres,
-    ) -> (Others, Option<Alternative>) {
+    pub fn others(&self, target: &Target, bearing: Radians, range: Metres) -> Others {
         let Config { sonar, echo, .. } = self.config;
         let position = SonarPosition::new(sonar.mount, &self.ekf.state());
         let axis = Vector::of_angle(self.ekf.heading().turned(bearing).radians().0);
@@ -76,7 +61,6 @@ impl Scene<'_, '_> {
                 && reflector.toward.dot(toward) > SAME_DIRECTION
         };
         let mut others = Others::NONE;
-        let mut best: Option<Alternative> = None;
         let mut silent = 1.0;
         for reflector in found.iter().filter(|reflector| !is_target(reflector)) {
             let Some(heard) = reflectors.heard(&beam, reflector) else { continue };
@@ -90,16 +74,12 @@ impl Scene<'_, '_> {
             let noise = SquareMetres(noise);
             let innovation = self.ekf.innovation(range, &expected, noise);
             let reached = if is_behind { silent * (1.0 - target.answers) } else { silent };
-            let density = answers * reached * density(innovation);
-            others.density += density;
-            if best.is_none_or(|best| density > best.density) {
-                best = Some(Alternative { expected, wall: reflector.wall, noise, density });
-            }
+            others.density += answers * reached * density(innovation);
             silent *= 1.0 - answers;
             if !is_behind {
                 others.silent_before = silent;
             }
         }
-        (others, best)
+        others
     }
 }

@@ -167,6 +167,8 @@ const DISPLACED: f32 = 0.02;
 const WIDENING: f32 = 3.0;
 /// Probability that the object which occludes a wall returns its echo again.
 const SAME_SOURCE: f32 = 0.7;
+/// An echo that differs by more than so many deviations comes from elsewhere.
+const ELSEWHERE: f32 = 3.0;
 /// Distance travelled that halves it, metres.
 const SOURCE_HALVED_WITHIN: f32 = 0.05;
 /// Standard deviation of that echo for a robot that stands still, metres.
@@ -208,17 +210,10 @@ pub(crate) struct Explanation {
     pub association: f32,
     /// Probability that an unmapped object occluded the wall.
     pub occluded: f32,
-    /// p(z): the density of the echo, or the probability of none.
-    pub likelihood: f32,
+    /// Probability that the map explains the echo: the wall or another reflector.
+    pub mapped: f32,
     /// Logarithm of the likelihood of a wrong pose over that of the right one.
     pub evidence: f32,
-}
-
-impl Explanation {
-    /// Probability of a hypothesis with this density.
-    pub fn share(&self, density: f32) -> f32 {
-        if self.likelihood > 0.0 { density / self.likelihood } else { 0.0 }
-    }
 }
 
 /// Reflectors of the map other than the target.
@@ -268,12 +263,13 @@ impl ExpectedEcho {
         if total <= 0.0 {
             // No clutter is configured, and the echo is too far off to be the wall's.
             let evidence = MAX_EVIDENCE;
-            return Explanation { association: 0.0, occluded: o, likelihood: 0.0, evidence };
+            return Explanation { association: 0.0, occluded: o, mapped: 0.0, evidence };
         }
         let ratio = AGREEMENT_WRONG_POSE + (1.0 - AGREEMENT_WRONG_POSE) * (d.wrong_pose / total);
         let evidence = if ratio < MAX_RATIO { ln(ratio) } else { MAX_EVIDENCE };
         let (association, occluded) = (wall / total, occluded / total);
-        Explanation { association, occluded, likelihood: total, evidence }
+        let mapped = association + others.density / total;
+        Explanation { association, occluded, mapped, evidence }
     }
 
     /// Probability that the target answers.
@@ -347,6 +343,12 @@ impl Source {
         SAME_SOURCE / (1.0 + ratio * ratio)
     }
 
+    /// Whether it is still near, while an echo at `range` comes from elsewhere.
+    pub fn hides(&self, range: Metres) -> bool {
+        let limit = ELSEWHERE * (SOURCE_DEVIATION + self.travelled.0);
+        self.travelled.0 < SOURCE_HALVED_WITHIN && (range - self.range).0.abs() > limit
+    }
+
     /// Density of its echo at a range: the source stands still while the robot moves, in any direction.
     fn density(&self, range: f32) -> f32 {
         let travelled = self.travelled.0;
@@ -411,7 +413,42 @@ mod tests {
         ]
     }
 
+    /// q' of eq. (26) in `f64`, with q and w.
+    fn repeated(q: f64, source: Source, z: f64) -> (f64, f64) {
+        let s = f64::from(source.travelled.0);
+        let w = 0.7 / (1.0 + (s / 0.05).powi(2));
+        let variance = 0.015_f64.powi(2) + s * s;
+        let off = z - f64::from(source.range.0);
+        let normal =
+            (-0.5 * off * off / variance).exp() / (core::f64::consts::TAU * variance).sqrt();
+        ((1.0 - w) * q + w * 0.8 * normal, w)
+    }
+
     proptest! {
+        /// Eq. (26): the probabilities are those of eq. (15) with q' instead of q.
+        #[test]
+        fn a_repeated_echo_has_the_density_of_its_source(
+            expected in any_expectation(), parameters in any_parameters(),
+            at in 0.3_f32..3.5, off in -0.1_f32..0.1, travelled in 0.0_f32..0.3,
+        ) {
+            let source = Source { range: Metres(at), travelled: Metres(travelled) };
+            let z = at + off;
+            let [wall, clutter, occluded, wrong] = densities(&expected, &parameters, Some(Metres(z)));
+            let (o, far) = (f64::from(expected.occluded), f64::from(expected.occluded).max(1e-9));
+            let (q, w) = repeated(occluded / far, source, f64::from(z));
+            let total = wall + clutter + o * q;
+            prop_assume!(total > 1e-6);
+            let found = ExpectedEcho { source: Some(source), ..expected }
+                .explain(&parameters, Some(Metres(z)), Others::NONE);
+            prop_assert!((f64::from(found.association) - wall / total).abs() < 2e-4);
+            prop_assert!((f64::from(found.occluded) - o * q / total).abs() < 2e-4);
+            let is_short = z < expected.range.0;
+            let elsewhere = if is_short { occluded / far } else { wrong };
+            let object = q - (1.0 - w) * occluded / far + (1.0 - w) * elsewhere;
+            let evidence = (0.3 + 0.7 * ((1.0 - o) * wrong + o * object) / total).ln().min(4.0);
+            prop_assert!((f64::from(found.evidence) - evidence).abs() < 2e-3);
+        }
+
         /// The probabilities of wall, clutter and object sum to one, and are those of eq. (15).
         #[test]
         fn association_probabilities_sum_to_one(
@@ -443,6 +480,26 @@ mod tests {
             let found = f64::from(parameters.map_variance(Some(Metres(spacing))));
             prop_assert!((found / exact - 1.0).abs() < 0.1, "{found} {exact}");
             prop_assert!(found >= f64::from(parameters.map_variance(None)) * 0.999);
+        }
+    }
+
+    /// An object 12 cm before the wall answers five pings from one place. Each ping widens S, as eq. (16)
+    /// does; the echo does not become the wall's.
+    #[test]
+    fn the_repeated_echo_of_an_object_does_not_become_the_walls() {
+        let parameters = EchoParameters::HC_SR04;
+        let (h, z) = (Metres(1.6), Metres(1.48));
+        let mut occluded = parameters.prior_occlusion(h);
+        let mut source = None;
+        for deviation in [0.03_f32, 0.05, 0.07, 0.08, 0.09] {
+            let variance = SquareMetres(deviation * deviation);
+            let limits = (Metres(0.05), Metres(4.0));
+            let expected =
+                ExpectedEcho { range: h, variance, geometry: 1.0, occluded, source, limits };
+            let found = expected.explain(&parameters, Some(z), Others::NONE);
+            assert!(found.association < 0.4, "{found:?}");
+            occluded = found.occluded.max(0.8 * occluded);
+            source = Some(Source { range: z, travelled: Metres(0.015) });
         }
     }
 

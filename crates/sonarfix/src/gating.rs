@@ -16,7 +16,7 @@ const ACCEPTED_FROM: f32 = 0.8;
 /// Association probability from which it is rounded to certainty, so that a clean echo costs no more
 /// than without the model and has the same bits.
 const CERTAIN_FROM: f32 = 0.999;
-/// Association probability below which an echo contradicts the pose.
+/// Probability that the map explains an echo below which it contradicts the pose.
 const CONTRADICTS_BELOW: f32 = 0.5;
 /// Probability of occlusion from which a further contradiction of the same wall is no independent one.
 const KNOWN_OCCLUSION: f32 = 0.5;
@@ -53,8 +53,8 @@ pub(crate) fn weight(association: f32) -> f32 {
 }
 
 /// Whether a ping contradicts the pose, given the probability with which its wall was occluded before.
-pub(crate) fn contradicts(association: f32, occluded_before: f32) -> bool {
-    association < CONTRADICTS_BELOW && occluded_before < KNOWN_OCCLUSION
+pub(crate) fn contradicts(mapped: f32, occluded_before: f32) -> bool {
+    mapped < CONTRADICTS_BELOW && occluded_before < KNOWN_OCCLUSION
 }
 
 // ===== Eq. (17): covariance inflation =====

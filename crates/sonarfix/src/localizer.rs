@@ -8,7 +8,7 @@
 //! to the bit.
 
 use crate::aim::{self, Aim, History, NoAim, Origin};
-use crate::alternatives::{Alternative, Scene, Target};
+use crate::alternatives::{Scene, Target};
 use crate::config::{Config, ConfigError};
 use crate::covariance::PredictedMeasurement;
 use crate::echo::{ExpectedEcho, Explanation, Others};
@@ -368,7 +368,7 @@ impl<'m> Localizer<'m> {
         let alone = expected_echo.explain(echo, measured.ok(), Others::NONE);
         let is_clear = gating::use_of(alone.association) == Use::Accept;
         let unclear = measured.ok().filter(|_| !is_clear && view.is_heading_known());
-        let (explanation, alternative) = if let Some(range) = unclear {
+        let explanation = if let Some(range) = unclear {
             let (variance, answers) = (innovation.variance, expected_echo.answers(echo));
             let target = Target { expected: &expected, variance, answers };
             let scene = Scene {
@@ -377,26 +377,15 @@ impl<'m> Localizer<'m> {
                 ekf: &self.ekf,
                 history: &self.history,
             };
-            let (others, best) = scene.alternatives(&target, aim.bearing, range);
-            (expected_echo.explain(echo, Some(range), others), best)
+            let others = scene.others(&target, aim.bearing, range);
+            expected_echo.explain(echo, Some(range), others)
         } else {
-            (alone, None)
+            alone
         };
-        let Explanation { association, occluded: now_occluded, evidence, .. } = explanation;
-        let other = alternative
-            .map(|other| (other, explanation.share(other.density)))
-            .filter(|(_, probability)| *probability > association);
-        let fix = match (measured, other) {
-            (Err(refusal), _) => Fix::Refused(refusal),
-            (Ok(_), None) => use_range(&mut self.ekf, &prediction, innovation, noise, association)?,
-            (Ok(range), Some((other, probability))) => {
-                let Alternative { expected, noise, wall, .. } = other;
-                let entry = self.history.entry(echo, wall, Metres(0.0), expected.range, self.time);
-                self.history.record_echo(&entry, 0.0, Origin::Wall, self.time);
-                let innovation = self.ekf.innovation(range, &expected, noise);
-                let prediction = self.ekf.predict_measurement(&expected);
-                use_range(&mut self.ekf, &prediction, innovation, noise, probability)?
-            }
+        let Explanation { association, occluded: now_occluded, mapped, evidence } = explanation;
+        let fix = match measured {
+            Err(refusal) => Fix::Refused(refusal),
+            Ok(_) => use_range(&mut self.ekf, &prediction, innovation, noise, association)?,
         };
         if fix.innovation_used().is_some() {
             self.pose_changed();
@@ -408,8 +397,7 @@ impl<'m> Localizer<'m> {
             Err(_) => Origin::Silence,
         };
         self.history.record_echo(&entry, now_occluded, origin, self.time);
-        let explained = other.map_or(association, |(_, probability)| probability);
-        Ok(Explained { fix, evidence, contradicts: gating::contradicts(explained, occluded) })
+        Ok(Explained { fix, evidence, contradicts: gating::contradicts(mapped, occluded) })
     }
 
     /// Inflates the covariance of the pose while the verdict is `Lost`, so that later echoes can be

@@ -157,10 +157,10 @@ impl History {
                 travelled: None,
             };
         };
-        let occlusion = prior + recent.above_prior(foot, now);
-        let occlusion = if occlusion > 0.0 { occlusion } else { 0.0 };
+        let occlusion = (prior + recent.above_prior(foot, now)).clamp(0.0, MAX_OCCLUSION);
         let travelled = recent.used_at.map(|used_at| self.odometer - used_at);
-        let source = recent.other.map(|(range, at)| Source { range, travelled: self.odometer - at });
+        let source =
+            recent.other.map(|(range, at)| Source { range, travelled: self.odometer - at });
         let RecentWall { used_at, other, .. } = *recent;
         Entry { slot, place, occlusion, used_at, other, source, travelled }
     }
@@ -174,6 +174,10 @@ impl History {
         let occluded = if occluded < MAX_OCCLUSION { occluded } else { MAX_OCCLUSION };
         let (used_at, other) = match echo {
             Origin::Wall => (Some(self.odometer), entry.other),
+            // An echo from elsewhere does not displace a source that is still near.
+            Origin::Other(range) if entry.source.is_some_and(|source| source.hides(range)) => {
+                (entry.used_at, entry.other)
+            }
             Origin::Other(range) => (entry.used_at, Some((range, self.odometer))),
             Origin::Silence => (entry.used_at, entry.other),
         };
@@ -182,8 +186,14 @@ impl History {
             self.newest
         });
         if let Some(slot) = self.recent.get_mut(slot) {
-            *slot =
-                Some(RecentWall { wall, foot, at: now, above_prior: occluded - prior, used_at, other });
+            *slot = Some(RecentWall {
+                wall,
+                foot,
+                at: now,
+                above_prior: occluded - prior,
+                used_at,
+                other,
+            });
         }
     }
 }
