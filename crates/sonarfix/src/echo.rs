@@ -171,6 +171,8 @@ const SAME_SOURCE: f32 = 0.7;
 const ELSEWHERE: f32 = 3.0;
 /// Distance travelled that halves it, metres.
 const SOURCE_HALVED_WITHIN: f32 = 0.05;
+/// Time that halves it, seconds: people and chairs move.
+const SOURCE_HALVED_AFTER: f32 = 5.0;
 /// Standard deviation of that echo for a robot that stands still, metres.
 const SOURCE_DEVIATION: f32 = 0.015;
 /// Smallest span of ranges over which clutter is distributed.
@@ -183,6 +185,8 @@ pub(crate) struct Source {
     pub range: Metres,
     /// Distance travelled since.
     pub travelled: Metres,
+    /// Seconds since.
+    pub age: f32,
 }
 
 /// What is expected of one ping at a wall.
@@ -238,6 +242,8 @@ struct Densities {
     clutter: f32,
     /// Anything, with the wall occluded.
     occluded: f32,
+    /// The same for the evidence: an object before the wall does not return a longer range, however often.
+    unrepeated: f32,
     /// Anything, at a wrong pose. An object that occluded the wall before returns its echo there as well.
     wrong_pose: f32,
 }
@@ -265,7 +271,9 @@ impl ExpectedEcho {
             let evidence = MAX_EVIDENCE;
             return Explanation { association: 0.0, occluded: o, mapped: 0.0, evidence };
         }
-        let ratio = AGREEMENT_WRONG_POSE + (1.0 - AGREEMENT_WRONG_POSE) * (d.wrong_pose / total);
+        let unrepeated = total - occluded + before * o * d.unrepeated;
+        let ratio = d.wrong_pose / unrepeated;
+        let ratio = AGREEMENT_WRONG_POSE + (1.0 - AGREEMENT_WRONG_POSE) * ratio;
         let evidence = if ratio < MAX_RATIO { ln(ratio) } else { MAX_EVIDENCE };
         let (association, occluded) = (wall / total, occluded / total);
         let mapped = association + others.density / total;
@@ -290,26 +298,23 @@ impl ExpectedEcho {
             let per_metre = 1.0 / at_least(farthest - self.range.0, MIN_SPAN);
             (long * per_metre, BEYOND_OCCLUDED * per_metre)
         };
-        let is_short = innovation < 0.0;
         let anywhere = (1.0 - NO_ECHO_WRONG_POSE) * everywhere;
         let o = self.occluded;
-        let (occluded, at_any_pose) = match self.source {
-            None if is_short => (by_object, by_object),
-            None => (by_object, anywhere),
-            Some(source) => {
-                let same = source.probability();
-                let again =
-                    same * (1.0 - NO_ECHO_OCCLUDED) * source.density(self.range.0 + innovation);
-                let other = 1.0 - same;
-                let elsewhere = if is_short { by_object } else { anywhere };
-                (other * by_object + again, other * elsewhere + again)
-            }
-        };
+        let repeated = self.source.map_or(by_object, |source| {
+            let same = source.probability();
+            let again = (1.0 - NO_ECHO_OCCLUDED) * source.density(self.range.0 + innovation);
+            (1.0 - same) * by_object + same * again
+        });
         Densities {
             wall: g * parameters.heard() * density,
             clutter: g * spurious + (1.0 - g) * (1.0 - NO_ECHO_OFF_WALL) * everywhere,
-            occluded,
-            wrong_pose: (1.0 - o) * anywhere + o * at_any_pose,
+            occluded: repeated,
+            unrepeated: if innovation < 0.0 { repeated } else { by_object },
+            wrong_pose: if innovation < 0.0 {
+                (1.0 - o) * anywhere + o * repeated
+            } else {
+                anywhere
+            },
         }
     }
 
@@ -319,6 +324,7 @@ impl ExpectedEcho {
             wall: 0.0,
             clutter: g * parameters.missed + (1.0 - g) * NO_ECHO_OFF_WALL,
             occluded: NO_ECHO_OCCLUDED,
+            unrepeated: NO_ECHO_OCCLUDED,
             wrong_pose: (1.0 - self.occluded) * NO_ECHO_WRONG_POSE
                 + self.occluded * NO_ECHO_OCCLUDED,
         }
@@ -340,13 +346,13 @@ impl Source {
     /// Probability that it returns its echo again, if the wall is occluded.
     fn probability(&self) -> f32 {
         let ratio = self.travelled.0 / SOURCE_HALVED_WITHIN;
-        SAME_SOURCE / (1.0 + ratio * ratio)
+        SAME_SOURCE / ((1.0 + ratio * ratio) * (1.0 + self.age / SOURCE_HALVED_AFTER))
     }
 
     /// Whether it is still near, while an echo at `range` comes from elsewhere.
     pub fn hides(&self, range: Metres) -> bool {
         let limit = ELSEWHERE * (SOURCE_DEVIATION + self.travelled.0);
-        self.travelled.0 < SOURCE_HALVED_WITHIN && (range - self.range).0.abs() > limit
+        self.probability() > 0.5 * SAME_SOURCE && (range - self.range).0.abs() > limit
     }
 
     /// Density of its echo at a range: the source stands still while the robot moves, in any direction.
@@ -413,15 +419,15 @@ mod tests {
         ]
     }
 
-    /// q' of eq. (26) in `f64`, with q and w.
-    fn repeated(q: f64, source: Source, z: f64) -> (f64, f64) {
+    /// q' of eq. (26) in `f64`.
+    fn repeated(q: f64, source: Source, z: f64) -> f64 {
         let s = f64::from(source.travelled.0);
-        let w = 0.7 / (1.0 + (s / 0.05).powi(2));
+        let w = 0.7 / ((1.0 + (s / 0.05).powi(2)) * (1.0 + f64::from(source.age) / 5.0));
         let variance = 0.015_f64.powi(2) + s * s;
         let off = z - f64::from(source.range.0);
         let normal =
             (-0.5 * off * off / variance).exp() / (core::f64::consts::TAU * variance).sqrt();
-        ((1.0 - w) * q + w * 0.8 * normal, w)
+        (1.0 - w) * q + w * 0.8 * normal
     }
 
     proptest! {
@@ -429,23 +435,26 @@ mod tests {
         #[test]
         fn a_repeated_echo_has_the_density_of_its_source(
             expected in any_expectation(), parameters in any_parameters(),
-            at in 0.3_f32..3.5, off in -0.1_f32..0.1, travelled in 0.0_f32..0.3,
+            at in 0.3_f32..3.5, off in -0.1_f32..0.1, travelled in 0.0_f32..0.3, age in 0.0_f32..20.0,
         ) {
-            let source = Source { range: Metres(at), travelled: Metres(travelled) };
+            let source = Source { range: Metres(at), travelled: Metres(travelled), age };
             let z = at + off;
             let [wall, clutter, occluded, wrong] = densities(&expected, &parameters, Some(Metres(z)));
             let (o, far) = (f64::from(expected.occluded), f64::from(expected.occluded).max(1e-9));
-            let (q, w) = repeated(occluded / far, source, f64::from(z));
+            let q = repeated(occluded / far, source, f64::from(z));
             let total = wall + clutter + o * q;
             prop_assume!(total > 1e-6);
             let found = ExpectedEcho { source: Some(source), ..expected }
                 .explain(&parameters, Some(Metres(z)), Others::NONE);
             prop_assert!((f64::from(found.association) - wall / total).abs() < 2e-4);
             prop_assert!((f64::from(found.occluded) - o * q / total).abs() < 2e-4);
-            let is_short = z < expected.range.0;
-            let elsewhere = if is_short { occluded / far } else { wrong };
-            let object = q - (1.0 - w) * occluded / far + (1.0 - w) * elsewhere;
-            let evidence = (0.3 + 0.7 * ((1.0 - o) * wrong + o * object) / total).ln().min(4.0);
+            // A longer range is evidence, however often it was measured.
+            let ratio = if z < expected.range.0 {
+                ((1.0 - o) * wrong + o * q) / total
+            } else {
+                wrong / (wall + clutter + occluded)
+            };
+            let evidence = (0.3 + 0.7 * ratio).ln().min(4.0);
             prop_assert!((f64::from(found.evidence) - evidence).abs() < 2e-3);
         }
 
@@ -499,7 +508,7 @@ mod tests {
             let found = expected.explain(&parameters, Some(z), Others::NONE);
             assert!(found.association < 0.4, "{found:?}");
             occluded = found.occluded.max(0.8 * occluded);
-            source = Some(Source { range: z, travelled: Metres(0.015) });
+            source = Some(Source { range: z, travelled: Metres(0.015), age: 0.06 });
         }
     }
 

@@ -41,8 +41,17 @@ struct RecentWall {
     above_prior: f32,
     /// Reading of the odometer when a range of the wall was last used.
     used_at: Option<Metres>,
-    /// The latest echo that was probably not the wall's, and the reading of the odometer at it.
-    other: Option<(Metres, Metres)>,
+    /// The latest echo that was probably not the wall's.
+    other: Option<OtherEcho>,
+}
+
+/// An echo that was probably not that of its wall.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct OtherEcho {
+    range: Metres,
+    /// Reading of the odometer.
+    odometer: Metres,
+    at: Instant,
 }
 
 impl RecentWall {
@@ -69,7 +78,7 @@ pub(crate) struct Entry {
     slot: Option<usize>,
     place: Place,
     used_at: Option<Metres>,
-    other: Option<(Metres, Metres)>,
+    other: Option<OtherEcho>,
     /// Probability that an unmapped object occludes the wall.
     pub occlusion: f32,
     /// What returned the latest echo that was probably not the wall's.
@@ -159,8 +168,11 @@ impl History {
         };
         let occlusion = (prior + recent.above_prior(foot, now)).clamp(0.0, MAX_OCCLUSION);
         let travelled = recent.used_at.map(|used_at| self.odometer - used_at);
-        let source =
-            recent.other.map(|(range, at)| Source { range, travelled: self.odometer - at });
+        let source = recent.other.map(|other| Source {
+            range: other.range,
+            travelled: self.odometer - other.odometer,
+            age: now.checked_duration_since(other.at).map_or(0.0, seconds),
+        });
         let RecentWall { used_at, other, .. } = *recent;
         Entry { slot, place, occlusion, used_at, other, source, travelled }
     }
@@ -178,7 +190,10 @@ impl History {
             Origin::Other(range) if entry.source.is_some_and(|source| source.hides(range)) => {
                 (entry.used_at, entry.other)
             }
-            Origin::Other(range) => (entry.used_at, Some((range, self.odometer))),
+            Origin::Other(range) => {
+                let other = OtherEcho { range, odometer: self.odometer, at: now };
+                (entry.used_at, Some(other))
+            }
             Origin::Silence => (entry.used_at, entry.other),
         };
         let slot = entry.slot.unwrap_or_else(|| {

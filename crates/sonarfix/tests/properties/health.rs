@@ -120,8 +120,11 @@ fn a_good_estimate_in_a_cluttered_room_is_not_lost() {
     assert!(!verdicts(&[TooShort; 90]).contains(&Lost));
 }
 
-/// Eqs. (15) and (23) in `f64`, for a robot that stands square to one wall, with an exact map.
+/// Eqs. (15), (23) and (26) in `f64`, for a robot that stands square to one wall, with an exact map. No time
+/// passes.
 struct PageOracle {
+    /// z' of eq. (26).
+    source: Option<f64>,
     range: f64,
     limits: (f64, f64),
     occluded: f64,
@@ -132,7 +135,7 @@ impl PageOracle {
     fn new(range: f32, limits: (Metres, Metres)) -> Self {
         let range = f64::from(range);
         let limits = (f64::from(limits.0.0), f64::from(limits.1.0));
-        Self { range, limits, occluded: range / (range + 10.0), evidence: 0.0 }
+        Self { range, limits, occluded: range / (range + 10.0), evidence: 0.0, source: None }
     }
 
     /// ν and S of an echo; `None`: there was none.
@@ -152,12 +155,29 @@ impl PageOracle {
             }
             None => (missed, 0.2, 0.3),
         };
-        let p = (1.0 - o) * seen + o * object;
+        let range = echo.map(|(nu, _)| self.range + nu);
+        let repeated = match (range, self.source) {
+            (Some(z), Some(source)) => {
+                let ratio = (z - source) / 0.015;
+                let normal = (-0.5 * ratio * ratio).exp() / (std::f64::consts::TAU.sqrt() * 0.015);
+                0.3 * object + 0.7 * 0.8 * normal
+            }
+            _ => object,
+        };
         let is_long = echo.is_some_and(|(nu, _)| nu >= 0.0);
-        let p_wrong = if is_long { wrong } else { (1.0 - o) * wrong + o * object };
+        let (p, p_wrong) = if is_long {
+            ((1.0 - o) * seen + o * object, wrong)
+        } else {
+            ((1.0 - o) * seen + o * repeated, (1.0 - o) * wrong + o * repeated)
+        };
         let ratio = 0.3 + 0.7 * p_wrong / p;
         self.evidence = (self.evidence + ratio.ln().min(4.0)).clamp(0.0, f64::from(LOST_AT));
-        self.occluded = (o * object / p).max(0.8 * o).min(0.95);
+        let total = (1.0 - o) * seen + o * repeated;
+        self.occluded = (o * repeated / total).max(0.8 * o).min(0.95);
+        let is_other = echo.is_some_and(|(nu, _)| nu.abs() > 0.5);
+        if is_other && self.source.is_none() {
+            self.source = range;
+        }
     }
 }
 
