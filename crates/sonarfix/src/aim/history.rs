@@ -174,7 +174,7 @@ impl History {
             age: now.checked_duration_since(other.at).map_or(0.0, seconds),
         });
         let RecentWall { used_at, other, .. } = *recent;
-        Entry { slot, place, occlusion, used_at, other, source, travelled }
+        Entry { slot, place, used_at, other, occlusion, source, travelled }
     }
 
     /// Records that the wall of this entry is occluded with a probability of `occluded`, and what
