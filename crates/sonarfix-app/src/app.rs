@@ -18,7 +18,7 @@ mod command;
 mod wire;
 
 use embedded_storage::nor_flash::NorFlash;
-use sonarfix::health::Verdict;
+use sonarfix::health::{DEGRADED_WITHOUT_ODOMETRY, Verdict};
 use sonarfix::localizer::Localizer;
 use sonarfix::map::{Map, MapError};
 use sonarfix::navigator;
@@ -30,13 +30,13 @@ use sonarfix_hal::robot::{
 };
 use sonarfix_link::baked::{self, BakedError};
 use sonarfix_link::message::{self, CommandResult, Hello, LoopStatus, ResetCause};
-use sonarfix_link::{Reporter, Telemetry};
+use sonarfix_link::{Frame, Reporter, SessionCommand, Telemetry};
 
 use crate::boots;
 use crate::check::Check;
 use crate::flash_contents::{self, FlashContents};
 use crate::store::{Resumed, SavePolicy, Saved, Store, StoreError, WriteLimit};
-use crate::time::since;
+use crate::time::{after, since};
 
 pub use wire::Link;
 use wire::Wire;
@@ -119,6 +119,10 @@ pub struct App<'m, F: NorFlash> {
     time: Instant,
     /// Why the board cannot be the robot that the configuration in use describes.
     unsupported: Option<Unsupported>,
+    /// Before this instant a poll has nothing to do, except for the loop and the link.
+    rests_until: Instant,
+    /// What such a poll returns.
+    at_rest: Polled,
     /// Whether the store has been read. The first poll does it, because during construction the stack holds copies of
     /// the application.
     is_store_loaded: bool,
@@ -130,6 +134,7 @@ enum Mode<'m> {
     Running(Running<'m>),
 }
 
+#[expect(clippy::struct_excessive_bools, reason = "independent facts, each with a name")]
 struct Running<'m> {
     robot: Robot<'m>,
     reporter: Reporter,
@@ -144,9 +149,21 @@ struct Running<'m> {
     has_been_blind: bool,
     /// The report of the last poll. It is stored here and not returned, because it is half a kilobyte.
     report: Report,
+    /// Whether it is known to be empty.
+    is_report_empty: bool,
 }
 
 impl<'m> Running<'m> {
+    /// Whether the loop has nothing to do at `now`; then its report is empty.
+    #[inline]
+    fn rest(&mut self, now: Instant, hardware: &mut impl Hardware) -> bool {
+        let rests = self.robot.rest(now, hardware);
+        if rests && !self.is_report_empty {
+            (self.report, self.is_report_empty) = (Report::default(), true);
+        }
+        rests
+    }
+
     /// Polls the loop and sends its telemetry; returns whether a record is due.
     #[inline(never)]
     fn poll(
@@ -158,6 +175,10 @@ impl<'m> Running<'m> {
         link: &mut impl Link,
         polled: &mut Polled,
     ) -> bool {
+        if self.rest(now, hardware) {
+            return false;
+        }
+        self.is_report_empty = false;
         let before = self.robot.localizer().health().verdict;
         self.report = if self.searches {
             self.robot.poll_with_search(now, hardware, search)
@@ -222,6 +243,8 @@ impl<'m, F: NorFlash> App<'m, F> {
             faults: Faults::default(),
             worst_poll: Duration::from_ticks(0),
             time: now,
+            rests_until: now,
+            at_rest: Polled::default(),
             is_store_loaded: false,
             unsupported: None,
         }
@@ -238,6 +261,28 @@ impl<'m, F: NorFlash> App<'m, F> {
         hardware: &mut impl Hardware,
         link: &mut impl Link,
     ) -> Polled {
+        let frame = self.wire.next(link);
+        if let Mode::Running(running) = &mut self.mode
+            && frame.is_none()
+            && now >= self.time
+            && now < self.rests_until
+            && running.rest(now, hardware)
+        {
+            self.time = now;
+            return self.at_rest;
+        }
+        self.poll_awake(now, frame.as_ref(), hardware, link)
+    }
+
+    /// A poll that has something to do.
+    #[inline(never)]
+    fn poll_awake(
+        &mut self,
+        now: Instant,
+        frame: Option<&Frame<SessionCommand>>,
+        hardware: &mut impl Hardware,
+        link: &mut impl Link,
+    ) -> Polled {
         let was_running = self.is_running();
         let mut polled = Polled::default();
         if !self.is_store_loaded {
@@ -245,9 +290,9 @@ impl<'m, F: NorFlash> App<'m, F> {
             polled.saved = self.load_store(now, hardware).err().map(Err);
             polled.unsupported = self.unsupported;
         }
-        if let Some(frame) = self.wire.next(link) {
+        if let Some(frame) = frame {
             self.heard = now;
-            self.answer(now, &frame, hardware, link, &mut polled);
+            self.answer(now, frame, hardware, link, &mut polled);
         }
         match &mut self.mode {
             Mode::Waiting(check) => {
@@ -267,6 +312,28 @@ impl<'m, F: NorFlash> App<'m, F> {
             }
         }
         self.write_pending(now, &mut polled);
+        self.send_periodic(now, link);
+        self.time = now;
+        polled.is_settled = since(now, self.started) >= boots::SETTLED_AFTER;
+        polled.is_running = self.is_running();
+        polled.may_drive = self.may_drive(now);
+        polled.has_changed = polled.is_running != was_running;
+        self.at_rest = Polled {
+            is_settled: polled.is_settled,
+            is_running: polled.is_running,
+            may_drive: polled.may_drive,
+            ..Polled::default()
+        };
+        self.rests_until = self.next_deadline(now);
+        polled
+    }
+
+    /// Sends the messages that are due periodically, each in a poll in which the loop has nothing to report.
+    fn send_periodic(&mut self, now: Instant, link: &mut impl Link) {
+        let is_busy = matches!(&self.mode, Mode::Running(running) if !running.report.is_empty());
+        if is_busy {
+            return;
+        }
         if self.wire.is_hello_due(now) {
             let hello = self.hello();
             self.wire.send(&Telemetry::Hello(hello), link);
@@ -275,12 +342,23 @@ impl<'m, F: NorFlash> App<'m, F> {
             let status = self.loop_status(now);
             self.wire.send(&Telemetry::LoopStatus(status), link);
         }
-        self.time = now;
-        polled.is_settled = since(now, self.started) >= boots::SETTLED_AFTER;
-        polled.is_running = self.is_running();
-        polled.may_drive = self.may_drive(now);
-        polled.has_changed = polled.is_running != was_running;
-        polled
+    }
+
+    /// The next instant at which a poll has something to do besides the loop and the link; `now` if that is not known.
+    fn next_deadline(&self, now: Instant) -> Instant {
+        if self.owes_record || self.owes_config {
+            return now;
+        }
+        let Some((config, _)) = &self.config else { return now };
+        let odometry = self.localizer().map_or(now, Localizer::time);
+        // What these decide does not change once they have passed.
+        let changes = [
+            after(self.started, boots::SETTLED_AFTER),
+            after(self.heard, config.motors.link_timeout),
+            after(odometry, DEGRADED_WITHOUT_ODOMETRY),
+        ];
+        let next = self.wire.next_deadline();
+        changes.into_iter().filter(|&at| at >= now).fold(next, Instant::min)
     }
 
     /// Records the duration of a poll, which the board measures.

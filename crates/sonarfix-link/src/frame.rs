@@ -10,7 +10,7 @@
 
 use core::marker::PhantomData;
 
-use sonarfix::map::image::checksum as crc32;
+use sonarfix::map::image::Crc32;
 
 use crate::message::Message;
 
@@ -94,18 +94,95 @@ impl<M: Message> Sender<M> {
 }
 
 fn encode<'b, M: Message>(sequence: u16, message: &M, buffer: &'b mut Buffer) -> Option<&'b [u8]> {
-    let mut body = [0; BODY_MAX];
-    let (header, rest) = body.split_first_chunk_mut::<HEADER>()?;
     let [low, high] = sequence.to_le_bytes();
-    *header = [VERSION, M::KIND, low, high];
-    let (message_space, _) = rest.split_at_mut_checked(MESSAGE_MAX)?;
-    let end = HEADER + postcard::to_slice(message, message_space).ok()?.len();
-    let checksum = crc32(body.get(..end)?);
-    body.get_mut(end..end + CHECKSUM)?.copy_from_slice(&checksum.to_le_bytes());
+    let mut encoder = Encoder::new(buffer);
+    for byte in [VERSION, M::KIND, low, high] {
+        encoder.push(byte);
+    }
+    let length = postcard::serialize_with_flavor(message, encoder).ok()?;
+    buffer.get(..length)
+}
 
-    let (first, rest) = buffer.split_first_mut()?;
-    *first = 0;
-    let length = cobs::try_encode(body.get(..end + CHECKSUM)?, rest).ok()?;
-    *rest.get_mut(length)? = 0;
-    buffer.get(..length + 2)
+/// Encodes a frame in one pass: every byte of the content enters the checksum and the COBS encoding at once.
+///
+/// COBS replaces each zero by the distance to the next one. The place of that distance, `code`, is reserved when a group
+/// begins and filled when it ends: at a zero, or after 254 bytes without one.
+struct Encoder<'b> {
+    buffer: &'b mut Buffer,
+    /// Index of the next byte; beyond the buffer after an overflow.
+    next: usize,
+    /// Index of the code of the present group.
+    code: usize,
+    checksum: Crc32,
+}
+
+/// The longest group of COBS, its code included.
+const GROUP: usize = 255;
+
+impl<'b> Encoder<'b> {
+    /// An encoder that has written the delimiter before the frame.
+    fn new(buffer: &'b mut Buffer) -> Self {
+        let mut encoder = Self { buffer, next: 0, code: 1, checksum: Crc32::default() };
+        encoder.put(0);
+        encoder.next = 2;
+        encoder
+    }
+
+    fn put(&mut self, byte: u8) {
+        if let Some(place) = self.buffer.get_mut(self.next) {
+            *place = byte;
+        }
+        self.next += 1;
+    }
+
+    /// Ends the group: the distance from its code to the next one.
+    fn end_group(&mut self) {
+        let length = self.next - self.code;
+        if let (Some(code), Ok(length)) = (self.buffer.get_mut(self.code), u8::try_from(length)) {
+            *code = length;
+        }
+        self.code = self.next;
+        self.next += 1;
+    }
+
+    /// Takes a byte of the content.
+    #[inline]
+    fn push(&mut self, byte: u8) {
+        self.checksum = self.checksum.with(byte);
+        self.encode(byte);
+    }
+
+    fn encode(&mut self, byte: u8) {
+        if byte == 0 {
+            return self.end_group();
+        }
+        self.put(byte);
+        if self.next - self.code == GROUP {
+            self.end_group();
+        }
+    }
+}
+
+impl postcard::ser_flavors::Flavor for Encoder<'_> {
+    type Output = usize;
+
+    fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
+        self.push(byte);
+        Ok(())
+    }
+
+    /// Appends the checksum and the delimiter; returns the length.
+    fn finalize(mut self) -> postcard::Result<usize> {
+        for byte in self.checksum.value().to_le_bytes() {
+            self.encode(byte);
+        }
+        self.end_group();
+        // The place reserved for the code of another group is that of the delimiter.
+        self.next = self.code;
+        self.put(0);
+        if self.next > FRAME_MAX {
+            return Err(postcard::Error::SerializeBufferFull);
+        }
+        Ok(self.next)
+    }
 }

@@ -381,6 +381,7 @@ impl<'m, F: NorFlash> App<'m, F> {
             has_rolled: false,
             has_been_blind: false,
             report: Report::default(),
+            is_report_empty: true,
         });
         Ok(())
     }

@@ -64,6 +64,12 @@ impl Wire {
         is_due(&mut self.loop_at, now, LOOP)
     }
 
+    /// When the next periodic message is due.
+    pub fn next_deadline(&self) -> Instant {
+        let at_once = Instant::from_ticks(0);
+        self.hello_at.unwrap_or(at_once).min(self.loop_at.unwrap_or(at_once))
+    }
+
     pub fn counters(&self) -> ReceiverCounters {
         self.receiver.counters()
     }

@@ -93,6 +93,11 @@ impl Odometer {
         }
     }
 
+    /// Whether the ledger has started.
+    pub fn has_begun(&self) -> bool {
+        self.taken.is_some()
+    }
+
     /// Reads both counters; `None` if one fails.
     pub fn read(
         &mut self,

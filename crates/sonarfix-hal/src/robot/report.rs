@@ -37,6 +37,11 @@ impl Report {
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }
+
+    /// Whether a ping has ended.
+    pub(super) fn has_ended_ping(&self) -> bool {
+        self.ping_result.is_some() || self.swept.is_some()
+    }
 }
 
 /// Travel of both wheels, passed to the localizer.

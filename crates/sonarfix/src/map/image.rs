@@ -118,39 +118,61 @@ impl Reference {
     }
 }
 
-/// Contribution of four bits to a CRC-32: the polynomial 0xEDB88320, shifted out bit by bit.
-const NIBBLES: [u32; 16] = [
-    0x0000_0000,
-    0x1DB7_1064,
-    0x3B6E_20C8,
-    0x26D9_30AC,
-    0x76DC_4190,
-    0x6B6B_51F4,
-    0x4DB2_6158,
-    0x5005_713C,
-    0xEDB8_8320,
-    0xF00F_9344,
-    0xD6D6_A3E8,
-    0xCB61_B38C,
-    0x9B64_C2B0,
-    0x86D3_D2D4,
-    0xA00A_E278,
-    0xBDBD_F21C,
-];
+/// Contribution of a byte to a CRC-32: the polynomial 0xEDB88320, shifted out bit by bit.
+const BYTES: [u32; 256] = contributions();
 
-/// CRC-32 (ISO 3309, as in Ethernet, gzip and PNG), by nibbles. Every frame on the link has one, so speed
-/// justifies a table of 64 bytes.
+const fn contributions() -> [u32; 256] {
+    let mut table = [0; 256];
+    let mut rest: &mut [u32] = &mut table;
+    let mut byte = 0_u32;
+    while let [entry, tail @ ..] = rest {
+        let (mut crc, mut bit) = (byte, 0);
+        while bit < 8 {
+            crc = (crc >> 1) ^ (0xEDB8_8320 * (crc & 1));
+            bit += 1;
+        }
+        *entry = crc;
+        (rest, byte) = (tail, byte + 1);
+    }
+    table
+}
+
+/// CRC-32 (ISO 3309, as in Ethernet, gzip and PNG), by bytes. Every frame on the link has one, so speed
+/// justifies a table of 1 KiB.
 ///
 /// ```
 /// assert_eq!(sonarfix::map::image::checksum(b"123456789"), 0xCBF4_3926);
 /// ```
 #[must_use]
 pub fn checksum(bytes: &[u8]) -> u32 {
-    let shift = |crc: u32| {
-        let low = usize::try_from(crc & 15).unwrap_or(0);
-        (crc >> 4) ^ NIBBLES.get(low).copied().unwrap_or(0)
-    };
-    !bytes.iter().fold(u32::MAX, |crc, &byte| shift(shift(crc ^ u32::from(byte))))
+    bytes.iter().fold(Crc32::default(), |crc, &byte| crc.with(byte)).value()
+}
+
+/// The CRC-32 of [`checksum`] over bytes that are taken one by one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[must_use]
+pub struct Crc32(u32);
+
+impl Default for Crc32 {
+    fn default() -> Self {
+        Self(u32::MAX)
+    }
+}
+
+impl Crc32 {
+    /// Takes one more byte.
+    #[inline]
+    pub fn with(self, byte: u8) -> Self {
+        let [low, ..] = self.0.to_le_bytes();
+        // Every byte has an entry.
+        Self((self.0 >> 8) ^ BYTES.get(usize::from(low ^ byte)).copied().unwrap_or(0))
+    }
+
+    /// The checksum of the bytes taken so far.
+    #[must_use]
+    pub fn value(self) -> u32 {
+        !self.0
+    }
 }
 
 /// Length in bytes of the image at the start of a region of flash, from its header. Bytes after the image
