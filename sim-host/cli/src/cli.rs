@@ -43,7 +43,7 @@ enum Command {
     Merge(merge::Args),
     /// Bakes a robot file into the configuration image for the robot's flash.
     Config(config::Args),
-    /// Checks, bakes, draws and simplifies maps.
+    /// Checks, bakes, draws, simplifies, imports and exports maps.
     Map(map::Args),
     /// Prints the Cramér–Rao bound on each state over time.
     Bound(bound::Args),

@@ -15,6 +15,7 @@ mod floor_plans;
 mod health;
 mod json;
 mod map;
+mod map_exchange;
 mod merge;
 mod monitor;
 mod overrides;

@@ -1,4 +1,4 @@
-//! `sonarfix map`: checks, bakes, draws and simplifies maps.
+//! `sonarfix map`: checks, bakes, draws, simplifies and converts maps.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,6 +10,7 @@ use sonarfix::map::Map;
 use sonarfix::units::Metres;
 use sonarfix_map::{Limits, MapFile, Severity, bake, robot_file, simplify, survey, symmetries};
 
+use crate::map_exchange;
 use crate::output::check_file;
 
 /// Maximum number of findings that are printed.
@@ -74,11 +75,25 @@ enum Task {
         #[arg(long, value_name = "MM", default_value_t = 0.0)]
         shortest: f64,
     },
+    /// Reads a grid, a drawing or `GeoJSON` of another program as a map; prints what was dropped and what is uncertain.
+    Import(map_exchange::Import),
+    /// Writes a map as a grid, SVG or `GeoJSON` for another program.
+    Export {
+        #[command(flatten)]
+        from: Source,
+        #[command(flatten)]
+        to: map_exchange::Target,
+    },
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
-    if let Task::Bake { out, .. } | Task::Draw { out, .. } | Task::Simplify { out, .. } = &args.task
-    {
+    let out = match &args.task {
+        Task::Check { .. } => None,
+        Task::Bake { out, .. } | Task::Draw { out, .. } | Task::Simplify { out, .. } => Some(out),
+        Task::Import(import) => Some(&import.out),
+        Task::Export { to, .. } => Some(&to.out),
+    };
+    if let Some(out) = out {
         check_file("--out", out)?;
     }
     match &args.task {
@@ -93,6 +108,8 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
             let limits = Limits { tolerance: tolerance / 1e3, shortest: shortest / 1e3 };
             write_simplified(&from.read()?, limits, out)
         }
+        Task::Import(import) => map_exchange::import(import),
+        Task::Export { from, to } => map_exchange::export(&from.read()?.floor, to),
     }
 }
 

@@ -10,6 +10,7 @@ mod find;
 mod floor_plan;
 mod link_command;
 mod map_command;
+mod map_exchange;
 mod monitor;
 mod plan;
 mod recordings;

@@ -1,0 +1,134 @@
+//! `sonarfix map import` and `map export`: maps from and for other programs.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail, ensure};
+use sonarfix_exchange::maps::geojson::Anchor;
+use sonarfix_exchange::maps::{Frame, Imported, MAX_TEXT_BYTES, dxf, geojson, grid, svg};
+use sonarfix_map::Floor;
+
+#[derive(Debug, clap::Args)]
+pub struct Import {
+    /// A grid of ROS's `map_server` (.yaml), a drawing (.dxf, .svg) or `GeoJSON` (.geojson, .json).
+    file: PathBuf,
+    /// The map to write: .csv, or else TOML.
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// The length of one unit of the drawing: m, cm, mm, in, ft, or metres as a number. By default that of the file.
+    #[arg(long, value_parser = unit)]
+    unit: Option<f64>,
+    /// The place of the drawing's origin in the map, metres.
+    #[arg(long, value_name = "X,Y", value_parser = pair, default_value = "0,0", allow_hyphen_values = true)]
+    origin: [f64; 2],
+    /// The place of the map's origin in `GeoJSON` with degrees.
+    #[arg(long, value_name = "LON,LAT", value_parser = pair, allow_hyphen_values = true)]
+    anchor: Option<[f64; 2]>,
+    /// Reads only this layer of a DXF; may be repeated.
+    #[arg(long, value_name = "NAME")]
+    layer: Vec<String>,
+    /// The shortest wall that is read from a grid, metres.
+    #[arg(long, value_name = "M", default_value_t = 0.1)]
+    shortest: f64,
+}
+
+#[derive(Debug, clap::Args)]
+pub struct Target {
+    /// The file to write: a grid of ROS's `map_server` (.yaml, and a .pgm beside it), .svg, or .geojson.
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// The size of a pixel of a grid, metres.
+    #[arg(long, value_name = "M", default_value_t = 0.02)]
+    resolution: f64,
+    /// The place of the map's origin in `GeoJSON`: writes degrees instead of metres.
+    #[arg(long, value_name = "LON,LAT", value_parser = pair, allow_hyphen_values = true)]
+    anchor: Option<[f64; 2]>,
+}
+
+fn unit(text: &str) -> Result<f64, String> {
+    match text {
+        "m" => Ok(1.0),
+        "cm" => Ok(1e-2),
+        "mm" => Ok(1e-3),
+        "in" => Ok(0.0254),
+        "ft" => Ok(0.3048),
+        other => {
+            let metres =
+                other.parse().ok().filter(|metres: &f64| metres.is_finite() && *metres > 0.0);
+            metres.ok_or_else(|| "m, cm, mm, in, ft or a positive number is expected".to_owned())
+        }
+    }
+}
+
+fn pair(text: &str) -> Result<[f64; 2], String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    let numbers = numbers.filter(|numbers| numbers.iter().all(|number| number.is_finite()));
+    let numbers = numbers.and_then(|numbers| <[f64; 2]>::try_from(numbers).ok());
+    numbers.ok_or_else(|| "two numbers with a comma between them are expected".to_owned())
+}
+
+fn anchor(pair: Option<[f64; 2]>) -> anyhow::Result<Option<Anchor>> {
+    let Some([longitude, latitude]) = pair else { return Ok(None) };
+    // Nearer to a pole, a degree of longitude is too short to be a coordinate.
+    let is_usable = longitude.abs() <= 180.0 && latitude.abs() <= 89.0;
+    ensure!(is_usable, "--anchor: a longitude within ±180 and a latitude within ±89 are expected");
+    Ok(Some(Anchor { longitude, latitude }))
+}
+
+fn ending(file: &Path) -> String {
+    let ending = file.extension().map(|ending| ending.to_string_lossy().to_lowercase());
+    ending.unwrap_or_default()
+}
+
+pub fn import(args: &Import) -> anyhow::Result<()> {
+    let imported = read(args).with_context(|| args.file.display().to_string())?;
+    for note in &imported.notes {
+        println!("{note}");
+    }
+    let floor = &imported.floor;
+    let text = if ending(&args.out) == "csv" { floor.to_csv() } else { floor.to_toml() };
+    std::fs::write(&args.out, text)
+        .with_context(|| format!("cannot write {}", args.out.display()))?;
+    println!("{}: {} walls", args.out.display(), floor.named_walls().len());
+    Ok(())
+}
+
+fn read(args: &Import) -> anyhow::Result<Imported> {
+    let frame = Frame { unit: args.unit, origin: args.origin };
+    let is_length = args.shortest.is_finite() && args.shortest >= 0.0;
+    ensure!(is_length, "--shortest must be zero or positive");
+    let ending = ending(&args.file);
+    let is_json = matches!(ending.as_str(), "geojson" | "json");
+    ensure!(args.anchor.is_none() || is_json, "--anchor is for GeoJSON");
+    ensure!(args.layer.is_empty() || ending == "dxf", "--layer is for DXF");
+    match ending.as_str() {
+        "yaml" | "yml" => grid::read(&args.file, &frame, args.shortest),
+        "dxf" => dxf::read(BufReader::new(File::open(&args.file)?), &frame, &args.layer),
+        "svg" => svg::read(&text(&args.file)?, &frame),
+        _ if is_json => geojson::read(&text(&args.file)?, &frame, anchor(args.anchor)?),
+        other => bail!("`{other}` is none of yaml, dxf, svg, geojson and json"),
+    }
+}
+
+/// The text of a file that is read at once.
+fn text(file: &Path) -> anyhow::Result<String> {
+    let bytes = File::open(file)?.metadata()?.len();
+    let most = MAX_TEXT_BYTES / (1024 * 1024);
+    ensure!(bytes <= MAX_TEXT_BYTES, "it has more than {most} MiB");
+    Ok(sonarfix_map::read_text(file)?)
+}
+
+pub fn export(floor: &Floor, args: &Target) -> anyhow::Result<()> {
+    let ending = ending(&args.out);
+    ensure!(args.anchor.is_none() || ending == "geojson", "--anchor is for GeoJSON");
+    let is_size = args.resolution.is_finite() && args.resolution >= 1e-3;
+    ensure!(is_size, "--resolution must be at least 0.001");
+    let text = match ending.as_str() {
+        "yaml" => return grid::write(floor, &args.out, args.resolution),
+        "svg" => svg::write(floor),
+        "geojson" => geojson::write(floor, anchor(args.anchor)?),
+        other => bail!("--out: `{other}` is none of yaml, svg and geojson"),
+    };
+    std::fs::write(&args.out, text).with_context(|| format!("cannot write {}", args.out.display()))
+}
