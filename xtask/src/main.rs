@@ -17,6 +17,7 @@ mod firmware;
 mod fuzz;
 mod golden;
 mod miri;
+mod mutants;
 mod panics;
 mod pil;
 mod program;
@@ -96,6 +97,8 @@ enum Task {
     SearchWindows(search_windows::Args),
     /// Fuzzing for a bounded time.
     Fuzz(fuzz::Args),
+    /// Mutation tests of the core and of the application with cargo-mutants (hours; one file with `--file`).
+    Mutants(mutants::Args),
     /// The core under Miri if it is installed (long: it builds a standard library first).
     Miri,
 }
@@ -167,6 +170,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Endurance(args) => endurance::run(args),
         Task::SearchWindows(args) => search_windows::run(args),
         Task::Fuzz(args) => fuzz::run(&args),
+        Task::Mutants(args) => mutants::run(&args),
         Task::Miri => miri::run(),
     }
 }

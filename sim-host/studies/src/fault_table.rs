@@ -65,6 +65,9 @@ policy disables the motors: without odometry, after 0.5 s.
 
 ";
 
+/// What the first table does not explain itself.
+const REMARKS: &str = include_str!("fault_table/remarks.md");
+
 /// The heading of the table of the robot that searches.
 const SEARCH_HEAD: &str = "
 ## With the search
@@ -201,6 +204,7 @@ impl Row {
 pub fn markdown(rows: &[Row], searching: &[Row]) -> String {
     let mut page = HEAD.to_owned();
     write_table(&mut page, rows);
+    page.push_str(REMARKS);
     page.push_str(SEARCH_HEAD);
     write_table(&mut page, searching);
     page.push_str(ATTACKS);

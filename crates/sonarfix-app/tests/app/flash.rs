@@ -17,7 +17,7 @@ pub const SECTOR: usize = 2_048;
 /// Sectors of the store.
 pub const SECTORS: usize = 2;
 /// Steps of an erase at which the power can be cut.
-const ERASE_STEPS: usize = 8;
+pub const ERASE_STEPS: usize = 8;
 
 /// Why an operation failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -181,26 +181,81 @@ fn dead_devices_cost_no_deadline() {
     assert!(minute.accepted as u64 >= seconds() / 2, "{} ranges", minute.accepted);
 }
 
-/// The wear that `docs/firmware.md` computes with: at most one write a minute, and eight more.
-#[test]
-fn a_day_of_commands_wears_the_flash_at_the_permitted_rate() {
-    const DAY: u64 = 86_400;
+/// A day with a command every 2 s; the flash after it.
+fn a_day_of(command: impl Fn(u64) -> Command) -> SimFlash {
     let baked = Baked::new(&config());
     let mut bench = Bench::switched_on(&baked, SimFlash::new());
-    for second in 0..DAY / 2 {
+    for number in 0..DAY / 2 {
         bench.now += 2_000_000;
-        let mut start = start();
-        start.pose.x.0 += second as f32 * 1e-5;
-        bench.send(&Command::SetPose(start));
+        bench.send(&command(number));
         let _ = bench.poll();
         bench.received();
     }
-    let flash = bench.switched_off();
-    let (record, erases) = (92, flash.erased as u64);
-    let writes = flash.written as u64 / record;
+    bench.switched_off()
+}
+
+/// Seconds.
+const DAY: u64 = 86_400;
+/// Bytes of a record and of a configuration in flash.
+const RECORD: u64 = 92;
+const CONFIGURATION: u64 = 204;
+
+/// Another pose each time.
+fn another_pose(number: u64) -> Command {
+    let mut start = start();
+    start.pose.x.0 += number as f32 * 1e-5;
+    Command::SetPose(start)
+}
+
+/// Another configuration each time.
+fn another_configuration(number: u64) -> Command {
+    let mut config = config();
+    config.localizer.gating.confidence += 1e-3 * (1 + number % 1_000) as f32;
+    Command::SetConfiguration(config)
+}
+
+/// Entries that fit into a sector, besides its header and the copies of the newest records.
+fn per_sector(entry: u64, copies: u64) -> u64 {
+    (SECTOR as u64 - 40 - copies) / entry
+}
+
+/// Life of so many sectors that endure so many erases each, with so many new bytes a day.
+fn years(new: u64, sector: u64, sectors: u64, endures: u64) -> f64 {
+    let erases = new as f64 / (sector - 40 - CONFIGURATION - RECORD) as f64;
+    (endures * sectors) as f64 / erases / 365.25
+}
+
+/// The wear that `docs/firmware.md` computes with: at most one write a minute, and eight more.
+#[test]
+fn a_day_of_commands_wears_the_flash_at_the_permitted_rate() {
+    let flash = a_day_of(another_pose);
+    let (writes, erases) = (flash.written as u64 / RECORD, flash.erased as u64);
     println!("{writes} writes and {erases} erases of {SECTORS} sectors of {SECTOR} bytes in a day");
     // A sector also holds its header and the copies of the newest records.
     assert!((DAY / 60..=DAY / 60 + 8 + 2 * erases).contains(&writes), "{writes}");
-    let records_per_sector = (SECTOR as u64 - 40) / record - 2;
-    assert!(erases <= writes / records_per_sector + 2, "{erases}");
+    assert!(erases <= writes / per_sector(RECORD, 2 * RECORD) + 2, "{erases}");
+}
+
+/// The same over both keys: no sequence of commands wears the flash faster than one configuration a minute.
+#[test]
+fn a_day_of_configurations_wears_the_flash_at_the_permitted_rate() {
+    let all = |number: u64| match number % 5 {
+        0 => another_configuration(number / 5),
+        1 => another_pose(number),
+        2 => Command::Start,
+        3 => Command::Stop,
+        _ => Command::ResetCalibration,
+    };
+    let most = DAY / 60 + 8;
+    let worst = most / per_sector(CONFIGURATION, CONFIGURATION + RECORD) + 2;
+    let days: [(&str, SimFlash); 2] =
+        [("configurations", a_day_of(another_configuration)), ("all commands", a_day_of(all))];
+    for (name, flash) in days {
+        let (bytes, erases) = (flash.written as u64, flash.erased as u64);
+        println!(
+            "{name}: {bytes} bytes and {erases} erases of {SECTORS} sectors of {SECTOR} bytes in a day"
+        );
+        assert!(bytes >= DAY / 60 * RECORD, "{name}: {bytes} bytes");
+        assert!(erases <= worst, "{name}: {erases} erases, at most {worst}");
+    }
 }

@@ -8,7 +8,7 @@ use sonarfix::units::Metres;
 use sonarfix_app::store::{Saved, Store, StoreError, StoredConfiguration};
 use sonarfix_hal::config::RobotConfig;
 
-use crate::flash::{Random, SECTOR, SECTORS, SimFlash};
+use crate::flash::{ERASE_STEPS, Random, SECTOR, SECTORS, SimFlash};
 
 const REGION: core::ops::Range<u32> = 0..(SECTOR * SECTORS) as u32;
 
@@ -127,7 +127,7 @@ fn check_cut(before: &SimFlash, old: &Records, write: Write, at: usize, seed: u6
 /// bytes, words and pages at once.
 #[test]
 fn a_power_cut_leaves_the_old_or_the_new_records() {
-    let mut cuts = 0;
+    let (mut writes, mut of_writes, mut erases, mut of_erases) = (0, 0, 0, 0);
     for unit in [1, 4, 256] {
         let mut flash = SimFlash::new().writing(unit);
         let mut old = Records::default();
@@ -137,16 +137,22 @@ fn a_power_cut_leaves_the_old_or_the_new_records() {
             for at in 0..after.steps - flash.steps {
                 for seed in 0..SEEDS {
                     check_cut(&flash, &old, write, at, seed + 1_000 * at as u64);
-                    cuts += 1;
                 }
             }
+            let erased = after.erased - flash.erased;
+            (writes, erases) = (writes + 1, erases + erased);
+            of_writes += after.steps - flash.steps - erased * ERASE_STEPS;
+            of_erases += erased * ERASE_STEPS;
             (flash, old) = (after, write.over(&old));
             if flash.erased > 4 {
                 break;
             }
         }
     }
-    println!("{cuts} cuts");
+    let cuts = (of_writes + of_erases) * SEEDS as usize;
+    println!(
+        "{cuts} cuts, {SEEDS} at each step: {of_writes} steps of {writes} writes, {of_erases} of {erases} erases"
+    );
     assert!(cuts > 10_000, "{cuts} cuts");
 }
 
@@ -188,6 +194,7 @@ fn a_cut_during_a_copy() {
             check_cut(&before, &old, write, at, seed);
         }
     }
+    println!("300 cuts at each of {} steps", written(&before, write).steps - before.steps);
 }
 
 /// A second cut while the store is repaired after the first.
@@ -215,6 +222,7 @@ fn a_cut_during_a_copy_and_another_during_its_repair() {
             assert!(found == old || found == write.over(&old), "{what}: {found:?}");
         }
     }
+    println!("{settled} second cuts in {} repairs", 300 * steps);
     assert!(settled > 5_000, "{settled} cuts");
 }
 

@@ -33,6 +33,10 @@ fn driven<'m>(walls: &'m [Wall], room: &Room, fastest: f32) -> (Localizer<'m>, u
     (localizer, 8)
 }
 
+fn square_room() -> Room {
+    Room { angle: 0.0, distances: [2.0; 4], robot: Pose::new(0.0, 0.0, Radians(0.5)) }
+}
+
 fn at(tick: u64) -> Instant {
     Instant::from_ticks(tick * TICK)
 }
@@ -189,7 +193,7 @@ proptest! {
 /// However long it takes, the deviations are at most those of an unknown pose, and the localizer accepts what comes.
 #[test]
 fn the_growth_has_a_limit() {
-    let room = Room { angle: 0.0, distances: [2.0; 4], robot: Pose::new(0.0, 0.0, Radians(0.5)) };
+    let room = square_room();
     let walls = room.walls();
     let (mut localizer, now) = driven(&walls, &room, 2.0);
     for hours in [1, 1_000, 10_000_000] {
@@ -209,7 +213,7 @@ fn the_growth_has_a_limit() {
 /// The verdict of a failure that is shorter than half a second does not depend on the growth.
 #[test]
 fn the_growth_alone_degrades_after_half_a_second() {
-    let room = Room { angle: 0.0, distances: [2.0; 4], robot: Pose::new(0.0, 0.0, Radians(0.5)) };
+    let room = square_room();
     let walls = room.walls();
     let (mut localizer, now) = driven(&walls, &room, 2.0);
     let verdict = |localizer: &mut Localizer, tick| {
@@ -220,4 +224,38 @@ fn the_growth_alone_degrades_after_half_a_second() {
     let verdicts: Vec<Verdict> = (1..=31).map(|tick| verdict(&mut localizer, tick)).collect();
     let first = |of| verdicts.iter().position(|verdict| *verdict == of).map(|n| n as u64 + 1);
     assert_eq!((first(Verdict::Degraded), first(Verdict::Lost)), (Some(limit + 1), Some(31)));
+}
+
+/// 0.1 s at 0.5 m/s: 5 cm and, with a track width of 20 cm, 0.5 rad.
+#[test]
+fn the_growth_of_one_tick_is_that_of_the_maximum_speed() {
+    let room = square_room();
+    let walls = room.walls();
+    let (mut localizer, now) = driven(&walls, &room, 0.5);
+    let before = *localizer.filter();
+    localizer.odometry_missing(at(now + 1));
+    for (state, deviation) in [(X, 0.05_f64), (Y, 0.05), (HEADING, 0.5)] {
+        let added = variance(localizer.filter(), state) - variance(&before, state);
+        assert!((added.sqrt() - deviation).abs() < 1e-4, "{state}: {added}");
+    }
+    assert!(localizer.is_odometry_missing());
+}
+
+/// A failure of exactly half a second is a short one, whether its end is a sample or a refused one.
+#[test]
+fn half_a_second_is_a_short_failure() {
+    let room = square_room();
+    let walls = room.walls();
+    let limit = u16::try_from(DEGRADED_WITHOUT_ODOMETRY.ticks() / TICK).unwrap();
+    let (with, without, _) = after_a_failure(&walls, &room, limit, [0.01, 0.01]);
+    assert_eq!(bits(with.filter()), bits(without.filter()));
+
+    // The travel that was refused then is contained in the next sample: the turn is known.
+    let (mut localizer, now) = driven(&walls, &room, 1.0);
+    let heading = variance(localizer.filter(), HEADING);
+    let end = now + u64::from(limit);
+    missing(&mut localizer, now + 1..=end - 1);
+    localizer.odometry(at(end), WheelTravel::new(1e3, 1e3)).unwrap_err();
+    localizer.odometry(at(end + 1), WheelTravel::default()).unwrap();
+    assert!(is_near(variance(localizer.filter(), HEADING), heading));
 }
