@@ -33,7 +33,7 @@ struct Point {
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
-    let text = std::fs::read_to_string(&args.scenario)
+    let text = sonarfix_map::read_text(&args.scenario)
         .with_context(|| format!("{} cannot be read", args.scenario.display()))?;
     let combinations = sweep_values::combinations(&args.sweep);
     // Before the work: a value that cannot be read is found at once.

@@ -7,6 +7,9 @@ use crate::log::Malformed;
 /// The longest line that is read: 1 MiB, a scan of a hundred thousand beams.
 pub const LONGEST: usize = 1 << 20;
 
+/// The longest line that is skipped. Beyond it the input has no lines, and may have no end.
+const LONGEST_SKIPPED: u64 = sonarfix_map::MAX_FILE_BYTES;
+
 /// Reads lines, and counts them.
 #[derive(Debug)]
 pub struct Lines<R> {
@@ -29,7 +32,7 @@ impl<R: BufRead> Lines<R> {
     /// The next line, without its end; `None` after the last.
     ///
     /// # Errors
-    /// Errors of the reader. A line that is not text is no error here: it is returned as
+    /// Errors of the reader; [`io::ErrorKind::FileTooLarge`] for a line that is too long to be skipped. A line that is not text is no error here: it is returned as
     /// [`Malformed`].
     #[expect(clippy::should_implement_trait, reason = "the line is lent until the next one")]
     pub fn next(&mut self) -> io::Result<Option<Result<&str, Malformed>>> {
@@ -60,6 +63,10 @@ impl<R: BufRead> Lines<R> {
             length = length.saturating_add(here);
             if length <= LONGEST {
                 self.line.extend(available.iter().take(here));
+            }
+            if length as u64 > LONGEST_SKIPPED {
+                let reason = format!("a line has more than {} MiB", LONGEST_SKIPPED >> 20);
+                return Err(io::Error::new(io::ErrorKind::FileTooLarge, reason));
             }
             // A skipped part counts as a line, in case the file ends within it.
             let consumed = here + usize::from(newline.is_some());
@@ -107,6 +114,12 @@ mod tests {
             ];
             assert_eq!(lines, expected);
         }
+    }
+
+    #[test]
+    fn a_line_without_an_end_is_an_error() {
+        let mut lines = Lines::of(BufReader::with_capacity(1 << 20, io::repeat(0)));
+        assert_eq!(lines.next().unwrap_err().kind(), io::ErrorKind::FileTooLarge);
     }
 
     #[test]

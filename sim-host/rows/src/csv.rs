@@ -3,7 +3,7 @@
 
 use std::fmt::Write as _;
 use std::fs::File;
-use std::io::{BufRead, BufReader, BufWriter, Write};
+use std::io::{BufRead, BufReader, BufWriter, Read as _, Write};
 use std::path::Path;
 
 use anyhow::{Context, ensure};
@@ -52,12 +52,31 @@ pub fn parse(line: &str) -> anyhow::Result<Row> {
     Ok(Row { seed, reals, counts })
 }
 
+/// The longest line that is read, bytes: a multiple of that of any row.
+const LONGEST: u64 = 1 << 16;
+
+/// Reads the next line with its end; empty after the last.
+///
+/// # Errors
+/// If the file cannot be read, or the line is too long to be one of rows.
+pub fn read_line(reader: &mut impl BufRead) -> anyhow::Result<String> {
+    let mut line = String::new();
+    let length = reader.take(LONGEST + 1).read_line(&mut line)?;
+    ensure!(length as u64 <= LONGEST, "a line has more than {} KiB", LONGEST >> 10);
+    Ok(line)
+}
+
 /// Opens a file: its plan, and its rows.
 ///
 /// # Errors
 /// If the file cannot be read or is no file of rows.
 pub fn open(file: &Path) -> anyhow::Result<(Plan, Rows)> {
-    let mut lines = BufReader::new(File::open(file)?).lines();
+    let mut reader = BufReader::new(File::open(file)?);
+    let mut lines = std::iter::from_fn(move || {
+        let line = read_line(&mut reader);
+        let whole = |line: String| line.strip_suffix('\n').unwrap_or(&line).to_owned();
+        line.map(|line| (!line.is_empty()).then(|| whole(line))).transpose()
+    });
     let mut line = || lines.next().context("the file ends too early");
     let plan = Plan::parse(&line()??)?;
     ensure!(line()?? == names(), "the columns are those of another version");

@@ -1,7 +1,7 @@
 //! A CSV of rows that grows as runs finish. After the end of the process, whatever its cause, it is resumed.
 
 use std::fs::{File, OpenOptions};
-use std::io::{BufRead, BufReader, Seek, SeekFrom, Write};
+use std::io::{BufReader, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use anyhow::{Context, ensure};
@@ -76,9 +76,7 @@ impl Journal {
 /// The number of whole rows, and the length of the file up to their end; zero if the head is not whole.
 fn finished(file: &File, plan: &Plan, head: &str) -> anyhow::Result<(u32, u64)> {
     let mut lines = BufReader::new(file);
-    let mut start = String::new();
-    lines.read_line(&mut start)?;
-    lines.read_line(&mut start)?;
+    let start = csv::read_line(&mut lines)? + &csv::read_line(&mut lines)?;
     if start != head {
         let is_cut_short = head.starts_with(&start);
         ensure!(
@@ -88,10 +86,8 @@ fn finished(file: &File, plan: &Plan, head: &str) -> anyhow::Result<(u32, u64)> 
         return Ok((0, 0));
     }
     let (mut done, mut length) = (0, head.len() as u64);
-    let mut line = String::new();
     loop {
-        line.clear();
-        lines.read_line(&mut line)?;
+        let line = csv::read_line(&mut lines)?;
         let Some(row) = line.strip_suffix('\n') else {
             return Ok((done, length));
         };

@@ -255,6 +255,11 @@ fn a_day_of_configurations_wears_the_flash_at_the_permitted_rate() {
         println!(
             "{name}: {bytes} bytes and {erases} erases of {SECTORS} sectors of {SECTOR} bytes in a day"
         );
+        // Without the header and the copies of each sector.
+        let new = bytes - erases * (40 + CONFIGURATION + RECORD);
+        let [stm32, pico] = [years(new, 16_384, 2, 10_000), years(new, 4_096, 8, 100_000)];
+        println!("life: {stm32:.1} years on an STM32F405, {pico:.0} on a Pico 2");
+        assert!(stm32 > 2.8 && pico > 26.0, "{name}: {stm32} and {pico} years");
         assert!(bytes >= DAY / 60 * RECORD, "{name}: {bytes} bytes");
         assert!(erases <= worst, "{name}: {erases} erases, at most {worst}");
     }

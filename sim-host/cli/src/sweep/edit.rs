@@ -32,7 +32,7 @@ fn read_in(root: &mut Table, key: &str, base: &Path) -> anyhow::Result<()> {
         return Ok(());
     };
     let file = base.join(name);
-    let text = std::fs::read_to_string(&file).with_context(|| file.display().to_string())?;
+    let text = sonarfix_map::read_text(&file).with_context(|| file.display().to_string())?;
     let mut content: Table = text.parse().with_context(|| file.display().to_string())?;
     content.remove("format");
     // A map file has its walls in a table of the same name.

@@ -87,7 +87,7 @@ fn rows(path: &Path) -> Result<Vec<Row>, ConvertError> {
 }
 
 fn readings(path: &Path) -> Result<Vec<f64>, ConvertError> {
-    let text = std::fs::read_to_string(path).map_err(ConvertError::read(path))?;
+    let text = sonarfix_map::read_text(path).map_err(ConvertError::read(path))?;
     let reading = |word: &str| {
         word.parse().map_err(|_| {
             ConvertError::content(path, format!("`{word}` is not a range in centimetres"))
