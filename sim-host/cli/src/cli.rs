@@ -3,8 +3,9 @@
 use clap::{Parser, Subcommand};
 
 use crate::{
-    bound, command, config, convert, export, faults, find, floor_plans, health, map, merge,
-    monitor, paper, pil, plan, reality, relocalize, replay, run, sonar_model, sweep,
+    bound, calibrate, calibration, command, config, convert, export, faults, find, floor_plans,
+    health, map, merge, monitor, paper, pil, plan, reality, relocalize, replay, run, sonar_model,
+    sweep,
 };
 
 /// Simulates, measures, replays and operates the Sonarfix localizer for small wheeled robots.
@@ -29,6 +30,8 @@ enum Command {
     Find(find::Args),
     /// Measures how robots that lose their pose, or start without one, find it in random floor plans.
     Relocalize(relocalize::Args),
+    /// Estimates the calibration of a robot from a recording, with a known map or true poses.
+    Calibrate(calibrate::Args),
     /// Converts recordings of other formats for `replay`.
     Convert(convert::Args),
     /// Writes logs, recordings and traces for other programs: MCAP and Parquet.
@@ -57,6 +60,8 @@ enum Command {
     Faults(faults::Args),
     /// Measures the reliability of the health verdict; prints markdown.
     Health(health::Args),
+    /// Measures the accuracy of `calibrate` on simulated robots; prints markdown.
+    Calibration(calibration::Args),
     /// Compares two measurement policies on random floor plans; prints markdown.
     FloorPlans(floor_plans::Args),
 }
@@ -76,6 +81,8 @@ impl Cli {
             Command::Replay(args) => replay::execute(&args),
             Command::Find(args) => find::execute(&args),
             Command::Relocalize(args) => relocalize::execute(&args),
+            Command::Calibrate(args) => calibrate::execute(&args),
+            Command::Calibration(args) => calibration::execute(&args),
             Command::Convert(args) => convert::execute(&args),
             Command::Export(args) => export::execute(&args),
             Command::Monitor(args) => monitor::execute(&args),

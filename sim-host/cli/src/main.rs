@@ -4,6 +4,8 @@
 mod output;
 
 mod bound;
+mod calibrate;
+mod calibration;
 mod cli;
 mod command;
 mod config;

@@ -1,5 +1,6 @@
 //! Tests of the command and of the packages behind it, in one program, which links once.
 
+mod calibrate;
 mod command;
 mod common;
 mod convert;

@@ -17,6 +17,7 @@
 //! | [`map`] | the drawing of a map |
 //! | `page`, `escape` | tables, figures and data as HTML |
 //! | [`Table`] | a table of numbers |
+//! | [`residuals`] | the figure of a calibration |
 //! | [`sweep`] | the figure of a sweep |
 
 mod axis;
@@ -30,6 +31,7 @@ mod page;
 mod palette;
 mod player;
 mod points;
+pub mod residuals;
 pub mod sweep;
 mod table;
 

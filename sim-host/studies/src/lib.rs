@@ -2,6 +2,7 @@
 //!
 //! | module | page |
 //! |---|---|
+//! | [`calibration`] | `docs/calibrate.md` |
 //! | [`fault_table`] | `docs/faults.md` |
 //! | [`floor_plan`] | `docs/floor-plans.md` |
 //! | [`health_page`], [`kidnapped`] | `docs/health.md` |
@@ -9,6 +10,7 @@
 //! | [`search_study`] | `docs/search.md` |
 //! | [`sonar_model`] | `docs/sonar-model.md` |
 
+pub mod calibration;
 pub mod fault_search;
 pub mod fault_table;
 pub mod floor_plan;
@@ -18,3 +20,4 @@ pub mod reality;
 pub mod relocalization;
 pub mod search_study;
 pub mod sonar_model;
+mod sweeping_robot;

@@ -1,0 +1,174 @@
+//! The line from commanded to true bearings, from which pings a wall answered.
+//!
+//! A wall answers at its perpendicular, whatever the bearing: the range has no information on the bearing. Whether it
+//! answers has: with probability `share / (1 + exp((|α| − half) / blur))` at the angle α off the axis, symmetric about
+//! zero. The likelihood of all answers and missing answers determines offset and scale of the bearing, the lag of the
+//! servo behind its command, and the cone. Fisher scoring; the inverse of the information is the covariance.
+
+#![expect(clippy::indexing_slicing, reason = "arrays of the model's fixed size")]
+
+use nalgebra::{SMatrix, SVector};
+
+/// Number of parameters.
+const COUNT: usize = 7;
+type Vector = SVector<f64, COUNT>;
+
+/// A ping towards a wall.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Look {
+    /// Commanded bearing, radians.
+    pub commanded: f64,
+    /// Bearing of the wall's perpendicular in the robot's frame, radians.
+    pub perpendicular: f64,
+    /// Distance of the wall, metres.
+    pub distance: f64,
+    /// Sign of the servo's last motion.
+    pub moved: f64,
+    /// Whether the wall answered.
+    pub answered: bool,
+}
+
+/// The estimate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bearings {
+    /// True bearing of a command of zero, radians.
+    pub offset: f64,
+    /// Growth of the true bearing with the command.
+    pub scale: f64,
+    /// Half of the cone in which walls answer, at [`MIDDLE`], radians.
+    pub half_cone: f64,
+    /// Standard deviation of the offset, radians.
+    pub offset_deviation: f64,
+    /// Standard deviation of the scale.
+    pub scale_deviation: f64,
+}
+
+/// Distance to which the cone refers, metres.
+pub const MIDDLE: f64 = 1.5;
+/// Fewest answers, and fewest missing ones, from which the bearings are estimated.
+const ENOUGH: usize = 40;
+
+/// Estimates the bearings; `None` if the pings do not determine them.
+#[must_use]
+pub fn fit(looks: &[Look]) -> Option<Bearings> {
+    let answers = looks.iter().filter(|look| look.answered).count();
+    if answers < ENOUGH || looks.len() - answers < ENOUGH {
+        return None;
+    }
+    let mut at = coarse(looks);
+    let mut damping = 1e-3;
+    let mut likelihood = log_likelihood(looks, &at);
+    for _ in 0..60 {
+        let (information, gradient) = score(looks, &at);
+        let mut raised = information;
+        for k in 0..COUNT {
+            raised[(k, k)] *= 1.0 + damping;
+        }
+        let Some(factor) = raised.cholesky() else {
+            damping *= 10.0;
+            continue;
+        };
+        let next = at + factor.solve(&gradient);
+        let higher = log_likelihood(looks, &next);
+        if higher >= likelihood {
+            let has_converged = higher - likelihood < 1e-7;
+            (at, likelihood) = (next, higher);
+            damping = (damping * 0.1).max(1e-9);
+            if has_converged {
+                break;
+            }
+        } else {
+            damping *= 10.0;
+            if damping > 1e9 {
+                break;
+            }
+        }
+    }
+    let covariance = score(looks, &at).0.try_inverse()?;
+    let deviation = |k: usize| Some(covariance[(k, k)]).filter(|v| *v > 0.0).map(f64::sqrt);
+    let fitted = Bearings {
+        offset: at[0],
+        scale: 1.0 + at[1],
+        half_cone: at[3],
+        offset_deviation: deviation(0)?,
+        scale_deviation: deviation(1)?,
+    };
+    let is_plausible = fitted.half_cone > 0.0 && fitted.scale > 0.5 && fitted.scale < 2.0;
+    is_plausible.then_some(fitted)
+}
+
+/// Offset, scale − 1, lag, half cone, its growth per metre, logarithm of the blur, logit of the share.
+fn start(offset: f64, scale: f64, half: f64) -> Vector {
+    Vector::from([offset, scale, 0.0, half, 0.0, 3_f64.to_radians().ln(), 2.5])
+}
+
+/// The best point of a grid, so that the iteration begins near the right maximum.
+fn coarse(looks: &[Look]) -> Vector {
+    let mut best = (start(0.0, 0.0, 0.25), f64::NEG_INFINITY);
+    for offset in -8..=8 {
+        for scale in -4..=4 {
+            for half in [12_f64, 20.0, 30.0] {
+                let (offset, scale) = (f64::from(2 * offset).to_radians(), 0.03 * f64::from(scale));
+                let at = start(offset, scale, half.to_radians());
+                let likelihood = log_likelihood(looks, &at);
+                if likelihood > best.1 {
+                    best = (at, likelihood);
+                }
+            }
+        }
+    }
+    best.0
+}
+
+/// Probability of an answer, and its derivatives.
+fn probability(look: &Look, at: &Vector) -> (f64, Vector) {
+    let angle = at[0] + (1.0 + at[1]) * look.commanded - at[2] * look.moved - look.perpendicular;
+    let sign = angle.signum();
+    let (away, blur) = (look.distance - MIDDLE, at[5].exp());
+    let rim = ((angle.abs() - at[3] - at[4] * away) / blur).clamp(-40.0, 40.0);
+    let share = 1.0 / (1.0 + (-at[6]).exp());
+    let inside = 1.0 / (1.0 + rim.exp());
+    let by_rim = -share * inside * (1.0 - inside);
+    let by_angle = by_rim * sign / blur;
+    let derivatives = Vector::from([
+        by_angle,
+        by_angle * look.commanded,
+        -by_angle * look.moved,
+        -by_rim / blur,
+        -by_rim * away / blur,
+        -by_rim * rim,
+        inside * share * (1.0 - share),
+    ]);
+    ((share * inside).clamp(1e-4, 1.0 - 1e-4), derivatives)
+}
+
+/// Weak priors keep what the pings do not determine: lag, growth, blur and share.
+const PRIOR: [(f64, f64); COUNT] =
+    [(0.0, 0.5), (0.0, 0.3), (0.0, 0.02), (0.3, 0.3), (0.0, 0.05), (-3.0, 1.0), (2.5, 2.0)];
+
+fn log_likelihood(looks: &[Look], at: &Vector) -> f64 {
+    let of = |look: &Look| {
+        let (p, _) = probability(look, at);
+        if look.answered { p.ln() } else { (1.0 - p).ln() }
+    };
+    let priors = PRIOR.iter().zip(at.iter());
+    let prior: f64 = priors.map(|((mean, sigma), value)| ((value - mean) / sigma).powi(2)).sum();
+    looks.iter().map(of).sum::<f64>() - 0.5 * prior
+}
+
+fn score(looks: &[Look], at: &Vector) -> (SMatrix<f64, COUNT, COUNT>, Vector) {
+    let mut information = SMatrix::<f64, COUNT, COUNT>::zeros();
+    let mut gradient = Vector::zeros();
+    for look in looks {
+        let (p, by) = probability(look, at);
+        let answered = f64::from(u8::from(look.answered));
+        let weight = 1.0 / (p * (1.0 - p));
+        information += by * by.transpose() * weight;
+        gradient += by * (weight * (answered - p));
+    }
+    for (k, (mean, sigma)) in PRIOR.iter().enumerate() {
+        information[(k, k)] += sigma.powi(-2);
+        gradient[k] -= (at[k] - mean) * sigma.powi(-2);
+    }
+    (information, gradient)
+}

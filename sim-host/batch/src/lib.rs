@@ -1,0 +1,33 @@
+//! Estimates the calibration of a robot, and its trajectory, from a whole recording at once.
+//!
+//! The estimator is offline, in `f64`, and independent of the filter. Its unknowns are a pose every few centimetres and
+//! the constants that the recording shares; its equations come from wheel travel, from ranges to known walls and from the
+//! poses of a reference stream. `docs/calibrate.md` derives them.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`recording`] | what was recorded |
+//! | [`log`] | reads it from a log |
+//! | [`chain_of_poses`] | the poses, the travel between them, the pings of each |
+//! | [`odometry`] | the motion by a travel, its derivatives and noise |
+//! | [`wall`] | which wall a ping comes from |
+//! | [`constants`] | the constants and their priors |
+//! | [`problem`] | residuals and derivatives |
+//! | [`chain`] | normal equations of a chain, their solution and covariance |
+//! | [`solve`] | Levenberg–Marquardt |
+//! | [`noise`] | noises from the residuals |
+//! | [`bearings`] | bearings of the servo, from answers and missing answers |
+//! | [`calibrate`] | the calibration: windows, association, intervals |
+
+pub mod bearings;
+pub mod calibrate;
+pub mod chain;
+pub mod chain_of_poses;
+pub mod constants;
+pub mod log;
+pub mod noise;
+pub mod odometry;
+pub mod problem;
+pub mod recording;
+pub mod solve;
+pub mod wall;

@@ -1,0 +1,111 @@
+use proptest::prelude::*;
+
+use super::*;
+use crate::recording::{Ping, Reading};
+
+const H: f64 = 1e-6;
+
+fn recording(steps: &[[f64; 2]], bearing: f64) -> Recording {
+    let mut recording = Recording::default();
+    let mut travel = [0.0, 0.0];
+    recording.readings.push(Reading { time: 0.0, travel });
+    for (n, step) in (1..).zip(steps) {
+        travel = [travel[0] + step[0], travel[1] + step[1]];
+        let time = 0.1 * f64::from(n);
+        recording.pings.push(Ping { time: time - 0.04, bearing, range: Some(1.0) });
+        recording.readings.push(Reading { time, travel });
+    }
+    for n in -20..60 {
+        let time = 0.1 * f64::from(n);
+        let pose = Vector3::new(0.2 * time.sin(), 0.1 * time * time, 0.5 * time);
+        recording.references.push(ReferencePose { time, pose });
+    }
+    recording
+}
+
+/// Compares derivatives with differences, by each component of the pose and each constant.
+fn check(
+    state: &State,
+    pose: usize,
+    by_pose: &[f64],
+    by_constants: &[f64],
+    residual: impl Fn(&State) -> f64,
+) -> Result<(), TestCaseError> {
+    for k in 0..3 {
+        let at = |h: f64| {
+            let mut state = state.clone();
+            state.poses[pose][k] += h;
+            residual(&state)
+        };
+        let difference = (at(H) - at(-H)) / (2.0 * H);
+        prop_assert!(
+            (difference - by_pose[k]).abs() < 1e-4,
+            "pose {k}: {difference} {}",
+            by_pose[k]
+        );
+    }
+    for k in 0..COUNT {
+        let at = |h: f64| {
+            let mut state = state.clone();
+            state.constants.values[k] += h;
+            residual(&state)
+        };
+        let difference = (at(H) - at(-H)) / (2.0 * H);
+        let derivative = by_constants[k];
+        prop_assert!(
+            (difference - derivative).abs() < 1e-4,
+            "constant {k}: {difference} {derivative}"
+        );
+    }
+    Ok(())
+}
+
+proptest! {
+    #[test]
+    fn derivatives_are_those_of_differences(
+        steps in prop::collection::vec([0.01..0.03_f64, 0.01..0.03_f64], 8..20),
+        x in 0.5..1.5_f64, y in 0.5..1.5_f64, heading in -3.0..3.0_f64, bearing in -1.5..1.5_f64,
+        values in prop::array::uniform13(-0.05..0.05_f64),
+    ) {
+        let recording = recording(&steps, bearing);
+        let chain = Chain::build(&recording, 0.0).unwrap();
+        let walls = [Wall::new([-9.0, -1.0], [9.0, -1.5]).unwrap()];
+        let mut constants = Constants::nominal(0.12, [0.0, 0.0]);
+        constants.values = values;
+        let pose = Vector3::new(x, y, heading);
+        let mut state = State { poses: vec![pose; chain.len()], constants };
+        for (i, pose) in (0..).zip(&mut state.poses) {
+            *pose += Vector3::new(0.04, 0.01, 0.02) * f64::from(i);
+        }
+        let problem = Problem {
+            recording: &recording,
+            chain: &chain,
+            walls: &walls,
+            matches: vec![Some(0); chain.pings.len()],
+            noise: Noise { wheel: 0.01, range: 0.01, range_per_metre: 0.0, position: 0.01, heading: 0.01 },
+            priors: Priors::fixed_at(&constants),
+            window: 0..chain.len(),
+            first: PosePrior { pose, position: 0.1, heading: 0.1 },
+            kernel: 3.0,
+        };
+        let k = chain.pings.len() / 2;
+        let at = chain.pings[k].pose;
+        let term = problem.range_term(&state, k, 0).unwrap();
+        // Where the wall is straight ahead the off-axis bias has a kink, behind the robot its angle jumps.
+        if term.off_axis.abs() > 1e-3 && term.off_axis.abs() < 3.1 {
+            let residual = |state: &State| problem.range_term(state, k, 0).unwrap().residual;
+            check(&state, at, term.by_pose.as_slice(), term.by_constants.as_slice(), residual)?;
+        }
+        let edge = problem.edge_term(&state, 1).unwrap();
+        let reference = problem.reference_term(&state, 1).unwrap();
+        for row in 0..3 {
+            let of = |columns: &Rows| columns.row(row).iter().copied().collect::<Vec<_>>();
+            let of_pose = |columns: &Matrix3<f64>| columns.row(row).iter().copied().collect::<Vec<_>>();
+            let residual = |state: &State| problem.edge_term(state, 1).unwrap().residual[row];
+            check(&state, 1, &of_pose(&edge.by_from), &of(&edge.by_constants), residual)?;
+            check(&state, 2, &of_pose(&edge.by_to), &of(&edge.by_constants), residual)?;
+            let residual = |state: &State| problem.reference_term(state, 1).unwrap().residual[row];
+            check(&state, 1, &of_pose(&reference.by_pose), &of(&reference.by_constants), residual)?;
+        }
+    }
+}

@@ -1,0 +1,335 @@
+//! `sonarfix calibrate`: the calibration of a robot from a recording.
+
+mod robot_edit;
+
+use std::fs::File;
+use std::io::{BufReader, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use nalgebra::Vector3;
+use serde::Serialize;
+use sonarfix_batch::calibrate::{Calibration, Determined, Estimate, calibrate};
+use sonarfix_batch::constants::Name;
+use sonarfix_batch::log;
+use sonarfix_batch::noise::INLIER;
+use sonarfix_batch::recording::StartPose;
+use sonarfix_batch::wall::Wall;
+use sonarfix_hal::config::RobotConfig;
+use sonarfix_map::{Floor, robot_file};
+use sonarfix_replay::REFERENCE_HEADER;
+use sonarfix_report::Table;
+use sonarfix_report::residuals::{Residual, residuals};
+
+use crate::output::check_file;
+use crate::table;
+
+/// Maximum number of skipped lines that are printed.
+const SHOWN: usize = 10;
+/// Half of a 95 % interval, in standard deviations.
+const INTERVAL: f64 = 1.96;
+
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The log (docs/formats.md).
+    log: PathBuf,
+    /// The robot as its builder describes it; by default robot.toml beside the log.
+    #[arg(long, value_name = "ROBOT.toml")]
+    robot: Option<PathBuf>,
+    /// The map; by default map.toml beside the log, if it exists.
+    #[arg(long, value_name = "MAP.toml")]
+    map: Option<PathBuf>,
+    /// True poses over time. Their clock may be late and fast.
+    #[arg(long, value_name = "REF.csv")]
+    reference: Option<PathBuf>,
+    /// The start pose, instead of that of the log: metres and degrees.
+    #[arg(long, value_name = "X,Y,HEADING", value_delimiter = ',', allow_hyphen_values = true)]
+    start: Option<Vec<f64>>,
+    /// The robot file to write, with the calibration.
+    #[arg(long, value_name = "ROBOT.toml")]
+    out: Option<PathBuf>,
+    /// The smoothed poses to write, as a reference for `replay`.
+    #[arg(long, value_name = "REF.csv")]
+    trajectory: Option<PathBuf>,
+    /// The figure of the residuals to write.
+    #[arg(long, value_name = "FILE.svg")]
+    residuals: Option<PathBuf>,
+    /// Prints one JSON value instead of tables.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn execute(args: &Args) -> anyhow::Result<()> {
+    let outputs = [
+        ("--out", &args.out),
+        ("--trajectory", &args.trajectory),
+        ("--residuals", &args.residuals),
+    ];
+    for (option, file) in outputs {
+        if let Some(file) = file {
+            check_file(option, file)?;
+        }
+    }
+    let robot_path = args.robot.clone().unwrap_or_else(|| args.log.with_file_name("robot.toml"));
+    let robot = robot_file::read(&robot_path)?;
+    let text =
+        sonarfix_map::read_text(&robot_path).with_context(|| robot_path.display().to_string())?;
+    let read = read_log(args, &robot)?;
+    let walls = walls(args)?;
+    let nominal = log::nominal(&robot, !read.has_scans);
+    let found = calibrate(&read.recording, &walls, &nominal)
+        .with_context(|| args.log.display().to_string())?;
+    if let Some(out) = &args.out {
+        let text = robot_edit::edited(&text, &robot, &found)?;
+        robot_file::parse(&text, &out.display().to_string())?;
+        std::fs::write(out, text).with_context(|| out.display().to_string())?;
+    }
+    if let Some(out) = &args.trajectory {
+        write_trajectory(out, &found).with_context(|| out.display().to_string())?;
+    }
+    if let Some(out) = &args.residuals {
+        let shown = found.residuals.iter().map(|residual| Residual {
+            time: residual.time,
+            value: residual.value,
+            is_inlier: residual.normalized.abs() <= INLIER,
+        });
+        let svg = residuals(&shown.collect::<Vec<_>>())
+            .map_err(|error| anyhow::anyhow!("cannot draw the figure: {error}"))?;
+        std::fs::write(out, svg).with_context(|| out.display().to_string())?;
+    }
+    if args.json {
+        crate::json::print(&Json::of(&found))
+    } else {
+        println!("{}", table::text(&estimates(&found, &robot)));
+        println!("\n{}", statement(&found));
+        Ok(())
+    }
+}
+
+fn read_log(args: &Args, robot: &RobotConfig) -> anyhow::Result<log::Read> {
+    let open = |path: &Path| {
+        File::open(path).map(BufReader::new).with_context(|| path.display().to_string())
+    };
+    let mut read =
+        log::read(open(&args.log)?, robot).with_context(|| args.log.display().to_string())?;
+    for (line, reason) in read.skipped.iter().take(SHOWN) {
+        eprintln!("skipped: log line {line}: {reason}");
+    }
+    if read.skipped.len() > SHOWN {
+        eprintln!("skipped: {} more lines", read.skipped.len() - SHOWN);
+    }
+    if let Some(reference) = &args.reference {
+        read.recording.references = log::read_reference(open(reference)?)
+            .with_context(|| reference.display().to_string())?;
+    }
+    if let Some(start) = &args.start {
+        let &[x, y, heading] = start.as_slice() else {
+            anyhow::bail!("--start must be x, y and heading, for example 1.5,2,90");
+        };
+        let time = read.recording.readings.first().map_or(0.0, |reading| reading.time);
+        let pose = Vector3::new(x, y, heading.to_radians());
+        read.recording.start = Some(StartPose { time, pose, position: 0.05, heading: 0.05 });
+    }
+    Ok(read)
+}
+
+/// The walls of the map; none if there is no map.
+fn walls(args: &Args) -> anyhow::Result<Vec<Wall>> {
+    let usual = args.log.with_file_name("map.toml");
+    let map = match &args.map {
+        Some(map) => map,
+        None if usual.exists() => &usual,
+        None => return Ok(Vec::new()),
+    };
+    let floor = Floor::read(map)?;
+    let walls = floor.named_walls().iter();
+    Ok(walls.filter_map(|wall| Wall::new(wall.from(), wall.to())).collect())
+}
+
+fn write_trajectory(path: &Path, found: &Calibration) -> std::io::Result<()> {
+    let mut out = BufWriter::new(File::create(path)?);
+    writeln!(out, "{REFERENCE_HEADER}")?;
+    for (time, pose, _) in &found.trajectory {
+        writeln!(out, "{time:.6},{:.6},{:.6},{:.7}", pose.x, pose.y, pose.z)?;
+    }
+    out.flush()
+}
+
+/// A value for people: relative errors in per cent, lengths in millimetres.
+struct Shown {
+    label: &'static str,
+    value: String,
+    interval: String,
+}
+
+fn shown(estimate: &Estimate, robot: &RobotConfig) -> Shown {
+    let half = INTERVAL * estimate.deviation;
+    let scaled = |scale: f64, decimals: usize, unit: &str| {
+        let value = format!("{:+.decimals$} {unit}", estimate.value * scale);
+        (value, format!("± {:.decimals$} {unit}", half * scale))
+    };
+    let (value, interval) = match estimate.name {
+        Name::Right | Name::Left | Name::RangeScale => scaled(100.0, 3, "%"),
+        Name::Track => {
+            let width = 1e3 * f64::from(robot.localizer.drive.track_width.0);
+            let value = format!("{:.2} mm", width * (1.0 + estimate.value));
+            (value, format!("± {:.2} mm", width * half))
+        }
+        Name::OffAxis => scaled(1e3, 1, "mm/rad"),
+        Name::Lag => scaled(1e3, 1, "ms"),
+        Name::ClockRate => scaled(1e3, 3, "ms/s"),
+        Name::MarkerHeading => scaled(180.0 / std::f64::consts::PI, 3, "deg"),
+        Name::MountAhead
+        | Name::MountLeft
+        | Name::RangeOffset
+        | Name::MarkerAhead
+        | Name::MarkerLeft => scaled(1e3, 2, "mm"),
+    };
+    Shown { label: estimate.name.label(), value, interval }
+}
+
+fn estimates(found: &Calibration, robot: &RobotConfig) -> Table {
+    let row = |estimate: &Estimate| {
+        let Shown { label, value, interval } = shown(estimate, robot);
+        let determined = match estimate.determined {
+            Determined::Yes => "",
+            Determined::Jointly => "only together with the others of the drive",
+            Determined::No => "not by this recording",
+        };
+        vec![
+            label.to_owned(),
+            value,
+            interval,
+            format!("{:.1}", estimate.scatter),
+            determined.to_owned(),
+        ]
+    };
+    let mut rows: Vec<Vec<String>> = found.estimates.iter().map(row).collect();
+    if let Some(bearings) = &found.bearings {
+        let mut push = |label: &str, value: String, deviation: f64| {
+            let interval = format!("± {:.2}", INTERVAL * deviation);
+            rows.push(vec![label.to_owned(), value, interval, "–".to_owned(), String::new()]);
+        };
+        let degrees = f64::to_degrees;
+        push(
+            "bearing offset (deg)",
+            format!("{:+.2}", degrees(bearings.offset)),
+            degrees(bearings.offset_deviation),
+        );
+        push(
+            "bearing scale (%)",
+            format!("{:+.2}", 100.0 * (bearings.scale - 1.0)),
+            100.0 * bearings.scale_deviation,
+        );
+        push("half cone (deg)", format!("{:.1}", degrees(bearings.half_cone)), 0.0);
+    }
+    Table {
+        title: "Calibration".to_owned(),
+        note: "errors of the wheels are relative to the robot file; intervals of 95 %, widened by the difference of \
+               the two halves\n(in its standard deviations)"
+            .to_owned(),
+        columns: ["", "estimate", "interval", "halves", "determined"].map(str::to_owned).to_vec(),
+        rows,
+    }
+}
+
+/// What was used, and what the recording cannot tell.
+fn statement(found: &Calibration) -> String {
+    let [left, right] = found.turned.map(f64::to_degrees);
+    let mut lines = vec![format!(
+        "{:.1} m, turns of {left:.0}° to the left and {right:.0}° to the right; {} of {} echoes from walls fit; \
+         {} reference poses",
+        found.distance, found.inliers, found.expected, found.referenced
+    )];
+    let noise = &found.noise;
+    lines.push(format!("wheel noise {:.2} mm/sqrt(m)", 1e3 * noise.wheel));
+    if found.expected > 0 {
+        let per_metre = 1e3 * noise.range_per_metre;
+        lines.push(format!("range noise {:.2} mm and {per_metre:.2} mm/m", 1e3 * noise.range));
+    }
+    if found.referenced > 0 {
+        let (position, heading) = (1e3 * noise.position, noise.heading.to_degrees());
+        lines.push(format!("reference noise {position:.2} mm and {heading:.3}°"));
+    }
+    if found.estimates.iter().any(|estimate| estimate.determined == Determined::Jointly) {
+        lines.push(
+            "Not determined: the difference of the wheels separately from the track width. The robot turned one way \
+             only; the wheels are assumed to be equal to 0.5 %. Drive figures of eight to separate them."
+                .to_owned(),
+        );
+    }
+    let unknown = found.estimates.iter().filter(|estimate| {
+        let is_in_file = !matches!(estimate.name, Name::RangeOffset | Name::OffAxis);
+        is_in_file && estimate.determined == Determined::No
+    });
+    let unknown: Vec<&str> = unknown.map(|estimate| estimate.name.label()).collect();
+    if !unknown.is_empty() {
+        lines.push(format!(
+            "Not determined: {}. The robot file keeps its value.",
+            unknown.join(", ")
+        ));
+    }
+    if found.expected > 0 && found.bearings.is_none() {
+        lines.push(
+            "Not determined: the bearings of servo and mount. They follow from the bearings at which a wall answers \
+             and no longer answers: record a drive in which the sonar sweeps."
+                .to_owned(),
+        );
+    }
+    lines.join("\n")
+}
+
+/// The result in SI units.
+#[derive(Serialize)]
+struct Json {
+    estimates: Vec<JsonEstimate>,
+    bearing_offset: Option<[f64; 2]>,
+    bearing_scale: Option<[f64; 2]>,
+    wheel_noise: f64,
+    range_noise: f64,
+    range_noise_per_metre: f64,
+    inliers: usize,
+    expected: usize,
+    referenced: usize,
+    turned: [f64; 2],
+    distance: f64,
+}
+
+#[derive(Serialize)]
+struct JsonEstimate {
+    name: &'static str,
+    value: f64,
+    deviation: f64,
+    halves: f64,
+    determined: &'static str,
+}
+
+impl Json {
+    fn of(found: &Calibration) -> Self {
+        let estimates = found.estimates.iter().map(|estimate| JsonEstimate {
+            name: estimate.name.label(),
+            value: estimate.value,
+            deviation: estimate.deviation,
+            halves: estimate.scatter,
+            determined: match estimate.determined {
+                Determined::Yes => "yes",
+                Determined::Jointly => "jointly",
+                Determined::No => "no",
+            },
+        });
+        let bearings = found.bearings.as_ref();
+        Self {
+            estimates: estimates.collect(),
+            bearing_offset: bearings.map(|b| [b.offset, b.offset_deviation]),
+            bearing_scale: bearings.map(|b| [b.scale, b.scale_deviation]),
+            wheel_noise: found.noise.wheel,
+            range_noise: found.noise.range,
+            range_noise_per_metre: found.noise.range_per_metre,
+            inliers: found.inliers,
+            expected: found.expected,
+            referenced: found.referenced,
+            turned: found.turned,
+            distance: found.distance,
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! Writes a calibration into the text of a robot file and keeps its comments.
+
+use anyhow::Context;
+use sonarfix_batch::calibrate::{Calibration, Determined};
+use sonarfix_batch::constants::Name;
+use sonarfix_hal::config::RobotConfig;
+use toml_edit::{DocumentMut, Item, Table, Value};
+
+/// The robot file with the calibration: wheels, track width and mount; the bearings of the servo's pulses and the
+/// temperature if they are determined; and the deviations of the prior.
+pub fn edited(text: &str, robot: &RobotConfig, found: &Calibration) -> anyhow::Result<String> {
+    let mut document: DocumentMut = text.parse().context("the robot file is not TOML")?;
+    let constants = &found.constants;
+    let is_known = |name: Name| {
+        let estimate = found.estimates.iter().find(|estimate| estimate.name == name);
+        estimate.is_some_and(|estimate| estimate.determined != Determined::No)
+    };
+    let drive = table(&mut document, "drive")?;
+    let width = robot.localizer.drive.track_width.0;
+    let width = f64::from(width) * (1.0 + constants.get(Name::Track));
+    if is_known(Name::Track) {
+        set(drive, "track_width", millimetres(width));
+    }
+    for (key, name) in [("right_wheel", Name::Right), ("left_wheel", Name::Left)] {
+        if is_known(name) {
+            wheel(drive, key, 1.0 + constants.get(name))?;
+        }
+    }
+    let sonar = table(&mut document, "sonar")?;
+    if is_known(Name::MountAhead) && is_known(Name::MountLeft) {
+        let mount = [Name::MountAhead, Name::MountLeft];
+        let mount = mount.map(|name| Value::from(millimetres(constants.get(name))));
+        replace(sonar, "mount", Value::Array(mount.into_iter().collect()));
+    }
+    if found.bearings.is_some() {
+        pulses(sonar, robot, found)?;
+    }
+    if is_known(Name::RangeScale) && sonar.contains_key("temperature") {
+        let celsius = f64::from(robot.ranger.temperature.0);
+        if let Some(celsius) = temperature(celsius, constants.get(Name::RangeScale)) {
+            set(sonar, "temperature", format!("{celsius:.1} degC"));
+        }
+    }
+    priors(&mut document, robot, found)?;
+    Ok(document.to_string())
+}
+
+/// The temperature at which the driver's ranges have no scale error; `None` outside of what a file may have. The speed of
+/// sound in air is proportional to the square root of the absolute temperature.
+fn temperature(celsius: f64, scale: f64) -> Option<f64> {
+    const ZERO: f64 = 273.15;
+    let corrected = (celsius + ZERO) / (1.0 + scale).powi(2) - ZERO;
+    (-40.0..=85.0).contains(&corrected).then_some(corrected)
+}
+
+/// The table of the document: the file's own, or that of `[robot]`.
+fn table<'d>(document: &'d mut DocumentMut, name: &str) -> anyhow::Result<&'d mut Table> {
+    let table = document.get_mut(name).and_then(Item::as_table_mut);
+    table.with_context(|| format!("the robot file has no table [{name}]"))
+}
+
+/// Replaces a value and keeps the comment behind it.
+fn replace(table: &mut Table, key: &str, value: Value) {
+    let decor = table.get(key).and_then(Item::as_value).map(|old| old.decor().clone());
+    let mut value = value;
+    if let Some(decor) = decor {
+        *value.decor_mut() = decor;
+    }
+    table.insert(key, Item::Value(value));
+}
+
+fn set(table: &mut Table, key: &str, text: String) {
+    replace(table, key, Value::from(text));
+}
+
+fn millimetres(metres: f64) -> String {
+    format!("{:.3} mm", 1e3 * metres)
+}
+
+/// Scales the wheel's diameter, or its travel per edge.
+fn wheel(drive: &mut Table, key: &str, scale: f64) -> anyhow::Result<()> {
+    let wheel = drive.get_mut(key).and_then(Item::as_table_like_mut);
+    let wheel = wheel.with_context(|| format!("the robot file has no table {key}"))?;
+    for length in ["diameter", "travel_per_edge"] {
+        let Some(value) = wheel.get_mut(length).and_then(Item::as_value_mut) else { continue };
+        let text = value.as_str().with_context(|| format!("{key}.{length} must be text"))?;
+        let (number, unit) = text.trim().split_once(' ').context("a length needs a unit")?;
+        let number: f64 = number.parse().with_context(|| format!("{key}.{length}"))?;
+        let decor = value.decor().clone();
+        *value = Value::from(format!("{:.6} {}", number * scale, unit.trim()));
+        *value.decor_mut() = decor;
+    }
+    Ok(())
+}
+
+/// The bearings of the servo's two measured pulses.
+fn pulses(sonar: &mut Table, robot: &RobotConfig, found: &Calibration) -> anyhow::Result<()> {
+    let pulses = sonar.get_mut("servo_pulses").and_then(Item::as_array_mut);
+    let pulses = pulses.context("the robot file has no servo_pulses")?;
+    for (pulse, measured) in pulses.iter_mut().zip(robot.servo_pulses) {
+        let pulse = pulse.as_inline_table_mut().context("servo_pulses must be tables")?;
+        let bearing = found.constants.bearing(measured.bearing.0.into()).to_degrees();
+        if let Some(value) = pulse.get_mut("bearing") {
+            let decor = value.decor().clone();
+            *value = Value::from(format!("{bearing:.2} deg"));
+            *value.decor_mut() = decor;
+        }
+    }
+    Ok(())
+}
+
+/// The deviations with which the localizer starts. At least a tenth of a per cent: wheels wear, and air warms.
+fn priors(
+    document: &mut DocumentMut,
+    robot: &RobotConfig,
+    found: &Calibration,
+) -> anyhow::Result<()> {
+    const LEAST: f64 = 1e-3;
+    let prior = table(document, "prior")?;
+    let width = f64::from(robot.localizer.drive.track_width.0);
+    for estimate in &found.estimates {
+        let deviation = estimate.deviation.max(LEAST);
+        let per_cent = || format!("{:.2} %", 100.0 * deviation);
+        match estimate.name {
+            _ if estimate.determined == Determined::No => {}
+            Name::Right => set(prior, "scale_right", per_cent()),
+            Name::Left => set(prior, "scale_left", per_cent()),
+            Name::Track => set(prior, "track_width", millimetres(width * deviation)),
+            // The temperature of the next day is another one.
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::temperature;
+
+    #[test]
+    fn a_range_that_is_too_long_needs_a_lower_temperature() {
+        // 0.18 % per °C: 343.4 m/s at 20 °C, 340.4 m/s at 15 °C.
+        let corrected = temperature(20.0, 343.4 / 340.4 - 1.0).unwrap();
+        assert!((corrected - 15.0).abs() < 0.2, "{corrected}");
+        assert_eq!(temperature(20.0, 0.5), None);
+    }
+}

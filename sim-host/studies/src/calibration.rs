@@ -1,0 +1,310 @@
+//! How exactly `calibrate` finds the errors of simulated robots.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use sonarfix::pose::Point;
+use sonarfix::units::Radians;
+use sonarfix_batch::calibrate::{CalibrateError, Calibration, Nominal, calibrate};
+use sonarfix_batch::constants::Name;
+use sonarfix_batch::log;
+use sonarfix_batch::wall::Wall;
+use sonarfix_map::{CLASSROOM, FileError, Scenario};
+use sonarfix_sim::progress::Progress;
+use sonarfix_sim::simulate::SimulationError;
+
+use crate::sweeping_robot::drive;
+
+/// The path: figures of eight of 8.8 m, with turns both ways.
+const PATH: &str = "start = [1.2, 0.7]
+corners = [[2.4, 0.7], [2.4, 1.7], [1.2, 1.7], [1.2, 2.7], [2.4, 2.7], [2.4, 1.7], [1.2, 1.7], [1.2, 0.7]]
+";
+/// The room: opposite walls are within reach, so that they determine the scale of wheels and ranges.
+const WALLS: [(&str, &str); 3] =
+    [("[6, 0]", "[4, 0]"), ("[6, 8]", "[4, 3.5]"), ("[0, 8]", "[0, 3.5]")];
+/// What is not in the map: a bin in a corner and the leg of a chair.
+const OBSTACLES: &str = "obstacle = [
+    { centre = [3.6, 3.1], radius = \"15 cm\" },
+    { centre = [0.4, 1.9], radius = \"3 cm\" },
+";
+/// Length of a figure, metres.
+const LAP: f64 = 8.8;
+
+/// Errors of a robot: how much its file differs from the truth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Errors {
+    /// Of the wheels, right and left.
+    pub wheels: [f64; 2],
+    /// Of the track width, relative.
+    pub track: f64,
+    /// Of the mount, metres.
+    pub mount: f64,
+    /// Of the bearing: heading of mount and servo together, radians.
+    pub bearing: f64,
+    /// Of the servo's scale.
+    pub servo: f64,
+    /// Of the ranger.
+    pub range: f64,
+}
+
+impl Errors {
+    /// Wheels 3 % and 2 % wrong, track width 5 %, mount 5° and 10 mm, servo 8 % and 4°, range 1 %.
+    pub const BUILDER: Self = Self {
+        wheels: [0.03, 0.02],
+        track: 0.05,
+        mount: 0.01,
+        bearing: 9.0 * std::f64::consts::PI / 180.0,
+        servo: 0.08,
+        range: 0.01,
+    };
+
+    /// Wheels 10 % wrong.
+    pub const GROSS: Self = Self { wheels: [0.1, 0.1], ..Self::BUILDER };
+
+    /// The same magnitudes with random signs.
+    fn drawn(self, rng: &mut impl Rng) -> Self {
+        let mut sign = |value: f64| if rng.random::<bool>() { value } else { -value };
+        Self {
+            wheels: self.wheels.map(&mut sign),
+            track: sign(self.track),
+            mount: sign(self.mount),
+            bearing: sign(self.bearing),
+            servo: sign(self.servo),
+            range: sign(self.range),
+        }
+    }
+}
+
+/// A quantity that is compared with the truth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Compared {
+    /// Its name.
+    pub name: &'static str,
+    /// Estimate minus truth.
+    pub error: f64,
+    /// The estimate's standard deviation.
+    pub deviation: f64,
+    /// Limit of the error.
+    pub limit: f64,
+}
+
+/// A trial.
+#[derive(Debug, Clone)]
+pub struct Trial {
+    /// Its seed.
+    pub seed: u64,
+    /// The comparison, or why there is no calibration.
+    pub outcome: Result<Vec<Compared>, CalibrateError>,
+}
+
+/// Why the study failed.
+#[derive(Debug, thiserror::Error)]
+pub enum CalibrationStudyError {
+    /// The scenario cannot be read.
+    #[error(transparent)]
+    Scenario(#[from] FileError),
+    /// The robot does not start.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+}
+
+/// Runs trials of robots that drive this far, metres, with errors of these magnitudes.
+///
+/// # Errors
+/// [`CalibrationStudyError`].
+pub fn trials(
+    first: u64,
+    count: u32,
+    metres: f64,
+    errors: Errors,
+    progress: &impl Progress,
+) -> Result<Vec<Trial>, CalibrationStudyError> {
+    let seeds: Vec<u64> = (0..u64::from(count)).map(|n| first.wrapping_add(n)).collect();
+    let run = |&seed: &u64| {
+        let trial = trial(seed, metres, errors);
+        progress.finished();
+        trial
+    };
+    seeds.par_iter().map(run).collect()
+}
+
+/// One trial.
+///
+/// # Errors
+/// [`CalibrationStudyError`].
+pub fn trial(seed: u64, metres: f64, errors: Errors) -> Result<Trial, CalibrationStudyError> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0xCA11_B8A7);
+    let errors = errors.drawn(&mut rng);
+    let mut scenario = Scenario::parse(&text(metres), "classroom.toml", Path::new(""))?;
+    let robot = scenario.robot;
+    let truth = &mut scenario.truth;
+    [truth.scale_right, truth.scale_left] = errors.wheels;
+    truth.track_width = f64::from(robot.localizer.drive.track_width.0) * (1.0 + errors.track);
+    truth.range_scale = errors.range;
+    #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
+    let [mount, offset, scale] =
+        [errors.mount, errors.bearing, 1.0 + errors.servo].map(|value| value as f32);
+    let true_robot = &mut scenario.robot;
+    let at = true_robot.localizer.sonar.mount;
+    true_robot.localizer.sonar.mount = Point::new(at.x.0 + mount, at.y.0 - mount);
+    for pulse in &mut true_robot.servo_pulses {
+        pulse.bearing = Radians(offset + scale * pulse.bearing.0);
+    }
+    let width = scenario.truth.track_width;
+    let (mut drive, simulation) = drive(scenario, robot, seed)?;
+    drive.recording.cut(metres);
+    let floor = simulation.scenario.floor.named_walls();
+    let walls: Vec<Wall> =
+        floor.iter().filter_map(|wall| Wall::new(wall.from(), wall.to())).collect();
+    let nominal = log::nominal(&robot, true);
+    let outcome = calibrate(&drive.recording, &walls, &nominal)
+        .map(|found| compare(&found, &errors, simulation.range_scale(), width, &nominal));
+    Ok(Trial { seed, outcome })
+}
+
+fn compare(
+    found: &Calibration,
+    errors: &Errors,
+    range_scale: f64,
+    track_width: f64,
+    nominal: &Nominal,
+) -> Vec<Compared> {
+    let [ahead, left] = nominal.mount;
+    let truths = [
+        (Name::Right, "right wheel", errors.wheels[0], 0.005),
+        (Name::Left, "left wheel", errors.wheels[1], 0.005),
+        (Name::Track, "track width", track_width / nominal.track_width - 1.0, 0.01),
+        (Name::RangeScale, "range", range_scale, 0.002),
+        (Name::MountAhead, "mount ahead", ahead + errors.mount, 0.003),
+        (Name::MountLeft, "mount left", left - errors.mount, 0.003),
+    ];
+    let mut compared: Vec<Compared> = Vec::new();
+    for (name, label, truth, limit) in truths {
+        if let Some(estimate) = found.estimates.iter().find(|estimate| estimate.name == name) {
+            let (error, deviation) = (estimate.value - truth, estimate.deviation);
+            compared.push(Compared { name: label, error, deviation, limit });
+        }
+    }
+    if let Some(bearings) = &found.bearings {
+        let limit = 0.5_f64.to_radians();
+        let (error, deviation) = (bearings.offset - errors.bearing, bearings.offset_deviation);
+        compared.push(Compared { name: "bearing", error, deviation, limit });
+        // Half a degree at 90°.
+        let (error, deviation) = (bearings.scale - 1.0 - errors.servo, bearings.scale_deviation);
+        let limit = limit / std::f64::consts::FRAC_PI_2;
+        compared.push(Compared { name: "servo scale", error, deviation, limit });
+    }
+    compared
+}
+
+/// The classroom's robot in a smaller room, with the path of the study.
+fn text(metres: f64) -> String {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some laps")]
+    let laps = (metres / LAP).ceil().max(1.0) as u32;
+    let mut text = String::new();
+    for line in CLASSROOM.lines() {
+        let key = line.split('=').next().unwrap_or_default().trim();
+        match key {
+            "start" if line.contains('[') => text.push_str(PATH),
+            "corners" | "{ centre" | "{ from" => {}
+            "obstacle" => text.push_str(OBSTACLES),
+            "laps" => {
+                let _ = writeln!(text, "laps = {laps}");
+            }
+            "follow" => text.push_str("follow = \"truth\"\n"),
+            _ => {
+                text.push_str(line);
+                text.push('\n');
+            }
+        }
+    }
+    WALLS.iter().fold(text, |text, (from, to)| text.replace(from, to))
+}
+
+/// The page's table: for each distance and quantity the share of the robots within the limit and inside the interval.
+#[must_use]
+pub fn page(rows: &[(f64, Vec<Trial>)]) -> String {
+    let mut page = String::from(
+        "| driven | quantity | limit | within it | inside its 95 % interval | RMS error | estimated |\n\
+         |---|---|---|---|---|---|---|\n",
+    );
+    for (metres, trials) in rows {
+        let refused = trials.iter().filter(|trial| trial.outcome.is_err()).count();
+        let found: Vec<&Vec<Compared>> =
+            trials.iter().filter_map(|trial| trial.outcome.as_ref().ok()).collect();
+        let mut names: Vec<&str> = Vec::new();
+        for compared in found.iter().copied().flatten() {
+            if !names.contains(&compared.name) {
+                names.push(compared.name);
+            }
+        }
+        for name in names {
+            let all = found.iter().copied().flatten().filter(|compared| compared.name == name);
+            page.push_str(&row(*metres, name, &all.copied().collect::<Vec<_>>()));
+        }
+        let _ =
+            writeln!(page, "| {metres:.0} m | refused | | {refused} of {} | | | |", trials.len());
+    }
+    page
+}
+
+fn row(metres: f64, name: &str, all: &[Compared]) -> String {
+    #[expect(clippy::cast_precision_loss, reason = "numbers of robots")]
+    let count = all.len().max(1) as f64;
+    #[expect(clippy::cast_precision_loss, reason = "numbers of robots")]
+    let share = |is: fn(&Compared) -> bool| {
+        100.0 * all.iter().filter(|compared| is(compared)).count() as f64 / count
+    };
+    let within = share(|compared| compared.error.abs() <= compared.limit);
+    let inside = share(|compared| compared.error.abs() <= 1.96 * compared.deviation);
+    let rms = (all.iter().map(|compared| compared.error.powi(2)).sum::<f64>() / count).sqrt();
+    let limit = all.first().map_or(0.0, |compared| compared.limit);
+    let unit = |value: f64| match name {
+        "mount ahead" | "mount left" => format!("{:.2} mm", 1e3 * value),
+        "bearing" => format!("{:.2}°", value.to_degrees()),
+        _ => format!("{:.3} %", 100.0 * value),
+    };
+    format!(
+        "| {metres:.0} m | {name} | {} | {within:.1} % | {inside:.1} % | {} | {} |\n",
+        unit(limit),
+        unit(rms),
+        all.len()
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn simulated_robots_are_calibrated_within_their_intervals() {
+        let trials = trials(70_000, 4, 20.0, Errors::BUILDER, &|| ()).unwrap();
+        for trial in trials {
+            let compared = trial.outcome.unwrap();
+            assert!(compared.len() >= 6, "{compared:?}");
+            for Compared { name, error, deviation, limit } in compared {
+                // Two limits, and 4 deviations: 4 robots with 8 quantities each.
+                assert!(
+                    error.abs() <= 2.0 * limit.max(2.0 * deviation),
+                    "{name}: {error} ± {deviation}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn wheels_that_are_ten_per_cent_wrong_are_found_or_refused() {
+        for trial in trials(70_100, 3, 20.0, Errors::GROSS, &|| ()).unwrap() {
+            let Ok(compared) = trial.outcome else { continue };
+            for Compared { name, error, deviation, limit } in compared {
+                assert!(
+                    error.abs() <= 2.0 * limit.max(2.0 * deviation),
+                    "{name}: {error} ± {deviation}"
+                );
+            }
+        }
+    }
+}
