@@ -2,6 +2,7 @@
 
 fn main() {
     let here = env!("CARGO_MANIFEST_DIR");
+    println!("cargo:rustc-check-cfg=cfg(rp2040)");
     println!("cargo:rustc-link-search={here}");
     println!("cargo:rerun-if-changed={here}/memory.x");
     // The scripts of cortex-m-rt and defmt. The relocations stay in the linked program, so that `cargo xtask`

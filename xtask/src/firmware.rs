@@ -5,24 +5,24 @@
 //!
 //! | module | |
 //! |---|---|
+//! | `boards` | the further boards |
 //! | `build` | builds the file |
 //! | `frames` | compares the stack frames read from instructions with the compiler's own |
 //! | `lines` | the source line that an instruction was compiled from |
 //! | `memory` | there is no allocator, and the stack is below all variables |
 //! | `panics` | lines that can panic |
-//! | `pico2` | the second board |
 //! | `size` | flash and RAM |
 //! | `stack` | the deepest stack |
 
 use crate::cargo;
 use crate::workspace::Workspace;
 
+mod boards;
 mod build;
 mod frames;
 mod lines;
 mod memory;
 mod panics;
-mod pico2;
 mod size;
 mod stack;
 
@@ -40,8 +40,12 @@ pub fn test() -> anyhow::Result<()> {
     let tests = "test --package sonarfix-app --test emulated -- --ignored --nocapture";
     let mut command = cargo::command(tests);
     command.env("SONARFIX_FIRMWARE", &program).env("SONARFIX_STACK", deepest.to_string());
-    cargo::check(command)?;
-    pico2::check()
+    cargo::check(command)
+}
+
+/// The firmware of the further boards, and the size of all.
+pub fn boards() -> anyhow::Result<()> {
+    boards::check(&build::read(&build::release()?)?)
 }
 
 /// Flash and RAM of the linked file, by crate.

@@ -25,6 +25,7 @@ mod publish;
 mod reality;
 mod search_windows;
 mod thumb;
+mod wiring;
 mod words;
 mod workspace;
 
@@ -59,6 +60,8 @@ enum Task {
     Embedded,
     /// The firmware: builds it, searches it for panics, and runs it in an emulator.
     TestFirmware,
+    /// The firmware of all further boards: lints it, builds it, searches it for panics and prints its size.
+    Boards,
     /// Flash and RAM of the shipped firmware, by crate.
     Size,
     /// The deepest that the stack of the shipped firmware can be, by the calls in it.
@@ -85,6 +88,8 @@ enum Task {
     Bless,
     /// Measures Sonarfix and its peers, and writes `docs/benchmarks.md` (ten minutes).
     Bench,
+    /// Draws the wiring of every board: `docs/images/wiring-*.svg`.
+    Wiring,
     /// Replays the recordings of a folder, and writes `docs/reality.md` (minutes).
     Reality(reality::Args),
     /// The paper's statistics at full length: 5,000 seeds, both policies (minutes).
@@ -104,7 +109,7 @@ enum Task {
 }
 
 /// The steps of CI, the fast ones first.
-fn ci_steps() -> [(&'static str, Task); 19] {
+fn ci_steps() -> [(&'static str, Task); 20] {
     [
         ("format", Task::Format),
         ("circles", Task::Circles),
@@ -113,6 +118,7 @@ fn ci_steps() -> [(&'static str, Task); 19] {
         ("docs", Task::Docs),
         ("embedded", Task::Embedded),
         ("test-firmware", Task::TestFirmware),
+        ("boards", Task::Boards),
         ("golden", Task::Golden),
         ("pil", Task::Pil),
         ("panics", Task::Panics),
@@ -151,6 +157,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Docs => checks::docs(),
         Task::Embedded => checks::embedded(),
         Task::TestFirmware => firmware::test(),
+        Task::Boards => firmware::boards(),
         Task::Size => firmware::size(),
         Task::Stack(args) => firmware::stack(&args),
         Task::Pil => pil::check(),
@@ -164,6 +171,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Deny => checks::deny(),
         Task::Bless => golden::bless().and_then(|()| budgets::bless()),
         Task::Bench => bench::run(),
+        Task::Wiring => wiring::write(),
         Task::Reality(args) => reality::run(&args),
         Task::Statistics => checks::statistics(),
         Task::Words(args) => words::count(&args),

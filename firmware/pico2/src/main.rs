@@ -1,7 +1,6 @@
-//! The second board: a Raspberry Pi Pico 2 with two encoders, a servo, a pulse-width sonar and a
-//! UART.
+//! A Raspberry Pi Pico 2 or Pico with two encoders, a servo, a pulse-width sonar and a UART.
 //!
-//! This file is the board. The robot is described by the baked configuration, and its behaviour is in `sonarfix-app`.
+//! This file is the board, except for what differs between its chips, which is in the module `chip`. The robot is described by the baked configuration, and its behaviour is in `sonarfix-app`.
 //! The wiring is a table in `docs/firmware.md`.
 //!
 //! | | for | pins |
@@ -19,34 +18,32 @@
 #![no_std]
 #![no_main]
 
-use core::convert::Infallible;
-
 use defmt_rtt as _;
 use embassy_executor::Executor;
 use embassy_rp::flash::{self, Flash};
 use embassy_rp::gpio::{Level, Output};
 use embassy_rp::peripherals::{FLASH, PIO0, PIO1};
-use embassy_rp::pio::{
-    Common, Config, FifoJoin, InterruptHandler, LoadedProgram, Pio, PioPin, ShiftDirection,
-    StateMachine,
-};
+use embassy_rp::pio::{InterruptHandler, Pio};
 use embassy_rp::pwm::{self, Pwm};
 use embassy_rp::uart::{self, Uart};
-use embassy_rp::watchdog::{ResetReason, Watchdog};
-use embassy_rp::{Peri, bind_interrupts, pac};
+use embassy_rp::watchdog::Watchdog;
+use embassy_rp::{bind_interrupts, pac};
 use embassy_time::{Duration, Timer};
 use embedded_hal_02::serial::{Read, Write};
 use heapless::Deque;
 use panic_probe as _;
-use pio::pio_file;
 use sonarfix::units::Instant;
 use sonarfix_app::store::Store;
 use sonarfix_app::{App, FlashContents, Link, boots, log};
-use sonarfix_hal::encoder::Counter;
-use sonarfix_hal::ranger::{Captured, EchoCapture, PulseRanger, StampedEdges, Stamps};
+use sonarfix_hal::ranger::{Captured, EchoCapture, PulseRanger};
 use sonarfix_hal::robot::Devices;
-use sonarfix_link::message::ResetCause;
 use sonarfix_robot::memory;
+
+// The other chip has its module beside its memory map.
+#[cfg_attr(rp2040, path = "../../pico/src/chip.rs")]
+mod chip;
+
+use chip::{Encoder, FLASH_SIZE, Stamper, reset};
 
 /// The poll period.
 const POLL: Duration = Duration::from_millis(1);
@@ -56,9 +53,8 @@ const WATCHDOG: Duration = Duration::from_secs(2);
 /// Number of the pin that is high while the robot may drive.
 const DRIVE: u32 = 9;
 
-/// Address and size of the flash.
+/// Address of the flash.
 const FLASH_BASE: u32 = 0x1000_0000;
-const FLASH_SIZE: usize = 4 * 1024 * 1024;
 
 type Hardware =
     Devices<Encoder<0>, Encoder<1>, Pwm<'static>, PulseRanger<Output<'static>, Captured<'static>>>;
@@ -76,87 +72,17 @@ fn now() -> Instant {
     Instant::from_ticks(embassy_time::Instant::now().as_micros())
 }
 
-/// A state machine that counts every edge of both channels.
-struct Encoder<const SM: usize>(StateMachine<'static, PIO0, SM>);
-
-impl<const SM: usize> Encoder<SM> {
-    // Inlined, its calls of embassy's panics would be merged with others and belong to no line, which
-    // `cargo xtask test-firmware` checks.
-    #[inline(never)]
-    fn new(
-        mut machine: StateMachine<'static, PIO0, SM>,
-        pio: &mut Common<'static, PIO0>,
-        program: &LoadedProgram<'static, PIO0>,
-        a: Peri<'static, impl PioPin>,
-        b: Peri<'static, impl PioPin>,
-    ) -> Self {
-        let (a, b) = (pio.make_pio_pin(a), pio.make_pio_pin(b));
-        let mut config = Config::default();
-        config.use_program(program, &[]);
-        config.set_in_pins(&[&a, &b]);
-        config.shift_in.direction = ShiftDirection::Left;
-        config.fifo_join = FifoJoin::RxAsStatus;
-        machine.set_config(&config);
-        machine.set_enable(true);
-        Self(machine)
-    }
-}
-
-impl<const SM: usize> Counter for Encoder<SM> {
-    type Error = Infallible;
-    const BITS: u32 = 32;
-
-    fn count(&mut self) -> Result<u32, Infallible> {
-        Ok(self.0.get_rxf_entry(0))
-    }
-}
-
-/// A state machine that stamps the edges of the echo.
-struct Stamper {
-    machine: StateMachine<'static, PIO1, 0>,
-    edges: StampedEdges,
-}
-
-impl Stamper {
-    // As above.
-    #[inline(never)]
-    fn new(pio: Peri<'static, PIO1>, echo: Peri<'static, impl PioPin>) -> Self {
-        let Pio { mut common, sm0: mut machine, .. } = Pio::new(pio, Interrupts);
-        let program = common.load_program(&pio_file!("src/echo.pio").program);
-        let echo = common.make_pio_pin(echo);
-        let mut config = Config::default();
-        config.use_program(&program, &[]);
-        config.set_jmp_pin(&echo);
-        config.fifo_join = FifoJoin::RxAsStatus;
-        config.clock_divider = clock_divider(5_000_000).into();
-        machine.set_config(&config);
-        let edges = StampedEdges::since(stamps(&mut machine));
-        machine.set_enable(true);
-        Self { machine, edges }
-    }
-
-    /// Passes the newest edges to [`ECHO`].
-    fn update(&mut self, now: Instant) {
-        let stamps = stamps(&mut self.machine);
-        self.edges.update(&ECHO, now, self.machine.get_rxf_entry(0), stamps);
-    }
-}
-
-fn stamps(machine: &mut StateMachine<'static, PIO1, 0>) -> Stamps {
-    Stamps { rise: machine.get_rxf_entry(1), fall: machine.get_rxf_entry(2) }
-}
-
 /// The divider of the system clock for this frequency in Hz.
 fn clock_divider(frequency: u32) -> u8 {
     u8::try_from(embassy_rp::clocks::clk_sys_freq() / frequency).unwrap_or(u8::MAX)
 }
 
-/// The servo's pulses: a resolution of half a microsecond, every 20 ms. The driver reports 39,999 counts for the 40,000
-/// of a frame, which is an error of less than one count of any pulse.
+/// The servo's pulses: a resolution of 0.4 µs, every 20 ms; 2.5 MHz is a whole fraction of both chips' clocks. The driver
+/// reports 49,999 counts for the 50,000 of a frame, which is an error of less than one count of any pulse.
 fn servo_pulses() -> pwm::Config {
     let mut config = pwm::Config::default();
-    config.divider = clock_divider(2_000_000).into();
-    config.top = 40_000 - 1;
+    config.divider = clock_divider(2_500_000).into();
+    config.top = 50_000 - 1;
     config
 }
 
@@ -207,19 +133,6 @@ unsafe fn HardFault() -> ! {
     }
 }
 
-/// The cause of the reset.
-fn reset(watchdog: &Watchdog) -> ResetCause {
-    let chip = pac::POWMAN.chip_reset().read();
-    match watchdog.reset_reason() {
-        Some(ResetReason::TimedOut) => ResetCause::Watchdog,
-        Some(ResetReason::Forced) => ResetCause::Software,
-        None if chip.had_por() => ResetCause::PowerOn,
-        None if chip.had_bor() => ResetCause::BrownOut,
-        None if chip.had_run_low() => ResetCause::Pin,
-        None => ResetCause::Unknown,
-    }
-}
-
 /// The state of the loop.
 struct Board {
     app: App<'static, Flash<'static, FLASH, flash::Blocking, FLASH_SIZE>>,
@@ -242,10 +155,10 @@ impl Board {
         let resets = boots::resets(watchdog.get_scratch(0));
         watchdog.set_scratch(0, boots::register(resets.saturating_add(1)));
         let Pio { common: mut pio, sm0, sm1, .. } = Pio::new(board.PIO0, Interrupts);
-        let program = pio.load_program(&pio_file!("src/quadrature.pio").program);
+        let program = chip::encoder_program(&mut pio);
         let right = Encoder::new(sm0, &mut pio, &program, board.PIN_2, board.PIN_3);
         let left = Encoder::new(sm1, &mut pio, &program, board.PIN_4, board.PIN_5);
-        let stamper = Stamper::new(board.PIO1, board.PIN_8);
+        let stamper = Stamper::new(board.PIO1, board.PIN_8, now());
         let pulses = Pwm::new_output_a(board.PWM_SLICE3, board.PIN_6, servo_pulses());
         let trigger = Output::new(board.PIN_7, Level::Low);
         let servo = sonarfix_robot::servo(pulses);
@@ -273,7 +186,7 @@ impl Board {
     /// One poll.
     fn poll(&mut self) {
         let start = now();
-        self.stamper.update(start);
+        self.stamper.update(&ECHO, start);
         let polled = self.app.poll(start, &mut self.hardware, &mut self.link);
         self.drive.set_level(polled.may_drive.into());
         if polled.is_on_time {

@@ -4,8 +4,8 @@ use clap::{Parser, Subcommand};
 
 use crate::{
     bound, calibrate, calibration, command, config, convert, export, faults, find, floor_plans,
-    health, map, merge, monitor, paper, pil, plan, reality, relocalize, replay, run, sonar_model,
-    sweep,
+    health, init, map, merge, monitor, paper, pil, plan, reality, relocalize, replay, run,
+    sonar_model, sweep,
 };
 
 /// Simulates, measures, replays and operates the Sonarfix localizer for small wheeled robots.
@@ -18,6 +18,8 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Writes the files of a new robot into a folder: robot, map, and a scenario that runs at once.
+    Init(init::Args),
     /// Runs the paper's scenario and prints the results beside the paper's Table 1.
     Paper(paper::Args),
     /// Runs a scenario.
@@ -73,6 +75,7 @@ impl Cli {
     /// Any error, with a message for the user.
     pub fn execute(self) -> anyhow::Result<()> {
         match self.command {
+            Command::Init(args) => init::execute(&args),
             Command::Paper(args) => paper::execute(&args),
             Command::Run(args) if !args.sweep.is_empty() => sweep::execute(&args),
             Command::Run(args) => run::execute(&args),

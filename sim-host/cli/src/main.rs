@@ -3,6 +3,7 @@
 #[macro_use]
 mod output;
 
+mod boards;
 mod bound;
 mod calibrate;
 mod calibration;
@@ -15,6 +16,7 @@ mod faults;
 mod find;
 mod floor_plans;
 mod health;
+mod init;
 mod json;
 mod map;
 mod map_exchange;

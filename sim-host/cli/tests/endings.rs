@@ -22,8 +22,9 @@ const PAPER: &str = "../../crates/sonarfix-map/scenarios/paper.toml";
 
 /// Every subcommand, with arguments for the shortest output. In `FILES` are a short log with its map and robot, a recorded
 /// stream of a robot's bytes, and room for results.
-const PRINTING: [&[&str]; 23] = [
+const PRINTING: [&[&str]; 24] = [
     &["--help"],
+    &["init", "FILES/robot"],
     &["paper", "--runs", "1"],
     &["run", CLASSROOM, "--runs", "1", "--json"],
     &["pil", CLASSROOM, "--seconds", "1", "--machine", "host"],

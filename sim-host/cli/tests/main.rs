@@ -9,6 +9,7 @@ mod export;
 mod faults;
 mod find;
 mod floor_plan;
+mod init;
 mod link_command;
 mod map_command;
 mod map_exchange;

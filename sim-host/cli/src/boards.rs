@@ -1,0 +1,77 @@
+//! The boards that have firmware: the table `firmware/boards.toml`.
+
+use anyhow::Context;
+use serde::Deserialize;
+
+const TABLE: &str = include_str!("../../../firmware/boards.toml");
+
+/// A board.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Board {
+    /// Its name on the command line.
+    pub name: String,
+    /// Its full name.
+    pub title: String,
+    /// The package of its firmware.
+    pub package: String,
+    /// The target that it is built for.
+    pub target: String,
+    /// Its chip, as `probe-rs` calls it.
+    pub chip: String,
+    /// Where the baked configuration lies.
+    pub config: Region,
+    /// Where the baked map lies.
+    pub map: Region,
+    /// Whether programs and images can be written over USB.
+    pub usb: bool,
+    /// Where the PC meets the link.
+    pub port: String,
+    /// The resistors of the divider at the echo pin.
+    pub divider: [String; 2],
+    /// Its pins.
+    pub pins: Pins,
+}
+
+/// A region of flash.
+#[derive(Debug, Clone, Copy, Deserialize)]
+pub struct Region {
+    /// First address.
+    pub address: u32,
+    /// Size, bytes.
+    pub bytes: u32,
+}
+
+/// The pin of each signal.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Pins {
+    /// Channels of the right encoder.
+    pub right_a: String,
+    pub right_b: String,
+    /// Channels of the left encoder.
+    pub left_a: String,
+    pub left_b: String,
+    /// The servo's pulses.
+    pub servo: String,
+    /// The sonar.
+    pub trigger: String,
+    pub echo: String,
+    /// Enable of the motor driver.
+    pub enable: String,
+    /// The link, from the board and to it.
+    pub tx: String,
+    pub rx: String,
+}
+
+#[derive(Deserialize)]
+struct Table {
+    board: Vec<Board>,
+}
+
+/// All boards.
+///
+/// # Errors
+/// If the table is invalid.
+pub fn all() -> anyhow::Result<Vec<Board>> {
+    let table: Table = toml::from_str(TABLE).context("firmware/boards.toml")?;
+    Ok(table.board)
+}

@@ -1,0 +1,96 @@
+//! The files of a new robot.
+
+use sonarfix_map::Scenario;
+
+use super::Answers;
+
+const ROBOT: &str = include_str!("../../templates/robot.toml");
+const MAP: &str = include_str!("../../templates/map.toml");
+const SCENARIO: &str = include_str!("../../templates/scenario.toml");
+const README: &str = include_str!("../../templates/README.md");
+
+/// The simulated track width, as a multiple of the configured one.
+const TRUE_TRACK_WIDTH: f64 = 1.02;
+
+/// Name and text of each file.
+///
+/// # Errors
+/// If the built-in scenario were invalid.
+pub fn all(answers: &Answers) -> anyhow::Result<[(&'static str, String); 4]> {
+    let replacements = replacements(answers)?;
+    let filled = |template: &str| {
+        replacements.iter().fold(template.to_owned(), |text, (key, value)| {
+            text.replace(&format!("@{key}@"), value)
+        })
+    };
+    let robot = filled(ROBOT);
+    // The simulated wheels differ from the configured ones.
+    let track_width =
+        sonarfix_map::robot_file::parse(&robot, "robot.toml")?.localizer.drive.track_width;
+    let true_width = TRUE_TRACK_WIDTH * f64::from(track_width.0);
+    let scenario = filled(SCENARIO).replace("@true_track_width@", &format!("{true_width:.5}"));
+    Ok([
+        ("robot.toml", robot),
+        ("map.toml", MAP.to_owned()),
+        ("scenario.toml", scenario),
+        ("README.md", filled(README)),
+    ])
+}
+
+/// The text for each key of the templates.
+fn replacements(answers: &Answers) -> anyhow::Result<Vec<(&'static str, String)>> {
+    let mut fitted = Scenario::paper()?;
+    answers.sonar.fit(&mut fitted);
+    let sonar = fitted.robot.localizer.sonar;
+    let (board, pins) = (&answers.board, &answers.board.pins);
+    let hexadecimal = |address: u32| format!("{address:#010X}").replace("0X", "0x");
+    let [upper, lower] = &board.divider;
+    Ok(vec![
+        ("title", board.title.clone()),
+        ("package", board.package.clone()),
+        ("target", board.target.clone()),
+        ("chip", board.chip.clone()),
+        ("port", board.port.clone()),
+        ("usb", usb(answers, &hexadecimal(board.config.address), &hexadecimal(board.map.address))),
+        ("config_address", hexadecimal(board.config.address)),
+        ("map_address", hexadecimal(board.map.address)),
+        ("map_bytes", board.map.bytes.to_string()),
+        ("divider_upper", upper.clone()),
+        ("divider_lower", lower.clone()),
+        ("right_a", pins.right_a.clone()),
+        ("right_b", pins.right_b.clone()),
+        ("left_a", pins.left_a.clone()),
+        ("left_b", pins.left_b.clone()),
+        ("servo_pin", pins.servo.clone()),
+        ("trigger", pins.trigger.clone()),
+        ("echo", pins.echo.clone()),
+        ("enable", pins.enable.clone()),
+        ("tx", pins.tx.clone()),
+        ("rx", pins.rx.clone()),
+        ("sonar", answers.sonar.file_name().to_owned()),
+        ("servo", answers.servo.0.to_owned()),
+        ("wheel_diameter", answers.wheel_diameter.clone()),
+        ("track_width", answers.track_width.clone()),
+        ("edges", answers.ticks_per_revolution.to_string()),
+        ("cone", sonar.cone.to_degrees().to_string()),
+        ("min_range", sonar.min_range.0.to_string()),
+        ("max_range", sonar.max_range.0.to_string()),
+        ("noise", sonar.noise.floor.0.to_string()),
+        ("noise_per_metre", sonar.noise.per_metre.to_string()),
+    ])
+}
+
+/// How to write program and images over USB, on a board that can.
+fn usb(answers: &Answers, config: &str, map: &str) -> String {
+    let board = &answers.board;
+    if !board.usb {
+        return String::new();
+    }
+    let program = format!("target/{}/release/{}", board.target, board.package);
+    format!(
+        "\nWithout a probe, over USB: hold `BOOTSEL` while plugging the board in, then\n\n```sh\ncargo build --release --package {} \
+         --target {}\npicotool load -t bin -o {config} config.bin\npicotool load -t bin -o {map} map.bin\n\
+         picotool load -x -t elf {program}\n```\n",
+        board.package, board.target
+    )
+}

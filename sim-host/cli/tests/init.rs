@@ -1,0 +1,194 @@
+//! `sonarfix init`: the files of a new robot.
+
+#![expect(clippy::unwrap_used, reason = "a test should stop")]
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+/// The rows of `firmware/boards.toml`.
+fn boards() -> Vec<toml::Table> {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../firmware/boards.toml");
+    let table: toml::Table = fs::read_to_string(path).unwrap().parse().unwrap();
+    let rows = table.get("board").unwrap().as_array().unwrap();
+    rows.iter().map(|row| row.as_table().unwrap().clone()).collect()
+}
+
+fn text<'t>(board: &'t toml::Table, key: &str) -> &'t str {
+    board.get(key).unwrap().as_str().unwrap()
+}
+
+fn sonarfix(dir: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sonarfix"));
+    // A standard input that never ends: the command must not wait for it.
+    command.current_dir(dir).args(arguments).stdin(Stdio::piped());
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    let input = child.stdin.take();
+    let output = child.wait_with_output().unwrap();
+    drop(input);
+    output
+}
+
+fn run(dir: &Path, arguments: &[&str]) -> String {
+    let output = sonarfix(dir, arguments);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments:?}: {errors}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn refusal(dir: &Path, arguments: &[&str]) -> String {
+    let output = sonarfix(dir, arguments);
+    assert!(!output.status.success(), "{arguments:?}");
+    String::from_utf8(output.stderr).unwrap()
+}
+
+/// Every board, sonar and servo: its files are valid, run, and fit into the board's flash.
+#[test]
+fn the_files_of_every_robot_are_used_without_an_error() {
+    let dir = tempfile::tempdir().unwrap();
+    let boards = boards();
+    assert!(boards.len() >= 3);
+    for board in &boards {
+        for sonar in ["hc_sr04", "lv_maxsonar"] {
+            for servo in ["sg90", "mg996r"] {
+                let name = format!("{}-{sonar}-{servo}", text(board, "name"));
+                let options = ["--board", text(board, "name"), "--sonar", sonar, "--servo", servo];
+                run(dir.path(), &[&["init", &name], &options[..]].concat());
+                let robot = dir.path().join(&name);
+                let checked = run(&robot, &["map", "check", "map.toml", "--robot", "robot.toml"]);
+                assert!(checked.contains("0 errors, 0 warnings"), "{name}: {checked}");
+                run(&robot, &["config", "bake", "robot.toml", "--out", "config.bin"]);
+                run(&robot, &["map", "bake", "map.toml", "--out", "map.bin"]);
+                run(&robot, &["run", "scenario.toml", "--runs", "1"]);
+                run(&robot, &["plan", "scenario.toml", "--runs", "1"]);
+                fits(&robot, board);
+                readme(&robot, board);
+            }
+        }
+    }
+}
+
+fn fits(robot: &Path, board: &toml::Table) {
+    for (file, key) in [("config.bin", "config"), ("map.bin", "map")] {
+        let bytes = board.get(key).unwrap().get("bytes").unwrap().as_integer().unwrap();
+        let length = fs::metadata(robot.join(file)).unwrap().len();
+        assert!(i64::try_from(length).unwrap() <= bytes, "{file}: {length} bytes");
+    }
+}
+
+/// The commands and pins are those of the board, and nothing is left of the template.
+fn readme(robot: &Path, board: &toml::Table) {
+    for file in ["robot.toml", "map.toml", "scenario.toml", "README.md"] {
+        let text = fs::read_to_string(robot.join(file)).unwrap();
+        assert!(!text.contains('@'), "{file}: {text}");
+    }
+    let readme = fs::read_to_string(robot.join("README.md")).unwrap();
+    for key in ["title", "package", "target", "chip"] {
+        assert!(readme.contains(text(board, key)), "{key}");
+    }
+    for (signal, pin) in board.get("pins").unwrap().as_table().unwrap() {
+        assert!(readme.contains(pin.as_str().unwrap()), "{signal}");
+    }
+    for key in ["config", "map"] {
+        let address = board.get(key).unwrap().get("address").unwrap().as_integer().unwrap();
+        assert!(readme.contains(&format!("0x{address:08X}")), "{key}");
+    }
+}
+
+/// In the simulated drive of the written files no robot is lost, and the pose is known to centimetres.
+#[test]
+fn the_written_robot_finds_its_way() {
+    let dir = tempfile::tempdir().unwrap();
+    let options = ["--wheel-diameter", "68 mm", "--track-width", "14 cm", "--ticks-per-revolution"];
+    run(dir.path(), &[&["init", "robot"], &options[..], &["900"]].concat());
+    let json = run(&dir.path().join("robot"), &["run", "scenario.toml", "--json"]);
+    let summary: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(summary.get("lost_runs").unwrap(), 0, "{summary}");
+    let rms = |axis: &str| summary["rms_path"][axis].as_f64().unwrap();
+    assert!(rms("x").hypot(rms("y")) < 0.03, "{summary}");
+}
+
+#[test]
+fn a_folder_with_files_is_left_alone() {
+    let dir = tempfile::tempdir().unwrap();
+    fs::write(dir.path().join("mine.txt"), "mine").unwrap();
+    let error = refusal(dir.path(), &["init", "."]);
+    assert!(error.contains("is not empty"), "{error}");
+    assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn wrong_answers_are_refused_and_leave_no_folder() {
+    let dir = tempfile::tempdir().unwrap();
+    let cases: [(&[&str], &str); 7] = [
+        (&["--board", "arduino"], "pico2"),
+        (&["--sonar", "srf08"], "hc_sr04, lv_maxsonar"),
+        (&["--servo", "sg91"], "sg90, mg996r"),
+        (&["--wheel-diameter", "65"], "a unit is missing"),
+        (&["--wheel-diameter", "0 mm"], "must be a positive length"),
+        (&["--track-width", "12\" }"], "is no value"),
+        (&["--ticks-per-revolution", "nan"], "is not a positive number"),
+    ];
+    for (options, message) in cases {
+        let error = refusal(dir.path(), &[&["init", "robot"], options].concat());
+        assert!(error.contains(message), "{options:?}: {error}");
+        assert!(!dir.path().join("robot").exists(), "{options:?}");
+    }
+}
+
+/// The table has the regions of the linker's memory maps.
+#[test]
+fn the_table_of_boards_agrees_with_the_memory_maps() {
+    for board in boards() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+        let memory = fs::read_to_string(Path::new(path).join(text(&board, "memory"))).unwrap();
+        for (region, key) in [("CONFIG", "config"), ("MAP", "map")] {
+            let number =
+                |what: &str| board.get(key).unwrap().get(what).unwrap().as_integer().unwrap();
+            let size = match number("bytes") {
+                bytes if bytes % (1 << 20) == 0 => format!("{}M", bytes >> 20),
+                bytes => format!("{}K", bytes >> 10),
+            };
+            let line = format!("{region} : ORIGIN = 0x{:08X}, LENGTH = {size}", number("address"));
+            assert!(memory.contains(&line), "{}: {line}", text(&board, "name"));
+        }
+    }
+}
+
+/// The page of the firmware has the table's programs and addresses, the guide its pins.
+#[test]
+fn the_docs_have_the_table_of_boards() {
+    let docs = |page: &str| {
+        fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs").join(page))
+            .unwrap()
+    };
+    let (firmware, guide) = (docs("firmware.md"), docs("build-a-robot.md"));
+    for board in boards() {
+        let number = |key: &str, what: &str| board[key][what].as_integer().unwrap();
+        let row = format!(
+            "| `{}` | `{}` | `{}` | `{}` | 0x{:08X} | 0x{:08X}, {} |",
+            text(&board, "name"),
+            text(&board, "package"),
+            text(&board, "target"),
+            text(&board, "chip"),
+            number("config", "address"),
+            number("map", "address"),
+            number("map", "bytes"),
+        );
+        assert!(firmware.contains(&row), "docs/firmware.md lacks {row}");
+        let name = format!("`{}`", text(&board, "name"));
+        let header = guide.lines().find(|line| line.starts_with("| signal |")).unwrap();
+        let column = header.split('|').position(|cell| cell.contains(&name)).unwrap();
+        let rows: Vec<&str> =
+            guide.lines().filter_map(|line| line.split('|').nth(column)).collect();
+        for (signal, pin) in board["pins"].as_table().unwrap() {
+            let pin = pin.as_str().unwrap();
+            let has_pin = |cell: &&str| cell.split_whitespace().next() == Some(pin);
+            assert!(rows.iter().any(|cell| has_pin(&cell)), "{name} {signal}: {pin}");
+        }
+        for resistor in board["divider"].as_array().unwrap() {
+            assert!(guide.contains(resistor.as_str().unwrap()), "{name}: {resistor}");
+        }
+    }
+}

@@ -1,0 +1,82 @@
+//! The firmware of the further boards, whose chips QEMU does not emulate: it is linted, built, measured and searched for
+//! panics.
+
+use std::fs;
+use std::path::Path;
+
+use anyhow::Context;
+use object::{Object, ObjectSection, SectionKind};
+use serde::Deserialize;
+
+use super::{build, memory, panics};
+use crate::cargo;
+use crate::workspace::Workspace;
+
+/// The board that is examined in detail, and emulated.
+const REFERENCE: &str = "stm32f405";
+
+#[derive(Deserialize)]
+struct Table {
+    board: Vec<Board>,
+}
+
+/// A row of `firmware/boards.toml`.
+#[derive(Deserialize)]
+struct Board {
+    name: String,
+    title: String,
+    package: String,
+    target: String,
+}
+
+/// Lints and builds the firmware of each further board, and checks the linked files; prints the size of all boards.
+pub fn check(reference: &[u8]) -> anyhow::Result<()> {
+    let firmware = Workspace::Firmware;
+    let table = fs::read_to_string(firmware.folder().join("boards.toml"))?;
+    let Table { board: boards } = toml::from_str(&table).context("firmware/boards.toml")?;
+    let mut rows = Vec::new();
+    for board in &boards {
+        if board.name == REFERENCE {
+            rows.push(row(board, reference)?);
+            continue;
+        }
+        let package = format!("--release --package {} --target {}", board.package, board.target);
+        cargo::check(firmware.cargo(&format!("clippy {package} -- -D warnings")))?;
+        cargo::check(firmware.cargo(&format!("build {package}")))?;
+        let folder = firmware.target_folder().join(&board.target).join("release");
+        let program = build::read(&folder.join(&board.package))?;
+        panics::others(&program)?;
+        rows.push(row(board, &program)?);
+    }
+    println!(
+        "\n| board | flash, bytes | variables in RAM, bytes | lines of its own: code, comments |"
+    );
+    println!("|---|---|---|---|\n{}", rows.join("\n"));
+    Ok(())
+}
+
+fn row(board: &Board, program: &[u8]) -> anyhow::Result<String> {
+    let file = object::File::parse(program)?;
+    let in_flash =
+        |kind| matches!(kind, SectionKind::Text | SectionKind::ReadOnlyData | SectionKind::Data);
+    let allocated = file.sections().filter(|section| section.address() > 0);
+    let flash: u64 = allocated.filter(|s| in_flash(s.kind())).map(|section| section.size()).sum();
+    let variables: u64 = memory::variables_of(&file).map(|section| section.size()).sum();
+    let folder = Workspace::Firmware.folder().join(board.package.trim_start_matches("sonarfix-"));
+    let (code, comments) = lines(&folder.join("src"))?;
+    Ok(format!("| {} | {flash} | {variables} | {code}, {comments} |", board.title))
+}
+
+/// Lines of code and of comments below a folder, in Rust and in the language of state machines.
+fn lines(folder: &Path) -> anyhow::Result<(usize, usize)> {
+    let (mut code, mut comments) = (0, 0);
+    // A board without a folder has no line of its own.
+    for entry in fs::read_dir(folder).into_iter().flatten() {
+        let text = fs::read_to_string(entry?.path())?;
+        for line in text.lines().map(str::trim).filter(|line| !line.is_empty()) {
+            let is_comment = line.starts_with("//") || line.starts_with(';');
+            *(if is_comment { &mut comments } else { &mut code }) += 1;
+        }
+    }
+    Ok((code, comments))
+}

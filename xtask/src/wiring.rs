@@ -1,0 +1,322 @@
+//! Draws the wiring of each board from `firmware/boards.toml`: `docs/images/wiring-NAME.svg`.
+
+use std::fmt::Write;
+use std::fs;
+use std::path::PathBuf;
+
+use anyhow::Context;
+use serde::Deserialize;
+
+use crate::cargo;
+
+#[derive(Deserialize)]
+struct Table {
+    board: Vec<Board>,
+}
+
+/// What a drawing needs of a row of the table.
+#[derive(Deserialize)]
+struct Board {
+    name: String,
+    title: String,
+    feed: String,
+    divider: [String; 2],
+    pins: Pins,
+}
+
+#[derive(Deserialize)]
+struct Pins {
+    right_a: String,
+    right_b: String,
+    left_a: String,
+    left_b: String,
+    servo: String,
+    trigger: String,
+    echo: String,
+    enable: String,
+    tx: String,
+    rx: String,
+}
+
+/// Writes the drawings of all boards.
+pub fn write() -> anyhow::Result<()> {
+    for (file, svg) in drawings()? {
+        fs::write(&file, svg).with_context(|| file.display().to_string())?;
+        println!("{}", file.display());
+    }
+    Ok(())
+}
+
+fn drawings() -> anyhow::Result<Vec<(PathBuf, String)>> {
+    let table = fs::read_to_string(cargo::root().join("firmware/boards.toml"))?;
+    let Table { board: boards } = toml::from_str(&table).context("firmware/boards.toml")?;
+    let folder = cargo::root().join("docs/images");
+    let drawn = |board: &Board| (folder.join(format!("wiring-{}.svg", board.name)), draw(board));
+    Ok(boards.iter().map(drawn).collect())
+}
+
+/// Sizes, pixels.
+const FONT: f64 = 13.0;
+/// Of a letter: more than the mean of any sans-serif font.
+const LETTER: f64 = 0.66 * FONT;
+const ROW: f64 = 24.0;
+const TITLE: f64 = 28.0;
+const MARGIN: f64 = 10.0;
+/// Between the boxes of a column.
+const BETWEEN: f64 = 18.0;
+/// Between a column and the board: room for wires and resistors.
+const GAP: f64 = 150.0;
+
+/// A line of a box, and the pin of the board that it is connected to.
+struct Row<'b> {
+    text: String,
+    pin: Option<&'b str>,
+    /// The resistor in the wire, and the one from the pin to ground.
+    resistors: [Option<&'b str>; 2],
+}
+
+impl<'b> Row<'b> {
+    fn text(text: impl Into<String>) -> Self {
+        Self { text: text.into(), pin: None, resistors: [None; 2] }
+    }
+
+    fn wire(text: &str, pin: &'b str) -> Self {
+        Self { pin: Some(pin), ..Self::text(text) }
+    }
+}
+
+/// A part: its title and its lines.
+struct Part<'b>(&'static str, Vec<Row<'b>>);
+
+impl Part<'_> {
+    fn height(&self) -> f64 {
+        TITLE + ROW * count(self.1.len()) + MARGIN
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "a few letters or lines")]
+fn count(number: usize) -> f64 {
+    number as f64
+}
+
+fn width(text: &str) -> f64 {
+    LETTER * count(text.chars().count())
+}
+
+/// The width of a box around these texts.
+fn around<'t>(texts: impl Iterator<Item = &'t str>) -> f64 {
+    texts.map(width).fold(0.0, f64::max) + 2.0 * MARGIN
+}
+
+fn left(board: &Board) -> Vec<Part<'_>> {
+    let pins = &board.pins;
+    let encoder = |title, a, b| {
+        let supply = Row::text("3.3 V of the board, GND");
+        Part(title, vec![Row::wire("A", a), Row::wire("B", b), supply])
+    };
+    vec![
+        encoder("right encoder", &pins.right_a, &pins.right_b),
+        encoder("left encoder", &pins.left_a, &pins.left_b),
+        Part(
+            "PC: serial port, 3.3 V",
+            vec![Row::wire("RX", &pins.tx), Row::wire("TX", &pins.rx), Row::text("GND")],
+        ),
+    ]
+}
+
+fn right(board: &Board) -> Vec<Part<'_>> {
+    let pins = &board.pins;
+    let [upper, lower] = &board.divider;
+    let echo = Row { resistors: [Some(upper), Some(lower)], ..Row::wire("ECHO, 5 V", &pins.echo) };
+    let enable = Row { resistors: [None, Some("10 kΩ")], ..Row::wire("enable", &pins.enable) };
+    vec![
+        Part(
+            "sonar HC-SR04",
+            vec![
+                Row::wire("TRIG", &pins.trigger),
+                echo,
+                Row::text("5 V of the regulator"),
+                Row::text("GND"),
+            ],
+        ),
+        Part(
+            "servo",
+            vec![
+                Row::wire("signal", &pins.servo),
+                Row::text("5 V of the regulator"),
+                Row::text("GND"),
+            ],
+        ),
+        Part(
+            "motor driver",
+            vec![
+                enable,
+                Row::text("inputs: your motor control"),
+                Row::text("VM: cells"),
+                Row::text("GND"),
+                Row::text("outputs: right, left motor"),
+            ],
+        ),
+    ]
+}
+
+/// The lines of the box of the supply.
+fn supply(board: &Board) -> [String; 4] {
+    [
+        "cells: VM of the motor driver, regulator".to_owned(),
+        "regulator 5 V, 3 A: sonar; servo, 470 µF beside it".to_owned(),
+        format!("and the board: {}", board.feed),
+        "GND of all parts joined".to_owned(),
+    ]
+}
+
+fn draw(board: &Board) -> String {
+    let (left, right) = (left(board), right(board));
+    let column = |parts: &[Part]| {
+        let texts =
+            |part: &Part| around(part.1.iter().map(|row| row.text.as_str()).chain([part.0]));
+        parts.iter().map(texts).fold(0.0, f64::max)
+    };
+    let height = |parts: &[Part]| {
+        parts.iter().map(Part::height).sum::<f64>() + BETWEEN * count(parts.len() - 1)
+    };
+    let (left_width, right_width) = (column(&left), column(&right));
+    let pins =
+        |parts: &[Part]| around(parts.iter().flat_map(|part| &part.1).filter_map(|row| row.pin));
+    let board_width = around([board.title.as_str()].into_iter()).max(pins(&left) + pins(&right));
+    let board_height = height(&left).max(height(&right)) + TITLE;
+    let board_at = MARGIN + left_width + GAP;
+    let right_at = board_at + board_width + GAP;
+    let all = (right_at + right_width + MARGIN, board_height + 2.0 * MARGIN);
+    let lines = supply(board);
+    let supply_height = TITLE + ROW * count(lines.len()) + MARGIN;
+    let supply_width = around(lines.iter().map(String::as_str));
+    let mut svg = Svg::new(all.0.max(supply_width + 2.0 * MARGIN), all.1 + supply_height + MARGIN);
+    svg.part(board_at, MARGIN, board_width, board_height, &board.title);
+    let top = MARGIN + TITLE;
+    svg.column(&left, MARGIN, left_width, top, Side { board: board_at, is_left: true });
+    let edge = board_at + board_width;
+    svg.column(&right, right_at, right_width, top, Side { board: edge, is_left: false });
+    let at = all.1;
+    svg.part(MARGIN, at, supply_width, supply_height, "supply");
+    for (number, line) in lines.iter().enumerate() {
+        svg.text(2.0 * MARGIN, at + TITLE + ROW * (count(number) + 0.7), line, "start", false);
+    }
+    svg.end()
+}
+
+/// The edge of the board that a column is connected to.
+#[derive(Clone, Copy)]
+struct Side {
+    board: f64,
+    is_left: bool,
+}
+
+struct Svg(String);
+
+impl Svg {
+    fn new(width: f64, height: f64) -> Self {
+        Self(format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width:.0} {height:.0}\" \
+             font-family=\"sans-serif\" font-size=\"{FONT}\">\n\
+             <rect width=\"{width:.0}\" height=\"{height:.0}\" fill=\"#ffffff\"/>\n"
+        ))
+    }
+
+    fn end(self) -> String {
+        self.0 + "</svg>\n"
+    }
+
+    fn add(&mut self, element: std::fmt::Arguments) {
+        // Writing to a string does not fail.
+        let _ = writeln!(self.0, "{element}");
+    }
+
+    /// A box with its title.
+    fn part(&mut self, x: f64, y: f64, width: f64, height: f64, title: &str) {
+        self.add(format_args!(
+            "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{width:.1}\" height=\"{height:.1}\" rx=\"6\" \
+             fill=\"#f4f6f8\" stroke=\"#444444\" stroke-width=\"1.5\"/>"
+        ));
+        self.text(x + 0.5 * width, y + 19.0, title, "middle", true);
+    }
+
+    fn text(&mut self, x: f64, y: f64, text: &str, anchor: &str, is_bold: bool) {
+        let weight = if is_bold { " font-weight=\"bold\"" } else { "" };
+        self.add(format_args!(
+            "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\"{weight} fill=\"#222222\">{text}</text>"
+        ));
+    }
+
+    fn wire(&mut self, path: &str) {
+        self.add(format_args!(
+            "<path d=\"{path}\" stroke=\"#1f6fb2\" stroke-width=\"2\" fill=\"none\"/>"
+        ));
+    }
+
+    fn resistor(&mut self, x: f64, y: f64, width: f64, height: f64) {
+        self.add(format_args!(
+            "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{width}\" height=\"{height}\" stroke=\"#1f6fb2\" \
+             stroke-width=\"2\" fill=\"#ffffff\"/>"
+        ));
+    }
+
+    /// A column of parts, wired to the board.
+    fn column(&mut self, parts: &[Part], x: f64, width: f64, top: f64, side: Side) {
+        let mut y = top;
+        for part in parts {
+            self.part(x, y, width, part.height(), part.0);
+            for (number, row) in part.1.iter().enumerate() {
+                let at = y + TITLE + ROW * (count(number) + 0.5);
+                let (text_at, anchor, edge) = if side.is_left {
+                    (x + width - MARGIN, "end", x + width)
+                } else {
+                    (x + MARGIN, "start", x)
+                };
+                self.text(text_at, at + 4.0, &row.text, anchor, false);
+                if let Some(pin) = row.pin {
+                    self.connect(row, pin, at, edge, side);
+                }
+            }
+            y += part.height() + BETWEEN;
+        }
+    }
+
+    /// The wire of a row, with its resistors, from the edge of its box to the board.
+    fn connect(&mut self, row: &Row, pin: &str, y: f64, edge: f64, side: Side) {
+        let (pin_at, anchor) = if side.is_left {
+            (side.board + MARGIN, "start")
+        } else {
+            (side.board - MARGIN, "end")
+        };
+        self.text(pin_at, y + 4.0, pin, anchor, false);
+        self.wire(&format!("M{edge:.1} {y:.1}H{:.1}", side.board));
+        if let Some(resistor) = row.resistors[0] {
+            let x = 0.4 * side.board + 0.6 * edge;
+            self.resistor(x, y - 6.0, 30.0, 12.0);
+            self.text(x + 15.0, y - 10.0, resistor, "middle", false);
+        }
+        if let Some(resistor) = row.resistors[1] {
+            let x = 0.75 * side.board + 0.25 * edge;
+            self.wire(&format!("M{x:.1} {y:.1}v46M{:.1} {:.1}h20", x - 10.0, y + 46.0));
+            self.resistor(x - 6.0, y + 10.0, 12.0, 26.0);
+            self.text(x + 12.0, y + 28.0, resistor, "start", false);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The drawings in the docs are those of the table: `cargo xtask wiring` writes them.
+    #[test]
+    fn the_drawings_are_those_of_the_table() {
+        let drawings = drawings().unwrap_or_default();
+        assert!(drawings.len() >= 4);
+        for (file, svg) in drawings {
+            let written = fs::read_to_string(&file).unwrap_or_default();
+            assert!(written == svg, "{}: run `cargo xtask wiring`", file.display());
+        }
+    }
+}
