@@ -15,8 +15,6 @@ use sonarfix_hal::encoder::Counter;
 use sonarfix_hal::ranger::{EchoCapture, StampedEdges, Stamps};
 use sonarfix_link::message::ResetCause;
 
-use crate::{Interrupts, clock_divider};
-
 /// Size of the flash, bytes.
 pub const FLASH_SIZE: usize = 4 * 1024 * 1024;
 
@@ -69,15 +67,20 @@ pub struct Stamper {
 impl Stamper {
     // As above.
     #[inline(never)]
-    pub fn new(pio: Peri<'static, PIO1>, echo: Peri<'static, impl PioPin>, _now: Instant) -> Self {
-        let Pio { mut common, sm0: mut machine, .. } = Pio::new(pio, Interrupts);
+    pub fn new(
+        pio: Pio<'static, PIO1>,
+        echo: Peri<'static, impl PioPin>,
+        clock_divider: u8,
+        _now: Instant,
+    ) -> Self {
+        let Pio { mut common, sm0: mut machine, .. } = pio;
         let program = common.load_program(&pio_file!("src/echo.pio").program);
         let echo = common.make_pio_pin(echo);
         let mut config = Config::default();
         config.use_program(&program, &[]);
         config.set_jmp_pin(&echo);
         config.fifo_join = FifoJoin::RxAsStatus;
-        config.clock_divider = clock_divider(5_000_000).into();
+        config.clock_divider = clock_divider.into();
         machine.set_config(&config);
         let edges = StampedEdges::since(stamps(&mut machine));
         machine.set_enable(true);

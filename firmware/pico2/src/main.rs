@@ -158,7 +158,8 @@ impl Board {
         let program = chip::encoder_program(&mut pio);
         let right = Encoder::new(sm0, &mut pio, &program, board.PIN_2, board.PIN_3);
         let left = Encoder::new(sm1, &mut pio, &program, board.PIN_4, board.PIN_5);
-        let stamper = Stamper::new(board.PIO1, board.PIN_8, now());
+        let echo_pio = Pio::new(board.PIO1, Interrupts);
+        let stamper = Stamper::new(echo_pio, board.PIN_8, clock_divider(5_000_000), now());
         let pulses = Pwm::new_output_a(board.PWM_SLICE3, board.PIN_6, servo_pulses());
         let trigger = Output::new(board.PIN_7, Level::Low);
         let servo = sonarfix_robot::servo(pulses);

@@ -2,7 +2,7 @@
 
 use sonarfix_map::Scenario;
 
-use super::Answers;
+use super::answers::Answers;
 
 const ROBOT: &str = include_str!("../../templates/robot.toml");
 const MAP: &str = include_str!("../../templates/map.toml");
