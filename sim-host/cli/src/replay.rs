@@ -81,6 +81,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
             subtitle: subtitle(&summary, trace.every()),
             tables,
             trace: trace.trace(),
+            of_paper: false,
         };
         eprintln!("open {}", report.write(dir)?.display());
     }
@@ -141,11 +142,35 @@ fn subtitle(summary: &Summary, every: u64) -> String {
 }
 
 fn tables(summary: &Summary) -> Vec<Table> {
-    let mut tables = vec![errors(summary), calibration(summary)];
-    if summary.reference_rows > 0 {
-        tables.insert(1, verdicts(summary));
+    if summary.reference_rows == 0 {
+        return vec![course(summary), calibration(summary)];
     }
-    tables
+    vec![errors(summary), verdicts(summary), calibration(summary)]
+}
+
+/// What is known without a reference.
+fn course(s: &Summary) -> Table {
+    let since = |time: Option<f64>, seconds: f64| match time {
+        Some(time) => format!("at {time:.1} s, {seconds:.1} s in total"),
+        None => "never".to_owned(),
+    };
+    let (fixes, health) = (s.fixes, &s.health);
+    let rows = [
+        ("distance (m)", format!("{:.1}", s.distance)),
+        ("duration (s)", format!("{:.1}", s.duration)),
+        ("ranges accepted", fixes.accepted.to_string()),
+        ("ranges gated", fixes.gated.to_string()),
+        ("ranges refused", fixes.refused.to_string()),
+        ("lines skipped", format!("{} of {}", s.lines_skipped, s.lines)),
+        ("verdict degraded", since(health.degraded_at, health.degraded_seconds)),
+        ("verdict lost", since(health.lost_at, health.lost_seconds)),
+    ];
+    Table {
+        title: "The replay".to_owned(),
+        note: "no reference: the errors are not known".to_owned(),
+        columns: ["", "value"].map(str::to_owned).to_vec(),
+        rows: rows.map(|(name, value)| vec![name.to_owned(), value]).to_vec(),
+    }
 }
 
 fn errors(s: &Summary) -> Table {
@@ -172,22 +197,17 @@ fn errors(s: &Summary) -> Table {
 fn errors_note(s: &Summary) -> String {
     let at = |time: Option<f64>| cell(time, |t| format!("at {t:.1} s"));
     let never = |time: Option<f64>| time.map_or("never".to_owned(), |_| at(time));
-    let (reference, consistency) = match s.reference_rows {
-        0 => ("no reference".to_owned(), String::new()),
-        rows => (
-            format!("{rows} rows of the reference"),
-            format!(
-                "; half a metre off {}, beyond 3σ {} ({} of the rows)",
-                never(s.consistency.diverged_at),
-                never(s.consistency.beyond_three_sigma_at),
-                cell(s.consistency.beyond_three_sigma, |share| format!("{:.1} %", 100.0 * share)),
-            ),
-        ),
-    };
+    let consistency = format!(
+        "; half a metre off {}, beyond 3σ {} ({} of the rows)",
+        never(s.consistency.diverged_at),
+        never(s.consistency.beyond_three_sigma_at),
+        cell(s.consistency.beyond_three_sigma, |share| format!("{:.1} %", 100.0 * share)),
+    );
     format!(
-        "{reference}; {:.1} m in {:.1} s; ranges accepted {}, gated {}, refused {}; \
+        "{} rows of the reference; {:.1} m in {:.1} s; ranges accepted {}, gated {}, refused {}; \
          lines skipped {} of {};\n\
          verdict degraded {} ({:.1} s in total), lost {} ({:.1} s in total){consistency}",
+        s.reference_rows,
         s.distance,
         s.duration,
         s.fixes.accepted,

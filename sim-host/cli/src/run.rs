@@ -198,6 +198,7 @@ impl Experiment {
             ),
             tables: vec![self.table(measured)],
             trace,
+            of_paper: self.beside_paper,
         };
         Ok(report.write(dir)?)
     }

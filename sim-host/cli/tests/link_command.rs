@@ -201,3 +201,20 @@ fn a_configuration_is_baked_checked_and_shown() {
         assert_eq!(printed(&output).1, expected);
     }
 }
+
+/// A log, a map and an empty file: only the last may be the end of a robot's bytes.
+#[test]
+fn a_text_file_is_no_port() {
+    let dir = tempfile::tempdir().unwrap();
+    for (text, is_refused) in
+        [("sonarfix-log,1\nticks,0,1,2\n", true), ("größe", true), ("", false)]
+    {
+        let file = dir.path().join("file");
+        std::fs::write(&file, text).unwrap();
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_sonarfix"));
+        let output = command.args(["monitor", "--port"]).arg(&file).output().unwrap();
+        assert_eq!(output.status.success(), !is_refused, "{text}");
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(error.contains("it is a text file"), is_refused, "{error}");
+    }
+}

@@ -119,6 +119,7 @@ fn report_opened(trace: &Trace) -> Option<String> {
         subtitle: "seed 1".into(),
         tables: vec![table],
         trace,
+        of_paper: false,
     };
     Some(opened(browser, &report.write(dir.path()).unwrap()))
 }

@@ -1,7 +1,7 @@
 //! A connection to a robot: serial port, socket or file.
 
 use std::fs::File;
-use std::io::{self, ErrorKind, Read, Write};
+use std::io::{self, ErrorKind, Read, Seek, Write};
 use std::net::TcpStream;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -31,11 +31,22 @@ impl Port {
         } else if let Some(address) = name.strip_prefix("tcp:") {
             Self::socket(address)
         } else if is_plain(Path::new(name)) {
-            File::open(name).map(|file| Self { reader: Box::new(file), writer: None })
+            Self::recorded(name)
         } else {
             Self::serial(name, baud)
         };
         port.with_context(|| format!("cannot open the port {name}"))
+    }
+
+    fn recorded(name: &str) -> io::Result<Self> {
+        let mut file = File::open(name)?;
+        // A FIFO cannot be read twice.
+        if file.metadata()?.is_file() && is_text(&mut file)? {
+            let reason =
+                "it is a text file, not the bytes of a robot; `sonarfix replay` reads logs";
+            return Err(io::Error::new(ErrorKind::InvalidData, reason));
+        }
+        Ok(Self { reader: Box::new(file), writer: None })
     }
 
     fn socket(address: &str) -> io::Result<Self> {
@@ -87,6 +98,19 @@ impl Port {
 
 fn is_silence(kind: ErrorKind) -> bool {
     matches!(kind, ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted)
+}
+
+/// Whether a file starts like a text: every frame ends with a zero, which no text contains.
+fn is_text(file: &mut File) -> io::Result<bool> {
+    let mut start = Vec::new();
+    Read::by_ref(file).take(4096).read_to_end(&mut start)?;
+    file.rewind()?;
+    let is_utf8 = match std::str::from_utf8(&start) {
+        Ok(_) => true,
+        // The last character may be cut off.
+        Err(error) => error.error_len().is_none(),
+    };
+    Ok(!start.is_empty() && !start.contains(&0) && is_utf8)
 }
 
 /// Whether a path is a file or a FIFO, not a device.

@@ -1,4 +1,4 @@
-//! The content of each figure. Figures 2 to 6 have the numbers of the paper.
+//! The content of each figure. On a page about the paper they have its numbers, 2 to 6.
 
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -47,6 +47,8 @@ pub(super) struct Figure {
     pub(super) file: &'static str,
     /// The caption.
     pub(super) caption: &'static str,
+    /// What the paper calls things in it.
+    pub(super) paper: &'static str,
     /// The picture.
     pub(super) svg: String,
 }
@@ -56,6 +58,7 @@ struct Plan {
     number: u8,
     file: &'static str,
     caption: &'static str,
+    paper: &'static str,
     chart: fn(&Trace) -> Chart<'static>,
 }
 
@@ -64,9 +67,10 @@ const PLANS: [Plan; 5] = [
     Plan {
         number: 2,
         file: "trajectory.svg",
-        caption: "The path over the floor: with the localizer (A in the paper) and by the \
-                  encoders alone (B). Both axes have the same scale. A path that leaves the \
+        caption: "The path over the floor: with the localizer and by the encoders \
+                  alone. Both axes have the same scale. A path that leaves the \
                   map is cut off.",
+        paper: " In the paper, A is the localizer and B the encoders alone.",
         chart: trajectory,
     },
     Plan {
@@ -75,12 +79,14 @@ const PLANS: [Plan; 5] = [
         caption: "Estimated minus true heading, where the truth is known, and one standard \
                   deviation of the filter on either side of zero. Initial values that would \
                   dwarf the rest are clipped.",
+        paper: "",
         chart: heading,
     },
     Plan {
         number: 4,
         file: "sigma-x.svg",
         caption: "Standard deviation of X and, where the truth is known, the absolute error.",
+        paper: "",
         chart: |trace| position(trace, "X", X, |pose| pose.x),
     },
     Plan {
@@ -88,6 +94,7 @@ const PLANS: [Plan; 5] = [
         file: "sigma-y.svg",
         caption: "The same for Y. A deviation grows while no wall across its axis is measured, \
                   and grows more slowly once the errors of the encoders are estimated.",
+        paper: "",
         chart: |trace| position(trace, "Y", Y, |pose| pose.y),
     },
     Plan {
@@ -96,6 +103,7 @@ const PLANS: [Plan; 5] = [
         caption: "The estimated scale error of the left wheel, one standard deviation on \
                   either side and, where it is known, the true value. Initial values that \
                   would dwarf the rest are clipped.",
+        paper: "",
         chart: scale_left,
     },
 ];
@@ -108,9 +116,9 @@ pub(super) fn draw(trace: &Trace) -> Result<Vec<Figure>, (&'static str, DrawErro
     if trace.ticks.is_empty() {
         return Ok(Vec::new());
     }
-    let figure = |Plan { number, file, caption, chart }| {
+    let figure = |Plan { number, file, caption, paper, chart }| {
         let svg = chart(trace).svg().map_err(|error| (file, error))?;
-        Ok(Figure { number, file, caption, svg })
+        Ok(Figure { number, file, caption, paper, svg })
     };
     PLANS.into_iter().map(figure).collect()
 }

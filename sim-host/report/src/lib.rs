@@ -67,6 +67,8 @@ pub struct Report<'a> {
     pub tables: Vec<Table>,
     /// The run. Without ticks the page has a placeholder.
     pub trace: &'a Trace,
+    /// Whether the figures have the numbers of the paper's.
+    pub of_paper: bool,
 }
 
 /// Why a report failed.
@@ -130,7 +132,7 @@ impl Report<'_> {
             ("palette", palette::css().into()),
             ("style", STYLE.into()),
             ("tables", page::tables(&self.tables).into()),
-            ("figures", page::figures(figures).into()),
+            ("figures", page::figures(figures, self.of_paper).into()),
             ("data", data.into()),
             ("script", SCRIPT.into()),
         ];
@@ -202,7 +204,7 @@ mod tests {
             rows: vec![vec![HOSTILE.into(), "1.5".into()]],
         };
         let (title, subtitle) = (HOSTILE.to_owned(), HOSTILE.to_owned());
-        Report { title, subtitle, tables: vec![table], trace }.html().unwrap()
+        Report { title, subtitle, tables: vec![table], trace, of_paper: true }.html().unwrap()
     }
 
     /// The page has three scripts of its own: the error handler, the data and the player.
@@ -273,8 +275,13 @@ mod tests {
         let taken = dir.path().join("taken");
         fs::write(&taken, "a file, not a directory").unwrap();
         let trace = trace(2);
-        let report =
-            Report { title: String::new(), subtitle: String::new(), tables: vec![], trace: &trace };
+        let report = Report {
+            title: String::new(),
+            subtitle: String::new(),
+            tables: vec![],
+            trace: &trace,
+            of_paper: false,
+        };
         let error = report.write(&taken).unwrap_err();
         assert!(error.to_string().contains("taken"), "{error}");
         let page = report.write(&dir.path().join("made")).unwrap();

@@ -60,20 +60,21 @@ fn cell(open: &str, close: &str, text: &str) -> String {
     format!("<{open}>{}</{close}>", escape(text))
 }
 
-pub(super) fn figures(figures: &[Figure]) -> String {
+pub(super) fn figures(figures: &[Figure], of_paper: bool) -> String {
     if figures.is_empty() {
         return NOTHING.into();
     }
-    let all: String = figures.iter().map(figure).collect();
+    let all: String = figures.iter().map(|of| figure(of, of_paper)).collect();
     format!("<div class=\"figures\">\n{all}</div>")
 }
 
-fn figure(Figure { number, caption, svg, .. }: &Figure) -> String {
-    let caption = escape(caption);
-    format!(
-        "<figure id=\"figure-{number}\">{svg}\
-         <figcaption><b>Figure {number}.</b> {caption}</figcaption></figure>\n"
-    )
+/// A figure, with the number and the letters of the paper's if it is one of `of_paper`.
+fn figure(of: &Figure, of_paper: bool) -> String {
+    let Figure { number, caption, paper, svg, .. } = of;
+    let (number, paper) =
+        if of_paper { (format!("<b>Figure {number}.</b> "), *paper) } else { Default::default() };
+    let (caption, paper) = (escape(caption), escape(paper));
+    format!("<figure>{svg}<figcaption>{number}{caption}{paper}</figcaption></figure>\n")
 }
 
 #[cfg(test)]
