@@ -109,9 +109,9 @@ fn an_improvement_has_each_of_its_conditions() {
         (0..ranges).for_each(|_| health.record_fix(&accepted(1.0), 0.0, CERTAIN, &LIMITS));
         health.verdict == Verdict::Tracking
     };
-    assert!(improved(0.499, MAX_CONFIRMABLE_INFLATIONS, 3));
+    assert!(improved(0.499, 3, 3));
     assert!(!improved(BETTER_BELOW, 0, 3));
-    assert!(!improved(0.0, MAX_CONFIRMABLE_INFLATIONS + 1, 3));
+    assert!(!improved(0.0, 4, 3));
     assert!(!improved(0.0, 0, 2));
 }
 
