@@ -323,3 +323,26 @@ fn ranges_too_far_out_on_average_degrade() {
     }
     assert!(degraded);
 }
+
+/// A ping without an echo contradicts the pose, and inflates the covariance of a lost robot, as an echo at a wrong range does.
+#[test]
+fn a_missing_echo_inflates_the_covariance_of_a_lost_robot() {
+    let walls = one_wall();
+    let mut config = *new_localizer(&walls).config();
+    config.gating.inflation = Metres(0.01);
+    let start = Start {
+        pose: Pose::default(),
+        position_deviation: Metres(0.03),
+        heading_deviation: Radians(0.01),
+    };
+    let zero = Instant::from_ticks(0);
+    let mut localizer = Localizer::new(config, Map::new(&walls), start, zero).unwrap();
+    for step in 1..=20 {
+        // Most of a minute between pings: no occlusion lasts.
+        let now = Instant::from_ticks(50_000_000 * step);
+        localizer.odometry(now, WheelTravel::default()).unwrap();
+        apply(&mut localizer, NoEcho);
+    }
+    assert_eq!(localizer.health().verdict, Lost);
+    assert!(localizer.health().inflations > 0, "{:?}", localizer.health());
+}
