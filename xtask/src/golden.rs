@@ -8,7 +8,7 @@ const TRACES: [(&str, &str); 3] = [
     ("loop", "crates/sonarfix-map/scenarios/classroom.toml --seed 30 --seconds 10"),
     (
         "search",
-        "crates/sonarfix-map/scenarios/classroom.toml --start unknown --fix-period as-fast-as-possible --seconds 6",
+        "crates/sonarfix-map/scenarios/classroom.toml --start unknown --fix-period as-fast-as-possible --seconds 7",
     ),
 ];
 
