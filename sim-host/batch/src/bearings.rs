@@ -48,9 +48,31 @@ pub const MIDDLE: f64 = 1.5;
 /// Fewest answers, and fewest missing ones, from which the bearings are estimated.
 const ENOUGH: usize = 40;
 
+/// Assumed scatter, in standard deviations, where a half alone has no solution.
+const UNKNOWN_SCATTER: f64 = 3.0;
+
 /// Estimates the bearings; `None` if the pings do not determine them.
+///
+/// Pings at one wall from one place share what the model does not contain, for example an object that is not in the map. The
+/// deviations are therefore widened by the scatter between the halves of the recording.
 #[must_use]
 pub fn fit(looks: &[Look]) -> Option<Bearings> {
+    let mut whole = maximum(looks)?;
+    let (first, second) = looks.split_at(looks.len() / 2);
+    let halves = maximum(first).zip(maximum(second));
+    let scatter = |value: fn(&Bearings) -> (f64, f64)| {
+        halves.as_ref().map_or(UNKNOWN_SCATTER, |(first, second)| {
+            let ((a, deviation_a), (b, deviation_b)) = (value(first), value(second));
+            ((a - b).abs() / deviation_a.hypot(deviation_b)).max(1.0)
+        })
+    };
+    whole.offset_deviation *= scatter(|half| (half.offset, half.offset_deviation));
+    whole.scale_deviation *= scatter(|half| (half.scale, half.scale_deviation));
+    Some(whole)
+}
+
+/// The maximum of the likelihood, with the deviations of independent pings.
+fn maximum(looks: &[Look]) -> Option<Bearings> {
     let answers = looks.iter().filter(|look| look.answered).count();
     if answers < ENOUGH || looks.len() - answers < ENOUGH {
         return None;

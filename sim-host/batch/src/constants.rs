@@ -158,6 +158,32 @@ impl Priors {
         self
     }
 
+    /// What a builder's ruler leaves open: wheels to 6 %, track width to 8 %, range scale to 2 %, mount to 12 mm.
+    #[must_use]
+    pub fn of_a_builder(constants: &Constants, has_ranges: bool, has_references: bool) -> Self {
+        let mut priors = Self::fixed_at(constants)
+            .with(Name::Right, 0.06)
+            .with(Name::Left, 0.06)
+            .with(Name::Track, 0.08);
+        if has_ranges {
+            priors = priors
+                .with(Name::RangeScale, 0.02)
+                .with(Name::MountAhead, 0.012)
+                .with(Name::MountLeft, 0.012)
+                .with(Name::RangeOffset, 0.003)
+                .with(Name::OffAxis, 0.02);
+        }
+        if has_references {
+            priors = priors
+                .with(Name::Lag, 0.5)
+                .with(Name::ClockRate, 0.005)
+                .with(Name::MarkerAhead, 0.1)
+                .with(Name::MarkerLeft, 0.1)
+                .with(Name::MarkerHeading, 0.1);
+        }
+        priors
+    }
+
     /// Whether a constant is estimated.
     #[must_use]
     pub fn is_free(&self, name: Name) -> bool {

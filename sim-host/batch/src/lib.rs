@@ -17,13 +17,17 @@
 //! | [`solve`] | Levenberg–Marquardt |
 //! | [`noise`] | noises from the residuals |
 //! | [`bearings`] | bearings of the servo, from answers and missing answers |
-//! | [`calibrate`] | the calibration: windows, association, intervals |
+//! | [`calibration`] | what a calibration needs, and what it results in |
+//! | `fit` | windows, association, checks |
+//! | [`calibrate`] | the calibration: attempts, intervals |
 
 pub mod bearings;
 pub mod calibrate;
+pub mod calibration;
 pub mod chain;
 pub mod chain_of_poses;
 pub mod constants;
+mod fit;
 pub mod log;
 pub mod noise;
 pub mod odometry;

@@ -12,7 +12,7 @@ use sonarfix_replay::{LONGEST, REFERENCE_HEADER};
 use sonarfix::config::PingSchedule;
 use sonarfix::units::Radians;
 
-use crate::calibrate::Nominal;
+use crate::calibration::Nominal;
 use crate::problem::Noise;
 use crate::recording::{Ping, Reading, Recording, ReferencePose, StartPose};
 

@@ -81,6 +81,30 @@ pub fn wrap(angle: f64) -> f64 {
     if turned > PI { turned - TAU } else { turned }
 }
 
+/// Angles turned to the left and to the right, radians; a turn counts once it exceeds 20°, so that a straight leg with
+/// small corrections has none.
+#[must_use]
+pub fn turned(headings: impl Iterator<Item = f64>) -> [f64; 2] {
+    const LEAST: f64 = 0.35;
+    let [mut left, mut right] = [0.0, 0.0];
+    // Heading without wrapping, and its value at the last counted turn.
+    let mut unwrapped: Option<(f64, f64)> = None;
+    for heading in headings {
+        let Some((now, counted)) = &mut unwrapped else {
+            unwrapped = Some((heading, heading));
+            continue;
+        };
+        *now += wrap(heading - *now);
+        let turn = *now - *counted;
+        if turn.abs() >= LEAST {
+            *counted = *now;
+            left += turn.max(0.0);
+            right += (-turn).max(0.0);
+        }
+    }
+    [left, right]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -7,8 +7,9 @@ use crate::log::Malformed;
 /// The longest line that is read: 1 MiB, a scan of a hundred thousand beams.
 pub const LONGEST: usize = 1 << 20;
 
-/// The longest line that is skipped. Beyond it the input has no lines, and may have no end.
-const LONGEST_SKIPPED: u64 = sonarfix_map::MAX_FILE_BYTES;
+/// The most bytes that are skipped, of one line or of all lines that are not text. Beyond it the input is no log, and may
+/// have no end.
+const MOST_SKIPPED: u64 = sonarfix_map::MAX_FILE_BYTES;
 
 /// Reads lines, and counts them.
 #[derive(Debug)]
@@ -16,12 +17,14 @@ pub struct Lines<R> {
     reader: R,
     number: u64,
     line: Vec<u8>,
+    /// Bytes of all lines that are no text, or too long.
+    skipped: u64,
 }
 
 impl<R: BufRead> Lines<R> {
     /// Reads from the start of a file.
     pub fn of(reader: R) -> Self {
-        Self { reader, number: 0, line: Vec::new() }
+        Self { reader, number: 0, line: Vec::new(), skipped: 0 }
     }
 
     /// The number of the line read last, from 1.
@@ -32,19 +35,33 @@ impl<R: BufRead> Lines<R> {
     /// The next line, without its end; `None` after the last.
     ///
     /// # Errors
-    /// Errors of the reader; [`io::ErrorKind::FileTooLarge`] for a line that is too long to be skipped. A line that is not text is no error here: it is returned as
-    /// [`Malformed`].
+    /// Errors of the reader; [`io::ErrorKind::FileTooLarge`] if more than 256 MiB are skipped. A line that is not text is no
+    /// error here: it is returned as [`Malformed`].
     #[expect(clippy::should_implement_trait, reason = "the line is lent until the next one")]
     pub fn next(&mut self) -> io::Result<Option<Result<&str, Malformed>>> {
         let Some(end) = self.read_line()? else {
             return Ok(None);
         };
         self.number += 1;
+        if std::str::from_utf8(&self.line).is_err() {
+            self.skip(self.line.len() as u64)?;
+        }
         Ok(Some(match end {
             End::Torn => Err(Malformed::Torn),
             End::TooLong => Err(Malformed::TooLong),
             End::Newline => std::str::from_utf8(&self.line).map_err(|_| Malformed::NotText),
         }))
+    }
+
+    /// Counts skipped bytes.
+    fn skip(&mut self, bytes: u64) -> io::Result<()> {
+        self.skipped = self.skipped.saturating_add(bytes);
+        if self.skipped > MOST_SKIPPED {
+            let reason =
+                format!("more than {} MiB of it are not lines of text", MOST_SKIPPED >> 20);
+            return Err(io::Error::new(io::ErrorKind::FileTooLarge, reason));
+        }
+        Ok(())
     }
 
     fn read_line(&mut self) -> io::Result<Option<End>> {
@@ -64,13 +81,12 @@ impl<R: BufRead> Lines<R> {
             if length <= LONGEST {
                 self.line.extend(available.iter().take(here));
             }
-            if length as u64 > LONGEST_SKIPPED {
-                let reason = format!("a line has more than {} MiB", LONGEST_SKIPPED >> 20);
-                return Err(io::Error::new(io::ErrorKind::FileTooLarge, reason));
-            }
             // A skipped part counts as a line, in case the file ends within it.
             let consumed = here + usize::from(newline.is_some());
             self.reader.consume(consumed);
+            if length > LONGEST {
+                self.skip(here as u64)?;
+            }
             if newline.is_some() {
                 return Ok(Some(if length <= LONGEST { End::Newline } else { End::TooLong }));
             }
@@ -120,6 +136,37 @@ mod tests {
     fn a_line_without_an_end_is_an_error() {
         let mut lines = Lines::of(BufReader::with_capacity(1 << 20, io::repeat(0)));
         assert_eq!(lines.next().unwrap_err().kind(), io::ErrorKind::FileTooLarge);
+    }
+
+    #[test]
+    fn endless_lines_that_are_not_text_are_an_error() {
+        let mut bytes = vec![0xff; 100_000];
+        bytes.push(b'\n');
+        let mut lines = Lines::of(BufReader::new(Repeated { bytes, at: 0 }));
+        let error = loop {
+            match lines.next() {
+                Ok(line) => assert!(line.unwrap().is_err()),
+                Err(error) => break error,
+            }
+        };
+        assert_eq!(error.kind(), io::ErrorKind::FileTooLarge);
+        assert!(lines.number() > 2000, "many such lines are read before");
+    }
+
+    /// The same bytes for ever.
+    struct Repeated {
+        bytes: Vec<u8>,
+        at: usize,
+    }
+
+    impl io::Read for Repeated {
+        fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+            let rest = &self.bytes[self.at..];
+            let count = rest.len().min(buffer.len());
+            buffer[..count].copy_from_slice(&rest[..count]);
+            self.at = (self.at + count) % self.bytes.len();
+            Ok(count)
+        }
     }
 
     #[test]

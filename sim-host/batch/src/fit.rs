@@ -1,0 +1,376 @@
+//! The estimation in progress.
+//!
+//! One loss that forgets outliers has wrong minima, and their likelihood can be higher than that of the right one. The
+//! estimate therefore grows: a window from the start is extended by at most 15 % of its length, so that the poses beyond it
+//! can be predicted; its pings are associated again with the walls and the kernel is narrowed in three rounds.
+
+#![expect(clippy::indexing_slicing, reason = "matches have the length of the chain")]
+
+use std::ops::Range;
+
+use crate::bearings::{self, Bearings, Look};
+use crate::calibration::{BOTH_WAYS, CalibrateError, FEWEST_INLIERS, Nominal, share};
+use crate::chain::Covariance;
+use crate::chain_of_poses::Chain;
+use crate::constants::{Constants, Name, Priors};
+use crate::noise;
+use crate::odometry::{compose, integrate, turned, wrap};
+use crate::problem::{PosePrior, Problem, State};
+use crate::recording::{Recording, StartPose};
+use crate::solve::{SolveError, covariance, solve};
+use crate::wall::{Gate, Wall, associate, sonar};
+
+/// Shortest drive, metres.
+const SHORTEST: f64 = 3.0;
+/// Largest noise of a wheel: as a multiple of the robot file's, and of at least 4 mm/√m.
+const NOISIEST: f64 = 3.0;
+const NOISE_FLOOR: f64 = 0.004;
+/// Standard deviations of the wheel difference and of the relative track width below which straight legs separate them
+/// even if the robot turns one way.
+const SEPARATE: [f64; 2] = [0.003, 0.01];
+/// Deviations of the prior beyond which a constant is implausible.
+const IMPLAUSIBLE: f64 = 3.0;
+/// Standard deviation of the difference of the wheels' scales if the turns cannot separate it.
+const SAME_WHEELS: f64 = 0.005;
+
+/// Gate of the association, metres, and the same as the kernel's width; narrowed in rounds.
+const ROUNDS: [f64; 3] = [0.30, 0.15, 0.08];
+/// Largest innovation of an echo that is associated, in its standard deviations.
+const COMPATIBLE: f64 = 4.0;
+/// Angle off the axis at which an echo can still be a wall's, radians: servo and mount may be wrong by 15°.
+const WIDE: f64 = 0.6;
+/// The same once the bearings are known.
+const NARROW: f64 = 0.45;
+
+/// The estimation in progress.
+pub(crate) struct Fit<'a> {
+    pub(crate) problem: Problem<'a>,
+    pub(crate) state: State,
+    pub(crate) nominal: &'a Nominal,
+    pub(crate) cone: f64,
+    pub(crate) has_ranges: bool,
+    pub(crate) has_references: bool,
+    pub(crate) turned: [f64; 2],
+    /// Whether wheel difference and track width are not separated.
+    pub(crate) is_joint: bool,
+}
+
+impl<'a> Fit<'a> {
+    pub(crate) fn new(
+        recording: &'a Recording,
+        chain: &'a Chain,
+        walls: &'a [Wall],
+        nominal: &'a Nominal,
+        start: StartPose,
+    ) -> Result<Self, CalibrateError> {
+        let distance = chain.distances.last().copied().unwrap_or(0.0);
+        if distance < SHORTEST {
+            return Err(CalibrateError::TooShort(distance));
+        }
+        let echoes = chain.pings.iter().any(|event| recording.pings[event.index].range.is_some());
+        let has_ranges = echoes && !walls.is_empty();
+        let has_references = !recording.references.is_empty();
+        if !has_ranges && !has_references {
+            return Err(CalibrateError::NothingMeasured);
+        }
+        let constants = Constants::nominal(nominal.track_width, nominal.mount);
+        let priors = Priors::of_a_builder(&constants, has_ranges, has_references);
+        // A start that is better known than it can be would bend the calibration.
+        let (position, heading) = (start.position.max(0.02), start.heading.max(0.02));
+        let problem = Problem {
+            recording,
+            chain,
+            walls,
+            matches: vec![None; chain.pings.len()],
+            noise: nominal.noise,
+            priors,
+            window: 0..chain.len(),
+            first: PosePrior { pose: start.pose, position, heading },
+            kernel: 3.0,
+        };
+        let state = State { poses: vec![start.pose; chain.len()], constants };
+        Ok(Self {
+            problem,
+            state,
+            nominal,
+            cone: WIDE,
+            has_ranges,
+            has_references,
+            turned: [0.0; 2],
+            is_joint: false,
+        })
+    }
+
+    /// Estimates everything, and checks the result.
+    pub(crate) fn run(&mut self) -> Result<Option<Bearings>, CalibrateError> {
+        if self.has_references {
+            self.follow_references();
+            self.refine(&ROUNDS)?;
+        } else {
+            self.grow()?;
+        }
+        self.separate()?;
+        let mut bearings = None;
+        if self.has_ranges {
+            for _ in 0..2 {
+                bearings = self.fit_bearings();
+                self.refine(&[ROUNDS[2]])?;
+            }
+        }
+        self.fit_noise()?;
+        self.check()?;
+        Ok(bearings)
+    }
+
+    /// Grows the window over the whole recording: by a share of the distance and of the turns in it, because those
+    /// determine how well the motion beyond is predicted.
+    fn grow(&mut self) -> Result<(), CalibrateError> {
+        const GROWTH: f64 = 0.15;
+        const DISTANCE: f64 = 0.08;
+        // 20° of a robot with a track width of 12 cm.
+        let turn = 0.35 * self.nominal.track_width;
+        let chain = self.problem.chain;
+        let count = chain.len();
+        let mut known = 1;
+        while known < count {
+            let until = |values: &[f64], least: f64| {
+                let reached = values[known - 1];
+                let limit = reached + least.max(GROWTH * reached);
+                values.partition_point(|&value| value <= limit)
+            };
+            let end = until(&chain.distances, DISTANCE).min(until(&chain.turns, turn));
+            let end = end.max(known + 1).min(count);
+            self.predict(known..end);
+            self.problem.window = 0..end;
+            known = end;
+            self.refine(&ROUNDS)?;
+        }
+        self.refine(&[ROUNDS[1], ROUNDS[2], ROUNDS[2]])
+    }
+
+    /// Starts at the poses of the reference stream, and between and beyond them by odometry.
+    fn follow_references(&mut self) {
+        for i in 0..self.problem.chain.len() {
+            match self.problem.reference_at(i) {
+                Some(pose) => self.state.poses[i] = pose,
+                None if i > 0 => self.predict(i..i + 1),
+                None => {}
+            }
+        }
+    }
+
+    /// Assumes that the wheels are nearly equal if the recording cannot separate their difference from the track width:
+    /// the robot turns one way only, and their deviations show it.
+    fn separate(&mut self) -> Result<(), CalibrateError> {
+        let headings = self.state.poses.iter().map(|pose| pose.z);
+        self.turned = turned(headings);
+        if self.turned.iter().all(|&angle| angle >= BOTH_WAYS) {
+            return Ok(());
+        }
+        let covariance =
+            covariance(&self.problem, &self.state).map_err(SolveError::from)?.constants;
+        let [right, left, track] = [Name::Right, Name::Left, Name::Track].map(|name| name as usize);
+        let difference =
+            covariance[(right, right)] + covariance[(left, left)] - 2.0 * covariance[(right, left)];
+        if difference.max(0.0).sqrt() < SEPARATE[0]
+            && covariance[(track, track)].sqrt() < SEPARATE[1]
+        {
+            return Ok(());
+        }
+        self.is_joint = true;
+        self.problem.priors.wheel_difference = SAME_WHEELS;
+        self.refine(&[ROUNDS[1], ROUNDS[2]])
+    }
+
+    /// Standard deviation of the range scale.
+    pub(crate) fn scale_deviation(&self) -> f64 {
+        let name = Name::RangeScale as usize;
+        let covariance = covariance(&self.problem, &self.state).ok();
+        covariance
+            .map_or(f64::INFINITY, |covariance| covariance.constants[(name, name)].max(0.0).sqrt())
+    }
+
+    /// Predicts poses by odometry from the one before.
+    fn predict(&mut self, poses: Range<usize>) {
+        let drive = self.state.constants.drive();
+        for i in poses {
+            let motion = integrate(&self.problem.chain.edges[i - 1], &drive);
+            let (mut pose, _) = compose(&self.state.poses[i - 1], &motion.pose);
+            pose.z = wrap(pose.z);
+            self.state.poses[i] = pose;
+        }
+    }
+
+    /// Associates and solves, once for each gate.
+    fn refine(&mut self, gates: &[f64]) -> Result<(), CalibrateError> {
+        const ITERATIONS: usize = 8;
+        let covariance = covariance(&self.problem, &self.state).map_err(SolveError::from)?;
+        for &gate in gates {
+            let mut widest = gate;
+            if self.has_ranges {
+                widest = self.associate(gate, &covariance);
+            }
+            // The kernel is as wide as the gate, in deviations of a range of a metre.
+            let deviations = 0.5 * widest / self.problem.noise.of_range(1.0);
+            self.problem.kernel = deviations.max(noise::INLIER);
+            solve(&self.problem, &mut self.state, ITERATIONS)?;
+        }
+        Ok(())
+    }
+
+    /// Associates each ping with the wall whose expected range is nearest, within [`COMPATIBLE`] deviations of the
+    /// innovation, and `widest` metres at most. Returns the widest gate used.
+    fn associate(&mut self, widest: f64, covariance: &Covariance) -> f64 {
+        let problem = &self.problem;
+        let constants = &self.state.constants;
+        let scale = 1.0 + constants.get(Name::RangeScale);
+        let mut used = 0.0_f64;
+        let matches = problem.chain.pings.iter().enumerate().map(|(k, event)| {
+            if !problem.window.contains(&event.pose) {
+                return problem.matches[k];
+            }
+            let ping = &problem.recording.pings[event.index];
+            let (pose, ..) = problem.pose_at(&self.state, event);
+            let (at, direction) = sonar(&pose, ping.bearing, constants);
+            let range = ping.range? - constants.get(Name::RangeOffset);
+            let gate = Gate { range: widest, cone: self.cone };
+            let wall = associate(problem.walls, at, direction, range, scale, gate)?;
+            let term = problem.range_term(&self.state, k, wall)?;
+            let spread = problem.variance(covariance, event.pose, &term) + term.deviation.powi(2);
+            let limit = COMPATIBLE * spread.sqrt();
+            used = used.max(limit.min(widest));
+            (term.residual.abs() <= limit).then_some(wall)
+        });
+        self.problem.matches = matches.collect();
+        used
+    }
+
+    /// Estimates the line of the bearings from answers and missing answers of isolated walls.
+    fn fit_bearings(&mut self) -> Option<Bearings> {
+        const ENOUGH: f64 = 0.02;
+        if !self.nominal.has_servo {
+            return None;
+        }
+        let found = bearings::fit(&self.looks())?;
+        if found.offset_deviation > ENOUGH {
+            return None;
+        }
+        self.state.constants.bearing_offset = found.offset;
+        self.state.constants.bearing_scale =
+            if found.scale_deviation < ENOUGH { found.scale } else { 1.0 };
+        self.cone = NARROW;
+        Some(found)
+    }
+
+    /// The pings towards the nearest wall ahead, where nothing else of the map is near.
+    fn looks(&self) -> Vec<Look> {
+        const ASIDE: f64 = 0.8;
+        const FROM_END: f64 = 0.2;
+        let (problem, constants) = (&self.problem, &self.state.constants);
+        let [nearest, farthest] = self.nominal.reach;
+        let mut looks = Vec::new();
+        let mut before: Option<f64> = None;
+        for (k, event) in problem.chain.pings.iter().enumerate() {
+            let ping = &problem.recording.pings[event.index];
+            let moved = before.map_or(0.0, |before| ping.bearing - before);
+            before = Some(ping.bearing);
+            let (pose, ..) = problem.pose_at(&self.state, event);
+            let (at, direction) = sonar(&pose, ping.bearing, constants);
+            let feet =
+                problem.walls.iter().enumerate().map(|(i, wall)| (i, wall.foot(at, direction)));
+            let ahead =
+                feet.filter(|(i, foot)| problem.walls[*i].has(foot) && foot.off_axis.abs() < ASIDE);
+            let first = ahead.min_by(|a, b| a.1.signed.abs().total_cmp(&b.1.signed.abs()));
+            let Some((wall, foot)) = first else { continue };
+            let inside =
+                foot.along > FROM_END && foot.along < problem.walls[wall].length() - FROM_END;
+            let distance = foot.signed.abs();
+            if !inside || distance < nearest + 0.05 || distance > 0.8 * farthest {
+                continue;
+            }
+            let term = problem.range_term(&self.state, k, wall);
+            let answered = term.is_some_and(|term| term.residual.abs() < 5.0 * term.deviation);
+            // Another object was nearer: the wall had no chance.
+            let is_hidden = term.is_some_and(|term| term.residual > 5.0 * term.deviation);
+            if is_hidden {
+                continue;
+            }
+            looks.push(Look {
+                commanded: ping.bearing,
+                perpendicular: wrap(direction - foot.off_axis - pose.z),
+                distance,
+                moved: if moved.abs() > 1e-6 { moved.signum() } else { 0.0 },
+                answered,
+            });
+        }
+        looks
+    }
+
+    fn fit_noise(&mut self) -> Result<(), CalibrateError> {
+        for _ in 0..4 {
+            let covariance = covariance(&self.problem, &self.state).map_err(SolveError::from)?;
+            self.problem.noise = noise::estimate(&self.problem, &self.state, &covariance);
+            if self.has_ranges {
+                self.associate(self.gate(), &covariance);
+            }
+            self.problem.kernel = 2.0 * noise::INLIER;
+            solve(&self.problem, &mut self.state, 10)?;
+        }
+        Ok(())
+    }
+
+    /// The final gate: eight deviations, at least 5 cm.
+    fn gate(&self) -> f64 {
+        (8.0 * self.problem.noise.of_range(1.0)).clamp(0.05, 0.3)
+    }
+
+    /// Numbers of inliers, and of echoes for which the map has a wall that is not hidden.
+    pub(crate) fn counted(&self) -> (usize, usize) {
+        let problem = &self.problem;
+        let (mut inliers, mut expected) = (0, 0);
+        for (k, event) in problem.chain.pings.iter().enumerate() {
+            let ping = &problem.recording.pings[event.index];
+            if ping.range.is_none() {
+                continue;
+            }
+            let term = problem.matches[k].and_then(|wall| problem.range_term(&self.state, k, wall));
+            if term.is_some_and(|term| term.residual.abs() <= noise::INLIER * term.deviation) {
+                inliers += 1;
+                expected += 1;
+                continue;
+            }
+            let (pose, ..) = problem.pose_at(&self.state, event);
+            let (at, direction) = sonar(&pose, ping.bearing, &self.state.constants);
+            let has_wall = problem.walls.iter().any(|wall| {
+                let foot = wall.foot(at, direction);
+                wall.has(&foot)
+                    && foot.off_axis.abs() < 0.15
+                    && foot.signed.abs() < self.nominal.reach[1]
+            });
+            expected += usize::from(has_wall);
+        }
+        (inliers, expected)
+    }
+
+    fn check(&self) -> Result<(), CalibrateError> {
+        if self.has_ranges {
+            let (inliers, expected) = self.counted();
+            if expected == 0 || share(inliers, expected) < FEWEST_INLIERS {
+                return Err(CalibrateError::FewInliers { inliers, expected });
+            }
+        }
+        for name in Name::ALL.into_iter().filter(|name| self.problem.priors.is_free(*name)) {
+            let priors = &self.problem.priors;
+            let (mean, deviation) = (priors.means[name as usize], priors.deviations[name as usize]);
+            if (self.state.constants.get(name) - mean).abs() > IMPLAUSIBLE * deviation {
+                return Err(CalibrateError::Implausible(name));
+            }
+        }
+        let wheel = self.problem.noise.wheel;
+        if wheel > NOISIEST * self.nominal.noise.wheel.max(NOISE_FLOOR) {
+            Err(CalibrateError::NoisyWheels(wheel * 1e3))
+        } else {
+            Ok(())
+        }
+    }
+}
