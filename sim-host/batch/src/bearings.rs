@@ -15,7 +15,7 @@ type Vector = SVector<f64, COUNT>;
 
 /// A ping towards a wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Look {
+pub struct WallPing {
     /// Commanded bearing, radians.
     pub commanded: f64,
     /// Bearing of the wall's perpendicular in the robot's frame, radians.
@@ -56,9 +56,9 @@ const UNKNOWN_SCATTER: f64 = 3.0;
 /// Pings at one wall from one place share what the model does not contain, for example an object that is not in the map. The
 /// deviations are therefore widened by the scatter between the halves of the recording.
 #[must_use]
-pub fn fit(looks: &[Look]) -> Option<Bearings> {
-    let mut whole = maximum(looks)?;
-    let (first, second) = looks.split_at(looks.len() / 2);
+pub fn fit(pings: &[WallPing]) -> Option<Bearings> {
+    let mut whole = maximum(pings)?;
+    let (first, second) = pings.split_at(pings.len() / 2);
     let halves = maximum(first).zip(maximum(second));
     let scatter = |value: fn(&Bearings) -> (f64, f64)| {
         halves.as_ref().map_or(UNKNOWN_SCATTER, |(first, second)| {
@@ -72,16 +72,16 @@ pub fn fit(looks: &[Look]) -> Option<Bearings> {
 }
 
 /// The maximum of the likelihood, with the deviations of independent pings.
-fn maximum(looks: &[Look]) -> Option<Bearings> {
-    let answers = looks.iter().filter(|look| look.answered).count();
-    if answers < ENOUGH || looks.len() - answers < ENOUGH {
+fn maximum(pings: &[WallPing]) -> Option<Bearings> {
+    let answers = pings.iter().filter(|ping| ping.answered).count();
+    if answers < ENOUGH || pings.len() - answers < ENOUGH {
         return None;
     }
-    let mut at = coarse(looks);
+    let mut at = coarse(pings);
     let mut damping = 1e-3;
-    let mut likelihood = log_likelihood(looks, &at);
+    let mut likelihood = log_likelihood(pings, &at);
     for _ in 0..60 {
-        let (information, gradient) = score(looks, &at);
+        let (information, gradient) = score(pings, &at);
         let mut raised = information;
         for k in 0..COUNT {
             raised[(k, k)] *= 1.0 + damping;
@@ -91,7 +91,7 @@ fn maximum(looks: &[Look]) -> Option<Bearings> {
             continue;
         };
         let next = at + factor.solve(&gradient);
-        let higher = log_likelihood(looks, &next);
+        let higher = log_likelihood(pings, &next);
         if higher >= likelihood {
             let has_converged = higher - likelihood < 1e-7;
             (at, likelihood) = (next, higher);
@@ -106,7 +106,7 @@ fn maximum(looks: &[Look]) -> Option<Bearings> {
             }
         }
     }
-    let covariance = score(looks, &at).0.try_inverse()?;
+    let covariance = score(pings, &at).0.try_inverse()?;
     let deviation = |k: usize| Some(covariance[(k, k)]).filter(|v| *v > 0.0).map(f64::sqrt);
     let fitted = Bearings {
         offset: at[0],
@@ -125,14 +125,14 @@ fn start(offset: f64, scale: f64, half: f64) -> Vector {
 }
 
 /// The best point of a grid, so that the iteration begins near the right maximum.
-fn coarse(looks: &[Look]) -> Vector {
+fn coarse(pings: &[WallPing]) -> Vector {
     let mut best = (start(0.0, 0.0, 0.25), f64::NEG_INFINITY);
     for offset in -8..=8 {
         for scale in -4..=4 {
             for half in [12_f64, 20.0, 30.0] {
                 let (offset, scale) = (f64::from(2 * offset).to_radians(), 0.03 * f64::from(scale));
                 let at = start(offset, scale, half.to_radians());
-                let likelihood = log_likelihood(looks, &at);
+                let likelihood = log_likelihood(pings, &at);
                 if likelihood > best.1 {
                     best = (at, likelihood);
                 }
@@ -143,10 +143,10 @@ fn coarse(looks: &[Look]) -> Vector {
 }
 
 /// Probability of an answer, and its derivatives.
-fn probability(look: &Look, at: &Vector) -> (f64, Vector) {
-    let angle = at[0] + (1.0 + at[1]) * look.commanded - at[2] * look.moved - look.perpendicular;
+fn probability(ping: &WallPing, at: &Vector) -> (f64, Vector) {
+    let angle = at[0] + (1.0 + at[1]) * ping.commanded - at[2] * ping.moved - ping.perpendicular;
     let sign = angle.signum();
-    let (away, blur) = (look.distance - MIDDLE, at[5].exp());
+    let (away, blur) = (ping.distance - MIDDLE, at[5].exp());
     let rim = ((angle.abs() - at[3] - at[4] * away) / blur).clamp(-40.0, 40.0);
     let share = 1.0 / (1.0 + (-at[6]).exp());
     let inside = 1.0 / (1.0 + rim.exp());
@@ -154,8 +154,8 @@ fn probability(look: &Look, at: &Vector) -> (f64, Vector) {
     let by_angle = by_rim * sign / blur;
     let derivatives = Vector::from([
         by_angle,
-        by_angle * look.commanded,
-        -by_angle * look.moved,
+        by_angle * ping.commanded,
+        -by_angle * ping.moved,
         -by_rim / blur,
         -by_rim * away / blur,
         -by_rim * rim,
@@ -168,22 +168,22 @@ fn probability(look: &Look, at: &Vector) -> (f64, Vector) {
 const PRIOR: [(f64, f64); COUNT] =
     [(0.0, 0.5), (0.0, 0.3), (0.0, 0.02), (0.3, 0.3), (0.0, 0.05), (-3.0, 1.0), (2.5, 2.0)];
 
-fn log_likelihood(looks: &[Look], at: &Vector) -> f64 {
-    let of = |look: &Look| {
-        let (p, _) = probability(look, at);
-        if look.answered { p.ln() } else { (1.0 - p).ln() }
+fn log_likelihood(pings: &[WallPing], at: &Vector) -> f64 {
+    let of = |ping: &WallPing| {
+        let (p, _) = probability(ping, at);
+        if ping.answered { p.ln() } else { (1.0 - p).ln() }
     };
     let priors = PRIOR.iter().zip(at.iter());
     let prior: f64 = priors.map(|((mean, sigma), value)| ((value - mean) / sigma).powi(2)).sum();
-    looks.iter().map(of).sum::<f64>() - 0.5 * prior
+    pings.iter().map(of).sum::<f64>() - 0.5 * prior
 }
 
-fn score(looks: &[Look], at: &Vector) -> (SMatrix<f64, COUNT, COUNT>, Vector) {
+fn score(pings: &[WallPing], at: &Vector) -> (SMatrix<f64, COUNT, COUNT>, Vector) {
     let mut information = SMatrix::<f64, COUNT, COUNT>::zeros();
     let mut gradient = Vector::zeros();
-    for look in looks {
-        let (p, by) = probability(look, at);
-        let answered = f64::from(u8::from(look.answered));
+    for ping in pings {
+        let (p, by) = probability(ping, at);
+        let answered = f64::from(u8::from(ping.answered));
         let weight = 1.0 / (p * (1.0 - p));
         information += by * by.transpose() * weight;
         gradient += by * (weight * (answered - p));

@@ -77,7 +77,7 @@ pub const BOTH_WAYS: f64 = std::f64::consts::PI;
 pub enum Determined {
     /// By the recording.
     Yes,
-    /// Only together with another value: the turns go one way.
+    /// Only together with another value: the turns go to one side.
     Jointly,
     /// The interval is hardly narrower than the prior.
     No,

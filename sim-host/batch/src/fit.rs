@@ -8,7 +8,7 @@
 
 use std::ops::Range;
 
-use crate::bearings::{self, Bearings, Look};
+use crate::bearings::{self, Bearings, WallPing};
 use crate::calibration::{BOTH_WAYS, CalibrateError, FEWEST_INLIERS, Nominal, share};
 use crate::chain::Covariance;
 use crate::chain_of_poses::Chain;
@@ -26,7 +26,7 @@ const SHORTEST: f64 = 3.0;
 const NOISIEST: f64 = 3.0;
 const NOISE_FLOOR: f64 = 0.004;
 /// Standard deviations of the wheel difference and of the relative track width below which straight legs separate them
-/// even if the robot turns one way.
+/// even if the robot turns to one side only.
 const SEPARATE: [f64; 2] = [0.003, 0.01];
 /// Deviations of the prior beyond which a constant is implausible.
 const IMPLAUSIBLE: f64 = 3.0;
@@ -160,7 +160,7 @@ impl<'a> Fit<'a> {
     }
 
     /// Assumes that the wheels are nearly equal if the recording cannot separate their difference from the track width:
-    /// the robot turns one way only, and their deviations show it.
+    /// the robot turns to one side only, and their deviations show it.
     fn separate(&mut self) -> Result<(), CalibrateError> {
         let headings = self.state.poses.iter().map(|pose| pose.z);
         self.turned = turned(headings);
@@ -251,7 +251,7 @@ impl<'a> Fit<'a> {
         if !self.nominal.has_servo {
             return None;
         }
-        let found = bearings::fit(&self.looks())?;
+        let found = bearings::fit(&self.wall_pings())?;
         if found.offset_deviation > ENOUGH {
             return None;
         }
@@ -263,12 +263,12 @@ impl<'a> Fit<'a> {
     }
 
     /// The pings towards the nearest wall ahead, where nothing else of the map is near.
-    fn looks(&self) -> Vec<Look> {
+    fn wall_pings(&self) -> Vec<WallPing> {
         const ASIDE: f64 = 0.8;
         const FROM_END: f64 = 0.2;
         let (problem, constants) = (&self.problem, &self.state.constants);
         let [nearest, farthest] = self.nominal.reach;
-        let mut looks = Vec::new();
+        let mut wall_pings = Vec::new();
         let mut before: Option<f64> = None;
         for (k, event) in problem.chain.pings.iter().enumerate() {
             let ping = &problem.recording.pings[event.index];
@@ -295,7 +295,7 @@ impl<'a> Fit<'a> {
             if is_hidden {
                 continue;
             }
-            looks.push(Look {
+            wall_pings.push(WallPing {
                 commanded: ping.bearing,
                 perpendicular: wrap(direction - foot.off_axis - pose.z),
                 distance,
@@ -303,7 +303,7 @@ impl<'a> Fit<'a> {
                 answered,
             });
         }
-        looks
+        wall_pings
     }
 
     fn fit_noise(&mut self) -> Result<(), CalibrateError> {

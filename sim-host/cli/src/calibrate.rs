@@ -253,7 +253,7 @@ fn statement(found: &Calibration) -> String {
     }
     if found.estimates.iter().any(|estimate| estimate.determined == Determined::Jointly) {
         lines.push(
-            "Not determined: the difference of the wheels separately from the track width. The robot turned one way \
+            "Not determined: the difference of the wheels separately from the track width. The robot turned to one side \
              only; the wheels are assumed to be equal to 0.5 %. Drive figures of eight to separate them."
                 .to_owned(),
         );

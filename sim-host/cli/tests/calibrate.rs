@@ -5,7 +5,7 @@ use std::process::Command;
 
 use crate::common::{MAP, ROBOT};
 
-/// A log of a robot whose wheels are 2 % larger than its file says, in the room of [`MAP`]: squares of a metre to the left
+/// A log of a robot whose wheels are 2 % larger than its file states, in the room of [`MAP`]: squares of a metre to the left
 /// and to the right, and a sonar that sweeps by 20°.
 fn log() -> String {
     use std::fmt::Write as _;

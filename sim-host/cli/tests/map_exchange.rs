@@ -73,8 +73,11 @@ fn a_grid_returns_every_wall_within_a_pixel_and_a_degree_and_no_other() {
         fs::write(dir.join("map.toml"), floor.to_toml()).unwrap();
         map(dir, &["export", "map.toml", "--out", "grid.yaml", "--resolution", resolution])
             .unwrap();
-        let said = map(dir, &["import", "grid.yaml", "--out", "back.toml"]).unwrap();
-        assert!(said.contains("uncertain: each end by") && !said.contains("dropped"), "{said}");
+        let printed = map(dir, &["import", "grid.yaml", "--out", "back.toml"]).unwrap();
+        assert!(
+            printed.contains("uncertain: each end by") && !printed.contains("dropped"),
+            "{printed}"
+        );
         let back = Floor::read(&dir.join("back.toml")).unwrap();
         let pixel: f64 = resolution.parse().unwrap();
         assert_eq!(back.named_walls().len(), floor.named_walls().len(), "{name}");
@@ -154,26 +157,29 @@ fn what_is_no_wall_is_dropped_and_counted() {
         map(dir, &["import", "a.dxf", "--out", "back.toml"]).unwrap_err().contains("give --unit")
     );
     let mm = ["import", "a.dxf", "--out", "back.toml", "--unit", "mm", "--origin", "1,-2"];
-    let said = map(dir, &mm).unwrap();
+    let printed = map(dir, &mm).unwrap();
     for expected in [
         "scale: one unit is 0.001 m; its origin is at (1, -2) m",
         "dropped: CIRCLE entities: no straight lines (1)",
         "dropped: LWPOLYLINE entities with arcs (1)",
         "back.toml: 4 walls",
     ] {
-        assert!(said.contains(expected), "{said}");
+        assert!(printed.contains(expected), "{printed}");
     }
     assert_eq!(ends(dir)[..2], [[1.0, -2.0, 5.0, -2.0], [5.0, -2.0, 5.0, 1.0]]);
     assert_eq!(ends(dir)[3], [1.5, -2.0, 1.5, -1.1]);
-    let said = map(dir, &[&mm[..], &["--layer", "old"]].concat()).unwrap();
-    assert!(said.contains("entities on the layer \"walls\" (2)") && ends(dir).len() == 1, "{said}");
+    let printed = map(dir, &[&mm[..], &["--layer", "old"]].concat()).unwrap();
+    assert!(
+        printed.contains("entities on the layer \"walls\" (2)") && ends(dir).len() == 1,
+        "{printed}"
+    );
 
     let svg = "<svg xmlns='http://www.w3.org/2000/svg' width='4000mm' viewBox='0 0 400 300'>\
         <g transform='translate(100 0) rotate(90)'><line id='door' x1='0' y1='0' x2='100' y2='0'/></g>\
         <path d='M0,0 h100 v50 c1,1 2,2 3,3 l10,0 z'/><circle r='4'/><rect width='100' height='50' rx='3'/>\
         <text>Plan</text><title>Plan</title></svg>";
     fs::write(dir.join("a.svg"), svg).unwrap();
-    let said = map(dir, &["import", "a.svg", "--out", "back.toml"]).unwrap();
+    let printed = map(dir, &["import", "a.svg", "--out", "back.toml"]).unwrap();
     for expected in [
         "one user unit is 0.01 m",
         "dropped: circle elements (1)",
@@ -182,7 +188,7 @@ fn what_is_no_wall_is_dropped_and_counted() {
         "uncertain: the round corners",
         "back.toml: 9 walls",
     ] {
-        assert!(said.contains(expected), "{said}");
+        assert!(printed.contains(expected), "{printed}");
     }
     let door = ends(dir)[0];
     assert!(door.iter().zip([1.0, 0.0, 1.0, -1.0]).all(|(a, b)| (a - b).abs() < 1e-12), "{door:?}");
@@ -195,8 +201,8 @@ fn what_is_no_wall_is_dropped_and_counted() {
     assert!(
         map(dir, &["import", "a.json", "--out", "back.toml"]).unwrap_err().contains("--anchor")
     );
-    let said = map(dir, &["import", "a.json", "--out", "back.toml", "--unit", "m"]).unwrap();
-    assert!(said.contains("dropped: Point geometries (1)") && ends(dir).len() == 3, "{said}");
+    let printed = map(dir, &["import", "a.json", "--out", "back.toml", "--unit", "m"]).unwrap();
+    assert!(printed.contains("dropped: Point geometries (1)") && ends(dir).len() == 3, "{printed}");
 
     // A table of 0.5 m and a line of 5 cm thickness, drawn as PNG beside the YAML.
     let mut pixels = vec![255_u8; 100 * 80];
@@ -212,10 +218,10 @@ fn what_is_no_wall_is_dropped_and_counted() {
     encoder.write_header().unwrap().write_image_data(&pixels).unwrap();
     let yaml = "image: a.png\nresolution: 0.01 # m\norigin: [2.0, -1.0, 0.0]\nnegate: 0\n";
     fs::write(dir.join("a.yaml"), yaml).unwrap();
-    let said = map(dir, &["import", "a.yaml", "--out", "back.toml"]).unwrap();
+    let printed = map(dir, &["import", "a.yaml", "--out", "back.toml"]).unwrap();
     assert!(
-        said.contains("areas thicker than 0.3 m (2750 pixels)") && ends(dir).len() == 1,
-        "{said}"
+        printed.contains("areas thicker than 0.3 m (2750 pixels)") && ends(dir).len() == 1,
+        "{printed}"
     );
     // Its centre line; thinning shortens it by up to its thickness.
     let [x, y, u, v] = ends(dir)[0];

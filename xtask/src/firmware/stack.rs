@@ -23,8 +23,10 @@ const ENDS: [&str; 3] = [START, "HardFault", "DefaultHandler"];
 /// The exception frame: 26 words with the floating-point registers, and one for alignment to eight bytes (`ARMv7-M
 /// Architecture Reference Manual`, B1.5.7).
 const EXCEPTION: u64 = 4 * 27;
-/// Limit of all RAM: 8 KiB for the loop, 4 KiB for the state of the search, 1 KiB for its stack. The map stays in flash.
-const BAR: u64 = (8 + 4 + 1) * 1024;
+/// Limit of all RAM: 8 KiB for the loop, 4 KiB for the state of the search, 1 KiB for its stack. 1 KiB more is for the source
+/// of repeated echoes of each recent wall: 192 bytes of the localizer, of which the start of the loop has four copies on
+/// its stack. The map stays in flash.
+const BAR: u64 = (8 + 4 + 1 + 1) * 1024;
 /// Formatting functions. Panic messages take their addresses, and they call each other. As long as no other function calls
 /// one of them, none is called.
 const FORMATTING: &str = "core::fmt::";

@@ -46,7 +46,7 @@ struct Reading<'f> {
 }
 
 /// Reads a map. The coordinates are degrees with an anchor, otherwise of the unit of the frame, or metres if the file was
-/// written by [`write`] without an anchor.
+/// written by [`write()`] without an anchor.
 ///
 /// # Errors
 /// If it is no `GeoJSON`, its unit is not known, or it has no wall.
@@ -149,7 +149,7 @@ fn array(value: &Value) -> anyhow::Result<&Vec<Value>> {
 }
 
 /// Writes a map, one feature for each wall: in degrees with an anchor, otherwise in metres, which the member `sonarfix`
-/// says.
+/// states.
 #[must_use]
 pub fn write(floor: &Floor, anchor: Option<Anchor>) -> String {
     let place = |[x, y]: [f64; 2]| match anchor {

@@ -47,7 +47,7 @@ pub struct Simulation {
     /// When the robot is carried along its path, and how far.
     pub(super) carried: Option<Carried>,
     /// The robot file of the robot's software, if it is not that of the true robot.
-    believed: Option<RobotConfig>,
+    assumed: Option<RobotConfig>,
 }
 
 /// A robot that is carried along its path.
@@ -84,7 +84,7 @@ impl Simulation {
             model: Model::of(&scenario.robot.localizer),
             end: micros(scenario.path.duration()),
             carried: None,
-            believed: None,
+            assumed: None,
             scenario,
         }
     }
@@ -93,7 +93,7 @@ impl Simulation {
     #[must_use]
     pub fn believing(self, robot: RobotConfig, walls: Vec<Wall>) -> Self {
         let image = (walls.len() > MANY).then(|| sonarfix_map::bake(&walls).ok()).flatten();
-        Self { believed: Some(robot), walls, image, ..self }
+        Self { assumed: Some(robot), walls, image, ..self }
     }
 
     /// The same with a baked map, as on a robot.
@@ -195,7 +195,7 @@ impl Simulation {
     /// The robot's configuration, with the measurement timing of this fidelity.
     #[must_use]
     pub fn config(&self) -> Config {
-        let mut config = self.believed.unwrap_or(self.scenario.robot).localizer;
+        let mut config = self.assumed.unwrap_or(self.scenario.robot).localizer;
         config.sonar.timing = self.timing();
         config
     }
@@ -203,7 +203,7 @@ impl Simulation {
     /// The robot, with the measurement timing of this fidelity.
     #[must_use]
     pub fn robot(&self) -> RobotConfig {
-        RobotConfig { localizer: self.config(), ..self.believed.unwrap_or(self.scenario.robot) }
+        RobotConfig { localizer: self.config(), ..self.assumed.unwrap_or(self.scenario.robot) }
     }
 
     /// The measurement timing: at the ideal fidelity there is no servo.
