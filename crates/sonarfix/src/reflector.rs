@@ -202,11 +202,13 @@ fn insert(into: &mut Vec<Reflector, REFLECTORS>, reflector: Reflector) {
                 && (other.distance - reflector.distance).abs() < TOUCH
                 && other.toward.dot(reflector.toward) > 0.999
         };
-        if let Some(known) = into.iter_mut().find(|other| is_same_end(other)) {
-            if known.arm.is_some_and(|known| is_before(arm, known)) {
-                (known.arm, known.wall) = (reflector.arm, reflector.wall);
+        // Both walls compute the same end, each with its own rounding: that of the first direction stays.
+        if let Some(at) = into.iter().position(is_same_end) {
+            let known = into.get(at).and_then(|known| known.arm);
+            if !known.is_some_and(|known| is_before(arm, known)) {
+                return;
             }
-            return;
+            into.remove(at);
         }
     }
     if into.is_full() {

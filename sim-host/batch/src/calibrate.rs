@@ -1,5 +1,7 @@
 //! The calibration of a robot from a recording, with a known map or a reference stream.
 
+#![expect(clippy::indexing_slicing, reason = "arrays with an element for each constant")]
+
 use std::ops::Range;
 
 use crate::bearings::Bearings;

@@ -185,7 +185,7 @@ fn the_docs_have_the_table_of_boards() {
         for (signal, pin) in board["pins"].as_table().unwrap() {
             let pin = pin.as_str().unwrap();
             let has_pin = |cell: &&str| cell.split_whitespace().next() == Some(pin);
-            assert!(rows.iter().any(|cell| has_pin(cell)), "{name} {signal}: {pin}");
+            assert!(rows.iter().any(has_pin), "{name} {signal}: {pin}");
         }
         for resistor in board["divider"].as_array().unwrap() {
             assert!(guide.contains(resistor.as_str().unwrap()), "{name}: {resistor}");
