@@ -328,17 +328,14 @@ impl<'m, F: NorFlash> App<'m, F> {
         polled
     }
 
-    /// Sends the messages that are due periodically, each in a poll in which the loop has nothing to report.
+    /// Sends the messages that are due periodically.
     fn send_periodic(&mut self, now: Instant, link: &mut impl Link) {
-        let is_busy = matches!(&self.mode, Mode::Running(running) if !running.report.is_empty());
-        if is_busy {
-            return;
-        }
-        if self.wire.is_hello_due(now) {
+        let is_busy = matches!(&self.mode, Mode::Running(running) if running.report.has_worked());
+        if self.wire.is_hello_due(now, is_busy) {
             let hello = self.hello();
             self.wire.send(&Telemetry::Hello(hello), link);
         }
-        if self.wire.is_loop_due(now) {
+        if self.wire.is_loop_due(now, is_busy) {
             let status = self.loop_status(now);
             self.wire.send(&Telemetry::LoopStatus(status), link);
         }

@@ -15,6 +15,9 @@ use crate::time::after;
 const HELLO: Duration = Duration::from_ticks(10_000_000);
 /// Period of [`LoopStatus`](Telemetry::LoopStatus).
 const LOOP: Duration = Duration::from_ticks(1_000_000);
+/// The time for which a busy poll leaves a periodic message to a later poll, so that one poll does not take as long as
+/// both. An executor that polls less often finds every poll busy, and sends at once.
+const POSTPONED: Duration = Duration::from_ticks(20_000);
 
 /// The bytes of the link, without waiting.
 pub trait Link {
@@ -56,12 +59,12 @@ impl Wire {
         link.send(self.sender.frame(message, &mut buffer));
     }
 
-    pub fn is_hello_due(&mut self, now: Instant) -> bool {
-        is_due(&mut self.hello_at, now, HELLO)
+    pub fn is_hello_due(&mut self, now: Instant, is_busy: bool) -> bool {
+        is_due(&mut self.hello_at, now, HELLO, is_busy)
     }
 
-    pub fn is_loop_due(&mut self, now: Instant) -> bool {
-        is_due(&mut self.loop_at, now, LOOP)
+    pub fn is_loop_due(&mut self, now: Instant, is_busy: bool) -> bool {
+        is_due(&mut self.loop_at, now, LOOP, is_busy)
     }
 
     /// When the next periodic message is due.
@@ -75,8 +78,9 @@ impl Wire {
     }
 }
 
-fn is_due(at: &mut Option<Instant>, now: Instant, period: Duration) -> bool {
-    let is_due = at.is_none_or(|at| now >= at);
+fn is_due(at: &mut Option<Instant>, now: Instant, period: Duration, is_busy: bool) -> bool {
+    let delay = if is_busy { POSTPONED } else { Duration::from_ticks(0) };
+    let is_due = at.is_none_or(|at| now >= after(at, delay));
     if is_due {
         *at = Some(after(now, period));
     }

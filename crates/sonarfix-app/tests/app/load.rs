@@ -264,3 +264,44 @@ fn a_day_of_configurations_wears_the_flash_at_the_permitted_rate() {
         assert!(erases <= worst, "{name}: {erases} erases, at most {worst}");
     }
 }
+
+/// Counts the messages that are due once a second and every ten seconds.
+fn periodic(messages: &[Telemetry]) -> (usize, usize) {
+    let count = |is_it: fn(&&Telemetry) -> bool| messages.iter().filter(is_it).count();
+    let statuses = count(|message| matches!(message, Telemetry::LoopStatus(_)));
+    (statuses, count(|message| matches!(message, Telemetry::Hello(_))))
+}
+
+/// Encoders that have never been read are a fault in every poll.
+#[test]
+fn a_fault_in_every_poll_does_not_suppress_the_periodic_messages() {
+    let baked = Baked::new(&config());
+    let mut bench = Bench::switched_on(&baked, SimFlash::new());
+    (bench.hardware.right.0, bench.hardware.left.0) = (None, None);
+    for command in [Command::SetPose(start()), Command::Start] {
+        assert_eq!(bench.order(&command), CommandResult::Done);
+    }
+    bench.received();
+    let messages = bench.wait(30_000);
+    assert!(loop_status(&messages).faults.right.errors > 10_000);
+    let (statuses, hellos) = periodic(&messages);
+    assert!((29..=30).contains(&statuses) && hellos == 3, "{statuses}, {hellos}");
+}
+
+/// An executor that polls only at the ticks has a tick in every poll.
+#[test]
+fn a_tick_in_every_poll_does_not_suppress_the_periodic_messages() {
+    let baked = Baked::new(&config());
+    let mut bench = running(&baked);
+    let period = config().encoder_period.ticks();
+    let first = bench.app.localizer().unwrap().time();
+    for _ in 0..300 {
+        bench.now += period - 1_000;
+        let polled = bench.poll();
+        assert!(polled.is_running);
+    }
+    let ticks = (bench.app.localizer().unwrap().time() - first).ticks() / period;
+    assert!(ticks >= 290, "{ticks} ticks");
+    let (statuses, hellos) = periodic(&bench.received());
+    assert!((27..=30).contains(&statuses) && (2..=3).contains(&hellos), "{statuses}, {hellos}");
+}

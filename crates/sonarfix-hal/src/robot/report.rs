@@ -38,6 +38,13 @@ impl Report {
         *self == Self::default()
     }
 
+    /// Whether the poll handled a ping, a tick or a choice, or changed the mode.
+    #[must_use]
+    pub fn has_worked(&self) -> bool {
+        let has_pinged = self.has_ended_ping() || self.pinged.is_some();
+        has_pinged || self.tick.is_some() || self.aimed.is_some() || self.mode.is_some()
+    }
+
     /// Whether a ping has ended.
     pub(super) fn has_ended_ping(&self) -> bool {
         self.ping_result.is_some() || self.swept.is_some()
