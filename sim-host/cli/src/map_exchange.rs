@@ -107,7 +107,7 @@ fn read(args: &Import) -> anyhow::Result<Imported> {
         "dxf" => dxf::read(BufReader::new(File::open(&args.file)?), &frame, &args.layer),
         "svg" => svg::read(&text(&args.file)?, &frame),
         _ if is_json => geojson::read(&text(&args.file)?, &frame, anchor(args.anchor)?),
-        other => bail!("`{other}` is none of yaml, dxf, svg, geojson and json"),
+        other => bail!("unknown ending `{other}`: expected yaml, dxf, svg, geojson or json"),
     }
 }
 
@@ -128,7 +128,7 @@ pub fn export(floor: &Floor, args: &Target) -> anyhow::Result<()> {
         "yaml" => return grid::write(floor, &args.out, args.resolution),
         "svg" => svg::write(floor),
         "geojson" => geojson::write(floor, anchor(args.anchor)?),
-        other => bail!("--out: `{other}` is none of yaml, svg and geojson"),
+        other => bail!("--out: unknown ending `{other}`: expected yaml, svg or geojson"),
     };
     std::fs::write(&args.out, text).with_context(|| format!("cannot write {}", args.out.display()))
 }

@@ -33,7 +33,7 @@ fn sonarfix(dir: &Path, arguments: &[&str]) -> Output {
 fn recorded(sonar: Sonar) -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     let (log, reference) = common::recording(20, sonar);
-    // On a clock that does not start at zero, with a line that is none.
+    // On a clock that does not start at zero, with a malformed line at the end.
     let log = shifted(&log) + "range,none\n";
     fs::write(dir.path().join("log.csv"), log).unwrap();
     fs::write(dir.path().join("reference.csv"), shifted(&reference)).unwrap();

@@ -12,7 +12,7 @@ use sonarfix::motion::WheelTravel;
 use sonarfix::pose::{Point, Pose};
 use sonarfix::units::{Instant, Metres, Radians};
 
-use crate::strategies::config_for_rooms;
+use crate::strategies::{config_for_rooms, start_at};
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Outcome {
@@ -29,11 +29,7 @@ fn one_wall() -> [Wall; 1] {
 }
 
 fn new_localizer(walls: &[Wall]) -> Localizer<'_> {
-    let start = Start {
-        pose: Pose::default(),
-        position_deviation: Metres(0.03),
-        heading_deviation: Radians(0.01),
-    };
+    let start = start_at(Pose::default());
     let mut config = config_for_rooms(Point::new(0.0, 0.0));
     config.echo = EchoParameters::HC_SR04;
     // The covariance of a lost robot is not inflated, so that the ranges stay outside the gate.
@@ -243,11 +239,8 @@ proptest! {
 
 /// A robot with this gating in front of one wall.
 fn with_gating(gating: GatingParameters, walls: &[Wall], heading_deviation: f32) -> Localizer<'_> {
-    let start = Start {
-        pose: Pose::default(),
-        position_deviation: Metres(0.03),
-        heading_deviation: Radians(heading_deviation),
-    };
+    let start =
+        Start { heading_deviation: Radians(heading_deviation), ..start_at(Pose::default()) };
     let mut config = config_for_rooms(Point::new(0.0, 0.0));
     config.gating = gating;
     Localizer::new(config, Map::new(walls), start, Instant::from_ticks(0)).unwrap()
@@ -330,11 +323,7 @@ fn a_missing_echo_inflates_the_covariance_of_a_lost_robot() {
     let walls = one_wall();
     let mut config = *new_localizer(&walls).config();
     config.gating.inflation = Metres(0.01);
-    let start = Start {
-        pose: Pose::default(),
-        position_deviation: Metres(0.03),
-        heading_deviation: Radians(0.01),
-    };
+    let start = start_at(Pose::default());
     let zero = Instant::from_ticks(0);
     let mut localizer = Localizer::new(config, Map::new(&walls), start, zero).unwrap();
     for step in 1..=20 {

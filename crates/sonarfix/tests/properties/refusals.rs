@@ -5,14 +5,16 @@ use sonarfix::aim::Aim;
 use sonarfix::echo::EchoParameters;
 use sonarfix::ekf::{Ekf, EkfError, StandardDeviations, StateEstimate};
 use sonarfix::health::Verdict;
-use sonarfix::localizer::{Fix, Localizer, OdometryError, Refusal, Start};
+use sonarfix::localizer::{Fix, Localizer, OdometryError, Refusal};
 use sonarfix::map::{Map, Wall, WallId};
 use sonarfix::motion::{Drive, WheelTravel};
 use sonarfix::pose::{Heading, Point, Pose};
 use sonarfix::range::ExpectedRange;
 use sonarfix::units::{Instant, Metres, PerRootMetre, Radians, SquareMetres};
 
-use crate::strategies::{Room, any_ekf, any_mount, any_room, any_sight, bits, config_for_rooms};
+use crate::strategies::{
+    Room, any_ekf, any_mount, any_room, any_sight, bits, config_for_rooms, start_at,
+};
 
 const BAD: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
 
@@ -300,11 +302,7 @@ fn a_filter_is_restored_if_a_variance_is_too_large() {
 fn a_refused_travel_does_not_count_for_health() {
     let walls = [Wall::new(Point::new(2.0, -5.0), Point::new(2.0, 5.0)).unwrap()];
     let config = config_for_rooms(Point::default());
-    let start = Start {
-        pose: Pose::default(),
-        position_deviation: Metres(0.03),
-        heading_deviation: Radians(0.01),
-    };
+    let start = start_at(Pose::default());
     let zero = Instant::from_ticks(0);
     let mut localizer = Localizer::new(config, Map::new(&walls), start, zero).unwrap();
     let before = localizer.health();

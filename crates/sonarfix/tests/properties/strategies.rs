@@ -236,12 +236,13 @@ impl Room {
 
     /// The robot in it, with a deviation of a few centimetres.
     pub fn start(&self) -> Start {
-        Start {
-            pose: self.robot,
-            position_deviation: Metres(0.03),
-            heading_deviation: Radians(0.01),
-        }
+        start_at(self.robot)
     }
+}
+
+/// A start with deviations of 3 cm and half a degree.
+pub fn start_at(pose: Pose) -> Start {
+    Start { pose, position_deviation: Metres(0.03), heading_deviation: Radians(0.01) }
 }
 
 /// Rooms of 2 m to 10 m, the robot at least 1 m from every wall.
