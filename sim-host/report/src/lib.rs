@@ -12,7 +12,7 @@
 //! | `called_lost` | the figure of `sonarfix health` |
 //! | `chart`, `axis`, `points` | drawing of a figure |
 //! | [`heat_map`] | a map with a quantity along a path |
-//! | `player` | the data of the player; its script is `player.js` |
+//! | `player` | the data of the player; its scripts are `moment.js` and `drawing.js` (shared with the live page) and `player.js` |
 //! | `palette` | one colour per role, in figures and player |
 //! | [`map`] | the drawing of a map |
 //! | `page`, `escape` | tables, figures and data as HTML |
@@ -55,6 +55,9 @@ const FILE: &str = "report.html";
 const TEMPLATE: &str = include_str!("template.html");
 const STYLE: &str = include_str!("report.css");
 const SCRIPT: &str = include_str!("player.js");
+
+/// The scripts that draw a run on a canvas; the player and the live page use them.
+pub const DRAWING: &str = concat!(include_str!("moment.js"), include_str!("drawing.js"));
 
 /// A report on one run.
 #[derive(Debug, Clone)]
@@ -126,7 +129,7 @@ impl Report<'_> {
 
     fn page(&self, figures: &[Figure]) -> Result<String, ReportError> {
         let data = page::json_in_script(&player::json(self.trace)?);
-        let values: [(&str, Cow<'_, str>); 8] = [
+        let values: [(&str, Cow<'_, str>); 9] = [
             ("title", escape(&self.title).into()),
             ("subtitle", escape(&self.subtitle).into()),
             ("palette", palette::css().into()),
@@ -134,6 +137,7 @@ impl Report<'_> {
             ("tables", page::tables(&self.tables).into()),
             ("figures", page::figures(figures, self.of_paper).into()),
             ("data", data.into()),
+            ("drawing", DRAWING.into()),
             ("script", SCRIPT.into()),
         ];
         Ok(page::fill(TEMPLATE, &values))
