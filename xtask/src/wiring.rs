@@ -5,38 +5,9 @@ use std::fs;
 use std::path::PathBuf;
 
 use anyhow::Context;
-use serde::Deserialize;
 
-use crate::cargo;
-
-#[derive(Deserialize)]
-struct Table {
-    board: Vec<Board>,
-}
-
-/// What a drawing needs of a row of the table.
-#[derive(Deserialize)]
-struct Board {
-    name: String,
-    title: String,
-    feed: String,
-    divider: [String; 2],
-    pins: Pins,
-}
-
-#[derive(Deserialize)]
-struct Pins {
-    right_a: String,
-    right_b: String,
-    left_a: String,
-    left_b: String,
-    servo: String,
-    trigger: String,
-    echo: String,
-    enable: String,
-    tx: String,
-    rx: String,
-}
+use crate::boards::Board;
+use crate::{boards, cargo};
 
 /// Writes the drawings of all boards.
 pub fn write() -> anyhow::Result<()> {
@@ -48,11 +19,9 @@ pub fn write() -> anyhow::Result<()> {
 }
 
 fn drawings() -> anyhow::Result<Vec<(PathBuf, String)>> {
-    let table = fs::read_to_string(cargo::root().join("firmware/boards.toml"))?;
-    let Table { board: boards } = toml::from_str(&table).context("firmware/boards.toml")?;
     let folder = cargo::root().join("docs/images");
     let drawn = |board: &Board| (folder.join(format!("wiring-{}.svg", board.name)), draw(board));
-    Ok(boards.iter().map(drawn).collect())
+    Ok(boards::all()?.iter().map(drawn).collect())
 }
 
 /// Sizes, pixels.

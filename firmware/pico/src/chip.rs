@@ -1,28 +1,23 @@
 //! What differs on the RP2040: the state machines put counts and stamps into queues.
 
-use embassy_rp::Peri;
 use embassy_rp::pac;
-use embassy_rp::peripherals::{PIO0, PIO1};
-use embassy_rp::pio::{
-    Common, Config, FifoJoin, LoadedProgram, Pio, PioPin, ShiftDirection, StateMachine,
-};
+use embassy_rp::pio::FifoJoin;
 use embassy_rp::watchdog::{ResetReason, Watchdog};
-use pio::pio_file;
 use sonarfix::units::Instant;
 use sonarfix_hal::encoder::Counter;
 use sonarfix_hal::ranger::{EchoCapture, StampedEdges, Stamps};
 use sonarfix_link::message::ResetCause;
 
+use crate::machines::{EchoMachine, EncoderMachine};
+
+/// The state machines only send: eight words.
+pub const QUEUE: FifoJoin = FifoJoin::RxOnly;
+
 /// Size of the flash, bytes.
 pub const FLASH_SIZE: usize = 2 * 1024 * 1024;
 
-/// The program of the encoders' state machines.
-pub fn encoder_program(pio: &mut Common<'static, PIO0>) -> LoadedProgram<'static, PIO0> {
-    pio.load_program(&pio_file!("src/quadrature.pio").program)
-}
-
-/// A state machine that counts every edge of both channels.
-pub struct Encoder<const SM: usize>(StateMachine<'static, PIO0, SM>);
+/// An encoder, counted by a state machine.
+pub struct Encoder<const SM: usize>(pub EncoderMachine<SM>);
 
 /// The state machine sends no counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,26 +26,6 @@ pub struct Stalled;
 impl<const SM: usize> Encoder<SM> {
     /// Readings of the queue that outlast any pass of the program.
     const PATIENCE: u32 = 100;
-
-    // Inlined, its calls of embassy's panics would be merged with others and belong to no line, which
-    // `cargo xtask test-firmware` checks.
-    #[inline(never)]
-    pub fn new(
-        mut machine: StateMachine<'static, PIO0, SM>,
-        pio: &mut Common<'static, PIO0>,
-        program: &LoadedProgram<'static, PIO0>,
-        a: Peri<'static, impl PioPin>,
-        b: Peri<'static, impl PioPin>,
-    ) -> Self {
-        let (a, b) = (pio.make_pio_pin(a), pio.make_pio_pin(b));
-        let mut config = Config::default();
-        config.use_program(program, &[]);
-        config.set_in_pins(&[&a, &b]);
-        config.shift_in.direction = ShiftDirection::Left;
-        machine.set_config(&config);
-        machine.set_enable(true);
-        Self(machine)
-    }
 }
 
 impl<const SM: usize> Counter for Encoder<SM> {
@@ -67,9 +42,9 @@ impl<const SM: usize> Counter for Encoder<SM> {
     }
 }
 
-/// A state machine that stamps the edges of the echo.
+/// The stamps of the echo's edges.
 pub struct Stamper {
-    machine: StateMachine<'static, PIO1, 0>,
+    machine: EchoMachine,
     /// The start of its counter. Counter and clock are derived from one crystal.
     start: Instant,
     stamps: Stamps,
@@ -77,24 +52,7 @@ pub struct Stamper {
 }
 
 impl Stamper {
-    // As above.
-    #[inline(never)]
-    pub fn new(
-        pio: Pio<'static, PIO1>,
-        echo: Peri<'static, impl PioPin>,
-        clock_divider: u8,
-        now: Instant,
-    ) -> Self {
-        let Pio { mut common, sm0: mut machine, .. } = pio;
-        let program = common.load_program(&pio_file!("src/echo.pio").program);
-        let echo = common.make_pio_pin(echo);
-        let mut config = Config::default();
-        config.use_program(&program, &[]);
-        config.set_jmp_pin(&echo);
-        config.shift_in.direction = ShiftDirection::Left;
-        config.fifo_join = FifoJoin::RxOnly;
-        config.clock_divider = clock_divider.into();
-        machine.set_config(&config);
+    pub fn start(mut machine: EchoMachine, now: Instant) -> Self {
         machine.set_enable(true);
         let stamps = Stamps { rise: 0, fall: 0 };
         Self { machine, start: now, stamps, edges: StampedEdges::since(stamps) }

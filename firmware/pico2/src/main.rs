@@ -42,8 +42,9 @@ use sonarfix_robot::memory;
 // The other chip has its module beside its memory map.
 #[cfg_attr(rp2040, path = "../../pico/src/chip.rs")]
 mod chip;
+mod machines;
 
-use chip::{Encoder, FLASH_SIZE, Stamper, reset};
+use chip::{Encoder, FLASH_SIZE, QUEUE, Stamper, reset};
 
 /// The poll period.
 const POLL: Duration = Duration::from_millis(1);
@@ -155,11 +156,13 @@ impl Board {
         let resets = boots::resets(watchdog.get_scratch(0));
         watchdog.set_scratch(0, boots::register(resets.saturating_add(1)));
         let Pio { common: mut pio, sm0, sm1, .. } = Pio::new(board.PIO0, Interrupts);
-        let program = chip::encoder_program(&mut pio);
-        let right = Encoder::new(sm0, &mut pio, &program, board.PIN_2, board.PIN_3);
-        let left = Encoder::new(sm1, &mut pio, &program, board.PIN_4, board.PIN_5);
+        let program = machines::encoder_program(&mut pio);
+        let right = machines::encoder(sm0, &mut pio, &program, board.PIN_2, board.PIN_3, QUEUE);
+        let left = machines::encoder(sm1, &mut pio, &program, board.PIN_4, board.PIN_5, QUEUE);
+        let (right, left) = (Encoder(right), Encoder(left));
         let echo_pio = Pio::new(board.PIO1, Interrupts);
-        let stamper = Stamper::new(echo_pio, board.PIN_8, clock_divider(5_000_000), now());
+        let echo = machines::echo(echo_pio, board.PIN_8, clock_divider(5_000_000), QUEUE);
+        let stamper = Stamper::start(echo, now());
         let pulses = Pwm::new_output_a(board.PWM_SLICE3, board.PIN_6, servo_pulses());
         let trigger = Output::new(board.PIN_7, Level::Low);
         let servo = sonarfix_robot::servo(pulses);

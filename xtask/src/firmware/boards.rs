@@ -4,38 +4,21 @@
 use std::fs;
 use std::path::Path;
 
-use anyhow::Context;
 use object::{Object, ObjectSection, SectionKind};
-use serde::Deserialize;
 
 use super::{build, memory, panics};
+use crate::boards::{self, Board};
 use crate::cargo;
 use crate::workspace::Workspace;
 
 /// The board that is examined in detail, and emulated.
 const REFERENCE: &str = "stm32f405";
 
-#[derive(Deserialize)]
-struct Table {
-    board: Vec<Board>,
-}
-
-/// A row of `firmware/boards.toml`.
-#[derive(Deserialize)]
-struct Board {
-    name: String,
-    title: String,
-    package: String,
-    target: String,
-}
-
 /// Lints and builds the firmware of each further board, and checks the linked files; prints the size of all boards.
 pub fn check(reference: &[u8]) -> anyhow::Result<()> {
     let firmware = Workspace::Firmware;
-    let table = fs::read_to_string(firmware.folder().join("boards.toml"))?;
-    let Table { board: boards } = toml::from_str(&table).context("firmware/boards.toml")?;
     let mut rows = Vec::new();
-    for board in &boards {
+    for board in &boards::all()? {
         if board.name == REFERENCE {
             rows.push(row(board, reference)?);
             continue;

@@ -1,0 +1,64 @@
+//! The state machines of the encoders and of the echo, as far as both chips configure them alike. The programs are those
+//! of the board that is built.
+
+use embassy_rp::Peri;
+use embassy_rp::peripherals::{PIO0, PIO1};
+use embassy_rp::pio::{
+    Common, Config, FifoJoin, LoadedProgram, Pio, PioPin, ShiftDirection, StateMachine,
+};
+use pio::pio_file;
+
+/// A state machine that counts the edges of an encoder.
+pub type EncoderMachine<const SM: usize> = StateMachine<'static, PIO0, SM>;
+/// The state machine that stamps the edges of the echo.
+pub type EchoMachine = StateMachine<'static, PIO1, 0>;
+
+/// The program of the encoders' state machines.
+pub fn encoder_program(pio: &mut Common<'static, PIO0>) -> LoadedProgram<'static, PIO0> {
+    pio.load_program(&pio_file!("src/quadrature.pio").program)
+}
+
+/// Starts the counting of every edge of both channels. `queue` is the use of the machine's queues.
+// Inlined, its calls of embassy's panics would be merged with others and belong to no line, which
+// `cargo xtask test-firmware` checks.
+#[inline(never)]
+pub fn encoder<const SM: usize>(
+    mut machine: EncoderMachine<SM>,
+    pio: &mut Common<'static, PIO0>,
+    program: &LoadedProgram<'static, PIO0>,
+    a: Peri<'static, impl PioPin>,
+    b: Peri<'static, impl PioPin>,
+    queue: FifoJoin,
+) -> EncoderMachine<SM> {
+    let (a, b) = (pio.make_pio_pin(a), pio.make_pio_pin(b));
+    let mut config = Config::default();
+    config.use_program(program, &[]);
+    config.set_in_pins(&[&a, &b]);
+    config.shift_in.direction = ShiftDirection::Left;
+    config.fifo_join = queue;
+    machine.set_config(&config);
+    machine.set_enable(true);
+    machine
+}
+
+/// Prepares the stamping of the echo's edges, which begins when the machine is enabled.
+// As above.
+#[inline(never)]
+pub fn echo(
+    pio: Pio<'static, PIO1>,
+    echo: Peri<'static, impl PioPin>,
+    clock_divider: u8,
+    queue: FifoJoin,
+) -> EchoMachine {
+    let Pio { mut common, sm0: mut machine, .. } = pio;
+    let program = common.load_program(&pio_file!("src/echo.pio").program);
+    let echo = common.make_pio_pin(echo);
+    let mut config = Config::default();
+    config.use_program(&program, &[]);
+    config.set_jmp_pin(&echo);
+    config.shift_in.direction = ShiftDirection::Left;
+    config.fifo_join = queue;
+    config.clock_divider = clock_divider.into();
+    machine.set_config(&config);
+    machine
+}
