@@ -21,6 +21,7 @@ mod miri;
 mod mutants;
 mod panics;
 mod pil;
+mod playground;
 mod program;
 mod publish;
 mod reality;
@@ -83,6 +84,8 @@ enum Task {
     Msrv,
     /// The packages of the published crates build from their own files.
     Package,
+    /// The simulator as a web page, `target/playground/index.html`; in Chromium it computes the same bits as here.
+    Playground,
     /// Licences of all dependencies, and advisories if their database can be reached.
     Deny,
     /// Records the golden traces, and measures and writes `budgets.toml`.
@@ -110,7 +113,7 @@ enum Task {
 }
 
 /// The steps of CI, the fast ones first.
-fn ci_steps() -> [(&'static str, Task); 20] {
+fn ci_steps() -> [(&'static str, Task); 21] {
     [
         ("format", Task::Format),
         ("circles", Task::Circles),
@@ -128,6 +131,7 @@ fn ci_steps() -> [(&'static str, Task); 20] {
         ("peers", Task::Peers),
         ("msrv", Task::Msrv),
         ("package", Task::Package),
+        ("playground", Task::Playground),
         ("deny", Task::Deny),
         ("endurance", Task::Endurance(endurance::Args::SHORT)),
         ("search-windows", Task::SearchWindows(search_windows::Args::SHORT)),
@@ -169,6 +173,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Peers => checks::peers(),
         Task::Msrv => publish::msrv(),
         Task::Package => publish::package(),
+        Task::Playground => playground::build_and_check(),
         Task::Deny => checks::deny(),
         Task::Bless => golden::bless().and_then(|()| budgets::bless()),
         Task::Bench => bench::run(),

@@ -18,7 +18,7 @@ pub(crate) fn is_near_enough(point: Point) -> bool {
 }
 
 pub(crate) fn distance(a: Point, b: Point) -> f64 {
-    f64::hypot(b[0] - a[0], b[1] - a[1])
+    libm::hypot(b[0] - a[0], b[1] - a[1])
 }
 
 /// An angle in (−π, π].
@@ -88,7 +88,7 @@ impl Segment {
         let (ax, ay) = (self.to[0] - self.from[0], self.to[1] - self.from[1]);
         let (bx, by) = (point[0] - self.from[0], point[1] - self.from[1]);
         let foot = ((ax * bx + ay * by) / (ax * ax + ay * ay)).clamp(0.0, 1.0);
-        f64::hypot(bx - foot * ax, by - foot * ay)
+        libm::hypot(bx - foot * ax, by - foot * ay)
     }
 }
 

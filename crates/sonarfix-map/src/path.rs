@@ -265,7 +265,7 @@ impl Path {
 }
 
 fn direction(from: [f64; 2], to: [f64; 2]) -> f64 {
-    wrap(f64::atan2(to[1] - from[1], to[0] - from[0]))
+    wrap(libm::atan2(to[1] - from[1], to[0] - from[0]))
 }
 
 fn is_closed(plan: &PathPlan) -> bool {

@@ -55,6 +55,7 @@ fn opened(browser: &str, page: &Path) -> String {
 fn trace(truth_known: bool) -> Trace {
     let wall = |name: &str, from, to| Wall { name: name.into(), from, to };
     Trace {
+        obstacles: Vec::new(),
         walls: vec![wall(HOSTILE, [0.0, 2.0], [2.0, 2.0]), wall("south", [0.0, 0.0], [2.0, 0.0])],
         cone: 0.26,
         start: None,

@@ -1,7 +1,7 @@
 "use strict";
 // Draws a run on a canvas: the robot on its map, its sonar, the estimate, the search. The report's player and the live page use it.
 //
-// A run is a set of columns (`player.rs`), to which the live page appends. `Drawing.picture` draws one moment of it (`moment.js`); what does not
+// A run is a set of columns (of the package `sonarfix-player`), to which the live page appends. `Drawing.picture` draws one moment of it (`moment.js`); what does not
 // depend on the time (grid, walls) and what only grows (paths) are layers, which are painted when their view changes.
 
 const Drawing = (() => {
@@ -10,7 +10,7 @@ const Drawing = (() => {
   const TRACK = 0.35;          // metres, where the run does not know
   const SILENT_BEAM = 1.5;     // metres: how far a beam is drawn that heard nothing
   const FADE = 1.5;            // seconds after which a beam has faded to its least
-  const COLOURS = ["paper", "ink", "grid", "wall", "truth", "estimate", "encoders", ...OUTCOMES];
+  const COLOURS = ["paper", "ink", "grid", "wall", "obstacle", "truth", "estimate", "encoders", ...OUTCOMES];
   const PATHS = [["encoders", 1.25, 0.7], ["truth", 3, 0.3], ["estimate", 1.5, 0.7]]; // role, width, opacity
   const ZOOM_STEP = 1.25;
   const ZOOMS = [0.2, 200];    // the least and the largest factor
@@ -73,7 +73,6 @@ const Drawing = (() => {
   // The picture of a run on a canvas. `settings` has the values of the menus `view` ("map", or the metres across when it
   // follows the robot) and `exaggeration` ("auto" or a factor of the ellipse).
   function picture(canvas, data, settings) {
-    const { ticks, searches } = data;
     const state = { colours: {}, wholeMap: null, usualSigma: NaN, zoom: 1, panX: 0, panY: 0, cam: null };
     const layers = new Map();
     let robotRadius = TRACK / 2;
@@ -128,6 +127,7 @@ const Drawing = (() => {
       const put = (image) => g.drawImage(image, 0, 0, width, height);
       put(layer("floor", key, cam, (over, found) => { if (found.length++ === 0) drawFloor(over, cam); }));
       drawAimedWall(g, cam, moment.fix);
+      (data.obstacles ?? []).forEach((obstacle) => drawObstacle(g, cam, obstacle, moment.time));
       for (const [role, thick, opacity] of PATHS) {
         g.globalAlpha = opacity;
         put(layer(role, key, cam, (over, found) => extendPath(over, cam, role, thick, moment, found)));
@@ -140,7 +140,7 @@ const Drawing = (() => {
     function drawFront(g, cam, moment) {
       const magnified = exaggerationFor(cam);
       if (moment.fix) drawBeam(g, cam, moment.fix, moment.time);
-      const search = searchAt(searches, moment.time);
+      const search = searchAt(data.searches, moment.time);
       if (search) drawSearch(g, cam, search);
       if (moment.encoders) drawRobot(g, cam, moment.encoders, "encoders", false);
       if (moment.truth) drawRobot(g, cam, moment.truth, "truth", true);
@@ -173,9 +173,24 @@ const Drawing = (() => {
       if (wall) drawWall(g, cam, wall, state.colours[OUTCOMES[fix.outcome]], 5);
     }
 
+    // An obstacle that is not in the map, where its walk has taken it.
+    function drawObstacle(g, cam, { circle, face, walk }, time) {
+      const [dx, dy] = Moment.walkedBy(walk, time);
+      g.strokeStyle = g.fillStyle = state.colours.obstacle;
+      g.lineWidth = 3;
+      g.lineCap = "butt";
+      g.beginPath();
+      if (circle) g.arc(...onScreen(cam, circle[0] + dx, circle[1] + dy), Math.max(2, circle[2] * cam.scale), 0, 2 * Math.PI);
+      else g.moveTo(...onScreen(cam, face[0] + dx, face[1] + dy)), g.lineTo(...onScreen(cam, face[2] + dx, face[3] + dy));
+      g.globalAlpha = 0.35;
+      if (circle) g.fill();
+      g.globalAlpha = 1;
+      g.stroke();
+    }
+
     // Draws the part of a path that its layer lacks; all of it when the time went back. It is interrupted where it is unknown.
     function extendPath(g, cam, role, width, moment, found) {
-      const poses = ticks[role];
+      const poses = data.ticks[role];
       const dropped = data.dropped ?? 0; // ticks that a live page has dropped at the front: the layer keeps them
       const end = moment.index + 1 + dropped;
       if (end < found.length) {
@@ -199,7 +214,7 @@ const Drawing = (() => {
 
     // From the last tick to the moment.
     function drawEndOfPath(g, cam, role, width, moment) {
-      const x = ticks[role].x[moment.index], y = ticks[role].y[moment.index], now = moment[role];
+      const x = data.ticks[role].x[moment.index], y = data.ticks[role].y[moment.index], now = moment[role];
       if (!now || x === null || y === null) return;
       g.strokeStyle = state.colours[role];
       g.lineWidth = width;
@@ -244,7 +259,7 @@ const Drawing = (() => {
 
     // The state of the search, and when it decided.
     function drawSearchNote(g, search) {
-      const decided = searches.find((other) => other.provisional && other.time <= search.time);
+      const decided = data.searches.find((other) => other.provisional && other.time <= search.time);
       const count = search.hypotheses.length;
       // A robot does not send its window of pings.
       const window = search.pings.length ? `, ${search.pings.length} pings, ${search.lines.length} lines` : "";

@@ -12,7 +12,7 @@
 //! | `called_lost` | the figure of `sonarfix health` |
 //! | `chart`, `axis`, `points` | drawing of a figure |
 //! | [`heat_map`] | a map with a quantity along a path |
-//! | `player` | the data of the player; its scripts are `moment.js` and `drawing.js` (shared with the live page) and `player.js` |
+//! | `moment.js`, `drawing.js` | the drawing of a run, shared with the live page and the playground; the report's player is `player.js` |
 //! | `palette` | one colour per role, in figures and player |
 //! | [`map`] | the drawing of a map |
 //! | `page`, `escape` | tables, figures and data as HTML |
@@ -29,7 +29,6 @@ pub mod heat_map;
 pub mod map;
 mod page;
 mod palette;
-mod player;
 mod points;
 pub mod residuals;
 pub mod sweep;
@@ -47,6 +46,7 @@ use escape::escape;
 use figures::Figure;
 
 pub use called_lost::called_lost;
+pub use page::fill;
 pub use table::Table;
 
 /// The name of the report's file.
@@ -54,7 +54,11 @@ const FILE: &str = "report.html";
 
 const TEMPLATE: &str = include_str!("template.html");
 const STYLE: &str = include_str!("report.css");
-const SCRIPT: &str = include_str!("player.js");
+
+/// The player as HTML. The page that includes it calls `openPlayer(data)` of [`SCRIPT`].
+pub const PLAYER: &str = include_str!("player.html");
+/// The script of the player, after [`DRAWING`].
+pub const SCRIPT: &str = include_str!("player.js");
 
 /// The scripts that draw a run on a canvas; the player and the live page use them.
 pub const DRAWING: &str = concat!(include_str!("moment.js"), include_str!("drawing.js"));
@@ -128,20 +132,26 @@ impl Report<'_> {
     }
 
     fn page(&self, figures: &[Figure]) -> Result<String, ReportError> {
-        let data = page::json_in_script(&player::json(self.trace)?);
+        let data = page::json_in_script(&sonarfix_player::json(self.trace)?);
         let values: [(&str, Cow<'_, str>); 9] = [
             ("title", escape(&self.title).into()),
             ("subtitle", escape(&self.subtitle).into()),
-            ("palette", palette::css().into()),
-            ("style", STYLE.into()),
+            ("style", style().into()),
             ("tables", page::tables(&self.tables).into()),
             ("figures", page::figures(figures, self.of_paper).into()),
+            ("player", PLAYER.into()),
             ("data", data.into()),
             ("drawing", DRAWING.into()),
             ("script", SCRIPT.into()),
         ];
         Ok(page::fill(TEMPLATE, &values))
     }
+}
+
+/// The style sheet of the report's page and of the player, with the palette.
+#[must_use]
+pub fn style() -> String {
+    palette::css() + STYLE
 }
 
 fn write(path: PathBuf, text: &str) -> Result<PathBuf, ReportError> {
@@ -177,6 +187,7 @@ mod tests {
             bound: None,
         };
         Trace {
+            obstacles: Vec::new(),
             walls: vec![Wall { name: HOSTILE.into(), from: [0.0, 0.0], to: [10.0, 0.0] }],
             cone: 0.26,
             start: None,

@@ -61,6 +61,14 @@ const Moment = (() => {
     return index >= 0 && time - searches[index].time < SEARCH_LASTS ? searches[index] : null;
   }
 
+  // How far an obstacle has walked back or forth, x and y; `walk` has the displacement to its turning point and the seconds there.
+  function walkedBy(walk, time) {
+    if (!walk) return [0, 0];
+    const lap = (time / walk[2]) % 2;
+    const share = lap <= 1 ? lap : 2 - lap;
+    return [share * walk[0], share * walk[1]];
+  }
+
   // Half axes and direction of the 1σ ellipse: the eigenvalues and -vectors of the covariance.
   function ellipse(sigmaX, sigmaY, correlation) {
     if (sigmaX === null || sigmaY === null) return null;
@@ -102,6 +110,6 @@ const Moment = (() => {
   }
 
   return {
-    OUTCOMES, SIGMAS, lastBefore, momentAt, searchAt, wrap, isUnusual, unknown, millimetres, degrees, length, distance, fixNumbers,
+    OUTCOMES, SIGMAS, lastBefore, momentAt, searchAt, walkedBy, wrap, isUnusual, unknown, millimetres, degrees, length, distance, fixNumbers,
   };
 })();

@@ -12,7 +12,8 @@ const NOTHING: &str =
 
 /// Fills the placeholders of a template, written `{{name}}`, in one pass: inserted text is not
 /// searched again. A placeholder without a value becomes empty.
-pub(super) fn fill(template: &str, values: &[(&str, Cow<'_, str>)]) -> String {
+#[must_use]
+pub fn fill(template: &str, values: &[(&str, Cow<'_, str>)]) -> String {
     let mut page = String::with_capacity(values.iter().map(|(_, value)| value.len()).sum());
     let mut pieces = template.split("{{");
     page.push_str(pieces.next().unwrap_or_default());

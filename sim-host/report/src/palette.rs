@@ -22,6 +22,8 @@ pub(super) enum Role {
     Grid,
     /// The walls of the map.
     Wall,
+    /// What is not in the map.
+    Obstacle,
     /// The truth.
     Truth,
     /// The estimate.
@@ -42,11 +44,12 @@ pub(super) enum Role {
 
 impl Role {
     /// Every role, in the order of the style sheet.
-    const ALL: [Self; 12] = [
+    const ALL: [Self; 13] = [
         Self::Paper,
         Self::Ink,
         Self::Grid,
         Self::Wall,
+        Self::Obstacle,
         Self::Truth,
         Self::Estimate,
         Self::Encoders,
@@ -64,6 +67,7 @@ impl Role {
             Self::Ink => "ink",
             Self::Grid => "grid",
             Self::Wall => "wall",
+            Self::Obstacle => "obstacle",
             Self::Truth => "truth",
             Self::Estimate => "estimate",
             Self::Encoders => "encoders",
@@ -82,6 +86,7 @@ impl Role {
             Self::Ink => (0x1B, 0x1F, 0x24),
             Self::Grid => (0xE3, 0xE6, 0xEA),
             Self::Wall => (0x6B, 0x72, 0x80),
+            Self::Obstacle => (0x8C, 0x6B, 0x4F),
             Self::Truth => (0x00, 0x00, 0x00),
             Self::Estimate => (0x00, 0x72, 0xB2),
             Self::Encoders => (0xD5, 0x5E, 0x00),
@@ -100,6 +105,7 @@ impl Role {
             Self::Ink => (0xE6, 0xE9, 0xED),
             Self::Grid => (0x2B, 0x32, 0x3B),
             Self::Wall => (0x9A, 0xA3, 0xAF),
+            Self::Obstacle => (0xB8, 0x95, 0x78),
             Self::Truth => (0xFF, 0xFF, 0xFF),
             Self::Estimate => (0x3F, 0xA9, 0xE8),
             Self::Encoders => (0xF0, 0x80, 0x3C),

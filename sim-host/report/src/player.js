@@ -2,15 +2,10 @@
 // Plays a run with the drawing of `drawing.js` and the numbers of `moment.js`.
 // The address may have a time and a view: report.html#time=612.5&view=8&exaggeration=100
 
-(() => {
-  const data = JSON.parse(document.getElementById("data").textContent);
-  const { ticks, fixes, walls } = data;
-  const searches = data.searches ?? [];
+// Opens the player on a run. `overlay(g)` draws over the picture; while `isBusy()`, dragging the picture does not move it.
+const openPlayer = (data, { overlay = () => {}, isBusy = () => false } = {}) => {
+  data.searches ??= [];
   const root = document.documentElement;
-  if (ticks.time.length === 0) { // the page has a placeholder
-    root.dataset.ready = "true";
-    return;
-  }
 
   const { OUTCOMES, SIGMAS, distance, degrees, length, unknown, wrap } = Moment;
   const FOLLOW = "8";          // the view that F follows with, metres across
@@ -20,17 +15,32 @@
     ["player", "stage", "strip", "scrub", "play", "speed", "view", "exaggeration"].map(element);
   const readout = Object.fromEntries(
     [...document.querySelectorAll("#readout [data-value]")].map((dd) => [dd.dataset.value, dd]));
-  const start = ticks.time[0], end = ticks.time[ticks.time.length - 1];
+  let [start, end] = spanOf(data.ticks.time);
   const state = { time: start, playing: false, lastFrame: 0 };
   const settings = { view: () => view.value, exaggeration: () => exaggeration.value };
-  const picture = Drawing.picture(stage, { ...data, searches }, settings);
+  const picture = Drawing.picture(stage, data, settings);
   const cycles = { canvas: document.createElement("canvas"), key: null };
+
+  function spanOf(times) {
+    return [times[0], times[times.length - 1]];
+  }
+
+  // Plays another run from the same time on.
+  function replace(run) {
+    Object.assign(data, run);
+    [start, end] = spanOf(data.ticks.time);
+    Object.assign(scrub, { min: start, max: end });
+    cycles.key = null;
+    picture.refresh();
+    goTo(state.time);
+  }
 
   // ---- Drawing ----
 
   function draw() {
     const moment = Moment.momentAt(data, state.time);
     picture.draw(moment);
+    overlay(stage.getContext("2d"), moment);
     drawStrip();
     showNumbers(moment);
     scrub.value = state.time;
@@ -62,14 +72,14 @@
     OUTCOMES.forEach((name, outcome) => {
       g.fillStyle = colours[name];
       const top = outcome === 0 ? height / 2 : 0;
-      fixes.time.forEach((time, index) => {
-        if (fixes.outcome[index] === outcome) g.fillRect(x(time) - 0.75, top, 1.5, height - top);
+      data.fixes.time.forEach((time, index) => {
+        if (data.fixes.outcome[index] === outcome) g.fillRect(x(time) - 0.75, top, 1.5, height - top);
       });
     });
     // When the robot has no pose, and the moments of decision.
     g.fillStyle = colours.estimate;
-    searches.forEach((search, index) => {
-      const isDecision = search.provisional && !(searches[index - 1]?.provisional);
+    data.searches.forEach((search, index) => {
+      const isDecision = search.provisional && !(data.searches[index - 1]?.provisional);
       if (!search.provisional) g.fillRect(x(search.time) - 0.75, 0, 1.5, 4);
       if (isDecision) g.fillRect(x(search.time) - 1.5, 0, 3, height);
     });
@@ -86,7 +96,7 @@
       heading: degrees(truth && estimate ? wrap(estimate.heading - truth.heading) : null),
       sigma: degrees(moment.sigmaHeading === null ? null : SIGMAS * moment.sigmaHeading),
       encoders: length(distance(truth ?? estimate, encoders)),
-      ...Moment.fixNumbers(fix, moment.time, walls),
+      ...Moment.fixNumbers(fix, moment.time, data.walls),
     };
     for (const [name, text] of Object.entries(values)) readout[name].textContent = text.replace(/^-/, "−");
     readout.outcome.style.setProperty("--of", fix ? `var(--${OUTCOMES[fix.outcome]})` : "transparent");
@@ -102,7 +112,7 @@
   function setPlaying(playing) {
     state.playing = playing;
     play.textContent = playing ? "Pause" : "Play";
-    if (!playing) return;
+    if (!playing) { draw(); return; }
     if (state.time >= end) state.time = start;
     state.lastFrame = performance.now();
     requestAnimationFrame(frame);
@@ -117,7 +127,7 @@
 
   // To the next (or, with −1, the previous) measurement cycle that did not correct the filter.
   function goToTrouble(direction) {
-    const times = fixes.time.filter((_, index) => fixes.outcome[index] !== 0);
+    const times = data.fixes.time.filter((_, index) => data.fixes.outcome[index] !== 0);
     const time = direction > 0
       ? times.find((other) => other > state.time)
       : times.findLast((other) => other < state.time);
@@ -169,9 +179,10 @@
   scrub.addEventListener("input", () => goTo(Number(scrub.value)));
   play.addEventListener("click", () => setPlaying(!state.playing));
   for (const menu of [view, exaggeration]) menu.addEventListener("change", draw);
-  picture.navigate(draw);
+  picture.navigate(draw, isBusy);
   window.addEventListener("hashchange", readAddress);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { picture.refresh(); draw(); });
   new ResizeObserver(draw).observe(stage);
   root.dataset.ready = "true";
-})();
+  return { data, draw, goTo, picture, replace, setPlaying, state };
+};

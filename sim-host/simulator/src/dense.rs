@@ -53,7 +53,7 @@ impl Line {
     #[must_use]
     pub fn through(from: [f64; 2], to: [f64; 2]) -> Self {
         let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
-        let length = dx.hypot(dy);
+        let length = libm::hypot(dx, dy);
         Self { point: from, normal: [-dy / length, dx / length] }
     }
 }
@@ -98,7 +98,7 @@ impl Model {
     pub fn moved(&self, x: &Vector, travel: [f64; 2]) -> Vector {
         let (right, left) = (travel[0] * (1.0 + x[3]), travel[1] * (1.0 + x[4]));
         let turn = (right - left) / (self.track_width + x[5]);
-        let (sin, cos) = (x[2] + turn / 2.0).sin_cos();
+        let (sin, cos) = libm::sincos(x[2] + turn / 2.0);
         let advance = f64::midpoint(right, left);
         let mut next = *x;
         next[0] += advance * cos;
@@ -114,7 +114,7 @@ impl Model {
         let width = self.track_width + x[5];
         let turn = (travel[0] * factor[0] - travel[1] * factor[1]) / width;
         let advance = f64::midpoint(travel[0] * factor[0], travel[1] * factor[1]);
-        let (sin, cos) = (x[2] + turn / 2.0).sin_cos();
+        let (sin, cos) = libm::sincos(x[2] + turn / 2.0);
         // Rows x, y, heading of the derivative by anything that changes advance and turn.
         let column = |by_advance: f64, by_turn: f64| {
             [
@@ -145,7 +145,7 @@ impl Model {
     /// h(x) for a wall's line, and its derivative H.
     #[must_use]
     pub fn range(&self, x: &Vector, line: &Line) -> (f64, Vector) {
-        let (sin, cos) = x[2].sin_cos();
+        let (sin, cos) = libm::sincos(x[2]);
         let [ahead, aside] = self.mount;
         let lever = [cos * ahead - sin * aside, sin * ahead + cos * aside];
         let [a, b] = line.normal;

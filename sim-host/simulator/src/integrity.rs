@@ -46,7 +46,7 @@ impl Integrity {
     /// Adds the error and the covariance after a tick of a length in seconds.
     pub fn add(&mut self, seconds: f64, error: &Vector, p: &Matrix, verdict: Verdict) {
         let is_inside = distance_squared(error, p) <= ELLIPSE;
-        let off = error[0].hypot(error[1]);
+        let off = libm::hypot(error[0], error[1]);
         self.ticks += 1;
         if verdict == Verdict::Tracking && off > POSITION {
             self.undetected_error += seconds;

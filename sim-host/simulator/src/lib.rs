@@ -15,6 +15,7 @@ pub mod odometry;
 pub mod pins;
 pub mod plant;
 pub mod progress;
+mod random;
 pub mod row;
 mod run_result;
 pub mod simulate;

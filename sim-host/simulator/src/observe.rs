@@ -169,7 +169,7 @@ pub fn search_record(time: f64, is_provisional: bool, search: &Search) -> Search
             y: found.pose.y.0.into(),
             heading: found.pose.heading.radians().0.into(),
         },
-        weight: (pings * (f64::from(found.fit) - best)).exp(),
+        weight: libm::exp(pings * (f64::from(found.fit) - best)),
     });
     SearchRecord {
         time,

@@ -21,7 +21,7 @@ impl DeadReckoning {
     pub fn moved(&mut self, [right, left]: [f64; 2]) {
         let turn = (right - left) / self.track_width;
         let advance = f64::midpoint(right, left);
-        let (sin, cos) = (self.pose.heading + turn / 2.0).sin_cos();
+        let (sin, cos) = libm::sincos(self.pose.heading + turn / 2.0);
         self.pose.x += advance * cos;
         self.pose.y += advance * sin;
         self.pose.heading = angle::wrap(self.pose.heading + turn);

@@ -61,6 +61,11 @@ impl<'a> Plant<'a> {
         self.course.carry(seconds);
     }
 
+    /// Puts the robot down at a pose; its wheels do not roll. Without effect on a robot that follows its path exactly.
+    pub fn put_down(&mut self, pose: Pose) {
+        self.course.put_down(pose);
+    }
+
     /// Drives on to `time` seconds and reads the encoders.
     pub fn drive_to(&mut self, time: f64, rng: &mut ChaCha8Rng) -> Travel {
         let rolled = self.course.drive(self.time, time, self.wheels.parameters());

@@ -103,7 +103,7 @@ impl RunResult {
     /// Decides whether the run ended lost.
     pub fn set_lost(&mut self, verdict: Verdict) {
         let e = &self.error;
-        let diverged = e[0].hypot(e[1]) > LOST_POSITION || e[2].abs() > LOST_HEADING;
+        let diverged = libm::hypot(e[0], e[1]) > LOST_POSITION || e[2].abs() > LOST_HEADING;
         self.lost = verdict == Verdict::Lost || diverged;
     }
 }

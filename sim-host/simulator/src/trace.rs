@@ -10,6 +10,7 @@ use sonarfix::units::Radians;
 use sonarfix_hal::robot::Report;
 use sonarfix_map::{Floor, NamedWall};
 
+use crate::world::obstacle::Obstacle;
 use crate::world::reflector::Source;
 
 /// A pose in the map frame: metres, metres, radians in (−π, π].
@@ -184,6 +185,9 @@ pub struct Wall {
 pub struct Trace {
     /// The map.
     pub walls: Vec<Wall>,
+    /// The unmapped obstacles, where they are known.
+    #[serde(skip)]
+    pub obstacles: Vec<Obstacle>,
     /// Half of the sonar's cone, radians.
     pub cone: f64,
     /// The state of the localizer before its first input.

@@ -20,10 +20,10 @@ pub mod sensor;
 pub mod vertex;
 mod wedge;
 
-use rand::{Rng, RngExt};
-use rand_distr::StandardNormal;
+use rand::Rng;
 
 use crate::angle;
+use crate::random;
 use reflector::{Reflector, Search, Source};
 use segment::{direction, distance};
 use sensor::SensorModel;
@@ -51,7 +51,7 @@ impl World {
         noise: &mut impl Rng,
         rng: &mut impl Rng,
     ) -> Option<Echo> {
-        let normal = noise.sample(StandardNormal);
+        let normal = random::normal(noise);
         let found = Search::new(self, sensor, ping).run();
         let first = detection::first(&found, rng);
         let scattered = self.scattered(ping, sensor, rng);

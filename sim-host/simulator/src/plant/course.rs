@@ -47,6 +47,13 @@ impl Course<'_> {
         }
     }
 
+    /// Puts the robot down at a pose; the wheels do not roll. Without effect on an exact path.
+    pub fn put_down(&mut self, at: Pose) {
+        if let Self::Steered { pose, .. } = self {
+            *pose = at;
+        }
+    }
+
     /// Drives from one time to another, seconds; returns how far the wheels rolled, metres.
     pub fn drive(&mut self, from: f64, to: f64, parameters: &Parameters) -> [f64; 2] {
         match self {
@@ -97,8 +104,8 @@ fn moved(pose: Pose, [right, left]: [f64; 2], track_width: f64) -> Pose {
     let advance = f64::midpoint(right, left);
     // The chord of the arc: sin(x)/x, which is 1 for a straight line.
     let half = 0.5 * turn;
-    let chord = if half.abs() < 1e-9 { advance } else { advance * half.sin() / half };
-    let (sin, cos) = (pose.heading + half).sin_cos();
+    let chord = if half.abs() < 1e-9 { advance } else { advance * libm::sin(half) / half };
+    let (sin, cos) = libm::sincos(pose.heading + half);
     Pose {
         x: pose.x + chord * cos,
         y: pose.y + chord * sin,

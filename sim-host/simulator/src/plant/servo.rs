@@ -113,7 +113,7 @@ impl ServoPlant {
         let came_from = (to - from).signum();
         let since = time - arrives;
         let swing = if since > 0.0 && to.total_cmp(&from).is_ne() {
-            ringing * (-since / settling).exp() * (TAU * RINGING * since).sin()
+            ringing * libm::exp(-since / settling) * libm::sin(TAU * RINGING * since)
         } else {
             0.0
         };

@@ -1,8 +1,8 @@
 //! Converts the distance that the wheels roll on the ground to encoder readings.
 
+use crate::random;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
-use rand_distr::StandardNormal;
 use sonarfix_map::{Truth as Parameters, Upsets};
 
 /// The travel of the wheels between two instants.
@@ -38,9 +38,8 @@ impl Wheels {
     pub fn roll(&mut self, rolled: [f64; 2], rng: &mut ChaCha8Rng) -> Travel {
         let p = &self.parameters;
         let noiseless = [rolled[0] / (1.0 + p.scale_right), rolled[1] / (1.0 + p.scale_left)];
-        let measured = noiseless.map(|travel| {
-            travel + p.wheel_noise * travel.abs().sqrt() * rng.sample::<f64, _>(StandardNormal)
-        });
+        let measured = noiseless
+            .map(|travel| travel + p.wheel_noise * travel.abs().sqrt() * random::normal(rng));
         let upsets = self.upsets;
         let measured = measured.map(|travel| travel + upset(&upsets, travel, rng));
         let root_distance = (0.5 * (noiseless[0].abs() + noiseless[1].abs())).sqrt();
@@ -52,11 +51,11 @@ impl Wheels {
         let p = &mut self.parameters;
         // No draw without a random walk, so that the noise of a constant robot does not change.
         if p.scale_walk > 0.0 {
-            p.scale_right += p.scale_walk * root_distance * rng.sample::<f64, _>(StandardNormal);
-            p.scale_left += p.scale_walk * root_distance * rng.sample::<f64, _>(StandardNormal);
+            p.scale_right += p.scale_walk * root_distance * random::normal(rng);
+            p.scale_left += p.scale_walk * root_distance * random::normal(rng);
         }
         if p.track_width_walk > 0.0 {
-            let step: f64 = rng.sample(StandardNormal);
+            let step = random::normal(rng);
             p.track_width += p.track_width_walk * root_distance * step;
         }
     }
@@ -70,7 +69,7 @@ fn upset(upsets: &Upsets, travel: f64, rng: &mut ChaCha8Rng) -> f64 {
         added += upsets.slip.by * travel.signum();
     }
     if happens(upsets.bump.every, travel, rng) {
-        added += upsets.bump.by * rng.sample::<f64, _>(StandardNormal);
+        added += upsets.bump.by * random::normal(rng);
     }
     added
 }

@@ -11,7 +11,7 @@ use sonarfix_pil::{Actuators, Sensors, Wires};
 use super::computer::{Computer, Controller};
 use super::error::SimulationError;
 use super::score::Score;
-use super::simulation::{Carried, Simulation};
+use super::simulation::{Carried, PutDown, Simulation};
 use super::streams::RandomStreams;
 use crate::angle;
 use crate::observe::{self, Measurement};
@@ -86,6 +86,8 @@ struct SimulatedHardware<'a> {
     search_recorded_at: u64,
     /// When the robot will be carried, and how far.
     carried: Option<Carried>,
+    /// Where the robot will be put down, and when.
+    put_down: &'a [PutDown],
     /// What determines the robot's pose.
     mode: Mode,
     /// The last ping, for the trace.
@@ -124,6 +126,7 @@ impl<'a> SimulatedHardware<'a> {
             silence: devices::listening_time(&scenario.robot) + GIVES_UP_AFTER,
             search_recorded_at: 0,
             carried: simulation.carried,
+            put_down: &simulation.put_down,
             mode: Mode::Tracking,
             measurement: None,
             now: 0,
@@ -184,6 +187,12 @@ impl<'a> SimulatedHardware<'a> {
             self.plant.carry(carried.by);
         }
         let travel = self.plant.drive_to(seconds(now), &mut self.streams.wheels);
+        while let Some((next, later)) =
+            self.put_down.split_first().filter(|(next, _)| next.at <= now)
+        {
+            self.plant.put_down(next.pose);
+            self.put_down = later;
+        }
         self.score.rolled(travel);
         let encoders = self.discs.iter_mut().zip(&mut self.faults.encoders);
         for ((disc, faults), metres) in encoders.zip(travel.measured) {

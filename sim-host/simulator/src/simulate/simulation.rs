@@ -1,8 +1,6 @@
 //! A scenario, prepared to be run.
 
-use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
-use rand_distr::StandardNormal;
 use sonarfix::config::{Config, PingSchedule, PingTiming};
 use sonarfix::localizer::{Localizer, Start};
 use sonarfix::map::{Map, Wall};
@@ -16,8 +14,9 @@ use super::error::SimulationError;
 use crate::dense::{Line, Model, Vector};
 use crate::plant::Plant;
 use crate::plant::follower::Follower;
+use crate::random;
 use crate::time::{micros, seconds};
-use crate::trace::Trace;
+use crate::trace::{self, Trace};
 use crate::world::obstacle::{Obstacle, Outline};
 use crate::world::segment::{Point, Segment};
 use crate::world::sensor::SensorModel;
@@ -46,6 +45,8 @@ pub struct Simulation {
     end: u64,
     /// When the robot is carried along its path, and how far.
     pub(super) carried: Option<Carried>,
+    /// When the robot is put down elsewhere, in order of time.
+    pub(super) put_down: Vec<PutDown>,
     /// The robot file of the robot's software, if it is not that of the true robot.
     assumed: Option<RobotConfig>,
 }
@@ -57,6 +58,15 @@ pub struct Carried {
     pub(super) at: u64,
     /// How far, as the time in which it would drive there, seconds.
     pub(super) by: f64,
+}
+
+/// A robot that is picked up and put down elsewhere.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PutDown {
+    /// When, microseconds since the run began.
+    pub(super) at: u64,
+    /// Its new true pose.
+    pub(super) pose: trace::Pose,
 }
 
 impl Simulation {
@@ -84,6 +94,7 @@ impl Simulation {
             model: Model::of(&scenario.robot.localizer),
             end: micros(scenario.path.duration()),
             carried: None,
+            put_down: Vec::new(),
             assumed: None,
             scenario,
         }
@@ -111,6 +122,15 @@ impl Simulation {
         let left = micros((self.scenario.path.duration() - by).max(0.0));
         let end = self.end.min(left);
         Self { carried: Some(Carried { at: micros(at), by }), end, ..self }
+    }
+
+    /// The same, with the robot picked up `at` seconds after the start and put down at a true pose; its wheels do not
+    /// roll. Only at the fidelity of pins, and if it steers by its estimate.
+    #[must_use]
+    pub fn put_down(mut self, at: f64, pose: trace::Pose) -> Self {
+        self.put_down.push(PutDown { at: micros(at), pose });
+        self.put_down.sort_by_key(|put_down| put_down.at);
+        self
     }
 
     /// The same, limited to a duration in seconds.
@@ -148,7 +168,8 @@ impl Simulation {
     /// An empty trace of this scenario.
     #[must_use]
     pub fn empty_trace(&self) -> Trace {
-        Trace::of(&self.scenario.floor, self.scenario.robot.localizer.sonar.cone)
+        let trace = Trace::of(&self.scenario.floor, self.scenario.robot.localizer.sonar.cone);
+        Trace { obstacles: self.world.obstacles().to_vec(), ..trace }
     }
 
     /// True scale error of the ranger: its own error and that of the air temperature that its driver
@@ -241,9 +262,9 @@ impl Simulation {
 
     /// Position of the sonar on a robot at a pose.
     #[must_use]
-    pub fn sonar_at(&self, pose: &crate::trace::Pose) -> Point {
+    pub fn sonar_at(&self, pose: &trace::Pose) -> Point {
         let mount = self.model.mount;
-        let (sin, cos) = pose.heading.sin_cos();
+        let (sin, cos) = libm::sincos(pose.heading);
         [pose.x + cos * mount[0] - sin * mount[1], pose.y + sin * mount[0] + cos * mount[1]]
     }
 }
@@ -272,7 +293,7 @@ fn obstacle(plan: &sonarfix_map::Obstacle) -> Obstacle {
 fn estimated_start(scenario: &Scenario, truth: &Vector, rng: &mut ChaCha8Rng) -> Start {
     let start = &scenario.start;
     let mut draw = |sigma: f64| {
-        let normal: f64 = rng.sample(StandardNormal);
+        let normal = random::normal(rng);
         if start.drawn { sigma * normal } else { 0.0 }
     };
     let pose = [

@@ -1,7 +1,8 @@
 //! Which reflector is detected, and with what error: the random part of the sonar model.
 
 use rand::{Rng, RngExt};
-use rand_distr::StandardNormal;
+
+use crate::random;
 
 use super::reflector::{Reflector, Source};
 use super::sensor::{SensorModel, WAVELENGTH};
@@ -44,7 +45,7 @@ pub(super) fn distorted(of: Reflector, sensor: &SensorModel, rng: &mut impl Rng)
 
 /// The reported range of a distance, given a standard normal draw for its noise.
 pub(super) fn reported(distance: f64, sensor: &SensorModel, normal: f64) -> f64 {
-    let sigma = sensor.noise.hypot(sensor.noise_per_metre * distance);
+    let sigma = libm::hypot(sensor.noise, sensor.noise_per_metre * distance);
     let range = (1.0 + sensor.scale) * distance + sigma * normal;
     if sensor.quantum > 0.0 { (range / sensor.quantum).round() * sensor.quantum } else { range }
 }
@@ -52,7 +53,7 @@ pub(super) fn reported(distance: f64, sensor: &SensorModel, normal: f64) -> f64 
 /// The angle from a wall's normal at which a diffuse echo originates; `off` is the angle between
 /// normal and beam axis, radians.
 pub(super) fn scatter_angle(off: f64, sensor: &SensorModel, rng: &mut impl Rng) -> f64 {
-    sensor.scatter_lean * off + sensor.scatter_spread * rng.sample::<f64, _>(StandardNormal)
+    sensor.scatter_lean * off + sensor.scatter_spread * random::normal(rng)
 }
 
 pub(super) fn happens(probability: f64, rng: &mut impl Rng) -> bool {

@@ -74,6 +74,12 @@ impl World {
         &self.walls
     }
 
+    /// The unmapped obstacles.
+    #[must_use]
+    pub fn obstacles(&self) -> &[Obstacle] {
+        &self.obstacles
+    }
+
     /// Speed of sound, m/s.
     #[must_use]
     pub fn speed_of_sound(&self) -> f64 {
@@ -83,7 +89,7 @@ impl World {
     /// The first wall on the beam's axis, and the point of intersection.
     #[must_use]
     pub fn on_axis(&self, from: Point, axis: f64) -> Option<(usize, Point)> {
-        let (sin, cos) = axis.sin_cos();
+        let (sin, cos) = libm::sincos(axis);
         let mut reach = FIRST_REACH;
         loop {
             let end = [from[0] + reach * cos, from[1] + reach * sin];

@@ -14,13 +14,13 @@ pub struct Segment {
 /// Distance between two points, metres.
 #[must_use]
 pub fn distance(from: Point, to: Point) -> f64 {
-    (to[0] - from[0]).hypot(to[1] - from[1])
+    libm::hypot(to[0] - from[0], to[1] - from[1])
 }
 
 /// Direction from one point to another, radians in the map frame.
 #[must_use]
 pub fn direction(from: Point, to: Point) -> f64 {
-    (to[1] - from[1]).atan2(to[0] - from[0])
+    libm::atan2(to[1] - from[1], to[0] - from[0])
 }
 
 impl Segment {
@@ -28,7 +28,7 @@ impl Segment {
     #[must_use]
     pub fn new(from: Point, to: Point) -> Self {
         let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
-        let length = dx.hypot(dy);
+        let length = libm::hypot(dx, dy);
         Self { from, tangent: [dx / length, dy / length], length }
     }
 
@@ -83,7 +83,7 @@ impl Segment {
     #[must_use]
     pub fn half_way_over(&self, from: Point, to: Point) -> f64 {
         let ((along_a, off_a), (along_b, off_b)) = (self.place(from), self.place(to));
-        0.5 * (off_a.abs() + off_b.abs()).hypot(along_b - along_a)
+        0.5 * libm::hypot(off_a.abs() + off_b.abs(), along_b - along_a)
     }
 
     /// The mirror image of a point in the wall's line.
@@ -109,7 +109,7 @@ impl Segment {
     #[must_use]
     pub fn hit(&self, from: Point, direction: f64) -> Option<Point> {
         let (_, off) = self.place(from);
-        let (sin, cos) = direction.sin_cos();
+        let (sin, cos) = libm::sincos(direction);
         let approach = self.tangent[1] * cos - self.tangent[0] * sin;
         let along_ray = off / approach;
         let end = [from[0] + along_ray * cos, from[1] + along_ray * sin];

@@ -68,7 +68,7 @@ impl Sensitivity {
     #[must_use]
     pub fn at(&self, range: f64, off_axis: f64) -> f64 {
         let rim = (off_axis.abs() - self.half_angle.at(range)) / self.blur.at(range);
-        self.share.at(range) / (1.0 + rim.exp())
+        self.share.at(range) / (1.0 + libm::exp(rim))
     }
 }
 

@@ -1,8 +1,12 @@
-//! The data of the player: columns of rounded numbers, as JSON.
+//! The data of the player: a run as columns of rounded numbers, as JSON.
+//!
+//! The pages of a report and of the playground draw it. This package compiles for `wasm32-unknown-unknown`.
 
 use serde::Serialize;
 
+use sonarfix_map::Oscillation;
 use sonarfix_sim::trace::{FixRecord, Hypothesis, Outcome, Pose, SearchRecord, Tick, Trace};
+use sonarfix_sim::world::obstacle::Outline;
 use sonarfix_sim::world::reflector::Source;
 
 /// Maximum number of ticks for the player, which interpolates between them: one every 0.3 s in a
@@ -33,6 +37,7 @@ struct Player<'a> {
     /// Track width of the robot, metres.
     track: Number,
     walls: Vec<Wall<'a>>,
+    obstacles: Vec<Obstacle>,
     ticks: Ticks,
     fixes: Fixes<'a>,
     searches: Vec<Search>,
@@ -55,6 +60,17 @@ struct Search {
 struct Wall<'a> {
     name: &'a str,
     ends: [Number; 4],
+}
+
+/// An unmapped obstacle: a circle or a face.
+#[derive(Serialize)]
+struct Obstacle {
+    /// x, y and radius.
+    circle: Option<[Number; 3]>,
+    /// x and y of both ends.
+    face: Option<[Number; 4]>,
+    /// Displacement in x and y to the turning point of its walk, and the seconds in one direction.
+    walk: Option<[Number; 3]>,
 }
 
 #[derive(Serialize, Default)]
@@ -95,7 +111,10 @@ struct Fixes<'a> {
 }
 
 /// The data of the player as JSON, not yet escaped for HTML.
-pub(super) fn json(trace: &Trace) -> Result<String, serde_json::Error> {
+///
+/// # Errors
+/// Those of the serializer.
+pub fn json(trace: &Trace) -> Result<String, serde_json::Error> {
     let walls = trace.walls.iter().map(|wall| {
         let [[x0, y0], [x1, y1]] = [wall.from, wall.to];
         Wall { name: &wall.name, ends: [x0, y0, x1, y1].map(|end| rounded(end, LENGTH)) }
@@ -105,10 +124,28 @@ pub(super) fn json(trace: &Trace) -> Result<String, serde_json::Error> {
         cone: rounded(trace.cone, ANGLE),
         track: track.and_then(|track| rounded(track, LENGTH)),
         walls: walls.collect(),
+        obstacles: trace.obstacles.iter().map(obstacle).collect(),
         ticks: ticks(trace),
         fixes: fixes(trace),
         searches: searches(trace),
     })
+}
+
+fn obstacle(of: &sonarfix_sim::world::obstacle::Obstacle) -> Obstacle {
+    let (circle, face) = match of.outline {
+        Outline::Circle { centre: [x, y], radius } => (Some([x, y, radius]), None),
+        Outline::Face(face) => {
+            let [[x0, y0], [x1, y1]] = face.ends();
+            (None, Some([x0, y0, x1, y1]))
+        }
+    };
+    Obstacle {
+        circle: circle.map(|numbers| numbers.map(|number| rounded(number, LENGTH))),
+        face: face.map(|numbers| numbers.map(|number| rounded(number, LENGTH))),
+        walk: of.walk.map(|Oscillation { by: [x, y], takes }| {
+            [x, y, takes].map(|number| rounded(number, LENGTH))
+        }),
+    }
 }
 
 /// Every n-th record of the search, and those at which a pose is handed over.

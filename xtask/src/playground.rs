@@ -1,0 +1,111 @@
+//! The simulator as a static web page, and its check in a headless browser.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, ensure};
+use flate2::Compression;
+use flate2::write::GzEncoder;
+
+use crate::cargo;
+
+/// Simulated seconds of each run that browser and computer compare.
+const SECONDS: u32 = 60;
+/// Limit of the page, compressed with gzip, bytes.
+const MOST_BYTES: usize = 2_000_000;
+/// Names of the Chromium executable.
+const BROWSERS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "chrome"];
+/// No window, network or services.
+const FLAGS: [&str; 9] = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--dump-dom",
+];
+
+/// Builds the page, and checks its size and, in a browser, that it computes the same bits as this computer.
+pub fn build_and_check() -> anyhow::Result<()> {
+    let page = build()?;
+    let bytes = compressed(&page)?;
+    println!("{}: {bytes} bytes compressed with gzip", page.display());
+    ensure!(bytes <= MOST_BYTES, "the limit is {MOST_BYTES} bytes");
+    let native = digests()?;
+    let Some(browser) = browser() else {
+        eprintln!("not opened: none of {BROWSERS:?} is on the path");
+        return Ok(());
+    };
+    let root = opened(browser, &page)?;
+    ensure!(attribute(&root, "data-error").is_none(), "a script failed: {root}");
+    let computed = attribute(&root, "data-digests").context("the page has not computed a run")?;
+    let time = attribute(&root, "data-milliseconds").unwrap_or("?");
+    println!("{native}: {} runs of {SECONDS} s in {time} ms", native.split(' ').count());
+    ensure!(attribute(&root, "data-checked").is_some(), "the check has not ended: {root}");
+    ensure!(computed == native, "{browser} computed {computed}, this computer {native}");
+    Ok(())
+}
+
+/// Builds the simulator for WebAssembly, and the page with it.
+fn build() -> anyhow::Result<PathBuf> {
+    cargo::run(
+        "build --package sonarfix-playground --lib --target wasm32-unknown-unknown --profile playground",
+    )?;
+    let target = cargo::target_folder();
+    let program = target.join("wasm32-unknown-unknown/playground/sonarfix_playground.wasm");
+    let folder = target.join("playground");
+    std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+    let page = folder.join("index.html");
+    let mut command = cargo::command("run --package sonarfix-playground -- page");
+    command.args([&program, &page]);
+    cargo::check(command)?;
+    Ok(page)
+}
+
+fn compressed(page: &Path) -> anyhow::Result<usize> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
+    encoder.write_all(&std::fs::read(page)?)?;
+    Ok(encoder.finish()?.len())
+}
+
+/// The hashes of the runs on this computer.
+fn digests() -> anyhow::Result<String> {
+    let command = format!("run --package sonarfix-playground -- digests {SECONDS}");
+    Ok(cargo::printed(cargo::command(&command))?.trim().to_owned())
+}
+
+fn browser() -> Option<&'static str> {
+    let answers = |name: &&str| Command::new(name).arg("--version").output().is_ok();
+    BROWSERS.into_iter().find(answers)
+}
+
+/// The opening tag of the page with a script that uses it, after its scripts ran.
+fn opened(browser: &str, page: &Path) -> anyhow::Result<String> {
+    let (profile, checked) = (page.with_file_name("profile"), page.with_file_name("check.html"));
+    let script = cargo::root().join("sim-host/playground/tests/check.js");
+    let script = std::fs::read_to_string(&script).context("tests/check.js")?;
+    let text = std::fs::read_to_string(page)?
+        .replacen("<html", &format!("<html data-seconds=\"{SECONDS}\""), 1)
+        .replace("</body>", &format!("<script>\n{script}</script>\n</body>"));
+    std::fs::write(&checked, text)?;
+    let mut command = Command::new(browser);
+    command.args(FLAGS);
+    command.arg(format!("--user-data-dir={}", profile.display()));
+    command.arg(format!("file://{}", checked.display()));
+    let output = command.output().with_context(|| format!("cannot start {browser}"))?;
+    std::fs::remove_dir_all(&profile)?;
+    let errors = String::from_utf8_lossy(&output.stderr);
+    ensure!(output.status.success(), "{browser} failed: {errors}");
+    let dom = String::from_utf8_lossy(&output.stdout);
+    let from = dom.find("<html").context("the browser printed no page")?;
+    let tag = dom.get(from..).and_then(|rest| rest.split('>').next());
+    Ok(tag.unwrap_or_default().to_owned())
+}
+
+fn attribute<'a>(tag: &'a str, name: &str) -> Option<&'a str> {
+    tag.split_once(&format!("{name}=\""))?.1.split('"').next()
+}
