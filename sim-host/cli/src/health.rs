@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::Context;
 use sonarfix_studies::health_page;
 
+use crate::output::check_file;
 use crate::progress::Runs;
 
 #[derive(Debug, clap::Args)]
@@ -19,6 +20,9 @@ pub struct Args {
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
     anyhow::ensure!(args.runs > 0, "--runs must be at least 1");
+    if let Some(file) = &args.figure {
+        check_file("--figure", file)?;
+    }
     let runs = Runs::new(args.runs.saturating_mul(health_page::SETS));
     let findings = health_page::findings(args.runs, &runs)?;
     runs.end()?;

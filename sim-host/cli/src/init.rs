@@ -5,6 +5,7 @@ use std::fs;
 use anyhow::{Context, ensure};
 use sonarfix_map::{MapFile, Scenario, robot_file};
 
+use crate::output::check_folder;
 use answers::Answers;
 
 mod answers;
@@ -21,10 +22,21 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         "{} is not empty: name a new folder, so that no file is overwritten",
         dir.display()
     );
+    // Before the questions.
+    check_folder("the folder", dir)?;
+    let written = write(args);
+    if written.is_err() && entries.is_err() {
+        // Only if it is empty.
+        let _ = fs::remove_dir(dir);
+    }
+    written
+}
+
+fn write(args: &Args) -> anyhow::Result<()> {
+    let dir = &args.dir;
     let answers = Answers::collect(args)?;
     let files = texts::all(&answers)?;
     check(&files)?;
-    fs::create_dir_all(dir).with_context(|| format!("cannot make {}", dir.display()))?;
     for (name, text) in &files {
         let file = dir.join(name);
         fs::write(&file, text).with_context(|| format!("cannot write {}", file.display()))?;

@@ -6,6 +6,7 @@ use anyhow::{Context, bail, ensure};
 use cpu_time::ProcessTime;
 use sonarfix_rows::{Plan, Rows};
 
+use crate::output::check_file;
 use crate::rows;
 use crate::table::{self, Beside, Measured};
 
@@ -27,6 +28,9 @@ pub struct Args {
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
     let start = ProcessTime::now();
+    if let Some(file) = &args.rows {
+        check_file("--rows", file)?;
+    }
     let (plan, files) = in_order(&args.files)?;
     let open = || Ok(all(files.clone()));
     if let Some(file) = &args.rows {

@@ -71,6 +71,12 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     if let Some(dir) = &args.output.out {
         check_folder("--out", dir)?;
     }
+    if let Some(dir) = &args.rows.traces {
+        check_folder("--traces", dir)?;
+    }
+    if let Some(file) = &args.rows.rows {
+        check_file("--rows", file)?;
+    }
     if let Some(file) = &args.trace {
         check_file("--trace", file)?;
         write_trace(&experiment.trace()?, file)?;
@@ -153,7 +159,6 @@ impl Experiment {
         let Some(dir) = &args.rows.traces else {
             return Ok(());
         };
-        std::fs::create_dir_all(dir).with_context(|| format!("--traces {}", dir.display()))?;
         for row in worst {
             let file = dir.join(format!("seed-{}.csv", row.seed));
             write_trace(&self.trace_of(row.seed)?, &file)?;

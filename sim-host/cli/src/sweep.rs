@@ -14,6 +14,7 @@ use sonarfix_sim::monte_carlo;
 use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::statistics::Summary;
 
+use crate::output::check_folder;
 use crate::progress::Runs;
 use crate::rows;
 use crate::run::{Args, Output};
@@ -44,7 +45,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     });
     let scenarios = scenarios.collect::<anyhow::Result<Vec<_>>>()?;
     if let Some(dir) = &args.output.out {
-        std::fs::create_dir_all(dir).with_context(|| format!("--out {}", dir.display()))?;
+        check_folder("--out", dir)?;
     }
     let mut points = Vec::new();
     for (number, (values, scenario)) in combinations.into_iter().zip(scenarios).enumerate() {

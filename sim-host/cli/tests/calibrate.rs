@@ -7,7 +7,7 @@ use crate::common::{MAP, ROBOT};
 
 /// A log of a robot whose wheels are 2 % larger than its file states, in the room of [`MAP`]: squares of a metre to the left
 /// and to the right, and a sonar that sweeps by 20°.
-fn log() -> String {
+pub fn log() -> String {
     use std::fmt::Write as _;
     let mut log = String::from("sonarfix-log,1\nstart,0,1.5,1.5,0,0.01,0.01\nticks,0,0,0\n");
     let (mut x, mut y, mut heading, mut counts, mut time) =

@@ -5,6 +5,8 @@
 
 use std::process::{Command, Output, Stdio};
 
+use sonarfix_link::CommandResult;
+
 use crate::common::{MAP, ROBOT};
 
 fn sonarfix(arguments: &[&str]) -> Command {
@@ -20,9 +22,9 @@ fn errors(output: &Output) -> String {
 const CLASSROOM: &str = "../../crates/sonarfix-map/scenarios/classroom.toml";
 const PAPER: &str = "../../crates/sonarfix-map/scenarios/paper.toml";
 
-/// Every subcommand, with arguments for the shortest output. In `FILES` are a short log with its map and robot, a recorded
-/// stream of a robot's bytes, and room for results.
-const PRINTING: [&[&str]; 28] = [
+/// Every subcommand, with arguments for the shortest output. In `FILES` are a short log with its map and robot, a drive for
+/// the calibration, a recorded stream of a robot's bytes, rows, and room for results; `ROBOT` is the port of a robot.
+const PRINTING: [&[&str]; 40] = [
     &["--help"],
     &["init", "FILES/robot"],
     &["paper", "--runs", "1"],
@@ -32,22 +34,35 @@ const PRINTING: [&[&str]; 28] = [
     &["find", "FILES/log.csv", "--json"],
     &["find", "--floor-plans", "1", "--seconds", "5"],
     &["relocalize", "--runs", "1", "--seconds", "5"],
-    &["calibrate", "--help"],
+    &["calibrate", "FILES/drive.csv"],
     &["calibration", "--runs", "1", "--metres", "5"],
     &["export", "FILES/log.csv", "--mcap", "FILES/log.mcap"],
-    &["map", "export", PAPER, "--out", "FILES/map.svg"],
     &["convert", "carmen", "FILES/carmen.log", "--out", "FILES/converted"],
+    // These need a recording.
+    &["convert", "lego", "--help"],
+    &["convert", "nxt", "--help"],
+    &["sonar-model", "--help"],
     &["monitor", "--port", "FILES/bytes"],
-    &["command", "--help"],
+    &["command", "--port", "ROBOT", "set-pose", "1", "2", "90"],
+    &["command", "--port", "ROBOT", "set-configuration", "tests/robot.toml"],
+    &["command", "--port", "ROBOT", "start"],
+    &["command", "--port", "ROBOT", "stop"],
+    &["command", "--port", "ROBOT", "reset-calibration"],
+    &["command", "--port", "ROBOT", "search"],
+    &["command", "--port", "ROBOT", "map-checksum"],
     &["config", "bake", "tests/robot.toml", "--out", "FILES/config.bin"],
     &["config", "check", "FILES/config.bin"],
+    &["config", "show", "FILES/config.bin"],
     &["map", "check", PAPER],
+    &["map", "bake", "FILES/map.toml", "--out", "FILES/map.bin"],
+    &["map", "draw", "FILES/map.toml", "--out", "FILES/map.svg"],
     &["map", "simplify", "FILES/map.toml", "--out", "FILES/simple.csv"],
+    &["map", "export", "FILES/map.toml", "--out", "FILES/map.geojson"],
+    &["map", "import", "FILES/room.geojson", "--unit", "m", "--out", "FILES/imported.toml"],
     &["bound", CLASSROOM],
-    &["merge", "--help"],
+    &["merge", "FILES/rows.csv"],
     &["plan", CLASSROOM, "--runs", "1"],
     &["reality", "FILES"],
-    &["sonar-model", "--help"],
     &["faults", "--runs", "1"],
     &["health", "--runs", "1"],
     &["floor-plans", "--plans", "1", "--runs", "1"],
@@ -64,32 +79,115 @@ fn files() -> tempfile::TempDir {
         "log.csv",
         &format!("sonarfix-log,1\nstart,0,2,1.5,0,0.02,0.01\n{}", wheels.collect::<String>()),
     );
+    write("drive.csv", &crate::calibrate::log());
     let flaser = "FLASER 3 2.0 9.0 2.0 5.0 6.0 0.5 0.5 0 0 10.5 host 0.6\n";
     let odom = |x, time| format!("ODOM {x} 0 0 0.5 0 0 {time} host 0\n");
     write("carmen.log", &[&odom(0, 10), flaser, &odom(1, 11), flaser, &odom(2, 12)].concat());
     write("bytes", "");
+    let geojson = r#"{"type": "LineString", "coordinates": [[0, 0], [4, 0], [4, 3]]}"#;
+    write("room.geojson", geojson);
+    for arguments in [
+        ["run", CLASSROOM, "--runs", "1", "--rows", "FILES/rows.csv"].as_slice(),
+        &["config", "bake", "tests/robot.toml", "--out", "FILES/config.bin"],
+    ] {
+        assert!(printing(arguments, dir.path()).stdout(Stdio::null()).status().unwrap().success());
+    }
     dir
 }
 
 fn printing(arguments: &[&str], files: &std::path::Path) -> Command {
     let files = files.display().to_string();
-    let arguments: Vec<String> =
-        arguments.iter().map(|argument| argument.replace("FILES", &files)).collect();
+    let argument = |argument: &&str| match *argument {
+        "ROBOT" => crate::link_command::robot(0, CommandResult::Done).0,
+        argument => argument.replace("FILES", &files),
+    };
+    let arguments: Vec<String> = arguments.iter().map(argument).collect();
     sonarfix(&arguments.iter().map(String::as_str).collect::<Vec<_>>())
+}
+
+/// The help of a subcommand, in short: each option in one line.
+fn help(subcommand: &[String]) -> String {
+    let subcommand = subcommand.iter().map(String::as_str);
+    let arguments: Vec<&str> = subcommand.chain(["-h"]).collect();
+    let output = sonarfix(&arguments).stdout(Stdio::piped()).output().unwrap();
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// Every subcommand without further ones, as clap lists it.
+fn subcommands(of: &[String]) -> Vec<Vec<String>> {
+    let help = help(of);
+    let commands = help.lines().skip_while(|line| *line != "Commands:").skip(1);
+    let commands = commands.take_while(|line| !line.is_empty());
+    let names = commands.filter_map(|line| line.split_whitespace().next());
+    let all: Vec<Vec<String>> = names
+        .filter(|name| *name != "help")
+        .flat_map(|name| subcommands(&[of, &[name.to_owned()]].concat()))
+        .collect();
+    if all.is_empty() { vec![of.to_vec()] } else { all }
 }
 
 /// No subcommand is missing in [`PRINTING`].
 #[test]
 fn every_subcommand_is_in_the_table() {
-    let output = sonarfix(&["--help"]).stdout(Stdio::piped()).output().unwrap();
-    let help = String::from_utf8(output.stdout).unwrap();
-    let commands = help.lines().skip_while(|line| *line != "Commands:").skip(1);
-    let commands = commands.take_while(|line| !line.is_empty());
-    let names: Vec<&str> = commands.filter_map(|line| line.split_whitespace().next()).collect();
-    assert!(names.len() > 15, "{names:?}");
-    for name in names.into_iter().filter(|name| *name != "help") {
-        let is_listed = PRINTING.iter().any(|arguments| arguments.first() == Some(&name));
-        assert!(is_listed, "{name}");
+    let all = subcommands(&[]);
+    assert!(all.len() > 30, "{all:?}");
+    for subcommand in all {
+        let is_this = |arguments: &&&[&str]| {
+            let mut words = arguments.iter();
+            subcommand.iter().all(|name| words.any(|word| word == name))
+        };
+        assert!(PRINTING.iter().any(|arguments| is_this(&arguments)), "{subcommand:?}");
+    }
+}
+
+/// The options that name a file or folder, of all subcommands: those that are written are in [`WRITING`].
+#[test]
+fn every_option_that_names_a_result_is_in_the_table() {
+    const READ: [&str; 11] = [
+        "--board",
+        "--config",
+        "--data",
+        "--firmware",
+        "--map",
+        "--path",
+        "--reference",
+        "--robot",
+        "--sensor",
+        "--servo",
+        "--walls",
+    ];
+    for subcommand in subcommands(&[]) {
+        for line in help(&subcommand).lines() {
+            let mut words = line.split_whitespace().skip_while(|word| !word.starts_with("--"));
+            let (Some(option), Some(value)) = (words.next(), words.next()) else { continue };
+            let names_a_file = value.contains('.') || value.contains("FILE") || value == "<DIR>";
+            if !line.trim_start().starts_with('-')
+                || !value.starts_with('<')
+                || !names_a_file
+                || READ.contains(&option)
+            {
+                continue;
+            }
+            let is_listed = WRITING.iter().any(|(arguments, listed)| {
+                let mut words = arguments.iter();
+                *listed == option && subcommand.iter().all(|name| words.any(|word| word == name))
+            });
+            assert!(is_listed, "{subcommand:?} {option}");
+        }
+    }
+}
+
+/// Ctrl-C of every subcommand with many runs is tested.
+#[cfg(unix)]
+#[test]
+fn every_subcommand_with_runs_is_interrupted() {
+    for subcommand in subcommands(&[]) {
+        let has_runs =
+            help(&subcommand).lines().any(|line| line.trim_start().starts_with("--runs "));
+        let is_listed = LONG.iter().any(|(arguments, _)| {
+            arguments.first().copied() == subcommand.first().map(String::as_str)
+        });
+        assert!(!has_runs || is_listed, "{subcommand:?}");
     }
 }
 
@@ -107,6 +205,10 @@ fn a_closed_standard_output_ends_it_quietly() {
     }
 }
 
+/// Print to standard error only.
+#[cfg(target_os = "linux")]
+const SILENT: [&[&str]; 4] = [&["convert"], &["map", "bake"], &["map", "draw"], &["map", "export"]];
+
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_standard_output_is_an_error() {
@@ -116,9 +218,8 @@ fn a_full_standard_output_is_an_error() {
         let output = printing(arguments, files.path()).stdout(full).output().unwrap();
         let errors = errors(&output);
         assert!(!errors.contains("panicked"), "{arguments:?}: {errors}");
-        // clap, which prints the help, has messages of its own; the conversions print to standard error only.
-        let is_silent =
-            arguments.starts_with(&["convert"]) || arguments.starts_with(&["map", "export"]);
+        // clap, which prints the help, has messages of its own.
+        let is_silent = SILENT.iter().any(|silent| arguments.starts_with(silent));
         if !arguments.contains(&"--help") && !is_silent {
             assert_eq!(output.status.code(), Some(1), "{arguments:?}: {errors}");
             assert!(errors.contains("error: standard output"), "{arguments:?}: {errors}");
@@ -168,27 +269,47 @@ fn a_long_line_is_not_echoed() {
     assert!(errors.len() < 2_000, "{} bytes of error message", errors.len());
 }
 
-/// A result that cannot be written is refused before the work, by every command that writes one: each of these would otherwise
-/// end with another error, or work for hours.
+/// The options that name a result, each in a command that would otherwise end with another error, or work for hours.
+const WRITING: [(&[&str], &str); 30] = [
+    (&["paper", "--runs", "4000000"], "--out"),
+    (&["run", CLASSROOM, "--runs", "4000000"], "--out"),
+    (&["run", CLASSROOM, "--runs", "4000000"], "--trace"),
+    (&["run", CLASSROOM, "--runs", "4000000", "--rows", "/dev/null", "--worst", "1"], "--traces"),
+    (&["run", CLASSROOM, "--runs", "4000000"], "--rows"),
+    (&["run", CLASSROOM, "--runs", "4000000", "--sweep", "sonar.noise=1mm,2mm"], "--out"),
+    (&["merge", "missing.csv"], "--rows"),
+    (&["pil", CLASSROOM, "--machine", "host"], "--record"),
+    (&["replay", "missing.csv"], "--out"),
+    (&["replay", "missing.csv"], "--trace"),
+    (&["plan", CLASSROOM, "--runs", "4000000"], "--out"),
+    (&["health", "--runs", "4000000"], "--figure"),
+    (&["floor-plans", "--plans", "4000000"], "--images"),
+    (&["floor-plans", "--draw", "1"], "--out"),
+    (&["floor-plans", "--draw", "1"], "--toml"),
+    (&["calibrate", "missing.csv"], "--out"),
+    (&["calibrate", "missing.csv"], "--trajectory"),
+    (&["calibrate", "missing.csv"], "--residuals"),
+    (&["export", "missing.csv"], "--mcap"),
+    (&["export", "missing.csv"], "--parquet"),
+    (&["map", "bake", "missing.toml"], "--out"),
+    (&["map", "draw", "missing.toml"], "--out"),
+    (&["map", "simplify", "missing.toml"], "--out"),
+    (&["map", "import", "missing.svg"], "--out"),
+    (&["map", "export", "missing.toml"], "--out"),
+    (&["config", "bake", "missing.toml"], "--out"),
+    (&["convert", "carmen", "missing.log"], "--out"),
+    (&["convert", "lego", "missing"], "--out"),
+    (&["convert", "nxt", "missing"], "--out"),
+    (&["monitor", "--port", "missing"], "--record"),
+];
+
+/// A result that cannot be written is refused before the work, by every command that writes one.
 #[test]
 fn a_result_that_cannot_be_written_is_an_early_error() {
     const NOWHERE: &str = "tests/robot.toml/result";
-    let commands: [(&[&str], &str); 13] = [
-        (&["paper", "--runs", "4000000"], "--out"),
-        (&["run", CLASSROOM, "--runs", "4000000"], "--out"),
-        (&["run", CLASSROOM, "--runs", "4000000"], "--trace"),
-        (&["replay", "missing.csv"], "--out"),
-        (&["replay", "missing.csv"], "--trace"),
-        (&["plan", CLASSROOM, "--runs", "4000000"], "--out"),
-        (&["floor-plans", "--plans", "4000000"], "--images"),
-        (&["floor-plans", "--draw", "1"], "--out"),
-        (&["map", "bake", "missing.toml"], "--out"),
-        (&["map", "draw", "missing.toml"], "--out"),
-        (&["config", "bake", "missing.toml"], "--out"),
-        (&["convert", "carmen", "missing.log"], "--out"),
-        (&["monitor", "--port", "missing"], "--record"),
-    ];
-    for (arguments, option) in commands {
+    let init = sonarfix(&["init", NOWHERE]).output().unwrap();
+    assert!(errors(&init).contains("the folder"), "{}", errors(&init));
+    for (arguments, option) in WRITING {
         let output = sonarfix(arguments).args([option, NOWHERE]).output().unwrap();
         assert!(errors(&output).contains(option), "{arguments:?}: {}", errors(&output));
         assert_eq!(output.status.code(), Some(1), "{arguments:?}");
@@ -208,7 +329,7 @@ fn a_narrow_office_is_drawn() {
 
 /// Commands with more runs than anyone waits for, and what their output must begin with.
 #[cfg(unix)]
-const LONG: [(&[&str], &str); 8] = [
+const LONG: [(&[&str], &str); 9] = [
     (&["paper", "--runs", "4000000"], "Estimates"),
     (
         &["run", "../../crates/sonarfix-map/scenarios/classroom.toml", "--runs", "4000000"],
@@ -220,6 +341,7 @@ const LONG: [(&[&str], &str); 8] = [
     (&["relocalize", "--runs", "1000000", "--seconds", "5"], ""),
     (&["plan", CLASSROOM, "--runs", "100000"], ""),
     (&["health", "--runs", "1000000"], "# Reliability"),
+    (&["calibration", "--runs", "1000000", "--metres", "5"], ""),
 ];
 
 /// Interrupts a command after this time.

@@ -30,7 +30,7 @@ fn printed(output: &Output) -> (String, String) {
 
 /// A robot on a socket: of its answers, as many as this are lost before each that arrives. Returns the executed
 /// commands.
-fn robot(deaf_for: usize, outcome: CommandResult) -> (String, JoinHandle<Vec<Order>>) {
+pub fn robot(deaf_for: usize, outcome: CommandResult) -> (String, JoinHandle<Vec<Order>>) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let port = format!("tcp:{}", listener.local_addr().unwrap());
     let run = move || {
