@@ -351,8 +351,21 @@ impl Source {
 
     /// Whether it is still near, while an echo at `range` comes from elsewhere.
     pub fn hides(&self, range: Metres) -> bool {
+        self.is_near() && !self.is_at(range)
+    }
+
+    /// Whether it is still near, and an echo at `range` is its own.
+    pub fn repeats(&self, range: Metres) -> bool {
+        self.is_near() && self.is_at(range)
+    }
+
+    fn is_near(&self) -> bool {
+        self.probability() > 0.5 * SAME_SOURCE
+    }
+
+    fn is_at(&self, range: Metres) -> bool {
         let limit = ELSEWHERE * (SOURCE_DEVIATION + self.travelled.0);
-        self.probability() > 0.5 * SAME_SOURCE && (range - self.range).0.abs() > limit
+        (range - self.range).0.abs() <= limit
     }
 
     /// Density of its echo at a range: the source stands still while the robot moves, in any direction.

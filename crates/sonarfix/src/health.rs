@@ -110,7 +110,7 @@ pub struct Health {
     /// Ranges used since the last one that was not, or since the verdict improved.
     pub accepted_in_a_row: u16,
     /// Ranges gated or downweighted since the last one accepted; pings without a range do not interrupt
-    /// the count.
+    /// the count, and the repeated echo of one object counts once (`docs/model.md`, eq. 26).
     pub gated_in_a_row: u16,
     /// Pings without a usable range since the last one used or gated.
     pub silent_in_a_row: u16,
@@ -191,11 +191,13 @@ impl Health {
         self.time_since_fix = Duration::from_ticks(ticks);
     }
 
-    /// Records the outcome of a ping, its evidence against the pose, and the uncertainty after it.
+    /// Records the outcome of a ping, its evidence against the pose, whether it repeats the echo of an object, and the
+    /// uncertainty after it.
     pub(crate) fn record_fix(
         &mut self,
         fix: &Fix,
         evidence: f32,
+        is_repeated: bool,
         uncertainty: PoseUncertainty,
         limits: &Limits,
     ) {
@@ -213,7 +215,8 @@ impl Health {
             Fix::Downweighted(_) | Fix::Gated(_) => {
                 self.accepted_in_a_row = 0;
                 self.silent_in_a_row = 0;
-                self.gated_in_a_row = self.gated_in_a_row.saturating_add(1);
+                let news = u16::from(!is_repeated);
+                self.gated_in_a_row = self.gated_in_a_row.saturating_add(news);
                 self.worsen(limits);
             }
             Fix::Refused(_) => self.count_silent(limits),

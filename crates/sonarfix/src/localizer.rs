@@ -120,11 +120,14 @@ struct Explained {
     evidence: f32,
     /// Whether it contradicts the pose, independently of the ping before.
     contradicts: bool,
+    /// Whether the echo is that of the object that has already returned one ([`Source::repeats`]).
+    is_repeated: bool,
 }
 
 impl Explained {
     fn refused(refusal: Refusal) -> Self {
-        Self { fix: Fix::Refused(refusal), evidence: 0.0, contradicts: false }
+        let fix = Fix::Refused(refusal);
+        Self { fix, evidence: 0.0, contradicts: false, is_repeated: false }
     }
 }
 
@@ -320,10 +323,11 @@ impl<'m> Localizer<'m> {
     pub fn fix(&mut self, aim: &Aim, range: Option<Metres>) -> Fix {
         self.history.record_bearing(aim.wall, aim.bearing, aim.range);
         self.association = 0.0;
-        let Explained { fix, evidence, contradicts } =
+        let Explained { fix, evidence, contradicts, is_repeated } =
             self.try_fix(aim, range).unwrap_or_else(Explained::refused);
         let limits = self.limits();
-        self.health.record_fix(&fix, evidence, self.ekf.pose_uncertainty(), &limits);
+        let uncertainty = self.ekf.pose_uncertainty();
+        self.health.record_fix(&fix, evidence, is_repeated, uncertainty, &limits);
         if contradicts {
             self.inflate_if_lost();
         }
@@ -391,13 +395,16 @@ impl<'m> Localizer<'m> {
             self.pose_changed();
         }
         self.association = association;
+        let is_repeated =
+            measured.is_ok_and(|range| entry.source.is_some_and(|source| source.repeats(range)));
         let origin = match measured {
             Ok(_) if association > 0.5 => Origin::Wall,
             Ok(range) => Origin::Other(range),
             Err(_) => Origin::Silence,
         };
         self.history.record_echo(&entry, now_occluded, origin, self.time);
-        Ok(Explained { fix, evidence, contradicts: gating::contradicts(mapped, occluded) })
+        let contradicts = gating::contradicts(mapped, occluded);
+        Ok(Explained { fix, evidence, contradicts, is_repeated })
     }
 
     /// Inflates the covariance of the pose while the verdict is `Lost`, so that later echoes can be

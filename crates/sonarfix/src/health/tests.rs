@@ -38,7 +38,7 @@ fn a_health_that_is_lost_has_its_evidence_and_uncertainty() {
 fn the_mean_nis_remembers_sixteen_ranges() {
     for (deviations, expected) in [(2.0, 1.0 + 3.0 / 16.0), (10.0, 1.0 + 24.0 / 16.0)] {
         let mut health = Health::default();
-        health.record_fix(&accepted(deviations), 0.0, CERTAIN, &LIMITS);
+        health.record_fix(&accepted(deviations), 0.0, false, CERTAIN, &LIMITS);
         assert_eq!(health.nis.to_bits(), f32::to_bits(expected));
     }
 }
@@ -81,7 +81,7 @@ fn a_minute_without_a_used_range_degrades() {
     let mut health = Health::default();
     health.record_unseen(MICROSECOND, DEGRADED_WITHOUT_FIX + MICROSECOND, CERTAIN, &LIMITS);
     assert_eq!(health.verdict, Verdict::Degraded);
-    health.record_fix(&accepted(0.0), 0.0, CERTAIN, &LIMITS);
+    health.record_fix(&accepted(0.0), 0.0, false, CERTAIN, &LIMITS);
     assert_eq!(health.time_since_fix, NO_TIME);
 }
 
@@ -106,7 +106,7 @@ fn an_improvement_has_each_of_its_conditions() {
     let improved = |evidence, inflations, ranges| {
         let mut health =
             Health { verdict: Verdict::Degraded, evidence, inflations, ..Health::default() };
-        (0..ranges).for_each(|_| health.record_fix(&accepted(1.0), 0.0, CERTAIN, &LIMITS));
+        (0..ranges).for_each(|_| health.record_fix(&accepted(1.0), 0.0, false, CERTAIN, &LIMITS));
         health.verdict == Verdict::Tracking
     };
     assert!(improved(0.499, 3, 3));
@@ -121,7 +121,7 @@ fn pings_without_a_range_degrade_by_their_number() {
     let first = |uncertainty, verdict| {
         let mut health = Health::default();
         (1..=40).find(|_| {
-            health.record_fix(&Fix::Refused(Refusal::NoEcho), 0.0, uncertainty, &LIMITS);
+            health.record_fix(&Fix::Refused(Refusal::NoEcho), 0.0, false, uncertainty, &LIMITS);
             health.verdict == verdict
         })
     };

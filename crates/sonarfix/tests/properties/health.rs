@@ -116,6 +116,26 @@ fn a_good_estimate_in_a_cluttered_room_is_not_lost() {
     assert!(!verdicts(&[TooShort; 90]).contains(&Lost));
 }
 
+/// Pings at an object before the wall: its repeated echo counts once, echoes of other objects count each.
+#[test]
+fn the_repeated_echo_of_one_object_counts_once() {
+    let walls = one_wall();
+    let mut repeated = new_localizer(&walls);
+    (0..30).for_each(|_| drop(apply(&mut repeated, TooShort)));
+    let health = repeated.health();
+    assert_eq!((health.gated_in_a_row, health.verdict), (1, Tracking), "{health:?}");
+
+    let mut different = new_localizer(&walls);
+    for count in 1_u8..=8 {
+        assert_eq!(different.health().verdict, Tracking, "{:?}", different.health());
+        let aim = different.aim().unwrap();
+        let fix = different.fix(&aim, Some(aim.range - Metres(0.3 + 0.15 * f32::from(count))));
+        assert!(matches!(fix, Fix::Gated(_)), "{fix:?}");
+        assert_eq!(different.health().gated_in_a_row, u16::from(count));
+    }
+    assert_eq!(different.health().verdict, Degraded);
+}
+
 /// Eqs. (15), (23) and (26) in `f64`, for a robot that stands square to one wall, with an exact map. No time
 /// passes.
 struct PageOracle {
@@ -169,7 +189,7 @@ impl PageOracle {
         let ratio = 0.3 + 0.7 * p_wrong / p;
         self.evidence = (self.evidence + ratio.ln().min(4.0)).clamp(0.0, f64::from(LOST_AT));
         let total = (1.0 - o) * seen + o * repeated;
-        self.occluded = (o * repeated / total).max(0.8 * o).min(0.95);
+        self.occluded = (o * repeated / total).max(0.8 * o).min(0.99);
         let is_other = echo.is_some_and(|(nu, _)| nu.abs() > 0.5);
         if is_other && self.source.is_none() {
             self.source = range;
