@@ -114,8 +114,15 @@ fn from_table(robot: &Table<'_>) -> RobotConfig {
     {
         robot.report_at(key_of(error), format!("must be {}", error.rule));
     }
+    if robot.mistakes() == mistakes && config.start.is_unknown() && !config.motors.lost {
+        robot.report_at("motors.lost", SEARCH_STOPPED);
+    }
     config
 }
+
+/// Why a robot that searches for its pose must be able to drive while it is lost.
+const SEARCH_STOPPED: &str = "must be \"on\" with start = \"unknown\": a robot finds its pose while it drives, and is lost until \
+     then; write \"on\", or start = \"known\"";
 
 /// The position in the file of a field that a check refused.
 fn key_of(error: RobotConfigError) -> &'static str {

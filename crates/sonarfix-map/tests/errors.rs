@@ -632,6 +632,23 @@ fn ten_mistakes_are_reported_at_once() {
     assert!(lines.is_sorted(), "{shown}");
 }
 
+/// A robot that searches for its pose has to drive while it is lost.
+#[test]
+fn a_searching_robot_may_drive_while_it_is_lost() {
+    let search =
+        CLASSROOM.replacen("[robot.drive]", "[robot]\nstart = \"unknown\"\n\n[robot.drive]", 1);
+    let with_motors = |lost: &str| format!("{search}\n[robot.motors]\nlost = \"{lost}\"\n");
+    parse(&search).unwrap();
+    parse(&with_motors("on")).unwrap();
+    let stopped = with_motors("off");
+    let error = parse(&stopped).unwrap_err();
+    let mistake = error.mistakes().next().unwrap();
+    assert_eq!(mistake.line(), line_of(&stopped, "lost = \"off\""));
+    let shown = error.to_string();
+    assert!(shown.contains("must be \"on\" with start = \"unknown\""), "{shown}");
+    parse(&stopped.replacen("\"unknown\"", "\"known\"", 1)).unwrap();
+}
+
 /// No mistake follows from another: with one value damaged, there is one mistake.
 #[test]
 fn a_mistake_has_no_consequences() {
@@ -766,8 +783,10 @@ fn a_robot_that_is_written_is_read_back() {
         link_timeout: Duration::millis(1_500),
     };
     let region = Region { from: Point::new(0.5, -1.0), to: Point::new(2.0, 3.25) };
-    odd.start = StartPose::Unknown { region: Some(region) };
-    for robot in [classroom, odd, parse(PAPER).unwrap().robot] {
+    let mut searching = odd;
+    searching.motors.lost = true;
+    searching.start = StartPose::Unknown { region: Some(region) };
+    for robot in [classroom, odd, searching, parse(PAPER).unwrap().robot] {
         let text = robot_text(&robot);
         let mut read = robot_file::parse(&text, "written.toml").unwrap();
         let near = |a: Radians, b: Radians| (a - b).abs() < Radians(1e-6);

@@ -41,7 +41,6 @@ enum Command {
     /// Shows the telemetry of a robot and records it for `replay`.
     Monitor(monitor::Args),
     /// Sends a command to a robot.
-    /// Sends a command to a robot.
     #[command(name = "command")]
     Send(command::Args),
     /// Joins the rows of `run --shard`.

@@ -109,6 +109,25 @@ fn the_written_robot_finds_its_way() {
     assert!(rms("x").hypot(rms("y")) < 0.03, "{summary}");
 }
 
+/// A robot that is to find its pose needs motors that run while it is lost, and the file says so.
+#[test]
+fn the_written_robot_can_be_changed_to_find_its_pose() {
+    let dir = tempfile::tempdir().unwrap();
+    run(dir.path(), &["init", "."]);
+    let file = dir.path().join("robot.toml");
+    let written = fs::read_to_string(&file).unwrap();
+    let searching = written.replace("\nstart = \"known\"", "\nstart = \"unknown\"");
+    assert_ne!(searching, written);
+    fs::write(&file, &searching).unwrap();
+    let bake = ["config", "bake", "robot.toml", "--out", "config.bin"];
+    let error = refusal(dir.path(), &bake);
+    assert!(error.contains("motors.lost") && error.contains("write \"on\""), "{error}");
+    let driving = searching.replace("\nlost = \"off\"", "\nlost = \"on\"");
+    assert_ne!(driving, searching);
+    fs::write(&file, driving).unwrap();
+    run(dir.path(), &bake);
+}
+
 #[test]
 fn a_folder_with_files_is_left_alone() {
     let dir = tempfile::tempdir().unwrap();
