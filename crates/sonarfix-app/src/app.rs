@@ -296,8 +296,12 @@ impl<'m, F: NorFlash> App<'m, F> {
         }
         match &mut self.mode {
             Mode::Waiting(check) => {
-                polled.missing = check.poll(now, hardware);
+                let config = self.config.as_ref().map(|(config, _)| config);
+                polled.missing = check.poll(now, config, hardware);
                 self.faults = self.faults.plus(polled.missing);
+                if let Some(readings) = check.readings(now, config, hardware) {
+                    self.wire.send(&Telemetry::Devices(readings), link);
+                }
                 polled.is_on_time = since(now, self.time) <= Settings::default().tolerance;
             }
             Mode::Running(running) => {

@@ -1,10 +1,12 @@
 //! The check of the devices while the loop does not run. The running loop only detects faults of devices that it uses.
 
 use sonarfix::units::{Duration, Instant, Radians};
+use sonarfix_hal::config::{RobotConfig, WheelConfig};
 use sonarfix_hal::encoder::Counter;
-use sonarfix_hal::ranger::{Ranger, TriggerError};
+use sonarfix_hal::ranger::{NoEcho, Outcome, Ranger, TriggerError};
 use sonarfix_hal::robot::{EncoderFaults, Faults, Hardware};
 use sonarfix_hal::servo::PointError;
+use sonarfix_link::message::{DeviceReadings, EncoderReading, ServoReading};
 
 use crate::time::after;
 
@@ -12,6 +14,14 @@ use crate::time::after;
 const PERIOD: Duration = Duration::from_ticks(1_000_000);
 /// The longest time of a ranger: longer than any driver of `sonarfix-hal` takes.
 const TIMEOUT: Duration = Duration::from_ticks(150_000);
+/// How long the readings are shown after a command.
+const SHOWN_FOR: Duration = Duration::from_ticks(60_000_000);
+/// Period of the readings.
+const READINGS: Duration = Duration::from_ticks(100_000);
+/// Period of the checks while the readings are shown.
+const SHOWN_PERIOD: Duration = Duration::from_ticks(200_000);
+/// Checks after which the servo turns to the next bearing: two seconds, in which a slow servo arrives and can be seen.
+const CHECKS_PER_BEARING: u8 = 8;
 
 /// A check of all devices, once a second: reads both counters, points the servo ahead, pings. Without a configuration
 /// the servo is not checked.
@@ -22,10 +32,15 @@ const TIMEOUT: Duration = Duration::from_ticks(150_000);
 /// ```
 ///
 /// It cannot detect an unplugged quadrature encoder, which reads like a wheel at rest, nor a hobby servo that does not
-/// turn, which has no feedback.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// turn, which has no feedback. [`Self::show`] therefore lets a person see them: for a minute the servo turns in turn ahead
+/// and to its limits, and [`Self::readings`] returns what the devices read.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Check {
     state: State,
+    has_servo_failed: bool,
+    /// The result of the last ping.
+    ping: Option<Outcome>,
+    shown: Option<Shown>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,26 +49,85 @@ enum State {
     Pinging { since: Instant },
 }
 
+/// The readings are shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Shown {
+    until: Instant,
+    /// When the next readings are due.
+    next: Instant,
+    /// Checks since the first bearing.
+    checks: u8,
+}
+
 impl Check {
     /// A check that is due at `now`.
     #[must_use]
     pub fn new(now: Instant) -> Self {
-        Self { state: State::Resting { until: now } }
+        let state = State::Resting { until: now };
+        Self { state, has_servo_failed: false, ping: None, shown: None }
+    }
+
+    /// Shows the readings for a minute from `now` on.
+    pub fn show(&mut self, now: Instant) {
+        let Shown { next, checks, .. } =
+            self.shown.unwrap_or(Shown { until: now, next: now, checks: 0 });
+        self.shown = Some(Shown { until: after(now, SHOWN_FOR), next, checks });
     }
 
     /// Handles what is due; returns the faults that were found.
-    pub fn poll(&mut self, now: Instant, hardware: &mut impl Hardware) -> Faults {
+    pub fn poll(
+        &mut self,
+        now: Instant,
+        config: Option<&RobotConfig>,
+        hardware: &mut impl Hardware,
+    ) -> Faults {
         let mut faults = Faults::default();
         match self.state {
             State::Resting { until } if now < until => {}
             State::Resting { .. } => {
                 count(hardware, &mut faults);
-                faults.servo = u32::from(has_servo_failed(now, hardware));
+                let bearing = config.map_or(Radians(0.0), |config| self.next_bearing(config));
+                self.has_servo_failed = has_servo_failed(now, bearing, hardware);
+                faults.servo = u32::from(self.has_servo_failed);
                 self.trigger(now, hardware, &mut faults);
             }
             State::Pinging { since } => self.listen(now, since, hardware, &mut faults),
         }
         faults
+    }
+
+    /// What the devices read, when that is due to be shown.
+    pub fn readings(
+        &mut self,
+        now: Instant,
+        config: Option<&RobotConfig>,
+        hardware: &mut impl Hardware,
+    ) -> Option<DeviceReadings> {
+        self.shown = self.shown.filter(|shown| now < shown.until);
+        let shown = self.shown.as_mut().filter(|shown| now >= shown.next)?;
+        shown.next = after(now, READINGS);
+        let [right, left] =
+            [config.map(|config| &config.right_wheel), config.map(|config| &config.left_wheel)];
+        Some(DeviceReadings {
+            at: now,
+            right: encoder(hardware.right(), right),
+            left: encoder(hardware.left(), left),
+            servo: if self.has_servo_failed { None } else { servo(hardware) },
+            ping: self.ping,
+        })
+    }
+
+    /// Ahead; while the readings are shown, ahead, to the right, ahead and to the left in turn.
+    fn next_bearing(&mut self, config: &RobotConfig) -> Radians {
+        let Some(shown) = &mut self.shown else { return Radians(0.0) };
+        let turn = shown.checks / CHECKS_PER_BEARING;
+        shown.checks = (shown.checks + 1) % (4 * CHECKS_PER_BEARING);
+        let (rightmost, leftmost) = config.localizer.sonar.servo;
+        match turn {
+            1 => rightmost,
+            3 => leftmost,
+            _ => Radians(0.0),
+        }
     }
 
     fn trigger(&mut self, now: Instant, hardware: &mut impl Hardware, faults: &mut Faults) {
@@ -63,7 +137,7 @@ impl Check {
             Err(TriggerError::TooSoon) => {
                 self.state = State::Resting { until: after(now, TIMEOUT) }
             }
-            Err(_) => self.end(now, true, faults),
+            Err(_) => self.end(now, Err(NoEcho::Failed), faults),
         }
     }
 
@@ -75,16 +149,17 @@ impl Check {
         faults: &mut Faults,
     ) {
         match hardware.ranger().poll(now) {
-            Ok(Some(Ok(_))) => self.end(now, false, faults),
-            Ok(Some(Err(reason))) => self.end(now, reason.is_fault(), faults),
+            Ok(Some(outcome)) => self.end(now, outcome, faults),
             Ok(None) if now < after(since, TIMEOUT) => {}
-            Ok(None) | Err(_) => self.end(now, true, faults),
+            Ok(None) | Err(_) => self.end(now, Err(NoEcho::Failed), faults),
         }
     }
 
-    fn end(&mut self, now: Instant, has_ranger_failed: bool, faults: &mut Faults) {
-        faults.ranger = u32::from(has_ranger_failed);
-        self.state = State::Resting { until: after(now, PERIOD) };
+    fn end(&mut self, now: Instant, outcome: Outcome, faults: &mut Faults) {
+        faults.ranger = u32::from(outcome.is_err_and(NoEcho::is_fault));
+        self.ping = Some(outcome);
+        let period = if self.shown.is_some() { SHOWN_PERIOD } else { PERIOD };
+        self.state = State::Resting { until: after(now, period) };
     }
 }
 
@@ -94,7 +169,25 @@ fn count(hardware: &mut impl Hardware, faults: &mut Faults) {
     faults.left = fault(hardware.left().count().is_err());
 }
 
-fn has_servo_failed(now: Instant, hardware: &mut impl Hardware) -> bool {
+fn has_servo_failed(now: Instant, bearing: Radians, hardware: &mut impl Hardware) -> bool {
     // A servo whose limits exclude straight ahead has not failed.
-    matches!(hardware.servo().point(now, Radians(0.0)), Err(PointError::Pwm(_)))
+    matches!(hardware.servo().point(now, bearing), Err(PointError::Pwm(_)))
+}
+
+fn encoder<C: Counter>(counter: &mut C, wheel: Option<&WheelConfig>) -> EncoderReading {
+    let metres_per_edge = wheel.map_or(0.0, |wheel| {
+        let travel = wheel.travel_per_edge.0;
+        if wheel.is_mirrored { -travel } else { travel }
+    });
+    EncoderReading {
+        count: counter.count().ok(),
+        bits: u8::try_from(C::BITS).unwrap_or(u8::MAX),
+        illegal: counter.illegal(),
+        metres_per_edge,
+    }
+}
+
+fn servo(hardware: &mut impl Hardware) -> Option<ServoReading> {
+    let servo = hardware.servo();
+    Some(ServoReading { bearing: servo.target()?, micros: servo.pulse()? })
 }

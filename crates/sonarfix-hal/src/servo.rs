@@ -151,6 +151,13 @@ impl<P> Servo<P> {
         self.setup.as_ref()?.motion.target()
     }
 
+    /// The width of the present pulses, µs; `None` before the first [`Self::point`].
+    #[must_use]
+    pub fn pulse(&self) -> Option<f32> {
+        let setup = self.setup.as_ref()?;
+        Some(setup.calibration.pulse(setup.motion.target()?))
+    }
+
     /// The bearing at `now` by the model; `None` before the first [`Self::point`].
     #[must_use]
     pub fn bearing(&self, now: Instant) -> Option<Radians> {

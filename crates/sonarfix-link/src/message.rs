@@ -76,6 +76,8 @@ pub enum Telemetry {
     Search(SearchStatus),
     /// A hypothesis of the search, each once a second.
     Hypothesis(RankedHypothesis),
+    /// The readings of the devices of a robot that waits, after [`Command::ShowDevices`].
+    Devices(DeviceReadings),
 }
 
 /// The identification of a robot.
@@ -253,6 +255,47 @@ pub struct RankedHypothesis {
     pub explained: f32,
 }
 
+/// What the devices of a robot read, before the loop interprets it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct DeviceReadings {
+    /// The time of the readings.
+    pub at: Instant,
+    /// The right encoder.
+    pub right: EncoderReading,
+    /// The left encoder.
+    pub left: EncoderReading,
+    /// The servo; `None` if it could not be commanded, or without a configuration.
+    pub servo: Option<ServoReading>,
+    /// The result of the last ping; `None` before the first one has ended.
+    pub ping: Option<ranger::Outcome>,
+}
+
+/// The reading of an encoder.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct EncoderReading {
+    /// The count of the hardware, which wraps around; `None` if it cannot be read.
+    pub count: Option<u32>,
+    /// The width of the counter in bits; higher bits of the count have no meaning.
+    pub bits: u8,
+    /// Illegal transitions since the start, where the hardware detects them.
+    pub illegal: u32,
+    /// The travel of the wheel for a count of one more by the configuration, metres: negative for a mirrored wheel, zero
+    /// without a configuration.
+    pub metres_per_edge: f32,
+}
+
+/// The state of the servo.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ServoReading {
+    /// The bearing to which it is commanded.
+    pub bearing: Radians,
+    /// The width of its pulses, µs.
+    pub micros: f32,
+}
+
 /// The status of the loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -317,6 +360,8 @@ pub enum CommandError {
     Session,
     /// The configuration does not let the robot search for its pose ([`RobotConfig::start`]).
     NoSearch,
+    /// The loop runs; stop it first ([`Command::Stop`]).
+    Running,
 }
 
 impl core::fmt::Display for CommandError {
@@ -330,6 +375,7 @@ impl core::fmt::Display for CommandError {
             Self::NoPose => "the robot's pose is unknown: set it first",
             Self::Session => "the command's session has ended: send it again in a new one",
             Self::NoSearch => "the robot does not search: its robot file needs start = \"unknown\"",
+            Self::Running => "the loop runs: stop it first",
             Self::Unsupported(reason) => return write!(f, "{reason}"),
         })
     }
@@ -366,4 +412,7 @@ pub enum Command {
     OpenSession,
     /// Declares the pose unknown: a running robot searches for it, one that waits does so when it is started.
     Search,
+    /// For a minute, while the loop does not run: turns the servo in turn ahead and to both of its limits, pings, and sends
+    /// [`Telemetry::Devices`] ten times a second. Refused while the loop runs.
+    ShowDevices,
 }

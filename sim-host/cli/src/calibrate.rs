@@ -16,7 +16,7 @@ use sonarfix_batch::noise::INLIER;
 use sonarfix_batch::recording::StartPose;
 use sonarfix_batch::wall::Wall;
 use sonarfix_hal::config::RobotConfig;
-use sonarfix_map::{Floor, robot_file};
+use sonarfix_map::{MapFile, robot_file};
 use sonarfix_replay::REFERENCE_HEADER;
 use sonarfix_report::Table;
 use sonarfix_report::residuals::{Residual, residuals};
@@ -37,7 +37,7 @@ pub struct Args {
     #[arg(long, value_name = "ROBOT.toml")]
     robot: Option<PathBuf>,
     /// The map; by default map.toml beside the log, if it exists.
-    #[arg(long, value_name = "MAP.toml")]
+    #[arg(long, value_name = "MAP")]
     map: Option<PathBuf>,
     /// True poses over time. Their clock may be late and fast.
     #[arg(long, value_name = "REF.csv")]
@@ -141,7 +141,7 @@ fn walls(args: &Args) -> anyhow::Result<Vec<Wall>> {
         None if usual.exists() => &usual,
         None => return Ok(Vec::new()),
     };
-    let floor = Floor::read(map)?;
+    let floor = MapFile::read(map, None)?.floor;
     let walls = floor.named_walls().iter();
     Ok(walls.filter_map(|wall| Wall::new(wall.from(), wall.to())).collect())
 }

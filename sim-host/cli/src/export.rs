@@ -19,7 +19,7 @@ pub struct Args {
     /// A log, a recording of `monitor --record`, or a trace (docs/formats.md). A log is replayed.
     file: PathBuf,
     /// The map, or a scenario; by default map.toml beside the file.
-    #[arg(long, value_name = "MAP.toml")]
+    #[arg(long, value_name = "MAP")]
     map: Option<PathBuf>,
     /// The robot of a log; by default robot.toml beside it.
     #[arg(long, value_name = "ROBOT.toml")]

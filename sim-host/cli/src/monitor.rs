@@ -13,6 +13,7 @@ use sonarfix_monitor::recording::Recording;
 use sonarfix_monitor::{Monitor, Received, view};
 
 use crate::output::check_file;
+use crate::signs_of_life;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -22,6 +23,13 @@ pub struct Args {
     /// a new log begins, with a number in its name.
     #[arg(long, value_name = "LOG.csv")]
     record: Option<PathBuf>,
+    /// Shows what each device of a robot that waits reads, with hints (docs/build-a-robot.md). The sonar turns and pings; the
+    /// motors stay off.
+    #[arg(long, conflicts_with = "record")]
+    signs_of_life: bool,
+    /// Ends the signs of life after this time by the robot's clock.
+    #[arg(long, requires = "signs_of_life", value_name = "SECONDS")]
+    seconds: Option<f64>,
 }
 
 /// The connection to a robot.
@@ -50,6 +58,9 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         check_file("--record", file)?;
     }
     let mut port = args.port.open()?;
+    if args.signs_of_life {
+        return signs_of_life::execute(&mut port, args.seconds);
+    }
     let mut recording = args.record.clone().map(Recording::new);
     let mut monitor = Monitor::default();
     let mut screen = Screen::new()?;

@@ -20,5 +20,6 @@ mod replay;
 mod replay_command;
 mod report_in_chromium;
 mod rows;
+mod signs_of_life;
 mod skipped;
 mod sonar_model;

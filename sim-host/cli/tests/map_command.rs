@@ -92,3 +92,36 @@ fn errors_are_printed_as_text() {
         assert!(error.contains(message), "{arguments:?}: {error}");
     }
 }
+
+/// Every command that takes a map takes it as TOML, CSV, baked image and scenario: what is missing then is only the log.
+#[test]
+fn every_command_takes_every_kind_of_map() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let run = |arguments: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_sonarfix"));
+        command.current_dir(dir).args(arguments.split_whitespace()).output().unwrap()
+    };
+    assert!(run("init .").status.success());
+    assert!(run("map bake map.toml --out map.bin").status.success());
+    assert!(run("map simplify map.toml --out map.csv").status.success());
+    let log = "sonarfix-log,1\nstart,0,1,0.8,0,0.02,0.03\nwheels,0,0,0\nwheels,0.1,0.01,0.01\n\
+               range,0.1,-1.5707963,0.8\nwheels,0.2,0.02,0.02\n";
+    fs::write(dir.join("log.csv"), log).unwrap();
+    fs::write(dir.join("route.csv"), "1,0.8\n1.5,0.8\n").unwrap();
+    for map in ["map.toml", "map.csv", "map.bin", "scenario.toml"] {
+        for command in [
+            format!("map check {map}"),
+            format!("plan {map} --path route.csv --sensor hc_sr04"),
+            format!("replay log.csv --map {map} --config robot.toml"),
+            format!("find log.csv --map {map} --config robot.toml"),
+            format!("export log.csv --map {map} --config robot.toml --mcap log.mcap"),
+            format!("calibrate log.csv --map {map} --robot robot.toml --out new.toml"),
+        ] {
+            let errors = text(&run(&command).stderr);
+            // A log of a tenth of a second calibrates nothing.
+            let is_expected = errors.is_empty() || command.starts_with("calibrate");
+            assert!(is_expected && !errors.contains(map), "{command}: {errors}");
+        }
+    }
+}

@@ -7,10 +7,12 @@
 //! | [`view`] | the latest telemetry as text |
 //! | [`recording`] | telemetry as a log |
 //! | [`request`] | a command, repeated until it is acknowledged |
+//! | [`signs`] | signs of life: the devices of a robot on the bench, with hints |
 
 pub mod port;
 pub mod recording;
 pub mod request;
+pub mod signs;
 pub mod view;
 
 use sonarfix::localizer::Fix;
@@ -90,6 +92,7 @@ impl Monitor {
             Telemetry::Odometry(_)
             | Telemetry::SkippedPing(_)
             | Telemetry::Sweep(_)
+            | Telemetry::Devices(_)
             | Telemetry::Ack(_) => {}
         }
         Some(Received { lost, telemetry: frame.message })

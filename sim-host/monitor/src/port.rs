@@ -63,6 +63,12 @@ impl Port {
         Ok(Self { reader: Box::new(port), writer: Some(Box::new(writer)) })
     }
 
+    /// Whether bytes can be sent.
+    #[must_use]
+    pub fn can_send(&self) -> bool {
+        self.writer.is_some()
+    }
+
     /// Sends bytes.
     ///
     /// # Errors

@@ -19,13 +19,25 @@ const TIMEOUT: Duration = Duration::from_millis(300);
 /// # Errors
 /// Errors of the port, or if there is no answer.
 pub fn ask(port: &mut Port, command: &Command) -> anyhow::Result<CommandResult> {
+    ask_and_watch(port, command, |_| {})
+}
+
+/// The same; `watch` takes every byte that arrives meanwhile.
+///
+/// # Errors
+/// As [`ask`].
+pub fn ask_and_watch(
+    port: &mut Port,
+    command: &Command,
+    mut watch: impl FnMut(u8),
+) -> anyhow::Result<CommandResult> {
     let mut sender = Sender::starting_at(first_sequence());
     let mut receiver = Receiver::new();
     let open = SessionCommand { session: 0, command: Command::OpenSession };
-    match send(port, &mut sender, &mut receiver, &open)? {
+    match send(port, &mut sender, &mut receiver, &open, &mut watch)? {
         CommandResult::Session(session) => {
             let command = SessionCommand { session, command: *command };
-            send(port, &mut sender, &mut receiver, &command)
+            send(port, &mut sender, &mut receiver, &command, &mut watch)
         }
         other => Ok(other),
     }
@@ -37,6 +49,7 @@ fn send(
     sender: &mut Sender<SessionCommand>,
     receiver: &mut Receiver<Telemetry>,
     command: &SessionCommand,
+    watch: &mut impl FnMut(u8),
 ) -> anyhow::Result<CommandResult> {
     let sequence = sender.next();
     let mut buffer = frame::EMPTY;
@@ -45,15 +58,18 @@ fn send(
         port.send(frame)?;
         let sent = Instant::now();
         let answer = port.read(|bytes| {
+            let mut answer = None;
             for &byte in bytes {
-                if let Some(Telemetry::Ack(ack)) = receiver.push(byte).map(|frame| frame.message)
-                    && ack.sequence == sequence
-                {
-                    return Ok(ControlFlow::Break(Some(ack.result)));
+                watch(byte);
+                match receiver.push(byte).map(|frame| frame.message) {
+                    Some(Telemetry::Ack(ack)) if ack.sequence == sequence => {
+                        answer = Some(ack.result)
+                    }
+                    _ => {}
                 }
             }
-            let is_timeout = sent.elapsed() > TIMEOUT;
-            Ok(if is_timeout { ControlFlow::Break(None) } else { ControlFlow::Continue(()) })
+            let is_over = answer.is_some() || sent.elapsed() > TIMEOUT;
+            Ok(if is_over { ControlFlow::Break(answer) } else { ControlFlow::Continue(()) })
         })?;
         if let Some(outcome) = answer.context("the port was closed before an answer came")? {
             return Ok(outcome);

@@ -89,18 +89,24 @@ fn hypothesis(hypothesis: &RankedHypothesis) -> String {
 #[must_use]
 pub fn hello(hello: &Hello) -> String {
     let [major, minor, patch] = hello.firmware;
-    let reset = match hello.reset {
+    let reset = reset(hello.reset);
+    let (map, configuration) = (flashed(hello.map), flashed(hello.configuration));
+    format!(
+        "robot   {major}.{minor}.{patch}, started by {reset}; map {map}, configuration {configuration}"
+    )
+}
+
+/// The cause of a reset.
+#[must_use]
+pub fn reset(cause: ResetCause) -> &'static str {
+    match cause {
         ResetCause::PowerOn => "power on",
         ResetCause::BrownOut => "a brown-out",
         ResetCause::Pin => "the reset pin",
         ResetCause::Watchdog => "the watchdog",
         ResetCause::Software => "the firmware",
         ResetCause::Unknown => "a reset of unknown cause",
-    };
-    let (map, configuration) = (flashed(hello.map), flashed(hello.configuration));
-    format!(
-        "robot   {major}.{minor}.{patch}, started by {reset}; map {map}, configuration {configuration}"
-    )
+    }
 }
 
 /// The status of an image in flash.

@@ -105,6 +105,7 @@ impl<'m, F: NorFlash> App<'m, F> {
             }
             Command::ResetCalibration => self.reset_calibration(now, polled),
             Command::Search => self.begin_search(now, polled),
+            Command::ShowDevices => self.show_devices(now),
             Command::MapChecksum | Command::OpenSession => Ok(Next::Nothing),
         }
     }
@@ -281,6 +282,12 @@ impl<'m, F: NorFlash> App<'m, F> {
         running.robot.search(now, &mut self.search);
         let (mode, localizer) = (running.robot.mode(), running.robot.localizer());
         Ok(Next::Report(reporter::mode_changed(mode, localizer)))
+    }
+
+    fn show_devices(&mut self, now: Instant) -> Result<Next, CommandError> {
+        let Mode::Waiting(check) = &mut self.mode else { return Err(CommandError::Running) };
+        check.show(now);
+        Ok(Next::Nothing)
     }
 
     fn stop(&mut self, now: Instant) {

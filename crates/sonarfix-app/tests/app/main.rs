@@ -8,6 +8,7 @@
 
 mod attacks;
 mod commands;
+mod devices;
 mod flash;
 mod load;
 mod motors;

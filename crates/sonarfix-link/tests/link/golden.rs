@@ -43,6 +43,7 @@ fn name_of_telemetry(message: &Telemetry) -> &'static str {
         Telemetry::Sweep(_) => "sweep",
         Telemetry::Search(_) => "search status",
         Telemetry::Hypothesis(_) => "hypothesis",
+        Telemetry::Devices(_) => "devices",
     }
 }
 
@@ -56,6 +57,7 @@ fn name_of_command(message: &Command) -> &'static str {
         Command::MapChecksum => "map checksum",
         Command::OpenSession => "open session",
         Command::Search => "search",
+        Command::ShowDevices => "show devices",
     }
 }
 

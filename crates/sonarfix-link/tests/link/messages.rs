@@ -19,8 +19,8 @@ use sonarfix_hal::ranger::{Celsius, Echo, NoEcho, Outcome, PulseTiming, RangerKi
 use sonarfix_hal::robot::{EncoderFaults, Faults};
 use sonarfix_hal::servo::{MeasuredPulse, SettingError};
 use sonarfix_link::message::{
-    CommandError, ImageStatus, LoopStatus, ModeChanged, Odometry, RankedHypothesis, ResetCause,
-    SearchAnswer, SearchStatus, SkippedPing, Sweep,
+    CommandError, DeviceReadings, EncoderReading, ImageStatus, LoopStatus, ModeChanged, Odometry,
+    RankedHypothesis, ResetCause, SearchAnswer, SearchStatus, ServoReading, SkippedPing, Sweep,
 };
 use sonarfix_link::{
     Ack, Command, CommandResult, Estimate, Hello, Ping, ReceiverCounters, SessionCommand, Telemetry,
@@ -116,8 +116,8 @@ impl Source for Largest {
 }
 
 /// The numbers of kinds of telemetry and of commands.
-pub const TELEMETRY: u32 = 13;
-pub const COMMANDS: u32 = 8;
+pub const TELEMETRY: u32 = 14;
+pub const COMMANDS: u32 = 9;
 
 pub fn any_telemetry(rng: &mut ChaCha8Rng) -> Telemetry {
     let kind = rng.pick(TELEMETRY);
@@ -166,7 +166,7 @@ pub fn telemetry(kind: u32, source: &mut impl Source) -> Telemetry {
             pings: source.bits16(),
             cycles: source.bits32(),
         }),
-        _ => Telemetry::Hypothesis(RankedHypothesis {
+        12 => Telemetry::Hypothesis(RankedHypothesis {
             at: source.instant(),
             rank: source.bits16().to_le_bytes()[0],
             pose: {
@@ -179,6 +179,25 @@ pub fn telemetry(kind: u32, source: &mut impl Source) -> Telemetry {
             fit: source.single(),
             explained: source.single(),
         }),
+        _ => Telemetry::Devices(DeviceReadings {
+            at: source.instant(),
+            right: encoder(source),
+            left: encoder(source),
+            servo: (source.pick(2) == 0).then(|| ServoReading {
+                bearing: Radians(source.single()),
+                micros: source.single(),
+            }),
+            ping: (source.pick(2) == 0).then(|| outcome(source)),
+        }),
+    }
+}
+
+fn encoder(source: &mut impl Source) -> EncoderReading {
+    EncoderReading {
+        count: (source.pick(2) == 0).then(|| source.bits32()),
+        bits: source.bits16().to_le_bytes()[0],
+        illegal: source.bits32(),
+        metres_per_edge: source.single(),
     }
 }
 
@@ -202,7 +221,8 @@ pub fn command(kind: u32, source: &mut impl Source) -> SessionCommand {
         4 => Command::ResetCalibration,
         5 => Command::MapChecksum,
         6 => Command::OpenSession,
-        _ => Command::Search,
+        7 => Command::Search,
+        _ => Command::ShowDevices,
     };
     SessionCommand { session: source.bits32(), command }
 }
@@ -346,7 +366,7 @@ fn reset(source: &mut impl Source) -> ResetCause {
     source.choose(&RESETS)
 }
 
-pub const REFUSED: [CommandError; 9] = [
+pub const REFUSED: [CommandError; 10] = [
     CommandError::Configuration,
     CommandError::Pose,
     CommandError::NoMap,
@@ -356,6 +376,7 @@ pub const REFUSED: [CommandError; 9] = [
     CommandError::Unsupported(Unsupported::Servo(SettingError::Frame)),
     CommandError::Session,
     CommandError::NoSearch,
+    CommandError::Running,
 ];
 
 fn command_result(source: &mut impl Source) -> CommandResult {
