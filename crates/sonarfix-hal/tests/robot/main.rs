@@ -12,3 +12,4 @@ mod asynch;
 mod faults;
 mod properties;
 mod rig;
+mod unmeasured;
