@@ -9,6 +9,7 @@
 mod attacks;
 mod commands;
 mod devices;
+mod facts;
 mod flash;
 mod load;
 mod motors;

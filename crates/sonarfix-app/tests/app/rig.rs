@@ -75,7 +75,7 @@ impl pwm::SetDutyCycle for Pwm {
 pub struct Sonar {
     pub is_there: bool,
     /// The echo that a ping would have; none without a room.
-    echo: Option<Metres>,
+    pub echo: Option<Metres>,
     /// The ping in flight.
     ping: Option<Ping>,
 }
