@@ -34,14 +34,19 @@ pub fn embedded() -> anyhow::Result<()> {
 
 /// Formatting and Clippy of the programs for emulated boards, and of those of `bench` that link no peer.
 pub fn lint_emulated() -> anyhow::Result<()> {
-    let target = "--target thumbv7em-none-eabihf";
     let programs = [
-        (Workspace::Emulated, "--workspace"),
-        (Workspace::Bench, "--package bench-mcu --package bench-ours"),
+        (Workspace::Emulated, "--workspace --target thumbv7em-none-eabihf"),
+        (Workspace::Emulated, "--package emulated-pil --target riscv32imac-unknown-none-elf"),
+        (
+            Workspace::Bench,
+            "--package bench-mcu --package bench-ours --target thumbv7em-none-eabihf",
+        ),
     ];
-    for (workspace, packages) in programs {
+    for workspace in [Workspace::Emulated, Workspace::Bench] {
         cargo::check(workspace.cargo("fmt --all --check"))?;
-        let clippy = format!("clippy --release {packages} {target} -- -D warnings");
+    }
+    for (workspace, packages) in programs {
+        let clippy = format!("clippy --release {packages} -- -D warnings");
         cargo::check(workspace.cargo(&clippy))?;
     }
     Ok(())
@@ -54,17 +59,28 @@ pub fn peers() -> anyhow::Result<()> {
     )
 }
 
-/// Checks licences and sources; advisories too if their database can be reached.
+/// Checks licences and sources of the crates and of the firmware; advisories too if their database can be reached.
 pub fn deny() -> anyhow::Result<()> {
     cargo::output(cargo::command("deny --version"))
         .context("cargo-deny is missing: install it with `cargo install cargo-deny --locked`")?;
-    cargo::run("deny --log-level error check licenses bans sources")?;
+    deny_in_all("licenses bans sources")?;
     // The advisory database is on the network.
     if cargo::run("deny fetch db").is_err() {
         eprintln!("advisories: not checked, their database cannot be reached");
         return Ok(());
     }
-    cargo::run("deny --log-level error check advisories")
+    deny_in_all("advisories")
+}
+
+/// These checks of cargo-deny in both workspaces that make products.
+fn deny_in_all(checks: &str) -> anyhow::Result<()> {
+    for workspace in [Workspace::Main, Workspace::Firmware] {
+        let manifest = workspace.folder().join("Cargo.toml");
+        let mut command = cargo::command("deny --log-level error --manifest-path");
+        command.arg(manifest).args(["check"]).args(checks.split(' '));
+        cargo::check(command)?;
+    }
+    Ok(())
 }
 
 /// The paper's statistics at full length.

@@ -13,7 +13,7 @@ const TRACES: [(&str, &str); 3] = [
 ];
 
 /// The first is this computer.
-const MACHINES: [&str; 5] = ["host", "m4f", "m33", "m3", "m0plus"];
+const MACHINES: [&str; 6] = ["host", "m4f", "m33", "m3", "m0plus", "rv32"];
 
 /// Replays every trace on every machine.
 pub fn check() -> anyhow::Result<()> {

@@ -27,6 +27,8 @@ pub enum Machine {
     /// Cortex-M0+, in soft float: its code on a Cortex-M3, because QEMU has no M0+ board with a
     /// timer and enough memory.
     M0plus,
+    /// RISC-V of 32 bits (IMAC), in soft float, as on the ESP32-C6.
+    Rv32,
 }
 
 /// The channel of the messages.
@@ -34,7 +36,7 @@ pub enum Machine {
 pub enum Carrier {
     /// Semihosting calls of the emulated program.
     Semihosting,
-    /// The board's UART, for all machines but M33: 40 times slower.
+    /// The board's UART, of the machines M4F, M3 and M0+: 40 times slower.
     Uart,
 }
 
@@ -43,18 +45,42 @@ pub enum Carrier {
 struct Build {
     /// Target triple of rustc.
     triple: &'static str,
+    /// The program of QEMU, and its Debian package.
+    emulator: Qemu,
     /// Machine name of QEMU.
     board: &'static str,
+}
+
+/// A program of QEMU.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Qemu {
+    name: &'static str,
+    /// Its Debian package.
+    package: &'static str,
+    /// Options that all its machines need.
+    options: &'static [&'static str],
+}
+
+const ARM: Qemu = Qemu { name: "qemu-system-arm", package: "qemu-system-arm", options: &[] };
+/// The program contains all that runs: no firmware of the board starts before it.
+const RISC_V: Qemu =
+    Qemu { name: "qemu-system-riscv32", package: "qemu-system-misc", options: &["-bios", "none"] };
+
+impl Qemu {
+    const fn build(self, triple: &'static str, board: &'static str) -> Build {
+        Build { triple, emulator: self, board }
+    }
 }
 
 impl Machine {
     fn build(self) -> Option<Build> {
         match self {
             Self::Host => None,
-            Self::M4f => Some(Build { triple: "thumbv7em-none-eabihf", board: "mps2-an386" }),
-            Self::M33 => Some(Build { triple: "thumbv8m.main-none-eabihf", board: "mps2-an505" }),
-            Self::M3 => Some(Build { triple: "thumbv7m-none-eabi", board: "mps2-an385" }),
-            Self::M0plus => Some(Build { triple: "thumbv6m-none-eabi", board: "mps2-an385" }),
+            Self::M4f => Some(ARM.build("thumbv7em-none-eabihf", "mps2-an386")),
+            Self::M33 => Some(ARM.build("thumbv8m.main-none-eabihf", "mps2-an505")),
+            Self::M3 => Some(ARM.build("thumbv7m-none-eabi", "mps2-an385")),
+            Self::M0plus => Some(ARM.build("thumbv6m-none-eabi", "mps2-an385")),
+            Self::Rv32 => Some(RISC_V.build("riscv32imac-unknown-none-elf", "virt")),
         }
     }
 
@@ -69,14 +95,14 @@ impl Machine {
     ) -> anyhow::Result<Option<Emulator>> {
         let Some(build) = self.build() else { return Ok(None) };
         ensure!(
-            carrier == Carrier::Semihosting || self != Self::M33,
-            "the UART of the board with a Cortex-M33 is elsewhere: take another machine"
+            carrier == Carrier::Semihosting || !matches!(self, Self::M33 | Self::Rv32),
+            "the board of this machine has another UART: take m4f, m3 or m0plus"
         );
         let program = match program {
             Some(program) => program.to_owned(),
             None => build.program(carrier, &repository())?,
         };
-        Emulator::start(build.board, carrier, &program).map(Some)
+        Emulator::start(build, carrier, &program).map(Some)
     }
 }
 
@@ -133,10 +159,12 @@ pub struct Emulator {
 }
 
 impl Emulator {
-    fn start(board: &str, carrier: Carrier, program: &Path) -> anyhow::Result<Self> {
+    fn start(build: Build, carrier: Carrier, program: &Path) -> anyhow::Result<Self> {
         ensure!(program.exists(), "there is no program {}", program.display());
-        let mut qemu = Command::new("qemu-system-arm");
+        let Build { emulator, board, .. } = build;
+        let mut qemu = Command::new(emulator.name);
         // An instruction takes 2⁷ ns of virtual time, so that the board's timer counts instructions.
+        qemu.args(emulator.options);
         qemu.args([
             "-machine", board, "-icount", "shift=7", "-display", "none", "-monitor", "none",
         ]);
@@ -148,9 +176,10 @@ impl Emulator {
             }
         };
         qemu.arg("-kernel").arg(program).stdin(Stdio::piped()).stdout(Stdio::piped());
-        let mut child = qemu.spawn().context(
-            "cannot start qemu-system-arm; on Debian: `apt-get install qemu-system-arm`",
-        )?;
+        let mut child = qemu.spawn().with_context(|| {
+            let Qemu { name, package, .. } = emulator;
+            format!("cannot start {name}; on Debian: `apt-get install {package}`")
+        })?;
         let stdin = child.stdin.take().context("the emulator has no input")?;
         let stdout = child.stdout.take().context("the emulator has no output")?;
         let pipe = Pipe { input: BufWriter::new(stdin), output: BufReader::new(stdout) };

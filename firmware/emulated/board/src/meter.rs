@@ -1,16 +1,13 @@
 //! Measures the cost of a call: instructions, exactly and repeatably, and bytes of stack.
 //!
-//! With `-icount shift=7` QEMU advances its time by 2⁷ = 128 ns per instruction. On the MPS2 boards SysTick counts this time at
-//! 25 MHz, 3.2 ticks per instruction (at 20 MHz, 2.56 ticks, on the board with a Cortex-M33). The result is instructions, not
-//! cycles. The memory below the stack pointer is painted before the call; words that have changed were used.
+//! With `-icount shift=7` QEMU advances its time by 2⁷ = 128 ns per instruction, and a clock of the processor counts this time.
+//! The result is instructions, not cycles. The memory below the stack pointer is painted before the call; words that have
+//! changed were used.
 
-use core::arch::asm;
 use core::hint::black_box;
 use core::sync::atomic::{Ordering, compiler_fence};
 
-use cortex_m::Peripherals;
-use cortex_m::peripheral::SYST;
-use cortex_m::peripheral::syst::SystClkSource;
+use crate::processor::{Clock, instructions, stack_pointer};
 
 /// A measurable call. All have the same signature, so that the empty call has the overhead of every other.
 pub type Call<A, B> = extern "C" fn(&mut A, &B);
@@ -28,15 +25,13 @@ pub struct Cost {
     pub most_stack: u32,
 }
 
-/// SysTick has 24 bits, which correspond to 5.2 million instructions.
-const LARGEST: u32 = 0x00FF_FFFF;
 const PAINT: u32 = 0xCAFE_D00D;
 /// Words of paint: 16 KiB.
 const WORDS: usize = 4 * 1024;
 
 /// Measures calls.
 pub struct Meter {
-    systick: SYST,
+    clock: Clock,
     /// Ticks of an empty call in [`Self::count`].
     empty: u32,
     /// The stack pointer at the last counted call.
@@ -46,17 +41,15 @@ pub struct Meter {
 }
 
 impl Meter {
-    /// Starts SysTick.
+    /// Starts the clock.
     #[must_use]
     pub fn start() -> Self {
-        // SAFETY: nothing else in these programs uses a core peripheral.
-        let mut systick = unsafe { Peripherals::steal() }.SYST;
-        systick.set_clock_source(SystClkSource::Core);
-        systick.set_reload(LARGEST);
-        systick.clear_current();
-        systick.enable_counter();
-        let mut meter =
-            Self { systick, empty: 0, top: core::ptr::null(), painted: core::ptr::null_mut() };
+        let mut meter = Self {
+            clock: Clock::start(),
+            empty: 0,
+            top: core::ptr::null(),
+            painted: core::ptr::null_mut(),
+        };
         meter.empty = meter.timed(|| ());
         meter
     }
@@ -83,12 +76,11 @@ impl Meter {
     #[inline(never)]
     fn timed(&mut self, call: impl FnOnce()) -> u32 {
         self.top = stack_pointer();
-        self.systick.clear_current();
-        let before = SYST::get_current();
+        let before = self.clock.restart();
         compiler_fence(Ordering::SeqCst);
         call();
         compiler_fence(Ordering::SeqCst);
-        before.wrapping_sub(SYST::get_current()) & LARGEST
+        Clock::since(before)
     }
 
     /// Makes a call and adds its cost without the overhead of the call to `cost`.
@@ -109,34 +101,15 @@ impl Meter {
         let call = black_box(call);
         let top = stack_pointer();
         paint_below(top);
-        self.systick.clear_current();
-        let before = SYST::get_current();
+        let before = self.clock.restart();
         call(a, b);
-        let after = SYST::get_current();
+        let ticks = Clock::since(before);
         let used = used_below(top) * size_of::<u32>();
-        (before.wrapping_sub(after) & LARGEST, u32::try_from(used).unwrap_or(u32::MAX))
+        (ticks, u32::try_from(used).unwrap_or(u32::MAX))
     }
 }
 
 extern "C" fn nothing<A, B>(_: &mut A, _: &B) {}
-
-/// Period of the board's SysTick, nanoseconds.
-const TICK: u32 = include!(concat!(env!("OUT_DIR"), "/tick.rs"));
-
-/// 128 ns an instruction; rounded.
-fn instructions(ticks: u32) -> u32 {
-    // A period is a multiple of ten nanoseconds; 2²⁴ periods in units of ten nanoseconds fit into 32 bits.
-    (ticks * (TICK / 10) * 5 + 32) / 64
-}
-
-#[inline(always)]
-#[expect(clippy::inline_always, reason = "its own frame would be in the painted memory")]
-fn stack_pointer() -> *mut u32 {
-    let top;
-    // SAFETY: reads a register.
-    unsafe { asm!("mov {}, sp", out(reg) top, options(nomem, nostack, preserves_flags)) };
-    top
-}
 
 /// Paints the memory below the stack pointer.
 #[inline(always)]

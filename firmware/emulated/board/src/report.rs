@@ -2,9 +2,9 @@
 
 use core::ffi::CStr;
 
-use cortex_m_semihosting::{debug, syscall1};
-
 use crate::meter::Cost;
+use crate::processor;
+use crate::semihosting::{exit, print as write};
 
 /// Digits of the largest `u32`, and the zero that ends a string.
 const LONGEST: usize = 11;
@@ -33,7 +33,7 @@ fn number(value: u32) {
 
 /// Ends the program with success.
 pub fn done() -> ! {
-    debug::exit(debug::EXIT_SUCCESS);
+    exit(true);
     stop()
 }
 
@@ -41,20 +41,15 @@ pub fn done() -> ! {
 pub fn fail(why: &CStr) -> ! {
     write(why);
     write(c"\n");
-    debug::exit(debug::EXIT_FAILURE);
+    exit(false);
     stop()
 }
 
 /// Not reached under QEMU, which exits.
 fn stop() -> ! {
     loop {
-        cortex_m::asm::wfi();
+        processor::wait();
     }
-}
-
-fn write(text: &CStr) {
-    // SAFETY: SYS_WRITE0 reads a string that ends with a zero, as this does.
-    unsafe { syscall1!(WRITE0, text.as_ptr()) };
 }
 
 /// A number in decimal, written from the end of `text`, whose last byte stays zero.

@@ -5,10 +5,43 @@
 pub mod semihosting;
 pub mod uart;
 
+use core::cell::UnsafeCell;
+
 use embedded_io::{Read, Write};
 use emulated_board::meter::Meter as Board;
 use emulated_board::report;
 use sonarfix_pil::{Line, Meter, serve};
+
+/// Memory that a program takes once.
+pub struct Memory<const BYTES: usize>(UnsafeCell<[u8; BYTES]>);
+
+// SAFETY: these programs have one thread and no interrupt.
+unsafe impl<const BYTES: usize> Sync for Memory<BYTES> {}
+
+impl<const BYTES: usize> Memory<BYTES> {
+    /// Zeros.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self(UnsafeCell::new([0; BYTES]))
+    }
+
+    /// The memory.
+    ///
+    /// # Safety
+    /// It is taken once.
+    #[must_use]
+    #[expect(clippy::mut_from_ref, reason = "the caller takes it once")]
+    pub unsafe fn take(&'static self) -> &'static mut [u8] {
+        // SAFETY: by the caller, this is the only reference.
+        unsafe { &mut *self.0.get() }
+    }
+}
+
+impl<const BYTES: usize> Default for Memory<BYTES> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
 
 /// The board's meter of instructions and stack.
 struct Counter(Board);

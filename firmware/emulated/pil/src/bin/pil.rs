@@ -2,11 +2,15 @@
 #![no_std]
 #![no_main]
 
+use emulated_pil::Memory;
 use emulated_pil::semihosting::Console;
 
+// Enough for a map of 4,000 walls.
+static MEMORY: Memory<{ 256 * 1024 }> = Memory::new();
+
+/// The program.
 #[emulated_board::entry]
 fn main() -> ! {
-    // Enough for a map of 4,000 walls.
-    static mut MEMORY: [u8; 256 * 1024] = [0; 256 * 1024];
-    emulated_pil::run(Console::open(), MEMORY)
+    // SAFETY: the program starts once.
+    emulated_pil::run(Console::open(), unsafe { MEMORY.take() })
 }

@@ -2,10 +2,14 @@
 #![no_std]
 #![no_main]
 
+use emulated_pil::Memory;
 use emulated_pil::uart::Uart;
 
+static MEMORY: Memory<{ 16 * 1024 }> = Memory::new();
+
+/// The program.
 #[emulated_board::entry]
 fn main() -> ! {
-    static mut MEMORY: [u8; 16 * 1024] = [0; 16 * 1024];
-    emulated_pil::run(Uart::open(), MEMORY)
+    // SAFETY: the program starts once.
+    emulated_pil::run(Uart::open(), unsafe { MEMORY.take() })
 }
