@@ -32,6 +32,7 @@ mod relocalize;
 mod replay;
 mod rows;
 mod run;
+mod serve;
 mod signs_of_life;
 mod sonar_model;
 mod sweep;

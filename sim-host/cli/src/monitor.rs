@@ -1,18 +1,23 @@
 //! `sonarfix monitor`: shows the telemetry of a robot and records it.
 
-use std::io::{IsTerminal, stderr};
+use std::io::{IsTerminal, stdout};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
-use anyhow::Context;
-use indicatif::{ProgressBar, ProgressStyle};
+use ratatui::DefaultTerminal;
+use ratatui::crossterm::event::{self, Event, KeyCode, KeyModifiers};
 use sonarfix_link::Telemetry;
-
+use sonarfix_live::order::{Order, Orders, Reply};
+use sonarfix_live::robot::Robot;
 use sonarfix_monitor::port::Port;
-use sonarfix_monitor::recording::Recording;
+use sonarfix_monitor::terminal::{self, History};
 use sonarfix_monitor::{Monitor, Received, view};
+use sonarfix_sim::trace::Wall;
 
 use crate::output::check_file;
+use crate::progress::{catch_interrupt, is_interrupted};
+use crate::serve::{self, ServeArgs};
 use crate::signs_of_life;
 
 #[derive(Debug, clap::Args)]
@@ -25,11 +30,19 @@ pub struct Args {
     record: Option<PathBuf>,
     /// Shows what each device of a robot that waits reads, with hints (docs/build-a-robot.md). The sonar turns and pings; the
     /// motors stay off.
-    #[arg(long, conflicts_with = "record")]
+    #[arg(long, conflicts_with_all = ["record", "serve"])]
     signs_of_life: bool,
     /// Ends the signs of life after this time by the robot's clock.
     #[arg(long, requires = "signs_of_life", value_name = "SECONDS")]
     seconds: Option<f64>,
+    /// The robot's map, to draw it and to name its walls.
+    #[arg(long, value_name = "MAP")]
+    map: Option<PathBuf>,
+    /// The robot file, for the place of the sonar and the track width.
+    #[arg(long, value_name = "ROBOT.toml")]
+    robot: Option<PathBuf>,
+    #[command(flatten)]
+    page: ServeArgs,
 }
 
 /// The connection to a robot.
@@ -52,85 +65,206 @@ impl PortArgs {
 
 /// Period of the lines without a terminal, µs of the robot's clock.
 const EVERY: u64 = 1_000_000;
+/// Least time between two drawings of a terminal.
+const REDRAW: Duration = Duration::from_millis(50);
+/// Period in which Ctrl-C is noticed after the end of the stream.
+const PATIENCE: Duration = Duration::from_millis(100);
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
     if let Some(file) = &args.record {
         check_file("--record", file)?;
     }
+    let title = format!("Sonarfix: {}", args.port.port);
+    let (map, robot) = (args.map.as_deref(), args.robot.as_deref());
+    let (mut scene, mount) = serve::scene_of_robot(title, map, robot)?;
     let mut port = args.port.open()?;
     if args.signs_of_life {
         return signs_of_life::execute(&mut port, args.seconds);
     }
-    let mut recording = args.record.clone().map(Recording::new);
-    let mut monitor = Monitor::default();
-    let mut screen = Screen::new()?;
-    port.read(|bytes| -> anyhow::Result<ControlFlow<()>> {
-        for &byte in bytes {
-            let Some(received) = monitor.push(byte) else { continue };
-            if let Some(recording) = &mut recording {
-                recording.take(&received).context("cannot write the log")?;
-            }
-            screen.print(&monitor, &received);
-        }
-        screen.refresh(&monitor);
-        Ok(ControlFlow::Continue(()))
-    })?;
-    screen.end();
-    println!("{}", view::page(&monitor));
+    scene.commands = port.can_send();
+    let (feed, orders) = args.page.start()?;
+    let mut screen = Screen::new(scene.walls.clone());
+    let mut robot = Robot::new(feed, scene, mount);
     if let Some(path) = &args.record {
-        match recording.map_or(0, |recording| recording.logs()) {
-            0 => eprintln!("nothing was recorded: the robot sent no estimate"),
-            1 => eprintln!("recorded {}", path.display()),
-            logs => {
-                let more = logs - 1;
-                eprintln!("recorded {} and {more} more, one for each start", path.display());
-            }
-        }
+        robot.record(path.clone());
     }
-    Ok(())
+    catch_interrupt();
+    let ended = watch(&mut port, &mut robot, orders.as_ref(), &mut screen);
+    let names = screen.end();
+    summarize(&mut robot, &names);
+    let reason = match &ended {
+        Ok(End::Asked) => return Ok(()),
+        Ok(End::Stream) => "the stream has ended".to_owned(),
+        Err(error) => format!("{error:#}"),
+    };
+    robot.end(&reason);
+    if let Some(orders) = orders {
+        eprintln!("{reason}; the page stays until Ctrl-C");
+        stay(&orders, &reason);
+    }
+    ended.map(|_| ())
 }
 
-/// A page that is redrawn on a terminal; elsewhere periodic lines.
-enum Screen {
-    Terminal(ProgressBar),
+/// Why telemetry is no longer read.
+enum End {
+    /// The user has ended it.
+    Asked,
+    /// There is no more.
+    Stream,
+}
+
+/// What interrupts the reading of telemetry.
+enum Next {
+    Send(Vec<u8>),
+    End,
+}
+
+/// Reads telemetry and sends commands until the end.
+fn watch(
+    port: &mut Port,
+    robot: &mut Robot,
+    orders: Option<&Orders>,
+    screen: &mut Screen,
+) -> anyhow::Result<End> {
+    loop {
+        let next = port.read(|bytes| -> anyhow::Result<ControlFlow<Next>> {
+            robot.take(bytes, |monitor, received| screen.take(monitor, received))?;
+            if is_interrupted() || screen.show(robot)?.is_break() {
+                return Ok(ControlFlow::Break(Next::End));
+            }
+            let bytes = robot.obey(orders, Instant::now());
+            Ok(bytes
+                .map_or(ControlFlow::Continue(()), |bytes| ControlFlow::Break(Next::Send(bytes))))
+        })?;
+        match next {
+            None => return Ok(End::Stream),
+            Some(Next::End) => return Ok(End::Asked),
+            Some(Next::Send(bytes)) => port.send(&bytes)?,
+        }
+    }
+}
+
+/// The last telemetry, and where the recordings are.
+fn summarize(robot: &mut Robot, names: &[String]) {
+    println!("{}", view::page(robot.monitor(), names));
+    for text in robot.recorded() {
+        eprintln!("{text}");
+    }
+    match robot.end_recording() {
+        None => {}
+        Some((_, 0)) => eprintln!("nothing was recorded: the robot sent no estimate"),
+        Some((path, 1)) => eprintln!("recorded {}", path.display()),
+        Some((path, logs)) => {
+            let more = logs - 1;
+            eprintln!("recorded {} and {more} more, one for each start", path.display());
+        }
+    }
+}
+
+/// Keeps the page until Ctrl-C.
+fn stay(orders: &Orders, reason: &str) {
+    while !is_interrupted() {
+        if let Some(ordered) = orders.wait(PATIENCE) {
+            ordered.answer(Reply::refused(reason));
+        }
+    }
+}
+
+/// A terminal that is redrawn; elsewhere periodic lines.
+struct Screen {
+    walls: Vec<Wall>,
+    names: Vec<String>,
+    output: Output,
+}
+
+enum Output {
+    Terminal { terminal: DefaultTerminal, history: History, drawn: Option<Instant> },
     Lines { next: u64 },
 }
 
 impl Screen {
-    fn new() -> anyhow::Result<Self> {
-        if !stderr().is_terminal() {
-            return Ok(Self::Lines { next: 0 });
-        }
-        let style = ProgressStyle::with_template("{msg}")?;
-        Ok(Self::Terminal(ProgressBar::new_spinner().with_style(style)))
+    fn new(walls: Vec<Wall>) -> Self {
+        let names = walls.iter().map(|wall| wall.name.clone()).collect();
+        let terminal = if stdout().is_terminal() { ratatui::try_init().ok() } else { None };
+        let output = match terminal {
+            Some(terminal) => {
+                Output::Terminal { terminal, history: History::default(), drawn: None }
+            }
+            None => Output::Lines { next: 0 },
+        };
+        Self { walls, names, output }
     }
 
-    /// Prints a line for a notable message.
-    fn print(&mut self, monitor: &Monitor, received: &Received) {
-        let Self::Lines { next } = self else { return };
+    /// Takes a message; prints a line for a notable one.
+    fn take(&mut self, monitor: &Monitor, received: &Received) {
+        let next = match &mut self.output {
+            Output::Terminal { history, .. } => return history.take(received),
+            Output::Lines { next } => next,
+        };
         match &received.telemetry {
             Telemetry::Hello(hello) => println!("{}", view::hello(hello)),
             Telemetry::Initialized(_) | Telemetry::PoseSet(_) => {
-                println!("began   {}", view::line(monitor));
+                println!("began   {}", view::line(monitor, &self.names));
                 *next = 0;
             }
             Telemetry::Estimate(estimate) if estimate.at.ticks() >= *next => {
-                println!("{}", view::line(monitor));
+                println!("{}", view::line(monitor, &self.names));
                 *next = estimate.at.ticks().saturating_add(EVERY);
             }
             _ => {}
         }
     }
 
-    fn refresh(&self, monitor: &Monitor) {
-        if let Self::Terminal(bar) = self {
-            bar.set_message(view::page(monitor));
+    /// Draws the terminal, if it is due, and takes its keys; breaks to end.
+    fn show(&mut self, robot: &mut Robot) -> anyhow::Result<ControlFlow<()>> {
+        let Output::Terminal { terminal, history, drawn } = &mut self.output else {
+            return Ok(ControlFlow::Continue(()));
+        };
+        if drawn.is_some_and(|drawn| drawn.elapsed() < REDRAW) {
+            return Ok(ControlFlow::Continue(()));
         }
+        *drawn = Some(Instant::now());
+        while event::poll(Duration::ZERO)? {
+            if let Event::Key(key) = event::read()?
+                && obey_key(key.code, key.modifiers, robot).is_break()
+            {
+                return Ok(ControlFlow::Break(()));
+            }
+        }
+        let screen = terminal::Screen {
+            monitor: robot.monitor(),
+            history,
+            walls: &self.walls,
+            names: &self.names,
+            recording: robot.recording(),
+            notice: robot.notice(),
+        };
+        terminal.draw(|frame| screen.draw(frame))?;
+        Ok(ControlFlow::Continue(()))
     }
 
-    fn end(&self) {
-        if let Self::Terminal(bar) = self {
-            bar.finish_and_clear();
+    /// Restores the terminal; the names of the walls.
+    fn end(self) -> Vec<String> {
+        if let Output::Terminal { .. } = self.output {
+            ratatui::restore();
+        }
+        self.names
+    }
+}
+
+/// A key of the terminal, where Ctrl-C is one as well.
+fn obey_key(key: KeyCode, modifiers: KeyModifiers, robot: &mut Robot) -> ControlFlow<()> {
+    match key {
+        KeyCode::Char('c') if modifiers.contains(KeyModifiers::CONTROL) => ControlFlow::Break(()),
+        KeyCode::Char('q') => ControlFlow::Break(()),
+        _ => {
+            match key {
+                KeyCode::Char('s') => robot.ask(Order::Start),
+                KeyCode::Char('x') => robot.ask(Order::Stop),
+                KeyCode::Char('r') => robot.ask(Order::Record { on: robot.recording().is_none() }),
+                _ => {}
+            }
+            ControlFlow::Continue(())
         }
     }
 }

@@ -29,8 +29,7 @@ impl Runs {
 
     /// A bar for results that take several runs each.
     pub fn weighted(runs: u32, weight: u64) -> Self {
-        // Without a handler Ctrl-C ends the command at once.
-        HANDLER.call_once(|| drop(ctrlc::set_handler(interrupt)));
+        catch_interrupt();
         // indicatif hides the bar by itself where standard error is not a terminal.
         let bar = ProgressBar::with_draw_target(Some(runs.into()), ProgressDrawTarget::stderr());
         let bar = match ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {eta} left") {
@@ -65,7 +64,14 @@ impl Progress for Runs {
     }
 }
 
-fn is_interrupted() -> bool {
+/// From now on the first Ctrl-C only sets [`is_interrupted`], and a second one ends the command at once.
+pub fn catch_interrupt() {
+    // Without a handler Ctrl-C ends the command at once.
+    HANDLER.call_once(|| drop(ctrlc::set_handler(interrupt)));
+}
+
+/// Whether Ctrl-C was pressed.
+pub fn is_interrupted() -> bool {
     IS_INTERRUPTED.load(Ordering::Relaxed)
 }
 

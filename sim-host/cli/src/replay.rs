@@ -12,10 +12,12 @@ use sonarfix_replay::fault::Complaint;
 use sonarfix_replay::thinned::{CAPACITY, Thinned};
 use sonarfix_replay::{ByVerdict, Figures, Replay, Summary};
 use sonarfix_report::{Report, Table};
+use sonarfix_sim::trace::Recorder;
 
 use crate::output::{check_file, check_folder};
 use crate::overrides::PolicyName;
 use crate::run::Output;
+use crate::serve::{self, PacedArgs};
 use crate::table;
 
 /// Maximum number of skipped lines that are printed.
@@ -44,6 +46,8 @@ pub struct Args {
     #[arg(long, value_name = "FILE.csv")]
     trace: Option<PathBuf>,
     #[command(flatten)]
+    paced: PacedArgs,
+    #[command(flatten)]
     output: Output,
 }
 
@@ -60,9 +64,15 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         robot.localizer.policy = policy.into();
     }
     let walls = floor.walls();
+    let with = Replay { robot: &robot, walls: &walls, strict: args.strict };
+    let title = format!("Sonarfix: {}", args.log.display());
+    let scene = serve::scene(title, "recording", &floor, &robot);
+    if let Some(mut paced) = args.paced.start(&scene)? {
+        replay(args, &with, &mut paced)?;
+        paced.end();
+    }
     let mut trace = Thinned::new(&floor, robot.localizer.sonar.cone, CAPACITY);
-    let summary =
-        replay(args, &Replay { robot: &robot, walls: &walls, strict: args.strict }, &mut trace)?;
+    let summary = replay(args, &with, &mut trace)?;
     if let Some(file) = &args.trace {
         let out = File::create(file).map(BufWriter::new);
         let out = out.with_context(|| format!("cannot write the trace {}", file.display()))?;
@@ -93,7 +103,7 @@ fn beside(log: &Path, given: Option<&PathBuf>, name: &str) -> PathBuf {
     given.cloned().unwrap_or_else(|| log.with_file_name(name))
 }
 
-fn replay(args: &Args, replay: &Replay, trace: &mut Thinned) -> anyhow::Result<Summary> {
+fn replay(args: &Args, replay: &Replay, trace: &mut impl Recorder) -> anyhow::Result<Summary> {
     let open = |path: &Path| File::open(path).with_context(|| path.display().to_string());
     let usual = args.log.with_file_name("reference.csv");
     let reference = match &args.reference {

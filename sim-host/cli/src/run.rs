@@ -19,6 +19,7 @@ use crate::output::{check_file, check_folder};
 use crate::overrides::Overrides;
 use crate::progress::Runs;
 use crate::rows::{self, Counted};
+use crate::serve::{self, PacedArgs};
 use crate::sweep_values::Sweep;
 use crate::table::{self, Beside, Measured};
 
@@ -44,6 +45,8 @@ pub struct Args {
     #[command(flatten)]
     pub overrides: Overrides,
     #[command(flatten)]
+    pub paced: PacedArgs,
+    #[command(flatten)]
     pub output: Output,
 }
 
@@ -68,6 +71,14 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         beside_paper: false,
     };
     anyhow::ensure!(experiment.runs > 0, "--runs must be at least 1");
+    let scenario = &experiment.simulation.scenario;
+    let title = format!("Sonarfix: {}, seed {}", scenario.name, experiment.seed);
+    let mut scene = serve::scene(title, "simulation", &scenario.floor, &scenario.robot);
+    scene.obstacles = experiment.simulation.empty_trace().obstacles;
+    if let Some(mut paced) = args.paced.start(&scene)? {
+        experiment.simulation.run(experiment.seed, &mut paced)?;
+        paced.end();
+    }
     if let Some(dir) = &args.output.out {
         check_folder("--out", dir)?;
     }

@@ -1,6 +1,7 @@
 //! Tests of the command and of the packages behind it, in one program, which links once.
 
 mod calibrate;
+mod chromium;
 mod command;
 mod common;
 mod convert;
@@ -11,6 +12,7 @@ mod find;
 mod floor_plan;
 mod init;
 mod link_command;
+mod live;
 mod map_command;
 mod map_exchange;
 mod monitor;
@@ -23,3 +25,4 @@ mod rows;
 mod signs_of_life;
 mod skipped;
 mod sonar_model;
+mod terminal;

@@ -2,8 +2,6 @@
 #![expect(clippy::unwrap_used, reason = "all of this file is a test, its helpers too")]
 
 use std::f64::consts::FRAC_PI_2;
-use std::path::Path;
-use std::process::Command;
 
 use sonarfix_report::{Report, Table};
 use sonarfix_sim::trace::{
@@ -11,45 +9,10 @@ use sonarfix_sim::trace::{
 };
 use sonarfix_sim::world::reflector::Source;
 
-use crate::skipped;
-
-/// Names of the Chromium executable.
-const BROWSERS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "chrome"];
-
-/// No window, network or services; virtual time, so that the page's five seconds pass at once.
-const FLAGS: [&str; 10] = [
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--virtual-time-budget=5000",
-    "--dump-dom",
-];
+use crate::chromium::{self, assert_ready};
 
 /// A name that would end the script of a page without escapes.
 const HOSTILE: &str = "north </script><b>wall</b> & \"more\"";
-
-fn browser() -> Option<&'static str> {
-    let answers = |name: &&str| Command::new(name).arg("--version").output().is_ok();
-    BROWSERS.into_iter().find(answers)
-}
-
-/// The page after its scripts ran.
-fn opened(browser: &str, page: &Path) -> String {
-    let profile = tempfile::tempdir().unwrap();
-    let output = Command::new(browser)
-        .args(FLAGS)
-        .arg(format!("--user-data-dir={}", profile.path().display()))
-        .arg(format!("file://{}", page.display()))
-        .output()
-        .unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
-}
 
 /// A room 2 m wide, crossed in 20 s, with a cycle of every outcome.
 fn trace(truth_known: bool) -> Trace {
@@ -104,10 +67,6 @@ fn fix(time: f64, outcome: Outcome, range: Option<f64>, reason: &str) -> FixReco
 
 /// Writes a report and opens it; `None`, with a message, without a browser.
 fn report_opened(trace: &Trace) -> Option<String> {
-    let Some(browser) = browser() else {
-        skipped::because(&format!("none of {BROWSERS:?} is on the path"));
-        return None;
-    };
     let dir = tempfile::tempdir().unwrap();
     let table = Table {
         title: "Errors".into(),
@@ -122,19 +81,8 @@ fn report_opened(trace: &Trace) -> Option<String> {
         trace,
         of_paper: false,
     };
-    Some(opened(browser, &report.write(dir.path()).unwrap()))
-}
-
-/// The opening tag of the page.
-fn root(dom: &str) -> &str {
-    let from = dom.find("<html").unwrap();
-    dom.get(from..from + dom.get(from..).unwrap().find('>').unwrap()).unwrap()
-}
-
-/// The player has drawn, and no script has failed.
-fn assert_ready(dom: &str) {
-    assert!(root(dom).contains("data-ready=\"true\""), "{}", root(dom));
-    assert!(!root(dom).contains("data-error"), "{}", root(dom));
+    let page = report.write(dir.path()).unwrap();
+    chromium::opened(&format!("file://{}", page.display()), &[])
 }
 
 #[test]

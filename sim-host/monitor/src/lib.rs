@@ -5,15 +5,23 @@
 //! | [`port`] | serial ports, sockets and files |
 //! | this one | [`Monitor`]: the latest telemetry |
 //! | [`view`] | the latest telemetry as text |
+//! | [`terminal`] | the latest telemetry on a terminal |
 //! | [`recording`] | telemetry as a log |
-//! | [`request`] | a command, repeated until it is acknowledged |
+//! | [`conversation`] | the commands of a session, repeated until they are acknowledged |
+//! | [`request`] | one command |
+//! | [`wheels`] | the travel of the wheels |
+//! | [`hints`] | what the telemetry suggests to check |
 //! | [`signs`] | signs of life: the devices of a robot on the bench, with hints |
 
+pub mod conversation;
+pub mod hints;
 pub mod port;
 pub mod recording;
 pub mod request;
 pub mod signs;
+pub mod terminal;
 pub mod view;
+pub mod wheels;
 
 use sonarfix::localizer::Fix;
 use sonarfix::navigator::Mode;
@@ -21,6 +29,8 @@ use sonarfix_link::message::{LoopStatus, RankedHypothesis, SearchStatus, Telemet
 use sonarfix_link::{Estimate, Gaps, Hello, Ping, Receiver, ReceiverCounters};
 
 use sonarfix_sim::statistics::FixCounts;
+
+use crate::wheels::Wheels;
 
 /// The latest telemetry of a robot.
 #[derive(Debug, Default)]
@@ -35,6 +45,7 @@ pub struct Monitor {
     mode: Mode,
     search: Option<SearchStatus>,
     hypotheses: Vec<RankedHypothesis>,
+    wheels: Wheels,
 }
 
 /// The most hypotheses that are shown.
@@ -89,8 +100,8 @@ impl Monitor {
                 self.search = Some(status);
             }
             Telemetry::Hypothesis(hypothesis) => self.rank(hypothesis),
-            Telemetry::Odometry(_)
-            | Telemetry::SkippedPing(_)
+            Telemetry::Odometry(step) => self.wheels.take(&step),
+            Telemetry::SkippedPing(_)
             | Telemetry::Sweep(_)
             | Telemetry::Devices(_)
             | Telemetry::Ack(_) => {}
@@ -124,5 +135,47 @@ impl Monitor {
     #[must_use]
     pub fn estimate(&self) -> Option<&Estimate> {
         self.estimate.as_ref()
+    }
+
+    /// The identification of the robot.
+    #[must_use]
+    pub fn hello(&self) -> Option<&Hello> {
+        self.hello.as_ref()
+    }
+
+    /// The last ping.
+    #[must_use]
+    pub fn ping(&self) -> Option<&Ping> {
+        self.ping.as_ref()
+    }
+
+    /// The last status of the loop.
+    #[must_use]
+    pub fn loop_status(&self) -> Option<&LoopStatus> {
+        self.state.as_ref()
+    }
+
+    /// What determines the pose.
+    #[must_use]
+    pub fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// The last status of the search.
+    #[must_use]
+    pub fn search(&self) -> Option<&SearchStatus> {
+        self.search.as_ref()
+    }
+
+    /// The hypotheses of the search, best first.
+    #[must_use]
+    pub fn hypotheses(&self) -> &[RankedHypothesis] {
+        &self.hypotheses
+    }
+
+    /// The travel of the wheels.
+    #[must_use]
+    pub fn wheels(&self) -> Wheels {
+        self.wheels
     }
 }

@@ -1,9 +1,8 @@
 //! The latest telemetry as text.
 
-use std::fmt::Write;
-
 use sonarfix::health::{LOST_AT, Verdict};
 use sonarfix::localizer::Fix;
+use sonarfix::map::WallId;
 use sonarfix::navigator::Mode;
 use sonarfix::units::Instant;
 use sonarfix_hal::robot::Faults;
@@ -13,33 +12,40 @@ use sonarfix_link::message::{
 use sonarfix_link::{Estimate, Hello, Ping};
 
 use crate::Monitor;
+use crate::hints::hints;
 
-/// All telemetry, one line per subject, of at most 100 characters.
+/// All telemetry, one line per subject, of at most 100 characters. `walls` has the names of the map's walls; without them
+/// walls have numbers.
 #[must_use]
-pub fn page(monitor: &Monitor) -> String {
+pub fn page(monitor: &Monitor, walls: &[String]) -> String {
     let mut lines = vec![
         monitor.hello.as_ref().map_or("robot   none yet".to_owned(), hello),
         monitor.estimate.as_ref().map_or("pose    none yet".to_owned(), estimate),
-        monitor.ping.as_ref().map_or("ping    none yet".to_owned(), |last| ping(monitor, last)),
+        monitor
+            .ping
+            .as_ref()
+            .map_or("ping    none yet".to_owned(), |last| ping(monitor, last, walls)),
         monitor.state.as_ref().map_or("loop    none yet".to_owned(), state),
         link(monitor),
     ];
     if monitor.mode != Mode::Tracking {
-        lines.extend(monitor.search.as_ref().map(search));
+        lines.extend(monitor.search.as_ref().map(|status| search(status, walls)));
         lines.extend(monitor.hypotheses.iter().map(hypothesis));
     }
+    lines.extend(hints(monitor).into_iter().map(|hint| format!("check   {hint}")));
     lines.join("\n")
 }
 
 /// The estimate in one line.
 #[must_use]
-pub fn line(monitor: &Monitor) -> String {
+pub fn line(monitor: &Monitor, walls: &[String]) -> String {
     let lost = monitor.gaps.lost();
     let link = format!("{} frames, {lost} lost", monitor.counters().frames);
     match &monitor.estimate {
         None => format!("no estimate yet; {link}"),
         Some(e) if monitor.mode == Mode::Searching => {
-            let answer = monitor.search.as_ref().map_or(String::new(), search);
+            let answer =
+                monitor.search.as_ref().map_or(String::new(), |status| search(status, walls));
             format!("{:.1} s: pose unknown; {answer}; {link}", seconds(e.at))
         }
         Some(e) => {
@@ -55,7 +61,15 @@ pub fn line(monitor: &Monitor) -> String {
     }
 }
 
-fn search(status: &SearchStatus) -> String {
+/// A wall by its name; by its number if that is unknown.
+fn wall(id: WallId, walls: &[String]) -> String {
+    let name = usize::try_from(id.0).ok().and_then(|index| walls.get(index));
+    name.map_or_else(|| format!("wall {}", id.0), |name| format!("wall {name}"))
+}
+
+/// The progress of the search.
+#[must_use]
+pub fn search(status: &SearchStatus, walls: &[String]) -> String {
     let mode = match status.mode {
         Mode::Tracking => "tracking",
         Mode::Searching => "searching",
@@ -64,7 +78,7 @@ fn search(status: &SearchStatus) -> String {
     let answer = match status.answer {
         SearchAnswer::Searching => "no answer yet".to_owned(),
         SearchAnswer::Several(count) => format!("{count} poses fit"),
-        SearchAnswer::Along(wall) => format!("somewhere along wall {}", wall.0),
+        SearchAnswer::Along(id) => format!("somewhere along {}", wall(id, walls)),
         SearchAnswer::Nowhere => "no pose fits".to_owned(),
         SearchAnswer::Unique => "one pose fits".to_owned(),
     };
@@ -159,7 +173,7 @@ fn estimate(e: &Estimate) -> String {
     )
 }
 
-fn ping(monitor: &Monitor, ping: &Ping) -> String {
+fn ping(monitor: &Monitor, ping: &Ping, walls: &[String]) -> String {
     let range = match ping.outcome {
         Ok(echo) => format!("{:.3} m", echo.range.0),
         Err(reason) => reason.to_string(),
@@ -171,10 +185,10 @@ fn ping(monitor: &Monitor, ping: &Ping) -> String {
         Fix::Refused(reason) => format!("refused, {reason}"),
         other => format!("{other:?}"),
     };
-    let (wall, bearing) = (ping.aim.wall.0, ping.aim.bearing.0.to_degrees());
+    let (wall, bearing) = (wall(ping.aim.wall, walls), ping.aim.bearing.0.to_degrees());
     let f = &monitor.fixes;
     format!(
-        "ping    wall {wall} at {bearing:.1}°: {range}; {fix}\n\
+        "ping    {wall} at {bearing:.1}°: {range}; {fix}\n\
          pings   {} accepted, {} gated, {} refused",
         f.accepted, f.gated, f.refused
     )
@@ -210,7 +224,7 @@ fn faults(f: &Faults) -> String {
 
 fn link(monitor: &Monitor) -> String {
     let (c, gaps) = (monitor.counters(), monitor.gaps);
-    let mut line = format!(
+    format!(
         "link    {} frames, {} lost, {} restarts; skipped: {} corrupt, {} too long, {} foreign, {} undecodable",
         c.frames,
         gaps.lost(),
@@ -219,17 +233,12 @@ fn link(monitor: &Monitor) -> String {
         c.too_long,
         c.foreign,
         c.undecodable,
-    );
-    if c.frames == 0 && c.foreign > 0 {
-        let _ = write!(
-            line,
-            "\nonly foreign frames: flash robot and PC with the same version of the link"
-        );
-    }
-    line
+    )
 }
 
-fn verdict(verdict: Verdict) -> &'static str {
+/// The health verdict in a word.
+#[must_use]
+pub fn verdict(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Tracking => "tracking",
         Verdict::Degraded => "degraded",

@@ -110,6 +110,43 @@ struct Fixes<'a> {
     spread: Vec<Number>,
 }
 
+/// One record in the columns of the player, for a page to which records arrive one by one.
+pub mod columns {
+    use serde::Serialize;
+    use sonarfix_sim::trace::{FixRecord, SearchRecord, Tick};
+    use sonarfix_sim::world::obstacle::Obstacle;
+
+    use super::{Fixes, Ticks};
+
+    /// The unmapped obstacles.
+    #[must_use]
+    pub fn obstacles(obstacles: &[Obstacle]) -> impl Serialize {
+        obstacles.iter().map(super::obstacle).collect::<Vec<_>>()
+    }
+
+    /// An encoder tick.
+    #[must_use]
+    pub fn tick(tick: &Tick) -> impl Serialize {
+        let mut columns = Ticks::default();
+        columns.push(tick);
+        columns
+    }
+
+    /// A measurement cycle.
+    #[must_use]
+    pub fn fix(fix: &FixRecord) -> impl Serialize {
+        let mut columns = Fixes::default();
+        columns.push(fix);
+        columns
+    }
+
+    /// The state of the search.
+    #[must_use]
+    pub fn search(record: &SearchRecord) -> impl Serialize {
+        [super::search(record)]
+    }
+}
+
 /// The data of the player as JSON, not yet escaped for HTML.
 ///
 /// # Errors

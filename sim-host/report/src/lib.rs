@@ -47,6 +47,7 @@ use figures::Figure;
 
 pub use called_lost::called_lost;
 pub use page::fill;
+pub use palette::css as palette_css;
 pub use table::Table;
 
 /// The name of the report's file.

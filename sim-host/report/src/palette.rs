@@ -126,7 +126,8 @@ impl Role {
 
 /// The palette as a style sheet: variables for the page and the player, and rules that map the
 /// colours of the figures, drawn for a white page, to these variables.
-pub(super) fn css() -> String {
+#[must_use]
+pub fn css() -> String {
     let mut css = format!(":root{{{}}}\n", variables(Role::light));
     let night = variables(Role::dark);
     put(&mut css, format_args!("@media (prefers-color-scheme:dark){{:root{{{night}}}}}\n"));

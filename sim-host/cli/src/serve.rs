@@ -1,0 +1,105 @@
+//! `--serve`: a page that shows what runs.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use sonarfix_hal::config::RobotConfig;
+use sonarfix_live::feed::{Feed, Scene};
+use sonarfix_live::order::Orders;
+use sonarfix_live::paced::Paced;
+use sonarfix_live::ring::Ring;
+use sonarfix_live::server::Server;
+use sonarfix_map::{Floor, MapFile, robot_file};
+use sonarfix_sim::trace::Trace;
+
+/// The page.
+#[derive(Debug, clap::Args)]
+pub struct ServeArgs {
+    /// Shows it on a page of this computer, and prints the page's address; `--serve=PORT` takes a port, by default any free one
+    /// (docs/live.md).
+    #[arg(long, value_name = "PORT", num_args = 0..=1, require_equals = true, default_missing_value = "0")]
+    pub serve: Option<u16>,
+}
+
+/// The speed of what has run before, or is simulated.
+#[derive(Debug, clap::Args)]
+pub struct PacedArgs {
+    #[command(flatten)]
+    pub page: ServeArgs,
+    /// The speed on the page: 1 for real time.
+    #[arg(long, value_name = "FACTOR", requires = "serve", default_value_t = 1.0)]
+    pub speed: f64,
+}
+
+impl ServeArgs {
+    /// Starts the server, if it was asked for; otherwise events go nowhere.
+    ///
+    /// # Errors
+    /// If the port is taken.
+    pub fn start(&self) -> anyhow::Result<(Feed, Option<Orders>)> {
+        let Some(port) = self.serve else {
+            return Ok((Feed::nowhere(), None));
+        };
+        let ring = Arc::new(Ring::default());
+        let (server, orders) = Server::start(port, Arc::clone(&ring))?;
+        eprintln!("open {}", server.address());
+        Ok((Feed::new(ring), Some(orders)))
+    }
+}
+
+impl PacedArgs {
+    /// Starts the server and a recorder that publishes at the speed; `None` if it was not asked for.
+    ///
+    /// # Errors
+    /// If the port is taken, or for a wrong speed.
+    pub fn start(&self, scene: &Scene) -> anyhow::Result<Option<Paced>> {
+        let (feed, Some(orders)) = self.page.start()? else {
+            return Ok(None);
+        };
+        feed.scene(scene);
+        Paced::new(feed, orders, self.speed).map(Some)
+    }
+}
+
+/// What a page shows of a run on a floor.
+pub fn scene(title: String, source: &'static str, floor: &Floor, robot: &RobotConfig) -> Scene {
+    let trace = Trace::of(floor, robot.localizer.sonar.cone);
+    let track = f64::from(robot.localizer.drive.track_width.0);
+    Scene {
+        title,
+        source,
+        commands: false,
+        cone: trace.cone,
+        track,
+        walls: trace.walls,
+        obstacles: Vec::new(),
+    }
+}
+
+/// What a page shows of a robot: as far as its map and its robot file are given.
+///
+/// # Errors
+/// If a file cannot be read.
+pub fn scene_of_robot(
+    title: String,
+    map: Option<&Path>,
+    robot: Option<&Path>,
+) -> anyhow::Result<(Scene, [f64; 2])> {
+    let robot = robot.map(robot_file::read).transpose()?;
+    let floor = map.map(|map| MapFile::read(map, None)).transpose()?.map(|file| file.floor);
+    let sonar = robot.as_ref().map(|robot| robot.localizer.sonar);
+    let cone = sonar.map(|sonar| sonar.cone).unwrap_or_default();
+    let walls = floor.map_or_else(Vec::new, |floor| Trace::of(&floor, cone).walls);
+    let track = robot.map_or(0.0, |robot| f64::from(robot.localizer.drive.track_width.0));
+    let mount = sonar.map_or([0.0; 2], |of| [of.mount.x.0.into(), of.mount.y.0.into()]);
+    let scene = Scene {
+        title,
+        source: "robot",
+        commands: true,
+        cone: cone.0.into(),
+        track,
+        walls,
+        obstacles: Vec::new(),
+    };
+    Ok((scene, mount))
+}

@@ -1,0 +1,75 @@
+//! Pages in headless Chromium.
+
+#![expect(clippy::unwrap_used, reason = "all of this file is a test helper")]
+
+use std::process::Command;
+
+use crate::skipped;
+
+/// Names of the Chromium executable.
+const BROWSERS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "chrome"];
+
+/// No window, network or services; virtual time, so that the page's five seconds pass at once.
+const FLAGS: [&str; 9] = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--virtual-time-budget=5000",
+];
+
+fn browser() -> Option<&'static str> {
+    let answers = |name: &&str| Command::new(name).arg("--version").output().is_ok();
+    BROWSERS.into_iter().find(answers)
+}
+
+/// The page at an address after its scripts ran, with further flags; `None`, with a message, without a browser.
+pub fn opened(url: &str, flags: &[&str]) -> Option<String> {
+    let Some(browser) = browser() else {
+        skipped::because(&format!("none of {BROWSERS:?} is on the path"));
+        return None;
+    };
+    Some(output_of(browser, url, &[&["--dump-dom"], flags].concat()))
+}
+
+/// Takes pictures of a page, light and dark, into the folder of `SONARFIX_PICTURES`, if it is set.
+pub fn picture(url: &str, name: &str, flags: &[&str]) {
+    let (Some(browser), Ok(folder)) = (browser(), std::env::var("SONARFIX_PICTURES")) else {
+        return;
+    };
+    let size = flags.concat().replace(|c: char| !c.is_ascii_digit() && c != ',', "");
+    for (scheme, setting) in [("light", "1"), ("dark", "0")] {
+        let file = format!("--screenshot={folder}/{name}-{size}-{scheme}.png");
+        let setting = format!("--blink-settings=preferredColorScheme={setting}");
+        output_of(browser, url, &[&[file.as_str(), &setting], flags].concat());
+    }
+}
+
+fn output_of(browser: &str, url: &str, flags: &[&str]) -> String {
+    let profile = tempfile::tempdir().unwrap();
+    let output = Command::new(browser)
+        .args(FLAGS)
+        .args(flags)
+        .arg(format!("--user-data-dir={}", profile.path().display()))
+        .arg(url)
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// The opening tag of the page.
+fn root(dom: &str) -> &str {
+    let from = dom.find("<html").unwrap();
+    dom.get(from..from + dom.get(from..).unwrap().find('>').unwrap()).unwrap()
+}
+
+/// The player has drawn, and no script has failed.
+pub fn assert_ready(dom: &str) {
+    assert!(root(dom).contains("data-ready=\"true\""), "{}", root(dom));
+    assert!(!root(dom).contains("data-error"), "{}", root(dom));
+}

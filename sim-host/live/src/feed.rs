@@ -1,0 +1,155 @@
+//! The records of a run as events, each one line of JSON.
+//!
+//! A record has the columns of the report's player (`sonarfix_player::columns`), which the page appends to its own, and `more` for
+//! the curves. All values are in SI units, in the map frame.
+
+use std::sync::Arc;
+
+use serde::Serialize;
+use serde_json::json;
+use sonarfix::health::Verdict;
+use sonarfix_player::columns;
+use sonarfix_sim::trace::{FixRecord, SearchRecord, Tick, Wall};
+use sonarfix_sim::world::obstacle::Obstacle;
+
+use crate::ring::Ring;
+
+/// What the page shows, and what it may ask for.
+#[derive(Debug, Clone, Serialize)]
+pub struct Scene {
+    /// The title of the page.
+    pub title: String,
+    /// `robot`, `recording` or `simulation`.
+    pub source: &'static str,
+    /// Whether the robot takes commands.
+    pub commands: bool,
+    /// Half of the sonar's cone, radians.
+    pub cone: f64,
+    /// Track width of the robot, metres; 0 if it is unknown.
+    pub track: f64,
+    /// The map; empty if it is unknown.
+    #[serde(skip)]
+    pub walls: Vec<Wall>,
+    /// The unmapped obstacles of a simulation.
+    #[serde(skip)]
+    pub obstacles: Vec<Obstacle>,
+}
+
+/// The loop, the link and what to check.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Status {
+    /// Seconds since the robot's clock began.
+    pub time: f64,
+    /// Longest duration of a poll so far, seconds.
+    pub longest_poll: Option<f64>,
+    /// Missed deadlines so far.
+    pub deadlines: Option<u32>,
+    /// All telemetry as lines of text.
+    pub lines: Vec<String>,
+    /// What to check.
+    pub hints: Vec<String>,
+    /// The file that is recorded.
+    pub recording: Option<String>,
+}
+
+/// Publishes events.
+#[derive(Debug, Clone)]
+pub struct Feed(Option<Arc<Ring>>);
+
+impl Feed {
+    /// Into this ring.
+    #[must_use]
+    pub fn new(ring: Arc<Ring>) -> Self {
+        Self(Some(ring))
+    }
+
+    /// To nobody.
+    #[must_use]
+    pub fn nowhere() -> Self {
+        Self(None)
+    }
+
+    /// A run begins: the page discards what it has.
+    pub fn scene(&self, scene: &Scene) {
+        let wall = |wall: &Wall| {
+            let [[x0, y0], [x1, y1]] = [wall.from, wall.to];
+            json!({ "name": wall.name, "ends": [x0, y0, x1, y1] })
+        };
+        let walls: Vec<_> = scene.walls.iter().map(wall).collect();
+        let obstacles = columns::obstacles(&scene.obstacles);
+        self.push(
+            &json!({ "kind": "scene", "scene": scene, "walls": walls, "obstacles": obstacles }),
+        );
+    }
+
+    /// An encoder tick.
+    pub fn tick(&self, tick: &Tick) {
+        let estimate = &tick.estimate;
+        let c = &estimate.calibration;
+        let verdict = match estimate.verdict {
+            Verdict::Tracking => 0,
+            Verdict::Degraded => 1,
+            Verdict::Lost => 2,
+        };
+        self.push(&json!({
+            "kind": "record",
+            "columns": { "ticks": columns::tick(tick) },
+            "more": { "states": {
+                "time": [tick.time],
+                "verdict": [verdict],
+                "scale_right": [c.scale_right],
+                "scale_left": [c.scale_left],
+                "track_width": [c.track_width],
+                "range_scale": [c.range_scale],
+                "sigma": [estimate.deviation],
+            } },
+        }));
+    }
+
+    /// A measurement cycle.
+    pub fn fix(&self, fix: &FixRecord) {
+        self.push(&json!({
+            "kind": "record",
+            "columns": { "fixes": columns::fix(fix) },
+            "more": { "weights": { "weight": [fix.association], "bearing": [fix.bearing] } },
+        }));
+    }
+
+    /// The state of the search; `text` has its answer in words.
+    pub fn search(&self, record: &SearchRecord, text: &str) {
+        self.push(&json!({
+            "kind": "record",
+            "columns": { "searches": columns::search(record) },
+            "search": text,
+        }));
+    }
+
+    /// The distances that the wheels have rolled, metres.
+    pub fn wheels(&self, time: f64, right: f64, left: f64) {
+        let wheels = json!({ "time": [time], "right": [right], "left": [left] });
+        self.push(&json!({ "kind": "record", "columns": {}, "more": { "wheels": wheels } }));
+    }
+
+    /// The loop, the link and what to check.
+    pub fn status(&self, status: &Status) {
+        self.push(&json!({ "kind": "status", "status": status }));
+    }
+
+    /// A line for the list of notices.
+    pub fn notice(&self, text: &str) {
+        self.push(&json!({ "kind": "notice", "text": text }));
+    }
+
+    /// No event will follow.
+    pub fn end(&self) {
+        if let Some(ring) = &self.0 {
+            ring.close();
+        }
+    }
+
+    fn push(&self, event: &serde_json::Value) {
+        if let Some(ring) = &self.0 {
+            ring.push(&event.to_string());
+        }
+    }
+}

@@ -1,0 +1,332 @@
+"use strict";
+// The page of a robot, a recording or a simulation as it runs: takes events, appends them to the columns of a run, and draws.
+
+(() => {
+  const { OUTCOMES, SIGMAS, degrees, length, unknown } = Moment;
+  const FOLLOW = "8";          // the view that F follows with, metres across
+  const MOST_ROWS = 24_000;    // of a column: 40 minutes at ten ticks a second
+  const DROPPED_AT_ONCE = 4_000;
+  const MOST_NOTICES = 100;
+  const RETRY = 1_000;         // ms until a lost connection is tried again
+  const REFRESH = 200;         // ticks after which the usual deviation is computed again
+  const VERDICTS = ["tracking", "degraded", "lost"];
+
+  const root = document.documentElement;
+  const element = (id) => document.getElementById(id);
+  const [stage, view, exaggeration, windowMenu, speed, record, drag, pause, poseForm] =
+    ["stage", "view", "exaggeration", "window", "speed", "record", "drag", "pause", "pose"].map(element);
+  const readout = Object.fromEntries(
+    [...document.querySelectorAll("#readout [data-value]")].map((dd) => [dd.dataset.value, dd]));
+
+  // The token is in the address at first; a reload finds it in the storage of this tab.
+  const token = new URLSearchParams(location.hash.slice(1)).get("token") ?? sessionStorage.getItem("token") ?? "";
+  sessionStorage.setItem("token", token);
+  history.replaceState(null, "", location.pathname);
+  const authorization = { Authorization: `Bearer ${token}` };
+
+  const poses = () => ({ x: [], y: [], heading: [] });
+  const emptyRun = () => ({
+    walls: [], obstacles: [], cone: 0, track: 0, dropped: 0, searches: [],
+    ticks: { time: [], truth: poses(), estimate: poses(), encoders: poses(), sigma_x: [], sigma_y: [], sigma_heading: [], correlation: [] },
+    fixes: { time: [], wall: [], x: [], y: [], direction: [], range: [], source: [], outcome: [], reason: [], innovation: [], spread: [] },
+    states: { time: [], verdict: [], scale_right: [], scale_left: [], track_width: [], range_scale: [], sigma: [] },
+    weights: { weight: [], bearing: [] },
+    wheels: { time: [], right: [], left: [] },
+    loop: { time: [], longest: [], deadlines: [] },
+  });
+
+  const run = emptyRun();
+  const state = { next: 0, search: "", isDue: false, ticks: 0, placing: null, isRobot: false, isEnded: false };
+
+  const changed = () => { state.isDue = true; };
+
+  // ---- Events ----
+
+  function append(to, from) {
+    for (const [name, column] of Object.entries(from)) {
+      if (Array.isArray(column)) to[name].push(...column); else append(to[name], column);
+    }
+  }
+
+  // Drops the oldest rows of columns of equal length.
+  function trim(columns) {
+    const first = (of) => (Array.isArray(of) ? of : first(Object.values(of)[0]));
+    if (first(columns).length <= MOST_ROWS) return 0;
+    const drop = (of) => { if (Array.isArray(of)) of.splice(0, DROPPED_AT_ONCE); else Object.values(of).forEach(drop); };
+    drop(columns);
+    return DROPPED_AT_ONCE;
+  }
+
+  function begin({ scene, walls, obstacles }) {
+    Object.assign(run, emptyRun(), { walls, obstacles, cone: scene.cone, track: scene.track });
+    picture.refresh();
+    state.search = "";
+    element("title").textContent = document.title = scene.title;
+    state.isRobot = scene.source === "robot";
+    element("robot").hidden = !state.isRobot;
+    element("paced").hidden = state.isRobot;
+    poseForm.hidden = !scene.commands;
+    document.querySelectorAll("[data-order]").forEach((button) => { button.hidden = !scene.commands; });
+    drag.hidden = !scene.commands;
+    element("keys").textContent = scene.commands ? ", P sets the pose by dragging" : "";
+  }
+
+  function take(event) {
+    switch (event.kind) {
+      case "scene": begin(event); break;
+      case "record":
+        append(run, event.columns);
+        if (event.more) append(run, event.more);
+        if (event.search) state.search = event.search;
+        if (event.columns.ticks) state.ticks++;
+        run.dropped += trim(run.ticks);
+        [run.states, run.wheels, run.loop].forEach(trim);
+        [run.fixes, run.weights].forEach(trim);
+        if (run.searches.length > 600) run.searches.splice(0, 200);
+        break;
+      case "status": showStatus(event.status); break;
+      case "notice": showNotice(event.text); break;
+      case "missed": showNotice(`${event.count} events were missed: this page was too slow`); break;
+      case "end": state.isEnded = true; break;
+    }
+    state.isDue = true;
+  }
+
+  async function listen() {
+    while (!state.isEnded) {
+      try {
+        const response = await fetch(`/events?from=${state.next}`, { headers: authorization, cache: "no-store" });
+        if (response.status === 401) return say("connection", "open the address that the program has printed");
+        if (!response.ok) throw new Error(response.statusText);
+        say("connection", "connected");
+        await read(response.body.pipeThrough(new TextDecoderStream()).getReader());
+      } catch {
+        // The program has ended, or the connection was lost.
+      }
+      say("connection", state.isEnded ? "ended" : "no connection: trying again");
+      if (!state.isEnded) await new Promise((resolve) => setTimeout(resolve, RETRY));
+    }
+  }
+
+  async function read(reader) {
+    let rest = "";
+    for (;;) {
+      const { done, value } = await reader.read();
+      if (done) return;
+      const lines = (rest + value).split("\n");
+      rest = lines.pop();
+      for (const line of lines.filter((text) => text !== "")) {
+        const event = JSON.parse(line);
+        if (event.kind === "missed") state.next += event.count; else if (event.kind !== "end") state.next++;
+        take(event);
+      }
+    }
+  }
+
+  // ---- Text ----
+
+  function say(id, text) { element(id).textContent = text; }
+
+  function fill(list, texts) {
+    list.replaceChildren(...texts.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
+  }
+
+  function showStatus(status) {
+    if (status.longest_poll !== null) {
+      append(run.loop, { time: [status.time], longest: [1e3 * status.longest_poll], deadlines: [status.deadlines] });
+    }
+    say("lines", status.lines.join("\n"));
+    fill(element("hints"), status.hints);
+    element("check").hidden = status.hints.length === 0;
+    record.setAttribute("aria-pressed", String(status.recording !== null));
+    record.textContent = status.recording === null ? "Record" : "End recording";
+  }
+
+  function showNotice(text) {
+    const list = element("notices");
+    list.prepend(Object.assign(document.createElement("li"), { textContent: text }));
+    while (list.children.length > MOST_NOTICES) list.lastChild.remove();
+  }
+
+  function showNumbers(moment) {
+    const { estimate, ellipse: shape, fix } = moment;
+    const last = run.weights.weight.length - 1;
+    const weight = last < 0 ? null : run.weights.weight[last];
+    const values = {
+      time: `${moment.time.toFixed(1)} s`,
+      pose: estimate ? `${estimate.x.toFixed(3)} m, ${estimate.y.toFixed(3)} m, ${degrees(estimate.heading)}` : unknown,
+      axes: shape ? `${length(SIGMAS * shape.major)} × ${length(SIGMAS * shape.minor)}` : unknown,
+      sigma: degrees(moment.sigmaHeading === null ? null : SIGMAS * moment.sigmaHeading),
+      ...Moment.fixNumbers(fix, moment.time, run.walls),
+      bearing: last < 0 ? unknown : degrees(run.weights.bearing[last]),
+      weight: weight === null ? weightOf(fix) : weight.toFixed(3),
+      search: state.search || unknown,
+    };
+    for (const [name, text] of Object.entries(values)) readout[name].textContent = text.replace(/-(?=\d)/g, "−");
+    readout.outcome.style.setProperty("--of", fix ? `var(--${OUTCOMES[fix.outcome]})` : "transparent");
+    const verdict = run.states.verdict.at(-1);
+    element("verdict").dataset.verdict = verdict ?? "none";
+    say("verdict", VERDICTS[verdict] ?? "no estimate yet");
+  }
+
+  // A robot sends whether a range has a lower weight, not the weight.
+  function weightOf(fix) {
+    if (!fix || fix.range === null || fix.innovation === null) return unknown;
+    if (fix.outcome !== 0) return "0";
+    return fix.reason ? "lower" : "full";
+  }
+
+  // ---- Curves ----
+
+  const states = (name, scale) => ({ time: () => run.states.time, value: (i) => scale * run.states[name][i] });
+  const sigma = (index, scale) => ({ time: () => run.states.time, value: (i) => scale * run.states.sigma[i]?.[index] });
+  const travel = (name) => ({
+    time: () => run.wheels.time,
+    value: (i) => i < 1 ? NaN : 1e3 * (run.wheels[name][i] - run.wheels[name][i - 1]) / (run.wheels.time[i] - run.wheels.time[i - 1]),
+  });
+  const fixes = {
+    time: () => run.fixes.time,
+    value: (i) => run.fixes.innovation[i] === null ? NaN : 1e3 * run.fixes.innovation[i],
+    band: (i) => run.fixes.spread[i] === null ? NaN : 3e3 * run.fixes.spread[i],
+    dots: (i) => OUTCOMES[run.fixes.outcome[i]],
+  };
+  const curves = [
+    ["Innovation in its 3σ band; rejected ones at the edge", "mm", [["innovation", "accepted", fixes]]],
+    ["Deviation of the position", "mm", [["σ of x", "estimate", sigma(0, 1e3)], ["σ of y", "encoders", sigma(1, 1e3)]]],
+    ["Deviation of the heading", "°", [["σ", "estimate", sigma(2, 180 / Math.PI)]]],
+    ["Scale errors", "%", [["right", "estimate", states("scale_right", 100)], ["left", "encoders", states("scale_left", 100)],
+      ["range", "accepted", states("range_scale", 100)]]],
+    ["Track width", "mm", [["estimate", "estimate", states("track_width", 1e3)]]],
+    ["Speed of the wheels", "mm/s", [["right", "estimate", travel("right")], ["left", "encoders", travel("left")]]],
+    ["Longest poll of the loop so far", "ms",
+      [["longest", "estimate", { time: () => run.loop.time, value: (i) => run.loop.longest[i] }]]],
+    ["Missed deadlines so far", "", [["missed", "gated", { time: () => run.loop.time, value: (i) => run.loop.deadlines[i] }]]],
+  ].map(([title, unit, series]) =>
+    Curves.curve(element("curves"), title, series.map(([name, colour, of]) => ({ name, colour, ...of })), unit));
+
+  // ---- Drawing ----
+
+  const settings = { view: () => view.value, exaggeration: () => exaggeration.value };
+  const picture = Drawing.picture(stage, run, settings);
+  picture.navigate(changed, () => state.placing !== null);
+
+  function draw() {
+    if (run.ticks.time.length > 0) {
+      const time = run.ticks.time.at(-1);
+      if (state.ticks > REFRESH) { picture.refresh(); state.ticks = 0; }
+      const moment = Moment.momentAt(run, time);
+      // A range may be later than the last tick.
+      moment.fix = Moment.momentAt(run, Math.max(time, run.fixes.time.at(-1) ?? time)).fix;
+      picture.draw(moment);
+      if (state.placing?.to) drawPlaced();
+      showNumbers(moment);
+      const from = Math.max(run.ticks.time[0], time - Number(windowMenu.value));
+      const colours = picture.colours();
+      curves.forEach((curve) => curve.draw(from, Math.max(time, from + 1), colours));
+    }
+    root.dataset.ready = "true";
+  }
+
+  // Draws once per picture of the screen, and only after a change.
+  function frame() {
+    if (state.isDue) { state.isDue = false; draw(); }
+    requestAnimationFrame(frame);
+  }
+
+  // ---- Orders ----
+
+  async function order(body) {
+    say("answer", "…");
+    try {
+      const response = await fetch("/order", { method: "POST", headers: authorization, body: JSON.stringify(body) });
+      say("answer", response.ok ? (await response.json()).text : await response.text());
+    } catch {
+      say("answer", "no connection");
+    }
+  }
+
+  function setPose({ x, y, heading }) {
+    const { position, angle } = poseForm.elements;
+    const position_deviation = Number(position.value), heading_deviation = Number(angle.value) * Math.PI / 180;
+    return order({ order: "set_pose", x, y, heading, position_deviation, heading_deviation });
+  }
+
+  function setPlacing(on) {
+    if (drag.hidden) return;
+    state.placing = on ? {} : null;
+    drag.setAttribute("aria-pressed", String(on));
+    stage.classList.toggle("placing", on);
+    if (on) say("answer", "press at the robot's position, drag towards its heading, and release");
+  }
+
+  // The pose that a drag describes: from its start towards its end.
+  function placed() {
+    const [x, y] = state.placing.at, [ahead, aside] = state.placing.to;
+    return { x, y, heading: Math.atan2(aside - y, ahead - x) };
+  }
+
+  function drawPlaced() {
+    const g = stage.getContext("2d");
+    picture.drawRobot(g, placed(), "gated");
+    g.beginPath();
+    g.moveTo(...picture.screenAt(...state.placing.at)), g.lineTo(...picture.screenAt(...state.placing.to));
+    g.stroke();
+  }
+
+  stage.addEventListener("pointerdown", (event) => {
+    if (!state.placing || run.ticks.time.length === 0) return;
+    state.placing.at = picture.floorAt(event.offsetX, event.offsetY);
+    stage.setPointerCapture(event.pointerId);
+  });
+  stage.addEventListener("pointermove", (event) => {
+    if (!state.placing?.at) return;
+    state.placing.to = picture.floorAt(event.offsetX, event.offsetY);
+    changed();
+  });
+  stage.addEventListener("pointerup", () => {
+    if (state.placing?.to) setPose(placed());
+    if (state.placing?.at) setPlacing(false);
+    changed();
+  });
+
+  // ---- Control ----
+
+  const KEYS = {
+    f: () => { view.value = view.value === "map" ? FOLLOW : "map"; changed(); },
+    "+": () => { picture.zoomBy(Drawing.ZOOM_STEP); changed(); },
+    "-": () => { picture.zoomBy(1 / Drawing.ZOOM_STEP); changed(); },
+    0: () => { picture.resetView(); changed(); },
+    p: () => setPlacing(!state.placing),
+    Escape: () => { setPlacing(false); say("answer", ""); },
+  };
+
+  stage.addEventListener("keydown", (event) => {
+    const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+    if (!KEYS[key] || event.ctrlKey || event.metaKey) return;
+    event.preventDefault();
+    KEYS[key]();
+  });
+  document.querySelectorAll("[data-order]").forEach((button) =>
+    button.addEventListener("click", () => order({ order: button.dataset.order })));
+  record.addEventListener("click", () => order({ order: "record", on: record.getAttribute("aria-pressed") === "false" }));
+  drag.addEventListener("click", () => setPlacing(!state.placing));
+  pause.addEventListener("click", () => {
+    const on = pause.getAttribute("aria-pressed") === "false";
+    pause.setAttribute("aria-pressed", String(on));
+    pause.textContent = on ? "Continue" : "Pause";
+    order({ order: "pause", on });
+  });
+  speed.addEventListener("change", () => { if (speed.value) order({ order: "speed", factor: Number(speed.value) }); });
+  poseForm.addEventListener("submit", (event) => {
+    event.preventDefault();
+    const value = (name) => Number(poseForm.elements[name].value);
+    setPose({ x: value("x"), y: value("y"), heading: value("heading") * Math.PI / 180 });
+  });
+  for (const menu of [view, exaggeration, windowMenu]) menu.addEventListener("change", changed);
+  const refresh = () => { picture.refresh(); changed(); };
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", refresh);
+  new ResizeObserver(changed).observe(stage);
+  document.addEventListener("pointermove", changed);
+  requestAnimationFrame(frame);
+  listen();
+})();

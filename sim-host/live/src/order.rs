@@ -1,0 +1,150 @@
+//! What a page may ask for.
+
+use std::sync::mpsc::{Receiver, SyncSender};
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+use sonarfix::localizer::Start;
+use sonarfix::pose::Pose;
+use sonarfix::units::{Metres, Radians};
+use sonarfix_link::Command;
+
+/// An order of a page, as JSON like `{"order": "set_pose", "x": 1, "y": 2, "heading": 0.5}`.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(tag = "order", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Order {
+    /// Start the robot's loop.
+    Start,
+    /// Stop it.
+    Stop,
+    /// Search for the pose.
+    Search,
+    /// Discard the learned calibration.
+    ResetCalibration,
+    /// Initialize the localizer at a pose.
+    SetPose {
+        /// Metres along the map's x axis.
+        x: f32,
+        /// Metres along the map's y axis.
+        y: f32,
+        /// Radians counter-clockwise from the map's x axis.
+        heading: f32,
+        /// Standard deviation of x and y, metres.
+        position_deviation: f32,
+        /// Standard deviation of the heading, radians.
+        heading_deviation: f32,
+    },
+    /// Begin or end a recording.
+    Record {
+        /// Whether it is to begin.
+        on: bool,
+    },
+    /// Halt or continue a simulation or a replay.
+    Pause {
+        /// Whether it is to halt.
+        on: bool,
+    },
+    /// The speed of a simulation or a replay.
+    Speed {
+        /// Its time over real time.
+        factor: f64,
+    },
+}
+
+impl Order {
+    /// Its name in words.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Start => "start",
+            Self::Stop => "stop",
+            Self::Search => "search",
+            Self::ResetCalibration => "reset of the calibration",
+            Self::SetPose { .. } => "set pose",
+            Self::Record { .. } => "recording",
+            Self::Pause { .. } => "pause",
+            Self::Speed { .. } => "speed",
+        }
+    }
+
+    /// The robot's command; `None` for an order to this program.
+    #[must_use]
+    pub fn command(&self) -> Option<Command> {
+        Some(match *self {
+            Self::Start => Command::Start,
+            Self::Stop => Command::Stop,
+            Self::Search => Command::Search,
+            Self::ResetCalibration => Command::ResetCalibration,
+            Self::SetPose { x, y, heading, position_deviation, heading_deviation } => {
+                Command::SetPose(Start {
+                    pose: Pose::new(x, y, Radians(heading)),
+                    position_deviation: Metres(position_deviation),
+                    heading_deviation: Radians(heading_deviation),
+                })
+            }
+            Self::Record { .. } | Self::Pause { .. } | Self::Speed { .. } => return None,
+        })
+    }
+}
+
+/// The answer to an order.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Reply {
+    /// Whether it was executed.
+    pub done: bool,
+    /// In words.
+    pub text: String,
+}
+
+impl Reply {
+    /// It was executed.
+    #[must_use]
+    pub fn done(text: &str) -> Self {
+        Self { done: true, text: text.to_owned() }
+    }
+
+    /// It was not, for this reason.
+    #[must_use]
+    pub fn refused(text: &str) -> Self {
+        Self { done: false, text: text.to_owned() }
+    }
+}
+
+/// An order, and where its answer goes.
+#[derive(Debug)]
+pub struct Ordered {
+    /// The order.
+    pub order: Order,
+    reply: SyncSender<Reply>,
+}
+
+impl Ordered {
+    /// An order with the other end of its answer.
+    #[must_use]
+    pub fn new(order: Order, reply: SyncSender<Reply>) -> Self {
+        Self { order, reply }
+    }
+
+    /// Answers it. The page may have gone.
+    pub fn answer(self, reply: Reply) {
+        let _ = self.reply.try_send(reply);
+    }
+}
+
+/// The orders of all pages.
+#[derive(Debug)]
+pub struct Orders(pub(crate) Receiver<Ordered>);
+
+impl Orders {
+    /// The next order, if there is one.
+    #[must_use]
+    pub fn next(&self) -> Option<Ordered> {
+        self.0.try_recv().ok()
+    }
+
+    /// Waits for an order.
+    #[must_use]
+    pub fn wait(&self, patience: Duration) -> Option<Ordered> {
+        self.0.recv_timeout(patience).ok()
+    }
+}

@@ -1,0 +1,297 @@
+//! A robot: its telemetry as events, the commands of pages to it, and its recording.
+
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::sync_channel;
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
+
+use anyhow::Context;
+use sonarfix::navigator::Mode;
+use sonarfix_link::message::Odometry;
+use sonarfix_link::{CommandResult, Estimate, Telemetry};
+use sonarfix_monitor::conversation::{Conversation, Due, Outcome};
+use sonarfix_monitor::recording::Recording;
+use sonarfix_monitor::{Monitor, Received, hints, view};
+
+use crate::feed::{Feed, Scene, Status};
+use crate::order::{Order, Ordered, Orders, Reply};
+use records::Geometry;
+
+mod records;
+
+/// Period of the status, µs of the robot's clock.
+const EVERY: u64 = 500_000;
+
+/// A robot on a page.
+#[derive(Debug)]
+pub struct Robot {
+    feed: Feed,
+    scene: Scene,
+    names: Vec<String>,
+    geometry: Geometry,
+    monitor: Monitor,
+    conversation: Conversation,
+    /// The orders whose commands wait, in their order.
+    waiting: VecDeque<Ordered>,
+    recording: Option<(Recording, PathBuf)>,
+    /// What was recorded, in words.
+    recorded: Vec<String>,
+    notice: String,
+    /// The pose by the encoders alone.
+    odometry: records::DeadReckoning,
+    /// The time of the last estimate, and when the next status is due.
+    last: u64,
+    next_status: u64,
+}
+
+impl Robot {
+    /// A robot of which nothing was received.
+    #[must_use]
+    pub fn new(feed: Feed, scene: Scene, mount: [f64; 2]) -> Self {
+        feed.scene(&scene);
+        Self {
+            feed,
+            names: scene.walls.iter().map(|wall| wall.name.clone()).collect(),
+            geometry: Geometry { mount, track: scene.track, ..Geometry::default() },
+            scene,
+            monitor: Monitor::default(),
+            conversation: Conversation::default(),
+            waiting: VecDeque::new(),
+            recording: None,
+            recorded: Vec::new(),
+            notice: String::new(),
+            odometry: records::DeadReckoning::default(),
+            last: 0,
+            next_status: 0,
+        }
+    }
+
+    /// Its telemetry.
+    #[must_use]
+    pub fn monitor(&self) -> &Monitor {
+        &self.monitor
+    }
+
+    /// Takes received bytes: each message that they complete is published, and passed to `show`, before this returns.
+    ///
+    /// # Errors
+    /// If a recording cannot be written.
+    pub fn take(
+        &mut self,
+        bytes: &[u8],
+        mut show: impl FnMut(&Monitor, &Received),
+    ) -> anyhow::Result<()> {
+        for &byte in bytes {
+            let Some(received) = self.monitor.push(byte) else { continue };
+            if let Some((recording, path)) = &mut self.recording {
+                let taken = recording.take(&received);
+                taken.with_context(|| format!("cannot write {}", path.display()))?;
+            }
+            self.publish(&received);
+            show(&self.monitor, &received);
+        }
+        Ok(())
+    }
+
+    /// Takes the orders of pages, and returns the bytes to send to the robot now.
+    pub fn obey(&mut self, orders: Option<&Orders>, now: Instant) -> Option<Vec<u8>> {
+        while let Some(ordered) = orders.and_then(Orders::next) {
+            self.order(ordered);
+        }
+        match self.conversation.poll(now) {
+            Due::Send(bytes) => Some(bytes),
+            Due::End(outcome) => {
+                self.answer(outcome);
+                None
+            }
+            Due::Nothing => None,
+        }
+    }
+
+    /// Begins a recording.
+    pub fn record(&mut self, path: PathBuf) {
+        self.recording = Some((Recording::new(path.clone()), path));
+    }
+
+    /// Ends a recording, if there is one; the first file of it, and how many there are.
+    pub fn end_recording(&mut self) -> Option<(PathBuf, u32)> {
+        let (recording, path) = self.recording.take()?;
+        Some((path, recording.logs()))
+    }
+
+    /// Publishes that the robot is gone, with the reason.
+    pub fn end(&mut self, reason: &str) {
+        self.status(self.last);
+        self.feed.notice(reason);
+        self.feed.end();
+        while let Some(ordered) = self.waiting.pop_front() {
+            ordered.answer(Reply::refused(reason));
+        }
+    }
+
+    /// Takes an order of this program; its answer is the next [`Self::notice`].
+    pub fn ask(&mut self, order: Order) {
+        let (nobody, _) = sync_channel(1);
+        self.order(Ordered::new(order, nobody));
+    }
+
+    /// The answer to the last order, in words; empty before the first.
+    #[must_use]
+    pub fn notice(&self) -> &str {
+        &self.notice
+    }
+
+    /// The file that is recorded.
+    #[must_use]
+    pub fn recording(&self) -> Option<&Path> {
+        self.recording.as_ref().map(|(_, path)| path.as_path())
+    }
+
+    fn order(&mut self, ordered: Ordered) {
+        let reply = match (ordered.order, ordered.order.command()) {
+            (_, Some(_)) if !self.scene.commands => {
+                Reply::refused("this connection can only be read")
+            }
+            (_, Some(command)) if self.conversation.add(command) => {
+                self.waiting.push_back(ordered);
+                return;
+            }
+            (Order::Record { on: true }, _) if self.recording.is_some() => {
+                Reply::refused("it is recorded already")
+            }
+            (Order::Record { on: true }, _) => {
+                let path = new_file();
+                let text = format!("recording {}", path.display());
+                self.record(path);
+                Reply::done(&text)
+            }
+            (Order::Record { on: false }, _) => match self.end_recording() {
+                Some((path, 1..)) => {
+                    let text = format!("recorded {}", path.display());
+                    self.recorded.push(text.clone());
+                    Reply::done(&text)
+                }
+                Some((_, 0)) => Reply::done("nothing was recorded: no estimate came"),
+                None => Reply::refused("nothing is recorded"),
+            },
+            _ => Reply::refused("a robot does not take this order now"),
+        };
+        self.note(&reply.text);
+        self.status(self.last);
+        ordered.answer(reply);
+    }
+
+    fn answer(&mut self, outcome: Outcome) {
+        let Some(ordered) = self.waiting.pop_front() else { return };
+        let reply = match outcome {
+            Outcome::Answered(CommandResult::Refused(reason)) => {
+                Reply::refused(&format!("the robot refuses: {reason}"))
+            }
+            Outcome::Answered(_) => Reply::done("done"),
+            Outcome::Silence => Reply::refused("the robot does not answer"),
+        };
+        self.note(&format!("{}: {}", ordered.order.name(), reply.text));
+        ordered.answer(reply);
+    }
+
+    fn note(&mut self, text: &str) {
+        self.feed.notice(text);
+        text.clone_into(&mut self.notice);
+    }
+
+    fn publish(&mut self, received: &Received) {
+        if received.lost > 0 {
+            self.feed.notice(&format!("{} frames were lost", received.lost));
+        }
+        match &received.telemetry {
+            Telemetry::Ack(ack) => {
+                if let Some(outcome) = self.conversation.take(ack) {
+                    self.answer(outcome);
+                }
+            }
+            Telemetry::Initialized(estimate) => self.begin(estimate),
+            Telemetry::PoseSet(estimate) => {
+                self.odometry.place(estimate);
+                self.estimate(estimate);
+            }
+            Telemetry::ModeChanged(change) => {
+                self.odometry.place(&change.estimate);
+                self.feed.notice(match change.mode {
+                    Mode::Tracking => "the pose is confirmed",
+                    Mode::Searching => "the pose is unknown: the search begins",
+                    Mode::Provisional => "the search has a pose, which is provisional",
+                });
+                self.estimate(&change.estimate);
+            }
+            Telemetry::Estimate(estimate) => self.estimate(estimate),
+            Telemetry::Odometry(step) => self.wheels(step),
+            Telemetry::Ping(ping) => self.feed.fix(&records::ping(ping, &self.geometry)),
+            Telemetry::Sweep(sweep) => self.feed.fix(&records::sweep(sweep, &self.geometry)),
+            Telemetry::SkippedPing(skip) => self.feed.fix(&records::skip(*skip, &self.geometry)),
+            Telemetry::Search(status) => {
+                let record = records::search(status, self.monitor.hypotheses());
+                self.feed.search(&record, &view::search(status, &self.names));
+            }
+            Telemetry::Hello(_) | Telemetry::LoopStatus(_) => self.status(self.last),
+            Telemetry::Hypothesis(_) | Telemetry::Devices(_) => {}
+        }
+    }
+
+    /// The robot has started: its clock and its path begin again.
+    fn begin(&mut self, estimate: &Estimate) {
+        self.feed.scene(&self.scene);
+        self.last = 0;
+        self.next_status = 0;
+        self.odometry = records::DeadReckoning::default();
+        self.odometry.place(estimate);
+        self.estimate(estimate);
+    }
+
+    fn estimate(&mut self, estimate: &Estimate) {
+        let at = estimate.at.ticks();
+        if at < self.last {
+            // The frame that reports the restart was lost.
+            self.feed.scene(&self.scene);
+            self.next_status = 0;
+        }
+        self.last = at;
+        let tick = records::tick(estimate, self.geometry.track, self.odometry.pose());
+        self.geometry.pose = tick.estimate.pose;
+        self.feed.tick(&tick);
+        if at >= self.next_status {
+            self.status(at);
+        }
+    }
+
+    fn wheels(&mut self, step: &Odometry) {
+        self.odometry.take(step, self.geometry.track);
+        self.feed.wheels(records::seconds(step.at), step.right_metres, step.left_metres);
+    }
+
+    fn status(&mut self, at: u64) {
+        self.next_status = at.saturating_add(EVERY);
+        let status = self.monitor.loop_status();
+        #[expect(clippy::cast_precision_loss, reason = "a duration far below 2^53 µs")]
+        let longest_poll = status.map(|status| status.worst_poll.to_micros() as f64 * 1e-6);
+        self.feed.status(&Status {
+            time: records::seconds(sonarfix::units::Instant::from_ticks(at)),
+            longest_poll,
+            deadlines: status.map(|status| status.faults.deadlines),
+            lines: view::page(&self.monitor, &self.names).lines().map(str::to_owned).collect(),
+            hints: hints::hints(&self.monitor),
+            recording: self.recording.as_ref().map(|(_, path)| path.display().to_string()),
+        });
+    }
+
+    /// What was recorded at the order of a page, in words.
+    #[must_use]
+    pub fn recorded(&self) -> &[String] {
+        &self.recorded
+    }
+}
+
+/// A new file in the working folder.
+fn new_file() -> PathBuf {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    PathBuf::from(format!("recording-{}.csv", now.as_secs()))
+}
