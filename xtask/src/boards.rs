@@ -17,11 +17,20 @@ pub struct Board {
     pub package: String,
     /// The target that it is built for.
     pub target: String,
+    /// Where the baked files lie in its flash.
+    pub config: Region,
+    pub map: Region,
     /// Where the board takes 5 V.
     pub feed: String,
     /// The resistors between echo and ground, upper and lower.
     pub divider: [String; 2],
     pub pins: Pins,
+}
+
+/// A region of flash.
+#[derive(Deserialize)]
+pub struct Region {
+    pub address: u32,
 }
 
 /// The pin of each signal.

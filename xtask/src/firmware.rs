@@ -26,6 +26,14 @@ mod panics;
 mod size;
 mod stack;
 
+/// The package of the reference board's firmware.
+pub const REFERENCE: &str = build::NAME;
+
+/// Builds the firmware of the reference board; returns the path of the linked file.
+pub fn reference() -> anyhow::Result<std::path::PathBuf> {
+    build::release()
+}
+
 /// Builds the firmware, checks the linked file, and runs it in an emulator.
 pub fn test() -> anyhow::Result<()> {
     for check in ["fmt --all --check", "clippy --release -- -D warnings"] {

@@ -17,6 +17,7 @@ mod endurance;
 mod firmware;
 mod fuzz;
 mod golden;
+mod guide;
 mod miri;
 mod mutants;
 mod panics;
@@ -70,6 +71,8 @@ enum Task {
     Stack(firmware::StackArgs),
     /// The shipped loop on emulated microcontrollers, bit by bit as on the PC; its cost.
     Pil,
+    /// Follows docs/build-a-robot.md in simulation: `sonarfix init`, signs of life in QEMU, a drive on each emulated core.
+    Guide,
     /// The golden traces on this computer and every emulated microcontroller.
     Golden,
     /// No panic is linked into a program for a microcontroller.
@@ -113,7 +116,7 @@ enum Task {
 }
 
 /// The steps of CI, the fast ones first.
-fn ci_steps() -> [(&'static str, Task); 21] {
+fn ci_steps() -> [(&'static str, Task); 22] {
     [
         ("format", Task::Format),
         ("circles", Task::Circles),
@@ -125,6 +128,7 @@ fn ci_steps() -> [(&'static str, Task); 21] {
         ("boards", Task::Boards),
         ("golden", Task::Golden),
         ("pil", Task::Pil),
+        ("guide", Task::Guide),
         ("panics", Task::Panics),
         ("budgets", Task::Budgets),
         ("lint-emulated", Task::LintEmulated),
@@ -166,6 +170,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Size => firmware::size(),
         Task::Stack(args) => firmware::stack(&args),
         Task::Pil => pil::check(),
+        Task::Guide => guide::follow(),
         Task::Golden => golden::check(),
         Task::Panics => panics::check(),
         Task::Budgets => budgets::check(),

@@ -22,7 +22,7 @@ use sonarfix::map::Wall;
 use sonarfix::pose::{Point, Pose};
 use sonarfix::units::{Metres, Radians};
 use sonarfix_hal::config::{RobotConfig, Unsupported};
-use sonarfix_hal::ranger::RangerKind;
+use sonarfix_hal::ranger::{NoEcho, RangerKind};
 use sonarfix_link::message::{CommandError, CommandResult, ImageStatus, LoopStatus};
 use sonarfix_link::{
     Ack, Command, Hello, Receiver, Sender, SessionCommand, Telemetry, baked, frame,
@@ -443,6 +443,39 @@ fn a_minute_of_ticks_without_a_missed_deadline() {
     assert_eq!(robot.receiver.counters().skipped(), 0);
     println!("{ticks} ticks in a minute, none late; worst poll {worst} µs; {:?}", status.faults);
     check_memory(&mut robot);
+}
+
+/// The emulator has no device: the readings say so, ten times a second, and end when the loop starts.
+#[test]
+#[ignore = "cargo xtask test-firmware"]
+fn a_robot_that_waits_shows_that_its_devices_are_missing() {
+    let mut robot = Robot::switched_on(&map(), &config());
+    robot.hello();
+    assert_eq!(robot.order(&Command::ShowDevices), CommandResult::Done);
+    let shown = |message: &Telemetry| match message {
+        Telemetry::Devices(readings) => Some(*readings),
+        _ => None,
+    };
+    let first = robot.wait_for(shown);
+    let mut last = first;
+    for _ in 0..50 {
+        last = robot.wait_for(shown);
+    }
+    let seconds = 1e-6 * (last.at.ticks() - first.at.ticks()) as f64;
+    assert!((4.9..5.2).contains(&seconds), "50 readings in {seconds} s");
+    assert_eq!((last.right.count, last.left.count, last.servo), (None, None, None));
+    assert_eq!(last.ping, Some(Err(NoEcho::NoResponse)));
+    assert_eq!((last.right.bits, last.right.metres_per_edge > 0.0), (16, true));
+    assert_eq!(robot.may_drive(), Some(false));
+
+    assert_eq!(robot.order(&Command::SetPose(pose())), CommandResult::Done);
+    assert_eq!(robot.order(&Command::Start), CommandResult::Done);
+    let refused = CommandResult::Refused(CommandError::Running);
+    assert_eq!(robot.order(&Command::ShowDevices), refused);
+    robot.pending.clear();
+    for _ in 0..30 {
+        assert_eq!(shown(&robot.next()), None, "the loop runs");
+    }
 }
 
 /// Checks the deepest stack against the bound of `cargo xtask stack`. The stack lies below everything else

@@ -10,7 +10,8 @@ use crate::cargo;
 use crate::workspace::Workspace;
 
 const TARGET: &str = "thumbv7em-none-eabihf";
-const NAME: &str = "sonarfix-stm32f405";
+/// Its package, and the name of the program.
+pub const NAME: &str = "sonarfix-stm32f405";
 
 /// Builds the firmware; returns the path of the linked file.
 pub fn release() -> anyhow::Result<PathBuf> {
