@@ -123,7 +123,7 @@ fn right(board: &Board) -> Vec<Part<'_>> {
                 Row::text("inputs: your motor control"),
                 Row::text("VM: cells"),
                 Row::text("GND"),
-                Row::text("outputs: right, left motor"),
+                Row::text("outputs: the motors"),
             ],
         ),
     ]
@@ -138,6 +138,13 @@ fn supply(board: &Board) -> [String; 4] {
         "GND of all parts joined".to_owned(),
     ]
 }
+
+/// The lines of the box of the motors.
+const MOTORS: [&str; 3] = [
+    "right motor: outputs A of the motor driver",
+    "left motor: outputs B of the motor driver",
+    "mounted as mirror images of each other",
+];
 
 fn draw(board: &Board) -> String {
     let (left, right) = (left(board), right(board));
@@ -160,16 +167,25 @@ fn draw(board: &Board) -> String {
     let lines = supply(board);
     let supply_height = TITLE + ROW * count(lines.len()) + MARGIN;
     let supply_width = around(lines.iter().map(String::as_str));
-    let mut svg = Svg::new(all.0.max(supply_width + 2.0 * MARGIN), all.1 + supply_height + MARGIN);
+    let motors_at = MARGIN + supply_width + BETWEEN;
+    let motors_width = around(MOTORS.into_iter());
+    let below = motors_at + motors_width + MARGIN;
+    let mut svg = Svg::new(all.0.max(below), all.1 + supply_height + MARGIN);
     svg.part(board_at, MARGIN, board_width, board_height, &board.title);
     let top = MARGIN + TITLE;
     svg.column(&left, MARGIN, left_width, top, Side { board: board_at, is_left: true });
     let edge = board_at + board_width;
     svg.column(&right, right_at, right_width, top, Side { board: edge, is_left: false });
     let at = all.1;
-    svg.part(MARGIN, at, supply_width, supply_height, "supply");
-    for (number, line) in lines.iter().enumerate() {
-        svg.text(2.0 * MARGIN, at + TITLE + ROW * (count(number) + 0.7), line, "start", false);
+    let boxes: [(f64, f64, &str, Vec<&str>); 2] = [
+        (MARGIN, supply_width, "supply", lines.iter().map(String::as_str).collect()),
+        (motors_at, motors_width, "motors", MOTORS.to_vec()),
+    ];
+    for (x, width, title, lines) in boxes {
+        svg.part(x, at, width, supply_height, title);
+        for (number, line) in lines.into_iter().enumerate() {
+            svg.text(x + MARGIN, at + TITLE + ROW * (count(number) + 0.7), line, "start", false);
+        }
     }
     svg.end()
 }
@@ -286,6 +302,63 @@ mod tests {
         for (file, svg) in drawings {
             let written = fs::read_to_string(&file).unwrap_or_default();
             assert!(written == svg, "{}: run `cargo xtask wiring`", file.display());
+        }
+    }
+
+    /// A number of an element.
+    fn number(element: &str, name: &str) -> f64 {
+        let (_, rest) = element.split_once(&format!(" {name}=\"")).unwrap_or_default();
+        rest.split('"').next().and_then(|text| text.parse().ok()).unwrap_or(f64::NAN)
+    }
+
+    /// Each text lies in one box of its drawing, or, beside a resistor, in none; and no box lies on another one.
+    #[test]
+    fn nothing_is_outside_its_box() {
+        for (file, svg) in drawings().unwrap_or_default() {
+            let of = |start: &str| -> Vec<&str> {
+                svg.lines().filter(|line| line.starts_with(start)).collect()
+            };
+            let rectangle = |line: &&str| {
+                let [x, y, width, height] =
+                    ["x", "y", "width", "height"].map(|name| number(line, name));
+                [x, y, x + width, y + height]
+            };
+            let page =
+                of("<rect width").first().map(|line| ["width", "height"].map(|n| number(line, n)));
+            let Some([page_width, page_height]) = page else { panic!("no page") };
+            let rounded: Vec<_> =
+                of("<rect x").into_iter().filter(|line| line.contains("rx=")).collect();
+            let boxes: Vec<[f64; 4]> = rounded.iter().map(rectangle).collect();
+            assert!(boxes.len() >= 9, "{}", file.display());
+            let overlap = |one: &[f64; 4], other: &[f64; 4]| {
+                let apart = |low, high| one[high] <= other[low] || other[high] <= one[low];
+                !(apart(0, 2) || apart(1, 3))
+            };
+            let holds = |outer: &[f64; 4], inner: &[f64; 4]| {
+                outer[0] <= inner[0]
+                    && outer[1] <= inner[1]
+                    && inner[2] <= outer[2]
+                    && inner[3] <= outer[3]
+            };
+            for (number, one) in boxes.iter().enumerate() {
+                assert!(holds(&[0.0, 0.0, page_width, page_height], one));
+                assert!(!boxes.iter().skip(number + 1).any(|other| overlap(one, other)));
+            }
+            for line in of("<text") {
+                let text =
+                    line.split('>').nth(1).and_then(|rest| rest.split('<').next()).unwrap_or("");
+                let (x, y, width) = (number(line, "x"), number(line, "y"), width(text));
+                let from = match line {
+                    middle if middle.contains("\"middle\"") => x - 0.5 * width,
+                    end if end.contains("\"end\"") => x - width,
+                    _ => x,
+                };
+                let space = [from, y - 0.8 * FONT, from + width, y + 0.25 * FONT];
+                let is_in_one = boxes.iter().any(|outer| holds(outer, &space));
+                let is_beside =
+                    text.ends_with('Ω') && !boxes.iter().any(|outer| overlap(outer, &space));
+                assert!(is_in_one || is_beside, "{}: {text}", file.display());
+            }
         }
     }
 }
