@@ -98,10 +98,14 @@ fn drive(robot: &Path, board: &Board) -> anyhow::Result<()> {
     let scenario = fs::read_to_string(robot.join("scenario.toml"))?;
     fs::write(robot.join("baked.toml"), scenario.replace("\"map.toml\"", "\"map.bin\""))?;
     let drive = ["pil", "baked.toml", "--robot", "config.bin", "--machine", machine];
-    let drive = [&drive[..], &["--seconds", SECONDS, "--json"]].concat();
-    let fixes = number(&json(robot, &drive)?, &["fix", "calls"]).unwrap_or(0);
-    ensure!(fixes > 0, "{}: no fix in {SECONDS} s", board.name);
-    println!("{}: {fixes} fixes in {SECONDS} s of driving on an emulated {machine}", board.name);
+    let drive = sonarfix(robot, &[&drive[..], &["--seconds", SECONDS]].concat())?;
+    let accepted = drive.lines().find_map(|line| line.split_once(" ranges accepted"));
+    let accepted: u32 = accepted.context("no count of ranges")?.0.parse()?;
+    ensure!(accepted > 0, "{}: no fix in {SECONDS} s", board.name);
+    for part in ["are equal to the bit", "\n0 deadlines missed"] {
+        ensure!(drive.contains(part), "{}: not `{part}` in\n{drive}", board.name);
+    }
+    println!("{}: {accepted} fixes in {SECONDS} s of driving on an emulated {machine}", board.name);
     Ok(())
 }
 
