@@ -27,7 +27,7 @@ use lines::{Line, Lines, TILTS};
 use refine::Prior;
 use score::EchoModel;
 use trial::{Odometry, Trial, Verdict};
-use window::Window;
+use window::{Straightening, Window};
 
 use crate::config::{Config, Sonar};
 use crate::echo::EchoParameters;
@@ -237,6 +237,8 @@ const REGION_MARGIN: f32 = 0.1;
 /// Where a cycle stands.
 #[derive(Debug, Clone, Copy)]
 enum Task {
+    Rebase,
+    Straighten(Straightening),
     Vote { ping: u16, tilt: u8 },
     Fit { line: u8 },
     Bank,
@@ -323,7 +325,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
             window: Window::new(sonar.mount.into()),
             lines: Lines::new(sonar.cone),
             bank: Bank::new(),
-            task: Task::Vote { ping: 0, tilt: 0 },
+            task: Task::Rebase,
             trial: None,
             cycles: 0,
             taken: 0,
@@ -345,7 +347,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         self.window.restart(sonar.mount.into());
         self.lines.restart(sonar.cone);
         self.bank.clear();
-        self.task = Task::Vote { ping: 0, tilt: 0 };
+        self.task = Task::Rebase;
         self.trial = None;
         self.cycles = 0;
         self.taken = 0;
@@ -423,7 +425,9 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
             self.evaluate();
         }
         match self.task {
-            Task::Vote { .. } | Task::Fit { .. } => Phase::Lines,
+            Task::Rebase | Task::Straighten(_) | Task::Vote { .. } | Task::Fit { .. } => {
+                Phase::Lines
+            }
             Task::Bank => Phase::Bank,
             Task::Pairs { .. } => Phase::Pairs,
             Task::Along { .. } => Phase::GlobalCheck,
@@ -529,6 +533,8 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
             return;
         }
         self.task = match self.task {
+            Task::Rebase => self.rebase(),
+            Task::Straighten(straightening) => self.straighten(straightening),
             Task::Vote { ping, tilt } => self.vote(ping, tilt),
             Task::Fit { line } => self.fit(line),
             Task::Bank => self.refine(),
@@ -538,10 +544,6 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
     }
 
     fn vote(&mut self, ping: u16, tilt: u8) -> Task {
-        if ping == 0 && tilt == 0 {
-            self.rebase();
-            self.lines.clear();
-        }
         let Some(part) = TILTS.get(usize::from(tilt)) else {
             let next = ping + 1;
             return if usize::from(next) < self.window.pings().len() {
@@ -554,16 +556,26 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         Task::Vote { ping, tilt: tilt + 1 }
     }
 
-    /// Moves the frame to the robot, and straightens the path by the best hypothesis.
-    fn rebase(&mut self) {
+    /// Moves the frame to the robot, and begins to straighten the path by the best hypothesis.
+    fn rebase(&mut self) -> Task {
         let bend = self.window.bend();
         let reference = self.window.rebase();
         self.bank.rebase(&reference, bend);
         if let Decision::Unique(entry) = &mut self.answer {
             entry.placement = moved(&entry.placement, &reference, bend);
         }
-        if let Some(best) = self.bank.entries().first() {
-            self.window.straighten(best.placement.bend);
+        self.lines.clear();
+        match self.bank.entries().first() {
+            Some(best) => Task::Straighten(self.window.begin_straightening(best.placement.bend)),
+            None => Task::Vote { ping: 0, tilt: 0 },
+        }
+    }
+
+    fn straighten(&mut self, mut straightening: Straightening) -> Task {
+        if self.window.straighten(&mut straightening) {
+            Task::Straighten(straightening)
+        } else {
+            Task::Vote { ping: 0, tilt: 0 }
         }
     }
 
@@ -597,7 +609,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
                 return Task::Along { line: 0, along: AlongWalls::default() };
             }
             self.decide(false);
-            return Task::Vote { ping: 0, tilt: 0 };
+            return Task::Rebase;
         };
         let bend = self.window.bend();
         match pairs.next(&self.echoes.reflectors.map, &first, &second, bend) {
@@ -613,7 +625,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         let checked = self.lines.all().get(usize::from(line)).copied();
         let Some(checked) = checked.filter(|_| line < CHECKED_LINES) else {
             self.decide(true);
-            return Task::Vote { ping: 0, tilt: 0 };
+            return Task::Rebase;
         };
         let bend = self.window.bend();
         match along.next(&self.echoes.reflectors.map, &checked, bend) {

@@ -229,21 +229,36 @@ impl<const PINGS: usize> Window<PINGS> {
         reference
     }
 
-    /// Takes this bend out of the odometry instead of the one before. To be called at the reference.
-    pub fn straighten(&mut self, bend: Bend) {
-        let difference = bend.minus(self.bend);
-        let mut chain = Chain::new(Vector::default());
-        for n in (0..self.pings.len()).rev() {
-            let Some(ping) = self.pings.get(n) else { continue };
-            let link = self.link(ping, difference);
-            chain.add(&link);
-            let (at, axis) = (chain.sonar(&link), ping.axis.turned(link.bent));
-            if let Some(ping) = self.pings.get_mut(n) {
-                ping.station.at = at;
+    /// Takes this bend out of the odometry instead of the one before, from here on; returns what does the same for the
+    /// pings so far. To be called at the reference.
+    pub fn begin_straightening(&mut self, bend: Bend) -> Straightening {
+        let before = self.bend;
+        self.bend = bend;
+        Straightening { before, done: 0, chain: Chain::new(Vector::default()) }
+    }
+
+    /// Takes the bend out of a few pings, the newest first; returns whether there are more.
+    #[inline(never)]
+    pub fn straighten(&mut self, straightening: &mut Straightening) -> bool {
+        let difference = self.bend.minus(straightening.before);
+        for _ in 0..STRAIGHTENED_AT_ONCE {
+            // A ping that arrives meanwhile lies after the reference and may replace the oldest: counted from the newest,
+            // the others keep their numbers.
+            let before_reference = self.pings().len();
+            let at = before_reference.checked_sub(1 + usize::from(straightening.done));
+            let Some((at, ping)) = at.and_then(|at| Some((at, self.pings.get(at)?))) else {
+                return false;
+            };
+            let link = self.link_of(ping, straightening.before, difference);
+            straightening.chain.add(&link);
+            let (place, axis) = (straightening.chain.sonar(&link), ping.axis.turned(link.bent));
+            if let Some(ping) = self.pings.get_mut(at) {
+                ping.station.at = place;
                 ping.axis = axis;
             }
+            straightening.done += 1;
         }
-        self.bend = bend;
+        true
     }
 
     /// The `k`-th ping before the reference, the newest first.
@@ -253,8 +268,13 @@ impl<const PINGS: usize> Window<PINGS> {
 
     /// A ping as a link of a chain that has another bend taken out.
     pub fn link(&self, ping: &Ping, difference: Bend) -> Link {
+        self.link_of(ping, self.bend, difference)
+    }
+
+    /// The same of a ping that has the bend `taken` taken out.
+    fn link_of(&self, ping: &Ping, taken: Bend, difference: Bend) -> Link {
         let station = &ping.station;
-        let turned = self.reference_heading + station.turned + self.bend.at(station).0;
+        let turned = self.reference_heading + station.turned + taken.at(station).0;
         let arm = self.mount.turned(Vector::of_angle(turned));
         Link {
             axle: station.at.minus(arm),
@@ -264,6 +284,19 @@ impl<const PINGS: usize> Window<PINGS> {
             bent: Vector::of_angle(difference.at(station).0),
         }
     }
+}
+
+/// Pings from which one slice takes the bend.
+const STRAIGHTENED_AT_ONCE: u8 = 8;
+
+/// How far the bend of the odometry was taken out of the pings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Straightening {
+    /// What was taken out before.
+    before: Bend,
+    /// Pings that are done.
+    done: u16,
+    chain: Chain,
 }
 
 /// A place of the path for a chain.
