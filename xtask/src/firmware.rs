@@ -48,6 +48,10 @@ pub fn test() -> anyhow::Result<()> {
     let tests = "test --package sonarfix-app --test emulated -- --ignored --nocapture";
     let mut command = cargo::command(tests);
     command.env("SONARFIX_FIRMWARE", &program).env("SONARFIX_STACK", deepest.to_string());
+    cargo::check(command)?;
+    let page = "test --package sonarfix-cli --test main emulated_firmware -- --ignored --nocapture";
+    let mut command = cargo::command(page);
+    command.env("SONARFIX_FIRMWARE", &program);
     cargo::check(command)
 }
 

@@ -250,24 +250,78 @@ impl Drop for Monitored {
 fn monitored(further: &[&str], dir: &Path) -> Monitored {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let port = format!("tcp:{}", listener.local_addr().unwrap());
+    let mut child = monitor(&port, further, dir);
+    let (stream, _) = listener.accept().unwrap();
+    stream.set_nodelay(true).unwrap();
+    let mut errors = BufReader::new(child.stderr.take().unwrap());
+    let (host, token) = printed(&mut errors).unwrap();
+    Monitored { child, robot: Wire { stream, sender: Sender::new() }, host, token, errors }
+}
+
+/// `sonarfix monitor --serve` on a port.
+fn monitor(port: &str, further: &[&str], dir: &Path) -> Child {
     let mut child = Command::new(env!("CARGO_BIN_EXE_sonarfix"))
-        .args(["monitor", "--port", &port, "--serve"])
+        .args(["monitor", "--port", port, "--serve"])
         .args(further)
         .current_dir(dir)
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    let (stream, _) = listener.accept().unwrap();
-    stream.set_nodelay(true).unwrap();
-    let mut errors = BufReader::new(child.stderr.take().unwrap());
-    let mut line = String::new();
-    errors.read_line(&mut line).unwrap();
-    let (host, token) = parts(line.trim().strip_prefix("open ").expect(&line));
     // Nobody reads the lines that it prints.
     let mut lines = child.stdout.take().unwrap();
     thread::spawn(move || std::io::copy(&mut lines, &mut std::io::sink()));
-    Monitored { child, robot: Wire { stream, sender: Sender::new() }, host, token, errors }
+    child
+}
+
+/// Host and token of the address that was printed; `None` if it was an error.
+fn printed(errors: &mut impl BufRead) -> Option<(String, String)> {
+    let mut line = String::new();
+    errors.read_line(&mut line).unwrap();
+    line.trim().strip_prefix("open ").map(parts)
+}
+
+/// The firmware that is flashed, in an emulator: the page shows it and passes on a command, which it refuses without a map.
+#[test]
+#[ignore = "needs the firmware: cargo xtask test-firmware"]
+fn the_emulated_firmware_is_on_the_page() {
+    let elf = std::env::var("SONARFIX_FIRMWARE").expect("run `cargo xtask test-firmware`");
+    let free = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let limit = PATIENCE.as_secs().to_string();
+    let mut emulator = Command::new("timeout")
+        .args([&limit, "qemu-system-arm", "-machine", "netduinoplus2", "-display", "none"])
+        .args(["-icount", "shift=0,sleep=off", "-monitor", "none", "-kernel", &elf])
+        // USART1 is not connected; the link is USART2.
+        .args(["-serial", "null", "-serial", &format!("tcp:{free},server=on,wait=on")])
+        .stdin(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("is qemu-system-arm installed?");
+    let dir = tempfile::tempdir().unwrap();
+    let (mut child, (host, token)) = loop {
+        let mut child = monitor(&format!("tcp:{free}"), &[], dir.path());
+        let mut errors = BufReader::new(child.stderr.take().unwrap());
+        if let Some(page) = printed(&mut errors) {
+            break (child, page);
+        }
+        // The emulator does not listen yet.
+        child.wait().unwrap();
+        assert!(emulator.try_wait().unwrap().is_none(), "the emulator has ended");
+        thread::sleep(Duration::from_millis(100));
+    };
+    let mut seen = events(&host, &token).filter_map(|event| {
+        let lines = event["status"]["lines"].as_array()?;
+        lines.iter().find_map(|line| Some(line.as_str()?.strip_prefix("robot   ")?.to_owned()))
+    });
+    let hello = seen.find(|line| line != "none yet").unwrap();
+    assert!(hello.contains("map missing"), "{hello}");
+    let headers = [format!("Host: {host}"), format!("Authorization: Bearer {token}")];
+    let answer = asked(&host, &post("{\"order\":\"start\"}", &headers));
+    assert!(answer.contains("the robot refuses: "), "{answer}");
+    for process in [&mut child, &mut emulator] {
+        process.kill().unwrap();
+        process.wait().unwrap();
+    }
 }
 
 /// The events of a page.

@@ -6,9 +6,13 @@ use std::path::Path;
 
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
-use sonarfix_link::{Reporter, Sender, Telemetry, frame};
+use sonarfix::ekf::{StandardDeviations, StateEstimate};
+use sonarfix::units::Instant;
+use sonarfix_link::message::{ImageStatus, Odometry, ResetCause};
+use sonarfix_link::{Hello, Reporter, Sender, Telemetry, frame};
 use sonarfix_map::{CLASSROOM, Fidelity, Scenario};
 use sonarfix_monitor::Monitor;
+use sonarfix_monitor::hints::hints;
 use sonarfix_monitor::terminal::{History, Screen};
 use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::trace::{FixRecord, Recorder, Tick, Trace};
@@ -103,4 +107,53 @@ fn a_terminal_may_be_tiny() {
         let screen = shown(&received, &trace, width, height);
         assert_eq!(screen.lines().count(), usize::from(height), "{width}×{height}");
     }
+}
+
+/// What the telemetry of a robot suggests to check.
+fn hints_after(telemetry: &[Telemetry]) -> String {
+    let mut received = Received::default();
+    telemetry.iter().for_each(|telemetry| received.send(telemetry));
+    hints(&received.monitor).join("\n")
+}
+
+fn wheels(number: u32, right_metres: f64, left_metres: f64) -> Telemetry {
+    let at = Instant::from_ticks(u64::from(number) * 100_000);
+    Telemetry::Odometry(Odometry { at, right_metres, left_metres })
+}
+
+#[test]
+fn a_wheel_that_does_not_count_is_found() {
+    let rolled = |number: u32| f64::from(number) * 0.05;
+    let right_dead: Vec<_> = (0..10).map(|n| wheels(n, 0.0, rolled(n))).collect();
+    let found = hints_after(&right_dead);
+    assert!(found.contains("the right encoder counts nothing"), "{found}");
+    let left_dead: Vec<_> = (0..10).map(|n| wheels(n, -rolled(n), 0.0)).collect();
+    let found = hints_after(&left_dead);
+    assert!(found.contains("the left encoder counts nothing"), "{found}");
+    // Turning about one wheel for a short time, then driving.
+    let good: Vec<_> =
+        (0..40).map(|n| wheels(n, rolled(n), if n < 5 { 0.0 } else { rolled(n - 5) })).collect();
+    assert_eq!(hints_after(&good), "");
+}
+
+#[test]
+fn a_robot_without_images_and_with_a_silent_sonar_is_found() {
+    let hello = Telemetry::Hello(Hello {
+        firmware: [1, 2, 3],
+        map: ImageStatus::Missing,
+        configuration: ImageStatus::Corrupt,
+        reset: ResetCause::PowerOn,
+    });
+    let found = hints_after(&[hello]);
+    assert!(found.contains("no map") && found.contains("a damaged configuration"), "{found}");
+
+    let at = Instant::from_ticks(0);
+    let (_, began) = Reporter::resume(at, StateEstimate::default(), StandardDeviations::default());
+    let Telemetry::Initialized(mut estimate) = began else { unreachable!("{began:?}") };
+    assert_eq!(hints_after(&[Telemetry::Estimate(estimate)]), "");
+    estimate.health.silent_in_a_row = 10;
+    estimate.health.gated_in_a_row = 10;
+    let found = hints_after(&[Telemetry::Estimate(estimate)]);
+    assert!(found.contains("no usable range for 10 pings"), "{found}");
+    assert!(found.contains("10 ranges in a row do not fit the map"), "{found}");
 }

@@ -21,6 +21,8 @@ pub enum Order {
     Search,
     /// Discard the learned calibration.
     ResetCalibration,
+    /// Show for a minute what the devices of a robot that waits read.
+    ShowDevices,
     /// Initialize the localizer at a pose.
     SetPose {
         /// Metres along the map's x axis.
@@ -60,6 +62,7 @@ impl Order {
             Self::Stop => "stop",
             Self::Search => "search",
             Self::ResetCalibration => "reset of the calibration",
+            Self::ShowDevices => "show devices",
             Self::SetPose { .. } => "set pose",
             Self::Record { .. } => "recording",
             Self::Pause { .. } => "pause",
@@ -75,6 +78,7 @@ impl Order {
             Self::Stop => Command::Stop,
             Self::Search => Command::Search,
             Self::ResetCalibration => Command::ResetCalibration,
+            Self::ShowDevices => Command::ShowDevices,
             Self::SetPose { x, y, heading, position_deviation, heading_deviation } => {
                 Command::SetPose(Start {
                     pose: Pose::new(x, y, Radians(heading)),

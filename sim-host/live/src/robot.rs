@@ -11,6 +11,7 @@ use sonarfix_link::message::Odometry;
 use sonarfix_link::{CommandResult, Estimate, Telemetry};
 use sonarfix_monitor::conversation::{Conversation, Due, Outcome};
 use sonarfix_monitor::recording::Recording;
+use sonarfix_monitor::signs::Signs;
 use sonarfix_monitor::{Monitor, Received, hints, view};
 
 use crate::feed::{Feed, Scene, Status};
@@ -33,6 +34,9 @@ pub struct Robot {
     conversation: Conversation,
     /// The orders whose commands wait, in their order.
     waiting: VecDeque<Ordered>,
+    signs: Signs,
+    /// Whether the robot has sent the readings of its devices.
+    shows_devices: bool,
     recording: Option<(Recording, PathBuf)>,
     /// What was recorded, in words.
     recorded: Vec<String>,
@@ -57,6 +61,8 @@ impl Robot {
             monitor: Monitor::default(),
             conversation: Conversation::default(),
             waiting: VecDeque::new(),
+            signs: Signs::default(),
+            shows_devices: false,
             recording: None,
             recorded: Vec::new(),
             notice: String::new(),
@@ -203,7 +209,14 @@ impl Robot {
         if received.lost > 0 {
             self.feed.notice(&format!("{} frames were lost", received.lost));
         }
+        self.signs.take(received);
         match &received.telemetry {
+            Telemetry::Devices(readings) => {
+                self.shows_devices = true;
+                if readings.at.ticks() >= self.next_status {
+                    self.status(readings.at.ticks());
+                }
+            }
             Telemetry::Ack(ack) => {
                 if let Some(outcome) = self.conversation.take(ack) {
                     self.answer(outcome);
@@ -233,7 +246,7 @@ impl Robot {
                 self.feed.search(&record, &view::search(status, &self.names));
             }
             Telemetry::Hello(_) | Telemetry::LoopStatus(_) => self.status(self.last),
-            Telemetry::Hypothesis(_) | Telemetry::Devices(_) => {}
+            Telemetry::Hypothesis(_) => {}
         }
     }
 
@@ -277,10 +290,21 @@ impl Robot {
             time: records::seconds(sonarfix::units::Instant::from_ticks(at)),
             longest_poll,
             deadlines: status.map(|status| status.faults.deadlines),
-            lines: view::page(&self.monitor, &self.names).lines().map(str::to_owned).collect(),
+            lines: self.lines(),
             hints: hints::hints(&self.monitor),
             recording: self.recording.as_ref().map(|(_, path)| path.display().to_string()),
         });
+    }
+
+    /// All telemetry, and the devices of a robot that shows them.
+    fn lines(&self) -> Vec<String> {
+        let page = view::page(&self.monitor, &self.names);
+        let mut lines: Vec<_> = page.lines().map(str::to_owned).collect();
+        if self.shows_devices {
+            let rows = self.signs.rows(&self.monitor.counters());
+            lines.extend(rows.iter().map(ToString::to_string));
+        }
+        lines
     }
 
     /// What was recorded at the order of a page, in words.
