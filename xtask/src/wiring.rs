@@ -121,7 +121,7 @@ fn right(board: &Board) -> Vec<Part<'_>> {
             vec![
                 enable,
                 Row::text("inputs: your motor control"),
-                Row::text("VM: cells"),
+                Row::text("VM: cells, VCC: 3.3 V"),
                 Row::text("GND"),
                 Row::text("outputs: the motors"),
             ],
