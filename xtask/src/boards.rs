@@ -20,6 +20,8 @@ pub struct Board {
     /// Where the baked files lie in its flash.
     pub config: Region,
     pub map: Region,
+    /// The linker's memory map, from the top of the repository.
+    pub memory: String,
     /// Where the board takes 5 V.
     pub feed: String,
     /// The resistors between echo and ground, upper and lower.

@@ -28,10 +28,27 @@ pub fn config() -> &'static [u8] {
     }
 }
 
-/// The store's region, in addresses relative to the start of the flash at `base`.
+/// The baked map's region, in addresses relative to the start of the flash at `base`: for a board whose flash cannot be read
+/// in place.
+#[must_use]
+pub fn map_in(base: u32) -> Range<u32> {
+    region(&raw const __map_start, &raw const __map_length, base)
+}
+
+/// The baked configuration's region, likewise.
+#[must_use]
+pub fn config_in(base: u32) -> Range<u32> {
+    region(&raw const __config_start, &raw const __config_length, base)
+}
+
+/// The store's region, likewise.
 #[must_use]
 pub fn store(base: u32) -> Range<u32> {
-    let number = |address: usize| u32::try_from(address).unwrap_or(u32::MAX);
-    let start = number((&raw const __store_start).addr()).saturating_sub(base);
-    start..start.saturating_add(number((&raw const __store_length).addr()))
+    region(&raw const __store_start, &raw const __store_length, base)
+}
+
+fn region(start: *const u8, length: *const u8, base: u32) -> Range<u32> {
+    let number = |address: *const u8| u32::try_from(address.addr()).unwrap_or(u32::MAX);
+    let start = number(start).saturating_sub(base);
+    start..start.saturating_add(number(length))
 }

@@ -32,9 +32,9 @@ pub fn check(reference: &[u8]) -> anyhow::Result<()> {
         rows.push(row(board, &program)?);
     }
     println!(
-        "\n| board | flash, bytes | variables in RAM, bytes | lines of its own: code, comments |"
+        "\n| board | flash, bytes | variables in RAM, bytes | lines of its own: code, comments | of its build files |"
     );
-    println!("|---|---|---|---|\n{}", rows.join("\n"));
+    println!("|---|---|---|---|---|\n{}", rows.join("\n"));
     Ok(())
 }
 
@@ -46,20 +46,52 @@ fn row(board: &Board, program: &[u8]) -> anyhow::Result<String> {
     let flash: u64 = allocated.filter(|s| in_flash(s.kind())).map(|section| section.size()).sum();
     let variables: u64 = memory::variables_of(&file).map(|section| section.size()).sum();
     let folder = Workspace::Firmware.folder().join(board.package.trim_start_matches("sonarfix-"));
-    let (code, comments) = lines(&folder.join("src"))?;
-    Ok(format!("| {} | {flash} | {variables} | {code}, {comments} |", board.title))
-}
-
-/// Lines of code and of comments below a folder, in Rust and in the language of state machines.
-fn lines(folder: &Path) -> anyhow::Result<(usize, usize)> {
     let (mut code, mut comments) = (0, 0);
-    // A board without a folder has no line of its own.
-    for entry in fs::read_dir(folder).into_iter().flatten() {
-        let text = fs::read_to_string(entry?.path())?;
-        for line in text.lines().map(str::trim).filter(|line| !line.is_empty()) {
-            let is_comment = line.starts_with("//") || line.starts_with(';');
-            *(if is_comment { &mut comments } else { &mut code }) += 1;
+    // A board that takes the source of another has no folder for it.
+    for entry in fs::read_dir(folder.join("src")).into_iter().flatten() {
+        let lines = lines(&entry?.path())?;
+        code += lines.0;
+        comments += lines.1;
+    }
+    let mut build = 0;
+    let beside = ["Cargo.toml", "build.rs", "partitions.csv"].map(|name| folder.join(name));
+    for file in beside.into_iter().chain([cargo::root().join(&board.memory)]) {
+        if file.exists() {
+            build += lines(&file)?.0;
         }
     }
+    Ok(format!("| {} | {flash} | {variables} | {code}, {comments} | {build} |", board.title))
+}
+
+/// Lines of code and of comments in a file: Rust, TOML, a linker script, or the language of state machines.
+fn lines(file: &Path) -> anyhow::Result<(usize, usize)> {
+    let text = fs::read_to_string(file)?;
+    let (mut code, mut comments) = (0, 0);
+    let mut is_inside = false;
+    for line in text.lines().map(str::trim).filter(|line| !line.is_empty()) {
+        let is_block = line.starts_with("/*");
+        let is_comment = is_inside
+            || is_block
+            || line.starts_with("//")
+            || line.starts_with(';')
+            || (line.starts_with('#') && !line.starts_with("#[") && !line.starts_with("#!["));
+        is_inside = (is_inside || is_block) && !line.ends_with("*/");
+        *(if is_comment { &mut comments } else { &mut code }) += 1;
+    }
     Ok((code, comments))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn comments_of_all_languages_are_not_counted_as_code() {
+        let text = "/* two\n   lines */\nA : B\n  /* one */\n#[attribute]\n# toml\n// rust\n\n; pio\nx = 1\n";
+        let file = std::env::temp_dir().join(format!("sonarfix-lines-{}", std::process::id()));
+        fs::write(&file, text).unwrap();
+        let counted = lines(&file);
+        fs::remove_file(&file).unwrap();
+        assert_eq!(counted.unwrap(), (3, 6));
+    }
 }

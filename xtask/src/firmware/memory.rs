@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 
 use anyhow::{Context, bail, ensure};
-use object::{Object, ObjectSection, SectionKind};
+use object::elf::SHF_WRITE;
+use object::{Object, ObjectSection, SectionFlags, SectionKind};
 
 use crate::elf;
 
@@ -58,12 +59,15 @@ fn lowest_variable(file: &object::File) -> anyhow::Result<u64> {
     lowest.context("the program has no variables")
 }
 
-/// The sections in RAM.
+/// The sections of variables in RAM: they can be written. That of the stack, where a linker script has one, is none of them.
 pub fn variables_of<'f, 'd>(
     file: &'f object::File<'d>,
 ) -> impl Iterator<Item = object::Section<'d, 'f>> {
     file.sections().filter(|section| {
+        let SectionFlags::Elf { sh_flags } = section.flags() else { return false };
         matches!(section.kind(), SectionKind::Data | SectionKind::UninitializedData)
+            && sh_flags & u64::from(SHF_WRITE) != 0
+            && section.name() != Ok(".stack")
             && section.size() > 0
     })
 }

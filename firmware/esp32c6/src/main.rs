@@ -1,0 +1,356 @@
+//! An ESP32-C6 DevKitC-1 with two encoders, a servo, a pulse-width sonar and a UART.
+//!
+//! This file is the board. The robot is described by the baked configuration, and its behaviour is in `sonarfix-app`.
+//! The wiring is a table in `docs/firmware.md`.
+//!
+//! | | for | pins |
+//! |---|---|---|
+//! | PCNT, units 0 and 1 | right and left encoder, every edge | 18 19, 20 21 |
+//! | MCPWM0, capture timer | the stamps of the echo's edges, 1 µs | 2 |
+//! | MCPWM0, timer 0, operator 0 | the servo's pulses, 1 µs | 22 |
+//! | system timer | the clock, 1 µs | |
+//! | UART0 | the link, 115,200 baud | 16 17 |
+//! | | the sonar's trigger; high while the robot may drive | 23; 3 |
+//!
+//! Hardware counts the wheels and stamps the edges, however long a poll or a write to flash takes. No interrupt is needed.
+
+#![no_std]
+#![no_main]
+
+use core::convert::Infallible;
+use core::ops::Range;
+
+use defmt_rtt as _;
+use esp_hal::clock::CpuClock;
+use esp_hal::gpio::interconnect::InputSignal as Signal;
+use esp_hal::gpio::{Input, InputConfig, InputSignal, Level, Output, OutputConfig, Pull};
+use esp_hal::mcpwm::operator::{PwmPin, PwmPinConfig};
+use esp_hal::mcpwm::timer::PwmWorkingMode;
+use esp_hal::mcpwm::{McPwm, PeripheralClockConfig};
+use esp_hal::pcnt::Pcnt;
+use esp_hal::pcnt::channel::{CtrlMode, EdgeMode};
+use esp_hal::pcnt::unit::Unit;
+use esp_hal::peripherals::{GPIO, MCPWM0};
+use esp_hal::rtc_cntl::{Rtc, RwdtStage, RwdtStageAction, SocResetReason};
+use esp_hal::system::reset_reason;
+use esp_hal::time::Duration;
+use esp_hal::uart::{self, Uart};
+use esp_hal::{Blocking, ram};
+use esp_storage::FlashStorage;
+use heapless::Deque;
+use portable_atomic::{AtomicU32, Ordering};
+use sonarfix::units::Instant;
+use sonarfix_app::store::Store;
+use sonarfix_app::{App, FlashContents, Link, boots, log};
+use sonarfix_hal::encoder::Counter;
+use sonarfix_hal::ranger::{Captured, EchoCapture, PulseRanger, StampedEdges, Stamps};
+use sonarfix_hal::robot::Devices;
+use sonarfix_link::message::ResetCause;
+use sonarfix_robot::memory;
+use static_cell::ConstStaticCell;
+
+// What the bootloader checks before it starts the program.
+esp_bootloader_esp_idf::esp_app_desc!();
+
+/// The poll period, microseconds.
+const POLL: u64 = 1_000;
+/// Longer than the erasure of a sector (at most 0.4 s), which delays the loop.
+const WATCHDOG: Duration = Duration::from_secs(2);
+/// Number of the pin that is high while the robot may drive.
+const DRIVE: u32 = 3;
+/// Periods of 12.5 ns: shorter pulses on an encoder line are interference.
+const GLITCH: u16 = 80;
+/// Divides the MCPWM's clock of 160 MHz: its timers count microseconds.
+const MICROS: u8 = 160 - 1;
+
+/// The edges of the echo, from [`Stamper`].
+static ECHO: EchoCapture = EchoCapture::new();
+
+/// Resets in a row, in memory that survives a reset but not a power loss.
+#[ram(unstable(rtc_fast, persistent))]
+static BOOTS: AtomicU32 = AtomicU32::new(0);
+
+/// The images are copied, because only the program is mapped into the address space.
+static MAP: ConstStaticCell<Image<{ 128 * 1024 }>> = ConstStaticCell::new(Image([0; _]));
+static CONFIG: ConstStaticCell<Image<{ 4 * 1024 }>> = ConstStaticCell::new(Image([0; _]));
+
+/// The copy of an image. The flash is read by words.
+#[repr(align(4))]
+struct Image<const BYTES: usize>([u8; BYTES]);
+
+impl<const BYTES: usize> Image<BYTES> {
+    /// Reads a region of the flash. If that fails, the application finds no image, and reports it.
+    fn read(&'static mut self, flash: &mut FlashStorage, region: &Range<u32>) -> &'static [u8] {
+        if flash.read_nor(region.start, &mut self.0).is_err() {
+            defmt::error!("the flash cannot be read");
+        }
+        &self.0
+    }
+}
+
+/// The time since the start.
+fn now() -> Instant {
+    Instant::from_ticks(esp_hal::time::Instant::now().duration_since_epoch().as_micros())
+}
+
+/// An encoder, counted by a unit of the pulse counter.
+struct Encoder<const UNIT: usize> {
+    unit: Unit<'static, UNIT>,
+    /// The pins remain inputs as long as these exist.
+    _pins: [Input<'static>; 2],
+}
+
+impl<const UNIT: usize> Encoder<UNIT> {
+    /// Starts the counting of every edge of both channels; A leads when the wheel rolls forwards. Without limits the
+    /// count wraps around.
+    #[inline(never)]
+    fn new(unit: Unit<'static, UNIT>, pins: [Input<'static>; 2]) -> Self {
+        let [a, b] = &pins;
+        let (a, b) = (a.peripheral_input(), b.peripheral_input());
+        if unit.set_filter(Some(GLITCH)).is_err() {
+            defmt::error!("the filter of an encoder is too long");
+        }
+        let channel = &unit.channel0;
+        channel.set_edge_signal(a.clone());
+        channel.set_ctrl_signal(b.clone());
+        channel.set_input_mode(EdgeMode::Decrement, EdgeMode::Increment);
+        channel.set_ctrl_mode(CtrlMode::Keep, CtrlMode::Reverse);
+        let channel = &unit.channel1;
+        channel.set_edge_signal(b);
+        channel.set_ctrl_signal(a);
+        channel.set_input_mode(EdgeMode::Decrement, EdgeMode::Increment);
+        channel.set_ctrl_mode(CtrlMode::Reverse, CtrlMode::Keep);
+        unit.clear();
+        unit.resume();
+        Self { unit, _pins: pins }
+    }
+}
+
+impl<const UNIT: usize> Counter for Encoder<UNIT> {
+    type Error = Infallible;
+    const BITS: u32 = 16;
+
+    fn count(&mut self) -> Result<u32, Infallible> {
+        Ok(self.unit.value().cast_unsigned().into())
+    }
+}
+
+/// The capture timer of the MCPWM, which stamps the edges of the echo: channel 0 the rising, channel 1 the falling ones.
+/// Its count is read by a capture of channel 2. `esp-hal` has no driver for it.
+struct Stamper {
+    edges: StampedEdges,
+    /// The pin remains an input as long as this exists.
+    _echo: Input<'static>,
+}
+
+impl Stamper {
+    /// Values of the field `MODE`: the edges of a channel.
+    const FALLING: u8 = 0b01;
+    const RISING: u8 = 0b10;
+
+    #[inline(never)]
+    #[expect(unsafe_code, reason = "the field has two bits, and each value is an edge")]
+    fn new(echo: Input<'static>) -> Self {
+        let signal: Signal = echo.peripheral_input();
+        InputSignal::PWM0_CAP0.connect_to(&signal);
+        InputSignal::PWM0_CAP1.connect_to(&signal);
+        let registers = MCPWM0::regs();
+        registers.cap_timer_cfg().write(|w| w.cap_timer_en().set_bit());
+        let channels =
+            [(registers.cap_ch_cfg(0), Self::RISING), (registers.cap_ch_cfg(1), Self::FALLING)];
+        for (channel, edge) in channels {
+            // SAFETY: both values are defined.
+            channel.write(|w| unsafe { w.en().set_bit().mode().bits(edge) });
+        }
+        Self { edges: StampedEdges::since(Self::stamps()), _echo: echo }
+    }
+
+    fn stamps() -> Stamps {
+        let registers = MCPWM0::regs();
+        let stamp = |channel| registers.cap_ch(channel).read().value().bits();
+        Stamps { rise: stamp(0), fall: stamp(1) }
+    }
+
+    /// The count of microseconds.
+    fn count() -> u32 {
+        let registers = MCPWM0::regs();
+        registers.cap_ch_cfg(2).write(|w| w.en().set_bit().sw().set_bit());
+        registers.cap_ch(2).read().value().bits()
+    }
+
+    /// Passes the newest edges on.
+    fn update(&mut self, echo: &EchoCapture) {
+        let stamps = Self::stamps();
+        self.edges.update(echo, now(), Self::count(), stamps);
+    }
+}
+
+/// The link. The UART's FIFOs of 128 bytes last 11 ms, and the loop polls every millisecond: no interrupt is needed.
+struct Serial {
+    uart: Uart<'static, Blocking>,
+    /// A poll sends at most 400 bytes.
+    to_send: Deque<u8, 512>,
+}
+
+impl Serial {
+    /// Writes as many bytes as the UART accepts.
+    fn transmit(&mut self) {
+        while self.uart.write_ready()
+            && let Some(byte) = self.to_send.pop_front()
+        {
+            // There is room for it: this neither waits nor fails.
+            let _ = self.uart.write(&[byte]);
+        }
+    }
+}
+
+impl Link for Serial {
+    fn receive(&mut self) -> Option<u8> {
+        let mut byte = [0];
+        // An error belongs to a damaged byte; the checksum of its frame detects it.
+        match self.uart.read_buffered(&mut byte) {
+            Ok(1..) => Some(byte[0]),
+            Ok(_) | Err(_) => None,
+        }
+    }
+
+    fn send(&mut self, frame: &[u8]) {
+        if self.to_send.capacity() - self.to_send.len() >= frame.len() {
+            self.to_send.extend(frame.iter().copied());
+        }
+    }
+}
+
+/// The cause of the reset.
+fn reset() -> ResetCause {
+    use SocResetReason as Reason;
+    match reset_reason() {
+        Some(Reason::ChipPowerOn) => ResetCause::PowerOn,
+        Some(Reason::SysBrownOut) => ResetCause::BrownOut,
+        Some(Reason::CoreRtcWdt | Reason::SysRtcWdt | Reason::Cpu0RtcWdt) => ResetCause::Watchdog,
+        Some(Reason::CoreSw | Reason::Cpu0Sw) => ResetCause::Software,
+        _ => ResetCause::Unknown,
+    }
+}
+
+/// The end of the program by a panic; an exception of the core panics. The motors are disabled until the watchdog restarts
+/// the program.
+#[panic_handler]
+#[expect(unsafe_code, reason = "each bit of the register is a pin")]
+fn panicked(info: &core::panic::PanicInfo) -> ! {
+    // SAFETY: any pattern of bits is valid; a set bit makes its pin low.
+    GPIO::regs().out_w1tc().write(|w| unsafe { w.bits(1 << DRIVE) });
+    if let Some(at) = info.location() {
+        defmt::error!("panicked at {}:{}", at.file(), at.line());
+    }
+    loop {
+        core::hint::spin_loop();
+    }
+}
+
+type Pulses = PwmPin<'static, MCPWM0<'static>, 0, true>;
+type Hardware =
+    Devices<Encoder<0>, Encoder<1>, Pulses, PulseRanger<Output<'static>, Captured<'static>>>;
+
+/// The state of the loop.
+struct Board {
+    app: App<'static, FlashStorage<'static>>,
+    hardware: Hardware,
+    stamper: Stamper,
+    link: Serial,
+    drive: Output<'static>,
+    watchdog: Rtc<'static>,
+}
+
+impl Board {
+    /// Initializes the board; `None` if the memory map has no store or a setting is invalid.
+    // Inlined, its stack frame would remain for the whole runtime.
+    #[inline(never)]
+    fn new() -> Option<Self> {
+        let board = esp_hal::init(esp_hal::Config::default().with_cpu_clock(CpuClock::max()));
+        let drive = Output::new(board.GPIO3, Level::Low, OutputConfig::default());
+        let reset = reset();
+        let resets = boots::resets(BOOTS.load(Ordering::Relaxed));
+        BOOTS.store(boots::register(resets.saturating_add(1)), Ordering::Relaxed);
+
+        let pulled_up = InputConfig::default().with_pull(Pull::Up);
+        let Pcnt { unit0, unit1, .. } = Pcnt::new(board.PCNT);
+        let right = [Input::new(board.GPIO18, pulled_up), Input::new(board.GPIO19, pulled_up)];
+        let left = [Input::new(board.GPIO20, pulled_up), Input::new(board.GPIO21, pulled_up)];
+        let (right, left) = (Encoder::new(unit0, right), Encoder::new(unit1, left));
+
+        let clock = PeripheralClockConfig::with_prescaler(MICROS);
+        let mut pwm = McPwm::new(board.MCPWM0, clock);
+        pwm.operator0.set_timer(&pwm.timer0);
+        let pulses = pwm.operator0.with_pin_a(board.GPIO22, PwmPinConfig::UP_ACTIVE_HIGH);
+        let period = 20_000 - 1;
+        pwm.timer0.start(clock.timer_clock_with_prescaler(period, PwmWorkingMode::Increase, 0));
+        let stamper = Stamper::new(Input::new(board.GPIO2, InputConfig::default()));
+        let trigger = Output::new(board.GPIO23, Level::Low, OutputConfig::default());
+        let servo = sonarfix_robot::servo(pulses);
+        let ranger = sonarfix_robot::ranger(trigger, &ECHO);
+
+        let mut flash = FlashStorage::new(board.FLASH);
+        let map = MAP.try_take()?.read(&mut flash, &memory::map_in(0));
+        let config = CONFIG.try_take()?.read(&mut flash, &memory::config_in(0));
+        let contents = FlashContents::read(map, config);
+        log::flash_contents(&contents);
+        let store = Store::new(flash, memory::store(0)).ok()?;
+        let app = App::new(sonarfix_robot::board(reset, resets), contents, store, now());
+        // The default is 115,200 baud, 8N1.
+        let uart = Uart::new(board.UART0, uart::Config::default()).ok()?;
+        let uart = uart.with_tx(board.GPIO16).with_rx(board.GPIO17);
+        let mut watchdog = Rtc::new(board.RTC_TIMER);
+        watchdog.rwdt.enable();
+        watchdog.rwdt.set_timeout(RwdtStage::Stage0, WATCHDOG);
+        // The count of resets survives this one.
+        watchdog.rwdt.set_stage_action(RwdtStage::Stage0, RwdtStageAction::ResetCore);
+        Some(Self {
+            app,
+            hardware: Devices { right, left, servo, ranger },
+            stamper,
+            link: Serial { uart, to_send: Deque::new() },
+            drive,
+            watchdog,
+        })
+    }
+
+    /// One poll.
+    fn poll(&mut self) {
+        let start = now();
+        self.stamper.update(&ECHO);
+        let polled = self.app.poll(start, &mut self.hardware, &mut self.link);
+        self.drive.set_level(polled.may_drive.into());
+        if polled.is_on_time {
+            self.watchdog.rwdt.feed();
+        }
+        if polled.is_settled {
+            BOOTS.store(boots::register(0), Ordering::Relaxed);
+        }
+        self.link.transmit();
+        log::polled(&polled, self.app.report());
+        if let Some(took) = now().checked_duration_since(start) {
+            self.app.took(took);
+        }
+        self.app.work(start, now);
+    }
+}
+
+/// Polls every millisecond.
+#[esp_hal::main]
+fn main() -> ! {
+    let Some(mut board) = Board::new() else {
+        defmt::error!("the memory map has no store, or a setting of the board is invalid");
+        loop {
+            core::hint::spin_loop();
+        }
+    };
+    let mut next_poll = now().ticks();
+    loop {
+        next_poll = next_poll.saturating_add(POLL);
+        while now().ticks() < next_poll {
+            core::hint::spin_loop();
+        }
+        board.poll();
+    }
+}
