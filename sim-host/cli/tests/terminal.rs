@@ -112,7 +112,9 @@ fn a_terminal_may_be_tiny() {
 /// What the telemetry of a robot suggests to check.
 fn hints_after(telemetry: &[Telemetry]) -> String {
     let mut received = Received::default();
-    telemetry.iter().for_each(|telemetry| received.send(telemetry));
+    for telemetry in telemetry {
+        received.send(telemetry);
+    }
     hints(&received.monitor).join("\n")
 }
 

@@ -11,7 +11,7 @@ use sonarfix::units::Instant;
 use sonarfix_link::message::{DeviceReadings, EncoderReading, ServoReading, Telemetry};
 use sonarfix_link::{Hello, ReceiverCounters};
 
-use hints::{Board, Counted, Heard, Hint, Supply};
+use hints::{Board, Counted, Heard, Hint, Servo, Supply};
 
 use crate::Received;
 use crate::view;
@@ -42,8 +42,7 @@ pub struct Signs {
     restarts: u32,
     right: Encoder,
     left: Encoder,
-    /// The last reading; the inner `None` is a servo that cannot be commanded.
-    servo: Option<Option<ServoReading>>,
+    servo: Servo,
     sonar: Heard,
 }
 
@@ -63,7 +62,7 @@ impl Signs {
         let is_restart = self.is_restart(readings.at);
         self.right.read(&readings.right);
         self.left.read(&readings.left);
-        self.servo = Some(readings.servo);
+        self.servo = readings.servo.into();
         self.sonar = self.sonar.then(readings.ping);
         is_restart
     }
@@ -86,11 +85,7 @@ impl Signs {
         let supply = Supply { reset: self.hello.map(|hello| hello.reset), restarts: self.restarts };
         [
             Row { device: "board", reading: board_text(&board), hint: hints::of_board(&board) },
-            Row {
-                device: "supply",
-                reading: supply_text(&supply),
-                hint: hints::of_supply(&supply),
-            },
+            Row { device: "supply", reading: supply_text(supply), hint: hints::of_supply(supply) },
             self.right.row("right encoder"),
             self.left.row("left encoder"),
             Row {
@@ -125,7 +120,7 @@ fn board_text(board: &Board) -> String {
     }
 }
 
-fn supply_text(supply: &Supply) -> String {
+fn supply_text(supply: Supply) -> String {
     let restarts = match supply.restarts {
         0 => String::new(),
         1 => ", 1 restart since".to_owned(),
@@ -137,11 +132,11 @@ fn supply_text(supply: &Supply) -> String {
     }
 }
 
-fn servo_text(servo: Option<Option<ServoReading>>) -> String {
+fn servo_text(servo: Servo) -> String {
     match servo {
-        None => "no reading yet".to_owned(),
-        Some(None) => "cannot be commanded".to_owned(),
-        Some(Some(ServoReading { bearing, micros })) => {
+        Servo::Unread => "no reading yet".to_owned(),
+        Servo::Failing => "cannot be commanded".to_owned(),
+        Servo::Commanded(ServoReading { bearing, micros }) => {
             format!("pulses of {micros:.0} µs, {:+.0}°", bearing.to_degrees())
         }
     }

@@ -5,7 +5,8 @@ use sonarfix_hal::ranger::{Echo, NoEcho, Outcome};
 use sonarfix_link::message::{ImageStatus, ResetCause, ServoReading};
 use sonarfix_link::{Hello, ReceiverCounters};
 use sonarfix_monitor::signs::hints::{
-    Board, Counted, Heard, Hint, State, Supply, of_board, of_encoder, of_servo, of_sonar, of_supply,
+    Board, Counted, Heard, Hint, Servo, State, Supply, of_board, of_encoder, of_servo, of_sonar,
+    of_supply,
 };
 
 /// Readings of a wheel of 0.2 mm per edge, by the edges between them.
@@ -79,19 +80,20 @@ fn a_sonar_is_judged_by_its_last_ping_and_by_whether_it_ever_had_an_echo() {
 #[test]
 fn a_servo_must_be_looked_at() {
     let pulses = |degrees| {
-        Some(Some(ServoReading { bearing: Radians::from_degrees(degrees), micros: 1_500.0 }))
+        let reading = ServoReading { bearing: Radians::from_degrees(degrees), micros: 1_500.0 };
+        Servo::Commanded(reading)
     };
-    says(of_servo(None, None), State::Try, "wait");
+    says(of_servo(Servo::Unread, None), State::Try, "wait");
     says(of_servo(pulses(0.0), None), State::Try, "ahead");
     says(of_servo(pulses(-90.0), None), State::Try, "to the right");
     says(of_servo(pulses(90.0), None), State::Try, "to the left");
-    says(of_servo(Some(None), Some(ImageStatus::Valid(1))), State::Wrong, "PWM");
-    says(of_servo(Some(None), Some(ImageStatus::Missing)), State::Wrong, "configuration");
+    says(of_servo(Servo::Failing, Some(ImageStatus::Valid(1))), State::Wrong, "PWM");
+    says(of_servo(Servo::Failing, Some(ImageStatus::Missing)), State::Wrong, "configuration");
 }
 
 #[test]
 fn a_restart_shows_the_supply() {
-    let of = |reset, restarts| of_supply(&Supply { reset, restarts });
+    let of = |reset, restarts| of_supply(Supply { reset, restarts });
     says(of(None, 0), State::Try, "wait");
     says(of(Some(ResetCause::PowerOn), 0), State::Good, "no restart");
     says(of(Some(ResetCause::PowerOn), 1), State::Wrong, "470 µF");

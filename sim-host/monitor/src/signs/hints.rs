@@ -103,7 +103,7 @@ pub struct Supply {
 
 /// The supply. No board measures its voltages; a supply that breaks down shows as a restart.
 #[must_use]
-pub fn of_supply(supply: &Supply) -> Hint {
+pub fn of_supply(supply: Supply) -> Hint {
     const WEAK: Hint = Hint::wrong(
         "the supply breaks down, often when the servo starts: 470 µF at the servo, a regulator of 3 A",
     );
@@ -151,9 +151,9 @@ impl Counted {
         let mut next = Self { span, changes: self.changes + u32::from(moved != 0), ..self };
         let edges = moved.unsigned_abs();
         if moved > 0 {
-            next.up += edges
+            next.up += edges;
         } else {
-            next.down += edges
+            next.down += edges;
         }
         let (was_moved, [forwards, backwards]) = (self.directions(), next.directions());
         if was_moved == [false; 2] {
@@ -210,26 +210,46 @@ pub fn of_encoder(counted: &Counted) -> Hint {
     }
 }
 
-/// The servo, of which nothing is measured: a person has to look. `None` before the first reading.
+/// The state of the servo.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Servo {
+    /// Not known before the first reading.
+    #[default]
+    Unread,
+    /// It cannot be commanded.
+    Failing,
+    /// Commanded to this bearing.
+    Commanded(ServoReading),
+}
+
+impl From<Option<ServoReading>> for Servo {
+    fn from(reading: Option<ServoReading>) -> Self {
+        reading.map_or(Self::Failing, Self::Commanded)
+    }
+}
+
+/// The servo, of which nothing is measured: a person has to look.
 #[must_use]
-pub fn of_servo(servo: Option<Option<ServoReading>>, configuration: Option<ImageStatus>) -> Hint {
+pub fn of_servo(servo: Servo, configuration: Option<ImageStatus>) -> Hint {
     match servo {
-        None => Hint::wait(),
-        Some(None) if matches!(configuration, Some(ImageStatus::Valid(_))) => Hint::wrong(
+        Servo::Unread => Hint::wait(),
+        Servo::Failing if matches!(configuration, Some(ImageStatus::Valid(_))) => Hint::wrong(
             "its PWM channel refuses the pulses: a program for another board, or limits too wide",
         ),
-        Some(None) => Hint::wrong("without a configuration its pulses are not known"),
-        Some(Some(ServoReading { bearing, .. })) => Hint::attempt(match bearing.to_degrees() {
-            right if right < -5.0 => {
-                "must point to the right; if to the left, swap the bearings of servo_pulses"
-            }
-            left if left > 5.0 => {
-                "must point to the left; if it hums at a stop, narrow the limits `servo`"
-            }
-            _ => {
-                "must point ahead, and turn every 2 s; if it stands still: signal wire, 5 V, ground"
-            }
-        }),
+        Servo::Failing => Hint::wrong("without a configuration its pulses are not known"),
+        Servo::Commanded(ServoReading { bearing, .. }) => {
+            Hint::attempt(match bearing.to_degrees() {
+                right if right < -5.0 => {
+                    "must point to the right; if to the left, swap the bearings of servo_pulses"
+                }
+                left if left > 5.0 => {
+                    "must point to the left; if it hums at a stop, narrow the limits `servo`"
+                }
+                _ => {
+                    "must point ahead, and turn every 2 s; if it stands still: signal wire, 5 V, ground"
+                }
+            })
+        }
     }
 }
 
