@@ -27,7 +27,11 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let progress = Runs::new(args.runs.saturating_mul(sets));
     let mut rows = Vec::new();
     for &metres in &args.metres {
-        rows.push((metres, calibration::trials(args.seed, args.runs, metres, errors, &progress)?));
+        let trials = calibration::trials(args.seed, args.runs, metres, errors, &progress)?;
+        // An interruption may come before the first trial of a distance.
+        if !trials.is_empty() {
+            rows.push((metres, trials));
+        }
     }
     progress.end()?;
     print!("{}", calibration::page(&rows));

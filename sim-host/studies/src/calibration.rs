@@ -111,7 +111,8 @@ pub enum CalibrationStudyError {
     Simulation(#[from] SimulationError),
 }
 
-/// Runs trials of robots that drive this far, metres, with errors of these magnitudes.
+/// Runs trials of robots that drive this far, metres, with errors of these magnitudes; after an interruption those that have
+/// begun.
 ///
 /// # Errors
 /// [`CalibrationStudyError`].
@@ -128,7 +129,7 @@ pub fn trials(
         progress.finished();
         trial
     };
-    seeds.par_iter().map(run).collect()
+    seeds.par_iter().filter(|_| !progress.is_interrupted()).map(run).collect()
 }
 
 /// One trial.
