@@ -27,6 +27,7 @@ mod paper;
 mod pil;
 mod plan;
 mod progress;
+mod provenance;
 mod reality;
 mod relocalize;
 mod replay;

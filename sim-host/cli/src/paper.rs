@@ -4,6 +4,7 @@ use sonarfix_map::Scenario;
 use sonarfix_sim::simulate::Simulation;
 
 use crate::overrides::Overrides;
+use crate::provenance;
 use crate::run::{Experiment, Output};
 
 #[derive(Debug, clap::Args)]
@@ -36,6 +37,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         runs: args.runs,
         seed: args.seed,
         beside_paper: true,
+        provenance: provenance::table(&[]),
     };
     experiment.conduct(&args.output)
 }

@@ -16,6 +16,7 @@ use sonarfix_sim::trace::Recorder;
 
 use crate::output::{check_file, check_folder};
 use crate::overrides::PolicyName;
+use crate::provenance;
 use crate::run::Output;
 use crate::serve::{self, PacedArgs};
 use crate::table;
@@ -91,11 +92,21 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
             subtitle: subtitle(&summary, trace.every()),
             tables,
             trace: trace.trace(),
+            spread: None,
+            provenance: provenance(args),
             of_paper: false,
         };
         eprintln!("open {}", report.write(dir)?.display());
     }
     Ok(())
+}
+
+/// The log, and what is read with it.
+fn provenance(args: &Args) -> sonarfix_report::Table {
+    let map = beside(&args.log, args.map.as_ref(), "map.toml");
+    let robot = beside(&args.log, args.config.as_ref(), "robot.toml");
+    let reference = beside(&args.log, args.reference.as_ref(), "reference.csv");
+    provenance::table(&[&args.log, &map, &robot, &reference])
 }
 
 /// A given file, or the one with the default name beside the log.

@@ -13,15 +13,20 @@ use sonarfix_rows::{Plan, Shard};
 use sonarfix_sim::monte_carlo;
 use sonarfix_sim::row::Row;
 use sonarfix_sim::simulate::Simulation;
+use sonarfix_sim::spread::Spread;
 use sonarfix_sim::trace::Trace;
 
 use crate::output::{check_file, check_folder};
 use crate::overrides::Overrides;
 use crate::progress::Runs;
+use crate::provenance;
 use crate::rows::{self, Counted};
 use crate::serve::{self, PacedArgs};
 use crate::sweep_values::Sweep;
 use crate::table::{self, Beside, Measured};
+
+/// Most runs whose spread is in a report: they are computed again, with all their ticks.
+const MOST_SPREAD: u32 = 100;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -69,6 +74,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         seed: args.seed.unwrap_or(scenario.run.seed),
         simulation: Simulation::new(scenario),
         beside_paper: false,
+        provenance: provenance::of_scenario(&args.scenario),
     };
     anyhow::ensure!(experiment.runs > 0, "--runs must be at least 1");
     let scenario = &experiment.simulation.scenario;
@@ -113,6 +119,8 @@ pub struct Experiment {
     pub seed: u64,
     /// Whether to show the paper's values.
     pub beside_paper: bool,
+    /// Where the report comes from.
+    pub provenance: sonarfix_report::Table,
 }
 
 impl Experiment {
@@ -204,6 +212,7 @@ impl Experiment {
 
     fn report(&self, measured: &Measured, trace: &Trace, dir: &Path) -> anyhow::Result<PathBuf> {
         let scenario = &self.simulation.scenario;
+        let spread = Spread::of(&self.simulation, self.seed, self.runs.min(MOST_SPREAD))?;
         let report = Report {
             title: format!("Sonarfix: {}", scenario.name),
             subtitle: format!(
@@ -214,6 +223,8 @@ impl Experiment {
             ),
             tables: vec![self.table(measured)],
             trace,
+            spread: Some(&spread),
+            provenance: self.provenance.clone(),
             of_paper: self.beside_paper,
         };
         Ok(report.write(dir)?)

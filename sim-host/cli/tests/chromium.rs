@@ -63,7 +63,7 @@ fn output_of(browser: &str, url: &str, flags: &[&str]) -> String {
 }
 
 /// The opening tag of the page.
-fn root(dom: &str) -> &str {
+pub fn root(dom: &str) -> &str {
     let from = dom.find("<html").unwrap();
     dom.get(from..from + dom.get(from..).unwrap().find('>').unwrap()).unwrap()
 }

@@ -65,23 +65,66 @@ fn fix(time: f64, outcome: Outcome, range: Option<f64>, reason: &str) -> FixReco
     }
 }
 
-/// Writes a report and opens it; `None`, with a message, without a browser.
-fn report_opened(trace: &Trace) -> Option<String> {
-    let dir = tempfile::tempdir().unwrap();
+fn report(trace: &Trace) -> Report<'_> {
     let table = Table {
         title: "Errors".into(),
         note: String::new(),
         columns: vec!["state".into(), "mean".into()],
         rows: vec![vec!["heading".into(), "0.125 deg".into()]],
     };
-    let report = Report {
+    Report {
         title: "A <small> room".into(),
         subtitle: "seed 1".into(),
         tables: vec![table],
         trace,
+        spread: None,
+        provenance: Table::default(),
         of_paper: false,
+    }
+}
+
+/// Magnifies a figure, reads values in it, and shows all of it again.
+const USES_A_FIGURE: &str = r##"<script>{
+  const assert = (holds, what) => { if (!holds) throw new Error(what); };
+  const figure = [...document.querySelectorAll("figure")].find((one) => one.textContent.includes("Deviation of X"));
+  const svg = figure.querySelector("svg");
+  const curve = () => svg.querySelector(".curves polyline").getAttribute("points");
+  const [plus, , all] = figure.querySelectorAll(".zoom button");
+  const first = curve();
+  plus.click();
+  assert(curve() !== first && svg.querySelector(".frame"), "a button magnifies");
+  const box = svg.getBoundingClientRect();
+  const [left, top, width, height] = svg.dataset.plot.split(" ").map((pixels) => Number(pixels) * box.width / svg.viewBox.baseVal.width);
+  const middle = { clientX: box.left + left + width / 2, clientY: box.top + top + height / 2, bubbles: true };
+  svg.dispatchEvent(new PointerEvent("pointermove", middle));
+  const text = figure.querySelector("output").textContent;
+  assert(/time \(s\): 9\.9\d* · .*σ: (2\.99\d*|3(\.00\d*)?)$/.test(text), `the values in the middle are shown: ${text}`);
+  all.click();
+  assert(curve() === first && !svg.querySelector(".frame"), "all of it is as before");
+  svg.dispatchEvent(new MouseEvent("dblclick", middle));
+  const time = document.querySelector('[data-value="time"]').textContent;
+  assert(/^(9\.9|10\.0) s/.test(time), `the player goes there: ${time}`);
+  document.documentElement.dataset.used = "true";
+}</script>"##;
+
+#[test]
+fn a_figure_can_be_magnified_and_read() {
+    let dir = tempfile::tempdir().unwrap();
+    let trace = trace(true);
+    let page = report(&trace).write(dir.path()).unwrap();
+    let html = std::fs::read_to_string(&page).unwrap();
+    std::fs::write(&page, html.replace("</body>", &format!("{USES_A_FIGURE}</body>"))).unwrap();
+    let Some(dom) = chromium::opened(&format!("file://{}", page.display()), &[]) else {
+        return;
     };
-    let page = report.write(dir.path()).unwrap();
+    assert_ready(&dom);
+    assert!(chromium::root(&dom).contains("data-used=\"true\""), "{}", chromium::root(&dom));
+}
+
+/// Writes a report and opens it; `None`, with a message, without a browser.
+fn report_opened(trace: &Trace) -> Option<String> {
+    let dir = tempfile::tempdir().unwrap();
+    let page = report(trace).write(dir.path()).unwrap();
     chromium::opened(&format!("file://{}", page.display()), &[])
 }
 
@@ -92,7 +135,8 @@ fn the_page_draws_without_an_error() {
             return;
         };
         assert_ready(&dom);
-        assert_eq!(dom.matches("<svg").count(), 5);
+        assert_eq!(dom.matches("<svg").count(), 20);
+        assert_eq!(dom.matches("class=\"zoom\"").count(), 10, "the figures have no script");
         assert!(dom.contains("<h1>A &lt;small&gt; room</h1>"));
         assert!(dom.contains("<td>0.125 deg</td>"));
         assert!(

@@ -32,6 +32,8 @@ enum Scale {
     Linear { decimals: usize },
     /// Logarithmic, base 10.
     Logarithmic,
+    /// A name for each whole number from zero.
+    Named(&'static [&'static str]),
 }
 
 impl Axis {
@@ -60,6 +62,29 @@ impl Axis {
         Self { label: label.into(), range, ticks, scale: Scale::Logarithmic }
     }
 
+    /// An axis with a name for each whole number from zero.
+    pub(super) fn named(label: &str, names: &'static [&'static str]) -> Self {
+        let ticks: Vec<f64> = (0_u8..).take(names.len()).map(f64::from).collect();
+        let range = -0.4..ticks.last().copied().unwrap_or(0.0) + 0.4;
+        Self { label: label.into(), range, ticks, scale: Scale::Named(names) }
+    }
+
+    /// The same with every second tick.
+    pub(super) fn sparse(&self) -> Self {
+        Self { ticks: self.ticks.iter().step_by(2).copied().collect(), ..self.clone() }
+    }
+
+    /// Range, kind and label for the script of a page.
+    pub(super) fn attribute(&self) -> String {
+        let kind = match self.scale {
+            Scale::Linear { .. } => "linear".to_owned(),
+            Scale::Logarithmic => "logarithmic".to_owned(),
+            Scale::Named(names) => format!("named:{}", names.join(",")),
+        };
+        let Range { start, end } = self.range;
+        format!("{start} {end} {kind} {}", super::escape::escape(&self.label))
+    }
+
     /// Tick positions.
     pub(super) fn ticks(&self) -> &[f64] {
         &self.ticks
@@ -69,7 +94,7 @@ impl Axis {
     /// the range, or zero, is placed a decade below.
     pub(super) fn place(&self, value: f64) -> f64 {
         match self.scale {
-            Scale::Linear { .. } => value,
+            Scale::Linear { .. } | Scale::Named(_) => value,
             Scale::Logarithmic => value.log10().max(self.range.start - 1.0),
         }
     }
@@ -79,6 +104,11 @@ impl Axis {
         let (value, decimals) = match self.scale {
             Scale::Linear { decimals } => (tick, decimals),
             Scale::Logarithmic => (10.0_f64.powf(tick), decimals(10.0_f64.powf(tick))),
+            Scale::Named(names) => {
+                let mut numbered = names.iter().zip(0_u8..);
+                let named = numbered.find(|(_, n)| (f64::from(*n) - tick).abs() < 0.5);
+                return named.map_or_else(String::new, |(name, _)| (*name).to_owned());
+            }
         };
         let text = format!("{value:.decimals$}");
         match text.strip_prefix('-') {

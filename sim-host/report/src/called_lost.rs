@@ -1,7 +1,7 @@
 //! The figure of the time that kidnapped robots take to detect it.
 
 use super::axis::Axis;
-use super::chart::{BROAD, Chart, DrawError, LINE, Layer, Shape};
+use super::chart::{BROAD, Chart, DrawError, LINE, Layer, Shape, WIDE};
 use super::palette::Role;
 use super::points::Point;
 
@@ -33,6 +33,7 @@ pub fn called_lost(called_after: &[Option<usize>]) -> Result<String, DrawError> 
         title: "Verdict Lost after a kidnapping by 1 m and 90°".into(),
         x: Axis::linear("measurement cycles since", 0.0..f64::from(SHOWN)),
         y: Axis::linear("robots (%)", 0.0..104.0),
+        width: WIDE,
         height: HEIGHT,
         layers: vec![
             Layer {

@@ -1,12 +1,20 @@
-//! The content of each figure. On a page about the paper they have its numbers, 2 to 6.
+//! The content of each figure. On a page about the paper those of the paper have its numbers, 2 to 6.
+
+mod calibration;
+mod pings;
+mod spread;
 
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
-use sonarfix_sim::trace::{Calibration, Pose, Tick, Trace};
+use sonarfix_sim::spread::Spread;
+use sonarfix_sim::trace::{Pose, Tick, Trace};
+use sonarfix_sim::world::obstacle::{Obstacle, Outline};
 
 use super::axis::Axis;
-use super::chart::{BROAD, Chart, DrawError, HAIRLINE, LINE, Layer, Shape, plot_size};
+use super::chart::{
+    BROAD, Chart, DrawError, HAIRLINE, LINE, Layer, NARROW, Shape, WIDE, plot_size,
+};
 use super::palette::Role;
 use super::points::Point;
 
@@ -14,10 +22,11 @@ use super::points::Point;
 const X: usize = 0;
 const Y: usize = 1;
 const HEADING: usize = 2;
-const SCALE_LEFT: usize = 4;
 
 /// Height of a figure over time, pixels.
 const TIME_HEIGHT: u16 = 350;
+/// The same on a narrow page.
+const NARROW_TIME_HEIGHT: u16 = 280;
 /// Limits of the height of the trajectory figure, pixels: it follows the shape of the map.
 const FLOOR_HEIGHT: Range<u16> = 400..780;
 
@@ -37,74 +46,128 @@ const TAIL: f64 = 0.04;
 const DWARFED: f64 = 4.0;
 
 const MM_PER_M: f64 = 1_000.0;
-const PER_MILLE: f64 = 1_000.0;
 
 /// A drawn figure.
 pub(super) struct Figure {
-    /// The number of the corresponding figure of the paper.
-    pub(super) number: u8,
+    /// The number of the corresponding figure of the paper, if it has one.
+    pub(super) number: Option<u8>,
     /// The name of its file.
     pub(super) file: &'static str,
     /// The caption.
-    pub(super) caption: &'static str,
+    pub(super) caption: String,
     /// What the paper calls things in it.
     pub(super) paper: &'static str,
     /// The picture.
     pub(super) svg: String,
+    /// The picture for a narrow page.
+    pub(super) narrow: String,
+}
+
+/// What the figures show.
+#[derive(Clone, Copy)]
+pub(super) struct Data<'a> {
+    /// One run.
+    pub(super) trace: &'a Trace,
+    /// The spread over many, if there are.
+    pub(super) spread: Option<&'a Spread>,
 }
 
 /// A figure before it is drawn.
 struct Plan {
-    number: u8,
+    number: Option<u8>,
     file: &'static str,
     caption: &'static str,
     paper: &'static str,
-    chart: fn(&Trace) -> Chart<'static>,
+    /// The chart at a width; none if the run has nothing to show in it.
+    chart: fn(Data<'_>, u16) -> Option<Chart<'static>>,
 }
 
-/// The figures, in the order of the paper.
-const PLANS: [Plan; 5] = [
+/// The figures, those of the paper in its order.
+const PLANS: [Plan; 11] = [
     Plan {
-        number: 2,
+        number: Some(2),
         file: "trajectory.svg",
         caption: "The path over the floor: with the localizer and by the encoders \
                   alone. Both axes have the same scale. A path that leaves the \
-                  map is cut off.",
+                  map is cut off. Furniture and people are not in the map; a dotted line is where one walks.",
         paper: " In the paper, A is the localizer and B the encoders alone.",
-        chart: trajectory,
+        chart: |data, width| Some(trajectory(data.trace, width)),
     },
     Plan {
-        number: 3,
+        number: Some(3),
         file: "heading-error.svg",
         caption: "Estimated minus true heading, where the truth is known, and one standard \
                   deviation of the filter on either side of zero. Initial values that would \
                   dwarf the rest are clipped.",
         paper: "",
-        chart: heading,
+        chart: |data, width| Some(heading(data.trace, width)),
     },
     Plan {
-        number: 4,
+        number: Some(4),
         file: "sigma-x.svg",
         caption: "Standard deviation of X and, where the truth is known, the absolute error.",
         paper: "",
-        chart: |trace| position(trace, "X", X, |pose| pose.x),
+        chart: |data, width| Some(position(data.trace, width, "X", X, |pose| pose.x)),
     },
     Plan {
-        number: 5,
+        number: Some(5),
         file: "sigma-y.svg",
         caption: "The same for Y. A deviation grows while no wall across its axis is measured, \
                   and grows more slowly once the errors of the encoders are estimated.",
         paper: "",
-        chart: |trace| position(trace, "Y", Y, |pose| pose.y),
+        chart: |data, width| Some(position(data.trace, width, "Y", Y, |pose| pose.y)),
     },
     Plan {
-        number: 6,
+        number: Some(6),
         file: "scale-left.svg",
-        caption: "The estimated scale error of the left wheel, one standard deviation on \
-                  either side and, where it is known, the true value. Initial values that \
-                  would dwarf the rest are clipped.",
+        caption: calibration::CAPTION,
         paper: "",
-        chart: scale_left,
+        chart: |data, width| calibration::chart(data.trace, width, &calibration::SCALE_LEFT),
+    },
+    Plan {
+        number: None,
+        file: "scale-right.svg",
+        caption: "The same for the scale error of the right wheel.",
+        paper: "",
+        chart: |data, width| calibration::chart(data.trace, width, &calibration::SCALE_RIGHT),
+    },
+    Plan {
+        number: None,
+        file: "track-width.svg",
+        caption: "The same for the track width.",
+        paper: "",
+        chart: |data, width| calibration::chart(data.trace, width, &calibration::TRACK_WIDTH),
+    },
+    Plan {
+        number: None,
+        file: "range-scale.svg",
+        caption: "The same for the scale error of the ranges.",
+        paper: "",
+        chart: |data, width| calibration::chart(data.trace, width, &calibration::RANGE_SCALE),
+    },
+    Plan {
+        number: None,
+        file: "innovations.svg",
+        caption: "Measured minus expected range of every ping with an echo, and three standard deviations of \
+                  the innovation. Whether a range is used is decided by the probability that the echo is the wall's, \
+                  which falls below the limit of 2 % near this band: \"gated\". Ranges with a lower weight may be clutter. \
+                  Values far beyond the band are clipped.",
+        paper: "",
+        chart: |data, width| pings::innovations(data.trace, width),
+    },
+    Plan {
+        number: None,
+        file: "verdict.svg",
+        caption: "The health verdict.",
+        paper: "",
+        chart: |data, width| Some(pings::verdict(data.trace, width)),
+    },
+    Plan {
+        number: None,
+        file: "spread.svg",
+        caption: "",
+        paper: "",
+        chart: |data, width| spread::chart(data, width),
     },
 ];
 
@@ -112,44 +175,74 @@ const PLANS: [Plan; 5] = [
 ///
 /// # Errors
 /// The name of the file and the error of the first figure that cannot be drawn.
-pub(super) fn draw(trace: &Trace) -> Result<Vec<Figure>, (&'static str, DrawError)> {
-    if trace.ticks.is_empty() {
+pub(super) fn draw(data: Data<'_>) -> Result<Vec<Figure>, (&'static str, DrawError)> {
+    if data.trace.ticks.is_empty() {
         return Ok(Vec::new());
     }
     let figure = |Plan { number, file, caption, paper, chart }| {
-        let svg = chart(trace).svg().map_err(|error| (file, error))?;
-        Ok(Figure { number, file, caption, paper, svg })
+        let drawn = |width| {
+            let svg = chart(data, width).map(|chart| chart.svg()).transpose();
+            svg.map_err(|error| (file, error))
+        };
+        let Some((svg, narrow)) = drawn(WIDE)?.zip(drawn(NARROW)?) else {
+            return Ok(None);
+        };
+        let spread = data.spread.filter(|_| caption.is_empty());
+        let caption = spread.map_or_else(|| caption.to_owned(), spread::caption);
+        Ok(Some(Figure { number, file, caption, paper, svg, narrow }))
     };
-    PLANS.into_iter().map(figure).collect()
+    PLANS.into_iter().filter_map(|plan| figure(plan).transpose()).collect()
 }
 
 /// Figure 2.
-fn trajectory(trace: &Trace) -> Chart<'static> {
+fn trajectory(trace: &Trace, width: u16) -> Chart<'static> {
     let truth = places(trace, |tick| tick.truth.map(|truth| truth.pose));
     let estimate = places(trace, |tick| Some(tick.estimate.pose));
     let encoders = places(trace, |tick| Some(tick.odometry));
     let (bounds_x, bounds_y) = floor(trace, &truth, &estimate);
-    let height = floor_height(&bounds_x, &bounds_y);
-    let (x, y) = equal_scale(bounds_x, bounds_y, plot_size(height));
     let start = truth.first().or(estimate.first()).copied();
 
     let mut layers: Vec<Layer<'static>> = trace.walls.iter().map(wall).collect();
+    layers.extend(trace.obstacles.iter().flat_map(obstacle));
     layers.push(path("encoders alone", Role::Encoders, LINE, encoders));
     layers.extend((!truth.is_empty()).then(|| path("true", Role::Truth, BROAD, truth)));
     layers.push(path("estimated", Role::Estimate, LINE, estimate));
     let dot = |at| Layer { label: "start", role: Role::Ink, shape: Shape::Dot(at) };
     layers.extend(start.map(dot));
+    let height = floor_height(&bounds_x, &bounds_y, width, &layers);
+    let (x, y) = equal_scale(bounds_x, bounds_y, plot_size(width, height, &layers));
     Chart {
         title: "Trajectory".into(),
         x: Axis::linear("X (m)", x),
         y: Axis::linear("Y (m)", y),
+        width,
         height,
         layers,
     }
 }
 
+/// An obstacle at the start, and where it walks.
+fn obstacle(obstacle: &Obstacle) -> Vec<Layer<'static>> {
+    /// Corners of a circle.
+    const CORNERS: u8 = 24;
+    let outline = match obstacle.outline {
+        Outline::Circle { centre: [x, y], radius } => (0..=CORNERS)
+            .map(|n| TAU * f64::from(n) / f64::from(CORNERS))
+            .map(|angle| (x + radius * angle.cos(), y + radius * angle.sin()))
+            .collect(),
+        Outline::Face(face) => face.ends().map(Point::from).to_vec(),
+    };
+    let first = outline.first().copied();
+    let walk = obstacle.walk.zip(first).map(|(walk, (x, y))| {
+        let shape = Shape::Dotted(vec![(x, y), (x + walk.by[0], y + walk.by[1])]);
+        Layer { label: "furniture, people", role: Role::Obstacle, shape }
+    });
+    let outline = path("furniture, people", Role::Obstacle, LINE, outline);
+    std::iter::once(outline).chain(walk).collect()
+}
+
 /// Figure 3.
-fn heading(trace: &Trace) -> Chart<'static> {
+fn heading(trace: &Trace, width: u16) -> Chart<'static> {
     let degrees = |tick: &Tick| {
         let truth = tick.truth?.pose.heading;
         Some(wrap(tick.estimate.pose.heading - truth).to_degrees())
@@ -163,11 +256,17 @@ fn heading(trace: &Trace) -> Chart<'static> {
     layers.extend(
         (!error.is_empty()).then(|| line("estimate − truth", Role::Error, HAIRLINE, error)),
     );
-    chart_over_time(trace, title.into(), Axis::linear("heading (°)", y), layers)
+    chart_over_time(trace, width, title.into(), Axis::linear("heading (°)", y), layers)
 }
 
 /// Figures 4 and 5.
-fn position(trace: &Trace, name: &str, state: usize, along: fn(&Pose) -> f64) -> Chart<'static> {
+fn position(
+    trace: &Trace,
+    width: u16,
+    name: &str,
+    state: usize,
+    along: fn(&Pose) -> f64,
+) -> Chart<'static> {
     let millimetres = |tick: &Tick| {
         let truth = along(&tick.truth?.pose);
         Some((along(&tick.estimate.pose) - truth).abs() * MM_PER_M)
@@ -181,34 +280,12 @@ fn position(trace: &Trace, name: &str, state: usize, along: fn(&Pose) -> f64) ->
         (!error.is_empty()).then(|| line("|estimate − truth|", Role::Error, HAIRLINE, error)),
     );
     layers.push(line("σ", Role::Estimate, LINE, sigma));
-    chart_over_time(trace, format!("Deviation of {name}"), y, layers)
-}
-
-/// Figure 6.
-fn scale_left(trace: &Trace) -> Chart<'static> {
-    let of = |calibration: Calibration| calibration.scale_left * PER_MILLE;
-    let beside = |sigmas: f64| {
-        move |tick: &Tick| {
-            let sigma = deviation::<SCALE_LEFT>(tick) * PER_MILLE;
-            Some(of(tick.estimate.calibration) + sigmas * sigma)
-        }
-    };
-    let estimate = over_time(trace, |tick| Some(of(tick.estimate.calibration)));
-    let (lower, upper) = (over_time(trace, beside(-1.0)), over_time(trace, beside(1.0)));
-    let truth = over_time(trace, |tick| tick.truth?.calibration.map(of));
-    let y = legible(estimate.iter().chain(&lower).chain(&upper).chain(&truth));
-    let mut layers = vec![band(lower, upper), line("estimated", Role::Estimate, LINE, estimate)];
-    layers.extend((!truth.is_empty()).then_some(Layer {
-        label: "true",
-        role: Role::Truth,
-        shape: Shape::Dotted(truth),
-    }));
-    let title = "Scale error of the left wheel, S_L";
-    chart_over_time(trace, title.into(), Axis::linear("S_L (10⁻³)", y), layers)
+    chart_over_time(trace, width, format!("Deviation of {name}"), y, layers)
 }
 
 fn chart_over_time(
     trace: &Trace,
+    width: u16,
     title: String,
     y: Axis,
     layers: Vec<Layer<'static>>,
@@ -216,7 +293,8 @@ fn chart_over_time(
     // From zero, the start of the run, even if the first tick is later.
     let times = span(trace.ticks.iter().map(|tick| tick.time).chain([0.0])).unwrap_or(0.0..0.0);
     let x = Axis::linear("time (s)", times.start..times.end.max(times.start + LEAST_TIME));
-    Chart { title, x, y, height: TIME_HEIGHT, layers }
+    let height = if width < WIDE { NARROW_TIME_HEIGHT } else { TIME_HEIGHT };
+    Chart { title, x, y, width, height, layers }
 }
 
 fn line(label: &'static str, role: Role, width: u16, points: Vec<Point>) -> Layer<'static> {
@@ -289,10 +367,10 @@ fn floor(trace: &Trace, truth: &[Point], estimate: &[Point]) -> (Range<f64>, Ran
     clippy::cast_sign_loss,
     reason = "clamped to the heights allowed"
 )]
-fn floor_height(x: &Range<f64>, y: &Range<f64>) -> u16 {
-    let (width, height) = plot_size(FLOOR_HEIGHT.start);
+fn floor_height(x: &Range<f64>, y: &Range<f64>, width: u16, layers: &[Layer<'_>]) -> u16 {
+    let (across, height) = plot_size(width, FLOOR_HEIGHT.start, layers);
     let around = f64::from(FLOOR_HEIGHT.start) - height;
-    let fitting = around + width * (y.end - y.start) / (x.end - x.start);
+    let fitting = around + across * (y.end - y.start) / (x.end - x.start);
     fitting.clamp(FLOOR_HEIGHT.start.into(), FLOOR_HEIGHT.end.into()) as u16
 }
 

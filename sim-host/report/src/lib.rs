@@ -8,7 +8,7 @@
 //!
 //! | module | what |
 //! |---|---|
-//! | `figures` | the content of each figure |
+//! | `figures` | the content of each figure; `figures.js`: values, zoom and pan
 //! | `called_lost` | the figure of `sonarfix health` |
 //! | `chart`, `axis`, `points` | drawing of a figure |
 //! | [`heat_map`] | a map with a quantity along a path |
@@ -39,6 +39,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
+use sonarfix_sim::spread::Spread;
 use sonarfix_sim::trace::Trace;
 use thiserror::Error;
 
@@ -55,6 +56,9 @@ const FILE: &str = "report.html";
 
 const TEMPLATE: &str = include_str!("template.html");
 const STYLE: &str = include_str!("report.css");
+
+/// Values, zoom and pan of the figures.
+const FIGURES: &str = include_str!("figures.js");
 
 /// The player as HTML. The page that includes it calls `openPlayer(data)` of [`SCRIPT`].
 pub const PLAYER: &str = include_str!("player.html");
@@ -75,6 +79,10 @@ pub struct Report<'a> {
     pub tables: Vec<Table>,
     /// The run. Without ticks the page has a placeholder.
     pub trace: &'a Trace,
+    /// The spread of the position error over many runs, if there are.
+    pub spread: Option<&'a Spread>,
+    /// Where it comes from, shown last: version, command, hashes of files.
+    pub provenance: Table,
     /// Whether the figures have the numbers of the paper's.
     pub of_paper: bool,
 }
@@ -129,18 +137,21 @@ impl Report<'_> {
     }
 
     fn figures(&self) -> Result<Vec<Figure>, ReportError> {
-        figures::draw(self.trace).map_err(|(file, source)| ReportError::Figure { file, source })
+        let data = figures::Data { trace: self.trace, spread: self.spread };
+        figures::draw(data).map_err(|(file, source)| ReportError::Figure { file, source })
     }
 
     fn page(&self, figures: &[Figure]) -> Result<String, ReportError> {
         let data = page::json_in_script(&sonarfix_player::json(self.trace)?);
-        let values: [(&str, Cow<'_, str>); 9] = [
+        let values: [(&str, Cow<'_, str>); 11] = [
             ("title", escape(&self.title).into()),
             ("subtitle", escape(&self.subtitle).into()),
             ("style", style().into()),
             ("tables", page::tables(&self.tables).into()),
             ("figures", page::figures(figures, self.of_paper).into()),
             ("player", PLAYER.into()),
+            ("provenance", page::tables(std::slice::from_ref(&self.provenance)).into()),
+            ("figures-script", FIGURES.into()),
             ("data", data.into()),
             ("drawing", DRAWING.into()),
             ("script", SCRIPT.into()),
@@ -165,7 +176,10 @@ fn write(path: PathBuf, text: &str) -> Result<PathBuf, ReportError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sonarfix::health::Verdict;
+    use sonarfix_map::Oscillation;
     use sonarfix_sim::trace::{Calibration, Estimate, FixRecord, Outcome, Pose, Tick, Truth, Wall};
+    use sonarfix_sim::world::obstacle::{Obstacle, Outline};
 
     const HOSTILE: &str = "</script><img src=x onerror=alert(1)>";
 
@@ -220,7 +234,17 @@ mod tests {
             rows: vec![vec![HOSTILE.into(), "1.5".into()]],
         };
         let (title, subtitle) = (HOSTILE.to_owned(), HOSTILE.to_owned());
-        Report { title, subtitle, tables: vec![table], trace, of_paper: true }.html().unwrap()
+        Report {
+            title,
+            subtitle,
+            tables: vec![table],
+            trace,
+            spread: None,
+            provenance: Table::default(),
+            of_paper: true,
+        }
+        .html()
+        .unwrap()
     }
 
     /// The page has three scripts of its own: the error handler, the data and the player.
@@ -236,7 +260,10 @@ mod tests {
     #[test]
     fn every_figure_and_every_place_of_the_template_is_filled() {
         let html = html(&trace(100));
-        assert_eq!(html.matches("<svg").count(), 5);
+        // Without innovations and without other runs; each in two widths.
+        assert_eq!(html.matches("<figure>").count(), 9);
+        assert_eq!(html.matches("<svg").count(), 18);
+        assert_eq!(html.matches("<b>Figure ").count(), 5, "as many as the paper's");
         assert!(!html.contains("{{"));
         for label in ["true", "estimated", "encoders alone", "walls", "X (m)", "heading (°)"] {
             assert!(html.contains(&format!("\n{label}\n")), "{label} is missing");
@@ -250,7 +277,7 @@ mod tests {
             tick.truth = None;
         }
         let html = html(&trace);
-        assert_eq!(html.matches("<svg").count(), 5);
+        assert_eq!(html.matches("<svg").count(), 18);
         assert!(!html.contains("\ntrue\n"));
         assert!(html.contains("\nestimated\n"));
     }
@@ -273,8 +300,8 @@ mod tests {
         broken.ticks[52].odometry.y = f64::NEG_INFINITY;
         broken.fixes[0].direction = f64::NAN;
         broken.walls[0].to[1] = f64::NAN;
-        // Only the legend has a wall line: a wall with a NaN end is not drawn.
-        assert_eq!(html(&broken).matches("stroke=\"#6B7280\" stroke-width").count(), 1);
+        // Only the legends of both widths have a wall line: a wall with a NaN end is not drawn.
+        assert_eq!(html(&broken).matches("stroke=\"#6B7280\" stroke-width").count(), 2);
         for html in [html(&broken), html(&trace(1))] {
             let figures = html.split("<svg").skip(1).map(|svg| svg.split("</svg>").next().unwrap());
             for figure in figures {
@@ -282,6 +309,62 @@ mod tests {
                 // For a NaN, plotters would write the limits of its integers.
                 assert!(!figure.contains("2147483"), "{figure}");
             }
+        }
+    }
+
+    /// Innovations, the verdict's steps, the spread over runs, obstacles and provenance appear where there are any.
+    #[test]
+    fn what_a_run_has_is_shown() {
+        let mut trace = trace(100);
+        let fix = |outcome, innovation| FixRecord {
+            outcome,
+            innovation: Some(innovation),
+            innovation_variance: Some(1e-6),
+            ..trace.fixes[0].clone()
+        };
+        trace.fixes = vec![fix(Outcome::Accepted, 1e-3), fix(Outcome::Gated, 5.0)];
+        trace.ticks[50].estimate.verdict = Verdict::Lost;
+        let outline = Outline::Circle { centre: [3.0, 0.5], radius: 0.2 };
+        let walk = Some(Oscillation { by: [1.0, 0.0], takes: 5.0 });
+        trace.obstacles = vec![Obstacle { outline, walk }];
+        let spread = Spread {
+            runs: 7,
+            seed: 3,
+            times: vec![1.0, 2.0],
+            median: vec![0.01, 0.02],
+            most: vec![0.03, 0.04],
+        };
+        let row = vec!["command".into(), "sonarfix <run>".into()];
+        let provenance = Table { title: "Provenance".into(), rows: vec![row], ..Table::default() };
+        let report = Report {
+            title: String::new(),
+            subtitle: String::new(),
+            tables: vec![],
+            trace: &trace,
+            spread: Some(&spread),
+            provenance,
+            of_paper: false,
+        };
+        let html = report.html().unwrap();
+        assert_eq!(html.matches("<figure>").count(), 11);
+        assert!(!html.contains("<b>Figure "), "only those of the paper have a number");
+        for text in
+            ["7 runs (seeds 3 to 9)", "\nfurniture, people\n", "\nLost\n", "sonarfix &lt;run&gt;"]
+        {
+            assert!(html.contains(text), "{text} is missing");
+        }
+        // An accepted and a gated dot in each width; the latter is at the edge of the axis.
+        for role in ["#009E73", "#E69F00"] {
+            let dots =
+                html.lines().filter(|line| line.starts_with("<polyline") && line.contains(role));
+            let no_length = |line: &&str| {
+                let points = line.split("points=\"").nth(1).and_then(|rest| rest.split('"').next());
+                points.is_some_and(|points| {
+                    let mut points = points.split_whitespace();
+                    points.next() == points.next()
+                })
+            };
+            assert_eq!(dots.filter(no_length).count(), 2, "{role}");
         }
     }
 
@@ -296,6 +379,8 @@ mod tests {
             subtitle: String::new(),
             tables: vec![],
             trace: &trace,
+            spread: None,
+            provenance: Table::default(),
             of_paper: false,
         };
         let error = report.write(&taken).unwrap_err();

@@ -71,11 +71,14 @@ pub(super) fn figures(figures: &[Figure], of_paper: bool) -> String {
 
 /// A figure, with the number and the letters of the paper's if it is one of `of_paper`.
 fn figure(of: &Figure, of_paper: bool) -> String {
-    let Figure { number, caption, paper, svg, .. } = of;
-    let (number, paper) =
-        if of_paper { (format!("<b>Figure {number}.</b> "), *paper) } else { Default::default() };
+    let Figure { number, caption, paper, svg, narrow, .. } = of;
+    let number = number.filter(|_| of_paper).map(|number| format!("<b>Figure {number}.</b> "));
+    let (number, paper) = (number.unwrap_or_default(), if of_paper { *paper } else { "" });
     let (caption, paper) = (escape(caption), escape(paper));
-    format!("<figure>{svg}<figcaption>{number}{caption}{paper}</figcaption></figure>\n")
+    format!(
+        "<figure><div class=\"wide\">{svg}</div><div class=\"narrow\">{narrow}</div>\
+         <output></output><figcaption>{number}{caption}{paper}</figcaption></figure>\n"
+    )
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The figure of a calibration: residuals of the ranges over time.
 
 use super::axis::Axis;
-use super::chart::{Chart, DrawError, LINE, Layer, Shape};
+use super::chart::{Chart, DrawError, LINE, Layer, Shape, WIDE};
 use super::palette::Role;
 
 /// Height of the figure, pixels.
@@ -42,6 +42,7 @@ pub fn residuals(residuals: &[Residual]) -> Result<String, DrawError> {
         title: "Measured minus expected range".into(),
         x: Axis::linear("time (s)", first..last),
         y: Axis::linear("residual (mm)", -1.05 * largest..1.05 * largest),
+        width: WIDE,
         height: HEIGHT,
         layers: std::iter::once(zero).chain(dots).collect(),
     };

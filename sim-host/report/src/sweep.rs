@@ -1,7 +1,7 @@
 //! The figure of a sweep: the position error over the values of a key.
 
 use super::axis::Axis;
-use super::chart::{BROAD, Chart, DrawError, Layer, Shape};
+use super::chart::{BROAD, Chart, DrawError, Layer, Shape, WIDE};
 use super::palette::Role;
 use super::points::Point;
 
@@ -46,6 +46,7 @@ impl Picture {
             title: "RMS position error along the path".into(),
             x: Axis::linear(&self.x_label, low - margin..high + margin),
             y: Axis::linear("position (mm)", 0.0..if top > 0.0 { 1.08 * top } else { 1.0 }),
+            width: WIDE,
             height: HEIGHT,
             layers: layers.flat_map(|(line, role)| layers_of(line, role)).collect(),
         };

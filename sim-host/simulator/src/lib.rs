@@ -19,6 +19,7 @@ mod random;
 pub mod row;
 mod run_result;
 pub mod simulate;
+pub mod spread;
 pub mod statistics;
 pub mod time;
 pub mod trace;
