@@ -3,11 +3,11 @@
 mod calibration;
 mod pings;
 mod spread;
+mod values;
 
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
-use sonarfix_sim::spread::Spread;
 use sonarfix_sim::trace::{Pose, Tick, Trace};
 use sonarfix_sim::world::obstacle::{Obstacle, Outline};
 
@@ -17,16 +17,17 @@ use super::chart::{
 };
 use super::palette::Role;
 use super::points::Point;
+use values::{
+    MM_PER_M, band, chart_over_time, legible, line, magnitude, over_time, path, span, widened,
+};
+
+pub(super) use values::Data;
 
 /// Indices of the deviations in [`sonarfix_sim::STATES`].
 const X: usize = 0;
 const Y: usize = 1;
 const HEADING: usize = 2;
 
-/// Height of a figure over time, pixels.
-const TIME_HEIGHT: u16 = 350;
-/// The same on a narrow page.
-const NARROW_TIME_HEIGHT: u16 = 280;
 /// Limits of the height of the trajectory figure, pixels: it follows the shape of the map.
 const FLOOR_HEIGHT: Range<u16> = 400..780;
 
@@ -34,18 +35,6 @@ const FLOOR_HEIGHT: Range<u16> = 400..780;
 const MARGIN: f64 = 0.04;
 /// Minimum extent of the trajectory figure, metres, for a robot that does not move.
 const LEAST_SPAN: f64 = 1.0;
-/// Minimum extent of a figure over time, seconds, for a run of one tick.
-const LEAST_TIME: f64 = 1.0;
-/// Margin above and below the values over time, as a fraction of their range.
-const HEADROOM: f64 = 0.06;
-
-/// The share of the values, at either end, that a figure may clip to make the rest legible: the
-/// first seconds of a run, while the filter converges.
-const TAIL: f64 = 0.04;
-/// A figure clips its tails if they would make it this many times taller.
-const DWARFED: f64 = 4.0;
-
-const MM_PER_M: f64 = 1_000.0;
 
 /// A drawn figure.
 pub(super) struct Figure {
@@ -61,15 +50,6 @@ pub(super) struct Figure {
     pub(super) svg: String,
     /// The picture for a narrow page.
     pub(super) narrow: String,
-}
-
-/// What the figures show.
-#[derive(Clone, Copy)]
-pub(super) struct Data<'a> {
-    /// One run.
-    pub(super) trace: &'a Trace,
-    /// The spread over many, if there are.
-    pub(super) spread: Option<&'a Spread>,
 }
 
 /// A figure before it is drawn.
@@ -283,32 +263,6 @@ fn position(
     chart_over_time(trace, width, format!("Deviation of {name}"), y, layers)
 }
 
-fn chart_over_time(
-    trace: &Trace,
-    width: u16,
-    title: String,
-    y: Axis,
-    layers: Vec<Layer<'static>>,
-) -> Chart<'static> {
-    // From zero, the start of the run, even if the first tick is later.
-    let times = span(trace.ticks.iter().map(|tick| tick.time).chain([0.0])).unwrap_or(0.0..0.0);
-    let x = Axis::linear("time (s)", times.start..times.end.max(times.start + LEAST_TIME));
-    let height = if width < WIDE { NARROW_TIME_HEIGHT } else { TIME_HEIGHT };
-    Chart { title, x, y, width, height, layers }
-}
-
-fn line(label: &'static str, role: Role, width: u16, points: Vec<Point>) -> Layer<'static> {
-    Layer { label, role, shape: Shape::Line(width, points) }
-}
-
-fn path(label: &'static str, role: Role, width: u16, points: Vec<Point>) -> Layer<'static> {
-    Layer { label, role, shape: Shape::Path(width, points) }
-}
-
-fn band(lower: Vec<Point>, upper: Vec<Point>) -> Layer<'static> {
-    Layer { label: "±σ", role: Role::Band, shape: Shape::Band(lower, upper) }
-}
-
 fn wall(wall: &sonarfix_sim::trace::Wall) -> Layer<'static> {
     line("walls", Role::Wall, BROAD, vec![wall.from.into(), wall.to.into()])
 }
@@ -318,11 +272,6 @@ fn places(trace: &Trace, pose: impl Fn(&Tick) -> Option<Pose>) -> Vec<Point> {
     points.filter(|(x, y)| x.is_finite() && y.is_finite()).collect()
 }
 
-fn over_time(trace: &Trace, value: impl Fn(&Tick) -> Option<f64>) -> Vec<Point> {
-    let points = trace.ticks.iter().filter_map(|tick| Some((tick.time, value(tick)?)));
-    points.filter(|(time, value)| time.is_finite() && value.is_finite()).collect()
-}
-
 fn deviation<const STATE: usize>(tick: &Tick) -> f64 {
     tick.estimate.deviation.get(STATE).copied().unwrap_or(f64::NAN)
 }
@@ -330,20 +279,6 @@ fn deviation<const STATE: usize>(tick: &Tick) -> f64 {
 /// The angle in (−π, π].
 fn wrap(angle: f64) -> f64 {
     PI - (PI - angle).rem_euclid(TAU)
-}
-
-/// Minimum and maximum of the finite values.
-fn span(values: impl IntoIterator<Item = f64>) -> Option<Range<f64>> {
-    values.into_iter().filter(|value| value.is_finite()).fold(None, |span, value| {
-        let Range { start, end } = span.unwrap_or(value..value);
-        Some(start.min(value)..end.max(value))
-    })
-}
-
-/// The range, extended to a minimum length.
-fn widened(range: Range<f64>, least: f64) -> Range<f64> {
-    let short = (least - (range.end - range.start)).max(0.0);
-    range.start - short / 2.0..range.end + short / 2.0
 }
 
 /// The extent of the trajectory figure: the map and the truth; without a map, the paths. Dead
@@ -382,45 +317,4 @@ fn equal_scale(
 ) -> (Range<f64>, Range<f64>) {
     let per_pixel = ((x.end - x.start) / width).max((y.end - y.start) / height);
     (widened(x, per_pixel * width), widened(y, per_pixel * height))
-}
-
-/// The range of the values, without tails that would dwarf the rest.
-fn legible<'a>(points: impl Iterator<Item = &'a Point>) -> Range<f64> {
-    let mut values: Vec<f64> = points.map(|point| point.1).collect();
-    values.sort_by(f64::total_cmp);
-    let tail = tail_of(values.len());
-    let body = values.get(tail..values.len() - tail).unwrap_or_default();
-    let whole = span(values.iter().copied()).unwrap_or(0.0..0.0);
-    let body = span(body.iter().copied()).unwrap_or(0.0..0.0);
-    let dwarfed = whole.end - whole.start > DWARFED * (body.end - body.start);
-    let chosen = if dwarfed && body.end > body.start { body } else { whole };
-    let length = chosen.end - chosen.start;
-    widened(chosen.start - HEADROOM * length..chosen.end + HEADROOM * length, f64::EPSILON)
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_precision_loss,
-    clippy::cast_sign_loss,
-    reason = "a share of a length is a length"
-)]
-fn tail_of(length: usize) -> usize {
-    (length as f64 * TAIL) as usize
-}
-
-/// An axis from zero for magnitudes; a logarithmic one where the largest deviation is many times
-/// the usual one.
-fn magnitude(label: &str, sigma: &[Point], error: &[Point]) -> Axis {
-    /// Extension of a logarithmic axis below the least deviation, to show smaller errors.
-    const BELOW: f64 = 3.0;
-    let mut sorted: Vec<f64> = sigma.iter().map(|point| point.1).filter(|s| *s > 0.0).collect();
-    sorted.sort_by(f64::total_cmp);
-    let usual = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
-    let least = sorted.first().copied().unwrap_or(0.0);
-    let both = sigma.iter().chain(error).map(|point| point.1);
-    let most = both.fold(0.0, f64::max) * (1.0 + HEADROOM);
-    if usual > 0.0 && most > 2.0 * DWARFED * usual {
-        return Axis::logarithmic(label, &(least / BELOW..most));
-    }
-    Axis::linear(label, if most > 0.0 { 0.0..most } else { 0.0..1.0 })
 }

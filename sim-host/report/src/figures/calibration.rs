@@ -5,7 +5,7 @@ use sonarfix_sim::trace::{Calibration, Tick, Trace};
 use super::super::axis::Axis;
 use super::super::chart::{Chart, LINE, Layer, Shape};
 use super::super::palette::Role;
-use super::{MM_PER_M, band, chart_over_time, legible, line, over_time};
+use super::values::{MM_PER_M, band, chart_over_time, legible, line, over_time};
 
 /// The caption of the first of them.
 pub(super) const CAPTION: &str = "The estimated scale error of the left wheel, one standard deviation on \

@@ -7,7 +7,7 @@ use super::super::axis::Axis;
 use super::super::chart::{Chart, LINE, Layer, Shape};
 use super::super::palette::Role;
 use super::super::points::Point;
-use super::{MM_PER_M, chart_over_time, over_time, path};
+use super::values::{MM_PER_M, chart_over_time, over_time, path};
 
 /// Half width of the band of innovations, standard deviations.
 const SIGMAS: f64 = 3.0;

@@ -5,7 +5,7 @@ use sonarfix_sim::spread::Spread;
 use super::super::chart::{Chart, HAIRLINE, LINE};
 use super::super::palette::Role;
 use super::super::points::Point;
-use super::{Data, MM_PER_M, chart_over_time, line, magnitude, over_time};
+use super::values::{Data, MM_PER_M, chart_over_time, line, magnitude, over_time};
 
 /// The position error of many runs over time, and of the run shown; none without many runs.
 pub(super) fn chart(Data { trace, spread }: Data<'_>, width: u16) -> Option<Chart<'static>> {
