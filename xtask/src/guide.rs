@@ -69,7 +69,7 @@ fn prepare(folder: &Path, robot: &Path, board: &Board) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Switches the reference board on in QEMU, looks at its signs of life, and starts and stops it.
+/// Switches the reference board on in QEMU, reads its signs of life, and starts and stops it.
 fn bring_up(robot: &Path, board: &Board, firmware: &Path) -> anyhow::Result<()> {
     let emulator = Emulator::start(robot, board, firmware)?;
     let port = emulator.port.as_str();

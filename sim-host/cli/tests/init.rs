@@ -109,7 +109,7 @@ fn the_written_robot_finds_its_way() {
     assert!(rms("x").hypot(rms("y")) < 0.03, "{summary}");
 }
 
-/// A robot that is to find its pose needs motors that run while it is lost, and the file says so.
+/// A robot that is to find its pose needs motors that run while it is lost, and the file states it.
 #[test]
 fn the_written_robot_can_be_changed_to_find_its_pose() {
     let dir = tempfile::tempdir().unwrap();

@@ -557,7 +557,7 @@ fn the_page_draws_without_an_error() {
     assert!(orders.next().is_none());
 }
 
-/// A page of another origin that even knows the token: its script can neither read nor command.
+/// A page of another origin, with the token: its script can neither read nor command.
 #[test]
 fn a_page_of_another_origin_is_refused_by_a_browser() {
     let Page { host, token, orders, .. } = filled();

@@ -93,7 +93,7 @@ fn a_line_for_each_device_with_its_hint() {
         assert!(line.contains(reading) && line.contains(hint), "{line}");
     }
     assert_eq!(text.lines().rev().take_while(|line| !line.is_empty()).count(), 6, "{text}");
-    // On the way each change of a hint was printed.
+    // Each change of a hint was printed.
     assert!(text.contains("WRONG the echo line is high: no divider?"), "{text}");
     assert!(text.contains("try   now roll it backwards"), "{text}");
 }

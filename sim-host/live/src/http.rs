@@ -92,7 +92,7 @@ impl Request {
     pub fn header(&self, name: &str) -> Option<&str> {
         let mut found = self.headers.iter().filter(|(of, _)| of == name);
         let (_, value) = found.next()?;
-        // Of two values nobody knows which one counts: a value that fits nothing.
+        // Which of two values counts is undefined: a value that matches nothing.
         Some(if found.next().is_some() { "?" } else { value })
     }
 }

@@ -122,7 +122,7 @@ mod tests {
         assert_eq!(answer["run"]["obstacles"].as_array().unwrap().len(), 6);
     }
 
-    /// A robot that is put down 1 m to the side is not at its estimate.
+    /// A robot that is kidnapped by 1 m to the side is not at its estimate.
     #[test]
     fn a_robot_can_be_put_down_elsewhere() {
         let put = serde_json::json!([{ "at": 10.0, "x": 2.0, "y": 4.0, "heading": 1.5 }]);

@@ -129,7 +129,7 @@ const playground = (() => {
 
   const selected = () => state.handles.find(({ name }) => name === state.selected);
 
-  // The robot can be picked up at the time of the slider; at the start the path begins elsewhere instead.
+  // The robot can be kidnapped at the time of the slider; at the start the path begins elsewhere instead.
   function robot() {
     const hasBegun = player && player.state.time > player.data.ticks.time[0];
     const truth = hasBegun && Moment.momentAt(player.data, player.state.time).truth;

@@ -1,4 +1,4 @@
-//! What the page asks for: a scenario, a seed, a duration, and where the robot is put down.
+//! What the page asks for: a scenario, a seed, a duration, and where the robot is kidnapped to.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use thiserror::Error;
 
 /// Longest run, seconds.
 pub const MOST_SECONDS: f64 = 3_600.0;
-/// Largest coordinate of a robot that is put down, metres.
+/// Largest coordinate of a kidnapped robot, metres.
 const FARTHEST: f64 = 1_000.0;
 
 /// A request.
@@ -22,7 +22,7 @@ pub struct Request {
     pub seed: u64,
     /// How long it lasts at most, simulated seconds.
     pub seconds: f64,
-    /// When and where the robot is put down.
+    /// When and where the robot is kidnapped to.
     #[serde(default)]
     pub moves: Vec<Move>,
     /// Whether the robot searches for its pose when it is lost.
@@ -30,7 +30,7 @@ pub struct Request {
     pub searches: bool,
 }
 
-/// A robot that is picked up and put down elsewhere.
+/// A kidnapping: the robot is moved elsewhere, without odometry.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 pub struct Move {
     /// When, seconds since the run began.
@@ -55,11 +55,13 @@ pub enum RequestError {
     /// The duration is not valid.
     #[error("the seconds must be from 0 to {MOST_SECONDS}")]
     Seconds,
-    /// The robot cannot be put down there.
-    #[error("a robot is put down within {FARTHEST} m of the origin, at a time of the run")]
+    /// The robot cannot be moved there.
+    #[error(
+        "a robot is kidnapped to a place within {FARTHEST} m of the origin, at a time of the run"
+    )]
     Move,
-    /// The scenario's robot cannot be picked up.
-    #[error("only a robot at the fidelity \"pins\" that follows its estimate can be picked up")]
+    /// The scenario's robot cannot be kidnapped.
+    #[error("only a robot at the fidelity \"pins\" that follows its estimate can be kidnapped")]
     NotSteered,
 }
 

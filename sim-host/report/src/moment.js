@@ -61,7 +61,7 @@ const Moment = (() => {
     return index >= 0 && time - searches[index].time < SEARCH_LASTS ? searches[index] : null;
   }
 
-  // How far an obstacle has walked back or forth, x and y; `walk` has the displacement to its turning point and the seconds there.
+  // How far an obstacle has moved back or forth, x and y; `walk` has the displacement to its turning point and the seconds there.
   function walkedBy(walk, time) {
     if (!walk) return [0, 0];
     const lap = (time / walk[2]) % 2;

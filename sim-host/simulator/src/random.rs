@@ -13,7 +13,7 @@ const TAIL: f64 = 3.654_152_885_361_009;
 
 /// A draw of the standard normal distribution.
 pub fn normal(rng: &mut impl Rng) -> f64 {
-    let mut kept = Kept { rng, last: [0; 2] };
+    let mut kept = LastWords { rng, last: [0; 2] };
     let drawn: f64 = kept.sample(StandardNormal);
     if drawn.abs() < TAIL {
         return drawn;
@@ -29,12 +29,12 @@ fn open_unit(bits: u64) -> f64 {
 }
 
 /// A generator that keeps its last two numbers.
-struct Kept<'a, R> {
+struct LastWords<'a, R> {
     rng: &'a mut R,
     last: [u64; 2],
 }
 
-impl<R: Rng> TryRng for Kept<'_, R> {
+impl<R: Rng> TryRng for LastWords<'_, R> {
     type Error = Infallible;
 
     fn try_next_u32(&mut self) -> Result<u32, Infallible> {

@@ -86,7 +86,7 @@ struct SimulatedHardware<'a> {
     search_recorded_at: u64,
     /// When the robot will be carried, and how far.
     carried: Option<Carried>,
-    /// Where the robot will be put down, and when.
+    /// Where the robot will be kidnapped to, and when.
     put_down: &'a [PutDown],
     /// What determines the robot's pose.
     mode: Mode,

@@ -45,7 +45,7 @@ pub struct Simulation {
     end: u64,
     /// When the robot is carried along its path, and how far.
     pub(super) carried: Option<Carried>,
-    /// When the robot is put down elsewhere, in order of time.
+    /// When the robot is kidnapped, in order of time.
     pub(super) put_down: Vec<PutDown>,
     /// The robot file of the robot's software, if it is not that of the true robot.
     assumed: Option<RobotConfig>,
@@ -60,7 +60,7 @@ pub struct Carried {
     pub(super) by: f64,
 }
 
-/// A robot that is picked up and put down elsewhere.
+/// A kidnapping: the robot is moved elsewhere, without odometry.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PutDown {
     /// When, microseconds since the run began.
@@ -124,7 +124,7 @@ impl Simulation {
         Self { carried: Some(Carried { at: micros(at), by }), end, ..self }
     }
 
-    /// The same, with the robot picked up `at` seconds after the start and put down at a true pose; its wheels do not
+    /// The same, with the robot kidnapped `at` seconds after the start, to a true pose; its wheels do not
     /// roll. Only at the fidelity of pins, and if it steers by its estimate.
     #[must_use]
     pub fn put_down(mut self, at: f64, pose: trace::Pose) -> Self {
