@@ -27,6 +27,7 @@ mod program;
 mod publish;
 mod reality;
 mod search_windows;
+mod template;
 mod thumb;
 mod wiring;
 mod words;
@@ -65,6 +66,8 @@ enum Task {
     TestFirmware,
     /// The firmware of all further boards: lints it, builds it, searches it for panics and prints its size.
     Boards,
+    /// The template of a further board: instantiated, built, and refused without each of its parts.
+    Template,
     /// Flash and RAM of the shipped firmware, by crate.
     Size,
     /// The deepest that the stack of the shipped firmware can be, by the calls in it.
@@ -116,7 +119,7 @@ enum Task {
 }
 
 /// The steps of CI, the fast ones first.
-fn ci_steps() -> [(&'static str, Task); 22] {
+fn ci_steps() -> [(&'static str, Task); 23] {
     [
         ("format", Task::Format),
         ("circles", Task::Circles),
@@ -126,6 +129,7 @@ fn ci_steps() -> [(&'static str, Task); 22] {
         ("embedded", Task::Embedded),
         ("test-firmware", Task::TestFirmware),
         ("boards", Task::Boards),
+        ("template", Task::Template),
         ("golden", Task::Golden),
         ("pil", Task::Pil),
         ("guide", Task::Guide),
@@ -167,6 +171,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Embedded => checks::embedded(),
         Task::TestFirmware => firmware::test(),
         Task::Boards => firmware::boards(),
+        Task::Template => template::check(),
         Task::Size => firmware::size(),
         Task::Stack(args) => firmware::stack(&args),
         Task::Pil => pil::check(),

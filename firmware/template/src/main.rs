@@ -1,0 +1,61 @@
+//! {{project-name}}: the start and the loop. The parts of the board are in `parts.rs`; this file needs no change.
+
+#![no_std]
+#![no_main]
+
+mod parts;
+
+use core::ops::Range;
+
+use defmt_rtt as _;
+use panic_probe as _;
+use sonarfix_app::store::Store;
+use sonarfix_app::{App, FlashContents, boots, log};
+use sonarfix_hal::robot::Devices;
+use sonarfix_robot::memory;
+
+use parts::{Board, ECHO};
+
+/// The poll period, microseconds.
+const POLL: u64 = 1_000;
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    let Board {
+        clock, right, left, pulses, trigger, mut link, flash, mut enable, mut watchdog, resets, ..
+    } = Board::start();
+    let servo = sonarfix_robot::servo(pulses);
+    let ranger = sonarfix_robot::ranger(trigger, &ECHO);
+    let mut hardware = Devices { right, left, servo, ranger };
+    let contents = FlashContents::read(memory::map(), memory::config());
+    log::flash_contents(&contents);
+    let store: Range<u32> = parts::store();
+    let Ok(store) = Store::new(flash, store) else {
+        panic!("the store is not two or more whole sectors");
+    };
+    let reset = watchdog.reset();
+    let count = boots::resets(resets.read());
+    resets.write(boots::register(count.saturating_add(1)));
+    let board = sonarfix_robot::board(reset, count);
+    let mut app = App::new(board, contents, store, clock.now());
+    let mut next_poll = clock.now().ticks();
+    loop {
+        next_poll = next_poll.saturating_add(POLL);
+        while clock.now().ticks() < next_poll {}
+        let start = clock.now();
+        let polled = app.poll(start, &mut hardware, &mut link);
+        enable.set(polled.may_drive);
+        if polled.is_on_time {
+            watchdog.feed();
+        }
+        if polled.is_settled {
+            resets.write(boots::register(0));
+        }
+        link.transmit();
+        log::polled(&polled, app.report());
+        if let Some(took) = clock.now().checked_duration_since(start) {
+            app.took(took);
+        }
+        app.work(start, || clock.now());
+    }
+}
