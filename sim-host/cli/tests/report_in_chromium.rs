@@ -84,7 +84,7 @@ fn report(trace: &Trace) -> Report<'_> {
 }
 
 /// Magnifies a figure, reads values in it, and shows all of it again.
-const USES_A_FIGURE: &str = r"<script>{
+const USES_A_FIGURE: &str = r#"<script>{
   const assert = (holds, what) => { if (!holds) throw new Error(what); };
   const figure = [...document.querySelectorAll("figure")].find((one) => one.textContent.includes("Deviation of X"));
   const svg = figure.querySelector("svg");
@@ -105,7 +105,7 @@ const USES_A_FIGURE: &str = r"<script>{
   const time = document.querySelector('[data-value="time"]').textContent;
   assert(/^(9\.9|10\.0) s/.test(time), `the player goes there: ${time}`);
   document.documentElement.dataset.used = "true";
-}</script>";
+}</script>"#;
 
 #[test]
 fn a_figure_can_be_magnified_and_read() {

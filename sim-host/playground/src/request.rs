@@ -22,7 +22,7 @@ pub struct Request {
     pub seed: u64,
     /// How long it lasts at most, simulated seconds.
     pub seconds: f64,
-    /// When and where the robot is kidnapped to.
+    /// When the robot is kidnapped, and to where.
     #[serde(default)]
     pub moves: Vec<Move>,
     /// Whether the robot searches for its pose when it is lost.

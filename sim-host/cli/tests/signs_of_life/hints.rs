@@ -88,7 +88,11 @@ fn a_servo_must_be_looked_at() {
     assert_hint(of_servo(pulses(-90.0), None), State::Try, "to the right");
     assert_hint(of_servo(pulses(90.0), None), State::Try, "to the left");
     assert_hint(of_servo(Servo::Failing, Some(ImageStatus::Valid(1))), State::Wrong, "PWM");
-    assert_hint(of_servo(Servo::Failing, Some(ImageStatus::Missing)), State::Wrong, "configuration");
+    assert_hint(
+        of_servo(Servo::Failing, Some(ImageStatus::Missing)),
+        State::Wrong,
+        "configuration",
+    );
 }
 
 #[test]
