@@ -33,7 +33,8 @@ impl Spread {
     pub fn of(simulation: &Simulation, seed: u64, runs: u32) -> Result<Self, SimulationError> {
         let end = simulation.seconds();
         let errors = |run: u32| -> Result<_, SimulationError> {
-            let mut errors = Errors { every: end / f64::from(INSTANTS), points: Vec::new() };
+            let every = end / f64::from(INSTANTS);
+            let mut errors = Errors { every, next: 0.0, points: Vec::new() };
             simulation.run(seed.wrapping_add(run.into()), &mut errors)?;
             Ok(errors.points)
         };
@@ -66,18 +67,21 @@ fn quantile(values: &[f64], share: f64) -> f64 {
     values.get(rank.saturating_sub(1)).copied().unwrap_or(f64::NAN)
 }
 
-/// Keeps the position error at the first tick of every interval.
+/// Keeps the position error at the first tick of every interval. Ticks are late by the rest of a ping, intervals are not.
 struct Errors {
     /// Length of an interval, seconds.
     every: f64,
+    /// When the next interval begins, seconds since the start.
+    next: f64,
     points: Vec<(f64, f64)>,
 }
 
 impl Recorder for Errors {
     fn tick(&mut self, make: impl FnOnce() -> Tick) {
         let tick = make();
-        let due = self.points.last().is_none_or(|(time, _)| tick.time >= time + self.every - 1e-9);
-        if let Some(truth) = tick.truth.filter(|_| due) {
+        let is_due = tick.time >= self.next - 1e-9;
+        if let Some(truth) = tick.truth.filter(|_| is_due) {
+            self.next += self.every;
             let (truth, pose) = (truth.pose, tick.estimate.pose);
             self.points.push((tick.time, libm::hypot(pose.x - truth.x, pose.y - truth.y)));
         }

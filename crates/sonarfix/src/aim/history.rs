@@ -19,7 +19,7 @@ const RECENT_WALLS: usize = 8;
 /// and at the end of a cupboard one range may be the wall's.
 const PERSISTENCE: f32 = 0.8;
 /// Limits of the probability: the only wall is measured however often it fails.
-const MAX_OCCLUSION: f32 = 0.99;
+const MAX_OCCLUSION: f32 = 0.95;
 /// Distance of the foot along the wall that halves the deviation from the prior: half the width of a
 /// chair.
 const HALVED_WITHIN: Metres = Metres(0.25);

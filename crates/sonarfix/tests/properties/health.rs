@@ -191,7 +191,7 @@ impl PageOracle {
         let ratio = 0.3 + 0.7 * p_wrong / p;
         self.evidence = (self.evidence + ratio.ln().min(4.0)).clamp(0.0, f64::from(LOST_AT));
         let total = (1.0 - o) * seen + o * repeated;
-        self.occluded = (o * repeated / total).max(0.8 * o).min(0.99);
+        self.occluded = (o * repeated / total).max(0.8 * o).min(0.95);
         let is_other = echo.is_some_and(|(nu, _)| nu.abs() > 0.5);
         if is_other && self.source.is_none() {
             self.source = range;
