@@ -286,9 +286,8 @@ fn printed(errors: &mut impl BufRead) -> Option<(String, String)> {
 fn the_emulated_firmware_is_on_the_page() {
     let elf = std::env::var("SONARFIX_FIRMWARE").expect("run `cargo xtask test-firmware`");
     let free = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
-    let limit = PATIENCE.as_secs().to_string();
-    let mut emulator = Command::new("timeout")
-        .args([&limit, "qemu-system-arm", "-machine", "netduinoplus2", "-display", "none"])
+    let emulator = Command::new("qemu-system-arm")
+        .args(["-machine", "netduinoplus2", "-display", "none"])
         .args(["-icount", "shift=0,sleep=off", "-monitor", "none", "-kernel", &elf])
         // USART1 is not connected; the link is USART2.
         .args(["-serial", "null", "-serial", &format!("tcp:{free},server=on,wait=on")])
@@ -296,16 +295,17 @@ fn the_emulated_firmware_is_on_the_page() {
         .stderr(Stdio::null())
         .spawn()
         .expect("is qemu-system-arm installed?");
+    let mut emulator = Ended(emulator);
     let dir = tempfile::tempdir().unwrap();
-    let (mut child, (host, token)) = loop {
-        let mut child = monitor(&format!("tcp:{free}"), &[], dir.path());
-        let mut errors = BufReader::new(child.stderr.take().unwrap());
+    let (_monitor, (host, token)) = loop {
+        let mut child = Ended(monitor(&format!("tcp:{free}"), &[], dir.path()));
+        let mut errors = BufReader::new(child.0.stderr.take().unwrap());
         if let Some(page) = printed(&mut errors) {
             break (child, page);
         }
         // The emulator does not listen yet.
-        child.wait().unwrap();
-        assert!(emulator.try_wait().unwrap().is_none(), "the emulator has ended");
+        child.0.wait().unwrap();
+        assert!(emulator.0.try_wait().unwrap().is_none(), "the emulator has ended");
         thread::sleep(Duration::from_millis(100));
     };
     let mut seen = events(&host, &token).filter_map(|event| {
@@ -317,9 +317,16 @@ fn the_emulated_firmware_is_on_the_page() {
     let headers = [format!("Host: {host}"), format!("Authorization: Bearer {token}")];
     let answer = asked(&host, &post("{\"order\":\"start\"}", &headers));
     assert!(answer.contains("the robot refuses: "), "{answer}");
-    for process in [&mut child, &mut emulator] {
-        process.kill().unwrap();
-        process.wait().unwrap();
+}
+
+/// A process that is ended when it is dropped.
+struct Ended(Child);
+
+impl Drop for Ended {
+    fn drop(&mut self) {
+        // It may have ended already.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
     }
 }
 
