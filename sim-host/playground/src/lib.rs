@@ -1,7 +1,7 @@
 //! The simulator as a static web page, without a server: `cargo xtask playground`.
 //!
 //! The page keeps a scenario as JSON, with the keys of a scenario file. For each change it passes the scenario to [`answer`],
-//! which runs it from start to end, and plays the result. A run is a function of its [request](request), so picking
+//! which runs it from start to end, and plays the result. A run is a function of its [`request`], so picking
 //! up the robot is a part of the request, too: the run is computed again with it.
 //!
 //! | module | what |
