@@ -18,9 +18,9 @@ use std::time::Duration;
 use anyhow::{Context, bail, ensure};
 use serde_json::Value;
 
-use crate::boards::{self, Board};
 use crate::cargo;
 use crate::firmware;
+use sonarfix_boards::Board;
 
 /// Simulated time of a drive, seconds.
 const SECONDS: &str = "20";
@@ -47,7 +47,7 @@ pub fn follow() -> anyhow::Result<()> {
         fs::remove_dir_all(&folder).context("cannot remove the old folder")?;
     }
     fs::create_dir_all(&folder)?;
-    for board in boards::all()? {
+    for board in sonarfix_boards::all()? {
         let robot = folder.join(&board.name);
         prepare(&folder, &robot, &board)?;
         if board.package == firmware::REFERENCE {

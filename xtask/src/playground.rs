@@ -14,21 +14,6 @@ use crate::cargo;
 const SECONDS: u32 = 60;
 /// Limit of the page, compressed with gzip, bytes.
 const MOST_BYTES: usize = 2_000_000;
-/// Names of the Chromium executable.
-const BROWSERS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "chrome"];
-/// No window, network or services.
-const FLAGS: [&str; 9] = [
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--dump-dom",
-];
-
 /// Builds the page, and checks its size and, in a browser, that it computes the same bits as this computer.
 pub fn build_and_check() -> anyhow::Result<()> {
     let page = build()?;
@@ -36,8 +21,8 @@ pub fn build_and_check() -> anyhow::Result<()> {
     println!("{}: {bytes} bytes compressed with gzip", page.display());
     ensure!(bytes <= MOST_BYTES, "the limit is {MOST_BYTES} bytes");
     let native = digests()?;
-    let Some(browser) = browser() else {
-        eprintln!("not opened: none of {BROWSERS:?} is on the path");
+    let Some(browser) = sonarfix_chromium::headless() else {
+        eprintln!("not opened: none of {:?} is on the path", sonarfix_chromium::NAMES);
         return Ok(());
     };
     let root = opened(browser, &page)?;
@@ -46,7 +31,7 @@ pub fn build_and_check() -> anyhow::Result<()> {
     let time = attribute(&root, "data-milliseconds").unwrap_or("?");
     println!("{native}: {} runs of {SECONDS} s in {time} ms", native.split(' ').count());
     ensure!(attribute(&root, "data-checked").is_some(), "the check has not ended: {root}");
-    ensure!(computed == native, "{browser} computed {computed}, this computer {native}");
+    ensure!(computed == native, "the browser computed {computed}, this computer {native}");
     Ok(())
 }
 
@@ -78,13 +63,8 @@ fn digests() -> anyhow::Result<String> {
     Ok(cargo::printed(cargo::command(&command))?.trim().to_owned())
 }
 
-fn browser() -> Option<&'static str> {
-    let answers = |name: &&str| Command::new(name).arg("--version").output().is_ok();
-    BROWSERS.into_iter().find(answers)
-}
-
 /// The opening tag of the page with a script that uses it, after its scripts ran.
-fn opened(browser: &str, page: &Path) -> anyhow::Result<String> {
+fn opened(mut browser: Command, page: &Path) -> anyhow::Result<String> {
     let (profile, checked) = (page.with_file_name("profile"), page.with_file_name("check.html"));
     let script = cargo::root().join("sim-host/playground/tests/check.js");
     let script = std::fs::read_to_string(&script).context("tests/check.js")?;
@@ -92,14 +72,12 @@ fn opened(browser: &str, page: &Path) -> anyhow::Result<String> {
         .replacen("<html", &format!("<html data-seconds=\"{SECONDS}\""), 1)
         .replace("</body>", &format!("<script>\n{script}</script>\n</body>"));
     std::fs::write(&checked, text)?;
-    let mut command = Command::new(browser);
-    command.args(FLAGS);
-    command.arg(format!("--user-data-dir={}", profile.display()));
-    command.arg(format!("file://{}", checked.display()));
-    let output = command.output().with_context(|| format!("cannot start {browser}"))?;
+    browser.arg("--dump-dom").arg(format!("--user-data-dir={}", profile.display()));
+    browser.arg(format!("file://{}", checked.display()));
+    let output = browser.output().context("cannot start the browser")?;
     std::fs::remove_dir_all(&profile)?;
     let errors = String::from_utf8_lossy(&output.stderr);
-    ensure!(output.status.success(), "{browser} failed: {errors}");
+    ensure!(output.status.success(), "the browser failed: {errors}");
     let dom = String::from_utf8_lossy(&output.stdout);
     let from = dom.find("<html").context("the browser printed no page")?;
     let tag = dom.get(from..).and_then(|rest| rest.split('>').next());

@@ -6,8 +6,9 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 
-use crate::boards::Board;
-use crate::{boards, cargo};
+use sonarfix_boards::Board;
+
+use crate::cargo;
 
 /// Writes the drawings of all boards.
 pub fn write() -> anyhow::Result<()> {
@@ -21,7 +22,7 @@ pub fn write() -> anyhow::Result<()> {
 fn drawings() -> anyhow::Result<Vec<(PathBuf, String)>> {
     let folder = cargo::root().join("docs/images");
     let drawn = |board: &Board| (folder.join(format!("wiring-{}.svg", board.name)), draw(board));
-    Ok(boards::all()?.iter().map(drawn).collect())
+    Ok(sonarfix_boards::all()?.iter().map(drawn).collect())
 }
 
 /// Sizes, pixels.

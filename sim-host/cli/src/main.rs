@@ -3,7 +3,6 @@
 #[macro_use]
 mod output;
 
-mod boards;
 mod bound;
 mod calibrate;
 mod calibration;

@@ -6,7 +6,7 @@ use std::path::Path;
 use sha2::{Digest, Sha256};
 use sonarfix_report::Table;
 
-/// The table of a report. A file that is not there, or is none, has no hash.
+/// The table of a report. A path that cannot be read as a file has no row.
 pub fn table(files: &[&Path]) -> Table {
     let version = concat!("sonarfix ", env!("CARGO_PKG_VERSION"));
     let mut rows = vec![row("version", version), row("command", &command(std::env::args()))];

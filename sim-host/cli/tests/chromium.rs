@@ -6,31 +6,13 @@ use std::process::Command;
 
 use crate::skipped;
 
-/// Names of the Chromium executable.
-const BROWSERS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "chrome"];
-
-/// No window, network or services; virtual time, so that the page's five seconds pass at once.
-const FLAGS: [&str; 9] = [
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--virtual-time-budget=5000",
-];
-
-fn browser() -> Option<&'static str> {
-    let answers = |name: &&str| Command::new(name).arg("--version").output().is_ok();
-    BROWSERS.into_iter().find(answers)
-}
+/// Virtual time, so that the page's five seconds pass at once.
+const FIVE_SECONDS: &str = "--virtual-time-budget=5000";
 
 /// The page at an address after its scripts ran, with further flags; `None`, with a message, without a browser.
 pub fn opened(url: &str, flags: &[&str]) -> Option<String> {
-    let Some(browser) = browser() else {
-        skipped::because(&format!("none of {BROWSERS:?} is on the path"));
+    let Some(browser) = sonarfix_chromium::headless() else {
+        skipped::because(&format!("none of {:?} is on the path", sonarfix_chromium::NAMES));
         return None;
     };
     Some(output_of(browser, url, &[&["--dump-dom"], flags].concat()))
@@ -38,21 +20,20 @@ pub fn opened(url: &str, flags: &[&str]) -> Option<String> {
 
 /// Takes pictures of a page, light and dark, into the folder of `SONARFIX_PICTURES`, if it is set.
 pub fn picture(url: &str, name: &str, flags: &[&str]) {
-    let (Some(browser), Ok(folder)) = (browser(), std::env::var("SONARFIX_PICTURES")) else {
-        return;
-    };
+    let Ok(folder) = std::env::var("SONARFIX_PICTURES") else { return };
     let size = flags.concat().replace(|c: char| !c.is_ascii_digit() && c != ',', "");
     for (scheme, setting) in [("light", "1"), ("dark", "0")] {
+        let Some(browser) = sonarfix_chromium::headless() else { return };
         let file = format!("--screenshot={folder}/{name}-{size}-{scheme}.png");
         let setting = format!("--blink-settings=preferredColorScheme={setting}");
         output_of(browser, url, &[&[file.as_str(), &setting], flags].concat());
     }
 }
 
-fn output_of(browser: &str, url: &str, flags: &[&str]) -> String {
+fn output_of(mut browser: Command, url: &str, flags: &[&str]) -> String {
     let profile = tempfile::tempdir().unwrap();
-    let output = Command::new(browser)
-        .args(FLAGS)
+    let output = browser
+        .arg(FIVE_SECONDS)
         .args(flags)
         .arg(format!("--user-data-dir={}", profile.path().display()))
         .arg(url)

@@ -9,9 +9,10 @@ const SCRIPTS: &str = concat!(include_str!("curves.js"), include_str!("live.js")
 /// The page.
 #[must_use]
 pub fn html() -> String {
-    let values: [(&str, Cow<'_, str>); 4] = [
+    let values: [(&str, Cow<'_, str>); 5] = [
         ("palette", sonarfix_report::palette_css().into()),
         ("style", STYLE.into()),
+        ("view", sonarfix_report::VIEW.into()),
         ("drawing", sonarfix_report::DRAWING.into()),
         ("script", SCRIPTS.into()),
     ];

@@ -22,7 +22,7 @@ use thiserror::Error;
 
 use request::{Request, RequestError};
 
-/// A run, or why there is none.
+/// The reason for which a request has no result.
 #[derive(Debug, Error)]
 pub enum PlaygroundError {
     /// The request is not valid.
@@ -78,7 +78,7 @@ pub fn answer(request: &str) -> String {
     answer.unwrap_or_else(|error| serde_json::json!({ "error": error.to_string() }).to_string())
 }
 
-/// The scenario of a request in JSON as a scenario file; empty if there is none.
+/// The scenario of a request in JSON as a scenario file; empty if the request is not valid.
 #[must_use]
 pub fn file(request: &str) -> String {
     let request = serde_json::from_str::<Request>(request);

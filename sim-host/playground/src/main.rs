@@ -7,7 +7,7 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use sonarfix_playground::request::Request;
 use sonarfix_playground::{classroom, run};
-use sonarfix_report::{DRAWING, PLAYER, SCRIPT, fill, style};
+use sonarfix_report::{DRAWING, SCRIPT, fill, player, style};
 
 /// The seeds that the page checks with `#check`.
 const SEEDS: [u64; 3] = [0, 1, 2];
@@ -25,12 +25,12 @@ fn main() -> anyhow::Result<()> {
 
 fn write(program: &Path, page: &Path) -> anyhow::Result<()> {
     let program = std::fs::read(program).with_context(|| program.display().to_string())?;
-    let style = style();
+    let (style, player) = (style(), player());
     let program = STANDARD.encode(program);
     let values = [
         ("style", style.as_str()),
         ("own-style", include_str!("page.css")),
-        ("player", PLAYER),
+        ("player", &player),
         ("wasm", &program),
         ("drawing", DRAWING),
         ("player-script", SCRIPT),

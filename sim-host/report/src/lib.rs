@@ -60,8 +60,9 @@ const STYLE: &str = include_str!("report.css");
 /// Values, zoom and pan of the figures.
 const FIGURES: &str = include_str!("figures.js");
 
-/// The player as HTML. The page that includes it calls `openPlayer(data)` of [`SCRIPT`].
-pub const PLAYER: &str = include_str!("player.html");
+/// The controls of the view of [`DRAWING`]: what is shown of the map, and the scale of the ellipse.
+pub const VIEW: &str = include_str!("view.html");
+
 /// The script of the player, after [`DRAWING`].
 pub const SCRIPT: &str = include_str!("player.js");
 
@@ -149,7 +150,7 @@ impl Report<'_> {
             ("style", style().into()),
             ("tables", page::tables(&self.tables).into()),
             ("figures", page::figures(figures, self.of_paper).into()),
-            ("player", PLAYER.into()),
+            ("player", player().into()),
             ("provenance", page::tables(std::slice::from_ref(&self.provenance)).into()),
             ("figures-script", FIGURES.into()),
             ("data", data.into()),
@@ -158,6 +159,12 @@ impl Report<'_> {
         ];
         Ok(page::fill(TEMPLATE, &values))
     }
+}
+
+/// The player as HTML. The page that includes it calls `openPlayer(data)` of [`SCRIPT`].
+#[must_use]
+pub fn player() -> String {
+    page::fill(include_str!("player.html"), &[("view", VIEW.into())])
 }
 
 /// The style sheet of the report's page and of the player, with the palette.

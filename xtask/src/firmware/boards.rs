@@ -7,9 +7,9 @@ use std::path::Path;
 use object::{Object, ObjectSection, SectionKind};
 
 use super::{build, memory, panics};
-use crate::boards::{self, Board};
 use crate::cargo;
 use crate::workspace::Workspace;
+use sonarfix_boards::Board;
 
 /// The board that is examined in detail, and emulated.
 const REFERENCE: &str = "stm32f405";
@@ -18,7 +18,7 @@ const REFERENCE: &str = "stm32f405";
 pub fn check(reference: &[u8]) -> anyhow::Result<()> {
     let firmware = Workspace::Firmware;
     let mut rows = Vec::new();
-    for board in &boards::all()? {
+    for board in &sonarfix_boards::all()? {
         if board.name == REFERENCE {
             rows.push(row(board, reference)?);
             continue;

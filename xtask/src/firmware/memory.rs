@@ -59,7 +59,7 @@ fn lowest_variable(file: &object::File) -> anyhow::Result<u64> {
     lowest.context("the program has no variables")
 }
 
-/// The sections of variables in RAM: they can be written. That of the stack, where a linker script has one, is none of them.
+/// The sections of variables in RAM, which can be written; without the section of the stack, which some linker scripts have.
 pub fn variables_of<'f, 'd>(
     file: &'f object::File<'d>,
 ) -> impl Iterator<Item = object::Section<'d, 'f>> {

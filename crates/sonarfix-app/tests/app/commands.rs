@@ -8,7 +8,7 @@ use sonarfix_link::message::{CommandError, CommandResult, ImageStatus};
 use sonarfix_link::{Command, Telemetry, baked};
 
 use crate::flash::SimFlash;
-use crate::rig::{Baked, Bench, config, loop_status, servo, start};
+use crate::rig::{Baked, Bench, config, loop_status, start};
 
 const DONE: CommandResult = CommandResult::Done;
 
@@ -77,13 +77,7 @@ fn every_missing_device_is_counted_and_no_other() {
     for missing in 0..16_u32 {
         let has = |bit: u32| missing & (1 << bit) == 0;
         let mut bench = Bench::switched_on(&baked, SimFlash::new());
-        bench.hardware.right.0 = has(0).then_some(7);
-        bench.hardware.left.0 = has(1).then_some(7);
-        bench.hardware.ranger.is_there = has(3);
-        bench.servo_is_there.set(has(2));
-        // A driver that has never set its channel.
-        bench.hardware.servo = servo(&bench.servo_is_there);
-        bench.hardware.servo.configure(&config().servo_settings()).unwrap();
+        bench.disconnect(missing);
         let faults = loop_status(&bench.wait(2_500)).faults;
         let found = [faults.right.errors, faults.left.errors, faults.servo, faults.ranger];
         for (bit, count) in (0..).zip(found) {

@@ -7,7 +7,7 @@ use sonarfix_link::message::{CommandError, CommandResult, DeviceReadings};
 use sonarfix_link::{Command, Telemetry};
 
 use crate::flash::SimFlash;
-use crate::rig::{Baked, Bench, config, servo, start};
+use crate::rig::{Baked, Bench, config, start};
 use crate::room::Truth;
 
 const DONE: CommandResult = CommandResult::Done;
@@ -101,12 +101,7 @@ fn each_missing_device_is_seen_and_no_other() {
     for missing in 0..16_u32 {
         let has = |bit: u32| missing & (1 << bit) == 0;
         let mut bench = Bench::switched_on(&baked, SimFlash::new());
-        bench.hardware.right.0 = has(0).then_some(7);
-        bench.hardware.left.0 = has(1).then_some(7);
-        bench.servo_is_there.set(has(2));
-        bench.hardware.servo = servo(&bench.servo_is_there);
-        bench.hardware.servo.configure(&config().servo_settings()).unwrap();
-        bench.hardware.ranger.is_there = has(3);
+        bench.disconnect(missing);
         assert_eq!(bench.order(&Command::ShowDevices), DONE);
         let shown = *readings(&bench.wait(3_000)).last().unwrap();
         let silence = if has(3) { NoEcho::Nothing } else { NoEcho::NoResponse };

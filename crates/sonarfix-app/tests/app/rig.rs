@@ -254,6 +254,19 @@ impl<'m> Bench<'m> {
         bench
     }
 
+    /// Disconnects devices: a bit for each of right encoder, left encoder, servo and ranger. Those that
+    /// remain are at rest.
+    pub fn disconnect(&mut self, missing: u32) {
+        let has = |bit: u32| missing & (1 << bit) == 0;
+        self.hardware.right.0 = has(0).then_some(7);
+        self.hardware.left.0 = has(1).then_some(7);
+        self.servo_is_there.set(has(2));
+        // A driver that has never set its channel.
+        self.hardware.servo = servo(&self.servo_is_there);
+        self.hardware.servo.configure(&config().servo_settings()).unwrap();
+        self.hardware.ranger.is_there = has(3);
+    }
+
     /// Switches the robot off and returns its flash.
     pub fn switched_off(self) -> SimFlash {
         self.app.release().release()

@@ -6,7 +6,7 @@ use anyhow::Context;
 use sonarfix_plan::preset::{ServoPreset, SonarPreset};
 
 use super::question::Question;
-use crate::boards::{self, Board};
+use sonarfix_boards::Board;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -50,7 +50,7 @@ const SERVOS: [(&str, ServoPreset); 2] =
 impl Answers {
     /// The options; for those that are not given, what the user answers on a terminal, or else the default.
     pub fn collect(args: &Args) -> anyhow::Result<Self> {
-        let boards = boards::all()?;
+        let boards = sonarfix_boards::all()?;
         let names: Vec<&str> = boards.iter().map(|board| board.name.as_str()).collect();
         let board =
             Question::new("--board", "board", &names, "pico2").ask(args.board.as_deref())?;

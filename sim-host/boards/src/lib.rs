@@ -22,11 +22,15 @@ pub struct Board {
     pub config: Region,
     /// Where the baked map lies.
     pub map: Region,
+    /// The linker's memory map, from the top of the repository.
+    pub memory: String,
     /// Whether programs and images can be written over USB.
     pub usb: bool,
     /// Where the PC meets the link.
     pub port: String,
-    /// The resistors of the divider at the echo pin.
+    /// Where the board takes 5 V.
+    pub feed: String,
+    /// The resistors between echo and ground, upper and lower.
     pub divider: [String; 2],
     /// Its pins.
     pub pins: Pins,
@@ -44,27 +48,26 @@ pub struct Region {
 /// The pin of each signal.
 #[derive(Debug, Clone, Deserialize)]
 pub struct Pins {
-    /// Channels of the right encoder.
+    /// Channel A of the right encoder.
     pub right_a: String,
+    /// Channel B of the right encoder.
     pub right_b: String,
-    /// Channels of the left encoder.
+    /// Channel A of the left encoder.
     pub left_a: String,
+    /// Channel B of the left encoder.
     pub left_b: String,
     /// The servo's pulses.
     pub servo: String,
-    /// The sonar.
+    /// Trigger of the sonar.
     pub trigger: String,
+    /// Echo of the sonar, behind the divider.
     pub echo: String,
     /// Enable of the motor driver.
     pub enable: String,
-    /// The link, from the board and to it.
+    /// The link, from the board.
     pub tx: String,
+    /// The link, to the board.
     pub rx: String,
-}
-
-#[derive(Deserialize)]
-struct Table {
-    board: Vec<Board>,
 }
 
 /// All boards.
@@ -72,6 +75,11 @@ struct Table {
 /// # Errors
 /// If the table is invalid.
 pub fn all() -> anyhow::Result<Vec<Board>> {
+    #[derive(Deserialize)]
+    struct Table {
+        board: Vec<Board>,
+    }
+
     let table: Table = toml::from_str(TABLE).context("firmware/boards.toml")?;
     Ok(table.board)
 }
