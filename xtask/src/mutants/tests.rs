@@ -13,8 +13,15 @@ use serde::Deserialize;
 use super::copy;
 use crate::cargo;
 
-/// What the tests of the mutated package do not catch, those of the other two may.
-const PACKAGES: [&str; 3] = ["sonarfix", "sonarfix-hal", "sonarfix-app"];
+/// What the tests of the mutated package do not catch, those of the others may. The last has the golden traces.
+const PACKAGES: [&str; 6] = [
+    "sonarfix",
+    "sonarfix-hal",
+    "sonarfix-app",
+    "sonarfix-link",
+    "sonarfix-map",
+    "sonarfix-pil-host",
+];
 
 /// A built program of tests.
 #[derive(Debug, Clone, PartialEq, Eq)]
