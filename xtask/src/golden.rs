@@ -25,11 +25,17 @@ pub fn check() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Records the traces on this computer.
+/// Records the traces and the hashes of whole runs on this computer.
 pub fn bless() -> anyhow::Result<()> {
-    TRACES
-        .into_iter()
-        .try_for_each(|(name, run)| pil(&format!("{run} --machine host --record {}", path(name))))
+    for (name, run) in TRACES {
+        pil(&format!("{run} --machine host --record {}", path(name)))?;
+    }
+    let mut runs = cargo::command("test --quiet --package sonarfix-pil-host --test golden runs::");
+    cargo::printed({
+        runs.env("SONARFIX_BLESS", "1");
+        runs
+    })?;
+    Ok(())
 }
 
 fn path(name: &str) -> String {

@@ -205,6 +205,33 @@ fn a_pose_that_is_set_while_running_replays_to_the_bit() {
     drop(dir);
 }
 
+/// Encoders that cannot be read for 4 s: the replay has the estimates of the robot to the bit, and between the samples the
+/// growth of its deviations and its verdicts.
+#[test]
+fn failed_encoder_samples_replay_to_the_bit() {
+    let kind = r#"kind = "read_errors", wheel = "right", share = "100 %""#;
+    let faults = format!(r#"{{ {kind}, from = "90 s", to = "94 s" }}"#);
+    let mut scenario = scenario(CLASSROOM);
+    let text = CLASSROOM.replacen("[map]", &format!("faults = [{faults}]\n[map]"), 1);
+    scenario.faults = Scenario::parse(&text, "scenario.toml", Path::new("")).unwrap().faults;
+    let mut robot = Robot::of(&scenario, 3);
+    let during = |at: u64| (90_000_000..94_000_000).contains(&at);
+    let grown = robot.estimates.iter().filter(|(at, _)| *at < 94_000_000).next_back().unwrap().1;
+    // The estimates at failed samples have the time of the last one that was taken.
+    let mut last = None;
+    robot.estimates.retain(|(at, _)| last.replace(*at) != Some(*at));
+    let (received, _) = received_from(&robot.frames.concat());
+    let (trace, summary) = replay(&log(&received), &scenario);
+    assert_same(&robot.estimates, &trace, 0);
+    let is_during = |tick: &&Tick| during((tick.time * 1e6).round() as u64);
+    let replayed: Vec<&Tick> = trace.ticks.iter().filter(is_during).collect();
+    assert!(replayed.len() >= 39, "{} samples", replayed.len());
+    assert_eq!(replayed.last().unwrap().estimate, grown);
+    assert!(grown.deviation[0] > 1.0, "{grown:?}");
+    let lost_at = summary.health.lost_at.unwrap();
+    assert!((lost_at - 93.0).abs() < 0.3, "{lost_at}");
+}
+
 /// The first ping of a run, changed to a wall that is not in the map, and ten cycles without a
 /// wall: by itself the replay would choose the right wall and would not skip a cycle.
 #[test]

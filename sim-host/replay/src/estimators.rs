@@ -12,6 +12,7 @@ use sonarfix_sim::observe;
 use sonarfix_sim::odometry::DeadReckoning;
 use sonarfix_sim::trace::{Pose, Tick, Truth};
 
+use crate::gap::Gap;
 use crate::reference::seconds;
 use crate::wheels::Reading;
 
@@ -56,6 +57,8 @@ pub struct Estimators<'a> {
     pub epoch: i64,
     /// The encoder reading that the localizer has received.
     pub received: Reading,
+    /// The time of the last encoder sample that failed.
+    missed: i64,
     pub searches: Searches,
     computing: ComputingTime,
 }
@@ -74,6 +77,7 @@ impl<'a> Estimators<'a> {
             odometry,
             epoch: reading.time,
             received: reading,
+            missed: reading.time,
             searches: Searches::default(),
             computing: ComputingTime::default(),
         }
@@ -119,6 +123,14 @@ impl<'a> Estimators<'a> {
         self.received = received;
         self.work(elapsed);
         Ok(f64::midpoint(right.into(), left.into()).abs())
+    }
+
+    /// Passes the next encoder sample that failed, in a gap of the log up to a time; returns its time.
+    pub fn miss(&mut self, gap: &Gap, until: i64) -> Option<i64> {
+        let time = gap.next_failed(self.missed, until)?;
+        self.navigator.odometry_missing(Instant::from_ticks((time - self.epoch).unsigned_abs()));
+        self.missed = time;
+        Some(time)
     }
 
     /// Makes the evaluations of a time, microseconds, and changes the mode when it is due.

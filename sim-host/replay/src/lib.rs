@@ -17,6 +17,7 @@
 //! | `session` | the replay itself |
 //! | `estimators` | navigator, search and dead reckoning |
 //! | `wheels` | travel between two readings of the encoders |
+//! | `gap` | periods in which a robot could not read its encoders |
 //! | [`scan`] | the range of a sonar cone in a scan |
 //! | `score`, `median` | errors, and the health verdicts over time |
 //! | [`thinned`] | a trace of bounded size |
@@ -28,6 +29,7 @@ pub mod convert;
 mod estimators;
 pub mod fault;
 pub mod find;
+mod gap;
 mod lines;
 pub mod log;
 mod median;

@@ -21,6 +21,7 @@ use sonarfix_sim::trace::{FixRecord, Pose, Recorder};
 
 use crate::estimators::{Estimators, Searches};
 use crate::fault::{Fault, ReplayError};
+use crate::gap::Gap;
 use crate::log::Record;
 use crate::reference::{Reference, micros, seconds};
 use crate::scan::{Cone, Scan, Sweep};
@@ -95,6 +96,8 @@ struct Begin {
     deviation: StandardDeviations,
     /// Whether the log has no start, and the robot searches for its pose.
     is_unknown: bool,
+    /// Whether the robot recorded the log itself, with every encoder sample that it took.
+    is_own: bool,
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -179,7 +182,8 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
                 let deviation = self.with_prior([sigma, sigma, heading]);
                 let state = estimate([pose.x, pose.y, pose.heading, 0.0, 0.0, 0.0, 0.0]);
                 let time = micros(time);
-                let begin = Begin { time, pose, state, deviation, is_unknown: false };
+                let (is_unknown, is_own) = (false, false);
+                let begin = Begin { time, pose, state, deviation, is_unknown, is_own };
                 self.take_start(begin, complain)
             }
             Record::Mode { time, mode, state, deviation } => {
@@ -191,7 +195,8 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
                 let pose = Pose { x, y, heading };
                 let (state, deviation) = (estimate(received), deviations(deviation));
                 let time = micros(time);
-                let begin = Begin { time, pose, state, deviation, is_unknown: false };
+                let (is_unknown, is_own) = (false, true);
+                let begin = Begin { time, pose, state, deviation, is_unknown, is_own };
                 self.take_start(begin, complain)
             }
             Record::Ticks { time, right, left } => {
@@ -240,7 +245,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         let position = f64::from(UNKNOWN_POSITION.0);
         let deviation = self.with_prior([position, position, UNKNOWN_HEADING.0.into()]);
         let (pose, state) = (Pose::default(), estimate([0.0; STATES]));
-        Some(Begin { time, pose, state, deviation, is_unknown: true })
+        Some(Begin { time, pose, state, deviation, is_unknown: true, is_own: false })
     }
 
     fn rolled(&self, ticks: [i64; 2]) -> [f64; 2] {
@@ -411,8 +416,9 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         };
         let mut pending = std::mem::take(&mut self.pending);
         pending.sort_by_key(|pending| pending.time);
+        let gap = self.gap(&estimators, from, to, &pending);
         let mut pending = pending.into_iter().peekable();
-        let lived = self.live(&mut estimators, from, to, &mut pending, complain);
+        let lived = self.live(&mut estimators, from, to, gap, &mut pending, complain);
         // Ranges later than the record, or after an error.
         self.pending = pending.filter(|pending| pending.time > to.time).collect();
         self.beams = self.pending.iter().map(|pending| pending.echo.beams()).sum();
@@ -428,6 +434,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         estimators: &mut Estimators,
         from: Reading,
         to: Reading,
+        gap: Option<Gap>,
         pending: &mut Peekable<IntoIter<Pending>>,
         complain: &mut Complain,
     ) -> Result<(), Trouble> {
@@ -453,21 +460,59 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
                     _ => self.measure(estimators, &measurement),
                 }
                 self.update(estimators, measurement.time);
-            } else if let (Some(row), Some(reference)) = (row, &mut self.reference) {
-                self.tally.distance += estimators.drive_to(from.between(to, row.time))?;
+            } else if let Some(row) = row {
+                match &gap {
+                    Some(gap) if row.time < to.time => self.miss(estimators, gap, row.time),
+                    _ => {
+                        let reading = from.between(to, row.time);
+                        self.tally.distance += estimators.drive_to(reading)?;
+                    }
+                }
                 let estimate = observe::estimate(estimators.localizer());
                 let at = (estimators.since_start(row.time), self.tally.distance);
                 let odometry = estimators.odometry.pose();
                 self.score.add(at, &estimate, &odometry, &row.pose);
-                reference.read(&mut *complain)?;
+                self.reference.as_mut().map_or(Ok(()), |it| it.read(&mut *complain))?;
             } else {
                 break;
             }
+        }
+        if let Some(gap) = &gap {
+            self.miss(estimators, gap, to.time);
         }
         self.tally.distance += estimators.drive_to(to)?;
         let truth = self.reference.as_ref().and_then(|r| r.pose_at(to.time));
         self.recorder.tick(|| estimators.tick(estimators.since_start(to.time), truth));
         Ok(())
+    }
+
+    /// The gap between two encoder records in which the robot could not read its encoders. After lost frames there may be
+    /// a measurement between the records, for which it has read them.
+    fn gap(
+        &self,
+        estimators: &Estimators,
+        from: Reading,
+        to: Reading,
+        pending: &[Pending],
+    ) -> Option<Gap> {
+        let is_between = |held: &Pending| from.time < held.time && held.time < to.time;
+        if !self.begin.is_some_and(|begin| begin.is_own) || pending.iter().any(is_between) {
+            return None;
+        }
+        let period = i64::try_from(self.robot.encoder_period.to_micros()).unwrap_or(i64::MAX);
+        Gap::between(from, to, estimators.epoch, period)
+    }
+
+    /// Passes the encoder samples that failed up to a time.
+    fn miss(&mut self, estimators: &mut Estimators, gap: &Gap, until: i64) {
+        let mut before = estimators.localizer().health().verdict;
+        while let Some(time) = estimators.miss(gap, until) {
+            let now = estimators.localizer().health().verdict;
+            self.tally.verdicts.note(estimators.since_start(time), before, now);
+            before = now;
+            let truth = self.reference.as_ref().and_then(|r| r.pose_at(time));
+            self.recorder.tick(|| estimators.tick(estimators.since_start(time), truth));
+        }
     }
 
     /// Changes the mode if a measurement requires it.
