@@ -215,15 +215,14 @@ fn failed_encoder_samples_replay_to_the_bit() {
     let text = CLASSROOM.replacen("[map]", &format!("faults = [{faults}]\n[map]"), 1);
     scenario.faults = Scenario::parse(&text, "scenario.toml", Path::new("")).unwrap().faults;
     let mut robot = Robot::of(&scenario, 3);
-    let during = |at: u64| (90_000_000..94_000_000).contains(&at);
-    let grown = robot.estimates.iter().filter(|(at, _)| *at < 94_000_000).next_back().unwrap().1;
+    let grown = robot.estimates.iter().rfind(|(at, _)| *at < 94_000_000).unwrap().1;
     // The estimates at failed samples have the time of the last one that was taken.
     let mut last = None;
     robot.estimates.retain(|(at, _)| last.replace(*at) != Some(*at));
     let (received, _) = received_from(&robot.frames.concat());
     let (trace, summary) = replay(&log(&received), &scenario);
     assert_same(&robot.estimates, &trace, 0);
-    let is_during = |tick: &&Tick| during((tick.time * 1e6).round() as u64);
+    let is_during = |tick: &&Tick| (90.0..94.0).contains(&tick.time);
     let replayed: Vec<&Tick> = trace.ticks.iter().filter(is_during).collect();
     assert!(replayed.len() >= 39, "{} samples", replayed.len());
     assert_eq!(replayed.last().unwrap().estimate, grown);

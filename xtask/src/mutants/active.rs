@@ -22,6 +22,9 @@ pub mod mutant {
     #[cold]
     #[inline(never)]
     fn is_first(number: u32) -> bool {
+        if REACHED[number as usize].load(Relaxed) {
+            return false;
+        }
         let file = std::env::var("SONARFIX_REACHED");
         if ACTIVE.load(Relaxed) == UNKNOWN {
             let active = std::env::var("SONARFIX_MUTANT").ok().and_then(|text| text.parse().ok());
