@@ -3,6 +3,7 @@
 mod baked;
 mod consistency;
 mod kidnapped;
+mod motors;
 mod oracle;
 mod pil;
 mod pins;

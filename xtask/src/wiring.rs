@@ -98,7 +98,8 @@ fn right(board: &Board) -> Vec<Part<'_>> {
     let pins = &board.pins;
     let [upper, lower] = &board.divider;
     let echo = Row { resistors: [Some(upper), Some(lower)], ..Row::wire("ECHO, 5 V", &pins.echo) };
-    let enable = Row { resistors: [None, Some("10 kΩ")], ..Row::wire("enable", &pins.enable) };
+    let enable =
+        Row { resistors: [None, Some("10 kΩ")], ..Row::wire("enable, STBY, SLP", &pins.enable) };
     vec![
         Part(
             "sonar HC-SR04",
@@ -120,11 +121,14 @@ fn right(board: &Board) -> Vec<Part<'_>> {
         Part(
             "motor driver",
             vec![
+                Row::wire("AIN1", &pins.right_1),
+                Row::wire("AIN2", &pins.right_2),
+                Row::wire("BIN1", &pins.left_1),
+                Row::wire("BIN2", &pins.left_2),
                 enable,
-                Row::text("inputs: your motor control"),
-                Row::text("VM: cells, VCC: 3.3 V"),
-                Row::text("GND"),
-                Row::text("outputs: the motors"),
+                Row::text("VM: cells, GND"),
+                Row::text("TB6612FNG: VCC, PWMA,"),
+                Row::text("PWMB to 3.3 V"),
             ],
         ),
     ]
@@ -142,9 +146,9 @@ fn supply(board: &Board) -> [String; 4] {
 
 /// The lines of the box of the motors.
 const MOTORS: [&str; 3] = [
-    "right motor: outputs A of the motor driver",
-    "left motor: outputs B of the motor driver",
-    "mounted as mirror images of each other",
+    "right motor: AOUT1, AOUT2 of the motor driver",
+    "left motor: BOUT1, BOUT2",
+    "a wheel turns backwards: swap its motor's wires",
 ];
 
 fn draw(board: &Board) -> String {

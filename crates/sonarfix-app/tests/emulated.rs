@@ -38,6 +38,8 @@ const RAM_AT: u32 = 0x2000_0000;
 /// Memory that the program does not use.
 const CODE_AT: u32 = RAM_AT + 0x1_0000;
 const RAM: usize = 128 * 1_024;
+/// The compare registers of TIM3's four channels, which are the inputs of the motor driver.
+const MOTORS_AT: u32 = 0x4000_0434;
 /// Limit of each wait, by the clock of this computer; the emulator is ended after it as well.
 const TIMEOUT: Duration = Duration::from_secs(100);
 
@@ -476,6 +478,32 @@ fn a_robot_that_waits_shows_that_its_devices_are_missing() {
     for _ in 0..30 {
         assert_eq!(shown(&robot.next()), None, "the loop runs");
     }
+}
+
+/// The motor code runs in the firmware: forwards while the motors are enabled, and neither before nor after. The emulator
+/// has no encoders, so the motors are enabled without them.
+#[test]
+#[ignore = "cargo xtask test-firmware"]
+fn the_motor_code_drives_while_the_motors_are_enabled() {
+    let mut config = configuration();
+    config.motors.dead_encoder = true;
+    let image = baked::write(&config, &mut [0; baked::LENGTH_MAX]).unwrap().to_vec();
+    let mut robot = Robot::switched_on(&map(), &image);
+    robot.hello();
+    let inputs = |robot: &mut Robot| -> Vec<u32> {
+        let bytes = robot.memory(MOTORS_AT, 16);
+        bytes.as_chunks().0.iter().map(|word| u32::from_le_bytes(*word)).collect()
+    };
+    assert_eq!(inputs(&mut robot), [0; 4], "it waits");
+    assert_eq!(robot.order(&Command::SetPose(pose())), CommandResult::Done);
+    assert_eq!(robot.order(&Command::Start), CommandResult::Done);
+    robot.loop_status();
+    assert_eq!(robot.may_drive(), Some(true));
+    // Four tenths of the 800 counts of a period at 16 MHz, on the inputs that drive forwards.
+    assert_eq!(inputs(&mut robot), [320, 0, 320, 0]);
+    assert_eq!(robot.order(&Command::Stop), CommandResult::Done);
+    robot.loop_status();
+    assert_eq!((robot.may_drive(), inputs(&mut robot)), (Some(false), vec![0; 4]));
 }
 
 /// Checks the deepest stack against the bound of `cargo xtask stack`. The stack lies below everything else

@@ -8,6 +8,7 @@
 //! | PCNT, units 0 and 1 | right and left encoder, every edge | 18 19, 20 21 |
 //! | MCPWM0, capture timer | the stamps of the echo's edges, 1 µs | 2 |
 //! | MCPWM0, timer 0, operator 0 | the servo's pulses, 1 µs | 22 |
+//! | MCPWM0, timer 1, operators 1 and 2 | the inputs of the motor driver, right and left motor, 20 kHz | 6 7, 10 11 |
 //! | system timer | the clock, 1 µs | |
 //! | UART0 | the link, 115,200 baud | 16 17 |
 //! | | the sonar's trigger; high while the robot may drive | 23; 3 |
@@ -46,6 +47,7 @@ use sonarfix_hal::encoder::Counter;
 use sonarfix_hal::ranger::{Captured, EchoCapture, PulseRanger, StampedEdges, Stamps};
 use sonarfix_hal::robot::Devices;
 use sonarfix_link::message::ResetCause;
+use sonarfix_motors::{Drive, Pattern};
 use sonarfix_robot::memory;
 use static_cell::ConstStaticCell;
 
@@ -62,6 +64,9 @@ const DRIVE: u32 = 3;
 const GLITCH: u16 = 80;
 /// Divides the MCPWM's clock of 160 MHz: its timers count microseconds.
 const MICROS: u8 = 160 - 1;
+
+/// Counts of a period of the motors' inputs: 20 kHz, above what can be heard.
+const MOTOR_PERIOD: u16 = 50;
 
 /// The edges of the echo, from [`Stamper`].
 static ECHO: EchoCapture = EchoCapture::new();
@@ -249,6 +254,29 @@ fn panicked(info: &core::panic::PanicInfo) -> ! {
 }
 
 type Pulses = PwmPin<'static, MCPWM0<'static>, 0, true>;
+
+/// Both inputs of an H bridge.
+type Bridge<const OPERATOR: u8> = (
+    PwmPin<'static, MCPWM0<'static>, OPERATOR, true>,
+    PwmPin<'static, MCPWM0<'static>, OPERATOR, false>,
+);
+
+/// The inputs of the motor driver. A count of zero keeps its input low, because the end of a pulse comes before its start.
+struct Motors {
+    right: Bridge<1>,
+    left: Bridge<2>,
+}
+
+impl Motors {
+    fn set(&mut self, drive: Drive) {
+        let [right_1, right_2, left_1, left_2] = drive.inputs(MOTOR_PERIOD);
+        self.right.0.set_timestamp(right_1);
+        self.right.1.set_timestamp(right_2);
+        self.left.0.set_timestamp(left_1);
+        self.left.1.set_timestamp(left_2);
+    }
+}
+
 type Hardware =
     Devices<Encoder<0>, Encoder<1>, Pulses, PulseRanger<Output<'static>, Captured<'static>>>;
 
@@ -259,6 +287,9 @@ struct Board {
     stamper: Stamper,
     link: Serial,
     drive: Output<'static>,
+    motors: Motors,
+    /// The example of motor code: your own controller takes its place.
+    pattern: Pattern,
     watchdog: Rtc<'static>,
 }
 
@@ -285,6 +316,16 @@ impl Board {
         let pulses = pwm.operator0.with_pin_a(board.GPIO22, PwmPinConfig::UP_ACTIVE_HIGH);
         let period = 20_000 - 1;
         pwm.timer0.start(clock.timer_clock_with_prescaler(period, PwmWorkingMode::Increase, 0));
+        pwm.operator1.set_timer(&pwm.timer1);
+        pwm.operator2.set_timer(&pwm.timer1);
+        let (a, b) = (PwmPinConfig::UP_ACTIVE_HIGH, PwmPinConfig::UP_ACTIVE_HIGH);
+        let right_motor = pwm.operator1.with_pins(board.GPIO6, a, board.GPIO7, b);
+        let (a, b) = (PwmPinConfig::UP_ACTIVE_HIGH, PwmPinConfig::UP_ACTIVE_HIGH);
+        let left_motor = pwm.operator2.with_pins(board.GPIO10, a, board.GPIO11, b);
+        let mut motors = Motors { right: right_motor, left: left_motor };
+        motors.set(Drive::STOP);
+        let period = MOTOR_PERIOD - 1;
+        pwm.timer1.start(clock.timer_clock_with_prescaler(period, PwmWorkingMode::Increase, 0));
         let stamper = Stamper::new(Input::new(board.GPIO2, InputConfig::default()));
         let trigger = Output::new(board.GPIO23, Level::Low, OutputConfig::default());
         let servo = sonarfix_robot::servo(pulses);
@@ -311,6 +352,8 @@ impl Board {
             stamper,
             link: Serial { uart, to_send: Deque::new() },
             drive,
+            motors,
+            pattern: Pattern::default(),
             watchdog,
         })
     }
@@ -329,6 +372,9 @@ impl Board {
         }
         self.link.transmit();
         log::polled(&polled, self.app.report());
+        // The motor code. The loop waits for it, and the telemetry reports its time as that of the poll.
+        let estimate = sonarfix_robot::estimate(&self.app, &polled);
+        self.motors.set(self.pattern.drive(estimate));
         if let Some(took) = now().checked_duration_since(start) {
             self.app.took(took);
         }

@@ -8,12 +8,14 @@
 //! | PIO0 | right and left encoder, a state machine each | GP2 GP3, GP4 GP5 |
 //! | PIO1 | the stamps of the echo's edges, 1 µs | GP8 |
 //! | PWM slice 3, channel A | the servo's pulses | GP6 |
+//! | PWM slices 5 and 6 | the inputs of the motor driver, right and left motor, 20 kHz | GP10 GP11, GP12 GP13 |
 //! | TIMER0 | the clock, 1 µs, and a poll every millisecond | |
 //! | UART0 | the link, 115,200 baud | GP0 GP1 |
 //! | | the sonar's trigger; high while the robot may drive | GP7; GP9 |
 //!
 //! State machines count the wheels and stamp the edges, however long a poll or a write to flash takes. One executor is
-//! therefore sufficient, and no interrupt but that of the clock.
+//! therefore sufficient, and no interrupt but that of the clock. It runs two tasks in turn: the loop, and after each of its
+//! polls the motor code (`sonarfix-motors`).
 
 #![no_std]
 #![no_main]
@@ -28,7 +30,10 @@ use embassy_rp::pwm::{self, Pwm};
 use embassy_rp::uart::{self, Uart};
 use embassy_rp::watchdog::Watchdog;
 use embassy_rp::{bind_interrupts, pac};
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Timer};
+use embedded_hal::pwm::SetDutyCycle;
 use embedded_hal_02::serial::{Read, Write};
 use heapless::Deque;
 use panic_probe as _;
@@ -37,6 +42,7 @@ use sonarfix_app::store::Store;
 use sonarfix_app::{App, FlashContents, Link, boots, log};
 use sonarfix_hal::ranger::{Captured, EchoCapture, PulseRanger};
 use sonarfix_hal::robot::Devices;
+use sonarfix_motors::{Drive, Estimate, Pattern};
 use sonarfix_robot::memory;
 
 // The other chip has its module beside its memory map.
@@ -63,6 +69,9 @@ type Hardware =
 /// The edges of the echo, from [`Stamper`].
 static ECHO: EchoCapture = EchoCapture::new();
 
+/// The newest estimate, from the loop; `None` while the motors are disabled.
+static ESTIMATE: Signal<CriticalSectionRawMutex, Option<Estimate>> = Signal::new();
+
 bind_interrupts!(struct Interrupts {
     PIO0_IRQ_0 => InterruptHandler<PIO0>;
     PIO1_IRQ_0 => InterruptHandler<PIO1>;
@@ -85,6 +94,39 @@ fn servo_pulses() -> pwm::Config {
     config.divider = clock_divider(2_500_000).into();
     config.top = 50_000 - 1;
     config
+}
+
+/// Counts of a period of the motors' inputs.
+fn motor_period() -> u16 {
+    u16::try_from(embassy_rp::clocks::clk_sys_freq() / 20_000).unwrap_or(u16::MAX)
+}
+
+/// The inputs of the motor driver: 20 kHz, above what can be heard.
+fn motor_pulses() -> pwm::Config {
+    let mut config = pwm::Config::default();
+    config.top = motor_period().saturating_sub(1);
+    config
+}
+
+/// The inputs of the motor driver.
+struct Motors {
+    right: Pwm<'static>,
+    left: Pwm<'static>,
+}
+
+impl Motors {
+    fn set(&mut self, drive: Drive) {
+        // The driver accepts a count less than the period's.
+        let [right_1, right_2, left_1, left_2] = drive.inputs(motor_period().saturating_sub(1));
+        for (pwm, first, second) in
+            [(&mut self.right, right_1, right_2), (&mut self.left, left_1, left_2)]
+        {
+            if let (Some(mut a), Some(mut b)) = pwm.split_by_ref() {
+                // Both are within the period.
+                let _ = (a.set_duty_cycle(first), b.set_duty_cycle(second));
+            }
+        }
+    }
 }
 
 /// The link. The UART's FIFOs of 32 bytes last 2.8 ms, and the loop polls every millisecond: no interrupt is needed.
@@ -149,7 +191,7 @@ impl Board {
     /// Initializes the board; `None` if the memory map has no store.
     // Inlined, its stack frame would remain for the whole runtime.
     #[inline(never)]
-    fn new() -> Option<Self> {
+    fn new() -> Option<(Self, Motors)> {
         let board = embassy_rp::init(embassy_rp::config::Config::default());
         let mut watchdog = Watchdog::new(board.WATCHDOG);
         let reset = reset(&watchdog);
@@ -164,6 +206,11 @@ impl Board {
         let echo = machines::echo(echo_pio, board.PIN_8, clock_divider(5_000_000), QUEUE);
         let stamper = Stamper::start(echo, now());
         let pulses = Pwm::new_output_a(board.PWM_SLICE3, board.PIN_6, servo_pulses());
+        let (slice, pins) = (board.PWM_SLICE5, (board.PIN_10, board.PIN_11));
+        let right_motor = Pwm::new_output_ab(slice, pins.0, pins.1, motor_pulses());
+        let (slice, pins) = (board.PWM_SLICE6, (board.PIN_12, board.PIN_13));
+        let left_motor = Pwm::new_output_ab(slice, pins.0, pins.1, motor_pulses());
+        let motors = Motors { right: right_motor, left: left_motor };
         let trigger = Output::new(board.PIN_7, Level::Low);
         let servo = sonarfix_robot::servo(pulses);
         let ranger = sonarfix_robot::ranger(trigger, &ECHO);
@@ -176,7 +223,7 @@ impl Board {
         let uart = uart::Config::default();
         let uart = Uart::new_blocking(board.UART0, board.PIN_0, board.PIN_1, uart);
         watchdog.start(WATCHDOG);
-        Some(Self {
+        let board = Self {
             app,
             hardware: Devices { right, left, servo, ranger },
             stamper,
@@ -184,7 +231,8 @@ impl Board {
             drive: Output::new(board.PIN_9, Level::Low),
             watchdog,
             next_poll: embassy_time::Instant::now(),
-        })
+        };
+        Some((board, motors))
     }
 
     /// One poll.
@@ -193,6 +241,7 @@ impl Board {
         self.stamper.update(&ECHO, start);
         let polled = self.app.poll(start, &mut self.hardware, &mut self.link);
         self.drive.set_level(polled.may_drive.into());
+        ESTIMATE.signal(sonarfix_robot::estimate(&self.app, &polled));
         if polled.is_on_time {
             self.watchdog.feed(WATCHDOG);
         }
@@ -219,12 +268,26 @@ async fn polls(mut board: Board) -> ! {
     }
 }
 
+/// The motors, after each poll. Your own controller takes the place of the example `Pattern`. The loop waits for it: a task
+/// that computes for long must be divided by `await`.
+#[embassy_executor::task]
+async fn motors(mut motors: Motors) -> ! {
+    let mut pattern = Pattern::default();
+    loop {
+        let estimate = ESTIMATE.wait().await;
+        motors.set(pattern.drive(estimate));
+    }
+}
+
 #[cortex_m_rt::entry]
 fn main() -> ! {
     static mut EXECUTOR: Option<Executor> = None;
     EXECUTOR.get_or_insert_with(Executor::new).run(|spawner| {
-        if let Some(Ok(polls)) = Board::new().map(polls) {
+        if let Some((board, inputs)) = Board::new()
+            && let (Ok(polls), Ok(motors)) = (polls(board), motors(inputs))
+        {
             spawner.spawn(polls);
+            spawner.spawn(motors);
         } else {
             defmt::error!("the memory map has no store");
         }

@@ -9,11 +9,13 @@
 pub mod memory;
 
 use embedded_hal::digital::OutputPin;
+use embedded_storage::nor_flash::NorFlash;
 use sonarfix::units::Duration;
-use sonarfix_app::Board;
+use sonarfix_app::{App, Board, Polled};
 use sonarfix_hal::ranger::{Captured, EchoCapture, PulseRanger};
 use sonarfix_hal::servo::{PwmFrame, Servo};
 use sonarfix_link::message::ResetCause;
+use sonarfix_motors::Estimate;
 
 /// The pulses of the boards' servo channels: 50 Hz, and the widths that hobby servos accept without running against
 /// their stops (0.5 to 2.5 ms by their datasheets).
@@ -40,6 +42,12 @@ pub fn ranger<T: OutputPin>(
     echo: &'static EchoCapture,
 ) -> PulseRanger<T, Captured<'static>> {
     PulseRanger::new(trigger, Captured::new(echo))
+}
+
+/// The estimate for the motor code; `None` while the motors are disabled.
+pub fn estimate<F: NorFlash>(app: &App<F>, polled: &Polled) -> Option<Estimate> {
+    let localizer = app.localizer().filter(|_| polled.may_drive)?;
+    Some(Estimate { pose: localizer.pose(), verdict: localizer.health().verdict })
 }
 
 fn version() -> [u8; 3] {

@@ -9,12 +9,13 @@
 //! | TIM10 | the servo's pulses | PB8 |
 //! | TIM5 | the clock, 1 µs in 32 bits, and the stamps of the echo's edges | PA0 |
 //! | TIM2 | a poll every millisecond | |
+//! | TIM3 | the inputs of the motor driver, right and left motor, 20 kHz | PA6 PA7, PB0 PB1 |
 //! | USART2 | the link, 115,200 baud | PA2 PA3 |
 //! | | the sonar's trigger; high while the robot may drive | PA1; PB7 |
 //!
 //! RTIC gives each interrupt exclusive access to its peripherals and queues. Only lock-free queues and the stamps of the
 //! echo are shared, so that no interrupt waits for another. The loop is RTIC's idle task: however long it takes,
-//! hardware stamps the edges, and an interrupt receives the bytes.
+//! hardware stamps the edges, and an interrupt receives the bytes. After each poll it runs the motor code (`sonarfix-motors`).
 
 #![no_std]
 #![no_main]
@@ -31,6 +32,7 @@ use panic_probe as _;
 use sonarfix_app::Link;
 use sonarfix_hal::encoder::Counter;
 use sonarfix_hal::ranger::EchoCapture;
+use sonarfix_motors::Drive;
 use sonarfix_robot::memory;
 use stm32f4xx_hal::pac::{self, tim1};
 use stm32f4xx_hal::rcc;
@@ -119,6 +121,45 @@ impl SetDutyCycle for ServoPwm {
     fn set_duty_cycle(&mut self, duty: u16) -> Result<(), NotThere> {
         self.0.ccr1().write(|w| w.ccr().set(duty));
         if self.0.cr1().read().cen().bit_is_set() { Ok(()) } else { Err(NotThere) }
+    }
+}
+
+/// TIM3's four channels: the inputs of the motor driver.
+struct MotorPwm {
+    timer: pac::TIM3,
+    /// Counts of a period.
+    full: u16,
+}
+
+impl MotorPwm {
+    /// Periods a second: above what can be heard.
+    const FREQUENCY: u32 = 20_000;
+
+    fn new(timer: pac::TIM3, clock: fugit::HertzU32) -> Self {
+        let full = u16::try_from(clock.to_Hz() / Self::FREQUENCY).unwrap_or(u16::MAX);
+        timer.arr().write(|w| w.arr().set(full.saturating_sub(1)));
+        timer.ccmr1_output().write(|w| {
+            w.oc1m().pwm_mode1().oc1pe().set_bit();
+            w.oc2m().pwm_mode1().oc2pe().set_bit()
+        });
+        timer.ccmr2_output().write(|w| {
+            w.oc3m().pwm_mode1().oc3pe().set_bit();
+            w.oc4m().pwm_mode1().oc4pe().set_bit()
+        });
+        timer
+            .ccer()
+            .write(|w| w.cc1e().set_bit().cc2e().set_bit().cc3e().set_bit().cc4e().set_bit());
+        timer.egr().write(|w| w.ug().set_bit());
+        timer.cr1().write(|w| w.cen().set_bit());
+        Self { timer, full }
+    }
+
+    fn set(&mut self, drive: Drive) {
+        let [right_1, right_2, left_1, left_2] = drive.inputs(self.full);
+        self.timer.ccr1().write(|w| w.ccr().set(right_1));
+        self.timer.ccr2().write(|w| w.ccr().set(right_2));
+        self.timer.ccr3().write(|w| w.ccr().set(left_1));
+        self.timer.ccr4().write(|w| w.ccr().set(left_2));
     }
 }
 
@@ -318,16 +359,17 @@ mod app {
     use sonarfix_hal::ranger::{Captured, PulseRanger};
     use sonarfix_hal::robot::Devices;
     use sonarfix_link::message::ResetCause;
+    use sonarfix_motors::Pattern;
     use sonarfix_robot::memory;
     use stm32f4xx_hal::gpio::{GpioExt, Output, Pin};
     use stm32f4xx_hal::hal_02::serial::{Read, Write};
-    use stm32f4xx_hal::pac::{self, PWR, RTC, TIM1, TIM2, TIM5, TIM8, TIM10, USART2};
+    use stm32f4xx_hal::pac::{self, PWR, RTC, TIM1, TIM2, TIM3, TIM5, TIM8, TIM10, USART2};
     use stm32f4xx_hal::rcc::{Enable, RccExt};
     use stm32f4xx_hal::serial::{self, Rx, RxListen, SerialExt, Tx, TxISR, TxListen};
     use stm32f4xx_hal::time::Bps;
     use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
-    use super::{ECHO, Encoder, Received, Sectors, ServoPwm, ToSend, Uart, microseconds};
+    use super::{ECHO, Encoder, MotorPwm, Received, Sectors, ServoPwm, ToSend, Uart, microseconds};
 
     /// The poll period, µs.
     const POLL: u32 = 1_000;
@@ -355,6 +397,7 @@ mod app {
         watchdog: IndependentWatchdog,
         backup: RTC,
         poll_timer: TIM2,
+        motors: MotorPwm,
         rx: (Rx<USART2>, Producer<'static, u8>),
         tx: (Tx<USART2>, Consumer<'static, u8>),
     }
@@ -370,16 +413,19 @@ mod app {
         let mut rcc = board.RCC.freeze(super::clocks());
         TIM1::enable(&mut rcc);
         TIM2::enable(&mut rcc);
+        TIM3::enable(&mut rcc);
         TIM5::enable(&mut rcc);
         TIM8::enable(&mut rcc);
         TIM10::enable(&mut rcc);
         let a = board.GPIOA.split(&mut rcc);
         let b = board.GPIOB.split(&mut rcc);
         let c = board.GPIOC.split(&mut rcc);
-        // The pins of encoders, echo and servo belong to the timers from here on.
+        // The pins of encoders, echo, servo and motors belong to the timers from here on.
         let _ = (a.pa8.into_alternate::<1>(), a.pa9.into_alternate::<1>());
         let _ = (c.pc6.into_alternate::<3>(), c.pc7.into_alternate::<3>());
         let _ = (a.pa0.into_alternate::<2>(), b.pb8.into_alternate::<3>());
+        let _ = (a.pa6.into_alternate::<2>(), a.pa7.into_alternate::<2>());
+        let _ = (b.pb0.into_alternate::<2>(), b.pb1.into_alternate::<2>());
         let timer_clock = rcc.clocks.timclk1();
         start_clock(&board.TIM5, microseconds(timer_clock));
         start_polls(&board.TIM2, microseconds(timer_clock));
@@ -420,6 +466,7 @@ mod app {
             watchdog,
             backup: board.RTC,
             poll_timer: board.TIM2,
+            motors: MotorPwm::new(board.TIM3, timer_clock),
             rx: (rx, received),
             tx: (tx, outgoing),
         };
@@ -427,12 +474,13 @@ mod app {
     }
 
     /// Polls at every interrupt of TIM2.
-    #[idle(shared = [clock], local = [app, hardware, link, drive, watchdog, backup])]
+    #[idle(shared = [clock], local = [app, hardware, link, drive, watchdog, backup, motors])]
     #[inline(never)]
     fn idle(mut context: idle::Context) -> ! {
-        let idle::LocalResources { app, hardware, link, drive, watchdog, backup, .. } =
+        let idle::LocalResources { app, hardware, link, drive, watchdog, backup, motors, .. } =
             context.local;
         let mut now = Instant::from_ticks(0);
+        let mut pattern = Pattern::default();
         loop {
             rtic::export::wfi();
             now = context.shared.clock.lock(|clock| advanced(now, clock.cnt().read().bits()));
@@ -445,6 +493,9 @@ mod app {
                 watchdog.feed();
             }
             log::polled(&polled, app.report());
+            // The motor code: your own controller takes the place of the example. The loop waits for it, and the telemetry
+            // reports its time as that of the poll.
+            motors.set(pattern.drive(sonarfix_robot::estimate(app, &polled)));
             let mut clock =
                 || context.shared.clock.lock(|clock| advanced(now, clock.cnt().read().bits()));
             if let Some(took) = clock().checked_duration_since(now) {

@@ -64,6 +64,14 @@ pub struct Pins {
     pub echo: String,
     /// Enable of the motor driver.
     pub enable: String,
+    /// First input of the motor driver for the right motor: forwards.
+    pub right_1: String,
+    /// Second input of the motor driver for the right motor: backwards.
+    pub right_2: String,
+    /// First input of the motor driver for the left motor: forwards.
+    pub left_1: String,
+    /// Second input of the motor driver for the left motor: backwards.
+    pub left_2: String,
     /// The link, from the board.
     pub tx: String,
     /// The link, to the board.

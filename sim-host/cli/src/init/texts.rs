@@ -65,6 +65,10 @@ fn replacements(answers: &Answers) -> anyhow::Result<Vec<(&'static str, String)>
         ("trigger", pins.trigger.clone()),
         ("echo", pins.echo.clone()),
         ("enable", pins.enable.clone()),
+        ("right_1", pins.right_1.clone()),
+        ("right_2", pins.right_2.clone()),
+        ("left_1", pins.left_1.clone()),
+        ("left_2", pins.left_2.clone()),
         ("tx", pins.tx.clone()),
         ("rx", pins.rx.clone()),
         ("sonar", answers.sonar.file_name().to_owned()),
@@ -86,11 +90,13 @@ fn usb(answers: &Answers, config: &str, map: &str) -> String {
     if !board.usb {
         return String::new();
     }
-    let program = format!("target/{}/release/{}", board.target, board.package);
+    let program = format!("firmware/target/{}/release/{}", board.target, board.package);
     format!(
-        "\nWithout a probe, over USB: hold `BOOTSEL` while plugging the board in, then\n\n```sh\ncargo build --release --package {} \
-         --target {}\npicotool load -t bin -o {config} config.bin\npicotool load -t bin -o {map} map.bin\n\
-         picotool load -x -t elf {program}\n```\n",
+        "\nWithout a probe, over USB: build the program in the folder `firmware` of the repository (`rustup` and `flip-link` as above),\n\n\
+         ```sh\ncargo build --release --package {} --target {}\n```\n\nhold `BOOTSEL` while plugging the board in, bake the two \
+         files as above, and write everything from this folder, with the path of the\nrepository in place of \
+         `../sonarfix`:\n\n```sh\npicotool load -t bin -o {config} config.bin\npicotool load -t bin -o {map} map.bin\n\
+         picotool load -x -t elf ../sonarfix/{program}\n```\n",
         board.package, board.target
     )
 }

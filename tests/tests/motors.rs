@@ -1,0 +1,94 @@
+//! The example of motor code, which the boards run, on a robot with unequal motors.
+
+use sonarfix::health::Verdict;
+use sonarfix::pose::Pose;
+use sonarfix::units::Radians;
+use sonarfix_motors::{Drive, Estimate, Pattern};
+
+/// Wheel speed at the full voltage, m/s, and track width, m.
+const FULL_SPEED: f32 = 0.5;
+const TRACK_WIDTH: f32 = 0.16;
+
+/// A robot without inertia, and the strengths of its motors.
+struct Robot {
+    pose: Pose,
+    strengths: [f32; 2],
+}
+
+impl Robot {
+    /// Drives for a millisecond.
+    fn drive(&mut self, drive: Drive) {
+        let [right, left] = self.strengths;
+        let (right, left) = (drive.right * right * FULL_SPEED, drive.left * left * FULL_SPEED);
+        let (turn, length) = (0.001 * (right - left) / TRACK_WIDTH, 0.0005 * (right + left));
+        let heading = self.pose.heading.turned(Radians(turn));
+        let (sin, cos) = heading.radians().0.sin_cos();
+        self.pose = Pose::new(
+            self.pose.x.0 + length * cos,
+            self.pose.y.0 + length * sin,
+            heading.radians(),
+        );
+    }
+}
+
+fn tracking(pose: Pose) -> Estimate {
+    Estimate { pose, verdict: Verdict::Tracking }
+}
+
+/// For any start and motors that differ by a fifth, the robot goes to and fro on its line.
+#[test]
+fn the_motor_pattern_stays_on_its_line() {
+    for degrees in [0.0_f32, 90.0, 179.9, -135.0] {
+        for strengths in [[1.0, 1.0], [1.1, 0.9], [0.9, 1.1]] {
+            let heading = degrees.to_radians();
+            let start = Pose::new(1.0, -2.0, Radians(heading));
+            let mut robot = Robot { pose: start, strengths };
+            let mut pattern = Pattern::default();
+            let (mut ends, mut was_ahead) = (0, true);
+            for _ in 0..30_000 {
+                let drive = pattern.drive(Some(tracking(robot.pose)));
+                assert!(drive.right.abs().max(drive.left.abs()) < 0.6, "{drive:?}");
+                let is_ahead = drive.right + drive.left > 0.0;
+                ends += i32::from(is_ahead != was_ahead);
+                was_ahead = is_ahead;
+                robot.drive(drive);
+                let (x, y) = (robot.pose.x.0 - 1.0, robot.pose.y.0 + 2.0);
+                let (sin, cos) = heading.sin_cos();
+                let (along, aside) = (x * cos + y * sin, y * cos - x * sin);
+                let name = format!("{degrees}°, {strengths:?}: {along} m, {aside} m");
+                assert!((-0.01..Pattern::LENGTH + 0.01).contains(&along), "{name}");
+                assert!(aside.abs() < 0.04, "{name}");
+            }
+            // 30 s at 0.2 m/s: twelve lengths.
+            assert!((10..=12).contains(&ends), "{degrees}°, {strengths:?}: {ends} ends");
+        }
+    }
+}
+
+/// A robot that is disabled or lost stands still; a pose set elsewhere begins another line.
+#[test]
+fn the_motor_pattern_stops_without_an_estimate() {
+    let mut pattern = Pattern::default();
+    let pose = Pose::new(1.0, 1.0, Radians(0.5));
+    let ahead = pattern.drive(Some(tracking(pose)));
+    assert!(ahead.right > 0.0 && ahead.left > 0.0, "{ahead:?}");
+    assert_eq!(pattern.drive(None), Drive::STOP);
+    let lost = Estimate { pose, verdict: Verdict::Lost };
+    assert_eq!(pattern.drive(Some(lost)), Drive::STOP);
+    assert_eq!(pattern.drive(Some(tracking(pose))), ahead);
+    let elsewhere = Pose::new(5.0, 1.0, Radians(2.0));
+    assert_eq!(pattern.drive(Some(tracking(elsewhere))), Drive::STOP);
+    assert_eq!(pattern.drive(Some(tracking(elsewhere))), ahead);
+}
+
+/// One input of each bridge carries the pulses, the other one is low.
+#[test]
+fn the_inputs_of_the_motor_driver_have_the_sign_of_the_voltage() {
+    let inputs = |right, left| Drive { right, left }.inputs(800);
+    assert_eq!(inputs(0.5, -0.25), [400, 0, 0, 200]);
+    assert_eq!(inputs(-1.0, 1.0), [0, 800, 800, 0]);
+    assert_eq!(inputs(7.0, -7.0), [800, 0, 0, 800]);
+    assert_eq!(inputs(f32::NAN, -f32::NAN), [0; 4]);
+    assert_eq!(Drive::STOP.inputs(u16::MAX), [0; 4]);
+    assert_eq!(Drive { right: 9.0, left: f32::INFINITY }.inputs(u16::MAX), [65_535, 0, 65_535, 0]);
+}
