@@ -74,6 +74,12 @@ impl World {
         &self.walls
     }
 
+    /// The points where walls meet or end.
+    #[must_use]
+    pub fn vertices(&self) -> &[Vertex] {
+        &self.vertices
+    }
+
     /// The unmapped obstacles.
     #[must_use]
     pub fn obstacles(&self) -> &[Obstacle] {

@@ -18,7 +18,8 @@ pub enum Kind {
 }
 
 impl Kind {
-    pub(super) const ALL: [Self; 3] = [Self::Home, Self::Office, Self::Lab];
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Home, Self::Office, Self::Lab];
 
     /// Its name.
     #[must_use]
