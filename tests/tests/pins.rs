@@ -102,17 +102,20 @@ fn twenty_minutes_take_less_than_half_a_second() {
     assert!(start.elapsed().as_secs_f64() < 0.5, "{:?}", start.elapsed());
 }
 
-/// The classroom, with fewer seeds than `sonarfix run`: no run lost, position RMS below 30 mm, the
-/// filter consistent.
+/// 200 runs of the classroom, on other seeds than the settings were chosen on: the position RMS is within 8 mm, no run is
+/// lost or called so, none is more than 10 cm off with the verdict `Tracking`, and the filter is consistent.
+/// 10,000 runs are a command (`docs/schedule.md`).
 #[test]
 fn the_classroom_is_crossed() {
-    const RUNS: u32 = 25;
-    let summary = summary(scenario(CLASSROOM), RUNS);
+    const RUNS: u32 = 200;
+    let simulation = Simulation::new(scenario(CLASSROOM));
+    let summary = Summary::of(&monte_carlo::results(&simulation, 200_000, RUNS, &|| ()).unwrap());
     let position = summary.rms_path.x.hypot(summary.rms_path.y);
-    assert_eq!(summary.lost_runs, 0);
+    assert_eq!((summary.lost_runs, summary.called_lost), (0, 0));
+    assert!(summary.undetected_error < 0.05, "{}", summary.undetected_error);
     // The robot file claims the noise that there is.
     assert!((0.8..1.2).contains(&summary.nis_mean), "{}", summary.nis_mean);
-    assert!(position < 0.030, "{position}");
+    assert!(position < 0.008, "{position}");
     // Seven states: deviation √14 of each run's NEES.
     let sampling = (14.0 / f64::from(RUNS)).sqrt();
     assert!((summary.nees_mean - 7.0).abs() < 4.0 * sampling, "{}", summary.nees_mean);

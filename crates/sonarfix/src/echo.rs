@@ -493,6 +493,24 @@ mod tests {
             prop_assert!(found.evidence >= -1.205 && found.evidence <= MAX_EVIDENCE);
         }
 
+        /// Without clutter an echo within two deviations is the wall's but for the bound of `docs/model.md`, "Echo
+        /// model"; below 0.001 the correction is that of certainty, bit for bit.
+        #[test]
+        fn without_clutter_an_echo_is_the_walls_within_its_bound(
+            expected in any_expectation(), deviations in -2.0_f32..2.0,
+        ) {
+            let expected = ExpectedEcho { occluded: 0.0, ..expected };
+            let sigma = sqrt(expected.variance.0);
+            let echo = Metres(expected.range.0 + deviations * sigma);
+            let found = expected.explain(&EchoParameters::NONE, Some(echo), Others::NONE);
+            let geometry = f64::from(expected.geometry);
+            let bound = (1.0 - geometry) / geometry * 10.91 * f64::from(sigma) / 3.9;
+            prop_assert!(1.0 - f64::from(found.association) <= bound + 1e-6, "{found:?} {bound}");
+            if bound < 0.000_99 {
+                prop_assert_eq!(crate::gating::weight(found.association).to_bits(), 1.0_f32.to_bits());
+            }
+        }
+
         /// The information of repeated ranges: n of them with correlation ρ hold as much as the batch.
         #[test]
         fn map_variance_is_that_of_a_correlated_sequence(spacing in 0.05_f32..5.0) {
