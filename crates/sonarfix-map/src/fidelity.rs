@@ -1,7 +1,7 @@
 //! The fidelity of a simulation, and the simulated hardware.
 
 use crate::document::{Node, Table};
-use crate::quantity::LENGTH;
+use crate::quantity::{ANGLE, LENGTH, TIME};
 use crate::sonar_model::{self, SonarName};
 
 /// The part of the robot that is simulated between world and localizer.
@@ -51,6 +51,23 @@ impl Default for Upset {
     }
 }
 
+/// Slips of one wheel at random times, which turn the odometry and not the robot.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeadingSlip {
+    /// Mean time between two, seconds; infinite for none.
+    pub every: f64,
+    /// Least turn of the odometry by one slip, radians; either wheel slips.
+    pub least: f64,
+    /// Greatest turn, radians.
+    pub most: f64,
+}
+
+impl Default for HeadingSlip {
+    fn default() -> Self {
+        Self { every: f64::INFINITY, least: 0.0, most: 0.0 }
+    }
+}
+
 /// Disturbances of the wheels.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Upsets {
@@ -58,6 +75,8 @@ pub struct Upsets {
     pub slip: Upset,
     /// A wheel rolls over something.
     pub bump: Upset,
+    /// A wheel spins so far that the odometry turns.
+    pub heading_slip: HeadingSlip,
 }
 
 /// The hardware of a scenario.
@@ -93,7 +112,25 @@ pub(crate) fn read_hardware(root: &Table<'_>) -> Hardware {
 }
 
 pub(crate) fn read_upsets(truth: &Table<'_>) -> Upsets {
-    Upsets { slip: upset(truth, "slip"), bump: upset(truth, "bump") }
+    Upsets {
+        slip: upset(truth, "slip"),
+        bump: upset(truth, "bump"),
+        heading_slip: truth.get("heading_slip").map_or_else(HeadingSlip::default, heading_slip),
+    }
+}
+
+fn heading_slip(node: Node<'_>) -> HeadingSlip {
+    let table = node.table(&["every", "least", "most"]);
+    let every_node = table.require("every");
+    let every = every_node.quantity(&TIME);
+    let least = table.require("least").deviation(&ANGLE);
+    let most_node = table.require("most");
+    let most = most_node.deviation(&ANGLE);
+    HeadingSlip {
+        every: every_node.check(every, every > 0.0, "positive"),
+        least,
+        most: most_node.check(most, most >= least, "at least the value of least"),
+    }
 }
 
 fn upset(truth: &Table<'_>, key: &str) -> Upset {

@@ -61,6 +61,17 @@ pub(crate) const TURN_RATE: Dimension = Dimension {
     units: &[unit("deg/s", HALF_TURN, 180.0), unit("rad/s", 1.0, 1.0)],
 };
 
+/// Density of the noise of a turn rate: the angle after one second.
+pub(crate) const ANGLE_WALK: Dimension = Dimension {
+    name: "an angle per square root of the time",
+    units: &[unit("deg/sqrt(s)", HALF_TURN, 180.0), unit("rad/sqrt(s)", 1.0, 1.0)],
+};
+
+pub(crate) const TURN_RATE_WALK: Dimension = Dimension {
+    name: "a turn rate per square root of the time",
+    units: &[unit("deg/s/sqrt(s)", HALF_TURN, 180.0), unit("rad/s/sqrt(s)", 1.0, 1.0)],
+};
+
 pub(crate) const FRACTION: Dimension =
     Dimension { name: "a fraction", units: &[unit("%", 1.0, 100.0)] };
 

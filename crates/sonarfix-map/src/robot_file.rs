@@ -22,10 +22,20 @@ use crate::quantity::{
     ANGLE, Dimension, LENGTH, LENGTH_PER_LENGTH, LENGTH_WALK, SCALE_WALK, SPEED,
 };
 use crate::spelling::alternatives;
-use crate::{file, ranger_file, single, sonar_model};
+use crate::{file, gyro_file, ranger_file, single, sonar_model};
 
-const KEYS: [&str; 9] =
-    ["start", "start_region", "drive", "sonar", "prior", "gating", "echo", "schedule", "motors"];
+const KEYS: [&str; 10] = [
+    "start",
+    "start_region",
+    "drive",
+    "sonar",
+    "prior",
+    "gating",
+    "echo",
+    "schedule",
+    "motors",
+    "gyro",
+];
 
 const DRIVE_KEYS: [&str; 8] = [
     "track_width",
@@ -99,6 +109,7 @@ fn from_table(robot: &Table<'_>) -> RobotConfig {
     read_gating(robot, &mut localizer.gating);
     read_echo(robot, &mut localizer.echo);
     read_schedule(robot, &mut localizer);
+    localizer.gyro = gyro_file::read(robot);
     let config = RobotConfig {
         localizer,
         right_wheel: read_wheel(drive.require("right_wheel")),

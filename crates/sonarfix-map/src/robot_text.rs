@@ -2,6 +2,7 @@
 
 use sonarfix::aim::Policy;
 use sonarfix::config::PingSchedule;
+use sonarfix::gyro::GyroParameters;
 use sonarfix::pose::Point;
 use sonarfix::search::Region;
 use sonarfix::units::{Duration, Radians};
@@ -12,7 +13,8 @@ use sonarfix_hal::servo::MeasuredPulse;
 /// Writes the robot file of a configuration.
 #[must_use]
 pub fn text(config: &RobotConfig) -> String {
-    let tables = [drive(config), sonar(config), estimation(config), motors(&config.motors)];
+    let gyro = config.localizer.gyro.as_ref().map(gyro).unwrap_or_default();
+    let tables = [drive(config), sonar(config), estimation(config), motors(&config.motors), gyro];
     format!("format = 1\n{}{}", start(config.start), tables.concat())
 }
 
@@ -24,6 +26,29 @@ fn start(start: StartPose) -> String {
         format!("start_region = {{ from = {}, to = {} }}\n", corner(from), corner(to))
     });
     format!("start = \"unknown\"\n{}", region.unwrap_or_default())
+}
+
+fn gyro(gyro: &GyroParameters) -> String {
+    format!(
+        r#"
+[gyro]
+sensor = "mpu6050"
+range = "{} rad/s"
+noise = "{} rad/sqrt(s)"
+bias = "{} rad/s"
+bias_walk = "{} rad/s/sqrt(s)"
+scale = {}
+period = "{}"
+inverted = {}
+"#,
+        gyro.range.0,
+        gyro.noise.0.0,
+        gyro.bias.0,
+        gyro.bias_walk.0.0,
+        gyro.scale,
+        time(gyro.period),
+        gyro.is_inverted,
+    )
 }
 
 fn drive(config: &RobotConfig) -> String {

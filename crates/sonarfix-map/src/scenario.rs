@@ -40,7 +40,7 @@ pub const KEYS: [&str; 13] = [
 const PATH_KEYS: [&str; 8] =
     ["unit", "start", "corners", "laps", "speed", "turn_rate", "clearance", "follow"];
 
-const TRUTH_KEYS: [&str; 12] = [
+const TRUTH_KEYS: [&str; 14] = [
     "track_width",
     "scale_right",
     "scale_left",
@@ -53,6 +53,8 @@ const TRUTH_KEYS: [&str; 12] = [
     "cone",
     "slip",
     "bump",
+    "heading_slip",
+    "gyro",
 ];
 
 /// The initial standard deviations of the filter.
@@ -103,6 +105,17 @@ pub struct Truth {
     pub range_noise_per_metre: f64,
     /// Half of the sonar's cone, radians.
     pub cone: f64,
+    /// The gyro; without effect on a robot that has none.
+    pub gyro: GyroTruth,
+}
+
+/// The true parameters of a gyro.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct GyroTruth {
+    /// Bias at the start, rad/s; drawn with the deviation that the robot assumes if there is none.
+    pub bias: Option<f64>,
+    /// Scale error, dimensionless.
+    pub scale: f64,
 }
 
 /// The number of runs of the scenario.
@@ -354,6 +367,16 @@ fn read_truth(table: &Table<'_>) -> Truth {
         range_noise: deviation(table, "range_noise", &LENGTH),
         range_noise_per_metre: deviation(table, "range_noise_per_metre", &LENGTH_PER_LENGTH),
         cone: cone_node.check(cone, narrow, "between 0 and 90° (half of the cone)"),
+        gyro: table.get("gyro").map_or_else(GyroTruth::default, read_gyro),
+    }
+}
+
+/// The true noise and random walk are those that the robot assumes.
+fn read_gyro(node: Node<'_>) -> GyroTruth {
+    let table = node.table(&["bias", "scale"]);
+    GyroTruth {
+        bias: table.get("bias").map(|node| node.quantity(&TURN_RATE)),
+        scale: table.get("scale").map_or(0.0, |node| node.fraction()),
     }
 }
 

@@ -9,7 +9,7 @@ use sonarfix::pose::Point;
 use sonarfix::range::RangeNoise;
 use sonarfix::units::{Duration, Metres, MetresPerSecond, PerRootMetre, Radians};
 use sonarfix_map::robot_file::INSTANT_SERVO;
-use sonarfix_map::{FileError, Movement, PAPER, PathPose, Run, Scenario, Start, Truth};
+use sonarfix_map::{FileError, GyroTruth, Movement, PAPER, PathPose, Run, Scenario, Start, Truth};
 
 fn paper() -> Result<Scenario, FileError> {
     Scenario::parse(PAPER, "paper.toml", std::path::Path::new(""))
@@ -137,6 +137,7 @@ fn start_truth_and_runs_are_those_of_the_paper() {
         range_noise: 0.0024,
         range_noise_per_metre: 0.0,
         cone: PI / 12.0,
+        gyro: GyroTruth::default(),
     };
     assert_eq!(paper.truth, truth);
     assert_eq!(paper.run, Run { runs: 50, seed: 0 });

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use sonarfix::aim::{Aim, NoAim};
 use sonarfix::ekf::{STATES, StateEstimate};
+use sonarfix::gyro::MeasuredTurn;
 use sonarfix::health::Health;
 use sonarfix::localizer::{Fix, Localizer, OdometryError, Start};
 use sonarfix::motion::WheelTravel;
@@ -18,8 +19,8 @@ use crate::wires::{Actuators, Sensors};
 pub enum Request<'a> {
     /// Begins a session with a baked map.
     Begin(Begin, &'a [u8]),
-    /// Localizer session: wheel travel.
-    Odometry(Instant, WheelTravel),
+    /// Localizer session: wheel travel, and the turn by the gyro.
+    Odometry(Instant, WheelTravel, Option<MeasuredTurn>),
     /// Localizer session: the bearing of the next ping.
     Aim,
     /// Localizer session: the range at the last aim; none without an echo.

@@ -123,9 +123,9 @@ fn call(
     meter: &mut impl Meter,
 ) -> (Answer, u32) {
     match *request {
-        Request::Odometry(at, travel) => {
+        Request::Odometry(at, travel, turn) => {
             let mut result = Ok(());
-            let cost = meter.measure(|| result = localizer.odometry(at, travel));
+            let cost = meter.measure(|| result = localizer.odometry_with_turn(at, travel, turn));
             (Answer::Odometry(result, Snapshot::of(localizer)), cost)
         }
         Request::Aim => {

@@ -123,7 +123,7 @@ fn a_localizer_is_driven_by_messages() {
     let map = map();
     let answers = asked(&[
         Request::Begin(begin(SessionKind::Localizer), &map),
-        Request::Odometry(Instant::from_ticks(100_000), WheelTravel::new(0.02, 0.02)),
+        Request::Odometry(Instant::from_ticks(100_000), WheelTravel::new(0.02, 0.02), None),
         Request::Aim,
         Request::Fix(Some(Metres(1.0))),
         Request::SkipPing,

@@ -8,6 +8,7 @@
 //! [`Localizer::new`](crate::localizer::Localizer::new) calls it.
 
 use crate::echo::EchoParameters;
+use crate::gyro::GyroParameters;
 use crate::motion::Drive;
 use crate::pose::Point;
 use crate::range::RangeNoise;
@@ -238,6 +239,8 @@ pub struct Config {
     pub policy: Policy,
     /// Weights of other states than the position.
     pub weights: Weights,
+    /// The gyro, if the robot has one.
+    pub gyro: Option<GyroParameters>,
 }
 
 /// A field that [`Config::check`] refused, and its rule.
@@ -303,6 +306,7 @@ impl Config {
             echo: EchoParameters::default(),
             policy: Policy::Informative,
             weights: Weights::default(),
+            gyro: None,
         }
     }
 
@@ -327,7 +331,22 @@ impl Config {
         not_negative("weights.heading", self.weights.heading.0)?;
         not_negative("weights.wheels", self.weights.wheels.0)?;
         self.check_gating()?;
-        self.check_echo()
+        self.check_echo()?;
+        self.check_gyro()
+    }
+
+    fn check_gyro(&self) -> Result<(), ConfigError> {
+        let Some(gyro) = &self.gyro else {
+            return Ok(());
+        };
+        positive("gyro.range", gyro.range.0)?;
+        positive("gyro.noise", gyro.noise.0.0)?;
+        positive("gyro.bias", gyro.bias.0)?;
+        not_negative("gyro.bias_walk", gyro.bias_walk.0.0)?;
+        let known = gyro.scale >= 0.0 && gyro.scale <= 0.5;
+        require("gyro.scale", known, "between 0 and 50 %")?;
+        let period = gyro.period.ticks();
+        require("gyro.period", (1_000..=50_000).contains(&period), "between 1 ms and 50 ms")
     }
 
     fn check_gating(&self) -> Result<(), ConfigError> {

@@ -16,17 +16,20 @@
 //! | `propagation` | eqs. (5) and (10): P ← F P Fᵀ + Q |
 //! | `projection` | P Hᵀ and H P Hᵀ, eq. (14) |
 //! | `correction` | eqs. (6) and (18) to (20): gain, state and covariance |
+//! | `bias` | bias of a gyro beside P, eqs. (37) and (38) |
 //!
 //! # Non-finite policy
 //! No value is refused here, except by [`Covariance::correct`]: it reports derivatives that are NaN
 //! or too large before it changes anything. Whether a result is valid is decided by its variances
 //! ([`Covariance::is_valid`]); the caller restores the previous values if it is not.
 
+mod bias;
 mod blocks;
 mod correction;
 mod projection;
 mod propagation;
 
+pub use bias::{GyroBias, TurnDifference};
 pub use blocks::{Covariance, PoseBlock};
 pub use correction::Correction;
 pub use projection::PredictedMeasurement;

@@ -20,9 +20,11 @@
 //! after a step it is sufficient to check the variances. The previous values are restored if one is
 //! invalid.
 
+mod turn;
+
 use nalgebra::{SMatrix, SVector};
 
-use crate::covariance::{Correction, Covariance, PoseBlock, PredictedMeasurement};
+use crate::covariance::{Correction, Covariance, GyroBias, PoseBlock, PredictedMeasurement};
 use crate::elementary::sqrt;
 use crate::estimate::FilterEstimate;
 use crate::motion::{Drive, LinearizedMotion, WheelTravel};
@@ -35,6 +37,7 @@ use crate::units::{Metres, Radians, SquareMetres};
 
 pub use crate::range::Innovation;
 pub use crate::state::{STATES, StandardDeviations, StateEstimate};
+pub(crate) use turn::{GyroTurn, SlipLimits, TurnAgreement};
 
 /// Largest magnitude of an innovation, m.
 const MAX_INNOVATION: f32 = 1e6;
@@ -425,7 +428,7 @@ impl Ekf {
         let innovation = range - expected.range;
         check_measurement(expected, innovation, noise)?;
         let prediction = self.predict_measurement(expected);
-        self.correct(&prediction, innovation, noise, 1.0)
+        self.correct(&prediction, innovation, noise, 1.0, None)
     }
 
     /// Corrects the state by a `range` that belongs to the expected wall with a probability of
@@ -448,17 +451,18 @@ impl Ekf {
         association: f32,
     ) -> Result<(), EkfError> {
         let prediction = self.predict_measurement(expected);
-        self.update_predicted(&prediction, range - expected.range, noise, association)
+        self.update_predicted(&prediction, range - expected.range, noise, association, None)
     }
 
     /// [`Self::update_associated`] with a measurement that was predicted from this filter, unchanged
-    /// since.
+    /// since, and with the bias of a gyro.
     pub(crate) fn update_predicted(
         &mut self,
         prediction: &PredictedMeasurement,
         innovation: Metres,
         noise: SquareMetres,
         association: f32,
+        bias: Option<&mut GyroBias>,
     ) -> Result<(), EkfError> {
         if !is_within(association, 1.0) {
             return Err(EkfError::NotFinite);
@@ -467,7 +471,7 @@ impl Ekf {
             return Ok(());
         }
         check_measurement(prediction.expected, innovation, noise)?;
-        self.correct(prediction, innovation, noise, association)
+        self.correct(prediction, innovation, noise, association, bias)
     }
 
     // ===== Eq. (16): X̂ ← X̂ + β K ν, P ← P − (1 − a) K mᵀ with a = (1 − β)(1 + β ν²/S) =====
@@ -478,20 +482,21 @@ impl Ekf {
         innovation: Metres,
         noise: SquareMetres,
         association: f32,
+        bias: Option<&mut GyroBias>,
     ) -> Result<(), EkfError> {
         let clutter = 1.0 - association;
         if clutter <= 0.0 {
-            return self.correct_certain(prediction, innovation, noise);
+            return self.correct_certain(prediction, innovation, noise, bias);
         }
         let s = noise.0 + prediction.variance;
         let spread = clutter * (1.0 + association * innovation.0 * innovation.0 / s);
         if spread >= 1.0 {
-            return self.spread(prediction, innovation * association, s, spread - 1.0);
+            return self.spread(prediction, innovation * association, s, spread - 1.0, bias);
         }
         // The same P and X̂ as of a certain association with S' = S/(1 − a) and ν' = β ν S'/S.
         let factor = 1.0 / (1.0 - spread);
         let noise = SquareMetres(noise.0 + s * (spread * factor));
-        self.correct_certain(prediction, innovation * (association * factor), noise)
+        self.correct_certain(prediction, innovation * (association * factor), noise, bias)
     }
 
     /// Corrects the state by a range that probably is clutter and fits so badly that P grows by the share
@@ -503,6 +508,7 @@ impl Ekf {
         innovation: Metres,
         s: f32,
         growth: f32,
+        bias: Option<&mut GyroBias>,
     ) -> Result<(), EkfError> {
         let before = self.p_without_walk;
         // False for NaN.
@@ -515,6 +521,9 @@ impl Ekf {
         p.add_along_gain(&gain, growth * s);
         if p.is_valid() {
             gain.correct(&mut self.estimate, innovation.0);
+            if let Some(bias) = bias {
+                bias.correct(prediction, &gain, innovation.0, -growth);
+            }
             return Ok(());
         }
         let error = invalid(p);
@@ -528,6 +537,7 @@ impl Ekf {
         prediction: &PredictedMeasurement,
         innovation: Metres,
         noise: SquareMetres,
+        bias: Option<&mut GyroBias>,
     ) -> Result<(), EkfError> {
         // In three parts, each small enough to be copied without a call.
         let Covariance { pose, calibration, range_scale } = self.p_without_walk;
@@ -538,6 +548,9 @@ impl Ekf {
             Correction::Applied(gain) if p.is_valid() => {
                 self.distance_since_update = 0.0;
                 gain.correct(&mut self.estimate, innovation.0);
+                if let Some(bias) = bias {
+                    bias.correct(prediction, &gain, innovation.0, 1.0);
+                }
                 return Ok(());
             }
             Correction::Saturated => {

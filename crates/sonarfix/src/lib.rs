@@ -14,11 +14,13 @@
 //! | [`map`] | walls |
 //! | `state`, `estimate` | the seven states: public form and filter coordinates |
 //! | [`motion`], `process_noise` | motion model and its noise, eqs. (4) and (7) to (9) |
+//! | [`gyro`] | a gyro: parameters, and the integral of its rate |
 //! | [`range`] | measurement model, eqs. (11) to (13) |
 //! | [`config`] | parameters |
 //! | `covariance` | P: eqs. (5), (6), (10), (14) and (18) to (20) |
 //! | [`ekf`] | the filter, eqs. (4) to (6) |
 //! | `outcome`, `odometry` | outcome of a measurement; plausibility of a travel |
+//! | `gyro_fusion` | turns of a gyro beside the wheels, eqs. (36) to (39) |
 //! | `visibility` | which walls can be measured |
 //! | `reflector` | what of the map may answer a ping |
 //! | `gating` | gate, downweighting and covariance inflation, eqs. (15) to (17) |
@@ -52,6 +54,8 @@ pub mod ekf;
 mod elementary;
 mod estimate;
 mod gating;
+pub mod gyro;
+mod gyro_fusion;
 pub mod health;
 pub mod localizer;
 pub mod map;

@@ -10,10 +10,12 @@
 use crate::aim::{self, Aim, History, NoAim, Origin};
 use crate::alternatives::{Scene, Target};
 use crate::config::{Config, ConfigError};
-use crate::covariance::PredictedMeasurement;
+use crate::covariance::{GyroBias, PredictedMeasurement};
 use crate::echo::{ExpectedEcho, Explanation, Others};
 use crate::ekf::{Ekf, EkfError, StandardDeviations, StateEstimate};
 use crate::gating::{self, Use};
+use crate::gyro::MeasuredTurn;
+use crate::gyro_fusion::GyroFusion;
 use crate::health::{Health, Limits, Verdict};
 use crate::map::Map;
 use crate::motion::WheelTravel;
@@ -24,6 +26,7 @@ use crate::units::{Duration, Instant, Metres, Radians, SquareMetres, seconds};
 use crate::unseen::Unseen;
 use crate::visibility::{Viewpoint, check_range, max_heading_deviation};
 
+pub use crate::gyro_fusion::{GyroStatus, TurnUse};
 pub use crate::odometry::OdometryError;
 pub use crate::outcome::{Fix, Refusal};
 
@@ -112,6 +115,8 @@ pub struct Localizer<'m> {
     history: History,
     /// Association probability of the latest ping.
     association: f32,
+    /// The gyro, if the configuration has one.
+    gyro: Option<GyroFusion>,
 }
 
 /// The outcome of a ping, and its evidence against the pose.
@@ -172,6 +177,7 @@ impl<'m> Localizer<'m> {
     ) -> Result<Self, StartError> {
         config.check().map_err(StartError::Config)?;
         let ekf = Ekf::new(config.drive, state, deviation).map_err(StartError::Start)?;
+        let gyro = config.gyro.as_ref().map(GyroFusion::new);
         Ok(Self {
             config,
             map,
@@ -182,6 +188,7 @@ impl<'m> Localizer<'m> {
             unseen: None,
             history: History::default(),
             association: 0.0,
+            gyro,
         })
     }
 
@@ -192,18 +199,37 @@ impl<'m> Localizer<'m> {
     /// # Errors
     /// [`OdometryError`], by what is wrong with the travel or its time; estimate and time are unchanged.
     pub fn odometry(&mut self, now: Instant, travel: WheelTravel) -> Result<(), OdometryError> {
-        let result = self.predict(now, travel);
+        self.odometry_with_turn(now, travel, None)
+    }
+
+    /// As [`Self::odometry`], with the turn that the gyro has measured over the same time; `None` if it has failed. Without
+    /// a gyro in the configuration the turn is ignored. What became of it: [`Self::gyro`].
+    ///
+    /// # Errors
+    /// As of [`Self::odometry`].
+    pub fn odometry_with_turn(
+        &mut self,
+        now: Instant,
+        travel: WheelTravel,
+        turn: Option<MeasuredTurn>,
+    ) -> Result<(), OdometryError> {
+        let result = self.predict(now, travel, turn);
         if let (Err(_), Some(unseen)) = (result, &mut self.unseen) {
             unseen.refuse(now);
         }
         result
     }
 
-    fn predict(&mut self, now: Instant, travel: WheelTravel) -> Result<(), OdometryError> {
+    fn predict(
+        &mut self,
+        now: Instant,
+        travel: WheelTravel,
+        turn: Option<MeasuredTurn>,
+    ) -> Result<(), OdometryError> {
         let elapsed = odometry::check(travel, self.time, now, self.config.max_wheel_speed)?;
         let unrecorded = now.checked_duration_since(self.recorded).unwrap_or(NO_TIME);
         let before = self.ekf.heading();
-        self.predict_seen(now, travel).map_err(OdometryError::Filter)?;
+        self.predict_seen(now, travel, elapsed, turn).map_err(OdometryError::Filter)?;
         self.history.record_turn(self.ekf.heading().from(before), seconds(elapsed));
         self.history.record_distance(travel.distance());
         (self.time, self.recorded) = (now, now);
@@ -213,13 +239,19 @@ impl<'m> Localizer<'m> {
     }
 
     /// Predicts over a travel that ends a period without odometry, if there is one.
-    fn predict_seen(&mut self, now: Instant, travel: WheelTravel) -> Result<(), EkfError> {
+    fn predict_seen(
+        &mut self,
+        now: Instant,
+        travel: WheelTravel,
+        elapsed: Duration,
+        turn: Option<MeasuredTurn>,
+    ) -> Result<(), EkfError> {
         let Some(unseen) = self.unseen else {
-            return self.ekf.predict(travel);
+            return self.predict_filter(travel, elapsed, turn);
         };
         let grown = self.ekf.pose_variances();
         unseen.end(&mut self.ekf, now, travel.distance(), &self.config);
-        let result = self.ekf.predict(travel);
+        let result = self.predict_filter(travel, elapsed, turn);
         if result.is_ok() {
             self.unseen = None;
             self.health.record_uncertainty(self.ekf.pose_uncertainty());
@@ -227,6 +259,21 @@ impl<'m> Localizer<'m> {
             self.ekf.set_pose_variances(grown);
         }
         result
+    }
+
+    #[inline]
+    fn predict_filter(
+        &mut self,
+        travel: WheelTravel,
+        elapsed: Duration,
+        turn: Option<MeasuredTurn>,
+    ) -> Result<(), EkfError> {
+        match (&mut self.gyro, &self.config.gyro) {
+            (Some(gyro), Some(parameters)) => {
+                gyro.predict(&mut self.ekf, travel, elapsed, turn, parameters)
+            }
+            _ => self.ekf.predict(travel),
+        }
     }
 
     /// Records that the wheels could not be observed up to `now`. To be called whenever an encoder sample is due and
@@ -259,6 +306,9 @@ impl<'m> Localizer<'m> {
     pub fn set_pose(&mut self, start: &Start) -> Result<(), EkfError> {
         let Start { pose, position_deviation, heading_deviation } = *start;
         self.ekf.set_pose(pose, position_deviation, heading_deviation)?;
+        if let Some(gyro) = &mut self.gyro {
+            gyro.forget_pose();
+        }
         self.pose_replaced();
         Ok(())
     }
@@ -274,6 +324,9 @@ impl<'m> Localizer<'m> {
         deviation: StandardDeviations,
     ) -> Result<(), EkfError> {
         self.ekf = Ekf::new(self.config.drive, state, deviation)?;
+        if let Some(gyro) = &mut self.gyro {
+            gyro.forget_states();
+        }
         self.pose_replaced();
         Ok(())
     }
@@ -389,7 +442,10 @@ impl<'m> Localizer<'m> {
         let Explanation { association, occluded: now_occluded, mapped, evidence } = explanation;
         let fix = match measured {
             Err(refusal) => Fix::Refused(refusal),
-            Ok(_) => use_range(&mut self.ekf, &prediction, innovation, noise, association)?,
+            Ok(_) => {
+                let bias = self.gyro.as_mut().map(GyroFusion::bias_mut);
+                use_range(&mut self.ekf, &prediction, innovation, noise, association, bias)?
+            }
         };
         if fix.innovation_used().is_some() {
             self.pose_changed();
@@ -457,6 +513,12 @@ impl<'m> Localizer<'m> {
         self.association
     }
 
+    /// The gyro: its bias, and what became of its turns; `None` without a gyro in the configuration.
+    #[must_use]
+    pub fn gyro(&self) -> Option<GyroStatus> {
+        self.gyro.as_ref().map(GyroFusion::status)
+    }
+
     /// The configuration.
     #[must_use]
     pub fn config(&self) -> &Config {
@@ -478,13 +540,15 @@ fn use_range(
     innovation: Innovation,
     noise: SquareMetres,
     association: f32,
+    bias: Option<&mut GyroBias>,
 ) -> Result<Fix, Refusal> {
     let used = gating::use_of(association);
     if used == Use::Reject {
         return Ok(Fix::Gated(innovation));
     }
     let weight = gating::weight(association);
-    ekf.update_predicted(prediction, innovation.value, noise, weight).map_err(Refusal::Filter)?;
+    ekf.update_predicted(prediction, innovation.value, noise, weight, bias)
+        .map_err(Refusal::Filter)?;
     Ok(match used {
         Use::Accept => Fix::Accepted(innovation),
         _ => Fix::Downweighted(innovation),

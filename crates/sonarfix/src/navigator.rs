@@ -30,6 +30,7 @@
 
 use crate::aim::{Aim, NoAim};
 use crate::ekf::{EkfError, StandardDeviations, StateEstimate};
+use crate::gyro::MeasuredTurn;
 use crate::health::Verdict;
 use crate::localizer::{Fix, Localizer, OdometryError, Start};
 use crate::motion::WheelTravel;
@@ -231,8 +232,23 @@ impl<'m> Navigator<'m> {
         travel: WheelTravel,
         search: Option<&mut Search<'m>>,
     ) -> Result<(), OdometryError> {
+        self.odometry_with_turn(now, travel, None, search)
+    }
+
+    /// As [`Self::odometry`], with the turn that the gyro has measured over the same time, as
+    /// [`Localizer::odometry_with_turn`].
+    ///
+    /// # Errors
+    /// As [`Localizer::odometry`]; neither has changed.
+    pub fn odometry_with_turn(
+        &mut self,
+        now: Instant,
+        travel: WheelTravel,
+        turn: Option<MeasuredTurn>,
+        search: Option<&mut Search<'m>>,
+    ) -> Result<(), OdometryError> {
         let before = self.localizer.pose().heading;
-        self.localizer.odometry(now, travel)?;
+        self.localizer.odometry_with_turn(now, travel, turn)?;
         let Some(search) = search else { return Ok(()) };
         self.driven = self.driven + travel.distance();
         if self.mode == Mode::Tracking {

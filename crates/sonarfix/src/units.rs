@@ -110,6 +110,30 @@ quantity! {
     MetresPerSecond
 }
 
+quantity! {
+    /// A turn rate in radians per second, counter-clockwise.
+    RadiansPerSecond
+}
+
+impl RadiansPerSecond {
+    /// A turn rate given in degrees per second.
+    ///
+    /// ```
+    /// use sonarfix::units::RadiansPerSecond;
+    /// assert_eq!(RadiansPerSecond::from_degrees(180.0).0, core::f32::consts::PI);
+    /// ```
+    #[must_use]
+    pub fn from_degrees(degrees: f32) -> Self {
+        Self(degrees.to_radians())
+    }
+
+    /// The turn rate in degrees per second.
+    #[must_use]
+    pub fn to_degrees(self) -> f32 {
+        self.0.to_degrees()
+    }
+}
+
 impl Radians {
     /// An angle given in degrees.
     ///
@@ -137,3 +161,12 @@ impl Radians {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PerRootMetre<T>(pub T);
+
+/// Density of a white noise or of a random walk over time: the standard deviation after one second. It grows with the
+/// square root of the time.
+///
+/// `PerRootSecond(Radians(1e-4))` is 1e-4 rad/√s.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct PerRootSecond<T>(pub T);

@@ -3,9 +3,10 @@
 use clap::ValueEnum;
 use sonarfix::aim::Policy;
 use sonarfix::config::PingSchedule;
+use sonarfix::gyro::GyroParameters;
 use sonarfix::units::Duration;
 use sonarfix_hal::config::StartPose;
-use sonarfix_map::{Fidelity, Scenario, ServoName};
+use sonarfix_map::{Fidelity, HeadingSlip, Scenario, ServoName};
 use sonarfix_sim::pins::devices;
 
 /// Changes of a scenario; by default it stays as it is.
@@ -27,6 +28,12 @@ pub struct Overrides {
     /// of the range scale in the filter.
     #[arg(long, value_name = "FRACTION")]
     range_error: Option<f32>,
+    /// The gyro of the robot.
+    #[arg(long, value_enum)]
+    gyro: Option<GyroChoice>,
+    /// Mean seconds between two slips of a wheel, each of which turns the odometry by 5 to 15 degrees.
+    #[arg(long, value_name = "SECONDS")]
+    heading_slips: Option<f64>,
     /// Whether the start pose is given to the robot. Without one it searches for its pose, at the start and whenever it is lost.
     #[arg(long, value_enum)]
     start: Option<StartName>,
@@ -75,6 +82,14 @@ enum ServoChoice {
     Mg996r,
 }
 
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum GyroChoice {
+    /// None.
+    None,
+    /// MPU-6050.
+    Mpu6050,
+}
+
 fn schedule(text: &str) -> Result<PingSchedule, String> {
     if text == "as-fast-as-possible" {
         return Ok(PingSchedule::AsFastAsPossible);
@@ -112,6 +127,18 @@ impl Overrides {
             anyhow::ensure!(sensible, "--range-error must be a fraction below 0.5, like 0.01");
             scenario.robot.localizer.prior.range_scale = error.abs();
             scenario.truth.range_scale = error.into();
+        }
+        match self.gyro {
+            Some(GyroChoice::None) => scenario.robot.localizer.gyro = None,
+            Some(GyroChoice::Mpu6050) => {
+                scenario.robot.localizer.gyro = Some(GyroParameters::MPU_6050);
+            }
+            None => {}
+        }
+        if let Some(every) = self.heading_slips {
+            anyhow::ensure!(every > 0.0, "--heading-slips must be a positive number of seconds");
+            let [least, most] = [5.0_f64, 15.0].map(f64::to_radians);
+            scenario.upsets.heading_slip = HeadingSlip { every, least, most };
         }
         if let Some(start) = self.start {
             scenario.robot.start = StartPose::Unknown { region: None };

@@ -24,6 +24,7 @@ pub mod progress;
 pub mod tally;
 
 use sonarfix::aim::{Aim, NoAim};
+use sonarfix::gyro::MeasuredTurn;
 use sonarfix::localizer::{Fix, Localizer, OdometryError, Start};
 use sonarfix::motion::WheelTravel;
 use sonarfix::navigator::Mode;
@@ -131,8 +132,9 @@ impl LocalizerInputs for ComparedDevice<'_> {
         &mut self,
         at: Instant,
         travel: WheelTravel,
+        turn: Option<MeasuredTurn>,
     ) -> Result<Result<(), OdometryError>, SimulationError> {
-        match self.execute(&Request::Odometry(at, travel))? {
+        match self.execute(&Request::Odometry(at, travel, turn))? {
             Answer::Odometry(taken, _) => Ok(taken),
             other => Err(mismatched(other)),
         }

@@ -115,7 +115,7 @@ impl Pair {
         let (own, _) = session.execute(request, &mut Unmetered);
         let at = match request {
             Request::Poll(sensors) => sensors.at,
-            Request::Odometry(at, _) => *at,
+            Request::Odometry(at, ..) => *at,
             _ => session.localizer().map_or(Instant::from_ticks(0), Localizer::time),
         };
         let instructions = self.compare(at.ticks(), bytes, &own)?;

@@ -5,29 +5,47 @@
 //! efficient filter equals it.
 
 use crate::dense::{DenseFilter, Line, Model, Vector};
+use crate::dense_gyro::{DenseGyroFilter, GyroModel};
 
 /// The bound of a run in progress.
 #[derive(Debug, Clone)]
 pub struct Bound {
     filter: DenseFilter,
+    /// The same with a gyro, if the robot has one.
+    with_gyro: Option<DenseGyroFilter>,
 }
 
 impl Bound {
     /// The bound at the true start, with the deviations of the filter's initial estimate.
     #[must_use]
-    pub fn new(model: Model, truth: Vector, deviation: &Vector) -> Self {
-        Self { filter: DenseFilter::new(model, truth, deviation) }
+    pub fn new(model: Model, gyro: Option<GyroModel>, truth: Vector, deviation: &Vector) -> Self {
+        let filter = DenseFilter::new(model, truth, deviation);
+        let with_gyro = gyro.map(|gyro| DenseGyroFilter::new(&filter, gyro));
+        Self { filter, with_gyro }
     }
 
-    /// Predicts over a motion; `travel` is the noiseless encoder reading, `truth` the state after it.
-    pub fn moved(&mut self, travel: [f64; 2], truth: Vector) {
-        self.filter.propagate(travel);
+    /// Predicts over a motion in a time, seconds; `travel` is the noiseless encoder reading, `truth` the state after it.
+    pub fn moved(&mut self, travel: [f64; 2], seconds: f64, truth: Vector) {
+        match &mut self.with_gyro {
+            None => self.filter.propagate(travel),
+            Some(aided) => {
+                aided.x = self.filter.x;
+                aided.propagate(travel, seconds);
+                self.filter.p = aided.covariance();
+            }
+        }
         self.filter.x = truth;
     }
 
     /// Updates with a range to a wall at the current state.
     pub fn fixed(&mut self, line: &Line) {
         let truth = self.filter.x;
+        if let Some(aided) = &mut self.with_gyro {
+            aided.x = truth;
+            aided.correct(line);
+            self.filter.p = aided.covariance();
+            return;
+        }
         let (range, _) = self.filter.model.range(&truth, line);
         self.filter.correct(line, range);
         self.filter.x = truth;

@@ -107,6 +107,12 @@ impl Model {
         next
     }
 
+    /// The turn of the robot when the encoders read `travel` (right, left), metres: radians.
+    #[must_use]
+    pub fn turn(&self, x: &Vector, travel: [f64; 2]) -> f64 {
+        (travel[0] * (1.0 + x[3]) - travel[1] * (1.0 + x[4])) / (self.track_width + x[5])
+    }
+
     /// ∂f/∂x and ∂f/∂u at a state and travel.
     #[must_use]
     pub fn motion_jacobians(&self, x: &Vector, travel: [f64; 2]) -> (Matrix, SMatrix<f64, 7, 2>) {

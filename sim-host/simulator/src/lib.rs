@@ -8,6 +8,7 @@
 pub mod angle;
 pub mod bound;
 pub mod dense;
+pub mod dense_gyro;
 pub mod integrity;
 pub mod monte_carlo;
 pub mod observe;

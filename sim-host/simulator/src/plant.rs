@@ -3,10 +3,12 @@
 //! - [`wheels`]: the encoder readings of rolling wheels;
 //! - `course`: the motion of the robot: exactly along its path, or as commanded;
 //! - [`follower`]: the path follower, which steers by the estimate;
+//! - [`gyro`]: a gyro's rates;
 //! - [`servo`]: the true bearing of the sonar.
 
 mod course;
 pub mod follower;
+pub mod gyro;
 pub mod servo;
 pub mod wheels;
 
@@ -67,10 +69,11 @@ impl<'a> Plant<'a> {
     }
 
     /// Drives on to `time` seconds and reads the encoders.
-    pub fn drive_to(&mut self, time: f64, rng: &mut ChaCha8Rng) -> Travel {
+    pub fn drive_to(&mut self, time: f64, rng: &mut ChaCha8Rng, slips: &mut ChaCha8Rng) -> Travel {
         let rolled = self.course.drive(self.time, time, self.wheels.parameters());
+        let seconds = time - self.time;
         self.time = time;
-        self.wheels.roll(rolled, rng)
+        self.wheels.roll(rolled, seconds, rng, slips)
     }
 
     /// The pose now.

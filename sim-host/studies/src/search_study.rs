@@ -96,12 +96,13 @@ pub fn trial(mut scenario: Scenario, seed: u64, seconds: f64) -> Result<Trial, S
         track_width: config.drive.track_width.0.into(),
         simulation: &simulation,
         wheels: stream(seed, 1),
+        slips: stream(seed, 4),
         noise: stream(seed, 2),
         luck: stream(seed, 3),
         has_all_twins: None,
     };
     let symmetries = symmetries(&simulation.scenario.floor)?;
-    drive.plant.drive_to(start, &mut drive.wheels);
+    drive.plant.drive_to(start, &mut drive.wheels, &mut drive.slips);
     let end = simulation.scenario.path.duration().min(start + seconds);
     let mut time = start + PERIOD;
     let mut unique = None;
@@ -122,6 +123,7 @@ struct Drive<'a> {
     plant: Plant<'a>,
     track_width: f64,
     wheels: ChaCha8Rng,
+    slips: ChaCha8Rng,
     noise: ChaCha8Rng,
     luck: ChaCha8Rng,
     has_all_twins: Option<bool>,
@@ -131,7 +133,7 @@ impl Drive<'_> {
     /// Drives on to a time, pings and searches.
     #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
     fn ping(&mut self, time: f64) {
-        let [right, left] = self.plant.drive_to(time, &mut self.wheels).measured;
+        let [right, left] = self.plant.drive_to(time, &mut self.wheels, &mut self.slips).measured;
         let turn = (right - left) / self.track_width;
         let advance = f64::midpoint(right, left);
         // Simulated wheels are finite, and so are ranges.

@@ -17,13 +17,15 @@ const MIN_VARIANCE_SHARE: f32 = 1.0 / 16_384.0;
 /// The gain K, one number for each state.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Gain {
-    x: f32,
-    y: f32,
-    h: f32,
-    c: f32,
-    d: f32,
-    w: f32,
-    k: f32,
+    pub(super) x: f32,
+    pub(super) y: f32,
+    pub(super) h: f32,
+    pub(super) c: f32,
+    pub(super) d: f32,
+    pub(super) w: f32,
+    pub(super) k: f32,
+    /// 1/S, 1/m².
+    pub(super) per_variance: f32,
 }
 
 impl Gain {
@@ -98,7 +100,7 @@ impl Covariance {
         let second = self.correct_range_states(h, &prediction.cross_covariance, &first);
         let [c, d, w] = self.correct_calibration(h, &first, &second);
         let Column { x, y, h, k } = first.gain;
-        Correction::Applied(Gain { x, y, h, c, d, w, k })
+        Correction::Applied(Gain { x, y, h, c, d, w, k, per_variance: first.per_variance })
     }
 
     // ===== Eqs. (18) and (20): K = P Hᵀ/S, with R raised where f32 would lose definiteness =====
@@ -232,7 +234,7 @@ impl Covariance {
         let c = column(p.xc, p.yc, p.hc, r.ck);
         let d = column(p.xd, p.yd, p.hd, r.dk);
         let w = column(p.xw, p.yw, p.hw, r.wk);
-        Gain { x, y, h: hh, c, d, w, k }
+        Gain { x, y, h: hh, c, d, w, k, per_variance }
     }
 
     // ===== Eq. (16): P ← P + a K Kᵀ =====
@@ -240,7 +242,7 @@ impl Covariance {
     /// of the association of a measurement.
     pub fn add_along_gain(&mut self, gain: &Gain, amount: f32) {
         let (p, q, r) = (&mut self.pose, &mut self.calibration, &mut self.range_scale);
-        let Gain { x, y, h, c, d, w, k } = *gain;
+        let Gain { x, y, h, c, d, w, k, .. } = *gain;
         let (ax, ay, ah, ac) = (amount * x, amount * y, amount * h, amount * c);
         let (ad, aw, ak) = (amount * d, amount * w, amount * k);
         p.xx += ax * x;

@@ -11,6 +11,8 @@ mod covariance;
 #[cfg(test)]
 mod filter;
 #[cfg(test)]
+mod gyro;
+#[cfg(test)]
 mod health;
 #[cfg(test)]
 mod jacobians;

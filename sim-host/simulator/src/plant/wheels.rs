@@ -3,7 +3,7 @@
 use crate::random;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
-use sonarfix_map::{Truth as Parameters, Upsets};
+use sonarfix_map::{HeadingSlip, Truth as Parameters, Upsets};
 
 /// The travel of the wheels between two instants.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -12,6 +12,10 @@ pub struct Travel {
     pub measured: [f64; 2],
     /// The readings without noise, slip and bumps, metres.
     pub noiseless: [f64; 2],
+    /// The true turn of the robot, radians.
+    pub turn: f64,
+    /// The time of the travel, seconds.
+    pub seconds: f64,
 }
 
 /// Two wheels with their systematic and random errors.
@@ -19,13 +23,27 @@ pub struct Travel {
 pub struct Wheels {
     parameters: Parameters,
     upsets: Upsets,
+    slipping: Slipping,
 }
+
+/// A wheel that spins: which one, by how much, and for how long from now.
+#[derive(Debug, Clone, Copy, Default)]
+struct Slipping {
+    wheel: usize,
+    /// Metres per second.
+    speed: f64,
+    /// Seconds.
+    left: f64,
+}
+
+/// How long a slip lasts that turns the odometry, seconds.
+const SLIP_TIME: f64 = 0.5;
 
 impl Wheels {
     /// Wheels with these true parameters.
     #[must_use]
     pub fn new(parameters: &Parameters, upsets: Upsets) -> Self {
-        Self { parameters: *parameters, upsets }
+        Self { parameters: *parameters, upsets, slipping: Slipping::default() }
     }
 
     /// The true parameters now.
@@ -34,17 +52,46 @@ impl Wheels {
         &self.parameters
     }
 
-    /// Rolls both wheels by these distances over the ground, metres, and reads the encoders.
-    pub fn roll(&mut self, rolled: [f64; 2], rng: &mut ChaCha8Rng) -> Travel {
+    /// Rolls both wheels by these distances over the ground, metres, in this time, seconds, and reads the encoders.
+    pub fn roll(
+        &mut self,
+        rolled: [f64; 2],
+        seconds: f64,
+        rng: &mut ChaCha8Rng,
+        slips: &mut ChaCha8Rng,
+    ) -> Travel {
         let p = &self.parameters;
         let noiseless = [rolled[0] / (1.0 + p.scale_right), rolled[1] / (1.0 + p.scale_left)];
         let measured = noiseless
             .map(|travel| travel + p.wheel_noise * travel.abs().sqrt() * random::normal(rng));
         let upsets = self.upsets;
-        let measured = measured.map(|travel| travel + upset(&upsets, travel, rng));
+        let mut measured = measured.map(|travel| travel + upset(&upsets, travel, rng));
+        let turn = (rolled[0] - rolled[1]) / self.parameters.track_width;
+        self.slip(&mut measured, seconds, slips);
         let root_distance = (0.5 * (noiseless[0].abs() + noiseless[1].abs())).sqrt();
         self.let_parameters_walk(root_distance, rng);
-        Travel { measured, noiseless }
+        Travel { measured, noiseless, turn, seconds }
+    }
+
+    /// Adds a slip that turns the odometry. A wheel that stands does not slip. No draw for a robot without slips.
+    fn slip(&mut self, measured: &mut [f64; 2], seconds: f64, rng: &mut ChaCha8Rng) {
+        let HeadingSlip { every, least, most } = self.upsets.heading_slip;
+        let is_driving = measured.iter().any(|travel| travel.abs() > 0.0);
+        if !every.is_finite() || !is_driving {
+            return;
+        }
+        if rng.random::<f64>() < seconds / every {
+            let turn = least + (most - least) * rng.random::<f64>();
+            let wheel = usize::from(rng.random::<bool>());
+            let speed = turn * self.parameters.track_width / SLIP_TIME;
+            self.slipping = Slipping { wheel, speed, left: SLIP_TIME };
+        }
+        let Slipping { wheel, speed, left } = &mut self.slipping;
+        let now = left.min(seconds);
+        if let Some(travel) = measured.get_mut(*wheel) {
+            *travel += *speed * now * travel.signum();
+        }
+        *left -= now;
     }
 
     fn let_parameters_walk(&mut self, root_distance: f64, rng: &mut ChaCha8Rng) {
@@ -92,8 +139,9 @@ mod tests {
         let truth = Parameters { wheel_noise: 0.0, ..scenario.truth };
         let mut wheels = Wheels::new(&truth, upsets);
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut slips = rng.clone();
         (0..10_000)
-            .map(|_| wheels.roll([0.04, 0.04], &mut rng))
+            .map(|_| wheels.roll([0.04, 0.04], 0.1, &mut rng, &mut slips))
             .map(|travel| travel.measured[0] - travel.noiseless[0])
             .sum()
     }

@@ -2,6 +2,7 @@
 //! microcontroller.
 
 use sonarfix::aim::{Aim, NoAim};
+use sonarfix::gyro::MeasuredTurn;
 use sonarfix::localizer::{Fix, Localizer, OdometryError, Start};
 use sonarfix::motion::WheelTravel;
 use sonarfix::navigator::{Mode, UNKNOWN_HEADING, UNKNOWN_POSITION};
@@ -47,7 +48,7 @@ pub trait Computer {
 
 /// The inputs of a localizer, without drivers.
 pub trait LocalizerInputs {
-    /// Passes wheel travel.
+    /// Passes wheel travel, and the turn by the gyro.
     ///
     /// # Errors
     /// [`SimulationError`], if the computer fails.
@@ -55,6 +56,7 @@ pub trait LocalizerInputs {
         &mut self,
         at: Instant,
         travel: WheelTravel,
+        turn: Option<MeasuredTurn>,
     ) -> Result<Result<(), OdometryError>, SimulationError>;
     /// Chooses the wall to measure.
     ///
@@ -164,8 +166,9 @@ impl LocalizerInputs for Localizer<'_> {
         &mut self,
         at: Instant,
         travel: WheelTravel,
+        turn: Option<MeasuredTurn>,
     ) -> Result<Result<(), OdometryError>, SimulationError> {
-        Ok(Localizer::odometry(self, at, travel))
+        Ok(Localizer::odometry_with_turn(self, at, travel, turn))
     }
 
     fn aim(&mut self) -> Result<Result<Aim, NoAim>, SimulationError> {

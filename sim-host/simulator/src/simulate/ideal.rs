@@ -1,8 +1,9 @@
 //! A run that passes travel and ranges directly and on time to the localizer.
 
 use sonarfix::aim::Aim;
+use sonarfix::gyro::MeasuredTurn;
 use sonarfix::motion::WheelTravel;
-use sonarfix::units::{Instant, Metres};
+use sonarfix::units::{Duration, Instant, Metres, Radians};
 
 use super::computer::{Computer, LocalizerInputs};
 use super::error::SimulationError;
@@ -13,6 +14,7 @@ use crate::angle;
 use crate::observe::{self, Measurement};
 use crate::plant::Plant;
 use crate::plant::follower::Follower;
+use crate::plant::gyro::Gyro;
 use crate::statistics::RunResult;
 use crate::time::seconds;
 use crate::trace::Recorder;
@@ -35,7 +37,9 @@ pub fn run(
     // At this fidelity the time of flight is zero.
     let sensor = SensorModel { scale: simulation.range_scale, ..simulation.sensor.clone() };
     let follower = simulation.follower();
-    let mut run = Run { simulation, sensor, streams, plant, localizer, follower, score, now: 0 };
+    let gyro = simulation.gyro(&mut streams.gyro);
+    let mut run =
+        Run { simulation, sensor, streams, plant, localizer, follower, score, gyro, now: 0 };
     let tick_period = simulation.scenario.robot.encoder_period.to_micros();
     let fix_period = simulation.ideal_period().to_micros();
     let (mut next_tick, mut next_fix) = (tick_period, fix_period);
@@ -65,6 +69,7 @@ struct Run<'a, T> {
     localizer: T,
     follower: Option<Follower>,
     score: Score<'a>,
+    gyro: Option<Gyro>,
     /// Microseconds since the run began.
     now: u64,
 }
@@ -75,15 +80,23 @@ impl<T: LocalizerInputs> Run<'_, T> {
     }
 
     fn drive_to(&mut self, now: u64) -> Result<(), SimulationError> {
+        let elapsed = Duration::from_ticks(now - self.now);
         self.now = now;
         let time = seconds(now);
-        let travel = self.plant.drive_to(time, &mut self.streams.wheels);
+        let RandomStreams { wheels, slips, gyro, .. } = &mut self.streams;
+        let travel = self.plant.drive_to(time, wheels, slips);
+        let turn = self.gyro.as_mut().map(|measured| {
+            let angle = measured.integral(travel.turn, travel.seconds, gyro);
+            #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
+            let angle = Radians(angle as f32);
+            MeasuredTurn { angle, duration: elapsed }
+        });
         self.score.rolled(travel);
         self.score.arrive(self.plant.state());
         #[expect(clippy::cast_possible_truncation, reason = "the robot counts in f32")]
         let [right, left] = travel.measured.map(|metres| metres as f32);
         self.localizer
-            .odometry(Instant::from_ticks(now), WheelTravel::new(right, left))?
+            .odometry(Instant::from_ticks(now), WheelTravel::new(right, left), turn)?
             .map_err(|error| SimulationError::Odometry { time, error })
     }
 

@@ -186,7 +186,8 @@ impl<'a> SimulatedHardware<'a> {
         if let Some(carried) = self.carried.take_if(|carried| carried.at <= now) {
             self.plant.carry(carried.by);
         }
-        let travel = self.plant.drive_to(seconds(now), &mut self.streams.wheels);
+        let RandomStreams { wheels, slips, .. } = &mut self.streams;
+        let travel = self.plant.drive_to(seconds(now), wheels, slips);
         while let Some((next, later)) =
             self.put_down.split_first().filter(|(next, _)| next.at <= now)
         {

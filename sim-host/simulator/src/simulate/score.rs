@@ -10,6 +10,7 @@ use super::error::SimulationError;
 use super::simulation::Simulation;
 use crate::bound::Bound;
 use crate::dense::Vector;
+use crate::dense_gyro::GyroModel;
 use crate::observe;
 use crate::odometry::DeadReckoning;
 use crate::plant::{Plant, Travel};
@@ -40,6 +41,7 @@ impl<'a> Score<'a> {
         let is_known = start.is_some();
         let localizer =
             simulation.localizer(start.unwrap_or_else(no_pose), Instant::from_ticks(0))?;
+        let gyro = localizer.config().gyro.as_ref().map(GyroModel::of);
         let deviation = localizer.filter().standard_deviations();
         let deviation = Vector::from(deviation.to_array().map(f64::from));
         // Dead reckoning needs a start; without an estimate it is the true one.
@@ -52,7 +54,7 @@ impl<'a> Score<'a> {
         Ok(Self {
             simulation,
             odometry: DeadReckoning::new(start, model.track_width),
-            bound: Bound::new(model, truth, &deviation),
+            bound: Bound::new(model, gyro, truth, &deviation),
             rolled: Travel::default(),
             last_tick: 0.0,
             result: RunResult::default(),
@@ -68,12 +70,13 @@ impl<'a> Score<'a> {
         for (sum, more) in self.rolled.noiseless.iter_mut().zip(travel.noiseless) {
             *sum += more;
         }
+        self.rolled.seconds += travel.seconds;
     }
 
     /// Updates bound and dead reckoning with the travel so far.
     pub fn arrive(&mut self, truth: Vector) {
         let travel = std::mem::take(&mut self.rolled);
-        self.bound.moved(travel.noiseless, truth);
+        self.bound.moved(travel.noiseless, travel.seconds, truth);
         self.odometry.moved(travel.measured);
     }
 

@@ -14,6 +14,7 @@ use super::error::SimulationError;
 use crate::dense::{Line, Model, Vector};
 use crate::plant::Plant;
 use crate::plant::follower::Follower;
+use crate::plant::gyro::Gyro;
 use crate::random;
 use crate::time::{micros, seconds};
 use crate::trace::{self, Trace};
@@ -192,6 +193,12 @@ impl Simulation {
 
     pub(super) fn plant(&self) -> Plant<'_> {
         Plant::new(&self.scenario, self.range_scale)
+    }
+
+    /// The gyro, if the robot has one.
+    pub(super) fn gyro(&self, rng: &mut ChaCha8Rng) -> Option<Gyro> {
+        let assumed = self.scenario.robot.localizer.gyro.as_ref()?;
+        Some(Gyro::new(&self.scenario.truth.gyro, assumed, rng))
     }
 
     /// The initial estimate of the localizer; none if the robot starts without a pose.

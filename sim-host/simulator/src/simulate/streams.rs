@@ -14,6 +14,10 @@ pub struct RandomStreams {
     pub ranges: ChaCha8Rng,
     /// Detection, outliers and other properties of an echo.
     pub echoes: ChaCha8Rng,
+    /// Slips of a wheel that turn the odometry.
+    pub slips: ChaCha8Rng,
+    /// Bias and noise of the gyro.
+    pub gyro: ChaCha8Rng,
 }
 
 impl RandomStreams {
@@ -24,6 +28,13 @@ impl RandomStreams {
             rng.set_stream(n);
             rng
         };
-        Self { start: stream(0), wheels: stream(1), ranges: stream(2), echoes: stream(3) }
+        Self {
+            start: stream(0),
+            wheels: stream(1),
+            ranges: stream(2),
+            echoes: stream(3),
+            slips: stream(4),
+            gyro: stream(5),
+        }
     }
 }
