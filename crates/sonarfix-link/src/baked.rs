@@ -17,7 +17,7 @@ pub const LENGTH_MAX: usize = HEADER + POSTCARD_MAX + CHECKSUM;
 
 const MAGIC: [u8; 4] = *b"SFXC";
 const HEADER: usize = 8;
-const POSTCARD_MAX: usize = 320;
+const POSTCARD_MAX: usize = 352;
 const CHECKSUM: usize = 4;
 
 /// Why bytes are not a configuration.

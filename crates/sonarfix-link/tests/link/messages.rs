@@ -5,6 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use sonarfix::aim::{Aim, NoAim, Reason};
 use sonarfix::config::{Config, PingSchedule, PingTiming, Policy, ServoTiming};
 use sonarfix::ekf::{Innovation, STATES, StandardDeviations, StateEstimate};
+use sonarfix::gyro::GyroParameters;
 use sonarfix::health::{Health, Verdict};
 use sonarfix::localizer::{Fix, Refusal, Start};
 use sonarfix::map::WallId;
@@ -12,7 +13,8 @@ use sonarfix::navigator::Mode;
 use sonarfix::pose::{Point, Pose};
 use sonarfix::search::Region;
 use sonarfix::units::{
-    Duration, Instant, Metres, MetresPerSecond, PerRootMetre, Radians, SquareMetres,
+    Duration, Instant, Metres, MetresPerSecond, PerRootMetre, PerRootSecond, Radians,
+    RadiansPerSecond, SquareMetres,
 };
 use sonarfix_hal::config::{MotorPolicy, RangerConfig, RobotConfig, StartPose, Unsupported};
 use sonarfix_hal::ranger::{Celsius, Echo, NoEcho, Outcome, PulseTiming, RangerKind};
@@ -465,5 +467,15 @@ fn localizer(source: &mut impl Source) -> Config {
     config.policy = if source.pick(2) == 0 { Policy::Nearest } else { Policy::Informative };
     config.weights.heading = Metres(source.single());
     config.weights.wheels = Metres(source.single());
+    let gyro = GyroParameters {
+        range: RadiansPerSecond(source.single()),
+        noise: PerRootSecond(Radians(source.single())),
+        bias: RadiansPerSecond(source.single()),
+        bias_walk: PerRootSecond(RadiansPerSecond(source.single())),
+        scale: source.single(),
+        period: source.duration(),
+        is_inverted: source.pick(2) == 0,
+    };
+    config.gyro = (source.pick(2) == 0).then_some(gyro);
     config
 }
