@@ -440,12 +440,11 @@ impl<'m> Localizer<'m> {
             alone
         };
         let Explanation { association, occluded: now_occluded, mapped, evidence } = explanation;
-        let fix = match measured {
-            Err(refusal) => Fix::Refused(refusal),
-            Ok(_) => {
-                let bias = self.gyro.as_mut().map(GyroFusion::bias_mut);
-                use_range(&mut self.ekf, &prediction, innovation, noise, association, bias)?
-            }
+        let fix = if let Err(refusal) = measured {
+            Fix::Refused(refusal)
+        } else {
+            let bias = self.gyro.as_mut().map(GyroFusion::bias_mut);
+            use_range(&mut self.ekf, &prediction, innovation, noise, association, bias)?
         };
         if fix.innovation_used().is_some() {
             self.pose_changed();

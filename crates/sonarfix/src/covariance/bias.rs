@@ -88,7 +88,7 @@ impl GyroBias {
     /// The same estimate and variance, independent of all states.
     pub fn independent(self) -> Self {
         let GyroBias { rate, bb, .. } = self;
-        Self { bb, rate, ..Self::unknown(0.0) }
+        Self { rate, bb, ..Self::unknown(0.0) }
     }
 
     /// Removes the covariance with the pose.

@@ -1,6 +1,13 @@
 //! The gyro beside the wheels, against a filter in `f64` that takes the turn as one measurement in each step, in the joint
 //! space of eight states and the noise of both wheels.
 
+#![expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    reason = "small numbers"
+)]
+
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
 use sonarfix::config::Config;
@@ -267,7 +274,7 @@ fn drive(
     for tick in ticks {
         let slipped = slip * WIDTH;
         let travel = WheelTravel::new((0.04 + slipped) as f32, 0.04);
-        let turn = gyro(tick).map(|angle| turn(angle));
+        let turn = gyro(tick).map(turn);
         localizer.odometry_with_turn(at(tick + 1), travel, turn).unwrap();
     }
 }
