@@ -99,7 +99,7 @@ impl<'a> Drive<'a> {
                     along.corners += f64::from(u8::from(target.answers < 1.0));
                 }
             }
-            let deviation = self.filter.p.fixed_view::<2, 2>(0, 0).trace().sqrt();
+            let deviation = position_variance(&self.filter.p).sqrt();
             samples += 1.0;
             along.rms += deviation * deviation;
             along.worst = along.worst.max(deviation);
@@ -172,8 +172,7 @@ impl<'a> Drive<'a> {
     }
 
     fn gain(&self, target: &Target) -> f64 {
-        let after = self.corrected(target);
-        (0..2).map(|axis| self.filter.p[(axis, axis)] - after[(axis, axis)]).sum()
+        position_variance(&self.filter.p) - position_variance(&self.corrected(target))
     }
 
     fn correct(&mut self, target: &Target, time: f64) {
@@ -184,6 +183,10 @@ impl<'a> Drive<'a> {
         }
         self.filter.p = self.corrected(target);
     }
+}
+
+fn position_variance(p: &Matrix) -> f64 {
+    p.fixed_view::<2, 2>(0, 0).trace()
 }
 
 /// Both bounds on a plan: without and with corners.
@@ -200,7 +203,8 @@ fn median(mut values: Vec<f64>) -> f64 {
 
 fn print(name: &str, of: &[[Along; 2]]) {
     let column = |value: fn(&Along) -> f64| {
-        [0, 1].map(|with| median(of.iter().map(|both| value(&both[with])).collect()))
+        let without = of.iter().map(|[without, _]| value(without)).collect();
+        [without, of.iter().map(|[_, with]| value(with)).collect()].map(median)
     };
     let [rms, rms_with] = column(|along| 1e3 * along.rms);
     let [worst, worst_with] = column(|along| 1e3 * along.worst);
