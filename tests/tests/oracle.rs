@@ -50,7 +50,11 @@ fn drive(policy: Policy, range_scale_prior: f32, seed: u64) -> Difference {
     let config = scenario.robot.localizer;
     let model = Model::of(&config);
     let walls = scenario.floor.walls();
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let [mut rng, mut slips] = [0, 1].map(|stream| {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(stream);
+        rng
+    });
     let mut plant = Plant::new(&scenario, 0.0);
 
     let start = Start {
@@ -65,7 +69,8 @@ fn drive(policy: Policy, range_scale_prior: f32, seed: u64) -> Difference {
 
     let mut difference = Difference::default();
     for tick in 1..=12_480_u64 {
-        let travel = plant.drive_to(tick as f64 * 0.1, &mut rng).measured.map(|m| m as f32);
+        let travel = plant.drive_to(tick as f64 * 0.1, &mut rng, &mut slips);
+        let travel = travel.measured.map(|m| m as f32);
         let now = Instant::from_ticks(tick * 100_000);
         localizer.odometry(now, WheelTravel::new(travel[0], travel[1])).unwrap();
         oracle.predict(travel.map(f64::from));

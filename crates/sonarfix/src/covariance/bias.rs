@@ -165,6 +165,7 @@ impl GyroBias {
 impl Covariance {
     /// Variance of a difference of turns at the estimate, without its noise, rad².
     #[inline]
+    #[must_use]
     pub fn variance_of(&self, difference: &TurnDifference, bias: &GyroBias) -> f32 {
         let (q, b, a) = (&self.calibration, bias, difference);
         let c = a.times(q.cc, q.cd, q.cw, b.cb);
