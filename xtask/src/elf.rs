@@ -109,12 +109,16 @@ impl Program {
             for (n, &(&from, mark)) in starts.iter().enumerate() {
                 is_code = mark.unwrap_or(is_code);
                 let to = starts.get(n + 1).map_or(end, |&(&next, _)| next);
-                let offset = |at: u64| usize::try_from(at - start);
+                let offset = |at: u64| usize::try_from(at.wrapping_sub(start));
                 let stretch = code.get(offset(from)?..offset(to)?).unwrap_or_default();
                 if let Some((_, function)) = self.functions.range_mut(..=from).next_back()
                     && is_code
                 {
-                    function.stack = function.stack.and(Stack::of(stretch));
+                    let word = |at| {
+                        let bytes = code.get(offset(at).ok()?..)?.first_chunk()?;
+                        Some(u32::from_le_bytes(*bytes))
+                    };
+                    function.stack = function.stack.and(Stack::of(stretch, from, word));
                     let calls = thumb::calls(stretch, from);
                     function.calls.extend(calls.filter(|to| functions.contains(to)));
                 }

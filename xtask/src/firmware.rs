@@ -14,8 +14,12 @@
 //! | `size` | flash and RAM |
 //! | `stack` | the deepest stack |
 
+use anyhow::{Context, ensure};
+
 use crate::cargo;
 use crate::workspace::Workspace;
+
+pub use boards::Args as BoardsArgs;
 
 mod boards;
 mod build;
@@ -56,8 +60,8 @@ pub fn test() -> anyhow::Result<()> {
 }
 
 /// The firmware of the further boards, and the size of all.
-pub fn boards() -> anyhow::Result<()> {
-    boards::check(&build::read(&build::release()?)?)
+pub fn boards(args: &BoardsArgs) -> anyhow::Result<()> {
+    boards::check(&build::read(&build::release()?)?, args)
 }
 
 /// Flash and RAM of the linked file, by crate.
@@ -72,6 +76,9 @@ pub struct StackArgs {
     /// a separate build (a minute).
     #[arg(long)]
     ask_compiler: bool,
+    /// The board, as `sonarfix init` names it: a Cortex-M.
+    #[arg(long, default_value = "stm32f405")]
+    board: String,
 }
 
 /// The deepest that the stack of the linked file can be.
@@ -79,5 +86,11 @@ pub fn stack(args: &StackArgs) -> anyhow::Result<()> {
     if args.ask_compiler {
         return frames::check(&build::read(&build::with_stack_sizes()?)?);
     }
-    stack::check(&build::read(&build::release()?)?).map(drop)
+    let board = sonarfix_boards::all()?.into_iter().find(|board| board.name == args.board);
+    let board = board.with_context(|| format!("there is no board {}", args.board))?;
+    ensure!(board.target.starts_with("thumb"), "only the instructions of a Cortex-M can be read");
+    let program = build::read(&build::of(&board)?)?;
+    let checked =
+        if board.package == REFERENCE { stack::check(&program) } else { stack::print(&program) };
+    checked.map(drop)
 }

@@ -115,6 +115,7 @@ fn machine(target: &str) -> Option<&'static str> {
         "thumbv7em-none-eabihf" => Some("m4f"),
         "thumbv8m.main-none-eabihf" => Some("m33"),
         "thumbv6m-none-eabi" => Some("m0plus"),
+        "riscv32imac-unknown-none-elf" => Some("rv32"),
         _ => None,
     }
 }

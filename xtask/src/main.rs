@@ -63,8 +63,9 @@ enum Task {
     Embedded,
     /// The firmware: builds it, searches it for panics, and runs it in an emulator.
     TestFirmware,
-    /// The firmware of all further boards: lints it, builds it, searches it for panics and prints its size.
-    Boards,
+    /// The firmware of all further boards: lints it, builds it, searches it for panics, prints its flash, RAM and stack, and
+    /// compares them with docs/firmware.md.
+    Boards(firmware::BoardsArgs),
     /// The template of a further board: instantiated, built, and refused without each of its parts.
     Template,
     /// Flash and RAM of the shipped firmware, by crate.
@@ -127,7 +128,7 @@ fn ci_steps() -> [(&'static str, Task); 23] {
         ("docs", Task::Docs),
         ("embedded", Task::Embedded),
         ("test-firmware", Task::TestFirmware),
-        ("boards", Task::Boards),
+        ("boards", Task::Boards(firmware::BoardsArgs::COMPARE)),
         ("template", Task::Template),
         ("golden", Task::Golden),
         ("pil", Task::Pil),
@@ -169,7 +170,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Docs => checks::docs(),
         Task::Embedded => checks::embedded(),
         Task::TestFirmware => firmware::test(),
-        Task::Boards => firmware::boards(),
+        Task::Boards(args) => firmware::boards(&args),
         Task::Template => template::check(),
         Task::Size => firmware::size(),
         Task::Stack(args) => firmware::stack(&args),

@@ -13,17 +13,44 @@ pub struct Stack {
 }
 
 impl Stack {
-    /// Decodes a block of code without data.
+    /// Decodes a block of code without data, which lies at this address; `word` returns the word at an address near it.
     ///
     /// Every instruction counts once. This is an upper bound: the stack may be lowered on two branches, but compilers do
     /// not lower it in a loop.
-    pub fn of(code: &[u8]) -> Self {
+    pub fn of(code: &[u8], at: u64, word: impl Fn(u64) -> Option<u32>) -> Self {
         let mut stack = Self::default();
-        for (_, instruction) in instructions(code) {
+        let mut last = None;
+        for (offset, instruction) in instructions(code) {
             match instruction {
-                Instruction::Short(word) => stack.short(word),
+                Instruction::Short(short) => match last {
+                    // ADD SP, …: how ARMv6-M makes a large frame, and frees it.
+                    Some((register, Value::Constant(constant)))
+                        if short == 0x4485_u16 | register << 3 =>
+                    {
+                        stack.bytes += u64::from(constant_below_zero(constant));
+                    }
+                    // MOV SP, …: frees it, too.
+                    Some((register, Value::BelowFrame)) if short == 0x4685_u16 | register << 3 => {}
+                    _ => stack.short(short),
+                },
                 Instruction::Long(first, second) => stack.long(first, second),
             }
+            last = match instruction {
+                // LDR …, [PC, #…]
+                Instruction::Short(short @ 0x4800..=0x4fff) => {
+                    let from = ((at + offset + 4) & !3) + 4 * u64::from(short & 0xff);
+                    word(from).map(|constant| (short >> 8 & 7, Value::Constant(constant)))
+                }
+                // SUBS …, R7, #…
+                Instruction::Short(short @ 0x1e00..=0x1fff) if short >> 3 & 7 == 7 => {
+                    Some((short & 7, Value::BelowFrame))
+                }
+                // SUBS …, #… of the same register
+                Instruction::Short(short @ 0x3800..=0x3fff) => last.filter(|(register, value)| {
+                    *register == short >> 8 & 7 && *value == Value::BelowFrame
+                }),
+                _ => None,
+            };
         }
         stack
     }
@@ -74,6 +101,15 @@ impl Stack {
     }
 }
 
+/// What a register holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Value {
+    /// A constant of the code.
+    Constant(u32),
+    /// An address below the frame pointer R7: what the stack pointer was when the function had saved its registers.
+    BelowFrame,
+}
+
 /// The targets of the BL instructions in a block of code at this address.
 pub fn calls(code: &[u8], at: u64) -> impl Iterator<Item = u64> {
     instructions(code).filter_map(move |(offset, instruction)| {
@@ -91,7 +127,14 @@ fn distance(first: u16, second: u16) -> i64 {
     i1 << 23 | i2 << 22 | (first & 0x3ff) << 12 | (second & 0x7ff) << 1 | -sign << 24
 }
 
+/// The magnitude of a negative constant, zero of another one.
+fn constant_below_zero(constant: u32) -> u32 {
+    let constant = constant.cast_signed();
+    if constant < 0 { constant.unsigned_abs() } else { 0 }
+}
+
 /// An instruction has one half word or two.
+#[derive(Clone, Copy)]
 enum Instruction {
     Short(u16),
     Long(u16, u16),
@@ -140,6 +183,34 @@ fn modified(bits: u16) -> u64 {
 mod tests {
     use super::*;
 
+    fn decoded(code: &[u8]) -> Stack {
+        Stack::of(code, 0, |_| None)
+    }
+
+    /// ldr r4, constant; add sp, r4; …; ldr r5, other; add sp, r5: a frame of 1,040 bytes, made and freed.
+    #[test]
+    fn a_frame_from_a_loaded_constant_is_known() {
+        let code = [0x02, 0x4c, 0xa5, 0x44, 0x02, 0x4d, 0xad, 0x44];
+        let word = |at| match at {
+            0x10c => Some((-1_040_i32).cast_unsigned()),
+            0x110 => Some(1_040),
+            _ => None,
+        };
+        assert_eq!(Stack::of(&code, 0x100, word), Stack { bytes: 1_040, ..Stack::default() });
+        // The constant is that of another register, or of another instruction.
+        assert!(Stack::of(&[0x02, 0x4c, 0xad, 0x44], 0x100, word).is_unbounded);
+        assert!(Stack::of(&[0x02, 0x4c, 0x00, 0xbf, 0xa5, 0x44], 0x100, word).is_unbounded);
+    }
+
+    /// subs r6, r7, #7; subs r6, #5; mov sp, r6
+    #[test]
+    fn a_frame_that_is_freed_by_the_frame_pointer_is_known() {
+        assert_eq!(decoded(&[0xfe, 0x1f, 0x05, 0x3e, 0xb5, 0x46]), Stack::default());
+        // Another register, another base.
+        assert!(decoded(&[0xfe, 0x1f, 0x05, 0x3d, 0xb5, 0x46]).is_unbounded);
+        assert!(decoded(&[0xee, 0x1f, 0x05, 0x3e, 0xb5, 0x46]).is_unbounded);
+    }
+
     /// Encoded by an assembler (`llvm-mc --triple=thumbv7em-none-eabihf --show-encoding`).
     #[test]
     fn every_instruction_that_lowers_the_stack_is_recognized() {
@@ -157,7 +228,7 @@ mod tests {
             (&[0x82, 0xb0, 0x02, 0xb0, 0x70, 0x47], 8), // sub sp, #8; add sp, #8; bx lr
         ];
         for (code, bytes) in known {
-            assert_eq!(Stack::of(code), Stack { bytes, ..Stack::default() }, "{code:x?}");
+            assert_eq!(decoded(code), Stack { bytes, ..Stack::default() }, "{code:x?}");
         }
     }
 
@@ -185,13 +256,13 @@ mod tests {
     fn indirect_calls_and_unknown_depths_are_detected() {
         let calls: [&[u8]; 2] = [&[0xa8, 0x47], &[0x18, 0x47]]; // blx r5; bx r3
         for code in calls {
-            assert!(Stack::of(code).calls_by_register, "{code:x?}");
+            assert!(decoded(code).calls_by_register, "{code:x?}");
         }
         // mov sp, r4; sub.w sp, sp, r3; add sp, r4; msr msp, r0
         let unknown: [&[u8]; 4] =
             [&[0xa5, 0x46], &[0xad, 0xeb, 0x03, 0x0d], &[0xa5, 0x44], &[0x80, 0xf3, 0x08, 0x88]];
         for code in unknown {
-            assert!(Stack::of(code).is_unbounded, "{code:x?}");
+            assert!(decoded(code).is_unbounded, "{code:x?}");
         }
     }
 }

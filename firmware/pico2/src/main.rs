@@ -21,7 +21,7 @@
 #![no_main]
 
 use defmt_rtt as _;
-use embassy_executor::Executor;
+use embassy_executor::{Executor, Spawner};
 use embassy_rp::flash::{self, Flash};
 use embassy_rp::gpio::{Level, Output};
 use embassy_rp::peripherals::{FLASH, PIO0, PIO1};
@@ -279,17 +279,25 @@ async fn motors(mut motors: Motors) -> ! {
     }
 }
 
+/// Initializes the board and starts both tasks.
+// Inlined, its stack frame, which holds copies of the board, would remain for the whole runtime.
+#[inline(never)]
+fn start(spawner: Spawner) {
+    let Some((board, inputs)) = Board::new() else {
+        defmt::error!("the memory map has no store");
+        return;
+    };
+    // Each task is spawned once, for which there is room.
+    if let Ok(polls) = polls(board) {
+        spawner.spawn(polls);
+    }
+    if let Ok(motors) = motors(inputs) {
+        spawner.spawn(motors);
+    }
+}
+
 #[cortex_m_rt::entry]
 fn main() -> ! {
     static mut EXECUTOR: Option<Executor> = None;
-    EXECUTOR.get_or_insert_with(Executor::new).run(|spawner| {
-        if let Some((board, inputs)) = Board::new()
-            && let (Ok(polls), Ok(motors)) = (polls(board), motors(inputs))
-        {
-            spawner.spawn(polls);
-            spawner.spawn(motors);
-        } else {
-            defmt::error!("the memory map has no store");
-        }
-    })
+    EXECUTOR.get_or_insert_with(Executor::new).run(start)
 }

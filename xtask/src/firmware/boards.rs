@@ -1,41 +1,93 @@
 //! The firmware of the further boards, whose chips QEMU does not emulate: it is linted, built, measured and searched for
-//! panics.
+//! panics. The table of all boards in the docs is that of this command.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use anyhow::{Context, ensure};
 use object::{Object, ObjectSection, SectionKind};
 
-use super::{build, memory, panics};
+use super::{build, memory, panics, stack};
 use crate::cargo;
 use crate::workspace::Workspace;
 use sonarfix_boards::Board;
 
-/// The board that is examined in detail, and emulated.
-const REFERENCE: &str = "stm32f405";
+/// Largest difference between a figure of the docs and the measured one, as a part of it: flash contains source paths, whose
+/// length depends on the checkout.
+const TOLERANCE: f64 = 0.05;
 
-/// Lints and builds the firmware of each further board, and checks the linked files; prints the size of all boards.
-pub fn check(reference: &[u8]) -> anyhow::Result<()> {
+/// The page with the table, and the start of the table's header.
+const PAGE: &str = "docs/firmware.md";
+const HEADER: &str = "| board | flash, bytes |";
+
+/// What is done with the table.
+#[derive(Debug, Clone, PartialEq, Eq, clap::Args)]
+pub struct Args {
+    /// Write the table into docs/firmware.md instead of comparing it.
+    #[arg(long)]
+    write: bool,
+}
+
+impl Args {
+    /// Compare.
+    pub const COMPARE: Self = Self { write: false };
+}
+
+/// Lints and builds the firmware of each further board, and checks the linked files; prints the table of all boards and
+/// compares it with that of the docs.
+pub fn check(reference: &[u8], args: &Args) -> anyhow::Result<()> {
     let firmware = Workspace::Firmware;
     let mut rows = Vec::new();
     for board in &sonarfix_boards::all()? {
-        if board.name == REFERENCE {
+        if board.package == build::NAME {
             rows.push(row(board, reference)?);
             continue;
         }
         let package = format!("--release --package {} --target {}", board.package, board.target);
         cargo::check(firmware.cargo(&format!("clippy {package} -- -D warnings")))?;
-        cargo::check(firmware.cargo(&format!("build {package}")))?;
-        let folder = firmware.target_folder().join(&board.target).join("release");
-        let program = build::read(&folder.join(&board.package))?;
+        let program = build::read(&build::of(board)?)?;
         panics::others(&program)?;
         rows.push(row(board, &program)?);
     }
-    println!(
-        "\n| board | flash, bytes | variables in RAM, bytes | lines of its own: code, comments | of its build files |"
+    let table = format!(
+        "{HEADER} variables in RAM, bytes | stack at most, bytes | lines of its own: code, comments | of its build files | shown by |\n\
+         |---|---|---|---|---|---|---|\n{}\n",
+        rows.join("\n")
     );
-    println!("|---|---|---|---|---|\n{}", rows.join("\n"));
+    println!("\n{table}");
+    let page = cargo::root().join(PAGE);
+    let text = fs::read_to_string(&page)?;
+    let written = in_page(&text).context("docs/firmware.md has no table of boards")?;
+    if args.write {
+        fs::write(&page, text.replace(written, &table))?;
+        return Ok(());
+    }
+    ensure!(
+        are_alike(written, &table),
+        "the table in {PAGE} differs by more than {:.0} %: run `cargo xtask boards --write`",
+        100.0 * TOLERANCE
+    );
     Ok(())
+}
+
+/// The table in the page.
+fn in_page(text: &str) -> Option<&str> {
+    let (before, rest) = text.split_once(HEADER)?;
+    let length = rest.find("\n\n")? + 1;
+    text.get(before.len()..before.len() + HEADER.len() + length)
+}
+
+/// Whether two tables differ by nothing but small differences of numbers.
+fn are_alike(one: &str, other: &str) -> bool {
+    let words = |text: &str| -> Vec<String> {
+        text.split([' ', ',', '\n']).filter(|word| !word.is_empty()).map(str::to_owned).collect()
+    };
+    let is_alike = |(one, other): (&String, &String)| match (one.parse(), other.parse()) {
+        (Ok(one), Ok(other)) => f64::abs(one - other) <= TOLERANCE * f64::max(one, other),
+        _ => one == other,
+    };
+    let (one, other) = (words(one), words(other));
+    one.len() == other.len() && one.iter().zip(&other).all(is_alike)
 }
 
 fn row(board: &Board, program: &[u8]) -> anyhow::Result<String> {
@@ -45,22 +97,47 @@ fn row(board: &Board, program: &[u8]) -> anyhow::Result<String> {
     let allocated = file.sections().filter(|section| section.address() > 0);
     let flash: u64 = allocated.filter(|s| in_flash(s.kind())).map(|section| section.size()).sum();
     let variables: u64 = memory::variables_of(&file).map(|section| section.size()).sum();
-    let folder = Workspace::Firmware.folder().join(board.package.trim_start_matches("sonarfix-"));
+    let stack = if board.target.starts_with("thumb") {
+        stack::bound(program)?.to_string()
+    } else {
+        let region = file.section_by_name(".stack").map_or(0, |section| section.size());
+        format!("not bounded; has {region}")
+    };
+    let (own, build) = (lines_of(board)?, lines_of_build(board)?);
+    let shown =
+        if board.package == build::NAME { "building and emulation" } else { "building only" };
+    Ok(format!(
+        "| {} | {flash} | {variables} | {stack} | {}, {} | {build} | {shown} |",
+        board.title, own.0, own.1
+    ))
+}
+
+fn folder(board: &Board) -> PathBuf {
+    Workspace::Firmware.folder().join(board.package.trim_start_matches("sonarfix-"))
+}
+
+/// Lines of code and of comments below the board's `src`.
+fn lines_of(board: &Board) -> anyhow::Result<(usize, usize)> {
     let (mut code, mut comments) = (0, 0);
     // A board that takes the source of another has no folder for it.
-    for entry in fs::read_dir(folder.join("src")).into_iter().flatten() {
+    for entry in fs::read_dir(folder(board).join("src")).into_iter().flatten() {
         let lines = lines(&entry?.path())?;
         code += lines.0;
         comments += lines.1;
     }
+    Ok((code, comments))
+}
+
+/// Lines of code of the files beside it.
+fn lines_of_build(board: &Board) -> anyhow::Result<usize> {
+    let beside = ["Cargo.toml", "build.rs", "partitions.csv"].map(|name| folder(board).join(name));
     let mut build = 0;
-    let beside = ["Cargo.toml", "build.rs", "partitions.csv"].map(|name| folder.join(name));
     for file in beside.into_iter().chain([cargo::root().join(&board.memory)]) {
         if file.exists() {
             build += lines(&file)?.0;
         }
     }
-    Ok(format!("| {} | {flash} | {variables} | {code}, {comments} | {build} |", board.title))
+    Ok(build)
 }
 
 /// Lines of code and of comments in a file: Rust, TOML, a linker script, or the language of state machines.
@@ -84,6 +161,18 @@ fn lines(file: &Path) -> anyhow::Result<(usize, usize)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_table_is_found_and_small_differences_are_tolerated() {
+        let table = format!("{HEADER} x |\n|---|---|\n| Pico | 1000 | 12, 0 | building |\n");
+        let page = format!("text\n\n{table}\nmore\n\nmore\n");
+        assert_eq!(in_page(&page), Some(table.as_str()));
+        assert_eq!(in_page("text"), None);
+        assert!(are_alike(&table, &table.replace("1000", "1040")));
+        for (from, to) in [("1000", "1100"), ("12, 0", "12, 1"), ("building", "emulation")] {
+            assert!(!are_alike(&table, &table.replace(from, to)), "{to}");
+        }
+    }
 
     #[test]
     fn comments_of_all_languages_are_not_counted_as_code() {

@@ -1,9 +1,10 @@
-//! Builds the reference board's firmware.
+//! Builds the firmware.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context, ensure};
+use sonarfix_boards::Board;
 
 use super::frames;
 use crate::cargo;
@@ -13,7 +14,7 @@ const TARGET: &str = "thumbv7em-none-eabihf";
 /// Its package, and the name of the program.
 pub const NAME: &str = "sonarfix-stm32f405";
 
-/// Builds the firmware; returns the path of the linked file.
+/// Builds the firmware of the reference board; returns the path of the linked file.
 pub fn release() -> anyhow::Result<PathBuf> {
     let found = Command::new("flip-link").arg("--version").output();
     ensure!(
@@ -22,6 +23,17 @@ pub fn release() -> anyhow::Result<PathBuf> {
     );
     cargo::check(Workspace::Firmware.cargo("build --release"))?;
     Ok(Workspace::Firmware.target_folder().join(TARGET).join("release").join(NAME))
+}
+
+/// Builds the firmware of a board; returns the path of the linked file.
+pub fn of(board: &Board) -> anyhow::Result<PathBuf> {
+    if board.package == NAME {
+        return release();
+    }
+    let firmware = Workspace::Firmware;
+    let package = format!("build --release --package {} --target {}", board.package, board.target);
+    cargo::check(firmware.cargo(&package))?;
+    Ok(firmware.target_folder().join(&board.target).join("release").join(&board.package))
 }
 
 /// Builds the firmware with the compiler's own stack sizes in it; returns the path of the linked file, which is not

@@ -35,6 +35,13 @@ pub fn variables(bytes: &[u8]) -> anyhow::Result<u64> {
     Ok(end.context("the program has no variables")? - top)
 }
 
+/// Bytes of RAM below the stack's top.
+pub fn room_of_stack(bytes: &[u8]) -> anyhow::Result<u64> {
+    /// Where every Cortex-M has its RAM.
+    const RAM: u64 = 0x2000_0000;
+    Ok(stack_top(&object::File::parse(bytes)?)?.saturating_sub(RAM))
+}
+
 /// Addresses of the functions in the vector table.
 pub fn handlers(bytes: &[u8]) -> anyhow::Result<BTreeSet<u64>> {
     let file = object::File::parse(bytes)?;

@@ -3,7 +3,7 @@
 //!
 //! - **Frames** are the bytes by which a function's instructions lower the stack.
 //! - **Calls** are the relocations, and the calls of a function to itself. A call through a register may reach any function
-//!   whose address is taken by reachable code.
+//!   whose address is taken by reachable code, except for handlers, which the core calls, and those in [`ONLY_BY`].
 //! - **Recursion** is an error.
 //! - **Interrupts** are assumed to nest, each once, whatever their priorities, and each with a full floating-point context.
 //! - **Panics** and fault handlers are excluded: the program has ended.
@@ -21,8 +21,12 @@ const START: &str = "Reset";
 /// Handlers that do not return.
 const ENDS: [&str; 3] = [START, "HardFault", "DefaultHandler"];
 /// The exception frame: 26 words with the floating-point registers, and one for alignment to eight bytes (`ARMv7-M
-/// Architecture Reference Manual`, B1.5.7).
+/// Architecture Reference Manual`, B1.5.7). A core without floating-point unit saves less.
 const EXCEPTION: u64 = 4 * 27;
+/// Functions whose address is taken, and the only ones that call them through a register, by parts of their names: an executor
+/// polls its tasks, and nothing else does.
+const ONLY_BY: [(&str, &str); 1] =
+    [("embassy_executor::raw::TaskStorage<F>::poll", "embassy_executor::platform::")];
 /// Limit of all RAM: 8 KiB for the loop, 4 KiB for the state of the search, 1 KiB for its stack. 1 KiB more is for the source
 /// of repeated echoes of each recent wall: 192 bytes of the localizer, of which the start of the loop has four copies on
 /// its stack. The map stays in flash.
@@ -31,39 +35,77 @@ const BAR: u64 = (8 + 4 + 1 + 1) * 1024;
 /// one of them, none is called.
 const FORMATTING: &str = "core::fmt::";
 
-/// Prints the deepest paths and checks the RAM; returns the total depth.
+/// The deepest path from a root.
+struct Deepest {
+    root: String,
+    /// With what the core saves.
+    depth: u64,
+    saved: u64,
+    /// The functions on it, each with its frame.
+    path: Vec<(String, u64)>,
+}
+
+/// Prints the deepest paths, and checks the RAM of the reference board; returns the total depth.
 pub fn check(bytes: &[u8]) -> anyhow::Result<u64> {
-    let program = Program::parse(bytes)?;
-    let roots = roots(&program, bytes)?;
-    let mut depths = Depths::of(&program, &roots)?;
-    let mut all = 0;
-    println!("\n| stack at its deepest, down from | bytes |\n|---|---|");
-    for root in roots {
-        let name = depths.name(root);
-        let saved = if name == START { 0 } else { EXCEPTION };
-        let depth = saved + depths.depth(root)?;
-        println!("| **`{name}`** | **{depth}** |");
-        if saved > 0 {
-            println!("| saved by the core | {saved} |");
-        }
-        for (name, bytes) in depths.deepest_path(root).into_iter().filter(|(_, bytes)| *bytes > 0) {
-            println!("| `{name}` | {bytes} |");
-        }
-        all += depth;
-    }
-    let variables = memory::variables(bytes)?;
-    println!("| **all stack, one in another** | **{all}** |");
-    println!("| all variables | {variables} |");
-    println!("| **all RAM** (bar: {BAR}) | **{}** |", variables + all);
-    ensure!(variables + all <= BAR, "the RAM exceeds its limit");
+    let all = print(bytes)?;
+    let ram = memory::variables(bytes)? + all;
+    println!("| **all RAM** (bar: {BAR}) | **{ram}** |");
+    ensure!(ram <= BAR, "the RAM exceeds its limit");
     Ok(all)
 }
 
+/// Prints the deepest paths of a program for a Cortex-M; returns the total depth.
+pub fn print(bytes: &[u8]) -> anyhow::Result<u64> {
+    let deepest = deepest(bytes)?;
+    println!("\n| stack at its deepest, down from | bytes |\n|---|---|");
+    for Deepest { root, depth, saved, path } in &deepest {
+        println!("| **`{root}`** | **{depth}** |");
+        if *saved > 0 {
+            println!("| saved by the core | {saved} |");
+        }
+        for (name, bytes) in path.iter().filter(|(_, bytes)| *bytes > 0) {
+            println!("| `{name}` | {bytes} |");
+        }
+    }
+    let all = total(&deepest);
+    println!("| **all stack, one in another** | **{all}** |");
+    println!("| all variables | {} |", memory::variables(bytes)?);
+    Ok(all)
+}
+
+/// The total depth of the stack of a program for a Cortex-M, which must fit below the variables.
+pub fn bound(bytes: &[u8]) -> anyhow::Result<u64> {
+    let all = total(&deepest(bytes)?);
+    let room = memory::room_of_stack(bytes)?;
+    ensure!(all <= room, "the stack may take {all} bytes and has {room}");
+    Ok(all)
+}
+
+fn total(deepest: &[Deepest]) -> u64 {
+    deepest.iter().map(|deepest| deepest.depth).sum()
+}
+
+fn deepest(bytes: &[u8]) -> anyhow::Result<Vec<Deepest>> {
+    let program = Program::parse(bytes)?;
+    let handlers = memory::handlers(bytes)?;
+    let roots = roots(&program, &handlers)?;
+    let mut depths = Depths::of(&program, &roots, handlers)?;
+    let deepest = |root| {
+        let name = depths.name(root);
+        let saved = if name == START { 0 } else { EXCEPTION };
+        let depth = saved + depths.depth(root)?;
+        let path = depths.deepest_path(root).into_iter();
+        let path = path.map(|(name, bytes)| (name.to_owned(), bytes)).collect();
+        Ok(Deepest { root: name.to_owned(), depth, saved, path })
+    };
+    roots.iter().copied().map(deepest).collect()
+}
+
 /// The start, and the handlers of all interrupts.
-fn roots(program: &Program, bytes: &[u8]) -> anyhow::Result<Vec<u64>> {
+fn roots(program: &Program, handlers: &BTreeSet<u64>) -> anyhow::Result<Vec<u64>> {
     let start = program.address_of(START).context("the program has no start")?;
     let mut roots = vec![start];
-    for at in memory::handlers(bytes)? {
+    for &at in handlers {
         let handler = program.function(at).context("a handler that is no function")?;
         if !handler.names.iter().any(|name| ENDS.contains(&name.as_str())) {
             roots.push(at);
@@ -75,6 +117,8 @@ fn roots(program: &Program, bytes: &[u8]) -> anyhow::Result<Vec<u64>> {
 /// How deep the stack is below each function.
 struct Depths<'a> {
     program: &'a Program,
+    /// The handlers in the vector table, which no function calls.
+    handlers: BTreeSet<u64>,
     /// The possible targets of a call through a register.
     taken: BTreeSet<u64>,
     /// By address: the depth, and the next function on the deepest path.
@@ -84,9 +128,9 @@ struct Depths<'a> {
 }
 
 impl<'a> Depths<'a> {
-    fn of(program: &'a Program, roots: &[u64]) -> anyhow::Result<Self> {
+    fn of(program: &'a Program, roots: &[u64], handlers: BTreeSet<u64>) -> anyhow::Result<Self> {
         let (taken, known, under_way) = Default::default();
-        let mut depths = Self { program, taken, known, under_way };
+        let mut depths = Self { program, handlers, taken, known, under_way };
         // Functions that are called through a register may take further addresses.
         loop {
             let reached = depths.reached(roots);
@@ -114,7 +158,11 @@ impl<'a> Depths<'a> {
         let Some(function) = self.program.function(at) else { return BTreeSet::new() };
         let mut called = function.calls.clone();
         if function.stack.calls_by_register {
-            called.extend(&self.taken);
+            let may_call = |taken: &u64| {
+                let rule = ONLY_BY.iter().find(|(part, _)| self.name(*taken).contains(part));
+                rule.is_none_or(|(_, caller)| function.name().contains(caller))
+            };
+            called.extend(self.taken.iter().copied().filter(may_call));
         }
         called.retain(|&called| !self.name(called).contains(PANIC));
         called
@@ -126,7 +174,7 @@ impl<'a> Depths<'a> {
         let addresses = functions.flat_map(|function| &function.takes);
         let mut taken: BTreeSet<u64> =
             addresses.flat_map(|&address| self.program.callable_through(address)).collect();
-        taken.retain(|&at| !self.name(at).contains(FORMATTING));
+        taken.retain(|at| !self.name(*at).contains(FORMATTING) && !self.handlers.contains(at));
         taken
     }
 
@@ -202,7 +250,7 @@ mod tests {
 
     fn depth(functions: Vec<(u64, Function)>, data: Vec<(u64, Vec<u64>)>) -> anyhow::Result<u64> {
         let program = Program::made_of(functions, data);
-        Depths::of(&program, &[1])?.depth(1)
+        Depths::of(&program, &[1], BTreeSet::from([9]))?.depth(1)
     }
 
     #[test]
@@ -239,6 +287,24 @@ mod tests {
             let error = depth(functions, Vec::new()).unwrap_err().to_string();
             assert!(error.contains("recursion: start → "), "{error}");
         }
+    }
+
+    #[test]
+    fn handlers_and_tasks_are_called_by_core_and_executor_only() {
+        let handler = vec![
+            (1, by_register(function("start", 8, &[], &[9]))),
+            (9, function("handler", 50, &[], &[])),
+        ];
+        assert_eq!(depth(handler, Vec::new()).unwrap(), 8);
+        let tasks = |executor| {
+            let (task, log) = ("embassy_executor::raw::TaskStorage<F>::poll", "log");
+            let run = by_register(function(executor, 8, &[], &[2]));
+            let (task, log) = (function(task, 50, &[3], &[]), function(log, 4, &[], &[]));
+            vec![(1, run), (2, task), (3, by_register(log))]
+        };
+        let executor = "embassy_executor::platform::thread::Executor::run";
+        assert_eq!(depth(tasks(executor), Vec::new()).unwrap(), 62);
+        assert_eq!(depth(tasks("another"), Vec::new()).unwrap(), 8);
     }
 
     #[test]
