@@ -52,8 +52,25 @@ fn copy_repository() -> anyhow::Result<()> {
     let mut command = std::process::Command::new("git");
     command.args(["ls-files", "--cached", "--others", "--exclude-standard"]);
     command.current_dir(cargo::root());
-    for file in cargo::printed(command)?.lines() {
+    let listed = cargo::printed(command)?;
+    let files: BTreeSet<PathBuf> = listed.lines().map(|file| folder().join(file)).collect();
+    remove_others(&folder(), &files)?;
+    for file in listed.lines() {
         copy(&cargo::root().join(file), &folder().join(file))?;
+    }
+    Ok(())
+}
+
+/// Removes what has been removed from the repository since the last copy.
+fn remove_others(folder: &Path, files: &BTreeSet<PathBuf>) -> anyhow::Result<()> {
+    let Ok(entries) = std::fs::read_dir(folder) else { return Ok(()) };
+    for entry in entries {
+        let path = entry?.path();
+        if path.is_dir() {
+            remove_others(&path, files)?;
+        } else if !files.contains(&path) {
+            std::fs::remove_file(path)?;
+        }
     }
     Ok(())
 }

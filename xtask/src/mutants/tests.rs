@@ -107,8 +107,8 @@ impl Program {
         command
     }
 
-    /// Its tests, each run alone without a mutant.
-    pub fn tests(&self, program: usize, effort: Effort) -> anyhow::Result<Vec<Test>> {
+    /// Its tests with this part of a name, each run alone without a mutant.
+    pub fn tests(&self, program: usize, part: &str, effort: Effort) -> anyhow::Result<Vec<Test>> {
         let mut list = self.command(effort);
         list.args(["--list", "--format", "terse"]);
         let ignored = {
@@ -120,6 +120,7 @@ impl Program {
         let list = cargo::printed(list)?;
         let names = list.lines().filter(|line| !ignored.contains(line));
         let names = names.filter_map(|line| line.strip_suffix(": test"));
+        let names = names.filter(|name| name.contains(part));
         let mut tests = Vec::new();
         for name in names {
             if let Some(test) = self.test(program, name, effort)? {

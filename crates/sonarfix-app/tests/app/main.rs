@@ -15,6 +15,7 @@ mod load;
 mod motors;
 mod power_cut;
 mod random;
+mod resume;
 mod rig;
 mod robot_file;
 mod room;
