@@ -562,4 +562,49 @@ mod tests {
         // A range that is too long is evidence, however well the wall is known to be occluded.
         assert!(again.explain(&parameters, Some(Metres(3.0)), Others::NONE).evidence > 0.5);
     }
+
+    proptest! {
+        /// The logarithms of the score, by the definitions of their fields.
+        #[test]
+        fn log_shares_are_those_of_the_mixture_at_half_the_longest_range(
+            parameters in any_parameters(), longest in 1.0_f32..6.0, anywhere in 0.05_f32..0.5,
+        ) {
+            let shares = parameters.log_shares(Metres(longest), anywhere);
+            let wide = |value: f32| f64::from(value);
+            let range = 0.5 * wide(longest);
+            let occluded = range / (range + wide(parameters.free_path.0));
+            let per_metre = 1.0 / (range * wide(anywhere));
+            let (missed, short, long) =
+                (wide(parameters.missed), wide(parameters.short), wide(parameters.long));
+            let expected = [
+                (shares.answers, 1.0 - missed - short - long),
+                (shares.misses, missed + short + long),
+                (shares.before, (short + occluded * 0.735) * per_metre),
+                (shares.behind, (long + occluded * 0.065) * per_metre),
+                (shares.silence, (missed + occluded * 0.2) / 0.3),
+            ];
+            for (is, share) in expected {
+                let expected = share.max(0.01).ln();
+                prop_assert!((wide(is) - expected).abs() < 1e-3, "{} {}", is, expected);
+            }
+        }
+
+        /// What another reflector explains is taken from the target's share, and counts as mapped.
+        #[test]
+        fn an_echo_of_another_reflector_is_mapped(
+            parameters in any_parameters(), expected in any_expectation(), density in 0.01_f32..5.0,
+            sigmas in -1.5_f32..1.5,
+        ) {
+            let range = expected.range + Metres(sigmas * sqrt(expected.variance.0));
+            let alone = expected.explain(&parameters, Some(range), Others::NONE);
+            let others = Others { density, ..Others::NONE };
+            let with = expected.explain(&parameters, Some(range), others);
+            prop_assert!((alone.mapped - alone.association).abs() < 1e-6);
+            // β is the target's density over the total, to which that of the other is added.
+            let of_other = 1.0 - with.association / alone.association;
+            prop_assert!(
+                (with.mapped - with.association - of_other).abs() < 1e-4, "{with:?} {alone:?}"
+            );
+        }
+    }
 }

@@ -186,3 +186,62 @@ impl Innovation {
         self.value.0 * self.value.0 / self.variance.0
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::Radians;
+
+    #[test]
+    fn squares_and_sum_have_every_entry() {
+        let h = MeasurementJacobian { x: 2.0, y: -3.0, h: 5.0, k: 7.0 };
+        assert_eq!(h.squared(), MeasurementJacobian { x: 4.0, y: 9.0, h: 25.0, k: 49.0 });
+        assert!((h.sum() - 11.0).abs() < 1e-6);
+    }
+
+    /// The range to a point, and its derivatives, against differences in `f64`.
+    #[test]
+    fn a_point_has_the_derivatives_of_its_distance() {
+        let (x, y, heading, scale) = (1.3_f64, -0.7_f64, 0.4_f64, 0.02_f64);
+        let (ahead, aside) = (0.11_f64, 0.05_f64);
+        let point = (3.1_f64, 1.9_f64);
+        let range = |x: f64, y: f64, heading: f64, scale: f64| {
+            let (sin, cos) = heading.sin_cos();
+            let sonar = (x + cos * ahead - sin * aside, y + sin * ahead + cos * aside);
+            (1.0 + scale) * (point.0 - sonar.0).hypot(point.1 - sonar.1)
+        };
+        #[expect(clippy::cast_possible_truncation, reason = "a few metres")]
+        let [fx, fy, fheading, fscale, fahead, faside] =
+            [x, y, heading, scale, ahead, aside].map(|value| value as f32);
+        let state = StateEstimate {
+            x: Metres(fx),
+            y: Metres(fy),
+            heading: Radians(fheading),
+            range_scale: fscale,
+            ..StateEstimate::default()
+        };
+        let sonar = SonarPosition::new(Point::new(fahead, faside), &state);
+        let (sin, cos) = heading.sin_cos();
+        let toward =
+            (point.0 - (x + cos * ahead - sin * aside), point.1 - (y + sin * ahead + cos * aside));
+        let distance = toward.0.hypot(toward.1);
+        #[expect(clippy::cast_possible_truncation, reason = "a few metres")]
+        let expected = ExpectedRange::from_point(
+            Vector { x: (toward.0 / distance) as f32, y: (toward.1 / distance) as f32 },
+            distance as f32,
+            &sonar,
+        );
+        let step = 1e-6;
+        let central = |plus: f64, minus: f64| (plus - minus) / (2.0 * step);
+        let h = expected.jacobian();
+        for (is, expected) in [
+            (h.x, central(range(x + step, y, heading, scale), range(x - step, y, heading, scale))),
+            (h.y, central(range(x, y + step, heading, scale), range(x, y - step, heading, scale))),
+            (h.h, central(range(x, y, heading + step, scale), range(x, y, heading - step, scale))),
+            (h.k, central(range(x, y, heading, scale + step), range(x, y, heading, scale - step))),
+            (expected.range.0, range(x, y, heading, scale)),
+        ] {
+            assert!((f64::from(is) - expected).abs() < 1e-5, "{is} {expected}");
+        }
+    }
+}

@@ -141,3 +141,6 @@ impl Beam {
         self.answers_first(self.place(foot))
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -17,11 +17,15 @@ mod health;
 #[cfg(test)]
 mod jacobians;
 #[cfg(test)]
+mod limits;
+#[cfg(test)]
 mod map;
 #[cfg(test)]
 mod navigator;
 #[cfg(test)]
 mod oracle;
+#[cfg(test)]
+mod planning;
 #[cfg(test)]
 mod refusals;
 #[cfg(test)]

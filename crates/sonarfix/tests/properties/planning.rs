@@ -1,0 +1,203 @@
+//! Gain, noise and duration of a planned ping, against eqs. (13), (21) and (22) of `docs/model.md` in `f64`.
+
+use proptest::prelude::*;
+use sonarfix::config::{Config, PingSchedule, ServoTiming};
+use sonarfix::ekf::{StandardDeviations, StateEstimate};
+use sonarfix::localizer::{Fix, Localizer};
+use sonarfix::map::{Map, Wall, WallId};
+use sonarfix::motion::WheelTravel;
+use sonarfix::pose::Point;
+use sonarfix::servo::ServoMotion;
+use sonarfix::units::{Duration, Instant, Metres, Radians};
+
+use crate::strategies::{any_deviation, config_for_rooms};
+
+/// Accuracy of the map, and the distance within which its error is common to two ranges, metres.
+const MAP_ACCURACY: f64 = 0.02;
+const CORRELATION: f64 = 1.0;
+const SPEED_OF_SOUND: f64 = 343.4;
+
+fn at(tick: u64) -> Instant {
+    Instant::from_ticks(tick * 100_000)
+}
+
+/// A robot with a sonar beside its centre that weighs heading and wheels as much as its position.
+fn config() -> Config {
+    let mut config = config_for_rooms(Point::new(0.07, 0.03));
+    (config.weights.heading, config.weights.wheels) = (Metres(1.7), Metres(13.0));
+    config.echo.map_accuracy = Metres(MAP_ACCURACY as f32);
+    config.sonar.max_range = Metres(8.0);
+    config.sonar.timing.schedule = PingSchedule::AsFastAsPossible;
+    config.sonar.timing.cycle = Duration::from_ticks(60_000);
+    config.sonar.timing.servo = ServoTiming::SG90;
+    config
+}
+
+/// A wall across x at this distance, 20 m long.
+fn across(x: f32) -> Wall {
+    Wall::new(Point::new(x, -10.0), Point::new(x, 10.0)).unwrap()
+}
+
+fn started<'m>(walls: &'m [Wall], deviation: StandardDeviations) -> Localizer<'m> {
+    let state = StateEstimate::default();
+    Localizer::resume(config(), Map::new(walls), state, deviation, at(0)).unwrap()
+}
+
+/// Of the range of a wall across x, whose sonar looks along x at a small angle: P Hᵀ and H P Hᵀ.
+fn projected(localizer: &Localizer, distance: f64) -> ([f64; 7], f64) {
+    let filter = localizer.filter();
+    let (state, p) = (filter.state(), filter.covariance().map(f64::from));
+    let (sin, cos) = state.heading.0.to_f64().sin_cos();
+    let stretch = 1.0 + state.range_scale.to_f64();
+    let lever_y = 0.07 * sin + 0.03 * cos;
+    // The range is (1 + κ)(X − x − λ_x), and ∂λ_x/∂ψ = −λ_y.
+    let h = [-stretch, 0.0, stretch * lever_y, 0.0, 0.0, 0.0, distance];
+    let m: [f64; 7] = std::array::from_fn(|row| (0..7).map(|k| p[(row, k)] * h[k]).sum());
+    (m, (0..7).map(|k| h[k] * m[k]).sum())
+}
+
+trait ToF64 {
+    fn to_f64(self) -> f64;
+}
+
+impl ToF64 for f32 {
+    fn to_f64(self) -> f64 {
+        f64::from(self)
+    }
+}
+
+/// The distance of the sonar from the wall across `x`.
+fn distance(localizer: &Localizer, x: f64) -> f64 {
+    let state = localizer.filter().state();
+    let (sin, cos) = state.heading.0.to_f64().sin_cos();
+    x - state.x.0.to_f64() - (0.07 * cos - 0.03 * sin)
+}
+
+/// R of a range, with the error of the map after this distance since the last range of the wall.
+fn noise(range: f64, travelled: Option<f64>) -> f64 {
+    let sonar = config().sonar.noise;
+    let proportional = f64::from(sonar.per_metre) * range;
+    let repeated = travelled.map_or(1.0, |travelled| {
+        let ratio = (2.0 * CORRELATION / travelled).min(50.0);
+        (1.0 + ratio * ratio).sqrt()
+    });
+    f64::from(sonar.floor.0).powi(2) + proportional.powi(2) + MAP_ACCURACY.powi(2) * repeated
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// Eq. (21) with all weights, and a covariance that travels have correlated.
+    #[test]
+    fn the_gain_is_the_expected_decrease_of_the_weighted_variances(
+        deviation in any_deviation(), x in 1.5_f32..6.0, steps in 1_u64..30, curve in -0.001_f32..0.001,
+    ) {
+        let walls = [across(x)];
+        let deviation = StandardDeviations { heading: Radians(0.01), ..deviation };
+        let mut localizer = started(&walls, deviation);
+        for tick in 1..=steps {
+            localizer.odometry(at(tick), WheelTravel::new(0.02 + curve, 0.02 - curve)).unwrap();
+        }
+        let Ok(aim) = localizer.aim() else { return Ok(()) };
+        let distance = distance(&localizer, x.into());
+        let (m, variance) = projected(&localizer, distance);
+        let range = aim.range.0.to_f64();
+        let [mx, my, mh, right, left, ..] = m;
+        let (common, difference) = (f64::midpoint(right, left), right - left);
+        let wheels = 13.0_f64.powi(2) * (common * common + 0.25 * difference * difference);
+        let weighted = mx * mx + my * my + (1.7 * mh).powi(2) + wheels;
+        let gain = weighted / (noise(range, None) + variance);
+        let is = aim.why.gain.0.to_f64();
+        prop_assert!((is - gain).abs() <= 2e-3 * gain, "{is} {gain}");
+    }
+
+    /// The innovation's variance of a second range of a wall holds the error of the map, by the distance since the first.
+    #[test]
+    fn repeated_ranges_of_a_wall_share_the_error_of_the_map(
+        x in 3.0_f32..6.0, steps in 1_u64..60, length in 0.0005_f32..0.02,
+    ) {
+        let walls = [across(x)];
+        let mut localizer = started(&walls, StandardDeviations {
+            x: Metres(0.02), y: Metres(0.02), heading: Radians(0.005), ..StandardDeviations::default()
+        });
+        let first = localizer.aim().unwrap();
+        let fix = localizer.fix(&first, Some(first.range));
+        let check = |fix: Fix, variance: f64, range: f64, travelled| -> Result<(), TestCaseError> {
+            let Fix::Accepted(innovation) = fix else {
+                return Err(TestCaseError::fail(format!("{fix:?}")));
+            };
+            let expected = variance + noise(range, travelled);
+            let is = innovation.variance.0.to_f64();
+            prop_assert!((is - expected).abs() < 2e-3 * expected, "{is} {expected}");
+            Ok(())
+        };
+        let mut before = started(&walls, StandardDeviations {
+            x: Metres(0.02), y: Metres(0.02), heading: Radians(0.005), ..StandardDeviations::default()
+        });
+        check(fix, projected(&before, distance(&before, x.into())).1, first.range.0.to_f64(), None)?;
+        before = localizer.clone();
+        for tick in 1..=steps {
+            for localizer in [&mut before, &mut localizer] {
+                localizer.odometry(at(tick), WheelTravel::new(length, length)).unwrap();
+            }
+        }
+        let aim = localizer.aim().unwrap();
+        let (_, variance) = projected(&before, distance(&before, x.into()));
+        let fix = localizer.fix(&aim, Some(aim.range));
+        let travelled = f64::from(length) * steps as f64;
+        check(fix, variance, aim.range.0.to_f64(), Some(travelled))?;
+    }
+
+    /// The time of a ping: the servo's turn from the last bearing or the rest of the ranger, and the flight of the sound.
+    #[test]
+    fn the_duration_of_a_ping_is_that_of_turn_and_flight(
+        near in 1.0_f32..2.0, far in 2.5_f32..6.0, is_far_first in any::<bool>(),
+    ) {
+        // One ahead, one to the left: 90° apart.
+        let left = Wall::new(Point::new(-10.0, near), Point::new(10.0, near)).unwrap();
+        let walls = [across(far), left];
+        let deviation = StandardDeviations {
+            x: Metres(0.05), y: Metres(0.05), heading: Radians(0.005), ..StandardDeviations::default()
+        };
+        let mut localizer = started(&walls, deviation);
+        let first = if is_far_first { Radians(0.0) } else { Radians(core::f32::consts::FRAC_PI_2) };
+        let aim = localizer.aim_at(first).unwrap();
+        let fix = localizer.fix(&aim, Some(aim.range));
+        prop_assert!(matches!(fix, Fix::Accepted(_)), "{fix:?}");
+        let next = localizer.aim().unwrap();
+        let servo = ServoMotion::new(&ServoTiming::SG90);
+        let flight = |range: Metres| 2.0 * range.0.to_f64() / SPEED_OF_SOUND;
+        let rest = (0.06 - flight(aim.range)).max(0.0);
+        let turn = servo.settling(next.bearing - first).to_f64();
+        let expected = turn.max(rest) + flight(next.range);
+        let is = next.why.time.ticks() as f64 * 1e-6;
+        prop_assert!((is - expected).abs() < 5e-5, "{is} {expected}, {next:?}");
+    }
+
+    /// Of two walls that a beam is square to, the nearer one, whichever is the first in the map.
+    #[test]
+    fn at_a_bearing_the_nearest_wall_is_measured(
+        near in 1.1_f32..2.0, further in 1.3_f32..2.5, half in 11.0_f32..13.0, is_first in any::<bool>(),
+    ) {
+        let mut config = config();
+        config.sonar.cone = Radians::from_degrees(15.0);
+        config.sonar.mount = Point::default();
+        let foot = |distance: f32, degrees: f32| {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            let end = |along: f32| {
+                Point::new(distance * cos - along * sin, distance * sin + along * cos)
+            };
+            Wall::new(end(-0.1), end(0.1)).unwrap()
+        };
+        let (one, other) = (foot(near, half), foot(near * further, -half));
+        let walls = if is_first { [one, other] } else { [other, one] };
+        let deviation = StandardDeviations {
+            x: Metres(1e-3), y: Metres(1e-3), heading: Radians(1e-3), ..StandardDeviations::default()
+        };
+        let state = StateEstimate::default();
+        let localizer =
+            Localizer::resume(config, Map::new(&walls), state, deviation, at(0)).unwrap();
+        let aim = localizer.aim_at(Radians(0.0)).unwrap();
+        prop_assert_eq!(aim.wall, WallId(u32::from(!is_first)));
+    }
+}
