@@ -39,9 +39,9 @@ pub struct Args {
     /// Only the mutants that survived before, with more cases and with the tests that take long.
     #[arg(long)]
     survivors: bool,
-    /// Only the tests whose name contains this: for the survivors of the others, after new tests.
+    /// Only the tests whose name contains one of these: for the survivors of the others, after new tests.
     #[arg(long)]
-    tests: Option<String>,
+    tests: Vec<String>,
     /// Also those that have a result.
     #[arg(long)]
     again: bool,
@@ -74,9 +74,8 @@ fn measure(args: &Args, mutants: &[(u32, Mutant)], results: &mut Results) -> any
         longest: Duration::from_secs(args.longest.unwrap_or(longest)),
     };
     let mut tests = Vec::new();
-    let part = args.tests.as_deref().unwrap_or_default();
     for (index, program) in programs.iter().enumerate() {
-        tests.extend(program.tests(index, part, effort)?);
+        tests.extend(program.tests(index, &args.tests, effort)?);
     }
     tests.sort_by_key(|test| test.time);
     eprintln!("{} mutants, {} built, {} tests", mutants.len(), built.len(), tests.len());

@@ -107,7 +107,7 @@ impl Program {
         command
     }
 
-    /// Its tests with this part of a name, each run alone without a mutant.
+    /// Its tests with one of these parts in their names, or all, each run alone without a mutant.
     pub fn tests(&self, program: usize, part: &str, effort: Effort) -> anyhow::Result<Vec<Test>> {
         let mut list = self.command(effort);
         list.args(["--list", "--format", "terse"]);
@@ -120,7 +120,8 @@ impl Program {
         let list = cargo::printed(list)?;
         let names = list.lines().filter(|line| !ignored.contains(line));
         let names = names.filter_map(|line| line.strip_suffix(": test"));
-        let names = names.filter(|name| name.contains(part));
+        let names =
+            names.filter(|name| parts.is_empty() || parts.iter().any(|it| name.contains(&**it)));
         let mut tests = Vec::new();
         for name in names {
             if let Some(test) = self.test(program, name, effort)? {

@@ -121,8 +121,8 @@ proptest! {
         let at = known.at(&start);
         let state = part([5.0, 6.0, 0.7, 0.0, 0.0, 0.0, 0.0], known.state.to_array());
         let deviation = part([0.03, 0.03, 0.04, 0.0, 0.0, 0.0, 0.0], known.deviation.to_array());
-        prop_assert_eq!(at.state.to_array(), state);
-        prop_assert_eq!(at.deviation.to_array(), deviation);
+        prop_assert_eq!(at.state.to_array().map(f32::to_bits), state.map(f32::to_bits));
+        prop_assert_eq!(at.deviation.to_array().map(f32::to_bits), deviation.map(f32::to_bits));
         let whole = Resumed { state: at.state, deviation: at.deviation, has_pose: true, ..known };
         prop_assert_eq!(at, Resumed { is_pose_interrupted: false, ..whole });
     }

@@ -13,7 +13,7 @@ use sonarfix::units::{Duration, Instant, Metres, Radians};
 use crate::strategies::{any_deviation, config_for_rooms};
 
 /// Accuracy of the map, and the distance within which its error is common to two ranges, metres.
-const MAP_ACCURACY: f64 = 0.02;
+const MAP_ACCURACY: f32 = 0.02;
 const CORRELATION: f64 = 1.0;
 const SPEED_OF_SOUND: f64 = 343.4;
 
@@ -25,7 +25,7 @@ fn at(tick: u64) -> Instant {
 fn config() -> Config {
     let mut config = config_for_rooms(Point::new(0.07, 0.03));
     (config.weights.heading, config.weights.wheels) = (Metres(1.7), Metres(13.0));
-    config.echo.map_accuracy = Metres(MAP_ACCURACY as f32);
+    config.echo.map_accuracy = Metres(MAP_ACCURACY);
     config.sonar.max_range = Metres(8.0);
     config.sonar.timing.schedule = PingSchedule::AsFastAsPossible;
     config.sonar.timing.cycle = Duration::from_ticks(60_000);
@@ -38,7 +38,7 @@ fn across(x: f32) -> Wall {
     Wall::new(Point::new(x, -10.0), Point::new(x, 10.0)).unwrap()
 }
 
-fn started<'m>(walls: &'m [Wall], deviation: StandardDeviations) -> Localizer<'m> {
+fn started(walls: &[Wall], deviation: StandardDeviations) -> Localizer<'_> {
     let state = StateEstimate::default();
     Localizer::resume(config(), Map::new(walls), state, deviation, at(0)).unwrap()
 }
@@ -81,7 +81,9 @@ fn noise(range: f64, travelled: Option<f64>) -> f64 {
         let ratio = (2.0 * CORRELATION / travelled).min(50.0);
         (1.0 + ratio * ratio).sqrt()
     });
-    f64::from(sonar.floor.0).powi(2) + proportional.powi(2) + MAP_ACCURACY.powi(2) * repeated
+    f64::from(sonar.floor.0).powi(2)
+        + proportional.powi(2)
+        + MAP_ACCURACY.to_f64().powi(2) * repeated
 }
 
 proptest! {
@@ -114,7 +116,7 @@ proptest! {
     /// The innovation's variance of a second range of a wall holds the error of the map, by the distance since the first.
     #[test]
     fn repeated_ranges_of_a_wall_share_the_error_of_the_map(
-        x in 3.0_f32..6.0, steps in 1_u64..60, length in 0.0005_f32..0.02,
+        x in 3.0_f32..6.0, steps in 1_u16..60, length in 0.0005_f32..0.02,
     ) {
         let walls = [across(x)];
         let mut localizer = started(&walls, StandardDeviations {
@@ -138,13 +140,13 @@ proptest! {
         before = localizer.clone();
         for tick in 1..=steps {
             for localizer in [&mut before, &mut localizer] {
-                localizer.odometry(at(tick), WheelTravel::new(length, length)).unwrap();
+                localizer.odometry(at(tick.into()), WheelTravel::new(length, length)).unwrap();
             }
         }
         let aim = localizer.aim().unwrap();
         let (_, variance) = projected(&before, distance(&before, x.into()));
         let fix = localizer.fix(&aim, Some(aim.range));
-        let travelled = f64::from(length) * steps as f64;
+        let travelled = f64::from(length) * f64::from(steps);
         check(fix, variance, aim.range.0.to_f64(), Some(travelled))?;
     }
 
@@ -170,7 +172,7 @@ proptest! {
         let rest = (0.06 - flight(aim.range)).max(0.0);
         let turn = servo.settling(next.bearing - first).to_f64();
         let expected = turn.max(rest) + flight(next.range);
-        let is = next.why.time.ticks() as f64 * 1e-6;
+        let is = f64::from(u32::try_from(next.why.time.ticks()).unwrap()) * 1e-6;
         prop_assert!((is - expected).abs() < 5e-5, "{is} {expected}, {next:?}");
     }
 
