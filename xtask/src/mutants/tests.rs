@@ -108,7 +108,12 @@ impl Program {
     }
 
     /// Its tests with one of these parts in their names, or all, each run alone without a mutant.
-    pub fn tests(&self, program: usize, part: &str, effort: Effort) -> anyhow::Result<Vec<Test>> {
+    pub fn tests(
+        &self,
+        program: usize,
+        parts: &[String],
+        effort: Effort,
+    ) -> anyhow::Result<Vec<Test>> {
         let mut list = self.command(effort);
         list.args(["--list", "--format", "terse"]);
         let ignored = {
