@@ -8,6 +8,7 @@
 mod copy;
 mod edits;
 mod mutant;
+mod reasons;
 mod tests;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -20,6 +21,7 @@ use anyhow::Context;
 
 use crate::cargo;
 use mutant::Mutant;
+use reasons::Reasons;
 use tests::{Effort, End, Program, Test};
 
 /// Tests up to this time run before all others, in one process.
@@ -60,7 +62,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     if !args.results {
         measure(args, &mutants, &mut results)?;
     }
-    print!("{}", table(&mutants, &results)?);
+    print!("{}", table(&mutants, &results, &reasons::read()?)?);
     Ok(())
 }
 
@@ -160,29 +162,68 @@ struct Counts {
     all: u32,
     caught: u32,
     unbuilt: u32,
-    survived: u32,
+    explained: u32,
+    unexplained: u32,
 }
 
-/// The numbers of each file, and the survivors.
-fn table(mutants: &[(u32, Mutant)], results: &Results) -> anyhow::Result<String> {
+impl Counts {
+    fn add(&mut self, other: &Self) {
+        self.all += other.all;
+        self.caught += other.caught;
+        self.unbuilt += other.unbuilt;
+        self.explained += other.explained;
+        self.unexplained += other.unexplained;
+    }
+
+    fn row(&self, name: &str) -> String {
+        let Self { all, caught, unbuilt, explained, unexplained } = self;
+        let left = all - caught - unbuilt - explained - unexplained;
+        format!(
+            "| {name} | {all} | {caught} | {unbuilt} | {explained} | {unexplained} | {left} |\n"
+        )
+    }
+}
+
+/// The numbers of each file, the survivors without a reason, and the reasons that no survivor needs.
+fn table(
+    mutants: &[(u32, Mutant)],
+    results: &Results,
+    reasons: &Reasons,
+) -> anyhow::Result<String> {
     let mut files: BTreeMap<&str, Counts> = BTreeMap::new();
-    let mut survivors = String::new();
+    let mut unexplained = String::new();
+    let mut unused: BTreeSet<&String> = reasons.keys().collect();
     for (_, mutant) in mutants {
         let counts = files.entry(&mutant.file).or_default();
         let result = results.get(&mutant.key).map_or("", String::as_str);
         counts.all += 1;
         counts.caught += u32::from(result.starts_with("caught"));
         counts.unbuilt += u32::from(result.starts_with("unbuilt"));
-        if result.starts_with("survived") {
-            counts.survived += 1;
-            writeln!(survivors, "- {} ({result})", mutant.name)?;
+        if !result.starts_with("survived") {
+            continue;
+        }
+        if reasons.contains_key(&mutant.key) {
+            unused.remove(&mutant.key);
+            counts.explained += 1;
+        } else {
+            counts.unexplained += 1;
+            writeln!(unexplained, "- {} ({result})", mutant.name)?;
         }
     }
-    let mut text = String::from("| file | mutants | caught | unbuilt | survivors | not tried |\n");
-    text.push_str("|---|---|---|---|---|---|\n");
-    for (file, Counts { all, caught, unbuilt, survived }) in files {
-        let left = all - caught - unbuilt - survived;
-        writeln!(text, "| `{file}` | {all} | {caught} | {unbuilt} | {survived} | {left} |")?;
+    let mut text = String::from(
+        "| file | mutants | caught | unbuilt | explained | unexplained | not tried |\n\
+         |---|---|---|---|---|---|---|\n",
+    );
+    let mut all = Counts::default();
+    for (file, counts) in files {
+        all.add(&counts);
+        text.push_str(&counts.row(&format!("`{file}`")));
     }
-    Ok(format!("{text}\n{survivors}"))
+    text.push_str(&all.row("**all**"));
+    write!(text, "\nUnexplained: {}\n{unexplained}", all.unexplained)?;
+    write!(text, "\nReasons without a survivor: {}\n", unused.len())?;
+    for key in unused {
+        writeln!(text, "- {key}")?;
+    }
+    Ok(text)
 }

@@ -83,3 +83,100 @@ impl Scene<'_, '_> {
         others
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::aim::Origin;
+    use crate::ekf::{StandardDeviations, StateEstimate};
+    use crate::map::{Wall, WallId};
+    use crate::pose::Point;
+    use crate::units::Instant;
+
+    proptest! {
+        /// Eq. (25) in `f64`, for the foot of another wall before the target, the corner of both and the foot of a third
+        /// one behind it.
+        #[test]
+        fn the_density_of_the_others_is_that_of_the_equation(
+            (target_at, near, far) in (1.5_f32..2.5, 0.4_f32..0.9, 1.1_f32..1.5), answers in 0.1_f32..0.9,
+            off in -0.1_f32..0.1, travelled in 0.05_f32..2.0, which in 0_usize..2, is_used in any::<bool>(),
+        ) {
+            // Feet at these angles from x, each on a wall of 4 cm.
+            let foot = |distance: f32, degrees: f32| {
+                let (sin, cos) = degrees.to_radians().sin_cos();
+                let end = |along: f32| {
+                    Point::new(distance * cos - along * sin, distance * sin + along * cos)
+                };
+                Wall::new(end(-0.02), end(0.02)).unwrap()
+            };
+            let distances = [target_at * near, target_at * far];
+            let walls = [foot(target_at, 0.0), foot(distances[0], 9.0), foot(distances[1], -9.0)];
+            let mut config = Config::for_track_width(Metres(0.2));
+            config.sonar.cone = Radians::from_degrees(12.0);
+            config.sonar.max_range = Metres(6.0);
+            config.sonar.mount = Point::default();
+            config.echo.map_accuracy = Metres(0.03);
+            let deviation = StandardDeviations {
+                x: Metres(0.08), y: Metres(0.05), heading: Radians(0.01), ..StandardDeviations::default()
+            };
+            let ekf = Ekf::new(config.drive, StateEstimate::default(), deviation).unwrap();
+            let map = Map::new(&walls);
+            let mut history = History::default();
+            let now = Instant::from_ticks(0);
+            let used = WallId(1);
+            if is_used {
+                let entry = history.entry(&config.echo, used, Metres(0.02), Metres(1.0), now);
+                history.record_echo(&entry, 0.1, Origin::Wall, now);
+                history.record_distance(Metres(travelled));
+            }
+            let known = history.travelled_since(used);
+            prop_assert!(known.is_some() == is_used);
+            prop_assert!(known.is_none_or(|known| (known.0 - travelled).abs() < 1e-6));
+            prop_assert!(history.travelled_since(WallId(2)).is_none());
+
+            let position = SonarPosition::new(config.sonar.mount, &ekf.state());
+            let expected = ExpectedRange::from_sonar(&walls[0], &position);
+            // So wide that every end of a wall is within reach of the measured range.
+            let target = Target { expected: &expected, variance: SquareMetres(1.0), answers };
+            let range = Metres(distances[which] + off);
+            let scene = Scene { config: &config, map, ekf: &ekf, history: &history };
+            let others = scene.others(&target, Radians(0.0), range);
+
+            let wide = f64::from;
+            let normal = |nu: f64, s: f64| (-0.5 * nu * nu / s).exp() / (core::f64::consts::TAU * s).sqrt();
+            let (mut density, mut silent, mut before) = (0.0, 1.0, 1.0);
+            let axis = Vector::of_angle(0.0);
+            let beam = Beam { from: Vector::new(0.0, 0.0), axis, range: Some(range.0) };
+            let reflectors = Reflectors::new(map, &config.sonar);
+            let (found, _) = reflectors.in_beam(&beam, 9.0, 3.0);
+            let mut compared = 0;
+            for it in found.iter().filter(|it| it.wall != WallId(0)) {
+                let Some(heard) = reflectors.heard(&beam, it) else { continue };
+                let h = wide(it.distance);
+                let free = wide(config.echo.free_path.0);
+                let a = wide(heard.probability(config.echo.heard())) * (1.0 - h / (h + free));
+                let (x, y) = (wide(it.toward.x), wide(it.toward.y));
+                let p = (0.08 * x).powi(2) + (0.05 * y).powi(2);
+                let ratio = 2.0 / wide(travelled);
+                let map_error = if is_used && it.wall == used { (1.0 + ratio * ratio).sqrt() } else { 1.0 };
+                let noise = &config.sonar.noise;
+                let sonar = wide(noise.floor.0).powi(2) + (wide(noise.per_metre) * h).powi(2);
+                let s = p + sonar + 0.03_f64.powi(2) * map_error;
+                let nu = wide(range.0) - h;
+                let is_behind = h > wide(target_at);
+                let reached = if is_behind { silent * (1.0 - wide(answers)) } else { silent };
+                density += a * reached * (0.98 * normal(nu, s) + 0.02 * normal(nu, 9.0 * s));
+                silent *= 1.0 - a;
+                if !is_behind {
+                    before = silent;
+                }
+                compared += 1;
+            }
+            prop_assert!(compared >= 2, "{compared}");
+            prop_assert!((wide(others.density) - density).abs() < 2e-3 * density + 1e-6, "{others:?} {density}");
+            prop_assert!((wide(others.silent_before) - before).abs() < 1e-4, "{others:?} {before}");
+        }
+    }
+}

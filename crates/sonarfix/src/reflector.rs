@@ -301,3 +301,6 @@ impl View {
         [(self.to_start, self.tangent), (to_end, self.tangent.times(-1.0))]
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -160,3 +160,39 @@ fn cut((first, last): (i32, i32), count: u16) -> Option<(u16, u16)> {
     let last = if last < count { last } else { count.checked_sub(1)? };
     (first <= last).then_some((first, last))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A grid of four columns and three rows of 0.5 m from (1, 2).
+    fn grid() -> Grid {
+        Grid::new(Point::new(1.0, 2.0), Metres(0.5), 4, 3).unwrap()
+    }
+
+    #[test]
+    fn a_wall_that_leaves_the_grid_has_no_cells() {
+        let wall = |from, to| Wall::new(from, to).unwrap();
+        let inside = wall(Point::new(1.1, 2.1), Point::new(2.9, 3.4));
+        assert_eq!(grid().cells_of(&inside), Some(Cells { columns: (0, 3), rows: (0, 2) }));
+        let flipped = wall(Point::new(2.9, 3.4), Point::new(1.1, 2.1));
+        assert_eq!(grid().cells_of(&flipped), grid().cells_of(&inside));
+        // The right edge belongs to the column that is not there any more.
+        assert_eq!(grid().cells_of(&wall(Point::new(1.1, 2.1), Point::new(3.0, 2.1))), None);
+        assert_eq!(grid().cells_of(&wall(Point::new(1.1, 2.1), Point::new(1.1, 3.5))), None);
+    }
+
+    #[test]
+    fn the_cells_near_a_point_are_those_of_the_grid() {
+        let near = |x, y, reach| grid().cells_near(Point::new(x, y), Metres(reach));
+        assert_eq!(near(1.6, 2.6, 0.2), Some(Cells { columns: (0, 1), rows: (0, 1) }));
+        assert_eq!(near(1.75, 2.75, 0.1), Some(Cells { columns: (1, 1), rows: (1, 1) }));
+        // The largest index is beyond the grid by one, and by many.
+        assert_eq!(near(2.75, 3.25, 0.25), Some(Cells { columns: (3, 3), rows: (2, 2) }));
+        assert_eq!(near(2.75, 3.25, 50.0), Some(Cells { columns: (0, 3), rows: (0, 2) }));
+        assert_eq!(near(9.0, 2.5, 1.0), None);
+        assert_eq!(near(-9.0, 2.5, 1.0), None);
+        assert_eq!(near(1.5, 2.5, -0.1), None);
+        assert_eq!(near(f32::NAN, 2.5, 0.1), None);
+    }
+}

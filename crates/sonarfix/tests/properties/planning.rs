@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use sonarfix::config::{Config, PingSchedule, ServoTiming};
 use sonarfix::ekf::{StandardDeviations, StateEstimate};
-use sonarfix::localizer::{Fix, Localizer};
+use sonarfix::localizer::{Fix, Localizer, Refusal};
 use sonarfix::map::{Map, Wall, WallId};
 use sonarfix::motion::WheelTravel;
 use sonarfix::pose::Point;
@@ -201,5 +201,42 @@ proptest! {
             Localizer::resume(config, Map::new(&walls), state, deviation, at(0)).unwrap();
         let aim = localizer.aim_at(Radians(0.0)).unwrap();
         prop_assert_eq!(aim.wall, WallId(u32::from(!is_first)));
+    }
+}
+
+/// Of two walls of exactly the same score the first in the map is measured.
+#[test]
+fn of_equal_walls_the_first_is_measured() {
+    let mut config = config();
+    config.sonar.mount = Point::default();
+    config.sonar.timing.schedule = PingSchedule::Every(Duration::from_ticks(1_000_000));
+    let beside = |y: f32| Wall::new(Point::new(-3.0, y), Point::new(3.0, y)).unwrap();
+    let deviation = StandardDeviations { y: Metres(0.05), ..StandardDeviations::default() };
+    for walls in [[beside(1.0), beside(-1.0)], [beside(-1.0), beside(1.0)]] {
+        let state = StateEstimate::default();
+        let localizer =
+            Localizer::resume(config, Map::new(&walls), state, deviation, at(0)).unwrap();
+        let aim = localizer.aim().unwrap();
+        assert_eq!((aim.wall, aim.why.candidates), (WallId(0), 2));
+    }
+}
+
+/// A range at the limits of the sonar is used or gated; the next one outside is refused.
+#[test]
+fn the_limits_of_the_sonar_are_inside_its_reach() {
+    let walls = [across(3.0)];
+    let deviation = StandardDeviations { x: Metres(0.05), ..StandardDeviations::default() };
+    let fix = |range: f32| {
+        let mut localizer = started(&walls, deviation);
+        let aim = localizer.aim().unwrap();
+        localizer.fix(&aim, Some(Metres(range)))
+    };
+    let sonar = config().sonar;
+    for (limit, outside) in [
+        (sonar.min_range.0, sonar.min_range.0.next_down()),
+        (sonar.max_range.0, sonar.max_range.0.next_up()),
+    ] {
+        assert!(!matches!(fix(limit), Fix::Refused(_)), "{:?}", fix(limit));
+        assert_eq!(fix(outside), Fix::Refused(Refusal::OutOfRange));
     }
 }
