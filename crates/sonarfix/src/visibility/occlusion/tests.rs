@@ -76,15 +76,26 @@ prop_compose! {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(4_000))]
+    #![proptest_config(ProptestConfig::with_cases(20_000))]
 
     #[test]
     fn a_wall_occludes_where_something_may_answer_first(
         angle in -3.1_f32..3.1, distance in 0.3_f32..4.0, cone in 2.0_f32..75.0,
         ahead in short(), aside in short(),
-        (from_ahead, from_aside) in (-1.0_f32..5.0, -2.0_f32..2.0),
+        is_near_the_edge in any::<bool>(), (near, off) in (-0.4_f32..0.4, -0.4_f32..0.4),
+        (anywhere_ahead, anywhere_aside) in (-1.0_f32..5.0, -2.0_f32..2.0),
         length in prop_oneof![1e-2_f32..0.3, 0.3_f32..4.0], turn in -3.1_f32..3.1,
     ) {
+        // About as far as the target, or about at the edge of the cone, or anywhere.
+        let (from_ahead, from_aside) = if is_near_the_edge {
+            let direction = (cone.to_radians() + off) * near.signum();
+            let from_sonar = if off > 0.0 { distance + near } else { distance * near.abs() * 2.4 };
+            (from_sonar * direction.cos(), from_sonar * direction.sin())
+        } else if off > 0.0 {
+            ((distance + near) * off.cos(), (distance + near) * (3.0 * near).sin())
+        } else {
+            (anywhere_ahead, anywhere_aside)
+        };
         let (sin, cos) = angle.sin_cos();
         let tangent_of_cone = cone.to_radians().tan();
         let beam = Beam {
