@@ -807,3 +807,6 @@ fn largest(xx: f32, xy: f32, yy: f32) -> f32 {
 fn placed(placement: &Placement, at: Vector) -> Vector {
     placement.at.plus(at.turned(placement.rotation))
 }
+
+#[cfg(test)]
+mod tests;

@@ -65,6 +65,12 @@ impl<const HYPOTHESES: usize> Bank<HYPOTHESES> {
         Self { entries: Vec::new() }
     }
 
+    /// These entries, best first, for tests.
+    #[cfg(test)]
+    pub fn of(entries: &[Entry]) -> Self {
+        Self { entries: entries.iter().copied().collect() }
+    }
+
     pub fn clear(&mut self) {
         self.entries.clear();
     }

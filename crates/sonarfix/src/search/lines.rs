@@ -55,6 +55,12 @@ impl Lines {
         self.cos_cone = cos_of_support(cone);
     }
 
+    /// These lines, for tests.
+    #[cfg(test)]
+    pub fn of(cone: Radians, lines: &[Line]) -> Self {
+        Self { found: lines.iter().copied().collect(), ..Self::new(cone) }
+    }
+
     pub fn all(&self) -> &[Line] {
         &self.found
     }

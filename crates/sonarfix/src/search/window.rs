@@ -146,6 +146,12 @@ impl<const PINGS: usize> Window<PINGS> {
         self.taken
     }
 
+    /// So many pings, for tests.
+    #[cfg(test)]
+    pub fn set_taken(&mut self, taken: u16) {
+        self.taken = taken;
+    }
+
     pub fn robot(&self) -> &Station {
         &self.robot
     }
