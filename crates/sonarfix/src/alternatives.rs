@@ -126,6 +126,7 @@ mod tests {
             let mut history = History::default();
             let now = Instant::from_ticks(0);
             let used = WallId(1);
+            history.record_distance(Metres(1.7));
             if is_used {
                 let entry = history.entry(&config.echo, used, Metres(0.02), Metres(1.0), now);
                 history.record_echo(&entry, 0.1, Origin::Wall, now);

@@ -63,3 +63,14 @@ impl From<Vector> for Point {
         Self::new(vector.x, vector.y)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_point_is_converted_both_ways() {
+        let point = Point::new(1.5, -2.5);
+        assert_eq!(Point::from(Vector::from(point)), point);
+    }
+}

@@ -29,3 +29,24 @@ impl Ranked {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whatever the order in which they are found.
+    #[test]
+    fn of_equal_scores_the_first_wall_of_the_map_is_first() {
+        let ranked = |wall, score| Ranked { wall: WallId(wall), score };
+        for order in [[2, 5, 9], [9, 5, 2], [5, 9, 2], [2, 9, 5]] {
+            let mut list = [None; 4];
+            for wall in order {
+                ranked(wall, 1.0).insert(&mut list);
+            }
+            ranked(7, 2.0).insert(&mut list);
+            ranked(1, 0.5).insert(&mut list);
+            let walls = list.map(|it| it.map(|it| it.wall));
+            assert_eq!(walls, [7, 2, 5, 9].map(|wall| Some(WallId(wall))), "{order:?}");
+        }
+    }
+}

@@ -206,3 +206,135 @@ proptest! {
         }
     }
 }
+
+fn wall(from: (f32, f32), to: (f32, f32)) -> Wall {
+    Wall::new(Point::new(from.0, from.1), Point::new(to.0, to.1)).unwrap()
+}
+
+fn reflectors<'m>(walls: &'m [Wall], degrees: f32) -> Reflectors<'m> {
+    let mut sonar = Config::for_track_width(Metres(0.2)).sonar;
+    (sonar.cone, sonar.max_range) = (Radians::from_degrees(degrees), Metres(4.0));
+    Reflectors::new(Map::new(walls), &sonar)
+}
+
+/// A corner that is convex from where the sonar is returns no more than the end of a wall, however its walls are
+/// drawn.
+#[test]
+fn a_convex_corner_is_an_end() {
+    let corner = (2.0, 2.0);
+    for (right, up) in [((3.0, 2.0), (2.0, 3.0)), ((2.6, 2.0), (2.0, 2.4))] {
+        for flips in 0..4 {
+            let ends = |number: u32, end| {
+                if flips & number == 0 { wall(corner, end) } else { wall(end, corner) }
+            };
+            let walls = [ends(1, right), ends(2, up)];
+            for (from, kind) in [
+                ((2.5_f32, 1.0_f32), Heard::End),
+                ((1.0, 2.5), Heard::End),
+                // From the other side of both walls it is concave.
+                ((2.3, 2.3), Heard::Corner),
+            ] {
+                let from = Vector::new(from.0, from.1);
+                let toward = Vector::new(corner.0, corner.1).minus(from);
+                let distance = toward.length_squared().sqrt();
+                let beam = Beam { from, axis: toward.times(1.0 / distance), range: Some(distance) };
+                let reflectors = reflectors(&walls, 10.0);
+                let (found, _) = reflectors.in_beam(&beam, 4.0, 0.1);
+                let at = found.iter().find(|it| it.arm.is_some()).unwrap();
+                assert_eq!(reflectors.heard(&beam, at), Some(kind), "{from:?} {flips}");
+            }
+        }
+    }
+}
+
+/// Where two walls meet in the form of a T, the corner is concave on both sides.
+#[test]
+fn a_junction_is_a_corner() {
+    let bar = wall((0.0, 2.0), (4.0, 2.0));
+    for stem in [wall((2.0, 0.5), (2.0, 2.0)), wall((2.0, 2.0), (2.0, 0.5))] {
+        let walls = [bar, stem];
+        for x in [1.2, 2.8] {
+            let from = Vector::new(x, 1.2);
+            let toward = Vector::new(2.0, 2.0).minus(from);
+            let distance = toward.length_squared().sqrt();
+            let beam = Beam { from, axis: toward.times(1.0 / distance), range: None };
+            let reflectors = reflectors(&walls, 10.0);
+            let (found, _) = reflectors.in_beam(&beam, 4.0, 0.1);
+            let at = found.iter().find(|it| it.arm.is_some()).unwrap();
+            assert_eq!(reflectors.heard(&beam, at), Some(Heard::Corner), "{x}");
+        }
+    }
+}
+
+/// A sonar at the end of a wall, to the last bit or less than a millimetre away, has no direction to it.
+#[test]
+fn a_sonar_at_an_end_finds_finite_reflectors() {
+    let walls = [wall((1.0, 1.0), (3.0, 1.0)), wall((1.0, 1.0), (1.0, 3.0))];
+    for off in [0.0, 1e-20, 1e-4] {
+        for degrees in [0.0_f32, 45.0, 90.0, -135.0] {
+            let from = Vector::new(1.0 + off, 1.0 + off);
+            let axis = Vector::of_angle(degrees.to_radians());
+            let (found, _) =
+                reflectors(&walls, 40.0).in_beam(&Beam { from, axis, range: None }, 4.0, 0.1);
+            for it in &found {
+                assert!(it.toward.x.is_finite() && it.toward.y.is_finite(), "{it:?}");
+                assert!(it.arm.is_none() || it.distance > 1e-3, "{it:?}");
+            }
+        }
+    }
+}
+
+/// Distance, direction and arm of each reflector, to the bit.
+fn list(walls: &[Wall], beam: &Beam) -> Vec<[u32; 5]> {
+    let (found, _) = reflectors(walls, 40.0).in_beam(beam, 4.0, 5.0);
+    let bits = |it: &Reflector| {
+        let arm = it.arm.unwrap_or(Vector::new(9.0, 9.0));
+        [it.distance, it.toward.x, it.toward.y, arm.x, arm.y].map(f32::to_bits)
+    };
+    found.iter().map(bits).collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(500))]
+
+    /// More reflectors than there is room for: the nearest, sorted, whatever the order of the walls; mirrored ones are
+    /// equally far.
+    #[test]
+    fn the_nearest_reflectors_do_not_depend_on_the_order_of_the_walls(
+        bends in prop::collection::vec((0.1_f32..0.5, -0.6_f32..0.6), 4..9), turns in 1_usize..8,
+        start in 0.6_f32..1.2, is_mirrored in any::<bool>(), has_range in any::<bool>(),
+    ) {
+        // A line of walls that share their ends, ahead of the sonar, and its mirror image.
+        let mut ends = Vec::from([(start, 0.0_f32)]);
+        for (along, aside) in bends {
+            let (x, y) = *ends.last().unwrap();
+            ends.push((x + aside * 0.5, y + along));
+        }
+        let mut walls: Vec<Wall> = ends.windows(2).map(|ends| wall(ends[0], ends[1])).collect();
+        if is_mirrored {
+            walls.extend(ends.windows(2).map(|ends| wall((ends[0].0, -ends[0].1), (ends[1].0, -ends[1].1))));
+        }
+        let axis = Vector::new(1.0, 0.0);
+        let range = has_range.then_some(start);
+        let beam = Beam { from: Vector::new(0.0, 0.0), axis, range };
+        let expected = list(&walls, &beam);
+        let (found, _) = reflectors(&walls, 40.0).in_beam(&beam, 4.0, 5.0);
+        prop_assert!(found.windows(2).all(|pair| pair[0].distance <= pair[1].distance));
+        if let Some(last) = found.last().filter(|_| found.is_full() && has_range) {
+            // Every nearer end in the rim is in the list; without a range those that jut out are not.
+            let cos_rim = f64::from(40.0_f32.to_radians() * RIM).cos();
+            for (x, y) in &ends {
+                let distance = f64::from(*x).hypot((*y).into());
+                if f64::from(*x) / distance > cos_rim + 1e-4 && distance < f64::from(last.distance) - 1e-4 {
+                    let is_there = found.iter().any(|it| (f64::from(it.distance) - distance).abs() < 1e-4);
+                    prop_assert!(is_there, "{x} {y} {found:?}");
+                }
+            }
+        }
+        let turns = turns % walls.len();
+        walls.rotate_left(turns);
+        prop_assert_eq!(&list(&walls, &beam), &expected);
+        walls.reverse();
+        prop_assert_eq!(&list(&walls, &beam), &expected);
+    }
+}

@@ -230,4 +230,20 @@ mod tests {
         }
         assert!((central_probability(1e9) - 1.0).abs() < 1e-6);
     }
+
+    /// Up to the limit of the sonar, and not beyond it.
+    #[test]
+    fn a_heading_is_known_up_to_its_limit() {
+        use crate::ekf::{Ekf, StandardDeviations, StateEstimate};
+        let config = Config::for_track_width(Metres(0.2));
+        let limit = max_heading_deviation(&config.sonar);
+        for (share, is_known) in
+            [(0.0, true), (0.5, true), (0.99, true), (1.01, false), (9.0, false)]
+        {
+            let heading = limit * share;
+            let deviation = StandardDeviations { heading, ..StandardDeviations::default() };
+            let ekf = Ekf::new(config.drive, StateEstimate::default(), deviation).unwrap();
+            assert_eq!(Viewpoint::new(&config, &ekf).is_heading_known(), is_known, "{share}");
+        }
+    }
 }

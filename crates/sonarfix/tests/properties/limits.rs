@@ -141,6 +141,29 @@ fn a_range_used_without_odometry_begins_the_growth_again() {
     assert_eq!(localizer.association().to_bits(), 0.0_f32.to_bits());
 }
 
+/// A restart has state and deviations of its arguments, or changes nothing.
+#[test]
+fn a_restart_replaces_state_and_deviations() {
+    let start = Start {
+        pose: Pose::default(),
+        position_deviation: Metres(0.05),
+        heading_deviation: Radians(0.01),
+    };
+    let mut localizer =
+        Localizer::new(config(), Map::new(&[]), start, Instant::from_ticks(0)).unwrap();
+    let state = StateEstimate::from_array([1.0, 2.0, 0.3, 0.01, -0.01, 0.002, 0.005]);
+    let deviation = StandardDeviations::from_array([0.1, 0.2, 0.3, 0.01, 0.01, 0.003, 0.004]);
+    let negative = StandardDeviations { x: Metres(-0.1), ..deviation };
+    let before = bits(localizer.filter());
+    assert_eq!(localizer.restart(state, negative), Err(EkfError::NegativeVariance));
+    assert_eq!(bits(localizer.filter()), before);
+    localizer.restart(state, deviation).unwrap();
+    let is = localizer.filter().state().to_array();
+    assert!(is.iter().zip(state.to_array()).all(|(is, of)| (is - of).abs() < 1e-6), "{is:?}");
+    let is = localizer.filter().standard_deviations().to_array();
+    assert!(is.iter().zip(deviation.to_array()).all(|(is, of)| (is - of).abs() < 1e-6), "{is:?}");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 

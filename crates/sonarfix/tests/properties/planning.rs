@@ -38,6 +38,13 @@ fn across(x: f32) -> Wall {
     Wall::new(Point::new(x, -10.0), Point::new(x, 10.0)).unwrap()
 }
 
+/// A wall whose foot is at this distance and angle, in degrees, of this length.
+fn at_angle(distance: f32, degrees: f32, length: f32) -> Wall {
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    let end = |along: f32| Point::new(distance * cos - along * sin, distance * sin + along * cos);
+    Wall::new(end(-0.5 * length), end(0.5 * length)).unwrap()
+}
+
 fn started(walls: &[Wall], deviation: StandardDeviations) -> Localizer<'_> {
     let state = StateEstimate::default();
     Localizer::resume(config(), Map::new(walls), state, deviation, at(0)).unwrap()
@@ -122,6 +129,9 @@ proptest! {
         let mut localizer = started(&walls, StandardDeviations {
             x: Metres(0.02), y: Metres(0.02), heading: Radians(0.005), ..StandardDeviations::default()
         });
+        // The distance is that since the range, not that since the start.
+        localizer.odometry(at(10), WheelTravel::new(0.4, 0.4)).unwrap();
+        let fresh = localizer.clone();
         let first = localizer.aim().unwrap();
         let fix = localizer.fix(&first, Some(first.range));
         let check = |fix: Fix, variance: f64, range: f64, travelled| -> Result<(), TestCaseError> {
@@ -133,14 +143,11 @@ proptest! {
             prop_assert!((is - expected).abs() < 2e-3 * expected, "{is} {expected}");
             Ok(())
         };
-        let mut before = started(&walls, StandardDeviations {
-            x: Metres(0.02), y: Metres(0.02), heading: Radians(0.005), ..StandardDeviations::default()
-        });
-        check(fix, projected(&before, distance(&before, x.into())).1, first.range.0.to_f64(), None)?;
-        before = localizer.clone();
+        check(fix, projected(&fresh, distance(&fresh, x.into())).1, first.range.0.to_f64(), None)?;
+        let mut before = localizer.clone();
         for tick in 1..=steps {
             for localizer in [&mut before, &mut localizer] {
-                localizer.odometry(at(tick.into()), WheelTravel::new(length, length)).unwrap();
+                localizer.odometry(at(10 + u64::from(tick)), WheelTravel::new(length, length)).unwrap();
             }
         }
         let aim = localizer.aim().unwrap();
@@ -153,27 +160,56 @@ proptest! {
     /// The time of a ping: the servo's turn from the last bearing or the rest of the ranger, and the flight of the sound.
     #[test]
     fn the_duration_of_a_ping_is_that_of_turn_and_flight(
-        near in 1.0_f32..2.0, far in 2.5_f32..6.0, is_far_first in any::<bool>(),
+        near in 1.0_f32..2.0, far in 2.5_f32..6.0, angle in 10.0_f32..80.0, is_far_first in any::<bool>(),
     ) {
-        // One ahead, one to the left: 90° apart.
-        let left = Wall::new(Point::new(-10.0, near), Point::new(10.0, near)).unwrap();
-        let walls = [across(far), left];
+        // One to the left, one to the right, at right angles.
+        let walls = [at_angle(far, angle, 6.0), at_angle(near, angle - 90.0, 6.0)];
         let deviation = StandardDeviations {
             x: Metres(0.05), y: Metres(0.05), heading: Radians(0.005), ..StandardDeviations::default()
         };
         let mut localizer = started(&walls, deviation);
-        let first = if is_far_first { Radians(0.0) } else { Radians(core::f32::consts::FRAC_PI_2) };
-        let aim = localizer.aim_at(first).unwrap();
+        let first = if is_far_first { angle } else { angle - 90.0 };
+        let aim = localizer.aim_at(Radians::from_degrees(first)).unwrap();
         let fix = localizer.fix(&aim, Some(aim.range));
         prop_assert!(matches!(fix, Fix::Accepted(_)), "{fix:?}");
         let next = localizer.aim().unwrap();
+        prop_assert_ne!(next.wall, aim.wall);
         let servo = ServoMotion::new(&ServoTiming::SG90);
         let flight = |range: Metres| 2.0 * range.0.to_f64() / SPEED_OF_SOUND;
         let rest = (0.06 - flight(aim.range)).max(0.0);
-        let turn = servo.settling(next.bearing - first).to_f64();
+        let turn = servo.settling(next.bearing - aim.bearing).to_f64();
         let expected = turn.max(rest) + flight(next.range);
         let is = f64::from(u32::try_from(next.why.time.ticks()).unwrap()) * 1e-6;
         prop_assert!((is - expected).abs() < 5e-5, "{is} {expected}, {next:?}");
+    }
+
+    /// The servo does not turn for less than its turn is worth: the next ping at the same wall has the same bearing.
+    #[test]
+    fn a_small_turn_is_not_made(x in 1.5_f32..4.0, turn in 0.002_f32..0.01) {
+        let walls = [across(x)];
+        let deviation = StandardDeviations {
+            x: Metres(0.05), y: Metres(0.05), heading: Radians(0.005), ..StandardDeviations::default()
+        };
+        let mut localizer = started(&walls, deviation);
+        let first = localizer.aim().unwrap();
+        let fix = localizer.fix(&first, Some(first.range));
+        prop_assert!(matches!(fix, Fix::Accepted(_)), "{fix:?}");
+        let aside = 0.5 * turn * config().drive.track_width.0;
+        localizer.odometry(at(20), WheelTravel::new(aside, -aside)).unwrap();
+        let next = localizer.aim().unwrap();
+        prop_assert_eq!(next.bearing, first.bearing);
+        // With a fixed period a turn costs nothing, and it is made.
+        let mut config = config();
+        config.sonar.timing.schedule = PingSchedule::Every(Duration::from_ticks(1_000_000));
+        let state = StateEstimate::default();
+        let mut localizer = Localizer::resume(config, Map::new(&walls), state, deviation, at(0)).unwrap();
+        let first = localizer.aim().unwrap();
+        let fix = localizer.fix(&first, Some(first.range));
+        prop_assert!(matches!(fix, Fix::Accepted(_)), "{fix:?}");
+        localizer.odometry(at(2_000), WheelTravel::new(aside, -aside)).unwrap();
+        let next = localizer.aim().unwrap();
+        let turned = f64::from((next.bearing - first.bearing).0);
+        prop_assert!((turned + f64::from(turn)).abs() < 2e-3, "{turned} {turn}");
     }
 
     /// Of two walls that a beam is square to, the nearer one, whichever is the first in the map.
@@ -184,14 +220,7 @@ proptest! {
         let mut config = config();
         config.sonar.cone = Radians::from_degrees(15.0);
         config.sonar.mount = Point::default();
-        let foot = |distance: f32, degrees: f32| {
-            let (sin, cos) = degrees.to_radians().sin_cos();
-            let end = |along: f32| {
-                Point::new(distance * cos - along * sin, distance * sin + along * cos)
-            };
-            Wall::new(end(-0.1), end(0.1)).unwrap()
-        };
-        let (one, other) = (foot(near, half), foot(near * further, -half));
+        let (one, other) = (at_angle(near, half, 0.2), at_angle(near * further, -half, 0.2));
         let walls = if is_first { [one, other] } else { [other, one] };
         let deviation = StandardDeviations {
             x: Metres(1e-3), y: Metres(1e-3), heading: Radians(1e-3), ..StandardDeviations::default()
