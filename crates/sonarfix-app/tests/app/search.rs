@@ -4,13 +4,14 @@ use sonarfix::health::Verdict;
 use sonarfix::localizer::Start;
 use sonarfix::navigator::{Mode, UNKNOWN_POSITION};
 use sonarfix::pose::Pose;
-use sonarfix::units::{Metres, Radians};
+use sonarfix::units::{Instant, Metres, Radians};
 use sonarfix_hal::config::{RobotConfig, StartPose};
 use sonarfix_link::message::{CommandError, SearchAnswer};
 use sonarfix_link::{Command, CommandResult, Telemetry};
 
 use crate::flash::SimFlash;
-use crate::rig::{Baked, Bench, config};
+use crate::rig::{Baked, Bench, config, start};
+use crate::room::Truth;
 
 fn searching() -> Baked {
     Baked::new(&RobotConfig { start: StartPose::Unknown { region: None }, ..config() })
@@ -101,4 +102,31 @@ fn a_robot_whose_start_is_known_does_not_search() {
     assert_eq!(bench.order(&Command::Search), refused);
     bench.wait(2_000);
     assert_eq!(mode(&bench), Some(Mode::Tracking));
+}
+
+/// Between two polls the search works for a robot that searches, up to 0.8 ms after the poll, and for no other.
+#[test]
+fn the_search_works_between_polls_while_it_is_time() {
+    let after = |bench: &mut Bench, micros: u64| {
+        let before = format!("{:?}", bench.app.search());
+        let start = Instant::from_ticks(bench.now);
+        bench.app.work(start, || Instant::from_ticks(start.ticks() + micros));
+        before != format!("{:?}", bench.app.search())
+    };
+    let baked = searching();
+    let mut bench = Bench::switched_on(&baked, SimFlash::new());
+    assert!(!after(&mut bench, 0), "it waits");
+    bench.truth = Some(Truth::at(&start()));
+    assert_eq!(bench.order(&Command::Start), CommandResult::Done);
+    // Pings enough for a window.
+    for _ in 0..200 {
+        bench.roll(40, 36);
+        bench.wait(100);
+    }
+    assert_eq!(mode(&bench), Some(Mode::Searching));
+    assert!(after(&mut bench, 0) && after(&mut bench, 799) && after(&mut bench, 800));
+    assert!(!after(&mut bench, 801) && !after(&mut bench, 10_000));
+    assert_eq!(bench.order(&here()), CommandResult::Done);
+    assert_eq!(mode(&bench), Some(Mode::Tracking));
+    assert!(!after(&mut bench, 0), "it tracks");
 }
