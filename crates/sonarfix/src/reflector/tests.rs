@@ -211,7 +211,7 @@ fn wall(from: (f32, f32), to: (f32, f32)) -> Wall {
     Wall::new(Point::new(from.0, from.1), Point::new(to.0, to.1)).unwrap()
 }
 
-fn reflectors<'m>(walls: &'m [Wall], degrees: f32) -> Reflectors<'m> {
+fn reflectors(walls: &[Wall], degrees: f32) -> Reflectors<'_> {
     let mut sonar = Config::for_track_width(Metres(0.2)).sonar;
     (sonar.cone, sonar.max_range) = (Radians::from_degrees(degrees), Metres(4.0));
     Reflectors::new(Map::new(walls), &sonar)

@@ -73,15 +73,6 @@ prop_compose! {
     }
 }
 
-/// What decides, in `f64`.
-struct Rules {
-    rivals: usize,
-    is_fit: bool,
-    is_determined: bool,
-    is_sole: bool,
-    has_persisted: bool,
-}
-
 fn is_clear(value: f64, limit: f64) -> bool {
     (value - limit).abs() > 1e-4 * (1.0 + limit.abs())
 }
@@ -151,27 +142,24 @@ proptest! {
         };
         let is_sharp = variance < sharpness.0 && rotation < sharpness.1;
         let streak = best.streak + fresh;
-        let rules = Rules {
-            rivals, is_fit, is_determined, is_sole,
-            has_persisted: is_sole && is_sharp && streak >= persistence,
-        };
+        let has_persisted = is_sole && is_sharp && streak >= persistence;
 
         search.decide(is_checked);
         prop_assert_eq!(search.cycles, cycles + 1);
         prop_assert_eq!(search.taken, search.window.taken());
         let streaks: Vec<u16> = search.bank.entries().iter().map(|entry| entry.streak).collect();
-        let first = if rules.is_sole { streak } else { 0 };
+        let first = if is_sole { streak } else { 0 };
         prop_assert!(streaks[0] == first && streaks.iter().skip(1).all(|streak| *streak == 0));
-        let is_due = rules.has_persisted && !is_checked && !was_unique || (cycles + 1) % 4 == 0;
+        let is_due = has_persisted && !is_checked && !was_unique || (cycles + 1) % 4 == 0;
         prop_assert_eq!(search.is_check_due, is_due);
-        let is_unique = rules.is_fit && rules.has_persisted && (is_checked || was_unique);
+        let is_unique = is_fit && has_persisted && (is_checked || was_unique);
         prop_assert_eq!(search.trial.is_some(), is_unique);
-        if !rules.is_fit {
+        if !is_fit {
             prop_assert_eq!(search.answer, Decision::Nowhere);
         } else if is_unique {
             prop_assert_eq!(search.answer, before);
-        } else if rules.is_determined {
-            prop_assert_eq!(search.answer, Decision::Several(rules.rivals));
+        } else if is_determined {
+            prop_assert_eq!(search.answer, Decision::Several(rivals));
         } else {
             // The nearest wall along the axis of the spread.
             let (sin, cos) = axis.sin_cos();
@@ -187,7 +175,7 @@ proptest! {
             }
             near.sort_by(|one, other| one.0.total_cmp(&other.0));
             match near.as_slice() {
-                [] => prop_assert_eq!(search.answer, Decision::Several(rules.rivals)),
+                [] => prop_assert_eq!(search.answer, Decision::Several(rivals)),
                 [nearest, next, ..] => {
                     prop_assume!(is_clear(nearest.0, next.0));
                     let Decision::Along(wall, extent) = search.answer else {
