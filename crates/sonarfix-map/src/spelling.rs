@@ -3,7 +3,9 @@
 /// The key that is nearest to an unknown one, if a typing error is plausible: at most one edit per three letters.
 pub(crate) fn nearest<'k>(unknown: &str, keys: &[&'k str]) -> Option<&'k str> {
     let far = unknown.chars().count().div_ceil(3);
-    let near = keys.iter().map(|key| (edit_distance(unknown, key), *key));
+    // Parts are labelled as in `HC-SR04`.
+    let plain = unknown.to_lowercase().replace(['-', ' '], "_");
+    let near = keys.iter().map(|key| (edit_distance(&plain, key), *key));
     near.filter(|(distance, _)| *distance <= far).min().map(|(_, key)| key)
 }
 

@@ -1,4 +1,4 @@
-//! {{project-name}}: the start and the loop. The parts of the board are in `parts.rs`; this file needs no change.
+//! {{project-name}}: the start and the loop. The parts of the board are in `parts.rs`; in this file only the motor code changes.
 
 #![no_std]
 #![no_main]
@@ -12,6 +12,7 @@ use panic_probe as _;
 use sonarfix_app::store::Store;
 use sonarfix_app::{App, FlashContents, boots, log};
 use sonarfix_hal::robot::Devices;
+use sonarfix_motors::Pattern;
 use sonarfix_robot::memory;
 
 use parts::{Board, ECHO};
@@ -22,7 +23,18 @@ const POLL: u64 = 1_000;
 #[cortex_m_rt::entry]
 fn main() -> ! {
     let Board {
-        clock, right, left, pulses, trigger, mut link, flash, mut enable, mut watchdog, resets, ..
+        clock,
+        right,
+        left,
+        pulses,
+        trigger,
+        mut link,
+        flash,
+        mut enable,
+        mut motors,
+        mut watchdog,
+        resets,
+        ..
     } = Board::start();
     let servo = sonarfix_robot::servo(pulses);
     let ranger = sonarfix_robot::ranger(trigger, &ECHO);
@@ -38,6 +50,8 @@ fn main() -> ! {
     resets.write(boots::register(count.saturating_add(1)));
     let board = sonarfix_robot::board(reset, count);
     let mut app = App::new(board, contents, store, clock.now());
+    // The motor code: your own controller takes the place of the example, which drives to and fro.
+    let mut pattern = Pattern::default();
     let mut next_poll = clock.now().ticks();
     loop {
         next_poll = next_poll.saturating_add(POLL);
@@ -53,6 +67,7 @@ fn main() -> ! {
         }
         link.transmit();
         log::polled(&polled, app.report());
+        motors.set(pattern.drive(sonarfix_robot::estimate(&app, &polled)));
         if let Some(took) = clock.now().checked_duration_since(start) {
             app.took(took);
         }

@@ -9,7 +9,7 @@
 //! | servo | [`SetDutyCycle`] |
 //! | sonar | [`OutputPin`] for the trigger, and edges for [`ECHO`] |
 //! | flash | [`ReadNorFlash`], [`NorFlash`] |
-//! | enable of the motors, watchdog, count of resets | [`Enable`], [`Watchdog`], [`Resets`] |
+//! | enable and inputs of the motor driver, watchdog, count of resets | [`Enable`], [`Motors`], [`Watchdog`], [`Resets`] |
 
 use core::cell::Cell;
 use core::convert::Infallible;
@@ -26,6 +26,7 @@ use sonarfix_app::Link;
 use sonarfix_hal::encoder::Counter;
 use sonarfix_hal::ranger::EchoCapture;
 use sonarfix_link::message::ResetCause;
+use sonarfix_motors::Drive;
 
 /// The edges of the echo. The interrupt of the echo's pin calls `ECHO.rose(now)` and `ECHO.fell(now)`; a timer that stamps
 /// edges passes them by `sonarfix_hal::ranger::StampedEdges`, as on the Pico 2.
@@ -41,6 +42,7 @@ pub struct Board {
     pub link: Serial,
     pub flash: Flash,
     pub enable: Enable,
+    pub motors: Motors,
     pub watchdog: Watchdog,
     pub resets: Resets,
 }
@@ -57,6 +59,7 @@ impl Board {
             link: Serial::open(),
             flash: Flash([0xFF; FLASH_BYTES]),
             enable: Enable,
+            motors: Motors,
             watchdog: Watchdog,
             resets: Resets,
         }
@@ -259,6 +262,14 @@ pub struct Enable;
 
 impl Enable {
     pub fn set(&mut self, _may_drive: bool) {}
+}
+
+/// The inputs of the motor driver: four PWM channels of about 20 kHz, which [`Drive::inputs`] gives the counts of. The
+/// emulated board has none.
+pub struct Motors;
+
+impl Motors {
+    pub fn set(&mut self, _drive: Drive) {}
 }
 
 /// The watchdog (2 s), and the cause of the reset. The emulated board has none.

@@ -211,3 +211,33 @@ fn the_docs_have_the_table_of_boards() {
         }
     }
 }
+
+/// Ten typical mistakes of a builder who edits the three files: one run names each with its file and what to write.
+#[test]
+fn ten_mistakes_in_the_written_files_are_answered_at_once() {
+    let dir = tempfile::tempdir().unwrap();
+    run(dir.path(), &["init", "."]);
+    let changes = [
+        ("map.toml", "unit = \"m\"", "unit = \"metres\"", "must be one of m, cm, mm"),
+        ("map.toml", "\"east\", from", "\"east\", form", "did you mean `from`?"),
+        ("robot.toml", "track_width = \"121 mm\"", "track_width = 121", "write \"121 m\" or"),
+        ("robot.toml", "mirrored = true", "mirrord = true", "did you mean `mirrored`?"),
+        ("robot.toml", "servo_timing = \"sg90\"", "servo_timing = \"SG90\"", "mean \"sg90\"?"),
+        ("robot.toml", "ranger = \"hc_sr04\"", "ranger = \"HC-SR04\"", "mean \"hc_sr04\"?"),
+        ("robot.toml", "encoder_period = \"50 ms\"", "", "write, for example, encoder_period"),
+        ("scenario.toml", "fidelity = \"pins\"", "fidelity = \"pin\"", "did you mean \"pins\"?"),
+        ("scenario.toml", "speed = \"0.2 m/s\"", "speed = \"0.2 m\"", "is not a speed"),
+        ("scenario.toml", "laps = 4", "laps = 4.5", "must be a whole number"),
+    ];
+    for (name, old, new, _) in changes {
+        let file = dir.path().join(name);
+        let text = fs::read_to_string(&file).unwrap();
+        assert!(text.contains(old), "{name}: {old}");
+        fs::write(&file, text.replacen(old, new, 1)).unwrap();
+    }
+    let error = refusal(dir.path(), &["run", "scenario.toml"]);
+    for (name, old, _, remedy) in changes {
+        let answered = error.lines().any(|line| line.contains(name) && line.contains(remedy));
+        assert!(answered, "{name}, {old}: {error}");
+    }
+}
