@@ -213,6 +213,8 @@ pub enum Unsupported {
     /// A wheel at full speed makes more edges from one reading to the next than half of what a
     /// counter of the board holds, so that its direction would be ambiguous.
     Counter,
+    /// The board has no gyro, or it does not respond.
+    Gyro,
 }
 
 impl core::fmt::Display for Unsupported {
@@ -223,6 +225,7 @@ impl core::fmt::Display for Unsupported {
             Self::Counter => f.write_str(
                 "a wheel at max_wheel_speed overruns the board's edge counter within an encoder_period",
             ),
+            Self::Gyro => f.write_str("the configured gyro is missing or does not respond"),
         }
     }
 }

@@ -10,6 +10,7 @@
 //! | [`encoder`] | counters of any width, a software quadrature decoder, edges to metres |
 //! | [`servo`] | bearing to pulse, and a model of the servo's present bearing |
 //! | [`ranger`] | ultrasonic rangers: HC-SR04 and compatible ones, LV-MaxSonar, SRF02, SRF08 |
+//! | [`gyro`] | gyros: MPU-6050 and compatible ones |
 //! | [`robot`] | the loop: encoder samples, and the measurement cycle of the sonar |
 //!
 //! Start with [`robot::Robot`], whose example is a complete fix.
@@ -37,6 +38,7 @@ extern crate std;
 pub mod asynch;
 pub mod config;
 pub mod encoder;
+pub mod gyro;
 pub mod ranger;
 pub mod robot;
 pub mod servo;

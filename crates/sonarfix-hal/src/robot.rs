@@ -10,6 +10,7 @@
 //! | `odometer` (private) | the ledger of encoder edges |
 //! | `schedule` (private) | periodic deadlines |
 //! | `sonar` (private) | the state machine of a measurement cycle |
+//! | `yaw` (private) | the ledger of a gyro's turns |
 //!
 //! *Tick*: one sample of both encoders (every 100 ms by default), passed to the localizer.
 //! *Measurement cycle*: choose a wall, turn the servo, wait until it has settled, ping, listen, fuse.
@@ -46,10 +47,12 @@ mod report;
 mod schedule;
 mod settings;
 mod sonar;
+mod yaw;
 
 use sonarfix::aim::Aim;
 use sonarfix::config::PingSchedule;
 use sonarfix::ekf::EkfError;
+use sonarfix::gyro::TurnReading;
 use sonarfix::localizer::{Localizer, Start};
 use sonarfix::motion::WheelTravel;
 use sonarfix::navigator::{Mode, Navigator};
@@ -61,12 +64,13 @@ use crate::ranger::{Echo, NoEcho, Outcome, Ranger, TriggerError};
 use crate::time::{after, micros, since};
 
 pub use faults::{EncoderFaults, Faults};
-pub use hardware::{Devices, Hardware};
+pub use hardware::{Devices, Hardware, WithGyro};
 use odometer::{Odometer, Position, Reading};
 pub use report::{PingResult, Report, Step, StepResult, SweepResult, Tick};
 use schedule::Schedule;
 pub use settings::{EVALUATIONS_PER_MILLISECOND, Settings, SettingsError, Stamp};
 use sonar::{Cycle, Target};
+use yaw::YawLedger;
 
 /// The loop.
 ///
@@ -144,6 +148,8 @@ pub struct Robot<'m> {
     /// The outcome of the ping in flight, which [`Self::rest`] has read for the next poll.
     heard: Option<Heard>,
     faults: Faults,
+    /// The gyro, if the robot has one.
+    yaw: Option<YawLedger>,
 }
 
 /// The outcome of a ping; `None` if the ranger failed.
@@ -166,6 +172,7 @@ impl<'m> Robot<'m> {
     ) -> Result<Self, SettingsError> {
         settings.check()?;
         let start = localizer.time();
+        let yaw = yaw_of(&localizer);
         let (pings, until) = match localizer.config().sonar.timing.schedule {
             PingSchedule::Every(period) => (Schedule::new(start, period), after(start, period)),
             PingSchedule::AsFastAsPossible => {
@@ -183,6 +190,7 @@ impl<'m> Robot<'m> {
             rests_until: AT_ONCE,
             heard: None,
             faults: Faults::default(),
+            yaw,
         })
     }
 
@@ -203,6 +211,7 @@ impl<'m> Robot<'m> {
             PingSchedule::Every(period) => self.pings.continued(now, period),
             PingSchedule::AsFastAsPossible => self.pings,
         };
+        self.yaw = yaw_of(&localizer);
         self.navigator = Navigator::new(localizer);
         self.odometer = Odometer::new(wheels);
         self.ticks = self.ticks.continued(now, settings.encoder_period);
@@ -226,8 +235,9 @@ impl<'m> Robot<'m> {
         self.rests_until = AT_ONCE;
         let mut faults = Faults::default();
         self.odometer.begin(now, hardware, &mut faults);
-        let reading = self.odometer.read(now, hardware, &mut faults);
-        let step = reading.map(|reading| self.advance(now, reading.position, &mut faults, None));
+        let reading = self.read(now, hardware, &mut faults);
+        let step = reading
+            .map(|reading| self.advance(now, reading.position, reading.turn, &mut faults, None));
         if step.is_none() {
             // The travel up to now does not belong to the new pose.
             self.odometer.forget();
@@ -278,6 +288,9 @@ impl<'m> Robot<'m> {
             report.faults.clock = 1;
         } else {
             self.odometer.begin(now, hardware, &mut report.faults);
+            if let Some(yaw) = &mut self.yaw {
+                yaw.sample(now, hardware, &mut report.faults);
+            }
             self.finish_ping(now, hardware, &mut report, search.as_deref_mut());
             self.sample_encoders(now, hardware, &mut report, search.as_deref_mut());
             self.choose_bearing(now, hardware, &mut report, search.as_deref_mut());
@@ -328,12 +341,24 @@ impl<'m> Robot<'m> {
 
     /// The next instant at which a poll has something to do besides a ping in flight.
     fn next_deadline(&self, hardware: &mut impl Hardware) -> Instant {
-        match self.cycle {
+        let next = match self.cycle {
             // Ticks are delayed until it has ended.
             Cycle::Listening { .. } => Instant::from_ticks(u64::MAX),
             Cycle::Idle { until } => until.min(self.ticks.next()),
             Cycle::Turning { .. } => can_ping_at(hardware).min(self.ticks.next()),
-        }
+        };
+        self.yaw.as_ref().map_or(next, |yaw| next.min(yaw.next()))
+    }
+
+    /// Reads both counters, and the gyro if there is one; `None` if a counter fails.
+    fn read(
+        &mut self,
+        now: Instant,
+        hardware: &mut impl Hardware,
+        faults: &mut Faults,
+    ) -> Option<Reading> {
+        let reading = self.odometer.read(now, hardware, faults)?;
+        Some(Reading { turn: self.yaw.as_ref().map(|yaw| yaw.reading(now)), ..reading })
     }
 
     /// Declares the pose unknown and begins the search, to which the present pose is proposed; a ping in flight is
@@ -482,15 +507,15 @@ impl<'m> Robot<'m> {
         faults: &mut Faults,
         search: Option<&mut Search<'m>>,
     ) -> Option<Step> {
-        let reading = self.odometer.read(now, hardware, faults)?;
-        let (at, position) = match self.settings.stamp {
+        let reading = self.read(now, hardware, faults)?;
+        let (at, position, turn) = match self.settings.stamp {
             Stamp::Reflection => {
                 let at = echo.reflected();
-                (at, from.between(&reading, at))
+                (at, from.between(&reading, at), from.turn_between(&reading, at))
             }
-            Stamp::Arrival => (now, reading.position),
+            Stamp::Arrival => (now, reading.position, reading.turn),
         };
-        Some(self.advance(at, position, faults, search))
+        Some(self.advance(at, position, turn, faults, search))
     }
 
     /// Samples the encoders, if a tick is due and no ping is in flight.
@@ -512,8 +537,9 @@ impl<'m> Robot<'m> {
         let late = since(now, due.due.max(self.time));
         report.faults.deadlines += u32::from(late > self.settings.tolerance);
         let faults = &mut report.faults;
-        let reading = self.odometer.read(now, hardware, faults);
-        let step = reading.map(|reading| self.advance(now, reading.position, faults, search));
+        let reading = self.read(now, hardware, faults);
+        let step = reading
+            .map(|reading| self.advance(now, reading.position, reading.turn, faults, search));
         if step.is_none_or(|step| matches!(step.result, StepResult::Discarded(_))) {
             self.navigator.odometry_missing(now);
         }
@@ -582,7 +608,7 @@ impl<'m> Robot<'m> {
                 Target::Wall(Aim { why, ..aim })
             }
         };
-        let Some(from) = self.odometer.read(now, hardware, &mut report.faults) else {
+        let Some(from) = self.read(now, hardware, &mut report.faults) else {
             self.abort_cycle(now);
             return;
         };
@@ -630,16 +656,18 @@ impl<'m> Robot<'m> {
         report.mode = self.navigator.work(evaluations, search);
     }
 
-    /// Passes the travel of the wheels up to `at` to the localizer.
+    /// Passes the travel of the wheels up to `at` to the localizer, and the turn of the gyro.
     fn advance(
         &mut self,
         at: Instant,
         position: Position,
+        reading: Option<TurnReading>,
         faults: &mut Faults,
         search: Option<&mut Search<'m>>,
     ) -> Step {
         let travel = self.odometer.travel_to(position);
-        let result = match self.navigator.odometry(at, travel, search) {
+        let turn = self.yaw.as_ref().and_then(|yaw| yaw.turn_to(&reading?));
+        let result = match self.navigator.odometry_with_turn(at, travel, turn, search) {
             Ok(()) => StepResult::Accepted,
             Err(error) if self.is_credible(at, travel) => StepResult::Deferred(error),
             Err(error) => StepResult::Discarded(error),
@@ -647,8 +675,11 @@ impl<'m> Robot<'m> {
         if !matches!(result, StepResult::Deferred(_)) {
             self.odometer.settle(position);
         }
+        if let (StepResult::Accepted, Some(yaw), Some(reading)) = (result, &mut self.yaw, reading) {
+            yaw.settle(reading);
+        }
         faults.travel += u32::from(matches!(result, StepResult::Discarded(_)));
-        Step { at, travel, result }
+        Step { at, travel, turn: reading, result }
     }
 
     /// Whether the wheels can have travelled so far since the localizer's last step. Each of the two positions is
@@ -659,6 +690,12 @@ impl<'m> Robot<'m> {
         let limit = fastest + 2.0 * self.odometer.wheels().coarser_tick().0;
         travel.right.abs().0 <= limit && travel.left.abs().0 <= limit
     }
+}
+
+/// The ledger of the gyro in the configuration of a localizer.
+fn yaw_of(localizer: &Localizer) -> Option<YawLedger> {
+    let parameters = localizer.config().gyro.as_ref()?;
+    Some(YawLedger::new(parameters, localizer.time()))
 }
 
 /// The instant at which the servo has settled and the echoes of the last ping have decayed.

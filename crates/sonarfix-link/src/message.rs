@@ -11,8 +11,9 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sonarfix::aim::{Aim, NoAim};
 use sonarfix::ekf::{StandardDeviations, StateEstimate};
+use sonarfix::gyro::TurnReading;
 use sonarfix::health::Health;
-use sonarfix::localizer::{Fix, Start};
+use sonarfix::localizer::{Fix, GyroStatus, Start};
 use sonarfix::map::WallId;
 use sonarfix::navigator::Mode;
 use sonarfix::pose::Pose;
@@ -78,6 +79,20 @@ pub enum Telemetry {
     Hypothesis(RankedHypothesis),
     /// The readings of the devices of a robot that waits, after [`Command::ShowDevices`].
     Devices(DeviceReadings),
+    /// The gyro at the end of the wheel travel of the next [`Self::Odometry`].
+    Turn(TurnReading),
+    /// The state of the gyro, once a second.
+    Gyro(GyroState),
+}
+
+/// The state of the gyro.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct GyroState {
+    /// The localizer's time.
+    pub at: Instant,
+    /// Its bias, and what became of its turns.
+    pub status: GyroStatus,
 }
 
 /// The identification of a robot.

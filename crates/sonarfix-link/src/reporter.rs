@@ -5,11 +5,11 @@ use sonarfix::health::Health;
 use sonarfix::localizer::Localizer;
 use sonarfix::navigator::Mode;
 use sonarfix::search::{Answer, Hypothesis, Search};
-use sonarfix::units::Instant;
+use sonarfix::units::{Duration, Instant};
 use sonarfix_hal::robot::{self, PingResult, Report, StepResult, SweepResult};
 
 use crate::message::{
-    Estimate, ModeChanged, Odometry, Ping, RankedHypothesis, SearchAnswer, SearchStatus,
+    Estimate, GyroState, ModeChanged, Odometry, Ping, RankedHypothesis, SearchAnswer, SearchStatus,
     SkippedPing, Sweep, Telemetry,
 };
 
@@ -21,7 +21,12 @@ pub struct Reporter {
     last: Odometry,
     /// The next message on the search: its status, then one hypothesis after the other.
     next: u8,
+    /// When the state of the gyro is sent next.
+    gyro_due: Instant,
 }
+
+/// Time between two messages on the gyro.
+const GYRO_PERIOD: Duration = Duration::from_ticks(1_000_000);
 
 /// Messages on the search before they begin again. There is one at each tick: with ten ticks a second, each once a second.
 const SEARCH_MESSAGES: u8 = 10;
@@ -47,7 +52,7 @@ impl Reporter {
     ) -> (Self, Telemetry) {
         let last = Odometry { at, right_metres: 0.0, left_metres: 0.0 };
         let began = Estimate { at, state, deviation, health: Health::default() };
-        (Self { last, next: 0 }, Telemetry::Initialized(began))
+        (Self { last, next: 0, gyro_due: at }, Telemetry::Initialized(began))
     }
 
     /// Passes the messages of one poll of the loop to `send`. `localizer` is that of the loop, after the poll.
@@ -68,6 +73,7 @@ impl Reporter {
         if let Some(tick) = &report.tick {
             self.odometry(tick.step.as_ref(), &mut send);
             send(&Telemetry::Estimate(estimate(localizer)));
+            self.gyro(localizer, &mut send);
         }
         if let Some(Err(reason)) = report.aimed {
             send(&Telemetry::SkippedPing(SkippedPing { at: self.last.at, reason }));
@@ -122,7 +128,22 @@ impl Reporter {
                 right_metres: self.last.right_metres + f64::from(step.travel.right.0),
                 left_metres: self.last.left_metres + f64::from(step.travel.left.0),
             };
+            if let Some(turn) = step.turn {
+                send(&Telemetry::Turn(turn));
+            }
             send(&Telemetry::Odometry(self.last));
+        }
+    }
+
+    /// The state of the gyro, when a second has passed since the last one.
+    fn gyro(&mut self, localizer: &Localizer, send: &mut impl FnMut(&Telemetry)) {
+        let Some(status) = localizer.gyro() else {
+            return;
+        };
+        let at = localizer.time();
+        if at >= self.gyro_due {
+            self.gyro_due = at.checked_add_duration(GYRO_PERIOD).unwrap_or(at);
+            send(&Telemetry::Gyro(GyroState { at, status }));
         }
     }
 

@@ -41,6 +41,12 @@ pub enum FaultKind {
     ClockJitter(f64),
     /// The controller loses power and restarts at the stored pose.
     BrownOut,
+    /// The gyro repeats its last rate.
+    StuckGyro,
+    /// The rate of the gyro stays at the end of its range.
+    SaturatedGyro,
+    /// This fraction of the readings of the gyro fail.
+    GyroReadErrors(f64),
 }
 
 /// A fault.
@@ -85,6 +91,9 @@ fn kind(table: &Table<'_>) -> Option<FaultKind> {
         "slow_servo" => FaultKind::SlowServo(times(table)),
         "clock_jitter" => FaultKind::ClockJitter(table.require("late").deviation(&TIME)),
         "brown_out" => FaultKind::BrownOut,
+        "stuck_gyro" => FaultKind::StuckGyro,
+        "saturated_gyro" => FaultKind::SaturatedGyro,
+        "gyro_read_errors" => FaultKind::GyroReadErrors(share(table)),
         _ => {
             node.report("must be one of the faults in docs/formats.md");
             return None;

@@ -4,6 +4,7 @@ use core::cell::Cell;
 use core::convert::Infallible;
 
 use embedded_hal::digital::{self, OutputPin};
+use embedded_hal::i2c::{self, ErrorKind, I2c, NoAcknowledgeSource, Operation};
 use embedded_hal::pwm::{self, SetDutyCycle};
 use serde::{Deserialize, Serialize};
 use sonarfix::units::Instant;
@@ -23,6 +24,17 @@ pub struct Sensors {
     pub rose: Option<Instant>,
     /// When it went low after that, if it did.
     pub fell: Option<Instant>,
+    /// The gyro.
+    pub gyro: GyroSignal,
+}
+
+/// What the gyro senses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct GyroSignal {
+    /// The yaw rate, millionths of a radian per second.
+    pub micros: i32,
+    /// Whether it does not respond on its bus.
+    pub has_failed: bool,
 }
 
 /// The counter of an encoder.
@@ -60,6 +72,8 @@ pub struct Wires {
     pub trigger: TriggerWire,
     /// The edges of the echo line.
     pub echo: EchoCapture,
+    /// The bus of the gyro.
+    pub gyro: GyroWire,
 }
 
 impl Wires {
@@ -67,6 +81,7 @@ impl Wires {
     pub fn apply(&self, sensors: &Sensors) {
         self.right.0.set(sensors.right);
         self.left.0.set(sensors.left);
+        self.gyro.signal.set(sensors.gyro);
         if let Some(at) = sensors.rose {
             self.echo.rose(at);
         }
@@ -150,6 +165,77 @@ impl OutputPin for &TriggerWire {
 
     fn set_high(&mut self) -> Result<(), Infallible> {
         self.is_raised.set(true);
+        Ok(())
+    }
+}
+
+/// An MPU-6050 on a bus of its own: its identity, its range, and the rate of its z axis.
+#[derive(Debug, Default)]
+pub struct GyroWire {
+    signal: Cell<GyroSignal>,
+    /// The register that is read next.
+    register: Cell<u8>,
+    /// The range: 0 for 250°/s, and twice as much for each number more.
+    range: Cell<u8>,
+}
+
+const GYRO_CONFIG: u8 = 0x1B;
+const GYRO_Z_HIGH: u8 = 0x47;
+const GYRO_Z_LOW: u8 = 0x48;
+const WHO_AM_I: u8 = 0x75;
+const IDENTITY: u8 = 0x68;
+/// Counts of a rate of one radian per second in the range of 250°/s.
+const COUNTS: f32 = 131.072 * 180.0 / core::f32::consts::PI;
+
+impl GyroWire {
+    fn byte(&self, register: u8) -> u8 {
+        let scale = f32::from(1_u8 << (self.range.get() & 3));
+        #[expect(clippy::cast_precision_loss, reason = "far more digits than the sensor has")]
+        let rate = 1e-6 * self.signal.get().micros as f32;
+        let counts = rate * COUNTS / scale;
+        #[expect(clippy::cast_possible_truncation, reason = "saturates as the sensor does")]
+        let counts = (counts + 0.5_f32.copysign(counts)) as i16;
+        let [high, low] = counts.to_be_bytes();
+        match register {
+            GYRO_Z_HIGH => high,
+            GYRO_Z_LOW => low,
+            WHO_AM_I => IDENTITY,
+            _ => 0,
+        }
+    }
+
+    fn take(&self, bytes: &[u8]) {
+        if let [register, values @ ..] = bytes {
+            self.register.set(*register);
+            if let (GYRO_CONFIG, [value, ..]) = (*register, values) {
+                self.range.set(value >> 3);
+            }
+        }
+    }
+
+    fn give(&self, bytes: &mut [u8]) {
+        for byte in bytes {
+            *byte = self.byte(self.register.get());
+            self.register.set(self.register.get().wrapping_add(1));
+        }
+    }
+}
+
+impl i2c::ErrorType for &GyroWire {
+    type Error = ErrorKind;
+}
+
+impl I2c for &GyroWire {
+    fn transaction(&mut self, _: u8, operations: &mut [Operation<'_>]) -> Result<(), ErrorKind> {
+        if self.signal.get().has_failed {
+            return Err(ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address));
+        }
+        for operation in operations {
+            match operation {
+                Operation::Write(bytes) => self.take(bytes),
+                Operation::Read(bytes) => self.give(bytes),
+            }
+        }
         Ok(())
     }
 }

@@ -16,8 +16,8 @@ use sonarfix_hal::config::RobotConfig;
 use sonarfix_hal::ranger::RangerKind;
 use sonarfix_pil::Unmetered;
 use sonarfix_pil::{
-    Answer, Begin, Counted, Line, LineError, Load, Request, RequestError, Sensors, SessionKind,
-    line, serve,
+    Answer, Begin, Counted, GyroSignal, Line, LineError, Load, Request, RequestError, Sensors,
+    SessionKind, line, serve,
 };
 
 /// A stream that delivers prepared bytes, then ends.
@@ -115,6 +115,7 @@ fn sensors(millis: u64, ticks: i32) -> Sensors {
         left: counted(-ticks),
         rose: None,
         fell: None,
+        gyro: GyroSignal::default(),
     }
 }
 

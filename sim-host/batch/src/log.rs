@@ -171,7 +171,10 @@ impl LogReader<'_> {
                 let pose = Vector3::new(x, y, heading);
                 self.start(StartPose { time, pose, position: dx.max(dy), heading: spread })
             }
-            Record::Skip { .. } | Record::Pose { .. } | Record::Mode { .. } => Ok(()),
+            Record::Skip { .. }
+            | Record::Turn { .. }
+            | Record::Pose { .. }
+            | Record::Mode { .. } => Ok(()),
         }
     }
 

@@ -16,7 +16,8 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let runs = Runs::new(args.runs.saturating_mul(fault_table::CASES + fault_search::CASES));
     let rows = fault_table::rows(args.runs, &runs)?;
     let searching = fault_search::rows(args.runs, &runs)?;
+    let with_gyro = fault_table::gyro_rows(args.runs, &runs)?;
     runs.end()?;
-    print!("{}", fault_table::markdown(&rows, &searching));
+    print!("{}", fault_table::markdown(&rows, &searching, &with_gyro));
     Ok(())
 }

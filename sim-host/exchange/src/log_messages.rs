@@ -41,11 +41,13 @@ pub fn topics() -> Vec<(&'static str, Schema)> {
     let states = || std::iter::once(("time_s", REAL)).chain(STATE_FIELDS.map(|name| (name, REAL)));
     let ticks = [("time_s", REAL), ("right", whole), ("left", whole)];
     let wheels = [("time_s", REAL), ("right_m", REAL), ("left_m", REAL)];
+    let turn = [("time_s", REAL), ("angle", whole), ("breaks", whole)];
     let range = [("time_s", REAL), ("bearing_rad", REAL), ("range_m", REAL), ("wall", whole)];
     let mode = states().chain([("mode", Kind::Text)]);
     vec![
         ("/log/ticks", schema::columns("sonarfix.Ticks", ticks.into_iter())),
         ("/log/wheels", schema::columns("sonarfix.Wheels", wheels.into_iter())),
+        ("/log/turn", schema::columns("sonarfix.Turn", turn.into_iter())),
         ("/log/range", schema::columns("sonarfix.Range", range.into_iter())),
         ("/log/skip", schema::columns("sonarfix.Skip", [("time_s", REAL)].into_iter())),
         ("/log/scan", schema::laser_scan()),
@@ -61,6 +63,7 @@ pub fn time(record: &Record) -> f64 {
     match record {
         Record::Ticks { time, .. }
         | Record::Wheels { time, .. }
+        | Record::Turn { time, .. }
         | Record::Range { time, .. }
         | Record::Skip { time }
         | Record::Scan { time, .. }
@@ -79,6 +82,9 @@ pub fn message(record: &Record, stamp: u64, mount: [f64; 2]) -> (&'static str, V
         }
         Record::Wheels { time, right, left } => {
             ("/log/wheels", json!({ "time_s": time, "right_m": right, "left_m": left }))
+        }
+        Record::Turn { time, angle, breaks } => {
+            ("/log/turn", json!({ "time_s": time, "angle": angle, "breaks": breaks }))
         }
         Record::Range { time, bearing, range, wall } => (
             "/log/range",

@@ -246,7 +246,7 @@ impl Robot {
                 self.feed.search(&record, &view::search(status, &self.names));
             }
             Telemetry::Hello(_) | Telemetry::LoopStatus(_) => self.status(self.last),
-            Telemetry::Hypothesis(_) => {}
+            Telemetry::Hypothesis(_) | Telemetry::Turn(_) | Telemetry::Gyro(_) => {}
         }
     }
 

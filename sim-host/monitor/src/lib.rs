@@ -25,7 +25,7 @@ pub mod wheels;
 
 use sonarfix::localizer::Fix;
 use sonarfix::navigator::Mode;
-use sonarfix_link::message::{LoopStatus, RankedHypothesis, SearchStatus, Telemetry};
+use sonarfix_link::message::{GyroState, LoopStatus, RankedHypothesis, SearchStatus, Telemetry};
 use sonarfix_link::{Estimate, Gaps, Hello, Ping, Receiver, ReceiverCounters};
 
 use sonarfix_sim::statistics::FixCounts;
@@ -42,6 +42,7 @@ pub struct Monitor {
     ping: Option<Ping>,
     fixes: FixCounts,
     state: Option<LoopStatus>,
+    gyro: Option<GyroState>,
     mode: Mode,
     search: Option<SearchStatus>,
     hypotheses: Vec<RankedHypothesis>,
@@ -101,7 +102,9 @@ impl Monitor {
             }
             Telemetry::Hypothesis(hypothesis) => self.rank(hypothesis),
             Telemetry::Odometry(step) => self.wheels.take(&step),
+            Telemetry::Gyro(gyro) => self.gyro = Some(gyro),
             Telemetry::SkippedPing(_)
+            | Telemetry::Turn(_)
             | Telemetry::Sweep(_)
             | Telemetry::Devices(_)
             | Telemetry::Ack(_) => {}

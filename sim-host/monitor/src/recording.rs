@@ -8,6 +8,7 @@ use std::io::{self, LineWriter, Write};
 use std::path::PathBuf;
 
 use sonarfix::ekf::STATES;
+use sonarfix::gyro::TurnReading;
 use sonarfix::navigator::{Mode, UNKNOWN_POSITION};
 use sonarfix::units::Instant;
 use sonarfix_link::message::{ModeChanged, Odometry, SkippedPing, Sweep};
@@ -149,6 +150,7 @@ impl<W: Write> Log<W> {
         self.lost(received.lost)?;
         match &received.telemetry {
             Telemetry::Odometry(step) => self.step(step),
+            Telemetry::Turn(reading) => self.turn(reading),
             Telemetry::Ping(ping) => self.ping(ping),
             Telemetry::Sweep(sweep) => self.sweep(sweep),
             Telemetry::SkippedPing(SkippedPing { at, .. }) => {
@@ -173,6 +175,12 @@ impl<W: Write> Log<W> {
             writeln!(self.out, "wheels,{},{right_metres},{left_metres}", Time(*at))?;
         }
         Ok(())
+    }
+
+    /// The gyro at the time of the next step.
+    fn turn(&mut self, reading: &TurnReading) -> io::Result<()> {
+        let breaks = reading.breaks().map_or(String::new(), |breaks| breaks.to_string());
+        writeln!(self.out, "turn,{},{},{breaks}", Time(reading.at()), reading.angle())
     }
 
     /// A range without a wall, for the search.

@@ -1,13 +1,13 @@
 //! The latest telemetry as text.
 
 use sonarfix::health::{LOST_AT, Verdict};
-use sonarfix::localizer::Fix;
+use sonarfix::localizer::{Fix, GyroStatus, TurnUse};
 use sonarfix::map::WallId;
 use sonarfix::navigator::Mode;
 use sonarfix::units::Instant;
 use sonarfix_hal::robot::Faults;
 use sonarfix_link::message::{
-    ImageStatus, LoopStatus, RankedHypothesis, ResetCause, SearchAnswer, SearchStatus,
+    GyroState, ImageStatus, LoopStatus, RankedHypothesis, ResetCause, SearchAnswer, SearchStatus,
 };
 use sonarfix_link::{Estimate, Hello, Ping};
 
@@ -28,6 +28,7 @@ pub fn page(monitor: &Monitor, walls: &[String]) -> String {
         monitor.state.as_ref().map_or("loop    none yet".to_owned(), state),
         link(monitor),
     ];
+    lines.extend(monitor.gyro.as_ref().map(gyro));
     if monitor.mode != Mode::Tracking {
         lines.extend(monitor.search.as_ref().map(|status| search(status, walls)));
         lines.extend(monitor.hypotheses.iter().map(hypothesis));
@@ -205,6 +206,23 @@ fn state(state: &LoopStatus) -> String {
     )
 }
 
+fn gyro(gyro: &GyroState) -> String {
+    let GyroStatus { bias, deviation, latest, slips, conflicts, .. } = gyro.status;
+    let latest = match latest {
+        TurnUse::Missing => "no turn: wheels alone",
+        TurnUse::Refused(_) => "turn refused: wheels alone",
+        TurnUse::Standing => "standing",
+        TurnUse::Combined => "combined with the wheels",
+        TurnUse::WheelSlip => "a wheel slips",
+        _ => "",
+    };
+    format!(
+        "gyro    bias {:.3}°/s ± {:.3}°/s, {latest}; {slips} slips, {conflicts} conflicts with the wheels",
+        bias.to_degrees(),
+        deviation.to_degrees(),
+    )
+}
+
 fn faults(f: &Faults) -> String {
     let counts = [
         ("right encoder", f.right.errors.saturating_add(f.right.illegal)),
@@ -213,6 +231,7 @@ fn faults(f: &Faults) -> String {
         ("ranger", f.ranger),
         ("travel", f.travel),
         ("clock", f.clock),
+        ("gyro", f.gyro),
     ];
     let nonzero: Vec<_> = counts
         .into_iter()

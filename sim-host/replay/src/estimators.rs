@@ -14,6 +14,7 @@ use sonarfix_sim::trace::{Pose, Tick, Truth};
 
 use crate::gap::Gap;
 use crate::reference::seconds;
+use crate::turns::Turns;
 use crate::wheels::Reading;
 
 /// What the search did during a replay. Times in seconds.
@@ -60,6 +61,8 @@ pub struct Estimators<'a> {
     /// The time of the last encoder sample that failed.
     missed: i64,
     pub searches: Searches,
+    /// The recorded turns of a gyro.
+    pub turns: Turns,
     computing: ComputingTime,
 }
 
@@ -79,6 +82,7 @@ impl<'a> Estimators<'a> {
             received: reading,
             missed: reading.time,
             searches: Searches::default(),
+            turns: Turns::default(),
             computing: ComputingTime::default(),
         }
     }
@@ -118,7 +122,10 @@ impl<'a> Estimators<'a> {
         let ([right, left], received) = self.received.advanced_to(reading);
         let now = Instant::from_ticks((reading.time - self.epoch).unsigned_abs());
         let travel = WheelTravel::new(right, left);
-        self.navigator.odometry(now, travel, self.search.as_deref_mut())?;
+        let reading = self.turns.at(received.time);
+        let turn = self.turns.since_taken(reading);
+        self.navigator.odometry_with_turn(now, travel, turn, self.search.as_deref_mut())?;
+        self.turns.take(reading);
         self.odometry.moved([right.into(), left.into()]);
         self.received = received;
         self.work(elapsed);

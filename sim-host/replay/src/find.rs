@@ -157,6 +157,7 @@ impl<'a> Run<'a> {
             }
             Record::Scan { time, ref scan } => self.scan(log_micros(time), scan),
             Record::Skip { .. }
+            | Record::Turn { .. }
             | Record::Start { .. }
             | Record::Pose { .. }
             | Record::Mode { .. }

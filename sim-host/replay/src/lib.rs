@@ -39,6 +39,7 @@ pub mod scan;
 mod score;
 mod session;
 pub mod thinned;
+mod turns;
 mod wheels;
 
 pub use estimators::Searches;

@@ -32,6 +32,15 @@ pub enum Record {
         /// Travel of the left wheel, metres.
         left: f64,
     },
+    /// The gyro at the end of a step, before the wheel travel of the same time.
+    Turn {
+        /// Time of the reading.
+        time: f64,
+        /// The angle since the start, 2⁻⁴⁰ rad.
+        angle: i64,
+        /// Interruptions since the start; `None` while the rate is not known.
+        breaks: Option<u32>,
+    },
     /// One range.
     Range {
         /// Time of the reflection.
@@ -112,7 +121,9 @@ pub enum Malformed {
     #[error("the line is not UTF-8 text")]
     NotText,
     /// Its kind is unknown.
-    #[error("`{0}` is not one of ticks, wheels, range, scan, skip, start, resume, pose, mode")]
+    #[error(
+        "`{0}` is not one of ticks, wheels, turn, range, scan, skip, start, resume, pose, mode"
+    )]
     UnknownKind(String),
     /// It ends too early.
     #[error("the {0} is missing")]
@@ -153,6 +164,11 @@ pub fn parse(line: &str) -> Result<Option<Record>, Malformed> {
             time: fields.time()?,
             right: fields.number("right travel")?,
             left: fields.number("left travel")?,
+        },
+        "turn" => Record::Turn {
+            time: fields.time()?,
+            angle: fields.count("angle")?,
+            breaks: fields.breaks()?,
         },
         "range" => Record::Range {
             time: fields.time()?,
@@ -258,6 +274,15 @@ impl<'a> Fields<'a> {
         };
         let text = text.trim();
         text.parse().map(Some).map_err(|_| not("wall", text, "a whole number, from 0"))
+    }
+
+    fn breaks(&mut self) -> Result<Option<u32>, Malformed> {
+        let text = self.next("number of interruptions")?;
+        if text.is_empty() {
+            return Ok(None);
+        }
+        let rule = "a whole number from 0, or empty";
+        text.parse().map(Some).map_err(|_| not("number of interruptions", text, rule))
     }
 
     fn mode(&mut self) -> Result<Mode, Malformed> {

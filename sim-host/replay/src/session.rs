@@ -8,6 +8,7 @@ use std::vec::IntoIter;
 use sonarfix::aim::{Aim, NoAim, Reason};
 use sonarfix::config::{PingSchedule, Sonar};
 use sonarfix::ekf::{STATES, StandardDeviations, StateEstimate};
+use sonarfix::gyro::TurnReading;
 use sonarfix::localizer::{Fix, Localizer, Start};
 use sonarfix::map::{Map, Wall, WallId};
 use sonarfix::navigator::{Mode, Navigator, UNKNOWN_HEADING, UNKNOWN_POSITION};
@@ -202,6 +203,14 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
             Record::Ticks { time, right, left } => {
                 let wheels = self.rolled([right, left]);
                 self.take_wheels(micros(time), wheels, Encoder::Ticks, complain)
+            }
+            Record::Turn { time, angle, breaks } => {
+                let time = micros(time);
+                let at = Instant::from_ticks(time.unsigned_abs());
+                if let Some(estimators) = &mut self.estimators {
+                    estimators.turns.add(time, TurnReading::new(at, angle, breaks));
+                }
+                Ok(())
             }
             Record::Wheels { time, right, left } => {
                 self.take_wheels(micros(time), [right, left], Encoder::Wheels, complain)

@@ -13,10 +13,12 @@
 //! - [`disc`]: an encoder disc, which generates the edges;
 //! - [`board`]: the board of a sonar, which answers a trigger with an echo pulse;
 //! - [`devices`]: the parameters of a scenario's devices, for the drivers and for the models;
+//! - [`gyro`]: the rate of a gyro, for its registers on the bus;
 //! - [`faults`]: faults of the hardware.
 
 pub mod board;
 pub mod devices;
 pub mod disc;
 pub mod faults;
+pub mod gyro;
 pub mod wires;

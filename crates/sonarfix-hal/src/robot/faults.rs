@@ -33,6 +33,9 @@ pub struct Faults {
     pub deadlines: u32,
     /// Polls with a time before that of an earlier poll, which have no other effect.
     pub clock: u32,
+    /// Samples of the gyro that could not be read, are saturated or stuck, or follow missing ones. The wheels alone are
+    /// used until there are good ones.
+    pub gyro: u32,
 }
 
 impl EncoderFaults {
@@ -56,6 +59,7 @@ impl Faults {
             travel: self.travel.saturating_add(other.travel),
             deadlines: self.deadlines.saturating_add(other.deadlines),
             clock: self.clock.saturating_add(other.clock),
+            gyro: self.gyro.saturating_add(other.gyro),
         }
     }
 

@@ -1,10 +1,12 @@
 //! The devices that the loop uses.
 
 use embedded_hal::pwm::SetDutyCycle;
-use sonarfix::units::Metres;
+use sonarfix::gyro::GyroParameters;
+use sonarfix::units::{Metres, RadiansPerSecond};
 
 use crate::config::{RobotConfig, Unsupported};
 use crate::encoder::Counter;
+use crate::gyro::{Unreadable, YawRate};
 use crate::ranger::Ranger;
 use crate::servo::Servo;
 use crate::time::micros;
@@ -31,6 +33,19 @@ pub trait Hardware {
     /// The ranger.
     fn ranger(&mut self) -> &mut Self::Ranger;
 
+    /// The rate of the gyro now; `None` without a gyro.
+    fn yaw_rate(&mut self) -> Option<Result<RadiansPerSecond, Unreadable>> {
+        None
+    }
+
+    /// Configures the gyro of this robot.
+    ///
+    /// # Errors
+    /// [`Unsupported::Gyro`], if the robot has one and these devices do not, or if it does not respond.
+    fn configure_gyro(&mut self, parameters: Option<&GyroParameters>) -> Result<(), Unsupported> {
+        if parameters.is_some() { Err(Unsupported::Gyro) } else { Ok(()) }
+    }
+
     /// Configures the drivers for this robot. The configuration has passed [`RobotConfig::check`].
     ///
     /// # Errors
@@ -45,7 +60,49 @@ pub trait Hardware {
         self.servo().check(&servo).map_err(Unsupported::Servo)?;
         let ranger = self.ranger().configure(&config.ranger_settings());
         ranger.map_err(|_| Unsupported::Ranger)?;
+        self.configure_gyro(config.localizer.gyro.as_ref())?;
         self.servo().configure(&servo).map_err(Unsupported::Servo)
+    }
+}
+
+/// The devices of a robot and its gyro. A robot file without `[gyro]` leaves the gyro as it is.
+#[derive(Debug)]
+pub struct WithGyro<H, G> {
+    /// The devices without the gyro.
+    pub devices: H,
+    /// The gyro.
+    pub gyro: G,
+}
+
+impl<H: Hardware, G: YawRate> Hardware for WithGyro<H, G> {
+    type Right = H::Right;
+    type Left = H::Left;
+    type Pwm = H::Pwm;
+    type Ranger = H::Ranger;
+
+    fn right(&mut self) -> &mut H::Right {
+        self.devices.right()
+    }
+
+    fn left(&mut self) -> &mut H::Left {
+        self.devices.left()
+    }
+
+    fn servo(&mut self) -> &mut Servo<H::Pwm> {
+        self.devices.servo()
+    }
+
+    fn ranger(&mut self) -> &mut H::Ranger {
+        self.devices.ranger()
+    }
+
+    fn yaw_rate(&mut self) -> Option<Result<RadiansPerSecond, Unreadable>> {
+        Some(self.gyro.rate())
+    }
+
+    fn configure_gyro(&mut self, parameters: Option<&GyroParameters>) -> Result<(), Unsupported> {
+        let configured = parameters.map(|parameters| self.gyro.configure(parameters));
+        configured.transpose().map(|_| ()).map_err(|_| Unsupported::Gyro)
     }
 }
 

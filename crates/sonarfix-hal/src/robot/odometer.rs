@@ -3,6 +3,7 @@
 //! It counts whole half edges, so that a step can end between two edges (at a reflection) without losing,
 //! duplicating or rounding any.
 
+use sonarfix::gyro::TurnReading;
 use sonarfix::motion::WheelTravel;
 use sonarfix::units::Instant;
 
@@ -22,9 +23,16 @@ pub(super) struct Position {
 pub(super) struct Reading {
     pub at: Instant,
     pub position: Position,
+    /// The gyro at the same time, if the robot has one.
+    pub turn: Option<TurnReading>,
 }
 
 impl Reading {
+    /// The gyro at a time between this reading and a later one.
+    pub fn turn_between(&self, later: &Self, at: Instant) -> Option<TurnReading> {
+        Some(self.turn?.between(&later.turn?, at))
+    }
+
     /// The position at a time between this reading and a later one at constant speed, rounded to half an edge.
     /// In the middle between two readings it is exactly their mean.
     pub fn between(&self, later: &Self, at: Instant) -> Position {
@@ -109,7 +117,7 @@ impl Odometer {
         let left = self.left.read(hardware.left(), &mut faults.left);
         let (right, left) = (right?, left?);
         let position = Position { right, left };
-        Some(Reading { at: now, position })
+        Some(Reading { at: now, position, turn: None })
     }
 
     /// The travel of the wheels since the position that the localizer has taken.

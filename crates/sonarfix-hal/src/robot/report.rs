@@ -1,6 +1,7 @@
 //! The report of one poll of the loop.
 
 use sonarfix::aim::{Aim, NoAim};
+use sonarfix::gyro::TurnReading;
 use sonarfix::localizer::{Fix, OdometryError};
 use sonarfix::motion::WheelTravel;
 use sonarfix::navigator::Mode;
@@ -59,6 +60,8 @@ pub struct Step {
     pub at: Instant,
     /// The travel since the last step that was not [`StepResult::Deferred`].
     pub travel: WheelTravel,
+    /// The gyro at the end of the travel, if the robot has one.
+    pub turn: Option<TurnReading>,
     /// The localizer's response.
     pub result: StepResult,
 }

@@ -44,6 +44,8 @@ fn name_of_telemetry(message: &Telemetry) -> &'static str {
         Telemetry::Search(_) => "search status",
         Telemetry::Hypothesis(_) => "hypothesis",
         Telemetry::Devices(_) => "devices",
+        Telemetry::Turn(_) => "turn",
+        Telemetry::Gyro(_) => "gyro",
     }
 }
 
@@ -120,7 +122,12 @@ fn every_variant_has_the_number_of_its_version() {
         RangerKind::Custom,
     ]);
     let limits = SettingError::Limits;
-    numbered(&[Unsupported::Ranger, Unsupported::Servo(limits), Unsupported::Counter]);
+    numbered(&[
+        Unsupported::Ranger,
+        Unsupported::Servo(limits),
+        Unsupported::Counter,
+        Unsupported::Gyro,
+    ]);
     numbered(&[SettingError::Calibration, limits, SettingError::Pulse, SettingError::Frame]);
     numbered(&[
         CommandResult::Done,

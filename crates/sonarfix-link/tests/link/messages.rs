@@ -5,9 +5,9 @@ use rand_chacha::ChaCha8Rng;
 use sonarfix::aim::{Aim, NoAim, Reason};
 use sonarfix::config::{Config, PingSchedule, PingTiming, Policy, ServoTiming};
 use sonarfix::ekf::{Innovation, STATES, StandardDeviations, StateEstimate};
-use sonarfix::gyro::GyroParameters;
+use sonarfix::gyro::{GyroParameters, TurnReading, TurnRefusal};
 use sonarfix::health::{Health, Verdict};
-use sonarfix::localizer::{Fix, Refusal, Start};
+use sonarfix::localizer::{Fix, GyroStatus, Refusal, Start, TurnUse};
 use sonarfix::map::WallId;
 use sonarfix::navigator::Mode;
 use sonarfix::pose::{Point, Pose};
@@ -21,8 +21,9 @@ use sonarfix_hal::ranger::{Celsius, Echo, NoEcho, Outcome, PulseTiming, RangerKi
 use sonarfix_hal::robot::{EncoderFaults, Faults};
 use sonarfix_hal::servo::{MeasuredPulse, SettingError};
 use sonarfix_link::message::{
-    CommandError, DeviceReadings, EncoderReading, ImageStatus, LoopStatus, ModeChanged, Odometry,
-    RankedHypothesis, ResetCause, SearchAnswer, SearchStatus, ServoReading, SkippedPing, Sweep,
+    CommandError, DeviceReadings, EncoderReading, GyroState, ImageStatus, LoopStatus, ModeChanged,
+    Odometry, RankedHypothesis, ResetCause, SearchAnswer, SearchStatus, ServoReading, SkippedPing,
+    Sweep,
 };
 use sonarfix_link::{
     Ack, Command, CommandResult, Estimate, Hello, Ping, ReceiverCounters, SessionCommand, Telemetry,
@@ -118,7 +119,7 @@ impl Source for Largest {
 }
 
 /// The numbers of kinds of telemetry and of commands.
-pub const TELEMETRY: u32 = 14;
+pub const TELEMETRY: u32 = 16;
 pub const COMMANDS: u32 = 9;
 
 pub fn any_telemetry(rng: &mut ChaCha8Rng) -> Telemetry {
@@ -181,6 +182,8 @@ pub fn telemetry(kind: u32, source: &mut impl Source) -> Telemetry {
             fit: source.single(),
             explained: source.single(),
         }),
+        14 => Telemetry::Turn(turn(source)),
+        15 => Telemetry::Gyro(gyro(source)),
         _ => Telemetry::Devices(DeviceReadings {
             at: source.instant(),
             right: encoder(source),
@@ -227,6 +230,32 @@ pub fn command(kind: u32, source: &mut impl Source) -> SessionCommand {
         _ => Command::ShowDevices,
     };
     SessionCommand { session: source.bits32(), command }
+}
+
+fn gyro(source: &mut impl Source) -> GyroState {
+    let refusals = [TurnRefusal::NotFinite, TurnRefusal::WrongDuration, TurnRefusal::TooFast];
+    let refused = TurnUse::Refused(source.choose(&refusals));
+    GyroState {
+        at: source.instant(),
+        status: GyroStatus {
+            bias: RadiansPerSecond(source.single()),
+            deviation: RadiansPerSecond(source.single()),
+            latest: source.choose(&[
+                TurnUse::Missing,
+                refused,
+                TurnUse::Standing,
+                TurnUse::Combined,
+                TurnUse::WheelSlip,
+            ]),
+            slips: source.bits32(),
+            conflicts: source.bits32(),
+        },
+    }
+}
+
+fn turn(source: &mut impl Source) -> TurnReading {
+    let (at, angle) = (source.instant(), source.bits64().cast_signed());
+    TurnReading::new(at, angle, (source.pick(2) == 0).then(|| source.bits32()))
 }
 
 fn numbers(source: &mut impl Source) -> [f32; STATES] {
@@ -334,6 +363,7 @@ fn state_of_loop(source: &mut impl Source) -> LoopStatus {
             travel: source.bits32(),
             deadlines: source.bits32(),
             clock: source.bits32(),
+            gyro: source.bits32(),
         },
         worst_poll: source.duration(),
         commands: ReceiverCounters {

@@ -123,6 +123,8 @@ pub struct TurnIntegral {
 
 /// The integral at an instant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TurnReading {
     at: Instant,
     angle: i64,
@@ -131,6 +133,30 @@ pub struct TurnReading {
 }
 
 impl TurnReading {
+    /// A reading of recorded parts, as [`Self::at`], [`Self::angle`] and [`Self::breaks`] return them.
+    #[must_use]
+    pub fn new(at: Instant, angle: i64, breaks: Option<u32>) -> Self {
+        Self { at, angle, breaks }
+    }
+
+    /// Its time.
+    #[must_use]
+    pub fn at(&self) -> Instant {
+        self.at
+    }
+
+    /// The angle since the start, in units of 2⁻⁴⁰ rad.
+    #[must_use]
+    pub fn angle(&self) -> i64 {
+        self.angle
+    }
+
+    /// Interruptions since the start; `None` while the integral is interrupted.
+    #[must_use]
+    pub fn breaks(&self) -> Option<u32> {
+        self.breaks
+    }
+
     /// The turn since an earlier reading; `None` if the integral was interrupted.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "a turn of a step is a few radians")]

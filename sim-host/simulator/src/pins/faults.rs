@@ -4,10 +4,12 @@
 //!
 //! - `sonar`: the echo pulse;
 //! - `encoder`: the edges of a wheel;
+//! - `gyro`: the rate of the gyro;
 //! - `controller`: the servo commands, the time of a poll, the power supply.
 
 mod controller;
 mod encoder;
+mod gyro;
 mod sonar;
 mod timed;
 
@@ -17,6 +19,7 @@ use sonarfix_map::{Fault, FaultKind, Wheel};
 
 pub use controller::ControllerFaults;
 pub use encoder::{Edge, EncoderFaults};
+pub use gyro::GyroFaults;
 pub use sonar::SonarFaults;
 use timed::Timed;
 
@@ -32,6 +35,8 @@ pub struct Faults {
     pub encoders: [EncoderFaults; 2],
     /// Faults of servo, timing and power.
     pub controller: ControllerFaults,
+    /// Faults of the gyro.
+    pub gyro: GyroFaults,
 }
 
 impl Faults {
@@ -48,6 +53,7 @@ impl Faults {
             sonar: SonarFaults::new(pick(faults, sonar::of), stream(0)),
             encoders: [of(Wheel::Right, 1), of(Wheel::Left, 2)],
             controller: ControllerFaults::new(pick(faults, controller::of), stream(3)),
+            gyro: GyroFaults::new(pick(faults, gyro::of), stream(4)),
         }
     }
 }

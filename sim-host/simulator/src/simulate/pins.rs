@@ -6,7 +6,7 @@ use sonarfix::search::Search;
 use sonarfix::units::{Instant, Metres, Radians};
 use sonarfix_hal::robot::{PingResult, Report};
 use sonarfix_map::Scenario;
-use sonarfix_pil::{Actuators, Sensors, Wires};
+use sonarfix_pil::{Actuators, GyroSignal, Sensors, Wires};
 
 use super::computer::{Computer, Controller};
 use super::error::SimulationError;
@@ -19,6 +19,7 @@ use crate::pins::board::{LATENCY, SonarBoard};
 use crate::pins::devices;
 use crate::pins::disc::EncoderDisc;
 use crate::pins::faults::Faults;
+use crate::pins::gyro::GyroChip;
 use crate::pins::wires::EncoderWires;
 use crate::plant::Plant;
 use crate::plant::follower::{Command, Follower};
@@ -92,6 +93,8 @@ struct SimulatedHardware<'a> {
     mode: Mode,
     /// The last ping, for the trace.
     measurement: Option<Measurement>,
+    /// The gyro, if the robot has one.
+    gyro: Option<GyroChip>,
     /// Microseconds since the run began.
     now: u64,
 }
@@ -107,6 +110,8 @@ impl<'a> SimulatedHardware<'a> {
         let plant = simulation.plant();
         let start = simulation.start(&plant.state(), &mut streams.start);
         let score = Score::new(simulation, start, plant.state())?;
+        let gyro = simulation.gyro(&mut streams.gyro).zip(scenario.robot.localizer.gyro);
+        let gyro = gyro.map(|(gyro, assumed)| GyroChip::new(gyro, &assumed));
         let [right, left] = encoders;
         let [right_tick, left_tick] = devices::ticks(&scenario.robot);
         let hardware = Self {
@@ -129,6 +134,7 @@ impl<'a> SimulatedHardware<'a> {
             put_down: &simulation.put_down,
             mode: Mode::Tracking,
             measurement: None,
+            gyro,
             now: 0,
         };
         Ok((hardware, start))
@@ -173,7 +179,8 @@ impl<'a> SimulatedHardware<'a> {
         let [right, left] = [(right, failed[0]), (left, failed[1])]
             .map(|(wires, has_failed)| wires.counted(has_failed));
         let (rose, fell) = std::mem::take(&mut self.edges);
-        Sensors { at: Instant::from_ticks(self.now), right, left, rose, fell }
+        let gyro = self.gyro.as_ref().map_or_else(GyroSignal::default, GyroChip::signal);
+        Sensors { at: Instant::from_ticks(self.now), right, left, rose, fell, gyro }
     }
 
     fn time(&self) -> f64 {
@@ -195,6 +202,9 @@ impl<'a> SimulatedHardware<'a> {
             self.put_down = later;
         }
         self.score.rolled(travel);
+        if let Some(gyro) = &mut self.gyro {
+            gyro.turn(now, &travel, &mut self.faults.gyro, &mut self.streams.gyro);
+        }
         let encoders = self.discs.iter_mut().zip(&mut self.faults.encoders);
         for ((disc, faults), metres) in encoders.zip(travel.measured) {
             disc.roll(metres, now, faults);

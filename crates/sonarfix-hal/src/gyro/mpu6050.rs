@@ -1,0 +1,141 @@
+//! MPU-6050 on I²C, and the MPU-6500 and MPU-9250, which have the same registers.
+//!
+//! By InvenSense's *MPU-6000 and MPU-6050 Register Map*, rev. 4.2. The driver wakes the sensor with the clock of its gyro,
+//! sets the smallest range that includes the configured one, and the low-pass filter of 98 Hz, whose delay is 2.8 ms.
+//! A reading is one transfer of two bytes, 0.1 ms at 400 kHz. Crates with more of the sensor's functions wait in between
+//! (`docs/hardware.md`).
+
+use embedded_hal::i2c::I2c;
+use sonarfix::gyro::GyroParameters;
+use sonarfix::units::RadiansPerSecond;
+
+use super::{Unreadable, YawRate};
+
+/// The address with AD0 low; with AD0 high it is one more.
+const ADDRESS: u8 = 0x68;
+
+const SAMPLE_RATE_DIVIDER: u8 = 0x19;
+const CONFIG: u8 = 0x1A;
+const GYRO_CONFIG: u8 = 0x1B;
+const GYRO_Z: u8 = 0x47;
+const POWER: u8 = 0x6B;
+const WHO_AM_I: u8 = 0x75;
+
+/// `WHO_AM_I` of MPU-6050, MPU-6500 and MPU-9250.
+const IDENTITIES: [u8; 3] = [0x68, 0x70, 0x71];
+/// Awake, with the clock of the gyro's x axis.
+const AWAKE: u8 = 1;
+/// Low-pass filter of 98 Hz.
+const FILTER: u8 = 2;
+/// The filter's output has 1,000 samples a second, each of which is kept.
+const EVERY_SAMPLE: u8 = 0;
+/// The smallest range, °/s; each of the three others has twice the one before.
+const SMALLEST_RANGE: f32 = 250.0;
+const RANGES: u8 = 4;
+/// Counts at the end of the range.
+const FULL_SCALE: f32 = 32_768.0;
+
+/// Why an MPU-6050 cannot be used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Mpu6050Error {
+    /// It does not respond on the bus.
+    Bus,
+    /// Another device responds, with this identity.
+    Identity(u8),
+    /// The configured range is larger than its largest, 2,000°/s.
+    Range,
+}
+
+impl core::fmt::Display for Mpu6050Error {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Bus => f.write_str("the gyro does not respond on the bus"),
+            Self::Identity(found) => write!(f, "{found:#04x} responds instead of an MPU-6050"),
+            Self::Range => f.write_str("the range of the gyro exceeds 2,000 degrees per second"),
+        }
+    }
+}
+
+impl core::error::Error for Mpu6050Error {}
+
+/// The driver.
+///
+/// ```
+/// use embedded_hal_mock::eh1::i2c::{Mock, Transaction as I2c};
+/// use sonarfix::gyro::GyroParameters;
+/// use sonarfix_hal::gyro::{Mpu6050, YawRate};
+/// let mut bus = Mock::new(&[
+///     I2c::write_read(0x68, vec![0x75], vec![0x68]),
+///     I2c::write(0x68, vec![0x6b, 1]),
+///     I2c::write(0x68, vec![0x19, 0]),
+///     I2c::write(0x68, vec![0x1a, 2]),
+///     I2c::write(0x68, vec![0x1b, 0]),
+///     I2c::write_read(0x68, vec![0x47], vec![0x00, 0x83]),
+/// ]);
+/// let mut gyro = Mpu6050::new(bus.clone());
+/// gyro.configure(&GyroParameters::MPU_6050)?;
+/// // 131 counts are 1°/s in the range of 250°/s.
+/// assert!((gyro.rate().unwrap().to_degrees() - 1.0).abs() < 1e-3);
+/// bus.done();
+/// # Ok::<(), sonarfix_hal::gyro::Mpu6050Error>(())
+/// ```
+#[derive(Debug)]
+pub struct Mpu6050<B> {
+    bus: B,
+    address: u8,
+    /// Radians per second of one count, negative if the sensor is mounted upside down.
+    per_count: f32,
+}
+
+impl<B: I2c> Mpu6050<B> {
+    /// A driver for the sensor with AD0 low.
+    pub fn new(bus: B) -> Self {
+        Self { bus, address: ADDRESS, per_count: 0.0 }
+    }
+
+    /// The same with AD0 high.
+    #[must_use]
+    pub fn with_ad0_high(self) -> Self {
+        Self { address: ADDRESS + 1, ..self }
+    }
+
+    fn write(&mut self, register: u8, value: u8) -> Result<(), Mpu6050Error> {
+        self.bus.write(self.address, &[register, value]).map_err(|_| Mpu6050Error::Bus)
+    }
+}
+
+impl<B: I2c> YawRate for Mpu6050<B> {
+    type Error = Mpu6050Error;
+
+    fn configure(&mut self, parameters: &GyroParameters) -> Result<(), Mpu6050Error> {
+        let wanted = parameters.range.to_degrees();
+        // Half a per mille for the conversion to radians and back.
+        let range = |number: u8| SMALLEST_RANGE * f32::from(1_u8 << number) * 1.0005;
+        let number = (0..RANGES).find(|&number| wanted <= range(number));
+        let number = number.ok_or(Mpu6050Error::Range)?;
+        let mut identity = [0];
+        let read = self.bus.write_read(self.address, &[WHO_AM_I], &mut identity);
+        read.map_err(|_| Mpu6050Error::Bus)?;
+        let [identity] = identity;
+        if !IDENTITIES.contains(&identity) {
+            return Err(Mpu6050Error::Identity(identity));
+        }
+        self.write(POWER, AWAKE)?;
+        self.write(SAMPLE_RATE_DIVIDER, EVERY_SAMPLE)?;
+        self.write(CONFIG, FILTER)?;
+        self.write(GYRO_CONFIG, number << 3)?;
+        let full = RadiansPerSecond::from_degrees(SMALLEST_RANGE * f32::from(1_u8 << number));
+        let sign = if parameters.is_inverted { -1.0 } else { 1.0 };
+        self.per_count = sign * full.0 / FULL_SCALE;
+        Ok(())
+    }
+
+    fn rate(&mut self) -> Result<RadiansPerSecond, Unreadable> {
+        let mut bytes = [0; 2];
+        let read = self.bus.write_read(self.address, &[GYRO_Z], &mut bytes);
+        read.map_err(|_| Unreadable)?;
+        Ok(RadiansPerSecond(self.per_count * f32::from(i16::from_be_bytes(bytes))))
+    }
+}
