@@ -2,6 +2,7 @@
 
 mod baked;
 mod consistency;
+mod gyro;
 mod kidnapped;
 mod motors;
 mod oracle;

@@ -10,6 +10,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use sonarfix::aim::NoAim;
 use sonarfix::ekf::{StandardDeviations, StateEstimate};
+use sonarfix::gyro::GyroParameters;
 use sonarfix::localizer::{Fix, Localizer, Start};
 use sonarfix::map::{Map, WallId};
 use sonarfix::motion::WheelTravel;
@@ -18,7 +19,7 @@ use sonarfix::units::{Instant, Metres, Radians};
 use sonarfix_hal::robot::Report;
 use sonarfix_link::message::{Odometry, SkippedPing};
 use sonarfix_link::{Ping, Reporter, Sender, Telemetry, frame};
-use sonarfix_map::{CLASSROOM, Fidelity, PAPER, Scenario};
+use sonarfix_map::{CLASSROOM, Fault, FaultKind, Fidelity, HeadingSlip, PAPER, Scenario};
 use sonarfix_monitor::recording::{Log, Recording};
 use sonarfix_monitor::{Monitor, Received};
 use sonarfix_replay::fault::Complaint;
@@ -145,6 +146,31 @@ fn a_recording_replays_to_the_bit() {
             }
         }
     }
+}
+
+/// A robot with a gyro whose wheels slip, and whose gyro fails for a while.
+#[test]
+fn the_turns_of_a_gyro_replay_to_the_bit() {
+    let mut scenario = scenario(CLASSROOM);
+    scenario.robot.localizer.gyro = Some(GyroParameters::MPU_6050);
+    scenario.upsets.heading_slip = HeadingSlip { every: 60.0, least: 0.1, most: 0.25 };
+    scenario.faults = vec![
+        Fault { kind: FaultKind::GyroReadErrors(0.1), from: 100.0, to: 160.0 },
+        Fault { kind: FaultKind::GyroReadErrors(1.0), from: 200.0, to: 230.0 },
+    ];
+    let robot = Robot::of(&scenario, 5);
+    let (received, _) = received_from(&robot.frames.concat());
+    let is_state = |received: &&Received| matches!(received.telemetry, Telemetry::Gyro(_));
+    assert!(received.iter().filter(is_state).count() > 600);
+    let log = log(&received);
+    let (trace, summary) = replay(&log, &scenario);
+    assert_same(&robot.estimates, &trace, 0);
+    assert!(summary.fixes.accepted > 500, "{:?}", summary.fixes);
+    // Without its turns it is another estimate.
+    let text = String::from_utf8(log).unwrap();
+    let without: String = text.split_inclusive('\n').filter(|l| !l.starts_with("turn,")).collect();
+    let (other, _) = replay(without.as_bytes(), &scenario);
+    assert_ne!(other.ticks.last().unwrap().estimate, trace.ticks.last().unwrap().estimate);
 }
 
 /// A localizer whose pose is replaced twice while it runs, between pings: one log, which replays to the bit.

@@ -4,6 +4,7 @@
 
 #[cfg(feature = "async")]
 mod asynch;
+mod mpu6050;
 mod pulse;
 mod quadrature;
 mod servo;

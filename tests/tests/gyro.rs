@@ -1,0 +1,118 @@
+//! A gyro beside the wheels, in simulation: statistics, slips, bias, faults.
+#![expect(clippy::unwrap_used, reason = "all of this file is a test, its helpers too")]
+
+use std::path::Path;
+
+use sonarfix::aim::Policy;
+use sonarfix::gyro::GyroParameters;
+use sonarfix::localizer::{GyroStatus, Localizer};
+use sonarfix_hal::robot::Report;
+use sonarfix_map::{CLASSROOM, Fault, FaultKind, HeadingSlip, PAPER, Scenario};
+use sonarfix_sim::monte_carlo;
+use sonarfix_sim::simulate::Simulation;
+use sonarfix_sim::statistics::Summary;
+use sonarfix_sim::trace::{FixRecord, Recorder, Tick};
+
+/// One degree, rad.
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
+
+fn with_gyro(text: &str) -> Scenario {
+    let mut scenario = Scenario::parse(text, "test.toml", Path::new("")).unwrap();
+    scenario.robot.localizer.policy = Policy::Informative;
+    scenario.robot.localizer.gyro = Some(GyroParameters::MPU_6050);
+    scenario
+}
+
+fn many(scenario: Scenario, seed: u64, runs: u32) -> Summary {
+    Summary::of(&monte_carlo::results(&Simulation::new(scenario), seed, runs, &|| ()).unwrap())
+}
+
+/// RMS over bound and NEES, with few runs and limits widened by four sampling errors.
+#[test]
+fn a_gyro_is_used_efficiently_and_consistently() {
+    const RUNS: u32 = 50;
+    let mut scenario = with_gyro(PAPER);
+    scenario.let_truth_walk_as_assumed();
+    let summary = many(scenario, 20_000, RUNS);
+    assert_eq!(summary.lost_runs, 0);
+    let sampling = 4.0 / f64::from(2 * RUNS).sqrt();
+    for state in summary.states.iter().filter(|state| state.bound > 0.0) {
+        let ratio = state.rms_error / state.bound;
+        assert!((ratio - 1.0).abs() < 0.05 + sampling, "{}: {ratio}", state.name);
+    }
+    let nees = summary.nees_mean / 6.0;
+    assert!((nees - 1.0).abs() < 0.05 + 4.0 * (12.0 / f64::from(RUNS)).sqrt() / 6.0, "{nees}");
+    // Without a gyro the bound of the heading is 0.13°.
+    let heading = summary.states.iter().find(|state| state.name == "heading").unwrap();
+    assert!(heading.bound < 0.08 * DEGREE, "{}", heading.bound);
+}
+
+/// Once a minute a wheel slips by 5° to 15°: most runs without a gyro end lost.
+#[test]
+fn slips_of_a_wheel_do_not_lose_a_robot_with_a_gyro() {
+    let mut scenario = with_gyro(PAPER);
+    scenario.upsets.heading_slip =
+        HeadingSlip { every: 60.0, least: 5.0 * DEGREE, most: 15.0 * DEGREE };
+    let with = many(scenario.clone(), 0, 10);
+    scenario.robot.localizer.gyro = None;
+    let without = many(scenario, 0, 10);
+    assert_eq!(with.lost_runs, 0);
+    assert!(without.lost_runs >= 5, "{}", without.lost_runs);
+    assert!(with.rms_path.heading < 0.2 * DEGREE, "{}", with.rms_path.heading);
+}
+
+/// The gyro at the end of every tick: time, status.
+#[derive(Default)]
+struct Statuses(Vec<(f64, GyroStatus)>);
+
+impl Recorder for Statuses {
+    fn tick(&mut self, _: impl FnOnce() -> Tick) {}
+
+    fn fix(&mut self, _: impl FnOnce() -> FixRecord) {}
+
+    fn polled(&mut self, report: &Report, localizer: &Localizer) {
+        if report.tick.is_some() {
+            let time = sonarfix_sim::time::seconds(localizer.time().ticks());
+            self.0.push((time, localizer.gyro().unwrap()));
+        }
+    }
+}
+
+/// Through pins, driver and loop, a bias of 1°/s is found to 0.02°/s (RMS) within 60 s of driving, and with the deviation
+/// that is reported.
+#[test]
+fn the_bias_is_found_within_a_minute_of_driving() {
+    const RUNS: u32 = 20;
+    let mut scenario = with_gyro(CLASSROOM);
+    scenario.truth.gyro.bias = Some(DEGREE);
+    let simulation = Simulation::new(scenario).shortened(60.0);
+    let mut squares = 0.0;
+    for seed in 0..RUNS {
+        let mut statuses = Statuses::default();
+        simulation.run(seed.into(), &mut statuses).unwrap();
+        let (_, status) = statuses.0.last().unwrap();
+        let error = f64::from(status.bias.to_degrees()) - 1.0;
+        assert!(error.abs() < 4.0 * f64::from(status.deviation.to_degrees()), "{seed}: {error}");
+        squares += error * error / f64::from(RUNS);
+    }
+    println!("bias after 60 s: {} deg/s", squares.sqrt());
+    assert!(squares.sqrt() < 0.02, "{}", squares.sqrt());
+}
+
+/// A gyro that fails is counted, and the robot continues.
+#[test]
+fn a_failing_gyro_is_counted_and_the_robot_goes_on() {
+    let kinds = [
+        (FaultKind::StuckGyro, 2_000),
+        (FaultKind::SaturatedGyro, 2_000),
+        (FaultKind::GyroReadErrors(1.0), 2_000),
+        (FaultKind::GyroReadErrors(0.1), 200),
+    ];
+    for (kind, least) in kinds {
+        let mut scenario = with_gyro(CLASSROOM);
+        scenario.faults = vec![Fault { kind, from: 60.0, to: 90.0 }];
+        let result = Simulation::new(scenario).shortened(150.0).run(3, &mut ()).unwrap();
+        assert!(result.faults.gyro >= least, "{kind:?}: {}", result.faults.gyro);
+        assert!(!result.lost, "{kind:?}");
+    }
+}
