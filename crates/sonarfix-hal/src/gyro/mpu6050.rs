@@ -2,8 +2,7 @@
 //!
 //! By InvenSense's *MPU-6000 and MPU-6050 Register Map*, rev. 4.2. The driver wakes the sensor with the clock of its gyro,
 //! sets the smallest range that includes the configured one, and the low-pass filter of 98 Hz, whose delay is 2.8 ms.
-//! A reading is one transfer of two bytes, 0.1 ms at 400 kHz. Crates with more of the sensor's functions wait in between
-//! (`docs/hardware.md`).
+//! A reading is one transfer of two bytes, 0.1 ms at 400 kHz. Why not an existing crate: `ARCHITECTURE.md`.
 
 use embedded_hal::i2c::I2c;
 use sonarfix::gyro::GyroParameters;
