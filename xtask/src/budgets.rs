@@ -203,6 +203,7 @@ fn measure_on(target: &Target) -> anyhow::Result<BTreeMap<String, u32>> {
     let programs = [
         ("filter", "core_and_expect", &["predict", "expect", "gate", "update"][..]),
         ("localizer", "localizer", &["odometry", "aim", "fix"][..]),
+        ("gyro", "gyro", &["turn", "turn_fix"][..]),
         ("search", "search", &["slice", "ping"][..]),
     ];
     for (name, code, calls) in programs {
