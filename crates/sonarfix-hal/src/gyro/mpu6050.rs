@@ -1,6 +1,6 @@
 //! MPU-6050 on I²C, and the MPU-6500 and MPU-9250, which have the same registers.
 //!
-//! By InvenSense's *MPU-6000 and MPU-6050 Register Map*, rev. 4.2. The driver wakes the sensor with the clock of its gyro,
+//! By the maker's *MPU-6000 and MPU-6050 Register Map*, rev. 4.2. The driver wakes the sensor with the clock of its gyro,
 //! sets the smallest range that includes the configured one, and the low-pass filter of 98 Hz, whose delay is 2.8 ms.
 //! A reading is one transfer of two bytes, 0.1 ms at 400 kHz. Why not an existing crate: `ARCHITECTURE.md`.
 

@@ -33,12 +33,11 @@ impl YawLedger {
         if self.samples.take(now).is_none() {
             return;
         }
-        let is_faulty = match hardware.yaw_rate() {
-            Some(Ok(rate)) => self.integral.sample(now, rate).is_err(),
-            _ => {
-                self.integral.unreadable();
-                true
-            }
+        let is_faulty = if let Some(Ok(rate)) = hardware.yaw_rate() {
+            self.integral.sample(now, rate).is_err()
+        } else {
+            self.integral.unreadable();
+            true
         };
         faults.gyro = faults.gyro.saturating_add(u32::from(is_faulty));
     }
