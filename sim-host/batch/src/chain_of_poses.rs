@@ -4,10 +4,19 @@
 use crate::odometry::Travel;
 use crate::recording::{Reading, Recording, RecordingError, StartPose};
 
-/// Travel after which a new pose begins, metres.
-const SPACING: f64 = 0.05;
-/// Difference of the wheels' travel after which a new pose begins, metres: about 10° of a small robot.
-const TURN: f64 = 0.02;
+/// When a new pose begins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spacing {
+    /// After this travel, metres.
+    pub travel: f64,
+    /// After this difference of the wheels' travel, metres.
+    pub turn: f64,
+}
+
+impl Spacing {
+    /// That of a calibration; the turn is about 10° of a small robot.
+    pub const CALIBRATION: Self = Self { travel: 0.05, turn: 0.02 };
+}
 
 /// Something that happened at a time between two poses.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,13 +58,14 @@ impl Chain {
             }
             (None, None) => return Err(RecordingError::NoStart),
         };
-        let chain = Self::build(recording, start.time).ok_or(RecordingError::NoTravel)?;
+        let chain = Self::build(recording, start.time, Spacing::CALIBRATION)
+            .ok_or(RecordingError::NoTravel)?;
         Ok((chain, start))
     }
 
     /// The chain from a time on; `None` with fewer than two readings.
     #[must_use]
-    pub fn build(recording: &Recording, from: f64) -> Option<Self> {
+    pub fn build(recording: &Recording, from: f64, spacing: Spacing) -> Option<Self> {
         let readings = &recording.readings;
         let first = readings.partition_point(|reading| reading.time < from);
         let readings = readings.get(first..)?;
@@ -83,9 +93,12 @@ impl Chain {
             distance += f64::midpoint(right.abs(), left.abs());
             turns += (right - left).abs();
             let sum = |of: fn(&Travel) -> f64| steps.iter().map(of).sum::<f64>().abs();
-            let long = sum(|[right, left]| f64::midpoint(*right, *left)) >= SPACING;
+            let long = sum(|[right, left]| f64::midpoint(*right, *left)) >= spacing.travel;
             let is_last = next.time >= end.time;
-            if long || sum(|[right, left]| right - left) >= TURN || (is_last && !steps.is_empty()) {
+            if long
+                || sum(|[right, left]| right - left) >= spacing.turn
+                || (is_last && !steps.is_empty())
+            {
                 chain.edges.push(std::mem::take(&mut steps));
                 chain.times.push(next.time);
                 chain.distances.push(distance);

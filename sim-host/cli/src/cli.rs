@@ -5,7 +5,7 @@ use clap::{Parser, Subcommand};
 use crate::{
     bound, calibrate, calibration, command, config, convert, export, faults, find, floor_plans,
     health, init, map, merge, monitor, paper, pil, plan, reality, relocalize, replay, run,
-    sonar_model, sweep,
+    sonar_model, survey, surveys, sweep,
 };
 
 /// Simulates, measures, replays and operates the Sonarfix localizer for small wheeled robots.
@@ -34,6 +34,8 @@ enum Command {
     Relocalize(relocalize::Args),
     /// Estimates the calibration of a robot from a recording, with a known map or true poses.
     Calibrate(calibrate::Args),
+    /// Maps the walls around a robot from the recording of a drive with a sweeping sonar.
+    Survey(survey::Args),
     /// Converts recordings of other formats for `replay`.
     Convert(convert::Args),
     /// Writes logs, recordings and traces for other programs: MCAP and Parquet.
@@ -63,6 +65,8 @@ enum Command {
     Health(health::Args),
     /// Measures the accuracy of `calibrate` on simulated robots; prints markdown.
     Calibration(calibration::Args),
+    /// Measures the accuracy of `survey` on simulated robots; prints markdown.
+    Surveys(surveys::Args),
     /// Compares two measurement policies on random floor plans; prints markdown.
     FloorPlans(floor_plans::Args),
 }
@@ -85,6 +89,8 @@ impl Cli {
             Command::Relocalize(args) => relocalize::execute(&args),
             Command::Calibrate(args) => calibrate::execute(&args),
             Command::Calibration(args) => calibration::execute(&args),
+            Command::Survey(args) => survey::execute(&args),
+            Command::Surveys(args) => surveys::execute(&args),
             Command::Convert(args) => convert::execute(&args),
             Command::Export(args) => export::execute(&args),
             Command::Monitor(args) => monitor::execute(&args),

@@ -35,6 +35,8 @@ mod run;
 mod serve;
 mod signs_of_life;
 mod sonar_model;
+mod survey;
+mod surveys;
 mod sweep;
 mod sweep_values;
 mod table;

@@ -20,4 +20,5 @@ pub mod reality;
 pub mod relocalization;
 pub mod search_study;
 pub mod sonar_model;
+pub mod surveys;
 mod sweeping_robot;

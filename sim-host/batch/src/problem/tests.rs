@@ -68,7 +68,7 @@ proptest! {
         values in prop::array::uniform13(-0.05..0.05_f64),
     ) {
         let recording = recording(&steps, bearing);
-        let chain = Chain::build(&recording, 0.0).unwrap();
+        let chain = Chain::build(&recording, 0.0, Spacing::CALIBRATION).unwrap();
         let walls = [Wall::new([-9.0, -1.0], [9.0, -1.5]).unwrap()];
         let mut constants = Constants::nominal(0.12, [0.0, 0.0]);
         constants.values = values;

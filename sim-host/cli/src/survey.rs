@@ -1,0 +1,168 @@
+//! `sonarfix survey`: a map of walls from a recording.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::PathBuf;
+
+use anyhow::Context;
+use sonarfix_batch::log;
+use sonarfix_map::robot_file;
+use sonarfix_report::Table;
+use sonarfix_survey::drawing::{draw, name};
+use sonarfix_survey::map_text::map_text;
+use sonarfix_survey::problem::Robot;
+use sonarfix_survey::survey::{Survey, survey};
+
+use crate::output::check_file;
+use crate::table;
+
+/// Accuracy from which on a wall should be driven along again, metres.
+const POOR: f64 = 0.03;
+
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The log (docs/formats.md) of a drive with a sweeping sonar.
+    log: PathBuf,
+    /// The robot; by default robot.toml beside the log.
+    #[arg(long, value_name = "ROBOT.toml")]
+    robot: Option<PathBuf>,
+    /// The map file to write.
+    #[arg(long, value_name = "MAP.toml")]
+    out: Option<PathBuf>,
+    /// The drawing of walls, path, echoes and residuals to write.
+    #[arg(long, value_name = "FILE.svg")]
+    drawing: Option<PathBuf>,
+    /// Measured length of a wall of the map, for example "wall 3=6.00 m": the map is scaled to it.
+    #[arg(long, value_name = "WALL=LENGTH")]
+    measured: Option<String>,
+}
+
+pub fn execute(args: &Args) -> anyhow::Result<()> {
+    for (option, file) in [("--out", &args.out), ("--drawing", &args.drawing)] {
+        if let Some(file) = file {
+            check_file(option, file)?;
+        }
+    }
+    let robot_path = args.robot.clone().unwrap_or_else(|| args.log.with_file_name("robot.toml"));
+    let robot = robot_file::read(&robot_path)?;
+    let file = File::open(&args.log).with_context(|| args.log.display().to_string())?;
+    let read =
+        log::read(BufReader::new(file), &robot).with_context(|| args.log.display().to_string())?;
+    for (line, reason) in read.skipped.iter().take(10) {
+        eprintln!("skipped: log line {line}: {reason}");
+    }
+    let nominal = log::nominal(&robot, !read.has_scans);
+    let mut found = survey(&read.recording, Robot::of(&nominal))
+        .with_context(|| args.log.display().to_string())?;
+    if let Some(measured) = &args.measured {
+        let (wall, length) = measured_wall(measured, &found)?;
+        let estimated = found.walls.get(wall).map_or(length, |wall| wall.length());
+        found.scale(length / estimated);
+    }
+    if let Some(out) = &args.out {
+        std::fs::write(out, map_text(&found)).with_context(|| out.display().to_string())?;
+    }
+    if let Some(out) = &args.drawing {
+        std::fs::write(out, draw(&found)).with_context(|| out.display().to_string())?;
+    }
+    println!("{}", table::text(&walls(&found)));
+    println!("\n{}", verdict(&found));
+    Ok(())
+}
+
+/// The wall and the length of `--measured`.
+fn measured_wall(text: &str, found: &Survey) -> anyhow::Result<(usize, f64)> {
+    let form =
+        "--measured must be a wall and its length with a unit, for example \"wall 3=6.00 m\"";
+    let (wall, length) = text.split_once('=').context(form)?;
+    let length = length.trim();
+    let units = [("mm", 1e-3), ("cm", 1e-2), ("m", 1.0)];
+    let (number, unit) = units
+        .iter()
+        .find_map(|(unit, scale)| length.strip_suffix(unit).map(|number| (number, scale)))
+        .context(form)?;
+    let length: f64 = number.trim().parse().context(form)?;
+    anyhow::ensure!(length.is_finite() && length > 0.0, "--measured: the length must be positive");
+    let index = (0..found.walls.len()).find(|&index| name(index) == wall.trim());
+    let index = index.with_context(|| {
+        format!(
+            "--measured: the map has no \"{}\"; its walls are wall 1 to wall {}",
+            wall.trim(),
+            found.walls.len()
+        )
+    })?;
+    let both = found.walls.get(index).is_some_and(|wall| wall.corners == [true, true]);
+    anyhow::ensure!(
+        both,
+        "--measured: \"{}\" does not end in a corner at both ends, so that its length in the map is not that of the wall",
+        wall.trim()
+    );
+    Ok((index, length * unit))
+}
+
+fn walls(found: &Survey) -> Table {
+    let row = |(index, wall): (usize, &sonarfix_survey::walls::MappedWall)| {
+        let end = |is_corner: bool| if is_corner { "corner" } else { "open" };
+        let [from, to] = wall.corners;
+        vec![
+            name(index),
+            format!("({:.2}, {:.2})", wall.from.x, wall.from.y),
+            format!("({:.2}, {:.2})", wall.to.x, wall.to.y),
+            format!("{:.2}", wall.length()),
+            format!("{:.0}", 1e3 * wall.accuracy),
+            wall.echoes.to_string(),
+            format!("{}, {}", end(from), end(to)),
+            if wall.is_confirmed { "" } else { "one direction only" }.to_owned(),
+        ]
+    };
+    Table {
+        title: "Walls".to_owned(),
+        note: "metres in the frame of the start pose; accuracy: standard deviation of the distance, mm".to_owned(),
+        columns: ["", "from", "to", "length", "accuracy", "echoes", "ends", ""]
+            .map(str::to_owned)
+            .to_vec(),
+        rows: found.walls.iter().enumerate().map(row).collect(),
+    }
+}
+
+/// The verdict, and what to drive again.
+fn verdict(found: &Survey) -> String {
+    let (fitting, all) = found.explained;
+    let [difference, track] = found.drive;
+    let mut lines = vec![format!(
+        "{:.1} m; {fitting} of {all} echoes fit a wall; paths forwards and backwards in time differ by at most {:.1} cm; \
+         wheels differ by {:+.2} %, track width {:+.1} %",
+        found.distance,
+        100.0 * found.differs,
+        100.0 * difference,
+        100.0 * track
+    )];
+    if found.is_sure() {
+        lines.push(format!(
+            "The map is sure. In the robot file: [echo] map_accuracy = \"{:.0} mm\"",
+            1e3 * found.accuracy()
+        ));
+    } else {
+        for reason in &found.reasons {
+            lines.push(format!("UNSURE: {reason}."));
+        }
+        lines.push(
+            "Do not use this map. Drive again: slower, closer to the walls, and along each wall."
+                .to_owned(),
+        );
+    }
+    if let Some((from, to)) = found.disputed {
+        lines.push(format!("Drive again what was driven from {from:.0} s to {to:.0} s."));
+    }
+    let poor: Vec<String> = found
+        .walls
+        .iter()
+        .enumerate()
+        .filter(|(_, wall)| wall.accuracy > POOR || !wall.is_confirmed)
+        .map(|(index, _)| name(index))
+        .collect();
+    if !poor.is_empty() {
+        lines.push(format!("Drive along these walls again: {}.", poor.join(", ")));
+    }
+    lines.join("\n")
+}
