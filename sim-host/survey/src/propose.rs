@@ -228,9 +228,9 @@ mod tests {
 
     use super::*;
 
-    /// Echoes along a drive of 1.2 m at y = 0.
+    /// Echoes along a drive of 2.4 m at y = 0.
     fn echoes(distance: impl Fn(&Vector2<f64>) -> Option<(f64, f64)>) -> Vec<Sighting> {
-        let at = (0_u8..40).map(|k| Vector2::new(0.03 * f64::from(k), 0.0));
+        let at = (0_u8..80).map(|k| Vector2::new(0.03 * f64::from(k), 0.0));
         let heard = at.enumerate().filter_map(|(ping, at)| {
             let (distance, direction) = distance(&at)?;
             Some(Sighting { ping, pose: ping, at, direction, distance })
@@ -249,7 +249,7 @@ mod tests {
     fn a_wall_is_a_line() {
         let wall = echoes(|at| Some((1.0 + 0.02 * at.x, 1.5)));
         let (line, pings) = propose(&wall, 0.005, None).unwrap();
-        assert_eq!(pings.len(), 40);
+        assert_eq!(pings.len(), 80);
         assert!((line.distance(&Vector2::zeros()) - 1.0).abs() < 0.005, "{line:?}");
         assert!((line.angle - FRAC_PI_2 - 0.02).abs() < 0.005, "{line:?}");
         assert!(!is_round(&line, &wall, 0.005));
@@ -266,7 +266,7 @@ mod tests {
     #[test]
     fn the_tangent_of_two_legs_is_no_line() {
         let legs = echoes(|at| {
-            let [one, other] = [0.25, 0.95].map(|x| round(at, [x, 0.8], 0.0));
+            let [one, other] = [0.5, 1.7].map(|x| round(at, [x, 0.8], 0.0));
             let both = one.into_iter().chain(other);
             both.min_by(|a, b| a.0.total_cmp(&b.0))
         });

@@ -23,9 +23,6 @@ const DIFFERS: f64 = 0.1;
 const LEAST_EXPLAINED: f64 = 0.2;
 /// Shortest drive, metres.
 const SHORTEST: f64 = 5.0;
-/// Fewest echoes of a wall that only one direction finds.
-const ENOUGH: usize = 15;
-
 /// Why there is no map.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SurveyError {
@@ -101,6 +98,8 @@ pub struct Survey {
     pub differs: f64,
     /// Where the paths differ by more than 10 cm: times from and to, seconds.
     pub disputed: Option<(f64, f64)>,
+    /// Share of the walls' length that both directions agree on.
+    pub confirmed: f64,
     /// Echoes that the map explains, and all.
     pub explained: (usize, usize),
     /// Wheel difference, and relative error of the track width.
@@ -166,9 +165,12 @@ pub fn survey(recording: &Recording, robot: Robot) -> Result<Survey, SurveyError
         chain(&backwards, f64::NEG_INFINITY, &robot).ok_or(RecordingError::NoTravel)?;
     let no_walls =
         SurveyError::NoWalls(recording.pings.iter().filter(|p| p.range.is_some()).count());
-    let forwards = track(recording, &chain_forwards, robot, start.pose).ok_or(no_walls.clone())?;
-    let back =
-        track(&backwards, &chain_backwards, robot, Vector3::zeros()).ok_or(no_walls.clone())?;
+    let forwards =
+        track(recording, &chain_forwards, robot, start.pose, None).ok_or(no_walls.clone())?;
+    let found =
+        [DIFFERENCE, TRACK].map(|k| forwards.state.constants.get(k).copied().unwrap_or(0.0));
+    let back = track(&backwards, &chain_backwards, robot, Vector3::zeros(), Some(found))
+        .ok_or(no_walls.clone())?;
     let mut one = outcome(&forwards, 1.0);
     let mut other = outcome(&back, -1.0);
     other.path.reverse();
@@ -176,10 +178,12 @@ pub fn survey(recording: &Recording, robot: Robot) -> Result<Survey, SurveyError
     let pairs = paired(&one.path, &other.path);
     other.apply(&Motion::fit(&swapped(&pairs)));
     let pairs = paired(&one.path, &other.path);
-    compare(&mut one, &other.walls.clone());
-    compare(&mut other, &one.walls.clone());
+    let differs = pairs.iter().map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    let of_one = one.walls.clone();
+    compare(&mut one, &other.walls, differs);
+    compare(&mut other, &of_one, differs);
     let mut chosen = if back.score() > forwards.score() { other } else { one };
-    chosen.differs = pairs.iter().map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    chosen.differs = differs;
     chosen.disputed = disputed(&chosen.path, &pairs);
     chosen.distance = distance;
     chosen.conclude();
@@ -239,22 +243,30 @@ fn outcome(track: &Track, clock: f64) -> Survey {
         reasons: Vec::new(),
         differs: 0.0,
         disputed: None,
+        confirmed: 0.0,
         explained: track.explained(),
         drive: [DIFFERENCE, TRACK].map(|k| track.state.constants.get(k).copied().unwrap_or(0.0)),
         distance: 0.0,
     }
 }
 
-/// Compares the walls with those of the other direction: the accuracy includes the difference, and walls with few echoes
+/// Compares the walls with those of the other direction: the accuracy includes the difference. If the paths agree, walls
 /// that the other direction does not have are removed.
-fn compare(survey: &mut Survey, others: &[MappedWall]) {
+fn compare(survey: &mut Survey, others: &[MappedWall], differs: f64) {
+    let length = |walls: &[MappedWall]| -> f64 { walls.iter().map(MappedWall::length).sum() };
+    let all = length(&survey.walls);
     for wall in &mut survey.walls {
         let apart =
             others.iter().filter_map(|other| wall.apart(other)).fold(f64::INFINITY, f64::min);
         wall.is_confirmed = apart <= DIFFERS;
         wall.accuracy = wall.accuracy.hypot(if wall.is_confirmed { apart } else { DIFFERS });
     }
-    survey.walls.retain(|wall| wall.is_confirmed || wall.echoes >= ENOUGH);
+    let confirmed: Vec<MappedWall> =
+        survey.walls.iter().copied().filter(|wall| wall.is_confirmed).collect();
+    survey.confirmed = length(&confirmed) / all.max(1e-9);
+    if differs <= DIFFERS {
+        survey.walls = confirmed;
+    }
 }
 
 impl Survey {
@@ -290,13 +302,18 @@ impl Survey {
         }
     }
 
-    /// The root mean square of the walls' accuracies, weighted by their echoes, metres.
+    /// The median accuracy of the walls, by their echoes, metres.
     #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "numbers of echoes")]
     pub fn accuracy(&self) -> f64 {
-        let weighted = self.walls.iter().map(|wall| wall.echoes as f64 * wall.accuracy.powi(2));
-        let echoes: usize = self.walls.iter().map(|wall| wall.echoes).sum();
-        (weighted.sum::<f64>() / echoes.max(1) as f64).sqrt()
+        let mut walls: Vec<&MappedWall> = self.walls.iter().collect();
+        walls.sort_by(|one, other| one.accuracy.total_cmp(&other.accuracy));
+        let mut left = walls.iter().map(|wall| wall.echoes).sum::<usize>() / 2;
+        let median = walls.iter().find(|wall| {
+            let is_there = wall.echoes > left;
+            left = left.saturating_sub(wall.echoes);
+            is_there
+        });
+        median.or(walls.last()).map_or(DIFFERS, |wall| wall.accuracy)
     }
 
     /// Whether the map is sure.
@@ -316,13 +333,8 @@ impl Survey {
         if share < LEAST_EXPLAINED {
             self.reasons.push(Reason::Explained(share));
         }
-        let length = |walls: &mut dyn Iterator<Item = &MappedWall>| -> f64 {
-            walls.map(MappedWall::length).sum()
-        };
-        let all = length(&mut self.walls.iter());
-        let confirmed = length(&mut self.walls.iter().filter(|wall| wall.is_confirmed)) / all;
-        if confirmed < AGREED {
-            self.reasons.push(Reason::Confirmed(confirmed));
+        if self.confirmed < AGREED {
+            self.reasons.push(Reason::Confirmed(self.confirmed));
         }
     }
 }
@@ -333,17 +345,18 @@ pub fn chain(recording: &Recording, from: f64, robot: &Robot) -> Option<Chain> {
     Chain::build(recording, from, Spacing { travel: 0.2, turn: 0.26 * robot.track_width })
 }
 
-/// The map of a recording in its order.
+/// The map of a recording in its order. `known` is one more attempt: wheel difference and error of the track width.
 #[must_use]
 pub fn track<'a>(
     recording: &'a Recording,
     chain: &'a Chain,
     robot: Robot,
     start: Vector3<f64>,
+    known: Option<[f64; 2]>,
 ) -> Option<Track<'a>> {
-    let mut tracks: Vec<Track> = (-STEPS..=STEPS)
-        .map(|step| Track::new(recording, chain, robot, start, f64::from(step) * STEP))
-        .collect();
+    let steps = (-STEPS..=STEPS).map(|step| [f64::from(step) * STEP, 0.0]);
+    let mut tracks: Vec<Track> =
+        steps.chain(known).map(|drive| Track::new(recording, chain, robot, start, drive)).collect();
     for (distance, count) in STAGES {
         for track in &mut tracks {
             track.run(distance);

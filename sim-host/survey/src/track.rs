@@ -73,17 +73,18 @@ pub struct Track<'a> {
 }
 
 impl<'a> Track<'a> {
-    /// A track at its first pose, with a wheel difference to begin with.
+    /// A track at its first pose, with wheel difference and error of the track width to begin with.
     #[must_use]
     pub fn new(
         recording: &'a Recording,
         chain: &'a Chain,
         robot: Robot,
         start: Vector3<f64>,
-        difference: f64,
+        [difference, track]: [f64; 2],
     ) -> Self {
         let mut constants = [0.0; COUNT];
         constants[DIFFERENCE] = difference;
+        constants[TRACK] = track;
         constants[OFF_AXIS] = 0.01;
         let whole_priors = priors(difference);
         let problem = Problem {

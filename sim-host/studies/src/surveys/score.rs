@@ -112,7 +112,9 @@ impl Score {
             path: path_errors(map, drive),
             ..Self::default()
         };
-        score.find_walls(&walls, &mapped, drive, simulation);
+        let mut hiding = standing(simulation);
+        hiding.extend(&walls);
+        score.find_walls(&walls, &mapped, &hiding, &stations(drive, simulation));
         score.measure_errors(&walls, &mapped);
         score.invented = invented(&walls, &mapped, simulation);
         score.corners = corners(&walls, map);
@@ -123,14 +125,13 @@ impl Score {
         &mut self,
         walls: &[Surface],
         mapped: &[Surface],
-        drive: &Drive,
-        simulation: &Simulation,
+        hiding: &[Surface],
+        stations: &[(Point, f64)],
     ) {
         const LONG: f64 = 0.3;
-        let stations = stations(drive, simulation);
         for wall in walls {
             let heard: Vec<Point> =
-                wall.samples().filter(|point| is_hearable(wall, point, walls, &stations)).collect();
+                wall.samples().filter(|point| is_hearable(wall, point, hiding, stations)).collect();
             let is_found = |point: &&Point| {
                 mapped.iter().any(|other| wall.is_parallel(other) && other.distance(point) < NEAR)
             };
@@ -231,11 +232,31 @@ fn stations(drive: &Drive, simulation: &Simulation) -> Vec<(Point, f64)> {
     driven.map(station).collect()
 }
 
+/// The furniture that stands still; a round piece as its two diameters along x and y.
+fn standing(simulation: &Simulation) -> Vec<Surface> {
+    let obstacles = &simulation.scenario.surroundings.obstacles;
+    let mut surfaces = Vec::new();
+    for obstacle in obstacles.iter().filter(|obstacle| obstacle.walk.is_none()) {
+        match obstacle.outline {
+            Outline::Face { from, to } => {
+                surfaces.push(Surface { from: from.into(), to: to.into() });
+            }
+            Outline::Circle { centre, radius } => {
+                let centre = Point::from(centre);
+                for by in [Point::new(radius, 0.0), Point::new(0.0, radius)] {
+                    surfaces.push(Surface { from: centre - by, to: centre + by });
+                }
+            }
+        }
+    }
+    surfaces
+}
+
 /// Whether a point of a wall was the foot of the perpendicular from some station, in reach and in sight.
 fn is_hearable(
     wall: &Surface,
     point: &Point,
-    walls: &[Surface],
+    hiding: &[Surface],
     stations: &[(Point, f64)],
 ) -> bool {
     const BEARING: f64 = 1.75;
@@ -246,7 +267,7 @@ fn is_hearable(
         apart.dot(&wall.along()).abs() < SAMPLE
             && (0.15..HEARABLE).contains(&distance)
             && bearing.abs() < BEARING
-            && !walls.iter().any(|other| other.blocks(at, &(at + apart * (1.0 - 0.02 / distance))))
+            && !hiding.iter().any(|other| other.blocks(at, &(at + apart * (1.0 - 0.02 / distance))))
     })
 }
 
