@@ -12,6 +12,7 @@ use sonarfix_survey::drawing::{draw, name};
 use sonarfix_survey::map_text::map_text;
 use sonarfix_survey::problem::Robot;
 use sonarfix_survey::survey::{Survey, survey};
+use sonarfix_survey::walls::MappedWall;
 
 use crate::output::check_file;
 use crate::table;
@@ -56,7 +57,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         .with_context(|| args.log.display().to_string())?;
     if let Some(measured) = &args.measured {
         let (wall, length) = measured_wall(measured, &found)?;
-        let estimated = found.walls.get(wall).map_or(length, |wall| wall.length());
+        let estimated = found.walls.get(wall).map_or(length, MappedWall::length);
         found.scale(length / estimated);
     }
     if let Some(out) = &args.out {
@@ -101,7 +102,7 @@ fn measured_wall(text: &str, found: &Survey) -> anyhow::Result<(usize, f64)> {
 }
 
 fn walls(found: &Survey) -> Table {
-    let row = |(index, wall): (usize, &sonarfix_survey::walls::MappedWall)| {
+    let row = |(index, wall): (usize, &MappedWall)| {
         let end = |is_corner: bool| if is_corner { "corner" } else { "open" };
         let [from, to] = wall.corners;
         vec![

@@ -31,9 +31,8 @@ impl Track<'_> {
         }
         let is_kept = |index: usize| {
             let is_in_view = here - last[index] < 1.5;
-            (is_in_view || evidence[index].all >= FEWEST)
-                && !is_refuted(&evidence[index])
-                && !(self.is_round(index) && !is_in_view)
+            let is_found = evidence[index].all >= FEWEST && !self.is_round(index);
+            (is_in_view || is_found) && !is_refuted(&evidence[index])
         };
         let kept: Vec<bool> = (0..self.state.lines.len()).map(is_kept).collect();
         self.keep(&kept);
@@ -48,10 +47,9 @@ impl Track<'_> {
 
     fn keep(&mut self, kept: &[bool]) {
         let mut numbers = vec![None; kept.len()];
-        let mut count = 0;
-        for (number, _) in numbers.iter_mut().zip(kept).filter(|(_, kept)| **kept) {
-            *number = Some(count);
-            count += 1;
+        let left = numbers.iter_mut().zip(kept).filter(|(_, kept)| **kept);
+        for (index, (number, _)) in left.enumerate() {
+            *number = Some(index);
         }
         for line in &mut self.problem.matches {
             *line = line.and_then(|line| numbers[line]);

@@ -60,12 +60,11 @@ impl Simulated {
         self.bearing = if self.bearing > 1.7 { -1.7 } else { self.bearing + 0.31 };
     }
 
-    /// Legs of the path, each followed by a turn to the left.
-    fn drive(mut self, legs: &[f64]) -> Recording {
+    /// Legs of the path in steps of 12 mm, each followed by a turn to the left.
+    fn drive(mut self, legs: &[u32]) -> Recording {
         for leg in legs {
-            let steps = (leg / 0.012).round();
-            for _ in 0..steps as u32 {
-                self.step(leg / steps, 0.0);
+            for _ in 0..*leg {
+                self.step(0.012, 0.0);
             }
             for _ in 0..20 {
                 self.step(0.0, FRAC_PI_2 / 20.0);
@@ -77,7 +76,7 @@ impl Simulated {
 
 #[test]
 fn the_walls_of_a_room_are_found_where_they_are() {
-    let recording = Simulated::new(true).drive(&[2.0, 1.2, 2.0, 1.2, 2.0]);
+    let recording = Simulated::new(true).drive(&[167, 100, 167, 100, 167]);
     let found = survey(&recording, ROBOT).unwrap();
     assert!(found.is_sure(), "{:?}", found.reasons);
     assert_eq!(found.walls.len(), 4, "{:#?}", found.walls);
@@ -96,15 +95,15 @@ fn the_walls_of_a_room_are_found_where_they_are() {
 
 #[test]
 fn recordings_without_a_map_are_refused() {
-    let silent = Simulated::new(false).drive(&[2.0, 1.2, 2.0, 1.2]);
+    let silent = Simulated::new(false).drive(&[167, 100, 167, 100]);
     assert_eq!(survey(&silent, ROBOT).unwrap_err(), SurveyError::NoWalls(0));
-    let short = Simulated::new(true).drive(&[2.0]);
+    let short = Simulated::new(true).drive(&[167]);
     assert!(matches!(survey(&short, ROBOT), Err(SurveyError::TooShort(_))));
 }
 
 #[test]
 fn a_recording_that_is_reversed_twice_is_the_same() {
-    let mut recording = Simulated::new(true).drive(&[1.0, 1.0]);
+    let mut recording = Simulated::new(true).drive(&[80, 80]);
     recording.start = None;
     assert_eq!(reversed(&reversed(&recording)), recording);
 }

@@ -1,6 +1,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::chain_of_poses::Spacing;
 use crate::recording::{Ping, Reading};
 
 const H: f64 = 1e-6;
