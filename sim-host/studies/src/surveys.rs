@@ -251,6 +251,8 @@ pub fn page(trials: &[Trial]) -> String {
         };
     }
     page.push('\n');
-    page.push_str(&score::summary(trials));
+    let scores: Vec<&Score> =
+        trials.iter().filter_map(|trial| trial.outcome.as_ref().ok()).collect();
+    page.push_str(&score::summary(trials.len(), &scores));
     page
 }

@@ -8,7 +8,6 @@ use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::trace::Pose;
 use sonarfix_survey::survey::Survey;
 
-use super::Trial;
 use crate::sweeping_robot::Drive;
 
 /// Distance between the samples of a wall, metres.
@@ -313,9 +312,7 @@ fn corners(walls: &[Surface], map: &Survey) -> Option<f64> {
 }
 
 /// What all drives amount to.
-pub(super) fn summary(trials: &[Trial]) -> String {
-    let scores: Vec<&Score> =
-        trials.iter().filter_map(|trial| trial.outcome.as_ref().ok()).collect();
+pub(super) fn summary(drives: usize, scores: &[&Score]) -> String {
     let count = |is: &dyn Fn(&Score) -> bool| scores.iter().filter(|score| is(score)).count();
     let sure = count(&|score| score.is_sure);
     let mut text = String::new();
@@ -325,7 +322,7 @@ pub(super) fn summary(trials: &[Trial]) -> String {
         "{} drives, {} maps, {sure} sure. All walls found: {} of the sure ones; at least 70 % of the hearable length and a path \
          of at most 5 cm RMS: {}; invented at most 10 %: {}. Path wrong by more than 10 cm: {} sure, {} unsure. Localized \
          on the sure maps: {} with at most 20 mm, {} with at most 30 mm, {} lost.",
-        trials.len(),
+        drives,
         scores.len(),
         count(&|score| score.is_sure && score.walls[0] == score.walls[1]),
         count(&|score| score.is_sure && score.share() >= 0.7 && score.path[0] <= 0.05),
