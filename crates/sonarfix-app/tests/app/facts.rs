@@ -7,8 +7,8 @@ use sonarfix::map::Map;
 use sonarfix::pose::Pose;
 use sonarfix::units::{Duration, Instant, Metres, Radians};
 use sonarfix_app::store::{Resumed, SavePolicy, Saved, Store, WriteLimit};
-use sonarfix_link::Command;
 use sonarfix_link::message::{CommandError, CommandResult};
+use sonarfix_link::{Command, Telemetry};
 
 use crate::flash::{SECTOR, SECTORS, SimFlash};
 use crate::rig::{Baked, Bench, config, loop_status, start};
@@ -201,4 +201,95 @@ fn an_improvement_of_any_one_is_written() {
     assert!(is_due(StandardDeviations { scale_left: 0.5 * written.scale_left, ..written }));
     assert!(is_due(StandardDeviations { track_width_error, ..written }));
     assert!(is_due(StandardDeviations { range_scale: 0.5 * written.range_scale, ..written }));
+}
+
+/// A robot that stands learns nothing and writes nothing.
+#[test]
+fn a_standing_robot_writes_nothing() {
+    let baked = Baked::new(&config());
+    let mut bench = running(&baked);
+    bench.wait(2_000);
+    let written = bench.app.store().flash().written;
+    bench.wait(180_000);
+    assert_eq!(bench.app.store().flash().written, written);
+}
+
+/// While commands come faster than they may be written, the record of the flash has the newest pose or is not parked.
+#[test]
+fn a_parked_record_has_the_newest_pose() {
+    let baked = Baked::new(&config());
+    let mut bench = waiting(&baked);
+    let mut written = 0;
+    for number in 0..40_u8 {
+        let x = 1.0 + f32::from(number);
+        let pose = Pose::new(x, 1.5, Radians(0.5));
+        assert_eq!(bench.order(&Command::SetPose(Start { pose, ..start() })), DONE);
+        let Some(saved) = record(&bench) else { continue };
+        let is_newest = saved.state.x == Metres(x);
+        assert!(is_newest || !saved.is_parked, "{number}: {saved:?}");
+        written += u32::from(is_newest && saved.is_parked);
+    }
+    assert!((4..=10).contains(&written), "{written}");
+    bench.wait(200_000);
+    let saved = record(&bench).unwrap();
+    assert!(saved.is_parked && saved.state.x == Metres(40.0), "{saved:?}");
+}
+
+/// Each deviation of a pose has its own limit.
+#[test]
+fn a_pose_with_one_deviation_beyond_its_limit_is_refused() {
+    let baked = Baked::new(&config());
+    let mut bench = waiting(&baked);
+    for (position, heading, is_refused) in [
+        (1_000.0, 3.141, false),
+        (0.0, 0.0, false),
+        (1_000.1, 0.1, true),
+        (0.1, 3.15, true),
+        (-1e-3, 0.1, true),
+        (0.1, -1e-3, true),
+        (f32::NAN, 0.1, true),
+        (0.1, f32::NAN, true),
+    ] {
+        let (position_deviation, heading_deviation) = (Metres(position), Radians(heading));
+        let command = Command::SetPose(Start { position_deviation, heading_deviation, ..start() });
+        let expected = if is_refused { CommandResult::Refused(CommandError::Pose) } else { DONE };
+        assert_eq!(bench.order(&command), expected, "{position} {heading}");
+    }
+}
+
+/// The travel up to a new pose is sent before the pose.
+#[test]
+fn the_travel_before_a_new_pose_is_sent() {
+    let baked = Baked::new(&config());
+    let mut bench = running(&baked);
+    bench.wait(1_030);
+    bench.roll(30, 20);
+    bench.received();
+    bench.send(&Command::SetPose(start()));
+    let messages = bench.wait(5);
+    let at = |wanted: fn(&Telemetry) -> bool| messages.iter().position(wanted);
+    let odometry = at(|message| matches!(message, Telemetry::Odometry(_))).unwrap();
+    let set = at(|message| matches!(message, Telemetry::PoseSet(_))).unwrap();
+    assert!(odometry < set, "{messages:?}");
+    let (Telemetry::Odometry(step), Telemetry::PoseSet(estimate)) =
+        (messages[odometry], messages[set])
+    else {
+        panic!("{messages:?}");
+    };
+    assert_eq!(step.at, estimate.at);
+    assert!(step.right_metres > step.left_metres && step.left_metres > 0.0, "{step:?}");
+}
+
+/// A calibration that is reset while the loop runs interrupts no pose.
+#[test]
+fn a_reset_calibration_leaves_the_pose_known() {
+    let baked = Baked::new(&config());
+    let mut bench = running(&baked);
+    bench.wait(1_000);
+    let before = bench.estimate();
+    assert_eq!(bench.order(&Command::ResetCalibration), DONE);
+    let after = bench.estimate();
+    assert_eq!(after.state.x, before.state.x);
+    assert!(after.deviation.x.0 <= before.deviation.x.0 * 1.01, "{after:?}");
+    assert!(after.deviation.heading.0 <= before.deviation.heading.0 * 1.01, "{after:?}");
 }

@@ -11,6 +11,7 @@ mod commands;
 mod devices;
 mod facts;
 mod flash;
+mod journal;
 mod load;
 mod motors;
 mod power_cut;

@@ -104,10 +104,21 @@ proptest! {
         let walls = [across(x)];
         let deviation = StandardDeviations { heading: Radians(0.01), ..deviation };
         let mut localizer = started(&walls, deviation);
-        for tick in 1..=steps {
+        // A range relates the range scale to the wheels.
+        let Ok(aim) = localizer.aim() else { return Ok(()) };
+        let fix = localizer.fix(&aim, Some(aim.range));
+        prop_assert!(matches!(fix, Fix::Accepted(_)), "{fix:?}");
+        for tick in 1..=2 * steps {
             localizer.odometry(at(tick), WheelTravel::new(0.02 + curve, 0.02 - curve)).unwrap();
+            if tick == steps
+                && let Ok(aim) = localizer.aim()
+            {
+                let fix = localizer.fix(&aim, Some(aim.range));
+                prop_assert!(matches!(fix, Fix::Accepted(_)), "{fix:?}");
+            }
         }
         let Ok(aim) = localizer.aim() else { return Ok(()) };
+        let travelled = 0.02 * f64::from(u32::try_from(steps).unwrap());
         let distance = distance(&localizer, x.into());
         let (m, variance) = projected(&localizer, distance);
         let range = aim.range.0.to_f64();
@@ -115,7 +126,7 @@ proptest! {
         let (common, difference) = (f64::midpoint(right, left), right - left);
         let wheels = 13.0_f64.powi(2) * (common * common + 0.25 * difference * difference);
         let weighted = mx * mx + my * my + (1.7 * mh).powi(2) + wheels;
-        let gain = weighted / (noise(range, None) + variance);
+        let gain = weighted / (noise(range, Some(travelled)) + variance);
         let is = aim.why.gain.0.to_f64();
         prop_assert!((is - gain).abs() <= 2e-3 * gain, "{is} {gain}");
     }
@@ -185,8 +196,10 @@ proptest! {
 
     /// The servo does not turn for less than its turn is worth: the next ping at the same wall has the same bearing.
     #[test]
-    fn a_small_turn_is_not_made(x in 1.5_f32..4.0, turn in 0.002_f32..0.01) {
-        let walls = [across(x)];
+    fn a_small_turn_is_not_made(
+        x in 1.5_f32..4.0, angle in -60.0_f32..60.0, turn in 0.002_f32..0.01,
+    ) {
+        let walls = [at_angle(x, angle, 6.0)];
         let deviation = StandardDeviations {
             x: Metres(0.05), y: Metres(0.05), heading: Radians(0.005), ..StandardDeviations::default()
         };

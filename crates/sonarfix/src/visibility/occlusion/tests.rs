@@ -82,12 +82,16 @@ proptest! {
     fn a_wall_occludes_where_something_may_answer_first(
         angle in -3.1_f32..3.1, distance in 0.3_f32..4.0, cone in 2.0_f32..75.0,
         ahead in short(), aside in short(),
-        is_near_the_edge in any::<bool>(), (near, off) in (-0.4_f32..0.4, -0.4_f32..0.4),
+        is_near_the_edge in any::<bool>(), is_near_the_sonar in prop::bool::weighted(0.2), (near, off) in (-0.4_f32..0.4, -0.4_f32..0.4),
         (anywhere_ahead, anywhere_aside) in (-1.0_f32..5.0, -2.0_f32..2.0),
         length in prop_oneof![1e-2_f32..0.3, 0.3_f32..4.0], turn in -3.1_f32..3.1,
     ) {
         // About as far as the target, or about at the edge of the cone, or anywhere.
-        let (from_ahead, from_aside) = if is_near_the_edge {
+        let (from_ahead, from_aside) = if is_near_the_sonar {
+            // Crossed by the beam within the uncertainty of the sonar, somewhere along it.
+            let share = 1.25 * (off + 0.4);
+            (near * ahead * 3.0 - share * length * turn.cos(), aside * off - share * length * turn.sin())
+        } else if is_near_the_edge {
             let direction = (cone.to_radians() + off) * near.signum();
             let from_sonar = if off > 0.0 { distance + near } else { distance * near.abs() * 2.4 };
             (from_sonar * direction.cos(), from_sonar * direction.sin())

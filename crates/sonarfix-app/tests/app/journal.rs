@@ -1,0 +1,78 @@
+//! Sectors that are exactly full, partly new or followed by foreign bytes.
+
+use sonarfix::ekf::{StandardDeviations, StateEstimate};
+use sonarfix_app::store::{Saved, Store};
+
+use crate::flash::{SECTOR, SECTORS, SimFlash};
+
+/// Bytes of a record in flash, and of a sector's header.
+const RECORD: usize = 92;
+const HEADER: usize = 24;
+
+fn store(flash: SimFlash) -> Store<SimFlash> {
+    Store::new(flash, 0..(SECTOR * SECTORS) as u32).unwrap()
+}
+
+/// A record whose numbers all have their longest form.
+fn record(number: u32) -> Saved {
+    let state = StateEstimate::from_array([1.0, 2.0, 0.5, 0.01, 0.02, 0.001, 0.003]);
+    let deviation = StandardDeviations::from_array([0.1; 7]);
+    let (run, seconds) = (0x1000_0000 + number, 0x1000_0000);
+    Saved { run, seconds, configuration: 0xF000_0000, is_parked: true, state, deviation }
+}
+
+/// Whatever record is the last one of its sector, it is found again; opening a journal that is in order changes nothing.
+#[test]
+fn the_last_record_of_a_sector_is_found_again() {
+    let mut flash = SimFlash::new();
+    for number in 0..3 * (SECTOR / RECORD) as u32 {
+        let mut opened = store(flash);
+        opened.save(&record(number)).unwrap();
+        flash = opened.release();
+        let (written, erased) = (flash.written, flash.erased);
+        let mut opened = store(flash);
+        opened.open().unwrap();
+        assert_eq!(opened.load().unwrap(), Some(record(number)), "{number}");
+        flash = opened.release();
+        assert_eq!((flash.written, flash.erased), (written, erased), "{number}");
+    }
+    assert!(flash.erased >= 3, "{} erases", flash.erased);
+}
+
+/// A power cut during the very first write leaves a part of the first header: the store is new, and nothing is lost.
+#[test]
+fn a_part_of_the_first_header_is_a_new_store() {
+    for at in 0..HEADER {
+        let mut flash = SimFlash::new();
+        flash.damage(at, 0);
+        let mut opened = store(flash);
+        assert_eq!(opened.open(), Ok(()), "byte {at}");
+        assert_eq!(opened.load(), Ok(None));
+        opened.save(&record(7)).unwrap();
+        assert_eq!(opened.load(), Ok(Some(record(7))));
+    }
+    let mut flash = SimFlash::new();
+    flash.damage(HEADER + 40, 0);
+    assert!(store(flash).open().is_err(), "it held something else");
+}
+
+/// Foreign bytes at the end of a sector that look like the head of a long entry: they are not one, and nothing beyond
+/// the store is read.
+#[test]
+fn an_entry_never_extends_beyond_its_sector() {
+    for (sector, tail) in (0..SECTORS).flat_map(|sector| (8..30).map(move |tail| (sector, tail))) {
+        let mut opened = store(SimFlash::new());
+        opened.save(&record(1)).unwrap();
+        let mut flash = opened.release();
+        let at = (sector + 1) * SECTOR - 4 * tail;
+        // Key and length of a head; the rest of the sector stays blank.
+        for (offset, byte) in [(0, 0), (4, 1), (5, 0), (6, 160), (7, 0)] {
+            flash.damage(at + offset, byte);
+        }
+        let mut opened = store(flash);
+        assert_eq!(opened.open(), Ok(()), "{sector} {tail}");
+        assert_eq!(opened.load(), Ok(Some(record(1))), "{sector} {tail}");
+        opened.save(&record(2)).unwrap();
+        assert_eq!(opened.load(), Ok(Some(record(2))));
+    }
+}
