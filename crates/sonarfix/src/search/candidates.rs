@@ -189,3 +189,125 @@ impl AlongWalls {
         Generated::Candidate(Placement { at, rotation, bend })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::vec::Vec;
+
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::pose::Point;
+
+    /// Direction of a wall's side away from the robot, distance of its line from the origin, and its ends along it.
+    type WideSide = (f64, f64, (f64, f64));
+
+    fn sides(ends: ((f64, f64), (f64, f64))) -> [WideSide; 2] {
+        let ((x0, y0), (x1, y1)) = ends;
+        let along = (y1 - y0).atan2(x1 - x0);
+        [along + std::f64::consts::FRAC_PI_2, along - std::f64::consts::FRAC_PI_2].map(|angle| {
+            let (sin, cos) = angle.sin_cos();
+            let (one, other) = (-sin * x0 + cos * y0, -sin * x1 + cos * y1);
+            (angle, cos * x0 + sin * y0, (one.min(other), one.max(other)))
+        })
+    }
+
+    fn is_clear(value: f64, limit: f64) -> bool {
+        (value - limit).abs() > 1e-3
+    }
+
+    /// Whether half of a shifted stretch, less the slack, is on the side; `None` at the limit.
+    fn holds(side: &WideSide, (from, to): (f32, f32), shift: f64) -> Option<bool> {
+        let (from, to) = (f64::from(from) + shift, f64::from(to) + shift);
+        let overlap = to.min(side.2.1) - from.max(side.2.0);
+        let least = 0.5 * (to - from) - 0.15;
+        is_clear(overlap, least).then_some(overlap > least)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig {
+            cases: 500, max_global_rejects: 50_000, ..ProptestConfig::default()
+        })]
+
+        /// Eq. (35) by trying all sides of all walls in `f64`.
+        #[test]
+        fn the_candidates_of_a_pair_are_all_that_fit(
+            angle in -3.1_f32..3.1, (quarter, tilt) in (0_u8..4, -0.3_f32..0.3),
+            offsets in (0.3_f32..4.0, 0.3_f32..4.0),
+            starts in (-3.0_f32..2.0, -3.0_f32..2.0), lengths in (0.1_f32..4.0, 0.1_f32..4.0),
+            supports in (3_u16..40, 3_u16..40), slanted in (0.5_f32..5.5, 0.5_f32..3.5, -3.1_f32..3.1),
+        ) {
+            let (x, y, turn) = slanted;
+            let corners = [(0.0, 0.0), (6.0, 0.0), (6.0, 4.0), (0.0, 4.0), (0.0, 0.0)];
+            let mut ends: Vec<_> = corners.windows(2).map(|ends| (ends[0], ends[1])).collect();
+            ends.push(((x, y), (x + 1.5 * turn.cos(), y + 1.5 * turn.sin())));
+            let point = |(x, y)| Point::new(x, y);
+            let walls: Vec<Wall> =
+                ends.iter().map(|&(from, to)| Wall::new(point(from), point(to)).unwrap()).collect();
+            let line = |angle: f32, offset, start, length, support| Line {
+                normal: Vector::of_angle(angle), offset, stretch: (start, start + length), support,
+            };
+            let first = line(angle, offsets.0, starts.0, lengths.0, supports.0);
+            let second_angle = angle + f32::from(quarter) * core::f32::consts::FRAC_PI_2 + tilt;
+            let second = line(second_angle, offsets.1, starts.1, lengths.1, supports.1);
+            let sine = f64::from(second_angle - angle).sin().abs();
+            prop_assume!(is_clear(sine, 0.5));
+            prop_assert_eq!(make_a_pair(&first, &second), sine > 0.5);
+            prop_assume!(sine > 0.5);
+
+            let wide = |(x, y): (f32, f32)| (f64::from(x), f64::from(y));
+            let all: Vec<[WideSide; 2]> =
+                ends.iter().map(|&(from, to)| sides((wide(from), wide(to)))).collect();
+            let (n1, n2) = (f64::from(angle), f64::from(second_angle));
+            let mut expected: Vec<[f64; 4]> = Vec::new();
+            for (one, other) in (0..all.len()).flat_map(|one| (0..all.len()).map(move |other| (one, other))) {
+                if one == other {
+                    continue;
+                }
+                for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(a, b)| (all[one][a], all[other][b])) {
+                    let (by_first, by_second) = (a.0 - n1, b.0 - n2);
+                    let agreement = (by_first - by_second).cos();
+                    prop_assume!(is_clear(agreement, 0.97));
+                    if agreement < 0.97 {
+                        continue;
+                    }
+                    let (w1, w2) = (f64::from(supports.0), f64::from(supports.1));
+                    let mean = (w1 * by_first.sin() + w2 * by_second.sin())
+                        .atan2(w1 * by_first.cos() + w2 * by_second.cos());
+                    let (p, q) = (a.1 - f64::from(offsets.0), b.1 - f64::from(offsets.1));
+                    let determinant = (b.0 - a.0).sin();
+                    let x = (p * b.0.sin() - q * a.0.sin()) / determinant;
+                    let y = (q * a.0.cos() - p * b.0.cos()) / determinant;
+                    let along = |angle: f64| -angle.sin() * x + angle.cos() * y;
+                    let fits = (holds(&a, first.stretch, along(a.0)), holds(&b, second.stretch, along(b.0)));
+                    let (Some(one), Some(other)) = fits else {
+                        return Err(TestCaseError::reject("at a limit"));
+                    };
+                    if one && other {
+                        expected.push([x, y, mean.cos(), mean.sin()]);
+                    }
+                }
+            }
+            let map = Map::new(&walls);
+            let (mut pairs, mut found) = (Pairs::default(), Vec::new());
+            let bend = Bend::default();
+            for _ in 0..1_000 {
+                match pairs.next(&map, &first, &second, bend) {
+                    Generated::Candidate(placement) => {
+                        let Placement { at, rotation, .. } = placement;
+                        found.push([at.x, at.y, rotation.x, rotation.y].map(f64::from));
+                    }
+                    Generated::Nothing => {}
+                    Generated::Done => break,
+                }
+            }
+            prop_assert_eq!(pairs.next(&map, &first, &second, bend), Generated::Done);
+            let is_in = |one: &[f64; 4], list: &[[f64; 4]]| {
+                list.iter().any(|it| it.iter().zip(one).all(|(a, b)| (a - b).abs() < 5e-3))
+            };
+            prop_assert!(expected.iter().all(|it| is_in(it, &found)), "{expected:?} {found:?}");
+            prop_assert!(found.iter().all(|it| is_in(it, &expected)), "{expected:?} {found:?}");
+            prop_assert_eq!(found.len(), expected.len());
+        }
+    }
+}
