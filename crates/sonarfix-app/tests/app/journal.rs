@@ -13,11 +13,11 @@ fn store(flash: SimFlash) -> Store<SimFlash> {
     Store::new(flash, 0..(SECTOR * SECTORS) as u32).unwrap()
 }
 
-/// A record whose numbers all have their longest form.
+/// A record of [`RECORD`] bytes: 22 of them fill a sector to the last byte.
 fn record(number: u32) -> Saved {
     let state = StateEstimate::from_array([1.0, 2.0, 0.5, 0.01, 0.02, 0.001, 0.003]);
     let deviation = StandardDeviations::from_array([0.1; 7]);
-    let (run, seconds) = (0x1000_0000 + number, 0x1000_0000);
+    let (run, seconds) = (1, 0x1000_0000 + number);
     Saved { run, seconds, configuration: 0xF000_0000, is_parked: true, state, deviation }
 }
 
@@ -25,6 +25,7 @@ fn record(number: u32) -> Saved {
 #[test]
 fn the_last_record_of_a_sector_is_found_again() {
     let mut flash = SimFlash::new();
+    assert_eq!((SECTOR - HEADER) % RECORD, 0);
     for number in 0..3 * (SECTOR / RECORD) as u32 {
         let mut opened = store(flash);
         opened.save(&record(number)).unwrap();
@@ -60,19 +61,27 @@ fn a_part_of_the_first_header_is_a_new_store() {
 /// the store is read.
 #[test]
 fn an_entry_never_extends_beyond_its_sector() {
-    for (sector, tail) in (0..SECTORS).flat_map(|sector| (8..30).map(move |tail| (sector, tail))) {
+    let full = ((SECTOR - HEADER) / RECORD) as u32;
+    // In the first sector, in the last one, and in the first again.
+    for (records, tail) in [1, full + 2, 2 * full + 2]
+        .into_iter()
+        .flat_map(|records| (8..30).map(move |tail| (records, tail)))
+    {
         let mut opened = store(SimFlash::new());
-        opened.save(&record(1)).unwrap();
+        for number in 1..=records {
+            opened.save(&record(number)).unwrap();
+        }
         let mut flash = opened.release();
+        let sector = flash.erased.saturating_sub(1) % SECTORS;
         let at = (sector + 1) * SECTOR - 4 * tail;
         // Key and length of a head; the rest of the sector stays blank.
         for (offset, byte) in [(0, 0), (4, 1), (5, 0), (6, 160), (7, 0)] {
             flash.damage(at + offset, byte);
         }
         let mut opened = store(flash);
-        assert_eq!(opened.open(), Ok(()), "{sector} {tail}");
-        assert_eq!(opened.load(), Ok(Some(record(1))), "{sector} {tail}");
-        opened.save(&record(2)).unwrap();
-        assert_eq!(opened.load(), Ok(Some(record(2))));
+        assert_eq!(opened.open(), Ok(()), "{records} {tail}");
+        assert_eq!(opened.load(), Ok(Some(record(records))), "{records} {tail}");
+        opened.save(&record(0)).unwrap();
+        assert_eq!(opened.load(), Ok(Some(record(0))));
     }
 }
