@@ -1,10 +1,12 @@
 //! Values at the limits of what is accepted, and small conversions.
 
 use proptest::prelude::*;
+use sonarfix::aim::Aim;
 use sonarfix::config::Config;
 use sonarfix::ekf::{Ekf, EkfError, StandardDeviations, StateEstimate};
-use sonarfix::localizer::{Fix, Localizer, OdometryError, Start};
-use sonarfix::map::{Map, Wall};
+use sonarfix::health::Verdict;
+use sonarfix::localizer::{Fix, Localizer, OdometryError, Refusal, Start};
+use sonarfix::map::{Map, Wall, WallId};
 use sonarfix::motion::{Drive, WheelTravel};
 use sonarfix::pose::{Point, Pose};
 use sonarfix::units::{Instant, Metres, MetresPerSecond, PerRootMetre, Radians, SquareMetres};
@@ -139,6 +141,33 @@ fn a_range_used_without_odometry_begins_the_growth_again() {
     let silent = localizer.fix(&aim, None);
     assert_eq!(silent.innovation_used(), None);
     assert_eq!(localizer.association().to_bits(), 0.0_f32.to_bits());
+}
+
+/// A ping that says nothing about the pose inflates nothing, also when the robot is lost.
+#[test]
+fn a_refused_ping_of_a_lost_robot_changes_no_bit() {
+    let walls = [Wall::new(Point::new(1.0, -1.0), Point::new(1.0, 1.0)).unwrap()];
+    let start = Start {
+        pose: Pose::default(),
+        position_deviation: Metres(0.05),
+        heading_deviation: Radians(0.01),
+    };
+    let began = Instant::from_ticks(0);
+    let mut localizer = Localizer::new(config(), Map::new(&walls), start, began).unwrap();
+    let aim = localizer.aim().unwrap();
+    localizer.odometry_missing(Instant::from_ticks(4_000_000));
+    localizer.odometry(Instant::from_ticks(4_100_000), WheelTravel::default()).unwrap();
+    assert_eq!(localizer.health().verdict, Verdict::Lost);
+    let before = bits(localizer.filter());
+    let unknown = Aim { wall: WallId(9), ..aim };
+    for (aim, range, refusal) in [
+        (aim, Some(Metres(f32::NAN)), Refusal::NotFinite),
+        (unknown, Some(aim.range), Refusal::UnknownWall),
+    ] {
+        assert_eq!(localizer.fix(&aim, range), Fix::Refused(refusal));
+        assert_eq!(bits(localizer.filter()), before, "{refusal:?}");
+        assert_eq!(localizer.health().inflations, 0);
+    }
 }
 
 /// A restart has state and deviations of its arguments, or changes nothing.
