@@ -131,8 +131,6 @@ impl GyroFusion {
     ///
     /// # Errors
     /// As of [`Ekf::predict`]; neither has changed.
-    // A copy beside each prediction by the wheels alone would cost a robot without a gyro stack and time.
-    #[inline(never)]
     pub fn predict(
         &mut self,
         ekf: &mut Ekf,

@@ -139,7 +139,6 @@ impl GyroBias {
 
     // ===== Eqs. (6) and (16): the bias in the correction by a range =====
     /// Corrects bias and column by a range whose gain has corrected P. `share`: of K mᵀ that P has lost, eq. (16).
-    #[inline(never)]
     pub fn correct(
         &mut self,
         prediction: &PredictedMeasurement,
@@ -178,7 +177,6 @@ impl Covariance {
     // ===== Eq. (38): correction by a difference of turns =====
     /// Corrects P, the column of the bias, and the bias by a difference of turns; `innovation` is its value less what is
     /// expected of it. Returns the gain; neither has changed without one.
-    #[inline(never)]
     pub fn correct_by_turns(
         &mut self,
         bias: &mut GyroBias,
