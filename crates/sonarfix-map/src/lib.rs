@@ -14,7 +14,7 @@
 //! | scenario | [`Scenario::read`] | both, a path, and the true parameters |
 //! | any with a map | [`MapFile::read`] | the walls, and the line of each |
 //!
-//! [`survey`] finds contradictions between walls, [`simplify`] joins collinear pieces, and [`bake`] creates the image that a
+//! [`flaws`] finds contradictions between walls, [`simplify`] joins collinear pieces, and [`bake`] creates the image that a
 //! robot reads in place.
 //!
 //! Parameters of the localizer are `f32` in the types of [`sonarfix`]; all others are `f64` in metres, seconds and radians.
@@ -29,6 +29,7 @@ mod example;
 mod faults;
 mod fidelity;
 mod file;
+mod flaws;
 mod floor;
 mod geometry;
 mod gyro_file;
@@ -44,7 +45,6 @@ mod simplify;
 mod sonar_model;
 mod spelling;
 mod surroundings;
-mod survey;
 mod symmetry;
 mod wall_file;
 
@@ -54,6 +54,7 @@ pub use error::{FileError, Mistake};
 pub use faults::{Fault, FaultKind, Wheel};
 pub use fidelity::{Fidelity, Follow, Hardware, HeadingSlip, ServoName, Upset, Upsets};
 pub use file::{MAX_FILE_BYTES, read_bytes, read_text};
+pub use flaws::{Finding, Flaw, Severity, flaws};
 pub use floor::{Floor, NamedWall};
 pub use map_file::MapFile;
 pub use path::{Leg, Motion, Movement, Path, PathError, PathPlan, PathPose};
@@ -62,7 +63,6 @@ pub use scenario::{GyroTruth, KEYS as SCENARIO_KEYS, Run, Scenario, Start, Truth
 pub use simplify::{Limits, Simplified, simplify};
 pub use sonar_model::{SonarModel, SonarName};
 pub use surroundings::{Obstacle, Oscillation, Outline, Surroundings};
-pub use survey::{Finding, Flaw, Severity, survey};
 pub use symmetry::{Motion as SymmetryMotion, Symmetry, symmetries, with_cabinet};
 
 /// The text of the reference scenario, with the conditions of the paper.

@@ -13,7 +13,7 @@ use proptest::prelude::*;
 use sonarfix::config::{Config, Sonar};
 use sonarfix::units::Metres;
 use sonarfix_map::{
-    Finding, Flaw, Floor, Limits, MapFile, NamedWall, PAPER, Severity, bake, simplify, survey,
+    Finding, Flaw, Floor, Limits, MapFile, NamedWall, PAPER, Severity, bake, flaws, simplify,
 };
 
 fn floor(walls: &[[f64; 4]]) -> Floor {
@@ -29,7 +29,7 @@ fn sonar() -> Sonar {
 }
 
 fn findings(walls: &[[f64; 4]]) -> Vec<Finding> {
-    survey(&floor(walls), &sonar()).unwrap()
+    flaws(&floor(walls), &sonar()).unwrap()
 }
 
 /// The only finding of the two walls.
@@ -116,7 +116,7 @@ fn a_wall_between_walls_is_unreachable() {
 #[test]
 fn a_room_has_no_flaw() {
     let paper = MapFile::read(&written("paper.toml", PAPER).1, None).unwrap();
-    assert_eq!(survey(&paper.floor, &paper.sonar().unwrap()).unwrap(), []);
+    assert_eq!(flaws(&paper.floor, &paper.sonar().unwrap()).unwrap(), []);
 }
 
 /// A file in a temporary folder, which is removed with the returned value.

@@ -8,7 +8,7 @@ use clap::Subcommand;
 use sonarfix::config::{Config, Sonar};
 use sonarfix::map::Map;
 use sonarfix::units::Metres;
-use sonarfix_map::{Limits, MapFile, Severity, bake, robot_file, simplify, survey, symmetries};
+use sonarfix_map::{Limits, MapFile, Severity, bake, flaws, robot_file, simplify, symmetries};
 
 use crate::map_exchange;
 use crate::output::check_file;
@@ -129,7 +129,7 @@ fn check(map: &MapFile, robot: Option<&Path>) -> anyhow::Result<()> {
         Some(robot) => robot_file::read(robot)?.localizer.sonar,
         None => map.sonar().unwrap_or_else(usual_sonar),
     };
-    let findings = survey(&map.floor, &sonar)?;
+    let findings = flaws(&map.floor, &sonar)?;
     for finding in findings.iter().take(SHOWN) {
         let beside = match (finding.other(), finding.other().and_then(|other| map.line(other))) {
             (Some(other), Some(line)) => format!(" and {} (line {line})", map.quoted(other)),
@@ -172,7 +172,7 @@ fn usual_sonar() -> Sonar {
 }
 
 fn write_image(map: &MapFile, out: &Path) -> anyhow::Result<()> {
-    let findings = survey(&map.floor, &map.sonar().unwrap_or_else(usual_sonar))?;
+    let findings = flaws(&map.floor, &map.sonar().unwrap_or_else(usual_sonar))?;
     let errors = count(&findings, Severity::Error);
     let name = map.name();
     anyhow::ensure!(errors == 0, "{name}: {errors} errors; run `sonarfix map check {name}`");

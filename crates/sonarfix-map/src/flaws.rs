@@ -138,7 +138,7 @@ impl fmt::Display for Flaw {
 ///
 /// # Errors
 /// [`BakeError`], if the walls cannot be indexed.
-pub fn survey(floor: &Floor, sonar: &Sonar) -> Result<Vec<Finding>, BakeError> {
+pub fn flaws(floor: &Floor, sonar: &Sonar) -> Result<Vec<Finding>, BakeError> {
     let image = bake(&floor.walls())?;
     let walls = Neighbours::new(floor, &image).map_err(BakeError::Refused)?;
     let min_range = f64::from(sonar.min_range.0);
