@@ -24,7 +24,7 @@ const PAPER: &str = "../../crates/sonarfix-map/scenarios/paper.toml";
 
 /// Every subcommand, with arguments for the shortest output. In `FILES` are a short log with its map and robot, a drive for
 /// the calibration, a recorded stream of a robot's bytes, rows, and room for results; `ROBOT` is the port of a robot.
-const PRINTING: [&[&str]; 40] = [
+const PRINTING: [&[&str]; 42] = [
     &["--help"],
     &["init", "FILES/robot"],
     &["paper", "--runs", "1"],
@@ -36,6 +36,8 @@ const PRINTING: [&[&str]; 40] = [
     &["relocalize", "--runs", "1", "--seconds", "5"],
     &["calibrate", "FILES/drive.csv"],
     &["calibration", "--runs", "1", "--metres", "5"],
+    &["survey", "FILES/survey/log.csv"],
+    &["surveys", "room", "--runs", "1"],
     &["export", "FILES/log.csv", "--mcap", "FILES/log.mcap"],
     &["convert", "carmen", "FILES/carmen.log", "--out", "FILES/converted"],
     // These need a recording.
@@ -89,6 +91,7 @@ fn files() -> tempfile::TempDir {
     for arguments in [
         ["run", CLASSROOM, "--runs", "1", "--rows", "FILES/rows.csv"].as_slice(),
         &["config", "bake", "tests/robot.toml", "--out", "FILES/config.bin"],
+        &["surveys", "room", "--record", "FILES/survey"],
     ] {
         assert!(printing(arguments, dir.path()).stdout(Stdio::null()).status().unwrap().success());
     }
@@ -270,7 +273,7 @@ fn a_long_line_is_not_echoed() {
 }
 
 /// The options that name a result, each in a command that would otherwise end with another error, or work for hours.
-const WRITING: [(&[&str], &str); 30] = [
+const WRITING: [(&[&str], &str); 32] = [
     (&["paper", "--runs", "4000000"], "--out"),
     (&["run", CLASSROOM, "--runs", "4000000"], "--out"),
     (&["run", CLASSROOM, "--runs", "4000000"], "--trace"),
@@ -289,6 +292,8 @@ const WRITING: [(&[&str], &str); 30] = [
     (&["calibrate", "missing.csv"], "--out"),
     (&["calibrate", "missing.csv"], "--trajectory"),
     (&["calibrate", "missing.csv"], "--residuals"),
+    (&["survey", "missing.csv"], "--out"),
+    (&["survey", "missing.csv"], "--drawing"),
     (&["export", "missing.csv"], "--mcap"),
     (&["export", "missing.csv"], "--parquet"),
     (&["map", "bake", "missing.toml"], "--out"),
@@ -329,7 +334,7 @@ fn a_narrow_office_is_drawn() {
 
 /// Commands with more runs than anyone waits for, and what their output must begin with.
 #[cfg(unix)]
-const LONG: [(&[&str], &str); 9] = [
+const LONG: [(&[&str], &str); 10] = [
     (&["paper", "--runs", "4000000"], "Estimates"),
     (
         &["run", "../../crates/sonarfix-map/scenarios/classroom.toml", "--runs", "4000000"],
@@ -342,6 +347,7 @@ const LONG: [(&[&str], &str); 9] = [
     (&["plan", CLASSROOM, "--runs", "100000"], ""),
     (&["health", "--runs", "1000000"], "# Reliability"),
     (&["calibration", "--runs", "1000000", "--metres", "5"], ""),
+    (&["surveys", "room", "--runs", "1000000"], ""),
 ];
 
 /// Interrupts a command after this time.
