@@ -24,7 +24,7 @@ const CORNER_ECHOES: usize = 3;
 /// A wall of the map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MappedWall {
-    /// Its ends, with the robot's side on the left of the way from the first to the second.
+    /// Its ends, with the robot's side on the left of the direction from the first to the second.
     pub from: Vector2<f64>,
     /// Its other end.
     pub to: Vector2<f64>,

@@ -143,7 +143,7 @@ fn a_range_used_without_odometry_begins_the_growth_again() {
     assert_eq!(localizer.association().to_bits(), 0.0_f32.to_bits());
 }
 
-/// A ping that says nothing about the pose inflates nothing, also when the robot is lost.
+/// A ping without information on the pose inflates nothing, also when the robot is lost.
 #[test]
 fn a_refused_ping_of_a_lost_robot_changes_no_bit() {
     let walls = [Wall::new(Point::new(1.0, -1.0), Point::new(1.0, 1.0)).unwrap()];

@@ -50,7 +50,7 @@ fn started(walls: &[Wall], deviation: StandardDeviations) -> Localizer<'_> {
     Localizer::resume(config(), Map::new(walls), state, deviation, at(0)).unwrap()
 }
 
-/// Of the range of a wall across x, whose sonar looks along x at a small angle: P Hᵀ and H P Hᵀ.
+/// Of the range of a wall across x, whose sonar points along x at a small angle: P Hᵀ and H P Hᵀ.
 fn projected(localizer: &Localizer, distance: f64) -> ([f64; 7], f64) {
     let filter = localizer.filter();
     let (state, p) = (filter.state(), filter.covariance().map(f64::from));

@@ -81,7 +81,7 @@ impl Surface {
         self.along().dot(&other.along()).abs() > PARALLEL
     }
 
-    /// Whether a straight way crosses it.
+    /// Whether a straight path crosses it.
     fn blocks(&self, from: &Point, to: &Point) -> bool {
         let side = |a: &Point, b: &Point, c: &Point| (b - a).perp(&(c - a));
         side(&self.from, &self.to, from) * side(&self.from, &self.to, to) < 0.0
