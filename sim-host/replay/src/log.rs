@@ -418,7 +418,7 @@ mod tests {
         let cases = [
             (
                 "tick,1,2,3",
-                "`tick` is not one of ticks, wheels, range, scan, skip, start, resume, pose, mode",
+                "`tick` is not one of ticks, wheels, turn, range, scan, skip, start, resume, pose, mode",
             ),
             ("range,1,2,3,x", "the wall is `x`, which is not a whole number, from 0"),
             ("range,1,2,3,4,5", "there are more fields than a record of this kind has"),
@@ -456,7 +456,7 @@ mod tests {
             ("start,0,0,0,0,1", "the deviation of the heading is missing"),
             (
                 "\u{1b}[31m,0",
-                "`\\u{1b}[31m` is not one of ticks, wheels, range, scan, skip, start, resume, pose, mode",
+                "`\\u{1b}[31m` is not one of ticks, wheels, turn, range, scan, skip, start, resume, pose, mode",
             ),
         ];
         for (line, reason) in cases {
