@@ -83,7 +83,7 @@ pub fn replay_log(bytes: &[u8]) {
 
 fn check_record(record: &Record) {
     let (time, numbers) = match record {
-        Record::Ticks { time, .. } => (time, vec![]),
+        Record::Ticks { time, .. } | Record::Turn { time, .. } => (time, vec![]),
         Record::Wheels { time, right, left } => (time, vec![*right, *left]),
         Record::Range { time, bearing, range, .. } => (time, vec![*bearing, range.unwrap_or(0.0)]),
         Record::Scan { time, .. } | Record::Skip { time } => (time, vec![]),
