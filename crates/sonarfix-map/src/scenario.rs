@@ -112,7 +112,7 @@ pub struct Truth {
 /// The true parameters of a gyro.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct GyroTruth {
-    /// Bias at the start, rad/s; drawn with the deviation that the robot assumes if there is none.
+    /// Bias at the start, rad/s; without this key it is drawn with the deviation that the robot assumes.
     pub bias: Option<f64>,
     /// Scale error, dimensionless.
     pub scale: f64,

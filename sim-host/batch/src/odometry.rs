@@ -1,5 +1,7 @@
 //! Wheel odometry between two instants, with its derivatives by the calibration and its covariance.
 
+#![expect(clippy::indexing_slicing, reason = "matrices of a fixed size")]
+
 use nalgebra::{Matrix3, Matrix3x2, Vector3};
 
 /// Wheel travel of one encoder interval, right and left, metres by the nominal wheels.
@@ -27,6 +29,46 @@ pub struct Motion {
     pub by_drive: Matrix3<f64>,
     /// Its covariance for travel noise of 1 m/√m of each wheel.
     pub covariance: Matrix3<f64>,
+}
+
+/// The motion between two poses of a trajectory as a residual, with its information and its derivatives by both poses.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Edge {
+    /// Relative pose less the motion: metres, metres, radians.
+    pub residual: Vector3<f64>,
+    /// Inverse of its covariance.
+    pub information: Matrix3<f64>,
+    /// Derivative by the first pose.
+    pub by_from: Matrix3<f64>,
+    /// Derivative by the second pose.
+    pub by_to: Matrix3<f64>,
+}
+
+impl Motion {
+    /// Compares the motion with two poses. `wheel_noise` is the travel noise of each wheel, m/√m; `floor` are standard
+    /// deviations of x, y and heading that a step has besides. `None` if the covariance is singular.
+    #[must_use]
+    pub fn between(
+        &self,
+        [from, to]: [&Vector3<f64>; 2],
+        wheel_noise: f64,
+        floor: [f64; 3],
+    ) -> Option<Edge> {
+        let (sin, cos) = from.z.sin_cos();
+        let back = Matrix3::new(cos, sin, 0.0, -sin, cos, 0.0, 0.0, 0.0, 1.0);
+        let relative = back * (to - from);
+        let mut residual = relative - self.pose;
+        residual.z = wrap(residual.z);
+        let mut by_from = -back;
+        by_from[(0, 2)] = relative.y;
+        by_from[(1, 2)] = -relative.x;
+        let mut covariance = self.covariance * wheel_noise.powi(2);
+        for (k, floor) in floor.iter().enumerate() {
+            covariance[(k, k)] += floor * floor;
+        }
+        let information = covariance.cholesky()?.inverse();
+        Some(Edge { residual, information, by_from, by_to: back })
+    }
 }
 
 /// Integrates exact arcs, to the third order of their angle.

@@ -12,7 +12,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector2, Vector3};
 use crate::chain::{Covariance, Normal};
 use crate::chain_of_poses::{Chain, Event};
 use crate::constants::{COUNT, Constants, Name, Priors};
-use crate::odometry::{compose, integrate, wrap};
+use crate::odometry::{Edge, compose, integrate, wrap};
 use crate::recording::{Recording, ReferencePose};
 use crate::wall::{Wall, sonar};
 
@@ -201,24 +201,13 @@ impl Problem<'_> {
     /// The term of the edge after a pose.
     #[must_use]
     pub fn edge_term(&self, state: &State, i: usize) -> Option<EdgeTerm> {
-        let (from, to) = (&state.poses[i], &state.poses[i + 1]);
         let motion = integrate(&self.chain.edges[i], &state.constants.drive());
-        let (sin, cos) = from.z.sin_cos();
-        let back = Matrix3::new(cos, sin, 0.0, -sin, cos, 0.0, 0.0, 0.0, 1.0);
-        let relative = back * (to - from);
-        let mut residual = relative - motion.pose;
-        residual.z = wrap(residual.z);
-        let mut by_from = -back;
-        by_from[(0, 2)] = relative.y;
-        by_from[(1, 2)] = -relative.x;
+        let poses = [&state.poses[i], &state.poses[i + 1]];
+        let edge = motion.between(poses, self.noise.wheel, EDGE_FLOOR)?;
         let mut by_constants = Rows::zeros();
         by_constants.fixed_columns_mut::<3>(0).copy_from(&-motion.by_drive);
-        let mut covariance = motion.covariance * self.noise.wheel.powi(2);
-        for (k, floor) in EDGE_FLOOR.iter().enumerate() {
-            covariance[(k, k)] += floor * floor;
-        }
-        let information = covariance.cholesky()?.inverse();
-        Some(EdgeTerm { residual, information, by_from, by_to: back, by_constants })
+        let Edge { residual, information, by_from, by_to } = edge;
+        Some(EdgeTerm { residual, information, by_from, by_to, by_constants })
     }
 
     /// The term of a pose with the reference stream; `None` outside of the stream.

@@ -18,6 +18,19 @@ pub fn opened(url: &str, flags: &[&str]) -> Option<String> {
     Some(output_of(browser, url, &[&["--dump-dom"], flags].concat()))
 }
 
+/// The page after its scripts ran and showed all of the texts. Virtual time goes on while the body of an answer arrives,
+/// so that a page on a busy machine may end before the last event is drawn; it is then opened again, at most 20 times.
+pub fn opened_until(url: &str, flags: &[&str], texts: &[&str]) -> Option<String> {
+    let mut dom = opened(url, flags)?;
+    for _ in 1..20 {
+        if texts.iter().all(|text| dom.contains(text)) {
+            break;
+        }
+        dom = opened(url, flags)?;
+    }
+    Some(dom)
+}
+
 /// Takes pictures of a page, light and dark, into the folder of `SONARFIX_PICTURES`, if it is set.
 pub fn picture(url: &str, name: &str, flags: &[&str]) {
     let Ok(folder) = std::env::var("SONARFIX_PICTURES") else { return };

@@ -538,24 +538,27 @@ fn fix(time: f64, sonar: [f64; 2], number: u32) -> FixRecord {
     }
 }
 
+/// What the page shows of [`filled`].
+const SHOWN: [&str; 9] = [
+    "A &lt;b&gt;robot&lt;/b&gt;",
+    "tracking</b>",
+    "19.9 s",
+    "0.970",
+    "2 poses fit",
+    "the left encoder counts nothing",
+    "a notice",
+    ">ended<",
+    "missed <",
+];
+
 #[test]
 fn the_page_draws_without_an_error() {
     let Page { url, orders, .. } = filled();
     for flags in [&["--window-size=1300,1500"][..], &["--window-size=400,1800"]] {
-        let Some(dom) = chromium::opened(&url, flags) else { return };
+        let Some(dom) = chromium::opened_until(&url, flags, &SHOWN) else { return };
         chromium::assert_ready(&dom);
         chromium::picture(&url, "live", flags);
-        for text in [
-            "A &lt;b&gt;robot&lt;/b&gt;",
-            "tracking</b>",
-            "19.9 s",
-            "0.970",
-            "2 poses fit",
-            "the left encoder counts nothing",
-            "a notice",
-            ">ended<",
-            "missed <",
-        ] {
+        for text in SHOWN {
             assert!(dom.contains(text), "the page does not show {text}: {dom}");
         }
         // The token is no longer in the address, and nothing of the map became markup.
@@ -579,7 +582,8 @@ fn a_page_of_another_origin_is_refused_by_a_browser() {
             .then((answer) => {{ if (answer.type === 'opaque') throw 0; return answer; }}),
         ];
         Promise.all(tries.map((one) => one.then((answer) => answer.text(), () => 'unreadable')))
-          .then((all) => {{ document.getElementById('result').textContent = all.join(' '); }});
+          .then((all) => {{ document.getElementById('result').textContent = all.join(' ');
+            document.title = 'decided'; }});
         </script>"
     );
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
@@ -594,8 +598,8 @@ fn a_page_of_another_origin_is_refused_by_a_browser() {
             let _ = write!(stream, "{head}\r\nConnection: close\r\n\r\n{script}");
         }
     });
-    let Some(dom) = chromium::opened(&url, &[]) else { return };
-    let all = "unreadable unreadable unreadable unreadable";
-    assert!(dom.contains(&format!("<p id=\"result\">{all}</p>")), "{dom}");
+    let all = "<p id=\"result\">unreadable unreadable unreadable unreadable</p>";
+    let Some(dom) = chromium::opened_until(&url, &[], &["<title>decided<"]) else { return };
+    assert!(dom.contains(all), "{dom}");
     assert!(orders.next().is_none(), "a page of another origin has commanded");
 }

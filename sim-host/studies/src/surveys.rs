@@ -41,7 +41,7 @@ pub struct Trial {
     pub seed: u64,
     /// Duration of the drive, seconds.
     pub seconds: f64,
-    /// The score of the map, or why there is none.
+    /// The score of the map, or the reason for which the recording gave no map.
     pub outcome: Result<Score, SurveyError>,
 }
 

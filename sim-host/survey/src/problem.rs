@@ -11,7 +11,7 @@ use nalgebra::{Matrix3, Matrix3x2, Vector2, Vector3};
 use sonarfix_batch::calibration::Nominal;
 use sonarfix_batch::chain::Normal;
 use sonarfix_batch::chain_of_poses::{Chain, Event};
-use sonarfix_batch::odometry::{Drive, compose, integrate, wrap};
+use sonarfix_batch::odometry::{Drive, Edge, compose, integrate, wrap};
 use sonarfix_batch::recording::Recording;
 
 use crate::line::Line;
@@ -290,28 +290,15 @@ impl Problem<'_> {
     }
 
     fn add_edge(&self, state: &State, i: usize, system: &mut System) {
-        let (from, to) = (&state.poses[i], &state.poses[i + 1]);
         let motion = integrate(&self.chain.edges[i], &state.drive(&self.robot));
-        let (sin, cos) = from.z.sin_cos();
-        let back = Matrix3::new(cos, sin, 0.0, -sin, cos, 0.0, 0.0, 0.0, 1.0);
-        let relative = back * (to - from);
-        let mut residual = relative - motion.pose;
-        residual.z = wrap(residual.z);
-        let mut by_from = -back;
-        by_from[(0, 2)] = relative.y;
-        by_from[(1, 2)] = -relative.x;
+        let poses = [&state.poses[i], &state.poses[i + 1]];
+        let Some(edge) = motion.between(poses, self.robot.wheel_noise, EDGE_FLOOR) else { return };
         let by_drive = &motion.by_drive;
         let by = Matrix3x2::from_columns(&[
             (by_drive.column(1) - by_drive.column(0)) * 0.5,
             -by_drive.column(2),
         ]);
-        let mut covariance = motion.covariance * self.robot.wheel_noise.powi(2);
-        for (k, floor) in EDGE_FLOOR.iter().enumerate() {
-            covariance[(k, k)] += floor * floor;
-        }
-        if let Some(factor) = covariance.cholesky() {
-            system.add_edge(i, &residual, &factor.inverse(), [&by_from, &back], &by);
-        }
+        system.add_edge(i, &edge, &by);
     }
 
     fn add_range(&self, state: &State, k: usize, line: usize, column: usize, system: &mut System) {
@@ -335,14 +322,8 @@ struct System {
 }
 
 impl System {
-    fn add_edge(
-        &mut self,
-        at: usize,
-        residual: &Vector3<f64>,
-        information: &Matrix3<f64>,
-        [by_from, by_to]: [&Matrix3<f64>; 2],
-        by: &Matrix3x2<f64>,
-    ) {
+    fn add_edge(&mut self, at: usize, edge: &Edge, by: &Matrix3x2<f64>) {
+        let Edge { residual, information, by_from, by_to } = edge;
         let norm = residual.dot(&(information * residual)).max(0.0).sqrt();
         let weight = if norm <= HUBER { 1.0 } else { HUBER / norm };
         self.cost += if norm <= HUBER { 0.5 * norm * norm } else { HUBER * (norm - 0.5 * HUBER) };

@@ -17,6 +17,19 @@ fn config() -> Config {
     config_for_rooms(Point::new(0.03, 0.01))
 }
 
+/// A wall 1 m ahead of a robot at the origin.
+fn wall_ahead() -> Wall {
+    Wall::new(Point::new(1.0, -1.0), Point::new(1.0, 1.0)).unwrap()
+}
+
+fn at_the_origin() -> Start {
+    Start {
+        pose: Pose::default(),
+        position_deviation: Metres(0.05),
+        heading_deviation: Radians(0.01),
+    }
+}
+
 /// Each rule of a configuration: a value that it permits, and the nearest kind that it does not.
 #[test]
 fn a_configuration_is_refused_at_its_limits() {
@@ -105,7 +118,7 @@ fn a_certain_state_accepts_a_range() {
     let drive = config().drive;
     let certain = StandardDeviations::default();
     let ekf = Ekf::new(drive, StateEstimate::default(), certain).unwrap();
-    let wall = Wall::new(Point::new(1.0, -1.0), Point::new(1.0, 1.0)).unwrap();
+    let wall = wall_ahead();
     let expected = sonarfix::range::ExpectedRange::new(&wall, Point::default(), &ekf.state());
     let mut after = ekf;
     after.update(Metres(1.1), &expected, SquareMetres(1e-6)).unwrap();
@@ -115,16 +128,11 @@ fn a_certain_state_accepts_a_range() {
 /// A new pose in a gap of the odometry begins the growth again; so does a range that is used.
 #[test]
 fn a_range_used_without_odometry_begins_the_growth_again() {
-    let walls = [Wall::new(Point::new(1.0, -1.0), Point::new(1.0, 1.0)).unwrap()];
-    let start = Start {
-        pose: Pose::default(),
-        position_deviation: Metres(0.05),
-        heading_deviation: Radians(0.01),
-    };
+    let walls = [wall_ahead()];
     let began = Instant::from_ticks(0);
     let mut config = config();
     config.max_wheel_speed = MetresPerSecond(0.1);
-    let mut localizer = Localizer::new(config, Map::new(&walls), start, began).unwrap();
+    let mut localizer = Localizer::new(config, Map::new(&walls), at_the_origin(), began).unwrap();
     let at = |tick: u64| Instant::from_ticks(tick * 100_000);
     localizer.odometry_missing(at(1));
     let aim = localizer.aim().unwrap();
@@ -146,14 +154,9 @@ fn a_range_used_without_odometry_begins_the_growth_again() {
 /// A ping without information on the pose inflates nothing, also when the robot is lost.
 #[test]
 fn a_refused_ping_of_a_lost_robot_changes_no_bit() {
-    let walls = [Wall::new(Point::new(1.0, -1.0), Point::new(1.0, 1.0)).unwrap()];
-    let start = Start {
-        pose: Pose::default(),
-        position_deviation: Metres(0.05),
-        heading_deviation: Radians(0.01),
-    };
+    let walls = [wall_ahead()];
     let began = Instant::from_ticks(0);
-    let mut localizer = Localizer::new(config(), Map::new(&walls), start, began).unwrap();
+    let mut localizer = Localizer::new(config(), Map::new(&walls), at_the_origin(), began).unwrap();
     let aim = localizer.aim().unwrap();
     localizer.odometry_missing(Instant::from_ticks(4_000_000));
     localizer.odometry(Instant::from_ticks(4_100_000), WheelTravel::default()).unwrap();
@@ -173,13 +176,8 @@ fn a_refused_ping_of_a_lost_robot_changes_no_bit() {
 /// A restart has state and deviations of its arguments, or changes nothing.
 #[test]
 fn a_restart_replaces_state_and_deviations() {
-    let start = Start {
-        pose: Pose::default(),
-        position_deviation: Metres(0.05),
-        heading_deviation: Radians(0.01),
-    };
     let mut localizer =
-        Localizer::new(config(), Map::new(&[]), start, Instant::from_ticks(0)).unwrap();
+        Localizer::new(config(), Map::new(&[]), at_the_origin(), Instant::from_ticks(0)).unwrap();
     let state = StateEstimate::from_array([1.0, 2.0, 0.3, 0.01, -0.01, 0.002, 0.005]);
     let deviation = StandardDeviations::from_array([0.1, 0.2, 0.3, 0.01, 0.01, 0.003, 0.004]);
     let negative = StandardDeviations { x: Metres(-0.1), ..deviation };

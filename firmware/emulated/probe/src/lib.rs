@@ -5,9 +5,13 @@
 
 #![no_std]
 
-use sonarfix::map::{Wall, WallError};
+use sonarfix::aim::Aim;
+use sonarfix::config::Config;
+use sonarfix::localizer::{Localizer, Start, StartError};
+use sonarfix::map::{Map, Wall, WallError};
 use sonarfix::motion::WheelTravel;
-use sonarfix::pose::Point;
+use sonarfix::pose::{Point, Pose};
+use sonarfix::units::{Instant, Metres, Radians};
 
 /// Walls of the room.
 pub const WALLS: usize = 8;
@@ -36,6 +40,33 @@ pub fn room() -> Result<[Wall; WALLS], WallError> {
         Wall::new(g, h)?,
         Wall::new(h, e)?,
     ])
+}
+
+/// A localizer, and the result of the last call.
+pub struct Robot<'a> {
+    /// The localizer.
+    pub localizer: Localizer<'a>,
+    /// Whether it has refused nothing.
+    pub all_well: bool,
+    /// The wall to measure.
+    pub aim: Option<Aim>,
+}
+
+impl<'a> Robot<'a> {
+    /// At the start of the drive.
+    ///
+    /// # Errors
+    /// Those of the localizer.
+    pub fn new(mut config: Config, walls: &'a [Wall]) -> Result<Self, StartError> {
+        config.prior.range_scale = 0.01;
+        let start = Start {
+            pose: Pose::new(1.2, 1.1, Radians(0.1)),
+            position_deviation: Metres(0.05),
+            heading_deviation: Radians(0.02),
+        };
+        let localizer = Localizer::new(config, Map::new(walls), start, Instant::from_ticks(0))?;
+        Ok(Self { localizer, all_well: true, aim: None })
+    }
 }
 
 /// A drive of curves and a turn in place, which stays in the room.

@@ -4,24 +4,13 @@
 
 use emulated_board::meter::{Cost, Meter};
 use emulated_board::report;
-use emulated_probe::{STEPS, STEPS_A_RANGE, room, travel};
-use sonarfix::aim::Aim;
+use emulated_probe::{Robot, STEPS, STEPS_A_RANGE, room, travel};
 use sonarfix::config::Config;
 use sonarfix::gyro::{GyroParameters, MeasuredTurn, TurnIntegral};
-use sonarfix::localizer::{Localizer, Start};
-use sonarfix::map::Map;
 use sonarfix::motion::WheelTravel;
-use sonarfix::pose::Pose;
 use sonarfix::units::{Duration, Instant, Metres, Radians};
 
 const TRACK_WIDTH: f32 = 0.16;
-
-/// The localizer, and the result of the last call.
-struct Robot<'a> {
-    localizer: Localizer<'a>,
-    all_well: bool,
-    aim: Option<Aim>,
-}
 
 /// Travel of the wheels and turn of the gyro up to a time.
 struct Roll {
@@ -56,14 +45,7 @@ fn drive() -> Option<bool> {
     let walls = room().ok()?;
     let mut config = Config::for_track_width(Metres(TRACK_WIDTH));
     config.gyro = Some(GyroParameters::MPU_6050);
-    config.prior.range_scale = 0.01;
-    let start = Start {
-        pose: Pose::new(1.2, 1.1, Radians(0.1)),
-        position_deviation: Metres(0.05),
-        heading_deviation: Radians(0.02),
-    };
-    let localizer = Localizer::new(config, Map::new(&walls), start, Instant::from_ticks(0)).ok()?;
-    let mut robot = Robot { localizer, all_well: true, aim: None };
+    let mut robot = Robot::new(config, &walls).ok()?;
 
     let mut meter = Meter::start();
     let [mut turns, mut fixes] = [Cost::default(); 2];

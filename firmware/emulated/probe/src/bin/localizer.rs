@@ -6,21 +6,11 @@ use core::hint::black_box;
 
 use emulated_board::meter::{Cost, Meter};
 use emulated_board::report;
-use emulated_probe::{STEPS, STEPS_A_RANGE, room, travel};
-use sonarfix::aim::Aim;
+use emulated_probe::{Robot, STEPS, STEPS_A_RANGE, room, travel};
 use sonarfix::config::Config;
-use sonarfix::localizer::{Localizer, Start};
-use sonarfix::map::Map;
+use sonarfix::localizer::Localizer;
 use sonarfix::motion::WheelTravel;
-use sonarfix::pose::Pose;
 use sonarfix::units::{Instant, Metres, Radians};
-
-/// The localizer, and the result of the last call.
-struct Robot<'a> {
-    localizer: Localizer<'a>,
-    all_well: bool,
-    aim: Option<Aim>,
-}
 
 /// Travel of the wheels up to a time.
 struct Roll {
@@ -57,15 +47,8 @@ fn main() -> ! {
 
 fn drive() -> Option<bool> {
     let walls = room().ok()?;
-    let mut config = Config::for_track_width(Metres(0.16));
-    config.prior.range_scale = 0.01;
-    let start = Start {
-        pose: Pose::new(1.2, 1.1, Radians(0.1)),
-        position_deviation: Metres(0.05),
-        heading_deviation: Radians(0.02),
-    };
-    let localizer = Localizer::new(config, Map::new(&walls), start, Instant::from_ticks(0)).ok()?;
-    let mut robot = Robot { localizer, all_well: true, aim: None };
+    let config = Config::for_track_width(Metres(0.16));
+    let mut robot = Robot::new(config, &walls).ok()?;
 
     let mut meter = Meter::start();
     let [mut odometry, mut aims, mut fixes] = [Cost::default(); 3];
