@@ -31,7 +31,7 @@ mod propagation;
 
 pub use bias::{GyroBias, TurnDifference};
 pub use blocks::{Covariance, PoseBlock};
-pub use correction::Correction;
+pub use correction::{Correction, Gain};
 pub use projection::PredictedMeasurement;
 #[cfg(feature = "unstable-kernel")]
 pub use propagation::RoundingNoise;

@@ -20,6 +20,7 @@
 //! after a step it is sufficient to check the variances. The previous values are restored if one is
 //! invalid.
 
+mod absolute;
 mod turn;
 
 use nalgebra::{SMatrix, SVector};
@@ -213,6 +214,11 @@ impl Ekf {
     #[must_use]
     pub fn state(&self) -> StateEstimate {
         self.estimate.state()
+    }
+
+    /// X̂ in the coordinates of the filter.
+    pub(crate) fn estimate(&self) -> FilterEstimate {
+        self.estimate
     }
 
     /// The estimated heading.

@@ -76,6 +76,11 @@ impl FilterEstimate {
         self.compensation = KahanCompensation::default();
     }
 
+    /// Displacement and turn from another estimate to this one.
+    pub(crate) fn pose_since(&self, before: &Self) -> (f32, f32, f32) {
+        (self.x - before.x, self.y - before.y, wrapped(self.heading - before.heading))
+    }
+
     /// Adds increments to the pose and wraps the heading.
     #[inline]
     pub(crate) fn add_to_pose(&mut self, x: f32, y: f32, heading: f32) {

@@ -54,7 +54,12 @@ pub(crate) fn weight(association: f32) -> f32 {
 
 /// Whether a ping contradicts the pose, given the probability with which its wall was occluded before.
 pub(crate) fn contradicts(mapped: f32, occluded_before: f32) -> bool {
-    mapped < CONTRADICTS_BELOW && occluded_before < KNOWN_OCCLUSION
+    mapped < CONTRADICTS_BELOW && !is_known(occluded_before)
+}
+
+/// Whether an occlusion, or an outlier, of this probability was to be expected.
+pub(crate) fn is_known(occluded_before: f32) -> bool {
+    occluded_before >= KNOWN_OCCLUSION
 }
 
 // ===== Eq. (17): covariance inflation =====

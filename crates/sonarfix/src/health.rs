@@ -41,7 +41,8 @@
 
 use crate::config::GatingParameters;
 use crate::ekf::PoseUncertainty;
-use crate::outcome::Fix;
+use crate::numeric::at_least;
+use crate::outcome::{AbsoluteFix, Fix};
 use crate::units::{Duration, Metres, Radians};
 
 /// Verdict on the estimate.
@@ -204,23 +205,63 @@ impl Health {
         self.record_uncertainty(uncertainty);
         self.add_evidence(evidence);
         match fix {
-            Fix::Accepted(innovation) => {
-                self.count_used(innovation.nis());
-                if self.can_improve(limits) {
-                    self.improve();
-                } else {
-                    self.degrade(limits);
-                }
-            }
-            Fix::Downweighted(_) | Fix::Gated(_) => {
-                self.accepted_in_a_row = 0;
-                self.silent_in_a_row = 0;
-                let news = u16::from(!is_repeated);
-                self.gated_in_a_row = self.gated_in_a_row.saturating_add(news);
-                self.worsen(limits);
-            }
+            Fix::Accepted(innovation) => self.accept(innovation.nis(), limits),
+            Fix::Downweighted(_) | Fix::Gated(_) => self.count_gated(is_repeated, limits),
             Fix::Refused(_) => self.count_silent(limits),
         }
+    }
+
+    /// Records an absolute measurement: a position as a range, with its evidence against the pose. A heading confirms no
+    /// position: it only counts in the mean NIS, and against the pose. One that was refused counts for nothing.
+    pub(crate) fn record_absolute(
+        &mut self,
+        fix: &AbsoluteFix,
+        has_position: bool,
+        evidence: f32,
+        is_repeated: bool,
+        uncertainty: PoseUncertainty,
+        limits: &Limits,
+    ) {
+        let (agreement, is_accepted) = match *fix {
+            AbsoluteFix::Accepted(agreement) => (agreement, true),
+            AbsoluteFix::Downweighted(agreement) | AbsoluteFix::Gated(agreement) => {
+                (agreement, false)
+            }
+            AbsoluteFix::Refused(_) => return,
+        };
+        self.record_uncertainty(uncertainty);
+        let nis = agreement.nis / f32::from(agreement.dimensions);
+        if has_position {
+            self.add_evidence(evidence);
+            if is_accepted {
+                self.accept(nis, limits);
+            } else {
+                self.count_gated(is_repeated, limits);
+            }
+            return;
+        }
+        self.add_evidence(at_least(evidence, 0.0));
+        if is_accepted {
+            self.average_nis(nis);
+        }
+        self.worsen(limits);
+    }
+
+    fn accept(&mut self, nis: f32, limits: &Limits) {
+        self.count_used(nis);
+        if self.can_improve(limits) {
+            self.improve();
+        } else {
+            self.degrade(limits);
+        }
+    }
+
+    fn count_gated(&mut self, is_repeated: bool, limits: &Limits) {
+        self.accepted_in_a_row = 0;
+        self.silent_in_a_row = 0;
+        let news = u16::from(!is_repeated);
+        self.gated_in_a_row = self.gated_in_a_row.saturating_add(news);
+        self.worsen(limits);
     }
 
     /// Records that there was no wall to measure.
@@ -269,6 +310,10 @@ impl Health {
         self.accepted_in_a_row = self.accepted_in_a_row.saturating_add(1);
         self.rolled_since_fix = Metres(0.0);
         self.time_since_fix = Duration::from_ticks(0);
+        self.average_nis(nis);
+    }
+
+    fn average_nis(&mut self, nis: f32) {
         let nis = if nis < MOST_NIS { nis } else { MOST_NIS };
         self.nis += LATEST_NIS * (nis - self.nis);
     }

@@ -15,6 +15,7 @@
 //! | `state`, `estimate` | the seven states: public form and filter coordinates |
 //! | [`motion`], `process_noise` | motion model and its noise, eqs. (4) and (7) to (9) |
 //! | [`gyro`] | a gyro: parameters, and the integral of its rate |
+//! | [`absolute`] | measurements of heading, position and pose, eqs. (40), (41) and (43) |
 //! | [`range`] | measurement model, eqs. (11) to (13) |
 //! | [`config`] | parameters |
 //! | `covariance` | P: eqs. (5), (6), (10), (14) and (18) to (20) |
@@ -45,6 +46,7 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod absolute;
 pub mod aim;
 mod alternatives;
 pub mod config;

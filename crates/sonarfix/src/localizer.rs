@@ -7,6 +7,9 @@
 //! NaN or infinity in an argument is a typed error or a [`Fix::Refused`], and the estimate is unchanged
 //! to the bit.
 
+use crate::absolute::{
+    AbsoluteMeasurement, Explained, LastStep, MeasurementError, OutsideStep, PoseVector, Sources,
+};
 use crate::aim::{self, Aim, History, NoAim, Origin};
 use crate::alternatives::{Scene, Target};
 use crate::config::{Config, ConfigError};
@@ -28,7 +31,7 @@ use crate::visibility::{Viewpoint, check_range, max_heading_deviation};
 
 pub use crate::gyro_fusion::{GyroStatus, TurnUse};
 pub use crate::odometry::OdometryError;
-pub use crate::outcome::{Fix, Refusal};
+pub use crate::outcome::{AbsoluteFix, AbsoluteRefusal, Agreement, Fix, Refusal};
 
 const NO_TIME: Duration = Duration::from_ticks(0);
 
@@ -117,10 +120,14 @@ pub struct Localizer<'m> {
     association: f32,
     /// The gyro, if the configuration has one.
     gyro: Option<GyroFusion>,
+    /// The latest step of the odometry.
+    step: LastStep,
+    /// The sources of absolute measurements.
+    sources: Sources,
 }
 
 /// The outcome of a ping, and its evidence against the pose.
-struct Explained {
+struct ExplainedPing {
     fix: Fix,
     evidence: f32,
     /// Whether it contradicts the pose, independently of the ping before.
@@ -129,7 +136,7 @@ struct Explained {
     is_repeated: bool,
 }
 
-impl Explained {
+impl ExplainedPing {
     fn refused(refusal: Refusal) -> Self {
         let fix = Fix::Refused(refusal);
         Self { fix, evidence: 0.0, contradicts: false, is_repeated: false }
@@ -189,6 +196,8 @@ impl<'m> Localizer<'m> {
             history: History::default(),
             association: 0.0,
             gyro,
+            step: LastStep::none(now),
+            sources: Sources::new(now),
         })
     }
 
@@ -228,9 +237,16 @@ impl<'m> Localizer<'m> {
     ) -> Result<(), OdometryError> {
         let elapsed = odometry::check(travel, self.time, now, self.config.max_wheel_speed)?;
         let unrecorded = now.checked_duration_since(self.recorded).unwrap_or(NO_TIME);
-        let before = self.ekf.heading();
+        let (before, is_seen) = (self.ekf.estimate(), self.unseen.is_none());
         self.predict_seen(now, travel, elapsed, turn).map_err(OdometryError::Filter)?;
-        self.history.record_turn(self.ekf.heading().from(before), seconds(elapsed));
+        let (x, y, h) = self.ekf.estimate().pose_since(&before);
+        // The path of a period without odometry is unknown.
+        self.step = if is_seen {
+            LastStep::new(self.time, PoseVector { x, y, h })
+        } else {
+            LastStep::none(now)
+        };
+        self.history.record_turn(Radians(h), seconds(elapsed));
         self.history.record_distance(travel.distance());
         (self.time, self.recorded) = (now, now);
         let limits = self.limits();
@@ -334,6 +350,8 @@ impl<'m> Localizer<'m> {
     fn pose_replaced(&mut self) {
         self.health = Health::default();
         self.history = History::default();
+        self.step = LastStep::none(self.time);
+        self.sources = Sources::new(self.time);
         self.pose_changed();
     }
 
@@ -376,8 +394,8 @@ impl<'m> Localizer<'m> {
     pub fn fix(&mut self, aim: &Aim, range: Option<Metres>) -> Fix {
         self.history.record_bearing(aim.wall, aim.bearing, aim.range);
         self.association = 0.0;
-        let Explained { fix, evidence, contradicts, is_repeated } =
-            self.try_fix(aim, range).unwrap_or_else(Explained::refused);
+        let ExplainedPing { fix, evidence, contradicts, is_repeated } =
+            self.try_fix(aim, range).unwrap_or_else(ExplainedPing::refused);
         let limits = self.limits();
         let uncertainty = self.ekf.pose_uncertainty();
         self.health.record_fix(&fix, evidence, is_repeated, uncertainty, &limits);
@@ -394,7 +412,57 @@ impl<'m> Localizer<'m> {
         self.health.record_no_aim(self.ekf.pose_uncertainty(), &limits);
     }
 
-    fn try_fix(&mut self, aim: &Aim, range: Option<Metres>) -> Result<Explained, Refusal> {
+    /// Corrects the estimate by a heading, position or pose that was measured at the time `at`, through the same gate and
+    /// with the same effect on the health as a range (`docs/model.md`, eqs. 40 to 44). The pose at that time is interpolated:
+    /// it must be within the latest step of the odometry, whose ends belong to it.
+    ///
+    /// A heading confirms no position: it counts against the pose, not for it. An outlier is refused as long as its source
+    /// repeats it; a pose that is to be taken in any case is set by [`Self::set_pose`].
+    pub fn absolute(&mut self, at: Instant, measurement: &AbsoluteMeasurement) -> AbsoluteFix {
+        self.try_absolute(at, measurement).unwrap_or_else(AbsoluteFix::Refused)
+    }
+
+    fn try_absolute(
+        &mut self,
+        at: Instant,
+        measurement: &AbsoluteMeasurement,
+    ) -> Result<AbsoluteFix, AbsoluteRefusal> {
+        let measured = measurement.check()?;
+        let back = self.step.back_to(at, self.time)?;
+        let prediction = self.ekf.predict_absolute(&measured, &back);
+        let indefinite = AbsoluteRefusal::Filter(EkfError::Indefinite);
+        let fit = prediction.fit().ok_or(indefinite)?;
+        let now = self.time;
+        let outliers = self.sources.of(measured.has_position).outliers(now);
+        let Explained { association, evidence } = fit.explain(outliers);
+        let agreement = Agreement { nis: fit.nis, dimensions: measured.dimensions() };
+        let used = gating::use_of(association);
+        let fix = if used == Use::Reject {
+            AbsoluteFix::Gated(agreement)
+        } else {
+            let weight = gating::weight(association);
+            let bias = self.gyro.as_mut().map(GyroFusion::bias_mut);
+            let corrected = self.ekf.update_absolute(&prediction, weight, bias);
+            corrected.map_err(AbsoluteRefusal::Filter)?;
+            self.pose_changed();
+            match used {
+                Use::Accept => AbsoluteFix::Accepted(agreement),
+                _ => AbsoluteFix::Downweighted(agreement),
+            }
+        };
+        self.sources.of(measured.has_position).record(1.0 - association, outliers, now);
+        let (limits, uncertainty) = (self.limits(), self.ekf.pose_uncertainty());
+        let is_repeated = gating::is_known(outliers);
+        let has_position = measured.has_position;
+        let health = &mut self.health;
+        health.record_absolute(&fix, has_position, evidence, is_repeated, uncertainty, &limits);
+        if gating::contradicts(association, outliers) {
+            self.inflate_if_lost();
+        }
+        Ok(fix)
+    }
+
+    fn try_fix(&mut self, aim: &Aim, range: Option<Metres>) -> Result<ExplainedPing, Refusal> {
         let Config { sonar, echo, .. } = &self.config;
         let measured = check_range(sonar, range);
         if measured == Err(Refusal::NotFinite) {
@@ -459,7 +527,7 @@ impl<'m> Localizer<'m> {
         };
         self.history.record_echo(&entry, now_occluded, origin, self.time);
         let contradicts = gating::contradicts(mapped, occluded);
-        Ok(Explained { fix, evidence, contradicts, is_repeated })
+        Ok(ExplainedPing { fix, evidence, contradicts, is_repeated })
     }
 
     /// Inflates the covariance of the pose while the verdict is `Lost`, so that later echoes can be
@@ -528,6 +596,24 @@ impl<'m> Localizer<'m> {
     #[must_use]
     pub fn map(&self) -> Map<'m> {
         self.map
+    }
+}
+
+impl From<MeasurementError> for AbsoluteRefusal {
+    fn from(error: MeasurementError) -> Self {
+        match error {
+            MeasurementError::NotFinite => Self::NotFinite,
+            MeasurementError::NotPositiveDefinite => Self::NotPositiveDefinite,
+        }
+    }
+}
+
+impl From<OutsideStep> for AbsoluteRefusal {
+    fn from(outside: OutsideStep) -> Self {
+        match outside {
+            OutsideStep::Before => Self::BeforeLastStep,
+            OutsideStep::After => Self::AfterLastStep,
+        }
     }
 }
 

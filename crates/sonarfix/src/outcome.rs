@@ -69,3 +69,74 @@ impl core::fmt::Display for Refusal {
         })
     }
 }
+
+/// How an absolute measurement agrees with the estimate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Agreement {
+    /// Normalized innovation squared νᵀ S⁻¹ ν, dimensionless.
+    pub nis: f32,
+    /// Its mean if the filter is consistent: how many numbers were measured, 1 to 3.
+    pub dimensions: u8,
+}
+
+/// Outcome of an absolute measurement: what the localizer did with it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[must_use]
+#[non_exhaustive]
+pub enum AbsoluteFix {
+    /// Probably no outlier: state and covariance are corrected.
+    Accepted(Agreement),
+    /// Possibly an outlier: state and covariance are corrected by probabilistic data association.
+    Downweighted(Agreement),
+    /// An outlier: not used. The filter is unchanged, except for the inflation of a lost one ([`Fix::Gated`]).
+    Gated(Agreement),
+    /// Not comparable with the estimate: nothing has changed.
+    Refused(AbsoluteRefusal),
+}
+
+impl AbsoluteFix {
+    /// Whether the measurement has corrected the estimate.
+    #[must_use]
+    pub fn is_used(&self) -> bool {
+        matches!(self, Self::Accepted(_) | Self::Downweighted(_))
+    }
+}
+
+/// Reason for which an absolute measurement is not compared with the estimate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum AbsoluteRefusal {
+    /// A number is NaN or infinite.
+    NotFinite,
+    /// The covariance of the noise is not positive definite, or a deviation is not positive.
+    NotPositiveDefinite,
+    /// It was measured before the latest step of the odometry.
+    BeforeLastStep,
+    /// It was measured after the latest step of the odometry: pass the wheel travel first.
+    AfterLastStep,
+    /// The pose is unknown: set it, or wait for the search.
+    NoPose,
+    /// The filter refused the correction.
+    Filter(EkfError),
+}
+
+impl core::fmt::Display for AbsoluteRefusal {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::NotFinite => "a number is not finite",
+            Self::NotPositiveDefinite => "the covariance of the noise is not positive definite",
+            Self::BeforeLastStep => "measured before the latest step of the odometry",
+            Self::AfterLastStep => "measured after the latest step of the odometry",
+            Self::NoPose => "the pose is unknown",
+            Self::Filter(error) => {
+                return write!(f, "the filter refused the measurement: {error}");
+            }
+        })
+    }
+}

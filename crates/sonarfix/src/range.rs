@@ -108,6 +108,12 @@ impl ExpectedRange {
         Self::at(distance, away, direction, sonar)
     }
 
+    /// A linear combination of x, y and heading as a measurement. Only its derivatives have a meaning.
+    pub(crate) fn linear(by_x: f32, by_y: f32, by_heading: f32) -> Self {
+        let (range, direction) = (Metres(0.0), Heading::default());
+        Self { range, by_x, by_y, by_heading, by_range_scale: 0.0, direction }
+    }
+
     /// At a distance; `away` are the derivatives by x and y.
     #[inline]
     fn at(

@@ -162,6 +162,22 @@ impl GyroBias {
     }
 }
 
+impl GyroBias {
+    // ===== Eq. (44): column of the bias =====
+    /// Adds `amount` times the outer product of a correction of all states and of the bias since `before`.
+    pub fn add_along(&mut self, before: &Self, correction: &Gain, amount: f32) {
+        let scaled = amount * (self.rate - before.rate);
+        self.xb += scaled * correction.x;
+        self.yb += scaled * correction.y;
+        self.hb += scaled * correction.h;
+        self.cb += scaled * correction.c;
+        self.db += scaled * correction.d;
+        self.wb += scaled * correction.w;
+        self.kb += scaled * correction.k;
+        self.bb += scaled * (self.rate - before.rate);
+    }
+}
+
 impl Covariance {
     /// Variance of a difference of turns at the estimate, without its noise, rad².
     #[inline]

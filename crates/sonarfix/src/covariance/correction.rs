@@ -29,6 +29,21 @@ pub struct Gain {
 }
 
 impl Gain {
+    /// The correction of all states that has led from one estimate to another: a gain for an innovation of one.
+    pub fn between(before: &FilterEstimate, after: &FilterEstimate) -> Self {
+        let (x, y, h) = after.pose_since(before);
+        Self {
+            x,
+            y,
+            h,
+            c: after.scale_common - before.scale_common,
+            d: after.scale_difference - before.scale_difference,
+            w: after.track_width_error - before.track_width_error,
+            k: after.range_scale - before.range_scale,
+            per_variance: 1.0,
+        }
+    }
+
     // ===== Eqs. (6) and (18): X̂ ← X̂ + K ν =====
     /// Corrects the estimate by an innovation.
     #[inline]

@@ -3,6 +3,8 @@
 //! with a fault in the code.
 
 #[cfg(test)]
+mod absolute;
+#[cfg(test)]
 mod aim;
 #[cfg(test)]
 mod angles;
