@@ -461,3 +461,49 @@ fn headings_show_the_bias_of_a_gyro() {
     let error = (gyro.bias.0 - bias).abs();
     assert!(gyro.deviation.0 < 0.002 && error < 4.0 * gyro.deviation.0, "{gyro:?}");
 }
+
+/// The bias of a gyro takes part in the uncertainty of the association. Its gain follows from its correction.
+#[test]
+fn the_bias_is_uncertain_by_the_association() {
+    let mut config = Config::for_track_width(Metres(0.2));
+    config.gyro = Some(GyroParameters::MPU_6050);
+    let deviation = StandardDeviations::from_array([0.01, 0.01, 0.01, 0.1, 0.1, 0.02, 0.0]);
+    let (mut localizer, _) = driven(config, StateEstimate::default(), deviation, &[]);
+    for tick in 1..=50_u64 {
+        let turn = sonarfix::gyro::MeasuredTurn {
+            angle: Radians(0.0),
+            duration: sonarfix::units::Duration::from_ticks(TICK),
+        };
+        let now = Instant::from_ticks(tick * TICK);
+        localizer.odometry_with_turn(now, WheelTravel::new(0.02, 0.02), Some(turn)).unwrap();
+    }
+    let (before, p) = (localizer.gyro().unwrap(), matrix(&localizer)[(2, 2)]);
+    let noise = Radians::from_degrees(1.0);
+    let s = p + f64::from(noise.0).powi(2);
+    for deviations in [3.0, 3.5, 4.0] {
+        let mut localizer = localizer.clone();
+        #[expect(clippy::cast_possible_truncation, reason = "radians")]
+        let angle = Radians(
+            (f64::from(localizer.pose().heading.radians().0) + deviations * s.sqrt()) as f32,
+        );
+        let fix = localizer
+            .absolute(localizer.time(), &AbsoluteMeasurement::Heading { angle, deviation: noise });
+        assert!(matches!(fix, AbsoluteFix::Accepted(_) | AbsoluteFix::Downweighted(_)), "{fix:?}");
+        let tau = std::f64::consts::TAU;
+        let right = 0.95 * (-0.5 * deviations * deviations).exp() / (tau * s).sqrt();
+        let beta = right / (right + 0.05 / tau);
+        let after = localizer.gyro().unwrap();
+        let moved = f64::from(after.bias.0 - before.bias.0);
+        let nu = deviations * s.sqrt();
+        let gain = moved / (beta * nu);
+        let was = f64::from(before.deviation.0).powi(2);
+        let expected = was - beta * gain * gain * s + (1.0 - beta) / beta * moved * moved;
+        let is = f64::from(after.deviation.0).powi(2);
+        // The part by the association alone is 2 % to 40 % of the variance.
+        let spread = (1.0 - beta) / beta * moved * moved;
+        assert!(
+            (is - expected).abs() < 0.05 * spread,
+            "{deviations}: {is} {expected} {spread} {was}"
+        );
+    }
+}
