@@ -1,5 +1,7 @@
 //! Heading, position and pose from outside, against a joint update in `f64` whose derivatives are finite differences.
 
+use std::f32::consts::PI;
+
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use proptest::prelude::*;
 use sonarfix::absolute::{AbsoluteMeasurement, PoseNoise, PositionNoise};
@@ -129,16 +131,15 @@ impl Oracle {
     }
 
     /// Association probability, state and covariance after the measurement `z`.
-    fn update(&self, x: Vector, p: Matrix, z: Vector3<f64>, plan: &Plan) -> (f64, Vector, Matrix) {
+    fn update(&self, x: Vector, p: &Matrix, z: Vector3<f64>, plan: &Plan) -> (f64, Vector, Matrix) {
         // A row without derivatives, innovation and correlation adds a factor of one to determinant and density.
         let measured = plan.measured();
         let count = measured.iter().filter(|&&is| is).count();
         let h3 = self.derivatives(&x);
         let h = SMatrix::<f64, 3, 7>::from_fn(|i, j| if measured[i] { h3[(i, j)] } else { 0.0 });
         let noise = plan.noise();
-        let r = Matrix3::from_fn(|i, j| match measured[i] && measured[j] {
-            true => noise[(i, j)],
-            false => f64::from(u8::from(i == j)),
+        let r = Matrix3::from_fn(|i, j| {
+            if measured[i] && measured[j] { noise[(i, j)] } else { f64::from(u8::from(i == j)) }
         });
         let mut off = z - self.pose(&x);
         off.z = wrap(off.z);
@@ -154,11 +155,11 @@ impl Oracle {
         let right = 0.95 * peak * (-0.5 * nis).exp();
         let beta = right / (right + outlier);
         let beta = if beta >= 0.999 { 1.0 } else { beta };
-        let gain = p * h.transpose() * &inverse;
-        let step = &gain * &nu;
-        let certain = p - &gain * &s * gain.transpose();
+        let gain = p * h.transpose() * inverse;
+        let step = gain * nu;
+        let certain = p - gain * s * gain.transpose();
         let mixed =
-            (1.0 - beta) * p + beta * certain + beta * (1.0 - beta) * &step * step.transpose();
+            (1.0 - beta) * p + beta * certain + beta * (1.0 - beta) * step * step.transpose();
         let mut corrected = x + beta * step;
         corrected[2] = wrap(corrected[2]);
         (beta, corrected, mixed)
@@ -217,7 +218,7 @@ proptest! {
         let oracle = oracle(&localizer, &before, plan.ago);
         let z = off(&plan, &oracle, &localizer);
         let (x, p) = (vector(&localizer), matrix(&localizer));
-        let (beta, expected, covariance) = oracle.update(x, p, z, &plan);
+        let (beta, expected, covariance) = oracle.update(x, &p, z, &plan);
         let at = Instant::from_ticks(localizer.time().ticks() - plan.ago);
         let fix = localizer.absolute(at, &plan.of(z));
         match fix {
@@ -290,7 +291,7 @@ proptest! {
 
     /// A heading is compared the short way around.
     #[test]
-    fn the_innovation_of_a_heading_is_wrapped(heading in -3.14_f32..3.14, off in -0.05_f32..0.05, turns in -3_i8..=3) {
+    fn the_innovation_of_a_heading_is_wrapped(heading in -PI..PI, off in -0.05_f32..0.05, turns in -3_i8..=3) {
         let mut localizer = parked(Radians(heading));
         let angle = Radians(heading + off + f32::from(turns) * std::f32::consts::TAU);
         let measured = AbsoluteMeasurement::Heading { angle, deviation: Radians(0.05) };
