@@ -481,3 +481,6 @@ fn start_of(found: &Hypothesis) -> Start {
         heading_deviation: Radians(cautious(found.heading_deviation.0, LEAST_HEADING)),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -162,3 +162,6 @@ fn is_near(one: &Placement, other: &Placement, distance: f32) -> bool {
     one.rotation.dot(other.rotation) > SAME_ROTATION
         && one.at.minus(other.at).length_squared() < distance * distance
 }
+
+#[cfg(test)]
+mod tests;

@@ -184,3 +184,6 @@ impl Lines {
 fn cos_of_support(cone: Radians) -> f32 {
     sin_cos(cone * 1.3).1
 }
+
+#[cfg(test)]
+mod tests;

@@ -216,3 +216,6 @@ impl Equations {
         solution.iter().all(|value| value.is_finite()).then_some(solution)
     }
 }
+
+#[cfg(test)]
+mod tests;

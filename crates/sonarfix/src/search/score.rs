@@ -164,3 +164,6 @@ impl<'m> EchoModel<'m> {
         })
     }
 }
+
+#[cfg(test)]
+mod tests;

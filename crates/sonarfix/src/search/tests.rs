@@ -14,7 +14,50 @@ use crate::search::refine::Spread;
 use crate::search::window::Bend;
 use crate::units::PerRootMetre;
 
+mod slices;
+
 type Small<'m> = Search<'m, 16, 4>;
+
+/// A search that has found something, for the tests of the navigator.
+impl Search<'_> {
+    /// Ends a cycle with this hypothesis as the best one, by its pose, deviations and fit.
+    pub(crate) fn find(&mut self, pose: Pose, deviation: (f32, f32), fit: f32) {
+        let turn = pose.heading.radians() - Radians(self.window.heading());
+        let rotation = Vector::of_angle(turn.0);
+        let at = Vector::from(pose.position()).minus(self.window.robot().at.turned(rotation));
+        let placement = Placement { at, rotation, bend: self.window.bend() };
+        let (pings, (position, heading)) = (10, deviation);
+        let score = self.echoes.nothing(pings, pings) + fit * f32::from(pings);
+        let (xx, rotation) = (position * position, heading * heading);
+        let spread = Spread { xx, xy: 0.0, yy: xx, rotation };
+        let entry = Entry { score, pings, echoes: pings, spread, ..Entry::proposed(placement) };
+        self.bank = Bank::of(&[entry]);
+        self.answer = Decision::Several(1);
+        self.cycles += 1;
+    }
+
+    /// The same, as the unique answer.
+    pub(crate) fn find_unique(&mut self, pose: Pose, deviation: (f32, f32)) {
+        self.find(pose, deviation, 1.0);
+        self.answer = Decision::Unique(self.bank.entries()[0]);
+    }
+
+    /// Ends a cycle that finds the same.
+    pub(crate) fn find_again(&mut self) {
+        self.cycles += 1;
+    }
+
+    /// The range of the latest ping, at the window's reference from here on.
+    pub(crate) fn latest_range(&mut self) -> Option<f32> {
+        self.window.rebase();
+        self.window.newest(0).and_then(window::Ping::range)
+    }
+
+    /// The parameters and the region.
+    pub(crate) fn begun(&self) -> (SearchParameters, Option<Region>) {
+        (self.parameters, self.region)
+    }
+}
 
 /// A room of 6 m × 4 m.
 fn room() -> Vec<Wall> {

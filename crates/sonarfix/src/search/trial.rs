@@ -177,3 +177,6 @@ pub fn count(of: usize) -> f32 {
     let count = of as f32;
     count
 }
+
+#[cfg(test)]
+mod tests;

@@ -360,3 +360,6 @@ impl Chain {
         self.at.plus(link.arm.turned(link.bent))
     }
 }
+
+#[cfg(test)]
+mod tests;

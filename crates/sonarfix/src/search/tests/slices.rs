@@ -1,0 +1,205 @@
+//! The slices of a cycle: how many, in which order, and which candidates are tried.
+
+use std::format;
+use std::vec::Vec;
+
+use super::*;
+use crate::search::trial::Trial;
+
+/// Lines at these angles, the best supported first.
+fn lines(angles: &[f32]) -> Lines {
+    let lines: Vec<Line> =
+        (1..20).rev().zip(angles).map(|(support, angle)| line(*angle, support)).collect();
+    Lines::of(Radians(0.2), &lines)
+}
+
+/// Pings without an echo from one place.
+fn ping(search: &mut Small<'_>, pings: u8) {
+    for n in 0..pings {
+        assert_eq!(search.ping(Radians(0.2 * f32::from(n) - 1.4), None), Ok(true));
+    }
+}
+
+/// Makes evaluations until the phase is another; returns how many it takes.
+fn until_end_of(search: &mut Small<'_>, phase: Phase) -> u32 {
+    let mut evaluations = 0;
+    while search.poll(0) == phase {
+        search.poll(1);
+        evaluations += 1;
+        assert!(evaluations < 100_000, "{phase:?} does not end");
+    }
+    evaluations
+}
+
+#[test]
+fn a_search_begins_with_twelve_pings() {
+    let walls = room();
+    let mut search = search(&walls);
+    ping(&mut search, 11);
+    search.poll(1_000);
+    assert_eq!(search.cycles(), 0);
+    assert!(matches!(search.task, Task::Rebase));
+    assert_eq!(search.ping(Radians(3.0), None), Ok(true));
+    search.poll(1_000);
+    assert!(search.cycles() > 0);
+    assert_eq!(search.answer(), Answer::Nowhere);
+}
+
+/// One slice moves the reference, each ping votes in five and ends in another one, each line is fitted in one.
+#[test]
+fn lines_take_six_slices_a_ping_and_one_a_line() {
+    let walls = room();
+    let mut search = search(&walls);
+    ping(&mut search, 14);
+    assert_eq!(until_end_of(&mut search, Phase::Lines), 1 + 14 * 6 + 1);
+    // With hypotheses, eight pings are straightened in one.
+    let mut search = self::search(&walls);
+    ping(&mut search, 14);
+    search.propose(Pose::new(2.0, 2.0, Radians(0.0))).unwrap();
+    assert_eq!(until_end_of(&mut search, Phase::Lines), 1 + 2 + 14 * 6 + 1);
+}
+
+#[test]
+fn every_line_is_fitted_once() {
+    let walls = room();
+    for count in 1..5_u8 {
+        let mut search = search(&walls);
+        let angles: Vec<f32> = (0..count).map(|n| 0.7 * f32::from(n)).collect();
+        search.lines = lines(&angles);
+        search.task = Task::Fit { line: 0 };
+        ping(&mut search, 14);
+        let mut fitted = Vec::new();
+        while let Task::Fit { line } = search.task {
+            fitted.push(line);
+            search.poll(1);
+        }
+        assert_eq!(fitted, (0..count).collect::<Vec<u8>>());
+    }
+}
+
+/// The first two lines are moved along all walls.
+#[test]
+fn a_global_check_moves_two_lines_along_the_walls() {
+    let walls = room();
+    let mut search = search(&walls);
+    ping(&mut search, 14);
+    search.lines = lines(&[0.0, 1.0, 2.0]);
+    search.task = Task::Along { line: 0, along: AlongWalls::default() };
+    let mut moved = [false; 4];
+    while let Task::Along { line, along } = search.task {
+        moved[usize::from(line)] |= along != AlongWalls::default();
+        search.trial = None;
+        search.poll(1);
+    }
+    assert_eq!(moved, [true, true, false, false]);
+    assert_eq!(search.cycles(), 1);
+}
+
+/// What a hypothesis is, from an entry and the robot's place.
+#[test]
+fn a_hypothesis_has_the_figures_of_its_entry() {
+    let walls = room();
+    let mut search = search(&walls);
+    let placement = Placement {
+        at: Vector::new(2.0, 1.0),
+        rotation: Vector::of_angle(0.5),
+        bend: Bend { drift: 0.02, turn_scale: 0.03 },
+    };
+    let spread = Spread { xx: 0.04, xy: 0.0, yy: 0.01, rotation: 0.09 };
+    let entry = Entry {
+        score: 12.0,
+        pings: 20,
+        echoes: 16,
+        explained: 12,
+        spread,
+        ..Entry::proposed(placement)
+    };
+    search.bank = Bank::of(&[entry]);
+    let nothing = f64::from(search.echoes.nothing(20, 16));
+    let is = search.ranked(0).unwrap();
+    for (is, expected) in [
+        (is.pose.x.0, 2.0),
+        (is.pose.y.0, 1.0),
+        (is.pose.heading.radians().0, 0.5),
+        (is.position_deviation.0, 0.2),
+        (is.heading_deviation.0, 0.3),
+        (is.fit, (12.0 - nothing) / 20.0),
+        (is.explained, 0.75),
+        (is.drift, 0.02),
+        (is.turn_scale, 0.03),
+    ] {
+        assert!((f64::from(is) - expected).abs() < 1e-5, "{is} {expected}");
+    }
+    // Nothing has been scored yet.
+    search.bank = Bank::of(&[Entry { pings: 0, echoes: 0, explained: 0, ..entry }]);
+    let is = search.ranked(0).unwrap();
+    assert!((is.fit - 12.0).abs() < 1e-5 && is.explained.abs() < 1e-5, "{is:?}");
+    assert_eq!(search.hypotheses().count(), 1);
+    assert!(search.ranked(1).is_none());
+}
+
+proptest! {
+    #[test]
+    fn a_region_has_a_margin(
+        from in (-2.0_f32..2.0, -2.0_f32..2.0), size in (0.1_f32..2.0, 0.1_f32..2.0),
+        at in (-5.0_f32..5.0, -5.0_f32..5.0), margin in 0.0_f32..1.0,
+    ) {
+        let to = (from.0 + size.0, from.1 + size.1);
+        let region = Region { from: Point::new(from.0, from.1), to: Point::new(to.0, to.1) };
+        let outside = |at: f32, from: f32, to: f32| {
+            let (at, from, to) = (f64::from(at), f64::from(from), f64::from(to));
+            (from - at).max(at - to)
+        };
+        let beyond = outside(at.0, from.0, to.0).max(outside(at.1, from.1, to.1)) - f64::from(margin);
+        prop_assume!(is_clear(beyond, 0.0));
+        prop_assert_eq!(region.contains(Vector::new(at.0, at.1), margin), beyond < 0.0);
+    }
+
+    /// Unless it is near a hypothesis or began outside of the region: by the score that it has to reach.
+    #[test]
+    fn a_candidate_has_to_reach_a_share_of_the_best_score(
+        scores in prop::collection::vec(-50.0_f32..100.0, 0..5), x in 0.0_f32..5.9, angle in -3.1_f32..3.1,
+        (start, since) in ((-1.0_f32..1.0, -1.0_f32..1.0), 0_u8..20), near in 0.1_f32..0.5, rivalry in 0.1_f32..0.9,
+        has_region in any::<bool>(),
+    ) {
+        let walls = room();
+        let mut search = search(&walls);
+        let mut scores = scores;
+        scores.sort_by(|one, other| other.total_cmp(one));
+        let entries: Vec<Entry> = (0_u8..).zip(&scores).map(|(n, score)| {
+            let placement = Placement {
+                at: Vector::new(f32::from(n), 1.0), rotation: Vector::of_angle(0.0), bend: Bend::NONE,
+            };
+            Entry { score: *score, ..Entry::proposed(placement) }
+        }).collect();
+        search.bank = Bank::of(&entries);
+        // Forth and back: the start stays where it is.
+        for _ in 0..since {
+            search.odometry(Metres(0.5), Radians(0.0)).unwrap();
+            search.odometry(Metres(-0.5), Radians(0.0)).unwrap();
+        }
+        search.odometry(Metres(-start.0), Radians(0.0)).unwrap();
+        search.window.rebase();
+        let region = Region { from: Point::new(1.0, 0.5), to: Point::new(3.0, 1.5) };
+        if has_region {
+            search.begin_within(region);
+        }
+        let placement = Placement {
+            at: Vector::new(x, 1.0 + start.1), rotation: Vector::of_angle(angle), bend: Bend::NONE,
+        };
+        let ((sin, cos), (back, aside)) = (f64::from(angle).sin_cos(), (f64::from(start.0), f64::from(start.1)));
+        let begun = (f64::from(x) + cos * back, 1.0 + aside + sin * back);
+        let margin = 0.1 * (1.0 + f64::from(since) + back.abs());
+        let outside = (1.0 - begun.0).max(begun.0 - 3.0).max(0.5 - begun.1).max(begun.1 - 1.5) - margin;
+        prop_assume!(is_clear(outside, 0.0));
+        let is_known = search.bank.has_near(&placement, near);
+        let full = if scores.len() == 4 { scores[3] } else { 0.0 };
+        let best = scores.first().copied().unwrap_or(0.0);
+        let least = full.max(rivalry * best).max(0.0);
+        search.trial = None;
+        search.try_candidate(placement, near, rivalry);
+        let is_tried = !is_known && (!has_region || outside < 0.0);
+        let expected = is_tried.then(|| Trial::of_candidate(placement, least));
+        prop_assert_eq!(format!("{:?}", search.trial), format!("{:?}", expected));
+    }
+}
