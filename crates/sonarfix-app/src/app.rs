@@ -36,7 +36,7 @@ use crate::boots;
 use crate::check::Check;
 use crate::flash_contents::{self, FlashContents};
 use crate::store::{Resumed, SavePolicy, Saved, Store, StoreError, WriteLimit};
-use crate::time::{after, since};
+use crate::time::{NEVER, after, since};
 
 pub use wire::Link;
 use wire::Wire;
@@ -121,6 +121,8 @@ pub struct App<'m, F: NorFlash> {
     unsupported: Option<Unsupported>,
     /// Before this instant a poll has nothing to do, except for the loop and the link.
     rests_until: Instant,
+    /// When the devices of a waiting robot are to be polled next: a later poll does not feed the watchdog.
+    expected: Instant,
     /// What such a poll returns.
     at_rest: Polled,
     /// Whether the store has been read. The first poll does it, because during construction the stack holds copies of
@@ -180,19 +182,16 @@ impl<'m> Running<'m> {
         }
         self.is_report_empty = false;
         let before = self.robot.localizer().health().verdict;
-        self.report = if self.searches {
-            self.robot.poll_with_search(now, hardware, search)
-        } else {
-            self.robot.poll(now, hardware)
-        };
+        let search_if_used = self.searches.then_some(&mut *search);
+        self.robot.poll_into(now, hardware, search_if_used, &mut self.report);
         let report = &self.report;
         let localizer = self.robot.localizer();
         let verdict = localizer.health().verdict;
         polled.verdict = (verdict != before).then_some(verdict);
-        self.reporter.report(report, localizer, |message| wire.send(message, link));
+        self.reporter.report(report, localizer, &mut wire.outlet(link));
         let mode = self.robot.mode();
         if report.tick.is_some() && mode != navigator::Mode::Tracking {
-            self.reporter.search(mode, search, |message| wire.send(message, link));
+            self.reporter.search(mode, search, &mut wire.outlet(link));
         }
         if has_rolled(report) {
             self.save_policy.rolled(now);
@@ -244,6 +243,7 @@ impl<'m, F: NorFlash> App<'m, F> {
             worst_poll: Duration::from_ticks(0),
             time: now,
             rests_until: now,
+            expected: now,
             at_rest: Polled::default(),
             is_store_loaded: false,
             unsupported: None,
@@ -302,7 +302,8 @@ impl<'m, F: NorFlash> App<'m, F> {
                 if let Some(readings) = check.readings(now, config, hardware) {
                     self.wire.send(&Telemetry::Devices(readings), link);
                 }
-                polled.is_on_time = since(now, self.time) <= Settings::default().tolerance;
+                polled.is_on_time = since(now, self.expected) <= Settings::default().tolerance;
+                self.expected = check.next_poll(now, hardware);
             }
             Mode::Running(running) => {
                 let (search, wire) = (&mut self.search, &mut self.wire);
@@ -345,21 +346,47 @@ impl<'m, F: NorFlash> App<'m, F> {
         }
     }
 
-    /// The next instant at which a poll has something to do besides the loop and the link; `now` if that is not known.
+    /// The next instant at which a poll has something to do besides the loop, the devices and the link.
     fn next_deadline(&self, now: Instant) -> Instant {
-        if self.owes_record || self.owes_config {
-            return now;
-        }
-        let Some((config, _)) = &self.config else { return now };
-        let odometry = self.localizer().map_or(now, Localizer::time);
+        let config = self.config.as_ref();
+        let link_timeout =
+            config.map_or(NEVER, |(config, _)| after(self.heard, config.motors.link_timeout));
+        let odometry = self
+            .localizer()
+            .map_or(NEVER, |localizer| after(localizer.time(), DEGRADED_WITHOUT_ODOMETRY));
         // What these decide does not change once they have passed.
-        let changes = [
-            after(self.started, boots::SETTLED_AFTER),
-            after(self.heard, config.motors.link_timeout),
-            after(odometry, DEGRADED_WITHOUT_ODOMETRY),
-        ];
-        let next = self.wire.next_deadline();
+        let changes = [after(self.started, boots::SETTLED_AFTER), link_timeout, odometry];
+        let next = self.wire.next_deadline().min(self.next_write());
         changes.into_iter().filter(|&at| at >= now).fold(next, Instant::min)
+    }
+
+    /// When a record that is owed can be written.
+    fn next_write(&self) -> Instant {
+        let owed = [(self.owes_record, u8::from(!self.is_running())), (self.owes_config, 1)];
+        let owed = owed.into_iter().filter(|&(is_owed, _)| is_owed && !self.ignores_store());
+        owed.fold(NEVER, |next, (_, reserve)| next.min(self.writes.next(reserve)))
+    }
+
+    /// When the application must be polled next, if no byte is received and no edge of the echo is stamped earlier; to be called
+    /// after a poll. A board sleeps until then. An instant that has passed: at once.
+    ///
+    /// Polls at other times do nothing, so that the results do not depend on them.
+    pub fn next_poll(&self, hardware: &mut impl Hardware) -> Instant {
+        let next = match &self.mode {
+            Mode::Waiting(_) => self.expected,
+            Mode::Running(running) => running.robot.next_poll(hardware),
+        };
+        next.min(self.rests_until)
+    }
+
+    /// As [`Self::next_poll`], but `None` while a ping is in flight ([`Robot::idle_until`]): for a simulator.
+    pub fn idle_until(&self, hardware: &mut impl Hardware) -> Option<Instant> {
+        match &self.mode {
+            Mode::Waiting(_) => Some(self.next_poll(hardware)),
+            Mode::Running(running) => {
+                running.robot.idle_until(hardware).map(|until| until.min(self.rests_until))
+            }
+        }
     }
 
     /// Records the duration of a poll, which the board measures.

@@ -4,7 +4,7 @@ use sonarfix::units::{Duration, Instant, Radians};
 use sonarfix_hal::config::{RobotConfig, WheelConfig};
 use sonarfix_hal::encoder::Counter;
 use sonarfix_hal::ranger::{NoEcho, Outcome, Ranger, TriggerError};
-use sonarfix_hal::robot::{EncoderFaults, Faults, Hardware};
+use sonarfix_hal::robot::{EncoderFaults, Faults, Hardware, PACE};
 use sonarfix_hal::servo::PointError;
 use sonarfix_link::message::{DeviceReadings, EncoderReading, ServoReading};
 
@@ -94,6 +94,18 @@ impl Check {
             State::Pinging { since } => self.listen(now, since, hardware, &mut faults),
         }
         faults
+    }
+
+    /// When it must be polled next after a poll at `now`, if no edge of the echo is stamped earlier.
+    pub(crate) fn next_poll(&self, now: Instant, hardware: &mut impl Hardware) -> Instant {
+        let check = match self.state {
+            State::Resting { until } => until,
+            State::Pinging { since } => {
+                let outcome = hardware.ranger().poll_at().filter(|&at| at > now);
+                outcome.unwrap_or(after(now, PACE)).min(after(since, TIMEOUT))
+            }
+        };
+        self.shown.map_or(check, |shown| check.min(shown.next))
     }
 
     /// What the devices read, when that is due to be shown.

@@ -27,6 +27,11 @@
 //! flight is delayed until the ping has ended (32 ms with an HC-SR04, 65 ms with an SRF08), so that time never runs
 //! backwards for the localizer.
 //!
+//! # Sleep
+//! Between two polls the processor may sleep: until [`Robot::next_poll`], or until an edge of the echo is stamped. A poll at any
+//! other time does nothing, so that the results are those of a loop that is polled without end ([`Robot::rest`] ends such
+//! a poll early).
+//!
 //! # Conservation of travel
 //! The ledger counts whole half edges. However the polls are spread and the steps are split, the travel that the
 //! [`Step`]s report as accepted or discarded adds up to what the counters have counted since the first poll.
@@ -57,11 +62,11 @@ use sonarfix::localizer::{Localizer, Start};
 use sonarfix::motion::WheelTravel;
 use sonarfix::navigator::{Mode, Navigator};
 use sonarfix::search::{Region, Search};
-use sonarfix::units::{Instant, Radians};
+use sonarfix::units::{Duration, Instant, Radians};
 
 use crate::encoder::Wheels;
 use crate::ranger::{Echo, NoEcho, Outcome, Ranger, TriggerError};
-use crate::time::{after, micros, since};
+use crate::time::{NEVER, after, micros, since};
 
 pub use faults::{EncoderFaults, Faults};
 pub use hardware::{Devices, Hardware, WithGyro};
@@ -145,6 +150,8 @@ pub struct Robot<'m> {
     time: Instant,
     /// Before this instant a poll has nothing to do, except for a ping in flight ([`Self::rest`]).
     rests_until: Instant,
+    /// Whether the previous poll found something to do.
+    has_worked: bool,
     /// The outcome of the ping in flight, which [`Self::rest`] has read for the next poll.
     heard: Option<Heard>,
     faults: Faults,
@@ -154,6 +161,9 @@ pub struct Robot<'m> {
 
 /// The outcome of a ping; `None` if the ranger failed.
 type Heard = Option<Outcome>;
+
+/// Period of the polls of a loop whose next deadline is not known.
+pub const PACE: Duration = Duration::from_ticks(1_000);
 
 /// An instant that has passed.
 const AT_ONCE: Instant = Instant::from_ticks(0);
@@ -188,6 +198,7 @@ impl<'m> Robot<'m> {
             cycle: Cycle::Idle { until },
             time: start,
             rests_until: AT_ONCE,
+            has_worked: true,
             heard: None,
             faults: Faults::default(),
             yaw,
@@ -258,7 +269,9 @@ impl<'m> Robot<'m> {
     /// # Panics
     /// Never.
     pub fn poll(&mut self, now: Instant, hardware: &mut impl Hardware) -> Report {
-        self.poll_with(now, hardware, None)
+        let mut report = Report::default();
+        self.poll_into(now, hardware, None, &mut report);
+        report
     }
 
     /// As [`Self::poll`], with a search: a robot whose pose is unknown sweeps with its sonar and searches for its pose
@@ -274,16 +287,24 @@ impl<'m> Robot<'m> {
         hardware: &mut impl Hardware,
         search: &mut Search<'m>,
     ) -> Report {
-        self.poll_with(now, hardware, Some(search))
+        let mut report = Report::default();
+        self.poll_into(now, hardware, Some(search), &mut report);
+        report
     }
 
-    fn poll_with(
+    /// As [`Self::poll`], or with a search as [`Self::poll_with_search`]; the report, which is half a kilobyte, is written in
+    /// place.
+    ///
+    /// # Panics
+    /// Never.
+    pub fn poll_into(
         &mut self,
         now: Instant,
         hardware: &mut impl Hardware,
         mut search: Option<&mut Search<'m>>,
-    ) -> Report {
-        let mut report = Report::default();
+        report: &mut Report,
+    ) {
+        *report = Report::default();
         if now < self.time {
             report.faults.clock = 1;
         } else {
@@ -291,27 +312,27 @@ impl<'m> Robot<'m> {
             if let Some(yaw) = &mut self.yaw {
                 yaw.sample(now, hardware, &mut report.faults);
             }
-            self.finish_ping(now, hardware, &mut report, search.as_deref_mut());
-            self.sample_encoders(now, hardware, &mut report, search.as_deref_mut());
-            self.choose_bearing(now, hardware, &mut report, search.as_deref_mut());
-            self.start_ping(now, hardware, &mut report);
+            self.finish_ping(now, hardware, report, search.as_deref_mut());
+            self.sample_encoders(now, hardware, report, search.as_deref_mut());
+            self.choose_bearing(now, hardware, report, search.as_deref_mut());
+            self.start_ping(now, hardware, report);
             if let Some(search) = search {
-                self.work_on(search, &mut report);
+                self.work_on(search, report);
             }
             self.time = now;
-            let can_rest = self.odometer.has_begun() && self.mode() == Mode::Tracking;
-            self.rests_until = if can_rest { self.next_deadline(hardware) } else { AT_ONCE };
+            self.has_worked = report.has_worked();
+            self.rests_until = if self.can_rest() { self.next_deadline(hardware) } else { AT_ONCE };
         }
         if !report.faults.is_none() {
             self.faults = self.faults.plus(report.faults);
         }
-        report
     }
 
     /// Whether a poll at `now` has nothing to do. If so, it is done: [`Self::poll`] need not be called, and would return
     /// an empty report. If not, [`Self::poll`] is to be called at the same `now`.
     ///
-    /// For a loop that is polled at a fixed rate: this takes a tenth of the instructions of an empty poll.
+    /// For a loop that is also polled for other reasons, or at a fixed rate: this takes a tenth of the instructions of an empty
+    /// poll.
     ///
     /// # Panics
     /// Never.
@@ -343,11 +364,37 @@ impl<'m> Robot<'m> {
     fn next_deadline(&self, hardware: &mut impl Hardware) -> Instant {
         let next = match self.cycle {
             // Ticks are delayed until it has ended.
-            Cycle::Listening { .. } => Instant::from_ticks(u64::MAX),
+            Cycle::Listening { .. } => NEVER,
             Cycle::Idle { until } => until.min(self.ticks.next()),
             Cycle::Turning { .. } => can_ping_at(hardware).min(self.ticks.next()),
         };
         self.yaw.as_ref().map_or(next, |yaw| next.min(yaw.next()))
+    }
+
+    /// Whether polls before the next deadline have nothing to do. A search works at every poll.
+    fn can_rest(&self) -> bool {
+        self.odometer.has_begun() && self.mode() == Mode::Tracking
+    }
+
+    /// When the loop must be polled next, if no edge of the echo is stamped earlier: at the next deadline of ticks, sonar, servo
+    /// or gyro, and every [`PACE`] where no deadline is known (a search, a ranger without [`Ranger::poll_at`]). An instant that
+    /// has passed: at once.
+    pub fn next_poll(&self, hardware: &mut impl Hardware) -> Instant {
+        let paced = after(self.time, PACE);
+        let deadline = match self.cycle {
+            Cycle::Listening { polled, .. } => {
+                let timeout = polled.map_or(NEVER, |polled| after(polled, self.settings.patience));
+                hardware.ranger().poll_at().unwrap_or(AT_ONCE).min(timeout)
+            }
+            _ => NEVER,
+        };
+        let deadline = deadline.min(self.next_deadline(hardware));
+        if !self.can_rest() {
+            return deadline.min(paced);
+        }
+        // A deadline that has passed without effect, such as that of a ranger that is not ready.
+        let is_waiting = deadline <= self.time && !self.has_worked;
+        if is_waiting { paced } else { deadline }
     }
 
     /// Reads both counters, and the gyro if there is one; `None` if a counter fails.

@@ -19,7 +19,7 @@ mod settings;
 use embedded_hal::pwm::SetDutyCycle;
 use sonarfix::units::{Instant, Radians};
 
-use crate::time::micros;
+use crate::time::{NEVER, micros};
 
 pub use calibration::{Calibration, MeasuredPulse};
 pub use error::{PointError, SettingError};
@@ -170,11 +170,11 @@ impl<P> Servo<P> {
         self.target().is_some() && now >= self.settles_at()
     }
 
-    /// The instant at which it has settled at its target; the greatest instant before the first [`Self::point`].
+    /// The instant at which it has settled at its target; centuries ahead before the first
+    /// [`Self::point`].
     #[must_use]
     pub fn settles_at(&self) -> Instant {
-        let never = Instant::from_ticks(u64::MAX);
-        self.setup.as_ref().map_or(never, |setup| setup.motion.settles_at())
+        self.setup.as_ref().map_or(NEVER, |setup| setup.motion.settles_at())
     }
 }
 

@@ -5,14 +5,18 @@
 
 use sonarfix::units::{Duration, Instant};
 
+/// An instant that is not reached. Not the greatest one: `fugit` compares instants as those of a counter that wraps around, by
+/// which the greatest is before the first.
+pub(crate) const NEVER: Instant = Instant::from_ticks(u64::MAX / 4);
+
 /// The time from `then` to `now`; zero if `then` is later.
 pub(crate) fn since(now: Instant, then: Instant) -> Duration {
     now.checked_duration_since(then).unwrap_or(Duration::from_ticks(0))
 }
 
-/// The instant `span` after `instant`; the greatest instant on overflow.
+/// The instant `span` after `instant`; an instant that is not reached on overflow.
 pub(crate) fn after(instant: Instant, span: Duration) -> Instant {
-    instant.checked_add_duration(span).unwrap_or(Instant::from_ticks(u64::MAX))
+    instant.checked_add_duration(span).unwrap_or(NEVER)
 }
 
 /// Microseconds as a float. Exact below 16 s, which no time of flight, pulse or servo turn reaches.

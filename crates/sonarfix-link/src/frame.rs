@@ -19,6 +19,8 @@ use crate::message::Message;
 pub const VERSION: u8 = 5;
 /// The longest message, in bytes. A test encodes the largest value of each.
 pub const MESSAGE_MAX: usize = 352;
+/// The longest message of a robot, in bytes. The same test encodes them.
+pub const TELEMETRY_MAX: usize = 112;
 /// Bytes before the message: version, kind, sequence number.
 pub(crate) const HEADER: usize = 4;
 /// Bytes after it.
@@ -27,8 +29,11 @@ pub(crate) const CHECKSUM: usize = 4;
 pub(crate) const BODY_MAX: usize = HEADER + MESSAGE_MAX + CHECKSUM;
 /// The longest frame after COBS, with its delimiters.
 pub const FRAME_MAX: usize = cobs::max_encoding_length(BODY_MAX) + 2;
+/// The longest frame of a robot.
+pub const TELEMETRY_FRAME_MAX: usize =
+    cobs::max_encoding_length(HEADER + TELEMETRY_MAX + CHECKSUM) + 2;
 
-/// A buffer for the frames of a [`Sender`].
+/// A buffer for any frame of a [`Sender`].
 pub type Buffer = [u8; FRAME_MAX];
 /// The initial value of a buffer.
 pub const EMPTY: Buffer = [0; FRAME_MAX];
@@ -81,24 +86,28 @@ impl<M: Message> Sender<M> {
         self.next
     }
 
-    /// Encodes the next message into `buffer`; returns the frame with its delimiters. Every message fits (a test
-    /// encodes the largest value of each); of one that did not, the frame would be empty.
+    /// Uses a sequence number up, for a message that is dropped: the receiver counts it as lost.
+    pub fn skip(&mut self) {
+        self.next = self.next.checked_add(1).unwrap_or(1);
+    }
+
+    /// Encodes the next message into `buffer`; returns the frame with its delimiters. Every message fits into a [`Buffer`], those
+    /// of a robot into [`TELEMETRY_FRAME_MAX`] bytes (a test encodes the largest value of each); of one that did not, the frame
+    /// would be empty.
     ///
     /// # Panics
     /// Never.
-    pub fn frame<'b>(&mut self, message: &M, buffer: &'b mut Buffer) -> &'b [u8] {
+    pub fn frame<'b>(&mut self, message: &M, buffer: &'b mut [u8]) -> &'b [u8] {
         let sequence = self.next;
-        self.next = sequence.checked_add(1).unwrap_or(1);
+        self.skip();
         encode(sequence, message, buffer).unwrap_or_default()
     }
 }
 
-fn encode<'b, M: Message>(sequence: u16, message: &M, buffer: &'b mut Buffer) -> Option<&'b [u8]> {
+fn encode<'b, M: Message>(sequence: u16, message: &M, buffer: &'b mut [u8]) -> Option<&'b [u8]> {
     let [low, high] = sequence.to_le_bytes();
     let mut encoder = Encoder::new(buffer);
-    for byte in [VERSION, M::KIND, low, high] {
-        encoder.push(byte);
-    }
+    encoder.push(&[VERSION, M::KIND, low, high]);
     let length = postcard::serialize_with_flavor(message, encoder).ok()?;
     buffer.get(..length)
 }
@@ -108,7 +117,7 @@ fn encode<'b, M: Message>(sequence: u16, message: &M, buffer: &'b mut Buffer) ->
 /// COBS replaces each zero by the distance to the next one. The place of that distance, `code`, is reserved when a group
 /// begins and filled when it ends: at a zero, or after 254 bytes without one.
 struct Encoder<'b> {
-    buffer: &'b mut Buffer,
+    buffer: &'b mut [u8],
     /// Index of the next byte; beyond the buffer after an overflow.
     next: usize,
     /// Index of the code of the present group.
@@ -121,7 +130,7 @@ const GROUP: usize = 255;
 
 impl<'b> Encoder<'b> {
     /// An encoder that has written the delimiter before the frame.
-    fn new(buffer: &'b mut Buffer) -> Self {
+    fn new(buffer: &'b mut [u8]) -> Self {
         let mut encoder = Self { buffer, next: 0, code: 1, checksum: Crc32::default() };
         encoder.put(0);
         encoder.next = 2;
@@ -145,19 +154,22 @@ impl<'b> Encoder<'b> {
         self.next += 1;
     }
 
-    /// Takes a byte of the content. A message has dozens of places that write a byte: inlined, this takes 3 KiB of flash.
+    /// Takes bytes of the content. A message has dozens of places that write a number: inlined, this takes 3 KiB of flash.
     #[inline(never)]
-    fn push(&mut self, byte: u8) {
-        self.checksum = self.checksum.with(byte);
-        self.encode(byte);
+    fn push(&mut self, bytes: &[u8]) {
+        self.checksum = bytes.iter().fold(self.checksum, |checksum, &byte| checksum.with(byte));
+        self.encode(bytes);
     }
 
-    fn encode(&mut self, byte: u8) {
-        if byte == 0 {
-            return self.end_group();
-        }
-        self.put(byte);
-        if self.next - self.code == GROUP {
+    #[inline]
+    fn encode(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            if byte != 0 {
+                self.put(byte);
+                if self.next - self.code != GROUP {
+                    continue;
+                }
+            }
             self.end_group();
         }
     }
@@ -167,20 +179,23 @@ impl postcard::ser_flavors::Flavor for Encoder<'_> {
     type Output = usize;
 
     fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
-        self.push(byte);
+        self.push(&[byte]);
+        Ok(())
+    }
+
+    fn try_extend(&mut self, bytes: &[u8]) -> postcard::Result<()> {
+        self.push(bytes);
         Ok(())
     }
 
     /// Appends the checksum and the delimiter; returns the length.
     fn finalize(mut self) -> postcard::Result<usize> {
-        for byte in self.checksum.value().to_le_bytes() {
-            self.encode(byte);
-        }
+        self.encode(&self.checksum.value().to_le_bytes());
         self.end_group();
         // The place reserved for the code of another group is that of the delimiter.
         self.next = self.code;
         self.put(0);
-        if self.next > FRAME_MAX {
+        if self.next > self.buffer.len() {
             return Err(postcard::Error::SerializeBufferFull);
         }
         Ok(self.next)

@@ -25,6 +25,18 @@ pub struct Reporter {
     gyro_due: Instant,
 }
 
+/// Where the messages of a [`Reporter`] go: a function that takes them, or a line that may have no room.
+pub trait Outlet {
+    /// Sends the message, or drops it without building it.
+    fn send_built(&mut self, build: impl FnOnce() -> Telemetry);
+}
+
+impl<F: FnMut(&Telemetry)> Outlet for F {
+    fn send_built(&mut self, build: impl FnOnce() -> Telemetry) {
+        self(&build());
+    }
+}
+
 /// Time between two messages on the gyro.
 const GYRO_PERIOD: Duration = Duration::from_ticks(1_000_000);
 
@@ -55,56 +67,56 @@ impl Reporter {
         (Self { last, next: 0, gyro_due: at }, Telemetry::Initialized(began))
     }
 
-    /// Passes the messages of one poll of the loop to `send`. `localizer` is that of the loop, after the poll.
-    pub fn report(
-        &mut self,
-        report: &Report,
-        localizer: &Localizer,
-        mut send: impl FnMut(&Telemetry),
-    ) {
+    /// Passes the messages of one poll of the loop to `outlet`. `localizer` is that of the loop, after the poll.
+    pub fn report(&mut self, report: &Report, localizer: &Localizer, outlet: &mut impl Outlet) {
         if let Some(heard) = &report.ping_result {
-            self.odometry(heard.step.as_ref(), &mut send);
-            self.ping(heard, &mut send);
+            self.odometry(heard.step.as_ref(), outlet);
+            self.ping(heard, outlet);
         }
         if let Some(SweepResult { bearing, outcome, step, .. }) = report.swept {
-            self.odometry(step.as_ref(), &mut send);
-            send(&Telemetry::Sweep(Sweep { at: self.last.at, bearing, outcome }));
+            self.odometry(step.as_ref(), outlet);
+            let at = self.last.at;
+            outlet.send_built(|| Telemetry::Sweep(Sweep { at, bearing, outcome }));
         }
         if let Some(tick) = &report.tick {
-            self.odometry(tick.step.as_ref(), &mut send);
-            send(&Telemetry::Estimate(estimate(localizer)));
-            self.gyro(localizer, &mut send);
+            self.odometry(tick.step.as_ref(), outlet);
+            outlet.send_built(|| Telemetry::Estimate(estimate(localizer)));
+            self.gyro(localizer, outlet);
         }
         if let Some(Err(reason)) = report.aimed {
-            send(&Telemetry::SkippedPing(SkippedPing { at: self.last.at, reason }));
+            let at = self.last.at;
+            outlet.send_built(|| Telemetry::SkippedPing(SkippedPing { at, reason }));
         }
         if let Some(mode) = report.mode {
-            send(&mode_changed(mode, localizer));
+            outlet.send_built(|| mode_changed(mode, localizer));
         }
     }
 
-    /// Passes the next message on the search to `send`; to be called at a tick while the search works.
-    pub fn search(&mut self, mode: Mode, search: &Search, send: impl FnOnce(&Telemetry)) {
+    /// Passes the next message on the search to `outlet`; to be called at a tick while the search works.
+    pub fn search(&mut self, mode: Mode, search: &Search, outlet: &mut impl Outlet) {
         let (at, number) = (self.last.at, self.next);
         self.next = (number + 1) % SEARCH_MESSAGES;
         let Some(rank) = number.checked_sub(1) else {
             let pings = u16::try_from(search.pings()).unwrap_or(u16::MAX);
             let (answer, cycles) = (kind_of(&search.answer()), search.cycles());
-            send(&Telemetry::Search(SearchStatus { at, mode, answer, pings, cycles }));
+            outlet
+                .send_built(|| Telemetry::Search(SearchStatus { at, mode, answer, pings, cycles }));
             return;
         };
         if let Some(hypothesis) = search.ranked(usize::from(rank)) {
             let Hypothesis { pose, position_deviation, heading_deviation, fit, explained, .. } =
                 hypothesis;
-            send(&Telemetry::Hypothesis(RankedHypothesis {
-                at,
-                rank,
-                pose,
-                position_deviation,
-                heading_deviation,
-                fit,
-                explained,
-            }));
+            outlet.send_built(|| {
+                Telemetry::Hypothesis(RankedHypothesis {
+                    at,
+                    rank,
+                    pose,
+                    position_deviation,
+                    heading_deviation,
+                    fit,
+                    explained,
+                })
+            });
         }
     }
 
@@ -120,7 +132,7 @@ impl Reporter {
         self.last.at
     }
 
-    fn odometry(&mut self, step: Option<&robot::Step>, send: &mut impl FnMut(&Telemetry)) {
+    fn odometry(&mut self, step: Option<&robot::Step>, outlet: &mut impl Outlet) {
         // Travel that was not taken has changed nothing; it is repeated, or counted as a fault.
         if let Some(step) = step.filter(|step| step.result == StepResult::Accepted) {
             self.last = Odometry {
@@ -129,29 +141,31 @@ impl Reporter {
                 left_metres: self.last.left_metres + f64::from(step.travel.left.0),
             };
             if let Some(turn) = step.turn {
-                send(&Telemetry::Turn(turn));
+                outlet.send_built(|| Telemetry::Turn(turn));
             }
-            send(&Telemetry::Odometry(self.last));
+            let last = self.last;
+            outlet.send_built(|| Telemetry::Odometry(last));
         }
     }
 
     /// The state of the gyro, when a second has passed since the last one.
-    fn gyro(&mut self, localizer: &Localizer, send: &mut impl FnMut(&Telemetry)) {
+    fn gyro(&mut self, localizer: &Localizer, outlet: &mut impl Outlet) {
         let Some(status) = localizer.gyro() else {
             return;
         };
         let at = localizer.time();
         if at >= self.gyro_due {
             self.gyro_due = at.checked_add_duration(GYRO_PERIOD).unwrap_or(at);
-            send(&Telemetry::Gyro(GyroState { at, status }));
+            outlet.send_built(|| Telemetry::Gyro(GyroState { at, status }));
         }
     }
 
-    fn ping(&mut self, heard: &PingResult, send: &mut impl FnMut(&Telemetry)) {
+    fn ping(&mut self, heard: &PingResult, outlet: &mut impl Outlet) {
         // An echo without a matching encoder sample did not reach the localizer.
         if let Some(fix) = heard.fix {
             let PingResult { aim, outcome, .. } = *heard;
-            send(&Telemetry::Ping(Ping { at: self.last.at, aim, outcome, fix }));
+            let at = self.last.at;
+            outlet.send_built(|| Telemetry::Ping(Ping { at, aim, outcome, fix }));
         }
     }
 }

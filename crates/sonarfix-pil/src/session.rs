@@ -79,6 +79,22 @@ impl<'m> Session<'m> {
         }
     }
 
+    /// When a loop must be polled next ([`App::next_poll`]).
+    pub fn next_poll(&mut self) -> Instant {
+        match self {
+            Self::Localizer { localizer, .. } => localizer.time(),
+            Self::Loop(LoopSession { app, devices, .. }) => app.next_poll(devices),
+        }
+    }
+
+    /// The time before which a poll of a loop has no effect; `None` while a ping is in flight ([`App::idle_until`]).
+    pub fn idle_until(&mut self) -> Option<Instant> {
+        match self {
+            Self::Localizer { localizer, .. } => Some(localizer.time()),
+            Self::Loop(LoopSession { app, devices, .. }) => app.idle_until(devices),
+        }
+    }
+
     /// The localizer; `None` if the loop does not run.
     #[must_use]
     pub fn localizer(&self) -> Option<&Localizer<'m>> {
@@ -203,6 +219,7 @@ impl<'m> LoopSession<'m> {
         let Self { app, devices, traffic, .. } = self;
         let is_unplugged = traffic.load == Load::Unplugged;
         let mut link = LinkBuffer::new(traffic.next(app.localizer()));
+        link.is_unplugged = is_unplugged;
         let mut answered = None;
         let cost = meter.measure(|| {
             // What else it did outside the loop is visible in the telemetry.
@@ -228,11 +245,13 @@ struct LinkBuffer<'b> {
     bytes: core::slice::Iter<'b, u8>,
     sent: [u8; CAPACITY_OF_LINK],
     length: usize,
+    /// Whether what is sent is lost.
+    is_unplugged: bool,
 }
 
 impl<'b> LinkBuffer<'b> {
     fn new(bytes: &'b [u8]) -> Self {
-        Self { bytes: bytes.iter(), sent: [0; CAPACITY_OF_LINK], length: 0 }
+        Self { bytes: bytes.iter(), sent: [0; CAPACITY_OF_LINK], length: 0, is_unplugged: false }
     }
 
     fn sent(&self) -> &[u8] {
@@ -251,5 +270,9 @@ impl Link for LinkBuffer<'_> {
             room.copy_from_slice(frame);
             self.length = end;
         }
+    }
+
+    fn has_room(&self, _: usize) -> bool {
+        !self.is_unplugged
     }
 }

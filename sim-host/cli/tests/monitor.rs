@@ -65,7 +65,7 @@ impl Recorder for Robot {
 
     fn polled(&mut self, report: &Report, localizer: &Localizer) {
         let mut reporter = self.reporter.unwrap();
-        reporter.report(report, localizer, |telemetry| self.send(telemetry));
+        reporter.report(report, localizer, &mut |telemetry: &Telemetry| self.send(telemetry));
         self.reporter = Some(reporter);
         if report.tick.is_some() {
             self.estimates.push((localizer.time().ticks(), observe::estimate(localizer)));

@@ -53,7 +53,7 @@ impl Recorder for Received {
         localizer: &sonarfix::localizer::Localizer,
     ) {
         let mut reporter = self.reporter.unwrap();
-        reporter.report(report, localizer, |telemetry| self.send(telemetry));
+        reporter.report(report, localizer, &mut |telemetry: &Telemetry| self.send(telemetry));
         self.reporter = Some(reporter);
     }
 }

@@ -41,8 +41,8 @@ pub use sonarfix_pil::Load;
 use sonarfix_sim::simulate::computer::{Computer, Controller, LocalizerInputs};
 use sonarfix_sim::simulate::{Simulation, SimulationError};
 
-/// Poll period of the firmware's loop.
-const POLL_PERIOD: Duration = Duration::from_ticks(1_000);
+/// Period at which bytes arrive, if there is a load.
+const BYTES_PERIOD: Duration = Duration::from_ticks(1_000);
 
 /// An emulated microcontroller, compared with this process.
 #[derive(Debug)]
@@ -88,7 +88,7 @@ impl Computer for Emulated<'_> {
         let (start, config) = (Some(start), self.simulation.robot());
         let begin = Begin { at, start, config, kind: SessionKind::Localizer, load: self.load };
         let session = self.pair.begin_localizer(&begin, &self.map)?;
-        Ok(ComparedDevice { session, pair: self.pair, polled: at })
+        Ok(ComparedDevice { session, pair: self.pair, polled: at, load: self.load })
     }
 
     fn controller<'w>(
@@ -100,7 +100,7 @@ impl Computer for Emulated<'_> {
         let (config, load) = (self.simulation.robot(), self.load);
         let begin = Begin { at, start, config, kind: SessionKind::Loop, load };
         let (session, actuators) = self.pair.begin_loop(&begin, &self.map, wires)?;
-        Ok((ComparedDevice { session, pair: self.pair, polled: at }, actuators))
+        Ok((ComparedDevice { session, pair: self.pair, polled: at, load }, actuators))
     }
 }
 
@@ -115,11 +115,19 @@ pub struct ComparedDevice<'w> {
     pair: &'w mut Pair,
     /// The time of the last poll.
     polled: Instant,
+    /// What arrives over the link.
+    load: Load,
 }
 
 impl ComparedDevice<'_> {
     fn execute(&mut self, request: &Request) -> Result<Answer, PilError> {
         self.pair.execute(&mut self.session, request)
+    }
+
+    /// When the next bytes arrive over the link.
+    fn next_bytes(&self) -> Option<Instant> {
+        let is_loaded = matches!(self.load, Load::Garbage | Load::Commands);
+        is_loaded.then(|| self.polled.checked_add_duration(BYTES_PERIOD)).flatten()
     }
 
     fn running(&self) -> Result<&Localizer<'_>, SimulationError> {
@@ -179,9 +187,14 @@ impl Controller for ComparedDevice<'_> {
         self.running()
     }
 
-    /// The firmware's loop polls periodically, whether or not there is work.
+    fn next_poll(&mut self) -> Instant {
+        let next = self.session.next_poll();
+        self.next_bytes().map_or(next, |bytes| bytes.min(next))
+    }
+
     fn idle_until(&mut self) -> Option<Instant> {
-        self.polled.checked_add_duration(POLL_PERIOD)
+        let idle = self.session.idle_until()?;
+        Some(self.next_bytes().map_or(idle, |bytes| bytes.min(idle)))
     }
 
     fn mode(&self) -> Result<Mode, SimulationError> {

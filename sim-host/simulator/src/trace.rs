@@ -222,7 +222,8 @@ pub trait Recorder {
     fn search(&mut self, _make: impl FnOnce() -> SearchRecord) {}
     /// The robot's localizer has started, at the fidelity of pins.
     fn began(&mut self, _localizer: &Localizer) {}
-    /// The robot's loop was polled, at the fidelity of pins.
+    /// What the robot's loop has done, at the fidelity of pins: after each step of the simulated hardware, empty while the loop
+    /// sleeps.
     fn polled(&mut self, _report: &Report, _localizer: &Localizer) {}
 }
 

@@ -178,7 +178,7 @@ impl<'m, F: NorFlash> App<'m, F> {
             let tick = Tick { step, lateness, held: false, skipped: 0 };
             let report = Report { tick: Some(tick), ..Report::default() };
             let localizer = running.robot.localizer();
-            running.reporter.report(&report, localizer, |message| self.wire.send(message, link));
+            running.reporter.report(&report, localizer, &mut self.wire.outlet(link));
         }
         Ok(Next::Report(running.reporter.pose_set(running.robot.localizer())))
     }

@@ -2,11 +2,13 @@
 //!
 //! Steps and pings are sent at once, the estimate at every tick, [`LoopStatus`](Telemetry::LoopStatus) once a second,
 //! [`Hello`](Telemetry::Hello) every ten: at ten ticks and a ping a second 1.4 kB/s of the 11.5 kB/s of a link at
-//! 115,200 baud (`docs/firmware.md`). A frame for which there is no room is dropped; the sequence numbers show the gap.
+//! 115,200 baud (`docs/firmware.md`). A message for which there is no room is not built; the sequence numbers show the gap.
 
 use sonarfix::units::{Duration, Instant};
+use sonarfix_link::frame::TELEMETRY_FRAME_MAX;
+use sonarfix_link::reporter::Outlet;
 use sonarfix_link::{
-    Frame, Receiver, ReceiverCounters, Sender, Session, SessionCommand, Telemetry, frame,
+    Frame, Receiver, ReceiverCounters, Sender, Session, SessionCommand, Telemetry,
 };
 
 use crate::time::after;
@@ -26,6 +28,11 @@ pub trait Link {
 
     /// Queues a whole frame, or nothing if there is no room for it.
     fn send(&mut self, frame: &[u8]);
+
+    /// Whether there is room for a frame of this length. Telemetry for which there is none is not built.
+    fn has_room(&self, _length: usize) -> bool {
+        true
+    }
 }
 
 /// The link's state.
@@ -55,8 +62,13 @@ impl Wire {
     /// Sends a message. Not inlined, because of the buffers of a frame.
     #[inline(never)]
     pub fn send(&mut self, message: &Telemetry, link: &mut impl Link) {
-        let mut buffer = frame::EMPTY;
+        let mut buffer = [0; TELEMETRY_FRAME_MAX];
         link.send(self.sender.frame(message, &mut buffer));
+    }
+
+    /// The telemetry's way to the link.
+    pub fn outlet<'w, L: Link>(&'w mut self, link: &'w mut L) -> WireOutlet<'w, L> {
+        WireOutlet { wire: self, link }
     }
 
     pub fn is_hello_due(&mut self, now: Instant, is_busy: bool) -> bool {
@@ -75,6 +87,22 @@ impl Wire {
 
     pub fn counters(&self) -> ReceiverCounters {
         self.receiver.counters()
+    }
+}
+
+/// Sends telemetry while the link has room; a message that is not sent uses up its sequence number.
+pub(super) struct WireOutlet<'w, L> {
+    wire: &'w mut Wire,
+    link: &'w mut L,
+}
+
+impl<L: Link> Outlet for WireOutlet<'_, L> {
+    fn send_built(&mut self, build: impl FnOnce() -> Telemetry) {
+        if self.link.has_room(TELEMETRY_FRAME_MAX) {
+            self.wire.send(&build(), self.link);
+        } else {
+            self.wire.sender.skip();
+        }
     }
 }
 

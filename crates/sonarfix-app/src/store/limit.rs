@@ -44,4 +44,10 @@ impl WriteLimit {
         self.writes = self.writes.saturating_sub(u8::from(is_permitted));
         is_permitted
     }
+
+    /// When a write is permitted next, if `reserve` are to remain after it.
+    #[must_use]
+    pub fn next(&self, reserve: u8) -> Instant {
+        if self.writes > reserve { Instant::from_ticks(0) } else { after(self.since, PERIOD) }
+    }
 }

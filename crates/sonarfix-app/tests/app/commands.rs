@@ -245,7 +245,9 @@ fn a_late_poll_is_not_on_time() {
     let baked = Baked::new(&config());
     let mut bench = Bench::switched_on(&baked, SimFlash::new());
     assert!(bench.poll().is_on_time);
-    bench.now += 50_000;
+    // It waits for the next check of the devices, which was due a second after the last ping: 50 ms later is too late.
+    bench.wait(10);
+    bench.now = bench.next_poll() + 50_000;
     assert!(!bench.poll().is_on_time);
     assert_eq!(bench.order(&Command::SetPose(start())), DONE);
     assert_eq!(bench.order(&Command::Start), DONE);

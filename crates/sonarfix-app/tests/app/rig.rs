@@ -283,6 +283,11 @@ impl<'m> Bench<'m> {
         self.app.poll(Instant::from_ticks(self.now), &mut self.hardware, &mut self.line)
     }
 
+    /// When the app asks to be polled next, µs.
+    pub fn next_poll(&mut self) -> u64 {
+        self.app.next_poll(&mut self.hardware).ticks()
+    }
+
     /// Rolls both wheels, whose encoders count unless they are dead.
     pub fn roll(&mut self, right: i16, left: i16) {
         let count = |encoder: &mut Encoder, counted: &mut u16, edges: i16| {

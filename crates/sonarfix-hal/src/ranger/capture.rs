@@ -126,6 +126,7 @@ impl<'c> Captured<'c> {
 
 impl EchoLine for Captured<'_> {
     type Error = Infallible;
+    const WAKES: bool = true;
 
     fn is_high(&mut self) -> Result<bool, Infallible> {
         Ok(self.0.high.load(Ordering::Relaxed))

@@ -28,6 +28,12 @@ pub trait Ranger {
     /// The device's; the ping is over.
     fn poll(&mut self, now: Instant) -> Result<Option<Outcome>, Self::Error>;
 
+    /// The next instant at which [`Self::poll`] does anything, unless an interrupt reports an edge of the echo earlier; `None` if
+    /// this is unknown, as by the default implementation, or in the past: the driver is to be polled at the rate of the loop.
+    fn poll_at(&self) -> Option<Instant> {
+        None
+    }
+
     /// Configures the driver for the ranger of the robot's configuration. The default implementation accepts
     /// [`RangerKind::Custom`] and ignores the other settings.
     ///

@@ -24,7 +24,7 @@ use super::air::Air;
 use super::driver::{Ranger, TriggerError, UnsupportedKind};
 use super::echo::{Echo, NoEcho, Outcome};
 use super::settings::{PulseTiming, RangerKind, RangerSettings};
-use crate::time::{after, since};
+use crate::time::{NEVER, after, since};
 
 /// A pulse of the echo line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,6 +40,9 @@ pub struct Pulse {
 pub trait EchoLine {
     /// The error of a reading.
     type Error: core::fmt::Debug;
+
+    /// Whether an edge wakes the program, so that the line need not be polled for it.
+    const WAKES: bool = false;
 
     /// Whether the line is high.
     ///
@@ -252,6 +255,15 @@ impl<T: OutputPin, L: EchoLine> Ranger for PulseRanger<T, L> {
             self.state = State::Idle;
         }
         result
+    }
+
+    fn poll_at(&self) -> Option<Instant> {
+        let since_edge = |span| after(self.triggered.unwrap_or(NEVER), span);
+        match self.state {
+            State::Idle => Some(NEVER),
+            State::Raised => Some(since_edge(self.timing.trigger)),
+            State::Listening => L::WAKES.then(|| since_edge(self.timing.listen)),
+        }
     }
 
     fn configure(&mut self, settings: &RangerSettings) -> Result<(), UnsupportedKind> {

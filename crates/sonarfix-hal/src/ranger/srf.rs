@@ -18,7 +18,7 @@ use super::air::Air;
 use super::driver::{Ranger, TriggerError, UnsupportedKind};
 use super::echo::{Echo, NoEcho, Outcome};
 use super::settings::{RangerKind, RangerSettings, SRF_ADDRESS, SRF_CYCLE};
-use crate::time::{after, since};
+use crate::time::{NEVER, after, since};
 
 const COMMAND: u8 = 0;
 const RANGE_IN_MICROSECONDS: u8 = 0x52;
@@ -149,6 +149,11 @@ impl<I: I2c> Ranger for Srf<I> {
         let result = self.listen(sent, since(now, sent));
         self.in_flight = matches!(result, Ok(None));
         result
+    }
+
+    fn poll_at(&self) -> Option<Instant> {
+        let sent = self.triggered.filter(|_| self.in_flight);
+        Some(sent.map_or(NEVER, |sent| after(sent, RANGING)))
     }
 
     fn configure(&mut self, settings: &RangerSettings) -> Result<(), UnsupportedKind> {

@@ -4,7 +4,7 @@ use sonarfix::config::ServoTiming;
 use sonarfix::servo::ServoMotion;
 use sonarfix::units::{Instant, Radians};
 
-use crate::time::{after, micros, since};
+use crate::time::{NEVER, after, micros, since};
 
 /// One turn of the servo.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,8 +58,7 @@ impl Motion {
     }
 
     pub fn settles_at(&self) -> Instant {
-        self.turn
-            .map_or(Instant::from_ticks(u64::MAX), |turn| after(turn.arrives, self.timing.settle))
+        self.turn.map_or(NEVER, |turn| after(turn.arrives, self.timing.settle))
     }
 }
 

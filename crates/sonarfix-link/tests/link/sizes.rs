@@ -1,6 +1,6 @@
 //! Every message fits into a frame.
 
-use sonarfix_link::frame::{FRAME_MAX, MESSAGE_MAX};
+use sonarfix_link::frame::{FRAME_MAX, MESSAGE_MAX, TELEMETRY_FRAME_MAX, TELEMETRY_MAX};
 use sonarfix_link::message::Message;
 
 use crate::messages::{COMMANDS, Largest, TELEMETRY, command, telemetry};
@@ -16,26 +16,25 @@ fn length<M: Message>(message: &M) -> usize {
 #[test]
 fn the_largest_of_every_message_fits() {
     // Every variant in turn; no enum has more than six.
-    let longest = (0..6)
-        .flat_map(|variant| {
-            let telemetry =
-                (0..TELEMETRY).map(move |kind| length(&telemetry(kind, &mut Largest { variant })));
-            let commands =
-                (0..COMMANDS).map(move |kind| length(&command(kind, &mut Largest { variant })));
-            telemetry.chain(commands)
-        })
-        .max()
-        .unwrap();
-    assert_eq!(longest, LONGEST);
-    assert!(longest <= MESSAGE_MAX);
+    let of_robot = (0..6).flat_map(|variant| {
+        (0..TELEMETRY).map(move |kind| length(&telemetry(kind, &mut Largest { variant })))
+    });
+    let of_commands = (0..6).flat_map(|variant| {
+        (0..COMMANDS).map(move |kind| length(&command(kind, &mut Largest { variant })))
+    });
+    let [of_robot, of_commands] = [of_robot.max(), of_commands.max()];
+    assert_eq!([of_robot, of_commands], [Some(LONGEST_OF_ROBOT), Some(LONGEST)]);
+    const { assert!(LONGEST <= MESSAGE_MAX && LONGEST_OF_ROBOT <= TELEMETRY_MAX) };
 }
 
 /// The longest of all, `SetConfiguration`: 5 for the session, 43 · 4 for the numbers, 16 · 10 for the times, 13 for
-/// variants (of command, schedule, policy, gyro and whether it is inverted, ranger, whether a wheel is mirrored, of the motor policy, start, region). The longest of the robot's,
-/// `Estimate`, has 110, of which an hour after the start 20 are not sent.
+/// variants (of command, schedule, policy, gyro and whether it is inverted, ranger, whether a wheel is mirrored, of the motor policy, start, region).
 const LONGEST: usize = 350;
+/// The longest of the robot's, `ModeChanged`: the mode and an `Estimate`, of which an hour after the start 20 bytes are not sent.
+const LONGEST_OF_ROBOT: usize = 111;
 
 #[test]
 fn the_frame_is_as_long_as_documented() {
     assert_eq!((MESSAGE_MAX, FRAME_MAX), (352, 364));
+    assert_eq!((TELEMETRY_MAX, TELEMETRY_FRAME_MAX), (112, 123));
 }

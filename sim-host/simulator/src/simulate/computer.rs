@@ -92,6 +92,8 @@ pub trait Controller {
     /// # Errors
     /// [`SimulationError`], if it has stopped.
     fn localizer(&self) -> Result<&Localizer<'_>, SimulationError>;
+    /// When it must be polled next, if no edge of the echo comes earlier.
+    fn next_poll(&mut self) -> Instant;
     /// The time before which a poll has no effect; `None` while a ping is in flight.
     fn idle_until(&mut self) -> Option<Instant>;
     /// What determines the pose.
@@ -211,6 +213,10 @@ impl Controller for RobotOnWires<'_> {
 
     fn localizer(&self) -> Result<&Localizer<'_>, SimulationError> {
         Ok(self.robot.localizer())
+    }
+
+    fn next_poll(&mut self) -> Instant {
+        self.robot.next_poll(&mut self.devices)
     }
 
     fn idle_until(&mut self) -> Option<Instant> {

@@ -29,9 +29,9 @@ use crate::time::{micros, seconds};
 use crate::trace::Recorder;
 use crate::world::Ping;
 
-/// Poll period while a ping is in flight, µs. The interrupt stamps the edges, so this only delays
-/// their processing. A firmware's loop has a similar period.
-const LISTEN_POLL: u64 = 1_000;
+/// Step of the simulated hardware while a ping is in flight, µs: by up to this much a ping without an echo ends later than on a
+/// board.
+const LISTEN_STEP: u64 = 1_000;
 /// Poll period of a robot that searches for its pose, µs.
 const SEARCH_POLL: u64 = 1_000;
 /// Length of the trigger pulse, µs: the driver's minimum.
@@ -148,11 +148,19 @@ impl<'a> SimulatedHardware<'a> {
     ) -> Result<Option<u64>, SimulationError> {
         let period = self.simulation.scenario.robot.encoder_period.to_micros();
         let end = self.simulation.end();
+        let mut next_poll = self.now;
         loop {
             if let Some(back_at) = self.faults.controller.power_back_at(self.now) {
                 return Ok(Some(back_at));
             }
-            let sensors = self.sensors();
+            let has_failed = self.read_fails();
+            if self.now < next_poll && self.edges == (None, None) {
+                recorder.polled(&Report::default(), controller.localizer()?);
+                let next = self.next_step(controller);
+                self.advance(next);
+                continue;
+            }
+            let sensors = self.sensors(has_failed);
             let (report, actuators) = controller.poll(&sensors)?;
             let localizer = controller.localizer()?;
             recorder.polled(&report, localizer);
@@ -165,16 +173,20 @@ impl<'a> SimulatedHardware<'a> {
             if is_last || self.now > end + period {
                 return Ok(None);
             }
-            let next = self.next_poll(controller);
+            next_poll = controller.next_poll().ticks();
+            let next = self.next_step(controller);
             self.advance(next);
         }
     }
 
-    /// The inputs of the devices since the last poll.
-    fn sensors(&mut self) -> Sensors {
+    /// Whether a reading of each encoder fails now.
+    fn read_fails(&mut self) -> [bool; 2] {
         let now = self.now;
-        let [right, left] = &mut self.faults.encoders;
-        let failed = [right, left].map(|faults| faults.read_fails(now));
+        self.faults.encoders.each_mut().map(|faults| faults.read_fails(now))
+    }
+
+    /// The inputs of the devices since the last poll.
+    fn sensors(&mut self, failed: [bool; 2]) -> Sensors {
         let [right, left] = self.encoders;
         let [right, left] = [(right, failed[0]), (left, failed[1])]
             .map(|(wires, has_failed)| wires.counted(has_failed));
@@ -209,7 +221,8 @@ impl<'a> SimulatedHardware<'a> {
         for ((disc, faults), metres) in encoders.zip(travel.measured) {
             disc.roll(metres, now, faults);
         }
-        self.edges = self.board.edges(now);
+        let (rose, fell) = self.board.edges(now);
+        self.edges = (rose.or(self.edges.0), fell.or(self.edges.1));
         self.turn_servo();
     }
 
@@ -235,6 +248,7 @@ impl<'a> SimulatedHardware<'a> {
         };
         self.plant.steer(Command::default());
         self.measurement = None;
+        self.edges = (None, None);
         self.advance(back_at);
         (!robot.start.is_unknown()).then_some(start)
     }
@@ -354,15 +368,15 @@ impl<'a> SimulatedHardware<'a> {
         }
     }
 
-    /// Time of the next poll: the time that the loop asks for; while it listens, the poll period or
-    /// the next interrupt.
-    fn next_poll(&mut self, controller: &mut impl Controller) -> u64 {
+    /// Time of the next step of the simulated hardware: the next deadline of the loop; while it listens, the next interrupt or
+    /// [`LISTEN_STEP`].
+    fn next_step(&mut self, controller: &mut impl Controller) -> u64 {
         let at = match controller.idle_until() {
             Some(idle_until) => idle_until.ticks(),
             None if self.is_raised => self.now + TRIGGER,
             None => {
                 let edge = self.board.next_edge().unwrap_or(u64::MAX);
-                edge.min(self.now + LISTEN_POLL)
+                edge.min(self.now + LISTEN_STEP)
             }
         };
         let at = match self.mode {
