@@ -111,3 +111,6 @@ impl MeasuredTurn {
 
 /// Difference of two durations that is not a difference of clocks, µs.
 const TOLERANCE: u64 = 2_000;
+
+#[cfg(test)]
+mod tests;

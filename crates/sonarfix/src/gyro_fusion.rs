@@ -258,3 +258,6 @@ impl GyroFusion {
         self.roll(ekf, travel, (angle, time), parameters)
     }
 }
+
+#[cfg(test)]
+mod tests;

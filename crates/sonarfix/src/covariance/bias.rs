@@ -273,3 +273,6 @@ impl Covariance {
         None
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -164,3 +164,6 @@ impl Ekf {
         self.set_pose_variances(self.pose_variances().plus(0.0, heading.0));
     }
 }
+
+#[cfg(test)]
+mod tests;

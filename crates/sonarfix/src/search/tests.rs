@@ -104,7 +104,8 @@ prop_compose! {
 prop_compose! {
     fn entry()(
         (x, y, angle) in (0.5_f32..5.5, 0.5_f32..3.5, -3.1_f32..3.1), score in 0.0_f32..1.5,
-        pings in 12_u16..96, silent in 0_u16..6, spread in spread(), streak in 0_u16..90,
+        pings in 12_u16..96, silent in 0_u16..6, spread in spread(),
+        streak in prop_oneof![0_u16..15, 0_u16..90],
     ) -> Entry {
         let placement = Placement {
             at: Vector::new(x, y), rotation: Vector::of_angle(angle), bend: Bend::default(),
@@ -128,7 +129,7 @@ proptest! {
     #[test]
     fn a_cycle_ends_by_the_rules(
         best in entry(), leads in prop::collection::vec(0.0_f32..90.0, 0..3), other in entry(),
-        fresh in 0_u16..40, taken in 0_u16..500, cycles in 0_u32..50, are_separate in any::<bool>(),
+        fresh in prop_oneof![0_u16..10, 0_u16..40], taken in 0_u16..500, cycles in 0_u32..50, are_separate in any::<bool>(),
         (is_checked, was_unique) in (any::<bool>(), any::<bool>()),
         is_sharp_entry in any::<bool>(),
     ) {
@@ -291,6 +292,27 @@ proptest! {
         let is = f64::from(largest(spread.xx, spread.xy, spread.yy));
         let (expected, _) = largest_of(&spread);
         prop_assert!((is - expected).abs() < 1e-5 * expected, "{} {}", is, expected);
+    }
+}
+
+/// Along the walls of a room, where one of the axes of the spread has no other component.
+#[test]
+fn a_position_is_undetermined_along_the_nearest_parallel_wall() {
+    let walls = room();
+    let search = search(&walls);
+    // Walls 0 and 2 lie along x, 1 and 3 along y.
+    for (xx, yy, at, expected) in [
+        (1.0, 1e-4, (2.0, 1.0), 0),
+        (1.0, 1e-4, (2.0, 3.0), 2),
+        (1e-4, 1.0, (5.0, 1.0), 1),
+        (1e-4, 1.0, (1.0, 1.0), 3),
+    ] {
+        let rotation = Vector::new(1.0, 0.0);
+        let at = Vector::new(at.0, at.1);
+        let placement = Placement { at, rotation, bend: Bend::default() };
+        let spread = Spread { xx, xy: 0.0, yy, rotation: 1e-4 };
+        let entry = Entry { spread, ..Entry::proposed(placement) };
+        assert_eq!(search.along(&entry), Some(Decision::Along(WallId(expected), 1.0)));
     }
 }
 

@@ -138,6 +138,55 @@ fn a_hypothesis_has_the_figures_of_its_entry() {
     assert!(search.ranked(1).is_none());
 }
 
+/// Pings and lines where the best hypothesis places them, rotated by a right angle here.
+#[test]
+fn pings_and_lines_are_placed_by_the_best_hypothesis() {
+    let walls = room();
+    let mut search = search(&walls);
+    search.odometry(Metres(1.0), Radians(0.0)).unwrap();
+    search.ping(Radians(0.0), Some(Metres(2.0))).unwrap();
+    search.ping(Radians(core::f32::consts::FRAC_PI_2), None).unwrap();
+    search.odometry(Metres(1.0), Radians(0.0)).unwrap();
+    search.window.rebase();
+    search.lines = Lines::of(
+        Radians(0.2),
+        &[Line { normal: Vector::new(0.0, 1.0), offset: 0.5, stretch: (-1.0, 2.0), support: 5 }],
+    );
+    assert_eq!((search.placed_pings().count(), search.placed_lines().count()), (0, 0));
+    let rotation = Vector::new(0.0, 1.0);
+    let placement = Placement { at: Vector::new(3.0, 1.0), rotation, bend: Bend::NONE };
+    search.bank = Bank::of(&[Entry::proposed(placement)]);
+    let is_at = |point: Point, x: f32, y: f32| (point.x.0 - x).hypot(point.y.0 - y) < 1e-5;
+    let pings: Vec<(Point, Option<Point>)> = search.placed_pings().collect();
+    assert!(is_at(pings[0].0, 3.0, 0.0) && is_at(pings[1].0, 3.0, 0.0), "{pings:?}");
+    assert!(is_at(pings[0].1.unwrap(), 3.0, 2.0) && pings[1].1.is_none(), "{pings:?}");
+    let lines: Vec<[Point; 2]> = search.placed_lines().collect();
+    assert!(is_at(lines[0][0], 2.5, 2.0) && is_at(lines[0][1], 2.5, -1.0), "{lines:?}");
+}
+
+/// A sweep turns by its step and back at the limits, a part of a step off.
+#[test]
+fn a_sweep_stays_within_the_limits_of_the_servo() {
+    let limits = (-1.0, 1.0);
+    let mut sweep = Sweep { bearing: -1.0, step: 0.5 };
+    let mut bearings = Vec::new();
+    for _ in 0..9 {
+        sweep.advance(limits);
+        bearings.push(sweep.bearing);
+    }
+    let part = 0.381_966 * 0.5;
+    let expected = [-0.5, 0.0, 0.5, 1.0, 1.0 - part, 0.5 - part, -part, -0.5 - part, -0.5];
+    for (is, expected) in bearings.iter().zip(expected) {
+        assert!((is - expected).abs() < 1e-5, "{bearings:?}");
+    }
+    // A servo that is narrower than a part of a step does not turn.
+    let mut narrow = Sweep { bearing: 0.0, step: 0.5 };
+    for _ in 0..4 {
+        narrow.advance((0.0, 0.1));
+        assert!((narrow.bearing - 0.0).abs() < 1e-6, "{narrow:?}");
+    }
+}
+
 proptest! {
     #[test]
     fn a_region_has_a_margin(
