@@ -111,7 +111,7 @@ impl Pairs {
     }
 }
 
-/// An upper bound of the distance between two walls that carry these lines.
+/// An upper bound of the distance between two walls on which these lines lie, but for a quarter of a metre each.
 fn gap(one: &Line, other: &Line) -> f32 {
     let end = |line: &Line, along: f32| {
         line.normal.times(line.offset).plus(line.normal.left().times(along))

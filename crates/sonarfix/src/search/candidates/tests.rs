@@ -115,6 +115,32 @@ fn holds(side: &WideSide, (from, to): (f32, f32), shift: f64) -> Option<bool> {
     is_clear(overlap, least).then_some(overlap > least)
 }
 
+/// With an index only the walls near the first one are compared: a line whose stretch begins 2.7 m before its wall, where
+/// the other wall is, is not found there.
+#[test]
+fn an_index_leaves_walls_out_that_are_far_from_the_first() {
+    let ends: [Ends; 2] = [((2.8, 1.0), (6.8, 1.0)), ((0.1, 1.0), (0.1, 2.0))];
+    let walls = walls(&ends);
+    let line = |angle: f32, offset, stretch| Line {
+        normal: Vector::of_angle(angle),
+        offset,
+        stretch,
+        support: 5,
+    };
+    // In the frame of the map: one wall is below the robot, the other one to its left.
+    let below = line(-core::f32::consts::FRAC_PI_2, -1.0, (0.1, 6.0));
+    let beside = line(core::f32::consts::PI, -0.1, (-2.0, -1.0));
+    let is_found = |map: &Map| {
+        all_of(map, &below, &beside).iter().any(|found| is_in(found, &[[0.0, 0.0, 1.0, 0.0]]))
+    };
+    assert!(is_found(&Map::new(&walls)));
+    let image = baked(&walls);
+    let map = Map::read(&image).unwrap();
+    let middle = Point::new(4.8, 1.0);
+    assert_eq!(map.near(middle, Metres(2.0 + gap(&below, &beside))).count(), 1);
+    assert!(!is_found(&map));
+}
+
 proptest! {
     #![proptest_config(ProptestConfig {
         cases: 500, max_global_rejects: 50_000, ..ProptestConfig::default()

@@ -186,7 +186,19 @@ proptest! {
     }
 }
 
-/// What is not finite gives no step and a wide spread.
+/// Rounding errors of a rotation do not add up over many steps.
+#[test]
+fn a_step_normalizes_the_rotation() {
+    let prior = Prior { drift: 0.1, turn_scale: 0.1 };
+    for length in [0.97, 1.03] {
+        let rotation = Vector::of_angle(0.5).times(length);
+        let placement = Placement { at: Vector::default(), rotation, bend: Bend::NONE };
+        let next = Equations::default().step(&placement, prior).unwrap();
+        assert!(is_near(next.rotation.length_squared(), 1.0, 1e-6), "{next:?}");
+    }
+}
+
+/// What is not finite gives no step.
 #[test]
 fn infinite_information_gives_no_step() {
     let mut equations = Equations::default();

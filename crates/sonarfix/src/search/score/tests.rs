@@ -167,3 +167,24 @@ proptest! {
         prop_assert!((f64::from(sharpness.peak) - peak).abs() < 1e-4);
     }
 }
+
+/// Behind a wall that hardly ever fails to answer nothing is looked at: a corner there makes no echo more or less likely.
+#[test]
+fn what_is_certain_to_answer_ends_the_list_of_reflectors() {
+    let walls = walls([(1.0, 1.0, 0.0); 2]);
+    let echo = EchoParameters {
+        missed: 0.0,
+        short: 0.0,
+        long: 0.0,
+        free_path: Metres(1e9),
+        ..EchoParameters::HC_SR04
+    };
+    let model = EchoModel::new(Map::new(&walls), &sonar(0.5), &echo);
+    let beam = Beam { from: Vector::new(5.0, 3.7), axis: Vector::new(1.0, 0.0), range: None };
+    let (reflectors, _) = model.reflectors.in_beam(&beam, 3.5, 3.0);
+    let heard: Vec<Option<Heard>> =
+        reflectors.iter().map(|reflector| model.reflectors.heard(&beam, reflector)).collect();
+    assert_eq!(heard, [Some(Heard::Foot), Some(Heard::Corner)]);
+    let is = f64::from(model.explain(&beam, Sharpness::new(1.0, 0.0)).score);
+    assert!((is - (0.7 + 0.01_f64.ln())).abs() < 1e-3, "{is}");
+}
