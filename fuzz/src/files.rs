@@ -86,6 +86,7 @@ fn check_record(record: &Record) {
         Record::Ticks { time, .. } | Record::Turn { time, .. } => (time, vec![]),
         Record::Wheels { time, right, left } => (time, vec![*right, *left]),
         Record::Range { time, bearing, range, .. } => (time, vec![*bearing, range.unwrap_or(0.0)]),
+        Record::Absolute { time, age, .. } => (time, vec![*age]),
         Record::Scan { time, .. } | Record::Skip { time } => (time, vec![]),
         Record::Resume { time, state, deviation } | Record::Mode { time, state, deviation, .. } => {
             (time, state.iter().chain(deviation).copied().collect())

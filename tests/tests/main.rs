@@ -1,5 +1,6 @@
 //! Tests across the crates, in one program, which links once.
 
+mod absolute;
 mod baked;
 mod consistency;
 mod gyro;

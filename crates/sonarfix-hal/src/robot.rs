@@ -10,6 +10,7 @@
 //! | `odometer` (private) | the ledger of encoder edges |
 //! | `schedule` (private) | periodic deadlines |
 //! | `sonar` (private) | the state machine of a measurement cycle |
+//! | `waiting` (private) | absolute measurements that wait for their step |
 //! | `yaw` (private) | the ledger of a gyro's turns |
 //!
 //! *Tick*: one sample of both encoders (every 100 ms by default), passed to the localizer.
@@ -52,8 +53,10 @@ mod report;
 mod schedule;
 mod settings;
 mod sonar;
+mod waiting;
 mod yaw;
 
+use sonarfix::absolute::AbsoluteMeasurement;
 use sonarfix::aim::Aim;
 use sonarfix::config::PingSchedule;
 use sonarfix::ekf::EkfError;
@@ -75,6 +78,8 @@ pub use report::{PingResult, Report, Step, StepResult, SweepResult, Tick};
 use schedule::Schedule;
 pub use settings::{EVALUATIONS_PER_MILLISECOND, Settings, SettingsError, Stamp};
 use sonar::{Cycle, Target};
+use waiting::Waiting;
+pub use waiting::{AbsoluteResult, Occupied};
 use yaw::YawLedger;
 
 /// The loop.
@@ -157,6 +162,8 @@ pub struct Robot<'m> {
     faults: Faults,
     /// The gyro, if the robot has one.
     yaw: Option<YawLedger>,
+    /// Headings and positions from outside.
+    waiting: Waiting,
 }
 
 /// The outcome of a ping; `None` if the ranger failed.
@@ -202,6 +209,7 @@ impl<'m> Robot<'m> {
             heard: None,
             faults: Faults::default(),
             yaw,
+            waiting: Waiting::default(),
         })
     }
 
@@ -228,6 +236,7 @@ impl<'m> Robot<'m> {
         self.ticks = self.ticks.continued(now, settings.encoder_period);
         self.pings = pings;
         self.settings = settings;
+        self.waiting = Waiting::default();
         self.end_cycle(now, false);
         Ok(())
     }
@@ -258,6 +267,22 @@ impl<'m> Robot<'m> {
         self.navigator.set_pose(start)?;
         self.end_cycle(now, false);
         Ok(step)
+    }
+
+    /// Passes a heading, position or pose that was measured at the time `at` to the localizer, when it has taken the travel
+    /// of the wheels up to then: in one of the next polls, with the outcome in its report. At most one heading
+    /// and one position or pose wait.
+    ///
+    /// # Errors
+    /// [`Occupied`], if another one of this kind waits; nothing has changed.
+    pub fn absolute(
+        &mut self,
+        at: Instant,
+        measurement: &AbsoluteMeasurement,
+    ) -> Result<(), Occupied> {
+        self.waiting.add(at, measurement)?;
+        self.rests_until = AT_ONCE;
+        Ok(())
     }
 
     /// Handles what is due at `now`: the end of one ping, or one tick, or the choice of one wall, and the start of one
@@ -312,6 +337,8 @@ impl<'m> Robot<'m> {
             if let Some(yaw) = &mut self.yaw {
                 yaw.sample(now, hardware, &mut report.faults);
             }
+            // What has arrived since the last step, before there is another one.
+            report.absolute = [self.take_absolute(), self.take_absolute()];
             self.finish_ping(now, hardware, report, search.as_deref_mut());
             self.sample_encoders(now, hardware, report, search.as_deref_mut());
             self.choose_bearing(now, hardware, report, search.as_deref_mut());
@@ -565,6 +592,15 @@ impl<'m> Robot<'m> {
         Some(self.advance(at, position, turn, faults, search))
     }
 
+    /// Passes one absolute measurement to the localizer, if one is due.
+    #[inline]
+    fn take_absolute(&mut self) -> Option<AbsoluteResult> {
+        let at = self.localizer().time();
+        let (measured_at, measurement) = self.waiting.take(at)?;
+        let fix = self.navigator.absolute(measured_at, &measurement);
+        Some(AbsoluteResult { at, measured_at, measurement, fix })
+    }
+
     /// Samples the encoders, if a tick is due and no ping is in flight.
     fn sample_encoders(
         &mut self,
@@ -726,7 +762,8 @@ impl<'m> Robot<'m> {
             yaw.settle(reading);
         }
         faults.travel += u32::from(matches!(result, StepResult::Discarded(_)));
-        Step { at, travel, turn: reading, result }
+        let absolute = self.take_absolute();
+        Step { at, travel, turn: reading, result, absolute }
     }
 
     /// Whether the wheels can have travelled so far since the localizer's last step. Each of the two positions is

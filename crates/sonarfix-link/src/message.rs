@@ -9,6 +9,7 @@
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use sonarfix::absolute::AbsoluteMeasurement;
 use sonarfix::aim::{Aim, NoAim};
 use sonarfix::ekf::{StandardDeviations, StateEstimate};
 use sonarfix::gyro::TurnReading;
@@ -20,7 +21,7 @@ use sonarfix::pose::Pose;
 use sonarfix::units::{Duration, Instant, Metres, Radians};
 use sonarfix_hal::config::{RobotConfig, Unsupported};
 use sonarfix_hal::ranger;
-use sonarfix_hal::robot::Faults;
+use sonarfix_hal::robot::{AbsoluteResult, Faults};
 
 use crate::counters::ReceiverCounters;
 
@@ -83,6 +84,8 @@ pub enum Telemetry {
     Turn(TurnReading),
     /// The state of the gyro, once a second.
     Gyro(GyroState),
+    /// A heading, position or pose from outside was taken ([`Command::Absolute`]).
+    Absolute(AbsoluteResult),
 }
 
 /// The state of the gyro.
@@ -377,6 +380,10 @@ pub enum CommandError {
     NoSearch,
     /// The loop runs; stop it first ([`Command::Stop`]).
     Running,
+    /// The loop does not run; start it first ([`Command::Start`]).
+    Waiting,
+    /// An earlier measurement of this kind waits for its encoder sample.
+    Occupied,
 }
 
 impl core::fmt::Display for CommandError {
@@ -391,6 +398,8 @@ impl core::fmt::Display for CommandError {
             Self::Session => "the command's session has ended: send it again in a new one",
             Self::NoSearch => "the robot does not search: its robot file needs start = \"unknown\"",
             Self::Running => "the loop runs: stop it first",
+            Self::Waiting => "the loop does not run: start it first",
+            Self::Occupied => "an earlier measurement of this kind waits for its encoder sample",
             Self::Unsupported(reason) => return write!(f, "{reason}"),
         })
     }
@@ -430,4 +439,12 @@ pub enum Command {
     /// For a minute, while the loop does not run: turns the servo in turn ahead and to both of its limits, pings, and sends
     /// [`Telemetry::Devices`] ten times a second. Refused while the loop runs.
     ShowDevices,
+    /// Passes a heading, position or pose to the localizer of a running loop, at the next encoder sample; the outcome is a
+    /// [`Telemetry::Absolute`].
+    Absolute {
+        /// How long ago it was measured when this frame was sent first. It is not repeated later with the same age.
+        age: Duration,
+        /// The measurement.
+        measurement: AbsoluteMeasurement,
+    },
 }

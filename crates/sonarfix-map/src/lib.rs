@@ -21,6 +21,7 @@
 
 #![forbid(unsafe_code)]
 
+mod absolute_file;
 mod bake;
 mod clearance;
 mod document;
@@ -48,6 +49,7 @@ mod surroundings;
 mod symmetry;
 mod wall_file;
 
+pub use absolute_file::{AbsoluteSensors, HeadingSensor, PositionSensor, Sampling};
 pub use bake::{BakeError, bake};
 pub use clearance::Collision;
 pub use error::{FileError, Mistake};

@@ -2,6 +2,7 @@
 
 use std::path::{Path as FilePath, PathBuf};
 
+use crate::absolute_file::{self, AbsoluteSensors};
 use crate::clearance::Collision;
 use sonarfix::navigator::{UNKNOWN_HEADING, UNKNOWN_POSITION};
 use sonarfix_hal::config::RobotConfig;
@@ -21,7 +22,7 @@ use crate::surroundings::{self, Surroundings};
 use crate::wall_file::WallFile;
 
 /// The keys of a scenario file, besides `format`.
-pub const KEYS: [&str; 13] = [
+pub const KEYS: [&str; 14] = [
     "name",
     "description",
     "fidelity",
@@ -33,6 +34,7 @@ pub const KEYS: [&str; 13] = [
     "sensor",
     "servo",
     "world",
+    "absolute",
     "faults",
     "run",
 ];
@@ -165,6 +167,8 @@ pub struct Scenario {
     pub hardware: Hardware,
     /// The surroundings that are not in the map.
     pub surroundings: Surroundings,
+    /// Sensors that measure heading, position or pose from outside.
+    pub absolute: AbsoluteSensors,
     /// Faults of the hardware, at [`Fidelity::Pins`] only.
     pub faults: Vec<Fault>,
     /// Number of runs.
@@ -214,6 +218,7 @@ impl Scenario {
             upsets: fidelity::read_upsets(&truth),
             hardware: fidelity::read_hardware(root),
             surroundings: surroundings::read(root),
+            absolute: absolute_file::read(root),
             faults: faults::read(root),
             run: read_run(root),
             path: path?,

@@ -1,11 +1,12 @@
 //! The messages: requests of the PC and answers of the microcontroller, one to each request, in postcard.
 
 use serde::{Deserialize, Serialize};
+use sonarfix::absolute::AbsoluteMeasurement;
 use sonarfix::aim::{Aim, NoAim};
 use sonarfix::ekf::{STATES, StateEstimate};
 use sonarfix::gyro::MeasuredTurn;
 use sonarfix::health::Health;
-use sonarfix::localizer::{Fix, Localizer, OdometryError, Start};
+use sonarfix::localizer::{AbsoluteFix, Fix, Localizer, OdometryError, Start};
 use sonarfix::motion::WheelTravel;
 use sonarfix::units::{Instant, Metres};
 use sonarfix_hal::config::RobotConfig;
@@ -31,6 +32,8 @@ pub enum Request<'a> {
     Poll(Sensors),
     /// Ends the session.
     End,
+    /// A heading, position or pose that was measured at this time.
+    Absolute(Instant, AbsoluteMeasurement),
 }
 
 /// The parameters of a session.
@@ -113,6 +116,10 @@ pub enum Answer {
     },
     /// The session has ended; bytes of stack of its deepest call, zero if they are not measured.
     Ended(u32),
+    /// Localizer session: the result of a heading, position or pose.
+    Absolute(AbsoluteFix, Snapshot),
+    /// Loop session: whether it waits for its encoder sample.
+    Waits(bool),
 }
 
 /// Entries of the covariance's upper triangle.

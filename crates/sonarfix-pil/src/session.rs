@@ -1,7 +1,7 @@
 //! Executes requests: on a microcontroller, and on the PC for comparison.
 
 use sonarfix::aim::{Aim, NoAim};
-use sonarfix::localizer::{self, Fix, Localizer};
+use sonarfix::localizer::{self, AbsoluteFix, AbsoluteRefusal, Fix, Localizer};
 use sonarfix::map::{Map, image};
 use sonarfix::navigator::Mode;
 use sonarfix::search::Search;
@@ -75,6 +75,9 @@ impl<'m> Session<'m> {
         match (self, request) {
             (Self::Localizer { localizer, aim }, request) => call(localizer, aim, request, meter),
             (Self::Loop(robot), Request::Poll(sensors)) => robot.poll(sensors, meter),
+            (Self::Loop(robot), Request::Absolute(at, measurement)) => {
+                (Answer::Waits(robot.app.absolute(*at, measurement).is_ok()), 0)
+            }
             (Self::Loop(_), _) => (Answer::Refused(RequestError::OutOfPlace), 0),
         }
     }
@@ -159,6 +162,11 @@ fn call(
         Request::SkipPing => {
             let cost = meter.measure(|| localizer.skip());
             (Answer::Skipped(localizer.health()), cost)
+        }
+        Request::Absolute(at, ref measurement) => {
+            let mut fix = AbsoluteFix::Refused(AbsoluteRefusal::NoPose);
+            let cost = meter.measure(|| fix = localizer.absolute(at, measurement));
+            (Answer::Absolute(fix, Snapshot::of(localizer)), cost)
         }
         Request::Begin(..) | Request::Poll(_) | Request::End => {
             (Answer::Refused(RequestError::OutOfPlace), 0)

@@ -28,11 +28,12 @@
 //! # Non-finite policy
 //! That of [`Localizer`] and [`Search`]: a NaN or infinity is refused and changes nothing.
 
+use crate::absolute::AbsoluteMeasurement;
 use crate::aim::{Aim, NoAim};
 use crate::ekf::{EkfError, StandardDeviations, StateEstimate};
 use crate::gyro::MeasuredTurn;
 use crate::health::Verdict;
-use crate::localizer::{Fix, Localizer, OdometryError, Start};
+use crate::localizer::{AbsoluteFix, AbsoluteRefusal, Fix, Localizer, OdometryError, Start};
 use crate::motion::WheelTravel;
 use crate::numeric::at_least;
 use crate::search::{Answer, Hypothesis, NotFinite, Region, Search, SearchParameters};
@@ -315,6 +316,14 @@ impl<'m> Navigator<'m> {
             }
         }
         fix
+    }
+
+    /// As [`Localizer::absolute`]; refused ([`AbsoluteRefusal::NoPose`]) while the pose is unknown.
+    pub fn absolute(&mut self, at: Instant, measurement: &AbsoluteMeasurement) -> AbsoluteFix {
+        if self.mode == Mode::Searching {
+            return AbsoluteFix::Refused(AbsoluteRefusal::NoPose);
+        }
+        self.localizer.absolute(at, measurement)
     }
 
     /// As [`Localizer::skip`].

@@ -173,6 +173,7 @@ impl LogReader<'_> {
             }
             Record::Skip { .. }
             | Record::Turn { .. }
+            | Record::Absolute { .. }
             | Record::Pose { .. }
             | Record::Mode { .. } => Ok(()),
         }

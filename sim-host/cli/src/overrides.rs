@@ -6,7 +6,10 @@ use sonarfix::config::PingSchedule;
 use sonarfix::gyro::GyroParameters;
 use sonarfix::units::Duration;
 use sonarfix_hal::config::StartPose;
-use sonarfix_map::{Fidelity, HeadingSlip, Scenario, ServoName};
+use sonarfix_map::{
+    AbsoluteSensors, Fidelity, HeadingSensor, HeadingSlip, PositionSensor, Sampling, Scenario,
+    ServoName,
+};
 use sonarfix_sim::pins::devices;
 
 /// Changes of a scenario; by default it stays as it is.
@@ -31,6 +34,9 @@ pub struct Overrides {
     /// The gyro of the robot.
     #[arg(long, value_enum)]
     gyro: Option<GyroChoice>,
+    /// A sensor that measures heading (2 degrees), position (2 cm) or pose (both) from outside, every 0.73 s and 20 ms late.
+    #[arg(long, value_enum)]
+    absolute: Option<AbsoluteChoice>,
     /// Mean seconds between two slips of a wheel, each of which turns the odometry by 5 to 15 degrees.
     #[arg(long, value_name = "SECONDS")]
     heading_slips: Option<f64>,
@@ -90,6 +96,30 @@ enum GyroChoice {
     Mpu6050,
 }
 
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum AbsoluteChoice {
+    /// A compass.
+    Heading,
+    /// A beacon.
+    Position,
+    /// A camera.
+    Pose,
+}
+
+impl AbsoluteChoice {
+    fn sensors(self) -> AbsoluteSensors {
+        let sampling = Sampling { period: 730_000, delay: 20_000, outliers: 0.0 };
+        let (deviation, turn) = (0.02, 2.0_f64.to_radians());
+        let heading = HeadingSensor { sampling, deviation: turn };
+        let heading_deviation = (self == Self::Pose).then_some(turn);
+        let position = PositionSensor { sampling, deviation, heading_deviation };
+        AbsoluteSensors {
+            heading: (self == Self::Heading).then_some(heading),
+            position: (self != Self::Heading).then_some(position),
+        }
+    }
+}
+
 fn schedule(text: &str) -> Result<PingSchedule, String> {
     if text == "as-fast-as-possible" {
         return Ok(PingSchedule::AsFastAsPossible);
@@ -134,6 +164,9 @@ impl Overrides {
                 scenario.robot.localizer.gyro = Some(GyroParameters::MPU_6050);
             }
             None => {}
+        }
+        if let Some(choice) = self.absolute {
+            scenario.absolute = choice.sensors();
         }
         if let Some(every) = self.heading_slips {
             anyhow::ensure!(every > 0.0, "--heading-slips must be a positive number of seconds");

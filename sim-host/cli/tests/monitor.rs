@@ -19,9 +19,12 @@ use sonarfix::units::{Instant, Metres, Radians};
 use sonarfix_hal::robot::Report;
 use sonarfix_link::message::{Odometry, SkippedPing};
 use sonarfix_link::{Ping, Reporter, Sender, Telemetry, frame};
-use sonarfix_map::{CLASSROOM, Fault, FaultKind, Fidelity, HeadingSlip, PAPER, Scenario};
+use sonarfix_map::{
+    AbsoluteSensors, CLASSROOM, Fault, FaultKind, Fidelity, HeadingSensor, HeadingSlip, PAPER,
+    PositionSensor, Sampling, Scenario,
+};
 use sonarfix_monitor::recording::{Log, Recording};
-use sonarfix_monitor::{Monitor, Received};
+use sonarfix_monitor::{Monitor, Received, view};
 use sonarfix_replay::fault::Complaint;
 use sonarfix_replay::{Replay, Summary};
 use sonarfix_sim::observe;
@@ -406,4 +409,36 @@ fn a_monitor_that_connects_late_records_from_an_estimate() {
         (&robot.estimates.last().unwrap().1, &trace.ticks.last().unwrap().estimate);
     let off = (replayed.pose.x - estimates.pose.x).hypot(replayed.pose.y - estimates.pose.y);
     assert!(off < 0.05, "{off} m off");
+}
+
+/// Headings and positions from outside, of which some come late, between ticks and with outliers.
+#[test]
+fn measurements_from_outside_replay_to_the_bit() {
+    let mut scenario = scenario(CLASSROOM);
+    scenario.robot.localizer.gyro = Some(GyroParameters::MPU_6050);
+    let sampling = |period, delay| Sampling { period, delay, outliers: 0.1 };
+    let heading = HeadingSensor { sampling: sampling(110_000, 30_000), deviation: 0.05 };
+    let position = PositionSensor {
+        sampling: sampling(370_000, 70_000),
+        deviation: 0.05,
+        heading_deviation: None,
+    };
+    let with_pose = PositionSensor { heading_deviation: Some(0.05), ..position };
+    for (seed, position) in [(5, position), (6, with_pose)] {
+        scenario.absolute = AbsoluteSensors { heading: Some(heading), position: Some(position) };
+        let robot = Robot::of(&scenario, seed);
+        let (received, monitor) = received_from(&robot.frames.concat());
+        assert!(view::page(&monitor, &[]).contains("outside"));
+        let log = log(&received);
+        let (trace, summary) = replay(&log, &scenario);
+        assert_same(&robot.estimates, &trace, 0);
+        let counts = summary.absolute;
+        assert!(counts.accepted > 3_000 && counts.gated > 300, "{counts:?}");
+        // Without them it is another estimate.
+        let text = String::from_utf8(log).unwrap();
+        let is_range = |line: &&str| !line.starts_with("heading,");
+        let without: String = text.split_inclusive('\n').filter(is_range).collect();
+        let (other, _) = replay(without.as_bytes(), &scenario);
+        assert_ne!(other.ticks.last().unwrap().estimate, trace.ticks.last().unwrap().estimate);
+    }
 }

@@ -1,6 +1,7 @@
 //! The records of a log as messages: one topic for each kind, with the fields of `docs/formats.md`.
 
 use serde_json::{Value, json};
+use sonarfix::absolute::{AbsoluteMeasurement, PoseNoise};
 use sonarfix::navigator::Mode;
 use sonarfix_replay::log::Record;
 use sonarfix_sim::STATES;
@@ -35,6 +36,47 @@ const POSE_FIELDS: [(&str, Kind); 6] = [
     ("sigma_heading_rad", REAL),
 ];
 
+const ABSOLUTE_FIELDS: [(&str, Kind); 12] = [
+    ("time_s", REAL),
+    ("age_s", REAL),
+    ("kind", Kind::Text),
+    ("x_m", REAL),
+    ("y_m", REAL),
+    ("heading_rad", REAL),
+    ("variance_x_m2", REAL),
+    ("covariance_xy_m2", REAL),
+    ("variance_y_m2", REAL),
+    ("covariance_x_heading_m_rad", REAL),
+    ("covariance_y_heading_m_rad", REAL),
+    ("variance_heading_rad2", REAL),
+];
+
+/// The kind of a measurement, its values x, y and heading, and the triangle of its covariance; nothing for what was not
+/// measured.
+#[expect(clippy::type_complexity, reason = "three parts of one thing")]
+fn numbers(
+    measurement: &AbsoluteMeasurement,
+) -> (&'static str, [Option<f64>; 3], [Option<f64>; 6]) {
+    let of = |value: f32| Some(f64::from(value));
+    match *measurement {
+        AbsoluteMeasurement::Heading { angle, deviation } => {
+            let variance = f64::from(deviation.0).powi(2);
+            ("heading", [None, None, of(angle.0)], [None, None, None, None, None, Some(variance)])
+        }
+        AbsoluteMeasurement::Position { point, noise } => {
+            let variances = [of(noise.xx), of(noise.xy), of(noise.yy), None, None, None];
+            ("position", [of(point.x.0), of(point.y.0), None], variances)
+        }
+        AbsoluteMeasurement::Pose { pose, noise } => {
+            let PoseNoise { position, xh, yh, hh } = noise;
+            let value = [of(pose.x.0), of(pose.y.0), of(pose.heading.radians().0)];
+            let variances =
+                [of(position.xx), of(position.xy), of(position.yy), of(xh), of(yh), of(hh)];
+            ("pose", value, variances)
+        }
+    }
+}
+
 /// The topics and their schemas.
 pub fn topics() -> Vec<(&'static str, Schema)> {
     let whole = Kind::Whole;
@@ -49,6 +91,7 @@ pub fn topics() -> Vec<(&'static str, Schema)> {
         ("/log/wheels", schema::columns("sonarfix.Wheels", wheels.into_iter())),
         ("/log/turn", schema::columns("sonarfix.Turn", turn.into_iter())),
         ("/log/range", schema::columns("sonarfix.Range", range.into_iter())),
+        ("/log/absolute", schema::columns("sonarfix.Absolute", ABSOLUTE_FIELDS.into_iter())),
         ("/log/skip", schema::columns("sonarfix.Skip", [("time_s", REAL)].into_iter())),
         ("/log/scan", schema::laser_scan()),
         ("/log/start", schema::columns("sonarfix.Start", POSE_FIELDS.into_iter())),
@@ -65,6 +108,7 @@ pub fn time(record: &Record) -> f64 {
         | Record::Wheels { time, .. }
         | Record::Turn { time, .. }
         | Record::Range { time, .. }
+        | Record::Absolute { time, .. }
         | Record::Skip { time }
         | Record::Scan { time, .. }
         | Record::Start { time, .. }
@@ -90,6 +134,21 @@ pub fn message(record: &Record, stamp: u64, mount: [f64; 2]) -> (&'static str, V
             "/log/range",
             json!({ "time_s": time, "bearing_rad": bearing, "range_m": range, "wall": wall }),
         ),
+        Record::Absolute { time, age, measurement } => {
+            let (kind, value, variances) = numbers(measurement);
+            let [x, y, heading] = value;
+            let [xx, xy, yy, xh, yh, hh] = variances;
+            (
+                "/log/absolute",
+                json!({
+                    "time_s": time, "age_s": age, "kind": kind,
+                    "x_m": x, "y_m": y, "heading_rad": heading,
+                    "variance_x_m2": xx, "covariance_xy_m2": xy, "variance_y_m2": yy,
+                    "covariance_x_heading_m_rad": xh, "covariance_y_heading_m_rad": yh,
+                    "variance_heading_rad2": hh,
+                }),
+            )
+        }
         Record::Skip { time } => ("/log/skip", json!({ "time_s": time })),
         Record::Scan { scan, .. } => {
             // Beams are counted in `u32`: a line of a log is shorter.

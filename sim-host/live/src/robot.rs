@@ -246,7 +246,10 @@ impl Robot {
                 self.feed.search(&record, &view::search(status, &self.names));
             }
             Telemetry::Hello(_) | Telemetry::LoopStatus(_) => self.status(self.last),
-            Telemetry::Hypothesis(_) | Telemetry::Turn(_) | Telemetry::Gyro(_) => {}
+            Telemetry::Hypothesis(_)
+            | Telemetry::Turn(_)
+            | Telemetry::Gyro(_)
+            | Telemetry::Absolute(_) => {}
         }
     }
 

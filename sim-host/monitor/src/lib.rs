@@ -25,6 +25,7 @@ pub mod wheels;
 
 use sonarfix::localizer::Fix;
 use sonarfix::navigator::Mode;
+use sonarfix_hal::robot::AbsoluteResult;
 use sonarfix_link::message::{GyroState, LoopStatus, RankedHypothesis, SearchStatus, Telemetry};
 use sonarfix_link::{Estimate, Gaps, Hello, Ping, Receiver, ReceiverCounters};
 
@@ -43,6 +44,7 @@ pub struct Monitor {
     fixes: FixCounts,
     state: Option<LoopStatus>,
     gyro: Option<GyroState>,
+    absolute: Option<AbsoluteResult>,
     mode: Mode,
     search: Option<SearchStatus>,
     hypotheses: Vec<RankedHypothesis>,
@@ -103,6 +105,7 @@ impl Monitor {
             Telemetry::Hypothesis(hypothesis) => self.rank(hypothesis),
             Telemetry::Odometry(step) => self.wheels.take(&step),
             Telemetry::Gyro(gyro) => self.gyro = Some(gyro),
+            Telemetry::Absolute(result) => self.absolute = Some(result),
             Telemetry::SkippedPing(_)
             | Telemetry::Turn(_)
             | Telemetry::Sweep(_)

@@ -7,10 +7,12 @@ use std::fs::File;
 use std::io::{self, LineWriter, Write};
 use std::path::PathBuf;
 
-use sonarfix::ekf::STATES;
+use sonarfix::absolute::{AbsoluteMeasurement, PoseNoise, PositionNoise};
 use sonarfix::gyro::TurnReading;
+use sonarfix::localizer::AbsoluteFix;
 use sonarfix::navigator::{Mode, UNKNOWN_POSITION};
 use sonarfix::units::Instant;
+use sonarfix_hal::robot::AbsoluteResult;
 use sonarfix_link::message::{ModeChanged, Odometry, SkippedPing, Sweep};
 use sonarfix_link::{Estimate, Ping, Telemetry};
 use sonarfix_replay::log::HEADER;
@@ -130,8 +132,8 @@ impl<W: Write> Log<W> {
             out,
             "{HEADER}\n{note}resume,{}{}{}",
             Time(start.at),
-            List(start.state.to_array()),
-            List(start.deviation.to_array())
+            Numbers(start.state.to_array()),
+            Numbers(start.deviation.to_array())
         )?;
         let [right, left] = wheels;
         writeln!(out, "wheels,{},{right},{left}", Time(start.at))?;
@@ -152,6 +154,7 @@ impl<W: Write> Log<W> {
             Telemetry::Odometry(step) => self.step(step),
             Telemetry::Turn(reading) => self.turn(reading),
             Telemetry::Ping(ping) => self.ping(ping),
+            Telemetry::Absolute(result) => self.absolute(result),
             Telemetry::Sweep(sweep) => self.sweep(sweep),
             Telemetry::SkippedPing(SkippedPing { at, .. }) => {
                 writeln!(self.out, "skip,{}", Time(*at))
@@ -183,6 +186,33 @@ impl<W: Write> Log<W> {
         writeln!(self.out, "turn,{},{},{breaks}", Time(reading.at()), reading.angle())
     }
 
+    /// A heading, position or pose from outside. One that was refused has changed nothing.
+    fn absolute(&mut self, result: &AbsoluteResult) -> io::Result<()> {
+        if matches!(result.fix, AbsoluteFix::Refused(_)) {
+            return Ok(());
+        }
+        let time = Time(result.at);
+        let age = result.at.ticks().saturating_sub(result.measured_at.ticks());
+        let age = Time(Instant::from_ticks(age));
+        match result.measurement {
+            AbsoluteMeasurement::Heading { angle, deviation } => {
+                let numbers = Numbers([angle.0, deviation.0]);
+                writeln!(self.out, "heading,{time}{numbers},{age}")
+            }
+            AbsoluteMeasurement::Position { point, noise } => {
+                let PositionNoise { xx, xy, yy } = noise;
+                let numbers = Numbers([point.x.0, point.y.0, xx, xy, yy]);
+                writeln!(self.out, "position,{time}{numbers},{age}")
+            }
+            AbsoluteMeasurement::Pose { pose, noise: PoseNoise { position, xh, yh, hh } } => {
+                let PositionNoise { xx, xy, yy } = position;
+                let heading = pose.heading.radians().0;
+                let numbers = Numbers([pose.x.0, pose.y.0, heading, xx, xy, yy, xh, yh, hh]);
+                writeln!(self.out, "measured_pose,{time}{numbers},{age}")
+            }
+        }
+    }
+
     /// A range without a wall, for the search.
     fn sweep(&mut self, sweep: &Sweep) -> io::Result<()> {
         let range = sweep.outcome.map_or(String::new(), |echo| f64::from(echo.range.0).to_string());
@@ -202,7 +232,13 @@ impl<W: Write> Log<W> {
             Mode::Provisional => "provisional",
         };
         let (state, deviation) = (estimate.state.to_array(), estimate.deviation.to_array());
-        writeln!(self.out, "mode,{},{name}{}{}", Time(estimate.at), List(state), List(deviation))
+        writeln!(
+            self.out,
+            "mode,{},{name}{}{}",
+            Time(estimate.at),
+            Numbers(state),
+            Numbers(deviation)
+        )
     }
 
     fn ping(&mut self, ping: &Ping) -> io::Result<()> {
@@ -222,11 +258,11 @@ impl std::fmt::Display for Time {
     }
 }
 
-/// A comma and a number for each state. As `f64`, whose shortest decimals give the same `f32` again;
+/// A comma and a number, for each of them. As `f64`, whose shortest decimals give the same `f32` again;
 /// those of an `f32` might not, because they are parsed as `f64` and rounded a second time.
-struct List([f32; STATES]);
+struct Numbers<const N: usize>([f32; N]);
 
-impl std::fmt::Display for List {
+impl<const N: usize> std::fmt::Display for Numbers<N> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         for value in self.0 {
             write!(f, ",{}", f64::from(value))?;

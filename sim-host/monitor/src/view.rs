@@ -1,11 +1,12 @@
 //! The latest telemetry as text.
 
+use sonarfix::absolute::AbsoluteMeasurement;
 use sonarfix::health::{LOST_AT, Verdict};
-use sonarfix::localizer::{Fix, GyroStatus, TurnUse};
+use sonarfix::localizer::{AbsoluteFix, Fix, GyroStatus, TurnUse};
 use sonarfix::map::WallId;
 use sonarfix::navigator::Mode;
 use sonarfix::units::Instant;
-use sonarfix_hal::robot::Faults;
+use sonarfix_hal::robot::{AbsoluteResult, Faults};
 use sonarfix_link::message::{
     GyroState, ImageStatus, LoopStatus, RankedHypothesis, ResetCause, SearchAnswer, SearchStatus,
 };
@@ -29,6 +30,7 @@ pub fn page(monitor: &Monitor, walls: &[String]) -> String {
         link(monitor),
     ];
     lines.extend(monitor.gyro.as_ref().map(gyro));
+    lines.extend(monitor.absolute.as_ref().map(absolute));
     if monitor.mode != Mode::Tracking {
         lines.extend(monitor.search.as_ref().map(|status| search(status, walls)));
         lines.extend(monitor.hypotheses.iter().map(hypothesis));
@@ -221,6 +223,28 @@ fn gyro(gyro: &GyroState) -> String {
         bias.to_degrees(),
         deviation.to_degrees(),
     )
+}
+
+fn absolute(result: &AbsoluteResult) -> String {
+    let age = seconds(result.at) - seconds(result.measured_at);
+    let value = match result.measurement {
+        AbsoluteMeasurement::Heading { angle, .. } => format!("heading {:.1}°", angle.to_degrees()),
+        AbsoluteMeasurement::Position { point, .. } => {
+            format!("x {:.3} m, y {:.3} m", point.x.0, point.y.0)
+        }
+        AbsoluteMeasurement::Pose { pose, .. } => {
+            let heading = pose.heading.radians().to_degrees();
+            format!("x {:.3} m, y {:.3} m, heading {heading:.1}°", pose.x.0, pose.y.0)
+        }
+    };
+    let outcome = match result.fix {
+        AbsoluteFix::Accepted(_) => "accepted".to_owned(),
+        AbsoluteFix::Downweighted(_) => "downweighted".to_owned(),
+        AbsoluteFix::Gated(_) => "gated".to_owned(),
+        AbsoluteFix::Refused(reason) => format!("refused: {reason}"),
+        _ => String::new(),
+    };
+    format!("outside {value}, measured {age:.3} s before, {outcome}")
 }
 
 fn faults(f: &Faults) -> String {

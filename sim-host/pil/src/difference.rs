@@ -20,7 +20,9 @@ pub fn difference(own: &Answer, theirs: Option<&Answer>) -> String {
 
 fn snapshot(answer: &Answer) -> Option<&Snapshot> {
     match answer {
-        Answer::Odometry(_, snapshot) | Answer::Fix(_, snapshot) => Some(snapshot),
+        Answer::Odometry(_, snapshot)
+        | Answer::Fix(_, snapshot)
+        | Answer::Absolute(_, snapshot) => Some(snapshot),
         Answer::Polled { snapshot, .. } => snapshot.as_ref(),
         _ => None,
     }

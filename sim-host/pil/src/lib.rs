@@ -23,9 +23,10 @@ pub mod pair;
 pub mod progress;
 pub mod tally;
 
+use sonarfix::absolute::AbsoluteMeasurement;
 use sonarfix::aim::{Aim, NoAim};
 use sonarfix::gyro::MeasuredTurn;
-use sonarfix::localizer::{Fix, Localizer, OdometryError, Start};
+use sonarfix::localizer::{AbsoluteFix, Fix, Localizer, OdometryError, Start};
 use sonarfix::motion::WheelTravel;
 use sonarfix::navigator::Mode;
 use sonarfix::search::Search;
@@ -162,6 +163,17 @@ impl LocalizerInputs for ComparedDevice<'_> {
         }
     }
 
+    fn absolute(
+        &mut self,
+        at: Instant,
+        measurement: &AbsoluteMeasurement,
+    ) -> Result<AbsoluteFix, SimulationError> {
+        match self.execute(&Request::Absolute(at, *measurement))? {
+            Answer::Absolute(fix, _) => Ok(fix),
+            other => Err(mismatched(other)),
+        }
+    }
+
     fn skip(&mut self) -> Result<(), SimulationError> {
         match self.execute(&Request::SkipPing)? {
             Answer::Skipped(_) => Ok(()),
@@ -179,6 +191,17 @@ impl Controller for ComparedDevice<'_> {
         self.polled = sensors.at;
         match self.execute(&Request::Poll(*sensors))? {
             Answer::Polled { actuators, .. } => Ok((self.session.report(), actuators)),
+            other => Err(mismatched(other)),
+        }
+    }
+
+    fn absolute(
+        &mut self,
+        at: Instant,
+        measurement: &AbsoluteMeasurement,
+    ) -> Result<bool, SimulationError> {
+        match self.execute(&Request::Absolute(at, *measurement))? {
+            Answer::Waits(waits) => Ok(waits),
             other => Err(mismatched(other)),
         }
     }

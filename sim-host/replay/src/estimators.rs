@@ -1,8 +1,9 @@
 //! The estimators of a replay: the navigator with its search, and dead reckoning beside it.
 
 use serde::Serialize;
+use sonarfix::absolute::AbsoluteMeasurement;
 use sonarfix::ekf::{EkfError, StandardDeviations, StateEstimate};
-use sonarfix::localizer::{Localizer, OdometryError};
+use sonarfix::localizer::{AbsoluteFix, AbsoluteRefusal, Localizer, OdometryError};
 use sonarfix::motion::WheelTravel;
 use sonarfix::navigator::{Mode, Navigator};
 use sonarfix::search::Search;
@@ -130,6 +131,16 @@ impl<'a> Estimators<'a> {
         self.received = received;
         self.work(elapsed);
         Ok(f64::midpoint(right.into(), left.into()).abs())
+    }
+
+    /// Passes a heading, position or pose that was measured at a time.
+    pub fn absolute(&mut self, time: i64, measurement: &AbsoluteMeasurement) -> AbsoluteFix {
+        // Before the epoch there is no step.
+        let since = u64::try_from(time - self.epoch);
+        let refused = AbsoluteFix::Refused(AbsoluteRefusal::BeforeLastStep);
+        since.map_or(refused, |since| {
+            self.navigator.absolute(Instant::from_ticks(since), measurement)
+        })
     }
 
     /// Passes the next encoder sample that failed, in a gap of the log up to a time; returns its time.

@@ -158,6 +158,7 @@ impl<'a> Run<'a> {
             Record::Scan { time, ref scan } => self.scan(log_micros(time), scan),
             Record::Skip { .. }
             | Record::Turn { .. }
+            | Record::Absolute { .. }
             | Record::Start { .. }
             | Record::Pose { .. }
             | Record::Mode { .. }

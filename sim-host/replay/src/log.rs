@@ -1,6 +1,9 @@
 //! The log format, one record a line (`docs/formats.md`, "Logs").
 
+use sonarfix::absolute::{AbsoluteMeasurement, PoseNoise, PositionNoise};
 use sonarfix::navigator::Mode;
+use sonarfix::pose::Point;
+use sonarfix::units::Radians;
 use sonarfix_sim::trace::Pose;
 
 use crate::scan::Scan;
@@ -51,6 +54,15 @@ pub enum Record {
         range: Option<f64>,
         /// The index of the wall that the robot aimed at; `None` if not recorded.
         wall: Option<u32>,
+    },
+    /// A heading, position or pose from outside.
+    Absolute {
+        /// When the localizer took it.
+        time: f64,
+        /// How long before it was measured, seconds.
+        age: f64,
+        /// The measurement.
+        measurement: AbsoluteMeasurement,
     },
     /// A measurement cycle without a measurable wall.
     Skip {
@@ -122,7 +134,7 @@ pub enum Malformed {
     NotText,
     /// Its kind is unknown.
     #[error(
-        "`{0}` is not one of ticks, wheels, turn, range, scan, skip, start, resume, pose, mode"
+        "`{0}` is not one of ticks, wheels, turn, range, scan, skip, heading, position, measured_pose, start, resume, pose, mode"
     )]
     UnknownKind(String),
     /// It ends too early.
@@ -176,6 +188,33 @@ pub fn parse(line: &str) -> Result<Option<Record>, Malformed> {
             range: fields.range()?,
             wall: fields.wall()?,
         },
+        "heading" => {
+            let time = fields.time()?;
+            let angle = Radians(fields.single("heading")?);
+            let deviation = Radians(fields.single("deviation of the heading")?);
+            let measurement = AbsoluteMeasurement::Heading { angle, deviation };
+            Record::Absolute { time, age: fields.age()?, measurement }
+        }
+        "position" => {
+            let time = fields.time()?;
+            let point = Point::new(fields.single("x")?, fields.single("y")?);
+            let noise = fields.position_noise()?;
+            let measurement = AbsoluteMeasurement::Position { point, noise };
+            Record::Absolute { time, age: fields.age()?, measurement }
+        }
+        "measured_pose" => {
+            let time = fields.time()?;
+            let (x, y) = (fields.single("x")?, fields.single("y")?);
+            let pose = sonarfix::pose::Pose::new(x, y, Radians(fields.single("heading")?));
+            let noise = PoseNoise {
+                position: fields.position_noise()?,
+                xh: fields.single("covariance of x and heading")?,
+                yh: fields.single("covariance of y and heading")?,
+                hh: fields.single("variance of the heading")?,
+            };
+            let measurement = AbsoluteMeasurement::Pose { pose, noise };
+            Record::Absolute { time, age: fields.age()?, measurement }
+        }
         "skip" => Record::Skip { time: fields.time()? },
         "scan" => Record::Scan { time: fields.time()?, scan: fields.scan()? },
         "start" => Record::Start {
@@ -250,6 +289,35 @@ impl<'a> Fields<'a> {
 
     fn pose(&mut self) -> Result<Pose, Malformed> {
         Ok(Pose { x: self.number("x")?, y: self.number("y")?, heading: self.number("heading")? })
+    }
+
+    /// A number for the robot, which computes in `f32`.
+    fn single(&mut self, field: &'static str) -> Result<f32, Malformed> {
+        let text = self.next(field)?;
+        #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
+        let value = number(text).map(|value| value as f32);
+        value
+            .filter(|v| v.is_finite())
+            .ok_or_else(|| not(field, text, "a finite number below 3e38"))
+    }
+
+    fn position_noise(&mut self) -> Result<PositionNoise, Malformed> {
+        Ok(PositionNoise {
+            xx: self.single("variance of x")?,
+            xy: self.single("covariance of x and y")?,
+            yy: self.single("variance of y")?,
+        })
+    }
+
+    /// The age of a measurement, if there is such a field.
+    fn age(&mut self) -> Result<f64, Malformed> {
+        let Some(text) = self.fields.next() else {
+            return Ok(0.0);
+        };
+        let text = text.trim();
+        number(text)
+            .filter(|age| (0.0..=TIME_LIMIT).contains(age))
+            .ok_or_else(|| not("age", text, "a number of seconds from 0 to 300 years"))
     }
 
     fn count(&mut self, field: &'static str) -> Result<i64, Malformed> {
@@ -372,6 +440,44 @@ mod tests {
             ),
             ("skip,3.5", Record::Skip { time: 3.5 }),
             (
+                "heading,3,1.5,0.25",
+                Record::Absolute {
+                    time: 3.0,
+                    age: 0.0,
+                    measurement: AbsoluteMeasurement::Heading {
+                        angle: Radians(1.5),
+                        deviation: Radians(0.25),
+                    },
+                },
+            ),
+            (
+                "position,3,1,-2,0.25,0.125,0.5,0.03",
+                Record::Absolute {
+                    time: 3.0,
+                    age: 0.03,
+                    measurement: AbsoluteMeasurement::Position {
+                        point: Point::new(1.0, -2.0),
+                        noise: PositionNoise { xx: 0.25, xy: 0.125, yy: 0.5 },
+                    },
+                },
+            ),
+            (
+                "measured_pose,3,1,-2,0.5,4,5,6,7,8,9,0",
+                Record::Absolute {
+                    time: 3.0,
+                    age: 0.0,
+                    measurement: AbsoluteMeasurement::Pose {
+                        pose: sonarfix::pose::Pose::new(1.0, -2.0, Radians(0.5)),
+                        noise: PoseNoise {
+                            position: PositionNoise { xx: 4.0, xy: 5.0, yy: 6.0 },
+                            xh: 7.0,
+                            yh: 8.0,
+                            hh: 9.0,
+                        },
+                    },
+                },
+            ),
+            (
                 "resume,2,1,2,3,4,5,6,7,8,9,10,11,12,13,0",
                 Record::Resume {
                     time: 2.0,
@@ -418,8 +524,16 @@ mod tests {
         let cases = [
             (
                 "tick,1,2,3",
-                "`tick` is not one of ticks, wheels, turn, range, scan, skip, start, resume, pose, mode",
+                "`tick` is not one of ticks, wheels, turn, range, scan, skip, heading, position, measured_pose, start, resume, pose, mode",
             ),
+            ("heading,1,1e39,1", "the heading is `1e39`, which is not a finite number below 3e38"),
+            ("heading,1,2", "the deviation of the heading is missing"),
+            (
+                "heading,1,2,3,-1",
+                "the age is `-1`, which is not a number of seconds from 0 to 300 years",
+            ),
+            ("position,1,2,3,4,5", "the variance of y is missing"),
+            ("measured_pose,1,2,3,4,5,6,7,8,9", "the variance of the heading is missing"),
             ("range,1,2,3,x", "the wall is `x`, which is not a whole number, from 0"),
             ("range,1,2,3,4,5", "there are more fields than a record of this kind has"),
             ("resume,1,2,3,4,5,6,7,8", "the x is missing"),

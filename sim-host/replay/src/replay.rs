@@ -58,6 +58,8 @@ pub struct Summary {
     pub odometry_heading_max: Option<f64>,
     /// Outcomes of the measurement cycles.
     pub fixes: FixCounts,
+    /// Outcomes of headings, positions and poses from outside.
+    pub absolute: FixCounts,
     /// How many measurement cycles were refused, by reason.
     pub refusals: BTreeMap<String, u64>,
     /// The calibration at the end.
@@ -180,6 +182,7 @@ impl Summary {
             odometry_heading_median: odometry.map(|f| f.heading_median),
             odometry_heading_max: odometry.map(|f| f.heading_max),
             fixes: end.tally.fixes,
+            absolute: end.tally.absolute,
             refusals: end.tally.refusals.clone(),
             calibration: estimate.calibration,
             final_deviation: Calibration { scale_right, scale_left, track_width, range_scale },

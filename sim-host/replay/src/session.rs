@@ -5,6 +5,7 @@ use std::io::BufRead;
 use std::iter::Peekable;
 use std::vec::IntoIter;
 
+use sonarfix::absolute::AbsoluteMeasurement;
 use sonarfix::aim::{Aim, NoAim, Reason};
 use sonarfix::config::{PingSchedule, Sonar};
 use sonarfix::ekf::{STATES, StandardDeviations, StateEstimate};
@@ -78,6 +79,11 @@ enum Echo {
     },
     /// There was no measurable wall.
     Skip,
+    /// A heading, position or pose from outside, measured so many microseconds before.
+    Absolute {
+        age: i64,
+        measurement: AbsoluteMeasurement,
+    },
     /// The pose was replaced.
     Pose(Start),
     /// The mode has changed.
@@ -111,6 +117,8 @@ enum Encoder {
 #[derive(Debug, Clone, Default)]
 pub struct Tally {
     pub fixes: FixCounts,
+    /// Headings, positions and poses from outside.
+    pub absolute: FixCounts,
     /// Refused measurement cycles, by reason.
     pub refusals: BTreeMap<String, u64>,
     pub encoder_records: u64,
@@ -217,6 +225,9 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
             }
             Record::Range { time, bearing, range, wall } => {
                 self.hold(micros(time), Echo::At { bearing, range, wall })
+            }
+            Record::Absolute { time, age, measurement } => {
+                self.hold(micros(time), Echo::Absolute { age: micros(age), measurement })
             }
             Record::Skip { time } => self.hold(micros(time), Echo::Skip),
             Record::Scan { time, scan } => {
@@ -458,6 +469,10 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
                 }
                 self.tally.distance += estimators.drive_to(from.between(to, measurement.time))?;
                 match &measurement.echo {
+                    Echo::Absolute { age, measurement: absolute } => {
+                        let fix = estimators.absolute(measurement.time - age, absolute);
+                        self.tally.absolute.count(&fix);
+                    }
                     Echo::Pose(start) => estimators.navigator.set_pose(start)?,
                     Echo::Mode { mode, state, deviation } => {
                         estimators.adopt(*mode, *state, *deviation)?;
@@ -558,7 +573,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
                 why: UNKNOWN,
             }),
             Echo::Scan { .. } => localizer.aim(),
-            Echo::Skip | Echo::Pose(_) | Echo::Mode { .. } => {
+            Echo::Skip | Echo::Absolute { .. } | Echo::Pose(_) | Echo::Mode { .. } => {
                 Err(localizer.aim().err().unwrap_or(NoAim::NoWall))
             }
         };
@@ -577,7 +592,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         };
         measurement.range = match &pending.echo {
             Echo::At { range, .. } => *range,
-            Echo::Skip | Echo::Pose(_) | Echo::Mode { .. } => None,
+            Echo::Skip | Echo::Absolute { .. } | Echo::Pose(_) | Echo::Mode { .. } => None,
             Echo::Scan { scan, .. } => scan.earliest(&Cone::of(sonar, aim.bearing)),
         };
         #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
@@ -624,7 +639,11 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
 impl Echo {
     fn beams(&self) -> usize {
         match self {
-            Echo::At { .. } | Echo::Skip | Echo::Pose(_) | Echo::Mode { .. } => 0,
+            Echo::At { .. }
+            | Echo::Skip
+            | Echo::Absolute { .. }
+            | Echo::Pose(_)
+            | Echo::Mode { .. } => 0,
             Echo::Scan { scan, .. } => scan.ranges.len(),
         }
     }
@@ -645,7 +664,7 @@ fn sweep(estimators: &mut Estimators, echo: &Echo, sonar: &Sonar) {
                 estimators.swept(bearing, range.map(|[range]| Metres(range)));
             }
         }
-        Echo::Skip | Echo::Pose(_) | Echo::Mode { .. } => {}
+        Echo::Skip | Echo::Absolute { .. } | Echo::Pose(_) | Echo::Mode { .. } => {}
     }
 }
 

@@ -4,6 +4,8 @@
 //! It is the filter's covariance recursion, evaluated at the true states. The RMS error of an
 //! efficient filter equals it.
 
+use sonarfix::absolute::{AbsoluteMeasurement, PositionNoise};
+
 use crate::dense::{DenseFilter, Line, Model, Vector};
 use crate::dense_gyro::{DenseGyroFilter, GyroModel};
 
@@ -49,6 +51,35 @@ impl Bound {
         let (range, _) = self.filter.model.range(&truth, line);
         self.filter.correct(line, range);
         self.filter.x = truth;
+    }
+
+    /// Updates with a heading, position or pose at the current state; its components have independent noise.
+    pub fn measured(&mut self, measurement: &AbsoluteMeasurement) {
+        match *measurement {
+            AbsoluteMeasurement::Heading { deviation, .. } => {
+                self.correct_state(2, f64::from(deviation.0).powi(2));
+            }
+            AbsoluteMeasurement::Position { noise, .. } => self.correct_position(&noise),
+            AbsoluteMeasurement::Pose { noise, .. } => {
+                self.correct_position(&noise.position);
+                self.correct_state(2, noise.hh.into());
+            }
+        }
+    }
+
+    fn correct_position(&mut self, noise: &PositionNoise) {
+        self.correct_state(0, noise.xx.into());
+        self.correct_state(1, noise.yy.into());
+    }
+
+    fn correct_state(&mut self, state: usize, noise: f64) {
+        match &mut self.with_gyro {
+            None => self.filter.correct_state(state, noise),
+            Some(aided) => {
+                aided.correct_state(state, noise);
+                self.filter.p = aided.covariance();
+            }
+        }
     }
 
     /// The bound on each state's standard deviation.

@@ -226,6 +226,15 @@ impl DenseFilter {
         self.x[2] = angle::wrap(self.x[2]);
     }
 
+    /// The covariance after one state was measured with noise of this variance.
+    pub fn correct_state(&mut self, state: usize, noise: f64) {
+        let mut h = Vector::zeros();
+        h[state] = 1.0;
+        let gain = self.p * h / (h.dot(&(self.p * h)) + noise);
+        let keep = Matrix::identity() - gain * h.transpose();
+        self.p = keep * self.p * keep.transpose() + gain * gain.transpose() * noise;
+    }
+
     /// One standard deviation of each state.
     #[must_use]
     pub fn standard_deviations(&self) -> Vector {

@@ -111,6 +111,15 @@ impl DenseGyroFilter {
         self.p = keep * self.p * keep.transpose() + gain * gain.transpose() * noise;
     }
 
+    /// The covariance after one state was measured with noise of this variance.
+    pub fn correct_state(&mut self, state: usize, noise: f64) {
+        let mut h = SVector::<f64, STATES>::zeros();
+        h[state] = 1.0;
+        let gain = self.p * h / (h.dot(&(self.p * h)) + noise);
+        let keep = SMatrix::<f64, STATES, STATES>::identity() - gain * h.transpose();
+        self.p = keep * self.p * keep.transpose() + gain * gain.transpose() * noise;
+    }
+
     /// The covariance of the seven states.
     #[must_use]
     pub fn covariance(&self) -> Matrix {

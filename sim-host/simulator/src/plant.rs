@@ -6,6 +6,7 @@
 //! - [`gyro`]: a gyro's rates;
 //! - [`servo`]: the true bearing of the sonar.
 
+pub mod absolute;
 mod course;
 pub mod follower;
 pub mod gyro;

@@ -2,12 +2,13 @@
 
 use serde::Serialize;
 use sonarfix::health::Verdict;
+use sonarfix::localizer::AbsoluteFix;
 use sonarfix_hal::robot::Faults;
 
 use crate::dense::Vector;
 use crate::integrity::Integrity;
 
-/// Number of measurement cycles by outcome.
+/// Number of measurement cycles, or of headings and positions from outside, by outcome.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct FixCounts {
     /// Ranges that corrected the filter.
@@ -16,6 +17,17 @@ pub struct FixCounts {
     pub gated: u64,
     /// Cycles without a usable range.
     pub refused: u64,
+}
+
+impl FixCounts {
+    /// Counts a heading, position or pose from outside.
+    pub fn count(&mut self, fix: &AbsoluteFix) {
+        *match fix {
+            AbsoluteFix::Accepted(_) | AbsoluteFix::Downweighted(_) => &mut self.accepted,
+            AbsoluteFix::Gated(_) => &mut self.gated,
+            _ => &mut self.refused,
+        } += 1;
+    }
 }
 
 /// Sum of the normalised innovations squared.
@@ -30,6 +42,12 @@ impl NisSum {
     pub fn add(&mut self, nis: f64) {
         self.sum += nis;
         self.count += 1;
+    }
+
+    /// Adds that of a measurement of several numbers, whose mean is their number.
+    pub fn add_vector(&mut self, nis: f64, dimensions: u8) {
+        self.sum += nis;
+        self.count += u64::from(dimensions);
     }
 
     /// The sum, and the number of terms.
@@ -85,6 +103,8 @@ pub struct RunResult {
     pub path: PathSum,
     /// Outcomes of the measurement cycles.
     pub fixes: FixCounts,
+    /// Outcomes of headings, positions and poses from outside.
+    pub absolute: FixCounts,
     /// Whether the robot was lost at the end.
     pub lost: bool,
     /// Whether the errors along the path were inside the filter's confidence ellipse.

@@ -4,6 +4,7 @@
 //! flash, and whatever it accepts can start.
 
 use embedded_storage::nor_flash::NorFlash;
+use sonarfix::absolute::AbsoluteMeasurement;
 use sonarfix::localizer::{Localizer, Start, StartError};
 use sonarfix::map::Map;
 use sonarfix::map::image::checksum as crc32;
@@ -106,6 +107,10 @@ impl<'m, F: NorFlash> App<'m, F> {
             Command::ResetCalibration => self.reset_calibration(now, polled),
             Command::Search => self.begin_search(now, polled),
             Command::ShowDevices => self.show_devices(now),
+            Command::Absolute { age, ref measurement } => {
+                let at = Instant::from_ticks(now.ticks().saturating_sub(age.ticks()));
+                self.absolute(at, measurement).map(|()| Next::Nothing)
+            }
             Command::MapChecksum | Command::OpenSession => Ok(Next::Nothing),
         }
     }
@@ -282,6 +287,19 @@ impl<'m, F: NorFlash> App<'m, F> {
         running.robot.search(now, &mut self.search);
         let (mode, localizer) = (running.robot.mode(), running.robot.localizer());
         Ok(Next::Report(reporter::mode_changed(mode, localizer)))
+    }
+
+    /// Passes a heading, position or pose that was measured at the time `at` to a running loop ([`Robot::absolute`]).
+    ///
+    /// # Errors
+    /// [`CommandError::Waiting`], or [`CommandError::Occupied`]; nothing has changed.
+    pub fn absolute(
+        &mut self,
+        at: Instant,
+        measurement: &AbsoluteMeasurement,
+    ) -> Result<(), CommandError> {
+        let Mode::Running(running) = &mut self.mode else { return Err(CommandError::Waiting) };
+        running.robot.absolute(at, measurement).map_err(|_| CommandError::Occupied)
     }
 
     fn show_devices(&mut self, now: Instant) -> Result<Next, CommandError> {

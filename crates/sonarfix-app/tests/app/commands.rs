@@ -1,8 +1,9 @@
 //! Effects of commands, also after a power cycle.
 
+use sonarfix::absolute::AbsoluteMeasurement;
 use sonarfix::ekf::StandardDeviations;
 use sonarfix::localizer::Start;
-use sonarfix::units::{Metres, MetresPerSecond, Radians};
+use sonarfix::units::{Duration, Metres, MetresPerSecond, Radians};
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_link::message::{CommandError, CommandResult, ImageStatus};
 use sonarfix_link::{Command, Telemetry, baked};
@@ -272,4 +273,37 @@ fn telemetry_leaves_half_of_the_line_free() {
     let a_second = (bench.line.sent - before) / 60;
     println!("{a_second} bytes a second");
     assert!(a_second > 500 && a_second < 11_520 / 2, "{a_second} bytes a second");
+}
+
+/// A heading from outside is taken by a running loop, with its outcome in a message; otherwise it is refused.
+#[test]
+fn a_heading_is_taken_by_a_running_loop() {
+    let baked = Baked::new(&config());
+    let mut bench = Bench::switched_on(&baked, SimFlash::new());
+    let heading = |angle, age| Command::Absolute {
+        age: Duration::from_ticks(age),
+        measurement: AbsoluteMeasurement::Heading { angle, deviation: Radians(0.05) },
+    };
+    let here = start().pose.heading.radians();
+    assert_eq!(bench.order(&heading(here, 0)), refused(CommandError::Waiting));
+    assert_eq!(bench.order(&Command::SetPose(start())), DONE);
+    assert_eq!(bench.order(&Command::Start), DONE);
+    bench.wait(1_000);
+    let off = Radians(here.0 + 1.0);
+    for (angle, age, expected) in [
+        (here, 20_000, "Accepted"),
+        (off, 20_000, "Gated"),
+        (here, 300_000, "Refused(BeforeLastStep)"),
+    ] {
+        assert_eq!(bench.order(&heading(angle, age)), DONE);
+        let messages = bench.wait(200);
+        let results = messages.iter().filter_map(|message| match message {
+            Telemetry::Absolute(result) => Some(format!("{:?}", result.fix)),
+            _ => None,
+        });
+        let results: Vec<_> = results.collect();
+        assert!(matches!(&results[..], [fix] if fix.starts_with(expected)), "{results:?}");
+    }
+    bench.send(&heading(here, 0));
+    assert_eq!(bench.order(&heading(here, 0)), refused(CommandError::Occupied));
 }

@@ -7,7 +7,7 @@ use sonarfix::motion::WheelTravel;
 use sonarfix::navigator::Mode;
 use sonarfix::units::{Duration, Instant, Radians};
 
-use super::Faults;
+use super::{AbsoluteResult, Faults};
 use crate::ranger::Outcome;
 
 /// The report of one poll, in the order of execution.
@@ -26,6 +26,9 @@ pub struct Report {
     /// A ping was started, at the bearing of the servo, which differs from that of the choice by the
     /// resolution of the PWM.
     pub pinged: Option<Aim>,
+    /// Heading and position from outside that were passed to the localizer before everything else, because they were made in
+    /// its last step. Those of the steps of this poll are in [`Step::absolute`].
+    pub absolute: [Option<AbsoluteResult>; 2],
     /// The new mode, if it has changed.
     pub mode: Option<Mode>,
     /// The faults of this poll.
@@ -43,7 +46,20 @@ impl Report {
     #[must_use]
     pub fn has_worked(&self) -> bool {
         let has_pinged = self.has_ended_ping() || self.pinged.is_some();
-        has_pinged || self.tick.is_some() || self.aimed.is_some() || self.mode.is_some()
+        has_pinged
+            || self.tick.is_some()
+            || self.aimed.is_some()
+            || self.mode.is_some()
+            || self.absolute.is_some()
+    }
+
+    /// The headings and positions from outside that were passed to the localizer, in this order.
+    pub fn absolutes(&self) -> impl Iterator<Item = &AbsoluteResult> {
+        let pinged = self.ping_result.as_ref().and_then(|result| result.step.as_ref());
+        let swept = self.swept.as_ref().and_then(|result| result.step.as_ref());
+        let ticked = self.tick.as_ref().and_then(|tick| tick.step.as_ref());
+        let steps = [pinged, swept, ticked].into_iter().flatten();
+        self.absolute.iter().chain(steps.filter_map(|step| step.absolute.as_ref()))
     }
 
     /// Whether a ping has ended.
@@ -64,6 +80,8 @@ pub struct Step {
     pub turn: Option<TurnReading>,
     /// The localizer's response.
     pub result: StepResult,
+    /// A heading or position from outside that was made during the travel, passed to the localizer after it.
+    pub absolute: Option<AbsoluteResult>,
 }
 
 /// The localizer's response to a step. No encoder edge is lost without a report: the travel of a step is

@@ -7,6 +7,7 @@
     reason = "a few seconds and a few metres fit into any of these types"
 )]
 
+mod absolute;
 #[cfg(feature = "async")]
 mod asynch;
 mod faults;

@@ -15,8 +15,8 @@ use sonarfix_link::message::ImageStatus;
 use sonarfix_link::{Command, CommandResult, Telemetry, VERSION, baked};
 
 use crate::messages::{
-    ANSWERS, COMMANDS, Counting, MODES, NO_ECHO, REFUSALS, REFUSED, RESETS, TELEMETRY, command,
-    telemetry,
+    ABSOLUTE_REFUSALS, ANSWERS, COMMANDS, Counting, MODES, NO_ECHO, REFUSALS, REFUSED, RESETS,
+    TELEMETRY, command, telemetry,
 };
 use crate::wire::to_stdvec;
 
@@ -46,6 +46,7 @@ fn name_of_telemetry(message: &Telemetry) -> &'static str {
         Telemetry::Devices(_) => "devices",
         Telemetry::Turn(_) => "turn",
         Telemetry::Gyro(_) => "gyro",
+        Telemetry::Absolute(_) => "absolute result",
     }
 }
 
@@ -60,6 +61,7 @@ fn name_of_command(message: &Command) -> &'static str {
         Command::OpenSession => "open session",
         Command::Search => "search",
         Command::ShowDevices => "show devices",
+        Command::Absolute { .. } => "absolute",
     }
 }
 
@@ -97,6 +99,7 @@ fn every_variant_has_the_number_of_its_version() {
     numbered(&REFUSALS);
     numbered(&RESETS);
     numbered(&REFUSED);
+    numbered(&ABSOLUTE_REFUSALS);
     numbered(&[NoAim::NoWall]);
     numbered(&[Verdict::Tracking, Verdict::Degraded, Verdict::Lost]);
     let innovation = Innovation { value: Metres(0.0), variance: SquareMetres(0.0) };

@@ -2,12 +2,15 @@
 
 use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
+use sonarfix::absolute::{AbsoluteMeasurement, PoseNoise, PositionNoise};
 use sonarfix::aim::{Aim, NoAim, Reason};
 use sonarfix::config::{Config, PingSchedule, PingTiming, Policy, ServoTiming};
-use sonarfix::ekf::{Innovation, STATES, StandardDeviations, StateEstimate};
+use sonarfix::ekf::{EkfError, Innovation, STATES, StandardDeviations, StateEstimate};
 use sonarfix::gyro::{GyroParameters, TurnReading, TurnRefusal};
 use sonarfix::health::{Health, Verdict};
-use sonarfix::localizer::{Fix, GyroStatus, Refusal, Start, TurnUse};
+use sonarfix::localizer::{
+    AbsoluteFix, AbsoluteRefusal, Agreement, Fix, GyroStatus, Refusal, Start, TurnUse,
+};
 use sonarfix::map::WallId;
 use sonarfix::navigator::Mode;
 use sonarfix::pose::{Point, Pose};
@@ -18,7 +21,7 @@ use sonarfix::units::{
 };
 use sonarfix_hal::config::{MotorPolicy, RangerConfig, RobotConfig, StartPose, Unsupported};
 use sonarfix_hal::ranger::{Celsius, Echo, NoEcho, Outcome, PulseTiming, RangerKind};
-use sonarfix_hal::robot::{EncoderFaults, Faults};
+use sonarfix_hal::robot::{AbsoluteResult, EncoderFaults, Faults};
 use sonarfix_hal::servo::{MeasuredPulse, SettingError};
 use sonarfix_link::message::{
     CommandError, DeviceReadings, EncoderReading, GyroState, ImageStatus, LoopStatus, ModeChanged,
@@ -119,8 +122,8 @@ impl Source for Largest {
 }
 
 /// The numbers of kinds of telemetry and of commands.
-pub const TELEMETRY: u32 = 16;
-pub const COMMANDS: u32 = 9;
+pub const TELEMETRY: u32 = 17;
+pub const COMMANDS: u32 = 10;
 
 pub fn any_telemetry(rng: &mut ChaCha8Rng) -> Telemetry {
     let kind = rng.pick(TELEMETRY);
@@ -184,6 +187,7 @@ pub fn telemetry(kind: u32, source: &mut impl Source) -> Telemetry {
         }),
         14 => Telemetry::Turn(turn(source)),
         15 => Telemetry::Gyro(gyro(source)),
+        16 => Telemetry::Absolute(absolute_result(source)),
         _ => Telemetry::Devices(DeviceReadings {
             at: source.instant(),
             right: encoder(source),
@@ -227,7 +231,8 @@ pub fn command(kind: u32, source: &mut impl Source) -> SessionCommand {
         5 => Command::MapChecksum,
         6 => Command::OpenSession,
         7 => Command::Search,
-        _ => Command::ShowDevices,
+        8 => Command::ShowDevices,
+        _ => Command::Absolute { age: source.duration(), measurement: absolute(source) },
     };
     SessionCommand { session: source.bits32(), command }
 }
@@ -252,6 +257,48 @@ fn gyro(source: &mut impl Source) -> GyroState {
         },
     }
 }
+
+fn absolute(source: &mut impl Source) -> AbsoluteMeasurement {
+    let kind = source.pick(3);
+    if kind == 2 {
+        let (angle, deviation) = (Radians(source.single()), Radians(source.single()));
+        return AbsoluteMeasurement::Heading { angle, deviation };
+    }
+    let (x, y) = (source.single(), source.single());
+    let heading = source.single();
+    let position = PositionNoise { xx: source.single(), xy: source.single(), yy: source.single() };
+    if kind == 1 {
+        return AbsoluteMeasurement::Position { point: Point::new(x, y), noise: position };
+    }
+    // A heading is wrapped, so only a finite one is transmitted bit for bit.
+    let pose = Pose::new(x, y, Radians(if heading.is_finite() { heading } else { 1.0 }));
+    let (xh, yh, hh) = (source.single(), source.single(), source.single());
+    AbsoluteMeasurement::Pose { pose, noise: PoseNoise { position, xh, yh, hh } }
+}
+
+fn absolute_result(source: &mut impl Source) -> AbsoluteResult {
+    let (at, measured_at, measurement) = (source.instant(), source.instant(), absolute(source));
+    let agreement =
+        Agreement { nis: source.single(), dimensions: source.bits16().to_le_bytes()[0] };
+    let refused = AbsoluteFix::Refused(source.choose(&ABSOLUTE_REFUSALS));
+    let fix = source.choose(&[
+        AbsoluteFix::Accepted(agreement),
+        AbsoluteFix::Downweighted(agreement),
+        AbsoluteFix::Gated(agreement),
+        refused,
+    ]);
+    AbsoluteResult { at, measured_at, measurement, fix }
+}
+
+/// Every reason for which an absolute measurement is refused, in the order of their numbers.
+pub const ABSOLUTE_REFUSALS: [AbsoluteRefusal; 6] = [
+    AbsoluteRefusal::NotFinite,
+    AbsoluteRefusal::NotPositiveDefinite,
+    AbsoluteRefusal::BeforeLastStep,
+    AbsoluteRefusal::AfterLastStep,
+    AbsoluteRefusal::NoPose,
+    AbsoluteRefusal::Filter(EkfError::NotFinite),
+];
 
 fn turn(source: &mut impl Source) -> TurnReading {
     let (at, angle) = (source.instant(), source.bits64().cast_signed());
@@ -398,7 +445,7 @@ fn reset(source: &mut impl Source) -> ResetCause {
     source.choose(&RESETS)
 }
 
-pub const REFUSED: [CommandError; 10] = [
+pub const REFUSED: [CommandError; 12] = [
     CommandError::Configuration,
     CommandError::Pose,
     CommandError::NoMap,
@@ -409,6 +456,8 @@ pub const REFUSED: [CommandError; 10] = [
     CommandError::Session,
     CommandError::NoSearch,
     CommandError::Running,
+    CommandError::Waiting,
+    CommandError::Occupied,
 ];
 
 fn command_result(source: &mut impl Source) -> CommandResult {

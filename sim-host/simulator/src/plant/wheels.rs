@@ -18,6 +18,20 @@ pub struct Travel {
     pub seconds: f64,
 }
 
+impl Travel {
+    /// This travel and another one after it.
+    #[must_use]
+    pub fn plus(&self, more: &Self) -> Self {
+        let sum = |a: [f64; 2], b: [f64; 2]| [a[0] + b[0], a[1] + b[1]];
+        Self {
+            measured: sum(self.measured, more.measured),
+            noiseless: sum(self.noiseless, more.noiseless),
+            turn: self.turn + more.turn,
+            seconds: self.seconds + more.seconds,
+        }
+    }
+}
+
 /// Two wheels with their systematic and random errors.
 #[derive(Debug, Clone)]
 pub struct Wheels {

@@ -1,9 +1,10 @@
 //! The computer that runs the robot's software: here this process; in `sonarfix-pil-host` an emulated
 //! microcontroller.
 
+use sonarfix::absolute::AbsoluteMeasurement;
 use sonarfix::aim::{Aim, NoAim};
 use sonarfix::gyro::MeasuredTurn;
-use sonarfix::localizer::{Fix, Localizer, OdometryError, Start};
+use sonarfix::localizer::{AbsoluteFix, Fix, Localizer, OdometryError, Start};
 use sonarfix::motion::WheelTravel;
 use sonarfix::navigator::{Mode, UNKNOWN_HEADING, UNKNOWN_POSITION};
 use sonarfix::pose::Pose;
@@ -68,6 +69,15 @@ pub trait LocalizerInputs {
     /// # Errors
     /// [`SimulationError`], if the computer fails.
     fn fix(&mut self, aim: &Aim, range: Option<Metres>) -> Result<Fix, SimulationError>;
+    /// Passes a heading, position or pose that was measured at a time.
+    ///
+    /// # Errors
+    /// [`SimulationError`], if the computer fails.
+    fn absolute(
+        &mut self,
+        at: Instant,
+        measurement: &AbsoluteMeasurement,
+    ) -> Result<AbsoluteFix, SimulationError>;
     /// Reports a cycle without a measurable wall.
     ///
     /// # Errors
@@ -87,6 +97,16 @@ pub trait Controller {
     /// # Errors
     /// [`SimulationError`], if the computer fails.
     fn poll(&mut self, sensors: &Sensors) -> Result<(Report, Actuators), SimulationError>;
+    /// Passes a heading, position or pose that was measured at a time, for the next polls; returns whether it waits for
+    /// one, or an earlier one still does.
+    ///
+    /// # Errors
+    /// [`SimulationError`], if the computer fails.
+    fn absolute(
+        &mut self,
+        at: Instant,
+        measurement: &AbsoluteMeasurement,
+    ) -> Result<bool, SimulationError>;
     /// The localizer, for reading its state.
     ///
     /// # Errors
@@ -181,6 +201,14 @@ impl LocalizerInputs for Localizer<'_> {
         Ok(Localizer::fix(self, aim, range))
     }
 
+    fn absolute(
+        &mut self,
+        at: Instant,
+        measurement: &AbsoluteMeasurement,
+    ) -> Result<AbsoluteFix, SimulationError> {
+        Ok(Localizer::absolute(self, at, measurement))
+    }
+
     fn skip(&mut self) -> Result<(), SimulationError> {
         Localizer::skip(self);
         Ok(())
@@ -209,6 +237,14 @@ impl Controller for RobotOnWires<'_> {
             Some(search) => robot.poll_with_search(sensors.at, devices, search),
         };
         Ok((report, wires.take()))
+    }
+
+    fn absolute(
+        &mut self,
+        at: Instant,
+        measurement: &AbsoluteMeasurement,
+    ) -> Result<bool, SimulationError> {
+        Ok(self.robot.absolute(at, measurement).is_ok())
     }
 
     fn localizer(&self) -> Result<&Localizer<'_>, SimulationError> {

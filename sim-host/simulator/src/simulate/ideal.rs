@@ -12,9 +12,10 @@ use super::simulation::Simulation;
 use super::streams::RandomStreams;
 use crate::angle;
 use crate::observe::{self, Measurement};
-use crate::plant::Plant;
+use crate::plant::absolute::Absolute;
 use crate::plant::follower::Follower;
 use crate::plant::gyro::Gyro;
+use crate::plant::{Plant, Travel};
 use crate::statistics::RunResult;
 use crate::time::seconds;
 use crate::trace::Recorder;
@@ -38,14 +39,31 @@ pub fn run(
     let sensor = SensorModel { scale: simulation.range_scale, ..simulation.sensor.clone() };
     let follower = simulation.follower();
     let gyro = simulation.gyro(&mut streams.gyro);
-    let mut run =
-        Run { simulation, sensor, streams, plant, localizer, follower, score, gyro, now: 0 };
+    let mut run = Run {
+        simulation,
+        sensor,
+        streams,
+        plant,
+        localizer,
+        follower,
+        score,
+        gyro,
+        absolute: Absolute::new(simulation.scenario.absolute),
+        rolled: Travel::default(),
+        turned: 0.0,
+        passed: 0,
+        now: 0,
+    };
     let tick_period = simulation.scenario.robot.encoder_period.to_micros();
     let fix_period = simulation.ideal_period().to_micros();
     let (mut next_tick, mut next_fix) = (tick_period, fix_period);
     run.score.started(run.localizer.localizer()?, &run.plant, recorder);
     while next_tick.min(next_fix) <= simulation.end() {
         let now = next_tick.min(next_fix);
+        while run.absolute.next(run.now) < now {
+            run.drive_plant_to(run.absolute.next(run.now));
+            run.take_absolutes()?;
+        }
         run.drive_to(now)?;
         if now == next_fix {
             run.take_fix(recorder)?;
@@ -70,6 +88,11 @@ struct Run<'a, T> {
     follower: Option<Follower>,
     score: Score<'a>,
     gyro: Option<Gyro>,
+    absolute: Absolute,
+    /// Travel since the last wheel travel that was passed to the localizer, the turn by the gyro, and its time, µs.
+    rolled: Travel,
+    turned: f64,
+    passed: u64,
     /// Microseconds since the run began.
     now: u64,
 }
@@ -79,16 +102,26 @@ impl<T: LocalizerInputs> Run<'_, T> {
         seconds(self.now)
     }
 
-    fn drive_to(&mut self, now: u64) -> Result<(), SimulationError> {
-        let elapsed = Duration::from_ticks(now - self.now);
+    /// Drives on; what is measured from outside is measured at the end.
+    fn drive_plant_to(&mut self, now: u64) {
         self.now = now;
+        let RandomStreams { wheels, slips, gyro, absolute, .. } = &mut self.streams;
+        let travel = self.plant.drive_to(seconds(now), wheels, slips);
+        if let Some(measured) = &mut self.gyro {
+            self.turned += measured.integral(travel.turn, travel.seconds, gyro);
+        }
+        self.rolled = self.rolled.plus(&travel);
+        self.absolute.measure(now, &self.plant.pose(), absolute);
+    }
+
+    fn drive_to(&mut self, now: u64) -> Result<(), SimulationError> {
+        self.drive_plant_to(now);
         let time = seconds(now);
-        let RandomStreams { wheels, slips, gyro, .. } = &mut self.streams;
-        let travel = self.plant.drive_to(time, wheels, slips);
-        let turn = self.gyro.as_mut().map(|measured| {
-            let angle = measured.integral(travel.turn, travel.seconds, gyro);
+        let (travel, turned) = (std::mem::take(&mut self.rolled), std::mem::take(&mut self.turned));
+        let elapsed = Duration::from_ticks(now - std::mem::replace(&mut self.passed, now));
+        let turn = self.gyro.is_some().then(|| {
             #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
-            let angle = Radians(angle as f32);
+            let angle = Radians(turned as f32);
             MeasuredTurn { angle, duration: elapsed }
         });
         self.score.rolled(travel);
@@ -97,7 +130,17 @@ impl<T: LocalizerInputs> Run<'_, T> {
         let [right, left] = travel.measured.map(|metres| metres as f32);
         self.localizer
             .odometry(Instant::from_ticks(now), WheelTravel::new(right, left), turn)?
-            .map_err(|error| SimulationError::Odometry { time, error })
+            .map_err(|error| SimulationError::Odometry { time, error })?;
+        self.take_absolutes()
+    }
+
+    /// Passes what has arrived and was measured up to the time of the localizer.
+    fn take_absolutes(&mut self) -> Result<(), SimulationError> {
+        while let Some((at, measurement)) = self.absolute.arrived(self.now, self.passed) {
+            let fix = self.localizer.absolute(at, &measurement)?;
+            self.score.absolute(&measurement, &fix);
+        }
+        Ok(())
     }
 
     fn take_fix(&mut self, recorder: &mut impl Recorder) -> Result<(), SimulationError> {

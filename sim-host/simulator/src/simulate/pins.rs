@@ -22,6 +22,7 @@ use crate::pins::faults::Faults;
 use crate::pins::gyro::GyroChip;
 use crate::pins::wires::EncoderWires;
 use crate::plant::Plant;
+use crate::plant::absolute::Absolute;
 use crate::plant::follower::{Command, Follower};
 use crate::plant::servo::ServoPlant;
 use crate::statistics::RunResult;
@@ -95,6 +96,7 @@ struct SimulatedHardware<'a> {
     measurement: Option<Measurement>,
     /// The gyro, if the robot has one.
     gyro: Option<GyroChip>,
+    absolute: Absolute,
     /// Microseconds since the run began.
     now: u64,
 }
@@ -135,6 +137,7 @@ impl<'a> SimulatedHardware<'a> {
             mode: Mode::Tracking,
             measurement: None,
             gyro,
+            absolute: Absolute::new(scenario.absolute),
             now: 0,
         };
         Ok((hardware, start))
@@ -153,8 +156,15 @@ impl<'a> SimulatedHardware<'a> {
             if let Some(back_at) = self.faults.controller.power_back_at(self.now) {
                 return Ok(Some(back_at));
             }
+            let mut has_arrived = false;
+            while let Some((at, measurement)) = self.absolute.arrived(self.now, self.now) {
+                has_arrived = true;
+                if !controller.absolute(at, &measurement)? {
+                    self.score.refused_absolute();
+                }
+            }
             let has_failed = self.read_fails();
-            if self.now < next_poll && self.edges == (None, None) {
+            if self.now < next_poll && self.edges == (None, None) && !has_arrived {
                 recorder.polled(&Report::default(), controller.localizer()?);
                 let next = self.next_step(controller);
                 self.advance(next);
@@ -213,6 +223,7 @@ impl<'a> SimulatedHardware<'a> {
             self.plant.put_down(next.pose);
             self.put_down = later;
         }
+        self.absolute.measure(now, &self.plant.pose(), &mut self.streams.absolute);
         self.score.rolled(travel);
         if let Some(gyro) = &mut self.gyro {
             gyro.turn(now, &travel, &mut self.faults.gyro, &mut self.streams.gyro);
@@ -296,6 +307,9 @@ impl<'a> SimulatedHardware<'a> {
         self.score.faults(report.faults);
         if report.tick.is_some() || report.ping_result.is_some() || report.swept.is_some() {
             self.score.arrive(self.plant.state());
+        }
+        for result in report.absolutes() {
+            self.score.absolute(&result.measurement, &result.fix);
         }
         if let Some(heard) = &report.ping_result {
             self.record_fix(heard, localizer, recorder);
@@ -383,6 +397,7 @@ impl<'a> SimulatedHardware<'a> {
             Mode::Tracking => at,
             _ => at.min(self.now + SEARCH_POLL),
         };
+        let at = at.min(self.absolute.next(self.now));
         self.faults.controller.poll_at(self.now, at.max(self.now + 1))
     }
 }

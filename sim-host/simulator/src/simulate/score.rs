@@ -1,7 +1,8 @@
 //! The result of a run in progress: the bound, dead reckoning, counts and errors.
 
+use sonarfix::absolute::AbsoluteMeasurement;
 use sonarfix::aim::Aim;
-use sonarfix::localizer::{Fix, Localizer, Start};
+use sonarfix::localizer::{AbsoluteFix, Fix, Localizer, Start};
 use sonarfix::units::Instant;
 use sonarfix_hal::robot::Faults;
 
@@ -64,13 +65,7 @@ impl<'a> Score<'a> {
 
     /// Adds wheel travel.
     pub fn rolled(&mut self, travel: Travel) {
-        for (sum, more) in self.rolled.measured.iter_mut().zip(travel.measured) {
-            *sum += more;
-        }
-        for (sum, more) in self.rolled.noiseless.iter_mut().zip(travel.noiseless) {
-            *sum += more;
-        }
-        self.rolled.seconds += travel.seconds;
+        self.rolled = self.rolled.plus(&travel);
     }
 
     /// Updates bound and dead reckoning with the travel so far.
@@ -103,6 +98,22 @@ impl<'a> Score<'a> {
             Fix::Gated(_) => counts.gated += 1,
             _ => counts.refused += 1,
         }
+    }
+
+    /// Adds the outcome of a heading, position or pose from outside.
+    pub fn absolute(&mut self, measurement: &AbsoluteMeasurement, fix: &AbsoluteFix) {
+        self.result.absolute.count(fix);
+        if fix.is_used() {
+            self.bound.measured(measurement);
+        }
+        if let AbsoluteFix::Accepted(agreement) = fix {
+            self.nis.add_vector(agreement.nis.into(), agreement.dimensions);
+        }
+    }
+
+    /// Counts a heading or position from outside that the loop has refused.
+    pub fn refused_absolute(&mut self) {
+        self.result.absolute.refused += 1;
     }
 
     /// Adds faults that the loop reported.

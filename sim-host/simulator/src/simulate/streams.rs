@@ -18,6 +18,8 @@ pub struct RandomStreams {
     pub slips: ChaCha8Rng,
     /// Bias and noise of the gyro.
     pub gyro: ChaCha8Rng,
+    /// Noise and outliers of headings and positions from outside.
+    pub absolute: ChaCha8Rng,
 }
 
 impl RandomStreams {
@@ -35,6 +37,7 @@ impl RandomStreams {
             echoes: stream(3),
             slips: stream(4),
             gyro: stream(5),
+            absolute: stream(6),
         }
     }
 }
