@@ -36,7 +36,7 @@ fn camera(outliers: f64) -> AbsoluteSensors {
 /// RMS over bound and NEES, with few runs and limits widened by four sampling errors.
 #[test]
 fn headings_and_poses_are_used_efficiently_and_consistently() {
-    const RUNS: u32 = 12;
+    const RUNS: u32 = 30;
     for (sensors, seed) in [(compass(0.0), 30_000), (camera(0.0), 31_000)] {
         let mut scenario = scenario(PAPER, sensors);
         scenario.let_truth_walk_as_assumed();

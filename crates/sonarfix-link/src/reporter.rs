@@ -69,7 +69,7 @@ impl Reporter {
 
     /// Passes the messages of one poll of the loop to `outlet`. `localizer` is that of the loop, after the poll.
     pub fn report(&mut self, report: &Report, localizer: &Localizer, outlet: &mut impl Outlet) {
-        if let Some(result) = report.absolute {
+        for result in report.absolute.into_iter().flatten() {
             outlet.send_built(|| Telemetry::Absolute(result));
         }
         if let Some(heard) = &report.ping_result {

@@ -101,7 +101,7 @@ fn implausible_lines_are_skipped_and_reported() {
         "log line 8: the log has a start record already",
         "log line 9: the log has both ticks and wheels",
         "log line 10: a wheel rolled faster than max_wheel_speed",
-        "log line 12: `tocks` is not one of ticks, wheels, turn, range, scan, skip, start, resume, pose, mode",
+        "log line 12: `tocks` is not one of ticks, wheels, turn, range, scan, skip, heading, position, measured_pose, start, resume, pose, mode",
         "log line 13: the left count is missing",
     ];
     assert_eq!(reported, expected);

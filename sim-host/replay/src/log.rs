@@ -570,7 +570,7 @@ mod tests {
             ("start,0,0,0,0,1", "the deviation of the heading is missing"),
             (
                 "\u{1b}[31m,0",
-                "`\\u{1b}[31m` is not one of ticks, wheels, turn, range, scan, skip, start, resume, pose, mode",
+                "`\\u{1b}[31m` is not one of ticks, wheels, turn, range, scan, skip, heading, position, measured_pose, start, resume, pose, mode",
             ),
         ];
         for (line, reason) in cases {

@@ -304,6 +304,6 @@ fn a_heading_is_taken_by_a_running_loop() {
         let results: Vec<_> = results.collect();
         assert!(matches!(&results[..], [fix] if fix.starts_with(expected)), "{results:?}");
     }
-    bench.send(&heading(here, 0));
+    assert_eq!(bench.order(&heading(here, 0)), DONE);
     assert_eq!(bench.order(&heading(here, 0)), refused(CommandError::Occupied));
 }

@@ -50,7 +50,7 @@ impl Report {
             || self.tick.is_some()
             || self.aimed.is_some()
             || self.mode.is_some()
-            || self.absolute.is_some()
+            || self.absolute != [None; 2]
     }
 
     /// The headings and positions from outside that were passed to the localizer, in this order.
@@ -59,7 +59,7 @@ impl Report {
         let swept = self.swept.as_ref().and_then(|result| result.step.as_ref());
         let ticked = self.tick.as_ref().and_then(|tick| tick.step.as_ref());
         let steps = [pinged, swept, ticked].into_iter().flatten();
-        self.absolute.iter().chain(steps.filter_map(|step| step.absolute.as_ref()))
+        self.absolute.iter().flatten().chain(steps.filter_map(|step| step.absolute.as_ref()))
     }
 
     /// Whether a ping has ended.

@@ -58,7 +58,7 @@ fn a_measurement_waits_for_its_step() {
             taken += 1;
         }
     }
-    assert_eq!(taken, 2 * 18);
+    assert_eq!(taken, 2 * 19);
 }
 
 /// One that arrives after its step has ended is used if that is the latest, else refused by its name.
