@@ -362,6 +362,25 @@ fn a_stored_configuration_that_cannot_start_is_not_used() {
     }
 }
 
+/// A configuration that is not used is reported, also if the store cannot be repaired.
+#[test]
+fn a_configuration_that_cannot_start_is_reported_first() {
+    let baked = Baked::new(&config());
+    let mut bad = config();
+    bad.localizer.prior.track_width = Metres(1e7);
+    let mut store = Store::new(SimFlash::new(), 0..(SECTOR * SECTORS) as u32).unwrap();
+    let stored = StoredConfiguration { replaces: baked::checksum(&config()), config: bad };
+    store.save_config(&stored).unwrap();
+    let mut flash = store.release();
+    // Foreign bytes behind the record are to be removed by a copy, which fails.
+    flash.damage(SECTOR - 100, 0);
+    flash.is_read_only = true;
+    let mut unrepaired = Store::new(flash.clone(), 0..(SECTOR * SECTORS) as u32).unwrap();
+    assert!(unrepaired.open().is_err_and(|error| error != StoreError::Configuration));
+    let bench = Bench::switched_on(&baked, flash);
+    assert_eq!(bench.first.saved, Some(Err(StoreError::Configuration)));
+}
+
 /// A recorded conversation that is sent again, in the same run or after a power cycle, starts nothing.
 #[test]
 fn a_recorded_start_does_not_start_the_robot() {

@@ -67,6 +67,32 @@ fn readings_are_those_of_the_devices() {
     }
 }
 
+/// Ahead, to the right, ahead, to the left: eight checks each, a fifth of a second apart.
+#[test]
+fn the_servo_turns_to_its_limits_in_turn() {
+    let baked = Baked::new(&config());
+    let mut bench = Bench::switched_on(&baked, SimFlash::new());
+    assert_eq!(bench.order(&Command::ShowDevices), DONE);
+    let mut bearings: Vec<(i8, usize)> = Vec::new();
+    for reading in readings(&bench.wait(30_000)) {
+        let bearing = reading.servo.map_or(0.0, |servo| servo.bearing.to_degrees());
+        let side = if bearing.abs() < 1.0 { 0 } else { bearing.signum() as i8 };
+        match bearings.last_mut() {
+            Some((last, count)) if *last == side => *count += 1,
+            _ => bearings.push((side, 1)),
+        }
+    }
+    let sides: Vec<i8> = bearings.iter().map(|(side, _)| *side).collect();
+    let expected = [0, -1, 0, 1].into_iter().cycle().take(sides.len());
+    assert_eq!(sides, expected.collect::<Vec<i8>>());
+    // Each for 1.6 s and the time of eight pings, at ten readings a second.
+    let whole = &bearings[1..bearings.len() - 1];
+    assert!(
+        whole.len() > 10 && whole.iter().all(|(_, count)| (15..20).contains(count)),
+        "{bearings:?}"
+    );
+}
+
 #[test]
 fn readings_end_after_a_minute_and_when_the_loop_starts() {
     let baked = Baked::new(&config());

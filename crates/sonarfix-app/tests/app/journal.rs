@@ -1,7 +1,10 @@
 //! Sectors that are exactly full, partly new or followed by foreign bytes.
 
+use embedded_storage::nor_flash::ReadNorFlash;
 use sonarfix::ekf::{StandardDeviations, StateEstimate};
+use sonarfix::map::image::checksum;
 use sonarfix_app::store::{Saved, Store};
+use sonarfix_link::baked;
 
 use crate::flash::{SECTOR, SECTORS, SimFlash};
 
@@ -65,7 +68,7 @@ fn an_entry_never_extends_beyond_its_sector() {
     // In the first sector, in the last one, and in the first again.
     for (records, tail) in [1, full + 2, 2 * full + 2]
         .into_iter()
-        .flat_map(|records| (8..30).map(move |tail| (records, tail)))
+        .flat_map(|records| (2..30).map(move |tail| (records, tail)))
     {
         let mut opened = store(SimFlash::new());
         for number in 1..=records {
@@ -83,5 +86,40 @@ fn an_entry_never_extends_beyond_its_sector() {
         assert_eq!(opened.load(), Ok(Some(record(records))), "{records} {tail}");
         opened.save(&record(0)).unwrap();
         assert_eq!(opened.load(), Ok(Some(record(0))));
+    }
+}
+
+/// A record whose payload is as long as the format permits, longer than any of this firmware, counts; one byte more does not.
+#[test]
+fn a_payload_of_the_greatest_length_counts() {
+    const LONGEST: usize = baked::LENGTH_MAX;
+    /// Of an entry before its payload.
+    const HEAD: usize = 12;
+    for (length, counts) in [(LONGEST, true), (LONGEST + 1, false)] {
+        let payload = {
+            let mut other = store(SimFlash::new());
+            other.save(&record(8)).unwrap();
+            let mut payload = [0; RECORD - HEADER];
+            other.release().read((HEADER + HEAD) as u32, &mut payload).unwrap();
+            payload
+        };
+        let mut opened = store(SimFlash::new());
+        opened.save(&record(7)).unwrap();
+        let mut flash = opened.release();
+        let mut head = [0; HEAD];
+        flash.read(HEADER as u32, &mut head).unwrap();
+        head[6..8].copy_from_slice(&u16::try_from(length).unwrap().to_le_bytes());
+        head[8] += 1;
+        let mut entry = head.to_vec();
+        entry.extend(payload);
+        entry.resize(HEAD + length.next_multiple_of(4), 0);
+        let sum = checksum(&entry[4..]);
+        entry.extend(sum.to_le_bytes());
+        entry.extend([0; 8]);
+        for (offset, byte) in entry.into_iter().enumerate() {
+            flash.damage(HEADER + RECORD + offset, byte);
+        }
+        let expected = record(if counts { 8 } else { 7 });
+        assert_eq!(store(flash).load(), Ok(Some(expected)), "{length}");
     }
 }

@@ -14,6 +14,7 @@ mod flash;
 mod journal;
 mod load;
 mod motors;
+mod next_poll;
 mod power_cut;
 mod random;
 mod resume;

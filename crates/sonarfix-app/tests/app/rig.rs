@@ -80,6 +80,13 @@ pub struct Sonar {
     ping: Option<Ping>,
 }
 
+impl Sonar {
+    /// Whether a ping is in flight.
+    pub fn is_pinging(&self) -> bool {
+        self.ping.is_some()
+    }
+}
+
 struct Ping {
     sent: Instant,
     echo: Option<Metres>,
@@ -101,13 +108,7 @@ impl Ranger for Sonar {
         let Some(Ping { sent, echo }) = self.ping.take() else { return Ok(None) };
         let silence = if self.is_there { NoEcho::Nothing } else { NoEcho::NoResponse };
         let Some(range) = echo.filter(|_| self.is_there) else { return Ok(Some(Err(silence))) };
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "some milliseconds"
-        )]
-        let flight = Duration::from_ticks((2e6 * range.0 / SPEED_OF_SOUND) as u64);
-        let heard = sent + flight;
+        let heard = sent + flight(range);
         if now < heard {
             self.ping = Some(Ping { sent, echo });
             return Ok(None);
@@ -115,11 +116,26 @@ impl Ranger for Sonar {
         Ok(Some(Ok(Echo { sent, heard, range })))
     }
 
+    fn poll_at(&self) -> Option<Instant> {
+        let Ping { sent, echo } = self.ping.as_ref()?;
+        Some(*sent + flight((*echo)?))
+    }
+
     /// The same check as the driver of a pulse ranger.
     fn configure(&mut self, settings: &RangerSettings) -> Result<(), UnsupportedKind> {
         let is_pulse = matches!(settings.kind, RangerKind::Pulse(_));
         if is_pulse { Ok(()) } else { Err(UnsupportedKind) }
     }
+}
+
+/// The time of flight of an echo.
+fn flight(range: Metres) -> Duration {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "some milliseconds"
+    )]
+    Duration::from_ticks((2e6 * range.0 / SPEED_OF_SOUND) as u64)
 }
 
 type Hardware = Devices<Encoder, Encoder, Pwm, Sonar>;

@@ -4,12 +4,16 @@ use proptest::prelude::*;
 use sonarfix::aim::Aim;
 use sonarfix::config::Config;
 use sonarfix::ekf::{Ekf, EkfError, StandardDeviations, StateEstimate};
+use sonarfix::gyro::GyroParameters;
 use sonarfix::health::Verdict;
 use sonarfix::localizer::{Fix, Localizer, OdometryError, Refusal, Start};
 use sonarfix::map::{Map, Wall, WallId};
 use sonarfix::motion::{Drive, WheelTravel};
 use sonarfix::pose::{Point, Pose};
-use sonarfix::units::{Instant, Metres, MetresPerSecond, PerRootMetre, Radians, SquareMetres};
+use sonarfix::units::{
+    Duration, Instant, Metres, MetresPerSecond, PerRootMetre, PerRootSecond, Radians,
+    RadiansPerSecond, SquareMetres,
+};
 
 use crate::strategies::{any_deviation, any_drive, any_state, bits, config_for_rooms};
 
@@ -77,6 +81,44 @@ fn a_configuration_is_refused_at_its_limits() {
         };
         assert_eq!(with(permitted), Ok(()), "{number}");
         assert!(with(refused).is_err(), "{number}");
+    }
+}
+
+/// Each parameter of a gyro: the values that are permitted, and those that are not.
+#[test]
+fn the_parameters_of_a_gyro_are_refused_at_their_limits() {
+    type Set = fn(&mut GyroParameters, f32);
+    let rules: [(&str, Set, &[f32], &[f32]); 5] = [
+        ("range", |it, to| it.range = RadiansPerSecond(to), &[1e-3, 40.0], &[0.0, -1.0, f32::NAN]),
+        ("noise", |it, to| it.noise = PerRootSecond(Radians(to)), &[1e-9], &[0.0, -1e-3, f32::NAN]),
+        ("bias", |it, to| it.bias = RadiansPerSecond(to), &[1e-9], &[0.0, -1e-3, f32::INFINITY]),
+        (
+            "bias_walk",
+            |it, to| it.bias_walk = PerRootSecond(RadiansPerSecond(to)),
+            &[0.0, 1e-3],
+            &[-1e-9, f32::NAN],
+        ),
+        ("scale", |it, to| it.scale = to, &[0.0, 0.5], &[-1e-6, 0.500_01, f32::NAN]),
+    ];
+    for (name, set, permitted, refused) in rules {
+        let with = |value: f32| {
+            let mut gyro = GyroParameters::MPU_6050;
+            set(&mut gyro, value);
+            let mut config = config();
+            config.gyro = Some(gyro);
+            config.check()
+        };
+        assert!(permitted.iter().all(|value| with(*value).is_ok()), "{name}");
+        for value in refused {
+            let error = with(*value).unwrap_err();
+            assert_eq!(error.field, format!("gyro.{name}"), "{value}");
+        }
+    }
+    for (ticks, is_permitted) in [(999, false), (1_000, true), (50_000, true), (50_001, false)] {
+        let period = Duration::from_ticks(ticks);
+        let mut config = config();
+        config.gyro = Some(GyroParameters { period, ..GyroParameters::MPU_6050 });
+        assert_eq!(config.check().is_ok(), is_permitted, "{ticks}");
     }
 }
 
