@@ -44,6 +44,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
             check_file(option, file)?;
         }
     }
+    let measured = args.measured.as_deref().map(Measured::parse).transpose()?;
     let robot_path = args.robot.clone().unwrap_or_else(|| args.log.with_file_name("robot.toml"));
     let robot = robot_file::read(&robot_path)?;
     let file = File::open(&args.log).with_context(|| args.log.display().to_string())?;
@@ -55,10 +56,9 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let nominal = log::nominal(&robot, !read.has_scans);
     let mut found = survey(&read.recording, Robot::of(&nominal))
         .with_context(|| args.log.display().to_string())?;
-    if let Some(measured) = &args.measured {
-        let (wall, length) = measured_wall(measured, &found)?;
-        let estimated = found.walls.get(wall).map_or(length, MappedWall::length);
-        found.scale(length / estimated);
+    if let Some(measured) = &measured {
+        let estimated = measured.wall(&found)?.length();
+        found.scale(measured.length / estimated);
     }
     if let Some(out) = &args.out {
         std::fs::write(out, map_text(&found)).with_context(|| out.display().to_string())?;
@@ -71,34 +71,48 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The wall and the length of `--measured`.
-fn measured_wall(text: &str, found: &Survey) -> anyhow::Result<(usize, f64)> {
-    let form =
-        "--measured must be a wall and its length with a unit, for example \"wall 3=6.00 m\"";
-    let (wall, length) = text.split_once('=').context(form)?;
-    let length = length.trim();
-    let units = [("mm", 1e-3), ("cm", 1e-2), ("m", 1.0)];
-    let (number, unit) = units
-        .iter()
-        .find_map(|(unit, scale)| length.strip_suffix(unit).map(|number| (number, scale)))
-        .context(form)?;
-    let length: f64 = number.trim().parse().context(form)?;
-    anyhow::ensure!(length.is_finite() && length > 0.0, "--measured: the length must be positive");
-    let index = (0..found.walls.len()).find(|&index| name(index) == wall.trim());
-    let index = index.with_context(|| {
-        format!(
-            "--measured: the map has no \"{}\"; its walls are wall 1 to wall {}",
-            wall.trim(),
-            found.walls.len()
-        )
-    })?;
-    let both = found.walls.get(index).is_some_and(|wall| wall.corners == [true, true]);
-    anyhow::ensure!(
-        both,
-        "--measured: \"{}\" does not end in a corner at both ends, so that its length in the map is not that of the wall",
-        wall.trim()
-    );
-    Ok((index, length * unit))
+/// What `--measured` states.
+struct Measured<'a> {
+    name: &'a str,
+    /// Metres.
+    length: f64,
+}
+
+impl<'a> Measured<'a> {
+    fn parse(text: &'a str) -> anyhow::Result<Self> {
+        let form =
+            "--measured must be a wall and its length with a unit, for example \"wall 3=6.00 m\"";
+        let (name, length) = text.split_once('=').context(form)?;
+        let length = length.trim();
+        let units = [("mm", 1e-3), ("cm", 1e-2), ("m", 1.0)];
+        let (number, unit) = units
+            .iter()
+            .find_map(|(unit, scale)| length.strip_suffix(unit).map(|number| (number, scale)))
+            .context(form)?;
+        let length = number.trim().parse::<f64>().context(form)? * unit;
+        let is_positive = length.is_finite() && length > 0.0;
+        anyhow::ensure!(is_positive, "--measured: the length must be positive");
+        Ok(Self { name: name.trim(), length })
+    }
+
+    /// The wall of the map.
+    fn wall<'m>(&self, found: &'m Survey) -> anyhow::Result<&'m MappedWall> {
+        let mut walls = found.walls.iter().enumerate();
+        let wall = walls.find(|(index, _)| name(*index) == self.name).map(|(_, wall)| wall);
+        let wall = wall.with_context(|| {
+            format!(
+                "--measured: the map has no \"{}\"; its walls are wall 1 to wall {}",
+                self.name,
+                found.walls.len()
+            )
+        })?;
+        anyhow::ensure!(
+            wall.corners == [true, true],
+            "--measured: \"{}\" does not end in a corner at both ends, so that its length in the map is not that of the wall",
+            self.name
+        );
+        Ok(wall)
+    }
 }
 
 fn walls(found: &Survey) -> Table {

@@ -25,4 +25,5 @@ mod rows;
 mod signs_of_life;
 mod skipped;
 mod sonar_model;
+mod survey;
 mod terminal;

@@ -250,7 +250,8 @@ fn outcome(track: &Track, clock: f64) -> Survey {
     }
 }
 
-/// Compares the walls with those of the other direction: the accuracy includes the difference. If the paths agree, walls
+/// Compares the walls with those of the other direction: the accuracy includes half of the difference, because this map
+/// explains the recording better. If the paths agree, walls
 /// that the other direction does not have are removed.
 fn compare(survey: &mut Survey, others: &[MappedWall], differs: f64) {
     let length = |walls: &[MappedWall]| -> f64 { walls.iter().map(MappedWall::length).sum() };
@@ -259,7 +260,8 @@ fn compare(survey: &mut Survey, others: &[MappedWall], differs: f64) {
         let apart =
             others.iter().filter_map(|other| wall.apart(other)).fold(f64::INFINITY, f64::min);
         wall.is_confirmed = apart <= DIFFERS;
-        wall.accuracy = wall.accuracy.hypot(if wall.is_confirmed { apart } else { DIFFERS });
+        let half = if wall.is_confirmed { 0.5 * apart } else { DIFFERS };
+        wall.accuracy = wall.accuracy.hypot(half);
     }
     let confirmed: Vec<MappedWall> =
         survey.walls.iter().copied().filter(|wall| wall.is_confirmed).collect();

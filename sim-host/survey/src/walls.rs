@@ -219,7 +219,7 @@ fn is_open(track: &Track, placed: &[Placed], line: usize, gap: &Span) -> bool {
 /// place share their errors, so that four of them count as one; off-axis bias and range scale leave some millimetres in any case.
 fn accuracies(track: &Track, parts: &[Part]) -> Vec<f64> {
     const DEPENDENT: f64 = 4.0;
-    const SYSTEMATIC: f64 = 0.004;
+    const SYSTEMATIC: f64 = 0.003;
     #[expect(clippy::cast_precision_loss, reason = "numbers of echoes")]
     let of_mean = |part: &Part| (DEPENDENT / part.echoes as f64).sqrt();
     let accuracy = |part: &Part| SYSTEMATIC.hypot(track.problem.range_noise * of_mean(part));
