@@ -90,8 +90,11 @@ pub fn run(
     progress: &impl Progress,
 ) -> (Vec<PlanResult>, Vec<CompareError>) {
     let seeds = (0..u64::from(plans)).into_par_iter().filter(|_| !progress.is_interrupted());
-    let results: Vec<_> =
-        seeds.map(|plan| run_plan(first.wrapping_add(plan), runs, progress)).collect();
+    divide(seeds.map(|plan| run_plan(first.wrapping_add(plan), runs, progress)).collect())
+}
+
+/// The plans with a finished pair, and the errors of the others.
+fn divide(results: Vec<Result<PlanResult, CompareError>>) -> (Vec<PlanResult>, Vec<CompareError>) {
     let (mut plans, mut errors) = (Vec::new(), Vec::new());
     for result in results {
         match result {
@@ -219,4 +222,27 @@ pub fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
 #[expect(clippy::cast_precision_loss, reason = "some thousand")]
 fn as_f64(count: usize) -> f64 {
     count as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plan_that_fails_does_not_end_the_others() {
+        let score = Score { mean_square: 1.0, lost: false };
+        let pair = Pair { nearest: score, informative: score };
+        let plan = |seed, pairs: &[Pair]| PlanResult {
+            plan: FloorPlan::new(seed),
+            walls: 4,
+            length: 1.0,
+            pairs: pairs.to_vec(),
+        };
+        let failed = CompareError::Run { seed: 4, source: SimulationError::NoPose };
+        let results =
+            vec![Ok(plan(1, &[pair])), Err(failed), Ok(plan(2, &[])), Ok(plan(3, &[pair]))];
+        let (plans, errors) = divide(results);
+        let seeds: Vec<u64> = plans.iter().map(|result| result.plan.seed).collect();
+        assert_eq!((seeds, errors.len()), (vec![1, 3], 1));
+    }
 }
