@@ -41,6 +41,11 @@ struct Cost {
 }
 
 impl Cost {
+    #[expect(clippy::cast_precision_loss, reason = "a small number")]
+    fn mean(&self) -> f64 {
+        self.all as f64 / self.calls as f64
+    }
+
     fn shown(&self) -> String {
         let mean = self.all.checked_div(self.calls).unwrap_or(0);
         format!("{mean} / {}", self.most)
@@ -53,6 +58,7 @@ struct Tally {
     predict: Cost,
     aim: Cost,
     fix: Cost,
+    start: Cost,
     poll: Cost,
     idle: Cost,
     per_tick: Cost,
@@ -113,10 +119,18 @@ pub fn check() -> anyhow::Result<()> {
     // The shipped loop for the whole reference scenario: a million polls.
     sonarfix("paper --fidelity pins")?;
     let mut table = "| instructions, mean / worst".to_owned();
-    let mut rows =
-        ["predict", "aim", "fix", "poll with work", "poll without", "all polls of 100 ms"]
-            .map(|name| format!("| {name}"));
+    let mut rows = [
+        "predict",
+        "aim",
+        "fix",
+        "longest poll of the start",
+        "poll with work",
+        "poll without",
+        "all polls of 100 ms",
+    ]
+    .map(|name| format!("| {name}"));
     let mut shares = "| share of 100 ms, worst poll".to_owned();
+    let mut all_shares = "| share of all polls".to_owned();
     let mut stacks = "| stack of the deepest poll, bytes".to_owned();
     let mut missed = Vec::new();
     for core in &CORES {
@@ -126,6 +140,7 @@ pub fn check() -> anyhow::Result<()> {
             paper.predict,
             paper.aim,
             paper.fix,
+            classroom.start,
             classroom.poll,
             classroom.idle,
             classroom.per_tick,
@@ -139,12 +154,14 @@ pub fn check() -> anyhow::Result<()> {
         let tick = core.clock * TICK;
         let permille = (1_000 * classroom.poll.most + tick / 2) / tick;
         let _ = write!(shares, " | {}.{} % at {} MHz", permille / 10, permille % 10, core.clock);
+        let all = 1e2 * classroom.per_tick.mean() / tick_instructions(core);
+        let _ = write!(all_shares, " | {all:.2} %");
         if core.bar.is_some_and(|bar| permille > 10 * bar) {
             missed.push(core.name);
         }
     }
     println!("{table} |\n|---|---:|---:|---:|---:|---:|");
-    for row in rows.iter().chain([&shares, &stacks]) {
+    for row in rows.iter().chain([&shares, &all_shares, &stacks]) {
         println!("{row} |");
     }
     ensure!(
@@ -153,6 +170,12 @@ pub fn check() -> anyhow::Result<()> {
         missed.join(", ")
     );
     Ok(())
+}
+
+/// Instructions of a core in an encoder period, at one a cycle.
+#[expect(clippy::cast_precision_loss, reason = "a small number")]
+fn tick_instructions(core: &Core) -> f64 {
+    (core.clock * TICK) as f64
 }
 
 /// Bakes a robot file.

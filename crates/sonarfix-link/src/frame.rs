@@ -131,47 +131,36 @@ const GROUP: usize = 255;
 impl<'b> Encoder<'b> {
     /// An encoder that has written the delimiter before the frame.
     fn new(buffer: &'b mut [u8]) -> Self {
-        let mut encoder = Self { buffer, next: 0, code: 1, checksum: Crc32::default() };
-        encoder.put(0);
-        encoder.next = 2;
-        encoder
-    }
-
-    fn put(&mut self, byte: u8) {
-        if let Some(place) = self.buffer.get_mut(self.next) {
-            *place = byte;
+        if let Some(delimiter) = buffer.first_mut() {
+            *delimiter = 0;
         }
-        self.next += 1;
-    }
-
-    /// Ends the group: the distance from its code to the next one.
-    fn end_group(&mut self) {
-        let length = self.next - self.code;
-        if let (Some(code), Ok(length)) = (self.buffer.get_mut(self.code), u8::try_from(length)) {
-            *code = length;
-        }
-        self.code = self.next;
-        self.next += 1;
+        Self { buffer, next: 2, code: 1, checksum: Crc32::default() }
     }
 
     /// Takes bytes of the content. A message has dozens of places that write a number: inlined, this takes 3 KiB of flash.
     #[inline(never)]
     fn push(&mut self, bytes: &[u8]) {
-        self.checksum = bytes.iter().fold(self.checksum, |checksum, &byte| checksum.with(byte));
-        self.encode(bytes);
-    }
-
-    #[inline]
-    fn encode(&mut self, bytes: &[u8]) {
+        // Local copies stay in registers.
+        let Self { mut next, mut code, mut checksum, .. } = *self;
         for &byte in bytes {
+            checksum = checksum.with(byte);
             if byte != 0 {
-                self.put(byte);
-                if self.next - self.code != GROUP {
+                if let Some(place) = self.buffer.get_mut(next) {
+                    *place = byte;
+                }
+                next += 1;
+                if next - code != GROUP {
                     continue;
                 }
             }
-            self.end_group();
+            // The group ends: the distance from its code to the next one, at most 255.
+            if let Some(place) = self.buffer.get_mut(code) {
+                [*place, ..] = (next - code).to_le_bytes();
+            }
+            code = next;
+            next += 1;
         }
+        (self.next, self.code, self.checksum) = (next, code, checksum);
     }
 }
 
@@ -190,11 +179,14 @@ impl postcard::ser_flavors::Flavor for Encoder<'_> {
 
     /// Appends the checksum and the delimiter; returns the length.
     fn finalize(mut self) -> postcard::Result<usize> {
-        self.encode(&self.checksum.value().to_le_bytes());
-        self.end_group();
-        // The place reserved for the code of another group is that of the delimiter.
+        self.push(&self.checksum.value().to_le_bytes());
+        // The last group ends as before a zero. The place reserved for the code of another group is that of the delimiter.
+        self.push(&[0]);
         self.next = self.code;
-        self.put(0);
+        if let Some(place) = self.buffer.get_mut(self.next) {
+            *place = 0;
+        }
+        self.next += 1;
         if self.next > self.buffer.len() {
             return Err(postcard::Error::SerializeBufferFull);
         }

@@ -33,9 +33,9 @@ fn session<S: Read + Write>(
     map: &[u8],
 ) -> Result<(), LineError<S::Error>> {
     let wires = Wires::default();
-    let mut running = match Session::begin(begin, map, &wires) {
-        Ok((session, actuators)) => {
-            line.send_reply(&Answer::Started(actuators), 0)?;
+    let mut running = match Session::begin(begin, map, &wires, meter) {
+        Ok((session, actuators, longest)) => {
+            line.send_reply(&Answer::Started(actuators), longest)?;
             session
         }
         Err(error) => return line.send_reply(&Answer::Refused(error), 0),

@@ -42,7 +42,8 @@ pub struct LoopSession<'m> {
 }
 
 impl<'m> Session<'m> {
-    /// Begins a session; returns what the first polls of a loop did to the devices.
+    /// Begins a session; returns what the first polls of a loop did to the devices, and the instructions of the longest of them:
+    /// the first reads the store, others set the pose and start the loop.
     ///
     /// # Errors
     /// [`RequestError`], by the cause.
@@ -50,12 +51,13 @@ impl<'m> Session<'m> {
         begin: &Begin,
         map: &'m [u8],
         wires: &'m Wires,
-    ) -> Result<(Self, Actuators), RequestError> {
+        meter: &mut impl Meter,
+    ) -> Result<(Self, Actuators, u32), RequestError> {
         if begin.kind == SessionKind::Localizer {
-            return Ok((Self::localizer_only(begin, map)?, Actuators::default()));
+            return Ok((Self::localizer_only(begin, map)?, Actuators::default(), 0));
         }
-        let (robot, actuators) = LoopSession::begin(begin, map, wires)?;
-        Ok((Self::Loop(robot), actuators))
+        let (robot, actuators, longest) = LoopSession::begin(begin, map, wires, meter)?;
+        Ok((Self::Loop(robot), actuators, longest))
     }
 
     /// Begins a session of a localizer alone.
@@ -180,7 +182,8 @@ impl<'m> LoopSession<'m> {
         begin: &Begin,
         image: &'m [u8],
         wires: &'m Wires,
-    ) -> Result<(Self, Actuators), RequestError> {
+        meter: &mut impl Meter,
+    ) -> Result<(Self, Actuators, u32), RequestError> {
         let Begin { at, start, config, load, .. } = *begin;
         config.check().map_err(|_| RequestError::Start)?;
         let devices = board::devices(&config, wires).map_err(|_| RequestError::Board)?;
@@ -194,30 +197,36 @@ impl<'m> LoopSession<'m> {
         let app = App::new(board, flash, store, at);
         let mut robot = Self { app, wires, devices, traffic: Traffic::new(load, 0, 0) };
         let open = SessionCommand { session: 0, command: Command::OpenSession };
-        let CommandResult::Session(session) = robot.send(at, 0, &open)? else {
+        let (CommandResult::Session(session), mut longest) = robot.send(at, 0, &open, meter)?
+        else {
             return Err(RequestError::Start);
         };
         let set_pose = start.map(Command::SetPose);
         for (sequence, command) in (1..).zip(set_pose.into_iter().chain([Command::Start])) {
-            let _ = robot.send(at, sequence, &SessionCommand { session, command })?;
+            let command = SessionCommand { session, command };
+            let (_, instructions) = robot.send(at, sequence, &command, meter)?;
+            longest = longest.max(instructions);
             robot.traffic = Traffic::new(load, session, sequence);
         }
-        Ok((robot, wires.take()))
+        Ok((robot, wires.take(), longest))
     }
 
-    /// Sends a command over the link.
+    /// Sends a command over the link; returns its result and the instructions of the poll.
     fn send(
         &mut self,
         at: Instant,
         sequence: u16,
         command: &SessionCommand,
-    ) -> Result<CommandResult, RequestError> {
+        meter: &mut impl Meter,
+    ) -> Result<(CommandResult, u32), RequestError> {
         let mut buffer = frame::EMPTY;
         let frame = Sender::starting_at(sequence).frame(command, &mut buffer);
         let mut link = LinkBuffer::new(frame);
-        let polled = self.app.poll(at, &mut self.devices, &mut link);
-        match polled.answered {
-            Some(result @ (CommandResult::Done | CommandResult::Session(_))) => Ok(result),
+        let Self { app, devices, .. } = self;
+        let mut answered = None;
+        let cost = meter.measure(|| answered = app.poll(at, devices, &mut link).answered);
+        match answered {
+            Some(result @ (CommandResult::Done | CommandResult::Session(_))) => Ok((result, cost)),
             _ => Err(RequestError::Start),
         }
     }

@@ -71,7 +71,8 @@ impl Pair {
         map: &'m [u8],
         wires: &'m Wires,
     ) -> Result<(Session<'m>, Actuators), PilError> {
-        self.begun(begin, map, Session::begin(begin, map, wires))
+        let own = Session::begin(begin, map, wires, &mut Unmetered);
+        self.begun(begin, map, own.map(|(session, actuators, _)| (session, actuators)))
     }
 
     fn begun<'m>(
@@ -92,7 +93,8 @@ impl Pair {
         if let Some(emulator) = &mut self.emulator {
             emulator.send_request(request)?;
         }
-        self.compare(begin.at.ticks(), request, &answer)?;
+        let instructions = self.compare(begin.at.ticks(), request, &answer)?;
+        self.tally.begun(instructions);
         self.is_in_session = own.is_ok();
         own.map_err(PilError::Refused)
     }

@@ -40,6 +40,8 @@ pub struct Tally {
     pub aim: Cost,
     /// Range input of the localizer.
     pub fix: Cost,
+    /// The longest poll of each start of a loop.
+    pub start: Cost,
     /// Polls of the loop with work.
     pub poll: Cost,
     /// Polls of the loop with nothing due.
@@ -54,6 +56,11 @@ pub struct Tally {
 }
 
 impl Tally {
+    /// Adds the instructions of the longest poll of a start.
+    pub(crate) fn begun(&mut self, instructions: u32) {
+        self.start.add(instructions.into());
+    }
+
     /// Adds the instructions of a request.
     pub fn add(&mut self, request: &Request, answer: &Answer, instructions: u32) {
         let instructions = u64::from(instructions);
@@ -85,6 +92,7 @@ impl Tally {
             ("predict", self.predict),
             ("aim", self.aim),
             ("fix", self.fix),
+            ("longest poll of the start", self.start),
             ("poll with work", self.poll),
             ("poll without", self.idle),
             ("all polls of 100 ms", self.per_tick),

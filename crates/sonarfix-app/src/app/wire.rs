@@ -36,7 +36,6 @@ pub trait Link {
 }
 
 /// The link's state.
-#[derive(Default)]
 pub(super) struct Wire {
     receiver: Receiver<SessionCommand>,
     pub session: Session,
@@ -44,6 +43,21 @@ pub(super) struct Wire {
     /// The next deadlines; immediately after the start.
     hello_at: Option<Instant>,
     loop_at: Option<Instant>,
+    /// The frame that is sent: here, so that no frame must be cleared first.
+    frame: [u8; TELEMETRY_FRAME_MAX],
+}
+
+impl Default for Wire {
+    fn default() -> Self {
+        Self {
+            receiver: Receiver::default(),
+            session: Session::default(),
+            sender: Sender::default(),
+            hello_at: None,
+            loop_at: None,
+            frame: [0; TELEMETRY_FRAME_MAX],
+        }
+    }
 }
 
 impl Wire {
@@ -59,11 +73,10 @@ impl Wire {
         None
     }
 
-    /// Sends a message. Not inlined, because of the buffers of a frame.
+    /// Sends a message. Not inlined, because of the stack of the serializer.
     #[inline(never)]
     pub fn send(&mut self, message: &Telemetry, link: &mut impl Link) {
-        let mut buffer = [0; TELEMETRY_FRAME_MAX];
-        link.send(self.sender.frame(message, &mut buffer));
+        link.send(self.sender.frame(message, &mut self.frame));
     }
 
     /// The telemetry's way to the link.
