@@ -1,7 +1,7 @@
 //! The motor code of the boards: an example, to be replaced by your own.
 //!
-//! A board calls [`Pattern::drive`] about every millisecond, with a lower priority than the robot's loop or after it, and
-//! puts the result on the inputs of its motor driver. Your controller takes the place of [`Pattern`]; no other file changes.
+//! A board calls [`Pattern::drive`] after each poll of the robot's loop, and at least every [`PERIOD`] while the motors are
+//! enabled, and puts the result on the inputs of its motor driver. Your controller takes the place of [`Pattern`]; no other file changes.
 //! `cargo test --package sonarfix-tests --test main motor` tests it on the PC.
 //!
 //! The motor driver's enable pin is not controlled here: the loop sets it, by the motor policy of the robot file.
@@ -11,6 +11,11 @@
 use sonarfix::health::Verdict;
 use sonarfix::pose::Pose;
 use sonarfix::trig;
+use sonarfix::units::Duration;
+
+/// The longest time between two calls while the motors are enabled. A new estimate comes at every encoder tick; a controller of
+/// your own may need a shorter period.
+pub const PERIOD: Duration = Duration::from_ticks(10_000);
 
 /// The newest estimate of a robot whose motors are enabled.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -9,13 +9,13 @@
 //! | PIO1 | the stamps of the echo's edges, 1 µs | GP8 |
 //! | PWM slice 3, channel A | the servo's pulses | GP6 |
 //! | PWM slices 5 and 6 | the inputs of the motor driver, right and left motor, 20 kHz | GP10 GP11, GP12 GP13 |
-//! | TIMER0 | the clock, 1 µs, and a poll every millisecond | |
+//! | TIMER0 | the clock, 1 µs, and the alarm of the next poll | |
 //! | UART0 | the link, 115,200 baud | GP0 GP1 |
 //! | | the sonar's trigger; high while the robot may drive | GP7; GP9 |
 //!
 //! State machines count the wheels and stamp the edges, however long a poll or a write to flash takes. One executor is
-//! therefore sufficient, and no interrupt but that of the clock. It runs two tasks in turn: the loop, and after each of its
-//! polls the motor code (`sonarfix-motors`).
+//! therefore sufficient, and no interrupts but those of the clock and of received bytes, which end its sleep. It runs two tasks in
+//! turn: the loop, and after each of its polls the motor code (`sonarfix-motors`).
 
 #![no_std]
 #![no_main]
@@ -24,6 +24,7 @@ use defmt_rtt as _;
 use embassy_executor::{Executor, Spawner};
 use embassy_rp::flash::{self, Flash};
 use embassy_rp::gpio::{Level, Output};
+use embassy_rp::interrupt::typelevel::{Handler, Interrupt, UART0_IRQ};
 use embassy_rp::peripherals::{FLASH, PIO0, PIO1};
 use embassy_rp::pio::{InterruptHandler, Pio};
 use embassy_rp::pwm::{self, Pwm};
@@ -32,7 +33,7 @@ use embassy_rp::watchdog::Watchdog;
 use embassy_rp::{bind_interrupts, pac};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
-use embassy_time::{Duration, Timer};
+use embassy_time::{Duration, with_deadline};
 use embedded_hal::pwm::SetDutyCycle;
 use embedded_hal_02::serial::{Read, Write};
 use heapless::Deque;
@@ -43,7 +44,7 @@ use sonarfix_app::{App, FlashContents, Link, boots, log};
 use sonarfix_hal::ranger::{Captured, EchoCapture, PulseRanger};
 use sonarfix_hal::robot::Devices;
 use sonarfix_motors::{Drive, Estimate, Pattern};
-use sonarfix_robot::memory;
+use sonarfix_robot::{NextPoll, memory};
 
 // The other chip has its module beside its memory map.
 #[cfg_attr(rp2040, path = "../../pico/src/chip.rs")]
@@ -52,8 +53,8 @@ mod machines;
 
 use chip::{Encoder, FLASH_SIZE, QUEUE, Stamper, reset};
 
-/// The poll period.
-const POLL: Duration = Duration::from_millis(1);
+/// Period at which the loop reads the stamps of the echo while a ping is in flight, and fills the UART's queue while it sends.
+const STEP: Duration = Duration::from_millis(1);
 /// Longer than the erasure of a sector (at most 0.4 s), which delays the loop.
 const WATCHDOG: Duration = Duration::from_secs(2);
 
@@ -72,7 +73,33 @@ static ECHO: EchoCapture = EchoCapture::new();
 /// The newest estimate, from the loop; `None` while the motors are disabled.
 static ESTIMATE: Signal<CriticalSectionRawMutex, Option<Estimate>> = Signal::new();
 
+/// Bytes have arrived.
+static RECEIVED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
+
+/// The interrupt of the UART: half of its queue is full, or bytes have waited for the time of three more.
+struct ReceivedBytes;
+
+impl ReceivedBytes {
+    /// Lets the next bytes interrupt.
+    fn listen() {
+        pac::UART0.uartimsc().write(|w| {
+            w.set_rxim(true);
+            w.set_rtim(true);
+        });
+    }
+}
+
+#[expect(unsafe_code, reason = "the vector table calls it; it does nothing that is unsafe")]
+impl Handler<UART0_IRQ> for ReceivedBytes {
+    unsafe fn on_interrupt() {
+        // The loop empties the queue, and listens again before it sleeps.
+        pac::UART0.uartimsc().write(|_| {});
+        RECEIVED.signal(());
+    }
+}
+
 bind_interrupts!(struct Interrupts {
+    UART0_IRQ => ReceivedBytes;
     PIO0_IRQ_0 => InterruptHandler<PIO0>;
     PIO1_IRQ_0 => InterruptHandler<PIO1>;
 });
@@ -129,7 +156,7 @@ impl Motors {
     }
 }
 
-/// The link. The UART's FIFOs of 32 bytes last 2.8 ms, and the loop polls every millisecond: no interrupt is needed.
+/// The link. The UART's FIFOs of 32 bytes last 2.8 ms; an interrupt wakes the loop when 16 have arrived, or fewer and then none.
 struct Serial {
     uart: Uart<'static, uart::Blocking>,
     /// A poll sends at most 400 bytes.
@@ -137,6 +164,11 @@ struct Serial {
 }
 
 impl Serial {
+    /// Whether bytes have arrived.
+    fn has_bytes() -> bool {
+        !pac::UART0.uartfr().read().rxfe()
+    }
+
     /// Writes as many bytes as the UART accepts.
     fn transmit(&mut self) {
         while let Some(byte) = self.to_send.front()
@@ -160,9 +192,13 @@ impl Link for Serial {
     }
 
     fn send(&mut self, frame: &[u8]) {
-        if self.to_send.capacity() - self.to_send.len() >= frame.len() {
+        if self.has_room(frame.len()) {
             self.to_send.extend(frame.iter().copied());
         }
+    }
+
+    fn has_room(&self, length: usize) -> bool {
+        self.to_send.capacity() - self.to_send.len() >= length
     }
 }
 
@@ -184,7 +220,7 @@ struct Board {
     link: Serial,
     drive: Output<'static>,
     watchdog: Watchdog,
-    next_poll: embassy_time::Instant,
+    next_poll: NextPoll,
 }
 
 impl Board {
@@ -222,6 +258,7 @@ impl Board {
         // The default is 115,200 baud, 8N1.
         let uart = uart::Config::default();
         let uart = Uart::new_blocking(board.UART0, board.PIN_0, board.PIN_1, uart);
+        listen_to_uart();
         watchdog.start(WATCHDOG);
         let board = Self {
             app,
@@ -230,7 +267,7 @@ impl Board {
             link: Serial { uart, to_send: Deque::new() },
             drive: Output::new(board.PIN_9, Level::Low),
             watchdog,
-            next_poll: embassy_time::Instant::now(),
+            next_poll: NextPoll::AT_ONCE,
         };
         Some((board, motors))
     }
@@ -238,7 +275,6 @@ impl Board {
     /// One poll.
     fn poll(&mut self) {
         let start = now();
-        self.stamper.update(&ECHO, start);
         let polled = self.app.poll(start, &mut self.hardware, &mut self.link);
         self.drive.set_level(polled.may_drive.into());
         ESTIMATE.signal(sonarfix_robot::estimate(&self.app, &polled));
@@ -254,17 +290,50 @@ impl Board {
             self.app.took(took);
         }
         self.app.work(start, now);
+        let (app, hardware) = (&self.app, &mut self.hardware);
+        self.next_poll = sonarfix_robot::next_poll(app, hardware, start, polled.may_drive);
+    }
+
+    /// Sleeps until the next poll is due, a byte has arrived or an edge of the echo was stamped.
+    async fn sleep(&mut self) {
+        loop {
+            let time = now();
+            self.stamper.update(&ECHO, time);
+            let has_bytes = Serial::has_bytes();
+            let next = self.next_poll.at(has_bytes);
+            if ECHO.take_edge() || time >= next {
+                return;
+            }
+            let is_listening = self.app.idle_until(&mut self.hardware).is_none();
+            let is_sending = !self.link.to_send.is_empty();
+            let mut wake = embassy_time::Instant::from_micros(next.ticks());
+            if is_listening || is_sending {
+                wake = wake.min(embassy_time::Instant::now().saturating_add(STEP));
+            }
+            if !has_bytes {
+                ReceivedBytes::listen();
+            }
+            // Whatever ends the sleep is found above.
+            let _ = with_deadline(wake, RECEIVED.wait()).await;
+            self.link.transmit();
+        }
     }
 }
 
-/// Polls every millisecond.
+/// Lets received bytes interrupt, early enough that the queue does not overflow before the loop wakes.
+#[expect(unsafe_code, reason = "the handler of the interrupt is bound above")]
+fn listen_to_uart() {
+    pac::UART0.uartifls().modify(|w| w.set_rxiflsel(0b010));
+    // SAFETY: no critical section depends on this interrupt.
+    unsafe { UART0_IRQ::enable() };
+}
+
+/// Polls when something is due.
 #[embassy_executor::task]
 async fn polls(mut board: Board) -> ! {
     loop {
-        // `Ticker` panics when its sum overflows; this sum cannot, and has no panic to link.
-        board.next_poll = board.next_poll.saturating_add(POLL);
-        Timer::at(board.next_poll).await;
         board.poll();
+        board.sleep().await;
     }
 }
 

@@ -10,9 +10,10 @@ pub mod memory;
 
 use embedded_hal::digital::OutputPin;
 use embedded_storage::nor_flash::NorFlash;
-use sonarfix::units::Duration;
+use sonarfix::units::{Duration, Instant};
 use sonarfix_app::{App, Board, Polled};
 use sonarfix_hal::ranger::{Captured, EchoCapture, PulseRanger};
+use sonarfix_hal::robot::{Hardware, PACE};
 use sonarfix_hal::servo::{PwmFrame, Servo};
 use sonarfix_link::message::ResetCause;
 use sonarfix_motors::Estimate;
@@ -48,6 +49,42 @@ pub fn ranger<T: OutputPin>(
 pub fn estimate<F: NorFlash>(app: &App<F>, polled: &Polled) -> Option<Estimate> {
     let localizer = app.localizer().filter(|_| polled.may_drive)?;
     Some(Estimate { pose: localizer.pose(), verdict: localizer.health().verdict })
+}
+
+/// When a board polls again, after a poll at `polled`: when something is due ([`App::next_poll`]), and in time for the motor
+/// code. Bytes that have arrived wait until several can be read together.
+pub fn next_poll<F: NorFlash>(
+    app: &App<F>,
+    hardware: &mut impl Hardware,
+    polled: Instant,
+    may_drive: bool,
+) -> NextPoll {
+    let drive = if may_drive { Some(after(polled, sonarfix_motors::PERIOD)) } else { None };
+    let due = app.next_poll(hardware);
+    NextPoll { due: drive.map_or(due, |drive| due.min(drive)), with_bytes: after(polled, PACE) }
+}
+
+/// When a board polls again.
+#[derive(Debug, Clone, Copy)]
+pub struct NextPoll {
+    due: Instant,
+    with_bytes: Instant,
+}
+
+impl NextPoll {
+    /// That of the first poll.
+    pub const AT_ONCE: Self =
+        Self { due: Instant::from_ticks(0), with_bytes: Instant::from_ticks(0) };
+
+    /// The instant, if bytes have arrived or not.
+    #[must_use]
+    pub fn at(&self, has_bytes: bool) -> Instant {
+        if has_bytes { self.due.min(self.with_bytes) } else { self.due }
+    }
+}
+
+fn after(instant: Instant, span: Duration) -> Instant {
+    instant.checked_add_duration(span).unwrap_or(instant)
 }
 
 fn version() -> [u8; 3] {

@@ -8,14 +8,15 @@
 //! | TIM1, TIM8 | right and left encoder, counted by hardware | PA8 PA9, PC6 PC7 |
 //! | TIM10 | the servo's pulses | PB8 |
 //! | TIM5 | the clock, 1 µs in 32 bits, and the stamps of the echo's edges | PA0 |
-//! | TIM2 | a poll every millisecond | |
+//! | TIM2 | ends the sleep every millisecond, to compare the time with that of the next poll | |
 //! | TIM3 | the inputs of the motor driver, right and left motor, 20 kHz | PA6 PA7, PB0 PB1 |
 //! | USART2 | the link, 115,200 baud | PA2 PA3 |
 //! | | the sonar's trigger; high while the robot may drive | PA1; PB7 |
 //!
 //! RTIC gives each interrupt exclusive access to its peripherals and queues. Only lock-free queues and the stamps of the
 //! echo are shared, so that no interrupt waits for another. The loop is RTIC's idle task: however long it takes,
-//! hardware stamps the edges, and an interrupt receives the bytes. After each poll it runs the motor code (`sonarfix-motors`).
+//! hardware stamps the edges, and an interrupt receives the bytes. After each poll it runs the motor code (`sonarfix-motors`),
+//! and sleeps until something is due, a byte arrives or an edge is stamped.
 
 #![no_std]
 #![no_main]
@@ -169,9 +170,20 @@ struct Uart {
     to_send: Producer<'static, u8>,
 }
 
-/// Between two polls at most 12 bytes arrive; a poll sends at most 400.
+/// Within a millisecond, after which bytes are read, at most 12 arrive; a poll sends at most 400.
 type Received = Queue<u8, 64>;
 type ToSend = Queue<u8, 512>;
+
+impl Uart {
+    /// Whether bytes have arrived.
+    fn has_bytes(&self) -> bool {
+        self.received.ready()
+    }
+
+    fn room(&self) -> usize {
+        self.to_send.capacity().saturating_sub(self.to_send.len())
+    }
+}
 
 impl Link for Uart {
     fn receive(&mut self) -> Option<u8> {
@@ -179,9 +191,7 @@ impl Link for Uart {
     }
 
     fn send(&mut self, frame: &[u8]) {
-        // Without this bound the compiler would guard the divisions by the capacity with a panic.
-        let Some(places) = self.to_send.capacity().checked_add(1) else { return };
-        if places - self.to_send.len() <= frame.len() {
+        if !self.has_room(frame.len()) {
             return;
         }
         for byte in frame {
@@ -189,6 +199,10 @@ impl Link for Uart {
             let _ = self.to_send.enqueue(*byte);
         }
         rtic::pend(pac::Interrupt::USART2);
+    }
+
+    fn has_room(&self, length: usize) -> bool {
+        self.room() >= length
     }
 }
 
@@ -360,7 +374,7 @@ mod app {
     use sonarfix_hal::robot::Devices;
     use sonarfix_link::message::ResetCause;
     use sonarfix_motors::Pattern;
-    use sonarfix_robot::memory;
+    use sonarfix_robot::{NextPoll, memory};
     use stm32f4xx_hal::gpio::{GpioExt, Output, Pin};
     use stm32f4xx_hal::hal_02::serial::{Read, Write};
     use stm32f4xx_hal::pac::{self, PWR, RTC, TIM1, TIM2, TIM3, TIM5, TIM8, TIM10, USART2};
@@ -371,8 +385,9 @@ mod app {
 
     use super::{ECHO, Encoder, MotorPwm, Received, Sectors, ServoPwm, ToSend, Uart, microseconds};
 
-    /// The poll period, µs.
-    const POLL: u32 = 1_000;
+    /// The longest sleep, µs: the timer of the emulator that this program is tested in has a fixed period. Waking to compare two
+    /// times takes some 40 instructions.
+    const WAKE: u32 = 1_000;
     /// Longer than the erasure of a sector (at most 0.5 s), which delays the loop.
     const WATCHDOG: fugit::MillisDurationU32 = fugit::MillisDurationU32::from_ticks(2_000);
 
@@ -395,8 +410,8 @@ mod app {
         link: Uart,
         drive: Pin<'B', 7, Output>,
         watchdog: IndependentWatchdog,
+        wake_timer: TIM2,
         backup: RTC,
-        poll_timer: TIM2,
         motors: MotorPwm,
         rx: (Rx<USART2>, Producer<'static, u8>),
         tx: (Tx<USART2>, Consumer<'static, u8>),
@@ -428,7 +443,7 @@ mod app {
         let _ = (b.pb0.into_alternate::<2>(), b.pb1.into_alternate::<2>());
         let timer_clock = rcc.clocks.timclk1();
         start_clock(&board.TIM5, microseconds(timer_clock));
-        start_polls(&board.TIM2, microseconds(timer_clock));
+        start_waking(&board.TIM2, microseconds(timer_clock));
 
         let uart = serial::Config::default().baudrate(Bps(115_200));
         let uart = board.USART2.serial((a.pa2, a.pa3), uart, &mut rcc);
@@ -465,7 +480,7 @@ mod app {
             drive: b.pb7.into_push_pull_output(),
             watchdog,
             backup: board.RTC,
-            poll_timer: board.TIM2,
+            wake_timer: board.TIM2,
             motors: MotorPwm::new(board.TIM3, timer_clock),
             rx: (rx, received),
             tx: (tx, outgoing),
@@ -473,7 +488,7 @@ mod app {
         (Shared { clock: board.TIM5 }, local)
     }
 
-    /// Polls at every interrupt of TIM2.
+    /// Polls when something is due, and sleeps until then.
     #[idle(shared = [clock], local = [app, hardware, link, drive, watchdog, backup, motors])]
     #[inline(never)]
     fn idle(mut context: idle::Context) -> ! {
@@ -481,9 +496,23 @@ mod app {
             context.local;
         let mut now = Instant::from_ticks(0);
         let mut pattern = Pattern::default();
+        let mut next_poll = NextPoll::AT_ONCE;
         loop {
-            rtic::export::wfi();
-            now = context.shared.clock.lock(|clock| advanced(now, clock.cnt().read().bits()));
+            loop {
+                let has_edge = ECHO.take_edge();
+                now = context.shared.clock.lock(|clock| advanced(now, clock.cnt().read().bits()));
+                let next = next_poll.at(link.has_bytes());
+                if has_edge || now >= next {
+                    break;
+                }
+                // An interrupt between this condition and the instruction ends the sleep at once.
+                let had_bytes = link.has_bytes();
+                cortex_m::interrupt::free(|_| {
+                    if !ECHO.has_edge() && link.has_bytes() == had_bytes {
+                        rtic::export::wfi();
+                    }
+                });
+            }
             let polled = app.poll(now, hardware, link);
             drive.set_state(polled.may_drive.into());
             if polled.is_settled {
@@ -502,6 +531,7 @@ mod app {
                 app.took(took);
             }
             app.work(now, clock);
+            next_poll = sonarfix_robot::next_poll(app, hardware, now, polled.may_drive);
         }
     }
 
@@ -523,9 +553,9 @@ mod app {
     }
 
     /// Wakes the loop.
-    #[task(binds = TIM2, local = [poll_timer])]
+    #[task(binds = TIM2, local = [wake_timer])]
     fn wake(context: wake::Context) {
-        context.local.poll_timer.sr().write(|w| w.uif().clear_bit());
+        context.local.wake_timer.sr().write(|w| w.uif().clear_bit());
     }
 
     /// Receives a byte, or sends the next one; the loop pends this interrupt when it has bytes to send.
@@ -564,10 +594,10 @@ mod app {
         timer.cr1().write(|w| w.cen().set_bit());
     }
 
-    /// Starts TIM2, which interrupts every [`POLL`].
-    fn start_polls(timer: &TIM2, divider: u16) {
+    /// Starts TIM2, which interrupts every [`WAKE`].
+    fn start_waking(timer: &TIM2, divider: u16) {
         timer.psc().write(|w| w.psc().set(divider));
-        timer.arr().write(|w| w.arr().set(POLL - 1));
+        timer.arr().write(|w| w.arr().set(WAKE - 1));
         timer.egr().write(|w| w.ug().set_bit());
         timer.sr().write(|w| w.uif().clear_bit());
         timer.dier().write(|w| w.uie().set_bit());

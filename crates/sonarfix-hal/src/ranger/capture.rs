@@ -50,6 +50,8 @@ pub struct EchoCapture {
     fall: AtomicU32,
     heard: AtomicU32,
     high: AtomicBool,
+    /// Whether there was an edge since [`EchoCapture::take_edge`].
+    has_edge: AtomicBool,
 }
 
 /// The low 32 bits.
@@ -77,6 +79,7 @@ impl EchoCapture {
             fall: AtomicU32::new(0),
             heard: AtomicU32::new(0),
             high: AtomicBool::new(false),
+            has_edge: AtomicBool::new(false),
         }
     }
 
@@ -88,6 +91,7 @@ impl EchoCapture {
             self.rise.store(stamp(at), Ordering::Relaxed);
             self.rise_of.store(ping, Ordering::Release);
         }
+        self.has_edge.store(true, Ordering::Release);
     }
 
     /// Records a falling edge at `at`.
@@ -96,15 +100,28 @@ impl EchoCapture {
         let ping = self.armed.load(Ordering::Acquire);
         let is_waited_for = self.heard.load(Ordering::Relaxed) != ping
             && self.rise_of.load(Ordering::Relaxed) == ping;
-        if !is_waited_for {
-            return;
-        }
         let width = stamp(at).wrapping_sub(self.rise.load(Ordering::Relaxed));
-        if width >= self.shortest.load(Ordering::Relaxed) {
+        if is_waited_for && width >= self.shortest.load(Ordering::Relaxed) {
             self.fall.store(stamp(at), Ordering::Relaxed);
             // Releases both stamps to the loop.
             self.heard.store(ping, Ordering::Release);
         }
+        self.has_edge.store(true, Ordering::Release);
+    }
+
+    /// Whether there was an edge since [`Self::take_edge`]: a reason not to sleep.
+    pub fn has_edge(&self) -> bool {
+        self.has_edge.load(Ordering::Acquire)
+    }
+
+    /// As [`Self::has_edge`], and forgets it. The clock of the following poll is read afterwards, so that the poll finds the
+    /// pulse.
+    pub fn take_edge(&self) -> bool {
+        let has_edge = self.has_edge();
+        if has_edge {
+            self.has_edge.store(false, Ordering::Relaxed);
+        }
+        has_edge
     }
 }
 
@@ -210,6 +227,18 @@ mod tests {
         assert_eq!(line.pulse(at(3_499)), Ok(None));
         let fall = line.pulse(at(3_500)).map(|pulse| pulse.map(|pulse| pulse.fall));
         assert_eq!(fall, Ok(Some(at(3_500))));
+    }
+
+    #[test]
+    fn an_edge_is_a_reason_to_wake_once() {
+        let capture = EchoCapture::new();
+        assert!(!capture.take_edge());
+        let edges: [fn(&EchoCapture, Instant); 2] = [EchoCapture::rose, EchoCapture::fell];
+        for edge in edges {
+            edge(&capture, at(0));
+            assert!(capture.has_edge() && capture.take_edge());
+            assert!(!capture.has_edge() && !capture.take_edge());
+        }
     }
 
     #[test]
