@@ -53,7 +53,6 @@ const ABSOLUTE_FIELDS: [(&str, Kind); 12] = [
 
 /// The kind of a measurement, its values x, y and heading, and the triangle of its covariance; nothing for what was not
 /// measured.
-#[expect(clippy::type_complexity, reason = "three parts of one thing")]
 fn numbers(
     measurement: &AbsoluteMeasurement,
 ) -> (&'static str, [Option<f64>; 3], [Option<f64>; 6]) {
