@@ -94,8 +94,8 @@ fn check(policy: Policy, range_scale_prior: f32) {
         let difference = drive(policy, range_scale_prior, seed);
         println!("{policy:?}, range scale ±{range_scale_prior}, seed {seed}: {difference:?}");
         assert_eq!(difference.fixes, 1_248);
-        assert!(difference.state < 0.01, "a state is off by {} σ", difference.state);
-        assert!(difference.deviation < 0.005, "a deviation is off by {}", difference.deviation);
+        assert!(difference.state < 0.005, "a state is off by {} σ", difference.state);
+        assert!(difference.deviation < 0.002, "a deviation is off by {}", difference.deviation);
     }
 }
 

@@ -1,14 +1,14 @@
 //! The parts of the kernel that correspond to the peers' work: six states, with sine, cosine and Q as arguments.
 //!
-//! Compared with the shipped filter, they lack the noise of each wheel, sine and cosine, the range scale's row in a
-//! prediction, and the checks of the input. Compared with a peer, they do more: the correction is that of seven states,
-//! since none for six exists; sums are compensated (Kahan); Q is the noise of advance and turn, not a diagonal.
+//! Compared with the shipped filter, they lack sine and cosine, the range scale's row of a motion that is applied to P, and the
+//! checks of the input. Compared with a peer, they do more: the correction is that of seven states, since none for six exists;
+//! Q is the noise of each wheel, not a diagonal. P is propagated when it is asked for: an update applies the motion first.
 
 use bench_workload::Filter;
 use bench_workload::model::{Matrix, Range, Step, Vector};
 use sonarfix::kernel::{
-    AccumulatedRandomWalk, Correction, Covariance, FilterEstimate, LinearizedMotion,
-    NoiseDensities, ProcessNoise, RoundingNoise,
+    AccumulatedMotion, AccumulatedRandomWalk, CalibratedDrive, Correction, Covariance,
+    FilterEstimate, NoiseDensities, WheelNoise,
 };
 use sonarfix::motion::WheelTravel;
 use sonarfix::pose::Heading;
@@ -20,11 +20,15 @@ use crate::{deviation, drive, scales, shown};
 /// The filter.
 pub struct Kernel {
     track_width: f32,
+    densities: NoiseDensities,
+    /// At the start of the interval.
     estimate: FilterEstimate,
     p: Covariance,
+    /// Since the start of the interval.
+    motion: AccumulatedMotion,
+    drive: CalibratedDrive,
     /// Q, the same for every prediction.
-    noise: ProcessNoise,
-    rounding: RoundingNoise,
+    noise: WheelNoise,
     walk: AccumulatedRandomWalk,
 }
 
@@ -35,26 +39,26 @@ impl Filter for Kernel {
         let densities = NoiseDensities::new(&drive);
         let estimate = FilterEstimate::new(&shown(state));
         let p = Covariance::independent(&deviation(variances));
-        let usual = WheelTravel::new(0.04, 0.038);
-        let motion = LinearizedMotion::new(track_width, &estimate, usual, |_| (0.0, 1.0));
-        let noise = ProcessNoise::new(&densities, &motion, usual);
-        let rounding = p.pose.rounding_noise(&noise);
+        let drive = CalibratedDrive::new(track_width, &densities, &estimate);
+        let noise = drive.noise(WheelTravel::new(0.04, 0.038));
         let walk = AccumulatedRandomWalk::new(&densities, 0.0);
-        Self { track_width, estimate, p, noise, rounding, walk }
+        let motion = AccumulatedMotion::default();
+        Self { track_width, densities, estimate, p, motion, drive, noise, walk }
     }
 
     #[inline]
     fn predict(&mut self, step: &Step) {
         let travel = WheelTravel::new(step.right, step.left);
         let sin_cos = |_| (step.sin, step.cos);
-        let motion = LinearizedMotion::new(self.track_width, &self.estimate, travel, sin_cos);
-        let Covariance { pose, calibration, .. } = &mut self.p;
-        pose.propagate(calibration, &motion, &self.noise, &self.rounding, &self.walk);
-        motion.advance(&mut self.estimate);
+        self.motion.add(&self.drive, 0.0, travel, self.noise, sin_cos);
     }
 
     #[inline]
     fn update(&mut self, range: &Range) {
+        let f = self.motion.transition(&self.drive, &self.estimate);
+        self.p.pose.propagate(&self.p.calibration, &self.walk, &f);
+        self.motion.advance(&mut self.estimate);
+        self.motion = AccumulatedMotion::default();
         let at = self.estimate.state();
         let expected = range.expected(at.x.0, at.y.0);
         let innovation = range.measured - expected;
@@ -69,16 +73,22 @@ impl Filter for Kernel {
         let prediction = self.p.project(&expected);
         if let Correction::Applied(gain) = self.p.correct(&prediction, range.variance) {
             gain.correct(&mut self.estimate, innovation);
+            self.drive = CalibratedDrive::new(self.track_width, &self.densities, &self.estimate);
         }
     }
 
     fn state(&self) -> Vector {
-        scales(&self.estimate.state())
+        let mut estimate = self.estimate;
+        self.motion.advance(&mut estimate);
+        scales(&estimate.state())
     }
 
     /// The scale errors per wheel, as in the crate's public state.
     fn covariance(&self) -> Matrix {
-        let p = self.p.to_matrix();
+        let f = self.motion.transition(&self.drive, &self.estimate);
+        let mut p = self.p;
+        p.pose.propagate(&self.p.calibration, &self.walk, &f);
+        let p = p.to_matrix();
         core::array::from_fn(|i| core::array::from_fn(|j| p[(i, j)]))
     }
 }

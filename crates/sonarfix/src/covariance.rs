@@ -13,6 +13,7 @@
 //! | module | contents |
 //! |---|---|
 //! | `blocks` | the numbers, and their conversion to a matrix |
+//! | `transition` | F and Q of a motion, eqs. (8), (9), (28) and (29) |
 //! | `propagation` | eqs. (5) and (10): P ← F P Fᵀ + Q |
 //! | `projection` | P Hᵀ and H P Hᵀ, eq. (14) |
 //! | `correction` | eqs. (6) and (18) to (20): gain, state and covariance |
@@ -28,10 +29,10 @@ mod blocks;
 mod correction;
 mod projection;
 mod propagation;
+mod transition;
 
 pub use bias::{GyroBias, TurnDifference};
 pub use blocks::{Covariance, PoseBlock};
 pub use correction::{Correction, Gain};
 pub use projection::PredictedMeasurement;
-#[cfg(feature = "unstable-kernel")]
-pub use propagation::RoundingNoise;
+pub use transition::Transition;

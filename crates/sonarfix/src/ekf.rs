@@ -21,19 +21,20 @@
 //! invalid.
 
 mod absolute;
+mod prediction;
 mod turn;
 
 use nalgebra::{SMatrix, SVector};
 
+use crate::accumulated::{AccumulatedMotion, CalibratedDrive};
 use crate::covariance::{Correction, Covariance, GyroBias, PoseBlock, PredictedMeasurement};
 use crate::elementary::sqrt;
 use crate::estimate::FilterEstimate;
-use crate::motion::{Drive, LinearizedMotion, WheelTravel};
+use crate::motion::Drive;
 use crate::numeric::{at_most_max_variance, is_within};
 use crate::pose::{Heading, Pose};
-use crate::process_noise::{AccumulatedRandomWalk, NoiseDensities, ProcessNoise};
+use crate::process_noise::{AccumulatedRandomWalk, NoiseDensities};
 use crate::range::ExpectedRange;
-use crate::trig::sin_cos_within;
 use crate::units::{Metres, Radians, SquareMetres};
 
 pub use crate::range::Innovation;
@@ -48,10 +49,6 @@ const MAX_NOISE: f32 = 1e6;
 
 /// Largest sum of squares of the derivatives of a range.
 const MAX_JACOBIAN_SQUARED: f32 = 1e6;
-
-/// Largest turn of one step, radians: the mid-heading stays in the range of the fast reduction of
-/// sine and cosine.
-const MAX_TURN: f32 = 64.0;
 
 /// Reason for which the filter refuses a call. The filter is unchanged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -161,15 +158,38 @@ pub(crate) struct PoseUncertainty {
 /// assert!((ekf.standard_deviations().x.0 - 0.0030).abs() < 0.0001);
 /// # Ok::<(), sonarfix::ekf::EkfError>(())
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Ekf {
+    /// X̂ at the start of the interval.
     estimate: FilterEstimate,
-    /// P without the random walk of the calibration since the last update; [`Self::p`] is P.
+    /// P at the start of the interval, without the random walk of the calibration since the last update.
     p_without_walk: Covariance,
-    /// Distance of both wheels together since the last update, metres.
+    /// Distance of both wheels together from the last update to the start of the interval, metres.
     distance_since_update: f32,
+    /// Motion since the start of the interval, not yet applied to estimate and P.
+    motion: AccumulatedMotion,
+    /// Distance of both wheels together since the start of the interval, metres.
+    distance: f32,
+    /// Up to this distance of both wheels together the motion is accumulated, metres. 0: the calibration or P have changed, and
+    /// `drive` and this limit are to be computed again.
+    longest: f32,
+    /// The drive at the estimate of the calibration.
+    drive: CalibratedDrive,
+    /// The limit by the noise densities alone.
+    longest_by_noise: f32,
     track_width: f32,
     densities: NoiseDensities,
+}
+
+/// Filters are equal that have the same state and P, and will have the same after the same corrections.
+impl PartialEq for Ekf {
+    fn eq(&self, other: &Self) -> bool {
+        let parts = |ekf: &Self| {
+            let Self { estimate, p_without_walk, distance_since_update, .. } = ekf.applied();
+            (estimate, p_without_walk, distance_since_update, ekf.track_width, ekf.densities)
+        };
+        parts(self) == parts(other)
+    }
 }
 
 impl Ekf {
@@ -205,6 +225,11 @@ impl Ekf {
             estimate: FilterEstimate::new(&state),
             p_without_walk: p,
             distance_since_update: 0.0,
+            motion: AccumulatedMotion::default(),
+            distance: 0.0,
+            longest: 0.0,
+            drive: CalibratedDrive::default(),
+            longest_by_noise: prediction::longest_interval(&drive),
             track_width: drive.track_width.0,
             densities,
         })
@@ -213,17 +238,17 @@ impl Ekf {
     /// The estimate X̂.
     #[must_use]
     pub fn state(&self) -> StateEstimate {
-        self.estimate.state()
+        self.estimate_now().state()
     }
 
     /// X̂ in the coordinates of the filter.
     pub(crate) fn estimate(&self) -> FilterEstimate {
-        self.estimate
+        self.estimate_now()
     }
 
     /// The estimated heading.
     pub(crate) fn heading(&self) -> Heading {
-        Heading::new(Radians(self.estimate.heading))
+        Heading::new(Radians(self.estimate_now().heading))
     }
 
     /// The estimate X̂ as a 7×1 vector, in the order and units of [`StateEstimate::to_array`].
@@ -246,8 +271,9 @@ impl Ekf {
 
     /// P.
     fn p(&self) -> Covariance {
-        let mut p = self.p_without_walk;
-        p.add_random_walk(&self.walk());
+        let applied = self.applied();
+        let mut p = applied.p_without_walk;
+        p.add_random_walk(&applied.walk());
         p
     }
 
@@ -256,20 +282,32 @@ impl Ekf {
         AccumulatedRandomWalk::new(&self.densities, self.distance_since_update)
     }
 
+    /// A number of P that does not depend on the random walk.
+    #[inline]
+    fn of_p<T>(&self, number: impl Fn(&Covariance) -> T) -> T {
+        if self.distance <= 0.0 {
+            return number(&self.p_without_walk);
+        }
+        number(&self.applied().p_without_walk)
+    }
+
     /// Covariance of the position and variance of the heading, which contain no random walk.
     pub(crate) fn pose_covariance(&self) -> PoseCovariance {
-        let p = &self.p_without_walk.pose;
-        PoseCovariance { xx: p.xx, xy: p.xy, yy: p.yy, hh: p.hh }
+        self.of_p(|p| {
+            let PoseBlock { xx, xy, yy, hh, .. } = p.pose;
+            PoseCovariance { xx, xy, yy, hh }
+        })
     }
 
     /// The variances of the pose.
     pub(crate) fn pose_variances(&self) -> PoseVariances {
-        let p = &self.p_without_walk.pose;
-        PoseVariances { xx: p.xx, yy: p.yy, hh: p.hh }
+        let PoseCovariance { xx, yy, hh, .. } = self.pose_covariance();
+        PoseVariances { xx, yy, hh }
     }
 
     /// Replaces the variances of the pose by valid ones, each not less than with which P was a covariance.
     pub(crate) fn set_pose_variances(&mut self, variances: PoseVariances) {
+        self.end_interval();
         let p = &mut self.p_without_walk.pose;
         (p.xx, p.yy, p.hh) = (variances.xx, variances.yy, variances.hh);
     }
@@ -283,46 +321,6 @@ impl Ekf {
             position: Metres(sqrt(middle + sqrt(half * half + xy * xy))),
             heading: Radians(sqrt(hh)),
         }
-    }
-
-    // ===== Eqs. (4) and (5): X̂ ← f(X̂, U), P ← F P Fᵀ + Q =====
-    /// Predicts the state over one odometry increment.
-    ///
-    /// X̂ moves by eq. (7) of `docs/model.md`, P changes by eqs. (8) to (10). Q grows with the
-    /// distance travelled, never with time: an increment without travel changes nothing.
-    ///
-    /// # Errors
-    /// [`EkfError::NotFinite`] if a travel is; [`EkfError::TurnTooLarge`] beyond 64 rad;
-    /// [`EkfError::VarianceTooLarge`] or [`EkfError::Indefinite`] if a variance would leave its
-    /// limits. The filter is unchanged.
-    ///
-    /// # Panics
-    /// Never.
-    pub fn predict(&mut self, travel: WheelTravel) -> Result<(), EkfError> {
-        let distance = travel.right.abs().0 + travel.left.abs().0;
-        if distance <= 0.0 {
-            return Ok(());
-        }
-        let motion =
-            LinearizedMotion::new(self.track_width, &self.estimate, travel, sin_cos_within);
-        if !is_within(motion.turn.abs(), MAX_TURN) {
-            return Err(refused_travel(travel));
-        }
-        let noise = ProcessNoise::new(&self.densities, &motion, travel);
-        let walk = self.walk();
-        let p = &mut self.p_without_walk;
-        let before = p.pose;
-        let rounding = p.pose.rounding_noise(&noise);
-        p.pose.propagate(&p.calibration, &motion, &noise, &rounding, &walk);
-        if !p.pose.is_valid() {
-            let error = invalid(p);
-            p.pose = before;
-            return Err(error);
-        }
-        p.range_scale.propagate(&motion);
-        self.distance_since_update += distance;
-        motion.advance(&mut self.estimate);
-        Ok(())
     }
 
     /// Adds independent errors with these standard deviations to x and y and to the heading.
@@ -342,6 +340,7 @@ impl Ekf {
         if position < Metres(0.0) || heading < Radians(0.0) {
             return Err(EkfError::NegativeVariance);
         }
+        self.end_interval();
         let p = &mut self.p_without_walk.pose;
         let before = *p;
         p.xx += position.0 * position.0;
@@ -380,6 +379,7 @@ impl Ekf {
         if !block.is_valid() {
             return Err(EkfError::VarianceTooLarge);
         }
+        self.end_interval();
         let p = &mut self.p_without_walk;
         p.pose = block;
         p.range_scale.forget_pose();
@@ -405,12 +405,12 @@ impl Ekf {
         &self,
         expected: &'e ExpectedRange,
     ) -> PredictedMeasurement<'e> {
-        self.p_without_walk.project(expected)
+        self.of_p(|p| p.project(expected))
     }
 
     /// Covariance of an expected range with the mean and the difference of the scale errors.
     pub(crate) fn cross_covariance_of_wheels(&self, expected: &ExpectedRange) -> (f32, f32) {
-        self.p_without_walk.cross_covariance_of_wheels(expected)
+        self.of_p(|p| p.cross_covariance_of_wheels(expected))
     }
 
     // ===== Eq. (6): K, X̂ ← X̂ + K ν, P ← P − K H P =====
@@ -433,6 +433,7 @@ impl Ekf {
     ) -> Result<(), EkfError> {
         let innovation = range - expected.range;
         check_measurement(expected, innovation, noise)?;
+        self.end_interval();
         let prediction = self.predict_measurement(expected);
         self.correct(&prediction, innovation, noise, 1.0, None)
     }
@@ -456,6 +457,7 @@ impl Ekf {
         noise: SquareMetres,
         association: f32,
     ) -> Result<(), EkfError> {
+        self.end_interval();
         let prediction = self.predict_measurement(expected);
         self.update_predicted(&prediction, range - expected.range, noise, association, None)
     }
@@ -477,6 +479,7 @@ impl Ekf {
             return Ok(());
         }
         check_measurement(prediction.expected, innovation, noise)?;
+        self.end_interval();
         self.correct(prediction, innovation, noise, association, bias)
     }
 
@@ -577,12 +580,6 @@ impl Ekf {
 #[cold]
 fn invalid(p: &Covariance) -> EkfError {
     if p.has_negative_variance() { EkfError::Indefinite } else { EkfError::VarianceTooLarge }
-}
-
-/// Why a travel is refused before P is propagated.
-#[cold]
-fn refused_travel(travel: WheelTravel) -> EkfError {
-    if travel.is_finite() { EkfError::TurnTooLarge } else { EkfError::NotFinite }
 }
 
 /// Whether the filter computes with a measurement.

@@ -47,6 +47,7 @@
 extern crate std;
 
 pub mod absolute;
+mod accumulated;
 pub mod aim;
 mod alternatives;
 pub mod config;
@@ -84,8 +85,8 @@ mod visibility;
 #[cfg(feature = "unstable-kernel")]
 #[doc(hidden)]
 pub mod kernel {
-    pub use crate::covariance::{Correction, Covariance, RoundingNoise};
+    pub use crate::accumulated::{AccumulatedMotion, CalibratedDrive, WheelNoise};
+    pub use crate::covariance::{Correction, Covariance};
     pub use crate::estimate::FilterEstimate;
-    pub use crate::motion::LinearizedMotion;
-    pub use crate::process_noise::{AccumulatedRandomWalk, NoiseDensities, ProcessNoise};
+    pub use crate::process_noise::{AccumulatedRandomWalk, NoiseDensities};
 }

@@ -301,6 +301,7 @@ impl<'m> Localizer<'m> {
     pub fn odometry_missing(&mut self, now: Instant) {
         let since = |then: Instant| now.checked_duration_since(then).unwrap_or(NO_TIME);
         let (unseen_for, unrecorded) = (since(self.time), since(self.recorded));
+        self.ekf.apply_motion();
         let unseen = *self.unseen.get_or_insert_with(|| Unseen::new(self.time, &self.ekf));
         unseen.grow(&mut self.ekf, now, &self.config);
         let (uncertainty, limits) = (self.ekf.pose_uncertainty(), self.limits());
@@ -374,7 +375,7 @@ impl<'m> Localizer<'m> {
     /// # Errors
     /// [`NoAim`], by the reason for which there is no wall to measure.
     pub fn aim(&self) -> Result<Aim, NoAim> {
-        aim::choose(&self.config, &self.map, &self.ekf, &self.history, self.time)
+        aim::choose(&self.config, &self.map, &self.ekf.applied(), &self.history, self.time)
     }
 
     /// The wall to which a beam at `bearing` (relative to the heading) is square, for a range whose
@@ -383,7 +384,8 @@ impl<'m> Localizer<'m> {
     /// # Errors
     /// [`NoAim`], by the reason for which there is none.
     pub fn aim_at(&self, bearing: Radians) -> Result<Aim, NoAim> {
-        aim::at(&self.config, &self.map, &self.ekf, &self.history, self.time, bearing)
+        let ekf = self.ekf.applied();
+        aim::at(&self.config, &self.map, &ekf, &self.history, self.time, bearing)
     }
 
     /// Corrects the estimate by the range measured along an aim, or records that there was no echo.
@@ -394,6 +396,7 @@ impl<'m> Localizer<'m> {
     pub fn fix(&mut self, aim: &Aim, range: Option<Metres>) -> Fix {
         self.history.record_bearing(aim.wall, aim.bearing, aim.range);
         self.association = 0.0;
+        self.ekf.apply_motion();
         let ExplainedPing { fix, evidence, contradicts, is_repeated } =
             self.try_fix(aim, range).unwrap_or_else(ExplainedPing::refused);
         let limits = self.limits();
@@ -429,6 +432,7 @@ impl<'m> Localizer<'m> {
     ) -> Result<AbsoluteFix, AbsoluteRefusal> {
         let measured = measurement.check()?;
         let back = self.step.back_to(at, self.time)?;
+        self.ekf.apply_motion();
         let prediction = self.ekf.predict_absolute(&measured, &back);
         let indefinite = AbsoluteRefusal::Filter(EkfError::Indefinite);
         let fit = prediction.fit().ok_or(indefinite)?;

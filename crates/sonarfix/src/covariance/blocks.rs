@@ -54,6 +54,11 @@ impl PoseBlock {
         Self { xx, yy: xx, hh, ..Self::default() }
     }
 
+    /// xx + yy + hh, m² + rad².
+    pub(crate) fn sum_of_variances(&self) -> f32 {
+        self.xx + self.yy + self.hh
+    }
+
     /// Whether the variances of the pose are valid.
     #[inline]
     pub fn is_valid(&self) -> bool {
@@ -70,6 +75,12 @@ impl CalibrationBlock {
             self.dd + walk.scale_difference,
             self.ww + walk.track_width_error,
         )
+    }
+
+    /// cc + dd + ww with the accumulated random walk, 1 + m².
+    pub(crate) fn sum_of_variances(&self, walk: &AccumulatedRandomWalk) -> f32 {
+        let (cc, dd, ww) = self.variances_with(walk);
+        cc + dd + ww
     }
 }
 

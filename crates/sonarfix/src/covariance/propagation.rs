@@ -1,101 +1,88 @@
-//! Propagation of P through one odometry increment (`docs/model.md`, eqs. 5 and 10).
+//! Propagation of P over a motion (`docs/model.md`, eqs. 5 and 10).
 
-use super::blocks::{CalibrationBlock, PoseBlock, RangeScaleBlock};
-use crate::motion::LinearizedMotion;
-use crate::numeric::positive_part;
-use crate::process_noise::{AccumulatedRandomWalk, ProcessNoise};
+use super::blocks::{CalibrationBlock, Covariance, PoseBlock, RangeScaleBlock};
+use super::transition::Transition;
+use crate::numeric::{at_most_max_variance, positive_part};
+use crate::process_noise::AccumulatedRandomWalk;
 
 /// Relative rounding error of a sum of a few terms: 4 u, four times 2⁻²⁴.
 const ROUNDING: f32 = 1.0 / 4_194_304.0;
 
-/// Process noise that compensates for rounding: `q_x`, `q_y` and `q_h` of eq. (10).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RoundingNoise {
-    x: f32,
-    y: f32,
-    heading: f32,
-}
-
 impl PoseBlock {
-    /// The part of the rounding error of a step that the noise of the wheels does not cover.
-    #[inline]
-    #[must_use]
-    pub fn rounding_noise(&self, noise: &ProcessNoise) -> RoundingNoise {
-        let missing = |variance: f32, noise: f32| positive_part(0.5 * ROUNDING * variance - noise);
-        RoundingNoise {
-            x: missing(self.xx, noise.advance),
-            y: missing(self.yy, noise.advance),
-            heading: missing(self.hh, noise.turn),
-        }
-    }
-
     // ===== Eqs. (5) and (10): P ← F P Fᵀ + Q, rows of the pose =====
     /// Propagates the rows of the pose.
     ///
-    /// The increment is three small movements: half the turn, the advance along the mid-heading, the
-    /// other half. The new pose is linear in the old pose, the turn t and the advance s, so only their
-    /// covariances are needed: `ht` is that of heading and turn, `xm` that of x and the mid-heading
-    /// m = h + t/2, and so on.
+    /// The new pose is the old pose plus the turn t and the displacement a, which are linear in the old heading and the
+    /// calibration, so only their covariances are needed: `ht` is that of heading and turn, `x_ax` that of x and its
+    /// displacement, and so on.
     #[inline]
     pub fn propagate(
         &mut self,
         calibration: &CalibrationBlock,
-        motion: &LinearizedMotion,
-        noise: &ProcessNoise,
-        rounding: &RoundingNoise,
         walk: &AccumulatedRandomWalk,
+        f: &Transition,
     ) {
         let (p, q) = (self, calibration);
         let (cc, dd, ww) = q.variances_with(walk);
-        let (sin, cos) = (motion.sin, motion.cos);
-        // ∂x/∂m and ∂y/∂m.
-        let (gx, gy) = (-motion.dy, motion.dx);
-        let turn_with = |c: f32, d: f32, w: f32| {
-            motion.turn_by_c * c + motion.turn_by_d * d + motion.turn_by_w * w
-        };
-        let advance_with = |c: f32, d: f32| motion.advance_by_c * c + motion.advance_by_d * d;
+        let (gx, gy) = (-f.dy, f.dx);
+        let turn = |c: f32, d: f32, w: f32| f.turn_by_c * c + f.turn_by_d * d + f.turn_by_w * w;
+        let along_x =
+            |h: f32, c: f32, d: f32, w: f32| gx * h + f.x_by_c * c + f.x_by_d * d + f.x_by_w * w;
+        let along_y =
+            |h: f32, c: f32, d: f32, w: f32| gy * h + f.y_by_c * c + f.y_by_d * d + f.y_by_w * w;
+        let missing = |variance: f32, noise: f32| positive_part(0.5 * ROUNDING * variance - noise);
 
-        let (tc, sc) = (turn_with(cc, q.cd, q.cw), advance_with(cc, q.cd));
-        let (td, sd) = (turn_with(q.cd, dd, q.dw), advance_with(q.cd, dd));
-        let (tw, sw) = (turn_with(q.cw, q.dw, ww), advance_with(q.cw, q.dw));
-        let tt = noise.turn + motion.turn_by_c * tc + motion.turn_by_d * td + motion.turn_by_w * tw;
-        let ts = noise.advance_turn + motion.advance_by_c * tc + motion.advance_by_d * td;
-        let ss = noise.advance + motion.advance_by_c * sc + motion.advance_by_d * sd;
+        let (tc, td, tw) = (turn(cc, q.cd, q.cw), turn(q.cd, dd, q.dw), turn(q.cw, q.dw, ww));
+        let (ht, tt) = (turn(p.hc, p.hd, p.hw), turn(tc, td, tw));
+        // Covariances of the displacement along x with heading, calibration, turn and itself.
+        let (xc, xd, xw) = (
+            along_x(p.hc, cc, q.cd, q.cw),
+            along_x(p.hd, q.cd, dd, q.dw),
+            along_x(p.hw, q.cw, q.dw, ww),
+        );
+        let xh = along_x(p.hh, p.hc, p.hd, p.hw);
+        let xx = along_x(xh, xc, xd, xw);
+        let xt = along_x(ht, tc, td, tw);
+        let (yc, yd, yw) = (
+            along_y(p.hc, cc, q.cd, q.cw),
+            along_y(p.hd, q.cd, dd, q.dw),
+            along_y(p.hw, q.cw, q.dw, ww),
+        );
+        let yh = along_y(p.hh, p.hc, p.hd, p.hw);
+        let yy = along_y(yh, yc, yd, yw);
+        let xy = along_x(yh, yc, yd, yw);
+        let yt = along_y(ht, tc, td, tw);
+        // Covariances of the old x and y with the displacement.
+        let x_ax = along_x(p.xh, p.xc, p.xd, p.xw);
+        let x_ay = along_y(p.xh, p.xc, p.xd, p.xw);
+        let y_ax = along_x(p.yh, p.yc, p.yd, p.yw);
+        let y_ay = along_y(p.yh, p.yc, p.yd, p.yw);
 
-        let (ht, hs) = (turn_with(p.hc, p.hd, p.hw), advance_with(p.hc, p.hd));
-        let (cm, dm, wm) = (p.hc + 0.5 * tc, p.hd + 0.5 * td, p.hw + 0.5 * tw);
+        p.xh += turn(p.xc, p.xd, p.xw) + xh + xt + f.xh;
+        p.yh += turn(p.yc, p.yd, p.yw) + yh + yt + f.yh;
+        p.xc += xc;
+        p.xd += xd;
+        p.xw += xw;
+        p.yc += yc;
+        p.yd += yd;
+        p.yw += yw;
+        // The variance of the displacement may cancel to zero but must not become negative.
+        let (xx, yy) = (xx * (1.0 + ROUNDING) + f.xx, yy * (1.0 + ROUNDING) + f.yy);
+        p.xx += missing(p.xx, f.advance) + (x_ax + x_ax + xx);
+        p.yy += missing(p.yy, f.advance) + (y_ay + y_ay + yy);
+        p.xy += x_ay + y_ax + xy + f.xy;
+        p.hh += missing(p.hh, f.hh) + (ht + ht + tt + f.hh);
         p.hc += tc;
         p.hd += td;
         p.hw += tw;
-        let hm = p.hh + 0.5 * ht;
-        let mt = ht + 0.5 * tt;
-        let (mm, ms) = (hm + 0.5 * mt, hs + 0.5 * ts);
-        let (m_new, s_new) = (hm + mt, hs + ts);
-        p.hh += mt + mt + rounding.heading;
-        // The displacement variance may cancel to zero but must not become negative.
-        let (mm, ss) = (mm * (1.0 + ROUNDING), ss * (1.0 + ROUNDING));
+    }
 
-        // x_m and x_s: covariance of the new x with the mid-heading and with the advance.
-        let (xt, xs) = (turn_with(p.xc, p.xd, p.xw), advance_with(p.xc, p.xd));
-        p.xc = p.xc + gx * cm + cos * sc;
-        p.xd = p.xd + gx * dm + cos * sd;
-        p.xw = p.xw + gx * wm + cos * sw;
-        let xm = p.xh + 0.5 * xt;
-        p.xh += xt + gx * m_new + cos * s_new;
-        let x_m = xm + gx * mm + cos * ms;
-        let x_s = xs + gx * ms + cos * ss;
-        p.xx += rounding.x + gx * (xm + x_m) + cos * (xs + x_s);
-
-        let (yt, ys) = (turn_with(p.yc, p.yd, p.yw), advance_with(p.yc, p.yd));
-        p.yc = p.yc + gy * cm + sin * sc;
-        p.yd = p.yd + gy * dm + sin * sd;
-        p.yw = p.yw + gy * wm + sin * sw;
-        let ym = p.yh + 0.5 * yt;
-        p.yh += yt + gy * m_new + sin * s_new;
-        p.xy += gy * x_m + sin * x_s + gx * ym + cos * ys;
-        let y_m = ym + gy * mm + sin * ms;
-        let y_s = ys + gy * ms + sin * ss;
-        p.yy += rounding.y + gy * (ym + y_m) + sin * (ys + y_s);
+    /// Sets variances that are not valid to the limit that they exceed.
+    #[cold]
+    fn limit_variances(&mut self) {
+        for variance in [&mut self.xx, &mut self.yy, &mut self.hh] {
+            *variance = if *variance < 0.0 { 0.0 } else { at_most_max_variance(*variance) };
+        }
     }
 }
 
@@ -103,13 +90,29 @@ impl RangeScaleBlock {
     // ===== Eq. (10): column of the range scale error, which has no process noise =====
     /// Propagates the covariances of the pose with the range scale error.
     #[inline]
-    pub fn propagate(&mut self, motion: &LinearizedMotion) {
+    pub fn propagate(&mut self, f: &Transition) {
         let p = self;
-        let tk = motion.turn_by_c * p.ck + motion.turn_by_d * p.dk + motion.turn_by_w * p.wk;
-        let sk = motion.advance_by_c * p.ck + motion.advance_by_d * p.dk;
-        let km = p.hk + 0.5 * tk;
-        p.xk += motion.cos * sk - motion.dy * km;
-        p.yk += motion.sin * sk + motion.dx * km;
-        p.hk += tk;
+        p.xk += f.x_by_c * p.ck + f.x_by_d * p.dk + f.x_by_w * p.wk - f.dy * p.hk;
+        p.yk += f.y_by_c * p.ck + f.y_by_d * p.dk + f.y_by_w * p.wk + f.dx * p.hk;
+        p.hk += f.turn_by_c * p.ck + f.turn_by_d * p.dk + f.turn_by_w * p.wk;
+    }
+}
+
+impl Covariance {
+    // ===== Eqs. (5) and (10): P ← F P Fᵀ + Q =====
+    /// Propagates P, its calibration with the random walk.
+    #[inline]
+    pub fn propagate(&mut self, walk: &AccumulatedRandomWalk, f: &Transition) {
+        self.pose.propagate(&self.calibration, walk, f);
+        self.range_scale.propagate(f);
+    }
+
+    /// As [`Self::propagate`], for a motion within the limits in which the variances stay valid.
+    #[inline]
+    pub fn propagate_within(&mut self, walk: &AccumulatedRandomWalk, f: &Transition) {
+        self.propagate(walk, f);
+        if !self.pose.is_valid() {
+            self.pose.limit_variances();
+        }
     }
 }

@@ -1,7 +1,8 @@
 //! Prediction with the turn that a gyro has measured beside the wheels (`docs/model.md`, "Gyro").
 
-use super::{Ekf, EkfError, MAX_TURN, invalid, refused_travel};
-use crate::covariance::{GyroBias, TurnDifference};
+use super::prediction::{MAX_TURN, refused_travel};
+use super::{Ekf, EkfError, invalid};
+use crate::covariance::{GyroBias, Transition, TurnDifference};
 use crate::motion::{LinearizedMotion, WheelTravel};
 use crate::numeric::is_within;
 use crate::process_noise::ProcessNoise;
@@ -48,6 +49,7 @@ impl Ekf {
         limits: SlipLimits,
         bias: &mut GyroBias,
     ) -> Result<TurnAgreement, EkfError> {
+        self.end_interval();
         // Sine and cosine are those of the combined turn, below: `dx` is the advance until then.
         let mut motion =
             LinearizedMotion::new(self.track_width, &self.estimate, travel, |_| (0.0, 1.0));
@@ -90,9 +92,7 @@ impl Ekf {
         (motion.sin, motion.cos) = (sin, cos);
         (motion.dx, motion.dy) = (advance * cos, advance * sin);
         let by_bias = -0.5 * share * measured.seconds;
-        self.propagate_with_bias(&motion, &noise, by_bias, bias)?;
-        self.distance_since_update += travel.right.abs().0 + travel.left.abs().0;
-        motion.advance(&mut self.estimate);
+        self.roll(travel, &motion, &noise, by_bias, bias)?;
         Ok(if is_slip { TurnAgreement::Differ(differs) } else { TurnAgreement::Agree(difference) })
     }
 
@@ -105,16 +105,17 @@ impl Ekf {
         travel: WheelTravel,
         bias: &mut GyroBias,
     ) -> Result<(), EkfError> {
-        let motion =
-            LinearizedMotion::new(self.track_width, &self.estimate, travel, sin_cos_within);
+        let estimate = self.estimate_now();
+        let motion = LinearizedMotion::new(self.track_width, &estimate, travel, sin_cos_within);
         self.predict(travel)?;
         bias.propagate(&motion);
         Ok(())
     }
 
     // ===== Eq. (37): half of the turn by the bias, the motion, the other half =====
-    fn propagate_with_bias(
+    fn roll(
         &mut self,
+        travel: WheelTravel,
         motion: &LinearizedMotion,
         noise: &ProcessNoise,
         by_bias: f32,
@@ -124,17 +125,17 @@ impl Ekf {
         let p = &mut self.p_without_walk;
         let (before, column) = (*p, *bias);
         bias.turn(p, by_bias);
-        let rounding = p.pose.rounding_noise(noise);
-        p.pose.propagate(&p.calibration, motion, noise, &rounding, &walk);
-        p.range_scale.propagate(motion);
+        p.propagate(&walk, &Transition::of_increment(motion, noise));
         bias.propagate(motion);
         bias.turn(p, by_bias);
-        if p.pose.is_valid() {
-            return Ok(());
+        if !p.pose.is_valid() {
+            let error = invalid(p);
+            (*p, *bias) = (before, column);
+            return Err(error);
         }
-        let error = invalid(p);
-        (*p, *bias) = (before, column);
-        Err(error)
+        self.distance_since_update += travel.right.abs().0 + travel.left.abs().0;
+        motion.advance(&mut self.estimate);
+        Ok(())
     }
 
     /// Corrects the state by a difference of turns, if it agrees with the estimate within a number of standard
@@ -145,6 +146,7 @@ impl Ekf {
         deviations: f32,
         bias: &mut GyroBias,
     ) -> bool {
+        self.end_interval();
         let mut p = self.p_without_walk;
         p.add_random_walk(&self.walk());
         let innovation = difference.value - difference.expected(&self.estimate, bias);

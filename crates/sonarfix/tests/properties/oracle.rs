@@ -105,11 +105,16 @@ impl Robot {
         let g = self.by_travel(state, travel);
         let per_metre = self.wheel_noise * self.wheel_noise;
         let wheels = SMatrix::<f64, 2, 2>::from_diagonal(&(travel.abs() * per_metre));
+        g * wheels * g.transpose() + self.walk(travel)
+    }
+
+    /// The random walk of the calibration over a step.
+    pub fn walk(&self, travel: &SVector<f64, 2>) -> Matrix {
         let rolled = travel.abs().sum() / 2.0;
-        let mut q = g * wheels * g.transpose();
-        q[(SCALE_RIGHT, SCALE_RIGHT)] += self.scale_walk * self.scale_walk * rolled;
-        q[(SCALE_LEFT, SCALE_LEFT)] += self.scale_walk * self.scale_walk * rolled;
-        q[(TRACK_WIDTH, TRACK_WIDTH)] += self.track_width_walk * self.track_width_walk * rolled;
+        let mut q = Matrix::zeros();
+        q[(SCALE_RIGHT, SCALE_RIGHT)] = self.scale_walk * self.scale_walk * rolled;
+        q[(SCALE_LEFT, SCALE_LEFT)] = self.scale_walk * self.scale_walk * rolled;
+        q[(TRACK_WIDTH, TRACK_WIDTH)] = self.track_width_walk * self.track_width_walk * rolled;
         q
     }
 

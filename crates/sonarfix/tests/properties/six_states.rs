@@ -21,6 +21,7 @@ const SHARPEST: f32 = 1.0 / 16_384.0;
 /// seventh state. Indices: x, y, heading, mean and difference of the scale errors, width.
 #[derive(Debug, Clone, Copy)]
 struct SixStateFilter {
+    /// At the start of the interval, as `compensation` and `p`.
     x: [f32; 6],
     /// Kahan compensation of x, y, heading.
     compensation: [f32; 3],
@@ -30,6 +31,22 @@ struct SixStateFilter {
     /// Distance of both wheels since the last update; the random walk of the calibration over it is
     /// not in `p`.
     distance_since_update: f32,
+    sums: Sums,
+}
+
+/// Eq. (27): the motion of an interval.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    distance: f32,
+    position: [f32; 2],
+    turn: f32,
+    /// By wheel, right before left: travel, and travel times the position of the other wheel.
+    travel: [f32; 2],
+    about: [[f32; 2]; 2],
+    noise: f32,
+    noise_at: [f32; 2],
+    /// xx, xy, yy.
+    noise_squared: [f32; 3],
 }
 
 /// Adds to a sum with Kahan compensation.
@@ -54,7 +71,8 @@ impl SixStateFilter {
         p[3][4] = 0.5 * (rr - ll);
         p[4][4] = rr + ll;
         p[5][5] = ww;
-        Self { x, compensation: [0.0; 3], p, drive, distance_since_update: 0.0 }
+        let sums = Sums::default();
+        Self { x, compensation: [0.0; 3], p, drive, distance_since_update: 0.0, sums }
     }
 
     /// An entry, from the upper triangle.
@@ -62,76 +80,145 @@ impl SixStateFilter {
         if i <= j { self.p[i][j] } else { self.p[j][i] }
     }
 
+    /// 1 + S of the right and the left wheel.
+    fn factors(&self) -> [f32; 2] {
+        [(1.0 + self.x[3]) + 0.5 * self.x[4], (1.0 + self.x[3]) - 0.5 * self.x[4]]
+    }
+
+    /// 2/W and W/2.
+    fn widths(&self) -> [f32; 2] {
+        let width = self.drive.track_width.0 + self.x[5];
+        [2.0 / width, 0.5 * width]
+    }
+
+    /// The longest interval; the drives of these tests have noise and random walks.
+    fn longest(&self) -> f32 {
+        let Drive { track_width, wheel_noise, scale_walk, track_width_walk } = self.drive;
+        let noise = 0.15 * wheel_noise.0.0;
+        let [_, half_width] = self.widths();
+        let by_walks = [noise / scale_walk.0, noise * track_width.0 / track_width_walk.0.0];
+        by_walks.into_iter().fold((8.0 * (half_width + half_width)).min(2.0), f32::min)
+    }
+
     fn predict(&mut self, travel: WheelTravel) {
-        let (right, left) = (travel.right.0, travel.left.0);
-        let [_, _, heading, common, difference, width_error] = self.x;
-        let factor_r = (1.0 + common) + 0.5 * difference;
-        let factor_l = (1.0 + common) - 0.5 * difference;
-        let (rolled_r, rolled_l) = (right * factor_r, left * factor_l);
-        let per_width = 1.0 / (self.drive.track_width.0 + width_error);
-        let turn = (rolled_r - rolled_l) * per_width;
-        let advance = 0.5 * (rolled_r + rolled_l);
-        let (sin, cos) = sin_cos(Radians(heading + 0.5 * turn));
-        let per_metre = self.drive.wheel_noise.0.0 * self.drive.wheel_noise.0.0;
-        let (of_r, of_l) =
-            ((right * factor_r * factor_r).abs(), (left * factor_l * factor_l).abs());
-        let noise_s = 0.25 * per_metre * (of_r + of_l);
-        let per_half_width = per_width + per_width;
-        let noise_t = noise_s * per_half_width * per_half_width;
-        let noise_st = 0.25 * per_metre * (of_r - of_l) * per_half_width;
-        let lacking = |variance: f32, noise: f32| {
-            let lack = 0.5 * ROUNDING * variance - noise;
-            if lack > 0.0 { lack } else { 0.0 }
+        let distance = travel.right.0.abs() + travel.left.0.abs();
+        if self.sums.distance + distance > self.longest() {
+            self.apply();
+        }
+        let (factors, [twice_per_width, half_width]) = (self.factors(), self.widths());
+        let travel = [travel.right.0, travel.left.0];
+        let quarters = factors.map(|factor| 0.25 * factor);
+        let parts = [travel[0] * quarters[0], travel[1] * quarters[1]];
+        let half_turn = (parts[0] - parts[1]) * twice_per_width;
+        let per_metre = 0.25 * (self.drive.wheel_noise.0.0 * self.drive.wheel_noise.0.0);
+        let per_metre = per_metre * twice_per_width * twice_per_width;
+        let noise: [f32; 2] =
+            core::array::from_fn(|i| per_metre * factors[i] * factors[i] * travel[i].abs());
+        let sums = &mut self.sums;
+        sums.distance += distance;
+        let turned = sums.turn + half_turn;
+        sums.turn = turned + half_turn;
+        let (sin, cos) = sin_cos(Radians(self.x[2] + turned));
+        let half = [(parts[0] + parts[1]) * cos, (parts[0] + parts[1]) * sin];
+        let middle = [sums.position[0] + half[0], sums.position[1] + half[1]];
+        sums.position = [middle[0] + half[0], middle[1] + half[1]];
+        let aside = [-(half_width * sin), half_width * cos];
+        // Of the left wheel, then of the right one: each is the centre of the error of the other.
+        let centres =
+            [1.0, -1.0].map(|side| [middle[0] + side * aside[0], middle[1] + side * aside[1]]);
+        let at: [[f32; 2]; 2] = core::array::from_fn(|i| centres[i].map(|c| noise[i] * c));
+        sums.noise += noise[0] + noise[1];
+        for i in 0..2 {
+            sums.travel[i] += travel[i];
+            for axis in 0..2 {
+                sums.about[i][axis] += travel[i] * centres[i][axis];
+            }
+            sums.noise_at[i] += at[0][i] + at[1][i];
+        }
+        for (sum, (i, j)) in sums.noise_squared.iter_mut().zip([(0, 0), (0, 1), (1, 1)]) {
+            *sum += at[0][i] * centres[0][j] + at[1][i] * centres[1][j];
+        }
+    }
+
+    /// Eqs. (28) to (30): applies the motion of the interval.
+    fn apply(&mut self) {
+        let Sums { distance, position, turn, travel, about, noise, noise_at, noise_squared } =
+            self.sums;
+        if distance <= 0.0 {
+            return;
+        }
+        let [twice_per_width, half_width] = self.widths();
+        let per_width = 0.5 * twice_per_width;
+        let since: [[f32; 2]; 2] = core::array::from_fn(|i| {
+            [0, 1].map(|axis: usize| (position[axis] * travel[i] - about[i][axis]) * per_width)
+        });
+        let [a, b] = since;
+        let by = [(b[1] - a[1], -0.5 * (a[1] + b[1])), (a[0] - b[0], 0.5 * (a[0] + b[0]))];
+        let (c, d) = (1.0 + self.x[3], self.x[4]);
+        let swing = [-position[1], position[0]];
+        // The rows of x, y and heading: derivatives by heading, c, d and w.
+        let row = |axis: usize| {
+            let (by_c, by_d) = by[axis];
+            [swing[axis], by_c, by_d, (position[axis] - c * by_c - d * by_d) * per_width]
         };
-        let lack_of_way = [0, 1].map(|axis: usize| lacking(self.p[axis][axis], noise_s));
-        let lack_of_heading = lacking(self.p[2][2], noise_t);
+        let (of_x, of_y) = (row(0), row(1));
+        let of_turn = [
+            (travel[0] - travel[1]) * per_width,
+            0.5 * (travel[0] + travel[1]) * per_width,
+            -turn * per_width,
+        ];
+        let n = [noise * position[0] - noise_at[0], noise * position[1] - noise_at[1]];
+        let [sxx, sxy, syy] = noise_squared;
+        let qxx = syy + position[1] * (n[1] - noise_at[1]);
+        let qxy = noise_at[0] * position[1] - sxy - position[0] * n[1];
+        let qyy = sxx + position[0] * (n[0] - noise_at[0]);
+        let advance = noise * half_width * half_width;
 
-        // Each is a row of six: the covariance of turn, advance or mid-heading with every state.
-        let by_turn =
-            [(right - left) * per_width, 0.5 * (right + left) * per_width, -turn * per_width];
-        let by_advance = [0.5 * (right + left), 0.25 * (right - left)];
-        let with_random_walk = Self { p: self.with_random_walk(), ..*self };
-        let row = |i: usize| core::array::from_fn::<f32, 6, _>(|j| with_random_walk.at(i, j));
-        let (h, c, d, w) = (row(2), row(3), row(4), row(5));
-        let turn_with = |c: f32, d: f32, w: f32| by_turn[0] * c + by_turn[1] * d + by_turn[2] * w;
-        let advance_with = |c: f32, d: f32| by_advance[0] * c + by_advance[1] * d;
-        let t: [f32; 6] = core::array::from_fn(|j| turn_with(c[j], d[j], w[j]));
-        let s: [f32; 6] = core::array::from_fn(|j| advance_with(c[j], d[j]));
-        let m: [f32; 6] = core::array::from_fn(|j| h[j] + 0.5 * t[j]);
-        let tt = noise_t + by_turn[0] * t[3] + by_turn[1] * t[4] + by_turn[2] * t[5];
-        let ts = noise_st + by_advance[0] * t[3] + by_advance[1] * t[4];
-        let ss = noise_s + by_advance[0] * s[3] + by_advance[1] * s[4];
-        let mt = t[2] + 0.5 * tt;
-        let (mm, ms) = (m[2] + 0.5 * mt, s[2] + 0.5 * ts);
-        let (m_new, s_new) = (m[2] + mt, s[2] + ts);
-        let (mm, ss) = (mm + ROUNDING * mm, ss + ROUNDING * ss);
-
-        let swing = [-advance * sin, advance * cos];
-        let ahead = [cos, sin];
-        // Adds the share of an axis of two covariances to a third.
-        let along = |to: f32, axis: usize, m: f32, s: f32| to + swing[axis] * m + ahead[axis] * s;
-        let new_m = [0, 1].map(|axis| along(m[axis], axis, mm, ms));
-        let new_s = [0, 1].map(|axis| along(s[axis], axis, ms, ss));
+        let middle = self.distance_since_update + 0.5 * distance;
+        let middle = Self { distance_since_update: middle, ..*self };
+        let old = Self { p: middle.with_random_walk(), ..*self };
+        self.distance_since_update += distance;
+        let at = |i: usize, j: usize| old.at(i, j);
+        let turn_of = |c: f32, d: f32, w: f32| of_turn[0] * c + of_turn[1] * d + of_turn[2] * w;
+        let along = |row: &[f32; 4], v: [f32; 4]| {
+            row[0] * v[0] + row[1] * v[1] + row[2] * v[2] + row[3] * v[3]
+        };
+        let column = |j: usize| [at(2, j), at(3, j), at(4, j), at(5, j)];
+        // Covariances of turn and displacement with heading and calibration.
+        let t: [f32; 4] = core::array::from_fn(|k| {
+            let j = k + 2;
+            turn_of(at(3, j), at(4, j), at(5, j))
+        });
+        let x: [f32; 4] = core::array::from_fn(|k| along(&of_x, column(k + 2)));
+        let y: [f32; 4] = core::array::from_fn(|k| along(&of_y, column(k + 2)));
+        let [ht, tc, td, tw] = t;
+        let tt = turn_of(tc, td, tw);
+        let [xx, xy, yy] = [along(&of_x, x), along(&of_x, y), along(&of_y, y)];
+        let xx = xx * (1.0 + ROUNDING) + qxx;
+        let yy = yy * (1.0 + ROUNDING) + qyy;
+        let lacking = |variance: f32, noise: f32| (0.5 * ROUNDING * variance - noise).max(0.0);
         let mut new = self.p;
-        for axis in 0..2 {
-            new[axis][axis] +=
-                along(lack_of_way[axis], axis, m[axis] + new_m[axis], s[axis] + new_s[axis]);
-            new[axis][2] += along(t[axis], axis, m_new, s_new);
+        new[0][0] +=
+            lacking(new[0][0], advance) + (along(&of_x, column(0)) + along(&of_x, column(0)) + xx);
+        new[1][1] +=
+            lacking(new[1][1], advance) + (along(&of_y, column(1)) + along(&of_y, column(1)) + yy);
+        new[0][1] += along(&of_y, column(0)) + along(&of_x, column(1)) + xy + qxy;
+        for (i, row, shifted, q) in [(0, of_x, x, -n[1]), (1, of_y, y, n[0])] {
+            let turned = turn_of(at(i, 3), at(i, 4), at(i, 5));
+            new[i][2] += turned + shifted[0] + along(&row, t) + q;
             for j in 3..6 {
-                new[axis][j] = along(new[axis][j], axis, m[j], s[j]);
+                new[i][j] += shifted[j - 2];
             }
         }
-        let across = swing[1] * new_m[0] + ahead[1] * new_s[0];
-        new[0][1] += along(across, 0, m[1], s[1]);
-        new[2][2] += mt + mt + lack_of_heading;
+        new[2][2] += lacking(new[2][2], noise) + (ht + ht + tt + noise);
         for j in 3..6 {
-            new[2][j] += t[j];
+            new[2][j] += t[j - 2];
         }
-        self.distance_since_update += right.abs() + left.abs();
         self.p = new;
-        self.add_to_pose(0, advance * cos);
-        self.add_to_pose(1, advance * sin);
+        self.add_to_pose(0, position[0]);
+        self.add_to_pose(1, position[1]);
         self.add_to_pose(2, turn);
+        self.sums = Sums::default();
     }
 
     /// P, with the random walk of the calibration.
@@ -169,6 +256,7 @@ impl SixStateFilter {
     }
 
     fn update(&mut self, range: f32, expected: f32, h: [f32; 3], noise: f32) {
+        self.apply();
         (self.p, self.distance_since_update) = (self.with_random_walk(), 0.0);
         let dot = |m: &[f32; 6]| h[0] * m[0] + h[1] * m[1] + h[2] * m[2];
         let m = self.cross(h);
@@ -215,10 +303,12 @@ impl SixStateFilter {
     /// The bits of state and covariance, in the order of the seven-state filter and wheel by wheel,
     /// the seventh zero.
     fn bits(&self) -> Vec<u32> {
-        let shown = Self { p: self.with_random_walk(), ..*self };
+        let mut shown = *self;
+        shown.apply();
+        shown.p = shown.with_random_walk();
         let wheels =
             |common: f32, difference: f32| [common + 0.5 * difference, common - 0.5 * difference];
-        let [x, y, heading, common, difference, width] = self.x;
+        let [x, y, heading, common, difference, width] = shown.x;
         let [right, left] = wheels(common, difference);
         let mut p = SMatrix::<f32, 7, 7>::zeros();
         for i in [0, 1, 2, 5] {
@@ -271,6 +361,7 @@ proptest! {
                     let expected = ExpectedRange::new(&wall, mount, &state);
                     let range = Metres(expected.range.0 + 0.02 * sigmas);
                     seven.update(range, &expected, SquareMetres(noise)).unwrap();
+                    six.apply();
                     let (of_six, h) = six.expected(&wall, mount);
                     six.update(range.0, of_six, h, noise);
                     prop_assert_eq!(bits(&seven), six.bits(), "after {:?}", event);

@@ -1,0 +1,177 @@
+//! Prediction from wheel travel. The state moves with every increment; P changes when it is asked for (`docs/model.md`,
+//! "Covariance on demand").
+
+use super::{Ekf, EkfError, invalid};
+use crate::accumulated::{AccumulatedMotion, CalibratedDrive};
+use crate::estimate::FilterEstimate;
+use crate::motion::{Drive, WheelTravel};
+use crate::numeric::{at_most, is_within};
+use crate::process_noise::AccumulatedRandomWalk;
+use crate::trig::sin_cos_within;
+
+/// Largest turn of one step, radians: the mid-heading stays in the range of the fast reduction of
+/// sine and cosine.
+pub(super) const MAX_TURN: f32 = 64.0;
+
+/// Longest distance of both wheels together over which motion is accumulated, metres.
+const LONGEST: f32 = 2.0;
+/// The same in track widths: the turn stays below 8 (1 + S) rad.
+const LONGEST_IN_WIDTHS: f32 = 8.0;
+/// The same in wheel noise per random walk. The random walk within the interval, which P has only in the mean, is then less
+/// than a thousandth of the variance by the noise.
+const LONGEST_IN_NOISE_PER_WALK: f32 = 0.15;
+/// Least track width, metres, and limits of the estimate and of P, with which no variance can leave its limits in an interval.
+const LEAST_WIDTH: f32 = 0.01;
+const MOST_POSE_VARIANCE: f32 = 4e6;
+const MOST_CALIBRATION_VARIANCE: f32 = 1e3;
+
+/// The longest interval by the noise of a drive.
+pub(super) fn longest_interval(drive: &Drive) -> f32 {
+    let noise = LONGEST_IN_NOISE_PER_WALK * drive.wheel_noise.0.0;
+    let limit = |longest: f32, noise: f32, walk: f32| {
+        if walk.abs() > 0.0 { at_most((noise / walk).abs(), longest) } else { longest }
+    };
+    let by_scale = limit(LONGEST, noise, drive.scale_walk.0);
+    limit(by_scale, noise * drive.track_width.0, drive.track_width_walk.0.0)
+}
+
+impl Ekf {
+    // ===== Eqs. (4) and (5): X̂ ← f(X̂, U), P ← F P Fᵀ + Q =====
+    /// Predicts the state over one odometry increment.
+    ///
+    /// X̂ moves by eq. (7) of `docs/model.md`. The motion is accumulated, eq. (27), and P changes when it is asked for, by eqs.
+    /// (28) to (30). Q grows with the distance travelled, never with time: an increment without travel changes nothing.
+    ///
+    /// # Errors
+    /// [`EkfError::NotFinite`] if a travel is; [`EkfError::TurnTooLarge`] beyond 64 rad;
+    /// [`EkfError::VarianceTooLarge`] or [`EkfError::Indefinite`] if a variance would leave its
+    /// limits. The filter is unchanged.
+    ///
+    /// # Panics
+    /// Never.
+    #[inline]
+    pub fn predict(&mut self, travel: WheelTravel) -> Result<(), EkfError> {
+        let distance = travel.right.abs().0 + travel.left.abs().0;
+        if distance <= 0.0 {
+            return Ok(());
+        }
+        let together = self.distance + distance;
+        // False for NaN.
+        if together <= self.longest {
+            self.accumulate(travel, together);
+            return Ok(());
+        }
+        self.begin_interval();
+        if distance <= self.longest {
+            self.accumulate(travel, distance);
+            return Ok(());
+        }
+        self.predict_at_once(travel, distance)
+    }
+
+    fn accumulate(&mut self, travel: WheelTravel, distance: f32) {
+        let noise = self.drive.noise(travel);
+        let heading = self.estimate.heading;
+        self.motion.add(&self.drive, heading, travel, noise, sin_cos_within);
+        self.distance = distance;
+    }
+
+    /// Predicts over an increment that is not within the limits of an interval, and checks the result.
+    #[cold]
+    #[inline(never)]
+    fn predict_at_once(&mut self, travel: WheelTravel, distance: f32) -> Result<(), EkfError> {
+        if !is_within(self.drive.turn(travel).abs(), MAX_TURN) {
+            return Err(refused_travel(travel));
+        }
+        let before = *self;
+        self.accumulate(travel, distance);
+        let f = self.motion.transition(&self.drive, &self.estimate);
+        let walk = self.walk_of_interval();
+        self.p_without_walk.propagate(&walk, &f);
+        if self.p_without_walk.pose.is_valid() {
+            self.interval_applied();
+            return Ok(());
+        }
+        let error = invalid(&self.p_without_walk);
+        *self = before;
+        Err(error)
+    }
+
+    /// The estimate.
+    #[inline]
+    pub(super) fn estimate_now(&self) -> FilterEstimate {
+        let mut estimate = self.estimate;
+        if self.distance > 0.0 {
+            self.motion.advance(&mut estimate);
+        }
+        estimate
+    }
+
+    /// This filter with the motion applied to P.
+    pub(crate) fn applied(&self) -> Self {
+        let mut applied = *self;
+        applied.apply_motion();
+        applied
+    }
+
+    /// Applies the accumulated motion to estimate and P. State and P are the same before and after.
+    #[inline]
+    pub(crate) fn apply_motion(&mut self) {
+        if self.distance > 0.0 {
+            self.apply_interval();
+        }
+    }
+
+    /// Applies the accumulated motion before a change of estimate or P.
+    #[inline]
+    pub(super) fn end_interval(&mut self) {
+        self.apply_motion();
+        self.longest = 0.0;
+    }
+
+    // ===== Eq. (30): P over the interval =====
+    #[inline(never)]
+    fn apply_interval(&mut self) {
+        let f = self.motion.transition(&self.drive, &self.estimate);
+        let walk = self.walk_of_interval();
+        self.p_without_walk.propagate_within(&walk, &f);
+        self.interval_applied();
+    }
+
+    fn interval_applied(&mut self) {
+        self.motion.advance(&mut self.estimate);
+        self.motion = AccumulatedMotion::default();
+        self.distance_since_update += self.distance;
+        self.distance = 0.0;
+    }
+
+    /// The random walk that acts on the pose over the interval: the mean of those at its ends.
+    #[inline]
+    fn walk_of_interval(&self) -> AccumulatedRandomWalk {
+        let middle = self.distance_since_update + 0.5 * self.distance;
+        AccumulatedRandomWalk::new(&self.densities, middle)
+    }
+
+    /// Begins an interval with the present calibration.
+    #[inline(never)]
+    fn begin_interval(&mut self) {
+        self.apply_motion();
+        self.drive = CalibratedDrive::new(self.track_width, &self.densities, &self.estimate);
+        let walk =
+            AccumulatedRandomWalk::new(&self.densities, self.distance_since_update + LONGEST);
+        let width = self.drive.width();
+        // False for NaN.
+        let is_usual = width >= LEAST_WIDTH
+            && self.drive.is_usual()
+            && self.p_without_walk.pose.sum_of_variances() <= MOST_POSE_VARIANCE
+            && self.p_without_walk.calibration.sum_of_variances(&walk) <= MOST_CALIBRATION_VARIANCE;
+        let longest = at_most(LONGEST_IN_WIDTHS * width, self.longest_by_noise);
+        self.longest = if is_usual { longest } else { 0.0 };
+    }
+}
+
+/// Why a travel is refused before P is propagated.
+#[cold]
+pub(super) fn refused_travel(travel: WheelTravel) -> EkfError {
+    if travel.is_finite() { EkfError::TurnTooLarge } else { EkfError::NotFinite }
+}
