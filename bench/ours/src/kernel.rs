@@ -5,6 +5,7 @@
 //! Q is the noise of each wheel, not a diagonal. P is propagated when it is asked for: an update applies the motion first.
 
 use bench_workload::Filter;
+use bench_workload::drive::{START, VARIANCES};
 use bench_workload::model::{Matrix, Range, Step, Vector};
 use sonarfix::kernel::{
     AccumulatedMotion, AccumulatedRandomWalk, CalibratedDrive, Correction, Covariance,
@@ -15,7 +16,7 @@ use sonarfix::pose::Heading;
 use sonarfix::range::ExpectedRange;
 use sonarfix::units::Metres;
 
-use crate::{deviation, drive, scales, shown};
+use crate::{deviation, drive, scales, scales_of, shown};
 
 /// The filter.
 pub struct Kernel {
@@ -30,6 +31,15 @@ pub struct Kernel {
     /// Q, the same for every prediction.
     noise: WheelNoise,
     walk: AccumulatedRandomWalk,
+}
+
+impl Kernel {
+    /// Q: the variance of the turn by the noise of the right and of the left wheel in a step, rad².
+    #[must_use]
+    pub fn noise_of_turn() -> [f32; 2] {
+        let Self { noise, .. } = Self::new(START, VARIANCES);
+        [noise.right, noise.left]
+    }
 }
 
 impl Filter for Kernel {
@@ -83,12 +93,11 @@ impl Filter for Kernel {
         scales(&estimate.state())
     }
 
-    /// The scale errors per wheel, as in the crate's public state.
     fn covariance(&self) -> Matrix {
         let f = self.motion.transition(&self.drive, &self.estimate);
         let mut p = self.p;
         p.pose.propagate(&self.p.calibration, &self.walk, &f);
         let p = p.to_matrix();
-        core::array::from_fn(|i| core::array::from_fn(|j| p[(i, j)]))
+        scales_of(|i, j| p[(i, j)])
     }
 }

@@ -54,10 +54,9 @@ impl Filter for Shipped {
         scales(&self.ekf.state())
     }
 
-    /// The scale errors per wheel, as in the crate's public state.
     fn covariance(&self) -> Matrix {
         let p = self.ekf.covariance();
-        core::array::from_fn(|i| core::array::from_fn(|j| p[(i, j)]))
+        scales_of(|i, j| p[(i, j)])
     }
 }
 
@@ -82,6 +81,19 @@ fn scales(state: &StateEstimate) -> Vector {
     let (right, left) = (state.scale_right, state.scale_left);
     let (mean, difference) = (0.5 * (right + left), right - left);
     [state.x.0, state.y.0, state.heading.0, mean, difference, state.track_width_error.0]
+}
+
+/// The covariance of the benchmark from that of the crate's public state.
+fn scales_of(p: impl Fn(usize, usize) -> f32) -> Matrix {
+    // Rows of the six states by those of the public state.
+    let row = |i: usize, p: [f32; 7]| match i {
+        3 => 0.5 * (p[3] + p[4]),
+        4 => p[3] - p[4],
+        _ => p[i],
+    };
+    let column =
+        |j: usize| core::array::from_fn::<f32, 7, _>(|i| row(j, core::array::from_fn(|k| p(i, k))));
+    core::array::from_fn(|i| core::array::from_fn(|j| row(i, column(j))))
 }
 
 /// Standard deviations in the crate's type.

@@ -7,8 +7,8 @@ use sonarfix::range::ExpectedRange;
 use sonarfix::units::{Metres, PerRootMetre};
 
 use crate::oracle::{
-    HEADING, Matrix, RANGE_SCALE, ROUNDING, Robot, SCALE_LEFT, SCALE_RIGHT, TRACK_WIDTH, View,
-    covariance_of, jacobian_of, state_of, travel_of,
+    HEADING, Matrix, RANGE_SCALE, ROUNDING, Robot, View, covariance_of, jacobian_of, state_of,
+    travel_of,
 };
 use crate::strategies::{any_drive, any_mount, any_sight, any_state, silent};
 
