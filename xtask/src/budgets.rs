@@ -201,7 +201,7 @@ fn measure() -> anyhow::Result<Table> {
 fn measure_on(target: &Target) -> anyhow::Result<BTreeMap<String, u32>> {
     let mut figures = BTreeMap::new();
     let programs = [
-        ("filter", "core_and_expect", &["predict", "expect", "gate", "update"][..]),
+        ("filter", "core_and_expect", &["predict", "apply", "expect", "gate", "update"][..]),
         ("localizer", "localizer", &["odometry", "aim", "fix"][..]),
         ("gyro", "gyro", &["turn", "turn_fix"][..]),
         ("search", "search", &["slice", "ping"][..]),
@@ -227,7 +227,7 @@ fn measure_on(target: &Target) -> anyhow::Result<BTreeMap<String, u32>> {
         };
         text(code, calls)?;
         if name == "filter" {
-            text("core", &["predict", "gate", "update"])?;
+            text("core", &["predict", "apply", "gate", "update"])?;
         }
     }
     Ok(figures)

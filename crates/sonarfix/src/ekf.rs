@@ -185,7 +185,9 @@ pub struct Ekf {
 impl PartialEq for Ekf {
     fn eq(&self, other: &Self) -> bool {
         let parts = |ekf: &Self| {
-            let Self { estimate, p_without_walk, distance_since_update, .. } = ekf.applied();
+            let mut applied = *ekf;
+            applied.apply_motion();
+            let Self { estimate, p_without_walk, distance_since_update, .. } = applied;
             (estimate, p_without_walk, distance_since_update, ekf.track_width, ekf.densities)
         };
         parts(self) == parts(other)
@@ -271,9 +273,19 @@ impl Ekf {
 
     /// P.
     fn p(&self) -> Covariance {
-        let applied = self.applied();
-        let mut p = applied.p_without_walk;
-        p.add_random_walk(&applied.walk());
+        let mut p = self.p_now();
+        let distance = self.distance_since_update + self.distance;
+        p.add_random_walk(&AccumulatedRandomWalk::new(&self.densities, distance));
+        p
+    }
+
+    /// P without the random walk of the calibration since the last update.
+    #[inline]
+    fn p_now(&self) -> Covariance {
+        let mut p = self.p_without_walk;
+        if self.distance > 0.0 {
+            self.propagate_copy(&mut p);
+        }
         p
     }
 
@@ -285,10 +297,7 @@ impl Ekf {
     /// A number of P that does not depend on the random walk.
     #[inline]
     fn of_p<T>(&self, number: impl Fn(&Covariance) -> T) -> T {
-        if self.distance <= 0.0 {
-            return number(&self.p_without_walk);
-        }
-        number(&self.applied().p_without_walk)
+        if self.distance <= 0.0 { number(&self.p_without_walk) } else { number(&self.p_now()) }
     }
 
     /// Covariance of the position and variance of the heading, which contain no random walk.

@@ -375,7 +375,9 @@ impl<'m> Localizer<'m> {
     /// # Errors
     /// [`NoAim`], by the reason for which there is no wall to measure.
     pub fn aim(&self) -> Result<Aim, NoAim> {
-        aim::choose(&self.config, &self.map, &self.ekf.applied(), &self.history, self.time)
+        let mut ekf = self.ekf;
+        ekf.apply_motion();
+        aim::choose(&self.config, &self.map, &ekf, &self.history, self.time)
     }
 
     /// The wall to which a beam at `bearing` (relative to the heading) is square, for a range whose
@@ -384,7 +386,8 @@ impl<'m> Localizer<'m> {
     /// # Errors
     /// [`NoAim`], by the reason for which there is none.
     pub fn aim_at(&self, bearing: Radians) -> Result<Aim, NoAim> {
-        let ekf = self.ekf.applied();
+        let mut ekf = self.ekf;
+        ekf.apply_motion();
         aim::at(&self.config, &self.map, &ekf, &self.history, self.time, bearing)
     }
 

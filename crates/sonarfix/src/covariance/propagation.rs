@@ -78,8 +78,15 @@ impl PoseBlock {
     }
 
     /// Sets variances that are not valid to the limit that they exceed.
+    #[inline]
+    pub fn limit_variances(&mut self) {
+        if !self.is_valid() {
+            self.limit_each();
+        }
+    }
+
     #[cold]
-    fn limit_variances(&mut self) {
+    fn limit_each(&mut self) {
         for variance in [&mut self.xx, &mut self.yy, &mut self.hh] {
             *variance = if *variance < 0.0 { 0.0 } else { at_most_max_variance(*variance) };
         }
@@ -105,14 +112,5 @@ impl Covariance {
     pub fn propagate(&mut self, walk: &AccumulatedRandomWalk, f: &Transition) {
         self.pose.propagate(&self.calibration, walk, f);
         self.range_scale.propagate(f);
-    }
-
-    /// As [`Self::propagate`], for a motion within the limits in which the variances stay valid.
-    #[inline]
-    pub fn propagate_within(&mut self, walk: &AccumulatedRandomWalk, f: &Transition) {
-        self.propagate(walk, f);
-        if !self.pose.is_valid() {
-            self.pose.limit_variances();
-        }
     }
 }

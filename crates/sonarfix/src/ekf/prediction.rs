@@ -3,6 +3,7 @@
 
 use super::{Ekf, EkfError, invalid};
 use crate::accumulated::{AccumulatedMotion, CalibratedDrive};
+use crate::covariance::Covariance;
 use crate::estimate::FilterEstimate;
 use crate::motion::{Drive, WheelTravel};
 use crate::numeric::{at_most, is_within};
@@ -55,25 +56,25 @@ impl Ekf {
         if distance <= 0.0 {
             return Ok(());
         }
-        let together = self.distance + distance;
-        // False for NaN.
-        if together <= self.longest {
-            self.accumulate(travel, together);
-            return Ok(());
+        // Both comparisons are false for NaN.
+        let is_within_interval = self.distance + distance <= self.longest;
+        if !is_within_interval {
+            self.begin_interval();
+            let is_short = distance <= self.longest;
+            if !is_short {
+                return self.predict_at_once(travel, distance);
+            }
         }
-        self.begin_interval();
-        if distance <= self.longest {
-            self.accumulate(travel, distance);
-            return Ok(());
-        }
-        self.predict_at_once(travel, distance)
+        self.accumulate(travel, distance);
+        Ok(())
     }
 
+    #[inline(never)]
     fn accumulate(&mut self, travel: WheelTravel, distance: f32) {
         let noise = self.drive.noise(travel);
         let heading = self.estimate.heading;
         self.motion.add(&self.drive, heading, travel, noise, sin_cos_within);
-        self.distance = distance;
+        self.distance += distance;
     }
 
     /// Predicts over an increment that is not within the limits of an interval, and checks the result.
@@ -85,9 +86,7 @@ impl Ekf {
         }
         let before = *self;
         self.accumulate(travel, distance);
-        let f = self.motion.transition(&self.drive, &self.estimate);
-        let walk = self.walk_of_interval();
-        self.p_without_walk.propagate(&walk, &f);
+        self.propagate();
         if self.p_without_walk.pose.is_valid() {
             self.interval_applied();
             return Ok(());
@@ -107,16 +106,10 @@ impl Ekf {
         estimate
     }
 
-    /// This filter with the motion applied to P.
-    pub(crate) fn applied(&self) -> Self {
-        let mut applied = *self;
-        applied.apply_motion();
-        applied
-    }
-
-    /// Applies the accumulated motion to estimate and P. State and P are the same before and after.
+    /// Applies the accumulated motion to P. State and P are the same before and after; until the next prediction P is read
+    /// and corrected at no further cost.
     #[inline]
-    pub(crate) fn apply_motion(&mut self) {
+    pub fn apply_motion(&mut self) {
         if self.distance > 0.0 {
             self.apply_interval();
         }
@@ -129,13 +122,23 @@ impl Ekf {
         self.longest = 0.0;
     }
 
-    // ===== Eq. (30): P over the interval =====
     #[inline(never)]
     fn apply_interval(&mut self) {
-        let f = self.motion.transition(&self.drive, &self.estimate);
-        let walk = self.walk_of_interval();
-        self.p_without_walk.propagate_within(&walk, &f);
+        self.propagate();
+        self.p_without_walk.pose.limit_variances();
         self.interval_applied();
+    }
+
+    fn propagate(&mut self) {
+        let walk = self.walk_of_interval();
+        let Self { motion, drive, estimate, p_without_walk, .. } = self;
+        propagate(p_without_walk, motion, drive, estimate, &walk);
+    }
+
+    /// Propagates a copy of P over the interval.
+    pub(super) fn propagate_copy(&self, p: &mut Covariance) {
+        propagate(p, &self.motion, &self.drive, &self.estimate, &self.walk_of_interval());
+        p.pose.limit_variances();
     }
 
     fn interval_applied(&mut self) {
@@ -168,6 +171,18 @@ impl Ekf {
         let longest = at_most(LONGEST_IN_WIDTHS * width, self.longest_by_noise);
         self.longest = if is_usual { longest } else { 0.0 };
     }
+}
+
+// ===== Eq. (30): P over the interval =====
+#[inline(never)]
+fn propagate(
+    p: &mut Covariance,
+    motion: &AccumulatedMotion,
+    drive: &CalibratedDrive,
+    at: &FilterEstimate,
+    walk: &AccumulatedRandomWalk,
+) {
+    p.propagate(walk, &motion.transition(drive, at));
 }
 
 /// Why a travel is refused before P is propagated.
