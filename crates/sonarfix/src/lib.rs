@@ -19,6 +19,7 @@
 //! | [`range`] | measurement model, eqs. (11) to (13) |
 //! | [`config`] | parameters |
 //! | `covariance` | P: eqs. (5), (6), (10), (14) and (18) to (20) |
+//! | `accumulated` | motion that is not yet applied to P, eqs. (27) to (29) |
 //! | [`ekf`] | the filter, eqs. (4) to (6) |
 //! | `outcome`, `odometry` | outcome of a measurement; plausibility of a travel |
 //! | `gyro_fusion` | turns of a gyro beside the wheels, eqs. (36) to (39) |
