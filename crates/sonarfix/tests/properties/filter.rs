@@ -92,6 +92,24 @@ proptest! {
         }
     }
 
+    /// Reading P and applying the motion to it give the same bits, and the filter moves on from both within rounding.
+    #[test]
+    fn applying_the_motion_changes_no_bit((_, mut ekf) in any_filter(), travel in any_travel(), times in 1_u8..60) {
+        for _ in 0..times {
+            ekf.predict(travel).unwrap();
+        }
+        let mut applied = ekf;
+        applied.apply_motion();
+        prop_assert_eq!(bits(&applied), bits(&ekf));
+        prop_assert_eq!(applied, ekf);
+        applied.predict(travel).unwrap();
+        ekf.predict(travel).unwrap();
+        let (one, other) = (applied.standard_deviations(), ekf.standard_deviations());
+        for (one, other) in one.to_array().into_iter().zip(other.to_array()) {
+            prop_assert!((one / other - 1.0).abs() < 1e-3, "{one} instead of {other}");
+        }
+    }
+
     /// One correction of any estimate equals Joseph's form, eq. (19), in dense `f64`, and the state
     /// changes by the gain of eq. (18) times the innovation. The terms of an entry are at most |I −
     /// K H| |P| |I − K H|ᵀ, and those that the first pass subtracts.
