@@ -5,7 +5,7 @@ use crate::cargo;
 /// The traces: a name, and the arguments of `sonarfix pil`. The second contains gated ranges, the third a search.
 const TRACES: [(&str, &str); 3] = [
     ("localizer", "paper --policy informative --seconds 60"),
-    ("loop", "crates/sonarfix-map/scenarios/classroom.toml --seed 30 --seconds 10"),
+    ("loop", "crates/sonarfix-map/scenarios/classroom.toml --seed 30 --seconds 120"),
     (
         "search",
         "crates/sonarfix-map/scenarios/classroom.toml --start unknown --fix-period as-fast-as-possible --seconds 7",
