@@ -10,8 +10,25 @@
 
 use crate::covariance::Transition;
 use crate::estimate::{FilterEstimate, wheels};
-use crate::motion::WheelTravel;
+use crate::motion::{Drive, WheelTravel};
+use crate::numeric::at_most;
 use crate::process_noise::NoiseDensities;
+
+/// Longest distance of both wheels together over which motion is accumulated, metres.
+pub const LONGEST: f32 = 2.0;
+/// The same in wheel noise per random walk. The random walk within the interval, which P has only in the mean, is then less
+/// than a thousandth of the variance by the noise.
+const LONGEST_IN_NOISE_PER_WALK: f32 = 0.15;
+
+/// The longest interval by the noise of a drive, metres of both wheels together.
+pub fn longest_interval(drive: &Drive) -> f32 {
+    let noise = LONGEST_IN_NOISE_PER_WALK * drive.wheel_noise.0.0;
+    let limit = |longest: f32, noise: f32, walk: f32| {
+        if walk.abs() > 0.0 { at_most((noise / walk).abs(), longest) } else { longest }
+    };
+    let by_scale = limit(LONGEST, noise, drive.scale_walk.0);
+    limit(by_scale, noise * drive.track_width.0, drive.track_width_walk.0.0)
+}
 
 /// What an increment needs of the drive at an estimate of its calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -27,7 +27,7 @@ mod turn;
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::accumulated::{AccumulatedMotion, CalibratedDrive};
+use crate::accumulated::{AccumulatedMotion, CalibratedDrive, longest_interval};
 use crate::covariance::{Correction, Covariance, GyroBias, PoseBlock, PredictedMeasurement};
 use crate::elementary::sqrt;
 use crate::estimate::FilterEstimate;
@@ -232,7 +232,7 @@ impl Ekf {
             distance: 0.0,
             longest: 0.0,
             drive: CalibratedDrive::default(),
-            longest_by_noise: prediction::longest_interval(&drive),
+            longest_by_noise: longest_interval(&drive),
             track_width: drive.track_width.0,
             densities,
         })

@@ -2,10 +2,10 @@
 //! "Covariance on demand").
 
 use super::{Ekf, EkfError, invalid};
-use crate::accumulated::{AccumulatedMotion, CalibratedDrive};
+use crate::accumulated::{AccumulatedMotion, CalibratedDrive, LONGEST};
 use crate::covariance::Covariance;
 use crate::estimate::FilterEstimate;
-use crate::motion::{Drive, WheelTravel};
+use crate::motion::WheelTravel;
 use crate::numeric::{at_most, is_within};
 use crate::process_noise::AccumulatedRandomWalk;
 use crate::trig::sin_cos_within;
@@ -14,27 +14,12 @@ use crate::trig::sin_cos_within;
 /// sine and cosine.
 pub(super) const MAX_TURN: f32 = 64.0;
 
-/// Longest distance of both wheels together over which motion is accumulated, metres.
-const LONGEST: f32 = 2.0;
-/// The same in track widths: the turn stays below 8 (1 + S) rad.
+/// Longest interval in track widths: the turn stays below 8 (1 + S) rad.
 const LONGEST_IN_WIDTHS: f32 = 8.0;
-/// The same in wheel noise per random walk. The random walk within the interval, which P has only in the mean, is then less
-/// than a thousandth of the variance by the noise.
-const LONGEST_IN_NOISE_PER_WALK: f32 = 0.15;
 /// Least track width, metres, and limits of the estimate and of P, with which no variance can leave its limits in an interval.
 const LEAST_WIDTH: f32 = 0.01;
 const MOST_POSE_VARIANCE: f32 = 4e6;
 const MOST_CALIBRATION_VARIANCE: f32 = 1e3;
-
-/// The longest interval by the noise of a drive.
-pub(super) fn longest_interval(drive: &Drive) -> f32 {
-    let noise = LONGEST_IN_NOISE_PER_WALK * drive.wheel_noise.0.0;
-    let limit = |longest: f32, noise: f32, walk: f32| {
-        if walk.abs() > 0.0 { at_most((noise / walk).abs(), longest) } else { longest }
-    };
-    let by_scale = limit(LONGEST, noise, drive.scale_walk.0);
-    limit(by_scale, noise * drive.track_width.0, drive.track_width_walk.0.0)
-}
 
 impl Ekf {
     // ===== Eqs. (4) and (5): X̂ ← f(X̂, U), P ← F P Fᵀ + Q =====
