@@ -1,7 +1,7 @@
 //! Counters and limits of the verdict, at and just beyond each limit.
 
 use super::*;
-use crate::outcome::Refusal;
+use crate::outcome::{AbsoluteFix, Agreement, Refusal};
 use crate::range::Innovation;
 use crate::units::SquareMetres;
 
@@ -40,6 +40,17 @@ fn the_mean_nis_remembers_sixteen_ranges() {
         let mut health = Health::default();
         health.record_fix(&accepted(deviations), 0.0, false, CERTAIN, &LIMITS);
         assert_eq!(health.nis.to_bits(), f32::to_bits(expected));
+    }
+}
+
+/// Of a pose from outside each of the three numbers has the weight of a range.
+#[test]
+fn the_mean_nis_is_that_of_one_number() {
+    for has_position in [true, false] {
+        let mut health = Health::default();
+        let fix = AbsoluteFix::Accepted(Agreement { nis: 12.0, dimensions: 3 });
+        health.record_absolute(&fix, has_position, 0.0, false, CERTAIN, &LIMITS);
+        assert_eq!(health.nis.to_bits(), f32::to_bits(1.0 + 3.0 / 16.0), "{has_position}");
     }
 }
 
