@@ -329,7 +329,7 @@ impl<'m> Robot<'m> {
         mut search: Option<&mut Search<'m>>,
         report: &mut Report,
     ) {
-        *report = Report::default();
+        report.clear();
         if now < self.time {
             report.faults.clock = 1;
         } else {

@@ -36,6 +36,16 @@ pub struct Report {
 }
 
 impl Report {
+    /// Empties it in place: only the discriminants are written, of half a kilobyte.
+    pub(super) fn clear(&mut self) {
+        let Self { ping_result, swept, tick, aimed, pinged, absolute, mode, faults } = self;
+        (*ping_result, *swept, *tick) = (None, None, None);
+        (*aimed, *pinged, *mode) = (None, None, None);
+        let [first, second] = absolute;
+        (*first, *second) = (None, None);
+        *faults = Faults::default();
+    }
+
     /// Whether the poll did nothing and found no fault.
     #[must_use]
     pub fn is_empty(&self) -> bool {
