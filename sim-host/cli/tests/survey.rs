@@ -1,6 +1,6 @@
 //! `sonarfix survey` on a simulated drive around a room.
 
-#![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "a test should stop")]
+#![expect(clippy::unwrap_used, reason = "a test should stop")]
 
 use std::path::Path;
 use std::process::{Command, Output};
