@@ -32,8 +32,8 @@ fn a_localizer_by_messages_equals_that_of_the_simulator_to_the_bit() {
     }
 }
 
-/// In processor in the loop the shipped loop is polled every millisecond, in the simulator at events;
-/// the results must be as good.
+/// In processor in the loop the shipped loop is polled when it asks to be, in whole milliseconds, in the simulator at
+/// events; the results must be as good.
 #[test]
 fn the_shipped_loop_drives_the_scenario_as_well() {
     let mut scenario = Scenario::paper().unwrap();
@@ -42,7 +42,8 @@ fn the_shipped_loop_drives_the_scenario_as_well() {
     for seed in 0..5 {
         let (asked, requests) = alone(&simulation, seed);
         let own = simulation.run(seed, &mut ()).unwrap();
-        assert!(requests >= 60_000, "{requests} polls");
+        // At least once per encoder sample, and not every millisecond.
+        assert!((600..6_000).contains(&requests), "{requests} polls");
         assert!(asked.fixes.accepted + 2 >= own.fixes.accepted && own.fixes.accepted > 50);
         assert!(asked.faults.is_none(), "{:?}", asked.faults);
         for (state, (asked, own)) in asked.error.iter().zip(own.error.iter()).enumerate() {
