@@ -2,7 +2,7 @@
 //! person on the map (`docs/model.md`, "Heading, position and pose").
 //!
 //! # Non-finite policy
-//! [`AbsoluteMeasurement::check`] refuses NaN, infinity and a covariance that is not positive definite.
+//! `AbsoluteMeasurement::check` refuses NaN, infinity and a covariance that is not positive definite.
 
 mod decorrelation;
 mod motion;

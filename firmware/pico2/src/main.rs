@@ -294,29 +294,26 @@ impl Board {
         self.next_poll = sonarfix_robot::next_poll(app, hardware, start, polled.may_drive);
     }
 
-    /// Sleeps until the next poll is due, a byte has arrived or an edge of the echo was stamped.
-    async fn sleep(&mut self) {
-        loop {
-            let time = now();
-            self.stamper.update(&ECHO, time);
-            let has_bytes = Serial::has_bytes();
-            let next = self.next_poll.at(has_bytes);
-            if ECHO.take_edge() || time >= next {
-                return;
-            }
-            let is_listening = self.app.idle_until(&mut self.hardware).is_none();
-            let is_sending = !self.link.to_send.is_empty();
-            let mut wake = embassy_time::Instant::from_micros(next.ticks());
-            if is_listening || is_sending {
-                wake = wake.min(embassy_time::Instant::now().saturating_add(STEP));
-            }
-            if !has_bytes {
-                ReceivedBytes::listen();
-            }
-            // Whatever ends the sleep is found above.
-            let _ = with_deadline(wake, RECEIVED.wait()).await;
-            self.link.transmit();
+    /// The latest time until which the board may sleep: `None` if the next poll is due, a byte has arrived or an edge of
+    /// the echo was stamped.
+    fn sleeps_until(&mut self) -> Option<embassy_time::Instant> {
+        let time = now();
+        self.stamper.update(&ECHO, time);
+        let has_bytes = Serial::has_bytes();
+        let next = self.next_poll.at(has_bytes);
+        if ECHO.take_edge() || time >= next {
+            return None;
         }
+        let is_listening = self.app.idle_until(&mut self.hardware).is_none();
+        let is_sending = !self.link.to_send.is_empty();
+        let mut wake = embassy_time::Instant::from_micros(next.ticks());
+        if is_listening || is_sending {
+            wake = wake.min(embassy_time::Instant::now().saturating_add(STEP));
+        }
+        if !has_bytes {
+            ReceivedBytes::listen();
+        }
+        Some(wake)
     }
 }
 
@@ -333,7 +330,12 @@ fn listen_to_uart() {
 async fn polls(mut board: Board) -> ! {
     loop {
         board.poll();
-        board.sleep().await;
+        // An `async fn` that returns could panic if it were polled again.
+        while let Some(wake) = board.sleeps_until() {
+            // Whatever ends the sleep is found by the next call.
+            let _ = with_deadline(wake, RECEIVED.wait()).await;
+            board.link.transmit();
+        }
     }
 }
 

@@ -181,7 +181,9 @@ impl Uart {
     }
 
     fn room(&self) -> usize {
-        self.to_send.capacity().saturating_sub(self.to_send.len())
+        // Without this bound the compiler would guard the divisions by the capacity with a panic.
+        let Some(places) = self.to_send.capacity().checked_add(1) else { return 0 };
+        places.saturating_sub(1 + self.to_send.len())
     }
 }
 
@@ -191,7 +193,9 @@ impl Link for Uart {
     }
 
     fn send(&mut self, frame: &[u8]) {
-        if !self.has_room(frame.len()) {
+        // The same bound here.
+        let Some(places) = self.to_send.capacity().checked_add(1) else { return };
+        if places - self.to_send.len() <= frame.len() {
             return;
         }
         for byte in frame {

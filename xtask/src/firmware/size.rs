@@ -15,8 +15,9 @@ use crate::elf;
 /// are for the association of an echo with other reflectors than its target and for the growth of the covariance
 /// without odometry. 1 KiB is for the source of repeated echoes and for polls that return at once, which take 0.35 and 0.7
 /// KiB. A gyro takes 9 KiB: the combination of its turns with those of the wheels, its bias beside P, the sum of its
-/// samples and their faults. Whether a robot has one is known when it reads its configuration.
-const FLASH_BAR: u64 = (36 + 16 + 4 + 1 + 9) * 1024;
+/// samples and their faults. Whether a robot has one is known when it reads its configuration. The same holds for headings,
+/// positions and poses from outside, 5 KiB with their messages. The motion that is accumulated until P is needed takes 4 KiB.
+const FLASH_BAR: u64 = (36 + 16 + 4 + 1 + 9 + 5 + 4) * 1024;
 /// Their crates.
 const CORE: [&str; 4] = ["sonarfix", "sonarfix-hal", "libm", "nalgebra"];
 /// Smallest size of a crate or a variable with its own row, bytes.
