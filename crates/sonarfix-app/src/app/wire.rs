@@ -79,7 +79,7 @@ impl Wire {
         link.send(self.sender.frame(message, &mut self.frame));
     }
 
-    /// The telemetry's way to the link.
+    /// The transport of the telemetry.
     pub fn outlet<'w, L: Link>(&'w mut self, link: &'w mut L) -> WireOutlet<'w, L> {
         WireOutlet { wire: self, link }
     }

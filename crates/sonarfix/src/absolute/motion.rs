@@ -40,7 +40,7 @@ impl LastStep {
     }
 
     // ===== Eq. (40): the pose at the time of a measurement =====
-    /// The way back from the end of the step, at `now`, to the instant `at`.
+    /// The motion from the end of the step, at `now`, back to the instant `at`.
     pub fn back_to(&self, at: Instant, now: Instant) -> Result<Return, OutsideStep> {
         let age = now.checked_duration_since(at).ok_or(OutsideStep::After)?;
         if at < self.began {

@@ -289,7 +289,7 @@ proptest! {
         }
     }
 
-    /// A heading is compared the short way around.
+    /// Headings are compared modulo a full turn.
     #[test]
     fn the_innovation_of_a_heading_is_wrapped(heading in -PI..PI, off in -0.05_f32..0.05, turns in -3_i8..=3) {
         let mut localizer = parked(Radians(heading));
