@@ -221,3 +221,6 @@ impl AccumulatedMotion {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

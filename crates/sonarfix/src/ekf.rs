@@ -624,3 +624,6 @@ fn refused_range(innovation: Metres, noise: SquareMetres) -> EkfError {
         EkfError::InnovationTooLarge
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -104,3 +104,6 @@ impl Decorrelated {
         self.variances.iter().product()
     }
 }
+
+#[cfg(test)]
+mod tests;

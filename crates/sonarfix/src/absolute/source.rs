@@ -101,3 +101,6 @@ impl Source {
         *self = Self { above_prior: at_least(outlier - OUTLIERS, 0.0), at: now };
     }
 }
+
+#[cfg(test)]
+mod tests;

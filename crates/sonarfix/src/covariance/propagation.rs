@@ -114,3 +114,6 @@ impl Covariance {
         self.range_scale.propagate(f);
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -152,3 +152,6 @@ impl Ekf {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests;

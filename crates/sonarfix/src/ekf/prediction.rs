@@ -175,3 +175,6 @@ fn propagate(
 pub(super) fn refused_travel(travel: WheelTravel) -> EkfError {
     if travel.is_finite() { EkfError::TurnTooLarge } else { EkfError::NotFinite }
 }
+
+#[cfg(test)]
+mod tests;

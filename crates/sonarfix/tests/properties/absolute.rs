@@ -221,12 +221,15 @@ proptest! {
         let (beta, expected, covariance) = oracle.update(x, &p, z, &plan);
         let at = Instant::from_ticks(localizer.time().ticks() - plan.ago);
         let fix = localizer.absolute(at, &plan.of(z));
-        match fix {
-            AbsoluteFix::Accepted(_) => prop_assert!(beta > 0.799, "{beta}"),
-            AbsoluteFix::Downweighted(_) => prop_assert!((0.019..0.801).contains(&beta), "{beta}"),
-            AbsoluteFix::Gated(_) => prop_assert!(beta < 0.021, "{beta}"),
-            other => prop_assert!(false, "{other:?}"),
-        }
+        let (agreement, betas) = match fix {
+            AbsoluteFix::Accepted(agreement) => (agreement, 0.799..1.001),
+            AbsoluteFix::Downweighted(agreement) => (agreement, 0.019..0.801),
+            AbsoluteFix::Gated(agreement) => (agreement, -0.001..0.021),
+            other => return Err(TestCaseError::fail(format!("{other:?}"))),
+        };
+        prop_assert!(betas.contains(&beta), "{fix:?} {beta}");
+        let measured = plan.measured().into_iter().filter(|is| *is).count();
+        prop_assert_eq!(usize::from(agreement.dimensions), measured);
         let (is, is_p) = (vector(&localizer), matrix(&localizer));
         if !fix.is_used() {
             prop_assert_eq!((is, is_p), (x, p));
@@ -398,6 +401,25 @@ fn a_repeated_outlier_is_evidence_once() {
     assert!(evidence[19] - evidence[0] < 0.8, "{evidence:?}");
     assert_ne!(localizer.health().verdict, Verdict::Lost);
     assert!(localizer.absolute(localizer.time(), &compass(0.0)).is_used());
+}
+
+/// Each measurement that agrees lowers the probability of the next outlier to 0.8 of what it was.
+#[test]
+fn measurements_that_agree_make_a_source_credible() {
+    let mut localizer = parked(Radians(0.0));
+    let gated = localizer.absolute(localizer.time(), &compass(90.0));
+    assert!(matches!(gated, AbsoluteFix::Gated(_)));
+    for _ in 0..4 {
+        assert!(localizer.absolute(localizer.time(), &compass(0.0)).is_used());
+    }
+    let before = localizer.health().evidence;
+    let gated = localizer.absolute(localizer.time(), &compass(90.0));
+    assert!(matches!(gated, AbsoluteFix::Gated(_)));
+    // An outlier was certain, as far as 0.95 is; now it is evidence again.
+    let outlier = 0.95 * 0.8_f32.powi(4);
+    let expected = (0.3 + 0.7 / outlier).ln();
+    let evidence = localizer.health().evidence - before;
+    assert!((evidence - expected).abs() < 0.01, "{evidence} {expected}");
 }
 
 /// A heading that agrees confirms no position; a position does.
