@@ -175,3 +175,6 @@ impl Covariance {
             && is_valid_variance(self.range_scale.kk)
     }
 }
+
+#[cfg(test)]
+mod tests;
