@@ -11,6 +11,8 @@ use sonarfix_sim::monte_carlo;
 use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::statistics::Summary;
 
+use crate::consistency::assert_efficient_and_consistent;
+
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 fn scenario(text: &str, absolute: AbsoluteSensors) -> Scenario {
@@ -44,15 +46,7 @@ fn headings_and_poses_are_used_efficiently_and_consistently() {
         let results = monte_carlo::results(&simulation, seed, RUNS, &|| ()).unwrap();
         assert!(results.iter().all(|result| result.absolute.accepted > 1_000));
         let summary = Summary::of(&results);
-        assert_eq!(summary.lost_runs, 0);
-        let sampling = 4.0 / f64::from(2 * RUNS).sqrt();
-        for state in summary.states.iter().filter(|state| state.bound > 0.0) {
-            let ratio = state.rms_error / state.bound;
-            assert!((ratio - 1.0).abs() < 0.05 + sampling, "{}: {ratio}", state.name);
-        }
-        let nees = summary.nees_mean / 6.0;
-        let limit = 0.05 + 4.0 * (12.0 / f64::from(RUNS)).sqrt() / 6.0;
-        assert!((nees - 1.0).abs() < limit, "{nees}");
+        assert_efficient_and_consistent(&summary);
         assert!((summary.nis_mean - 1.0).abs() < 0.05, "{}", summary.nis_mean);
     }
 }

@@ -8,8 +8,6 @@ use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::statistics::Summary;
 
 const RUNS: u32 = 200;
-/// Four standard deviations of an RMS over n runs: 4/√(2n).
-const RMS_NOISE: f64 = 4.0 / 20.0;
 
 fn many(simulation: &Simulation, seed: u64, runs: u32) -> Summary {
     Summary::of(&monte_carlo::results(simulation, seed, runs, &|| ()).unwrap())
@@ -24,23 +22,31 @@ fn paper(policy: Policy, statistics: bool) -> Simulation {
     Simulation::new(scenario)
 }
 
+/// RMS over bound and NEES within 5 % of one, widened by four standard deviations of their sampling errors.
+pub fn assert_efficient_and_consistent(summary: &Summary) {
+    let runs = f64::from(u32::try_from(summary.runs).unwrap());
+    assert_eq!(summary.lost_runs, 0);
+    for state in summary.states.iter().filter(|state| state.bound > 0.0) {
+        let ratio = state.rms_error / state.bound;
+        // An RMS over n runs has a standard error of 1/√(2n).
+        assert!((ratio - 1.0).abs() < 0.05 + 4.0 / (2.0 * runs).sqrt(), "{}: {ratio}", state.name);
+    }
+    // A χ² with 6 degrees of freedom has variance 12.
+    let nees = summary.nees_mean / 6.0;
+    assert!((nees - 1.0).abs() < 0.05 + 4.0 * (12.0 / runs).sqrt() / 6.0, "NEES/6 {nees}");
+}
+
 fn check_consistency(policy: Policy) {
     let summary = many(&paper(policy, true), 10_000, RUNS);
     assert_eq!((summary.lost_runs, summary.fixes.gated, summary.fixes.refused), (0, 0, 0));
     assert_eq!(summary.fixes.accepted, 1_248 * u64::from(RUNS));
-    let estimated: Vec<_> = summary.states.iter().filter(|s| s.bound > 0.0).collect();
-    assert_eq!(estimated.len(), 6);
-    for state in estimated {
-        let ratio = state.rms_error / state.bound;
-        assert!((ratio - 1.0).abs() < 0.05 + RMS_NOISE, "{policy:?} {}: {ratio}", state.name);
+    assert_eq!(summary.states.iter().filter(|state| state.bound > 0.0).count(), 6);
+    assert_efficient_and_consistent(&summary);
+    for state in summary.states.iter().filter(|state| state.bound > 0.0) {
         // The standard error of a mean over n runs is σ/√n.
         let bias = (state.mean_error / state.std_error).abs();
         assert!(bias < 0.1 + 4.0 / f64::from(RUNS).sqrt(), "{policy:?} {}: {bias}", state.name);
     }
-    // A χ² with 6 degrees of freedom has variance 12.
-    let nees = summary.nees_mean / 6.0;
-    let nees_noise = 4.0 * (12.0 / f64::from(RUNS)).sqrt() / 6.0;
-    assert!((nees - 1.0).abs() < 0.05 + nees_noise, "{policy:?}: NEES/6 {nees}");
     let nis_noise = 4.0 * (2.0 / summary.fixes.accepted as f64).sqrt();
     assert!((summary.nis_mean - 1.0).abs() < 0.02 + nis_noise, "{policy:?}: {}", summary.nis_mean);
 }

@@ -13,6 +13,8 @@ use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::statistics::Summary;
 use sonarfix_sim::trace::{FixRecord, Recorder, Tick};
 
+use crate::consistency::assert_efficient_and_consistent;
+
 /// One degree, rad.
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
@@ -34,14 +36,7 @@ fn a_gyro_is_used_efficiently_and_consistently() {
     let mut scenario = with_gyro(PAPER);
     scenario.let_truth_walk_as_assumed();
     let summary = many(scenario, 20_000, RUNS);
-    assert_eq!(summary.lost_runs, 0);
-    let sampling = 4.0 / f64::from(2 * RUNS).sqrt();
-    for state in summary.states.iter().filter(|state| state.bound > 0.0) {
-        let ratio = state.rms_error / state.bound;
-        assert!((ratio - 1.0).abs() < 0.05 + sampling, "{}: {ratio}", state.name);
-    }
-    let nees = summary.nees_mean / 6.0;
-    assert!((nees - 1.0).abs() < 0.05 + 4.0 * (12.0 / f64::from(RUNS)).sqrt() / 6.0, "{nees}");
+    assert_efficient_and_consistent(&summary);
     // Without a gyro the bound of the heading is 0.13°.
     let heading = summary.states.iter().find(|state| state.name == "heading").unwrap();
     assert!(heading.bound < 0.08 * DEGREE, "{}", heading.bound);

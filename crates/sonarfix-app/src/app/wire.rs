@@ -29,7 +29,7 @@ pub trait Link {
     /// Queues a whole frame, or nothing if there is no room for it.
     fn send(&mut self, frame: &[u8]);
 
-    /// Whether there is room for a frame of this length. Telemetry for which there is none is not built.
+    /// Whether there is room for a frame of this length. Telemetry without room is not built.
     fn has_room(&self, _length: usize) -> bool {
         true
     }

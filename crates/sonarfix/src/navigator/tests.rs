@@ -273,7 +273,7 @@ fn ranges_of_a_provisional_pose_are_passed_to_the_search() {
     }
 }
 
-/// An echo from nearer than the shortest range is none.
+/// An echo from nearer than the shortest range counts as no echo.
 #[test]
 fn the_search_takes_ranges_from_the_shortest_on() {
     let walls = walls();

@@ -5,26 +5,28 @@ use proptest::prelude::*;
 
 use super::*;
 
-fn dense(a: &PoseMatrix) -> Matrix3<f64> {
-    let PoseMatrix { xx, xy, yy, xh, yh, hh } = *a;
-    Matrix3::new(xx, xy, xh, xy, yy, yh, xh, yh, hh).map(f64::from)
+impl PoseMatrix {
+    /// A matrix with these deviations; the factors of the correlations make it positive definite.
+    pub(crate) fn correlated([x, y, h]: [f32; 3], [a, b, c]: [f32; 3]) -> Self {
+        Self {
+            xx: x * x,
+            xy: a * x * y,
+            yy: (1.0 + a * a) * y * y,
+            xh: b * x * h,
+            yh: (a * b + c) * y * h,
+            hh: (1.0 + b * b + c * c) * h * h,
+        }
+    }
+
+    /// All its elements.
+    pub(crate) fn dense(&self) -> Matrix3<f64> {
+        let Self { xx, xy, yy, xh, yh, hh } = *self;
+        Matrix3::new(xx, xy, xh, xy, yy, yh, xh, yh, hh).map(f64::from)
+    }
 }
 
 fn vector(v: &PoseVector) -> Vector3<f64> {
     Vector3::new(v.x, v.y, v.h).map(f64::from)
-}
-
-/// A matrix with these deviations; the factors of the correlations make it positive definite.
-fn matrix(sigmas: [f32; 3], [a, b, c]: [f32; 3]) -> PoseMatrix {
-    let [x, y, h] = sigmas;
-    PoseMatrix {
-        xx: x * x,
-        xy: a * x * y,
-        yy: (1.0 + a * a) * y * y,
-        xh: b * x * h,
-        yh: (a * b + c) * y * h,
-        hh: (1.0 + b * b + c * c) * h * h,
-    }
 }
 
 proptest! {
@@ -34,11 +36,11 @@ proptest! {
         sigmas in [0.01_f32..3.0, 0.01_f32..3.0, 0.01_f32..3.0], factors in [-0.9_f32..0.9, -0.9_f32..0.9, -0.9_f32..0.9],
         v in [-3.0_f32..3.0, -3.0_f32..3.0, -3.0_f32..3.0],
     ) {
-        let a = matrix(sigmas, factors);
+        let a = PoseMatrix::correlated(sigmas, factors);
         let factors = a.decorrelated().unwrap();
         let [x, y, h] = factors.rows.map(|row| vector(&row));
         let rows = Matrix3::from_rows(&[x.transpose(), y.transpose(), h.transpose()]);
-        let is = rows * dense(&a) * rows.transpose();
+        let is = rows * a.dense() * rows.transpose();
         let variances = Vector3::from(factors.variances).map(f64::from);
         for i in 0..3 {
             for j in 0..3 {
@@ -48,14 +50,14 @@ proptest! {
             }
         }
         let v = PoseVector { x: v[0], y: v[1], h: v[2] };
-        let expected = vector(&v).dot(&(dense(&a).try_inverse().unwrap() * vector(&v)));
+        let expected = vector(&v).dot(&(a.dense().try_inverse().unwrap() * vector(&v)));
         let squared = f64::from(factors.squared(&v));
         prop_assert!((squared / expected - 1.0).abs() < 1e-3, "{squared} {expected}");
-        let ratio = f64::from(factors.determinant()) / dense(&a).determinant();
+        let ratio = f64::from(factors.determinant()) / a.dense().determinant();
         prop_assert!((ratio - 1.0).abs() < 1e-4, "{ratio}");
     }
 
-    /// A variance that is independent by less than 1e-6 of itself is none; by more it is one.
+    /// A variance of which less than 1e-6 is independent of the others is refused; more is accepted.
     #[test]
     fn a_matrix_has_to_be_definite_by_more_than_its_rounding(
         sigma in 0.1_f32..10.0, other in 0.1_f32..10.0, which in 0..3_usize, is_definite in any::<bool>(),

@@ -1,6 +1,6 @@
 //! Eqs. (40) to (44) against a joint update in `f64`, with motions since the measurement of a metre.
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{SMatrix, SVector, Vector3};
 use proptest::prelude::*;
 
 use super::*;
@@ -42,16 +42,7 @@ prop_compose! {
             ekf.predict(WheelTravel::new(travel[0], travel[1])).unwrap();
         }
         let back = Return { moved: PoseVector { x: moved[0], y: moved[1], h: moved[2] }, age: Duration::from_ticks(1) };
-        let ([a, b, c], [x, y, h]) = (factors, sigmas);
-        // Products of the factors of the correlations are positive definite.
-        let all = PoseMatrix {
-            xx: x * x,
-            xy: a * x * y,
-            yy: (1.0 + a * a) * y * y,
-            xh: b * x * h,
-            yh: (a * b + c) * y * h,
-            hh: (1.0 + b * b + c * c) * h * h,
-        };
+        let all = PoseMatrix::correlated(sigmas, factors);
         let one = PoseMatrix::IDENTITY;
         let noise = match (has_position, has_heading) {
             (true, true) => all,
@@ -61,11 +52,6 @@ prop_compose! {
         let measured = Components { value: PoseVector::default(), noise, has_position, has_heading };
         Case { ekf, back, measured, off }
     }
-}
-
-fn dense(a: &PoseMatrix) -> Matrix3<f64> {
-    let PoseMatrix { xx, xy, yy, xh, yh, hh } = *a;
-    Matrix3::new(xx, xy, xh, xy, yy, yh, xh, yh, hh).map(f64::from)
 }
 
 fn wrap(angle: f64) -> f64 {
@@ -119,10 +105,10 @@ proptest! {
             }
         }
         let (x, p, h) = (case.state(), case.ekf.covariance().map(f64::from), case.derivatives());
-        let s = h * p * h.transpose() + dense(&case.measured.noise);
+        let s = h * p * h.transpose() + case.measured.noise.dense();
         let prediction = case.ekf.predict_absolute(&case.measured, &case.back);
-        let off = (dense(&prediction.s) - s).abs().max();
-        prop_assert!(off < 1e-5, "{} {s}", dense(&prediction.s));
+        let off = (prediction.s.dense() - s).abs().max();
+        prop_assert!(off < 1e-5, "{} {s}", prediction.s.dense());
         let PoseVector { x: nx, y: ny, h: nh } = prediction.innovation;
         let innovation = Vector3::new(nx, ny, nh).map(f64::from);
         prop_assert!((innovation - nu).abs().max() < 1e-5, "{innovation} {nu}");
