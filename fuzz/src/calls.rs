@@ -1,7 +1,7 @@
 //! The localizer, called in any order with any arguments.
 
 use sonarfix::aim::{Aim, Policy, Reason};
-use sonarfix::config::{Config, PingSchedule, PingTiming, ServoTiming};
+use sonarfix::config::{Config, PingSchedule, PingTiming, RangerId, ServoTiming};
 use sonarfix::echo::EchoParameters;
 use sonarfix::ekf::Ekf;
 use sonarfix::health::{Health, LOST_AT, MOST_NIS, Verdict};
@@ -144,6 +144,7 @@ impl Session<'_> {
                         time: Duration::from_ticks(bytes.word().into()),
                         candidates: 0,
                     },
+                    ranger: RangerId(bytes.byte() % 2),
                 };
                 self.fix(&aim, Some(Metres(bytes.number(5.0))));
             }

@@ -3,6 +3,7 @@
 //! | target | meaning of the bytes |
 //! |---|---|
 //! | [`localizer`] | a configuration, a map, and calls in any order with hostile numbers and times |
+//! | [`search`] | a map, and travels, pings and evaluations of the search |
 //! | [`baked_map`] | a baked map, whole or damaged, or walls to bake |
 //! | [`map_file`], [`scenario_file`], [`robot_file`] | the text of such a file |
 //! | [`replay_log`] | the lines of a log |
@@ -16,18 +17,21 @@ mod bytes;
 mod calls;
 mod files;
 mod link;
+mod search;
 
 pub use baked::baked_map;
 pub use calls::localizer;
 pub use files::{map_file, replay_log, robot_file, scenario_file};
 pub use link::link;
+pub use search::search;
 
 /// A target with its name, which is also that of its corpus.
 pub type Target = (&'static str, fn(&[u8]));
 
 /// Every target.
-pub const TARGETS: [Target; 7] = [
+pub const TARGETS: [Target; 8] = [
     ("localizer", localizer),
+    ("search", search),
     ("baked_map", baked_map),
     ("map_file", map_file),
     ("scenario_file", scenario_file),

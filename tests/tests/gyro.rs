@@ -3,12 +3,19 @@
 
 use std::path::Path;
 
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 use sonarfix::aim::Policy;
-use sonarfix::gyro::GyroParameters;
-use sonarfix::localizer::{GyroStatus, Localizer};
+use sonarfix::gyro::{GyroParameters, MeasuredTurn};
+use sonarfix::localizer::{GyroStatus, Localizer, Start};
+use sonarfix::map::Map;
+use sonarfix::motion::WheelTravel;
+use sonarfix::pose::Pose;
+use sonarfix::units::{Duration, Instant, Metres, Radians};
 use sonarfix_hal::robot::Report;
-use sonarfix_map::{CLASSROOM, Fault, FaultKind, HeadingSlip, PAPER, Scenario};
+use sonarfix_map::{CLASSROOM, Fault, FaultKind, GyroTruth, HeadingSlip, PAPER, Scenario};
 use sonarfix_sim::monte_carlo;
+use sonarfix_sim::plant::gyro::Gyro;
 use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::statistics::Summary;
 use sonarfix_sim::trace::{FixRecord, Recorder, Tick};
@@ -94,12 +101,47 @@ fn the_bias_is_found_within_a_minute_of_driving() {
     assert!(squares.sqrt() < 0.02, "{}", squares.sqrt());
 }
 
+/// Standing wheels: a bias of 1°/s is found to 0.02°/s (RMS) within 5 s, with the deviation that is reported.
+#[test]
+fn the_bias_is_found_within_five_seconds_of_standing() {
+    const RUNS: u32 = 200;
+    let scenario = with_gyro(CLASSROOM);
+    let (config, walls) = (scenario.robot.localizer, scenario.floor.walls());
+    let truth = GyroTruth { bias: Some(DEGREE), scale: 0.0 };
+    let start = Start {
+        pose: Pose::new(1.5, 1.5, Radians(0.0)),
+        position_deviation: Metres(0.02),
+        heading_deviation: Radians(0.03),
+    };
+    let mut squares = 0.0;
+    for seed in 0..RUNS {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed.into());
+        let mut gyro = Gyro::new(&truth, &GyroParameters::MPU_6050, &mut rng);
+        let at = |tick: u64| Instant::from_ticks(100_000 * tick);
+        let mut localizer = Localizer::new(config, Map::new(&walls), start, at(0)).unwrap();
+        for tick in 1..=50 {
+            let angle = Radians(gyro.integral(0.0, 0.1, &mut rng) as f32);
+            let turn = MeasuredTurn { angle, duration: Duration::from_ticks(100_000) };
+            let standing = WheelTravel::new(0.0, 0.0);
+            localizer.odometry_with_turn(at(tick), standing, Some(turn)).unwrap();
+        }
+        let status = localizer.gyro().unwrap();
+        let error = f64::from(status.bias.to_degrees()) - 1.0;
+        assert!(error.abs() < 5.0 * f64::from(status.deviation.to_degrees()), "{seed}: {error}");
+        squares += error * error / f64::from(RUNS);
+    }
+    println!("bias after 5 s of standing: {} deg/s", squares.sqrt());
+    assert!(squares.sqrt() < 0.02, "{}", squares.sqrt());
+}
+
 /// A gyro that fails is counted, and the robot continues.
 #[test]
 fn a_failing_gyro_is_counted_and_the_robot_goes_on() {
     let kinds = [
         (FaultKind::StuckGyro, 2_000),
         (FaultKind::SaturatedGyro, 2_000),
+        (FaultKind::GarbledGyro(0.1), 2_000),
+        (FaultKind::GarbledGyro(1.0), 2_000),
         (FaultKind::GyroReadErrors(1.0), 2_000),
         (FaultKind::GyroReadErrors(0.1), 200),
     ];

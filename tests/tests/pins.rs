@@ -5,13 +5,15 @@ use std::path::Path;
 
 use cpu_time::ThreadTime;
 use sonarfix::aim::Policy;
-use sonarfix::config::ServoTiming;
+use sonarfix::config::{PingSchedule, PingTiming, ServoTiming};
+use sonarfix::pose::Point;
+use sonarfix::units::Radians;
 use sonarfix_hal::robot::Stamp;
 use sonarfix_map::{CLASSROOM, Fidelity, PAPER, Scenario, ServoName};
 use sonarfix_sim::monte_carlo;
 use sonarfix_sim::simulate::Simulation;
-use sonarfix_sim::statistics::Summary;
-use sonarfix_sim::trace::{Outcome, Trace};
+use sonarfix_sim::statistics::{PathSummary, Summary};
+use sonarfix_sim::trace::{FixRecord, Outcome, Recorder, Tick, Trace};
 use sonarfix_sim::world::reflector::Source;
 
 fn scenario(text: &str) -> Scenario {
@@ -162,4 +164,88 @@ fn a_closed_loop_follows_its_path() {
         let nearest = nearest.fold(f64::INFINITY, f64::min);
         assert!(nearest < 0.05, "{nearest} m off {corner:?}");
     }
+}
+
+/// The robot of the classroom with a sonar at a fixed bearing instead of the servo: it measures what it passes.
+#[test]
+fn a_fixed_sonar_localizes_the_robot_of_the_classroom() {
+    let mut classroom = scenario(CLASSROOM);
+    let robot = &mut classroom.robot;
+    let to_the_right = Radians(-core::f32::consts::FRAC_PI_2);
+    robot.localizer.sonar.servo = (to_the_right, to_the_right);
+    robot.localizer.sonar.timing = PingTiming {
+        schedule: PingSchedule::AsFastAsPossible,
+        servo: ServoTiming::INSTANT,
+        ..robot.localizer.sonar.timing
+    };
+    let summary = summary(classroom, 4);
+    assert_eq!(summary.lost_runs, 0);
+    let PathSummary { x, y, heading } = summary.rms_path;
+    assert!(x.max(y) < 0.03 && heading < 0.03, "{x} {y} {heading}");
+    assert!(summary.fixes.accepted > 4 * 2_000, "{:?}", summary.fixes);
+}
+
+/// A scenario with two sonars, a servo under each as in `classroom`, or fixed.
+fn two_sonars(right: [f32; 2], left: [f32; 2]) -> Scenario {
+    let mut classroom = scenario(CLASSROOM);
+    let robot = &mut classroom.robot;
+    robot.localizer.sonar.timing.schedule = PingSchedule::AsFastAsPossible;
+    let mut other = robot.localizer.sonar;
+    other.mount = Point::new(0.06, -0.05);
+    let limits = |[from, to]: [f32; 2]| (Radians::from_degrees(from), Radians::from_degrees(to));
+    (robot.localizer.sonar.servo, other.servo) = (limits(left), limits(right));
+    robot.localizer.further_sonars.push(other).unwrap();
+    robot.further_rangers.push(robot.ranger).unwrap();
+    classroom
+}
+
+/// Notes the pings of a run.
+#[derive(Default)]
+struct Pings(Vec<(u8, f64)>);
+
+impl Recorder for Pings {
+    fn tick(&mut self, _: impl FnOnce() -> Tick) {}
+
+    fn fix(&mut self, make: impl FnOnce() -> FixRecord) {
+        let fix = make();
+        if fix.wall.is_some() {
+            self.0.push((fix.ranger, fix.time));
+        }
+    }
+}
+
+/// The pings of two sonars never overlap, nor do the late echoes of one reach the next, of whichever sonar. To the left there
+/// is no wall in reach of a fixed sonar for most of the path; on servos both ping.
+#[test]
+fn pings_of_two_sonars_never_overlap() {
+    let fixed = ([-90.0, -90.0], [90.0, 90.0]);
+    let turning = ([-100.0, 10.0], [-10.0, 100.0]);
+    for ((right, left), least) in [(fixed, 0), (turning, 300), ((fixed.0, turning.1), 300)] {
+        let scenario = two_sonars(right, left);
+        let cycle = 1e-6 * scenario.robot.localizer.sonar.timing.cycle.to_micros() as f64;
+        let mut pings = Pings::default();
+        let result = Simulation::new(scenario).run(31, &mut pings).unwrap();
+        assert!(!result.lost);
+        let between = pings.0.windows(2).map(|pair| pair[1].1 - pair[0].1);
+        let shortest = between.fold(f64::MAX, f64::min);
+        assert!(shortest > cycle - 1e-6, "{shortest}");
+        let of_other = pings.0.iter().filter(|(ranger, _)| *ranger == 1).count();
+        let of_first = pings.0.len() - of_other;
+        assert!(of_other >= least && of_first >= least, "{of_first} and {of_other}");
+    }
+}
+
+/// While one sonar pings, the servo of the other turns: two on servos ping more often than one.
+#[test]
+fn a_second_servo_turns_while_the_first_sonar_pings() {
+    let mut alone = scenario(CLASSROOM);
+    alone.robot.localizer.sonar.timing.schedule = PingSchedule::AsFastAsPossible;
+    let one = summary(alone, 2);
+    let two = summary(two_sonars([-100.0, 10.0], [-10.0, 100.0]), 2);
+    let pings = |summary: &Summary| {
+        let counts = summary.fixes;
+        counts.accepted + counts.gated + counts.refused
+    };
+    assert_eq!(two.lost_runs, 0);
+    assert!(10 * pings(&two) > 11 * pings(&one), "{} {}", pings(&two), pings(&one));
 }

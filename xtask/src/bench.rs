@@ -10,7 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::elf::Program;
 use crate::emulator;
-use crate::program::{M0PLUS, M3, M4F, M4F_SMALL, Target};
+use crate::program::{M0PLUS, M3, M4F, M4F_FUSED, M4F_SMALL, Target};
 use crate::workspace::Workspace;
 use crate::{budgets, cargo};
 
@@ -21,7 +21,7 @@ mod subjects;
 use subjects::{Figures, OnTarget, SUBJECTS};
 
 pub fn run() -> anyhow::Result<()> {
-    for target in [M4F, M4F_SMALL, M3, M0PLUS] {
+    for target in [M4F, M4F_FUSED, M4F_SMALL, M3, M0PLUS] {
         target.build(Workspace::Bench, "bench-mcu --features peers")?;
         target.build(Workspace::Bench, "bench-ours")?;
     }
@@ -40,6 +40,7 @@ pub fn run() -> anyhow::Result<()> {
         let figures = Figures {
             version: versions.get(subject.package).cloned().unwrap_or_default(),
             m4f: on_target(&M4F, name)?,
+            m4f_fused: on_target(&M4F_FUSED, name)?,
             m4f_small: on_target(&M4F_SMALL, name)?,
             m3: on_target(&M3, name)?,
             m0plus: on_target(&M0PLUS, name)?,

@@ -2,13 +2,23 @@
 
 use crate::cargo;
 
-/// The traces: a name, and the arguments of `sonarfix pil`. The second contains gated ranges, the third a search.
-const TRACES: [(&str, &str); 3] = [
+/// The traces: a name, and the arguments of `sonarfix pil`. The second contains gated ranges, the third a search, the fourth slips of a
+/// wheel, the fifth measurements that are outliers and others that are too late, the last a time-of-flight ranger.
+const TRACES: [(&str, &str); 6] = [
     ("localizer", "paper --policy informative --seconds 60"),
     ("loop", "crates/sonarfix-map/scenarios/classroom.toml --seed 30 --seconds 120"),
     (
         "search",
         "crates/sonarfix-map/scenarios/classroom.toml --start unknown --fix-period as-fast-as-possible --seconds 7",
+    ),
+    (
+        "gyro",
+        "crates/sonarfix-map/scenarios/classroom.toml --gyro mpu6050 --heading-slips 10 --absolute heading --seconds 30",
+    ),
+    ("absolute", "tests/golden/absolute.toml --seconds 40"),
+    (
+        "light",
+        "crates/sonarfix-map/scenarios/classroom.toml --sensor vl53l1x --seed 31 --seconds 30",
     ),
 ];
 

@@ -20,8 +20,10 @@ mod guide;
 mod miri;
 mod mutants;
 mod panics;
+mod parts;
 mod pil;
 mod playground;
+mod profile;
 mod program;
 mod publish;
 mod reality;
@@ -74,6 +76,8 @@ enum Task {
     Stack(firmware::StackArgs),
     /// The shipped loop on emulated microcontrollers, bit by bit as on the PC; its cost.
     Pil,
+    /// The worst poll of the loop by part, in instructions of a Cortex-M4F.
+    Parts(parts::Args),
     /// Follows docs/build-a-robot.md in simulation: `sonarfix init`, signs of life in QEMU, a drive on each emulated core.
     Guide,
     /// The golden traces on this computer and every emulated microcontroller.
@@ -95,7 +99,7 @@ enum Task {
     /// Licences of all dependencies, and advisories if their database can be reached.
     Deny,
     /// Records the golden traces, and measures and writes `budgets.toml`.
-    Bless,
+    Bless(BlessArgs),
     /// Measures Sonarfix and its peers, and writes `docs/benchmarks.md` (ten minutes).
     Bench,
     /// Draws the wiring of every board: `docs/images/wiring-*.svg`.
@@ -161,6 +165,21 @@ fn main() -> ExitCode {
     }
 }
 
+/// What is renewed.
+#[derive(Debug, Clone, PartialEq, Eq, clap::Args)]
+struct BlessArgs {
+    /// Only `budgets.toml`.
+    #[arg(long)]
+    budgets: bool,
+}
+
+fn bless(args: &BlessArgs) -> anyhow::Result<()> {
+    if !args.budgets {
+        golden::bless()?;
+    }
+    budgets::bless()
+}
+
 fn run(task: Task) -> anyhow::Result<()> {
     match task {
         Task::Format => cargo::run("fmt --all --check"),
@@ -175,6 +194,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Size => firmware::size(),
         Task::Stack(args) => firmware::stack(&args),
         Task::Pil => pil::check(),
+        Task::Parts(args) => parts::run(&args),
         Task::Guide => guide::follow(),
         Task::Golden => golden::check(),
         Task::Panics => panics::check(),
@@ -185,7 +205,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Package => publish::package(),
         Task::Playground => playground::build_and_check(),
         Task::Deny => checks::deny(),
-        Task::Bless => golden::bless().and_then(|()| budgets::bless()),
+        Task::Bless(args) => bless(&args),
         Task::Bench => bench::run(),
         Task::Wiring => wiring::write(),
         Task::Reality(args) => reality::run(&args),

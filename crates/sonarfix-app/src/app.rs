@@ -302,6 +302,9 @@ impl<'m, F: NorFlash> App<'m, F> {
                 if let Some(readings) = check.readings(now, config, hardware) {
                     self.wire.send(&Telemetry::Devices(readings), link);
                 }
+                if let Some(ping) = check.take_ping() {
+                    self.wire.send(&Telemetry::Sweep(ping), link);
+                }
                 polled.is_on_time = since(now, self.expected) <= Settings::default().tolerance;
                 self.expected = check.next_poll(now, hardware);
             }

@@ -6,7 +6,7 @@ use sonarfix_hal::encoder::Counter;
 use sonarfix_hal::ranger::{NoEcho, Outcome, Ranger, TriggerError};
 use sonarfix_hal::robot::{EncoderFaults, Faults, Hardware, PACE};
 use sonarfix_hal::servo::PointError;
-use sonarfix_link::message::{DeviceReadings, EncoderReading, ServoReading};
+use sonarfix_link::message::{DeviceReadings, EncoderReading, ServoReading, Sweep};
 
 use crate::time::after;
 
@@ -20,6 +20,8 @@ const SHOWN_FOR: Duration = Duration::from_ticks(60_000_000);
 const READINGS: Duration = Duration::from_ticks(100_000);
 /// Period of the checks while the readings are shown.
 const SHOWN_PERIOD: Duration = Duration::from_ticks(200_000);
+/// Pause between pings at a bearing that was asked for.
+const POINTED_PERIOD: Duration = Duration::from_ticks(50_000);
 /// Checks after which the servo turns to the next bearing: two seconds, in which a slow servo arrives and can be seen.
 const CHECKS_PER_BEARING: u8 = 8;
 
@@ -33,13 +35,15 @@ const CHECKS_PER_BEARING: u8 = 8;
 ///
 /// It cannot detect an unplugged quadrature encoder, which reads like a wheel at rest, nor a hobby servo that does not
 /// turn, which has no feedback. [`Self::show`] therefore lets a person see them: for a minute the servo turns in turn ahead
-/// and to its limits, and [`Self::readings`] returns what the devices read.
+/// and to its limits, or to one bearing, and [`Self::readings`] returns what the devices read.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Check {
     state: State,
     has_servo_failed: bool,
     /// The result of the last ping.
     ping: Option<Outcome>,
+    /// The last ping at a bearing that was asked for.
+    pinged: Option<Sweep>,
     shown: Option<Shown>,
 }
 
@@ -50,13 +54,15 @@ enum State {
 }
 
 /// The readings are shown.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct Shown {
     until: Instant,
     /// When the next readings are due.
     next: Instant,
     /// Checks since the first bearing.
     checks: u8,
+    /// The bearing that was asked for.
+    bearing: Option<Radians>,
 }
 
 impl Check {
@@ -64,14 +70,14 @@ impl Check {
     #[must_use]
     pub fn new(now: Instant) -> Self {
         let state = State::Resting { until: now };
-        Self { state, has_servo_failed: false, ping: None, shown: None }
+        Self { state, has_servo_failed: false, ping: None, pinged: None, shown: None }
     }
 
-    /// Shows the readings for a minute from `now` on.
-    pub fn show(&mut self, now: Instant) {
-        let Shown { next, checks, .. } =
-            self.shown.unwrap_or(Shown { until: now, next: now, checks: 0 });
-        self.shown = Some(Shown { until: after(now, SHOWN_FOR), next, checks });
+    /// Shows the readings for a minute from `now` on, with the servo at `bearing`, which it can reach, or in turn ahead and at its
+    /// limits.
+    pub fn show(&mut self, now: Instant, bearing: Option<Radians>) {
+        let (next, checks) = self.shown.map_or((now, 0), |shown| (shown.next, shown.checks));
+        self.shown = Some(Shown { until: after(now, SHOWN_FOR), next, checks, bearing });
     }
 
     /// Handles what is due; returns the faults that were found.
@@ -89,11 +95,19 @@ impl Check {
                 let bearing = config.map_or(Radians(0.0), |config| self.next_bearing(config));
                 self.has_servo_failed = has_servo_failed(now, bearing, hardware);
                 faults.servo = u32::from(self.has_servo_failed);
-                self.trigger(now, hardware, &mut faults);
+                match self.settles_at(hardware).filter(|&at| at > now) {
+                    Some(until) => self.state = State::Resting { until },
+                    None => self.trigger(now, hardware, &mut faults),
+                }
             }
             State::Pinging { since } => self.listen(now, since, hardware, &mut faults),
         }
         faults
+    }
+
+    /// The last ping at a bearing that was asked for, once.
+    pub fn take_ping(&mut self) -> Option<Sweep> {
+        self.pinged.take()
     }
 
     /// When it must be polled next after a poll at `now`, if no edge of the echo is stamped earlier.
@@ -129,8 +143,23 @@ impl Check {
         })
     }
 
-    /// Ahead; while the readings are shown, ahead, to the right, ahead and to the left in turn.
+    /// The bearing that was asked for.
+    fn asked(&self) -> Option<Radians> {
+        self.shown.and_then(|shown| shown.bearing)
+    }
+
+    /// When a ping at a bearing that was asked for may begin; other pings do not wait for the servo.
+    fn settles_at(&self, hardware: &mut impl Hardware) -> Option<Instant> {
+        let servo = hardware.servo();
+        self.asked().and(servo.target()).map(|_| servo.settles_at())
+    }
+
+    /// Ahead; while the readings are shown, the bearing that was asked for, or ahead, to the right, ahead and to the left in
+    /// turn.
     fn next_bearing(&mut self, config: &RobotConfig) -> Radians {
+        if let Some(bearing) = self.asked() {
+            return bearing;
+        }
         let Some(shown) = &mut self.shown else { return Radians(0.0) };
         let turn = shown.checks / CHECKS_PER_BEARING;
         shown.checks = (shown.checks + 1) % (4 * CHECKS_PER_BEARING);
@@ -161,7 +190,11 @@ impl Check {
         faults: &mut Faults,
     ) {
         match hardware.ranger().poll(now) {
-            Ok(Some(outcome)) => self.end(now, outcome, faults),
+            Ok(Some(outcome)) => {
+                self.end(now, outcome, faults);
+                let bearing = self.asked().and(hardware.servo().target());
+                self.pinged = bearing.map(|bearing| Sweep { at: now, bearing, outcome });
+            }
             Ok(None) if now < after(since, TIMEOUT) => {}
             Ok(None) | Err(_) => self.end(now, Err(NoEcho::Failed), faults),
         }
@@ -170,7 +203,11 @@ impl Check {
     fn end(&mut self, now: Instant, outcome: Outcome, faults: &mut Faults) {
         faults.ranger = u32::from(outcome.is_err_and(NoEcho::is_fault));
         self.ping = Some(outcome);
-        let period = if self.shown.is_some() { SHOWN_PERIOD } else { PERIOD };
+        let period = match self.shown {
+            Some(Shown { bearing: Some(_), .. }) => POINTED_PERIOD,
+            Some(_) => SHOWN_PERIOD,
+            None => PERIOD,
+        };
         self.state = State::Resting { until: after(now, period) };
     }
 }
@@ -201,5 +238,5 @@ fn encoder<C: Counter>(counter: &mut C, wheel: Option<&WheelConfig>) -> EncoderR
 
 fn servo(hardware: &mut impl Hardware) -> Option<ServoReading> {
     let servo = hardware.servo();
-    Some(ServoReading { bearing: servo.target()?, micros: servo.pulse()? })
+    Some(ServoReading { bearing: servo.target()?, micros: servo.pulse().unwrap_or(0.0) })
 }

@@ -3,7 +3,7 @@
 //! [`RobotConfig`] is what `sonarfix config bake` writes into flash (`sonarfix-link`'s `baked`), and
 //! what loop, drivers, planner, simulator and replay read. No fact is in it twice: the servo's limits
 //! and timing, the ping schedule and the ranger's cycle are those of
-//! [`Sonar`](sonarfix::config::Sonar) inside [`RobotConfig::localizer`], which the planner uses as
+//! [`Sonar`] inside [`RobotConfig::localizer`], which the planner uses as
 //! well; the other fields are what only the loop and the drivers need.
 //!
 //! [`Unsupported`] is the reason for which a board cannot be the robot that a configuration describes.
@@ -16,7 +16,7 @@
 //! # Non-finite policy
 //! [`RobotConfig::check`] refuses NaN and infinity in every field.
 
-use sonarfix::config::{Config, ConfigError};
+use sonarfix::config::{Config, ConfigError, Further, RangerId, Sonar};
 use sonarfix::health::{DEGRADED_WITHOUT_ODOMETRY, Verdict};
 use sonarfix::localizer::Localizer;
 use sonarfix::search::Region;
@@ -41,14 +41,14 @@ pub struct RobotConfig {
     pub left_wheel: WheelConfig,
     /// Time from one reading of the encoders to the next.
     pub encoder_period: Duration,
-    /// Two pulses of the servo, and the bearing of the sonar that was measured with each.
-    pub servo_pulses: [MeasuredPulse; 2],
-    /// The ranger.
+    /// The driver of the first ranger, [`Config::sonar`].
     pub ranger: RangerConfig,
     /// When the motors are enabled.
     pub motors: MotorPolicy,
     /// Whether the robot needs to know where it starts.
     pub start: StartPose,
+    /// The drivers of [`Config::further_sonars`], in the same order.
+    pub further_rangers: Further<RangerConfig>,
 }
 
 /// Whether a robot needs to know where it starts.
@@ -127,15 +127,54 @@ impl WheelConfig {
     }
 }
 
-/// A ranger.
+/// The drivers of a ranger and of its servo.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RangerConfig {
     /// The kind, which determines the driver.
     pub kind: RangerKind,
-    /// Temperature of the air that the driver computes ranges with.
+    /// Temperature of the air that the driver computes ranges with; the same for all rangers.
     pub temperature: Celsius,
+    /// Two pulses of the servo, and the bearing of the ranger that was measured with each. Without effect on a ranger at a
+    /// fixed bearing ([`Sonar::fixed_bearing`]).
+    pub servo_pulses: [MeasuredPulse; 2],
+}
+
+impl RangerConfig {
+    /// The pulses of a ranger without a servo.
+    pub const NO_PULSES: [MeasuredPulse; 2] =
+        [MeasuredPulse { width: Duration::from_ticks(0), bearing: Radians(0.0) }; 2];
+
+    /// The settings of the servo's driver for this sonar; `None` without a servo.
+    #[must_use]
+    pub fn servo_settings(&self, sonar: &Sonar) -> Option<ServoSettings> {
+        sonar.fixed_bearing().is_none().then_some(ServoSettings {
+            pulses: self.servo_pulses,
+            limits: sonar.servo,
+            timing: sonar.timing.servo,
+        })
+    }
+
+    /// The settings of the ranger's driver for this sonar.
+    #[must_use]
+    pub fn settings(&self, sonar: &Sonar) -> RangerSettings {
+        // `check` refuses a temperature out of range; without it the driver uses room temperature.
+        let air = Air::at(self.temperature).unwrap_or(Air::ROOM);
+        RangerSettings { kind: self.kind, air, cycle: sonar.timing.cycle }
+    }
+
+    fn check(&self, sonar: &Sonar) -> Result<(), RobotConfigError> {
+        if let Some(servo) = self.servo_settings(sonar) {
+            let [one, other] = servo.pulses;
+            let calibration = Calibration::new(one, other);
+            require("servo_pulses", calibration.is_ok(), "two pulses with two bearings")?;
+            let fits = servo.fits_its_frame();
+            require("servo_pulses", fits, "within the servo's frame at both limits of the servo")?;
+        }
+        let air = Air::at(self.temperature);
+        require("ranger.temperature", air.is_ok(), "between -40 and 85 degrees Celsius")
+    }
 }
 
 /// In which of three situations the motor driver stays enabled while the loop runs. While it does not run, the motors
@@ -206,7 +245,7 @@ impl From<ConfigError> for RobotConfigError {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Unsupported {
-    /// The board has no driver for [`RobotConfig::ranger`].
+    /// The board has no driver for a ranger of this kind.
     Ranger,
     /// The servo's driver or its PWM channel refuses limits, pulses or timing.
     Servo(SettingError),
@@ -215,6 +254,8 @@ pub enum Unsupported {
     Counter,
     /// The board has no gyro, or it does not respond.
     Gyro,
+    /// The configuration has more rangers than the board.
+    Rangers,
 }
 
 impl core::fmt::Display for Unsupported {
@@ -226,6 +267,7 @@ impl core::fmt::Display for Unsupported {
                 "a wheel at max_wheel_speed overruns the board's edge counter within an encoder_period",
             ),
             Self::Gyro => f.write_str("the configured gyro is missing or does not respond"),
+            Self::Rangers => f.write_str("the configuration has more rangers than the board"),
         }
     }
 }
@@ -260,13 +302,14 @@ impl RobotConfig {
             right_wheel: wheel,
             left_wheel: wheel,
             encoder_period: Duration::from_ticks(100_000),
-            servo_pulses: [pulse(1_000, -45.0), pulse(2_000, 45.0)],
             ranger: RangerConfig {
                 kind: RangerKind::Pulse(PulseTiming::HC_SR04),
                 temperature: Celsius(20.0),
+                servo_pulses: [pulse(1_000, -45.0), pulse(2_000, 45.0)],
             },
             motors: MotorPolicy::DEFAULT,
             start: StartPose::Known,
+            further_rangers: Further::NONE,
         }
     }
 
@@ -280,13 +323,17 @@ impl RobotConfig {
         require("right_wheel.travel_per_edge", self.right_wheel.geometry().is_ok(), length)?;
         require("left_wheel.travel_per_edge", self.left_wheel.geometry().is_ok(), length)?;
         require("encoder_period", !self.encoder_period.is_zero(), "longer than zero")?;
-        let [one, other] = self.servo_pulses;
-        let calibration = Calibration::new(one, other);
-        require("servo_pulses", calibration.is_ok(), "two pulses with two bearings")?;
-        let fits = self.servo_settings().fits_its_frame();
-        require("servo_pulses", fits, "within the servo's frame at both limits of the servo")?;
-        let air = Air::at(self.ranger.temperature);
-        require("ranger.temperature", air.is_ok(), "between -40 and 85 degrees Celsius")?;
+        self.ranger.check(&self.localizer.sonar)?;
+        let (sonars, rangers) =
+            (self.localizer.further_sonars.iter().count(), self.further_rangers.iter().count());
+        let drivers = "one for each of localizer.further_sonars";
+        require("further_rangers", sonars == rangers, drivers)?;
+        for (sonar, ranger) in self.localizer.further_sonars.iter().zip(self.further_rangers.iter())
+        {
+            ranger.check(sonar)?;
+            let is_shared = ranger.temperature == self.ranger.temperature;
+            require("further_rangers.temperature", is_shared, "that of the first ranger")?;
+        }
         require("motors.link_timeout", !self.motors.link_timeout.is_zero(), "longer than zero")?;
         let region = self.start.region().is_none_or(|region| region.is_valid());
         require("start.region", region, "a rectangle from its smaller to its larger coordinates")
@@ -300,20 +347,26 @@ impl RobotConfig {
         Ok(Wheels { right: self.right_wheel.geometry()?, left: self.left_wheel.geometry()? })
     }
 
-    /// The settings of the servo's driver.
+    /// A ranger and its drivers; `None` if the robot has no such one.
     #[must_use]
-    pub fn servo_settings(&self) -> ServoSettings {
-        let sonar = &self.localizer.sonar;
-        ServoSettings { pulses: self.servo_pulses, limits: sonar.servo, timing: sonar.timing.servo }
+    pub fn ranger_of(&self, ranger: RangerId) -> Option<(&Sonar, &RangerConfig)> {
+        let driver = match ranger.index().checked_sub(1) {
+            None => Some(&self.ranger),
+            Some(further) => self.further_rangers.get(further),
+        };
+        self.localizer.sonar_of(ranger).zip(driver)
     }
 
-    /// The settings of the ranger's driver.
+    /// The settings of the first ranger's servo; `None` without a servo.
+    #[must_use]
+    pub fn servo_settings(&self) -> Option<ServoSettings> {
+        self.ranger.servo_settings(&self.localizer.sonar)
+    }
+
+    /// The settings of the first ranger's driver.
     #[must_use]
     pub fn ranger_settings(&self) -> RangerSettings {
-        let RangerConfig { kind, temperature } = self.ranger;
-        // `check` refuses a temperature out of range; without it the driver uses room temperature.
-        let air = Air::at(temperature).unwrap_or(Air::ROOM);
-        RangerSettings { kind, air, cycle: self.localizer.sonar.timing.cycle }
+        self.ranger.settings(&self.localizer.sonar)
     }
 }
 

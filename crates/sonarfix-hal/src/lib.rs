@@ -1,7 +1,7 @@
 //! Drivers for the sensors of a small wheeled robot, and the loop that connects them to the
 //! [`sonarfix`] localizer.
 //!
-//! `no_std`, no allocation, no panic, no `unsafe`, no global. Nothing waits: firmware, simulator and emulator
+//! `no_std`, no allocation, no panic, no `unsafe`, no global. Nothing waits, except [`gyro::TwoWire`] for the bits of its bus: firmware, simulator and emulator
 //! poll the same code with the time as an argument. The hardware is accessed through `embedded-hal` 1.0.
 //!
 //! | module | |
@@ -10,7 +10,7 @@
 //! | [`encoder`] | counters of any width, a software quadrature decoder, edges to metres |
 //! | [`servo`] | bearing to pulse, and a model of the servo's present bearing |
 //! | [`ranger`] | ultrasonic rangers: HC-SR04 and compatible ones, LV-MaxSonar, SRF02, SRF08 |
-//! | [`gyro`] | gyros: MPU-6050 and compatible ones |
+//! | [`gyro`] | gyros: MPU-6050 and compatible ones; an I²C master on two pins, whose transfers always end |
 //! | [`robot`] | the loop: encoder samples, and the measurement cycle of the sonar |
 //!
 //! Start with [`robot::Robot`], whose example is a complete fix.

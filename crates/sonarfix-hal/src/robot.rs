@@ -8,6 +8,7 @@
 //! | [`Report`] | what a poll did |
 //! | [`Faults`] | counts of faults |
 //! | `odometer` (private) | the ledger of encoder edges |
+//! | `rangers` (private) | when each of several rangers can ping, and which one does |
 //! | `schedule` (private) | periodic deadlines |
 //! | `sonar` (private) | the state machine of a measurement cycle |
 //! | `waiting` (private) | absolute measurements that wait for their step |
@@ -15,6 +16,11 @@
 //!
 //! *Tick*: one sample of both encoders (every 100 ms by default), passed to the localizer.
 //! *Measurement cycle*: choose a wall, turn the servo, wait until it has settled, ping, listen, fuse.
+//!
+//! # Several rangers
+//! There is one ping at a time. A ranger pings when its servo has settled and the echoes of all pings that it
+//! [hears](sonarfix::config::Sonar::hears) have decayed, those of its own included. While one pings, the servos of the others turn
+//! to their walls; while the best one turns, another one pings if it ends before.
 //!
 //! # Time
 //! [`Robot::poll`] never waits and reads no clock. It may be called at any rate, and late: deadlines stay on their
@@ -49,6 +55,7 @@
 mod faults;
 mod hardware;
 mod odometer;
+mod rangers;
 mod report;
 mod schedule;
 mod settings;
@@ -57,8 +64,8 @@ mod waiting;
 mod yaw;
 
 use sonarfix::absolute::AbsoluteMeasurement;
-use sonarfix::aim::Aim;
-use sonarfix::config::PingSchedule;
+use sonarfix::aim::{Aim, NoAim};
+use sonarfix::config::{MAX_RANGERS, PingSchedule, RangerId};
 use sonarfix::ekf::EkfError;
 use sonarfix::gyro::TurnReading;
 use sonarfix::localizer::{Localizer, Start};
@@ -72,8 +79,9 @@ use crate::ranger::{Echo, NoEcho, Outcome, Ranger, TriggerError};
 use crate::time::{NEVER, after, micros, since};
 
 pub use faults::{EncoderFaults, Faults};
-pub use hardware::{Devices, Hardware, WithGyro};
+pub use hardware::{Devices, Hardware, WithGyro, WithRangers};
 use odometer::{Odometer, Position, Reading};
+use rangers::can_ping_at;
 pub use report::{PingResult, Report, Step, StepResult, SweepResult, Tick};
 use schedule::Schedule;
 pub use settings::{EVALUATIONS_PER_MILLISECOND, Settings, SettingsError, Stamp};
@@ -256,9 +264,10 @@ impl<'m> Robot<'m> {
         let mut faults = Faults::default();
         self.odometer.begin(now, hardware, &mut faults);
         let reading = self.read(now, hardware, &mut faults);
-        let step = reading
-            .map(|reading| self.advance(now, reading.position, reading.turn, &mut faults, None));
-        if step.is_none() {
+        let mut step = None;
+        if let Some(Reading { position, turn, .. }) = reading {
+            self.advance(now, position, turn, &mut faults, None, &mut step);
+        } else {
             // The travel up to now does not belong to the new pose.
             self.odometer.forget();
             self.navigator.odometry_missing(now);
@@ -373,12 +382,12 @@ impl<'m> Robot<'m> {
 
     /// Whether the ping in flight has no outcome at `now`, if there is one.
     fn is_silent(&mut self, now: Instant, hardware: &mut impl Hardware) -> bool {
-        let Cycle::Listening { polled, .. } = &mut self.cycle else {
+        let Cycle::Listening { polled, target, .. } = &mut self.cycle else {
             return true;
         };
         let polled = *polled.get_or_insert(now);
         if self.heard.is_none() {
-            match hardware.ranger().poll(now) {
+            match hardware.ranger_of(target.ranger()).poll(now) {
                 Ok(None) => return since(now, polled) < self.settings.patience,
                 Ok(outcome) => self.heard = Some(outcome),
                 Err(_) => self.heard = Some(None),
@@ -393,7 +402,9 @@ impl<'m> Robot<'m> {
             // Ticks are delayed until it has ended.
             Cycle::Listening { .. } => NEVER,
             Cycle::Idle { until } => until.min(self.ticks.next()),
-            Cycle::Turning { .. } => can_ping_at(hardware).min(self.ticks.next()),
+            Cycle::Turning { ranger, .. } => {
+                can_ping_at(self.localizer().config(), ranger, hardware).min(self.ticks.next())
+            }
         };
         self.yaw.as_ref().map_or(next, |yaw| next.min(yaw.next()))
     }
@@ -409,9 +420,9 @@ impl<'m> Robot<'m> {
     pub fn next_poll(&self, hardware: &mut impl Hardware) -> Instant {
         let paced = after(self.time, PACE);
         let deadline = match self.cycle {
-            Cycle::Listening { polled, .. } => {
+            Cycle::Listening { polled, target, .. } => {
                 let timeout = polled.map_or(NEVER, |polled| after(polled, self.settings.patience));
-                hardware.ranger().poll_at().unwrap_or(AT_ONCE).min(timeout)
+                hardware.ranger_of(target.ranger()).poll_at().unwrap_or(AT_ONCE).min(timeout)
             }
             _ => NEVER,
         };
@@ -493,7 +504,7 @@ impl<'m> Robot<'m> {
         let (target, from, polled) = (*target, *from, *polled.get_or_insert(now));
         let heard = match self.heard.take() {
             Some(heard) => heard,
-            None => match hardware.ranger().poll(now) {
+            None => match hardware.ranger_of(target.ranger()).poll(now) {
                 Ok(None) if since(now, polled) < self.settings.patience => return,
                 Ok(None) => Some(Err(NoEcho::NoResponse)),
                 Ok(outcome) => outcome,
@@ -504,13 +515,9 @@ impl<'m> Robot<'m> {
         let outcome = outcome.and_then(|echo| in_time(echo, from.at, now));
         report.faults.ranger += u32::from(outcome.err().is_some_and(NoEcho::is_fault));
         match target {
-            Target::Wall(aim) => {
-                let heard = self.fuse(now, &aim, &from, outcome, hardware, report, search);
-                report.ping_result = Some(heard);
-            }
+            Target::Wall(aim) => self.fuse(now, &aim, &from, outcome, hardware, report, search),
             Target::Sweep(bearing) => {
-                let heard = self.sweep(now, bearing, &from, outcome, hardware, report, search);
-                report.swept = Some(heard);
+                self.sweep(now, bearing, &from, outcome, hardware, report, search);
             }
         }
         self.end_cycle(now, true);
@@ -528,19 +535,18 @@ impl<'m> Robot<'m> {
         hardware: &mut impl Hardware,
         report: &mut Report,
         mut search: Option<&mut Search<'m>>,
-    ) -> PingResult {
-        let (step, fix) = match outcome {
-            Ok(echo) => {
-                let faults = &mut report.faults;
-                let step = self.reach(now, from, &echo, hardware, faults, search.as_deref_mut());
-                if step.is_none() {
-                    self.navigator.skip();
-                }
-                (step, step.map(|_| self.navigator.fix(aim, Some(echo.range), search)))
+    ) {
+        let Report { ping_result, faults, .. } = report;
+        let result = ping_result.insert(PingResult { aim: *aim, outcome, step: None, fix: None });
+        let range = outcome.ok().map(|echo| echo.range);
+        if let Ok(echo) = outcome {
+            let (step, search) = (&mut result.step, search.as_deref_mut());
+            if !self.reach(now, from, &echo, hardware, faults, search, step) {
+                self.navigator.skip();
+                return;
             }
-            Err(_) => (None, Some(self.navigator.fix(aim, None, search))),
-        };
-        PingResult { aim: *aim, outcome, step, fix }
+        }
+        result.fix = Some(self.navigator.fix(aim, range, search));
     }
 
     /// Passes the travel up to the instant of the echo to the localizer, then the range to the search.
@@ -555,23 +561,29 @@ impl<'m> Robot<'m> {
         hardware: &mut impl Hardware,
         report: &mut Report,
         mut search: Option<&mut Search<'m>>,
-    ) -> SweepResult {
-        let (step, range) = match outcome {
+    ) {
+        let Report { swept, faults, .. } = report;
+        let result = swept.insert(SweepResult { bearing, outcome, step: None, is_novel: None });
+        let range = match outcome {
             Ok(echo) => {
-                let faults = &mut report.faults;
-                let step = self.reach(now, from, &echo, hardware, faults, search.as_deref_mut());
-                (step, step.map(|_| Some(echo.range)))
+                let (step, search) = (&mut result.step, search.as_deref_mut());
+                let is_reached = self.reach(now, from, &echo, hardware, faults, search, step);
+                is_reached.then_some(Some(echo.range))
             }
-            Err(reason) => (None, (!reason.is_fault()).then_some(None)),
+            Err(reason) => (!reason.is_fault()).then_some(None),
         };
-        let taken = range.zip(search).map(|(range, search)| {
+        result.is_novel = range.zip(search).map(|(range, search)| {
             // A range of a driver is finite, and so is the bearing.
             self.navigator.ping(bearing, range, search).unwrap_or(false)
         });
-        SweepResult { bearing, outcome, step, is_novel: taken }
     }
 
-    /// Passes the travel up to the instant of the echo to the localizer; `None` if a counter cannot be read.
+    /// Passes the travel up to the instant of the echo to the localizer, and writes the step in place, because it is
+    /// large. Returns whether the counters could be read.
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "a ping, its echo, what takes them, and the step"
+    )]
     fn reach(
         &mut self,
         now: Instant,
@@ -580,8 +592,9 @@ impl<'m> Robot<'m> {
         hardware: &mut impl Hardware,
         faults: &mut Faults,
         search: Option<&mut Search<'m>>,
-    ) -> Option<Step> {
-        let reading = self.read(now, hardware, faults)?;
+        step: &mut Option<Step>,
+    ) -> bool {
+        let Some(reading) = self.read(now, hardware, faults) else { return false };
         let (at, position, turn) = match self.settings.stamp {
             Stamp::Reflection => {
                 let at = echo.reflected();
@@ -589,7 +602,8 @@ impl<'m> Robot<'m> {
             }
             Stamp::Arrival => (now, reading.position, reading.turn),
         };
-        Some(self.advance(at, position, turn, faults, search))
+        self.advance(at, position, turn, faults, search, step);
+        true
     }
 
     /// Passes one absolute measurement to the localizer, if one is due.
@@ -619,15 +633,16 @@ impl<'m> Robot<'m> {
         let held = self.time >= due.due;
         let late = since(now, due.due.max(self.time));
         report.faults.deadlines += u32::from(late > self.settings.tolerance);
-        let faults = &mut report.faults;
-        let reading = self.read(now, hardware, faults);
-        let step = reading
-            .map(|reading| self.advance(now, reading.position, reading.turn, faults, search));
-        if step.is_none_or(|step| matches!(step.result, StepResult::Discarded(_))) {
+        let Report { tick, faults, .. } = report;
+        let lateness = since(now, due.due);
+        let Tick { step, .. } =
+            tick.insert(Tick { step: None, lateness, held, skipped: due.skipped });
+        if let Some(Reading { position, turn, .. }) = self.read(now, hardware, faults) {
+            self.advance(now, position, turn, faults, search, step);
+        }
+        if step.as_ref().is_none_or(|step| matches!(step.result, StepResult::Discarded(_))) {
             self.navigator.odometry_missing(now);
         }
-        report.tick =
-            Some(Tick { step, lateness: since(now, due.due), held, skipped: due.skipped });
     }
 
     /// Chooses a wall, or the next bearing of the sweep, if a ping is due, and turns the servo.
@@ -646,7 +661,7 @@ impl<'m> Robot<'m> {
         if let (Mode::Searching, Some(search)) = (self.mode(), search) {
             let turned = hardware.servo().point(now, search.aim());
             report.faults.servo += u32::from(turned.is_err());
-            self.cycle = Cycle::Turning { why: None };
+            self.cycle = Cycle::Turning { ranger: RangerId::FIRST, why: None };
             return;
         }
         if self.localizer().is_odometry_missing() {
@@ -654,12 +669,17 @@ impl<'m> Robot<'m> {
             self.cycle = Cycle::Idle { until: self.ticks.next() };
             return;
         }
-        let aimed = self.navigator.aim();
+        let aimed = if self.localizer().config().has_several_sonars() {
+            self.choose_among(now, hardware, &mut report.faults)
+        } else {
+            self.navigator.aim().inspect(|aim| {
+                let turned = hardware.servo().point(now, aim.bearing);
+                // If it does not turn, the wall at its last bearing is measured.
+                report.faults.servo += u32::from(turned.is_err());
+            })
+        };
         if let Ok(aim) = aimed {
-            let turned = hardware.servo().point(now, aim.bearing);
-            // If it does not turn, the wall at its last bearing is measured.
-            report.faults.servo += u32::from(turned.is_err());
-            self.cycle = Cycle::Turning { why: Some(aim.why) };
+            self.cycle = Cycle::Turning { ranger: aim.ranger, why: Some(aim.why) };
         } else {
             self.navigator.skip();
             self.end_cycle(now, false);
@@ -667,24 +687,47 @@ impl<'m> Robot<'m> {
         report.aimed = Some(aimed);
     }
 
+    /// Chooses ranger and wall of the next ping of a robot with several rangers. The servos of the others turn to their
+    /// walls meanwhile.
+    #[inline(never)]
+    fn choose_among(
+        &mut self,
+        now: Instant,
+        hardware: &mut impl Hardware,
+        faults: &mut Faults,
+    ) -> Result<Aim, NoAim> {
+        let config = self.localizer().config();
+        let mut aims = [None; MAX_RANGERS];
+        for ((ranger, _), aim) in config.sonars().zip(&mut aims) {
+            let standing = rangers::standing(config, ranger, now, hardware);
+            *aim = self.navigator.aim_of(ranger, &standing).ok();
+        }
+        let chosen = rangers::first_of(config, &aims).ok_or(NoAim::NoWall)?;
+        for aim in aims.iter().flatten() {
+            let turned = hardware.servo_of(aim.ranger).point(now, aim.bearing);
+            faults.servo += u32::from(turned.is_err());
+        }
+        Ok(chosen)
+    }
+
     /// Starts a ping once the servo has settled and the ranger is ready ([`can_ping_at`]), if a wall is square to
     /// the sonar (the robot may have turned in the meantime) or the sonar sweeps.
     fn start_ping(&mut self, now: Instant, hardware: &mut impl Hardware, report: &mut Report) {
-        let Cycle::Turning { why } = self.cycle else {
+        let Cycle::Turning { ranger, why } = self.cycle else {
             return;
         };
-        let Some(bearing) = hardware.servo().target() else {
+        let Some(bearing) = hardware.servo_of(ranger).target() else {
             self.abort_cycle(now);
             return;
         };
-        let ready_at = can_ping_at(hardware);
+        let ready_at = can_ping_at(self.localizer().config(), ranger, hardware);
         if now < ready_at {
             return;
         }
         let target = match why {
             None => Target::Sweep(bearing),
             Some(why) => {
-                let Ok(aim) = self.navigator.aim_at(bearing) else {
+                let Ok(aim) = self.navigator.aim_along(ranger, bearing) else {
                     self.end_cycle(now, false);
                     return;
                 };
@@ -695,7 +738,7 @@ impl<'m> Robot<'m> {
             self.abort_cycle(now);
             return;
         };
-        match hardware.ranger().trigger(now) {
+        match hardware.ranger_of(ranger).trigger(now) {
             Ok(()) => {
                 self.cycle = Cycle::Listening { target, from, polled: None };
                 if let Target::Wall(aim) = target {
@@ -739,7 +782,7 @@ impl<'m> Robot<'m> {
         report.mode = self.navigator.work(evaluations, search);
     }
 
-    /// Passes the travel of the wheels up to `at` to the localizer, and the turn of the gyro.
+    /// Passes the travel of the wheels up to `at` to the localizer, and the turn of the gyro; writes the step in place.
     fn advance(
         &mut self,
         at: Instant,
@@ -747,7 +790,8 @@ impl<'m> Robot<'m> {
         reading: Option<TurnReading>,
         faults: &mut Faults,
         search: Option<&mut Search<'m>>,
-    ) -> Step {
+        step: &mut Option<Step>,
+    ) {
         let travel = self.odometer.travel_to(position);
         let turn = self.yaw.as_ref().and_then(|yaw| yaw.turn_to(&reading?));
         let result = match self.navigator.odometry_with_turn(at, travel, turn, search) {
@@ -762,8 +806,8 @@ impl<'m> Robot<'m> {
             yaw.settle(reading);
         }
         faults.travel += u32::from(matches!(result, StepResult::Discarded(_)));
-        let absolute = self.take_absolute();
-        Step { at, travel, turn: reading, result, absolute }
+        let step = step.insert(Step { at, travel, turn: reading, result, absolute: None });
+        step.absolute = self.take_absolute();
     }
 
     /// Whether the wheels can have travelled so far since the localizer's last step. Each of the two positions is
@@ -780,12 +824,6 @@ impl<'m> Robot<'m> {
 fn yaw_of(localizer: &Localizer) -> Option<YawLedger> {
     let parameters = localizer.config().gyro.as_ref()?;
     Some(YawLedger::new(parameters, localizer.time()))
-}
-
-/// The instant at which the servo has settled and the echoes of the last ping have decayed.
-fn can_ping_at(hardware: &mut impl Hardware) -> Instant {
-    let settled_at = hardware.servo().settles_at();
-    settled_at.max(hardware.ranger().ready_at())
 }
 
 /// The echo, if its times are between the trigger and now.

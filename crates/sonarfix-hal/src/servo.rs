@@ -3,7 +3,9 @@
 //! - [`Calibration`]: pulse width ↔ bearing, from two measured points;
 //! - [`ServoTiming`]: speed and settling time; the model is [`sonarfix::servo::ServoMotion`];
 //! - [`ServoSettings`]: the settings of the driver; [`PwmFrame`]: the pulses that a channel can generate;
-//! - [`Servo`]: the driver over [`SetDutyCycle`]; [`Servo::settles_at`] is the end of the settle wait.
+//! - [`Servo`]: the driver over [`SetDutyCycle`]; [`Servo::settles_at`] is the end of the settle wait;
+//! - [`Servo::fix`]: the same for a ranger that is mounted at a fixed bearing; [`NoPwm`] is the channel of a board that
+//!   has none.
 //!
 //! A hobby servo has no feedback. The bearing is that of the model, which assumes a servo that is connected and not
 //! blocked; a stalled servo is only detected by innovation gating.
@@ -14,6 +16,7 @@
 mod calibration;
 mod error;
 mod motion;
+mod no_pwm;
 mod settings;
 
 use embedded_hal::pwm::SetDutyCycle;
@@ -23,6 +26,7 @@ use crate::time::{NEVER, micros};
 
 pub use calibration::{Calibration, MeasuredPulse};
 pub use error::{PointError, SettingError};
+pub use no_pwm::NoPwm;
 use settings::Setup;
 pub use settings::{PwmFrame, ServoSettings};
 pub use sonarfix::config::ServoTiming;
@@ -62,16 +66,27 @@ pub use sonarfix::config::ServoTiming;
 pub struct Servo<P> {
     pwm: P,
     frame: PwmFrame,
-    setup: Option<Setup>,
+    mounting: Mounting,
     /// The present duty; `None` before the first.
     duty: Option<u16>,
+}
+
+/// How the ranger is mounted.
+#[derive(Debug)]
+enum Mounting {
+    /// Not configured.
+    Unknown,
+    /// On a servo.
+    Turning(Setup),
+    /// At a fixed bearing, since the first command to point there.
+    Fixed { bearing: Radians, pointed_at: Option<Instant> },
 }
 
 impl<P> Servo<P> {
     /// A driver without settings, on a channel with these pulses.
     #[must_use]
     pub const fn new(pwm: P, frame: PwmFrame) -> Self {
-        Self { pwm, frame, setup: None, duty: None }
+        Self { pwm, frame, mounting: Mounting::Unknown, duty: None }
     }
 
     /// A configured driver whose bearing is unknown before the first [`Self::point`], on a channel that generates
@@ -100,10 +115,22 @@ impl<P> Servo<P> {
     /// [`SettingError`], by what is wrong with them; nothing has changed.
     pub fn configure(&mut self, settings: &ServoSettings) -> Result<(), SettingError> {
         let setup = Setup::of(settings, &self.frame)?;
-        if self.setup.as_ref().is_none_or(|before| before.settings != *settings) {
-            (self.setup, self.duty) = (Some(setup), None);
+        if self.setup().is_none_or(|before| before.settings != *settings) {
+            (self.mounting, self.duty) = (Mounting::Turning(setup), None);
         }
         Ok(())
+    }
+
+    /// Configures the driver for a ranger without a servo, at this bearing. It points nowhere else, and generates no pulse.
+    pub fn fix(&mut self, bearing: Radians) {
+        (self.mounting, self.duty) = (Mounting::Fixed { bearing, pointed_at: None }, None);
+    }
+
+    fn setup(&self) -> Option<&Setup> {
+        match &self.mounting {
+            Mounting::Turning(setup) => Some(setup),
+            Mounting::Unknown | Mounting::Fixed { .. } => None,
+        }
     }
 
     /// Releases the PWM channel.
@@ -121,8 +148,14 @@ impl<P: SetDutyCycle> Servo<P> {
     /// # Errors
     /// [`PointError`]; the servo keeps its target.
     pub fn point(&mut self, now: Instant, bearing: Radians) -> Result<(), PointError<P::Error>> {
-        let Some(setup) = &mut self.setup else {
-            return Err(PointError::NotConfigured);
+        let setup = match &mut self.mounting {
+            Mounting::Unknown => return Err(PointError::NotConfigured),
+            Mounting::Turning(setup) => setup,
+            Mounting::Fixed { bearing: fixed, pointed_at } => {
+                let is_there = bearing.0.to_bits() == fixed.0.to_bits();
+                *pointed_at = is_there.then_some(now).or(*pointed_at);
+                return if is_there { Ok(()) } else { Err(PointError::OutOfReach) };
+            }
         };
         let ServoSettings { limits, timing, .. } = setup.settings;
         let (rightmost, leftmost) = limits;
@@ -145,23 +178,30 @@ impl<P: SetDutyCycle> Servo<P> {
 }
 
 impl<P> Servo<P> {
-    /// The target bearing; `None` before the first [`Self::point`].
+    /// The target bearing; `None` before the first [`Self::point`] of a servo. That of a fixed ranger is its bearing.
     #[must_use]
     pub fn target(&self) -> Option<Radians> {
-        self.setup.as_ref()?.motion.target()
+        match &self.mounting {
+            Mounting::Unknown => None,
+            Mounting::Turning(setup) => setup.motion.target(),
+            Mounting::Fixed { bearing, .. } => Some(*bearing),
+        }
     }
 
-    /// The width of the present pulses, µs; `None` before the first [`Self::point`].
+    /// The width of the present pulses, µs; `None` before the first [`Self::point`], and without a servo.
     #[must_use]
     pub fn pulse(&self) -> Option<f32> {
-        let setup = self.setup.as_ref()?;
+        let setup = self.setup()?;
         Some(setup.calibration.pulse(setup.motion.target()?))
     }
 
-    /// The bearing at `now` by the model; `None` before the first [`Self::point`].
+    /// The bearing at `now` by the model; `None` before the first [`Self::point`] of a servo.
     #[must_use]
     pub fn bearing(&self, now: Instant) -> Option<Radians> {
-        self.setup.as_ref()?.motion.bearing(now)
+        match &self.mounting {
+            Mounting::Turning(setup) => setup.motion.bearing(now),
+            Mounting::Unknown | Mounting::Fixed { .. } => self.target(),
+        }
     }
 
     /// Whether it has settled at its target. False before the first [`Self::point`].
@@ -171,10 +211,14 @@ impl<P> Servo<P> {
     }
 
     /// The instant at which it has settled at its target; centuries ahead before the first
-    /// [`Self::point`].
+    /// [`Self::point`]. A fixed ranger has settled with the command.
     #[must_use]
     pub fn settles_at(&self) -> Instant {
-        self.setup.as_ref().map_or(NEVER, |setup| setup.motion.settles_at())
+        match &self.mounting {
+            Mounting::Turning(setup) => setup.motion.settles_at(),
+            Mounting::Fixed { pointed_at: Some(at), .. } => *at,
+            Mounting::Unknown | Mounting::Fixed { .. } => NEVER,
+        }
     }
 }
 

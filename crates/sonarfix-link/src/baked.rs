@@ -11,13 +11,13 @@ use sonarfix::map::image::checksum as crc32;
 use sonarfix_hal::config::{RobotConfig, RobotConfigError};
 
 /// The version of the image. It is raised whenever the bytes of a configuration change.
-pub const VERSION: u16 = 5;
+pub const VERSION: u16 = 6;
 /// Largest size of an image, bytes.
 pub const LENGTH_MAX: usize = HEADER + POSTCARD_MAX + CHECKSUM;
 
 const MAGIC: [u8; 4] = *b"SFXC";
 const HEADER: usize = 8;
-const POSTCARD_MAX: usize = 352;
+const POSTCARD_MAX: usize = 784;
 const CHECKSUM: usize = 4;
 
 /// Why bytes are not a configuration.

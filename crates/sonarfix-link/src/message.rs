@@ -72,7 +72,7 @@ pub enum Telemetry {
     PoseSet(Estimate),
     /// What determines the pose has changed.
     ModeChanged(ModeChanged),
-    /// A ping of the search's sweep is complete.
+    /// A ping of the search's sweep is complete, or one after [`Command::Point`].
     Sweep(Sweep),
     /// The progress of the search, once a second while it works.
     Search(SearchStatus),
@@ -209,11 +209,12 @@ pub struct ModeChanged {
     pub estimate: Estimate,
 }
 
-/// A ping of the search's sweep.
+/// A ping at a bearing, without a wall that it is to measure.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sweep {
-    /// The localizer's time: the instant of the echo's reflection, or without an echo that of the last wheel travel.
+    /// The localizer's time: the instant of the echo's reflection, or without an echo that of the last wheel travel. Without
+    /// the loop, the time at which the ping ended.
     pub at: Instant,
     /// The bearing of the sonar.
     pub bearing: Radians,
@@ -308,9 +309,9 @@ pub struct EncoderReading {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ServoReading {
-    /// The bearing to which it is commanded.
+    /// The bearing to which it is commanded, or at which the sonar is fixed.
     pub bearing: Radians,
-    /// The width of its pulses, µs.
+    /// The width of its pulses, µs; zero for a sonar at a fixed bearing.
     pub micros: f32,
 }
 
@@ -384,6 +385,8 @@ pub enum CommandError {
     Waiting,
     /// An earlier measurement of this kind waits for its encoder sample.
     Occupied,
+    /// The bearing is not within the limits of the servo.
+    OutOfReach,
 }
 
 impl core::fmt::Display for CommandError {
@@ -400,6 +403,7 @@ impl core::fmt::Display for CommandError {
             Self::Running => "the loop runs: stop it first",
             Self::Waiting => "the loop does not run: start it first",
             Self::Occupied => "an earlier measurement of this kind waits for its encoder sample",
+            Self::OutOfReach => "the servo does not reach this bearing",
             Self::Unsupported(reason) => return write!(f, "{reason}"),
         })
     }
@@ -447,4 +451,7 @@ pub enum Command {
         /// The measurement.
         measurement: AbsoluteMeasurement,
     },
+    /// As [`Self::ShowDevices`], with the servo at this bearing: once it has settled, the ranger pings, and each ping is a
+    /// [`Telemetry::Sweep`].
+    Point(Radians),
 }

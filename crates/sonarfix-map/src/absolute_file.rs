@@ -14,6 +14,11 @@ pub struct Sampling {
     pub outliers: f64,
 }
 
+impl Sampling {
+    /// Every 0.73 s, between the samples of the encoders, and 20 ms late.
+    pub const EXAMPLE: Self = Self { period: 730_000, delay: 20_000, outliers: 0.0 };
+}
+
 /// A sensor of the heading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadingSensor {
@@ -21,6 +26,12 @@ pub struct HeadingSensor {
     pub sampling: Sampling,
     /// Standard deviation of its noise, radians.
     pub deviation: f64,
+}
+
+impl HeadingSensor {
+    /// A calibrated compass that its surroundings disturb little: 2°, every 0.73 s and 20 ms late.
+    pub const COMPASS: Self =
+        Self { sampling: Sampling::EXAMPLE, deviation: 2.0 * std::f64::consts::PI / 180.0 };
 }
 
 /// A sensor of the position, or of the pose.

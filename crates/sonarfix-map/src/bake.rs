@@ -2,7 +2,9 @@
 
 use std::fmt;
 
-use sonarfix::map::image::{MAGIC, MOST, MOST_NARROW, Reference, VERSION, checksum};
+use sonarfix::map::image::{
+    MAGIC, MOST, MOST_NARROW, Reference, VERSION, VERSION_WITH_ACCURACIES, checksum,
+};
 use sonarfix::map::{Cells, Grid, Map, MapError, Wall, WallId};
 use sonarfix::pose::Point;
 use sonarfix::units::Metres;
@@ -39,7 +41,7 @@ impl fmt::Display for BakeError {
 
 impl std::error::Error for BakeError {}
 
-/// Bakes walls, in their order: the n-th is [`WallId`] n, from 0.
+/// Bakes walls, in their order: the n-th is [`WallId`] n, from 0. The map has accuracies if a wall has one of its own.
 ///
 /// Cells are squares of 2 m, or of the least power of two metres with which the index (starts and
 /// references) takes at most 11 bytes for each wall.
@@ -114,7 +116,9 @@ impl Index {
         let (starts, references) = self.by_cell();
         let mut image = Vec::from(MAGIC);
         let mut put = |bytes: &[u8]| image.extend_from_slice(bytes);
-        put(&VERSION.to_le_bytes());
+        let has_accuracies = walls.iter().any(|wall| wall.accuracy().is_some());
+        let version = if has_accuracies { VERSION_WITH_ACCURACIES } else { VERSION };
+        put(&version.to_le_bytes());
         put(&count.to_le_bytes());
         put(&starts.last().copied().unwrap_or_default().to_le_bytes());
         put(&grid.columns().to_le_bytes());
@@ -131,6 +135,9 @@ impl Index {
         for reference in references {
             let [a, b, c, _] = reference.stored().to_le_bytes();
             if self.is_narrow() { put(&[a, b]) } else { put(&[a, b, c]) }
+        }
+        if has_accuracies {
+            image.extend(walls.iter().map(Wall::stored_accuracy));
         }
         let seal = checksum(&image);
         image.extend_from_slice(&seal.to_le_bytes());

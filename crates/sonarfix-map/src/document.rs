@@ -172,6 +172,11 @@ impl<'a> Node<'a> {
         Table { node: self, entries, misspelt: Vec::new() }
     }
 
+    /// Whether it is an array.
+    pub fn is_array(&self) -> bool {
+        self.value.is_some_and(|value| value.as_array().is_some())
+    }
+
     /// The values of an array.
     pub fn items(&self) -> Vec<Self> {
         let Some(array) = self.value.and_then(DeValue::as_array) else {

@@ -45,6 +45,8 @@ pub enum FaultKind {
     StuckGyro,
     /// The rate of the gyro stays at the end of its range.
     SaturatedGyro,
+    /// This fraction of the readings of the gyro are random numbers of its range.
+    GarbledGyro(f64),
     /// This fraction of the readings of the gyro fail.
     GyroReadErrors(f64),
 }
@@ -93,6 +95,7 @@ fn kind(table: &Table<'_>) -> Option<FaultKind> {
         "brown_out" => FaultKind::BrownOut,
         "stuck_gyro" => FaultKind::StuckGyro,
         "saturated_gyro" => FaultKind::SaturatedGyro,
+        "garbled_gyro" => FaultKind::GarbledGyro(share(table)),
         "gyro_read_errors" => FaultKind::GyroReadErrors(share(table)),
         _ => {
             node.report("must be one of the faults in docs/formats.md");

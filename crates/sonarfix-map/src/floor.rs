@@ -5,11 +5,12 @@ use std::path::Path;
 
 use sonarfix::map::{Wall, WallError};
 use sonarfix::pose;
+use sonarfix::units::Metres;
 
 use crate::document::{Document, Node, Table};
 use crate::error::FileError;
 use crate::geometry::{Segment, TOO_FAR, is_near_enough};
-use crate::quantity::Unit;
+use crate::quantity::{LENGTH, Unit};
 use crate::{file, single};
 
 /// A wall of a floor.
@@ -33,6 +34,22 @@ impl NamedWall {
         let point = |[x, y]: [f64; 2]| pose::Point::new(single(x), single(y));
         let wall = Wall::new(point(from), point(to))?;
         Ok(Self { name, from, to, wall })
+    }
+
+    /// The same wall with this accuracy of its own, metres ([`Wall::with_accuracy`]), if it has one.
+    #[must_use]
+    pub fn with_accuracy(self, accuracy: Option<f64>) -> Self {
+        let wall = match accuracy {
+            Some(accuracy) => self.wall.with_accuracy(Metres(single(accuracy))),
+            None => self.wall,
+        };
+        Self { wall, ..self }
+    }
+
+    /// The standard deviation of its place, metres, if it has one of its own.
+    #[must_use]
+    pub fn accuracy(&self) -> Option<f64> {
+        self.wall.accuracy().map(|accuracy| accuracy.0.into())
     }
 
     /// Its unique name.
@@ -91,7 +108,7 @@ impl Floor {
         let mut names = HashSet::new();
         for item in array.items() {
             let place = item.place();
-            let table = item.table(&["name", "from", "to"]);
+            let table = item.table(&["name", "from", "to", "accuracy"]);
             let Some(wall) = wall(&table, unit) else { continue };
             if !names.insert(wall.name.clone()) {
                 let message = format!("another wall is already called \"{}\"", wall.name);
@@ -125,13 +142,18 @@ impl Floor {
         let line = |wall: &NamedWall| {
             let name = toml::Value::String(wall.name.clone());
             let ([x1, y1], [x2, y2]) = (wall.from, wall.to);
-            format!("    {{ name = {name}, from = [{x1:?}, {y1:?}], to = [{x2:?}, {y2:?}] }},\n")
+            let accuracy = wall.accuracy().map_or_else(String::new, |accuracy| {
+                format!(", accuracy = \"{:.0} mm\"", 1e3 * accuracy)
+            });
+            format!(
+                "    {{ name = {name}, from = [{x1:?}, {y1:?}], to = [{x2:?}, {y2:?}]{accuracy} }},\n"
+            )
         };
         let walls: String = self.walls.iter().map(line).collect();
         format!("format = 1\n\n[map]\nunit = \"m\"\nwall = [\n{walls}]\n")
     }
 
-    /// The text of a CSV of these walls, in metres.
+    /// The text of a CSV of these walls, in metres, without their accuracies.
     #[must_use]
     pub fn to_csv(&self) -> String {
         let line = |wall: &NamedWall| {
@@ -177,5 +199,11 @@ fn wall(table: &Table<'_>, unit: &Unit) -> Option<NamedWall> {
         };
         table.report_at("to", message);
     }
-    wall.ok()
+    let wall = wall.ok()?;
+    let accuracy = table.get("accuracy").map(|node| {
+        let accuracy = node.quantity(&LENGTH);
+        let is_possible = accuracy > 0.0 && accuracy <= f64::from(Wall::WORST_ACCURACY.0);
+        node.check(accuracy, is_possible, "above 0 and at most 255 mm")
+    });
+    Some(wall.with_accuracy(accuracy))
 }

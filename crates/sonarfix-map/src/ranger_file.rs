@@ -1,20 +1,24 @@
 //! Reads the ranger of a robot file: its name, or its name with different settings.
 
-use sonarfix::units::Duration;
+use sonarfix::config::{LightBeam, Ranging};
+use sonarfix::units::{Duration, Radians};
 use sonarfix_hal::config::RangerConfig;
 use sonarfix_hal::ranger::{Celsius, PulseTiming, RangerKind, RangerSettings};
 
 use crate::document::{Node, Table};
+use crate::quantity::ANGLE;
 use crate::single;
 use crate::sonar_model::{self, CUSTOM};
 use crate::surroundings::temperature;
 
 /// The ranger's settings in `[sonar]`.
 pub(crate) struct Ranger {
-    /// The driver's part.
+    /// The driver's part, without the pulses of the servo.
     pub config: RangerConfig,
     /// Shortest ping period.
     pub cycle: Duration,
+    /// Sound, or the beam of light.
+    pub ranging: Ranging,
 }
 
 /// Reads `ranger`, `temperature` and `cycle` of `[sonar]`.
@@ -32,8 +36,37 @@ pub(crate) fn read(sonar: &Table<'_>) -> Ranger {
             RangerSettings::HC_SR04.cycle
         }
     };
+    let ranging = read_beam(sonar, kind);
     let temperature = Celsius(single(temperature(Some(sonar))));
-    Ranger { config: RangerConfig { kind, temperature }, cycle }
+    Ranger {
+        config: RangerConfig { kind, temperature, servo_pulses: RangerConfig::NO_PULSES },
+        cycle,
+        ranging,
+    }
+}
+
+/// The beam: that of the ranger, with different settings. A custom ranger measures with light if it has a beam.
+fn read_beam(sonar: &Table<'_>, kind: RangerKind) -> Ranging {
+    let usual = match kind {
+        RangerKind::Vl53l1x { .. } => Some(LightBeam::VL53L1X),
+        RangerKind::Pulse(_) | RangerKind::Srf { .. } | RangerKind::Custom => None,
+    };
+    let Some(node) = sonar.get("beam") else {
+        return usual.map_or(Ranging::Sound, Ranging::Light);
+    };
+    if usual.is_none() && kind != RangerKind::Custom {
+        node.report("is of a time-of-flight ranger, and this ranger is a sonar");
+        return Ranging::Sound;
+    }
+    let table = node.table(&["spot", "pointing"]);
+    let angle = |key, usual: Option<Radians>| match (table.get(key), usual) {
+        (None, Some(usual)) => usual,
+        _ => Radians(single(table.require(key).quantity(&ANGLE))),
+    };
+    Ranging::Light(LightBeam {
+        spot: angle("spot", usual.map(|beam| beam.spot)),
+        pointing: angle("pointing", usual.map(|beam| beam.pointing)),
+    })
 }
 
 fn named(name: &str, node: &Node<'_>) -> (RangerKind, Option<Duration>) {
@@ -64,6 +97,10 @@ fn described(node: Node<'_>) -> (RangerKind, Option<Duration>) {
         RangerKind::Srf { address: usual } => {
             misplaced(&PULSE);
             RangerKind::Srf { address: read_address(&table).unwrap_or(usual) }
+        }
+        RangerKind::Vl53l1x { address: usual } => {
+            misplaced(&PULSE);
+            RangerKind::Vl53l1x { address: read_address(&table).unwrap_or(usual) }
         }
         RangerKind::Custom => {
             misplaced(&["address"]);

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use sonarfix::aim::Policy;
 use sonarfix::config::{
-    CalibrationPrior, Config, GatingParameters, PingSchedule, PingTiming, ServoTiming, Sonar,
+    CalibrationPrior, Config, Further, GatingParameters, MAX_RANGERS, PingSchedule, PingTiming,
+    ServoTiming, Sonar,
 };
 use sonarfix::echo::EchoParameters;
 use sonarfix::motion::Drive;
@@ -13,7 +14,9 @@ use sonarfix::range::RangeNoise;
 use sonarfix::units::{Duration, Metres, MetresPerSecond, PerRootMetre, Radians};
 
 use sonarfix::search::Region;
-use sonarfix_hal::config::{MotorPolicy, RobotConfig, RobotConfigError, StartPose, WheelConfig};
+use sonarfix_hal::config::{
+    MotorPolicy, RangerConfig, RobotConfig, RobotConfigError, StartPose, WheelConfig,
+};
 use sonarfix_hal::servo::MeasuredPulse;
 
 use crate::document::{Document, Node, Table};
@@ -21,6 +24,7 @@ use crate::error::FileError;
 use crate::quantity::{
     ANGLE, Dimension, LENGTH, LENGTH_PER_LENGTH, LENGTH_WALK, SCALE_WALK, SPEED,
 };
+use crate::ranger_file::Ranger;
 use crate::spelling::alternatives;
 use crate::{file, gyro_file, ranger_file, single, sonar_model};
 
@@ -48,8 +52,9 @@ const DRIVE_KEYS: [&str; 8] = [
     "left_wheel",
 ];
 
-const SONAR_KEYS: [&str; 13] = [
+const SONAR_KEYS: [&str; 15] = [
     "mount",
+    "bearing",
     "servo",
     "servo_pulses",
     "servo_timing",
@@ -62,6 +67,7 @@ const SONAR_KEYS: [&str; 13] = [
     "ranger",
     "temperature",
     "cycle",
+    "beam",
 ];
 
 /// A servo that turns instantly, with the frame of a digital one: `servo_timing = "instant"`.
@@ -99,36 +105,95 @@ pub(crate) fn from_node(node: Node<'_>) -> RobotConfig {
 fn from_table(robot: &Table<'_>) -> RobotConfig {
     let mistakes = robot.mistakes();
     let drive = robot.table("drive", &DRIVE_KEYS);
-    let sonar = robot.table("sonar", &SONAR_KEYS);
+    let (sonar, further) = sonar_tables(robot);
     let ranger = ranger_file::read(&sonar);
     let mut localizer = Config::for_track_width(Metres(quantity(&drive, "track_width", &LENGTH)));
     localizer.drive = read_drive(&drive, localizer.drive.track_width);
     localizer.max_wheel_speed = MetresPerSecond(quantity(&drive, "max_wheel_speed", &SPEED));
-    read_sonar(&sonar, ranger.cycle, &mut localizer.sonar);
+    let schedule = read_ping_schedule(&sonar.require("fix_period"));
+    read_sonar(&sonar, &ranger, schedule, &mut localizer.sonar);
     read_prior(robot, &mut localizer.prior);
     read_gating(robot, &mut localizer.gating);
     read_echo(robot, &mut localizer.echo);
     read_schedule(robot, &mut localizer);
     localizer.gyro = gyro_file::read(robot);
-    let config = RobotConfig {
+    let mut config = RobotConfig {
         localizer,
         right_wheel: read_wheel(drive.require("right_wheel")),
         left_wheel: read_wheel(drive.require("left_wheel")),
         encoder_period: drive.require("encoder_period").period(),
-        servo_pulses: read_pulses(&sonar),
-        ranger: ranger.config,
+        ranger: RangerConfig {
+            servo_pulses: read_pulses(&sonar, &localizer.sonar),
+            ..ranger.config
+        },
         motors: read_motors(robot),
         start: read_start(robot),
+        further_rangers: Further::NONE,
     };
     if robot.mistakes() == mistakes
         && let Err(error) = config.check()
     {
-        robot.report_at(key_of(error), format!("must be {}", error.rule));
+        let (key, message) = (key_of(error), format!("must be {}", error.rule));
+        match key.strip_prefix("sonar.") {
+            Some(key) => sonar.report_at(key, message),
+            None => robot.report_at(key, message),
+        }
+    }
+    let alone = config;
+    for table in &further {
+        let (sonar, ranger) = read_further(table, &alone);
+        // Too many are a mistake that has been reported.
+        _ = config.localizer.further_sonars.push(sonar);
+        _ = config.further_rangers.push(ranger);
     }
     if robot.mistakes() == mistakes && config.start.is_unknown() && !config.motors.lost {
         robot.report_at("motors.lost", SEARCH_STOPPED);
     }
     config
+}
+
+/// The table `[sonar]`, or the first of the tables `[[sonar]]` and the others.
+fn sonar_tables<'a>(robot: &Table<'a>) -> (Table<'a>, Vec<Table<'a>>) {
+    let node = robot.require("sonar");
+    if !node.is_array() {
+        return (node.table(&SONAR_KEYS), Vec::new());
+    }
+    let mut items = node.items().into_iter();
+    if !(1..=MAX_RANGERS).contains(&items.len()) {
+        node.report(format!("must be 1 to {MAX_RANGERS} tables"));
+    }
+    let first = items.next().unwrap_or(node).table(&SONAR_KEYS);
+    (first, items.map(|item| item.table(&SONAR_KEYS)).collect())
+}
+
+/// A ranger beside the first one of this robot, with which it shares the air and the ping schedule.
+fn read_further(table: &Table<'_>, robot: &RobotConfig) -> (Sonar, RangerConfig) {
+    let mistakes = table.mistakes();
+    for shared in ["fix_period", "temperature"] {
+        if let Some(node) = table.get(shared) {
+            node.report("is one for all sonars: write it in the first only");
+        }
+    }
+    let ranger = ranger_file::read(table);
+    let mut sonar = robot.localizer.sonar;
+    read_sonar(table, &ranger, sonar.timing.schedule, &mut sonar);
+    let temperature = robot.ranger.temperature;
+    let servo_pulses = read_pulses(table, &sonar);
+    let ranger = RangerConfig { temperature, servo_pulses, ..ranger.config };
+    // The same rules as for the only one.
+    let mut alone = RobotConfig { ranger, ..*robot };
+    alone.localizer.sonar = sonar;
+    if table.mistakes() == mistakes
+        && robot.check().is_ok()
+        && let Err(error) = alone.check()
+    {
+        let key = key_of(error);
+        table.report_at(
+            key.strip_prefix("sonar.").unwrap_or(key),
+            format!("must be {}", error.rule),
+        );
+    }
+    (sonar, ranger)
 }
 
 /// Why a robot that searches for its pose must be able to drive while it is lost.
@@ -139,6 +204,8 @@ const SEARCH_STOPPED: &str = "must be \"on\" with start = \"unknown\": a robot f
 fn key_of(error: RobotConfigError) -> &'static str {
     match error.field {
         "max_wheel_speed" => "drive.max_wheel_speed",
+        "sonar.ranging.spot" => "sonar.beam.spot",
+        "sonar.ranging.pointing" => "sonar.beam.pointing",
         "sonar.noise.floor" => "sonar.noise",
         "sonar.noise.per_metre" => "sonar.noise_per_metre",
         "right_wheel.travel_per_edge" => "drive.right_wheel",
@@ -198,11 +265,11 @@ fn read_drive(table: &Table<'_>, track_width: Metres) -> Drive {
     }
 }
 
-fn read_sonar(table: &Table<'_>, cycle: Duration, sonar: &mut Sonar) {
+fn read_sonar(table: &Table<'_>, ranger: &Ranger, schedule: PingSchedule, sonar: &mut Sonar) {
     let [ahead, left] = pair(table, "mount", &LENGTH);
     sonar.mount = Point::new(ahead, left);
-    let [rightmost, leftmost] = pair(table, "servo", &ANGLE);
-    sonar.servo = (Radians(rightmost), Radians(leftmost));
+    let fixed = read_fixed_bearing(table);
+    sonar.servo = fixed.map_or_else(|| read_limits(table), |bearing| (bearing, bearing));
     sonar.cone = Radians(quantity(table, "cone", &ANGLE));
     sonar.min_range = Metres(quantity(table, "min_range", &LENGTH));
     sonar.max_range = Metres(quantity(table, "max_range", &LENGTH));
@@ -211,10 +278,39 @@ fn read_sonar(table: &Table<'_>, cycle: Duration, sonar: &mut Sonar) {
         per_metre: quantity(table, "noise_per_metre", &LENGTH_PER_LENGTH),
     };
     sonar.timing = PingTiming {
-        schedule: read_ping_schedule(&table.require("fix_period")),
-        servo: read_timing(table.require("servo_timing")),
-        cycle,
+        schedule,
+        servo: match fixed {
+            None => read_timing(table.require("servo_timing")),
+            Some(_) => ServoTiming::INSTANT,
+        },
+        cycle: ranger.cycle,
     };
+    sonar.ranging = ranger.ranging;
+}
+
+/// The bearing of a sonar without a servo.
+fn read_fixed_bearing(table: &Table<'_>) -> Option<Radians> {
+    let node = table.get("bearing")?;
+    for of_servo in ["servo", "servo_pulses", "servo_timing"] {
+        if let Some(node) = table.get(of_servo) {
+            node.report(
+                "is of a sonar on a servo, and `bearing` of one without: remove one of them",
+            );
+        }
+    }
+    let bearing = Radians(single(node.quantity(&ANGLE)));
+    Some(node.check(bearing, bearing.abs().0 <= core::f32::consts::PI, "within ±180°"))
+}
+
+/// The limits of a servo, which turns: those of a sonar without a servo are no limits.
+fn read_limits(table: &Table<'_>) -> (Radians, Radians) {
+    let [rightmost, leftmost] = pair(table, "servo", &ANGLE);
+    if table.get("servo").is_some() && rightmost.to_bits() == leftmost.to_bits() {
+        let message =
+            "must be a rightmost below a leftmost bearing: a sonar without a servo has `bearing`";
+        table.report_at("servo", message);
+    }
+    (Radians(rightmost), Radians(leftmost))
 }
 
 fn pair(table: &Table<'_>, key: &str, dimension: &Dimension) -> [f32; 2] {
@@ -337,10 +433,13 @@ fn read_motors(robot: &Table<'_>) -> MotorPolicy {
     motors
 }
 
-fn read_pulses(sonar: &Table<'_>) -> [MeasuredPulse; 2] {
-    sonar.require("servo_pulses").pair().map(|node| {
-        let table = node.table(&["width", "bearing"]);
-        let bearing = Radians(quantity(&table, "bearing", &ANGLE));
-        MeasuredPulse { width: table.require("width").span(), bearing }
+fn read_pulses(table: &Table<'_>, sonar: &Sonar) -> [MeasuredPulse; 2] {
+    if sonar.fixed_bearing().is_some() {
+        return RangerConfig::NO_PULSES;
+    }
+    table.require("servo_pulses").pair().map(|node| {
+        let pulse = node.table(&["width", "bearing"]);
+        let bearing = Radians(quantity(&pulse, "bearing", &ANGLE));
+        MeasuredPulse { width: pulse.require("width").span(), bearing }
     })
 }

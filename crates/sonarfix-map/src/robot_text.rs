@@ -1,7 +1,7 @@
 //! A [`RobotConfig`] as the text of a robot file, which [`robot_file`](crate::robot_file) reads back.
 
 use sonarfix::aim::Policy;
-use sonarfix::config::PingSchedule;
+use sonarfix::config::{LightBeam, PingSchedule, RangerId, Ranging, Sonar};
 use sonarfix::gyro::GyroParameters;
 use sonarfix::pose::Point;
 use sonarfix::search::Region;
@@ -76,43 +76,68 @@ left_wheel = {}
     )
 }
 
+/// The table of the only sonar, or those of all; the first has what they share.
 fn sonar(config: &RobotConfig) -> String {
-    let sonar = &config.localizer.sonar;
-    let timing = &sonar.timing;
-    let schedule = match timing.schedule {
+    let header = if config.localizer.has_several_sonars() { "[[sonar]]" } else { "[sonar]" };
+    let tables = config.localizer.sonars().filter_map(|(id, _)| {
+        let (sonar, driver) = config.ranger_of(id)?;
+        let shared = if id == RangerId::FIRST { shared(config) } else { String::new() };
+        Some(format!("\n{header}\n{}{shared}", one_sonar(sonar, driver)))
+    });
+    tables.collect()
+}
+
+/// The keys that all sonars share.
+fn shared(config: &RobotConfig) -> String {
+    let schedule = match config.localizer.sonar.timing.schedule {
         PingSchedule::Every(period) => time(period),
         PingSchedule::AsFastAsPossible => "as fast as possible".to_owned(),
     };
+    let temperature = config.ranger.temperature.0;
+    format!("fix_period = \"{schedule}\"\ntemperature = \"{temperature} degC\"\n")
+}
+
+fn one_sonar(sonar: &Sonar, driver: &RangerConfig) -> String {
     format!(
-        r#"
-[sonar]
-mount = ["{} m", "{} m"]
-servo = ["{} deg", "{} deg"]
-servo_pulses = [{}]
-servo_timing = {{ frame = "{}", sixty_degrees = "{}", settle = "{}" }}
+        r#"mount = ["{} m", "{} m"]
+{}
 cone = "{} deg"
 min_range = "{} m"
 max_range = "{} m"
 noise = "{} m"
 noise_per_metre = "{} m/m"
-fix_period = "{schedule}"
-{}cycle = "{}"
+{}{}cycle = "{}"
 "#,
         sonar.mount.x.0,
         sonar.mount.y.0,
-        degrees(sonar.servo.0),
-        degrees(sonar.servo.1),
-        config.servo_pulses.map(pulse).join(", "),
-        time(timing.servo.frame),
-        time(timing.servo.sixty_degrees),
-        time(timing.servo.settle),
+        mounting(sonar, driver),
         degrees(sonar.cone),
         sonar.min_range.0,
         sonar.max_range.0,
         sonar.noise.floor.0,
         sonar.noise.per_metre,
-        ranger(&config.ranger),
-        time(timing.cycle),
+        ranger(driver),
+        beam(sonar.ranging),
+        time(sonar.timing.cycle),
+    )
+}
+
+/// The keys of a servo, or the bearing without one.
+fn mounting(sonar: &Sonar, driver: &RangerConfig) -> String {
+    if let Some(bearing) = sonar.fixed_bearing() {
+        return format!(r#"bearing = "{} deg""#, degrees(bearing));
+    }
+    let servo = &sonar.timing.servo;
+    format!(
+        r#"servo = ["{} deg", "{} deg"]
+servo_pulses = [{}]
+servo_timing = {{ frame = "{}", sixty_degrees = "{}", settle = "{}" }}"#,
+        degrees(sonar.servo.0),
+        degrees(sonar.servo.1),
+        driver.servo_pulses.map(pulse).join(", "),
+        time(servo.frame),
+        time(servo.sixty_degrees),
+        time(servo.settle),
     )
 }
 
@@ -196,14 +221,24 @@ fn pulse(pulse: MeasuredPulse) -> String {
     format!(r#"{{ width = "{}", bearing = "{} deg" }}"#, time(width), degrees(bearing))
 }
 
-/// The lines of the ranger's kind and its temperature.
+/// The line of the beam of light; nothing of a sonar.
+fn beam(ranging: Ranging) -> String {
+    let Ranging::Light(LightBeam { spot, pointing }) = ranging else { return String::new() };
+    let (spot, pointing) = (degrees(spot), degrees(pointing));
+    format!("beam = {{ spot = \"{spot} deg\", pointing = \"{pointing} deg\" }}\n")
+}
+
+/// The line of the ranger's kind.
 fn ranger(ranger: &RangerConfig) -> String {
     let kind = match ranger.kind {
         RangerKind::Pulse(timing) => pulse_ranger(&timing),
         RangerKind::Srf { address } => format!(r#"{{ kind = "srf08", address = {address} }}"#),
+        RangerKind::Vl53l1x { address } => {
+            format!(r#"{{ kind = "vl53l1x", address = {address} }}"#)
+        }
         RangerKind::Custom => r#""custom""#.to_owned(),
     };
-    format!("ranger = {kind}\ntemperature = \"{} degC\"\n", ranger.temperature.0)
+    format!("ranger = {kind}\n")
 }
 
 fn pulse_ranger(timing: &PulseTiming) -> String {

@@ -41,8 +41,9 @@ pub fn simplify(floor: &Floor, limits: Limits) -> Result<Simplified, BakeError> 
             continue;
         }
         let line = Line::from(&walls, wall, &mut taken, limits.tolerance);
-        let Some(joined) =
-            line.wall(named).filter(|wall| wall.segment().length() >= limits.shortest)
+        let Some(joined) = line
+            .wall(floor.named_walls(), named)
+            .filter(|wall| wall.segment().length() >= limits.shortest)
         else {
             simplified.dropped.push(line.pieces);
             continue;
@@ -103,12 +104,16 @@ impl Line {
         in_line
     }
 
-    /// The line as a wall with the name and the direction of its first piece.
-    fn wall(&self, named: &NamedWall) -> Option<NamedWall> {
+    /// The line as a wall with the name and the direction of its first piece, and the worst accuracy of all; without one if
+    /// a piece has none.
+    fn wall(&self, walls: &[NamedWall], named: &NamedWall) -> Option<NamedWall> {
         let Segment { from, to } = self.whole;
         let [start, end] = [from, to].map(|end| named.segment().place(end)[0]);
         let (from, to) = if start <= end { (from, to) } else { (to, from) };
-        NamedWall::new(named.name().to_owned(), from, to).ok()
+        let joined = NamedWall::new(named.name().to_owned(), from, to).ok()?;
+        let accuracies = self.pieces.iter().map(|&piece| walls.get(piece)?.accuracy());
+        let worst = accuracies.reduce(|one, other| Some(one?.max(other?))).flatten();
+        Some(joined.with_accuracy(worst))
     }
 }
 

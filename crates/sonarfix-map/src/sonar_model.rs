@@ -1,5 +1,6 @@
-//! The sonars that have a name, in one list for robot files, scenarios and forecasts.
+//! The sonars and time-of-flight rangers that have a name, in one list for robot files, scenarios and forecasts.
 
+use sonarfix::config::LightBeam;
 use sonarfix::echo::EchoParameters;
 use sonarfix_hal::ranger::RangerSettings;
 
@@ -12,7 +13,8 @@ pub(crate) const CUSTOM: &str = "custom";
 /// A simulated sonar.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SonarName {
-    /// The paper's: always detects the nearest wall in its cone. Noise and cone are in `[truth]`.
+    /// The paper's: always detects the nearest wall in its cone. Noise and cone are in `[truth]`. Of a robot that
+    /// measures with light, a ranger without other errors than noise and direction.
     #[default]
     Ideal,
     /// HC-SR04.
@@ -25,6 +27,8 @@ pub enum SonarName {
     Srf08,
     /// Polaroid 6500 with its electrostatic transducer.
     Polaroid6500,
+    /// VL53L1X, a time-of-flight ranger.
+    Vl53l1x,
 }
 
 /// What is known of a sonar, by its name in files and on the command line.
@@ -38,47 +42,68 @@ pub struct SonarModel {
     pub ranger: Option<RangerSettings>,
     /// The parameters of its echoes, if they were measured: a robot file's `echo.sensor`.
     pub echo: Option<EchoParameters>,
+    /// Its beam, if it measures with light.
+    pub beam: Option<LightBeam>,
 }
 
 impl SonarModel {
     /// All sonars.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self {
             name: "ideal",
             simulated: Some(SonarName::Ideal),
             ranger: None,
             echo: Some(EchoParameters::NONE),
+            beam: None,
         },
         Self {
             name: "hc_sr04",
             simulated: Some(SonarName::HcSr04),
             ranger: Some(RangerSettings::HC_SR04),
             echo: Some(EchoParameters::HC_SR04),
+            beam: None,
         },
         Self {
             name: "nxt",
             simulated: Some(SonarName::Nxt),
             ranger: None,
             echo: Some(EchoParameters::NXT),
+            beam: None,
         },
         Self {
             name: "lv_maxsonar",
             simulated: Some(SonarName::LvMaxSonar),
             ranger: Some(RangerSettings::LV_MAXSONAR),
             echo: Some(EchoParameters::LV_MAXSONAR),
+            beam: None,
         },
-        Self { name: "srf02", simulated: None, ranger: Some(RangerSettings::SRF), echo: None },
+        Self {
+            name: "srf02",
+            simulated: None,
+            ranger: Some(RangerSettings::SRF),
+            echo: None,
+            beam: None,
+        },
         Self {
             name: "srf08",
             simulated: Some(SonarName::Srf08),
             ranger: Some(RangerSettings::SRF),
             echo: Some(EchoParameters::SRF08),
+            beam: None,
         },
         Self {
             name: "polaroid_6500",
             simulated: Some(SonarName::Polaroid6500),
             ranger: None,
             echo: Some(EchoParameters::POLAROID_6500),
+            beam: None,
+        },
+        Self {
+            name: "vl53l1x",
+            simulated: Some(SonarName::Vl53l1x),
+            ranger: Some(RangerSettings::VL53L1X),
+            echo: Some(EchoParameters::VL53L1X),
+            beam: Some(LightBeam::VL53L1X),
         },
     ];
 

@@ -53,9 +53,11 @@ impl WallFile {
         let map = Map::read(bytes).map_err(|error| refused(error.to_string()))?;
         let wall = |(id, wall): (sonarfix::map::WallId, sonarfix::map::Wall)| {
             let place = |point: Point| [point.x.0.into(), point.y.0.into()];
-            let wall =
+            let named =
                 NamedWall::new(format!("wall {}", id.0), place(wall.from()), place(wall.to()));
-            wall.map_err(|error| refused(format!("wall {}: {error}", id.0)))
+            let named = named.map_err(|error| refused(format!("wall {}: {error}", id.0)))?;
+            let accuracy = wall.accuracy().map(|accuracy| accuracy.0.into());
+            Ok::<_, FileError>(named.with_accuracy(accuracy))
         };
         let walls = map.walls().map(wall).collect::<Result<_, _>>()?;
         Ok(Self { floor: Floor::new(walls), lines: Vec::new() })

@@ -4,7 +4,7 @@
 
 use proptest::collection::vec;
 use proptest::prelude::*;
-use sonarfix::map::image::{MAGIC, VERSION, checksum};
+use sonarfix::map::image::{self, MAGIC, VERSION, VERSION_WITH_ACCURACIES, checksum};
 use sonarfix::map::{Map, MapError, Wall, WallId};
 use sonarfix::pose::Point;
 use sonarfix::units::Metres;
@@ -23,14 +23,19 @@ fn any_walls() -> impl Strategy<Value = Vec<Wall>> {
     let origin = prop_oneof![Just((0.0, 0.0)), (-2e4_f32..2e4, -2e4_f32..2e4)];
     let length = prop_oneof![4 => 0.01_f32..5.0, 1 => 5.0_f32..80.0];
     let one = (-30.0_f32..30.0, -30.0_f32..30.0, length, -3.2_f32..3.2, any::<bool>());
-    (origin, vec(one, 1..60)).prop_map(|((x, y), walls)| {
+    let accuracies = proptest::option::of(vec(proptest::option::of(0.0_f32..0.3), 60));
+    (origin, vec(one, 1..60), accuracies).prop_map(|((x, y), walls, accuracies)| {
         let walls = walls.into_iter().filter_map(|(dx, dy, length, angle, is_square)| {
             // Half of them along an axis, as in buildings, where rounding meets cells' edges.
             let quarter = core::f32::consts::FRAC_PI_2;
             let angle = if is_square { (angle / quarter).round() * quarter } else { angle };
             wall(x + dx.round(), y + dy, length * angle.cos(), length * angle.sin())
         });
-        walls.collect()
+        let Some(accuracies) = accuracies else { return walls.collect() };
+        let with_accuracy = |(wall, accuracy): (Wall, Option<f32>)| {
+            accuracy.map_or(wall, |accuracy| wall.with_accuracy(Metres(accuracy)))
+        };
+        walls.zip(accuracies).map(with_accuracy).collect()
     })
 }
 
@@ -101,6 +106,7 @@ proptest! {
             prop_assert_eq!(baked_id, WallId(id));
             prop_assert_eq!(map.wall(baked_id), Some(baked));
             prop_assert_eq!(baked.stored().map(f32::to_bits), wall.stored().map(f32::to_bits));
+            prop_assert_eq!(baked.stored_accuracy(), wall.stored_accuracy());
         }
         prop_assert_eq!(map.wall(WallId(map.count())), None);
     }
@@ -109,19 +115,49 @@ proptest! {
     #[test]
     fn noise_is_refused_or_harmless(
         shape in (0..5_u32, 0..9_u32, 0..4_u16, 0..4_u16),
-        exact in prop::bool::weighted(0.9),
+        (exact, has_accuracies) in (prop::bool::weighted(0.9), any::<bool>()),
         bytes in vec(prop_oneof![Just(0_u8), Just(1), Just(63), any::<u8>()], 0..240),
     ) {
         let (walls, references, columns, rows) = shape;
-        let mut image = [&MAGIC[..], &VERSION.to_le_bytes()].concat();
+        let version = if has_accuracies { VERSION_WITH_ACCURACIES } else { VERSION };
+        let mut image = [&MAGIC[..], &version.to_le_bytes()].concat();
         image.extend([walls.to_le_bytes(), references.to_le_bytes()].concat());
         image.extend([columns.to_le_bytes(), rows.to_le_bytes()].concat());
         image.extend([0.0_f32.to_le_bytes(), 0.0_f32.to_le_bytes(), 1.0_f32.to_le_bytes()].concat());
         let cells = usize::from(columns) * usize::from(rows);
-        let length = 20 * walls as usize + 4 * (cells + 1) + 2 * references as usize;
+        let wall = 20 + usize::from(has_accuracies);
+        let length = wall * walls as usize + 4 * (cells + 1) + 2 * references as usize;
         let length = if exact && !bytes.is_empty() { length } else { bytes.len() };
         image.extend(bytes.iter().cycle().take(length));
         let _ = use_or_refuse(&sealed(image));
+    }
+}
+
+#[test]
+fn accuracies_are_in_millimetres() {
+    let one = wall(0.0, 0.0, 1.0, 0.0).unwrap();
+    assert_eq!(one.accuracy(), None);
+    for (metres, millimetres) in [
+        (0.0, 1),
+        (0.0004, 1),
+        (0.012, 12),
+        (0.0125, 13),
+        (0.255, 255),
+        (9.0, 255),
+        (f32::INFINITY, 255),
+    ] {
+        let wall = one.with_accuracy(Metres(metres));
+        assert_eq!(wall.stored_accuracy(), millimetres, "{metres}");
+        assert_eq!(wall.accuracy(), Some(Metres(1e-3 * f32::from(millimetres))));
+        // One byte for each wall, and a version that older programs refuse.
+        let (with, without) = (bake(&[wall, one]).unwrap(), bake(&[one, one]).unwrap());
+        assert_eq!((with.len(), with[4]), (without.len() + 2, 2));
+        assert_eq!(image::length(&with), Ok(with.len()));
+        let read: Vec<_> = Map::read(&with).unwrap().walls().map(|(_, wall)| wall).collect();
+        assert_eq!(read, [wall, one]);
+    }
+    for metres in [-0.01, f32::NAN, f32::NEG_INFINITY] {
+        assert_eq!(one.with_accuracy(Metres(metres)).accuracy(), None);
     }
 }
 
@@ -233,7 +269,8 @@ fn each_error_is_named() {
     };
     assert_eq!(Map::read(b"").unwrap_err(), MapError::NotAMap);
     assert_eq!(with(0, b"PNG"), MapError::NotAMap);
-    assert_eq!(with(4, &[2]), MapError::Version(2));
+    assert_eq!(with(4, &[2]), MapError::Length);
+    assert_eq!(with(4, &[3]), MapError::Version(3));
     assert_eq!(with(8, &[9]), MapError::Length);
     assert_eq!(with(12, &[0]), MapError::Length);
     assert_eq!(with(8, &[0xFF; 4]), MapError::Length);
@@ -245,8 +282,8 @@ fn each_error_is_named() {
     // The first wall, moved by a cell: its references are wrong.
     assert_eq!(with(HEADER + 4, &2.5_f32.to_le_bytes()), MapError::Index);
     assert_eq!(with(HEADER + 4, &9.0_f32.to_le_bytes()), MapError::Wall(WallId(0)));
-    let message = with(4, &[2]).to_string();
-    assert!(message.contains("format 2") && message.contains("bake it again"), "{message}");
+    let message = with(4, &[3]).to_string();
+    assert!(message.contains("format 3") && message.contains("bake it again"), "{message}");
 }
 
 /// At any address: nothing in the slice needs to be aligned.

@@ -4,12 +4,12 @@ use std::fs;
 use std::path::Path;
 
 use proptest::prelude::*;
-use sonarfix::config::PingSchedule;
+use sonarfix::config::{LightBeam, PingSchedule, Ranging, ServoTiming};
 use sonarfix::echo::EchoParameters;
 use sonarfix::pose::Point;
 use sonarfix::search::Region;
 use sonarfix::units::{Duration, Metres, Radians};
-use sonarfix_hal::config::{MotorPolicy, RobotConfig, StartPose, WheelConfig};
+use sonarfix_hal::config::{MotorPolicy, RangerConfig, RobotConfig, StartPose, WheelConfig};
 use sonarfix_hal::ranger::{PulseTiming, RangerKind};
 use sonarfix_map::{
     CLASSROOM, Fault, FaultKind, Fidelity, FileError, Floor, Follow, Mistake, PAPER, Scenario,
@@ -82,7 +82,7 @@ const FORMAT: [Case; 9] = [
         "servo =",
         "srvo =",
         "robot.sonar.srvo",
-        "unknown key: did you mean `servo`? possible here: mount, servo, servo_pulses",
+        "unknown key: did you mean `servo`? possible here: mount, bearing, servo",
     ),
     value("[run]", "[ran]", "ran", "unknown key: did you mean `run`? possible here: format, name"),
     value(
@@ -336,7 +336,7 @@ const ROBOT: [Case; 12] = [
         "ranger = { kind = \"hc_sr04\",",
         "ranger = { kind = \"hc_sr05\",",
         "robot.sonar.ranger.kind",
-        "must be \"hc_sr04\", \"lv_maxsonar\", \"srf02\", \"srf08\" or \"custom\"; did you mean \"hc_sr04\"?",
+        "must be \"hc_sr04\", \"lv_maxsonar\", \"srf02\", \"srf08\", \"vl53l1x\" or \"custom\"; did you mean \"hc_sr04\"?",
     ),
     value(
         "ranger = { kind = \"hc_sr04\",",
@@ -429,7 +429,7 @@ const HARDWARE: [Case; 12] = [
         "[sensor]\nmodel = \"srf99\"\n[run]",
         "model = ",
         "sensor.model",
-        "must be \"ideal\", \"hc_sr04\", \"nxt\", \"lv_maxsonar\", \"srf08\" or \"polaroid_6500\"",
+        "must be \"ideal\", \"hc_sr04\", \"nxt\", \"lv_maxsonar\", \"srf08\", \"polaroid_6500\" or \"vl53l1x\"",
     ),
     case("[run]", "[servo]\nmodle = 1\n[run]", "modle = ", "servo.modle", "unknown key"),
     case(
@@ -743,6 +743,68 @@ fn a_wheel_is_read_in_either_way_and_may_be_mirrored() {
     assert_eq!(robot.left_wheel.signed_travel(), Metres(-0.001));
 }
 
+/// A sonar without a servo has a bearing, and none of the keys of a servo.
+#[test]
+fn a_fixed_sonar_has_a_bearing() {
+    let without = |keys: &[&str]| {
+        let lines = CLASSROOM.lines().filter(|line| !keys.iter().any(|key| line.starts_with(key)));
+        lines.collect::<Vec<_>>().join("\n")
+    };
+    let servo = ["servo = ", "servo_pulses", "servo_timing"];
+    let fixed = |bearing: &str| {
+        let mount = "mount = [\"60 mm\", \"0 mm\"]";
+        without(&servo).replace(mount, &format!("{mount}\nbearing = \"{bearing}\""))
+    };
+    let robot = parse(&fixed("90 deg")).unwrap().robot;
+    let bearing = robot.localizer.sonar.fixed_bearing().unwrap();
+    assert!((bearing.0 - core::f32::consts::FRAC_PI_2).abs() < 1e-6);
+    assert_eq!(robot.localizer.sonar.timing.servo, ServoTiming::INSTANT);
+    assert_eq!(robot.servo_settings(), None);
+    let error = parse(&fixed("200 deg")).unwrap_err();
+    assert_eq!(error.first().key(), "robot.sonar.bearing");
+    for key in servo {
+        let line = CLASSROOM.lines().find(|line| line.starts_with(key)).unwrap();
+        let error = parse(&fixed("90 deg").replace("cone = \"12", &format!("{line}\ncone = \"12")));
+        let error = error.unwrap_err();
+        let key = format!("robot.sonar.{}", key.trim_end_matches(" = "));
+        assert_eq!(error.first().key(), key, "{error}");
+        assert!(error.first().message().contains("`bearing`"), "{error}");
+    }
+    let same = CLASSROOM.replace("servo = [\"-100 deg\", ", "servo = [\"100 deg\", ");
+    assert_eq!(parse(&same).unwrap_err().first().key(), "robot.sonar.servo");
+}
+
+/// Several sonars are an array of tables; what they share is in the first.
+#[test]
+fn several_sonars_are_tables_of_their_own() {
+    let begin = CLASSROOM.find("[robot.sonar]").unwrap();
+    let end = CLASSROOM.find("[robot.prior]").unwrap();
+    let (before, sonar, after) = (&CLASSROOM[..begin], &CLASSROOM[begin..end], &CLASSROOM[end..]);
+    let first = sonar.replace("[robot.sonar]", "[[robot.sonar]]");
+    let shared = ["fix_period", "temperature"];
+    let is_own = |line: &&str| !shared.iter().any(|key| line.starts_with(key));
+    let second: Vec<_> = first.lines().filter(is_own).collect();
+    let second = second.join("\n").replace("\"60 mm\", \"0 mm\"", "\"60 mm\", \"50 mm\"");
+    let with = |further: &[&str]| parse(&format!("{before}{first}{}\n{after}", further.join("\n")));
+    let robot = with(&[&second]).unwrap().robot;
+    let other = robot.localizer.further_sonars.get(0).unwrap();
+    assert_eq!(other.mount, Point::new(0.06, 0.05));
+    assert_eq!(other.timing, robot.localizer.sonar.timing);
+    assert_eq!(robot.further_rangers.get(0), Some(&robot.ranger));
+    assert_eq!(robot.localizer.sonars().count(), 2);
+    assert_eq!(
+        robot_file::parse(&robot_text(&robot), "written.toml").unwrap().localizer.sonars().count(),
+        2
+    );
+    let error = with(&[&second, &second, &second]).unwrap_err();
+    assert_eq!(error.first().key(), "robot.sonar");
+    let error = with(&[&format!("{second}\ntemperature = \"10 degC\"")]).unwrap_err();
+    assert_eq!(error.first().key(), "robot.sonar[1].temperature");
+    let error =
+        with(&[&second.replace("min_range = \"10 cm\"", "min_range = \"10 m\"")]).unwrap_err();
+    assert_eq!(error.first().key(), "robot.sonar[1].max_range");
+}
+
 #[test]
 fn a_ranger_is_a_name_or_a_table_of_differences() {
     let robot = |ranger: &str| {
@@ -766,6 +828,39 @@ fn a_ranger_is_a_name_or_a_table_of_differences() {
     assert_eq!(custom.ranger.kind, RangerKind::Custom);
 }
 
+/// A VL53L1X has a beam, whose settings a file may change; a custom ranger may have one, a sonar none.
+#[test]
+fn a_time_of_flight_ranger_has_a_beam() {
+    let with = |ranger: &str| {
+        let lines = ["temperature", "ranger"];
+        let lines = CLASSROOM.lines().filter(|line| !lines.iter().any(|key| line.starts_with(key)));
+        let text = lines.collect::<Vec<_>>().join("\n");
+        parse(&text.replace("cone = \"12 deg\"", &format!("cone = \"30 deg\"\n{ranger}")))
+    };
+    let sonar = |ranger: &str| with(ranger).unwrap().robot.localizer.sonar;
+    assert_eq!(sonar("ranger = \"hc_sr04\"").ranging, Ranging::Sound);
+    assert_eq!(sonar("ranger = \"vl53l1x\"").ranging, Ranging::Light(LightBeam::VL53L1X));
+    let wide = sonar("ranger = \"vl53l1x\"\nbeam = { spot = \"10 deg\" }").ranging;
+    let spot = Radians::from_degrees(10.0);
+    assert_eq!(wide, Ranging::Light(LightBeam { spot, ..LightBeam::VL53L1X }));
+    let robot = with("ranger = { kind = \"vl53l1x\", address = 0x30 }").unwrap().robot;
+    assert_eq!(robot.ranger.kind, RangerKind::Vl53l1x { address: 0x30 });
+    assert_eq!(robot.localizer.sonar.timing.cycle, Duration::millis(60));
+    let custom = "ranger = \"custom\"\ncycle = \"30 ms\"\n";
+    assert_eq!(sonar(custom).ranging, Ranging::Sound);
+    let beam = "beam = { spot = \"2 deg\", pointing = \"1 deg\" }";
+    assert!(matches!(sonar(&format!("{custom}{beam}")).ranging, Ranging::Light(_)));
+    for (ranger, key) in [
+        (format!("ranger = \"hc_sr04\"\n{beam}"), "robot.sonar.beam"),
+        (format!("{custom}beam = {{ spot = \"2 deg\" }}"), "robot.sonar.beam.pointing"),
+        ("ranger = \"vl53l1x\"\nbeam = { spot = \"30 deg\" }".to_owned(), "robot.sonar.beam.spot"),
+        ("ranger = { kind = \"vl53l1x\", stuck = \"1 s\" }".to_owned(), "robot.sonar.ranger.stuck"),
+    ] {
+        let error = with(&ranger).unwrap_err();
+        assert_eq!(error.first().key(), key, "{error}");
+    }
+}
+
 /// A written file is read back: every number, except for the last bits of angles, which are in degrees.
 #[test]
 fn a_robot_that_is_written_is_read_back() {
@@ -783,23 +878,35 @@ fn a_robot_that_is_written_is_read_back() {
         link_timeout: Duration::millis(1_500),
     };
     let region = Region { from: Point::new(0.5, -1.0), to: Point::new(2.0, 3.25) };
+    let mut lit = odd;
+    lit.ranger.kind = RangerKind::Vl53l1x { address: 0x29 };
+    lit.localizer.sonar.ranging = Ranging::Light(LightBeam::VL53L1X);
     let mut searching = odd;
     searching.motors.lost = true;
     searching.start = StartPose::Unknown { region: Some(region) };
-    for robot in [classroom, odd, searching, parse(PAPER).unwrap().robot] {
+    let mut fixed = classroom;
+    fixed.localizer.sonar.servo = (Radians(-1.25), Radians(-1.25));
+    fixed.localizer.sonar.timing.servo = ServoTiming::INSTANT;
+    fixed.ranger.servo_pulses = RangerConfig::NO_PULSES;
+    for robot in [classroom, odd, lit, searching, fixed, parse(PAPER).unwrap().robot] {
         let text = robot_text(&robot);
         let mut read = robot_file::parse(&text, "written.toml").unwrap();
         let near = |a: Radians, b: Radians| (a - b).abs() < Radians(1e-6);
         let angles = |robot: &RobotConfig| {
             let sonar = &robot.localizer.sonar;
-            let [one, other] = robot.servo_pulses;
-            [sonar.servo.0, sonar.servo.1, sonar.cone, one.bearing, other.bearing]
+            let [one, other] = robot.ranger.servo_pulses;
+            let spot = match sonar.ranging {
+                Ranging::Sound => Radians(0.0),
+                Ranging::Light(beam) => beam.spot + beam.pointing,
+            };
+            [sonar.servo.0, sonar.servo.1, sonar.cone, one.bearing, other.bearing, spot]
         };
         let pairs = angles(&read).into_iter().zip(angles(&robot));
         assert!(pairs.into_iter().all(|(a, b)| near(a, b)), "{text}");
         read.localizer.sonar.servo = robot.localizer.sonar.servo;
         read.localizer.sonar.cone = robot.localizer.sonar.cone;
-        read.servo_pulses = robot.servo_pulses;
+        read.localizer.sonar.ranging = robot.localizer.sonar.ranging;
+        read.ranger.servo_pulses = robot.ranger.servo_pulses;
         assert_eq!(read, robot, "{text}");
     }
 }

@@ -162,6 +162,33 @@ fn every_kind_of_file_gives_the_same_walls_with_their_lines() {
     assert_eq!((baked.line(0), baked.floor.named_walls()[1].name()), (None, "wall 1"));
 }
 
+/// The accuracy of a wall survives writing and baking; a joined wall has the worst of its pieces.
+#[test]
+fn a_wall_may_have_an_accuracy() {
+    let toml = "format = 1\n[map]\nunit = \"m\"\nwall = [\n\
+                { name = \"a\", from = [0, 0], to = [4, 0], accuracy = \"12 mm\" },\n\
+                { name = \"b\", from = [4, 0], to = [6, 0], accuracy = \"3 cm\" },\n\
+                { name = \"c\", from = [6, 0], to = [6, 3] },\n]\n";
+    let map = read("m.toml", toml, None).unwrap();
+    let accuracies = |floor: &Floor| -> Vec<_> {
+        let millimetres = |wall: &NamedWall| wall.accuracy().map(|metres| (1e3 * metres).round());
+        floor.named_walls().iter().map(millimetres).collect()
+    };
+    let expected = [Some(12.0), Some(30.0), None];
+    assert_eq!(accuracies(&map.floor), expected);
+    assert_eq!(read("m.toml", map.floor.to_toml(), None).unwrap().floor, map.floor);
+    let baked = read("m.bin", bake(&map.floor.walls()).unwrap(), None).unwrap();
+    assert_eq!(accuracies(&baked.floor), expected);
+    let simple = simplify(&map.floor, Limits { tolerance: 0.01, shortest: 0.1 }).unwrap();
+    assert_eq!(accuracies(&simple.floor), [Some(30.0), None]);
+    for wrong in ["0 mm", "-1 mm", "256 mm"] {
+        let error = read("m.toml", toml.replace("12 mm", wrong), None).unwrap_err();
+        assert!(error.contains("m.toml:5: ") && error.contains("at most 255 mm"), "{error}");
+    }
+    let error = read("m.toml", toml.replace("\"12 mm\"", "12"), None).unwrap_err();
+    assert!(error.contains("m.toml:5: "), "{error}");
+}
+
 /// A scenario has a robot, whose sonar is used for the check, and may name another file.
 #[test]
 fn a_scenario_gives_its_map_and_its_sonar() {

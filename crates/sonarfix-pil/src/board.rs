@@ -1,23 +1,26 @@
 //! The drivers of a robot on its wires.
 
+use sonarfix::config::{MAX_RANGERS, RangerId, ServoTiming};
 use sonarfix_hal::config::{RobotConfig, Unsupported};
 use sonarfix_hal::gyro::Mpu6050;
-use sonarfix_hal::ranger::{Captured, PulseRanger};
-use sonarfix_hal::robot::{Devices, Hardware, WithGyro};
+use sonarfix_hal::ranger::{Captured, OneOf, PulseRanger, Vl53l1x};
+use sonarfix_hal::robot::{Devices, Hardware, WithGyro, WithRangers};
 use sonarfix_hal::servo::{PwmFrame, Servo};
 
-use crate::wires::{CounterWire, GyroWire, ServoWire, TriggerWire, Wires};
+use crate::wires::{CounterWire, GyroWire, LightWire, RangerWires, ServoWire, TriggerWire, Wires};
 
 /// The drivers on a robot's wires.
-pub type WiredDevices<'w> = WithGyro<
-    Devices<
-        &'w CounterWire,
-        &'w CounterWire,
-        &'w ServoWire,
-        PulseRanger<&'w TriggerWire, Captured<'w>>,
-    >,
-    Mpu6050<&'w GyroWire>,
+pub type WiredDevices<'w> = WithGyro<WithRangers<OneRanger<'w>, FURTHER>, Mpu6050<&'w GyroWire>>;
+
+type OneRanger<'w> = Devices<
+    &'w CounterWire,
+    &'w CounterWire,
+    &'w ServoWire,
+    OneOf<PulseRanger<&'w TriggerWire, Captured<'w>>, Vl53l1x<&'w LightWire>>,
 >;
+
+/// The rangers beside the first.
+const FURTHER: usize = MAX_RANGERS - 1;
 
 /// Creates the drivers on the wires for this robot. The PWM channel has the period of its servo.
 ///
@@ -27,16 +30,25 @@ pub fn devices<'w>(
     config: &RobotConfig,
     wires: &'w Wires,
 ) -> Result<WiredDevices<'w>, Unsupported> {
-    let frame = PwmFrame::of(config.localizer.sonar.timing.servo.frame);
-    let mut devices = WithGyro {
-        devices: Devices {
-            right: &wires.right,
-            left: &wires.left,
-            servo: Servo::new(&wires.servo, frame),
-            ranger: PulseRanger::new(&wires.trigger, Captured::new(&wires.echo)),
-        },
-        gyro: Mpu6050::new(&wires.gyro),
+    let Wires { right, left, rangers: [first, further @ ..], gyro } = wires;
+    let frame_of = |ranger: usize| {
+        let ranger = u8::try_from(ranger).map_or(RangerId::FIRST, RangerId);
+        let timing = config.localizer.sonar_of(ranger).map(|sonar| sonar.timing.servo);
+        PwmFrame::of(timing.unwrap_or(ServoTiming::INSTANT).frame)
     };
+    let ranger = |wires: &'w RangerWires| {
+        let pulse = PulseRanger::new(&wires.trigger, Captured::new(&wires.echo));
+        OneOf::new(pulse, Vl53l1x::new(&wires.light))
+    };
+    let mut number = 0;
+    let servos = further.each_ref().map(|wires| {
+        number += 1;
+        Servo::new(&wires.servo, frame_of(number))
+    });
+    let servo = Servo::new(&first.servo, frame_of(0));
+    let one = Devices { right, left, servo, ranger: ranger(first) };
+    let devices = WithRangers { devices: one, servos, rangers: further.each_ref().map(ranger) };
+    let mut devices = WithGyro { devices, gyro: Mpu6050::new(gyro) };
     devices.configure(config)?;
     Ok(devices)
 }

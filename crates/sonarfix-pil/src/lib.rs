@@ -41,4 +41,6 @@ pub use message::{Answer, Begin, Request, RequestError, SessionKind, Snapshot};
 pub use meter::{Meter, Unmetered};
 pub use serve::serve;
 pub use session::Session;
-pub use wires::{Actuators, Counted, GyroSignal, Sensors, Wires};
+pub use wires::{
+    Actuators, Counted, EchoSignals, GyroSignal, LightSignal, RangerActuators, Sensors, Wires,
+};

@@ -1,5 +1,7 @@
 //! The simulated pins of a robot's devices.
 
+mod light;
+
 use core::cell::Cell;
 use core::convert::Infallible;
 
@@ -7,6 +9,7 @@ use embedded_hal::digital::{self, OutputPin};
 use embedded_hal::i2c::{self, ErrorKind, I2c, NoAcknowledgeSource, Operation};
 use embedded_hal::pwm::{self, SetDutyCycle};
 use serde::{Deserialize, Serialize};
+use sonarfix::config::MAX_RANGERS;
 use sonarfix::units::Instant;
 use sonarfix_hal::encoder::Counter;
 use sonarfix_hal::ranger::EchoCapture;
@@ -20,12 +23,21 @@ pub struct Sensors {
     pub right: Counted,
     /// The left wheel's encoder.
     pub left: Counted,
-    /// When the echo line went high since the last poll, if it did.
+    /// The echoes of the rangers.
+    pub echoes: [EchoSignals; MAX_RANGERS],
+    /// The gyro.
+    pub gyro: GyroSignal,
+}
+
+/// The edges of an echo line since the last poll, or the bus of a ranger.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct EchoSignals {
+    /// When it went high, if it did.
     pub rose: Option<Instant>,
     /// When it went low after that, if it did.
     pub fell: Option<Instant>,
-    /// The gyro.
-    pub gyro: GyroSignal,
+    /// What its bus reads, if it is a time-of-flight ranger.
+    pub light: LightSignal,
 }
 
 /// What the gyro senses.
@@ -36,6 +48,8 @@ pub struct GyroSignal {
     /// Whether it does not respond on its bus.
     pub has_failed: bool,
 }
+
+pub use light::{LightSignal, LightWire};
 
 /// The counter of an encoder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -51,11 +65,18 @@ pub struct Counted {
 /// The actuators' signals of a poll.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Actuators {
+    /// Of each ranger.
+    pub rangers: [RangerActuators; MAX_RANGERS],
+}
+
+/// The signals of a ranger and its servo of a poll.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct RangerActuators {
     /// The servo's duty, of [`FULL_DUTY`], if it was set.
     pub duty: Option<u16>,
     /// Whether the sonar's trigger is high.
     pub is_raised: bool,
-    /// Whether the trigger has fallen, which starts a ping.
+    /// Whether the sonar's trigger has fallen or the time-of-flight ranger was started: a ping begins.
     pub has_fallen: bool,
 }
 
@@ -66,14 +87,23 @@ pub struct Wires {
     pub right: CounterWire,
     /// The left encoder's counter.
     pub left: CounterWire,
+    /// The wires of the rangers.
+    pub rangers: [RangerWires; MAX_RANGERS],
+    /// The bus of the gyro.
+    pub gyro: GyroWire,
+}
+
+/// The wires of a ranger and its servo.
+#[derive(Debug, Default)]
+pub struct RangerWires {
     /// The servo's PWM channel.
     pub servo: ServoWire,
     /// The sonar's trigger.
     pub trigger: TriggerWire,
     /// The edges of the echo line.
     pub echo: EchoCapture,
-    /// The bus of the gyro.
-    pub gyro: GyroWire,
+    /// The bus of a time-of-flight ranger.
+    pub light: LightWire,
 }
 
 impl Wires {
@@ -82,21 +112,25 @@ impl Wires {
         self.right.0.set(sensors.right);
         self.left.0.set(sensors.left);
         self.gyro.signal.set(sensors.gyro);
-        if let Some(at) = sensors.rose {
-            self.echo.rose(at);
-        }
-        if let Some(at) = sensors.fell {
-            self.echo.fell(at);
+        for (wires, echo) in self.rangers.iter().zip(&sensors.echoes) {
+            wires.light.apply(echo.light);
+            if let Some(at) = echo.rose {
+                wires.echo.rose(at);
+            }
+            if let Some(at) = echo.fell {
+                wires.echo.fell(at);
+            }
         }
     }
 
     /// Returns the actuators' signals since the last call.
     pub fn take(&self) -> Actuators {
-        Actuators {
-            duty: self.servo.0.take(),
-            is_raised: self.trigger.is_raised.get(),
-            has_fallen: self.trigger.has_fallen.take(),
-        }
+        let rangers = self.rangers.each_ref().map(|wires| RangerActuators {
+            duty: wires.servo.0.take(),
+            is_raised: wires.trigger.is_raised.get(),
+            has_fallen: wires.trigger.has_fallen.take() | wires.light.take_start(),
+        });
+        Actuators { rangers }
     }
 }
 
@@ -169,6 +203,25 @@ impl OutputPin for &TriggerWire {
     }
 }
 
+/// A transaction with a device on a bus: `take` gets what is written, `next` returns each byte that is read.
+fn transact(
+    has_failed: bool,
+    operations: &mut [Operation<'_>],
+    take: impl Fn(&[u8]),
+    next: impl Fn() -> u8,
+) -> Result<(), ErrorKind> {
+    if has_failed {
+        return Err(ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address));
+    }
+    for operation in operations {
+        match operation {
+            Operation::Write(bytes) => take(bytes),
+            Operation::Read(bytes) => bytes.iter_mut().for_each(|byte| *byte = next()),
+        }
+    }
+    Ok(())
+}
+
 /// An MPU-6050 on a bus of its own: its identity, its range, and the rate of its z axis.
 #[derive(Debug, Default)]
 pub struct GyroWire {
@@ -213,11 +266,11 @@ impl GyroWire {
         }
     }
 
-    fn give(&self, bytes: &mut [u8]) {
-        for byte in bytes {
-            *byte = self.byte(self.register.get());
-            self.register.set(self.register.get().wrapping_add(1));
-        }
+    /// The byte of the register that is read next.
+    fn next(&self) -> u8 {
+        let register = self.register.get();
+        self.register.set(register.wrapping_add(1));
+        self.byte(register)
     }
 }
 
@@ -227,15 +280,7 @@ impl i2c::ErrorType for &GyroWire {
 
 impl I2c for &GyroWire {
     fn transaction(&mut self, _: u8, operations: &mut [Operation<'_>]) -> Result<(), ErrorKind> {
-        if self.signal.get().has_failed {
-            return Err(ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address));
-        }
-        for operation in operations {
-            match operation {
-                Operation::Write(bytes) => self.take(bytes),
-                Operation::Read(bytes) => self.give(bytes),
-            }
-        }
-        Ok(())
+        let has_failed = self.signal.get().has_failed;
+        transact(has_failed, operations, |bytes| self.take(bytes), || self.next())
     }
 }

@@ -113,8 +113,7 @@ fn sensors(millis: u64, ticks: i32) -> Sensors {
         at: Instant::from_ticks(millis * 1_000),
         right: counted(ticks),
         left: counted(-ticks),
-        rose: None,
-        fell: None,
+        echoes: Default::default(),
         gyro: GyroSignal::default(),
     }
 }
@@ -156,7 +155,7 @@ fn a_loop_drives_its_devices() {
         (0..=1_600).map(|t| sensors(t, i32::try_from(t / 2).unwrap())).collect();
     let fallen = |answers: &[Answer]| {
         answers.iter().position(
-            |answer| matches!(answer, Answer::Polled { actuators, .. } if actuators.has_fallen),
+            |answer| matches!(answer, Answer::Polled { actuators, .. } if actuators.rangers[0].has_fallen),
         )
     };
     let ask = |polls: &[Sensors]| {
@@ -173,8 +172,8 @@ fn a_loop_drives_its_devices() {
     let sent = polls[pinged].at + Duration::from_ticks(500);
     let rolled = f64::from(polls[pinged].right.ticks) * 0.065 * std::f64::consts::PI / 1_496.6;
     let flight = (2.0 * (3.0 - rolled) / 343.2 * 1e6) as u64;
-    polls[pinged + 1].rose = Some(sent);
-    polls[pinged + 18].fell = Some(sent + Duration::from_ticks(flight));
+    polls[pinged + 1].echoes[0].rose = Some(sent);
+    polls[pinged + 18].echoes[0].fell = Some(sent + Duration::from_ticks(flight));
     let answers = ask(&polls);
     assert_eq!(answers.len(), polls.len() + 1);
     let snapshots: Vec<_> = answers
@@ -190,7 +189,7 @@ fn a_loop_drives_its_devices() {
     assert!(snapshots.iter().any(looked), "a range was taken");
     // The wall is ahead, where the servo also points at the start.
     let duty = |answer: &Answer| match answer {
-        Answer::Started(actuators) | Answer::Polled { actuators, .. } => actuators.duty,
+        Answer::Started(actuators) | Answer::Polled { actuators, .. } => actuators.rangers[0].duty,
         _ => None,
     };
     let half_way = u16::try_from(u32::from(u16::MAX) * 1_500 / 20_000).unwrap();

@@ -1,4 +1,4 @@
-//! The planner: the wall to measure next, and the bearing of the servo that is square to it
+//! The planner: the ranger and the wall to measure next, and the bearing of the servo that is square to it
 //! (`docs/model.md`, eqs. 21 and 22).
 //!
 //! Candidates are the walls that can be measured (module `visibility`) and that the servo
@@ -12,6 +12,7 @@
 //! | module | contents |
 //! |---|---|
 //! | `gain` | expected decrease of the variance |
+//! | `light` | beams of a time-of-flight ranger |
 //! | `history` | occlusion of recent walls, last bearing, turn rate |
 //! | `ranking` | order of the candidates |
 //! | `timing` | duration of a ping |
@@ -23,25 +24,27 @@
 
 mod gain;
 mod history;
+mod light;
 mod ranking;
 mod timing;
 
-use crate::config::Config;
+use crate::config::{Config, RangerId, Ranging, Sonar};
 use crate::ekf::Ekf;
 use crate::map::{Map, Wall, WallId};
 use crate::pose::Heading;
 use crate::range::ExpectedRange;
-use crate::units::{Duration, Instant, Metres, Radians, SquareMetres};
-use crate::visibility::{Beam, Viewpoint};
+use crate::units::{Duration, Instant, Metres, Radians, SquareMetres, seconds};
+use crate::visibility::{Beam, Sight, Viewpoint};
 
 use gain::expected_gain;
+use history::Slot;
 use ranking::Ranked;
 use timing::PingDuration;
 
 pub use crate::config::Policy;
 pub(crate) use history::{History, Origin};
 
-/// One ping at one wall.
+/// One ping of one ranger at one wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -54,6 +57,19 @@ pub struct Aim {
     pub range: Metres,
     /// The numbers behind the choice.
     pub why: Reason,
+    /// The ranger that pings.
+    pub ranger: RangerId,
+}
+
+impl Aim {
+    /// What the policy maximizes over all rangers: the expected decrease of the variance per time, or the nearness.
+    #[must_use]
+    pub fn score(&self, policy: Policy) -> f32 {
+        match policy {
+            Policy::Nearest => self.why.success / self.range.0,
+            Policy::Informative => self.why.gain.0 * self.why.success / seconds(self.why.time),
+        }
+    }
 }
 
 /// The numbers behind the choice of a wall.
@@ -107,44 +123,79 @@ const DEAD_BAND: f32 = 0.125;
 /// order; if all are occluded, the next ones are searched.
 const SHORTLIST: usize = 8;
 
-/// Chooses the wall to measure.
-///
-/// # Errors
-/// [`NoAim`] if there is none.
-///
-/// # Panics
-/// Never.
-pub(crate) fn choose(
-    config: &Config,
-    map: &Map,
-    ekf: &Ekf,
-    history: &History,
-    now: Instant,
-) -> Result<Aim, NoAim> {
-    let planner = Planner::new(config, map, ekf, history, now);
-    planner.best(|id, wall| planner.by_policy(id, wall)).or_else(|_| {
-        let planner = planner.without_margins();
-        planner.best(|id, wall| planner.by_policy(id, wall))
-    })
+/// The robot in its map, for the choice of a ping.
+#[derive(Clone, Copy)]
+pub(crate) struct Situation<'a> {
+    pub config: &'a Config,
+    pub map: &'a Map<'a>,
+    pub ekf: &'a Ekf,
+    pub history: &'a History,
+    pub now: Instant,
 }
 
-/// Finds the nearest wall to which a beam at `bearing` is square.
-///
-/// # Errors
-/// [`NoAim`] if there is none.
-pub(crate) fn at(
-    config: &Config,
-    map: &Map,
-    ekf: &Ekf,
-    history: &History,
-    now: Instant,
-    bearing: Radians,
+impl<'a> Situation<'a> {
+    /// Chooses ranger and wall.
+    ///
+    /// # Errors
+    /// [`NoAim`] if no ranger has a wall to measure.
+    pub fn choose(&self) -> Result<Aim, NoAim> {
+        let mut best = Planner::new(self, RangerId::FIRST, &self.config.sonar).choose();
+        if self.config.has_several_sonars() {
+            for (ranger, sonar) in self.config.sonars().skip(1) {
+                let other = Planner::new(self, ranger, sonar).choose();
+                best = better(self.config.policy, best, other);
+            }
+        }
+        best
+    }
+
+    /// Chooses the wall of one ranger whose servo and schedule slot are known.
+    ///
+    /// # Errors
+    /// [`NoAim`] if no wall can be measured, or the robot has no such ranger.
+    pub fn choose_of(&self, ranger: RangerId, standing: &Standing) -> Result<Aim, NoAim> {
+        let mut planner = self.planner(ranger)?;
+        let Standing { bearing, ready_in } = *standing;
+        planner.slot = Slot { bearing, ready_in: seconds(ready_in), ..planner.slot };
+        planner.choose()
+    }
+
+    /// Finds the nearest wall to which a beam of a ranger at `bearing` is square.
+    ///
+    /// # Errors
+    /// [`NoAim`] if no wall can be measured, or the robot has no such ranger.
+    pub fn at(&self, ranger: RangerId, bearing: Radians) -> Result<Aim, NoAim> {
+        let planner = self.planner(ranger)?;
+        planner.nearest_at(bearing).or_else(|_| planner.without_margins().nearest_at(bearing))
+    }
+
+    fn planner(&self, ranger: RangerId) -> Result<Planner<'a>, NoAim> {
+        let sonar = self.config.sonar_of(ranger).ok_or(NoAim::NoWall)?;
+        Ok(Planner::new(self, ranger, sonar))
+    }
+}
+
+/// Where the servo of a ranger stands, and when it can ping.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Standing {
+    /// The bearing to which its servo is commanded; `None` before the first command.
+    pub bearing: Option<Radians>,
+    /// Time until it can ping there: its servo has settled, and the echoes of earlier pings that it
+    /// [hears](Sonar::hears) have decayed.
+    pub ready_in: Duration,
+}
+
+/// The better one of two pings; the first of two equal ones.
+fn better(
+    policy: Policy,
+    one: Result<Aim, NoAim>,
+    other: Result<Aim, NoAim>,
 ) -> Result<Aim, NoAim> {
-    let planner = Planner::new(config, map, ekf, history, now);
-    planner.best(|id, wall| planner.at_bearing(id, wall, bearing)).or_else(|_| {
-        let planner = planner.without_margins();
-        planner.best(|id, wall| planner.at_bearing(id, wall, bearing))
-    })
+    let (Ok(first), Ok(second)) = (&one, &other) else {
+        return one.or(other);
+    };
+    if second.score(policy) > first.score(policy) { other } else { one }
 }
 
 /// Everything that the scores of the candidates depend on.
@@ -154,6 +205,9 @@ struct Planner<'a> {
     ekf: &'a Ekf,
     history: &'a History,
     now: Instant,
+    ranger: RangerId,
+    sonar: &'a Sonar,
+    slot: Slot,
     view: Viewpoint<'a>,
     duration: PingDuration,
 }
@@ -178,21 +232,38 @@ struct Pointing {
 }
 
 impl<'a> Planner<'a> {
-    fn new(
-        config: &'a Config,
-        map: &'a Map<'a>,
-        ekf: &'a Ekf,
-        history: &'a History,
-        now: Instant,
-    ) -> Self {
-        let view = Viewpoint::new(config, ekf);
-        let duration = PingDuration::new(&config.sonar.timing);
-        Self { config, map, ekf, history, now, view, duration }
+    fn new(situation: &Situation<'a>, ranger: RangerId, sonar: &'a Sonar) -> Self {
+        let Situation { config, map, ekf, history, now } = *situation;
+        let view = Viewpoint::new(config, sonar, ekf);
+        let duration = PingDuration::new(sonar);
+        let slot = history.slot(ranger, config, &duration);
+        Self { config, map, ekf, history, now, ranger, sonar, slot, view, duration }
+    }
+
+    /// The best ping of this ranger.
+    fn choose(self) -> Result<Aim, NoAim> {
+        self.choice().or_else(|_| self.without_margins().choice())
     }
 
     /// The same planner without the margins for the uncertainty of the estimate.
     fn without_margins(self) -> Self {
         Self { view: self.view.without_margins(), ..self }
+    }
+
+    /// The best ping.
+    fn choice(&self) -> Result<Aim, NoAim> {
+        match self.sonar.ranging {
+            Ranging::Sound => self.best(|id, wall| self.by_policy(id, wall)),
+            Ranging::Light(beam) => self.best_beam(beam),
+        }
+    }
+
+    /// The ping at the nearest wall along a bearing that the planner does not choose.
+    fn nearest_at(&self, bearing: Radians) -> Result<Aim, NoAim> {
+        match self.sonar.ranging {
+            Ranging::Sound => self.best(|id, wall| self.at_bearing(id, wall, bearing)),
+            Ranging::Light(beam) => self.beam_at(beam, bearing),
+        }
     }
 
     /// The best candidate that is not occluded. `candidate` scores a wall, if it can be measured.
@@ -204,7 +275,7 @@ impl<'a> Planner<'a> {
                 let best =
                     self.map.wall(ranked.wall).and_then(|wall| candidate(ranked.wall, &wall));
                 if let Some(best) = best.filter(|best| !self.is_occluded(ranked.wall, best)) {
-                    return Ok(best.aim(ranked.wall, count));
+                    return Ok(best.aim(self.ranger, ranked.wall, count));
                 }
             }
             // The list is not full: there are no more candidates.
@@ -223,7 +294,7 @@ impl<'a> Planner<'a> {
     ) -> ([Option<Ranked>; SHORTLIST], u16) {
         let mut shortlist = [None; SHORTLIST];
         let mut count = 0_u16;
-        for (wall, segment) in self.map.near(self.view.position(), self.config.sonar.max_range) {
+        for (wall, segment) in self.map.near(self.view.position(), self.sonar.max_range) {
             let Some(candidate) = candidate(wall, &segment) else {
                 continue;
             };
@@ -244,12 +315,13 @@ impl<'a> Planner<'a> {
         if !self.view.is_square(pointing.off) {
             return None;
         }
-        let mut candidate = self.candidate(id, wall, (expected, on_wall), &pointing);
+        let sight = self.heard(wall, (expected, on_wall), pointing.off);
+        let mut candidate = self.candidate(id, &sight, &pointing);
         candidate.score = match self.config.policy {
             Policy::Nearest => candidate.success / candidate.expected.range.0,
             Policy::Informative => candidate.gain.0 * candidate.success / candidate.seconds,
         };
-        if self.history.last.is_some_and(|last| last.wall == id) {
+        if self.slot.wall == Some(id) {
             candidate.score *= HYSTERESIS;
         }
         Some(candidate)
@@ -264,31 +336,44 @@ impl<'a> Planner<'a> {
         }
         let score = 1.0 / expected.range.0;
         let pointing = Pointing { bearing, off, until_ping: 0.0 };
-        Some(Candidate { score, ..self.candidate(id, wall, (expected, on_wall), &pointing) })
+        let sight = self.heard(wall, (expected, on_wall), off);
+        Some(Candidate { score, ..self.candidate(id, &sight, &pointing) })
+    }
+
+    /// A wall that a sonar measures along a bearing.
+    #[inline]
+    fn heard(&self, wall: &Wall, (expected, on_wall): (ExpectedRange, f32), off: Radians) -> Sight {
+        Sight {
+            on_wall,
+            square: self.view.probability_of_square(off),
+            noise: self.sonar.noise.variance(expected.range).0,
+            accuracy: wall.accuracy(),
+            of_map: 1.0,
+            place: wall.along(self.view.position()),
+            off,
+            expected,
+        }
     }
 
     /// Everything but the score.
-    fn candidate(
-        &self,
-        id: WallId,
-        wall: &Wall,
-        (expected, on_wall): (ExpectedRange, f32),
-        pointing: &Pointing,
-    ) -> Candidate {
+    #[expect(
+        clippy::inline_always,
+        reason = "200 instructions of an aim: it is called for each wall"
+    )]
+    #[inline(always)]
+    fn candidate(&self, id: WallId, sight: &Sight, pointing: &Pointing) -> Candidate {
+        let Sight { expected, on_wall, square, place, .. } = *sight;
         let range = expected.range;
         let echo = &self.config.echo;
-        let foot = wall.along(self.view.position());
-        let entry = self.history.entry(echo, id, foot, range, self.now);
-        let map_variance = echo.map_variance(entry.travelled);
-        let noise = SquareMetres(self.config.sonar.noise.variance(range).0 + map_variance);
+        let entry = self.history.entry(echo, self.ranger, id, place, range, self.now);
+        let map_variance = echo.map_variance(sight.accuracy, entry.travelled);
+        let noise = SquareMetres(sight.noise + map_variance * sight.of_map);
         let prediction = self.ekf.predict_measurement(&expected);
         let wheels = self.ekf.cross_covariance_of_wheels(&expected);
         Candidate {
             bearing: pointing.bearing,
             gain: expected_gain(&prediction, wheels, noise, self.config.weights),
-            success: (1.0 - entry.occlusion)
-                * on_wall
-                * self.view.probability_of_square(pointing.off),
+            success: (1.0 - entry.occlusion) * on_wall * square,
             seconds: self.duration.ping(pointing.until_ping, range),
             score: 0.0,
             expected,
@@ -299,11 +384,7 @@ impl<'a> Planner<'a> {
     /// and the ping earlier; otherwise square to the wall at the time of the ping, when the robot has
     /// turned further; if that is beyond the travel of the servo, its limit.
     fn point(&self, expected: &ExpectedRange) -> Pointing {
-        // The last bearing may be outside the travel of the servo if it was not planned.
-        let last = self.history.last;
-        let (current, rest) = last.map_or((Radians(0.0), 0.0), |last| {
-            (self.reachable(last.bearing), self.duration.rest_after(last.range))
-        });
+        let (current, rest) = self.standing();
         let bearing_after = |time: f32| expected.direction.from(self.heading_after(time));
         let target = self.reachable(bearing_after(0.0));
         let turn = self.duration.turn(target - current);
@@ -311,13 +392,20 @@ impl<'a> Planner<'a> {
         let off_without_turn = bearing_after(rest) - current;
         let range = expected.range;
         let is_faster = self.duration.ping(rest, range) < self.duration.ping(until_ping, range);
-        if is_faster && off_without_turn.abs() <= self.config.sonar.cone * DEAD_BAND {
+        if is_faster && off_without_turn.abs() <= self.sonar.cone * DEAD_BAND {
             return Pointing { bearing: current, off: off_without_turn, until_ping: rest };
         }
         let square = bearing_after(until_ping);
         let bearing = self.reachable(square);
         let off = Heading::new(square).from(Heading::new(bearing));
         Pointing { bearing, off, until_ping }
+    }
+
+    /// Where the servo stands, and the seconds until the ranger can ping there.
+    fn standing(&self) -> (Radians, f32) {
+        // The last bearing may be outside the travel of the servo if it was not planned.
+        let current = self.slot.bearing.map_or(Radians(0.0), |bearing| self.reachable(bearing));
+        (current, self.slot.ready_in)
     }
 
     /// The heading after a time in seconds at the present turn rate.
@@ -327,7 +415,7 @@ impl<'a> Planner<'a> {
 
     /// The nearest bearing within the travel of the servo.
     fn reachable(&self, bearing: Radians) -> Radians {
-        let (right, left) = self.config.sonar.servo;
+        let (right, left) = self.sonar.servo;
         if bearing >= right && bearing <= left {
             return bearing;
         }
@@ -345,13 +433,13 @@ impl<'a> Planner<'a> {
 }
 
 impl Candidate {
-    fn aim(&self, wall: WallId, candidates: u16) -> Aim {
+    fn aim(&self, ranger: RangerId, wall: WallId, candidates: u16) -> Aim {
         let why = Reason {
             gain: self.gain,
             success: self.success,
             time: timing::duration(self.seconds),
             candidates,
         };
-        Aim { wall, bearing: self.bearing, range: self.expected.range, why }
+        Aim { wall, bearing: self.bearing, range: self.expected.range, why, ranger }
     }
 }

@@ -6,8 +6,10 @@
 //! # Non-finite policy
 //! State and walls are finite.
 
+use heapless::Vec;
+
 use crate::aim::History;
-use crate::config::Config;
+use crate::config::{Config, Sonar};
 use crate::echo::{Others, density};
 use crate::ekf::Ekf;
 use crate::elementary::sqrt;
@@ -37,6 +39,7 @@ pub(crate) struct Target<'a> {
 /// The robot in its map.
 pub(crate) struct Scene<'a, 'm> {
     pub config: &'a Config,
+    pub sonar: &'a Sonar,
     pub map: Map<'m>,
     pub ekf: &'a Ekf,
     pub history: &'a History,
@@ -47,42 +50,64 @@ impl Scene<'_, '_> {
     /// The reflectors other than the target that may have returned the echo.
     #[inline(never)]
     pub fn others(&self, target: &Target, bearing: Radians, range: Metres) -> Others {
-        let Config { sonar, echo, .. } = self.config;
+        let (sonar, echo) = (self.sonar, &self.config.echo);
         let position = SonarPosition::new(sonar.mount, &self.ekf.state());
         let axis = Vector::of_angle(self.ekf.heading().turned(bearing).radians().0);
         let beam = Beam { from: position.point.into(), axis, range: Some(range.0) };
         let reflectors = Reflectors::new(self.map, sonar);
         let margin = MATCH * sqrt(target.variance.0);
-        let (found, _) = reflectors.in_beam(&beam, range.0 + margin, margin);
+        let mut found = Vec::new();
+        reflectors.collect(&beam, range.0 + margin, margin, &mut found);
         let toward = Vector::of_angle(target.expected.direction.radians().0);
         let distance = target.expected.by_range_scale;
         let is_target = |reflector: &Reflector| {
             (reflector.distance - distance).abs() < SAME_DISTANCE
                 && reflector.toward.dot(toward) > SAME_DIRECTION
         };
-        let mut others = Others::NONE;
-        let mut silent = 1.0;
+        let mut sum = Sum::new(target);
         for reflector in found.iter().filter(|reflector| !is_target(reflector)) {
             let Some(heard) = reflectors.heard(&beam, reflector) else { continue };
-            let is_behind = reflector.distance > distance;
             let visible = 1.0 - echo.prior_occlusion(Metres(reflector.distance));
             let answers = visible * heard.probability(echo.heard());
             let expected =
                 ExpectedRange::from_point(reflector.toward, reflector.distance, &position);
             let travelled = self.history.travelled_since(reflector.wall);
-            let noise = sonar.noise.variance(expected.range).0 + echo.map_variance(travelled);
+            let noise = sonar.noise.variance(expected.range).0
+                + echo.map_variance(reflector.accuracy, travelled);
             let noise = SquareMetres(noise);
             let innovation = self.ekf.innovation(range, &expected, noise);
-            let reached = if is_behind { silent * (1.0 - target.answers) } else { silent };
-            others.density += answers * reached * density(innovation);
-            silent *= 1.0 - answers;
-            if !is_behind {
-                others.silent_before = silent;
-            }
+            let is_behind = reflector.distance > distance;
+            sum.add(answers, density(innovation), is_behind);
         }
-        others
+        sum.others
     }
 }
+
+/// Eq. (25), reflector by reflector, nearest first.
+struct Sum {
+    others: Others,
+    /// Probability that no other reflector so far answers, and that the target does not.
+    silent: f32,
+    target_silent: f32,
+}
+
+impl Sum {
+    fn new(target: &Target) -> Self {
+        Self { others: Others::NONE, silent: 1.0, target_silent: 1.0 - target.answers }
+    }
+
+    /// Adds a reflector that answers with a probability, and the density of its echo.
+    fn add(&mut self, answers: f32, density: f32, is_behind: bool) {
+        let reached = if is_behind { self.silent * self.target_silent } else { self.silent };
+        self.others.density += answers * reached * density;
+        self.silent *= 1.0 - answers;
+        if !is_behind {
+            self.others.silent_before = self.silent;
+        }
+    }
+}
+
+mod light;
 
 #[cfg(test)]
 mod tests {
@@ -90,6 +115,7 @@ mod tests {
 
     use super::*;
     use crate::aim::Origin;
+    use crate::config::RangerId;
     use crate::ekf::{StandardDeviations, StateEstimate};
     use crate::map::{Wall, WallId};
     use crate::pose::Point;
@@ -102,6 +128,7 @@ mod tests {
         fn the_density_of_the_others_is_that_of_the_equation(
             (target_at, near, far) in (1.5_f32..2.5, 0.4_f32..0.9, 1.1_f32..1.5), answers in 0.1_f32..0.9,
             off in -0.1_f32..0.1, travelled in 0.05_f32..2.0, which in 0_usize..2, is_used in any::<bool>(),
+            accuracy in proptest::option::of(5_u8..80),
         ) {
             // Feet at these angles from x, each on a wall of 4 cm.
             let foot = |distance: f32, degrees: f32| {
@@ -112,7 +139,10 @@ mod tests {
                 Wall::new(end(-0.02), end(0.02)).unwrap()
             };
             let distances = [target_at * near, target_at * far];
-            let walls = [foot(target_at, 0.0), foot(distances[0], 9.0), foot(distances[1], -9.0)];
+            let mut walls = [foot(target_at, 0.0), foot(distances[0], 9.0), foot(distances[1], -9.0)];
+            if let Some(accuracy) = accuracy {
+                walls[1] = walls[1].with_accuracy(Metres(1e-3 * f32::from(accuracy)));
+            }
             let mut config = Config::for_track_width(Metres(0.2));
             config.sonar.cone = Radians::from_degrees(12.0);
             config.sonar.max_range = Metres(6.0);
@@ -128,7 +158,7 @@ mod tests {
             let used = WallId(1);
             history.record_distance(Metres(1.7));
             if is_used {
-                let entry = history.entry(&config.echo, used, Metres(0.02), Metres(1.0), now);
+                let entry = history.entry(&config.echo, RangerId::FIRST, used, Metres(0.02), Metres(1.0), now);
                 history.record_echo(&entry, 0.1, Origin::Wall, now);
                 history.record_distance(Metres(travelled));
             }
@@ -142,7 +172,7 @@ mod tests {
             // So wide that every end of a wall is within reach of the measured range.
             let target = Target { expected: &expected, variance: SquareMetres(1.0), answers };
             let range = Metres(distances[which] + off);
-            let scene = Scene { config: &config, map, ekf: &ekf, history: &history };
+            let scene = Scene { config: &config, sonar: &config.sonar, map, ekf: &ekf, history: &history };
             let others = scene.others(&target, Radians(0.0), range);
 
             let wide = f64::from;
@@ -164,7 +194,9 @@ mod tests {
                 let map_error = if is_used && it.wall == used { (1.0 + ratio * ratio).sqrt() } else { 1.0 };
                 let noise = &config.sonar.noise;
                 let sonar = wide(noise.floor.0).powi(2) + (wide(noise.per_metre) * h).powi(2);
-                let s = p + sonar + 0.03_f64.powi(2) * map_error;
+                let own = accuracy.filter(|_| it.wall == WallId(1));
+                let map = own.map_or(0.03, |accuracy| 1e-3 * f64::from(accuracy));
+                let s = p + sonar + map.powi(2) * map_error;
                 let nu = wide(range.0) - h;
                 let is_behind = h > wide(target_at);
                 let reached = if is_behind { silent * (1.0 - wide(answers)) } else { silent };

@@ -7,6 +7,8 @@
 //! [`Config::check`] refuses NaN and infinity in every field;
 //! [`Localizer::new`](crate::localizer::Localizer::new) calls it.
 
+mod further;
+
 use crate::echo::EchoParameters;
 use crate::gyro::GyroParameters;
 use crate::motion::Drive;
@@ -14,7 +16,56 @@ use crate::pose::Point;
 use crate::range::RangeNoise;
 use crate::units::{Duration, Metres, MetresPerSecond, PerRootMetre, Radians};
 
-/// The sonar and its servo.
+pub use further::{Further, MAX_RANGERS, TooMany};
+
+/// What a ranger measures the range with.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Ranging {
+    /// Sound: the first echo comes from the foot of the perpendicular on a wall, if it is in the cone
+    /// (`docs/model.md`, eq. 11).
+    #[default]
+    Sound,
+    /// Light: a time-of-flight ranger measures along its beam to the wall that it meets first (eq. 45).
+    Light(LightBeam),
+}
+
+/// The beam of a time-of-flight ranger.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct LightBeam {
+    /// Half of the angle of the cone that it lights. A wall is measured if the whole spot is on it.
+    pub spot: Radians,
+    /// Standard deviation of the direction of the beam: of the servo, the mount and the spot's centre.
+    pub pointing: Radians,
+}
+
+impl LightBeam {
+    /// VL53L1X with all 16 × 16 detectors: a field of view of 27°, of which the inner half returns most of the
+    /// light (assumed), on a hobby servo that is off by 1.1° (assumed).
+    pub const VL53L1X: Self = Self { spot: Radians(0.12), pointing: Radians(0.02) };
+}
+
+/// One of a robot's rangers, by its place in the robot file: 0 is [`Config::sonar`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct RangerId(pub u8);
+
+impl RangerId {
+    /// The first one, [`Config::sonar`].
+    pub const FIRST: Self = Self(0);
+
+    /// The number as an index.
+    #[must_use]
+    pub fn index(self) -> usize {
+        usize::from(self.0)
+    }
+}
+
+/// The ranger, a sonar or a time-of-flight ranger, on its servo or at a fixed bearing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -23,9 +74,10 @@ pub struct Sonar {
     /// Position of the sonar's axis in the robot frame.
     pub mount: Point,
     /// Rightmost and leftmost bearing of the servo, relative to the heading of the robot; −π and π
-    /// for one without limits.
+    /// for one without limits. Twice the same bearing: the sonar is fixed there, without a servo.
     pub servo: (Radians, Radians),
-    /// Half of the cone within which the sonar receives the perpendicular echo of a wall.
+    /// Largest angle between the beam's axis and the perpendicular on a wall at which its range is measured: half
+    /// of the cone of a sonar, largest angle of incidence of light.
     pub cone: Radians,
     /// Shortest range that the sonar reports.
     pub min_range: Metres,
@@ -35,6 +87,33 @@ pub struct Sonar {
     pub noise: RangeNoise,
     /// Duration of a ping.
     pub timing: PingTiming,
+    /// Whether it is a sonar or a time-of-flight ranger.
+    pub ranging: Ranging,
+}
+
+impl Sonar {
+    /// The bearing of a sonar without a servo; `None` for one with a servo.
+    ///
+    /// ```
+    /// use sonarfix::config::Config;
+    /// use sonarfix::units::{Metres, Radians};
+    /// let mut config = Config::for_track_width(Metres(0.16));
+    /// assert_eq!(config.sonar.fixed_bearing(), None);
+    /// config.sonar.servo = (Radians(1.5), Radians(1.5));
+    /// assert_eq!(config.sonar.fixed_bearing(), Some(Radians(1.5)));
+    /// assert!(config.check().is_ok());
+    /// ```
+    #[must_use]
+    pub fn fixed_bearing(&self) -> Option<Radians> {
+        let (right, left) = self.servo;
+        (right.0.to_bits() == left.0.to_bits()).then_some(right)
+    }
+
+    /// Whether this ranger may take the late echoes of another one's ping for its own: sound disturbs sound.
+    #[must_use]
+    pub fn hears(&self, other: &Self) -> bool {
+        matches!((self.ranging, other.ranging), (Ranging::Sound, Ranging::Sound))
+    }
 }
 
 impl Default for Sonar {
@@ -50,9 +129,15 @@ impl Default for Sonar {
             max_range: Metres(4.0),
             noise: RangeNoise { floor: Metres(0.005), per_metre: 0.002 },
             timing: PingTiming::EVERY_SECOND,
+            ranging: Ranging::Sound,
         }
     }
 }
+
+/// Largest angle of incidence of light: beyond it the range along the beam diverges.
+const MAX_INCIDENCE: Radians = Radians(75.0 * core::f32::consts::PI / 180.0);
+/// Widest spot of light that is taken for a beam.
+const MAX_SPOT: Radians = Radians(20.0 * core::f32::consts::PI / 180.0);
 
 /// How often the sonar pings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -241,6 +326,8 @@ pub struct Config {
     pub weights: Weights,
     /// The gyro, if the robot has one.
     pub gyro: Option<GyroParameters>,
+    /// The rangers beside [`Self::sonar`]. They have its ping schedule: there is one ping at a time.
+    pub further_sonars: Further<Sonar>,
 }
 
 /// A field that [`Config::check`] refused, and its rule.
@@ -307,7 +394,35 @@ impl Config {
             policy: Policy::Informative,
             weights: Weights::default(),
             gyro: None,
+            further_sonars: Further::NONE,
         }
+    }
+
+    /// A ranger of this robot; `None` if it has no such one.
+    #[must_use]
+    pub fn sonar_of(&self, ranger: RangerId) -> Option<&Sonar> {
+        match ranger.index().checked_sub(1) {
+            None => Some(&self.sonar),
+            Some(further) => self.further_sonars.get(further),
+        }
+    }
+
+    /// All rangers, in the order of the robot file.
+    pub fn sonars(&self) -> impl Iterator<Item = (RangerId, &Sonar)> {
+        let all = core::iter::once(&self.sonar).chain(self.further_sonars.iter());
+        (0..).map(RangerId).zip(all)
+    }
+
+    /// Sets the ping schedule, which all rangers share.
+    pub fn set_ping_schedule(&mut self, schedule: PingSchedule) {
+        self.sonar.timing.schedule = schedule;
+        self.further_sonars.iter_mut().for_each(|sonar| sonar.timing.schedule = schedule);
+    }
+
+    /// Whether the robot has more than one ranger.
+    #[must_use]
+    pub fn has_several_sonars(&self) -> bool {
+        !self.further_sonars.is_empty()
     }
 
     /// Checks every field.
@@ -316,7 +431,8 @@ impl Config {
     /// [`ConfigError`] with the first field that breaks its rule.
     pub fn check(&self) -> Result<(), ConfigError> {
         self.check_drive()?;
-        self.check_sonar()?;
+        check_sonar(&self.sonar)?;
+        self.check_further_sonars()?;
         let prior = &self.prior;
         not_negative("prior.scale_right", prior.scale_right)?;
         not_negative("prior.scale_left", prior.scale_left)?;
@@ -377,22 +493,38 @@ impl Config {
         positive("max_wheel_speed", self.max_wheel_speed.0)
     }
 
-    fn check_sonar(&self) -> Result<(), ConfigError> {
-        let sonar = &self.sonar;
-        require("sonar.mount", sonar.mount.is_finite(), "finite")?;
-        let (right, left) = sonar.servo;
-        let half_turn = core::f32::consts::PI;
-        let in_order = right.0 >= -half_turn && right.0 < left.0 && left.0 <= half_turn;
-        require("sonar.servo", in_order, "a rightmost below a leftmost bearing, within ±180°")?;
-        let narrow = sonar.cone.0 > 0.0 && sonar.cone.0 < 0.5 * half_turn;
-        require("sonar.cone", narrow, "between 0 and 90° (half of the cone)")?;
-        not_negative("sonar.min_range", sonar.min_range.0)?;
-        positive("sonar.max_range", sonar.max_range.0)?;
-        let wide = sonar.max_range > sonar.min_range;
-        require("sonar.max_range", wide, "greater than sonar.min_range")?;
-        positive("sonar.noise.floor", sonar.noise.floor.0)?;
-        not_negative("sonar.noise.per_metre", sonar.noise.per_metre)?;
-        let no_time = sonar.timing.schedule == PingSchedule::Every(Duration::from_ticks(0));
-        require("sonar.timing.schedule", !no_time, "a period that is not zero")
+    fn check_further_sonars(&self) -> Result<(), ConfigError> {
+        for sonar in self.further_sonars.iter() {
+            let is_shared = sonar.timing.schedule == self.sonar.timing.schedule;
+            require("further_sonars.timing.schedule", is_shared, "that of the first ranger")?;
+            check_sonar(sonar)?;
+        }
+        Ok(())
     }
+}
+
+/// Checks the fields of one ranger.
+fn check_sonar(sonar: &Sonar) -> Result<(), ConfigError> {
+    require("sonar.mount", sonar.mount.is_finite(), "finite")?;
+    let (right, left) = sonar.servo;
+    let half_turn = core::f32::consts::PI;
+    let in_order = right.0 < left.0 || sonar.fixed_bearing().is_some();
+    let in_order = in_order && right.0 >= -half_turn && left.0 <= half_turn;
+    require("sonar.servo", in_order, "a rightmost below a leftmost bearing, within ±180°")?;
+    let narrow = sonar.cone.0 > 0.0 && sonar.cone.0 < 0.5 * half_turn;
+    require("sonar.cone", narrow, "between 0 and 90° (half of the cone)")?;
+    not_negative("sonar.min_range", sonar.min_range.0)?;
+    positive("sonar.max_range", sonar.max_range.0)?;
+    let wide = sonar.max_range > sonar.min_range;
+    require("sonar.max_range", wide, "greater than sonar.min_range")?;
+    positive("sonar.noise.floor", sonar.noise.floor.0)?;
+    not_negative("sonar.noise.per_metre", sonar.noise.per_metre)?;
+    let no_time = sonar.timing.schedule == PingSchedule::Every(Duration::from_ticks(0));
+    require("sonar.timing.schedule", !no_time, "a period that is not zero")?;
+    let Ranging::Light(beam) = sonar.ranging else { return Ok(()) };
+    let oblique = sonar.cone <= MAX_INCIDENCE;
+    require("sonar.cone", oblique, "at most 75° (largest angle of incidence of light)")?;
+    let narrow = beam.spot.0 > 0.0 && beam.spot.0 <= MAX_SPOT.0;
+    require("sonar.ranging.spot", narrow, "between 0 and 20° (half of the beam)")?;
+    not_negative("sonar.ranging.pointing", beam.pointing.0)
 }

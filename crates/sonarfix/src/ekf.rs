@@ -269,15 +269,21 @@ impl Ekf {
     /// One standard deviation of each state.
     #[must_use]
     pub fn standard_deviations(&self) -> StandardDeviations {
-        self.p().standard_deviations()
+        let walk = self.walk_until_now();
+        self.of_p(|p| p.standard_deviations(&walk))
     }
 
     /// P.
     fn p(&self) -> Covariance {
         let mut p = self.p_now();
-        let distance = self.distance_since_update + self.distance;
-        p.add_random_walk(&AccumulatedRandomWalk::new(&self.densities, distance));
+        p.add_random_walk(&self.walk_until_now());
         p
+    }
+
+    /// The random walk of the calibration since the last update.
+    fn walk_until_now(&self) -> AccumulatedRandomWalk {
+        let distance = self.distance_since_update + self.distance;
+        AccumulatedRandomWalk::new(&self.densities, distance)
     }
 
     /// P without the random walk of the calibration since the last update.
@@ -295,7 +301,7 @@ impl Ekf {
         AccumulatedRandomWalk::new(&self.densities, self.distance_since_update)
     }
 
-    /// A number of P that does not depend on the random walk.
+    /// Numbers of P without the random walk.
     #[inline]
     fn of_p<T>(&self, number: impl Fn(&Covariance) -> T) -> T {
         if self.distance <= 0.0 { number(&self.p_without_walk) } else { number(&self.p_now()) }

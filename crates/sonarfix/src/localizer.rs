@@ -10,9 +10,9 @@
 use crate::absolute::{
     AbsoluteMeasurement, Explained, LastStep, MeasurementError, OutsideStep, PoseVector, Sources,
 };
-use crate::aim::{self, Aim, History, NoAim, Origin};
+use crate::aim::{Aim, History, NoAim, Origin, Situation, Standing};
 use crate::alternatives::{Scene, Target};
-use crate::config::{Config, ConfigError};
+use crate::config::{Config, ConfigError, RangerId, Ranging};
 use crate::covariance::{GyroBias, PredictedMeasurement};
 use crate::echo::{ExpectedEcho, Explanation, Others};
 use crate::ekf::{Ekf, EkfError, StandardDeviations, StateEstimate};
@@ -27,13 +27,17 @@ use crate::pose::Pose;
 use crate::range::Innovation;
 use crate::units::{Duration, Instant, Metres, Radians, SquareMetres, seconds};
 use crate::unseen::Unseen;
-use crate::visibility::{Viewpoint, check_range, max_heading_deviation};
+use crate::visibility::{Sight, Viewpoint, check_range, max_heading_deviation_of};
 
 pub use crate::gyro_fusion::{GyroStatus, TurnUse};
 pub use crate::odometry::OdometryError;
 pub use crate::outcome::{AbsoluteFix, AbsoluteRefusal, Agreement, Fix, Refusal};
 
 const NO_TIME: Duration = Duration::from_ticks(0);
+
+/// Time after a ping, or after the last time without a wall that has counted, from which on a time without a wall counts as a
+/// ping without an accepted range, with a sonar at a fixed bearing.
+pub const FIXED_SKIP: Duration = Duration::from_ticks(1_000_000);
 
 /// The pose at the start, and its uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -116,6 +120,8 @@ pub struct Localizer<'m> {
     /// The period without odometry that has not ended.
     unseen: Option<Unseen>,
     history: History,
+    /// The time of the latest ping, or of the latest time without a wall that has counted ([`FIXED_SKIP`]).
+    pinged: Instant,
     /// Association probability of the latest ping.
     association: f32,
     /// The gyro, if the configuration has one.
@@ -137,10 +143,13 @@ struct ExplainedPing {
 }
 
 impl ExplainedPing {
-    fn refused(refusal: Refusal) -> Self {
-        let fix = Fix::Refused(refusal);
-        Self { fix, evidence: 0.0, contradicts: false, is_repeated: false }
-    }
+    /// A ping that is not explained.
+    const REFUSED: Self = Self {
+        fix: Fix::Refused(Refusal::NoEcho),
+        evidence: 0.0,
+        contradicts: false,
+        is_repeated: false,
+    };
 }
 
 impl<'m> Localizer<'m> {
@@ -194,6 +203,7 @@ impl<'m> Localizer<'m> {
             recorded: now,
             unseen: None,
             history: History::default(),
+            pinged: now,
             association: 0.0,
             gyro,
             step: LastStep::none(now),
@@ -227,6 +237,14 @@ impl<'m> Localizer<'m> {
             unseen.refuse(now);
         }
         result
+    }
+
+    /// Applies the motion that has been accumulated since the last reading or correction of P to it (`docs/model.md`, "Covariance
+    /// on demand"). To be called once before several readings of deviations, each of which would apply it to a copy.
+    ///
+    /// The estimate and P are the same before and after; what later steps compute differs in roundings.
+    pub fn apply_motion(&mut self) {
+        self.ekf.apply_motion();
     }
 
     fn predict(
@@ -375,20 +393,38 @@ impl<'m> Localizer<'m> {
     /// # Errors
     /// [`NoAim`], by the reason for which there is no wall to measure.
     pub fn aim(&self) -> Result<Aim, NoAim> {
-        let mut ekf = self.ekf;
-        ekf.apply_motion();
-        aim::choose(&self.config, &self.map, &ekf, &self.history, self.time)
+        self.ekf.applied(|ekf| self.situation(ekf).choose())
     }
 
-    /// The wall to which a beam at `bearing` (relative to the heading) is square, for a range whose
+    /// As [`Self::aim`] for one ranger whose servo stands as given: for a robot with several, whose loop turns all servos
+    /// and pings with the ranger that has the highest [score](Aim::score).
+    ///
+    /// # Errors
+    /// [`NoAim`], by the reason for which there is no wall to measure.
+    pub fn aim_of(&self, ranger: RangerId, standing: &Standing) -> Result<Aim, NoAim> {
+        self.ekf.applied(|ekf| self.situation(ekf).choose_of(ranger, standing))
+    }
+
+    /// The wall to which a beam of the first ranger at `bearing` (relative to the heading) is square, for a range whose
     /// bearing this localizer did not choose.
     ///
     /// # Errors
-    /// [`NoAim`], by the reason for which there is none.
+    /// [`NoAim`], by the reason for which no wall can be measured.
     pub fn aim_at(&self, bearing: Radians) -> Result<Aim, NoAim> {
-        let mut ekf = self.ekf;
-        ekf.apply_motion();
-        aim::at(&self.config, &self.map, &ekf, &self.history, self.time, bearing)
+        self.aim_along(RangerId::FIRST, bearing)
+    }
+
+    /// As [`Self::aim_at`], for any ranger.
+    ///
+    /// # Errors
+    /// [`NoAim`], by the reason for which no wall can be measured.
+    pub fn aim_along(&self, ranger: RangerId, bearing: Radians) -> Result<Aim, NoAim> {
+        self.ekf.applied(|ekf| self.situation(ekf).at(ranger, bearing))
+    }
+
+    fn situation<'a>(&'a self, ekf: &'a Ekf) -> Situation<'a> {
+        let Self { config, map, history, time, .. } = self;
+        Situation { config, map, ekf, history, now: *time }
     }
 
     /// Corrects the estimate by the range measured along an aim, or records that there was no echo.
@@ -397,11 +433,15 @@ impl<'m> Localizer<'m> {
     /// to it first. [`Fix::Accepted`] and [`Fix::Downweighted`] correct the estimate; every outcome
     /// enters the health.
     pub fn fix(&mut self, aim: &Aim, range: Option<Metres>) -> Fix {
-        self.history.record_bearing(aim.wall, aim.bearing, aim.range);
+        self.history.record_ping(aim.ranger, aim.wall, aim.bearing, aim.range);
+        self.pinged = self.time;
         self.association = 0.0;
         self.ekf.apply_motion();
-        let ExplainedPing { fix, evidence, contradicts, is_repeated } =
-            self.try_fix(aim, range).unwrap_or_else(ExplainedPing::refused);
+        let mut ping = ExplainedPing::REFUSED;
+        if let Err(refusal) = self.try_fix(aim, range, &mut ping) {
+            ping.fix = Fix::Refused(refusal);
+        }
+        let ExplainedPing { fix, evidence, contradicts, is_repeated } = ping;
         let limits = self.limits();
         let uncertainty = self.ekf.pose_uncertainty();
         self.health.record_fix(&fix, evidence, is_repeated, uncertainty, &limits);
@@ -412,8 +452,16 @@ impl<'m> Localizer<'m> {
     }
 
     /// Records that [`Self::aim`] found no wall to measure when a ping was due, so that the verdict of
-    /// a localizer without measurements does not stay `Tracking`.
+    /// a localizer without measurements does not stay `Tracking`. A robot with sonars at fixed bearings only often waits
+    /// until it has turned: that counts once in [`FIXED_SKIP`].
     pub fn skip(&mut self) {
+        if self.config.sonars().all(|(_, sonar)| sonar.fixed_bearing().is_some()) {
+            let since = self.time.checked_duration_since(self.pinged).unwrap_or(NO_TIME);
+            if since < FIXED_SKIP {
+                return;
+            }
+            self.pinged = self.time;
+        }
         let limits = self.limits();
         self.health.record_no_aim(self.ekf.pose_uncertainty(), &limits);
     }
@@ -469,24 +517,39 @@ impl<'m> Localizer<'m> {
         Ok(fix)
     }
 
-    fn try_fix(&mut self, aim: &Aim, range: Option<Metres>) -> Result<ExplainedPing, Refusal> {
-        let Config { sonar, echo, .. } = &self.config;
+    /// Writes the outcome in place: a result that contains it is copied byte by byte.
+    fn try_fix(
+        &mut self,
+        aim: &Aim,
+        range: Option<Metres>,
+        ping: &mut ExplainedPing,
+    ) -> Result<(), Refusal> {
+        let echo = &self.config.echo;
+        let Some(sonar) = self.config.sonar_of(aim.ranger) else {
+            return Err(match range {
+                None => Refusal::NoEcho,
+                Some(range) if !range.is_finite() => Refusal::NotFinite,
+                Some(_) => Refusal::UnknownRanger,
+            });
+        };
         let measured = check_range(sonar, range);
         if measured == Err(Refusal::NotFinite) {
             return Err(Refusal::NotFinite);
         }
         // A range that is refused by itself has that reason, whatever the geometry.
         let refused = |geometry: Refusal| measured.err().unwrap_or(geometry);
-        let wall = self.map.wall(aim.wall).ok_or_else(|| refused(Refusal::UnknownWall))?;
-        let view = Viewpoint::new(&self.config, &self.ekf).of_echo();
-        let (expected, on_wall) = view.expected_range(&wall).map_err(refused)?;
-        let square = view.of_square(&expected, aim.bearing).map_err(refused)?;
-        let geometry = on_wall * square;
-        let foot = wall.along(view.position());
-        let entry = self.history.entry(echo, aim.wall, foot, expected.range, self.time);
+        let Some(wall) = self.map.wall(aim.wall) else {
+            return Err(refused(Refusal::UnknownWall));
+        };
+        let view = Viewpoint::new(&self.config, sonar, &self.ekf).of_echo();
+        let sight = view.sight(&wall, aim.bearing).map_err(refused)?;
+        let Sight { expected, place, .. } = sight;
+        let geometry = sight.on_wall * sight.square;
+        let entry =
+            self.history.entry(echo, aim.ranger, aim.wall, place, expected.range, self.time);
         let occluded = entry.occlusion;
-        let map_variance = echo.map_variance(entry.travelled);
-        let noise = SquareMetres(sonar.noise.variance(expected.range).0 + map_variance);
+        let map_variance = echo.map_variance(sight.accuracy, entry.travelled);
+        let noise = SquareMetres(sight.noise + map_variance * sight.of_map);
         let prediction = self.ekf.predict_measurement(&expected);
         let innovation = prediction.innovation(measured.unwrap_or(expected.range), noise);
         let expected_echo = ExpectedEcho {
@@ -505,11 +568,15 @@ impl<'m> Localizer<'m> {
             let target = Target { expected: &expected, variance, answers };
             let scene = Scene {
                 config: &self.config,
+                sonar,
                 map: self.map,
                 ekf: &self.ekf,
                 history: &self.history,
             };
-            let others = scene.others(&target, aim.bearing, range);
+            let others = match sonar.ranging {
+                Ranging::Sound => scene.others(&target, aim.bearing, range),
+                Ranging::Light(beam) => scene.others_lit(&view, beam, &target, range),
+            };
             expected_echo.explain(echo, Some(range), others)
         } else {
             alone
@@ -534,7 +601,8 @@ impl<'m> Localizer<'m> {
         };
         self.history.record_echo(&entry, now_occluded, origin, self.time);
         let contradicts = gating::contradicts(mapped, occluded);
-        Ok(ExplainedPing { fix, evidence, contradicts, is_repeated })
+        *ping = ExplainedPing { fix, evidence, contradicts, is_repeated };
+        Ok(())
     }
 
     /// Inflates the covariance of the pose while the verdict is `Lost`, so that later echoes can be
@@ -553,7 +621,7 @@ impl<'m> Localizer<'m> {
     }
 
     fn limits(&self) -> Limits {
-        Limits::new(&self.config.gating, max_heading_deviation(&self.config.sonar))
+        Limits::new(&self.config.gating, max_heading_deviation_of(&self.config))
     }
 
     /// The time of the last accepted travel.

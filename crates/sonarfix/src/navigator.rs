@@ -29,14 +29,15 @@
 //! That of [`Localizer`] and [`Search`]: a NaN or infinity is refused and changes nothing.
 
 use crate::absolute::AbsoluteMeasurement;
-use crate::aim::{Aim, NoAim};
+use crate::aim::{Aim, NoAim, Standing};
+use crate::config::RangerId;
 use crate::ekf::{EkfError, StandardDeviations, StateEstimate};
 use crate::gyro::MeasuredTurn;
 use crate::health::Verdict;
 use crate::localizer::{AbsoluteFix, AbsoluteRefusal, Fix, Localizer, OdometryError, Start};
 use crate::motion::WheelTravel;
 use crate::numeric::at_least;
-use crate::search::{Answer, Hypothesis, NotFinite, Region, Search, SearchParameters};
+use crate::search::{Answer, Hypothesis, InvalidInput, Region, Search, SearchParameters};
 use crate::units::{Instant, Metres, Radians};
 
 pub use crate::unseen::{UNKNOWN_HEADING, UNKNOWN_POSITION};
@@ -250,6 +251,8 @@ impl<'m> Navigator<'m> {
     ) -> Result<(), OdometryError> {
         let before = self.localizer.pose().heading;
         self.localizer.odometry_with_turn(now, travel, turn)?;
+        // The deviations are read after each step.
+        self.localizer.apply_motion();
         let Some(search) = search else { return Ok(()) };
         self.driven = self.driven + travel.distance();
         if self.mode == Mode::Tracking {
@@ -291,6 +294,22 @@ impl<'m> Navigator<'m> {
         self.localizer.aim()
     }
 
+    /// As [`Localizer::aim_of`], while the mode is not [`Mode::Searching`].
+    ///
+    /// # Errors
+    /// [`NoAim`], by the reason.
+    pub fn aim_of(&self, ranger: RangerId, standing: &Standing) -> Result<Aim, NoAim> {
+        self.localizer.aim_of(ranger, standing)
+    }
+
+    /// As [`Localizer::aim_along`], while the mode is not [`Mode::Searching`].
+    ///
+    /// # Errors
+    /// [`NoAim`], by the reason.
+    pub fn aim_along(&self, ranger: RangerId, bearing: Radians) -> Result<Aim, NoAim> {
+        self.localizer.aim_along(ranger, bearing)
+    }
+
     /// As [`Localizer::aim_at`], while the mode is not [`Mode::Searching`].
     ///
     /// # Errors
@@ -299,7 +318,8 @@ impl<'m> Navigator<'m> {
         self.localizer.aim_at(bearing)
     }
 
-    /// As [`Localizer::fix`]; while the pose is provisional, the search takes the ping as well.
+    /// As [`Localizer::fix`]; while the pose is provisional, the search takes the ping as well, if it is of the first
+    /// ranger, with which it sweeps.
     pub fn fix(
         &mut self,
         aim: &Aim,
@@ -310,7 +330,7 @@ impl<'m> Navigator<'m> {
         if self.mode == Mode::Provisional {
             self.accepted =
                 self.accepted.saturating_add(u16::from(matches!(fix, Fix::Accepted(_))));
-            if let Some(search) = search {
+            if let Some(search) = search.filter(|_| aim.ranger == RangerId::FIRST) {
                 // What is not finite was refused above and is not taken here either.
                 _ = self.ping(aim.bearing, range, search);
             }
@@ -335,13 +355,13 @@ impl<'m> Navigator<'m> {
     /// range counts as none. Returns whether the ping is novel.
     ///
     /// # Errors
-    /// [`NotFinite`]; nothing changes.
+    /// [`InvalidInput`]; nothing changes.
     pub fn ping(
         &mut self,
         bearing: Radians,
         range: Option<Metres>,
         search: &mut Search<'m>,
-    ) -> Result<bool, NotFinite> {
+    ) -> Result<bool, InvalidInput> {
         let shortest = self.localizer.config().sonar.min_range;
         // The search refuses what is not finite.
         search.ping(bearing, range.filter(|range| *range >= shortest || !range.is_finite()))

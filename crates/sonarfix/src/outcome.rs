@@ -54,6 +54,8 @@ pub enum Refusal {
     UnknownWall,
     /// The filter refused the correction.
     Filter(EkfError),
+    /// The robot has no such ranger.
+    UnknownRanger,
 }
 
 impl core::fmt::Display for Refusal {
@@ -65,6 +67,7 @@ impl core::fmt::Display for Refusal {
             Self::FootOffWall => "the foot of the perpendicular may be off the wall",
             Self::NotSquare => "the beam is not square to the wall",
             Self::UnknownWall => "the map has no such wall",
+            Self::UnknownRanger => "the robot has no such ranger",
             Self::Filter(error) => return write!(f, "the filter refused the range: {error}"),
         })
     }

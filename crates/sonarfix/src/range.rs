@@ -2,7 +2,8 @@
 //! (`docs/model.md`, eqs. 1 and 11 to 13).
 //!
 //! With a wide cone and a smooth wall the first echo comes from the foot of the perpendicular,
-//! whatever the exact bearing, so the range is the distance of the sonar from the line of the wall.
+//! whatever the exact bearing, so the range is the distance of the sonar from the line of the wall. Light
+//! returns from where its beam meets the wall (eqs. 45 and 46).
 //!
 //! # Non-finite policy
 //! No value is refused here; [`Ekf`](crate::ekf::Ekf) refuses an expected range that is not finite.
@@ -42,6 +43,9 @@ impl RangeNoise {
     }
 }
 
+/// Least cosine of the angle between a beam of light and the perpendicular of a wall: 84°.
+const LEAST_APPROACH: f32 = 0.1;
+
 /// The sonar at an estimate: what its expected ranges have in common.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SonarPosition {
@@ -80,7 +84,7 @@ pub struct ExpectedRange {
     pub by_heading: f32,
     /// ∂h/∂κ, metres: the true distance.
     pub by_range_scale: f32,
-    /// Direction from the sonar to the foot of the perpendicular, in the map frame.
+    /// Direction from the sonar to the foot of the perpendicular, of a beam of light that of the beam; map frame.
     pub direction: Heading,
 }
 
@@ -106,6 +110,43 @@ impl ExpectedRange {
         let away = (-sonar.stretch * toward.x, -sonar.stretch * toward.y);
         let direction = Heading::new(Radians(atan2(toward.y, toward.x)));
         Self::at(distance, away, direction, sonar)
+    }
+
+    // ===== Eqs. (45) and (46): h(X̂) and H of a beam of light =====
+    /// The range expected from the line of `wall` along a beam at `bearing` (relative to the heading) by a
+    /// time-of-flight ranger at `mount` (robot frame) at this estimate; `None` if the beam does not meet the line, or
+    /// meets it at more than 84° from its perpendicular.
+    #[must_use]
+    pub fn along_beam(
+        wall: &Wall,
+        mount: Point,
+        bearing: Radians,
+        state: &StateEstimate,
+    ) -> Option<Self> {
+        let direction = Heading::new(state.heading).turned(bearing);
+        let axis = Vector::of_angle(direction.radians().0);
+        Self::of_beam(wall, (direction, axis), &SonarPosition::new(mount, state))
+    }
+
+    /// [`Self::along_beam`] with the position of the ranger and the direction of the beam computed before; the axis is
+    /// the unit vector of the direction.
+    pub(crate) fn of_beam(
+        wall: &Wall,
+        (direction, axis): (Heading, Vector),
+        sonar: &SonarPosition,
+    ) -> Option<Self> {
+        let approach = wall.a() * axis.x + wall.b() * axis.y;
+        let distance = -wall.signed_distance(sonar.point).0 / approach;
+        // Neither holds for NaN.
+        let is_met = approach.abs() >= LEAST_APPROACH && distance >= 0.0;
+        if !is_met {
+            return None;
+        }
+        let by_distance = -sonar.stretch / approach;
+        let away = Vector::new(by_distance * wall.a(), by_distance * wall.b());
+        let expected = Self::at(distance, (away.x, away.y), direction, sonar);
+        let by_heading = expected.by_heading + distance * away.dot(axis.left());
+        Some(Self { by_heading, ..expected })
     }
 
     /// A linear combination of x, y and heading as a measurement. Only its derivatives have a meaning.

@@ -18,7 +18,7 @@ use crate::vector::Vector;
 /// Nearest reflectors that are looked at.
 pub(crate) const REFLECTORS: usize = 6;
 /// Beyond this share of the longest range an echo is often missed.
-const FADES: f32 = 0.8;
+pub(crate) const FADES: f32 = 0.8;
 /// Two walls touch within this distance, metres.
 const TOUCH: f32 = 0.02;
 /// Cosine of the angle between two walls up to which they make a corner: 75°.
@@ -46,7 +46,19 @@ pub(crate) struct Reflector {
     /// The direction of the wall from its end; `None`: the foot of a perpendicular.
     pub arm: Option<Vector>,
     pub wall: WallId,
+    /// That of the wall's place, if it has one of its own.
+    pub accuracy: Option<Metres>,
     is_central: bool,
+}
+
+/// Where a beam of light meets a wall.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Lit {
+    /// Metres along the beam.
+    pub distance: f32,
+    /// Change of the distance by the position of the ranger, with the opposite sign: the normal over the cosine of the
+    /// incidence.
+    pub away: Vector,
 }
 
 /// How a reflector is heard.
@@ -93,13 +105,27 @@ impl<'m> Reflectors<'m> {
     }
 
     /// The reflectors in the cone up to `reach`, nearest first, and how far the axis is free.
+    #[inline]
     pub fn in_beam(
         &self,
         beam: &Beam,
         reach: f32,
         margin: f32,
     ) -> (Vec<Reflector, REFLECTORS>, f32) {
-        let mut found: Vec<Reflector, REFLECTORS> = Vec::new();
+        let mut found = Vec::new();
+        let free = self.collect(beam, reach, margin, &mut found);
+        (found, free)
+    }
+
+    /// As [`Self::in_beam`], into an empty list, because one that is returned is copied. Returns how far the axis is free.
+    #[inline(never)]
+    pub fn collect(
+        &self,
+        beam: &Beam,
+        reach: f32,
+        margin: f32,
+        found: &mut Vec<Reflector, REFLECTORS>,
+    ) -> f32 {
         let mut free = f32::INFINITY;
         let range = beam.range.unwrap_or(f32::INFINITY);
         for (id, wall) in self.map.near(beam.from.into(), Metres(reach)) {
@@ -113,8 +139,11 @@ impl<'m> Reflectors<'m> {
                 && foot.distance <= reach
             {
                 insert(
-                    &mut found,
-                    Reflector { is_central: foot.cosine >= self.cos_cone, ..foot.reflector(id) },
+                    found,
+                    Reflector {
+                        is_central: foot.cosine >= self.cos_cone,
+                        ..foot.reflector(id, &wall)
+                    },
                 );
             }
             for (to_end, arm) in view.ends() {
@@ -136,12 +165,37 @@ impl<'m> Reflectors<'m> {
                 let is_central = ahead >= self.cos_cone * distance;
                 let toward = to_end.times(1.0 / distance);
                 insert(
-                    &mut found,
-                    Reflector { distance, toward, arm: Some(arm), wall: id, is_central },
+                    found,
+                    Reflector {
+                        distance,
+                        toward,
+                        arm: Some(arm),
+                        wall: id,
+                        accuracy: wall.accuracy(),
+                        is_central,
+                    },
                 );
             }
         }
-        (found, free)
+        free
+    }
+
+    /// The wall that a beam of light meets first.
+    pub fn lit(&self, beam: &Beam) -> Option<Lit> {
+        let mut first: Option<Lit> = None;
+        for (_, wall) in self.map.near(beam.from.into(), Metres(self.max_range)) {
+            let tangent = Vector::new(wall.b(), -wall.a());
+            let normal = tangent.left();
+            let to_start = Vector::from(wall.from()).minus(beam.from);
+            let by_approach = 1.0 / normal.dot(beam.axis);
+            let distance = to_start.dot(normal) * by_approach;
+            let along = distance * beam.axis.dot(tangent) - to_start.dot(tangent);
+            let is_met = distance > 0.0 && along >= 0.0 && along <= wall.length().0;
+            if is_met && first.is_none_or(|first| distance < first.distance) {
+                first = Some(Lit { distance, away: normal.times(by_approach) });
+            }
+        }
+        first.filter(|first| first.distance <= self.max_range)
     }
 
     /// How a reflector is heard, `None` if a wall hides it.
@@ -257,9 +311,10 @@ struct Foot {
 }
 
 impl Foot {
-    fn reflector(&self, wall: WallId) -> Reflector {
+    fn reflector(&self, id: WallId, wall: &Wall) -> Reflector {
         let Self { distance, toward, .. } = *self;
-        Reflector { distance, toward, arm: None, wall, is_central: true }
+        let accuracy = wall.accuracy();
+        Reflector { distance, toward, arm: None, wall: id, accuracy, is_central: true }
     }
 }
 

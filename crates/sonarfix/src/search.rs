@@ -206,18 +206,27 @@ pub enum Phase {
     GlobalCheck,
 }
 
-/// Why an input is refused.
+/// Why an input is refused: a number is NaN or infinite, a range is negative, or a place, travel or turn is beyond 10⁶ m or
+/// radians.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct NotFinite;
+pub struct InvalidInput;
 
-impl core::fmt::Display for NotFinite {
+impl core::fmt::Display for InvalidInput {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str("a travel, bearing or range is NaN or infinite")
+        f.write_str("a travel, bearing or range is NaN, infinite or too large")
     }
 }
 
-impl core::error::Error for NotFinite {}
+impl core::error::Error for InvalidInput {}
+
+/// Largest coordinate, travel (metres) and turn (radians): squares of their sums are finite.
+const FARTHEST: f32 = 1e6;
+
+/// Whether a number is finite and not so large that sums of it are not; false for NaN.
+fn is_near(number: f32) -> bool {
+    number.abs() <= FARTHEST
+}
 
 /// Fewer pings than these are no window to search with.
 const LEAST_PINGS: usize = 12;
@@ -323,7 +332,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
             servo: (right, left),
             sweep: Sweep { bearing: right, step: parameters.novel_angle.0 },
             window: Window::new(sonar.mount.into()),
-            lines: Lines::new(sonar.cone),
+            lines: Lines::of_ranger(sonar),
             bank: Bank::new(),
             task: Task::Rebase,
             trial: None,
@@ -345,7 +354,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         self.servo = (right, left);
         self.sweep = Sweep { bearing: right, step: self.parameters.novel_angle.0 };
         self.window.restart(sonar.mount.into());
-        self.lines.restart(sonar.cone);
+        self.lines.restart_of_ranger(sonar);
         self.bank.clear();
         self.task = Task::Rebase;
         self.trial = None;
@@ -370,10 +379,10 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
     /// Moves the robot by a distance along its mid-heading and a turn.
     ///
     /// # Errors
-    /// [`NotFinite`]; nothing changes.
-    pub fn odometry(&mut self, advance: Metres, turn: Radians) -> Result<(), NotFinite> {
-        if !advance.is_finite() || !turn.is_finite() {
-            return Err(NotFinite);
+    /// [`InvalidInput`]; nothing changes.
+    pub fn odometry(&mut self, advance: Metres, turn: Radians) -> Result<(), InvalidInput> {
+        if !is_near(advance.0) || !is_near(turn.0) {
+            return Err(InvalidInput);
         }
         self.window.drive(advance.0, turn.0);
         Ok(())
@@ -388,11 +397,11 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
     /// Takes the result of a ping; `None`: no echo. Returns whether it is novel.
     ///
     /// # Errors
-    /// [`NotFinite`]; nothing changes.
-    pub fn ping(&mut self, bearing: Radians, range: Option<Metres>) -> Result<bool, NotFinite> {
+    /// [`InvalidInput`]; nothing changes.
+    pub fn ping(&mut self, bearing: Radians, range: Option<Metres>) -> Result<bool, InvalidInput> {
         if !bearing.is_finite() || range.is_some_and(|range| !(range.is_finite() && range.0 >= 0.0))
         {
-            return Err(NotFinite);
+            return Err(InvalidInput);
         }
         self.sweep.advance(self.servo);
         let range =
@@ -405,10 +414,10 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
     /// region where it starts. It is scored in the next cycle like any other hypothesis.
     ///
     /// # Errors
-    /// [`NotFinite`]; nothing changes.
-    pub fn propose(&mut self, pose: Pose) -> Result<(), NotFinite> {
-        if !pose.is_finite() {
-            return Err(NotFinite);
+    /// [`InvalidInput`]; nothing changes.
+    pub fn propose(&mut self, pose: Pose) -> Result<(), InvalidInput> {
+        if !is_near(pose.x.0) || !is_near(pose.y.0) || !pose.is_finite() {
+            return Err(InvalidInput);
         }
         let turn = pose.heading.radians() - Radians(self.window.heading());
         let bend = self.window.bend();
@@ -552,7 +561,12 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
                 Task::Fit { line: 0 }
             };
         };
-        self.lines.vote(self.window.pings(), usize::from(ping), *part);
+        let (pings, voter) = (self.window.pings(), usize::from(ping));
+        if self.lines.is_light() {
+            self.lines.vote_of_two(pings, voter, usize::from(tilt) + 1);
+        } else {
+            self.lines.vote(pings, voter, *part);
+        }
         Task::Vote { ping, tilt: tilt + 1 }
     }
 

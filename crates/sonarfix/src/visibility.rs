@@ -8,10 +8,12 @@
 //! | module | contents |
 //! |---|---|
 //! | `viewpoint` | the conditions on one wall by itself |
+//! | `light` | the same for a beam of light |
 //! | `occlusion` | the conditions on all other walls |
 
+mod light;
 mod occlusion;
 mod viewpoint;
 
 pub(crate) use occlusion::Beam;
-pub(crate) use viewpoint::{Viewpoint, check_range, max_heading_deviation};
+pub(crate) use viewpoint::{Sight, Viewpoint, check_range, max_heading_deviation_of};

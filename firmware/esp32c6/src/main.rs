@@ -13,18 +13,22 @@
 //! | UART0 | the link, 115,200 baud | 16 17 |
 //! | | the sonar's trigger; high while the robot may drive | 23; 3 |
 //!
-//! Hardware counts the wheels and stamps the edges, however long a poll or a write to flash takes. No interrupt is needed.
+//! Hardware counts the wheels and stamps the edges, however long a poll or a write to flash takes. The only interrupt is that of
+//! an alarm, which ends the sleep.
 
 #![no_std]
 #![no_main]
 
+use core::cell::RefCell;
 use core::convert::Infallible;
 use core::ops::Range;
 
+use critical_section::Mutex;
 use defmt_rtt as _;
 use esp_hal::clock::CpuClock;
 use esp_hal::gpio::interconnect::InputSignal as Signal;
 use esp_hal::gpio::{Input, InputConfig, InputSignal, Level, Output, OutputConfig, Pull};
+use esp_hal::interrupt::wait_for_interrupt;
 use esp_hal::mcpwm::operator::{PwmPin, PwmPinConfig};
 use esp_hal::mcpwm::timer::PwmWorkingMode;
 use esp_hal::mcpwm::{McPwm, PeripheralClockConfig};
@@ -35,6 +39,8 @@ use esp_hal::peripherals::{GPIO, MCPWM0};
 use esp_hal::rtc_cntl::{Rtc, RwdtStage, RwdtStageAction, SocResetReason};
 use esp_hal::system::reset_reason;
 use esp_hal::time::Duration;
+use esp_hal::timer::PeriodicTimer;
+use esp_hal::timer::systimer::SystemTimer;
 use esp_hal::uart::{self, Uart};
 use esp_hal::{Blocking, ram};
 use esp_storage::FlashStorage;
@@ -48,14 +54,16 @@ use sonarfix_hal::ranger::{Captured, EchoCapture, PulseRanger, StampedEdges, Sta
 use sonarfix_hal::robot::Devices;
 use sonarfix_link::message::ResetCause;
 use sonarfix_motors::{Drive, Pattern};
-use sonarfix_robot::memory;
+use sonarfix_robot::{NextPoll, memory};
 use static_cell::ConstStaticCell;
 
 // What the bootloader checks before it starts the program.
 esp_bootloader_esp_idf::esp_app_desc!();
 
-/// The poll period, microseconds.
-const POLL: u64 = 1_000;
+/// The longest sleep, microseconds: half of the time in which the UART's FIFO of 128 bytes fills.
+const LONGEST_SLEEP: u64 = 5_000;
+/// The longest sleep while the stamps of an echo are to be read or bytes are to be sent, microseconds.
+const SHORT_SLEEP: u64 = 1_000;
 /// Longer than the erasure of a sector (at most 0.4 s), which delays the loop.
 const WATCHDOG: Duration = Duration::from_secs(2);
 /// Number of the pin that is high while the robot may drive.
@@ -70,6 +78,35 @@ const MOTOR_PERIOD: u16 = 50;
 
 /// The edges of the echo, from [`Stamper`].
 static ECHO: EchoCapture = EchoCapture::new();
+
+/// The alarm that ends the sleep. It repeats, so that one that is early delays the end of the sleep and does not prevent it.
+static ALARM: Mutex<RefCell<Option<PeriodicTimer<'static, Blocking>>>> =
+    Mutex::new(RefCell::new(None));
+
+/// Does something with the alarm, if it has been started.
+fn with_alarm(work: impl FnOnce(&mut PeriodicTimer<'static, Blocking>)) {
+    critical_section::with(|section| {
+        if let Ok(mut alarm) = ALARM.borrow(section).try_borrow_mut()
+            && let Some(alarm) = alarm.as_mut()
+        {
+            work(alarm);
+        }
+    });
+}
+
+#[esp_hal::handler]
+fn woken() {
+    with_alarm(PeriodicTimer::clear_interrupt);
+}
+
+/// Sleeps for so many microseconds, at least one.
+fn sleep(micros: u64) {
+    let mut is_set = false;
+    with_alarm(|alarm| is_set = alarm.start(Duration::from_micros(micros.max(1))).is_ok());
+    if is_set {
+        wait_for_interrupt();
+    }
+}
 
 /// Resets in a row, in memory that survives a reset but not a power loss.
 #[ram(unstable(rtc_fast, persistent))]
@@ -190,7 +227,7 @@ impl Stamper {
     }
 }
 
-/// The link. The UART's FIFOs of 128 bytes last 11 ms, and the loop polls every millisecond: no interrupt is needed.
+/// The link. The UART's FIFOs of 128 bytes last 11 ms, longer than a sleep: no interrupt is needed.
 struct Serial {
     uart: Uart<'static, Blocking>,
     /// A poll sends at most 400 bytes.
@@ -198,6 +235,11 @@ struct Serial {
 }
 
 impl Serial {
+    /// Whether bytes have arrived.
+    fn has_bytes(&self) -> bool {
+        self.uart.read_ready()
+    }
+
     /// Writes as many bytes as the UART accepts.
     fn transmit(&mut self) {
         while self.uart.write_ready()
@@ -291,6 +333,7 @@ struct Board {
     /// The example of motor code: your own controller takes its place.
     pattern: Pattern,
     watchdog: Rtc<'static>,
+    next_poll: NextPoll,
 }
 
 impl Board {
@@ -337,6 +380,14 @@ impl Board {
         let contents = FlashContents::read(map, config);
         log::flash_contents(&contents);
         let store = Store::new(flash, memory::store(0)).ok()?;
+        let mut alarm = PeriodicTimer::new(SystemTimer::new(board.SYSTIMER).alarm0);
+        alarm.set_interrupt_handler(woken);
+        alarm.listen();
+        critical_section::with(|section| {
+            if let Ok(mut place) = ALARM.borrow(section).try_borrow_mut() {
+                *place = Some(alarm);
+            }
+        });
         let app = App::new(sonarfix_robot::board(reset, resets), contents, store, now());
         // The default is 115,200 baud, 8N1.
         let uart = Uart::new(board.UART0, uart::Config::default()).ok()?;
@@ -355,6 +406,7 @@ impl Board {
             motors,
             pattern: Pattern::default(),
             watchdog,
+            next_poll: NextPoll::AT_ONCE,
         })
     }
 
@@ -379,10 +431,27 @@ impl Board {
             self.app.took(took);
         }
         self.app.work(start, now);
+        let (app, hardware) = (&self.app, &mut self.hardware);
+        self.next_poll = sonarfix_robot::next_poll(app, hardware, start, polled.may_drive);
+    }
+
+    /// How long the board may sleep, microseconds: `None` if the next poll is due, a byte has arrived or an edge of the echo
+    /// was stamped.
+    fn may_sleep(&mut self) -> Option<u64> {
+        self.stamper.update(&ECHO);
+        let next = self.next_poll.at(self.link.has_bytes());
+        let left = next.checked_duration_since(now())?.ticks();
+        if left == 0 || ECHO.take_edge() {
+            return None;
+        }
+        let is_listening = self.app.idle_until(&mut self.hardware).is_none();
+        let is_sending = !self.link.to_send.is_empty();
+        let longest = if is_listening || is_sending { SHORT_SLEEP } else { LONGEST_SLEEP };
+        Some(left.min(longest))
     }
 }
 
-/// Polls every millisecond.
+/// Polls when something is due, and sleeps until then.
 #[esp_hal::main]
 fn main() -> ! {
     let Some(mut board) = Board::new() else {
@@ -391,12 +460,11 @@ fn main() -> ! {
             core::hint::spin_loop();
         }
     };
-    let mut next_poll = now().ticks();
     loop {
-        next_poll = next_poll.saturating_add(POLL);
-        while now().ticks() < next_poll {
-            core::hint::spin_loop();
-        }
         board.poll();
+        while let Some(micros) = board.may_sleep() {
+            sleep(micros);
+            board.link.transmit();
+        }
     }
 }

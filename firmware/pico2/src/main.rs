@@ -12,6 +12,7 @@
 //! | TIMER0 | the clock, 1 µs, and the alarm of the next poll | |
 //! | UART0 | the link, 115,200 baud | GP0 GP1 |
 //! | | the sonar's trigger; high while the robot may drive | GP7; GP9 |
+//! | | the bus of the gyro, clock and data, if the robot file has one | GP15 GP14 |
 //!
 //! State machines count the wheels and stamp the edges, however long a poll or a write to flash takes. One executor is
 //! therefore sufficient, and no interrupts but those of the clock and of received bytes, which end its sleep. It runs two tasks in
@@ -23,17 +24,17 @@
 use defmt_rtt as _;
 use embassy_executor::{Executor, Spawner};
 use embassy_rp::flash::{self, Flash};
-use embassy_rp::gpio::{Level, Output};
+use embassy_rp::gpio::{Level, Output, OutputOpenDrain, Pin};
 use embassy_rp::interrupt::typelevel::{Handler, Interrupt, UART0_IRQ};
 use embassy_rp::peripherals::{FLASH, PIO0, PIO1};
 use embassy_rp::pio::{InterruptHandler, Pio};
 use embassy_rp::pwm::{self, Pwm};
 use embassy_rp::uart::{self, Uart};
 use embassy_rp::watchdog::Watchdog;
-use embassy_rp::{bind_interrupts, pac};
+use embassy_rp::{Peri, bind_interrupts, pac};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
-use embassy_time::{Duration, with_deadline};
+use embassy_time::{Delay, Duration, with_deadline};
 use embedded_hal::pwm::SetDutyCycle;
 use embedded_hal_02::serial::{Read, Write};
 use heapless::Deque;
@@ -41,8 +42,9 @@ use panic_probe as _;
 use sonarfix::units::Instant;
 use sonarfix_app::store::Store;
 use sonarfix_app::{App, FlashContents, Link, boots, log};
+use sonarfix_hal::gyro::{Mpu6050, TwoWire};
 use sonarfix_hal::ranger::{Captured, EchoCapture, PulseRanger};
-use sonarfix_hal::robot::Devices;
+use sonarfix_hal::robot::{Devices, WithGyro};
 use sonarfix_motors::{Drive, Estimate, Pattern};
 use sonarfix_robot::{NextPoll, memory};
 
@@ -64,8 +66,20 @@ const DRIVE: u32 = 9;
 /// Address of the flash.
 const FLASH_BASE: u32 = 0x1000_0000;
 
-type Hardware =
-    Devices<Encoder<0>, Encoder<1>, Pwm<'static>, PulseRanger<Output<'static>, Captured<'static>>>;
+type Hardware = WithGyro<
+    Devices<Encoder<0>, Encoder<1>, Pwm<'static>, PulseRanger<Output<'static>, Captured<'static>>>,
+    Gyro,
+>;
+
+/// The gyro. It is read and configured only if the robot file has one.
+type Gyro = Mpu6050<TwoWire<OutputOpenDrain<'static>, OutputOpenDrain<'static>, Delay>>;
+
+/// A line of the gyro's bus. The module has pull-ups; that of the pin keeps the line defined without one.
+fn line(pin: Peri<'static, impl Pin>) -> OutputOpenDrain<'static> {
+    let mut line = OutputOpenDrain::new(pin, Level::High);
+    line.set_pullup(true);
+    line
+}
 
 /// The edges of the echo, from [`Stamper`].
 static ECHO: EchoCapture = EchoCapture::new();
@@ -251,6 +265,8 @@ impl Board {
         let servo = sonarfix_robot::servo(pulses);
         let ranger = sonarfix_robot::ranger(trigger, &ECHO);
 
+        let gyro = Mpu6050::new(TwoWire::new(line(board.PIN_15), line(board.PIN_14), Delay));
+
         let flash = FlashContents::read(memory::map(), memory::config());
         log::flash_contents(&flash);
         let store = Store::new(Flash::new_blocking(board.FLASH), memory::store(FLASH_BASE)).ok()?;
@@ -262,7 +278,7 @@ impl Board {
         watchdog.start(WATCHDOG);
         let board = Self {
             app,
-            hardware: Devices { right, left, servo, ranger },
+            hardware: WithGyro { devices: Devices { right, left, servo, ranger }, gyro },
             stamper,
             link: Serial { uart, to_send: Deque::new() },
             drive: Output::new(board.PIN_9, Level::Low),

@@ -13,12 +13,9 @@ use sonarfix_app::store::Store;
 use sonarfix_app::{App, FlashContents, boots, log};
 use sonarfix_hal::robot::Devices;
 use sonarfix_motors::Pattern;
-use sonarfix_robot::memory;
+use sonarfix_robot::{NextPoll, memory};
 
 use parts::{Board, ECHO};
-
-/// The poll period, microseconds.
-const POLL: u64 = 1_000;
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
@@ -52,10 +49,13 @@ fn main() -> ! {
     let mut app = App::new(board, contents, store, clock.now());
     // The motor code: your own controller takes the place of the example, which drives to and fro.
     let mut pattern = Pattern::default();
-    let mut next_poll = clock.now().ticks();
+    let mut next_poll = NextPoll::AT_ONCE;
     loop {
-        next_poll = next_poll.saturating_add(POLL);
-        while clock.now().ticks() < next_poll {}
+        // Until something is due, a byte has arrived or an edge of the echo is stamped. On a chip whose timer, UART and echo pin
+        // interrupt, the end of this loop is the place of an instruction that sleeps.
+        while clock.now() < next_poll.at(link.has_bytes()) && !ECHO.take_edge() {
+            link.transmit();
+        }
         let start = clock.now();
         let polled = app.poll(start, &mut hardware, &mut link);
         enable.set(polled.may_drive);
@@ -72,5 +72,6 @@ fn main() -> ! {
             app.took(took);
         }
         app.work(start, || clock.now());
+        next_poll = sonarfix_robot::next_poll(&app, &mut hardware, start, polled.may_drive);
     }
 }

@@ -102,7 +102,8 @@ impl Clock {
     }
 }
 
-/// The link to the PC: a UART of 115,200 baud, 8N1, which is polled every millisecond.
+/// The link to the PC: a UART of 115,200 baud, 8N1. Without an interrupt its bytes are read by polls, at most a millisecond apart
+/// while there are any.
 pub struct Serial {
     /// A poll sends at most 400 bytes.
     to_send: Deque<u8, 512>,
@@ -128,6 +129,11 @@ impl Serial {
     fn is(state: u32) -> bool {
         // SAFETY: as above.
         unsafe { register(Self::STATE).read_volatile() & state != 0 }
+    }
+
+    /// Whether bytes have arrived.
+    pub fn has_bytes(&self) -> bool {
+        Self::is(Self::RECEIVER_FULL)
     }
 
     /// Writes as many bytes as the UART accepts.

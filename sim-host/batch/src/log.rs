@@ -9,7 +9,7 @@ use sonarfix_replay::log::{self, HEADER, Malformed, Record};
 use sonarfix_replay::scan::{Cone, Scan};
 use sonarfix_replay::{LONGEST, REFERENCE_HEADER};
 
-use sonarfix::config::PingSchedule;
+use sonarfix::config::{PingSchedule, RangerId};
 use sonarfix::units::Radians;
 
 use crate::calibration::Nominal;
@@ -152,7 +152,7 @@ impl LogReader<'_> {
             Record::Wheels { time, right, left } => {
                 self.reading(Reading { time, travel: [right, left] })
             }
-            Record::Range { time, bearing, range, .. } => {
+            Record::Range { time, bearing, range, ranger: RangerId::FIRST, .. } => {
                 self.ping(Ping { time, bearing, range });
                 Ok(())
             }
@@ -171,7 +171,9 @@ impl LogReader<'_> {
                 let pose = Vector3::new(x, y, heading);
                 self.start(StartPose { time, pose, position: dx.max(dy), heading: spread })
             }
-            Record::Skip { .. }
+            // Those of further rangers are left out: the constants are those of the first.
+            Record::Range { .. }
+            | Record::Skip { .. }
             | Record::Turn { .. }
             | Record::Absolute { .. }
             | Record::Pose { .. }

@@ -1,7 +1,5 @@
 //! `sonarfix calibrate`: the calibration of a robot from a recording.
 
-mod robot_edit;
-
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -22,6 +20,7 @@ use sonarfix_report::Table;
 use sonarfix_report::residuals::{Residual, residuals};
 
 use crate::output::check_file;
+use crate::robot_edit;
 use crate::table;
 
 /// Maximum number of skipped lines that are printed.
@@ -80,7 +79,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let found = calibrate(&read.recording, &walls, &nominal)
         .with_context(|| args.log.display().to_string())?;
     if let Some(out) = &args.out {
-        let text = robot_edit::edited(&text, &robot, &found)?;
+        let text = robot_edit::calibrated(&text, &robot, &found)?;
         robot_file::parse(&text, &out.display().to_string())?;
         std::fs::write(out, text).with_context(|| out.display().to_string())?;
     }

@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 
 use crate::{
     bound, calibrate, calibration, command, config, convert, export, faults, find, floor_plans,
-    health, init, map, merge, monitor, paper, pil, plan, reality, relocalize, replay, run,
+    health, init, map, measure, merge, monitor, paper, pil, plan, reality, relocalize, replay, run,
     sonar_model, survey, surveys, sweep,
 };
 
@@ -34,6 +34,8 @@ enum Command {
     Relocalize(relocalize::Args),
     /// Estimates the calibration of a robot from a recording, with a known map or true poses.
     Calibrate(calibrate::Args),
+    /// Measures encoders and servo of a robot step by step: wheels turned by hand, a sweep in a corner of a room.
+    Measure(measure::Args),
     /// Maps the walls around a robot from the recording of a drive with a sweeping sonar.
     Survey(survey::Args),
     /// Converts recordings of other formats for `replay`.
@@ -89,6 +91,7 @@ impl Cli {
             Command::Relocalize(args) => relocalize::execute(&args),
             Command::Calibrate(args) => calibrate::execute(&args),
             Command::Calibration(args) => calibration::execute(&args),
+            Command::Measure(args) => measure::execute(&args),
             Command::Survey(args) => survey::execute(&args),
             Command::Surveys(args) => surveys::execute(&args),
             Command::Convert(args) => convert::execute(&args),

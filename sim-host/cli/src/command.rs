@@ -2,9 +2,10 @@
 
 use std::path::PathBuf;
 
+use sonarfix::absolute::{AbsoluteMeasurement, PoseNoise, PositionNoise};
 use sonarfix::localizer::Start;
-use sonarfix::pose::Pose;
-use sonarfix::units::{Metres, Radians};
+use sonarfix::pose::{Point, Pose};
+use sonarfix::units::{Duration, Metres, Radians};
 use sonarfix_link::{Command, CommandResult};
 use sonarfix_map::robot_file;
 use sonarfix_monitor::{request, view};
@@ -23,19 +24,38 @@ pub struct Args {
 enum What {
     /// Restart the localizer from this pose.
     #[command(allow_negative_numbers = true)]
-    SetPose {
+    SetPose(PoseArgs),
+    /// Pass a heading from outside to the running localizer, beside its own estimate.
+    #[command(allow_negative_numbers = true)]
+    Heading {
+        /// Degrees, counter-clockwise from the map's x axis.
+        heading: f32,
+        /// Standard deviation, degrees.
+        #[arg(long, default_value_t = 3.0)]
+        deviation: f32,
+        #[command(flatten)]
+        age: Age,
+    },
+    /// Pass a position from outside to the running localizer.
+    #[command(allow_negative_numbers = true)]
+    Position {
         /// Metres along the map's x axis.
         x: f32,
         /// Metres along the map's y axis.
         y: f32,
-        /// Degrees, counter-clockwise from the map's x axis.
-        heading: f32,
-        /// Standard deviation of x and y, metres.
+        /// Standard deviation of x and of y, metres.
         #[arg(long, default_value_t = 0.05)]
-        position_deviation: f32,
-        /// Standard deviation of the heading, degrees.
-        #[arg(long, default_value_t = 3.0)]
-        heading_deviation: f32,
+        deviation: f32,
+        #[command(flatten)]
+        age: Age,
+    },
+    /// Pass a pose from outside to the running localizer.
+    #[command(allow_negative_numbers = true)]
+    Pose {
+        #[command(flatten)]
+        pose: PoseArgs,
+        #[command(flatten)]
+        age: Age,
     },
     /// Store this configuration and restart the localizer with it.
     SetConfiguration {
@@ -52,18 +72,74 @@ enum What {
     Search,
     /// Print the checksum of the map in flash.
     MapChecksum,
+    /// Turn the servo of a robot that waits to this bearing for a minute, for example to fit the horn.
+    #[command(allow_negative_numbers = true)]
+    Point {
+        /// Degrees, counter-clockwise from the robot's heading.
+        bearing: f32,
+    },
+}
+
+/// A pose with its deviations.
+#[derive(Debug, Clone, Copy, clap::Args)]
+struct PoseArgs {
+    /// Metres along the map's x axis.
+    x: f32,
+    /// Metres along the map's y axis.
+    y: f32,
+    /// Degrees, counter-clockwise from the map's x axis.
+    heading: f32,
+    /// Standard deviation of x and of y, metres.
+    #[arg(long, default_value_t = 0.05)]
+    position_deviation: f32,
+    /// Standard deviation of the heading, degrees.
+    #[arg(long, default_value_t = 3.0)]
+    heading_deviation: f32,
+}
+
+impl PoseArgs {
+    fn start(&self) -> Start {
+        Start {
+            pose: Pose::new(self.x, self.y, Radians::from_degrees(self.heading)),
+            position_deviation: Metres(self.position_deviation),
+            heading_deviation: Radians::from_degrees(self.heading_deviation),
+        }
+    }
+}
+
+/// How old a measurement is.
+#[derive(Debug, Clone, Copy, clap::Args)]
+struct Age {
+    /// How long ago it was measured, milliseconds.
+    #[arg(long, value_name = "MS", default_value_t = 0)]
+    age: u32,
+}
+
+impl Age {
+    fn command(self, measurement: AbsoluteMeasurement) -> Command {
+        Command::Absolute { age: Duration::from_ticks(1_000 * u64::from(self.age)), measurement }
+    }
 }
 
 impl What {
     fn command(&self) -> anyhow::Result<Command> {
         Ok(match self {
-            Self::SetPose { x, y, heading, position_deviation, heading_deviation } => {
+            Self::SetPose(pose) => Command::SetPose(pose.start()),
+            Self::Heading { heading, deviation, age } => {
                 let degrees = Radians::from_degrees;
-                Command::SetPose(Start {
-                    pose: Pose::new(*x, *y, degrees(*heading)),
-                    position_deviation: Metres(*position_deviation),
-                    heading_deviation: degrees(*heading_deviation),
+                age.command(AbsoluteMeasurement::Heading {
+                    angle: degrees(*heading),
+                    deviation: degrees(*deviation),
                 })
+            }
+            Self::Position { x, y, deviation, age } => {
+                let noise = PositionNoise::circular(Metres(*deviation));
+                age.command(AbsoluteMeasurement::Position { point: Point::new(*x, *y), noise })
+            }
+            Self::Pose { pose, age } => {
+                let Start { pose, position_deviation, heading_deviation } = pose.start();
+                let noise = PoseNoise::independent(position_deviation, heading_deviation);
+                age.command(AbsoluteMeasurement::Pose { pose, noise })
             }
             Self::SetConfiguration { robot } => Command::SetConfiguration(robot_file::read(robot)?),
             Self::Start => Command::Start,
@@ -71,14 +147,22 @@ impl What {
             Self::ResetCalibration => Command::ResetCalibration,
             Self::Search => Command::Search,
             Self::MapChecksum => Command::MapChecksum,
+            Self::Point { bearing } => Command::Point(Radians::from_degrees(*bearing)),
         })
     }
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
     let command = args.what.command()?;
-    match request::ask(&mut args.port.open()?, &command)? {
-        CommandResult::Done => println!("done"),
+    let mut port = args.port.open()?;
+    let (result, response) = match command {
+        Command::Absolute { .. } => request::ask_absolute(&mut port, &command)?,
+        _ => (request::ask(&mut port, &command)?, None),
+    };
+    match result {
+        CommandResult::Done => {
+            println!("{}", response.as_ref().map_or_else(|| "done".to_owned(), view::absolute));
+        }
         CommandResult::Session(number) => println!("session {number}"),
         CommandResult::Map(map) => println!("map {}", view::flashed(map)),
         CommandResult::Refused(reason) => anyhow::bail!("the robot refuses: {reason}"),

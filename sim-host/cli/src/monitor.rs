@@ -57,6 +57,11 @@ pub struct PortArgs {
 }
 
 impl PortArgs {
+    /// Its name.
+    pub fn name(&self) -> &str {
+        &self.port
+    }
+
     /// Opens it.
     pub fn open(&self) -> anyhow::Result<Port> {
         Port::open(&self.port, self.baud)

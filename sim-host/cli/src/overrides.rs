@@ -2,14 +2,15 @@
 
 use clap::ValueEnum;
 use sonarfix::aim::Policy;
-use sonarfix::config::PingSchedule;
+use sonarfix::config::{LightBeam, PingSchedule, Ranging};
 use sonarfix::gyro::GyroParameters;
-use sonarfix::units::Duration;
+use sonarfix::units::{Duration, Radians};
 use sonarfix_hal::config::StartPose;
 use sonarfix_map::{
     AbsoluteSensors, Fidelity, HeadingSensor, HeadingSlip, PositionSensor, Sampling, Scenario,
-    ServoName,
+    ServoName, SonarName,
 };
+use sonarfix_plan::preset::SonarPreset;
 use sonarfix_sim::pins::devices;
 
 /// Changes of a scenario; by default it stays as it is.
@@ -27,6 +28,13 @@ pub struct Overrides {
     /// The servo of the sonar, in the simulation and in the ping schedule.
     #[arg(long, value_enum)]
     servo: Option<ServoChoice>,
+    /// The ranger in place of the robot's, in the simulation and in the robot; the ping schedule stays.
+    #[arg(long, value_name = "NAME", value_parser = sensor)]
+    sensor: Option<SonarPreset>,
+    /// Measures along a beam of light in place of sound, up to 40 degrees from the perpendicular of a wall, with the noise and
+    /// reach of the scenario: the beam of a VL53L1X without its other errors.
+    #[arg(long, conflicts_with = "sensor")]
+    light: bool,
     /// Scale error of the ranges, as a fraction like 0.01; it is also the prior standard deviation
     /// of the range scale in the filter.
     #[arg(long, value_name = "FRACTION")]
@@ -108,11 +116,10 @@ enum AbsoluteChoice {
 
 impl AbsoluteChoice {
     fn sensors(self) -> AbsoluteSensors {
-        let sampling = Sampling { period: 730_000, delay: 20_000, outliers: 0.0 };
-        let (deviation, turn) = (0.02, 2.0_f64.to_radians());
-        let heading = HeadingSensor { sampling, deviation: turn };
-        let heading_deviation = (self == Self::Pose).then_some(turn);
-        let position = PositionSensor { sampling, deviation, heading_deviation };
+        let heading = HeadingSensor::COMPASS;
+        let heading_deviation = (self == Self::Pose).then_some(heading.deviation);
+        let sampling = Sampling::EXAMPLE;
+        let position = PositionSensor { sampling, deviation: 0.02, heading_deviation };
         AbsoluteSensors {
             heading: (self == Self::Heading).then_some(heading),
             position: (self != Self::Heading).then_some(position),
@@ -131,9 +138,35 @@ fn schedule(text: &str) -> Result<PingSchedule, String> {
     Ok(PingSchedule::Every(Duration::from_ticks(sonarfix_sim::time::micros(seconds))))
 }
 
+fn sensor(name: &str) -> Result<SonarPreset, String> {
+    let known = || SonarPreset::ALL.map(SonarPreset::file_name).join(", ");
+    SonarPreset::named(name).ok_or_else(|| format!("must be one of {}", known()))
+}
+
+/// The largest angle of incidence with the option `--light`, degrees.
+const LIGHT_CONE: f32 = 40.0;
+
+/// Whether the sonar of a robot is on a servo, which an option replaces.
+pub fn has_servo(scenario: &Scenario) -> anyhow::Result<()> {
+    let is_fixed = scenario.robot.localizer.sonar.fixed_bearing().is_some();
+    anyhow::ensure!(!is_fixed, "--servo: the robot's sonar has a fixed bearing and no servo");
+    Ok(())
+}
+
 impl Overrides {
     /// Applies the changes to a scenario.
     pub fn apply(&self, scenario: &mut Scenario) -> anyhow::Result<()> {
+        if let Some(preset) = self.sensor {
+            let schedule = scenario.robot.localizer.sonar.timing.schedule;
+            preset.fit(scenario);
+            scenario.robot.localizer.set_ping_schedule(schedule);
+        }
+        if self.light {
+            let sonar = &mut scenario.robot.localizer.sonar;
+            sonar.ranging = Ranging::Light(LightBeam::VL53L1X);
+            sonar.cone = Radians::from_degrees(LIGHT_CONE);
+            scenario.hardware.sonar = SonarName::Ideal;
+        }
         let config = &mut scenario.robot.localizer;
         config.policy = self.policy.map_or(config.policy, Policy::from);
         match self.fidelity {
@@ -142,9 +175,10 @@ impl Overrides {
             None => {}
         }
         if let Some(schedule) = self.fix_period {
-            config.sonar.timing.schedule = schedule;
+            config.set_ping_schedule(schedule);
         }
         if let Some(servo) = self.servo {
+            has_servo(scenario)?;
             let name = match servo {
                 ServoChoice::Ideal => ServoName::Ideal,
                 ServoChoice::Sg90 => ServoName::Sg90,

@@ -5,12 +5,13 @@ use std::path::{Path as FilePath, PathBuf};
 use anyhow::Context;
 use sonarfix_map::{MapFile, Scenario, SonarModel, robot_file};
 use sonarfix_plan::preset::{ServoPreset, SonarPreset};
-use sonarfix_plan::{BLIND_AFTER, Forecast, Spread, route};
+use sonarfix_plan::{BLIND_AFTER, Forecast, HeadingAid, Spread, route};
 use sonarfix_report::Table;
 use sonarfix_report::heat_map::{Heat, HeatMap};
 use sonarfix_studies::floor_plan::{FloorPlan, picture};
 
 use crate::output::check_file;
+use crate::overrides::has_servo;
 use crate::progress::Runs;
 use crate::table;
 
@@ -31,7 +32,7 @@ pub struct Args {
     /// The servo of the sonar; by default the scenario's.
     #[arg(long, value_enum)]
     servo: Option<ServoPreset>,
-    /// Compares all sonars.
+    /// Compares all sonars, each alone, with a gyro, and with a compass.
     #[arg(long, conflicts_with = "sensor")]
     compare: bool,
     /// The required position accuracy, one standard deviation, millimetres: marks the sonars that
@@ -53,6 +54,9 @@ pub struct Args {
 #[derive(Debug, serde::Serialize)]
 struct Candidate {
     sensor: String,
+    /// With `--compare`, what measures the heading beside wheels and sonar.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    heading_aid: Option<HeadingAid>,
     #[serde(flatten)]
     forecast: Forecast,
     /// With `--need`, the bound on the position from a known start, metres.
@@ -60,7 +64,22 @@ struct Candidate {
     from_known_start: Option<Spread>,
 }
 
+/// A robot to be compared.
+struct Fitted {
+    sensor: String,
+    heading_aid: Option<HeadingAid>,
+    scenario: Scenario,
+}
+
 impl Candidate {
+    /// Its sonar, and what measures the heading beside it.
+    fn name(&self) -> String {
+        match self.heading_aid {
+            None | Some(HeadingAid::None) => self.sensor.clone(),
+            Some(aid) => format!("{} and {}", self.sensor, aid.name()),
+        }
+    }
+
     /// Whether the bound from a known start stays within this accuracy, millimetres.
     fn suffices(&self, need: f64) -> bool {
         self.from_known_start.is_some_and(|spread| 1e3 * spread.worst <= need)
@@ -84,13 +103,13 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let count = u32::try_from(forecasts).unwrap_or(u32::MAX);
     let runs = Runs::new(args.runs.saturating_mul(count));
     let mut candidates = Vec::new();
-    for (sensor, mut scenario) in fitted {
+    for Fitted { sensor, heading_aid, mut scenario } in fitted {
         let Some(forecast) = Forecast::new(&scenario, args.runs, &runs)? else { continue };
         scenario.start.position = KNOWN_POSITION;
         scenario.start.heading = KNOWN_HEADING;
         let known = args.need.map(|_| Forecast::new(&scenario, args.runs, &runs)).transpose()?;
         let from_known_start = known.flatten().map(|forecast| forecast.position);
-        candidates.push(Candidate { sensor, forecast, from_known_start });
+        candidates.push(Candidate { sensor, heading_aid, forecast, from_known_start });
     }
     runs.end()?;
     candidates.sort_by(|a, b| a.forecast.position.rms.total_cmp(&b.forecast.position.rms));
@@ -134,16 +153,19 @@ fn scenario(args: &Args) -> anyhow::Result<Scenario> {
 }
 
 /// The scenario with each requested sonar.
-fn fitted(args: &Args, scenario: &Scenario) -> anyhow::Result<Vec<(String, Scenario)>> {
+fn fitted(args: &Args, scenario: &Scenario) -> anyhow::Result<Vec<Fitted>> {
     let mut scenario = scenario.clone();
     if let Some(servo) = args.servo {
+        has_servo(&scenario)?;
         servo.fit(&mut scenario);
     }
     if args.compare {
-        return Ok(SonarPreset::ALL.map(|preset| with(preset, &scenario)).to_vec());
+        let aided = |preset| HeadingAid::ALL.map(|aid| with(preset, &scenario).aided(aid));
+        return Ok(SonarPreset::ALL.into_iter().flat_map(aided).collect());
     }
     let Some(sensor) = &args.sensor else {
-        return Ok(vec![("its own sonar".to_owned(), scenario)]);
+        let sensor = "its own sonar".to_owned();
+        return Ok(vec![Fitted { sensor, heading_aid: None, scenario }]);
     };
     if let Some(preset) = SonarPreset::named(sensor) {
         return Ok(vec![with(preset, &scenario)]);
@@ -156,13 +178,20 @@ fn fitted(args: &Args, scenario: &Scenario) -> anyhow::Result<Vec<(String, Scena
     );
     anyhow::ensure!(file.exists(), "--sensor: \"{sensor}\" is neither a file nor one of {known}");
     scenario.robot = robot_file::read(file)?;
-    Ok(vec![(sensor.clone(), scenario)])
+    Ok(vec![Fitted { sensor: sensor.clone(), heading_aid: None, scenario }])
 }
 
-fn with(preset: SonarPreset, scenario: &Scenario) -> (String, Scenario) {
+fn with(preset: SonarPreset, scenario: &Scenario) -> Fitted {
     let mut scenario = scenario.clone();
     preset.fit(&mut scenario);
-    (preset.name().to_owned(), scenario)
+    Fitted { sensor: preset.name().to_owned(), heading_aid: None, scenario }
+}
+
+impl Fitted {
+    fn aided(mut self, aid: HeadingAid) -> Self {
+        aid.fit(&mut self.scenario);
+        Self { heading_aid: Some(aid), ..self }
+    }
 }
 
 fn millimetres(spread: Spread) -> String {
@@ -229,16 +258,16 @@ fn legs(candidate: &Candidate, need: Option<f64>) -> Table {
     }
 }
 
-/// One line per sonar.
+/// One line per sonar and heading aid.
 fn comparison(candidates: &[Candidate], need: Option<f64>) -> Table {
-    let mut columns =
-        vec!["sonar", "position (mm)", "worst at (m)", "heading (°)", "longest blind (s)"];
-    columns.extend(["blind (%)", "ranges/s"]);
+    let mut columns = vec!["sonar", "beside it", "position (mm)", "worst at (m)", "heading (°)"];
+    columns.extend(["longest blind (s)", "blind (%)", "ranges/s"]);
     columns.extend(need.into_iter().flat_map(|_| ["from a known start (mm)", "would do"]));
     let row = |candidate: &Candidate| {
-        let Candidate { sensor, forecast, from_known_start } = candidate;
+        let Candidate { sensor, heading_aid, forecast, from_known_start } = candidate;
         let mut row = vec![
             sensor.clone(),
+            heading_aid.map_or("", HeadingAid::name).to_owned(),
             millimetres(forecast.position),
             point(forecast.worst_at),
             degrees(forecast.heading),
@@ -270,18 +299,18 @@ fn comparison(candidates: &[Candidate], need: Option<f64>) -> Table {
     }
 }
 
-fn picture(scenario: &Scenario, Candidate { sensor, forecast, .. }: &Candidate) -> HeatMap {
+fn picture(scenario: &Scenario, candidate: &Candidate) -> HeatMap {
     let heat = |sample: &sonarfix_plan::Sample| Heat {
         at: sample.at,
         value: 1e3 * sample.position(),
         marked: sample.blind,
     };
     HeatMap {
-        title: format!("{}: {sensor}", scenario.name),
+        title: format!("{}: {}", scenario.name, candidate.name()),
         label: "bound on the position error (mm)".to_owned(),
         mark: format!("blind for more than {BLIND_AFTER:.0} s"),
         unmapped: Vec::new(),
-        path: forecast.samples.iter().map(heat).collect(),
+        path: candidate.forecast.samples.iter().map(heat).collect(),
         ..picture::place(scenario)
     }
 }

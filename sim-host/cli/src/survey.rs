@@ -6,8 +6,9 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use sonarfix_batch::log;
-use sonarfix_map::robot_file;
+use sonarfix_map::{MapFile, NamedWall, robot_file};
 use sonarfix_report::Table;
+use sonarfix_survey::comparison::{alignment, counterpart};
 use sonarfix_survey::drawing::{draw, name};
 use sonarfix_survey::map_text::map_text;
 use sonarfix_survey::problem::Robot;
@@ -36,6 +37,9 @@ pub struct Args {
     /// Measured length of a wall of the map, for example "wall 3=6.00 m": the map is scaled to it.
     #[arg(long, value_name = "WALL=LENGTH")]
     measured: Option<String>,
+    /// A map in the frame of the start pose, with which the walls are compared.
+    #[arg(long, value_name = "MAP.toml")]
+    compare: Option<PathBuf>,
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
@@ -45,6 +49,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         }
     }
     let measured = args.measured.as_deref().map(Measured::parse).transpose()?;
+    let map = args.compare.as_deref().map(|file| MapFile::read(file, None)).transpose()?;
     let robot_path = args.robot.clone().unwrap_or_else(|| args.log.with_file_name("robot.toml"));
     let robot = robot_file::read(&robot_path)?;
     let file = File::open(&args.log).with_context(|| args.log.display().to_string())?;
@@ -67,6 +72,9 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         std::fs::write(out, draw(&found)).with_context(|| out.display().to_string())?;
     }
     println!("{}", table::text(&walls(&found)));
+    if let Some(map) = &map {
+        println!("\n{}", table::text(&comparison(&found, map)));
+    }
     println!("\n{}", verdict(&found));
     Ok(())
 }
@@ -140,6 +148,48 @@ fn walls(found: &Survey) -> Table {
     }
 }
 
+/// Each wall of the survey beside that of a map, as it is and after the motion that fits best; the note counts those without one.
+fn comparison(found: &Survey, map: &MapFile) -> Table {
+    let named = map.floor.named_walls();
+    let ends: Vec<_> = named.iter().map(|wall| [wall.from().into(), wall.to().into()]).collect();
+    let motion = alignment(&found.walls, &ends);
+    let moved = |wall: &MappedWall| MappedWall {
+        from: motion.of(&wall.from),
+        to: motion.of(&wall.to),
+        ..*wall
+    };
+    let matches: Vec<_> = found.walls.iter().map(|wall| counterpart(wall, &ends)).collect();
+    let is_found = |index: usize| matches.iter().flatten().any(|found| found.index == index);
+    let row = |(index, wall): (usize, &MappedWall)| {
+        let its = counterpart(wall, &ends);
+        let wall_of_map = its.and_then(|its| named.get(its.index)).map_or("", NamedWall::name);
+        let mut row = vec![name(index), wall_of_map.to_owned()];
+        for its in [its, counterpart(&moved(wall), &ends)] {
+            row.extend(its.map_or_else(<[String; 2]>::default, |its| {
+                [format!("{:.1}", 1e3 * its.offset), format!("{:.2}", its.angle.to_degrees())]
+            }));
+        }
+        row
+    };
+    Table {
+        title: format!("Compared with {}", map.name()),
+        note: format!(
+            "{} of {} walls of the map are found, {} other walls; offset in mm, angle in degrees, both also after the \
+             motion of the survey that fits best, {:+.0} mm, {:+.0} mm and {:+.2}°",
+            (0..named.len()).filter(|&index| is_found(index)).count(),
+            named.len(),
+            matches.iter().filter(|found| found.is_none()).count(),
+            1e3 * motion.shift.x,
+            1e3 * motion.shift.y,
+            motion.turn.to_degrees()
+        ),
+        columns: ["", "wall of the map", "offset", "angle", "offset moved", "angle moved"]
+            .map(str::to_owned)
+            .to_vec(),
+        rows: found.walls.iter().enumerate().map(row).collect(),
+    }
+}
+
 /// The verdict, and what to drive again.
 fn verdict(found: &Survey) -> String {
     let (fitting, all) = found.explained;
@@ -153,10 +203,7 @@ fn verdict(found: &Survey) -> String {
         100.0 * track
     )];
     if found.is_sure() {
-        lines.push(format!(
-            "The map is sure. In the robot file: [echo] map_accuracy = \"{:.0} mm\"",
-            1e3 * found.accuracy()
-        ));
+        lines.push("The map is sure.".to_owned());
     } else {
         for reason in &found.reasons {
             lines.push(format!("UNSURE: {reason}."));

@@ -24,7 +24,7 @@ const PAPER: &str = "../../crates/sonarfix-map/scenarios/paper.toml";
 
 /// Every subcommand, with arguments for the shortest output. In `FILES` are a short log with its map and robot, a drive for
 /// the calibration, a recorded stream of a robot's bytes, rows, and room for results; `ROBOT` is the port of a robot.
-const PRINTING: [&[&str]; 42] = [
+const PRINTING: [&[&str]; 47] = [
     &["--help"],
     &["init", "FILES/robot"],
     &["paper", "--runs", "1"],
@@ -44,14 +44,20 @@ const PRINTING: [&[&str]; 42] = [
     &["convert", "lego", "--help"],
     &["convert", "nxt", "--help"],
     &["sonar-model", "--help"],
+    // This needs a person.
+    &["measure", "--help"],
     &["monitor", "--port", "FILES/bytes"],
     &["command", "--port", "ROBOT", "set-pose", "1", "2", "90"],
+    &["command", "--port", "ROBOT", "heading", "90"],
+    &["command", "--port", "ROBOT", "position", "1", "2"],
+    &["command", "--port", "ROBOT", "pose", "1", "2", "90"],
     &["command", "--port", "ROBOT", "set-configuration", "tests/robot.toml"],
     &["command", "--port", "ROBOT", "start"],
     &["command", "--port", "ROBOT", "stop"],
     &["command", "--port", "ROBOT", "reset-calibration"],
     &["command", "--port", "ROBOT", "search"],
     &["command", "--port", "ROBOT", "map-checksum"],
+    &["command", "--port", "ROBOT", "point", "-30"],
     &["config", "bake", "tests/robot.toml", "--out", "FILES/config.bin"],
     &["config", "check", "FILES/config.bin"],
     &["config", "show", "FILES/config.bin"],
@@ -146,8 +152,9 @@ fn every_subcommand_is_in_the_table() {
 /// The options that name a file or folder, of all subcommands: those that are written are in [`WRITING`].
 #[test]
 fn every_option_that_names_a_result_is_in_the_table() {
-    const READ: [&str; 11] = [
+    const READ: [&str; 12] = [
         "--board",
+        "--compare",
         "--config",
         "--data",
         "--firmware",
@@ -273,7 +280,8 @@ fn a_long_line_is_not_echoed() {
 }
 
 /// The options that name a result, each in a command that would otherwise end with another error, or work for hours.
-const WRITING: [(&[&str], &str); 32] = [
+const WRITING: [(&[&str], &str); 33] = [
+    (&["measure", "--port", "missing"], "--out"),
     (&["paper", "--runs", "4000000"], "--out"),
     (&["run", CLASSROOM, "--runs", "4000000"], "--out"),
     (&["run", CLASSROOM, "--runs", "4000000"], "--trace"),

@@ -9,9 +9,13 @@ use std::path::Path;
 use std::process::{Command, Output};
 use std::thread::{self, JoinHandle};
 
+use sonarfix::absolute::{AbsoluteMeasurement, PoseNoise, PositionNoise};
 use sonarfix::config::Policy;
 use sonarfix::ekf::{StandardDeviations, StateEstimate};
+use sonarfix::localizer::{AbsoluteFix, Agreement};
+use sonarfix::pose::{Point, Pose};
 use sonarfix::units::{Instant, Metres, Radians};
+use sonarfix_hal::robot::AbsoluteResult;
 use sonarfix_link::message::{CommandError, ImageStatus, Odometry, ResetCause};
 use sonarfix_link::{
     Command as Order, CommandResult, Hello, Receiver, Reporter, Sender, Session, SessionCommand,
@@ -77,6 +81,67 @@ fn a_command_is_repeated_until_answered_and_executed_once() {
     let [Order::SetPose(start)] = done[..] else { panic!("{done:?}") };
     assert_eq!((start.pose.x, start.pose.y), (Metres(1.5), Metres(-2.0)));
     assert_eq!(start.pose.heading.radians(), Radians::from_degrees(-90.0));
+}
+
+#[test]
+fn a_heading_a_position_and_a_pose_are_commands() {
+    let sent = |arguments: &[&str]| {
+        let (port, robot) = robot(0, CommandResult::Refused(CommandError::Waiting));
+        let output = sonarfix(&[&["command", "--port", &port], arguments].concat());
+        let refused = "error: the robot refuses: the loop does not run: start it first\n";
+        assert_eq!(printed(&output).1, refused);
+        let done = robot.join().unwrap();
+        let [Order::Absolute { age, measurement }] = done[..] else { panic!("{done:?}") };
+        (age.to_millis(), measurement)
+    };
+    let degrees = Radians::from_degrees;
+    let heading = AbsoluteMeasurement::Heading { angle: degrees(-90.0), deviation: degrees(5.0) };
+    assert_eq!(sent(&["heading", "-90", "--deviation", "5", "--age", "40"]), (40, heading));
+    let noise = PositionNoise::circular(Metres(0.05));
+    let position = AbsoluteMeasurement::Position { point: Point::new(1.5, -2.0), noise };
+    assert_eq!(sent(&["position", "1.5", "-2"]), (0, position));
+    let noise = PoseNoise::independent(Metres(0.1), degrees(3.0));
+    let pose = AbsoluteMeasurement::Pose { pose: Pose::new(1.0, 2.0, degrees(45.0)), noise };
+    assert_eq!(sent(&["pose", "1", "2", "45", "--position-deviation", "0.1"]), (0, pose));
+}
+
+/// The localizer's response is printed.
+#[test]
+fn what_the_localizer_did_with_a_position_is_printed() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = format!("tcp:{}", listener.local_addr().unwrap());
+    let robot = thread::spawn(move || {
+        let (mut stream, _) = listener.accept().unwrap();
+        let mut receiver = Receiver::<SessionCommand>::new();
+        let mut telemetry = Sender::<Telemetry>::new();
+        let (mut session, mut buffer) = (Session::default(), [0; 256]);
+        while let Ok(count @ 1..) = stream.read(&mut buffer) {
+            for frame in buffer[..count].iter().filter_map(|&byte| receiver.push(byte)) {
+                let mut taken = None;
+                let ack = session.answer(&frame, 77, |order| {
+                    if let Order::Absolute { measurement, .. } = *order {
+                        let (at, measured_at) = (at(0.5), at(0.45));
+                        let fix = AbsoluteFix::Gated(Agreement { nis: 50.0, dimensions: 2 });
+                        taken = Some(AbsoluteResult { at, measured_at, measurement, fix });
+                    }
+                    CommandResult::Done
+                });
+                send(&mut stream, &mut telemetry, &ack, true);
+                if let Some(result) = taken {
+                    send(&mut stream, &mut telemetry, &Telemetry::Absolute(result), true);
+                }
+            }
+        }
+    });
+    let output = sonarfix(&["command", "--port", &port, "position", "1.5", "-2"]);
+    let (stdout, stderr) = printed(&output);
+    assert!(output.status.success(), "{stderr}");
+    assert_eq!(stdout, "outside x 1.500 m, y -2.000 m, measured 0.050 s before, gated\n");
+    robot.join().unwrap();
+}
+
+fn at(seconds: f64) -> Instant {
+    Instant::from_ticks(sonarfix_sim::time::micros(seconds))
 }
 
 #[test]

@@ -16,7 +16,9 @@ use std::thread;
 use std::time::Duration;
 
 use serde_json::Value;
+use sonarfix::absolute::{AbsoluteMeasurement, PositionNoise};
 use sonarfix::ekf::{StandardDeviations, StateEstimate};
+use sonarfix::pose::Point;
 use sonarfix::units::{Instant, Metres, Radians};
 use sonarfix_link::message::Odometry;
 use sonarfix_link::{
@@ -27,7 +29,9 @@ use sonarfix_live::feed::{Feed, Scene, Status};
 use sonarfix_live::order::{Orders, Reply};
 use sonarfix_live::ring::{CAPACITY, Ring};
 use sonarfix_live::server::Server;
-use sonarfix_sim::trace::{FixRecord, Hypothesis, Outcome, Pose, SearchRecord, Tick, Wall};
+use sonarfix_sim::trace::{
+    AbsoluteRecord, FixRecord, GyroEstimate, Hypothesis, Outcome, Pose, SearchRecord, Tick, Wall,
+};
 
 use crate::chromium;
 use crate::skipped;
@@ -428,6 +432,8 @@ fn a_page_commands_and_records_the_robot() {
     let set = "{\"order\":\"set_pose\",\"x\":1.5,\"y\":-2,\"heading\":0.5,\"position_deviation\":0.05,\"heading_deviation\":0.1}";
     assert!(order(set).ends_with("{\"done\":true,\"text\":\"done\"}"));
     assert!(order("{\"order\":\"start\"}").ends_with("{\"done\":true,\"text\":\"done\"}"));
+    let tap = "{\"order\":\"position\",\"x\":1,\"y\":2,\"deviation\":0.1}";
+    assert!(order(tap).ends_with("{\"done\":true,\"text\":\"done\"}"));
     assert!(order("{\"order\":\"speed\",\"factor\":2}").contains("\"done\":false"));
 
     let answer = order("{\"order\":\"record\",\"on\":true}");
@@ -443,7 +449,13 @@ fn a_page_commands_and_records_the_robot() {
 
     monitored.robot.stream.shutdown(std::net::Shutdown::Both).unwrap();
     let done = answers.join().unwrap();
-    let [Order::SetPose(start), Order::Start] = done[..] else { panic!("{done:?}") };
+    let [Order::SetPose(start), Order::Start, Order::Absolute { age, measurement }] = done[..]
+    else {
+        panic!("{done:?}")
+    };
+    let noise = PositionNoise::circular(Metres(0.1));
+    let tapped = AbsoluteMeasurement::Position { point: Point::new(1.0, 2.0), noise };
+    assert_eq!((age.ticks(), measurement), (0, tapped));
     assert_eq!((start.pose.x, start.pose.y), (Metres(1.5), Metres(-2.0)));
 }
 
@@ -491,7 +503,13 @@ fn filled() -> Page {
         estimate.deviation = [0.01, 0.02 + 0.005 * time.sin(), 0.03, 0.01, 0.01, 0.002, 0.01];
         estimate.calibration.track_width = 0.12;
         let odometry = Pose { y: pose.y + 0.01 * time, ..pose };
+        let slips = number / 70;
+        estimate.gyro =
+            Some(GyroEstimate { bias: 0.02 * (0.2 * time).tanh(), deviation: 0.001, slips });
         feed.tick(&Tick { time, truth: None, estimate, bound: None, odometry });
+        if number.is_multiple_of(9) {
+            feed.absolute(&outside(time, pose, number));
+        }
         feed.wheels(time, 0.015 * f64::from(number), 0.0149 * f64::from(number));
         if number.is_multiple_of(5) {
             feed.fix(&fix(time, [x, pose.y], number));
@@ -519,9 +537,24 @@ fn filled() -> Page {
     page
 }
 
+/// A pose from outside; every third is an outlier.
+fn outside(time: f64, pose: Pose, number: u32) -> AbsoluteRecord {
+    let is_outlier = number.is_multiple_of(27);
+    let aside = if is_outlier { 0.9 } else { 0.03 * time.sin() };
+    AbsoluteRecord {
+        time,
+        position: Some([pose.x, pose.y + aside]),
+        heading: Some(pose.heading + aside),
+        outcome: if is_outlier { Outcome::Gated } else { Outcome::Accepted },
+        reason: String::new(),
+        nis: Some(if is_outlier { 90.0 } else { time.cos().powi(2) }),
+    }
+}
+
 fn fix(time: f64, sonar: [f64; 2], number: u32) -> FixRecord {
     let is_gated = number.is_multiple_of(25);
     FixRecord {
+        ranger: 0,
         time,
         wall: Some(1),
         sonar,
@@ -539,7 +572,7 @@ fn fix(time: f64, sonar: [f64; 2], number: u32) -> FixRecord {
 }
 
 /// What the page shows of [`filled`].
-const SHOWN: [&str; 9] = [
+const SHOWN: [&str; 12] = [
     "A &lt;b&gt;robot&lt;/b&gt;",
     "tracking</b>",
     "19.9 s",
@@ -549,6 +582,9 @@ const SHOWN: [&str; 9] = [
     "a notice",
     ">ended<",
     "missed <",
+    "1.145°/s ± 0.057°/s",
+    "slips <",
+    "0.1 s ago, 3.47 m,",
 ];
 
 #[test]

@@ -15,6 +15,7 @@ mod link_command;
 mod live;
 mod map_command;
 mod map_exchange;
+mod measure;
 mod monitor;
 mod plan;
 mod recordings;

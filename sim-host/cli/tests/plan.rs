@@ -7,7 +7,8 @@ use std::path::Path as FilePath;
 use std::process::{Command, Output};
 
 use serde_json::Value;
-use sonarfix_map::{PAPER, Scenario};
+use sonarfix::gyro::GyroParameters;
+use sonarfix_map::{GyroTruth, HeadingSensor, PAPER, Scenario};
 use sonarfix_plan::preset::SonarPreset;
 use sonarfix_plan::{Forecast, Sample};
 use sonarfix_sim::simulate::Simulation;
@@ -121,11 +122,15 @@ fn a_corridor_is_blind_until_its_end_is_in_range() {
     assert!((28.0..34.0).contains(&to), "{to}");
 }
 
-/// Wheel errors and unmapped obstacles do not enter a forecast.
+/// Errors of wheels, gyro and compass, and unmapped obstacles do not enter a forecast.
 #[test]
-fn wheel_errors_and_obstacles_do_not_enter_a_forecast() {
-    let honest = paper();
+fn errors_and_obstacles_do_not_enter_a_forecast() {
+    let mut honest = paper();
+    honest.robot.localizer.gyro = Some(GyroParameters::MPU_6050);
+    honest.absolute.heading = Some(HeadingSensor::COMPASS);
     let mut wrong = honest.clone();
+    wrong.truth.gyro = GyroTruth { bias: Some(0.05), scale: 0.02 };
+    wrong.absolute.heading.as_mut().unwrap().sampling.outliers = 0.3;
     wrong.truth.scale_right = 0.02;
     wrong.truth.wheel_noise = 0.01;
     wrong.start.drawn = true;
@@ -171,8 +176,36 @@ fn sonars_are_compared_the_best_first() {
     assert_documented(&answer);
     let rms: Vec<f64> =
         answer.as_array().unwrap().iter().map(|c| number(&c["position"]["rms"])).collect();
-    assert_eq!(rms.len(), 4);
+    assert_eq!(rms.len(), 15);
     assert!(rms.is_sorted(), "{rms:?}");
+}
+
+/// A gyro and a compass reduce the uncertainty of the heading with every sonar; a scenario's own gyro counts.
+#[test]
+fn sonars_are_compared_with_and_without_a_gyro_and_a_compass() {
+    let dir = tempfile::tempdir().unwrap();
+    let gyro = "[robot.gyro]\nsensor = \"mpu6050\"\nnoise = \"30 deg/sqrt(s)\"\n\n[robot.prior]";
+    let noisy = PAPER.replace("laps = 4", "laps = 1").replace("[robot.prior]", gyro);
+    let room = write(dir.path(), "room.toml", ROOM);
+    let noisy = write(dir.path(), "noisy.toml", &noisy);
+    let compared = |arguments: &[&str]| -> Value {
+        let arguments = [&["plan"], arguments, &["--compare", "--runs", "2", "--json"]].concat();
+        serde_json::from_str(&text(&sonarfix(&arguments))).unwrap()
+    };
+    let heading = |answer: &Value, sensor: &str, aid: &str| {
+        let mut candidates = answer.as_array().unwrap().iter();
+        let found = candidates.find(|it| it["sensor"] == sensor && it["heading_aid"] == aid);
+        number(&found.unwrap()["heading"]["rms"])
+    };
+    let in_room = compared(&[&room, "--path", "1,1 1,3 4,3 4,1"]);
+    for sensor in ["HC-SR04", "LV-MaxSonar", "SRF08", "Polaroid 6500"] {
+        let of = |aid| heading(&in_room, sensor, aid);
+        assert!(of("gyro") < 0.9 * of("none"), "{sensor}: {} {}", of("gyro"), of("none"));
+        assert!(of("compass") < of("none"), "{sensor}: {} {}", of("compass"), of("none"));
+    }
+    let with_noise = compared(&[&noisy]);
+    let of = |aid| heading(&with_noise, "Polaroid 6500", aid);
+    assert!((0.97..1.001).contains(&(of("gyro") / of("none"))), "{} {}", of("gyro"), of("none"));
 }
 
 /// The start of a scenario may be less certain than what is needed; what the sonar does along the path is another matter.

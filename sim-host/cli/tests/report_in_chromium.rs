@@ -5,7 +5,8 @@ use std::f64::consts::FRAC_PI_2;
 
 use sonarfix_report::{Report, Table};
 use sonarfix_sim::trace::{
-    Calibration, Estimate, FixRecord, Outcome, Pose, Tick, Trace, Truth, Wall,
+    AbsoluteRecord, Calibration, Estimate, FixRecord, GyroEstimate, Outcome, Pose, Tick, Trace,
+    Truth, Wall,
 };
 use sonarfix_sim::world::reflector::Source;
 
@@ -24,6 +25,15 @@ fn trace(truth_known: bool) -> Trace {
         start: None,
         ticks: (0..200).map(|n| tick(f64::from(n) * 0.1, truth_known)).collect(),
         searches: Vec::new(),
+        absolutes: if truth_known {
+            vec![
+                outside(4.0, Outcome::Accepted, Some(0.8)),
+                outside(5.0, Outcome::Gated, Some(70.0)),
+                outside(6.0, Outcome::Refused, None),
+            ]
+        } else {
+            Vec::new()
+        },
         fixes: vec![
             fix(1.0, Outcome::Accepted, Some(1.0), ""),
             fix(2.0, Outcome::Gated, Some(0.4), ""),
@@ -35,20 +45,37 @@ fn trace(truth_known: bool) -> Trace {
 fn tick(time: f64, truth_known: bool) -> Tick {
     let pose = Pose { x: 0.2 + 0.05 * time, y: 1.0, heading: 0.0 };
     let calibration = Calibration { track_width: 0.1, ..Calibration::default() };
+    // The run of which the truth is known has a gyro.
+    let gyro = GyroEstimate {
+        bias: 0.012 + 0.01 / (1.0 + time),
+        deviation: 0.01 / (1.0 + time),
+        slips: u32::from(time > 5.0) + u32::from(time > 12.0),
+    };
     let estimate = Estimate {
+        gyro: truth_known.then_some(gyro),
         pose: Pose { x: pose.x + 0.002, ..pose },
         calibration,
         deviation: [0.003, 0.002, 0.01, 1e-3, 1e-3, 1e-3, 1e-3],
         covariance_xy: 1e-6,
         ..Estimate::default()
     };
-    let truth = truth_known.then_some(Truth { pose, calibration: Some(calibration) });
+    let truth = truth_known.then_some(Truth {
+        pose,
+        calibration: Some(calibration),
+        gyro_bias: Some(0.012),
+    });
     let odometry = Pose { y: 1.0 + 0.01 * time, ..pose };
     Tick { time, truth, estimate, odometry, bound: None }
 }
 
+fn outside(time: f64, outcome: Outcome, nis: Option<f64>) -> AbsoluteRecord {
+    let (position, reason) = (Some([0.3, 1.1]), String::new());
+    AbsoluteRecord { time, position, heading: Some(0.1), outcome, reason, nis }
+}
+
 fn fix(time: f64, outcome: Outcome, range: Option<f64>, reason: &str) -> FixRecord {
     FixRecord {
+        ranger: 0,
         time,
         wall: Some(0),
         sonar: [0.2 + 0.05 * time, 1.0],
@@ -135,8 +162,12 @@ fn the_page_draws_without_an_error() {
             return;
         };
         assert_ready(&dom);
-        assert_eq!(dom.matches("<svg").count(), 20);
-        assert_eq!(dom.matches("class=\"zoom\"").count(), 10, "the figures have no script");
+        // Those of a gyro and of measurements from outside only where there are any.
+        let figures = if truth_known { 12 } else { 10 };
+        assert_eq!(dom.matches("<svg").count(), 2 * figures);
+        assert_eq!(dom.matches("class=\"zoom\"").count(), figures, "the figures have no script");
+        let bias = "1.261°/s ± 0.573°/s"; // at the start
+        assert_eq!(dom.contains(bias), truth_known, "the player shows the bias of a gyro");
         assert!(dom.contains("<h1>A &lt;small&gt; room</h1>"));
         assert!(dom.contains("<td>0.125 deg</td>"));
         assert!(

@@ -34,6 +34,10 @@ fn a_measured_wall_scales_the_map() {
     let plain = walls(&folder.join("map.toml"));
     assert_eq!(plain.len(), 4);
 
+    let output = survey(&["--compare", "drive/true-map.toml"]);
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(text.contains("4 of 4 walls of the map are found, 0 other walls"), "{text}");
+
     let output = survey(&["--out", "scaled.toml", "--measured", "wall 2 = 660 cm"]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let scaled = walls(&folder.join("scaled.toml"));

@@ -83,7 +83,13 @@ pub fn topics() -> Vec<(&'static str, Schema)> {
     let ticks = [("time_s", REAL), ("right", whole), ("left", whole)];
     let wheels = [("time_s", REAL), ("right_m", REAL), ("left_m", REAL)];
     let turn = [("time_s", REAL), ("angle", whole), ("breaks", whole)];
-    let range = [("time_s", REAL), ("bearing_rad", REAL), ("range_m", REAL), ("wall", whole)];
+    let range = [
+        ("time_s", REAL),
+        ("bearing_rad", REAL),
+        ("range_m", REAL),
+        ("wall", whole),
+        ("ranger", whole),
+    ];
     let mode = states().chain([("mode", Kind::Text)]);
     vec![
         ("/log/ticks", schema::columns("sonarfix.Ticks", ticks.into_iter())),
@@ -129,10 +135,13 @@ pub fn message(record: &Record, stamp: u64, mount: [f64; 2]) -> (&'static str, V
         Record::Turn { time, angle, breaks } => {
             ("/log/turn", json!({ "time_s": time, "angle": angle, "breaks": breaks }))
         }
-        Record::Range { time, bearing, range, wall } => (
-            "/log/range",
-            json!({ "time_s": time, "bearing_rad": bearing, "range_m": range, "wall": wall }),
-        ),
+        Record::Range { time, bearing, range, wall, ranger } => {
+            let ranger = ranger.0;
+            (
+                "/log/range",
+                json!({ "time_s": time, "bearing_rad": bearing, "range_m": range, "wall": wall, "ranger": ranger }),
+            )
+        }
         Record::Absolute { time, age, measurement } => {
             let (kind, value, variances) = numbers(measurement);
             let [x, y, heading] = value;

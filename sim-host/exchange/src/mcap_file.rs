@@ -53,6 +53,7 @@ impl<W: Write + Seek> File<W> {
         for (topic, schema) in [
             ("/estimate", state),
             ("/fix", schema::columns("sonarfix.Fix", row::fix_columns())),
+            ("/absolute", schema::columns("sonarfix.TakenAbsolute", row::absolute_columns())),
             ("/pose", schema::pose_in_frame()),
             ("/pose/with_covariance", schema::odometry()),
             ("/pose/dead_reckoning", schema::pose_in_frame()),
@@ -186,6 +187,10 @@ impl<W: Write + Seek> Sink for File<W> {
             if let Some(beam) = scene::beam(time, row) {
                 self.write("/scene/beam", time, &beam)?;
             }
+        }
+        if let Some(seconds) = row.real("absolute_time_s") {
+            let time = stamp(self.epoch + seconds)?;
+            self.write("/absolute", time, &object(row.absolute()))?;
         }
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use anyhow::ensure;
 use sonarfix::health::Verdict;
-use sonarfix_sim::trace::{FixRecord, Outcome, Recorder, Tick, Wall};
+use sonarfix_sim::trace::{AbsoluteRecord, FixRecord, Outcome, Recorder, Tick, Wall};
 
 /// The type of a column's values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,7 +29,7 @@ pub enum Value {
 }
 
 /// The columns of an instant: name with unit, and type.
-const STATE_COLUMNS: [(&str, Kind); 31] = [
+const STATE_COLUMNS: [(&str, Kind); 35] = [
     ("time_s", Kind::Real),
     ("true_x_m", Kind::Real),
     ("true_y_m", Kind::Real),
@@ -61,10 +61,14 @@ const STATE_COLUMNS: [(&str, Kind); 31] = [
     ("odometry_x_m", Kind::Real),
     ("odometry_y_m", Kind::Real),
     ("odometry_heading_rad", Kind::Real),
+    ("true_gyro_bias_rad_per_s", Kind::Real),
+    ("gyro_bias_rad_per_s", Kind::Real),
+    ("sigma_gyro_bias_rad_per_s", Kind::Real),
+    ("slips", Kind::Whole),
 ];
 
 /// The columns of a measurement cycle.
-const FIX_COLUMNS: [(&str, Kind); 16] = [
+const FIX_COLUMNS: [(&str, Kind); 17] = [
     ("fix_time_s", Kind::Real),
     ("fix_wall", Kind::Text),
     ("fix_bearing_rad", Kind::Real),
@@ -81,11 +85,23 @@ const FIX_COLUMNS: [(&str, Kind); 16] = [
     ("fix_innovation_variance_m2", Kind::Real),
     ("fix_sonar_x_m", Kind::Real),
     ("fix_sonar_y_m", Kind::Real),
+    ("fix_ranger", Kind::Whole),
+];
+
+/// The columns of a heading, position or pose from outside.
+const ABSOLUTE_COLUMNS: [(&str, Kind); 7] = [
+    ("absolute_time_s", Kind::Real),
+    ("absolute_x_m", Kind::Real),
+    ("absolute_y_m", Kind::Real),
+    ("absolute_heading_rad", Kind::Real),
+    ("absolute_outcome", Kind::Text),
+    ("absolute_reason", Kind::Text),
+    ("absolute_nis", Kind::Real),
 ];
 
 /// All columns, in the order of a row.
 pub fn columns() -> impl Iterator<Item = (&'static str, Kind)> {
-    STATE_COLUMNS.into_iter().chain(FIX_COLUMNS)
+    STATE_COLUMNS.into_iter().chain(FIX_COLUMNS).chain(ABSOLUTE_COLUMNS)
 }
 
 /// The columns of an instant.
@@ -98,20 +114,34 @@ pub fn fix_columns() -> impl Iterator<Item = (&'static str, Kind)> {
     FIX_COLUMNS.into_iter()
 }
 
-/// An instant of a trace, with at most one measurement cycle.
+/// The columns of a heading, position or pose from outside.
+pub fn absolute_columns() -> impl Iterator<Item = (&'static str, Kind)> {
+    ABSOLUTE_COLUMNS.into_iter()
+}
+
+/// An instant of a trace, with at most one measurement cycle and one absolute measurement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     values: Vec<Value>,
 }
 
 impl Row {
-    /// The row of an instant, and of a measurement cycle at or before it.
+    /// The row of an instant, and of a measurement cycle and an absolute measurement at or before it.
     #[must_use]
-    pub fn new(tick: &Tick, fix: Option<&FixRecord>, walls: &[Wall]) -> Self {
+    pub fn new(
+        tick: &Tick,
+        fix: Option<&FixRecord>,
+        absolute: Option<&AbsoluteRecord>,
+        walls: &[Wall],
+    ) -> Self {
         let mut values = state_values(tick);
         match fix {
             Some(fix) => values.extend(fix_values(fix, walls)),
             None => values.extend(FIX_COLUMNS.map(|_| Value::Unknown)),
+        }
+        match absolute {
+            Some(absolute) => values.extend(absolute_values(absolute)),
+            None => values.extend(ABSOLUTE_COLUMNS.map(|_| Value::Unknown)),
         }
         Self { values }
     }
@@ -172,6 +202,12 @@ impl Row {
         let values = self.values.iter().skip(STATE_COLUMNS.len());
         fix_columns().map(|(name, _)| name).zip(values)
     }
+
+    /// The columns of the absolute measurement with their values.
+    pub fn absolute(&self) -> impl Iterator<Item = (&'static str, &Value)> {
+        let values = self.values.iter().skip(STATE_COLUMNS.len() + FIX_COLUMNS.len());
+        absolute_columns().map(|(name, _)| name).zip(values)
+    }
 }
 
 fn optional(value: Option<f64>) -> Value {
@@ -201,20 +237,42 @@ fn state_values(tick: &Tick) -> Vec<Value> {
     let bound = tick.bound.map_or([None; 3], |[x, y, heading, ..]| [x, y, heading].map(Some));
     values.extend(bound.map(optional));
     values.extend([tick.odometry.x, tick.odometry.y, tick.odometry.heading].map(Value::Real));
+    let gyro = estimate.gyro;
+    let true_bias = gyro.and_then(|_| tick.truth?.gyro_bias);
+    values.extend(
+        [true_bias, gyro.map(|gyro| gyro.bias), gyro.map(|gyro| gyro.deviation)].map(optional),
+    );
+    values.push(gyro.map_or(Value::Unknown, |gyro| Value::Whole(gyro.slips.into())));
     values
 }
 
-fn fix_values(fix: &FixRecord, walls: &[Wall]) -> [Value; FIX_COLUMNS.len()] {
-    let wall = fix.wall.and_then(|wall| walls.get(wall));
-    let outcome = match fix.outcome {
+fn text(text: &str) -> Value {
+    if text.is_empty() { Value::Unknown } else { Value::Text(text.to_owned()) }
+}
+
+fn outcome(outcome: Outcome) -> Value {
+    text(match outcome {
         Outcome::Accepted => "accepted",
         Outcome::Downweighted => "downweighted",
         Outcome::Gated => "gated",
         Outcome::Refused => "refused",
-    };
-    let text = |text: &str| {
-        if text.is_empty() { Value::Unknown } else { Value::Text(text.to_owned()) }
-    };
+    })
+}
+
+fn absolute_values(of: &AbsoluteRecord) -> [Value; ABSOLUTE_COLUMNS.len()] {
+    [
+        Value::Real(of.time),
+        optional(of.position.map(|[x, _]| x)),
+        optional(of.position.map(|[_, y]| y)),
+        optional(of.heading),
+        outcome(of.outcome),
+        text(&of.reason),
+        optional(of.nis),
+    ]
+}
+
+fn fix_values(fix: &FixRecord, walls: &[Wall]) -> [Value; FIX_COLUMNS.len()] {
+    let wall = fix.wall.and_then(|wall| walls.get(wall));
     let [x, y] = fix.sonar;
     [
         Value::Real(fix.time),
@@ -226,13 +284,14 @@ fn fix_values(fix: &FixRecord, walls: &[Wall]) -> [Value; FIX_COLUMNS.len()] {
         optional(fix.why.map(|why| why.success)),
         optional(fix.why.map(|why| why.seconds)),
         fix.why.map_or(Value::Unknown, |why| Value::Whole(why.candidates.into())),
-        text(outcome),
+        outcome(fix.outcome),
         optional(fix.association),
         text(&fix.reason),
         optional(fix.innovation),
         optional(fix.innovation_variance),
         Value::Real(x),
         Value::Real(y),
+        Value::Whole(fix.ranger.into()),
     ]
 }
 
@@ -253,12 +312,13 @@ pub trait Sink {
     fn take(&mut self, row: &Row) -> anyhow::Result<()>;
 }
 
-/// Passes the rows of a run on as it proceeds. A measurement cycle is in the row of the first instant at or after it;
-/// several cycles before one instant have a row each, with the same state.
+/// Passes the rows of a run on as it proceeds. A measurement cycle is in the row of the first instant at or after it, and so is a measurement
+/// from outside; several before one instant have a row each, with the same state.
 pub struct Rows<'a> {
     sinks: Vec<&'a mut dyn Sink>,
     walls: &'a [Wall],
     pending: Vec<FixRecord>,
+    pending_absolutes: Vec<AbsoluteRecord>,
     error: Option<anyhow::Error>,
 }
 
@@ -266,7 +326,8 @@ impl<'a> Rows<'a> {
     /// Rows of a run on these walls.
     #[must_use]
     pub fn new(walls: &'a [Wall], sinks: Vec<&'a mut dyn Sink>) -> Self {
-        Self { sinks, walls, pending: Vec::new(), error: None }
+        let (pending, pending_absolutes) = (Vec::new(), Vec::new());
+        Self { sinks, walls, pending, pending_absolutes, error: None }
     }
 
     /// Ends the run.
@@ -280,14 +341,13 @@ impl<'a> Rows<'a> {
     fn instant(&mut self, tick: &Tick) -> anyhow::Result<()> {
         let due = self.pending.iter().take_while(|fix| fix.time <= tick.time).count();
         let fixes: Vec<FixRecord> = self.pending.drain(..due).collect();
-        let mut rows: Vec<Row> =
-            fixes.iter().map(|fix| Row::new(tick, Some(fix), self.walls)).collect();
-        if rows.is_empty() {
-            rows.push(Row::new(tick, None, self.walls));
-        }
-        for row in &rows {
+        let is_due = |absolute: &&AbsoluteRecord| absolute.time <= tick.time;
+        let due = self.pending_absolutes.iter().take_while(is_due).count();
+        let absolutes: Vec<AbsoluteRecord> = self.pending_absolutes.drain(..due).collect();
+        for at in 0..fixes.len().max(absolutes.len()).max(1) {
+            let row = Row::new(tick, fixes.get(at), absolutes.get(at), self.walls);
             for sink in &mut self.sinks {
-                sink.take(row)?;
+                sink.take(&row)?;
             }
         }
         Ok(())
@@ -311,5 +371,9 @@ impl Recorder for Rows<'_> {
 
     fn fix(&mut self, make: impl FnOnce() -> FixRecord) {
         self.pending.push(make());
+    }
+
+    fn absolute(&mut self, make: impl FnOnce() -> AbsoluteRecord) {
+        self.pending_absolutes.push(make());
     }
 }

@@ -8,8 +8,8 @@ use sonarfix_sim::trace::{Recorder, Trace};
 
 use crate::row::{Kind, Row, Rows, Sink, Value, columns};
 
-/// Writes a trace. The first line is the start, if it is known. A measurement cycle is in the line of the first tick at or after it; several
-/// cycles before one tick have a line each, with the same state. Unknown values are empty cells.
+/// Writes a trace. The first line is the start, if it is known. A measurement cycle is in the line of the first tick at or after it, and so is a
+/// measurement from outside; several before one tick have a line each, with the same state. Unknown values are empty cells.
 ///
 /// # Errors
 /// Errors of the writer.
@@ -18,9 +18,13 @@ pub fn write(trace: &Trace, out: impl Write) -> anyhow::Result<()> {
     csv.csv.write_record(columns().map(|(name, _)| name))?;
     let mut rows = Rows::new(&trace.walls, vec![&mut csv]);
     let mut fixes = trace.fixes.iter().peekable();
+    let mut absolutes = trace.absolutes.iter().peekable();
     for tick in trace.start.iter().chain(&trace.ticks) {
         while let Some(fix) = fixes.next_if(|fix| fix.time <= tick.time) {
             rows.fix(|| fix.clone());
+        }
+        while let Some(absolute) = absolutes.next_if(|absolute| absolute.time <= tick.time) {
+            rows.absolute(|| absolute.clone());
         }
         rows.tick(|| *tick);
     }
@@ -98,7 +102,9 @@ fn cell(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sonarfix_sim::trace::{Estimate, FixRecord, Outcome, Pose, Tick, Why};
+    use sonarfix_sim::trace::{
+        AbsoluteRecord, Estimate, FixRecord, GyroEstimate, Outcome, Pose, Tick, Why,
+    };
 
     fn tick(time: f64) -> Tick {
         Tick {
@@ -112,6 +118,7 @@ mod tests {
 
     fn fix(time: f64) -> FixRecord {
         FixRecord {
+            ranger: 0,
             time,
             wall: None,
             sonar: [0.0, 0.0],
@@ -143,16 +150,48 @@ mod tests {
         let names: Vec<_> = columns().map(|(name, _)| name).collect();
         assert_eq!(reader.headers().unwrap(), &names[..]);
         let lines: Vec<_> = reader.records().map(Result::unwrap).collect();
-        let times: Vec<_> = lines.iter().map(|l| (l[0].to_owned(), l[31].to_owned())).collect();
+        let times: Vec<_> = lines.iter().map(|l| (l[0].to_owned(), l[35].to_owned())).collect();
         let expected = [("0", ""), ("0.1", ""), ("0.2", "0.15"), ("0.2", "0.2"), ("0.3", "0.3")];
         assert_eq!(times, expected.map(|(t, f)| (t.to_owned(), f.to_owned())));
         assert_eq!([&lines[2][23], &lines[2][24]], ["tracking", "0"]);
         assert_eq!(
-            [40, 41, 42].map(|c| &lines[2][c]),
+            [44, 45, 46].map(|c| &lines[2][c]),
             ["downweighted", "0.25", "no wall, \"none\""]
         );
-        let why = [36, 37, 38, 39].map(|column| &lines[2][column]);
+        let why = [40, 41, 42, 43].map(|column| &lines[2][column]);
         assert_eq!(why, ["2.00000000e-6", "0.75", "0.25", "3"]);
+    }
+
+    /// A gyro and measurements from outside: two of them before one tick have a line each.
+    #[test]
+    fn a_gyro_and_measurements_from_outside_have_their_columns() {
+        let absolute = |time: f64, position, heading| AbsoluteRecord {
+            time,
+            position,
+            heading,
+            outcome: Outcome::Gated,
+            reason: String::new(),
+            nis: Some(20.5),
+        };
+        let mut with_gyro = tick(0.3);
+        with_gyro.estimate.gyro = Some(GyroEstimate { bias: 0.02, deviation: 0.001, slips: 2 });
+        let absolutes = [absolute(0.21, None, Some(-1.5)), absolute(0.25, Some([1.0, 2.0]), None)];
+        let trace = Trace {
+            ticks: [tick(0.2), with_gyro].to_vec(),
+            fixes: [fix(0.3)].to_vec(),
+            absolutes: absolutes.to_vec(),
+            ..Trace::default()
+        };
+        let mut out = Vec::new();
+        write(&trace, &mut out).unwrap();
+        let mut reader = csv::Reader::from_reader(out.as_slice());
+        let lines: Vec<_> = reader.records().map(Result::unwrap).collect();
+        assert_eq!(lines.len(), 3);
+        assert_eq!([31, 32, 33, 34].map(|c| &lines[0][c]), ["", "", "", ""]);
+        assert_eq!([31, 32, 33, 34].map(|c| &lines[1][c]), ["", "0.02", "0.001", "2"]);
+        let of = |line: usize| [35, 52, 53, 54, 55, 56, 58].map(|c| lines[line][c].to_owned());
+        assert_eq!(of(1), ["0.3", "0.21", "", "", "-1.5", "gated", "20.5"]);
+        assert_eq!(of(2), ["", "0.25", "1", "2", "", "gated", "20.5"]);
     }
 
     #[test]

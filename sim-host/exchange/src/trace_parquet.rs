@@ -14,7 +14,7 @@ use parquet::schema::types::{Type, TypePtr};
 use crate::row::{Kind, Row, Sink, Value, columns};
 
 /// The version of the columns, in the metadata `sonarfix` of a file.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 /// Rows that are in memory at once.
 const GROUP: usize = 8_192;
 

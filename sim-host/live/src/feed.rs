@@ -9,7 +9,7 @@ use serde::Serialize;
 use serde_json::json;
 use sonarfix::health::Verdict;
 use sonarfix_player::columns;
-use sonarfix_sim::trace::{FixRecord, SearchRecord, Tick, Wall};
+use sonarfix_sim::trace::{AbsoluteRecord, FixRecord, GyroEstimate, SearchRecord, Tick, Wall};
 use sonarfix_sim::world::obstacle::Obstacle;
 
 use crate::ring::Ring;
@@ -82,8 +82,11 @@ impl Feed {
         );
     }
 
-    /// An encoder tick.
+    /// An encoder tick, and the gyro if the estimate contains one.
     pub fn tick(&self, tick: &Tick) {
+        if let Some(gyro) = &tick.estimate.gyro {
+            self.gyro(tick.time, gyro);
+        }
         let estimate = &tick.estimate;
         let c = &estimate.calibration;
         let verdict = match estimate.verdict {
@@ -113,6 +116,18 @@ impl Feed {
             "columns": { "fixes": columns::fix(fix) },
             "more": { "weights": { "weight": [fix.association], "bearing": [fix.bearing] } },
         }));
+    }
+
+    /// A gyro at a time, seconds.
+    pub fn gyro(&self, time: f64, gyro: &GyroEstimate) {
+        let columns = json!({ "gyro": columns::gyro(time, gyro) });
+        self.push(&json!({ "kind": "record", "columns": columns }));
+    }
+
+    /// A heading, position or pose from outside.
+    pub fn absolute(&self, absolute: &AbsoluteRecord) {
+        let columns = json!({ "absolutes": columns::absolute(absolute) });
+        self.push(&json!({ "kind": "record", "columns": columns }));
     }
 
     /// The state of the search; `text` has its answer in words.

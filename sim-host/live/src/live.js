@@ -13,8 +13,8 @@
 
   const root = document.documentElement;
   const element = (id) => document.getElementById(id);
-  const [stage, view, exaggeration, windowMenu, speed, record, drag, pause, poseForm] =
-    ["stage", "view", "exaggeration", "window", "speed", "record", "drag", "pause", "pose"].map(element);
+  const [stage, view, exaggeration, windowMenu, speed, record, drag, tap, pause, poseForm] =
+    ["stage", "view", "exaggeration", "window", "speed", "record", "drag", "tap", "pause", "pose"].map(element);
   const readout = Object.fromEntries(
     [...document.querySelectorAll("#readout [data-value]")].map((dd) => [dd.dataset.value, dd]));
 
@@ -29,6 +29,8 @@
     walls: [], obstacles: [], cone: 0, track: 0, dropped: 0, searches: [],
     ticks: { time: [], truth: poses(), estimate: poses(), encoders: poses(), sigma_x: [], sigma_y: [], sigma_heading: [], correlation: [] },
     fixes: { time: [], wall: [], x: [], y: [], direction: [], range: [], source: [], outcome: [], reason: [], innovation: [], spread: [] },
+    gyro: { time: [], bias: [], sigma: [], slips: [] },
+    absolutes: { time: [], x: [], y: [], heading: [], outcome: [], reason: [], sigmas: [] },
     states: { time: [], verdict: [], scale_right: [], scale_left: [], track_width: [], range_scale: [], sigma: [] },
     weights: { weight: [], bearing: [] },
     wheels: { time: [], right: [], left: [] },
@@ -67,8 +69,8 @@
     element("paced").hidden = state.isRobot;
     poseForm.hidden = !scene.commands;
     document.querySelectorAll("[data-order]").forEach((button) => { button.hidden = !scene.commands; });
-    drag.hidden = !scene.commands;
-    element("keys").textContent = scene.commands ? ", P sets the pose by dragging" : "";
+    drag.hidden = tap.hidden = !scene.commands;
+    element("keys").textContent = scene.commands ? ", P sets the pose by dragging, T sends a position by a tap" : "";
   }
 
   function take(event) {
@@ -80,7 +82,7 @@
         if (event.search) state.search = event.search;
         if (event.columns.ticks) state.ticks++;
         run.dropped += trim(run.ticks);
-        [run.states, run.wheels, run.loop].forEach(trim);
+        [run.states, run.wheels, run.loop, run.gyro, run.absolutes].forEach(trim);
         [run.fixes, run.weights].forEach(trim);
         if (run.searches.length > 600) run.searches.splice(0, 200);
         break;
@@ -161,8 +163,9 @@
       bearing: last < 0 ? unknown : degrees(run.weights.bearing[last]),
       weight: weight === null ? weightOf(fix) : weight.toFixed(3),
       search: state.search || unknown,
+      ...Moment.inputNumbers(moment),
     };
-    for (const [name, text] of Object.entries(values)) readout[name].textContent = text.replace(/-(?=\d)/g, "−");
+    Moment.show(readout, values);
     readout.outcome.style.setProperty("--of", fix ? `var(--${OUTCOMES[fix.outcome]})` : "transparent");
     const verdict = run.states.verdict.at(-1);
     element("verdict").dataset.verdict = verdict ?? "none";
@@ -190,6 +193,13 @@
     band: (i) => run.fixes.spread[i] === null ? NaN : 3e3 * run.fixes.spread[i],
     dots: (i) => OUTCOMES[run.fixes.outcome[i]],
   };
+  const DEGREES = 180 / Math.PI;
+  const gyro = (value) => ({ time: () => run.gyro.time, value });
+  const absolutes = {
+    time: () => run.absolutes.time,
+    value: (i) => run.absolutes.sigmas[i] ?? NaN,
+    dots: (i) => OUTCOMES[run.absolutes.outcome[i]],
+  };
   const curves = [
     ["Innovation in its 3σ band; rejected ones at the edge", "mm", [["innovation", "accepted", fixes]]],
     ["Deviation of the position", "mm", [["σ of x", "estimate", sigma(0, 1e3)], ["σ of y", "encoders", sigma(1, 1e3)]]],
@@ -197,6 +207,10 @@
     ["Scale errors", "%", [["right", "estimate", states("scale_right", 100)], ["left", "encoders", states("scale_left", 100)],
       ["range", "accepted", states("range_scale", 100)]]],
     ["Track width", "mm", [["estimate", "estimate", states("track_width", 1e3)]]],
+    ["Bias of the gyro", "°/s", [["estimate", "estimate", gyro((i) => DEGREES * run.gyro.bias[i])],
+      ["σ", "encoders", gyro((i) => DEGREES * run.gyro.sigma[i])]]],
+    ["Slips of the wheels so far", "", [["slips", "gated", gyro((i) => run.gyro.slips[i])]]],
+    ["Innovation of measurements from outside; outliers at the edge", "σ", [["innovation", "accepted", absolutes]]],
     ["Speed of the wheels", "mm/s", [["right", "estimate", travel("right")], ["left", "encoders", travel("left")]]],
     ["Longest poll of the loop so far", "ms",
       [["longest", "estimate", { time: () => run.loop.time, value: (i) => run.loop.longest[i] }]]],
@@ -217,6 +231,7 @@
       const moment = Moment.momentAt(run, time);
       // A range may be later than the last tick.
       moment.fix = Moment.momentAt(run, Math.max(time, run.fixes.time.at(-1) ?? time)).fix;
+      moment.absolute = Moment.momentAt(run, Math.max(time, run.absolutes.time.at(-1) ?? time)).absolute;
       picture.draw(moment);
       if (state.placing?.to) drawPlaced();
       showNumbers(moment);
@@ -251,12 +266,18 @@
     return order({ order: "set_pose", x, y, heading, position_deviation, heading_deviation });
   }
 
-  function setPlacing(on) {
+  // A position from outside, beside the estimate, with the deviation of the form.
+  function sendPosition([x, y]) {
+    return order({ order: "position", x, y, deviation: Number(poseForm.elements.position.value) });
+  }
+
+  function setPlacing(on, isTap = false) {
     if (drag.hidden) return;
-    state.placing = on ? {} : null;
-    drag.setAttribute("aria-pressed", String(on));
+    state.placing = on ? { isTap } : null;
+    drag.setAttribute("aria-pressed", String(on && !isTap));
+    tap.setAttribute("aria-pressed", String(on && isTap));
     stage.classList.toggle("placing", on);
-    if (on) say("answer", "press at the robot's position, drag towards its heading, and release");
+    if (on) say("answer", isTap ? "tap where the robot is" : "press at the robot's position, drag towards its heading, and release");
   }
 
   // The pose that a drag describes: from its start towards its end.
@@ -276,6 +297,11 @@
   stage.addEventListener("pointerdown", (event) => {
     if (!state.placing || run.ticks.time.length === 0) return;
     state.placing.at = picture.floorAt(event.offsetX, event.offsetY);
+    if (state.placing.isTap) {
+      sendPosition(state.placing.at);
+      setPlacing(false);
+      return;
+    }
     stage.setPointerCapture(event.pointerId);
   });
   stage.addEventListener("pointermove", (event) => {
@@ -297,6 +323,7 @@
     "-": () => { picture.zoomBy(1 / Drawing.ZOOM_STEP); changed(); },
     0: () => { picture.resetView(); changed(); },
     p: () => setPlacing(!state.placing),
+    t: () => setPlacing(!state.placing, true),
     Escape: () => { setPlacing(false); say("answer", ""); },
   };
 
@@ -310,6 +337,7 @@
     button.addEventListener("click", () => order({ order: button.dataset.order })));
   record.addEventListener("click", () => order({ order: "record", on: record.getAttribute("aria-pressed") === "false" }));
   drag.addEventListener("click", () => setPlacing(!state.placing));
+  tap.addEventListener("click", () => setPlacing(!state.placing, true));
   pause.addEventListener("click", () => {
     const on = pause.getAttribute("aria-pressed") === "false";
     pause.setAttribute("aria-pressed", String(on));

@@ -4,8 +4,9 @@ use std::sync::mpsc::{Receiver, SyncSender};
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
+use sonarfix::absolute::{AbsoluteMeasurement, PositionNoise};
 use sonarfix::localizer::Start;
-use sonarfix::pose::Pose;
+use sonarfix::pose::{Point, Pose};
 use sonarfix::units::{Metres, Radians};
 use sonarfix_link::Command;
 
@@ -36,6 +37,15 @@ pub enum Order {
         /// Standard deviation of the heading, radians.
         heading_deviation: f32,
     },
+    /// Pass a position that was measured now to the localizer.
+    Position {
+        /// Metres along the map's x axis.
+        x: f32,
+        /// Metres along the map's y axis.
+        y: f32,
+        /// Standard deviation of x and of y, metres.
+        deviation: f32,
+    },
     /// Begin or end a recording.
     Record {
         /// Whether it is to begin.
@@ -64,6 +74,7 @@ impl Order {
             Self::ResetCalibration => "reset of the calibration",
             Self::ShowDevices => "show devices",
             Self::SetPose { .. } => "set pose",
+            Self::Position { .. } => "position",
             Self::Record { .. } => "recording",
             Self::Pause { .. } => "pause",
             Self::Speed { .. } => "speed",
@@ -86,6 +97,13 @@ impl Order {
                     heading_deviation: Radians(heading_deviation),
                 })
             }
+            Self::Position { x, y, deviation } => Command::Absolute {
+                age: sonarfix::units::Duration::from_ticks(0),
+                measurement: AbsoluteMeasurement::Position {
+                    point: Point::new(x, y),
+                    noise: PositionNoise::circular(Metres(deviation)),
+                },
+            },
             Self::Record { .. } | Self::Pause { .. } | Self::Speed { .. } => return None,
         })
     }

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use sonarfix_sim::trace::{FixRecord, Recorder, SearchRecord, Tick};
+use sonarfix_sim::trace::{AbsoluteRecord, FixRecord, Recorder, SearchRecord, Tick};
 
 use crate::feed::Feed;
 use crate::order::{Order, Ordered, Orders, Reply};
@@ -101,6 +101,12 @@ impl Recorder for Paced {
         let fix = make();
         self.wait_for(fix.time);
         self.feed.fix(&fix);
+    }
+
+    fn absolute(&mut self, make: impl FnOnce() -> AbsoluteRecord) {
+        let absolute = make();
+        self.wait_for(absolute.time);
+        self.feed.absolute(&absolute);
     }
 
     fn search(&mut self, make: impl FnOnce() -> SearchRecord) {

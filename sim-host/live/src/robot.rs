@@ -7,12 +7,14 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::Context;
 use sonarfix::navigator::Mode;
+use sonarfix_hal::robot::AbsoluteResult;
 use sonarfix_link::message::Odometry;
 use sonarfix_link::{CommandResult, Estimate, Telemetry};
 use sonarfix_monitor::conversation::{Conversation, Due, Outcome};
 use sonarfix_monitor::recording::Recording;
 use sonarfix_monitor::signs::Signs;
 use sonarfix_monitor::{Monitor, Received, hints, view};
+use sonarfix_sim::observe;
 
 use crate::feed::{Feed, Scene, Status};
 use crate::order::{Order, Ordered, Orders, Reply};
@@ -246,10 +248,13 @@ impl Robot {
                 self.feed.search(&record, &view::search(status, &self.names));
             }
             Telemetry::Hello(_) | Telemetry::LoopStatus(_) => self.status(self.last),
-            Telemetry::Hypothesis(_)
-            | Telemetry::Turn(_)
-            | Telemetry::Gyro(_)
-            | Telemetry::Absolute(_) => {}
+            Telemetry::Gyro(gyro) => {
+                self.feed.gyro(records::seconds(gyro.at), &observe::gyro(&gyro.status));
+            }
+            Telemetry::Absolute(AbsoluteResult { measured_at, measurement, fix, .. }) => {
+                self.feed.absolute(&observe::absolute_record(*measured_at, measurement, fix));
+            }
+            Telemetry::Hypothesis(_) | Telemetry::Turn(_) => {}
         }
     }
 

@@ -8,6 +8,7 @@ use std::io::{self, LineWriter, Write};
 use std::path::PathBuf;
 
 use sonarfix::absolute::{AbsoluteMeasurement, PoseNoise, PositionNoise};
+use sonarfix::config::RangerId;
 use sonarfix::gyro::TurnReading;
 use sonarfix::localizer::AbsoluteFix;
 use sonarfix::navigator::{Mode, UNKNOWN_POSITION};
@@ -244,7 +245,12 @@ impl<W: Write> Log<W> {
     fn ping(&mut self, ping: &Ping) -> io::Result<()> {
         let range = ping.outcome.map_or(String::new(), |echo| f64::from(echo.range.0).to_string());
         let (time, bearing) = (Time(ping.at), f64::from(ping.aim.bearing.0));
-        writeln!(self.out, "range,{time},{bearing},{range},{}", ping.aim.wall.0)
+        write!(self.out, "range,{time},{bearing},{range},{}", ping.aim.wall.0)?;
+        // The logs of robots with one ranger have no such field.
+        if ping.aim.ranger != RangerId::FIRST {
+            write!(self.out, ",{}", ping.aim.ranger.0)?;
+        }
+        writeln!(self.out)
     }
 }
 

@@ -1,9 +1,10 @@
 //! A command, repeated until it is acknowledged.
 
 use std::ops::ControlFlow;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use anyhow::Context;
+use sonarfix_hal::robot::AbsoluteResult;
 use sonarfix_link::{Command, CommandResult, Receiver, Telemetry};
 
 use crate::conversation::{ATTEMPTS, Conversation, Due, Outcome};
@@ -18,7 +19,45 @@ pub fn ask(port: &mut Port, command: &Command) -> anyhow::Result<CommandResult> 
     ask_and_watch(port, command, |_| {})
 }
 
-/// The same; `watch` takes every byte that arrives meanwhile.
+/// How long the localizer's response to a measurement is waited for after the acknowledgement: some encoder samples.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// Sends a heading, position or pose as [`ask`] does; returns the localizer's response, too, if it arrives.
+///
+/// # Errors
+/// As [`ask`].
+pub fn ask_absolute(
+    port: &mut Port,
+    command: &Command,
+) -> anyhow::Result<(CommandResult, Option<AbsoluteResult>)> {
+    let mut responses = Responses(Receiver::new());
+    let mut response = None;
+    let result = ask_and_watch(port, command, |byte| response = responses.take(byte).or(response))?;
+    if result != CommandResult::Done || response.is_some() {
+        return Ok((result, response));
+    }
+    let since = Instant::now();
+    let response = port.read(|bytes| {
+        let response = bytes.iter().filter_map(|&byte| responses.take(byte)).last();
+        let is_over = response.is_some() || since.elapsed() > PATIENCE;
+        Ok(if is_over { ControlFlow::Break(response) } else { ControlFlow::Continue(()) })
+    })?;
+    Ok((result, response.flatten()))
+}
+
+/// The localizer's responses to absolute measurements.
+struct Responses(Receiver<Telemetry>);
+
+impl Responses {
+    fn take(&mut self, byte: u8) -> Option<AbsoluteResult> {
+        match self.0.push(byte)?.message {
+            Telemetry::Absolute(result) => Some(result),
+            _ => None,
+        }
+    }
+}
+
+/// As [`ask`]; `watch` takes every byte that arrives meanwhile.
 ///
 /// # Errors
 /// As [`ask`].

@@ -197,7 +197,8 @@ impl Encoder {
 }
 
 /// `to − from` of a counter with this number of bits: the difference of the smallest magnitude.
-fn difference(to: u32, from: u32, bits: u8) -> i64 {
+#[must_use]
+pub fn difference(to: u32, from: u32, bits: u8) -> i64 {
     let spare = 32_u32.saturating_sub(bits.into()).min(31);
     let shifted = (to.wrapping_sub(from) << spare).cast_signed();
     i64::from(shifted >> spare)

@@ -225,7 +225,9 @@ fn gyro(gyro: &GyroState) -> String {
     )
 }
 
-fn absolute(result: &AbsoluteResult) -> String {
+/// A heading, position or pose from outside, and what the localizer did with it.
+#[must_use]
+pub fn absolute(result: &AbsoluteResult) -> String {
     let age = seconds(result.at) - seconds(result.measured_at);
     let value = match result.measurement {
         AbsoluteMeasurement::Heading { angle, .. } => format!("heading {:.1}°", angle.to_degrees()),

@@ -1,7 +1,9 @@
 //! Runs without parameter errors, and the forecast at each point of the path.
 
 use rayon::prelude::*;
-use sonarfix_map::{Fidelity, Follow, Leg, Movement, Scenario, Surroundings, Upsets};
+use sonarfix_map::{
+    AbsoluteSensors, Fidelity, Follow, GyroTruth, Leg, Movement, Scenario, Surroundings, Upsets,
+};
 
 use sonarfix_sim::angle;
 use sonarfix_sim::progress::Progress;
@@ -164,6 +166,12 @@ fn as_told(scenario: &Scenario) -> Scenario {
     error_free.truth.scale_walk = 0.0;
     error_free.truth.track_width_walk = 0.0;
     error_free.truth.cone = error_free.robot.localizer.sonar.cone.0.into();
+    // The noise of a gyro remains: one without noise would count as stuck.
+    error_free.truth.gyro = GyroTruth { bias: Some(0.0), scale: 0.0 };
+    let AbsoluteSensors { heading, position } = &mut error_free.absolute;
+    let of_heading = heading.iter_mut().map(|sensor| &mut sensor.sampling);
+    let of_position = position.iter_mut().map(|sensor| &mut sensor.sampling);
+    of_heading.chain(of_position).for_each(|sampling| sampling.outliers = 0.0);
     error_free.upsets = Upsets::default();
     error_free.surroundings = Surroundings {
         temperature: error_free.robot.ranger.temperature.0.into(),

@@ -9,11 +9,14 @@
 //! | module | what |
 //! |---|---|
 //! | `forecast` | the runs, and the forecast at each point of the path |
+//! | `heading_aid` | gyro or compass beside wheels and sonar |
 //! | [`preset`] | presets of common sonars and servos |
 //! | [`route`] | a path on the command line |
 
 mod forecast;
+mod heading_aid;
 pub mod preset;
 pub mod route;
 
 pub use forecast::{BLIND_AFTER, Blind, Forecast, LegForecast, Sample, Spread};
+pub use heading_aid::HeadingAid;

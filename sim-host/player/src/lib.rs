@@ -5,7 +5,9 @@
 use serde::Serialize;
 
 use sonarfix_map::Oscillation;
-use sonarfix_sim::trace::{FixRecord, Hypothesis, Outcome, Pose, SearchRecord, Tick, Trace};
+use sonarfix_sim::trace::{
+    AbsoluteRecord, FixRecord, GyroEstimate, Hypothesis, Outcome, Pose, SearchRecord, Tick, Trace,
+};
 use sonarfix_sim::world::obstacle::Outline;
 use sonarfix_sim::world::reflector::Source;
 
@@ -40,7 +42,33 @@ struct Player<'a> {
     obstacles: Vec<Obstacle>,
     ticks: Ticks,
     fixes: Fixes<'a>,
+    gyro: Gyro,
+    absolutes: Absolutes<'a>,
     searches: Vec<Search>,
+}
+
+/// The gyro; empty for a robot without one.
+#[derive(Serialize, Default)]
+struct Gyro {
+    time: Vec<Number>,
+    /// Bias and its deviation, radians per second.
+    bias: Vec<Number>,
+    sigma: Vec<Number>,
+    slips: Vec<u32>,
+}
+
+/// Headings, positions and poses from outside.
+#[derive(Serialize, Default)]
+struct Absolutes<'a> {
+    time: Vec<Number>,
+    x: Vec<Number>,
+    y: Vec<Number>,
+    heading: Vec<Number>,
+    /// 0 accepted, 1 gated, 2 refused.
+    outcome: Vec<u8>,
+    reason: Vec<&'a str>,
+    /// The root of its NIS over the number of dimensions.
+    sigmas: Vec<Number>,
 }
 
 /// The search at one instant.
@@ -113,10 +141,10 @@ struct Fixes<'a> {
 /// One record in the columns of the player, for a page to which records arrive one by one.
 pub mod columns {
     use serde::Serialize;
-    use sonarfix_sim::trace::{FixRecord, SearchRecord, Tick};
+    use sonarfix_sim::trace::{AbsoluteRecord, FixRecord, GyroEstimate, SearchRecord, Tick};
     use sonarfix_sim::world::obstacle::Obstacle;
 
-    use super::{Fixes, Ticks};
+    use super::{Absolutes, Fixes, Gyro, Ticks};
 
     /// The unmapped obstacles.
     #[must_use]
@@ -137,6 +165,22 @@ pub mod columns {
     pub fn fix(fix: &FixRecord) -> impl Serialize {
         let mut columns = Fixes::default();
         columns.push(fix);
+        columns
+    }
+
+    /// A gyro at a time, seconds.
+    #[must_use]
+    pub fn gyro(time: f64, gyro: &GyroEstimate) -> impl Serialize {
+        let mut columns = Gyro::default();
+        columns.push(time, gyro);
+        columns
+    }
+
+    /// A heading, position or pose from outside.
+    #[must_use]
+    pub fn absolute(absolute: &AbsoluteRecord) -> impl Serialize {
+        let mut columns = Absolutes::default();
+        columns.push(absolute);
         columns
     }
 
@@ -164,6 +208,8 @@ pub fn json(trace: &Trace) -> Result<String, serde_json::Error> {
         obstacles: trace.obstacles.iter().map(obstacle).collect(),
         ticks: ticks(trace),
         fixes: fixes(trace),
+        gyro: gyro(trace),
+        absolutes: absolutes(trace),
         searches: searches(trace),
     })
 }
@@ -218,16 +264,73 @@ fn search(record: &SearchRecord) -> Search {
 }
 
 /// Every n-th tick, and the last.
-fn ticks(trace: &Trace) -> Ticks {
+fn thinned(trace: &Trace) -> impl Iterator<Item = &Tick> {
     let step = trace.ticks.len().div_ceil(MOST_TICKS).max(1);
     let last = trace.ticks.len().saturating_sub(1);
+    let ticks = trace.ticks.iter().enumerate();
+    ticks.filter(move |(index, _)| index % step == 0 || *index == last).map(|(_, tick)| tick)
+}
+
+fn ticks(trace: &Trace) -> Ticks {
     let mut columns = Ticks::default();
-    for (index, tick) in trace.ticks.iter().enumerate() {
-        if index % step == 0 || index == last {
-            columns.push(tick);
+    thinned(trace).for_each(|tick| columns.push(tick));
+    columns
+}
+
+fn gyro(trace: &Trace) -> Gyro {
+    let mut columns = Gyro::default();
+    for tick in thinned(trace) {
+        if let Some(gyro) = &tick.estimate.gyro {
+            columns.push(tick.time, gyro);
         }
     }
     columns
+}
+
+impl Gyro {
+    fn push(&mut self, time: f64, gyro: &GyroEstimate) {
+        self.time.push(rounded(time, TIME));
+        self.bias.push(rounded(gyro.bias, DEVIATION));
+        self.sigma.push(rounded(gyro.deviation, DEVIATION));
+        self.slips.push(gyro.slips);
+    }
+}
+
+fn absolutes(trace: &Trace) -> Absolutes<'_> {
+    let mut columns = Absolutes::default();
+    for absolute in &trace.absolutes {
+        columns.push(absolute);
+    }
+    columns
+}
+
+impl<'a> Absolutes<'a> {
+    fn push(&mut self, of: &'a AbsoluteRecord) {
+        let [x, y] = of.position.unwrap_or([f64::NAN; 2]);
+        self.time.push(rounded(of.time, TIME));
+        self.x.push(rounded(x, LENGTH));
+        self.y.push(rounded(y, LENGTH));
+        self.heading.push(of.heading.and_then(|heading| rounded(heading, ANGLE)));
+        self.outcome.push(outcome(of.outcome));
+        self.reason.push(reason(of.outcome, &of.reason));
+        self.sigmas.push(of.nis.and_then(|nis| rounded(nis.sqrt(), FRACTION)));
+    }
+}
+
+/// 0 accepted, 1 gated, 2 refused.
+fn outcome(outcome: Outcome) -> u8 {
+    match outcome {
+        Outcome::Accepted | Outcome::Downweighted => 0,
+        Outcome::Gated => 1,
+        Outcome::Refused => 2,
+    }
+}
+
+fn reason(outcome: Outcome, refusal: &str) -> &str {
+    match outcome {
+        Outcome::Downweighted => "with a lower weight",
+        _ => refusal,
+    }
 }
 
 impl Ticks {
@@ -272,15 +375,8 @@ impl<'a> Fixes<'a> {
         self.direction.push(rounded(fix.direction, ANGLE));
         self.range.push(fix.range.and_then(|range| rounded(range, LENGTH)));
         self.source.push(fix.source.map(name));
-        self.outcome.push(match fix.outcome {
-            Outcome::Accepted | Outcome::Downweighted => 0,
-            Outcome::Gated => 1,
-            Outcome::Refused => 2,
-        });
-        self.reason.push(match fix.outcome {
-            Outcome::Downweighted => "with a lower weight",
-            _ => &fix.reason,
-        });
+        self.outcome.push(outcome(fix.outcome));
+        self.reason.push(reason(fix.outcome, &fix.reason));
         self.innovation.push(fix.innovation.and_then(|length| rounded(length, LENGTH)));
         let spread = fix.innovation_variance.map(f64::sqrt);
         self.spread.push(spread.and_then(|length| rounded(length, LENGTH)));

@@ -102,7 +102,7 @@ impl<'a> Estimators<'a> {
     pub fn tick(&self, time: f64, truth: Option<Pose>) -> Tick {
         Tick {
             time,
-            truth: truth.map(|pose| Truth { pose, calibration: None }),
+            truth: truth.map(|pose| Truth { pose, calibration: None, gyro_bias: None }),
             estimate: observe::estimate(self.localizer()),
             bound: None,
             odometry: self.odometry.pose(),

@@ -3,7 +3,7 @@
 use std::io::BufRead;
 
 use serde::Serialize;
-use sonarfix::config::Sonar;
+use sonarfix::config::{RangerId, Sonar};
 use sonarfix::map::{Map, Wall};
 use sonarfix::search::{Answer, Hypothesis, Search, SearchParameters};
 use sonarfix::units::{Metres, Radians};
@@ -152,12 +152,13 @@ impl<'a> Run<'a> {
                 self.roll(log_micros(time), wheels);
             }
             Record::Wheels { time, right, left } => self.roll(log_micros(time), [right, left]),
-            Record::Range { time, bearing, range, .. } => {
+            Record::Range { time, bearing, range, ranger: RangerId::FIRST, .. } => {
                 self.waiting.push((log_micros(time), Heard::Range { bearing, range }));
             }
             Record::Scan { time, ref scan } => self.scan(log_micros(time), scan),
             Record::Skip { .. }
             | Record::Turn { .. }
+            | Record::Range { .. }
             | Record::Absolute { .. }
             | Record::Start { .. }
             | Record::Pose { .. }

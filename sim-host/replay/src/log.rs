@@ -1,6 +1,7 @@
 //! The log format, one record a line (`docs/formats.md`, "Logs").
 
 use sonarfix::absolute::{AbsoluteMeasurement, PoseNoise, PositionNoise};
+use sonarfix::config::{MAX_RANGERS, RangerId};
 use sonarfix::navigator::Mode;
 use sonarfix::pose::Point;
 use sonarfix::units::Radians;
@@ -54,6 +55,8 @@ pub enum Record {
         range: Option<f64>,
         /// The index of the wall that the robot aimed at; `None` if not recorded.
         wall: Option<u32>,
+        /// The ranger.
+        ranger: RangerId,
     },
     /// A heading, position or pose from outside.
     Absolute {
@@ -187,6 +190,7 @@ pub fn parse(line: &str) -> Result<Option<Record>, Malformed> {
             bearing: fields.number("bearing")?,
             range: fields.range()?,
             wall: fields.wall()?,
+            ranger: fields.ranger()?,
         },
         "heading" => {
             let time = fields.time()?;
@@ -341,7 +345,20 @@ impl<'a> Fields<'a> {
             return Ok(None);
         };
         let text = text.trim();
+        if text.is_empty() {
+            return Ok(None);
+        }
         text.parse().map(Some).map_err(|_| not("wall", text, "a whole number, from 0"))
+    }
+
+    /// The ranger that measured, if there is such a field; otherwise the first.
+    fn ranger(&mut self) -> Result<RangerId, Malformed> {
+        let Some(text) = self.fields.next() else {
+            return Ok(RangerId::FIRST);
+        };
+        let text = text.trim();
+        let number = text.parse().ok().filter(|number| usize::from(*number) < MAX_RANGERS);
+        number.map(RangerId).ok_or_else(|| not("ranger", text, "a whole number, from 0 to 2"))
     }
 
     fn breaks(&mut self) -> Result<Option<u32>, Malformed> {
@@ -418,8 +435,26 @@ fn beginning(text: &str) -> String {
 mod tests {
     use super::*;
 
+    /// The ranger is behind the wall, which may be empty.
+    #[test]
+    fn a_range_may_have_a_ranger() {
+        let read = |line: &str| parse(line).unwrap();
+        for (line, expected) in [
+            ("range,3,-1.5,2,7,1", (Some(7), RangerId(1))),
+            ("range,3,-1.5,2,,2", (None, RangerId(2))),
+            ("range,3,-1.5,2,7", (Some(7), RangerId::FIRST)),
+        ] {
+            let Some(Record::Range { wall, ranger, .. }) = read(line) else { panic!("{line}") };
+            assert_eq!((wall, ranger), expected, "{line}");
+        }
+    }
+
     #[test]
     fn every_kind_of_record_is_read() {
+        let range = |range, wall| {
+            let (time, bearing, ranger) = (3.0, -1.5, RangerId::FIRST);
+            Record::Range { time, bearing, range, wall, ranger }
+        };
         let cases = [
             (
                 "ticks,0.25,-12,9007199254740993",
@@ -429,15 +464,9 @@ mod tests {
                 " wheels , 1e1 , 0.5 , -0.25 ",
                 Record::Wheels { time: 10.0, right: 0.5, left: -0.25 },
             ),
-            (
-                "range,3,-1.5,2.25",
-                Record::Range { time: 3.0, bearing: -1.5, range: Some(2.25), wall: None },
-            ),
-            ("range,3,-1.5,", Record::Range { time: 3.0, bearing: -1.5, range: None, wall: None }),
-            (
-                "range,3,-1.5,,7",
-                Record::Range { time: 3.0, bearing: -1.5, range: None, wall: Some(7) },
-            ),
+            ("range,3,-1.5,2.25", range(Some(2.25), None)),
+            ("range,3,-1.5,", range(None, None)),
+            ("range,3,-1.5,,7", range(None, Some(7))),
             ("skip,3.5", Record::Skip { time: 3.5 }),
             (
                 "heading,3,1.5,0.25",
@@ -535,7 +564,8 @@ mod tests {
             ("position,1,2,3,4,5", "the variance of y is missing"),
             ("measured_pose,1,2,3,4,5,6,7,8,9", "the variance of the heading is missing"),
             ("range,1,2,3,x", "the wall is `x`, which is not a whole number, from 0"),
-            ("range,1,2,3,4,5", "there are more fields than a record of this kind has"),
+            ("range,1,2,3,4,5", "the ranger is `5`, which is not a whole number, from 0 to 2"),
+            ("range,1,2,3,4,1,5", "there are more fields than a record of this kind has"),
             ("resume,1,2,3,4,5,6,7,8", "the x is missing"),
             (
                 "resume,2,1,2,3,4,5,6,7,8,9,-10,11,12,13,0",

@@ -7,7 +7,7 @@ use std::vec::IntoIter;
 
 use sonarfix::absolute::AbsoluteMeasurement;
 use sonarfix::aim::{Aim, NoAim, Reason};
-use sonarfix::config::{PingSchedule, Sonar};
+use sonarfix::config::{PingSchedule, RangerId, Sonar};
 use sonarfix::ekf::{STATES, StandardDeviations, StateEstimate};
 use sonarfix::gyro::TurnReading;
 use sonarfix::localizer::{Fix, Localizer, Start};
@@ -70,6 +70,7 @@ enum Echo {
         bearing: f64,
         range: Option<f64>,
         wall: Option<u32>,
+        ranger: RangerId,
     },
     /// Of a scan one range is used, if one is due; during a search, several are.
     Scan {
@@ -223,8 +224,8 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
             Record::Wheels { time, right, left } => {
                 self.take_wheels(micros(time), [right, left], Encoder::Wheels, complain)
             }
-            Record::Range { time, bearing, range, wall } => {
-                self.hold(micros(time), Echo::At { bearing, range, wall })
+            Record::Range { time, bearing, range, wall, ranger } => {
+                self.hold(micros(time), Echo::At { bearing, range, wall, ranger })
             }
             Record::Absolute { time, age, measurement } => {
                 self.hold(micros(time), Echo::Absolute { age: micros(age), measurement })
@@ -470,8 +471,13 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
                 self.tally.distance += estimators.drive_to(from.between(to, measurement.time))?;
                 match &measurement.echo {
                     Echo::Absolute { age, measurement: absolute } => {
-                        let fix = estimators.absolute(measurement.time - age, absolute);
+                        let measured_at = measurement.time - age;
+                        let fix = estimators.absolute(measured_at, absolute);
                         self.tally.absolute.count(&fix);
+                        let since = u64::try_from(measured_at - estimators.epoch).unwrap_or(0);
+                        let measured_at = Instant::from_ticks(since);
+                        self.recorder
+                            .absolute(|| observe::absolute_record(measured_at, absolute, &fix));
                     }
                     Echo::Pose(start) => estimators.navigator.set_pose(start)?,
                     Echo::Mode { mode, state, deviation } => {
@@ -552,7 +558,11 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         let navigator = &mut estimators.navigator;
         let localizer = navigator.localizer();
         let pose = localizer.pose();
-        let sonar = &self.robot.localizer.sonar;
+        let sonar = match pending.echo {
+            Echo::At { ranger, .. } => self.robot.localizer.sonar_of(ranger),
+            _ => None,
+        };
+        let sonar = sonar.unwrap_or(&self.robot.localizer.sonar);
         let mount = pose.to_map(sonar.mount);
         let mut measurement = Measurement {
             time: seconds(pending.time - estimators.epoch),
@@ -563,10 +573,13 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         };
         #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
         let aim = match &pending.echo {
-            Echo::At { bearing, wall: None, .. } => localizer.aim_at(Radians(*bearing as f32)),
+            Echo::At { bearing, wall: None, ranger, .. } => {
+                localizer.aim_along(*ranger, Radians(*bearing as f32))
+            }
             // The robot chose the wall at the time of the ping, not of the echo. A fix does not
             // depend on the predicted range and gain of that choice.
-            Echo::At { bearing, wall: Some(wall), .. } => Ok(Aim {
+            Echo::At { bearing, wall: Some(wall), ranger, .. } => Ok(Aim {
+                ranger: *ranger,
                 wall: WallId(*wall),
                 bearing: Radians(*bearing as f32),
                 range: Metres(0.0),

@@ -4,7 +4,7 @@
 use sonarfix::units::Radians;
 use sonarfix_map::Floor;
 
-use sonarfix_sim::trace::{FixRecord, Recorder, Tick, Trace};
+use sonarfix_sim::trace::{AbsoluteRecord, FixRecord, Recorder, Tick, Trace};
 
 /// Default capacity: more than the pixels of a figure and the frames of the player.
 pub const CAPACITY: usize = 16_384;
@@ -15,6 +15,7 @@ pub struct Thinned {
     trace: Trace,
     ticks: Spacing,
     fixes: Spacing,
+    absolutes: Spacing,
     capacity: usize,
 }
 
@@ -47,13 +48,14 @@ impl Spacing {
 }
 
 impl Thinned {
-    /// An empty trace on a floor, of at most `capacity` ticks and as many fixes.
+    /// An empty trace on a floor, of at most `capacity` ticks, and as many fixes and absolute measurements.
     #[must_use]
     pub fn new(floor: &Floor, cone: Radians, capacity: usize) -> Self {
         Self {
             trace: Trace::of(floor, cone),
             ticks: Spacing::ALL,
             fixes: Spacing::ALL,
+            absolutes: Spacing::ALL,
             capacity: capacity.max(2),
         }
     }
@@ -82,6 +84,10 @@ impl Recorder for Thinned {
 
     fn fix(&mut self, make: impl FnOnce() -> FixRecord) {
         self.fixes.record(&mut self.trace.fixes, self.capacity, make);
+    }
+
+    fn absolute(&mut self, make: impl FnOnce() -> AbsoluteRecord) {
+        self.absolutes.record(&mut self.trace.absolutes, self.capacity, make);
     }
 }
 

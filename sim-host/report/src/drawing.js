@@ -145,6 +145,7 @@ const Drawing = (() => {
       if (moment.encoders) drawRobot(g, cam, moment.encoders, "encoders", false);
       if (moment.truth) drawRobot(g, cam, moment.truth, "truth", true);
       if (moment.estimate && (!search || search.provisional)) drawEstimate(g, cam, moment, magnified);
+      if (moment.absolute) drawAbsolute(g, cam, moment);
       drawNotes(g, cam, magnified);
       if (search) drawSearchNote(g, search);
     }
@@ -338,6 +339,25 @@ const Drawing = (() => {
       g.arc(dotX, dotY, 4.5, 0, 2 * Math.PI);
       g.fill();
       if (isUnusual(fix)) g.fillText(fix.source, dotX + 8, dotY - 8);
+    }
+
+    // A heading, position or pose from outside: a square, and a line in the direction of the heading.
+    function drawAbsolute(g, cam, { absolute, estimate, time }) {
+      const age = time - absolute.time;
+      const at = absolute.x === null ? estimate : absolute;
+      if (age > 2 * FADE || !at) return;
+      const [x, y] = onScreen(cam, at.x, at.y);
+      g.strokeStyle = state.colours[OUTCOMES[absolute.outcome]];
+      g.lineWidth = 2;
+      g.globalAlpha = Math.max(0.25, 1 - age / (2 * FADE));
+      g.beginPath();
+      if (absolute.x !== null) g.rect(x - 5, y - 5, 10, 10);
+      if (absolute.heading !== null) {
+        const length = 3 * radiusOnScreen(cam);
+        g.moveTo(x, y), g.lineTo(x + length * Math.cos(absolute.heading), y - length * Math.sin(absolute.heading));
+      }
+      g.stroke();
+      g.globalAlpha = 1;
     }
 
     // The estimated robot and its ellipse, magnified; where the truth is known, a cross at its

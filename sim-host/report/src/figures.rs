@@ -1,6 +1,7 @@
 //! The content of each figure. On a page about the paper those of the paper have its numbers, 2 to 6.
 
 mod calibration;
+mod inputs;
 mod pings;
 mod spread;
 mod values;
@@ -63,7 +64,7 @@ struct Plan {
 }
 
 /// The figures, those of the paper in its order.
-const PLANS: [Plan; 11] = [
+const PLANS: [Plan; 13] = [
     Plan {
         number: Some(2),
         file: "trajectory.svg",
@@ -127,6 +128,14 @@ const PLANS: [Plan; 11] = [
     },
     Plan {
         number: None,
+        file: "gyro-bias.svg",
+        caption: "The estimated bias of the gyro, one standard deviation on either side and, where it is known, the true value. \
+                  A dot is a slip of a wheel: wheels and gyro turned differently by more than their noise.",
+        paper: "",
+        chart: |data, width| inputs::gyro_bias(data.trace, width),
+    },
+    Plan {
+        number: None,
         file: "innovations.svg",
         caption: "Measured minus expected range of every ping with an echo, and three standard deviations of \
                   the innovation. Whether a range is used is decided by the probability that the echo is the wall's, \
@@ -134,6 +143,15 @@ const PLANS: [Plan; 11] = [
                   Values far beyond the band are clipped.",
         paper: "",
         chart: |data, width| pings::innovations(data.trace, width),
+    },
+    Plan {
+        number: None,
+        file: "absolute.svg",
+        caption: "Headings, positions and poses from outside: the root of their normalized innovation squared over its dimensions, \
+                  which is about one where noise and covariance are as assumed. Outliers are gated; those that came too late are at zero. \
+                  Values far above are clipped.",
+        paper: "",
+        chart: |data, width| inputs::absolute(data.trace, width),
     },
     Plan {
         number: None,

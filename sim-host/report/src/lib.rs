@@ -193,7 +193,8 @@ mod tests {
     /// A robot that drives 10 m along a wall.
     fn trace(ticks: u32) -> Trace {
         let pose = |n: u32| Pose { x: f64::from(n) * 0.1, y: 1.0, heading: 0.0 };
-        let truth = |n| Truth { pose: pose(n), calibration: Some(Calibration::default()) };
+        let truth =
+            |n| Truth { pose: pose(n), calibration: Some(Calibration::default()), gyro_bias: None };
         let estimate = |n| Estimate {
             pose: pose(n),
             calibration: Calibration { track_width: 0.35, ..Calibration::default() },
@@ -213,9 +214,11 @@ mod tests {
             walls: vec![Wall { name: HOSTILE.into(), from: [0.0, 0.0], to: [10.0, 0.0] }],
             cone: 0.26,
             start: None,
+            absolutes: Vec::new(),
             ticks: (0..ticks).map(tick).collect(),
             searches: Vec::new(),
             fixes: vec![FixRecord {
+                ranger: 0,
                 time: 0.5,
                 wall: None,
                 sonar: [0.2, 1.0],

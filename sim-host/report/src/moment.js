@@ -33,7 +33,7 @@ const Moment = (() => {
     return { x, y, heading: a + at.part * wrap(b - a) };
   }
 
-  function momentAt({ ticks, fixes }, time) {
+  function momentAt({ ticks, fixes, gyro, absolutes }, time) {
     const index = Math.max(0, lastBefore(ticks.time, time));
     const next = ticks.time[Math.min(index + 1, ticks.time.length - 1)];
     const length = next - ticks.time[index];
@@ -46,6 +46,8 @@ const Moment = (() => {
       ellipse: ellipse(between(ticks.sigma_x, at), between(ticks.sigma_y, at), between(ticks.correlation, at)),
       sigmaHeading: between(ticks.sigma_heading, at),
       fix: recordAt(fixes, lastBefore(fixes.time, time)),
+      gyro: recordAt(gyro, lastBefore(gyro.time, time)),
+      absolute: recordAt(absolutes, lastBefore(absolutes.time, time)),
     };
   }
 
@@ -109,7 +111,32 @@ const Moment = (() => {
     };
   }
 
+  // The gyro and the last heading, position or pose from outside as text; null without one.
+  function inputNumbers({ gyro, absolute, time }) {
+    const perSecond = (rate) => `${(rate * 180 / Math.PI).toFixed(3)}°/s`;
+    const parts = absolute ? [
+      `${Math.max(0, time - absolute.time).toFixed(1)} s ago`,
+      absolute.x === null ? null : `${absolute.x.toFixed(2)} m, ${absolute.y.toFixed(2)} m`,
+      absolute.heading === null ? null : degrees(absolute.heading),
+      OUTCOMES[absolute.outcome] + (absolute.reason ? `: ${absolute.reason}` : ""),
+    ] : [];
+    return {
+      bias: gyro ? `${perSecond(gyro.bias)} ± ${perSecond(gyro.sigma)}` : null,
+      slips: gyro ? `${gyro.slips}` : null,
+      absolute: absolute ? parts.filter((part) => part !== null).join(", ") : null,
+    };
+  }
+
+  // Writes texts into the list of numbers; a row without a text is hidden.
+  function show(readout, texts) {
+    for (const [name, text] of Object.entries(texts)) {
+      const row = readout[name];
+      row.hidden = row.previousElementSibling.hidden = text === null;
+      row.textContent = (text ?? "").replace(/-(?=\d)/g, "−");
+    }
+  }
+
   return {
-    OUTCOMES, SIGMAS, lastBefore, momentAt, searchAt, walkedBy, wrap, isUnusual, unknown, millimetres, degrees, length, distance, fixNumbers,
+    OUTCOMES, SIGMAS, lastBefore, momentAt, searchAt, walkedBy, wrap, isUnusual, unknown, millimetres, degrees, length, distance, fixNumbers, inputNumbers, show,
   };
 })();

@@ -5,6 +5,8 @@
 // Opens the player on a run. `overlay(g)` draws over the picture; while `isBusy()`, dragging the picture does not move it.
 const openPlayer = (data, { overlay = () => {}, isBusy = () => false } = {}) => {
   data.searches ??= [];
+  data.gyro ??= { time: [] };
+  data.absolutes ??= { time: [] };
   const root = document.documentElement;
 
   const { OUTCOMES, SIGMAS, distance, degrees, length, unknown, wrap } = Moment;
@@ -97,8 +99,9 @@ const openPlayer = (data, { overlay = () => {}, isBusy = () => false } = {}) => 
       sigma: degrees(moment.sigmaHeading === null ? null : SIGMAS * moment.sigmaHeading),
       encoders: length(distance(truth ?? estimate, encoders)),
       ...Moment.fixNumbers(fix, moment.time, data.walls),
+      ...Moment.inputNumbers(moment),
     };
-    for (const [name, text] of Object.entries(values)) readout[name].textContent = text.replace(/^-/, "−");
+    Moment.show(readout, values);
     readout.outcome.style.setProperty("--of", fix ? `var(--${OUTCOMES[fix.outcome]})` : "transparent");
   }
 

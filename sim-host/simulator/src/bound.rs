@@ -39,17 +39,26 @@ impl Bound {
         self.filter.x = truth;
     }
 
-    /// Updates with a range to a wall at the current state.
-    pub fn fixed(&mut self, line: &Line) {
+    /// Sets the model of the ranger that measures next.
+    pub fn measures_by(&mut self, model: Model) {
+        self.filter.model = model;
+        if let Some(aided) = &mut self.with_gyro {
+            aided.set_model(model);
+        }
+    }
+
+    /// Updates with a range to a wall, by a ping at a bearing, at the current state.
+    pub fn fixed(&mut self, line: &Line, bearing: f64) {
         let truth = self.filter.x;
         if let Some(aided) = &mut self.with_gyro {
             aided.x = truth;
-            aided.correct(line);
+            aided.correct(line, bearing);
             self.filter.p = aided.covariance();
             return;
         }
-        let (range, _) = self.filter.model.range(&truth, line);
-        self.filter.correct(line, range);
+        // The innovation is zero: only the covariance changes.
+        let (range, ..) = self.filter.model.measured(&truth, line, bearing);
+        self.filter.correct_at(line, bearing, range);
         self.filter.x = truth;
     }
 

@@ -8,7 +8,7 @@
 )]
 
 use nalgebra::{SMatrix, SVector};
-use sonarfix::config::Config;
+use sonarfix::config::{Config, Ranging, Sonar};
 
 use crate::angle;
 
@@ -75,6 +75,8 @@ pub struct Model {
     pub noise_floor: f64,
     /// Range noise per metre of range.
     pub noise_per_metre: f64,
+    /// Of a time-of-flight ranger the standard deviation of the direction of its beam, radians; of a sonar none.
+    pub pointing: Option<f64>,
 }
 
 impl Model {
@@ -90,7 +92,19 @@ impl Model {
             mount: [config.sonar.mount.x.0.into(), config.sonar.mount.y.0.into()],
             noise_floor: config.sonar.noise.floor.0.into(),
             noise_per_metre: config.sonar.noise.per_metre.into(),
+            pointing: match config.sonar.ranging {
+                Ranging::Sound => None,
+                Ranging::Light(beam) => Some(beam.pointing.0.into()),
+            },
         }
+    }
+
+    /// The same with another ranger of the robot.
+    #[must_use]
+    pub fn of_ranger(config: &Config, sonar: &Sonar) -> Self {
+        let mut config = *config;
+        config.sonar = *sonar;
+        Self::of(&config)
     }
 
     /// f(x, u): the state after the encoders read `travel` (right, left), metres.
@@ -165,6 +179,38 @@ impl Model {
         ((1.0 + x[6]) * signed.abs(), h)
     }
 
+    /// What a ping at a bearing measures of a wall's line: h(x), H, and the variance of its noise.
+    #[must_use]
+    pub fn measured(&self, x: &Vector, line: &Line, bearing: f64) -> (f64, Vector, f64) {
+        let Some(pointing) = self.pointing else {
+            let (range, h) = self.range(x, line);
+            return (range, h, self.range_variance(range));
+        };
+        let (range, h, by_bearing) = self.range_along(x, line, bearing);
+        (range, h, self.range_variance(range) + (by_bearing * pointing).powi(2))
+    }
+
+    /// The range along a beam at a bearing, its derivative H, and that by the bearing: eqs. (45) and (46).
+    #[must_use]
+    pub fn range_along(&self, x: &Vector, line: &Line, bearing: f64) -> (f64, Vector, f64) {
+        let (sin, cos) = libm::sincos(x[2]);
+        let [ahead, aside] = self.mount;
+        let lever = [cos * ahead - sin * aside, sin * ahead + cos * aside];
+        let [a, b] = line.normal;
+        let signed = a * (x[0] + lever[0] - line.point[0]) + b * (x[1] + lever[1] - line.point[1]);
+        let (sin, cos) = libm::sincos(x[2] + bearing);
+        let approach = a * cos + b * sin;
+        let distance = -signed / approach;
+        let scale = 1.0 + x[6];
+        let by_bearing = -scale * distance * (b * cos - a * sin) / approach;
+        let mut h = Vector::zeros();
+        h[0] = -scale * a / approach;
+        h[1] = -scale * b / approach;
+        h[2] = -scale * (b * lever[0] - a * lever[1]) / approach + by_bearing;
+        h[6] = distance;
+        (scale * distance, h, by_bearing)
+    }
+
     /// Variance of a range, m².
     #[must_use]
     pub fn range_variance(&self, range: f64) -> f64 {
@@ -217,8 +263,12 @@ impl DenseFilter {
 
     /// Eqs. (6) and (10)–(14), in Joseph's form.
     pub fn correct(&mut self, line: &Line, range: f64) {
-        let (expected, h) = self.model.range(&self.x, line);
-        let noise = self.model.range_variance(expected);
+        self.correct_at(line, 0.0, range);
+    }
+
+    /// The same for a ping at a bearing, which matters to a time-of-flight ranger.
+    pub fn correct_at(&mut self, line: &Line, bearing: f64, range: f64) {
+        let (expected, h, noise) = self.model.measured(&self.x, line, bearing);
         let gain = self.p * h / (h.dot(&(self.p * h)) + noise);
         let keep = Matrix::identity() - gain * h.transpose();
         self.p = keep * self.p * keep.transpose() + gain * gain.transpose() * noise;

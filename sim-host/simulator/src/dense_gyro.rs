@@ -100,12 +100,16 @@ impl DenseGyroFilter {
         self.p[(BIAS, BIAS)] += self.gyro.bias_walk * seconds;
     }
 
+    /// Replaces the model, of which only the ranger differs.
+    pub fn set_model(&mut self, model: Model) {
+        self.model = model;
+    }
+
     /// The covariance after a range to a wall.
-    pub fn correct(&mut self, line: &Line) {
-        let (range, h7) = self.model.range(&self.x, line);
+    pub fn correct(&mut self, line: &Line, bearing: f64) {
+        let (_, h7, noise) = self.model.measured(&self.x, line, bearing);
         let mut h = SVector::<f64, STATES>::zeros();
         h.fixed_rows_mut::<7>(0).copy_from(&h7);
-        let noise = self.model.range_variance(range);
         let gain = self.p * h / (h.dot(&(self.p * h)) + noise);
         let keep = SMatrix::<f64, STATES, STATES>::identity() - gain * h.transpose();
         self.p = keep * self.p * keep.transpose() + gain * gain.transpose() * noise;

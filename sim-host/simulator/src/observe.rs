@@ -6,16 +6,20 @@
 )]
 
 use nalgebra::{DMatrix, DVector};
+use sonarfix::absolute::AbsoluteMeasurement;
 use sonarfix::aim::{Aim, NoAim};
 use sonarfix::ekf::{Ekf, Innovation};
-use sonarfix::localizer::{Fix, Localizer};
+use sonarfix::localizer::{AbsoluteFix, Agreement, Fix, GyroStatus, Localizer};
 use sonarfix::pose::Point;
 use sonarfix::search::Search;
+use sonarfix::units::Instant;
 
 use crate::angle;
 use crate::dense::{Matrix, Vector};
+use crate::time::seconds;
 use crate::trace::{
-    Calibration, Estimate, FixRecord, Hypothesis, Outcome, Pose, SearchRecord, Why,
+    AbsoluteRecord, Calibration, Estimate, FixRecord, GyroEstimate, Hypothesis, Outcome, Pose,
+    SearchRecord, Why,
 };
 use crate::world::reflector::Source;
 
@@ -36,9 +40,17 @@ pub fn estimate(localizer: &Localizer) -> Estimate {
         },
         deviation: p.diagonal().map(f64::sqrt).into(),
         covariance_xy: p[(0, 1)],
+        gyro: localizer.gyro().map(|status| gyro(&status)),
         verdict: localizer.health().verdict,
         inflations: localizer.health().inflations,
     }
+}
+
+/// The estimate of a gyro.
+#[must_use]
+pub fn gyro(status: &GyroStatus) -> GyroEstimate {
+    let GyroStatus { bias, deviation, slips, .. } = *status;
+    GyroEstimate { bias: bias.0.into(), deviation: deviation.0.into(), slips }
 }
 
 /// The filter's state X̂.
@@ -111,6 +123,7 @@ pub fn fix_record(
     FixRecord {
         time: measurement.time,
         wall: usize::try_from(aim.wall.0).ok(),
+        ranger: aim.ranger.0,
         sonar: measurement.sonar,
         direction: angle::wrap(measurement.heading + bearing),
         bearing,
@@ -142,6 +155,7 @@ pub fn no_aim_record(measurement: Measurement, no_aim: NoAim) -> FixRecord {
     FixRecord {
         time: measurement.time,
         wall: None,
+        ranger: 0,
         sonar: measurement.sonar,
         direction: measurement.heading,
         bearing: 0.0,
@@ -153,6 +167,41 @@ pub fn no_aim_record(measurement: Measurement, no_aim: NoAim) -> FixRecord {
         reason: no_aim.to_string(),
         innovation: None,
         innovation_variance: None,
+    }
+}
+
+/// The record of a heading, position or pose from outside, with its outcome.
+#[must_use]
+pub fn absolute_record(
+    measured_at: Instant,
+    measurement: &AbsoluteMeasurement,
+    fix: &AbsoluteFix,
+) -> AbsoluteRecord {
+    let (outcome, agreement, reason) = match fix {
+        AbsoluteFix::Accepted(agreement) => (Outcome::Accepted, Some(agreement), String::new()),
+        AbsoluteFix::Downweighted(agreement) => {
+            (Outcome::Downweighted, Some(agreement), String::new())
+        }
+        AbsoluteFix::Gated(agreement) => (Outcome::Gated, Some(agreement), String::new()),
+        AbsoluteFix::Refused(refusal) => (Outcome::Refused, None, refusal.to_string()),
+        other => (Outcome::Refused, None, format!("{other:?}")),
+    };
+    let at = |point: &Point| Some([point.x.0.into(), point.y.0.into()]);
+    let (position, heading) = match measurement {
+        AbsoluteMeasurement::Heading { angle, .. } => (None, Some(angle.0.into())),
+        AbsoluteMeasurement::Position { point, .. } => (at(point), None),
+        AbsoluteMeasurement::Pose { pose, .. } => {
+            (at(&pose.position()), Some(pose.heading.radians().0.into()))
+        }
+    };
+    let nis = |of: &Agreement| f64::from(of.nis) / f64::from(of.dimensions.max(1));
+    AbsoluteRecord {
+        time: seconds(measured_at.ticks()),
+        position,
+        heading,
+        outcome,
+        reason,
+        nis: agreement.map(nis),
     }
 }
 

@@ -12,6 +12,7 @@
 //! - [`wires`]: the channels of an encoder and the count of the shipped decoder;
 //! - [`disc`]: an encoder disc, which generates the edges;
 //! - [`board`]: the board of a sonar, which answers a trigger with an echo pulse;
+//! - [`sonar`]: a sonar with its board and its servo, and the cross-talk of several;
 //! - [`devices`]: the parameters of a scenario's devices, for the drivers and for the models;
 //! - [`gyro`]: the rate of a gyro, for its registers on the bus;
 //! - [`faults`]: faults of the hardware.
@@ -21,4 +22,6 @@ pub mod devices;
 pub mod disc;
 pub mod faults;
 pub mod gyro;
+pub mod light;
+pub mod sonar;
 pub mod wires;

@@ -99,7 +99,7 @@ impl<'a> Plant<'a> {
             track_width: p.track_width,
             range_scale: self.range_scale,
         };
-        Truth { pose: self.pose(), calibration: Some(calibration) }
+        Truth { pose: self.pose(), calibration: Some(calibration), gyro_bias: None }
     }
 
     /// The truth now, as the states of the filter.

@@ -37,6 +37,17 @@ pub struct Calibration {
     pub range_scale: f64,
 }
 
+/// The estimate of a gyro at one instant.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct GyroEstimate {
+    /// Estimated bias, rad/s.
+    pub bias: f64,
+    /// Its standard deviation, rad/s.
+    pub deviation: f64,
+    /// Slips of the wheels since the start.
+    pub slips: u32,
+}
+
 /// The filter's estimate at one instant.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Estimate {
@@ -48,6 +59,8 @@ pub struct Estimate {
     pub deviation: [f64; 7],
     /// Covariance of x and y, m².
     pub covariance_xy: f64,
+    /// The gyro of a robot that has one.
+    pub gyro: Option<GyroEstimate>,
     /// The health verdict.
     #[serde(skip)]
     pub verdict: Verdict,
@@ -62,6 +75,8 @@ pub struct Truth {
     pub pose: Pose,
     /// True systematic errors, where they are known.
     pub calibration: Option<Calibration>,
+    /// True bias of the gyro, rad/s, where it is known.
+    pub gyro_bias: Option<f64>,
 }
 
 /// One encoder tick.
@@ -121,6 +136,8 @@ pub struct FixRecord {
     pub time: f64,
     /// Index of the wall aimed at, if there was one.
     pub wall: Option<usize>,
+    /// The ranger, counted from 0 as in the robot file; 0 if no wall was chosen.
+    pub ranger: u8,
     /// The true position of the sonar (in a replay, the estimated one), metres.
     pub sonar: [f64; 2],
     /// Direction of the beam, radians in the map frame.
@@ -143,6 +160,23 @@ pub struct FixRecord {
     pub innovation: Option<f64>,
     /// Innovation variance, m², where one was computed.
     pub innovation_variance: Option<f64>,
+}
+
+/// A heading, position or pose from outside.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AbsoluteRecord {
+    /// When it was measured, seconds since the run began.
+    pub time: f64,
+    /// The measured position, metres; `None` for a heading.
+    pub position: Option<[f64; 2]>,
+    /// The measured heading, radians; `None` for a position.
+    pub heading: Option<f64>,
+    /// The outcome.
+    pub outcome: Outcome,
+    /// Why it was refused; empty otherwise.
+    pub reason: String,
+    /// Normalized innovation squared over its number of dimensions, where an innovation was computed.
+    pub nis: Option<f64>,
 }
 
 /// A hypothesis of the search.
@@ -196,6 +230,8 @@ pub struct Trace {
     pub ticks: Vec<Tick>,
     /// Every measurement cycle, in order of time.
     pub fixes: Vec<FixRecord>,
+    /// Every heading, position and pose from outside, in the order in which the localizer took them.
+    pub absolutes: Vec<AbsoluteRecord>,
     /// The search, in order of time.
     pub searches: Vec<SearchRecord>,
 }
@@ -218,6 +254,8 @@ pub trait Recorder {
     fn tick(&mut self, make: impl FnOnce() -> Tick);
     /// A measurement cycle is over.
     fn fix(&mut self, make: impl FnOnce() -> FixRecord);
+    /// The localizer has taken or refused a heading, position or pose from outside.
+    fn absolute(&mut self, _make: impl FnOnce() -> AbsoluteRecord) {}
     /// The robot has no confirmed pose, twice a second.
     fn search(&mut self, _make: impl FnOnce() -> SearchRecord) {}
     /// The robot's localizer has started, at the fidelity of pins.
@@ -245,6 +283,10 @@ impl Recorder for Trace {
 
     fn fix(&mut self, make: impl FnOnce() -> FixRecord) {
         self.fixes.push(make());
+    }
+
+    fn absolute(&mut self, make: impl FnOnce() -> AbsoluteRecord) {
+        self.absolutes.push(make());
     }
 
     fn search(&mut self, make: impl FnOnce() -> SearchRecord) {

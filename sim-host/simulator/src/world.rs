@@ -6,12 +6,14 @@
 //! - `index`, `grid`, `wedge`: the walls near the sonar, along a line, and in the cone;
 //! - [`reflector`]: the reflectors that can answer a ping (deterministic);
 //! - [`sensor`]: the parameters of a sonar (deterministic);
+//! - `light`: the range of a time-of-flight ranger (random);
 //! - `detection`: which reflector is detected, and with what error (random).
 
 pub mod air;
 mod detection;
 mod grid;
 mod index;
+mod light;
 pub mod obstacle;
 pub mod reflector;
 mod scene;
@@ -52,6 +54,9 @@ impl World {
         rng: &mut impl Rng,
     ) -> Option<Echo> {
         let normal = random::normal(noise);
+        if let Some(light) = &sensor.light {
+            return self.lit(ping, sensor, light, normal, rng);
+        }
         let found = Search::new(self, sensor, ping).run();
         let first = detection::first(&found, rng);
         let scattered = self.scattered(ping, sensor, rng);

@@ -54,10 +54,12 @@ const KINDS: [(&str, Kinds); 15] = [
 ];
 
 /// Faults of a gyro, with names.
-const GYRO_KINDS: [(&str, Kinds); 6] = [
+const GYRO_KINDS: [(&str, Kinds); 8] = [
     ("none", &[]),
     ("gyro stuck", &[FaultKind::StuckGyro]),
     ("gyro saturated", &[FaultKind::SaturatedGyro]),
+    ("a tenth of the gyro's samples random", &[FaultKind::GarbledGyro(0.1)]),
+    ("all of the gyro's samples random", &[FaultKind::GarbledGyro(1.0)]),
     ("gyro unreadable", &[FaultKind::GyroReadErrors(1.0)]),
     ("a tenth of the gyro's samples missing", &[FaultKind::GyroReadErrors(0.1)]),
     ("an encoder channel dead", &[FaultKind::DeadEncoder(Wheel::Right)]),

@@ -17,6 +17,7 @@ use sonarfix_sim::progress::Progress;
 use sonarfix_sim::simulate::{Simulation, SimulationError};
 use sonarfix_survey::problem::Robot;
 use sonarfix_survey::survey::{Motion, Survey, SurveyError, survey};
+use sonarfix_survey::walls::MappedWall;
 
 use crate::floor_plan::FloorPlan;
 use crate::sweeping_robot::drive;
@@ -183,14 +184,15 @@ fn alignment(map: &Survey, truth: &[(f64, sonarfix_sim::trace::Pose)]) -> Motion
 /// The position RMS of a drive with the map, metres, and whether the robot was lost at its end.
 fn localized(place: Place, seed: u64, map: &Survey) -> Result<(f64, bool), SurveyStudyError> {
     let scenario = scenario(place, seed)?;
-    let mut robot = scenario.robot;
+    let robot = scenario.robot;
     #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
     let point = |at: &nalgebra::Vector2<f64>| Point::new(at.x as f32, at.y as f32);
     #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
-    let accuracy = Metres(map.accuracy() as f32);
-    robot.localizer.echo.map_accuracy = accuracy;
-    let walls =
-        map.walls.iter().filter_map(|wall| Wall::new(point(&wall.from), point(&wall.to)).ok());
+    let accuracy = |wall: &MappedWall| Metres(wall.accuracy as f32);
+    let walls = map.walls.iter().filter_map(|wall| {
+        let placed = Wall::new(point(&wall.from), point(&wall.to)).ok()?;
+        Some(placed.with_accuracy(accuracy(wall)))
+    });
     let simulation = Simulation::new(scenario).believing(robot, walls.collect());
     let result = simulation.run(seed, &mut ())?;
     Ok((result.path.position_mean_square().sqrt(), result.lost))

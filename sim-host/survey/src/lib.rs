@@ -2,6 +2,7 @@
 //!
 //! `docs/survey.md` describes the method.
 
+pub mod comparison;
 pub mod drawing;
 pub mod evidence;
 pub mod line;

@@ -18,16 +18,11 @@ pub fn map_text(survey: &Survey) -> String {
             reasons.iter().map(Reason::to_string).collect::<Vec<_>>().join("; ")
         ),
     };
-    let _ = writeln!(
-        text,
-        "# In the robot file: [echo] map_accuracy = \"{:.0} mm\"\n",
-        1e3 * survey.accuracy()
-    );
-    text.push_str("format = 1\n\n[map]\nunit = \"m\"\nwall = [\n");
+    text.push_str("\nformat = 1\n\n[map]\nunit = \"m\"\nwall = [\n");
     for (index, wall) in survey.walls.iter().enumerate() {
         let _ = writeln!(
             text,
-            "    {{ name = \"{}\", from = [{:.4}, {:.4}], to = [{:.4}, {:.4}] }}, # ± {:.0} mm, {} echoes{}",
+            "    {{ name = \"{}\", from = [{:.4}, {:.4}], to = [{:.4}, {:.4}], accuracy = \"{:.0} mm\" }}, # {} echoes{}",
             name(index),
             wall.from.x,
             wall.from.y,

@@ -304,20 +304,6 @@ impl Survey {
         }
     }
 
-    /// The median accuracy of the walls, by their echoes, metres.
-    #[must_use]
-    pub fn accuracy(&self) -> f64 {
-        let mut walls: Vec<&MappedWall> = self.walls.iter().collect();
-        walls.sort_by(|one, other| one.accuracy.total_cmp(&other.accuracy));
-        let mut left = walls.iter().map(|wall| wall.echoes).sum::<usize>() / 2;
-        let median = walls.iter().find(|wall| {
-            let is_there = wall.echoes > left;
-            left = left.saturating_sub(wall.echoes);
-            is_there
-        });
-        median.or(walls.last()).map_or(DIFFERS, |wall| wall.accuracy)
-    }
-
     /// Whether the map is sure.
     #[must_use]
     pub fn is_sure(&self) -> bool {

@@ -9,7 +9,7 @@ use sonarfix::localizer::{Localizer, Start, StartError};
 use sonarfix::map::Map;
 use sonarfix::map::image::checksum as crc32;
 use sonarfix::navigator;
-use sonarfix::units::{Duration, Instant, Metres};
+use sonarfix::units::{Duration, Instant, Metres, Radians};
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_hal::encoder::Wheels;
 use sonarfix_hal::robot::{Hardware, Report, Robot, Settings, Tick};
@@ -106,7 +106,8 @@ impl<'m, F: NorFlash> App<'m, F> {
             }
             Command::ResetCalibration => self.reset_calibration(now, polled),
             Command::Search => self.begin_search(now, polled),
-            Command::ShowDevices => self.show_devices(now),
+            Command::ShowDevices => self.show_devices(now, None),
+            Command::Point(bearing) => self.show_devices(now, Some(bearing)),
             Command::Absolute { age, ref measurement } => {
                 let at = Instant::from_ticks(now.ticks().saturating_sub(age.ticks()));
                 self.absolute(at, measurement).map(|()| Next::Nothing)
@@ -302,9 +303,21 @@ impl<'m, F: NorFlash> App<'m, F> {
         running.robot.absolute(at, measurement).map_err(|_| CommandError::Occupied)
     }
 
-    fn show_devices(&mut self, now: Instant) -> Result<Next, CommandError> {
+    /// With the servo at `bearing`, or in turn ahead and at its limits.
+    fn show_devices(
+        &mut self,
+        now: Instant,
+        bearing: Option<Radians>,
+    ) -> Result<Next, CommandError> {
         let Mode::Waiting(check) = &mut self.mode else { return Err(CommandError::Running) };
-        check.show(now);
+        if let Some(bearing) = bearing {
+            let (config, _) = self.config.as_ref().ok_or(CommandError::NoConfiguration)?;
+            let (rightmost, leftmost) = config.localizer.sonar.servo;
+            if !(bearing >= rightmost && bearing <= leftmost) {
+                return Err(CommandError::OutOfReach);
+            }
+        }
+        check.show(now, bearing);
         Ok(Next::Nothing)
     }
 

@@ -61,6 +61,8 @@ const TAIL: usize = 12;
 const ENTRY_MAX: usize = HEAD + LONGEST.next_multiple_of(4) + TAIL;
 /// Length of a sector's header.
 const HEADER: u32 = 24;
+/// Room for a header, the copies of both records, and the longest record behind them. Pose and calibration take 88 bytes.
+const SECTOR_MIN: usize = 24 + 88 + 2 * ENTRY_MAX;
 /// The key of a sector's header.
 const HEADER_KEY: u8 = 0;
 /// Bytes that are read at once in blank space.
@@ -133,7 +135,7 @@ impl<F: NorFlash> Journal<F> {
     pub fn new(flash: F, region: Range<u32>) -> Result<Self, StoreError> {
         const {
             assert!(4_usize.is_multiple_of(F::WRITE_SIZE), "the flash writes longer words");
-            assert!(F::ERASE_SIZE >= 4 * ENTRY_MAX, "a sector is too short");
+            assert!(F::ERASE_SIZE >= SECTOR_MIN, "a sector is too short");
             assert!(HEADER as usize == HEAD + TAIL, "a header has no payload");
         }
         let journal = Self { flash, region, view: None };

@@ -3,7 +3,7 @@
 use sonarfix::units::Radians;
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_hal::ranger::NoEcho;
-use sonarfix_link::message::{CommandError, CommandResult, DeviceReadings};
+use sonarfix_link::message::{CommandError, CommandResult, DeviceReadings, Sweep};
 use sonarfix_link::{Command, Telemetry};
 
 use crate::flash::SimFlash;
@@ -18,6 +18,14 @@ fn readings(messages: &[Telemetry]) -> Vec<DeviceReadings> {
         _ => None,
     });
     devices.collect()
+}
+
+fn sweeps(messages: &[Telemetry]) -> Vec<Sweep> {
+    let pings = messages.iter().filter_map(|message| match message {
+        Telemetry::Sweep(ping) => Some(*ping),
+        _ => None,
+    });
+    pings.collect()
 }
 
 /// A robot whose left wheel is mirrored.
@@ -60,7 +68,7 @@ fn readings_are_those_of_the_devices() {
         };
         let servo = shown.iter().find(at).and_then(|shown| shown.servo);
         let micros = servo.unwrap_or_else(|| panic!("never at {bearing:?}")).micros;
-        let [one, other] = config().servo_pulses;
+        let [one, other] = config().ranger.servo_pulses;
         let [from, to] = [one, other].map(|pulse| pulse.width.to_micros() as f32);
         let slope = (to - from) / (other.bearing - one.bearing).0;
         assert!((micros - from - slope * (bearing - one.bearing).0).abs() < 1.0, "{micros}");
@@ -149,4 +157,47 @@ fn a_board_without_a_configuration_shows_what_it_can() {
     assert_eq!((shown.right.count, shown.left.count), (Some(5), Some(6)));
     assert!([shown.right, shown.left].iter().all(|wheel| wheel.metres_per_edge.abs() < 1e-9));
     assert_eq!((shown.servo, shown.ping), (None, Some(Err(NoEcho::Nothing))));
+}
+
+#[test]
+fn the_servo_points_where_it_is_asked_to_and_the_ranger_pings_there() {
+    let baked = Baked::new(&config());
+    let mut bench = Bench::switched_on(&baked, SimFlash::new());
+    bench.truth = Some(Truth { x: 1.0, y: 1.5, heading: 0.0 });
+    bench.wait(2_000);
+    // It stands 3 m before a wall, and 1.5 m from the one at its left.
+    for (degrees, range) in [(0.0, 3.0), (90.0, 1.5), (2.0, 3.0)] {
+        let bearing = Radians::from_degrees(degrees);
+        assert_eq!(bench.order(&Command::Point(bearing)), DONE);
+        let ordered = bench.now;
+        let pings: Vec<Sweep> = sweeps(&bench.wait(3_000));
+        assert!(pings.len() > 20, "{} pings in 3 s", pings.len());
+        for ping in &pings {
+            assert!((ping.bearing - bearing).abs() < Radians(0.005), "{ping:?}");
+            let echo = ping.outcome.unwrap();
+            assert!((echo.range.0 - range).abs() < 0.02, "{echo:?} at {degrees}°");
+        }
+        // The turn from one limit to the other takes longer than a small one, and no ping is earlier than its end.
+        let first = pings[0].at.ticks() - ordered;
+        let turn = if degrees > 80.0 { 250_000..900_000 } else { 0..600_000 };
+        assert!(turn.contains(&first), "{first} µs to {degrees}°");
+    }
+    assert_eq!(bench.order(&Command::ShowDevices), DONE);
+    assert!(sweeps(&bench.wait(2_000)).is_empty(), "in turn again");
+}
+
+#[test]
+fn a_bearing_that_the_servo_does_not_reach_is_refused() {
+    let baked = Baked::new(&config());
+    let mut bench = Bench::switched_on(&baked, SimFlash::new());
+    let refused = CommandResult::Refused(CommandError::OutOfReach);
+    for bearing in [1.6, -1.6, f32::NAN, f32::INFINITY] {
+        assert_eq!(bench.order(&Command::Point(Radians(bearing))), refused, "{bearing}");
+    }
+    assert!(readings(&bench.wait(2_000)).is_empty(), "nothing has changed");
+    let erased = vec![0xFF; 64];
+    let without = Baked { map: erased.clone(), config: erased };
+    let mut bench = Bench::switched_on(&without, SimFlash::new());
+    let refused = CommandResult::Refused(CommandError::NoConfiguration);
+    assert_eq!(bench.order(&Command::Point(Radians(0.0))), refused);
 }

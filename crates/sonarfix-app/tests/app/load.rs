@@ -198,7 +198,7 @@ fn a_day_of(command: impl Fn(u64) -> Command) -> SimFlash {
 const DAY: u64 = 86_400;
 /// Bytes of a record and of a configuration in flash.
 const RECORD: u64 = 92;
-const CONFIGURATION: u64 = 204;
+const CONFIGURATION: u64 = 216;
 
 /// Another pose each time.
 fn another_pose(number: u64) -> Command {

@@ -279,7 +279,7 @@ impl<'m> Bench<'m> {
         self.servo_is_there.set(has(2));
         // A driver that has never set its channel.
         self.hardware.servo = servo(&self.servo_is_there);
-        self.hardware.servo.configure(&config().servo_settings()).unwrap();
+        self.hardware.servo.configure(&config().servo_settings().unwrap()).unwrap();
         self.hardware.ranger.is_there = has(3);
     }
 

@@ -5,7 +5,7 @@ use sonarfix::units::Instant;
 use super::echo::Outcome;
 use super::settings::{RangerKind, RangerSettings};
 
-/// The driver of an ultrasonic ranger. It never waits: it is triggered, and then polled until it returns an outcome.
+/// The driver of a ranger. It never waits: it is triggered, and then polled until it returns an outcome.
 ///
 /// Requirements on implementations: every accepted trigger leads to exactly one outcome or one error in bounded time,
 /// while it is polled; either ends the ping. A ping that is no longer polled does not block the next trigger forever.

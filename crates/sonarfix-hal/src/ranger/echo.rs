@@ -13,11 +13,11 @@ pub type Outcome = Result<Echo, NoEcho>;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Echo {
-    /// The instant at which the sound was sent.
+    /// The instant at which the sound was sent, or the first light.
     pub sent: Instant,
-    /// The instant at which the echo arrived.
+    /// The instant at which the echo arrived, or the last light.
     pub heard: Instant,
-    /// The distance from the sonar to the wall: half the time of flight at the configured speed of sound.
+    /// The distance from the ranger to the wall: of sound half the time of flight at the configured speed of sound.
     pub range: Metres,
 }
 

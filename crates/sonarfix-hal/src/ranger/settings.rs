@@ -6,6 +6,8 @@ use super::air::Air;
 
 /// The address that an SRF02 or SRF08 is shipped with: 0xE0 in the datasheets' eight bits.
 pub(super) const SRF_ADDRESS: u8 = 0x70;
+/// The address of a VL53L1X after a reset: 0x52 in the datasheet's eight bits.
+pub(super) const VL53L1X_ADDRESS: u8 = 0x29;
 /// Least time from ping to ping: the ranging, and 5 ms for the ranger to get ready.
 pub(super) const SRF_CYCLE: Duration = Duration::from_ticks(70_000);
 
@@ -23,6 +25,11 @@ pub enum RangerKind {
     },
     /// Another one, for which the board has a driver of its own.
     Custom,
+    /// VL53L1X, a time-of-flight ranger on an I²C bus: [`Vl53l1x`](super::Vl53l1x).
+    Vl53l1x {
+        /// Address in seven bits.
+        address: u8,
+    },
 }
 
 /// The settings of a ranger's driver.
@@ -55,6 +62,16 @@ impl RangerSettings {
     /// SRF02 or SRF08 at the address that it is shipped with, in the air of a room.
     pub const SRF: Self =
         Self { kind: RangerKind::Srf { address: SRF_ADDRESS }, cycle: SRF_CYCLE, air: Air::ROOM };
+}
+
+impl RangerSettings {
+    /// VL53L1X at the address that it has after a reset. It collects light for the cycle less 10 ms, up to 50 ms
+    /// (`docs/hardware.md`).
+    pub const VL53L1X: Self = Self {
+        kind: RangerKind::Vl53l1x { address: VL53L1X_ADDRESS },
+        cycle: Duration::from_ticks(60_000),
+        air: Air::ROOM,
+    };
 }
 
 /// The timing of a ranger with a trigger and an echo pin.

@@ -33,7 +33,7 @@ pub struct Faults {
     pub deadlines: u32,
     /// Polls with a time before that of an earlier poll, which have no other effect.
     pub clock: u32,
-    /// Samples of the gyro that could not be read, are saturated or stuck, or follow missing ones. The wheels alone are
+    /// Samples of the gyro that could not be read, are saturated, stuck or erratic, or follow missing ones. The wheels alone are
     /// used until there are good ones.
     pub gyro: u32,
 }

@@ -1,6 +1,7 @@
 //! The devices that the loop uses.
 
 use embedded_hal::pwm::SetDutyCycle;
+use sonarfix::config::RangerId;
 use sonarfix::gyro::GyroParameters;
 use sonarfix::units::{Metres, RadiansPerSecond};
 
@@ -19,19 +20,34 @@ pub trait Hardware {
     type Right: Counter;
     /// Counter of the left wheel.
     type Left: Counter;
-    /// PWM channel of the servo.
+    /// PWM channel of the servo; [`NoPwm`](crate::servo::NoPwm) without one.
     type Pwm: SetDutyCycle;
-    /// The ranger on the servo.
+    /// The ranger on the servo; those of a robot with several have one type.
     type Ranger: Ranger;
 
     /// The right wheel's counter.
     fn right(&mut self) -> &mut Self::Right;
     /// The left wheel's counter.
     fn left(&mut self) -> &mut Self::Left;
-    /// The servo.
+    /// The servo of the first ranger.
     fn servo(&mut self) -> &mut Servo<Self::Pwm>;
-    /// The ranger.
+    /// The first ranger.
     fn ranger(&mut self) -> &mut Self::Ranger;
+
+    /// Whether the robot has this ranger.
+    fn has_ranger(&self, ranger: RangerId) -> bool {
+        ranger == RangerId::FIRST
+    }
+
+    /// The servo of a ranger that the robot [has](Self::has_ranger).
+    fn servo_of(&mut self, _: RangerId) -> &mut Servo<Self::Pwm> {
+        self.servo()
+    }
+
+    /// A ranger that the robot [has](Self::has_ranger).
+    fn ranger_of(&mut self, _: RangerId) -> &mut Self::Ranger {
+        self.ranger()
+    }
 
     /// The rate of the gyro now; `None` without a gyro.
     fn yaw_rate(&mut self) -> Option<Result<RadiansPerSecond, Unreadable>> {
@@ -56,12 +72,29 @@ pub trait Hardware {
         if !(right && left) {
             return Err(Unsupported::Counter);
         }
-        let servo = config.servo_settings();
-        self.servo().check(&servo).map_err(Unsupported::Servo)?;
-        let ranger = self.ranger().configure(&config.ranger_settings());
-        ranger.map_err(|_| Unsupported::Ranger)?;
+        for (ranger, _) in config.localizer.sonars() {
+            let known = self.has_ranger(ranger).then(|| config.ranger_of(ranger)).flatten();
+            let (sonar, driver) = known.ok_or(Unsupported::Rangers)?;
+            if let Some(servo) = driver.servo_settings(sonar) {
+                self.servo_of(ranger).check(&servo).map_err(Unsupported::Servo)?;
+            }
+        }
+        for (ranger, _) in config.localizer.sonars() {
+            let Some((sonar, driver)) = config.ranger_of(ranger) else { continue };
+            let configured = self.ranger_of(ranger).configure(&driver.settings(sonar));
+            configured.map_err(|_| Unsupported::Ranger)?;
+        }
         self.configure_gyro(config.localizer.gyro.as_ref())?;
-        self.servo().configure(&servo).map_err(Unsupported::Servo)
+        for (ranger, _) in config.localizer.sonars() {
+            let Some((sonar, driver)) = config.ranger_of(ranger) else { continue };
+            match driver.servo_settings(sonar) {
+                None => self.servo_of(ranger).fix(sonar.servo.0),
+                Some(servo) => {
+                    self.servo_of(ranger).configure(&servo).map_err(Unsupported::Servo)?;
+                }
+            }
+        }
+        Ok(())
     }
 }
 
@@ -96,6 +129,18 @@ impl<H: Hardware, G: YawRate> Hardware for WithGyro<H, G> {
         self.devices.ranger()
     }
 
+    fn has_ranger(&self, ranger: RangerId) -> bool {
+        self.devices.has_ranger(ranger)
+    }
+
+    fn servo_of(&mut self, ranger: RangerId) -> &mut Servo<H::Pwm> {
+        self.devices.servo_of(ranger)
+    }
+
+    fn ranger_of(&mut self, ranger: RangerId) -> &mut H::Ranger {
+        self.devices.ranger_of(ranger)
+    }
+
     fn yaw_rate(&mut self) -> Option<Result<RadiansPerSecond, Unreadable>> {
         Some(self.gyro.rate())
     }
@@ -103,6 +148,65 @@ impl<H: Hardware, G: YawRate> Hardware for WithGyro<H, G> {
     fn configure_gyro(&mut self, parameters: Option<&GyroParameters>) -> Result<(), Unsupported> {
         let configured = parameters.map(|parameters| self.gyro.configure(parameters));
         configured.transpose().map(|_| ()).map_err(|_| Unsupported::Gyro)
+    }
+}
+
+/// The devices of a robot, with `N` further rangers of the same type, each on a servo or at a fixed bearing
+/// ([`NoPwm`](crate::servo::NoPwm) where none has a servo).
+#[derive(Debug)]
+pub struct WithRangers<H: Hardware, const N: usize> {
+    /// The devices with the first ranger.
+    pub devices: H,
+    /// The servos of the further rangers.
+    pub servos: [Servo<H::Pwm>; N],
+    /// The further rangers.
+    pub rangers: [H::Ranger; N],
+}
+
+impl<H: Hardware, const N: usize> Hardware for WithRangers<H, N> {
+    type Right = H::Right;
+    type Left = H::Left;
+    type Pwm = H::Pwm;
+    type Ranger = H::Ranger;
+
+    fn right(&mut self) -> &mut H::Right {
+        self.devices.right()
+    }
+
+    fn left(&mut self) -> &mut H::Left {
+        self.devices.left()
+    }
+
+    fn servo(&mut self) -> &mut Servo<H::Pwm> {
+        self.devices.servo()
+    }
+
+    fn ranger(&mut self) -> &mut H::Ranger {
+        self.devices.ranger()
+    }
+
+    fn has_ranger(&self, ranger: RangerId) -> bool {
+        ranger.index() <= N
+    }
+
+    fn servo_of(&mut self, ranger: RangerId) -> &mut Servo<H::Pwm> {
+        let further = ranger.index().checked_sub(1);
+        let further = further.and_then(|further| self.servos.get_mut(further));
+        further.unwrap_or_else(|| self.devices.servo())
+    }
+
+    fn ranger_of(&mut self, ranger: RangerId) -> &mut H::Ranger {
+        let further = ranger.index().checked_sub(1);
+        let further = further.and_then(|further| self.rangers.get_mut(further));
+        further.unwrap_or_else(|| self.devices.ranger())
+    }
+
+    fn yaw_rate(&mut self) -> Option<Result<RadiansPerSecond, Unreadable>> {
+        self.devices.yaw_rate()
+    }
+
+    fn configure_gyro(&mut self, parameters: Option<&GyroParameters>) -> Result<(), Unsupported> {
+        self.devices.configure_gyro(parameters)
     }
 }
 

@@ -1,6 +1,7 @@
 //! The state machine of a measurement cycle.
 
 use sonarfix::aim::{Aim, Reason};
+use sonarfix::config::RangerId;
 use sonarfix::units::{Instant, Radians};
 
 use super::odometer::Reading;
@@ -26,6 +27,8 @@ pub(super) enum Cycle {
     },
     /// The servo turns, or has settled and waits for the ranger.
     Turning {
+        /// The ranger that pings next.
+        ranger: RangerId,
         /// Why the wall was chosen; `None` in a sweep.
         why: Option<Reason>,
     },
@@ -47,6 +50,16 @@ pub(super) enum Target {
     Wall(Aim),
     /// Whatever is at this bearing, for the search.
     Sweep(Radians),
+}
+
+impl Target {
+    /// The ranger that measures it. The first one sweeps.
+    pub fn ranger(&self) -> RangerId {
+        match self {
+            Self::Wall(aim) => aim.ranger,
+            Self::Sweep(_) => RangerId::FIRST,
+        }
+    }
 }
 
 impl Cycle {

@@ -9,6 +9,8 @@ mod pulse;
 mod quadrature;
 mod servo;
 mod srf;
+mod two_wire;
+mod vl53l1x;
 
 use sonarfix::units::{Duration, Instant};
 

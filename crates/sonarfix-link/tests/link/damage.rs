@@ -83,7 +83,7 @@ fn skipped_frames_are_counted_by_reason() {
     assert_eq!(count(&[0, 5, 1, 0]), ReceiverCounters { corrupt: 1, ..none });
     assert_eq!(count(&[0, 1, 1, 0]), ReceiverCounters { corrupt: 1, ..none }, "too short");
     assert_eq!(
-        count(&[&[0], &[1; 400][..], &[0]].concat()),
+        count(&[&[0], &[1; 900][..], &[0]].concat()),
         ReceiverCounters { too_long: 1, ..none }
     );
     let foreign = ReceiverCounters { foreign: 1, ..none };

@@ -21,7 +21,7 @@ use crate::messages::{
 use crate::wire::to_stdvec;
 
 /// The version of the bytes below.
-const OF_VERSION: u8 = 5;
+const OF_VERSION: u8 = 6;
 
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().fold(String::new(), |hex, byte| format!("{hex}{byte:02x}"))
@@ -62,6 +62,7 @@ fn name_of_command(message: &Command) -> &'static str {
         Command::Search => "search",
         Command::ShowDevices => "show devices",
         Command::Absolute { .. } => "absolute",
+        Command::Point(_) => "point",
     }
 }
 
@@ -123,6 +124,7 @@ fn every_variant_has_the_number_of_its_version() {
         RangerKind::Pulse(PulseTiming::HC_SR04),
         RangerKind::Srf { address: 0 },
         RangerKind::Custom,
+        RangerKind::Vl53l1x { address: 0 },
     ]);
     let limits = SettingError::Limits;
     numbered(&[
@@ -130,6 +132,7 @@ fn every_variant_has_the_number_of_its_version() {
         Unsupported::Servo(limits),
         Unsupported::Counter,
         Unsupported::Gyro,
+        Unsupported::Rangers,
     ]);
     numbered(&[SettingError::Calibration, limits, SettingError::Pulse, SettingError::Frame]);
     numbered(&[
@@ -142,7 +145,7 @@ fn every_variant_has_the_number_of_its_version() {
 
 #[test]
 fn a_baked_configuration_has_the_bytes_of_its_version() {
-    assert_eq!(baked::VERSION, 5);
+    assert_eq!(baked::VERSION, 6);
     let mut localizer = Config::for_track_width(Metres(0.35));
     localizer.sonar.servo = (Radians(-1.5), Radians(1.5));
     localizer.sonar.timing.servo = ServoTiming::SG90;

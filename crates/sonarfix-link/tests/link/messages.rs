@@ -4,7 +4,10 @@ use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
 use sonarfix::absolute::{AbsoluteMeasurement, PoseNoise, PositionNoise};
 use sonarfix::aim::{Aim, NoAim, Reason};
-use sonarfix::config::{Config, PingSchedule, PingTiming, Policy, ServoTiming};
+use sonarfix::config::{
+    Config, LightBeam, MAX_RANGERS, PingSchedule, PingTiming, Policy, RangerId, Ranging,
+    ServoTiming,
+};
 use sonarfix::ekf::{EkfError, Innovation, STATES, StandardDeviations, StateEstimate};
 use sonarfix::gyro::{GyroParameters, TurnReading, TurnRefusal};
 use sonarfix::health::{Health, Verdict};
@@ -123,7 +126,7 @@ impl Source for Largest {
 
 /// The numbers of kinds of telemetry and of commands.
 pub const TELEMETRY: u32 = 17;
-pub const COMMANDS: u32 = 10;
+pub const COMMANDS: u32 = 11;
 
 pub fn any_telemetry(rng: &mut ChaCha8Rng) -> Telemetry {
     let kind = rng.pick(TELEMETRY);
@@ -232,7 +235,8 @@ pub fn command(kind: u32, source: &mut impl Source) -> SessionCommand {
         6 => Command::OpenSession,
         7 => Command::Search,
         8 => Command::ShowDevices,
-        _ => Command::Absolute { age: source.duration(), measurement: absolute(source) },
+        9 => Command::Absolute { age: source.duration(), measurement: absolute(source) },
+        _ => Command::Point(Radians(source.single())),
     };
     SessionCommand { session: source.bits32(), command }
 }
@@ -381,6 +385,7 @@ fn look(source: &mut impl Source) -> Ping {
             time: source.duration(),
             candidates: source.bits16(),
         },
+        ranger: RangerId(source.bits16().to_le_bytes()[0]),
     };
     let outcome = outcome(source);
     let innovation =
@@ -445,7 +450,7 @@ fn reset(source: &mut impl Source) -> ResetCause {
     source.choose(&RESETS)
 }
 
-pub const REFUSED: [CommandError; 12] = [
+pub const REFUSED: [CommandError; 13] = [
     CommandError::Configuration,
     CommandError::Pose,
     CommandError::NoMap,
@@ -458,6 +463,7 @@ pub const REFUSED: [CommandError; 12] = [
     CommandError::Running,
     CommandError::Waiting,
     CommandError::Occupied,
+    CommandError::OutOfReach,
 ];
 
 fn command_result(source: &mut impl Source) -> CommandResult {
@@ -476,23 +482,10 @@ pub fn config(source: &mut impl Source) -> RobotConfig {
         wheel.is_mirrored = source.pick(2) == 0;
     }
     config.encoder_period = source.duration();
-    config.servo_pulses = [0; 2]
-        .map(|_| MeasuredPulse { width: source.duration(), bearing: Radians(source.single()) });
-    config.ranger = RangerConfig {
-        kind: match source.pick(3) {
-            0 => RangerKind::Pulse(PulseTiming {
-                trigger: source.duration(),
-                blanking: source.duration(),
-                longest: source.duration(),
-                silence: source.duration(),
-                listen: source.duration(),
-                stuck: source.duration(),
-            }),
-            1 => RangerKind::Srf { address: source.bits16().to_le_bytes()[0] },
-            _ => RangerKind::Custom,
-        },
-        temperature: Celsius(source.single()),
-    };
+    config.ranger = ranger(source);
+    for _ in config.localizer.further_sonars.iter() {
+        config.further_rangers.push(ranger(source)).unwrap();
+    }
     let [lost, dead_encoder, lost_link] = [0; 3].map(|_| source.pick(2) == 0);
     config.motors = MotorPolicy { lost, dead_encoder, lost_link, link_timeout: source.duration() };
     let mut corner = || Point::new(source.single(), source.single());
@@ -503,6 +496,27 @@ pub fn config(source: &mut impl Source) -> RobotConfig {
         _ => StartPose::Known,
     };
     config
+}
+
+fn ranger(source: &mut impl Source) -> RangerConfig {
+    RangerConfig {
+        servo_pulses: [0; 2]
+            .map(|_| MeasuredPulse { width: source.duration(), bearing: Radians(source.single()) }),
+        kind: match source.pick(4) {
+            0 => RangerKind::Pulse(PulseTiming {
+                trigger: source.duration(),
+                blanking: source.duration(),
+                longest: source.duration(),
+                silence: source.duration(),
+                listen: source.duration(),
+                stuck: source.duration(),
+            }),
+            1 => RangerKind::Srf { address: source.bits16().to_le_bytes()[0] },
+            2 => RangerKind::Vl53l1x { address: source.bits16().to_le_bytes()[0] },
+            _ => RangerKind::Custom,
+        },
+        temperature: Celsius(source.single()),
+    }
 }
 
 fn localizer(source: &mut impl Source) -> Config {
@@ -518,6 +532,10 @@ fn localizer(source: &mut impl Source) -> Config {
     config.sonar.max_range = Metres(source.single());
     config.sonar.noise.floor = Metres(source.single());
     config.sonar.noise.per_metre = source.single();
+    if source.pick(2) == 0 {
+        let (spot, pointing) = (Radians(source.single()), Radians(source.single()));
+        config.sonar.ranging = Ranging::Light(LightBeam { spot, pointing });
+    }
     config.sonar.timing = PingTiming {
         schedule: match source.pick(2) {
             0 => PingSchedule::Every(source.duration()),
@@ -530,6 +548,10 @@ fn localizer(source: &mut impl Source) -> Config {
         },
         cycle: source.duration(),
     };
+    let has_several = source.pick(2) == 0;
+    for _ in 1..if has_several { MAX_RANGERS } else { 1 } {
+        config.further_sonars.push(config.sonar).unwrap();
+    }
     config.prior.scale_right = source.single();
     config.prior.scale_left = source.single();
     config.prior.track_width = Metres(source.single());

@@ -9,6 +9,8 @@
 //! Bearing, range and foot come from a finite state. For a wall far beyond any range the square of the
 //! distance may be infinite; the probability is then the prior.
 
+use super::timing::PingDuration;
+use crate::config::{Config, MAX_RANGERS, RangerId};
 use crate::echo::{EchoParameters, Source};
 use crate::map::WallId;
 use crate::units::{Instant, Metres, Radians, seconds};
@@ -52,6 +54,8 @@ struct OtherEcho {
     /// Reading of the odometer.
     odometer: Metres,
     at: Instant,
+    /// The ranger that received it. Another one stands elsewhere, and receives the object's echo at another range.
+    ranger: RangerId,
 }
 
 impl RecentWall {
@@ -62,10 +66,11 @@ impl RecentWall {
     }
 }
 
-/// A wall seen from the sonar.
+/// A wall seen from a ranger.
 #[derive(Debug, Clone, Copy)]
 struct Place {
     wall: WallId,
+    ranger: RangerId,
     /// Place of the foot along the wall.
     foot: Metres,
     /// Prior probability of occlusion at its range.
@@ -97,18 +102,31 @@ pub(crate) enum Origin {
     Silence,
 }
 
-/// The previous ping.
+/// The previous ping of a ranger.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct LastPing {
-    pub wall: WallId,
-    pub bearing: Radians,
-    pub range: Metres,
+struct LastPing {
+    wall: WallId,
+    bearing: Radians,
+    range: Metres,
+}
+
+/// When and from where a ranger can ping next.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Slot {
+    /// Where its servo stands, or will.
+    pub bearing: Option<Radians>,
+    /// Seconds until it can ping there: its servo has settled, and the echoes that it hears have decayed.
+    pub ready_in: f32,
+    /// The wall of its last ping.
+    pub wall: Option<WallId>,
 }
 
 /// The history of pings.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct History {
-    pub(super) last: Option<LastPing>,
+    last: [Option<LastPing>; MAX_RANGERS],
+    /// The ranger of the latest ping.
+    latest: RangerId,
     /// Radians per second.
     pub(super) turn_rate: f32,
     /// Distance travelled, metres.
@@ -129,9 +147,34 @@ impl History {
         self.odometer = self.odometer + distance;
     }
 
-    /// Records where the sonar pointed.
-    pub fn record_bearing(&mut self, wall: WallId, bearing: Radians, range: Metres) {
-        self.last = Some(LastPing { wall, bearing, range });
+    /// Records where a ranger pointed.
+    pub fn record_ping(&mut self, ranger: RangerId, wall: WallId, bearing: Radians, range: Metres) {
+        if let Some(last) = self.last.get_mut(ranger.index()) {
+            *last = Some(LastPing { wall, bearing, range });
+            self.latest = ranger;
+        }
+    }
+
+    fn last_of(&self, ranger: RangerId) -> Option<LastPing> {
+        *self.last.get(ranger.index())?
+    }
+
+    /// The slot of a ranger if the echo of the latest ping, of whichever ranger, has just arrived.
+    pub(super) fn slot(&self, ranger: RangerId, config: &Config, duration: &PingDuration) -> Slot {
+        let own = self.last_of(ranger);
+        let rest = |latest: LastPing| {
+            if self.latest == ranger {
+                return duration.rest_after(latest.range);
+            }
+            let sonars = config.sonar_of(ranger).zip(config.sonar_of(self.latest));
+            let heard = sonars.filter(|(sonar, latest)| sonar.hears(latest));
+            heard.map_or(0.0, |(_, other)| PingDuration::new(other).rest_after(latest.range))
+        };
+        Slot {
+            bearing: own.map(|last| last.bearing),
+            ready_in: self.last_of(self.latest).map_or(0.0, rest),
+            wall: own.map(|last| last.wall),
+        }
     }
 
     /// Distance travelled since a range of the wall was last used.
@@ -145,13 +188,14 @@ impl History {
     pub fn entry(
         &self,
         parameters: &EchoParameters,
+        ranger: RangerId,
         wall: WallId,
         foot: Metres,
         range: Metres,
         now: Instant,
     ) -> Entry {
         let prior = parameters.prior_occlusion(range);
-        let place = Place { wall, foot, prior };
+        let place = Place { wall, ranger, foot, prior };
         let is_same =
             |slot: &Option<RecentWall>| matches!(slot, Some(recent) if recent.wall == wall);
         let slot = self.recent.iter().position(is_same);
@@ -168,7 +212,8 @@ impl History {
         };
         let occlusion = (prior + recent.above_prior(foot, now)).clamp(0.0, MAX_OCCLUSION);
         let travelled = recent.used_at.map(|used_at| self.odometer - used_at);
-        let source = recent.other.map(|other| Source {
+        let own = recent.other.filter(|other| other.ranger == ranger);
+        let source = own.map(|other| Source {
             range: other.range,
             travelled: self.odometer - other.odometer,
             age: now.checked_duration_since(other.at).map_or(0.0, seconds),
@@ -180,7 +225,7 @@ impl History {
     /// Records that the wall of this entry is occluded with a probability of `occluded`, and what
     /// returned the echo.
     pub fn record_echo(&mut self, entry: &Entry, occluded: f32, echo: Origin, now: Instant) {
-        let Place { wall, foot, prior } = entry.place;
+        let Place { wall, ranger, foot, prior } = entry.place;
         let persistent = PERSISTENCE * entry.occlusion;
         let occluded = if occluded > persistent { occluded } else { persistent };
         let occluded = if occluded < MAX_OCCLUSION { occluded } else { MAX_OCCLUSION };
@@ -191,7 +236,7 @@ impl History {
                 (entry.used_at, entry.other)
             }
             Origin::Other(range) => {
-                let other = OtherEcho { range, odometer: self.odometer, at: now };
+                let other = OtherEcho { range, odometer: self.odometer, at: now, ranger };
                 (entry.used_at, Some(other))
             }
             Origin::Silence => (entry.used_at, entry.other),

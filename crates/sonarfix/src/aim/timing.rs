@@ -4,7 +4,7 @@
 //! Times are whole ticks and ranges are within the limits of the sonar, so all numbers are finite; a
 //! duration from NaN or from a negative number is zero.
 
-use crate::config::{PingSchedule, PingTiming};
+use crate::config::{PingSchedule, Ranging, Sonar};
 use crate::servo::ServoMotion;
 use crate::units::{Duration, Metres, Radians, seconds};
 
@@ -21,13 +21,11 @@ pub(super) fn duration(seconds: f32) -> Duration {
     Duration::from_ticks((seconds * 1e6) as u64)
 }
 
-/// Seconds from a ping until its echo from `range`.
-pub(super) fn flight(range: Metres) -> f32 {
-    2.0 / SPEED_OF_SOUND * range.0
-}
-
-/// [`PingTiming`] in seconds.
+/// [`PingTiming`](crate::config::PingTiming) in seconds.
 pub(super) struct PingDuration {
+    /// Time from the ping to the range: constant, and per metre of range.
+    measuring: f32,
+    per_metre: f32,
     /// Least time between two pings by the schedule.
     period: f32,
     /// Least time between two pings by the ranger; zero where the period ensures it.
@@ -36,12 +34,23 @@ pub(super) struct PingDuration {
 }
 
 impl PingDuration {
-    pub fn new(timing: &PingTiming) -> Self {
+    pub fn new(sonar: &Sonar) -> Self {
+        let timing = &sonar.timing;
         let (period, cycle) = match timing.schedule {
             PingSchedule::Every(period) => (seconds(period), 0.0),
             PingSchedule::AsFastAsPossible => (0.0, seconds(timing.cycle)),
         };
-        Self { period, cycle, servo: ServoMotion::new(&timing.servo) }
+        // A time-of-flight ranger collects light for the whole of its cycle.
+        let (measuring, per_metre) = match sonar.ranging {
+            Ranging::Sound => (0.0, 2.0 / SPEED_OF_SOUND),
+            Ranging::Light(_) => (seconds(timing.cycle), 0.0),
+        };
+        Self { measuring, per_metre, period, cycle, servo: ServoMotion::new(&timing.servo) }
+    }
+
+    /// Seconds from a ping until its echo from `range`.
+    fn flight(&self, range: Metres) -> f32 {
+        self.measuring + self.per_metre * range.0
     }
 
     /// Time of the servo for a turn, until it has settled.
@@ -51,14 +60,14 @@ impl PingDuration {
 
     /// Remaining rest of the ranger when the echo from `range` has just arrived.
     pub fn rest_after(&self, range: Metres) -> f32 {
-        let rest = self.cycle - flight(range);
+        let rest = self.cycle - self.flight(range);
         if rest > 0.0 { rest } else { 0.0 }
     }
 
     /// Duration of a ping, from the choice of the wall to the echo from `range`; the ping starts after
     /// `until_ping`.
     pub fn ping(&self, until_ping: f32, range: Metres) -> f32 {
-        let ping = until_ping + flight(range);
+        let ping = until_ping + self.flight(range);
         // A duration of zero would make the score infinite.
         let least = if self.period > 1e-4 { self.period } else { 1e-4 };
         if ping > least { ping } else { least }

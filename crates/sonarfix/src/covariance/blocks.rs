@@ -120,7 +120,7 @@ impl Covariance {
         let (hr, hl) = wheels(p.hc, p.hd);
         let (wr, wl) = wheels(q.cw, q.dw);
         let (kr, kl) = wheels(k.ck, k.dk);
-        let (rr, ll) = self.wheel_variances();
+        let (rr, ll) = wheel_variances(q.cc, q.cd, q.dd);
         let rl = q.cc - 0.25 * q.dd;
         SMatrix::from([
             [p.xx, p.xy, p.xh,   xr,   xl, p.xw, k.xk],
@@ -133,19 +133,14 @@ impl Covariance {
         ])
     }
 
-    /// One standard deviation of each state.
+    /// One standard deviation of each state, with the accumulated random walk of the calibration.
     #[must_use]
-    pub fn standard_deviations(&self) -> StandardDeviations {
+    pub fn standard_deviations(&self, walk: &AccumulatedRandomWalk) -> StandardDeviations {
         let (p, q, k) = (&self.pose, &self.calibration, &self.range_scale);
-        let (rr, ll) = self.wheel_variances();
-        let variances = [p.xx, p.yy, p.hh, rr, ll, q.ww, k.kk];
+        let (cc, dd, ww) = q.variances_with(walk);
+        let (rr, ll) = wheel_variances(cc, q.cd, dd);
+        let variances = [p.xx, p.yy, p.hh, rr, ll, ww, k.kk];
         StandardDeviations::from_array(variances.map(libm::sqrtf))
-    }
-
-    /// Variances of the right and the left wheel's scale error.
-    fn wheel_variances(&self) -> (f32, f32) {
-        let q = &self.calibration;
-        wheels(q.cc + 0.25 * q.dd, 2.0 * q.cd)
     }
 
     /// Adds the accumulated random walk of the calibration.
@@ -174,6 +169,11 @@ impl Covariance {
             && is_valid_variance(q.ww)
             && is_valid_variance(self.range_scale.kk)
     }
+}
+
+/// Variances of the right and the left wheel's scale error, from those of their mean and difference.
+fn wheel_variances(cc: f32, cd: f32, dd: f32) -> (f32, f32) {
+    wheels(cc + 0.25 * dd, 2.0 * cd)
 }
 
 #[cfg(test)]

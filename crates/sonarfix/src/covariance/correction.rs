@@ -14,6 +14,10 @@ use crate::range::MeasurementJacobian;
 /// few hundred runs, at 2⁻¹⁵ it does not.
 const MIN_VARIANCE_SHARE: f32 = 1.0 / 16_384.0;
 
+/// Largest S/R of a measurement that is corrected by the first pass of eq. (19) alone. Along H its rounding is then below 10⁻⁴ of
+/// the remaining variance.
+const PLAIN_UP_TO: f32 = 256.0;
+
 /// The gain K, one number for each state.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Gain {
@@ -112,8 +116,10 @@ impl Covariance {
         let Some(first) = self.first_pass(h, prediction, noise) else {
             return Correction::Saturated;
         };
-        let second = self.correct_range_states(h, &prediction.cross_covariance, &first);
-        let [c, d, w] = self.correct_calibration(h, &first, &second);
+        let m = &prediction.cross_covariance;
+        let is_sharp = prediction.variance > (PLAIN_UP_TO - 1.0) * first.noise;
+        let second = self.correct_range_states(h, m, &first, is_sharp);
+        let [c, d, w] = self.correct_calibration(h, &first, second.as_ref());
         let Column { x, y, h, k } = first.gain;
         Correction::Applied(Gain { x, y, h, c, d, w, k, per_variance: first.per_variance })
     }
@@ -152,28 +158,34 @@ impl Covariance {
     }
 
     // ===== Eq. (19), block of the states that the range depends on =====
+    /// The second pass only for a sharp range.
     #[inline]
     fn correct_range_states(
         &mut self,
         h: &MeasurementJacobian,
         m: &CrossCovariance,
         first: &FirstPass,
-    ) -> SecondPass {
-        let FirstPass { noise, gain, variances: p1, .. } = first;
-        let (p, k) = (&mut self.pose, &mut self.range_scale);
+        is_sharp: bool,
+    ) -> Option<SecondPass> {
+        let FirstPass { noise, gain, variances, .. } = first;
+        let (p, r) = (&mut self.pose, &mut self.range_scale);
         // P₁ = P − K mᵀ.
-        let xy = p.xy - gain.x * m.y;
-        let xh = p.xh - gain.x * m.h;
-        let xk = k.xk - gain.x * m.k;
-        let yh = p.yh - gain.y * m.h;
-        let yk = k.yk - gain.y * m.k;
-        let hk = k.hk - gain.h * m.k;
+        (p.xx, p.yy, p.hh, r.kk) = (variances.x, variances.y, variances.h, variances.k);
+        p.xy -= gain.x * m.y;
+        p.xh -= gain.x * m.h;
+        r.xk -= gain.x * m.k;
+        p.yh -= gain.y * m.h;
+        r.yk -= gain.y * m.k;
+        r.hk -= gain.h * m.k;
+        if !is_sharp {
+            return None;
+        }
         // d = K R − P₁ Hᵀ; zero in exact arithmetic.
         let d = Column {
-            x: gain.x * noise - (p1.x * h.x + xy * h.y + xh * h.h + xk * h.k),
-            y: gain.y * noise - (xy * h.x + p1.y * h.y + yh * h.h + yk * h.k),
-            h: gain.h * noise - (xh * h.x + yh * h.y + p1.h * h.h + hk * h.k),
-            k: gain.k * noise - (xk * h.x + yk * h.y + hk * h.h + p1.k * h.k),
+            x: gain.x * noise - (p.xx * h.x + p.xy * h.y + p.xh * h.h + r.xk * h.k),
+            y: gain.y * noise - (p.xy * h.x + p.yy * h.y + p.yh * h.h + r.yk * h.k),
+            h: gain.h * noise - (p.xh * h.x + p.yh * h.y + p.hh * h.h + r.hk * h.k),
+            k: gain.k * noise - (r.xk * h.x + r.yk * h.y + r.hk * h.h + r.kk * h.k),
         };
         // e = d − ½ K (H d).
         let half = 0.5 * d.times(h);
@@ -184,17 +196,17 @@ impl Covariance {
             k: d.k - half * gain.k,
         };
         // P⁺ = P₁ + e Kᵀ + K eᵀ.
-        p.xx = p1.x + e.x * gain.x + e.x * gain.x;
-        p.xy = xy + e.x * gain.y + gain.x * e.y;
-        p.xh = xh + e.x * gain.h + gain.x * e.h;
-        k.xk = xk + e.x * gain.k + gain.x * e.k;
-        p.yy = p1.y + e.y * gain.y + e.y * gain.y;
-        p.yh = yh + e.y * gain.h + gain.y * e.h;
-        k.yk = yk + e.y * gain.k + gain.y * e.k;
-        p.hh = p1.h + e.h * gain.h + e.h * gain.h;
-        k.hk = hk + e.h * gain.k + gain.h * e.k;
-        k.kk = p1.k + e.k * gain.k + e.k * gain.k;
-        SecondPass { e, remaining_noise: noise - half }
+        p.xx = p.xx + e.x * gain.x + e.x * gain.x;
+        p.xy = p.xy + e.x * gain.y + gain.x * e.y;
+        p.xh = p.xh + e.x * gain.h + gain.x * e.h;
+        r.xk = r.xk + e.x * gain.k + gain.x * e.k;
+        p.yy = p.yy + e.y * gain.y + e.y * gain.y;
+        p.yh = p.yh + e.y * gain.h + gain.y * e.h;
+        r.yk = r.yk + e.y * gain.k + gain.y * e.k;
+        p.hh = p.hh + e.h * gain.h + e.h * gain.h;
+        r.hk = r.hk + e.h * gain.k + gain.h * e.k;
+        r.kk = r.kk + e.k * gain.k + e.k * gain.k;
+        Some(SecondPass { e, remaining_noise: noise - half })
     }
 
     // ===== Eq. (19), columns of the calibration =====
@@ -204,32 +216,42 @@ impl Covariance {
         &mut self,
         h: &MeasurementJacobian,
         first: &FirstPass,
-        second: &SecondPass,
+        second: Option<&SecondPass>,
     ) -> [f32; 3] {
         let FirstPass { per_variance, gain, .. } = first;
-        let SecondPass { e, remaining_noise } = second;
-        let (p, q, k) = (&mut self.pose, &mut self.calibration, &mut self.range_scale);
+        let (p, q, r) = (&mut self.pose, &mut self.calibration, &mut self.range_scale);
         let column = |x: &mut f32, y: &mut f32, h_: &mut f32, k: &mut f32| {
             let m = *x * h.x + *y * h.y + *h_ * h.h + *k * h.k;
             let g = m * per_variance;
-            let (x1, y1) = (*x - gain.x * m, *y - gain.y * m);
-            let (h1, k1) = (*h_ - gain.h * m, *k - gain.k * m);
-            let e_j = g * remaining_noise - (x1 * h.x + y1 * h.y + h1 * h.h + k1 * h.k);
-            *x = x1 + e.x * g + gain.x * e_j;
-            *y = y1 + e.y * g + gain.y * e_j;
-            *h_ = h1 + e.h * g + gain.h * e_j;
-            *k = k1 + e.k * g + gain.k * e_j;
+            *x -= gain.x * m;
+            *y -= gain.y * m;
+            *h_ -= gain.h * m;
+            *k -= gain.k * m;
+            let Some(SecondPass { e, remaining_noise }) = second else { return (m, g, 0.0) };
+            let e_j = g * remaining_noise - (*x * h.x + *y * h.y + *h_ * h.h + *k * h.k);
+            *x = *x + e.x * g + gain.x * e_j;
+            *y = *y + e.y * g + gain.y * e_j;
+            *h_ = *h_ + e.h * g + gain.h * e_j;
+            *k = *k + e.k * g + gain.k * e_j;
             (m, g, e_j)
         };
-        let (mc, gc, ec) = column(&mut p.xc, &mut p.yc, &mut p.hc, &mut k.ck);
-        q.cc = q.cc - gc * mc + ec * gc + ec * gc;
-        let (md, gd, ed) = column(&mut p.xd, &mut p.yd, &mut p.hd, &mut k.dk);
-        q.cd = q.cd - gc * md + ec * gd + gc * ed;
-        q.dd = q.dd - gd * md + ed * gd + ed * gd;
-        let (mw, gw, ew) = column(&mut p.xw, &mut p.yw, &mut p.hw, &mut k.wk);
-        q.cw = q.cw - gc * mw + ec * gw + gc * ew;
-        q.dw = q.dw - gd * mw + ed * gw + gd * ew;
-        q.ww = q.ww - gw * mw + ew * gw + ew * gw;
+        let (mc, gc, ec) = column(&mut p.xc, &mut p.yc, &mut p.hc, &mut r.ck);
+        let (md, gd, ed) = column(&mut p.xd, &mut p.yd, &mut p.hd, &mut r.dk);
+        let (mw, gw, ew) = column(&mut p.xw, &mut p.yw, &mut p.hw, &mut r.wk);
+        q.cc -= gc * mc;
+        q.cd -= gc * md;
+        q.dd -= gd * md;
+        q.cw -= gc * mw;
+        q.dw -= gd * mw;
+        q.ww -= gw * mw;
+        if second.is_some() {
+            q.cc = q.cc + ec * gc + ec * gc;
+            q.cd = q.cd + ec * gd + gc * ed;
+            q.dd = q.dd + ed * gd + ed * gd;
+            q.cw = q.cw + ec * gw + gc * ew;
+            q.dw = q.dw + ed * gw + gd * ew;
+            q.ww = q.ww + ew * gw + ew * gw;
+        }
         [gc, gd, gw]
     }
 }

@@ -12,9 +12,9 @@ impl PoseBlock {
     // ===== Eqs. (5) and (10): P ← F P Fᵀ + Q, rows of the pose =====
     /// Propagates the rows of the pose.
     ///
-    /// The new pose is the old pose plus the turn t and the displacement a, which are linear in the old heading and the
-    /// calibration, so only their covariances are needed: `ht` is that of heading and turn, `x_ax` that of x and its
-    /// displacement, and so on.
+    /// The new pose is the old pose plus the turn t and the displacement a, b, which are linear in the old heading and the
+    /// calibration. The covariance of two new errors is built up factor by factor: `xh` of the new x with the old heading, then
+    /// `p.xh` of both new ones. A variance grows by the form of its own displacement on the sum of its old and its new row.
     #[inline]
     pub fn propagate(
         &mut self,
@@ -31,50 +31,36 @@ impl PoseBlock {
         let along_y =
             |h: f32, c: f32, d: f32, w: f32| gy * h + f.y_by_c * c + f.y_by_d * d + f.y_by_w * w;
         let missing = |variance: f32, noise: f32| positive_part(0.5 * ROUNDING * variance - noise);
+        // The growth of a variance may cancel to zero, but must not exceed its rounding downwards.
+        let widened = |growth: f32| growth + ROUNDING * growth.abs();
 
-        let (tc, td, tw) = (turn(cc, q.cd, q.cw), turn(q.cd, dd, q.dw), turn(q.cw, q.dw, ww));
-        let (ht, tt) = (turn(p.hc, p.hd, p.hw), turn(tc, td, tw));
-        // Covariances of the displacement along x with heading, calibration, turn and itself.
-        let (xc, xd, xw) = (
-            along_x(p.hc, cc, q.cd, q.cw),
-            along_x(p.hd, q.cd, dd, q.dw),
-            along_x(p.hw, q.cw, q.dw, ww),
-        );
-        let xh = along_x(p.hh, p.hc, p.hd, p.hw);
-        let xx = along_x(xh, xc, xd, xw);
-        let xt = along_x(ht, tc, td, tw);
-        let (yc, yd, yw) = (
-            along_y(p.hc, cc, q.cd, q.cw),
-            along_y(p.hd, q.cd, dd, q.dw),
-            along_y(p.hw, q.cw, q.dw, ww),
-        );
-        let yh = along_y(p.hh, p.hc, p.hd, p.hw);
-        let yy = along_y(yh, yc, yd, yw);
-        let xy = along_x(yh, yc, yd, yw);
-        let yt = along_y(ht, tc, td, tw);
-        // Covariances of the old x and y with the displacement.
-        let x_ax = along_x(p.xh, p.xc, p.xd, p.xw);
-        let x_ay = along_y(p.xh, p.xc, p.xd, p.xw);
-        let y_ax = along_x(p.yh, p.yc, p.yd, p.yw);
-        let y_ay = along_y(p.yh, p.yc, p.yd, p.yw);
+        // The new x and y with the old heading and the calibration.
+        let xh = p.xh + along_x(p.hh, p.hc, p.hd, p.hw);
+        let xc = p.xc + along_x(p.hc, cc, q.cd, q.cw);
+        let xd = p.xd + along_x(p.hd, q.cd, dd, q.dw);
+        let xw = p.xw + along_x(p.hw, q.cw, q.dw, ww);
+        let yh = p.yh + along_y(p.hh, p.hc, p.hd, p.hw);
+        let yc = p.yc + along_y(p.hc, cc, q.cd, q.cw);
+        let yd = p.yd + along_y(p.hd, q.cd, dd, q.dw);
+        let yw = p.yw + along_y(p.hw, q.cw, q.dw, ww);
 
-        p.xh += turn(p.xc, p.xd, p.xw) + xh + xt + f.xh;
-        p.yh += turn(p.yc, p.yd, p.yw) + yh + yt + f.yh;
-        p.xc += xc;
-        p.xd += xd;
-        p.xw += xw;
-        p.yc += yc;
-        p.yd += yd;
-        p.yw += yw;
-        // The variance of the displacement may cancel to zero but must not become negative.
-        let (xx, yy) = (xx * (1.0 + ROUNDING) + f.xx, yy * (1.0 + ROUNDING) + f.yy);
-        p.xx += missing(p.xx, f.advance) + (x_ax + x_ax + xx);
-        p.yy += missing(p.yy, f.advance) + (y_ay + y_ay + yy);
-        p.xy += x_ay + y_ax + xy + f.xy;
-        p.hh += missing(p.hh, f.hh) + (ht + ht + tt + f.hh);
-        p.hc += tc;
-        p.hd += td;
-        p.hw += tw;
+        let xx = along_x(p.xh + xh, p.xc + xc, p.xd + xd, p.xw + xw);
+        let yy = along_y(p.yh + yh, p.yc + yc, p.yd + yd, p.yw + yw);
+        p.xx += missing(p.xx, f.advance) + (widened(xx) + f.xx);
+        p.yy += missing(p.yy, f.advance) + (widened(yy) + f.yy);
+        p.xy += along_y(p.xh, p.xc, p.xd, p.xw) + along_x(yh, yc, yd, yw) + f.xy;
+        p.xh = xh + (turn(xc, xd, xw) + f.xh);
+        p.yh = yh + (turn(yc, yd, yw) + f.yh);
+        (p.xc, p.xd, p.xw) = (xc, xd, xw);
+        (p.yc, p.yd, p.yw) = (yc, yd, yw);
+
+        // The new heading with the calibration, and with itself.
+        let hc = p.hc + turn(cc, q.cd, q.cw);
+        let hd = p.hd + turn(q.cd, dd, q.dw);
+        let hw = p.hw + turn(q.cw, q.dw, ww);
+        let hh = turn(p.hc + hc, p.hd + hd, p.hw + hw);
+        p.hh += missing(p.hh, f.hh) + (hh + f.hh);
+        (p.hc, p.hd, p.hw) = (hc, hd, hw);
     }
 
     /// Sets variances that are not valid to the limit that they exceed.

@@ -100,6 +100,25 @@ impl Ekf {
         }
     }
 
+    /// Reads this filter after the accumulated motion has been applied, to a copy if there is any.
+    #[inline]
+    pub(crate) fn applied<T>(&self, read: impl FnOnce(&Self) -> T) -> T {
+        let copy;
+        // One call, because what is read may be inlined.
+        read(if self.distance <= 0.0 {
+            self
+        } else {
+            copy = self.with_motion_applied();
+            &copy
+        })
+    }
+
+    fn with_motion_applied(&self) -> Self {
+        let mut applied = *self;
+        applied.apply_interval();
+        applied
+    }
+
     /// Applies the accumulated motion before a change of estimate or P.
     #[inline]
     pub(super) fn end_interval(&mut self) {

@@ -13,6 +13,11 @@ const MOST_MISSING: u64 = 5;
 /// digits.
 const STUCK_SAMPLES: u16 = 20;
 const STUCK_TIME: Duration = Duration::from_ticks(500_000);
+/// A sample that differs by more than this from the one before and, in the same direction, from the one after it is a spike, rad/s. A robot can
+/// do that once, when a wheel drops into a joint of the floor.
+const SPIKE: f32 = 1.0;
+/// After a second spike within this time, a gyro is erratic until it has had none for as long.
+const ERRATIC_TIME: Duration = Duration::from_ticks(2_000_000);
 
 /// What is wrong with a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,6 +33,8 @@ pub enum SampleFault {
     Saturated,
     /// The rate has not changed in its last digit for half a second.
     Stuck,
+    /// The rate has jumped to and fro at least twice in a short time, as the bytes of a disturbed bus do.
+    Erratic,
     /// Samples are missing before this one, more than can be interpolated.
     Missing,
     /// The time is not after that of the sample before.
@@ -41,6 +48,7 @@ impl core::fmt::Display for SampleFault {
             Self::NotFinite => "the rate is NaN or infinite",
             Self::Saturated => "the rate has reached the range of the gyro",
             Self::Stuck => "the rate has not changed for half a second",
+            Self::Erratic => "the rate jumps to and fro",
             Self::Missing => "too many samples are missing before this one",
             Self::TimeRanBackwards => "the time is not after that of the sample before",
         })
@@ -62,6 +70,8 @@ pub struct SampleFaults {
     pub saturated: u32,
     /// Samples of a gyro that is stuck.
     pub stuck: u32,
+    /// Samples of a gyro that is erratic.
+    pub erratic: u32,
     /// Missing samples, interpolated ones included.
     pub missing: u32,
     /// Samples with a time that is not after that of the sample before.
@@ -77,6 +87,7 @@ impl SampleFaults {
             not_finite: self.not_finite.saturating_add(other.not_finite),
             saturated: self.saturated.saturating_add(other.saturated),
             stuck: self.stuck.saturating_add(other.stuck),
+            erratic: self.erratic.saturating_add(other.erratic),
             missing: self.missing.saturating_add(other.missing),
             mistimed: self.mistimed.saturating_add(other.mistimed),
         }
@@ -118,7 +129,35 @@ pub struct TurnIntegral {
     latest: u32,
     equal_since: Instant,
     equal: u16,
+    spikes: Spikes,
     faults: SampleFaults,
+}
+
+/// Spikes of the rate, which a disturbed bus causes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Spikes {
+    /// The two latest rates, the earlier first; NaN before there are two.
+    rates: [f32; 2],
+    latest: Option<Instant>,
+    is_erratic: bool,
+}
+
+impl Spikes {
+    const NONE: Self = Self { rates: [f32::NAN; 2], latest: None, is_erratic: false };
+
+    fn add(&mut self, at: Instant, rate: f32) {
+        let [before, last] = self.rates;
+        let (from, to) = (last - before, last - rate);
+        let is_spike = from * to > 0.0 && from.abs().min(to.abs()) > SPIKE;
+        let is_recent = self.latest.is_some_and(|latest| {
+            at.checked_duration_since(latest).is_some_and(|since| since < ERRATIC_TIME)
+        });
+        self.is_erratic = is_recent && (self.is_erratic || is_spike);
+        if is_spike {
+            self.latest = Some(at);
+        }
+        self.rates = [last, rate];
+    }
 }
 
 /// The integral at an instant.
@@ -196,6 +235,7 @@ impl TurnIntegral {
             latest: f32::NAN.to_bits(),
             equal_since: Instant::from_ticks(0),
             equal: 0,
+            spikes: Spikes::NONE,
             faults: SampleFaults::default(),
         }
     }
@@ -203,7 +243,7 @@ impl TurnIntegral {
     /// Adds a sample of the time `at`.
     ///
     /// # Errors
-    /// [`SampleFault`]. A saturated or stuck sample, and missing ones, interrupt the integral; other faults count as a
+    /// [`SampleFault`]. A saturated, stuck or erratic sample, and missing ones, interrupt the integral; other faults count as a
     /// missing sample.
     pub fn sample(&mut self, at: Instant, rate: RadiansPerSecond) -> Result<(), SampleFault> {
         let result = self.add(at, rate.0);
@@ -216,6 +256,7 @@ impl TurnIntegral {
             Err(SampleFault::NotFinite) => &mut faults.not_finite,
             Err(SampleFault::Saturated) => &mut faults.saturated,
             Err(SampleFault::Stuck) => &mut faults.stuck,
+            Err(SampleFault::Erratic) => &mut faults.erratic,
             Err(SampleFault::TimeRanBackwards) => &mut faults.mistimed,
         };
         *count = count.saturating_add(1);
@@ -239,6 +280,7 @@ impl TurnIntegral {
             },
         };
         self.count_equal(at, rate);
+        self.spikes.add(at, rate);
         let fault = self.fault(at, rate, elapsed);
         self.count_missing(elapsed);
         match (fault, self.last) {
@@ -249,7 +291,10 @@ impl TurnIntegral {
             (None, None) => {}
             (Some(_), _) => self.breaks = self.breaks.wrapping_add(1),
         }
-        let interrupts = matches!(fault, Some(SampleFault::Saturated | SampleFault::Stuck));
+        let interrupts = matches!(
+            fault,
+            Some(SampleFault::Saturated | SampleFault::Stuck | SampleFault::Erratic)
+        );
         self.last = (!interrupts).then_some(Sample { at, rate });
         fault.map_or(Ok(()), Err)
     }
@@ -269,6 +314,8 @@ impl TurnIntegral {
             Some(SampleFault::Saturated)
         } else if self.equal >= STUCK_SAMPLES && is_old {
             Some(SampleFault::Stuck)
+        } else if self.spikes.is_erratic {
+            Some(SampleFault::Erratic)
         } else if elapsed.ticks() > self.longest_gap() {
             Some(SampleFault::Missing)
         } else {

@@ -109,12 +109,13 @@ proptest! {
     #[test]
     fn faults_add_up(one in [any::<u32>(), any::<u32>(), any::<u32>()], other in [any::<u32>(), any::<u32>(), any::<u32>()]) {
         let faults = |[a, b, c]: [u32; 3]| SampleFaults {
-            unreadable: a, not_finite: b, saturated: c, stuck: a ^ 7, missing: b ^ 7, mistimed: c ^ 7,
+            unreadable: a, not_finite: b, saturated: c, stuck: a ^ 7, missing: b ^ 7, mistimed: c ^ 7, erratic: a ^ 9,
         };
         let sum = faults(one).plus(faults(other));
         for (i, is) in [sum.unreadable, sum.not_finite, sum.saturated].into_iter().enumerate() {
             prop_assert_eq!(is, one[i].saturating_add(other[i]));
         }
+        prop_assert_eq!(sum.erratic, (one[0] ^ 9).saturating_add(other[0] ^ 9));
         for (i, is) in [sum.stuck, sum.missing, sum.mistimed].into_iter().enumerate() {
             prop_assert_eq!(is, (one[i] ^ 7).saturating_add(other[i] ^ 7));
         }

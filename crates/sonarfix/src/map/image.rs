@@ -5,7 +5,7 @@
 //! | bytes | content |
 //! |---|---|
 //! | 4 | [`MAGIC`] |
-//! | 4 | [`VERSION`] |
+//! | 4 | [`VERSION`], or [`VERSION_WITH_ACCURACIES`] |
 //! | 4 | number of walls W |
 //! | 4 | number of references R |
 //! | 2, 2 | columns and rows of the [`Grid`] |
@@ -14,6 +14,7 @@
 //! | [20](WALL) W | the walls, each [as stored](super::Wall::stored): five `f32` |
 //! | 4 (cells + 1) | for each cell, row by row, the index of its first reference; finally R |
 //! | 2 R or 3 R | the [references](Reference): two bytes each if W ≤ [`MOST_NARROW`], else three |
+//! | W | with accuracies: that [of each wall](super::Wall::stored_accuracy) |
 //! | 4 | [`checksum`] of all preceding bytes |
 //!
 //! Each cell refers to every wall whose bounding box touches it, in ascending order.
@@ -31,8 +32,10 @@ use crate::units::Metres;
 
 /// First bytes of every baked map.
 pub const MAGIC: [u8; 4] = *b"SFXM";
-/// Version of the format that this crate reads.
+/// Version of the format in which no wall has an accuracy of its own.
 pub const VERSION: u32 = 1;
+/// Version of the format with an accuracy for each wall.
+pub const VERSION_WITH_ACCURACIES: u32 = 2;
 /// Size of a wall, bytes.
 pub const WALL: usize = 20;
 /// Largest number of walls with two-byte references.
@@ -49,7 +52,7 @@ const HEADER: usize = 32;
 pub enum MapError {
     /// The bytes do not start with [`MAGIC`].
     NotAMap,
-    /// The map has this format, which is not [`VERSION`].
+    /// The map has this format, which this crate does not read.
     Version(u32),
     /// The checksum is wrong: bytes are changed, missing or added.
     Checksum,
@@ -69,7 +72,7 @@ impl core::fmt::Display for MapError {
             Self::NotAMap => f.write_str("this is not a baked map"),
             Self::Version(version) => write!(
                 f,
-                "the map has format {version} and this reads format {VERSION}: bake it again"
+                "the map has format {version} and this reads up to format {VERSION_WITH_ACCURACIES}: bake it again"
             ),
             Self::Checksum => f.write_str("the map is damaged or cut off: its checksum is wrong"),
             Self::Length => f.write_str("the length of the map is not that of its header"),
@@ -186,14 +189,14 @@ impl Crc32 {
 /// # Errors
 /// [`MapError`] if no image of this version starts there.
 pub fn length(region: &[u8]) -> Result<usize, MapError> {
-    check_version(region)?;
+    let has_accuracies = has_accuracies(region)?;
     let (header, _) = Header::split(region)?;
     let cells = u64::from(header.columns) * u64::from(header.rows);
     let reference = if header.is_narrow() { 2 } else { 3 };
     // Every part is below 2³⁸ bytes, so no sum overflows. The last four bytes are the checksum.
-    let tables = WALL as u64 * u64::from(header.walls)
-        + 4 * (cells + 1)
-        + reference * u64::from(header.references);
+    let wall = WALL as u64 + u64::from(has_accuracies);
+    let tables =
+        wall * u64::from(header.walls) + 4 * (cells + 1) + reference * u64::from(header.references);
     usize::try_from(HEADER as u64 + tables + 4).map_err(|_| MapError::Length)
 }
 
@@ -240,6 +243,8 @@ pub(super) struct Image<'a> {
     walls: &'a [[u8; WALL]],
     starts: &'a [[u8; 4]],
     references: References<'a>,
+    /// Empty in a map without accuracies.
+    accuracies: &'a [u8],
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -258,6 +263,7 @@ impl<'a> Image<'a> {
 
     /// Splits the bytes into their parts, by the numbers in the header.
     fn split(bytes: &'a [u8]) -> Result<Self, MapError> {
+        let has_accuracies = has_accuracies(bytes)?;
         let (header, rest) = Header::split(sealed(bytes)?)?;
         let grid = Grid::new(header.origin, header.cell, header.columns, header.rows);
         let grid = grid.ok_or(MapError::Grid)?;
@@ -270,6 +276,11 @@ impl<'a> Image<'a> {
                 References::Narrow(rest.take(header.references.into())?)
             } else {
                 References::Wide(rest.take(header.references.into())?)
+            },
+            accuracies: if has_accuracies {
+                rest.take::<1>(header.walls.into())?.as_flattened()
+            } else {
+                &[]
             },
         };
         let is_whole = rest.0.is_empty() && header.walls <= MOST;
@@ -341,12 +352,15 @@ impl<'a> Image<'a> {
     }
 
     pub fn wall(&self, id: WallId) -> Option<Wall> {
-        let stored = self.walls.get(usize::try_from(id.0).ok()?)?;
+        let index = usize::try_from(id.0).ok()?;
+        let stored = self.walls.get(index)?;
         let (numbers, _) = stored.as_chunks::<4>();
         let &[x, y, tangent_x, tangent_y, length] = numbers else {
             return None;
         };
-        Some(Wall::from_stored([x, y, tangent_x, tangent_y, length].map(f32::from_le_bytes)))
+        let accuracy = self.accuracies.get(index).copied().unwrap_or(0);
+        let numbers = [x, y, tangent_x, tangent_y, length].map(f32::from_le_bytes);
+        Some(Wall::from_stored(numbers, accuracy))
     }
 
     /// The reference at an index.
@@ -360,19 +374,22 @@ impl<'a> Image<'a> {
     }
 }
 
-/// Checks that the bytes are a map of this version.
-fn check_version(bytes: &[u8]) -> Result<(), MapError> {
+/// Whether the bytes are a map with accuracies.
+///
+/// # Errors
+/// [`MapError`], if they are no map, or of another version.
+fn has_accuracies(bytes: &[u8]) -> Result<bool, MapError> {
     let rest = bytes.strip_prefix(&MAGIC).ok_or(MapError::NotAMap)?;
     let version = rest.first_chunk().map(|&version| u32::from_le_bytes(version));
     match version.ok_or(MapError::Length)? {
-        VERSION => Ok(()),
+        VERSION => Ok(false),
+        VERSION_WITH_ACCURACIES => Ok(true),
         other => Err(MapError::Version(other)),
     }
 }
 
-/// The bytes of an image of this version without their checksum, if it is right.
+/// The bytes of an image without their checksum, if it is right.
 fn sealed(bytes: &[u8]) -> Result<&[u8], MapError> {
-    check_version(bytes)?;
     let (content, stated) = bytes.split_last_chunk().ok_or(MapError::Length)?;
     if checksum(content) == u32::from_le_bytes(*stated) {
         Ok(content)

@@ -2,7 +2,7 @@
 //!
 //! # Non-finite policy
 //! [`Wall::new`] refuses NaN, infinity and a length that overflows. For a point that is not finite the
-//! functions return NaN or infinity.
+//! functions return NaN or infinity. [`Wall::with_accuracy`] takes any number.
 
 use crate::pose::{Heading, Point};
 use crate::trig::atan2;
@@ -57,13 +57,18 @@ pub struct Wall {
     tangent_x: f32,
     tangent_y: f32,
     length: f32,
+    /// Millimetres, 0 for none.
+    accuracy: u8,
 }
 
 impl Wall {
     /// Length of the shortest wall. The direction of a shorter one is not significant.
     pub const SHORTEST: Metres = Metres(1e-4);
 
-    /// A wall between two points of the map.
+    /// Worst accuracy that a wall can state.
+    pub const WORST_ACCURACY: Metres = Metres(0.255);
+
+    /// A wall between two points of the map, without an accuracy of its own.
     ///
     /// # Errors
     /// [`WallError`], by what is wrong with the points.
@@ -76,12 +81,43 @@ impl Wall {
         if length < Self::SHORTEST.0 {
             return Err(WallError::ZeroLength);
         }
-        Ok(Self { from, tangent_x: dx / length, tangent_y: dy / length, length })
+        let (tangent_x, tangent_y) = (dx / length, dy / length);
+        Ok(Self { from, tangent_x, tangent_y, length, accuracy: 0 })
     }
 
-    /// A wall from its stored form: coordinates of its start, unit tangent, length.
-    pub(super) fn from_stored([x, y, tangent_x, tangent_y, length]: [f32; 5]) -> Self {
-        Self { from: Point::new(x, y), tangent_x, tangent_y, length }
+    /// The same wall with an accuracy of its own: the standard deviation of its place, rounded to whole millimetres, at least
+    /// 1 mm and at most [`Self::WORST_ACCURACY`]. It replaces [`map_accuracy`](crate::echo::EchoParameters::map_accuracy).
+    /// Without one if it is negative or NaN.
+    #[must_use]
+    pub fn with_accuracy(self, accuracy: Metres) -> Self {
+        let millimetres = (1e3 * accuracy.0 + 0.5).clamp(1.0, 255.0);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "the integer part, which is a byte"
+        )]
+        let millimetres = millimetres as u8;
+        Self { accuracy: if accuracy.0 >= 0.0 { millimetres } else { 0 }, ..self }
+    }
+
+    /// The standard deviation of its place, if it has one of its own.
+    #[must_use]
+    pub fn accuracy(&self) -> Option<Metres> {
+        (self.accuracy > 0).then(|| Metres(1e-3 * f32::from(self.accuracy)))
+    }
+
+    /// The accuracy in a [baked map](super::image): millimetres, 0 for none.
+    #[must_use]
+    pub fn stored_accuracy(&self) -> u8 {
+        self.accuracy
+    }
+
+    /// A wall from its stored form: coordinates of its start, unit tangent, length; accuracy.
+    pub(super) fn from_stored(
+        [x, y, tangent_x, tangent_y, length]: [f32; 5],
+        accuracy: u8,
+    ) -> Self {
+        Self { from: Point::new(x, y), tangent_x, tangent_y, length, accuracy }
     }
 
     /// The stored form in a [baked map](super::image): coordinates of its start, unit tangent, length.

@@ -286,7 +286,7 @@ fn the_search_takes_ranges_from_the_shortest_on() {
     let mut robot = Robot::new(&walls);
     let Robot { navigator, search, .. } = &mut robot;
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-        assert_eq!(navigator.ping(Radians(0.1), Some(Metres(bad)), search), Err(NotFinite));
+        assert_eq!(navigator.ping(Radians(0.1), Some(Metres(bad)), search), Err(InvalidInput));
     }
     assert_eq!(navigator.ping(Radians(0.1), None, search), Ok(true));
 }

@@ -173,13 +173,15 @@ impl AlongWalls {
         // The line's middle from half of its stretch before the wall's end to as much beyond.
         let inset = if half < 0.5 * wall.length().0 { half } else { 0.5 * wall.length().0 };
         let middle = side.stretch.0 + inset + STEP * f32::from(self.step);
-        if middle > side.stretch.1 - inset + STEP {
+        let next = self.step.checked_add(1);
+        // A wall of more steps than can be counted is left after these.
+        let (false, Some(next)) = (middle > side.stretch.1 - inset + STEP, next) else {
             self.step = 0;
             self.wall += u32::from(self.is_left);
             self.is_left = !self.is_left;
             return Generated::Nothing;
-        }
-        self.step += 1;
+        };
+        self.step = next;
         let foot = line
             .normal
             .times(line.offset)

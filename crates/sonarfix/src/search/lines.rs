@@ -5,6 +5,8 @@
 use heapless::Vec;
 
 use super::window::Ping;
+use crate::config::{Ranging, Sonar};
+use crate::elementary::sqrt;
 use crate::trig::sin_cos;
 use crate::units::Radians;
 use crate::vector::Vector;
@@ -34,6 +36,11 @@ pub(super) struct Line {
 /// The cosine of 75°: two lines at right angles are separate for any cone.
 const LARGEST_SEPARATION: f32 = 0.259;
 
+/// The cosine of 30°: points are on one of two lines at that angle, except near their intersection.
+const LIT_SEPARATION: f32 = 0.866;
+/// Distance between two points that determine a line, metres.
+const APART: (f32, f32) = (0.1, 2.5);
+
 /// The best lines, by their support.
 #[derive(Debug, Clone)]
 pub(super) struct Lines {
@@ -41,11 +48,23 @@ pub(super) struct Lines {
     /// Cosine and angle of the cone in which a ping may support a line.
     cone: Radians,
     cos_cone: f32,
+    /// Whether a ping is a point of its wall, not the distance of a foot.
+    is_light: bool,
 }
 
 impl Lines {
     pub fn new(cone: Radians) -> Self {
-        Self { found: Vec::new(), cone, cos_cone: cos_of_support(cone) }
+        Self { found: Vec::new(), cone, cos_cone: cos_of_support(cone), is_light: false }
+    }
+
+    /// No lines yet, for a ranger.
+    pub fn of_ranger(sonar: &Sonar) -> Self {
+        Self { is_light: sonar.ranging != Ranging::Sound, ..Self::new(sonar.cone) }
+    }
+
+    /// Whether the pings are points, so that two of them determine a line ([`Self::vote_of_two`]).
+    pub fn is_light(&self) -> bool {
+        self.is_light
     }
 
     /// Removes all lines, for a sonar with this cone.
@@ -53,6 +72,13 @@ impl Lines {
         self.found.clear();
         self.cone = cone;
         self.cos_cone = cos_of_support(cone);
+        self.is_light = false;
+    }
+
+    /// Removes all lines, for a ranger.
+    pub fn restart_of_ranger(&mut self, sonar: &Sonar) {
+        self.restart(sonar.cone);
+        self.is_light = sonar.ranging != Ranging::Sound;
     }
 
     /// These lines, for tests.
@@ -72,6 +98,9 @@ impl Lines {
     /// Whether two lines are at an angle at which no ping supports both, so that they are not one
     /// wall twice: it may appear as two tangents of its echoes.
     pub fn are_separate(&self, one: &Line, other: &Line) -> bool {
+        if self.is_light {
+            return one.normal.dot(other.normal).abs() < LIT_SEPARATION;
+        }
         let twice = 2.0 * self.cos_cone * self.cos_cone - 1.0;
         let limit = if twice > LARGEST_SEPARATION { twice } else { LARGEST_SEPARATION };
         one.normal.dot(other.normal).abs() < limit
@@ -91,11 +120,35 @@ impl Lines {
         }
     }
 
+    /// Lets all pings vote on the line through the points of one ping and of a later one.
+    #[inline(never)]
+    pub fn vote_of_two(&mut self, pings: &[Ping], voter: usize, later: usize) {
+        let (Some(one), Some(other)) = (pings.get(voter), pings.get(voter + later)) else { return };
+        let (Some(at), Some(to)) = (point(one), point(other)) else { return };
+        let along = to.minus(at);
+        let length = sqrt(along.length_squared());
+        let is_apart = length >= APART.0 && length <= APART.1;
+        if !is_apart {
+            return;
+        }
+        let normal = along.left().times(1.0 / length);
+        let normal = if normal.dot(one.axis) < 0.0 { normal.times(-1.0) } else { normal };
+        let mut line = Line { normal, offset: normal.dot(at), stretch: (0.0, 0.0), support: 0 };
+        self.gather(pings, &mut line);
+        if line.support >= LEAST_SUPPORT {
+            self.keep(line);
+        }
+    }
+
     /// Counts the pings that support a line, and finds the stretch that they cover.
     fn gather(&self, pings: &[Ping], line: &mut Line) {
         let (mut support, mut from, mut to) = (0, f32::INFINITY, f32::NEG_INFINITY);
         for ping in pings.iter().filter(|ping| self.supports(ping, line)) {
-            let along = line.normal.left().dot(ping.station.at);
+            let along = if self.is_light {
+                point(ping).map_or(0.0, |at| line.normal.left().dot(at))
+            } else {
+                line.normal.left().dot(ping.station.at)
+            };
             from = if along < from { along } else { from };
             to = if along > to { along } else { to };
             support += 1;
@@ -106,7 +159,8 @@ impl Lines {
 
     fn supports(&self, ping: &Ping, line: &Line) -> bool {
         ping.range().is_some_and(|range| {
-            let at = line.normal.dot(ping.station.at) + range;
+            let ahead = if self.is_light { range * line.normal.dot(ping.axis) } else { range };
+            let at = line.normal.dot(ping.station.at) + ahead;
             (at - line.offset).abs() < TOLERANCE && line.normal.dot(ping.axis) >= self.cos_cone
         })
     }
@@ -145,13 +199,19 @@ impl Lines {
         const RANGE_WEIGHT: f32 = 1.0 / (0.03 * 0.03);
         let Some(&line) = self.found.get(number) else { return };
         let beam = 0.7 * self.cone.0;
-        let beam_weight = 1.0 / (beam * beam);
+        let beam_weight = if self.is_light { 0.0 } else { 1.0 / (beam * beam) };
         // Normal equations of turn and offset.
         let (mut aa, mut ab, mut bb, mut ga, mut gb) = (1e-3_f32, 0.0, 1e-3_f32, 0.0, 0.0);
         for ping in pings.iter().filter(|ping| self.supports(ping, &line)) {
             let Some(range) = ping.range() else { continue };
-            let residual = line.normal.dot(ping.station.at) + range - line.offset;
-            let by_turn = line.normal.left().dot(ping.station.at);
+            let (ahead, aside) = if self.is_light {
+                let met = ping.axis.times(range);
+                (line.normal.dot(met), line.normal.left().dot(met))
+            } else {
+                (range, 0.0)
+            };
+            let residual = line.normal.dot(ping.station.at) + ahead - line.offset;
+            let by_turn = line.normal.left().dot(ping.station.at) + aside;
             let off_axis = line.normal.left().dot(ping.axis);
             aa += RANGE_WEIGHT * by_turn * by_turn + beam_weight;
             ab -= RANGE_WEIGHT * by_turn;
@@ -178,6 +238,11 @@ impl Lines {
             *slot = fitted;
         }
     }
+}
+
+/// The point that a ping of light has met.
+fn point(ping: &Ping) -> Option<Vector> {
+    Some(ping.station.at.plus(ping.axis.times(ping.range()?)))
 }
 
 /// Cosine of the angle between a ping's axis and a normal up to which the ping supports the line.

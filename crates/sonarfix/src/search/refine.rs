@@ -97,6 +97,20 @@ impl Placed {
     }
 }
 
+impl Placed {
+    /// The same with the derivatives of the point that a beam of light has met: it turns with the beam.
+    #[inline(never)]
+    pub fn at_its_point(self) -> Self {
+        let ahead = self.beam.axis.times(self.beam.range.unwrap_or(0.0));
+        Self {
+            arm: self.arm.plus(ahead),
+            by_drift: self.by_drift.plus(ahead.left().times(self.travelled)),
+            by_turn_scale: self.by_turn_scale.plus(ahead.left().times(self.turned)),
+            ..self
+        }
+    }
+}
+
 impl Equations {
     // ===== Eq. (34): rows of the least squares =====
     /// Adds the two rows of a ping.

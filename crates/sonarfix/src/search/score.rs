@@ -3,12 +3,12 @@
 //!
 //! Scores are natural logarithms of the likelihood over that of an echo anywhere in the sonar's range.
 
-use crate::config::Sonar;
+use crate::config::{Ranging, Sonar};
 use crate::echo::{EchoParameters, LogShares};
 use crate::elementary::{ln, sqrt};
 use crate::map::Map;
 use crate::numeric::at_least;
-use crate::reflector::{Beam, Heard, Reflector, Reflectors};
+use crate::reflector::{Beam, Heard, Lit, Reflector, Reflectors};
 use crate::vector::Vector;
 
 /// Deviation of the angle between axis and reflector, as a part of the cone.
@@ -85,18 +85,22 @@ pub(super) struct Explanation {
 pub(super) struct EchoModel<'m> {
     pub reflectors: Reflectors<'m>,
     shares: LogShares,
-    /// Inverse of the deviation of the angle between the axis and what answers.
+    /// Inverse of the deviation of the angle between the axis and what answers; zero of light, whose axis is exact.
     pub by_beam: f32,
+    /// Whether the range is along the axis.
+    pub is_light: bool,
 }
 
 impl<'m> EchoModel<'m> {
     #[inline(never)]
     pub fn new(map: Map<'m>, sonar: &Sonar, echo: &EchoParameters) -> Self {
-        let Sonar { cone, max_range, .. } = *sonar;
+        let Sonar { cone, max_range, ranging, .. } = *sonar;
+        let is_light = ranging != Ranging::Sound;
         Self {
             reflectors: Reflectors::new(map, sonar),
             shares: echo.log_shares(max_range, ANYWHERE),
-            by_beam: 1.0 / (BEAM * cone.0),
+            by_beam: if is_light { 0.0 } else { 1.0 / (BEAM * cone.0) },
+            is_light,
         }
     }
 
@@ -110,6 +114,9 @@ impl<'m> EchoModel<'m> {
     // ===== Eq. (31): p(z) over the density of an echo anywhere =====
     /// Scores a ping; one call is one evaluation.
     pub fn explain(&self, beam: &Beam, sharpness: Sharpness) -> Explanation {
+        if self.is_light {
+            return self.explain_lit(beam, sharpness);
+        }
         let margin = MATCH * sharpness.deviation;
         let reach = beam.range.map_or(self.reflectors.max_range, |range| range + margin);
         let (reflectors, free) = self.reflectors.in_beam(beam, reach, margin);
@@ -152,6 +159,32 @@ impl<'m> EchoModel<'m> {
             Some(best) if best.score > other => best,
             _ => Explanation { score: other, target: None },
         }
+    }
+
+    /// Scores a ping of light, which only the wall that the axis meets first can answer.
+    #[inline(never)]
+    fn explain_lit(&self, beam: &Beam, sharpness: Sharpness) -> Explanation {
+        let met = self.reflectors.lit(beam);
+        let Some(range) = beam.range else {
+            let missed = if met.is_some() { self.shares.misses } else { 0.0 };
+            let score = at_least(SILENCE + missed, self.shares.silence);
+            return Explanation { score, target: None };
+        };
+        let Some(Lit { distance, away }) = met else {
+            return Explanation { score: at_least(self.shares.before, LEAST_ECHO), target: None };
+        };
+        // The deviation is across the wall: a place that is wrong by it changes an oblique range by more.
+        let residual = range - distance;
+        let ratio = residual / (sharpness.deviation * sqrt(away.length_squared()));
+        let clutter = if residual < 0.0 { self.shares.before } else { self.shares.behind };
+        let other = at_least(clutter + self.shares.misses, LEAST_ECHO);
+        let score = self.shares.answers + sharpness.peak - 0.5 * ratio * ratio;
+        // False for NaN.
+        if ratio.abs() <= MATCH && score > other {
+            let target = Some(Target { residual, toward: away, off_axis: 0.0 });
+            return Explanation { score, target };
+        }
+        Explanation { score: other, target: None }
     }
 
     /// How well a reflector is heard, `None` if a wall hides it.

@@ -113,6 +113,7 @@ impl Trial {
         self.sum += explanation.score;
         if let Some(target) = explanation.target {
             let by = Tolerance { deviation: sharpness.deviation, by_beam: echoes.by_beam };
+            let placed = if echoes.is_light { placed.at_its_point() } else { placed };
             self.equations.add(&placed, &target, by);
         }
         if self.sum < self.least_sum(window.pings().len()) {

@@ -3,7 +3,7 @@
 //! # Non-finite policy
 //! Comparisons are written so that a wall whose numbers are NaN cannot be measured.
 
-use crate::config::{Config, Sonar};
+use crate::config::{Config, Ranging, Sonar};
 use crate::ekf::{Ekf, PoseCovariance};
 use crate::elementary::{inverse_sqrt, sqrt};
 use crate::map::Wall;
@@ -29,12 +29,34 @@ const MAX_WIDENING: Radians = Radians(0.3);
 
 /// Standard deviations of the foot along the wall, of the range and of the heading that the estimate
 /// does not contain: rounded ends of walls, limits of the sonar, dead band of the servo.
-const FOOT_MARGIN: f32 = 0.02;
-const RANGE_MARGIN: f32 = 0.001;
+pub(super) const FOOT_MARGIN: f32 = 0.02;
+pub(super) const RANGE_MARGIN: f32 = 0.001;
 const HEADING_MARGIN: f32 = 0.01;
 
 /// Largest deviation of the heading at which the estimate counts as tracking, as a share of the cone.
 const MAX_HEADING_DEVIATION: f32 = 0.25;
+
+/// The same of light, whose range is not linear in the heading: the curvature, half of the range times the variance, is 3 mm at 2 m.
+const MAX_LIGHT_HEADING_DEVIATION: Radians = Radians(0.05);
+
+/// A wall as one ping measures it.
+pub(crate) struct Sight {
+    pub expected: ExpectedRange,
+    /// Probability that foot or spot is on the wall and the range within the limits.
+    pub on_wall: f32,
+    /// Probability that the beam is square, or of light not too oblique.
+    pub square: f32,
+    /// Angle between the beam and the perpendicular.
+    pub off: Radians,
+    /// Variance of the range apart from that of the map, m².
+    pub noise: f32,
+    /// Accuracy of the wall in the map, if it has one of its own.
+    pub accuracy: Option<Metres>,
+    /// Factor on the variance of the place of the wall in the map.
+    pub of_map: f32,
+    /// Place of the foot along the wall, also of light: what occludes a wall is remembered by where the robot was.
+    pub place: Metres,
+}
 
 /// The estimate of the filter as seen from the sonar: computed once for all walls.
 pub(crate) struct Viewpoint<'a> {
@@ -45,19 +67,21 @@ pub(crate) struct Viewpoint<'a> {
     cone: Radians,
     confidence: f32,
     /// Least probability of foot and range.
-    least: f32,
+    pub(super) least: f32,
     covariance: PoseCovariance,
 }
 
 impl<'a> Viewpoint<'a> {
-    pub fn new(config: &'a Config, ekf: &Ekf) -> Self {
-        let sonar = &config.sonar;
+    pub fn new(config: &'a Config, sonar: &'a Sonar, ekf: &Ekf) -> Self {
         let state = ekf.state();
         Self {
             sonar,
             position: SonarPosition::new(sonar.mount, &state),
             heading: ekf.heading(),
-            cone: sonar.cone,
+            cone: match sonar.ranging {
+                Ranging::Sound => sonar.cone,
+                Ranging::Light(beam) => beam.spot,
+            },
             confidence: config.gating.confidence,
             least: SAFE,
             covariance: ekf.pose_covariance(),
@@ -66,13 +90,53 @@ impl<'a> Viewpoint<'a> {
 
     /// The same estimate without margins, for when no wall is safe.
     pub fn without_margins(self) -> Self {
-        let cone = self.sonar.cone * CORE_OF_CONE;
+        let cone = self.cone * CORE_OF_CONE;
         Self { cone, confidence: 0.0, least: LIKELY, ..self }
     }
 
     /// The same estimate for an echo that has arrived.
     pub fn of_echo(self) -> Self {
         Self { least: POSSIBLE, ..self }
+    }
+
+    /// The sonar at the estimate.
+    pub(super) fn sonar_position(&self) -> &SonarPosition {
+        &self.position
+    }
+
+    /// Variance of the heading, rad².
+    pub(super) fn heading_variance(&self) -> f32 {
+        self.covariance.hh
+    }
+
+    /// A wall as a ping at `bearing` measures it.
+    ///
+    /// # Errors
+    /// [`Refusal::FootOffWall`], [`Refusal::OutOfRange`] or [`Refusal::NotSquare`] if that is too improbable.
+    pub fn sight(&self, wall: &Wall, bearing: Radians) -> Result<Sight, Refusal> {
+        let beam = match self.sonar.ranging {
+            Ranging::Sound => return self.heard(wall, bearing),
+            Ranging::Light(beam) => beam,
+        };
+        self.lit(wall, beam, self.heading.turned(bearing))
+    }
+
+    fn heard(&self, wall: &Wall, bearing: Radians) -> Result<Sight, Refusal> {
+        let (expected, on_wall) = self.expected_range(wall)?;
+        let off = self.off_square(&expected, bearing);
+        let square = self.of_square(off)?;
+        let place = wall.along(self.position());
+        let noise = self.sonar.noise.variance(expected.range).0;
+        Ok(Sight {
+            expected,
+            on_wall,
+            square,
+            off,
+            noise,
+            accuracy: wall.accuracy(),
+            of_map: 1.0,
+            place,
+        })
     }
 
     /// Estimated position of the sonar.
@@ -92,9 +156,9 @@ impl<'a> Viewpoint<'a> {
     }
 
     /// Variance of the position along the unit vector (x, y), m².
-    fn variance(&self, x: f32, y: f32) -> f32 {
+    pub(super) fn variance(&self, x: f32, y: f32) -> f32 {
         let p = &self.covariance;
-        positive_part(p.xx * x * x + 2.0 * p.xy * x * y + p.yy * y * y)
+        positive_part((p.xx * x + (p.xy + p.xy) * y) * x + p.yy * y * y)
     }
 
     /// The range expected from a wall, and the probability that its foot lies on it and the range is
@@ -135,12 +199,12 @@ impl<'a> Viewpoint<'a> {
         expected.direction.from(self.heading.turned(bearing))
     }
 
-    /// Probability that a beam at `bearing` is square to the expected wall.
+    /// Probability that a beam at the angle `off` from the perpendicular is square.
     ///
     /// # Errors
     /// [`Refusal::NotSquare`] if that is too improbable.
-    pub fn of_square(&self, expected: &ExpectedRange, bearing: Radians) -> Result<f32, Refusal> {
-        let probability = self.probability_of_square(self.off_square(expected, bearing));
+    fn of_square(&self, off: Radians) -> Result<f32, Refusal> {
+        let probability = self.probability_of_square(off);
         // Does not hold for NaN.
         let is_possible = probability >= self.least;
         if is_possible { Ok(probability) } else { Err(Refusal::NotSquare) }
@@ -160,9 +224,19 @@ impl<'a> Viewpoint<'a> {
     }
 }
 
-/// Largest deviation of the heading at which the estimate counts as tracking.
-pub(crate) fn max_heading_deviation(sonar: &Sonar) -> Radians {
-    sonar.cone * MAX_HEADING_DEVIATION
+/// Largest deviation of the heading at which the estimate counts as tracking: that of the least demanding ranger.
+pub(crate) fn max_heading_deviation_of(config: &Config) -> Radians {
+    let first = max_heading_deviation(&config.sonar);
+    let others = config.further_sonars.iter().map(max_heading_deviation);
+    others.fold(first, |most, other| if other > most { other } else { most })
+}
+
+/// The same of one ranger.
+fn max_heading_deviation(sonar: &Sonar) -> Radians {
+    match sonar.ranging {
+        Ranging::Sound => sonar.cone * MAX_HEADING_DEVIATION,
+        Ranging::Light(_) => MAX_LIGHT_HEADING_DEVIATION,
+    }
 }
 
 /// The range of an echo, if it is one that the sonar can report.
@@ -186,7 +260,7 @@ const CERTAIN: f32 = 4.0;
 /// Probability that a normal variable with this variance lies less than `below` below its mean and less than
 /// `above` above it.
 #[inline]
-fn probability_within(below: f32, above: f32, variance: f32) -> f32 {
+pub(super) fn probability_within(below: f32, above: f32, variance: f32) -> f32 {
     let least = if below < above { below } else { above };
     if least > 0.0 && least * least >= CERTAIN * CERTAIN * variance {
         return 1.0;
@@ -243,7 +317,11 @@ mod tests {
             let heading = limit * share;
             let deviation = StandardDeviations { heading, ..StandardDeviations::default() };
             let ekf = Ekf::new(config.drive, StateEstimate::default(), deviation).unwrap();
-            assert_eq!(Viewpoint::new(&config, &ekf).is_heading_known(), is_known, "{share}");
+            assert_eq!(
+                Viewpoint::new(&config, &config.sonar, &ekf).is_heading_known(),
+                is_known,
+                "{share}"
+            );
         }
     }
 }

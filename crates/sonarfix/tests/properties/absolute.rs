@@ -168,13 +168,13 @@ impl Oracle {
 
 /// A localizer after some steps, with its state before the last one.
 fn driven(
-    config: Config,
+    config: &Config,
     state: StateEstimate,
     deviation: StandardDeviations,
     travels: &[WheelTravel],
 ) -> (Localizer<'static>, Vector) {
     let now = Instant::from_ticks(0);
-    let mut localizer = Localizer::resume(config, NO_MAP, state, deviation, now).unwrap();
+    let mut localizer = Localizer::resume(*config, NO_MAP, state, deviation, now).unwrap();
     let mut before = vector(&localizer);
     for (step, travel) in (1..).zip(travels) {
         before = vector(&localizer);
@@ -214,7 +214,7 @@ proptest! {
     ) {
         let mut config = Config::for_track_width(drive.track_width);
         config.drive = drive;
-        let (mut localizer, before) = driven(config, state, deviation, &travels);
+        let (mut localizer, before) = driven(&config, state, deviation, &travels);
         let oracle = oracle(&localizer, &before, plan.ago);
         let z = off(&plan, &oracle, &localizer);
         let (x, p) = (vector(&localizer), matrix(&localizer));
@@ -260,7 +260,7 @@ proptest! {
         let mut config = Config::for_track_width(drive.track_width);
         config.drive = drive;
         config.gyro = has_gyro.then_some(GyroParameters::MPU_6050);
-        let (mut localizer, mut before) = driven(config, state, deviation, &travels[..1]);
+        let (mut localizer, mut before) = driven(&config, state, deviation, &travels[..1]);
         for (travel, plan) in travels.iter().zip(&plans) {
             let oracle = oracle(&localizer, &before, plan.ago);
             let z = off(plan, &oracle, &localizer);
@@ -315,7 +315,7 @@ fn parked(heading: Radians) -> Localizer<'static> {
         ..StandardDeviations::from_array([0.0; 7])
     };
     let config = Config::for_track_width(Metres(0.2));
-    driven(config, state, deviation, &[]).0
+    driven(&config, state, deviation, &[]).0
 }
 
 fn compass(degrees: f32) -> AbsoluteMeasurement {
@@ -469,7 +469,7 @@ fn headings_show_the_bias_of_a_gyro() {
         scale_left: 0.1,
         range_scale: 0.0,
     };
-    let (mut localizer, _) = driven(config, StateEstimate::default(), deviation, &[]);
+    let (mut localizer, _) = driven(&config, StateEstimate::default(), deviation, &[]);
     let bias = 0.02_f32;
     for tick in 1..=600_u64 {
         let turn = sonarfix::gyro::MeasuredTurn {
@@ -491,7 +491,7 @@ fn the_bias_is_uncertain_by_the_association() {
     let mut config = Config::for_track_width(Metres(0.2));
     config.gyro = Some(GyroParameters::MPU_6050);
     let deviation = StandardDeviations::from_array([0.01, 0.01, 0.01, 0.1, 0.1, 0.02, 0.0]);
-    let (mut localizer, _) = driven(config, StateEstimate::default(), deviation, &[]);
+    let (mut localizer, _) = driven(&config, StateEstimate::default(), deviation, &[]);
     for tick in 1..=50_u64 {
         let turn = sonarfix::gyro::MeasuredTurn {
             angle: Radians(0.0),

@@ -265,17 +265,17 @@ fn is_best(
 }
 
 /// A robot at the origin, with the covariance after a drive.
-fn started(
-    config: Config,
-    walls: &[Wall],
+fn started<'w>(
+    config: &Config,
+    walls: &'w [Wall],
     pose: Pose,
     deviation: f32,
     drive: (f32, f32, u8),
-) -> Localizer<'_> {
+) -> Localizer<'w> {
     let start =
         Start { pose, position_deviation: Metres(deviation), heading_deviation: Radians(0.01) };
     let mut localizer =
-        Localizer::new(config, Map::new(walls), start, Instant::from_ticks(0)).unwrap();
+        Localizer::new(*config, Map::new(walls), start, Instant::from_ticks(0)).unwrap();
     for step in 1..=u64::from(drive.2) {
         let travel = WheelTravel::new(drive.0, drive.1);
         localizer.odometry(Instant::from_ticks(100_000 * step), travel).unwrap();
@@ -324,7 +324,7 @@ proptest! {
         let ends: Vec<_> = sights.iter().map(|s| s.ends(Point::default())).collect();
         let walls: Vec<_> = ends.iter().map(|e| Wall::new(e.0, e.1).unwrap()).collect();
         let pose = Pose::new(0.0, 0.0, Radians(heading));
-        let mut localizer = started(config, &walls, pose, deviation, drive);
+        let mut localizer = started(&config, &walls, pose, deviation, drive);
         // Fixes reduce the variance of the position along one line, not along the other.
         for _ in 0..fixes {
             if let Ok(aim) = localizer.aim() {
@@ -389,7 +389,7 @@ proptest! {
         // The turn on the spot must not raise the uncertainty of the heading above the cone.
         config.prior.track_width = Metres(0.002);
         let walls = room.walls();
-        let mut localizer = started(config, &walls, room.robot, deviation, drive);
+        let mut localizer = started(&config, &walls, room.robot, deviation, drive);
         for _ in 0..fixes {
             let aim = localizer.aim().unwrap();
             prop_assert!(matches!(localizer.fix(&aim, Some(aim.range)), Fix::Accepted(_)));
@@ -406,7 +406,7 @@ proptest! {
         let mut config = config_for_rooms(Point::default());
         config.policy = Policy::Nearest;
         let mut walls = room.walls().to_vec();
-        let open = started(config, &walls, room.robot, 0.01, (0.0, 0.0, 0));
+        let open = started(&config, &walls, room.robot, 0.01, (0.0, 0.0, 0));
         let target = open.aim().unwrap();
         // A board across the beam. Slanted by more than the length of its ends, its own foot is off
         // it.
@@ -418,7 +418,7 @@ proptest! {
             room.robot.y.0 + middle * beam.sin() + s * across.sin(),
         );
         walls.push(Wall::new(end(-half), end(half)).unwrap());
-        let closed = started(config, &walls, room.robot, 0.01, (0.0, 0.0, 0));
+        let closed = started(&config, &walls, room.robot, 0.01, (0.0, 0.0, 0));
         let aim = closed.aim().unwrap();
         prop_assert_ne!(aim.wall, target.wall);
         // Nor by its bearing.
@@ -433,7 +433,7 @@ proptest! {
         let mut config = config_for_rooms(Point::default());
         config.policy = Policy::Nearest;
         let mut walls = room.walls().to_vec();
-        let target = started(config, &walls, room.robot, metres, (0.0, 0.0, 0)).aim().unwrap();
+        let target = started(&config, &walls, room.robot, metres, (0.0, 0.0, 0)).aim().unwrap();
         let beam = room.robot.heading.turned(target.bearing).radians().0;
         let side = if left { 1.0 } else { -1.0 };
         // The edge of a board that points at the robot and extends away from it: its foot is off
@@ -445,7 +445,7 @@ proptest! {
         );
         let near = target.range.0 * share;
         walls.push(Wall::new(end(near), end(near + 0.05)).unwrap());
-        let aim = started(config, &walls, room.robot, metres, (0.0, 0.0, 0)).aim().unwrap();
+        let aim = started(&config, &walls, room.robot, metres, (0.0, 0.0, 0)).aim().unwrap();
         // The cone is 15°, and 0.01 rad more for the heading; the apex may be one deviation nearer
         // and aside.
         let tangent = (config.sonar.cone.0 + 0.01).tan();
@@ -466,7 +466,7 @@ proptest! {
         prop_assume!((inward - least).abs() > 1e-3);
         let sight = Sight { direction, distance, foot: inward / 4.0, length: 4.0, flipped: false };
         let walls = [sight.wall(Point::default())];
-        let localizer = started(config, &walls, Pose::default(), deviation, (0.0, 0.0, 0));
+        let localizer = started(&config, &walls, Pose::default(), deviation, (0.0, 0.0, 0));
         let aim = localizer.aim();
         prop_assert_eq!(aim.is_ok(), inward > least, "{:?}", aim);
         prop_assert!(aim.is_ok() || aim == Err(NoAim::NoWall));
@@ -482,7 +482,7 @@ proptest! {
         // the first; its foot is `inward` metres from its end.
         let square = direction + core::f32::consts::FRAC_PI_2;
         let walls = [sight(direction, 0.5), sight(square, inward / 4.0)].map(|s| s.wall(Point::default()));
-        let blunt = started(config, &walls, Pose::default(), deviation, (0.0, 0.0, 0));
+        let blunt = started(&config, &walls, Pose::default(), deviation, (0.0, 0.0, 0));
         let mut sharp = blunt.clone();
         let aim = sharp.aim_at(Radians(direction)).unwrap();
         prop_assert_eq!(aim.wall, WallId(0));
@@ -508,7 +508,7 @@ proptest! {
         config.sonar.max_range = Metres(max);
         let sight = Sight { direction, distance, foot: 0.5, length: 4.0, flipped: false };
         let walls = [sight.wall(Point::default())];
-        let localizer = started(config, &walls, Pose::default(), 0.02, (0.0, 0.0, 0));
+        let localizer = started(&config, &walls, Pose::default(), 0.02, (0.0, 0.0, 0));
         // 20 % are in range at −0.84 standard deviations: 2 cm, and 1 mm for the limit itself.
         let slack = (distance - min).min(max - distance) + 0.8416 * 0.021;
         prop_assume!(slack.abs() > 1e-3);
@@ -523,7 +523,7 @@ proptest! {
         config.sonar.servo = (Radians(right), Radians(left));
         let sight = Sight { direction, distance: 2.0, foot: 0.5, length: 4.0, flipped: false };
         let walls = [sight.wall(Point::default())];
-        let localizer = started(config, &walls, Pose::default(), 0.02, (0.0, 0.0, 0));
+        let localizer = started(&config, &walls, Pose::default(), 0.02, (0.0, 0.0, 0));
         let beyond = |limit: f32| turn_between(direction.into(), limit.into()).abs();
         let off = if (right..=left).contains(&direction) { 0.0 } else { beyond(right).min(beyond(left)) };
         let slack = f64::from(config.sonar.cone.0) - off;
@@ -532,6 +532,22 @@ proptest! {
         prop_assert_eq!(aim.is_ok(), slack > 0.0);
         prop_assert!(aim.is_err() || (right..=left).contains(&aim.unwrap().bearing.0));
         prop_assert_eq!(localizer.aim_at(Radians(direction)).map(|a| a.wall), Ok(WallId(0)));
+    }
+
+    /// Without a servo a wall is measured if it is in the cone at the fixed bearing, which is that of the ping.
+    #[test]
+    fn a_fixed_sonar_measures_what_is_in_its_cone(direction in -3.1_f32..3.1, fixed in -3.1_f32..3.1) {
+        let mut config = config_for_rooms(Point::default());
+        config.sonar.servo = (Radians(fixed), Radians(fixed));
+        let sight = Sight { direction, distance: 2.0, foot: 0.5, length: 4.0, flipped: false };
+        let walls = [sight.wall(Point::default())];
+        let localizer = started(&config, &walls, Pose::default(), 0.02, (0.0, 0.0, 0));
+        let off = turn_between(direction.into(), fixed.into()).abs();
+        let slack = f64::from(config.sonar.cone.0) - off;
+        prop_assume!(slack.abs() > 1e-4);
+        let aim = localizer.aim();
+        prop_assert_eq!(aim.is_ok(), slack > 0.0);
+        prop_assert!(aim.is_err() || aim.unwrap().bearing.0.to_bits() == fixed.to_bits());
     }
 
     /// However uncertain the heading: there is a wall to measure, and the uncertainty lowers the
@@ -558,8 +574,8 @@ proptest! {
         let walls = room.walls();
         let mut turned = walls.to_vec();
         turned.rotate_left(turn);
-        let mut one = started(config, &walls, room.robot, 0.03, (0.02, 0.01, 3));
-        let mut other = started(config, &turned, room.robot, 0.03, (0.02, 0.01, 3));
+        let mut one = started(&config, &walls, room.robot, 0.03, (0.02, 0.01, 3));
+        let mut other = started(&config, &turned, room.robot, 0.03, (0.02, 0.01, 3));
         for ping in 0..30_u8 {
             let (a, b) = (one.aim().unwrap(), other.aim().unwrap());
             // Of two walls with the same score the first in the map is measured.
@@ -578,7 +594,7 @@ proptest! {
         let mut config = config_for_rooms(mount);
         config.policy = policy;
         let walls = room.walls();
-        let mut localizer = started(config, &walls, room.robot, 0.03, (0.02, 0.01, 3));
+        let mut localizer = started(&config, &walls, room.robot, 0.03, (0.02, 0.01, 3));
         for _ in 0..20 {
             let aim = localizer.aim().unwrap();
             let expected = ExpectedRange::new(&walls[aim.wall.0 as usize], mount, &localizer.filter().state());
@@ -591,7 +607,7 @@ proptest! {
 #[test]
 fn an_empty_map_has_no_aim() {
     let localizer =
-        started(config_for_rooms(Point::default()), &[], Pose::default(), 0.01, (0.0, 0.0, 0));
+        started(&config_for_rooms(Point::default()), &[], Pose::default(), 0.01, (0.0, 0.0, 0));
     assert_eq!(localizer.aim(), Err(NoAim::NoWall));
     assert_eq!(localizer.aim_at(Radians(0.0)), Err(NoAim::NoWall));
 }
@@ -618,7 +634,7 @@ proptest! {
         config.policy = Policy::Nearest;
         let far = near * (1.0 + share);
         let walls = if first_is_right { corridor(far, near) } else { corridor(near, far) };
-        let mut localizer = started(config, &walls, Pose::default(), 0.001, (0.0, 0.0, 0));
+        let mut localizer = started(&config, &walls, Pose::default(), 0.001, (0.0, 0.0, 0));
         let nearer = localizer.aim().unwrap().wall;
         // The previous ping was at the farther one.
         let bearing = if first_is_right { -1.0 } else { 1.0 } * core::f32::consts::FRAC_PI_2;
@@ -637,7 +653,7 @@ proptest! {
         // A turn on the spot in steps of 0.1 s, until the wall is one radian to the left.
         let arc = 0.1 * rate * 0.5 * config.drive.track_width.0;
         let start = Pose::new(0.0, 0.0, Radians(-1.0 - 0.1 * rate * f32::from(steps)));
-        let localizer = started(config, &walls, start, 0.001, (arc, -arc, steps));
+        let localizer = started(&config, &walls, start, 0.001, (arc, -arc, steps));
         let aim = localizer.aim().unwrap();
         // 0.17 s for 60°, and 80 ms for a frame and settling; the servo starts ahead.
         let square = turn_between(0.0, localizer.pose().heading.radians().0.into());
@@ -683,7 +699,7 @@ proptest! {
         // A ping without a turn takes the cycle of the sonar; one after a turn by 90° a frame,
         // settling, 0.17 s/60°, and the flight of the sound.
         let times_longer = (0.08 + 0.17 * 1.5 + 4.0 / 343.4) / 0.06;
-        let mut localizer = started(config, &walls, Pose::default(), 0.01, (0.0, 0.0, 0));
+        let mut localizer = started(&config, &walls, Pose::default(), 0.01, (0.0, 0.0, 0));
         let (sin, cos) = f64::from(angle).sin_cos();
         let (mut pair, mut row, mut longest, mut turns) = (None, 0, 0, 0);
         for ping in 1..=600 {
@@ -710,4 +726,28 @@ proptest! {
         }
         prop_assert!(longest >= 30 && turns >= 4, "{longest} in a row, {turns} turns");
     }
+}
+
+/// A robot with a fixed sonar that waits until a wall is in its cone: once a second it counts as a ping without an accepted
+/// range, however often the loop asks; with a servo each time counts.
+#[test]
+fn waiting_for_a_wall_counts_once_a_second() {
+    let walls = [Wall::new(Point::new(2.0, -2.0), Point::new(2.0, 2.0)).unwrap()];
+    let mut config = config_for_rooms(Point::default());
+    let silent = |config: Config| {
+        let mut localizer = started(&config, &walls, Pose::default(), 0.02, (0.0, 0.0, 0));
+        let begin = localizer.time();
+        for tick in 1..=50 {
+            let now = begin.checked_add_duration(Duration::from_ticks(tick * 100_000)).unwrap();
+            localizer.odometry(now, WheelTravel::new(0.0, 0.0)).unwrap();
+            assert_eq!(localizer.aim(), Err(NoAim::NoWall));
+            localizer.skip();
+        }
+        localizer.health().silent_in_a_row
+    };
+    let back = core::f32::consts::PI;
+    config.sonar.servo = (Radians(back), Radians(back));
+    assert_eq!(silent(config), 5);
+    config.sonar.servo = (Radians(back - 0.1), Radians(back));
+    assert_eq!(silent(config), 50);
 }

@@ -243,6 +243,8 @@ proptest! {
     fn turns_between_readings_add_up(
         rates in prop::collection::vec(-4.0_f32..4.0, 2..200), period in 1_000_u64..10_000, every in 1_usize..20,
     ) {
+        // Each rate in two samples: one that differs from both of its neighbours may be a spike.
+        let rates: Vec<f32> = rates.into_iter().flat_map(|rate| [rate; 2]).collect();
         let mut integral = TurnIntegral::new(&GyroParameters::MPU_6050);
         let mut exact = 0.0;
         let mut sum = 0.0;
@@ -347,6 +349,62 @@ fn a_failed_gyro_leaves_the_wheels() {
     drive(&mut without, 0..100, 0.0, |_| None);
     assert_eq!(with.filter(), without.filter());
     assert_eq!(with.gyro().unwrap().latest, TurnUse::Missing);
+}
+
+/// The result of each sample of a rate, every 10 ms, and whether the turn was measured without an interruption.
+fn sampled(rates: &[f32]) -> (Vec<Result<(), SampleFault>>, bool) {
+    let mut integral = TurnIntegral::new(&GyroParameters::MPU_6050);
+    let at = |sample: usize| Instant::from_ticks(10_000 * sample as u64);
+    let mut results = vec![integral.sample(at(0), RadiansPerSecond(rates[0]))];
+    let start = integral.reading(at(0));
+    for (sample, rate) in rates.iter().enumerate().skip(1) {
+        results.push(integral.sample(at(sample), RadiansPerSecond(*rate)));
+    }
+    let is_whole = integral.reading(at(rates.len())).since(&start).is_some();
+    (results, is_whole)
+}
+
+/// Noise that is no fault.
+fn quiet(samples: usize) -> Vec<f32> {
+    (0..samples).map(|sample| 1e-3 * (sample % 7) as f32).collect()
+}
+
+/// A rate that jumps to and fro twice within two seconds, by more than 1 rad/s, is erratic from then on, until it has not done so for
+/// two seconds.
+#[test]
+fn a_rate_that_jumps_to_and_fro_is_erratic() {
+    for (gap, spike) in [(2, 1.1), (50, -3.0), (198, 4.0)] {
+        let mut rates = quiet(800);
+        rates[100] += spike;
+        rates[101 + gap] += spike;
+        let (results, is_whole) = sampled(&rates);
+        let first = 102 + gap; // the sample that shows that the second was a spike
+        for (sample, result) in results.iter().enumerate() {
+            let expected = match sample {
+                n if n < first || n >= first + 200 => Ok(()),
+                _ => Err(SampleFault::Erratic),
+            };
+            assert_eq!(*result, expected, "gap {gap}, sample {sample}");
+        }
+        assert!(!is_whole);
+    }
+}
+
+/// What a robot can do is no fault: one jump to and fro, a step, a fast oscillation of less than 1 rad/s, two jumps 2 s apart.
+#[test]
+fn motion_is_not_erratic() {
+    let mut single = quiet(500);
+    single[100] += 4.0;
+    let mut apart = single.clone();
+    apart[301] -= 4.0;
+    let step = quiet(500).into_iter().enumerate();
+    let step = step.map(|(n, rate)| rate + 4.0 * f32::from(u8::from(n % 100 > 50))).collect();
+    let swing = quiet(500).into_iter().enumerate();
+    let swing = swing.map(|(n, rate)| rate + 0.49 * f32::from(u8::from(n % 2 == 0))).collect();
+    for rates in [single, apart, step, swing] {
+        let (results, is_whole) = sampled(&rates);
+        assert!(is_whole && results.iter().all(Result::is_ok), "{rates:?}");
+    }
 }
 
 #[test]

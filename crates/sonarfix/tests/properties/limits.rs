@@ -38,7 +38,7 @@ fn at_the_origin() -> Start {
 #[test]
 fn a_configuration_is_refused_at_its_limits() {
     type Change = fn(&mut Config);
-    let rules: [(Change, Change); 9] = [
+    let rules: [(Change, Change); 11] = [
         (
             |it| (it.prior.scale_right, it.prior.scale_left) = (0.0, 0.0),
             |it| (it.prior.scale_right, it.prior.scale_left) = (0.0, 0.01),
@@ -60,8 +60,16 @@ fn a_configuration_is_refused_at_its_limits() {
             |it| (it.echo.missed, it.echo.short, it.echo.long) = (0.4, 0.3, 0.5),
         ),
         (
-            |it| it.sonar.servo = (Radians(0.2), Radians(0.3)),
             |it| it.sonar.servo = (Radians(0.3), Radians(0.3)),
+            |it| it.sonar.servo = (Radians(0.3), Radians(0.299_999_98)),
+        ),
+        (
+            |it| it.sonar.servo = (Radians(3.0), Radians(3.0)),
+            |it| it.sonar.servo = (Radians(3.2), Radians(3.2)),
+        ),
+        (
+            |it| it.sonar.servo = (Radians(-3.0), Radians(-3.0)),
+            |it| it.sonar.servo = (Radians(f32::NAN), Radians(f32::NAN)),
         ),
         (|it| it.sonar.cone = Radians(1e-3), |it| it.sonar.cone = Radians(0.0)),
         (

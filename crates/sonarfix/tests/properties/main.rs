@@ -19,6 +19,8 @@ mod health;
 #[cfg(test)]
 mod jacobians;
 #[cfg(test)]
+mod light;
+#[cfg(test)]
 mod limits;
 #[cfg(test)]
 mod map;
@@ -28,6 +30,8 @@ mod navigator;
 mod oracle;
 #[cfg(test)]
 mod planning;
+#[cfg(test)]
+mod rangers;
 #[cfg(test)]
 mod refusals;
 #[cfg(test)]

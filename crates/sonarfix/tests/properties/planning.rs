@@ -227,6 +227,36 @@ proptest! {
         prop_assert!((turned + f64::from(turn)).abs() < 2e-3, "{turned} {turn}");
     }
 
+    /// The accuracy of a wall replaces that of the map: aims and fixes are the same to the bit.
+    #[test]
+    fn the_accuracy_of_a_wall_replaces_that_of_the_map(
+        deviation in any_deviation(), x in 1.5_f32..6.0, steps in 1_u64..10, off in -0.02_f32..0.02,
+    ) {
+        let deviation = StandardDeviations { heading: Radians(0.01), ..deviation };
+        let own = [across(x).with_accuracy(Metres(MAP_ACCURACY))];
+        let of_map = [across(x)];
+        let mut config = config();
+        config.echo.map_accuracy = own[0].accuracy().unwrap();
+        let mut coarse = config;
+        coarse.echo.map_accuracy = Metres(0.2);
+        let start = |config: Config, walls| {
+            Localizer::resume(config, Map::new(walls), StateEstimate::default(), deviation, at(0)).unwrap()
+        };
+        let (mut one, mut other) = (start(coarse, &own), start(config, &of_map));
+        for tick in 1..=steps {
+            let aim = one.aim();
+            prop_assert_eq!(&aim, &other.aim());
+            let Ok(aim) = aim else { break };
+            let range = Some(Metres(aim.range.0 + off));
+            prop_assert_eq!(one.fix(&aim, range), other.fix(&aim, range));
+            for localizer in [&mut one, &mut other] {
+                localizer.odometry(at(tick), WheelTravel::new(0.02, 0.02)).unwrap();
+            }
+        }
+        let bits = |localizer: &Localizer| localizer.filter().covariance().map(f32::to_bits);
+        prop_assert_eq!(bits(&one), bits(&other));
+    }
+
     /// Of two walls that a beam is square to, the nearer one, whichever is the first in the map.
     #[test]
     fn at_a_bearing_the_nearest_wall_is_measured(

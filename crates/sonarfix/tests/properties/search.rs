@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use sonarfix::config::{Config, Sonar};
 use sonarfix::map::{Map, Wall};
 use sonarfix::pose::{Heading, Point, Pose};
-use sonarfix::search::{Answer, Hypothesis, NotFinite, Region, Search, SearchParameters};
+use sonarfix::search::{Answer, Hypothesis, InvalidInput, Region, Search, SearchParameters};
 use sonarfix::units::{Metres, Radians};
 
 /// Evaluations after each ping: a cycle or two in a room of a few walls.
@@ -162,21 +162,29 @@ fn a_proposed_pose_is_scored_like_any_other() {
     }
     assert!(search.hypotheses().any(|hypothesis| is_at(&hypothesis, end)));
     let nan = Pose::new(f32::NAN, 0.0, Radians(0.0));
-    assert_eq!(search.propose(nan), Err(NotFinite));
+    assert_eq!(search.propose(nan), Err(InvalidInput));
 }
 
 #[test]
-fn non_finite_input_is_refused() {
+fn invalid_input_is_refused() {
     let room = Room::rectangle();
     let mut search: Search =
         Search::new(&sonar(), Map::new(&room.walls), SearchParameters::default());
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-        assert_eq!(search.odometry(Metres(bad), Radians(0.0)), Err(NotFinite));
-        assert_eq!(search.odometry(Metres(0.0), Radians(bad)), Err(NotFinite));
-        assert_eq!(search.ping(Radians(bad), None), Err(NotFinite));
-        assert_eq!(search.ping(Radians(0.0), Some(Metres(bad))), Err(NotFinite));
+        assert_eq!(search.odometry(Metres(bad), Radians(0.0)), Err(InvalidInput));
+        assert_eq!(search.odometry(Metres(0.0), Radians(bad)), Err(InvalidInput));
+        assert_eq!(search.ping(Radians(bad), None), Err(InvalidInput));
+        assert_eq!(search.ping(Radians(0.0), Some(Metres(bad))), Err(InvalidInput));
     }
-    assert_eq!(search.ping(Radians(0.0), Some(Metres(-0.1))), Err(NotFinite));
+    // Finite, but sums of them would not be.
+    for bad in [1.1e6, -1.1e6, f32::MAX] {
+        assert_eq!(search.odometry(Metres(bad), Radians(0.0)), Err(InvalidInput));
+        assert_eq!(search.odometry(Metres(0.0), Radians(bad)), Err(InvalidInput));
+        for pose in [Pose::new(bad, 0.0, Radians(0.0)), Pose::new(0.0, bad, Radians(0.0))] {
+            assert_eq!(search.propose(pose), Err(InvalidInput));
+        }
+    }
+    assert_eq!(search.ping(Radians(0.0), Some(Metres(-0.1))), Err(InvalidInput));
     assert_eq!(search.ping(Radians(0.0), Some(Metres(1.0))), Ok(true));
     assert_eq!(search.ping(Radians(0.0), Some(Metres(1.0))), Ok(false), "not novel");
 }

@@ -184,36 +184,29 @@ impl SixStateFilter {
             row[0] * v[0] + row[1] * v[1] + row[2] * v[2] + row[3] * v[3]
         };
         let column = |j: usize| [at(2, j), at(3, j), at(4, j), at(5, j)];
-        // Covariances of turn and displacement with heading and calibration.
-        let t: [f32; 4] = core::array::from_fn(|k| {
-            let j = k + 2;
-            turn_of(at(3, j), at(4, j), at(5, j))
-        });
-        let x: [f32; 4] = core::array::from_fn(|k| along(&of_x, column(k + 2)));
-        let y: [f32; 4] = core::array::from_fn(|k| along(&of_y, column(k + 2)));
-        let [ht, tc, td, tw] = t;
-        let tt = turn_of(tc, td, tw);
-        let [xx, xy, yy] = [along(&of_x, x), along(&of_x, y), along(&of_y, y)];
-        let xx = xx * (1.0 + ROUNDING) + qxx;
-        let yy = yy * (1.0 + ROUNDING) + qyy;
+        // Covariances of the turn with the calibration, and of the new x and y with the old heading and the calibration.
+        let t: [f32; 3] =
+            core::array::from_fn(|k| turn_of(at(3, k + 3), at(4, k + 3), at(5, k + 3)));
+        let moved = |i: usize, row: &[f32; 4]| -> [f32; 4] {
+            core::array::from_fn(|k| at(i, k + 2) + along(row, column(k + 2)))
+        };
+        let (x, y) = (moved(0, &of_x), moved(1, &of_y));
         let lacking = |variance: f32, noise: f32| (0.5 * ROUNDING * variance - noise).max(0.0);
         let mut new = self.p;
-        new[0][0] +=
-            lacking(new[0][0], advance) + (along(&of_x, column(0)) + along(&of_x, column(0)) + xx);
-        new[1][1] +=
-            lacking(new[1][1], advance) + (along(&of_y, column(1)) + along(&of_y, column(1)) + yy);
-        new[0][1] += along(&of_y, column(0)) + along(&of_x, column(1)) + xy + qxy;
-        for (i, row, shifted, q) in [(0, of_x, x, -n[1]), (1, of_y, y, n[0])] {
-            let turned = turn_of(at(i, 3), at(i, 4), at(i, 5));
-            new[i][2] += turned + shifted[0] + along(&row, t) + q;
-            for j in 3..6 {
-                new[i][j] += shifted[j - 2];
-            }
+        for (i, row, moved, q) in [(0, of_x, x, qxx), (1, of_y, y, qyy)] {
+            let sum = core::array::from_fn(|k| at(i, k + 2) + moved[k]);
+            let growth = along(&row, sum);
+            new[i][i] += lacking(new[i][i], advance) + (growth + ROUNDING * growth.abs() + q);
         }
-        new[2][2] += lacking(new[2][2], noise) + (ht + ht + tt + noise);
-        for j in 3..6 {
-            new[2][j] += t[j - 2];
+        new[0][1] += along(&of_y, column(0)) + along(&of_x, y) + qxy;
+        for (i, moved, q) in [(0, x, -n[1]), (1, y, n[0])] {
+            new[i][2] = moved[0] + (turn_of(moved[1], moved[2], moved[3]) + q);
+            new[i][3..6].copy_from_slice(&moved[1..]);
         }
+        let [hc, hd, hw] = core::array::from_fn(|k| at(2, k + 3) + t[k]);
+        let growth = turn_of(at(2, 3) + hc, at(2, 4) + hd, at(2, 5) + hw);
+        new[2][2] += lacking(new[2][2], noise) + (growth + noise);
+        new[2][3..6].copy_from_slice(&[hc, hd, hw]);
         self.p = new;
         self.add_to_pose(0, position[0]);
         self.add_to_pose(1, position[1]);
@@ -271,6 +264,9 @@ impl SixStateFilter {
             self.x[i] += gain[i] * innovation;
         }
         self.each(|i, j, p| p - gain[i] * m[j]);
+        if dot(&m) <= 255.0 * noise {
+            return;
+        }
         let left_over = self.cross(h);
         let d: [f32; 6] = core::array::from_fn(|i| gain[i] * noise - left_over[i]);
         let half = 0.5 * dot(&d);

@@ -5,6 +5,7 @@
 
 #![no_std]
 
+use emulated_board::report;
 use sonarfix::aim::Aim;
 use sonarfix::config::Config;
 use sonarfix::localizer::{Localizer, Start, StartError};
@@ -77,5 +78,13 @@ pub fn travel(step: u32) -> WheelTravel {
         20..=35 => WheelTravel::new(0.02, -0.02),
         36..=44 => WheelTravel::new(0.018, 0.021),
         _ => WheelTravel::new(-0.01, -0.012),
+    }
+}
+
+/// Ends the program: with success if the drive was complete and nothing was refused.
+pub fn end(drive: Option<bool>) -> ! {
+    match drive {
+        Some(true) => report::done(),
+        _ => report::fail(c"the localizer refused something"),
     }
 }

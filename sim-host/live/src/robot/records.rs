@@ -52,6 +52,7 @@ pub fn tick(estimate: &Estimate, track: f64, odometry: Option<Pose>) -> Tick {
             },
             deviation: estimate.deviation.to_array().map(f64::from),
             covariance_xy: 0.0,
+            gyro: None,
             verdict: health.verdict,
             inflations: health.inflations,
         },
@@ -65,6 +66,7 @@ fn cycle(at: Instant, bearing: f64, geometry: &Geometry) -> FixRecord {
     let Geometry { mount: [ahead, left], pose: Pose { x, y, heading }, .. } = *geometry;
     let (sin, cos) = heading.sin_cos();
     FixRecord {
+        ranger: 0,
         time: seconds(at),
         wall: None,
         sonar: [x + ahead * cos - left * sin, y + ahead * sin + left * cos],
@@ -96,6 +98,7 @@ pub fn ping(ping: &Ping, geometry: &Geometry) -> FixRecord {
     };
     FixRecord {
         wall: usize::try_from(ping.aim.wall.0).ok(),
+        ranger: ping.aim.ranger.0,
         range: range(&ping.outcome),
         outcome,
         reason,

@@ -237,6 +237,9 @@ pub fn of_servo(servo: Servo, configuration: Option<ImageStatus>) -> Hint {
             "its PWM channel refuses the pulses: a program for another board, or limits too wide",
         ),
         Servo::Failing => Hint::wrong("without a configuration its pulses are not known"),
+        Servo::Commanded(ServoReading { micros, .. }) if micros <= 0.0 => {
+            Hint::good("the sonar has a fixed bearing and no servo")
+        }
         Servo::Commanded(ServoReading { bearing, .. }) => {
             Hint::attempt(match bearing.to_degrees() {
                 right if right < -5.0 => {

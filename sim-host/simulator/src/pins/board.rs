@@ -25,6 +25,20 @@ impl SonarBoard {
         self.edges.extend([(sent, true), (sent + pulse.max(1), false)]);
     }
 
+    /// When the line falls, µs, if it is high or will rise.
+    #[must_use]
+    pub fn falls_at(&self) -> Option<u64> {
+        self.edges.back().filter(|(_, is_high)| !is_high).map(|&(at, _)| at)
+    }
+
+    /// Lets the line fall at `at`, µs, if it falls later, and after it has risen.
+    pub fn ends_by(&mut self, at: u64) {
+        let rises = self.edges.front().filter(|(_, is_high)| *is_high).map_or(0, |&(at, _)| at);
+        if let Some((falls, false)) = self.edges.back_mut() {
+            *falls = (*falls).min(at.max(rises + 1));
+        }
+    }
+
     /// Time of the next edge, µs.
     #[must_use]
     pub fn next_edge(&self) -> Option<u64> {

@@ -1,16 +1,16 @@
 //! The devices of a scenario on the world's side of the wires. What the drivers know of them is the
 //! robot's configuration.
 
-use sonarfix::config::ServoTiming;
+use sonarfix::config::{ServoTiming, Sonar};
 use sonarfix::units::Duration;
-use sonarfix_hal::config::RobotConfig;
+use sonarfix_hal::config::{RangerConfig, RobotConfig};
 use sonarfix_hal::ranger::{PulseTiming, RangerKind};
 use sonarfix_hal::servo::MeasuredPulse;
 use sonarfix_map::robot_file::INSTANT_SERVO;
 use sonarfix_map::{Scenario, ServoName};
 use sonarfix_pil::wires::FULL_DUTY;
 
-use crate::plant::servo::ServoModel;
+use crate::plant::servo::{ServoModel, ServoPlant};
 use crate::world::air;
 
 /// Right and left wheel's travel from tick to tick, metres; negative where the encoder is mirrored.
@@ -29,12 +29,21 @@ pub fn servo_model(name: ServoName) -> ServoModel {
     }
 }
 
+/// The servo of a sonar, of this name; or the fixed mount, at the configured bearing.
+#[must_use]
+pub fn servo(sonar: &Sonar, name: ServoName) -> ServoPlant {
+    match sonar.fixed_bearing() {
+        None => ServoPlant::new(servo_model(name)),
+        Some(bearing) => ServoPlant::fixed(bearing.0.into()),
+    }
+}
+
 /// Where a duty sends the servo, radians: the simulated servo is as it was measured.
 #[must_use]
-pub fn bearing(duty: u16, robot: &RobotConfig) -> f64 {
-    let frame = micros(robot.localizer.sonar.timing.servo.frame);
+pub fn bearing(duty: u16, sonar: &Sonar, driver: &RangerConfig) -> f64 {
+    let frame = micros(sonar.timing.servo.frame);
     let pulse = f64::from(duty) / f64::from(FULL_DUTY) * frame;
-    let [one, other] = robot.servo_pulses;
+    let [one, other] = driver.servo_pulses;
     let (from, to) = (f64::from(one.bearing.0), f64::from(other.bearing.0));
     let (shorter, longer) = (micros(one.width), micros(other.width));
     from + (to - from) * (pulse - shorter) / (longer - shorter)
@@ -58,16 +67,18 @@ pub fn mount_servo(scenario: &mut Scenario, name: ServoName) {
     let (rightmost, leftmost) = robot.localizer.sonar.servo;
     let pulse = |width, bearing| MeasuredPulse { width: Duration::from_ticks(width), bearing };
     robot.localizer.sonar.timing.servo = timing;
-    robot.servo_pulses = [pulse(shortest, rightmost), pulse(longest, leftmost)];
+    robot.ranger.servo_pulses = [pulse(shortest, rightmost), pulse(longest, leftmost)];
 }
 
-/// How long the driver of the robot's sonar listens, µs. At the fidelity of pins there are rangers
+/// How long the driver of a sonar listens, µs. At the fidelity of pins there are rangers
 /// that answer with a pulse, and no others.
 #[must_use]
-pub fn listening_time(robot: &RobotConfig) -> u64 {
-    let timing = match robot.ranger.kind {
+pub fn listening_time(driver: &RangerConfig) -> u64 {
+    let timing = match driver.kind {
         RangerKind::Pulse(timing) => timing,
-        RangerKind::Srf { .. } | RangerKind::Custom => PulseTiming::HC_SR04,
+        RangerKind::Srf { .. } | RangerKind::Custom | RangerKind::Vl53l1x { .. } => {
+            PulseTiming::HC_SR04
+        }
     };
     timing.listen.to_micros()
 }

@@ -54,6 +54,12 @@ impl GyroChip {
         (self.turned, self.time) = (0.0, 0.0);
     }
 
+    /// The bias now, rad/s, as the robot sees it.
+    #[must_use]
+    pub fn bias(&self) -> f64 {
+        self.gyro.bias()
+    }
+
     /// The signal now.
     #[must_use]
     pub fn signal(&self) -> GyroSignal {

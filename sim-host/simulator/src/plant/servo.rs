@@ -82,6 +82,13 @@ impl ServoPlant {
         Self { model, turn: Turn { from: 0.0, to: 0.0, starts: 0.0, arrives: 0.0 } }
     }
 
+    /// A sonar at a fixed bearing.
+    #[must_use]
+    pub fn fixed(bearing: f64) -> Self {
+        let model = ServoModel::ideal();
+        Self { model, turn: Turn { from: bearing, to: bearing, starts: 0.0, arrives: 0.0 } }
+    }
+
     /// Commands a bearing; the motion takes `slowness` times the nominal time.
     pub fn send(&mut self, now: f64, bearing: f64, slowness: f64) {
         let ServoModel { frame, slew, dead_band, .. } = self.model;

@@ -62,9 +62,9 @@ pub fn run(
         let now = next_tick.min(next_fix);
         while run.absolute.next(run.now) < now {
             run.drive_plant_to(run.absolute.next(run.now));
-            run.take_absolutes()?;
+            run.take_absolutes(recorder)?;
         }
-        run.drive_to(now)?;
+        run.drive_to(now, recorder)?;
         if now == next_fix {
             run.take_fix(recorder)?;
             next_fix += fix_period;
@@ -114,7 +114,7 @@ impl<T: LocalizerInputs> Run<'_, T> {
         self.absolute.measure(now, &self.plant.pose(), absolute);
     }
 
-    fn drive_to(&mut self, now: u64) -> Result<(), SimulationError> {
+    fn drive_to(&mut self, now: u64, recorder: &mut impl Recorder) -> Result<(), SimulationError> {
         self.drive_plant_to(now);
         let time = seconds(now);
         let (travel, turned) = (std::mem::take(&mut self.rolled), std::mem::take(&mut self.turned));
@@ -131,14 +131,14 @@ impl<T: LocalizerInputs> Run<'_, T> {
         self.localizer
             .odometry(Instant::from_ticks(now), WheelTravel::new(right, left), turn)?
             .map_err(|error| SimulationError::Odometry { time, error })?;
-        self.take_absolutes()
+        self.take_absolutes(recorder)
     }
 
     /// Passes what has arrived and was measured up to the time of the localizer.
-    fn take_absolutes(&mut self) -> Result<(), SimulationError> {
+    fn take_absolutes(&mut self, recorder: &mut impl Recorder) -> Result<(), SimulationError> {
         while let Some((at, measurement)) = self.absolute.arrived(self.now, self.passed) {
             let fix = self.localizer.absolute(at, &measurement)?;
-            self.score.absolute(&measurement, &fix);
+            self.score.absolute(at, &measurement, &fix, recorder);
         }
         Ok(())
     }
@@ -162,7 +162,8 @@ impl<T: LocalizerInputs> Run<'_, T> {
                 return Ok(());
             }
         };
-        let echo = self.ping(sonar, truth.heading, &aim);
+        measurement.sonar = self.simulation.ranger_at(aim.ranger, &truth);
+        let echo = self.ping(measurement.sonar, truth.heading, &aim);
         measurement.range = echo.map(|echo| echo.range);
         measurement.source = echo.map(|echo| echo.source);
         #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
@@ -185,6 +186,7 @@ impl<T: LocalizerInputs> Run<'_, T> {
 
     fn end_tick(&mut self, recorder: &mut impl Recorder) -> Result<(), SimulationError> {
         let localizer = self.localizer.localizer()?;
+        self.score.biased(self.gyro.as_ref().map(Gyro::bias));
         self.score.tick(self.time(), localizer, &self.plant, recorder);
         if let Some(follower) = &mut self.follower {
             let command = follower.command(&observe::estimate(localizer).pose);

@@ -1,12 +1,13 @@
 //! A run through pins, drivers and the shipped loop, as a discrete-event simulation.
 
+use sonarfix::config::{MAX_RANGERS, RangerId};
 use sonarfix::localizer::{Localizer, Start};
 use sonarfix::navigator::Mode;
 use sonarfix::search::Search;
 use sonarfix::units::{Instant, Metres, Radians};
 use sonarfix_hal::robot::{PingResult, Report};
 use sonarfix_map::Scenario;
-use sonarfix_pil::{Actuators, GyroSignal, Sensors, Wires};
+use sonarfix_pil::{Actuators, EchoSignals, GyroSignal, Sensors, Wires};
 
 use super::computer::{Computer, Controller};
 use super::error::SimulationError;
@@ -15,20 +16,20 @@ use super::simulation::{Carried, PutDown, Simulation};
 use super::streams::RandomStreams;
 use crate::angle;
 use crate::observe::{self, Measurement};
-use crate::pins::board::{LATENCY, SonarBoard};
+use crate::pins::board::LATENCY;
 use crate::pins::devices;
 use crate::pins::disc::EncoderDisc;
 use crate::pins::faults::Faults;
 use crate::pins::gyro::GyroChip;
+use crate::pins::sonar::{SonarDevice, cross_talk};
 use crate::pins::wires::EncoderWires;
 use crate::plant::Plant;
 use crate::plant::absolute::Absolute;
 use crate::plant::follower::{Command, Follower};
-use crate::plant::servo::ServoPlant;
 use crate::statistics::RunResult;
 use crate::time::{micros, seconds};
 use crate::trace::Recorder;
-use crate::world::Ping;
+use crate::world::{Echo, Ping};
 
 /// Step of the simulated hardware while a ping is in flight, µs: by up to this much a ping without an echo ends later than on a
 /// board.
@@ -37,10 +38,6 @@ const LISTEN_STEP: u64 = 1_000;
 const SEARCH_POLL: u64 = 1_000;
 /// Length of the trigger pulse, µs: the driver's minimum.
 const TRIGGER: u64 = 10;
-/// By how much the pulse of a board without an echo exceeds the driver's timeout, µs: 38 ms in the
-/// HC-SR04's datasheet, 32 ms in the driver.
-const GIVES_UP_AFTER: u64 = 6_000;
-
 pub fn run(
     simulation: &Simulation,
     seed: u64,
@@ -71,19 +68,10 @@ struct SimulatedHardware<'a> {
     streams: RandomStreams,
     plant: Plant<'a>,
     discs: [EncoderDisc<'a>; 2],
-    servo: ServoPlant,
-    /// A commanded bearing that the servo has not started to move to.
-    ordered: Option<f64>,
+    sonars: Vec<SonarDevice<'a>>,
     faults: Faults,
-    board: SonarBoard,
-    /// Times of the rising and the falling edge of the echo line since the last poll.
-    edges: (Option<Instant>, Option<Instant>),
-    /// Whether the trigger of the sonar is high.
-    is_raised: bool,
     follower: Option<Follower>,
     score: Score<'a>,
-    /// Length of the board's pulse without an echo, µs.
-    silence: u64,
     /// When the search was recorded last, µs.
     search_recorded_at: u64,
     /// When the robot will be carried, and how far.
@@ -122,15 +110,10 @@ impl<'a> SimulatedHardware<'a> {
             streams,
             plant,
             discs: [EncoderDisc::new(right, right_tick), EncoderDisc::new(left, left_tick)],
-            servo: ServoPlant::new(devices::servo_model(scenario.hardware.servo)),
-            ordered: None,
+            sonars: SonarDevice::all(&scenario.robot, scenario.hardware.servo),
             faults: Faults::new(&scenario.faults, seed),
-            board: SonarBoard::default(),
-            edges: (None, None),
-            is_raised: false,
             follower: simulation.follower(),
             score,
-            silence: devices::listening_time(&scenario.robot) + GIVES_UP_AFTER,
             search_recorded_at: 0,
             carried: simulation.carried,
             put_down: &simulation.put_down,
@@ -164,7 +147,7 @@ impl<'a> SimulatedHardware<'a> {
                 }
             }
             let has_failed = self.read_fails();
-            if self.now < next_poll && self.edges == (None, None) && !has_arrived {
+            if self.now < next_poll && !self.has_edges() && !has_arrived {
                 recorder.polled(&Report::default(), controller.localizer()?);
                 let next = self.next_step(controller);
                 self.advance(next);
@@ -200,9 +183,16 @@ impl<'a> SimulatedHardware<'a> {
         let [right, left] = self.encoders;
         let [right, left] = [(right, failed[0]), (left, failed[1])]
             .map(|(wires, has_failed)| wires.counted(has_failed));
-        let (rose, fell) = std::mem::take(&mut self.edges);
         let gyro = self.gyro.as_ref().map_or_else(GyroSignal::default, GyroChip::signal);
-        Sensors { at: Instant::from_ticks(self.now), right, left, rose, fell, gyro }
+        for sonar in &mut self.sonars {
+            let is_dead = sonar.ranger == RangerId::FIRST && self.faults.sonar.is_dead(self.now);
+            sonar.read_bus(self.now, is_dead);
+        }
+        let mut echoes = [EchoSignals::default(); MAX_RANGERS];
+        for (signals, sonar) in echoes.iter_mut().zip(&mut self.sonars) {
+            *signals = sonar.take_signals();
+        }
+        Sensors { at: Instant::from_ticks(self.now), right, left, echoes, gyro }
     }
 
     fn time(&self) -> f64 {
@@ -232,17 +222,28 @@ impl<'a> SimulatedHardware<'a> {
         for ((disc, faults), metres) in encoders.zip(travel.measured) {
             disc.roll(metres, now, faults);
         }
-        let (rose, fell) = self.board.edges(now);
-        self.edges = (rose.or(self.edges.0), fell.or(self.edges.1));
-        self.turn_servo();
+        for sonar in &mut self.sonars {
+            sonar.collect_edges(now);
+        }
+        self.turn_servos();
+        for number in 0..self.sonars.len() {
+            self.collect_light(number);
+        }
     }
 
-    /// Moves the servo to the commanded bearing unless it is stuck.
-    fn turn_servo(&mut self) {
-        if let Some(slowness) = self.faults.controller.servo_slowness(self.now)
-            && let Some(bearing) = self.ordered.take()
-        {
-            self.servo.send(seconds(self.now), bearing, slowness);
+    /// Whether an echo line has had an edge since the last poll.
+    fn has_edges(&self) -> bool {
+        self.sonars.iter().any(SonarDevice::has_edges)
+    }
+
+    /// Moves the servos to the commanded bearings, the first unless it is stuck.
+    fn turn_servos(&mut self) {
+        let mut slowness = self.faults.controller.servo_slowness(self.now);
+        for sonar in &mut self.sonars {
+            if let Some(slowness) = slowness {
+                sonar.turn(self.now, slowness);
+            }
+            slowness = Some(1.0);
         }
     }
 
@@ -259,36 +260,74 @@ impl<'a> SimulatedHardware<'a> {
         };
         self.plant.steer(Command::default());
         self.measurement = None;
-        self.edges = (None, None);
+        self.sonars.iter_mut().for_each(SonarDevice::forget_edges);
         self.advance(back_at);
         (!robot.start.is_unknown()).then_some(start)
     }
 
     /// Applies the outputs of the loop.
     fn obey(&mut self, actuators: Actuators) {
-        if let Some(duty) = actuators.duty {
-            self.ordered = Some(devices::bearing(duty, &self.simulation.scenario.robot));
-            self.turn_servo();
-        }
-        self.is_raised = actuators.is_raised;
-        if actuators.has_fallen {
-            let undisturbed = self.ping();
-            let pulse = self.faults.sonar.pulse(self.now, undisturbed, self.silence);
-            if !self.faults.sonar.is_dead(self.now) {
-                self.board.answer(self.now, pulse);
-            }
+        let sonars = self.sonars.iter_mut().zip(actuators.rangers);
+        let pinging: Vec<usize> = sonars
+            .enumerate()
+            .filter_map(|(number, (sonar, actuators))| sonar.obey(actuators).then_some(number))
+            .collect();
+        self.turn_servos();
+        for number in pinging {
+            self.trigger(number);
         }
     }
 
-    /// Sends a ping; returns the length of its echo pulse, µs.
-    fn ping(&mut self) -> u64 {
+    /// Measures in the middle of the light of a time-of-flight ranger.
+    fn collect_light(&mut self, number: usize) {
+        let now = self.now;
+        let Some(sonar) = self.sonars.get_mut(number) else { return };
+        if !sonar.light.is_due(now) {
+            return;
+        }
+        let is_first = sonar.ranger == RangerId::FIRST;
+        let range = self.ping(number, 0).map(|echo| echo.range);
+        let is_lost = is_first && self.faults.sonar.pulse(now, 1, u64::MAX) == u64::MAX;
+        if let Some(sonar) = self.sonars.get_mut(number) {
+            sonar.light.measured(range.filter(|_| !is_lost));
+        }
+    }
+
+    /// Handles the trigger of a ranger. The faults of a sonar are those of the first.
+    fn trigger(&mut self, number: usize) {
+        let now = self.now;
+        let Some(sonar) = self.sonars.get_mut(number) else { return };
+        if self.simulation.sensor.light.is_some() {
+            sonar.light.start(now);
+            return;
+        }
+        let (ranger, silence) = (sonar.ranger, sonar.silence);
+        let speed_of_sound = self.simulation.world.speed_of_sound();
+        let flight = |echo: Echo| micros(2.0 * echo.range.max(0.0) / speed_of_sound);
+        let mut pulse = self.ping(number, LATENCY).map_or(silence, flight);
+        if ranger == RangerId::FIRST {
+            pulse = self.faults.sonar.pulse(now, pulse, silence);
+            if self.faults.sonar.is_dead(now) {
+                return;
+            }
+        }
+        let pulse = cross_talk(ranger, &mut self.sonars, self.now, pulse, speed_of_sound);
+        if let Some(sonar) = self.sonars.get_mut(number) {
+            sonar.answer(self.now, pulse);
+        }
+    }
+
+    /// Sends a ping so many µs from now.
+    fn ping(&mut self, number: usize, latency: u64) -> Option<Echo> {
         let Simulation { world, sensor, .. } = self.simulation;
-        let latency = seconds(LATENCY);
+        let device = self.sonars.get(number)?;
+        let latency = seconds(latency);
         let time = self.time() + latency;
         let pose = self.plant.pose_after(latency);
-        let sonar_after =
-            |after: f64| self.simulation.sonar_at(&self.plant.pose_after(latency + after));
-        let direction = angle::wrap(pose.heading + self.servo.bearing(time));
+        let sonar_after = |after: f64| {
+            self.simulation.ranger_at(device.ranger, &self.plant.pose_after(latency + after))
+        };
+        let direction = angle::wrap(pose.heading + device.bearing(time));
         let ping = Ping { time, sonar_after: &sonar_after, direction };
         let RandomStreams { ranges, echoes, .. } = &mut self.streams;
         let echo = world.echo(&ping, sensor, ranges, echoes);
@@ -299,8 +338,7 @@ impl<'a> SimulatedHardware<'a> {
             range: None,
             source: echo.map(|echo| echo.source),
         });
-        let flight = |range: f64| micros(2.0 * range.max(0.0) / world.speed_of_sound());
-        echo.map_or(self.silence, |echo| flight(echo.range))
+        echo
     }
 
     fn record(&mut self, report: &Report, localizer: &Localizer, recorder: &mut impl Recorder) {
@@ -309,12 +347,13 @@ impl<'a> SimulatedHardware<'a> {
             self.score.arrive(self.plant.state());
         }
         for result in report.absolutes() {
-            self.score.absolute(&result.measurement, &result.fix);
+            self.score.absolute(result.measured_at, &result.measurement, &result.fix, recorder);
         }
         if let Some(heard) = &report.ping_result {
             self.record_fix(heard, localizer, recorder);
         }
         if report.tick.is_some() {
+            self.score.biased(self.gyro.as_ref().map(GyroChip::bias));
             self.score.tick(self.time(), localizer, &self.plant, recorder);
             self.steer(localizer);
         }
@@ -387,10 +426,11 @@ impl<'a> SimulatedHardware<'a> {
     fn next_step(&mut self, controller: &mut impl Controller) -> u64 {
         let at = match controller.idle_until() {
             Some(idle_until) => idle_until.ticks(),
-            None if self.is_raised => self.now + TRIGGER,
+            None if self.sonars.iter().any(|sonar| sonar.is_raised) => self.now + TRIGGER,
             None => {
-                let edge = self.board.next_edge().unwrap_or(u64::MAX);
-                edge.min(self.now + LISTEN_STEP)
+                let next = |sonar: &SonarDevice| sonar.next_event(self.now);
+                let event = self.sonars.iter().filter_map(next).min().unwrap_or(u64::MAX);
+                event.min(self.now + LISTEN_STEP)
             }
         };
         let at = match self.mode {

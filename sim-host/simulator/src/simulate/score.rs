@@ -2,6 +2,7 @@
 
 use sonarfix::absolute::AbsoluteMeasurement;
 use sonarfix::aim::Aim;
+use sonarfix::config::RangerId;
 use sonarfix::localizer::{AbsoluteFix, Fix, Localizer, Start};
 use sonarfix::units::Instant;
 use sonarfix_hal::robot::Faults;
@@ -17,7 +18,7 @@ use crate::odometry::DeadReckoning;
 use crate::plant::{Plant, Travel};
 use crate::statistics::{NisSum, RunResult};
 use crate::time::seconds;
-use crate::trace::{Pose, Recorder, Tick};
+use crate::trace::{Pose, Recorder, Tick, Truth};
 
 /// Accumulates the result of a run.
 pub struct Score<'a> {
@@ -26,6 +27,8 @@ pub struct Score<'a> {
     bound: Bound,
     /// Travel since the bound was last updated.
     rolled: Travel,
+    /// True bias of the gyro, rad/s.
+    gyro_bias: Option<f64>,
     /// Time of the last tick, seconds.
     last_tick: f64,
     result: RunResult,
@@ -38,7 +41,7 @@ impl<'a> Score<'a> {
         start: Option<Start>,
         truth: Vector,
     ) -> Result<Self, SimulationError> {
-        let model = simulation.model;
+        let model = simulation.model_of(RangerId::FIRST);
         let is_known = start.is_some();
         let localizer =
             simulation.localizer(start.unwrap_or_else(no_pose), Instant::from_ticks(0))?;
@@ -57,10 +60,16 @@ impl<'a> Score<'a> {
             odometry: DeadReckoning::new(start, model.track_width),
             bound: Bound::new(model, gyro, truth, &deviation),
             rolled: Travel::default(),
+            gyro_bias: None,
             last_tick: 0.0,
             result: RunResult::default(),
             nis: NisSum::default(),
         })
+    }
+
+    /// Takes the true bias of the gyro, rad/s, for the records from now on.
+    pub fn biased(&mut self, gyro_bias: Option<f64>) {
+        self.gyro_bias = gyro_bias;
     }
 
     /// Adds wheel travel.
@@ -91,8 +100,9 @@ impl<'a> Score<'a> {
                     self.nis.add(innovation.nis().into());
                 }
                 let wall = usize::try_from(aim.wall.0).ok();
+                self.bound.measures_by(self.simulation.model_of(aim.ranger));
                 if let Some(line) = wall.and_then(|wall| self.simulation.lines.get(wall)) {
-                    self.bound.fixed(line);
+                    self.bound.fixed(line, aim.bearing.0.into());
                 }
             }
             Fix::Gated(_) => counts.gated += 1,
@@ -100,8 +110,15 @@ impl<'a> Score<'a> {
         }
     }
 
-    /// Adds the outcome of a heading, position or pose from outside.
-    pub fn absolute(&mut self, measurement: &AbsoluteMeasurement, fix: &AbsoluteFix) {
+    /// Adds the outcome of a heading, position or pose from outside, and records it.
+    pub fn absolute(
+        &mut self,
+        measured_at: Instant,
+        measurement: &AbsoluteMeasurement,
+        fix: &AbsoluteFix,
+        recorder: &mut impl Recorder,
+    ) {
+        recorder.absolute(|| observe::absolute_record(measured_at, measurement, fix));
         self.result.absolute.count(fix);
         if fix.is_used() {
             self.bound.measured(measurement);
@@ -129,7 +146,7 @@ impl<'a> Score<'a> {
     fn record(&self, time: f64, localizer: &Localizer, plant: &Plant) -> Tick {
         Tick {
             time,
-            truth: Some(plant.truth()),
+            truth: Some(Truth { gyro_bias: self.gyro_bias, ..plant.truth() }),
             estimate: observe::estimate(localizer),
             bound: Some(self.bound.standard_deviations().into()),
             odometry: self.odometry.pose(),

@@ -1,7 +1,7 @@
 //! A scenario, prepared to be run.
 
 use rand_chacha::ChaCha8Rng;
-use sonarfix::config::{Config, PingSchedule, PingTiming};
+use sonarfix::config::{Config, PingSchedule, PingTiming, RangerId, Ranging, Sonar};
 use sonarfix::localizer::{Localizer, Start};
 use sonarfix::map::{Map, Wall};
 use sonarfix::pose::Pose;
@@ -41,7 +41,8 @@ pub struct Simulation {
     pub(super) sensor: SensorModel,
     /// Scale error of the ranger, including that of the speed of sound.
     pub(super) range_scale: f64,
-    pub(super) model: Model,
+    /// The filter's model with each ranger.
+    pub(super) models: Vec<Model>,
     /// When the run ends, microseconds.
     end: u64,
     /// When the robot is carried along its path, and how far.
@@ -80,7 +81,10 @@ impl Simulation {
             .with_obstacles(around.obstacles.iter().map(obstacle).collect())
             .at_temperature(around.temperature);
         let assumed = air::speed_of_sound(scenario.robot.ranger.temperature.0.into());
-        let stretch = assumed / world.speed_of_sound();
+        let stretch = match scenario.robot.localizer.sonar.ranging {
+            Ranging::Sound => assumed / world.speed_of_sound(),
+            Ranging::Light(_) => 1.0,
+        };
         let walls = scenario.floor.walls();
         Self {
             stamp: Stamp::Reflection,
@@ -92,7 +96,7 @@ impl Simulation {
             sensor: sensor(&scenario),
             // (1 + scale) · stretch − 1, arranged so that a stretch of one changes no bit.
             range_scale: scenario.truth.range_scale * stretch + (stretch - 1.0),
-            model: Model::of(&scenario.robot.localizer),
+            models: models(&scenario.robot.localizer),
             end: micros(scenario.path.duration()),
             carried: None,
             put_down: Vec::new(),
@@ -224,7 +228,10 @@ impl Simulation {
     #[must_use]
     pub fn config(&self) -> Config {
         let mut config = self.assumed.unwrap_or(self.scenario.robot).localizer;
-        config.sonar.timing = self.timing();
+        config.sonar.timing = self.timing(&config.sonar);
+        for sonar in config.further_sonars.iter_mut() {
+            sonar.timing = self.timing(sonar);
+        }
         config
     }
 
@@ -235,9 +242,9 @@ impl Simulation {
     }
 
     /// The measurement timing: at the ideal fidelity there is no servo.
-    fn timing(&self) -> PingTiming {
+    fn timing(&self, sonar: &Sonar) -> PingTiming {
         match self.scenario.fidelity {
-            Fidelity::Pins => self.scenario.robot.localizer.sonar.timing,
+            Fidelity::Pins => sonar.timing,
             Fidelity::Ideal => PingTiming {
                 schedule: PingSchedule::Every(self.ideal_period()),
                 ..PingTiming::EVERY_SECOND
@@ -267,13 +274,29 @@ impl Simulation {
         }
     }
 
-    /// Position of the sonar on a robot at a pose.
+    /// Position of the first sonar on a robot at a pose.
     #[must_use]
     pub fn sonar_at(&self, pose: &trace::Pose) -> Point {
-        let mount = self.model.mount;
+        self.ranger_at(RangerId::FIRST, pose)
+    }
+
+    /// The filter's model with a ranger of the robot; with the first, if it has no such one.
+    pub(super) fn model_of(&self, ranger: RangerId) -> Model {
+        let model = self.models.get(ranger.index()).or(self.models.first());
+        model.copied().unwrap_or_else(|| Model::of(&self.scenario.robot.localizer))
+    }
+
+    /// Position of a ranger on a robot at a pose.
+    #[must_use]
+    pub fn ranger_at(&self, ranger: RangerId, pose: &trace::Pose) -> Point {
+        let mount = self.model_of(ranger).mount;
         let (sin, cos) = libm::sincos(pose.heading);
         [pose.x + cos * mount[0] - sin * mount[1], pose.y + sin * mount[0] + cos * mount[1]]
     }
+}
+
+fn models(config: &Config) -> Vec<Model> {
+    config.sonars().map(|(_, sonar)| Model::of_ranger(config, sonar)).collect()
 }
 
 fn sensor(scenario: &Scenario) -> SensorModel {
@@ -284,6 +307,7 @@ fn sensor(scenario: &Scenario) -> SensorModel {
         SonarName::LvMaxSonar => SensorModel::lv_maxsonar(),
         SonarName::Srf08 => SensorModel::srf08(),
         SonarName::Polaroid6500 => SensorModel::polaroid_6500(),
+        SonarName::Vl53l1x => SensorModel::vl53l1x(),
     };
     SensorModel { scale: scenario.truth.range_scale, ..model }
 }

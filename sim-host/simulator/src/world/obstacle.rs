@@ -71,6 +71,27 @@ impl Outline {
         }
     }
 
+    /// Where a ray meets it first: the distance, and the cosine of the incidence.
+    #[must_use]
+    pub fn met(&self, from: Point, direction: f64) -> Option<(f64, f64)> {
+        match self {
+            Self::Circle { centre, radius } => {
+                let (sin, cos) = libm::sincos(direction);
+                let (dx, dy) = (centre[0] - from[0], centre[1] - from[1]);
+                let (ahead, aside) = (cos * dx + sin * dy, cos * dy - sin * dx);
+                let half_chord = libm::sqrt(radius * radius - aside * aside);
+                // False for a ray beside it, whose chord is NaN, and for one that begins inside or behind.
+                let distance = ahead - half_chord;
+                (distance > 0.0).then_some((distance, half_chord / radius))
+            }
+            Self::Face(face) => {
+                let hit = face.hit(from, direction)?;
+                let incidence = direction - face.normal_towards(from);
+                Some((distance(from, hit), libm::cos(incidence)))
+            }
+        }
+    }
+
     /// Whether it blocks the line between two points.
     #[must_use]
     pub fn blocks(&self, from: Point, to: Point) -> bool {

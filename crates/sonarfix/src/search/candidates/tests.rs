@@ -304,3 +304,20 @@ proptest! {
         prop_assert_eq!(found.next(), None);
     }
 }
+
+/// Each side of a wall has at most as many steps as a number of 16 bits can count.
+#[test]
+fn a_wall_of_many_steps_is_left() {
+    let walls = [Wall::new(Point::new(0.0, 0.0), Point::new(1e6, 0.0)).unwrap()];
+    let line = Line { normal: Vector::new(0.0, 1.0), offset: 1.0, stretch: (0.0, 1.0), support: 5 };
+    let (map, mut along) = (Map::new(&walls), AlongWalls::default());
+    let mut found = 0_u32;
+    loop {
+        match along.next(&map, &line, Bend::NONE) {
+            Generated::Candidate(_) => found += 1,
+            Generated::Nothing => {}
+            Generated::Done => break,
+        }
+    }
+    assert_eq!(found, 2 * u32::from(u16::MAX));
+}

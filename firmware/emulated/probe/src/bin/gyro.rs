@@ -4,7 +4,7 @@
 
 use emulated_board::meter::{Cost, Meter};
 use emulated_board::report;
-use emulated_probe::{Robot, STEPS, STEPS_A_RANGE, room, travel};
+use emulated_probe::{Robot, STEPS, STEPS_A_RANGE, end, room, travel};
 use sonarfix::config::Config;
 use sonarfix::gyro::{GyroParameters, MeasuredTurn, TurnIntegral};
 use sonarfix::motion::WheelTravel;
@@ -35,10 +35,7 @@ extern "C" fn probe_turn_fix(robot: &mut Robot, range: &Metres) {
 
 #[emulated_board::entry]
 fn main() -> ! {
-    match drive() {
-        Some(true) => report::done(),
-        _ => report::fail(c"the localizer refused something"),
-    }
+    end(drive())
 }
 
 fn drive() -> Option<bool> {

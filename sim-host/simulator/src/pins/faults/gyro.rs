@@ -12,13 +12,18 @@ use super::timed::Timed;
 pub(super) enum Wrong {
     Stuck,
     Saturated,
+    Garbled(f64),
     Unreadable(f64),
 }
+
+/// The end of the smallest range of an MPU-6050, 250°/s, in millionths of a radian per second.
+const RANGE: i32 = 4_363_323;
 
 pub(super) fn of(kind: FaultKind) -> Option<Wrong> {
     match kind {
         FaultKind::StuckGyro => Some(Wrong::Stuck),
         FaultKind::SaturatedGyro => Some(Wrong::Saturated),
+        FaultKind::GarbledGyro(share) => Some(Wrong::Garbled(share)),
         FaultKind::GyroReadErrors(share) => Some(Wrong::Unreadable(share)),
         _ => None,
     }
@@ -43,6 +48,11 @@ impl GyroFaults {
             match fault.what {
                 Wrong::Stuck => seen.micros = last.micros,
                 Wrong::Saturated => seen.micros = i32::MAX,
+                Wrong::Garbled(share) => {
+                    if self.rng.random::<f64>() < share {
+                        seen.micros = self.rng.random_range(-RANGE..RANGE);
+                    }
+                }
                 Wrong::Unreadable(share) => {
                     seen.has_failed |= self.rng.random::<f64>() < share;
                 }

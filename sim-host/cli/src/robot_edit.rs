@@ -1,14 +1,17 @@
-//! Writes a calibration into the text of a robot file and keeps its comments.
+//! Writes what was measured into the text of a robot file and keeps its comments.
 
 use anyhow::Context;
 use sonarfix_batch::calibrate::{Calibration, Determined};
 use sonarfix_batch::constants::Name;
 use sonarfix_hal::config::RobotConfig;
-use toml_edit::{DocumentMut, Item, Table, Value};
+use toml_edit::{DocumentMut, Item, Table, TableLike, Value};
+
+use crate::measure::wheel::Turned;
+use sonarfix_batch::bearings::Bearings;
 
 /// The robot file with the calibration: wheels, track width and mount; the bearings of the servo's pulses and the
 /// temperature if they are determined; and the deviations of the prior.
-pub fn edited(text: &str, robot: &RobotConfig, found: &Calibration) -> anyhow::Result<String> {
+pub fn calibrated(text: &str, robot: &RobotConfig, found: &Calibration) -> anyhow::Result<String> {
     let mut document: DocumentMut = text.parse().context("the robot file is not TOML")?;
     let constants = &found.constants;
     let is_known = |name: Name| {
@@ -33,7 +36,7 @@ pub fn edited(text: &str, robot: &RobotConfig, found: &Calibration) -> anyhow::R
         replace(sonar, "mount", Value::Array(mount.into_iter().collect()));
     }
     if found.bearings.is_some() {
-        pulses(sonar, robot, found)?;
+        pulses(sonar, robot, |bearing| found.constants.bearing(bearing))?;
     }
     if is_known(Name::RangeScale) && sonar.contains_key("temperature") {
         let celsius = f64::from(robot.ranger.temperature.0);
@@ -93,13 +96,64 @@ fn wheel(drive: &mut Table, key: &str, scale: f64) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The bearings of the servo's two measured pulses.
-fn pulses(sonar: &mut Table, robot: &RobotConfig, found: &Calibration) -> anyhow::Result<()> {
+/// The robot file with what was measured on the bench: the wheels, right and left, and the servo.
+pub fn measured(
+    text: &str,
+    robot: &RobotConfig,
+    wheels: &[Turned; 2],
+    servo: Option<&Bearings>,
+) -> anyhow::Result<String> {
+    let mut document: DocumentMut = text.parse().context("the robot file is not TOML")?;
+    let drive = table(&mut document, "drive")?;
+    for (key, turned) in ["right_wheel", "left_wheel"].into_iter().zip(wheels) {
+        let wheel = drive.get_mut(key).and_then(Item::as_table_like_mut);
+        turn(wheel.with_context(|| format!("the robot file has no table {key}"))?, turned);
+        if let Some(inline) = drive.get_mut(key).and_then(Item::as_inline_table_mut) {
+            inline.fmt();
+        }
+    }
+    if let Some(servo) = servo {
+        let sonar = table(&mut document, "sonar")?;
+        pulses(sonar, robot, |bearing| servo.offset + servo.scale * bearing)?;
+    }
+    Ok(document.to_string())
+}
+
+/// Direction and edges per revolution of a wheel. A number that agrees with the file's is less exact than that.
+fn turn(wheel: &mut dyn TableLike, turned: &Turned) {
+    if turned.is_mirrored() {
+        wheel.insert("mirrored", Item::Value(Value::from(true)));
+    } else {
+        wheel.remove("mirrored");
+    }
+    let edges = wheel.get("edges_per_revolution").and_then(number);
+    if edges.is_some_and(|edges| !turned.agrees_with(edges)) {
+        let edges = Value::from(turned.edges_per_revolution().round());
+        wheel.insert("edges_per_revolution", Item::Value(edges));
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "edges of a revolution")]
+fn number(item: &Item) -> Option<f64> {
+    item.as_float().or_else(|| item.as_integer().map(|integer| integer as f64))
+}
+
+/// The bearings of the servo's two measured pulses, or the bearing of a sonar without a servo; `truth` is that of a bearing of the robot file, both in radians.
+fn pulses(
+    sonar: &mut Table,
+    robot: &RobotConfig,
+    truth: impl Fn(f64) -> f64,
+) -> anyhow::Result<()> {
+    if let Some(bearing) = robot.localizer.sonar.fixed_bearing() {
+        let bearing = truth(bearing.0.into()).to_degrees();
+        set(sonar, "bearing", format!("{bearing:.2} deg"));
+        return Ok(());
+    }
     let pulses = sonar.get_mut("servo_pulses").and_then(Item::as_array_mut);
     let pulses = pulses.context("the robot file has no servo_pulses")?;
-    for (pulse, measured) in pulses.iter_mut().zip(robot.servo_pulses) {
+    for (pulse, measured) in pulses.iter_mut().zip(robot.ranger.servo_pulses) {
         let pulse = pulse.as_inline_table_mut().context("servo_pulses must be tables")?;
-        let bearing = found.constants.bearing(measured.bearing.0.into()).to_degrees();
+        let bearing = truth(measured.bearing.0.into()).to_degrees();
         if let Some(value) = pulse.get_mut("bearing") {
             let decor = value.decor().clone();
             *value = Value::from(format!("{bearing:.2} deg"));

@@ -1,0 +1,223 @@
+//! What the longest poll of the loop costs, by part, and the fix of the localizer.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::Command;
+
+use anyhow::Context;
+
+use crate::cargo;
+use crate::elf::Program;
+use crate::profile::{self, LOGGED, Pipe, Profile};
+use crate::program::{M0PLUS, M4F, Target};
+use crate::workspace::Workspace;
+
+/// What is profiled.
+#[derive(Debug, Clone, PartialEq, Eq, clap::Args)]
+pub struct Args {
+    /// The worst fix of the probe on the Cortex-M0+ instead of the worst poll.
+    #[arg(long)]
+    fix: bool,
+    /// The Cortex-M0+ for the poll.
+    #[arg(long)]
+    m0plus: bool,
+    /// Every function instead of the parts.
+    #[arg(long)]
+    tree: bool,
+    /// The most expensive call of another function than a poll.
+    #[arg(long, default_value = POLL)]
+    function: String,
+    /// Calls in which this function is called do not count.
+    #[arg(long)]
+    without: Option<String>,
+    /// Simulated seconds of `classroom`.
+    #[arg(long, default_value_t = 60)]
+    seconds: u32,
+}
+
+/// A poll of the application.
+const POLL: &str = "sonarfix_app::app::App<F>::poll";
+/// What executes a command: the polls that start the loop.
+const START: &str = "sonarfix_app::app::command::<impl sonarfix_app::app::App<F>>::answer";
+
+/// Parts by the beginning of a function's path, the first that matches. What matches none (library routines, sine and cosine)
+/// belongs to its caller.
+const PARTS: [(&str, &str); 24] = [
+    ("sonarfix::ekf::prediction", "odometry: state and accumulated motion"),
+    ("sonarfix::covariance::propagation", "P on demand"),
+    ("sonarfix::accumulated", "P on demand"),
+    ("sonarfix::covariance", "correction"),
+    ("sonarfix::ekf::Ekf::predict_measurement", "gate: innovation"),
+    ("sonarfix::ekf::Ekf::innovation", "gate: innovation"),
+    ("sonarfix::ekf", "correction"),
+    ("sonarfix::visibility", "expected range and its visibility"),
+    ("sonarfix::range", "expected range and its visibility"),
+    ("sonarfix::map", "expected range and its visibility"),
+    ("sonarfix::echo", "echo model: association and evidence"),
+    ("sonarfix::alternatives", "other reflectors"),
+    ("sonarfix::reflector", "other reflectors"),
+    ("sonarfix::aim", "choice of the wall"),
+    ("sonarfix::health", "health"),
+    ("sonarfix::search", "search"),
+    ("sonarfix::", "localizer: the rest"),
+    ("sonarfix_hal::ranger", "drivers"),
+    ("sonarfix_hal::servo", "drivers"),
+    ("sonarfix_hal::encoder", "drivers"),
+    ("sonarfix_hal", "loop"),
+    ("sonarfix_link::", "telemetry"),
+    ("sonarfix_app::app::wire", "telemetry"),
+    ("sonarfix_app", "application"),
+];
+
+pub fn run(args: &Args) -> anyhow::Result<()> {
+    let profile =
+        if args.fix { probe(&M0PLUS, "localizer", "probe_fix")? } else { worst_poll(args)? };
+    if args.tree {
+        print_tree(&profile);
+    } else {
+        print_parts(&profile);
+    }
+    Ok(())
+}
+
+/// The most expensive call of a function of a probe.
+fn probe(target: &Target, name: &str, root: &str) -> anyhow::Result<Profile> {
+    target.build(Workspace::Emulated, "emulated-probe")?;
+    let path = target.program(Workspace::Emulated, name);
+    let program = Program::read(&path)?;
+    let pipe = Pipe::create("probe.pipe")?;
+    let mut qemu = Command::new("qemu-system-arm");
+    qemu.args(["-machine", target.board, "-icount", "shift=7", "-display", "none"]);
+    qemu.args(["-monitor", "none", "-serial", "none"]);
+    qemu.args(["-semihosting-config", "enable=on,target=native", "-kernel"]).arg(&path);
+    qemu.args(LOGGED).arg(pipe.path());
+    profiled(qemu, &pipe, &program, root, &[])
+}
+
+/// The worst poll of `classroom`, without those that start the loop.
+fn worst_poll(args: &Args) -> anyhow::Result<Profile> {
+    let Args { m0plus, seconds, function, without, .. } = args;
+    let machine = if *m0plus { "m0plus" } else { "m4f" };
+    let triple = if machine == "m4f" { M4F.triple } else { M0PLUS.triple };
+    let folder = Workspace::Emulated.target_folder().join(triple).join("small");
+    let build = format!("build --package emulated-pil --bins --target {triple} --profile small");
+    cargo::check(Workspace::Emulated.cargo(&build))?;
+    let path = folder.join("pil");
+    let program = Program::read(&path)?;
+    let pipe = Pipe::create("poll.pipe")?;
+    // `sonarfix pil` starts the emulator that is found first: a script that adds the log.
+    let scripts = cargo::target_folder().join("logged");
+    std::fs::create_dir_all(&scripts)?;
+    let real = cargo::output({
+        let mut which = Command::new("which");
+        which.arg("qemu-system-arm");
+        which
+    })?;
+    let script = scripts.join("qemu-system-arm");
+    let (options, log) = (LOGGED.join(" "), pipe.path().display());
+    std::fs::write(&script, format!("#!/bin/sh\nexec {} \"$@\" {options} {log}\n", real.trim()))?;
+    executable(&script)?;
+    let run = format!(
+        "run --quiet --bin sonarfix -- pil crates/sonarfix-map/scenarios/classroom.toml --seconds {seconds} \
+         --machine {machine}"
+    );
+    let mut pil = cargo::command(&run);
+    pil.arg("--firmware").arg(&path);
+    let known = std::env::var("PATH").unwrap_or_default();
+    pil.env("PATH", format!("{}:{known}", scripts.display()));
+    let skipped: Vec<&str> = [START].into_iter().chain(without.as_deref()).collect();
+    let profile = profiled(pil, &pipe, &program, function, &skipped);
+    std::fs::remove_file(&script)?;
+    profile
+}
+
+#[cfg(unix)]
+fn executable(script: &Path) -> anyhow::Result<()> {
+    use std::os::unix::fs::PermissionsExt as _;
+    Ok(std::fs::set_permissions(script, std::fs::Permissions::from_mode(0o755))?)
+}
+
+#[cfg(not(unix))]
+fn executable(_: &Path) -> anyhow::Result<()> {
+    anyhow::bail!("the log of the emulator needs a named pipe")
+}
+
+fn profiled(
+    mut command: Command,
+    pipe: &Pipe,
+    program: &Program,
+    root: &str,
+    skipped: &[&str],
+) -> anyhow::Result<Profile> {
+    command.stdout(std::process::Stdio::null());
+    let mut child = command.spawn().context("cannot start the emulator")?;
+    let profile = profile::most_expensive(pipe.path(), program, root, skipped);
+    child.wait()?;
+    profile
+}
+
+fn part_of<'n>(mut stack: impl Iterator<Item = &'n str>) -> &'static str {
+    let part = |name: &str| {
+        // `<sonarfix::… as …>::…` and `sonarfix::…::<impl …>::…`.
+        let path = name.trim_start_matches('<');
+        PARTS.iter().find(|(prefix, _)| path.starts_with(prefix)).map(|(_, part)| *part)
+    };
+    stack.find_map(part).unwrap_or("the rest")
+}
+
+fn print_parts(profile: &Profile) {
+    let mut parts: BTreeMap<&str, u64> = BTreeMap::new();
+    for (at, node) in profile.nodes.iter().enumerate() {
+        *parts.entry(part_of(profile.stack(at))).or_default() += node.own;
+    }
+    let all = profile.instructions();
+    let mut parts: Vec<_> = parts.into_iter().collect();
+    parts.sort_by_key(|&(_, instructions)| std::cmp::Reverse(instructions));
+    println!("| part | instructions | % |\n|---|---:|---:|");
+    for (part, instructions) in parts {
+        println!("| {part} | {instructions} | {} |", (100 * instructions + all / 2) / all);
+    }
+    println!("| all | {all} | 100 |");
+    print_routines(profile);
+}
+
+/// The routines that compute in floating point where the core cannot: how often they are called, and what a call takes.
+fn print_routines(profile: &Profile) {
+    let mut routines: BTreeMap<&str, (u64, u64)> = BTreeMap::new();
+    for (at, node) in profile.nodes.iter().enumerate() {
+        let name = profile.stack(at).next().unwrap_or_default();
+        if name.starts_with("__aeabi_f") {
+            let (calls, instructions) = routines.entry(name).or_default();
+            *calls += node.calls;
+            *instructions += profile.inclusive(at);
+        }
+    }
+    if routines.is_empty() {
+        return;
+    }
+    println!("\n| routine | calls | instructions of a call | together |\n|---|---:|---:|---:|");
+    for (name, (calls, instructions)) in routines {
+        let mean = instructions.checked_div(calls).unwrap_or_default();
+        println!("| {name} | {calls} | {mean} | {instructions} |");
+    }
+}
+
+fn print_tree(profile: &Profile) {
+    let all = profile.instructions();
+    print_node(profile, 0, 0, all / 400);
+}
+
+/// Prints a function with its instructions, its own instructions and its calls, and the functions that it calls.
+fn print_node(profile: &Profile, at: usize, depth: usize, least: u64) {
+    let Some(node) = profile.nodes.get(at) else { return };
+    let name = profile.stack(at).next().unwrap_or_default();
+    let indent = "  ".repeat(depth);
+    println!("{:7} {:7} {:5} {indent}{name}", profile.inclusive(at), node.own, node.calls);
+    let mut called: Vec<(u64, usize)> =
+        profile.called(at).map(|called| (profile.inclusive(called), called)).collect();
+    called.retain(|&(instructions, _)| instructions >= least);
+    called.sort_unstable_by_key(|&(instructions, _)| std::cmp::Reverse(instructions));
+    for (_, called) in called {
+        print_node(profile, called, depth + 1, least);
+    }
+}
