@@ -222,7 +222,6 @@ proptest! {
         let walls = room.walls();
         let localizer = localizer(&walls, room.start(), mount);
         let Ok(aim) = localizer.aim() else { return Err(TestCaseError::reject("no wall")) };
-        let config = localizer.config();
         let behind = sonarfix::aim::Aim { bearing: aim.bearing + Radians(2.5), ..aim };
         let cases = [
             (aim, None, Refusal::NoEcho),
