@@ -1,18 +1,21 @@
 //! The simulated pins of a robot's devices.
 
+mod bus;
 mod light;
 
 use core::cell::Cell;
 use core::convert::Infallible;
 
 use embedded_hal::digital::{self, OutputPin};
-use embedded_hal::i2c::{self, ErrorKind, I2c, NoAcknowledgeSource, Operation};
+use embedded_hal::i2c::{self, ErrorKind, I2c, Operation};
 use embedded_hal::pwm::{self, SetDutyCycle};
 use serde::{Deserialize, Serialize};
 use sonarfix::config::MAX_RANGERS;
 use sonarfix::units::Instant;
 use sonarfix_hal::encoder::Counter;
 use sonarfix_hal::ranger::EchoCapture;
+
+use self::bus::transact;
 
 /// The sensors' signals up to a poll.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -201,25 +204,6 @@ impl OutputPin for &TriggerWire {
         self.is_raised.set(true);
         Ok(())
     }
-}
-
-/// A transaction with a device on a bus: `take` gets what is written, `next` returns each byte that is read.
-fn transact(
-    has_failed: bool,
-    operations: &mut [Operation<'_>],
-    take: impl Fn(&[u8]),
-    next: impl Fn() -> u8,
-) -> Result<(), ErrorKind> {
-    if has_failed {
-        return Err(ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address));
-    }
-    for operation in operations {
-        match operation {
-            Operation::Write(bytes) => take(bytes),
-            Operation::Read(bytes) => bytes.iter_mut().for_each(|byte| *byte = next()),
-        }
-    }
-    Ok(())
 }
 
 /// An MPU-6050 on a bus of its own: its identity, its range, and the rate of its z axis.

@@ -5,7 +5,7 @@ use core::cell::Cell;
 use embedded_hal::i2c::{self, ErrorKind, I2c, Operation};
 use serde::{Deserialize, Serialize};
 
-use super::transact;
+use super::bus::transact;
 
 /// What a time-of-flight ranger reports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
