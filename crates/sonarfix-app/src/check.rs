@@ -40,6 +40,8 @@ const CHECKS_PER_BEARING: u8 = 8;
 pub struct Check {
     state: State,
     has_servo_failed: bool,
+    /// Since when the ranger refuses a trigger as too soon.
+    refused: Option<Instant>,
     /// The result of the last ping.
     ping: Option<Outcome>,
     /// The last ping at a bearing that was asked for.
@@ -70,7 +72,14 @@ impl Check {
     #[must_use]
     pub fn new(now: Instant) -> Self {
         let state = State::Resting { until: now };
-        Self { state, has_servo_failed: false, ping: None, pinged: None, shown: None }
+        Self {
+            state,
+            has_servo_failed: false,
+            refused: None,
+            ping: None,
+            pinged: None,
+            shown: None,
+        }
     }
 
     /// Shows the readings for a minute from `now` on, with the servo at `bearing`, which it can reach, or in turn ahead and at its
@@ -173,10 +182,16 @@ impl Check {
 
     fn trigger(&mut self, now: Instant, hardware: &mut impl Hardware, faults: &mut Faults) {
         match hardware.ranger().trigger(now) {
-            Ok(()) => self.state = State::Pinging { since: now },
-            // The echoes of the loop's last ping have not decayed.
-            Err(TriggerError::TooSoon) => {
-                self.state = State::Resting { until: after(now, TIMEOUT) }
+            Ok(()) => {
+                self.refused = None;
+                self.state = State::Pinging { since: now };
+            }
+            // The echoes of the loop's last ping have not decayed, or the ranger is being set up.
+            Err(TriggerError::TooSoon)
+                if now < after(*self.refused.get_or_insert(now), TIMEOUT) =>
+            {
+                let until = after(now, PACE).max(hardware.ranger().ready_at());
+                self.state = State::Resting { until };
             }
             Err(_) => self.end(now, Err(NoEcho::Failed), faults),
         }
@@ -202,6 +217,7 @@ impl Check {
 
     fn end(&mut self, now: Instant, outcome: Outcome, faults: &mut Faults) {
         faults.ranger = u32::from(outcome.is_err_and(NoEcho::is_fault));
+        self.refused = None;
         self.ping = Some(outcome);
         let period = match self.shown {
             Some(Shown { bearing: Some(_), .. }) => POINTED_PERIOD,

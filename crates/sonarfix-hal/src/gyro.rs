@@ -4,13 +4,11 @@
 //! ([`TurnIntegral`](sonarfix::gyro::TurnIntegral)).
 
 mod mpu6050;
-mod two_wire;
 
 use sonarfix::gyro::GyroParameters;
 use sonarfix::units::RadiansPerSecond;
 
 pub use mpu6050::{Mpu6050, Mpu6050Error};
-pub use two_wire::{MOST_STRETCHES, TwoWire};
 
 /// The gyro could not be read. The loop counts it and continues with the wheels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

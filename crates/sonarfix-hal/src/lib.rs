@@ -1,7 +1,7 @@
 //! Drivers for the sensors of a small wheeled robot, and the loop that connects them to the
 //! [`sonarfix`] localizer.
 //!
-//! `no_std`, no allocation, no panic, no `unsafe`, no global. Nothing waits, except [`gyro::TwoWire`] for the bits of its bus: firmware, simulator and emulator
+//! `no_std`, no allocation, no panic, no `unsafe`, no global. Nothing waits, except [`bus::TwoWire`] for the bits of its bus: firmware, simulator and emulator
 //! poll the same code with the time as an argument. The hardware is accessed through `embedded-hal` 1.0.
 //!
 //! | module | |
@@ -9,8 +9,9 @@
 //! | [`config`] | the description of a robot: everything that its builder measures or chooses |
 //! | [`encoder`] | counters of any width, a software quadrature decoder, edges to metres |
 //! | [`servo`] | bearing to pulse, and a model of the servo's present bearing |
-//! | [`ranger`] | ultrasonic rangers: HC-SR04 and compatible ones, LV-MaxSonar, SRF02, SRF08 |
-//! | [`gyro`] | gyros: MPU-6050 and compatible ones; an I²C master on two pins, whose transfers always end |
+//! | [`ranger`] | ultrasonic rangers: HC-SR04 and compatible ones, LV-MaxSonar, SRF02, SRF08; of light: VL53L0X, VL53L1X |
+//! | [`gyro`] | gyros: MPU-6050 and compatible ones |
+//! | [`bus`] | an I²C master on two pins, whose transfers always end; one bus for several drivers |
 //! | [`robot`] | the loop: encoder samples, and the measurement cycle of the sonar |
 //!
 //! Start with [`robot::Robot`], whose example is a complete fix.
@@ -36,6 +37,7 @@ extern crate std;
 
 #[cfg(feature = "async")]
 pub mod asynch;
+pub mod bus;
 pub mod config;
 pub mod encoder;
 pub mod gyro;

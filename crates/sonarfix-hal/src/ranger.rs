@@ -6,7 +6,7 @@
 //!   SRF04/05, LV-MaxSonar by pulse width), over an [`EchoLine`] that is [`Polled`], or [`Captured`] by an interrupt
 //!   or by hardware with time stamps ([`StampedEdges`]);
 //! - [`Srf`]: SRF02 and SRF08 on I²C;
-//! - [`Vl53l1x`]: a time-of-flight ranger on I²C, which measures with light;
+//! - [`Vl53l1x`], [`Vl53l0x`]: time-of-flight rangers on I²C, which measure with light;
 //! - [`OneOf`]: drivers for two kinds of rangers on one board.
 //!
 //! Not supported: rangers whose pulse encodes the range after the measurement (HRLV-MaxSonar, 1 µs/mm), because the
@@ -24,8 +24,10 @@ mod one_of;
 mod polled;
 mod pulse;
 mod settings;
+mod shot;
 mod srf;
 mod stamps;
+mod vl53l0x;
 mod vl53l1x;
 
 pub use air::{Air, Celsius, TemperatureError};
@@ -38,4 +40,5 @@ pub use pulse::{EchoLine, Pulse, PulseError, PulseRanger};
 pub use settings::{PulseTiming, RangerKind, RangerSettings};
 pub use srf::Srf;
 pub use stamps::{StampedEdges, Stamps};
+pub use vl53l0x::{Vl53l0x, Vl53l0xError};
 pub use vl53l1x::{Vl53l1x, Vl53l1xError};

@@ -49,6 +49,7 @@ pub(crate) fn read(sonar: &Table<'_>) -> Ranger {
 fn read_beam(sonar: &Table<'_>, kind: RangerKind) -> Ranging {
     let usual = match kind {
         RangerKind::Vl53l1x { .. } => Some(LightBeam::VL53L1X),
+        RangerKind::Vl53l0x { .. } => Some(LightBeam::VL53L0X),
         RangerKind::Pulse(_) | RangerKind::Srf { .. } | RangerKind::Custom => None,
     };
     let Some(node) = sonar.get("beam") else {
@@ -101,6 +102,10 @@ fn described(node: Node<'_>) -> (RangerKind, Option<Duration>) {
         RangerKind::Vl53l1x { address: usual } => {
             misplaced(&PULSE);
             RangerKind::Vl53l1x { address: read_address(&table).unwrap_or(usual) }
+        }
+        RangerKind::Vl53l0x { address: usual } => {
+            misplaced(&PULSE);
+            RangerKind::Vl53l0x { address: read_address(&table).unwrap_or(usual) }
         }
         RangerKind::Custom => {
             misplaced(&["address"]);

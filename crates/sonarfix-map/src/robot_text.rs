@@ -236,6 +236,9 @@ fn ranger(ranger: &RangerConfig) -> String {
         RangerKind::Vl53l1x { address } => {
             format!(r#"{{ kind = "vl53l1x", address = {address} }}"#)
         }
+        RangerKind::Vl53l0x { address } => {
+            format!(r#"{{ kind = "vl53l0x", address = {address} }}"#)
+        }
         RangerKind::Custom => r#""custom""#.to_owned(),
     };
     format!("ranger = {kind}\n")

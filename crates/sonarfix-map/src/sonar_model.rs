@@ -29,6 +29,8 @@ pub enum SonarName {
     Polaroid6500,
     /// VL53L1X, a time-of-flight ranger.
     Vl53l1x,
+    /// VL53L0X, a time-of-flight ranger.
+    Vl53l0x,
 }
 
 /// What is known of a sonar, by its name in files and on the command line.
@@ -48,7 +50,7 @@ pub struct SonarModel {
 
 impl SonarModel {
     /// All sonars.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self {
             name: "ideal",
             simulated: Some(SonarName::Ideal),
@@ -104,6 +106,13 @@ impl SonarModel {
             ranger: Some(RangerSettings::VL53L1X),
             echo: Some(EchoParameters::VL53L1X),
             beam: Some(LightBeam::VL53L1X),
+        },
+        Self {
+            name: "vl53l0x",
+            simulated: Some(SonarName::Vl53l0x),
+            ranger: Some(RangerSettings::VL53L0X),
+            echo: Some(EchoParameters::VL53L0X),
+            beam: Some(LightBeam::VL53L0X),
         },
     ];
 

@@ -336,7 +336,7 @@ const ROBOT: [Case; 12] = [
         "ranger = { kind = \"hc_sr04\",",
         "ranger = { kind = \"hc_sr05\",",
         "robot.sonar.ranger.kind",
-        "must be \"hc_sr04\", \"lv_maxsonar\", \"srf02\", \"srf08\", \"vl53l1x\" or \"custom\"; did you mean \"hc_sr04\"?",
+        "must be \"hc_sr04\", \"lv_maxsonar\", \"srf02\", \"srf08\", \"vl53l1x\", \"vl53l0x\" or \"custom\"; did you mean \"hc_sr04\"?",
     ),
     value(
         "ranger = { kind = \"hc_sr04\",",
@@ -429,7 +429,7 @@ const HARDWARE: [Case; 12] = [
         "[sensor]\nmodel = \"srf99\"\n[run]",
         "model = ",
         "sensor.model",
-        "must be \"ideal\", \"hc_sr04\", \"nxt\", \"lv_maxsonar\", \"srf08\", \"polaroid_6500\" or \"vl53l1x\"",
+        "must be \"ideal\", \"hc_sr04\", \"nxt\", \"lv_maxsonar\", \"srf08\", \"polaroid_6500\", \"vl53l1x\" or \"vl53l0x\"",
     ),
     case("[run]", "[servo]\nmodle = 1\n[run]", "modle = ", "servo.modle", "unknown key"),
     case(
@@ -845,6 +845,9 @@ fn a_time_of_flight_ranger_has_a_beam() {
     assert_eq!(wide, Ranging::Light(LightBeam { spot, ..LightBeam::VL53L1X }));
     let robot = with("ranger = { kind = \"vl53l1x\", address = 0x30 }").unwrap().robot;
     assert_eq!(robot.ranger.kind, RangerKind::Vl53l1x { address: 0x30 });
+    assert_eq!(sonar("ranger = \"vl53l0x\"").ranging, Ranging::Light(LightBeam::VL53L0X));
+    let robot = with("ranger = { kind = \"vl53l0x\", address = 0x31 }").unwrap().robot;
+    assert_eq!(robot.ranger.kind, RangerKind::Vl53l0x { address: 0x31 });
     assert_eq!(robot.localizer.sonar.timing.cycle, Duration::millis(60));
     let custom = "ranger = \"custom\"\ncycle = \"30 ms\"\n";
     assert_eq!(sonar(custom).ranging, Ranging::Sound);

@@ -3,11 +3,13 @@
 use sonarfix::config::{MAX_RANGERS, RangerId, ServoTiming};
 use sonarfix_hal::config::{RobotConfig, Unsupported};
 use sonarfix_hal::gyro::Mpu6050;
-use sonarfix_hal::ranger::{Captured, OneOf, PulseRanger, Vl53l1x};
+use sonarfix_hal::ranger::{Captured, OneOf, PulseRanger, Vl53l0x, Vl53l1x};
 use sonarfix_hal::robot::{Devices, Hardware, WithGyro, WithRangers};
 use sonarfix_hal::servo::{PwmFrame, Servo};
 
-use crate::wires::{CounterWire, GyroWire, LightWire, RangerWires, ServoWire, TriggerWire, Wires};
+use crate::wires::{
+    CounterWire, GyroWire, RangerWires, ServoWire, TriggerWire, Vl53l0xWire, Vl53l1xWire, Wires,
+};
 
 /// The drivers on a robot's wires.
 pub type WiredDevices<'w> = WithGyro<WithRangers<OneRanger<'w>, FURTHER>, Mpu6050<&'w GyroWire>>;
@@ -16,8 +18,10 @@ type OneRanger<'w> = Devices<
     &'w CounterWire,
     &'w CounterWire,
     &'w ServoWire,
-    OneOf<PulseRanger<&'w TriggerWire, Captured<'w>>, Vl53l1x<&'w LightWire>>,
+    OneOf<PulseRanger<&'w TriggerWire, Captured<'w>>, TimeOfFlight<'w>>,
 >;
+
+type TimeOfFlight<'w> = OneOf<Vl53l1x<&'w Vl53l1xWire>, Vl53l0x<&'w Vl53l0xWire>>;
 
 /// The rangers beside the first.
 const FURTHER: usize = MAX_RANGERS - 1;
@@ -38,7 +42,8 @@ pub fn devices<'w>(
     };
     let ranger = |wires: &'w RangerWires| {
         let pulse = PulseRanger::new(&wires.trigger, Captured::new(&wires.echo));
-        OneOf::new(pulse, Vl53l1x::new(&wires.light))
+        let light = OneOf::new(Vl53l1x::new(&wires.vl53l1x), Vl53l0x::new(&wires.vl53l0x));
+        OneOf::new(pulse, light)
     };
     let mut number = 0;
     let servos = further.each_ref().map(|wires| {

@@ -52,7 +52,7 @@ pub struct GyroSignal {
     pub has_failed: bool,
 }
 
-pub use light::{LightSignal, LightWire};
+pub use light::{LightSignal, Vl53l0xWire, Vl53l1xWire};
 
 /// The counter of an encoder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -105,8 +105,10 @@ pub struct RangerWires {
     pub trigger: TriggerWire,
     /// The edges of the echo line.
     pub echo: EchoCapture,
-    /// The bus of a time-of-flight ranger.
-    pub light: LightWire,
+    /// The bus of a VL53L1X.
+    pub vl53l1x: Vl53l1xWire,
+    /// The bus of a VL53L0X.
+    pub vl53l0x: Vl53l0xWire,
 }
 
 impl Wires {
@@ -116,7 +118,8 @@ impl Wires {
         self.left.0.set(sensors.left);
         self.gyro.signal.set(sensors.gyro);
         for (wires, echo) in self.rangers.iter().zip(&sensors.echoes) {
-            wires.light.apply(echo.light);
+            wires.vl53l1x.apply(echo.light);
+            wires.vl53l0x.apply(echo.light);
             if let Some(at) = echo.rose {
                 wires.echo.rose(at);
             }
@@ -131,7 +134,9 @@ impl Wires {
         let rangers = self.rangers.each_ref().map(|wires| RangerActuators {
             duty: wires.servo.0.take(),
             is_raised: wires.trigger.is_raised.get(),
-            has_fallen: wires.trigger.has_fallen.take() | wires.light.take_start(),
+            has_fallen: wires.trigger.has_fallen.take()
+                | wires.vl53l1x.take_start()
+                | wires.vl53l0x.take_start(),
         });
         Actuators { rangers }
     }

@@ -46,6 +46,8 @@ impl LightBeam {
     /// VL53L1X with all 16 × 16 detectors: a field of view of 27°, of which the inner half returns most of the
     /// light (assumed), on a hobby servo that is off by 1.1° (assumed).
     pub const VL53L1X: Self = Self { spot: Radians(0.12), pointing: Radians(0.02) };
+    /// VL53L0X: a field of view of 25°; the same assumptions.
+    pub const VL53L0X: Self = Self { spot: Radians(0.11), ..Self::VL53L1X };
 }
 
 /// One of a robot's rangers, by its place in the robot file: 0 is [`Config::sonar`].

@@ -84,6 +84,9 @@ impl EchoParameters {
         map_accuracy: Metres(0.0),
     };
 
+    /// VL53L0X: assumed like the VL53L1X.
+    pub const VL53L0X: Self = Self::VL53L1X;
+
     /// Probability that a wall within range, square to the beam and not occluded, returns its range.
     pub(crate) fn heard(&self) -> f32 {
         1.0 - self.missed - self.short - self.long

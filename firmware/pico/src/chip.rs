@@ -42,17 +42,17 @@ impl<const SM: usize> Counter for Encoder<SM> {
     }
 }
 
-/// The stamps of the echo's edges.
-pub struct Stamper {
-    machine: EchoMachine,
+/// The stamps of an echo's edges.
+pub struct Stamper<const SM: usize> {
+    machine: EchoMachine<SM>,
     /// The start of its counter. Counter and clock are derived from one crystal.
     start: Instant,
     stamps: Stamps,
     edges: StampedEdges,
 }
 
-impl Stamper {
-    pub fn start(mut machine: EchoMachine, now: Instant) -> Self {
+impl<const SM: usize> Stamper<SM> {
+    pub fn start(mut machine: EchoMachine<SM>, now: Instant) -> Self {
         machine.set_enable(true);
         let stamps = Stamps { rise: 0, fall: 0 };
         Self { machine, start: now, stamps, edges: StampedEdges::since(stamps) }

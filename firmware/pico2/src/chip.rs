@@ -30,14 +30,14 @@ impl<const SM: usize> Counter for Encoder<SM> {
     }
 }
 
-/// The stamps of the echo's edges.
-pub struct Stamper {
-    machine: EchoMachine,
+/// The stamps of an echo's edges.
+pub struct Stamper<const SM: usize> {
+    machine: EchoMachine<SM>,
     edges: StampedEdges,
 }
 
-impl Stamper {
-    pub fn start(mut machine: EchoMachine, _now: Instant) -> Self {
+impl<const SM: usize> Stamper<SM> {
+    pub fn start(mut machine: EchoMachine<SM>, _now: Instant) -> Self {
         let edges = StampedEdges::since(stamps(&mut machine));
         machine.set_enable(true);
         Self { machine, edges }
@@ -50,7 +50,7 @@ impl Stamper {
     }
 }
 
-fn stamps(machine: &mut EchoMachine) -> Stamps {
+fn stamps<const SM: usize>(machine: &mut EchoMachine<SM>) -> Stamps {
     Stamps { rise: machine.get_rxf_entry(1), fall: machine.get_rxf_entry(2) }
 }
 

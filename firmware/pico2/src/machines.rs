@@ -1,17 +1,17 @@
-//! The state machines of the encoders and of the echo, as far as both chips configure them alike. The programs are those
+//! The state machines of the encoders and of the echoes, as far as both chips configure them alike. The programs are those
 //! of the board that is built.
 
 use embassy_rp::Peri;
 use embassy_rp::peripherals::{PIO0, PIO1};
 use embassy_rp::pio::{
-    Common, Config, FifoJoin, LoadedProgram, Pio, PioPin, ShiftDirection, StateMachine,
+    Common, Config, FifoJoin, LoadedProgram, PioPin, ShiftDirection, StateMachine,
 };
 use pio::pio_file;
 
 /// A state machine that counts the edges of an encoder.
 pub type EncoderMachine<const SM: usize> = StateMachine<'static, PIO0, SM>;
-/// The state machine that stamps the edges of the echo.
-pub type EchoMachine = StateMachine<'static, PIO1, 0>;
+/// A state machine that stamps the edges of an echo.
+pub type EchoMachine<const SM: usize> = StateMachine<'static, PIO1, SM>;
 
 /// The program of the encoders' state machines.
 pub fn encoder_program(pio: &mut Common<'static, PIO0>) -> LoadedProgram<'static, PIO0> {
@@ -41,20 +41,25 @@ pub fn encoder<const SM: usize>(
     machine
 }
 
-/// Prepares the stamping of the echo's edges, which begins when the machine is enabled.
+/// The program of the echoes' state machines.
+pub fn echo_program(pio: &mut Common<'static, PIO1>) -> LoadedProgram<'static, PIO1> {
+    pio.load_program(&pio_file!("src/echo.pio").program)
+}
+
+/// Prepares the stamping of an echo's edges, which begins when the machine is enabled.
 // As above.
 #[inline(never)]
-pub fn echo(
-    pio: Pio<'static, PIO1>,
+pub fn echo<const SM: usize>(
+    mut machine: EchoMachine<SM>,
+    pio: &mut Common<'static, PIO1>,
+    program: &LoadedProgram<'static, PIO1>,
     echo: Peri<'static, impl PioPin>,
     clock_divider: u8,
     queue: FifoJoin,
-) -> EchoMachine {
-    let Pio { mut common, sm0: mut machine, .. } = pio;
-    let program = common.load_program(&pio_file!("src/echo.pio").program);
-    let echo = common.make_pio_pin(echo);
+) -> EchoMachine<SM> {
+    let echo = pio.make_pio_pin(echo);
     let mut config = Config::default();
-    config.use_program(&program, &[]);
+    config.use_program(program, &[]);
     config.set_jmp_pin(&echo);
     config.shift_in.direction = ShiftDirection::Left;
     config.fifo_join = queue;

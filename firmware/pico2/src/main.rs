@@ -1,4 +1,4 @@
-//! A Raspberry Pi Pico 2 or Pico with two encoders, a servo, a pulse-width sonar and a UART.
+//! A Raspberry Pi Pico 2 or Pico with two encoders, two rangers on servos, a gyro and a UART.
 //!
 //! This file is the board, except for what differs between its chips, which is in the module `chip`. The robot is described by the baked configuration, and its behaviour is in `sonarfix-app`.
 //! The wiring is a table in `docs/firmware.md`.
@@ -6,13 +6,13 @@
 //! | | for | pins |
 //! |---|---|---|
 //! | PIO0 | right and left encoder, a state machine each | GP2 GP3, GP4 GP5 |
-//! | PIO1 | the stamps of the echo's edges, 1 µs | GP8 |
-//! | PWM slice 3, channel A | the servo's pulses | GP6 |
+//! | PIO1 | the stamps of the edges of both echoes, 1 µs, a state machine each | GP8, GP17 |
+//! | PWM slices 3 and 1, channel A | the pulses of the servos of both rangers | GP6, GP18 |
 //! | PWM slices 5 and 6 | the inputs of the motor driver, right and left motor, 20 kHz | GP10 GP11, GP12 GP13 |
 //! | TIMER0 | the clock, 1 µs, and the alarm of the next poll | |
 //! | UART0 | the link, 115,200 baud | GP0 GP1 |
-//! | | the sonar's trigger; high while the robot may drive | GP7; GP9 |
-//! | | the bus of the gyro, clock and data, if the robot file has one | GP15 GP14 |
+//! | | the triggers of both rangers; high while the robot may drive | GP7, GP16; GP9 |
+//! | | the buses of both rangers, clock and data, for light; the gyro is on the first | GP15 GP14, GP21 GP20 |
 //!
 //! State machines count the wheels and stamp the edges, however long a poll or a write to flash takes. One executor is
 //! therefore sufficient, and no interrupts but those of the clock and of received bytes, which end its sleep. It runs two tasks in
@@ -42,11 +42,12 @@ use panic_probe as _;
 use sonarfix::units::Instant;
 use sonarfix_app::store::Store;
 use sonarfix_app::{App, FlashContents, Link, boots, log};
-use sonarfix_hal::gyro::{Mpu6050, TwoWire};
-use sonarfix_hal::ranger::{Captured, EchoCapture, PulseRanger};
-use sonarfix_hal::robot::{Devices, WithGyro};
+use sonarfix_hal::bus::{SharedBus, TwoWire};
+use sonarfix_hal::gyro::Mpu6050;
+use sonarfix_hal::ranger::EchoCapture;
+use sonarfix_hal::robot::{Devices, WithGyro, WithRangers};
 use sonarfix_motors::{Drive, Estimate, Pattern};
-use sonarfix_robot::{NextPoll, memory};
+use sonarfix_robot::{AnyRanger, NextPoll, memory};
 
 // The other chip has its module beside its memory map.
 #[cfg_attr(rp2040, path = "../../pico/src/chip.rs")]
@@ -66,23 +67,30 @@ const DRIVE: u32 = 9;
 /// Address of the flash.
 const FLASH_BASE: u32 = 0x1000_0000;
 
+/// The gyro is read and configured only if the robot file has one.
 type Hardware = WithGyro<
-    Devices<Encoder<0>, Encoder<1>, Pwm<'static>, PulseRanger<Output<'static>, Captured<'static>>>,
-    Gyro,
+    WithRangers<Devices<Encoder<0>, Encoder<1>, Pwm<'static>, Ranger>, 1>,
+    Mpu6050<&'static Bus>,
 >;
 
-/// The gyro. It is read and configured only if the robot file has one.
-type Gyro = Mpu6050<TwoWire<OutputOpenDrain<'static>, OutputOpenDrain<'static>, Delay>>;
+type Ranger = AnyRanger<Output<'static>, &'static Bus>;
+type Bus = SharedBus<TwoWire<OutputOpenDrain<'static>, OutputOpenDrain<'static>, Delay>>;
 
-/// A line of the gyro's bus. The module has pull-ups; that of the pin keeps the line defined without one.
+/// The bus with these pins for clock and data.
+fn bus(clock: Peri<'static, impl Pin>, data: Peri<'static, impl Pin>) -> Bus {
+    SharedBus::new(TwoWire::new(line(clock), line(data), Delay))
+}
+
+/// A line of a bus. The module of a sensor has pull-ups; that of the pin keeps the line defined without one.
 fn line(pin: Peri<'static, impl Pin>) -> OutputOpenDrain<'static> {
     let mut line = OutputOpenDrain::new(pin, Level::High);
     line.set_pullup(true);
     line
 }
 
-/// The edges of the echo, from [`Stamper`].
+/// The edges of both echoes, from their [`Stamper`].
 static ECHO: EchoCapture = EchoCapture::new();
+static SECOND_ECHO: EchoCapture = EchoCapture::new();
 
 /// The newest estimate, from the loop; `None` while the motors are disabled.
 static ESTIMATE: Signal<CriticalSectionRawMutex, Option<Estimate>> = Signal::new();
@@ -230,7 +238,7 @@ unsafe fn HardFault() -> ! {
 struct Board {
     app: App<'static, Flash<'static, FLASH, flash::Blocking, FLASH_SIZE>>,
     hardware: Hardware,
-    stamper: Stamper,
+    stampers: (Stamper<0>, Stamper<1>),
     link: Serial,
     drive: Output<'static>,
     watchdog: Watchdog,
@@ -241,7 +249,7 @@ impl Board {
     /// Initializes the board; `None` if the memory map has no store.
     // Inlined, its stack frame would remain for the whole runtime.
     #[inline(never)]
-    fn new() -> Option<(Self, Motors)> {
+    fn new(buses: &'static mut Option<[Bus; 2]>) -> Option<(Self, Motors)> {
         let board = embassy_rp::init(embassy_rp::config::Config::default());
         let mut watchdog = Watchdog::new(board.WATCHDOG);
         let reset = reset(&watchdog);
@@ -252,20 +260,29 @@ impl Board {
         let right = machines::encoder(sm0, &mut pio, &program, board.PIN_2, board.PIN_3, QUEUE);
         let left = machines::encoder(sm1, &mut pio, &program, board.PIN_4, board.PIN_5, QUEUE);
         let (right, left) = (Encoder(right), Encoder(left));
-        let echo_pio = Pio::new(board.PIO1, Interrupts);
-        let echo = machines::echo(echo_pio, board.PIN_8, clock_divider(5_000_000), QUEUE);
-        let stamper = Stamper::start(echo, now());
+        let Pio { common: mut pio, sm0, sm1, .. } = Pio::new(board.PIO1, Interrupts);
+        let (program, divider) = (machines::echo_program(&mut pio), clock_divider(5_000_000));
+        let first = machines::echo(sm0, &mut pio, &program, board.PIN_8, divider, QUEUE);
+        let second = machines::echo(sm1, &mut pio, &program, board.PIN_17, divider, QUEUE);
+        let stampers = (Stamper::start(first, now()), Stamper::start(second, now()));
         let pulses = Pwm::new_output_a(board.PWM_SLICE3, board.PIN_6, servo_pulses());
+        let second_pulses = Pwm::new_output_a(board.PWM_SLICE1, board.PIN_18, servo_pulses());
         let (slice, pins) = (board.PWM_SLICE5, (board.PIN_10, board.PIN_11));
         let right_motor = Pwm::new_output_ab(slice, pins.0, pins.1, motor_pulses());
         let (slice, pins) = (board.PWM_SLICE6, (board.PIN_12, board.PIN_13));
         let left_motor = Pwm::new_output_ab(slice, pins.0, pins.1, motor_pulses());
         let motors = Motors { right: right_motor, left: left_motor };
+        let [first, second] =
+            buses.insert([bus(board.PIN_15, board.PIN_14), bus(board.PIN_21, board.PIN_20)]);
+        let (first, second) = (&*first, &*second);
         let trigger = Output::new(board.PIN_7, Level::Low);
         let servo = sonarfix_robot::servo(pulses);
-        let ranger = sonarfix_robot::ranger(trigger, &ECHO);
-
-        let gyro = Mpu6050::new(TwoWire::new(line(board.PIN_15), line(board.PIN_14), Delay));
+        let ranger = sonarfix_robot::any_ranger(trigger, &ECHO, first);
+        let devices = Devices { right, left, servo, ranger };
+        let trigger = Output::new(board.PIN_16, Level::Low);
+        let ranger = sonarfix_robot::any_ranger(trigger, &SECOND_ECHO, second);
+        let servos = [sonarfix_robot::servo(second_pulses)];
+        let devices = WithRangers { devices, servos, rangers: [ranger] };
 
         let flash = FlashContents::read(memory::map(), memory::config());
         log::flash_contents(&flash);
@@ -278,8 +295,8 @@ impl Board {
         watchdog.start(WATCHDOG);
         let board = Self {
             app,
-            hardware: WithGyro { devices: Devices { right, left, servo, ranger }, gyro },
-            stamper,
+            hardware: WithGyro { devices, gyro: Mpu6050::new(first) },
+            stampers,
             link: Serial { uart, to_send: Deque::new() },
             drive: Output::new(board.PIN_9, Level::Low),
             watchdog,
@@ -314,10 +331,11 @@ impl Board {
     /// the echo was stamped.
     fn sleeps_until(&mut self) -> Option<embassy_time::Instant> {
         let time = now();
-        self.stamper.update(&ECHO, time);
+        self.stampers.0.update(&ECHO, time);
+        self.stampers.1.update(&SECOND_ECHO, time);
         let has_bytes = Serial::has_bytes();
         let next = self.next_poll.at(has_bytes);
-        if ECHO.take_edge() || time >= next {
+        if ECHO.take_edge() | SECOND_ECHO.take_edge() || time >= next {
             return None;
         }
         let is_listening = self.app.idle_until(&mut self.hardware).is_none();
@@ -369,8 +387,8 @@ async fn motors(mut motors: Motors) -> ! {
 /// Initializes the board and starts both tasks.
 // Inlined, its stack frame, which holds copies of the board, would remain for the whole runtime.
 #[inline(never)]
-fn start(spawner: Spawner) {
-    let Some((board, inputs)) = Board::new() else {
+fn start(spawner: Spawner, buses: &'static mut Option<[Bus; 2]>) {
+    let Some((board, inputs)) = Board::new(buses) else {
         defmt::error!("the memory map has no store");
         return;
     };
@@ -386,5 +404,6 @@ fn start(spawner: Spawner) {
 #[cortex_m_rt::entry]
 fn main() -> ! {
     static mut EXECUTOR: Option<Executor> = None;
-    EXECUTOR.get_or_insert_with(Executor::new).run(start)
+    static mut BUSES: Option<[Bus; 2]> = None;
+    EXECUTOR.get_or_insert_with(Executor::new).run(|spawner| start(spawner, BUSES))
 }

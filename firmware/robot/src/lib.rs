@@ -1,18 +1,19 @@
 //! The common part of the boards: the drivers on a board's pins, and the regions of flash.
 //!
 //! It contains no parameter of a robot: wheels, servo, ranger and loop are configured by the baked configuration
-//! ([`RobotConfig`](sonarfix_hal::config::RobotConfig)). It contains the capabilities of the boards: a servo at 50 Hz,
-//! and a ranger with a trigger and an echo pin.
+//! ([`RobotConfig`](sonarfix_hal::config::RobotConfig)). It contains the capabilities of the boards: servos at 50 Hz,
+//! and rangers with a trigger and an echo pin, or of light on an I²C bus.
 
 #![no_std]
 
 pub mod memory;
 
 use embedded_hal::digital::OutputPin;
+use embedded_hal::i2c::I2c;
 use embedded_storage::nor_flash::NorFlash;
 use sonarfix::units::{Duration, Instant};
 use sonarfix_app::{App, Board, Polled};
-use sonarfix_hal::ranger::{Captured, EchoCapture, PulseRanger};
+use sonarfix_hal::ranger::{Captured, EchoCapture, OneOf, PulseRanger, Vl53l0x, Vl53l1x};
 use sonarfix_hal::robot::{Hardware, PACE};
 use sonarfix_hal::servo::{PwmFrame, Servo};
 use sonarfix_link::message::ResetCause;
@@ -43,6 +44,18 @@ pub fn ranger<T: OutputPin>(
     echo: &'static EchoCapture,
 ) -> PulseRanger<T, Captured<'static>> {
     PulseRanger::new(trigger, Captured::new(echo))
+}
+
+/// A ranger with a trigger and an echo pin, or one of light on a bus, as the robot file has it.
+pub type AnyRanger<T, B> = OneOf<PulseRanger<T, Captured<'static>>, OneOf<Vl53l1x<B>, Vl53l0x<B>>>;
+
+/// The drivers of a ranger whose kind the robot file states.
+pub fn any_ranger<T: OutputPin, B: I2c + Copy>(
+    trigger: T,
+    echo: &'static EchoCapture,
+    bus: B,
+) -> AnyRanger<T, B> {
+    OneOf::new(ranger(trigger, echo), OneOf::new(Vl53l1x::new(bus), Vl53l0x::new(bus)))
 }
 
 /// The estimate for the motor code; `None` while the motors are disabled.

@@ -1,4 +1,4 @@
-//! The reference board: an STM32F405 with two encoders, a servo, a pulse-width sonar and a UART.
+//! The reference board: an STM32F405 with two encoders, two rangers on servos, a gyro and a UART.
 //!
 //! This file is the board. The robot is described by the baked configuration, and its behaviour is in `sonarfix-app`.
 //! The wiring diagram is in the README.
@@ -6,12 +6,14 @@
 //! | | for | pins |
 //! |---|---|---|
 //! | TIM1, TIM8 | right and left encoder, counted by hardware | PA8 PA9, PC6 PC7 |
-//! | TIM10 | the servo's pulses | PB8 |
-//! | TIM5 | the clock, 1 µs in 32 bits, and the stamps of the echo's edges | PA0 |
+//! | TIM10, TIM11 | the pulses of the servos of both rangers | PB8, PB9 |
+//! | TIM5 | the clock, 1 µs in 32 bits, and the stamps of the first echo's edges | PA0 |
+//! | TIM12 | the stamps of the second echo's edges, 1 µs in 16 bits | PB14 |
 //! | TIM2 | ends the sleep every millisecond, to compare the time with that of the next poll | |
 //! | TIM3 | the inputs of the motor driver, right and left motor, 20 kHz | PA6 PA7, PB0 PB1 |
 //! | USART2 | the link, 115,200 baud | PA2 PA3 |
-//! | | the sonar's trigger; high while the robot may drive | PA1; PB7 |
+//! | | the triggers of both rangers; high while the robot may drive | PA1, PA4; PB7 |
+//! | | the buses of both rangers, clock and data, for light; the gyro is on the first | PC0 PC1, PC2 PC3 |
 //!
 //! RTIC gives each interrupt exclusive access to its peripherals and queues. Only lock-free queues and the stamps of the
 //! echo are shared, so that no interrupt waits for another. The loop is RTIC's idle task: however long it takes,
@@ -24,6 +26,7 @@
 use core::ops::Deref;
 
 use defmt_rtt as _;
+use embedded_hal::delay::DelayNs;
 use embedded_hal::pwm::{self, SetDutyCycle};
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
@@ -31,15 +34,18 @@ use embedded_storage::nor_flash::{
 use heapless::spsc::{Consumer, Producer, Queue};
 use panic_probe as _;
 use sonarfix_app::Link;
+use sonarfix_hal::bus::{SharedBus, TwoWire};
 use sonarfix_hal::encoder::Counter;
 use sonarfix_hal::ranger::EchoCapture;
 use sonarfix_motors::Drive;
 use sonarfix_robot::memory;
+use stm32f4xx_hal::gpio::{ErasedPin, OpenDrain, Output, Pin, Pull};
 use stm32f4xx_hal::pac::{self, tim1};
 use stm32f4xx_hal::rcc;
 
-/// The edges of the echo, from TIM5's interrupt.
+/// The edges of the first echo, from TIM5's interrupt, and of the second one, from TIM12's.
 static ECHO: EchoCapture = EchoCapture::new();
+static SECOND_ECHO: EchoCapture = EchoCapture::new();
 
 /// The clocks: the internal oscillator at 16 MHz with an error of 1 %, which scales all ranges and is estimated as the
 /// filter's range scale. With a crystal of 8 MHz: 48 MHz.
@@ -85,22 +91,37 @@ impl<T: Deref<Target = tim1::RegisterBlock>> Counter for Encoder<T> {
     }
 }
 
-/// TIM10's only channel: pulses of half a microsecond's resolution every 20 ms.
-struct ServoPwm(pac::TIM10);
+/// The only channel of TIM10 or TIM11: pulses of half a microsecond's resolution every 20 ms.
+enum ServoPwm {
+    First(pac::TIM10),
+    Second(pac::TIM11),
+}
+
+/// The same registers, of which the crate has two types.
+macro_rules! of_either {
+    ($pwm:expr, $timer:ident => $work:expr) => {
+        match $pwm {
+            ServoPwm::First($timer) => $work,
+            ServoPwm::Second($timer) => $work,
+        }
+    };
+}
 
 impl ServoPwm {
     /// Counts of a 20 ms frame.
     const FRAME: u16 = 40_000;
 
-    fn new(timer: pac::TIM10, clock: fugit::HertzU32) -> Self {
+    fn started(self, clock: fugit::HertzU32) -> Self {
         let divider = u16::try_from(clock.to_MHz() / 2).unwrap_or(u16::MAX).saturating_sub(1);
-        timer.psc().write(|w| w.psc().set(divider));
-        timer.arr().write(|w| w.arr().set(Self::FRAME - 1));
-        timer.ccmr1_output().write(|w| w.oc1m().pwm_mode1().oc1pe().set_bit());
-        timer.ccer().write(|w| w.cc1e().set_bit());
-        timer.egr().write(|w| w.ug().set_bit());
-        timer.cr1().write(|w| w.cen().set_bit());
-        Self(timer)
+        of_either!(&self, timer => {
+            timer.psc().write(|w| w.psc().set(divider));
+            timer.arr().write(|w| w.arr().set(Self::FRAME - 1));
+            timer.ccmr1_output().write(|w| w.oc1m().pwm_mode1().oc1pe().set_bit());
+            timer.ccer().write(|w| w.cc1e().set_bit());
+            timer.egr().write(|w| w.ug().set_bit());
+            timer.cr1().write(|w| w.cen().set_bit());
+        });
+        self
     }
 }
 
@@ -120,8 +141,11 @@ impl SetDutyCycle for ServoPwm {
     }
 
     fn set_duty_cycle(&mut self, duty: u16) -> Result<(), NotThere> {
-        self.0.ccr1().write(|w| w.ccr().set(duty));
-        if self.0.cr1().read().cen().bit_is_set() { Ok(()) } else { Err(NotThere) }
+        let runs = of_either!(self, timer => {
+            timer.ccr1().write(|w| w.ccr().set(duty));
+            timer.cr1().read().cen().bit_is_set()
+        });
+        if runs { Ok(()) } else { Err(NotThere) }
     }
 }
 
@@ -162,6 +186,31 @@ impl MotorPwm {
         self.timer.ccr3().write(|w| w.ccr().set(left_1));
         self.timer.ccr4().write(|w| w.ccr().set(left_2));
     }
+}
+
+/// The waits of the buses, by the core's clock.
+struct Wait {
+    cycles_per_microsecond: u32,
+}
+
+impl DelayNs for Wait {
+    fn delay_ns(&mut self, ns: u32) {
+        // At most a microsecond and a half at once.
+        cortex_m::asm::delay(ns.saturating_mul(self.cycles_per_microsecond) / 1_000);
+    }
+}
+
+/// A line of a bus. The module of a sensor has pull-ups; that of the pin keeps the line defined without one.
+type Line = ErasedPin<Output<OpenDrain>>;
+type Bus = SharedBus<TwoWire<Line, Line, Wait>>;
+
+fn line<const P: char, const N: u8>(pin: Pin<P, N>) -> Line {
+    pin.into_open_drain_output().internal_resistor(Pull::Up).erase()
+}
+
+fn bus(clock: Line, data: Line, core: fugit::HertzU32) -> Bus {
+    let wait = Wait { cycles_per_microsecond: core.to_MHz() };
+    SharedBus::new(TwoWire::new(clock, data, wait))
 }
 
 /// The loop's side of the link.
@@ -374,20 +423,25 @@ mod app {
     use sonarfix::units::Instant;
     use sonarfix_app::store::Store;
     use sonarfix_app::{App, FlashContents, boots, log};
-    use sonarfix_hal::ranger::{Captured, PulseRanger};
-    use sonarfix_hal::robot::Devices;
+    use sonarfix_hal::gyro::Mpu6050;
+    use sonarfix_hal::robot::{Devices, WithGyro, WithRangers};
     use sonarfix_link::message::ResetCause;
     use sonarfix_motors::Pattern;
-    use sonarfix_robot::{NextPoll, memory};
-    use stm32f4xx_hal::gpio::{GpioExt, Output, Pin};
+    use sonarfix_robot::{AnyRanger, NextPoll, memory};
+    use stm32f4xx_hal::gpio::{ErasedPin, GpioExt, Output, Pin};
     use stm32f4xx_hal::hal_02::serial::{Read, Write};
-    use stm32f4xx_hal::pac::{self, PWR, RTC, TIM1, TIM2, TIM3, TIM5, TIM8, TIM10, USART2};
+    use stm32f4xx_hal::pac::{
+        self, PWR, RTC, TIM1, TIM2, TIM3, TIM5, TIM8, TIM10, TIM11, TIM12, USART2,
+    };
     use stm32f4xx_hal::rcc::{Enable, RccExt};
     use stm32f4xx_hal::serial::{self, Rx, RxListen, SerialExt, Tx, TxISR, TxListen};
     use stm32f4xx_hal::time::Bps;
     use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
-    use super::{ECHO, Encoder, MotorPwm, Received, Sectors, ServoPwm, ToSend, Uart, microseconds};
+    use super::{
+        Bus, ECHO, Encoder, MotorPwm, Received, SECOND_ECHO, Sectors, ServoPwm, ToSend, Uart, bus,
+        line, microseconds,
+    };
 
     /// The longest sleep, µs: the timer of the emulator that this program is tested in has a fixed period. Waking to compare two
     /// times takes some 40 instructions.
@@ -395,12 +449,12 @@ mod app {
     /// Longer than the erasure of a sector (at most 0.5 s), which delays the loop.
     const WATCHDOG: fugit::MillisDurationU32 = fugit::MillisDurationU32::from_ticks(2_000);
 
-    type Hardware = Devices<
-        Encoder<TIM1>,
-        Encoder<TIM8>,
-        ServoPwm,
-        PulseRanger<Pin<'A', 1, Output>, Captured<'static>>,
+    type Hardware = WithGyro<
+        WithRangers<Devices<Encoder<TIM1>, Encoder<TIM8>, ServoPwm, Ranger>, 1>,
+        Mpu6050<&'static Bus>,
     >;
+
+    type Ranger = AnyRanger<ErasedPin<Output>, &'static Bus>;
 
     #[shared]
     struct Shared {
@@ -417,11 +471,16 @@ mod app {
         wake_timer: TIM2,
         backup: RTC,
         motors: MotorPwm,
+        second_echo: TIM12,
         rx: (Rx<USART2>, Producer<'static, u8>),
         tx: (Tx<USART2>, Consumer<'static, u8>),
     }
 
-    #[init(local = [received: Received = Received::new(), to_send: ToSend = ToSend::new()])]
+    #[init(local = [
+        received: Received = Received::new(),
+        to_send: ToSend = ToSend::new(),
+        buses: Option<[Bus; 2]> = None,
+    ])]
     // Inlined, its stack frame would remain for the whole runtime.
     #[inline(never)]
     fn init(context: init::Context) -> (Shared, Local) {
@@ -436,6 +495,8 @@ mod app {
         TIM5::enable(&mut rcc);
         TIM8::enable(&mut rcc);
         TIM10::enable(&mut rcc);
+        TIM11::enable(&mut rcc);
+        TIM12::enable(&mut rcc);
         let a = board.GPIOA.split(&mut rcc);
         let b = board.GPIOB.split(&mut rcc);
         let c = board.GPIOC.split(&mut rcc);
@@ -443,15 +504,19 @@ mod app {
         let _ = (a.pa8.into_alternate::<1>(), a.pa9.into_alternate::<1>());
         let _ = (c.pc6.into_alternate::<3>(), c.pc7.into_alternate::<3>());
         let _ = (a.pa0.into_alternate::<2>(), b.pb8.into_alternate::<3>());
+        let _ = (b.pb14.into_alternate::<9>(), b.pb9.into_alternate::<3>());
         let _ = (a.pa6.into_alternate::<2>(), a.pa7.into_alternate::<2>());
         let _ = (b.pb0.into_alternate::<2>(), b.pb1.into_alternate::<2>());
         let timer_clock = rcc.clocks.timclk1();
         start_clock(&board.TIM5, microseconds(timer_clock));
         start_waking(&board.TIM2, microseconds(timer_clock));
+        start_stamps(&board.TIM12, microseconds(timer_clock));
 
         let uart = serial::Config::default().baudrate(Bps(115_200));
         let uart = board.USART2.serial((a.pa2, a.pa3), uart, &mut rcc);
-        let pwm = ServoPwm::new(board.TIM10, rcc.clocks.timclk2());
+        let pulses = [ServoPwm::First(board.TIM10), ServoPwm::Second(board.TIM11)];
+        let [first, second] = pulses.map(|pwm| pwm.started(rcc.clocks.timclk2()));
+        let servos = (sonarfix_robot::servo(first), sonarfix_robot::servo(second));
         let flash = FlashContents::read(memory::map(), memory::config());
         log::flash_contents(&flash);
         let store = Store::new(Sectors(board.FLASH), memory::store(Sectors::BASE));
@@ -464,13 +529,22 @@ mod app {
         set_resets(&board.RTC, resets.saturating_add(1));
         let board_info = sonarfix_robot::board(reset, resets);
         let app = App::new(board_info, flash, store, Instant::from_ticks(0));
-        let trigger = a.pa1.into_push_pull_output();
-        let hardware = Devices {
+        let [first, second] = context.local.buses.insert([
+            bus(line(c.pc0), line(c.pc1), rcc.clocks.sysclk()),
+            bus(line(c.pc2), line(c.pc3), rcc.clocks.sysclk()),
+        ]);
+        let (first, second) = (&*first, &*second);
+        let trigger = a.pa1.into_push_pull_output().erase();
+        let devices = Devices {
             right: Encoder::new(board.TIM1),
             left: Encoder::new(board.TIM8),
-            servo: sonarfix_robot::servo(pwm),
-            ranger: sonarfix_robot::ranger(trigger, &ECHO),
+            servo: servos.0,
+            ranger: sonarfix_robot::any_ranger(trigger, &ECHO, first),
         };
+        let trigger = a.pa4.into_push_pull_output().erase();
+        let ranger = sonarfix_robot::any_ranger(trigger, &SECOND_ECHO, second);
+        let devices = WithRangers { devices, servos: [servos.1], rangers: [ranger] };
+        let hardware = WithGyro { devices, gyro: Mpu6050::new(first) };
         let (tx, mut rx) = uart.split();
         rx.listen();
         let (received, incoming) = context.local.received.split();
@@ -485,6 +559,7 @@ mod app {
             watchdog,
             backup: board.RTC,
             wake_timer: board.TIM2,
+            second_echo: board.TIM12,
             motors: MotorPwm::new(board.TIM3, timer_clock),
             rx: (rx, received),
             tx: (tx, outgoing),
@@ -503,7 +578,7 @@ mod app {
         let mut next_poll = NextPoll::AT_ONCE;
         loop {
             loop {
-                let has_edge = ECHO.take_edge();
+                let has_edge = ECHO.take_edge() | SECOND_ECHO.take_edge();
                 now = context.shared.clock.lock(|clock| advanced(now, clock.cnt().read().bits()));
                 let next = next_poll.at(link.has_bytes());
                 if has_edge || now >= next {
@@ -512,7 +587,8 @@ mod app {
                 // An interrupt between this condition and the instruction ends the sleep at once.
                 let had_bytes = link.has_bytes();
                 cortex_m::interrupt::free(|_| {
-                    if !ECHO.has_edge() && link.has_bytes() == had_bytes {
+                    let has_edge = ECHO.has_edge() || SECOND_ECHO.has_edge();
+                    if !has_edge && link.has_bytes() == had_bytes {
                         rtic::export::wfi();
                     }
                 });
@@ -556,6 +632,30 @@ mod app {
         });
     }
 
+    /// Reads the edges of the second echo. The timer has 16 bits; the interrupt is served long before they wrap.
+    #[task(binds = TIM8_BRK_TIM12, shared = [clock], local = [second_echo], priority = 2)]
+    fn second_echo(mut context: second_echo::Context) {
+        let timer = context.local.second_echo;
+        let status = timer.sr().read();
+        let rise = timer.ccr1().read().ccr().bits();
+        let fall = timer.ccr2().read().ccr().bits();
+        timer.sr().write(|w| w.cc1if().clear_bit().cc2if().clear_bit());
+        let (now, count) = context
+            .shared
+            .clock
+            .lock(|clock| (clock.cnt().read().bits(), timer.cnt().read().cnt().bits()));
+        let at = |stamp: u16| {
+            let stamp = now.wrapping_sub(count.wrapping_sub(stamp).into());
+            Instant::from_ticks(stamp.into())
+        };
+        if status.cc1if().bit_is_set() {
+            SECOND_ECHO.rose(at(rise));
+        }
+        if status.cc2if().bit_is_set() {
+            SECOND_ECHO.fell(at(fall));
+        }
+    }
+
     /// Wakes the loop.
     #[task(binds = TIM2, local = [wake_timer])]
     fn wake(context: wake::Context) {
@@ -594,6 +694,24 @@ mod app {
             w.cc1e().set_bit().cc1p().clear_bit();
             w.cc2e().set_bit().cc2p().set_bit()
         });
+        timer.dier().write(|w| w.cc1ie().set_bit().cc2ie().set_bit());
+        timer.cr1().write(|w| w.cen().set_bit());
+    }
+
+    /// Starts TIM12: it counts microseconds, and stamps both edges at its first pin.
+    fn start_stamps(timer: &TIM12, divider: u16) {
+        timer.psc().write(|w| w.psc().set(divider));
+        timer.arr().write(|w| w.arr().set(u16::MAX));
+        timer.egr().write(|w| w.ug().set_bit());
+        timer.ccmr1_input().write(|w| {
+            w.cc1s().ti1().ic1f().fck_int_n8();
+            w.cc2s().ti1().ic2f().set(0b11)
+        });
+        timer.ccer().write(|w| {
+            w.cc1e().set_bit().cc1p().clear_bit();
+            w.cc2e().set_bit().cc2p().set_bit()
+        });
+        timer.sr().write(|w| w.cc1if().clear_bit().cc2if().clear_bit());
         timer.dier().write(|w| w.cc1ie().set_bit().cc2ie().set_bit());
         timer.cr1().write(|w| w.cen().set_bit());
     }

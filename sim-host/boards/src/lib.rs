@@ -34,6 +34,33 @@ pub struct Board {
     pub divider: [String; 2],
     /// Its pins.
     pub pins: Pins,
+    /// The I²C bus of the first ranger and of the gyro, if it has one.
+    pub bus: Option<Bus>,
+    /// The pins of a second ranger, if it has them.
+    pub second: Option<Second>,
+}
+
+/// The pins of an I²C bus.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Bus {
+    /// The clock.
+    pub scl: String,
+    /// The data.
+    pub sda: String,
+}
+
+/// The pins of a second ranger.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Second {
+    /// Trigger of a sonar.
+    pub trigger: String,
+    /// Echo of a sonar, behind a divider like that of the first.
+    pub echo: String,
+    /// The pulses of its servo, if it has one.
+    pub servo: String,
+    /// The bus of a ranger of light.
+    #[serde(flatten)]
+    pub bus: Bus,
 }
 
 /// A region of flash.

@@ -63,7 +63,46 @@ fn the_files_of_every_robot_are_used_without_an_error() {
                 run(&robot, &["run", "scenario.toml", "--runs", "1"]);
                 run(&robot, &["plan", "scenario.toml", "--runs", "1"]);
                 fits(&robot, board);
-                readme(&robot, board);
+                readme(&robot, board, &["servo", "trigger", "echo"]);
+            }
+        }
+    }
+}
+
+/// A ranger of light, alone or with a second one: on the boards that have a bus, with its pins; refused by name on the others.
+#[test]
+fn the_files_of_a_robot_with_light_are_used_without_an_error() {
+    let dir = tempfile::tempdir().unwrap();
+    for board in &boards() {
+        for sonar in ["vl53l1x", "vl53l0x"] {
+            let name = format!("{}-{sonar}", text(board, "name"));
+            let options = ["init", &name, "--board", text(board, "name"), "--sonar", sonar];
+            let second = [&options[..], &["--second-at", "-90 deg"]].concat();
+            let Some(bus) = board.get("bus") else {
+                let error = refusal(dir.path(), &options);
+                assert!(error.contains(text(board, "title")) && error.contains("bus"), "{error}");
+                let sonars = [&options[..4], &["--second-at", "90 deg"]].concat();
+                let error = refusal(dir.path(), &sonars);
+                assert!(error.contains("has one ranger"), "{error}");
+                continue;
+            };
+            run(dir.path(), &second);
+            let robot = dir.path().join(&name);
+            let checked = run(&robot, &["map", "check", "map.toml", "--robot", "robot.toml"]);
+            assert!(checked.contains("0 errors, 0 warnings"), "{name}: {checked}");
+            run(&robot, &["config", "bake", "robot.toml", "--out", "config.bin"]);
+            run(&robot, &["map", "bake", "map.toml", "--out", "map.bin"]);
+            let json = run(&robot, &["run", "scenario.toml", "--runs", "2", "--json"]);
+            let summary: serde_json::Value = serde_json::from_str(&json).unwrap();
+            assert_eq!(summary.get("lost_runs").unwrap(), 0, "{name}: {summary}");
+            run(&robot, &["plan", "scenario.toml", "--runs", "1"]);
+            fits(&robot, board);
+            readme(&robot, board, &["servo"]);
+            let readme = fs::read_to_string(robot.join("README.md")).unwrap();
+            for bus in [bus, board.get("second").unwrap()] {
+                let [scl, sda] =
+                    ["scl", "sda"].map(|line| bus.get(line).unwrap().as_str().unwrap());
+                assert!(readme.contains(&format!("{scl}, {sda}")), "{name}: {readme}");
             }
         }
     }
@@ -78,7 +117,8 @@ fn fits(robot: &Path, board: &toml::Table) {
 }
 
 /// The commands and pins are those of the board, and nothing is left of the template.
-fn readme(robot: &Path, board: &toml::Table) {
+/// The pins of a ranger are those of `ranger`.
+fn readme(robot: &Path, board: &toml::Table, ranger: &[&str]) {
     for file in ["robot.toml", "map.toml", "scenario.toml", "README.md"] {
         let text = fs::read_to_string(robot.join(file)).unwrap();
         assert!(!text.contains('@'), "{file}: {text}");
@@ -87,7 +127,11 @@ fn readme(robot: &Path, board: &toml::Table) {
     for key in ["title", "package", "target", "chip"] {
         assert!(readme.contains(text(board, key)), "{key}");
     }
+    let of_rangers = ["servo", "trigger", "echo"];
     for (signal, pin) in board.get("pins").unwrap().as_table().unwrap() {
+        if of_rangers.contains(&signal.as_str()) && !ranger.contains(&signal.as_str()) {
+            continue;
+        }
         assert!(readme.contains(pin.as_str().unwrap()), "{signal}");
     }
     for key in ["config", "map"] {
@@ -140,9 +184,10 @@ fn a_folder_with_files_is_left_alone() {
 #[test]
 fn wrong_answers_are_refused_and_leave_no_folder() {
     let dir = tempfile::tempdir().unwrap();
-    let cases: [(&[&str], &str); 7] = [
+    let cases: [(&[&str], &str); 8] = [
         (&["--board", "arduino"], "pico2"),
-        (&["--sonar", "srf08"], "hc_sr04, lv_maxsonar"),
+        (&["--sonar", "srf08"], "hc_sr04, lv_maxsonar, vl53l1x, vl53l0x"),
+        (&["--second-at", "90"], "a unit is missing"),
         (&["--servo", "sg91"], "sg90, mg996r"),
         (&["--wheel-diameter", "65"], "a unit is missing"),
         (&["--wheel-diameter", "0 mm"], "must be a positive length"),
@@ -205,6 +250,11 @@ fn the_docs_have_the_table_of_boards() {
             let pin = pin.as_str().unwrap();
             let has_pin = |cell: &&str| cell.split_whitespace().next() == Some(pin);
             assert!(rows.iter().any(has_pin), "{name} {signal}: {pin}");
+        }
+        let further = ["bus", "second"].iter().filter_map(|key| board.get(*key)?.as_table());
+        for (signal, pin) in further.flatten() {
+            let pin = pin.as_str().unwrap();
+            assert!(rows.iter().any(|cell| cell.contains(pin)), "{name} {signal}: {pin}");
         }
         for resistor in board["divider"].as_array().unwrap() {
             assert!(guide.contains(resistor.as_str().unwrap()), "{name}: {resistor}");

@@ -2,7 +2,6 @@
 
 use clap::ValueEnum;
 use sonarfix::config::{PingSchedule, Ranging};
-use sonarfix::echo::EchoParameters;
 use sonarfix::range::RangeNoise;
 use sonarfix::units::{Duration, Metres, Radians};
 use sonarfix_hal::ranger::{PulseTiming, RangerKind, RangerSettings};
@@ -22,6 +21,8 @@ pub enum SonarPreset {
     Polaroid6500,
     /// VL53L1X: 0.05–3.2 m along a beam of light.
     Vl53l1x,
+    /// VL53L0X: 0.05–1.2 m along a beam of light.
+    Vl53l0x,
 }
 
 /// The filter parameters of a sonar.
@@ -40,8 +41,14 @@ struct FilterParameters {
 
 impl SonarPreset {
     /// All of them.
-    pub const ALL: [Self; 5] =
-        [Self::HcSr04, Self::LvMaxsonar, Self::Srf08, Self::Polaroid6500, Self::Vl53l1x];
+    pub const ALL: [Self; 6] = [
+        Self::HcSr04,
+        Self::LvMaxsonar,
+        Self::Srf08,
+        Self::Polaroid6500,
+        Self::Vl53l1x,
+        Self::Vl53l0x,
+    ];
 
     /// The sonar with this name in files, with hyphens or without.
     #[must_use]
@@ -65,6 +72,7 @@ impl SonarPreset {
             Self::Srf08 => "SRF08",
             Self::Polaroid6500 => "Polaroid 6500",
             Self::Vl53l1x => "VL53L1X",
+            Self::Vl53l0x => "VL53L0X",
         }
     }
 
@@ -109,7 +117,20 @@ impl SonarPreset {
                 noise: (0.005, 0.005),
                 cycle: 60_000,
             },
+            Self::Vl53l0x => FilterParameters {
+                sonar: SonarName::Vl53l0x,
+                cone: 15.0,
+                reach: (0.05, 1.2),
+                noise: (0.01, 0.02),
+                cycle: 60_000,
+            },
         }
+    }
+
+    /// Whether it measures with light.
+    #[must_use]
+    pub fn is_light(self) -> bool {
+        self.model().is_some_and(|model| model.beam.is_some())
     }
 
     fn model(self) -> Option<SonarModel> {
@@ -128,10 +149,11 @@ impl SonarPreset {
         sonar.max_range = Metres(filter.reach.1);
         sonar.noise = RangeNoise { floor: Metres(filter.noise.0), per_metre: filter.noise.1 };
         sonar.timing.cycle = Duration::from_ticks(filter.cycle);
-        let beam = self.model().and_then(|model| model.beam);
+        let model = self.model();
+        let beam = model.and_then(|model| model.beam);
         sonar.ranging = beam.map_or(Ranging::Sound, Ranging::Light);
-        if beam.is_some() {
-            scenario.robot.localizer.echo = EchoParameters::VL53L1X;
+        if let Some(echo) = model.filter(|_| beam.is_some()).and_then(|model| model.echo) {
+            scenario.robot.localizer.echo = echo;
         }
         let ranger = &mut scenario.robot.ranger;
         ranger.kind = match self {
@@ -142,6 +164,7 @@ impl SonarPreset {
                 ranger.temperature.0.into(),
             )),
             Self::Vl53l1x => RangerSettings::VL53L1X.kind,
+            Self::Vl53l0x => RangerSettings::VL53L0X.kind,
         };
     }
 }

@@ -175,6 +175,28 @@ fn a_waiting_robot_checks_its_devices_once_a_second() {
     assert!((8..=10).contains(&silent), "{silent}");
 }
 
+/// A ranger that is being set up refuses triggers for a while, and one that is broken forever.
+#[test]
+fn a_trigger_that_is_too_soon_is_repeated_every_millisecond() {
+    let baked = Baked::new(&config());
+    let mut bench = Bench::switched_on(&baked, SimFlash::new());
+    bench.wait(1_100);
+    let before = loop_status(&bench.wait(1_100)).faults;
+    bench.hardware.ranger.refusals = 20;
+    bench.hardware.ranger.echo = Some(Metres(1e4));
+    let pinged = (0..1_100).any(|_| {
+        bench.wait(1);
+        bench.hardware.ranger.is_pinging()
+    });
+    assert!(pinged && bench.hardware.ranger.refusals == 0);
+    bench.hardware.ranger.echo = None;
+    bench.wait(1_100);
+    bench.hardware.ranger.refusals = u32::MAX;
+    let after = loop_status(&bench.wait(10_000)).faults;
+    // The ping without an end, and each check.
+    assert!((8..=11).contains(&(after.ranger - before.ranger)), "{}", after.ranger);
+}
+
 #[test]
 fn a_long_pause_permits_a_burst_of_writes_and_no_more() {
     let second = |seconds: u64| Instant::from_ticks(seconds * 1_000_000);

@@ -76,6 +76,8 @@ pub struct Sonar {
     pub is_there: bool,
     /// The echo that a ping would have; none without a room.
     pub echo: Option<Metres>,
+    /// Triggers that it refuses as too soon.
+    pub refusals: u32,
     /// The ping in flight.
     ping: Option<Ping>,
 }
@@ -100,6 +102,10 @@ impl Ranger for Sonar {
     }
 
     fn trigger(&mut self, now: Instant) -> Result<(), TriggerError<Missing>> {
+        if self.refusals > 0 {
+            self.refusals -= 1;
+            return Err(TriggerError::TooSoon);
+        }
         self.ping = Some(Ping { sent: now, echo: self.echo });
         Ok(())
     }
@@ -248,7 +254,7 @@ impl<'m> Bench<'m> {
             right: Encoder(Some(0)),
             left: Encoder(Some(0)),
             servo: servo(&servo_is_there),
-            ranger: Sonar { is_there: true, echo: None, ping: None },
+            ranger: Sonar { is_there: true, echo: None, refusals: 0, ping: None },
         };
         let (receiver, sender) = (Receiver::new(), Sender::starting_at(1));
         let (line, first) = (Line::default(), Polled::default());

@@ -8,6 +8,8 @@ use super::air::Air;
 pub(super) const SRF_ADDRESS: u8 = 0x70;
 /// The address of a VL53L1X after a reset: 0x52 in the datasheet's eight bits.
 pub(super) const VL53L1X_ADDRESS: u8 = 0x29;
+/// That of a VL53L0X, which is the same.
+pub(super) const VL53L0X_ADDRESS: u8 = 0x29;
 /// Least time from ping to ping: the ranging, and 5 ms for the ranger to get ready.
 pub(super) const SRF_CYCLE: Duration = Duration::from_ticks(70_000);
 
@@ -27,6 +29,11 @@ pub enum RangerKind {
     Custom,
     /// VL53L1X, a time-of-flight ranger on an I²C bus: [`Vl53l1x`](super::Vl53l1x).
     Vl53l1x {
+        /// Address in seven bits.
+        address: u8,
+    },
+    /// VL53L0X, a time-of-flight ranger on an I²C bus: [`Vl53l0x`](super::Vl53l0x).
+    Vl53l0x {
         /// Address in seven bits.
         address: u8,
     },
@@ -69,6 +76,13 @@ impl RangerSettings {
     /// (`docs/hardware.md`).
     pub const VL53L1X: Self = Self {
         kind: RangerKind::Vl53l1x { address: VL53L1X_ADDRESS },
+        cycle: Duration::from_ticks(60_000),
+        air: Air::ROOM,
+    };
+
+    /// VL53L0X at the address that it has after a reset. A range takes 50 ms (`docs/hardware.md`).
+    pub const VL53L0X: Self = Self {
+        kind: RangerKind::Vl53l0x { address: VL53L0X_ADDRESS },
         cycle: Duration::from_ticks(60_000),
         air: Air::ROOM,
     };

@@ -12,6 +12,7 @@ use sonarfix::units::{Duration, Instant, Metres};
 use super::driver::{Ranger, TriggerError, UnsupportedKind};
 use super::echo::{Echo, NoEcho, Outcome};
 use super::settings::{RangerKind, RangerSettings, VL53L1X_ADDRESS};
+use super::shot::{Shot, encoded};
 use crate::time::{NEVER, after, since};
 
 mod registers;
@@ -75,14 +76,11 @@ impl<E: core::fmt::Debug> core::error::Error for Vl53l1xError<E> {}
 pub struct Vl53l1x<I> {
     bus: I,
     address: u8,
-    /// Least time from ping to ping.
-    cycle: Duration,
+    shot: Shot,
     /// Whether the settings are written.
     is_set: bool,
     /// Whether the first range has calibrated the sensor.
     is_calibrated: bool,
-    triggered: Option<Instant>,
-    in_flight: bool,
 }
 
 /// The registers of a range that are read.
@@ -101,11 +99,9 @@ impl<I: I2c> Vl53l1x<I> {
         Self {
             bus,
             address: VL53L1X_ADDRESS,
-            cycle: RangerSettings::VL53L1X.cycle,
+            shot: Shot::new(RangerSettings::VL53L1X.cycle),
             is_set: false,
             is_calibrated: false,
-            triggered: None,
-            in_flight: false,
         }
     }
 
@@ -259,29 +255,15 @@ fn periods(micros: u32, period: u32) -> u32 {
     ((micros << 12) + period / 2).checked_div(period).unwrap_or(0)
 }
 
-/// A timeout of so many macro periods as the sensor stores it: one more than mantissa · 2^exponent.
-fn encoded(periods: u32) -> u16 {
-    let (mut mantissa, mut exponent) = (periods.saturating_sub(1), 0_u16);
-    while mantissa > 0xFF {
-        mantissa >>= 1;
-        exponent += 1;
-    }
-    #[expect(clippy::cast_possible_truncation, reason = "at most 0xFF")]
-    let mantissa = mantissa as u16;
-    exponent << 8 | mantissa
-}
-
 impl<I: I2c> Ranger for Vl53l1x<I> {
     type Error = Vl53l1xError<I::Error>;
 
     fn ready_at(&self) -> Instant {
-        self.triggered.map_or(Instant::from_ticks(0), |at| after(at, self.cycle))
+        self.shot.ready_at()
     }
 
     fn trigger(&mut self, now: Instant) -> Result<(), TriggerError<Self::Error>> {
-        // A ping that is no longer polled must not block the next one forever.
-        let age = since(now, self.triggered.unwrap_or(now));
-        if (self.in_flight && age < GIVE_UP) || now < self.ready_at() {
+        if !self.shot.may_start(now, GIVE_UP) {
             return Err(TriggerError::TooSoon);
         }
         if !self.is_set {
@@ -294,17 +276,18 @@ impl<I: I2c> Ranger for Vl53l1x<I> {
             self.is_set = false;
             return Err(TriggerError::Device(error));
         }
-        self.triggered = Some(now);
-        self.in_flight = true;
+        self.shot.start(now);
         Ok(())
     }
 
     fn poll(&mut self, now: Instant) -> Result<Option<Outcome>, Self::Error> {
-        let Some(sent) = self.triggered.filter(|_| self.in_flight) else {
+        let Some(sent) = self.shot.in_flight_since() else {
             return Ok(None);
         };
         let result = self.listen(sent, now);
-        self.in_flight = matches!(result, Ok(None));
+        if !matches!(result, Ok(None)) {
+            self.shot.end();
+        }
         // What does not respond may have lost its settings.
         if matches!(result, Err(_) | Ok(Some(Err(NoEcho::NoResponse)))) {
             self.is_set = false;
@@ -313,15 +296,14 @@ impl<I: I2c> Ranger for Vl53l1x<I> {
     }
 
     fn poll_at(&self) -> Option<Instant> {
-        let sent = self.triggered.filter(|_| self.in_flight);
-        Some(sent.map_or(NEVER, |sent| after(sent, RANGING)))
+        Some(self.shot.in_flight_since().map_or(NEVER, |sent| after(sent, RANGING)))
     }
 
     fn configure(&mut self, settings: &RangerSettings) -> Result<(), UnsupportedKind> {
         let RangerSettings { kind: RangerKind::Vl53l1x { address }, cycle, .. } = *settings else {
             return Err(UnsupportedKind);
         };
-        (self.address, self.cycle, self.is_set) = (address, cycle.max(RANGING), false);
+        (self.address, self.shot.cycle, self.is_set) = (address, cycle.max(RANGING), false);
         Ok(())
     }
 }

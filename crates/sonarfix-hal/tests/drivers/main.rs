@@ -10,6 +10,7 @@ mod quadrature;
 mod servo;
 mod srf;
 mod two_wire;
+mod vl53l0x;
 mod vl53l1x;
 
 use sonarfix::units::{Duration, Instant};

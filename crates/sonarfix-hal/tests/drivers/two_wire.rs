@@ -9,7 +9,12 @@ use embedded_hal::digital::{ErrorType, InputPin, OutputPin};
 use embedded_hal::i2c::{ErrorKind, I2c, NoAcknowledgeSource, Operation};
 use proptest::prelude::*;
 use sonarfix::gyro::GyroParameters;
-use sonarfix_hal::gyro::{MOST_STRETCHES, Mpu6050, TwoWire, Unreadable, YawRate};
+use sonarfix::units::Instant;
+use sonarfix_hal::bus::{MOST_STRETCHES, SharedBus, TwoWire};
+use sonarfix_hal::gyro::{Mpu6050, Unreadable, YawRate};
+use sonarfix_hal::ranger::{
+    Ranger, RangerKind, RangerSettings, TriggerError, Vl53l0x, Vl53l0xError,
+};
 
 const ADDRESS: u8 = 0x68;
 
@@ -249,6 +254,25 @@ fn a_gyro_is_configured_and_read() {
     assert!((gyro.rate().unwrap().to_degrees() - 1.0).abs() < 1e-3);
     let waited = bus.borrow().waited;
     assert!((100_000..300_000).contains(&waited), "{waited} ns");
+}
+
+/// A gyro and a ranger in turn on one bus, each with its own address.
+#[test]
+fn two_drivers_share_a_bus() {
+    let mut registers = [0; 256];
+    (registers[0x75], registers[0xC0]) = (0x68, 0xEE);
+    let bus = Bus::new(registers);
+    let shared = SharedBus::new(master(&bus));
+    let mut gyro = Mpu6050::new(&shared);
+    let mut ranger = Vl53l0x::new(&shared);
+    let kind = RangerKind::Vl53l0x { address: ADDRESS };
+    ranger.configure(&RangerSettings { kind, ..RangerSettings::VL53L0X }).unwrap();
+    gyro.configure(&GyroParameters::MPU_6050).unwrap();
+    let now = Instant::from_ticks(0);
+    assert_eq!(ranger.trigger(now), Err(TriggerError::TooSoon), "the set-up has begun");
+    assert!(gyro.rate().is_ok());
+    let missing = Vl53l0xError::Bus(ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address));
+    assert_eq!(Vl53l0x::new(&shared).trigger(now), Err(TriggerError::Device(missing)));
 }
 
 #[test]

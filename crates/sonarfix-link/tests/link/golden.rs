@@ -125,6 +125,7 @@ fn every_variant_has_the_number_of_its_version() {
         RangerKind::Srf { address: 0 },
         RangerKind::Custom,
         RangerKind::Vl53l1x { address: 0 },
+        RangerKind::Vl53l0x { address: 0 },
     ]);
     let limits = SettingError::Limits;
     numbered(&[

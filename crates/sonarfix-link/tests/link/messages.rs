@@ -502,7 +502,7 @@ fn ranger(source: &mut impl Source) -> RangerConfig {
     RangerConfig {
         servo_pulses: [0; 2]
             .map(|_| MeasuredPulse { width: source.duration(), bearing: Radians(source.single()) }),
-        kind: match source.pick(4) {
+        kind: match source.pick(5) {
             0 => RangerKind::Pulse(PulseTiming {
                 trigger: source.duration(),
                 blanking: source.duration(),
@@ -513,6 +513,7 @@ fn ranger(source: &mut impl Source) -> RangerConfig {
             }),
             1 => RangerKind::Srf { address: source.bits16().to_le_bytes()[0] },
             2 => RangerKind::Vl53l1x { address: source.bits16().to_le_bytes()[0] },
+            3 => RangerKind::Vl53l0x { address: source.bits16().to_le_bytes()[0] },
             _ => RangerKind::Custom,
         },
         temperature: Celsius(source.single()),

@@ -1,4 +1,6 @@
-//! A VL53L1X on a bus of its own: its identity, its state, and the result of its last range.
+//! Time-of-flight rangers, each on a bus of its own: their identity, their state, and the result of the last range. Here the VL53L1X.
+
+mod vl53l0x;
 
 use core::cell::Cell;
 
@@ -7,10 +9,13 @@ use serde::{Deserialize, Serialize};
 
 use super::bus::transact;
 
+pub use vl53l0x::Vl53l0xWire;
+
 /// What a time-of-flight ranger reports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct LightSignal {
-    /// The status of the range (`RESULT__RANGE_STATUS`): 9 if it is complete, 4 without light; 0 while it is measured.
+    /// The status of the range, as the sensor's register has it: of a VL53L1X 9 if it is complete, 4 without light; of a VL53L0X
+    /// eight times 11 or 4. 0 while it is measured.
     pub status: u8,
     /// The range in millimetres, without the sensor's correction gain.
     pub millimetres: u16,
@@ -18,9 +23,9 @@ pub struct LightSignal {
     pub has_failed: bool,
 }
 
-/// The wire.
+/// The wire of a VL53L1X.
 #[derive(Debug, Default)]
-pub struct LightWire {
+pub struct Vl53l1xWire {
     signal: Cell<LightSignal>,
     /// The register that is read next.
     register: Cell<u16>,
@@ -38,7 +43,7 @@ const MODEL_ID: u16 = 0x010F;
 const MODEL: [u8; 2] = [0xEA, 0xCC];
 const FREQUENCY: [u8; 2] = [0xBC, 0x00];
 
-impl LightWire {
+impl Vl53l1xWire {
     /// Applies the signal. A range that was started since is not yet in it.
     pub(super) fn apply(&self, signal: LightSignal) {
         self.signal.set(signal);
@@ -86,11 +91,11 @@ impl LightWire {
     }
 }
 
-impl i2c::ErrorType for &LightWire {
+impl i2c::ErrorType for &Vl53l1xWire {
     type Error = ErrorKind;
 }
 
-impl I2c for &LightWire {
+impl I2c for &Vl53l1xWire {
     fn transaction(&mut self, _: u8, operations: &mut [Operation<'_>]) -> Result<(), ErrorKind> {
         let has_failed = self.signal.get().has_failed;
         transact(has_failed, operations, |bytes| self.take(bytes), || self.next())

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use sonarfix_plan::preset::{ServoPreset, SonarPreset};
 
 use super::question::Question;
@@ -15,9 +15,12 @@ pub struct Args {
     /// The board: its name in firmware/boards.toml.
     #[arg(long)]
     board: Option<String>,
-    /// The sonar: `hc_sr04` or `lv_maxsonar`, which the boards can drive.
+    /// The ranger: `hc_sr04` or `lv_maxsonar`, or of light `vl53l1x` or `vl53l0x`.
     #[arg(long)]
     sonar: Option<String>,
+    /// A second ranger of this kind at a fixed bearing, with its unit, for example "90 deg"; none without this option.
+    #[arg(long, value_name = "BEARING", allow_hyphen_values = true)]
+    second_at: Option<String>,
     /// The servo of the sonar: sg90 or mg996r.
     #[arg(long)]
     servo: Option<String>,
@@ -36,14 +39,17 @@ pub struct Args {
 pub struct Answers {
     pub board: Board,
     pub sonar: SonarPreset,
+    /// The bearing of a second one.
+    pub second_at: Option<String>,
     pub servo: (&'static str, ServoPreset),
     pub wheel_diameter: String,
     pub track_width: String,
     pub ticks_per_revolution: f64,
 }
 
-/// The sonars that the boards can drive.
-const SONARS: [SonarPreset; 2] = [SonarPreset::HcSr04, SonarPreset::LvMaxsonar];
+/// The rangers that the boards can drive.
+const SONARS: [SonarPreset; 4] =
+    [SonarPreset::HcSr04, SonarPreset::LvMaxsonar, SonarPreset::Vl53l1x, SonarPreset::Vl53l0x];
 const SERVOS: [(&str, ServoPreset); 2] =
     [("sg90", ServoPreset::Sg90), ("mg996r", ServoPreset::Mg996r)];
 
@@ -59,6 +65,21 @@ impl Answers {
         let sonars = SONARS.map(SonarPreset::file_name);
         let sonar =
             Question::new("--sonar", "sonar", &sonars, "hc_sr04").ask(args.sonar.as_deref())?;
+        let sonar = SonarPreset::named(&sonar).context("no such sonar")?;
+        ensure!(
+            !sonar.is_light() || board.bus.is_some(),
+            "--sonar: the firmware of the {} has no I2C bus for a {}; the boards with one are listed in docs/firmware.md",
+            board.title,
+            sonar.name()
+        );
+        let ask =
+            |bearing| Question::new("--second-at", "bearing", &[], "90 deg").ask(Some(bearing));
+        let second_at = args.second_at.as_deref().map(ask).transpose()?;
+        ensure!(
+            second_at.is_none() || board.second.is_some(),
+            "--second-at: the firmware of the {} has one ranger; the boards with two are listed in docs/firmware.md",
+            board.title
+        );
         let servos = SERVOS.map(|(name, _)| name);
         let servo = Question::new("--servo", "servo of the sonar", &servos, "sg90")
             .ask(args.servo.as_deref())?;
@@ -70,7 +91,8 @@ impl Answers {
         let edges = length("--ticks-per-revolution", what, "1496.6", &edges)?;
         Ok(Self {
             board,
-            sonar: SonarPreset::named(&sonar).context("no such sonar")?,
+            sonar,
+            second_at,
             servo: SERVOS.into_iter().find(|(name, _)| *name == servo).context("no such servo")?,
             wheel_diameter: length(
                 "--wheel-diameter",

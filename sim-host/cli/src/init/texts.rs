@@ -3,6 +3,7 @@
 use sonarfix_map::Scenario;
 
 use super::answers::Answers;
+use sonarfix_boards::Bus;
 
 const ROBOT: &str = include_str!("../../templates/robot.toml");
 const MAP: &str = include_str!("../../templates/map.toml");
@@ -44,7 +45,6 @@ fn replacements(answers: &Answers) -> anyhow::Result<Vec<(&'static str, String)>
     let sonar = fitted.robot.localizer.sonar;
     let (board, pins) = (&answers.board, &answers.board.pins);
     let hexadecimal = |address: u32| format!("{address:#010X}").replace("0X", "0x");
-    let [upper, lower] = &board.divider;
     Ok(vec![
         ("title", board.title.clone()),
         ("package", board.package.clone()),
@@ -55,20 +55,19 @@ fn replacements(answers: &Answers) -> anyhow::Result<Vec<(&'static str, String)>
         ("config_address", hexadecimal(board.config.address)),
         ("map_address", hexadecimal(board.map.address)),
         ("map_bytes", board.map.bytes.to_string()),
-        ("divider_upper", upper.clone()),
-        ("divider_lower", lower.clone()),
         ("right_a", pins.right_a.clone()),
         ("right_b", pins.right_b.clone()),
         ("left_a", pins.left_a.clone()),
         ("left_b", pins.left_b.clone()),
         ("servo_pin", pins.servo.clone()),
-        ("trigger", pins.trigger.clone()),
-        ("echo", pins.echo.clone()),
         ("enable", pins.enable.clone()),
         ("right_1", pins.right_1.clone()),
         ("right_2", pins.right_2.clone()),
         ("left_1", pins.left_1.clone()),
         ("left_2", pins.left_2.clone()),
+        ("rangers", wiring(answers)),
+        ("table", if answers.second_at.is_some() { "[[sonar]]" } else { "[sonar]" }.to_owned()),
+        ("second", second(answers)),
         ("tx", pins.tx.clone()),
         ("rx", pins.rx.clone()),
         ("sonar", answers.sonar.file_name().to_owned()),
@@ -82,6 +81,44 @@ fn replacements(answers: &Answers) -> anyhow::Result<Vec<(&'static str, String)>
         ("noise", sonar.noise.floor.0.to_string()),
         ("noise_per_metre", sonar.noise.per_metre.to_string()),
     ])
+}
+
+/// The rows of the rangers in the table of signals.
+fn wiring(answers: &Answers) -> String {
+    let Answers { board, sonar, second_at, .. } = answers;
+    let pins = &board.pins;
+    let [upper, lower] = &board.divider;
+    let rows = |which: &str, trigger: &str, echo: &str, bus: Option<&Bus>| match bus {
+        Some(Bus { scl, sda }) if sonar.is_light() => {
+            format!("| {which}, which gets 3.3 V: SCL, SDA | {scl}, {sda} |\n")
+        }
+        _ => format!(
+            "| trigger of the {which} | {trigger} |\n| echo of the {which}, through {upper} with {lower} to ground | {echo} |\n"
+        ),
+    };
+    let kind = if sonar.is_light() { "ranger" } else { "sonar" };
+    let first = rows(kind, &pins.trigger, &pins.echo, board.bus.as_ref());
+    let second =
+        board.second.as_ref().filter(|_| second_at.is_some()).map_or_else(String::new, |pins| {
+            rows(&format!("second {kind}"), &pins.trigger, &pins.echo, Some(&pins.bus))
+        });
+    first + &second
+}
+
+/// The table of a second ranger, which is like the first but does not turn. The keys have the placeholders of the template.
+fn second(answers: &Answers) -> String {
+    let Some(bearing) = &answers.second_at else { return String::new() };
+    format!(
+        "\n[[sonar]]\n\
+         mount = [\"0 mm\", \"60 mm\"]            # measure\n\
+         bearing = \"{bearing}\"\n\
+         cone = \"@cone@ deg\"\n\
+         min_range = \"@min_range@ m\"\n\
+         max_range = \"@max_range@ m\"\n\
+         noise = \"@noise@ m\"\n\
+         noise_per_metre = \"@noise_per_metre@ m/m\"\n\
+         ranger = \"@sonar@\"\n"
+    )
 }
 
 /// How to write program and images over USB, on a board that can.

@@ -308,9 +308,9 @@ pub fn of_sonar(heard: &Heard) -> Hint {
         Some(Err(NoEcho::NoResponse)) => Hint::wrong(
             "no pulse on the echo line: 5 V and ground of the sonar? trigger and echo swapped? upper resistor?",
         ),
-        Some(Err(NoEcho::Failed | NoEcho::Mistimed)) => {
-            Hint::wrong("its driver fails: a program for another board, or another ranger")
-        }
+        Some(Err(NoEcho::Failed | NoEcho::Mistimed)) => Hint::wrong(
+            "its driver fails: no sensor on its bus (3.3 V? SDA and SCL swapped?), or another ranger or board",
+        ),
         Some(Err(NoEcho::Nothing | NoEcho::OutOfRange)) if heard.has_echo => {
             Hint::good("no wall within its range at present")
         }

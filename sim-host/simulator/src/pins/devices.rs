@@ -76,9 +76,10 @@ pub fn mount_servo(scenario: &mut Scenario, name: ServoName) {
 pub fn listening_time(driver: &RangerConfig) -> u64 {
     let timing = match driver.kind {
         RangerKind::Pulse(timing) => timing,
-        RangerKind::Srf { .. } | RangerKind::Custom | RangerKind::Vl53l1x { .. } => {
-            PulseTiming::HC_SR04
-        }
+        RangerKind::Srf { .. }
+        | RangerKind::Custom
+        | RangerKind::Vl53l1x { .. }
+        | RangerKind::Vl53l0x { .. } => PulseTiming::HC_SR04,
     };
     timing.listen.to_micros()
 }

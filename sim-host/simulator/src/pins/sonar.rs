@@ -49,7 +49,7 @@ impl<'a> SonarDevice<'a> {
                 servo: devices::servo(sonar, name),
                 ordered: None,
                 board: SonarBoard::default(),
-                light: LightChip::default(),
+                light: LightChip::of(driver.kind),
                 signals: EchoSignals::default(),
                 is_raised: false,
                 silence: devices::listening_time(driver) + GIVES_UP_AFTER,

@@ -308,6 +308,7 @@ fn sensor(scenario: &Scenario) -> SensorModel {
         SonarName::Srf08 => SensorModel::srf08(),
         SonarName::Polaroid6500 => SensorModel::polaroid_6500(),
         SonarName::Vl53l1x => SensorModel::vl53l1x(),
+        SonarName::Vl53l0x => SensorModel::vl53l0x(),
     };
     SensorModel { scale: scenario.truth.range_scale, ..model }
 }

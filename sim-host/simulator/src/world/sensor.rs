@@ -154,28 +154,31 @@ impl SensorModel {
     }
 
     /// VL53L1X in its long mode with 50 ms of light. From `docs/hardware.md`: 4 cm to 4 m, a field of view of 27°,
-    /// steps of 1 mm. The shares of dark walls and glass, and the noise in indoor light, are assumed.
+    /// steps of 1 mm. The noise in indoor light is assumed.
     #[must_use]
     pub fn vl53l1x() -> Self {
-        let light = LightModel {
-            half_view: 13.5_f64.to_radians(),
-            pointing: 0.0,
-            absorbed: 0.03,
-            through: 0.005,
-        };
         let share = Curve::through(&[(2.5, 0.99), (3.2, 0.9), (4.0, 0.3)]);
+        let light = Self::of_light(13.5_f64.to_radians(), (0.04, 4.0), share);
+        Self { noise: 0.004, noise_per_metre: 0.003, ..light }
+    }
+
+    /// VL53L0X with 50 ms for a range. From `docs/hardware.md`: to 1.2 m, on a white wall up to 2 m, a field of view of 25°,
+    /// steps of 1 mm. The noise in indoor light is assumed.
+    #[must_use]
+    pub fn vl53l0x() -> Self {
+        let share = Curve::through(&[(0.7, 0.99), (1.2, 0.9), (2.0, 0.1)]);
+        let light = Self::of_light(12.5_f64.to_radians(), (0.04, 2.0), share);
+        Self { noise: 0.006, noise_per_metre: 0.015, ..light }
+    }
+
+    /// A time-of-flight ranger without noise, with steps of 1 mm. The shares of dark walls, glass and outliers are assumed.
+    fn of_light(half_view: f64, reach: (f64, f64), share: Curve) -> Self {
         Self {
             short: Curve::level(0.005),
             long: Curve::level(0.005),
-            noise: 0.004,
-            noise_per_metre: 0.003,
             quantum: 0.001,
-            light: Some(light),
-            ..Self::of_mirrors(
-                light.half_view,
-                (0.04, 4.0),
-                Sensitivity { share, ..Sensitivity::perfect() },
-            )
+            light: Some(LightModel { half_view, pointing: 0.0, absorbed: 0.03, through: 0.005 }),
+            ..Self::of_mirrors(half_view, reach, Sensitivity { share, ..Sensitivity::perfect() })
         }
     }
 

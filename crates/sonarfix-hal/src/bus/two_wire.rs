@@ -21,7 +21,8 @@ const FREEING_CLOCKS: u8 = 9;
 /// # fn wired(scl: impl embedded_hal::digital::OutputPin + embedded_hal::digital::InputPin,
 /// #     sda: impl embedded_hal::digital::OutputPin + embedded_hal::digital::InputPin,
 /// #     delay: impl embedded_hal::delay::DelayNs) {
-/// use sonarfix_hal::gyro::{Mpu6050, TwoWire};
+/// use sonarfix_hal::bus::TwoWire;
+/// use sonarfix_hal::gyro::Mpu6050;
 /// let gyro = Mpu6050::new(TwoWire::new(scl, sda, delay));
 /// # }
 /// ```
