@@ -59,7 +59,6 @@ pub struct Second {
     /// The pulses of its servo, if it has one.
     pub servo: String,
     /// The bus of a ranger of light.
-    #[serde(flatten)]
     pub bus: Bus,
 }
 

@@ -77,7 +77,7 @@ fn the_files_of_a_robot_with_light_are_used_without_an_error() {
         for sonar in ["vl53l1x", "vl53l0x"] {
             let name = format!("{}-{sonar}", text(board, "name"));
             let options = ["init", &name, "--board", text(board, "name"), "--sonar", sonar];
-            let second = [&options[..], &["--second-at", "-90 deg"]].concat();
+            let second = [&options[..], &["--second-at", "90 deg"]].concat();
             let Some(bus) = board.get("bus") else {
                 let error = refusal(dir.path(), &options);
                 assert!(error.contains(text(board, "title")) && error.contains("bus"), "{error}");
@@ -99,7 +99,7 @@ fn the_files_of_a_robot_with_light_are_used_without_an_error() {
             fits(&robot, board);
             readme(&robot, board, &["servo"]);
             let readme = fs::read_to_string(robot.join("README.md")).unwrap();
-            for bus in [bus, board.get("second").unwrap()] {
+            for bus in [bus, &board["second"]["bus"]] {
                 let [scl, sda] =
                     ["scl", "sda"].map(|line| bus.get(line).unwrap().as_str().unwrap());
                 assert!(readme.contains(&format!("{scl}, {sda}")), "{name}: {readme}");
@@ -251,9 +251,11 @@ fn the_docs_have_the_table_of_boards() {
             let has_pin = |cell: &&str| cell.split_whitespace().next() == Some(pin);
             assert!(rows.iter().any(has_pin), "{name} {signal}: {pin}");
         }
-        let further = ["bus", "second"].iter().filter_map(|key| board.get(*key)?.as_table());
-        for (signal, pin) in further.flatten() {
-            let pin = pin.as_str().unwrap();
+        let second = board.get("second").and_then(toml::Value::as_table);
+        let buses = [board.get("bus"), second.and_then(|second| second.get("bus"))];
+        let buses = buses.into_iter().flatten().filter_map(toml::Value::as_table);
+        for (signal, pin) in second.into_iter().chain(buses).flatten() {
+            let Some(pin) = pin.as_str() else { continue };
             assert!(rows.iter().any(|cell| cell.contains(pin)), "{name} {signal}: {pin}");
         }
         for resistor in board["divider"].as_array().unwrap() {

@@ -238,7 +238,7 @@ fn no_step_of_the_set_up_takes_long() {
 fn a_status_is_the_reason_for_no_range() {
     for (status, signal, outcome) in [
         (11, 31, Err(NoEcho::Nothing)),
-        (11, 32, Ok(1_500)),
+        (11, 32, Ok(1_500.0)),
         (4, 500, Err(NoEcho::Nothing)),
         (0, 500, Err(NoEcho::Nothing)),
         (7, 500, Err(NoEcho::Nothing)),
@@ -253,7 +253,7 @@ fn a_status_is_the_reason_for_no_range() {
         let sent = started(&mut ranger, &bus, 0);
         bus.answer(status, signal, 1_500);
         let result = ranger.poll(at(sent + DUE)).unwrap().unwrap();
-        let millimetres = result.map(|echo| (1e3 * echo.range.0).round() as u32);
+        let millimetres = result.map(|echo| (1e3 * echo.range.0).round());
         assert_eq!(millimetres, outcome, "{status}");
     }
 }

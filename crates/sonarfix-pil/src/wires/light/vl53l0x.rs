@@ -5,7 +5,7 @@ use core::cell::Cell;
 use embedded_hal::i2c::{self, ErrorKind, I2c, Operation};
 
 use super::LightSignal;
-use crate::wires::transact;
+use crate::wires::bus::transact;
 
 /// The wire.
 #[derive(Debug, Default)]
