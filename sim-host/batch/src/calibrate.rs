@@ -6,7 +6,8 @@ use std::ops::Range;
 
 use crate::bearings::Bearings;
 pub use crate::calibration::{
-    BOTH_WAYS, CalibrateError, Calibration, Determined, Estimate, FEWEST_INLIERS, Nominal, Residual,
+    BOTH_WAYS, CalibrateError, Calibration, Determined, Estimate, FEWEST_EXPLAINED, FEWEST_INLIERS,
+    Nominal, Residual,
 };
 use crate::chain_of_poses::Chain;
 use crate::constants::{COUNT, Name};

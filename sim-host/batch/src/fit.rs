@@ -9,7 +9,9 @@
 use std::ops::Range;
 
 use crate::bearings::{self, Bearings, WallPing};
-use crate::calibration::{BOTH_WAYS, CalibrateError, FEWEST_INLIERS, Nominal, share};
+use crate::calibration::{
+    BOTH_WAYS, CalibrateError, FEWEST_EXPLAINED, FEWEST_INLIERS, Nominal, share,
+};
 use crate::chain::Covariance;
 use crate::chain_of_poses::Chain;
 use crate::constants::{Constants, Name, Priors};
@@ -357,6 +359,11 @@ impl<'a> Fit<'a> {
             let (inliers, expected) = self.counted();
             if expected == 0 || share(inliers, expected) < FEWEST_INLIERS {
                 return Err(CalibrateError::FewInliers { inliers, expected });
+            }
+            let pings = &self.problem.recording.pings;
+            let echoes = pings.iter().filter(|ping| ping.range.is_some()).count();
+            if share(inliers, echoes) < FEWEST_EXPLAINED {
+                return Err(CalibrateError::Unexplained { inliers, echoes });
             }
         }
         for name in Name::ALL.into_iter().filter(|name| self.problem.priors.is_free(*name)) {
