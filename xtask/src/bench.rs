@@ -12,17 +12,20 @@ use crate::elf::Program;
 use crate::emulator;
 use crate::program::{M0PLUS, M3, M4F, M4F_FUSED, M4F_SMALL, Target};
 use crate::workspace::Workspace;
-use crate::{budgets, cargo};
+use crate::{budgets, cargo, firmware, parts};
 
+pub mod cmsis;
 mod host;
 mod page;
 mod subjects;
 
-use subjects::{Figures, OnTarget, SUBJECTS};
+use page::Tables;
+use subjects::{CMSIS, Figures, OnTarget, SUBJECTS};
 
 pub fn run() -> anyhow::Result<()> {
+    cmsis::fetch()?;
     for target in [M4F, M4F_FUSED, M4F_SMALL, M3, M0PLUS] {
-        target.build(Workspace::Bench, "bench-mcu --features peers")?;
+        target.build(Workspace::Bench, "bench-mcu --features peers,crazyflie")?;
         target.build(Workspace::Bench, "bench-ours")?;
     }
     host::build()?;
@@ -38,7 +41,11 @@ pub fn run() -> anyhow::Result<()> {
         bar.set_message(subject.label);
         let name = subject.name;
         let figures = Figures {
-            version: versions.get(subject.package).cloned().unwrap_or_default(),
+            version: if subject.package == CMSIS {
+                cmsis::version()?
+            } else {
+                versions.get(subject.package).cloned().unwrap_or_default()
+            },
             m4f: on_target(&M4F, name)?,
             m4f_fused: on_target(&M4F_FUSED, name)?,
             m4f_small: on_target(&M4F_SMALL, name)?,
@@ -52,7 +59,13 @@ pub fn run() -> anyhow::Result<()> {
     }
     bar.finish_and_clear();
     let path = cargo::root().join("docs/benchmarks.md");
-    fs::write(&path, page::written(rows, &tools()?, &budgets::standing()?)?)?;
+    let tables = Tables {
+        poll: parts::tables(false)?,
+        fix: parts::tables(true)?,
+        memory: firmware::size_tables()?,
+        bars: budgets::standing()?,
+    };
+    fs::write(&path, page::written(rows, &tools()?, &tables)?)?;
     eprintln!("written: docs/benchmarks.md");
     Ok(())
 }
@@ -85,5 +98,8 @@ fn tools() -> anyhow::Result<Vec<String>> {
         let text = cargo::output(command)?;
         Ok(text.lines().next().unwrap_or_default().to_owned())
     };
-    ["rustc", "qemu-system-arm", "valgrind"].into_iter().map(first_line).collect()
+    ["rustc", "arm-none-eabi-gcc", "qemu-system-arm", "valgrind"]
+        .into_iter()
+        .map(first_line)
+        .collect()
 }

@@ -2,6 +2,7 @@
 
 use anyhow::Context;
 
+use crate::bench::cmsis;
 use crate::cargo;
 use crate::workspace::Workspace;
 
@@ -54,9 +55,9 @@ pub fn lint_emulated() -> anyhow::Result<()> {
 
 /// Compares the result of every peer with that of an independent filter.
 pub fn peers() -> anyhow::Result<()> {
-    cargo::check(
-        Workspace::Bench.cargo("test --package bench-host --test agreement --test derived"),
-    )
+    cmsis::fetch()?;
+    let tests = "test --package bench-host --features crazyflie --test agreement --test derived";
+    cargo::check(Workspace::Bench.cargo(tests))
 }
 
 /// Checks licences and sources of the crates and of the firmware; advisories too if their database can be reached.

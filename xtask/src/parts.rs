@@ -1,6 +1,7 @@
 //! What the longest poll of the loop costs, by part, and the fix of the localizer.
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::path::Path;
 use std::process::Command;
 
@@ -31,10 +32,12 @@ pub struct Args {
     #[arg(long)]
     without: Option<String>,
     /// Simulated seconds of `classroom`.
-    #[arg(long, default_value_t = 60)]
+    #[arg(long, default_value_t = SECONDS)]
     seconds: u32,
 }
 
+/// The default of `--seconds`.
+const SECONDS: u32 = 60;
 /// A poll of the application.
 const POLL: &str = "sonarfix_app::app::App<F>::poll";
 /// What executes a command: the polls that start the loop.
@@ -70,14 +73,32 @@ const PARTS: [(&str, &str); 24] = [
 ];
 
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    let profile =
-        if args.fix { probe(&M0PLUS, "localizer", "probe_fix")? } else { worst_poll(args)? };
+    let profile = if args.fix { worst_fix()? } else { worst_poll(args)? };
     if args.tree {
         print_tree(&profile);
     } else {
-        print_parts(&profile);
+        print!("{}", table(&profile));
     }
     Ok(())
+}
+
+/// The tables of `cargo xtask parts`: of the worst poll, or of the worst fix.
+pub fn tables(fix: bool) -> anyhow::Result<String> {
+    let profile = if fix { worst_fix()? } else { worst_poll(&Args::of_a_poll())? };
+    Ok(table(&profile))
+}
+
+impl Args {
+    /// Without any option.
+    fn of_a_poll() -> Self {
+        let function = POLL.to_owned();
+        Self { fix: false, m0plus: false, tree: false, function, without: None, seconds: SECONDS }
+    }
+}
+
+/// The worst fix of the localizer on a Cortex-M0+.
+fn worst_fix() -> anyhow::Result<Profile> {
+    probe(&M0PLUS, "localizer", "probe_fix")
 }
 
 /// The most expensive call of a function of a probe.
@@ -165,7 +186,8 @@ fn part_of<'n>(mut stack: impl Iterator<Item = &'n str>) -> &'static str {
     stack.find_map(part).unwrap_or("the rest")
 }
 
-fn print_parts(profile: &Profile) {
+/// The parts by their instructions, and [`routines`].
+fn table(profile: &Profile) -> String {
     let mut parts: BTreeMap<&str, u64> = BTreeMap::new();
     for (at, node) in profile.nodes.iter().enumerate() {
         *parts.entry(part_of(profile.stack(at))).or_default() += node.own;
@@ -173,16 +195,18 @@ fn print_parts(profile: &Profile) {
     let all = profile.instructions();
     let mut parts: Vec<_> = parts.into_iter().collect();
     parts.sort_by_key(|&(_, instructions)| std::cmp::Reverse(instructions));
-    println!("| part | instructions | % |\n|---|---:|---:|");
+    let mut text = "| part | instructions | % |\n|---|---:|---:|\n".to_owned();
+    // Writing to a string does not fail, here and below.
     for (part, instructions) in parts {
-        println!("| {part} | {instructions} | {} |", (100 * instructions + all / 2) / all);
+        let share = (100 * instructions + all / 2) / all;
+        let _ = writeln!(text, "| {part} | {instructions} | {share} |");
     }
-    println!("| all | {all} | 100 |");
-    print_routines(profile);
+    let _ = writeln!(text, "| all | {all} | 100 |");
+    text + &routines(profile)
 }
 
 /// The routines that compute in floating point where the core cannot: how often they are called, and what a call takes.
-fn print_routines(profile: &Profile) {
+fn routines(profile: &Profile) -> String {
     let mut routines: BTreeMap<&str, (u64, u64)> = BTreeMap::new();
     for (at, node) in profile.nodes.iter().enumerate() {
         let name = profile.stack(at).next().unwrap_or_default();
@@ -192,14 +216,15 @@ fn print_routines(profile: &Profile) {
             *instructions += profile.inclusive(at);
         }
     }
-    if routines.is_empty() {
-        return;
+    let mut text = String::new();
+    if !routines.is_empty() {
+        text += "\n| routine | calls | instructions of a call | together |\n|---|---:|---:|---:|\n";
     }
-    println!("\n| routine | calls | instructions of a call | together |\n|---|---:|---:|---:|");
     for (name, (calls, instructions)) in routines {
         let mean = instructions.checked_div(calls).unwrap_or_default();
-        println!("| {name} | {calls} | {mean} | {instructions} |");
+        let _ = writeln!(text, "| {name} | {calls} | {mean} | {instructions} |");
     }
+    text
 }
 
 fn print_tree(profile: &Profile) {

@@ -37,9 +37,9 @@ fn measure<F: Filter>(criterion: &mut Criterion, name: &str) {
 }
 
 macro_rules! measure_each {
-    ($($name:ident: $filter:ty;)*) => {
+    ($($(#[$feature:meta])* $name:ident: $filter:ty;)*) => {
         fn filters(criterion: &mut Criterion) {
-            $(measure::<$filter>(criterion, stringify!($name));)*
+            $($(#[$feature])* measure::<$filter>(criterion, stringify!($name));)*
         }
     };
 }

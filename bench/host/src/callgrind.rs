@@ -33,10 +33,10 @@ fn run<F: Filter>() {
 }
 
 macro_rules! run_named {
-    ($($name:ident: $filter:ty;)*) => {
+    ($($(#[$feature:meta])* $name:ident: $filter:ty;)*) => {
         fn run_named(name: &str) -> bool {
             match name {
-                $(stringify!($name) => run::<$filter>(),)*
+                $($(#[$feature])* stringify!($name) => run::<$filter>(),)*
                 _ => return false,
             }
             true

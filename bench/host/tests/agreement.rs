@@ -170,8 +170,8 @@ fn sonarfix_kernel() {
 }
 
 macro_rules! agrees {
-    ($($name:ident: $filter:ty;)*) => {
-        $(#[test] fn $name() { assert_agrees::<$filter>(); })*
+    ($($(#[$feature:meta])* $name:ident: $filter:ty;)*) => {
+        $($(#[$feature])* #[test] fn $name() { assert_agrees::<$filter>(); })*
     };
 }
 

@@ -3,6 +3,8 @@
 
 #[cfg(feature = "adskalman")]
 pub mod adskalman;
+#[cfg(feature = "crazyflie")]
+pub mod crazyflie;
 pub mod derived;
 #[cfg(feature = "kfilter")]
 pub mod kfilter;
@@ -15,11 +17,14 @@ pub mod naive;
 #[cfg(feature = "numeris")]
 pub mod numeris;
 
-/// Calls `$do!(name: type; …)` with every peer, by the name of its program in `bench-mcu`, and with the further arguments.
+/// Calls `$do!(name: type; …)` with every peer, by the name of its program in `bench-mcu`, and with the further arguments. The
+/// feature `crazyflie` is that of the calling crate.
 #[macro_export]
 macro_rules! each_filter {
     ($do:ident, $($rest:tt)*) => {
         $do! {
+            #[cfg(feature = "crazyflie")]
+            crazyflie: $crate::filters::crazyflie::Crazyflie;
             derived: $crate::filters::derived::Plain;
             derived_stabilised: $crate::filters::derived::Stabilised;
             naive: $crate::filters::naive::Plain;

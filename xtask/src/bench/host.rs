@@ -14,8 +14,8 @@ const SCALAR: &str = "-C no-vectorize-loops -C no-vectorize-slp";
 
 /// Builds the program that callgrind runs.
 pub fn build() -> anyhow::Result<()> {
-    let mut command =
-        Workspace::Bench.cargo("build --release --package bench-host --bin callgrind");
+    let mut command = Workspace::Bench
+        .cargo("build --release --package bench-host --features crazyflie --bin callgrind");
     command.env("RUSTFLAGS", SCALAR);
     cargo::check(command)
 }
@@ -36,7 +36,7 @@ pub fn instructions(name: &str, call: &str) -> anyhow::Result<f64> {
 
 /// Nanoseconds of ten predicts and one update, by filter: criterion's median.
 pub fn times<'a>(names: impl Iterator<Item = &'a str>) -> anyhow::Result<BTreeMap<&'a str, f64>> {
-    let bench = "bench --package bench-host --bench filters -- --noplot --warm-up-time 1 --measurement-time 2";
+    let bench = "bench --package bench-host --features crazyflie --bench filters -- --noplot --warm-up-time 1 --measurement-time 2";
     cargo::check(Workspace::Bench.cargo(bench))?;
     names.map(|name| Ok((name, median(name)?))).collect()
 }

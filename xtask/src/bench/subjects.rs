@@ -14,12 +14,16 @@ pub struct Subject {
     pub form: &'static str,
 }
 
+/// The package of `PyPI` with the C source of a peer.
+pub const CMSIS: &str = "cmsisdsp";
+
 /// The first two are Sonarfix's.
-pub const SUBJECTS: [Subject; 14] = [
+pub const SUBJECTS: [Subject; 15] = [
     subject("shipped", "**Sonarfix as it ships**", "sonarfix", "plain, if sharp Joseph"),
     subject("kernel", "**Sonarfix's kernel alone**", "sonarfix", "plain, if sharp Joseph"),
     subject("derived", "derived by sympy", "bench-workload", "plain"),
     subject("derived_stabilised", "derived by sympy", "bench-workload", "Joseph"),
+    subject("crazyflie", "Crazyflie's form, CMSIS-DSP", CMSIS, "Joseph"),
     subject("naive", "naive nalgebra", "nalgebra", "plain"),
     subject("naive_joseph", "naive nalgebra", "nalgebra", "Joseph"),
     subject("adskalman_symmetric", "adskalman", "adskalman", "symmetrised"),

@@ -1,6 +1,7 @@
 //! Flash and RAM of the linked file, by crate.
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 
 use anyhow::{Context, ensure};
 use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
@@ -48,26 +49,32 @@ impl Flash {
 
 /// Prints both tables, and checks the size of core, loop and drivers.
 pub fn check(bytes: &[u8]) -> anyhow::Result<()> {
-    let file = object::File::parse(bytes)?;
-    print_flash(&file)?;
-    print_ram(&file)
+    println!("\n{}", tables(bytes)?);
+    let (core, _) = by_crate(&object::File::parse(bytes)?)?;
+    let bytes = Flash::sum(&core).bytes();
+    ensure!(bytes <= FLASH_BAR, "core, loop and drivers exceed their limit of flash");
+    Ok(())
 }
 
-fn print_flash(file: &object::File) -> anyhow::Result<()> {
+/// Flash by crate, and variables.
+pub fn tables(bytes: &[u8]) -> anyhow::Result<String> {
+    let file = object::File::parse(bytes)?;
+    Ok(format!("{}\n{}", flash(&file)?, ram(&file)?))
+}
+
+fn flash(file: &object::File) -> anyhow::Result<String> {
     let (core, others) = by_crate(file)?;
-    println!("\n| flash | code | constants |\n|---|---|---|");
-    let row = |name: &str, Flash { code, constants }| {
-        println!("| {name} | {code} | {constants} |");
+    let mut text = "| flash | code | constants |\n|---|---|---|\n".to_owned();
+    let mut row = |name: &str, Flash { code, constants }| {
+        // Writing to a string does not fail, here and below.
+        let _ = writeln!(text, "| {name} | {code} | {constants} |");
     };
     for (name, flash) in &core {
         row(name, *flash);
     }
     let sum = Flash::sum(&core);
     let bytes = sum.bytes();
-    println!(
-        "| **core, loop and drivers: {bytes}** (bar: {FLASH_BAR}) | **{}** | **{}** |",
-        sum.code, sum.constants
-    );
+    row(&format!("**core, loop and drivers: {bytes}** (bar: {FLASH_BAR})"), sum);
     let (large, small): (Vec<_>, Vec<_>) =
         others.into_iter().partition(|(_, flash)| flash.bytes() >= LARGE_CRATE);
     for (name, flash) in &large {
@@ -79,9 +86,8 @@ fn print_flash(file: &object::File) -> anyhow::Result<()> {
     row("interrupt vectors, first values of variables", rest);
     let mut all = Flash::sum(core.iter().chain(&large).chain(&small));
     all.constants += rest.constants;
-    println!("| **all** | **{}** | **{}** |", all.code, all.constants);
-    ensure!(bytes <= FLASH_BAR, "core, loop and drivers exceed their limit of flash");
-    Ok(())
+    row("**all**", all);
+    Ok(text)
 }
 
 /// Crates by their size in flash, largest first.
@@ -164,7 +170,7 @@ fn objects(file: &object::File, section: &object::Section) -> BTreeMap<u64, u64>
     all
 }
 
-fn print_ram(file: &object::File) -> anyhow::Result<()> {
+fn ram(file: &object::File) -> anyhow::Result<String> {
     let mut rows = Vec::new();
     let mut all = 0;
     for section in memory::variables_of(file) {
@@ -175,7 +181,7 @@ fn print_ram(file: &object::File) -> anyhow::Result<()> {
         }
     }
     rows.sort_by_key(|(_, bytes)| std::cmp::Reverse(*bytes));
-    println!("\n| variable in RAM | of | bytes |\n|---|---|---|");
+    let mut text = "| variable in RAM | of | bytes |\n|---|---|---|\n".to_owned();
     let mut rest = all;
     for (path, bytes) in rows.iter().filter(|(_, bytes)| *bytes >= LARGE_VARIABLE) {
         let (owner, name) = path.split_once("::").unwrap_or((OTHER, path));
@@ -183,10 +189,10 @@ fn print_ram(file: &object::File) -> anyhow::Result<()> {
         // RTIC's prefixes of the names of a task's resources.
         let rtic = ["__rtic_internal_local_resource_", "__rtic_internal_local_init_"];
         let name = rtic.iter().find_map(|prefix| name.strip_prefix(prefix)).unwrap_or(name);
-        println!("| `{name}` | {} | {bytes} |", owner.replace('_', "-"));
+        let _ = writeln!(text, "| `{name}` | {} | {bytes} |", owner.replace('_', "-"));
         rest -= bytes;
     }
-    println!("| smaller ones | | {rest} |");
-    println!("| **all variables** | | **{all}** |");
-    Ok(())
+    let _ = writeln!(text, "| smaller ones | | {rest} |");
+    let _ = writeln!(text, "| **all variables** | | **{all}** |");
+    Ok(text)
 }
