@@ -207,6 +207,7 @@ fn measure_on(target: &Target) -> anyhow::Result<BTreeMap<String, u32>> {
     let programs = [
         ("filter", "core_and_expect", &["predict", "apply", "expect", "gate", "update"][..]),
         ("localizer", "localizer", &["odometry", "aim", "fix"][..]),
+        ("rangers", "rangers", &["light_aim", "light_fix", "pair_aim", "pair_fix"][..]),
         ("gyro", "gyro", &["turn", "turn_fix"][..]),
         ("absolute", "absolute", &["heading", "pose"][..]),
         ("search", "search", &["slice", "ping"][..]),

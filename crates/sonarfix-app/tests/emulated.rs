@@ -15,14 +15,14 @@ use std::path::Path;
 use std::process::{Child, Command as Process, Stdio};
 use std::time::{Duration, Instant};
 
-use sonarfix::config::{Config, ServoTiming};
+use sonarfix::config::{Config, LightBeam, Ranging, ServoTiming};
 use sonarfix::health::Verdict;
 use sonarfix::localizer::Start;
 use sonarfix::map::Wall;
 use sonarfix::pose::{Point, Pose};
 use sonarfix::units::{Metres, Radians};
 use sonarfix_hal::config::{RobotConfig, Unsupported};
-use sonarfix_hal::ranger::{NoEcho, RangerKind};
+use sonarfix_hal::ranger::{NoEcho, RangerKind, RangerSettings};
 use sonarfix_link::message::{CommandError, CommandResult, ImageStatus, LoopStatus};
 use sonarfix_link::{
     Ack, Command, Hello, Receiver, Sender, SessionCommand, Telemetry, baked, frame,
@@ -394,6 +394,43 @@ fn one_program_follows_different_configurations() {
     assert_eq!(robot.order(&Command::SetPose(pose())), CommandResult::Done);
     let refused = CommandError::Unsupported(Unsupported::Ranger);
     assert_eq!(robot.order(&Command::Start), CommandResult::Refused(refused));
+}
+
+/// The emulator has no bus. A ranger of light is taken, with a second one beside it, and the first is reported as missing before
+/// the loop runs and while it does; a third ranger is refused.
+#[test]
+#[ignore = "cargo xtask test-firmware"]
+fn rangers_of_light_are_taken_and_reported_as_missing() {
+    let baked =
+        |config: &RobotConfig| baked::write(config, &mut [0; baked::LENGTH_MAX]).unwrap().to_vec();
+    for kind in [RangerSettings::VL53L1X.kind, RangerSettings::VL53L0X.kind] {
+        let mut config = configuration();
+        config.ranger.kind = kind;
+        config.localizer.sonar.ranging = Ranging::Light(LightBeam::VL53L1X);
+        let mut left = config.localizer.sonar;
+        left.servo = (Radians::from_degrees(90.0), Radians::from_degrees(90.0));
+        config.localizer.further_sonars.push(left).unwrap();
+        config.further_rangers.push(config.ranger).unwrap();
+        let mut robot = Robot::switched_on(&map(), &baked(&config));
+        robot.hello();
+        assert_eq!(robot.order(&Command::ShowDevices), CommandResult::Done);
+        let ping = robot.wait_for(|message| match message {
+            Telemetry::Devices(readings) => readings.ping,
+            _ => None,
+        });
+        assert_eq!(ping, Err(NoEcho::Failed), "no sensor acknowledges its address");
+        assert_eq!(robot.order(&Command::SetPose(pose())), CommandResult::Done);
+        assert_eq!(robot.order(&Command::Start), CommandResult::Done);
+        assert!(robot.loop_status().faults.ranger > 0);
+
+        config.localizer.further_sonars.push(left).unwrap();
+        config.further_rangers.push(config.ranger).unwrap();
+        let mut robot = Robot::switched_on(&map(), &baked(&config));
+        robot.hello();
+        assert_eq!(robot.order(&Command::SetPose(pose())), CommandResult::Done);
+        let refused = CommandError::Unsupported(Unsupported::Rangers);
+        assert_eq!(robot.order(&Command::Start), CommandResult::Refused(refused));
+    }
 }
 
 /// The emulator has no sensor. Each is reported as missing, before the loop runs and while it does; the loop runs
