@@ -6,12 +6,16 @@ use crate::map::{Map, Wall, WallId};
 use crate::units::Metres;
 use crate::vector::Vector;
 
-/// Two normals fit together within this cosine: 10°.
+/// Two normals fit together within this cosine: 14°.
 const SAME_ANGLE: f32 = 0.97;
+/// Length of the difference of two unit vectors at that angle, rounded up.
+const SAME_ANGLE_CHORD: f32 = 0.245;
 /// The sine of the least angle between two lines of a pair: 30°.
 const LEAST_ANGLE: f32 = 0.5;
 /// A line need not lie on its wall with all of its stretch, but with half of it, less this, metres.
 const SLACK: f32 = 0.15;
+/// What rounding adds to a distance between two walls, metres.
+const ROUNDING: f32 = 0.01;
 /// Walls that one step compares.
 const WALLS_A_STEP: u16 = 16;
 /// Steps along a wall, metres.
@@ -111,16 +115,20 @@ impl Pairs {
     }
 }
 
-/// An upper bound of the distance between two walls on which these lines lie, but for a quarter of a metre each.
+/// An upper bound of the distance between two walls on which these lines lie: each wall comes within [`SLACK`] of the middle of
+/// its line, because it holds half of the stretch, less that. The rotations onto both walls differ by the tolerance of their angle.
 fn gap(one: &Line, other: &Line) -> f32 {
-    let end = |line: &Line, along: f32| {
+    let middle = |line: &Line| {
+        let along = 0.5 * (line.stretch.0 + line.stretch.1);
         line.normal.times(line.offset).plus(line.normal.left().times(along))
     };
-    let from = end(one, one.stretch.0);
-    let nearer = end(other, other.stretch.0).minus(from).length_squared();
-    let farther = end(other, other.stretch.1).minus(from).length_squared();
-    let least = if nearer < farther { nearer } else { farther };
-    libm::sqrtf(least) + 0.5
+    let (one, other) = (middle(one), middle(other));
+    let (from, to) = (one.length_squared(), other.length_squared());
+    let nearer = if from < to { from } else { to };
+    libm::sqrtf(other.minus(one).length_squared())
+        + SAME_ANGLE_CHORD * libm::sqrtf(nearer)
+        + 2.0 * SLACK
+        + ROUNDING
 }
 
 // ===== Eq. (35): two lines on two walls =====
