@@ -131,6 +131,7 @@ pub(crate) struct Situation<'a> {
     pub ekf: &'a Ekf,
     pub history: &'a History,
     pub now: Instant,
+    pub policy: Policy,
 }
 
 impl<'a> Situation<'a> {
@@ -143,7 +144,7 @@ impl<'a> Situation<'a> {
         if self.config.has_several_sonars() {
             for (ranger, sonar) in self.config.sonars().skip(1) {
                 let other = Planner::new(self, ranger, sonar).choose();
-                best = better(self.config.policy, best, other);
+                best = better(self.policy, best, other);
             }
         }
         best
@@ -205,6 +206,7 @@ struct Planner<'a> {
     ekf: &'a Ekf,
     history: &'a History,
     now: Instant,
+    policy: Policy,
     ranger: RangerId,
     sonar: &'a Sonar,
     slot: Slot,
@@ -233,11 +235,11 @@ struct Pointing {
 
 impl<'a> Planner<'a> {
     fn new(situation: &Situation<'a>, ranger: RangerId, sonar: &'a Sonar) -> Self {
-        let Situation { config, map, ekf, history, now } = *situation;
+        let Situation { config, map, ekf, history, now, policy } = *situation;
         let view = Viewpoint::new(config, sonar, ekf);
         let duration = PingDuration::new(sonar);
         let slot = history.slot(ranger, config, &duration);
-        Self { config, map, ekf, history, now, ranger, sonar, slot, view, duration }
+        Self { config, map, ekf, history, now, policy, ranger, sonar, slot, view, duration }
     }
 
     /// The best ping of this ranger.
@@ -317,7 +319,7 @@ impl<'a> Planner<'a> {
         }
         let sight = self.heard(wall, (expected, on_wall), pointing.off);
         let mut candidate = self.candidate(id, &sight, &pointing);
-        candidate.score = match self.config.policy {
+        candidate.score = match self.policy {
             Policy::Nearest => candidate.success / candidate.expected.range.0,
             Policy::Informative => candidate.gain.0 * candidate.success / candidate.seconds,
         };

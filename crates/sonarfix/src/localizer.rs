@@ -12,7 +12,7 @@ use crate::absolute::{
 };
 use crate::aim::{Aim, History, NoAim, Origin, Situation, Standing};
 use crate::alternatives::{Scene, Target};
-use crate::config::{Config, ConfigError, RangerId, Ranging};
+use crate::config::{Config, ConfigError, Policy, RangerId, Ranging};
 use crate::covariance::{GyroBias, PredictedMeasurement};
 use crate::echo::{ExpectedEcho, Explanation, Others};
 use crate::ekf::{Ekf, EkfError, StandardDeviations, StateEstimate};
@@ -393,7 +393,12 @@ impl<'m> Localizer<'m> {
     /// # Errors
     /// [`NoAim`], by the reason for which there is no wall to measure.
     pub fn aim(&self) -> Result<Aim, NoAim> {
-        self.ekf.applied(|ekf| self.situation(ekf).choose())
+        self.aim_by(self.config.policy)
+    }
+
+    /// As [`Self::aim`], by another policy.
+    pub(crate) fn aim_by(&self, policy: Policy) -> Result<Aim, NoAim> {
+        self.ekf.applied(|ekf| Situation { policy, ..self.situation(ekf) }.choose())
     }
 
     /// As [`Self::aim`] for one ranger whose servo stands as given: for a robot with several, whose loop turns all servos
@@ -402,7 +407,18 @@ impl<'m> Localizer<'m> {
     /// # Errors
     /// [`NoAim`], by the reason for which there is no wall to measure.
     pub fn aim_of(&self, ranger: RangerId, standing: &Standing) -> Result<Aim, NoAim> {
-        self.ekf.applied(|ekf| self.situation(ekf).choose_of(ranger, standing))
+        self.aim_of_by(self.config.policy, ranger, standing)
+    }
+
+    /// As [`Self::aim_of`], by another policy.
+    pub(crate) fn aim_of_by(
+        &self,
+        policy: Policy,
+        ranger: RangerId,
+        standing: &Standing,
+    ) -> Result<Aim, NoAim> {
+        self.ekf
+            .applied(|ekf| Situation { policy, ..self.situation(ekf) }.choose_of(ranger, standing))
     }
 
     /// The wall to which a beam of the first ranger at `bearing` (relative to the heading) is square, for a range whose
@@ -424,7 +440,7 @@ impl<'m> Localizer<'m> {
 
     fn situation<'a>(&'a self, ekf: &'a Ekf) -> Situation<'a> {
         let Self { config, map, history, time, .. } = self;
-        Situation { config, map, ekf, history, now: *time }
+        Situation { config, map, ekf, history, now: *time, policy: config.policy }
     }
 
     /// Corrects the estimate by the range measured along an aim, or records that there was no echo.

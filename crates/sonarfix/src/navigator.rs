@@ -30,7 +30,7 @@
 
 use crate::absolute::AbsoluteMeasurement;
 use crate::aim::{Aim, NoAim, Standing};
-use crate::config::RangerId;
+use crate::config::{Policy, RangerId};
 use crate::ekf::{EkfError, StandardDeviations, StateEstimate};
 use crate::gyro::MeasuredTurn;
 use crate::health::Verdict;
@@ -58,6 +58,8 @@ const ELSEWHERE: f32 = 0.5;
 const TURNED: f32 = 0.35;
 /// Mean log-likelihood per ping from which the best hypothesis is a guess of an unknown pose.
 const LEAST_GUESS: f32 = 0.2;
+/// Pings of a provisional pose without an accepted range after which the nearest wall is measured.
+const UNUSED: u16 = 3;
 /// Cycles of the search after a failed hand-over before the next.
 const PAUSE: u32 = 2;
 /// A checkpoint holds deviations and no correlations. No covariance of four errors exceeds four times its diagonal.
@@ -112,6 +114,8 @@ pub struct Navigator<'m> {
     driven: Metres,
     /// Ranges accepted since the hand-over.
     accepted: u16,
+    /// Pings of the provisional pose since the last accepted range.
+    unused: u16,
     /// The search's cycles when the unknown pose was last guessed.
     guessed: u32,
     /// The search's cycles before which it hands nothing over.
@@ -164,6 +168,7 @@ impl<'m> Navigator<'m> {
             mode: Mode::Tracking,
             driven: Metres(0.0),
             accepted: 0,
+            unused: 0,
             guessed: 0,
             not_before: 0,
             checkpoints: [checkpoint; 2],
@@ -196,11 +201,18 @@ impl<'m> Navigator<'m> {
     /// and [`UNKNOWN_HEADING`]: in this region, or anywhere.
     pub fn search_in(&mut self, region: Option<Region>, search: &mut Search<'m>) {
         self.restart(search);
+        self.keep_calibration();
         self.localizer.declare_lost();
         self.mode = Mode::Searching;
         if let Some(region) = region {
             search.begin_within(region);
         }
+    }
+
+    /// Makes the present calibration that with which the search begins, and with which each of its failed answers is forgotten.
+    fn keep_calibration(&mut self) {
+        let [_, older] = &mut self.checkpoints;
+        *older = Calibration::of(&self.localizer);
     }
 
     fn restart(&mut self, search: &mut Search<'m>) {
@@ -249,6 +261,7 @@ impl<'m> Navigator<'m> {
         turn: Option<MeasuredTurn>,
         search: Option<&mut Search<'m>>,
     ) -> Result<(), OdometryError> {
+        let has_gyro = turn.is_some();
         let before = self.localizer.pose().heading;
         self.localizer.odometry_with_turn(now, travel, turn)?;
         // The deviations are read after each step.
@@ -259,10 +272,16 @@ impl<'m> Navigator<'m> {
             self.record_calibration();
             return Ok(());
         }
-        let state = self.localizer.filter().state();
+        // The calibration with which the search has begun: its bend is that of one odometry.
+        let [_, Calibration { state, .. }] = &self.checkpoints;
         let right = travel.right.0 * (1.0 + state.scale_right);
         let left = travel.left.0 * (1.0 + state.scale_left);
-        let turn = self.localizer.pose().heading.from(before);
+        let width = self.localizer.config().drive.track_width + state.track_width_error;
+        let turn = if has_gyro {
+            self.localizer.pose().heading.from(before)
+        } else {
+            Radians((right - left) / width.0)
+        };
         // Travel that the localizer has accepted is finite.
         _ = search.odometry(Metres(0.5 * (right + left)), turn);
         Ok(())
@@ -291,7 +310,7 @@ impl<'m> Navigator<'m> {
     /// # Errors
     /// [`NoAim`], by the reason.
     pub fn aim(&self) -> Result<Aim, NoAim> {
-        self.localizer.aim()
+        self.localizer.aim_by(self.policy())
     }
 
     /// As [`Localizer::aim_of`], while the mode is not [`Mode::Searching`].
@@ -299,7 +318,18 @@ impl<'m> Navigator<'m> {
     /// # Errors
     /// [`NoAim`], by the reason.
     pub fn aim_of(&self, ranger: RangerId, standing: &Standing) -> Result<Aim, NoAim> {
-        self.localizer.aim_of(ranger, standing)
+        self.localizer.aim_of_by(self.policy(), ranger, standing)
+    }
+
+    /// The policy of the configuration; [`Policy::Nearest`] after [`UNUSED`] pings of a provisional pose without an accepted
+    /// range: a hidden wall neither confirms nor contradicts it, however much it would tell.
+    fn policy(&self) -> Policy {
+        self.policy_with(self.localizer.config().policy)
+    }
+
+    fn policy_with(&self, configured: Policy) -> Policy {
+        let is_hidden = self.mode == Mode::Provisional && self.unused >= UNUSED;
+        if is_hidden { Policy::Nearest } else { configured }
     }
 
     /// As [`Localizer::aim_along`], while the mode is not [`Mode::Searching`].
@@ -328,8 +358,9 @@ impl<'m> Navigator<'m> {
     ) -> Fix {
         let fix = self.localizer.fix(aim, range);
         if self.mode == Mode::Provisional {
-            self.accepted =
-                self.accepted.saturating_add(u16::from(matches!(fix, Fix::Accepted(_))));
+            let is_accepted = matches!(fix, Fix::Accepted(_));
+            self.accepted = self.accepted.saturating_add(u16::from(is_accepted));
+            self.unused = if is_accepted { 0 } else { self.unused.saturating_add(1) };
             if let Some(search) = search.filter(|_| aim.ranger == RangerId::FIRST) {
                 // What is not finite was refused above and is not taken here either.
                 _ = self.ping(aim.bearing, range, search);
@@ -393,6 +424,7 @@ impl<'m> Navigator<'m> {
             Mode::Searching => {
                 self.localizer.restart(state, deviation)?;
                 self.localizer.declare_lost();
+                self.keep_calibration();
             }
             Mode::Provisional => self.localizer.set_pose(&Start {
                 pose: state.pose(),
@@ -496,6 +528,7 @@ impl<'m> Navigator<'m> {
         let Answer::Unique(found) = search.answer() else { return None };
         self.localizer.set_pose(&start_of(&found)).ok()?;
         self.mode = Mode::Provisional;
+        self.unused = 0;
         self.begin_confirmation();
         Some(())
     }

@@ -9,6 +9,7 @@ use sonarfix_plan::{BLIND_AFTER, Forecast, HeadingAid, Spread, route};
 use sonarfix_report::Table;
 use sonarfix_report::heat_map::{Heat, HeatMap};
 use sonarfix_studies::floor_plan::{FloorPlan, picture};
+use sonarfix_studies::starts::{Share, Starts};
 
 use crate::output::check_file;
 use crate::overrides::has_servo;
@@ -39,6 +40,10 @@ pub struct Args {
     /// meet it along the whole path from a start that is known to 1 mm and 0.1°.
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     need: Option<f64>,
+    /// Starts the robot without a pose at so many places along the path, and reports from where it finds its pose, and after
+    /// how many metres.
+    #[arg(long, value_name = "N", conflicts_with = "compare")]
+    starts: Option<u32>,
     /// Number of runs: detection is random.
     #[arg(long, default_value_t = 10)]
     runs: u32,
@@ -62,6 +67,9 @@ struct Candidate {
     /// With `--need`, the bound on the position from a known start, metres.
     #[serde(skip_serializing_if = "Option::is_none")]
     from_known_start: Option<Spread>,
+    /// With `--starts`, what starts without a pose lead to.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    starts: Option<Starts>,
 }
 
 /// A robot to be compared.
@@ -86,12 +94,15 @@ impl Candidate {
     }
 }
 
+/// Longest time in which a robot without a pose drives on, seconds.
+const SEARCHED_FOR: f64 = 120.0;
 /// The deviations of a known start, metres and radians.
 const KNOWN_POSITION: f64 = 1e-3;
 const KNOWN_HEADING: f64 = 0.1 * std::f64::consts::PI / 180.0;
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
     anyhow::ensure!(args.runs > 0, "--runs must be at least 1");
+    anyhow::ensure!(args.starts != Some(0), "--starts must be at least 1");
     let is_sensible = args.need.is_none_or(|need| need > 0.0 && need.is_finite());
     anyhow::ensure!(is_sensible, "--need must be a number of millimetres above zero");
     if let Some(file) = &args.out {
@@ -101,15 +112,19 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let fitted = fitted(args, &scenario)?;
     let forecasts = fitted.len() * if args.need.is_some() { 2 } else { 1 };
     let count = u32::try_from(forecasts).unwrap_or(u32::MAX);
-    let runs = Runs::new(args.runs.saturating_mul(count));
+    let starts = args.starts.unwrap_or(0);
+    let runs = Runs::new(args.runs.saturating_mul(count).saturating_add(starts));
     let mut candidates = Vec::new();
     for Fitted { sensor, heading_aid, mut scenario } in fitted {
         let Some(forecast) = Forecast::new(&scenario, args.runs, &runs)? else { continue };
+        let searched =
+            args.starts.map(|starts| Starts::new(&scenario, starts, SEARCHED_FOR, &runs));
+        let starts = searched.transpose()?.flatten();
         scenario.start.position = KNOWN_POSITION;
         scenario.start.heading = KNOWN_HEADING;
         let known = args.need.map(|_| Forecast::new(&scenario, args.runs, &runs)).transpose()?;
         let from_known_start = known.flatten().map(|forecast| forecast.position);
-        candidates.push(Candidate { sensor, heading_aid, forecast, from_known_start });
+        candidates.push(Candidate { sensor, heading_aid, forecast, from_known_start, starts });
     }
     runs.end()?;
     candidates.sort_by(|a, b| a.forecast.position.rms.total_cmp(&b.forecast.position.rms));
@@ -120,6 +135,9 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     } else {
         for candidate in &candidates {
             println!("{}", table::text(&legs(candidate, args.need)));
+            if let Some(starts) = &candidate.starts {
+                println!("{}", table::text(&starts_table(starts)));
+            }
         }
     }
     if let (Some(file), Some(best)) = (&args.out, candidates.first()) {
@@ -258,13 +276,45 @@ fn legs(candidate: &Candidate, need: Option<f64>) -> Table {
     }
 }
 
+/// What starts without a pose on each leg lead to.
+fn starts_table(starts: &Starts) -> Table {
+    let metres = |metres: Option<f64>| metres.map_or("-".to_owned(), |m| format!("{m:.1}"));
+    let percent = |share: f64| format!("{:.0} %", 100.0 * share);
+    let row = |name: String, share: &Share| {
+        vec![
+            name,
+            share.starts.to_string(),
+            percent(share.right),
+            percent(share.wrong),
+            metres(share.median_metres),
+            metres(share.most_metres),
+        ]
+    };
+    let leg = |leg: &sonarfix_studies::starts::LegShare| {
+        row(format!("{} to {}", point(leg.from), point(leg.to)), &leg.share)
+    };
+    let whole = row("all".to_owned(), &starts.all);
+    Table {
+        title: "Starts without a pose".to_owned(),
+        note: format!(
+            "Driving on for at most {:.0} s, back and forth on the path. Metres until the pose is unique and right: of half of \
+             the starts, and of nine in ten.",
+            starts.seconds
+        ),
+        columns: ["from leg (m)", "starts", "right", "wrong", "half (m)", "9 in 10 (m)"]
+            .map(str::to_owned)
+            .to_vec(),
+        rows: starts.legs.iter().map(leg).chain([whole]).collect(),
+    }
+}
+
 /// One line per sonar and heading aid.
 fn comparison(candidates: &[Candidate], need: Option<f64>) -> Table {
     let mut columns = vec!["sonar", "beside it", "position (mm)", "worst at (m)", "heading (°)"];
     columns.extend(["longest blind (s)", "blind (%)", "ranges/s"]);
     columns.extend(need.into_iter().flat_map(|_| ["from a known start (mm)", "would do"]));
     let row = |candidate: &Candidate| {
-        let Candidate { sensor, heading_aid, forecast, from_known_start } = candidate;
+        let Candidate { sensor, heading_aid, forecast, from_known_start, .. } = candidate;
         let mut row = vec![
             sensor.clone(),
             heading_aid.map_or("", HeadingAid::name).to_owned(),

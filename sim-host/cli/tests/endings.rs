@@ -24,7 +24,7 @@ const PAPER: &str = "../../crates/sonarfix-map/scenarios/paper.toml";
 
 /// Every subcommand, with arguments for the shortest output. In `FILES` are a short log with its map and robot, a drive for
 /// the calibration, a recorded stream of a robot's bytes, rows, and room for results; `ROBOT` is the port of a robot.
-const PRINTING: [&[&str]; 47] = [
+const PRINTING: [&[&str]; 48] = [
     &["--help"],
     &["init", "FILES/robot"],
     &["paper", "--runs", "1"],
@@ -70,6 +70,7 @@ const PRINTING: [&[&str]; 47] = [
     &["bound", CLASSROOM],
     &["merge", "FILES/rows.csv"],
     &["plan", CLASSROOM, "--runs", "1"],
+    &["plan", CLASSROOM, "--runs", "1", "--starts", "1"],
     &["reality", "FILES"],
     &["faults", "--runs", "1"],
     &["health", "--runs", "1"],

@@ -227,6 +227,39 @@ fn the_uncertainty_of_the_start_does_not_decide_what_suffices() {
     assert!(table.contains(": does not suffice for 0.1 mm"), "{table}");
 }
 
+/// Starts without a pose are reported for each leg; far from the end of a corridor no pose is determined, in a room
+/// without symmetry most are.
+#[test]
+fn starts_without_a_pose_are_forecast() {
+    let dir = tempfile::tempdir().unwrap();
+    let room = write(dir.path(), "room.toml", ROOM);
+    let path = "1,1 1,3 4,3 4,1";
+    let plan = ["plan", &room, "--path", path, "--runs", "1", "--starts", "6"];
+    let answer = text(&sonarfix(&[&plan[..], &["--json"]].concat()));
+    let answer: Value = serde_json::from_str(&answer).unwrap();
+    assert_documented(&answer);
+    let starts = &answer[0]["starts"];
+    let legs = starts["legs"].as_array().unwrap();
+    assert_eq!(legs.len(), 3);
+    let of_legs: f64 = legs.iter().map(|leg| number(&leg["starts"])).sum();
+    assert!((of_legs - 6.0).abs() < 1e-9 && (number(&starts["starts"]) - 6.0).abs() < 1e-9);
+    let right: f64 = legs.iter().map(|leg| number(&leg["right"]) * number(&leg["starts"])).sum();
+    assert!((right / 6.0 - number(&starts["right"])).abs() < 1e-9, "{starts}");
+    assert!(number(&starts["right"]) > 0.6 && number(&starts["wrong"]) < 1e-9, "{starts}");
+    assert!(number(&starts["median_metres"]) > 0.3, "{starts}");
+    let table = text(&sonarfix(&plan));
+    assert!(table.contains("Starts without a pose") && table.contains("all"), "{table}");
+    // Far from the end of a corridor every place along it looks the same.
+    let corridor = write(dir.path(), "corridor.toml", CORRIDOR);
+    let along =
+        ["plan", &corridor, "--path", "15,0 20,0", "--runs", "1", "--starts", "2", "--json"];
+    let answer: Value = serde_json::from_str(&text(&sonarfix(&along))).unwrap();
+    let starts = &answer[0]["starts"];
+    assert!(number(&starts["right"]) < 1e-9 && starts["median_metres"].is_null(), "{starts}");
+    let message = error(&["plan", &room, "--path", path, "--starts", "0"]);
+    assert!(message.contains("--starts must be at least 1"), "{message}");
+}
+
 /// A map is the same to `plan` and `map` whether it is TOML, CSV, baked or that of a scenario.
 #[test]
 fn a_map_is_read_from_every_format() {

@@ -20,5 +20,6 @@ pub mod reality;
 pub mod relocalization;
 pub mod search_study;
 pub mod sonar_model;
+pub mod starts;
 pub mod surveys;
 mod sweeping_robot;

@@ -12,7 +12,7 @@ use sonarfix::map::{Map, MapError};
 use sonarfix::search::{Answer, Hypothesis, Search, SearchParameters};
 use sonarfix::units::{Metres, Radians};
 use sonarfix_hal::robot::EVALUATIONS_PER_MILLISECOND;
-use sonarfix_map::{BakeError, FileError, Follow, Scenario, Symmetry, symmetries};
+use sonarfix_map::{BakeError, FileError, Follow, PathError, Scenario, Symmetry, symmetries};
 use sonarfix_sim::angle;
 use sonarfix_sim::plant::Plant;
 use sonarfix_sim::progress::Progress;
@@ -46,6 +46,9 @@ pub enum SearchStudyError {
     /// The baked map is refused.
     #[error(transparent)]
     Map(#[from] MapError),
+    /// The path cannot be driven back.
+    #[error(transparent)]
+    Path(#[from] PathError),
 }
 
 /// The outcome of one trial.
@@ -57,6 +60,8 @@ pub struct Trial {
     pub walls: usize,
     /// Seconds until the first unique answer, if there was one; the trial ends with it.
     pub unique_after: Option<f64>,
+    /// Distance driven until then, or until the end, metres.
+    pub metres: f64,
     /// Whether the unique answer was right.
     pub is_right: bool,
     /// Position error of the unique answer, metres.
@@ -79,14 +84,43 @@ pub struct Trial {
 ///
 /// # Errors
 /// [`SearchStudyError`], if the map cannot be used.
-pub fn trial(mut scenario: Scenario, seed: u64, seconds: f64) -> Result<Trial, SearchStudyError> {
+pub fn trial(scenario: Scenario, seed: u64, seconds: f64) -> Result<Trial, SearchStudyError> {
     let mut rng = stream(seed, 0);
-    scenario.truth.scale_right = rng.random_range(-WHEEL_ERROR..WHEEL_ERROR);
-    scenario.truth.scale_left = rng.random_range(-WHEEL_ERROR..WHEEL_ERROR);
-    // There is no estimate to follow.
-    scenario.follow = Follow::Truth;
+    let errors = wheel_errors(&mut rng);
     let spare = scenario.path.duration() - seconds;
     let start = if spare > 1.0 { rng.random_range(0.0..spare) } else { 0.0 };
+    drive(scenario, seed, errors, start, seconds)
+}
+
+/// As [`trial`], from a given time of the path on.
+///
+/// # Errors
+/// As of [`trial`].
+pub fn trial_from(
+    scenario: Scenario,
+    seed: u64,
+    start: f64,
+    seconds: f64,
+) -> Result<Trial, SearchStudyError> {
+    let errors = wheel_errors(&mut stream(seed, 0));
+    drive(scenario, seed, errors, start, seconds)
+}
+
+/// Errors of the right and of the left wheel.
+fn wheel_errors(rng: &mut ChaCha8Rng) -> [f64; 2] {
+    [(); 2].map(|()| rng.random_range(-WHEEL_ERROR..WHEEL_ERROR))
+}
+
+fn drive(
+    mut scenario: Scenario,
+    seed: u64,
+    errors: [f64; 2],
+    start: f64,
+    seconds: f64,
+) -> Result<Trial, SearchStudyError> {
+    [scenario.truth.scale_right, scenario.truth.scale_left] = errors;
+    // There is no estimate to follow.
+    scenario.follow = Follow::Truth;
     let simulation = Simulation::new(scenario);
     let image = simulation.baked_map()?;
     let config = simulation.config();
@@ -100,6 +134,7 @@ pub fn trial(mut scenario: Scenario, seed: u64, seconds: f64) -> Result<Trial, S
         noise: stream(seed, 2),
         luck: stream(seed, 3),
         has_all_twins: None,
+        metres: 0.0,
     };
     let symmetries = symmetries(&simulation.scenario.floor)?;
     drive.plant.drive_to(start, &mut drive.wheels, &mut drive.slips);
@@ -127,6 +162,8 @@ struct Drive<'a> {
     noise: ChaCha8Rng,
     luck: ChaCha8Rng,
     has_all_twins: Option<bool>,
+    /// Driven since the start.
+    metres: f64,
 }
 
 impl Drive<'_> {
@@ -136,6 +173,7 @@ impl Drive<'_> {
         let [right, left] = self.plant.drive_to(time, &mut self.wheels, &mut self.slips).measured;
         let turn = (right - left) / self.track_width;
         let advance = f64::midpoint(right, left);
+        self.metres += advance.abs();
         // Simulated wheels are finite, and so are ranges.
         _ = self.search.odometry(Metres(advance as f32), Radians(turn as f32));
         let bearing = self.search.aim();
@@ -179,6 +217,7 @@ impl Drive<'_> {
             seed,
             walls: self.simulation.scenario.floor.named_walls().len(),
             unique_after: unique.as_ref().map(|(after, _)| *after),
+            metres: self.metres,
             is_right: unique.as_ref().is_some_and(|(_, found)| is_right(found)),
             position_error,
             heading_error,

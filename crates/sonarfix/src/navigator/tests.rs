@@ -169,6 +169,41 @@ fn a_unique_answer_is_handed_over() {
     }
 }
 
+/// Three pings without an accepted range, while the pose is provisional.
+#[test]
+fn a_hidden_wall_gives_way_to_the_nearest() {
+    let walls = walls();
+    for (mode, nearest) in [(Mode::Tracking, false), (Mode::Provisional, true)] {
+        let mut robot = Robot::in_mode(&walls, mode);
+        robot.navigator.unused = 0;
+        let is = |robot: &Robot| robot.navigator.policy_with(Policy::Informative);
+        for _ in 0..2 {
+            let aim = robot.navigator.aim().unwrap();
+            _ = robot.navigator.fix(&aim, None, Some(&mut robot.search));
+            assert_eq!(is(&robot), Policy::Informative);
+        }
+        let aim = robot.navigator.aim().unwrap();
+        _ = robot.navigator.fix(&aim, None, Some(&mut robot.search));
+        let expected = if nearest { Policy::Nearest } else { Policy::Informative };
+        assert_eq!(is(&robot), expected);
+        assert!(matches!(robot.fix(), Fix::Accepted(_)));
+        assert_eq!(is(&robot), Policy::Informative);
+    }
+}
+
+/// The localizer may correct its calibration: the bend of the search is that of the odometry with which it began.
+#[test]
+fn the_search_takes_the_odometry_of_one_calibration() {
+    let walls = walls();
+    let mut robot = Robot::in_mode(&walls, Mode::Provisional);
+    let filter = robot.navigator.localizer.filter();
+    let state = StateEstimate { scale_right: 0.1, scale_left: 0.1, ..filter.state() };
+    let deviation = filter.standard_deviations();
+    robot.navigator.localizer.restart(state, deviation).unwrap();
+    robot.drive(0.2, 0.2);
+    assert!((robot.search.driven() - 0.2).abs() < 1e-6, "{}", robot.search.driven());
+}
+
 /// The best hypothesis of each cycle, if it fits: as an unknown pose.
 #[test]
 fn an_unknown_pose_is_guessed_once_a_cycle() {

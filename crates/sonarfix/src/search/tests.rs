@@ -42,6 +42,11 @@ impl Search<'_> {
         self.answer = Decision::Unique(self.bank.entries()[0]);
     }
 
+    /// Metres driven since the search began.
+    pub(crate) fn driven(&self) -> f32 {
+        self.window.since_start()
+    }
+
     /// Ends a cycle that finds the same.
     pub(crate) fn find_again(&mut self) {
         self.cycles += 1;
