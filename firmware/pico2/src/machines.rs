@@ -14,13 +14,15 @@ pub type EncoderMachine<const SM: usize> = StateMachine<'static, PIO0, SM>;
 pub type EchoMachine<const SM: usize> = StateMachine<'static, PIO1, SM>;
 
 /// The program of the encoders' state machines.
+// Inlined, its calls of embassy's panics would be merged with others and belong to no line, which
+// `cargo xtask test-firmware` checks.
+#[inline(never)]
 pub fn encoder_program(pio: &mut Common<'static, PIO0>) -> LoadedProgram<'static, PIO0> {
     pio.load_program(&pio_file!("src/quadrature.pio").program)
 }
 
 /// Starts the counting of every edge of both channels. `queue` is the use of the machine's queues.
-// Inlined, its calls of embassy's panics would be merged with others and belong to no line, which
-// `cargo xtask test-firmware` checks.
+// As above.
 #[inline(never)]
 pub fn encoder<const SM: usize>(
     mut machine: EncoderMachine<SM>,
@@ -42,6 +44,8 @@ pub fn encoder<const SM: usize>(
 }
 
 /// The program of the echoes' state machines.
+// As above.
+#[inline(never)]
 pub fn echo_program(pio: &mut Common<'static, PIO1>) -> LoadedProgram<'static, PIO1> {
     pio.load_program(&pio_file!("src/echo.pio").program)
 }

@@ -21,6 +21,8 @@
 #![no_std]
 #![no_main]
 
+use core::mem::ManuallyDrop;
+
 use defmt_rtt as _;
 use embassy_executor::{Executor, Spawner};
 use embassy_rp::flash::{self, Flash};
@@ -74,6 +76,8 @@ type Hardware = WithGyro<
 >;
 
 type Ranger = AnyRanger<Output<'static>, &'static Bus>;
+/// Never dropped: the pins' drop can panic.
+type Buses = ManuallyDrop<[Bus; 2]>;
 type Bus = SharedBus<TwoWire<OutputOpenDrain<'static>, OutputOpenDrain<'static>, Delay>>;
 
 /// The bus with these pins for clock and data.
@@ -249,7 +253,7 @@ impl Board {
     /// Initializes the board; `None` if the memory map has no store.
     // Inlined, its stack frame would remain for the whole runtime.
     #[inline(never)]
-    fn new(buses: &'static mut Option<[Bus; 2]>) -> Option<(Self, Motors)> {
+    fn new(buses: &'static mut Option<Buses>) -> Option<(Self, Motors)> {
         let board = embassy_rp::init(embassy_rp::config::Config::default());
         let mut watchdog = Watchdog::new(board.WATCHDOG);
         let reset = reset(&watchdog);
@@ -272,9 +276,8 @@ impl Board {
         let (slice, pins) = (board.PWM_SLICE6, (board.PIN_12, board.PIN_13));
         let left_motor = Pwm::new_output_ab(slice, pins.0, pins.1, motor_pulses());
         let motors = Motors { right: right_motor, left: left_motor };
-        let [first, second] =
-            buses.insert([bus(board.PIN_15, board.PIN_14), bus(board.PIN_21, board.PIN_20)]);
-        let (first, second) = (&*first, &*second);
+        let made = [bus(board.PIN_15, board.PIN_14), bus(board.PIN_21, board.PIN_20)];
+        let [first, second] = &**buses.insert(ManuallyDrop::new(made));
         let trigger = Output::new(board.PIN_7, Level::Low);
         let servo = sonarfix_robot::servo(pulses);
         let ranger = sonarfix_robot::any_ranger(trigger, &ECHO, first);
@@ -387,7 +390,7 @@ async fn motors(mut motors: Motors) -> ! {
 /// Initializes the board and starts both tasks.
 // Inlined, its stack frame, which holds copies of the board, would remain for the whole runtime.
 #[inline(never)]
-fn start(spawner: Spawner, buses: &'static mut Option<[Bus; 2]>) {
+fn start(spawner: Spawner, buses: &'static mut Option<Buses>) {
     let Some((board, inputs)) = Board::new(buses) else {
         defmt::error!("the memory map has no store");
         return;
@@ -404,6 +407,6 @@ fn start(spawner: Spawner, buses: &'static mut Option<[Bus; 2]>) {
 #[cortex_m_rt::entry]
 fn main() -> ! {
     static mut EXECUTOR: Option<Executor> = None;
-    static mut BUSES: Option<[Bus; 2]> = None;
+    static mut BUSES: Option<Buses> = None;
     EXECUTOR.get_or_insert_with(Executor::new).run(|spawner| start(spawner, BUSES))
 }

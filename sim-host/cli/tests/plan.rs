@@ -176,7 +176,7 @@ fn sonars_are_compared_the_best_first() {
     assert_documented(&answer);
     let rms: Vec<f64> =
         answer.as_array().unwrap().iter().map(|c| number(&c["position"]["rms"])).collect();
-    assert_eq!(rms.len(), 15);
+    assert_eq!(rms.len(), 18);
     assert!(rms.is_sorted(), "{rms:?}");
 }
 
