@@ -69,7 +69,7 @@ pub fn size() -> anyhow::Result<()> {
     size::check(&build::read(&build::release()?)?)
 }
 
-/// The tables of [`size`].
+/// The tables of [`size()`].
 pub fn size_tables() -> anyhow::Result<String> {
     size::tables(&build::read(&build::release()?)?)
 }
