@@ -61,7 +61,7 @@ type Fix = extern "C" fn(&mut Robot, &Metres);
 fn drives() -> Option<bool> {
     let mut light = Config::for_track_width(Metres(0.16));
     light.sonar.ranging = Ranging::Light(LightBeam::VL53L1X);
-    let (with_light, [aim, fix]) = drive(light, probe_light_aim, probe_light_fix)?;
+    let (with_light, [aim, fix]) = drive(&light, probe_light_aim, probe_light_fix)?;
     report::cost(c"light_aim", &aim);
     report::cost(c"light_fix", &fix);
 
@@ -69,7 +69,7 @@ fn drives() -> Option<bool> {
     let mut second = pair.sonar;
     second.mount = Point::new(0.05, 0.08);
     pair.further_sonars.push(second).ok()?;
-    let (with_pair, [aim, fix]) = drive(pair, probe_pair_aim, probe_pair_fix)?;
+    let (with_pair, [aim, fix]) = drive(&pair, probe_pair_aim, probe_pair_fix)?;
     report::cost(c"pair_aim", &aim);
     report::cost(c"pair_fix", &fix);
     report::line(c"object", u32::try_from(size_of::<Localizer>()).unwrap_or(u32::MAX));
@@ -77,9 +77,9 @@ fn drives() -> Option<bool> {
 }
 
 /// Whether nothing was refused, and the costs of aim and fix.
-fn drive(config: Config, aim: Aim, fix: Fix) -> Option<(bool, [Cost; 2])> {
+fn drive(config: &Config, aim: Aim, fix: Fix) -> Option<(bool, [Cost; 2])> {
     let walls = room().ok()?;
-    let mut robot = Robot::new(config, &walls).ok()?;
+    let mut robot = Robot::new(*config, &walls).ok()?;
     let mut meter = Meter::start();
     let [mut aims, mut fixes] = [Cost::default(); 2];
     for step in 0..STEPS {
