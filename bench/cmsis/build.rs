@@ -13,7 +13,7 @@ fn main() {
     build.include(folder.join("Include")).include(folder.join("PrivateInclude"));
     // The library's own choice (`option(LOOPUNROLL … ON)`), and no dependency on CMSIS-Core.
     build.define("ARM_MATH_LOOPUNROLL", None).define("__GNUC_PYTHON__", None).warnings(false);
-    // As rustc is told for the other programs.
+    // The same choice as rustc's for the other programs.
     let flags = env::var("CARGO_ENCODED_RUSTFLAGS").unwrap_or_default();
     let is_fused = flags.contains("fp-contract=fast");
     build.flag(if is_fused { "-ffp-contract=fast" } else { "-ffp-contract=off" });

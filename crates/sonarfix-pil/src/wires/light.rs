@@ -23,13 +23,27 @@ pub struct LightSignal {
     pub has_failed: bool,
 }
 
+/// The range of a sensor: what it reports, and whether a new one was started.
+#[derive(Debug, Default)]
+struct Shot {
+    signal: Cell<LightSignal>,
+    has_started: Cell<bool>,
+}
+
+impl Shot {
+    /// Starts a range, which is not yet measured.
+    fn start(&self) {
+        self.has_started.set(true);
+        self.signal.set(LightSignal { status: 0, ..self.signal.get() });
+    }
+}
+
 /// The wire of a VL53L1X.
 #[derive(Debug, Default)]
 pub struct Vl53l1xWire {
-    signal: Cell<LightSignal>,
+    shot: Shot,
     /// The register that is read next.
     register: Cell<u16>,
-    has_started: Cell<bool>,
 }
 
 const OSCILLATOR: u16 = 0x0006;
@@ -46,16 +60,16 @@ const FREQUENCY: [u8; 2] = [0xBC, 0x00];
 impl Vl53l1xWire {
     /// Applies the signal. A range that was started since is not yet in it.
     pub(super) fn apply(&self, signal: LightSignal) {
-        self.signal.set(signal);
+        self.shot.signal.set(signal);
     }
 
     /// Whether a range was started since the last call.
     pub(super) fn take_start(&self) -> bool {
-        self.has_started.take()
+        self.shot.has_started.take()
     }
 
     fn byte(&self, register: u16) -> u8 {
-        let LightSignal { status, millimetres, .. } = self.signal.get();
+        let LightSignal { status, millimetres, .. } = self.shot.signal.get();
         let [high, low] = millimetres.to_be_bytes();
         match register {
             OSCILLATOR => FREQUENCY[0],
@@ -77,8 +91,7 @@ impl Vl53l1xWire {
             let register = u16::from_be_bytes([*high, *low]);
             self.register.set(register);
             if register == MODE_START && values.first().is_some_and(|&mode| mode != 0) {
-                self.has_started.set(true);
-                self.signal.set(LightSignal { status: 0, ..self.signal.get() });
+                self.shot.start();
             }
         }
     }
@@ -97,7 +110,7 @@ impl i2c::ErrorType for &Vl53l1xWire {
 
 impl I2c for &Vl53l1xWire {
     fn transaction(&mut self, _: u8, operations: &mut [Operation<'_>]) -> Result<(), ErrorKind> {
-        let has_failed = self.signal.get().has_failed;
+        let has_failed = self.shot.signal.get().has_failed;
         transact(has_failed, operations, |bytes| self.take(bytes), || self.next())
     }
 }

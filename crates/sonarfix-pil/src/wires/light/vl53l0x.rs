@@ -4,20 +4,19 @@ use core::cell::Cell;
 
 use embedded_hal::i2c::{self, ErrorKind, I2c, Operation};
 
-use super::LightSignal;
+use super::{LightSignal, Shot};
 use crate::wires::bus::transact;
 
 /// The wire.
 #[derive(Debug, Default)]
 pub struct Vl53l0xWire {
-    signal: Cell<LightSignal>,
+    shot: Shot,
     /// The register that is read next, and its page.
     register: Cell<u8>,
     page: Cell<u8>,
     /// The steps of what is started.
     sequence: Cell<u8>,
     is_calibrating: Cell<bool>,
-    has_started: Cell<bool>,
 }
 
 const START: u8 = 0x00;
@@ -38,16 +37,16 @@ const CALIBRATIONS: [u8; 2] = [0x01, 0x02];
 impl Vl53l0xWire {
     /// Applies the signal. A range that was started since is not yet in it.
     pub(crate) fn apply(&self, signal: LightSignal) {
-        self.signal.set(signal);
+        self.shot.signal.set(signal);
     }
 
     /// Whether a range was started since the last call.
     pub(crate) fn take_start(&self) -> bool {
-        self.has_started.take()
+        self.shot.has_started.take()
     }
 
     fn byte(&self, register: u8) -> u8 {
-        let LightSignal { status, millimetres, .. } = self.signal.get();
+        let LightSignal { status, millimetres, .. } = self.shot.signal.get();
         let [high, low] = millimetres.to_be_bytes();
         match register {
             INTERRUPT_STATUS if status != 0 || self.is_calibrating.get() => 4,
@@ -78,8 +77,7 @@ impl Vl53l0xWire {
         let is_calibration = CALIBRATIONS.contains(&self.sequence.get());
         self.is_calibrating.set(is_start && is_calibration);
         if is_start && !is_calibration {
-            self.has_started.set(true);
-            self.signal.set(LightSignal { status: 0, ..self.signal.get() });
+            self.shot.start();
         }
     }
 
@@ -97,7 +95,7 @@ impl i2c::ErrorType for &Vl53l0xWire {
 
 impl I2c for &Vl53l0xWire {
     fn transaction(&mut self, _: u8, operations: &mut [Operation<'_>]) -> Result<(), ErrorKind> {
-        let has_failed = self.signal.get().has_failed;
+        let has_failed = self.shot.signal.get().has_failed;
         transact(has_failed, operations, |bytes| self.take(bytes), || self.next())
     }
 }
