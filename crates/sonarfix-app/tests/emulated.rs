@@ -40,6 +40,8 @@ const CODE_AT: u32 = RAM_AT + 0x1_0000;
 const RAM: usize = 128 * 1_024;
 /// The compare registers of TIM3's four channels, which are the inputs of the motor driver.
 const MOTORS_AT: u32 = 0x4000_0434;
+/// Counts of the emulated `SysTick`, 168 MHz, in a millisecond of the firmware, which is 16 µs there.
+const SYSTICK_RATE: f64 = 168.0 * 16.0;
 /// Limit of each wait, by the clock of this computer; the emulator is ended after it as well.
 const TIMEOUT: Duration = Duration::from_secs(100);
 
@@ -182,12 +184,17 @@ impl Robot {
         })
     }
 
+    /// Gives the emulator's monitor an order, which is executed while the connection exists.
+    fn monitor(&self, order: &str) -> UnixStream {
+        let mut monitor = connected(&self.files.path().join("monitor"));
+        monitor.write_all(format!("{order}\n").as_bytes()).unwrap();
+        monitor
+    }
+
     /// The board's memory from an address on.
     fn memory(&mut self, from: u32, length: usize) -> Vec<u8> {
         let file = self.files.path().join("memory");
-        let mut monitor = connected(&self.files.path().join("monitor"));
-        let order = format!("pmemsave {from:#x} {length} \"{}\"\n", file.display());
-        monitor.write_all(order.as_bytes()).unwrap();
+        let _monitor = self.monitor(&format!("pmemsave {from:#x} {length} \"{}\"", file.display()));
         loop {
             match std::fs::read(&file) {
                 Ok(bytes) if bytes.len() == length => {
@@ -257,6 +264,18 @@ impl Robot {
                 _ => None,
             }
         })
+    }
+
+    /// The sleeps since the emulator was told to log them, milliseconds by the robot's clock. A sleep begins with a write of its
+    /// length to `SysTick`.
+    fn sleeps(&self) -> Vec<f64> {
+        let log = std::fs::read_to_string(self.files.path().join("writes")).unwrap_or_default();
+        let counts = log.lines().filter_map(|line| {
+            let (_, write) = line.split_once("systick write addr 0x4 data 0x")?;
+            u32::from_str_radix(write.split_whitespace().next()?, 16).ok()
+        });
+        // The length is followed by a 0: there is one period only.
+        counts.filter(|counts| *counts > 0).map(|counts| f64::from(counts) / SYSTICK_RATE).collect()
     }
 
     /// Whether the motors have ever been enabled.
@@ -515,6 +534,26 @@ fn a_robot_that_waits_shows_that_its_devices_are_missing() {
     for _ in 0..30 {
         assert_eq!(shown(&robot.next()), None, "the loop runs");
     }
+}
+
+/// A robot that waits checks its devices once a second and sends a few messages a second. It sleeps between, and not a
+/// millisecond at a time.
+#[test]
+#[ignore = "cargo xtask test-firmware"]
+fn a_robot_that_waits_sleeps_until_something_is_due() {
+    let mut robot = Robot::switched_on(&map(), &config());
+    robot.hello();
+    let _monitor = robot.monitor("trace-event systick_write on");
+    while robot.sleeps().len() < 100 {
+        robot.next();
+    }
+    let sleeps = robot.sleeps();
+    let mean = sleeps.iter().sum::<f64>() / f64::from(u32::try_from(sleeps.len()).unwrap());
+    println!(
+        "sleeps of {mean:.0} ms on average, at most {:.0} ms",
+        sleeps.iter().copied().fold(0.0, f64::max)
+    );
+    assert!(mean > 100.0, "sleeps of {mean} ms");
 }
 
 /// The motor code runs in the firmware: forwards while the motors are enabled, and neither before nor after. The emulator

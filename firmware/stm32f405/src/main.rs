@@ -9,7 +9,7 @@
 //! | TIM10, TIM11 | the pulses of the servos of both rangers | PB8, PB9 |
 //! | TIM5 | the clock, 1 µs in 32 bits, and the stamps of the first echo's edges | PA0 |
 //! | TIM12 | the stamps of the second echo's edges, 1 µs in 16 bits | PB14 |
-//! | TIM2 | ends the sleep every millisecond, to compare the time with that of the next poll | |
+//! | `SysTick` | ends the sleep when the next poll is due | |
 //! | TIM3 | the inputs of the motor driver, right and left motor, 20 kHz | PA6 PA7, PB0 PB1 |
 //! | USART2 | the link, 115,200 baud | PA2 PA3 |
 //! | | the triggers of both rangers; high while the robot may drive | PA1, PA4; PB7 |
@@ -22,6 +22,8 @@
 
 #![no_std]
 #![no_main]
+
+mod alarm;
 
 use core::ops::Deref;
 
@@ -430,22 +432,18 @@ mod app {
     use sonarfix_robot::{AnyRanger, NextPoll, memory};
     use stm32f4xx_hal::gpio::{ErasedPin, GpioExt, Output, Pin};
     use stm32f4xx_hal::hal_02::serial::{Read, Write};
-    use stm32f4xx_hal::pac::{
-        self, PWR, RTC, TIM1, TIM2, TIM3, TIM5, TIM8, TIM10, TIM11, TIM12, USART2,
-    };
+    use stm32f4xx_hal::pac::{self, PWR, RTC, TIM1, TIM3, TIM5, TIM8, TIM10, TIM11, TIM12, USART2};
     use stm32f4xx_hal::rcc::{Enable, RccExt};
     use stm32f4xx_hal::serial::{self, Rx, RxListen, SerialExt, Tx, TxISR, TxListen};
     use stm32f4xx_hal::time::Bps;
     use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
+    use super::alarm::Alarm;
     use super::{
         Bus, ECHO, Encoder, MotorPwm, Received, SECOND_ECHO, Sectors, ServoPwm, ToSend, Uart, bus,
         line, microseconds,
     };
 
-    /// The longest sleep, µs: the timer of the emulator that this program is tested in has a fixed period. Waking to compare two
-    /// times takes some 40 instructions.
-    const WAKE: u32 = 1_000;
     /// Longer than the erasure of a sector (at most 0.5 s), which delays the loop.
     const WATCHDOG: fugit::MillisDurationU32 = fugit::MillisDurationU32::from_ticks(2_000);
 
@@ -468,7 +466,7 @@ mod app {
         link: Uart,
         drive: Pin<'B', 7, Output>,
         watchdog: IndependentWatchdog,
-        wake_timer: TIM2,
+        alarm: Alarm,
         backup: RTC,
         motors: MotorPwm,
         second_echo: TIM12,
@@ -490,7 +488,6 @@ mod app {
         board.DBGMCU.cr().modify(|_, w| w.dbg_sleep().set_bit());
         let mut rcc = board.RCC.freeze(super::clocks());
         TIM1::enable(&mut rcc);
-        TIM2::enable(&mut rcc);
         TIM3::enable(&mut rcc);
         TIM5::enable(&mut rcc);
         TIM8::enable(&mut rcc);
@@ -509,7 +506,7 @@ mod app {
         let _ = (b.pb0.into_alternate::<2>(), b.pb1.into_alternate::<2>());
         let timer_clock = rcc.clocks.timclk1();
         start_clock(&board.TIM5, microseconds(timer_clock));
-        start_waking(&board.TIM2, microseconds(timer_clock));
+        let alarm = Alarm::new(context.core.SYST, || board.TIM5.cnt().read().bits());
         start_stamps(&board.TIM12, microseconds(timer_clock));
 
         let uart = serial::Config::default().baudrate(Bps(115_200));
@@ -558,7 +555,7 @@ mod app {
             drive: b.pb7.into_push_pull_output(),
             watchdog,
             backup: board.RTC,
-            wake_timer: board.TIM2,
+            alarm,
             second_echo: board.TIM12,
             motors: MotorPwm::new(board.TIM3, timer_clock),
             rx: (rx, received),
@@ -568,11 +565,20 @@ mod app {
     }
 
     /// Polls when something is due, and sleeps until then.
-    #[idle(shared = [clock], local = [app, hardware, link, drive, watchdog, backup, motors])]
+    #[idle(shared = [clock], local = [app, hardware, link, drive, watchdog, alarm, backup, motors])]
     #[inline(never)]
     fn idle(mut context: idle::Context) -> ! {
-        let idle::LocalResources { app, hardware, link, drive, watchdog, backup, motors, .. } =
-            context.local;
+        let idle::LocalResources {
+            app,
+            hardware,
+            link,
+            drive,
+            watchdog,
+            alarm,
+            backup,
+            motors,
+            ..
+        } = context.local;
         let mut now = Instant::from_ticks(0);
         let mut pattern = Pattern::default();
         let mut next_poll = NextPoll::AT_ONCE;
@@ -589,7 +595,7 @@ mod app {
                 cortex_m::interrupt::free(|_| {
                     let has_edge = ECHO.has_edge() || SECOND_ECHO.has_edge();
                     if !has_edge && link.has_bytes() == had_bytes {
-                        rtic::export::wfi();
+                        alarm.sleep(next.ticks().saturating_sub(now.ticks()));
                     }
                 });
             }
@@ -656,12 +662,6 @@ mod app {
         }
     }
 
-    /// Wakes the loop.
-    #[task(binds = TIM2, local = [wake_timer])]
-    fn wake(context: wake::Context) {
-        context.local.wake_timer.sr().write(|w| w.uif().clear_bit());
-    }
-
     /// Receives a byte, or sends the next one; the loop pends this interrupt when it has bytes to send.
     #[task(binds = USART2, local = [rx, tx])]
     fn uart(context: uart::Context) {
@@ -713,16 +713,6 @@ mod app {
         });
         timer.sr().write(|w| w.cc1if().clear_bit().cc2if().clear_bit());
         timer.dier().write(|w| w.cc1ie().set_bit().cc2ie().set_bit());
-        timer.cr1().write(|w| w.cen().set_bit());
-    }
-
-    /// Starts TIM2, which interrupts every [`WAKE`].
-    fn start_waking(timer: &TIM2, divider: u16) {
-        timer.psc().write(|w| w.psc().set(divider));
-        timer.arr().write(|w| w.arr().set(WAKE - 1));
-        timer.egr().write(|w| w.ug().set_bit());
-        timer.sr().write(|w| w.uif().clear_bit());
-        timer.dier().write(|w| w.uie().set_bit());
         timer.cr1().write(|w| w.cen().set_bit());
     }
 
