@@ -1,6 +1,5 @@
 //! The shipped `f32` filter against the dense `f64` one, on the same inputs over a whole run.
 
-use nalgebra::SVector;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -64,8 +63,8 @@ fn drive(policy: Policy, range_scale_prior: f32, seed: u64) -> Difference {
     };
     let mut localizer =
         Localizer::new(config, Map::new(&walls), start, Instant::from_ticks(0)).unwrap();
-    let mut oracle = DenseFilter::new(model, observe::state(localizer.filter()), &SVector::zeros());
-    oracle.p = observe::covariance(localizer.filter());
+    let (x, p) = (observe::state(localizer.filter()), observe::covariance(localizer.filter()));
+    let mut oracle = DenseFilter { model, x, p };
 
     let mut difference = Difference::default();
     for tick in 1..=12_480_u64 {

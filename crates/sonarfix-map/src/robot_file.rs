@@ -318,10 +318,12 @@ fn pair(table: &Table<'_>, key: &str, dimension: &Dimension) -> [f32; 2] {
 }
 
 fn read_prior(robot: &Table<'_>, prior: &mut CalibrationPrior) {
-    let keys = ["scale_right", "scale_left", "track_width", "range_scale"];
+    let keys = ["scale_right", "scale_left", "scale_difference", "track_width", "range_scale"];
     let table = robot.table("prior", &keys);
     prior.scale_right = fraction(&table, "scale_right");
     prior.scale_left = fraction(&table, "scale_left");
+    prior.scale_difference =
+        table.get("scale_difference").map(|_| fraction(&table, "scale_difference"));
     prior.track_width = Metres(quantity(&table, "track_width", &LENGTH));
     prior.range_scale = fraction(&table, "range_scale");
 }

@@ -154,7 +154,7 @@ fn estimation(config: &RobotConfig) -> String {
         r#"
 [prior]
 scale_right = {}
-scale_left = {}
+scale_left = {}{}
 track_width = "{} m"
 range_scale = {}
 
@@ -178,6 +178,7 @@ wheels_weight = "{} m"
 "#,
         prior.scale_right,
         prior.scale_left,
+        prior.scale_difference.map_or_else(String::new, |of| format!("\nscale_difference = {of}")),
         prior.track_width.0,
         prior.range_scale,
         gating.confidence,

@@ -224,6 +224,10 @@ pub struct CalibrationPrior {
     pub scale_right: f32,
     /// Of the left wheel's scale error, dimensionless.
     pub scale_left: f32,
+    /// Of the right wheel's scale error less that of the left, dimensionless: wheels of one type are alike, however wrong
+    /// their nominal diameter is. At least `1.1 |σ_R − σ_L|` and at most `√(σ_R² + σ_L²)` of the two above, else the nearest of
+    /// these is taken; the latter means independent errors, as `None` does (`docs/model.md`, eq. 48).
+    pub scale_difference: Option<f32>,
     /// Of the track width's error.
     pub track_width: Metres,
     /// Of the ranger's scale error, dimensionless. Zero: not estimated, as in the paper.
@@ -237,6 +241,7 @@ impl CalibrationPrior {
         Self {
             scale_right: 0.01,
             scale_left: 0.01,
+            scale_difference: None,
             track_width: track_width * 0.03,
             range_scale: 0.0,
         }
@@ -441,6 +446,10 @@ impl Config {
         // The filter holds mean and difference, which cannot represent that one alone is exact.
         let one_is_exact = (prior.scale_right > 0.0) != (prior.scale_left > 0.0);
         require("prior.scale_left", !one_is_exact, "zero if prior.scale_right is, and only then")?;
+        let difference = prior.scale_difference;
+        let is_positive =
+            difference.is_none_or(|difference| difference > 0.0 && difference.is_finite());
+        require("prior.scale_difference", is_positive, "positive and finite, if given")?;
         not_negative("prior.track_width", prior.track_width.0)?;
         let width = self.drive.track_width.0;
         let below_width = prior.track_width.0 < 0.5 * width;

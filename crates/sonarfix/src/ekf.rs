@@ -238,6 +238,16 @@ impl Ekf {
         })
     }
 
+    /// Of a new filter: one whose wheels differ by at most this standard deviation of `S_R − S_L`. The deviations of both
+    /// are the same.
+    #[must_use]
+    pub(crate) fn with_scale_difference(mut self, deviation: Option<f32>) -> Self {
+        if let Some(deviation) = deviation {
+            self.p_without_walk.calibration.correlate_wheels(deviation);
+        }
+        self
+    }
+
     /// The estimate X̂.
     #[must_use]
     pub fn state(&self) -> StateEstimate {

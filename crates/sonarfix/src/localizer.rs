@@ -180,7 +180,9 @@ impl<'m> Localizer<'m> {
     /// A localizer that continues from the estimate of an earlier one, calibration included.
     ///
     /// `deviation` holds the standard deviations of `state` as they are now; the errors are taken as
-    /// independent. The prior of the configuration is not used.
+    /// independent, but for those of the two wheels, which differ by no more than
+    /// [`CalibrationPrior::scale_difference`](crate::config::CalibrationPrior::scale_difference). The rest of the prior of the
+    /// configuration is not used.
     ///
     /// # Errors
     /// [`StartError`], by what is wrong with an argument.
@@ -192,7 +194,7 @@ impl<'m> Localizer<'m> {
         now: Instant,
     ) -> Result<Self, StartError> {
         config.check().map_err(StartError::Config)?;
-        let ekf = Ekf::new(config.drive, state, deviation).map_err(StartError::Start)?;
+        let ekf = filter(&config, state, deviation).map_err(StartError::Start)?;
         let gyro = config.gyro.as_ref().map(GyroFusion::new);
         Ok(Self {
             config,
@@ -358,7 +360,7 @@ impl<'m> Localizer<'m> {
         state: StateEstimate,
         deviation: StandardDeviations,
     ) -> Result<(), EkfError> {
-        self.ekf = Ekf::new(self.config.drive, state, deviation)?;
+        self.ekf = filter(&self.config, state, deviation)?;
         if let Some(gyro) = &mut self.gyro {
             gyro.forget_states();
         }
@@ -706,6 +708,16 @@ impl From<OutsideStep> for AbsoluteRefusal {
             OutsideStep::After => Self::AfterLastStep,
         }
     }
+}
+
+/// A filter at `state`, with what the configuration knows of the wheels.
+fn filter(
+    config: &Config,
+    state: StateEstimate,
+    deviation: StandardDeviations,
+) -> Result<Ekf, EkfError> {
+    let ekf = Ekf::new(config.drive, state, deviation)?;
+    Ok(ekf.with_scale_difference(config.prior.scale_difference))
 }
 
 /// Corrects the estimate by a range with this association probability.

@@ -119,10 +119,10 @@ impl SearchParameters {
     /// As [`Self::of`] with the standard deviations that the scales of the right and of the left wheel and the track
     /// width have after a calibration.
     #[must_use]
-    pub fn calibrated(config: &Config, [right, left]: [f32; 2], track_width: Metres) -> Self {
+    pub fn calibrated(config: &Config, wheels: [f32; 2], track_width: Metres) -> Self {
         let drive = &config.drive;
         let width = drive.track_width.0;
-        let by_wheels = libm::hypotf(right, left);
+        let (common, difference) = mean_and_difference(wheels, config);
         let by_width = track_width.0 / width;
         // Heading noise after a metre: the deviation aside that it causes grows with the distance to the
         // power 1.5, and is this many metres a metre at 4 m.
@@ -130,13 +130,26 @@ impl SearchParameters {
         let odometry = at_least(1.2 * per_root_metre, LEAST_ODOMETRY);
         let (position, heading) = Self::default().sharpness;
         Self {
-            drift: Radians(at_least(by_wheels / width, LEAST_DRIFT.0)),
-            turn_scale: at_least(libm::hypotf(by_width, 0.5 * by_wheels), LEAST_TURN_SCALE),
+            drift: Radians(at_least(difference / width, LEAST_DRIFT.0)),
+            turn_scale: at_least(libm::hypotf(by_width, common), LEAST_TURN_SCALE),
             odometry,
             echo: config.echo,
             sharpness: (Metres(at_least(SHARP_WITHIN * odometry, position.0)), heading),
             ..Self::default()
         }
+    }
+}
+
+/// Deviations of the mean and of the difference of the scale errors of both wheels, eq. (48).
+fn mean_and_difference([right, left]: [f32; 2], config: &Config) -> (f32, f32) {
+    let independent = libm::hypotf(right, left);
+    let alike = config.prior.scale_difference;
+    match alike.map(|difference| at_least(difference, 1.1 * (right - left).abs())) {
+        Some(difference) if difference < independent => {
+            let mean = 0.5 * independent * independent - 0.25 * difference * difference;
+            (libm::sqrtf(mean), difference)
+        }
+        _ => (0.5 * independent, independent),
     }
 }
 

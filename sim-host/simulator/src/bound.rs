@@ -6,7 +6,7 @@
 
 use sonarfix::absolute::{AbsoluteMeasurement, PositionNoise};
 
-use crate::dense::{DenseFilter, Line, Model, Vector};
+use crate::dense::{DenseFilter, Line, Matrix, Model, Vector};
 use crate::dense_gyro::{DenseGyroFilter, GyroModel};
 
 /// The bound of a run in progress.
@@ -18,10 +18,10 @@ pub struct Bound {
 }
 
 impl Bound {
-    /// The bound at the true start, with the deviations of the filter's initial estimate.
+    /// The bound at the true start, with the covariance of the filter's initial estimate.
     #[must_use]
-    pub fn new(model: Model, gyro: Option<GyroModel>, truth: Vector, deviation: &Vector) -> Self {
-        let filter = DenseFilter::new(model, truth, deviation);
+    pub fn new(model: Model, gyro: Option<GyroModel>, truth: Vector, p: Matrix) -> Self {
+        let filter = DenseFilter { model, x: truth, p };
         let with_gyro = gyro.map(|gyro| DenseGyroFilter::new(&filter, gyro));
         Self { filter, with_gyro }
     }

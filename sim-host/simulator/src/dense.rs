@@ -230,13 +230,6 @@ pub struct DenseFilter {
 }
 
 impl DenseFilter {
-    /// A filter at a state with independent errors of these standard deviations.
-    #[must_use]
-    pub fn new(model: Model, x: Vector, deviation: &Vector) -> Self {
-        let p = Matrix::from_diagonal(&deviation.component_mul(deviation));
-        Self { model, x, p }
-    }
-
     /// Eqs. (4)–(5) and (7)–(8).
     pub fn predict(&mut self, travel: [f64; 2]) {
         self.propagate(travel);

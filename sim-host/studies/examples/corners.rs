@@ -78,7 +78,8 @@ impl<'a> Drive<'a> {
         let deviation = Vector::from([position, position, heading, right, left, width, range]);
         let pose = scenario.path.pose_at(0.0);
         let truth = Vector::from([pose.x, pose.y, pose.heading, 0.0, 0.0, 0.0, 0.0]);
-        let filter = DenseFilter::new(Model::of(config), truth, &deviation);
+        let p = Matrix::from_diagonal(&deviation.component_mul(&deviation));
+        let filter = DenseFilter { model: Model::of(config), x: truth, p };
         let vertices = world.vertices().to_vec();
         Self { scenario, world, vertices, filter, seen: 0.0 }
     }

@@ -21,7 +21,7 @@ use crate::messages::{
 use crate::wire::to_stdvec;
 
 /// The version of the bytes below.
-const OF_VERSION: u8 = 6;
+const OF_VERSION: u8 = 7;
 
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().fold(String::new(), |hex, byte| format!("{hex}{byte:02x}"))
@@ -146,7 +146,7 @@ fn every_variant_has_the_number_of_its_version() {
 
 #[test]
 fn a_baked_configuration_has_the_bytes_of_its_version() {
-    assert_eq!(baked::VERSION, 6);
+    assert_eq!(baked::VERSION, 7);
     let mut localizer = Config::for_track_width(Metres(0.35));
     localizer.sonar.servo = (Radians(-1.5), Radians(1.5));
     localizer.sonar.timing.servo = ServoTiming::SG90;

@@ -555,6 +555,7 @@ fn localizer(source: &mut impl Source) -> Config {
     }
     config.prior.scale_right = source.single();
     config.prior.scale_left = source.single();
+    config.prior.scale_difference = Some(source.single());
     config.prior.track_width = Metres(source.single());
     config.prior.range_scale = source.single();
     config.gating.confidence = source.single();

@@ -268,18 +268,22 @@ proptest! {
     #[test]
     fn parameters_follow_from_the_calibration(
         (right, left) in (0.0_f32..0.03, 0.0_f32..0.03), track in 0.0_f32..0.02, width in 0.1_f32..0.5,
-        noise in 1e-4_f32..0.01, missed in 0.0_f32..0.3,
+        noise in 1e-4_f32..0.01, missed in 0.0_f32..0.3, alike in proptest::option::of(1e-3_f32..0.05),
     ) {
         let mut config = Config::for_track_width(Metres(width));
+        config.prior.scale_difference = alike;
         config.drive.wheel_noise = PerRootMetre(Metres(noise));
         config.echo.missed = missed;
         let is = SearchParameters::calibrated(&config, [right, left], Metres(track));
         let wide = f64::from;
-        let wheels = wide(right).hypot(wide(left));
+        let independent = wide(right).hypot(wide(left));
+        let least = 1.1 * (wide(right) - wide(left)).abs();
+        let difference = alike.map_or(independent, |alike| wide(alike).max(least)).min(independent);
+        let mean = (0.5 * independent.powi(2) - 0.25 * difference.powi(2)).sqrt();
         let odometry = (1.2 * std::f64::consts::SQRT_2 * wide(noise) / wide(width)).max(0.005);
         for (is, expected) in [
-            (is.drift.0, (wheels / wide(width)).max(0.005)),
-            (is.turn_scale, (wide(track) / wide(width)).hypot(0.5 * wheels).max(0.003)),
+            (is.drift.0, (difference / wide(width)).max(0.005)),
+            (is.turn_scale, (wide(track) / wide(width)).hypot(mean).max(0.003)),
             (is.odometry, odometry),
             (is.sharpness.0.0, (1.8 * odometry).max(0.05)),
         ] {

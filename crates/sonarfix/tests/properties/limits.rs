@@ -38,7 +38,7 @@ fn at_the_origin() -> Start {
 #[test]
 fn a_configuration_is_refused_at_its_limits() {
     type Change = fn(&mut Config);
-    let rules: [(Change, Change); 11] = [
+    let rules: [(Change, Change); 13] = [
         (
             |it| (it.prior.scale_right, it.prior.scale_left) = (0.0, 0.0),
             |it| (it.prior.scale_right, it.prior.scale_left) = (0.0, 0.01),
@@ -46,6 +46,11 @@ fn a_configuration_is_refused_at_its_limits() {
         (
             |it| (it.prior.scale_right, it.prior.scale_left) = (0.01, 0.02),
             |it| (it.prior.scale_right, it.prior.scale_left) = (0.01, 0.0),
+        ),
+        (|it| it.prior.scale_difference = Some(1e-3), |it| it.prior.scale_difference = Some(0.0)),
+        (
+            |it| it.prior.scale_difference = None,
+            |it| it.prior.scale_difference = Some(f32::INFINITY),
         ),
         (
             |it| it.prior.track_width.0 = 0.499 * it.drive.track_width.0,

@@ -42,3 +42,5 @@ mod six_states;
 mod strategies;
 #[cfg(test)]
 mod unseen;
+#[cfg(test)]
+mod wheels;

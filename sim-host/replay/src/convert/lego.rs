@@ -291,6 +291,7 @@ impl Lego<'_> {
                         text(scale, "real wheels are within 0.5 % of what was measured"),
                     ),
                     ("scale_left", text(scale, "likewise")),
+                    ("scale_difference", text("1 %", "wheels of one type")),
                     ("track_width", text(track, "a ruler between tyres 3 cm wide")),
                     ("range_scale", text("1 %", "the nearest of a noisy cone is a little short")),
                 ],

@@ -46,8 +46,7 @@ impl<'a> Score<'a> {
         let localizer =
             simulation.localizer(start.unwrap_or_else(no_pose), Instant::from_ticks(0))?;
         let gyro = localizer.config().gyro.as_ref().map(GyroModel::of);
-        let deviation = localizer.filter().standard_deviations();
-        let deviation = Vector::from(deviation.to_array().map(f64::from));
+        let p = observe::covariance(localizer.filter());
         // Dead reckoning needs a start; without an estimate it is the true one.
         let start = if is_known {
             observe::estimate(&localizer).pose
@@ -58,7 +57,7 @@ impl<'a> Score<'a> {
         Ok(Self {
             simulation,
             odometry: DeadReckoning::new(start, model.track_width),
-            bound: Bound::new(model, gyro, truth, &deviation),
+            bound: Bound::new(model, gyro, truth, p),
             rolled: Travel::default(),
             gyro_bias: None,
             last_tick: 0.0,

@@ -66,6 +66,7 @@ pub fn write(dir: &Path, mount: [f64; 2], field: [f64; 2]) -> Result<(), Convert
             vec![
                 ("scale_right", text("5 %", "odometry of unknown calibration: real ones are wrong by 3 to 5 %")),
                 ("scale_left", text("5 %", "likewise")),
+                ("scale_difference", text("1 %", "wheels of one type")),
                 ("track_width", text("20 mm", "likewise")),
                 ("range_scale", Value("0.0".to_owned(), "map and scanner share their metre")),
             ],
