@@ -152,6 +152,12 @@ impl Robot {
         })
     }
 
+    /// Waits for half a second by the robot's clock at least: a message is received before the poll that sends it has ended.
+    fn pass_half_a_second(&mut self) {
+        let first = self.loop_status().at;
+        while self.loop_status().at < first + sonarfix::units::Duration::millis(500) {}
+    }
+
     /// Sends a command and waits for its answer.
     fn order(&mut self, command: &Command) -> CommandResult {
         if self.session == 0 {
@@ -573,12 +579,12 @@ fn the_motor_code_drives_while_the_motors_are_enabled() {
     assert_eq!(inputs(&mut robot), [0; 4], "it waits");
     assert_eq!(robot.order(&Command::SetPose(pose())), CommandResult::Done);
     assert_eq!(robot.order(&Command::Start), CommandResult::Done);
-    robot.loop_status();
+    robot.pass_half_a_second();
     assert_eq!(robot.may_drive(), Some(true));
     // Four tenths of the 800 counts of a period at 16 MHz, on the inputs that drive forwards.
     assert_eq!(inputs(&mut robot), [320, 0, 320, 0]);
     assert_eq!(robot.order(&Command::Stop), CommandResult::Done);
-    robot.loop_status();
+    robot.pass_half_a_second();
     assert_eq!((robot.may_drive(), inputs(&mut robot)), (Some(false), vec![0; 4]));
 }
 
@@ -743,11 +749,11 @@ fn half_a_frame_and_silence_cost_no_deadline() {
 #[ignore = "cargo xtask test-firmware"]
 fn a_fault_stops_the_motors() {
     let mut robot = Robot::switched_on(&map(), &config());
-    robot.hello();
+    robot.pass_half_a_second();
     assert_eq!(robot.may_drive(), Some(false));
     assert_eq!(robot.order(&Command::SetPose(pose())), CommandResult::Done);
     assert_eq!(robot.order(&Command::Start), CommandResult::Done);
-    robot.loop_status();
+    robot.pass_half_a_second();
     // Its encoders cannot be read here.
     assert_eq!(robot.may_drive(), Some(false));
     robot.jump_to_invalid_code();
