@@ -48,7 +48,23 @@ pub(crate) struct Reflector {
     pub wall: WallId,
     /// That of the wall's place, if it has one of its own.
     pub accuracy: Option<Metres>,
+    part: Part,
     is_central: bool,
+}
+
+/// A part of a wall that may answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Part {
+    Foot,
+    Start,
+    End,
+}
+
+/// Where on the map a reflector is, without its geometry: less memory than a [`Reflector`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Place {
+    wall: WallId,
+    part: Part,
 }
 
 /// Where a beam of light meets a wall.
@@ -105,7 +121,7 @@ impl<'m> Reflectors<'m> {
     }
 
     /// The reflectors in the cone up to `reach`, nearest first, and how far the axis is free.
-    #[inline]
+    #[cfg(test)]
     pub fn in_beam(
         &self,
         beam: &Beam,
@@ -138,15 +154,9 @@ impl<'m> Reflectors<'m> {
             if let Some(foot) = view.foot(self.cos_rim)
                 && foot.distance <= reach
             {
-                insert(
-                    found,
-                    Reflector {
-                        is_central: foot.cosine >= self.cos_cone,
-                        ..foot.reflector(id, &wall)
-                    },
-                );
+                insert(found, self.foot(&foot, (id, &wall)));
             }
-            for (to_end, arm) in view.ends() {
+            for (part, to_end, arm) in view.ends() {
                 let ahead = to_end.dot(beam.axis);
                 let square = to_end.length_squared();
                 if ahead <= 0.0
@@ -156,28 +166,53 @@ impl<'m> Reflectors<'m> {
                 {
                     continue;
                 }
-                let distance = sqrt(square);
                 // An edge that cannot be the echo hardly matters.
                 let juts_out = to_end.dot(arm) >= 0.0;
-                if juts_out && (distance - range).abs() > margin {
+                if juts_out && (sqrt(square) - range).abs() > margin {
                     continue;
                 }
-                let is_central = ahead >= self.cos_cone * distance;
-                let toward = to_end.times(1.0 / distance);
-                insert(
-                    found,
-                    Reflector {
-                        distance,
-                        toward,
-                        arm: Some(arm),
-                        wall: id,
-                        accuracy: wall.accuracy(),
-                        is_central,
-                    },
-                );
+                insert(found, self.end((part, to_end, arm), beam, (id, &wall)));
             }
         }
         free
+    }
+
+    /// The reflector at a place that was found in this beam, the same bits.
+    #[inline(never)]
+    pub fn at(&self, beam: &Beam, Place { wall: id, part }: Place) -> Option<Reflector> {
+        let wall = self.map.wall(id)?;
+        let view = View::new(&wall, beam);
+        if part == Part::Foot {
+            return view.foot(self.cos_rim).map(|foot| self.foot(&foot, (id, &wall)));
+        }
+        let mut ends = view.ends().into_iter();
+        ends.find(|(end, ..)| *end == part).map(|end| self.end(end, beam, (id, &wall)))
+    }
+
+    fn foot(&self, foot: &Foot, (id, wall): (WallId, &Wall)) -> Reflector {
+        Reflector {
+            distance: foot.distance,
+            toward: foot.toward,
+            arm: None,
+            wall: id,
+            accuracy: wall.accuracy(),
+            part: Part::Foot,
+            is_central: foot.cosine >= self.cos_cone,
+        }
+    }
+
+    #[inline(never)]
+    fn end(&self, (part, to_end, arm): End, beam: &Beam, (id, wall): (WallId, &Wall)) -> Reflector {
+        let distance = sqrt(to_end.length_squared());
+        Reflector {
+            distance,
+            toward: to_end.times(1.0 / distance),
+            arm: Some(arm),
+            wall: id,
+            accuracy: wall.accuracy(),
+            part,
+            is_central: to_end.dot(beam.axis) >= self.cos_cone * distance,
+        }
     }
 
     /// The wall that a beam of light meets first.
@@ -279,6 +314,10 @@ fn insert(into: &mut Vec<Reflector, REFLECTORS>, reflector: Reflector) {
 }
 
 impl Reflector {
+    pub fn place(&self) -> Place {
+        Place { wall: self.wall, part: self.part }
+    }
+
     /// Whether this one is nearer, or as near and first by its direction.
     fn is_before(&self, other: &Self) -> bool {
         self.distance < other.distance
@@ -310,13 +349,8 @@ struct Foot {
     cosine: f32,
 }
 
-impl Foot {
-    fn reflector(&self, id: WallId, wall: &Wall) -> Reflector {
-        let Self { distance, toward, .. } = *self;
-        let accuracy = wall.accuracy();
-        Reflector { distance, toward, arm: None, wall: id, accuracy, is_central: true }
-    }
-}
+/// An end of a wall: from the sonar to it, and the direction of the wall from there.
+type End = (Part, Vector, Vector);
 
 impl View {
     fn new(wall: &Wall, beam: &Beam) -> Self {
@@ -350,10 +384,9 @@ impl View {
         (distance > 0.0 && along >= 0.0 && along <= self.length).then_some(distance)
     }
 
-    /// Both ends, each with the direction of the wall from there.
-    fn ends(&self) -> [(Vector, Vector); 2] {
+    fn ends(&self) -> [End; 2] {
         let to_end = self.to_start.plus(self.tangent.times(self.length));
-        [(self.to_start, self.tangent), (to_end, self.tangent.times(-1.0))]
+        [(Part::Start, self.to_start, self.tangent), (Part::End, to_end, self.tangent.times(-1.0))]
     }
 }
 

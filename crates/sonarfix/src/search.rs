@@ -260,12 +260,20 @@ const REGION_MARGIN: f32 = 0.1;
 #[derive(Debug, Clone, Copy)]
 enum Task {
     Rebase,
-    Straighten(Straightening),
     Vote { ping: u16, tilt: u8 },
     Fit { line: u8 },
     Bank,
     Pairs { pair: u8, pairs: Pairs },
     Along { line: u8, along: AlongWalls },
+}
+
+/// What takes several evaluations, before the task goes on.
+#[derive(Debug, Clone)]
+#[expect(clippy::large_enum_variant, reason = "there is one of it, and no heap")]
+enum Work {
+    None,
+    Straighten(Straightening),
+    Trial(Trial),
 }
 
 /// The search for the pose.
@@ -296,7 +304,7 @@ pub struct Search<'m, const PINGS: usize = 96, const HYPOTHESES: usize = 8> {
     lines: Lines,
     bank: Bank<HYPOTHESES>,
     task: Task,
-    trial: Option<Trial>,
+    work: Work,
     cycles: u32,
     /// Novel pings when the last cycle ended.
     taken: u16,
@@ -348,7 +356,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
             lines: Lines::of_ranger(sonar),
             bank: Bank::new(),
             task: Task::Rebase,
-            trial: None,
+            work: Work::None,
             cycles: 0,
             taken: 0,
             is_check_due: true,
@@ -370,7 +378,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         self.lines.restart_of_ranger(sonar);
         self.bank.clear();
         self.task = Task::Rebase;
-        self.trial = None;
+        self.work = Work::None;
         self.cycles = 0;
         self.taken = 0;
         self.is_check_due = true;
@@ -447,9 +455,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
             self.evaluate();
         }
         match self.task {
-            Task::Rebase | Task::Straighten(_) | Task::Vote { .. } | Task::Fit { .. } => {
-                Phase::Lines
-            }
+            Task::Rebase | Task::Vote { .. } | Task::Fit { .. } => Phase::Lines,
             Task::Bank => Phase::Bank,
             Task::Pairs { .. } => Phase::Pairs,
             Task::Along { .. } => Phase::GlobalCheck,
@@ -537,26 +543,36 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         if self.window.count() < LEAST_PINGS {
             return;
         }
-        if let Some(trial) = &mut self.trial {
-            let is_answer = trial.is_answer;
-            let parameters = &self.parameters;
-            let prior = Prior { drift: parameters.drift.0, turn_scale: parameters.turn_scale };
-            let odometry = Odometry { prior, per_metre: parameters.odometry };
-            match trial.advance(&self.echoes, &self.window, &odometry) {
-                Verdict::Running => return,
-                Verdict::Rejected => self.bank.end_trial(),
-                Verdict::Scored(entry) if is_answer => self.answer = Decision::Unique(entry),
-                Verdict::Scored(entry) => {
-                    self.bank.end_trial();
-                    self.bank.offer(entry);
+        match &mut self.work {
+            Work::None => self.begin(),
+            Work::Straighten(straightening) => {
+                if !self.window.straighten(straightening) {
+                    self.work = Work::None;
                 }
             }
-            self.trial = None;
-            return;
+            Work::Trial(trial) => {
+                let is_answer = trial.is_answer;
+                let parameters = &self.parameters;
+                let prior = Prior { drift: parameters.drift.0, turn_scale: parameters.turn_scale };
+                let odometry = Odometry { prior, per_metre: parameters.odometry };
+                match trial.advance(&self.echoes, &self.window, &odometry) {
+                    Verdict::Running => return,
+                    Verdict::Rejected => self.bank.end_trial(),
+                    Verdict::Scored(entry) if is_answer => self.answer = Decision::Unique(entry),
+                    Verdict::Scored(entry) => {
+                        self.bank.end_trial();
+                        self.bank.offer(entry);
+                    }
+                }
+                self.work = Work::None;
+            }
         }
+    }
+
+    /// Makes a step of the task.
+    fn begin(&mut self) {
         self.task = match self.task {
             Task::Rebase => self.rebase(),
-            Task::Straighten(straightening) => self.straighten(straightening),
             Task::Vote { ping, tilt } => self.vote(ping, tilt),
             Task::Fit { line } => self.fit(line),
             Task::Bank => self.refine(),
@@ -592,18 +608,11 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
             entry.placement = moved(&entry.placement, &reference, bend);
         }
         self.lines.clear();
-        match self.bank.entries().first() {
-            Some(best) => Task::Straighten(self.window.begin_straightening(best.placement.bend)),
-            None => Task::Vote { ping: 0, tilt: 0 },
+        if let Some(best) = self.bank.entries().first() {
+            let straightening = self.window.begin_straightening(best.placement.bend);
+            self.work = Work::Straighten(straightening);
         }
-    }
-
-    fn straighten(&mut self, mut straightening: Straightening) -> Task {
-        if self.window.straighten(&mut straightening) {
-            Task::Straighten(straightening)
-        } else {
-            Task::Vote { ping: 0, tilt: 0 }
-        }
+        Task::Vote { ping: 0, tilt: 0 }
     }
 
     fn fit(&mut self, line: u8) -> Task {
@@ -622,7 +631,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
     fn refine(&mut self) -> Task {
         match self.bank.next_stale() {
             Some(entry) => {
-                self.trial = Some(Trial::of_entry(&entry));
+                self.work = Work::Trial(Trial::of_entry(&entry));
                 Task::Bank
             }
             None => Task::Pairs { pair: 0, pairs: Pairs::default() },
@@ -676,45 +685,60 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         let full = self.bank.least_score().unwrap_or(0.0);
         let least = if full > rivalry * best { full } else { rivalry * best };
         let least = if least > 0.0 { least } else { 0.0 };
-        self.trial = Some(Trial::of_candidate(placement, least));
+        self.work = Work::Trial(Trial::of_candidate(placement, least));
     }
 
     /// The pairs of this cycle: the best ones, then others that take turns.
     fn pair(&self, number: u8) -> Option<(Line, Line)> {
-        let lines = self.lines.all();
-        let sums = 1..2 * lines.len();
-        let all = sums.flat_map(|sum| {
-            let half = sum.div_ceil(2);
-            (0..half).map(move |one| (one, sum - one))
-        });
-        let mut all = all.filter_map(|(one, other)| {
-            let (one, other) = (lines.get(one)?, lines.get(other)?);
-            make_a_pair(one, other).then_some((*one, *other))
-        });
         if number < BEST_PAIRS {
-            return all.nth(usize::from(number));
+            return self.nth_pair(number.into()).ok();
         }
         let turn = number - BEST_PAIRS;
         if turn >= OTHER_PAIRS {
             return None;
         }
-        let others = all.clone().count().checked_sub(usize::from(BEST_PAIRS))?;
+        let all = self.nth_pair(usize::MAX).err()?;
+        let others = all.checked_sub(usize::from(BEST_PAIRS))?;
         let nth = usize::from(turn);
         if nth >= others {
             return None;
         }
         let first = (self.cycles as usize).wrapping_mul(usize::from(OTHER_PAIRS));
-        all.nth(usize::from(BEST_PAIRS) + (first + nth) % others)
+        self.nth_pair(usize::from(BEST_PAIRS) + (first + nth) % others).ok()
+    }
+
+    /// The pair of this rank, from 0; how many there are if it is beyond.
+    #[inline(never)]
+    fn nth_pair(&self, nth: usize) -> Result<(Line, Line), usize> {
+        let lines = self.lines.all();
+        let mut rank = 0;
+        for sum in 1..2 * lines.len() {
+            for one in 0..sum.div_ceil(2) {
+                let (Some(one), Some(other)) = (lines.get(one), lines.get(sum - one)) else {
+                    continue;
+                };
+                if !make_a_pair(one, other) {
+                    continue;
+                }
+                if rank == nth {
+                    return Ok((*one, *other));
+                }
+                rank += 1;
+            }
+        }
+        Err(rank)
     }
 
     /// Whether the lines are more than one wall.
     fn has_separate_lines(&self) -> bool {
-        let lines = self.lines.all();
-        let mut pairs = lines
-            .iter()
-            .enumerate()
-            .flat_map(|(n, one)| lines.iter().skip(n + 1).map(move |other| (one, other)));
-        pairs.any(|(one, other)| self.lines.are_separate(one, other))
+        let mut lines = self.lines.all();
+        while let [one, others @ ..] = lines {
+            if others.iter().any(|other| self.lines.are_separate(one, other)) {
+                return true;
+            }
+            lines = others;
+        }
+        false
     }
 
     /// Ends a cycle.
@@ -754,7 +778,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
             along
         } else if has_persisted && (is_checked || was_unique) {
             // The answer before stays until this one is refined.
-            self.trial = Some(Trial::of_answer(&best));
+            self.work = Work::Trial(Trial::of_answer(&best));
             return;
         } else {
             Decision::Several(rivals)

@@ -16,6 +16,7 @@ impl Vector {
     }
 
     /// Cosine and sine of an angle, radians.
+    #[inline(never)]
     pub fn of_angle(angle: f32) -> Self {
         let (sin, cos) = sin_cos(Radians(angle));
         Self { x: cos, y: sin }

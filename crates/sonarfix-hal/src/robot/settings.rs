@@ -15,8 +15,8 @@ pub enum Stamp {
 }
 
 /// Evaluations of the search a millisecond: the computing time that simulation, replay and the STM32 firmware grant it.
-/// 40 evaluations of 1,380 instructions on average (`docs/search.md`) are some 55,000 of the 168,000 cycles that a
-/// Cortex-M4F at 168 MHz has in a millisecond, and leave half of it free at 1.6 cycles an instruction.
+/// 40 evaluations of 1,800 instructions on average (`docs/search.md`) are 72,000 instructions, at 1.6 cycles an instruction two
+/// thirds of the 168,000 cycles that a Cortex-M4F at 168 MHz has in a millisecond.
 pub const EVALUATIONS_PER_MILLISECOND: u16 = 40;
 
 /// Settings of the loop. The ping schedule is that of the localizer's configuration

@@ -99,7 +99,13 @@ impl<const HYPOTHESES: usize> Bank<HYPOTHESES> {
 
     /// Removes the entry in trial, if there is one.
     pub fn end_trial(&mut self) {
-        self.entries.retain(|entry| entry.state != State::InTrial);
+        self.remove(|entry| entry.state == State::InTrial);
+    }
+
+    fn remove(&mut self, is_gone: impl Fn(&Entry) -> bool) {
+        while let Some(at) = self.entries.iter().position(&is_gone) {
+            self.entries.remove(at);
+        }
     }
 
     /// The score that a newcomer has to reach.
@@ -115,16 +121,15 @@ impl<const HYPOTHESES: usize> Bank<HYPOTHESES> {
     /// Adds an entry, or lets it replace those of its mode if it is better.
     #[inline(never)]
     pub fn offer(&mut self, mut entry: Entry) {
-        let is_same = |other: &Entry| is_near(&other.placement, &entry.placement, SAME_PLACE);
-        let better = self.entries.iter().any(|other| is_same(other) && other.score >= entry.score);
-        if better {
-            return;
-        }
-        let same = self.entries.iter().filter(|other| is_same(other));
-        let streak = same.map(|other| other.streak).max().unwrap_or(0);
         let placement = entry.placement;
-        entry.streak = if streak > entry.streak { streak } else { entry.streak };
-        self.entries.retain(|other| !is_near(&other.placement, &placement, SAME_PLACE));
+        let is_same = |other: &Entry| is_near(&other.placement, &placement, SAME_PLACE);
+        for other in self.entries.iter().filter(|other| is_same(other)) {
+            if other.score >= entry.score {
+                return;
+            }
+            entry.streak = if other.streak > entry.streak { other.streak } else { entry.streak };
+        }
+        self.remove(is_same);
         if self.entries.is_full() {
             match self.entries.last() {
                 Some(last) if last.score < entry.score => {

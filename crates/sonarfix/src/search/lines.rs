@@ -110,8 +110,7 @@ impl Lines {
     pub fn vote(&mut self, pings: &[Ping], voter: usize, tilt: f32) {
         let Some(ping) = pings.get(voter) else { return };
         let Some(range) = ping.range() else { return };
-        let (sin, cos) = sin_cos(self.cone * tilt);
-        let normal = ping.axis.turned(Vector::new(cos, sin));
+        let normal = ping.axis.turned(Vector::of_angle((self.cone * tilt).0));
         let offset = normal.dot(ping.station.at) + range;
         let mut line = Line { normal, offset, stretch: (0.0, 0.0), support: 0 };
         self.gather(pings, &mut line);
@@ -166,6 +165,7 @@ impl Lines {
     }
 
     /// Keeps a line unless a similar one has more support.
+    #[inline(never)]
     fn keep(&mut self, line: Line) {
         let similar = self.found.iter().position(|other| {
             other.normal.dot(line.normal) > SAME_DIRECTION
@@ -174,8 +174,7 @@ impl Lines {
         if let Some(at) = similar {
             match self.found.get(at) {
                 Some(other) if other.support < line.support => {
-                    let mut index = 0..;
-                    self.found.retain(|_| index.next() != Some(at));
+                    self.found.remove(at);
                 }
                 _ => return,
             }
@@ -225,9 +224,8 @@ impl Lines {
         if !(turn.abs() < self.cone.0 && shift.is_finite()) {
             return;
         }
-        let (sin, cos) = sin_cos(Radians(turn));
         let mut fitted = Line {
-            normal: line.normal.turned(Vector::new(cos, sin)),
+            normal: line.normal.turned(Vector::of_angle(turn)),
             offset: line.offset + shift,
             ..line
         };

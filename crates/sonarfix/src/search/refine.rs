@@ -3,7 +3,7 @@
 
 use super::candidates::Placement;
 use super::score::Target;
-use super::window::{Bend, Chain, Ping, Window};
+use super::window::{Bend, Chain, Ping};
 use crate::reflector::Beam;
 use crate::vector::Vector;
 
@@ -73,17 +73,11 @@ pub(super) struct Placed {
 }
 
 impl Placed {
-    /// Places the next ping of a chain that began at the reference.
-    pub fn new<const PINGS: usize>(
-        ping: &Ping,
-        placement: &Placement,
-        window: &Window<PINGS>,
-        chain: &mut Chain,
-    ) -> Self {
-        let link = window.link(ping, placement.bend.minus(window.bend()));
-        chain.add(&link);
+    /// Places the last ping of a chain that began at the reference.
+    pub fn new(ping: &Ping, placement: &Placement, chain: &Chain) -> Self {
+        let link = chain.last();
         let to_map = |vector: Vector| vector.turned(placement.rotation);
-        let arm = to_map(chain.sonar(&link));
+        let arm = to_map(chain.sonar(link));
         let from = placement.at.plus(arm);
         let axis = to_map(ping.axis.turned(link.bent));
         Self {
@@ -131,7 +125,7 @@ impl Equations {
         // Beams are square to what answers, on the mean.
         let aside = by.by_beam * target.off_axis;
         let weight = by.by_beam * by.by_beam / (1.0 + 0.3 * aside * aside);
-        self.add_row([0.0, 0.0, 1.0, placed.travelled, placed.turned], target.off_axis, weight);
+        self.add_turn([1.0, placed.travelled, placed.turned], target.off_axis, weight);
         self.count += 1;
     }
 
@@ -139,6 +133,20 @@ impl Equations {
         for ((row, right), hi) in self.rows.iter_mut().zip(&mut self.right).zip(h) {
             let weighted = weight * hi;
             for (cell, hj) in row.iter_mut().zip(h) {
+                *cell += weighted * hj;
+            }
+            *right += weighted * value;
+        }
+    }
+
+    /// Adds a row that does not depend on the position.
+    fn add_turn(&mut self, h: [f32; PARAMETERS - 2], value: f32, weight: f32) {
+        let [.., a, b, c] = &mut self.rows;
+        let [.., d, e, f] = &mut self.right;
+        for ((row, right), hi) in [(a, d), (b, e), (c, f)].into_iter().zip(h) {
+            let weighted = weight * hi;
+            let [.., a, b, c] = row;
+            for (cell, hj) in [a, b, c].into_iter().zip(h) {
                 *cell += weighted * hj;
             }
             *right += weighted * value;

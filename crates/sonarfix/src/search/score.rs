@@ -3,12 +3,14 @@
 //!
 //! Scores are natural logarithms of the likelihood over that of an echo anywhere in the sonar's range.
 
+use heapless::Vec;
+
 use crate::config::{Ranging, Sonar};
 use crate::echo::{EchoParameters, LogShares};
 use crate::elementary::{ln, sqrt};
 use crate::map::Map;
 use crate::numeric::at_least;
-use crate::reflector::{Beam, Heard, Lit, Reflector, Reflectors};
+use crate::reflector::{Beam, Heard, Lit, Place, REFLECTORS, Reflector, Reflectors};
 use crate::vector::Vector;
 
 /// Deviation of the angle between axis and reflector, as a part of the cone.
@@ -80,6 +82,28 @@ pub(super) struct Explanation {
     pub target: Option<Target>,
 }
 
+/// How far what may answer a ping of sound was looked at.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Hearing {
+    /// Nearest first.
+    found: Vec<Place, REFLECTORS, u8>,
+    /// How many of them were looked at.
+    heard: u8,
+    /// Whether the range is not beyond the wall that the axis meets first.
+    is_before: bool,
+    /// Logarithm of the probability that none of them has answered.
+    missed: f32,
+    /// The best of them.
+    best: Option<Explanation>,
+}
+
+impl Hearing {
+    /// How many are looked at in the evaluation that finds them: the fewer, the more were found.
+    pub fn at_first(&self) -> usize {
+        (REFLECTORS - self.found.len()) / 2
+    }
+}
+
 /// The sonar in its map.
 #[derive(Debug, Clone)]
 pub(super) struct EchoModel<'m> {
@@ -112,58 +136,91 @@ impl<'m> EchoModel<'m> {
     }
 
     // ===== Eq. (31): p(z) over the density of an echo anywhere =====
-    /// Scores a ping; one call is one evaluation.
-    pub fn explain(&self, beam: &Beam, sharpness: Sharpness) -> Explanation {
-        if self.is_light {
-            return self.explain_lit(beam, sharpness);
-        }
+    /// Finds what may answer a ping of sound.
+    #[inline(never)]
+    pub fn listen(&self, beam: &Beam, sharpness: Sharpness) -> Hearing {
         let margin = MATCH * sharpness.deviation;
         let reach = beam.range.map_or(self.reflectors.max_range, |range| range + margin);
-        let (reflectors, free) = self.reflectors.in_beam(beam, reach, margin);
-        let mut missed = 0.0;
-        let mut best: Option<Explanation> = None;
+        let mut reflectors = Vec::new();
+        let free = self.reflectors.collect(beam, reach, margin, &mut reflectors);
+        let mut found = Vec::new();
         for reflector in &reflectors {
-            let Some(audible) = self.audible(beam, reflector) else { continue };
+            // There is room: both lists hold as many.
+            let _ = found.push(reflector.place());
+        }
+        Hearing {
+            found,
+            heard: 0,
+            is_before: beam.range.is_some_and(|range| range < free + margin),
+            missed: 0.0,
+            best: None,
+        }
+    }
+
+    /// Looks at so many of those that were found, nearest first; the score of the ping when no other one matters.
+    #[inline(never)]
+    pub fn hear(
+        &self,
+        hearing: &mut Hearing,
+        (beam, sharpness): (&Beam, Sharpness),
+        most: usize,
+    ) -> Option<Explanation> {
+        let mut left = most;
+        while let Some(&place) = hearing.found.get(usize::from(hearing.heard)) {
+            left = left.checked_sub(1)?;
+            hearing.heard += 1;
+            let Some(reflector) = self.reflectors.at(beam, place) else { continue };
+            let Some(audible) = self.audible(beam, &reflector) else { continue };
             if let Some(range) = beam.range {
                 let residual = range - reflector.distance;
                 let ratio = residual / sharpness.deviation;
                 if ratio.abs() <= MATCH {
                     let off_axis = beam.axis.left().dot(reflector.toward);
                     let aside = off_axis * self.by_beam;
-                    let score = audible.hit + missed + sharpness.peak
+                    let score = audible.hit + hearing.missed + sharpness.peak
                         - 0.5 * (ratio * ratio + aside * aside);
-                    if best.is_none_or(|best| score > best.score) {
+                    if hearing.best.is_none_or(|best| score > best.score) {
                         let toward = reflector.toward;
                         let target = Some(Target { residual, toward, off_axis });
-                        best = Some(Explanation { score, target });
+                        hearing.best = Some(Explanation { score, target });
                     }
                 }
                 if residual < 0.0 {
                     break;
                 }
             }
-            missed += audible.miss;
-            if missed < LEAST_ECHO - sharpness.peak {
+            hearing.missed += audible.miss;
+            if hearing.missed < LEAST_ECHO - sharpness.peak {
                 break;
             }
         }
-        let other = match beam.range {
-            None => at_least(SILENCE + missed, self.shares.silence),
-            Some(range) => {
-                let is_before = range < free + margin;
-                let clutter = if is_before { self.shares.before } else { self.shares.behind };
-                at_least(clutter + missed, LEAST_ECHO)
-            }
+        Some(self.end_hearing(hearing, beam))
+    }
+
+    /// The best of what was heard and what else an echo, or none, may come from.
+    fn end_hearing(&self, hearing: &Hearing, beam: &Beam) -> Explanation {
+        let missed = hearing.missed;
+        let other = if beam.range.is_some() {
+            let shares = &self.shares;
+            let clutter = if hearing.is_before { shares.before } else { shares.behind };
+            at_least(clutter + missed, LEAST_ECHO)
+        } else {
+            at_least(SILENCE + missed, self.shares.silence)
         };
-        match best {
-            Some(best) if best.score > other => best,
-            _ => Explanation { score: other, target: None },
-        }
+        let best = hearing.best.filter(|best| best.score > other);
+        best.unwrap_or(Explanation { score: other, target: None })
+    }
+
+    /// Scores a ping at once.
+    #[cfg(test)]
+    pub fn explain(&self, beam: &Beam, sharpness: Sharpness) -> Explanation {
+        let mut hearing = self.listen(beam, sharpness);
+        self.hear(&mut hearing, (beam, sharpness), REFLECTORS).unwrap()
     }
 
     /// Scores a ping of light, which only the wall that the axis meets first can answer.
     #[inline(never)]
-    fn explain_lit(&self, beam: &Beam, sharpness: Sharpness) -> Explanation {
+    pub fn explain_lit(&self, beam: &Beam, sharpness: Sharpness) -> Explanation {
         let met = self.reflectors.lit(beam);
         let Some(range) = beam.range else {
             let missed = if met.is_some() { self.shares.misses } else { 0.0 };

@@ -159,7 +159,7 @@ proptest! {
         search.window.set_taken(taken.wrapping_add(fresh));
         let before = if was_unique { Decision::Unique(best) } else { Decision::Several(3) };
         search.answer = before;
-        search.trial = None;
+        search.work = Work::None;
 
         let parameters = search.parameters;
         let margin = f64::from(parameters.margin);
@@ -202,7 +202,7 @@ proptest! {
         let is_due = has_persisted && !is_checked && !was_unique || (cycles + 1) % 4 == 0;
         prop_assert_eq!(search.is_check_due, is_due);
         let is_unique = is_fit && has_persisted && (is_checked || was_unique);
-        prop_assert_eq!(search.trial.is_some(), is_unique);
+        prop_assert_eq!(matches!(search.work, Work::Trial(_)), is_unique);
         if !is_fit {
             prop_assert_eq!(search.answer, Decision::Nowhere);
         } else if is_unique {

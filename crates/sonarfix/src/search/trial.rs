@@ -4,8 +4,9 @@
 use super::bank::{Entry, State};
 use super::candidates::Placement;
 use super::refine::{Equations, Placed, Prior, Tolerance};
-use super::score::{EchoModel, Sharpness};
+use super::score::{EchoModel, Explanation, Hearing, Sharpness};
 use super::window::{Chain, Window};
+use crate::reflector::Beam;
 use crate::vector::Vector;
 
 /// Gauss–Newton steps after the coarse one, and those of an answer.
@@ -13,6 +14,9 @@ const STEPS: u8 = 2;
 const STEPS_OF_ANSWER: u8 = 4;
 /// By how much the running sum may fall short: scores deviate by 1.3 a ping.
 const LEAD: f32 = 8.0;
+
+/// Of what may answer a ping, so much is looked at in one evaluation; in the one that finds it, [`Hearing::at_first`].
+const HEARD_AT_ONCE: usize = 4;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Stage {
@@ -43,6 +47,8 @@ pub(super) struct Trial {
     placement: Placement,
     stage: Stage,
     chain: Chain,
+    /// The ping that is being looked at.
+    hearing: Option<Hearing>,
     /// Pings looked at in this stage, and those of them with an echo.
     seen: u16,
     echoes: u16,
@@ -62,6 +68,7 @@ impl Trial {
             placement,
             stage: Stage::Coarse,
             chain: Chain::new(Vector::default()),
+            hearing: None,
             seen: 0,
             echoes: 0,
             sum: 0.0,
@@ -86,7 +93,7 @@ impl Trial {
         Self { is_answer: true, ..Self::of_entry(entry) }
     }
 
-    /// Looks at one ping.
+    /// Looks at one ping, or at a part of what may answer it.
     #[inline(never)]
     pub fn advance<const PINGS: usize>(
         &mut self,
@@ -97,19 +104,17 @@ impl Trial {
         let Some(ping) = window.newest(usize::from(self.seen)) else {
             return self.end_stage(odometry.prior);
         };
+        let sharpness =
+            Sharpness::new(self.deviation(), odometry.per_metre * ping.station.travelled);
+        if self.hearing.is_none() {
+            self.chain.add(&window.link(ping, self.placement.bend.minus(window.bend())));
+        }
+        let placed = Placed::new(ping, &self.placement, &self.chain);
+        let Some(explanation) = self.explain(echoes, &placed.beam, sharpness) else {
+            return Verdict::Running;
+        };
         self.seen += 1;
         self.echoes += u16::from(ping.range().is_some());
-        let deviation = match self.stage {
-            Stage::Coarse => Sharpness::COARSE,
-            Stage::Step(0) => Sharpness::MEDIUM,
-            Stage::Step(1) => Sharpness::FINE,
-            Stage::Step(_) => Sharpness::SHARP,
-            Stage::Fine if self.is_answer => Sharpness::SHARP,
-            Stage::Fine => Sharpness::FINE,
-        };
-        let sharpness = Sharpness::new(deviation, odometry.per_metre * ping.station.travelled);
-        let placed = Placed::new(ping, &self.placement, window, &mut self.chain);
-        let explanation = echoes.explain(&placed.beam, sharpness);
         self.sum += explanation.score;
         if let Some(target) = explanation.target {
             let by = Tolerance { deviation: sharpness.deviation, by_beam: echoes.by_beam };
@@ -120,6 +125,36 @@ impl Trial {
             return Verdict::Rejected;
         }
         Verdict::Running
+    }
+
+    /// The score of a ping, in a few evaluations if much may answer it.
+    fn explain(
+        &mut self,
+        echoes: &EchoModel,
+        beam: &Beam,
+        sharpness: Sharpness,
+    ) -> Option<Explanation> {
+        if echoes.is_light {
+            return Some(echoes.explain_lit(beam, sharpness));
+        }
+        let most = self.hearing.is_some().then_some(HEARD_AT_ONCE);
+        let hearing = self.hearing.get_or_insert_with(|| echoes.listen(beam, sharpness));
+        let most = most.unwrap_or(hearing.at_first());
+        let explanation = echoes.hear(hearing, (beam, sharpness), most)?;
+        self.hearing = None;
+        Some(explanation)
+    }
+
+    /// Expected deviation of the ranges in this stage, metres.
+    fn deviation(&self) -> f32 {
+        match self.stage {
+            Stage::Coarse => Sharpness::COARSE,
+            Stage::Step(0) => Sharpness::MEDIUM,
+            Stage::Step(1) => Sharpness::FINE,
+            Stage::Step(_) => Sharpness::SHARP,
+            Stage::Fine if self.is_answer => Sharpness::SHARP,
+            Stage::Fine => Sharpness::FINE,
+        }
     }
 
     /// The sum below which the trial ends: a sequential test against the mean that a placement of the
@@ -164,6 +199,7 @@ impl Trial {
     fn begin(&mut self, stage: Stage) -> Verdict {
         self.stage = stage;
         self.chain = Chain::new(Vector::default());
+        self.hearing = None;
         self.seen = 0;
         self.echoes = 0;
         self.sum = 0.0;

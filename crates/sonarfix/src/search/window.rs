@@ -211,10 +211,9 @@ impl<const PINGS: usize> Window<PINGS> {
         if is_known {
             return false;
         }
-        if self.pings.is_full() {
+        if self.pings.is_full() && !self.pings.is_empty() {
             // The oldest; a shift of less than 4 KiB, once per novel ping.
-            self.pings.rotate_left(1);
-            self.pings.pop();
+            self.pings.remove(0);
         }
         // There is room now, unless there is room for none.
         self.taken = self.taken.wrapping_add(1);
@@ -353,6 +352,11 @@ impl Chain {
         self.by_drift = self.by_drift.plus(step.left().times(travelled));
         self.by_turn_scale = self.by_turn_scale.plus(step.left().times(turned));
         self.last = *link;
+    }
+
+    /// The last place.
+    pub fn last(&self) -> &Link {
+        &self.last
     }
 
     /// Where the sonar was at the last place.

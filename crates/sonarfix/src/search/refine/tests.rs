@@ -5,6 +5,7 @@ use std::vec::Vec;
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
 
+use super::super::window::Window;
 use super::*;
 use crate::units::Radians;
 
@@ -170,7 +171,8 @@ proptest! {
         };
         let (mut chain, mut other) = (Chain::new(Vector::default()), Chain::new(Vector::default()));
         for ping in window.pings().iter().rev() {
-            let placed = Placed::new(ping, &placement, &window, &mut chain);
+            chain.add(&window.link(ping, placement.bend.minus(window.bend())));
+            let placed = Placed::new(ping, &placement, &chain);
             let link = window.link(ping, placement.bend);
             other.add(&link);
             let arm = turned(other.sonar(&link));

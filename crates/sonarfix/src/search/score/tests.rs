@@ -1,5 +1,6 @@
 //! Eq. (31) in `f64`.
 
+use std::format;
 use std::vec::Vec;
 
 use proptest::prelude::*;
@@ -141,6 +142,38 @@ proptest! {
             let (reflectors, _) = model.reflectors.in_beam(&beam, reach, 3.0 * deviation);
             prop_assert!(reflectors.iter().any(explains), "{target:?}");
         }
+    }
+
+    /// The same bits, however much is looked at in one evaluation, and with the reflectors that were found, not what is left of
+    /// them in memory.
+    #[test]
+    fn a_ping_that_is_looked_at_in_parts_has_the_same_score(
+        inside in [(0.5_f32..5.5, 0.5_f32..3.5, -3.1_f32..3.1), (0.5_f32..5.5, 0.5_f32..3.5, -3.1_f32..3.1)],
+        (x, y, angle) in (0.2_f32..5.8, 0.2_f32..3.8, -3.1_f32..3.1), cone in 0.1_f32..0.5,
+        range in prop::option::of(0.1_f32..3.5), parts in prop::collection::vec(0_usize..4, 6),
+    ) {
+        let (walls, sonar) = (walls(inside), sonar(cone));
+        let model = EchoModel::new(Map::new(&walls), &sonar, &EchoParameters::HC_SR04);
+        let beam = Beam { from: Vector::new(x, y), axis: Vector::of_angle(angle), range };
+        let sharpness = Sharpness::new(0.08, 0.0);
+        let reach = range.map_or(3.5, |range| range + 3.0 * sharpness.deviation);
+        let (reflectors, _) = model.reflectors.in_beam(&beam, reach, 3.0 * sharpness.deviation);
+        for reflector in &reflectors {
+            let again = model.reflectors.at(&beam, reflector.place());
+            prop_assert_eq!(format!("{:?}", again), format!("{:?}", Some(reflector)));
+        }
+        let mut hearing = model.listen(&beam, sharpness);
+        prop_assert_eq!(hearing.at_first(), (6 - reflectors.len()) / 2);
+        let mut parts = parts.into_iter();
+        let (mut looked, mut explanation) = (0, None);
+        while explanation.is_none() {
+            let most = parts.next().unwrap_or(1);
+            explanation = model.hear(&mut hearing, (&beam, sharpness), most);
+            looked += most;
+            prop_assert!(explanation.is_some() || usize::from(hearing.heard) == looked);
+        }
+        let at_once = model.explain(&beam, sharpness);
+        prop_assert_eq!(format!("{:?}", explanation.unwrap()), format!("{:?}", at_once));
     }
 
     #[test]

@@ -88,7 +88,7 @@ fn a_global_check_moves_two_lines_along_the_walls() {
     let mut moved = [false; 4];
     while let Task::Along { line, along } = search.task {
         moved[usize::from(line)] |= along != AlongWalls::default();
-        search.trial = None;
+        search.work = Work::None;
         search.poll(1);
     }
     assert_eq!(moved, [true, true, false, false]);
@@ -245,10 +245,11 @@ proptest! {
         let full = if scores.len() == 4 { scores[3] } else { 0.0 };
         let best = scores.first().copied().unwrap_or(0.0);
         let least = full.max(rivalry * best).max(0.0);
-        search.trial = None;
+        search.work = Work::None;
         search.try_candidate(placement, near, rivalry);
         let is_tried = !is_known && (!has_region || outside < 0.0);
-        let expected = is_tried.then(|| Trial::of_candidate(placement, least));
-        prop_assert_eq!(format!("{:?}", search.trial), format!("{:?}", expected));
+        let expected =
+            if is_tried { Work::Trial(Trial::of_candidate(placement, least)) } else { Work::None };
+        prop_assert_eq!(format!("{:?}", search.work), format!("{:?}", expected));
     }
 }

@@ -48,8 +48,21 @@ struct Sum {
     score: f32,
     echoes: u16,
     equations: Equations,
-    /// The sums after each ping.
-    running: Vec<f32>,
+    /// The sums after each ping, and the evaluations so far.
+    running: Vec<(f32, usize)>,
+}
+
+/// Evaluations of a ping: what may answer it is found in the first, and up to four of that are looked at in each later one.
+fn evaluations(echoes: &EchoModel, beam: &Beam, sharpness: Sharpness) -> usize {
+    let mut hearing = echoes.listen(beam, sharpness);
+    let mut most = hearing.at_first();
+    for evaluations in 1..4 {
+        if echoes.hear(&mut hearing, (beam, sharpness), most).is_some() {
+            return evaluations;
+        }
+        most = 4;
+    }
+    panic!("more than six reflectors");
 }
 
 fn stage(
@@ -63,7 +76,8 @@ fn stage(
     let mut sum =
         Sum { score: 0.0, echoes: 0, equations: Equations::default(), running: Vec::new() };
     for ping in window.pings().iter().rev() {
-        let placed = Placed::new(ping, placement, window, &mut chain);
+        chain.add(&window.link(ping, placement.bend.minus(window.bend())));
+        let placed = Placed::new(ping, placement, &chain);
         let sharpness = Sharpness::new(deviation, odometry.per_metre * ping.station.travelled);
         let explanation = echoes.explain(&placed.beam, sharpness);
         sum.score += explanation.score;
@@ -72,7 +86,8 @@ fn stage(
             let by = Tolerance { deviation: sharpness.deviation, by_beam: echoes.by_beam };
             sum.equations.add(&placed, &target, by);
         }
-        sum.running.push(sum.score);
+        let before = sum.running.last().map_or(0, |(_, evaluations)| *evaluations);
+        sum.running.push((sum.score, before + evaluations(echoes, &placed.beam, sharpness)));
     }
     sum
 }
@@ -133,20 +148,20 @@ proptest! {
             let sum = stage(&echoes, &window, &odometry, &at, deviation);
             // The mean that is wanted, less the slack and a lead of 8.
             let mut rejected = None;
-            for (seen, running) in (1_u16..).zip(&sum.running) {
+            for (seen, (running, evaluations)) in (1_u16..).zip(&sum.running) {
                 let rate = share * f64::from(least) / f64::from(u16::try_from(pings).unwrap()) - slack;
                 let limit = rate * f64::from(seen) - 8.0;
                 prop_assume!((f64::from(*running) - limit).abs() > 1e-3);
                 if f64::from(*running) < limit {
-                    rejected = Some(usize::from(seen));
+                    rejected = Some(*evaluations);
                     break;
                 }
             }
-            if let Some(seen) = rejected {
-                expected = Some((evaluations + seen, Verdict::Rejected));
+            if let Some(until) = rejected {
+                expected = Some((evaluations + until, Verdict::Rejected));
                 break;
             }
-            evaluations += pings + 1;
+            evaluations += sum.running.last().unwrap().1 + 1;
             if n < number {
                 at = sum.equations.step(&at, prior).unwrap();
                 continue;
