@@ -13,7 +13,7 @@
 //! ```text
 //!              2.5, or 8 pings in a row without an    6.5, or 30 pings without
 //!              accepted range, or mean NIS above 3,   an accepted range while
-//!              or too far without a fix, or uncertain uncertain
+//!              or too far without a fix, or uncertain unmeasurable
 //!   Tracking ────────────────────────────▶ Degraded ──────────────────────▶ Lost
 //!      ▲                                    │   ▲                             │
 //!      └── below 0.5, 3 accepted in a   ────┘   └── below 0.5, 3 accepted in a row
@@ -30,6 +30,7 @@
 //! - *Uncertain*: the deviation of the position in its worst direction exceeds
 //!   [`max_position_deviation`](GatingParameters::max_position_deviation), or that of the heading a
 //!   quarter of the cone.
+//! - *Unmeasurable*: the same with half of the cone, at which no wall can be measured.
 //!
 //! Whatever the outcomes, the verdict is not `Tracking` after [`DEGRADED_WITHOUT_FIX`] without a used
 //! range or [`DEGRADED_WITHOUT_ODOMETRY`] without odometry, and `Lost` after
@@ -74,7 +75,7 @@ const BETTER_BELOW: f32 = 0.5;
 /// start can confirm the pose.
 const MAX_CONFIRMABLE_INFLATIONS: u16 = 3;
 /// Pings in a row without an accepted range after which the verdict is [`Verdict::Lost`], if the
-/// uncertainty of the pose exceeds its limits.
+/// uncertainty of the pose is too large for any wall to be measured.
 const LOST_AFTER_UNUSED: u16 = 30;
 
 /// Pings in a row without an accepted range, for whatever reason: the estimate then depends on the encoders.
@@ -343,6 +344,10 @@ impl Health {
         self.position_deviation > limits.position || self.heading_deviation > limits.heading
     }
 
+    fn is_unmeasurable(&self, limits: &Limits) -> bool {
+        self.position_deviation > limits.position || self.heading_deviation > limits.heading * 2.0
+    }
+
     fn can_improve(&self, limits: &Limits) -> bool {
         let agrees = self.evidence < BETTER_BELOW && self.accepted_in_a_row >= BETTER_AFTER;
         let is_confirmable = self.inflations <= MAX_CONFIRMABLE_INFLATIONS;
@@ -372,7 +377,7 @@ impl Health {
     fn worsen(&mut self, limits: &Limits) {
         let unused = self.silent_in_a_row.saturating_add(self.gated_in_a_row);
         let is_unaided = unused >= DEGRADED_AFTER_UNUSED;
-        let is_blind = unused >= LOST_AFTER_UNUSED && self.is_uncertain(limits);
+        let is_blind = unused >= LOST_AFTER_UNUSED && self.is_unmeasurable(limits);
         if self.evidence >= LOST_AT || is_blind {
             self.verdict = Verdict::Lost;
         } else if self.verdict == Verdict::Tracking && (self.evidence >= DEGRADED_AT || is_unaided)

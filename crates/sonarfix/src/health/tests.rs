@@ -126,7 +126,7 @@ fn an_improvement_has_each_of_its_conditions() {
     assert!(!improved(0.0, 0, 2));
 }
 
-/// Without an accepted range: `Degraded` at the eighth ping, `Lost` at the thirtieth of an uncertain robot.
+/// Without an accepted range: `Degraded` at the eighth ping, `Lost` at the thirtieth of a robot that is too uncertain to measure.
 #[test]
 fn pings_without_a_range_degrade_by_their_number() {
     let first = |uncertainty, verdict| {
@@ -138,4 +138,9 @@ fn pings_without_a_range_degrade_by_their_number() {
     };
     assert_eq!((first(CERTAIN, Verdict::Degraded), first(CERTAIN, Verdict::Lost)), (Some(8), None));
     assert_eq!(first(UNCERTAIN, Verdict::Lost), Some(30));
+    let turned = |heading| PoseUncertainty { heading: Radians(heading), ..CERTAIN };
+    assert_eq!(first(turned(2.0 * LIMITS.heading.0), Verdict::Lost), None);
+    assert_eq!(first(turned(2.01 * LIMITS.heading.0), Verdict::Lost), Some(30));
+    let moved = PoseUncertainty { position: Metres(1.01 * LIMITS.position.0), ..CERTAIN };
+    assert_eq!(first(moved, Verdict::Lost), Some(30));
 }
