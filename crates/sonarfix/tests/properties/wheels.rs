@@ -10,7 +10,7 @@ use sonarfix::units::{Instant, Metres, Radians};
 use crate::oracle::{SCALE_LEFT, SCALE_RIGHT, covariance_of, is_positive_definite};
 
 /// A localizer at its start, as `f64` matrix P.
-fn covariance(config: Config) -> crate::oracle::Matrix {
+fn covariance(config: &Config) -> crate::oracle::Matrix {
     let walls = [Wall::new(Point::new(3.0, -2.0), Point::new(3.0, 2.0)).unwrap()];
     let start = Start {
         pose: Pose::new(0.0, 0.0, Radians(0.0)),
@@ -18,7 +18,7 @@ fn covariance(config: Config) -> crate::oracle::Matrix {
         heading_deviation: Radians(0.01),
     };
     let now = Instant::from_ticks(0);
-    covariance_of(Localizer::new(config, Map::new(&walls), start, now).unwrap().filter())
+    covariance_of(Localizer::new(*config, Map::new(&walls), start, now).unwrap().filter())
 }
 
 proptest! {
@@ -30,11 +30,11 @@ proptest! {
     ) {
         let mut config = Config::for_track_width(Metres(0.2));
         (config.prior.scale_right, config.prior.scale_left) = (right, left);
-        let independent = covariance(config.clone());
+        let independent = covariance(&config);
         prop_assert!(independent[(SCALE_RIGHT, SCALE_LEFT)].abs() < 1e-7);
 
         config.prior.scale_difference = Some(share * right.hypot(left));
-        let p = covariance(config);
+        let p = covariance(&config);
         let [wide_right, wide_left] = [right, left].map(f64::from);
         let (most, least) = (wide_right.hypot(wide_left), 1.1 * (wide_right - wide_left).abs());
         let expected = (f64::from(share) * most).max(least).min(most);
