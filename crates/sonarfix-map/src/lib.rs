@@ -22,6 +22,7 @@
 #![forbid(unsafe_code)]
 
 mod absolute_file;
+mod addition;
 mod bake;
 mod clearance;
 mod document;
@@ -50,6 +51,7 @@ mod symmetry;
 mod wall_file;
 
 pub use absolute_file::{AbsoluteSensors, HeadingSensor, PositionSensor, Sampling};
+pub use addition::{Addition, with_cabinet};
 pub use bake::{BakeError, bake};
 pub use clearance::Collision;
 pub use error::{FileError, Mistake};
@@ -65,7 +67,7 @@ pub use scenario::{GyroTruth, KEYS as SCENARIO_KEYS, Run, Scenario, Start, Truth
 pub use simplify::{Limits, Simplified, simplify};
 pub use sonar_model::{SonarModel, SonarName};
 pub use surroundings::{Obstacle, Oscillation, Outline, Surroundings};
-pub use symmetry::{Motion as SymmetryMotion, Symmetry, symmetries, with_cabinet};
+pub use symmetry::{Motion as SymmetryMotion, Remedy, Symmetry, symmetries};
 
 /// The text of the reference scenario, with the conditions of the paper.
 pub const PAPER: &str = include_str!("../scenarios/paper.toml");

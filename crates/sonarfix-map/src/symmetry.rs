@@ -7,8 +7,9 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::fmt;
 
+use crate::addition::{Addition, inside, with_faces};
 use crate::bake::{BakeError, bake};
-use crate::floor::{Floor, NamedWall};
+use crate::floor::Floor;
 use crate::geometry::{Point, Segment, distance, wrap};
 use crate::neighbours::Neighbours;
 
@@ -29,9 +30,11 @@ const LEAST_DISPLACEMENT: f64 = 0.5;
 const FIRST: usize = 16;
 /// A stride through the points that visits neighbours late.
 const STRIDE: usize = 7_919;
-/// Depth and width of a cabinet, metres.
-const CABINET: f64 = 0.4;
-const WIDTH: f64 = 0.6;
+/// Walls on which an addition is tried, the longest, and its places on each: parts of the wall.
+const PLACED_ON: usize = 12;
+const PARTS: [f64; 7] = [0.5, 0.3, 0.7, 0.4, 0.6, 0.2, 0.8];
+/// From an addition to all walls but its own, metres.
+const CLEARANCE: f64 = 0.3;
 
 /// A motion by which the map repeats itself.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,9 +43,21 @@ pub struct Symmetry {
     pub motion: Motion,
     /// The share of the walls that it moves onto walls: the smaller one of two directions.
     pub share: f64,
-    /// A cabinet that breaks the repetition of the whole map: its wall and the place of its middle there,
-    /// metres.
-    pub remedy: Option<(usize, Point)>,
+    /// The smallest addition that ends every repetition of the whole map.
+    pub remedy: Option<Remedy>,
+}
+
+/// What ends every repetition of the whole map, if it is mapped.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Remedy {
+    /// What it is.
+    pub addition: Addition,
+    /// The wall at which it stands.
+    pub wall: usize,
+    /// The place of its middle there, metres.
+    pub at: Point,
+    /// Its faces, each from end to end, metres.
+    pub faces: Vec<[Point; 2]>,
 }
 
 /// A turn, or a shift without a turn.
@@ -65,37 +80,6 @@ impl Symmetry {
     pub fn is_whole(&self) -> bool {
         self.share >= WHOLE
     }
-}
-
-/// A floor with a cabinet in its map, at the place of a wall that is nearest to a point; `None` of a floor
-/// without walls.
-#[must_use]
-pub fn with_cabinet(floor: &Floor, near: [f64; 2]) -> Option<Floor> {
-    let segments = floor.named_walls().iter().map(NamedWall::segment);
-    let wall =
-        segments.min_by(|one, other| one.distance_to(near).total_cmp(&other.distance_to(near)))?;
-    let at = wall.at(wall.place(near)[0].clamp(0.0, wall.length()));
-    // On the side of the middle of the map.
-    let ends: Vec<Point> = floor.named_walls().iter().flat_map(|w| [w.from(), w.to()]).collect();
-    #[expect(clippy::cast_precision_loss, reason = "far fewer than 2^53 walls")]
-    let count = ends.len() as f64;
-    let sum = ends.iter().fold([0.0, 0.0], |sum: Point, end| [sum[0] + end[0], sum[1] + end[1]]);
-    let side = wall.place([sum[0] / count, sum[1] / count])[1].signum();
-    let [x, y] = wall.tangent();
-    let corner = |along: f64, depth: f64| {
-        [at[0] + along * x - side * depth * y, at[1] + along * y + side * depth * x]
-    };
-    let half = 0.5 * WIDTH;
-    let outline =
-        [corner(-half, 0.0), corner(-half, CABINET), corner(half, CABINET), corner(half, 0.0)];
-    let mut walls = floor.named_walls().to_vec();
-    for (n, ends) in outline.windows(2).enumerate() {
-        if let [from, to] = ends {
-            // Sides of a cabinet have a length and lie near the map.
-            walls.extend(NamedWall::new(format!("cabinet {n}"), *from, *to));
-        }
-    }
-    Some(Floor::new(walls))
 }
 
 impl fmt::Display for Symmetry {
@@ -140,36 +124,82 @@ pub fn symmetries(floor: &Floor) -> Result<Vec<Symmetry>, BakeError> {
     found.sort_by(|one, other| other.1.total_cmp(&one.1));
     let whole = found.iter().filter(|(_, share)| *share >= WHOLE).count();
     found.truncate(whole.max(1));
-    let remedy = if whole > 0 { remedy(&found, &walls) } else { None };
-    let symmetry =
-        |(rigid, share): &(Rigid, f64)| Symmetry { motion: rigid.motion(), share: *share, remedy };
+    let remedy = if whole > 0 { remedy(&found, floor, walls.segments())? } else { None };
+    let symmetry = |(rigid, share): &(Rigid, f64)| Symmetry {
+        motion: rigid.motion(),
+        share: *share,
+        remedy: remedy.clone(),
+    };
     Ok(found.iter().map(symmetry).collect())
 }
 
-/// A cabinet in the middle of a long wall that none of the motions moves onto a wall or onto itself.
-fn remedy(motions: &[(Rigid, f64)], walls: &Neighbours) -> Option<(usize, Point)> {
-    let mut longest: Vec<(usize, &Segment)> = walls.segments().iter().enumerate().collect();
+/// The smallest addition that ends all motions, where it differs most from what is at its image.
+fn remedy(
+    motions: &[(Rigid, f64)],
+    floor: &Floor,
+    walls: &[Segment],
+) -> Result<Option<Remedy>, BakeError> {
+    let mut longest: Vec<(usize, &Segment)> = walls.iter().enumerate().collect();
     longest.sort_by(|(_, one), (_, other)| other.length().total_cmp(&one.length()));
-    let places = longest.into_iter().flat_map(|(wall, segment)| {
-        [0.5, 0.3].map(|part| (wall, segment.at(part * segment.length()), segment))
-    });
-    let breaks = |at: Point, wall: &Segment| {
-        motions.iter().all(|(rigid, _)| {
-            // The middle of its face, on either side of the wall.
-            [CABINET, -CABINET].into_iter().all(|depth| {
-                let [x, y] = wall.tangent();
-                let face = [at[0] - depth * y, at[1] + depth * x];
-                let image = rigid.place(face);
-                distance(image, face) > CABINET && !is_on_walls(image, walls)
-            })
-        })
-    };
-    let mut places = places.filter(|(_, at, segment)| breaks(*at, segment));
-    places.next().map(|(wall, at, _)| (wall, at))
+    longest.truncate(PLACED_ON);
+    for addition in Addition::BY_SIZE {
+        let mut best: Option<(f64, Remedy, Vec<Segment>)> = None;
+        for (wall, segment) in &longest {
+            for part in PARTS {
+                let along = part * segment.length();
+                let at = segment.at(along);
+                let faces = addition.faces(at, segment, inside(segment, walls));
+                let end = along.min(segment.length() - along);
+                if end < 0.5 * addition.width() || !is_clear(&faces, *wall, walls) {
+                    continue;
+                }
+                let difference = difference(motions, &faces, walls);
+                // The first of equal ones.
+                if best.as_ref().is_none_or(|(most, ..)| difference > most + 1e-6) {
+                    let ends = faces.iter().map(|face| [face.from, face.to]).collect();
+                    let remedy = Remedy { addition, wall: *wall, at, faces: ends };
+                    best = Some((difference, remedy, faces));
+                }
+            }
+        }
+        let Some((_, remedy, faces)) = best else { continue };
+        if !repeats(motions, &with_faces(floor, &faces, "addition"))? {
+            return Ok(Some(remedy));
+        }
+    }
+    Ok(None)
 }
 
-fn is_on_walls(point: Point, walls: &Neighbours) -> bool {
-    walls.near(point, ALIKE).any(|(_, wall)| wall.distance_to(point) <= ALIKE)
+/// Whether nothing but its own wall is near an addition.
+fn is_clear(faces: &[Segment], own: usize, walls: &[Segment]) -> bool {
+    let others = walls.iter().enumerate().filter(|(wall, _)| *wall != own);
+    let mut all = others.flat_map(|(_, wall)| faces.iter().map(move |face| face.distance(*wall)));
+    all.all(|distance| distance >= CLEARANCE)
+}
+
+/// Distance of an addition's images from walls and addition, the mean over its faces, of the motion with the least, metres.
+fn difference(motions: &[(Rigid, f64)], faces: &[Segment], walls: &[Segment]) -> f64 {
+    let of_a_motion = |(rigid, _): &(Rigid, f64)| {
+        let images = faces.iter().flat_map(|face| {
+            [0.25, 0.5, 0.75, 1.0].map(|part| rigid.place(face.at(part * face.length())))
+        });
+        let distances = images.map(|image| {
+            let all = walls.iter().chain(faces);
+            all.map(|wall| wall.distance_to(image)).fold(f64::INFINITY, f64::min)
+        });
+        let (sum, count) = distances.fold((0.0, 0.0), |(sum, count), at| (sum + at, count + 1.0));
+        sum / count
+    };
+    motions.iter().map(of_a_motion).fold(f64::INFINITY, f64::min)
+}
+
+/// Whether one of the motions repeats the whole of a floor.
+fn repeats(motions: &[(Rigid, f64)], floor: &Floor) -> Result<bool, BakeError> {
+    let image = bake(&floor.walls())?;
+    let walls = Neighbours::new(floor, &image).map_err(BakeError::Refused)?;
+    let Some(points) = Points::of(walls.segments()) else { return Ok(false) };
+    let shares = motions.iter().filter_map(|(rigid, _)| points.share(rigid, &walls));
+    Ok(shares.fold(0.0, f64::max) >= WHOLE)
 }
 
 /// A rigid motion: a turn about the origin, then a shift.

@@ -6,9 +6,12 @@
 )]
 
 use std::f64::consts::{FRAC_PI_2, PI};
+use std::path::Path;
 
 use proptest::prelude::*;
-use sonarfix_map::{Floor, NamedWall, Symmetry, SymmetryMotion, symmetries};
+use sonarfix_map::{
+    Addition, CLASSROOM, Floor, NamedWall, Remedy, Scenario, Symmetry, SymmetryMotion, symmetries,
+};
 
 type Point = [f64; 2];
 
@@ -88,10 +91,88 @@ fn the_message_names_the_motion() {
     );
 }
 
+/// Whether an addition begins at its wall, at right angles to it, and is as deep as it says.
+fn is_attached(remedy: &Remedy, walls: &[[Point; 2]]) -> bool {
+    let (from, to) = (walls[remedy.wall][0], walls[remedy.wall][1]);
+    let length = (to[0] - from[0]).hypot(to[1] - from[1]);
+    let tangent = [(to[0] - from[0]) / length, (to[1] - from[1]) / length];
+    // Along the wall and aside of it.
+    let place = |[x, y]: Point| {
+        let [dx, dy] = [x - from[0], y - from[1]];
+        (dx * tangent[0] + dy * tangent[1], dx * tangent[1] - dy * tangent[0])
+    };
+    let (half, depth) = match remedy.addition {
+        Addition::Board { depth } => (0.0, depth),
+        Addition::Cabinet { width, depth } => (0.5 * width, depth),
+    };
+    let middle = place(remedy.at).0;
+    let [near, far] = remedy.faces[0].map(place);
+    (near.0 - middle + half).abs() < 1e-9
+        && near.1.abs() < 1e-9
+        && (far.0 - near.0).abs() < 1e-9
+        && (far.1.abs() - depth).abs() < 1e-9
+        && (0.0..=length).contains(&middle)
+}
+
+fn remedy(walls: &[[Point; 2]]) -> Remedy {
+    let remedy = found(walls)[0].remedy.clone().unwrap();
+    assert!(is_attached(&remedy, walls), "{remedy:?}");
+    remedy
+}
+
+/// A board of 30 cm is more than 2 % of the walls in its direction of a room of 4 m × 4 m or 6 m × 8 m: less may be missing in the
+/// image of a map.
+#[test]
+fn a_short_board_breaks_the_symmetry_of_a_room() {
+    let classroom = Scenario::parse(CLASSROOM, "classroom.toml", Path::new(".")).unwrap().floor;
+    let classroom: Vec<[Point; 2]> =
+        classroom.named_walls().iter().map(|wall| [wall.from(), wall.to()]).collect();
+    for room in [rectangle(4.0, 4.0), rectangle(6.0, 8.0), classroom] {
+        let remedy = remedy(&room);
+        assert_eq!(remedy.addition, Addition::Board { depth: 0.3 });
+        let mut with = room.clone();
+        with.push(remedy.faces[0]);
+        assert!(!found(&with)[0].is_whole(), "{:?}", found(&with));
+    }
+}
+
+/// In larger rooms an addition has to be larger, and in a hall none of those that are tried is large enough.
+#[test]
+fn an_addition_grows_with_the_room() {
+    let depth = |remedy: &Remedy| match remedy.addition {
+        Addition::Board { depth } | Addition::Cabinet { depth, .. } => depth,
+    };
+    let rooms = [(6.0, 8.0), (12.0, 10.0), (14.0, 18.0), (26.0, 32.0)];
+    let remedies = rooms.map(|(width, height)| remedy(&rectangle(width, height)));
+    assert!(matches!(remedies[1].addition, Addition::Board { .. }), "{remedies:?}");
+    assert!(depth(&remedies[1]) > depth(&remedies[0]), "{remedies:?}");
+    assert!(matches!(remedies[3].addition, Addition::Cabinet { .. }), "{remedies:?}");
+    assert_eq!(found(&rectangle(90.0, 60.0))[0].remedy, None);
+}
+
+/// In an empty room all places differ from their images by the board: it stands in the middle of a long wall, inside. Boards
+/// there, one the image of the other, leave less of a difference beside them.
+#[test]
+fn an_addition_stands_where_it_differs_most_from_its_image() {
+    let mut room = rectangle(6.0, 8.0);
+    let remedy_of = |room: &[[Point; 2]]| {
+        let Remedy { at, faces, .. } = remedy(room);
+        let [[from, to]] = faces[..] else { panic!("{faces:?}") };
+        assert!((from[0] - at[0]).hypot(from[1] - at[1]) < 1e-12, "{from:?} {at:?}");
+        assert!((1.0..5.0).contains(&to[0]) || (to[0] - 3.0).abs() < (from[0] - 3.0).abs());
+        at
+    };
+    let [x, y] = remedy_of(&room);
+    assert!((x - 3.0).abs() > 2.9 && (y - 4.0).abs() < 1e-9, "({x}, {y})");
+    room.extend([[[0.0, 4.2], [0.6, 4.2]], [[6.0, 3.8], [5.4, 3.8]]]);
+    let [x, y] = remedy_of(&room);
+    assert!((x - 3.0).abs() < 2.9 || (y - 4.0).abs() > 0.5, "({x}, {y})");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Copies of random walls around a centre: the turn from one to the next is found, and the cabinet of
+    /// Copies of random walls around a centre: the turn from one to the next is found, and the addition of
     /// the remedy ends all repetition.
     #[test]
     fn constructed_rotations_are_found(
@@ -116,21 +197,12 @@ proptest! {
             prop_assert!((times - times.round()).abs() < 0.05, "{symmetry:?}");
             prop_assert!((about[0] - at[0]).hypot(about[1] - at[1]) < 0.1, "{symmetry:?}");
         }
-        let (wall, [x, y]) = whole[0].remedy.expect("a cabinet");
-        let [from, to] = all[wall];
-        let length = (to[0] - from[0]).hypot(to[1] - from[1]);
-        let (tx, ty) = ((to[0] - from[0]) / length, (to[1] - from[1]) / length);
-        let corner = |along: f64, aside: f64| {
-            [x + along * tx - aside * ty, y + along * ty + aside * tx]
-        };
+        let remedy = whole[0].remedy.as_ref().expect("an addition");
         let mut with = all.clone();
-        // As large a share of the walls as the rule for a whole map needs.
-        let half = 0.3_f64.min(0.4 * length);
-        with.push([corner(-half, 0.0), corner(-half, 0.4)]);
-        with.push([corner(-half, 0.4), corner(half, 0.4)]);
-        with.push([corner(half, 0.4), corner(half, 0.0)]);
+        with.extend(remedy.faces.iter().copied());
         let share = symmetries(&floor(&with)).unwrap();
         prop_assert!(!share.iter().any(Symmetry::is_whole), "{share:?}");
+        prop_assert!(is_attached(remedy, &all), "{remedy:?}");
     }
 
     /// A room that is not symmetric is not, in any direction.

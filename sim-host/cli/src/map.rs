@@ -149,11 +149,9 @@ fn check(map: &MapFile, robot: Option<&Path>) -> anyhow::Result<()> {
     for symmetry in &symmetries {
         println!("{}: warning: {symmetry}", map.name());
     }
-    if let Some((wall, [x, y])) = symmetries.first().and_then(|symmetry| symmetry.remedy) {
-        let wall = map.quoted(wall);
-        println!(
-            "    a cabinet of 0.6 m × 0.4 m at ({x:.1}, {y:.1}) m on {wall}, mapped, ends that"
-        );
+    if let Some(remedy) = symmetries.first().and_then(|symmetry| symmetry.remedy.as_ref()) {
+        let (addition, [x, y], wall) = (remedy.addition, remedy.at, map.quoted(remedy.wall));
+        println!("    {addition} at ({x:.1}, {y:.1}) m on {wall}, mapped, ends that");
     }
     let errors = count(&findings, Severity::Error);
     let warnings = count(&findings, Severity::Warning) + symmetries.len();
