@@ -9,7 +9,7 @@ use sonarfix_map::{MapFile, Scenario, robot_file, with_cabinet};
 use sonarfix_replay::find::{Find, Found};
 use sonarfix_report::Table;
 use sonarfix_studies::floor_plan::Kind;
-use sonarfix_studies::search_study::{self, Summary, Trial};
+use sonarfix_studies::search_study::{self, Plans, Summary, Trial};
 
 use crate::progress::Runs;
 use crate::table;
@@ -43,6 +43,9 @@ pub struct Args {
     /// Takes only homes among the floor plans.
     #[arg(long, requires = "floor_plans")]
     homes: bool,
+    /// Walls of the map of each floor plan: those of other plans stand beside it, and a plan with more is left out.
+    #[arg(long, requires = "floor_plans", value_parser = clap::value_parser!(u16).range(1..))]
+    walls: Option<u16>,
     /// Prints every trial.
     #[arg(long)]
     trials: bool,
@@ -57,7 +60,9 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         (_, Some(trials)) => {
             let kind = args.homes.then_some(Kind::Home);
             let runs = Runs::new(trials);
-            let found = search_study::floor_plans(args.seed, trials, args.seconds, kind, &runs)?;
+            let walls = args.walls.map(usize::from);
+            let plans = Plans { first: args.seed, trials, kind, walls };
+            let found = search_study::floor_plans(&plans, args.seconds, &runs)?;
             runs.end()?;
             found
         }
@@ -177,6 +182,10 @@ fn summary_table(summary: &Summary, seconds: f64) -> Table {
             row("true pose and all twins among the answers", twins),
             row("true pose best at the end", percent(summary.best_is_right)),
             row("mean time to a unique answer", mean_time),
+            row("evaluations of a cycle, mean", format!("{:.0}", summary.cycle)),
+            row("the same by the walls", format!("{:.1}", summary.cycle_a_wall)),
+            row("evaluations of the longest cycle", format!("{:.0}", summary.longest_cycle)),
+            row("the same by the walls", format!("{:.1}", summary.longest_cycle_a_wall)),
             row(
                 "position error, 95th percentile",
                 format!("{:.1} cm", 100.0 * summary.position_error_95),

@@ -24,7 +24,7 @@ const PAPER: &str = "../../crates/sonarfix-map/scenarios/paper.toml";
 
 /// Every subcommand, with arguments for the shortest output. In `FILES` are a short log with its map and robot, a drive for
 /// the calibration, a recorded stream of a robot's bytes, rows, and room for results; `ROBOT` is the port of a robot.
-const PRINTING: [&[&str]; 48] = [
+const PRINTING: [&[&str]; 49] = [
     &["--help"],
     &["init", "FILES/robot"],
     &["paper", "--runs", "1"],
@@ -33,6 +33,7 @@ const PRINTING: [&[&str]; 48] = [
     &["replay", "FILES/log.csv"],
     &["find", "FILES/log.csv", "--json"],
     &["find", "--floor-plans", "1", "--seconds", "5"],
+    &["find", "--floor-plans", "1", "--walls", "30", "--seconds", "5"],
     &["relocalize", "--runs", "1", "--seconds", "5"],
     &["calibrate", "FILES/drive.csv"],
     &["calibration", "--runs", "1", "--metres", "5"],

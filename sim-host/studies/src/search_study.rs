@@ -12,7 +12,9 @@ use sonarfix::map::{Map, MapError};
 use sonarfix::search::{Answer, Hypothesis, Search, SearchParameters};
 use sonarfix::units::{Metres, Radians};
 use sonarfix_hal::robot::EVALUATIONS_PER_MILLISECOND;
-use sonarfix_map::{BakeError, FileError, Follow, PathError, Scenario, Symmetry, symmetries};
+use sonarfix_map::{
+    BakeError, FileError, Floor, Follow, NamedWall, PathError, Scenario, Symmetry, symmetries,
+};
 use sonarfix_sim::angle;
 use sonarfix_sim::plant::Plant;
 use sonarfix_sim::progress::Progress;
@@ -27,6 +29,8 @@ use crate::floor_plan::{FloorPlan, Kind};
 pub const PERIOD: f64 = 0.12;
 /// Evaluations between two pings, which are 120 ms apart.
 const EVALUATIONS: u16 = 120 * EVALUATIONS_PER_MILLISECOND;
+/// Pings with which a search begins.
+const LEAST_PINGS: usize = 12;
 /// The largest systematic error of a wheel.
 const WHEEL_ERROR: f64 = 0.01;
 /// The largest deviation of the servo from the bearing, radians.
@@ -77,6 +81,10 @@ pub struct Trial {
     pub has_all_twins: Option<bool>,
     /// Complete cycles of the search.
     pub cycles: u32,
+    /// Evaluations of all of them, in steps of a millisecond.
+    pub evaluations: u64,
+    /// Those of the longest.
+    pub longest_cycle: u64,
 }
 
 /// Simulates one trial of at most `seconds`: the seed chooses the wheel errors and the place on the
@@ -135,6 +143,9 @@ fn drive(
         luck: stream(seed, 3),
         has_all_twins: None,
         metres: 0.0,
+        cycle: 0,
+        evaluations: 0,
+        longest_cycle: 0,
     };
     let symmetries = symmetries(&simulation.scenario.floor)?;
     drive.plant.drive_to(start, &mut drive.wheels, &mut drive.slips);
@@ -164,6 +175,10 @@ struct Drive<'a> {
     has_all_twins: Option<bool>,
     /// Driven since the start.
     metres: f64,
+    /// Evaluations of the present cycle, of all that are complete, and of the longest.
+    cycle: u64,
+    evaluations: u64,
+    longest_cycle: u64,
 }
 
 impl Drive<'_> {
@@ -188,7 +203,17 @@ impl Drive<'_> {
         let range = echo.map(|echo| Metres((echo.range * stretch) as f32));
         let shortest = self.simulation.config().sonar.min_range;
         _ = self.search.ping(bearing, range.filter(|range| *range >= shortest));
-        self.search.poll(EVALUATIONS);
+        let has_begun = self.search.pings() >= LEAST_PINGS;
+        for _ in 0..EVALUATIONS / EVALUATIONS_PER_MILLISECOND {
+            let cycles = self.search.cycles();
+            self.search.poll(EVALUATIONS_PER_MILLISECOND);
+            self.cycle += u64::from(has_begun) * u64::from(EVALUATIONS_PER_MILLISECOND);
+            if self.search.cycles() != cycles {
+                self.evaluations += self.cycle;
+                self.longest_cycle = self.longest_cycle.max(self.cycle);
+                self.cycle = 0;
+            }
+        }
     }
 
     /// Notes whether the true pose and its images under every motion are among several answers.
@@ -229,6 +254,8 @@ impl Drive<'_> {
             },
             has_all_twins: self.has_all_twins,
             cycles: self.search.cycles(),
+            evaluations: self.evaluations,
+            longest_cycle: self.longest_cycle,
         }
     }
 }
@@ -244,27 +271,81 @@ fn errors(hypothesis: &Hypothesis, truth: &Pose) -> (f64, f64) {
     (position, angle::wrap(f64::from(found.heading.radians().0) - truth.heading).abs())
 }
 
-/// Trials in floor plans, of one kind if given: the plan, the wheels and the place on the path of each
-/// come from its seed.
+/// Which floor plans.
+#[derive(Debug, Clone, Copy)]
+pub struct Plans {
+    /// The seed of the first; the others count up from it.
+    pub first: u64,
+    /// How many.
+    pub trials: u32,
+    /// Of one kind alone.
+    pub kind: Option<Kind>,
+    /// Walls of each map: those of other plans stand far beside a plan, and a plan with more is left out.
+    pub walls: Option<usize>,
+}
+
+impl Plans {
+    /// Each with its scenario.
+    fn scenarios(&self) -> Result<Vec<(u64, Scenario)>, SearchStudyError> {
+        let seeds = (0..u64::MAX).map(|n| self.first.wrapping_add(n));
+        let plans = seeds.map(FloorPlan::new);
+        let plans = plans.filter(|plan| self.kind.is_none_or(|kind| plan.kind == kind));
+        let scenarios = plans.map(|plan| Ok((plan.seed, plan.scenario()?)));
+        let Some(walls) = self.walls else {
+            return scenarios.take(self.trials as usize).collect();
+        };
+        let fits = |plan: &Result<(u64, Scenario), SearchStudyError>| {
+            plan.as_ref().map_or(true, |(_, of)| of.floor.named_walls().len() <= walls)
+        };
+        let filled = scenarios.filter(fits).map(|plan| {
+            let (seed, mut scenario) = plan?;
+            scenario.floor = filled(&scenario.floor, seed, walls)?;
+            Ok((seed, scenario))
+        });
+        filled.take(self.trials as usize).collect()
+    }
+}
+
+/// Distance between two plans in one map, metres: more than the largest plan and the longest range.
+const APART: f64 = 60.0;
+/// Seeds of the plans beside a plan, from its own.
+const BESIDE: u64 = 1_000_000;
+
+/// A floor with walls of other plans beside it, as many as make it `count`.
+fn filled(floor: &Floor, seed: u64, count: usize) -> Result<Floor, SearchStudyError> {
+    let mut walls = floor.named_walls().to_vec();
+    let mut east = 0.0;
+    for n in 0..u64::MAX {
+        if walls.len() >= count {
+            break;
+        }
+        east += APART;
+        let other = FloorPlan::new(seed.wrapping_add(BESIDE + n)).scenario()?;
+        let shifted = other.floor.named_walls().iter().filter_map(|wall| {
+            let [from, to] = [wall.from(), wall.to()].map(|[x, y]| [x + east, y]);
+            NamedWall::new(format!("{} of {n}", wall.name()), from, to).ok()
+        });
+        walls.extend(shifted.take(count - walls.len()));
+    }
+    Ok(Floor::new(walls))
+}
+
+/// Trials in floor plans: the plan, the wheels and the place on the path of each come from its seed.
 ///
 /// # Errors
 /// [`SearchStudyError`] of the first plan that cannot be used.
 pub fn floor_plans(
-    first: u64,
-    trials: u32,
+    plans: &Plans,
     seconds: f64,
-    kind: Option<Kind>,
     progress: &impl Progress,
 ) -> Result<Vec<Trial>, SearchStudyError> {
-    let seeds = (0..u64::MAX).map(|n| first.wrapping_add(n));
-    let plans = seeds.map(FloorPlan::new).filter(|plan| kind.is_none_or(|kind| plan.kind == kind));
-    let plans: Vec<FloorPlan> = plans.take(trials as usize).collect();
-    let one = |plan: &FloorPlan| {
-        let trial = trial(plan.scenario()?, plan.seed, seconds);
+    let one = |(seed, scenario)| {
+        let trial = trial(scenario, seed, seconds);
         progress.finished();
         trial
     };
-    plans.par_iter().filter(|_| !progress.is_interrupted()).map(one).collect()
+    let scenarios = plans.scenarios()?.into_par_iter();
+    scenarios.filter(|_| !progress.is_interrupted()).map(one).collect()
 }
 
 /// Trials in one scenario.
@@ -305,6 +386,14 @@ pub struct Summary {
     /// Share with the true pose and all its images among the last answers, of the trials in a
     /// map with symmetry; `None` without such trials.
     pub with_all_twins: Option<f64>,
+    /// Mean evaluations of a cycle.
+    pub cycle: f64,
+    /// The same by the walls of its map.
+    pub cycle_a_wall: f64,
+    /// Evaluations of the longest cycle of a trial, on average.
+    pub longest_cycle: f64,
+    /// The same by the walls of the map.
+    pub longest_cycle_a_wall: f64,
     /// Mean time to a unique answer, seconds.
     pub mean_seconds: f64,
     /// 95th percentile of the position error of right unique answers, metres.
@@ -321,6 +410,9 @@ impl Summary {
         let count = |is: &dyn Fn(&Trial) -> bool| trials.iter().filter(|t| is(t)).count() as f64;
         let share = |is: &dyn Fn(&Trial) -> bool| count(is) / trials.len() as f64;
         let is_unique = |trial: &Trial| trial.unique_after.is_some();
+        let mean =
+            |of: &dyn Fn(&Trial) -> f64| trials.iter().map(of).sum::<f64>() / trials.len() as f64;
+        let evaluations = trials.iter().map(|trial| trial.evaluations as f64).sum::<f64>();
         let right = || trials.iter().filter(|trial| trial.is_right);
         Self {
             trials: trials.len(),
@@ -335,6 +427,11 @@ impl Summary {
                 count(&|trial| trial.has_all_twins == Some(true))
                     / count(&|trial| trial.has_all_twins.is_some())
             }),
+            cycle: evaluations / trials.iter().map(|t| f64::from(t.cycles)).sum::<f64>(),
+            cycle_a_wall: evaluations
+                / trials.iter().map(|t| f64::from(t.cycles) * t.walls as f64).sum::<f64>(),
+            longest_cycle: mean(&|trial| trial.longest_cycle as f64),
+            longest_cycle_a_wall: mean(&|trial| trial.longest_cycle as f64 / trial.walls as f64),
             mean_seconds: trials.iter().filter_map(|trial| trial.unique_after).sum::<f64>()
                 / count(&is_unique),
             position_error_95: percentile_95(right().map(|trial| trial.position_error).collect()),
@@ -353,4 +450,52 @@ fn stream(seed: u64, number: u64) -> ChaCha8Rng {
     // Apart from the streams of a run and of a floor plan.
     rng.set_stream(100 + number);
     rng
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A plan keeps its walls, and those of other plans stand out of the sonar's range.
+    #[test]
+    fn a_map_is_filled_with_other_plans_beside_the_plan() -> Result<(), SearchStudyError> {
+        let plans = Plans { first: 43_000, trials: 3, kind: None, walls: Some(200) };
+        for (seed, scenario) in plans.scenarios()? {
+            let own = FloorPlan::new(seed).scenario()?.floor;
+            let (own, all) = (own.named_walls(), scenario.floor.named_walls());
+            assert_eq!((all.len(), all.get(..own.len())), (200, Some(own)));
+            let right = own.iter().flat_map(|wall| [wall.from()[0], wall.to()[0]]);
+            let right = right.fold(f64::NEG_INFINITY, f64::max);
+            for wall in all.iter().skip(own.len()) {
+                assert!(wall.from()[0] > right + 4.0 && wall.to()[0] > right + 4.0, "{wall:?}");
+            }
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn plans_with_more_walls_are_left_out() -> Result<(), SearchStudyError> {
+        let plans = Plans { first: 43_000, trials: 3, kind: None, walls: Some(30) };
+        for (seed, scenario) in plans.scenarios()? {
+            assert!(FloorPlan::new(seed).scenario()?.floor.named_walls().len() <= 30);
+            assert_eq!(scenario.floor.named_walls().len(), 30);
+        }
+        Ok(())
+    }
+
+    /// No cycle is longer than all together, and none begins before there are twelve pings, of which each takes 4,800 evaluations.
+    #[test]
+    fn the_longest_cycle_is_one_of_all() -> Result<(), SearchStudyError> {
+        let plans = Plans { first: 43_000, trials: 2, kind: None, walls: None };
+        for trial in floor_plans(&plans, 10.0, &|| ())? {
+            assert!(trial.cycles > 1 && trial.longest_cycle > 0, "{trial:?}");
+            assert!(trial.longest_cycle < trial.evaluations, "{trial:?}");
+            assert!(
+                trial.longest_cycle * u64::from(trial.cycles) >= trial.evaluations,
+                "{trial:?}"
+            );
+            assert!(trial.evaluations <= 4_800 * (83 - 11), "{trial:?}");
+        }
+        Ok(())
+    }
 }
