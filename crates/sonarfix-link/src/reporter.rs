@@ -69,16 +69,17 @@ impl Reporter {
 
     /// Passes the messages of one poll of the loop to `outlet`. `localizer` is that of the loop, after the poll.
     pub fn report(&mut self, report: &Report, localizer: &Localizer, outlet: &mut impl Outlet) {
-        for result in report.absolute.into_iter().flatten() {
-            outlet.send_built(|| Telemetry::Absolute(result));
+        for result in report.absolute.iter().flatten() {
+            outlet.send_built(|| Telemetry::Absolute(*result));
         }
         if let Some(heard) = &report.ping_result {
             self.odometry(heard.step.as_ref(), outlet);
             self.ping(heard, outlet);
         }
-        if let Some(SweepResult { bearing, outcome, step, .. }) = report.swept {
+        if let Some(SweepResult { bearing, outcome, step, .. }) = &report.swept {
             self.odometry(step.as_ref(), outlet);
             let at = self.last.at;
+            let (bearing, outcome) = (*bearing, *outcome);
             outlet.send_built(|| Telemetry::Sweep(Sweep { at, bearing, outcome }));
         }
         if let Some(tick) = &report.tick {
@@ -137,8 +138,8 @@ impl Reporter {
 
     /// The travel of a step, after the gyro at its end and what was measured from outside during it.
     fn odometry(&mut self, step: Option<&robot::Step>, outlet: &mut impl Outlet) {
-        if let Some(result) = step.and_then(|step| step.absolute) {
-            outlet.send_built(|| Telemetry::Absolute(result));
+        if let Some(result) = step.and_then(|step| step.absolute.as_ref()) {
+            outlet.send_built(|| Telemetry::Absolute(*result));
         }
         // Travel that was not taken has changed nothing; it is repeated, or counted as a fault.
         if let Some(step) = step.filter(|step| step.result == StepResult::Accepted) {
@@ -169,9 +170,8 @@ impl Reporter {
 
     fn ping(&mut self, heard: &PingResult, outlet: &mut impl Outlet) {
         // An echo without a matching encoder sample did not reach the localizer.
-        if let Some(fix) = heard.fix {
-            let PingResult { aim, outcome, .. } = *heard;
-            let at = self.last.at;
+        if let PingResult { aim, outcome, fix: Some(fix), .. } = heard {
+            let (at, aim, outcome, fix) = (self.last.at, *aim, *outcome, *fix);
             outlet.send_built(|| Telemetry::Ping(Ping { at, aim, outcome, fix }));
         }
     }
