@@ -151,7 +151,9 @@ fn check(map: &MapFile, robot: Option<&Path>) -> anyhow::Result<()> {
     }
     if let Some(remedy) = symmetries.first().and_then(|symmetry| symmetry.remedy.as_ref()) {
         let (addition, [x, y], wall) = (remedy.addition, remedy.at, map.quoted(remedy.wall));
-        println!("    {addition} at ({x:.1}, {y:.1}) m on {wall}, mapped, ends that");
+        println!(
+            "    {addition} at ({x:.1}, {y:.1}) m on {wall}, mapped and not hidden by furniture, ends that"
+        );
     }
     let errors = count(&findings, Severity::Error);
     let warnings = count(&findings, Severity::Warning) + symmetries.len();
