@@ -126,7 +126,7 @@ cargo xtask panics                     # no panic in the linked programs
 ## A time-of-flight ranger
 
 `sonarfix pil paper --policy informative --seconds 60` prints the instructions of predict, aim and fix of a Cortex-M4F with a sonar, with `--light` those with a time-of-flight
-ranger; `budgets.toml` has the worst ones (*light_aim*, *light_fix*). The aim of such a ranger compares 18 bearings, whatever the map, and costs about three times that of a sonar.
+ranger; `budgets.toml` has the worst ones (*light_aim*, *light_fix*). The aim of such a ranger compares 18 bearings, whatever the map, and costs three to four times that of a sonar.
 
 ## Budgets
 
