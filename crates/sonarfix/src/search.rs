@@ -16,6 +16,7 @@ mod bank;
 mod candidates;
 mod lines;
 mod refine;
+mod removal;
 mod score;
 mod trial;
 mod window;

@@ -4,6 +4,7 @@ use heapless::Vec;
 
 use super::candidates::Placement;
 use super::refine::Spread;
+use super::removal::remove_at;
 use super::window::{Bend, Station};
 use crate::vector::Vector;
 
@@ -104,7 +105,7 @@ impl<const HYPOTHESES: usize> Bank<HYPOTHESES> {
 
     fn remove(&mut self, is_gone: impl Fn(&Entry) -> bool) {
         while let Some(at) = self.entries.iter().position(&is_gone) {
-            self.entries.remove(at);
+            remove_at(&mut self.entries, at);
         }
     }
 

@@ -4,6 +4,7 @@
 
 use heapless::Vec;
 
+use super::removal::remove_at;
 use super::window::Ping;
 use crate::config::{Ranging, Sonar};
 use crate::elementary::sqrt;
@@ -174,7 +175,7 @@ impl Lines {
         if let Some(at) = similar {
             match self.found.get(at) {
                 Some(other) if other.support < line.support => {
-                    self.found.remove(at);
+                    remove_at(&mut self.found, at);
                 }
                 _ => return,
             }

@@ -12,6 +12,7 @@
 
 use heapless::Vec;
 
+use super::removal::remove_at;
 use crate::pose::Heading;
 use crate::units::Radians;
 use crate::vector::Vector;
@@ -211,9 +212,9 @@ impl<const PINGS: usize> Window<PINGS> {
         if is_known {
             return false;
         }
-        if self.pings.is_full() && !self.pings.is_empty() {
+        if self.pings.is_full() {
             // The oldest; a shift of less than 4 KiB, once per novel ping.
-            self.pings.remove(0);
+            remove_at(&mut self.pings, 0);
         }
         // There is room now, unless there is room for none.
         self.taken = self.taken.wrapping_add(1);
