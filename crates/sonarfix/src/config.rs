@@ -12,6 +12,7 @@ mod further;
 use crate::echo::EchoParameters;
 use crate::gyro::GyroParameters;
 use crate::motion::Drive;
+use crate::numeric::at_least;
 use crate::pose::Point;
 use crate::range::RangeNoise;
 use crate::units::{Duration, Metres, MetresPerSecond, PerRootMetre, Radians};
@@ -245,6 +246,14 @@ impl CalibrationPrior {
             track_width: track_width * 0.03,
             range_scale: 0.0,
         }
+    }
+
+    // ===== Eq. (48) =====
+    /// The deviation of the right wheel's scale error less that of the left, for these deviations of both. `None`: the errors are
+    /// independent.
+    pub(crate) fn difference_of(&self, right: f32, left: f32) -> Option<f32> {
+        let difference = at_least(self.scale_difference?, 1.1 * (right - left).abs());
+        (difference < libm::hypotf(right, left)).then_some(difference)
     }
 }
 

@@ -238,13 +238,11 @@ impl Ekf {
         })
     }
 
-    /// Of a new filter: one whose wheels differ by at most this standard deviation of `S_R − S_L`. The deviations of both
+    /// A new filter with the scale errors of its wheels correlated: `S_R − S_L` has this standard deviation, and those of both
     /// are the same.
     #[must_use]
-    pub(crate) fn with_scale_difference(mut self, deviation: Option<f32>) -> Self {
-        if let Some(deviation) = deviation {
-            self.p_without_walk.calibration.correlate_wheels(deviation);
-        }
+    pub(crate) fn with_scale_difference(mut self, deviation: f32) -> Self {
+        self.p_without_walk.calibration.correlate_wheels(deviation);
         self
     }
 

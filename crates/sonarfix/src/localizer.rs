@@ -717,7 +717,11 @@ fn filter(
     deviation: StandardDeviations,
 ) -> Result<Ekf, EkfError> {
     let ekf = Ekf::new(config.drive, state, deviation)?;
-    Ok(ekf.with_scale_difference(config.prior.scale_difference))
+    let difference = config.prior.difference_of(deviation.scale_right, deviation.scale_left);
+    Ok(match difference {
+        Some(difference) => ekf.with_scale_difference(difference),
+        None => ekf,
+    })
 }
 
 /// Corrects the estimate by a range with this association probability.

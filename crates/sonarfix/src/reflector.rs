@@ -120,20 +120,8 @@ impl<'m> Reflectors<'m> {
         Self { map, cos_cone: cos(cone), cos_rim: cos(cone * RIM), max_range: max_range.0 }
     }
 
-    /// The reflectors in the cone up to `reach`, nearest first, and how far the axis is free.
-    #[cfg(test)]
-    pub fn in_beam(
-        &self,
-        beam: &Beam,
-        reach: f32,
-        margin: f32,
-    ) -> (Vec<Reflector, REFLECTORS>, f32) {
-        let mut found = Vec::new();
-        let free = self.collect(beam, reach, margin, &mut found);
-        (found, free)
-    }
-
-    /// As [`Self::in_beam`], into an empty list, because one that is returned is copied. Returns how far the axis is free.
+    /// Collects the reflectors in the cone up to `reach`, nearest first, into an empty list, because one that is returned is
+    /// copied. Returns how far the axis is free.
     #[inline(never)]
     pub fn collect(
         &self,

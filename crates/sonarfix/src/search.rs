@@ -144,13 +144,12 @@ impl SearchParameters {
 /// Deviations of the mean and of the difference of the scale errors of both wheels, eq. (48).
 fn mean_and_difference([right, left]: [f32; 2], config: &Config) -> (f32, f32) {
     let independent = libm::hypotf(right, left);
-    let alike = config.prior.scale_difference;
-    match alike.map(|difference| at_least(difference, 1.1 * (right - left).abs())) {
-        Some(difference) if difference < independent => {
+    match config.prior.difference_of(right, left) {
+        Some(difference) => {
             let mean = 0.5 * independent * independent - 0.25 * difference * difference;
             (libm::sqrtf(mean), difference)
         }
-        _ => (0.5 * independent, independent),
+        None => (0.5 * independent, independent),
     }
 }
 

@@ -3,7 +3,7 @@
 use nalgebra::SMatrix;
 
 use crate::estimate::wheels;
-use crate::numeric::{at_least, is_valid_variance};
+use crate::numeric::is_valid_variance;
 use crate::process_noise::AccumulatedRandomWalk;
 use crate::state::StandardDeviations;
 use crate::units::{Metres, Radians};
@@ -78,16 +78,12 @@ impl CalibrationBlock {
     }
 
     // ===== Eq. (48) =====
-    /// Correlates the scale errors of the wheels, so that the deviation of their difference is at most `deviation`, and at least
-    /// `1.1 |σ_R − σ_L|`: the deviations of the wheels do not change, and P stays positive definite.
-    pub(crate) fn correlate_wheels(&mut self, deviation: f32) {
-        let (rr, ll) = wheel_variances(self.cc, self.cd, self.dd);
-        let least = libm::sqrtf(rr) - libm::sqrtf(ll);
-        let dd = at_least(deviation * deviation, 1.21 * least * least);
-        if dd < self.dd {
-            self.cc += 0.25 * (self.dd - dd);
-            self.dd = dd;
-        }
+    /// Correlates the scale errors of the wheels, so that their difference has this deviation, of `CalibrationPrior::difference_of`.
+    /// The deviations of the wheels do not change.
+    pub(crate) fn correlate_wheels(&mut self, difference: f32) {
+        let dd = difference * difference;
+        self.cc += 0.25 * (self.dd - dd);
+        self.dd = dd;
     }
 
     /// cc + dd + ww with the accumulated random walk, 1 + m².

@@ -9,6 +9,20 @@ use crate::config::Config;
 use crate::pose::Point;
 use crate::units::Radians;
 
+impl Reflectors<'_> {
+    /// As [`Self::collect`], returned.
+    pub(crate) fn in_beam(
+        &self,
+        beam: &Beam,
+        reach: f32,
+        margin: f32,
+    ) -> (heapless::Vec<Reflector, REFLECTORS>, f32) {
+        let mut found = heapless::Vec::new();
+        let free = self.collect(beam, reach, margin, &mut found);
+        (found, free)
+    }
+}
+
 /// Cases in which a limit is closer than this (metres, or a cosine) are left to rounding.
 const EDGE: f64 = 2e-3;
 const COSINE_EDGE: f64 = 1e-3;

@@ -211,13 +211,6 @@ impl<'m> EchoModel<'m> {
         best.unwrap_or(Explanation { score: other, target: None })
     }
 
-    /// Scores a ping at once.
-    #[cfg(test)]
-    pub fn explain(&self, beam: &Beam, sharpness: Sharpness) -> Explanation {
-        let mut hearing = self.listen(beam, sharpness);
-        self.hear(&mut hearing, (beam, sharpness), REFLECTORS).unwrap()
-    }
-
     /// Scores a ping of light, which only the wall that the axis meets first can answer.
     #[inline(never)]
     pub fn explain_lit(&self, beam: &Beam, sharpness: Sharpness) -> Explanation {

@@ -10,6 +10,14 @@ use crate::map::Wall;
 use crate::pose::Point;
 use crate::units::{Metres, Radians};
 
+impl EchoModel<'_> {
+    /// Scores a ping at once.
+    pub(in crate::search) fn explain(&self, beam: &Beam, sharpness: Sharpness) -> Explanation {
+        let mut hearing = self.listen(beam, sharpness);
+        self.hear(&mut hearing, (beam, sharpness), REFLECTORS).unwrap()
+    }
+}
+
 /// A room of 6 m × 4 m with two walls in it.
 fn walls(inside: [(f32, f32, f32); 2]) -> Vec<Wall> {
     let corners = [(0.0, 0.0), (6.0, 0.0), (6.0, 4.0), (0.0, 4.0), (0.0, 0.0)];
