@@ -72,6 +72,12 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Writes the inputs of the target `link` again, which a change of a message makes old.
+pub fn bless() -> anyhow::Result<()> {
+    let write = "test --release --no-default-features --test link_corpus -- --ignored";
+    cargo::check(Workspace::Fuzz.cargo(write))
+}
+
 fn host() -> anyhow::Result<String> {
     let output = Command::new("rustc").arg("-vV").output().context("cannot start `rustc -vV`")?;
     let text = String::from_utf8_lossy(&output.stdout);

@@ -98,7 +98,7 @@ enum Task {
     Playground,
     /// Licences of all dependencies, and advisories if their database can be reached.
     Deny,
-    /// Records the golden traces, and measures and writes `budgets.toml`.
+    /// Records the golden traces, writes the fuzz inputs of messages, and measures and writes `budgets.toml`.
     Bless(BlessArgs),
     /// Measures Sonarfix and its peers, and writes `docs/benchmarks.md` (ten minutes).
     Bench,
@@ -176,6 +176,7 @@ struct BlessArgs {
 fn bless(args: &BlessArgs) -> anyhow::Result<()> {
     if !args.budgets {
         golden::bless()?;
+        fuzz::bless()?;
     }
     budgets::bless()
 }
