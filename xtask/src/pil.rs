@@ -32,6 +32,9 @@ const TICK: u64 = 100_000;
 
 const CLASSROOM: &str = "crates/sonarfix-map/scenarios/classroom.toml --seconds 60";
 
+const CLASSROOM_SEARCH: &str =
+    "crates/sonarfix-map/scenarios/classroom.toml --start unknown --seconds 30";
+
 /// The instructions of all calls of one kind.
 #[derive(Debug, Clone, Copy, Deserialize)]
 struct Cost {
@@ -106,6 +109,22 @@ fn loaded(arguments: &str) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// The longest poll while the pose is searched for, instructions of a Cortex-M4F.
+const SEARCHING: u64 = 12_000;
+
+/// Runs the loop without a pose, and prints the cost of its polls, each of which makes an evaluation of the search.
+fn searching() -> anyhow::Result<()> {
+    let Tally { poll, idle, .. } = sonarfix(CLASSROOM_SEARCH)?;
+    println!(
+        "While the pose is searched for, mean / worst: poll with work {}, without {}",
+        poll.shown(),
+        idle.shown()
+    );
+    let most = poll.most.max(idle.most);
+    ensure!(most <= SEARCHING, "a poll that searches takes {most} instructions of {SEARCHING}");
+    Ok(())
+}
+
 /// Runs the scenarios on every core, a short one over the UART, and the loop for the whole reference scenario on one
 /// core; prints the table of costs.
 pub fn check() -> anyhow::Result<()> {
@@ -118,6 +137,7 @@ pub fn check() -> anyhow::Result<()> {
     under_load()?;
     // The shipped loop for the whole reference scenario: a million polls.
     sonarfix("paper --fidelity pins")?;
+    searching()?;
     let mut table = "| instructions, mean / worst".to_owned();
     let mut rows = [
         "predict",

@@ -14,12 +14,15 @@ pub struct Args {
     /// Seed of the first trial; the others count up from it.
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Duration after the start, or after the kidnapping.
+    /// Duration after the start, the kidnapping or the slip.
     #[arg(long, default_value_t = 60.0)]
     seconds: f64,
     /// Starts with a pose, and carries the robot so far after 30 s; without it the robot starts without a pose.
     #[arg(long, value_name = "METRES")]
     kidnapped: Option<f64>,
+    /// Starts with a pose, and lets a wheel slip after 30 s, which turns the odometry by so much.
+    #[arg(long, value_name = "DEGREES", conflicts_with = "kidnapped")]
+    slipped: Option<f64>,
     /// Prints every trial.
     #[arg(long)]
     trials: bool,
@@ -30,7 +33,11 @@ pub struct Args {
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
     anyhow::ensure!(args.seconds > 0.0, "--seconds must be positive");
-    let upset = args.kidnapped.map_or(Upset::UnknownStart, Upset::Kidnapped);
+    let upset = match (args.kidnapped, args.slipped) {
+        (Some(metres), _) => Upset::Kidnapped(metres),
+        (None, Some(degrees)) => Upset::Slipped(degrees.to_radians()),
+        (None, None) => Upset::UnknownStart,
+    };
     let runs = Runs::new(args.runs);
     let trials = relocalization::trials(args.seed, args.runs, upset, args.seconds, &runs)?;
     runs.end()?;
@@ -88,13 +95,11 @@ fn summary_table(summary: &Summary, seconds: f64) -> Table {
             row("loss noticed", percent(summary.searched)),
             row("first hand-over right", percent(summary.first_right)),
             row("first hand-over wrong", percent(summary.first_wrong)),
-            row(
-                "right and Tracking before the kidnapping",
-                summary.was_tracking.map_or("-".to_owned(), percent),
-            ),
+            row("right and Tracking before", summary.was_tracking.map_or("-".to_owned(), percent)),
             row("right and Tracking 20 pings later", percent(summary.right_later)),
             row("wrong pose confirmed", percent(summary.confirmed_wrong)),
             row("right pose at the end", percent(summary.back)),
+            row("right pose at the end without a search", percent(summary.kept)),
             row("wrong and Tracking at the end", percent(summary.wrong_and_tracking)),
             row("mean time to the first hand-over", format!("{:.1} s", summary.mean_seconds)),
             row(

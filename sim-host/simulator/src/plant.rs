@@ -64,6 +64,11 @@ impl<'a> Plant<'a> {
         self.course.carry(seconds);
     }
 
+    /// Begins a slip of the right (0) or left (1) wheel that turns the odometry by this angle, radians.
+    pub fn begin_slip(&mut self, wheel: usize, turn: f64) {
+        self.wheels.begin_slip(wheel, turn);
+    }
+
     /// Puts the robot down at a pose; its wheels do not roll. Without effect on a robot that follows its path exactly.
     pub fn put_down(&mut self, pose: Pose) {
         self.course.put_down(pose);

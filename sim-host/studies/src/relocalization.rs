@@ -23,8 +23,8 @@ use crate::floor_plan::FloorPlan;
 
 /// A pose within these errors is right, metres and radians.
 const RIGHT: (f64, f64) = (0.3, 0.175);
-/// When a robot is kidnapped, seconds.
-const KIDNAPPED_AT: f64 = 30.0;
+/// When a robot is kidnapped or slips, seconds.
+const UPSET_AT: f64 = 30.0;
 /// Pings after a hand-over when the pose must be right.
 const SETTLED: u32 = 20;
 
@@ -35,6 +35,8 @@ pub enum Upset {
     UnknownStart,
     /// It is carried so far along its path while it tracks its pose, metres.
     Kidnapped(f64),
+    /// One of its wheels slips while it tracks its pose, which turns the odometry by this angle, radians.
+    Slipped(f64),
 }
 
 /// Why a trial cannot be made.
@@ -95,30 +97,34 @@ pub fn trial(seed: u64, upset: Upset, seconds: f64) -> Result<Option<Trial>, Rel
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(110);
     let spare = scenario.path.duration() - seconds;
-    let (at, by) = match upset {
-        Upset::UnknownStart => {
-            scenario.start.is_unknown = true;
-            (0.0, if spare > 1.0 { rng.random_range(0.0..spare) } else { 0.0 })
-        }
-        Upset::Kidnapped(metres) => match carried_by(&scenario.path, metres, spare) {
-            Some(by) => (KIDNAPPED_AT, by),
-            None => return Ok(None),
-        },
-    };
+    scenario.start.is_unknown = upset == Upset::UnknownStart;
     let walls = scenario.floor.named_walls().len();
-    let simulation = Simulation::new(scenario).carried(at, by).shortened(at + seconds);
+    let at = if upset == Upset::UnknownStart { 0.0 } else { UPSET_AT };
+    let by = match upset {
+        Upset::UnknownStart if spare > 1.0 => Some(rng.random_range(0.0..spare)),
+        Upset::UnknownStart => Some(0.0),
+        Upset::Kidnapped(metres) => carried_by(&scenario.path, metres, spare),
+        Upset::Slipped(_) => (spare > UPSET_AT).then_some(0.0),
+    };
+    let Some(by) = by else { return Ok(None) };
+    let mut simulation = Simulation::new(scenario);
+    simulation = match upset {
+        Upset::Slipped(turn) => simulation.slipped(at, usize::from(rng.random::<bool>()), turn),
+        Upset::UnknownStart | Upset::Kidnapped(_) => simulation.carried(at, by),
+    };
+    let simulation = simulation.shortened(at + seconds);
     let mut watch = Watch::new(at, upset == Upset::UnknownStart);
     simulation.run(seed, &mut watch)?;
     Ok(Some(watch.trial(seed, walls)))
 }
 
-/// The time of driving after which the robot is this far from where it is at [`KIDNAPPED_AT`], as the crow flies.
+/// The time of driving after which the robot is this far from where it is at [`UPSET_AT`], as the crow flies.
 fn carried_by(path: &Path, metres: f64, spare: f64) -> Option<f64> {
     const STEP: f64 = 0.25;
-    let from = path.pose_at(KIDNAPPED_AT);
+    let from = path.pose_at(UPSET_AT);
     let mut by = STEP;
-    while by < spare - KIDNAPPED_AT {
-        let to = path.pose_at(KIDNAPPED_AT + by);
+    while by < spare - UPSET_AT {
+        let to = path.pose_at(UPSET_AT + by);
         if (to.x - from.x).hypot(to.y - from.y) >= metres {
             return Some(by);
         }
@@ -267,6 +273,8 @@ pub struct Summary {
     pub confirmed_wrong: f64,
     /// Share with the right pose at the end.
     pub back: f64,
+    /// Share with the right pose at the end without a search.
+    pub kept: f64,
     /// Share that ends with a wrong pose and the verdict `Tracking`.
     pub wrong_and_tracking: f64,
     /// Mean time to the first hand-over, seconds.
@@ -303,6 +311,7 @@ impl Summary {
             right_later: held as f64 / later.len() as f64,
             confirmed_wrong: share(&|trial| trial.confirmed_wrong),
             back: share(&|trial| trial.is_back),
+            kept: share(&|trial| trial.is_back && trial.searched_after.is_none()),
             wrong_and_tracking: share(&|trial| trial.is_wrong_and_tracking),
             mean_seconds: firsts.iter().sum::<f64>() / firsts.len() as f64,
             position_error_95: percentile_95(right.iter().map(|h| h.position_error).collect()),
@@ -314,4 +323,25 @@ impl Summary {
 fn percentile_95(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() * 95 / 100).copied().unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The short form of `sonarfix relocalize --slipped`; docs/schedule.md has more trials.
+    #[test]
+    fn a_slip_is_corrected_or_leads_to_a_search() {
+        let trials = |degrees: f64| {
+            let upset = Upset::Slipped(degrees.to_radians());
+            trials(0, 6, upset, 60.0, &|| {}).unwrap()
+        };
+        let small = trials(5.0);
+        assert!(small.iter().all(|trial| trial.is_back && trial.searched_after.is_none()));
+        // Beyond the cone the beams that should be square to a wall return no echo.
+        let large = trials(25.0);
+        assert!(large.iter().any(|trial| trial.searched_after.is_some()), "{large:?}");
+        assert!(large.iter().filter(|trial| trial.is_back).count() >= 5, "{large:?}");
+        assert!(large.iter().all(|trial| !trial.is_wrong_and_tracking), "{large:?}");
+    }
 }

@@ -87,18 +87,22 @@ impl Wheels {
         Travel { measured, noiseless, turn, seconds }
     }
 
+    /// Begins a slip of the right (0) or left (1) wheel that turns the odometry by this angle, radians, while the robot drives.
+    pub fn begin_slip(&mut self, wheel: usize, turn: f64) {
+        let speed = turn * self.parameters.track_width / SLIP_TIME;
+        self.slipping = Slipping { wheel, speed, left: SLIP_TIME };
+    }
+
     /// Adds a slip that turns the odometry. A wheel that stands does not slip. No draw for a robot without slips.
     fn slip(&mut self, measured: &mut [f64; 2], seconds: f64, rng: &mut ChaCha8Rng) {
         let HeadingSlip { every, least, most } = self.upsets.heading_slip;
         let is_driving = measured.iter().any(|travel| travel.abs() > 0.0);
-        if !every.is_finite() || !is_driving {
+        if !is_driving {
             return;
         }
-        if rng.random::<f64>() < seconds / every {
+        if every.is_finite() && rng.random::<f64>() < seconds / every {
             let turn = least + (most - least) * rng.random::<f64>();
-            let wheel = usize::from(rng.random::<bool>());
-            let speed = turn * self.parameters.track_width / SLIP_TIME;
-            self.slipping = Slipping { wheel, speed, left: SLIP_TIME };
+            self.begin_slip(usize::from(rng.random::<bool>()), turn);
         }
         let Slipping { wheel, speed, left } = &mut self.slipping;
         let now = left.min(seconds);
@@ -158,6 +162,28 @@ mod tests {
             .map(|_| wheels.roll([0.04, 0.04], 0.1, &mut rng, &mut slips))
             .map(|travel| travel.measured[0] - travel.noiseless[0])
             .sum()
+    }
+
+    #[test]
+    fn a_slip_turns_the_odometry_by_its_angle_while_the_robot_drives() {
+        let scenario = Scenario::paper().unwrap();
+        let truth = Parameters { wheel_noise: 0.0, ..scenario.truth };
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let mut slips = rng.clone();
+        for (wheel, speed, turn) in [(0, 0.04, 0.3), (1, 0.04, -0.3), (0, -0.04, -0.3)] {
+            let mut wheels = Wheels::new(&truth, Upsets::default());
+            wheels.begin_slip(wheel, 0.3);
+            let standing = wheels.roll([0.0, 0.0], 1.0, &mut rng, &mut slips);
+            assert_eq!(standing.measured, [0.0, 0.0]);
+            let [mut right, mut left] = [0.0, 0.0];
+            for _ in 0..10 {
+                let travel = wheels.roll([speed, speed], 0.1, &mut rng, &mut slips);
+                right += travel.measured[0] - travel.noiseless[0];
+                left += travel.measured[1] - travel.noiseless[1];
+            }
+            let turned = (right - left) / wheels.parameters().track_width;
+            assert!((turned - turn).abs() < 1e-9, "{turned}");
+        }
     }
 
     #[test]

@@ -12,7 +12,7 @@ use sonarfix_pil::{Actuators, EchoSignals, GyroSignal, Sensors, Wires};
 use super::computer::{Computer, Controller};
 use super::error::SimulationError;
 use super::score::Score;
-use super::simulation::{Carried, PutDown, Simulation};
+use super::simulation::{Carried, PutDown, Simulation, Slipped};
 use super::streams::RandomStreams;
 use crate::angle;
 use crate::observe::{self, Measurement};
@@ -76,6 +76,8 @@ struct SimulatedHardware<'a> {
     search_recorded_at: u64,
     /// When the robot will be carried, and how far.
     carried: Option<Carried>,
+    /// When a wheel will slip, and how far.
+    slipped: Option<Slipped>,
     /// Where the robot will be kidnapped to, and when.
     put_down: &'a [PutDown],
     /// What determines the robot's pose.
@@ -116,6 +118,7 @@ impl<'a> SimulatedHardware<'a> {
             score,
             search_recorded_at: 0,
             carried: simulation.carried,
+            slipped: simulation.slipped,
             put_down: &simulation.put_down,
             mode: Mode::Tracking,
             measurement: None,
@@ -204,6 +207,9 @@ impl<'a> SimulatedHardware<'a> {
         self.now = now;
         if let Some(carried) = self.carried.take_if(|carried| carried.at <= now) {
             self.plant.carry(carried.by);
+        }
+        if let Some(slipped) = self.slipped.take_if(|slipped| slipped.at <= now) {
+            self.plant.begin_slip(slipped.wheel, slipped.turn);
         }
         let RandomStreams { wheels, slips, .. } = &mut self.streams;
         let travel = self.plant.drive_to(seconds(now), wheels, slips);

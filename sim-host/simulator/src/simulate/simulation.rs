@@ -47,6 +47,8 @@ pub struct Simulation {
     end: u64,
     /// When the robot is carried along its path, and how far.
     pub(super) carried: Option<Carried>,
+    /// When a wheel slips, and how far.
+    pub(super) slipped: Option<Slipped>,
     /// When the robot is kidnapped, in order of time.
     pub(super) put_down: Vec<PutDown>,
     /// The robot file of the robot's software, if it is not that of the true robot.
@@ -60,6 +62,17 @@ pub struct Carried {
     pub(super) at: u64,
     /// How far, as the time in which it would drive there, seconds.
     pub(super) by: f64,
+}
+
+/// A slip of one wheel that turns the odometry.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slipped {
+    /// When, microseconds since the run began.
+    pub(super) at: u64,
+    /// The right wheel (0) or the left (1).
+    pub(super) wheel: usize,
+    /// The turn of the odometry, radians.
+    pub(super) turn: f64,
 }
 
 /// A kidnapping: the robot is moved elsewhere, without odometry.
@@ -99,6 +112,7 @@ impl Simulation {
             models: models(&scenario.robot.localizer),
             end: micros(scenario.path.duration()),
             carried: None,
+            slipped: None,
             put_down: Vec::new(),
             assumed: None,
             scenario,
@@ -127,6 +141,13 @@ impl Simulation {
         let left = micros((self.scenario.path.duration() - by).max(0.0));
         let end = self.end.min(left);
         Self { carried: Some(Carried { at: micros(at), by }), end, ..self }
+    }
+
+    /// The same, with a slip `at` seconds after the start of the right (0) or left (1) wheel, which turns the odometry by this
+    /// angle, radians, and not the robot. Only at the fidelity of pins; a robot that stands slips when it drives on.
+    #[must_use]
+    pub fn slipped(self, at: f64, wheel: usize, turn: f64) -> Self {
+        Self { slipped: Some(Slipped { at: micros(at), wheel, turn }), ..self }
     }
 
     /// The same, with the robot kidnapped `at` seconds after the start, to a true pose; its wheels do not
