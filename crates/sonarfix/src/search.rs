@@ -75,7 +75,7 @@ impl Default for SearchParameters {
             margin: 8.0,
             least_fit: 0.5,
             persistence: 20,
-            sharpness: (Metres(0.04), Radians::from_degrees(3.0)),
+            sharpness: (Metres(0.05), Radians::from_degrees(3.0)),
         }
     }
 }
