@@ -7,8 +7,14 @@ use crate::cargo;
 use crate::workspace::Workspace;
 
 /// The crates that run on a robot.
-const NO_STD_CRATES: [&str; 5] =
-    ["sonarfix", "sonarfix-hal", "sonarfix-link", "sonarfix-app", "sonarfix-pil"];
+const NO_STD_CRATES: [&str; 6] = [
+    "sonarfix",
+    "sonarfix-hal",
+    "sonarfix-link",
+    "sonarfix-app",
+    "sonarfix-pil",
+    "sonarfix-soft-float",
+];
 /// Cortex-M4F, and Cortex-M0+ without FPU or atomics.
 const TARGETS: [&str; 2] = ["thumbv7em-none-eabihf", "thumbv6m-none-eabi"];
 

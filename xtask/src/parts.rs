@@ -209,8 +209,11 @@ fn table(profile: &Profile) -> String {
 fn routines(profile: &Profile) -> String {
     let mut routines: BTreeMap<&str, (u64, u64)> = BTreeMap::new();
     for (at, node) in profile.nodes.iter().enumerate() {
-        let name = profile.stack(at).next().unwrap_or_default();
-        if name.starts_with("__aeabi_f") {
+        let mut stack = profile.stack(at);
+        let name = stack.next().unwrap_or_default();
+        // A difference calls the sum, and counts with it.
+        let is_within = stack.next().is_some_and(|caller| caller.starts_with("__aeabi_f"));
+        if name.starts_with("__aeabi_f") && !is_within {
             let (calls, instructions) = routines.entry(name).or_default();
             *calls += node.calls;
             *instructions += profile.inclusive(at);

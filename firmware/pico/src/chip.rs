@@ -7,6 +7,8 @@ use sonarfix::units::Instant;
 use sonarfix_hal::encoder::Counter;
 use sonarfix_hal::ranger::{EchoCapture, StampedEdges, Stamps};
 use sonarfix_link::message::ResetCause;
+// The products and sums of the program; embassy-rp has none without its feature `intrinsics`.
+use sonarfix_soft_float as _;
 
 use crate::machines::{EchoMachine, EncoderMachine};
 

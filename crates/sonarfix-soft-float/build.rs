@@ -1,0 +1,9 @@
+//! Finds out whether the processor is an ARMv6-M, which no `cfg` of the compiler tells.
+
+fn main() {
+    println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rustc-check-cfg=cfg(armv6m)");
+    if std::env::var("TARGET").is_ok_and(|target| target.starts_with("thumbv6m-")) {
+        println!("cargo::rustc-cfg=armv6m");
+    }
+}
