@@ -187,10 +187,17 @@ impl LocalizerInputs for ComparedDevice<'_> {
 }
 
 impl Controller for ComparedDevice<'_> {
-    fn poll(&mut self, sensors: &Sensors) -> Result<(Report, Actuators), SimulationError> {
+    fn poll(
+        &mut self,
+        sensors: &Sensors,
+        report: &mut Report,
+    ) -> Result<Actuators, SimulationError> {
         self.polled = sensors.at;
         match self.execute(&Request::Poll(*sensors))? {
-            Answer::Polled { actuators, .. } => Ok((self.session.report(), actuators)),
+            Answer::Polled { actuators, .. } => {
+                *report = self.session.report();
+                Ok(actuators)
+            }
             other => Err(mismatched(other)),
         }
     }

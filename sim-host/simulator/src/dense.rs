@@ -7,6 +7,8 @@
     reason = "vectors and matrices of a fixed size, indexed by constants of the model"
 )]
 
+use std::ops::Range;
+
 use nalgebra::{SMatrix, SVector};
 use sonarfix::config::{Config, Ranging, Sonar};
 
@@ -21,19 +23,25 @@ pub type Matrix = SMatrix<f64, STATES, STATES>;
 
 /// The states that a motion changes: x, y, heading.
 const MOVED: usize = 3;
+/// The states that a motion depends on: heading, scale errors of the wheels, track-width error.
+const MOVING: Range<usize> = 2..6;
 
-/// F P Fᵀ. The other rows of F are those of the identity, and the products with them are left out.
+/// F P Fᵀ. F is the identity, and in the rows of [`MOVED`] states and the columns of [`MOVING`] ones above it: only the products
+/// with those entries are computed, in place, as no state is changed before it is used.
 fn congruent(f: &Matrix, p: &Matrix) -> Matrix {
-    let mut fp = *p;
+    let mut result = *p;
     for column in 0..STATES {
-        for row in 0..MOVED {
-            fp[(row, column)] = (0..STATES).map(|k| f[(row, k)] * p[(k, column)]).sum();
+        for k in MOVING {
+            for row in 0..MOVED.min(k) {
+                result[(row, column)] += f[(row, k)] * result[(k, column)];
+            }
         }
     }
-    let mut result = fp;
-    for column in 0..MOVED {
-        for row in 0..STATES {
-            result[(row, column)] = (0..STATES).map(|k| fp[(row, k)] * f[(column, k)]).sum();
+    for k in MOVING {
+        for column in 0..MOVED.min(k) {
+            for row in 0..STATES {
+                result[(row, column)] += result[(row, k)] * f[(column, k)];
+            }
         }
     }
     result

@@ -1,9 +1,10 @@
 //! Integrity of a run: whether the error stays inside the filter's confidence ellipse, and if not,
 //! whether the health verdict reports it.
 
+use nalgebra::Matrix2;
 use sonarfix::health::Verdict;
 
-use crate::dense::{Matrix, Vector};
+use crate::dense::Vector;
 
 /// The 99.9 % quantile of χ² with two degrees of freedom.
 const ELLIPSE: f64 = 13.8;
@@ -43,8 +44,8 @@ impl Integrity {
         }
     }
 
-    /// Adds the error and the covariance after a tick of a length in seconds.
-    pub fn add(&mut self, seconds: f64, error: &Vector, p: &Matrix, verdict: Verdict) {
+    /// Adds the error and the covariance of x and y after a tick of a length in seconds.
+    pub fn add(&mut self, seconds: f64, error: &Vector, p: &Matrix2<f64>, verdict: Verdict) {
         let is_inside = distance_squared(error, p) <= ELLIPSE;
         let off = libm::hypot(error[0], error[1]);
         self.ticks += 1;
@@ -128,7 +129,7 @@ impl Integrity {
 }
 
 /// Mahalanobis distance squared of x and y.
-fn distance_squared(error: &Vector, p: &Matrix) -> f64 {
+fn distance_squared(error: &Vector, p: &Matrix2<f64>) -> f64 {
     let determinant = p[(0, 0)] * p[(1, 1)] - p[(0, 1)] * p[(1, 0)];
     let (x, y) = (error[0], error[1]);
     (p[(1, 1)] * x * x - 2.0 * p[(0, 1)] * x * y + p[(0, 0)] * y * y) / determinant
@@ -139,9 +140,7 @@ mod tests {
     use super::*;
 
     fn taken(steps: &[(f64, Verdict)]) -> Integrity {
-        let mut p = Matrix::zeros();
-        p[(0, 0)] = 4e-4;
-        p[(1, 1)] = 1e-4;
+        let p = Matrix2::new(4e-4, 0.0, 0.0, 1e-4);
         let mut integrity = Integrity::default();
         for &(x, verdict) in steps {
             let mut error = Vector::zeros();

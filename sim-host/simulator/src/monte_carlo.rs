@@ -7,6 +7,11 @@ use crate::row::Row;
 use crate::simulate::{Simulation, SimulationError};
 use crate::statistics::RunResult;
 
+/// Runs once without a record. It is not generic: what it calls is compiled, and so optimized, with this crate.
+fn unrecorded(simulation: &Simulation, seed: u64) -> Result<RunResult, SimulationError> {
+    simulation.run(seed, &mut ())
+}
+
 /// Runs the seeds `seed`, `seed + 1`, … and returns the results in the order of their seeds; after an interruption those
 /// of the runs that were finished.
 ///
@@ -22,7 +27,7 @@ pub fn results(
         .into_par_iter()
         .filter(|_| !progress.is_interrupted())
         .map(|run| {
-            let result = simulation.run(seed.wrapping_add(run), &mut ());
+            let result = unrecorded(simulation, seed.wrapping_add(run));
             progress.finished();
             result
         })
@@ -41,7 +46,7 @@ pub fn rows(
 ) -> Result<Vec<Row>, SimulationError> {
     let seeds = (0..u64::from(runs)).into_par_iter().map(|run| first.wrapping_add(run));
     let row = |seed| {
-        let result = simulation.run(seed, &mut ())?;
+        let result = unrecorded(simulation, seed)?;
         progress.finished();
         Ok(Row::new(seed, &result))
     };

@@ -5,7 +5,7 @@
     reason = "vectors and matrices of a fixed size, indexed by constants of the model"
 )]
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix2};
 use sonarfix::absolute::AbsoluteMeasurement;
 use sonarfix::aim::{Aim, NoAim};
 use sonarfix::ekf::{Ekf, Innovation};
@@ -23,6 +23,13 @@ use crate::trace::{
 };
 use crate::world::reflector::Source;
 
+/// The localizer's pose.
+#[must_use]
+pub fn pose(localizer: &Localizer) -> Pose {
+    let state = localizer.filter().state();
+    Pose { x: state.x.0.into(), y: state.y.0.into(), heading: state.heading.0.into() }
+}
+
 /// The localizer's estimate.
 #[must_use]
 pub fn estimate(localizer: &Localizer) -> Estimate {
@@ -31,7 +38,7 @@ pub fn estimate(localizer: &Localizer) -> Estimate {
     let p = covariance(ekf);
     let nominal = f64::from(localizer.config().drive.track_width.0);
     Estimate {
-        pose: Pose { x: state.x.0.into(), y: state.y.0.into(), heading: state.heading.0.into() },
+        pose: pose(localizer),
         calibration: Calibration {
             scale_right: state.scale_right.into(),
             scale_left: state.scale_left.into(),
@@ -63,6 +70,12 @@ pub fn state(ekf: &Ekf) -> Vector {
 #[must_use]
 pub fn covariance(ekf: &Ekf) -> Matrix {
     ekf.covariance().map(f64::from)
+}
+
+/// The filter's covariance of x and y.
+#[must_use]
+pub fn position_covariance(ekf: &Ekf) -> Matrix2<f64> {
+    ekf.covariance().fixed_view::<2, 2>(0, 0).map(f64::from)
 }
 
 /// The error of the filter's state, its heading wrapped.

@@ -27,7 +27,7 @@ use rand::Rng;
 use crate::angle;
 use crate::random;
 use reflector::{Reflector, Search, Source};
-use segment::{direction, distance};
+use segment::{Point, direction, distance};
 use sensor::SensorModel;
 
 pub use scene::{Ping, World};
@@ -57,9 +57,10 @@ impl World {
         if let Some(light) = &sensor.light {
             return self.lit(ping, sensor, light, normal, rng);
         }
-        let found = Search::new(self, sensor, ping).run();
+        let from = (ping.sonar_after)(0.0);
+        let found = Search::new(self, sensor, ping, from).run();
         let first = detection::first(&found, rng);
-        let scattered = self.scattered(ping, sensor, rng);
+        let scattered = self.scattered(ping, sensor, from, rng);
         // The echo of a rough surface is later than that of the foot, but may be the only one.
         let earliest = match (first, scattered) {
             (Some(first), Some(rough)) if rough.distance < first.distance => rough,
@@ -71,17 +72,17 @@ impl World {
         Some(Echo { source: detected.source, distance: earliest.distance, range })
     }
 
-    /// The diffuse echo of the wall on the beam's axis, from a point near the axis.
+    /// The diffuse echo of the wall on the beam's axis from a sonar, from a point near the axis.
     fn scattered(
         &self,
         ping: &Ping,
         sensor: &SensorModel,
+        from: Point,
         rng: &mut impl Rng,
     ) -> Option<Reflector> {
         if sensor.scatter.is_deaf() {
             return None;
         }
-        let from = (ping.sonar_after)(0.0);
         let (wall, hit) = self.on_axis(from, ping.direction)?;
         let along_axis = distance(from, hit);
         let segment = self.walls.get(wall)?;

@@ -32,6 +32,9 @@ impl<'w> EncoderDisc<'w> {
     pub fn roll(&mut self, metres: f64, now: u64, faults: &mut EncoderFaults) {
         self.travelled += metres;
         let target = whole(self.travelled / self.tick);
+        if target == self.ticks {
+            return;
+        }
         let step = (target - self.ticks).signum();
         if !faults.may_disturb() {
             self.skip_periods(target);

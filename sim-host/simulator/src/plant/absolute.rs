@@ -43,6 +43,12 @@ impl Absolute {
         heading.min(position).min(later.min().unwrap_or(u64::MAX))
     }
 
+    /// Whether something is to be measured at `now`, µs.
+    #[must_use]
+    pub fn is_due(&self, now: u64) -> bool {
+        self.next.iter().any(|&next| next <= now)
+    }
+
     /// Measures what is due at the true pose.
     pub fn measure(&mut self, now: u64, truth: &trace::Pose, rng: &mut ChaCha8Rng) {
         let at = Instant::from_ticks(now);

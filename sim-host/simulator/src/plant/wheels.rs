@@ -76,10 +76,13 @@ impl Wheels {
     ) -> Travel {
         let p = &self.parameters;
         let noiseless = [rolled[0] / (1.0 + p.scale_right), rolled[1] / (1.0 + p.scale_left)];
-        let measured = noiseless
-            .map(|travel| travel + p.wheel_noise * travel.abs().sqrt() * random::normal(rng));
-        let upsets = self.upsets;
-        let mut measured = measured.map(|travel| travel + upset(&upsets, travel, rng));
+        let mut measured = noiseless;
+        for travel in &mut measured {
+            *travel += p.wheel_noise * travel.abs().sqrt() * random::normal(rng);
+        }
+        for travel in &mut measured {
+            *travel += upset(&self.upsets, *travel, rng);
+        }
         let turn = (rolled[0] - rolled[1]) / self.parameters.track_width;
         self.slip(&mut measured, seconds, slips);
         let root_distance = (0.5 * (noiseless[0].abs() + noiseless[1].abs())).sqrt();
@@ -174,7 +177,7 @@ mod tests {
             let mut wheels = Wheels::new(&truth, Upsets::default());
             wheels.begin_slip(wheel, 0.3);
             let standing = wheels.roll([0.0, 0.0], 1.0, &mut rng, &mut slips);
-            assert_eq!(standing.measured, [0.0, 0.0]);
+            assert_eq!(standing.measured.map(f64::to_bits), [0; 2]);
             let [mut right, mut left] = [0.0, 0.0];
             for _ in 0..10 {
                 let travel = wheels.roll([speed, speed], 0.1, &mut rng, &mut slips);

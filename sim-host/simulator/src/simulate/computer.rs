@@ -92,11 +92,15 @@ pub trait LocalizerInputs {
 
 /// A robot's loop and its drivers.
 pub trait Controller {
-    /// Polls the loop.
+    /// Polls the loop, which writes its report in place.
     ///
     /// # Errors
     /// [`SimulationError`], if the computer fails.
-    fn poll(&mut self, sensors: &Sensors) -> Result<(Report, Actuators), SimulationError>;
+    fn poll(
+        &mut self,
+        sensors: &Sensors,
+        report: &mut Report,
+    ) -> Result<Actuators, SimulationError>;
     /// Passes a heading, position or pose that was measured at a time, for the next polls; returns whether it waits for
     /// one, or an earlier one still does.
     ///
@@ -229,14 +233,14 @@ pub struct RobotOnWires<'w> {
 }
 
 impl Controller for RobotOnWires<'_> {
-    fn poll(&mut self, sensors: &Sensors) -> Result<(Report, Actuators), SimulationError> {
+    fn poll(
+        &mut self,
+        sensors: &Sensors,
+        report: &mut Report,
+    ) -> Result<Actuators, SimulationError> {
         self.wires.apply(sensors);
-        let Self { robot, search, devices, wires } = self;
-        let report = match search {
-            None => robot.poll(sensors.at, devices),
-            Some(search) => robot.poll_with_search(sensors.at, devices, search),
-        };
-        Ok((report, wires.take()))
+        self.robot.poll_into(sensors.at, &mut self.devices, self.search.as_mut(), report);
+        Ok(self.wires.take())
     }
 
     fn absolute(

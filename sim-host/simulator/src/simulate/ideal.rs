@@ -189,7 +189,7 @@ impl<T: LocalizerInputs> Run<'_, T> {
         self.score.biased(self.gyro.as_ref().map(Gyro::bias));
         self.score.tick(self.time(), localizer, &self.plant, recorder);
         if let Some(follower) = &mut self.follower {
-            let command = follower.command(&observe::estimate(localizer).pose);
+            let command = follower.command(&observe::pose(localizer));
             self.plant.steer(command);
         }
         Ok(())

@@ -138,6 +138,7 @@ impl<'a> SimulatedHardware<'a> {
         let period = self.simulation.scenario.robot.encoder_period.to_micros();
         let end = self.simulation.end();
         let mut next_poll = self.now;
+        let mut report = Report::default();
         loop {
             if let Some(back_at) = self.faults.controller.power_back_at(self.now) {
                 return Ok(Some(back_at));
@@ -157,7 +158,7 @@ impl<'a> SimulatedHardware<'a> {
                 continue;
             }
             let sensors = self.sensors(has_failed);
-            let (report, actuators) = controller.poll(&sensors)?;
+            let actuators = controller.poll(&sensors, &mut report)?;
             let localizer = controller.localizer()?;
             recorder.polled(&report, localizer);
             self.obey(actuators);
@@ -178,7 +179,8 @@ impl<'a> SimulatedHardware<'a> {
     /// Whether a reading of each encoder fails now.
     fn read_fails(&mut self) -> [bool; 2] {
         let now = self.now;
-        self.faults.encoders.each_mut().map(|faults| faults.read_fails(now))
+        let [right, left] = &mut self.faults.encoders;
+        [right.read_fails(now), left.read_fails(now)]
     }
 
     /// The inputs of the devices since the last poll.
@@ -219,7 +221,9 @@ impl<'a> SimulatedHardware<'a> {
             self.plant.put_down(next.pose);
             self.put_down = later;
         }
-        self.absolute.measure(now, &self.plant.pose(), &mut self.streams.absolute);
+        if self.absolute.is_due(now) {
+            self.absolute.measure(now, &self.plant.pose(), &mut self.streams.absolute);
+        }
         self.score.rolled(travel);
         if let Some(gyro) = &mut self.gyro {
             gyro.turn(now, &travel, &mut self.faults.gyro, &mut self.streams.gyro);
@@ -273,13 +277,14 @@ impl<'a> SimulatedHardware<'a> {
 
     /// Applies the outputs of the loop.
     fn obey(&mut self, actuators: Actuators) {
-        let sonars = self.sonars.iter_mut().zip(actuators.rangers);
-        let pinging: Vec<usize> = sonars
-            .enumerate()
-            .filter_map(|(number, (sonar, actuators))| sonar.obey(actuators).then_some(number))
-            .collect();
+        let mut pings = [false; MAX_RANGERS];
+        for ((sonar, actuators), pings) in
+            self.sonars.iter_mut().zip(actuators.rangers).zip(&mut pings)
+        {
+            *pings = sonar.obey(actuators);
+        }
         self.turn_servos();
-        for number in pinging {
+        for (number, _) in pings.into_iter().enumerate().filter(|(_, pings)| *pings) {
             self.trigger(number);
         }
     }
@@ -339,7 +344,7 @@ impl<'a> SimulatedHardware<'a> {
         let echo = world.echo(&ping, sensor, ranges, echoes);
         self.measurement = Some(Measurement {
             time,
-            sonar: sonar_after(0.0),
+            sonar: self.simulation.ranger_at(device.ranger, &pose),
             heading: pose.heading,
             range: None,
             source: echo.map(|echo| echo.source),
@@ -420,7 +425,7 @@ impl<'a> SimulatedHardware<'a> {
             }
             let pose = match self.mode {
                 Mode::Searching => self.plant.pose(),
-                _ => observe::estimate(localizer).pose,
+                _ => observe::pose(localizer),
             };
             let command = follower.command(&pose);
             self.plant.steer(command);

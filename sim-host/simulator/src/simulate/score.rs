@@ -49,7 +49,7 @@ impl<'a> Score<'a> {
         let p = observe::covariance(localizer.filter());
         // Dead reckoning needs a start; without an estimate it is the true one.
         let start = if is_known {
-            observe::estimate(&localizer).pose
+            observe::pose(&localizer)
         } else {
             let [x, y, heading, ..]: [f64; 7] = truth.into();
             Pose { x, y, heading }
@@ -162,7 +162,7 @@ impl<'a> Score<'a> {
     ) {
         self.result.error = observe::error(localizer.filter(), &plant.state());
         self.result.path.add(&self.result.error);
-        let covariance = observe::covariance(localizer.filter());
+        let covariance = observe::position_covariance(localizer.filter());
         let health = localizer.health();
         let verdict = health.verdict;
         let without_range = seconds(health.time_since_fix.to_micros());

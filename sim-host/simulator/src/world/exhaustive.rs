@@ -182,7 +182,7 @@ proptest! {
         for sensor in [SensorModel::nxt(), SensorModel::hc_sr04(), SensorModel::polaroid_6500()] {
             let obstacles = world.obstacles.iter().map(|o| o.outline_at(ping.time)).collect();
             let all = Exhaustive { world: &world, sensor: &sensor, ping: &ping, obstacles, from };
-            prop_assert_eq!(bits(&Search::new(&world, &sensor, &ping).run()), bits(&all.run()));
+            prop_assert_eq!(bits(&Search::new(&world, &sensor, &ping, from).run()), bits(&all.run()));
         }
     }
 }

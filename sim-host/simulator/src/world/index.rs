@@ -41,8 +41,10 @@ impl Index {
     /// All items of which a part lies within `reach` metres of a point, and others; ascending, each once.
     #[must_use]
     pub fn near(&self, point: Point, reach: f64) -> Vec<usize> {
-        let cells = self.grid.around(point, reach);
-        let mut found: Vec<usize> = cells.flat_map(|cells| self.items_of(cells)).copied().collect();
+        let mut found = Vec::new();
+        for cells in self.grid.around(point, reach) {
+            found.extend_from_slice(self.items_of(cells));
+        }
         if self.grid.cells() > 1 {
             found.sort_unstable();
             found.dedup();

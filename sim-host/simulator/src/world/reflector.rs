@@ -64,9 +64,9 @@ pub(super) struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    pub fn new(world: &'a World, sensor: &'a SensorModel, ping: &'a Ping<'a>) -> Self {
+    /// The search for a ping from this place.
+    pub fn new(world: &'a World, sensor: &'a SensorModel, ping: &'a Ping<'a>, from: Point) -> Self {
         let obstacles = world.obstacles.iter().map(|o| o.outline_at(ping.time)).collect();
-        let from = (ping.sonar_after)(0.0);
         let radius = MOTION * sensor.reach.1;
         let near = world.walls_index.near(from, radius);
         let cone = Wedge::new(from, ping.direction, sensor.cone);

@@ -17,7 +17,10 @@ pub struct Wedge {
 impl Wedge {
     /// The sector up to `half_angle` to either side of a direction, radians.
     pub fn new(from: Point, direction: f64, half_angle: f64) -> Self {
-        let normal = |angle: f64| [libm::cos(angle), libm::sin(angle)];
+        let normal = |angle: f64| {
+            let (sin, cos) = libm::sincos(angle);
+            [cos, sin]
+        };
         let (left, right) = (direction + half_angle, direction - half_angle);
         let inwards =
             (half_angle < FRAC_PI_2).then(|| [normal(left - FRAC_PI_2), normal(right + FRAC_PI_2)]);
