@@ -26,25 +26,23 @@ const MOVED: usize = 3;
 /// The states that a motion depends on: heading, scale errors of the wheels, track-width error.
 const MOVING: Range<usize> = 2..6;
 
-/// F P Fᵀ. F is the identity, and in the rows of [`MOVED`] states and the columns of [`MOVING`] ones above it: only the products
-/// with those entries are computed, in place, as no state is changed before it is used.
-fn congruent(f: &Matrix, p: &Matrix) -> Matrix {
-    let mut result = *p;
+/// P becomes F P Fᵀ. F differs from the identity only in the rows of [`MOVED`] states and the columns of [`MOVING`] ones, above its
+/// diagonal: only the products with those entries are computed, in place, as no state is changed before it is used.
+fn transform(p: &mut Matrix, f: &Matrix) {
     for column in 0..STATES {
         for k in MOVING {
             for row in 0..MOVED.min(k) {
-                result[(row, column)] += f[(row, k)] * result[(k, column)];
+                p[(row, column)] += f[(row, k)] * p[(k, column)];
             }
         }
     }
     for k in MOVING {
         for column in 0..MOVED.min(k) {
             for row in 0..STATES {
-                result[(row, column)] += result[(row, k)] * f[(column, k)];
+                p[(row, column)] += p[(row, k)] * f[(column, k)];
             }
         }
     }
-    result
 }
 
 /// A wall's line, as a point on it and its unit normal, metres.
@@ -250,7 +248,7 @@ impl DenseFilter {
         let m = &self.model;
         let wheels = [travel[0].abs(), travel[1].abs()].map(|metres| metres * m.wheel_variance);
         let distance = f64::midpoint(travel[0].abs(), travel[1].abs());
-        self.p = congruent(&f, &self.p);
+        transform(&mut self.p, &f);
         for row in 0..MOVED {
             for column in 0..MOVED {
                 self.p[(row, column)] += g[(row, 0)] * wheels[0] * g[(column, 0)]

@@ -88,9 +88,12 @@ impl<'a> SonarDevice<'a> {
     /// Collects the edges of the echo line up to `now`, µs.
     pub fn collect_edges(&mut self, now: u64) {
         let (rose, fell) = self.board.edges(now);
-        let before = self.signals;
-        self.signals =
-            EchoSignals { rose: rose.or(before.rose), fell: fell.or(before.fell), ..before };
+        if rose.is_some() {
+            self.signals.rose = rose;
+        }
+        if fell.is_some() {
+            self.signals.fell = fell;
+        }
     }
 
     /// Reads the bus at `now`, µs, of a ranger that responds or does not.

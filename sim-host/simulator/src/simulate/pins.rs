@@ -189,12 +189,10 @@ impl<'a> SimulatedHardware<'a> {
         let [right, left] = [(right, failed[0]), (left, failed[1])]
             .map(|(wires, has_failed)| wires.counted(has_failed));
         let gyro = self.gyro.as_ref().map_or_else(GyroSignal::default, GyroChip::signal);
-        for sonar in &mut self.sonars {
-            let is_dead = sonar.ranger == RangerId::FIRST && self.faults.sonar.is_dead(self.now);
-            sonar.read_bus(self.now, is_dead);
-        }
         let mut echoes = [EchoSignals::default(); MAX_RANGERS];
         for (signals, sonar) in echoes.iter_mut().zip(&mut self.sonars) {
+            let is_dead = sonar.ranger == RangerId::FIRST && self.faults.sonar.is_dead(self.now);
+            sonar.read_bus(self.now, is_dead);
             *signals = sonar.take_signals();
         }
         Sensors { at: Instant::from_ticks(self.now), right, left, echoes, gyro }
@@ -277,15 +275,16 @@ impl<'a> SimulatedHardware<'a> {
 
     /// Applies the outputs of the loop.
     fn obey(&mut self, actuators: Actuators) {
-        let mut pings = [false; MAX_RANGERS];
-        for ((sonar, actuators), pings) in
-            self.sonars.iter_mut().zip(actuators.rangers).zip(&mut pings)
-        {
-            *pings = sonar.obey(actuators);
+        let mut has_pinged = [false; MAX_RANGERS];
+        let sonars = self.sonars.iter_mut().zip(&actuators.rangers);
+        for ((sonar, actuators), has_pinged) in sonars.zip(&mut has_pinged) {
+            *has_pinged = sonar.obey(*actuators);
         }
         self.turn_servos();
-        for (number, _) in pings.into_iter().enumerate().filter(|(_, pings)| *pings) {
-            self.trigger(number);
+        for (number, has_pinged) in has_pinged.iter().enumerate() {
+            if *has_pinged {
+                self.trigger(number);
+            }
         }
     }
 
