@@ -1,4 +1,4 @@
-//! Finds out whether the processor is an ARMv6-M, which no `cfg` of the compiler tells.
+//! Finds out whether the processor is an ARMv6-M, for which the compiler has no stable `cfg`.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
