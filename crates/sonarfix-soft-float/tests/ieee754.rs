@@ -89,28 +89,27 @@ fn all_pairs_of_exponents() {
     }
 }
 
+/// Compares the results of so many random pairs.
+fn compare_random(pair: fn(&mut ChaCha8Rng) -> Pair, count: u32, seed: u64) {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    for _ in 0..count {
+        compare(pair(&mut rng));
+    }
+}
+
 #[test]
 fn random_bits() {
-    let mut rng = ChaCha8Rng::seed_from_u64(2);
-    for _ in 0..10_000_000 {
-        compare(any(&mut rng));
-    }
+    compare_random(any, 10_000_000, 2);
 }
 
 #[test]
 fn neighbouring_exponents() {
-    let mut rng = ChaCha8Rng::seed_from_u64(3);
-    for _ in 0..5_000_000 {
-        compare(neighbours(&mut rng));
-    }
+    compare_random(neighbours, 5_000_000, 3);
 }
 
 #[test]
 fn few_ones() {
-    let mut rng = ChaCha8Rng::seed_from_u64(4);
-    for _ in 0..5_000_000 {
-        compare(ties(&mut rng));
-    }
+    compare_random(ties, 5_000_000, 4);
 }
 
 #[test]
