@@ -98,19 +98,22 @@ pub fn trial(seed: u64, upset: Upset, seconds: f64) -> Result<Option<Trial>, Rel
     rng.set_stream(110);
     let spare = scenario.path.duration() - seconds;
     scenario.start.is_unknown = upset == Upset::UnknownStart;
+    let at = if scenario.start.is_unknown { 0.0 } else { UPSET_AT };
     let walls = scenario.floor.named_walls().len();
-    let at = if upset == Upset::UnknownStart { 0.0 } else { UPSET_AT };
-    let by = match upset {
+    let carried_by = match upset {
         Upset::UnknownStart if spare > 1.0 => Some(rng.random_range(0.0..spare)),
         Upset::UnknownStart => Some(0.0),
         Upset::Kidnapped(metres) => carried_by(&scenario.path, metres, spare),
-        Upset::Slipped(_) => (spare > UPSET_AT).then_some(0.0),
+        Upset::Slipped(_) => None,
     };
-    let Some(by) = by else { return Ok(None) };
-    let mut simulation = Simulation::new(scenario);
-    simulation = match upset {
-        Upset::Slipped(turn) => simulation.slipped(at, usize::from(rng.random::<bool>()), turn),
-        Upset::UnknownStart | Upset::Kidnapped(_) => simulation.carried(at, by),
+    let simulation = Simulation::new(scenario);
+    let simulation = match (upset, carried_by) {
+        (_, Some(by)) => simulation.carried(at, by),
+        (Upset::Slipped(turn), None) if spare > at => {
+            simulation.slipped(at, usize::from(rng.random::<bool>()), turn)
+        }
+        // The path is too short.
+        (_, None) => return Ok(None),
     };
     let simulation = simulation.shortened(at + seconds);
     let mut watch = Watch::new(at, upset == Upset::UnknownStart);
