@@ -2,8 +2,8 @@
 
 use sonarfix::map::image::{MAGIC, VERSION, checksum};
 use sonarfix::map::{Map, MapError, Wall, WallId};
-use sonarfix::pose::Point;
-use sonarfix::units::Metres;
+use sonarfix::geometry::pose::Point;
+use sonarfix::geometry::units::Metres;
 use sonarfix_map::{BakeError, bake};
 
 use crate::bytes::Bytes;

@@ -2,15 +2,15 @@
 
 use sonarfix::aim::{Aim, Policy, Reason};
 use sonarfix::config::{Config, PingSchedule, PingTiming, RangerId, ServoTiming};
-use sonarfix::echo::EchoParameters;
-use sonarfix::ekf::Ekf;
+use sonarfix::sensor::echo::EchoParameters;
+use sonarfix::filter::ekf::Ekf;
 use sonarfix::health::{Health, LOST_AT, MOST_NIS, Verdict};
 use sonarfix::localizer::{Fix, Localizer, Refusal, Start};
 use sonarfix::map::{Map, Wall, WallId};
-use sonarfix::motion::{Drive, WheelTravel};
-use sonarfix::pose::{Point, Pose};
-use sonarfix::range::RangeNoise;
-use sonarfix::units::{
+use sonarfix::filter::motion::{Drive, WheelTravel};
+use sonarfix::geometry::pose::{Point, Pose};
+use sonarfix::sensor::range::RangeNoise;
+use sonarfix::geometry::units::{
     Duration, Instant, Metres, MetresPerSecond, PerRootMetre, Radians, SquareMetres,
 };
 

@@ -2,9 +2,9 @@
 
 use sonarfix::config::Config;
 use sonarfix::map::{Map, Wall};
-use sonarfix::pose::{Point, Pose};
-use sonarfix::search::{Answer, Region, Search, SearchParameters};
-use sonarfix::units::{Metres, Radians};
+use sonarfix::geometry::pose::{Point, Pose};
+use sonarfix_search::search::{Answer, Region, Search, SearchParameters};
+use sonarfix::geometry::units::{Metres, Radians};
 
 use crate::bytes::Bytes;
 

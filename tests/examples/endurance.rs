@@ -16,12 +16,12 @@ use nalgebra::{DMatrix, SMatrix};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use sonarfix::ekf::{Ekf, StandardDeviations, StateEstimate};
+use sonarfix::filter::ekf::{Ekf, StandardDeviations, StateEstimate};
+use sonarfix::filter::motion::{Drive, WheelTravel};
+use sonarfix::geometry::pose::Point;
+use sonarfix::geometry::units::{Metres, PerRootMetre, Radians, SquareMetres};
 use sonarfix::map::Wall;
-use sonarfix::motion::{Drive, WheelTravel};
-use sonarfix::pose::Point;
-use sonarfix::range::ExpectedRange;
-use sonarfix::units::{Metres, PerRootMetre, Radians, SquareMetres};
+use sonarfix::sensor::range::ExpectedRange;
 
 #[derive(Debug, Parser)]
 #[command(about = "Random runs of a filter")]

@@ -15,10 +15,10 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use sonarfix::config::{Config, Sonar};
+use sonarfix::geometry::pose::Point;
+use sonarfix::geometry::units::{Metres, Radians};
 use sonarfix::map::{Map, Wall};
-use sonarfix::pose::Point;
-use sonarfix::search::{Answer, Search, SearchParameters};
-use sonarfix::units::{Metres, Radians};
+use sonarfix_search::search::{Answer, Search, SearchParameters};
 
 #[derive(Debug, Parser)]
 #[command(about = "Random windows of pings for the search")]

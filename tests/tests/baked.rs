@@ -3,9 +3,9 @@
 #![expect(clippy::unwrap_used, reason = "a test should stop")]
 
 use sonarfix::config::Policy;
+use sonarfix::geometry::pose::Point;
+use sonarfix::geometry::units::Metres;
 use sonarfix::map::Map;
-use sonarfix::pose::Point;
-use sonarfix::units::Metres;
 use sonarfix_map::Scenario;
 use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::trace::Trace;

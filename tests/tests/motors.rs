@@ -1,8 +1,8 @@
 //! The example of motor code, which the boards run, on a robot with unequal motors.
 
+use sonarfix::geometry::pose::Pose;
+use sonarfix::geometry::units::Radians;
 use sonarfix::health::Verdict;
-use sonarfix::pose::Pose;
-use sonarfix::units::Radians;
 use sonarfix_motors::{Drive, Estimate, Pattern};
 
 /// Wheel speed at the full voltage, m/s, and track width, m.

@@ -7,8 +7,9 @@ use crate::cargo;
 use crate::workspace::Workspace;
 
 /// The crates that run on a robot.
-const NO_STD_CRATES: [&str; 6] = [
+const NO_STD_CRATES: [&str; 7] = [
     "sonarfix",
+    "sonarfix-search",
     "sonarfix-hal",
     "sonarfix-link",
     "sonarfix-app",

@@ -10,8 +10,8 @@ use rooms::{inside, rooms};
 use sonarfix::config::Config;
 use sonarfix::localizer::{Localizer, Start};
 use sonarfix::map::Map;
-use sonarfix::pose::Pose;
-use sonarfix::units::{Instant, Metres, Radians};
+use sonarfix::geometry::pose::Pose;
+use sonarfix::geometry::units::{Instant, Metres, Radians};
 use sonarfix_map::bake;
 
 /// The reach of a usual sonar.

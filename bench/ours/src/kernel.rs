@@ -11,10 +11,10 @@ use sonarfix::kernel::{
     AccumulatedMotion, AccumulatedRandomWalk, CalibratedDrive, Correction, Covariance,
     FilterEstimate, NoiseDensities, WheelNoise,
 };
-use sonarfix::motion::WheelTravel;
-use sonarfix::pose::Heading;
-use sonarfix::range::ExpectedRange;
-use sonarfix::units::Metres;
+use sonarfix::filter::motion::WheelTravel;
+use sonarfix::geometry::pose::Heading;
+use sonarfix::sensor::range::ExpectedRange;
+use sonarfix::geometry::units::Metres;
 
 use crate::{deviation, drive, scales, scales_of, shown};
 

@@ -8,11 +8,11 @@ pub mod kernel;
 
 use bench_workload::Filter;
 use bench_workload::model::{Matrix, Range, Step, TRACK_WIDTH, Vector};
-use sonarfix::ekf::{Ekf, StandardDeviations, StateEstimate};
-use sonarfix::motion::{Drive, WheelTravel};
-use sonarfix::pose::Heading;
-use sonarfix::range::ExpectedRange;
-use sonarfix::units::{Metres, PerRootMetre, SquareMetres};
+use sonarfix::filter::ekf::{Ekf, StandardDeviations, StateEstimate};
+use sonarfix::filter::motion::{Drive, WheelTravel};
+use sonarfix::geometry::pose::Heading;
+use sonarfix::sensor::range::ExpectedRange;
+use sonarfix::geometry::units::{Metres, PerRootMetre, SquareMetres};
 
 /// The filter.
 pub struct Shipped {

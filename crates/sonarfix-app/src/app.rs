@@ -18,12 +18,10 @@ mod command;
 mod wire;
 
 use embedded_storage::nor_flash::NorFlash;
+use sonarfix::geometry::units::{Duration, Instant, Metres};
 use sonarfix::health::{DEGRADED_WITHOUT_ODOMETRY, Verdict};
 use sonarfix::localizer::Localizer;
 use sonarfix::map::{Map, MapError};
-use sonarfix::navigator;
-use sonarfix::search::Search;
-use sonarfix::units::{Duration, Instant, Metres};
 use sonarfix_hal::config::{RobotConfig, Unsupported};
 use sonarfix_hal::robot::{
     EVALUATIONS_PER_MILLISECOND, Faults, Hardware, Report, Robot, Settings, Step,
@@ -31,6 +29,8 @@ use sonarfix_hal::robot::{
 use sonarfix_link::baked::{self, BakedError};
 use sonarfix_link::message::{self, CommandResult, Hello, LoopStatus, ResetCause};
 use sonarfix_link::{Frame, Reporter, SessionCommand, Telemetry};
+use sonarfix_search::navigator;
+use sonarfix_search::search::Search;
 
 use crate::boots;
 use crate::check::Check;

@@ -4,7 +4,7 @@
 //! counts its starts. After [`MAX_RESETS`] resets, each less than [`SETTLED_AFTER`] after a start, the
 //! application does not use the store until the next start, and reports this: the robot works without stored state.
 
-use sonarfix::units::Duration;
+use sonarfix::geometry::units::Duration;
 
 /// Resets in a row after which the store is not used.
 pub const MAX_RESETS: u8 = 3;

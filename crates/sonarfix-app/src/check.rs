@@ -1,6 +1,6 @@
 //! The check of the devices while the loop does not run. The running loop only detects faults of devices that it uses.
 
-use sonarfix::units::{Duration, Instant, Radians};
+use sonarfix::geometry::units::{Duration, Instant, Radians};
 use sonarfix_hal::config::{RobotConfig, WheelConfig};
 use sonarfix_hal::encoder::Counter;
 use sonarfix_hal::ranger::{NoEcho, Outcome, Ranger, TriggerError};

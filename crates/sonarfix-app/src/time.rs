@@ -1,6 +1,6 @@
 //! Arithmetic of instants that cannot panic: `fugit`'s operators do on overflow, these saturate.
 
-use sonarfix::units::{Duration, Instant};
+use sonarfix::geometry::units::{Duration, Instant};
 
 /// An instant that is not reached. `fugit` compares instants as those of a counter that wraps around.
 pub(crate) const NEVER: Instant = Instant::from_ticks(u64::MAX / 4);

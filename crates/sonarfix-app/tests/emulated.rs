@@ -16,11 +16,11 @@ use std::process::{Child, Command as Process, Stdio};
 use std::time::{Duration, Instant};
 
 use sonarfix::config::{Config, LightBeam, Ranging, ServoTiming};
+use sonarfix::geometry::pose::{Point, Pose};
+use sonarfix::geometry::units::{Metres, Radians};
 use sonarfix::health::Verdict;
 use sonarfix::localizer::Start;
 use sonarfix::map::Wall;
-use sonarfix::pose::{Point, Pose};
-use sonarfix::units::{Metres, Radians};
 use sonarfix_hal::config::{RobotConfig, Unsupported};
 use sonarfix_hal::ranger::{NoEcho, RangerKind, RangerSettings};
 use sonarfix_link::message::{CommandError, CommandResult, ImageStatus, LoopStatus};
@@ -155,7 +155,7 @@ impl Robot {
     /// Waits for half a second by the robot's clock at least: a message is received before the poll that sends it has ended.
     fn pass_half_a_second(&mut self) {
         let first = self.loop_status().at;
-        while self.loop_status().at < first + sonarfix::units::Duration::millis(500) {}
+        while self.loop_status().at < first + sonarfix::geometry::units::Duration::millis(500) {}
     }
 
     /// Sends a command and waits for its answer.
@@ -395,7 +395,7 @@ fn one_program_follows_different_configurations() {
     let baked =
         |config: &RobotConfig| baked::write(config, &mut [0; baked::LENGTH_MAX]).unwrap().to_vec();
     for (period, expected) in [(100_000, 50), (50_000, 100)] {
-        let encoder_period = sonarfix::units::Duration::from_ticks(period);
+        let encoder_period = sonarfix::geometry::units::Duration::from_ticks(period);
         let config = RobotConfig { encoder_period, ..configuration() };
         let mut robot = Robot::switched_on(&map(), &baked(&config));
         assert_eq!(robot.hello().configuration, ImageStatus::Valid(baked::checksum(&config)));
@@ -494,7 +494,7 @@ fn a_minute_of_ticks_without_a_missed_deadline() {
             Telemetry::LoopStatus(status) => {
                 assert!(status.running && status.faults.deadlines == 0, "{status:?}");
                 worst = worst.max(status.worst_poll.to_micros());
-                if status.at > began.at + sonarfix::units::Duration::secs(60) {
+                if status.at > began.at + sonarfix::geometry::units::Duration::secs(60) {
                     break status;
                 }
             }
@@ -672,7 +672,7 @@ fn a_minute_under(robot: &mut Robot, mut load: impl FnMut(&Robot) -> Vec<u8>) ->
             Telemetry::LoopStatus(status) => {
                 assert!(status.running && status.faults.deadlines == 0, "{status:?}");
                 assert!(status.at > first.at, "the robot was reset: {status:?}");
-                if status.at > first.at + sonarfix::units::Duration::secs(60) {
+                if status.at > first.at + sonarfix::geometry::units::Duration::secs(60) {
                     let worst = status.worst_poll.to_micros();
                     println!("{ticks} ticks; worst poll {worst} µs; {:?}", status.commands);
                     // Telemetry for which the line has no room is dropped.

@@ -8,10 +8,10 @@ use std::error::Error;
 
 use embedded_hal::pwm::{self, SetDutyCycle};
 use sonarfix::config::{Config, PingSchedule, ServoTiming};
+use sonarfix::geometry::pose::{Point, Pose};
+use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
 use sonarfix::localizer::{Localizer, Start};
 use sonarfix::map::{Map, Wall};
-use sonarfix::pose::{Point, Pose};
-use sonarfix::units::{Duration, Instant, Metres, Radians};
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_hal::encoder::Count16;
 use sonarfix_hal::ranger::{

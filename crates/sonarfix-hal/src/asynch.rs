@@ -15,7 +15,7 @@ use embedded_hal::digital::{ErrorType, InputPin, OutputPin};
 use embedded_hal::pwm::SetDutyCycle;
 use embedded_hal_async::delay::DelayNs;
 use embedded_hal_async::digital::Wait;
-use sonarfix::units::{Duration, Instant};
+use sonarfix::geometry::units::{Duration, Instant};
 
 use crate::encoder::Quadrature;
 use crate::ranger::{Outcome, Polled, PulseError, PulseRanger, Ranger, TriggerError};
@@ -41,7 +41,7 @@ impl<F: Fn() -> Instant> Clock for F {
 /// ```
 /// use embedded_hal::digital::{InputPin, OutputPin};
 /// use embedded_hal_async::{delay::DelayNs, digital::Wait};
-/// use sonarfix::units::Metres;
+/// use sonarfix::geometry::units::Metres;
 /// use sonarfix_hal::asynch::{Clock, ping};
 /// use sonarfix_hal::ranger::{Polled, PulseRanger};
 ///

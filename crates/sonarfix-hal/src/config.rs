@@ -17,10 +17,10 @@
 //! [`RobotConfig::check`] refuses NaN and infinity in every field.
 
 use sonarfix::config::{Config, ConfigError, Further, RangerId, Sonar};
+use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
 use sonarfix::health::{DEGRADED_WITHOUT_ODOMETRY, Verdict};
 use sonarfix::localizer::Localizer;
-use sonarfix::search::Region;
-use sonarfix::units::{Duration, Instant, Metres, Radians};
+use sonarfix_search::search::Region;
 
 use crate::encoder::{GeometryError, WheelGeometry, Wheels};
 use crate::ranger::{Air, Celsius, PulseTiming, RangerKind, RangerSettings};
@@ -60,7 +60,7 @@ pub enum StartPose {
     #[default]
     Known,
     /// It searches for its pose if it starts without one, and whenever it is lost
-    /// ([`Navigator`](sonarfix::navigator::Navigator)).
+    /// ([`Navigator`](sonarfix_search::navigator::Navigator)).
     Unknown {
         /// The region in which it starts without a pose; anywhere on the map if there is none.
         region: Option<Region>,
@@ -280,7 +280,7 @@ impl RobotConfig {
     /// 1 ms and 2 ms are −45° and 45°. A start for one's own; the parts must be measured.
     ///
     /// ```
-    /// use sonarfix::{config::{Config, ServoTiming}, units::{Metres, Radians}};
+    /// use sonarfix::{config::{Config, ServoTiming}, geometry::units::{Metres, Radians}};
     /// use sonarfix_hal::config::RobotConfig;
     /// let mut config = RobotConfig::with_common_parts(Config::for_track_width(Metres(0.16)));
     /// config.localizer.sonar.timing.servo = ServoTiming::SG90;

@@ -1,12 +1,12 @@
 //! Gyros that measure the yaw rate.
 //!
 //! The loop reads a gyro at the period of its [`GyroParameters`] and adds the rates up
-//! ([`TurnIntegral`](sonarfix::gyro::TurnIntegral)).
+//! ([`TurnIntegral`](sonarfix::sensor::gyro::TurnIntegral)).
 
 mod mpu6050;
 
-use sonarfix::gyro::GyroParameters;
-use sonarfix::units::RadiansPerSecond;
+use sonarfix::geometry::units::RadiansPerSecond;
+use sonarfix::sensor::gyro::GyroParameters;
 
 pub use mpu6050::{Mpu6050, Mpu6050Error};
 

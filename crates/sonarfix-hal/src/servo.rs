@@ -1,7 +1,7 @@
 //! The servo that turns the ranger: converts a bearing to a pulse, and models the bearing while the servo turns.
 //!
 //! - [`Calibration`]: pulse width ↔ bearing, from two measured points;
-//! - [`ServoTiming`]: speed and settling time; the model is [`sonarfix::servo::ServoMotion`];
+//! - [`ServoTiming`]: speed and settling time; the model is [`sonarfix::sensor::servo::ServoMotion`];
 //! - [`ServoSettings`]: the settings of the driver; [`PwmFrame`]: the pulses that a channel can generate;
 //! - [`Servo`]: the driver over [`SetDutyCycle`]; [`Servo::settles_at`] is the end of the settle wait;
 //! - [`Servo::fix`]: the same for a ranger that is mounted at a fixed bearing; [`NoPwm`] is the channel of a board that
@@ -20,7 +20,7 @@ mod no_pwm;
 mod settings;
 
 use embedded_hal::pwm::SetDutyCycle;
-use sonarfix::units::{Instant, Radians};
+use sonarfix::geometry::units::{Instant, Radians};
 
 use crate::time::{NEVER, micros};
 
@@ -35,7 +35,7 @@ pub use sonarfix::config::ServoTiming;
 ///
 /// ```
 /// use embedded_hal_mock::eh1::pwm::{Mock, Transaction as Pwm};
-/// use sonarfix::units::{Duration, Instant, Radians};
+/// use sonarfix::geometry::units::{Duration, Instant, Radians};
 /// use sonarfix_hal::servo::{MeasuredPulse, Servo, ServoSettings, ServoTiming};
 ///
 /// // Two pulses, and the bearing that was measured with each.

@@ -3,7 +3,7 @@
 //! # Non-finite policy
 //! Times are integers.
 
-use sonarfix::units::{Duration, Instant};
+use sonarfix::geometry::units::{Duration, Instant};
 
 /// An instant that is not reached. Not the greatest one: `fugit` compares instants as those of a counter that wraps around, by
 /// which the greatest is before the first.

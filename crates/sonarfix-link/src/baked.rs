@@ -88,7 +88,7 @@ fn fill<'b>(config: &RobotConfig, buffer: &'b mut [u8; LENGTH_MAX]) -> Option<&'
 /// Reads and checks the configuration at the start of `bytes`.
 ///
 /// ```
-/// use sonarfix::{config::{Config, ServoTiming}, units::{Metres, Radians}};
+/// use sonarfix::{config::{Config, ServoTiming}, geometry::units::{Metres, Radians}};
 /// use sonarfix_hal::config::RobotConfig;
 /// use sonarfix_link::baked::{self, BakedError};
 /// let mut localizer = Config::for_track_width(Metres(0.16));

@@ -9,19 +9,19 @@
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use sonarfix::absolute::AbsoluteMeasurement;
 use sonarfix::aim::{Aim, NoAim};
-use sonarfix::ekf::{StandardDeviations, StateEstimate};
-use sonarfix::gyro::TurnReading;
+use sonarfix::filter::ekf::{StandardDeviations, StateEstimate};
+use sonarfix::geometry::pose::Pose;
+use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
 use sonarfix::health::Health;
 use sonarfix::localizer::{Fix, GyroStatus, Start};
 use sonarfix::map::WallId;
-use sonarfix::navigator::Mode;
-use sonarfix::pose::Pose;
-use sonarfix::units::{Duration, Instant, Metres, Radians};
+use sonarfix::sensor::absolute::AbsoluteMeasurement;
+use sonarfix::sensor::gyro::TurnReading;
 use sonarfix_hal::config::{RobotConfig, Unsupported};
 use sonarfix_hal::ranger;
 use sonarfix_hal::robot::{AbsoluteResult, Faults};
+use sonarfix_search::navigator::Mode;
 
 use crate::counters::ReceiverCounters;
 
@@ -238,7 +238,7 @@ pub struct SearchStatus {
     pub cycles: u32,
 }
 
-/// What the search has found ([`Answer`](sonarfix::search::Answer)).
+/// What the search has found ([`Answer`](sonarfix_search::search::Answer)).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SearchAnswer {

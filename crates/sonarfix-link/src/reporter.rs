@@ -1,12 +1,12 @@
 //! Turns the polls of the robot's loop into telemetry, for firmware, simulator and emulator.
 
-use sonarfix::ekf::{StandardDeviations, StateEstimate};
+use sonarfix::filter::ekf::{StandardDeviations, StateEstimate};
+use sonarfix::geometry::units::{Duration, Instant};
 use sonarfix::health::Health;
 use sonarfix::localizer::Localizer;
-use sonarfix::navigator::Mode;
-use sonarfix::search::{Answer, Hypothesis, Search};
-use sonarfix::units::{Duration, Instant};
 use sonarfix_hal::robot::{self, PingResult, Report, StepResult, SweepResult};
+use sonarfix_search::navigator::Mode;
+use sonarfix_search::search::{Answer, Hypothesis, Search};
 
 use crate::message::{
     Estimate, GyroState, ModeChanged, Odometry, Ping, RankedHypothesis, SearchAnswer, SearchStatus,

@@ -2,12 +2,12 @@
 
 use std::fmt;
 
+use sonarfix::geometry::pose::Point;
+use sonarfix::geometry::units::Metres;
 use sonarfix::map::image::{
     MAGIC, MOST, MOST_NARROW, Reference, VERSION, VERSION_WITH_ACCURACIES, checksum,
 };
 use sonarfix::map::{Cells, Grid, Map, MapError, Wall, WallId};
-use sonarfix::pose::Point;
-use sonarfix::units::Metres;
 
 /// The smallest cell, about half of the reach of a cheap sonar. Measured in rooms of 4 m × 5 m with a reach of 4 m: an
 /// aim takes the same time with cells of 1 m, and 40 % more with cells of 4 m.
@@ -51,7 +51,7 @@ impl std::error::Error for BakeError {}
 ///
 /// ```
 /// use sonarfix::map::{Map, Wall, WallId};
-/// use sonarfix::pose::Point;
+/// use sonarfix::geometry::pose::Point;
 /// let walls = [Wall::new(Point::new(0.0, 0.0), Point::new(4.0, 0.0))?];
 /// let image = sonarfix_map::bake(&walls)?;
 /// assert_eq!(Map::read(&image)?.wall(WallId(0)), Some(walls[0]));

@@ -6,7 +6,7 @@
 use std::cell::{Cell, RefCell};
 use std::ops::RangeInclusive;
 
-use sonarfix::units::Duration;
+use sonarfix::geometry::units::Duration;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 

@@ -3,9 +3,9 @@
 use std::collections::HashSet;
 use std::path::Path;
 
+use sonarfix::geometry::pose;
+use sonarfix::geometry::units::Metres;
 use sonarfix::map::{Wall, WallError};
-use sonarfix::pose;
-use sonarfix::units::Metres;
 
 use crate::document::{Document, Node, Table};
 use crate::error::FileError;

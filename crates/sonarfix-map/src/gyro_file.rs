@@ -1,7 +1,7 @@
 //! Reads the `[gyro]` table of a robot file.
 
-use sonarfix::gyro::GyroParameters;
-use sonarfix::units::{PerRootSecond, Radians, RadiansPerSecond};
+use sonarfix::geometry::units::{PerRootSecond, Radians, RadiansPerSecond};
+use sonarfix::sensor::gyro::GyroParameters;
 
 use crate::document::{Node, Table};
 use crate::quantity::{ANGLE_WALK, Dimension, TURN_RATE, TURN_RATE_WALK};

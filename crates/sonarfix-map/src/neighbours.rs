@@ -1,8 +1,8 @@
 //! Finds neighbouring walls by the index of the baked map.
 
+use sonarfix::geometry::pose;
+use sonarfix::geometry::units::Metres;
 use sonarfix::map::{Map, MapError};
-use sonarfix::pose;
-use sonarfix::units::Metres;
 
 use crate::floor::{Floor, NamedWall};
 use crate::geometry::{Point, Segment};

@@ -1,7 +1,7 @@
 //! Reads the ranger of a robot file: its name, or its name with different settings.
 
 use sonarfix::config::{LightBeam, Ranging};
-use sonarfix::units::{Duration, Radians};
+use sonarfix::geometry::units::{Duration, Radians};
 use sonarfix_hal::config::RangerConfig;
 use sonarfix_hal::ranger::{Celsius, PulseTiming, RangerKind, RangerSettings};
 

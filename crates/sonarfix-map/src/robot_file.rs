@@ -7,17 +7,17 @@ use sonarfix::config::{
     CalibrationPrior, Config, Further, GatingParameters, MAX_RANGERS, PingSchedule, PingTiming,
     ServoTiming, Sonar,
 };
-use sonarfix::echo::EchoParameters;
-use sonarfix::motion::Drive;
-use sonarfix::pose::Point;
-use sonarfix::range::RangeNoise;
-use sonarfix::units::{Duration, Metres, MetresPerSecond, PerRootMetre, Radians};
+use sonarfix::filter::motion::Drive;
+use sonarfix::geometry::pose::Point;
+use sonarfix::geometry::units::{Duration, Metres, MetresPerSecond, PerRootMetre, Radians};
+use sonarfix::sensor::echo::EchoParameters;
+use sonarfix::sensor::range::RangeNoise;
 
-use sonarfix::search::Region;
 use sonarfix_hal::config::{
     MotorPolicy, RangerConfig, RobotConfig, RobotConfigError, StartPose, WheelConfig,
 };
 use sonarfix_hal::servo::MeasuredPulse;
+use sonarfix_search::search::Region;
 
 use crate::document::{Document, Node, Table};
 use crate::error::FileError;

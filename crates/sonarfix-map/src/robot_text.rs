@@ -2,13 +2,13 @@
 
 use sonarfix::aim::Policy;
 use sonarfix::config::{LightBeam, PingSchedule, RangerId, Ranging, Sonar};
-use sonarfix::gyro::GyroParameters;
-use sonarfix::pose::Point;
-use sonarfix::search::Region;
-use sonarfix::units::{Duration, Radians};
+use sonarfix::geometry::pose::Point;
+use sonarfix::geometry::units::{Duration, Radians};
+use sonarfix::sensor::gyro::GyroParameters;
 use sonarfix_hal::config::{MotorPolicy, RangerConfig, RobotConfig, StartPose, WheelConfig};
 use sonarfix_hal::ranger::{PulseTiming, RangerKind};
 use sonarfix_hal::servo::MeasuredPulse;
+use sonarfix_search::search::Region;
 
 /// Writes the robot file of a configuration.
 #[must_use]

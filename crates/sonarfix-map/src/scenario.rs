@@ -4,8 +4,8 @@ use std::path::{Path as FilePath, PathBuf};
 
 use crate::absolute_file::{self, AbsoluteSensors};
 use crate::clearance::Collision;
-use sonarfix::navigator::{UNKNOWN_HEADING, UNKNOWN_POSITION};
 use sonarfix_hal::config::RobotConfig;
+use sonarfix_search::navigator::{UNKNOWN_HEADING, UNKNOWN_POSITION};
 
 use crate::document::{Document, Node, Table};
 use crate::error::FileError;

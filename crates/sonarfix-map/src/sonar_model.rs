@@ -1,7 +1,7 @@
 //! The sonars and time-of-flight rangers that have a name, in one list for robot files, scenarios and forecasts.
 
 use sonarfix::config::LightBeam;
-use sonarfix::echo::EchoParameters;
+use sonarfix::sensor::echo::EchoParameters;
 use sonarfix_hal::ranger::RangerSettings;
 
 use crate::document::Node;

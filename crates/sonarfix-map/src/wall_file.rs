@@ -3,8 +3,8 @@
 use std::collections::HashSet;
 use std::path::Path;
 
+use sonarfix::geometry::pose::Point;
 use sonarfix::map::{Map, WallError, image};
-use sonarfix::pose::Point;
 
 use crate::document::{self, Document};
 use crate::error::{FileError, Mistake};

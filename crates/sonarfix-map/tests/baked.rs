@@ -4,10 +4,10 @@
 
 use proptest::collection::vec;
 use proptest::prelude::*;
+use sonarfix::geometry::pose::Point;
+use sonarfix::geometry::units::Metres;
 use sonarfix::map::image::{self, MAGIC, VERSION, VERSION_WITH_ACCURACIES, checksum};
 use sonarfix::map::{Map, MapError, Wall, WallId};
-use sonarfix::pose::Point;
-use sonarfix::units::Metres;
 use sonarfix_map::{BakeError, bake};
 
 use crate::rooms::{inside, rooms};

@@ -5,16 +5,16 @@ use std::path::Path;
 
 use proptest::prelude::*;
 use sonarfix::config::{LightBeam, PingSchedule, Ranging, ServoTiming};
-use sonarfix::echo::EchoParameters;
-use sonarfix::pose::Point;
-use sonarfix::search::Region;
-use sonarfix::units::{Duration, Metres, Radians};
+use sonarfix::geometry::pose::Point;
+use sonarfix::geometry::units::{Duration, Metres, Radians};
+use sonarfix::sensor::echo::EchoParameters;
 use sonarfix_hal::config::{MotorPolicy, RangerConfig, RobotConfig, StartPose, WheelConfig};
 use sonarfix_hal::ranger::{PulseTiming, RangerKind};
 use sonarfix_map::{
     CLASSROOM, Fault, FaultKind, Fidelity, FileError, Floor, Follow, Mistake, PAPER, Scenario,
     ServoName, SonarName, Wheel, robot_file, robot_text,
 };
+use sonarfix_search::search::Region;
 
 fn parse(text: &str) -> Result<Scenario, FileError> {
     Scenario::parse(text, "paper.toml", Path::new(""))

@@ -11,7 +11,7 @@ use std::path::Path;
 
 use proptest::prelude::*;
 use sonarfix::config::{Config, Sonar};
-use sonarfix::units::Metres;
+use sonarfix::geometry::units::Metres;
 use sonarfix_map::{
     Finding, Flaw, Floor, Limits, MapFile, NamedWall, PAPER, Severity, bake, flaws, simplify,
 };

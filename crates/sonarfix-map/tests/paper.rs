@@ -4,10 +4,10 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI};
 
 use sonarfix::aim::Policy;
 use sonarfix::config::{Config, PingSchedule, PingTiming};
-use sonarfix::echo::EchoParameters;
-use sonarfix::pose::Point;
-use sonarfix::range::RangeNoise;
-use sonarfix::units::{Duration, Metres, MetresPerSecond, PerRootMetre, Radians};
+use sonarfix::geometry::pose::Point;
+use sonarfix::geometry::units::{Duration, Metres, MetresPerSecond, PerRootMetre, Radians};
+use sonarfix::sensor::echo::EchoParameters;
+use sonarfix::sensor::range::RangeNoise;
 use sonarfix_map::robot_file::INSTANT_SERVO;
 use sonarfix_map::{FileError, GyroTruth, Movement, PAPER, PathPose, Run, Scenario, Start, Truth};
 

@@ -1,14 +1,14 @@
 //! The messages: requests of the PC and answers of the microcontroller, one to each request, in postcard.
 
 use serde::{Deserialize, Serialize};
-use sonarfix::absolute::AbsoluteMeasurement;
 use sonarfix::aim::{Aim, NoAim};
-use sonarfix::ekf::{STATES, StateEstimate};
-use sonarfix::gyro::MeasuredTurn;
+use sonarfix::filter::ekf::{STATES, StateEstimate};
+use sonarfix::filter::motion::WheelTravel;
+use sonarfix::geometry::units::{Instant, Metres};
 use sonarfix::health::Health;
 use sonarfix::localizer::{AbsoluteFix, Fix, Localizer, OdometryError, Start};
-use sonarfix::motion::WheelTravel;
-use sonarfix::units::{Instant, Metres};
+use sonarfix::sensor::absolute::AbsoluteMeasurement;
+use sonarfix::sensor::gyro::MeasuredTurn;
 use sonarfix_hal::config::RobotConfig;
 
 use crate::load::Load;

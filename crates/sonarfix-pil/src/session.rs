@@ -1,16 +1,16 @@
 //! Executes requests: on a microcontroller, and on the PC for comparison.
 
 use sonarfix::aim::{Aim, NoAim};
+use sonarfix::geometry::units::Instant;
 use sonarfix::localizer::{self, AbsoluteFix, AbsoluteRefusal, Fix, Localizer};
 use sonarfix::map::{Map, image};
-use sonarfix::navigator::Mode;
-use sonarfix::search::Search;
-use sonarfix::units::Instant;
 use sonarfix_app::store::Store;
 use sonarfix_app::{App, Board, FlashContents, Link};
 use sonarfix_hal::robot::Report;
 use sonarfix_link::message::ResetCause;
 use sonarfix_link::{Command, CommandResult, Sender, SessionCommand, baked, frame};
+use sonarfix_search::navigator::Mode;
+use sonarfix_search::search::Search;
 
 use crate::board::{self, WiredDevices};
 use crate::load::{Load, Traffic};

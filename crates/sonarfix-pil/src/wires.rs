@@ -11,7 +11,7 @@ use embedded_hal::i2c::{self, ErrorKind, I2c, Operation};
 use embedded_hal::pwm::{self, SetDutyCycle};
 use serde::{Deserialize, Serialize};
 use sonarfix::config::MAX_RANGERS;
-use sonarfix::units::Instant;
+use sonarfix::geometry::units::Instant;
 use sonarfix_hal::encoder::Counter;
 use sonarfix_hal::ranger::EchoCapture;
 

@@ -7,11 +7,11 @@ use std::convert::Infallible;
 
 use embedded_io::{ErrorType, Read, Write};
 use sonarfix::config::{Config, ServoTiming};
+use sonarfix::filter::motion::WheelTravel;
+use sonarfix::geometry::pose::{Point, Pose};
+use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
 use sonarfix::localizer::Start;
 use sonarfix::map::Wall;
-use sonarfix::motion::WheelTravel;
-use sonarfix::pose::{Point, Pose};
-use sonarfix::units::{Duration, Instant, Metres, Radians};
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_hal::ranger::RangerKind;
 use sonarfix_pil::Unmetered;

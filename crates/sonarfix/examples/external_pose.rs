@@ -8,11 +8,11 @@
 use std::error::Error;
 
 use sonarfix::config::Config;
+use sonarfix::filter::motion::WheelTravel;
+use sonarfix::geometry::pose::{Point, Pose};
+use sonarfix::geometry::units::{Instant, Metres, Radians};
 use sonarfix::localizer::{Localizer, Start};
 use sonarfix::map::{Map, Wall};
-use sonarfix::motion::WheelTravel;
-use sonarfix::pose::{Point, Pose};
-use sonarfix::units::{Instant, Metres, Radians};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let (a, b) = (Point::new(0.0, 0.0), Point::new(6.0, 0.0));

@@ -10,11 +10,11 @@
 use std::error::Error;
 
 use sonarfix::config::Config;
+use sonarfix::filter::motion::WheelTravel;
+use sonarfix::geometry::pose::{Point, Pose};
+use sonarfix::geometry::units::{Instant, Metres, Radians};
 use sonarfix::localizer::{Fix, Localizer, Start};
 use sonarfix::map::{Map, Wall};
-use sonarfix::motion::WheelTravel;
-use sonarfix::pose::{Point, Pose};
-use sonarfix::units::{Instant, Metres, Radians};
 
 const TRACK_WIDTH: f32 = 0.16;
 

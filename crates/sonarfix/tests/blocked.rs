@@ -8,12 +8,12 @@
 
 use sonarfix::aim::Policy;
 use sonarfix::config::Config;
+use sonarfix::filter::motion::WheelTravel;
+use sonarfix::geometry::pose::{Point, Pose};
+use sonarfix::geometry::units::{Instant, Metres, Radians};
 use sonarfix::health::Verdict;
 use sonarfix::localizer::{Fix, Localizer, Start};
 use sonarfix::map::{Map, Wall};
-use sonarfix::motion::WheelTravel;
-use sonarfix::pose::{Point, Pose};
-use sonarfix::units::{Instant, Metres, Radians};
 
 /// A room of 4 m × 3 m.
 fn room() -> Vec<Wall> {

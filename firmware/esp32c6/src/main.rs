@@ -46,7 +46,7 @@ use esp_hal::{Blocking, ram};
 use esp_storage::FlashStorage;
 use heapless::Deque;
 use portable_atomic::{AtomicU32, Ordering};
-use sonarfix::units::Instant;
+use sonarfix::geometry::units::Instant;
 use sonarfix_app::store::Store;
 use sonarfix_app::{App, FlashContents, Link, boots, log};
 use sonarfix_hal::encoder::Counter;

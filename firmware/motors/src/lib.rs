@@ -8,10 +8,10 @@
 
 #![no_std]
 
+use sonarfix::geometry::pose::Pose;
+use sonarfix::geometry::trig;
+use sonarfix::geometry::units::Duration;
 use sonarfix::health::Verdict;
-use sonarfix::pose::Pose;
-use sonarfix::trig;
-use sonarfix::units::Duration;
 
 /// The longest time between two calls while the motors are enabled. A new estimate comes at every encoder tick; a controller of
 /// your own may need a shorter period.

@@ -5,7 +5,7 @@ use core::convert::Infallible;
 use embassy_rp::pac;
 use embassy_rp::pio::FifoJoin;
 use embassy_rp::watchdog::{ResetReason, Watchdog};
-use sonarfix::units::Instant;
+use sonarfix::geometry::units::Instant;
 use sonarfix_hal::encoder::Counter;
 use sonarfix_hal::ranger::{EchoCapture, StampedEdges, Stamps};
 use sonarfix_link::message::ResetCause;

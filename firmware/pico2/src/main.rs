@@ -41,7 +41,7 @@ use embedded_hal::pwm::SetDutyCycle;
 use embedded_hal_02::serial::{Read, Write};
 use heapless::Deque;
 use panic_probe as _;
-use sonarfix::units::Instant;
+use sonarfix::geometry::units::Instant;
 use sonarfix_app::store::Store;
 use sonarfix_app::{App, FlashContents, Link, boots, log};
 use sonarfix_hal::bus::{SharedBus, TwoWire};

@@ -11,7 +11,7 @@ pub mod memory;
 use embedded_hal::digital::OutputPin;
 use embedded_hal::i2c::I2c;
 use embedded_storage::nor_flash::NorFlash;
-use sonarfix::units::{Duration, Instant};
+use sonarfix::geometry::units::{Duration, Instant};
 use sonarfix_app::{App, Board, Polled};
 use sonarfix_hal::ranger::{Captured, EchoCapture, OneOf, PulseRanger, Vl53l0x, Vl53l1x};
 use sonarfix_hal::robot::{Hardware, PACE};

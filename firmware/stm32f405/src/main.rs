@@ -422,7 +422,7 @@ unsafe fn HardFault() -> ! {
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod app {
     use heapless::spsc::{Consumer, Producer};
-    use sonarfix::units::Instant;
+    use sonarfix::geometry::units::Instant;
     use sonarfix_app::store::Store;
     use sonarfix_app::{App, FlashContents, boots, log};
     use sonarfix_hal::gyro::Mpu6050;

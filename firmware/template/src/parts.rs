@@ -21,7 +21,7 @@ use embedded_storage::nor_flash::{
     self, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
 };
 use heapless::Deque;
-use sonarfix::units::Instant;
+use sonarfix::geometry::units::Instant;
 use sonarfix_app::Link;
 use sonarfix_hal::encoder::Counter;
 use sonarfix_hal::ranger::EchoCapture;

@@ -3,14 +3,14 @@
 use std::io::BufRead;
 
 use nalgebra::Vector3;
-use sonarfix::pose::Point;
+use sonarfix::geometry::pose::Point;
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_replay::log::{self, HEADER, Malformed, Record};
 use sonarfix_replay::scan::{Cone, Scan};
 use sonarfix_replay::{LONGEST, REFERENCE_HEADER};
 
 use sonarfix::config::{PingSchedule, RangerId};
-use sonarfix::units::Radians;
+use sonarfix::geometry::units::Radians;
 
 use crate::calibration::Nominal;
 use crate::problem::Noise;

@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use sonarfix::absolute::{AbsoluteMeasurement, PoseNoise, PositionNoise};
+use sonarfix::geometry::pose::{Point, Pose};
+use sonarfix::geometry::units::{Duration, Metres, Radians};
 use sonarfix::localizer::Start;
-use sonarfix::pose::{Point, Pose};
-use sonarfix::units::{Duration, Metres, Radians};
+use sonarfix::sensor::absolute::{AbsoluteMeasurement, PoseNoise, PositionNoise};
 use sonarfix_link::{Command, CommandResult};
 use sonarfix_map::robot_file;
 use sonarfix_monitor::{request, view};

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::Subcommand;
 use sonarfix::config::{Config, Sonar};
+use sonarfix::geometry::units::Metres;
 use sonarfix::map::Map;
-use sonarfix::units::Metres;
 use sonarfix_map::{Limits, MapFile, Severity, bake, flaws, robot_file, simplify, symmetries};
 
 use crate::map_exchange;

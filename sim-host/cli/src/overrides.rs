@@ -3,8 +3,8 @@
 use clap::ValueEnum;
 use sonarfix::aim::Policy;
 use sonarfix::config::{LightBeam, PingSchedule, Ranging};
-use sonarfix::gyro::GyroParameters;
-use sonarfix::units::{Duration, Radians};
+use sonarfix::geometry::units::{Duration, Radians};
+use sonarfix::sensor::gyro::GyroParameters;
 use sonarfix_hal::config::StartPose;
 use sonarfix_map::{
     AbsoluteSensors, Fidelity, HeadingSensor, HeadingSlip, PositionSensor, Sampling, Scenario,

@@ -16,10 +16,10 @@ use std::thread;
 use std::time::Duration;
 
 use serde_json::Value;
-use sonarfix::absolute::{AbsoluteMeasurement, PositionNoise};
-use sonarfix::ekf::{StandardDeviations, StateEstimate};
-use sonarfix::pose::Point;
-use sonarfix::units::{Instant, Metres, Radians};
+use sonarfix::filter::ekf::{StandardDeviations, StateEstimate};
+use sonarfix::geometry::pose::Point;
+use sonarfix::geometry::units::{Instant, Metres, Radians};
+use sonarfix::sensor::absolute::{AbsoluteMeasurement, PositionNoise};
 use sonarfix_link::message::Odometry;
 use sonarfix_link::{
     Command as Order, CommandResult, Estimate, Receiver, Reporter, Sender, Session, SessionCommand,

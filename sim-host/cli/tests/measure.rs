@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use sonarfix::units::{Instant, Metres, Radians};
+use sonarfix::geometry::units::{Instant, Metres, Radians};
 use sonarfix_hal::ranger::{Echo, NoEcho};
 use sonarfix_link::message::{CommandError, DeviceReadings, EncoderReading, Sweep};
 use sonarfix_link::{

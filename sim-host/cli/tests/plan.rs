@@ -7,7 +7,7 @@ use std::path::Path as FilePath;
 use std::process::{Command, Output};
 
 use serde_json::Value;
-use sonarfix::gyro::GyroParameters;
+use sonarfix::sensor::gyro::GyroParameters;
 use sonarfix_map::{GyroTruth, HeadingSensor, PAPER, Scenario};
 use sonarfix_plan::preset::SonarPreset;
 use sonarfix_plan::{Forecast, Sample};

@@ -9,7 +9,7 @@ use std::net::TcpListener;
 use std::process::{Command, Output};
 use std::thread::{self, JoinHandle};
 
-use sonarfix::units::{Instant, Metres, Radians};
+use sonarfix::geometry::units::{Instant, Metres, Radians};
 use sonarfix_hal::ranger::{Echo, NoEcho};
 use sonarfix_link::message::{
     CommandError, DeviceReadings, EncoderReading, ImageStatus, ResetCause, ServoReading,

@@ -1,7 +1,7 @@
 //! The simulated NXT sonar against the recorded one.
 #![expect(clippy::unwrap_used, reason = "all of this file is a test, its helpers too")]
 
-use sonarfix::echo::EchoParameters;
+use sonarfix::sensor::echo::EchoParameters;
 use sonarfix_sim::world::sensor::SensorModel;
 use sonarfix_studies::sonar_model::echo_fit::EchoFit;
 use sonarfix_studies::sonar_model::{Comparison, compare, page};

@@ -6,8 +6,8 @@ use std::path::Path;
 
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
-use sonarfix::ekf::{StandardDeviations, StateEstimate};
-use sonarfix::units::Instant;
+use sonarfix::filter::ekf::{StandardDeviations, StateEstimate};
+use sonarfix::geometry::units::Instant;
 use sonarfix_link::message::{ImageStatus, Odometry, ResetCause};
 use sonarfix_link::{Hello, Reporter, Sender, Telemetry, frame};
 use sonarfix_map::{CLASSROOM, Fidelity, Scenario};

@@ -1,9 +1,9 @@
 //! The records of a log as messages: one topic for each kind, with the fields of `docs/formats.md`.
 
 use serde_json::{Value, json};
-use sonarfix::absolute::{AbsoluteMeasurement, PoseNoise};
-use sonarfix::navigator::Mode;
+use sonarfix::sensor::absolute::{AbsoluteMeasurement, PoseNoise};
 use sonarfix_replay::log::Record;
+use sonarfix_search::navigator::Mode;
 use sonarfix_sim::STATES;
 
 use crate::row::Kind;

@@ -4,10 +4,10 @@ use std::sync::mpsc::{Receiver, SyncSender};
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
-use sonarfix::absolute::{AbsoluteMeasurement, PositionNoise};
+use sonarfix::geometry::pose::{Point, Pose};
+use sonarfix::geometry::units::{Metres, Radians};
 use sonarfix::localizer::Start;
-use sonarfix::pose::{Point, Pose};
-use sonarfix::units::{Metres, Radians};
+use sonarfix::sensor::absolute::{AbsoluteMeasurement, PositionNoise};
 use sonarfix_link::Command;
 
 /// An order of a page, as JSON like `{"order": "set_pose", "x": 1, "y": 2, "heading": 0.5}`.
@@ -98,7 +98,7 @@ impl Order {
                 })
             }
             Self::Position { x, y, deviation } => Command::Absolute {
-                age: sonarfix::units::Duration::from_ticks(0),
+                age: sonarfix::geometry::units::Duration::from_ticks(0),
                 measurement: AbsoluteMeasurement::Position {
                     point: Point::new(x, y),
                     noise: PositionNoise::circular(Metres(deviation)),

@@ -6,7 +6,6 @@ use std::sync::mpsc::sync_channel;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::Context;
-use sonarfix::navigator::Mode;
 use sonarfix_hal::robot::AbsoluteResult;
 use sonarfix_link::message::Odometry;
 use sonarfix_link::{CommandResult, Estimate, Telemetry};
@@ -14,6 +13,7 @@ use sonarfix_monitor::conversation::{Conversation, Due, Outcome};
 use sonarfix_monitor::recording::Recording;
 use sonarfix_monitor::signs::Signs;
 use sonarfix_monitor::{Monitor, Received, hints, view};
+use sonarfix_search::navigator::Mode;
 use sonarfix_sim::observe;
 
 use crate::feed::{Feed, Scene, Status};
@@ -295,7 +295,7 @@ impl Robot {
         #[expect(clippy::cast_precision_loss, reason = "a duration far below 2^53 µs")]
         let longest_poll = status.map(|status| status.worst_poll.to_micros() as f64 * 1e-6);
         self.feed.status(&Status {
-            time: records::seconds(sonarfix::units::Instant::from_ticks(at)),
+            time: records::seconds(sonarfix::geometry::units::Instant::from_ticks(at)),
             longest_poll,
             deadlines: status.map(|status| status.faults.deadlines),
             lines: self.lines(),

@@ -24,10 +24,10 @@ pub mod view;
 pub mod wheels;
 
 use sonarfix::localizer::Fix;
-use sonarfix::navigator::Mode;
 use sonarfix_hal::robot::AbsoluteResult;
 use sonarfix_link::message::{GyroState, LoopStatus, RankedHypothesis, SearchStatus, Telemetry};
 use sonarfix_link::{Estimate, Gaps, Hello, Ping, Receiver, ReceiverCounters};
+use sonarfix_search::navigator::Mode;
 
 use sonarfix_sim::statistics::FixCounts;
 

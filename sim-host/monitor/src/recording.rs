@@ -7,16 +7,16 @@ use std::fs::File;
 use std::io::{self, LineWriter, Write};
 use std::path::PathBuf;
 
-use sonarfix::absolute::{AbsoluteMeasurement, PoseNoise, PositionNoise};
 use sonarfix::config::RangerId;
-use sonarfix::gyro::TurnReading;
+use sonarfix::geometry::units::Instant;
 use sonarfix::localizer::AbsoluteFix;
-use sonarfix::navigator::{Mode, UNKNOWN_POSITION};
-use sonarfix::units::Instant;
+use sonarfix::sensor::absolute::{AbsoluteMeasurement, PoseNoise, PositionNoise};
+use sonarfix::sensor::gyro::TurnReading;
 use sonarfix_hal::robot::AbsoluteResult;
 use sonarfix_link::message::{ModeChanged, Odometry, SkippedPing, Sweep};
 use sonarfix_link::{Estimate, Ping, Telemetry};
 use sonarfix_replay::log::HEADER;
+use sonarfix_search::navigator::{Mode, UNKNOWN_POSITION};
 
 use crate::Received;
 

@@ -7,7 +7,7 @@ pub mod hints;
 
 use std::fmt;
 
-use sonarfix::units::Instant;
+use sonarfix::geometry::units::Instant;
 use sonarfix_link::message::{DeviceReadings, EncoderReading, ServoReading, Telemetry};
 use sonarfix_link::{Hello, ReceiverCounters};
 

@@ -1,16 +1,16 @@
 //! The latest telemetry as text.
 
-use sonarfix::absolute::AbsoluteMeasurement;
+use sonarfix::geometry::units::Instant;
 use sonarfix::health::{LOST_AT, Verdict};
 use sonarfix::localizer::{AbsoluteFix, Fix, GyroStatus, TurnUse};
 use sonarfix::map::WallId;
-use sonarfix::navigator::Mode;
-use sonarfix::units::Instant;
+use sonarfix::sensor::absolute::AbsoluteMeasurement;
 use sonarfix_hal::robot::{AbsoluteResult, Faults};
 use sonarfix_link::message::{
     GyroState, ImageStatus, LoopStatus, RankedHypothesis, ResetCause, SearchAnswer, SearchStatus,
 };
 use sonarfix_link::{Estimate, Hello, Ping};
+use sonarfix_search::navigator::Mode;
 
 use crate::Monitor;
 use crate::hints::hints;

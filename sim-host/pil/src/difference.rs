@@ -54,7 +54,7 @@ mod tests {
     #[test]
     fn the_first_number_that_differs_is_named_with_its_bits() {
         let own = Snapshot {
-            state: sonarfix::ekf::StateEstimate::default(),
+            state: sonarfix::filter::ekf::StateEstimate::default(),
             covariance: [0.0; sonarfix_pil::message::TRIANGLE],
             health: Health::default(),
         };

@@ -23,16 +23,16 @@ pub mod pair;
 pub mod progress;
 pub mod tally;
 
-use sonarfix::absolute::AbsoluteMeasurement;
 use sonarfix::aim::{Aim, NoAim};
-use sonarfix::gyro::MeasuredTurn;
+use sonarfix::filter::motion::WheelTravel;
+use sonarfix::geometry::units::{Duration, Instant, Metres};
 use sonarfix::localizer::{AbsoluteFix, Fix, Localizer, OdometryError, Start};
-use sonarfix::motion::WheelTravel;
-use sonarfix::navigator::Mode;
-use sonarfix::search::Search;
-use sonarfix::units::{Duration, Instant, Metres};
+use sonarfix::sensor::absolute::AbsoluteMeasurement;
+use sonarfix::sensor::gyro::MeasuredTurn;
 use sonarfix_hal::robot::Report;
 use sonarfix_pil::{Actuators, Answer, Begin, Request, Sensors, Session, SessionKind, Wires};
+use sonarfix_search::navigator::Mode;
+use sonarfix_search::search::Search;
 
 use self::pair::Pair;
 

@@ -1,8 +1,8 @@
 //! Sends the same requests to a microcontroller and to this process, and compares the answers byte
 //! by byte.
 
+use sonarfix::geometry::units::Instant;
 use sonarfix::localizer::Localizer;
-use sonarfix::units::Instant;
 use sonarfix_pil::Unmetered;
 use sonarfix_pil::line::{self, ANSWER_MAX};
 use sonarfix_pil::{Actuators, Answer, Begin, Request, RequestError, Session, Wires};

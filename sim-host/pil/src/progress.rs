@@ -3,7 +3,7 @@
 use std::io::IsTerminal;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use sonarfix::units::Instant;
+use sonarfix::geometry::units::Instant;
 
 /// Progress of a run.
 #[derive(Debug)]

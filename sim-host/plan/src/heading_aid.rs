@@ -1,6 +1,6 @@
 //! Sensors of the heading beside wheels and sonar.
 
-use sonarfix::gyro::GyroParameters;
+use sonarfix::sensor::gyro::GyroParameters;
 use sonarfix_map::{AbsoluteSensors, HeadingSensor, Scenario};
 
 /// What measures the heading beside wheels and sonar.

@@ -2,8 +2,8 @@
 
 use clap::ValueEnum;
 use sonarfix::config::{PingSchedule, Ranging};
-use sonarfix::range::RangeNoise;
-use sonarfix::units::{Duration, Metres, Radians};
+use sonarfix::geometry::units::{Duration, Metres, Radians};
+use sonarfix::sensor::range::RangeNoise;
 use sonarfix_hal::ranger::{PulseTiming, RangerKind, RangerSettings};
 use sonarfix_map::{Scenario, ServoName, SonarModel, SonarName};
 use sonarfix_sim::pins::devices;

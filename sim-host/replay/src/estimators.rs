@@ -1,14 +1,14 @@
 //! The estimators of a replay: the navigator with its search, and dead reckoning beside it.
 
 use serde::Serialize;
-use sonarfix::absolute::AbsoluteMeasurement;
-use sonarfix::ekf::{EkfError, StandardDeviations, StateEstimate};
+use sonarfix::filter::ekf::{EkfError, StandardDeviations, StateEstimate};
+use sonarfix::filter::motion::WheelTravel;
+use sonarfix::geometry::units::{Instant, Metres, Radians};
 use sonarfix::localizer::{AbsoluteFix, AbsoluteRefusal, Localizer, OdometryError};
-use sonarfix::motion::WheelTravel;
-use sonarfix::navigator::{Mode, Navigator};
-use sonarfix::search::Search;
-use sonarfix::units::{Instant, Metres, Radians};
+use sonarfix::sensor::absolute::AbsoluteMeasurement;
 use sonarfix_hal::robot::EVALUATIONS_PER_MILLISECOND;
+use sonarfix_search::navigator::{Mode, Navigator};
+use sonarfix_search::search::Search;
 use sonarfix_sim::observe;
 use sonarfix_sim::odometry::DeadReckoning;
 use sonarfix_sim::trace::{Pose, Tick, Truth};

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::io;
 
-use sonarfix::ekf::EkfError;
+use sonarfix::filter::ekf::EkfError;
 use sonarfix::localizer::{OdometryError, StartError};
 
 use crate::log::Malformed;

@@ -4,10 +4,10 @@ use std::io::BufRead;
 
 use serde::Serialize;
 use sonarfix::config::{RangerId, Sonar};
+use sonarfix::geometry::units::{Metres, Radians};
 use sonarfix::map::{Map, Wall};
-use sonarfix::search::{Answer, Hypothesis, Search, SearchParameters};
-use sonarfix::units::{Metres, Radians};
 use sonarfix_hal::config::RobotConfig;
+use sonarfix_search::search::{Answer, Hypothesis, Search, SearchParameters};
 use sonarfix_sim::time::micros;
 use sonarfix_sim::trace::Pose;
 

@@ -1,10 +1,10 @@
 //! The log format, one record a line (`docs/formats.md`, "Logs").
 
-use sonarfix::absolute::{AbsoluteMeasurement, PoseNoise, PositionNoise};
 use sonarfix::config::{MAX_RANGERS, RangerId};
-use sonarfix::navigator::Mode;
-use sonarfix::pose::Point;
-use sonarfix::units::Radians;
+use sonarfix::geometry::pose::Point;
+use sonarfix::geometry::units::Radians;
+use sonarfix::sensor::absolute::{AbsoluteMeasurement, PoseNoise, PositionNoise};
+use sonarfix_search::navigator::Mode;
 use sonarfix_sim::trace::Pose;
 
 use crate::scan::Scan;
@@ -209,7 +209,8 @@ pub fn parse(line: &str) -> Result<Option<Record>, Malformed> {
         "measured_pose" => {
             let time = fields.time()?;
             let (x, y) = (fields.single("x")?, fields.single("y")?);
-            let pose = sonarfix::pose::Pose::new(x, y, Radians(fields.single("heading")?));
+            let pose =
+                sonarfix::geometry::pose::Pose::new(x, y, Radians(fields.single("heading")?));
             let noise = PoseNoise {
                 position: fields.position_noise()?,
                 xh: fields.single("covariance of x and heading")?,
@@ -496,7 +497,7 @@ mod tests {
                     time: 3.0,
                     age: 0.0,
                     measurement: AbsoluteMeasurement::Pose {
-                        pose: sonarfix::pose::Pose::new(1.0, -2.0, Radians(0.5)),
+                        pose: sonarfix::geometry::pose::Pose::new(1.0, -2.0, Radians(0.5)),
                         noise: PoseNoise {
                             position: PositionNoise { xx: 4.0, xy: 5.0, yy: 6.0 },
                             xh: 7.0,

@@ -1,7 +1,7 @@
 //! A scan, and the range of a sonar with a wide cone in its place.
 
 use sonarfix::config::Sonar;
-use sonarfix::units::Radians;
+use sonarfix::geometry::units::Radians;
 use sonarfix_sim::angle;
 
 /// Duration of a measurement of a sonar that sweeps, microseconds: an HC-SR04 on an SG90.

@@ -5,17 +5,17 @@ use std::io::BufRead;
 use std::iter::Peekable;
 use std::vec::IntoIter;
 
-use sonarfix::absolute::AbsoluteMeasurement;
 use sonarfix::aim::{Aim, NoAim, Reason};
 use sonarfix::config::{PingSchedule, RangerId, Sonar};
-use sonarfix::ekf::{STATES, StandardDeviations, StateEstimate};
-use sonarfix::gyro::TurnReading;
+use sonarfix::filter::ekf::{STATES, StandardDeviations, StateEstimate};
+use sonarfix::geometry::units::{Duration, Instant, Metres, Radians, SquareMetres};
 use sonarfix::localizer::{Fix, Localizer, Start};
 use sonarfix::map::{Map, Wall, WallId};
-use sonarfix::navigator::{Mode, Navigator, UNKNOWN_HEADING, UNKNOWN_POSITION};
-use sonarfix::search::Search;
-use sonarfix::units::{Duration, Instant, Metres, Radians, SquareMetres};
+use sonarfix::sensor::absolute::AbsoluteMeasurement;
+use sonarfix::sensor::gyro::TurnReading;
 use sonarfix_hal::config::RobotConfig;
+use sonarfix_search::navigator::{Mode, Navigator, UNKNOWN_HEADING, UNKNOWN_POSITION};
+use sonarfix_search::search::Search;
 use sonarfix_sim::observe::{self, Measurement};
 use sonarfix_sim::odometry::DeadReckoning;
 use sonarfix_sim::statistics::FixCounts;
@@ -237,7 +237,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
             Record::Pose { time, pose, position_deviation, heading_deviation } => {
                 let [x, y, heading, position, deviation] =
                     single([pose.x, pose.y, pose.heading, position_deviation, heading_deviation]);
-                let pose = sonarfix::pose::Pose::new(x, y, Radians(heading));
+                let pose = sonarfix::geometry::pose::Pose::new(x, y, Radians(heading));
                 let position_deviation = Metres(position);
                 let heading_deviation = Radians(deviation);
                 let start = Start { pose, position_deviation, heading_deviation };

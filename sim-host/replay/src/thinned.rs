@@ -1,7 +1,7 @@
 //! A trace of bounded size: when it is full, every second record is dropped, and from then on only
 //! every second one is kept.
 
-use sonarfix::units::Radians;
+use sonarfix::geometry::units::Radians;
 use sonarfix_map::Floor;
 
 use sonarfix_sim::trace::{AbsoluteRecord, FixRecord, Recorder, Tick, Trace};

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use sonarfix::gyro::{MeasuredTurn, TurnReading};
+use sonarfix::sensor::gyro::{MeasuredTurn, TurnReading};
 
 /// Readings that wait for their step: more than a log has between two encoder records.
 const MOST: usize = 64;

@@ -4,7 +4,7 @@
 //! It is the filter's covariance recursion, evaluated at the true states. The RMS error of an
 //! efficient filter equals it.
 
-use sonarfix::absolute::{AbsoluteMeasurement, PositionNoise};
+use sonarfix::sensor::absolute::{AbsoluteMeasurement, PositionNoise};
 
 use crate::dense::{DenseFilter, Line, Matrix, Model, Vector};
 use crate::dense_gyro::{DenseGyroFilter, GyroModel};

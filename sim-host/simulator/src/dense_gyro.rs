@@ -8,7 +8,7 @@
 )]
 
 use nalgebra::{SMatrix, SVector};
-use sonarfix::gyro::GyroParameters;
+use sonarfix::sensor::gyro::GyroParameters;
 
 use crate::dense::{DenseFilter, Line, Matrix, Model, Vector};
 

@@ -6,13 +6,13 @@
 )]
 
 use nalgebra::{DMatrix, DVector, Matrix2};
-use sonarfix::absolute::AbsoluteMeasurement;
 use sonarfix::aim::{Aim, NoAim};
-use sonarfix::ekf::{Ekf, Innovation};
+use sonarfix::filter::ekf::{Ekf, Innovation};
+use sonarfix::geometry::pose::Point;
+use sonarfix::geometry::units::Instant;
 use sonarfix::localizer::{AbsoluteFix, Agreement, Fix, GyroStatus, Localizer};
-use sonarfix::pose::Point;
-use sonarfix::search::Search;
-use sonarfix::units::Instant;
+use sonarfix::sensor::absolute::AbsoluteMeasurement;
+use sonarfix_search::search::Search;
 
 use crate::angle;
 use crate::dense::{Matrix, Vector};

@@ -4,9 +4,9 @@
 //! SI units (metres, radians, seconds), in the map frame of the scenario.
 
 use serde::Serialize;
+use sonarfix::geometry::units::Radians;
 use sonarfix::health::Verdict;
 use sonarfix::localizer::Localizer;
-use sonarfix::units::Radians;
 use sonarfix_hal::robot::Report;
 use sonarfix_map::{Floor, NamedWall};
 

@@ -3,7 +3,7 @@
 
 use std::fmt::Write;
 
-use sonarfix::gyro::GyroParameters;
+use sonarfix::sensor::gyro::GyroParameters;
 use sonarfix_hal::robot::Faults;
 use sonarfix_map::{CLASSROOM, Fault, FaultKind, FileError, Scenario, Wheel};
 

@@ -5,12 +5,12 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use sonarfix::config::Config;
+use sonarfix::filter::motion::WheelTravel;
+use sonarfix::geometry::pose::Pose;
+use sonarfix::geometry::units::{Instant, Metres, Radians};
 use sonarfix::health::Verdict;
 use sonarfix::localizer::{Localizer, OdometryError, Start, StartError};
 use sonarfix::map::Map;
-use sonarfix::motion::WheelTravel;
-use sonarfix::pose::Pose;
-use sonarfix::units::{Instant, Metres, Radians};
 use sonarfix_map::{FileError, Floor, Scenario};
 
 use sonarfix_sim::progress::Progress;

@@ -8,13 +8,13 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
+use sonarfix::geometry::units::{Metres, Radians};
 use sonarfix::map::{Map, MapError};
-use sonarfix::search::{Answer, Hypothesis, Search, SearchParameters};
-use sonarfix::units::{Metres, Radians};
 use sonarfix_hal::robot::EVALUATIONS_PER_MILLISECOND;
 use sonarfix_map::{
     BakeError, FileError, Floor, Follow, NamedWall, PathError, Scenario, Symmetry, symmetries,
 };
+use sonarfix_search::search::{Answer, Hypothesis, Search, SearchParameters};
 use sonarfix_sim::angle;
 use sonarfix_sim::plant::Plant;
 use sonarfix_sim::progress::Progress;

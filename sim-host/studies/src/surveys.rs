@@ -7,9 +7,9 @@ use std::io::Write as _;
 use std::path::Path;
 
 use rayon::prelude::*;
+use sonarfix::geometry::pose::Point;
+use sonarfix::geometry::units::Metres;
 use sonarfix::map::Wall;
-use sonarfix::pose::Point;
-use sonarfix::units::Metres;
 use sonarfix_batch::log;
 use sonarfix_batch::recording::Recording;
 use sonarfix_map::{CLASSROOM, FileError, Follow, Scenario};

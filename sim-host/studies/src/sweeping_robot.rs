@@ -2,9 +2,9 @@
 //! software records.
 
 use nalgebra::Vector3;
+use sonarfix::geometry::pose::Point;
 use sonarfix::localizer::Localizer;
 use sonarfix::map::Wall;
-use sonarfix::pose::Point;
 use sonarfix_batch::recording::{Ping, Reading, Recording, StartPose};
 use sonarfix_hal::config::{RobotConfig, StartPose as Start};
 use sonarfix_hal::robot::{Report, Step, StepResult};

@@ -23,7 +23,7 @@ use crate::elf;
 /// most 5,000 instructions (0.8 KiB) and for the difference of the wheels (0.4 KiB).
 const FLASH_BAR: u64 = (36 + 16 + 4 + 1 + 9 + 5 + 4 + 12 + 7 + 2) * 1024;
 /// Their crates.
-const CORE: [&str; 4] = ["sonarfix", "sonarfix-hal", "libm", "nalgebra"];
+const CORE: [&str; 5] = ["sonarfix", "sonarfix-search", "sonarfix-hal", "libm", "nalgebra"];
 /// Smallest size of a crate or a variable with its own row, bytes.
 const LARGE_CRATE: u64 = 500;
 const LARGE_VARIABLE: u64 = 64;

@@ -4,18 +4,18 @@
 //! flash, and whatever it accepts can start.
 
 use embedded_storage::nor_flash::NorFlash;
-use sonarfix::absolute::AbsoluteMeasurement;
+use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
 use sonarfix::localizer::{Localizer, Start, StartError};
 use sonarfix::map::Map;
 use sonarfix::map::image::checksum as crc32;
-use sonarfix::navigator;
-use sonarfix::units::{Duration, Instant, Metres, Radians};
+use sonarfix::sensor::absolute::AbsoluteMeasurement;
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_hal::encoder::Wheels;
 use sonarfix_hal::robot::{Hardware, Report, Robot, Settings, Tick};
 use sonarfix_link::message::{CommandError, CommandResult};
 use sonarfix_link::reporter;
 use sonarfix_link::{Command, Frame, Reporter, SessionCommand, Telemetry, baked};
+use sonarfix_search::navigator;
 
 use super::{App, Link, Mode, Polled, Running, SavePolicy};
 use crate::check::Check;

@@ -4,7 +4,7 @@
 //! [`Hello`](Telemetry::Hello) every ten: at ten ticks and a ping a second 1.4 kB/s of the 11.5 kB/s of a link at
 //! 115,200 baud (`docs/firmware.md`). A message for which there is no room is not built; the sequence numbers show the gap.
 
-use sonarfix::units::{Duration, Instant};
+use sonarfix::geometry::units::{Duration, Instant};
 use sonarfix_link::frame::TELEMETRY_FRAME_MAX;
 use sonarfix_link::reporter::Outlet;
 use sonarfix_link::{

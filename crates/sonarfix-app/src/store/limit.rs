@@ -7,7 +7,7 @@
 //! One write is kept in reserve while the stored record is *parked*, for the record that must
 //! replace it before the robot drives.
 
-use sonarfix::units::{Duration, Instant};
+use sonarfix::geometry::units::{Duration, Instant};
 
 use crate::time::{after, since};
 

@@ -1,7 +1,7 @@
 //! The records of the store.
 
 use serde::{Deserialize, Serialize};
-use sonarfix::ekf::{StandardDeviations, StateEstimate};
+use sonarfix::filter::ekf::{StandardDeviations, StateEstimate};
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_link::baked;
 

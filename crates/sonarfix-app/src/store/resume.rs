@@ -20,10 +20,10 @@
 //! configuration that it corrects: with another one, the prior is used.
 
 use sonarfix::config::Config;
-use sonarfix::ekf::{StandardDeviations, StateEstimate};
+use sonarfix::filter::ekf::{StandardDeviations, StateEstimate};
+use sonarfix::geometry::units::{Metres, Radians};
 use sonarfix::localizer::Start;
-use sonarfix::navigator::{UNKNOWN_HEADING, UNKNOWN_POSITION};
-use sonarfix::units::{Metres, Radians};
+use sonarfix_search::navigator::{UNKNOWN_HEADING, UNKNOWN_POSITION};
 
 use super::Saved;
 

@@ -9,10 +9,10 @@
 //! One record a minute is 1,440 records a day; `docs/firmware.md` states the life of the flash at
 //! this rate.
 
-use sonarfix::ekf::StandardDeviations;
+use sonarfix::filter::ekf::StandardDeviations;
+use sonarfix::geometry::units::{Duration, Instant};
 use sonarfix::health::Verdict;
 use sonarfix::localizer::Localizer;
-use sonarfix::units::{Duration, Instant};
 
 use crate::time::since;
 

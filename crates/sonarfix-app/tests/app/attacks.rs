@@ -2,11 +2,11 @@
 //! without a report. `docs/faults.md` has a table of them.
 
 use sonarfix::config::CalibrationPrior;
-use sonarfix::ekf::StandardDeviations;
+use sonarfix::filter::ekf::StandardDeviations;
+use sonarfix::geometry::pose::Pose;
+use sonarfix::geometry::units::{Metres, MetresPerSecond, Radians};
 use sonarfix::health::Verdict;
 use sonarfix::localizer::Start;
-use sonarfix::pose::Pose;
-use sonarfix::units::{Metres, Radians};
 use sonarfix_app::store::{Saved, Store, StoreError, StoredConfiguration};
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_link::message::{CommandError, CommandResult, ImageStatus};
@@ -310,7 +310,7 @@ fn a_refused_command_changes_nothing() {
     let mut unstartable = config();
     unstartable.localizer.prior.track_width = Metres(1e7);
     let mut broken = config();
-    broken.localizer.max_wheel_speed = sonarfix::units::MetresPerSecond(-1.0);
+    broken.localizer.max_wheel_speed = MetresPerSecond(-1.0);
     let commands = poses
         .map(Command::SetPose)
         .into_iter()
@@ -339,7 +339,9 @@ fn a_stored_configuration_that_cannot_start_is_not_used() {
     let baked = Baked::new(&config());
     let bad: [fn(&mut RobotConfig); 3] = [
         |config| config.localizer.prior.track_width = Metres(1e7),
-        |config| config.localizer.max_wheel_speed = sonarfix::units::MetresPerSecond(-1.0),
+        |config| {
+            config.localizer.max_wheel_speed = MetresPerSecond(-1.0);
+        },
         |config| config.localizer.sonar.servo = (Radians(-3.0), Radians(3.0)),
     ];
     for make_bad in bad {

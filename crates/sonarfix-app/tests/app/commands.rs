@@ -1,9 +1,9 @@
 //! Effects of commands, also after a power cycle.
 
-use sonarfix::absolute::AbsoluteMeasurement;
-use sonarfix::ekf::StandardDeviations;
+use sonarfix::filter::ekf::StandardDeviations;
+use sonarfix::geometry::units::{Duration, Metres, MetresPerSecond, Radians};
 use sonarfix::localizer::Start;
-use sonarfix::units::{Duration, Metres, MetresPerSecond, Radians};
+use sonarfix::sensor::absolute::AbsoluteMeasurement;
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_link::message::{CommandError, CommandResult, ImageStatus};
 use sonarfix_link::{Command, Telemetry, baked};

@@ -1,6 +1,6 @@
 //! The readings of the devices of a robot that waits: signs of life.
 
-use sonarfix::units::Radians;
+use sonarfix::geometry::units::Radians;
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_hal::ranger::NoEcho;
 use sonarfix_link::message::{CommandError, CommandResult, DeviceReadings, Sweep};

@@ -1,11 +1,11 @@
 //! What a poll, a record and a status state, each exactly when it is true.
 
-use sonarfix::ekf::{StandardDeviations, StateEstimate};
+use sonarfix::filter::ekf::{StandardDeviations, StateEstimate};
+use sonarfix::geometry::pose::Pose;
+use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
 use sonarfix::health::Verdict;
 use sonarfix::localizer::{Localizer, Start};
 use sonarfix::map::Map;
-use sonarfix::pose::Pose;
-use sonarfix::units::{Duration, Instant, Metres, Radians};
 use sonarfix_app::store::{Resumed, SavePolicy, Saved, Store, WriteLimit};
 use sonarfix_link::message::{CommandError, CommandResult};
 use sonarfix_link::{Command, Telemetry};

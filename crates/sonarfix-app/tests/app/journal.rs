@@ -1,7 +1,7 @@
 //! Sectors that are exactly full, partly new or followed by foreign bytes.
 
 use embedded_storage::nor_flash::ReadNorFlash;
-use sonarfix::ekf::{StandardDeviations, StateEstimate};
+use sonarfix::filter::ekf::{StandardDeviations, StateEstimate};
 use sonarfix::map::image::checksum;
 use sonarfix_app::store::{Saved, Store};
 use sonarfix_link::baked;

@@ -1,10 +1,10 @@
 //! The loop under load: garbage and commands at the rate of the line, dead devices, and the wear of the flash in a day.
 //! `SONARFIX_SECONDS=3600` makes the first three of them an hour long instead of a minute.
 
+use sonarfix::geometry::pose::Pose;
+use sonarfix::geometry::units::Radians;
 use sonarfix::health::Verdict;
 use sonarfix::localizer::{Fix, Start};
-use sonarfix::pose::Pose;
-use sonarfix::units::Radians;
 use sonarfix_link::message::CommandResult;
 use sonarfix_link::{Command, Ping, Telemetry};
 

@@ -1,7 +1,7 @@
 //! The motor policy: when the motors are enabled.
 
+use sonarfix::geometry::units::Duration;
 use sonarfix::health::Verdict;
-use sonarfix::units::Duration;
 use sonarfix_hal::config::MotorPolicy;
 use sonarfix_link::Command;
 use sonarfix_link::message::CommandResult;

@@ -1,6 +1,6 @@
 //! When the application asks to be polled next: a board sleeps until then.
 
-use sonarfix::units::Metres;
+use sonarfix::geometry::units::Metres;
 use sonarfix_link::Command;
 use sonarfix_link::message::CommandResult;
 

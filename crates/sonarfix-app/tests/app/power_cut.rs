@@ -3,8 +3,8 @@
 
 use proptest::prelude::*;
 use sonarfix::config::Config;
-use sonarfix::ekf::{StandardDeviations, StateEstimate};
-use sonarfix::units::Metres;
+use sonarfix::filter::ekf::{StandardDeviations, StateEstimate};
+use sonarfix::geometry::units::Metres;
 use sonarfix_app::store::{Saved, Store, StoreError, StoredConfiguration};
 use sonarfix_hal::config::RobotConfig;
 

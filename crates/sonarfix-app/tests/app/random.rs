@@ -6,10 +6,10 @@
 //! which `SONARFIX_SEED` runs alone.
 
 use sonarfix::config::PingSchedule;
+use sonarfix::geometry::pose::Pose;
+use sonarfix::geometry::units::{Metres, Radians};
 use sonarfix::health::Verdict;
 use sonarfix::localizer::Start;
-use sonarfix::pose::Pose;
-use sonarfix::units::{Metres, Radians};
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_link::Command;
 use sonarfix_link::message::CommandResult;
@@ -60,7 +60,8 @@ fn any_config(random: &mut Random) -> RobotConfig {
             4 => localizer.max_wheel_speed.0 = number,
             5 => localizer.sonar.servo = (Radians(-number), Radians(number)),
             6 => {
-                any.encoder_period = sonarfix::units::Duration::from_ticks(random.next() % 200_000);
+                any.encoder_period =
+                    sonarfix::geometry::units::Duration::from_ticks(random.next() % 200_000);
             }
             _ => any.right_wheel.travel_per_edge = Metres(number),
         }

@@ -2,10 +2,10 @@
 
 use proptest::prelude::*;
 use sonarfix::config::Config;
-use sonarfix::ekf::{STATES, StandardDeviations, StateEstimate};
+use sonarfix::filter::ekf::{STATES, StandardDeviations, StateEstimate};
+use sonarfix::geometry::pose::Pose;
+use sonarfix::geometry::units::{Metres, Radians};
 use sonarfix::localizer::Start;
-use sonarfix::pose::Pose;
-use sonarfix::units::{Metres, Radians};
 use sonarfix_app::store::{Resumed, Saved};
 
 use crate::rig::config;

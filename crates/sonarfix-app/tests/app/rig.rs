@@ -6,10 +6,10 @@ use std::rc::Rc;
 
 use embedded_hal::pwm;
 use sonarfix::config::{Config, ServoTiming};
+use sonarfix::geometry::pose::{Point, Pose};
+use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
 use sonarfix::localizer::Start;
 use sonarfix::map::Wall;
-use sonarfix::pose::{Point, Pose};
-use sonarfix::units::{Duration, Instant, Metres, Radians};
 use sonarfix_app::store::Store;
 use sonarfix_app::{App, Board, FlashContents, Link, Polled};
 use sonarfix_hal::config::{RobotConfig, WheelConfig};

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
+use sonarfix::geometry::pose::Pose;
+use sonarfix::geometry::units::{Metres, Radians};
 use sonarfix::localizer::Start;
-use sonarfix::pose::Pose;
-use sonarfix::units::{Metres, Radians};
 use sonarfix_hal::config::{RobotConfig, Unsupported};
 use sonarfix_hal::servo::SettingError;
 use sonarfix_link::message::{CommandError, CommandResult, ImageStatus};

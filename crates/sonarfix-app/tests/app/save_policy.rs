@@ -1,10 +1,10 @@
 //! When a running robot writes its calibration.
 
 use sonarfix::config::Config;
-use sonarfix::ekf::{StandardDeviations, StateEstimate};
+use sonarfix::filter::ekf::{StandardDeviations, StateEstimate};
+use sonarfix::geometry::units::Instant;
 use sonarfix::localizer::Localizer;
 use sonarfix::map::Map;
-use sonarfix::units::Instant;
 use sonarfix_app::store::{Resumed, SavePolicy};
 
 use crate::rig::config;

@@ -1,13 +1,13 @@
 //! A robot that may start without a pose: it starts, sweeps and reports no pose; commands and power cuts leave it so.
 
+use sonarfix::geometry::pose::Pose;
+use sonarfix::geometry::units::{Instant, Metres, Radians};
 use sonarfix::health::Verdict;
 use sonarfix::localizer::Start;
-use sonarfix::navigator::{Mode, UNKNOWN_POSITION};
-use sonarfix::pose::Pose;
-use sonarfix::units::{Instant, Metres, Radians};
 use sonarfix_hal::config::{RobotConfig, StartPose};
 use sonarfix_link::message::{CommandError, SearchAnswer};
 use sonarfix_link::{Command, CommandResult, Telemetry};
+use sonarfix_search::navigator::{Mode, UNKNOWN_POSITION};
 
 use crate::flash::SimFlash;
 use crate::rig::{Baked, Bench, config, start};

@@ -4,8 +4,8 @@
 //! [`WheelGeometry::new`] refuses a diameter or a resolution that is not a positive finite
 //! number, so no travel is ever NaN.
 
-use sonarfix::motion::WheelTravel;
-use sonarfix::units::Metres;
+use sonarfix::filter::motion::WheelTravel;
+use sonarfix::geometry::units::Metres;
 
 /// Why a wheel's geometry was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,7 +35,7 @@ impl core::error::Error for GeometryError {}
 /// The travel of a wheel from one tick to the next, by its nominal diameter.
 ///
 /// ```
-/// use sonarfix::units::Metres;
+/// use sonarfix::geometry::units::Metres;
 /// use sonarfix_hal::encoder::WheelGeometry;
 /// // A 65 mm wheel on a gear motor: 11 lines × 4 edges × 34.014 turns of the motor.
 /// let wheel = WheelGeometry::new(Metres(0.065), 11.0 * 4.0 * 34.014)?;

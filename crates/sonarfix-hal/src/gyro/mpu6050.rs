@@ -5,8 +5,8 @@
 //! A reading is one transfer of two bytes, 0.1 ms at 400 kHz. Why not an existing crate: `ARCHITECTURE.md`.
 
 use embedded_hal::i2c::I2c;
-use sonarfix::gyro::GyroParameters;
-use sonarfix::units::RadiansPerSecond;
+use sonarfix::geometry::units::RadiansPerSecond;
+use sonarfix::sensor::gyro::GyroParameters;
 
 use super::{Unreadable, YawRate};
 
@@ -63,7 +63,7 @@ impl core::error::Error for Mpu6050Error {}
 ///
 /// ```
 /// use embedded_hal_mock::eh1::i2c::{Mock, Transaction as I2c};
-/// use sonarfix::gyro::GyroParameters;
+/// use sonarfix::sensor::gyro::GyroParameters;
 /// use sonarfix_hal::gyro::{Mpu6050, YawRate};
 /// let mut bus = Mock::new(&[
 ///     I2c::write_read(0x68, vec![0x75], vec![0x68]),

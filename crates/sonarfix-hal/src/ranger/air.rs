@@ -1,6 +1,6 @@
 //! The speed of sound.
 
-use sonarfix::units::{Duration, Metres, MetresPerSecond};
+use sonarfix::geometry::units::{Duration, Metres, MetresPerSecond};
 
 use crate::time::micros;
 
@@ -41,7 +41,7 @@ impl Air {
     /// Air of this temperature.
     ///
     /// ```
-    /// use sonarfix::units::Duration;
+    /// use sonarfix::geometry::units::Duration;
     /// use sonarfix_hal::ranger::{Air, Celsius};
     /// // A flight of 10 ms, on a cold morning and at noon: 5 cm apart.
     /// let flight = Duration::from_ticks(10_000);

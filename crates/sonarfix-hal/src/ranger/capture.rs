@@ -16,7 +16,7 @@
 use core::convert::Infallible;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
-use sonarfix::units::{Duration, Instant};
+use sonarfix::geometry::units::{Duration, Instant};
 
 use super::pulse::{EchoLine, Pulse};
 
@@ -27,7 +27,7 @@ use super::pulse::{EchoLine, Pulse};
 /// `now` the loop is polled with.
 ///
 /// ```
-/// use sonarfix::units::Instant;
+/// use sonarfix::geometry::units::Instant;
 /// use sonarfix_hal::ranger::EchoCapture;
 ///
 /// static ECHO: EchoCapture = EchoCapture::new();

@@ -1,6 +1,6 @@
 //! The interface of a ranger's driver.
 
-use sonarfix::units::Instant;
+use sonarfix::geometry::units::Instant;
 
 use super::echo::Outcome;
 use super::settings::{RangerKind, RangerSettings};

@@ -1,6 +1,6 @@
 //! The result of a ping: an echo, or the reason for none.
 
-use sonarfix::units::{Duration, Instant, Metres};
+use sonarfix::geometry::units::{Duration, Instant, Metres};
 
 use super::air::Air;
 use crate::time::{after, since};
@@ -31,7 +31,7 @@ impl Echo {
     /// The instant of the reflection: the middle of the flight. The range belongs to it (`docs/hardware.md`).
     ///
     /// ```
-    /// use sonarfix::units::{Duration, Instant};
+    /// use sonarfix::geometry::units::{Duration, Instant};
     /// use sonarfix_hal::ranger::{Air, Celsius, Echo};
     /// let sent = Instant::from_ticks(1_000);
     /// let echo = Echo::new(sent, Duration::from_ticks(6_000), Air::at(Celsius(20.0))?);

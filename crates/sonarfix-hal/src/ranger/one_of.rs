@@ -1,6 +1,6 @@
 //! Two rangers on one board, of which the robot's configuration chooses one.
 
-use sonarfix::units::Instant;
+use sonarfix::geometry::units::Instant;
 
 use super::driver::{Ranger, TriggerError, UnsupportedKind};
 use super::echo::Outcome;

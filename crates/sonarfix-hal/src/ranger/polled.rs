@@ -1,7 +1,7 @@
 //! An echo line whose pin is polled.
 
 use embedded_hal::digital::InputPin;
-use sonarfix::units::{Duration, Instant};
+use sonarfix::geometry::units::{Duration, Instant};
 
 use super::pulse::{EchoLine, Pulse};
 use crate::time::since;

@@ -18,7 +18,7 @@
 //! a reading. The pulse is the flight itself, not compensated for temperature.
 
 use embedded_hal::digital::OutputPin;
-use sonarfix::units::{Duration, Instant};
+use sonarfix::geometry::units::{Duration, Instant};
 
 use super::air::Air;
 use super::driver::{Ranger, TriggerError, UnsupportedKind};
@@ -108,7 +108,7 @@ enum State {
 ///
 /// ```
 /// use embedded_hal_mock::eh1::digital::{Mock, State::{High, Low}, Transaction as Pin};
-/// use sonarfix::units::{Instant, Metres};
+/// use sonarfix::geometry::units::{Instant, Metres};
 /// use sonarfix_hal::ranger::{Captured, EchoCapture, PulseRanger, Ranger};
 ///
 /// let mut trigger = Mock::new(&[Pin::set(High), Pin::set(Low)]);

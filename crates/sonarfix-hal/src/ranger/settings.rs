@@ -1,6 +1,6 @@
 //! The kind of a ranger, and the settings of its driver.
 
-use sonarfix::units::Duration;
+use sonarfix::geometry::units::Duration;
 
 use super::air::Air;
 

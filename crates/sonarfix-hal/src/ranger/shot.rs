@@ -1,6 +1,6 @@
 //! A ranger that makes one range at a time: when it was started, and when it may be started again.
 
-use sonarfix::units::{Duration, Instant};
+use sonarfix::geometry::units::{Duration, Instant};
 
 use crate::time::{after, since};
 

@@ -12,7 +12,7 @@
 //! 0.3 ms at 100 kHz.
 
 use embedded_hal::i2c::{Error as _, ErrorKind, I2c};
-use sonarfix::units::{Duration, Instant};
+use sonarfix::geometry::units::{Duration, Instant};
 
 use super::air::Air;
 use super::driver::{Ranger, TriggerError, UnsupportedKind};
@@ -38,7 +38,7 @@ const LONGEST: Duration = Duration::from_ticks(37_000);
 ///
 /// ```
 /// use embedded_hal_mock::eh1::i2c::{Mock, Transaction as I2c};
-/// use sonarfix::units::{Instant, Metres};
+/// use sonarfix::geometry::units::{Instant, Metres};
 /// use sonarfix_hal::ranger::{Air, Ranger, Srf};
 ///
 /// let mut bus = Mock::new(&[

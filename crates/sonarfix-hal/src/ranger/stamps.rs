@@ -4,7 +4,7 @@
 //! several pulses between two readings only the last is detected; a [`PulseRanger`](super::PulseRanger) generates at
 //! most one pulse between two polls that are a few milliseconds apart.
 
-use sonarfix::units::{Duration, Instant};
+use sonarfix::geometry::units::{Duration, Instant};
 
 use super::EchoCapture;
 
@@ -21,7 +21,7 @@ pub struct Stamps {
 /// Passes edges to an [`EchoCapture`] by their stamps, in place of an interrupt.
 ///
 /// ```
-/// use sonarfix::units::{Duration, Instant};
+/// use sonarfix::geometry::units::{Duration, Instant};
 /// use sonarfix_hal::ranger::{Captured, EchoCapture, EchoLine, StampedEdges, Stamps};
 ///
 /// let capture = EchoCapture::new();

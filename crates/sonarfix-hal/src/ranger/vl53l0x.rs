@@ -19,7 +19,7 @@
 //! gate. It has been tested on a simulated bus only. Why not an existing crate: `ARCHITECTURE.md`.
 
 use embedded_hal::i2c::I2c;
-use sonarfix::units::{Duration, Instant, Metres};
+use sonarfix::geometry::units::{Duration, Instant, Metres};
 
 use super::driver::{Ranger, TriggerError, UnsupportedKind};
 use super::echo::{Echo, NoEcho, Outcome};
@@ -112,7 +112,7 @@ enum Step {
 /// ```
 /// use embedded_hal::i2c::ErrorKind;
 /// use embedded_hal_mock::eh1::i2c::{Mock, Transaction as I2c};
-/// use sonarfix::units::Instant;
+/// use sonarfix::geometry::units::Instant;
 /// use sonarfix_hal::ranger::{Ranger, TriggerError, Vl53l0x, Vl53l0xError};
 ///
 /// // Another device has the address.

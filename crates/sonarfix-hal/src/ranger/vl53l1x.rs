@@ -7,7 +7,7 @@
 //! an existing crate: `ARCHITECTURE.md`.
 
 use embedded_hal::i2c::I2c;
-use sonarfix::units::{Duration, Instant, Metres};
+use sonarfix::geometry::units::{Duration, Instant, Metres};
 
 use super::driver::{Ranger, TriggerError, UnsupportedKind};
 use super::echo::{Echo, NoEcho, Outcome};
@@ -62,7 +62,7 @@ impl<E: core::fmt::Debug> core::error::Error for Vl53l1xError<E> {}
 /// ```
 /// use embedded_hal::i2c::ErrorKind;
 /// use embedded_hal_mock::eh1::i2c::{Mock, Transaction as I2c};
-/// use sonarfix::units::Instant;
+/// use sonarfix::geometry::units::Instant;
 /// use sonarfix_hal::ranger::{Ranger, TriggerError, Vl53l1x, Vl53l1xError};
 ///
 /// // Another device has the address.

@@ -2,8 +2,8 @@
 
 use embedded_hal::pwm::SetDutyCycle;
 use sonarfix::config::RangerId;
-use sonarfix::gyro::GyroParameters;
-use sonarfix::units::{Metres, RadiansPerSecond};
+use sonarfix::geometry::units::{Metres, RadiansPerSecond};
+use sonarfix::sensor::gyro::GyroParameters;
 
 use crate::config::{RobotConfig, Unsupported};
 use crate::encoder::Counter;

@@ -3,9 +3,9 @@
 //! It counts whole half edges, so that a step can end between two edges (at a reflection) without losing,
 //! duplicating or rounding any.
 
-use sonarfix::gyro::TurnReading;
-use sonarfix::motion::WheelTravel;
-use sonarfix::units::Instant;
+use sonarfix::filter::motion::WheelTravel;
+use sonarfix::geometry::units::Instant;
+use sonarfix::sensor::gyro::TurnReading;
 
 use super::{EncoderFaults, Faults, Hardware};
 use crate::encoder::{Counter, Unwrapped, Wheels};

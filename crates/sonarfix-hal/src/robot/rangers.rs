@@ -2,7 +2,7 @@
 
 use sonarfix::aim::{Aim, Standing};
 use sonarfix::config::{Config, MAX_RANGERS, PingSchedule, RangerId};
-use sonarfix::units::Instant;
+use sonarfix::geometry::units::Instant;
 
 use super::Hardware;
 use crate::ranger::Ranger;

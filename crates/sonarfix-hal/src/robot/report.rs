@@ -1,11 +1,11 @@
 //! The report of one poll of the loop.
 
 use sonarfix::aim::{Aim, NoAim};
-use sonarfix::gyro::TurnReading;
+use sonarfix::filter::motion::WheelTravel;
+use sonarfix::geometry::units::{Duration, Instant, Radians};
 use sonarfix::localizer::{Fix, OdometryError};
-use sonarfix::motion::WheelTravel;
-use sonarfix::navigator::Mode;
-use sonarfix::units::{Duration, Instant, Radians};
+use sonarfix::sensor::gyro::TurnReading;
+use sonarfix_search::navigator::Mode;
 
 use super::{AbsoluteResult, Faults};
 use crate::ranger::Outcome;

@@ -1,6 +1,6 @@
 //! Periodic deadlines that stay on their grid, however late each is noticed.
 
-use sonarfix::units::{Duration, Instant};
+use sonarfix::geometry::units::{Duration, Instant};
 
 use crate::time::{after, since};
 

@@ -1,6 +1,6 @@
 //! The settings of the loop.
 
-use sonarfix::units::Duration;
+use sonarfix::geometry::units::Duration;
 
 /// The instant to which an echo belongs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 use sonarfix::aim::{Aim, Reason};
 use sonarfix::config::RangerId;
-use sonarfix::units::{Instant, Radians};
+use sonarfix::geometry::units::{Instant, Radians};
 
 use super::odometer::Reading;
 

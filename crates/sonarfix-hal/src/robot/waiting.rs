@@ -1,8 +1,8 @@
 //! Absolute measurements that wait for the step of the wheels in which they were made.
 
-use sonarfix::absolute::AbsoluteMeasurement;
+use sonarfix::geometry::units::Instant;
 use sonarfix::localizer::AbsoluteFix;
-use sonarfix::units::Instant;
+use sonarfix::sensor::absolute::AbsoluteMeasurement;
 
 /// An absolute measurement, the localizer's response, and their times.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,7 +1,7 @@
 //! The ledger of turns: what the gyro has measured, and how much of it the localizer has taken.
 
-use sonarfix::gyro::{GyroParameters, MeasuredTurn, TurnIntegral, TurnReading};
-use sonarfix::units::Instant;
+use sonarfix::geometry::units::Instant;
+use sonarfix::sensor::gyro::{GyroParameters, MeasuredTurn, TurnIntegral, TurnReading};
 
 use super::schedule::Schedule;
 use super::{Faults, Hardware};

@@ -1,6 +1,6 @@
 //! Pulse width ↔ bearing: a straight line through two measured points.
 
-use sonarfix::units::{Duration, Radians};
+use sonarfix::geometry::units::{Duration, Radians};
 
 use super::error::SettingError;
 use crate::time::micros;

@@ -1,8 +1,8 @@
 //! The bearing of a servo while it turns, by the model [`ServoMotion`] in place of feedback.
 
 use sonarfix::config::ServoTiming;
-use sonarfix::servo::ServoMotion;
-use sonarfix::units::{Instant, Radians};
+use sonarfix::geometry::units::{Instant, Radians};
+use sonarfix::sensor::servo::ServoMotion;
 
 use crate::time::{NEVER, after, micros, since};
 

@@ -3,7 +3,7 @@
 use core::convert::Infallible;
 
 use embedded_hal::pwm::{ErrorType, SetDutyCycle};
-use sonarfix::units::Duration;
+use sonarfix::geometry::units::Duration;
 
 use super::{PwmFrame, Servo};
 
@@ -11,7 +11,7 @@ use super::{PwmFrame, Servo};
 /// ([`SettingError::Frame`](super::SettingError::Frame)).
 ///
 /// ```
-/// use sonarfix::units::{Instant, Radians};
+/// use sonarfix::geometry::units::{Instant, Radians};
 /// use sonarfix_hal::servo::NoPwm;
 /// let mut mount = NoPwm::servo();
 /// mount.fix(Radians(1.5));

@@ -1,7 +1,7 @@
 //! The settings of a servo's driver, and the pulses of a PWM channel.
 
 use sonarfix::config::ServoTiming;
-use sonarfix::units::{Duration, Radians};
+use sonarfix::geometry::units::{Duration, Radians};
 
 use super::calibration::{Calibration, MeasuredPulse};
 use super::error::SettingError;

@@ -11,7 +11,7 @@ use embedded_hal_mock::eh1::MockError;
 use embedded_hal_mock::eh1::digital::State::{High, Low};
 use embedded_hal_mock::eh1::digital::{Edge, Mock, Transaction};
 use embedded_hal_mock::eh1::i2c::{Mock as Bus, Transaction as OnBus};
-use sonarfix::units::Instant;
+use sonarfix::geometry::units::Instant;
 use sonarfix_hal::asynch::{count, measure, ping};
 use sonarfix_hal::encoder::{Counter, Quadrature, TickCount};
 use sonarfix_hal::ranger::{Air, NoEcho, Polled, PulseRanger, Srf};

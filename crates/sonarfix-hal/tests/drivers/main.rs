@@ -13,7 +13,7 @@ mod two_wire;
 mod vl53l0x;
 mod vl53l1x;
 
-use sonarfix::units::{Duration, Instant};
+use sonarfix::geometry::units::{Duration, Instant};
 
 fn at(micros: u64) -> Instant {
     Instant::from_ticks(micros)

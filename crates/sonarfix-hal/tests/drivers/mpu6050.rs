@@ -3,8 +3,8 @@
 use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
 use embedded_hal_mock::eh1::i2c::{Mock, Transaction as I2c};
 use proptest::prelude::*;
-use sonarfix::gyro::GyroParameters;
-use sonarfix::units::RadiansPerSecond;
+use sonarfix::geometry::units::RadiansPerSecond;
+use sonarfix::sensor::gyro::GyroParameters;
 use sonarfix_hal::gyro::{Mpu6050, Mpu6050Error, Unreadable, YawRate};
 
 /// The transfers that configure the sensor at this address for a range.

@@ -5,7 +5,7 @@ use std::io::ErrorKind;
 use embedded_hal_mock::eh1::MockError;
 use embedded_hal_mock::eh1::pwm::{Mock, Transaction};
 use proptest::prelude::*;
-use sonarfix::units::Radians;
+use sonarfix::geometry::units::Radians;
 use sonarfix_hal::servo::{
     MeasuredPulse, PointError, PwmFrame, Servo, ServoSettings, ServoTiming, SettingError,
 };

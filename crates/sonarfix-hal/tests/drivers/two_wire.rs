@@ -8,8 +8,8 @@ use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{ErrorType, InputPin, OutputPin};
 use embedded_hal::i2c::{ErrorKind, I2c, NoAcknowledgeSource, Operation};
 use proptest::prelude::*;
-use sonarfix::gyro::GyroParameters;
-use sonarfix::units::Instant;
+use sonarfix::geometry::units::Instant;
+use sonarfix::sensor::gyro::GyroParameters;
 use sonarfix_hal::bus::{MOST_STRETCHES, SharedBus, TwoWire};
 use sonarfix_hal::gyro::{Mpu6050, Unreadable, YawRate};
 use sonarfix_hal::ranger::{

@@ -1,10 +1,10 @@
 //! Headings and positions from outside in the loop: they wait for their step, and each has an outcome.
 
-use sonarfix::absolute::{AbsoluteMeasurement, PositionNoise};
 use sonarfix::config::PingSchedule;
+use sonarfix::geometry::pose::Point;
+use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
 use sonarfix::localizer::{AbsoluteFix, AbsoluteRefusal};
-use sonarfix::pose::Point;
-use sonarfix::units::{Duration, Instant, Metres, Radians};
+use sonarfix::sensor::absolute::{AbsoluteMeasurement, PositionNoise};
 use sonarfix_hal::robot::{AbsoluteResult, Occupied, Report, Settings};
 use sonarfix_hal::servo::ServoTiming;
 

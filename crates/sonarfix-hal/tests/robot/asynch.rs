@@ -7,8 +7,8 @@ use core::task::{Context, Waker};
 
 use embedded_hal_async::delay::DelayNs;
 use sonarfix::config::PingSchedule;
+use sonarfix::geometry::units::{Duration, Instant, Radians};
 use sonarfix::localizer::Fix;
-use sonarfix::units::{Duration, Instant, Radians};
 use sonarfix_hal::asynch;
 use sonarfix_hal::robot::Settings;
 use sonarfix_hal::servo::ServoTiming;

@@ -1,8 +1,8 @@
 //! Faults of the hardware: each is counted, none stops the loop, and it recovers.
 
 use sonarfix::config::PingSchedule;
+use sonarfix::geometry::units::{Duration, Instant};
 use sonarfix::localizer::Fix;
-use sonarfix::units::{Duration, Instant};
 use sonarfix_hal::encoder::Wheels;
 use sonarfix_hal::ranger::{Air, Echo, NoEcho, Outcome, Ranger, TriggerError};
 use sonarfix_hal::robot::{Devices, Faults, Report, Robot, Settings, SettingsError, StepResult};

@@ -2,8 +2,8 @@
 
 use proptest::prelude::*;
 use sonarfix::config::PingSchedule;
+use sonarfix::geometry::units::{Duration, Instant};
 use sonarfix::localizer::Fix;
-use sonarfix::units::{Duration, Instant};
 use sonarfix_hal::ranger::NoEcho;
 use sonarfix_hal::robot::{Report, Settings, Stamp, StepResult};
 use sonarfix_hal::servo::ServoTiming;

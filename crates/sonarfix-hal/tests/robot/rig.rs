@@ -8,10 +8,10 @@ use std::collections::VecDeque;
 
 use embedded_hal::{digital, pwm};
 use sonarfix::config::{Config, PingSchedule};
+use sonarfix::geometry::pose::{Point, Pose};
+use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
 use sonarfix::localizer::{Localizer, Start};
 use sonarfix::map::{Map, Wall};
-use sonarfix::pose::{Point, Pose};
-use sonarfix::units::{Duration, Instant, Metres, Radians};
 use sonarfix_hal::encoder::{Counter, WheelGeometry, Wheels};
 use sonarfix_hal::ranger::{Air, Captured, EchoCapture, PulseRanger};
 use sonarfix_hal::robot::{Devices, Report, Robot, Settings, Step, StepResult};

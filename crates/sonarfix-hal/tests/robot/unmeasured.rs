@@ -2,10 +2,10 @@
 //! deviation grows with the distance. The verdict of a robot that drives is `Lost`, when its deviation exceeds the limit.
 
 use sonarfix::config::PingSchedule;
+use sonarfix::geometry::pose::Point;
+use sonarfix::geometry::units::Duration;
 use sonarfix::health::{DEGRADED_WITHOUT_FIX, Verdict};
 use sonarfix::map::Wall;
-use sonarfix::pose::Point;
-use sonarfix::units::Duration;
 use sonarfix_hal::robot::Settings;
 use sonarfix_hal::servo::ServoTiming;
 

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use sonarfix::config::{Config, Policy, ServoTiming};
-use sonarfix::units::{Metres, Radians};
+use sonarfix::geometry::units::{Metres, Radians};
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_link::baked::{self, BakedError, LENGTH_MAX};
 

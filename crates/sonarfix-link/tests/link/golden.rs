@@ -4,10 +4,10 @@
 
 use sonarfix::aim::NoAim;
 use sonarfix::config::{Config, PingSchedule, Policy, ServoTiming};
-use sonarfix::ekf::Innovation;
+use sonarfix::filter::ekf::Innovation;
+use sonarfix::geometry::units::{Duration, Metres, Radians, SquareMetres};
 use sonarfix::health::Verdict;
 use sonarfix::localizer::Fix;
-use sonarfix::units::{Duration, Metres, Radians, SquareMetres};
 use sonarfix_hal::config::{RobotConfig, Unsupported};
 use sonarfix_hal::ranger::{PulseTiming, RangerKind};
 use sonarfix_hal::servo::SettingError;

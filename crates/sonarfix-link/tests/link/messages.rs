@@ -2,26 +2,24 @@
 
 use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
-use sonarfix::absolute::{AbsoluteMeasurement, PoseNoise, PositionNoise};
 use sonarfix::aim::{Aim, NoAim, Reason};
 use sonarfix::config::{
     Config, LightBeam, MAX_RANGERS, PingSchedule, PingTiming, Policy, RangerId, Ranging,
     ServoTiming,
 };
-use sonarfix::ekf::{EkfError, Innovation, STATES, StandardDeviations, StateEstimate};
-use sonarfix::gyro::{GyroParameters, TurnReading, TurnRefusal};
+use sonarfix::filter::ekf::{EkfError, Innovation, STATES, StandardDeviations, StateEstimate};
+use sonarfix::geometry::pose::{Point, Pose};
+use sonarfix::geometry::units::{
+    Duration, Instant, Metres, MetresPerSecond, PerRootMetre, PerRootSecond, Radians,
+    RadiansPerSecond, SquareMetres,
+};
 use sonarfix::health::{Health, Verdict};
 use sonarfix::localizer::{
     AbsoluteFix, AbsoluteRefusal, Agreement, Fix, GyroStatus, Refusal, Start, TurnUse,
 };
 use sonarfix::map::WallId;
-use sonarfix::navigator::Mode;
-use sonarfix::pose::{Point, Pose};
-use sonarfix::search::Region;
-use sonarfix::units::{
-    Duration, Instant, Metres, MetresPerSecond, PerRootMetre, PerRootSecond, Radians,
-    RadiansPerSecond, SquareMetres,
-};
+use sonarfix::sensor::absolute::{AbsoluteMeasurement, PoseNoise, PositionNoise};
+use sonarfix::sensor::gyro::{GyroParameters, TurnReading, TurnRefusal};
 use sonarfix_hal::config::{MotorPolicy, RangerConfig, RobotConfig, StartPose, Unsupported};
 use sonarfix_hal::ranger::{Celsius, Echo, NoEcho, Outcome, PulseTiming, RangerKind};
 use sonarfix_hal::robot::{AbsoluteResult, EncoderFaults, Faults};
@@ -34,6 +32,8 @@ use sonarfix_link::message::{
 use sonarfix_link::{
     Ack, Command, CommandResult, Estimate, Hello, Ping, ReceiverCounters, SessionCommand, Telemetry,
 };
+use sonarfix_search::navigator::Mode;
+use sonarfix_search::search::Region;
 
 /// The source of the numbers of a message.
 pub trait Source {

@@ -1,7 +1,7 @@
 //! Buildings of any size with constant density, for benchmarks and tests.
 
+use sonarfix::geometry::pose::Point;
 use sonarfix::map::Wall;
-use sonarfix::pose::Point;
 
 /// Inner size of a room, metres.
 const ROOM: (f32, f32) = (4.0, 5.0);

@@ -4,8 +4,8 @@
 //! The result of a valid covariance is finite; the planner never chooses a wall with a NaN.
 
 use crate::config::Weights;
-use crate::covariance::PredictedMeasurement;
-use crate::units::SquareMetres;
+use crate::filter::covariance::PredictedMeasurement;
+use crate::geometry::units::SquareMetres;
 
 // ===== Eq. (21): expected decrease of the weighted variances =====
 /// The decrease of the weighted sum of variances by a range with noise variance `noise`.

@@ -7,10 +7,10 @@
 
 use super::{Aim, Candidate, HYSTERESIS, NoAim, Planner, Pointing, Policy};
 use crate::config::LightBeam;
+use crate::geometry::pose::{Heading, Point};
+use crate::geometry::units::Radians;
+use crate::geometry::vector::Vector;
 use crate::map::{Wall, WallId};
-use crate::pose::{Heading, Point};
-use crate::units::Radians;
-use crate::vector::Vector;
 
 /// Bearings of the fan: 12.5° apart on a servo of 200°.
 const FAN: usize = 17;

@@ -1,9 +1,9 @@
 //! Counters and limits of the verdict, at and just beyond each limit.
 
 use super::*;
-use crate::outcome::{AbsoluteFix, Agreement, Refusal};
-use crate::range::Innovation;
-use crate::units::SquareMetres;
+use crate::association::outcome::{AbsoluteFix, Agreement, Refusal};
+use crate::geometry::units::SquareMetres;
+use crate::sensor::range::Innovation;
 
 const LIMITS: Limits =
     Limits { distance: Metres(2.0), position: Metres(0.5), heading: Radians(0.125) };

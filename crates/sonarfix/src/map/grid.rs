@@ -9,8 +9,8 @@
 //! cell.
 
 use super::wall::Wall;
-use crate::pose::Point;
-use crate::units::Metres;
+use crate::geometry::pose::Point;
+use crate::geometry::units::Metres;
 
 /// A grid of square cells, in rows along x.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,8 +57,8 @@ impl Grid {
     ///
     /// ```
     /// use sonarfix::map::{Grid, Wall};
-    /// use sonarfix::pose::Point;
-    /// use sonarfix::units::Metres;
+    /// use sonarfix::geometry::pose::Point;
+    /// use sonarfix::geometry::units::Metres;
     /// let grid = Grid::new(Point::new(0.0, 0.0), Metres(2.0), 3, 2).unwrap();
     /// let cells = grid.cells_of(&Wall::new(Point::new(1.0, 3.0), Point::new(5.0, 3.0))?);
     /// assert_eq!(cells.map(|cells| (cells.columns, cells.rows)), Some(((0, 2), (1, 1))));

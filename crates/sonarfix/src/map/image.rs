@@ -27,8 +27,8 @@ use core::ops::Range;
 
 use super::grid::{Cells, Grid};
 use super::wall::{Wall, WallId};
-use crate::pose::Point;
-use crate::units::Metres;
+use crate::geometry::pose::Point;
+use crate::geometry::units::Metres;
 
 /// First bytes of every baked map.
 pub const MAGIC: [u8; 4] = *b"SFXM";

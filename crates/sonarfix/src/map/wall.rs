@@ -4,9 +4,9 @@
 //! [`Wall::new`] refuses NaN, infinity and a length that overflows. For a point that is not finite the
 //! functions return NaN or infinity. [`Wall::with_accuracy`] takes any number.
 
-use crate::pose::{Heading, Point};
-use crate::trig::atan2;
-use crate::units::{Metres, Radians};
+use crate::geometry::pose::{Heading, Point};
+use crate::geometry::trig::atan2;
+use crate::geometry::units::{Metres, Radians};
 
 /// Reason for which a wall is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,7 +43,7 @@ pub struct WallId(pub u32);
 ///
 /// ```
 /// use sonarfix::map::Wall;
-/// use sonarfix::pose::Point;
+/// use sonarfix::geometry::pose::Point;
 /// let wall = Wall::new(Point::new(0.0, 0.0), Point::new(4.0, 0.0))?;
 /// // Left of the direction from one end to the other, the distance is positive.
 /// assert_eq!(wall.signed_distance(Point::new(1.0, 2.0)).0, 2.0);
@@ -86,7 +86,7 @@ impl Wall {
     }
 
     /// The same wall with an accuracy of its own: the standard deviation of its place, rounded to whole millimetres, at least
-    /// 1 mm and at most [`Self::WORST_ACCURACY`]. It replaces [`map_accuracy`](crate::echo::EchoParameters::map_accuracy).
+    /// 1 mm and at most [`Self::WORST_ACCURACY`]. It replaces [`map_accuracy`](crate::sensor::echo::EchoParameters::map_accuracy).
     /// Without one if it is negative or NaN.
     #[must_use]
     pub fn with_accuracy(self, accuracy: Metres) -> Self {

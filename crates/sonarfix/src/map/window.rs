@@ -5,8 +5,8 @@ use core::ops::Range;
 use super::grid::Cells;
 use super::image::{Image, Reference};
 use super::wall::{Wall, WallId};
-use crate::pose::Point;
-use crate::units::Metres;
+use crate::geometry::pose::Point;
+use crate::geometry::units::Metres;
 
 /// The walls of a rectangle of cells, each once: in the first column (row) of the rectangle every wall that
 /// the cell refers to, in the others those for which the column (row) is their first.

@@ -4,16 +4,16 @@ use std::f32::consts::PI;
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use proptest::prelude::*;
-use sonarfix::absolute::{AbsoluteMeasurement, PoseNoise, PositionNoise};
 use sonarfix::config::Config;
-use sonarfix::ekf::{StandardDeviations, StateEstimate};
-use sonarfix::gyro::GyroParameters;
+use sonarfix::filter::ekf::{StandardDeviations, StateEstimate};
+use sonarfix::filter::motion::WheelTravel;
+use sonarfix::geometry::pose::{Point, Pose};
+use sonarfix::geometry::units::{Instant, Metres, Radians};
 use sonarfix::health::Verdict;
 use sonarfix::localizer::{AbsoluteFix, AbsoluteRefusal, Localizer};
 use sonarfix::map::Map;
-use sonarfix::motion::WheelTravel;
-use sonarfix::pose::{Point, Pose};
-use sonarfix::units::{Instant, Metres, Radians};
+use sonarfix::sensor::absolute::{AbsoluteMeasurement, PoseNoise, PositionNoise};
+use sonarfix::sensor::gyro::GyroParameters;
 
 use crate::strategies::{any_deviation, any_drive, any_state, any_travel};
 
@@ -472,9 +472,9 @@ fn headings_show_the_bias_of_a_gyro() {
     let (mut localizer, _) = driven(&config, StateEstimate::default(), deviation, &[]);
     let bias = 0.02_f32;
     for tick in 1..=600_u64 {
-        let turn = sonarfix::gyro::MeasuredTurn {
+        let turn = sonarfix::sensor::gyro::MeasuredTurn {
             angle: Radians(bias * 0.1),
-            duration: sonarfix::units::Duration::from_ticks(TICK),
+            duration: sonarfix::geometry::units::Duration::from_ticks(TICK),
         };
         let now = Instant::from_ticks(tick * TICK);
         localizer.odometry_with_turn(now, WheelTravel::new(0.02, 0.02), Some(turn)).unwrap();
@@ -493,9 +493,9 @@ fn the_bias_is_uncertain_by_the_association() {
     let deviation = StandardDeviations::from_array([0.01, 0.01, 0.01, 0.1, 0.1, 0.02, 0.0]);
     let (mut localizer, _) = driven(&config, StateEstimate::default(), deviation, &[]);
     for tick in 1..=50_u64 {
-        let turn = sonarfix::gyro::MeasuredTurn {
+        let turn = sonarfix::sensor::gyro::MeasuredTurn {
             angle: Radians(0.0),
-            duration: sonarfix::units::Duration::from_ticks(TICK),
+            duration: sonarfix::geometry::units::Duration::from_ticks(TICK),
         };
         let now = Instant::from_ticks(tick * TICK);
         localizer.odometry_with_turn(now, WheelTravel::new(0.02, 0.02), Some(turn)).unwrap();

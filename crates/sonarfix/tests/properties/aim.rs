@@ -4,13 +4,13 @@
 use proptest::prelude::*;
 use sonarfix::aim::{Aim, NoAim, Policy};
 use sonarfix::config::{Config, PingSchedule, PingTiming, ServoTiming};
-use sonarfix::echo::EchoParameters;
+use sonarfix::filter::motion::WheelTravel;
+use sonarfix::geometry::pose::{Point, Pose};
+use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
 use sonarfix::localizer::{Fix, Localizer, Start};
 use sonarfix::map::{Map, Wall, WallId};
-use sonarfix::motion::WheelTravel;
-use sonarfix::pose::{Point, Pose};
-use sonarfix::range::ExpectedRange;
-use sonarfix::units::{Duration, Instant, Metres, Radians};
+use sonarfix::sensor::echo::EchoParameters;
+use sonarfix::sensor::range::ExpectedRange;
 
 use crate::oracle::{
     HEADING, Matrix, Row, Vector, View, corrected, covariance_of, state_of, turn_between,

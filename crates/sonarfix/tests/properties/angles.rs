@@ -3,13 +3,13 @@
 use core::f32::consts::{PI, TAU};
 
 use proptest::prelude::*;
-use sonarfix::ekf::{Ekf, StandardDeviations, StateEstimate};
+use sonarfix::filter::ekf::{Ekf, StandardDeviations, StateEstimate};
+use sonarfix::filter::motion::WheelTravel;
+use sonarfix::geometry::pose::{Heading, Point};
+use sonarfix::geometry::trig::{RANGE, sin_cos};
+use sonarfix::geometry::units::{Metres, Radians, SquareMetres};
 use sonarfix::map::Wall;
-use sonarfix::motion::WheelTravel;
-use sonarfix::pose::{Heading, Point};
-use sonarfix::range::ExpectedRange;
-use sonarfix::trig::{RANGE, sin_cos};
-use sonarfix::units::{Metres, Radians, SquareMetres};
+use sonarfix::sensor::range::ExpectedRange;
 
 use crate::oracle::turn_between;
 use crate::strategies::any_drive;

@@ -1,10 +1,10 @@
 //! The covariance stays positive definite.
 
 use proptest::prelude::*;
-use sonarfix::ekf::{Ekf, StandardDeviations, StateEstimate};
-use sonarfix::motion::Drive;
-use sonarfix::range::ExpectedRange;
-use sonarfix::units::{Metres, Radians, SquareMetres};
+use sonarfix::filter::ekf::{Ekf, StandardDeviations, StateEstimate};
+use sonarfix::filter::motion::Drive;
+use sonarfix::geometry::units::{Metres, Radians, SquareMetres};
+use sonarfix::sensor::range::ExpectedRange;
 
 use crate::oracle::{
     ROUNDING, SCALE_LEFT, SCALE_RIGHT, SHARPEST, corrected, covariance_of, is_positive_definite,
@@ -127,7 +127,7 @@ proptest! {
             by_y: if along_x { 0.0 } else { 1.0 },
             by_heading: 0.0,
             by_range_scale: distance,
-            direction: sonarfix::pose::Heading::default(),
+            direction: sonarfix::geometry::pose::Heading::default(),
         };
         ekf.update(expected.range, &expected, SquareMetres(noise)).unwrap();
         let left = covariance_of(&ekf)[if along_x { (0, 0) } else { (1, 1) }];
@@ -151,7 +151,7 @@ proptest! {
             by_y: direction.sin(),
             by_heading: 0.0,
             by_range_scale: 1.0,
-            direction: sonarfix::pose::Heading::default(),
+            direction: sonarfix::geometry::pose::Heading::default(),
         };
         let mut range = || {
             ekf.update(expected.range, &expected, SquareMetres(1e-8)).unwrap();

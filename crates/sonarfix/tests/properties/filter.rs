@@ -2,10 +2,10 @@
 
 use nalgebra::SVector;
 use proptest::prelude::*;
-use sonarfix::ekf::{Ekf, StandardDeviations, StateEstimate};
-use sonarfix::motion::{Drive, WheelTravel};
-use sonarfix::range::ExpectedRange;
-use sonarfix::units::{Metres, PerRootMetre, Radians, SquareMetres};
+use sonarfix::filter::ekf::{Ekf, StandardDeviations, StateEstimate};
+use sonarfix::filter::motion::{Drive, WheelTravel};
+use sonarfix::geometry::units::{Metres, PerRootMetre, Radians, SquareMetres};
+use sonarfix::sensor::range::ExpectedRange;
 
 use crate::oracle::{
     HEADING, Matrix, ROUNDING, Robot, SCALE_LEFT, SCALE_RIGHT, TRACK_WIDTH, Vector, corrected,

@@ -11,12 +11,16 @@
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
 use sonarfix::config::Config;
-use sonarfix::gyro::{GyroParameters, MeasuredTurn, SampleFault, TurnIntegral, TurnRefusal};
+use sonarfix::filter::motion::WheelTravel;
+use sonarfix::geometry::pose::{Point, Pose};
+use sonarfix::geometry::units::{
+    Duration, Instant, Metres, PerRootSecond, Radians, RadiansPerSecond,
+};
 use sonarfix::localizer::{Localizer, Start, TurnUse};
 use sonarfix::map::{Map, Wall};
-use sonarfix::motion::WheelTravel;
-use sonarfix::pose::{Point, Pose};
-use sonarfix::units::{Duration, Instant, Metres, PerRootSecond, Radians, RadiansPerSecond};
+use sonarfix::sensor::gyro::{
+    GyroParameters, MeasuredTurn, SampleFault, TurnIntegral, TurnRefusal,
+};
 
 type Joint = SMatrix<f64, 10, 10>;
 

@@ -2,15 +2,15 @@
 
 use proptest::prelude::*;
 use sonarfix::config::GatingParameters;
-use sonarfix::echo::EchoParameters;
+use sonarfix::filter::motion::WheelTravel;
+use sonarfix::geometry::pose::{Point, Pose};
+use sonarfix::geometry::units::{Instant, Metres, Radians};
 use sonarfix::health::LOST_AT;
 use sonarfix::health::Verdict::{self, Degraded, Lost, Tracking};
 use sonarfix::localizer::Start;
 use sonarfix::localizer::{Fix, Localizer};
 use sonarfix::map::{Map, Wall};
-use sonarfix::motion::WheelTravel;
-use sonarfix::pose::{Point, Pose};
-use sonarfix::units::{Instant, Metres, Radians};
+use sonarfix::sensor::echo::EchoParameters;
 
 use crate::strategies::{config_for_rooms, start_at};
 

@@ -1,10 +1,10 @@
 //! The analytic derivatives, against central differences of the model in `f64`.
 
 use proptest::prelude::*;
-use sonarfix::ekf::{Ekf, StandardDeviations};
-use sonarfix::motion::{Drive, WheelTravel};
-use sonarfix::range::ExpectedRange;
-use sonarfix::units::{Metres, PerRootMetre};
+use sonarfix::filter::ekf::{Ekf, StandardDeviations};
+use sonarfix::filter::motion::{Drive, WheelTravel};
+use sonarfix::geometry::units::{Metres, PerRootMetre};
+use sonarfix::sensor::range::ExpectedRange;
 
 use crate::oracle::{
     HEADING, Matrix, RANGE_SCALE, ROUNDING, Robot, View, covariance_of, jacobian_of, state_of,

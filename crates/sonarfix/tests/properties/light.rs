@@ -1,21 +1,19 @@
 //! The beam of a time-of-flight ranger: range and derivatives against `f64`, the correction, the choice of the bearing.
 
 use proptest::prelude::*;
-use sonarfix::config::{Config, LightBeam, Ranging, Sonar};
-use sonarfix::ekf::{Ekf, StandardDeviations, StateEstimate};
+use sonarfix::config::{Config, LightBeam, Ranging};
+use sonarfix::filter::ekf::{Ekf, StandardDeviations, StateEstimate};
+use sonarfix::filter::motion::WheelTravel;
+use sonarfix::geometry::pose::{Point, Pose};
+use sonarfix::geometry::units::{Instant, Metres, Radians, SquareMetres};
 use sonarfix::localizer::{Fix, Localizer, Refusal, Start};
 use sonarfix::map::{Map, Wall};
-use sonarfix::motion::WheelTravel;
-use sonarfix::pose::{Point, Pose};
-use sonarfix::range::ExpectedRange;
-use sonarfix::search::{Answer, Search, SearchParameters};
-use sonarfix::units::{Instant, Metres, Radians, SquareMetres};
+use sonarfix::sensor::range::ExpectedRange;
 
 use crate::oracle::{
     HEADING, RANGE_SCALE, ROUNDING, Row, SCALE_LEFT, SCALE_RIGHT, Vector, X, Y, covariance_of,
     is_positive_definite, jacobian_of, state_of,
 };
-use crate::search;
 use crate::strategies::{
     any_ekf, any_mount, any_room, any_sight, any_state, bits, config_for_rooms, start_at,
 };
@@ -304,58 +302,4 @@ fn a_beam_has_limits() {
     let mut config = config_with_light(Point::default());
     config.sonar.cone = Radians(1.4);
     assert_eq!(config.check().unwrap_err().field, "sonar.cone");
-}
-
-/// The range along a beam in a room, `None` beyond the reach.
-fn range_in(walls: &[Wall], sonar: &Sonar, pose: Pose, bearing: Radians) -> Option<Metres> {
-    let state = StateEstimate::at_pose(pose);
-    let exact = state_of(
-        &Ekf::new(Config::for_track_width(Metres(0.2)).drive, state, StandardDeviations::default())
-            .unwrap(),
-    );
-    let crossings = walls
-        .iter()
-        .map(|wall| Beam::new((wall.from(), wall.to()), sonar.mount, bearing.0).crossing(&exact));
-    let met = crossings.filter(|(along, share)| *along > 0.0 && (0.0..=1.0).contains(share));
-    let nearest = met.map(|(along, _)| along).min_by(f64::total_cmp)?;
-    #[expect(clippy::cast_possible_truncation, reason = "a few metres")]
-    let range = Metres(nearest as f32);
-    (range <= sonar.max_range).then_some(range)
-}
-
-/// The search finds the pose of a robot that measures with light: from several starts, with ranges that are rounded to 1 cm.
-#[test]
-fn a_robot_with_light_is_found_once_it_has_driven() {
-    let room = search::Room::irregular();
-    let mut ranger = search::sonar();
-    ranger.ranging = light();
-    ranger.cone = Radians::from_degrees(40.0);
-    for mut pose in [
-        search::start(2.6, 2.0, 90.0),
-        search::start(1.6, 3.0, 180.0),
-        search::start(1.6, 1.0, 0.0),
-        search::start(0.7, 1.6, -85.0),
-        search::start(2.4, 1.4, 60.0),
-    ] {
-        let map = Map::new(&room.walls);
-        let mut search: Search = Search::new(&ranger, map, SearchParameters::default());
-        for _ in 0..160 {
-            let (step, turn) = (0.03, Radians(0.03));
-            let middle = pose.heading.turned(turn * 0.5);
-            let ahead = Pose { heading: middle, ..pose }.to_map(Point::new(step, 0.0));
-            pose = Pose { x: ahead.x, y: ahead.y, heading: pose.heading.turned(turn) };
-            search.odometry(Metres(step), turn).unwrap();
-            let bearing = search.aim();
-            let range = range_in(&room.walls, &ranger, pose, bearing);
-            let rounded = range.map(|range| Metres((range.0 * 100.0).round() / 100.0));
-            search.ping(bearing, rounded).unwrap();
-            search.poll(search::EVALUATIONS);
-        }
-        let Answer::Unique(found) = search.answer() else {
-            panic!("{pose:?}: {:?}", search.answer());
-        };
-        let off = ((found.pose.x - pose.x).0, (found.pose.y - pose.y).0);
-        let turn = found.pose.heading.from(pose.heading).abs();
-        assert!(off.0.hypot(off.1) < 0.05 && turn < Radians(0.03), "{found:?}, but {pose:?}");
-    }
 }

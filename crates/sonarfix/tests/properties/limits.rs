@@ -3,17 +3,17 @@
 use proptest::prelude::*;
 use sonarfix::aim::Aim;
 use sonarfix::config::Config;
-use sonarfix::ekf::{Ekf, EkfError, StandardDeviations, StateEstimate};
-use sonarfix::gyro::GyroParameters;
-use sonarfix::health::Verdict;
-use sonarfix::localizer::{Fix, Localizer, OdometryError, Refusal, Start};
-use sonarfix::map::{Map, Wall, WallId};
-use sonarfix::motion::{Drive, WheelTravel};
-use sonarfix::pose::{Point, Pose};
-use sonarfix::units::{
+use sonarfix::filter::ekf::{Ekf, EkfError, StandardDeviations, StateEstimate};
+use sonarfix::filter::motion::{Drive, WheelTravel};
+use sonarfix::geometry::pose::{Point, Pose};
+use sonarfix::geometry::units::{
     Duration, Instant, Metres, MetresPerSecond, PerRootMetre, PerRootSecond, Radians,
     RadiansPerSecond, SquareMetres,
 };
+use sonarfix::health::Verdict;
+use sonarfix::localizer::{Fix, Localizer, OdometryError, Refusal, Start};
+use sonarfix::map::{Map, Wall, WallId};
+use sonarfix::sensor::gyro::GyroParameters;
 
 use crate::strategies::{any_deviation, any_drive, any_state, bits, config_for_rooms};
 
@@ -174,7 +174,8 @@ fn a_certain_state_accepts_a_range() {
     let certain = StandardDeviations::default();
     let ekf = Ekf::new(drive, StateEstimate::default(), certain).unwrap();
     let wall = wall_ahead();
-    let expected = sonarfix::range::ExpectedRange::new(&wall, Point::default(), &ekf.state());
+    let expected =
+        sonarfix::sensor::range::ExpectedRange::new(&wall, Point::default(), &ekf.state());
     let mut after = ekf;
     after.update(Metres(1.1), &expected, SquareMetres(1e-6)).unwrap();
     assert_eq!(after.state(), ekf.state());
@@ -288,7 +289,7 @@ proptest! {
         for _ in 0..steps {
             ekf.predict(WheelTravel::new(0.04, 0.035)).unwrap();
             let mount = Point::new(0.1, 0.05);
-            let expected = sonarfix::range::ExpectedRange::new(&wall, mount, &ekf.state());
+            let expected = sonarfix::sensor::range::ExpectedRange::new(&wall, mount, &ekf.state());
             ekf.update(expected.range, &expected, SquareMetres(1e-4)).unwrap();
         }
         let before = ekf.covariance();

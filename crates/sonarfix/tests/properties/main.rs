@@ -25,8 +25,6 @@ mod limits;
 #[cfg(test)]
 mod map;
 #[cfg(test)]
-mod navigator;
-#[cfg(test)]
 mod oracle;
 #[cfg(test)]
 mod planning;
@@ -34,8 +32,6 @@ mod planning;
 mod rangers;
 #[cfg(test)]
 mod refusals;
-#[cfg(test)]
-mod search;
 #[cfg(test)]
 mod six_states;
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! Walls: distances, directions, and precision far from the origin.
 
 use proptest::prelude::*;
+use sonarfix::geometry::pose::Point;
 use sonarfix::map::{Wall, WallError};
-use sonarfix::pose::Point;
 
 use crate::oracle::{ROUNDING, View, coordinates};
 use crate::strategies::{Sight, any_sight};

@@ -3,10 +3,10 @@
 //! analytic derivative is written twice.
 
 use nalgebra::{RowSVector, SMatrix, SVector};
-use sonarfix::ekf::Ekf;
-use sonarfix::motion::{Drive, WheelTravel};
-use sonarfix::pose::Point;
-use sonarfix::range::ExpectedRange;
+use sonarfix::filter::ekf::Ekf;
+use sonarfix::filter::motion::{Drive, WheelTravel};
+use sonarfix::geometry::pose::Point;
+use sonarfix::sensor::range::ExpectedRange;
 
 pub type Vector = SVector<f64, 7>;
 pub type Matrix = SMatrix<f64, 7, 7>;

@@ -2,13 +2,13 @@
 
 use proptest::prelude::*;
 use sonarfix::config::{Config, PingSchedule, ServoTiming};
-use sonarfix::ekf::{StandardDeviations, StateEstimate};
+use sonarfix::filter::ekf::{StandardDeviations, StateEstimate};
+use sonarfix::filter::motion::WheelTravel;
+use sonarfix::geometry::pose::Point;
+use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
 use sonarfix::localizer::{Fix, Localizer, Refusal};
 use sonarfix::map::{Map, Wall, WallId};
-use sonarfix::motion::WheelTravel;
-use sonarfix::pose::Point;
-use sonarfix::servo::ServoMotion;
-use sonarfix::units::{Duration, Instant, Metres, Radians};
+use sonarfix::sensor::servo::ServoMotion;
 
 use crate::strategies::{any_deviation, config_for_rooms};
 

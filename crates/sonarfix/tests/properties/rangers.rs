@@ -2,11 +2,11 @@
 
 use proptest::prelude::*;
 use sonarfix::config::{Config, RangerId, Sonar};
+use sonarfix::filter::motion::WheelTravel;
+use sonarfix::geometry::pose::{Point, Pose};
+use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
 use sonarfix::localizer::{Fix, Localizer, Refusal};
 use sonarfix::map::Map;
-use sonarfix::motion::WheelTravel;
-use sonarfix::pose::{Point, Pose};
-use sonarfix::units::{Duration, Instant, Metres, Radians};
 
 use crate::strategies::{Room, any_room, bits, config_for_rooms};
 

@@ -2,15 +2,15 @@
 
 use proptest::prelude::*;
 use sonarfix::aim::Aim;
-use sonarfix::echo::EchoParameters;
-use sonarfix::ekf::{Ekf, EkfError, StandardDeviations, StateEstimate};
+use sonarfix::filter::ekf::{Ekf, EkfError, StandardDeviations, StateEstimate};
+use sonarfix::filter::motion::{Drive, WheelTravel};
+use sonarfix::geometry::pose::{Heading, Point, Pose};
+use sonarfix::geometry::units::{Instant, Metres, PerRootMetre, Radians, SquareMetres};
 use sonarfix::health::Verdict;
 use sonarfix::localizer::{Fix, Localizer, OdometryError, Refusal};
 use sonarfix::map::{Map, Wall, WallId};
-use sonarfix::motion::{Drive, WheelTravel};
-use sonarfix::pose::{Heading, Point, Pose};
-use sonarfix::range::ExpectedRange;
-use sonarfix::units::{Instant, Metres, PerRootMetre, Radians, SquareMetres};
+use sonarfix::sensor::echo::EchoParameters;
+use sonarfix::sensor::range::ExpectedRange;
 
 use crate::strategies::{
     Room, any_ekf, any_mount, any_room, any_sight, bits, config_for_rooms, start_at,

@@ -3,13 +3,13 @@
 
 use nalgebra::SMatrix;
 use proptest::prelude::*;
-use sonarfix::ekf::{Ekf, StandardDeviations, StateEstimate};
+use sonarfix::filter::ekf::{Ekf, StandardDeviations, StateEstimate};
+use sonarfix::filter::motion::{Drive, WheelTravel};
+use sonarfix::geometry::pose::{Heading, Point};
+use sonarfix::geometry::trig::sin_cos;
+use sonarfix::geometry::units::{Metres, Radians, SquareMetres};
 use sonarfix::map::Wall;
-use sonarfix::motion::{Drive, WheelTravel};
-use sonarfix::pose::{Heading, Point};
-use sonarfix::range::ExpectedRange;
-use sonarfix::trig::sin_cos;
-use sonarfix::units::{Metres, Radians, SquareMetres};
+use sonarfix::sensor::range::ExpectedRange;
 
 use crate::strategies::{Event, any_deviation, any_drive, any_event, any_state, bits};
 

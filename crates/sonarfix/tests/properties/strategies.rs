@@ -2,14 +2,14 @@
 
 use proptest::prelude::*;
 use sonarfix::config::Config;
-use sonarfix::echo::EchoParameters;
-use sonarfix::ekf::{Ekf, StandardDeviations, StateEstimate};
+use sonarfix::filter::ekf::{Ekf, StandardDeviations, StateEstimate};
+use sonarfix::filter::motion::{Drive, WheelTravel};
+use sonarfix::geometry::pose::{Point, Pose};
+use sonarfix::geometry::units::{Metres, PerRootMetre, Radians, SquareMetres};
 use sonarfix::localizer::Start;
 use sonarfix::map::Wall;
-use sonarfix::motion::{Drive, WheelTravel};
-use sonarfix::pose::{Point, Pose};
-use sonarfix::range::ExpectedRange;
-use sonarfix::units::{Metres, PerRootMetre, Radians, SquareMetres};
+use sonarfix::sensor::echo::EchoParameters;
+use sonarfix::sensor::range::ExpectedRange;
 
 /// A robot with a track width of 10 cm to 60 cm and low to high wheel noise.
 pub fn any_drive() -> impl Strategy<Value = Drive> {

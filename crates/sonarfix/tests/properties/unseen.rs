@@ -1,13 +1,13 @@
 //! The covariance while the wheels cannot be observed, against eq. (24) of `docs/model.md` in `f64`.
 
 use proptest::prelude::*;
-use sonarfix::ekf::Ekf;
+use sonarfix::filter::ekf::Ekf;
+use sonarfix::filter::motion::WheelTravel;
+use sonarfix::geometry::pose::{Point, Pose};
+use sonarfix::geometry::units::{Instant, Metres, MetresPerSecond, Radians};
 use sonarfix::health::{DEGRADED_WITHOUT_ODOMETRY, Verdict};
 use sonarfix::localizer::{Localizer, Start};
 use sonarfix::map::{Map, Wall};
-use sonarfix::motion::WheelTravel;
-use sonarfix::pose::{Point, Pose};
-use sonarfix::units::{Instant, Metres, MetresPerSecond, Radians};
 
 use crate::strategies::{Room, any_room, bits, config_for_rooms};
 

@@ -2,10 +2,10 @@
 
 use proptest::prelude::*;
 use sonarfix::config::Config;
+use sonarfix::geometry::pose::{Point, Pose};
+use sonarfix::geometry::units::{Instant, Metres, Radians};
 use sonarfix::localizer::{Localizer, Start};
 use sonarfix::map::{Map, Wall};
-use sonarfix::pose::{Point, Pose};
-use sonarfix::units::{Instant, Metres, Radians};
 
 use crate::oracle::{SCALE_LEFT, SCALE_RIGHT, covariance_of, is_positive_definite};
 

@@ -11,8 +11,8 @@ use sonarfix::aim::Aim;
 use sonarfix::config::{Config, Policy};
 use sonarfix::localizer::{Localizer, Start};
 use sonarfix::map::Map;
-use sonarfix::pose::Pose;
-use sonarfix::units::{Instant, Metres, Radians};
+use sonarfix::geometry::pose::Pose;
+use sonarfix::geometry::units::{Instant, Metres, Radians};
 
 /// Tested rooms.
 const ROOMS: u32 = 40;

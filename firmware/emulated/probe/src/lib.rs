@@ -10,9 +10,9 @@ use sonarfix::aim::Aim;
 use sonarfix::config::Config;
 use sonarfix::localizer::{Localizer, Start, StartError};
 use sonarfix::map::{Map, Wall, WallError};
-use sonarfix::motion::WheelTravel;
-use sonarfix::pose::{Point, Pose};
-use sonarfix::units::{Instant, Metres, Radians};
+use sonarfix::filter::motion::WheelTravel;
+use sonarfix::geometry::pose::{Point, Pose};
+use sonarfix::geometry::units::{Instant, Metres, Radians};
 
 /// Walls of the room.
 pub const WALLS: usize = 8;

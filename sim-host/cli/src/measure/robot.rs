@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use indicatif::ProgressBar;
-use sonarfix::units::Radians;
+use sonarfix::geometry::units::Radians;
 use sonarfix_link::{Command, CommandResult, Receiver, Telemetry};
 use sonarfix_monitor::port::Port;
 use sonarfix_monitor::request;

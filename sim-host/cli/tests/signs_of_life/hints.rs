@@ -1,6 +1,6 @@
 //! The hints of each device.
 
-use sonarfix::units::{Instant, Metres, Radians};
+use sonarfix::geometry::units::{Instant, Metres, Radians};
 use sonarfix_hal::ranger::{Echo, NoEcho, Outcome};
 use sonarfix_link::message::{ImageStatus, ResetCause, ServoReading};
 use sonarfix_link::{Hello, ReceiverCounters};

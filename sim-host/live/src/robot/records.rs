@@ -3,12 +3,12 @@
 //! What is not sent is absent: the truth, the covariance of x and y (the ellipse is parallel to the axes), the probability that an
 //! echo was the wall's, and the window of the search.
 
+use sonarfix::geometry::units::Instant;
 use sonarfix::localizer::Fix;
-use sonarfix::navigator::Mode;
-use sonarfix::units::Instant;
 use sonarfix_hal::ranger;
 use sonarfix_link::message::{Odometry, RankedHypothesis, SearchStatus, SkippedPing, Sweep};
 use sonarfix_link::{Estimate, Ping};
+use sonarfix_search::navigator::Mode;
 use sonarfix_sim::trace::{
     self, Calibration, FixRecord, Hypothesis, Outcome, Pose, SearchRecord, Tick,
 };

@@ -7,13 +7,13 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
+use sonarfix::geometry::pose::Point;
 use sonarfix::localizer::Localizer;
-use sonarfix::navigator::Mode;
-use sonarfix::pose::Point;
-use sonarfix::search::Region;
 use sonarfix_hal::config::StartPose;
 use sonarfix_hal::robot::Report;
 use sonarfix_map::{CLASSROOM, Fault, FaultKind, Fidelity, PAPER, Scenario, Wheel};
+use sonarfix_search::navigator::Mode;
+use sonarfix_search::search::Region;
 use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::trace::{FixRecord, Recorder, Tick};
 

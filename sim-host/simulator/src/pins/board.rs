@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use sonarfix::units::Instant;
+use sonarfix::geometry::units::Instant;
 
 /// From the end of the trigger to the rise of the echo line, µs: an HC-SR04 first sends its eight
 /// cycles (timing diagram: `PulseRanger` in `sonarfix-hal`).

@@ -2,7 +2,7 @@
 //! robot's configuration.
 
 use sonarfix::config::{ServoTiming, Sonar};
-use sonarfix::units::Duration;
+use sonarfix::geometry::units::Duration;
 use sonarfix_hal::config::{RangerConfig, RobotConfig};
 use sonarfix_hal::ranger::{PulseTiming, RangerKind};
 use sonarfix_hal::servo::MeasuredPulse;

@@ -1,7 +1,7 @@
 //! The gyro at its bus: the mean rate over each of its periods, held until the next.
 
 use rand_chacha::ChaCha8Rng;
-use sonarfix::gyro::GyroParameters;
+use sonarfix::sensor::gyro::GyroParameters;
 use sonarfix_pil::GyroSignal;
 
 use super::faults::GyroFaults;

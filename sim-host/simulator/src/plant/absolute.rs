@@ -2,9 +2,9 @@
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
-use sonarfix::absolute::{AbsoluteMeasurement, PoseNoise, PositionNoise};
-use sonarfix::pose::{Point, Pose};
-use sonarfix::units::{Instant, Metres, Radians};
+use sonarfix::geometry::pose::{Point, Pose};
+use sonarfix::geometry::units::{Instant, Metres, Radians};
+use sonarfix::sensor::absolute::{AbsoluteMeasurement, PoseNoise, PositionNoise};
 use sonarfix_map::{AbsoluteSensors, HeadingSensor, PositionSensor, Sampling};
 
 use crate::random;

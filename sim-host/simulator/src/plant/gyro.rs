@@ -1,7 +1,7 @@
 //! A gyro: the true turn with scale error, bias and noise.
 
 use rand_chacha::ChaCha8Rng;
-use sonarfix::gyro::GyroParameters;
+use sonarfix::sensor::gyro::GyroParameters;
 use sonarfix_map::GyroTruth;
 
 use crate::random;

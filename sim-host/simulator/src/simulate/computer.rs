@@ -1,18 +1,18 @@
 //! The computer that runs the robot's software: here this process; in `sonarfix-pil-host` an emulated
 //! microcontroller.
 
-use sonarfix::absolute::AbsoluteMeasurement;
 use sonarfix::aim::{Aim, NoAim};
-use sonarfix::gyro::MeasuredTurn;
+use sonarfix::filter::motion::WheelTravel;
+use sonarfix::geometry::pose::Pose;
+use sonarfix::geometry::units::{Instant, Metres, Radians};
 use sonarfix::localizer::{AbsoluteFix, Fix, Localizer, OdometryError, Start};
-use sonarfix::motion::WheelTravel;
-use sonarfix::navigator::{Mode, UNKNOWN_HEADING, UNKNOWN_POSITION};
-use sonarfix::pose::Pose;
-use sonarfix::search::{Search, SearchParameters};
-use sonarfix::units::{Instant, Metres, Radians};
+use sonarfix::sensor::absolute::AbsoluteMeasurement;
+use sonarfix::sensor::gyro::MeasuredTurn;
 use sonarfix_hal::robot::{EVALUATIONS_PER_MILLISECOND, Report, Robot, Settings};
 use sonarfix_pil::board::{self, WiredDevices};
 use sonarfix_pil::{Actuators, Sensors, Wires};
+use sonarfix_search::navigator::{Mode, UNKNOWN_HEADING, UNKNOWN_POSITION};
+use sonarfix_search::search::{Search, SearchParameters};
 
 use super::error::SimulationError;
 use super::simulation::Simulation;

@@ -1,9 +1,9 @@
 //! A run that passes travel and ranges directly and on time to the localizer.
 
 use sonarfix::aim::Aim;
-use sonarfix::gyro::MeasuredTurn;
-use sonarfix::motion::WheelTravel;
-use sonarfix::units::{Duration, Instant, Metres, Radians};
+use sonarfix::filter::motion::WheelTravel;
+use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
+use sonarfix::sensor::gyro::MeasuredTurn;
 
 use super::computer::{Computer, LocalizerInputs};
 use super::error::SimulationError;

@@ -1,13 +1,13 @@
 //! A run through pins, drivers and the shipped loop, as a discrete-event simulation.
 
 use sonarfix::config::{MAX_RANGERS, RangerId};
+use sonarfix::geometry::units::{Instant, Metres, Radians};
 use sonarfix::localizer::{Localizer, Start};
-use sonarfix::navigator::Mode;
-use sonarfix::search::Search;
-use sonarfix::units::{Instant, Metres, Radians};
 use sonarfix_hal::robot::{PingResult, Report};
 use sonarfix_map::Scenario;
 use sonarfix_pil::{Actuators, EchoSignals, GyroSignal, Sensors, Wires};
+use sonarfix_search::navigator::Mode;
+use sonarfix_search::search::Search;
 
 use super::computer::{Computer, Controller};
 use super::error::SimulationError;

@@ -1,10 +1,10 @@
 //! The result of a run in progress: the bound, dead reckoning, counts and errors.
 
-use sonarfix::absolute::AbsoluteMeasurement;
 use sonarfix::aim::Aim;
 use sonarfix::config::RangerId;
+use sonarfix::geometry::units::Instant;
 use sonarfix::localizer::{AbsoluteFix, Fix, Localizer, Start};
-use sonarfix::units::Instant;
+use sonarfix::sensor::absolute::AbsoluteMeasurement;
 use sonarfix_hal::robot::Faults;
 
 use super::computer::no_pose;

@@ -2,10 +2,10 @@
 
 use rand_chacha::ChaCha8Rng;
 use sonarfix::config::{Config, PingSchedule, PingTiming, RangerId, Ranging, Sonar};
+use sonarfix::geometry::pose::Pose;
+use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
 use sonarfix::localizer::{Localizer, Start};
 use sonarfix::map::{Map, Wall};
-use sonarfix::pose::Pose;
-use sonarfix::units::{Duration, Instant, Metres, Radians};
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_hal::robot::Stamp;
 use sonarfix_map::{BakeError, Fidelity, Follow, NamedWall, Scenario, SonarName};

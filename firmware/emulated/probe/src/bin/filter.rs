@@ -6,12 +6,12 @@ use emulated_board::meter::{Cost, Meter};
 use emulated_board::report;
 use emulated_probe::{STEPS, STEPS_A_RANGE, room, travel};
 use sonarfix::config::Config;
-use sonarfix::ekf::{Ekf, EkfError, StandardDeviations, StateEstimate};
+use sonarfix::filter::ekf::{Ekf, EkfError, StandardDeviations, StateEstimate};
 use sonarfix::map::Wall;
-use sonarfix::motion::WheelTravel;
-use sonarfix::pose::{Point, Pose};
-use sonarfix::range::ExpectedRange;
-use sonarfix::units::{Metres, Radians, SquareMetres};
+use sonarfix::filter::motion::WheelTravel;
+use sonarfix::geometry::pose::{Point, Pose};
+use sonarfix::sensor::range::ExpectedRange;
+use sonarfix::geometry::units::{Metres, Radians, SquareMetres};
 
 /// The filter, and whether it has accepted every input.
 struct Filter {

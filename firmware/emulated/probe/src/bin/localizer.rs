@@ -9,8 +9,8 @@ use emulated_board::report;
 use emulated_probe::{Robot, STEPS, STEPS_A_RANGE, end, room, travel};
 use sonarfix::config::Config;
 use sonarfix::localizer::Localizer;
-use sonarfix::motion::WheelTravel;
-use sonarfix::units::{Instant, Metres, Radians};
+use sonarfix::filter::motion::WheelTravel;
+use sonarfix::geometry::units::{Instant, Metres, Radians};
 
 /// Travel of the wheels up to a time.
 struct Roll {

@@ -8,8 +8,8 @@ use emulated_probe::{Robot, STEPS, STEPS_A_RANGE, end, room, travel};
 use sonarfix::aim::Standing;
 use sonarfix::config::{Config, LightBeam, RangerId, Ranging};
 use sonarfix::localizer::Localizer;
-use sonarfix::pose::Point;
-use sonarfix::units::{Duration, Instant, Metres};
+use sonarfix::geometry::pose::Point;
+use sonarfix::geometry::units::{Duration, Instant, Metres};
 
 /// No input: the localizer chooses the aim.
 #[unsafe(no_mangle)]

@@ -10,9 +10,9 @@ use emulated_probe::{STEPS, room, travel};
 use sonarfix::config::Config;
 use sonarfix::localizer::{Localizer, Start};
 use sonarfix::map::Map;
-use sonarfix::pose::Pose;
-use sonarfix::search::{Search, SearchParameters};
-use sonarfix::units::{Instant, Metres, Radians};
+use sonarfix::geometry::pose::Pose;
+use sonarfix_search::search::{Search, SearchParameters};
+use sonarfix::geometry::units::{Instant, Metres, Radians};
 
 /// Evaluations after each ping.
 const EVALUATIONS: u32 = 150;

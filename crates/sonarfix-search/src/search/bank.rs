@@ -1,0 +1,173 @@
+//! The bank: the best placements, one per mode.
+
+use heapless::Vec;
+
+use super::candidates::Placement;
+use super::refine::Spread;
+use super::removal::remove_at;
+use super::window::{Bend, Station};
+use sonarfix::geometry::vector::Vector;
+
+/// Placements within this distance, metres, and this cosine of rotation (25°) are one mode.
+const SAME_PLACE: f32 = 0.3;
+const SAME_ROTATION: f32 = 0.906;
+
+/// A placement with its score.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Entry {
+    pub placement: Placement,
+    /// Sum of the scores of all pings.
+    pub score: f32,
+    /// Pings that were scored, those of them with an echo, and those that a reflector of the map
+    /// explains.
+    pub pings: u16,
+    pub echoes: u16,
+    pub explained: u16,
+    pub spread: Spread,
+    /// Novel pings while it was the only answer.
+    pub streak: u16,
+    pub state: State,
+}
+
+/// Where an entry stands in a cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum State {
+    /// Its score is that of an earlier cycle.
+    Stale,
+    /// It is being refined.
+    InTrial,
+    /// It was scored in this cycle.
+    Fresh,
+}
+
+impl Entry {
+    /// A placement that was not scored yet.
+    pub fn proposed(placement: Placement) -> Self {
+        Self {
+            placement,
+            score: f32::MIN,
+            pings: 0,
+            echoes: 0,
+            explained: 0,
+            spread: Spread::default(),
+            streak: 0,
+            state: State::Stale,
+        }
+    }
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct Bank<const HYPOTHESES: usize> {
+    entries: Vec<Entry, HYPOTHESES>,
+}
+
+impl<const HYPOTHESES: usize> Bank<HYPOTHESES> {
+    pub const fn new() -> Self {
+        Self { entries: Vec::new() }
+    }
+
+    /// These entries, best first, for tests.
+    #[cfg(test)]
+    pub fn of(entries: &[Entry]) -> Self {
+        Self { entries: entries.iter().copied().collect() }
+    }
+
+    pub fn clear(&mut self) {
+        self.entries.clear();
+    }
+
+    pub fn entries(&self) -> &[Entry] {
+        &self.entries
+    }
+
+    pub fn entries_mut(&mut self) -> &mut [Entry] {
+        &mut self.entries
+    }
+
+    /// Begins a refinement of all entries.
+    pub fn begin_refinement(&mut self) {
+        for entry in &mut self.entries {
+            entry.state = State::Stale;
+        }
+    }
+
+    /// An entry that was not refined since; it stays in the bank until its trial ends.
+    pub fn next_stale(&mut self) -> Option<Entry> {
+        let entry = self.entries.iter_mut().find(|entry| entry.state == State::Stale)?;
+        entry.state = State::InTrial;
+        Some(*entry)
+    }
+
+    /// Removes the entry in trial, if there is one.
+    pub fn end_trial(&mut self) {
+        self.remove(|entry| entry.state == State::InTrial);
+    }
+
+    fn remove(&mut self, is_gone: impl Fn(&Entry) -> bool) {
+        while let Some(at) = self.entries.iter().position(&is_gone) {
+            remove_at(&mut self.entries, at);
+        }
+    }
+
+    /// The score that a newcomer has to reach.
+    pub fn least_score(&self) -> Option<f32> {
+        if self.entries.is_full() { self.entries.last().map(|entry| entry.score) } else { None }
+    }
+
+    /// Whether a placement is near one of the bank, so that refining it leads there.
+    pub fn has_near(&self, placement: &Placement, distance: f32) -> bool {
+        self.entries.iter().any(|entry| is_near(&entry.placement, placement, distance))
+    }
+
+    /// Adds an entry, or lets it replace those of its mode if it is better.
+    #[inline(never)]
+    pub fn offer(&mut self, mut entry: Entry) {
+        let placement = entry.placement;
+        let is_same = |other: &Entry| is_near(&other.placement, &placement, SAME_PLACE);
+        for other in self.entries.iter().filter(|other| is_same(other)) {
+            if other.score >= entry.score {
+                return;
+            }
+            entry.streak = if other.streak > entry.streak { other.streak } else { entry.streak };
+        }
+        self.remove(is_same);
+        if self.entries.is_full() {
+            match self.entries.last() {
+                Some(last) if last.score < entry.score => {
+                    self.entries.pop();
+                }
+                _ => return,
+            }
+        }
+        let at = self.entries.iter().position(|other| other.score < entry.score);
+        // There is room: it was made above.
+        let _ = self.entries.insert(at.unwrap_or(self.entries.len()), entry);
+    }
+
+    /// Moves all placements to a new reference of the odometry frame, of which `bend` is taken out.
+    pub fn rebase(&mut self, reference: &Station, bend: Bend) {
+        for entry in &mut self.entries {
+            entry.placement = moved(&entry.placement, reference, bend);
+        }
+    }
+}
+
+/// The placement of the odometry frame, of which `bend` is taken out, with the origin at a station
+/// that is not far: the path to it is rotated by half of the remaining bend.
+pub(super) fn moved(placement: &Placement, station: &Station, bend: Bend) -> Placement {
+    let turn = placement.bend.minus(bend).at(station).0;
+    let middle = placement.rotation.turned(Vector::of_angle(0.5 * turn));
+    Placement {
+        at: placement.at.plus(station.at.turned(middle)),
+        rotation: placement.rotation.turned(Vector::of_angle(turn)),
+        bend: placement.bend,
+    }
+}
+
+fn is_near(one: &Placement, other: &Placement, distance: f32) -> bool {
+    one.rotation.dot(other.rotation) > SAME_ROTATION
+        && one.at.minus(other.at).length_squared() < distance * distance
+}
+
+#[cfg(test)]
+mod tests;

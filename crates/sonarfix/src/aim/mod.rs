@@ -1,0 +1,442 @@
+//! The planner: the ranger and the wall to measure next, and the bearing of the servo that is square to it
+//! (`docs/model.md`, eqs. 21 and 22).
+//!
+//! Candidates are the walls that can be measured (module `visibility`) and that the servo
+//! reaches. Among them the policy chooses: [`Policy::Nearest`] the nearest, and
+//! [`Policy::Informative`] the one with the largest expected gain per time,
+//!
+//! ```text
+//! score = decrease of the variance · probability of success / seconds of the ping
+//! ```
+//!
+//! | module | contents |
+//! |---|---|
+//! | `gain` | expected decrease of the variance |
+//! | `light` | beams of a time-of-flight ranger |
+//! | `ranking` | order of the candidates |
+//! | this one | candidates, scores and the choice |
+//!
+//! # Non-finite policy
+//! The state of the filter is finite. Comparisons are written so that a candidate whose numbers are
+//! NaN is not chosen.
+
+mod gain;
+mod light;
+mod ranking;
+
+use crate::association::visibility::{Beam, Sight, Viewpoint};
+use crate::config::{Config, RangerId, Ranging, Sonar};
+use crate::filter::ekf::Ekf;
+use crate::geometry::pose::Heading;
+use crate::geometry::units::{Duration, Instant, Metres, Radians, SquareMetres, seconds};
+use crate::map::{Map, Wall, WallId};
+use crate::sensor::range::ExpectedRange;
+
+use crate::association::history::{History, Slot};
+use crate::sensor::timing::PingDuration;
+use gain::expected_gain;
+use ranking::Ranked;
+
+pub use crate::config::Policy;
+
+/// One ping of one ranger at one wall.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Aim {
+    /// The wall.
+    pub wall: WallId,
+    /// Bearing of the servo, relative to the robot's heading.
+    pub bearing: Radians,
+    /// The range expected now. A fix computes its own at the pose of the echo.
+    pub range: Metres,
+    /// The numbers behind the choice.
+    pub why: Reason,
+    /// The ranger that pings.
+    pub ranger: RangerId,
+}
+
+impl Aim {
+    /// What the policy maximizes over all rangers: the expected decrease of the variance per time, or the nearness.
+    #[must_use]
+    pub fn score(&self, policy: Policy) -> f32 {
+        match policy {
+            Policy::Nearest => self.why.success / self.range.0,
+            Policy::Informative => self.why.gain.0 * self.why.success / seconds(self.why.time),
+        }
+    }
+}
+
+/// The numbers behind the choice of a wall.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Reason {
+    /// Expected decrease of the variance of the position, and of the other weighted states
+    /// ([`Weights`](crate::config::Weights)).
+    pub gain: SquareMetres,
+    /// Probability of success: the foot lies on the wall, its range is within the limits of the sonar and
+    /// the beam is square, given the uncertainty of the estimate, and no unmapped object occludes the
+    /// wall, given earlier pings.
+    pub success: f32,
+    /// Duration of the ping: servo, ranger and flight of sound, or the period of the schedule.
+    pub time: Duration,
+    /// Number of walls that can be measured, before the test for occlusion.
+    pub candidates: u16,
+}
+
+/// Reason for which there is no wall to measure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum NoAim {
+    /// No wall can be measured.
+    NoWall,
+}
+
+impl core::fmt::Display for NoAim {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::NoWall => "no wall can be measured from here",
+        })
+    }
+}
+
+impl core::error::Error for NoAim {}
+
+/// Factor by which the score of another wall must exceed that of the last one: about what the error of
+/// the estimate may add to a score. The servo then does not alternate between equal walls, and the
+/// choice between them does not depend on the error of the estimate, which would bias it
+/// (`docs/schedule.md`).
+const HYSTERESIS: f32 = 1.02;
+
+/// Share of the cone within which the servo stays where it is if that saves time.
+const DEAD_BAND: f32 = 0.125;
+
+/// Number of candidates that are kept at a time, best first. They are tested for occlusion in that
+/// order; if all are occluded, the next ones are searched.
+const SHORTLIST: usize = 8;
+
+/// The robot in its map, for the choice of a ping.
+#[derive(Clone, Copy)]
+pub(crate) struct Situation<'a> {
+    pub config: &'a Config,
+    pub map: &'a Map<'a>,
+    pub ekf: &'a Ekf,
+    pub history: &'a History,
+    pub now: Instant,
+    pub policy: Policy,
+}
+
+impl<'a> Situation<'a> {
+    /// Chooses ranger and wall.
+    ///
+    /// # Errors
+    /// [`NoAim`] if no ranger has a wall to measure.
+    pub fn choose(&self) -> Result<Aim, NoAim> {
+        let mut best = Planner::new(self, RangerId::FIRST, &self.config.sonar).choose();
+        if self.config.has_several_sonars() {
+            for (ranger, sonar) in self.config.sonars().skip(1) {
+                let other = Planner::new(self, ranger, sonar).choose();
+                best = better(self.policy, best, other);
+            }
+        }
+        best
+    }
+
+    /// Chooses the wall of one ranger whose servo and schedule slot are known.
+    ///
+    /// # Errors
+    /// [`NoAim`] if no wall can be measured, or the robot has no such ranger.
+    pub fn choose_of(&self, ranger: RangerId, standing: &Standing) -> Result<Aim, NoAim> {
+        let mut planner = self.planner(ranger)?;
+        let Standing { bearing, ready_in } = *standing;
+        planner.slot = Slot { bearing, ready_in: seconds(ready_in), ..planner.slot };
+        planner.choose()
+    }
+
+    /// Finds the nearest wall to which a beam of a ranger at `bearing` is square.
+    ///
+    /// # Errors
+    /// [`NoAim`] if no wall can be measured, or the robot has no such ranger.
+    pub fn at(&self, ranger: RangerId, bearing: Radians) -> Result<Aim, NoAim> {
+        let planner = self.planner(ranger)?;
+        planner.nearest_at(bearing).or_else(|_| planner.without_margins().nearest_at(bearing))
+    }
+
+    fn planner(&self, ranger: RangerId) -> Result<Planner<'a>, NoAim> {
+        let sonar = self.config.sonar_of(ranger).ok_or(NoAim::NoWall)?;
+        Ok(Planner::new(self, ranger, sonar))
+    }
+}
+
+/// Where the servo of a ranger stands, and when it can ping.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Standing {
+    /// The bearing to which its servo is commanded; `None` before the first command.
+    pub bearing: Option<Radians>,
+    /// Time until it can ping there: its servo has settled, and the echoes of earlier pings that it
+    /// [hears](Sonar::hears) have decayed.
+    pub ready_in: Duration,
+}
+
+/// The better one of two pings; the first of two equal ones.
+fn better(
+    policy: Policy,
+    one: Result<Aim, NoAim>,
+    other: Result<Aim, NoAim>,
+) -> Result<Aim, NoAim> {
+    let (Ok(first), Ok(second)) = (&one, &other) else {
+        return one.or(other);
+    };
+    if second.score(policy) > first.score(policy) { other } else { one }
+}
+
+/// Everything that the scores of the candidates depend on.
+struct Planner<'a> {
+    config: &'a Config,
+    map: &'a Map<'a>,
+    ekf: &'a Ekf,
+    history: &'a History,
+    now: Instant,
+    policy: Policy,
+    ranger: RangerId,
+    sonar: &'a Sonar,
+    slot: Slot,
+    view: Viewpoint<'a>,
+    duration: PingDuration,
+}
+
+/// A wall that can be measured unless it is occluded.
+struct Candidate {
+    expected: ExpectedRange,
+    bearing: Radians,
+    gain: SquareMetres,
+    success: f32,
+    seconds: f32,
+    score: f32,
+}
+
+/// Bearing of the servo for a wall.
+struct Pointing {
+    bearing: Radians,
+    /// Angle between beam and perpendicular at the ping.
+    off: Radians,
+    /// Seconds until the ping.
+    until_ping: f32,
+}
+
+impl<'a> Planner<'a> {
+    fn new(situation: &Situation<'a>, ranger: RangerId, sonar: &'a Sonar) -> Self {
+        let Situation { config, map, ekf, history, now, policy } = *situation;
+        let view = Viewpoint::new(config, sonar, ekf);
+        let duration = PingDuration::new(sonar);
+        let slot = history.slot(ranger, config, &duration);
+        Self { config, map, ekf, history, now, policy, ranger, sonar, slot, view, duration }
+    }
+
+    /// The best ping of this ranger.
+    fn choose(self) -> Result<Aim, NoAim> {
+        self.choice().or_else(|_| self.without_margins().choice())
+    }
+
+    /// The same planner without the margins for the uncertainty of the estimate.
+    fn without_margins(self) -> Self {
+        Self { view: self.view.without_margins(), ..self }
+    }
+
+    /// The best ping.
+    fn choice(&self) -> Result<Aim, NoAim> {
+        match self.sonar.ranging {
+            Ranging::Sound => self.best(|id, wall| self.by_policy(id, wall)),
+            Ranging::Light(beam) => self.best_beam(beam),
+        }
+    }
+
+    /// The ping at the nearest wall along a bearing that the planner does not choose.
+    fn nearest_at(&self, bearing: Radians) -> Result<Aim, NoAim> {
+        match self.sonar.ranging {
+            Ranging::Sound => self.best(|id, wall| self.at_bearing(id, wall, bearing)),
+            Ranging::Light(beam) => self.beam_at(beam, bearing),
+        }
+    }
+
+    /// The best candidate that is not occluded. `candidate` scores a wall, if it can be measured.
+    fn best(&self, candidate: impl Fn(WallId, &Wall) -> Option<Candidate>) -> Result<Aim, NoAim> {
+        let mut after = None;
+        loop {
+            let (shortlist, count) = self.shortlist(&candidate, after);
+            for ranked in shortlist.iter().flatten() {
+                let best =
+                    self.map.wall(ranked.wall).and_then(|wall| candidate(ranked.wall, &wall));
+                if let Some(best) = best.filter(|best| !self.is_occluded(ranked.wall, best)) {
+                    return Ok(best.aim(self.ranger, ranked.wall, count));
+                }
+            }
+            // The list is not full: there are no more candidates.
+            after = *shortlist.last().ok_or(NoAim::NoWall)?;
+            if after.is_none() {
+                return Err(NoAim::NoWall);
+            }
+        }
+    }
+
+    /// The best candidates that rank after `after`, and the number of all candidates.
+    fn shortlist(
+        &self,
+        candidate: impl Fn(WallId, &Wall) -> Option<Candidate>,
+        after: Option<Ranked>,
+    ) -> ([Option<Ranked>; SHORTLIST], u16) {
+        let mut shortlist = [None; SHORTLIST];
+        let mut count = 0_u16;
+        for (wall, segment) in self.map.near(self.view.position(), self.sonar.max_range) {
+            let Some(candidate) = candidate(wall, &segment) else {
+                continue;
+            };
+            count = count.saturating_add(1);
+            let ranked = Ranked { wall, score: candidate.score };
+            if after.is_none_or(|after| after.is_before(ranked)) {
+                ranked.insert(&mut shortlist);
+            }
+        }
+        (shortlist, count)
+    }
+
+    // ===== Eq. (22): score =====
+    /// A wall with the servo turned to it.
+    fn by_policy(&self, id: WallId, wall: &Wall) -> Option<Candidate> {
+        let (expected, on_wall) = self.view.expected_range(wall).ok()?;
+        let pointing = self.point(&expected);
+        if !self.view.is_square(pointing.off) {
+            return None;
+        }
+        let sight = self.heard(wall, (expected, on_wall), pointing.off);
+        let mut candidate = self.candidate(id, &sight, &pointing);
+        candidate.score = match self.policy {
+            Policy::Nearest => candidate.success / candidate.expected.range.0,
+            Policy::Informative => candidate.gain.0 * candidate.success / candidate.seconds,
+        };
+        if self.slot.wall == Some(id) {
+            candidate.score *= HYSTERESIS;
+        }
+        Some(candidate)
+    }
+
+    /// A wall along a bearing that the planner does not choose: the nearest is the best.
+    fn at_bearing(&self, id: WallId, wall: &Wall, bearing: Radians) -> Option<Candidate> {
+        let (expected, on_wall) = self.view.expected_range(wall).ok()?;
+        let off = self.view.off_square(&expected, bearing);
+        if !self.view.is_square(off) {
+            return None;
+        }
+        let score = 1.0 / expected.range.0;
+        let pointing = Pointing { bearing, off, until_ping: 0.0 };
+        let sight = self.heard(wall, (expected, on_wall), off);
+        Some(Candidate { score, ..self.candidate(id, &sight, &pointing) })
+    }
+
+    /// A wall that a sonar measures along a bearing.
+    #[inline]
+    fn heard(&self, wall: &Wall, (expected, on_wall): (ExpectedRange, f32), off: Radians) -> Sight {
+        Sight {
+            on_wall,
+            square: self.view.probability_of_square(off),
+            noise: self.sonar.noise.variance(expected.range).0,
+            accuracy: wall.accuracy(),
+            of_map: 1.0,
+            place: wall.along(self.view.position()),
+            off,
+            expected,
+        }
+    }
+
+    /// Everything but the score.
+    #[expect(
+        clippy::inline_always,
+        reason = "200 instructions of an aim: it is called for each wall"
+    )]
+    #[inline(always)]
+    fn candidate(&self, id: WallId, sight: &Sight, pointing: &Pointing) -> Candidate {
+        let Sight { expected, on_wall, square, place, .. } = *sight;
+        let range = expected.range;
+        let echo = &self.config.echo;
+        let entry = self.history.entry(echo, self.ranger, id, place, range, self.now);
+        let map_variance = echo.map_variance(sight.accuracy, entry.travelled);
+        let noise = SquareMetres(sight.noise + map_variance * sight.of_map);
+        let prediction = self.ekf.predict_measurement(&expected);
+        let wheels = self.ekf.cross_covariance_of_wheels(&expected);
+        Candidate {
+            bearing: pointing.bearing,
+            gain: expected_gain(&prediction, wheels, noise, self.config.weights),
+            success: (1.0 - entry.occlusion) * on_wall * square,
+            seconds: self.duration.ping(pointing.until_ping, range),
+            score: 0.0,
+            expected,
+        }
+    }
+
+    /// The bearing of the servo for a wall: where the servo stands, if the beam is then nearly square
+    /// and the ping earlier; otherwise square to the wall at the time of the ping, when the robot has
+    /// turned further; if that is beyond the travel of the servo, its limit.
+    fn point(&self, expected: &ExpectedRange) -> Pointing {
+        let (current, rest) = self.standing();
+        let bearing_after = |time: f32| expected.direction.from(self.heading_after(time));
+        let target = self.reachable(bearing_after(0.0));
+        let turn = self.duration.turn(target - current);
+        let until_ping = if turn > rest { turn } else { rest };
+        let off_without_turn = bearing_after(rest) - current;
+        let range = expected.range;
+        let is_faster = self.duration.ping(rest, range) < self.duration.ping(until_ping, range);
+        if is_faster && off_without_turn.abs() <= self.sonar.cone * DEAD_BAND {
+            return Pointing { bearing: current, off: off_without_turn, until_ping: rest };
+        }
+        let square = bearing_after(until_ping);
+        let bearing = self.reachable(square);
+        let off = Heading::new(square).from(Heading::new(bearing));
+        Pointing { bearing, off, until_ping }
+    }
+
+    /// Where the servo stands, and the seconds until the ranger can ping there.
+    fn standing(&self) -> (Radians, f32) {
+        // The last bearing may be outside the travel of the servo if it was not planned.
+        let current = self.slot.bearing.map_or(Radians(0.0), |bearing| self.reachable(bearing));
+        (current, self.slot.ready_in)
+    }
+
+    /// The heading after a time in seconds at the present turn rate.
+    fn heading_after(&self, seconds: f32) -> Heading {
+        self.view.heading.turned(Radians(self.history.turn_rate * seconds))
+    }
+
+    /// The nearest bearing within the travel of the servo.
+    fn reachable(&self, bearing: Radians) -> Radians {
+        let (right, left) = self.sonar.servo;
+        if bearing >= right && bearing <= left {
+            return bearing;
+        }
+        let beyond = |limit: Radians| Heading::new(bearing).from(Heading::new(limit)).abs();
+        if beyond(right) < beyond(left) { right } else { left }
+    }
+
+    /// Whether another wall of the map returns an earlier echo.
+    fn is_occluded(&self, target: WallId, candidate: &Candidate) -> bool {
+        let beam = Beam::new(&self.view, &candidate.expected);
+        self.map
+            .near(self.view.position(), beam.reach())
+            .any(|(id, wall)| id != target && beam.is_occluded_by(&wall))
+    }
+}
+
+impl Candidate {
+    fn aim(&self, ranger: RangerId, wall: WallId, candidates: u16) -> Aim {
+        let why = Reason {
+            gain: self.gain,
+            success: self.success,
+            time: crate::sensor::timing::duration(self.seconds),
+            candidates,
+        };
+        Aim { wall, bearing: self.bearing, range: self.expected.range, why, ranger }
+    }
+}

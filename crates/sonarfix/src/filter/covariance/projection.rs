@@ -1,0 +1,71 @@
+//! Projection of P onto a measurement: P Hᵀ and H P Hᵀ (`docs/model.md`, eq. 14).
+
+use super::blocks::Covariance;
+use crate::geometry::units::{Metres, SquareMetres};
+use crate::sensor::range::{ExpectedRange, Innovation};
+
+/// P Hᵀ: covariance of the expected range with the states that it depends on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CrossCovariance {
+    /// With x, m².
+    pub x: f32,
+    /// With y, m².
+    pub y: f32,
+    /// With the heading, m rad.
+    pub h: f32,
+    /// With the range scale error, m.
+    pub k: f32,
+}
+
+/// An expected range seen from the filter: computed once, used by innovation, gate and correction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PredictedMeasurement<'e> {
+    /// h(X̂) and H.
+    pub expected: &'e ExpectedRange,
+    /// P Hᵀ.
+    pub cross_covariance: CrossCovariance,
+    /// H P Hᵀ, m²: variance of the expected range.
+    pub variance: f32,
+}
+
+impl PredictedMeasurement<'_> {
+    // ===== Eq. (14): ν and S =====
+    /// The innovation of a measured `range` with noise variance `noise`.
+    #[inline]
+    #[must_use]
+    pub fn innovation(&self, range: Metres, noise: SquareMetres) -> Innovation {
+        let value = range - self.expected.range;
+        Innovation { value, variance: SquareMetres(noise.0 + self.variance) }
+    }
+}
+
+impl Covariance {
+    // ===== Eq. (14): P Hᵀ and H P Hᵀ =====
+    /// Projects P onto a measurement.
+    #[inline]
+    #[must_use]
+    pub fn project<'e>(&self, expected: &'e ExpectedRange) -> PredictedMeasurement<'e> {
+        let h = expected.jacobian();
+        let (p, k) = (&self.pose, &self.range_scale);
+        let cross_covariance = CrossCovariance {
+            x: p.xx * h.x + p.xy * h.y + p.xh * h.h + k.xk * h.k,
+            y: p.xy * h.x + p.yy * h.y + p.yh * h.h + k.yk * h.k,
+            h: p.xh * h.x + p.yh * h.y + p.hh * h.h + k.hk * h.k,
+            k: k.xk * h.x + k.yk * h.y + k.hk * h.h + k.kk * h.k,
+        };
+        let m = &cross_covariance;
+        let variance = h.x * m.x + h.y * m.y + h.h * m.h + h.k * m.k;
+        PredictedMeasurement { expected, cross_covariance, variance }
+    }
+
+    /// P Hᵀ for the mean and the difference of the scale errors.
+    #[must_use]
+    pub fn cross_covariance_of_wheels(&self, expected: &ExpectedRange) -> (f32, f32) {
+        let h = expected.jacobian();
+        let (p, k) = (&self.pose, &self.range_scale);
+        (
+            p.xc * h.x + p.yc * h.y + p.hc * h.h + k.ck * h.k,
+            p.xd * h.x + p.yd * h.y + p.hd * h.h + k.dk * h.k,
+        )
+    }
+}

@@ -1,0 +1,169 @@
+//! The parameters of the echo model: what a ping returns besides the range of its wall (`docs/model.md`, "Echo model").
+//! The model itself is [`association::echo`](crate::association::echo).
+//!
+//! # Non-finite policy
+//! The parameters are checked by [`Config::check`](crate::config::Config::check).
+
+use crate::geometry::elementary::{ln, sqrt};
+use crate::geometry::numeric::at_least;
+use crate::geometry::units::Metres;
+
+/// Parameters of clutter: of the sensor, of the unmapped objects around it, and of the map.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct EchoParameters {
+    /// Probability that a wall within range, square to the beam, returns no echo.
+    pub missed: f32,
+    /// Probability of a spurious range that is shorter than the wall's.
+    pub short: f32,
+    /// Probability of a spurious range that is longer: a reflection by two walls, or cross-talk.
+    pub long: f32,
+    /// Range at which every second beam meets an object that is not in the map. Zero: there are no
+    /// such objects.
+    pub free_path: Metres,
+    /// Standard deviation of the place of a wall in the map, of walls without an
+    /// [accuracy](crate::map::Wall::accuracy) of their own. It is common to all ranges to one wall from
+    /// one place, so that repeated pings do not average it away.
+    pub map_accuracy: Metres,
+}
+
+impl EchoParameters {
+    /// No clutter and an exact map: every echo is the wall's.
+    pub const NONE: Self = Self {
+        missed: 0.0,
+        short: 0.0,
+        long: 0.0,
+        free_path: Metres(0.0),
+        map_accuracy: Metres(0.0),
+    };
+
+    /// An HC-SR04 in a furnished room: assumed, no recordings.
+    pub const HC_SR04: Self = Self {
+        missed: 0.03,
+        short: 0.02,
+        long: 0.02,
+        free_path: Metres(10.0),
+        map_accuracy: Metres(0.0),
+    };
+
+    /// LEGO NXT: shares of its recorded sweeps within 20° of the normal (`docs/sonar-model.md`),
+    /// averaged over the ranges.
+    pub const NXT: Self = Self { missed: 0.08, short: 0.04, long: 0.03, ..Self::HC_SR04 };
+
+    /// Devantech SRF08: assumed like the HC-SR04.
+    pub const SRF08: Self = Self::HC_SR04;
+
+    /// `MaxBotix` LV-MaxSonar-EZ: assumed like the HC-SR04.
+    pub const LV_MAXSONAR: Self = Self::HC_SR04;
+
+    /// Polaroid 6500: assumed like the HC-SR04, with fewer misses.
+    pub const POLAROID_6500: Self = Self { missed: 0.02, ..Self::HC_SR04 };
+
+    /// VL53L1X in a furnished room, whose walls are plaster, wood and some glass: assumed, no recordings. A narrow beam
+    /// meets fewer objects than a cone.
+    pub const VL53L1X: Self = Self {
+        missed: 0.04,
+        short: 0.01,
+        long: 0.01,
+        free_path: Metres(15.0),
+        map_accuracy: Metres(0.0),
+    };
+
+    /// VL53L0X: assumed like the VL53L1X.
+    pub const VL53L0X: Self = Self::VL53L1X;
+
+    /// Probability that a wall within range, square to the beam and not occluded, returns its range.
+    #[must_use]
+    #[inline]
+    pub fn heard(&self) -> f32 {
+        1.0 - self.missed - self.short - self.long
+    }
+
+    /// Prior probability that an unmapped object stands before a wall at this range.
+    #[must_use]
+    #[inline]
+    pub fn prior_occlusion(&self, range: Metres) -> f32 {
+        if self.free_path > Metres(0.0) { range.0 / (range.0 + self.free_path.0) } else { 0.0 }
+    }
+
+    /// Variance of the map error in a range to a wall with this accuracy of its own, if the last range to
+    /// the same wall was used `travelled` metres ago; `None` if there was none.
+    ///
+    /// The error is a first-order Gauss–Markov process of the distance. A sequence of n ranges with
+    /// correlation ρ = exp(−s/L) holds as much information as n independent ones whose variance is
+    /// larger by (1 + ρ)/(1 − ρ) = coth(s/2L); √(1 + (2L/s)²) is within 10 % of it.
+    #[must_use]
+    #[inline]
+    pub fn map_variance(&self, accuracy: Option<Metres>, travelled: Option<Metres>) -> f32 {
+        let accuracy = accuracy.unwrap_or(self.map_accuracy).0;
+        let variance = accuracy * accuracy;
+        let Some(travelled) = travelled else {
+            return variance;
+        };
+        let least = 2.0 * MAP_CORRELATION.0 / MAX_REPETITION;
+        let distance = if travelled.0 > least { travelled.0 } else { least };
+        let ratio = 2.0 * MAP_CORRELATION.0 / distance;
+        variance * sqrt(1.0 + ratio * ratio)
+    }
+}
+
+/// Logarithms of probabilities and of densities over that of an echo anywhere, for a score of many
+/// pings. Those that depend on the range hold at half of the longest one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LogShares {
+    /// A reflector answers.
+    pub answers: f32,
+    /// It does not answer.
+    pub misses: f32,
+    /// Clutter before a reflector.
+    pub before: f32,
+    /// Clutter behind it.
+    pub behind: f32,
+    /// No echo where a reflector answers.
+    pub silence: f32,
+}
+
+impl EchoParameters {
+    /// The shares of one reflector; `anywhere` is the density of an echo anywhere, per metre.
+    #[must_use]
+    pub fn log_shares(&self, longest: Metres, anywhere: f32) -> LogShares {
+        let range = 0.5 * longest.0;
+        let occluded = self.prior_occlusion(Metres(range));
+        let per_metre = 1.0 / (range * anywhere);
+        let before = self.short + occluded * (1.0 - NO_ECHO_OCCLUDED - BEYOND_OCCLUDED);
+        let behind = self.long + occluded * BEYOND_OCCLUDED;
+        let silence = self.missed + occluded * NO_ECHO_OCCLUDED;
+        let log = |share: f32| ln(at_least(share, LEAST_SHARE));
+        LogShares {
+            answers: log(1.0 - self.missed - self.short - self.long),
+            misses: log(self.missed + self.short + self.long),
+            before: log(before * per_metre),
+            behind: log(behind * per_metre),
+            silence: log(silence / NO_ECHO_WRONG_POSE),
+        }
+    }
+}
+
+/// Least share of which a logarithm is taken: one ping does not decide.
+const LEAST_SHARE: f32 = 0.01;
+
+impl Default for EchoParameters {
+    fn default() -> Self {
+        Self::HC_SR04
+    }
+}
+
+/// Distance over which the error of a wall in the map is correlated. A wall fitted to a SLAM map
+/// deviates from a straight line over the width of doors and pillars.
+const MAP_CORRELATION: Metres = Metres(1.0);
+/// Limit of the factor on the variance of the map error.
+const MAX_REPETITION: f32 = 50.0;
+
+/// Share of pings without an echo if an unmapped object occludes the wall: it may absorb or deflect.
+pub(crate) const NO_ECHO_OCCLUDED: f32 = 0.2;
+/// Share of echoes from beyond the wall if it is occluded: reflections by other walls.
+pub(crate) const BEYOND_OCCLUDED: f32 = 0.065;
+/// Share of pings without an echo at a wrong pose.
+pub(crate) const NO_ECHO_WRONG_POSE: f32 = 0.3;
