@@ -375,6 +375,9 @@ impl<'m, F: NorFlash> App<'m, F> {
     ///
     /// Polls at other times do nothing, so that the results do not depend on them.
     pub fn next_poll(&self, hardware: &mut impl Hardware) -> Instant {
+        if self.wire.is_unread() {
+            return self.time;
+        }
         let next = match &self.mode {
             Mode::Waiting(_) => self.expected,
             Mode::Running(running) => running.robot.next_poll(hardware),

@@ -21,6 +21,10 @@ const LOOP: Duration = Duration::from_ticks(1_000_000);
 /// both. An executor that polls less often finds every poll busy, and sends at once.
 const POSTPONED: Duration = Duration::from_ticks(20_000);
 
+/// The most bytes that a poll reads, so that its duration is bounded on a line that never falls silent. Between two polls,
+/// which are at most an encoder period apart, a link at 115,200 baud receives more; the next poll then follows at once.
+const BYTES_PER_POLL: usize = 64;
+
 /// The bytes of the link, without waiting.
 pub trait Link {
     /// The next received byte, if any.
@@ -43,6 +47,8 @@ pub(super) struct Wire {
     /// The next deadlines; immediately after the start.
     hello_at: Option<Instant>,
     loop_at: Option<Instant>,
+    /// Whether the latest poll ended at its limit of bytes, so that more may wait.
+    is_unread: bool,
     /// The frame that is sent: here, so that no frame must be cleared first.
     frame: [u8; TELEMETRY_FRAME_MAX],
 }
@@ -55,22 +61,33 @@ impl Default for Wire {
             sender: Sender::default(),
             hello_at: None,
             loop_at: None,
+            is_unread: false,
             frame: [0; TELEMETRY_FRAME_MAX],
         }
     }
 }
 
 impl Wire {
-    /// Reads the received bytes up to the next command.
+    /// Reads the received bytes up to the next command, at most [`BYTES_PER_POLL`].
     #[inline(never)]
     pub fn next(&mut self, link: &mut impl Link) -> Option<Frame<SessionCommand>> {
-        while let Some(byte) = link.receive() {
+        self.is_unread = true;
+        for _ in 0..BYTES_PER_POLL {
+            let Some(byte) = link.receive() else {
+                self.is_unread = false;
+                return None;
+            };
             let frame = self.receiver.push(byte);
             if frame.is_some() {
                 return frame;
             }
         }
         None
+    }
+
+    /// Whether received bytes may wait for the next poll.
+    pub fn is_unread(&self) -> bool {
+        self.is_unread
     }
 
     /// Sends a message. Not inlined, because of the stack of the serializer.
