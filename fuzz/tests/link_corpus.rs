@@ -14,7 +14,7 @@ use sonarfix_hal::config::RobotConfig;
 use sonarfix_hal::ranger::NoEcho;
 use sonarfix_hal::robot::Faults;
 use sonarfix_link::counters::ReceiverCounters;
-use sonarfix_link::message::{LoopStatus, Message, Ping};
+use sonarfix_link::message::{FlashStatus, LoopStatus, Message, Ping};
 use sonarfix_link::{Command, SessionCommand, Telemetry, reporter};
 
 fn folder() -> PathBuf {
@@ -51,6 +51,7 @@ fn inputs() -> [(&'static str, Vec<u8>); 5] {
         faults: Faults::default(),
         worst_poll: Duration::from_ticks(1_500),
         commands: ReceiverCounters::default(),
+        flash: FlashStatus::default(),
     };
     let telemetry = |message: Telemetry| input(&bytes(&message));
     let command = |command| input(&bytes(&SessionCommand { session: 5, command }));

@@ -14,6 +14,7 @@
 //! This file composes; `command` executes commands; `wire` reads the link and schedules telemetry. The deadline check
 //! is [`Polled::is_on_time`].
 
+mod clock;
 mod command;
 mod wire;
 
@@ -35,9 +36,10 @@ use sonarfix_search::search::Search;
 use crate::boots;
 use crate::check::Check;
 use crate::flash_contents::{self, FlashContents};
-use crate::store::{Resumed, SavePolicy, Saved, Store, StoreError, WriteLimit};
+use crate::store::{Resumed, SavePolicy, Saved, Store, StoreError};
 use crate::time::{NEVER, after, since};
 
+use clock::{Clock, Reading};
 pub use wire::Link;
 use wire::Wire;
 
@@ -97,7 +99,6 @@ pub struct App<'m, F: NorFlash> {
     store: Store<F>,
     /// The record in the store, if it has been read or written.
     stored: Option<Saved>,
-    writes: WriteLimit,
     /// When the app began.
     started: Instant,
     /// Whether the record in the store is not the newest state.
@@ -116,6 +117,7 @@ pub struct App<'m, F: NorFlash> {
     /// Faults before the present run of the loop.
     faults: Faults,
     worst_poll: Duration,
+    clock: Clock,
     time: Instant,
     /// Why the board cannot be the robot that the configuration in use describes.
     unsupported: Option<Unsupported>,
@@ -203,6 +205,12 @@ impl<'m> Running<'m> {
         report.tick.is_some() && is_tracking && self.save_policy.is_due(now, localizer)
     }
 
+    /// Continues at `now` after the clock was set back.
+    fn set_clock(&mut self, now: Instant) {
+        self.robot.set_clock(now);
+        self.save_policy.set_clock(now);
+    }
+
     /// The state after it has stopped.
     fn known(&self) -> Resumed {
         let is_searching = self.robot.mode() == navigator::Mode::Searching;
@@ -221,7 +229,8 @@ impl<'m> Running<'m> {
 impl<'m, F: NorFlash> App<'m, F> {
     /// A waiting application at the time `now`, with the contents of the flash.
     #[must_use]
-    pub fn new(board: Board, flash: FlashContents<'m>, store: Store<F>, now: Instant) -> Self {
+    pub fn new(board: Board, flash: FlashContents<'m>, mut store: Store<F>, now: Instant) -> Self {
+        store.limit().set_clock(now);
         Self {
             board,
             map: flash.map,
@@ -229,7 +238,6 @@ impl<'m, F: NorFlash> App<'m, F> {
             config: flash.config.ok(),
             store,
             stored: None,
-            writes: WriteLimit::new(now),
             started: now,
             owes_record: false,
             owes_config: false,
@@ -241,6 +249,7 @@ impl<'m, F: NorFlash> App<'m, F> {
             heard: now,
             faults: Faults::default(),
             worst_poll: Duration::from_ticks(0),
+            clock: Clock::new(now),
             time: now,
             rests_until: now,
             expected: now,
@@ -253,6 +262,9 @@ impl<'m, F: NorFlash> App<'m, F> {
     /// Handles what is due at `now`: at most one command, one poll of the loop, and telemetry. It never waits, except
     /// for the flash when a record is written.
     ///
+    /// A `now` that leaps ahead or back is counted as a fault of the clock and has no other effect, unless the next poll
+    /// confirms it: then the loop continues at the new time.
+    ///
     /// # Panics
     /// Never.
     pub fn poll(
@@ -261,6 +273,14 @@ impl<'m, F: NorFlash> App<'m, F> {
         hardware: &mut impl Hardware,
         link: &mut impl Link,
     ) -> Polled {
+        match self.clock.read(now) {
+            Reading::Usual => {}
+            Reading::Unconfirmed => {
+                self.faults.clock = self.faults.clock.saturating_add(1);
+                return self.at_rest;
+            }
+            Reading::SetBack => self.set_clock(now),
+        }
         let frame = self.wire.next(link);
         if let Mode::Running(running) = &mut self.mode
             && frame.is_none()
@@ -336,6 +356,19 @@ impl<'m, F: NorFlash> App<'m, F> {
         polled
     }
 
+    /// Continues at `now` after the clock was set back. What was due at a later time is due at once.
+    #[inline(never)]
+    fn set_clock(&mut self, now: Instant) {
+        self.store.limit().set_clock(now);
+        (self.started, self.heard, self.time) = (now, now, now);
+        (self.rests_until, self.expected) = (now, now);
+        self.wire.set_clock();
+        match &mut self.mode {
+            Mode::Waiting(check) => *check = Check::new(now),
+            Mode::Running(running) => running.set_clock(now),
+        }
+    }
+
     /// Sends the messages that are due periodically.
     fn send_periodic(&mut self, now: Instant, link: &mut impl Link) {
         let is_busy = matches!(&self.mode, Mode::Running(running) if running.report.has_worked());
@@ -367,7 +400,7 @@ impl<'m, F: NorFlash> App<'m, F> {
     fn next_write(&self) -> Instant {
         let owed = [(self.owes_record, u8::from(!self.is_running())), (self.owes_config, 1)];
         let owed = owed.into_iter().filter(|&(is_owed, _)| is_owed && !self.ignores_store());
-        owed.fold(NEVER, |next, (_, reserve)| next.min(self.writes.next(reserve)))
+        owed.fold(NEVER, |next, (_, reserve)| next.min(self.store.next_write(reserve)))
     }
 
     /// When the application must be polled next, if no byte is received and no edge of the echo is stamped earlier; to be called
@@ -611,11 +644,12 @@ impl<'m, F: NorFlash> App<'m, F> {
         if self.ignores_store() {
             return;
         }
-        if self.owes_record && self.writes.take(now, u8::from(!self.is_running())) {
+        let reserve = u8::from(!self.is_running());
+        if self.owes_record && self.store.limit().take(now, reserve) {
             if let Some(saved) = self.record(now) {
                 polled.saved = Some(self.write(&saved));
             }
-        } else if self.owes_config && self.writes.take(now, 1) {
+        } else if self.owes_config && self.store.limit().take(now, 1) {
             let replaces = self.baked();
             let config = self.config.as_ref();
             let written = config.map(|(config, _)| self.store.save_replacement(replaces, config));
@@ -650,6 +684,7 @@ impl<'m, F: NorFlash> App<'m, F> {
             faults: self.faults(),
             worst_poll: self.worst_poll,
             commands: self.wire.counters(),
+            flash: self.store.status(),
         }
     }
 }

@@ -23,7 +23,9 @@ mod resume;
 mod save_policy;
 
 use core::ops::Range;
+use sonarfix::geometry::units::Instant;
 use sonarfix_hal::config::RobotConfig;
+use sonarfix_link::message::FlashStatus;
 
 use embedded_storage::nor_flash::NorFlash;
 use serde::Serialize;
@@ -32,6 +34,7 @@ use serde::de::DeserializeOwned;
 pub use error::StoreError;
 use journal::Journal;
 pub use limit::WriteLimit;
+use limit::{TRAILER, Trailer};
 use record::{LONGEST, SAVED, STORED_CONFIGURATION};
 pub use record::{Saved, StoredConfiguration};
 pub use resume::{MAX_HEADING_DEVIATION, MAX_POSITION_DEVIATION, Resumed};
@@ -43,6 +46,9 @@ pub use save_policy::SavePolicy;
 /// some hundred records (`docs/firmware.md`).
 pub struct Store<F: NorFlash> {
     journal: Journal<F>,
+    limit: WriteLimit,
+    /// Writes of this run that have failed.
+    failures: u32,
 }
 
 impl<F: NorFlash> Store<F> {
@@ -51,7 +57,8 @@ impl<F: NorFlash> Store<F> {
     /// # Errors
     /// [`StoreError::Region`] if it is not two or more whole sectors.
     pub fn new(flash: F, region: Range<u32>) -> Result<Self, StoreError> {
-        Journal::new(flash, region).map(|journal| Self { journal })
+        let limit = WriteLimit::new(Instant::from_ticks(0));
+        Journal::new(flash, region).map(|journal| Self { journal, limit, failures: 0 })
     }
 
     /// Searches the region, and copies the records to another sector if a power cut may have damaged
@@ -107,23 +114,43 @@ impl<F: NorFlash> Store<F> {
         // The bytes of a `StoredConfiguration`.
         let bytes = postcard::to_slice(&(replaces, config), &mut buffer);
         let bytes = bytes.map_err(|_| StoreError::NotWritten)?;
+        let length = bytes.len();
         if self.holds(STORED_CONFIGURATION, bytes) {
             return Ok(());
         }
-        self.journal.write(STORED_CONFIGURATION, bytes)
+        self.write_buffer(STORED_CONFIGURATION, &mut buffer, length)
+    }
+
+    /// How often records may be written.
+    pub fn limit(&mut self) -> &mut WriteLimit {
+        &mut self.limit
+    }
+
+    /// When a write is permitted next, if `reserve` are to remain after it.
+    pub(crate) fn next_write(&self, reserve: u8) -> Instant {
+        self.limit.next(reserve)
+    }
+
+    /// The number of all writes, those of earlier runs included, and of those of this run that have failed.
+    #[must_use]
+    pub fn status(&self) -> FlashStatus {
+        FlashStatus { writes: self.limit.total(), failures: self.failures }
     }
 
     /// Whether the newest record of this key has these bytes.
     #[inline(never)]
     fn holds(&mut self, key: u8, bytes: &[u8]) -> bool {
         let mut buffer = [0; LONGEST];
-        matches!(self.journal.read(key, &mut buffer), Ok(Some(found)) if found == bytes)
+        let found = self.journal.read(key, &mut buffer);
+        matches!(found, Ok(Some(found)) if split(found).is_some_and(|(found, _)| found == bytes))
     }
 
     #[inline(never)]
     fn read<T: DeserializeOwned>(&mut self, key: u8) -> Result<Option<T>, StoreError> {
         let mut buffer = [0; LONGEST];
         let Some(bytes) = self.journal.read(key, &mut buffer)? else { return Ok(None) };
+        let (bytes, trailer) = split(bytes).ok_or(StoreError::Layout)?;
+        self.limit.resume(*trailer);
         postcard::from_bytes(bytes).map(Some).map_err(|_| StoreError::Layout)
     }
 
@@ -131,7 +158,24 @@ impl<F: NorFlash> Store<F> {
     fn write<T: Serialize>(&mut self, key: u8, record: &T) -> Result<(), StoreError> {
         let mut buffer = [0; LONGEST];
         let bytes = postcard::to_slice(record, &mut buffer).map_err(|_| StoreError::NotWritten)?;
-        self.journal.write(key, bytes)
+        let length = bytes.len();
+        self.write_buffer(key, &mut buffer, length)
+    }
+
+    /// Writes the first `length` bytes of a buffer as a record, with the end that every record has.
+    fn write_buffer(
+        &mut self,
+        key: u8,
+        buffer: &mut [u8; LONGEST],
+        length: usize,
+    ) -> Result<(), StoreError> {
+        let end = length.saturating_add(TRAILER);
+        let trailer = buffer.get_mut(length..end).ok_or(StoreError::NotWritten)?;
+        trailer.copy_from_slice(&self.limit.count());
+        let record = buffer.get(..end).ok_or(StoreError::NotWritten)?;
+        let written = self.journal.write(key, record);
+        self.failures = self.failures.saturating_add(u32::from(written.is_err()));
+        written
     }
 
     /// The flash.
@@ -149,4 +193,9 @@ impl<F: NorFlash> Store<F> {
     pub fn release(self) -> F {
         self.journal.release()
     }
+}
+
+/// The bytes of a record, and its end.
+fn split(record: &[u8]) -> Option<(&[u8], &Trailer)> {
+    record.split_last_chunk()
 }

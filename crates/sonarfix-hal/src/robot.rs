@@ -278,6 +278,21 @@ impl<'m> Robot<'m> {
         Ok(step)
     }
 
+    /// Continues at `now` after the clock was set back: travel and turn since the last step belong to the next one, a ping
+    /// in flight is aborted, and measurements that wait are dropped.
+    pub fn set_clock(&mut self, now: Instant) {
+        self.navigator.set_clock(now);
+        self.ticks = Schedule::new(now, self.settings.encoder_period);
+        self.pings = match self.localizer().config().sonar.timing.schedule {
+            PingSchedule::Every(period) => Schedule::new(now, period),
+            PingSchedule::AsFastAsPossible => self.ticks,
+        };
+        self.yaw = yaw_of(self.localizer());
+        self.waiting = Waiting::default();
+        self.time = now;
+        self.end_cycle(now, false);
+    }
+
     /// Passes a heading, position or pose that was measured at the time `at` to the localizer, when it has taken the travel
     /// of the wheels up to then: in one of the next polls, with the outcome in its report. At most one heading
     /// and one position or pose wait.

@@ -329,6 +329,18 @@ pub struct LoopStatus {
     pub worst_poll: Duration,
     /// The counters of the robot's receiver of commands.
     pub commands: ReceiverCounters,
+    /// The writes to the flash.
+    pub flash: FlashStatus,
+}
+
+/// The writes of a robot to its flash.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct FlashStatus {
+    /// All writes, those of earlier runs included.
+    pub writes: u32,
+    /// Those since the start that have failed: what they contained is lost when the robot is switched off.
+    pub failures: u32,
 }
 
 /// The acknowledgement of a command.
@@ -369,8 +381,6 @@ pub enum CommandError {
     NoMap,
     /// There is no valid configuration in flash ([`Hello::configuration`]).
     NoConfiguration,
-    /// Writing to flash failed.
-    Storage,
     /// The pose is unknown; set it first ([`Command::SetPose`]).
     NoPose,
     /// The board cannot be the robot that the configuration describes.
@@ -396,7 +406,6 @@ impl core::fmt::Display for CommandError {
             Self::Pose => "the pose or a deviation is not finite, or a deviation is negative",
             Self::NoMap => "the robot has no valid map in its flash",
             Self::NoConfiguration => "the robot has no valid configuration in its flash",
-            Self::Storage => "the robot could not write to its flash",
             Self::NoPose => "the robot's pose is unknown: set it first",
             Self::Session => "the command's session has ended: send it again in a new one",
             Self::NoSearch => "the robot does not search: its robot file needs start = \"unknown\"",

@@ -187,6 +187,11 @@ impl<'m> Navigator<'m> {
         self.mode
     }
 
+    /// Continues at `now` after the clock was set back ([`Localizer::set_clock`]).
+    pub fn set_clock(&mut self, now: Instant) {
+        self.localizer.set_clock(now);
+    }
+
     /// Declares the pose unknown and begins the search. The pose of the localizer is proposed to it: if the robot was
     /// lost, it is probably near.
     pub fn search(&mut self, search: &mut Search<'m>) {

@@ -200,8 +200,12 @@ fn ping(monitor: &Monitor, ping: &Ping, walls: &[String]) -> String {
 fn state(state: &LoopStatus) -> String {
     let running = if state.running { "running" } else { "waiting" };
     let f = &state.faults;
+    let flash = match state.flash.failures {
+        0 => String::new(),
+        failures => format!("; flash: {failures} writes failed, what changes is lost at power off"),
+    };
     format!(
-        "loop    {running}, {} deadlines missed, longest poll {} µs; faults: {}",
+        "loop    {running}, {} deadlines missed, longest poll {} µs; faults: {}{flash}",
         f.deadlines,
         state.worst_poll.to_micros(),
         faults(f),

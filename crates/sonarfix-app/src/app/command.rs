@@ -98,7 +98,9 @@ impl<'m, F: NorFlash> App<'m, F> {
     ) -> Result<Next, CommandError> {
         match *command {
             Command::SetPose(ref start) => self.set_pose(now, start, hardware, link, polled),
-            Command::SetConfiguration(ref config) => self.set_configuration(now, config, hardware),
+            Command::SetConfiguration(ref config) => {
+                self.set_configuration(now, config, hardware, polled)
+            }
             Command::Start => self.start(now, polled),
             Command::Stop => {
                 self.stop(now);
@@ -195,16 +197,18 @@ impl<'m, F: NorFlash> App<'m, F> {
         now: Instant,
         config: &RobotConfig,
         hardware: &mut impl Hardware,
+        polled: &mut Polled,
     ) -> Result<Next, CommandError> {
         let afresh = Resumed::afresh(&config.localizer);
         let known = self.known_now().map_or(afresh, |known| known.calibrated_as(&afresh));
         let known = self.where_it_is(known);
         self.check_start_with(now, config, &known)?;
         configure(hardware, config)?;
-        self.owes_config = self.ignores_store() || !self.writes.take(now, 1);
-        if !self.owes_config && self.store.save_replacement(self.baked(), config).is_err() {
-            self.configure_devices(hardware);
-            return Err(CommandError::Storage);
+        self.owes_config = self.ignores_store() || !self.store.limit().take(now, 1);
+        if !self.owes_config {
+            let written = self.store.save_replacement(self.baked(), config);
+            self.owes_config = written.is_err();
+            polled.saved = Some(written);
         }
         self.use_config(config);
         self.owes_record = true;
@@ -265,13 +269,29 @@ impl<'m, F: NorFlash> App<'m, F> {
             return Err(CommandError::NoPose);
         }
         self.check_start(now, &known)?;
-        if self.stored.is_some_and(|stored| stored.is_parked) {
-            // From now on the pose after a power loss is unknown.
-            self.writes.take(now, 0);
-            let saved = self.record_of(now, &known, false);
-            self.replace_stored(&saved, polled)?;
+        let known = self.without_parked_record(now, known, polled);
+        if !known.has_pose && !searches {
+            return Err(CommandError::NoPose);
         }
         Ok(Next::Begin(known))
+    }
+
+    /// Replaces the record of a parked robot by one of a robot that drives, whose pose is unknown after a power loss. If that
+    /// cannot be written, the record may have remained from an earlier run in which the robot drove: its pose is not used.
+    #[inline(never)]
+    fn without_parked_record(
+        &mut self,
+        now: Instant,
+        known: Resumed,
+        polled: &mut Polled,
+    ) -> Resumed {
+        if self.stored.is_none_or(|stored| !stored.is_parked) {
+            return known;
+        }
+        self.store.limit().take(now, 0);
+        let saved = self.record_of(now, &known, false);
+        let is_replaced = self.replace_stored(&saved, polled);
+        if is_replaced || !known.is_pose_stored { known } else { known.without_pose() }
     }
 
     /// Declares the pose unknown. The search begins at once, or when the loop is started.
@@ -343,25 +363,25 @@ impl<'m, F: NorFlash> App<'m, F> {
         self.check_start(now, &known)?;
         let mut is_owed = true;
         if self.stored.is_some_and(|stored| stored.is_parked) {
-            is_owed = !self.writes.take(now, 1);
+            is_owed = !self.store.limit().take(now, 1);
             if is_owed {
-                self.writes.take(now, 0);
+                self.store.limit().take(now, 0);
             }
             let saved = self.record_of(now, &known, known.has_pose && !is_owed);
-            self.replace_stored(&saved, polled)?;
+            is_owed |= !self.replace_stored(&saved, polled);
         }
         self.known = Some(known);
         self.owes_record = is_owed;
         Ok(())
     }
 
-    /// Writes a record over one that is no longer true.
-    fn replace_stored(&mut self, saved: &Saved, polled: &mut Polled) -> Result<(), CommandError> {
+    /// Writes a record over one that does not hold any more; returns whether it was written.
+    fn replace_stored(&mut self, saved: &Saved, polled: &mut Polled) -> bool {
         let owed = self.owes_record;
         let written = self.write(saved);
         polled.saved = Some(written);
         self.owes_record = owed;
-        written.map_err(|_| CommandError::Storage)
+        written.is_ok()
     }
 
     /// Starts the loop, or restarts a running one; returns its telemetry. The localizer is built before the stack holds

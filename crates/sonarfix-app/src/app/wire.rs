@@ -115,6 +115,11 @@ impl Wire {
         self.hello_at.unwrap_or(at_once).min(self.loop_at.unwrap_or(at_once))
     }
 
+    /// Makes the periodic messages due at once.
+    pub fn set_clock(&mut self) {
+        (self.hello_at, self.loop_at) = (None, None);
+    }
+
     pub fn counters(&self) -> ReceiverCounters {
         self.receiver.counters()
     }

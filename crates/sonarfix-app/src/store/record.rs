@@ -5,14 +5,16 @@ use sonarfix::filter::ekf::{StandardDeviations, StateEstimate};
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_link::baked;
 
+use super::limit::TRAILER;
+
 /// Keys of the two records. A new layout gets a new key, so that newer firmware
 /// never misreads a record of older firmware.
-pub(super) const SAVED: u8 = 1;
-pub(super) const STORED_CONFIGURATION: u8 = 4;
+pub(super) const SAVED: u8 = 6;
+pub(super) const STORED_CONFIGURATION: u8 = 7;
 pub(super) const KEYS: [u8; 2] = [SAVED, STORED_CONFIGURATION];
 
 /// Room for a record: the configuration is the longer one.
-pub(super) const LONGEST: usize = baked::LENGTH_MAX;
+pub(super) const LONGEST: usize = baked::LENGTH_MAX + TRAILER;
 
 /// Pose and calibration at the time of the write.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

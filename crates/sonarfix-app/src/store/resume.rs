@@ -56,6 +56,8 @@ pub struct Resumed {
     pub is_pose_interrupted: bool,
     /// Whether the calibration was.
     pub is_calibration_interrupted: bool,
+    /// Whether the pose is that of a record of an earlier run.
+    pub is_pose_stored: bool,
 }
 
 impl Resumed {
@@ -77,6 +79,7 @@ impl Resumed {
             has_calibration: false,
             is_pose_interrupted: false,
             is_calibration_interrupted: false,
+            is_pose_stored: false,
         }
     }
 
@@ -90,6 +93,7 @@ impl Resumed {
         let whole = Self::interrupted(saved.state, saved.deviation);
         let has_calibration = saved.configuration == configuration;
         let resumed = if has_calibration { whole } else { whole.calibrated_as(&afresh) };
+        let resumed = Self { is_pose_stored: true, ..resumed };
         if saved.is_parked { resumed } else { resumed.without_pose() }
     }
 
@@ -103,6 +107,7 @@ impl Resumed {
             has_calibration: true,
             is_pose_interrupted: true,
             is_calibration_interrupted: true,
+            is_pose_stored: false,
         }
     }
 
@@ -157,6 +162,7 @@ impl Resumed {
                 ..self.deviation
             },
             has_pose: false,
+            is_pose_stored: false,
             ..self
         }
     }
@@ -170,7 +176,7 @@ impl Resumed {
         known.state.heading = pose.heading.radians();
         (known.deviation.x, known.deviation.y) = (position_deviation, position_deviation);
         known.deviation.heading = heading_deviation;
-        Self { has_pose: true, is_pose_interrupted: false, ..known }
+        Self { has_pose: true, is_pose_interrupted: false, is_pose_stored: false, ..known }
     }
 
     /// The same pose with another's calibration.

@@ -40,6 +40,11 @@ impl SavePolicy {
         Self { written, at: now, still_since: now }
     }
 
+    /// Continues after the clock was set to `now`.
+    pub fn set_clock(&mut self, now: Instant) {
+        (self.at, self.still_since) = (now, now);
+    }
+
     /// Records that a wheel rolled.
     pub fn rolled(&mut self, now: Instant) {
         self.still_since = now;

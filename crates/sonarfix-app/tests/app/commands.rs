@@ -223,9 +223,41 @@ fn a_flash_that_fails() {
     assert_eq!(bench.order(&Command::SetPose(start())), DONE);
     let mut worn_out = bench.switched_off();
     worn_out.is_read_only = true;
+    // The record says that the robot is parked and cannot be replaced: it may be of an earlier drive.
     let mut bench = Bench::switched_on(&baked, worn_out);
-    assert_eq!(bench.order(&Command::Start), refused(CommandError::Storage));
+    assert_eq!(bench.order(&Command::Start), refused(CommandError::NoPose));
     assert!(!bench.poll().is_running);
+    // A pose that is set now is valid, and the telemetry states that the flash fails.
+    assert_eq!(bench.order(&Command::SetPose(start())), DONE);
+    assert_eq!(bench.order(&Command::Start), DONE);
+    assert!(bench.poll().is_running);
+    assert!(loop_status(&bench.wait(1_200)).flash.failures >= 2);
+    // Stopped and started again, it continues at the pose of this run.
+    assert_eq!(bench.order(&Command::Stop), DONE);
+    assert_eq!(bench.order(&Command::Start), DONE);
+    // A configuration is used although it cannot be stored.
+    assert_eq!(bench.order(&Command::SetConfiguration(config())), DONE);
+}
+
+/// A robot that is reset every minute writes no more often than one that runs on.
+#[test]
+fn resets_do_not_refill_the_budget_of_writes() {
+    let baked = Baked::new(&config());
+    let mut flash = SimFlash::new();
+    let (resets, mut writes) = (60, 0);
+    for _ in 0..resets {
+        let mut bench = Bench::switched_on(&baked, flash);
+        for _ in 0..3 {
+            for command in [Command::SetPose(start()), Command::Start, Command::Stop] {
+                let _ = bench.order(&command);
+            }
+        }
+        bench.wait(59_000);
+        writes = loop_status(&bench.wait(1_200)).flash.writes;
+        flash = bench.switched_off();
+    }
+    // One a minute, and the burst at the start.
+    assert!((120..=resets + 120 + 1).contains(&writes), "{writes} writes in {resets} minutes");
 }
 
 #[test]

@@ -17,9 +17,9 @@ fn a_postponed_record_is_no_reason_to_poll() {
     let baked = Baked::new(&config());
     let mut bench = Bench::switched_on(&baked, SimFlash::new());
     let mut written = 0;
-    for number in 0..12_u8 {
+    for number in 0..130_u8 {
         let mut pose = start();
-        pose.pose.x = Metres(0.1 * f32::from(number));
+        pose.pose.x = Metres(0.01 * f32::from(number));
         bench.send(&Command::SetPose(pose));
         let polled = bench.poll();
         assert_eq!(polled.answered, Some(DONE));
@@ -27,7 +27,7 @@ fn a_postponed_record_is_no_reason_to_poll() {
         bench.wait(1);
         assert!(bench.next_poll() > bench.now, "after {number} poses");
     }
-    assert_eq!(written, 8);
+    assert_eq!(written, 120);
     let mut awake = 0;
     let saved = (1..=121_000).find(|_| {
         let is_saved = bench.poll().saved.is_some();

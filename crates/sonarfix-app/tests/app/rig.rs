@@ -305,6 +305,21 @@ impl<'m> Bench<'m> {
         self.app.poll(Instant::from_ticks(self.now), &mut self.hardware, &mut self.line)
     }
 
+    /// The time of the last poll, µs.
+    pub fn now(&self) -> u64 {
+        self.now
+    }
+
+    /// Sets the clock: the next poll is a millisecond later.
+    pub fn set_now(&mut self, now: u64) {
+        self.now = now;
+    }
+
+    /// Bytes on the line to the robot that it has not read.
+    pub fn unread(&self) -> usize {
+        self.line.to_robot.len()
+    }
+
     /// When the app asks to be polled next, µs.
     pub fn next_poll(&mut self) -> u64 {
         self.app.next_poll(&mut self.hardware).ticks()
@@ -388,10 +403,15 @@ impl<'m> Bench<'m> {
         self.line.from_robot.clear();
     }
 
-    /// Sends a command, and returns its answer.
+    /// Sends a command, and returns its answer: by the poll that reads its last byte.
     pub fn order(&mut self, command: &Command) -> CommandResult {
         self.send(command);
-        self.poll().answered.expect("a command is answered at once")
+        loop {
+            let answered = self.poll().answered;
+            if self.line.to_robot.is_empty() {
+                return answered.expect("a command is answered at once");
+            }
+        }
     }
 
     /// The estimate of a running robot.

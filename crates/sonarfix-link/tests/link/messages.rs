@@ -25,9 +25,9 @@ use sonarfix_hal::ranger::{Celsius, Echo, NoEcho, Outcome, PulseTiming, RangerKi
 use sonarfix_hal::robot::{AbsoluteResult, EncoderFaults, Faults};
 use sonarfix_hal::servo::{MeasuredPulse, SettingError};
 use sonarfix_link::message::{
-    CommandError, DeviceReadings, EncoderReading, GyroState, ImageStatus, LoopStatus, ModeChanged,
-    Odometry, RankedHypothesis, ResetCause, SearchAnswer, SearchStatus, ServoReading, SkippedPing,
-    Sweep,
+    CommandError, DeviceReadings, EncoderReading, FlashStatus, GyroState, ImageStatus, LoopStatus,
+    ModeChanged, Odometry, RankedHypothesis, ResetCause, SearchAnswer, SearchStatus, ServoReading,
+    SkippedPing, Sweep,
 };
 use sonarfix_link::{
     Ack, Command, CommandResult, Estimate, Hello, Ping, ReceiverCounters, SessionCommand, Telemetry,
@@ -425,6 +425,7 @@ fn state_of_loop(source: &mut impl Source) -> LoopStatus {
             foreign: source.bits32(),
             undecodable: source.bits32(),
         },
+        flash: FlashStatus { writes: source.bits32(), failures: source.bits32() },
     }
 }
 
@@ -450,12 +451,11 @@ fn reset(source: &mut impl Source) -> ResetCause {
     source.choose(&RESETS)
 }
 
-pub const REFUSED: [CommandError; 13] = [
+pub const REFUSED: [CommandError; 12] = [
     CommandError::Configuration,
     CommandError::Pose,
     CommandError::NoMap,
     CommandError::NoConfiguration,
-    CommandError::Storage,
     CommandError::NoPose,
     CommandError::Unsupported(Unsupported::Servo(SettingError::Frame)),
     CommandError::Session,

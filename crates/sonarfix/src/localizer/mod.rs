@@ -333,6 +333,17 @@ impl<'m> Localizer<'m> {
         self.recorded = self.recorded.max(now);
     }
 
+    /// Continues at `now` after the clock was set back. The next travel is that since the last accepted one; times of
+    /// earlier pings are forgotten, and measurements from before are refused.
+    pub fn set_clock(&mut self, now: Instant) {
+        (self.time, self.recorded, self.pinged) = (now, now, now);
+        self.step = LastStep::none(now);
+        self.sources = Sources::new(now);
+        if self.unseen.is_some() {
+            self.unseen = Some(Unseen::new(now, &self.ekf));
+        }
+    }
+
     /// Whether an encoder sample has failed since the last accepted travel.
     #[must_use]
     pub fn is_odometry_missing(&self) -> bool {
