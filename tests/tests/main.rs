@@ -3,6 +3,7 @@
 mod absolute;
 mod baked;
 mod consistency;
+mod failed_ranger;
 mod gyro;
 mod kidnapped;
 mod motors;

@@ -732,6 +732,7 @@ impl<'m> Robot<'m> {
             return;
         };
         let Some(bearing) = hardware.servo_of(ranger).target() else {
+            self.navigator.ranger_failed(ranger);
             self.abort_cycle(now);
             return;
         };
@@ -763,6 +764,7 @@ impl<'m> Robot<'m> {
             Err(TriggerError::TooSoon) if since(now, ready_at) < self.settings.patience => {}
             Err(_) => {
                 report.faults.ranger += 1;
+                self.navigator.ranger_failed(ranger);
                 self.abort_cycle(now);
             }
         }

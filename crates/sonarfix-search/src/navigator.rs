@@ -187,6 +187,11 @@ impl<'m> Navigator<'m> {
         self.mode
     }
 
+    /// As [`Localizer::ranger_failed`].
+    pub fn ranger_failed(&mut self, ranger: RangerId) {
+        self.localizer.ranger_failed(ranger);
+    }
+
     /// Continues at `now` after the clock was set back ([`Localizer::set_clock`]).
     pub fn set_clock(&mut self, now: Instant) {
         self.localizer.set_clock(now);

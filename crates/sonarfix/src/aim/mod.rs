@@ -135,11 +135,13 @@ impl<'a> Situation<'a> {
     /// # Errors
     /// [`NoAim`] if no ranger has a wall to measure.
     pub fn choose(&self) -> Result<Aim, NoAim> {
-        let mut best = Planner::new(self, RangerId::FIRST, &self.config.sonar).choose();
-        if self.config.has_several_sonars() {
-            for (ranger, sonar) in self.config.sonars().skip(1) {
-                let other = Planner::new(self, ranger, sonar).choose();
-                best = better(self.policy, best, other);
+        if !self.config.has_several_sonars() {
+            return Planner::new(self, RangerId::FIRST, &self.config.sonar).choose();
+        }
+        let mut best = Err(NoAim::NoWall);
+        for (ranger, sonar) in self.config.sonars() {
+            if !self.rests(ranger) {
+                best = better(self.policy, best, Planner::new(self, ranger, sonar).choose());
             }
         }
         best
@@ -150,6 +152,9 @@ impl<'a> Situation<'a> {
     /// # Errors
     /// [`NoAim`] if no wall can be measured, or the robot has no such ranger.
     pub fn choose_of(&self, ranger: RangerId, standing: &Standing) -> Result<Aim, NoAim> {
+        if self.rests(ranger) {
+            return Err(NoAim::NoWall);
+        }
         let mut planner = self.planner(ranger)?;
         let Standing { bearing, ready_in } = *standing;
         planner.slot = Slot { bearing, ready_in: seconds(ready_in), ..planner.slot };
@@ -163,6 +168,11 @@ impl<'a> Situation<'a> {
     pub fn at(&self, ranger: RangerId, bearing: Radians) -> Result<Aim, NoAim> {
         let planner = self.planner(ranger)?;
         planner.nearest_at(bearing).or_else(|_| planner.without_margins().nearest_at(bearing))
+    }
+
+    /// Whether a ranger of several is not to be tried, because it has failed.
+    fn rests(&self, ranger: RangerId) -> bool {
+        self.history.rests(ranger, self.config, self.now)
     }
 
     fn planner(&self, ranger: RangerId) -> Result<Planner<'a>, NoAim> {

@@ -16,6 +16,7 @@
 //! the measured range is finite. The density of clutter is positive, so that no quotient is 0/0; if
 //! all clutter is configured away and the echo is too far off to be the wall's, it is not used.
 
+use crate::association::reliability::Shares;
 use crate::geometry::elementary::{exp, inverse_sqrt, ln};
 use crate::geometry::numeric::at_least;
 use crate::geometry::units::{Metres, SquareMetres};
@@ -149,6 +150,14 @@ impl ExpectedEcho {
     /// Probability that the target answers.
     pub fn answers(&self, parameters: &EchoParameters) -> f32 {
         (1.0 - self.occluded) * self.geometry * parameters.heard()
+    }
+
+    /// What a ping of a ranger that works returns here, if no earlier ping has revealed an object.
+    pub fn shares(&self, parameters: &EchoParameters) -> Shares {
+        let (g, occluded) = (self.geometry, parameters.prior_occlusion(self.range));
+        let explained = g * (1.0 - occluded) * parameters.heard();
+        let silent = (1.0 - occluded) * parameters.missed + occluded * NO_ECHO_OCCLUDED;
+        Shares::working(explained, g * silent + (1.0 - g) * NO_ECHO_OFF_WALL)
     }
 
     fn of_echo(&self, parameters: &EchoParameters, innovation: f32) -> Densities {

@@ -10,6 +10,7 @@
 //! distance may be infinite; the probability is then the prior.
 
 use crate::association::echo::Source;
+use crate::association::reliability::{Reliability, Returned, Shares};
 use crate::config::{Config, MAX_RANGERS, RangerId};
 use crate::geometry::units::{Instant, Metres, Radians, seconds};
 use crate::map::WallId;
@@ -126,6 +127,7 @@ pub struct Slot {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct History {
     last: [Option<LastPing>; MAX_RANGERS],
+    reliability: [Reliability; MAX_RANGERS],
     /// The ranger of the latest ping.
     latest: RangerId,
     /// Radians per second.
@@ -154,6 +156,32 @@ impl History {
             *last = Some(LastPing { wall, bearing, range });
             self.latest = ranger;
         }
+    }
+
+    /// Records what a ping of a ranger returned, and with which shares one that works does.
+    pub fn record_returned(
+        &mut self,
+        ranger: RangerId,
+        returned: Returned,
+        working: &Shares,
+        now: Instant,
+    ) {
+        if let Some(reliability) = self.reliability.get_mut(ranger.index()) {
+            reliability.record(returned, working, now);
+        }
+    }
+
+    /// Whether a ranger has probably failed, and more probably than another one of the robot.
+    pub fn has_failed(&self, ranger: RangerId, config: &Config) -> bool {
+        let Some(own) = self.reliability.get(ranger.index()) else { return false };
+        let others = self.reliability.iter().zip(config.sonars());
+        others.map(|(other, _)| other).any(|other| own.has_failed(other))
+    }
+
+    /// Whether a ranger is not to be tried at `now`, because it has failed.
+    pub fn rests(&self, ranger: RangerId, config: &Config, now: Instant) -> bool {
+        let is_tried = self.reliability.get(ranger.index()).is_some_and(|it| it.is_tried(now));
+        is_tried && self.has_failed(ranger, config)
     }
 
     fn last_of(&self, ranger: RangerId) -> Option<LastPing> {

@@ -6,4 +6,5 @@ pub(crate) mod gating;
 pub(crate) mod history;
 pub(crate) mod outcome;
 pub mod reflector;
+pub(crate) mod reliability;
 pub(crate) mod visibility;

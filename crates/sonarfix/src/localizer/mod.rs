@@ -15,6 +15,7 @@ use crate::association::alternatives::{Scene, Target};
 use crate::association::echo::{ExpectedEcho, Explanation, Others};
 use crate::association::gating::{self, Use};
 use crate::association::history::{History, Origin};
+use crate::association::reliability::{Returned, Shares};
 use crate::association::visibility::{Sight, Viewpoint, check_range, max_heading_deviation_of};
 use crate::config::{Config, ConfigError, Policy, RangerId, Ranging};
 use crate::filter::covariance::{GyroBias, PredictedMeasurement};
@@ -481,6 +482,10 @@ impl<'m> Localizer<'m> {
             ping.fix = Fix::Refused(refusal);
         }
         let ExplainedPing { fix, evidence, contradicts, is_repeated } = ping;
+        if self.history.has_failed(aim.ranger, &self.config) && fix.innovation_used().is_none() {
+            // It says nothing about the pose.
+            return fix;
+        }
         let limits = self.limits();
         let uncertainty = self.ekf.pose_uncertainty();
         self.health.record_fix(&fix, evidence, is_repeated, uncertainty, &limits);
@@ -488,6 +493,12 @@ impl<'m> Localizer<'m> {
             self.inflate_if_lost();
         }
         fix
+    }
+
+    /// Records that a ranger could not ping, because it or its servo has failed.
+    pub fn ranger_failed(&mut self, ranger: RangerId) {
+        let silence = Shares::working(1.0, 0.0);
+        self.history.record_returned(ranger, Returned::Silence, &silence, self.time);
     }
 
     /// Records that [`Self::aim`] found no wall to measure when a ping was due, so that the verdict of
@@ -633,6 +644,13 @@ impl<'m> Localizer<'m> {
         self.association = association;
         let is_repeated =
             measured.is_ok_and(|range| entry.source.is_some_and(|source| source.repeats(range)));
+        let returned = match measured {
+            Ok(_) if association > 0.5 || is_repeated => Returned::Explained,
+            Ok(_) => Returned::Unexplained,
+            Err(_) => Returned::Silence,
+        };
+        let working = expected_echo.shares(&self.config.echo);
+        self.history.record_returned(aim.ranger, returned, &working, self.time);
         let origin = match measured {
             Ok(_) if association > 0.5 => Origin::Wall,
             Ok(range) => Origin::Other(range),
