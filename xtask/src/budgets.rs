@@ -51,7 +51,7 @@ const BARS: [Bar; 10] = [
         section: "cortex-m4f",
         key: "core_text_bytes",
         most: 8192,
-        why: "predict, P on demand, gate, update and sine belong in a quarter of a 32 KiB flash",
+        why: "predict, gate, update and sine belong in a quarter of a 32 KiB flash",
     },
     Bar {
         section: "cortex-m4f-small",
@@ -109,10 +109,6 @@ const HEADER: &str = "\
 # Its changes are reviewed like code. `docs/benchmarks.md` describes the measurement.
 # Instructions and stack: of the worst call on an emulated board, without the overhead of the call.
 # Text: all functions that can be reached from the calls, in a linked program.
-# What grew by more than 2 % since P is propagated on demand, and why: bytes, text and stack of the localizer, aim and fix by up to
-# three rangers with settings and history of their own, by time-of-flight rangers (also slices and text of the search, whose
-# echo model they share) and by walls with an accuracy; odometry by the motion that is applied after each step; bytes and text of
-# the gyro by the detection of erratic samples.
 ";
 
 /// Measures and compares.
@@ -211,7 +207,7 @@ fn measure() -> anyhow::Result<Table> {
 fn measure_on(target: &Target) -> anyhow::Result<BTreeMap<String, u32>> {
     let mut figures = BTreeMap::new();
     let programs = [
-        ("filter", "core_and_expect", &["predict", "apply", "expect", "gate", "update"][..]),
+        ("filter", "core_and_expect", &["predict", "expect", "gate", "update"][..]),
         ("localizer", "localizer", &["odometry", "aim", "fix"][..]),
         ("rangers", "rangers", &["light_aim", "light_fix", "pair_aim", "pair_fix"][..]),
         ("gyro", "gyro", &["turn", "turn_fix"][..]),
@@ -239,7 +235,7 @@ fn measure_on(target: &Target) -> anyhow::Result<BTreeMap<String, u32>> {
         };
         text(code, calls)?;
         if name == "filter" {
-            text("core", &["predict", "apply", "gate", "update"])?;
+            text("core", &["predict", "gate", "update"])?;
         }
     }
     Ok(figures)

@@ -45,10 +45,9 @@ const START: &str = "sonarfix_app::app::command::<impl sonarfix_app::app::App<F>
 
 /// Parts by the beginning of a function's path, the first that matches. What matches none (library routines, sine and cosine)
 /// belongs to its caller.
-const PARTS: [(&str, &str); 24] = [
-    ("sonarfix::filter::ekf::prediction", "odometry: state and accumulated motion"),
-    ("sonarfix::filter::covariance::propagation", "P on demand"),
-    ("sonarfix::filter::accumulated", "P on demand"),
+const PARTS: [(&str, &str); 23] = [
+    ("sonarfix::filter::ekf::prediction", "prediction: state"),
+    ("sonarfix::filter::covariance::propagation", "prediction: P"),
     ("sonarfix::filter::covariance", "correction"),
     ("sonarfix::filter::ekf::Ekf::predict_measurement", "gate: innovation"),
     ("sonarfix::filter::ekf::Ekf::innovation", "gate: innovation"),

@@ -5,12 +5,12 @@ use std::hint::black_box;
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use sonarfix::config::Config;
 use sonarfix::filter::ekf::Ekf;
-use sonarfix::localizer::{Fix, Localizer, Start};
-use sonarfix::map::{Map, Wall};
 use sonarfix::filter::motion::WheelTravel;
 use sonarfix::geometry::pose::{Point, Pose};
-use sonarfix::sensor::range::ExpectedRange;
 use sonarfix::geometry::units::{Instant, Metres, Radians, SquareMetres};
+use sonarfix::localizer::{Fix, Localizer, Start};
+use sonarfix::map::{Map, Wall};
+use sonarfix::sensor::range::ExpectedRange;
 
 /// A room of 4 m × 3 m.
 fn room() -> [Wall; 4] {

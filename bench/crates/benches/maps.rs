@@ -8,10 +8,10 @@ use std::hint::black_box;
 use criterion::{Criterion, criterion_group, criterion_main};
 use rooms::{inside, rooms};
 use sonarfix::config::Config;
-use sonarfix::localizer::{Localizer, Start};
-use sonarfix::map::Map;
 use sonarfix::geometry::pose::Pose;
 use sonarfix::geometry::units::{Instant, Metres, Radians};
+use sonarfix::localizer::{Localizer, Start};
+use sonarfix::map::Map;
 use sonarfix_map::bake;
 
 /// The reach of a usual sonar.

@@ -11,8 +11,8 @@ use bench_workload::model::{Matrix, Range, Step, TRACK_WIDTH, Vector};
 use sonarfix::filter::ekf::{Ekf, StandardDeviations, StateEstimate};
 use sonarfix::filter::motion::{Drive, WheelTravel};
 use sonarfix::geometry::pose::Heading;
-use sonarfix::sensor::range::ExpectedRange;
 use sonarfix::geometry::units::{Metres, PerRootMetre, SquareMetres};
+use sonarfix::sensor::range::ExpectedRange;
 
 /// The filter.
 pub struct Shipped {

@@ -274,8 +274,6 @@ impl<'m> Navigator<'m> {
         let has_gyro = turn.is_some();
         let before = self.localizer.pose().heading;
         self.localizer.odometry_with_turn(now, travel, turn)?;
-        // The deviations are read after each step.
-        self.localizer.apply_motion();
         let Some(search) = search else { return Ok(()) };
         self.driven = self.driven + travel.distance();
         if self.mode == Mode::Tracking {

@@ -50,8 +50,8 @@ mod state;
 #[cfg(feature = "unstable-kernel")]
 #[doc(hidden)]
 pub mod kernel {
-    pub use crate::filter::accumulated::{AccumulatedMotion, CalibratedDrive, WheelNoise};
-    pub use crate::filter::covariance::{Correction, Covariance};
-    pub use crate::filter::process_noise::{AccumulatedRandomWalk, NoiseDensities};
+    pub use crate::filter::covariance::{Correction, Covariance, Transition};
+    pub use crate::filter::motion::LinearizedMotion;
+    pub use crate::filter::process_noise::{AccumulatedRandomWalk, NoiseDensities, ProcessNoise};
     pub use crate::state::estimate::FilterEstimate;
 }

@@ -196,8 +196,6 @@ fn a_pose_that_is_set_while_running_replays_to_the_bit() {
         let at = Instant::from_ticks(u64::from(tick) * 100_000);
         let travel = WheelTravel::new(0.02, 0.0197 + 1e-5 * f32::from(tick % 7));
         localizer.odometry(at, travel).unwrap();
-        // As the loop does after each step.
-        localizer.apply_motion();
         right_metres += f64::from(travel.right.0);
         left_metres += f64::from(travel.left.0);
         robot.send(&Telemetry::Odometry(Odometry { at, right_metres, left_metres }));

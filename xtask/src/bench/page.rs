@@ -35,16 +35,15 @@ column *fused* every row uses it: rustc gets `-C llvm-args=-fp-contract=fast`, G
 products with a sum become `vfma`. It hardly changes the figures of Rust, because without it LLVM
 computes both by `vmla`, one instruction as well, which rounds twice and has the bits of the separate operations.
 
-Sonarfix has two rows, and applies motion to P only when P is asked for (`docs/model.md`, covariance on demand): its update contains that. Peers update P
-at every predict.
+Sonarfix has two rows:
 
 - *As it ships* does more than the peers: seven states, its own sine and cosine, the full noise of each wheel, and the checks
   of the input. This is not a comparison of six states with six. The column *÷ shipped* refers to it.
 - *Kernel alone* (`bench/ours/src/kernel.rs`) is closest to the peers' work: six states, with sine, cosine and Q as
   arguments. It omits sine and cosine, the range scale's row of the motion, and the checks with the copy
   for their rollback. Its update does more than the peers': it has all seven states, since no version for six exists, and
-  adds motion and correction to the pose with compensation (Kahan); its predict has none. Its Q is the noise of each wheel, of which the peers' diagonal is a simpler form; the agreement test compares it with that Q.
-  The column *÷ kernel* refers to it; its limit is 1,900 for 10 + 1.
+  adds motion and correction to the pose with compensation (Kahan). Its Q is the noise of each wheel, of which the peers' diagonal is a simpler form; the agreement test compares it with that Q.
+  The column *÷ kernel* refers to it.
 
 ";
 
@@ -132,7 +131,7 @@ ranger; `budgets.toml` has the worst ones (*light_aim*, *light_fix*). The aim of
 
 `budgets.toml` contains the cost of the shipped crate, with seven states, sine and cosine: instructions and stack of
 the worst call over a drive of 200 travels and 20 ranges through a room of 8 walls (`firmware/emulated/probe`), bytes of all functions that can
-be reached from the calls, bytes of the objects. *core* is predict, P on demand (*apply*), gate and update, with their sine and cosine; *core_and_expect* adds the
+be reached from the calls, bytes of the objects. *core* is predict, gate and update, with their sine and cosine; *core_and_expect* adds the
 expected range; *localizer* is odometry, aim (the informative policy) and fix; *light_aim* and *light_fix* are those of a time-of-flight ranger, *pair_aim* the aims of two rotating sonars, of which one is chosen, and *pair_fix* its fix
 (*rangers_bytes* is the same localizer); *turn* and *turn_fix* are odometry and fix with a gyro, *gyro_bytes* the
 integral of its samples; *heading* and *pose* come from outside. *building* is the worst aim over 640 poses in

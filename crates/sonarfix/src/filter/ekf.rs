@@ -27,7 +27,6 @@ mod turn;
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::filter::accumulated::{AccumulatedMotion, CalibratedDrive, longest_interval};
 use crate::filter::covariance::{
     Correction, Covariance, GyroBias, PoseBlock, PredictedMeasurement,
 };
@@ -161,40 +160,16 @@ pub(crate) struct PoseUncertainty {
 /// assert!((ekf.standard_deviations().x.0 - 0.0030).abs() < 0.0001);
 /// # Ok::<(), sonarfix::filter::ekf::EkfError>(())
 /// ```
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ekf {
-    /// X̂ at the start of the interval.
+    /// X̂.
     estimate: FilterEstimate,
-    /// P at the start of the interval, without the random walk of the calibration since the last update.
+    /// P without the random walk of the calibration since the last update.
     p_without_walk: Covariance,
-    /// Distance of both wheels together from the last update to the start of the interval, metres.
+    /// Distance of both wheels together since the last update, metres.
     distance_since_update: f32,
-    /// Motion since the start of the interval, not yet applied to estimate and P.
-    motion: AccumulatedMotion,
-    /// Distance of both wheels together since the start of the interval, metres.
-    distance: f32,
-    /// Up to this distance of both wheels together the motion is accumulated, metres. 0: the calibration or P have changed, and
-    /// `drive` and this limit are to be computed again.
-    longest: f32,
-    /// The drive at the estimate of the calibration.
-    drive: CalibratedDrive,
-    /// The limit by the noise densities alone.
-    longest_by_noise: f32,
     track_width: f32,
     densities: NoiseDensities,
-}
-
-/// Filters are equal that have the same state and P, and will have the same after the same corrections.
-impl PartialEq for Ekf {
-    fn eq(&self, other: &Self) -> bool {
-        let parts = |ekf: &Self| {
-            let mut applied = *ekf;
-            applied.apply_motion();
-            let Self { estimate, p_without_walk, distance_since_update, .. } = applied;
-            (estimate, p_without_walk, distance_since_update, ekf.track_width, ekf.densities)
-        };
-        parts(self) == parts(other)
-    }
 }
 
 impl Ekf {
@@ -230,11 +205,6 @@ impl Ekf {
             estimate: FilterEstimate::new(&state),
             p_without_walk: p,
             distance_since_update: 0.0,
-            motion: AccumulatedMotion::default(),
-            distance: 0.0,
-            longest: 0.0,
-            drive: CalibratedDrive::default(),
-            longest_by_noise: longest_interval(&drive),
             track_width: drive.track_width.0,
             densities,
         })
@@ -251,17 +221,17 @@ impl Ekf {
     /// The estimate X̂.
     #[must_use]
     pub fn state(&self) -> StateEstimate {
-        self.estimate_now().state()
+        self.estimate.state()
     }
 
     /// X̂ in the coordinates of the filter.
     pub(crate) fn estimate(&self) -> FilterEstimate {
-        self.estimate_now()
+        self.estimate
     }
 
     /// The estimated heading.
     pub(crate) fn heading(&self) -> Heading {
-        Heading::new(Radians(self.estimate_now().heading))
+        Heading::new(Radians(self.estimate.heading))
     }
 
     /// The estimate X̂ as a 7×1 vector, in the order and units of [`StateEstimate::to_array`].
@@ -279,50 +249,26 @@ impl Ekf {
     /// One standard deviation of each state.
     #[must_use]
     pub fn standard_deviations(&self) -> StandardDeviations {
-        let walk = self.walk_until_now();
-        self.of_p(|p| p.standard_deviations(&walk))
+        self.p_without_walk.standard_deviations(&self.walk())
     }
 
     /// P.
     fn p(&self) -> Covariance {
-        let mut p = self.p_now();
-        p.add_random_walk(&self.walk_until_now());
+        let mut p = self.p_without_walk;
+        p.add_random_walk(&self.walk());
         p
     }
 
     /// The random walk of the calibration since the last update.
-    fn walk_until_now(&self) -> AccumulatedRandomWalk {
-        let distance = self.distance_since_update + self.distance;
-        AccumulatedRandomWalk::new(&self.densities, distance)
-    }
-
-    /// P without the random walk of the calibration since the last update.
-    #[inline]
-    fn p_now(&self) -> Covariance {
-        let mut p = self.p_without_walk;
-        if self.distance > 0.0 {
-            self.propagate_copy(&mut p);
-        }
-        p
-    }
-
     #[inline]
     fn walk(&self) -> AccumulatedRandomWalk {
         AccumulatedRandomWalk::new(&self.densities, self.distance_since_update)
     }
 
-    /// Numbers of P without the random walk.
-    #[inline]
-    fn of_p<T>(&self, number: impl Fn(&Covariance) -> T) -> T {
-        if self.distance <= 0.0 { number(&self.p_without_walk) } else { number(&self.p_now()) }
-    }
-
     /// Covariance of the position and variance of the heading, which contain no random walk.
     pub(crate) fn pose_covariance(&self) -> PoseCovariance {
-        self.of_p(|p| {
-            let PoseBlock { xx, xy, yy, hh, .. } = p.pose;
-            PoseCovariance { xx, xy, yy, hh }
-        })
+        let PoseBlock { xx, xy, yy, hh, .. } = self.p_without_walk.pose;
+        PoseCovariance { xx, xy, yy, hh }
     }
 
     /// The variances of the pose.
@@ -333,7 +279,6 @@ impl Ekf {
 
     /// Replaces the variances of the pose by valid ones, each not less than with which P was a covariance.
     pub(crate) fn set_pose_variances(&mut self, variances: PoseVariances) {
-        self.end_interval();
         let p = &mut self.p_without_walk.pose;
         (p.xx, p.yy, p.hh) = (variances.xx, variances.yy, variances.hh);
     }
@@ -366,7 +311,6 @@ impl Ekf {
         if position < Metres(0.0) || heading < Radians(0.0) {
             return Err(EkfError::NegativeVariance);
         }
-        self.end_interval();
         let p = &mut self.p_without_walk.pose;
         let before = *p;
         p.xx += position.0 * position.0;
@@ -405,7 +349,6 @@ impl Ekf {
         if !block.is_valid() {
             return Err(EkfError::VarianceTooLarge);
         }
-        self.end_interval();
         let p = &mut self.p_without_walk;
         p.pose = block;
         p.range_scale.forget_pose();
@@ -431,12 +374,12 @@ impl Ekf {
         &self,
         expected: &'e ExpectedRange,
     ) -> PredictedMeasurement<'e> {
-        self.of_p(|p| p.project(expected))
+        self.p_without_walk.project(expected)
     }
 
     /// Covariance of an expected range with the mean and the difference of the scale errors.
     pub(crate) fn cross_covariance_of_wheels(&self, expected: &ExpectedRange) -> (f32, f32) {
-        self.of_p(|p| p.cross_covariance_of_wheels(expected))
+        self.p_without_walk.cross_covariance_of_wheels(expected)
     }
 
     // ===== Eq. (6): K, X̂ ← X̂ + K ν, P ← P − K H P =====
@@ -459,7 +402,6 @@ impl Ekf {
     ) -> Result<(), EkfError> {
         let innovation = range - expected.range;
         check_measurement(expected, innovation, noise)?;
-        self.end_interval();
         let prediction = self.predict_measurement(expected);
         self.correct(&prediction, innovation, noise, 1.0, None)
     }
@@ -483,7 +425,6 @@ impl Ekf {
         noise: SquareMetres,
         association: f32,
     ) -> Result<(), EkfError> {
-        self.end_interval();
         let prediction = self.predict_measurement(expected);
         self.update_predicted(&prediction, range - expected.range, noise, association, None)
     }
@@ -505,7 +446,6 @@ impl Ekf {
             return Ok(());
         }
         check_measurement(prediction.expected, innovation, noise)?;
-        self.end_interval();
         self.correct(prediction, innovation, noise, association, bias)
     }
 

@@ -1,6 +1,5 @@
 //! The extended Kalman filter: motion model, process noise, covariance, prediction and correction.
 
-pub(crate) mod accumulated;
 pub(crate) mod covariance;
 pub mod ekf;
 pub(crate) mod gyro_fusion;

@@ -36,11 +36,6 @@ impl NoiseDensities {
         }
     }
 
-    /// Of the advance, m²/m.
-    pub(crate) fn advance(&self) -> f32 {
-        self.advance
-    }
-
     /// Whether every density is within the limits of a variance.
     #[must_use]
     pub fn is_valid(&self) -> bool {

@@ -246,14 +246,6 @@ impl<'m> Localizer<'m> {
         result
     }
 
-    /// Applies the motion that has been accumulated since the last reading or correction of P to it (`docs/model.md`, "Covariance
-    /// on demand"). To be called once before several readings of deviations, each of which would apply it to a copy.
-    ///
-    /// The estimate and P are the same before and after; what later steps compute differs in roundings.
-    pub fn apply_motion(&mut self) {
-        self.ekf.apply_motion();
-    }
-
     fn predict(
         &mut self,
         now: Instant,
@@ -326,7 +318,6 @@ impl<'m> Localizer<'m> {
     pub fn odometry_missing(&mut self, now: Instant) {
         let since = |then: Instant| now.checked_duration_since(then).unwrap_or(NO_TIME);
         let (unseen_for, unrecorded) = (since(self.time), since(self.recorded));
-        self.ekf.apply_motion();
         let unseen = *self.unseen.get_or_insert_with(|| Unseen::new(self.time, &self.ekf));
         unseen.grow(&mut self.ekf, now, &self.config);
         let (uncertainty, limits) = (self.ekf.pose_uncertainty(), self.limits());
@@ -419,7 +410,7 @@ impl<'m> Localizer<'m> {
     /// # Errors
     /// [`NoAim`], by the reason for which there is no wall to measure.
     pub fn aim_by(&self, policy: Policy) -> Result<Aim, NoAim> {
-        self.ekf.applied(|ekf| Situation { policy, ..self.situation(ekf) }.choose())
+        Situation { policy, ..self.situation() }.choose()
     }
 
     /// As [`Self::aim`] for one ranger whose servo stands as given: for a robot with several, whose loop turns all servos
@@ -441,8 +432,7 @@ impl<'m> Localizer<'m> {
         ranger: RangerId,
         standing: &Standing,
     ) -> Result<Aim, NoAim> {
-        self.ekf
-            .applied(|ekf| Situation { policy, ..self.situation(ekf) }.choose_of(ranger, standing))
+        Situation { policy, ..self.situation() }.choose_of(ranger, standing)
     }
 
     /// The wall to which a beam of the first ranger at `bearing` (relative to the heading) is square, for a range whose
@@ -459,11 +449,11 @@ impl<'m> Localizer<'m> {
     /// # Errors
     /// [`NoAim`], by the reason for which no wall can be measured.
     pub fn aim_along(&self, ranger: RangerId, bearing: Radians) -> Result<Aim, NoAim> {
-        self.ekf.applied(|ekf| self.situation(ekf).at(ranger, bearing))
+        self.situation().at(ranger, bearing)
     }
 
-    fn situation<'a>(&'a self, ekf: &'a Ekf) -> Situation<'a> {
-        let Self { config, map, history, time, .. } = self;
+    fn situation(&self) -> Situation<'_> {
+        let Self { config, map, ekf, history, time, .. } = self;
         Situation { config, map, ekf, history, now: *time, policy: config.policy }
     }
 
@@ -476,7 +466,6 @@ impl<'m> Localizer<'m> {
         self.history.record_ping(aim.ranger, aim.wall, aim.bearing, aim.range);
         self.pinged = self.time;
         self.association = 0.0;
-        self.ekf.apply_motion();
         let mut ping = ExplainedPing::REFUSED;
         if let Err(refusal) = self.try_fix(aim, range, &mut ping) {
             ping.fix = Fix::Refused(refusal);
@@ -533,7 +522,6 @@ impl<'m> Localizer<'m> {
     ) -> Result<AbsoluteFix, AbsoluteRefusal> {
         let measured = measurement.check()?;
         let back = self.step.back_to(at, self.time)?;
-        self.ekf.apply_motion();
         let prediction = self.ekf.predict_absolute(&measured, &back);
         let indefinite = AbsoluteRefusal::Filter(EkfError::Indefinite);
         let fit = prediction.fit().ok_or(indefinite)?;

@@ -21,7 +21,6 @@ const SHARPEST: f32 = 1.0 / 16_384.0;
 /// seventh state. Indices: x, y, heading, mean and difference of the scale errors, width.
 #[derive(Debug, Clone, Copy)]
 struct SixStateFilter {
-    /// At the start of the interval, as `compensation` and `p`.
     x: [f32; 6],
     /// Kahan compensation of x, y, heading.
     compensation: [f32; 3],
@@ -31,22 +30,6 @@ struct SixStateFilter {
     /// Distance of both wheels since the last update; the random walk of the calibration over it is
     /// not in `p`.
     distance_since_update: f32,
-    sums: Sums,
-}
-
-/// Eq. (27): the motion of an interval.
-#[derive(Debug, Clone, Copy, Default)]
-struct Sums {
-    distance: f32,
-    position: [f32; 2],
-    turn: f32,
-    /// By wheel, right before left: travel, and travel times the position of the other wheel.
-    travel: [f32; 2],
-    about: [[f32; 2]; 2],
-    noise: f32,
-    noise_at: [f32; 2],
-    /// xx, xy, yy.
-    noise_squared: [f32; 3],
 }
 
 /// Adds to a sum with Kahan compensation.
@@ -71,8 +54,7 @@ impl SixStateFilter {
         p[3][4] = 0.5 * (rr - ll);
         p[4][4] = rr + ll;
         p[5][5] = ww;
-        let sums = Sums::default();
-        Self { x, compensation: [0.0; 3], p, drive, distance_since_update: 0.0, sums }
+        Self { x, compensation: [0.0; 3], p, drive, distance_since_update: 0.0 }
     }
 
     /// An entry, from the upper triangle.
@@ -80,104 +62,51 @@ impl SixStateFilter {
         if i <= j { self.p[i][j] } else { self.p[j][i] }
     }
 
-    /// 1 + S of the right and the left wheel.
-    fn factors(&self) -> [f32; 2] {
-        [(1.0 + self.x[3]) + 0.5 * self.x[4], (1.0 + self.x[3]) - 0.5 * self.x[4]]
-    }
-
-    /// 2/W and W/2.
-    fn widths(&self) -> [f32; 2] {
-        let width = self.drive.track_width.0 + self.x[5];
-        [2.0 / width, 0.5 * width]
-    }
-
-    /// The longest interval; the drives of these tests have noise and random walks.
-    fn longest(&self) -> f32 {
-        let Drive { track_width, wheel_noise, scale_walk, track_width_walk } = self.drive;
-        let noise = 0.15 * wheel_noise.0.0;
-        let [_, half_width] = self.widths();
-        let by_walks = [noise / scale_walk.0, noise * track_width.0 / track_width_walk.0.0];
-        by_walks.into_iter().fold((8.0 * (half_width + half_width)).min(2.0), f32::min)
-    }
-
+    /// Eqs. (4), (5) and (7) to (10).
     fn predict(&mut self, travel: WheelTravel) {
-        let distance = travel.right.0.abs() + travel.left.0.abs();
-        if self.sums.distance + distance > self.longest() {
-            self.apply();
-        }
-        let (factors, [twice_per_width, half_width]) = (self.factors(), self.widths());
-        let travel = [travel.right.0, travel.left.0];
-        let quarters = factors.map(|factor| 0.25 * factor);
-        let parts = [travel[0] * quarters[0], travel[1] * quarters[1]];
-        let half_turn = (parts[0] - parts[1]) * twice_per_width;
+        let (right, left) = (travel.right.0, travel.left.0);
+        let [_, _, heading, common, difference, width_error] = self.x;
+        let factor_r = (1.0 + common) + 0.5 * difference;
+        let factor_l = (1.0 + common) - 0.5 * difference;
+        let (rolled_r, rolled_l) = (right * factor_r, left * factor_l);
+        let per_width = 1.0 / (self.drive.track_width.0 + width_error);
+        let turn = (rolled_r - rolled_l) * per_width;
+        let advance = 0.5 * (rolled_r + rolled_l);
+        let (sin, cos) = sin_cos(Radians(heading + 0.5 * turn));
+        let position = [advance * cos, advance * sin];
         let per_metre = 0.25 * (self.drive.wheel_noise.0.0 * self.drive.wheel_noise.0.0);
-        let per_metre = per_metre * twice_per_width * twice_per_width;
-        let noise: [f32; 2] =
-            core::array::from_fn(|i| per_metre * factors[i] * factors[i] * travel[i].abs());
-        let sums = &mut self.sums;
-        sums.distance += distance;
-        let turned = sums.turn + half_turn;
-        sums.turn = turned + half_turn;
-        let (sin, cos) = sin_cos(Radians(self.x[2] + turned));
-        let half = [(parts[0] + parts[1]) * cos, (parts[0] + parts[1]) * sin];
-        let middle = [sums.position[0] + half[0], sums.position[1] + half[1]];
-        sums.position = [middle[0] + half[0], middle[1] + half[1]];
-        let aside = [-(half_width * sin), half_width * cos];
-        // Of the left wheel, then of the right one: each is the centre of the error of the other.
-        let centres =
-            [1.0, -1.0].map(|side| [middle[0] + side * aside[0], middle[1] + side * aside[1]]);
-        let at: [[f32; 2]; 2] = core::array::from_fn(|i| centres[i].map(|c| noise[i] * c));
-        sums.noise += noise[0] + noise[1];
-        for i in 0..2 {
-            sums.travel[i] += travel[i];
-            for axis in 0..2 {
-                sums.about[i][axis] += travel[i] * centres[i][axis];
-            }
-            sums.noise_at[i] += at[0][i] + at[1][i];
-        }
-        for (sum, (i, j)) in sums.noise_squared.iter_mut().zip([(0, 0), (0, 1), (1, 1)]) {
-            *sum += at[0][i] * centres[0][j] + at[1][i] * centres[1][j];
-        }
-    }
-
-    /// Eqs. (28) to (30): applies the motion of the interval.
-    fn apply(&mut self) {
-        let Sums { distance, position, turn, travel, about, noise, noise_at, noise_squared } =
-            self.sums;
-        if distance <= 0.0 {
-            return;
-        }
-        let [twice_per_width, half_width] = self.widths();
-        let per_width = 0.5 * twice_per_width;
-        let since: [[f32; 2]; 2] = core::array::from_fn(|i| {
-            [0, 1].map(|axis: usize| (position[axis] * travel[i] - about[i][axis]) * per_width)
-        });
-        let [a, b] = since;
-        let by = [(b[1] - a[1], -0.5 * (a[1] + b[1])), (a[0] - b[0], 0.5 * (a[0] + b[0]))];
-        let (c, d) = (1.0 + self.x[3], self.x[4]);
+        let (of_r, of_l) =
+            ((right * factor_r * factor_r).abs(), (left * factor_l * factor_l).abs());
+        let noise_s = per_metre * (of_r + of_l);
+        let per_half_width = per_width + per_width;
+        let noise_t = noise_s * per_half_width * per_half_width;
+        let noise_st = per_metre * (of_r - of_l) * per_half_width;
+        // Derivatives of advance and turn by c, d and w, and of x and y by the heading and these.
+        let of_advance = [0.5 * (right + left), 0.25 * (right - left)];
+        let of_turn =
+            [(right - left) * per_width, 0.5 * (right + left) * per_width, -turn * per_width];
         let swing = [-position[1], position[0]];
-        // The rows of x, y and heading: derivatives by heading, c, d and w.
-        let row = |axis: usize| {
-            let (by_c, by_d) = by[axis];
-            [swing[axis], by_c, by_d, (position[axis] - c * by_c - d * by_d) * per_width]
+        let row = |axis: usize, along: f32| {
+            let half = 0.5 * swing[axis];
+            [
+                swing[axis],
+                along * of_advance[0] + half * of_turn[0],
+                along * of_advance[1] + half * of_turn[1],
+                half * of_turn[2],
+            ]
         };
-        let (of_x, of_y) = (row(0), row(1));
-        let of_turn = [
-            (travel[0] - travel[1]) * per_width,
-            0.5 * (travel[0] + travel[1]) * per_width,
-            -turn * per_width,
-        ];
-        let n = [noise * position[0] - noise_at[0], noise * position[1] - noise_at[1]];
-        let [sxx, sxy, syy] = noise_squared;
-        let qxx = syy + position[1] * (n[1] - noise_at[1]);
-        let qxy = noise_at[0] * position[1] - sxy - position[0] * n[1];
-        let qyy = sxx + position[0] * (n[0] - noise_at[0]);
-        let advance = noise * half_width * half_width;
+        let (of_x, of_y) = (row(0, cos), row(1, sin));
+        let noise = |axis: usize, along: f32| {
+            let half = 0.5 * swing[axis];
+            (half * noise_t + along * noise_st, half * noise_st + along * noise_s)
+        };
+        let ((xt, xs), (yt, ys)) = (noise(0, cos), noise(1, sin));
+        let (half_x, half_y) = (0.5 * swing[0], 0.5 * swing[1]);
+        let (qxx, qxy) = (half_x * xt + cos * xs, half_x * yt + cos * ys);
+        let qyy = half_y * yt + sin * ys;
 
-        let middle = self.distance_since_update + 0.5 * distance;
-        let middle = Self { distance_since_update: middle, ..*self };
-        let old = Self { p: middle.with_random_walk(), ..*self };
-        self.distance_since_update += distance;
+        let old = Self { p: self.with_random_walk(), ..*self };
+        self.distance_since_update += right.abs() + left.abs();
         let at = |i: usize, j: usize| old.at(i, j);
         let turn_of = |c: f32, d: f32, w: f32| of_turn[0] * c + of_turn[1] * d + of_turn[2] * w;
         let along = |row: &[f32; 4], v: [f32; 4]| {
@@ -196,22 +125,21 @@ impl SixStateFilter {
         for (i, row, moved, q) in [(0, of_x, x, qxx), (1, of_y, y, qyy)] {
             let sum = core::array::from_fn(|k| at(i, k + 2) + moved[k]);
             let growth = along(&row, sum);
-            new[i][i] += lacking(new[i][i], advance) + (growth + ROUNDING * growth.abs() + q);
+            new[i][i] += lacking(new[i][i], noise_s) + (growth + ROUNDING * growth.abs() + q);
         }
         new[0][1] += along(&of_y, column(0)) + along(&of_x, y) + qxy;
-        for (i, moved, q) in [(0, x, -n[1]), (1, y, n[0])] {
+        for (i, moved, q) in [(0, x, xt), (1, y, yt)] {
             new[i][2] = moved[0] + (turn_of(moved[1], moved[2], moved[3]) + q);
             new[i][3..6].copy_from_slice(&moved[1..]);
         }
         let [hc, hd, hw] = core::array::from_fn(|k| at(2, k + 3) + t[k]);
         let growth = turn_of(at(2, 3) + hc, at(2, 4) + hd, at(2, 5) + hw);
-        new[2][2] += lacking(new[2][2], noise) + (growth + noise);
+        new[2][2] += lacking(new[2][2], noise_t) + (growth + noise_t);
         new[2][3..6].copy_from_slice(&[hc, hd, hw]);
         self.p = new;
         self.add_to_pose(0, position[0]);
         self.add_to_pose(1, position[1]);
         self.add_to_pose(2, turn);
-        self.sums = Sums::default();
     }
 
     /// P, with the random walk of the calibration.
@@ -249,7 +177,6 @@ impl SixStateFilter {
     }
 
     fn update(&mut self, range: f32, expected: f32, h: [f32; 3], noise: f32) {
-        self.apply();
         (self.p, self.distance_since_update) = (self.with_random_walk(), 0.0);
         let dot = |m: &[f32; 6]| h[0] * m[0] + h[1] * m[1] + h[2] * m[2];
         let m = self.cross(h);
@@ -300,7 +227,6 @@ impl SixStateFilter {
     /// the seventh zero.
     fn bits(&self) -> Vec<u32> {
         let mut shown = *self;
-        shown.apply();
         shown.p = shown.with_random_walk();
         let wheels =
             |common: f32, difference: f32| [common + 0.5 * difference, common - 0.5 * difference];
@@ -357,7 +283,7 @@ proptest! {
                     let expected = ExpectedRange::new(&wall, mount, &state);
                     let range = Metres(expected.range.0 + 0.02 * sigmas);
                     seven.update(range, &expected, SquareMetres(noise)).unwrap();
-                    six.apply();
+
                     let (of_six, h) = six.expected(&wall, mount);
                     six.update(range.0, of_six, h, noise);
                     prop_assert_eq!(bits(&seven), six.bits(), "after {:?}", event);

@@ -54,11 +54,6 @@ impl PoseBlock {
         Self { xx, yy: xx, hh, ..Self::default() }
     }
 
-    /// xx + yy + hh, m² + rad².
-    pub(crate) fn sum_of_variances(&self) -> f32 {
-        self.xx + self.yy + self.hh
-    }
-
     /// Whether the variances of the pose are valid.
     #[inline]
     pub fn is_valid(&self) -> bool {
@@ -84,12 +79,6 @@ impl CalibrationBlock {
         let dd = difference * difference;
         self.cc += 0.25 * (self.dd - dd);
         self.dd = dd;
-    }
-
-    /// cc + dd + ww with the accumulated random walk, 1 + m².
-    pub(crate) fn sum_of_variances(&self, walk: &AccumulatedRandomWalk) -> f32 {
-        let (cc, dd, ww) = self.variances_with(walk);
-        cc + dd + ww
     }
 }
 

@@ -3,7 +3,7 @@
 use super::blocks::{CalibrationBlock, Covariance, PoseBlock, RangeScaleBlock};
 use super::transition::Transition;
 use crate::filter::process_noise::AccumulatedRandomWalk;
-use crate::geometry::numeric::{at_most_max_variance, positive_part};
+use crate::geometry::numeric::positive_part;
 
 /// Relative rounding error of a sum of a few terms: 4 u, four times 2⁻²⁴.
 const ROUNDING: f32 = 1.0 / 4_194_304.0;
@@ -62,21 +62,6 @@ impl PoseBlock {
         p.hh += missing(p.hh, f.hh) + (hh + f.hh);
         (p.hc, p.hd, p.hw) = (hc, hd, hw);
     }
-
-    /// Sets variances that are not valid to the limit that they exceed.
-    #[inline]
-    pub fn limit_variances(&mut self) {
-        if !self.is_valid() {
-            self.limit_each();
-        }
-    }
-
-    #[cold]
-    fn limit_each(&mut self) {
-        for variance in [&mut self.xx, &mut self.yy, &mut self.hh] {
-            *variance = if *variance < 0.0 { 0.0 } else { at_most_max_variance(*variance) };
-        }
-    }
 }
 
 impl RangeScaleBlock {
@@ -100,6 +85,3 @@ impl Covariance {
         self.range_scale.propagate(f);
     }
 }
-
-#[cfg(test)]
-mod tests;

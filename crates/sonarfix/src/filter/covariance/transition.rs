@@ -1,5 +1,4 @@
-//! Jacobian F and process noise Q of the pose over a motion, of one increment or of an interval (`docs/model.md`, eqs. 8, 9, 28
-//! and 29).
+//! Jacobian F and process noise Q of the pose over one odometry increment (`docs/model.md`, eqs. 8 and 9).
 
 use crate::filter::motion::LinearizedMotion;
 use crate::filter::process_noise::ProcessNoise;
@@ -33,10 +32,10 @@ pub struct Transition {
 
 impl Transition {
     // ===== Eqs. (8) and (9) =====
-    /// Of one increment.
+    /// Of a motion and the noise of its travels.
     #[inline]
     #[must_use]
-    pub fn of_increment(motion: &LinearizedMotion, noise: &ProcessNoise) -> Self {
+    pub fn new(motion: &LinearizedMotion, noise: &ProcessNoise) -> Self {
         let m = motion;
         let (gx, gy) = (-0.5 * m.dy, 0.5 * m.dx);
         // Covariances of the noise of x and y with that of turn and advance.

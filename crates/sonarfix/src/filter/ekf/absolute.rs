@@ -42,7 +42,7 @@ impl Ekf {
     /// An absolute measurement, seen from the filter; `back` leads to the pose at its time.
     pub(crate) fn predict_absolute(&self, measured: &Components, back: &Return) -> PredictedPose {
         let (z, then) = (&measured.value, &back.moved);
-        let at = self.estimate_now();
+        let at = self.estimate;
         let turned = Heading::new(Radians(at.heading - then.h));
         let mut innovation = PoseVector {
             x: z.x - (at.x - then.x),
@@ -107,7 +107,6 @@ impl Ekf {
         association: f32,
         mut bias: Option<&mut GyroBias>,
     ) -> Result<(), EkfError> {
-        self.end_interval();
         let before = self.estimate;
         let column = bias.as_deref().copied();
         let unlikely = (1.0 - association) / association;

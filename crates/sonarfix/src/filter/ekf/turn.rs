@@ -49,7 +49,6 @@ impl Ekf {
         limits: SlipLimits,
         bias: &mut GyroBias,
     ) -> Result<TurnAgreement, EkfError> {
-        self.end_interval();
         // Sine and cosine are those of the combined turn, below: `dx` is the advance until then.
         let mut motion =
             LinearizedMotion::new(self.track_width, &self.estimate, travel, |_| (0.0, 1.0));
@@ -105,7 +104,7 @@ impl Ekf {
         travel: WheelTravel,
         bias: &mut GyroBias,
     ) -> Result<(), EkfError> {
-        let estimate = self.estimate_now();
+        let estimate = self.estimate;
         let motion = LinearizedMotion::new(self.track_width, &estimate, travel, sin_cos_within);
         self.predict(travel)?;
         bias.propagate(&motion);
@@ -125,7 +124,7 @@ impl Ekf {
         let p = &mut self.p_without_walk;
         let (before, column) = (*p, *bias);
         bias.turn(p, by_bias);
-        p.propagate(&walk, &Transition::of_increment(motion, noise));
+        p.propagate(&walk, &Transition::new(motion, noise));
         bias.propagate(motion);
         bias.turn(p, by_bias);
         if !p.pose.is_valid() {
@@ -146,7 +145,6 @@ impl Ekf {
         deviations: f32,
         bias: &mut GyroBias,
     ) -> bool {
-        self.end_interval();
         let mut p = self.p_without_walk;
         p.add_random_walk(&self.walk());
         let innovation = difference.value - difference.expected(&self.estimate, bias);

@@ -1,4 +1,4 @@
-//! The filter alone: predict, P on demand, expected range, gate, update.
+//! The filter alone: predict, expected range, gate, update.
 #![no_std]
 #![no_main]
 
@@ -48,11 +48,6 @@ extern "C" fn probe_predict(filter: &mut Filter, travel: &WheelTravel) {
 }
 
 #[unsafe(no_mangle)]
-extern "C" fn probe_apply(filter: &mut Filter, (): &()) {
-    filter.ekf.apply_motion();
-}
-
-#[unsafe(no_mangle)]
 extern "C" fn probe_expect(out: &mut Expectation, sight: &Sight) {
     out.expected = ExpectedRange::new(&sight.wall, sight.mount, &out.ekf.state());
 }
@@ -89,14 +84,13 @@ fn drive() -> Result<bool, EkfError> {
     let mut filter = Filter { ekf, all_well: true };
 
     let mut meter = Meter::start();
-    let [mut predicts, mut applies, mut expects, mut gates, mut updates] = [Cost::default(); 5];
+    let [mut predicts, mut expects, mut gates, mut updates] = [Cost::default(); 4];
     let mut turns = walls.iter().cycle();
     for step in 0..STEPS {
         meter.measure(&mut predicts, probe_predict, &mut filter, &travel(step));
         if !(step + 1).is_multiple_of(STEPS_A_RANGE) {
             continue;
         }
-        meter.measure(&mut applies, probe_apply, &mut filter, &());
         let Some(&wall) = turns.next() else { continue };
         // Ahead of the robot's centre and to its left, so that the lever arm matters.
         let sight = Sight { wall, mount: Point::new(0.05, 0.02) };
@@ -115,7 +109,6 @@ fn drive() -> Result<bool, EkfError> {
         meter.measure(&mut updates, probe_update, &mut filter, &heard);
     }
     report::cost(c"predict", &predicts);
-    report::cost(c"apply", &applies);
     report::cost(c"expect", &expects);
     report::cost(c"gate", &gates);
     report::cost(c"update", &updates);
