@@ -65,7 +65,7 @@ impl Filter for Kernel {
         let sin_cos = |_| (step.sin, step.cos);
         let motion = LinearizedMotion::new(self.track_width, &self.estimate, travel, sin_cos);
         let f = Transition::new(&motion, &self.noise);
-        self.p.pose.propagate(&self.p.calibration, &self.walk, &f);
+        self.p.pose = self.p.pose.propagated(&self.p.calibration, &self.walk, &f);
         motion.advance(&mut self.estimate);
     }
 

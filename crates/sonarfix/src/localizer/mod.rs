@@ -471,7 +471,9 @@ impl<'m> Localizer<'m> {
             ping.fix = Fix::Refused(refusal);
         }
         let ExplainedPing { fix, evidence, contradicts, is_repeated } = ping;
-        if self.history.has_failed(aim.ranger, &self.config) && fix.innovation_used().is_none() {
+        let has_failed =
+            self.config.has_several_sonars() && self.history.has_failed(aim.ranger, &self.config);
+        if has_failed && fix.innovation_used().is_none() {
             // It says nothing about the pose.
             return fix;
         }
@@ -632,13 +634,15 @@ impl<'m> Localizer<'m> {
         self.association = association;
         let is_repeated =
             measured.is_ok_and(|range| entry.source.is_some_and(|source| source.repeats(range)));
-        let returned = match measured {
-            Ok(_) if association > 0.5 || is_repeated => Returned::Explained,
-            Ok(_) => Returned::Unexplained,
-            Err(_) => Returned::Silence,
-        };
-        let working = expected_echo.shares(&self.config.echo);
-        self.history.record_returned(aim.ranger, returned, &working, self.time);
+        if self.config.has_several_sonars() {
+            let returned = match measured {
+                Ok(_) if association > 0.5 || is_repeated => Returned::Explained,
+                Ok(_) => Returned::Unexplained,
+                Err(_) => Returned::Silence,
+            };
+            let working = expected_echo.shares(&self.config.echo);
+            self.history.record_returned(aim.ranger, returned, &working, self.time);
+        }
         let origin = match measured {
             Ok(_) if association > 0.5 => Origin::Wall,
             Ok(range) => Origin::Other(range),

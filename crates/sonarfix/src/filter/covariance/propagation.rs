@@ -10,18 +10,19 @@ const ROUNDING: f32 = 1.0 / 4_194_304.0;
 
 impl PoseBlock {
     // ===== Eqs. (5) and (10): P ← F P Fᵀ + Q, rows of the pose =====
-    /// Propagates the rows of the pose.
+    /// The rows of the pose after a motion.
     ///
     /// The new pose is the old pose plus the turn t and the displacement a, b, which are linear in the old heading and the
     /// calibration. The covariance of two new errors is built up factor by factor: `xh` of the new x with the old heading, then
     /// `p.xh` of both new ones. A variance grows by the form of its own displacement on the sum of its old and its new row.
     #[inline]
-    pub fn propagate(
-        &mut self,
+    #[must_use]
+    pub fn propagated(
+        &self,
         calibration: &CalibrationBlock,
         walk: &AccumulatedRandomWalk,
         f: &Transition,
-    ) {
+    ) -> Self {
         let (p, q) = (self, calibration);
         let (cc, dd, ww) = q.variances_with(walk);
         let (gx, gy) = (-f.dy, f.dx);
@@ -46,21 +47,30 @@ impl PoseBlock {
 
         let xx = along_x(p.xh + xh, p.xc + xc, p.xd + xd, p.xw + xw);
         let yy = along_y(p.yh + yh, p.yc + yc, p.yd + yd, p.yw + yw);
-        p.xx += missing(p.xx, f.advance) + (widened(xx) + f.xx);
-        p.yy += missing(p.yy, f.advance) + (widened(yy) + f.yy);
-        p.xy += along_y(p.xh, p.xc, p.xd, p.xw) + along_x(yh, yc, yd, yw) + f.xy;
-        p.xh = xh + (turn(xc, xd, xw) + f.xh);
-        p.yh = yh + (turn(yc, yd, yw) + f.yh);
-        (p.xc, p.xd, p.xw) = (xc, xd, xw);
-        (p.yc, p.yd, p.yw) = (yc, yd, yw);
+        let xy = along_y(p.xh, p.xc, p.xd, p.xw) + along_x(yh, yc, yd, yw);
 
         // The new heading with the calibration, and with itself.
         let hc = p.hc + turn(cc, q.cd, q.cw);
         let hd = p.hd + turn(q.cd, dd, q.dw);
         let hw = p.hw + turn(q.cw, q.dw, ww);
         let hh = turn(p.hc + hc, p.hd + hd, p.hw + hw);
-        p.hh += missing(p.hh, f.hh) + (hh + f.hh);
-        (p.hc, p.hd, p.hw) = (hc, hd, hw);
+        Self {
+            xx: p.xx + (missing(p.xx, f.advance) + (widened(xx) + f.xx)),
+            xy: p.xy + (xy + f.xy),
+            yy: p.yy + (missing(p.yy, f.advance) + (widened(yy) + f.yy)),
+            hh: p.hh + (missing(p.hh, f.hh) + (hh + f.hh)),
+            xh: xh + (turn(xc, xd, xw) + f.xh),
+            yh: yh + (turn(yc, yd, yw) + f.yh),
+            xc,
+            xd,
+            xw,
+            yc,
+            yd,
+            yw,
+            hc,
+            hd,
+            hw,
+        }
     }
 }
 
@@ -81,7 +91,7 @@ impl Covariance {
     /// Propagates P, its calibration with the random walk.
     #[inline]
     pub fn propagate(&mut self, walk: &AccumulatedRandomWalk, f: &Transition) {
-        self.pose.propagate(&self.calibration, walk, f);
+        self.pose = self.pose.propagated(&self.calibration, walk, f);
         self.range_scale.propagate(f);
     }
 }

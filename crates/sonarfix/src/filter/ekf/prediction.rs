@@ -1,7 +1,7 @@
 //! Prediction from wheel travel: state and covariance move with every increment.
 
 use super::{Ekf, EkfError, invalid};
-use crate::filter::covariance::Transition;
+use crate::filter::covariance::{Covariance, Transition};
 use crate::filter::motion::{LinearizedMotion, WheelTravel};
 use crate::filter::process_noise::ProcessNoise;
 use crate::geometry::numeric::is_within;
@@ -39,13 +39,11 @@ impl Ekf {
         let transition = Transition::new(&motion, &noise);
         let walk = self.walk();
         let p = &mut self.p_without_walk;
-        let before = p.pose;
-        p.pose.propagate(&p.calibration, &walk, &transition);
-        if !p.pose.is_valid() {
-            let error = invalid(p);
-            p.pose = before;
-            return Err(error);
+        let pose = p.pose.propagated(&p.calibration, &walk, &transition);
+        if !pose.is_valid() {
+            return Err(invalid(&Covariance { pose, ..*p }));
         }
+        p.pose = pose;
         p.range_scale.propagate(&transition);
         self.distance_since_update += distance;
         motion.advance(&mut self.estimate);
