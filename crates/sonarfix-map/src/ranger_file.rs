@@ -1,6 +1,6 @@
 //! Reads the ranger of a robot file: its name, or its name with different settings.
 
-use sonarfix::config::{LightBeam, Ranging};
+use sonarfix::config::{LightBeam, LightLinked, Ranging};
 use sonarfix::geometry::units::{Duration, Radians};
 use sonarfix_hal::config::RangerConfig;
 use sonarfix_hal::ranger::{Celsius, PulseTiming, RangerKind, RangerSettings};
@@ -67,6 +67,7 @@ fn read_beam(sonar: &Table<'_>, kind: RangerKind) -> Ranging {
     Ranging::Light(LightBeam {
         spot: angle("spot", usual.map(|beam| beam.spot)),
         pointing: angle("pointing", usual.map(|beam| beam.pointing)),
+        linked: LightLinked,
     })
 }
 

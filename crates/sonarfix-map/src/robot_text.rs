@@ -224,7 +224,7 @@ fn pulse(pulse: MeasuredPulse) -> String {
 
 /// The line of the beam of light; nothing of a sonar.
 fn beam(ranging: Ranging) -> String {
-    let Ranging::Light(LightBeam { spot, pointing }) = ranging else { return String::new() };
+    let Ranging::Light(LightBeam { spot, pointing, .. }) = ranging else { return String::new() };
     let (spot, pointing) = (degrees(spot), degrees(pointing));
     format!("beam = {{ spot = \"{spot} deg\", pointing = \"{pointing} deg\" }}\n")
 }

@@ -17,7 +17,7 @@ use crate::filter::ekf::{Ekf, EkfError, GyroTurn, SlipLimits, TurnAgreement};
 use crate::filter::motion::WheelTravel;
 use crate::geometry::elementary::sqrt;
 use crate::geometry::units::{Duration, Radians, RadiansPerSecond, seconds};
-use crate::sensor::gyro::{GyroParameters, MeasuredTurn, TurnRefusal};
+use crate::sensor::gyro::{GyroLinked, GyroParameters, MeasuredTurn, TurnRefusal};
 
 /// Standard deviations up to which a difference of turns is noise.
 const GATE: f32 = 5.0;
@@ -78,6 +78,8 @@ pub struct GyroFusion {
     latest: TurnUse,
     slips: u32,
     conflicts: u32,
+    /// Without the feature `gyro` it has no value, and no code of it is linked.
+    _linked: GyroLinked,
 }
 
 /// The present slip: its time, the time since its last step, and the difference that it has caused.
@@ -98,6 +100,7 @@ impl GyroFusion {
             latest: TurnUse::Missing,
             slips: 0,
             conflicts: 0,
+            _linked: parameters.linked,
         }
     }
 
@@ -259,5 +262,5 @@ impl GyroFusion {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "gyro"))]
 mod tests;
