@@ -10,6 +10,7 @@ mod cargo;
 mod checks;
 mod ci;
 mod circles;
+mod compositions;
 mod elf;
 mod emulator;
 mod endurance;
@@ -86,6 +87,8 @@ enum Task {
     Panics,
     /// Instructions, code, stack and memory against `budgets.toml`.
     Budgets,
+    /// Flash, memory and instructions of what a robot links: writes docs/compositions.md.
+    Compositions(compositions::Args),
     /// Programs for emulated boards: formatting, Clippy.
     LintEmulated,
     /// Sonarfix and every peer compute the same.
@@ -200,6 +203,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Golden => golden::check(),
         Task::Panics => panics::check(),
         Task::Budgets => budgets::check(),
+        Task::Compositions(args) => compositions::run(&args),
         Task::LintEmulated => checks::lint_emulated(),
         Task::Peers => checks::peers(),
         Task::Msrv => publish::msrv(),

@@ -63,7 +63,7 @@ impl CalibrationPrior {
     #[must_use]
     pub fn difference_of(&self, right: f32, left: f32) -> Option<f32> {
         let difference = at_least(self.scale_difference?, 1.1 * (right - left).abs());
-        (difference < libm::hypotf(right, left)).then_some(difference)
+        (difference * difference < right * right + left * left).then_some(difference)
     }
 }
 

@@ -90,6 +90,11 @@ struct Slip {
     angle: f32,
 }
 
+#[expect(
+    clippy::manual_map,
+    clippy::ref_option,
+    reason = "the compiler removes an arm without values here, but not a call of `map`, which takes a reference"
+)]
 impl GyroFusion {
     pub fn new(parameters: &GyroParameters) -> Self {
         Self {
@@ -104,7 +109,7 @@ impl GyroFusion {
         }
     }
 
-    pub fn status(&self) -> GyroStatus {
+    fn status(&self) -> GyroStatus {
         GyroStatus {
             bias: RadiansPerSecond(self.bias.rate),
             deviation: RadiansPerSecond(sqrt(self.bias.variance())),
@@ -114,9 +119,30 @@ impl GyroFusion {
         }
     }
 
+    /// That of a robot with these parameters.
+    #[allow(unreachable_code, reason = "without the feature there are none")]
+    pub fn of(parameters: &Option<GyroParameters>) -> Option<Self> {
+        match parameters {
+            Some(parameters) => Some(Self::new(parameters)),
+            None => None,
+        }
+    }
+
     /// The bias, for the correction by a range.
-    pub fn bias_mut(&mut self) -> &mut GyroBias {
-        &mut self.bias
+    #[inline]
+    pub fn bias_of(gyro: &mut Option<Self>) -> Option<&mut GyroBias> {
+        match gyro {
+            Some(gyro) => Some(&mut gyro.bias),
+            None => None,
+        }
+    }
+
+    /// The status, if there is a gyro.
+    pub fn status_of(gyro: &Option<Self>) -> Option<GyroStatus> {
+        match gyro {
+            Some(gyro) => Some(gyro.status()),
+            None => None,
+        }
     }
 
     /// The pose was replaced.
