@@ -1,9 +1,9 @@
 //! Straight lines in an image of thin lines.
 //!
-//! From a pixel that no line explains, the direction with the most such pixels is followed in both directions; a line through
-//! its pixels by least squares is followed again, until it grows no longer. Its pixels are then explained. A line may cross
-//! others, whose pixels keep it connected. Short lines, whose direction is uncertain, take that of a long line if it
-//! is parallel or perpendicular to them within their uncertainty.
+//! A line starts at a pixel that no line explains. It follows the direction with the most such pixels, both ways. A fit by
+//! least squares gives it a better direction, which it follows again, until it gains no more pixels. The line then explains
+//! its pixels. It may cross other lines, whose pixels keep it connected. The direction of a short line is uncertain; it takes
+//! that of a long line that is parallel or perpendicular to it within the uncertainty.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
