@@ -19,9 +19,8 @@ use sonarfix_replay::REFERENCE_HEADER;
 use sonarfix_report::Table;
 use sonarfix_report::residuals::{Residual, residuals};
 
-use crate::output::check_file;
 use crate::robot_edit;
-use crate::table;
+use sonarfix_terminal::output::check_file;
 
 /// Maximum number of skipped lines that are printed.
 const SHOWN: usize = 10;
@@ -97,9 +96,9 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         std::fs::write(out, svg).with_context(|| out.display().to_string())?;
     }
     if args.json {
-        crate::json::print(&Json::of(&found))
+        sonarfix_terminal::json::print(&Json::of(&found))
     } else {
-        println!("{}", table::text(&estimates(&found, &robot)));
+        println!("{}", estimates(&found, &robot).text());
         println!("\n{}", statement(&found));
         Ok(())
     }

@@ -8,7 +8,7 @@ use sonarfix_hal::config::RobotConfig;
 use sonarfix_link::baked;
 use sonarfix_map::{robot_file, robot_text};
 
-use crate::output::check_file;
+use sonarfix_terminal::output::check_file;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {

@@ -12,7 +12,7 @@ use sonarfix_map::{Floor, MapFile, robot_file};
 use sonarfix_replay::{Replay, Summary, log};
 use sonarfix_sim::trace::{Recorder, Wall};
 
-use crate::output::check_file;
+use sonarfix_terminal::output::check_file;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {

@@ -5,8 +5,8 @@ use std::fs;
 use anyhow::{Context, ensure};
 use sonarfix_map::{MapFile, Scenario, robot_file};
 
-use crate::output::check_folder;
 use answers::Answers;
+use sonarfix_terminal::output::check_folder;
 
 mod answers;
 mod question;

@@ -11,7 +11,7 @@ use sonarfix::map::Map;
 use sonarfix_map::{Limits, MapFile, Severity, bake, flaws, robot_file, simplify, symmetries};
 
 use crate::map_exchange;
-use crate::output::check_file;
+use sonarfix_terminal::output::check_file;
 
 /// Maximum number of findings that are printed.
 const SHOWN: usize = 100;

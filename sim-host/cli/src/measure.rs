@@ -13,8 +13,8 @@ use sonarfix_link::Command;
 use sonarfix_map::robot_file;
 
 use crate::monitor::PortArgs;
-use crate::output::check_file;
 use crate::robot_edit;
+use sonarfix_terminal::output::check_file;
 
 use robot::Robot;
 use wheel::Turned;

@@ -6,9 +6,9 @@ use anyhow::{Context, bail, ensure};
 use cpu_time::ProcessTime;
 use sonarfix_rows::{Plan, Rows};
 
-use crate::output::check_file;
 use crate::rows;
 use crate::table::{self, Beside, Measured};
+use sonarfix_terminal::output::check_file;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -40,13 +40,13 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let (summary, worst) = rows::summary(open, args.worst)?;
     let measured = Measured { summary, cpu_seconds: start.elapsed().as_secs_f64() };
     if args.json {
-        return crate::json::print(&measured);
+        return sonarfix_terminal::json::print(&measured);
     }
     // The truth is in the scenario: the table shows the errors.
     let errors = Beside { truth: [0.0; 7], paper: false };
-    println!("{}", table::text(&table::states(&measured, &errors)));
+    println!("{}", table::states(&measured, &errors).text());
     if !worst.is_empty() {
-        println!("\n{}", table::text(&rows::worst_table(&worst)));
+        println!("\n{}", rows::worst_table(&worst).text());
     }
     Ok(())
 }

@@ -15,10 +15,10 @@ use sonarfix_monitor::terminal::{self, History};
 use sonarfix_monitor::{Monitor, Received, view};
 use sonarfix_sim::trace::Wall;
 
-use crate::output::check_file;
-use crate::progress::{catch_interrupt, is_interrupted};
 use crate::serve::{self, ServeArgs};
 use crate::signs_of_life;
+use sonarfix_terminal::output::check_file;
+use sonarfix_terminal::progress::{catch_interrupt, is_interrupted};
 
 #[derive(Debug, clap::Args)]
 pub struct Args {

@@ -14,12 +14,11 @@ use sonarfix_replay::{ByVerdict, Figures, Replay, Summary};
 use sonarfix_report::{Report, Table};
 use sonarfix_sim::trace::Recorder;
 
-use crate::output::{check_file, check_folder};
 use crate::overrides::PolicyName;
 use crate::provenance;
 use crate::run::Output;
 use crate::serve::{self, PacedArgs};
-use crate::table;
+use sonarfix_terminal::output::{check_file, check_folder};
 
 /// Maximum number of skipped lines that are printed.
 const SHOWN: u64 = 10;
@@ -81,9 +80,9 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     }
     let tables = tables(&summary);
     if args.output.json {
-        crate::json::print(&summary)?;
+        sonarfix_terminal::json::print(&summary)?;
     } else {
-        let texts: Vec<_> = tables.iter().map(table::text).collect();
+        let texts: Vec<_> = tables.iter().map(Table::text).collect();
         println!("{}", texts.join("\n\n"));
     }
     if let Some(dir) = &args.output.out {

@@ -12,8 +12,8 @@ use sonarfix_sim::row::Row;
 use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::statistics::{Summary, Totals};
 
-use crate::progress::Runs;
 use crate::table::Measured;
+use sonarfix_terminal::progress::Runs;
 
 /// Runs between two writes of the file: what a killed process loses at most.
 const CHUNK: u32 = 256;

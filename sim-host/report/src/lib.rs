@@ -9,7 +9,7 @@
 //! | module | what |
 //! |---|---|
 //! | `figures` | the content of each figure; `figures.js`: values, zoom and pan
-//! | `called_lost` | the figure of `sonarfix health` |
+//! | `called_lost` | the figure of `sonarfix-studies health` |
 //! | `chart`, `axis`, `points` | drawing of a figure |
 //! | [`heat_map`] | a map with a quantity along a path |
 //! | `moment.js`, `drawing.js` | the drawing of a run, shared with the live page and the playground; the report's player is `player.js` |

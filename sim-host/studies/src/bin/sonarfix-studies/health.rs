@@ -1,12 +1,12 @@
-//! `sonarfix health`: the reliability of the health verdict.
+//! `sonarfix-studies health`: the reliability of the health verdict.
 
 use std::path::PathBuf;
 
 use anyhow::Context;
 use sonarfix_studies::health_page;
 
-use crate::output::check_file;
-use crate::progress::Runs;
+use sonarfix_terminal::output::check_file;
+use sonarfix_terminal::progress::Runs;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {

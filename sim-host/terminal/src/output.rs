@@ -14,16 +14,19 @@ use std::process::exit;
 use anyhow::Context;
 
 /// As the standard library's, without panic.
+#[macro_export]
 macro_rules! println {
     ($($argument:tt)*) => { $crate::output::print(format_args!("{}\n", format_args!($($argument)*))) };
 }
 
 /// As the standard library's, without panic.
+#[macro_export]
 macro_rules! print {
     ($($argument:tt)*) => { $crate::output::print(format_args!($($argument)*)) };
 }
 
 /// As the standard library's, without panic.
+#[macro_export]
 macro_rules! eprintln {
     ($($argument:tt)*) => { $crate::output::report(format_args!($($argument)*)) };
 }

@@ -1,12 +1,13 @@
-//! `sonarfix floor-plans`: two measurement policies on random floor plans.
+//! `sonarfix-studies floor-plans`: two measurement policies on random floor plans.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use sonarfix_studies::floor_plan::{FloorPlan, compare, page, picture};
+use sonarfix_report::heat_map::HeatMap;
+use sonarfix_studies::floor_plan::{FloorPlan, compare, page};
 
-use crate::output::{check_file, check_folder};
-use crate::progress::Runs;
+use sonarfix_terminal::output::{check_file, check_folder};
+use sonarfix_terminal::progress::Runs;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -71,7 +72,7 @@ fn draw(seed: u64, args: &Args) -> anyhow::Result<()> {
     }
     let plan = FloorPlan::new(seed);
     if let Some(file) = &args.out {
-        write(file, &picture::place(&plan.scenario()?).svg())?;
+        write(file, &HeatMap::of(&plan.scenario()?).svg())?;
     }
     if let Some(file) = &args.toml {
         write(file, &plan.toml)?;
