@@ -7,6 +7,7 @@
 //! NaN or infinity in an argument is a typed error or a [`Fix::Refused`], and the estimate is unchanged
 //! to the bit.
 
+mod mode;
 pub(crate) mod unseen;
 
 use self::unseen::Unseen;
@@ -33,6 +34,7 @@ use crate::sensor::absolute::{
 use crate::sensor::gyro::MeasuredTurn;
 use crate::sensor::range::Innovation;
 
+pub use self::mode::Mode;
 pub use self::unseen::{UNKNOWN_HEADING, UNKNOWN_POSITION};
 pub use crate::association::outcome::{AbsoluteFix, AbsoluteRefusal, Agreement, Fix, Refusal};
 pub use crate::filter::gyro_fusion::{GyroStatus, TurnUse};
