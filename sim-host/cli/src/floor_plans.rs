@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
 use sonarfix_studies::floor_plan::{FloorPlan, compare, page, picture};
 
 use crate::output::{check_file, check_folder};
@@ -80,5 +79,5 @@ fn draw(seed: u64, args: &Args) -> anyhow::Result<()> {
 }
 
 fn write(file: &Path, text: &str) -> anyhow::Result<()> {
-    std::fs::write(file, text).with_context(|| format!("cannot write {}", file.display()))
+    sonarfix_files::write(file, text)
 }

@@ -88,8 +88,7 @@ pub fn import(args: &Import) -> anyhow::Result<()> {
     }
     let floor = &imported.floor;
     let text = if ending(&args.out) == "csv" { floor.to_csv() } else { floor.to_toml() };
-    std::fs::write(&args.out, text)
-        .with_context(|| format!("cannot write {}", args.out.display()))?;
+    sonarfix_files::write(&args.out, text)?;
     println!("{}: {} walls", args.out.display(), floor.named_walls().len());
     Ok(())
 }
@@ -130,5 +129,5 @@ pub fn export(floor: &Floor, args: &Target) -> anyhow::Result<()> {
         "geojson" => geojson::write(floor, anchor(args.anchor)?),
         other => bail!("--out: unknown ending `{other}`: expected yaml, svg or geojson"),
     };
-    std::fs::write(&args.out, text).with_context(|| format!("cannot write {}", args.out.display()))
+    sonarfix_files::write(&args.out, text)
 }

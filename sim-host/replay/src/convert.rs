@@ -9,10 +9,11 @@ mod robot_file;
 
 use std::fmt::Write as _;
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, BufWriter, Write};
+use std::io::{self, BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 
 use flate2::bufread::MultiGzDecoder;
+use sonarfix_files::Output;
 use sonarfix_map::NamedWall;
 use sonarfix_sim::trace::Pose;
 
@@ -95,21 +96,21 @@ pub fn open(path: &Path) -> Result<Box<dyn BufRead>, ConvertError> {
 /// A file being written.
 struct Out {
     path: PathBuf,
-    file: BufWriter<File>,
+    file: Output,
 }
 
 impl Out {
     fn create(path: PathBuf) -> Result<Self, ConvertError> {
-        let file = File::create(&path).map_err(ConvertError::write(&path))?;
-        Ok(Self { path, file: BufWriter::new(file) })
+        let file = Output::create(&path).map_err(ConvertError::write(&path))?;
+        Ok(Self { path, file })
     }
 
     fn line(&mut self, line: impl std::fmt::Display) -> Result<(), ConvertError> {
         writeln!(self.file, "{line}").map_err(ConvertError::write(&self.path))
     }
 
-    fn close(mut self) -> Result<(), ConvertError> {
-        self.file.flush().map_err(ConvertError::write(&self.path))
+    fn close(self) -> Result<(), ConvertError> {
+        self.file.finish().map_err(ConvertError::write(&self.path))
     }
 }
 

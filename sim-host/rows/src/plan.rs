@@ -60,7 +60,7 @@ pub struct Plan {
 }
 
 /// The start of the first line of a file.
-const MAGIC: &str = "# sonarfix rows, format 1";
+const MAGIC: &str = "# sonarfix rows, format 2";
 
 impl Plan {
     /// The plan of a shard of a scenario's runs.
@@ -124,7 +124,7 @@ impl Plan {
 
 /// Everything that the runs depend on besides their seeds; not the number of runs that the scenario suggests.
 fn checksum(scenario: &Scenario) -> u64 {
-    let mut sum = Fnv(0xcbf2_9ce4_8422_2325);
+    let mut sum = Fnv::default();
     let Scenario { fidelity, floor, robot, path, follow, start, truth, .. } = scenario;
     let Scenario { upsets, hardware, surroundings, faults, .. } = scenario;
     let version = env!("CARGO_PKG_VERSION");
@@ -138,7 +138,13 @@ fn checksum(scenario: &Scenario) -> u64 {
 }
 
 /// The FNV-1a hash of a text.
-struct Fnv(u64);
+pub(crate) struct Fnv(pub u64);
+
+impl Default for Fnv {
+    fn default() -> Self {
+        Self(0xcbf2_9ce4_8422_2325)
+    }
+}
 
 impl Write for Fnv {
     fn write_str(&mut self, text: &str) -> fmt::Result {

@@ -167,9 +167,8 @@ pub fn write(floor: &Floor, yaml: &Path, resolution: f64) -> anyhow::Result<()> 
         "image: {name}\nmode: trinary\nresolution: {resolution}\norigin: [{left}, {bottom}, 0.0]\n\
          negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n"
     );
-    let wrote = std::fs::write(&file, image.pgm());
-    wrote.with_context(|| format!("cannot write {}", file.display()))?;
-    std::fs::write(yaml, text).with_context(|| format!("cannot write {}", yaml.display()))
+    sonarfix_files::write(&file, image.pgm())?;
+    sonarfix_files::write(yaml, text)
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count of pixels")]
