@@ -4,12 +4,16 @@
 //! failure, Ctrl-C or a loss of power its place holds the old file, whole, or nothing. A second program that writes the same
 //! file is refused. What a killed program leaves of its `.NAME.part`, the next one overwrites.
 
+mod checksum;
+
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, BufWriter, ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use tempfile::TempPath;
+
+pub use checksum::Checksum;
 
 /// A file that is being written. Dropping it without [`Self::finish`] leaves the old one.
 #[derive(Debug)]

@@ -8,10 +8,10 @@ use std::io::{BufRead, BufReader, Read as _, Write};
 use std::path::Path;
 
 use anyhow::{Context, ensure};
-use sonarfix_files::Output;
+use sonarfix_files::{Checksum, Output};
 use sonarfix_sim::row::{COUNTS, REALS, Row};
 
-use crate::plan::{Fnv, Plan, Rows};
+use crate::plan::{Plan, Rows};
 
 /// The names of the columns.
 #[must_use]
@@ -31,16 +31,9 @@ pub fn line(row: &Row) -> String {
     for real in row.reals {
         let _ = write!(line, ",{real:?}");
     }
-    let sum = checksum(&line);
-    let _ = writeln!(line, ",{sum:016x}");
+    let sum = Checksum::of(&line);
+    let _ = writeln!(line, ",{sum}");
     line
-}
-
-fn checksum(cells: &str) -> u64 {
-    let mut sum = Fnv::default();
-    // Writing to a sum does not fail.
-    let _ = sum.write_str(cells);
-    sum.0
 }
 
 /// Reads a line with its end.
@@ -50,7 +43,7 @@ fn checksum(cells: &str) -> u64 {
 pub fn parse(line: &str) -> anyhow::Result<Row> {
     let line = line.strip_suffix('\n').context("it is torn: the line has no end")?;
     let (cells, sum) = line.rsplit_once(',').context("the line is too short")?;
-    let is_whole = sum == format!("{:016x}", checksum(cells));
+    let is_whole = sum == Checksum::of(cells).to_string();
     ensure!(is_whole, "it is torn or changed: its checksum is another");
     let mut cells = cells.split(',');
     let mut cell = || cells.next().context("the line is too short");

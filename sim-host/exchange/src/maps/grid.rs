@@ -78,8 +78,9 @@ pub fn read(yaml: &Path, frame: &Frame, shortest: f64) -> anyhow::Result<Importe
     let image = sonarfix_map::read_bytes(&file).map_err(anyhow::Error::new);
     let image = image.and_then(|bytes| Image::read(&bytes));
     let image = image.with_context(|| format!("the image {}", file.display()))?;
-    let mut drawing = Drawing::default();
     let mut bitmap = occupied(&image, &keys);
+    drop(image);
+    let mut drawing = Drawing::default();
     let [x0, y0, yaw] = keys.origin;
     let r = keys.resolution;
     drawing.note(format!(
@@ -93,7 +94,7 @@ pub fn read(yaml: &Path, frame: &Frame, shortest: f64) -> anyhow::Result<Importe
         drawing.note(format!("dropped: areas thicker than {THICKEST} m ({solid} pixels)"));
     }
     bitmap.thin();
-    let (found, unexplained) = lines::find(&bitmap, (shortest / r).max(3.0));
+    let (found, unexplained) = lines::find(&bitmap, (shortest / r).max(3.0))?;
     if unexplained > 0 {
         drawing
             .note(format!("dropped: pixels of no straight line of {shortest} m ({unexplained})"));
