@@ -29,7 +29,6 @@ pub struct PaperRobot<'m> {
 pub struct Target<'m> {
     wall: &'m Wall,
     /// Where to turn the sonar, relative to the heading of the robot.
-    /// Where to turn the sonar, relative to the heading of the robot.
     pub bearing: Radians,
 }
 
