@@ -4,8 +4,8 @@ use clap::{Parser, Subcommand};
 
 use crate::{
     bound, calibrate, calibration, command, config, convert, export, faults, find, floor_plans,
-    health, init, map, measure, merge, monitor, paper, pil, plan, reality, relocalize, replay, run,
-    sonar_model, survey, surveys, sweep,
+    health, init, map, measure, merge, monitor, paper, pil, plan, reality, relocalize, replay,
+    rooms, run, sonar_model, survey, surveys, sweep,
 };
 
 /// Simulates, measures, replays and operates the Sonarfix localizer for small wheeled robots.
@@ -71,6 +71,8 @@ enum Command {
     Surveys(surveys::Args),
     /// Compares two measurement policies on random floor plans; prints markdown.
     FloorPlans(floor_plans::Args),
+    /// Measures consistency and verdicts in generated rooms; prints markdown.
+    Rooms(rooms::Args),
 }
 
 impl Cli {
@@ -107,6 +109,7 @@ impl Cli {
             Command::Faults(args) => faults::execute(&args),
             Command::Health(args) => health::execute(&args),
             Command::FloorPlans(args) => floor_plans::execute(&args),
+            Command::Rooms(args) => rooms::execute(&args),
         }
     }
 }

@@ -32,6 +32,7 @@ mod reality;
 mod relocalize;
 mod replay;
 mod robot_edit;
+mod rooms;
 mod rows;
 mod run;
 mod serve;
