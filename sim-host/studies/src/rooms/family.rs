@@ -138,6 +138,7 @@ fn write_scenario(
     Ok(())
 }
 
+/// The walks and, with slips and bumps by variance, the noise of the wheels are those that the robot file assumes.
 fn write_truth(text: &mut String, rng: &mut ChaCha8Rng) -> std::fmt::Result {
     let mut within = |most: f64| rng.random_range(-most..most);
     let width = TRACK_WIDTH + within(TRACK_WIDTH_ERROR);
@@ -145,10 +146,10 @@ fn write_truth(text: &mut String, rng: &mut ChaCha8Rng) -> std::fmt::Result {
     let celsius = ROOM + within(COLDER_OR_WARMER);
     writeln!(text, "[truth]\ntrack_width = \"{width:.5} m\"")?;
     writeln!(text, "scale_right = {right:.5}\nscale_left = {left:.5}\nrange_scale = \"0 %\"")?;
-    writeln!(text, "wheel_noise = \"2 mm/sqrt(m)\"\nscale_walk = \"0 /sqrt(m)\"")?;
+    writeln!(text, "wheel_noise = \"2 mm/sqrt(m)\"\nscale_walk = \"1e-4 /sqrt(m)\"")?;
     writeln!(text, "slip = {{ every = \"20 m\", by = \"3 mm\" }}")?;
     writeln!(text, "bump = {{ every = \"20 m\", by = \"3 mm\" }}")?;
-    writeln!(text, "track_width_walk = \"0 m/sqrt(m)\"\nrange_noise = \"3 mm\"")?;
+    writeln!(text, "track_width_walk = \"2e-5 m/sqrt(m)\"\nrange_noise = \"3 mm\"")?;
     writeln!(text, "range_noise_per_metre = \"0 mm/m\"\ncone = \"15 deg\"\n")?;
     writeln!(text, "[world]\ntemperature = \"{celsius:.1} degC\"\n")
 }
