@@ -339,12 +339,15 @@ fn read_gating(robot: &Table<'_>, gating: &mut GatingParameters) {
     replace(&table, "max_position_deviation", &mut gating.max_position_deviation, length);
 }
 
+const ECHO_KEYS: [&str; 8] =
+    ["sensor", "missed", "short", "long", "free_path", "map_accuracy", "late", "late_per_radian"];
+
 /// The parameters of a known sensor, that of an HC-SR04 if none is named, or keys of their own.
 fn read_echo(robot: &Table<'_>, echo: &mut EchoParameters) {
     let Some(node) = robot.get("echo") else {
         return;
     };
-    let table = node.table(&["sensor", "missed", "short", "long", "free_path", "map_accuracy"]);
+    let table = node.table(&ECHO_KEYS);
     if let Some(sensor) = table.get("sensor") {
         *echo = sonar_model::read(&sensor, &[], *echo, |model| model.echo);
     }
@@ -355,6 +358,8 @@ fn read_echo(robot: &Table<'_>, echo: &mut EchoParameters) {
     let length = |node: Node<'_>| Metres(single(node.deviation(&LENGTH)));
     replace(&table, "free_path", &mut echo.free_path, length);
     replace(&table, "map_accuracy", &mut echo.map_accuracy, length);
+    replace(&table, "late", &mut echo.late, length);
+    replace(&table, "late_per_radian", &mut echo.late_per_radian, length);
 }
 
 /// A missing weight is zero.

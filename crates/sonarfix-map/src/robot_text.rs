@@ -170,6 +170,8 @@ short = {}
 long = {}
 free_path = "{} m"
 map_accuracy = "{} m"
+late = "{} m"
+late_per_radian = "{} m"
 
 [schedule]
 policy = "{policy}"
@@ -190,6 +192,8 @@ wheels_weight = "{} m"
         echo.long,
         echo.free_path.0,
         echo.map_accuracy.0,
+        echo.late.0,
+        echo.late_per_radian.0,
         weights.heading.0,
         weights.wheels.0,
     )

@@ -330,7 +330,9 @@ impl Config {
         let some_are_right = echo.missed + echo.short + echo.long < 1.0;
         require("echo.missed", some_are_right, "below 1 together with echo.short and echo.long")?;
         not_negative("echo.free_path", echo.free_path.0)?;
-        not_negative("echo.map_accuracy", echo.map_accuracy.0)
+        not_negative("echo.map_accuracy", echo.map_accuracy.0)?;
+        not_negative("echo.late", echo.late.0)?;
+        not_negative("echo.late_per_radian", echo.late_per_radian.0)
     }
 
     fn check_drive(&self) -> Result<(), ConfigError> {
