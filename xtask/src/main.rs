@@ -11,10 +11,12 @@ mod cargo;
 mod checks;
 mod ci;
 mod circles;
+mod compositions;
 mod elf;
 mod emulator;
 mod endurance;
 mod features;
+mod figures;
 mod firmware;
 mod fuzz;
 mod golden;
@@ -94,6 +96,8 @@ enum Task {
     Panics,
     /// Instructions, code, stack and memory against `budgets.toml`.
     Budgets,
+    /// Flash, memory and instructions of what a robot links: writes docs/compositions.md.
+    Compositions(compositions::Args),
     /// Programs for emulated boards: formatting, Clippy.
     LintEmulated,
     /// Sonarfix and every peer compute the same.
@@ -108,10 +112,12 @@ enum Task {
     Deny,
     /// Records the golden traces, writes the fuzz inputs of messages, and measures and writes `budgets.toml`.
     Bless(BlessArgs),
-    /// Measures Sonarfix and its peers, and writes `docs/benchmarks.md` (ten minutes).
+    /// Measures Sonarfix and its peers (ten minutes).
     Bench,
     /// The paper's statistics at full length: 5,000 seeds, both policies (minutes).
     Statistics,
+    /// Writes the figures that README and pages quote (`docs/figures.toml`); `--check` compares them.
+    Figures(figures::Args),
     /// Lines with words that `docs/glossary.md` avoids.
     Words,
     /// Random runs of the filter, 10⁸ steps by default (minutes).
@@ -127,7 +133,7 @@ enum Task {
 }
 
 /// The steps of CI, by job.
-fn steps() -> [Step<Task>; 26] {
+fn steps() -> [Step<Task>; 27] {
     [
         ("lint", "format", Task::Format),
         ("lint", "circles", Task::Circles),
@@ -149,6 +155,7 @@ fn steps() -> [Step<Task>; 26] {
         ("emulated", "guide", Task::Guide),
         ("budgets", "panics", Task::Panics),
         ("budgets", "budgets", Task::Budgets),
+        ("budgets", "figures", Task::Figures(figures::Args::CHECK)),
         ("budgets", "peers", Task::Peers),
         ("budgets", "playground", Task::Playground),
         ("random", "endurance", Task::Endurance(endurance::Args::SHORT)),
@@ -207,6 +214,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Golden => golden::check(),
         Task::Panics => panics::check(),
         Task::Budgets => budgets::check(),
+        Task::Compositions(args) => compositions::run(&args),
         Task::LintEmulated => checks::lint_emulated(),
         Task::Peers => checks::peers(),
         Task::Msrv => publish::msrv(),
@@ -216,6 +224,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Bless(args) => bless(&args),
         Task::Bench => bench::run(),
         Task::Statistics => checks::statistics(),
+        Task::Figures(args) => figures::run(&args),
         Task::Words => words::print(),
         Task::Endurance(args) => endurance::run(args),
         Task::SearchWindows(args) => search_windows::run(args),

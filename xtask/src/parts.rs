@@ -58,14 +58,9 @@ const PARTS: [(&str, &str); 23] = [
 
 /// Prints the parts of the worst poll, or of the worst fix.
 pub fn run(args: Args) -> anyhow::Result<()> {
-    print!("{}", tables(args.fix)?);
+    let profile = if args.fix { worst_fix()? } else { worst_poll()? };
+    print!("{}", table(&profile));
     Ok(())
-}
-
-/// The tables of `cargo xtask parts`.
-pub fn tables(fix: bool) -> anyhow::Result<String> {
-    let profile = if fix { worst_fix()? } else { worst_poll()? };
-    Ok(table(&profile))
 }
 
 /// The worst fix of the localizer on a Cortex-M0+.

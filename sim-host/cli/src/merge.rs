@@ -57,12 +57,12 @@ fn in_order(files: &[PathBuf]) -> anyhow::Result<(Plan, Vec<PathBuf>)> {
     for file in files {
         let (plan, rows) = sonarfix_rows::open(file)?;
         let (mut count, (_, expected)) = (0_u32, plan.part());
+        let name = format!("shard {}, the rows {}", plan.shard, file.display());
         for row in rows {
-            row.with_context(|| format!("the rows {}", file.display()))?;
+            row.with_context(|| name.clone())?;
             count += 1;
         }
-        let name = file.display();
-        ensure!(count == expected, "{name} has {count} of {expected} rows: run its command again");
+        ensure!(count == expected, "{name}: {count} of {expected} rows; run its command again");
         shards.push((plan, file.clone()));
     }
     shards.sort_by_key(|(plan, _)| plan.shard.index);

@@ -2,7 +2,6 @@
 
 use std::path::{Path as FilePath, PathBuf};
 
-use anyhow::Context;
 use sonarfix_map::{MapFile, Scenario, SonarModel, robot_file};
 use sonarfix_plan::preset::{ServoPreset, SonarPreset};
 use sonarfix_plan::starts::{LegShare, Share, Starts};
@@ -145,7 +144,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
 }
 
 fn write(file: &FilePath, svg: &str) -> anyhow::Result<()> {
-    std::fs::write(file, svg).with_context(|| format!("cannot write {}", file.display()))?;
+    sonarfix_files::write(file, svg)?;
     eprintln!("open {}", file.display());
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! `sonarfix replay`: replays the recording of a robot through the localizer.
 
 use std::fs::File;
-use std::io::{BufReader, BufWriter};
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
@@ -74,9 +74,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let mut trace = Thinned::new(&floor, robot.localizer.sonar.cone, CAPACITY);
     let summary = replay(args, &with, &mut trace)?;
     if let Some(file) = &args.trace {
-        let out = File::create(file).map(BufWriter::new);
-        let out = out.with_context(|| format!("cannot write the trace {}", file.display()))?;
-        trace_csv::write(trace.trace(), out)?;
+        sonarfix_files::write_with(file, |out| trace_csv::write(trace.trace(), out))?;
     }
     let tables = tables(&summary);
     if args.output.json {

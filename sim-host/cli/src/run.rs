@@ -1,10 +1,7 @@
 //! `sonarfix run`: runs a scenario a number of times.
 
-use std::fs::File;
-use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
 use cpu_time::ProcessTime;
 use sonarfix_exchange::trace_csv;
 use sonarfix_map::Scenario;
@@ -104,11 +101,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
 }
 
 fn write_trace(trace: &Trace, file: &Path) -> anyhow::Result<()> {
-    let create = || -> anyhow::Result<()> {
-        let out = BufWriter::new(File::create(file)?);
-        trace_csv::write(trace, out)
-    };
-    create().with_context(|| format!("cannot write the trace {}", file.display()))
+    sonarfix_files::write_with(file, |out| trace_csv::write(trace, out))
 }
 
 /// A scenario and a number of runs.

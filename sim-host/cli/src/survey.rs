@@ -65,10 +65,10 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         found.scale(measured.length / estimated);
     }
     if let Some(out) = &args.out {
-        std::fs::write(out, map_text(&found)).with_context(|| out.display().to_string())?;
+        sonarfix_files::write(out, map_text(&found))?;
     }
     if let Some(out) = &args.drawing {
-        std::fs::write(out, draw(&found)).with_context(|| out.display().to_string())?;
+        sonarfix_files::write(out, draw(&found))?;
     }
     println!("{}", walls(&found).text());
     if let Some(map) = &map {

@@ -86,7 +86,7 @@ fn show(points: &[Point], sweeps: &[Sweep], output: &Output) -> anyhow::Result<(
     if let Some(dir) = &output.out {
         let file = dir.join(PICTURE);
         let svg = picture(points, sweeps).svg().map_err(|error| anyhow::anyhow!("{error}"))?;
-        std::fs::write(&file, svg).with_context(|| format!("cannot write {}", file.display()))?;
+        sonarfix_files::write(&file, svg)?;
         eprintln!("open {}", file.display());
     }
     Ok(())

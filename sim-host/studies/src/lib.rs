@@ -18,6 +18,7 @@ pub mod health_page;
 pub mod kidnapped;
 pub mod reality;
 pub mod relocalization;
+pub mod rooms;
 pub mod search_study;
 pub mod sonar_model;
 pub mod surveys;

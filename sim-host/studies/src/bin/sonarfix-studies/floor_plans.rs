@@ -2,10 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
 use sonarfix_report::heat_map::HeatMap;
 use sonarfix_studies::floor_plan::{FloorPlan, compare, page};
-
 use sonarfix_terminal::output::{check_file, check_folder};
 use sonarfix_terminal::progress::Runs;
 
@@ -81,5 +79,5 @@ fn draw(seed: u64, args: &Args) -> anyhow::Result<()> {
 }
 
 fn write(file: &Path, text: &str) -> anyhow::Result<()> {
-    std::fs::write(file, text).with_context(|| format!("cannot write {}", file.display()))
+    sonarfix_files::write(file, text)
 }

@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context;
 use sonarfix_studies::health_page;
 
 use sonarfix_terminal::output::check_file;
@@ -31,7 +30,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
             findings.trials.iter().map(|outcome| outcome.called_after).collect();
         let svg = sonarfix_report::called_lost(&called_after)
             .map_err(|error| anyhow::anyhow!("cannot draw the figure: {error}"))?;
-        std::fs::write(file, svg).with_context(|| format!("cannot write {}", file.display()))?;
+        sonarfix_files::write(file, svg)?;
     }
     print!("{}", health_page::markdown(&findings));
     Ok(())

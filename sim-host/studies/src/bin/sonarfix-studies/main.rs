@@ -10,6 +10,7 @@ mod floor_plans;
 mod health;
 mod reality;
 mod relocalize;
+mod rooms;
 mod sonar_model;
 mod surveys;
 
@@ -41,6 +42,8 @@ enum Command {
     Reality(reality::Args),
     /// Measures how robots that lose their pose, or start without one, find it in random floor plans.
     Relocalize(relocalize::Args),
+    /// Measures consistency and verdicts in generated rooms; prints markdown.
+    Rooms(rooms::Args),
     /// Compares the simulated NXT sonar with recorded sweeps; prints markdown.
     SonarModel(sonar_model::Args),
     /// Measures the accuracy of `sonarfix survey` on simulated robots; prints markdown.
@@ -66,6 +69,7 @@ fn execute(command: Command) -> anyhow::Result<()> {
         Command::Health(args) => health::execute(&args),
         Command::Reality(args) => reality::execute(&args),
         Command::Relocalize(args) => relocalize::execute(&args),
+        Command::Rooms(args) => rooms::execute(&args),
         Command::SonarModel(args) => sonar_model::execute(&args),
         Command::Surveys(args) => surveys::execute(&args),
     }

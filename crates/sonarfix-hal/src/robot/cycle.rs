@@ -2,9 +2,10 @@
 
 use sonarfix::aim::{Aim, Reason};
 use sonarfix::config::RangerId;
-use sonarfix::geometry::units::{Instant, Radians};
+use sonarfix::geometry::units::Instant;
 
 use super::odometer::Reading;
+use super::tracker::Sweep;
 
 /// The state of a measurement cycle.
 ///
@@ -29,13 +30,13 @@ pub(super) enum Cycle {
     Turning {
         /// The ranger that pings next.
         ranger: RangerId,
-        /// Why the wall was chosen; `None` in a sweep.
-        why: Option<Reason>,
+        /// What it measures.
+        target: Target<Reason>,
     },
     /// A ping is in flight.
     Listening {
         /// What is measured.
-        target: Target,
+        target: Target<Aim>,
         /// The position of the wheels at the trigger.
         from: Reading,
         /// The first poll of the ranger.
@@ -45,14 +46,14 @@ pub(super) enum Cycle {
 
 /// What a ping measures.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Target {
-    /// A wall.
-    Wall(Aim),
-    /// Whatever is at this bearing, for the search.
-    Sweep(Radians),
+pub(super) enum Target<W> {
+    /// A wall: why it was chosen, then the aim.
+    Wall(W),
+    /// Whatever is at a bearing, for the search.
+    Sweep(Sweep),
 }
 
-impl Target {
+impl Target<Aim> {
     /// The ranger that measures it. The first one sweeps.
     pub fn ranger(&self) -> RangerId {
         match self {
