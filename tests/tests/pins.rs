@@ -106,7 +106,7 @@ fn twenty_minutes_take_less_than_half_a_second() {
 
 /// 200 runs of the classroom, on other seeds than the settings were chosen on: the position RMS is within 8 mm, no run is
 /// lost or called so, none is more than 10 cm off with the verdict `Tracking`, and the filter is consistent.
-/// 10,000 runs are a command (`docs/schedule.md`).
+/// 10,000 runs are a command (`docs/results.md`).
 #[test]
 fn the_classroom_is_crossed() {
     const RUNS: u32 = 200;

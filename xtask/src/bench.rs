@@ -1,6 +1,7 @@
-//! Measures Sonarfix and its peers on the same task, on this machine, and writes `docs/benchmarks.md`.
+//! Measures Sonarfix and its peers on the same task, on this machine, and prints the tables of `docs/benchmarks.md`.
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::fs;
 use std::process::Command;
 use std::time::Duration;
@@ -8,18 +9,17 @@ use std::time::Duration;
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::cargo;
 use crate::elf::Program;
 use crate::emulator;
 use crate::program::{M0PLUS, M3, M4F, M4F_FUSED, M4F_SMALL, Target};
 use crate::workspace::Workspace;
-use crate::{budgets, cargo, firmware, parts};
 
 pub mod cmsis;
 mod host;
-mod page;
 mod subjects;
+mod table;
 
-use page::Tables;
 use subjects::{CMSIS, Figures, OnTarget, SUBJECTS};
 
 pub fn run() -> anyhow::Result<()> {
@@ -58,15 +58,7 @@ pub fn run() -> anyhow::Result<()> {
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let path = cargo::root().join("docs/benchmarks.md");
-    let tables = Tables {
-        poll: parts::tables(false)?,
-        fix: parts::tables(true)?,
-        memory: firmware::size_tables()?,
-        bars: budgets::standing()?,
-    };
-    fs::write(&path, page::written(rows, &tools()?, &tables)?)?;
-    eprintln!("written: docs/benchmarks.md");
+    println!("{}\n{}", table::of(rows)?, tools()?);
     Ok(())
 }
 
@@ -90,16 +82,14 @@ fn versions() -> anyhow::Result<BTreeMap<String, String>> {
     Ok(packages.filter_map(|p| Some((text_of(p, "name")?, text_of(p, "version")?))).collect())
 }
 
-/// The versions of the tools.
-fn tools() -> anyhow::Result<Vec<String>> {
-    let first_line = |program: &str| -> anyhow::Result<String> {
+/// The versions of the tools, as a table.
+fn tools() -> anyhow::Result<String> {
+    let mut table = "| measured with |\n|---|\n".to_owned();
+    for program in ["rustc", "arm-none-eabi-gcc", "qemu-system-arm", "valgrind"] {
         let mut command = Command::new(program);
         command.arg("--version");
-        let text = cargo::output(command)?;
-        Ok(text.lines().next().unwrap_or_default().to_owned())
-    };
-    ["rustc", "arm-none-eabi-gcc", "qemu-system-arm", "valgrind"]
-        .into_iter()
-        .map(first_line)
-        .collect()
+        let version = cargo::output(command)?;
+        writeln!(table, "| {} |", version.lines().next().unwrap_or_default())?;
+    }
+    Ok(table)
 }

@@ -144,19 +144,6 @@ pub fn bless() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The committed figures against their limits, as a table for the page.
-pub fn standing() -> anyhow::Result<String> {
-    let committed = committed()?;
-    let mut text = "| | limit | committed | |\n|---|---:|---:|---|\n".to_owned();
-    for Bar { section, key, most, .. } in BARS {
-        let is = figure(&committed, section, key).context("a bar's figure is not committed")?;
-        let verdict = if is <= most { "reached" } else { "**not reached**" };
-        // Writing to a string does not fail.
-        let _ = writeln!(text, "| {section} {key} | {most} | {is} | {verdict} |");
-    }
-    Ok(text)
-}
-
 fn committed() -> anyhow::Result<Table> {
     let text = fs::read_to_string(path()).with_context(|| path().display().to_string())?;
     toml::from_str(&text).context("cannot read budgets.toml")

@@ -69,11 +69,6 @@ pub fn size() -> anyhow::Result<()> {
     size::check(&build::read(&build::release()?)?)
 }
 
-/// The tables of [`size()`].
-pub fn size_tables() -> anyhow::Result<String> {
-    size::tables(&build::read(&build::release()?)?)
-}
-
 /// How the stack is examined.
 #[derive(Debug, Clone, PartialEq, Eq, clap::Args)]
 pub struct StackArgs {

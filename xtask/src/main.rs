@@ -10,9 +10,11 @@ mod cargo;
 mod checks;
 mod ci;
 mod circles;
+mod compositions;
 mod elf;
 mod emulator;
 mod endurance;
+mod figures;
 mod firmware;
 mod fuzz;
 mod golden;
@@ -26,7 +28,6 @@ mod playground;
 mod profile;
 mod program;
 mod publish;
-mod reality;
 mod search_windows;
 mod template;
 mod thumb;
@@ -86,6 +87,8 @@ enum Task {
     Panics,
     /// Instructions, code, stack and memory against `budgets.toml`.
     Budgets,
+    /// Flash, memory and instructions of what a robot links: writes docs/compositions.md.
+    Compositions(compositions::Args),
     /// Programs for emulated boards: formatting, Clippy.
     LintEmulated,
     /// Sonarfix and every peer compute the same.
@@ -100,14 +103,14 @@ enum Task {
     Deny,
     /// Records the golden traces, writes the fuzz inputs of messages, and measures and writes `budgets.toml`.
     Bless(BlessArgs),
-    /// Measures Sonarfix and its peers, and writes `docs/benchmarks.md` (ten minutes).
+    /// Measures Sonarfix and its peers (ten minutes).
     Bench,
     /// Draws the wiring of every board: `docs/images/wiring-*.svg`.
     Wiring,
-    /// Replays the recordings of a folder, and writes `docs/reality.md` (minutes).
-    Reality(reality::Args),
     /// The paper's statistics at full length: 5,000 seeds, both policies (minutes).
     Statistics,
+    /// Writes the figures that README and pages quote (`docs/figures.toml`); `--check` compares them.
+    Figures(figures::Args),
     /// Lines with words that `docs/glossary.md` avoids.
     Words(words::Args),
     /// Random runs of the filter, 10⁸ steps by default (minutes).
@@ -123,7 +126,7 @@ enum Task {
 }
 
 /// The steps of CI, the fast ones first.
-fn ci_steps() -> [(&'static str, Task); 23] {
+fn ci_steps() -> [(&'static str, Task); 24] {
     [
         ("format", Task::Format),
         ("circles", Task::Circles),
@@ -137,6 +140,7 @@ fn ci_steps() -> [(&'static str, Task); 23] {
         ("golden", Task::Golden),
         ("pil", Task::Pil),
         ("guide", Task::Guide),
+        ("figures", Task::Figures(figures::Args::CHECK)),
         ("panics", Task::Panics),
         ("budgets", Task::Budgets),
         ("lint-emulated", Task::LintEmulated),
@@ -200,6 +204,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Golden => golden::check(),
         Task::Panics => panics::check(),
         Task::Budgets => budgets::check(),
+        Task::Compositions(args) => compositions::run(&args),
         Task::LintEmulated => checks::lint_emulated(),
         Task::Peers => checks::peers(),
         Task::Msrv => publish::msrv(),
@@ -209,8 +214,8 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Bless(args) => bless(&args),
         Task::Bench => bench::run(),
         Task::Wiring => wiring::write(),
-        Task::Reality(args) => reality::run(&args),
         Task::Statistics => checks::statistics(),
+        Task::Figures(args) => figures::run(&args),
         Task::Words(args) => words::count(&args),
         Task::Endurance(args) => endurance::run(args),
         Task::SearchWindows(args) => search_windows::run(args),

@@ -81,20 +81,6 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The tables of `cargo xtask parts`: of the worst poll, or of the worst fix.
-pub fn tables(fix: bool) -> anyhow::Result<String> {
-    let profile = if fix { worst_fix()? } else { worst_poll(&Args::of_a_poll())? };
-    Ok(table(&profile))
-}
-
-impl Args {
-    /// Without any option.
-    fn of_a_poll() -> Self {
-        let function = POLL.to_owned();
-        Self { fix: false, m0plus: false, tree: false, function, without: None, seconds: SECONDS }
-    }
-}
-
 /// The worst fix of the localizer on a Cortex-M0+.
 fn worst_fix() -> anyhow::Result<Profile> {
     probe(&M0PLUS, "localizer", "probe_fix")

@@ -1,4 +1,4 @@
-//! The line from commanded to true bearings, from which pings a wall answered.
+//! Estimates the line from commanded to true bearings. The data are the pings that a wall answered, and those that it did not.
 //!
 //! A wall answers at its perpendicular, whatever the bearing: the range has no information on the bearing. Whether it
 //! answers has: with probability `share / (1 + exp((|α| − half) / blur))` at the angle α off the axis, symmetric about

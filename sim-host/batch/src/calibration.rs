@@ -82,8 +82,8 @@ pub enum CalibrateError {
 /// Smallest share of inliers.
 pub const FEWEST_INLIERS: f64 = 0.6;
 /// Smallest share of the inliers of all echoes, unmapped objects and other echoes included. A path outside of the room has
-/// no wall that an echo could contradict. Of 104 right calibrations (docs/calibrate.md) the least has 28 %, of two wrong
-/// ones the larger 3 %.
+/// no wall that an echo could contradict. Right calibrations explain more than a quarter of all echoes, wrong ones a few
+/// percent.
 pub const FEWEST_EXPLAINED: f64 = 0.15;
 /// Smallest angle turned to either side for which wheel difference and track width are separated in any case, radians.
 pub const BOTH_WAYS: f64 = std::f64::consts::PI;

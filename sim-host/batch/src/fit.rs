@@ -1,8 +1,8 @@
 //! The estimation in progress.
 //!
-//! One loss that forgets outliers has wrong minima, and their likelihood can be higher than that of the right one. The
-//! estimate therefore grows: a window from the start is extended by at most 15 % of its length, so that the poses beyond it
-//! can be predicted; its pings are associated again with the walls and the kernel is narrowed in three rounds.
+//! A loss that forgets outliers has wrong minima, whose likelihood can be higher than that of the right one. The estimate
+//! therefore grows. A window from the start is extended by at most 15 % of its length, so that it predicts the poses beyond
+//! it. In three rounds its pings are associated again with the walls, each round with a narrower kernel.
 
 #![expect(clippy::indexing_slicing, reason = "matches have the length of the chain")]
 

@@ -1,4 +1,4 @@
-//! Who may ask: programs on this computer that have the token, and no page of another origin.
+//! Decides who may read and command: programs on this computer that have the token, and no page of another origin.
 //!
 //! - The server listens on the loopback address only.
 //! - The `Host` must be this server's: a name of another site that resolves to this computer (DNS rebinding) is refused.

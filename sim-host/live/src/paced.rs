@@ -1,4 +1,4 @@
-//! A simulation or a replay at a speed: its records are published when their time has come.
+//! Plays a simulation or a replay at a chosen speed: publishes each record at its time.
 
 use std::time::{Duration, Instant};
 

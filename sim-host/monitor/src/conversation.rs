@@ -1,4 +1,4 @@
-//! The commands of a session: each is repeated until the robot acknowledges it, and then comes the next.
+//! Sends the commands of a session, one after the other: repeats each until the robot acknowledges it.
 //!
 //! It reads neither port nor clock: bytes to send are returned, acknowledgements and the time are arguments. So a program that
 //! shows telemetry can send commands beside it.

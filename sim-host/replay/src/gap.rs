@@ -1,7 +1,7 @@
 //! Periods in which a robot could not read its encoders, in the log that it recorded itself.
 //!
-//! Such a log has every encoder sample that the robot took, also of one that stands. Samples that failed have no record:
-//! they were due at the robot's period since its start.
+//! The log of a robot has a record for every encoder sample that it took, also while it stood. A sample that failed has no
+//! record; it was due at a multiple of the robot's period since its start.
 
 use sonarfix::health::DEGRADED_WITHOUT_ODOMETRY;
 

@@ -1,4 +1,4 @@
-//! The content of each figure. On a page about the paper those of the paper have its numbers, 2 to 6.
+//! The content of each figure. In the report of the paper's scenario, the figures that the paper has keep its numbers, 2 to 6.
 
 mod calibration;
 mod inputs;

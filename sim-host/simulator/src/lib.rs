@@ -30,7 +30,7 @@ pub mod world;
 pub const STATES: [&str; 7] =
     ["x", "y", "heading", "scale_right", "scale_left", "track_width", "range_scale"];
 
-/// The README's example, so that the tests compile it.
+/// The example in the README of the core, so that the tests compile it.
 #[cfg(doctest)]
-#[doc = include_str!("../../../README.md")]
+#[doc = include_str!("../../../crates/sonarfix/README.md")]
 pub struct Readme;

@@ -121,7 +121,7 @@ pub fn trial(seed: u64, upset: Upset, seconds: f64) -> Result<Option<Trial>, Rel
     Ok(Some(watch.trial(seed, walls)))
 }
 
-/// The time of driving after which the robot is this far from where it is at [`UPSET_AT`], as the crow flies.
+/// The time of driving after which the robot is this far from where it is at [`UPSET_AT`], in a straight line.
 fn carried_by(path: &Path, metres: f64, spare: f64) -> Option<f64> {
     const STEP: f64 = 0.25;
     let from = path.pose_at(UPSET_AT);
@@ -332,7 +332,7 @@ fn percentile_95(mut values: Vec<f64>) -> f64 {
 mod tests {
     use super::*;
 
-    /// The short form of `sonarfix relocalize --slipped`; docs/schedule.md has more trials.
+    /// The short form of `sonarfix-studies relocalize --slipped`; docs/schedule.md has more trials.
     #[test]
     fn a_slip_is_corrected_or_leads_to_a_search() {
         let trials = |degrees: f64| {

@@ -1,4 +1,4 @@
-//! What the pings say for and against a line: echoes from it, echoes from behind it, and echoes that reached it through
+//! The evidence of the pings for and against a line: echoes from it, echoes from behind it, and echoes that reached it through
 //! another wall.
 
 #![expect(clippy::indexing_slicing, reason = "lines and pings have the lengths of the problem")]

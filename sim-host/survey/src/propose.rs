@@ -1,8 +1,9 @@
 //! New lines from the echoes that no line explains.
 //!
-//! An echo of a wall lies on the circle of its range about the sonar, near the axis; the wall is a tangent of all circles.
-//! Votes for tangents (Hough) propose lines. A small or round object answers from every direction as well: a line is only
-//! accepted if a point and circles explain its echoes worse, which needs a drive along the wall.
+//! An echo of a wall comes from a point of the circle of its range about the sonar, near the axis. The wall is a tangent of
+//! the circles of all its echoes. Votes for tangents (Hough) propose lines. A small or round object answers from every
+//! direction as well. A line is therefore only accepted if a point and circles explain its echoes worse, which needs a drive
+//! along the wall.
 
 #![expect(clippy::indexing_slicing, reason = "bins within their table")]
 

@@ -218,7 +218,7 @@ fn disputed(path: &[(f64, Vector3<f64>)], pairs: &Pairs) -> Option<(f64, f64)> {
     Some((first, last))
 }
 
-/// What a track amounts to; `clock` is −1 for the reversed recording.
+/// The result of a track; `clock` is −1 for the reversed recording.
 fn outcome(track: &Track, clock: f64) -> Survey {
     let chain = track.problem.chain;
     let path = chain.times.iter().zip(&track.state.poses);

@@ -1,5 +1,5 @@
-//! The map in progress: one pose after the other is predicted, its pings are associated with lines, a window behind it is
-//! solved, and new lines are proposed; every two metres everything is associated and solved again.
+//! The map in progress. For each pose the track predicts the pose, associates its pings with lines, solves a window of poses
+//! behind it, and proposes new lines. Every two metres it associates and solves everything again.
 
 #![expect(
     clippy::indexing_slicing,

@@ -13,7 +13,7 @@
 //! | module | contents |
 //! |---|---|
 //! | `blocks` | the numbers, and their conversion to a matrix |
-//! | `transition` | F and Q of a motion, eqs. (8), (9), (28) and (29) |
+//! | `transition` | F and Q of a motion, eqs. (8) and (9) |
 //! | `propagation` | eqs. (5) and (10): P ← F P Fᵀ + Q |
 //! | `projection` | P Hᵀ and H P Hᵀ, eq. (14) |
 //! | `correction` | eqs. (6) and (18) to (20): gain, state and covariance |

@@ -5,9 +5,8 @@
 //! the task of the [`localizer`](crate::localizer).
 //!
 //! # Form
-//! The covariance is stored as its upper triangle. A prediction moves the state and accumulates the motion, eq. (27); P is
-//! propagated over it when it is asked for, eqs. (28) to (30), with F P Fᵀ multiplied out without the zeros and ones of F,
-//! eq. (10). Correction is Joseph's form in two passes of rank one, eq. (19): the
+//! The covariance is stored as its upper triangle. A prediction moves the state and propagates P, eq. (5), with F P Fᵀ
+//! multiplied out without the zeros and ones of F, eq. (10). Correction is Joseph's form in two passes of rank one, eq. (19): the
 //! first is P − K H P, the second removes its rounding error and that of K. Variances stay positive
 //! in single precision even for a range with a variance 10⁶ times smaller than the prior, where the
 //! plain form reaches zero. The correlation of two states can exceed what single precision holds; the

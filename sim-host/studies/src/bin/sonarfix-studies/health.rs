@@ -1,12 +1,11 @@
-//! `sonarfix health`: the reliability of the health verdict.
+//! `sonarfix-studies health`: the reliability of the health verdict.
 
 use std::path::PathBuf;
 
-use anyhow::Context;
 use sonarfix_studies::health_page;
 
-use crate::output::check_file;
-use crate::progress::Runs;
+use sonarfix_terminal::output::check_file;
+use sonarfix_terminal::progress::Runs;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -31,7 +30,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
             findings.trials.iter().map(|outcome| outcome.called_after).collect();
         let svg = sonarfix_report::called_lost(&called_after)
             .map_err(|error| anyhow::anyhow!("cannot draw the figure: {error}"))?;
-        std::fs::write(file, svg).with_context(|| format!("cannot write {}", file.display()))?;
+        sonarfix_files::write(file, svg)?;
     }
     print!("{}", health_page::markdown(&findings));
     Ok(())

@@ -1,10 +1,9 @@
-//! `sonarfix relocalize`: robots that lose their pose, or start without one, in random floor plans.
+//! `sonarfix-studies relocalize`: robots that lose their pose, or start without one, in random floor plans.
 
 use sonarfix_report::Table;
 use sonarfix_studies::relocalization::{self, Summary, Trial, Upset};
 
-use crate::progress::Runs;
-use crate::table;
+use sonarfix_terminal::progress::Runs;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -44,12 +43,14 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     anyhow::ensure!(!trials.is_empty(), "no floor plan of these seeds is large enough");
     let summary = Summary::new(&trials);
     if args.json {
-        return crate::json::print(&serde_json::json!({ "summary": summary, "trials": trials }));
+        return sonarfix_terminal::json::print(
+            &serde_json::json!({ "summary": summary, "trials": trials }),
+        );
     }
     if args.trials {
-        println!("{}\n", table::text(&trial_table(&trials)));
+        println!("{}\n", trial_table(&trials).text());
     }
-    println!("{}", table::text(&summary_table(&summary, args.seconds)));
+    println!("{}", summary_table(&summary, args.seconds).text());
     Ok(())
 }
 

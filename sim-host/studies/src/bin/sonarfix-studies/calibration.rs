@@ -1,8 +1,8 @@
-//! `sonarfix calibration`: the accuracy of `sonarfix calibrate` on simulated robots.
+//! `sonarfix-studies calibration`: the accuracy of `sonarfix calibrate` on simulated robots.
 
 use sonarfix_studies::calibration::{self, Errors};
 
-use crate::progress::Runs;
+use sonarfix_terminal::progress::Runs;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {

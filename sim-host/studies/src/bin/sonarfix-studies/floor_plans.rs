@@ -1,12 +1,11 @@
-//! `sonarfix floor-plans`: two measurement policies on random floor plans.
+//! `sonarfix-studies floor-plans`: two measurement policies on random floor plans.
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
-use sonarfix_studies::floor_plan::{FloorPlan, compare, page, picture};
-
-use crate::output::{check_file, check_folder};
-use crate::progress::Runs;
+use sonarfix_report::heat_map::HeatMap;
+use sonarfix_studies::floor_plan::{FloorPlan, compare, page};
+use sonarfix_terminal::output::{check_file, check_folder};
+use sonarfix_terminal::progress::Runs;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -71,7 +70,7 @@ fn draw(seed: u64, args: &Args) -> anyhow::Result<()> {
     }
     let plan = FloorPlan::new(seed);
     if let Some(file) = &args.out {
-        write(file, &picture::place(&plan.scenario()?).svg())?;
+        write(file, &HeatMap::of(&plan.scenario()?).svg())?;
     }
     if let Some(file) = &args.toml {
         write(file, &plan.toml)?;
@@ -80,5 +79,5 @@ fn draw(seed: u64, args: &Args) -> anyhow::Result<()> {
 }
 
 fn write(file: &Path, text: &str) -> anyhow::Result<()> {
-    std::fs::write(file, text).with_context(|| format!("cannot write {}", file.display()))
+    sonarfix_files::write(file, text)
 }

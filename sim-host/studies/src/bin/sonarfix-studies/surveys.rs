@@ -1,11 +1,11 @@
-//! `sonarfix surveys`: the accuracy of `sonarfix survey` on simulated robots.
+//! `sonarfix-studies surveys`: the accuracy of `sonarfix survey` on simulated robots.
 
 use std::path::PathBuf;
 
 use anyhow::Context;
 use sonarfix_studies::surveys::{self, Place};
 
-use crate::progress::Runs;
+use sonarfix_terminal::progress::Runs;
 
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
 enum Site {

@@ -1,4 +1,4 @@
-//! `sonarfix sonar-model`: compares the simulated NXT sonar with recorded sweeps.
+//! `sonarfix-studies sonar-model`: compares the simulated NXT sonar with recorded sweeps.
 
 use std::path::PathBuf;
 

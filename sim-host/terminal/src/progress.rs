@@ -15,6 +15,7 @@ static HANDLER: Once = Once::new();
 
 /// A bar that counts runs. Where standard error is not a terminal there is none. After Ctrl-C no further run begins; a second
 /// Ctrl-C ends the command at once.
+#[derive(Debug)]
 pub struct Runs {
     bar: ProgressBar,
     /// What one finished run counts.
@@ -23,11 +24,13 @@ pub struct Runs {
 
 impl Runs {
     /// A bar for this number of runs.
+    #[must_use]
     pub fn new(runs: u32) -> Self {
         Self::weighted(runs, 1)
     }
 
     /// A bar for results that take several runs each.
+    #[must_use]
     pub fn weighted(runs: u32, weight: u64) -> Self {
         catch_interrupt();
         // indicatif hides the bar by itself where standard error is not a terminal.
@@ -71,6 +74,7 @@ pub fn catch_interrupt() {
 }
 
 /// Whether Ctrl-C was pressed.
+#[must_use]
 pub fn is_interrupted() -> bool {
     IS_INTERRUPTED.load(Ordering::Relaxed)
 }
@@ -82,6 +86,7 @@ fn interrupt() {
 }
 
 /// The exit code of a command that has succeeded, perhaps with fewer runs than requested.
+#[must_use]
 pub fn exit_code() -> ExitCode {
     if is_interrupted() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS }
 }

@@ -5,7 +5,7 @@ use serde::Serialize;
 use sonarfix_map::{Movement, Path, PathError, PathPlan, PathPose, Scenario};
 use sonarfix_sim::progress::Progress;
 
-use crate::search_study::{SearchStudyError, Trial, trial_from};
+use crate::trial::{Trial, TrialError, trial_from};
 
 /// The starts on one leg of the path, or on all of it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -57,13 +57,13 @@ impl Starts {
     /// drives on along the path, and at its end back and forth. `None` if it was interrupted before the first was finished.
     ///
     /// # Errors
-    /// [`SearchStudyError`], if the map cannot be used.
+    /// [`TrialError`], if the map cannot be used.
     pub fn new(
         scenario: &Scenario,
         starts: u32,
         seconds: f64,
         progress: &impl Progress,
-    ) -> Result<Option<Self>, SearchStudyError> {
+    ) -> Result<Option<Self>, TrialError> {
         let lap = Path::new(PathPlan { laps: 1, ..scenario.path.plan().clone() })?;
         let interval = lap.duration() / f64::from(starts);
         let mut scenario = scenario.clone();
@@ -74,7 +74,7 @@ impl Starts {
             progress.finished();
             Ok(Start { time, trial })
         });
-        let made: Vec<Start> = made.collect::<Result<_, SearchStudyError>>()?;
+        let made: Vec<Start> = made.collect::<Result<_, TrialError>>()?;
         let Some(all) = Share::of(&made, |_| true) else { return Ok(None) };
         let mut since = 0.0;
         let straight =

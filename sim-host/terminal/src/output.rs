@@ -6,7 +6,6 @@
 //! - What cannot be written to standard error is dropped.
 
 use std::fmt::Arguments;
-use std::fs::OpenOptions;
 use std::io::{self, ErrorKind, Write};
 use std::path::Path;
 use std::process::exit;
@@ -14,16 +13,19 @@ use std::process::exit;
 use anyhow::Context;
 
 /// As the standard library's, without panic.
+#[macro_export]
 macro_rules! println {
     ($($argument:tt)*) => { $crate::output::print(format_args!("{}\n", format_args!($($argument)*))) };
 }
 
 /// As the standard library's, without panic.
+#[macro_export]
 macro_rules! print {
     ($($argument:tt)*) => { $crate::output::print(format_args!($($argument)*)) };
 }
 
 /// As the standard library's, without panic.
+#[macro_export]
 macro_rules! eprintln {
     ($($argument:tt)*) => { $crate::output::report(format_args!($($argument)*)) };
 }
@@ -57,13 +59,8 @@ pub fn report(text: Arguments) {
 /// # Errors
 /// If it cannot be, with the option that names it.
 pub fn check_file(option: &str, file: &Path) -> anyhow::Result<()> {
-    let existed = file.exists();
-    let opened = OpenOptions::new().append(true).create(true).open(file);
-    opened.with_context(|| format!("{option}: cannot write {}", file.display()))?;
-    if !existed {
-        // What follows may fail, and should then not leave an empty file.
-        let _ = std::fs::remove_file(file);
-    }
+    let created = sonarfix_files::Output::create(file);
+    created.with_context(|| format!("{option}: cannot write {}", file.display()))?;
     Ok(())
 }
 

@@ -1,8 +1,8 @@
-//! `sonarfix faults`: the effects of hardware faults.
+//! `sonarfix-studies faults`: the effects of hardware faults.
 
 use sonarfix_studies::{fault_search, fault_table};
 
-use crate::progress::Runs;
+use sonarfix_terminal::progress::Runs;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {

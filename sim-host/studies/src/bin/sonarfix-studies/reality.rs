@@ -1,4 +1,4 @@
-//! `sonarfix reality`: all recordings of a folder.
+//! `sonarfix-studies reality`: all recordings of a folder.
 
 use std::path::PathBuf;
 

@@ -63,5 +63,5 @@ fn the_committed_page_is_current() {
         return;
     };
     let committed = include_str!("../../../docs/sonar-model.md");
-    assert_eq!(page::markdown(&comparison), committed, "run `sonarfix sonar-model` again");
+    assert_eq!(page::markdown(&comparison), committed, "run `sonarfix-studies sonar-model` again");
 }
