@@ -28,3 +28,4 @@ mod skipped;
 mod sonar_model;
 mod survey;
 mod terminal;
+mod whole_files;
