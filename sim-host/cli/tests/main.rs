@@ -25,3 +25,4 @@ mod signs_of_life;
 mod skipped;
 mod survey;
 mod terminal;
+mod whole_files;
