@@ -85,6 +85,8 @@ fn config(bytes: &mut Bytes) -> Config {
     echo.long = bytes.between(0.0, 0.3);
     echo.free_path = Metres(bytes.between(0.0, 20.0));
     echo.map_accuracy = Metres(bytes.between(0.0, 0.1));
+    echo.late = Metres(bytes.between(0.0, 0.01));
+    echo.late_per_radian = Metres(bytes.between(0.0, 0.1));
     config.policy = policy(bytes);
     config.weights.heading = Metres(bytes.between(0.0, 1.0));
     config.weights.wheels = Metres(bytes.between(0.0, 10.0));

@@ -8,6 +8,7 @@ mod gyro;
 mod kidnapped;
 mod motors;
 mod oracle;
+mod paper_robot;
 mod pil;
 mod pins;
 mod state_machines;

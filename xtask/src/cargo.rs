@@ -5,6 +5,8 @@ use std::process::Command;
 
 use anyhow::{Context, bail};
 
+use crate::ci;
+
 /// Runs cargo with these arguments, none of which contains a space.
 pub fn run(arguments: &str) -> anyhow::Result<()> {
     check(command(arguments))
@@ -14,7 +16,13 @@ pub fn run(arguments: &str) -> anyhow::Result<()> {
 pub fn command(arguments: &str) -> Command {
     let mut command = Command::new("cargo");
     command.args(arguments.split_whitespace());
+    ci::tell_where_skipped(&mut command);
     command
+}
+
+/// Installs a program of this version; does nothing if it is there.
+pub fn install(name: &str, version: &str) -> anyhow::Result<()> {
+    run(&format!("install {name} --version {version} --locked --quiet"))
 }
 
 /// Where builds go, whatever folder cargo runs in.

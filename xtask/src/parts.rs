@@ -10,34 +10,19 @@ use anyhow::Context;
 use crate::cargo;
 use crate::elf::Program;
 use crate::profile::{self, LOGGED, Pipe, Profile};
-use crate::program::{M0PLUS, M4F, Target};
+use crate::program::{M0PLUS, M4F_SMALL};
 use crate::workspace::Workspace;
 
 /// What is profiled.
-#[derive(Debug, Clone, PartialEq, Eq, clap::Args)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::Args)]
 pub struct Args {
-    /// The worst fix of the probe on the Cortex-M0+ instead of the worst poll.
+    /// The worst fix of the probe on the Cortex-M0+ instead of the worst poll on the Cortex-M4F.
     #[arg(long)]
     fix: bool,
-    /// The Cortex-M0+ for the poll.
-    #[arg(long)]
-    m0plus: bool,
-    /// Every function instead of the parts.
-    #[arg(long)]
-    tree: bool,
-    /// The most expensive call of another function than a poll.
-    #[arg(long, default_value = POLL)]
-    function: String,
-    /// Calls in which this function is called do not count.
-    #[arg(long)]
-    without: Option<String>,
-    /// Simulated seconds of `classroom`.
-    #[arg(long, default_value_t = SECONDS)]
-    seconds: u32,
 }
 
-/// The default of `--seconds`.
-const SECONDS: u32 = 60;
+/// The scenario of the polls.
+const RUN: &str = "run --quiet --release --bin sonarfix -- pil crates/sonarfix-map/scenarios/classroom.toml --seconds 60";
 /// A poll of the application.
 const POLL: &str = "sonarfix_app::app::App<F>::poll";
 /// What executes a command: the polls that start the loop.
@@ -71,68 +56,46 @@ const PARTS: [(&str, &str); 23] = [
     ("sonarfix_app", "application"),
 ];
 
-pub fn run(args: &Args) -> anyhow::Result<()> {
-    let profile = if args.fix { worst_fix()? } else { worst_poll(args)? };
-    if args.tree {
-        print_tree(&profile);
-    } else {
-        print!("{}", table(&profile));
-    }
+/// Prints the parts of the worst poll, or of the worst fix.
+pub fn run(args: Args) -> anyhow::Result<()> {
+    let profile = if args.fix { worst_fix()? } else { worst_poll()? };
+    print!("{}", table(&profile));
     Ok(())
 }
 
 /// The worst fix of the localizer on a Cortex-M0+.
 fn worst_fix() -> anyhow::Result<Profile> {
-    probe(&M0PLUS, "localizer", "probe_fix")
-}
-
-/// The most expensive call of a function of a probe.
-fn probe(target: &Target, name: &str, root: &str) -> anyhow::Result<Profile> {
-    target.build(Workspace::Emulated, "emulated-probe")?;
-    let path = target.program(Workspace::Emulated, name);
-    let program = Program::read(&path)?;
+    M0PLUS.build(Workspace::Emulated, "emulated-probe")?;
+    let path = M0PLUS.program(Workspace::Emulated, "localizer");
     let pipe = Pipe::create("probe.pipe")?;
     let mut qemu = Command::new("qemu-system-arm");
-    qemu.args(["-machine", target.board, "-icount", "shift=7", "-display", "none"]);
+    qemu.args(["-machine", M0PLUS.board, "-icount", "shift=7", "-display", "none"]);
     qemu.args(["-monitor", "none", "-serial", "none"]);
     qemu.args(["-semihosting-config", "enable=on,target=native", "-kernel"]).arg(&path);
     qemu.args(LOGGED).arg(pipe.path());
-    profiled(qemu, &pipe, &program, root, &[])
+    profiled(qemu, &pipe, &Program::read(&path)?, "probe_fix", &[])
 }
 
-/// The worst poll of `classroom`, without those that start the loop.
-fn worst_poll(args: &Args) -> anyhow::Result<Profile> {
-    let Args { m0plus, seconds, function, without, .. } = args;
-    let machine = if *m0plus { "m0plus" } else { "m4f" };
-    let triple = if machine == "m4f" { M4F.triple } else { M0PLUS.triple };
-    let folder = Workspace::Emulated.target_folder().join(triple).join("small");
-    let build = format!("build --package emulated-pil --bins --target {triple} --profile small");
-    cargo::check(Workspace::Emulated.cargo(&build))?;
-    let path = folder.join("pil");
-    let program = Program::read(&path)?;
+/// The worst poll on a Cortex-M4F, without those that start the loop.
+fn worst_poll() -> anyhow::Result<Profile> {
+    M4F_SMALL.build(Workspace::Emulated, "emulated-pil")?;
+    let path = M4F_SMALL.program(Workspace::Emulated, "pil");
     let pipe = Pipe::create("poll.pipe")?;
     // `sonarfix pil` starts the emulator that is found first: a script that adds the log.
     let scripts = cargo::target_folder().join("logged");
     std::fs::create_dir_all(&scripts)?;
-    let real = cargo::output({
-        let mut which = Command::new("which");
-        which.arg("qemu-system-arm");
-        which
-    })?;
+    let mut which = Command::new("which");
+    which.arg("qemu-system-arm");
+    let real = cargo::output(which)?;
     let script = scripts.join("qemu-system-arm");
     let (options, log) = (LOGGED.join(" "), pipe.path().display());
     std::fs::write(&script, format!("#!/bin/sh\nexec {} \"$@\" {options} {log}\n", real.trim()))?;
     executable(&script)?;
-    let run = format!(
-        "run --quiet --bin sonarfix -- pil crates/sonarfix-map/scenarios/classroom.toml --seconds {seconds} \
-         --machine {machine}"
-    );
-    let mut pil = cargo::command(&run);
+    let mut pil = cargo::command(RUN);
     pil.arg("--firmware").arg(&path);
     let known = std::env::var("PATH").unwrap_or_default();
     pil.env("PATH", format!("{}:{known}", scripts.display()));
-    let skipped: Vec<&str> = [START].into_iter().chain(without.as_deref()).collect();
-    let profile = profiled(pil, &pipe, &program, function, &skipped);
+    let profile = profiled(pil, &pipe, &Program::read(&path)?, POLL, &[START]);
     std::fs::remove_file(&script)?;
     profile
 }
@@ -213,24 +176,4 @@ fn routines(profile: &Profile) -> String {
         let _ = writeln!(text, "| {name} | {calls} | {mean} | {instructions} |");
     }
     text
-}
-
-fn print_tree(profile: &Profile) {
-    let all = profile.instructions();
-    print_node(profile, 0, 0, all / 400);
-}
-
-/// Prints a function with its instructions, its own instructions and its calls, and the functions that it calls.
-fn print_node(profile: &Profile, at: usize, depth: usize, least: u64) {
-    let Some(node) = profile.nodes.get(at) else { return };
-    let name = profile.stack(at).next().unwrap_or_default();
-    let indent = "  ".repeat(depth);
-    println!("{:7} {:7} {:5} {indent}{name}", profile.inclusive(at), node.own, node.calls);
-    let mut called: Vec<(u64, usize)> =
-        profile.called(at).map(|called| (profile.inclusive(called), called)).collect();
-    called.retain(|&(instructions, _)| instructions >= least);
-    called.sort_unstable_by_key(|&(instructions, _)| std::cmp::Reverse(instructions));
-    for (_, called) in called {
-        print_node(profile, called, depth + 1, least);
-    }
 }

@@ -41,6 +41,8 @@ pub const M3: Target = Target {
 /// Cortex-M0+, in soft float. QEMU has no M0+ with enough memory and a counter; an emulated
 /// Cortex-M3 runs the program, because its instruction set contains that of the M0+.
 pub const M0PLUS: Target = Target { name: "Cortex-M0+", triple: "thumbv6m-none-eabi", ..M3 };
+/// The same, optimised for size.
+pub const M0PLUS_SMALL: Target = Target { name: "Cortex-M0+ at `s`", profile: "small", ..M0PLUS };
 
 impl Target {
     /// Builds all programs of a package; then they are at [`Self::program`].

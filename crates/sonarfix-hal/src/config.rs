@@ -20,7 +20,7 @@ use sonarfix::config::{Config, ConfigError, Further, RangerId, Sonar};
 use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
 use sonarfix::health::{DEGRADED_WITHOUT_ODOMETRY, Verdict};
 use sonarfix::localizer::Localizer;
-use sonarfix_search::search::Region;
+use sonarfix::map::Region;
 
 use crate::encoder::{GeometryError, WheelGeometry, Wheels};
 use crate::ranger::{Air, Celsius, PulseTiming, RangerKind, RangerSettings};
@@ -59,8 +59,7 @@ pub enum StartPose {
     /// The pose must be set before the start. A lost robot stays lost.
     #[default]
     Known,
-    /// It searches for its pose if it starts without one, and whenever it is lost
-    /// ([`Navigator`](sonarfix_search::navigator::Navigator)).
+    /// It searches for its pose if it starts without one, and whenever it is lost (feature `search`).
     Unknown {
         /// The region in which it starts without a pose; anywhere on the map if there is none.
         region: Option<Region>,

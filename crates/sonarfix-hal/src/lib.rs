@@ -26,6 +26,7 @@
 //!
 //! # Features
 //! - `async`: `embedded-hal-async` functions over the same drivers (module `asynch`).
+//! - `search` (default): a loop that searches for its pose when it does not know it, by `sonarfix-search`.
 //! - `defmt`: derives `defmt::Format` for the public types that hold data.
 //! - `serde`: derives `Serialize` and `Deserialize` for configuration and telemetry.
 

@@ -7,12 +7,12 @@
 //! | [`Settings`], [`Stamp`] | the settings |
 //! | [`Report`] | what a poll did |
 //! | [`Faults`] | counts of faults |
-//! | `odometer` (private) | the ledger of encoder edges |
+//! | `measurement` (private) | the steps of a measurement cycle; `cycle`: its states |
 //! | `rangers` (private) | when each of several rangers can ping, and which one does |
-//! | `schedule` (private) | periodic deadlines |
-//! | `sonar` (private) | the state machine of a measurement cycle |
+//! | `travel` (private) | the travel of the wheels for the localizer; `odometer`, `yaw`: the ledgers of edges and turns |
 //! | `waiting` (private) | absolute measurements that wait for their step |
-//! | `yaw` (private) | the ledger of a gyro's turns |
+//! | `tracker` (private) | the localizer, and with the feature `search` the search beside it |
+//! | `rest` (private) | when a poll has something to do; `schedule`: periodic deadlines |
 //!
 //! *Tick*: one sample of both encoders (every 100 ms by default), passed to the localizer.
 //! *Measurement cycle*: choose a wall, turn the servo, wait until it has settled, ping, listen, fuse.
@@ -52,40 +52,44 @@
 //! # Non-finite policy
 //! Travel is computed from whole edges and ranges from whole microseconds, so both are finite.
 
+mod cycle;
 mod faults;
 mod hardware;
+mod measurement;
 mod odometer;
+mod poll;
 mod rangers;
 mod report;
+mod rest;
 mod schedule;
 mod settings;
-mod sonar;
+#[cfg_attr(not(feature = "search"), path = "robot/lone_tracker.rs")]
+mod tracker;
+mod travel;
 mod waiting;
 mod yaw;
 
-use sonarfix::aim::{Aim, NoAim};
-use sonarfix::config::{MAX_RANGERS, PingSchedule, RangerId};
+use sonarfix::config::PingSchedule;
 use sonarfix::filter::ekf::EkfError;
-use sonarfix::filter::motion::WheelTravel;
-use sonarfix::geometry::units::{Duration, Instant, Radians};
-use sonarfix::localizer::{Localizer, Start};
+use sonarfix::geometry::units::Instant;
+use sonarfix::localizer::{Localizer, Mode, Start};
 use sonarfix::sensor::absolute::AbsoluteMeasurement;
-use sonarfix::sensor::gyro::TurnReading;
-use sonarfix_search::navigator::{Mode, Navigator};
-use sonarfix_search::search::{Region, Search};
 
 use crate::encoder::Wheels;
-use crate::ranger::{Echo, NoEcho, Outcome, Ranger, TriggerError};
-use crate::time::{NEVER, after, micros, since};
+use crate::time::after;
 
+use cycle::Cycle;
 pub use faults::{EncoderFaults, Faults};
 pub use hardware::{Devices, Hardware, WithGyro, WithRangers};
-use odometer::{Odometer, Position, Reading};
-use rangers::can_ping_at;
-pub use report::{PingResult, Report, Step, StepResult, SweepResult, Tick};
+use measurement::PingEnd;
+use odometer::Odometer;
+use poll::Poll;
+pub use report::{PingResult, Report, Step, StepResult, Tick};
+pub use rest::PACE;
 use schedule::Schedule;
 pub use settings::{EVALUATIONS_PER_MILLISECOND, Settings, SettingsError, Stamp};
-use sonar::{Cycle, Target};
+use tracker::Tracker;
+pub use tracker::{Search, SweepResult};
 use waiting::Waiting;
 pub use waiting::{AbsoluteResult, Occupied};
 use yaw::YawLedger;
@@ -152,7 +156,7 @@ use yaw::YawLedger;
 /// ```
 #[derive(Debug, Clone)]
 pub struct Robot<'m> {
-    navigator: Navigator<'m>,
+    tracker: Tracker<'m>,
     settings: Settings,
     odometer: Odometer,
     ticks: Schedule,
@@ -165,20 +169,14 @@ pub struct Robot<'m> {
     rests_until: Instant,
     /// Whether the previous poll found something to do.
     has_worked: bool,
-    /// The outcome of the ping in flight, which [`Self::rest`] has read for the next poll.
-    heard: Option<Heard>,
+    /// The end of the ping in flight, which [`Self::rest`] has read for the next poll.
+    ping_end: Option<PingEnd>,
     faults: Faults,
     /// The gyro, if the robot has one.
     yaw: Option<YawLedger>,
     /// Headings and positions from outside.
     waiting: Waiting,
 }
-
-/// The outcome of a ping; `None` if the ranger failed.
-type Heard = Option<Outcome>;
-
-/// Period of the polls of a loop whose next deadline is not known.
-pub const PACE: Duration = Duration::from_ticks(1_000);
 
 /// An instant that has passed.
 const AT_ONCE: Instant = Instant::from_ticks(0);
@@ -205,7 +203,7 @@ impl<'m> Robot<'m> {
             }
         };
         Ok(Self {
-            navigator: Navigator::new(localizer),
+            tracker: Tracker::new(localizer),
             settings,
             odometer: Odometer::new(wheels),
             ticks: Schedule::new(start, settings.encoder_period),
@@ -214,7 +212,7 @@ impl<'m> Robot<'m> {
             time: start,
             rests_until: AT_ONCE,
             has_worked: true,
-            heard: None,
+            ping_end: None,
             faults: Faults::default(),
             yaw,
             waiting: Waiting::default(),
@@ -239,7 +237,7 @@ impl<'m> Robot<'m> {
             PingSchedule::AsFastAsPossible => self.pings,
         };
         self.yaw = yaw_of(&localizer);
-        self.navigator = Navigator::new(localizer);
+        self.tracker = Tracker::new(localizer);
         self.odometer = Odometer::new(wheels);
         self.ticks = self.ticks.continued(now, settings.encoder_period);
         self.pings = pings;
@@ -261,19 +259,18 @@ impl<'m> Robot<'m> {
         hardware: &mut impl Hardware,
     ) -> Result<Option<Step>, EkfError> {
         self.rests_until = AT_ONCE;
-        let mut faults = Faults::default();
-        self.odometer.begin(now, hardware, &mut faults);
-        let reading = self.read(now, hardware, &mut faults);
+        let poll = &mut Poll::new(now, hardware, None);
+        self.odometer.begin(poll);
         let mut step = None;
-        if let Some(Reading { position, turn, .. }) = reading {
-            self.advance(now, position, turn, &mut faults, None, &mut step);
+        if let Some(reading) = self.read(poll) {
+            self.advance(poll, &reading, &mut step);
         } else {
             // The travel up to now does not belong to the new pose.
             self.odometer.forget();
-            self.navigator.odometry_missing(now);
+            self.tracker.localizer_mut().odometry_missing(now);
         }
-        self.faults = self.faults.plus(faults);
-        self.navigator.set_pose(start)?;
+        self.faults = self.faults.plus(poll.faults);
+        self.tracker.set_pose(start)?;
         self.end_cycle(now, false);
         Ok(step)
     }
@@ -281,7 +278,7 @@ impl<'m> Robot<'m> {
     /// Continues at `now` after the clock was set back: travel and turn since the last step belong to the next one, a ping
     /// in flight is aborted, and measurements that wait are dropped.
     pub fn set_clock(&mut self, now: Instant) {
-        self.navigator.set_clock(now);
+        self.tracker.localizer_mut().set_clock(now);
         self.ticks = Schedule::new(now, self.settings.encoder_period);
         self.pings = match self.localizer().config().sonar.timing.schedule {
             PingSchedule::Every(period) => Schedule::new(now, period),
@@ -323,26 +320,9 @@ impl<'m> Robot<'m> {
         report
     }
 
-    /// As [`Self::poll`], with a search: a robot whose pose is unknown sweeps with its sonar and searches for its pose
-    /// ([`Navigator`]). A poll with nothing else to do makes [`Settings::evaluations`] of the search.
-    ///
-    /// The search must be the same in every call.
-    ///
-    /// # Panics
-    /// Never.
-    pub fn poll_with_search(
-        &mut self,
-        now: Instant,
-        hardware: &mut impl Hardware,
-        search: &mut Search<'m>,
-    ) -> Report {
-        let mut report = Report::default();
-        self.poll_into(now, hardware, Some(search), &mut report);
-        report
-    }
-
-    /// As [`Self::poll`], or with a search as [`Self::poll_with_search`]; the report, which is half a kilobyte, is written in
-    /// place.
+    /// As [`Self::poll`], with or without a search: with one, a robot whose pose is unknown sweeps with its sonar and searches
+    /// for its pose, and a poll with nothing else to do makes [`Settings::evaluations`] of the search, which must be the same in
+    /// every call. The report, which is half a kilobyte, is written in place.
     ///
     /// # Panics
     /// Never.
@@ -350,147 +330,53 @@ impl<'m> Robot<'m> {
         &mut self,
         now: Instant,
         hardware: &mut impl Hardware,
-        mut search: Option<&mut Search<'m>>,
+        search: Option<&mut Search<'m>>,
         report: &mut Report,
     ) {
         report.clear();
         if now < self.time {
             report.faults.clock = 1;
         } else {
-            self.odometer.begin(now, hardware, &mut report.faults);
-            if let Some(yaw) = &mut self.yaw {
-                yaw.sample(now, hardware, &mut report.faults);
-            }
-            // What has arrived since the last step, before there is another one.
-            report.absolute = [self.take_absolute(), self.take_absolute()];
-            self.finish_ping(now, hardware, report, search.as_deref_mut());
-            self.sample_encoders(now, hardware, report, search.as_deref_mut());
-            self.choose_bearing(now, hardware, report, search.as_deref_mut());
-            self.start_ping(now, hardware, report);
-            if let Some(search) = search {
-                self.work_on(search, report);
-            }
-            self.time = now;
-            self.has_worked = report.has_worked();
-            self.rests_until = if self.can_rest() { self.next_deadline(hardware) } else { AT_ONCE };
+            self.poll_in_time(&mut Poll::new(now, hardware, search), report);
         }
         if !report.faults.is_none() {
             self.faults = self.faults.plus(report.faults);
         }
     }
 
-    /// Whether a poll at `now` has nothing to do. If so, it is done: [`Self::poll`] need not be called, and would return
-    /// an empty report. If not, [`Self::poll`] is to be called at the same `now`.
-    ///
-    /// For a loop that is also polled for other reasons, or at a fixed rate: this takes a tenth of the instructions of an empty
-    /// poll.
-    ///
-    /// # Panics
-    /// Never.
-    pub fn rest(&mut self, now: Instant, hardware: &mut impl Hardware) -> bool {
-        if now < self.time || now >= self.rests_until || !self.is_silent(now, hardware) {
-            return false;
+    /// A poll at a time that is not before that of the previous one.
+    #[inline]
+    fn poll_in_time(&mut self, poll: &mut Poll<'_, 'm, impl Hardware>, report: &mut Report) {
+        self.odometer.begin(poll);
+        if let Some(yaw) = &mut self.yaw {
+            yaw.sample(poll);
         }
-        self.time = now;
-        true
-    }
-
-    /// Whether the ping in flight has no outcome at `now`, if there is one.
-    fn is_silent(&mut self, now: Instant, hardware: &mut impl Hardware) -> bool {
-        let Cycle::Listening { polled, target, .. } = &mut self.cycle else {
-            return true;
-        };
-        let polled = *polled.get_or_insert(now);
-        if self.heard.is_none() {
-            match hardware.ranger_of(target.ranger()).poll(now) {
-                Ok(None) => return since(now, polled) < self.settings.patience,
-                Ok(outcome) => self.heard = Some(outcome),
-                Err(_) => self.heard = Some(None),
-            }
+        // What has arrived since the last step, before there is another one.
+        report.absolute = [self.take_absolute(), self.take_absolute()];
+        self.finish_ping(poll, report);
+        self.sample_encoders(poll, report);
+        self.choose_bearing(poll, report);
+        self.start_ping(poll, report);
+        report.faults = poll.faults;
+        if let Some(search) = poll.search.as_deref_mut() {
+            self.work_on(search, report);
         }
-        false
-    }
-
-    /// The next instant at which a poll has something to do besides a ping in flight.
-    fn next_deadline(&self, hardware: &mut impl Hardware) -> Instant {
-        let next = match self.cycle {
-            // Ticks are delayed until it has ended.
-            Cycle::Listening { .. } => NEVER,
-            Cycle::Idle { until } => until.min(self.ticks.next()),
-            Cycle::Turning { ranger, .. } => {
-                can_ping_at(self.localizer().config(), ranger, hardware).min(self.ticks.next())
-            }
-        };
-        self.yaw.as_ref().map_or(next, |yaw| next.min(yaw.next()))
-    }
-
-    /// Whether polls before the next deadline have nothing to do. A search works at every poll.
-    fn can_rest(&self) -> bool {
-        self.odometer.has_begun() && self.mode() == Mode::Tracking
-    }
-
-    /// When the loop must be polled next, if no edge of the echo is stamped earlier: at the next deadline of ticks, sonar, servo
-    /// or gyro, and every [`PACE`] where no deadline is known (a search, a ranger without [`Ranger::poll_at`]). An instant that
-    /// has passed: at once.
-    pub fn next_poll(&self, hardware: &mut impl Hardware) -> Instant {
-        let paced = after(self.time, PACE);
-        let deadline = match self.cycle {
-            Cycle::Listening { polled, target, .. } => {
-                let timeout = polled.map_or(NEVER, |polled| after(polled, self.settings.patience));
-                hardware.ranger_of(target.ranger()).poll_at().unwrap_or(AT_ONCE).min(timeout)
-            }
-            _ => NEVER,
-        };
-        let deadline = deadline.min(self.next_deadline(hardware));
-        if !self.can_rest() {
-            return deadline.min(paced);
-        }
-        // A deadline that has passed without effect, such as that of a ranger that is not ready.
-        let is_waiting = deadline <= self.time && !self.has_worked;
-        if is_waiting { paced } else { deadline }
-    }
-
-    /// Reads both counters, and the gyro if there is one; `None` if a counter fails.
-    fn read(
-        &mut self,
-        now: Instant,
-        hardware: &mut impl Hardware,
-        faults: &mut Faults,
-    ) -> Option<Reading> {
-        let reading = self.odometer.read(now, hardware, faults)?;
-        Some(Reading { turn: self.yaw.as_ref().map(|yaw| yaw.reading(now)), ..reading })
-    }
-
-    /// Declares the pose unknown and begins the search, to which the present pose is proposed; a ping in flight is
-    /// aborted.
-    pub fn search(&mut self, now: Instant, search: &mut Search<'m>) {
-        self.navigator.search(search);
-        self.end_cycle(now, false);
-    }
-
-    /// Begins the search of a robot that has been started without a pose ([`Navigator::search_in`]); a ping in flight
-    /// is aborted.
-    pub fn search_in(&mut self, now: Instant, region: Option<Region>, search: &mut Search<'m>) {
-        self.navigator.search_in(region, search);
-        self.end_cycle(now, false);
+        self.time = poll.now;
+        self.has_worked = report.has_worked();
+        self.rests_until =
+            if self.can_rest() { self.next_deadline(poll.hardware) } else { AT_ONCE };
     }
 
     /// What determines the pose.
     #[must_use]
     pub fn mode(&self) -> Mode {
-        self.navigator.mode()
-    }
-
-    /// The next instant at which a poll has something to do; `None` while a ping is in flight, when the loop
-    /// should be polled at the rate that the ranger requires. For an executor that sleeps, and for a simulator.
-    pub fn idle_until(&self, hardware: &mut impl Hardware) -> Option<Instant> {
-        (!self.cycle.is_listening()).then(|| self.next_deadline(hardware))
+        self.tracker.mode()
     }
 
     /// The localizer: pose, covariance, calibration, health.
     #[must_use]
     pub fn localizer(&self) -> &Localizer<'m> {
-        self.navigator.localizer()
+        self.tracker.localizer()
     }
 
     /// The faults since the start.
@@ -504,347 +390,10 @@ impl<'m> Robot<'m> {
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
-
-    /// Reads the outcome of the ping in flight.
-    fn finish_ping(
-        &mut self,
-        now: Instant,
-        hardware: &mut impl Hardware,
-        report: &mut Report,
-        search: Option<&mut Search<'m>>,
-    ) {
-        let Cycle::Listening { target, from, polled } = &mut self.cycle else {
-            return;
-        };
-        let (target, from, polled) = (*target, *from, *polled.get_or_insert(now));
-        let heard = match self.heard.take() {
-            Some(heard) => heard,
-            None => match hardware.ranger_of(target.ranger()).poll(now) {
-                Ok(None) if since(now, polled) < self.settings.patience => return,
-                Ok(None) => Some(Err(NoEcho::NoResponse)),
-                Ok(outcome) => outcome,
-                Err(_) => None,
-            },
-        };
-        let outcome = heard.unwrap_or(Err(NoEcho::Failed));
-        let outcome = outcome.and_then(|echo| in_time(echo, from.at, now));
-        report.faults.ranger += u32::from(outcome.err().is_some_and(NoEcho::is_fault));
-        match target {
-            Target::Wall(aim) => self.fuse(now, &aim, &from, outcome, hardware, report, search),
-            Target::Sweep(bearing) => {
-                self.sweep(now, bearing, &from, outcome, hardware, report, search);
-            }
-        }
-        self.end_cycle(now, true);
-    }
-
-    /// Passes the travel up to the instant of the echo to the localizer, then the range.
-    #[expect(clippy::too_many_arguments, reason = "a ping, its echo, and what takes them")]
-    #[inline(never)]
-    fn fuse(
-        &mut self,
-        now: Instant,
-        aim: &Aim,
-        from: &Reading,
-        outcome: Outcome,
-        hardware: &mut impl Hardware,
-        report: &mut Report,
-        mut search: Option<&mut Search<'m>>,
-    ) {
-        let Report { ping_result, faults, .. } = report;
-        let result = ping_result.insert(PingResult { aim: *aim, outcome, step: None, fix: None });
-        let range = outcome.ok().map(|echo| echo.range);
-        if let Ok(echo) = outcome {
-            let (step, search) = (&mut result.step, search.as_deref_mut());
-            if !self.reach(now, from, &echo, hardware, faults, search, step) {
-                self.navigator.skip();
-                return;
-            }
-        }
-        result.fix = Some(self.navigator.fix(aim, range, search));
-    }
-
-    /// Passes the travel up to the instant of the echo to the localizer, then the range to the search.
-    #[expect(clippy::too_many_arguments, reason = "a ping, its echo, and what takes them")]
-    #[inline(never)]
-    fn sweep(
-        &mut self,
-        now: Instant,
-        bearing: Radians,
-        from: &Reading,
-        outcome: Outcome,
-        hardware: &mut impl Hardware,
-        report: &mut Report,
-        mut search: Option<&mut Search<'m>>,
-    ) {
-        let Report { swept, faults, .. } = report;
-        let result = swept.insert(SweepResult { bearing, outcome, step: None, is_novel: None });
-        let range = match outcome {
-            Ok(echo) => {
-                let (step, search) = (&mut result.step, search.as_deref_mut());
-                let is_reached = self.reach(now, from, &echo, hardware, faults, search, step);
-                is_reached.then_some(Some(echo.range))
-            }
-            Err(reason) => (!reason.is_fault()).then_some(None),
-        };
-        result.is_novel = range.zip(search).map(|(range, search)| {
-            // A range of a driver is finite, and so is the bearing.
-            self.navigator.ping(bearing, range, search).unwrap_or(false)
-        });
-    }
-
-    /// Passes the travel up to the instant of the echo to the localizer, and writes the step in place, because it is
-    /// large. Returns whether the counters could be read.
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "a ping, its echo, what takes them, and the step"
-    )]
-    fn reach(
-        &mut self,
-        now: Instant,
-        from: &Reading,
-        echo: &Echo,
-        hardware: &mut impl Hardware,
-        faults: &mut Faults,
-        search: Option<&mut Search<'m>>,
-        step: &mut Option<Step>,
-    ) -> bool {
-        let Some(reading) = self.read(now, hardware, faults) else { return false };
-        let (at, position, turn) = match self.settings.stamp {
-            Stamp::Reflection => {
-                let at = echo.reflected();
-                (at, from.between(&reading, at), from.turn_between(&reading, at))
-            }
-            Stamp::Arrival => (now, reading.position, reading.turn),
-        };
-        self.advance(at, position, turn, faults, search, step);
-        true
-    }
-
-    /// Passes one absolute measurement to the localizer, if one is due.
-    #[inline]
-    fn take_absolute(&mut self) -> Option<AbsoluteResult> {
-        let at = self.localizer().time();
-        let (measured_at, measurement) = self.waiting.take(at)?;
-        let fix = self.navigator.absolute(measured_at, &measurement);
-        Some(AbsoluteResult { at, measured_at, measurement, fix })
-    }
-
-    /// Samples the encoders, if a tick is due and no ping is in flight.
-    fn sample_encoders(
-        &mut self,
-        now: Instant,
-        hardware: &mut impl Hardware,
-        report: &mut Report,
-        search: Option<&mut Search<'m>>,
-    ) {
-        if self.cycle.is_listening() || report.has_ended_ping() {
-            return;
-        }
-        let Some(due) = self.ticks.take(now) else {
-            return;
-        };
-        // Up to the previous poll a ping has delayed it; the time since then counts as late.
-        let held = self.time >= due.due;
-        let late = since(now, due.due.max(self.time));
-        report.faults.deadlines += u32::from(late > self.settings.tolerance);
-        let Report { tick, faults, .. } = report;
-        let lateness = since(now, due.due);
-        let Tick { step, .. } =
-            tick.insert(Tick { step: None, lateness, held, skipped: due.skipped });
-        if let Some(Reading { position, turn, .. }) = self.read(now, hardware, faults) {
-            self.advance(now, position, turn, faults, search, step);
-        }
-        if step.as_ref().is_none_or(|step| matches!(step.result, StepResult::Discarded(_))) {
-            self.navigator.odometry_missing(now);
-        }
-    }
-
-    /// Chooses a wall, or the next bearing of the sweep, if a ping is due, and turns the servo.
-    #[inline(never)]
-    fn choose_bearing(
-        &mut self,
-        now: Instant,
-        hardware: &mut impl Hardware,
-        report: &mut Report,
-        search: Option<&mut Search<'m>>,
-    ) {
-        let is_due = matches!(self.cycle, Cycle::Idle { until } if now >= until);
-        if !is_due || report.has_ended_ping() || report.tick.is_some() {
-            return;
-        }
-        if let (Mode::Searching, Some(search)) = (self.mode(), search) {
-            let turned = hardware.servo().point(now, search.aim());
-            report.faults.servo += u32::from(turned.is_err());
-            self.cycle = Cycle::Turning { ranger: RangerId::FIRST, why: None };
-            return;
-        }
-        if self.localizer().is_odometry_missing() {
-            // The next encoder sample ends the period, or the health records that it lasts.
-            self.cycle = Cycle::Idle { until: self.ticks.next() };
-            return;
-        }
-        let aimed = if self.localizer().config().has_several_sonars() {
-            self.choose_among(now, hardware, &mut report.faults)
-        } else {
-            self.navigator.aim().inspect(|aim| {
-                let turned = hardware.servo().point(now, aim.bearing);
-                // If it does not turn, the wall at its last bearing is measured.
-                report.faults.servo += u32::from(turned.is_err());
-            })
-        };
-        if let Ok(aim) = aimed {
-            self.cycle = Cycle::Turning { ranger: aim.ranger, why: Some(aim.why) };
-        } else {
-            self.navigator.skip();
-            self.end_cycle(now, false);
-        }
-        report.aimed = Some(aimed);
-    }
-
-    /// Chooses ranger and wall of the next ping of a robot with several rangers. The servos of the others turn to their
-    /// walls meanwhile.
-    #[inline(never)]
-    fn choose_among(
-        &mut self,
-        now: Instant,
-        hardware: &mut impl Hardware,
-        faults: &mut Faults,
-    ) -> Result<Aim, NoAim> {
-        let config = self.localizer().config();
-        let mut aims = [None; MAX_RANGERS];
-        for ((ranger, _), aim) in config.sonars().zip(&mut aims) {
-            let standing = rangers::standing(config, ranger, now, hardware);
-            *aim = self.navigator.aim_of(ranger, &standing).ok();
-        }
-        let chosen = rangers::first_of(config, &aims).ok_or(NoAim::NoWall)?;
-        for aim in aims.iter().flatten() {
-            let turned = hardware.servo_of(aim.ranger).point(now, aim.bearing);
-            faults.servo += u32::from(turned.is_err());
-        }
-        Ok(chosen)
-    }
-
-    /// Starts a ping once the servo has settled and the ranger is ready ([`can_ping_at`]), if a wall is square to
-    /// the sonar (the robot may have turned in the meantime) or the sonar sweeps.
-    fn start_ping(&mut self, now: Instant, hardware: &mut impl Hardware, report: &mut Report) {
-        let Cycle::Turning { ranger, why } = self.cycle else {
-            return;
-        };
-        let Some(bearing) = hardware.servo_of(ranger).target() else {
-            self.navigator.ranger_failed(ranger);
-            self.abort_cycle(now);
-            return;
-        };
-        let ready_at = can_ping_at(self.localizer().config(), ranger, hardware);
-        if now < ready_at {
-            return;
-        }
-        let target = match why {
-            None => Target::Sweep(bearing),
-            Some(why) => {
-                let Ok(aim) = self.navigator.aim_along(ranger, bearing) else {
-                    self.end_cycle(now, false);
-                    return;
-                };
-                Target::Wall(Aim { why, ..aim })
-            }
-        };
-        let Some(from) = self.read(now, hardware, &mut report.faults) else {
-            self.abort_cycle(now);
-            return;
-        };
-        match hardware.ranger_of(ranger).trigger(now) {
-            Ok(()) => {
-                self.cycle = Cycle::Listening { target, from, polled: None };
-                if let Target::Wall(aim) = target {
-                    report.pinged = Some(aim);
-                }
-            }
-            Err(TriggerError::TooSoon) if since(now, ready_at) < self.settings.patience => {}
-            Err(_) => {
-                report.faults.ranger += 1;
-                self.navigator.ranger_failed(ranger);
-                self.abort_cycle(now);
-            }
-        }
-    }
-
-    /// Ends a measurement cycle in which a device has prevented the ping.
-    fn abort_cycle(&mut self, now: Instant) {
-        if self.mode() != Mode::Searching {
-            self.navigator.skip();
-        }
-        self.end_cycle(now, false);
-    }
-
-    /// Ends the measurement cycle. If there was no ping, nothing changes before the next tick.
-    fn end_cycle(&mut self, now: Instant, pinged: bool) {
-        let is_sweeping = self.mode() == Mode::Searching;
-        let until = match self.localizer().config().sonar.timing.schedule {
-            PingSchedule::Every(_) if !is_sweeping => {
-                self.pings.take(now);
-                self.pings.next()
-            }
-            _ if pinged => now,
-            _ => self.ticks.next(),
-        };
-        self.cycle = Cycle::Idle { until };
-        (self.rests_until, self.heard) = (AT_ONCE, None);
-    }
-
-    /// Works on the search if nothing else was done in this poll, and changes the mode when it is time.
-    fn work_on(&mut self, search: &mut Search<'m>, report: &mut Report) {
-        let evaluations = if report.is_empty() { self.settings.evaluations } else { 0 };
-        report.mode = self.navigator.work(evaluations, search);
-    }
-
-    /// Passes the travel of the wheels up to `at` to the localizer, and the turn of the gyro; writes the step in place.
-    fn advance(
-        &mut self,
-        at: Instant,
-        position: Position,
-        reading: Option<TurnReading>,
-        faults: &mut Faults,
-        search: Option<&mut Search<'m>>,
-        step: &mut Option<Step>,
-    ) {
-        let travel = self.odometer.travel_to(position);
-        let turn = self.yaw.as_ref().and_then(|yaw| yaw.turn_to(&reading?));
-        let result = match self.navigator.odometry_with_turn(at, travel, turn, search) {
-            Ok(()) => StepResult::Accepted,
-            Err(error) if self.is_credible(at, travel) => StepResult::Deferred(error),
-            Err(error) => StepResult::Discarded(error),
-        };
-        if !matches!(result, StepResult::Deferred(_)) {
-            self.odometer.settle(position);
-        }
-        if let (StepResult::Accepted, Some(yaw), Some(reading)) = (result, &mut self.yaw, reading) {
-            yaw.settle(reading);
-        }
-        faults.travel += u32::from(matches!(result, StepResult::Discarded(_)));
-        let step = step.insert(Step { at, travel, turn: reading, result, absolute: None });
-        step.absolute = self.take_absolute();
-    }
-
-    /// Whether the wheels can have travelled so far since the localizer's last step. Each of the two positions is
-    /// quantized to one edge.
-    fn is_credible(&self, at: Instant, travel: WheelTravel) -> bool {
-        let seconds = 1e-6 * micros(since(at, self.localizer().time()));
-        let fastest = self.localizer().config().max_wheel_speed.0 * seconds;
-        let limit = fastest + 2.0 * self.odometer.wheels().coarser_tick().0;
-        travel.right.abs().0 <= limit && travel.left.abs().0 <= limit
-    }
 }
 
 /// The ledger of the gyro in the configuration of a localizer.
 fn yaw_of(localizer: &Localizer) -> Option<YawLedger> {
     let parameters = localizer.config().gyro.as_ref()?;
     Some(YawLedger::new(parameters, localizer.time()))
-}
-
-/// The echo, if its times are between the trigger and now.
-fn in_time(echo: Echo, triggered: Instant, now: Instant) -> Result<Echo, NoEcho> {
-    let fits = triggered <= echo.sent && echo.sent <= echo.heard && echo.heard <= now;
-    if fits { Ok(echo) } else { Err(NoEcho::Mistimed) }
 }

@@ -11,7 +11,7 @@ use sonarfix::map::image::checksum as crc32;
 use sonarfix_hal::config::{RobotConfig, RobotConfigError};
 
 /// The version of the image. It is raised whenever the bytes of a configuration change.
-pub const VERSION: u16 = 7;
+pub const VERSION: u16 = 8;
 /// Largest size of an image, bytes.
 pub const LENGTH_MAX: usize = HEADER + POSTCARD_MAX + CHECKSUM;
 

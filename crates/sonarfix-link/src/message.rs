@@ -14,14 +14,13 @@ use sonarfix::filter::ekf::{StandardDeviations, StateEstimate};
 use sonarfix::geometry::pose::Pose;
 use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
 use sonarfix::health::Health;
-use sonarfix::localizer::{Fix, GyroStatus, Start};
+use sonarfix::localizer::{Fix, GyroStatus, Mode, Start};
 use sonarfix::map::WallId;
 use sonarfix::sensor::absolute::AbsoluteMeasurement;
 use sonarfix::sensor::gyro::TurnReading;
 use sonarfix_hal::config::{RobotConfig, Unsupported};
 use sonarfix_hal::ranger;
 use sonarfix_hal::robot::{AbsoluteResult, Faults};
-use sonarfix_search::navigator::Mode;
 
 use crate::counters::ReceiverCounters;
 
@@ -238,7 +237,7 @@ pub struct SearchStatus {
     pub cycles: u32,
 }
 
-/// What the search has found ([`Answer`](sonarfix_search::search::Answer)).
+/// What the search has found (`Answer` of `sonarfix-search`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SearchAnswer {

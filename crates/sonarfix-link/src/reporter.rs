@@ -1,16 +1,16 @@
 //! Turns the polls of the robot's loop into telemetry, for firmware, simulator and emulator.
 
+#[cfg(feature = "search")]
+mod search;
+
 use sonarfix::filter::ekf::{StandardDeviations, StateEstimate};
 use sonarfix::geometry::units::{Duration, Instant};
 use sonarfix::health::Health;
-use sonarfix::localizer::Localizer;
-use sonarfix_hal::robot::{self, PingResult, Report, StepResult, SweepResult};
-use sonarfix_search::navigator::Mode;
-use sonarfix_search::search::{Answer, Hypothesis, Search};
+use sonarfix::localizer::{Localizer, Mode};
+use sonarfix_hal::robot::{self, PingResult, Report, StepResult};
 
 use crate::message::{
-    Estimate, GyroState, ModeChanged, Odometry, Ping, RankedHypothesis, SearchAnswer, SearchStatus,
-    SkippedPing, Sweep, Telemetry,
+    Estimate, GyroState, ModeChanged, Odometry, Ping, SkippedPing, Sweep, Telemetry,
 };
 
 /// Turns what the loop did into telemetry, in the order of the localizer's inputs. The telemetry contains all of
@@ -39,9 +39,6 @@ impl<F: FnMut(&Telemetry)> Outlet for F {
 
 /// Time between two messages on the gyro.
 const GYRO_PERIOD: Duration = Duration::from_ticks(1_000_000);
-
-/// Messages on the search before they begin again. There is one at each tick: with ten ticks a second, each once a second.
-const SEARCH_MESSAGES: u8 = 10;
 
 impl Reporter {
     /// A reporter for a localizer that was just initialized, and the first message.
@@ -76,10 +73,9 @@ impl Reporter {
             self.odometry(heard.step.as_ref(), outlet);
             self.ping(heard, outlet);
         }
-        if let Some(SweepResult { bearing, outcome, step, .. }) = &report.swept {
-            self.odometry(step.as_ref(), outlet);
-            let at = self.last.at;
-            let (bearing, outcome) = (*bearing, *outcome);
+        if let Some(swept) = &report.swept {
+            self.odometry(swept.step(), outlet);
+            let (at, (bearing, outcome)) = (self.last.at, swept.ping());
             outlet.send_built(|| Telemetry::Sweep(Sweep { at, bearing, outcome }));
         }
         if let Some(tick) = &report.tick {
@@ -93,34 +89,6 @@ impl Reporter {
         }
         if let Some(mode) = report.mode {
             outlet.send_built(|| mode_changed(mode, localizer));
-        }
-    }
-
-    /// Passes the next message on the search to `outlet`; to be called at a tick while the search works.
-    pub fn search(&mut self, mode: Mode, search: &Search, outlet: &mut impl Outlet) {
-        let (at, number) = (self.last.at, self.next);
-        self.next = (number + 1) % SEARCH_MESSAGES;
-        let Some(rank) = number.checked_sub(1) else {
-            let pings = u16::try_from(search.pings()).unwrap_or(u16::MAX);
-            let (answer, cycles) = (kind_of(&search.answer()), search.cycles());
-            outlet
-                .send_built(|| Telemetry::Search(SearchStatus { at, mode, answer, pings, cycles }));
-            return;
-        };
-        if let Some(hypothesis) = search.ranked(usize::from(rank)) {
-            let Hypothesis { pose, position_deviation, heading_deviation, fit, explained, .. } =
-                hypothesis;
-            outlet.send_built(|| {
-                Telemetry::Hypothesis(RankedHypothesis {
-                    at,
-                    rank,
-                    pose,
-                    position_deviation,
-                    heading_deviation,
-                    fit,
-                    explained,
-                })
-            });
         }
     }
 
@@ -174,16 +142,6 @@ impl Reporter {
             let (at, aim, outcome, fix) = (self.last.at, *aim, *outcome, *fix);
             outlet.send_built(|| Telemetry::Ping(Ping { at, aim, outcome, fix }));
         }
-    }
-}
-
-fn kind_of(answer: &Answer) -> SearchAnswer {
-    match *answer {
-        Answer::Searching => SearchAnswer::Searching,
-        Answer::Several(count) => SearchAnswer::Several(u8::try_from(count).unwrap_or(u8::MAX)),
-        Answer::Along { wall, .. } => SearchAnswer::Along(wall),
-        Answer::Nowhere => SearchAnswer::Nowhere,
-        Answer::Unique(_) => SearchAnswer::Unique,
     }
 }
 

@@ -1,7 +1,4 @@
-//! Reads the `[absolute]` table of a scenario: sensors that measure heading, position or pose from outside.
-
-use crate::document::{Node, Table};
-use crate::quantity::{ANGLE, LENGTH};
+//! The `[absolute]` table of a scenario: sensors that measure heading, position or pose from outside.
 
 /// When a sensor measures, and how often it is wrong.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,52 +51,12 @@ pub struct AbsoluteSensors {
     pub position: Option<PositionSensor>,
 }
 
-/// The sensors of a scenario.
-pub(crate) fn read(root: &Table<'_>) -> AbsoluteSensors {
-    let Some(node) = root.get("absolute") else {
-        return AbsoluteSensors::default();
-    };
-    let table = node.table(&["heading", "position"]);
-    AbsoluteSensors {
-        heading: table.get("heading").map(read_heading),
-        position: table.get("position").map(read_position),
-    }
-}
+const NO_SAMPLING: Sampling = Sampling { period: 0, delay: 0, outliers: 0.0 };
 
-fn read_heading(node: Node<'_>) -> HeadingSensor {
-    let table = node.table(&["deviation", "period", "delay", "outliers"]);
-    HeadingSensor {
-        sampling: read_sampling(&table),
-        deviation: positive(&table, "deviation", &ANGLE),
-    }
-}
+/// A sensor of the heading before its keys are read.
+pub(crate) const NO_HEADING: HeadingSensor =
+    HeadingSensor { sampling: NO_SAMPLING, deviation: 0.0 };
 
-fn read_position(node: Node<'_>) -> PositionSensor {
-    let keys = ["deviation", "heading_deviation", "period", "delay", "outliers"];
-    let table = node.table(&keys);
-    PositionSensor {
-        sampling: read_sampling(&table),
-        deviation: positive(&table, "deviation", &LENGTH),
-        heading_deviation: table
-            .get("heading_deviation")
-            .map(|_| positive(&table, "heading_deviation", &ANGLE)),
-    }
-}
-
-fn positive(table: &Table<'_>, key: &str, dimension: &crate::quantity::Dimension) -> f64 {
-    let node = table.require(key);
-    let value = node.quantity(dimension);
-    node.check(value, value > 0.0, "positive")
-}
-
-fn read_sampling(table: &Table<'_>) -> Sampling {
-    let outliers = table.get("outliers").map_or(0.0, |node| {
-        let share = node.fraction();
-        node.check(share, (0.0..=1.0).contains(&share), "between 0 and 1")
-    });
-    Sampling {
-        period: table.require("period").period().to_micros(),
-        delay: table.get("delay").map_or(0, |node| node.span().to_micros()),
-        outliers,
-    }
-}
+/// A sensor of the position before its keys are read.
+pub(crate) const NO_POSITION: PositionSensor =
+    PositionSensor { sampling: NO_SAMPLING, deviation: 0.0, heading_deviation: None };

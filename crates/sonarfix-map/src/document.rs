@@ -6,20 +6,17 @@
 use std::cell::{Cell, RefCell};
 use std::ops::RangeInclusive;
 
-use sonarfix::geometry::units::Duration;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use crate::error::{FileError, Mistake};
 use crate::example;
-use crate::quantity::{Dimension, FRACTION, LENGTH, METRE, TIME, Unit};
+use crate::geometry::{TOO_FAR, is_near_enough};
+use crate::quantity::{Dimension, LENGTH, Limits, METRE, Unit};
 use crate::spelling::{alternatives, nearest};
 
 /// The version of the formats that this crate reads.
 const FORMAT: u64 = 1;
-
-/// The longest duration in a file, seconds.
-const LONGEST_SPAN: f64 = 3600.0;
 
 /// A number in place of one that cannot be read; every dimension permits it.
 const PLACEHOLDER: f64 = 1.0;
@@ -210,16 +207,14 @@ impl<'a> Node<'a> {
         })
     }
 
-    /// The meaning of one of several words; a placeholder for another text.
-    pub fn one_of<T: Copy>(&self, words: &[(&str, T)], placeholder: T) -> T {
+    /// The index of one of several words; 0 for another text.
+    pub fn word(&self, words: &[&str]) -> usize {
         let text = self.text();
-        let found = words.iter().find(|(word, _)| *word == text);
-        let Some((_, meaning)) = found else {
-            let known: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
-            self.report(format!("must be {}", alternatives(text, &known)));
-            return placeholder;
-        };
-        *meaning
+        let found = words.iter().position(|word| *word == text);
+        found.unwrap_or_else(|| {
+            self.report(format!("must be {}", alternatives(text, words)));
+            0
+        })
     }
 
     /// `true` or `false`.
@@ -264,11 +259,14 @@ impl<'a> Node<'a> {
         PLACEHOLDER
     }
 
-    /// A number with a unit, converted to the SI unit.
+    /// A number in the SI unit: with a unit, or bare where the dimension permits it.
     pub fn quantity(&self, dimension: &Dimension) -> f64 {
-        if let Some(number) = self.number_text() {
+        if let Some(number) = self.number_text().filter(|_| !dimension.is_bare) {
             self.report(dimension.missing_unit(number));
             return PLACEHOLDER;
+        }
+        if self.as_text().is_none() || !dimension.has_units() {
+            return self.number();
         }
         dimension.parse(self.text()).unwrap_or_else(|message| {
             self.report(message);
@@ -276,40 +274,12 @@ impl<'a> Node<'a> {
         })
     }
 
-    /// A quantity that is not negative.
-    pub fn deviation(&self, dimension: &Dimension) -> f64 {
+    /// A number within limits, which are texts like those of the file; `what` it is, for the message.
+    pub fn within(&self, dimension: &Dimension, limits: Limits, what: &str) -> f64 {
         let value = self.quantity(dimension);
-        self.check(value, value >= 0.0, "zero or positive")
-    }
-
-    /// A fraction, as a number or in per cent.
-    pub fn fraction(&self) -> f64 {
-        if self.number_text().is_some() { self.number() } else { self.quantity(&FRACTION) }
-    }
-
-    /// A duration in whole microseconds, the resolution of the localizer's time.
-    pub fn span(&self) -> Duration {
-        self.duration(0.0, "from 0 s to 1 hour")
-    }
-
-    /// A duration longer than zero.
-    pub fn period(&self) -> Duration {
-        self.duration(1e-6, "from 1 us to 1 hour")
-    }
-
-    fn duration(&self, shortest: f64, limits: &str) -> Duration {
-        let seconds = self.quantity(&TIME);
-        if !(shortest..=LONGEST_SPAN).contains(&seconds) {
-            self.report(format!("must be {limits}"));
-            return Duration::secs(1);
-        }
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "rounded, and between 0 and 3.6e9"
-        )]
-        let microseconds = (seconds * 1e6).round() as u64;
-        Duration::micros(microseconds)
+        let (least, most) = (dimension.number(limits.0), dimension.number(limits.1));
+        let holds = least <= value && value <= most;
+        self.check(value, holds, &format!("from {} to {} ({what})", limits.0, limits.1))
     }
 
     /// The unit of a table's coordinates.
@@ -322,7 +292,8 @@ impl<'a> Node<'a> {
 
     /// A point of two bare coordinates, in metres.
     pub fn point(&self, unit: &Unit) -> [f64; 2] {
-        self.pair().map(|coordinate| unit.in_si(coordinate.number()))
+        let point = self.pair().map(|coordinate| unit.in_si(coordinate.number()));
+        self.check(point, is_near_enough(point), TOO_FAR)
     }
 }
 

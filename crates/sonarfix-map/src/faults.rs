@@ -1,9 +1,7 @@
 //! Faults of the hardware, with their times.
 
 use crate::document::{Node, Table};
-use crate::quantity::TIME;
-
-const KEYS: [&str; 7] = ["kind", "from", "to", "wheel", "share", "times", "late"];
+use crate::keys::scenario::FAULT;
 
 /// A wheel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,6 +60,17 @@ pub struct Fault {
     pub to: f64,
 }
 
+/// The keys of a fault; which of them it has depends on its kind.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct FaultKeys {
+    pub from: f64,
+    pub to: f64,
+    pub is_left: bool,
+    pub share: f64,
+    pub times: f64,
+    pub late: f64,
+}
+
 /// Reads `faults`, an optional array of tables.
 pub(crate) fn read(root: &Table<'_>) -> Vec<Fault> {
     let items = root.get("faults").map(|list| list.items());
@@ -70,52 +79,52 @@ pub(crate) fn read(root: &Table<'_>) -> Vec<Fault> {
 
 /// None if its kind is unknown.
 fn fault(node: Node<'_>) -> Option<Fault> {
-    let table = node.table(&KEYS);
-    let from = table.require("from").deviation(&TIME);
-    let to_node = table.require("to");
-    let to = to_node.quantity(&TIME);
-    let kind = kind(&table)?;
-    Some(Fault { kind, from, to: to_node.check(to, to > from, "after `from`") })
+    let table = node.table(&FAULT.names());
+    let mistakes = table.mistakes();
+    let keys = FAULT.read_from(&table, FaultKeys::default());
+    if table.mistakes() == mistakes && keys.to <= keys.from {
+        table.report_at("to", "must be after `from`");
+    }
+    Some(Fault { kind: kind(&table, &keys)?, from: keys.from, to: keys.to })
 }
 
-fn kind(table: &Table<'_>) -> Option<FaultKind> {
+fn kind(table: &Table<'_>, keys: &FaultKeys) -> Option<FaultKind> {
+    let needs = |names: &[&str]| names.iter().for_each(|name| drop(table.require(name)));
+    let share = || {
+        needs(&["share"]);
+        keys.share
+    };
+    let wheel = || {
+        needs(&["wheel"]);
+        if keys.is_left { Wheel::Left } else { Wheel::Right }
+    };
     let node = table.require("kind");
     Some(match node.text() {
-        "lost_echoes" => FaultKind::LostEchoes(share(table)),
-        "cross_talk" => FaultKind::CrossTalk(share(table)),
+        "lost_echoes" => FaultKind::LostEchoes(share()),
+        "cross_talk" => FaultKind::CrossTalk(share()),
         "stuck_echo" => FaultKind::StuckEcho,
         "dead_sonar" => FaultKind::DeadSonar,
-        "dead_encoder" => FaultKind::DeadEncoder(wheel(table)),
-        "reversed_encoder" => FaultKind::ReversedEncoder(wheel(table)),
-        "missing_ticks" => FaultKind::MissingTicks(wheel(table), share(table)),
-        "read_errors" => FaultKind::ReadErrors(wheel(table), share(table)),
+        "dead_encoder" => FaultKind::DeadEncoder(wheel()),
+        "reversed_encoder" => FaultKind::ReversedEncoder(wheel()),
+        "missing_ticks" => FaultKind::MissingTicks(wheel(), share()),
+        "read_errors" => FaultKind::ReadErrors(wheel(), share()),
         "stuck_servo" => FaultKind::StuckServo,
-        "slow_servo" => FaultKind::SlowServo(times(table)),
-        "clock_jitter" => FaultKind::ClockJitter(table.require("late").deviation(&TIME)),
+        "slow_servo" => {
+            needs(&["times"]);
+            FaultKind::SlowServo(keys.times)
+        }
+        "clock_jitter" => {
+            needs(&["late"]);
+            FaultKind::ClockJitter(keys.late)
+        }
         "brown_out" => FaultKind::BrownOut,
         "stuck_gyro" => FaultKind::StuckGyro,
         "saturated_gyro" => FaultKind::SaturatedGyro,
-        "garbled_gyro" => FaultKind::GarbledGyro(share(table)),
-        "gyro_read_errors" => FaultKind::GyroReadErrors(share(table)),
+        "garbled_gyro" => FaultKind::GarbledGyro(share()),
+        "gyro_read_errors" => FaultKind::GyroReadErrors(share()),
         _ => {
             node.report("must be one of the faults in docs/formats.md");
             return None;
         }
     })
-}
-
-fn share(table: &Table<'_>) -> f64 {
-    let node = table.require("share");
-    let share = node.fraction();
-    node.check(share, (0.0..=1.0).contains(&share), "from 0 to 1")
-}
-
-fn times(table: &Table<'_>) -> f64 {
-    let node = table.require("times");
-    let times = node.number();
-    node.check(times, times >= 1.0, "at least 1")
-}
-
-fn wheel(table: &Table<'_>) -> Wheel {
-    table.require("wheel").one_of(&[("right", Wheel::Right), ("left", Wheel::Left)], Wheel::Right)
 }

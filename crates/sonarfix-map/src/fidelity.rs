@@ -1,8 +1,9 @@
 //! The fidelity of a simulation, and the simulated hardware.
 
-use crate::document::{Node, Table};
-use crate::quantity::{ANGLE, LENGTH, TIME};
-use crate::sonar_model::{self, SonarName};
+use crate::document::Node;
+use crate::keys::scenario::HEADING_SLIP;
+use crate::scenario::Truth;
+use crate::sonar_model::SonarName;
 
 /// The part of the robot that is simulated between world and localizer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -88,60 +89,12 @@ pub struct Hardware {
     pub servo: ServoName,
 }
 
-/// Reads an optional key whose value is one of several names.
-fn named<T: Copy + Default>(node: Option<Node<'_>>, names: &[(&str, T)]) -> T {
-    node.map_or_else(T::default, |node| node.one_of(names, T::default()))
-}
-
-pub(crate) fn read_fidelity(root: &Table<'_>) -> Fidelity {
-    named(root.get("fidelity"), &[("ideal", Fidelity::Ideal), ("pins", Fidelity::Pins)])
-}
-
-pub(crate) fn read_follow(path: &Table<'_>) -> Follow {
-    named(path.get("follow"), &[("truth", Follow::Truth), ("estimate", Follow::Estimate)])
-}
-
-pub(crate) fn read_hardware(root: &Table<'_>) -> Hardware {
-    let model = |key| root.get(key)?.table(&["model"]).get("model");
-    let servos =
-        [("ideal", ServoName::Ideal), ("sg90", ServoName::Sg90), ("mg996r", ServoName::Mg996r)];
-    let ideal = SonarName::default();
-    let sonar = model("sensor")
-        .map_or(ideal, |node| sonar_model::read(&node, &[], ideal, |model| model.simulated));
-    Hardware { sonar, servo: named(model("servo"), &servos) }
-}
-
-pub(crate) fn read_upsets(truth: &Table<'_>) -> Upsets {
-    Upsets {
-        slip: upset(truth, "slip"),
-        bump: upset(truth, "bump"),
-        heading_slip: truth.get("heading_slip").map_or_else(HeadingSlip::default, heading_slip),
+pub(crate) fn read_heading_slip(node: Node<'_>, into: &mut (Truth, Upsets)) {
+    let table = node.table(&HEADING_SLIP.names());
+    let read = || Some(HEADING_SLIP.read_from(&table, HeadingSlip::default()));
+    let Some(slip) = table.faultless(read) else { return };
+    if slip.most < slip.least {
+        table.report_at("most", "must be at least the value of least");
     }
-}
-
-fn heading_slip(node: Node<'_>) -> HeadingSlip {
-    let table = node.table(&["every", "least", "most"]);
-    let every_node = table.require("every");
-    let every = every_node.quantity(&TIME);
-    let least = table.require("least").deviation(&ANGLE);
-    let most_node = table.require("most");
-    let most = most_node.deviation(&ANGLE);
-    HeadingSlip {
-        every: every_node.check(every, every > 0.0, "positive"),
-        least,
-        most: most_node.check(most, most >= least, "at least the value of least"),
-    }
-}
-
-fn upset(truth: &Table<'_>, key: &str) -> Upset {
-    let Some(node) = truth.get(key) else {
-        return Upset::default();
-    };
-    let table = node.table(&["every", "by"]);
-    let every_node = table.require("every");
-    let every = every_node.quantity(&LENGTH);
-    Upset {
-        every: every_node.check(every, every > 0.0, "positive"),
-        by: table.require("by").deviation(&LENGTH),
-    }
+    into.1.heading_slip = slip;
 }

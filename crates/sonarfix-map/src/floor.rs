@@ -10,7 +10,8 @@ use sonarfix::map::{Wall, WallError};
 use crate::document::{Document, Node, Table};
 use crate::error::FileError;
 use crate::geometry::{Segment, TOO_FAR, is_near_enough};
-use crate::quantity::{LENGTH, Unit};
+use crate::keys::scenario::{MAP, WALL};
+use crate::quantity::Unit;
 use crate::{file, single};
 
 /// A wall of a floor.
@@ -101,14 +102,14 @@ impl Floor {
 
     /// Reads a `[map]` table; also returns the position of each wall in the text.
     pub(crate) fn from_node(node: Node<'_>) -> (Self, Vec<usize>) {
-        let map = node.table(&["unit", "wall"]);
+        let map = node.table(&MAP.names());
         let unit = map.require("unit").unit_of_length();
         let array = map.require("wall");
         let (mut walls, mut places) = (Vec::new(), Vec::new());
         let mut names = HashSet::new();
         for item in array.items() {
             let place = item.place();
-            let table = item.table(&["name", "from", "to", "accuracy"]);
+            let table = item.table(&WALL.names());
             let Some(wall) = wall(&table, unit) else { continue };
             if !names.insert(wall.name.clone()) {
                 let message = format!("another wall is already called \"{}\"", wall.name);
@@ -182,11 +183,7 @@ fn wall(table: &Table<'_>, unit: &Unit) -> Option<NamedWall> {
     let mistakes = table.mistakes();
     let name = table.require("name");
     let name = name.check(name.text(), !name.text().is_empty(), "a name");
-    let point = |key| {
-        let node = table.require(key);
-        let point = node.point(unit);
-        node.check(point, is_near_enough(point), TOO_FAR)
-    };
+    let point = |key| table.require(key).point(unit);
     let (from, to) = (point("from"), point("to"));
     let wall = NamedWall::new(name.into(), from, to);
     if let Err(error) = &wall
@@ -200,10 +197,6 @@ fn wall(table: &Table<'_>, unit: &Unit) -> Option<NamedWall> {
         table.report_at("to", message);
     }
     let wall = wall.ok()?;
-    let accuracy = table.get("accuracy").map(|node| {
-        let accuracy = node.quantity(&LENGTH);
-        let is_possible = accuracy > 0.0 && accuracy <= f64::from(Wall::WORST_ACCURACY.0);
-        node.check(accuracy, is_possible, "above 0 and at most 255 mm")
-    });
+    let accuracy = WALL.read_from(table, None);
     Some(wall.with_accuracy(accuracy))
 }

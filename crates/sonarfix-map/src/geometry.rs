@@ -2,14 +2,14 @@
 
 use std::f64::consts::{PI, TAU};
 
-/// The largest coordinate, metres: beyond 100 km, the resolution of `f32` exceeds a centimetre.
-pub(crate) const FARTHEST: f64 = 1e5;
+/// The largest coordinate, metres: up to 8,192 m, neighbouring numbers in `f32` are less than half a millimetre apart.
+const FARTHEST: f64 = 8_000.0;
 
 /// The distance at which two objects touch: a nanometre, a thousand times the rounding of a coordinate.
 pub(crate) const TOUCH: f64 = 1e-9;
 
 /// Why a point was refused.
-pub(crate) const TOO_FAR: &str = "finite and within 100 km of the origin";
+pub(crate) const TOO_FAR: &str = "finite and within 8 km of the origin: subtract the same offset from all coordinates of the map";
 
 pub(crate) type Point = [f64; 2];
 

@@ -8,7 +8,7 @@ use crate::document::{self, Document};
 use crate::error::FileError;
 use crate::file;
 use crate::floor::{Floor, NamedWall};
-use crate::scenario::{self, Scenario};
+use crate::scenario::{Scenario, scenario_keys};
 use crate::wall_file::WallFile;
 
 /// A map, with the position of each wall in its file.
@@ -50,7 +50,7 @@ impl MapFile {
     ) -> Result<Self, FileError> {
         let scenario = Box::new(Scenario::parse(text, &name, base)?);
         let floor = scenario.floor.clone();
-        let map = document.read(&scenario::KEYS, |root| {
+        let map = document.read(&scenario_keys(), |root| {
             let map = root.require("map");
             Some(match map.as_text() {
                 Some(file) => Err(base.join(file)),

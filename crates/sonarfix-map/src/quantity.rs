@@ -1,5 +1,9 @@
 //! Numbers with units in a file: `"2.4 mm"`.
 
+use sonarfix::geometry::units::Duration;
+
+use crate::single;
+
 /// A unit, as a fraction of the SI unit.
 ///
 /// Numerator and denominator are separate, because dividing a whole number of millimetres by 1000 gives the same double
@@ -21,11 +25,20 @@ impl Unit {
     }
 }
 
+/// The least and the largest value of a key, both permitted, written as in a file.
+pub(crate) type Limits = (&'static str, &'static str);
+
 /// A kind of quantity, and the units it may be written in.
 pub(crate) struct Dimension {
     /// With its article: "a length".
     name: &'static str,
     units: &'static [Unit],
+    /// Whether it may also be a number without a unit.
+    pub is_bare: bool,
+}
+
+const fn dimension(name: &'static str, units: &'static [Unit]) -> Dimension {
+    Dimension { name, units, is_bare: false }
 }
 
 const HALF_TURN: f64 = std::f64::consts::PI;
@@ -33,67 +46,67 @@ const HALF_TURN: f64 = std::f64::consts::PI;
 /// The unit in place of one that cannot be read.
 pub(crate) static METRE: Unit = unit("m", 1.0, 1.0);
 
-pub(crate) const LENGTH: Dimension = Dimension {
-    name: "a length",
-    units: &[unit("m", 1.0, 1.0), unit("cm", 1.0, 100.0), unit("mm", 1.0, 1000.0)],
-};
+pub(crate) static LENGTH: Dimension =
+    dimension("a length", &[unit("m", 1.0, 1.0), unit("cm", 1.0, 100.0), unit("mm", 1.0, 1000.0)]);
 
-pub(crate) const ANGLE: Dimension = Dimension {
-    name: "an angle",
-    units: &[unit("deg", HALF_TURN, 180.0), unit("rad", 1.0, 1.0), unit("mrad", 1.0, 1000.0)],
-};
+pub(crate) static ANGLE: Dimension = dimension(
+    "an angle",
+    &[unit("deg", HALF_TURN, 180.0), unit("rad", 1.0, 1.0), unit("mrad", 1.0, 1000.0)],
+);
 
-pub(crate) const TIME: Dimension = Dimension {
-    name: "a time",
-    units: &[unit("s", 1.0, 1.0), unit("ms", 1.0, 1e3), unit("us", 1.0, 1e6)],
-};
+pub(crate) static TIME: Dimension =
+    dimension("a time", &[unit("s", 1.0, 1.0), unit("ms", 1.0, 1e3), unit("us", 1.0, 1e6)]);
 
-pub(crate) const TEMPERATURE: Dimension =
-    Dimension { name: "a temperature", units: &[unit("degC", 1.0, 1.0)] };
+pub(crate) static TEMPERATURE: Dimension = dimension("a temperature", &[unit("degC", 1.0, 1.0)]);
 
-pub(crate) const SPEED: Dimension = Dimension {
-    name: "a speed",
-    units: &[unit("m/s", 1.0, 1.0), unit("cm/s", 1.0, 100.0), unit("mm/s", 1.0, 1000.0)],
-};
+pub(crate) static SPEED: Dimension = dimension(
+    "a speed",
+    &[unit("m/s", 1.0, 1.0), unit("cm/s", 1.0, 100.0), unit("mm/s", 1.0, 1000.0)],
+);
 
-pub(crate) const TURN_RATE: Dimension = Dimension {
-    name: "a turn rate",
-    units: &[unit("deg/s", HALF_TURN, 180.0), unit("rad/s", 1.0, 1.0)],
-};
+pub(crate) static TURN_RATE: Dimension =
+    dimension("a turn rate", &[unit("deg/s", HALF_TURN, 180.0), unit("rad/s", 1.0, 1.0)]);
 
 /// Density of the noise of a turn rate: the angle after one second.
-pub(crate) const ANGLE_WALK: Dimension = Dimension {
-    name: "an angle per square root of the time",
-    units: &[unit("deg/sqrt(s)", HALF_TURN, 180.0), unit("rad/sqrt(s)", 1.0, 1.0)],
-};
+pub(crate) static ANGLE_WALK: Dimension = dimension(
+    "an angle per square root of the time",
+    &[unit("deg/sqrt(s)", HALF_TURN, 180.0), unit("rad/sqrt(s)", 1.0, 1.0)],
+);
 
-pub(crate) const TURN_RATE_WALK: Dimension = Dimension {
-    name: "a turn rate per square root of the time",
-    units: &[unit("deg/s/sqrt(s)", HALF_TURN, 180.0), unit("rad/s/sqrt(s)", 1.0, 1.0)],
-};
+pub(crate) static TURN_RATE_WALK: Dimension = dimension(
+    "a turn rate per square root of the time",
+    &[unit("deg/s/sqrt(s)", HALF_TURN, 180.0), unit("rad/s/sqrt(s)", 1.0, 1.0)],
+);
 
-pub(crate) const FRACTION: Dimension =
-    Dimension { name: "a fraction", units: &[unit("%", 1.0, 100.0)] };
+pub(crate) static FRACTION: Dimension =
+    Dimension { is_bare: true, ..dimension("a fraction", &[unit("%", 1.0, 100.0)]) };
 
-pub(crate) const LENGTH_PER_LENGTH: Dimension = Dimension {
-    name: "a length per length",
-    units: &[unit("m/m", 1.0, 1.0), unit("cm/m", 1.0, 100.0), unit("mm/m", 1.0, 1000.0)],
-};
+pub(crate) static NUMBER: Dimension = Dimension { is_bare: true, ..dimension("a number", &[]) };
 
-pub(crate) const LENGTH_WALK: Dimension = Dimension {
-    name: "a length per square root of the distance",
-    units: &[unit("m/sqrt(m)", 1.0, 1.0), unit("mm/sqrt(m)", 1.0, 1000.0)],
-};
+pub(crate) static LENGTH_PER_LENGTH: Dimension = dimension(
+    "a length per length",
+    &[unit("m/m", 1.0, 1.0), unit("cm/m", 1.0, 100.0), unit("mm/m", 1.0, 1000.0)],
+);
 
-pub(crate) const SCALE_WALK: Dimension = Dimension {
-    name: "a fraction per square root of the distance",
-    units: &[unit("/sqrt(m)", 1.0, 1.0), unit("%/sqrt(m)", 1.0, 100.0)],
-};
+pub(crate) static LENGTH_WALK: Dimension = dimension(
+    "a length per square root of the distance",
+    &[unit("m/sqrt(m)", 1.0, 1.0), unit("mm/sqrt(m)", 1.0, 1000.0)],
+);
+
+pub(crate) static SCALE_WALK: Dimension = dimension(
+    "a fraction per square root of the distance",
+    &[unit("/sqrt(m)", 1.0, 1.0), unit("%/sqrt(m)", 1.0, 100.0)],
+);
 
 impl Dimension {
     /// The unit with this name.
     pub fn unit(&self, name: &str) -> Option<&'static Unit> {
         self.units.iter().find(|unit| unit.name == name)
+    }
+
+    /// Whether its numbers have units.
+    pub fn has_units(&self) -> bool {
+        !self.units.is_empty()
     }
 
     /// The names of the units, for a message.
@@ -116,6 +129,27 @@ impl Dimension {
         value.ok_or_else(|| self.refusal(text))
     }
 
+    /// The number of a text of the table of keys, in the SI unit: one that may be bare may be so here.
+    pub fn number(&self, text: &str) -> f64 {
+        let bare = finite(text).filter(|_| self.is_bare);
+        bare.or_else(|| self.parse(text).ok()).unwrap_or(f64::NAN)
+    }
+
+    /// The value of a key: a bare number if it may be one, else the shortest text that is read back exactly.
+    pub fn text(&self, value: &dyn Number) -> Option<String> {
+        let si = value.get()?;
+        if self.is_bare {
+            return Some(value.digits(si));
+        }
+        let texts = self.units.iter().map(|unit| {
+            let number = value.digits(si * unit.over / unit.times);
+            let read = number.parse().map_or(f64::NAN, |number| unit.in_si(number));
+            (value.digits(read) != value.digits(si), format!("\"{number} {}\"", unit.name))
+        });
+        let (_, text) = texts.min_by_key(|(is_inexact, text)| (*is_inexact, text.len()))?;
+        Some(text)
+    }
+
     fn refusal(&self, text: &str) -> String {
         if finite(text).is_some() {
             return self.missing_unit(text);
@@ -136,6 +170,96 @@ impl Dimension {
     fn examples(&self, number: &str) -> Vec<String> {
         let example = |unit: &Unit| format!("\"{number} {}\"", unit.name);
         self.units.iter().map(example).collect()
+    }
+}
+
+/// A field of a structure that holds a number.
+pub(crate) trait Number {
+    /// Stores a value of the SI unit.
+    fn set(&mut self, si: f64);
+    /// The value in the SI unit; `None` if there is none.
+    fn get(&self) -> Option<f64>;
+    /// The digits of a number as exact as this field.
+    fn digits(&self, number: f64) -> String;
+}
+
+impl Number for f32 {
+    fn set(&mut self, si: f64) {
+        *self = single(si);
+    }
+
+    fn get(&self) -> Option<f64> {
+        Some((*self).into())
+    }
+
+    fn digits(&self, number: f64) -> String {
+        single(number).to_string()
+    }
+}
+
+impl Number for f64 {
+    fn set(&mut self, si: f64) {
+        *self = si;
+    }
+
+    fn get(&self) -> Option<f64> {
+        Some(*self)
+    }
+
+    fn digits(&self, number: f64) -> String {
+        number.to_string()
+    }
+}
+
+impl<T: Number + Default> Number for Option<T> {
+    fn set(&mut self, si: f64) {
+        self.insert(T::default()).set(si);
+    }
+
+    fn get(&self) -> Option<f64> {
+        self.as_ref()?.get()
+    }
+
+    fn digits(&self, number: f64) -> String {
+        T::default().digits(number)
+    }
+}
+
+/// Whole microseconds, the resolution of the localizer's time.
+impl Number for u64 {
+    fn set(&mut self, si: f64) {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "rounded, and within the limits of its key"
+        )]
+        let micros = (si * 1e6).round() as Self;
+        *self = micros;
+    }
+
+    fn get(&self) -> Option<f64> {
+        #[expect(clippy::cast_precision_loss, reason = "exact below 285 years")]
+        Some(*self as f64 / 1e6)
+    }
+
+    fn digits(&self, number: f64) -> String {
+        number.to_string()
+    }
+}
+
+impl Number for Duration {
+    fn set(&mut self, si: f64) {
+        let mut micros = 0;
+        Number::set(&mut micros, si);
+        *self = Self::micros(micros);
+    }
+
+    fn get(&self) -> Option<f64> {
+        self.to_micros().get()
+    }
+
+    fn digits(&self, number: f64) -> String {
+        number.to_string()
     }
 }
 

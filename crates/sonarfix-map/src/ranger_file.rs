@@ -1,134 +1,127 @@
-//! Reads the ranger of a robot file: its name, or its name with different settings.
+//! Reads and writes the ranger of a robot file: its name, or its name with different settings.
 
-use sonarfix::config::{LightBeam, Ranging};
+use sonarfix::config::{LightBeam, LightLinked, Ranging};
 use sonarfix::geometry::units::{Duration, Radians};
-use sonarfix_hal::config::RangerConfig;
-use sonarfix_hal::ranger::{Celsius, PulseTiming, RangerKind, RangerSettings};
+use sonarfix_hal::config::RobotConfig;
+use sonarfix_hal::ranger::{PulseTiming, RangerKind, RangerSettings};
 
 use crate::document::{Node, Table};
-use crate::quantity::ANGLE;
-use crate::single;
+use crate::keys::robot::{BEAM, RANGER};
+use crate::robot_file::Ranger;
 use crate::sonar_model::{self, CUSTOM};
-use crate::surroundings::temperature;
 
-/// The ranger's settings in `[sonar]`.
-pub(crate) struct Ranger {
-    /// The driver's part, without the pulses of the servo.
-    pub config: RangerConfig,
-    /// Shortest ping period.
-    pub cycle: Duration,
-    /// Sound, or the beam of light.
-    pub ranging: Ranging,
+/// The settings of a ranger by its kind.
+#[derive(Clone, Copy)]
+pub(crate) struct RangerKeys {
+    pub timing: PulseTiming,
+    pub address: Option<u8>,
 }
 
-/// Reads `ranger`, `temperature` and `cycle` of `[sonar]`.
-pub(crate) fn read(sonar: &Table<'_>) -> Ranger {
-    let node = sonar.require("ranger");
-    let (kind, usual_cycle) = match node.as_text() {
+const PULSE: [&str; 6] = ["trigger", "blanking", "longest", "silence", "listen", "stuck"];
+
+/// Reads `ranger`: the driver, and the usual cycle and beam of this kind.
+pub(crate) fn read_kind(node: Node<'_>, ranger: &mut Ranger) {
+    let (kind, cycle) = match node.as_text() {
         Some(name) => named(name, &node),
         None => described(node),
     };
-    let cycle = match (sonar.get("cycle"), usual_cycle) {
-        (Some(node), _) => node.span(),
-        (None, Some(usual)) => usual,
-        (None, None) => {
-            sonar.report_at("cycle", "is missing: a custom ranger has its own");
-            RangerSettings::HC_SR04.cycle
+    ranger.driver.kind = kind;
+    ranger.sonar.timing.cycle = cycle;
+    ranger.sonar.ranging = match kind {
+        RangerKind::Vl53l1x { .. } => Ranging::Light(LightBeam::VL53L1X),
+        RangerKind::Vl53l0x { .. } => Ranging::Light(LightBeam::VL53L0X),
+        RangerKind::Pulse(_) | RangerKind::Srf { .. } | RangerKind::Custom => Ranging::Sound,
+    };
+}
+
+/// Records that a custom ranger has no `cycle`, which is known of the others.
+pub(crate) fn require_cycle(sonar: &Table<'_>, ranger: &Ranger) {
+    if ranger.driver.kind == RangerKind::Custom && sonar.get("cycle").is_none() {
+        sonar.report_at("cycle", "is missing: a custom ranger has its own");
+    }
+}
+
+/// Reads `beam`: that of the ranger, with different settings. A custom ranger measures with light if it has a beam.
+pub(crate) fn read_beam(node: Node<'_>, ranger: &mut Ranger) {
+    let table = match ranger.sonar.ranging {
+        Ranging::Sound if ranger.driver.kind != RangerKind::Custom => {
+            return node.report("is of a time-of-flight ranger, and this ranger is a sonar");
+        }
+        _ => node.table(&BEAM.names()),
+    };
+    let usual = match ranger.sonar.ranging {
+        Ranging::Light(beam) => beam,
+        Ranging::Sound => {
+            BEAM.names().into_iter().for_each(|key| drop(table.require(key)));
+            LightBeam { spot: Radians(0.0), pointing: Radians(0.0), linked: LightLinked }
         }
     };
-    let ranging = read_beam(sonar, kind);
-    let temperature = Celsius(single(temperature(Some(sonar))));
-    Ranger {
-        config: RangerConfig { kind, temperature, servo_pulses: RangerConfig::NO_PULSES },
-        cycle,
-        ranging,
-    }
+    ranger.sonar.ranging = Ranging::Light(BEAM.read_from(&table, usual));
 }
 
-/// The beam: that of the ranger, with different settings. A custom ranger measures with light if it has a beam.
-fn read_beam(sonar: &Table<'_>, kind: RangerKind) -> Ranging {
-    let usual = match kind {
-        RangerKind::Vl53l1x { .. } => Some(LightBeam::VL53L1X),
-        RangerKind::Vl53l0x { .. } => Some(LightBeam::VL53L0X),
-        RangerKind::Pulse(_) | RangerKind::Srf { .. } | RangerKind::Custom => None,
-    };
-    let Some(node) = sonar.get("beam") else {
-        return usual.map_or(Ranging::Sound, Ranging::Light);
-    };
-    if usual.is_none() && kind != RangerKind::Custom {
-        node.report("is of a time-of-flight ranger, and this ranger is a sonar");
-        return Ranging::Sound;
-    }
-    let table = node.table(&["spot", "pointing"]);
-    let angle = |key, usual: Option<Radians>| match (table.get(key), usual) {
-        (None, Some(usual)) => usual,
-        _ => Radians(single(table.require(key).quantity(&ANGLE))),
-    };
-    Ranging::Light(LightBeam {
-        spot: angle("spot", usual.map(|beam| beam.spot)),
-        pointing: angle("pointing", usual.map(|beam| beam.pointing)),
-    })
-}
-
-fn named(name: &str, node: &Node<'_>) -> (RangerKind, Option<Duration>) {
+fn named(name: &str, node: &Node<'_>) -> (RangerKind, Duration) {
+    let usual = RangerSettings::HC_SR04;
     if name == CUSTOM {
-        return (RangerKind::Custom, None);
+        return (RangerKind::Custom, usual.cycle);
     }
-    let settings =
-        sonar_model::read(node, &[CUSTOM], RangerSettings::HC_SR04, |model| model.ranger);
-    (settings.kind, Some(settings.cycle))
+    let settings = sonar_model::read(node, &[CUSTOM], usual, |model| model.ranger);
+    (settings.kind, settings.cycle)
 }
 
 /// A ranger by its kind, with different settings.
-fn described(node: Node<'_>) -> (RangerKind, Option<Duration>) {
-    const PULSE: [&str; 6] = ["trigger", "blanking", "longest", "silence", "listen", "stuck"];
-    let table = node.table(&[&["kind", "address"], &PULSE[..]].concat());
+fn described(node: Node<'_>) -> (RangerKind, Duration) {
+    let table = node.table(&RANGER.names());
     let kind = table.require("kind");
     let (usual, cycle) = named(kind.text(), &kind);
-    let misplaced = |keys: &[&str]| {
-        for node in keys.iter().filter_map(|key| table.get(key)) {
+    let (timing, is_pulse) = match usual {
+        RangerKind::Pulse(timing) => (timing, true),
+        _ => (PulseTiming::HC_SR04, false),
+    };
+    let RangerKeys { timing, address } =
+        RANGER.read_from(&table, RangerKeys { timing, address: None });
+    let has_address = !is_pulse && usual != RangerKind::Custom;
+    let pulse = PULSE.iter().filter(|_| !is_pulse);
+    for key in pulse.chain(["address"].iter().filter(|_| !has_address)) {
+        if let Some(node) = table.get(key) {
             node.report("is no setting of this kind of ranger");
         }
-    };
+    }
     let kind = match usual {
-        RangerKind::Pulse(usual) => {
-            misplaced(&["address"]);
-            RangerKind::Pulse(read_timing(&table, &usual))
-        }
-        RangerKind::Srf { address: usual } => {
-            misplaced(&PULSE);
-            RangerKind::Srf { address: read_address(&table).unwrap_or(usual) }
-        }
+        RangerKind::Pulse(_) => RangerKind::Pulse(timing),
+        RangerKind::Srf { address: usual } => RangerKind::Srf { address: address.unwrap_or(usual) },
         RangerKind::Vl53l1x { address: usual } => {
-            misplaced(&PULSE);
-            RangerKind::Vl53l1x { address: read_address(&table).unwrap_or(usual) }
+            RangerKind::Vl53l1x { address: address.unwrap_or(usual) }
         }
         RangerKind::Vl53l0x { address: usual } => {
-            misplaced(&PULSE);
-            RangerKind::Vl53l0x { address: read_address(&table).unwrap_or(usual) }
+            RangerKind::Vl53l0x { address: address.unwrap_or(usual) }
         }
-        RangerKind::Custom => {
-            misplaced(&["address"]);
-            misplaced(&PULSE);
-            RangerKind::Custom
-        }
+        RangerKind::Custom => RangerKind::Custom,
     };
     (kind, cycle)
 }
 
-fn read_timing(table: &Table<'_>, usual: &PulseTiming) -> PulseTiming {
-    let time = |key, usual| table.get(key).map_or(usual, |node| node.span());
-    PulseTiming {
-        trigger: time("trigger", usual.trigger),
-        blanking: time("blanking", usual.blanking),
-        longest: time("longest", usual.longest),
-        silence: time("silence", usual.silence),
-        listen: time("listen", usual.listen),
-        stuck: time("stuck", usual.stuck),
-    }
+/// A seven-bit I²C address that is not reserved.
+pub(crate) fn read_address(node: &Node<'_>, keys: &mut RangerKeys) {
+    keys.address = u8::try_from(node.integer(0x08..=0x77)).ok();
 }
 
-/// A seven-bit I²C address that is not reserved.
-fn read_address(table: &Table<'_>) -> Option<u8> {
-    u8::try_from(table.get("address")?.integer(0x08..=0x77)).ok()
+/// The value of `ranger`.
+pub(crate) fn kind_text(ranger: &Ranger) -> String {
+    let (kind, address) = match ranger.driver.kind {
+        RangerKind::Pulse(timing) => {
+            let keys = RANGER.inline(&RangerKeys { timing, address: None });
+            return keys.replacen('{', "{ kind = \"hc_sr04\",", 1);
+        }
+        RangerKind::Srf { address } => ("srf08", address),
+        RangerKind::Vl53l1x { address } => ("vl53l1x", address),
+        RangerKind::Vl53l0x { address } => ("vl53l0x", address),
+        RangerKind::Custom => return format!("\"{CUSTOM}\""),
+    };
+    format!("{{ kind = \"{kind}\", address = {address} }}")
+}
+
+/// Reads `sensor` of `[echo]`: the usual parameters of its echoes.
+pub(crate) fn read_echo_sensor(node: &Node<'_>, config: &mut RobotConfig) {
+    let echo = &mut config.localizer.echo;
+    *echo = sonar_model::read(node, &[], *echo, |model| model.echo);
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path as FilePath, PathBuf};
 
-use crate::absolute_file::{self, AbsoluteSensors};
+use crate::absolute_file::AbsoluteSensors;
 use crate::clearance::Collision;
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_search::navigator::{UNKNOWN_HEADING, UNKNOWN_POSITION};
@@ -10,54 +10,21 @@ use sonarfix_search::navigator::{UNKNOWN_HEADING, UNKNOWN_POSITION};
 use crate::document::{Document, Node, Table};
 use crate::error::FileError;
 use crate::faults::{self, Fault};
-use crate::fidelity::{self, Fidelity, Follow, Hardware, Upsets};
+use crate::fidelity::{Fidelity, Follow, Hardware, ServoName, Upsets};
 use crate::file;
 use crate::floor::Floor;
+use crate::keys::scenario::{ABSOLUTE, PATH, RUN, SCENARIO, SENSOR, SERVO, START, TRUTH};
 use crate::path::{Path, PathPlan};
-use crate::quantity::{
-    ANGLE, Dimension, LENGTH, LENGTH_PER_LENGTH, LENGTH_WALK, SCALE_WALK, SPEED, TURN_RATE,
-};
 use crate::robot_file;
+use crate::sonar_model::{self, SonarName};
 use crate::surroundings::{self, Surroundings};
 use crate::wall_file::WallFile;
 
 /// The keys of a scenario file, besides `format`.
-pub const KEYS: [&str; 14] = [
-    "name",
-    "description",
-    "fidelity",
-    "map",
-    "robot",
-    "path",
-    "start",
-    "truth",
-    "sensor",
-    "servo",
-    "world",
-    "absolute",
-    "faults",
-    "run",
-];
-
-const PATH_KEYS: [&str; 8] =
-    ["unit", "start", "corners", "laps", "speed", "turn_rate", "clearance", "follow"];
-
-const TRUTH_KEYS: [&str; 14] = [
-    "track_width",
-    "scale_right",
-    "scale_left",
-    "range_scale",
-    "wheel_noise",
-    "scale_walk",
-    "track_width_walk",
-    "range_noise",
-    "range_noise_per_metre",
-    "cone",
-    "slip",
-    "bump",
-    "heading_slip",
-    "gyro",
-];
+#[must_use]
+pub fn scenario_keys() -> Vec<&'static str> {
+    SCENARIO.names()
+}
 
 /// The initial standard deviations of the filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -74,7 +41,7 @@ pub struct Start {
 }
 
 impl Start {
-    fn unknown() -> Self {
+    pub(crate) fn unknown() -> Self {
         Self {
             position: UNKNOWN_POSITION.0.into(),
             heading: UNKNOWN_HEADING.0.into(),
@@ -85,7 +52,7 @@ impl Start {
 }
 
 /// The true parameters of the robot, which the filter does not receive.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Truth {
     /// Track width, metres.
     pub track_width: f64,
@@ -191,7 +158,8 @@ impl Scenario {
     /// # Errors
     /// [`FileError`] with all mistakes, also those in the files it names.
     pub fn parse(text: &str, file_name: &str, base: &FilePath) -> Result<Self, FileError> {
-        Document::parse(text, file_name)?.read(&KEYS, |root| Self::from_table(root, base))
+        Document::parse(text, file_name)?
+            .read(&SCENARIO.names(), |root| Self::from_table(root, base))
     }
 
     /// None if there is no floor, robot or path, which is recorded.
@@ -205,22 +173,31 @@ impl Scenario {
             Some(file) => file_or_report(&robot, robot_file::read(&file)),
             None => Some(robot_file::from_node(robot)),
         });
-        let path_table = root.table("path", &PATH_KEYS);
-        let truth = root.table("truth", &TRUTH_KEYS);
-        let path = read_path(&path_table, floor.as_ref(), robot.as_ref());
+        let path_table = root.table("path", &PATH.names());
+        let drive = || Some(PATH.read_from(&path_table, Drive::default()));
+        let drive = path_table.faultless(drive);
+        let path = read_path(&path_table, drive, floor.as_ref(), robot.as_ref());
+        let (truth, upsets) = TRUTH.read(root.require("truth"), Default::default());
+        let (sensor, servo) = (root.get("sensor"), root.get("servo"));
+        let (sonar, name) = (SonarName::default(), ServoName::default());
         let scenario = Self {
             name: root.require("name").text().into(),
             description: root.require("description").text().into(),
-            fidelity: fidelity::read_fidelity(root),
-            follow: fidelity::read_follow(&path_table),
+            fidelity: SCENARIO.read_from(root, Fidelity::default()),
+            follow: drive.map_or_else(Follow::default, |drive| drive.follow),
             start: read_start(root, robot.as_ref()),
-            truth: read_truth(&truth),
-            upsets: fidelity::read_upsets(&truth),
-            hardware: fidelity::read_hardware(root),
+            truth,
+            upsets,
+            hardware: Hardware {
+                sonar: sensor.map_or(sonar, |node| SENSOR.read(node, sonar)),
+                servo: servo.map_or(name, |node| SERVO.read(node, name)),
+            },
             surroundings: surroundings::read(root),
-            absolute: absolute_file::read(root),
+            absolute: root.get("absolute").map_or_else(AbsoluteSensors::default, |node| {
+                ABSOLUTE.read(node, AbsoluteSensors::default())
+            }),
             faults: faults::read(root),
-            run: read_run(root),
+            run: RUN.read(root.require("run"), (RUN.usual)()),
             path: path?,
             floor: floor?,
             robot: robot?,
@@ -261,34 +238,38 @@ fn file_or_report<T>(node: &Node<'_>, read: Result<T, FileError>) -> Option<T> {
     .ok()
 }
 
-fn quantity(table: &Table<'_>, key: &str, dimension: &Dimension) -> f64 {
-    table.require(key).quantity(dimension)
+/// How the path is driven.
+#[derive(Clone, Copy)]
+pub(crate) struct Drive {
+    pub laps: u32,
+    pub speed: f64,
+    pub turn_rate: f64,
+    pub clearance: f64,
+    pub follow: Follow,
 }
 
-fn deviation(table: &Table<'_>, key: &str, dimension: &Dimension) -> f64 {
-    table.require(key).deviation(dimension)
+impl Default for Drive {
+    fn default() -> Self {
+        Self { laps: 1, speed: 0.0, turn_rate: 0.0, clearance: 0.0, follow: Follow::default() }
+    }
 }
 
 /// Rules that concern several values are checked only if all of them could be read.
 fn read_path(
     table: &Table<'_>,
+    drive: Option<Drive>,
     floor: Option<&Floor>,
     robot: Option<&RobotConfig>,
 ) -> Option<Path> {
-    let mistakes = table.mistakes();
     let unit = table.require("unit").unit_of_length();
     let corners = table.require("corners").items();
-    let plan = PathPlan {
-        start: table.require("start").point(unit),
-        corners: corners.iter().map(|node| node.point(unit)).collect(),
-        laps: table.get("laps").map_or(1, |node| whole(&node)),
-        speed: quantity(table, "speed", &SPEED),
-        turn_rate: quantity(table, "turn_rate", &TURN_RATE),
-    };
-    let clearance = table.get("clearance").map_or(0.0, |node| node.deviation(&LENGTH));
-    if table.mistakes() > mistakes {
-        return None;
-    }
+    let points = table.faultless(|| {
+        let start = table.require("start").point(unit);
+        Some((start, corners.iter().map(|node| node.point(unit)).collect()))
+    });
+    let (drive, (start, corner_points)) = drive.zip(points)?;
+    let Drive { laps, speed, turn_rate, clearance, .. } = drive;
+    let plan = PathPlan { start, corners: corner_points, laps, speed, turn_rate };
     let path = match Path::new(plan) {
         Ok(path) => path,
         Err(error) => {
@@ -309,7 +290,7 @@ fn read_path(
     Some(path)
 }
 
-fn whole(node: &Node<'_>) -> u32 {
+pub(crate) fn whole(node: &Node<'_>) -> u32 {
     let number = node.integer(1..=u64::from(u32::MAX));
     u32::try_from(number).unwrap_or(u32::MAX)
 }
@@ -346,53 +327,9 @@ fn read_start(root: &Table<'_>, robot: Option<&RobotConfig>) -> Start {
         let searches = robot.is_none_or(|robot| robot.start.is_unknown());
         return start.check(Start::unknown(), searches, "that of a robot with start = \"unknown\"");
     }
-    let table = start.table(&["position", "heading", "drawn"]);
-    Start {
-        position: deviation(&table, "position", &LENGTH),
-        heading: deviation(&table, "heading", &ANGLE),
-        drawn: table.require("drawn").boolean(),
-        is_unknown: false,
-    }
+    Start { is_unknown: false, ..START.read(start, Start::unknown()) }
 }
 
-fn read_truth(table: &Table<'_>) -> Truth {
-    let width = table.require("track_width");
-    let track_width = width.quantity(&LENGTH);
-    let cone_node = table.require("cone");
-    let cone = cone_node.quantity(&ANGLE);
-    let narrow = cone > 0.0 && cone < std::f64::consts::FRAC_PI_2;
-    Truth {
-        track_width: width.check(track_width, track_width > 0.0, "positive"),
-        scale_right: scale(table, "scale_right"),
-        scale_left: scale(table, "scale_left"),
-        range_scale: scale(table, "range_scale"),
-        wheel_noise: deviation(table, "wheel_noise", &LENGTH_WALK),
-        scale_walk: deviation(table, "scale_walk", &SCALE_WALK),
-        track_width_walk: deviation(table, "track_width_walk", &LENGTH_WALK),
-        range_noise: deviation(table, "range_noise", &LENGTH),
-        range_noise_per_metre: deviation(table, "range_noise_per_metre", &LENGTH_PER_LENGTH),
-        cone: cone_node.check(cone, narrow, "between 0 and 90° (half of the cone)"),
-        gyro: table.get("gyro").map_or_else(GyroTruth::default, read_gyro),
-    }
-}
-
-/// The true noise and random walk are those that the robot assumes.
-fn read_gyro(node: Node<'_>) -> GyroTruth {
-    let table = node.table(&["bias", "scale"]);
-    GyroTruth {
-        bias: table.get("bias").map(|node| node.quantity(&TURN_RATE)),
-        scale: table.get("scale").map_or(0.0, |node| node.fraction()),
-    }
-}
-
-/// A scale error, greater than −1: the wheel would otherwise stand still or roll backwards.
-fn scale(table: &Table<'_>, key: &str) -> f64 {
-    let node = table.require(key);
-    let scale = node.fraction();
-    node.check(scale, scale > -1.0, "greater than -1")
-}
-
-fn read_run(root: &Table<'_>) -> Run {
-    let table = root.table("run", &["runs", "seed"]);
-    Run { runs: whole(&table.require("runs")), seed: table.require("seed").integer(0..=u64::MAX) }
+pub(crate) fn read_sensor(node: &Node<'_>, sonar: &mut SonarName) {
+    *sonar = sonar_model::read(node, &[], *sonar, |model| model.simulated);
 }

@@ -1,16 +1,8 @@
 //! The surroundings that are not in the map: air, furniture, people.
 
 use crate::document::{Node, Table};
-use crate::quantity::{LENGTH, TEMPERATURE, TIME, Unit};
-
-const KEYS: [&str; 3] = ["temperature", "unit", "obstacle"];
-const OBSTACLE_KEYS: [&str; 6] = ["centre", "radius", "from", "to", "walk", "takes"];
-
-/// Temperature of a room, °C.
-const ROOM: f64 = 20.0;
-/// Temperatures that a ranger's driver accepts, °C.
-const COLDEST: f64 = -40.0;
-const HOTTEST: f64 = 85.0;
+use crate::keys::scenario::{OBSTACLE, WORLD};
+use crate::quantity::Unit;
 
 /// The outline of an obstacle, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,38 +50,33 @@ pub struct Surroundings {
     pub obstacles: Vec<Obstacle>,
 }
 
-/// Reads `[world]`; the default is an empty room of 20 °C.
+/// Reads `[world]`; without it, an empty room of the usual temperature.
 pub(crate) fn read(root: &Table<'_>) -> Surroundings {
+    let usual = (WORLD.usual)();
     let Some(node) = root.get("world") else {
-        return Surroundings { temperature: ROOM, obstacles: Vec::new() };
+        return Surroundings { temperature: usual, obstacles: Vec::new() };
     };
-    let table = node.table(&KEYS);
+    let table = node.table(&WORLD.names());
     let obstacles = table.get("obstacle").map_or_else(Vec::new, |list| {
         let unit = table.require("unit").unit_of_length();
         list.items().into_iter().map(|node| obstacle(node, unit)).collect()
     });
-    Surroundings { temperature: temperature(Some(&table)), obstacles }
-}
-
-/// The optional key `temperature` of an optional table, °C; that of a room by default.
-pub(crate) fn temperature(table: Option<&Table<'_>>) -> f64 {
-    let Some(node) = table.and_then(|table| table.get("temperature")) else {
-        return ROOM;
-    };
-    let celsius = node.quantity(&TEMPERATURE);
-    node.check(celsius, (COLDEST..=HOTTEST).contains(&celsius), "from -40 to 85 degC")
+    Surroundings { temperature: WORLD.read_from(&table, usual), obstacles }
 }
 
 fn obstacle(node: Node<'_>, unit: &Unit) -> Obstacle {
-    let table = node.table(&OBSTACLE_KEYS);
-    Obstacle { outline: outline(&table, unit), walk: walk(&table, unit) }
+    let table = node.table(&OBSTACLE.names());
+    let (radius, takes) = OBSTACLE.read_from(&table, (OBSTACLE.usual)());
+    let walk = table.get("walk").map(|by| {
+        table.require("takes");
+        Oscillation { by: by.point(unit), takes }
+    });
+    Obstacle { outline: outline(&table, unit, radius), walk }
 }
 
-fn outline(table: &Table<'_>, unit: &Unit) -> Outline {
+fn outline(table: &Table<'_>, unit: &Unit, radius: f64) -> Outline {
     if let Some(centre) = table.get("centre") {
-        let radius_node = table.require("radius");
-        let radius = radius_node.quantity(&LENGTH);
-        let radius = radius_node.check(radius, radius > 0.0, "positive");
+        table.require("radius");
         return Outline::Circle { centre: centre.point(unit), radius };
     }
     let mistakes = table.mistakes();
@@ -100,12 +87,4 @@ fn outline(table: &Table<'_>, unit: &Unit) -> Outline {
     let rule = "different from `from`: the obstacle has no length";
     to_node.check((), has_length || table.mistakes() > mistakes, rule);
     Outline::Face { from, to }
-}
-
-fn walk(table: &Table<'_>, unit: &Unit) -> Option<Oscillation> {
-    let by = table.get("walk")?;
-    let takes_node = table.require("takes");
-    let takes = takes_node.quantity(&TIME);
-    let takes = takes_node.check(takes, takes > 0.0, "positive");
-    Some(Oscillation { by: by.point(unit), takes })
 }

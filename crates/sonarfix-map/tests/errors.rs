@@ -182,7 +182,12 @@ const MAP: [Case; 6] = [
     ),
     value("name = \"inner west\"", "name = \"\"", "map.wall[6].name", "must be a name"),
     value("from = [-3, 3]", "from = [inf, 3]", "map.wall[4].from[0]", "must be finite"),
-    value("from = [-3, 3]", "from = [-3, 1e6]", "map.wall[4].from", "within 100 km"),
+    value(
+        "from = [-3, 3]",
+        "from = [-3, 1e6]",
+        "map.wall[4].from",
+        "within 8 km of the origin: subtract the same offset",
+    ),
     case("wall = [", "wall = []\nignored = [", "ignored", "map.ignored", "unknown key").among(2),
 ];
 
@@ -192,42 +197,42 @@ const CONFIG: [Case; 17] = [
         "track_width = \"350",
         "track_width = \"0",
         "robot.drive.track_width",
-        "must be positive and finite",
+        "must be from 1 cm to 10 m (distance between",
     ),
     value(
         "track_width = \"350 mm",
         "track_width = \"1e60 m",
         "robot.drive.track_width",
-        "must be positive and finite",
+        "must be from 1 cm to 10 m (distance between",
     ),
     value(
         "wheel_noise = \"0.5",
         "wheel_noise = \"-1",
         "robot.drive.wheel_noise",
-        "must be positive",
+        "must be from 0.001 mm/sqrt(m) to 1 m/sqrt(m)",
     ),
     value(
         "scale_walk = \"5",
         "scale_walk = \"-5",
         "robot.drive.scale_walk",
-        "must be zero or positive",
+        "must be from 0 /sqrt(m)",
     ),
     value(
         "track_width_walk = \"5",
         "track_width_walk = \"-5",
         "robot.drive.track_width_walk",
-        "must be zero or positive",
+        "must be from 0 m/sqrt(m)",
     ),
     value(
         "max_wheel_speed = \"2",
         "max_wheel_speed = \"0",
         "robot.drive.max_wheel_speed",
-        "must be positive",
+        "must be from 1 mm/s to 100 m/s",
     ),
-    value("mount = [\"0", "mount = [\"1e60", "robot.sonar.mount", "must be finite"),
+    value("mount = [\"0", "mount = [\"1e60", "robot.sonar.mount[0]", "must be from -10 m to 10 m"),
     value(
-        "servo = [\"-180",
-        "servo = [\"190",
+        "servo = [\"-180 deg\", \"180",
+        "servo = [\"90 deg\", \"-90",
         "robot.sonar.servo",
         "must be a rightmost below a leftmost bearing",
     ),
@@ -235,13 +240,13 @@ const CONFIG: [Case; 17] = [
         "cone = \"15",
         "cone = \"90",
         "robot.sonar.cone",
-        "must be between 0 and 90° (half of the cone)",
+        "must be from 0.1 deg to 89 deg (half of the cone",
     ),
     value(
         "min_range = \"5",
         "min_range = \"-5",
         "robot.sonar.min_range",
-        "must be zero or positive",
+        "must be from 0 m to 100 m",
     ),
     value(
         "max_range = \"10 m\"",
@@ -249,12 +254,12 @@ const CONFIG: [Case; 17] = [
         "robot.sonar.max_range",
         "must be greater than sonar.min_range",
     ),
-    value("noise = \"2.4", "noise = \"0.0", "robot.sonar.noise", "must be positive"),
+    value("noise = \"2.4", "noise = \"0.0", "robot.sonar.noise", "must be from 0.001 mm to 10 m"),
     value(
         "noise_per_metre = \"0",
         "noise_per_metre = \"-1",
         "robot.sonar.noise_per_metre",
-        "must be zero or positive",
+        "must be from 0 mm/m to 1 m/m",
     ),
     value(
         "track_width = \"10",
@@ -266,7 +271,7 @@ const CONFIG: [Case; 17] = [
         "scale_left = \"1",
         "scale_left = \"-1",
         "robot.prior.scale_left",
-        "must be zero or positive",
+        "must be from 0 % to 100 %",
     ),
     value(
         "sensor = \"ideal\"",
@@ -278,7 +283,7 @@ const CONFIG: [Case; 17] = [
         "confidence = 3.0",
         "confidence = -3.0",
         "robot.gating.confidence",
-        "must be zero or positive",
+        "must be from 0 to 100",
     ),
 ];
 
@@ -287,13 +292,13 @@ const ROBOT: [Case; 12] = [
         "encoder_period = \"100",
         "encoder_period = \"0",
         "robot.drive.encoder_period",
-        "must be from 1 us to 1 hour",
+        "must be from 1 ms to 1 s (period of the encoder samples)",
     ),
     value(
         "fix_period = \"1 s",
         "fix_period = \"2e4 s",
         "robot.sonar.fix_period",
-        "must be from 1 us to 1 hour",
+        "must be from 1 us to 3600 s",
     ),
     value(
         "policy = \"nearest\"",
@@ -305,7 +310,7 @@ const ROBOT: [Case; 12] = [
         "right_wheel = { travel_per_edge = \"1 mm\"",
         "right_wheel = { travel_per_edge = \"0 mm\"",
         "robot.drive.right_wheel.travel_per_edge",
-        "must be a positive length",
+        "must be from 0.00001 mm to 1 m",
     ),
     value(
         "left_wheel = {",
@@ -355,7 +360,7 @@ const ROBOT: [Case; 12] = [
         "range_scale = \"0 %\"",
         "range_scale = -0.5",
         "robot.prior.range_scale",
-        "must be zero or positive",
+        "must be from 0 % to 100 %",
     ),
 ];
 
@@ -375,9 +380,19 @@ const PATH: [Case; 13] = [
         "path.corners[1]",
         "the robot is already there",
     ),
-    value("corners = [[0, 40]", "corners = [[0, 4e9]", "path.corners[0]", "within 100 km"),
+    value(
+        "corners = [[0, 40]",
+        "corners = [[0, 4e9]",
+        "path.corners[0]",
+        "within 8 km of the origin: subtract the same offset",
+    ),
     value("corners = [[0, 40]", "corners = [] #", "path.corners", "at least one corner"),
-    value("speed = \"0.4 m/s\"", "speed = \"0 m/s\"", "path.speed", "must be positive"),
+    value(
+        "speed = \"0.4 m/s\"",
+        "speed = \"0 m/s\"",
+        "path.speed",
+        "must be from 1 mm/s to 100 m/s",
+    ),
     value(
         "speed = \"0.4 m/s\"",
         "speed = \"3 m/s\"",
@@ -407,7 +422,7 @@ const PATH: [Case; 13] = [
         "clearance = \"20 cm\"",
         "clearance = \"-1 cm\"",
         "path.clearance",
-        "must be zero or positive",
+        "must be from 0 m to 100 m",
     ),
 ];
 
@@ -437,7 +452,7 @@ const HARDWARE: [Case; 12] = [
         "temperature = \"90 degC\"\nranger = {",
         "temperature = ",
         "robot.sonar.temperature",
-        "must be from -40 to 85 degC",
+        "must be from -40 degC to 85 degC",
     ),
     case(
         "[run]",
@@ -452,7 +467,7 @@ const HARDWARE: [Case; 12] = [
         "[world]\nunit = \"m\"\nobstacle = [{ centre = [0, 0], radius = \"0 m\" }]\n[run]",
         "obstacle = ",
         "world.obstacle[0].radius",
-        "must be positive",
+        "must be from 0.1 mm to 1000 m",
     ),
     case(
         "[run]",
@@ -472,7 +487,7 @@ const HARDWARE: [Case; 12] = [
         "track_width = \"348.8 mm\"",
         "slip = { every = \"0 m\", by = \"1 mm\" }\ntrack_width = \"348.8 mm\"",
         "truth.slip.every",
-        "must be positive",
+        "must be from 1 mm to 1000000 m",
     ),
     value(
         "track_width = \"348.8 mm\"",
@@ -487,37 +502,37 @@ const REST: [Case; 8] = [
         "position = \"1 mm\"",
         "position = \"-1 mm\"",
         "start.position",
-        "must be zero or positive",
+        "must be from 0 m to 1000 m",
     ),
     value(
         "heading = \"1 mrad\"",
         "heading = \"-1 mrad\"",
         "start.heading",
-        "must be zero or positive",
+        "must be from 0 deg to 360 deg",
     ),
     value(
         "track_width = \"348.8 mm\"",
         "track_width = \"0 mm\"",
         "truth.track_width",
-        "must be positive",
+        "must be from 1 cm to 10 m",
     ),
     value(
         "scale_right = -0.0065",
         "scale_right = -1",
         "truth.scale_right",
-        "must be greater than -1",
+        "must be from -99 % to 1000 %",
     ),
     value(
         "range_noise = \"2.4",
         "range_noise = \"-2.4",
         "truth.range_noise",
-        "must be zero or positive",
+        "must be from 0 m to 10 m",
     ),
     value(
         "cone = \"15 deg\"                      # paper\n\n[run]",
         "cone = \"0 deg\" # here\n\n[run]",
         "truth.cone",
-        "must be between 0 and 90°",
+        "must be from 0.1 deg to 89 deg",
     ),
     value("runs = 50", "runs = 0", "run.runs", "must be a whole number from 1"),
     case("[map]", "map = \"nowhere.toml\"\n[was_map]", "[was_map]", "was_map", "unknown key")
@@ -970,7 +985,7 @@ fn a_wrong_fault_has_its_line_and_key() {
         ("kind = \"cross_talk\", share = 1.5", "share", "must be from 0 to 1"),
         ("kind = \"read_errors\", wheel = \"left\"", "share", "is missing"),
         ("kind = \"dead_encoder\", wheel = \"front\"", "wheel", "must be \"right\" or"),
-        ("kind = \"slow_servo\", times = 0.5", "times", "must be at least 1"),
+        ("kind = \"slow_servo\", times = 0.5", "times", "must be from 1 to 1000"),
         ("kind = \"clock_jitter\", late = 5", "late", "a unit is missing"),
         ("kind = \"stuck_servo\", since = \"1 s\"", "since", "unknown key"),
     ];
@@ -1005,4 +1020,35 @@ fn faults_are_read_in_their_order() {
     let read = Fault { kind: FaultKind::ReadErrors(Wheel::Right, 1.0), from: 1.0, to: 2.0 };
     let sonar = Fault { kind: FaultKind::DeadSonar, ..read };
     assert_eq!(faults, [ticks, echo, read, sonar]);
+}
+
+/// Numbers that no robot file may have are found in a configuration from elsewhere, each by its key.
+#[test]
+fn a_configuration_from_elsewhere_is_within_the_limits_of_its_keys() {
+    type Change = fn(&mut RobotConfig);
+    let robot = Scenario::parse(CLASSROOM, "classroom.toml", Path::new("")).unwrap().robot;
+    let changes: [(&str, Change); 12] = [
+        ("drive.track_width", |c| c.localizer.drive.track_width = Metres(1e4)),
+        ("drive.wheel_noise", |c| c.localizer.drive.wheel_noise.0.0 = f32::NAN),
+        ("drive.encoder_period", |c| c.encoder_period = Duration::from_ticks(u64::MAX)),
+        ("drive.left_wheel.travel_per_edge", |c| c.left_wheel.travel_per_edge = Metres(2.0)),
+        ("sonar.mount[1]", |c| c.localizer.sonar.mount.y = Metres(-11.0)),
+        ("sonar.cycle", |c| c.localizer.sonar.timing.cycle = Duration::secs(61)),
+        ("sonar.servo_timing.frame", |c| c.localizer.sonar.timing.servo.frame = Duration::secs(11)),
+        ("sonar.servo_pulses[0].width", |c| c.ranger.servo_pulses[0].width = Duration::secs(1)),
+        ("sonar.fix_period", |c| {
+            c.localizer.sonar.timing.schedule = PingSchedule::Every(Duration::secs(3_601));
+        }),
+        ("gating.confidence", |c| c.localizer.gating.confidence = f32::INFINITY),
+        ("echo.free_path", |c| c.localizer.echo.free_path = Metres(2e4)),
+        ("motors.link_timeout", |c| c.motors.link_timeout = Duration::secs(86_400)),
+    ];
+    assert_eq!(robot_file::check(&robot, "flash"), Ok(()));
+    for (key, change) in changes {
+        let mut changed = robot;
+        change(&mut changed);
+        let error = robot_file::check(&changed, "flash").unwrap_err();
+        let keys: Vec<_> = error.mistakes().map(Mistake::key).collect();
+        assert_eq!(keys, [key], "{error}");
+    }
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use sonarfix_map::{FileError, Floor, Scenario, robot_file};
+use sonarfix_map::{FileError, Floor, Scenario, documentation, robot_file};
 
 // Read at run time, because the page is outside of the crate and not in its package.
 const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/formats.md");
@@ -52,4 +52,27 @@ fn every_key_is_explained() {
     };
     let missing: Vec<_> = keys.iter().filter(|key| !is_explained(key)).collect();
     assert!(missing.is_empty(), "{missing:?}");
+}
+
+/// The page with the tables of the code between its markers; `None` if it lacks a marker.
+fn with_tables(page: &str) -> Option<String> {
+    const END: &str = "<!-- end of keys -->";
+    documentation().iter().try_fold(page.to_owned(), |page, (name, table)| {
+        let marker = format!("<!-- keys {name} -->\n");
+        let (before, rest) = page.split_once(&marker)?;
+        let (_, after) = rest.split_once(END)?;
+        Some(format!("{before}{marker}{table}{END}{after}"))
+    })
+}
+
+/// With `SONARFIX_WRITE_DOCS=1` the test writes the page instead.
+#[test]
+fn the_page_has_the_tables_of_the_code() {
+    let page = std::fs::read_to_string(PAGE).unwrap();
+    let written = with_tables(&page).unwrap();
+    if std::env::var_os("SONARFIX_WRITE_DOCS").is_some() {
+        std::fs::write(PAGE, written).unwrap();
+        return;
+    }
+    assert_eq!(page, written, "write it: SONARFIX_WRITE_DOCS=1 cargo test -p sonarfix-map formats");
 }

@@ -183,7 +183,7 @@ fn a_wall_may_have_an_accuracy() {
     assert_eq!(accuracies(&simple.floor), [Some(30.0), None]);
     for wrong in ["0 mm", "-1 mm", "256 mm"] {
         let error = read("m.toml", toml.replace("12 mm", wrong), None).unwrap_err();
-        assert!(error.contains("m.toml:5: ") && error.contains("at most 255 mm"), "{error}");
+        assert!(error.contains("m.toml:5: ") && error.contains("from 0.1 mm to 255 mm"), "{error}");
     }
     let error = read("m.toml", toml.replace("\"12 mm\"", "12"), None).unwrap_err();
     assert!(error.contains("m.toml:5: "), "{error}");
@@ -208,10 +208,10 @@ fn a_wrong_csv_is_refused_with_its_line() {
         ("x1_m,y1_m,x2_m,y2_m\n", "m.csv:1: there is no wall below the header"),
         ("x1_m,y1_m,x2_m,y2_m\n0,0,1,1\n0,0,1,x\n", "m.csv:3: y2: `x` is not a number"),
         ("x1_m,y1_m,x2_m,y2_m\n0,0,1,1\n5,5,5,5\n", "m.csv:3: the wall has no length"),
-        ("x1_m,y1_m,x2_m,y2_m\n0,0,1,nan\n", "m.csv:2: both ends must be finite and within 100 km"),
+        ("x1_m,y1_m,x2_m,y2_m\n0,0,1,nan\n", "m.csv:2: both ends must be finite and within 8 km"),
         (
             "x1_m,y1_m,x2_m,y2_m\n0,0,1,200000\n",
-            "m.csv:2: both ends must be finite and within 100 km",
+            "m.csv:2: both ends must be finite and within 8 km",
         ),
         ("x1_m,y1_m,x2_m,y2_m\n0,0,1\n", "m.csv:2: cannot be read as CSV"),
         (

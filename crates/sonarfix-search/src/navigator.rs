@@ -40,7 +40,7 @@ use sonarfix::localizer::{AbsoluteFix, AbsoluteRefusal, Fix, Localizer, Odometry
 use sonarfix::sensor::absolute::AbsoluteMeasurement;
 use sonarfix::sensor::gyro::MeasuredTurn;
 
-pub use sonarfix::localizer::{UNKNOWN_HEADING, UNKNOWN_POSITION};
+pub use sonarfix::localizer::{Mode, UNKNOWN_HEADING, UNKNOWN_POSITION};
 
 /// Distance between two checkpoints of the calibration.
 pub const CHECKPOINT: Metres = Metres(10.0);
@@ -64,20 +64,6 @@ const UNUSED: u16 = 3;
 const PAUSE: u32 = 2;
 /// A checkpoint holds deviations and no correlations. No covariance of four errors exceeds four times its diagonal.
 const DECORRELATED: f32 = 2.0;
-
-/// What determines the pose.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Mode {
-    /// The localizer tracks it.
-    #[default]
-    Tracking,
-    /// It is unknown, and the search is running.
-    Searching,
-    /// The localizer tracks the search's answer, which is not confirmed yet.
-    Provisional,
-}
 
 /// A localizer that searches for its pose when it has none.
 ///
@@ -181,20 +167,16 @@ impl<'m> Navigator<'m> {
         &self.localizer
     }
 
+    /// The localizer, for what does not depend on the mode: a missing ping, ranger or odometry, and the clock. Its pose is
+    /// replaced by [`Self::set_pose`] alone.
+    pub fn localizer_mut(&mut self) -> &mut Localizer<'m> {
+        &mut self.localizer
+    }
+
     /// The mode.
     #[must_use]
     pub fn mode(&self) -> Mode {
         self.mode
-    }
-
-    /// As [`Localizer::ranger_failed`].
-    pub fn ranger_failed(&mut self, ranger: RangerId) {
-        self.localizer.ranger_failed(ranger);
-    }
-
-    /// Continues at `now` after the clock was set back ([`Localizer::set_clock`]).
-    pub fn set_clock(&mut self, now: Instant) {
-        self.localizer.set_clock(now);
     }
 
     /// Declares the pose unknown and begins the search. The pose of the localizer is proposed to it: if the robot was
@@ -246,21 +228,8 @@ impl<'m> Navigator<'m> {
         self.mode = Mode::Searching;
     }
 
-    /// Predicts over the travel of both wheels up to the time `now`; the search takes it as well.
-    ///
-    /// # Errors
-    /// As [`Localizer::odometry`]; neither has changed.
-    pub fn odometry(
-        &mut self,
-        now: Instant,
-        travel: WheelTravel,
-        search: Option<&mut Search<'m>>,
-    ) -> Result<(), OdometryError> {
-        self.odometry_with_turn(now, travel, None, search)
-    }
-
-    /// As [`Self::odometry`], with the turn that the gyro has measured over the same time, as
-    /// [`Localizer::odometry_with_turn`].
+    /// Predicts over the travel of both wheels up to the time `now`, with the turn that the gyro has measured over the same time
+    /// ([`Localizer::odometry_with_turn`]); the search takes it as well.
     ///
     /// # Errors
     /// As [`Localizer::odometry`]; neither has changed.
@@ -308,11 +277,6 @@ impl<'m> Navigator<'m> {
         }
     }
 
-    /// As [`Localizer::odometry_missing`].
-    pub fn odometry_missing(&mut self, now: Instant) {
-        self.localizer.odometry_missing(now);
-    }
-
     /// As [`Localizer::aim`], while the mode is not [`Mode::Searching`].
     ///
     /// # Errors
@@ -338,22 +302,6 @@ impl<'m> Navigator<'m> {
     fn policy_with(&self, configured: Policy) -> Policy {
         let is_hidden = self.mode == Mode::Provisional && self.unused >= UNUSED;
         if is_hidden { Policy::Nearest } else { configured }
-    }
-
-    /// As [`Localizer::aim_along`], while the mode is not [`Mode::Searching`].
-    ///
-    /// # Errors
-    /// [`NoAim`], by the reason.
-    pub fn aim_along(&self, ranger: RangerId, bearing: Radians) -> Result<Aim, NoAim> {
-        self.localizer.aim_along(ranger, bearing)
-    }
-
-    /// As [`Localizer::aim_at`], while the mode is not [`Mode::Searching`].
-    ///
-    /// # Errors
-    /// [`NoAim`], by the reason.
-    pub fn aim_at(&self, bearing: Radians) -> Result<Aim, NoAim> {
-        self.localizer.aim_at(bearing)
     }
 
     /// As [`Localizer::fix`]; while the pose is provisional, the search takes the ping as well, if it is of the first
@@ -383,11 +331,6 @@ impl<'m> Navigator<'m> {
             return AbsoluteFix::Refused(AbsoluteRefusal::NoPose);
         }
         self.localizer.absolute(at, measurement)
-    }
-
-    /// As [`Localizer::skip`].
-    pub fn skip(&mut self) {
-        self.localizer.skip();
     }
 
     /// Passes a ping in any direction to the search; `None`: no echo. An echo from nearer than the sonar's shortest

@@ -37,6 +37,8 @@ use sonarfix::geometry::units::{Metres, Radians};
 use sonarfix::map::{Map, WallId};
 use sonarfix::sensor::echo::EchoParameters;
 
+pub use sonarfix::map::Region;
+
 /// What the search is tuned with.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SearchParameters {
@@ -77,35 +79,6 @@ impl Default for SearchParameters {
             persistence: 20,
             sharpness: (Metres(0.05), Radians::from_degrees(3.0)),
         }
-    }
-}
-
-/// A rectangle of the map, parallel to its axes, in which a robot starts.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Region {
-    /// The corner of the smallest coordinates.
-    pub from: Point,
-    /// The corner of the largest coordinates.
-    pub to: Point,
-}
-
-impl Region {
-    /// Whether it is finite and not empty.
-    #[must_use]
-    pub fn is_valid(&self) -> bool {
-        let Self { from, to } = self;
-        from.is_finite() && to.is_finite() && from.x < to.x && from.y < to.y
-    }
-
-    /// Whether a place is in it or not farther than `margin` metres beside it.
-    fn contains(&self, at: Vector, margin: f32) -> bool {
-        let within = |value: f32, from: Metres, to: Metres| {
-            value >= from.0 - margin && value <= to.0 + margin
-        };
-        let Self { from, to } = self;
-        within(at.x, from.x, to.x) && within(at.y, from.y, to.y)
     }
 }
 
@@ -677,7 +650,8 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
     fn try_candidate(&mut self, placement: Placement, near: f32, rivalry: f32) {
         let start = placement.at.plus(self.window.start().turned(placement.rotation));
         let margin = REGION_MARGIN * (1.0 + self.window.since_start());
-        let is_outside = self.region.is_some_and(|region| !region.contains(start, margin));
+        let is_outside =
+            self.region.is_some_and(|region| !region.contains(start.into(), Metres(margin)));
         if is_outside || self.bank.has_near(&placement, near) {
             return;
         }

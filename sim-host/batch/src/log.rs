@@ -5,9 +5,10 @@ use std::io::BufRead;
 use nalgebra::Vector3;
 use sonarfix::geometry::pose::Point;
 use sonarfix_hal::config::RobotConfig;
-use sonarfix_replay::log::{self, HEADER, Malformed, Record};
+use sonarfix_replay::REFERENCE_HEADER;
+use sonarfix_replay::lines::Lines;
+use sonarfix_replay::log::{self, HEADER, Record};
 use sonarfix_replay::scan::{Cone, Scan};
-use sonarfix_replay::{LONGEST, REFERENCE_HEADER};
 
 use sonarfix::config::{PingSchedule, RangerId};
 use sonarfix::geometry::units::Radians;
@@ -36,7 +37,7 @@ pub struct Read {
     /// The recording.
     pub recording: Recording,
     /// Lines that were skipped: number and reason.
-    pub skipped: Vec<(usize, String)>,
+    pub skipped: Vec<(u64, String)>,
     /// Whether the ranges are cut from scans.
     pub has_scans: bool,
 }
@@ -69,29 +70,17 @@ pub fn nominal(robot: &RobotConfig, has_servo: bool) -> Nominal {
 ///
 /// # Errors
 /// [`ReadError`]; malformed lines are skipped and reported.
-pub fn read(mut reader: impl BufRead, robot: &RobotConfig) -> Result<Read, ReadError> {
+pub fn read(reader: impl BufRead, robot: &RobotConfig) -> Result<Read, ReadError> {
     let mut reading =
         LogReader { robot, read: Read::default(), suspect: None, next_scan: 0.0, shift: [0.0; 2] };
-    let mut line = Vec::new();
-    for number in 1.. {
-        line.clear();
-        if std::io::Read::take(&mut reader, LONGEST as u64).read_until(b'\n', &mut line)? == 0 {
-            break;
-        }
-        let text = String::from_utf8_lossy(&line);
-        if number == 1 {
-            if text.trim() != HEADER {
-                return Err(ReadError::Header(HEADER));
-            }
-            continue;
-        }
-        let taken = if line.ends_with(b"\n") {
-            log::parse(&text).map_err(|malformed| malformed.to_string())
-        } else {
-            Err(Malformed::Torn.to_string())
-        };
+    let mut lines = Lines::of(reader);
+    if !matches!(lines.next()?, Some(Ok(first)) if first.trim() == HEADER) {
+        return Err(ReadError::Header(HEADER));
+    }
+    while let Some(line) = lines.next()? {
+        let taken = line.and_then(log::parse).map_err(|malformed| malformed.to_string());
         if let Err(reason) = taken.and_then(|record| record.map_or(Ok(()), |r| reading.take(r))) {
-            reading.read.skipped.push((number, reason));
+            reading.read.skipped.push((lines.number(), reason));
         }
     }
     Ok(reading.read)
@@ -286,7 +275,7 @@ mod tests {
         let log = "sonarfix-log,1\nstart,0,1,2,0.5,0.01,0.02\nticks,0,0,0\nticks,1,100,100\nnonsense\n\
                    ticks,1,100,100\nrange,1.5,0.2,1.25\nticks,2,90000,90000\nticks,3,90100,90100\nticks,4,9";
         let read = read(log.as_bytes(), &robot()).unwrap();
-        let skipped: Vec<usize> = read.skipped.iter().map(|(line, _)| *line).collect();
+        let skipped: Vec<u64> = read.skipped.iter().map(|(line, _)| *line).collect();
         assert_eq!(skipped, [5, 6, 8, 10]);
         let travel: Vec<f64> =
             read.recording.readings.iter().map(|r| r.travel[0] / 0.4887e-3).collect();

@@ -1,6 +1,6 @@
 //! Calibration of synthetic robots in a room with a known map: accuracy, coverage of the intervals, refusals.
 //!
-//! The robots here are a model of a few lines, independent of estimator and simulator; the study `sonarfix calibration`
+//! The robots here are a model of a few lines, independent of estimator and simulator; the study `sonarfix-studies calibration`
 //! uses the simulated pins.
 
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "all of this file is a test")]

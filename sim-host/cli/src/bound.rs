@@ -7,8 +7,6 @@ use sonarfix_report::Table;
 use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::trace::Tick;
 
-use crate::table;
-
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The scenario file (docs/formats.md).
@@ -42,7 +40,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     simulation.run(seed, &mut trace)?;
     let ticks = spaced(&trace.ticks, every);
     if args.json {
-        return crate::json::print(&ticks.filter_map(row).collect::<Vec<_>>());
+        return sonarfix_terminal::json::print(&ticks.filter_map(row).collect::<Vec<_>>());
     }
     let table = Table {
         title: format!(
@@ -64,7 +62,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         .to_vec(),
         rows: ticks.filter_map(cells).collect(),
     };
-    println!("{}", table::text(&table));
+    println!("{}", table.text());
     Ok(())
 }
 

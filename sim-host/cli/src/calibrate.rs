@@ -1,7 +1,7 @@
 //! `sonarfix calibrate`: the calibration of a robot from a recording.
 
 use std::fs::File;
-use std::io::{BufReader, BufWriter, Write};
+use std::io::{BufReader, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
@@ -19,9 +19,8 @@ use sonarfix_replay::REFERENCE_HEADER;
 use sonarfix_report::Table;
 use sonarfix_report::residuals::{Residual, residuals};
 
-use crate::output::check_file;
 use crate::robot_edit;
-use crate::table;
+use sonarfix_terminal::output::check_file;
 
 /// Maximum number of skipped lines that are printed.
 const SHOWN: usize = 10;
@@ -81,10 +80,10 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     if let Some(out) = &args.out {
         let text = robot_edit::calibrated(&text, &robot, &found)?;
         robot_file::parse(&text, &out.display().to_string())?;
-        std::fs::write(out, text).with_context(|| out.display().to_string())?;
+        sonarfix_files::write(out, text)?;
     }
     if let Some(out) = &args.trajectory {
-        write_trajectory(out, &found).with_context(|| out.display().to_string())?;
+        sonarfix_files::write_with(out, |out| write_trajectory(out, &found))?;
     }
     if let Some(out) = &args.residuals {
         let shown = found.residuals.iter().map(|residual| Residual {
@@ -94,12 +93,12 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         });
         let svg = residuals(&shown.collect::<Vec<_>>())
             .map_err(|error| anyhow::anyhow!("cannot draw the figure: {error}"))?;
-        std::fs::write(out, svg).with_context(|| out.display().to_string())?;
+        sonarfix_files::write(out, svg)?;
     }
     if args.json {
-        crate::json::print(&Json::of(&found))
+        sonarfix_terminal::json::print(&Json::of(&found))
     } else {
-        println!("{}", table::text(&estimates(&found, &robot)));
+        println!("{}", estimates(&found, &robot).text());
         println!("\n{}", statement(&found));
         Ok(())
     }
@@ -145,13 +144,12 @@ fn walls(args: &Args) -> anyhow::Result<Vec<Wall>> {
     Ok(walls.filter_map(|wall| Wall::new(wall.from(), wall.to())).collect())
 }
 
-fn write_trajectory(path: &Path, found: &Calibration) -> std::io::Result<()> {
-    let mut out = BufWriter::new(File::create(path)?);
+fn write_trajectory(out: &mut impl Write, found: &Calibration) -> anyhow::Result<()> {
     writeln!(out, "{REFERENCE_HEADER}")?;
     for (time, pose, _) in &found.trajectory {
         writeln!(out, "{time:.6},{:.6},{:.6},{:.7}", pose.x, pose.y, pose.z)?;
     }
-    out.flush()
+    Ok(())
 }
 
 /// A value for people: relative errors in per cent, lengths in millimetres.

@@ -3,9 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::{
-    bound, calibrate, calibration, command, config, convert, export, faults, find, floor_plans,
-    health, init, map, measure, merge, monitor, paper, pil, plan, reality, relocalize, replay, run,
-    sonar_model, survey, surveys, sweep,
+    bound, calibrate, command, config, convert, export, find, init, map, measure, merge, monitor,
+    paper, pil, plan, replay, run, survey, sweep,
 };
 
 /// Simulates, measures, replays and operates the Sonarfix localizer for small wheeled robots.
@@ -28,10 +27,8 @@ enum Command {
     Pil(pil::Args),
     /// Replays the recording of a robot through the localizer.
     Replay(replay::Args),
-    /// Searches for the pose of a robot without a start pose, on a log or in simulation.
+    /// Searches for the pose of a robot without a start pose on a log.
     Find(find::Args),
-    /// Measures how robots that lose their pose, or start without one, find it in random floor plans.
-    Relocalize(relocalize::Args),
     /// Estimates the calibration of a robot from a recording, with a known map or true poses.
     Calibrate(calibrate::Args),
     /// Measures encoders and servo of a robot step by step: wheels turned by hand, a sweep in a corner of a room.
@@ -57,20 +54,6 @@ enum Command {
     Bound(bound::Args),
     /// Forecasts the localization accuracy along a path, before a robot is built.
     Plan(plan::Args),
-    /// Replays all recordings of a folder; prints markdown.
-    Reality(reality::Args),
-    /// Compares the simulated NXT sonar with recorded sweeps; prints markdown.
-    SonarModel(sonar_model::Args),
-    /// Measures the effects of hardware faults; prints markdown.
-    Faults(faults::Args),
-    /// Measures the reliability of the health verdict; prints markdown.
-    Health(health::Args),
-    /// Measures the accuracy of `calibrate` on simulated robots; prints markdown.
-    Calibration(calibration::Args),
-    /// Measures the accuracy of `survey` on simulated robots; prints markdown.
-    Surveys(surveys::Args),
-    /// Compares two measurement policies on random floor plans; prints markdown.
-    FloorPlans(floor_plans::Args),
 }
 
 impl Cli {
@@ -88,12 +71,9 @@ impl Cli {
             Command::Pil(args) => pil::execute(&args),
             Command::Replay(args) => replay::execute(&args),
             Command::Find(args) => find::execute(&args),
-            Command::Relocalize(args) => relocalize::execute(&args),
             Command::Calibrate(args) => calibrate::execute(&args),
-            Command::Calibration(args) => calibration::execute(&args),
             Command::Measure(args) => measure::execute(&args),
             Command::Survey(args) => survey::execute(&args),
-            Command::Surveys(args) => surveys::execute(&args),
             Command::Convert(args) => convert::execute(&args),
             Command::Export(args) => export::execute(&args),
             Command::Monitor(args) => monitor::execute(&args),
@@ -102,11 +82,6 @@ impl Cli {
             Command::Map(args) => map::execute(&args),
             Command::Bound(args) => bound::execute(&args),
             Command::Plan(args) => plan::execute(&args),
-            Command::Reality(args) => reality::execute(&args),
-            Command::SonarModel(args) => sonar_model::execute(&args),
-            Command::Faults(args) => faults::execute(&args),
-            Command::Health(args) => health::execute(&args),
-            Command::FloorPlans(args) => floor_plans::execute(&args),
         }
     }
 }

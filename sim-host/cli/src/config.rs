@@ -1,6 +1,5 @@
 //! `sonarfix config`: the configuration image of a robot.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
@@ -8,7 +7,7 @@ use sonarfix_hal::config::RobotConfig;
 use sonarfix_link::baked;
 use sonarfix_map::{robot_file, robot_text};
 
-use crate::output::check_file;
+use sonarfix_terminal::output::check_file;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -45,7 +44,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
             let config = robot_file::read(robot)?;
             let mut buffer = [0; baked::LENGTH_MAX];
             let bytes = baked::write(&config, &mut buffer)?;
-            fs::write(out, bytes).with_context(|| format!("cannot write {}", out.display()))?;
+            sonarfix_files::write(out, &*bytes)?;
             println!("{}: {} bytes, {}", out.display(), bytes.len(), checksum(&config));
         }
         What::Check { config: file } => {

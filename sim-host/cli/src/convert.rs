@@ -9,7 +9,7 @@ use sonarfix_replay::convert::lego::{ENCODER_LAG, Lego, Nominal};
 use sonarfix_replay::convert::nxt::Nxt;
 use sonarfix_replay::convert::{ConvertError, Converted};
 
-use crate::output::check_folder;
+use sonarfix_terminal::output::check_folder;
 
 /// Maximum number of skipped or implausible lines that are printed.
 const SHOWN: u64 = 10;

@@ -1,18 +1,19 @@
 //! `sonarfix export`: writes logs and traces for other programs.
 
 use std::fs::File;
-use std::io::{BufReader, BufWriter, Read};
+use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use sonarfix_exchange::row::{Rows, Sink};
 use sonarfix_exchange::{mcap_file, trace_csv, trace_parquet};
+use sonarfix_files::Output;
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_map::{Floor, MapFile, robot_file};
 use sonarfix_replay::{Replay, Summary, log};
 use sonarfix_sim::trace::{Recorder, Wall};
 
-use crate::output::check_file;
+use sonarfix_terminal::output::check_file;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -35,8 +36,8 @@ pub struct Args {
     parquet: Option<PathBuf>,
 }
 
-type Mcap = mcap_file::File<BufWriter<File>>;
-type Parquet = trace_parquet::File<BufWriter<File>>;
+type Mcap = mcap_file::File<Output>;
+type Parquet = trace_parquet::File<Output>;
 
 /// The files that are written.
 struct Outputs {
@@ -123,8 +124,7 @@ fn replay(
 impl Outputs {
     fn new(args: &Args, epoch: f64, walls: &[Wall]) -> anyhow::Result<Self> {
         let create = |file: &PathBuf| -> anyhow::Result<_> {
-            let created = File::create(file);
-            Ok(BufWriter::new(created.with_context(|| format!("cannot write {}", file.display()))?))
+            Output::create(file).with_context(|| format!("cannot write {}", file.display()))
         };
         let metadata = [
             ("sonarfix", env!("CARGO_PKG_VERSION").to_owned()),
@@ -144,8 +144,11 @@ impl Outputs {
 
     fn end(self) -> anyhow::Result<()> {
         if let Some(file) = self.mcap {
-            file.end()?;
+            file.end()?.finish()?;
         }
-        self.parquet.map_or(Ok(()), Parquet::end)
+        if let Some(file) = self.parquet {
+            file.end()?.finish()?;
+        }
+        Ok(())
     }
 }

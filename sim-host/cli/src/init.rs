@@ -5,8 +5,8 @@ use std::fs;
 use anyhow::{Context, ensure};
 use sonarfix_map::{MapFile, Scenario, robot_file};
 
-use crate::output::check_folder;
 use answers::Answers;
+use sonarfix_terminal::output::check_folder;
 
 mod answers;
 mod question;
@@ -39,7 +39,7 @@ fn write(args: &Args) -> anyhow::Result<()> {
     check(&files)?;
     for (name, text) in &files {
         let file = dir.join(name);
-        fs::write(&file, text).with_context(|| format!("cannot write {}", file.display()))?;
+        sonarfix_files::write(&file, text)?;
     }
     println!("wrote {}", files.map(|(name, _)| dir.join(name).display().to_string()).join(", "));
     println!("next: cd {}; sonarfix run scenario.toml --out report", dir.display());

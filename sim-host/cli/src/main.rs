@@ -1,22 +1,17 @@
 //! The command `sonarfix`.
 
 #[macro_use]
-mod output;
+extern crate sonarfix_terminal;
 
 mod bound;
 mod calibrate;
-mod calibration;
 mod cli;
 mod command;
 mod config;
 mod convert;
 mod export;
-mod faults;
 mod find;
-mod floor_plans;
-mod health;
 mod init;
-mod json;
 mod map;
 mod map_exchange;
 mod measure;
@@ -26,19 +21,14 @@ mod overrides;
 mod paper;
 mod pil;
 mod plan;
-mod progress;
 mod provenance;
-mod reality;
-mod relocalize;
 mod replay;
 mod robot_edit;
 mod rows;
 mod run;
 mod serve;
 mod signs_of_life;
-mod sonar_model;
 mod survey;
-mod surveys;
 mod sweep;
 mod sweep_values;
 mod table;
@@ -47,6 +37,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use cli::Cli;
+use sonarfix_terminal::progress;
 
 fn main() -> ExitCode {
     match Cli::parse().execute() {

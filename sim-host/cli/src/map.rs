@@ -1,6 +1,5 @@
 //! `sonarfix map`: checks, bakes, draws, simplifies and converts maps.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
@@ -11,7 +10,7 @@ use sonarfix::map::Map;
 use sonarfix_map::{Limits, MapFile, Severity, bake, flaws, robot_file, simplify, symmetries};
 
 use crate::map_exchange;
-use crate::output::check_file;
+use sonarfix_terminal::output::check_file;
 
 /// Maximum number of findings that are printed.
 const SHOWN: usize = 100;
@@ -177,7 +176,7 @@ fn write_image(map: &MapFile, out: &Path) -> anyhow::Result<()> {
     let name = map.name();
     anyhow::ensure!(errors == 0, "{name}: {errors} errors; run `sonarfix map check {name}`");
     let image = bake(&map.floor.walls())?;
-    write(out, &image)?;
+    sonarfix_files::write(out, &image)?;
     let (walls, bytes) = (map.floor.named_walls().len(), image.len());
     if let Some(grid) = Map::read(&image)?.grid() {
         let (columns, rows, cell) = (grid.columns(), grid.rows(), grid.cell_size().0);
@@ -191,7 +190,7 @@ fn draw(map: &MapFile, title: &str, out: &Path, with_grid: bool) -> anyhow::Resu
     let walls = map.floor.named_walls().len();
     let title = format!("{title}: {walls} {}", if walls == 1 { "wall" } else { "walls" });
     let grid = if with_grid { Map::read(&bake(&map.floor.walls())?)?.grid() } else { None };
-    write(out, sonarfix_report::map::svg(&title, &map.floor, grid).as_bytes())
+    sonarfix_files::write(out, sonarfix_report::map::svg(&title, &map.floor, grid))
 }
 
 fn write_simplified(map: &MapFile, limits: Limits, out: &Path) -> anyhow::Result<()> {
@@ -199,7 +198,7 @@ fn write_simplified(map: &MapFile, limits: Limits, out: &Path) -> anyhow::Result
     let is_csv = out.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
     let floor = &simplified.floor;
     let text = if is_csv { floor.to_csv() } else { floor.to_toml() };
-    write(out, text.as_bytes())?;
+    sonarfix_files::write(out, text)?;
     let pieces =
         |walls: &[usize]| walls.iter().map(|&wall| map.quoted(wall)).collect::<Vec<_>>().join(", ");
     for joined in simplified.joined.iter().take(SHOWN) {
@@ -216,8 +215,4 @@ fn write_simplified(map: &MapFile, limits: Limits, out: &Path) -> anyhow::Result
     let (before, after) = (map.floor.named_walls().len(), floor.named_walls().len());
     println!("{}: {after} walls of {before}", out.display());
     Ok(())
-}
-
-fn write(out: &Path, bytes: &[u8]) -> anyhow::Result<()> {
-    fs::write(out, bytes).with_context(|| format!("cannot write {}", out.display()))
 }

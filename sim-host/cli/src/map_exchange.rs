@@ -87,9 +87,22 @@ pub fn import(args: &Import) -> anyhow::Result<()> {
         println!("{note}");
     }
     let floor = &imported.floor;
-    let text = if ending(&args.out) == "csv" { floor.to_csv() } else { floor.to_toml() };
-    std::fs::write(&args.out, text)
-        .with_context(|| format!("cannot write {}", args.out.display()))?;
+    let text = match (ending(&args.out) == "csv", imported.offset) {
+        (true, None) => floor.to_csv(),
+        (true, Some([x, y])) => bail!(
+            "--out: a CSV cannot keep the offset of {x}, {y} m: write TOML, or pass --origin={},{}",
+            -x,
+            -y
+        ),
+        (false, None) => floor.to_toml(),
+        (false, Some([x, y])) => {
+            format!(
+                "# Moved: add ({x}, {y}) m for the coordinates of the drawing.\n{}",
+                floor.to_toml()
+            )
+        }
+    };
+    sonarfix_files::write(&args.out, text)?;
     println!("{}: {} walls", args.out.display(), floor.named_walls().len());
     Ok(())
 }
@@ -130,5 +143,5 @@ pub fn export(floor: &Floor, args: &Target) -> anyhow::Result<()> {
         "geojson" => geojson::write(floor, anchor(args.anchor)?),
         other => bail!("--out: unknown ending `{other}`: expected yaml, svg or geojson"),
     };
-    std::fs::write(&args.out, text).with_context(|| format!("cannot write {}", args.out.display()))
+    sonarfix_files::write(&args.out, text)
 }

@@ -13,8 +13,8 @@ use sonarfix_link::Command;
 use sonarfix_map::robot_file;
 
 use crate::monitor::PortArgs;
-use crate::output::check_file;
 use crate::robot_edit;
+use sonarfix_terminal::output::check_file;
 
 use robot::Robot;
 use wheel::Turned;
@@ -56,7 +56,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     if let Some(out) = &args.out {
         let text = robot_edit::measured(&text, &config, &[right, left], servo.as_ref())?;
         robot_file::parse(&text, &out.display().to_string())?;
-        std::fs::write(out, text).with_context(|| out.display().to_string())?;
+        sonarfix_files::write(out, text)?;
         let (port, out) = (args.port.name(), out.display());
         println!(
             "Written to {out}. Into the robot: sonarfix command --port {port} set-configuration {out}"

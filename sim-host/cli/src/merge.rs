@@ -6,9 +6,9 @@ use anyhow::{Context, bail, ensure};
 use cpu_time::ProcessTime;
 use sonarfix_rows::{Plan, Rows};
 
-use crate::output::check_file;
 use crate::rows;
 use crate::table::{self, Beside, Measured};
+use sonarfix_terminal::output::check_file;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -40,13 +40,13 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let (summary, worst) = rows::summary(open, args.worst)?;
     let measured = Measured { summary, cpu_seconds: start.elapsed().as_secs_f64() };
     if args.json {
-        return crate::json::print(&measured);
+        return sonarfix_terminal::json::print(&measured);
     }
     // The truth is in the scenario: the table shows the errors.
     let errors = Beside { truth: [0.0; 7], paper: false };
-    println!("{}", table::text(&table::states(&measured, &errors)));
+    println!("{}", table::states(&measured, &errors).text());
     if !worst.is_empty() {
-        println!("\n{}", table::text(&rows::worst_table(&worst)));
+        println!("\n{}", rows::worst_table(&worst).text());
     }
     Ok(())
 }
@@ -57,12 +57,12 @@ fn in_order(files: &[PathBuf]) -> anyhow::Result<(Plan, Vec<PathBuf>)> {
     for file in files {
         let (plan, rows) = sonarfix_rows::open(file)?;
         let (mut count, (_, expected)) = (0_u32, plan.part());
+        let name = format!("shard {}, the rows {}", plan.shard, file.display());
         for row in rows {
-            row.with_context(|| format!("the rows {}", file.display()))?;
+            row.with_context(|| name.clone())?;
             count += 1;
         }
-        let name = file.display();
-        ensure!(count == expected, "{name} has {count} of {expected} rows: run its command again");
+        ensure!(count == expected, "{name}: {count} of {expected} rows; run its command again");
         shards.push((plan, file.clone()));
     }
     shards.sort_by_key(|(plan, _)| plan.shard.index);

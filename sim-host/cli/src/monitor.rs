@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
+use anyhow::{Context, ensure};
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyModifiers};
 use sonarfix_link::Telemetry;
@@ -15,10 +16,10 @@ use sonarfix_monitor::terminal::{self, History};
 use sonarfix_monitor::{Monitor, Received, view};
 use sonarfix_sim::trace::Wall;
 
-use crate::output::check_file;
-use crate::progress::{catch_interrupt, is_interrupted};
 use crate::serve::{self, ServeArgs};
 use crate::signs_of_life;
+use sonarfix_terminal::output::check_file;
+use sonarfix_terminal::progress::{catch_interrupt, is_interrupted};
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -28,6 +29,9 @@ pub struct Args {
     /// a new log begins, with a number in its name.
     #[arg(long, value_name = "LOG.csv")]
     record: Option<PathBuf>,
+    /// Replaces files that exist by the recording.
+    #[arg(long, requires = "record")]
+    force: bool,
     /// Shows what each device of a robot that waits reads, with hints (docs/build-a-robot.md). The sonar turns and pings; the
     /// motors stay off.
     #[arg(long, conflicts_with_all = ["record", "serve"])]
@@ -78,6 +82,12 @@ const PATIENCE: Duration = Duration::from_millis(100);
 pub fn execute(args: &Args) -> anyhow::Result<()> {
     if let Some(file) = &args.record {
         check_file("--record", file)?;
+        let is_old = std::fs::metadata(file).is_ok_and(|file| file.is_file());
+        let file = file.display();
+        ensure!(
+            args.force || !is_old,
+            "--record: {file} exists: name another file, or replace it with --force"
+        );
     }
     let title = format!("Sonarfix: {}", args.port.port);
     let (map, robot) = (args.map.as_deref(), args.robot.as_deref());
@@ -91,14 +101,14 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let mut screen = Screen::new(scene.walls.clone());
     let mut robot = Robot::new(feed, scene, mount);
     if let Some(path) = &args.record {
-        robot.record(path.clone());
+        robot.record(path.clone(), args.force);
     }
     catch_interrupt();
     let ended = watch(&mut port, &mut robot, orders.as_ref(), &mut screen);
     let names = screen.end();
-    summarize(&mut robot, &names);
+    let summarized = summarize(&mut robot, &names);
     let reason = match &ended {
-        Ok(End::Asked) => return Ok(()),
+        Ok(End::Asked) => return summarized,
         Ok(End::Stream) => "the stream has ended".to_owned(),
         Err(error) => format!("{error:#}"),
     };
@@ -107,7 +117,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         eprintln!("{reason}; the page stays until Ctrl-C");
         stay(&orders, &reason);
     }
-    ended.map(|_| ())
+    ended.and(summarized)
 }
 
 /// Why telemetry is no longer read.
@@ -150,20 +160,19 @@ fn watch(
 }
 
 /// The last telemetry, and where the recordings are.
-fn summarize(robot: &mut Robot, names: &[String]) {
+fn summarize(robot: &mut Robot, names: &[String]) -> anyhow::Result<()> {
     println!("{}", view::page(robot.monitor(), names));
     for text in robot.recorded() {
         eprintln!("{text}");
     }
-    match robot.end_recording() {
-        None => {}
-        Some((_, 0)) => eprintln!("nothing was recorded: the robot sent no estimate"),
-        Some((path, 1)) => eprintln!("recorded {}", path.display()),
-        Some((path, logs)) => {
-            let more = logs - 1;
-            eprintln!("recorded {} and {more} more, one for each start", path.display());
-        }
+    let Some((path, logs)) = robot.end_recording() else { return Ok(()) };
+    let path = path.display();
+    match logs.with_context(|| format!("cannot write {path}"))? {
+        0 => eprintln!("nothing was recorded: the robot sent no estimate"),
+        1 => eprintln!("recorded {path}"),
+        logs => eprintln!("recorded {path} and {} more, one for each start", logs - 1),
     }
+    Ok(())
 }
 
 /// Keeps the page until Ctrl-C.

@@ -12,8 +12,8 @@ use sonarfix_pil_host::tally::Tally;
 use sonarfix_pil_host::{Emulated, Load};
 use sonarfix_sim::simulate::Simulation;
 
-use crate::output::check_file;
 use crate::overrides::Overrides;
+use sonarfix_terminal::output::check_file;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -106,7 +106,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         golden::write(path, &words, recorded)?;
     }
     if args.json {
-        return crate::json::print(&pair.tally);
+        return sonarfix_terminal::json::print(&pair.tally);
     }
     print(&pair.tally);
     Ok(())

@@ -2,19 +2,16 @@
 
 use std::path::{Path as FilePath, PathBuf};
 
-use anyhow::Context;
 use sonarfix_map::{MapFile, Scenario, SonarModel, robot_file};
 use sonarfix_plan::preset::{ServoPreset, SonarPreset};
-use sonarfix_plan::{BLIND_AFTER, Forecast, HeadingAid, Spread, route};
+use sonarfix_plan::starts::{LegShare, Share, Starts};
+use sonarfix_plan::{BLIND_AFTER, Forecast, HeadingAid, Spread, bare, route};
 use sonarfix_report::Table;
 use sonarfix_report::heat_map::{Heat, HeatMap};
-use sonarfix_studies::floor_plan::{FloorPlan, picture};
-use sonarfix_studies::starts::{Share, Starts};
 
-use crate::output::check_file;
 use crate::overrides::has_servo;
-use crate::progress::Runs;
-use crate::table;
+use sonarfix_terminal::output::check_file;
+use sonarfix_terminal::progress::Runs;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -129,14 +126,14 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     runs.end()?;
     candidates.sort_by(|a, b| a.forecast.position.rms.total_cmp(&b.forecast.position.rms));
     if args.json {
-        crate::json::print(&candidates)?;
+        sonarfix_terminal::json::print(&candidates)?;
     } else if args.compare {
-        println!("{}", table::text(&comparison(&candidates, args.need)));
+        println!("{}", comparison(&candidates, args.need).text());
     } else {
         for candidate in &candidates {
-            println!("{}", table::text(&legs(candidate, args.need)));
+            println!("{}", legs(candidate, args.need).text());
             if let Some(starts) = &candidate.starts {
-                println!("{}", table::text(&starts_table(starts)));
+                println!("{}", starts_table(starts).text());
             }
         }
     }
@@ -147,7 +144,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
 }
 
 fn write(file: &FilePath, svg: &str) -> anyhow::Result<()> {
-    std::fs::write(file, svg).with_context(|| format!("cannot write {}", file.display()))?;
+    sonarfix_files::write(file, svg)?;
     eprintln!("open {}", file.display());
     Ok(())
 }
@@ -162,7 +159,7 @@ fn scenario(args: &Args) -> anyhow::Result<Scenario> {
         let missing = "a map has no path: give one with --path \"x,y x,y …\"";
         anyhow::ensure!(corners.is_some(), "{}: {missing}", args.map.display());
         let name = args.map.display().to_string();
-        Scenario { floor: map.floor, name, ..FloorPlan::new(0).scenario()? }
+        bare::scenario(map.floor, name)?
     };
     if let Some(corners) = corners {
         scenario.path = route::path(&corners, &scenario.floor, &scenario.robot)?;
@@ -290,9 +287,7 @@ fn starts_table(starts: &Starts) -> Table {
             metres(share.most_metres),
         ]
     };
-    let leg = |leg: &sonarfix_studies::starts::LegShare| {
-        row(format!("{} to {}", point(leg.from), point(leg.to)), &leg.share)
-    };
+    let leg = |leg: &LegShare| row(format!("{} to {}", point(leg.from), point(leg.to)), &leg.share);
     let whole = row("all".to_owned(), &starts.all);
     Table {
         title: "Starts without a pose".to_owned(),
@@ -361,6 +356,6 @@ fn picture(scenario: &Scenario, candidate: &Candidate) -> HeatMap {
         mark: format!("blind for more than {BLIND_AFTER:.0} s"),
         unmapped: Vec::new(),
         path: candidate.forecast.samples.iter().map(heat).collect(),
-        ..picture::place(scenario)
+        ..HeatMap::of(scenario)
     }
 }

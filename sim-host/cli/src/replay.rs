@@ -1,7 +1,7 @@
 //! `sonarfix replay`: replays the recording of a robot through the localizer.
 
 use std::fs::File;
-use std::io::{BufReader, BufWriter};
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
@@ -14,12 +14,11 @@ use sonarfix_replay::{ByVerdict, Figures, Replay, Summary};
 use sonarfix_report::{Report, Table};
 use sonarfix_sim::trace::Recorder;
 
-use crate::output::{check_file, check_folder};
 use crate::overrides::PolicyName;
 use crate::provenance;
 use crate::run::Output;
 use crate::serve::{self, PacedArgs};
-use crate::table;
+use sonarfix_terminal::output::{check_file, check_folder};
 
 /// Maximum number of skipped lines that are printed.
 const SHOWN: u64 = 10;
@@ -75,15 +74,13 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let mut trace = Thinned::new(&floor, robot.localizer.sonar.cone, CAPACITY);
     let summary = replay(args, &with, &mut trace)?;
     if let Some(file) = &args.trace {
-        let out = File::create(file).map(BufWriter::new);
-        let out = out.with_context(|| format!("cannot write the trace {}", file.display()))?;
-        trace_csv::write(trace.trace(), out)?;
+        sonarfix_files::write_with(file, |out| trace_csv::write(trace.trace(), out))?;
     }
     let tables = tables(&summary);
     if args.output.json {
-        crate::json::print(&summary)?;
+        sonarfix_terminal::json::print(&summary)?;
     } else {
-        let texts: Vec<_> = tables.iter().map(table::text).collect();
+        let texts: Vec<_> = tables.iter().map(Table::text).collect();
         println!("{}", texts.join("\n\n"));
     }
     if let Some(dir) = &args.output.out {

@@ -12,8 +12,8 @@ use sonarfix_sim::row::Row;
 use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::statistics::{Summary, Totals};
 
-use crate::progress::Runs;
 use crate::table::Measured;
+use sonarfix_terminal::progress::Runs;
 
 /// Runs between two writes of the file: what a killed process loses at most.
 const CHUNK: u32 = 256;
@@ -122,9 +122,7 @@ fn filled(simulation: &Simulation, plan: &Plan, file: &Path) -> anyhow::Result<P
     if journal.left() > 0 {
         return Ok(growing);
     }
-    let unfinished = with_ending(file, "part.parquet");
-    sonarfix_rows::write(&unfinished, plan, sonarfix_rows::open(&growing)?.1)?;
-    std::fs::rename(&unfinished, file)?;
+    sonarfix_rows::write(file, plan, sonarfix_rows::open(&growing)?.1)?;
     std::fs::remove_file(&growing)?;
     Ok(file.to_owned())
 }

@@ -1,10 +1,7 @@
 //! `sonarfix run`: runs a scenario a number of times.
 
-use std::fs::File;
-use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
 use cpu_time::ProcessTime;
 use sonarfix_exchange::trace_csv;
 use sonarfix_map::Scenario;
@@ -16,14 +13,14 @@ use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::spread::Spread;
 use sonarfix_sim::trace::Trace;
 
-use crate::output::{check_file, check_folder};
 use crate::overrides::Overrides;
-use crate::progress::Runs;
 use crate::provenance;
 use crate::rows::{self, Counted};
 use crate::serve::{self, PacedArgs};
 use crate::sweep_values::Sweep;
 use crate::table::{self, Beside, Measured};
+use sonarfix_terminal::output::{check_file, check_folder};
+use sonarfix_terminal::progress::Runs;
 
 /// Most runs whose spread is in a report: they are computed again, with all their ticks.
 const MOST_SPREAD: u32 = 100;
@@ -104,11 +101,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
 }
 
 fn write_trace(trace: &Trace, file: &Path) -> anyhow::Result<()> {
-    let create = || -> anyhow::Result<()> {
-        let out = BufWriter::new(File::create(file)?);
-        trace_csv::write(trace, out)
-    };
-    create().with_context(|| format!("cannot write the trace {}", file.display()))
+    sonarfix_files::write_with(file, |out| trace_csv::write(trace, out))
 }
 
 /// A scenario and a number of runs.
@@ -135,9 +128,9 @@ impl Experiment {
 
     fn show(&self, measured: &Measured, output: &Output) -> anyhow::Result<()> {
         if output.json {
-            crate::json::print(measured)?;
+            sonarfix_terminal::json::print(measured)?;
         } else {
-            println!("{}", table::text(&self.table(measured)));
+            println!("{}", self.table(measured).text());
         }
         if let Some(dir) = &output.out {
             let page = self.report(measured, &self.trace()?, dir)?;
@@ -173,7 +166,7 @@ impl Experiment {
     /// Lists the runs with the largest errors, and writes their traces.
     fn show_worst(&self, worst: &[Row], args: &Args) -> anyhow::Result<()> {
         if !worst.is_empty() && !args.output.json {
-            println!("\n{}", table::text(&rows::worst_table(worst)));
+            println!("\n{}", rows::worst_table(worst).text());
         }
         let Some(dir) = &args.rows.traces else {
             return Ok(());

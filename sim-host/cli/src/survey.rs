@@ -15,8 +15,7 @@ use sonarfix_survey::problem::Robot;
 use sonarfix_survey::survey::{Survey, survey};
 use sonarfix_survey::walls::MappedWall;
 
-use crate::output::check_file;
-use crate::table;
+use sonarfix_terminal::output::check_file;
 
 /// Accuracy from which on a wall should be driven along again, metres.
 const POOR: f64 = 0.03;
@@ -66,14 +65,14 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         found.scale(measured.length / estimated);
     }
     if let Some(out) = &args.out {
-        std::fs::write(out, map_text(&found)).with_context(|| out.display().to_string())?;
+        sonarfix_files::write(out, map_text(&found))?;
     }
     if let Some(out) = &args.drawing {
-        std::fs::write(out, draw(&found)).with_context(|| out.display().to_string())?;
+        sonarfix_files::write(out, draw(&found))?;
     }
-    println!("{}", table::text(&walls(&found)));
+    println!("{}", walls(&found).text());
     if let Some(map) = &map {
-        println!("\n{}", table::text(&comparison(&found, map)));
+        println!("\n{}", comparison(&found, map).text());
     }
     println!("\n{}", verdict(&found));
     Ok(())

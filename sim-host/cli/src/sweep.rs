@@ -14,12 +14,11 @@ use sonarfix_sim::monte_carlo;
 use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::statistics::Summary;
 
-use crate::output::check_folder;
-use crate::progress::Runs;
 use crate::rows;
 use crate::run::{Args, Output};
 use crate::sweep_values::{self, Sweep};
-use crate::table;
+use sonarfix_terminal::output::check_folder;
+use sonarfix_terminal::progress::Runs;
 
 /// The picture's file.
 const PICTURE: &str = "sweep.svg";
@@ -80,14 +79,14 @@ fn numbered(file: &Path, number: usize) -> PathBuf {
 
 fn show(points: &[Point], sweeps: &[Sweep], output: &Output) -> anyhow::Result<()> {
     if output.json {
-        crate::json::print(&points)?;
+        sonarfix_terminal::json::print(&points)?;
     } else {
-        println!("{}", table::text(&as_table(points, sweeps)));
+        println!("{}", as_table(points, sweeps).text());
     }
     if let Some(dir) = &output.out {
         let file = dir.join(PICTURE);
         let svg = picture(points, sweeps).svg().map_err(|error| anyhow::anyhow!("{error}"))?;
-        std::fs::write(&file, svg).with_context(|| format!("cannot write {}", file.display()))?;
+        sonarfix_files::write(&file, svg)?;
         eprintln!("open {}", file.display());
     }
     Ok(())

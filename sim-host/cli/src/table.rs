@@ -119,25 +119,3 @@ fn note(Measured { summary: s, cpu_seconds }: &Measured) -> String {
         s.lost_runs,
     )
 }
-
-/// A table as text with aligned columns.
-#[must_use]
-pub fn text(table: &Table) -> String {
-    let lines: Vec<&Vec<String>> = std::iter::once(&table.columns).chain(&table.rows).collect();
-    let width = |column: usize| {
-        lines.iter().filter_map(|line| line.get(column)).map(|cell| cell.chars().count()).max()
-    };
-    let mut text = format!("{}\n", table.title);
-    for line in &lines {
-        for (column, cell) in line.iter().enumerate() {
-            let width = width(column).unwrap_or(0);
-            // Names are left-aligned, numbers right-aligned.
-            let cell =
-                if column == 0 { format!("{cell:<width$}") } else { format!("  {cell:>width$}") };
-            text.push_str(&cell);
-        }
-        text.push('\n');
-    }
-    text.push_str(&table.note);
-    text
-}

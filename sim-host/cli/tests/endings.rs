@@ -6,6 +6,7 @@
 use std::process::{Command, Output, Stdio};
 
 use sonarfix_link::CommandResult;
+use sonarfix_studies::surveys::{self, Place};
 
 use crate::common::{MAP, ROBOT};
 
@@ -24,7 +25,7 @@ const PAPER: &str = "../../crates/sonarfix-map/scenarios/paper.toml";
 
 /// Every subcommand, with arguments for the shortest output. In `FILES` are a short log with its map and robot, a drive for
 /// the calibration, a recorded stream of a robot's bytes, rows, and room for results; `ROBOT` is the port of a robot.
-const PRINTING: [&[&str]; 49] = [
+const PRINTING: [&[&str]; 39] = [
     &["--help"],
     &["init", "FILES/robot"],
     &["paper", "--runs", "1"],
@@ -32,19 +33,13 @@ const PRINTING: [&[&str]; 49] = [
     &["pil", CLASSROOM, "--seconds", "1", "--machine", "host"],
     &["replay", "FILES/log.csv"],
     &["find", "FILES/log.csv", "--json"],
-    &["find", "--floor-plans", "1", "--seconds", "5"],
-    &["find", "--floor-plans", "1", "--walls", "30", "--seconds", "5"],
-    &["relocalize", "--runs", "1", "--seconds", "5"],
     &["calibrate", "FILES/drive.csv"],
-    &["calibration", "--runs", "1", "--metres", "5"],
     &["survey", "FILES/survey/log.csv"],
-    &["surveys", "room", "--runs", "1"],
     &["export", "FILES/log.csv", "--mcap", "FILES/log.mcap"],
     &["convert", "carmen", "FILES/carmen.log", "--out", "FILES/converted"],
     // These need a recording.
     &["convert", "lego", "--help"],
     &["convert", "nxt", "--help"],
-    &["sonar-model", "--help"],
     // This needs a person.
     &["measure", "--help"],
     &["monitor", "--port", "FILES/bytes"],
@@ -72,10 +67,6 @@ const PRINTING: [&[&str]; 49] = [
     &["merge", "FILES/rows.csv"],
     &["plan", CLASSROOM, "--runs", "1"],
     &["plan", CLASSROOM, "--runs", "1", "--starts", "1"],
-    &["reality", "FILES"],
-    &["faults", "--runs", "1"],
-    &["health", "--runs", "1"],
-    &["floor-plans", "--plans", "1", "--runs", "1"],
 ];
 
 /// The files of [`PRINTING`].
@@ -99,10 +90,10 @@ fn files() -> tempfile::TempDir {
     for arguments in [
         ["run", CLASSROOM, "--runs", "1", "--rows", "FILES/rows.csv"].as_slice(),
         &["config", "bake", "tests/robot.toml", "--out", "FILES/config.bin"],
-        &["surveys", "room", "--record", "FILES/survey"],
     ] {
         assert!(printing(arguments, dir.path()).stdout(Stdio::null()).status().unwrap().success());
     }
+    surveys::record(Place::Room, 20_000, &dir.path().join("survey")).unwrap();
     dir
 }
 
@@ -282,7 +273,7 @@ fn a_long_line_is_not_echoed() {
 }
 
 /// The options that name a result, each in a command that would otherwise end with another error, or work for hours.
-const WRITING: [(&[&str], &str); 33] = [
+const WRITING: [(&[&str], &str); 29] = [
     (&["measure", "--port", "missing"], "--out"),
     (&["paper", "--runs", "4000000"], "--out"),
     (&["run", CLASSROOM, "--runs", "4000000"], "--out"),
@@ -295,10 +286,6 @@ const WRITING: [(&[&str], &str); 33] = [
     (&["replay", "missing.csv"], "--out"),
     (&["replay", "missing.csv"], "--trace"),
     (&["plan", CLASSROOM, "--runs", "4000000"], "--out"),
-    (&["health", "--runs", "4000000"], "--figure"),
-    (&["floor-plans", "--plans", "4000000"], "--images"),
-    (&["floor-plans", "--draw", "1"], "--out"),
-    (&["floor-plans", "--draw", "1"], "--toml"),
     (&["calibrate", "missing.csv"], "--out"),
     (&["calibrate", "missing.csv"], "--trajectory"),
     (&["calibrate", "missing.csv"], "--residuals"),
@@ -331,33 +318,15 @@ fn a_result_that_cannot_be_written_is_an_early_error() {
     }
 }
 
-/// An office whose corridor and rooms are as wide as the whole.
-#[test]
-fn a_narrow_office_is_drawn() {
-    let dir = tempfile::tempdir().unwrap();
-    let file = dir.path().join("plan.svg");
-    let output =
-        sonarfix(&["floor-plans", "--draw", "10078", "--out"]).arg(&file).output().unwrap();
-    assert!(output.status.success(), "{}", errors(&output));
-    assert!(std::fs::read_to_string(file).unwrap().contains("<svg"));
-}
-
 /// Commands with more runs than anyone waits for, and what their output must begin with.
 #[cfg(unix)]
-const LONG: [(&[&str], &str); 10] = [
+const LONG: [(&[&str], &str); 3] = [
     (&["paper", "--runs", "4000000"], "Estimates"),
     (
         &["run", "../../crates/sonarfix-map/scenarios/classroom.toml", "--runs", "4000000"],
         "Estimates",
     ),
-    (&["floor-plans", "--plans", "1000000", "--runs", "1"], "# "),
-    (&["faults", "--runs", "4000000"], "# Effects"),
-    (&["find", CLASSROOM, "--runs", "1000000", "--seconds", "5"], ""),
-    (&["relocalize", "--runs", "1000000", "--seconds", "5"], ""),
     (&["plan", CLASSROOM, "--runs", "100000"], ""),
-    (&["health", "--runs", "1000000"], "# Reliability"),
-    (&["calibration", "--runs", "1000000", "--metres", "5"], ""),
-    (&["surveys", "room", "--runs", "1000000"], ""),
 ];
 
 /// Interrupts a command after this time.

@@ -225,7 +225,7 @@ fn a_pose_that_is_set_while_running_replays_to_the_bit() {
     for received in &received {
         recording.take(received).unwrap();
     }
-    assert_eq!(recording.logs(), 1);
+    assert_eq!(recording.end().unwrap(), 1);
     let text = fs::read_to_string(path).unwrap();
     assert_eq!(text.lines().filter(|line| line.starts_with("pose,")).count(), 2);
     let (trace, summary) = replay(text.as_bytes(), &scenario);
@@ -361,7 +361,7 @@ fn a_restart_begins_another_log() {
     for received in &received {
         recording.take(received).unwrap();
     }
-    assert_eq!(recording.logs(), 2);
+    assert_eq!(recording.end().unwrap(), 2);
     let began = 62_000_000;
     let (first, second): (Vec<_>, Vec<_>) = robot.estimates.iter().partition(|(at, _)| *at < began);
     assert!(first.len() > 100 && second.len() > 100);
@@ -387,7 +387,7 @@ fn a_restart_whose_first_frames_are_lost_begins_another_log() {
     for telemetry in nonzero {
         recording.take(&Received { lost: 0, telemetry }).unwrap();
     }
-    assert_eq!(recording.logs(), 2);
+    assert_eq!(recording.end().unwrap(), 2);
 }
 
 #[test]
@@ -401,7 +401,7 @@ fn a_monitor_that_connects_late_records_from_an_estimate() {
     for received in &received {
         recording.take(received).unwrap();
     }
-    assert_eq!(recording.logs(), 1);
+    assert_eq!(recording.end().unwrap(), 1);
     let log = fs::read(path).unwrap();
     assert!(String::from_utf8_lossy(&log).contains("# recorded from the middle of a run"));
     let (trace, _) = replay(&log, &scenario);

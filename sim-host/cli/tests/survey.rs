@@ -6,6 +6,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use sonarfix_map::MapFile;
+use sonarfix_studies::surveys::{self, Place};
 
 fn sonarfix(arguments: &[&str], folder: &Path) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_sonarfix"));
@@ -26,7 +27,7 @@ fn walls(file: &Path) -> Vec<[f64; 3]> {
 fn a_measured_wall_scales_the_map() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    assert!(sonarfix(&["surveys", "room", "--record", "drive"], folder).status.success());
+    surveys::record(Place::Room, 20_000, &folder.join("drive")).unwrap();
     let survey =
         |options: &[&str]| sonarfix(&[&["survey", "drive/log.csv"], options].concat(), folder);
     let output = survey(&["--out", "map.toml"]);

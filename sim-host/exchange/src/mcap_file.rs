@@ -167,9 +167,9 @@ impl<W: Write + Seek> File<W> {
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn end(mut self) -> anyhow::Result<()> {
+    pub fn end(mut self) -> anyhow::Result<W> {
         self.out.finish()?;
-        Ok(())
+        Ok(self.out.into_inner())
     }
 }
 

@@ -55,10 +55,9 @@ impl<W: Write + Send> File<W> {
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn end(mut self) -> anyhow::Result<()> {
+    pub fn end(mut self) -> anyhow::Result<W> {
         self.write_group()?;
-        self.out.close()?;
-        Ok(())
+        Ok(self.out.into_inner()?)
     }
 
     fn write_group(&mut self) -> anyhow::Result<()> {

@@ -1,6 +1,7 @@
 //! A robot: its telemetry as events, the commands of pages to it, and its recording.
 
 use std::collections::VecDeque;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::sync_channel;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
@@ -116,15 +117,15 @@ impl Robot {
         }
     }
 
-    /// Begins a recording.
-    pub fn record(&mut self, path: PathBuf) {
-        self.recording = Some((Recording::new(path.clone()), path));
+    /// Begins a recording, which replaces files only if `is_forced`.
+    pub fn record(&mut self, path: PathBuf, is_forced: bool) {
+        self.recording = Some((Recording::new(path.clone()).forced(is_forced), path));
     }
 
-    /// Ends a recording, if there is one; the first file of it, and how many there are.
-    pub fn end_recording(&mut self) -> Option<(PathBuf, u32)> {
+    /// Ends a recording, if there is one; the first file of it, and how many there are, or why the last one is not whole.
+    pub fn end_recording(&mut self) -> Option<(PathBuf, io::Result<u32>)> {
         let (recording, path) = self.recording.take()?;
-        Some((path, recording.logs()))
+        Some((path, recording.end()))
     }
 
     /// Publishes that the robot is gone, with the reason.
@@ -170,16 +171,19 @@ impl Robot {
             (Order::Record { on: true }, _) => {
                 let path = new_file();
                 let text = format!("recording {}", path.display());
-                self.record(path);
+                self.record(path, false);
                 Reply::done(&text)
             }
             (Order::Record { on: false }, _) => match self.end_recording() {
-                Some((path, 1..)) => {
+                Some((path, Ok(1..))) => {
                     let text = format!("recorded {}", path.display());
                     self.recorded.push(text.clone());
                     Reply::done(&text)
                 }
-                Some((_, 0)) => Reply::done("nothing was recorded: no estimate came"),
+                Some((path, Err(error))) => {
+                    Reply::refused(&format!("cannot write {}: {error}", path.display()))
+                }
+                Some((_, Ok(0))) => Reply::done("nothing was recorded: no estimate came"),
                 None => Reply::refused("nothing is recorded"),
             },
             _ => Reply::refused("a robot does not take this order now"),

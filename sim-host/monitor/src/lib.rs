@@ -7,6 +7,7 @@
 //! | [`view`] | the latest telemetry as text |
 //! | [`terminal`] | the latest telemetry on a terminal |
 //! | [`recording`] | telemetry as a log |
+//! | [`sealed`] | the file of a log, with checksums and an end |
 //! | [`conversation`] | the commands of a session, repeated until they are acknowledged |
 //! | [`request`] | one command |
 //! | [`wheels`] | the travel of the wheels |
@@ -18,6 +19,7 @@ pub mod hints;
 pub mod port;
 pub mod recording;
 pub mod request;
+pub mod sealed;
 pub mod signs;
 pub mod terminal;
 pub mod view;

@@ -3,8 +3,7 @@
 //! The log has all inputs of the localizer, so a replay reproduces its estimates bit for bit if no
 //! frame was lost. A log has one start; when the robot restarts, a new log begins.
 
-use std::fs::File;
-use std::io::{self, LineWriter, Write};
+use std::io::{self, ErrorKind, Write};
 use std::path::PathBuf;
 
 use sonarfix::config::RangerId;
@@ -19,13 +18,17 @@ use sonarfix_replay::log::HEADER;
 use sonarfix_search::navigator::{Mode, UNKNOWN_POSITION};
 
 use crate::Received;
+use crate::sealed::Sealed;
 
-/// Writes logs to files: the first to the given path, further ones with a number in the name.
+/// Writes logs to files: the first to the given path, further ones with a number in the name. Files that exist are kept.
 #[derive(Debug)]
 pub struct Recording {
     path: PathBuf,
+    is_forced: bool,
     written: u32,
-    log: Option<Log<LineWriter<File>>>,
+    /// In the name of the last file.
+    number: u32,
+    log: Option<Log<Sealed>>,
     /// The last odometry, for a log that begins during a run or when the pose is set before one began.
     step: Option<Odometry>,
 }
@@ -34,23 +37,38 @@ impl Recording {
     /// A recording to `path`, which is created when the robot starts or its first estimate arrives.
     #[must_use]
     pub fn new(path: PathBuf) -> Self {
-        Self { path, written: 0, log: None, step: None }
+        Self { path, is_forced: false, written: 0, number: 0, log: None, step: None }
     }
 
-    /// Number of logs begun.
+    /// Replaces files that exist.
     #[must_use]
-    pub fn logs(&self) -> u32 {
-        self.written
+    pub fn forced(self, is_forced: bool) -> Self {
+        Self { is_forced, ..self }
+    }
+
+    /// Ends the last log, whole; returns the number of logs.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn end(mut self) -> io::Result<u32> {
+        self.end_log()?;
+        Ok(self.written)
+    }
+
+    fn end_log(&mut self) -> io::Result<()> {
+        self.log.take().map_or(Ok(()), |log| log.out.end())
     }
 
     /// Records a message.
     ///
     /// # Errors
-    /// If a file cannot be written.
+    /// If a file cannot be written, or the first one exists.
     pub fn take(&mut self, received: &Received) -> io::Result<()> {
         if let Telemetry::Odometry(step) = &received.telemetry {
             // The robot has restarted, and the frame that reports it was lost.
-            self.log = self.log.take().filter(|log| step.at >= log.last);
+            if self.log.as_ref().is_some_and(|log| step.at < log.last) {
+                self.end_log()?;
+            }
             self.step = Some(*step);
         }
         match (&received.telemetry, &mut self.log) {
@@ -87,17 +105,32 @@ impl Recording {
         Ok(())
     }
 
-    fn next_file(&mut self) -> io::Result<LineWriter<File>> {
-        self.written += 1;
+    /// The file of the next log. A further log takes the next number that is free.
+    fn next_file(&mut self) -> io::Result<Sealed> {
+        self.end_log()?;
+        loop {
+            self.number += 1;
+            match Sealed::create(&self.numbered(), self.is_forced) {
+                Err(error) if error.kind() == ErrorKind::AlreadyExists && self.number > 1 => {}
+                created => {
+                    let file = created?;
+                    self.written += 1;
+                    return Ok(file);
+                }
+            }
+        }
+    }
+
+    fn numbered(&self) -> PathBuf {
         let mut path = self.path.clone();
-        if self.written > 1 {
+        if self.number > 1 {
             let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
-            path.set_file_name(format!("{stem}-{}", self.written));
+            path.set_file_name(format!("{stem}-{}", self.number));
             if let Some(extension) = self.path.extension() {
                 path.set_extension(extension);
             }
         }
-        Ok(LineWriter::new(File::create(path)?))
+        path
     }
 }
 

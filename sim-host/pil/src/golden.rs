@@ -28,7 +28,7 @@ pub fn write(path: &Path, words: &str, exchanges: &[Exchange]) -> anyhow::Result
         // Writing to a string does not fail.
         let _ = writeln!(text, "{} {}", hex(request), hex(answer));
     }
-    fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
+    sonarfix_files::write(path, text)
 }
 
 /// Reads a trace.

@@ -12,11 +12,16 @@
 //! | `heading_aid` | gyro or compass beside wheels and sonar |
 //! | [`preset`] | presets of common sonars and servos |
 //! | [`route`] | a path on the command line |
+//! | [`bare`] | the scenario of a map without a robot |
+//! | [`trial`], [`starts`] | starts without a pose: from where the search finds it, and after how many metres |
 
+pub mod bare;
 mod forecast;
 mod heading_aid;
 pub mod preset;
 pub mod route;
+pub mod starts;
+pub mod trial;
 
 pub use forecast::{BLIND_AFTER, Blind, Forecast, LegForecast, Sample, Spread};
 pub use heading_aid::HeadingAid;

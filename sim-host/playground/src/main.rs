@@ -39,7 +39,7 @@ fn write(program: &Path, page: &Path) -> anyhow::Result<()> {
         ("script", include_str!("playground.js")),
     ];
     let text = fill(include_str!("page.html"), &values.map(|(name, text)| (name, text.into())));
-    std::fs::write(page, text).with_context(|| page.display().to_string())
+    sonarfix_files::write(page, text)
 }
 
 /// The hashes of runs of `classroom` on this computer, in one line.

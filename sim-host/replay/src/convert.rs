@@ -9,10 +9,11 @@ mod robot_file;
 
 use std::fmt::Write as _;
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, BufWriter, Write};
+use std::io::{self, BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
 use flate2::bufread::MultiGzDecoder;
+use sonarfix_files::Output;
 use sonarfix_map::NamedWall;
 use sonarfix_sim::trace::Pose;
 
@@ -82,34 +83,58 @@ pub struct Converted {
     pub bridged: u64,
 }
 
-/// Opens a recording; a file whose name ends in `.gz` is unpacked.
+/// Most bytes that are unpacked of a recording.
+const MOST_UNPACKED: u64 = 256 << 20;
+
+/// Unpacks a recording up to [`MOST_UNPACKED`].
+struct Unpacked(io::Take<MultiGzDecoder<BufReader<File>>>);
+
+impl Read for Unpacked {
+    fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
+        let count = self.0.read(to)?;
+        if count == 0 && self.0.limit() == 0 && !to.is_empty() {
+            let reason = format!(
+                "it is unpacked to more than {} MiB: unpack it with gunzip, and convert that file",
+                MOST_UNPACKED >> 20
+            );
+            return Err(io::Error::new(io::ErrorKind::FileTooLarge, reason));
+        }
+        Ok(count)
+    }
+}
+
+/// Opens a recording; a file whose name ends in `.gz` is unpacked, up to 256 MiB.
 ///
 /// # Errors
 /// [`ConvertError::Read`].
 pub fn open(path: &Path) -> Result<Box<dyn BufRead>, ConvertError> {
     let file = BufReader::new(File::open(path).map_err(ConvertError::read(path))?);
     let packed = path.extension().is_some_and(|extension| extension == "gz");
-    Ok(if packed { Box::new(BufReader::new(MultiGzDecoder::new(file))) } else { Box::new(file) })
+    if !packed {
+        return Ok(Box::new(file));
+    }
+    let unpacked = MultiGzDecoder::new(file).take(MOST_UNPACKED);
+    Ok(Box::new(BufReader::new(Unpacked(unpacked))))
 }
 
 /// A file being written.
 struct Out {
     path: PathBuf,
-    file: BufWriter<File>,
+    file: Output,
 }
 
 impl Out {
     fn create(path: PathBuf) -> Result<Self, ConvertError> {
-        let file = File::create(&path).map_err(ConvertError::write(&path))?;
-        Ok(Self { path, file: BufWriter::new(file) })
+        let file = Output::create(&path).map_err(ConvertError::write(&path))?;
+        Ok(Self { path, file })
     }
 
     fn line(&mut self, line: impl std::fmt::Display) -> Result<(), ConvertError> {
         writeln!(self.file, "{line}").map_err(ConvertError::write(&self.path))
     }
 
-    fn close(mut self) -> Result<(), ConvertError> {
-        self.file.flush().map_err(ConvertError::write(&self.path))
+    fn close(self) -> Result<(), ConvertError> {
+        self.file.finish().map_err(ConvertError::write(&self.path))
     }
 }
 

@@ -146,7 +146,8 @@ impl<'a> Estimators<'a> {
     /// Passes the next encoder sample that failed, in a gap of the log up to a time; returns its time.
     pub fn miss(&mut self, gap: &Gap, until: i64) -> Option<i64> {
         let time = gap.next_failed(self.missed, until)?;
-        self.navigator.odometry_missing(Instant::from_ticks((time - self.epoch).unsigned_abs()));
+        let now = Instant::from_ticks((time - self.epoch).unsigned_abs());
+        self.navigator.localizer_mut().odometry_missing(now);
         self.missed = time;
         Some(time)
     }

@@ -30,7 +30,7 @@ mod estimators;
 pub mod fault;
 pub mod find;
 mod gap;
-mod lines;
+pub mod lines;
 pub mod log;
 mod median;
 mod reference;

@@ -2,10 +2,17 @@
 
 use std::io::{self, BufRead};
 
+use sonarfix_files::Checksum;
+
 use crate::log::Malformed;
 
 /// The longest line that is read: 1 MiB, a scan of a hundred thousand beams.
 pub const LONGEST: usize = 1 << 20;
+
+/// Begins the comment with the checksum of the lines since the one before it. A log with checksums has an [`END`].
+pub const CHECKSUM: &str = "# checksum ";
+/// The last line of a log with checksums.
+pub const END: &str = "# end";
 
 /// The most bytes that are skipped, of one line or of all lines that are not text. Beyond it the input is no log, and may
 /// have no end.
@@ -19,12 +26,23 @@ pub struct Lines<R> {
     line: Vec<u8>,
     /// Bytes of all lines that are no text, or too long.
     skipped: u64,
+    /// Of the lines since the last checksum.
+    sum: Checksum,
+    /// Whether an end must follow.
+    is_open: bool,
 }
 
 impl<R: BufRead> Lines<R> {
     /// Reads from the start of a file.
     pub fn of(reader: R) -> Self {
-        Self { reader, number: 0, line: Vec::new(), skipped: 0 }
+        Self {
+            reader,
+            number: 0,
+            line: Vec::new(),
+            skipped: 0,
+            sum: Checksum::default(),
+            is_open: false,
+        }
     }
 
     /// The number of the line read last, from 1.
@@ -36,21 +54,37 @@ impl<R: BufRead> Lines<R> {
     ///
     /// # Errors
     /// Errors of the reader; [`io::ErrorKind::FileTooLarge`] if more than 256 MiB are skipped. A line that is not text is no
-    /// error here: it is returned as [`Malformed`].
+    /// error here: it is returned as [`Malformed`], as are a wrong checksum and a missing end.
     #[expect(clippy::should_implement_trait, reason = "the line is lent until the next one")]
     pub fn next(&mut self) -> io::Result<Option<Result<&str, Malformed>>> {
         let Some(end) = self.read_line()? else {
-            return Ok(None);
+            let is_torn = std::mem::take(&mut self.is_open);
+            return Ok(is_torn.then_some(Err(Malformed::NoEnd)));
         };
         self.number += 1;
         if std::str::from_utf8(&self.line).is_err() {
             self.skip(self.line.len() as u64)?;
         }
+        let is_whole = self.check();
         Ok(Some(match end {
             End::Torn => Err(Malformed::Torn),
             End::TooLong => Err(Malformed::TooLong),
+            End::Newline if !is_whole => Err(Malformed::Changed),
             End::Newline => std::str::from_utf8(&self.line).map_err(|_| Malformed::NotText),
         }))
+    }
+
+    /// Adds the line to the checksum of its block; false if it is the checksum of other lines.
+    fn check(&mut self) -> bool {
+        let line = self.line.as_slice();
+        if let Some(sum) = line.strip_prefix(CHECKSUM.as_bytes()) {
+            self.is_open = true;
+            return sum == std::mem::take(&mut self.sum).to_string().as_bytes();
+        }
+        self.is_open &= line != END.as_bytes();
+        self.sum.add(line);
+        self.sum.add(b"\n");
+        true
     }
 
     /// Counts skipped bytes.
@@ -130,6 +164,21 @@ mod tests {
             ];
             assert_eq!(lines, expected);
         }
+    }
+
+    /// A log with checksums is whole only with its end, and unchanged.
+    #[test]
+    fn a_torn_log_is_found() {
+        let block = |text: &str| format!("{text}{CHECKSUM}{}\n", Checksum::of(text));
+        let log = block("one\ntwo\n") + &block("three\n") + END + "\n";
+        let found = |text: &str| all(text.as_bytes(), 7).into_iter().filter_map(Result::err);
+        assert_eq!(found(&log).count(), 0);
+        for end in 1..log.len() {
+            let is_open = log[..end].contains(CHECKSUM);
+            assert!(found(&log[..end]).count() > 0 || !is_open || end == log.len() - 1, "{end}");
+        }
+        assert!(found(&log.replace("two", "too")).eq([Malformed::Changed]));
+        assert!(found(&log.replace("three\n", "")).eq([Malformed::Changed]));
     }
 
     #[test]

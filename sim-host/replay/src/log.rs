@@ -129,6 +129,12 @@ pub enum Malformed {
     /// The file ends inside the line.
     #[error("the line is truncated: the file ends before its newline")]
     Torn,
+    /// It is a checksum of other lines than those before it.
+    #[error("lines before it are torn or changed: their checksum is another")]
+    Changed,
+    /// The file ends before the end of the recording.
+    #[error("the end of the recording is missing: it is torn")]
+    NoEnd,
     /// It is longer than [`LONGEST`](crate::lines::LONGEST).
     #[error("the line is longer than 1 MiB")]
     TooLong,

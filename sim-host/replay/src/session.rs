@@ -594,7 +594,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         let aim = match aim {
             Ok(aim) => aim,
             Err(no_aim) => {
-                navigator.skip();
+                navigator.localizer_mut().skip();
                 let now = navigator.localizer().health().verdict;
                 self.tally.verdicts.note(measurement.time, before, now);
                 self.tally.fixes.refused += 1;

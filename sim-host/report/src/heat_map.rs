@@ -6,6 +6,8 @@
 use std::fmt::Write as _;
 use std::ops::Range;
 
+use sonarfix_map::{Outline, Scenario};
+
 use super::axis::Axis;
 use super::escape::escape;
 use super::palette::{Role, hex};
@@ -101,6 +103,30 @@ impl Place {
 }
 
 impl HeatMap {
+    /// The map of a scenario, with an empty path.
+    #[must_use]
+    pub fn of(scenario: &Scenario) -> Self {
+        let unmapped =
+            scenario.surroundings.obstacles.iter().map(|obstacle| match obstacle.outline {
+                Outline::Circle { centre, radius } => Unmapped::Round(centre, radius),
+                Outline::Face { from, to } => Unmapped::Face(from, to),
+            });
+        let plan = scenario.path.plan();
+        let corners = std::iter::once(&plan.start).chain(&plan.corners);
+        Self {
+            title: scenario.name.clone(),
+            walls: scenario
+                .floor
+                .named_walls()
+                .iter()
+                .map(|wall| [wall.from(), wall.to()])
+                .collect(),
+            unmapped: unmapped.collect(),
+            path: corners.map(|&at| Heat { at, value: 0.0, marked: false }).collect(),
+            ..Self::default()
+        }
+    }
+
     /// The least and the greatest finite value of the path.
     #[must_use]
     pub fn values(&self) -> Option<Range<f64>> {

@@ -9,7 +9,7 @@
 //! | module | what |
 //! |---|---|
 //! | `figures` | the content of each figure; `figures.js`: values, zoom and pan
-//! | `called_lost` | the figure of `sonarfix health` |
+//! | `called_lost` | the figure of `sonarfix-studies health` |
 //! | `chart`, `axis`, `points` | drawing of a figure |
 //! | [`heat_map`] | a map with a quantity along a path |
 //! | `moment.js`, `drawing.js` | the drawing of a run, shared with the live page and the playground; the report's player is `player.js` |
@@ -36,9 +36,11 @@ mod table;
 
 use std::borrow::Cow;
 use std::error::Error;
+use std::fs;
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
-use std::{fs, io};
 
+use sonarfix_files::Output;
 use sonarfix_sim::spread::Spread;
 use sonarfix_sim::trace::Trace;
 use thiserror::Error;
@@ -174,7 +176,11 @@ pub fn style() -> String {
 }
 
 fn write(path: PathBuf, text: &str) -> Result<PathBuf, ReportError> {
-    match fs::write(&path, text) {
+    let written = Output::create(&path).and_then(|mut out| {
+        out.write_all(text.as_bytes())?;
+        out.finish()
+    });
+    match written {
         Ok(()) => Ok(path),
         Err(source) => Err(ReportError::Write { path, source }),
     }

@@ -12,6 +12,7 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::reader::{FileReader, RowGroupReader, SerializedFileReader};
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::{Type, TypePtr};
+use sonarfix_files::Output;
 use sonarfix_sim::row::{COUNTS, REALS, Row};
 
 use crate::plan::{Plan, Rows};
@@ -44,8 +45,8 @@ pub fn write(
     let metadata = KeyValue::new(KEY.to_owned(), plan.line());
     let properties =
         WriterProperties::builder().set_key_value_metadata(Some(vec![metadata])).build();
-    let mut writer =
-        SerializedFileWriter::new(File::create(file)?, schema()?, Arc::new(properties))?;
+    let out = Output::create(file)?;
+    let mut writer = SerializedFileWriter::new(out, schema()?, Arc::new(properties))?;
     let mut rows = rows.peekable();
     while rows.peek().is_some() {
         let group: Vec<Row> = rows.by_ref().take(GROUP).collect::<anyhow::Result<_>>()?;
@@ -53,12 +54,11 @@ pub fn write(
         write_group(&mut columns, &group)?;
         columns.close()?;
     }
-    writer.close()?;
-    Ok(())
+    Ok(writer.into_inner()?.finish()?)
 }
 
 fn write_group(
-    columns: &mut SerializedRowGroupWriter<'_, File>,
+    columns: &mut SerializedRowGroupWriter<'_, Output>,
     rows: &[Row],
 ) -> anyhow::Result<()> {
     let counts = (0..COUNTS.len()).map(|of| column(rows, |row| row.counts.get(of).copied()));

@@ -1,12 +1,14 @@
 //! Rows as CSV: the plan in a comment, the names of the columns, a line per run. Numbers are written with the digits that
-//! identify them, so that they are read back to the bit.
+//! identify them, so that they are read back to the bit. The last cell of a line is the checksum of the cells before it, so
+//! that a line which is torn is not taken for a whole one.
 
 use std::fmt::Write as _;
 use std::fs::File;
-use std::io::{BufRead, BufReader, BufWriter, Read as _, Write};
+use std::io::{BufRead, BufReader, Read as _, Write};
 use std::path::Path;
 
 use anyhow::{Context, ensure};
+use sonarfix_files::{Checksum, Output};
 use sonarfix_sim::row::{COUNTS, REALS, Row};
 
 use crate::plan::{Plan, Rows};
@@ -14,8 +16,8 @@ use crate::plan::{Plan, Rows};
 /// The names of the columns.
 #[must_use]
 pub fn names() -> String {
-    let names: Vec<&str> = std::iter::once("seed").chain(COUNTS).chain(REALS).collect();
-    names.join(",")
+    let names = std::iter::once("seed").chain(COUNTS).chain(REALS).chain(["checksum"]);
+    names.collect::<Vec<_>>().join(",")
 }
 
 /// The line of a row, with its end.
@@ -29,16 +31,21 @@ pub fn line(row: &Row) -> String {
     for real in row.reals {
         let _ = write!(line, ",{real:?}");
     }
-    line.push('\n');
+    let sum = Checksum::of(&line);
+    let _ = writeln!(line, ",{sum}");
     line
 }
 
-/// Reads a line without its end.
+/// Reads a line with its end.
 ///
 /// # Errors
-/// If it is not a row.
+/// If it is not a whole row.
 pub fn parse(line: &str) -> anyhow::Result<Row> {
-    let mut cells = line.split(',');
+    let line = line.strip_suffix('\n').context("it is torn: the line has no end")?;
+    let (cells, sum) = line.rsplit_once(',').context("the line is too short")?;
+    let is_whole = sum == Checksum::of(cells).to_string();
+    ensure!(is_whole, "it is torn or changed: its checksum is another");
+    let mut cells = cells.split(',');
     let mut cell = || cells.next().context("the line is too short");
     let seed = cell()?.parse().context("seed")?;
     let (mut counts, mut reals) = ([0; COUNTS.len()], [0.0; REALS.len()]);
@@ -72,14 +79,13 @@ pub fn read_line(reader: &mut impl BufRead) -> anyhow::Result<String> {
 /// If the file cannot be read or is no file of rows.
 pub fn open(file: &Path) -> anyhow::Result<(Plan, Rows)> {
     let mut reader = BufReader::new(File::open(file)?);
-    let mut lines = std::iter::from_fn(move || {
+    let plan = Plan::parse(read_line(&mut reader)?.trim_end())?;
+    let columns = read_line(&mut reader)?;
+    ensure!(columns.trim_end() == names(), "the columns are those of another version");
+    let lines = std::iter::from_fn(move || {
         let line = read_line(&mut reader);
-        let whole = |line: String| line.strip_suffix('\n').unwrap_or(&line).to_owned();
-        line.map(|line| (!line.is_empty()).then(|| whole(line))).transpose()
+        line.map(|line| (!line.is_empty()).then_some(line)).transpose()
     });
-    let mut line = || lines.next().context("the file ends too early");
-    let plan = Plan::parse(&line()??)?;
-    ensure!(line()?? == names(), "the columns are those of another version");
     let rows = lines.enumerate().map(move |(run, line)| {
         let run = u32::try_from(run)?;
         let row = parse(&line?).with_context(|| format!("row {}", u64::from(run) + 1))?;
@@ -98,10 +104,10 @@ pub fn write(
     plan: &Plan,
     rows: impl Iterator<Item = anyhow::Result<Row>>,
 ) -> anyhow::Result<()> {
-    let mut out = BufWriter::new(File::create(file)?);
+    let mut out = Output::create(file)?;
     writeln!(out, "{}\n{}", plan.line(), names())?;
     for row in rows {
         out.write_all(line(&row?).as_bytes())?;
     }
-    Ok(out.flush()?)
+    Ok(out.finish()?)
 }

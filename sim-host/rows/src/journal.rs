@@ -1,7 +1,7 @@
 //! A CSV of rows that grows as runs finish. After the end of the process, whatever its cause, it is resumed.
 
 use std::fs::{File, OpenOptions};
-use std::io::{BufReader, Seek, SeekFrom, Write};
+use std::io::{BufRead, BufReader, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use anyhow::{Context, ensure};
@@ -19,10 +19,10 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Opens the file of a plan, or creates it. A line without an end is removed: its run is computed again.
+    /// Opens the file of a plan, or creates it. A last line that is torn is removed: its run is computed again.
     ///
     /// # Errors
-    /// If the file cannot be read or written, or is that of another plan.
+    /// If the file cannot be read or written, is that of another plan, or another program writes it.
     pub fn open(path: &Path, plan: &Plan) -> anyhow::Result<Self> {
         Self::opened(path, plan).with_context(|| format!("the rows {}", path.display()))
     }
@@ -30,6 +30,7 @@ impl Journal {
     fn opened(path: &Path, plan: &Plan) -> anyhow::Result<Self> {
         let mut file =
             OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path)?;
+        sonarfix_files::lock(&file)?;
         let head = format!("{}\n{}\n", plan.line(), csv::names());
         let (done, length) = finished(&file, plan, &head)?;
         file.set_len(length)?;
@@ -58,7 +59,7 @@ impl Journal {
         self.plan.seed_of(self.done)
     }
 
-    /// Appends the next rows.
+    /// Appends the next rows, and waits until they are on the disk.
     ///
     /// # Errors
     /// If the file cannot be written, or a row is not the next one.
@@ -69,7 +70,10 @@ impl Journal {
             text.push_str(&csv::line(row));
             self.done += 1;
         }
-        Ok(self.file.write_all(text.as_bytes())?)
+        self.file.write_all(text.as_bytes())?;
+        // A device has nothing to wait for.
+        let _ = self.file.sync_data();
+        Ok(())
     }
 }
 
@@ -88,10 +92,12 @@ fn finished(file: &File, plan: &Plan, head: &str) -> anyhow::Result<(u32, u64)> 
     let (mut done, mut length) = (0, head.len() as u64);
     loop {
         let line = csv::read_line(&mut lines)?;
-        let Some(row) = line.strip_suffix('\n') else {
-            return Ok((done, length));
+        let row = match csv::parse(&line) {
+            Ok(row) => row,
+            // The last line, which a loss of power may also leave with its end.
+            Err(_) if lines.fill_buf()?.is_empty() => return Ok((done, length)),
+            Err(error) => return Err(error.context(format!("row {}", u64::from(done) + 1))),
         };
-        let row = csv::parse(row).with_context(|| format!("row {}", u64::from(done) + 1))?;
         let is_next = row.seed == plan.seed_of(done) && done < plan.part().1;
         ensure!(is_next, "row {} has another seed", u64::from(done) + 1);
         done += 1;

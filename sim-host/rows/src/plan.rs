@@ -4,6 +4,7 @@ use std::fmt::{self, Write};
 use std::str::FromStr;
 
 use anyhow::{Context, bail, ensure};
+use sonarfix_files::Checksum;
 use sonarfix_map::Scenario;
 use sonarfix_sim::row::Row;
 
@@ -60,7 +61,7 @@ pub struct Plan {
 }
 
 /// The start of the first line of a file.
-const MAGIC: &str = "# sonarfix rows, format 1";
+const MAGIC: &str = "# sonarfix rows, format 2";
 
 impl Plan {
     /// The plan of a shard of a scenario's runs.
@@ -124,7 +125,7 @@ impl Plan {
 
 /// Everything that the runs depend on besides their seeds; not the number of runs that the scenario suggests.
 fn checksum(scenario: &Scenario) -> u64 {
-    let mut sum = Fnv(0xcbf2_9ce4_8422_2325);
+    let mut sum = Checksum::default();
     let Scenario { fidelity, floor, robot, path, follow, start, truth, .. } = scenario;
     let Scenario { upsets, hardware, surroundings, faults, .. } = scenario;
     let version = env!("CARGO_PKG_VERSION");
@@ -135,16 +136,4 @@ fn checksum(scenario: &Scenario) -> u64 {
     // The sum takes every text; a number is written with all of its digits.
     let _ = write!(sum, "{all:?}");
     sum.0
-}
-
-/// The FNV-1a hash of a text.
-struct Fnv(u64);
-
-impl Write for Fnv {
-    fn write_str(&mut self, text: &str) -> fmt::Result {
-        for byte in text.bytes() {
-            self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
-        }
-        Ok(())
-    }
 }

@@ -1,4 +1,4 @@
-//! Studies that are pages of the documentation.
+//! Studies that are pages of the documentation, and the command `sonarfix-studies` that runs them.
 //!
 //! | module | page |
 //! |---|---|
@@ -18,8 +18,8 @@ pub mod health_page;
 pub mod kidnapped;
 pub mod reality;
 pub mod relocalization;
+pub mod rooms;
 pub mod search_study;
 pub mod sonar_model;
-pub mod starts;
 pub mod surveys;
 mod sweeping_robot;

@@ -332,7 +332,7 @@ fn percentile_95(mut values: Vec<f64>) -> f64 {
 mod tests {
     use super::*;
 
-    /// The short form of `sonarfix relocalize --slipped`; docs/schedule.md has more trials.
+    /// The short form of `sonarfix-studies relocalize --slipped`; docs/schedule.md has more trials.
     #[test]
     fn a_slip_is_corrected_or_leads_to_a_search() {
         let trials = |degrees: f64| {

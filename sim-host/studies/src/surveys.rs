@@ -12,6 +12,7 @@ use sonarfix::geometry::units::Metres;
 use sonarfix::map::Wall;
 use sonarfix_batch::log;
 use sonarfix_batch::recording::Recording;
+use sonarfix_files::Output;
 use sonarfix_map::{CLASSROOM, FileError, Follow, Scenario};
 use sonarfix_sim::progress::Progress;
 use sonarfix_sim::simulate::{Simulation, SimulationError};
@@ -205,12 +206,19 @@ fn localized(place: Place, seed: u64, map: &Survey) -> Result<(f64, bool), Surve
 pub fn record(place: Place, seed: u64, folder: &Path) -> Result<(), SurveyStudyError> {
     let (driven, simulation) = driven(place, seed)?;
     std::fs::create_dir_all(folder)?;
-    let robot = sonarfix_map::robot_text(&simulation.scenario.robot);
-    std::fs::write(folder.join("robot.toml"), robot)?;
-    std::fs::write(folder.join("true-map.toml"), simulation.scenario.floor.to_toml())?;
-    let mut file = std::io::BufWriter::new(std::fs::File::create(folder.join("log.csv"))?);
-    write_log(&mut file, &driven.recording)?;
-    Ok(file.flush()?)
+    let mut log = Vec::new();
+    write_log(&mut log, &driven.recording)?;
+    let Scenario { robot, floor, .. } = &simulation.scenario;
+    for (name, bytes) in [
+        ("robot.toml", sonarfix_map::robot_text(robot).into_bytes()),
+        ("true-map.toml", floor.to_toml().into_bytes()),
+        ("log.csv", log),
+    ] {
+        let mut file = Output::create(&folder.join(name))?;
+        file.write_all(&bytes)?;
+        file.finish()?;
+    }
+    Ok(())
 }
 
 /// Writes a recording as a log.

@@ -5,7 +5,7 @@
 
 use embedded_storage::nor_flash::NorFlash;
 use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
-use sonarfix::localizer::{Localizer, Start, StartError};
+use sonarfix::localizer::{Localizer, Mode, Start, StartError};
 use sonarfix::map::Map;
 use sonarfix::map::image::checksum as crc32;
 use sonarfix::sensor::absolute::AbsoluteMeasurement;
@@ -15,12 +15,11 @@ use sonarfix_hal::robot::{Hardware, Report, Robot, Settings, Tick};
 use sonarfix_link::message::{CommandError, CommandResult};
 use sonarfix_link::reporter;
 use sonarfix_link::{Command, Frame, Reporter, SessionCommand, Telemetry, baked};
-use sonarfix_search::navigator;
 
-use super::{App, Link, Mode, Polled, Running, SavePolicy};
+use super::{App, Link, Poll, Running, State};
 use crate::check::Check;
 use crate::flash_contents;
-use crate::store::{MAX_HEADING_DEVIATION, MAX_POSITION_DEVIATION, Resumed, Saved};
+use crate::store::{MAX_HEADING_DEVIATION, MAX_POSITION_DEVIATION, Resumed, SavePolicy, Saved};
 
 /// What follows a command that was executed. The loop begins in [`App::answer`], after the stack frame of the command
 /// has been released.
@@ -44,20 +43,17 @@ impl<'m, F: NorFlash> App<'m, F> {
     #[inline(never)]
     pub(super) fn answer(
         &mut self,
-        now: Instant,
+        poll: &mut Poll<impl Hardware, impl Link>,
         frame: &Frame<SessionCommand>,
-        hardware: &mut impl Hardware,
-        link: &mut impl Link,
-        polled: &mut Polled,
     ) {
         let mut began = None;
         let mut session = self.wire.session;
-        let answer = session.answer(frame, self.next_session(now), |command| {
-            let next = self.act(now, command, hardware, link, polled);
+        let answer = session.answer(frame, self.next_session(poll.now), |command| {
+            let next = self.act(poll, command);
             let message = next.and_then(|next| match next {
                 Next::Nothing => Ok(None),
                 Next::Report(message) => Ok(Some(message)),
-                Next::Begin(known) => self.begin(now, &known).map(Some),
+                Next::Begin(known) => self.begin(poll.now, &known).map(Some),
             });
             match message {
                 Ok(message) => began = message,
@@ -70,11 +66,11 @@ impl<'m, F: NorFlash> App<'m, F> {
         });
         self.wire.session = session;
         if let Telemetry::Ack(ack) = answer {
-            polled.answered = Some(ack.result);
+            poll.polled.answered = Some(ack.result);
         }
-        self.wire.send(&answer, link);
+        self.wire.send(&answer, poll.link);
         if let Some(began) = began {
-            self.wire.send(&began, link);
+            self.wire.send(&began, poll.link);
         }
     }
 
@@ -90,24 +86,20 @@ impl<'m, F: NorFlash> App<'m, F> {
     /// the stack frame of each would be part of every other one's.
     fn act(
         &mut self,
-        now: Instant,
+        poll: &mut Poll<impl Hardware, impl Link>,
         command: &Command,
-        hardware: &mut impl Hardware,
-        link: &mut impl Link,
-        polled: &mut Polled,
     ) -> Result<Next, CommandError> {
+        let now = poll.now;
         match *command {
-            Command::SetPose(ref start) => self.set_pose(now, start, hardware, link, polled),
-            Command::SetConfiguration(ref config) => {
-                self.set_configuration(now, config, hardware, polled)
-            }
-            Command::Start => self.start(now, polled),
+            Command::SetPose(ref start) => self.set_pose(poll, start),
+            Command::SetConfiguration(ref config) => self.set_configuration(poll, config),
+            Command::Start => self.start(poll),
             Command::Stop => {
                 self.stop(now);
                 Ok(Next::Nothing)
             }
-            Command::ResetCalibration => self.reset_calibration(now, polled),
-            Command::Search => self.begin_search(now, polled),
+            Command::ResetCalibration => self.reset_calibration(poll),
+            Command::Search => self.begin_search(poll),
             Command::ShowDevices => self.show_devices(now, None),
             Command::Point(bearing) => self.show_devices(now, Some(bearing)),
             Command::Absolute { age, ref measurement } => {
@@ -161,12 +153,10 @@ impl<'m, F: NorFlash> App<'m, F> {
     #[inline(never)]
     fn set_pose(
         &mut self,
-        now: Instant,
+        poll: &mut Poll<impl Hardware, impl Link>,
         start: &Start,
-        hardware: &mut impl Hardware,
-        link: &mut impl Link,
-        polled: &mut Polled,
     ) -> Result<Next, CommandError> {
+        let now = poll.now;
         let Start { position_deviation: Metres(position), heading_deviation, .. } = *start;
         // Neither comparison holds for NaN.
         let is_known = (0.0..=MAX_POSITION_DEVIATION).contains(&position)
@@ -176,17 +166,18 @@ impl<'m, F: NorFlash> App<'m, F> {
         }
         let known = self.known_now().ok_or(CommandError::NoConfiguration)?.at(start);
         self.check_start(now, &known)?;
-        let Mode::Running(running) = &mut self.mode else {
-            return self.replace(now, known, polled).map(|()| Next::Nothing);
+        let State::Running(running) = &mut self.state else {
+            return self.replace(poll, known).map(|()| Next::Nothing);
         };
-        let step = running.robot.set_pose(now, start, hardware).map_err(|_| CommandError::Pose)?;
+        let step =
+            running.robot.set_pose(now, start, poll.hardware).map_err(|_| CommandError::Pose)?;
         running.origin = running.origin.at(start);
         if step.is_some() {
             let lateness = Duration::from_ticks(0);
             let tick = Tick { step, lateness, held: false, skipped: 0 };
             let report = Report { tick: Some(tick), ..Report::default() };
             let localizer = running.robot.localizer();
-            running.reporter.report(&report, localizer, &mut self.wire.outlet(link));
+            running.reporter.report(&report, localizer, &mut self.wire.outlet(poll.link));
         }
         Ok(Next::Report(running.reporter.pose_set(running.robot.localizer())))
     }
@@ -194,21 +185,20 @@ impl<'m, F: NorFlash> App<'m, F> {
     #[inline(never)]
     fn set_configuration(
         &mut self,
-        now: Instant,
+        poll: &mut Poll<impl Hardware, impl Link>,
         config: &RobotConfig,
-        hardware: &mut impl Hardware,
-        polled: &mut Polled,
     ) -> Result<Next, CommandError> {
+        let now = poll.now;
         let afresh = Resumed::afresh(&config.localizer);
         let known = self.known_now().map_or(afresh, |known| known.calibrated_as(&afresh));
         let known = self.where_it_is(known);
         self.check_start_with(now, config, &known)?;
-        configure(hardware, config)?;
+        configure(poll.hardware, config)?;
         self.owes_config = self.ignores_store() || !self.store.limit().take(now, 1);
         if !self.owes_config {
             let written = self.store.save_replacement(self.baked(), config);
             self.owes_config = written.is_err();
-            polled.saved = Some(written);
+            poll.polled.saved = Some(written);
         }
         self.use_config(config);
         self.owes_record = true;
@@ -229,17 +219,16 @@ impl<'m, F: NorFlash> App<'m, F> {
     #[inline(never)]
     fn reset_calibration(
         &mut self,
-        now: Instant,
-        polled: &mut Polled,
+        poll: &mut Poll<impl Hardware, impl Link>,
     ) -> Result<Next, CommandError> {
         let (config, _) = self.config.ok_or(CommandError::NoConfiguration)?;
         let known = self.known_now().ok_or(CommandError::NoConfiguration)?;
         let known = known.calibrated_as(&Resumed::afresh(&config.localizer));
         if !self.is_running() {
-            return self.replace(now, known, polled).map(|()| Next::Nothing);
+            return self.replace(poll, known).map(|()| Next::Nothing);
         }
         let known = self.where_it_is(known);
-        self.check_start(now, &known)?;
+        self.check_start(poll.now, &known)?;
         self.owes_record = true;
         Ok(Next::Begin(known))
     }
@@ -250,12 +239,12 @@ impl<'m, F: NorFlash> App<'m, F> {
         let filter = localizer.filter();
         let here = Resumed::interrupted(filter.state(), filter.standard_deviations());
         let here = Resumed { is_pose_interrupted: false, ..here.calibrated_as(&known) };
-        let has_pose = self.navigation_mode() != Some(navigator::Mode::Searching);
+        let has_pose = self.navigation_mode() != Some(Mode::Searching);
         if has_pose { here } else { here.without_pose() }
     }
 
     #[inline(never)]
-    fn start(&mut self, now: Instant, polled: &mut Polled) -> Result<Next, CommandError> {
+    fn start(&mut self, poll: &mut Poll<impl Hardware, impl Link>) -> Result<Next, CommandError> {
         if self.is_running() {
             return Ok(Next::Nothing);
         }
@@ -268,8 +257,8 @@ impl<'m, F: NorFlash> App<'m, F> {
         if !known.has_pose && !searches {
             return Err(CommandError::NoPose);
         }
-        self.check_start(now, &known)?;
-        let known = self.without_parked_record(now, known, polled);
+        self.check_start(poll.now, &known)?;
+        let known = self.without_parked_record(poll, known);
         if !known.has_pose && !searches {
             return Err(CommandError::NoPose);
         }
@@ -281,31 +270,33 @@ impl<'m, F: NorFlash> App<'m, F> {
     #[inline(never)]
     fn without_parked_record(
         &mut self,
-        now: Instant,
+        poll: &mut Poll<impl Hardware, impl Link>,
         known: Resumed,
-        polled: &mut Polled,
     ) -> Resumed {
         if self.stored.is_none_or(|stored| !stored.is_parked) {
             return known;
         }
-        self.store.limit().take(now, 0);
-        let saved = self.record_of(now, &known, false);
-        let is_replaced = self.replace_stored(&saved, polled);
+        self.store.limit().take(poll.now, 0);
+        let saved = self.record_of(poll.now, &known, false);
+        let is_replaced = self.replace_stored(poll, &saved);
         if is_replaced || !known.is_pose_stored { known } else { known.without_pose() }
     }
 
     /// Declares the pose unknown. The search begins at once, or when the loop is started.
     #[inline(never)]
-    fn begin_search(&mut self, now: Instant, polled: &mut Polled) -> Result<Next, CommandError> {
+    fn begin_search(
+        &mut self,
+        poll: &mut Poll<impl Hardware, impl Link>,
+    ) -> Result<Next, CommandError> {
         let (config, _) = self.config.as_ref().ok_or(CommandError::NoConfiguration)?;
         if !config.start.is_unknown() {
             return Err(CommandError::NoSearch);
         }
         let known = self.known_now().ok_or(CommandError::NoConfiguration)?.without_pose();
-        let Mode::Running(running) = &mut self.mode else {
-            return self.replace(now, known, polled).map(|()| Next::Nothing);
+        let State::Running(running) = &mut self.state else {
+            return self.replace(poll, known).map(|()| Next::Nothing);
         };
-        running.robot.search(now, &mut self.search);
+        self.search.begin(poll.now, &mut running.robot);
         let (mode, localizer) = (running.robot.mode(), running.robot.localizer());
         Ok(Next::Report(reporter::mode_changed(mode, localizer)))
     }
@@ -319,7 +310,7 @@ impl<'m, F: NorFlash> App<'m, F> {
         at: Instant,
         measurement: &AbsoluteMeasurement,
     ) -> Result<(), CommandError> {
-        let Mode::Running(running) = &mut self.mode else { return Err(CommandError::Waiting) };
+        let State::Running(running) = &mut self.state else { return Err(CommandError::Waiting) };
         running.robot.absolute(at, measurement).map_err(|_| CommandError::Occupied)
     }
 
@@ -329,7 +320,7 @@ impl<'m, F: NorFlash> App<'m, F> {
         now: Instant,
         bearing: Option<Radians>,
     ) -> Result<Next, CommandError> {
-        let Mode::Waiting(check) = &mut self.mode else { return Err(CommandError::Running) };
+        let State::Waiting(check) = &mut self.state else { return Err(CommandError::Running) };
         if let Some(bearing) = bearing {
             let (config, _) = self.config.as_ref().ok_or(CommandError::NoConfiguration)?;
             let (rightmost, leftmost) = config.localizer.sonar.servo;
@@ -347,7 +338,7 @@ impl<'m, F: NorFlash> App<'m, F> {
         }
         self.known = self.known_now();
         self.faults = self.faults();
-        self.mode = Mode::Waiting(Check::new(now));
+        self.state = State::Waiting(Check::new(now));
         self.owes_record = true;
     }
 
@@ -356,10 +347,10 @@ impl<'m, F: NorFlash> App<'m, F> {
     #[inline(never)]
     fn replace(
         &mut self,
-        now: Instant,
+        poll: &mut Poll<impl Hardware, impl Link>,
         known: Resumed,
-        polled: &mut Polled,
     ) -> Result<(), CommandError> {
+        let now = poll.now;
         self.check_start(now, &known)?;
         let mut is_owed = true;
         if self.stored.is_some_and(|stored| stored.is_parked) {
@@ -368,7 +359,7 @@ impl<'m, F: NorFlash> App<'m, F> {
                 self.store.limit().take(now, 0);
             }
             let saved = self.record_of(now, &known, known.has_pose && !is_owed);
-            is_owed |= !self.replace_stored(&saved, polled);
+            is_owed |= !self.replace_stored(poll, &saved);
         }
         self.known = Some(known);
         self.owes_record = is_owed;
@@ -376,10 +367,10 @@ impl<'m, F: NorFlash> App<'m, F> {
     }
 
     /// Writes a record over one that does not hold any more; returns whether it was written.
-    fn replace_stored(&mut self, saved: &Saved, polled: &mut Polled) -> bool {
+    fn replace_stored(&mut self, poll: &mut Poll<impl Hardware, impl Link>, saved: &Saved) -> bool {
         let owed = self.owes_record;
         let written = self.write(saved);
-        polled.saved = Some(written);
+        poll.polled.saved = Some(written);
         self.owes_record = owed;
         written.is_ok()
     }
@@ -398,12 +389,12 @@ impl<'m, F: NorFlash> App<'m, F> {
         } else {
             self.start_loop(now, startable, origin, reporter)?;
         }
-        if let Mode::Running(running) = &mut self.mode {
+        if let State::Running(running) = &mut self.state {
             running.reporter = reporter;
             running.origin = *origin;
             running.searches = start.is_unknown();
             if !origin.has_pose {
-                running.robot.search_in(now, start.region(), &mut self.search);
+                self.search.begin_in(now, start.region(), &mut running.robot);
             }
         }
         Ok(began)
@@ -412,7 +403,7 @@ impl<'m, F: NorFlash> App<'m, F> {
     #[inline(never)]
     fn restart_loop(&mut self, startable: Startable<'m>) -> Result<(), CommandError> {
         let Startable { localizer, wheels, settings } = startable;
-        let Mode::Running(running) = &mut self.mode else { return Ok(()) };
+        let State::Running(running) = &mut self.state else { return Ok(()) };
         running.robot.restart(localizer, wheels, settings).map_err(|_| CommandError::Configuration)
     }
 
@@ -430,7 +421,7 @@ impl<'m, F: NorFlash> App<'m, F> {
         let robot = Robot::new(localizer, wheels, settings);
         let robot = robot.map_err(|_| CommandError::Configuration)?;
         self.faults = self.faults();
-        self.mode = Mode::Running(Running {
+        self.state = State::Running(Running {
             robot,
             reporter,
             save_policy: SavePolicy::new(now, written),

@@ -22,8 +22,7 @@
 use sonarfix::config::Config;
 use sonarfix::filter::ekf::{StandardDeviations, StateEstimate};
 use sonarfix::geometry::units::{Metres, Radians};
-use sonarfix::localizer::Start;
-use sonarfix_search::navigator::{UNKNOWN_HEADING, UNKNOWN_POSITION};
+use sonarfix::localizer::{Start, UNKNOWN_HEADING, UNKNOWN_POSITION};
 
 use super::Saved;
 

@@ -7,7 +7,8 @@ use sonarfix::filter::motion::WheelTravel;
 use sonarfix::geometry::units::Instant;
 use sonarfix::sensor::gyro::TurnReading;
 
-use super::{EncoderFaults, Faults, Hardware};
+use super::poll::Poll;
+use super::{EncoderFaults, Hardware};
 use crate::encoder::{Counter, Unwrapped, Wheels};
 use crate::time::since;
 
@@ -28,21 +29,18 @@ pub(super) struct Reading {
 }
 
 impl Reading {
-    /// The gyro at a time between this reading and a later one.
-    pub fn turn_between(&self, later: &Self, at: Instant) -> Option<TurnReading> {
-        Some(self.turn?.between(&later.turn?, at))
-    }
-
-    /// The position at a time between this reading and a later one at constant speed, rounded to half an edge.
+    /// The reading at a time between this one and a later one at constant speed, rounded to half an edge.
     /// In the middle between two readings it is exactly their mean.
-    pub fn between(&self, later: &Self, at: Instant) -> Position {
+    pub fn between(&self, later: &Self, at: Instant) -> Self {
         let whole = since(later.at, self.at).ticks();
         let part = since(at, self.at).ticks().min(whole);
         let mix = |from, to| interpolate(from, to, part, whole);
-        Position {
+        let position = Position {
             right: mix(self.position.right, later.position.right),
             left: mix(self.position.left, later.position.left),
-        }
+        };
+        let turn = self.turn.zip(later.turn).map(|(turn, later)| turn.between(&later, at));
+        Self { at, position, turn }
     }
 }
 
@@ -94,10 +92,9 @@ impl Odometer {
     }
 
     /// Starts the ledger, if it has not started yet.
-    pub fn begin(&mut self, now: Instant, hardware: &mut impl Hardware, faults: &mut Faults) {
+    pub fn begin(&mut self, poll: &mut Poll<'_, '_, impl Hardware>) {
         if self.taken.is_none() {
-            let reading = self.read(now, hardware, faults);
-            self.taken = reading.map(|reading| reading.position);
+            self.taken = self.read(poll).map(|reading| reading.position);
         }
     }
 
@@ -107,17 +104,11 @@ impl Odometer {
     }
 
     /// Reads both counters; `None` if one fails.
-    pub fn read(
-        &mut self,
-        now: Instant,
-        hardware: &mut impl Hardware,
-        faults: &mut Faults,
-    ) -> Option<Reading> {
-        let right = self.right.read(hardware.right(), &mut faults.right);
-        let left = self.left.read(hardware.left(), &mut faults.left);
-        let (right, left) = (right?, left?);
-        let position = Position { right, left };
-        Some(Reading { at: now, position, turn: None })
+    pub fn read(&mut self, poll: &mut Poll<'_, '_, impl Hardware>) -> Option<Reading> {
+        let right = self.right.read(poll.hardware.right(), &mut poll.faults.right);
+        let left = self.left.read(poll.hardware.left(), &mut poll.faults.left);
+        let position = Position { right: right?, left: left? };
+        Some(Reading { at: poll.now, position, turn: None })
     }
 
     /// The travel of the wheels since the position that the localizer has taken.

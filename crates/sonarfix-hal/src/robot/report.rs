@@ -2,12 +2,11 @@
 
 use sonarfix::aim::{Aim, NoAim};
 use sonarfix::filter::motion::WheelTravel;
-use sonarfix::geometry::units::{Duration, Instant, Radians};
-use sonarfix::localizer::{Fix, OdometryError};
+use sonarfix::geometry::units::{Duration, Instant};
+use sonarfix::localizer::{Fix, Mode, OdometryError};
 use sonarfix::sensor::gyro::TurnReading;
-use sonarfix_search::navigator::Mode;
 
-use super::{AbsoluteResult, Faults};
+use super::{AbsoluteResult, Faults, SweepResult};
 use crate::ranger::Outcome;
 
 /// The report of one poll, in the order of execution.
@@ -66,7 +65,7 @@ impl Report {
     /// The headings and positions from outside that were passed to the localizer, in this order.
     pub fn absolutes(&self) -> impl Iterator<Item = &AbsoluteResult> {
         let pinged = self.ping_result.as_ref().and_then(|result| result.step.as_ref());
-        let swept = self.swept.as_ref().and_then(|result| result.step.as_ref());
+        let swept = self.swept.as_ref().and_then(SweepResult::step);
         let ticked = self.tick.as_ref().and_then(|tick| tick.step.as_ref());
         let steps = [pinged, swept, ticked].into_iter().flatten();
         self.absolute.iter().flatten().chain(steps.filter_map(|step| step.absolute.as_ref()))
@@ -136,19 +135,4 @@ pub struct PingResult {
     pub step: Option<Step>,
     /// The localizer's response; `None` if there was an echo but no step.
     pub fix: Option<Fix>,
-}
-
-/// The result of a ping of the search's sweep.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct SweepResult {
-    /// The bearing of the servo.
-    pub bearing: Radians,
-    /// The echo, or why there is none.
-    pub outcome: Outcome,
-    /// The step of the wheels up to the reflection; `None` without an echo, or if a counter could not be
-    /// read.
-    pub step: Option<Step>,
-    /// Whether the search took the ping as a novel one; `None` if it was not passed on, because of a fault.
-    pub is_novel: Option<bool>,
 }

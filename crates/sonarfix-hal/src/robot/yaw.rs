@@ -3,8 +3,9 @@
 use sonarfix::geometry::units::Instant;
 use sonarfix::sensor::gyro::{GyroParameters, MeasuredTurn, TurnIntegral, TurnReading};
 
+use super::Hardware;
+use super::poll::Poll;
 use super::schedule::Schedule;
-use super::{Faults, Hardware};
 
 /// The ledger of a robot with a gyro.
 #[derive(Debug, Clone, Copy)]
@@ -29,16 +30,17 @@ impl YawLedger {
     }
 
     /// Takes a sample if one is due. A fault is counted; the integral states what it interrupts.
-    pub fn sample(&mut self, now: Instant, hardware: &mut impl Hardware, faults: &mut Faults) {
-        if self.samples.take(now).is_none() {
+    pub fn sample(&mut self, poll: &mut Poll<'_, '_, impl Hardware>) {
+        if self.samples.take(poll.now).is_none() {
             return;
         }
-        let is_faulty = if let Some(Ok(rate)) = hardware.yaw_rate() {
-            self.integral.sample(now, rate).is_err()
+        let is_faulty = if let Some(Ok(rate)) = poll.hardware.yaw_rate() {
+            self.integral.sample(poll.now, rate).is_err()
         } else {
             self.integral.unreadable();
             true
         };
+        let faults = &mut poll.faults;
         faults.gyro = faults.gyro.saturating_add(u32::from(is_faulty));
     }
 

@@ -535,7 +535,7 @@ fn localizer(source: &mut impl Source) -> Config {
     config.sonar.noise.per_metre = source.single();
     if source.pick(2) == 0 {
         let (spot, pointing) = (Radians(source.single()), Radians(source.single()));
-        config.sonar.ranging = Ranging::Light(LightBeam { spot, pointing });
+        config.sonar.ranging = Ranging::Light(LightBeam { spot, pointing, ..LightBeam::VL53L1X });
     }
     config.sonar.timing = PingTiming {
         schedule: match source.pick(2) {
@@ -567,6 +567,8 @@ fn localizer(source: &mut impl Source) -> Config {
     config.echo.long = source.single();
     config.echo.free_path = Metres(source.single());
     config.echo.map_accuracy = Metres(source.single());
+    config.echo.late = Metres(source.single());
+    config.echo.late_per_radian = Metres(source.single());
     config.policy = if source.pick(2) == 0 { Policy::Nearest } else { Policy::Informative };
     config.weights.heading = Metres(source.single());
     config.weights.wheels = Metres(source.single());
@@ -578,6 +580,7 @@ fn localizer(source: &mut impl Source) -> Config {
         scale: source.single(),
         period: source.duration(),
         is_inverted: source.pick(2) == 0,
+        ..GyroParameters::MPU_6050
     };
     config.gyro = (source.pick(2) == 0).then_some(gyro);
     config

@@ -58,7 +58,7 @@ impl<'m> Robot<'m> {
         self.ticks += 100_000;
         let now = Instant::from_ticks(self.ticks);
         let travel = WheelTravel::new(right, left);
-        self.navigator.odometry(now, travel, Some(&mut self.search)).unwrap();
+        self.navigator.odometry_with_turn(now, travel, None, Some(&mut self.search)).unwrap();
     }
 
     /// Measures the wall at the right bearing at its range.
@@ -85,7 +85,7 @@ impl<'m> Robot<'m> {
 
     fn degrade(&mut self) {
         for _ in 0..8 {
-            self.navigator.skip();
+            self.navigator.localizer_mut().skip();
         }
         assert_eq!(self.verdict(), Verdict::Degraded);
     }
@@ -302,7 +302,7 @@ fn ranges_of_a_provisional_pose_are_passed_to_the_search() {
         let mut robot = Robot::in_mode(&walls, mode);
         assert!(matches!(robot.fix(), Fix::Accepted(_)));
         assert_eq!((robot.navigator.accepted, robot.search.pings()), (taken, usize::from(taken)));
-        let aim = robot.navigator.aim_at(Radians(-0.2)).unwrap();
+        let aim = robot.navigator.localizer().aim_at(Radians(-0.2)).unwrap();
         assert!(!matches!(robot.navigator.fix(&aim, None, None), Fix::Accepted(_)));
         assert_eq!(robot.navigator.accepted, taken);
     }

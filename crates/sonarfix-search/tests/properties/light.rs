@@ -34,7 +34,7 @@ fn range_in(walls: &[Wall], sonar: &Sonar, pose: Pose, bearing: Radians) -> Opti
 }
 
 fn light() -> Ranging {
-    Ranging::Light(LightBeam { spot: Radians(0.12), pointing: Radians(0.02) })
+    Ranging::Light(LightBeam::VL53L1X)
 }
 
 /// The search finds the pose of a robot that measures with light: from several starts, with ranges that are rounded to 1 cm.

@@ -54,14 +54,14 @@ impl<'a> Robot<'a> {
         let aside = 0.5 * TURN * TRACK_WIDTH;
         let travel = WheelTravel::new(STEP + aside, STEP - aside);
         let (navigator, search) = (&mut self.navigator, &mut *self.search);
-        navigator.odometry(now, travel, Some(search)).unwrap();
+        navigator.odometry_with_turn(now, travel, None, Some(search)).unwrap();
         if navigator.mode() == Mode::Searching {
             let bearing = search.aim();
             navigator.ping(bearing, self.room.echo(self.truth, bearing), search).unwrap();
         } else if let Ok(aim) = navigator.aim() {
             let _ = navigator.fix(&aim, self.room.echo(self.truth, aim.bearing), Some(search));
         } else {
-            navigator.skip();
+            navigator.localizer_mut().skip();
         }
         navigator.work(EVALUATIONS, search);
     }

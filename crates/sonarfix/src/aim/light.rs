@@ -5,7 +5,7 @@
 //! # Non-finite policy
 //! Comparisons are written so that a beam whose numbers are NaN is not chosen.
 
-use super::{Aim, Candidate, HYSTERESIS, NoAim, Planner, Pointing, Policy};
+use super::{Aim, Candidate, HYSTERESIS, NoAim, Planner, Pointing};
 use crate::config::LightBeam;
 use crate::geometry::pose::{Heading, Point};
 use crate::geometry::units::Radians;
@@ -135,10 +135,7 @@ impl Planner<'_> {
         }
         let pointing = Pointing { bearing, off: sight.off, until_ping };
         let mut candidate = self.candidate(id, &sight, &pointing);
-        candidate.score = match self.config.policy {
-            Policy::Nearest => candidate.success / candidate.expected.range.0,
-            Policy::Informative => candidate.gain.0 * candidate.success / candidate.seconds,
-        };
+        candidate.score = candidate.score_by(self.config.policy);
         if self.slot.wall == Some(id) {
             candidate.score *= HYSTERESIS;
         }

@@ -60,10 +60,8 @@ impl Aim {
     /// What the policy maximizes over all rangers: the expected decrease of the variance per time, or the nearness.
     #[must_use]
     pub fn score(&self, policy: Policy) -> f32 {
-        match policy {
-            Policy::Nearest => self.why.success / self.range.0,
-            Policy::Informative => self.why.gain.0 * self.why.success / seconds(self.why.time),
-        }
+        let Reason { gain, success, time, .. } = self.why;
+        score(policy, gain, success, self.range, seconds(time))
     }
 }
 
@@ -314,7 +312,6 @@ impl<'a> Planner<'a> {
         (shortlist, count)
     }
 
-    // ===== Eq. (22): score =====
     /// A wall with the servo turned to it.
     fn by_policy(&self, id: WallId, wall: &Wall) -> Option<Candidate> {
         let (expected, on_wall) = self.view.expected_range(wall).ok()?;
@@ -324,10 +321,7 @@ impl<'a> Planner<'a> {
         }
         let sight = self.heard(wall, (expected, on_wall), pointing.off);
         let mut candidate = self.candidate(id, &sight, &pointing);
-        candidate.score = match self.policy {
-            Policy::Nearest => candidate.success / candidate.expected.range.0,
-            Policy::Informative => candidate.gain.0 * candidate.success / candidate.seconds,
-        };
+        candidate.score = candidate.score_by(self.policy);
         if self.slot.wall == Some(id) {
             candidate.score *= HYSTERESIS;
         }
@@ -439,7 +433,16 @@ impl<'a> Planner<'a> {
     }
 }
 
+// ===== Eq. (22): score =====
+fn score(policy: Policy, gain: SquareMetres, success: f32, range: Metres, seconds: f32) -> f32 {
+    if policy.is_informative() { gain.0 * success / seconds } else { success / range.0 }
+}
+
 impl Candidate {
+    fn score_by(&self, policy: Policy) -> f32 {
+        score(policy, self.gain, self.success, self.expected.range, self.seconds)
+    }
+
     fn aim(&self, ranger: RangerId, wall: WallId, candidates: u16) -> Aim {
         let why = Reason {
             gain: self.gain,

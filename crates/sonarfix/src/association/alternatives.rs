@@ -48,8 +48,16 @@ pub(crate) struct Scene<'a, 'm> {
 impl Scene<'_, '_> {
     // ===== Eq. (25): the other reflectors, nearest first =====
     /// The reflectors other than the target that may have returned the echo.
-    #[inline(never)]
     pub fn others(&self, target: &Target, bearing: Radians, range: Metres) -> Others {
+        if cfg!(feature = "reflectors") {
+            self.reflectors(target, bearing, range)
+        } else {
+            Others::NONE
+        }
+    }
+
+    #[inline(never)]
+    fn reflectors(&self, target: &Target, bearing: Radians, range: Metres) -> Others {
         let (sonar, echo) = (self.sonar, &self.config.echo);
         let position = SonarPosition::new(sonar.mount, &self.ekf.state());
         let axis = Vector::of_angle(self.ekf.heading().turned(bearing).radians().0);

@@ -272,7 +272,7 @@ mod tests {
             missed in 0.0_f32..0.3, short in 0.0_f32..0.3, long in 0.0_f32..0.3, path in 0.5_f32..20.0,
         ) -> EchoParameters {
             let map_accuracy = Metres(0.01);
-            EchoParameters { missed, short, long, free_path: Metres(path), map_accuracy }
+            EchoParameters { missed, short, long, free_path: Metres(path), map_accuracy, ..EchoParameters::NONE }
         }
     }
 

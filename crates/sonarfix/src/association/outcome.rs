@@ -127,6 +127,8 @@ pub enum AbsoluteRefusal {
     NoPose,
     /// The filter refused the correction.
     Filter(EkfError),
+    /// This program was built without the feature `absolute`.
+    NotLinked,
 }
 
 impl core::fmt::Display for AbsoluteRefusal {
@@ -140,6 +142,7 @@ impl core::fmt::Display for AbsoluteRefusal {
             Self::Filter(error) => {
                 return write!(f, "the filter refused the measurement: {error}");
             }
+            Self::NotLinked => "this program was built without `absolute`",
         })
     }
 }

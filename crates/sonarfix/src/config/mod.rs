@@ -15,7 +15,7 @@ use crate::sensor::gyro::GyroParameters;
 pub use crate::sensor::echo::EchoParameters;
 pub use crate::sensor::further::{Further, MAX_RANGERS, TooMany};
 pub use crate::sensor::ranger::{
-    LightBeam, PingSchedule, PingTiming, RangerId, Ranging, ServoTiming, Sonar,
+    LightBeam, LightLinked, PingSchedule, PingTiming, RangerId, Ranging, ServoTiming, Sonar,
 };
 
 /// Largest angle of incidence of light: beyond it the range along the beam diverges.
@@ -63,7 +63,7 @@ impl CalibrationPrior {
     #[must_use]
     pub fn difference_of(&self, right: f32, left: f32) -> Option<f32> {
         let difference = at_least(self.scale_difference?, 1.1 * (right - left).abs());
-        (difference < libm::hypotf(right, left)).then_some(difference)
+        (difference * difference < right * right + left * left).then_some(difference)
     }
 }
 
@@ -111,8 +111,25 @@ pub const MAX_INFLATION_STEPS: f32 = 10.0;
 pub enum Policy {
     /// The nearest, as in the paper, because the noise of a sonar grows with the range.
     Nearest,
-    /// The one with the largest expected decrease of the position variance per time.
+    /// The one with the largest expected decrease of the position variance per time. Only with the feature `informative`;
+    /// [`Config::check`] refuses it otherwise.
     Informative,
+}
+
+impl Policy {
+    /// Whether the expected gain decides. Without the feature `informative` the compiler knows that it does not.
+    #[must_use]
+    #[inline]
+    pub fn is_informative(self) -> bool {
+        cfg!(feature = "informative") && self == Self::Informative
+    }
+}
+
+impl Default for Policy {
+    /// The recommended one of those that are linked.
+    fn default() -> Self {
+        if cfg!(feature = "informative") { Self::Informative } else { Self::Nearest }
+    }
 }
 
 /// Weights of other states than the position for [`Policy::Informative`]: metres of position error that
@@ -217,7 +234,7 @@ impl Config {
             prior: CalibrationPrior::for_track_width(track_width),
             gating: GatingParameters::default(),
             echo: EchoParameters::default(),
-            policy: Policy::Informative,
+            policy: Policy::default(),
             weights: Weights::default(),
             gyro: None,
             further_sonars: Further::NONE,
@@ -276,6 +293,8 @@ impl Config {
         not_negative("prior.range_scale", prior.range_scale)?;
         not_negative("weights.heading", self.weights.heading.0)?;
         not_negative("weights.wheels", self.weights.wheels.0)?;
+        let is_linked = self.policy == Policy::Nearest || self.policy.is_informative();
+        require("policy", is_linked, "`nearest`: this program was built without `informative`")?;
         self.check_gating()?;
         self.check_echo()?;
         self.check_gyro()
@@ -311,7 +330,9 @@ impl Config {
         let some_are_right = echo.missed + echo.short + echo.long < 1.0;
         require("echo.missed", some_are_right, "below 1 together with echo.short and echo.long")?;
         not_negative("echo.free_path", echo.free_path.0)?;
-        not_negative("echo.map_accuracy", echo.map_accuracy.0)
+        not_negative("echo.map_accuracy", echo.map_accuracy.0)?;
+        not_negative("echo.late", echo.late.0)?;
+        not_negative("echo.late_per_radian", echo.late_per_radian.0)
     }
 
     fn check_drive(&self) -> Result<(), ConfigError> {

@@ -17,7 +17,7 @@ use crate::filter::ekf::{Ekf, EkfError, GyroTurn, SlipLimits, TurnAgreement};
 use crate::filter::motion::WheelTravel;
 use crate::geometry::elementary::sqrt;
 use crate::geometry::units::{Duration, Radians, RadiansPerSecond, seconds};
-use crate::sensor::gyro::{GyroParameters, MeasuredTurn, TurnRefusal};
+use crate::sensor::gyro::{GyroLinked, GyroParameters, MeasuredTurn, TurnRefusal};
 
 /// Standard deviations up to which a difference of turns is noise.
 const GATE: f32 = 5.0;
@@ -78,6 +78,8 @@ pub struct GyroFusion {
     latest: TurnUse,
     slips: u32,
     conflicts: u32,
+    /// Without the feature `gyro` it has no value, and no code of it is linked.
+    _linked: GyroLinked,
 }
 
 /// The present slip: its time, the time since its last step, and the difference that it has caused.
@@ -88,6 +90,11 @@ struct Slip {
     angle: f32,
 }
 
+#[expect(
+    clippy::manual_map,
+    clippy::ref_option,
+    reason = "the compiler removes an arm without values here, but not a call of `map`, which takes a reference"
+)]
 impl GyroFusion {
     pub fn new(parameters: &GyroParameters) -> Self {
         Self {
@@ -98,10 +105,11 @@ impl GyroFusion {
             latest: TurnUse::Missing,
             slips: 0,
             conflicts: 0,
+            _linked: parameters.linked,
         }
     }
 
-    pub fn status(&self) -> GyroStatus {
+    fn status(&self) -> GyroStatus {
         GyroStatus {
             bias: RadiansPerSecond(self.bias.rate),
             deviation: RadiansPerSecond(sqrt(self.bias.variance())),
@@ -111,9 +119,30 @@ impl GyroFusion {
         }
     }
 
+    /// That of a robot with these parameters.
+    #[allow(unreachable_code, reason = "without the feature there are none")]
+    pub fn of(parameters: &Option<GyroParameters>) -> Option<Self> {
+        match parameters {
+            Some(parameters) => Some(Self::new(parameters)),
+            None => None,
+        }
+    }
+
     /// The bias, for the correction by a range.
-    pub fn bias_mut(&mut self) -> &mut GyroBias {
-        &mut self.bias
+    #[inline]
+    pub fn bias_of(gyro: &mut Option<Self>) -> Option<&mut GyroBias> {
+        match gyro {
+            Some(gyro) => Some(&mut gyro.bias),
+            None => None,
+        }
+    }
+
+    /// The status, if there is a gyro.
+    pub fn status_of(gyro: &Option<Self>) -> Option<GyroStatus> {
+        match gyro {
+            Some(gyro) => Some(gyro.status()),
+            None => None,
+        }
     }
 
     /// The pose was replaced.
@@ -259,5 +288,5 @@ impl GyroFusion {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "gyro"))]
 mod tests;

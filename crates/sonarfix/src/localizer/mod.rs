@@ -7,6 +7,7 @@
 //! NaN or infinity in an argument is a typed error or a [`Fix::Refused`], and the estimate is unchanged
 //! to the bit.
 
+mod mode;
 pub(crate) mod unseen;
 
 use self::unseen::Unseen;
@@ -33,6 +34,7 @@ use crate::sensor::absolute::{
 use crate::sensor::gyro::MeasuredTurn;
 use crate::sensor::range::Innovation;
 
+pub use self::mode::Mode;
 pub use self::unseen::{UNKNOWN_HEADING, UNKNOWN_POSITION};
 pub use crate::association::outcome::{AbsoluteFix, AbsoluteRefusal, Agreement, Fix, Refusal};
 pub use crate::filter::gyro_fusion::{GyroStatus, TurnUse};
@@ -200,7 +202,7 @@ impl<'m> Localizer<'m> {
     ) -> Result<Self, StartError> {
         config.check().map_err(StartError::Config)?;
         let ekf = filter(&config, state, deviation).map_err(StartError::Start)?;
-        let gyro = config.gyro.as_ref().map(GyroFusion::new);
+        let gyro = GyroFusion::of(&config.gyro);
         Ok(Self {
             config,
             map,
@@ -536,7 +538,7 @@ impl<'m> Localizer<'m> {
             AbsoluteFix::Gated(agreement)
         } else {
             let weight = gating::weight(association);
-            let bias = self.gyro.as_mut().map(GyroFusion::bias_mut);
+            let bias = GyroFusion::bias_of(&mut self.gyro);
             let corrected = self.ekf.update_absolute(&prediction, weight, bias);
             corrected.map_err(AbsoluteRefusal::Filter)?;
             self.pose_changed();
@@ -625,7 +627,7 @@ impl<'m> Localizer<'m> {
         let fix = if let Err(refusal) = measured {
             Fix::Refused(refusal)
         } else {
-            let bias = self.gyro.as_mut().map(GyroFusion::bias_mut);
+            let bias = GyroFusion::bias_of(&mut self.gyro);
             use_range(&mut self.ekf, &prediction, innovation, noise, association, bias)?
         };
         if fix.innovation_used().is_some() {
@@ -707,7 +709,7 @@ impl<'m> Localizer<'m> {
     /// The gyro: its bias, and what became of its turns; `None` without a gyro in the configuration.
     #[must_use]
     pub fn gyro(&self) -> Option<GyroStatus> {
-        self.gyro.as_ref().map(GyroFusion::status)
+        GyroFusion::status_of(&self.gyro)
     }
 
     /// The configuration.
@@ -728,6 +730,7 @@ impl From<MeasurementError> for AbsoluteRefusal {
         match error {
             MeasurementError::NotFinite => Self::NotFinite,
             MeasurementError::NotPositiveDefinite => Self::NotPositiveDefinite,
+            MeasurementError::NotLinked => Self::NotLinked,
         }
     }
 }

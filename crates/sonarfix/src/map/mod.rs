@@ -10,6 +10,7 @@
 
 mod grid;
 pub mod image;
+mod region;
 mod wall;
 mod window;
 
@@ -18,6 +19,7 @@ use window::Window;
 
 pub use grid::{Cells, Grid};
 pub use image::MapError;
+pub use region::Region;
 pub use wall::{Wall, WallError, WallId};
 
 use crate::geometry::pose::Point;

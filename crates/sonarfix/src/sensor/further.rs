@@ -3,8 +3,8 @@
 //! # Non-finite policy
 //! Values are stored as they are; the check of the configuration refuses those that are not finite.
 
-/// The largest number of rangers of a robot.
-pub const MAX_RANGERS: usize = 3;
+/// The largest number of rangers of a robot: one without the feature `rangers`.
+pub const MAX_RANGERS: usize = if cfg!(feature = "rangers") { 3 } else { 1 };
 
 /// One value for each ranger beside the first, in the order of the robot file.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,7 +32,7 @@ impl<T> Further<T> {
     /// Whether nothing follows the first.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        matches!(self.0, [None, ..])
+        self.iter().next().is_none()
     }
 
     /// That of the ranger with this number after the first.

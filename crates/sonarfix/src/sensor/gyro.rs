@@ -12,6 +12,20 @@ use crate::geometry::units::{Duration, PerRootSecond, Radians, RadiansPerSecond,
 
 pub use integral::{SampleFault, SampleFaults, TurnIntegral, TurnReading};
 
+/// Exists only in a program that is linked with the feature `gyro`.
+#[cfg(feature = "gyro")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct GyroLinked;
+
+/// Has no value: this program is linked without the feature `gyro`.
+#[cfg(not(feature = "gyro"))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum GyroLinked {}
+
 /// Parameters of a gyro that measures the yaw rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -31,8 +45,11 @@ pub struct GyroParameters {
     pub period: Duration,
     /// Whether it is mounted upside down, so that it measures clockwise turns as positive.
     pub is_inverted: bool,
+    /// The feature `gyro`.
+    pub linked: GyroLinked,
 }
 
+#[cfg(feature = "gyro")]
 impl GyroParameters {
     /// MPU-6050 at ±250°/s and 100 samples a second. By its product specification 0.005°/s/√Hz of noise; the scale error
     /// of 3 % before calibration is taken as calibrated to 1 %. Assumed: bias known to 3°/s at the start, a bias walk of
@@ -45,8 +62,11 @@ impl GyroParameters {
         scale: 0.01,
         period: Duration::from_ticks(10_000),
         is_inverted: false,
+        linked: GyroLinked,
     };
+}
 
+impl GyroParameters {
     // ===== Eq. (36): variance of the white noise of a turn =====
     /// Variance of the noise of a turn without bias, rad². The scale error enters as white noise that has its deviation
     /// after a quarter turn; the noise of a straight step, squared, adds nothing.
@@ -61,6 +81,7 @@ impl GyroParameters {
 /// Turn of a step below which it is nearly straight, rad: 6°/s at ten steps a second.
 const SMALL_TURN: f32 = 0.01;
 
+#[cfg(feature = "gyro")]
 const DEGREE: f32 = core::f32::consts::PI / 180.0;
 
 /// A turn measured by a gyro: the integral of its rate, bias included.

@@ -20,6 +20,20 @@ pub enum Ranging {
     Light(LightBeam),
 }
 
+/// Exists only in a program that is linked with the feature `light`.
+#[cfg(feature = "light")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct LightLinked;
+
+/// Has no value: this program is linked without the feature `light`.
+#[cfg(not(feature = "light"))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum LightLinked {}
+
 /// The beam of a time-of-flight ranger.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -29,12 +43,16 @@ pub struct LightBeam {
     pub spot: Radians,
     /// Standard deviation of the direction of the beam: of the servo, the mount and the spot's centre.
     pub pointing: Radians,
+    /// The feature `light`.
+    pub linked: LightLinked,
 }
 
+#[cfg(feature = "light")]
 impl LightBeam {
     /// VL53L1X with all 16 × 16 detectors: a field of view of 27°, of which the inner half returns most of the
     /// light (assumed), on a hobby servo that is off by 1.1° (assumed).
-    pub const VL53L1X: Self = Self { spot: Radians(0.12), pointing: Radians(0.02) };
+    pub const VL53L1X: Self =
+        Self { spot: Radians(0.12), pointing: Radians(0.02), linked: LightLinked };
     /// VL53L0X: a field of view of 25°; the same assumptions.
     pub const VL53L0X: Self = Self { spot: Radians(0.11), ..Self::VL53L1X };
 }

@@ -289,7 +289,7 @@ fn a_beam_has_limits() {
     let with = |spot, pointing| {
         let mut config = config_with_light(Point::default());
         let (spot, pointing) = (Radians(spot), Radians(pointing));
-        config.sonar.ranging = Ranging::Light(LightBeam { spot, pointing });
+        config.sonar.ranging = Ranging::Light(LightBeam { spot, pointing, ..LightBeam::VL53L1X });
         config.check().map_err(|error| error.field)
     };
     assert_eq!(with(0.1, 0.0), Ok(()));

@@ -9,10 +9,10 @@ use emulated_board::meter::{Cost, Meter};
 use emulated_board::report;
 use sonarfix::aim::Aim;
 use sonarfix::config::{Config, Policy};
-use sonarfix::localizer::{Localizer, Start};
-use sonarfix::map::Map;
 use sonarfix::geometry::pose::Pose;
 use sonarfix::geometry::units::{Instant, Metres, Radians};
+use sonarfix::localizer::{Localizer, Start};
+use sonarfix::map::Map;
 
 /// Tested rooms.
 const ROOMS: u32 = 40;

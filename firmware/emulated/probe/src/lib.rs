@@ -8,11 +8,11 @@
 use emulated_board::report;
 use sonarfix::aim::Aim;
 use sonarfix::config::Config;
-use sonarfix::localizer::{Localizer, Start, StartError};
-use sonarfix::map::{Map, Wall, WallError};
 use sonarfix::filter::motion::WheelTravel;
 use sonarfix::geometry::pose::{Point, Pose};
 use sonarfix::geometry::units::{Instant, Metres, Radians};
+use sonarfix::localizer::{Localizer, Start, StartError};
+use sonarfix::map::{Map, Wall, WallError};
 
 /// Walls of the room.
 pub const WALLS: usize = 8;

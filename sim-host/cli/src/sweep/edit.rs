@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use sonarfix_map::{SCENARIO_KEYS, Scenario};
+use sonarfix_map::{Scenario, scenario_keys};
 use toml::{Table, Value};
 
 /// The scenario of a file with these values of its keys.
@@ -13,7 +13,7 @@ pub fn scenario(file: &Path, text: &str, values: &[(String, String)]) -> anyhow:
     for (key, value) in values {
         let mut path: Vec<&str> = key.split('.').collect();
         // Any other key is one of the robot.
-        if path.first().is_some_and(|first| !SCENARIO_KEYS.contains(first)) {
+        if path.first().is_some_and(|first| !scenario_keys().contains(first)) {
             path.insert(0, "robot");
         }
         if let Some(first) = path.first() {

@@ -5,10 +5,14 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Reports that a test is skipped. Writes directly to standard error, because the test harness
-/// captures the output of a passing test.
+/// Reports that a test is skipped: on standard error directly, because the test harness captures the output of a passing
+/// test, and in the file that CI reads.
 pub fn because(why: &str) {
     let _ = writeln!(std::io::stderr(), "SKIPPED: {why}");
+    if let Some(file) = std::env::var_os("SONARFIX_SKIPPED") {
+        let file = std::fs::OpenOptions::new().append(true).create(true).open(file);
+        let _ = file.and_then(|mut file| writeln!(file, "{why}"));
+    }
 }
 
 /// A folder of recordings, in `SONARFIX_DATA` or in `../shared/data` beside the repository.

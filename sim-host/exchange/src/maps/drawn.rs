@@ -7,6 +7,14 @@ use sonarfix_map::{Floor, NamedWall};
 
 /// Largest number of segments that are read.
 pub const MAX_SEGMENTS: usize = 200_000;
+/// Nearer to the origin of a map the localizer's numbers resolve a millimetre, metres: 2¹³.
+const FARTHEST: f64 = 8_192.0;
+/// Coordinates from which a wall's length is not known to a tenth of a millimetre any more, metres.
+const UNKNOWN: f64 = 1e9;
+/// A map that is farther is moved by a multiple of this, metres.
+const MOVE: f64 = 100.0;
+/// Most kinds of dropped things that are counted by name.
+const MOST_KINDS: usize = 100;
 /// Shorter segments are no walls, metres: a wall needs a direction.
 const SHORTEST: f64 = 1e-4;
 
@@ -34,6 +42,9 @@ pub struct Imported {
     pub floor: Floor,
     /// Scale and origin, what was dropped, and what is uncertain; one line each.
     pub notes: Vec<String>,
+    /// What must be added to the map's coordinates for those of the drawing in its frame, metres; `None` if the walls are where the
+    /// drawing has them.
+    pub offset: Option<[f64; 2]>,
 }
 
 fn length(from: [f64; 2], to: [f64; 2]) -> f64 {
@@ -43,7 +54,7 @@ fn length(from: [f64; 2], to: [f64; 2]) -> f64 {
 /// Collects segments and counts what is dropped.
 #[derive(Debug, Default)]
 pub struct Drawing {
-    walls: Vec<NamedWall>,
+    walls: Vec<(String, [[f64; 2]; 2])>,
     names: HashSet<String>,
     dropped: BTreeMap<String, u64>,
     notes: Vec<String>,
@@ -52,7 +63,10 @@ pub struct Drawing {
 impl Drawing {
     /// Counts something that is dropped, by its kind and the reason.
     pub fn drop(&mut self, what: impl Into<String>) {
-        *self.dropped.entry(what.into()).or_insert(0) += 1;
+        let what = what.into();
+        let is_known = self.dropped.contains_key(&what) || self.dropped.len() < MOST_KINDS;
+        let what = if is_known { what } else { "others".to_owned() };
+        *self.dropped.entry(what).or_insert(0) += 1;
     }
 
     /// Adds a note.
@@ -76,11 +90,10 @@ impl Drawing {
         let name = if is_free { name.to_owned() } else { format!("{base} {}", count + 1) };
         // A name may look like a number that was given.
         let name = if self.names.contains(&name) { format!("{name} ({count})") } else { name };
-        let wall = NamedWall::new(name.clone(), from, to);
-        let wall =
-            wall.map_err(|error| anyhow::anyhow!("the segment {from:?} to {to:?}: {error}"))?;
-        self.names.insert(name);
-        self.walls.push(wall);
+        let is_known = [from, to].iter().flatten().all(|value| value.abs() < UNKNOWN);
+        ensure!(is_known, "the segment {from:?} to {to:?}: it is too far from the origin");
+        self.names.insert(name.clone());
+        self.walls.push((name, [from, to]));
         Ok(())
     }
 
@@ -118,6 +131,44 @@ impl Drawing {
             "there is no straight line in it. {}",
             self.notes.join("; ")
         );
-        Ok(Imported { floor: Floor::new(self.walls), notes: self.notes })
+        let offset = self.offset()?;
+        if let Some([x, y]) = offset {
+            self.notes.push(format!(
+                "moved: ({x}, {y}) m of the drawing is the origin of the map, whose numbers would not resolve a millimetre there"
+            ));
+        }
+        let floor = Floor::new(moved(self.walls, offset.unwrap_or_default())?);
+        Ok(Imported { floor, notes: self.notes, offset })
     }
+
+    /// The point that becomes the origin if a wall is too far from the drawing's: the lower left corner, rounded down.
+    fn offset(&self) -> anyhow::Result<Option<[f64; 2]>> {
+        let ends = || self.walls.iter().flat_map(|(_, ends)| ends);
+        let span = |of: fn(&[f64; 2]) -> f64| {
+            ends().map(of).fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)))
+        };
+        let (x, y) = (span(|[x, _]| *x), span(|[_, y]| *y));
+        if [x.0, x.1, y.0, y.1].iter().all(|value| value.abs() <= FARTHEST) {
+            return Ok(None);
+        }
+        let offset = [x.0, y.0].map(|low| (low / MOVE).floor() * MOVE);
+        let is_near = x.1 - offset[0] <= FARTHEST && y.1 - offset[1] <= FARTHEST;
+        ensure!(
+            is_near,
+            "it is {:.0} × {:.0} m large: a map has at most {FARTHEST} m. Import a part of it",
+            x.1 - x.0,
+            y.1 - y.0
+        );
+        Ok(Some(offset))
+    }
+}
+
+/// The walls relative to a point.
+fn moved(walls: Vec<(String, [[f64; 2]; 2])>, by: [f64; 2]) -> anyhow::Result<Vec<NamedWall>> {
+    let wall = |(name, ends): (String, [[f64; 2]; 2])| {
+        let [from, to] = ends.map(|[x, y]| [x - by[0], y - by[1]]);
+        let wall = NamedWall::new(name, from, to);
+        wall.map_err(|error| anyhow::anyhow!("the segment {from:?} to {to:?}: {error}"))
+    };
+    walls.into_iter().map(wall).collect()
 }

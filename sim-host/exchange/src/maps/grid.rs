@@ -78,8 +78,9 @@ pub fn read(yaml: &Path, frame: &Frame, shortest: f64) -> anyhow::Result<Importe
     let image = sonarfix_map::read_bytes(&file).map_err(anyhow::Error::new);
     let image = image.and_then(|bytes| Image::read(&bytes));
     let image = image.with_context(|| format!("the image {}", file.display()))?;
-    let mut drawing = Drawing::default();
     let mut bitmap = occupied(&image, &keys);
+    drop(image);
+    let mut drawing = Drawing::default();
     let [x0, y0, yaw] = keys.origin;
     let r = keys.resolution;
     drawing.note(format!(
@@ -93,7 +94,7 @@ pub fn read(yaml: &Path, frame: &Frame, shortest: f64) -> anyhow::Result<Importe
         drawing.note(format!("dropped: areas thicker than {THICKEST} m ({solid} pixels)"));
     }
     bitmap.thin();
-    let (found, unexplained) = lines::find(&bitmap, (shortest / r).max(3.0));
+    let (found, unexplained) = lines::find(&bitmap, (shortest / r).max(3.0))?;
     if unexplained > 0 {
         drawing
             .note(format!("dropped: pixels of no straight line of {shortest} m ({unexplained})"));
@@ -167,9 +168,8 @@ pub fn write(floor: &Floor, yaml: &Path, resolution: f64) -> anyhow::Result<()> 
         "image: {name}\nmode: trinary\nresolution: {resolution}\norigin: [{left}, {bottom}, 0.0]\n\
          negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n"
     );
-    let wrote = std::fs::write(&file, image.pgm());
-    wrote.with_context(|| format!("cannot write {}", file.display()))?;
-    std::fs::write(yaml, text).with_context(|| format!("cannot write {}", yaml.display()))
+    sonarfix_files::write(&file, image.pgm())?;
+    sonarfix_files::write(yaml, text)
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count of pixels")]

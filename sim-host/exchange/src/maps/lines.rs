@@ -5,8 +5,12 @@
 //! its pixels. It may cross other lines, whose pixels keep it connected. The direction of a short line is uncertain; it takes
 //! that of a long line that is parallel or perpendicular to it within the uncertainty.
 
+use std::collections::HashMap;
 use std::f64::consts::{FRAC_PI_2, PI};
 
+use anyhow::ensure;
+
+use super::drawn::MAX_SEGMENTS;
 use super::thin::{Bitmap, Pixel};
 
 /// Directions that are tried.
@@ -21,6 +25,10 @@ const CORNER: f64 = 2.0;
 const STEEP: f64 = 0.342;
 /// Largest number of fits of a line.
 const FITS: usize = 16;
+/// Most pixels of lines that are tried, in all: a hundred times those of a large building. Noise has more.
+const MOST_TRIED: usize = 200_000_000;
+/// Side of the squares in which the ends of lines are looked up, pixels.
+const SQUARE: f64 = 16.0;
 
 /// A line between two points, pixels; the centre of pixel (0, 0) is (0, 0).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -120,15 +128,23 @@ fn nearest(on: &Bitmap, cross: f64, pixel: impl Fn(i32) -> Pixel) -> Option<Pixe
 }
 
 /// The lines that are at least `shortest` pixels long, and the number of pixels that belong to none.
-#[must_use]
-pub fn find(on: &Bitmap, shortest: f64) -> (Vec<Line>, usize) {
+///
+/// # Errors
+/// If there are more lines than a map may have, or so many pixels beside each other that they are noise.
+pub fn find(on: &Bitmap, shortest: f64) -> anyhow::Result<(Vec<Line>, usize)> {
     let mut left = on.clone();
-    let (mut lines, mut unexplained) = (Vec::new(), 0);
+    let (mut lines, mut unexplained, mut tried) = (Vec::new(), 0, 0);
     for seed in on.pixels() {
         if !left.is_on(seed) {
             continue;
         }
-        let line = line_from(on, &left, seed);
+        let line = line_from(on, &left, seed, &mut tried);
+        let is_map = tried <= MOST_TRIED && lines.len() <= MAX_SEGMENTS;
+        ensure!(
+            is_map,
+            "it is noise or a pattern: more than {MAX_SEGMENTS} lines, or {MOST_TRIED} pixels in lines that were tried. \
+             Remove what is no wall from the image, or give a larger --shortest"
+        );
         match line.filter(|(line, _)| length(line) >= shortest) {
             Some((line, pixels)) => {
                 explain(&mut left, &line);
@@ -143,14 +159,20 @@ pub fn find(on: &Bitmap, shortest: f64) -> (Vec<Line>, usize) {
     }
     align(&mut lines);
     join_corners(&mut lines);
-    (lines, unexplained)
+    Ok((lines, unexplained))
 }
 
 /// The line with the most pixels of `left` through a pixel, and its pixels.
-fn line_from(on: &Bitmap, left: &Bitmap, seed: Pixel) -> Option<(Line, Vec<Pixel>)> {
+fn line_from(
+    on: &Bitmap,
+    left: &Bitmap,
+    seed: Pixel,
+    tried: &mut usize,
+) -> Option<(Line, Vec<Pixel>)> {
     let of = |direction: u32| {
         let ray = Ray::new(coordinates(seed), PI * f64::from(direction) / f64::from(DIRECTIONS));
         let pixels = ray.follow(on, seed);
+        *tried += pixels.len();
         let new = pixels.iter().filter(|&&pixel| left.is_on(pixel)).count();
         (new, pixels)
     };
@@ -230,23 +252,65 @@ fn align(lines: &mut [Line]) {
     }
 }
 
-/// Moves the ends of lines that meet to where they meet.
+/// Moves the ends of lines that meet to where they meet: the nearest crossing within [`CORNER`].
 fn join_corners(lines: &mut [Line]) {
-    let drawn = lines.to_vec();
-    for (at, line) in lines.iter_mut().enumerate() {
+    let ends = Ends::of(lines);
+    let mut moves = vec![[None::<f64>; 2]; lines.len()];
+    for (other, crossed) in lines.iter().enumerate() {
+        ends.near(crossed, |at, end| {
+            let (Some(line), Some(of)) = (lines.get(at), moves.get_mut(at)) else { return };
+            let (ray, here) = (Ray::new(line.from, direction(line)), [0.0, length(line)]);
+            let (Some(here), Some(moved)) = (here.get(end), of.get_mut(end)) else { return };
+            let crossing = (at != other).then(|| crossing(&ray, crossed)).flatten();
+            let off = |along: f64| (along - here).abs();
+            let nearest = moved.map_or(CORNER, off);
+            let is_better =
+                |along: &f64| off(*along) < nearest || moved.is_none() && off(*along) <= CORNER;
+            *moved = crossing.filter(is_better).or(*moved);
+        });
+    }
+    for (line, [from, to]) in lines.iter_mut().zip(moves) {
         let ray = Ray::new(line.from, direction(line));
-        let end = length(line);
-        let near = |along: f64| {
-            let others = drawn.iter().enumerate().filter(|(other, _)| *other != at);
-            let crossings = others.filter_map(|(_, other)| crossing(&ray, other));
-            crossings
-                .filter(|crossing| (crossing - along).abs() <= CORNER)
-                .min_by(|a, b| (a - along).abs().total_cmp(&(b - along).abs()))
-        };
-        let (from, to) = (near(0.0), near(end));
         line.from = from.map_or(line.from, |along| ray.point(along));
         line.to = to.map_or(line.to, |along| ray.point(along));
     }
+}
+
+/// The ends of lines by the square in which they are.
+struct Ends(HashMap<Pixel, Vec<(usize, usize)>>);
+
+impl Ends {
+    fn of(lines: &[Line]) -> Self {
+        let mut squares: HashMap<Pixel, Vec<(usize, usize)>> = HashMap::new();
+        for (at, line) in lines.iter().enumerate() {
+            for (end, point) in [line.from, line.to].into_iter().enumerate() {
+                squares.entry(square(point)).or_default().push((at, end));
+            }
+        }
+        Self(squares)
+    }
+
+    /// Passes the ends near a line, as the number of their line and 0 or 1: all within half a square of it or of its
+    /// continuation by as much, and others. An end may be passed several times.
+    fn near(&self, line: &Line, mut pass: impl FnMut(usize, usize)) {
+        let ray = Ray::new(line.from, direction(line));
+        let (step, end) = (SQUARE / 2.0, length(line) + SQUARE / 2.0);
+        let mut along = -step;
+        while along <= end + step {
+            let (column, row) = square(ray.point(along));
+            for at in (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| (column + dx, row + dy))) {
+                for &(line, end) in self.0.get(&at).into_iter().flatten() {
+                    pass(line, end);
+                }
+            }
+            along += step;
+        }
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "coordinates of an image")]
+fn square([x, y]: [f64; 2]) -> Pixel {
+    ((x / SQUARE).floor() as i32, (y / SQUARE).floor() as i32)
 }
 
 /// The place along a ray at which it crosses a line, or would if that were longer by [`CORNER`]; `None` if they are almost

@@ -50,35 +50,23 @@ impl Bitmap {
 
     /// Turns solid areas off: all pixels of squares whose side is longer than `thickest`. Returns the number of pixels.
     pub fn remove_solid(&mut self, thickest: usize) -> usize {
-        // Sides of the largest square of pixels that ends at each pixel, by its smallest three neighbours.
-        let mut side = vec![0_u16; self.on.len()];
-        let mut solid = Vec::new();
-        for at in 0..self.on.len() {
-            let (x, y) = (at % self.width, at / self.width);
-            if !self.on.get(at).copied().unwrap_or(false) {
-                continue;
-            }
-            let of = |back: usize| side.get(at - back).copied().unwrap_or(0);
-            let inner = if x == 0 || y == 0 {
-                0
-            } else {
-                of(1).min(of(self.width)).min(of(self.width + 1))
-            };
-            let length = inner.saturating_add(1);
-            if let Some(side) = side.get_mut(at) {
-                *side = length;
-            }
-            if usize::from(length) > thickest {
-                solid.push((x, y));
-            }
-        }
+        let corners = self.corners(thickest);
+        // The lowest row above this one, for each column, from which a square reaches down to here.
+        let mut reaching = vec![usize::MAX; self.width];
         let mut count = 0;
-        for (x, y) in solid {
-            for row in (y - thickest)..=y {
-                let from = row * self.width + x - thickest;
-                let pixels = self.on.get_mut(from..=from + thickest).into_iter().flatten();
-                for pixel in pixels.filter(|pixel| **pixel) {
-                    *pixel = false;
+        for y in (0..self.height).rev() {
+            let from = y * self.width;
+            let corners = corners.get(from..from + self.width).unwrap_or_default();
+            let on = self.on.get_mut(from..from + self.width).unwrap_or_default();
+            // The last corner to the right.
+            let mut right = usize::MAX;
+            for x in (0..on.len()).rev() {
+                let is_corner = corners.get(x).copied().unwrap_or(false);
+                right = if is_corner { x } else { right };
+                let (Some(row), Some(on)) = (reaching.get_mut(x), on.get_mut(x)) else { continue };
+                *row = if right.wrapping_sub(x) <= thickest { y } else { *row };
+                if *on && row.wrapping_sub(y) <= thickest {
+                    *on = false;
                     count += 1;
                 }
             }
@@ -86,27 +74,56 @@ impl Bitmap {
         count
     }
 
+    /// The upper right corners of squares of pixels that are on and whose side is longer than `thickest`.
+    fn corners(&self, thickest: usize) -> Vec<bool> {
+        let mut corners = vec![false; self.on.len()];
+        // Sides of the largest square that ends at each pixel of a row, by its smallest three neighbours; a pixel to the left.
+        let mut below = vec![0_usize; self.width + 1];
+        for (on, corners) in
+            self.on.chunks(self.width.max(1)).zip(corners.chunks_mut(self.width.max(1)))
+        {
+            let (mut diagonal, mut left) = (0, 0);
+            for ((on, corner), side) in on.iter().zip(corners).zip(below.iter_mut().skip(1)) {
+                let length = if *on { left.min(*side).min(diagonal) + 1 } else { 0 };
+                (diagonal, left) = (*side, length);
+                *side = length;
+                *corner = length > thickest;
+            }
+        }
+        corners
+    }
+
     /// Thins lines to one pixel.
     pub fn thin(&mut self) {
-        let mut left = self.pixels();
-        loop {
-            let before = left.len();
-            for pass in 0..2 {
-                let removed: Vec<Pixel> =
-                    left.iter().copied().filter(|&pixel| self.is_removable(pixel, pass)).collect();
-                for &pixel in &removed {
-                    self.set(pixel, false);
-                }
-                left.retain(|&pixel| self.is_on(pixel));
-            }
-            if left.len() == before {
+        // In the first two passes all pixels are examined, later those beside what the last two have removed.
+        let mut all = self.pixels();
+        let mut last = self.remove(all.iter().copied(), 0);
+        all.retain(|&pixel| self.is_on(pixel));
+        let mut before = std::mem::replace(&mut last, self.remove(all.into_iter(), 1));
+        for pass in [0, 1].into_iter().cycle() {
+            if before.is_empty() && last.is_empty() {
                 return;
             }
+            let mut near: Vec<Pixel> =
+                before.iter().chain(&last).copied().flat_map(beside).collect();
+            near.sort_unstable();
+            near.dedup();
+            before = std::mem::replace(&mut last, self.remove(near.into_iter(), pass));
         }
     }
 
-    fn is_removable(&self, (x, y): Pixel, pass: u8) -> bool {
-        let around = AROUND.map(|(dx, dy)| self.is_on((x + dx, y + dy)));
+    /// Turns off those of some pixels that a pass removes, all at once; returns them.
+    fn remove(&mut self, of: impl Iterator<Item = Pixel>, pass: u8) -> Vec<Pixel> {
+        let is_removed = |&pixel: &Pixel| self.is_on(pixel) && self.is_removable(pixel, pass);
+        let removed: Vec<Pixel> = of.filter(is_removed).collect();
+        for &pixel in &removed {
+            self.set(pixel, false);
+        }
+        removed
+    }
+
+    fn is_removable(&self, pixel: Pixel, pass: u8) -> bool {
+        let around = beside(pixel).map(|pixel| self.is_on(pixel));
         let [east, _, north, _, west, _, south, _] = around;
         let count = around.iter().filter(|on| **on).count();
         let next = around.iter().skip(1).chain(&around);
@@ -118,4 +135,9 @@ impl Bitmap {
         };
         (2..=6).contains(&count) && begins == 1 && is_edge
     }
+}
+
+/// The eight pixels beside a pixel.
+fn beside((x, y): Pixel) -> [Pixel; 8] {
+    AROUND.map(|(dx, dy)| (x + dx, y + dy))
 }

@@ -82,6 +82,12 @@ pub struct Carmen<'a> {
     pub to: &'a Path,
 }
 
+/// Most ranges and poses of a log, which are all in memory: fifty times those of the largest public logs.
+const MOST_NUMBERS: usize = 16 << 20;
+
+/// Numbers of a pose with its time and place in the log.
+const POSE: usize = 8;
+
 /// A scan with the pose of its scanner.
 struct Scanned {
     time: f64,
@@ -95,6 +101,8 @@ struct Scanned {
 struct Content {
     samples: Vec<Sample>,
     scans: Vec<Scanned>,
+    /// Those of ranges and poses.
+    numbers: usize,
 }
 
 impl Carmen<'_> {
@@ -148,11 +156,13 @@ impl Carmen<'_> {
                     Message::Other => {}
                     Message::Odometry { time, robot } => {
                         odometry.check(time)?;
+                        content.numbers += POSE;
                         let source = Source::Odometry;
                         content.samples.push(Sample { line, time, pose: robot, source });
                     }
                     Message::Laser { time, robot, laser: scanner, scan } => {
                         laser.check(time)?;
+                        content.numbers += POSE + scan.ranges.len();
                         let source = Source::Scan;
                         content.samples.push(Sample { line, time, pose: robot, source });
                         content.scans.push(Scanned { time, laser: scanner, robot, scan });
@@ -160,6 +170,10 @@ impl Carmen<'_> {
                 }
                 Ok(())
             });
+            if content.numbers > MOST_NUMBERS {
+                let why = format!("has more than {MOST_NUMBERS} ranges: split it");
+                return Err(ConvertError::content(self.from, why));
+            }
             if let Err(reason) = taken {
                 converted.skipped += 1;
                 report(line, &reason);

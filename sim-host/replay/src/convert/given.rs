@@ -1,12 +1,11 @@
 //! A log in the project's own format, with reference and walls as CSV and no robot file: the rest of a folder for
 //! `sonarfix replay`.
 
-use std::fs::File;
 use std::io;
 use std::path::Path;
 
 use super::carmen::robot;
-use super::{ConvertError, make_dir, open, read_walls, write_map};
+use super::{ConvertError, Out, make_dir, open, read_walls, write_map};
 use crate::lines::Lines;
 use crate::log::{self, HEADER, Record};
 
@@ -47,9 +46,9 @@ impl Given<'_> {
         let field_of_view = field_of_view(self.log)?;
         make_dir(self.to)?;
         for (from, name) in [(self.log, "log.csv"), (self.reference, "reference.csv")] {
-            let to = self.to.join(name);
-            let mut file = File::create(&to).map_err(ConvertError::write(&to))?;
-            io::copy(&mut open(from)?, &mut file).map_err(ConvertError::read(from))?;
+            let mut out = Out::create(self.to.join(name))?;
+            io::copy(&mut open(from)?, &mut out.file).map_err(ConvertError::read(from))?;
+            out.close()?;
         }
         write_map(self.to, "Walls as given; furniture is not in them", &walls)?;
         robot::write(self.to, [0.0, 0.0], field_of_view)

@@ -310,7 +310,7 @@ impl SensorModel {
     }
 
     /// The LEGO NXT ultrasonic sensor, fitted to 20 sweeps of four robots
-    /// (`docs/sonar-model.md` shows the fit; `sonarfix sonar-model` writes that page).
+    /// (`docs/sonar-model.md` shows the fit; `sonarfix-studies sonar-model` writes that page).
     #[must_use]
     pub fn nxt() -> Self {
         let degrees = f64::to_radians;

@@ -2,32 +2,13 @@
 
 use rayon::prelude::*;
 use sonarfix::aim::Policy;
-use sonarfix_map::{Outline, Scenario};
-use sonarfix_report::heat_map::{Heat, HeatMap, Unmapped};
+use sonarfix_report::heat_map::{Heat, HeatMap};
 use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::trace::{FixRecord, Outcome, Trace};
 use sonarfix_sim::world::reflector::Source;
 
 use super::FloorPlan;
 use super::compare::{CompareError, simulation};
-
-/// The map of a scenario, with an empty path.
-#[must_use]
-pub fn place(scenario: &Scenario) -> HeatMap {
-    let unmapped = scenario.surroundings.obstacles.iter().map(|obstacle| match obstacle.outline {
-        Outline::Circle { centre, radius } => Unmapped::Round(centre, radius),
-        Outline::Face { from, to } => Unmapped::Face(from, to),
-    });
-    let plan = scenario.path.plan();
-    let corners = std::iter::once(&plan.start).chain(&plan.corners);
-    HeatMap {
-        title: scenario.name.clone(),
-        walls: scenario.floor.named_walls().iter().map(|wall| [wall.from(), wall.to()]).collect(),
-        unmapped: unmapped.collect(),
-        path: corners.map(|&at| Heat { at, value: 0.0, marked: false }).collect(),
-        ..HeatMap::default()
-    }
-}
 
 /// The traces of the runs of a plan under one policy.
 #[derive(Debug)]
@@ -134,7 +115,7 @@ impl Runs {
     /// The map for a drawing of the errors of these runs.
     #[must_use]
     pub fn place(&self) -> HeatMap {
-        place(&self.simulation.scenario)
+        HeatMap::of(&self.simulation.scenario)
     }
 
     fn fixes(&self) -> impl Iterator<Item = &FixRecord> {

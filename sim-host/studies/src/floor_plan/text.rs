@@ -4,13 +4,11 @@ use std::fmt::Write;
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
+use sonarfix_plan::bare::ROBOT;
 
 use super::clutter::{Clutter, Round};
 use super::site::{CLEARANCE, Kind, Point};
 use super::walls::Face;
-
-/// The tables that are the same for every plan.
-const SAME_FOR_ALL: &str = include_str!("scenario.toml");
 
 /// Errors of wheels and track width, from `docs/hardware.md`.
 const SCALE: f64 = 0.005;
@@ -42,7 +40,7 @@ impl Plan {
 
     fn write(&self, text: &mut String, rng: &mut ChaCha8Rng) -> std::fmt::Result {
         let (seed, kind) = (self.seed, self.kind.name());
-        writeln!(text, "# Written by `sonarfix floor-plans --draw {seed}`.\n")?;
+        writeln!(text, "# Written by `sonarfix-studies floor-plans --draw {seed}`.\n")?;
         writeln!(text, "format = 1\nname = \"floor plan {seed}\"")?;
         writeln!(text, "description = \"The {kind} of seed {seed}\"\nfidelity = \"pins\"\n")?;
         self.write_map(text)?;
@@ -50,7 +48,7 @@ impl Plan {
         write_truth(text, rng)?;
         self.write_world(text, rng)?;
         text.push('\n');
-        text.push_str(SAME_FOR_ALL);
+        text.push_str(ROBOT);
         Ok(())
     }
 

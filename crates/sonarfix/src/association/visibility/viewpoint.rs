@@ -4,7 +4,7 @@
 //! Comparisons are written so that a wall whose numbers are NaN cannot be measured.
 
 use crate::association::outcome::Refusal;
-use crate::config::{Config, Ranging, Sonar};
+use crate::config::{Config, EchoParameters, Ranging, Sonar};
 use crate::filter::ekf::{Ekf, PoseCovariance};
 use crate::geometry::elementary::{inverse_sqrt, sqrt};
 use crate::geometry::numeric::positive_part;
@@ -32,6 +32,8 @@ const MAX_WIDENING: Radians = Radians(0.3);
 pub(super) const FOOT_MARGIN: f32 = 0.02;
 pub(super) const RANGE_MARGIN: f32 = 0.001;
 const HEADING_MARGIN: f32 = 0.01;
+/// Standard deviation of the bearing of a servo, radians: dead band and backlash of an SG90.
+const SERVO_MARGIN: f32 = 0.015;
 
 /// Largest deviation of the heading at which the estimate counts as tracking, as a share of the cone.
 const MAX_HEADING_DEVIATION: f32 = 0.25;
@@ -69,6 +71,8 @@ pub(crate) struct Viewpoint<'a> {
     /// Least probability of foot and range.
     pub(super) least: f32,
     covariance: PoseCovariance,
+    /// What the echo model knows of the sensor.
+    echo: &'a EchoParameters,
 }
 
 impl<'a> Viewpoint<'a> {
@@ -85,6 +89,7 @@ impl<'a> Viewpoint<'a> {
             confidence: config.gating.confidence,
             least: SAFE,
             covariance: ekf.pose_covariance(),
+            echo: &config.echo,
         }
     }
 
@@ -124,6 +129,9 @@ impl<'a> Viewpoint<'a> {
     fn heard(&self, wall: &Wall, bearing: Radians) -> Result<Sight, Refusal> {
         let (expected, on_wall) = self.expected_range(wall)?;
         let off = self.off_square(&expected, bearing);
+        let variance = self.covariance.hh + SERVO_MARGIN * SERVO_MARGIN;
+        let range = expected.range + self.echo.lateness(off, variance);
+        let expected = ExpectedRange { range, ..expected };
         let square = self.of_square(off)?;
         let place = wall.along(self.position());
         let noise = self.sonar.noise.variance(expected.range).0;

@@ -5,10 +5,10 @@
 use emulated_board::meter::{Cost, Meter};
 use emulated_board::report;
 use emulated_probe::{Robot, STEPS, STEPS_A_RANGE, end, room, travel};
-use sonarfix::sensor::absolute::{AbsoluteMeasurement, PoseNoise};
 use sonarfix::config::Config;
 use sonarfix::geometry::pose::{Point, Pose};
 use sonarfix::geometry::units::{Instant, Metres, Radians};
+use sonarfix::sensor::absolute::{AbsoluteMeasurement, PoseNoise};
 
 /// A measurement and its time.
 struct Measured {

@@ -7,11 +7,11 @@ use emulated_board::report;
 use emulated_probe::{STEPS, STEPS_A_RANGE, room, travel};
 use sonarfix::config::Config;
 use sonarfix::filter::ekf::{Ekf, EkfError, StandardDeviations, StateEstimate};
-use sonarfix::map::Wall;
 use sonarfix::filter::motion::WheelTravel;
 use sonarfix::geometry::pose::{Point, Pose};
-use sonarfix::sensor::range::ExpectedRange;
 use sonarfix::geometry::units::{Metres, Radians, SquareMetres};
+use sonarfix::map::Wall;
+use sonarfix::sensor::range::ExpectedRange;
 
 /// The filter, and whether it has accepted every input.
 struct Filter {

@@ -6,9 +6,9 @@ use emulated_board::meter::{Cost, Meter};
 use emulated_board::report;
 use emulated_probe::{Robot, STEPS, STEPS_A_RANGE, end, room, travel};
 use sonarfix::config::Config;
-use sonarfix::sensor::gyro::{GyroParameters, MeasuredTurn, TurnIntegral};
 use sonarfix::filter::motion::WheelTravel;
 use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
+use sonarfix::sensor::gyro::{GyroParameters, MeasuredTurn, TurnIntegral};
 
 const TRACK_WIDTH: f32 = 0.16;
 

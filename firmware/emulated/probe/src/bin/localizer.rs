@@ -8,9 +8,9 @@ use emulated_board::meter::{Cost, Meter};
 use emulated_board::report;
 use emulated_probe::{Robot, STEPS, STEPS_A_RANGE, end, room, travel};
 use sonarfix::config::Config;
-use sonarfix::localizer::Localizer;
 use sonarfix::filter::motion::WheelTravel;
 use sonarfix::geometry::units::{Instant, Metres, Radians};
+use sonarfix::localizer::Localizer;
 
 /// Travel of the wheels up to a time.
 struct Roll {

@@ -7,9 +7,9 @@ use emulated_board::report;
 use emulated_probe::{Robot, STEPS, STEPS_A_RANGE, end, room, travel};
 use sonarfix::aim::Standing;
 use sonarfix::config::{Config, LightBeam, RangerId, Ranging};
-use sonarfix::localizer::Localizer;
 use sonarfix::geometry::pose::Point;
 use sonarfix::geometry::units::{Duration, Instant, Metres};
+use sonarfix::localizer::Localizer;
 
 /// No input: the localizer chooses the aim.
 #[unsafe(no_mangle)]

@@ -8,11 +8,11 @@ use emulated_board::meter::{Cost, Meter};
 use emulated_board::report;
 use emulated_probe::{STEPS, room, travel};
 use sonarfix::config::Config;
+use sonarfix::geometry::pose::Pose;
+use sonarfix::geometry::units::{Instant, Metres, Radians};
 use sonarfix::localizer::{Localizer, Start};
 use sonarfix::map::Map;
-use sonarfix::geometry::pose::Pose;
 use sonarfix_search::search::{Search, SearchParameters};
-use sonarfix::geometry::units::{Instant, Metres, Radians};
 
 /// Evaluations after each ping.
 const EVALUATIONS: u32 = 150;

@@ -1,0 +1,127 @@
+//! What determines the pose in the loop of a program without the feature `search`: the localizer. A search and the pings of
+//! its sweep are types without a value.
+
+use core::convert::Infallible;
+use core::marker::PhantomData;
+
+use sonarfix::aim::{Aim, NoAim, Standing};
+use sonarfix::config::RangerId;
+use sonarfix::filter::ekf::EkfError;
+use sonarfix::filter::motion::WheelTravel;
+use sonarfix::geometry::units::{Instant, Metres, Radians};
+use sonarfix::localizer::{AbsoluteFix, Fix, Localizer, Mode, OdometryError, Start};
+use sonarfix::sensor::absolute::AbsoluteMeasurement;
+use sonarfix::sensor::gyro::MeasuredTurn;
+
+use super::odometer::Reading;
+use super::poll::Poll;
+use super::{Hardware, Report, Robot, Step};
+use crate::ranger::Outcome;
+
+/// A search for the pose, which this program does not have.
+#[derive(Debug)]
+pub struct Search<'m>(Infallible, PhantomData<&'m ()>);
+
+/// A ping of the sweep of a search.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Sweep(Infallible);
+
+impl Sweep {
+    pub fn along(self, _: Radians) -> Self {
+        self
+    }
+}
+
+/// The result of a ping of the sweep of a search.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct SweepResult(Infallible);
+
+impl SweepResult {
+    /// The bearing of the servo, and the echo or why there is none.
+    pub fn ping(&self) -> (Radians, Outcome) {
+        match self.0 {}
+    }
+
+    /// The step of the wheels up to the reflection.
+    #[must_use]
+    pub fn step(&self) -> Option<&Step> {
+        match self.0 {}
+    }
+}
+
+/// The localizer, with the methods of a navigator.
+#[derive(Debug, Clone)]
+pub(super) struct Tracker<'m>(Localizer<'m>);
+
+impl<'m> Tracker<'m> {
+    pub fn new(localizer: Localizer<'m>) -> Self {
+        Self(localizer)
+    }
+
+    pub fn localizer(&self) -> &Localizer<'m> {
+        &self.0
+    }
+
+    pub fn localizer_mut(&mut self) -> &mut Localizer<'m> {
+        &mut self.0
+    }
+
+    #[expect(clippy::unused_self, reason = "that of a navigator depends on it")]
+    pub fn mode(&self) -> Mode {
+        Mode::Tracking
+    }
+
+    pub fn odometry_with_turn(
+        &mut self,
+        now: Instant,
+        travel: WheelTravel,
+        turn: Option<MeasuredTurn>,
+        _: Option<&mut Search<'m>>,
+    ) -> Result<(), OdometryError> {
+        self.0.odometry_with_turn(now, travel, turn)
+    }
+
+    pub fn aim(&self) -> Result<Aim, NoAim> {
+        self.0.aim()
+    }
+
+    pub fn aim_of(&self, ranger: RangerId, standing: &Standing) -> Result<Aim, NoAim> {
+        self.0.aim_of(ranger, standing)
+    }
+
+    pub fn fix(&mut self, aim: &Aim, range: Option<Metres>, _: Option<&mut Search<'m>>) -> Fix {
+        self.0.fix(aim, range)
+    }
+
+    pub fn absolute(&mut self, at: Instant, measurement: &AbsoluteMeasurement) -> AbsoluteFix {
+        self.0.absolute(at, measurement)
+    }
+
+    pub fn set_pose(&mut self, start: &Start) -> Result<(), EkfError> {
+        self.0.set_pose(start)
+    }
+}
+
+impl<'m> Robot<'m> {
+    pub(super) fn next_of_sweep(search: &Search<'m>) -> (Radians, Sweep) {
+        match search.0 {}
+    }
+
+    #[expect(clippy::unused_self, reason = "that of a robot that searches depends on it")]
+    pub(super) fn take_sweep(
+        &mut self,
+        _: &mut Poll<'_, 'm, impl Hardware>,
+        sweep: Sweep,
+        _: &Reading,
+        _: Outcome,
+        _: &mut Option<SweepResult>,
+    ) {
+        match sweep.0 {}
+    }
+
+    #[expect(clippy::unused_self, reason = "that of a robot that searches depends on it")]
+    pub(super) fn work_on(&mut self, search: &mut Search<'m>, _: &mut Report) {
+        match search.0 {}
+    }
+}

@@ -1,0 +1,273 @@
+//! A robot without a start pose in simulation: set down anywhere on its path, it drives on, sweeps with its sonar and searches for
+//! its pose.
+//!
+//! World, sonar and wheels are those of the simulator. The measurement timing is simplified: a ping
+//! each [`PERIOD`] at exactly the requested bearing ± 1°, and the range belongs to its instant.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
+use sonarfix::geometry::units::{Metres, Radians};
+use sonarfix::map::{Map, MapError};
+use sonarfix_hal::robot::EVALUATIONS_PER_MILLISECOND;
+use sonarfix_map::{BakeError, FileError, Follow, PathError, Scenario, Symmetry, symmetries};
+use sonarfix_search::search::{Answer, Hypothesis, Search, SearchParameters};
+use sonarfix_sim::angle;
+use sonarfix_sim::plant::Plant;
+use sonarfix_sim::simulate::Simulation;
+use sonarfix_sim::trace::Pose;
+use sonarfix_sim::world::Ping;
+
+/// Time of one ping of an HC-SR04 on an SG90 with steps of 20°, seconds: a frame of the servo, the
+/// turn, settling and the cycle of the sonar.
+pub const PERIOD: f64 = 0.12;
+/// Evaluations between two pings, which are 120 ms apart.
+const EVALUATIONS: u16 = 120 * EVALUATIONS_PER_MILLISECOND;
+/// Pings with which a search begins.
+const LEAST_PINGS: usize = 12;
+/// The largest systematic error of a wheel.
+const WHEEL_ERROR: f64 = 0.01;
+/// The largest deviation of the servo from the bearing, radians.
+const SERVO_ERROR: f64 = 0.02;
+/// A pose within these errors is right, metres and radians.
+const RIGHT: (f64, f64) = (0.3, 0.175);
+
+/// Why a trial cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum TrialError {
+    /// The scenario cannot be read.
+    #[error(transparent)]
+    Scenario(#[from] FileError),
+    /// The map cannot be baked.
+    #[error(transparent)]
+    Bake(#[from] BakeError),
+    /// The baked map is refused.
+    #[error(transparent)]
+    Map(#[from] MapError),
+    /// The path cannot be driven back.
+    #[error(transparent)]
+    Path(#[from] PathError),
+}
+
+/// The outcome of one trial.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Trial {
+    /// Seed of the trial.
+    pub seed: u64,
+    /// Walls of the map.
+    pub walls: usize,
+    /// Seconds until the first unique answer, if there was one; the trial ends with it.
+    pub unique_after: Option<f64>,
+    /// Distance driven until then, or until the end, metres.
+    pub metres: f64,
+    /// Whether the unique answer was right.
+    pub is_right: bool,
+    /// Position error of the unique answer, metres.
+    pub position_error: f64,
+    /// Heading error of the unique answer, radians.
+    pub heading_error: f64,
+    /// The place of the true pose in the bank at the end, from 0.
+    pub rank: Option<usize>,
+    /// How many hypotheses were answers at the end.
+    pub answers: usize,
+    /// Whether the true pose and its images under the symmetries of the map were among the answers when
+    /// there last were several; `None` of a map without symmetry.
+    pub has_all_twins: Option<bool>,
+    /// Complete cycles of the search.
+    pub cycles: u32,
+    /// Evaluations of all of them, in steps of a millisecond.
+    pub evaluations: u64,
+    /// Those of the longest.
+    pub longest_cycle: u64,
+}
+
+/// Simulates one trial of at most `seconds`: the seed chooses the wheel errors and the place on the
+/// path.
+///
+/// # Errors
+/// [`TrialError`], if the map cannot be used.
+pub fn trial(scenario: Scenario, seed: u64, seconds: f64) -> Result<Trial, TrialError> {
+    let mut rng = stream(seed, 0);
+    let errors = wheel_errors(&mut rng);
+    let spare = scenario.path.duration() - seconds;
+    let start = if spare > 1.0 { rng.random_range(0.0..spare) } else { 0.0 };
+    drive(scenario, seed, errors, start, seconds)
+}
+
+/// As [`trial`], from a given time of the path on.
+///
+/// # Errors
+/// As of [`trial`].
+pub fn trial_from(
+    scenario: Scenario,
+    seed: u64,
+    start: f64,
+    seconds: f64,
+) -> Result<Trial, TrialError> {
+    let errors = wheel_errors(&mut stream(seed, 0));
+    drive(scenario, seed, errors, start, seconds)
+}
+
+/// Errors of the right and of the left wheel.
+fn wheel_errors(rng: &mut ChaCha8Rng) -> [f64; 2] {
+    [(); 2].map(|()| rng.random_range(-WHEEL_ERROR..WHEEL_ERROR))
+}
+
+fn drive(
+    mut scenario: Scenario,
+    seed: u64,
+    errors: [f64; 2],
+    start: f64,
+    seconds: f64,
+) -> Result<Trial, TrialError> {
+    [scenario.truth.scale_right, scenario.truth.scale_left] = errors;
+    // There is no estimate to follow.
+    scenario.follow = Follow::Truth;
+    let simulation = Simulation::new(scenario);
+    let image = simulation.baked_map()?;
+    let config = simulation.config();
+    let mut drive = Drive {
+        search: Search::new(&config.sonar, Map::read(&image)?, SearchParameters::of(&config)),
+        plant: Plant::new(&simulation.scenario, simulation.range_scale()),
+        track_width: config.drive.track_width.0.into(),
+        simulation: &simulation,
+        wheels: stream(seed, 1),
+        slips: stream(seed, 4),
+        noise: stream(seed, 2),
+        luck: stream(seed, 3),
+        has_all_twins: None,
+        metres: 0.0,
+        cycle: 0,
+        evaluations: 0,
+        longest_cycle: 0,
+    };
+    let symmetries = symmetries(&simulation.scenario.floor)?;
+    drive.plant.drive_to(start, &mut drive.wheels, &mut drive.slips);
+    let end = simulation.scenario.path.duration().min(start + seconds);
+    let mut time = start + PERIOD;
+    let mut unique = None;
+    while time < end && unique.is_none() {
+        drive.ping(time);
+        if let Answer::Unique(hypothesis) = drive.search.answer() {
+            unique = Some((time - start, hypothesis));
+        }
+        drive.note_twins(&symmetries);
+        time += PERIOD;
+    }
+    Ok(drive.result(seed, unique))
+}
+
+struct Drive<'a> {
+    simulation: &'a Simulation,
+    search: Search<'a>,
+    plant: Plant<'a>,
+    track_width: f64,
+    wheels: ChaCha8Rng,
+    slips: ChaCha8Rng,
+    noise: ChaCha8Rng,
+    luck: ChaCha8Rng,
+    has_all_twins: Option<bool>,
+    /// Driven since the start.
+    metres: f64,
+    /// Evaluations of the present cycle, of all that are complete, and of the longest.
+    cycle: u64,
+    evaluations: u64,
+    longest_cycle: u64,
+}
+
+impl Drive<'_> {
+    /// Drives on to a time, pings and searches.
+    #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
+    fn ping(&mut self, time: f64) {
+        let [right, left] = self.plant.drive_to(time, &mut self.wheels, &mut self.slips).measured;
+        let turn = (right - left) / self.track_width;
+        let advance = f64::midpoint(right, left);
+        self.metres += advance.abs();
+        // Simulated wheels are finite, and so are ranges.
+        _ = self.search.odometry(Metres(advance as f32), Radians(turn as f32));
+        let bearing = self.search.aim();
+        let pose = self.plant.pose();
+        let at = self.simulation.sonar_at(&pose);
+        let servo = self.noise.random_range(-SERVO_ERROR..SERVO_ERROR);
+        let direction = angle::wrap(pose.heading + f64::from(bearing.0) + servo);
+        let ping = Ping { time, sonar_after: &|_| at, direction };
+        let (world, sensor) = (self.simulation.world(), self.simulation.sensor());
+        let echo = world.echo(&ping, sensor, &mut self.noise, &mut self.luck);
+        let stretch = 1.0 + self.simulation.range_scale();
+        let range = echo.map(|echo| Metres((echo.range * stretch) as f32));
+        let shortest = self.simulation.config().sonar.min_range;
+        _ = self.search.ping(bearing, range.filter(|range| *range >= shortest));
+        let has_begun = self.search.pings() >= LEAST_PINGS;
+        for _ in 0..EVALUATIONS / EVALUATIONS_PER_MILLISECOND {
+            let cycles = self.search.cycles();
+            self.search.poll(EVALUATIONS_PER_MILLISECOND);
+            self.cycle += u64::from(has_begun) * u64::from(EVALUATIONS_PER_MILLISECOND);
+            if self.search.cycles() != cycles {
+                self.evaluations += self.cycle;
+                self.longest_cycle = self.longest_cycle.max(self.cycle);
+                self.cycle = 0;
+            }
+        }
+    }
+
+    /// Notes whether the true pose and its images under every motion are among several answers.
+    fn note_twins(&mut self, symmetries: &[Symmetry]) {
+        let whole = || symmetries.iter().filter(|symmetry| symmetry.is_whole());
+        if whole().next().is_none() {
+            return;
+        }
+        let found = self.has_all_twins.get_or_insert(false);
+        let Answer::Several(count) = self.search.answer() else { return };
+        let truth = self.plant.pose();
+        let answers: Vec<Hypothesis> = self.search.hypotheses().take(count).collect();
+        let pose = [truth.x, truth.y, truth.heading];
+        let images = whole().flat_map(|symmetry| symmetry.motion.images(pose));
+        let mut wanted = images.chain([pose]).map(|[x, y, heading]| Pose { x, y, heading });
+        *found = wanted.all(|twin| answers.iter().any(|answer| is_right(answer, &twin)));
+    }
+
+    fn result(&self, seed: u64, unique: Option<(f64, Hypothesis)>) -> Trial {
+        let truth = self.plant.pose();
+        let errors = |hypothesis: &Hypothesis| errors(hypothesis, &truth);
+        let is_right = |hypothesis: &Hypothesis| is_right(hypothesis, &truth);
+        let (position_error, heading_error) =
+            unique.as_ref().map_or((0.0, 0.0), |(_, found)| errors(found));
+        Trial {
+            seed,
+            walls: self.simulation.scenario.floor.named_walls().len(),
+            unique_after: unique.as_ref().map(|(after, _)| *after),
+            metres: self.metres,
+            is_right: unique.as_ref().is_some_and(|(_, found)| is_right(found)),
+            position_error,
+            heading_error,
+            rank: self.search.hypotheses().position(|hypothesis| is_right(&hypothesis)),
+            answers: match self.search.answer() {
+                Answer::Several(count) => count,
+                Answer::Unique(_) => 1,
+                Answer::Searching | Answer::Nowhere | Answer::Along { .. } => 0,
+            },
+            has_all_twins: self.has_all_twins,
+            cycles: self.search.cycles(),
+            evaluations: self.evaluations,
+            longest_cycle: self.longest_cycle,
+        }
+    }
+}
+
+fn is_right(hypothesis: &Hypothesis, truth: &Pose) -> bool {
+    let (position, heading) = errors(hypothesis, truth);
+    position < RIGHT.0 && heading < RIGHT.1
+}
+
+fn errors(hypothesis: &Hypothesis, truth: &Pose) -> (f64, f64) {
+    let found = hypothesis.pose;
+    let position = (f64::from(found.x.0) - truth.x).hypot(f64::from(found.y.0) - truth.y);
+    (position, angle::wrap(f64::from(found.heading.radians().0) - truth.heading).abs())
+}
+
+fn stream(seed: u64, number: u64) -> ChaCha8Rng {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    // Apart from the streams of a run and of a floor plan.
+    rng.set_stream(100 + number);
+    rng
+}

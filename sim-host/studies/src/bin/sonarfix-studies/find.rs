@@ -1,0 +1,141 @@
+//! `sonarfix-studies find`: simulated robots that search for their pose without a start pose.
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use sonarfix_map::{Scenario, with_cabinet};
+use sonarfix_plan::trial::Trial;
+use sonarfix_report::Table;
+use sonarfix_studies::floor_plan::Kind;
+use sonarfix_studies::search_study::{self, Plans, Summary};
+use sonarfix_terminal::progress::Runs;
+
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A scenario (docs/formats.md).
+    #[arg(required_unless_present = "floor_plans")]
+    file: Option<PathBuf>,
+    /// Number of trials in a scenario.
+    #[arg(long, default_value_t = 20)]
+    runs: u32,
+    /// Seed of the first trial; the others count up from it.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Longest duration of a trial.
+    #[arg(long, default_value_t = 120.0)]
+    seconds: f64,
+    /// Makes so many trials in random floor plans instead.
+    #[arg(long, value_name = "TRIALS", conflicts_with = "file")]
+    floor_plans: Option<u32>,
+    /// Adds a mapped cabinet to a scenario, beside the wall that is nearest to this place.
+    #[arg(long, value_name = "X,Y")]
+    cabinet: Option<String>,
+    /// Takes only homes among the floor plans.
+    #[arg(long, requires = "floor_plans")]
+    homes: bool,
+    /// Walls of the map of each floor plan: those of other plans stand beside it, and a plan with more is left out.
+    #[arg(long, requires = "floor_plans", value_parser = clap::value_parser!(u16).range(1..))]
+    walls: Option<u16>,
+    /// Prints every trial.
+    #[arg(long)]
+    trials: bool,
+    /// Prints JSON instead of a table.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn execute(args: &Args) -> anyhow::Result<()> {
+    anyhow::ensure!(args.seconds > 0.0, "--seconds must be positive");
+    let runs = Runs::new(args.floor_plans.unwrap_or(args.runs));
+    let trials = match (&args.file, args.floor_plans) {
+        (_, Some(trials)) => {
+            let kind = args.homes.then_some(Kind::Home);
+            let walls = args.walls.map(usize::from);
+            let plans = Plans { first: args.seed, trials, kind, walls };
+            search_study::floor_plans(&plans, args.seconds, &runs)?
+        }
+        (Some(file), None) => {
+            let mut scenario = Scenario::read(file)?;
+            if let Some(at) = &args.cabinet {
+                let floor = with_cabinet(&scenario.floor, point(at)?);
+                scenario.floor = floor.context("the map has no wall")?;
+            }
+            search_study::scenario(&scenario, args.seed, args.runs, args.seconds, &runs)?
+        }
+        (None, None) => anyhow::bail!("a scenario is needed"),
+    };
+    runs.end()?;
+    anyhow::ensure!(!trials.is_empty(), "at least 1 trial is needed");
+    let summary = Summary::new(&trials);
+    if args.json {
+        let answer = serde_json::json!({ "summary": summary, "trials": trials });
+        return sonarfix_terminal::json::print(&answer);
+    }
+    if args.trials {
+        println!("{}\n", trial_table(&trials).text());
+    }
+    println!("{}", summary_table(&summary, args.seconds).text());
+    Ok(())
+}
+
+/// A point as `X,Y`, metres.
+fn point(text: &str) -> anyhow::Result<[f64; 2]> {
+    let (x, y) = text.split_once(',').context("--cabinet must be X,Y in metres")?;
+    let number = |text: &str| text.trim().parse().context("--cabinet must be X,Y in metres");
+    Ok([number(x)?, number(y)?])
+}
+
+fn trial_table(trials: &[Trial]) -> Table {
+    let row = |trial: &Trial| {
+        let answer = match (trial.unique_after, trial.is_right) {
+            (Some(after), true) => format!("right after {after:.1} s"),
+            (Some(after), false) => format!("wrong after {after:.1} s"),
+            (None, _) => format!("{} answers", trial.answers),
+        };
+        let rank = trial.rank.map_or("-".to_owned(), |rank| (rank + 1).to_string());
+        vec![trial.seed.to_string(), trial.walls.to_string(), answer, rank]
+    };
+    Table {
+        title: "Trials".to_owned(),
+        note: "rank: place of the true pose in the bank".to_owned(),
+        columns: ["seed", "walls", "unique", "rank"].map(str::to_owned).into(),
+        rows: trials.iter().map(row).collect(),
+    }
+}
+
+fn summary_table(summary: &Summary, seconds: f64) -> Table {
+    let mean_time = if summary.mean_seconds.is_nan() {
+        "none is unique".into()
+    } else {
+        format!("{:.1} s", summary.mean_seconds)
+    };
+    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+    let row = |name: &str, value: String| vec![name.to_owned(), value];
+    let twins = summary.with_all_twins.map_or("no symmetry".to_owned(), percent);
+    Table {
+        title: format!("{} trials of at most {seconds} s", summary.trials),
+        note: String::new(),
+        columns: ["", "value"].map(str::to_owned).into(),
+        rows: vec![
+            row("unique and right", percent(summary.unique_and_right)),
+            row("the same within 45 s", percent(summary.right_within_45)),
+            row("unique and wrong", percent(summary.unique_and_wrong)),
+            row("true pose in the bank at the end", percent(summary.in_bank)),
+            row("true pose and all twins among the answers", twins),
+            row("true pose best at the end", percent(summary.best_is_right)),
+            row("mean time to a unique answer", mean_time),
+            row("evaluations of a cycle, mean", format!("{:.0}", summary.cycle)),
+            row("the same by the walls", format!("{:.1}", summary.cycle_a_wall)),
+            row("evaluations of the longest cycle", format!("{:.0}", summary.longest_cycle)),
+            row("the same by the walls", format!("{:.1}", summary.longest_cycle_a_wall)),
+            row(
+                "position error, 95th percentile",
+                format!("{:.1} cm", 100.0 * summary.position_error_95),
+            ),
+            row(
+                "heading error, 95th percentile",
+                format!("{:.1} deg", summary.heading_error_95.to_degrees()),
+            ),
+        ],
+    }
+}

@@ -1,0 +1,76 @@
+//! The studies: runs that are pages of the documentation.
+
+#[macro_use]
+extern crate sonarfix_terminal;
+
+mod calibration;
+mod faults;
+mod find;
+mod floor_plans;
+mod health;
+mod reality;
+mod relocalize;
+mod rooms;
+mod sonar_model;
+mod surveys;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Runs the studies of the Sonarfix localizer, and prints their pages.
+#[derive(Debug, Parser)]
+#[command(name = "sonarfix-studies", version, about)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Measures the accuracy of `sonarfix calibrate` on simulated robots; prints markdown.
+    Calibration(calibration::Args),
+    /// Measures the effects of hardware faults; prints markdown.
+    Faults(faults::Args),
+    /// Measures how simulated robots without a start pose find it.
+    Find(find::Args),
+    /// Compares two measurement policies on random floor plans; prints markdown.
+    FloorPlans(floor_plans::Args),
+    /// Measures the reliability of the health verdict; prints markdown.
+    Health(health::Args),
+    /// Replays all recordings of a folder; prints markdown.
+    Reality(reality::Args),
+    /// Measures how robots that lose their pose, or start without one, find it in random floor plans.
+    Relocalize(relocalize::Args),
+    /// Measures consistency and verdicts in generated rooms; prints markdown.
+    Rooms(rooms::Args),
+    /// Compares the simulated NXT sonar with recorded sweeps; prints markdown.
+    SonarModel(sonar_model::Args),
+    /// Measures the accuracy of `sonarfix survey` on simulated robots; prints markdown.
+    Surveys(surveys::Args),
+}
+
+fn main() -> ExitCode {
+    match execute(Cli::parse().command) {
+        Ok(()) => sonarfix_terminal::progress::exit_code(),
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn execute(command: Command) -> anyhow::Result<()> {
+    match command {
+        Command::Calibration(args) => calibration::execute(&args),
+        Command::Faults(args) => faults::execute(&args),
+        Command::Find(args) => find::execute(&args),
+        Command::FloorPlans(args) => floor_plans::execute(&args),
+        Command::Health(args) => health::execute(&args),
+        Command::Reality(args) => reality::execute(&args),
+        Command::Relocalize(args) => relocalize::execute(&args),
+        Command::Rooms(args) => rooms::execute(&args),
+        Command::SonarModel(args) => sonar_model::execute(&args),
+        Command::Surveys(args) => surveys::execute(&args),
+    }
+}

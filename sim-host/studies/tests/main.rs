@@ -1,0 +1,9 @@
+//! Tests of the studies and of their command, in one program, which links once.
+
+mod endings;
+mod faults;
+mod find;
+mod floor_plan;
+#[path = "../../cli/tests/skipped/mod.rs"]
+mod skipped;
+mod sonar_model;

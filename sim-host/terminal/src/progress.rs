@@ -1,0 +1,92 @@
+//! A progress bar on a terminal, and the end of many runs by Ctrl-C.
+
+use std::process::ExitCode;
+use std::sync::Once;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use sonarfix_sim::progress::Progress;
+
+/// Exit code after Ctrl-C, as of a shell: 128 + the number of SIGINT.
+const INTERRUPTED: u8 = 130;
+
+static IS_INTERRUPTED: AtomicBool = AtomicBool::new(false);
+static HANDLER: Once = Once::new();
+
+/// A bar that counts runs. Where standard error is not a terminal there is none. After Ctrl-C no further run begins; a second
+/// Ctrl-C ends the command at once.
+#[derive(Debug)]
+pub struct Runs {
+    bar: ProgressBar,
+    /// What one finished run counts.
+    weight: u64,
+}
+
+impl Runs {
+    /// A bar for this number of runs.
+    #[must_use]
+    pub fn new(runs: u32) -> Self {
+        Self::weighted(runs, 1)
+    }
+
+    /// A bar for results that take several runs each.
+    #[must_use]
+    pub fn weighted(runs: u32, weight: u64) -> Self {
+        catch_interrupt();
+        // indicatif hides the bar by itself where standard error is not a terminal.
+        let bar = ProgressBar::with_draw_target(Some(runs.into()), ProgressDrawTarget::stderr());
+        let bar = match ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {eta} left") {
+            Ok(style) => bar.with_style(style),
+            Err(_) => bar,
+        };
+        Self { bar, weight }
+    }
+
+    /// Removes the bar; reports an interruption.
+    ///
+    /// # Errors
+    /// If it was interrupted before the first run was finished.
+    pub fn end(self) -> anyhow::Result<()> {
+        let (finished, all) = (self.bar.position(), self.bar.length().unwrap_or(0));
+        self.bar.finish_and_clear();
+        if is_interrupted() {
+            anyhow::ensure!(finished > 0, "interrupted before the first run was finished");
+            eprintln!("interrupted: the results are those of {finished} of {all} runs");
+        }
+        Ok(())
+    }
+}
+
+impl Progress for Runs {
+    fn finished(&self) {
+        self.bar.inc(self.weight);
+    }
+
+    fn is_interrupted(&self) -> bool {
+        is_interrupted()
+    }
+}
+
+/// From now on the first Ctrl-C only sets [`is_interrupted`], and a second one ends the command at once.
+pub fn catch_interrupt() {
+    // Without a handler Ctrl-C ends the command at once.
+    HANDLER.call_once(|| drop(ctrlc::set_handler(interrupt)));
+}
+
+/// Whether Ctrl-C was pressed.
+#[must_use]
+pub fn is_interrupted() -> bool {
+    IS_INTERRUPTED.load(Ordering::Relaxed)
+}
+
+fn interrupt() {
+    if IS_INTERRUPTED.swap(true, Ordering::Relaxed) {
+        std::process::exit(INTERRUPTED.into());
+    }
+}
+
+/// The exit code of a command that has succeeded, perhaps with fewer runs than requested.
+#[must_use]
+pub fn exit_code() -> ExitCode {
+    if is_interrupted() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS }
+}
