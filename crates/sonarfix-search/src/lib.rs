@@ -7,7 +7,6 @@
 //!
 //! # Features
 //! - `defmt`: derives `defmt::Format` for the public types.
-//! - `serde`: derives `Serialize` and `Deserialize` for the public types that hold data.
 
 #![no_std]
 #![forbid(unsafe_code)]

@@ -39,7 +39,6 @@ pub struct SweepResult(Infallible);
 
 impl SweepResult {
     /// The bearing of the servo, and the echo or why there is none.
-    #[must_use]
     pub fn ping(&self) -> (Radians, Outcome) {
         match self.0 {}
     }

@@ -37,7 +37,7 @@ pub struct Settings {
     /// the loop aborts the ping. It is longer than any driver of this crate takes, and protects the loop from a
     /// driver that never ends.
     pub patience: Duration,
-    /// Evaluations of the search in a poll that has nothing else to do ([`Robot::poll_with_search`](super::Robot)).
+    /// Evaluations of the search in a poll that has nothing else to do ([`Robot::poll_into`](super::Robot)).
     pub evaluations: u16,
 }
 

@@ -27,8 +27,9 @@ pub(super) struct Sweep {
 
 impl Sweep {
     /// The same ping at the bearing that the servo has reached.
-    pub fn along(self, bearing: Radians) -> Self {
-        Self { bearing }
+    pub fn along(mut self, bearing: Radians) -> Self {
+        self.bearing = bearing;
+        self
     }
 }
 
@@ -49,7 +50,6 @@ pub struct SweepResult {
 
 impl SweepResult {
     /// The bearing of the servo, and the echo or why there is none.
-    #[must_use]
     pub fn ping(&self) -> (Radians, Outcome) {
         (self.bearing, self.outcome)
     }

@@ -201,7 +201,7 @@ proptest! {
         };
         let beyond = outside(at.0, from.0, to.0).max(outside(at.1, from.1, to.1)) - f64::from(margin);
         prop_assume!(is_clear(beyond, 0.0));
-        prop_assert_eq!(region.contains(Vector::new(at.0, at.1), margin), beyond < 0.0);
+        prop_assert_eq!(region.contains(Point::new(at.0, at.1), Metres(margin)), beyond < 0.0);
     }
 
     /// Unless it is near a hypothesis or began outside of the region: by the score that it has to reach.
