@@ -8,6 +8,7 @@ mod convert;
 mod endings;
 mod export;
 mod find;
+mod guide;
 mod init;
 mod link_command;
 mod live;
