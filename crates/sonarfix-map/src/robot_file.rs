@@ -339,8 +339,18 @@ fn read_gating(robot: &Table<'_>, gating: &mut GatingParameters) {
     replace(&table, "max_position_deviation", &mut gating.max_position_deviation, length);
 }
 
-const ECHO_KEYS: [&str; 8] =
-    ["sensor", "missed", "short", "long", "free_path", "map_accuracy", "late", "late_per_radian"];
+const ECHO_KEYS: [&str; 10] = [
+    "sensor",
+    "missed",
+    "short",
+    "long",
+    "free_path",
+    "map_accuracy",
+    "late",
+    "late_per_radian",
+    "half_angle",
+    "rim",
+];
 
 /// The parameters of a known sensor, that of an HC-SR04 if none is named, or keys of their own.
 fn read_echo(robot: &Table<'_>, echo: &mut EchoParameters) {
@@ -360,6 +370,9 @@ fn read_echo(robot: &Table<'_>, echo: &mut EchoParameters) {
     replace(&table, "map_accuracy", &mut echo.map_accuracy, length);
     replace(&table, "late", &mut echo.late, length);
     replace(&table, "late_per_radian", &mut echo.late_per_radian, length);
+    let angle = |node: Node<'_>| Radians(single(node.quantity(&ANGLE)));
+    replace(&table, "half_angle", &mut echo.half_angle, angle);
+    replace(&table, "rim", &mut echo.rim, angle);
 }
 
 /// A missing weight is zero.

@@ -172,6 +172,8 @@ free_path = "{} m"
 map_accuracy = "{} m"
 late = "{} m"
 late_per_radian = "{} m"
+half_angle = "{} deg"
+rim = "{} deg"
 
 [schedule]
 policy = "{policy}"
@@ -194,6 +196,8 @@ wheels_weight = "{} m"
         echo.map_accuracy.0,
         echo.late.0,
         echo.late_per_radian.0,
+        degrees(echo.half_angle),
+        degrees(echo.rim),
         weights.heading.0,
         weights.wheels.0,
     )

@@ -390,6 +390,11 @@ impl<'m> Navigator<'m> {
         self.localizer.skip();
     }
 
+    /// As [`Localizer::skip_unplanned`].
+    pub fn skip_unplanned(&mut self) {
+        self.localizer.skip_unplanned();
+    }
+
     /// Passes a ping in any direction to the search; `None`: no echo. An echo from nearer than the sonar's shortest
     /// range counts as none. Returns whether the ping is novel.
     ///
