@@ -594,9 +594,10 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         let aim = match aim {
             Ok(aim) => aim,
             Err(no_aim) => {
-                match &pending.echo {
-                    Echo::At { .. } => navigator.skip_unplanned(),
-                    _ => navigator.skip(),
+                if matches!(pending.echo, Echo::At { .. }) {
+                    navigator.skip_unplanned();
+                } else {
+                    navigator.skip();
                 }
                 let now = navigator.localizer().health().verdict;
                 self.tally.verdicts.note(measurement.time, before, now);
