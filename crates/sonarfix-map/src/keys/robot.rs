@@ -39,8 +39,8 @@ pub(crate) fn usual() -> RobotConfig {
 pub(crate) static ROBOT: Section<RobotConfig> = Section { name: "robot", usual, keys: &[
     optional(Key::new("start", Value::Word(&["known", "unknown"], |c| usize::from(c.start.is_unknown()), |c, word| {
         c.start = if word == 0 { StartPose::Known } else { StartPose::Unknown { region: None } };
-    }), "`\"known\"`: the pose must be set before the start, and a lost robot stays lost. `\"unknown\"`: the robot \
-        [searches](search.md#in-the-robots-loop) for its pose when it starts without one and whenever it is lost")),
+    }), "whether the pose is set before the start. If not, or when it is lost, the robot \
+        [searches](search.md#in-the-robots-loop) for it. A robot with a known start stays lost")),
     optional(Key::new("start_region", Value::Own("a table of `from` and `to`", file::read_region, |c| c.start.region().map(|region| REGION.inline(&region))),
         "where on the map a robot without a pose starts, with `start = \"unknown\"`. Anywhere without this key")),
     Key::new("drive", Value::Table(&DRIVE), "wheels and encoders"),
