@@ -16,6 +16,8 @@
 //! # Non-finite policy
 //! [`RobotConfig::check`] refuses NaN and infinity in every field.
 
+mod feature;
+
 use sonarfix::config::{Config, ConfigError, Further, RangerId, Sonar};
 use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
 use sonarfix::health::{DEGRADED_WITHOUT_ODOMETRY, Verdict};
@@ -26,6 +28,8 @@ use crate::encoder::{GeometryError, WheelGeometry, Wheels};
 use crate::ranger::{Air, Celsius, PulseTiming, RangerKind, RangerSettings};
 use crate::servo::{Calibration, MeasuredPulse, ServoSettings, SettingError};
 use crate::time::since;
+
+pub use feature::{Feature, NotLinked};
 
 /// The configuration of a robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -255,6 +259,8 @@ pub enum Unsupported {
     Gyro,
     /// The configuration has more rangers than the board.
     Rangers,
+    /// The program of the board was built without a part that the configuration asks for.
+    NotLinked(NotLinked),
 }
 
 impl core::fmt::Display for Unsupported {
@@ -267,6 +273,7 @@ impl core::fmt::Display for Unsupported {
             ),
             Self::Gyro => f.write_str("the configured gyro is missing or does not respond"),
             Self::Rangers => f.write_str("the configuration has more rangers than the board"),
+            Self::NotLinked(error) => write!(f, "{error}"),
         }
     }
 }
