@@ -15,6 +15,8 @@
 //! # Non-finite policy
 //! [`RobotConfig::check`] refuses NaN and infinity in every field.
 
+mod feature;
+
 use sonarfix::config::{Config, ConfigError, Further, PingSchedule, PingTiming, RangerId, Sonar};
 use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
 use sonarfix::health::{DEGRADED_WITHOUT_ODOMETRY, Verdict};
@@ -25,6 +27,8 @@ use crate::encoder::{GeometryError, WheelGeometry, Wheels};
 use crate::ranger::{Air, Celsius, PulseTiming, RangerKind, RangerSettings};
 use crate::servo::{Calibration, MeasuredPulse, ServoSettings, SettingError};
 use crate::time::since;
+
+pub use feature::{Feature, NotLinked};
 
 /// Longest time from one reading of the encoders to the next, as in robot files: without odometry for longer, no pose is known.
 const LONGEST_ENCODER_PERIOD: Duration = Duration::from_ticks(1_000_000);
@@ -267,6 +271,8 @@ pub enum Unsupported {
     Gyro,
     /// The configuration has more rangers than the board.
     Rangers,
+    /// The program of the board was built without a part that the configuration asks for.
+    NotLinked(NotLinked),
 }
 
 impl core::fmt::Display for Unsupported {
@@ -279,6 +285,7 @@ impl core::fmt::Display for Unsupported {
             ),
             Self::Gyro => f.write_str("the configured gyro is missing or does not respond"),
             Self::Rangers => f.write_str("the configuration has more rangers than the board"),
+            Self::NotLinked(error) => write!(f, "{error}"),
         }
     }
 }

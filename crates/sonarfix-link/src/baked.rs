@@ -7,8 +7,14 @@
 //! Numbers are little-endian. Bytes after the image are ignored.
 
 use serde::Deserialize;
+use sonarfix::config::{
+    CalibrationPrior, EchoParameters, Further, GatingParameters, Policy, Sonar, Weights,
+};
+use sonarfix::filter::motion::Drive;
+use sonarfix::geometry::units::MetresPerSecond;
 use sonarfix::map::image::checksum as crc32;
-use sonarfix_hal::config::{RobotConfig, RobotConfigError};
+use sonarfix::sensor::gyro::GyroParameters;
+use sonarfix_hal::config::{Feature, NotLinked, RobotConfig, RobotConfigError};
 
 /// The version of the image. It is raised whenever the bytes of a configuration change.
 pub const VERSION: u16 = 8;
@@ -37,6 +43,8 @@ pub enum BakedError {
     Layout,
     /// The configuration violates a rule.
     Rule(RobotConfigError),
+    /// The program was built without a part that the configuration asks for.
+    NotLinked(NotLinked),
 }
 
 impl core::fmt::Display for BakedError {
@@ -50,6 +58,7 @@ impl core::fmt::Display for BakedError {
             Self::Checksum => f.write_str("the configuration is damaged: its checksum is wrong"),
             Self::Layout => f.write_str("the configuration's bytes are not those of one"),
             Self::Rule(error) => write!(f, "the configuration is wrong: {error}"),
+            Self::NotLinked(error) => write!(f, "{error}"),
         }
     }
 }
@@ -130,11 +139,39 @@ pub fn read(bytes: &[u8]) -> Result<RobotConfig, BakedError> {
     }
     // Without the tuple of `take_from_bytes`, the stack holds one copy less of the configuration.
     let mut decoder = postcard::Deserializer::from_bytes(postcard);
-    let config = RobotConfig::deserialize(&mut decoder).map_err(|_| BakedError::Layout)?;
+    let config = RobotConfig::deserialize(&mut decoder)
+        .map_err(|_| not_linked(postcard).map_or(BakedError::Layout, BakedError::NotLinked))?;
     if !decoder.finalize().is_ok_and(<[u8]>::is_empty) {
         return Err(BakedError::Layout);
     }
+    config.check_linked().map_err(BakedError::NotLinked)?;
     config.check().map(|()| config).map_err(BakedError::Rule)
+}
+
+/// The part that a configuration in postcard asks for and that this program was built without; `None` if there is no such
+/// part, or before it there is no configuration.
+///
+/// The parameters of such a part have no value, so that the whole configuration cannot be decoded. Its fields follow each
+/// other in postcard without anything between them.
+pub(crate) fn not_linked(postcard: &[u8]) -> Option<NotLinked> {
+    if Feature::Light.is_linked() && Feature::Gyro.is_linked() && Feature::Rangers.is_linked() {
+        return None;
+    }
+    let decoder = &mut postcard::Deserializer::from_bytes(postcard);
+    <(Drive, MetresPerSecond)>::deserialize(&mut *decoder).ok()?;
+    if Sonar::deserialize(&mut *decoder).is_err() {
+        return Some(NotLinked(Feature::Light));
+    }
+    type UpToGyro = (CalibrationPrior, GatingParameters, EchoParameters, Policy, Weights);
+    UpToGyro::deserialize(&mut *decoder).ok()?;
+    if Option::<GyroParameters>::deserialize(&mut *decoder).is_err() {
+        return Some(NotLinked(Feature::Gyro));
+    }
+    if Further::<Sonar>::deserialize(&mut *decoder).is_err() {
+        let rangers = Feature::Rangers.is_linked();
+        return Some(NotLinked(if rangers { Feature::Light } else { Feature::Rangers }));
+    }
+    None
 }
 
 /// The checksum by which a robot identifies its configuration

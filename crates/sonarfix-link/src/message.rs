@@ -18,16 +18,22 @@ use sonarfix::localizer::{Fix, GyroStatus, Mode, Start};
 use sonarfix::map::WallId;
 use sonarfix::sensor::absolute::AbsoluteMeasurement;
 use sonarfix::sensor::gyro::TurnReading;
-use sonarfix_hal::config::{RobotConfig, Unsupported};
+use sonarfix_hal::config::{NotLinked, RobotConfig, Unsupported};
 use sonarfix_hal::ranger;
 use sonarfix_hal::robot::{AbsoluteResult, Faults};
 
+use crate::baked;
 use crate::counters::ReceiverCounters;
 
 /// [`Telemetry`] or [`SessionCommand`].
 pub trait Message: Serialize + DeserializeOwned + sealed::Sealed {
     /// The kind in the frame, by which a receiver rejects an echo of its own frames.
     const KIND: u8;
+
+    /// What stands for a message that this program cannot decode, if it is known.
+    fn substitute(_postcard: &[u8]) -> Option<Self> {
+        None
+    }
 }
 
 mod sealed {
@@ -44,6 +50,22 @@ impl sealed::Sealed for SessionCommand {}
 
 impl Message for SessionCommand {
     const KIND: u8 = 1;
+
+    fn substitute(postcard: &[u8]) -> Option<Self> {
+        let (session, number, config) = split_command(postcard)?;
+        let not_linked = baked::not_linked(config).filter(|_| number == SET_CONFIGURATION)?;
+        Some(Self { session, command: Command::SetUnusable(not_linked) })
+    }
+}
+
+/// The number of [`Command::SetConfiguration`] in postcard.
+const SET_CONFIGURATION: u32 = 1;
+
+/// The session of a command in postcard, its number, and its content.
+fn split_command(postcard: &[u8]) -> Option<(u32, u32, &[u8])> {
+    let (session, rest) = postcard::take_from_bytes(postcard).ok()?;
+    let (number, content) = postcard::take_from_bytes(rest).ok()?;
+    Some((session, number, content))
 }
 
 /// A message from the robot. Times are those of its own clock.
@@ -462,4 +484,8 @@ pub enum Command {
     /// As [`Self::ShowDevices`], with the servo at this bearing: once it has settled, the ranger pings, and each ping is a
     /// [`Telemetry::Sweep`].
     Point(Radians),
+    /// Stands for a [`Self::SetConfiguration`] that a program received and cannot decode, because it was built without a part
+    /// of it. It is refused, and never sent.
+    #[serde(skip)]
+    SetUnusable(NotLinked),
 }

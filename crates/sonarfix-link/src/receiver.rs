@@ -114,6 +114,11 @@ fn decode<M: Message>(body: &[u8]) -> Result<Frame<M>, Skipped> {
         Ok((message, [])) => {
             Ok(Frame { sequence: u16::from_le_bytes([low, high]), checksum, message })
         }
-        _ => Err(Skipped::Undecodable),
+        _ => match M::substitute(message) {
+            Some(message) => {
+                Ok(Frame { sequence: u16::from_le_bytes([low, high]), checksum, message })
+            }
+            None => Err(Skipped::Undecodable),
+        },
     }
 }

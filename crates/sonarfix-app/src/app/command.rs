@@ -9,9 +9,10 @@ use sonarfix::localizer::{Localizer, Mode, Start, StartError};
 use sonarfix::map::Map;
 use sonarfix::map::image::checksum as crc32;
 use sonarfix::sensor::absolute::AbsoluteMeasurement;
-use sonarfix_hal::config::RobotConfig;
+use sonarfix_hal::config::{Feature, NotLinked, RobotConfig, Unsupported};
 use sonarfix_hal::encoder::Wheels;
 use sonarfix_hal::robot::{Hardware, Report, Robot, Settings, Tick};
+use sonarfix_link::baked::BakedError;
 use sonarfix_link::message::{CommandError, CommandResult};
 use sonarfix_link::reporter;
 use sonarfix_link::{Command, Frame, Reporter, SessionCommand, Telemetry, baked};
@@ -93,6 +94,7 @@ impl<'m, F: NorFlash> App<'m, F> {
         match *command {
             Command::SetPose(ref start) => self.set_pose(poll, start),
             Command::SetConfiguration(ref config) => self.set_configuration(poll, config),
+            Command::SetUnusable(reason) => Err(refused(reason)),
             Command::Start => self.start(poll),
             Command::Stop => {
                 self.stop(now);
@@ -127,6 +129,7 @@ impl<'m, F: NorFlash> App<'m, F> {
         config: &RobotConfig,
         known: &Resumed,
     ) -> Result<(), CommandError> {
+        config.check_linked().map_err(refused)?;
         config.check().map_err(|_| CommandError::Configuration)?;
         self.startable(now, config, known).map(drop)
     }
@@ -249,7 +252,7 @@ impl<'m, F: NorFlash> App<'m, F> {
             return Ok(Next::Nothing);
         }
         self.map.map_err(|_| CommandError::NoMap)?;
-        let known = self.known.ok_or(CommandError::NoConfiguration)?;
+        let known = self.known.ok_or_else(|| self.why_no_configuration())?;
         if let Some(reason) = self.unsupported {
             return Err(CommandError::Unsupported(reason));
         }
@@ -263,6 +266,14 @@ impl<'m, F: NorFlash> App<'m, F> {
             return Err(CommandError::NoPose);
         }
         Ok(Next::Begin(known))
+    }
+
+    /// Why there is no configuration.
+    fn why_no_configuration(&self) -> CommandError {
+        match self.baked {
+            Err(BakedError::NotLinked(reason)) => refused(reason),
+            _ => CommandError::NoConfiguration,
+        }
     }
 
     /// Replaces the record of a parked robot by one of a robot that drives, whose pose is unknown after a power loss. If that
@@ -304,12 +315,16 @@ impl<'m, F: NorFlash> App<'m, F> {
     /// Passes a heading, position or pose that was measured at the time `at` to a running loop ([`Robot::absolute`]).
     ///
     /// # Errors
-    /// [`CommandError::Waiting`], or [`CommandError::Occupied`]; nothing has changed.
+    /// [`CommandError::Waiting`], [`CommandError::Occupied`], or [`Unsupported::NotLinked`] in a program without the feature
+    /// `absolute`; nothing has changed.
     pub fn absolute(
         &mut self,
         at: Instant,
         measurement: &AbsoluteMeasurement,
     ) -> Result<(), CommandError> {
+        if !Feature::Absolute.is_linked() {
+            return Err(refused(NotLinked(Feature::Absolute)));
+        }
         let State::Running(running) = &mut self.state else { return Err(CommandError::Waiting) };
         running.robot.absolute(at, measurement).map_err(|_| CommandError::Occupied)
     }
@@ -434,6 +449,11 @@ impl<'m, F: NorFlash> App<'m, F> {
         });
         Ok(())
     }
+}
+
+/// The answer to a request for a part that is not linked.
+fn refused(reason: NotLinked) -> CommandError {
+    CommandError::Unsupported(Unsupported::NotLinked(reason))
 }
 
 #[inline(never)]

@@ -8,7 +8,7 @@ use sonarfix::filter::ekf::Innovation;
 use sonarfix::geometry::units::{Duration, Metres, Radians, SquareMetres};
 use sonarfix::health::Verdict;
 use sonarfix::localizer::Fix;
-use sonarfix_hal::config::{RobotConfig, Unsupported};
+use sonarfix_hal::config::{Feature, NotLinked, RobotConfig, Unsupported};
 use sonarfix_hal::ranger::{PulseTiming, RangerKind};
 use sonarfix_hal::servo::SettingError;
 use sonarfix_link::message::ImageStatus;
@@ -63,6 +63,7 @@ fn name_of_command(message: &Command) -> &'static str {
         Command::ShowDevices => "show devices",
         Command::Absolute { .. } => "absolute",
         Command::Point(_) => "point",
+        Command::SetUnusable(_) => "never sent",
     }
 }
 
@@ -134,6 +135,15 @@ fn every_variant_has_the_number_of_its_version() {
         Unsupported::Counter,
         Unsupported::Gyro,
         Unsupported::Rangers,
+        Unsupported::NotLinked(NotLinked(Feature::Light)),
+    ]);
+    numbered(&[
+        Feature::Light,
+        Feature::Gyro,
+        Feature::Rangers,
+        Feature::Absolute,
+        Feature::Informative,
+        Feature::Search,
     ]);
     numbered(&[SettingError::Calibration, limits, SettingError::Pulse, SettingError::Frame]);
     numbered(&[

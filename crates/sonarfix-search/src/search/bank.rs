@@ -3,8 +3,8 @@
 use heapless::Vec;
 
 use super::candidates::Placement;
+use super::ranked::{insert_ranked, remove_at};
 use super::refine::Spread;
-use super::removal::remove_at;
 use super::window::{Bend, Station};
 use sonarfix::geometry::vector::Vector;
 
@@ -131,17 +131,7 @@ impl<const HYPOTHESES: usize> Bank<HYPOTHESES> {
             entry.streak = if other.streak > entry.streak { other.streak } else { entry.streak };
         }
         self.remove(is_same);
-        if self.entries.is_full() {
-            match self.entries.last() {
-                Some(last) if last.score < entry.score => {
-                    self.entries.pop();
-                }
-                _ => return,
-            }
-        }
-        let at = self.entries.iter().position(|other| other.score < entry.score);
-        // There is room: it was made above.
-        let _ = self.entries.insert(at.unwrap_or(self.entries.len()), entry);
+        insert_ranked(&mut self.entries, entry, |entry| entry.score);
     }
 
     /// Moves all placements to a new reference of the odometry frame, of which `bend` is taken out.

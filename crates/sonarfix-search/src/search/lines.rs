@@ -4,9 +4,8 @@
 
 use heapless::Vec;
 
-use super::removal::remove_at;
+use super::ranked::{insert_ranked, remove_at};
 use super::window::Ping;
-use sonarfix::config::{Ranging, Sonar};
 use sonarfix::geometry::elementary::sqrt;
 use sonarfix::geometry::trig::sin_cos;
 use sonarfix::geometry::units::Radians;
@@ -54,13 +53,15 @@ pub(super) struct Lines {
 }
 
 impl Lines {
-    pub fn new(cone: Radians) -> Self {
-        Self { found: Vec::new(), cone, cos_cone: cos_of_support(cone), is_light: false }
+    /// No lines yet, for a sonar with this cone, or for a ranger of light.
+    pub fn new(cone: Radians, is_light: bool) -> Self {
+        Self { found: Vec::new(), cone, cos_cone: cos_of_support(cone), is_light }
     }
 
-    /// No lines yet, for a ranger.
-    pub fn of_ranger(sonar: &Sonar) -> Self {
-        Self { is_light: sonar.ranging != Ranging::Sound, ..Self::new(sonar.cone) }
+    /// Removes all lines, for another ranger.
+    pub fn restart(&mut self, cone: Radians, is_light: bool) {
+        self.found.clear();
+        (self.cone, self.cos_cone, self.is_light) = (cone, cos_of_support(cone), is_light);
     }
 
     /// Whether the pings are points, so that two of them determine a line ([`Self::vote_of_two`]).
@@ -68,24 +69,10 @@ impl Lines {
         self.is_light
     }
 
-    /// Removes all lines, for a sonar with this cone.
-    pub fn restart(&mut self, cone: Radians) {
-        self.found.clear();
-        self.cone = cone;
-        self.cos_cone = cos_of_support(cone);
-        self.is_light = false;
-    }
-
-    /// Removes all lines, for a ranger.
-    pub fn restart_of_ranger(&mut self, sonar: &Sonar) {
-        self.restart(sonar.cone);
-        self.is_light = sonar.ranging != Ranging::Sound;
-    }
-
     /// These lines, for tests.
     #[cfg(test)]
     pub fn of(cone: Radians, lines: &[Line]) -> Self {
-        Self { found: lines.iter().copied().collect(), ..Self::new(cone) }
+        Self { found: lines.iter().copied().collect(), ..Self::new(cone, false) }
     }
 
     pub fn all(&self) -> &[Line] {
@@ -180,17 +167,7 @@ impl Lines {
                 _ => return,
             }
         }
-        if self.found.is_full() {
-            match self.found.last() {
-                Some(last) if last.support < line.support => {
-                    self.found.pop();
-                }
-                _ => return,
-            }
-        }
-        let at = self.found.iter().position(|other| other.support < line.support);
-        // There is room: it was made above.
-        let _ = self.found.insert(at.unwrap_or(self.found.len()), line);
+        insert_ranked(&mut self.found, line, |line| line.support);
     }
 
     /// Fits a line to its pings by one Gauss–Newton step: ranges to 3 cm, and beams that on the mean

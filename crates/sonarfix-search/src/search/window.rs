@@ -12,7 +12,7 @@
 
 use heapless::Vec;
 
-use super::removal::remove_at;
+use super::ranked::remove_at;
 use sonarfix::geometry::pose::Heading;
 use sonarfix::geometry::units::Radians;
 use sonarfix::geometry::vector::Vector;
@@ -88,6 +88,12 @@ pub(super) struct Window<const PINGS: usize> {
     pings: Vec<Ping, PINGS>,
     /// Where the sonar is in the robot frame.
     mount: Vector,
+    path: Path,
+}
+
+/// The robot's path by odometry.
+#[derive(Debug, Clone, Default)]
+struct Path {
     robot: Station,
     /// Where the search began, with the bends that were taken out since, and the distance since.
     start: Vector,
@@ -103,37 +109,19 @@ pub(super) struct Window<const PINGS: usize> {
 
 impl<const PINGS: usize> Window<PINGS> {
     pub fn new(mount: Vector) -> Self {
-        Self {
-            pings: Vec::new(),
-            mount,
-            robot: Station::default(),
-            start: Vector::default(),
-            since_start: 0.0,
-            heading: 0.0,
-            reference_heading: 0.0,
-            bend: Bend::NONE,
-            taken: 0,
-            referred: 0,
-        }
+        Self { pings: Vec::new(), mount, path: Path::default() }
     }
 
     /// Removes all pings and moves the origin to the robot.
     pub fn restart(&mut self, mount: Vector) {
         self.pings.clear();
         self.mount = mount;
-        self.robot = Station::default();
-        self.start = Vector::default();
-        self.since_start = 0.0;
-        self.heading = 0.0;
-        self.reference_heading = 0.0;
-        self.bend = Bend::NONE;
-        self.taken = 0;
-        self.referred = 0;
+        self.path = Path::default();
     }
 
     /// The pings before the reference, the oldest first: those that the current cycle works with.
     pub fn pings(&self) -> &[Ping] {
-        let later = usize::from(self.taken.wrapping_sub(self.referred));
+        let later = usize::from(self.path.taken.wrapping_sub(self.path.referred));
         let count = self.pings.len().saturating_sub(later);
         self.pings.get(..count).unwrap_or_default()
     }
@@ -144,51 +132,51 @@ impl<const PINGS: usize> Window<PINGS> {
     }
 
     pub fn taken(&self) -> u16 {
-        self.taken
+        self.path.taken
     }
 
     /// So many pings, for tests.
     #[cfg(test)]
     pub fn set_taken(&mut self, taken: u16) {
-        self.taken = taken;
+        self.path.taken = taken;
     }
 
     pub fn robot(&self) -> &Station {
-        &self.robot
+        &self.path.robot
     }
 
     /// Where the search began.
     pub fn start(&self) -> Vector {
-        self.start
+        self.path.start
     }
 
     /// Distance travelled since the search began, metres.
     pub fn since_start(&self) -> f32 {
-        self.since_start
+        self.path.since_start
     }
 
     /// What is taken out of the odometry.
     pub fn bend(&self) -> Bend {
-        self.bend
+        self.path.bend
     }
 
     /// Heading of the robot in the odometry frame, radians.
     pub fn heading(&self) -> f32 {
-        self.heading
+        self.path.heading
     }
 
     /// Moves the robot by a distance and a turn by the encoders, both finite.
     #[inline(never)]
     pub fn drive(&mut self, advance: f32, turn: f32) {
         let travelled = advance.abs();
-        let bent = self.bend.drift * travelled + self.bend.turn_scale * turn;
-        let heading = self.heading + turn + bent;
-        let middle = Vector::of_angle(0.5 * (self.heading + heading));
-        self.robot.at = self.robot.at.plus(middle.times(advance));
-        self.robot.travelled += travelled;
-        self.since_start += travelled;
-        self.robot.turned += turn;
-        self.heading = Heading::new(Radians(heading)).radians().0;
+        let bent = self.path.bend.drift * travelled + self.path.bend.turn_scale * turn;
+        let heading = self.path.heading + turn + bent;
+        let middle = Vector::of_angle(0.5 * (self.path.heading + heading));
+        self.path.robot.at = self.path.robot.at.plus(middle.times(advance));
+        self.path.robot.travelled += travelled;
+        self.path.since_start += travelled;
+        self.path.robot.turned += turn;
+        self.path.heading = Heading::new(Radians(heading)).radians().0;
     }
 
     /// Takes a ping, if it is novel.
@@ -197,9 +185,9 @@ impl<const PINGS: usize> Window<PINGS> {
     /// has left the first place, and after.
     #[inline(never)]
     pub fn ping(&mut self, bearing: f32, range: Option<f32>, novel: [Radians; 2]) -> bool {
-        let mut station = self.robot;
-        station.at = station.at.plus(self.mount.turned(Vector::of_angle(self.heading)));
-        let axis = Vector::of_angle(self.heading + bearing);
+        let mut station = self.path.robot;
+        station.at = station.at.plus(self.mount.turned(Vector::of_angle(self.path.heading)));
+        let axis = Vector::of_angle(self.path.heading + bearing);
         let [at_rest, driving] = novel;
         let first = self.pings.first().map_or(station.travelled, |ping| ping.station.travelled);
         let novel = if station.travelled - first > NOVEL_DISTANCE { driving } else { at_rest };
@@ -217,36 +205,36 @@ impl<const PINGS: usize> Window<PINGS> {
             remove_at(&mut self.pings, 0);
         }
         // There is room now, unless there is room for none.
-        self.taken = self.taken.wrapping_add(1);
+        self.path.taken = self.path.taken.wrapping_add(1);
         self.pings.push(Ping { station, axis, range: range.unwrap_or(-1.0) }).is_ok()
     }
 
     /// Makes the robot's present place the reference and returns it in the old frame.
     #[inline(never)]
     pub fn rebase(&mut self) -> Station {
-        let reference = self.robot;
+        let reference = self.path.robot;
         for ping in &mut self.pings {
             ping.station = ping.station.seen_from(&reference);
         }
-        self.start = self.start.minus(reference.at);
-        self.robot = Station::default();
-        self.reference_heading = self.heading;
-        self.referred = self.taken;
+        self.path.start = self.path.start.minus(reference.at);
+        self.path.robot = Station::default();
+        self.path.reference_heading = self.path.heading;
+        self.path.referred = self.path.taken;
         reference
     }
 
     /// Takes this bend out of the odometry instead of the one before, from here on; returns what does the same for the
     /// pings so far. To be called at the reference.
     pub fn begin_straightening(&mut self, bend: Bend) -> Straightening {
-        let before = self.bend;
-        self.bend = bend;
+        let before = self.path.bend;
+        self.path.bend = bend;
         Straightening { before, done: 0, chain: Chain::new(Vector::default()) }
     }
 
     /// Takes the bend out of a few pings, the newest first; returns whether there are more.
     #[inline(never)]
     pub fn straighten(&mut self, straightening: &mut Straightening) -> bool {
-        let difference = self.bend.minus(straightening.before);
+        let difference = self.path.bend.minus(straightening.before);
         for _ in 0..STRAIGHTENED_AT_ONCE {
             // A ping that arrives meanwhile lies after the reference and may replace the oldest: counted from the newest,
             // the others keep their numbers.
@@ -274,13 +262,13 @@ impl<const PINGS: usize> Window<PINGS> {
 
     /// A ping as a link of a chain that has another bend taken out.
     pub fn link(&self, ping: &Ping, difference: Bend) -> Link {
-        self.link_of(ping, self.bend, difference)
+        self.link_of(ping, self.path.bend, difference)
     }
 
     /// The same of a ping that has the bend `taken` taken out.
     fn link_of(&self, ping: &Ping, taken: Bend, difference: Bend) -> Link {
         let station = &ping.station;
-        let turned = self.reference_heading + station.turned + taken.at(station).0;
+        let turned = self.path.reference_heading + station.turned + taken.at(station).0;
         let arm = self.mount.turned(Vector::of_angle(turned));
         Link {
             axle: station.at.minus(arm),

@@ -136,9 +136,9 @@ proptest! {
     fn the_lines_are_those_with_the_most_votes(walls in walls(), seeds in seeds(), cone in 0.1_f32..0.4) {
         let (window, angles) = pings(&walls, &seeds, cone);
         let pings = window.pings();
-        let mut lines = Lines::new(Radians(1.0));
+        let mut lines = Lines::new(Radians(1.0), false);
         lines.vote(pings, 0, 0.0);
-        lines.restart(Radians(cone));
+        lines.restart(Radians(cone), false);
         prop_assert!(lines.all().is_empty());
         let wide_cone = f64::from(cone);
         let mut expected = List::new();
@@ -206,7 +206,7 @@ proptest! {
         prop_assume!(after.is_some());
         let is_taken = step[0].abs() < wide_cone && after.is_some_and(|after| after.support >= before.support);
         let expected = if is_taken { after.unwrap() } else { before };
-        let mut lines = Lines::new(Radians(cone));
+        let mut lines = Lines::new(Radians(cone), false);
         let mut line = Line { normal: Vector::of_angle(angle), offset, stretch: (0.0, 0.0), support: 0 };
         lines.gather(pings, &mut line);
         lines.found.push(line).unwrap();
@@ -230,7 +230,7 @@ proptest! {
         let cosine = (f64::from(one) - f64::from(other)).cos().abs();
         let limit = (2.6 * f64::from(cone)).cos().max(0.259);
         prop_assume!(is_clear(cosine, limit));
-        let are_separate = Lines::new(Radians(cone)).are_separate(&line(one), &line(other));
+        let are_separate = Lines::new(Radians(cone), false).are_separate(&line(one), &line(other));
         prop_assert_eq!(are_separate, cosine < limit);
     }
 }

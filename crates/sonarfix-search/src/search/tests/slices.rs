@@ -4,6 +4,7 @@ use std::format;
 use std::vec::Vec;
 
 use super::*;
+use crate::search::candidates::AlongWalls;
 use crate::search::trial::Trial;
 
 /// Lines at these angles, the best supported first.

@@ -1,4 +1,4 @@
-//! Removal from a list.
+//! Lists in the order of a score, best first.
 
 /// Removes an element and moves those behind it; nothing if there is no such element. [`heapless::Vec::remove`] can panic.
 pub(super) fn remove_at<T: Copy, const N: usize>(list: &mut heapless::Vec<T, N>, at: usize) {
@@ -15,6 +15,24 @@ pub(super) fn remove_at<T: Copy, const N: usize>(list: &mut heapless::Vec<T, N>,
     if !is_empty {
         list.pop();
     }
+}
+
+/// Inserts an element behind those with an equal or higher score. In a full list it replaces the last one, if its score is higher.
+pub(super) fn insert_ranked<T, S: PartialOrd, const N: usize>(
+    list: &mut heapless::Vec<T, N>,
+    element: T,
+    score: impl Fn(&T) -> S,
+) {
+    let is_below = |other: &T| score(other) < score(&element);
+    if list.is_full() {
+        if !list.last().is_some_and(is_below) {
+            return;
+        }
+        list.pop();
+    }
+    let at = list.iter().position(is_below).unwrap_or(list.len());
+    // There is room: it was made above.
+    let _ = list.insert(at, element);
 }
 
 #[cfg(test)]

@@ -1,0 +1,96 @@
+//! The parts that a program links or leaves out, and which of them a configuration asks for.
+
+use sonarfix::config::{Policy, Ranging};
+
+use super::RobotConfig;
+
+/// A part that is linked only by its Cargo feature.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum Feature {
+    /// Time-of-flight rangers.
+    Light,
+    /// A gyro beside the wheels.
+    Gyro,
+    /// More than one ranger.
+    Rangers,
+    /// Headings, positions and poses from outside.
+    Absolute,
+    /// The choice of the wall with the highest information gain.
+    Informative,
+    /// The search for an unknown pose.
+    Search,
+}
+
+impl Feature {
+    /// All of them.
+    const ALL: [Self; 6] =
+        [Self::Light, Self::Gyro, Self::Rangers, Self::Absolute, Self::Informative, Self::Search];
+
+    /// The name of the Cargo feature.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Light => "light",
+            Self::Gyro => "gyro",
+            Self::Rangers => "rangers",
+            Self::Absolute => "absolute",
+            Self::Informative => "informative",
+            Self::Search => "search",
+        }
+    }
+
+    /// Whether this program was built with it.
+    #[must_use]
+    pub const fn is_linked(self) -> bool {
+        match self {
+            Self::Light => cfg!(feature = "light"),
+            Self::Gyro => cfg!(feature = "gyro"),
+            Self::Rangers => cfg!(feature = "rangers"),
+            Self::Absolute => cfg!(feature = "absolute"),
+            Self::Informative => cfg!(feature = "informative"),
+            Self::Search => cfg!(feature = "search"),
+        }
+    }
+
+    /// Whether a robot of this configuration uses it. The configuration does not say whether measurements come from outside.
+    fn is_used_by(self, config: &RobotConfig) -> bool {
+        let localizer = &config.localizer;
+        match self {
+            Self::Light => localizer.sonars().any(|(_, sonar)| sonar.ranging != Ranging::Sound),
+            Self::Gyro => localizer.gyro.is_some(),
+            Self::Rangers => localizer.has_several_sonars(),
+            Self::Absolute => false,
+            Self::Informative => localizer.policy == Policy::Informative,
+            Self::Search => config.start.is_unknown(),
+        }
+    }
+}
+
+/// A part that is asked for and that this program was built without.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct NotLinked(pub Feature);
+
+impl core::fmt::Display for NotLinked {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "this program was built without `{}`", self.0.name())
+    }
+}
+
+impl core::error::Error for NotLinked {}
+
+impl RobotConfig {
+    /// Whether this program links all parts that the robot uses.
+    ///
+    /// # Errors
+    /// [`NotLinked`] with the first that it does not link.
+    pub fn check_linked(&self) -> Result<(), NotLinked> {
+        let missing = Feature::ALL.into_iter().filter(|feature| !feature.is_linked());
+        let mut asked = missing.filter(|feature| feature.is_used_by(self));
+        asked.next().map_or(Ok(()), |feature| Err(NotLinked(feature)))
+    }
+}

@@ -1,0 +1,237 @@
+//! The stages of a cycle, in bounded slices: lines, the bank, pairs of lines on pairs of walls, and lines along every wall.
+
+use sonarfix::geometry::units::Metres;
+
+use super::Search;
+use super::bank::moved;
+use super::candidates::{AlongWalls, Generated, Pairs, Placement, make_a_pair};
+use super::decision::Decision;
+use super::lines::{Line, TILTS};
+use super::refine::Prior;
+use super::trial::{Odometry, Trial, Verdict};
+use super::window::Straightening;
+
+/// Fewer pings than these are no window to search with.
+pub(super) const LEAST_PINGS: usize = 12;
+/// Pairs of lines that every cycle tries, and those that take turns.
+pub(super) const BEST_PAIRS: u8 = 4;
+pub(super) const OTHER_PAIRS: u8 = 4;
+/// Lines that are moved along every wall.
+pub(super) const CHECKED_LINES: u8 = 2;
+
+/// How far beside its region a start may seem to lie: metres, and metres per metre travelled since.
+pub(super) const REGION_MARGIN: f32 = 0.1;
+
+/// Where a cycle stands.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Task {
+    Rebase,
+    Vote { ping: u16, tilt: u8 },
+    Fit { line: u8 },
+    Bank,
+    Pairs { pair: u8, pairs: Pairs },
+    Along { line: u8, along: AlongWalls },
+}
+
+/// What takes several evaluations, before the task goes on.
+#[derive(Debug, Clone)]
+#[expect(clippy::large_enum_variant, reason = "there is one of it, and no heap")]
+pub(super) enum Work {
+    None,
+    Straighten(Straightening),
+    Trial(Trial),
+}
+
+impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> {
+    #[inline(never)]
+    pub(super) fn evaluate(&mut self) {
+        if self.window.count() < LEAST_PINGS {
+            return;
+        }
+        match &mut self.work {
+            Work::None => self.begin(),
+            Work::Straighten(straightening) => {
+                if !self.window.straighten(straightening) {
+                    self.work = Work::None;
+                }
+            }
+            Work::Trial(trial) => {
+                let is_answer = trial.is_answer;
+                let parameters = &self.parameters;
+                let prior = Prior { drift: parameters.drift.0, turn_scale: parameters.turn_scale };
+                let odometry = Odometry { prior, per_metre: parameters.odometry };
+                match trial.advance(&self.echoes, &self.window, &odometry) {
+                    Verdict::Running => return,
+                    Verdict::Rejected => self.bank.end_trial(),
+                    Verdict::Scored(entry) if is_answer => self.answer = Decision::Unique(entry),
+                    Verdict::Scored(entry) => {
+                        self.bank.end_trial();
+                        self.bank.offer(entry);
+                    }
+                }
+                self.work = Work::None;
+            }
+        }
+    }
+
+    /// Makes a step of the task.
+    pub(super) fn begin(&mut self) {
+        self.task = match self.task {
+            Task::Rebase => self.rebase(),
+            Task::Vote { ping, tilt } => self.vote(ping, tilt),
+            Task::Fit { line } => self.fit(line),
+            Task::Bank => self.refine(),
+            Task::Pairs { pair, pairs } => self.try_pairs(pair, pairs),
+            Task::Along { line, along } => self.check(line, along),
+        };
+    }
+
+    pub(super) fn vote(&mut self, ping: u16, tilt: u8) -> Task {
+        let Some(part) = TILTS.get(usize::from(tilt)) else {
+            let next = ping + 1;
+            return if usize::from(next) < self.window.pings().len() {
+                Task::Vote { ping: next, tilt: 0 }
+            } else {
+                Task::Fit { line: 0 }
+            };
+        };
+        let (pings, voter) = (self.window.pings(), usize::from(ping));
+        if self.lines.is_light() {
+            self.lines.vote_of_two(pings, voter, usize::from(tilt) + 1);
+        } else {
+            self.lines.vote(pings, voter, *part);
+        }
+        Task::Vote { ping, tilt: tilt + 1 }
+    }
+
+    /// Moves the frame to the robot, and begins to straighten the path by the best hypothesis.
+    pub(super) fn rebase(&mut self) -> Task {
+        let bend = self.window.bend();
+        let reference = self.window.rebase();
+        self.bank.rebase(&reference, bend);
+        if let Decision::Unique(entry) = &mut self.answer {
+            entry.placement = moved(&entry.placement, &reference, bend);
+        }
+        self.lines.clear();
+        if let Some(best) = self.bank.entries().first() {
+            let straightening = self.window.begin_straightening(best.placement.bend);
+            self.work = Work::Straighten(straightening);
+        }
+        Task::Vote { ping: 0, tilt: 0 }
+    }
+
+    pub(super) fn fit(&mut self, line: u8) -> Task {
+        self.lines.fit(self.window.pings(), usize::from(line));
+        if usize::from(line) + 1 < self.lines.all().len() {
+            Task::Fit { line: line + 1 }
+        } else {
+            {
+                self.bank.begin_refinement();
+                Task::Bank
+            }
+        }
+    }
+
+    /// Tries the entries of the bank again, one after the other.
+    pub(super) fn refine(&mut self) -> Task {
+        match self.bank.next_stale() {
+            Some(entry) => {
+                self.work = Work::Trial(Trial::of_entry(&entry));
+                Task::Bank
+            }
+            None => Task::Pairs { pair: 0, pairs: Pairs::default() },
+        }
+    }
+
+    #[inline(never)]
+    pub(super) fn try_pairs(&mut self, pair: u8, mut pairs: Pairs) -> Task {
+        let Some((first, second)) = self.pair(pair) else {
+            if self.is_check_due {
+                return Task::Along { line: 0, along: AlongWalls::default() };
+            }
+            self.decide(false);
+            return Task::Rebase;
+        };
+        let bend = self.window.bend();
+        match pairs.next(&self.echoes.reflectors.map, &first, &second, bend) {
+            Generated::Candidate(placement) => self.try_candidate(placement, 0.15, 0.25),
+            Generated::Nothing => {}
+            Generated::Done => return Task::Pairs { pair: pair + 1, pairs: Pairs::default() },
+        }
+        Task::Pairs { pair, pairs }
+    }
+
+    #[inline(never)]
+    pub(super) fn check(&mut self, line: u8, mut along: AlongWalls) -> Task {
+        let checked = self.lines.all().get(usize::from(line)).copied();
+        let Some(checked) = checked.filter(|_| line < CHECKED_LINES) else {
+            self.decide(true);
+            return Task::Rebase;
+        };
+        let bend = self.window.bend();
+        match along.next(&self.echoes.reflectors.map, &checked, bend) {
+            Generated::Candidate(placement) => self.try_candidate(placement, 0.25, 0.6),
+            Generated::Nothing => {}
+            Generated::Done => {
+                return Task::Along { line: line + 1, along: AlongWalls::default() };
+            }
+        }
+        Task::Along { line, along }
+    }
+
+    pub(super) fn try_candidate(&mut self, placement: Placement, near: f32, rivalry: f32) {
+        let start = placement.at.plus(self.window.start().turned(placement.rotation));
+        let margin = REGION_MARGIN * (1.0 + self.window.since_start());
+        let is_outside =
+            self.region.is_some_and(|region| !region.contains(start.into(), Metres(margin)));
+        if is_outside || self.bank.has_near(&placement, near) {
+            return;
+        }
+        let best = self.bank.entries().first().map_or(0.0, |entry| entry.score);
+        let full = self.bank.least_score().unwrap_or(0.0);
+        let least = if full > rivalry * best { full } else { rivalry * best };
+        let least = if least > 0.0 { least } else { 0.0 };
+        self.work = Work::Trial(Trial::of_candidate(placement, least));
+    }
+
+    /// The pairs of this cycle: the best ones, then others that take turns.
+    pub(super) fn pair(&self, number: u8) -> Option<(Line, Line)> {
+        if number < BEST_PAIRS {
+            return self.nth_pair(number.into()).ok();
+        }
+        let turn = number - BEST_PAIRS;
+        if turn >= OTHER_PAIRS {
+            return None;
+        }
+        let all = self.nth_pair(usize::MAX).err()?;
+        let others = all.checked_sub(usize::from(BEST_PAIRS))?;
+        let nth = usize::from(turn);
+        if nth >= others {
+            return None;
+        }
+        let first = (self.cycles as usize).wrapping_mul(usize::from(OTHER_PAIRS));
+        self.nth_pair(usize::from(BEST_PAIRS) + (first + nth) % others).ok()
+    }
+
+    /// The pair of this rank, from 0; how many there are if it is beyond.
+    #[inline(never)]
+    pub(super) fn nth_pair(&self, nth: usize) -> Result<(Line, Line), usize> {
+        let lines = self.lines.all();
+        let mut rank = 0;
+        for sum in 1..2 * lines.len() {
+            for one in 0..sum.div_ceil(2) {
+                let (Some(one), Some(other)) = (lines.get(one), lines.get(sum - one)) else {
+                    continue;
+                };
+                if !make_a_pair(one, other) {
+                    continue;
+                }
+                if rank == nth {
+                    return Ok((*one, *other));
+                }
+                rank += 1;
+            }
+        }
+        Err(rank)
+    }
+}
