@@ -2,16 +2,12 @@
 
 use std::fmt::Write as _;
 use std::fs;
-use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
 use anyhow::ensure;
 
 use crate::cargo;
-
-/// The environment variable with the file to which a check that is skipped adds a line. Tests of the crates write it, too.
-const SKIPPED: &str = "SONARFIX_SKIPPED";
 
 /// A check.
 pub struct Step<T> {
@@ -41,34 +37,25 @@ pub fn run<T>(
         ensure!(is_known, "there is no job or step {name}");
     }
     fs::create_dir_all(cargo::target_folder())?;
-    fs::write(skipped_file(), "")?;
+    fs::write(cargo::skipped_file(), "")?;
     let is_chosen = |step: &&Step<T>| {
         names.is_empty() || names.iter().any(|name| step.job == name || step.name == name)
     };
     let outcomes: Vec<Outcome> =
         steps.iter().filter(is_chosen).map(|step| outcome(step, &run)).collect();
-    let skipped = fs::read_to_string(skipped_file())?;
+    let skipped = fs::read_to_string(cargo::skipped_file())?;
     println!("{}", report(&outcomes, &skipped.lines().collect::<Vec<_>>()));
     let has_passed = outcomes.iter().all(|outcome| outcome.failure.is_none());
     Ok(if has_passed { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Gives the commands that a step starts the file for what is skipped.
-pub fn tell_where_skipped(command: &mut std::process::Command) {
-    command.env(SKIPPED, skipped_file());
-}
-
 /// Reports that a check, or a part of it, is skipped.
 pub fn skip(why: &str) {
     eprintln!("SKIPPED: {why}");
-    let file = fs::OpenOptions::new().append(true).create(true).open(skipped_file());
+    let file = fs::OpenOptions::new().append(true).create(true).open(cargo::skipped_file());
     // The message above remains if the file cannot be written.
     let _ = file
         .and_then(|mut file| std::io::Write::write_all(&mut file, format!("{why}\n").as_bytes()));
-}
-
-fn skipped_file() -> PathBuf {
-    cargo::target_folder().join("skipped.txt")
 }
 
 fn outcome<T>(step: &Step<T>, run: impl Fn(&T) -> anyhow::Result<()>) -> Outcome {

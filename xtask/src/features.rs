@@ -6,7 +6,7 @@ use crate::workspace::{Package, Workspace};
 /// Checks no feature, each alone, each two, all, and all but one; tests no feature and all.
 pub fn check() -> anyhow::Result<()> {
     cargo::install("cargo-hack", "0.6.46")?;
-    cargo::run("hack check --package sonarfix --feature-powerset --depth 2 --no-dev-deps")?;
+    cargo::run("hack check --package sonarfix --feature-powerset --depth 2")?;
     let packages = Workspace::Main.packages()?;
     let core = packages.iter().find(|package| package.name == "sonarfix");
     let features: Vec<&str> = core.into_iter().flat_map(Package::own_features).collect();

@@ -28,14 +28,6 @@ mod panics;
 mod size;
 mod stack;
 
-/// The package of the reference board's firmware.
-pub const REFERENCE: &str = build::NAME;
-
-/// Builds the firmware of the reference board; returns the path of the linked file.
-pub fn reference() -> anyhow::Result<std::path::PathBuf> {
-    build::release()
-}
-
 /// Builds the firmware, checks the linked file, and runs it in an emulator.
 pub fn test() -> anyhow::Result<()> {
     for check in ["fmt --all --check", "clippy --release -- -D warnings"] {
@@ -55,6 +47,14 @@ pub fn test() -> anyhow::Result<()> {
     let mut command = cargo::command(page);
     command.env("SONARFIX_FIRMWARE", &program);
     cargo::check(command)
+}
+
+/// Follows the guide with this firmware.
+pub fn guide() -> anyhow::Result<()> {
+    let mut test =
+        cargo::command("test --package sonarfix-cli --test main guide:: -- --ignored --nocapture");
+    test.env("SONARFIX_FIRMWARE", build::release()?);
+    cargo::check(test)
 }
 
 /// The firmware of the further boards, and the size of all.
@@ -82,6 +82,6 @@ pub fn stack(args: &StackArgs) -> anyhow::Result<()> {
     ensure!(board.target.starts_with("thumb"), "only the instructions of a Cortex-M can be read");
     let program = build::read(&build::of(&board)?)?;
     let checked =
-        if board.package == REFERENCE { stack::check(&program) } else { stack::print(&program) };
+        if board.package == build::NAME { stack::check(&program) } else { stack::print(&program) };
     checked.map(drop)
 }

@@ -20,14 +20,11 @@ mod figures;
 mod firmware;
 mod fuzz;
 mod golden;
-mod guide;
 mod miri;
 mod mutants;
 mod panics;
-mod parts;
 mod pil;
 mod playground;
-mod profile;
 mod program;
 mod publish;
 mod search_windows;
@@ -84,8 +81,6 @@ enum Task {
     Stack(firmware::StackArgs),
     /// The shipped loop on emulated microcontrollers, bit by bit as on the PC; its cost.
     Pil,
-    /// The worst poll of the loop by part, in instructions of a Cortex-M4F.
-    Parts(parts::Args),
     /// The worst poll of many scenarios on a Cortex-M4F and a Cortex-M0+, against docs/worst-poll.md.
     WorstPoll(worst_poll::Args),
     /// Follows docs/build-a-robot.md in simulation: `sonarfix init`, signs of life in QEMU, a drive on each emulated core.
@@ -133,7 +128,7 @@ enum Task {
 }
 
 /// The steps of CI, by job.
-fn steps() -> [Step<Task>; 27] {
+fn steps() -> [Step<Task>; 28] {
     [
         ("lint", "format", Task::Format),
         ("lint", "circles", Task::Circles),
@@ -155,6 +150,7 @@ fn steps() -> [Step<Task>; 27] {
         ("emulated", "guide", Task::Guide),
         ("budgets", "panics", Task::Panics),
         ("budgets", "budgets", Task::Budgets),
+        ("budgets", "compositions", Task::Compositions(compositions::Args { check: true })),
         ("budgets", "figures", Task::Figures(figures::Args::CHECK)),
         ("budgets", "peers", Task::Peers),
         ("budgets", "playground", Task::Playground),
@@ -208,9 +204,8 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Size => firmware::size(),
         Task::Stack(args) => firmware::stack(&args),
         Task::Pil => pil::check(),
-        Task::Parts(args) => parts::run(args),
         Task::WorstPoll(args) => worst_poll::run(args),
-        Task::Guide => guide::follow(),
+        Task::Guide => firmware::guide(),
         Task::Golden => golden::check(),
         Task::Panics => panics::check(),
         Task::Budgets => budgets::check(),

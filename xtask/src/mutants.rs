@@ -23,8 +23,8 @@ pub struct Args {
 impl Args {
     /// What CI runs.
     pub fn short() -> Self {
-        let file = Some("crates/sonarfix/src/geometry/*.rs".to_owned());
-        Self { since: None, file, most: 4, part: 0 }
+        let file = Some("crates/sonarfix/src/geometry/numeric.rs".to_owned());
+        Self { since: None, file, most: 3, part: 0 }
     }
 }
 

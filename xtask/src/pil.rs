@@ -1,8 +1,6 @@
 //! Processor in the loop: runs the shipped loop on emulated microcontrollers for whole scenarios, compares it with the
 //! PC bit by bit, and measures its cost.
 
-use std::fmt::Write as _;
-
 use anyhow::{Context, ensure};
 use serde::Deserialize;
 
@@ -125,51 +123,27 @@ pub fn check() -> anyhow::Result<()> {
     under_load()?;
     // The shipped loop for the whole reference scenario: a million polls.
     sonarfix("paper --fidelity pins")?;
-    let mut table = "| instructions, mean / worst".to_owned();
-    let mut rows = [
-        "predict",
-        "aim",
-        "fix",
-        "longest poll of the start",
-        "poll with work",
-        "poll without",
-        "all polls of 100 ms",
-    ]
-    .map(|name| format!("| {name}"));
-    let mut shares = "| share of 100 ms, worst poll".to_owned();
-    let mut all_shares = "| share of all polls".to_owned();
-    let mut stacks = "| stack of the deepest poll, bytes".to_owned();
+    println!(
+        "| core, mean / worst | predict | aim | fix | longest poll of the start | poll with work | poll without | all polls of 100 ms | \
+         worst poll, share of 100 ms | all polls, share | stack of the deepest poll, bytes |\n\
+         |---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|"
+    );
     let mut missed = Vec::new();
     for core in &CORES {
         let paper = sonarfix(&format!("paper --machine {}", core.machine))?;
         let classroom = sonarfix(&format!("{CLASSROOM} --machine {}", core.machine))?;
-        let costs = [
-            paper.predict,
-            paper.aim,
-            paper.fix,
-            classroom.start,
-            classroom.poll,
-            classroom.idle,
-            classroom.per_tick,
-        ];
-        // Writing to a string does not fail.
-        let _ = write!(table, " | {}", core.name);
-        for (row, cost) in rows.iter_mut().zip(costs) {
-            let _ = write!(row, " | {}", cost.shown());
-        }
-        let _ = write!(stacks, " | {}", classroom.stack);
+        let costs = [paper.predict, paper.aim, paper.fix, classroom.start, classroom.poll];
+        let costs = [&costs[..], &[classroom.idle, classroom.per_tick]].concat();
+        let costs: Vec<String> = costs.iter().map(Cost::shown).collect();
         let tick = core.clock * TICK;
         let permille = (1_000 * classroom.poll.most + tick / 2) / tick;
-        let _ = write!(shares, " | {}.{} % at {} MHz", permille / 10, permille % 10, core.clock);
         let all = 1e2 * classroom.per_tick.mean() / tick_instructions(core);
-        let _ = write!(all_shares, " | {all:.2} %");
+        let worst = format!("{}.{} % at {} MHz", permille / 10, permille % 10, core.clock);
+        let (costs, stack) = (costs.join(" | "), classroom.stack);
+        println!("| {} | {costs} | {worst} | {all:.2} % | {stack} |", core.name);
         if core.bar.is_some_and(|bar| permille > 10 * bar) {
             missed.push(core.name);
         }
-    }
-    println!("{table} |\n|---|---:|---:|---:|---:|---:|");
-    for row in rows.iter().chain([&shares, &all_shares, &stacks]) {
-        println!("{row} |");
     }
     ensure!(
         missed.is_empty(),

@@ -205,6 +205,11 @@ static ECHO: Section<RobotConfig> = Section { name: "echo", usual, keys: &[
         "mean by which an echo from the normal is reported too far, by missed cycles and the threshold of the detector")),
     optional(number("late_per_radian", &LENGTH, ("0 m", "1 m"), |c| &mut c.localizer.echo.late_per_radian.0,
         "by how much more per radian between the axis of the sonar and the normal of the wall")),
+    optional(number("half_angle", &ANGLE, ("0 deg", "90 deg"), |c| &mut c.localizer.echo.half_angle.0,
+        "angle between the axis of the sonar and the normal of a wall at which it hears half of the echoes: it explains echoes, and `cone` chooses walls. \
+        0: the `cone` is taken")),
+    optional(number("rim", &ANGLE, ("0 deg", "90 deg"), |c| &mut c.localizer.echo.rim.0,
+        "standard deviation of that angle from ping to ping")),
 ] };
 
 #[rustfmt::skip]
