@@ -26,6 +26,7 @@ mod window;
 
 use sonarfix::config::{Config, Ranging, Sonar};
 use sonarfix::geometry::pose::{Point, Pose};
+use sonarfix::geometry::trig::atan2;
 use sonarfix::geometry::units::{Metres, Radians};
 use sonarfix::geometry::vector::Vector;
 use sonarfix::map::{Map, WallId};
@@ -348,7 +349,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
 
     fn hypothesis(&self, entry: &Entry) -> Hypothesis {
         let now = moved(&entry.placement, self.window.robot(), self.window.bend());
-        let rotation = libm::atan2f(now.rotation.y, now.rotation.x);
+        let rotation = atan2(now.rotation.y, now.rotation.x);
         let spread = &entry.spread;
         Hypothesis {
             pose: Pose::new(now.at.x, now.at.y, Radians(rotation + self.window.heading())),

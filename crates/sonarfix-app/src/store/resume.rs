@@ -201,7 +201,7 @@ fn least(one: f32, other: f32) -> f32 {
 
 /// The deviation of two independent errors together.
 fn both(one: f32, other: f32) -> f32 {
-    libm::hypotf(one, other)
+    libm::sqrtf(one * one + other * other)
 }
 
 fn is_sound(saved: &Saved) -> bool {

@@ -71,7 +71,10 @@ impl SearchParameters {
         let (position, heading) = Self::default().sharpness;
         Self {
             drift: Radians(at_least(difference / width, LEAST_DRIFT.0)),
-            turn_scale: at_least(libm::hypotf(by_width, common), LEAST_TURN_SCALE),
+            turn_scale: at_least(
+                libm::sqrtf(by_width * by_width + common * common),
+                LEAST_TURN_SCALE,
+            ),
             odometry,
             echo: config.echo,
             sharpness: (Metres(at_least(SHARP_WITHIN * odometry, position.0)), heading),
@@ -82,13 +85,16 @@ impl SearchParameters {
 
 /// Deviations of the mean and of the difference of the scale errors of both wheels, eq. (48).
 fn mean_and_difference([right, left]: [f32; 2], config: &Config) -> (f32, f32) {
-    let independent = libm::hypotf(right, left);
+    let square = right * right + left * left;
     match config.prior.difference_of(right, left) {
         Some(difference) => {
-            let mean = 0.5 * independent * independent - 0.25 * difference * difference;
+            let mean = 0.5 * square - 0.25 * difference * difference;
             (libm::sqrtf(mean), difference)
         }
-        None => (0.5 * independent, independent),
+        None => {
+            let independent = libm::sqrtf(square);
+            (0.5 * independent, independent)
+        }
     }
 }
 

@@ -192,14 +192,30 @@ impl core::fmt::Display for ConfigError {
 
 impl core::error::Error for ConfigError {}
 
+/// Checks fields, each with its value, by one rule.
 #[inline(never)]
-fn positive(field: &'static str, value: f32) -> Result<(), ConfigError> {
-    require(field, value > 0.0 && value.is_finite(), "positive and finite")
+fn positive(fields: &[&'static str], values: &[f32]) -> Result<(), ConfigError> {
+    let is_wrong = |value: f32| !(value > 0.0 && value.is_finite());
+    first(fields, values, is_wrong, "positive and finite")
 }
 
 #[inline(never)]
-fn not_negative(field: &'static str, value: f32) -> Result<(), ConfigError> {
-    require(field, value >= 0.0 && value.is_finite(), "zero or positive, and finite")
+fn not_negative(fields: &[&'static str], values: &[f32]) -> Result<(), ConfigError> {
+    let is_wrong = |value: f32| !(value >= 0.0 && value.is_finite());
+    first(fields, values, is_wrong, "zero or positive, and finite")
+}
+
+/// The first field whose value is wrong.
+fn first(
+    fields: &[&'static str],
+    values: &[f32],
+    is_wrong: impl Fn(f32) -> bool,
+    rule: &'static str,
+) -> Result<(), ConfigError> {
+    match fields.iter().zip(values).find(|&(_, &value)| is_wrong(value)) {
+        Some((field, _)) => Err(ConfigError { field, rule }),
+        None => Ok(()),
+    }
 }
 
 fn require(field: &'static str, holds: bool, rule: &'static str) -> Result<(), ConfigError> {
@@ -277,8 +293,25 @@ impl Config {
         check_sonar(&self.sonar)?;
         self.check_further_sonars()?;
         let prior = &self.prior;
-        not_negative("prior.scale_right", prior.scale_right)?;
-        not_negative("prior.scale_left", prior.scale_left)?;
+        let weights = &self.weights;
+        not_negative(
+            &[
+                "prior.scale_right",
+                "prior.scale_left",
+                "prior.track_width",
+                "prior.range_scale",
+                "weights.heading",
+                "weights.wheels",
+            ],
+            &[
+                prior.scale_right,
+                prior.scale_left,
+                prior.track_width.0,
+                prior.range_scale,
+                weights.heading.0,
+                weights.wheels.0,
+            ],
+        )?;
         // The filter holds mean and difference, which cannot represent that one alone is exact.
         let one_is_exact = (prior.scale_right > 0.0) != (prior.scale_left > 0.0);
         require("prior.scale_left", !one_is_exact, "zero if prior.scale_right is, and only then")?;
@@ -286,13 +319,9 @@ impl Config {
         let is_positive =
             difference.is_none_or(|difference| difference > 0.0 && difference.is_finite());
         require("prior.scale_difference", is_positive, "positive and finite, if given")?;
-        not_negative("prior.track_width", prior.track_width.0)?;
         let width = self.drive.track_width.0;
         let below_width = prior.track_width.0 < 0.5 * width;
         require("prior.track_width", below_width, "less than half the track width")?;
-        not_negative("prior.range_scale", prior.range_scale)?;
-        not_negative("weights.heading", self.weights.heading.0)?;
-        not_negative("weights.wheels", self.weights.wheels.0)?;
         let is_linked = self.policy == Policy::Nearest || self.policy.is_informative();
         require("policy", is_linked, "`nearest`: this program was built without `informative`")?;
         self.check_gating()?;
@@ -304,10 +333,11 @@ impl Config {
         let Some(gyro) = &self.gyro else {
             return Ok(());
         };
-        positive("gyro.range", gyro.range.0)?;
-        positive("gyro.noise", gyro.noise.0.0)?;
-        positive("gyro.bias", gyro.bias.0)?;
-        not_negative("gyro.bias_walk", gyro.bias_walk.0.0)?;
+        positive(
+            &["gyro.range", "gyro.noise", "gyro.bias"],
+            &[gyro.range.0, gyro.noise.0.0, gyro.bias.0],
+        )?;
+        not_negative(&["gyro.bias_walk"], &[gyro.bias_walk.0.0])?;
         let known = gyro.scale >= 0.0 && gyro.scale <= 0.5;
         require("gyro.scale", known, "between 0 and 50 %")?;
         let period = gyro.period.ticks();
@@ -316,36 +346,58 @@ impl Config {
 
     fn check_gating(&self) -> Result<(), ConfigError> {
         let gating = &self.gating;
-        not_negative("gating.confidence", gating.confidence)?;
-        not_negative("gating.inflation", gating.inflation.0)?;
-        positive("gating.max_distance_without_fix", gating.max_distance_without_fix.0)?;
-        positive("gating.max_position_deviation", gating.max_position_deviation.0)
+        not_negative(
+            &["gating.confidence", "gating.inflation"],
+            &[gating.confidence, gating.inflation.0],
+        )?;
+        positive(
+            &["gating.max_distance_without_fix", "gating.max_position_deviation"],
+            &[gating.max_distance_without_fix.0, gating.max_position_deviation.0],
+        )
     }
 
     fn check_echo(&self) -> Result<(), ConfigError> {
         let echo = &self.echo;
-        not_negative("echo.missed", echo.missed)?;
-        not_negative("echo.short", echo.short)?;
-        not_negative("echo.long", echo.long)?;
+        not_negative(
+            &[
+                "echo.missed",
+                "echo.short",
+                "echo.long",
+                "echo.free_path",
+                "echo.map_accuracy",
+                "echo.late",
+                "echo.late_per_radian",
+                "echo.rim",
+            ],
+            &[
+                echo.missed,
+                echo.short,
+                echo.long,
+                echo.free_path.0,
+                echo.map_accuracy.0,
+                echo.late.0,
+                echo.late_per_radian.0,
+                echo.rim.0,
+            ],
+        )?;
         let some_are_right = echo.missed + echo.short + echo.long < 1.0;
         require("echo.missed", some_are_right, "below 1 together with echo.short and echo.long")?;
-        not_negative("echo.free_path", echo.free_path.0)?;
-        not_negative("echo.map_accuracy", echo.map_accuracy.0)?;
-        not_negative("echo.late", echo.late.0)?;
-        not_negative("echo.late_per_radian", echo.late_per_radian.0)?;
         let half = echo.half_angle.0;
         let narrow = half >= 0.0 && half < 0.5 * core::f32::consts::PI;
-        require("echo.half_angle", narrow, "between 0 and 90°")?;
-        not_negative("echo.rim", echo.rim.0)
+        require("echo.half_angle", narrow, "between 0 and 90°")
     }
 
     fn check_drive(&self) -> Result<(), ConfigError> {
-        positive("drive.track_width", self.drive.track_width.0)?;
-        // Without noise, correlations in P would grow until rounding makes it indefinite.
-        positive("drive.wheel_noise", self.drive.wheel_noise.0.0)?;
-        not_negative("drive.scale_walk", self.drive.scale_walk.0)?;
-        not_negative("drive.track_width_walk", self.drive.track_width_walk.0.0)?;
-        positive("max_wheel_speed", self.max_wheel_speed.0)
+        let drive = &self.drive;
+        // Without noise of the wheels, correlations in P would grow until rounding makes it indefinite.
+        positive(
+            &["drive.track_width", "drive.wheel_noise", "max_wheel_speed"],
+            &[drive.track_width.0, drive.wheel_noise.0.0, self.max_wheel_speed.0],
+        )?;
+        not_negative(
+            &["drive.scale_walk", "drive.track_width_walk"],
+            &[drive.scale_walk.0, drive.track_width_walk.0.0],
+        )
     }
 
     fn check_further_sonars(&self) -> Result<(), ConfigError> {
@@ -368,12 +420,13 @@ fn check_sonar(sonar: &Sonar) -> Result<(), ConfigError> {
     require("sonar.servo", in_order, "a rightmost below a leftmost bearing, within ±180°")?;
     let narrow = sonar.cone.0 > 0.0 && sonar.cone.0 < 0.5 * half_turn;
     require("sonar.cone", narrow, "between 0 and 90° (half of the cone)")?;
-    not_negative("sonar.min_range", sonar.min_range.0)?;
-    positive("sonar.max_range", sonar.max_range.0)?;
+    positive(&["sonar.max_range", "sonar.noise.floor"], &[sonar.max_range.0, sonar.noise.floor.0])?;
+    not_negative(
+        &["sonar.min_range", "sonar.noise.per_metre"],
+        &[sonar.min_range.0, sonar.noise.per_metre],
+    )?;
     let wide = sonar.max_range > sonar.min_range;
     require("sonar.max_range", wide, "greater than sonar.min_range")?;
-    positive("sonar.noise.floor", sonar.noise.floor.0)?;
-    not_negative("sonar.noise.per_metre", sonar.noise.per_metre)?;
     let no_time = sonar.timing.schedule == PingSchedule::Every(Duration::from_ticks(0));
     require("sonar.timing.schedule", !no_time, "a period that is not zero")?;
     let Ranging::Light(beam) = sonar.ranging else { return Ok(()) };
@@ -381,5 +434,5 @@ fn check_sonar(sonar: &Sonar) -> Result<(), ConfigError> {
     require("sonar.cone", oblique, "at most 75° (largest angle of incidence of light)")?;
     let narrow = beam.spot.0 > 0.0 && beam.spot.0 <= MAX_SPOT.0;
     require("sonar.ranging.spot", narrow, "between 0 and 20° (half of the beam)")?;
-    not_negative("sonar.ranging.pointing", beam.pointing.0)
+    not_negative(&["sonar.ranging.pointing"], &[beam.pointing.0])
 }

@@ -39,14 +39,14 @@ const SHIFT: f32 = 12_582_912.0;
 /// ```
 #[must_use]
 pub fn sin_cos(angle: Radians) -> (f32, f32) {
-    if angle.abs() <= RANGE { sin_cos_within(angle.0) } else { of_a_huge_angle(angle.0) }
+    sin_cos_within(if angle.abs() <= RANGE { angle.0 } else { less_turns(angle.0) })
 }
 
-/// Sine and cosine beyond [`RANGE`].
+/// A huge angle less its whole turns.
 #[cold]
 #[inline(never)]
-fn of_a_huge_angle(x: f32) -> (f32, f32) {
-    sin_cos_within(libm::remainderf(x, core::f32::consts::TAU))
+fn less_turns(angle: f32) -> f32 {
+    libm::remainderf(angle, core::f32::consts::TAU)
 }
 
 /// Sine and cosine of |x| ≤ [`RANGE`].

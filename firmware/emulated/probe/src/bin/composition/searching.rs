@@ -4,7 +4,7 @@ use core::hint::black_box;
 
 use sonarfix::config::Config;
 use sonarfix::filter::motion::WheelTravel;
-use sonarfix::geometry::units::{Duration, Metres, Radians};
+use sonarfix::geometry::units::{Duration, Metres};
 use sonarfix::localizer::Localizer;
 use sonarfix_search::navigator::Navigator;
 use sonarfix_search::search::{Search, SearchParameters};
@@ -23,7 +23,12 @@ extern "C" fn probe_search(searcher: &mut Searcher, range: &Option<Metres>) {
     let Searcher { navigator, search } = searcher;
     navigator.search(search);
     let now = navigator.localizer().time() + Duration::from_ticks(100_000);
-    let _ = black_box(navigator.odometry(now, WheelTravel::new(0.01, 0.01), Some(search)));
+    let _ = black_box(navigator.odometry_with_turn(
+        now,
+        WheelTravel::new(0.01, 0.01),
+        None,
+        Some(search),
+    ));
     let bearing = search.aim();
     let _ = black_box(navigator.ping(bearing, *range, search));
     black_box(navigator.work(2, search));
@@ -38,5 +43,4 @@ pub fn link(localizer: Localizer, config: Config) {
     let search = Search::new(&config.sonar, map, SearchParameters::default());
     let mut searcher = Searcher { navigator: Navigator::new(localizer), search };
     probe_search(&mut searcher, &black_box(Some(Metres(1.0))));
-    let _ = black_box(Radians(0.0));
 }
