@@ -47,7 +47,7 @@ fn config(bytes: &mut Bytes) -> Config {
     let mut config = Config::for_track_width(Metres(0.16));
     // Half of the robots are usual ones, so that the calls are reached at all.
     if bytes.byte() < 128 {
-        config.echo = if bytes.byte() < 128 { EchoParameters::NONE } else { EchoParameters::NXT };
+        config.echo = if bytes.byte() < 128 { EchoParameters::NONE } else { EchoParameters::HC_SR04 };
         config.gating.confidence = f32::from(bytes.byte() % 4);
         config.policy = policy(bytes);
         return config;

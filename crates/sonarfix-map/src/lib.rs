@@ -25,6 +25,7 @@ mod absolute_file;
 mod addition;
 mod bake;
 mod clearance;
+pub mod devices;
 mod document;
 mod error;
 mod example;

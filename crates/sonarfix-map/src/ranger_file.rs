@@ -5,6 +5,7 @@ use sonarfix::geometry::units::{Duration, Radians};
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_hal::ranger::{PulseTiming, RangerKind, RangerSettings};
 
+use crate::devices::VL53L0X_BEAM;
 use crate::document::{Node, Table};
 use crate::keys::robot::{BEAM, RANGER};
 use crate::robot_file::Ranger;
@@ -29,7 +30,7 @@ pub(crate) fn read_kind(node: Node<'_>, ranger: &mut Ranger) {
     ranger.sonar.timing.cycle = cycle;
     ranger.sonar.ranging = match kind {
         RangerKind::Vl53l1x { .. } => Ranging::Light(LightBeam::VL53L1X),
-        RangerKind::Vl53l0x { .. } => Ranging::Light(LightBeam::VL53L0X),
+        RangerKind::Vl53l0x { .. } => Ranging::Light(VL53L0X_BEAM),
         RangerKind::Pulse(_) | RangerKind::Srf { .. } | RangerKind::Custom => Ranging::Sound,
     };
 }

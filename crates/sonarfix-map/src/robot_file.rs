@@ -7,6 +7,7 @@ use sonarfix::config::{Further, MAX_RANGERS, PingSchedule, RangerId, ServoTiming
 use sonarfix::geometry::units::{Duration, Metres, Radians};
 use sonarfix_hal::config::{RangerConfig, RobotConfig, RobotConfigError, StartPose, WheelConfig};
 
+use crate::devices::SERVOS;
 use crate::document::{Document, Node, Table};
 use crate::error::FileError;
 use crate::file;
@@ -14,17 +15,6 @@ use crate::keys::robot::{PULSE, REGION, ROBOT, SERVO_TIMING, SONAR, WHEEL, usual
 use crate::quantity::{Number, TIME};
 use crate::ranger_file;
 use crate::spelling::alternatives;
-
-/// A servo that turns instantly, with the frame of a digital one: `servo_timing = "instant"`.
-pub const INSTANT_SERVO: ServoTiming = ServoTiming {
-    frame: Duration::from_ticks(1_000),
-    sixty_degrees: Duration::from_ticks(0),
-    settle: Duration::from_ticks(0),
-};
-
-/// Names of servos.
-const SERVOS: [(&str, ServoTiming); 3] =
-    [("instant", INSTANT_SERVO), ("sg90", ServoTiming::SG90), ("mg996r", ServoTiming::MG996R)];
 
 /// The fix period of a sonar that pings as fast as possible.
 const AS_FAST_AS_POSSIBLE: &str = "as fast as possible";

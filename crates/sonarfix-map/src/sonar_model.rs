@@ -4,6 +4,10 @@ use sonarfix::config::LightBeam;
 use sonarfix::sensor::echo::EchoParameters;
 use sonarfix_hal::ranger::RangerSettings;
 
+use crate::devices::{
+    LV_MAXSONAR_ECHO, NXT_ECHO, POLAROID_6500_ECHO, SRF08_ECHO, VL53L0X_BEAM, VL53L0X_ECHO,
+    VL53L1X_ECHO,
+};
 use crate::document::Node;
 use crate::spelling::alternatives;
 
@@ -69,14 +73,14 @@ impl SonarModel {
             name: "nxt",
             simulated: Some(SonarName::Nxt),
             ranger: None,
-            echo: Some(EchoParameters::NXT),
+            echo: Some(NXT_ECHO),
             beam: None,
         },
         Self {
             name: "lv_maxsonar",
             simulated: Some(SonarName::LvMaxSonar),
             ranger: Some(RangerSettings::LV_MAXSONAR),
-            echo: Some(EchoParameters::LV_MAXSONAR),
+            echo: Some(LV_MAXSONAR_ECHO),
             beam: None,
         },
         Self {
@@ -90,29 +94,29 @@ impl SonarModel {
             name: "srf08",
             simulated: Some(SonarName::Srf08),
             ranger: Some(RangerSettings::SRF),
-            echo: Some(EchoParameters::SRF08),
+            echo: Some(SRF08_ECHO),
             beam: None,
         },
         Self {
             name: "polaroid_6500",
             simulated: Some(SonarName::Polaroid6500),
             ranger: None,
-            echo: Some(EchoParameters::POLAROID_6500),
+            echo: Some(POLAROID_6500_ECHO),
             beam: None,
         },
         Self {
             name: "vl53l1x",
             simulated: Some(SonarName::Vl53l1x),
             ranger: Some(RangerSettings::VL53L1X),
-            echo: Some(EchoParameters::VL53L1X),
+            echo: Some(VL53L1X_ECHO),
             beam: Some(LightBeam::VL53L1X),
         },
         Self {
             name: "vl53l0x",
             simulated: Some(SonarName::Vl53l0x),
             ranger: Some(RangerSettings::VL53L0X),
-            echo: Some(EchoParameters::VL53L0X),
-            beam: Some(LightBeam::VL53L0X),
+            echo: Some(VL53L0X_ECHO),
+            beam: Some(VL53L0X_BEAM),
         },
     ];
 

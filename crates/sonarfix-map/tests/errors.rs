@@ -7,12 +7,11 @@ use proptest::prelude::*;
 use sonarfix::config::{LightBeam, PingSchedule, Ranging, ServoTiming};
 use sonarfix::geometry::pose::Point;
 use sonarfix::geometry::units::{Duration, Metres, Radians};
-use sonarfix::sensor::echo::EchoParameters;
 use sonarfix_hal::config::{MotorPolicy, RangerConfig, RobotConfig, StartPose, WheelConfig};
 use sonarfix_hal::ranger::{PulseTiming, RangerKind};
 use sonarfix_map::{
     CLASSROOM, Fault, FaultKind, Fidelity, FileError, Floor, Follow, Mistake, PAPER, Scenario,
-    ServoName, SonarName, Wheel, robot_file, robot_text,
+    ServoName, SonarName, Wheel, devices, robot_file, robot_text,
 };
 use sonarfix_search::search::Region;
 
@@ -860,7 +859,7 @@ fn a_time_of_flight_ranger_has_a_beam() {
     assert_eq!(wide, Ranging::Light(LightBeam { spot, ..LightBeam::VL53L1X }));
     let robot = with("ranger = { kind = \"vl53l1x\", address = 0x30 }").unwrap().robot;
     assert_eq!(robot.ranger.kind, RangerKind::Vl53l1x { address: 0x30 });
-    assert_eq!(sonar("ranger = \"vl53l0x\"").ranging, Ranging::Light(LightBeam::VL53L0X));
+    assert_eq!(sonar("ranger = \"vl53l0x\"").ranging, Ranging::Light(devices::VL53L0X_BEAM));
     let robot = with("ranger = { kind = \"vl53l0x\", address = 0x31 }").unwrap().robot;
     assert_eq!(robot.ranger.kind, RangerKind::Vl53l0x { address: 0x31 });
     assert_eq!(robot.localizer.sonar.timing.cycle, Duration::millis(60));
@@ -887,7 +886,7 @@ fn a_robot_that_is_written_is_read_back() {
     odd.left_wheel = odd.left_wheel.mirrored();
     odd.ranger.kind = RangerKind::Srf { address: 0x31 };
     odd.localizer.sonar.timing.schedule = PingSchedule::AsFastAsPossible;
-    odd.localizer.echo = EchoParameters::NXT;
+    odd.localizer.echo = devices::NXT_ECHO;
     odd.localizer.echo.short = 0.04;
     odd.motors = MotorPolicy {
         lost: false,

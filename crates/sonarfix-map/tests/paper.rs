@@ -8,7 +8,7 @@ use sonarfix::geometry::pose::Point;
 use sonarfix::geometry::units::{Duration, Metres, MetresPerSecond, PerRootMetre, Radians};
 use sonarfix::sensor::echo::EchoParameters;
 use sonarfix::sensor::range::RangeNoise;
-use sonarfix_map::robot_file::INSTANT_SERVO;
+use sonarfix_map::devices::INSTANT_SERVO;
 use sonarfix_map::{FileError, GyroTruth, Movement, PAPER, PathPose, Run, Scenario, Start, Truth};
 
 fn paper() -> Result<Scenario, FileError> {

@@ -1,7 +1,7 @@
 //! The simulated NXT sonar against the recorded one.
 #![expect(clippy::unwrap_used, reason = "all of this file is a test, its helpers too")]
 
-use sonarfix::sensor::echo::EchoParameters;
+use sonarfix_map::devices::NXT_ECHO;
 use sonarfix_sim::world::sensor::SensorModel;
 use sonarfix_studies::sonar_model::echo_fit::EchoFit;
 use sonarfix_studies::sonar_model::{Comparison, compare, page};
@@ -32,14 +32,14 @@ fn the_nxt_model_matches_the_sensor() {
     }
 }
 
-/// The preset of the core is the fit, rounded to 0.01.
+/// The preset is the fit, rounded to 0.01.
 #[test]
 fn the_echo_parameters_of_the_nxt_are_fitted() {
     let Some(comparison) = nxt() else {
         return;
     };
     let fit = EchoFit::of(&comparison.measured).mean;
-    let preset = EchoParameters::NXT;
+    let preset = NXT_ECHO;
     let preset = [preset.missed, preset.short, preset.long].map(f64::from);
     for (fit, preset) in fit.into_iter().zip(preset) {
         assert!((fit - preset).abs() <= 0.0051, "{fit} {preset}");

@@ -66,37 +66,6 @@ impl EchoParameters {
         rim: Radians(0.0),
     };
 
-    /// LEGO NXT: shares of its recorded sweeps within 20° of the normal (`docs/sonar-model.md`),
-    /// averaged over the ranges. It hears walls up to 38° off the normal at 0.3 m, and up to 30° at 0.8 m. Its resolution of
-    /// 10 mm hides how late it is.
-    pub const NXT: Self = Self {
-        missed: 0.08,
-        short: 0.04,
-        long: 0.03,
-        late: Metres(0.0),
-        late_per_radian: Metres(0.0),
-        half_angle: Radians(0.56),
-        rim: Radians(0.03),
-        ..Self::HC_SR04
-    };
-
-    /// Devantech SRF08: assumed like the HC-SR04.
-    pub const SRF08: Self = Self::HC_SR04;
-
-    /// `MaxBotix` LV-MaxSonar-EZ: assumed like the HC-SR04.
-    pub const LV_MAXSONAR: Self = Self::HC_SR04;
-
-    /// Polaroid 6500: assumed like the HC-SR04, with fewer misses.
-    pub const POLAROID_6500: Self = Self { missed: 0.02, ..Self::HC_SR04 };
-
-    /// VL53L1X in a furnished room, whose walls are plaster, wood and some glass: assumed, no recordings. A narrow beam
-    /// meets fewer objects than a cone.
-    pub const VL53L1X: Self =
-        Self { missed: 0.04, short: 0.01, long: 0.01, free_path: Metres(15.0), ..Self::NONE };
-
-    /// VL53L0X: assumed like the VL53L1X.
-    pub const VL53L0X: Self = Self::VL53L1X;
-
     /// Probability that a wall within range, square to the beam and not occluded, returns its range.
     #[must_use]
     #[inline]

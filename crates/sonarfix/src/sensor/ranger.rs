@@ -53,8 +53,6 @@ impl LightBeam {
     /// light (assumed), on a hobby servo that is off by 1.1° (assumed).
     pub const VL53L1X: Self =
         Self { spot: Radians(0.12), pointing: Radians(0.02), linked: LightLinked };
-    /// VL53L0X: a field of view of 25°; the same assumptions.
-    pub const VL53L0X: Self = Self { spot: Radians(0.11), ..Self::VL53L1X };
 }
 
 /// One of a robot's rangers, by its place in the robot file: 0 is [`Config::sonar`](crate::config::Config::sonar).
@@ -182,13 +180,6 @@ impl ServoTiming {
     pub const SG90: Self = Self {
         frame: Duration::from_ticks(20_000),
         sixty_degrees: Duration::from_ticks(120_000),
-        settle: Duration::from_ticks(60_000),
-    };
-
-    /// MG996R: 0.17 s/60° by its datasheet (4.8 V), pulses at 50 Hz; settling as assumed for the SG90.
-    pub const MG996R: Self = Self {
-        frame: Duration::from_ticks(20_000),
-        sixty_degrees: Duration::from_ticks(170_000),
         settle: Duration::from_ticks(60_000),
     };
 }

@@ -87,7 +87,9 @@ mod tests {
     /// Driver and planner reckon with the same times, to a microsecond.
     #[test]
     fn both_evaluations_agree() {
-        for timing in [ServoTiming::SG90, ServoTiming::MG996R] {
+        let slow =
+            ServoTiming { sixty_degrees: Duration::from_ticks(170_000), ..ServoTiming::SG90 };
+        for timing in [ServoTiming::SG90, slow] {
             let servo = ServoMotion::new(&timing);
             for degrees in 1..=180_u8 {
                 let turn = Radians::from_degrees(f32::from(degrees));

@@ -617,6 +617,10 @@ fn corridor(right: f32, left: f32) -> [Wall; 2] {
     [-right, left].map(|y| Wall::new(Point::new(-20.0, y), Point::new(20.0, y)).unwrap())
 }
 
+/// A large hobby servo.
+const SLOW_SERVO: ServoTiming =
+    ServoTiming { sixty_degrees: Duration::from_ticks(170_000), ..ServoTiming::SG90 };
+
 /// A sonar that pings without pause, on a servo.
 fn with_servo(servo: ServoTiming) -> Config {
     let mut config = config_for_rooms(Point::default());
@@ -647,7 +651,7 @@ proptest! {
     /// The bearing of a turning robot is square when the servo has settled, not now.
     #[test]
     fn the_bearing_leads_a_turning_robot(rate in -0.8_f32..0.8, steps in 10_u8..40) {
-        let mut config = with_servo(ServoTiming::MG996R);
+        let mut config = with_servo(SLOW_SERVO);
         config.prior.track_width = Metres(0.002);
         let walls = [Wall::new(Point::new(2.0, -9.0), Point::new(2.0, 9.0)).unwrap()];
         // A turn on the spot in steps of 0.1 s, until the wall is one radian to the left.
@@ -691,7 +695,7 @@ proptest! {
     #[test]
     fn no_bearing_is_starved(angle in 0.01_f32..1.56, wheel in 0.0_f32..0.01) {
         let walls = rotated_square(angle);
-        let mut config = with_servo(ServoTiming::MG996R);
+        let mut config = with_servo(SLOW_SERVO);
         // Ranges contain information on the position only.
         config.prior.range_scale = 0.0;
         let noise = config.sonar.noise;

@@ -6,7 +6,7 @@ use sonarfix::geometry::units::Duration;
 use sonarfix_hal::config::{RangerConfig, RobotConfig};
 use sonarfix_hal::ranger::{PulseTiming, RangerKind};
 use sonarfix_hal::servo::MeasuredPulse;
-use sonarfix_map::robot_file::INSTANT_SERVO;
+use sonarfix_map::devices::{INSTANT_SERVO, MG996R};
 use sonarfix_map::{Scenario, ServoName};
 use sonarfix_pil::wires::FULL_DUTY;
 
@@ -60,7 +60,7 @@ pub fn mount_servo(scenario: &mut Scenario, name: ServoName) {
     let (timing, [shortest, longest]) = match name {
         ServoName::Ideal => (INSTANT_SERVO, [100, 900]),
         ServoName::Sg90 => (ServoTiming::SG90, [500, 2_500]),
-        ServoName::Mg996r => (ServoTiming::MG996R, [500, 2_500]),
+        ServoName::Mg996r => (MG996R, [500, 2_500]),
     };
     scenario.hardware.servo = name;
     let robot = &mut scenario.robot;

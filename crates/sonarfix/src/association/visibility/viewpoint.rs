@@ -370,7 +370,7 @@ mod tests {
         for cone in [8.0_f32, 12.0, 20.0, 40.0] {
             let mut config = Config::for_track_width(Metres(0.2));
             config.sonar.cone = Radians::from_degrees(cone);
-            config.echo = EchoParameters::NXT;
+            (config.echo.half_angle, config.echo.rim) = (Radians(0.56), Radians(0.03));
             let view = Viewpoint::new(&config, &config.sonar, &ekf);
             let (half, rim) = (f64::from(config.echo.half_angle.0), f64::from(config.echo.rim.0));
             let sigma = (0.02_f64.powi(2) + 0.01_f64.powi(2) + rim * rim).sqrt()

@@ -1,0 +1,63 @@
+//! Presets of devices that have a name in files, each with its source. The core has those that a program without files needs as
+//! well: [`EchoParameters::HC_SR04`], its default, [`LightBeam::VL53L1X`], [`ServoTiming::SG90`] and the MPU-6050.
+
+use sonarfix::config::{LightBeam, ServoTiming};
+use sonarfix::geometry::units::{Duration, Radians};
+use sonarfix::sensor::echo::EchoParameters;
+
+/// LEGO NXT: shares of its recorded sweeps within 20° of the normal (`docs/sonar-model.md`), averaged over the ranges. It hears
+/// walls up to 38° off the normal at 0.3 m, and up to 30° at 0.8 m. Its resolution of 10 mm hides how late it is.
+pub const NXT_ECHO: EchoParameters = {
+    let mut nxt = on_time(echo(0.08, 0.04, 0.03));
+    (nxt.half_angle, nxt.rim) = (Radians(0.56), Radians(0.03));
+    nxt
+};
+
+/// Devantech SRF08: assumed like the HC-SR04.
+pub const SRF08_ECHO: EchoParameters = EchoParameters::HC_SR04;
+
+/// `MaxBotix` LV-MaxSonar-EZ: assumed like the HC-SR04.
+pub const LV_MAXSONAR_ECHO: EchoParameters = EchoParameters::HC_SR04;
+
+/// Polaroid 6500: assumed like the HC-SR04, with fewer misses.
+pub const POLAROID_6500_ECHO: EchoParameters = echo(0.02, 0.02, 0.02);
+
+/// VL53L1X in a furnished room, whose walls are plaster, wood and some glass: assumed, no recordings. A narrow beam meets
+/// fewer objects than a cone.
+pub const VL53L1X_ECHO: EchoParameters = {
+    let mut light = on_time(echo(0.04, 0.01, 0.01));
+    light.free_path.0 = 15.0;
+    light
+};
+
+/// VL53L0X: assumed like the VL53L1X.
+pub const VL53L0X_ECHO: EchoParameters = VL53L1X_ECHO;
+
+/// VL53L0X: a field of view of 25°, of which the inner half returns most of the light (assumed), on a hobby servo that is off
+/// by 1.1° (assumed).
+pub const VL53L0X_BEAM: LightBeam = LightBeam { spot: Radians(0.11), ..LightBeam::VL53L1X };
+
+/// MG996R: 0.17 s/60° by its datasheet (4.8 V), pulses at 50 Hz; settling as assumed for the SG90 (`docs/hardware.md`).
+pub const MG996R: ServoTiming =
+    ServoTiming { sixty_degrees: Duration::from_ticks(170_000), ..ServoTiming::SG90 };
+
+/// A servo that turns instantly, with the frame of a digital one: `servo_timing = "instant"`.
+pub const INSTANT_SERVO: ServoTiming =
+    ServoTiming { frame: Duration::from_ticks(1_000), ..ServoTiming::INSTANT };
+
+/// Names of servos.
+pub(crate) const SERVOS: [(&str, ServoTiming); 3] =
+    [("instant", INSTANT_SERVO), ("sg90", ServoTiming::SG90), ("mg996r", MG996R)];
+
+/// The same without lateness.
+const fn on_time(mut echo: EchoParameters) -> EchoParameters {
+    (echo.late.0, echo.late_per_radian.0) = (0.0, 0.0);
+    echo
+}
+
+/// A sonar with these probabilities of a missed, a short and a long echo, among the objects of a furnished room.
+const fn echo(missed: f32, short: f32, long: f32) -> EchoParameters {
+    let mut echo = EchoParameters::HC_SR04;
+    (echo.missed, echo.short, echo.long) = (missed, short, long);
+    echo
+}
