@@ -33,7 +33,7 @@ pub(super) const FOOT_MARGIN: f32 = 0.02;
 pub(super) const RANGE_MARGIN: f32 = 0.001;
 const HEADING_MARGIN: f32 = 0.01;
 /// Standard deviation of the bearing of a servo, radians: dead band and backlash of an SG90.
-const SERVO_MARGIN: f32 = 0.015;
+const SERVO_MARGIN: f32 = 0.017_5;
 
 /// Largest deviation of the heading at which the estimate counts as tracking, as a share of the cone.
 const MAX_HEADING_DEVIATION: f32 = 0.25;
@@ -407,7 +407,7 @@ mod tests {
         assert!((expected(&config, 0.1) - 2.0).abs() < 1e-6);
         config.echo = EchoParameters::HC_SR04;
         for bearing in [-0.15_f32, 0.0, 0.1] {
-            let variance = 0.02_f64.powi(2) + 0.015_f64.powi(2);
+            let variance = 0.02_f64.powi(2) + 0.017_5_f64.powi(2);
             let angle =
                 (f64::from(bearing).powi(2) + 2.0 / core::f64::consts::PI * variance).sqrt();
             let late = 0.000_23 + 0.014_3 * angle;
