@@ -87,6 +87,8 @@ fn config(bytes: &mut Bytes) -> Config {
     echo.map_accuracy = Metres(bytes.between(0.0, 0.1));
     echo.late = Metres(bytes.between(0.0, 0.01));
     echo.late_per_radian = Metres(bytes.between(0.0, 0.1));
+    echo.half_angle = Radians(bytes.between(0.0, 1.5));
+    echo.rim = Radians(bytes.between(0.0, 0.2));
     config.policy = policy(bytes);
     config.weights.heading = Metres(bytes.between(0.0, 1.0));
     config.weights.wheels = Metres(bytes.between(0.0, 10.0));

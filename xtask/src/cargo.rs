@@ -14,13 +14,24 @@ pub fn run(arguments: &str) -> anyhow::Result<()> {
 pub fn command(arguments: &str) -> Command {
     let mut command = Command::new("cargo");
     command.args(arguments.split_whitespace());
+    command.env("SONARFIX_SKIPPED", skipped_file());
     command
+}
+
+/// Installs a program of this version; does nothing if it is there.
+pub fn install(name: &str, version: &str) -> anyhow::Result<()> {
+    run(&format!("install {name} --version {version} --locked --quiet"))
 }
 
 /// Where builds go, whatever folder cargo runs in.
 pub fn target_folder() -> PathBuf {
     let chosen = std::env::var_os("CARGO_TARGET_DIR");
     chosen.map_or_else(|| root().join("target"), |chosen| root().join(chosen))
+}
+
+/// The file to which a check that is skipped adds a line. Tests of the crates get it in an environment variable.
+pub fn skipped_file() -> PathBuf {
+    target_folder().join("skipped.txt")
 }
 
 /// The root of the repository.

@@ -1,9 +1,8 @@
 //! Checks that are a few calls of cargo.
 
-use anyhow::Context;
-
 use crate::bench::cmsis;
 use crate::cargo;
+use crate::ci;
 use crate::workspace::Workspace;
 
 /// The crates that run on a robot.
@@ -66,19 +65,18 @@ pub fn peers() -> anyhow::Result<()> {
     let mut tests = "test --package bench-host --test agreement --test derived".to_owned();
     match cmsis::fetch() {
         Ok(()) => tests.push_str(" --features crazyflie"),
-        Err(error) => eprintln!("crazyflie: not compared, {error:#}"),
+        Err(error) => ci::skip(&format!("the peer crazyflie: {error:#}")),
     }
     cargo::check(Workspace::Bench.cargo(&tests))
 }
 
 /// Checks licences and sources of the crates and of the firmware; advisories too if their database can be reached.
 pub fn deny() -> anyhow::Result<()> {
-    cargo::output(cargo::command("deny --version"))
-        .context("cargo-deny is missing: install it with `cargo install cargo-deny --locked`")?;
+    cargo::install("cargo-deny", "0.20.2")?;
     deny_in_all("licenses bans sources")?;
     // The advisory database is on the network.
     if cargo::run("deny fetch db").is_err() {
-        eprintln!("advisories: not checked, their database cannot be reached");
+        ci::skip("the advisories: their database cannot be reached");
         return Ok(());
     }
     deny_in_all("advisories")

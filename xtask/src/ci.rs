@@ -1,7 +1,21 @@
-//! Runs all steps of CI, also after one has failed, and reports each with its time.
+//! Runs the steps of CI, also after one has failed, and reports each with its time.
 
+use std::fmt::Write as _;
+use std::fs;
 use std::process::ExitCode;
 use std::time::Instant;
+
+use anyhow::ensure;
+
+use crate::cargo;
+
+/// A check.
+pub struct Step<T> {
+    /// The job that it belongs to.
+    pub job: &'static str,
+    pub name: &'static str,
+    pub task: T,
+}
 
 /// How a step ended.
 struct Outcome {
@@ -11,44 +25,75 @@ struct Outcome {
     failure: Option<String>,
 }
 
-/// Runs the steps in order. The last line that it prints is `N passed, N failed`.
-pub fn run<S>(steps: &[(&'static str, S)], run: impl Fn(&S) -> anyhow::Result<()>) -> ExitCode {
-    let outcomes: Vec<Outcome> = steps
-        .iter()
-        .map(|(name, step)| {
-            eprintln!("══ {name}");
-            let start = Instant::now();
-            let failure = run(step).err().map(|error| format!("{error:#}"));
-            let seconds = start.elapsed().as_secs();
-            let word = if failure.is_some() { "failed" } else { "passed" };
-            eprintln!("══ {name}: {word} after {seconds} s");
-            Outcome { name, seconds, failure }
-        })
-        .collect();
-    println!("{}", report(&outcomes));
-    if outcomes.iter().all(|outcome| outcome.failure.is_none()) {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::FAILURE
+/// Runs the steps of these names, or of jobs of these names, or all if there is no name. The last line that it prints is
+/// `N passed, N failed`, with `, N skipped` if parts of checks were skipped.
+pub fn run<T>(
+    steps: &[Step<T>],
+    names: &[String],
+    run: impl Fn(&T) -> anyhow::Result<()>,
+) -> anyhow::Result<ExitCode> {
+    for name in names {
+        let is_known = steps.iter().any(|step| step.job == name || step.name == name);
+        ensure!(is_known, "there is no job or step {name}");
     }
+    fs::create_dir_all(cargo::target_folder())?;
+    fs::write(cargo::skipped_file(), "")?;
+    let is_chosen = |step: &&Step<T>| {
+        names.is_empty() || names.iter().any(|name| step.job == name || step.name == name)
+    };
+    let outcomes: Vec<Outcome> =
+        steps.iter().filter(is_chosen).map(|step| outcome(step, &run)).collect();
+    let skipped = fs::read_to_string(cargo::skipped_file())?;
+    println!("{}", report(&outcomes, &skipped.lines().collect::<Vec<_>>()));
+    let has_passed = outcomes.iter().all(|outcome| outcome.failure.is_none());
+    Ok(if has_passed { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// A line for each step, then each failure, then the counts.
-fn report(outcomes: &[Outcome]) -> String {
-    let mut lines = Vec::new();
+/// Reports that a check, or a part of it, is skipped.
+pub fn skip(why: &str) {
+    eprintln!("SKIPPED: {why}");
+    let file = fs::OpenOptions::new().append(true).create(true).open(cargo::skipped_file());
+    // The message above remains if the file cannot be written.
+    let _ = file
+        .and_then(|mut file| std::io::Write::write_all(&mut file, format!("{why}\n").as_bytes()));
+}
+
+fn outcome<T>(step: &Step<T>, run: impl Fn(&T) -> anyhow::Result<()>) -> Outcome {
+    let name = step.name;
+    eprintln!("══ {name}");
+    let start = Instant::now();
+    let failure = run(&step.task).err().map(|error| format!("{error:#}"));
+    let seconds = start.elapsed().as_secs();
+    eprintln!("══ {name}: {} after {seconds} s", word(failure.as_ref()));
+    Outcome { name, seconds, failure }
+}
+
+fn word(failure: Option<&String>) -> &'static str {
+    if failure.is_some() { "failed" } else { "passed" }
+}
+
+/// A line for each step, then each failure, then what was skipped, then the counts.
+fn report(outcomes: &[Outcome], skipped: &[&str]) -> String {
+    let mut text = String::new();
+    // Writing to a string does not fail.
     for Outcome { name, seconds, failure } in outcomes {
-        let word = if failure.is_some() { "failed" } else { "passed" };
-        lines.push(format!("{word} {seconds:>5} s  {name}"));
+        let _ = writeln!(text, "{} {seconds:>5} s  {name}", word(failure.as_ref()));
     }
-    let failures: Vec<String> = outcomes
-        .iter()
-        .filter_map(|outcome| Some(format!("{}: {}", outcome.name, outcome.failure.as_ref()?)))
-        .collect();
     let total: u64 = outcomes.iter().map(|outcome| outcome.seconds).sum();
-    lines.push(format!("total  {total:>5} s"));
-    lines.extend_from_slice(&failures);
-    lines.push(format!("{} passed, {} failed", outcomes.len() - failures.len(), failures.len()));
-    lines.join("\n")
+    let _ = writeln!(text, "total  {total:>5} s");
+    let mut failed = 0;
+    for (name, failure) in outcomes.iter().filter_map(|it| Some((it.name, it.failure.as_ref()?))) {
+        failed += 1;
+        let _ = writeln!(text, "FAILED {name}: {failure}");
+    }
+    for (number, why) in (1..).zip(skipped) {
+        let _ = writeln!(text, "SKIPPED {number} of {}: {why}", skipped.len());
+    }
+    let _ = write!(text, "{} passed, {failed} failed", outcomes.len() - failed);
+    if !skipped.is_empty() {
+        let _ = write!(text, ", {} skipped", skipped.len());
+    }
+    text
 }
 
 #[cfg(test)]
@@ -57,18 +102,31 @@ mod tests {
 
     use super::*;
 
-    #[test]
-    fn every_step_runs_after_a_failure() {
+    fn steps() -> Vec<Step<u32>> {
+        [("one", "a", 1), ("one", "b", 2), ("two", "c", 3)]
+            .map(|(job, name, task)| Step { job, name, task })
+            .into()
+    }
+
+    /// The tasks that run for these names, of which the second fails.
+    fn ran(names: &[&str]) -> (Vec<u32>, String) {
+        let names: Vec<String> = names.iter().map(|&name| name.to_owned()).collect();
         let seen = RefCell::new(Vec::new());
-        let steps = [("a", 1), ("b", 2), ("c", 3)];
-        let code = run(&steps, |&step| {
-            seen.borrow_mut().push(step);
-            anyhow::ensure!(step != 2, "broken");
+        let code = run(&steps(), &names, |&task| {
+            seen.borrow_mut().push(task);
+            ensure!(task != 2, "broken");
             Ok(())
         });
-        assert_eq!(seen.into_inner(), [1, 2, 3]);
-        assert_eq!(format!("{code:?}"), format!("{:?}", ExitCode::FAILURE));
-        assert_eq!(format!("{:?}", run(&steps, |_| Ok(()))), format!("{:?}", ExitCode::SUCCESS));
+        (seen.into_inner(), format!("{:?}", code.unwrap()))
+    }
+
+    #[test]
+    fn jobs_and_steps_run_by_name_and_after_a_failure() {
+        let [passed, failed] = [ExitCode::SUCCESS, ExitCode::FAILURE].map(|it| format!("{it:?}"));
+        assert_eq!(ran(&[]), (vec![1, 2, 3], failed.clone()));
+        assert_eq!(ran(&["one"]), (vec![1, 2], failed));
+        assert_eq!(ran(&["two", "a"]), (vec![1, 3], passed));
+        assert!(run(&steps(), &["three".to_owned()], |_| Ok(())).is_err());
     }
 
     #[test]
@@ -77,10 +135,26 @@ mod tests {
             Outcome { name: "lint", seconds: 7, failure: None },
             Outcome { name: "docs", seconds: 12, failure: Some("`cargo doc` failed".to_owned()) },
         ];
+        let steps = "passed     7 s  lint\nfailed    12 s  docs\ntotal     19 s\n\
+             FAILED docs: `cargo doc` failed\n";
+        assert_eq!(report(&outcomes, &[]), format!("{steps}1 passed, 1 failed"));
         assert_eq!(
-            report(&outcomes),
-            "passed     7 s  lint\nfailed    12 s  docs\ntotal     19 s\n\
-             docs: `cargo doc` failed\n1 passed, 1 failed"
+            report(&outcomes, &["no browser", "no data"]),
+            format!(
+                "{steps}SKIPPED 1 of 2: no browser\nSKIPPED 2 of 2: no data\n\
+                 1 passed, 1 failed, 2 skipped"
+            )
         );
+    }
+
+    /// The workflow runs every job.
+    #[test]
+    fn the_workflow_has_all_jobs() {
+        let workflow = fs::read_to_string(cargo::root().join(".github/workflows/ci.yml")).unwrap();
+        let line = workflow.lines().find(|line| line.trim_start().starts_with("job: [")).unwrap();
+        let jobs: Vec<&str> = line.split(['[', ']']).nth(1).unwrap().split(", ").collect();
+        let mut expected: Vec<&str> = crate::steps().iter().map(|step| step.job).collect();
+        expected.dedup();
+        assert_eq!(jobs, expected);
     }
 }

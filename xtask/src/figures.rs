@@ -139,6 +139,11 @@ impl Figure {
             git.current_dir(cargo::root()).args(["log", "-1", "--format=Commit %h, %cs:"]);
             writeln!(source, "{}\n", cargo::printed(git)?.trim())?;
         }
+        if let [part] = self.part.as_slice()
+            && part.is_file()
+        {
+            return Ok(format!("From `{}`.\n", part.run));
+        }
         let commands: Vec<&str> = self.part.iter().map(|part| part.run.as_str()).collect();
         writeln!(source, "```sh\n{}\n```", commands.join("\n"))?;
         Ok(source)
@@ -232,19 +237,15 @@ fn number(place: &str, value: &Value) -> anyhow::Result<String> {
 
 /// A number with so many digits (`2`), with its thousands apart (`,`), or with an exponent (`e2`).
 fn shown(number: f64, format: &str) -> anyhow::Result<String> {
-    Ok(match format.strip_prefix('e') {
-        Some(digits) => format!("{number:.*e}", digits.parse()?),
-        None if format == "," => thousands(&format!("{number:.0}")),
-        None => {
-            let text = format!("{number:.*}", format.parse()?);
-            // Not a negative zero.
-            if text.parse::<f64>() == Ok(0.0) {
-                text.replace('-', "")
-            } else {
-                text.replace('-', "−")
-            }
-        }
-    })
+    let size = number.abs();
+    let text = match format.strip_prefix('e') {
+        Some(digits) => format!("{size:.*e}", digits.parse()?),
+        None if format == "," => thousands(&format!("{size:.0}")),
+        None => format!("{size:.*}", format.parse()?),
+    };
+    // No negative zero.
+    let is_negative = number < 0.0 && text.contains(|c| matches!(c, '1'..='9'));
+    Ok(if is_negative { format!("−{text}") } else { text })
 }
 
 fn thousands(digits: &str) -> String {

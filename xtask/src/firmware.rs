@@ -7,7 +7,6 @@
 //! |---|---|
 //! | `boards` | the further boards |
 //! | `build` | builds the file |
-//! | `frames` | compares the stack frames read from instructions with the compiler's own |
 //! | `lines` | the source line that an instruction was compiled from |
 //! | `memory` | there is no allocator, and the stack is below all variables |
 //! | `panics` | lines that can panic |
@@ -23,20 +22,11 @@ pub use boards::Args as BoardsArgs;
 
 mod boards;
 mod build;
-mod frames;
 mod lines;
 mod memory;
 mod panics;
 mod size;
 mod stack;
-
-/// The package of the reference board's firmware.
-pub const REFERENCE: &str = build::NAME;
-
-/// Builds the firmware of the reference board; returns the path of the linked file.
-pub fn reference() -> anyhow::Result<std::path::PathBuf> {
-    build::release()
-}
 
 /// Builds the firmware, checks the linked file, and runs it in an emulator.
 pub fn test() -> anyhow::Result<()> {
@@ -59,6 +49,14 @@ pub fn test() -> anyhow::Result<()> {
     cargo::check(command)
 }
 
+/// Follows the guide with this firmware.
+pub fn guide() -> anyhow::Result<()> {
+    let mut test =
+        cargo::command("test --package sonarfix-cli --test main guide:: -- --ignored --nocapture");
+    test.env("SONARFIX_FIRMWARE", build::release()?);
+    cargo::check(test)
+}
+
 /// The firmware of the further boards, and the size of all.
 pub fn boards(args: &BoardsArgs) -> anyhow::Result<()> {
     boards::check(&build::read(&build::release()?)?, args)
@@ -72,10 +70,6 @@ pub fn size() -> anyhow::Result<()> {
 /// How the stack is examined.
 #[derive(Debug, Clone, PartialEq, Eq, clap::Args)]
 pub struct StackArgs {
-    /// Compare the frames that are read from instructions with those that the compiler reports, in
-    /// a separate build (a minute).
-    #[arg(long)]
-    ask_compiler: bool,
     /// The board, as `sonarfix init` names it: a Cortex-M.
     #[arg(long, default_value = "stm32f405")]
     board: String,
@@ -83,14 +77,11 @@ pub struct StackArgs {
 
 /// The deepest that the stack of the linked file can be.
 pub fn stack(args: &StackArgs) -> anyhow::Result<()> {
-    if args.ask_compiler {
-        return frames::check(&build::read(&build::with_stack_sizes()?)?);
-    }
     let board = sonarfix_boards::all()?.into_iter().find(|board| board.name == args.board);
     let board = board.with_context(|| format!("there is no board {}", args.board))?;
     ensure!(board.target.starts_with("thumb"), "only the instructions of a Cortex-M can be read");
     let program = build::read(&build::of(&board)?)?;
     let checked =
-        if board.package == REFERENCE { stack::check(&program) } else { stack::print(&program) };
+        if board.package == build::NAME { stack::check(&program) } else { stack::print(&program) };
     checked.map(drop)
 }

@@ -2,6 +2,7 @@
 
 use std::process::ExitCode;
 
+use ci::Step;
 use clap::{Parser, Subcommand};
 
 mod bench;
@@ -14,26 +15,24 @@ mod compositions;
 mod elf;
 mod emulator;
 mod endurance;
+mod features;
 mod figures;
 mod firmware;
 mod fuzz;
 mod golden;
-mod guide;
 mod miri;
 mod mutants;
 mod panics;
-mod parts;
 mod pil;
 mod playground;
-mod profile;
 mod program;
 mod publish;
 mod search_windows;
 mod template;
 mod thumb;
-mod wiring;
 mod words;
 mod workspace;
+mod worst_poll;
 
 #[derive(Debug, Parser)]
 #[command(about = "The project's checks and chores")]
@@ -44,8 +43,11 @@ struct Xtask {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Every check of CI; a failure does not keep the following ones from running.
-    Ci,
+    /// The checks of CI; a failure does not keep the following ones from running.
+    Ci {
+        /// Jobs or steps by name; all if none is given.
+        names: Vec<String>,
+    },
     #[command(flatten)]
     Task(Task),
 }
@@ -64,6 +66,8 @@ enum Task {
     Docs,
     /// The `no_std` crates for microcontrollers with and without FPU.
     Embedded,
+    /// The core with each combination of its features that matters.
+    Features,
     /// The firmware: builds it, searches it for panics, and runs it in an emulator.
     TestFirmware,
     /// The firmware of all further boards: lints it, builds it, searches it for panics, prints its flash, RAM and stack, and
@@ -77,8 +81,8 @@ enum Task {
     Stack(firmware::StackArgs),
     /// The shipped loop on emulated microcontrollers, bit by bit as on the PC; its cost.
     Pil,
-    /// The worst poll of the loop by part, in instructions of a Cortex-M4F.
-    Parts(parts::Args),
+    /// The worst poll of many scenarios on a Cortex-M4F and a Cortex-M0+, against docs/worst-poll.md.
+    WorstPoll(worst_poll::Args),
     /// Follows docs/build-a-robot.md in simulation: `sonarfix init`, signs of life in QEMU, a drive on each emulated core.
     Guide,
     /// The golden traces on this computer and every emulated microcontroller.
@@ -105,68 +109,68 @@ enum Task {
     Bless(BlessArgs),
     /// Measures Sonarfix and its peers (ten minutes).
     Bench,
-    /// Draws the wiring of every board: `docs/images/wiring-*.svg`.
-    Wiring,
     /// The paper's statistics at full length: 5,000 seeds, both policies (minutes).
     Statistics,
     /// Writes the figures that README and pages quote (`docs/figures.toml`); `--check` compares them.
     Figures(figures::Args),
     /// Lines with words that `docs/glossary.md` avoids.
-    Words(words::Args),
+    Words,
     /// Random runs of the filter, 10⁸ steps by default (minutes).
     Endurance(endurance::Args),
     /// Random windows of pings for the search for the pose, 10⁶ by default (minutes).
     SearchWindows(search_windows::Args),
     /// Fuzzing for a bounded time.
     Fuzz(fuzz::Args),
-    /// Mutation tests of the core and of the application with cargo-mutants (hours; one file with `--file`).
+    /// Mutation tests with cargo-mutants: of a change with `--since`, of one file with `--file`, or a part of all.
     Mutants(mutants::Args),
     /// The core under Miri if it is installed (long: it builds a standard library first).
     Miri,
 }
 
-/// The steps of CI, the fast ones first.
-fn ci_steps() -> [(&'static str, Task); 24] {
+/// The steps of CI, by job.
+fn steps() -> [Step<Task>; 28] {
     [
-        ("format", Task::Format),
-        ("circles", Task::Circles),
-        ("lint", Task::Lint),
-        ("test-host", Task::TestHost),
-        ("docs", Task::Docs),
-        ("embedded", Task::Embedded),
-        ("test-firmware", Task::TestFirmware),
-        ("boards", Task::Boards(firmware::BoardsArgs::COMPARE)),
-        ("template", Task::Template),
-        ("golden", Task::Golden),
-        ("pil", Task::Pil),
-        ("guide", Task::Guide),
-        ("figures", Task::Figures(figures::Args::CHECK)),
-        ("panics", Task::Panics),
-        ("budgets", Task::Budgets),
-        ("lint-emulated", Task::LintEmulated),
-        ("peers", Task::Peers),
-        ("msrv", Task::Msrv),
-        ("package", Task::Package),
-        ("playground", Task::Playground),
-        ("deny", Task::Deny),
-        ("endurance", Task::Endurance(endurance::Args::SHORT)),
-        ("search-windows", Task::SearchWindows(search_windows::Args::SHORT)),
-        ("fuzz", Task::Fuzz(fuzz::Args::short())),
+        ("lint", "format", Task::Format),
+        ("lint", "circles", Task::Circles),
+        ("lint", "lint", Task::Lint),
+        ("lint", "lint-emulated", Task::LintEmulated),
+        ("lint", "docs", Task::Docs),
+        ("lint", "deny", Task::Deny),
+        ("test", "test-host", Task::TestHost),
+        ("crates", "embedded", Task::Embedded),
+        ("crates", "features", Task::Features),
+        ("crates", "msrv", Task::Msrv),
+        ("crates", "package", Task::Package),
+        ("firmware", "test-firmware", Task::TestFirmware),
+        ("firmware", "boards", Task::Boards(firmware::BoardsArgs::COMPARE)),
+        ("firmware", "template", Task::Template),
+        ("emulated", "golden", Task::Golden),
+        ("emulated", "pil", Task::Pil),
+        ("emulated", "worst-poll", Task::WorstPoll(worst_poll::Args::CHECK)),
+        ("emulated", "guide", Task::Guide),
+        ("budgets", "panics", Task::Panics),
+        ("budgets", "budgets", Task::Budgets),
+        ("budgets", "compositions", Task::Compositions(compositions::Args { check: true })),
+        ("budgets", "figures", Task::Figures(figures::Args::CHECK)),
+        ("budgets", "peers", Task::Peers),
+        ("budgets", "playground", Task::Playground),
+        ("random", "endurance", Task::Endurance(endurance::Args::SHORT)),
+        ("random", "search-windows", Task::SearchWindows(search_windows::Args::SHORT)),
+        ("random", "fuzz", Task::Fuzz(fuzz::Args::short())),
+        ("random", "mutants", Task::Mutants(mutants::Args::short())),
     ]
+    .map(|(job, name, task)| Step { job, name, task })
 }
 
 fn main() -> ExitCode {
     let result = match Xtask::parse().command {
-        Command::Ci => return ci::run(&ci_steps(), |task| run(task.clone())),
-        Command::Task(task) => run(task),
+        Command::Ci { names } => ci::run(&steps(), &names, |task| run(task.clone())),
+        Command::Task(task) => run(task).map(|()| ExitCode::SUCCESS),
     };
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error:#}");
-            ExitCode::FAILURE
-        }
-    }
+    result.unwrap_or_else(|error| {
+        eprintln!("error: {error:#}");
+        ExitCode::FAILURE
+    })
 }
 
 /// What is renewed.
@@ -193,14 +197,15 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::TestHost => cargo::run("test"),
         Task::Docs => checks::docs(),
         Task::Embedded => checks::embedded(),
+        Task::Features => features::check(),
         Task::TestFirmware => firmware::test(),
         Task::Boards(args) => firmware::boards(&args),
         Task::Template => template::check(),
         Task::Size => firmware::size(),
         Task::Stack(args) => firmware::stack(&args),
         Task::Pil => pil::check(),
-        Task::Parts(args) => parts::run(&args),
-        Task::Guide => guide::follow(),
+        Task::WorstPoll(args) => worst_poll::run(args),
+        Task::Guide => firmware::guide(),
         Task::Golden => golden::check(),
         Task::Panics => panics::check(),
         Task::Budgets => budgets::check(),
@@ -213,10 +218,9 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Deny => checks::deny(),
         Task::Bless(args) => bless(&args),
         Task::Bench => bench::run(),
-        Task::Wiring => wiring::write(),
         Task::Statistics => checks::statistics(),
         Task::Figures(args) => figures::run(&args),
-        Task::Words(args) => words::count(&args),
+        Task::Words => words::print(),
         Task::Endurance(args) => endurance::run(args),
         Task::SearchWindows(args) => search_windows::run(args),
         Task::Fuzz(args) => fuzz::run(&args),

@@ -6,15 +6,16 @@
 use std::process::{Command, Stdio};
 
 use crate::cargo;
+use crate::ci;
 
 /// libm has inline assembly for x86, which Miri cannot run; for this target it has none.
 const TARGET: &str = "armv7-unknown-linux-gnueabihf";
 
 pub fn run() -> anyhow::Result<()> {
     if !is_there() {
-        eprintln!(
-            "miri: SKIPPED. It needs a nightly toolchain: \
-             `rustup toolchain install nightly --profile minimal --component miri,rust-src`"
+        ci::skip(
+            "miri needs a nightly toolchain: \
+             `rustup toolchain install nightly --profile minimal --component miri,rust-src`",
         );
         return Ok(());
     }

@@ -3,10 +3,9 @@
 use std::path::PathBuf;
 
 use anyhow::{Context, ensure};
-use serde::Deserialize;
 
 use crate::cargo;
-use crate::workspace::Workspace;
+use crate::workspace::{Package, Workspace};
 
 /// Files that every package contains.
 const FILES: [&str; 4] = ["Cargo.toml", "README.md", "LICENSE-MIT", "LICENSE-APACHE"];
@@ -14,7 +13,7 @@ const FILES: [&str; 4] = ["Cargo.toml", "README.md", "LICENSE-MIT", "LICENSE-APA
 /// Packages every published crate and builds each package from its own files only.
 pub fn package() -> anyhow::Result<()> {
     let crates = crates()?;
-    for Crate { name, .. } in &crates {
+    for Package { name, .. } in &crates {
         let list = cargo::command(&format!("package --list --allow-dirty --package {name}"));
         let list = cargo::printed(list)?;
         for file in FILES {
@@ -34,7 +33,7 @@ pub fn package() -> anyhow::Result<()> {
 }
 
 /// Removes the sources of these crates that an earlier `cargo package` has unpacked into cargo's home.
-fn remove_stale_sources(crates: &[Crate]) -> anyhow::Result<()> {
+fn remove_stale_sources(crates: &[Package]) -> anyhow::Result<()> {
     let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
     let home = home.or_else(|| Some(std::env::home_dir()?.join(".cargo")));
     let sources = home.context("there is neither CARGO_HOME nor a home")?.join("registry/src");
@@ -45,7 +44,7 @@ fn remove_stale_sources(crates: &[Crate]) -> anyhow::Result<()> {
         if !registry.file_name().to_string_lossy().starts_with('-') {
             continue;
         }
-        for Crate { name, version, .. } in crates {
+        for Package { name, version, .. } in crates {
             let unpacked = registry.path().join(format!("{name}-{version}"));
             if unpacked.exists() {
                 std::fs::remove_dir_all(&unpacked)
@@ -58,7 +57,7 @@ fn remove_stale_sources(crates: &[Crate]) -> anyhow::Result<()> {
 
 /// Checks every published crate with the oldest toolchain that it declares.
 pub fn msrv() -> anyhow::Result<()> {
-    for Crate { name, rust_version, .. } in crates()? {
+    for Package { name, rust_version, .. } in crates()? {
         let version = rust_version.with_context(|| format!("{name} has no `rust-version`"))?;
         for features in ["", "--all-features"] {
             let check = format!("+{version} check --package {name} {features}");
@@ -74,28 +73,12 @@ pub fn msrv() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// A package, as far as publishing needs it.
-#[derive(Debug, Deserialize)]
-struct Crate {
-    name: String,
-    version: String,
-    rust_version: Option<String>,
-    /// The registries that it may be published to; none if it may not be published.
-    publish: Option<Vec<String>>,
+fn crates() -> anyhow::Result<Vec<Package>> {
+    let packages = Workspace::Main.packages()?;
+    Ok(packages.into_iter().filter(Package::is_published).collect())
 }
 
-fn crates() -> anyhow::Result<Vec<Crate>> {
-    #[derive(Deserialize)]
-    struct Metadata {
-        packages: Vec<Crate>,
-    }
-    let json = cargo::printed(Workspace::Main.cargo("metadata --no-deps --format-version 1"))?;
-    let metadata: Metadata = serde_json::from_str(&json).context("cannot read cargo's metadata")?;
-    let is_published = |package: &Crate| package.publish.as_ref().is_none_or(|to| !to.is_empty());
-    Ok(metadata.packages.into_iter().filter(is_published).collect())
-}
-
-fn arguments(crates: &[Crate]) -> String {
+fn arguments(crates: &[Package]) -> String {
     let packages: Vec<String> =
         crates.iter().map(|package| format!("--package {}", package.name)).collect();
     packages.join(" ")

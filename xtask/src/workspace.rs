@@ -1,7 +1,11 @@
 //! The workspaces of the repository: where each is and where it is built.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::Command;
+
+use anyhow::Context;
+use serde::Deserialize;
 
 use crate::cargo;
 
@@ -56,4 +60,45 @@ impl Workspace {
         }
         command
     }
+
+    /// Its own packages.
+    pub fn packages(self) -> anyhow::Result<Vec<Package>> {
+        #[derive(Deserialize)]
+        struct Metadata {
+            packages: Vec<Package>,
+        }
+        let json = cargo::printed(self.cargo("metadata --no-deps --format-version 1"))?;
+        let metadata: Metadata =
+            serde_json::from_str(&json).context("cannot read cargo's metadata")?;
+        Ok(metadata.packages)
+    }
+}
+
+/// A package, as cargo describes it.
+#[derive(Debug, Deserialize)]
+pub struct Package {
+    pub name: String,
+    pub version: String,
+    pub rust_version: Option<String>,
+    /// The registries that it may be published to; none if it may not be published.
+    publish: Option<Vec<String>>,
+    features: BTreeMap<String, Vec<String>>,
+    pub targets: Vec<Target>,
+}
+
+impl Package {
+    pub fn is_published(&self) -> bool {
+        self.publish.as_ref().is_none_or(|to| !to.is_empty())
+    }
+
+    /// Its features without the set that is on by default.
+    pub fn own_features(&self) -> impl Iterator<Item = &str> {
+        self.features.keys().map(String::as_str).filter(|name| *name != "default")
+    }
+}
+
+/// A library, program, test, example or benchmark: the root of a tree of modules.
+#[derive(Debug, Deserialize)]
+pub struct Target {
+    pub src_path: PathBuf,
 }

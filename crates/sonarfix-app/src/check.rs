@@ -34,8 +34,8 @@ const CHECKS_PER_BEARING: u8 = 8;
 /// ```
 ///
 /// It cannot detect an unplugged quadrature encoder, which reads like a wheel at rest, nor a hobby servo that does not
-/// turn, which has no feedback. [`Self::show`] therefore lets a person see them: for a minute the servo turns in turn ahead
-/// and to its limits, or to one bearing, and [`Self::readings`] returns what the devices read.
+/// turn, which has no feedback. [`Self::show`] therefore lets a person see them. For a minute the servo points ahead and to
+/// both limits, one after the other, or to one bearing; [`Self::readings`] returns what the devices read.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Check {
     state: State,
@@ -55,7 +55,7 @@ enum State {
     Pinging { since: Instant },
 }
 
-/// The readings are shown.
+/// The minute in which the readings are shown.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Shown {
     until: Instant,

@@ -9,16 +9,15 @@
 //! [`Unsupported`] is the reason for which a board cannot be the robot that a configuration describes.
 //!
 //! # Adding a field
-//! A field is added to its structure here (or to the localizer's [`Config`]), to
-//! [`RobotConfig::check`], and in `sonarfix-map` to the reader and the writer of robot files; the
-//! version of the baked image rises (`sonarfix-link`, `baked::VERSION`).
+//! `CONTRIBUTING.md` has the recipe: the field in its structure here (or in the localizer's [`Config`]) with its default, and a
+//! row in the table of keys of `sonarfix-map`; the version of the baked image rises (`sonarfix-link`, `baked::VERSION`).
 //!
 //! # Non-finite policy
 //! [`RobotConfig::check`] refuses NaN and infinity in every field.
 
 mod feature;
 
-use sonarfix::config::{Config, ConfigError, Further, RangerId, Sonar};
+use sonarfix::config::{Config, ConfigError, Further, PingSchedule, PingTiming, RangerId, Sonar};
 use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
 use sonarfix::health::{DEGRADED_WITHOUT_ODOMETRY, Verdict};
 use sonarfix::localizer::Localizer;
@@ -30,6 +29,11 @@ use crate::servo::{Calibration, MeasuredPulse, ServoSettings, SettingError};
 use crate::time::since;
 
 pub use feature::{Feature, NotLinked};
+
+/// Longest time from one reading of the encoders to the next, as in robot files: without odometry for longer, no pose is known.
+const LONGEST_ENCODER_PERIOD: Duration = Duration::from_ticks(1_000_000);
+/// Longest time of a ping, a servo or the link, as in robot files: what takes longer never ends for a robot that drives.
+const LONGEST_TIME: Duration = Duration::from_ticks(3_600_000_000);
 
 /// The configuration of a robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -175,6 +179,14 @@ impl RangerConfig {
             let fits = servo.fits_its_frame();
             require("servo_pulses", fits, "within the servo's frame at both limits of the servo")?;
         }
+        let PingTiming { schedule, servo, cycle } = sonar.timing;
+        let period = if let PingSchedule::Every(period) = schedule { period } else { cycle };
+        let times = [period, cycle, servo.frame, servo.sixty_degrees, servo.settle];
+        require(
+            "sonar.timing",
+            times.iter().all(|time| *time <= LONGEST_TIME),
+            "at most 1 h each",
+        )?;
         let air = Air::at(self.temperature);
         require("ranger.temperature", air.is_ok(), "between -40 and 85 degrees Celsius")
     }
@@ -328,7 +340,9 @@ impl RobotConfig {
         let length = "a positive, finite length";
         require("right_wheel.travel_per_edge", self.right_wheel.geometry().is_ok(), length)?;
         require("left_wheel.travel_per_edge", self.left_wheel.geometry().is_ok(), length)?;
-        require("encoder_period", !self.encoder_period.is_zero(), "longer than zero")?;
+        let sampled =
+            !self.encoder_period.is_zero() && self.encoder_period <= LONGEST_ENCODER_PERIOD;
+        require("encoder_period", sampled, "longer than zero, and at most 1 s")?;
         self.ranger.check(&self.localizer.sonar)?;
         let (sonars, rangers) =
             (self.localizer.further_sonars.iter().count(), self.further_rangers.iter().count());
@@ -340,7 +354,9 @@ impl RobotConfig {
             let is_shared = ranger.temperature == self.ranger.temperature;
             require("further_rangers.temperature", is_shared, "that of the first ranger")?;
         }
-        require("motors.link_timeout", !self.motors.link_timeout.is_zero(), "longer than zero")?;
+        let timeout = self.motors.link_timeout;
+        let ends = !timeout.is_zero() && timeout <= LONGEST_TIME;
+        require("motors.link_timeout", ends, "longer than zero, and at most 1 h")?;
         let region = self.start.region().is_none_or(|region| region.is_valid());
         require("start.region", region, "a rectangle from its smaller to its larger coordinates")
     }

@@ -137,7 +137,8 @@ impl<'b> Encoder<'b> {
         Self { buffer, next: 2, code: 1, checksum: Crc32::default() }
     }
 
-    /// Takes bytes of the content. A message has dozens of places that write a number: inlined, this takes 3 KiB of flash.
+    /// Takes bytes of the content. A message has dozens of places that write a number: inlined, this would take much
+    /// flash.
     #[inline(never)]
     fn push(&mut self, bytes: &[u8]) {
         // Local copies stay in registers.

@@ -206,7 +206,8 @@ pub fn documentation() -> Vec<(&'static str, String)> {
     [robot::rows(), scenario::rows()].concat()
 }
 
-/// The text of a robot file with the explanation of its key behind each value that stands alone in its line and has no comment.
+/// The text of a robot file with the explanation of its key at each value that has no comment, or a comment that ends in a
+/// colon.
 #[must_use]
 pub fn with_comments(text: &str) -> String {
     let notes = robot::notes();
@@ -216,10 +217,22 @@ pub fn with_comments(text: &str) -> String {
         if let Some(header) = line.strip_prefix('[') {
             section = header.trim_matches(['[', ']']);
         }
-        let key = line.split_once(" = ").filter(|_| !line.contains('#'));
-        let note = key.and_then(|(key, _)| notes.get(&format!("{section}.{key}")));
-        let note = note.map(|note| format!("{line:36} # {note}"));
-        commented += note.as_deref().unwrap_or(line);
+        let (value, comment) = line.split_once('#').unwrap_or((line, " "));
+        let key = value.split_once(" = ").map_or("", |(key, _)| key);
+        let note = notes.get(&format!("{section}.{key}"));
+        let note = note.filter(|_| comment == " " || comment.ends_with(':'));
+        commented += &note.map_or_else(
+            || line.to_owned(),
+            |note| {
+                let note = format!("#{} {note}", comment.trim_end());
+                let value = value.trim_end();
+                if value.len() < 37 {
+                    format!("{value:36} {note}")
+                } else {
+                    format!("{note}\n{value}")
+                }
+            },
+        );
         commented.push('\n');
     }
     commented

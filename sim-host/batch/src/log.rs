@@ -275,7 +275,7 @@ mod tests {
         let log = "sonarfix-log,1\nstart,0,1,2,0.5,0.01,0.02\nticks,0,0,0\nticks,1,100,100\nnonsense\n\
                    ticks,1,100,100\nrange,1.5,0.2,1.25\nticks,2,90000,90000\nticks,3,90100,90100\nticks,4,9";
         let read = read(log.as_bytes(), &robot()).unwrap();
-        let skipped: Vec<usize> = read.skipped.iter().map(|(line, _)| *line).collect();
+        let skipped: Vec<u64> = read.skipped.iter().map(|(line, _)| *line).collect();
         assert_eq!(skipped, [5, 6, 8, 10]);
         let travel: Vec<f64> =
             read.recording.readings.iter().map(|r| r.travel[0] / 0.4887e-3).collect();

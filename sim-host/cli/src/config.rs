@@ -61,7 +61,10 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
 fn read(file: &Path) -> anyhow::Result<RobotConfig> {
     let bytes = sonarfix_map::read_bytes(file)
         .with_context(|| format!("cannot read {}", file.display()))?;
-    baked::read(&bytes).with_context(|| file.display().to_string())
+    let name = file.display().to_string();
+    let config = baked::read(&bytes).with_context(|| name.clone())?;
+    robot_file::check(&config, &name)?;
+    Ok(config)
 }
 
 /// A robot from a robot file or from a baked configuration.

@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
 use sonarfix_exchange::maps::geojson::Anchor;
-use sonarfix_exchange::maps::{Frame, Imported, MAX_TEXT_BYTES, dxf, geojson, grid, svg};
+use sonarfix_exchange::maps::{
+    Frame, Imported, MAX_JSON_BYTES, MAX_TEXT_BYTES, dxf, geojson, grid, svg,
+};
 use sonarfix_map::Floor;
 
 #[derive(Debug, clap::Args)]
@@ -118,17 +120,19 @@ fn read(args: &Import) -> anyhow::Result<Imported> {
     match ending.as_str() {
         "yaml" | "yml" => grid::read(&args.file, &frame, args.shortest),
         "dxf" => dxf::read(BufReader::new(File::open(&args.file)?), &frame, &args.layer),
-        "svg" => svg::read(&text(&args.file)?, &frame),
-        _ if is_json => geojson::read(&text(&args.file)?, &frame, anchor(args.anchor)?),
+        "svg" => svg::read(&text(&args.file, MAX_TEXT_BYTES)?, &frame),
+        _ if is_json => {
+            geojson::read(&text(&args.file, MAX_JSON_BYTES)?, &frame, anchor(args.anchor)?)
+        }
         other => bail!("unknown ending `{other}`: expected yaml, dxf, svg, geojson or json"),
     }
 }
 
 /// The text of a file that is read at once.
-fn text(file: &Path) -> anyhow::Result<String> {
+fn text(file: &Path, most: u64) -> anyhow::Result<String> {
     let bytes = File::open(file)?.metadata()?.len();
-    let most = MAX_TEXT_BYTES / (1024 * 1024);
-    ensure!(bytes <= MAX_TEXT_BYTES, "it has more than {most} MiB");
+    let mebibytes = most / (1024 * 1024);
+    ensure!(bytes <= most, "it has more than {mebibytes} MiB: remove what is no wall, or split it");
     Ok(sonarfix_map::read_text(file)?)
 }
 

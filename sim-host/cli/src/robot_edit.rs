@@ -4,6 +4,7 @@ use anyhow::Context;
 use sonarfix_batch::calibrate::{Calibration, Determined};
 use sonarfix_batch::constants::Name;
 use sonarfix_hal::config::RobotConfig;
+use sonarfix_hal::ranger::{Air, Celsius};
 use toml_edit::{DocumentMut, Item, Table, TableLike, Value};
 
 use crate::measure::wheel::Turned;
@@ -39,8 +40,8 @@ pub fn calibrated(text: &str, robot: &RobotConfig, found: &Calibration) -> anyho
         pulses(sonar, robot, |bearing| found.constants.bearing(bearing))?;
     }
     if is_known(Name::RangeScale) && sonar.contains_key("temperature") {
-        let celsius = f64::from(robot.ranger.temperature.0);
-        if let Some(celsius) = temperature(celsius, constants.get(Name::RangeScale)) {
+        let corrected = temperature(robot.ranger.temperature, constants.get(Name::RangeScale));
+        if let Some(Celsius(celsius)) = corrected {
             set(sonar, "temperature", format!("{celsius:.1} degC"));
         }
     }
@@ -48,12 +49,14 @@ pub fn calibrated(text: &str, robot: &RobotConfig, found: &Calibration) -> anyho
     Ok(document.to_string())
 }
 
-/// The temperature at which the driver's ranges have no scale error; `None` outside of what a file may have. The speed of
-/// sound in air is proportional to the square root of the absolute temperature.
-fn temperature(celsius: f64, scale: f64) -> Option<f64> {
+/// The temperature at which the driver's ranges have no scale error; `None` if the driver cannot compute with it. The speed
+/// of sound in air is proportional to the square root of the absolute temperature.
+fn temperature(celsius: Celsius, scale: f64) -> Option<Celsius> {
     const ZERO: f64 = 273.15;
-    let corrected = (celsius + ZERO) / (1.0 + scale).powi(2) - ZERO;
-    (-40.0..=85.0).contains(&corrected).then_some(corrected)
+    let corrected = (f64::from(celsius.0) + ZERO) / (1.0 + scale).powi(2) - ZERO;
+    #[expect(clippy::cast_possible_truncation, reason = "a tenth of a degree matters")]
+    let corrected = Celsius(corrected as f32);
+    Air::at(corrected).is_ok().then_some(corrected)
 }
 
 /// The table of the document: the file's own, or that of `[robot]`.
@@ -63,13 +66,17 @@ fn table<'d>(document: &'d mut DocumentMut, name: &str) -> anyhow::Result<&'d mu
 }
 
 /// Replaces a value and keeps the comment behind it.
+fn put(old: &mut Value, new: impl Into<Value>) {
+    let decor = old.decor().clone();
+    *old = new.into();
+    *old.decor_mut() = decor;
+}
+
 fn replace(table: &mut Table, key: &str, value: Value) {
-    let decor = table.get(key).and_then(Item::as_value).map(|old| old.decor().clone());
-    let mut value = value;
-    if let Some(decor) = decor {
-        *value.decor_mut() = decor;
+    match table.get_mut(key).and_then(Item::as_value_mut) {
+        Some(old) => put(old, value),
+        None => drop(table.insert(key, Item::Value(value))),
     }
-    table.insert(key, Item::Value(value));
 }
 
 fn set(table: &mut Table, key: &str, text: String) {
@@ -89,9 +96,8 @@ fn wheel(drive: &mut Table, key: &str, scale: f64) -> anyhow::Result<()> {
         let text = value.as_str().with_context(|| format!("{key}.{length} must be text"))?;
         let (number, unit) = text.trim().split_once(' ').context("a length needs a unit")?;
         let number: f64 = number.parse().with_context(|| format!("{key}.{length}"))?;
-        let decor = value.decor().clone();
-        *value = Value::from(format!("{:.6} {}", number * scale, unit.trim()));
-        *value.decor_mut() = decor;
+        let scaled = format!("{:.6} {}", number * scale, unit.trim());
+        put(value, scaled);
     }
     Ok(())
 }
@@ -155,9 +161,7 @@ fn pulses(
         let pulse = pulse.as_inline_table_mut().context("servo_pulses must be tables")?;
         let bearing = truth(measured.bearing.0.into()).to_degrees();
         if let Some(value) = pulse.get_mut("bearing") {
-            let decor = value.decor().clone();
-            *value = Value::from(format!("{bearing:.2} deg"));
-            *value.decor_mut() = decor;
+            put(value, format!("{bearing:.2} deg"));
         }
     }
     Ok(())
@@ -189,13 +193,13 @@ fn priors(
 
 #[cfg(test)]
 mod tests {
-    use super::temperature;
+    use super::{Celsius, temperature};
 
     #[test]
     fn a_range_that_is_too_long_needs_a_lower_temperature() {
         // 0.18 % per °C: 343.4 m/s at 20 °C, 340.4 m/s at 15 °C.
-        let corrected = temperature(20.0, 343.4 / 340.4 - 1.0).unwrap();
+        let corrected = temperature(Celsius(20.0), 343.4 / 340.4 - 1.0).unwrap().0;
         assert!((corrected - 15.0).abs() < 0.2, "{corrected}");
-        assert_eq!(temperature(20.0, 0.5), None);
+        assert_eq!(temperature(Celsius(20.0), 0.5), None);
     }
 }

@@ -20,7 +20,7 @@ fn errors(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-const CLASSROOM: &str = "../../crates/sonarfix-map/scenarios/classroom.toml";
+pub const CLASSROOM: &str = "../../crates/sonarfix-map/scenarios/classroom.toml";
 const PAPER: &str = "../../crates/sonarfix-map/scenarios/paper.toml";
 
 /// Every subcommand, with arguments for the shortest output. In `FILES` are a short log with its map and robot, a drive for
@@ -70,7 +70,7 @@ const PRINTING: [&[&str]; 39] = [
 ];
 
 /// The files of [`PRINTING`].
-fn files() -> tempfile::TempDir {
+pub fn files() -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| std::fs::write(dir.path().join(name), text).unwrap();
     write("map.toml", MAP);
@@ -97,7 +97,7 @@ fn files() -> tempfile::TempDir {
     dir
 }
 
-fn printing(arguments: &[&str], files: &std::path::Path) -> Command {
+pub fn printing(arguments: &[&str], files: &std::path::Path) -> Command {
     let files = files.display().to_string();
     let argument = |argument: &&str| match *argument {
         "ROBOT" => crate::link_command::robot(0, CommandResult::Done).0,

@@ -190,7 +190,7 @@ fn wrong_answers_are_refused_and_leave_no_folder() {
         (&["--second-at", "90"], "a unit is missing"),
         (&["--servo", "sg91"], "sg90, mg996r"),
         (&["--wheel-diameter", "65"], "a unit is missing"),
-        (&["--wheel-diameter", "0 mm"], "must be a positive length"),
+        (&["--wheel-diameter", "0 mm"], "must be from 1 mm to 10 m"),
         (&["--track-width", "12\" }"], "is no value"),
         (&["--ticks-per-revolution", "nan"], "is not a positive number"),
     ];

@@ -356,6 +356,8 @@ fn a_restart_begins_another_log() {
     scenario.faults = Scenario::parse(&text, "scenario.toml", Path::new("")).unwrap().faults;
     let robot = Robot::of(&scenario, 0);
     let (dir, path) = folder();
+    let other = dir.path().join("run-2.csv");
+    fs::write(&other, "a recording of another day").unwrap();
     let mut recording = Recording::new(path.clone());
     let (received, _) = received_from(&robot.frames.concat());
     for received in &received {
@@ -366,7 +368,8 @@ fn a_restart_begins_another_log() {
     let (first, second): (Vec<_>, Vec<_>) = robot.estimates.iter().partition(|(at, _)| *at < began);
     assert!(first.len() > 100 && second.len() > 100);
     assert_same(&first, &replay(&fs::read(path).unwrap(), &scenario).0, 0);
-    let second_log = fs::read(dir.path().join("run-2.csv")).unwrap();
+    assert_eq!(fs::read(other).unwrap(), b"a recording of another day");
+    let second_log = fs::read(dir.path().join("run-3.csv")).unwrap();
     assert_same(&second, &replay(&second_log, &scenario).0, began);
 }
 

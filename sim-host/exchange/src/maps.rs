@@ -22,5 +22,8 @@ mod thin;
 
 pub use drawn::{Frame, Imported, MAX_SEGMENTS};
 
-/// Largest text of a drawing that is read at once, bytes: SVG and `GeoJSON`.
+/// Largest text of a drawing that is read at once, bytes: SVG.
 pub const MAX_TEXT_BYTES: u64 = 32 * 1024 * 1024;
+
+/// Largest `GeoJSON`, bytes: thirty times as much is in memory.
+pub const MAX_JSON_BYTES: u64 = 8 * 1024 * 1024;

@@ -62,12 +62,10 @@ impl Access {
     /// # Errors
     /// The first check that fails.
     pub fn page(&self, request: &Request) -> Result<(), Refusal> {
-        let is_own = |host: &str| self.hosts.iter().any(|own| own == host);
-        if !request.header("host").is_some_and(is_own) {
-            return Err(Refusal::Host);
-        }
+        let host = request.header("host").filter(|&host| self.hosts.iter().any(|own| own == host));
+        let host = host.ok_or(Refusal::Host)?;
         let origin = request.header("origin");
-        if origin.is_some_and(|origin| !origin.strip_prefix("http://").is_some_and(is_own)) {
+        if origin.is_some_and(|origin| origin.strip_prefix("http://") != Some(host)) {
             return Err(Refusal::Origin);
         }
         Ok(())

@@ -76,7 +76,10 @@ impl Request {
     fn read_body(&mut self, from: &mut impl Read) -> io::Result<()> {
         let length = match self.header("content-length") {
             None => 0,
-            Some(text) => text.parse().map_err(|_| malformed())?,
+            Some(text) if text.bytes().all(|byte| byte.is_ascii_digit()) => {
+                text.parse().map_err(|_| malformed())?
+            }
+            Some(_) => return Err(malformed()),
         };
         // Two lengths, or pieces of unknown length, are read differently by different programs.
         if length > MOST_BODY || self.header("transfer-encoding").is_some() {

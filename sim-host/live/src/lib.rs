@@ -11,6 +11,7 @@
 //! | module | what |
 //! |---|---|
 //! | [`server`] | connections, and what each may ask for |
+//! | [`connection`] | their deadlines and their number |
 //! | [`access`] | who may ask: this computer, a page of this server, with the token |
 //! | [`http`] | requests and answers |
 //! | [`ring`] | the latest events, in bounded memory |
@@ -21,6 +22,7 @@
 //! | [`page`] | the page: `live.html`, `live.css`, `live.js`, `curves.js`, and the drawing of the report's player |
 
 pub mod access;
+pub mod connection;
 pub mod feed;
 pub mod http;
 pub mod order;

@@ -7,10 +7,9 @@
 //! | `POST /order` | an order as JSON; the answer as JSON |
 
 use std::fmt::Write as _;
-use std::io::{self, Write};
+use std::io::{self, ErrorKind, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread;
 use std::time::Duration;
@@ -18,17 +17,14 @@ use std::time::Duration;
 use anyhow::Context;
 
 use crate::access::{Access, Refusal};
+use crate::connection::{Connections, PATIENCE, Timed};
 use crate::http::{self, Request};
 use crate::order::{Ordered, Orders, Reply};
 use crate::page;
 use crate::ring::Ring;
 
-/// Time for a request to arrive, and for a page to take what it is sent.
-const PATIENCE: Duration = Duration::from_secs(5);
 /// Time for a robot to answer a command: all attempts of the command and of its session.
 const ANSWER: Duration = Duration::from_secs(10);
-/// Most connections at once.
-const MOST_CONNECTIONS: usize = 32;
 /// Most orders that wait.
 const MOST_ORDERS: usize = 16;
 
@@ -45,7 +41,7 @@ struct Shared {
     access: Access,
     ring: Arc<Ring>,
     orders: SyncSender<Ordered>,
-    connections: AtomicUsize,
+    connections: Connections,
 }
 
 impl Server {
@@ -61,7 +57,7 @@ impl Server {
         let access = Access::new(address)?;
         let (orders, received) = sync_channel(MOST_ORDERS);
         let url = format!("http://{address}/#token={}", access.token());
-        let shared = Arc::new(Shared { access, ring, orders, connections: AtomicUsize::new(0) });
+        let shared = Arc::new(Shared { access, ring, orders, connections: Connections::default() });
         thread::spawn(move || accept(&listener, &shared));
         Ok((Self { address: url }, Orders(received)))
     }
@@ -74,29 +70,31 @@ impl Server {
 }
 
 fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
-    for stream in listener.incoming() {
-        let Ok(mut stream) = stream else { continue };
-        let shared = Arc::clone(shared);
-        if shared.connections.fetch_add(1, Ordering::Relaxed) >= MOST_CONNECTIONS {
-            shared.connections.fetch_sub(1, Ordering::Relaxed);
+    for (number, stream) in (0..).zip(listener.incoming()) {
+        let Ok(stream) = stream else { continue };
+        if shared.connections.arrive(number, &stream).is_err() {
             continue;
         }
+        let shared = Arc::clone(shared);
         thread::spawn(move || {
             // An error here is that of a page which has gone.
-            let _ = serve(&mut stream, &shared);
-            shared.connections.fetch_sub(1, Ordering::Relaxed);
+            let _ = serve(stream, number, &shared);
+            shared.connections.leave(number);
         });
     }
 }
 
-fn serve(stream: &mut TcpStream, shared: &Shared) -> io::Result<()> {
-    stream.set_read_timeout(Some(PATIENCE))?;
-    stream.set_write_timeout(Some(PATIENCE))?;
-    stream.set_nodelay(true)?;
-    let request = match Request::read(stream) {
+fn serve(stream: TcpStream, number: u64, shared: &Shared) -> io::Result<()> {
+    let mut connection = Timed::new(stream)?;
+    let read = Request::read(&mut connection);
+    connection.restart();
+    let request = match read {
         Ok(Some(request)) => request,
         Ok(None) => return Ok(()),
-        Err(error) => return http::answer(stream, "400 Bad Request", TEXT, &error.to_string()),
+        Err(error) if error.kind() == ErrorKind::InvalidData => {
+            return http::answer(&mut connection, "400 Bad Request", TEXT, &error.to_string());
+        }
+        Err(error) => return Err(error),
     };
     let (path, query) = request.target.split_once('?').unwrap_or((&request.target, ""));
     let checked = match path {
@@ -104,35 +102,43 @@ fn serve(stream: &mut TcpStream, shared: &Shared) -> io::Result<()> {
         _ => shared.access.data(&request),
     };
     if let Err(refusal) = checked {
-        return refuse(stream, refusal);
+        return refuse(&mut connection, refusal);
     }
+    if path == "/" && request.method == "GET" {
+        let page = page::html();
+        return http::answer(&mut connection, "200 OK", "text/html; charset=utf-8", &page);
+    }
+    let Some(_seat) = shared.connections.seat(number) else {
+        let text = "too many pages are open";
+        return http::answer(&mut connection, "503 Service Unavailable", TEXT, text);
+    };
     match (request.method.as_str(), path) {
-        ("GET", "/") => http::answer(stream, "200 OK", "text/html; charset=utf-8", &page::html()),
         ("GET", "/events") => {
             let from = query.strip_prefix("from=").and_then(|number| number.parse().ok());
-            events(stream, &shared.ring, from.unwrap_or(0))
+            events(&mut connection, &shared.ring, from.unwrap_or(0))
         }
         ("POST", "/order") => {
             let reply = order(&request.body, &shared.orders);
             let json = serde_json::to_string(&reply).unwrap_or_default();
-            http::answer(stream, "200 OK", "application/json", &json)
+            connection.restart();
+            http::answer(&mut connection, "200 OK", "application/json", &json)
         }
-        _ => http::answer(stream, "404 Not Found", TEXT, "there is nothing here"),
+        _ => http::answer(&mut connection, "404 Not Found", TEXT, "there is nothing here"),
     }
 }
 
-fn refuse(stream: &mut TcpStream, refusal: Refusal) -> io::Result<()> {
+fn refuse(connection: &mut Timed, refusal: Refusal) -> io::Result<()> {
     let (status, reason) = match refusal {
         Refusal::Host => ("403 Forbidden", "this server has another name"),
         Refusal::Origin => ("403 Forbidden", "pages of other origins have no access"),
         Refusal::Token => ("401 Unauthorized", "open the address that the program has printed"),
     };
-    http::answer(stream, status, TEXT, reason)
+    http::answer(connection, status, TEXT, reason)
 }
 
 /// Writes events as they arrive, until the end or until the page has gone.
-fn events(stream: &mut TcpStream, ring: &Ring, from: u64) -> io::Result<()> {
-    http::begin(stream, "application/x-ndjson")?;
+fn events(connection: &mut Timed, ring: &Ring, from: u64) -> io::Result<()> {
+    http::begin(connection, "application/x-ndjson")?;
     let mut from = from;
     loop {
         let batch = ring.next(from, PATIENCE);
@@ -152,7 +158,8 @@ fn events(stream: &mut TcpStream, ring: &Ring, from: u64) -> io::Result<()> {
             // An empty line shows whether the page is still there.
             text.push('\n');
         }
-        stream.write_all(text.as_bytes())?;
+        connection.restart();
+        connection.write_all(text.as_bytes())?;
         if batch.is_end {
             return Ok(());
         }

@@ -1,6 +1,6 @@
 //! A recording that shows where it is torn.
 //!
-//! After every [`BLOCK`] lines follows a comment with their checksum, and after the last ones the end. A reader
+//! After every 32 lines follows a comment with their checksum, and after the last ones the end. A reader
 //! ([`Lines`](sonarfix_replay::lines::Lines)) reports a block with another checksum, and a recording without its end.
 
 use std::fs::{self, File, OpenOptions};

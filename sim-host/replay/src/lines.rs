@@ -59,6 +59,7 @@ impl<R: BufRead> Lines<R> {
     pub fn next(&mut self) -> io::Result<Option<Result<&str, Malformed>>> {
         let Some(end) = self.read_line()? else {
             let is_torn = std::mem::take(&mut self.is_open);
+            self.number += u64::from(is_torn);
             return Ok(is_torn.then_some(Err(Malformed::NoEnd)));
         };
         self.number += 1;

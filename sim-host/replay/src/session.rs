@@ -594,7 +594,12 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         let aim = match aim {
             Ok(aim) => aim,
             Err(no_aim) => {
-                navigator.localizer_mut().skip();
+                let localizer = navigator.localizer_mut();
+                if matches!(pending.echo, Echo::At { .. }) {
+                    localizer.skip_unplanned();
+                } else {
+                    localizer.skip();
+                }
                 let now = navigator.localizer().health().verdict;
                 self.tally.verdicts.note(measurement.time, before, now);
                 self.tally.fixes.refused += 1;

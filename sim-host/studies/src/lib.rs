@@ -7,6 +7,7 @@
 //! | [`floor_plan`] | `docs/floor-plans.md` |
 //! | [`health_page`], [`kidnapped`] | `docs/health.md` |
 //! | [`reality`] | `docs/reality.md` |
+//! | [`rooms`] | none: a table of generated rooms |
 //! | [`search_study`] | `docs/search.md` |
 //! | [`sonar_model`] | `docs/sonar-model.md` |
 

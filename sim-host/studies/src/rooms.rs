@@ -165,7 +165,7 @@ const HEAD: &str = "\
 
 /// The results as a table.
 #[must_use]
-pub fn markdown(results: &Results) -> String {
+pub fn markdown(results: &[(&str, Sums)]) -> String {
     let mut page = HEAD.to_owned();
     for (name, sums) in results {
         let (runs, consistent) = (f64::from(sums.runs), f64::from(sums.consistent));

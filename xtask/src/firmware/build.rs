@@ -6,7 +6,6 @@ use std::process::Command;
 use anyhow::{Context, ensure};
 use sonarfix_boards::Board;
 
-use super::frames;
 use crate::cargo;
 use crate::workspace::Workspace;
 
@@ -34,17 +33,6 @@ pub fn of(board: &Board) -> anyhow::Result<PathBuf> {
     let package = format!("build --release --package {} --target {}", board.package, board.target);
     cargo::check(firmware.cargo(&package))?;
     Ok(firmware.target_folder().join(&board.target).join("release").join(&board.package))
-}
-
-/// Builds the firmware with the compiler's own stack sizes in it; returns the path of the linked file, which is not
-/// the one that ships.
-pub fn with_stack_sizes() -> anyhow::Result<PathBuf> {
-    let target = cargo::target_folder().join("firmware-stack-sizes");
-    let mut command = Workspace::Firmware.cargo("build --release --config");
-    command.arg(format!("target.{TARGET}.rustflags = ['{}']", frames::FLAG));
-    command.env("CARGO_TARGET_DIR", &target).env("RUSTC_BOOTSTRAP", "1");
-    cargo::check(command)?;
-    Ok(target.join(TARGET).join("release").join(NAME))
 }
 
 /// Reads a linked file.

@@ -103,7 +103,7 @@ impl<'m> Running<'m> {
 }
 
 fn has_rolled(report: &Report) -> bool {
-    // By reference: a copy of a step takes 150 instructions.
+    // By reference: a step is large.
     let rolled = |step: Option<&Step>| {
         step.is_some_and(|Step { travel, .. }| {
             travel.right.abs() > Metres(0.0) || travel.left.abs() > Metres(0.0)

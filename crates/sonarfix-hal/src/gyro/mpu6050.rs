@@ -2,7 +2,7 @@
 //!
 //! By the maker's *MPU-6000 and MPU-6050 Register Map*, rev. 4.2. The driver wakes the sensor with the clock of its gyro,
 //! sets the smallest range that includes the configured one, and the low-pass filter of 98 Hz, whose delay is 2.8 ms.
-//! A reading is one transfer of two bytes, 0.1 ms at 400 kHz. Why not an existing crate: `ARCHITECTURE.md`.
+//! A reading is one transfer of two bytes, 0.1 ms at 400 kHz. Why not an existing crate: `docs/decisions.md`.
 
 use embedded_hal::i2c::I2c;
 use sonarfix::geometry::units::RadiansPerSecond;

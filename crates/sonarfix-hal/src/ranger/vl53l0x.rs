@@ -16,7 +16,7 @@
 //!
 //! Each trigger makes one step and is too soon until the last, so that the loop, which repeats it every millisecond, has a
 //! range after some 20 ms. ST's driver also estimates the noise of each range from its signal; this one leaves that to the
-//! gate. It has been tested on a simulated bus only. Why not an existing crate: `ARCHITECTURE.md`.
+//! gate. It has been tested on a simulated bus only. Why not an existing crate: `docs/decisions.md`.
 
 use embedded_hal::i2c::I2c;
 use sonarfix::geometry::units::{Duration, Instant, Metres};

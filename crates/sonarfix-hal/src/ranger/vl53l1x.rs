@@ -4,7 +4,7 @@
 //! 50 ms of light. A trigger starts one range; until it is due the bus is idle, and then one register is read per poll.
 //! The first trigger after a configuration or a failure of the bus writes all settings, about 50 transfers (6 ms at
 //! 400 kHz), so that a sensor that has lost its supply is used again. It has been tested on a simulated bus only. Why not
-//! an existing crate: `ARCHITECTURE.md`.
+//! an existing crate: `docs/decisions.md`.
 
 use embedded_hal::i2c::I2c;
 use sonarfix::geometry::units::{Duration, Instant, Metres};

@@ -14,9 +14,8 @@ pub enum Stamp {
     Arrival,
 }
 
-/// Evaluations of the search a millisecond: the computing time that simulation, replay and the STM32 firmware grant it.
-/// 40 evaluations of 1,800 instructions on average (`docs/search.md`) are 72,000 instructions, at 1.6 cycles an instruction two
-/// thirds of the 168,000 cycles that a Cortex-M4F at 168 MHz has in a millisecond.
+/// Evaluations of the search a millisecond: the computing time that simulation, replay and the STM32 firmware grant it. A
+/// Cortex-M4F at 168 MHz needs two thirds of a millisecond for them (`docs/benchmarks.md` has the instructions).
 pub const EVALUATIONS_PER_MILLISECOND: u16 = 40;
 
 /// Settings of the loop. The ping schedule is that of the localizer's configuration

@@ -569,6 +569,8 @@ fn localizer(source: &mut impl Source) -> Config {
     config.echo.map_accuracy = Metres(source.single());
     config.echo.late = Metres(source.single());
     config.echo.late_per_radian = Metres(source.single());
+    config.echo.half_angle = Radians(source.single());
+    config.echo.rim = Radians(source.single());
     config.policy = if source.pick(2) == 0 { Policy::Nearest } else { Policy::Informative };
     config.weights.heading = Metres(source.single());
     config.weights.wheels = Metres(source.single());

@@ -39,8 +39,8 @@ pub(crate) fn usual() -> RobotConfig {
 pub(crate) static ROBOT: Section<RobotConfig> = Section { name: "robot", usual, keys: &[
     optional(Key::new("start", Value::Word(&["known", "unknown"], |c| usize::from(c.start.is_unknown()), |c, word| {
         c.start = if word == 0 { StartPose::Known } else { StartPose::Unknown { region: None } };
-    }), "`\"known\"`: the pose must be set before the start, and a lost robot stays lost. `\"unknown\"`: the robot \
-        [searches](search.md#in-the-robots-loop) for its pose when it starts without one and whenever it is lost")),
+    }), "whether the pose is set before the start. If not, or when it is lost, the robot \
+        [searches](search.md#in-the-robots-loop) for it. A robot with a known start stays lost")),
     optional(Key::new("start_region", Value::Own("a table of `from` and `to`", file::read_region, |c| c.start.region().map(|region| REGION.inline(&region))),
         "where on the map a robot without a pose starts, with `start = \"unknown\"`. Anywhere without this key")),
     Key::new("drive", Value::Table(&DRIVE), "wheels and encoders"),
@@ -205,6 +205,11 @@ static ECHO: Section<RobotConfig> = Section { name: "echo", usual, keys: &[
         "mean by which an echo from the normal is reported too far, by missed cycles and the threshold of the detector")),
     optional(number("late_per_radian", &LENGTH, ("0 m", "1 m"), |c| &mut c.localizer.echo.late_per_radian.0,
         "by how much more per radian between the axis of the sonar and the normal of the wall")),
+    optional(number("half_angle", &ANGLE, ("0 deg", "90 deg"), |c| &mut c.localizer.echo.half_angle.0,
+        "angle between the axis of the sonar and the normal of a wall at which it hears half of the echoes: it explains echoes, and `cone` chooses walls. \
+        0: the `cone` is taken")),
+    optional(number("rim", &ANGLE, ("0 deg", "90 deg"), |c| &mut c.localizer.echo.rim.0,
+        "standard deviation of that angle from ping to ping")),
 ] };
 
 #[rustfmt::skip]

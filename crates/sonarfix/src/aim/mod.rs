@@ -328,11 +328,11 @@ impl<'a> Planner<'a> {
         Some(candidate)
     }
 
-    /// A wall along a bearing that the planner does not choose: the nearest is the best.
+    /// A wall along a bearing that the planner does not choose: the nearest that may answer is the best.
     fn at_bearing(&self, id: WallId, wall: &Wall, bearing: Radians) -> Option<Candidate> {
         let (expected, on_wall) = self.view.expected_range(wall).ok()?;
         let off = self.view.off_square(&expected, bearing);
-        if !self.view.is_square(off) {
+        if !self.view.may_answer(off) {
             return None;
         }
         let score = 1.0 / expected.range.0;

@@ -332,7 +332,11 @@ impl Config {
         not_negative("echo.free_path", echo.free_path.0)?;
         not_negative("echo.map_accuracy", echo.map_accuracy.0)?;
         not_negative("echo.late", echo.late.0)?;
-        not_negative("echo.late_per_radian", echo.late_per_radian.0)
+        not_negative("echo.late_per_radian", echo.late_per_radian.0)?;
+        let half = echo.half_angle.0;
+        let narrow = half >= 0.0 && half < 0.5 * core::f32::consts::PI;
+        require("echo.half_angle", narrow, "between 0 and 90°")?;
+        not_negative("echo.rim", echo.rim.0)
     }
 
     fn check_drive(&self) -> Result<(), ConfigError> {

@@ -1,8 +1,7 @@
 //! Square root, exponential and logarithm in `f32`, with the same bits on every target.
 //!
-//! The functions of `libm` take 60 to 100 instructions of a Cortex-M4F each, because they round correctly and
-//! handle every bit pattern. These take 15 to 25, with errors that are far below those of the models that use
-//! them. Each argument has a domain; outside it the result is unspecified, but nothing panics.
+//! The functions of `libm` round correctly and handle every bit pattern, which makes them several times as
+//! expensive. The errors of these are far below those of the models that use them. Each argument has a domain; outside it the result is unspecified, but nothing panics.
 //!
 //! # Non-finite policy
 //! The callers pass finite arguments from a valid filter.

@@ -499,12 +499,23 @@ impl<'m> Localizer<'m> {
     /// until it has turned: that counts once in [`FIXED_SKIP`].
     pub fn skip(&mut self) {
         if self.config.sonars().all(|(_, sonar)| sonar.fixed_bearing().is_some()) {
-            let since = self.time.checked_duration_since(self.pinged).unwrap_or(NO_TIME);
-            if since < FIXED_SKIP {
-                return;
-            }
-            self.pinged = self.time;
+            self.skip_unplanned();
+        } else {
+            self.count_skip();
         }
+    }
+
+    /// Records that [`Self::aim_along`] found no wall for a ping whose bearing this localizer did not choose. Of a ring of sonars most
+    /// pings go where no wall answers, which is no evidence: it counts once in [`FIXED_SKIP`].
+    pub fn skip_unplanned(&mut self) {
+        let since = self.time.checked_duration_since(self.pinged).unwrap_or(NO_TIME);
+        if since >= FIXED_SKIP {
+            self.pinged = self.time;
+            self.count_skip();
+        }
+    }
+
+    fn count_skip(&mut self) {
         let limits = self.limits();
         self.health.record_no_aim(self.ekf.pose_uncertainty(), &limits);
     }

@@ -31,6 +31,11 @@ pub struct EchoParameters {
     pub late: Metres,
     /// By how much more per radian between the axis and the normal.
     pub late_per_radian: Metres,
+    /// Angle between the axis of a sonar and the normal of a wall at which it answers half as often as on the normal. Zero: not
+    /// known, and the [cone](crate::sensor::ranger::Sonar::cone) is taken for it.
+    pub half_angle: Radians,
+    /// Standard deviation of that angle from ping to ping: the width of a soft rim.
+    pub rim: Radians,
 }
 
 impl EchoParameters {
@@ -43,6 +48,8 @@ impl EchoParameters {
         map_accuracy: Metres(0.0),
         late: Metres(0.0),
         late_per_radian: Metres(0.0),
+        half_angle: Radians(0.0),
+        rim: Radians(0.0),
     };
 
     /// An HC-SR04 in a furnished room: assumed, no recordings. It misses a cycle, half a wavelength of 4.3 mm, of one echo in
@@ -55,16 +62,21 @@ impl EchoParameters {
         map_accuracy: Metres(0.0),
         late: Metres(0.000_23),
         late_per_radian: Metres(0.014_3),
+        half_angle: Radians(0.0),
+        rim: Radians(0.0),
     };
 
     /// LEGO NXT: shares of its recorded sweeps within 20° of the normal (`docs/sonar-model.md`),
-    /// averaged over the ranges. Its resolution of 10 mm hides how late it is.
+    /// averaged over the ranges. It hears walls up to 38° off the normal at 0.3 m, and up to 30° at 0.8 m. Its resolution of
+    /// 10 mm hides how late it is.
     pub const NXT: Self = Self {
         missed: 0.08,
         short: 0.04,
         long: 0.03,
         late: Metres(0.0),
         late_per_radian: Metres(0.0),
+        half_angle: Radians(0.56),
+        rim: Radians(0.03),
         ..Self::HC_SR04
     };
 

@@ -729,25 +729,26 @@ proptest! {
 }
 
 /// A robot with a fixed sonar that waits until a wall is in its cone: once a second it counts as a ping without an accepted
-/// range, however often the loop asks; with a servo each time counts.
+/// range, however often the loop asks; with a servo each time counts, unless the bearing was not planned.
 #[test]
 fn waiting_for_a_wall_counts_once_a_second() {
     let walls = [Wall::new(Point::new(2.0, -2.0), Point::new(2.0, 2.0)).unwrap()];
     let mut config = config_for_rooms(Point::default());
-    let silent = |config: Config| {
+    let silent = |config: Config, skip: fn(&mut Localizer)| {
         let mut localizer = started(&config, &walls, Pose::default(), 0.02, (0.0, 0.0, 0));
         let begin = localizer.time();
         for tick in 1..=50 {
             let now = begin.checked_add_duration(Duration::from_ticks(tick * 100_000)).unwrap();
             localizer.odometry(now, WheelTravel::new(0.0, 0.0)).unwrap();
             assert_eq!(localizer.aim(), Err(NoAim::NoWall));
-            localizer.skip();
+            skip(&mut localizer);
         }
         localizer.health().silent_in_a_row
     };
     let back = core::f32::consts::PI;
     config.sonar.servo = (Radians(back), Radians(back));
-    assert_eq!(silent(config), 5);
+    assert_eq!(silent(config, Localizer::skip), 5);
     config.sonar.servo = (Radians(back - 0.1), Radians(back));
-    assert_eq!(silent(config), 50);
+    assert_eq!(silent(config, Localizer::skip), 50);
+    assert_eq!(silent(config, Localizer::skip_unplanned), 5);
 }

@@ -1,6 +1,6 @@
 //! The files of a new robot.
 
-use sonarfix_map::Scenario;
+use sonarfix_map::{Scenario, with_comments};
 
 use super::answers::Answers;
 use sonarfix_boards::Bus;
@@ -24,7 +24,7 @@ pub fn all(answers: &Answers) -> anyhow::Result<[(&'static str, String); 4]> {
             text.replace(&format!("@{key}@"), value)
         })
     };
-    let robot = filled(ROBOT);
+    let robot = with_comments(&filled(ROBOT));
     // The simulated wheels differ from the configured ones.
     let track_width =
         sonarfix_map::robot_file::parse(&robot, "robot.toml")?.localizer.drive.track_width;
@@ -110,7 +110,7 @@ fn second(answers: &Answers) -> String {
     let Some(bearing) = &answers.second_at else { return String::new() };
     format!(
         "\n[[sonar]]\n\
-         mount = [\"0 mm\", \"60 mm\"]            # measure\n\
+         mount = [\"0 mm\", \"60 mm\"] # measure:\n\
          bearing = \"{bearing}\"\n\
          cone = \"@cone@ deg\"\n\
          min_range = \"@min_range@ m\"\n\

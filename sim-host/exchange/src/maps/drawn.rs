@@ -84,7 +84,10 @@ impl Drawing {
             return Ok(());
         }
         let count = self.walls.len();
-        ensure!(count < MAX_SEGMENTS, "it has more than {MAX_SEGMENTS} segments");
+        ensure!(
+            count < MAX_SEGMENTS,
+            "it has more than {MAX_SEGMENTS} segments: remove what is no wall"
+        );
         let base = if name.is_empty() { "wall" } else { name };
         let is_free = !name.is_empty() && !self.names.contains(name);
         let name = if is_free { name.to_owned() } else { format!("{base} {}", count + 1) };

@@ -10,7 +10,7 @@ use super::drawn::{Drawing, Frame, Imported};
 /// Largest number of entities that are read.
 pub const MAX_ENTITIES: u64 = 1_000_000;
 /// Largest number of pairs of code and value that are read, in all sections.
-pub const MAX_PAIRS: u64 = 50_000_000;
+pub const MAX_PAIRS: u64 = 20_000_000;
 /// Longest line, bytes.
 const MAX_LINE: u64 = 4_096;
 
@@ -38,7 +38,10 @@ impl<R: BufRead> Pairs<R> {
         let Some(code) = self.line()? else { return Ok(None) };
         self.count += 1;
         let at = self.count.saturating_mul(2);
-        ensure!(self.count <= MAX_PAIRS, "it has more than {MAX_PAIRS} pairs of lines");
+        ensure!(
+            self.count <= MAX_PAIRS,
+            "it has more than {MAX_PAIRS} pairs of lines: remove what is no wall"
+        );
         ensure!(!code.starts_with("AutoCAD Binary DXF"), "it is binary: save it as DXF text");
         let code = code.parse().with_context(|| format!("line {}: no group code", at - 1))?;
         let value = self.line()?.with_context(|| format!("line {at}: the value is missing"))?;
@@ -170,7 +173,10 @@ impl Reading<'_> {
 
     fn finish(&mut self, entity: Entity) -> anyhow::Result<()> {
         self.entities += 1;
-        ensure!(self.entities <= MAX_ENTITIES, "it has more than {MAX_ENTITIES} entities");
+        ensure!(
+            self.entities <= MAX_ENTITIES,
+            "it has more than {MAX_ENTITIES} entities: remove what is no wall"
+        );
         match entity.kind.as_str() {
             "VERTEX" => {
                 if let Some(polyline) = &mut self.polyline {

@@ -23,7 +23,7 @@ fn check(width: u64, height: u64) -> anyhow::Result<(usize, usize)> {
     ensure!(width > 0 && height > 0, "it has no pixel");
     ensure!(
         width.saturating_mul(height) <= MAX_PIXELS,
-        "it has {width} × {height} pixels: at most {MAX_PIXELS} are read"
+        "it has {width} × {height} pixels: at most {MAX_PIXELS} are read: make it smaller or coarser"
     );
     Ok((usize::try_from(width)?, usize::try_from(height)?))
 }

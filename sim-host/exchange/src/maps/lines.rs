@@ -25,8 +25,10 @@ const CORNER: f64 = 2.0;
 const STEEP: f64 = 0.342;
 /// Largest number of fits of a line.
 const FITS: usize = 16;
-/// Most pixels of lines that are tried, in all: a hundred times those of a large building. Noise has more.
-const MOST_TRIED: usize = 200_000_000;
+/// Most pixels in lines that are tried, in all. A wall takes some thousands, of which most are not its own.
+const MOST_TRIED: usize = 50_000_000;
+/// Pixels that are missing at the two ends of a line that is tried.
+const TRIED_ENDS: usize = 6;
 /// Side of the squares in which the ends of lines are looked up, pixels.
 const SQUARE: f64 = 16.0;
 
@@ -172,7 +174,7 @@ fn line_from(
     let of = |direction: u32| {
         let ray = Ray::new(coordinates(seed), PI * f64::from(direction) / f64::from(DIRECTIONS));
         let pixels = ray.follow(on, seed);
-        *tried += pixels.len();
+        *tried += pixels.len() + TRIED_ENDS;
         let new = pixels.iter().filter(|&&pixel| left.is_on(pixel)).count();
         (new, pixels)
     };

@@ -73,6 +73,9 @@ pub(crate) struct Viewpoint<'a> {
     covariance: PoseCovariance,
     /// What the echo model knows of the sensor.
     echo: &'a EchoParameters,
+    /// Angle off the perpendicular at which half of the walls answer, and its variance, rad².
+    half_angle: Radians,
+    rim_squared: f32,
 }
 
 impl<'a> Viewpoint<'a> {
@@ -90,6 +93,8 @@ impl<'a> Viewpoint<'a> {
             least: SAFE,
             covariance: ekf.pose_covariance(),
             echo: &config.echo,
+            half_angle: half_angle(sonar, &config.echo),
+            rim_squared: config.echo.rim.0 * config.echo.rim.0,
         }
     }
 
@@ -198,7 +203,7 @@ impl<'a> Viewpoint<'a> {
 
     /// Whether the heading is known well enough to tell what is in a beam.
     pub fn is_heading_known(&self) -> bool {
-        let limit = max_heading_deviation(self.sonar).0;
+        let limit = max_heading_deviation(self.sonar, self.echo).0;
         self.covariance.hh <= limit * limit
     }
 
@@ -223,28 +228,45 @@ impl<'a> Viewpoint<'a> {
         off.abs() <= self.sonar.cone
     }
 
-    /// Probability that a beam at the angle `off` from the perpendicular is square, given the
-    /// uncertainty of the heading.
+    /// Whether a wall may answer a beam at the angle `off` from its perpendicular that was not planned: an echo is explained by
+    /// what is known of the sensor, also where the planner would not measure.
+    pub fn may_answer(&self, off: Radians) -> bool {
+        if self.echo.half_angle > Radians(0.0) {
+            self.probability_of_square(off) >= POSSIBLE
+        } else {
+            self.is_square(off)
+        }
+    }
+
+    /// Probability that a beam at the angle `off` from the perpendicular is square, or near enough for the sonar to hear the
+    /// wall, given the uncertainty of the heading.
     pub fn probability_of_square(&self, off: Radians) -> f32 {
-        let cone = self.sonar.cone.0;
-        let variance = self.covariance.hh + HEADING_MARGIN * HEADING_MARGIN;
-        probability_within(cone + off.0, cone - off.0, variance)
+        let half = self.half_angle.0;
+        let variance = self.covariance.hh + HEADING_MARGIN * HEADING_MARGIN + self.rim_squared;
+        probability_within(half + off.0, half - off.0, variance)
     }
 }
 
 /// Largest deviation of the heading at which the estimate counts as tracking: that of the least demanding ranger.
 pub(crate) fn max_heading_deviation_of(config: &Config) -> Radians {
-    let first = max_heading_deviation(&config.sonar);
-    let others = config.further_sonars.iter().map(max_heading_deviation);
+    let of = |sonar: &Sonar| max_heading_deviation(sonar, &config.echo);
+    let first = of(&config.sonar);
+    let others = config.further_sonars.iter().map(of);
     others.fold(first, |most, other| if other > most { other } else { most })
 }
 
 /// The same of one ranger.
-fn max_heading_deviation(sonar: &Sonar) -> Radians {
+fn max_heading_deviation(sonar: &Sonar, echo: &EchoParameters) -> Radians {
     match sonar.ranging {
-        Ranging::Sound => sonar.cone * MAX_HEADING_DEVIATION,
+        Ranging::Sound => half_angle(sonar, echo) * MAX_HEADING_DEVIATION,
         Ranging::Light(_) => MAX_LIGHT_HEADING_DEVIATION,
     }
+}
+
+/// Angle off the perpendicular at which a ranger hears half of the walls: that of its echo model, otherwise its cone.
+fn half_angle(sonar: &Sonar, echo: &EchoParameters) -> Radians {
+    let is_known = sonar.ranging == Ranging::Sound && echo.half_angle > Radians(0.0);
+    if is_known { echo.half_angle } else { sonar.cone }
 }
 
 /// The range of an echo, if it is one that the sonar can report.
@@ -318,7 +340,7 @@ mod tests {
     fn a_heading_is_known_up_to_its_limit() {
         use crate::filter::ekf::{Ekf, StandardDeviations, StateEstimate};
         let config = Config::for_track_width(Metres(0.2));
-        let limit = max_heading_deviation(&config.sonar);
+        let limit = max_heading_deviation(&config.sonar, &config.echo);
         for (share, is_known) in
             [(0.0, true), (0.5, true), (0.99, true), (1.01, false), (9.0, false)]
         {
@@ -330,6 +352,66 @@ mod tests {
                 is_known,
                 "{share}"
             );
+        }
+    }
+
+    fn ekf_with(heading: f32) -> Ekf {
+        use crate::filter::ekf::{StandardDeviations, StateEstimate};
+        let heading = Radians(heading);
+        let deviation = StandardDeviations { heading, ..StandardDeviations::default() };
+        let drive = Config::for_track_width(Metres(0.2)).drive;
+        Ekf::new(drive, StateEstimate::default(), deviation).unwrap()
+    }
+
+    /// Eq. (50) in `f64`, whatever the cone in which walls are chosen; without a half-angle the cone is taken, and is hard.
+    #[test]
+    fn what_a_sonar_hears_does_not_depend_on_the_cone() {
+        let ekf = ekf_with(0.02);
+        for cone in [8.0_f32, 12.0, 20.0, 40.0] {
+            let mut config = Config::for_track_width(Metres(0.2));
+            config.sonar.cone = Radians::from_degrees(cone);
+            config.echo = EchoParameters::NXT;
+            let view = Viewpoint::new(&config, &config.sonar, &ekf);
+            let (half, rim) = (f64::from(config.echo.half_angle.0), f64::from(config.echo.rim.0));
+            let sigma = (0.02_f64.powi(2) + 0.01_f64.powi(2) + rim * rim).sqrt()
+                * core::f64::consts::SQRT_2;
+            for degrees in -12..=12_i16 {
+                let off = Radians::from_degrees(5.0 * f32::from(degrees));
+                let at = f64::from(off.0);
+                let inside = libm::erf((half + at) / sigma) + libm::erf((half - at) / sigma);
+                let probability = f64::from(view.probability_of_square(off));
+                assert!((probability - 0.5 * inside).abs() < 1e-3, "{cone} {degrees}");
+                assert_eq!(view.may_answer(off), 0.5 * inside >= 0.05, "{cone} {degrees}");
+            }
+            assert_eq!(view.is_square(Radians(0.5)), cone > 30.0);
+            config.echo = EchoParameters::HC_SR04;
+            let view = Viewpoint::new(&config, &config.sonar, &ekf);
+            let [inside, outside] =
+                [0.99, 1.01].map(|share| view.may_answer(config.sonar.cone * share));
+            assert!(inside && !outside, "{cone}");
+        }
+    }
+
+    /// Eq. (49) in the range expected of an echo.
+    #[test]
+    fn an_echo_is_expected_as_late_as_its_model_says() {
+        use crate::map::Wall;
+        let ekf = ekf_with(0.02);
+        let mut config = Config::for_track_width(Metres(0.2));
+        let wall = Wall::new(Point::new(2.0, -2.0), Point::new(2.0, 2.0)).unwrap();
+        let expected = |config: &Config, bearing: f32| {
+            let view = Viewpoint::new(config, &config.sonar, &ekf).of_echo();
+            view.sight(&wall, Radians(bearing)).unwrap().expected.range.0
+        };
+        config.echo = EchoParameters::NONE;
+        assert!((expected(&config, 0.1) - 2.0).abs() < 1e-6);
+        config.echo = EchoParameters::HC_SR04;
+        for bearing in [-0.15_f32, 0.0, 0.1] {
+            let variance = 0.02_f64.powi(2) + 0.015_f64.powi(2);
+            let angle =
+                (f64::from(bearing).powi(2) + 2.0 / core::f64::consts::PI * variance).sqrt();
+            let late = 0.000_23 + 0.014_3 * angle;
+            assert!((f64::from(expected(&config, bearing)) - 2.0 - late).abs() < 1e-6, "{bearing}");
         }
     }
 }

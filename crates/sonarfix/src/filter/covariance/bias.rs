@@ -191,8 +191,8 @@ impl Covariance {
     }
 
     // ===== Eq. (38): correction by a difference of turns =====
-    /// Corrects P, the column of the bias, and the bias by a difference of turns; `innovation` is its value less what is
-    /// expected of it. Returns the gain; neither has changed without one.
+    /// Corrects P and the bias, with its column, by a difference of turns. `innovation` is the difference less its expected
+    /// value. Returns the gain; without a gain nothing has changed.
     pub fn correct_by_turns(
         &mut self,
         bias: &mut GyroBias,

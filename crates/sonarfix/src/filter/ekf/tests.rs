@@ -2,6 +2,7 @@
 
 use super::turn::{GyroTurn, SlipLimits};
 use super::*;
+use crate::filter::covariance::GyroBias;
 use crate::filter::motion::WheelTravel;
 use crate::geometry::units::PerRootMetre;
 

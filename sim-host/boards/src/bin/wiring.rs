@@ -1,17 +1,16 @@
-//! Draws the wiring of each board from `firmware/boards.toml`: `docs/images/wiring-NAME.svg`.
+//! Draws the wiring of each board from `firmware/boards.toml`: `cargo run --bin wiring` writes `docs/images/wiring-NAME.svg`.
 
 use std::fmt::Write;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-
 use sonarfix_boards::Board;
 
-use crate::cargo;
+/// The folder of the drawings.
+const IMAGES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/images");
 
-/// Writes the drawings of all boards.
-pub fn write() -> anyhow::Result<()> {
+fn main() -> anyhow::Result<()> {
     for (file, svg) in drawings()? {
         fs::write(&file, svg).with_context(|| file.display().to_string())?;
         println!("{}", file.display());
@@ -20,8 +19,8 @@ pub fn write() -> anyhow::Result<()> {
 }
 
 fn drawings() -> anyhow::Result<Vec<(PathBuf, String)>> {
-    let folder = cargo::root().join("docs/images");
-    let drawn = |board: &Board| (folder.join(format!("wiring-{}.svg", board.name)), draw(board));
+    let drawn =
+        |board: &Board| (Path::new(IMAGES).join(format!("wiring-{}.svg", board.name)), draw(board));
     Ok(sonarfix_boards::all()?.iter().map(drawn).collect())
 }
 
@@ -299,14 +298,14 @@ impl Svg {
 mod tests {
     use super::*;
 
-    /// The drawings in the docs are those of the table: `cargo xtask wiring` writes them.
+    /// The drawings in the docs are those of the table: `cargo run --bin wiring` writes them.
     #[test]
     fn the_drawings_are_those_of_the_table() {
         let drawings = drawings().unwrap_or_default();
         assert!(drawings.len() >= 4);
         for (file, svg) in drawings {
             let written = fs::read_to_string(&file).unwrap_or_default();
-            assert!(written == svg, "{}: run `cargo xtask wiring`", file.display());
+            assert!(written == svg, "{}: run `cargo run --bin wiring`", file.display());
         }
     }
 

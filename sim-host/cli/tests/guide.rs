@@ -1,4 +1,4 @@
-//! Follows `docs/build-a-robot.md` in simulation: from an empty folder to the fixes of a drive, with the files that
+//! `cargo xtask guide` follows `docs/build-a-robot.md` in simulation: from an empty folder to the fixes of a drive, with the files that
 //! `sonarfix init` writes.
 //!
 //! | step | on |
@@ -11,16 +11,16 @@
 
 use std::fs;
 use std::net::TcpListener;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use anyhow::{Context, bail, ensure};
 use serde_json::Value;
-
-use crate::cargo;
-use crate::firmware;
 use sonarfix_boards::Board;
+
+/// The package of the firmware that QEMU runs.
+const REFERENCE: &str = "sonarfix-stm32f405";
 
 /// Simulated time of a drive, seconds.
 const SECONDS: &str = "20";
@@ -38,19 +38,17 @@ const SIGNS: [(&str, &str); 6] = [
     ("sonar", "WRONG no pulse on the echo line"),
 ];
 
-/// Runs the steps for each board.
-pub fn follow() -> anyhow::Result<()> {
-    cargo::run("build --quiet --release --bin sonarfix")?;
-    let firmware = firmware::reference()?;
-    let folder = cargo::target_folder().join("guide");
-    if folder.exists() {
-        fs::remove_dir_all(&folder).context("cannot remove the old folder")?;
-    }
-    fs::create_dir_all(&folder)?;
+/// The steps for each board; `SONARFIX_FIRMWARE` is the firmware of the reference board.
+#[test]
+#[ignore = "needs the firmware and QEMU; `cargo xtask guide` runs it"]
+fn the_guide_leads_to_a_drive_on_every_board() -> anyhow::Result<()> {
+    let firmware = std::env::var_os("SONARFIX_FIRMWARE").map(PathBuf::from);
+    let firmware = firmware.context("SONARFIX_FIRMWARE is not set")?;
+    let folder = tempfile::tempdir()?;
     for board in sonarfix_boards::all()? {
-        let robot = folder.join(&board.name);
-        prepare(&folder, &robot, &board)?;
-        if board.package == firmware::REFERENCE {
+        let robot = folder.path().join(&board.name);
+        prepare(folder.path(), &robot, &board)?;
+        if board.package == REFERENCE {
             bring_up(&robot, &board, &firmware)?;
         }
         drive(&robot, &board)?;
@@ -160,9 +158,8 @@ impl Drop for Emulator {
 
 /// Runs the command; a port that is not open yet is tried again.
 fn sonarfix(folder: &Path, arguments: &[&str]) -> anyhow::Result<String> {
-    let program = cargo::target_folder().join("release").join("sonarfix");
     for _ in 0..ATTEMPTS {
-        let mut command = Command::new(&program);
+        let mut command = Command::new(env!("CARGO_BIN_EXE_sonarfix"));
         command.args(arguments).current_dir(folder).stdin(Stdio::null());
         let output = command.output().context("cannot start `sonarfix`")?;
         let errors = String::from_utf8_lossy(&output.stderr);
