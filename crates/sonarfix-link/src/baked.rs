@@ -148,6 +148,9 @@ pub fn read(bytes: &[u8]) -> Result<RobotConfig, BakedError> {
     config.check().map(|()| config).map_err(BakedError::Rule)
 }
 
+/// The fields of the localizer's configuration between the first ranger and the gyro.
+type UpToGyro = (CalibrationPrior, GatingParameters, EchoParameters, Policy, Weights);
+
 /// The part that a configuration in postcard asks for and that this program was built without; `None` if there is no such
 /// part, or before it there is no configuration.
 ///
@@ -162,7 +165,6 @@ pub(crate) fn not_linked(postcard: &[u8]) -> Option<NotLinked> {
     if Sonar::deserialize(&mut *decoder).is_err() {
         return Some(NotLinked(Feature::Light));
     }
-    type UpToGyro = (CalibrationPrior, GatingParameters, EchoParameters, Policy, Weights);
     UpToGyro::deserialize(&mut *decoder).ok()?;
     if Option::<GyroParameters>::deserialize(&mut *decoder).is_err() {
         return Some(NotLinked(Feature::Gyro));

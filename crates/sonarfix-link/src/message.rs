@@ -31,6 +31,7 @@ pub trait Message: Serialize + DeserializeOwned + sealed::Sealed {
     const KIND: u8;
 
     /// What stands for a message that this program cannot decode, if it is known.
+    #[must_use]
     fn substitute(_postcard: &[u8]) -> Option<Self> {
         None
     }

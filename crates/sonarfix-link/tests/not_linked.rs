@@ -3,8 +3,8 @@
 #![cfg(not(any(feature = "light", feature = "gyro", feature = "rangers", feature = "search")))]
 
 use serde::Serialize;
-use sonarfix::config::{Config, Policy};
-use sonarfix::geometry::units::Metres;
+use sonarfix::config::{Config, Policy, ServoTiming};
+use sonarfix::geometry::units::{Metres, Radians};
 use sonarfix::map::image::checksum;
 use sonarfix_hal::config::{Feature, NotLinked, RobotConfig, StartPose};
 use sonarfix_link::baked::{self, BakedError};
@@ -12,7 +12,10 @@ use sonarfix_link::message::SessionCommand;
 use sonarfix_link::{Command, Receiver, Sender, frame};
 
 fn example() -> RobotConfig {
-    RobotConfig::with_common_parts(Config::for_track_width(Metres(0.16)))
+    let mut localizer = Config::for_track_width(Metres(0.16));
+    localizer.sonar.servo = (Radians(-1.5), Radians(1.5));
+    localizer.sonar.timing.servo = ServoTiming::SG90;
+    RobotConfig::with_common_parts(localizer)
 }
 
 fn postcard(value: &impl Serialize) -> Vec<u8> {
@@ -65,8 +68,8 @@ fn a_baked_configuration_names_what_is_missing() {
         let refused = Err(BakedError::NotLinked(NotLinked(feature)));
         assert_eq!(baked::read(&sealed(&config)), refused);
     }
-    let damaged = postcard(&example());
-    assert_eq!(baked::read(&sealed(&damaged[1..])), Err(BakedError::Layout));
+    let longer = [&postcard(&example())[..], &[0]].concat();
+    assert_eq!(baked::read(&sealed(&longer)), Err(BakedError::Layout));
 }
 
 #[test]
