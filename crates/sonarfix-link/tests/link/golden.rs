@@ -156,7 +156,7 @@ fn every_variant_has_the_number_of_its_version() {
 
 #[test]
 fn a_baked_configuration_has_the_bytes_of_its_version() {
-    assert_eq!(baked::VERSION, 7);
+    assert_eq!(baked::VERSION, 8);
     let mut localizer = Config::for_track_width(Metres(0.35));
     localizer.sonar.servo = (Radians(-1.5), Radians(1.5));
     localizer.sonar.timing.servo = ServoTiming::SG90;

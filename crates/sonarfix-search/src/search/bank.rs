@@ -58,7 +58,7 @@ impl Entry {
 
 #[derive(Debug, Clone)]
 pub(super) struct Bank<const HYPOTHESES: usize> {
-    entries: Vec<Entry, HYPOTHESES>,
+    entries: Vec<Entry, HYPOTHESES, u8>,
 }
 
 impl<const HYPOTHESES: usize> Bank<HYPOTHESES> {

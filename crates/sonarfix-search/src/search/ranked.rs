@@ -1,7 +1,9 @@
 //! Lists in the order of a score, best first.
 
-/// Removes an element and moves those behind it; nothing if there is no such element. [`heapless::Vec::remove`] can panic.
-pub(super) fn remove_at<T: Copy, const N: usize>(list: &mut heapless::Vec<T, N>, at: usize) {
+use heapless::{LenType, Vec};
+
+/// Removes an element and moves those behind it; nothing if there is no such element. [`Vec::remove`] can panic.
+pub(super) fn remove_at<T: Copy, L: LenType, const N: usize>(list: &mut Vec<T, N, L>, at: usize) {
     let Some(tail) = list.get_mut(at..) else { return };
     let mut behind: Option<&mut T> = None;
     let mut is_empty = true;
@@ -18,8 +20,8 @@ pub(super) fn remove_at<T: Copy, const N: usize>(list: &mut heapless::Vec<T, N>,
 }
 
 /// Inserts an element behind those with an equal or higher score. In a full list it replaces the last one, if its score is higher.
-pub(super) fn insert_ranked<T, S: PartialOrd, const N: usize>(
-    list: &mut heapless::Vec<T, N>,
+pub(super) fn insert_ranked<T, S: PartialOrd, L: LenType, const N: usize>(
+    list: &mut Vec<T, N, L>,
     element: T,
     score: impl Fn(&T) -> S,
 ) {
@@ -41,7 +43,7 @@ mod tests {
 
     #[test]
     fn an_element_is_removed_and_no_other() {
-        let list: heapless::Vec<u8, 4> = [1, 2, 3, 4].into_iter().collect();
+        let list: Vec<u8, 4> = [1, 2, 3, 4].into_iter().collect();
         for (at, left) in [
             (0, &[2, 3, 4][..]),
             (1, &[1, 3, 4]),
