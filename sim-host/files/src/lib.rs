@@ -166,8 +166,6 @@ fn sync_folder(of: &Path) {
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "tests")]
-
     use super::*;
 
     fn place() -> (tempfile::TempDir, PathBuf) {
