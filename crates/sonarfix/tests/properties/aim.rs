@@ -747,8 +747,8 @@ fn waiting_for_a_wall_counts_once_a_second() {
     };
     let back = core::f32::consts::PI;
     config.sonar.servo = (Radians(back), Radians(back));
-    assert_eq!(silent(config, Localizer::skip), 5);
+    assert_eq!(silent(config, |localizer| localizer.skip()), 5);
     config.sonar.servo = (Radians(back - 0.1), Radians(back));
-    assert_eq!(silent(config, Localizer::skip), 50);
-    assert_eq!(silent(config, Localizer::skip_unplanned), 5);
+    assert_eq!(silent(config, |localizer| localizer.skip()), 50);
+    assert_eq!(silent(config, |localizer| localizer.skip_unplanned()), 5);
 }
