@@ -445,7 +445,9 @@ fn a_page_commands_and_records_the_robot() {
     let answer = order("{\"order\":\"record\",\"on\":false}");
     assert!(answer.contains(&format!("recorded {file}")), "{answer}");
     let log = std::fs::read_to_string(dir.path().join(file)).unwrap();
-    assert!(log.ends_with("wheels,0.100000,0.02,0.02\n"), "{log}");
+    let is_whole =
+        log.contains("\nwheels,0.100000,0.02,0.02\n# checksum ") && log.ends_with("\n# end\n");
+    assert!(is_whole, "{log}");
 
     monitored.robot.stream.shutdown(std::net::Shutdown::Both).unwrap();
     let done = answers.join().unwrap();

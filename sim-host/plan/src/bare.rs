@@ -11,6 +11,7 @@ pub const ROBOT: &str = include_str!("robot.toml");
 const PLACE: &str = r#"
 format = 1
 name = "a map"
+description = "A robot that drives through doors, on a map alone"
 fidelity = "pins"
 
 [map]

@@ -58,6 +58,10 @@ track_width = "4 mm"
 range_scale = "0 %"
 [gating]
 confidence = 3.0
+[echo]
+# The recorded ranges are exact.
+late = "0 mm"
+late_per_radian = "0 mm"
 [schedule]
 policy = "nearest"
 "#;
