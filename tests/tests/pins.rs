@@ -7,7 +7,7 @@ use cpu_time::ThreadTime;
 use sonarfix::aim::Policy;
 use sonarfix::config::{PingSchedule, PingTiming, ServoTiming};
 use sonarfix::geometry::pose::Point;
-use sonarfix::geometry::units::Radians;
+use sonarfix::geometry::units::{Metres, PerRootMetre, Radians};
 use sonarfix_hal::robot::Stamp;
 use sonarfix_map::{CLASSROOM, Fidelity, PAPER, Scenario, ServoName};
 use sonarfix_sim::monte_carlo;
@@ -105,22 +105,40 @@ fn twenty_minutes_take_less_than_half_a_second() {
 }
 
 /// 200 runs of the classroom, on other seeds than the settings were chosen on: the position RMS is within 8 mm, no run is
-/// lost or called so, none is more than 10 cm off with the verdict `Tracking`, and the filter is consistent.
+/// lost or called so, and none is more than 10 cm off with the verdict `Tracking`. The robot file claims more noise of the wheels
+/// than there is, because slips come 3 mm at a time: the NEES is at most that of a consistent filter.
 /// 10,000 runs are a command (`docs/results.md`).
 #[test]
 fn the_classroom_is_crossed() {
-    const RUNS: u32 = 200;
-    let simulation = Simulation::new(scenario(CLASSROOM));
-    let summary = Summary::of(&monte_carlo::results(&simulation, 200_000, RUNS, &|| ()).unwrap());
+    let summary = classroom(|_| ());
     let position = summary.rms_path.x.hypot(summary.rms_path.y);
     assert_eq!((summary.lost_runs, summary.called_lost), (0, 0));
     assert!(summary.undetected_error < 0.05, "{}", summary.undetected_error);
-    // The robot file claims the noise that there is.
     assert!((0.8..1.2).contains(&summary.nis_mean), "{}", summary.nis_mean);
     assert!(position < 0.008, "{position}");
-    // Seven states: deviation √14 of each run's NEES.
-    let sampling = (14.0 / f64::from(RUNS)).sqrt();
-    assert!((summary.nees_mean - 7.0).abs() < 4.0 * sampling, "{}", summary.nees_mean);
+    assert!(summary.nees_mean < 7.0 + 4.0 * SAMPLING, "{}", summary.nees_mean);
+}
+
+/// With the noise that the wheels have, slips and bumps by variance, the filter is consistent in the classroom.
+#[test]
+fn with_the_true_noise_of_the_wheels_the_filter_is_consistent() {
+    let summary = classroom(|scenario| {
+        scenario.robot.localizer.drive.wheel_noise = PerRootMetre(Metres(2.2e-3));
+    });
+    assert!((summary.nees_mean - 7.0).abs() < 4.0 * SAMPLING, "{}", summary.nees_mean);
+    assert!((0.8..1.2).contains(&summary.nis_mean), "{}", summary.nis_mean);
+}
+
+const CLASSROOM_RUNS: u32 = 200;
+/// Sampling error of the mean NEES of seven states over these runs: each has the deviation √14.
+const SAMPLING: f64 = 0.2646;
+
+fn classroom(change: impl Fn(&mut Scenario)) -> Summary {
+    let mut scenario = scenario(CLASSROOM);
+    change(&mut scenario);
+    let simulation = Simulation::new(scenario);
+    let results = monte_carlo::results(&simulation, 200_000, CLASSROOM_RUNS, &|| ());
+    Summary::of(&results.unwrap())
 }
 
 /// The features of the classroom occur: every kind of echo, gated echoes of obstacles, and the

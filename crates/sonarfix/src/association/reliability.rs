@@ -15,9 +15,9 @@ const LEAST_ODDS: f32 = 0.01;
 /// The largest odds of silence: four explained echoes end them.
 const MOST_SILENT: f32 = 1_000.0;
 /// The largest odds of false ranges. A flat object before the wall looks alike, so that they stay below those of silence.
-const MOST_FALSE: f32 = 20.0;
-/// The odds above which a ranger counts as failed: three to twelve unexplained pings in a row.
-const FAILED: f32 = 9.0;
+const MOST_FALSE: f32 = 200.0;
+/// The odds above which a ranger counts as failed: a probability of 99 %.
+const FAILED: f32 = 99.0;
 /// The time after which a failed ranger is tried again.
 const PROBE_PERIOD: Duration = Duration::from_ticks(12_000_000);
 /// What a silent ranger returns, by its shares. An echo may be cross-talk of another one.
