@@ -340,7 +340,7 @@ impl<'m, F: NorFlash> App<'m, F> {
         next.min(self.rests_until)
     }
 
-    /// As [`Self::next_poll`], but `None` while a ping is in flight ([`Robot::idle_until`]): for a simulator.
+    /// As [`Self::next_poll`], but `None` while a ping is in flight ([`Robot::idle_until`](sonarfix_hal::robot::Robot::idle_until)): for a simulator.
     pub fn idle_until(&self, hardware: &mut impl Hardware) -> Option<Instant> {
         match &self.state {
             State::Waiting(_) => Some(self.next_poll(hardware)),

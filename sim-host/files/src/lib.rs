@@ -184,10 +184,11 @@ mod tests {
     fn a_file_is_old_until_it_is_finished() {
         let (dir, file) = place();
         let mut out = Output::create(&file).unwrap();
-        out.write_all(&[b'x'; 100_000]).unwrap();
+        let text = vec![b'x'; 100_000];
+        out.write_all(&text).unwrap();
         assert_eq!(fs::read(&file).unwrap(), b"old");
         out.finish().unwrap();
-        assert_eq!(fs::read(&file).unwrap(), [b'x'; 100_000]);
+        assert_eq!(fs::read(&file).unwrap(), text);
         assert_eq!(names(&dir), ["map.toml"]);
     }
 

@@ -383,7 +383,7 @@ impl Config {
         let some_are_right = echo.missed + echo.short + echo.long < 1.0;
         require("echo.missed", some_are_right, "below 1 together with echo.short and echo.long")?;
         let half = echo.half_angle.0;
-        let narrow = half >= 0.0 && half < 0.5 * core::f32::consts::PI;
+        let narrow = (0.0..0.5 * core::f32::consts::PI).contains(&half);
         require("echo.half_angle", narrow, "between 0 and 90°")
     }
 

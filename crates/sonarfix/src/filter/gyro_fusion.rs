@@ -288,5 +288,6 @@ impl GyroFusion {
     }
 }
 
-#[cfg(all(test, feature = "gyro"))]
+#[cfg(test)]
+#[cfg(feature = "gyro")]
 mod tests;

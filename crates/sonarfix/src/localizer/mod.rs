@@ -741,7 +741,7 @@ impl From<MeasurementError> for AbsoluteRefusal {
         match error {
             MeasurementError::NotFinite => Self::NotFinite,
             MeasurementError::NotPositiveDefinite => Self::NotPositiveDefinite,
-            MeasurementError::NotLinked => Self::NotLinked,
+            MeasurementError::WithoutFeature => Self::NotLinked,
         }
     }
 }

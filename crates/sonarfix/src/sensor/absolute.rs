@@ -95,7 +95,7 @@ pub(crate) enum MeasurementError {
     NotFinite,
     NotPositiveDefinite,
     /// This program was built without the feature `absolute`.
-    NotLinked,
+    WithoutFeature,
 }
 
 /// A checked measurement as three numbers with their noise.
@@ -123,7 +123,7 @@ impl AbsoluteMeasurement {
     /// measurement passes, does instead: without the feature the compiler removes what follows it.
     pub(crate) fn check(&self) -> Result<Components, MeasurementError> {
         if !cfg!(feature = "absolute") {
-            return Err(MeasurementError::NotLinked);
+            return Err(MeasurementError::WithoutFeature);
         }
         let components = self.components();
         if !(components.value.is_finite() && components.noise.is_finite()) {

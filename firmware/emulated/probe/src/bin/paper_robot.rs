@@ -5,6 +5,8 @@
 #[path = "../../../../../crates/sonarfix/examples/paper_robot/robot.rs"]
 mod robot;
 
+use core::hint::black_box;
+
 use emulated_board::meter::{Cost, Meter};
 use emulated_board::report;
 use emulated_probe::{STEPS, STEPS_A_RANGE, end, room, travel};
@@ -28,6 +30,8 @@ extern "C" fn probe_odometry(probed: &mut Probed, travel: &WheelTravel) {
 #[unsafe(no_mangle)]
 extern "C" fn probe_aim(probed: &mut Probed, _: &()) {
     probed.target = probed.robot.aim();
+    // A robot turns its sonar there.
+    black_box(probed.target.as_ref().map(|target| target.bearing));
 }
 
 #[unsafe(no_mangle)]

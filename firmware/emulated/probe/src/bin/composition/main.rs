@@ -116,9 +116,9 @@ fn drive() -> Option<bool> {
     report::cost(c"aim", &aims);
     report::cost(c"fix", &fixes);
     let well = robot.all_well;
-    link_the_rest(&mut robot, config);
+    link_the_rest(&mut robot, &config);
     #[cfg(feature = "search")]
-    searching::link(robot.localizer.clone(), config);
+    searching::link(robot.localizer.clone(), &config);
     #[cfg(feature = "search")]
     let bytes = size_of::<Localizer>() + searching::BYTES;
     #[cfg(not(feature = "search"))]
@@ -127,13 +127,13 @@ fn drive() -> Option<bool> {
     Some(well)
 }
 
-fn link_the_rest(robot: &mut Robot, config: Config) {
+fn link_the_rest(robot: &mut Robot, config: &Config) {
     let start = Start {
         pose: Pose::new(1.2, 1.1, Radians(0.1)),
         position_deviation: Metres(0.05),
         heading_deviation: Radians(0.02),
     };
-    probe_start(robot, &black_box(Stored { config, image: &[], start }));
+    probe_start(robot, &black_box(Stored { config: *config, image: &[], start }));
     let turn = MeasuredTurn { angle: Radians(0.0), duration: Duration::from_ticks(100_000) };
     let now = robot.localizer.time() + Duration::from_ticks(100_000);
     let step = Step { now, travel: WheelTravel::new(0.0, 0.0), turn: black_box(Some(turn)) };

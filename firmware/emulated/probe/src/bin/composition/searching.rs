@@ -19,7 +19,8 @@ struct Searcher<'m> {
 }
 
 #[unsafe(no_mangle)]
-extern "C" fn probe_search(searcher: &mut Searcher, range: &Option<Metres>) {
+extern "C" fn probe_search(searcher: &mut Searcher, range: &Metres) {
+    let range = Some(*range);
     let Searcher { navigator, search } = searcher;
     navigator.search(search);
     let now = navigator.localizer().time() + Duration::from_ticks(100_000);
@@ -30,17 +31,17 @@ extern "C" fn probe_search(searcher: &mut Searcher, range: &Option<Metres>) {
         Some(search),
     ));
     let bearing = search.aim();
-    let _ = black_box(navigator.ping(bearing, *range, search));
+    let _ = black_box(navigator.ping(bearing, range, search));
     black_box(navigator.work(2, search));
     if let Ok(aim) = navigator.aim() {
-        let _ = black_box(navigator.fix(&aim, *range, Some(search)));
+        let _ = black_box(navigator.fix(&aim, range, Some(search)));
     }
 }
 
 /// Links the search of a robot at the pose of this localizer.
-pub fn link(localizer: Localizer, config: Config) {
+pub fn link(localizer: Localizer, config: &Config) {
     let map = localizer.map();
     let search = Search::new(&config.sonar, map, SearchParameters::default());
     let mut searcher = Searcher { navigator: Navigator::new(localizer), search };
-    probe_search(&mut searcher, &black_box(Some(Metres(1.0))));
+    probe_search(&mut searcher, &black_box(Metres(1.0)));
 }
