@@ -18,29 +18,34 @@
 mod clock;
 mod command;
 mod flash;
+mod poll;
 mod running;
 #[cfg_attr(not(feature = "search"), path = "app/lone_search.rs")]
 mod search;
+#[cfg(feature = "search")]
+mod searching;
 mod wire;
 
 use embedded_storage::nor_flash::NorFlash;
 use sonarfix::geometry::units::{Duration, Instant};
-use sonarfix::health::{DEGRADED_WITHOUT_ODOMETRY, Verdict};
+use sonarfix::health::DEGRADED_WITHOUT_ODOMETRY;
 use sonarfix::localizer::{Localizer, Mode};
 use sonarfix::map::{Map, MapError};
 use sonarfix_hal::config::{RobotConfig, Unsupported};
 use sonarfix_hal::robot::{EVALUATIONS_PER_MILLISECOND, Faults, Hardware, Report, Settings};
 use sonarfix_link::baked::BakedError;
-use sonarfix_link::message::{self, CommandResult, Hello, LoopStatus, ResetCause};
+use sonarfix_link::message::{self, Hello, LoopStatus, ResetCause};
 use sonarfix_link::{Frame, SessionCommand, Telemetry};
 
 use crate::boots;
 use crate::check::Check;
 use crate::flash_contents::{self, FlashContents};
-use crate::store::{Resumed, Saved, Store, StoreError};
+use crate::store::{Resumed, Saved, Store};
 use crate::time::{NEVER, after, since};
 
 use clock::{Clock, Reading};
+use poll::Poll;
+pub use poll::Polled;
 use running::Running;
 use search::PoseSearch;
 pub use wire::Link;
@@ -60,35 +65,6 @@ pub struct Board {
     pub reset: ResetCause,
     /// Resets in a row before this start ([`boots`](crate::boots)).
     pub resets: u8,
-}
-
-/// The result of one poll, without the loop's, which is [`App::report`].
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[must_use]
-#[expect(clippy::struct_excessive_bools, reason = "independent facts, each with a name")]
-pub struct Polled {
-    /// Faults that the device check has found, while the loop does not run.
-    pub missing: Faults,
-    /// The result of the command that was executed.
-    pub answered: Option<CommandResult>,
-    /// At the start: why the board cannot be the robot that its configuration describes.
-    pub unsupported: Option<Unsupported>,
-    /// The new health verdict, if it has changed.
-    pub verdict: Option<Verdict>,
-    /// The result of a write to the store.
-    pub saved: Option<Result<(), StoreError>>,
-    /// Whether this start counts as a success: a reason to set the register of [`boots`] to zero.
-    pub is_settled: bool,
-    /// Whether the loop runs.
-    pub is_running: bool,
-    /// Whether the motors may be enabled: while the loop runs, by the
-    /// [`MotorPolicy`](sonarfix_hal::config::MotorPolicy) of the configuration.
-    pub may_drive: bool,
-    /// Whether the loop has been started or stopped in this poll.
-    pub has_changed: bool,
-    /// Whether a deadline was met: the only condition for feeding the watchdog.
-    pub is_on_time: bool,
 }
 
 /// The application.
@@ -133,15 +109,6 @@ pub struct App<'m, F: NorFlash> {
     /// Whether the store has been read. The first poll does it, because during construction the stack holds copies of
     /// the application.
     is_store_loaded: bool,
-}
-
-/// What the parts of a poll share.
-struct Poll<'p, H, L> {
-    now: Instant,
-    hardware: &'p mut H,
-    link: &'p mut L,
-    /// The result so far.
-    polled: Polled,
 }
 
 #[expect(clippy::large_enum_variant, reason = "there is one of it, and no heap")]

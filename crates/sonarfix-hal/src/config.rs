@@ -17,7 +17,9 @@
 
 mod feature;
 
-use sonarfix::config::{Config, ConfigError, Further, PingSchedule, PingTiming, RangerId, Sonar};
+use sonarfix::config::{
+    Config, ConfigError, Further, PingSchedule, PingTiming, Policy, RangerId, Ranging, Sonar,
+};
 use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
 use sonarfix::health::{DEGRADED_WITHOUT_ODOMETRY, Verdict};
 use sonarfix::localizer::Localizer;
@@ -389,6 +391,29 @@ impl RobotConfig {
     #[must_use]
     pub fn ranger_settings(&self) -> RangerSettings {
         self.ranger.settings(&self.localizer.sonar)
+    }
+
+    /// Whether this program links all parts that the robot uses.
+    ///
+    /// # Errors
+    /// [`NotLinked`] with the first that it does not link.
+    pub fn check_linked(&self) -> Result<(), NotLinked> {
+        let missing = Feature::ALL.into_iter().filter(|feature| !feature.is_linked());
+        let mut asked = missing.filter(|feature| self.uses(*feature));
+        asked.next().map_or(Ok(()), |feature| Err(NotLinked(feature)))
+    }
+
+    /// Whether the robot uses a part. The configuration does not say whether measurements come from outside.
+    fn uses(&self, feature: Feature) -> bool {
+        let localizer = &self.localizer;
+        match feature {
+            Feature::Light => localizer.sonars().any(|(_, sonar)| sonar.ranging != Ranging::Sound),
+            Feature::Gyro => localizer.gyro.is_some(),
+            Feature::Rangers => localizer.has_several_sonars(),
+            Feature::Absolute => false,
+            Feature::Informative => localizer.policy == Policy::Informative,
+            Feature::Search => self.start.is_unknown(),
+        }
     }
 }
 

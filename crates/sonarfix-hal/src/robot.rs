@@ -11,7 +11,7 @@
 //! | `rangers` (private) | when each of several rangers can ping, and which one does |
 //! | `travel` (private) | the travel of the wheels for the localizer; `odometer`, `yaw`: the ledgers of edges and turns |
 //! | `waiting` (private) | absolute measurements that wait for their step |
-//! | `tracker` (private) | the localizer, and with the feature `search` the search beside it |
+//! | `tracker` (private) | the localizer, and with the feature `search` the search beside it; `searching`: the steps of a search |
 //! | `rest` (private) | when a poll has something to do; `schedule`: periodic deadlines |
 //!
 //! *Tick*: one sample of both encoders (every 100 ms by default), passed to the localizer.
@@ -62,7 +62,10 @@ mod rangers;
 mod report;
 mod rest;
 mod schedule;
+#[cfg_attr(not(feature = "search"), path = "robot/lone_searching.rs")]
+mod searching;
 mod settings;
+mod step;
 #[cfg_attr(not(feature = "search"), path = "robot/lone_tracker.rs")]
 mod tracker;
 mod travel;
@@ -76,18 +79,18 @@ use sonarfix::localizer::{Localizer, Mode, Start};
 use sonarfix::sensor::absolute::AbsoluteMeasurement;
 
 use crate::encoder::Wheels;
-use crate::time::after;
+use crate::time::{AT_ONCE, after};
 
-use cycle::Cycle;
+use cycle::{Cycle, PingEnd};
 pub use faults::{EncoderFaults, Faults};
 pub use hardware::{Devices, Hardware, WithGyro, WithRangers};
-use measurement::PingEnd;
 use odometer::Odometer;
 use poll::Poll;
-pub use report::{PingResult, Report, Step, StepResult, Tick};
+pub use report::{PingResult, Report, Tick};
 pub use rest::PACE;
 use schedule::Schedule;
 pub use settings::{EVALUATIONS_PER_MILLISECOND, Settings, SettingsError, Stamp};
+pub use step::{Step, StepResult};
 use tracker::Tracker;
 pub use tracker::{Search, SweepResult};
 use waiting::Waiting;
@@ -177,9 +180,6 @@ pub struct Robot<'m> {
     /// Headings and positions from outside.
     waiting: Waiting,
 }
-
-/// An instant that has passed.
-const AT_ONCE: Instant = Instant::from_ticks(0);
 
 impl<'m> Robot<'m> {
     /// A loop that starts at the localizer's time, from which the deadlines of ticks and pings are counted.

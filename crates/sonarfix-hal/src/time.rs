@@ -9,6 +9,9 @@ use sonarfix::geometry::units::{Duration, Instant};
 /// which the greatest is before the first.
 pub(crate) const NEVER: Instant = Instant::from_ticks(u64::MAX / 4);
 
+/// An instant that has passed.
+pub(crate) const AT_ONCE: Instant = Instant::from_ticks(0);
+
 /// The time from `then` to `now`; zero if `then` is later.
 pub(crate) fn since(now: Instant, then: Instant) -> Duration {
     now.checked_duration_since(then).unwrap_or(Duration::from_ticks(0))

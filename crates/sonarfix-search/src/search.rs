@@ -21,6 +21,7 @@ mod parameters;
 mod ranked;
 mod refine;
 mod score;
+mod state;
 mod trial;
 mod window;
 
@@ -33,10 +34,9 @@ use sonarfix::map::{Map, WallId};
 
 use bank::{Bank, Entry, moved};
 use candidates::Placement;
-use cycle::{Task, Work};
-use decision::Decision;
 use lines::Lines;
 use score::EchoModel;
+use state::{Decision, Task, Work};
 use window::Window;
 
 pub use parameters::SearchParameters;

@@ -5,7 +5,7 @@ use sonarfix::localizer::Mode;
 use sonarfix_hal::robot::{Hardware, Report, Robot, Step};
 use sonarfix_link::Reporter;
 
-use super::Poll;
+use super::poll::Poll;
 use super::search::PoseSearch;
 use super::wire::{Link, Wire};
 use crate::store::{Resumed, SavePolicy};

@@ -1,6 +1,5 @@
 //! The search for the pose of a running loop.
 
-use embedded_storage::nor_flash::NorFlash;
 use sonarfix::geometry::units::Instant;
 use sonarfix::localizer::Mode;
 use sonarfix::map::Region;
@@ -8,11 +7,9 @@ use sonarfix_hal::robot::{Robot, Search};
 use sonarfix_link::Reporter;
 use sonarfix_link::reporter::Outlet;
 
-use super::App;
-
 /// The search, which is large and is never moved. Without the feature `search` the same name stands for nothing.
 #[derive(Default)]
-pub(super) struct PoseSearch<'m>(Search<'m>);
+pub(super) struct PoseSearch<'m>(pub Search<'m>);
 
 impl<'m> PoseSearch<'m> {
     /// The search for the loop, if the robot searches at all.
@@ -38,13 +35,5 @@ impl<'m> PoseSearch<'m> {
     /// Makes one evaluation.
     pub fn work(&mut self) {
         self.0.poll(1);
-    }
-}
-
-impl<'m, F: NorFlash> App<'m, F> {
-    /// The search for the pose; its state has a meaning while the mode is not `Tracking`.
-    #[must_use]
-    pub fn search(&self) -> &Search<'m> {
-        &self.search.0
     }
 }

@@ -1,8 +1,4 @@
-//! The parts that a program links or leaves out, and which of them a configuration asks for.
-
-use sonarfix::config::{Policy, Ranging};
-
-use super::RobotConfig;
+//! The parts that a program links or leaves out.
 
 /// A part that is linked only by its Cargo feature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,7 +22,7 @@ pub enum Feature {
 
 impl Feature {
     /// All of them.
-    const ALL: [Self; 6] =
+    pub(super) const ALL: [Self; 6] =
         [Self::Light, Self::Gyro, Self::Rangers, Self::Absolute, Self::Informative, Self::Search];
 
     /// The name of the Cargo feature.
@@ -54,19 +50,6 @@ impl Feature {
             Self::Search => cfg!(feature = "search"),
         }
     }
-
-    /// Whether a robot of this configuration uses it. The configuration does not say whether measurements come from outside.
-    fn is_used_by(self, config: &RobotConfig) -> bool {
-        let localizer = &config.localizer;
-        match self {
-            Self::Light => localizer.sonars().any(|(_, sonar)| sonar.ranging != Ranging::Sound),
-            Self::Gyro => localizer.gyro.is_some(),
-            Self::Rangers => localizer.has_several_sonars(),
-            Self::Absolute => false,
-            Self::Informative => localizer.policy == Policy::Informative,
-            Self::Search => config.start.is_unknown(),
-        }
-    }
 }
 
 /// A part that is asked for and that this program was built without.
@@ -82,15 +65,3 @@ impl core::fmt::Display for NotLinked {
 }
 
 impl core::error::Error for NotLinked {}
-
-impl RobotConfig {
-    /// Whether this program links all parts that the robot uses.
-    ///
-    /// # Errors
-    /// [`NotLinked`] with the first that it does not link.
-    pub fn check_linked(&self) -> Result<(), NotLinked> {
-        let missing = Feature::ALL.into_iter().filter(|feature| !feature.is_linked());
-        let mut asked = missing.filter(|feature| feature.is_used_by(self));
-        asked.next().map_or(Ok(()), |feature| Err(NotLinked(feature)))
-    }
-}

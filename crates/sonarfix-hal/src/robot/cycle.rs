@@ -6,6 +6,7 @@ use sonarfix::geometry::units::Instant;
 
 use super::odometer::Reading;
 use super::tracker::Sweep;
+use crate::ranger::Outcome;
 
 /// The state of a measurement cycle.
 ///
@@ -52,6 +53,9 @@ pub(super) enum Target<W> {
     /// Whatever is at a bearing, for the search.
     Sweep(Sweep),
 }
+
+/// How a ping ended; `None` if the ranger failed.
+pub(super) type PingEnd = Option<Outcome>;
 
 impl Target<Aim> {
     /// The ranger that measures it. The first one sweeps.

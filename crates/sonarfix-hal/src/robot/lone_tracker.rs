@@ -13,14 +13,19 @@ use sonarfix::localizer::{AbsoluteFix, Fix, Localizer, Mode, OdometryError, Star
 use sonarfix::sensor::absolute::AbsoluteMeasurement;
 use sonarfix::sensor::gyro::MeasuredTurn;
 
-use super::odometer::Reading;
-use super::poll::Poll;
-use super::{Hardware, Report, Robot, Step};
+use super::Step;
 use crate::ranger::Outcome;
 
 /// A search for the pose, which this program does not have.
 #[derive(Debug)]
 pub struct Search<'m>(Infallible, PhantomData<&'m ()>);
+
+impl Search<'_> {
+    /// Ends code that has a search, and that is never reached.
+    pub(super) fn never(&self) -> ! {
+        match self.0 {}
+    }
+}
 
 /// A ping of the sweep of a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,6 +34,11 @@ pub(super) struct Sweep(Infallible);
 impl Sweep {
     pub fn along(self, _: Radians) -> Self {
         self
+    }
+
+    /// As [`Search::never`].
+    pub fn never(self) -> ! {
+        match self.0 {}
     }
 }
 
@@ -100,28 +110,5 @@ impl<'m> Tracker<'m> {
 
     pub fn set_pose(&mut self, start: &Start) -> Result<(), EkfError> {
         self.0.set_pose(start)
-    }
-}
-
-impl<'m> Robot<'m> {
-    pub(super) fn next_of_sweep(search: &Search<'m>) -> (Radians, Sweep) {
-        match search.0 {}
-    }
-
-    #[expect(clippy::unused_self, reason = "that of a robot that searches depends on it")]
-    pub(super) fn take_sweep(
-        &mut self,
-        _: &mut Poll<'_, 'm, impl Hardware>,
-        sweep: Sweep,
-        _: &Reading,
-        _: Outcome,
-        _: &mut Option<SweepResult>,
-    ) {
-        match sweep.0 {}
-    }
-
-    #[expect(clippy::unused_self, reason = "that of a robot that searches depends on it")]
-    pub(super) fn work_on(&mut self, search: &mut Search<'m>, _: &mut Report) {
-        match search.0 {}
     }
 }

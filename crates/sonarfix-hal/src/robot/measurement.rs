@@ -9,12 +9,9 @@ use super::cycle::{Cycle, Target};
 use super::odometer::Reading;
 use super::poll::Poll;
 use super::rangers::{self, can_ping_at};
-use super::{AT_ONCE, Hardware, PingResult, Report, Robot, Stamp, Step};
+use super::{Hardware, PingResult, Report, Robot, Stamp, Step};
 use crate::ranger::{Echo, NoEcho, Outcome, Ranger, TriggerError};
-use crate::time::since;
-
-/// How a ping ended; `None` if the ranger failed.
-pub(super) type PingEnd = Option<Outcome>;
+use crate::time::{AT_ONCE, since};
 
 impl<'m> Robot<'m> {
     /// Reads the outcome of the ping in flight.

@@ -5,9 +5,9 @@ use sonarfix::localizer::Mode;
 
 use super::cycle::Cycle;
 use super::rangers::can_ping_at;
-use super::{AT_ONCE, Hardware, Robot};
+use super::{Hardware, Robot};
 use crate::ranger::Ranger;
-use crate::time::{NEVER, after, since};
+use crate::time::{AT_ONCE, NEVER, after, since};
 
 /// Period of the polls of a loop whose next deadline is not known.
 pub const PACE: Duration = Duration::from_ticks(1_000);

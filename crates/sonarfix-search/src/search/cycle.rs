@@ -5,11 +5,10 @@ use sonarfix::geometry::units::Metres;
 use super::Search;
 use super::bank::moved;
 use super::candidates::{AlongWalls, Generated, Pairs, Placement, make_a_pair};
-use super::decision::Decision;
 use super::lines::{Line, TILTS};
 use super::refine::Prior;
+use super::state::{Decision, Task, Work};
 use super::trial::{Odometry, Trial, Verdict};
-use super::window::Straightening;
 
 /// Fewer pings than these are no window to search with.
 pub(super) const LEAST_PINGS: usize = 12;
@@ -21,26 +20,6 @@ pub(super) const CHECKED_LINES: u8 = 2;
 
 /// How far beside its region a start may seem to lie: metres, and metres per metre travelled since.
 pub(super) const REGION_MARGIN: f32 = 0.1;
-
-/// Where a cycle stands.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Task {
-    Rebase,
-    Vote { ping: u16, tilt: u8 },
-    Fit { line: u8 },
-    Bank,
-    Pairs { pair: u8, pairs: Pairs },
-    Along { line: u8, along: AlongWalls },
-}
-
-/// What takes several evaluations, before the task goes on.
-#[derive(Debug, Clone)]
-#[expect(clippy::large_enum_variant, reason = "there is one of it, and no heap")]
-pub(super) enum Work {
-    None,
-    Straighten(Straightening),
-    Trial(Trial),
-}
 
 impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> {
     #[inline(never)]

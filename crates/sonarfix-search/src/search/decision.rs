@@ -6,7 +6,7 @@ use sonarfix::geometry::vector::Vector;
 use sonarfix::map::WallId;
 
 use super::bank::Entry;
-use super::cycle::Work;
+use super::state::{Decision, Work};
 use super::trial::Trial;
 use super::{Search, at_least_one, largest};
 
@@ -21,16 +21,6 @@ const LARGE_LEAD: f32 = 8.0;
 const CHECK_EVERY: u32 = 4;
 /// A position with a larger deviation than this is undetermined, metres.
 const UNDETERMINED: f32 = 0.3;
-
-/// The answer without the poses, which follow the odometry.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Decision {
-    Searching,
-    Several(usize),
-    Along(WallId, f32),
-    Nowhere,
-    Unique(Entry),
-}
 
 impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> {
     /// Mean log-likelihood per ping, relative to a place without walls.

@@ -86,15 +86,12 @@ impl SearchParameters {
 /// Deviations of the mean and of the difference of the scale errors of both wheels, eq. (48).
 fn mean_and_difference([right, left]: [f32; 2], config: &Config) -> (f32, f32) {
     let square = right * right + left * left;
-    match config.prior.difference_of(right, left) {
-        Some(difference) => {
-            let mean = 0.5 * square - 0.25 * difference * difference;
-            (libm::sqrtf(mean), difference)
-        }
-        None => {
-            let independent = libm::sqrtf(square);
-            (0.5 * independent, independent)
-        }
+    if let Some(difference) = config.prior.difference_of(right, left) {
+        let mean = 0.5 * square - 0.25 * difference * difference;
+        (libm::sqrtf(mean), difference)
+    } else {
+        let independent = libm::sqrtf(square);
+        (0.5 * independent, independent)
     }
 }
 
