@@ -239,6 +239,11 @@ impl<'a> Node<'a> {
         })
     }
 
+    /// A whole number from 1 on.
+    pub fn count(&self) -> u32 {
+        u32::try_from(self.integer(1..=u32::MAX.into())).unwrap_or(u32::MAX)
+    }
+
     /// The text of a number; `None` for another type.
     fn number_text(&self) -> Option<&'a str> {
         match self.value? {

@@ -10,9 +10,24 @@ use sonarfix::map::{Wall, WallError};
 use crate::document::{Document, Node, Table};
 use crate::error::FileError;
 use crate::geometry::{Segment, TOO_FAR, is_near_enough};
-use crate::keys::scenario::{MAP, WALL};
-use crate::quantity::Unit;
+use crate::keys::{Key, Section, Value, optional, other};
+use crate::quantity::{LENGTH, Unit};
 use crate::{file, single};
+
+#[rustfmt::skip]
+pub(crate) static MAP: Section<()> = Section { name: "map", usual: || (), keys: &[
+    other("unit", "`\"m\"`, `\"cm\"` or `\"mm\"`", "unit of the coordinates"),
+    other("wall", "at least one table", "the walls. `[[map.wall]]` tables are equivalent"),
+] };
+
+#[rustfmt::skip]
+pub(crate) static WALL: Section<Option<f64>> = Section { name: "wall", usual: || None, keys: &[
+    other("name", "unique", "name of the wall"),
+    other("from", "within 8 km of the origin", "one end of the wall"),
+    other("to", "the same", "the other end, at least 0.1 mm away"),
+    optional(Key::new("accuracy", Value::Number(&LENGTH, ("0.1 mm", "255 mm"), |accuracy| accuracy),
+        "standard deviation of its place, in whole millimetres, instead of `map_accuracy` of the [robot file](#robot). `sonarfix survey` writes it")),
+] };
 
 /// A wall of a floor.
 #[derive(Debug, Clone, PartialEq)]

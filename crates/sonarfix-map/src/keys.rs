@@ -1,13 +1,6 @@
-//! The one table of keys. A row has the name of a key, its unit and limits, its place in a structure and its explanation;
-//! reader, writer, error messages, comments of new files and the tables of `docs/formats.md` come from the rows.
-//!
-//! | part | has |
-//! |---|---|
-//! | [`robot`] | the rows of robot files |
-//! | [`scenario`] | the rows of map and scenario files |
-
-pub(crate) mod robot;
-pub(crate) mod scenario;
+//! The table of keys. A row has the name of a key, its unit and limits, its place in a structure and its explanation; reader,
+//! writer, error messages, comments of new files and the tables of `docs/formats.md` come from the rows. The rows are beside
+//! the part that they describe.
 
 use crate::document::{Node, Table};
 use crate::quantity::{Dimension, Limits, Number};
@@ -42,7 +35,7 @@ enum Need {
 
 /// What a key holds, and where it goes.
 #[derive(Clone, Copy)]
-enum Value<T: 'static> {
+pub(crate) enum Value<T: 'static> {
     Number(&'static Dimension, Limits, fn(&mut T) -> &mut dyn Number),
     Pair(&'static Dimension, Limits, fn(&mut T) -> [&mut dyn Number; 2]),
     Flag(fn(&mut T) -> &mut bool),
@@ -57,17 +50,37 @@ enum Value<T: 'static> {
 }
 
 /// A key that a file need not have.
-const fn optional<T: Copy>(key: Key<T>) -> Key<T> {
+pub(crate) const fn optional<T: Copy>(key: Key<T>) -> Key<T> {
     Key { need: Need::Optional, ..key }
 }
 
 /// A key for which the reader of the table decides.
-const fn depends<T: Copy>(key: Key<T>) -> Key<T> {
+pub(crate) const fn depends<T: Copy>(key: Key<T>) -> Key<T> {
     Key { need: Need::Depends, ..key }
 }
 
+/// A key with a number.
+pub(crate) const fn number<T: Copy>(
+    name: &'static str,
+    dimension: &'static Dimension,
+    limits: Limits,
+    field: fn(&mut T) -> &mut dyn Number,
+    doc: &'static str,
+) -> Key<T> {
+    Key::new(name, Value::Number(dimension, limits, field), doc)
+}
+
+/// A key whose table reads it together with others.
+pub(crate) const fn other<T: Copy>(
+    name: &'static str,
+    must: &'static str,
+    doc: &'static str,
+) -> Key<T> {
+    depends(Key::new(name, Value::Own(must, |_, _| {}, |_| None), doc))
+}
+
 impl<T: Copy> Key<T> {
-    const fn new(name: &'static str, value: Value<T>, doc: &'static str) -> Self {
+    pub const fn new(name: &'static str, value: Value<T>, doc: &'static str) -> Self {
         Self { name, need: Need::Required, value, doc }
     }
 
@@ -184,7 +197,7 @@ impl<T: Copy> Section<T> {
     }
 
     /// Its rows in `docs/formats.md`; tables in it have their own.
-    fn rows(&self) -> (&'static str, String) {
+    pub fn rows(&self) -> (&'static str, String) {
         let usual = (self.usual)();
         let is_value = |key: &&Key<T>| !matches!(key.value, Value::Table(_) | Value::Tables(..));
         let rows = self.keys.iter().filter(is_value).map(|key| key.row(&usual));
@@ -195,45 +208,7 @@ impl<T: Copy> Section<T> {
     }
 
     /// The explanation of each key in one line.
-    fn notes(&self) -> impl Iterator<Item = (String, &'static str)> {
+    pub fn notes(&self) -> impl Iterator<Item = (String, &'static str)> {
         self.keys.iter().map(|key| (format!("{}.{}", self.name, key.name), key.note()))
     }
-}
-
-/// The tables of keys in `docs/formats.md`, by the names of their markers.
-#[must_use]
-pub fn documentation() -> Vec<(&'static str, String)> {
-    [robot::rows(), scenario::rows()].concat()
-}
-
-/// The text of a robot file with the explanation of its key at each value that has no comment, or a comment that ends in a
-/// colon.
-#[must_use]
-pub fn with_comments(text: &str) -> String {
-    let notes = robot::notes();
-    let mut section = "robot";
-    let mut commented = String::new();
-    for line in text.lines() {
-        if let Some(header) = line.strip_prefix('[') {
-            section = header.trim_matches(['[', ']']);
-        }
-        let (value, comment) = line.split_once('#').unwrap_or((line, " "));
-        let key = value.split_once(" = ").map_or("", |(key, _)| key);
-        let note = notes.get(&format!("{section}.{key}"));
-        let note = note.filter(|_| comment == " " || comment.ends_with(':'));
-        commented += &note.map_or_else(
-            || line.to_owned(),
-            |note| {
-                let note = format!("#{} {note}", comment.trim_end());
-                let value = value.trim_end();
-                if value.len() < 37 {
-                    format!("{value:36} {note}")
-                } else {
-                    format!("{note}\n{value}")
-                }
-            },
-        );
-        commented.push('\n');
-    }
-    commented
 }

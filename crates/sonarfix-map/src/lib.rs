@@ -21,16 +21,14 @@
 
 #![forbid(unsafe_code)]
 
-mod absolute_file;
 mod addition;
 mod bake;
 mod clearance;
 pub mod devices;
 mod document;
+mod documentation;
 mod error;
 mod example;
-mod faults;
-mod fidelity;
 mod file;
 mod flaws;
 mod floor;
@@ -40,34 +38,36 @@ mod map_file;
 mod neighbours;
 mod path;
 mod quantity;
-mod ranger_file;
 pub mod robot_file;
 mod scenario;
 mod simplify;
 mod sonar_model;
 mod spelling;
-mod surroundings;
 mod symmetry;
 mod wall_file;
 
-pub use absolute_file::{AbsoluteSensors, HeadingSensor, PositionSensor, Sampling};
 pub use addition::{Addition, with_cabinet};
 pub use bake::{BakeError, bake};
 pub use clearance::Collision;
+pub use documentation::{documentation, with_comments};
 pub use error::{FileError, Mistake};
-pub use faults::{Fault, FaultKind, Wheel};
-pub use fidelity::{Fidelity, Follow, Hardware, HeadingSlip, ServoName, Upset, Upsets};
 pub use file::{MAX_FILE_BYTES, read_bytes, read_text};
 pub use flaws::{Finding, Flaw, Severity, flaws};
 pub use floor::{Floor, NamedWall};
-pub use keys::{documentation, with_comments};
 pub use map_file::MapFile;
 pub use path::{Leg, Motion, Movement, Path, PathError, PathPlan, PathPose};
 pub use robot_file::text as robot_text;
-pub use scenario::{GyroTruth, Run, Scenario, Start, Truth, scenario_keys};
+pub use scenario::absolute::{AbsoluteSensors, HeadingSensor, PositionSensor, Sampling};
+pub use scenario::faults::{Fault, FaultKind, Wheel};
+pub use scenario::fidelity::{Fidelity, Hardware, ServoName};
+pub use scenario::path_table::Follow;
+pub use scenario::start::Start;
+pub use scenario::surroundings::{Obstacle, Oscillation, Outline, Surroundings};
+pub use scenario::truth::{GyroTruth, Truth};
+pub use scenario::upsets::{HeadingSlip, Upset, Upsets};
+pub use scenario::{Run, Scenario, scenario_keys};
 pub use simplify::{Limits, Simplified, simplify};
 pub use sonar_model::{SonarModel, SonarName};
-pub use surroundings::{Obstacle, Oscillation, Outline, Surroundings};
 pub use symmetry::{Motion as SymmetryMotion, Remedy, Symmetry, symmetries};
 
 /// The text of the reference scenario, with the conditions of the paper.

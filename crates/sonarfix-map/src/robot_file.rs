@@ -1,29 +1,127 @@
 //! Reads robot files into the [`RobotConfig`] of loop, drivers, planner, simulator and replay, and writes them, by the
 //! [table of keys](crate::keys).
 
+mod common_parts;
+mod drive;
+mod echo;
+mod ranger;
+mod sonar;
+
+use std::collections::HashMap;
 use std::path::Path;
 
-use sonarfix::config::{Further, MAX_RANGERS, PingSchedule, RangerId, ServoTiming, Sonar};
-use sonarfix::geometry::units::{Duration, Metres, Radians};
-use sonarfix_hal::config::{RangerConfig, RobotConfig, RobotConfigError, StartPose, WheelConfig};
+use sonarfix::aim::Policy;
+use sonarfix::config::Further;
+use sonarfix::geometry::pose::Point;
+use sonarfix::sensor::gyro::GyroParameters;
+use sonarfix_hal::config::{RobotConfig, RobotConfigError, StartPose};
+use sonarfix_search::search::Region;
 
-use crate::devices::SERVOS;
 use crate::document::{Document, Node, Table};
 use crate::error::FileError;
 use crate::file;
-use crate::keys::robot::{PULSE, REGION, ROBOT, SERVO_TIMING, SONAR, WHEEL, usual};
-use crate::quantity::{Number, TIME};
-use crate::ranger_file;
-use crate::spelling::alternatives;
+use crate::keys::{Key, Section, Value, number, optional};
+use crate::quantity::{ANGLE_WALK, FRACTION, LENGTH, NUMBER, TIME, TURN_RATE, TURN_RATE_WALK};
 
-/// The fix period of a sonar that pings as fast as possible.
-const AS_FAST_AS_POSSIBLE: &str = "as fast as possible";
+use common_parts::usual;
+use drive::{DRIVE, WHEEL};
+use echo::ECHO;
+use ranger::{BEAM, RANGER};
+use sonar::{PULSE, SERVO_TIMING, SONAR};
 
-/// The keys that all sonars of a robot share, so that the first has them.
-const SHARED: [&str; 2] = ["fix_period", "temperature"];
+#[rustfmt::skip]
+static ROBOT: Section<RobotConfig> = Section { name: "robot", usual, keys: &[
+    optional(Key::new("start", Value::Word(&["known", "unknown"], |c| usize::from(c.start.is_unknown()), |c, word| {
+        c.start = if word == 0 { StartPose::Known } else { StartPose::Unknown { region: None } };
+    }), "whether the pose is set before the start. If not, or when it is lost, the robot \
+        [searches](search.md#in-the-robots-loop) for it. A robot with a known start stays lost")),
+    optional(Key::new("start_region", Value::Own("a table of `from` and `to`", read_region, |c| c.start.region().map(|region| REGION.inline(&region))),
+        "where on the map a robot without a pose starts, with `start = \"unknown\"`. Anywhere without this key")),
+    Key::new("drive", Value::Table(&DRIVE), "wheels and encoders"),
+    Key::new("sonar", Value::Tables(sonar::read, sonar::text), "ranger and servo"),
+    Key::new("prior", Value::Table(&PRIOR), "how wrong the calibration may be"),
+    Key::new("gating", Value::Table(&GATING), "which ranges and walls are used"),
+    optional(Key::new("echo", Value::Table(&ECHO), "what a ping returns besides the range of its wall")),
+    Key::new("schedule", Value::Table(&SCHEDULE), "which wall is measured next"),
+    optional(Key::new("motors", Value::Table(&MOTORS), "when the motors are enabled")),
+    optional(Key::new("gyro", Value::Tables(|node, c| c.localizer.gyro = Some(GYRO.read(node, (GYRO.usual)())), |c| {
+        c.localizer.gyro.map_or_else(String::new, |gyro| format!("\n[gyro]\n{}", GYRO.lines(&gyro)))
+    }), "a gyro that measures the yaw rate")),
+] };
 
-/// The keys of a sonar on a servo.
-const OF_SERVO: [&str; 3] = ["servo", "servo_pulses", "servo_timing"];
+#[rustfmt::skip]
+static REGION: Section<Region> = Section {
+    name: "start_region", usual: || Region { from: Point::new(0.0, 0.0), to: Point::new(0.0, 0.0) }, keys: &[
+    Key::new("from", Value::Pair(&LENGTH, ("-8000 m", "8000 m"), |r| [&mut r.from.x.0, &mut r.from.y.0]),
+        "the corner with the smaller coordinates, on the map"),
+    Key::new("to", Value::Pair(&LENGTH, ("-8000 m", "8000 m"), |r| [&mut r.to.x.0, &mut r.to.y.0]), "the corner with the larger ones"),
+] };
+
+#[rustfmt::skip]
+static PRIOR: Section<RobotConfig> = Section { name: "prior", usual, keys: &[
+    number("scale_right", &FRACTION, ("0 %", "100 %"), |c| &mut c.localizer.prior.scale_right, "scale error of the right wheel's diameter, a fraction"),
+    number("scale_left", &FRACTION, ("0 %", "100 %"), |c| &mut c.localizer.prior.scale_left, "scale error of the left wheel's diameter"),
+    optional(number("scale_difference", &FRACTION, ("0.0001 %", "100 %"), |c| &mut c.localizer.prior.scale_difference,
+        "scale error of the right wheel less that of the left. Wheels of one type are alike, however wrong their nominal diameter is. Limited to what the \
+        two above permit ([model.md](model.md#motion), eq. 48); without it their errors are independent")),
+    number("track_width", &LENGTH, ("0 m", "5 m"), |c| &mut c.localizer.prior.track_width.0, "error of the track width. Below half the track width"),
+    number("range_scale", &FRACTION, ("0 %", "100 %"), |c| &mut c.localizer.prior.range_scale,
+        "scale error of the ranges: the speed of sound changes by 0.18 %/°C. Zero: not estimated"),
+] };
+
+#[rustfmt::skip]
+static GATING: Section<RobotConfig> = Section { name: "gating", usual, keys: &[
+    number("confidence", &NUMBER, ("0", "100"), |c| &mut c.localizer.gating.confidence,
+        "standard deviations of position and heading by which no other wall may return an earlier echo. A wall is measured only then; if no wall passes, \
+        the margins are ignored"),
+    optional(number("inflation", &LENGTH, ("0 m", "100 m"), |c| &mut c.localizer.gating.inflation.0,
+        "standard deviation that each independent contradiction adds to the position of a lost robot. Up to ten times that, and in radians to its heading, up \
+        to 0.26. 0: none")),
+    optional(number("max_distance_without_fix", &LENGTH, ("1 mm", "10000 m"), |c| &mut c.localizer.gating.max_distance_without_fix.0,
+        "travel without a used range after which the verdict is `Degraded`")),
+    optional(number("max_position_deviation", &LENGTH, ("1 mm", "1000 m"), |c| &mut c.localizer.gating.max_position_deviation.0,
+        "position deviation in any direction above which the verdict is `Degraded`")),
+] };
+
+#[rustfmt::skip]
+static SCHEDULE: Section<RobotConfig> = Section { name: "schedule", usual, keys: &[
+    Key::new("policy", Value::Word(&["nearest", "informative"], |c| usize::from(c.localizer.policy == Policy::Informative), |c, word| {
+        c.localizer.policy = if word == 0 { Policy::Nearest } else { Policy::Informative };
+    }), "measures the nearest wall, or the one with the highest expected information gain on the position per time"),
+    optional(number("heading_weight", &LENGTH, ("0 m", "1000 m"), |c| &mut c.localizer.weights.heading.0,
+        "weight of the heading in the gain, in metres of position per radian: a lever arm")),
+    optional(number("wheels_weight", &LENGTH, ("0 m", "1000 m"), |c| &mut c.localizer.weights.wheels.0,
+        "weight of a wheel's scale error in the gain, in metres of position per 100 %")),
+] };
+
+#[rustfmt::skip]
+static GYRO: Section<GyroParameters> = Section { name: "gyro", usual: || GyroParameters::MPU_6050, keys: &[
+    Key::new("sensor", Value::Word(&["mpu6050"], |_| 0, |_, _| {}), "the sensor. Also for an MPU-6500 or MPU-9250"),
+    optional(number("range", &TURN_RATE, ("1 deg/s", "2000 deg/s"), |g| &mut g.range.0,
+        "largest rate. The driver sets the smallest range of the sensor that includes it")),
+    optional(number("noise", &ANGLE_WALK, ("0.000001 deg/sqrt(s)", "100 deg/sqrt(s)"), |g| &mut g.noise.0.0,
+        "white noise of the rate, as the angle after one second")),
+    optional(number("bias", &TURN_RATE, ("0.00001 deg/s", "1000 deg/s"), |g| &mut g.bias.0, "standard deviation of the bias at the start")),
+    optional(number("bias_walk", &TURN_RATE_WALK, ("0 deg/s/sqrt(s)", "100 deg/s/sqrt(s)"), |g| &mut g.bias_walk.0.0,
+        "random walk of the bias in one second")),
+    optional(number("scale", &FRACTION, ("0 %", "50 %"), |g| &mut g.scale, "standard deviation of its scale error")),
+    optional(number("period", &TIME, ("1 ms", "50 ms"), |g| &mut g.period, "time from one sample to the next")),
+    optional(Key::new("inverted", Value::Flag(|g| &mut g.is_inverted), "whether it is mounted upside down")),
+] };
+
+const ON_OFF: &[&str] = &["off", "on"];
+
+#[rustfmt::skip]
+static MOTORS: Section<RobotConfig> = Section { name: "motors", usual, keys: &[
+    optional(Key::new("lost", Value::Word(ON_OFF, |c| usize::from(c.motors.lost), |c, word| c.motors.lost = word == 1),
+        "while the verdict is `Lost`. On, because a robot that searches for its pose drives meanwhile: needed with `start = \"unknown\"`")),
+    optional(Key::new("dead_encoder", Value::Word(ON_OFF, |c| usize::from(c.motors.dead_encoder), |c, word| c.motors.dead_encoder = word == 1),
+        "once the localizer has had no odometry for 0.5 s")),
+    optional(Key::new("lost_link", Value::Word(ON_OFF, |c| usize::from(c.motors.lost_link), |c, word| c.motors.lost_link = word == 1),
+        "once the robot has received no valid frame of a command for `link_timeout`. With `\"off\"`, the program that drives the robot must send a command \
+        regularly, for example `MapChecksum`")),
+    optional(number("link_timeout", &TIME, ("1 ms", "3600 s"), |c| &mut c.motors.link_timeout, "time without a frame after which the link counts as lost")),
+] };
 
 /// Why a robot that searches for its pose must be able to drive while it is lost.
 const SEARCH_STOPPED: &str = "must be \"on\" with start = \"unknown\": a robot finds its pose while it drives, and is lost until \
@@ -75,7 +173,7 @@ fn from_table(robot: &Table<'_>) -> RobotConfig {
 
 /// Checks the rules about several values, for each sonar as if it were the only one.
 fn check_rules(robot: &Table<'_>, config: &RobotConfig) {
-    for ((id, _), node) in config.localizer.sonars().zip(sonar_nodes(robot.require("sonar"))) {
+    for ((id, _), node) in config.localizer.sonars().zip(sonar::nodes(robot.require("sonar"))) {
         let Some((sonar, driver)) = config.ranger_of(id) else { continue };
         let mut alone = *config;
         (alone.localizer.sonar, alone.ranger) = (*sonar, *driver);
@@ -102,97 +200,7 @@ fn key_of(error: RobotConfigError) -> &'static str {
     }
 }
 
-/// A table for each sonar: `[sonar]`, or several of `[[sonar]]`.
-fn sonar_nodes(node: Node<'_>) -> Vec<Node<'_>> {
-    if node.is_array() { node.items() } else { vec![node] }
-}
-
-pub(crate) fn read_sonars(node: Node<'_>, config: &mut RobotConfig) {
-    let count = if node.is_array() { node.items().len() } else { 1 };
-    if !(1..=MAX_RANGERS).contains(&count) {
-        node.report(format!("must be 1 to {MAX_RANGERS} tables"));
-    }
-    for (index, node) in sonar_nodes(node).into_iter().enumerate() {
-        let table = node.table(&SONAR.names());
-        if index == 0 {
-            table.require("fix_period");
-            let Ranger { sonar, driver, .. } = read_sonar(&table, Ranger::usual());
-            (config.localizer.sonar, config.ranger) = (sonar, driver);
-            continue;
-        }
-        for node in SHARED.iter().filter_map(|key| table.get(key)) {
-            node.report("is one for all sonars: write it in the first only");
-        }
-        let first = Ranger { sonar: config.localizer.sonar, driver: config.ranger, bearing: None };
-        let Ranger { sonar, driver, .. } = read_sonar(&table, first);
-        // Too many are a mistake that has been reported.
-        _ = config.localizer.further_sonars.push(sonar);
-        _ = config.further_rangers.push(driver);
-    }
-}
-
-/// Reads a sonar, which is on a servo or at a bearing.
-fn read_sonar(table: &Table<'_>, usual: Ranger) -> Ranger {
-    let mut ranger = SONAR.read_from(table, usual);
-    ranger_file::require_cycle(table, &ranger);
-    let bearing = ranger.bearing.map(Radians);
-    for key in OF_SERVO {
-        if let (Some(_), Some(node)) = (bearing, table.get(key)) {
-            node.report(
-                "is of a sonar on a servo, and `bearing` of one without: remove one of them",
-            );
-        } else if bearing.is_none() {
-            table.require(key);
-        }
-    }
-    if let Some(bearing) = bearing {
-        ranger.sonar.servo = (bearing, bearing);
-        ranger.sonar.timing.servo = ServoTiming::INSTANT;
-        ranger.driver.servo_pulses = RangerConfig::NO_PULSES;
-    } else if ranger.sonar.fixed_bearing().is_some() {
-        table.report_at(
-            "servo",
-            "must be a rightmost below a leftmost bearing: a sonar without a servo has `bearing`",
-        );
-    }
-    ranger
-}
-
-/// The tables of all sonars; the first has what they share.
-pub(crate) fn sonars_text(config: &RobotConfig) -> String {
-    let header = if config.localizer.has_several_sonars() { "[[sonar]]" } else { "[sonar]" };
-    let tables = config.localizer.sonars().filter_map(|(id, _)| {
-        let (&sonar, &driver) = config.ranger_of(id)?;
-        let bearing = sonar.fixed_bearing().map(|bearing| bearing.0);
-        let shared: &[&str] = if id == RangerId::FIRST { &[] } else { &SHARED };
-        let of_servo: &[&str] = if bearing.is_some() { &OF_SERVO } else { &[] };
-        let is_written = |line: &&str| {
-            let key = line.split(" = ").next().unwrap_or_default();
-            !shared.contains(&key) && !of_servo.contains(&key)
-        };
-        let lines = SONAR.lines(&Ranger { sonar, driver, bearing });
-        let lines: String = lines.split_inclusive('\n').filter(is_written).collect();
-        Some(format!("\n{header}\n{lines}"))
-    });
-    tables.collect()
-}
-
-/// A ranger as its table describes it.
-#[derive(Clone, Copy)]
-pub(crate) struct Ranger {
-    pub sonar: Sonar,
-    pub driver: RangerConfig,
-    /// That of a sonar without a servo, radians.
-    pub bearing: Option<f32>,
-}
-
-impl Ranger {
-    pub(crate) fn usual() -> Self {
-        Self { sonar: usual().localizer.sonar, driver: usual().ranger, bearing: None }
-    }
-}
-
-pub(crate) fn read_region(node: Node<'_>, config: &mut RobotConfig) {
+fn read_region(node: Node<'_>, config: &mut RobotConfig) {
     if config.start.is_unknown() {
         let region = Some(REGION.read(node, (REGION.usual)()));
         config.start = StartPose::Unknown { region };
@@ -201,74 +209,25 @@ pub(crate) fn read_region(node: Node<'_>, config: &mut RobotConfig) {
     }
 }
 
-pub(crate) fn read_schedule(node: &Node<'_>, ranger: &mut Ranger) {
-    ranger.sonar.timing.schedule = if node.as_text() == Some(AS_FAST_AS_POSSIBLE) {
-        PingSchedule::AsFastAsPossible
-    } else {
-        let mut period = Duration::from_ticks(0);
-        period.set(node.within(&TIME, ("1 us", "3600 s"), "period of the pings"));
-        PingSchedule::Every(period)
-    };
+/// The tables of `docs/formats.md`.
+pub(crate) fn rows() -> Vec<(&'static str, String)> {
+    let main = [&ROBOT, &DRIVE, &PRIOR, &GATING, &ECHO, &SCHEDULE, &MOTORS].map(Section::rows);
+    let others = [
+        REGION.rows(),
+        WHEEL.rows(),
+        SONAR.rows(),
+        PULSE.rows(),
+        SERVO_TIMING.rows(),
+        RANGER.rows(),
+        BEAM.rows(),
+        GYRO.rows(),
+    ];
+    main.into_iter().chain(others).collect()
 }
 
-pub(crate) fn schedule_text(ranger: &Ranger) -> Option<String> {
-    match ranger.sonar.timing.schedule {
-        PingSchedule::Every(period) => TIME.text(&period),
-        PingSchedule::AsFastAsPossible => Some(format!("\"{AS_FAST_AS_POSSIBLE}\"")),
-    }
-}
-
-/// A servo by its name, or by its times.
-pub(crate) fn read_timing(node: Node<'_>, ranger: &mut Ranger) {
-    let timing = &mut ranger.sonar.timing.servo;
-    let Some(name) = node.as_text() else {
-        *timing = SERVO_TIMING.read(node, *timing);
-        return;
-    };
-    if let Some((_, named)) = SERVOS.iter().find(|(known, _)| *known == name) {
-        *timing = *named;
-    } else {
-        let known = alternatives(name, &SERVOS.map(|(known, _)| known));
-        node.report(format!("must be {known}, or a table of its times"));
-    }
-}
-
-pub(crate) fn read_pulses(node: &Node<'_>, ranger: &mut Ranger) {
-    ranger.driver.servo_pulses = node.pair().map(|node| PULSE.read(node, (PULSE.usual)()));
-}
-
-pub(crate) fn pulses_text(ranger: &Ranger) -> String {
-    let pulses = ranger.driver.servo_pulses.map(|pulse| PULSE.inline(&pulse));
-    format!("[{}]", pulses.join(", "))
-}
-
-/// A wheel as its table describes it; lengths in metres.
-#[derive(Clone, Copy, Default)]
-pub(crate) struct Wheel {
-    pub diameter: Option<f32>,
-    pub edges: Option<f32>,
-    pub travel: Option<f32>,
-    pub is_mirrored: bool,
-}
-
-/// A wheel: by its diameter and the edges per revolution of its encoder, or by its travel per edge.
-pub(crate) fn read_wheel(node: Node<'_>) -> WheelConfig {
-    let table = node.table(&WHEEL.names());
-    let Wheel { diameter, edges, travel, is_mirrored } = WHEEL.read_from(&table, Wheel::default());
-    let wheel = if let Some(travel) = travel {
-        if let Some(other) = table.get("diameter").or(table.get("edges_per_revolution")) {
-            other.report("contradicts travel_per_edge: remove one of them");
-        }
-        WheelConfig { travel_per_edge: Metres(travel), is_mirrored: false }
-    } else {
-        table.require("edges_per_revolution");
-        table.require("diameter");
-        WheelConfig::of_diameter(Metres(diameter.unwrap_or(1.0)), edges.unwrap_or(1.0))
-    };
-    if is_mirrored { wheel.mirrored() } else { wheel }
-}
-
-pub(crate) fn wheel_text(wheel: WheelConfig) -> String {
-    let WheelConfig { travel_per_edge, is_mirrored } = wheel;
-    WHEEL.inline(&Wheel { travel: Some(travel_per_edge.0), is_mirrored, ..Wheel::default() })
+/// The explanation of each key of a table.
+pub(crate) fn notes() -> HashMap<String, &'static str> {
+    let tables = [&ROBOT, &DRIVE, &PRIOR, &GATING, &ECHO, &SCHEDULE, &MOTORS];
+    let notes = tables.into_iter().flat_map(Section::notes);
+    notes.chain(SONAR.notes()).chain(GYRO.notes()).collect()
 }

@@ -1,90 +1,60 @@
 //! The scenario: a floor, a robot on a path, and its true parameters.
 
+pub(crate) mod absolute;
+pub(crate) mod faults;
+pub(crate) mod fidelity;
+pub(crate) mod path_table;
+pub(crate) mod start;
+pub(crate) mod surroundings;
+pub(crate) mod truth;
+pub(crate) mod upsets;
+
 use std::path::{Path as FilePath, PathBuf};
 
-use crate::absolute_file::AbsoluteSensors;
-use crate::clearance::Collision;
 use sonarfix_hal::config::RobotConfig;
-use sonarfix_search::navigator::{UNKNOWN_HEADING, UNKNOWN_POSITION};
 
 use crate::document::{Document, Node, Table};
 use crate::error::FileError;
-use crate::faults::{self, Fault};
-use crate::fidelity::{Fidelity, Follow, Hardware, ServoName, Upsets};
-use crate::file;
-use crate::floor::Floor;
-use crate::keys::scenario::{ABSOLUTE, PATH, RUN, SCENARIO, SENSOR, SERVO, START, TRUTH};
-use crate::path::{Path, PathPlan};
-use crate::robot_file;
-use crate::sonar_model::{self, SonarName};
-use crate::surroundings::{self, Surroundings};
+use crate::floor::{Floor, MAP, WALL};
+use crate::keys::{Key, Section, Value, optional, other};
+use crate::path::Path;
+use crate::sonar_model::SonarName;
 use crate::wall_file::WallFile;
+use crate::{file, robot_file};
+
+use absolute::{ABSOLUTE, AbsoluteSensors, HEADING, POSITION};
+use faults::{FAULT, Fault};
+use fidelity::{Fidelity, Hardware, SENSOR, SERVO, ServoName};
+use path_table::{Drive, Follow, PATH};
+use start::{START, Start};
+use surroundings::{OBSTACLE, Surroundings, WORLD};
+use truth::{GYRO, TRUTH, Truth};
+use upsets::{HEADING_SLIP, UPSET, Upsets};
+
+#[rustfmt::skip]
+static SCENARIO: Section<Fidelity> = Section { name: "scenario", usual: Fidelity::default, keys: &[
+    other("name", "a text", "name of the scenario"),
+    other("description", "a text", "what the scenario demonstrates"),
+    optional(Key::new("fidelity", Value::Word(&["ideal", "pins"], |f| usize::from(*f == Fidelity::Pins), |f, word| {
+        *f = if word == 0 { Fidelity::Ideal } else { Fidelity::Pins };
+    }), "travel and ranges are passed directly and on time, or through simulated pins, with the drivers and the loop of a robot")),
+    other("map", "a table, or a name", "the `[map]` table as in a map file, or the name of one: `map = \"map.toml\"`"),
+    other("robot", "tables, or a name", "the robot file's tables, as `[robot.drive]` and so on, or the name of one: `robot = \"robot.toml\"`"),
+    other("path", "a table", "[the path](#path)"),
+    other("start", "a table, or `\"unknown\"`", "[the initial estimate](#start)"),
+    other("truth", "a table", "[the true parameters](#truth)"),
+    optional(other("sensor", "a table", "[the simulated sonar](#sensor)")),
+    optional(other("servo", "a table", "[the simulated servo](#servo)")),
+    optional(other("world", "a table", "[air and obstacles](#world)")),
+    optional(other("absolute", "a table", "[sensors that measure from outside](#absolute)")),
+    optional(other("faults", "tables", "[faults of the hardware](#faults)")),
+    other("run", "a table", "[how many runs](#run)"),
+] };
 
 /// The keys of a scenario file, besides `format`.
 #[must_use]
 pub fn scenario_keys() -> Vec<&'static str> {
     SCENARIO.names()
-}
-
-/// The initial standard deviations of the filter.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Start {
-    /// Of x and of y, metres.
-    pub position: f64,
-    /// Of the heading, radians.
-    pub heading: f64,
-    /// Whether the estimate's start is drawn with these deviations around the truth; if not, it
-    /// starts on the truth.
-    pub drawn: bool,
-    /// Whether the robot starts without a pose; the other fields then have no meaning.
-    pub is_unknown: bool,
-}
-
-impl Start {
-    pub(crate) fn unknown() -> Self {
-        Self {
-            position: UNKNOWN_POSITION.0.into(),
-            heading: UNKNOWN_HEADING.0.into(),
-            drawn: false,
-            is_unknown: true,
-        }
-    }
-}
-
-/// The true parameters of the robot, which the filter does not receive.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Truth {
-    /// Track width, metres.
-    pub track_width: f64,
-    /// Scale error of the right wheel, dimensionless.
-    pub scale_right: f64,
-    /// Scale error of the left wheel, dimensionless.
-    pub scale_left: f64,
-    /// Scale error of the ranger, dimensionless.
-    pub range_scale: f64,
-    /// White noise of each wheel's travel, m/√m.
-    pub wheel_noise: f64,
-    /// Random walk of the wheels' scale errors, 1/√m.
-    pub scale_walk: f64,
-    /// Random walk of the track width, m/√m.
-    pub track_width_walk: f64,
-    /// Standard deviation of a range, at range zero, metres.
-    pub range_noise: f64,
-    /// Standard deviation of a range per metre of range, dimensionless.
-    pub range_noise_per_metre: f64,
-    /// Half of the sonar's cone, radians.
-    pub cone: f64,
-    /// The gyro; without effect on a robot that has none.
-    pub gyro: GyroTruth,
-}
-
-/// The true parameters of a gyro.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct GyroTruth {
-    /// Bias at the start, rad/s; without this key it is drawn with the deviation that the robot assumes.
-    pub bias: Option<f64>,
-    /// Scale error, dimensionless.
-    pub scale: f64,
 }
 
 /// The number of runs of the scenario.
@@ -95,6 +65,13 @@ pub struct Run {
     /// The seed of the first run; each following run has the next seed.
     pub seed: u64,
 }
+
+#[rustfmt::skip]
+static RUN: Section<Run> = Section { name: "run", usual: || Run { runs: 1, seed: 0 }, keys: &[
+    Key::new("runs", Value::Own("a whole number from 1 to 4294967295", |node, r| r.runs = node.count(), |_| None), "number of Monte-Carlo runs"),
+    Key::new("seed", Value::Own("a whole number from 0 to 18446744073709551615", |node, r| r.seed = node.integer(0..=u64::MAX), |_| None),
+        "seed of the first run. Each further run uses the next number"),
+] };
 
 /// A scenario.
 ///
@@ -176,7 +153,7 @@ impl Scenario {
         let path_table = root.table("path", &PATH.names());
         let drive = || Some(PATH.read_from(&path_table, Drive::default()));
         let drive = path_table.faultless(drive);
-        let path = read_path(&path_table, drive, floor.as_ref(), robot.as_ref());
+        let path = path_table::read(&path_table, drive, floor.as_ref(), robot.as_ref());
         let (truth, upsets) = TRUTH.read(root.require("truth"), Default::default());
         let (sensor, servo) = (root.get("sensor"), root.get("servo"));
         let (sonar, name) = (SonarName::default(), ServoName::default());
@@ -185,7 +162,7 @@ impl Scenario {
             description: root.require("description").text().into(),
             fidelity: SCENARIO.read_from(root, Fidelity::default()),
             follow: drive.map_or_else(Follow::default, |drive| drive.follow),
-            start: read_start(root, robot.as_ref()),
+            start: start::read(root, robot.as_ref()),
             truth,
             upsets,
             hardware: Hardware {
@@ -238,98 +215,26 @@ fn file_or_report<T>(node: &Node<'_>, read: Result<T, FileError>) -> Option<T> {
     .ok()
 }
 
-/// How the path is driven.
-#[derive(Clone, Copy)]
-pub(crate) struct Drive {
-    pub laps: u32,
-    pub speed: f64,
-    pub turn_rate: f64,
-    pub clearance: f64,
-    pub follow: Follow,
-}
-
-impl Default for Drive {
-    fn default() -> Self {
-        Self { laps: 1, speed: 0.0, turn_rate: 0.0, clearance: 0.0, follow: Follow::default() }
-    }
-}
-
-/// Rules that concern several values are checked only if all of them could be read.
-fn read_path(
-    table: &Table<'_>,
-    drive: Option<Drive>,
-    floor: Option<&Floor>,
-    robot: Option<&RobotConfig>,
-) -> Option<Path> {
-    let unit = table.require("unit").unit_of_length();
-    let corners = table.require("corners").items();
-    let points = table.faultless(|| {
-        let start = table.require("start").point(unit);
-        Some((start, corners.iter().map(|node| node.point(unit)).collect()))
-    });
-    let (drive, (start, corner_points)) = drive.zip(points)?;
-    let Drive { laps, speed, turn_rate, clearance, .. } = drive;
-    let plan = PathPlan { start, corners: corner_points, laps, speed, turn_rate };
-    let path = match Path::new(plan) {
-        Ok(path) => path,
-        Err(error) => {
-            let corner = error.corner().and_then(|index| corners.get(index));
-            match corner {
-                Some(node) => node.report(error.to_string()),
-                None => table.report_at(error.field(), error.to_string()),
-            }
-            return None;
-        }
-    };
-    if let Some(robot) = robot {
-        check_speeds(table, &path, robot);
-    }
-    if let Some(floor) = floor {
-        check_clearance(&path, &corners, floor, clearance);
-    }
-    Some(path)
-}
-
-pub(crate) fn whole(node: &Node<'_>) -> u32 {
-    let number = node.integer(1..=u64::from(u32::MAX));
-    u32::try_from(number).unwrap_or(u32::MAX)
-}
-
-/// Checks the wheel speed: the localizer refuses the travel of a wheel that is faster than `max_wheel_speed`.
-fn check_speeds(table: &Table<'_>, path: &Path, robot: &RobotConfig) {
-    let fastest = f64::from(robot.localizer.max_wheel_speed.0);
-    let half_width = 0.5 * f64::from(robot.localizer.drive.track_width.0);
-    let plan = path.plan();
-    for (key, wheel) in [("speed", plan.speed), ("turn_rate", plan.turn_rate * half_width)] {
-        if wheel > fastest {
-            let message = format!(
-                "rolls a wheel at {wheel:.3} m/s, faster than the robot's \
-                 drive.max_wheel_speed of {fastest:.3} m/s"
-            );
-            table.report_at(key, message);
-        }
-    }
-}
-
-/// Records a collision, at the corner at the end of the leg.
-fn check_clearance(path: &Path, corners: &[Node<'_>], floor: &Floor, clearance: f64) {
-    if let Some(collision) = Collision::first(path.plan(), floor, clearance)
-        && let Some(corner) = corners.get(collision.corner)
-    {
-        corner.report(collision.to_string());
-    }
-}
-
-fn read_start(root: &Table<'_>, robot: Option<&RobotConfig>) -> Start {
-    let start = root.require("start");
-    if let Some(text) = start.as_text() {
-        start.check((), text == "unknown", "a table of deviations, or \"unknown\"");
-        let searches = robot.is_none_or(|robot| robot.start.is_unknown());
-        return start.check(Start::unknown(), searches, "that of a robot with start = \"unknown\"");
-    }
-    Start { is_unknown: false, ..START.read(start, Start::unknown()) }
-}
-
-pub(crate) fn read_sensor(node: &Node<'_>, sonar: &mut SonarName) {
-    *sonar = sonar_model::read(node, &[], *sonar, |model| model.simulated);
+/// The tables of `docs/formats.md`.
+pub(crate) fn rows() -> Vec<(&'static str, String)> {
+    vec![
+        SCENARIO.rows(),
+        MAP.rows(),
+        WALL.rows(),
+        PATH.rows(),
+        START.rows(),
+        TRUTH.rows(),
+        UPSET.rows(),
+        HEADING_SLIP.rows(),
+        GYRO.rows(),
+        SENSOR.rows(),
+        SERVO.rows(),
+        WORLD.rows(),
+        OBSTACLE.rows(),
+        FAULT.rows(),
+        RUN.rows(),
+        ABSOLUTE.rows(),
+        HEADING.rows(),
+        POSITION.rows(),
+    ]
 }

@@ -1,8 +1,8 @@
 //! The surroundings that are not in the map: air, furniture, people.
 
 use crate::document::{Node, Table};
-use crate::keys::scenario::{OBSTACLE, WORLD};
-use crate::quantity::Unit;
+use crate::keys::{Key, Section, Value, depends, number, optional, other};
+use crate::quantity::{LENGTH, TEMPERATURE, TIME, Unit};
 
 /// The outline of an obstacle, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,6 +49,24 @@ pub struct Surroundings {
     /// Obstacles.
     pub obstacles: Vec<Obstacle>,
 }
+
+#[rustfmt::skip]
+pub(crate) static WORLD: Section<f64> = Section { name: "world", usual: || 20.0, keys: &[
+    optional(Key::new("temperature", Value::Number(&TEMPERATURE, ("-40 degC", "85 degC"), |celsius| celsius), "temperature of the air")),
+    depends(other("unit", "`\"m\"`, `\"cm\"` or `\"mm\"`", "unit of the coordinates. Required with obstacles")),
+    optional(other("obstacle", "tables", "standing or moving obstacles, round or flat")),
+] };
+
+/// Radius and `takes` of an obstacle.
+#[rustfmt::skip]
+pub(crate) static OBSTACLE: Section<(f64, f64)> = Section { name: "obstacle", usual: || (0.0, 0.0), keys: &[
+    depends(other("centre", "within 8 km of the origin", "centre of a round one")),
+    depends(number("radius", &LENGTH, ("0.1 mm", "1000 m"), |o| &mut o.0, "radius of a round one")),
+    depends(other("from", "within 8 km of the origin", "one end of a flat one")),
+    depends(other("to", "different from `from`", "the other end")),
+    optional(other("walk", "within 8 km", "by what x and y it moves, and back, repeatedly")),
+    depends(number("takes", &TIME, ("1 ms", "1000000 s"), |o| &mut o.1, "how long it moves in one direction. Required with `walk`")),
+] };
 
 /// Reads `[world]`; without it, an empty room of the usual temperature.
 pub(crate) fn read(root: &Table<'_>) -> Surroundings {

@@ -1,7 +1,8 @@
 //! Faults of the hardware, with their times.
 
 use crate::document::{Node, Table};
-use crate::keys::scenario::FAULT;
+use crate::keys::{Key, Section, Value, depends, number, other};
+use crate::quantity::{FRACTION, NUMBER, TIME};
 
 /// A wheel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,6 +71,17 @@ pub(crate) struct FaultKeys {
     pub times: f64,
     pub late: f64,
 }
+
+#[rustfmt::skip]
+pub(crate) static FAULT: Section<FaultKeys> = Section { name: "faults", usual: FaultKeys::default, keys: &[
+    other("kind", "a fault of the list below", "the fault"),
+    number("from", &TIME, ("0 s", "1000000 s"), |f| &mut f.from, "when it begins, from the start of the run"),
+    number("to", &TIME, ("0 s", "1000000 s"), |f| &mut f.to, "when it ends. After `from`"),
+    depends(Key::new("wheel", Value::Word(&["right", "left"], |f| usize::from(f.is_left), |f, word| f.is_left = word == 1), "the wheel")),
+    depends(number("share", &FRACTION, ("0", "1"), |f| &mut f.share, "how many, a fraction")),
+    depends(number("times", &NUMBER, ("1", "1000"), |f| &mut f.times, "how many times as long")),
+    depends(number("late", &TIME, ("0 s", "100 s"), |f| &mut f.late, "the maximum delay")),
+] };
 
 /// Reads `faults`, an optional array of tables.
 pub(crate) fn read(root: &Table<'_>) -> Vec<Fault> {

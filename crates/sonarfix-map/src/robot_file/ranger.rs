@@ -1,15 +1,31 @@
 //! Reads and writes the ranger of a robot file: its name, or its name with different settings.
 
-use sonarfix::config::{LightBeam, LightLinked, Ranging};
+use sonarfix::config::{LightBeam, LightLinked, Ranging, Sonar};
 use sonarfix::geometry::units::{Duration, Radians};
-use sonarfix_hal::config::RobotConfig;
+use sonarfix_hal::config::RangerConfig;
 use sonarfix_hal::ranger::{PulseTiming, RangerKind, RangerSettings};
 
+use super::common_parts::usual;
 use crate::devices::VL53L0X_BEAM;
 use crate::document::{Node, Table};
-use crate::keys::robot::{BEAM, RANGER};
-use crate::robot_file::Ranger;
+use crate::keys::{Key, Section, Value, depends, number};
+use crate::quantity::{ANGLE, TIME};
 use crate::sonar_model::{self, CUSTOM};
+
+/// A ranger as its table describes it.
+#[derive(Clone, Copy)]
+pub(crate) struct Ranger {
+    pub sonar: Sonar,
+    pub driver: RangerConfig,
+    /// That of a sonar without a servo, radians.
+    pub bearing: Option<f32>,
+}
+
+impl Ranger {
+    pub(crate) fn usual() -> Self {
+        Self { sonar: usual().localizer.sonar, driver: usual().ranger, bearing: None }
+    }
+}
 
 /// The settings of a ranger by its kind.
 #[derive(Clone, Copy)]
@@ -17,6 +33,26 @@ pub(crate) struct RangerKeys {
     pub timing: PulseTiming,
     pub address: Option<u8>,
 }
+
+#[rustfmt::skip]
+pub(crate) static RANGER: Section<RangerKeys> = Section { name: "ranger", usual: || RangerKeys { timing: PulseTiming::HC_SR04, address: None }, keys: &[
+    depends(Key::new("kind", Value::Own("a driver of the list above", |_, _| {}, |_| None), "the kind of ranger")),
+    depends(Key::new("address", Value::Own("0x08 to 0x77", |node, r| read_address(&node, r), |_| None),
+        "address on the bus of an SRF, a VL53L1X or a VL53L0X. The other settings are those of an HC-SR04 and an LV-MaxSonar")),
+    depends(number("trigger", &TIME, ("0 s", "10 s"), |r| &mut r.timing.trigger, "width of the trigger pulse")),
+    depends(number("blanking", &TIME, ("0 s", "10 s"), |r| &mut r.timing.blanking, "time after the trigger in which the echo line is ignored")),
+    depends(number("longest", &TIME, ("0 s", "10 s"), |r| &mut r.timing.longest, "the longest echo pulse that is a range")),
+    depends(number("silence", &TIME, ("0 s", "10 s"), |r| &mut r.timing.silence, "pulses from this length on mean that there was no echo")),
+    depends(number("listen", &TIME, ("0 s", "10 s"), |r| &mut r.timing.listen, "time after which the ranger is taken not to answer")),
+    depends(number("stuck", &TIME, ("0 s", "10 s"), |r| &mut r.timing.stuck, "time after which the echo line is taken to be stuck")),
+] };
+
+#[rustfmt::skip]
+pub(crate) static BEAM: Section<LightBeam> = Section { name: "beam", usual: || LightBeam::VL53L1X, keys: &[
+    depends(number("spot", &ANGLE, ("0.01 deg", "20 deg"), |b| &mut b.spot.0, "half of the cone that it lights")),
+    depends(number("pointing", &ANGLE, ("0 deg", "45 deg"), |b| &mut b.pointing.0,
+        "standard deviation of its direction: of servo and mount")),
+] };
 
 const PULSE: [&str; 6] = ["trigger", "blanking", "longest", "silence", "listen", "stuck"];
 
@@ -102,7 +138,7 @@ fn described(node: Node<'_>) -> (RangerKind, Duration) {
 }
 
 /// A seven-bit I²C address that is not reserved.
-pub(crate) fn read_address(node: &Node<'_>, keys: &mut RangerKeys) {
+fn read_address(node: &Node<'_>, keys: &mut RangerKeys) {
     keys.address = u8::try_from(node.integer(0x08..=0x77)).ok();
 }
 
@@ -119,10 +155,4 @@ pub(crate) fn kind_text(ranger: &Ranger) -> String {
         RangerKind::Custom => return format!("\"{CUSTOM}\""),
     };
     format!("{{ kind = \"{kind}\", address = {address} }}")
-}
-
-/// Reads `sensor` of `[echo]`: the usual parameters of its echoes.
-pub(crate) fn read_echo_sensor(node: &Node<'_>, config: &mut RobotConfig) {
-    let echo = &mut config.localizer.echo;
-    *echo = sonar_model::read(node, &[], *echo, |model| model.echo);
 }

@@ -1,41 +1,8 @@
-//! The fidelity of a simulation, and the simulated hardware.
+//! Disturbances of the wheels.
 
 use crate::document::Node;
-use crate::keys::scenario::HEADING_SLIP;
-use crate::scenario::Truth;
-use crate::sonar_model::SonarName;
-
-/// The part of the robot that is simulated between world and localizer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Fidelity {
-    /// None: the localizer receives travel and ranges without delay or jitter, as in the paper.
-    #[default]
-    Ideal,
-    /// Pins and counters, with the drivers and the loop of a robot.
-    Pins,
-}
-
-/// The sonar's servo.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum ServoName {
-    /// Reaches the commanded bearing at once.
-    #[default]
-    Ideal,
-    /// SG90.
-    Sg90,
-    /// MG996R.
-    Mg996r,
-}
-
-/// How the robot follows its path.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Follow {
-    /// Exactly, whatever the estimate.
-    #[default]
-    Truth,
-    /// A controller steers by the estimate only.
-    Estimate,
-}
+use crate::keys::{Section, number};
+use crate::quantity::{ANGLE, LENGTH, TIME};
 
 /// Disturbances of a wheel at random distances.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -80,21 +47,26 @@ pub struct Upsets {
     pub heading_slip: HeadingSlip,
 }
 
-/// The hardware of a scenario.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Hardware {
-    /// The sonar.
-    pub sonar: SonarName,
-    /// The servo.
-    pub servo: ServoName,
-}
+#[rustfmt::skip]
+pub(crate) static UPSET: Section<Upset> = Section { name: "slip", usual: Upset::default, keys: &[
+    number("every", &LENGTH, ("1 mm", "1000000 m"), |u| &mut u.every, "mean distance between two of a wheel"),
+    number("by", &LENGTH, ("0 m", "10 m"), |u| &mut u.by, "travel of the wheel"),
+] };
 
-pub(crate) fn read_heading_slip(node: Node<'_>, into: &mut (Truth, Upsets)) {
+#[rustfmt::skip]
+pub(crate) static HEADING_SLIP: Section<HeadingSlip> = Section { name: "heading_slip", usual: HeadingSlip::default, keys: &[
+    number("every", &TIME, ("1 ms", "1000000 s"), |s| &mut s.every, "mean time between two"),
+    number("least", &ANGLE, ("0 deg", "360 deg"), |s| &mut s.least, "least turn of the odometry"),
+    number("most", &ANGLE, ("0 deg", "360 deg"), |s| &mut s.most, "greatest turn. At least `least`"),
+] };
+
+/// Reads `heading_slip`, whose least and greatest turn are in order.
+pub(crate) fn read_heading_slip(node: Node<'_>, into: &mut HeadingSlip) {
     let table = node.table(&HEADING_SLIP.names());
     let read = || Some(HEADING_SLIP.read_from(&table, HeadingSlip::default()));
     let Some(slip) = table.faultless(read) else { return };
     if slip.most < slip.least {
         table.report_at("most", "must be at least the value of least");
     }
-    into.1.heading_slip = slip;
+    *into = slip;
 }
