@@ -1,5 +1,5 @@
 //! Reads robot files into the [`RobotConfig`] of loop, drivers, planner, simulator and replay, and writes them, by the
-//! [table of keys](crate::keys).
+//! table of keys.
 
 mod common_parts;
 mod drive;

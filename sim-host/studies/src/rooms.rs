@@ -87,7 +87,8 @@ fn one(family: Family, seed: u64) -> Result<Sums, RoomError> {
     let result = simulation.run(seed, &mut watch)?;
     let (sum, count) = result.nis.parts();
     let states = f64::from(u32::try_from(result.estimated_states).unwrap_or(1));
-    let scale = if result.lost { 0.0 } else { result.error[6] / watch.scale_deviation };
+    let [.., scale_error] = *result.error.as_slice() else { return Ok(Sums::default()) };
+    let scale = if result.lost { 0.0 } else { scale_error / watch.scale_deviation };
     Ok(Sums {
         runs: 1,
         nees: if result.lost { 0.0 } else { result.nees / states },
