@@ -387,7 +387,7 @@ mod tests {
     fn ratios_have_bars() {
         let good = on_the_bars();
         let mut bad = good.clone();
-        set(&mut bad, "cortex-m4f-small", "predict_instructions", 601);
+        set(&mut bad, "cortex-m4f-small", "predict_instructions", 676);
         assert_eq!(lost_bars(&good, &bad).len(), 1);
         let mut bad = good.clone();
         for (walls, is) in [(100, 1000), (100_000, 1201)] {

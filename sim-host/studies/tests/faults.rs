@@ -62,7 +62,10 @@ fn blindness_is_not_silent() {
         let errors = counted(name, |faults| faults.right.errors + faults.left.errors);
         assert!(errors.iter().all(|&n| n >= 300), "{name}: {errors:?}");
         let none = row("none").longest_silence();
-        assert!(row(name).longest_silence() <= none.max(0.7), "{name}");
+        let silence = row(name).longest_silence();
+        // The end of a ping may differ by the flight time of an echo.
+        let longest = none.max(0.7) + 0.01;
+        assert!(silence <= longest, "{name}: {silence} s, without a fault {none} s");
     }
     for row in ROWS.iter() {
         assert!(row.longest_silence() <= 60.0, "{}: {}", row.name, row.longest_silence());
