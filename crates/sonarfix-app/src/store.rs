@@ -170,8 +170,9 @@ impl<F: NorFlash> Store<F> {
         length: usize,
     ) -> Result<(), StoreError> {
         let end = length.saturating_add(TRAILER);
-        let trailer = buffer.get_mut(length..end).ok_or(StoreError::NotWritten)?;
-        trailer.copy_from_slice(&self.limit.count());
+        let free = buffer.get_mut(length..).ok_or(StoreError::NotWritten)?;
+        let trailer: &mut Trailer = free.first_chunk_mut().ok_or(StoreError::NotWritten)?;
+        *trailer = self.limit.count();
         let record = buffer.get(..end).ok_or(StoreError::NotWritten)?;
         let written = self.journal.write(key, record);
         self.failures = self.failures.saturating_add(u32::from(written.is_err()));
