@@ -58,7 +58,7 @@ impl Entry {
 
 #[derive(Debug, Clone)]
 pub(super) struct Bank<const HYPOTHESES: usize> {
-    entries: Vec<Entry, HYPOTHESES, u8>,
+    entries: Vec<Entry, HYPOTHESES>,
 }
 
 impl<const HYPOTHESES: usize> Bank<HYPOTHESES> {

@@ -44,7 +44,7 @@ const APART: (f32, f32) = (0.1, 2.5);
 /// The best lines, by their support.
 #[derive(Debug, Clone)]
 pub(super) struct Lines {
-    found: Vec<Line, LINES, u8>,
+    found: Vec<Line, LINES>,
     /// Cosine and angle of the cone in which a ping may support a line.
     cone: Radians,
     cos_cone: f32,

@@ -1,9 +1,9 @@
 //! Lists in the order of a score, best first.
 
-use heapless::{LenType, Vec};
+use heapless::Vec;
 
 /// Removes an element and moves those behind it; nothing if there is no such element. [`Vec::remove`] can panic.
-pub(super) fn remove_at<T: Copy, L: LenType, const N: usize>(list: &mut Vec<T, N, L>, at: usize) {
+pub(super) fn remove_at<T: Copy, const N: usize>(list: &mut Vec<T, N>, at: usize) {
     let Some(tail) = list.get_mut(at..) else { return };
     let mut behind: Option<&mut T> = None;
     let mut is_empty = true;
@@ -20,8 +20,8 @@ pub(super) fn remove_at<T: Copy, L: LenType, const N: usize>(list: &mut Vec<T, N
 }
 
 /// Inserts an element behind those with an equal or higher score. In a full list it replaces the last one, if its score is higher.
-pub(super) fn insert_ranked<T, S: PartialOrd, L: LenType, const N: usize>(
-    list: &mut Vec<T, N, L>,
+pub(super) fn insert_ranked<T, S: PartialOrd, const N: usize>(
+    list: &mut Vec<T, N>,
     element: T,
     score: impl Fn(&T) -> S,
 ) {

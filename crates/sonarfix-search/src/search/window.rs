@@ -85,7 +85,7 @@ impl Ping {
 /// Recent novel pings and the robot's pose by odometry.
 #[derive(Debug, Clone)]
 pub(super) struct Window<const PINGS: usize> {
-    pings: Vec<Ping, PINGS, u16>,
+    pings: Vec<Ping, PINGS>,
     /// Where the sonar is in the robot frame.
     mount: Vector,
     path: Path,

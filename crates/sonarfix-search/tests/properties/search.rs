@@ -191,8 +191,11 @@ fn invalid_input_is_refused() {
 
 #[test]
 fn the_state_fits_in_four_kibibytes() {
+    // On this computer three lengths, and the address and length of the walls, are wider than on a microcontroller, where
+    // `cargo xtask budgets` compares the size with the same limit.
+    let wider = 5 * (size_of::<usize>() - 4);
     let size = size_of::<Search>();
-    assert!(size <= 4096, "{size} bytes");
+    assert!(size <= 4096 + wider, "{size} bytes");
 }
 
 /// Any ping of any window: also ranges that no wall of the room explains.
