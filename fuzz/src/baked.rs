@@ -1,9 +1,9 @@
 //! A baked map: one that [`Map::read`] accepts must answer every query correctly.
 
-use sonarfix::map::image::{MAGIC, VERSION, checksum};
-use sonarfix::map::{Map, MapError, Wall, WallId};
 use sonarfix::geometry::pose::Point;
 use sonarfix::geometry::units::Metres;
+use sonarfix::map::image::{MAGIC, VERSION, checksum};
+use sonarfix::map::{Map, MapError, Wall, WallId};
 use sonarfix_map::{BakeError, bake};
 
 use crate::bytes::Bytes;

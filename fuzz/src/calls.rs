@@ -2,17 +2,17 @@
 
 use sonarfix::aim::{Aim, Policy, Reason};
 use sonarfix::config::{Config, PingSchedule, PingTiming, RangerId, ServoTiming};
-use sonarfix::sensor::echo::EchoParameters;
 use sonarfix::filter::ekf::Ekf;
-use sonarfix::health::{Health, LOST_AT, MOST_NIS, Verdict};
-use sonarfix::localizer::{Fix, Localizer, Refusal, Start};
-use sonarfix::map::{Map, Wall, WallId};
 use sonarfix::filter::motion::{Drive, WheelTravel};
 use sonarfix::geometry::pose::{Point, Pose};
-use sonarfix::sensor::range::RangeNoise;
 use sonarfix::geometry::units::{
     Duration, Instant, Metres, MetresPerSecond, PerRootMetre, Radians, SquareMetres,
 };
+use sonarfix::health::{Health, LOST_AT, MOST_NIS, Verdict};
+use sonarfix::localizer::{Fix, Localizer, Refusal, Start};
+use sonarfix::map::{Map, Wall, WallId};
+use sonarfix::sensor::echo::EchoParameters;
+use sonarfix::sensor::range::RangeNoise;
 
 use crate::bytes::Bytes;
 
@@ -47,7 +47,8 @@ fn config(bytes: &mut Bytes) -> Config {
     let mut config = Config::for_track_width(Metres(0.16));
     // Half of the robots are usual ones, so that the calls are reached at all.
     if bytes.byte() < 128 {
-        config.echo = if bytes.byte() < 128 { EchoParameters::NONE } else { EchoParameters::HC_SR04 };
+        config.echo =
+            if bytes.byte() < 128 { EchoParameters::NONE } else { EchoParameters::HC_SR04 };
         config.gating.confidence = f32::from(bytes.byte() % 4);
         config.policy = policy(bytes);
         return config;

@@ -1,10 +1,10 @@
 //! The search, fed in any order with any travels and pings.
 
 use sonarfix::config::Config;
-use sonarfix::map::{Map, Wall};
 use sonarfix::geometry::pose::{Point, Pose};
-use sonarfix_search::search::{Answer, Region, Search, SearchParameters};
 use sonarfix::geometry::units::{Metres, Radians};
+use sonarfix::map::{Map, Wall};
+use sonarfix_search::search::{Answer, Region, Search, SearchParameters};
 
 use crate::bytes::Bytes;
 

@@ -6,10 +6,10 @@
 use std::path::{Path, PathBuf};
 
 use sonarfix::config::Config;
-use sonarfix::localizer::{Fix, Localizer, Start};
-use sonarfix::map::{Map, Wall};
 use sonarfix::geometry::pose::{Point, Pose};
 use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
+use sonarfix::localizer::{Fix, Localizer, Start};
+use sonarfix::map::{Map, Wall};
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_hal::ranger::NoEcho;
 use sonarfix_hal::robot::Faults;

@@ -64,7 +64,8 @@ fn an_occluded_wall_is_avoided_and_returns_to_the_prior_with_time() {
 #[test]
 fn another_wall_follows_a_gated_one_with_every_policy() {
     let walls = room();
-    for policy in [Policy::Nearest, Policy::Informative] {
+    // The default is the informative policy where it is linked.
+    for policy in [Policy::Nearest, Policy::default()] {
         let mut config = *localizer(&walls, 0.01).config();
         config.policy = policy;
         let mut localizer = Localizer::new(config, Map::new(&walls), start(0.01), START).unwrap();

@@ -44,7 +44,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
             let config = robot_file::read(robot)?;
             let mut buffer = [0; baked::LENGTH_MAX];
             let bytes = baked::write(&config, &mut buffer)?;
-            sonarfix_files::write(out, &*bytes)?;
+            sonarfix_files::write(out, bytes)?;
             println!("{}: {} bytes, {}", out.display(), bytes.len(), checksum(&config));
         }
         What::Check { config: file } => {

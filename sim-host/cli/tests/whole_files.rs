@@ -75,6 +75,10 @@ fn command(arguments: &[&str], result: &str, dir: &Path) -> Command {
     command
 }
 
+fn has_extension(name: &str, extension: &str) -> bool {
+    Path::new(name).extension().is_some_and(|it| it == extension)
+}
+
 /// Each result is whole: the old one or the new one; without an error all are new. What a killed command leaves beside them
 /// is hidden.
 fn assert_whole(what: &str, status: ExitStatus, dir: &Path, new: &BTreeMap<String, Vec<u8>>) {
@@ -82,7 +86,7 @@ fn assert_whole(what: &str, status: ExitStatus, dir: &Path, new: &BTreeMap<Strin
         // The rows from which Parquet is made grow in a file of their own.
         let is_growing = name.ends_with(".parquet.csv");
         // An interrupted command reports the runs that have ended: another report, and a whole one.
-        let is_report = name.ends_with(".html") && text.ends_with(b"</html>\n");
+        let is_report = has_extension(name, "html") && text.ends_with(b"</html>\n");
         let is_new = new.get(name) == Some(text);
         assert!(
             is_new || is_report || is_growing || text == OLD,
@@ -122,12 +126,12 @@ fn on_a_full_disk_the_old_results_are_whole() {
             assert_whole(&what, output.status, dir, &new);
             assert!(blocks != "0" || !output.status.success(), "{what}");
             let names: Vec<_> = results(dir).into_keys().collect();
-            assert!(!names.iter().any(|name| name.ends_with(".part")), "{what}: {names:?}");
+            assert!(!names.iter().any(|name| has_extension(name, "part")), "{what}: {names:?}");
         }
     }
 }
 
-/// Killed, or ended by Ctrl-C, at moments from the start to the end of each command; SONARFIX_MOMENTS sets their number.
+/// Killed, or ended by Ctrl-C, at moments from the start to the end of each command; `SONARFIX_MOMENTS` sets their number.
 #[cfg(unix)]
 #[test]
 fn killed_commands_leave_whole_results() {

@@ -196,7 +196,7 @@ mod tests {
     fn a_failure_leaves_the_old_file_and_nothing_else() {
         let (dir, file) = place();
         let failed = write_with(&file, |out| {
-            out.write_all(&[b'x'; 100_000])?;
+            out.write_all(&vec![b'x'; 100_000])?;
             anyhow::bail!("the disk is full")
         });
         assert!(format!("{:#}", failed.unwrap_err()).contains("map.toml: the disk is full"));

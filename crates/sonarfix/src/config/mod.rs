@@ -192,17 +192,20 @@ impl core::fmt::Display for ConfigError {
 
 impl core::error::Error for ConfigError {}
 
+/// Largest value of a number, in its unit of this module: products of four remain far below the largest `f32`.
+const LARGEST: f32 = 10_000.0;
+
 /// Checks fields, each with its value, by one rule.
 #[inline(never)]
 fn positive(fields: &[&'static str], values: &[f32]) -> Result<(), ConfigError> {
-    let is_wrong = |value: f32| !(value > 0.0 && value.is_finite());
-    first(fields, values, is_wrong, "positive and finite")
+    let is_wrong = |value: f32| !(value > 0.0 && value <= LARGEST);
+    first(fields, values, is_wrong, "positive, and at most 10,000")
 }
 
 #[inline(never)]
 fn not_negative(fields: &[&'static str], values: &[f32]) -> Result<(), ConfigError> {
-    let is_wrong = |value: f32| !(value >= 0.0 && value.is_finite());
-    first(fields, values, is_wrong, "zero or positive, and finite")
+    let is_wrong = |value: f32| !(0.0..=LARGEST).contains(&value);
+    first(fields, values, is_wrong, "zero or positive, and at most 10,000")
 }
 
 /// The first field whose value is wrong.
@@ -317,8 +320,8 @@ impl Config {
         require("prior.scale_left", !one_is_exact, "zero if prior.scale_right is, and only then")?;
         let difference = prior.scale_difference;
         let is_positive =
-            difference.is_none_or(|difference| difference > 0.0 && difference.is_finite());
-        require("prior.scale_difference", is_positive, "positive and finite, if given")?;
+            difference.is_none_or(|difference| difference > 0.0 && difference <= LARGEST);
+        require("prior.scale_difference", is_positive, "positive, and at most 10,000, if given")?;
         let width = self.drive.track_width.0;
         let below_width = prior.track_width.0 < 0.5 * width;
         require("prior.track_width", below_width, "less than half the track width")?;
@@ -412,7 +415,9 @@ impl Config {
 
 /// Checks the fields of one ranger.
 fn check_sonar(sonar: &Sonar) -> Result<(), ConfigError> {
-    require("sonar.mount", sonar.mount.is_finite(), "finite")?;
+    let is_near = |offset: f32| (-LARGEST..=LARGEST).contains(&offset);
+    let is_near = is_near(sonar.mount.x.0) && is_near(sonar.mount.y.0);
+    require("sonar.mount", is_near, "at most 10,000 m from the middle of the axle")?;
     let (right, left) = sonar.servo;
     let half_turn = core::f32::consts::PI;
     let in_order = right.0 < left.0 || sonar.fixed_bearing().is_some();
