@@ -60,7 +60,7 @@ fn config(bytes: &mut Bytes) -> Config {
         track_width_walk: PerRootMetre(Metres(bytes.between(0.0, 1e-4))),
     };
     config.max_wheel_speed = MetresPerSecond(bytes.between(0.1, 5.0));
-    let sonar = &mut config.sonar;
+    let sonar = &mut config.rangers.first;
     sonar.mount = Point::new(bytes.number(0.2), bytes.number(0.2));
     sonar.servo = (Radians(bytes.between(-3.1, 0.0)), Radians(bytes.between(0.0, 3.1)));
     sonar.cone = Radians(bytes.between(0.05, 1.5));
@@ -204,7 +204,7 @@ impl Session<'_> {
             self.skip();
             return;
         };
-        let sonar = self.localizer.config().sonar;
+        let sonar = self.localizer.config().rangers.first;
         assert!(aim.bearing >= sonar.servo.0 && aim.bearing <= sonar.servo.1, "{aim:?}");
         self.check_aim(&aim);
         self.hear(&aim, bytes);

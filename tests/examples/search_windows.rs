@@ -14,7 +14,7 @@ use clap::Parser;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use sonarfix::config::{Config, Sonar};
+use sonarfix::config::{Config, RangerParameters};
 use sonarfix::geometry::pose::Point;
 use sonarfix::geometry::units::{Metres, Radians};
 use sonarfix::map::{Map, Wall};
@@ -54,8 +54,8 @@ fn main() -> ExitCode {
     }
 }
 
-fn sonar() -> Sonar {
-    let mut sonar = Config::for_track_width(Metres(0.2)).sonar;
+fn sonar() -> RangerParameters {
+    let mut sonar = Config::for_track_width(Metres(0.2)).rangers.first;
     sonar.mount = Point::new(0.1, 0.0);
     sonar.cone = Radians::from_degrees(15.0);
     sonar.max_range = Metres(3.5);

@@ -66,7 +66,7 @@ fn pins_with_ideal_hardware_have_the_statistics_of_the_ideal_run() {
 fn stamped(stamp: Stamp) -> (f64, f64, usize) {
     let mut scenario = paper(Fidelity::Pins);
     scenario.hardware.servo = ServoName::Sg90;
-    scenario.robot.localizer.sonar.timing.servo = ServoTiming::SG90;
+    scenario.robot.localizer.rangers.first.timing.servo = ServoTiming::SG90;
     scenario.robot.localizer.policy = Policy::Informative;
     let mut simulation = Simulation::new(scenario);
     simulation.stamp = stamp;
@@ -190,11 +190,11 @@ fn a_fixed_sonar_localizes_the_robot_of_the_classroom() {
     let mut classroom = scenario(CLASSROOM);
     let robot = &mut classroom.robot;
     let to_the_right = Radians(-core::f32::consts::FRAC_PI_2);
-    robot.localizer.sonar.servo = (to_the_right, to_the_right);
-    robot.localizer.sonar.timing = PingTiming {
+    robot.localizer.rangers.first.servo = (to_the_right, to_the_right);
+    robot.localizer.rangers.first.timing = PingTiming {
         schedule: PingSchedule::AsFastAsPossible,
         servo: ServoTiming::INSTANT,
-        ..robot.localizer.sonar.timing
+        ..robot.localizer.rangers.first.timing
     };
     let summary = summary(classroom, 4);
     assert_eq!(summary.lost_runs, 0);
@@ -207,13 +207,13 @@ fn a_fixed_sonar_localizes_the_robot_of_the_classroom() {
 fn two_sonars(right: [f32; 2], left: [f32; 2]) -> Scenario {
     let mut classroom = scenario(CLASSROOM);
     let robot = &mut classroom.robot;
-    robot.localizer.sonar.timing.schedule = PingSchedule::AsFastAsPossible;
-    let mut other = robot.localizer.sonar;
+    robot.localizer.rangers.first.timing.schedule = PingSchedule::AsFastAsPossible;
+    let mut other = robot.localizer.rangers.first;
     other.mount = Point::new(0.06, -0.05);
     let limits = |[from, to]: [f32; 2]| (Radians::from_degrees(from), Radians::from_degrees(to));
-    (robot.localizer.sonar.servo, other.servo) = (limits(left), limits(right));
-    robot.localizer.further_sonars.push(other).unwrap();
-    robot.further_rangers.push(robot.ranger).unwrap();
+    (robot.localizer.rangers.first.servo, other.servo) = (limits(left), limits(right));
+    robot.localizer.rangers.push(other).unwrap();
+    robot.rangers.push(robot.rangers.first).unwrap();
     classroom
 }
 
@@ -240,7 +240,7 @@ fn pings_of_two_sonars_never_overlap() {
     let turning = ([-100.0, 10.0], [-10.0, 100.0]);
     for ((right, left), least) in [(fixed, 0), (turning, 300), ((fixed.0, turning.1), 300)] {
         let scenario = two_sonars(right, left);
-        let cycle = 1e-6 * scenario.robot.localizer.sonar.timing.cycle.to_micros() as f64;
+        let cycle = 1e-6 * scenario.robot.localizer.rangers.first.timing.cycle.to_micros() as f64;
         let mut pings = Pings::default();
         let result = Simulation::new(scenario).run(31, &mut pings).unwrap();
         assert!(!result.lost);
@@ -257,7 +257,7 @@ fn pings_of_two_sonars_never_overlap() {
 #[test]
 fn a_second_servo_turns_while_the_first_sonar_pings() {
     let mut alone = scenario(CLASSROOM);
-    alone.robot.localizer.sonar.timing.schedule = PingSchedule::AsFastAsPossible;
+    alone.robot.localizer.rangers.first.timing.schedule = PingSchedule::AsFastAsPossible;
     let one = summary(alone, 2);
     let two = summary(two_sonars([-100.0, 10.0], [-10.0, 100.0]), 2);
     let pings = |summary: &Summary| {

@@ -172,7 +172,7 @@ impl Check {
         let Some(shown) = &mut self.shown else { return Radians(0.0) };
         let turn = shown.checks / CHECKS_PER_BEARING;
         shown.checks = (shown.checks + 1) % (4 * CHECKS_PER_BEARING);
-        let (rightmost, leftmost) = config.localizer.sonar.servo;
+        let (rightmost, leftmost) = config.localizer.rangers.first.servo;
         match turn {
             1 => rightmost,
             3 => leftmost,

@@ -340,8 +340,8 @@ fn map() -> Vec<u8> {
 
 fn configuration() -> RobotConfig {
     let mut localizer = Config::for_track_width(Metres(0.16));
-    localizer.sonar.servo = (Radians::from_degrees(-90.0), Radians::from_degrees(90.0));
-    localizer.sonar.timing.servo = ServoTiming::SG90;
+    localizer.rangers.first.servo = (Radians::from_degrees(-90.0), Radians::from_degrees(90.0));
+    localizer.rangers.first.timing.servo = ServoTiming::SG90;
     RobotConfig::with_common_parts(localizer)
 }
 
@@ -413,7 +413,7 @@ fn one_program_follows_different_configurations() {
         assert!(samples.abs_diff(expected) <= 1, "{samples} samples in 5 s");
     }
     let mut srf = configuration();
-    srf.ranger.kind = RangerKind::Srf { address: 0x70 };
+    srf.rangers.first.kind = RangerKind::Srf { address: 0x70 };
     let mut robot = Robot::switched_on(&map(), &baked(&srf));
     robot.hello();
     assert_eq!(robot.order(&Command::SetPose(pose())), CommandResult::Done);
@@ -430,12 +430,12 @@ fn rangers_of_light_are_taken_and_reported_as_missing() {
         |config: &RobotConfig| baked::write(config, &mut [0; baked::LENGTH_MAX]).unwrap().to_vec();
     for kind in [RangerSettings::VL53L1X.kind, RangerSettings::VL53L0X.kind] {
         let mut config = configuration();
-        config.ranger.kind = kind;
-        config.localizer.sonar.ranging = Ranging::Light(LightBeam::VL53L1X);
-        let mut left = config.localizer.sonar;
+        config.rangers.first.kind = kind;
+        config.localizer.rangers.first.ranging = Ranging::Light(LightBeam::VL53L1X);
+        let mut left = config.localizer.rangers.first;
         left.servo = (Radians::from_degrees(90.0), Radians::from_degrees(90.0));
-        config.localizer.further_sonars.push(left).unwrap();
-        config.further_rangers.push(config.ranger).unwrap();
+        config.localizer.rangers.push(left).unwrap();
+        config.rangers.push(config.rangers.first).unwrap();
         let mut robot = Robot::switched_on(&map(), &baked(&config));
         robot.hello();
         assert_eq!(robot.order(&Command::ShowDevices), CommandResult::Done);
@@ -448,8 +448,8 @@ fn rangers_of_light_are_taken_and_reported_as_missing() {
         assert_eq!(robot.order(&Command::Start), CommandResult::Done);
         assert!(robot.loop_status().faults.ranger > 0);
 
-        config.localizer.further_sonars.push(left).unwrap();
-        config.further_rangers.push(config.ranger).unwrap();
+        config.localizer.rangers.push(left).unwrap();
+        config.rangers.push(config.rangers.first).unwrap();
         let mut robot = Robot::switched_on(&map(), &baked(&config));
         robot.hello();
         assert_eq!(robot.order(&Command::SetPose(pose())), CommandResult::Done);

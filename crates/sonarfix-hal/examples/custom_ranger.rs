@@ -91,12 +91,12 @@ impl SetDutyCycle for Channel {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut localizer = Config::for_track_width(Metres(0.16));
-    localizer.sonar.servo = (Radians(-1.4), Radians(1.4));
-    localizer.sonar.timing.servo = ServoTiming::SG90;
-    localizer.sonar.timing.schedule = PingSchedule::AsFastAsPossible;
-    localizer.sonar.timing.cycle = Duration::from_ticks(33_000);
+    localizer.rangers.first.servo = (Radians(-1.4), Radians(1.4));
+    localizer.rangers.first.timing.servo = ServoTiming::SG90;
+    localizer.rangers.first.timing.schedule = PingSchedule::AsFastAsPossible;
+    localizer.rangers.first.timing.cycle = Duration::from_ticks(33_000);
     let mut config = RobotConfig::with_common_parts(localizer);
-    config.ranger.kind = RangerKind::Custom;
+    config.rangers.first.kind = RangerKind::Custom;
     config.check()?;
 
     let mut devices = Devices {

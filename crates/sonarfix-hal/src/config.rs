@@ -3,7 +3,7 @@
 //! [`RobotConfig`] is what `sonarfix config bake` writes into flash (`sonarfix-link`'s `baked`), and
 //! what loop, drivers, planner, simulator and replay read. No fact is in it twice: the servo's limits
 //! and timing, the ping schedule and the ranger's cycle are those of
-//! [`Sonar`] inside [`RobotConfig::localizer`], which the planner uses as
+//! [`RangerParameters`] inside [`RobotConfig::localizer`], which the planner uses as
 //! well; the other fields are what only the loop and the drivers need.
 //!
 //! [`Unsupported`] is the reason for which a board cannot be the robot that a configuration describes.
@@ -18,7 +18,8 @@
 mod feature;
 
 use sonarfix::config::{
-    Config, ConfigError, Further, PingSchedule, PingTiming, Policy, RangerId, Ranging, Sonar,
+    Config, ConfigError, PingSchedule, PingTiming, Policy, RangerId, RangerParameters, Rangers,
+    Ranging,
 };
 use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
 use sonarfix::health::{DEGRADED_WITHOUT_ODOMETRY, Verdict};
@@ -51,14 +52,12 @@ pub struct RobotConfig {
     pub left_wheel: WheelConfig,
     /// Time from one reading of the encoders to the next.
     pub encoder_period: Duration,
-    /// The driver of the first ranger, [`Config::sonar`].
-    pub ranger: RangerConfig,
+    /// The drivers of [`Config::rangers`], in the same order.
+    pub rangers: Rangers<RangerConfig>,
     /// When the motors are enabled.
     pub motors: MotorPolicy,
     /// Whether the robot needs to know where it starts.
     pub start: StartPose,
-    /// The drivers of [`Config::further_sonars`], in the same order.
-    pub further_rangers: Further<RangerConfig>,
 }
 
 /// Whether a robot needs to know where it starts.
@@ -157,7 +156,7 @@ impl RangerConfig {
 
     /// The settings of the servo's driver for this sonar; `None` without a servo.
     #[must_use]
-    pub fn servo_settings(&self, sonar: &Sonar) -> Option<ServoSettings> {
+    pub fn servo_settings(&self, sonar: &RangerParameters) -> Option<ServoSettings> {
         sonar.fixed_bearing().is_none().then_some(ServoSettings {
             pulses: self.servo_pulses,
             limits: sonar.servo,
@@ -167,13 +166,13 @@ impl RangerConfig {
 
     /// The settings of the ranger's driver for this sonar.
     #[must_use]
-    pub fn settings(&self, sonar: &Sonar) -> RangerSettings {
+    pub fn settings(&self, sonar: &RangerParameters) -> RangerSettings {
         // `check` refuses a temperature out of range; without it the driver uses room temperature.
         let air = Air::at(self.temperature).unwrap_or(Air::ROOM);
         RangerSettings { kind: self.kind, air, cycle: sonar.timing.cycle }
     }
 
-    fn check(&self, sonar: &Sonar) -> Result<(), RobotConfigError> {
+    fn check(&self, sonar: &RangerParameters) -> Result<(), RobotConfigError> {
         if let Some(servo) = self.servo_settings(sonar) {
             let [one, other] = servo.pulses;
             let calibration = Calibration::new(one, other);
@@ -303,8 +302,8 @@ impl RobotConfig {
     /// use sonarfix::{config::{Config, ServoTiming}, geometry::units::{Metres, Radians}};
     /// use sonarfix_hal::config::RobotConfig;
     /// let mut config = RobotConfig::with_common_parts(Config::for_track_width(Metres(0.16)));
-    /// config.localizer.sonar.timing.servo = ServoTiming::SG90;
-    /// config.localizer.sonar.servo = (Radians(-1.5), Radians(1.5));
+    /// config.localizer.rangers.first.timing.servo = ServoTiming::SG90;
+    /// config.localizer.rangers.first.servo = (Radians(-1.5), Radians(1.5));
     /// assert!(config.check().is_ok());
     /// config.left_wheel.travel_per_edge = Metres(0.0);
     /// assert_eq!(config.check().unwrap_err().field, "left_wheel.travel_per_edge");
@@ -322,14 +321,13 @@ impl RobotConfig {
             right_wheel: wheel,
             left_wheel: wheel,
             encoder_period: Duration::from_ticks(100_000),
-            ranger: RangerConfig {
+            rangers: Rangers::one(RangerConfig {
                 kind: RangerKind::Pulse(PulseTiming::HC_SR04),
                 temperature: Celsius(20.0),
                 servo_pulses: [pulse(1_000, -45.0), pulse(2_000, 45.0)],
-            },
+            }),
             motors: MotorPolicy::DEFAULT,
             start: StartPose::Known,
-            further_rangers: Further::NONE,
         }
     }
 
@@ -345,16 +343,13 @@ impl RobotConfig {
         let sampled =
             !self.encoder_period.is_zero() && self.encoder_period <= LONGEST_ENCODER_PERIOD;
         require("encoder_period", sampled, "longer than zero, and at most 1 s")?;
-        self.ranger.check(&self.localizer.sonar)?;
-        let (sonars, rangers) =
-            (self.localizer.further_sonars.iter().count(), self.further_rangers.iter().count());
-        let drivers = "one for each of localizer.further_sonars";
-        require("further_rangers", sonars == rangers, drivers)?;
-        for (sonar, ranger) in self.localizer.further_sonars.iter().zip(self.further_rangers.iter())
-        {
-            ranger.check(sonar)?;
-            let is_shared = ranger.temperature == self.ranger.temperature;
-            require("further_rangers.temperature", is_shared, "that of the first ranger")?;
+        let (models, drivers) = (&self.localizer.rangers, &self.rangers);
+        let is_each = models.iter().count() == drivers.iter().count();
+        require("rangers", is_each, "one for each of localizer.rangers")?;
+        for ((_, model), (_, driver)) in models.iter().zip(drivers.iter()) {
+            driver.check(model)?;
+            let is_shared = driver.temperature == drivers.first.temperature;
+            require("rangers.temperature", is_shared, "that of the first ranger")?;
         }
         let timeout = self.motors.link_timeout;
         let ends = !timeout.is_zero() && timeout <= LONGEST_TIME;
@@ -373,24 +368,20 @@ impl RobotConfig {
 
     /// A ranger and its drivers; `None` if the robot has no such one.
     #[must_use]
-    pub fn ranger_of(&self, ranger: RangerId) -> Option<(&Sonar, &RangerConfig)> {
-        let driver = match ranger.index().checked_sub(1) {
-            None => Some(&self.ranger),
-            Some(further) => self.further_rangers.get(further),
-        };
-        self.localizer.sonar_of(ranger).zip(driver)
+    pub fn ranger_of(&self, ranger: RangerId) -> Option<(&RangerParameters, &RangerConfig)> {
+        self.localizer.rangers.get(ranger).zip(self.rangers.get(ranger))
     }
 
     /// The settings of the first ranger's servo; `None` without a servo.
     #[must_use]
     pub fn servo_settings(&self) -> Option<ServoSettings> {
-        self.ranger.servo_settings(&self.localizer.sonar)
+        self.rangers.first.servo_settings(&self.localizer.rangers.first)
     }
 
     /// The settings of the first ranger's driver.
     #[must_use]
     pub fn ranger_settings(&self) -> RangerSettings {
-        self.ranger.settings(&self.localizer.sonar)
+        self.rangers.first.settings(&self.localizer.rangers.first)
     }
 
     /// Whether this program links all parts that the robot uses.
@@ -407,9 +398,11 @@ impl RobotConfig {
     fn uses(&self, feature: Feature) -> bool {
         let localizer = &self.localizer;
         match feature {
-            Feature::Light => localizer.sonars().any(|(_, sonar)| sonar.ranging != Ranging::Sound),
+            Feature::Light => {
+                localizer.rangers.iter().any(|(_, sonar)| sonar.ranging != Ranging::Sound)
+            }
             Feature::Gyro => localizer.gyro.is_some(),
-            Feature::Rangers => localizer.has_several_sonars(),
+            Feature::Rangers => localizer.rangers.are_several(),
             Feature::Absolute => false,
             Feature::Informative => localizer.policy == Policy::Informative,
             Feature::Search => self.start.is_unknown(),

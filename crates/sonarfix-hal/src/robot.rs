@@ -19,7 +19,7 @@
 //!
 //! # Several rangers
 //! There is one ping at a time. A ranger pings when its servo has settled and the echoes of all pings that it
-//! [hears](sonarfix::config::Sonar::hears) have decayed, those of its own included. While one pings, the servos of the others turn
+//! [hears](sonarfix::config::RangerParameters::hears) have decayed, those of its own included. While one pings, the servos of the others turn
 //! to their walls; while the best one turns, another one pings if it ends before.
 //!
 //! # Time
@@ -118,7 +118,7 @@ use yaw::YawLedger;
 /// };
 /// let at = |millis: u64| Instant::from_ticks(millis * 1_000);
 /// let mut config = Config::for_track_width(Metres(0.16));
-/// config.sonar.timing.schedule = PingSchedule::AsFastAsPossible;
+/// config.rangers.first.timing.schedule = PingSchedule::AsFastAsPossible;
 /// let localizer = Localizer::new(config, Map::new(&walls), start, at(0))?;
 /// let wheel = WheelGeometry::new(Metres(0.065), 1_496.6)?;
 /// let mut robot = Robot::new(localizer, Wheels::alike(wheel), Settings::default())?;
@@ -196,7 +196,7 @@ impl<'m> Robot<'m> {
         settings.check()?;
         let start = localizer.time();
         let yaw = yaw_of(&localizer);
-        let (pings, until) = match localizer.config().sonar.timing.schedule {
+        let (pings, until) = match localizer.config().rangers.first.timing.schedule {
             PingSchedule::Every(period) => (Schedule::new(start, period), after(start, period)),
             PingSchedule::AsFastAsPossible => {
                 (Schedule::new(start, settings.encoder_period), start)
@@ -232,7 +232,7 @@ impl<'m> Robot<'m> {
     ) -> Result<(), SettingsError> {
         settings.check()?;
         let now = localizer.time();
-        let pings = match localizer.config().sonar.timing.schedule {
+        let pings = match localizer.config().rangers.first.timing.schedule {
             PingSchedule::Every(period) => self.pings.continued(now, period),
             PingSchedule::AsFastAsPossible => self.pings,
         };
@@ -280,7 +280,7 @@ impl<'m> Robot<'m> {
     pub fn set_clock(&mut self, now: Instant) {
         self.tracker.localizer_mut().set_clock(now);
         self.ticks = Schedule::new(now, self.settings.encoder_period);
-        self.pings = match self.localizer().config().sonar.timing.schedule {
+        self.pings = match self.localizer().config().rangers.first.timing.schedule {
             PingSchedule::Every(period) => Schedule::new(now, period),
             PingSchedule::AsFastAsPossible => self.ticks,
         };

@@ -8,7 +8,7 @@
 
 use serde::Deserialize;
 use sonarfix::config::{
-    CalibrationPrior, EchoParameters, Further, GatingParameters, Policy, Sonar, Weights,
+    CalibrationPrior, EchoParameters, GatingParameters, Policy, RangerParameters, Rangers, Weights,
 };
 use sonarfix::filter::motion::Drive;
 use sonarfix::geometry::units::MetresPerSecond;
@@ -101,8 +101,8 @@ fn fill<'b>(config: &RobotConfig, buffer: &'b mut [u8; LENGTH_MAX]) -> Option<&'
 /// use sonarfix_hal::config::RobotConfig;
 /// use sonarfix_link::baked::{self, BakedError};
 /// let mut localizer = Config::for_track_width(Metres(0.16));
-/// localizer.sonar.servo = (Radians(-1.5), Radians(1.5));
-/// localizer.sonar.timing.servo = ServoTiming::SG90;
+/// localizer.rangers.first.servo = (Radians(-1.5), Radians(1.5));
+/// localizer.rangers.first.timing.servo = ServoTiming::SG90;
 /// let config = RobotConfig::with_common_parts(localizer);
 /// let mut buffer = [0xff; baked::LENGTH_MAX];
 /// let bytes = baked::write(&config, &mut buffer)?;
@@ -148,7 +148,7 @@ pub fn read(bytes: &[u8]) -> Result<RobotConfig, BakedError> {
     config.check().map(|()| config).map_err(BakedError::Rule)
 }
 
-/// The fields of the localizer's configuration between the first ranger and the gyro.
+/// The fields of the localizer's configuration between the rangers and the gyro.
 type UpToGyro = (CalibrationPrior, GatingParameters, EchoParameters, Policy, Weights);
 
 /// The part that a configuration in postcard asks for and that this program was built without; `None` if there is no such
@@ -162,18 +162,15 @@ pub(crate) fn not_linked(postcard: &[u8]) -> Option<NotLinked> {
     }
     let decoder = &mut postcard::Deserializer::from_bytes(postcard);
     <(Drive, MetresPerSecond)>::deserialize(&mut *decoder).ok()?;
-    if Sonar::deserialize(&mut *decoder).is_err() {
-        return Some(NotLinked(Feature::Light));
+    if Rangers::<RangerParameters>::deserialize(&mut *decoder).is_err() {
+        let first = <(Drive, MetresPerSecond, RangerParameters)>::deserialize(
+            &mut postcard::Deserializer::from_bytes(postcard),
+        );
+        let one_is_read = first.is_ok() && !Feature::Rangers.is_linked();
+        return Some(NotLinked(if one_is_read { Feature::Rangers } else { Feature::Light }));
     }
     UpToGyro::deserialize(&mut *decoder).ok()?;
-    if Option::<GyroParameters>::deserialize(&mut *decoder).is_err() {
-        return Some(NotLinked(Feature::Gyro));
-    }
-    if Further::<Sonar>::deserialize(&mut *decoder).is_err() {
-        let rangers = Feature::Rangers.is_linked();
-        return Some(NotLinked(if rangers { Feature::Light } else { Feature::Rangers }));
-    }
-    None
+    Option::<GyroParameters>::deserialize(&mut *decoder).err().map(|_| NotLinked(Feature::Gyro))
 }
 
 /// The checksum by which a robot identifies its configuration

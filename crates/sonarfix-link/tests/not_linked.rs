@@ -13,8 +13,8 @@ use sonarfix_link::{Command, Receiver, Sender, frame};
 
 fn example() -> RobotConfig {
     let mut localizer = Config::for_track_width(Metres(0.16));
-    localizer.sonar.servo = (Radians(-1.5), Radians(1.5));
-    localizer.sonar.timing.servo = ServoTiming::SG90;
+    localizer.rangers.first.servo = (Radians(-1.5), Radians(1.5));
+    localizer.rangers.first.timing.servo = ServoTiming::SG90;
     RobotConfig::with_common_parts(localizer)
 }
 
@@ -38,14 +38,16 @@ fn replaced(before: usize, bytes: &[u8]) -> Vec<u8> {
     [&config[..before], bytes, &config[before + 1..]].concat()
 }
 
-/// Bytes of the example before the kind of its ranger, the gyro and the further rangers.
+/// Bytes of the example before the kind of its ranger, the gyro and the rangers after the first.
 fn before() -> [usize; 3] {
-    let Config { drive, max_wheel_speed, sonar, prior, gating, echo, policy, weights, .. } =
+    let Config { drive, max_wheel_speed, rangers, prior, gating, echo, policy, weights, .. } =
         example().localizer;
+    let sonar = rangers.first;
     let parts = (sonar.mount, sonar.servo, sonar.cone, sonar.min_range, sonar.max_range);
     let ranging = postcard(&(drive, max_wheel_speed, parts, sonar.noise, sonar.timing));
-    let gyro = postcard(&(drive, max_wheel_speed, sonar, prior, gating, echo, policy, weights));
-    [ranging.len(), gyro.len(), gyro.len() + 1]
+    let further = postcard(&(drive, max_wheel_speed, sonar));
+    let gyro = postcard(&(drive, max_wheel_speed, rangers, prior, gating, echo, policy, weights));
+    [ranging.len(), gyro.len(), further.len()]
 }
 
 /// Configurations that ask for a part each.
@@ -53,7 +55,7 @@ fn asking() -> [(Feature, Vec<u8>); 3] {
     let [ranging, gyro, rangers] = before();
     let light = [&[1], &postcard(&[0.1_f32; 2])[..]].concat();
     let measured = [&[1], &postcard(&([0.1_f32; 5], 10_000_u64, false))[..]].concat();
-    let further = [&[1], &postcard(&example().localizer.sonar)[..]].concat();
+    let further = [&[1], &postcard(&example().localizer.rangers.first)[..]].concat();
     [
         (Feature::Light, replaced(ranging, &light)),
         (Feature::Gyro, replaced(gyro, &measured)),

@@ -12,7 +12,7 @@
 
 use std::fmt;
 
-use sonarfix::config::Sonar;
+use sonarfix::config::RangerParameters;
 
 use crate::bake::{BakeError, bake};
 use crate::floor::Floor;
@@ -138,7 +138,7 @@ impl fmt::Display for Flaw {
 ///
 /// # Errors
 /// [`BakeError`], if the walls cannot be indexed.
-pub fn flaws(floor: &Floor, sonar: &Sonar) -> Result<Vec<Finding>, BakeError> {
+pub fn flaws(floor: &Floor, sonar: &RangerParameters) -> Result<Vec<Finding>, BakeError> {
     let image = bake(&floor.walls())?;
     let walls = Neighbours::new(floor, &image).map_err(BakeError::Refused)?;
     let min_range = f64::from(sonar.min_range.0);

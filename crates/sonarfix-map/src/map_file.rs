@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use sonarfix::config::Sonar;
+use sonarfix::config::RangerParameters;
 
 use crate::document::{self, Document};
 use crate::error::FileError;
@@ -66,8 +66,8 @@ impl MapFile {
 
     /// The sonar of the robot, if the file is a scenario.
     #[must_use]
-    pub fn sonar(&self) -> Option<Sonar> {
-        self.scenario.as_ref().map(|scenario| scenario.robot.localizer.sonar)
+    pub fn sonar(&self) -> Option<RangerParameters> {
+        self.scenario.as_ref().map(|scenario| scenario.robot.localizer.rangers.first)
     }
 
     /// The name of the file in error messages.

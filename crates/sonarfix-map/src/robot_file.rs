@@ -11,7 +11,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use sonarfix::aim::Policy;
-use sonarfix::config::Further;
+use sonarfix::config::Rangers;
 use sonarfix::geometry::pose::Point;
 use sonarfix::sensor::gyro::GyroParameters;
 use sonarfix_hal::config::{RobotConfig, RobotConfigError, StartPose};
@@ -173,11 +173,11 @@ fn from_table(robot: &Table<'_>) -> RobotConfig {
 
 /// Checks the rules about several values, for each sonar as if it were the only one.
 fn check_rules(robot: &Table<'_>, config: &RobotConfig) {
-    for ((id, _), node) in config.localizer.sonars().zip(sonar::nodes(robot.require("sonar"))) {
+    for ((id, _), node) in config.localizer.rangers.iter().zip(sonar::nodes(robot.require("sonar")))
+    {
         let Some((sonar, driver)) = config.ranger_of(id) else { continue };
         let mut alone = *config;
-        (alone.localizer.sonar, alone.ranger) = (*sonar, *driver);
-        (alone.localizer.further_sonars, alone.further_rangers) = (Further::NONE, Further::NONE);
+        (alone.localizer.rangers, alone.rangers) = (Rangers::one(*sonar), Rangers::one(*driver));
         if let Err(error) = alone.check() {
             let (key, message) = (key_of(error), format!("must be {}", error.rule));
             return match key.strip_prefix("sonar.") {

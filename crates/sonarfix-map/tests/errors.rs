@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use proptest::prelude::*;
-use sonarfix::config::{LightBeam, PingSchedule, Ranging, ServoTiming};
+use sonarfix::config::{LightBeam, PingSchedule, RangerId, Ranging, ServoTiming};
 use sonarfix::geometry::pose::Point;
 use sonarfix::geometry::units::{Duration, Metres, Radians};
 use sonarfix_hal::config::{MotorPolicy, RangerConfig, RobotConfig, StartPose, WheelConfig};
@@ -770,9 +770,9 @@ fn a_fixed_sonar_has_a_bearing() {
         without(&servo).replace(mount, &format!("{mount}\nbearing = \"{bearing}\""))
     };
     let robot = parse(&fixed("90 deg")).unwrap().robot;
-    let bearing = robot.localizer.sonar.fixed_bearing().unwrap();
+    let bearing = robot.localizer.rangers.first.fixed_bearing().unwrap();
     assert!((bearing.0 - core::f32::consts::FRAC_PI_2).abs() < 1e-6);
-    assert_eq!(robot.localizer.sonar.timing.servo, ServoTiming::INSTANT);
+    assert_eq!(robot.localizer.rangers.first.timing.servo, ServoTiming::INSTANT);
     assert_eq!(robot.servo_settings(), None);
     let error = parse(&fixed("200 deg")).unwrap_err();
     assert_eq!(error.first().key(), "robot.sonar.bearing");
@@ -801,13 +801,18 @@ fn several_sonars_are_tables_of_their_own() {
     let second = second.join("\n").replace("\"60 mm\", \"0 mm\"", "\"60 mm\", \"50 mm\"");
     let with = |further: &[&str]| parse(&format!("{before}{first}{}\n{after}", further.join("\n")));
     let robot = with(&[&second]).unwrap().robot;
-    let other = robot.localizer.further_sonars.get(0).unwrap();
+    let other = robot.localizer.rangers.get(RangerId(1)).unwrap();
     assert_eq!(other.mount, Point::new(0.06, 0.05));
-    assert_eq!(other.timing, robot.localizer.sonar.timing);
-    assert_eq!(robot.further_rangers.get(0), Some(&robot.ranger));
-    assert_eq!(robot.localizer.sonars().count(), 2);
+    assert_eq!(other.timing, robot.localizer.rangers.first.timing);
+    assert_eq!(robot.rangers.get(RangerId(1)), Some(&robot.rangers.first));
+    assert_eq!(robot.localizer.rangers.iter().count(), 2);
     assert_eq!(
-        robot_file::parse(&robot_text(&robot), "written.toml").unwrap().localizer.sonars().count(),
+        robot_file::parse(&robot_text(&robot), "written.toml")
+            .unwrap()
+            .localizer
+            .rangers
+            .iter()
+            .count(),
         2
     );
     let error = with(&[&second, &second, &second]).unwrap_err();
@@ -826,20 +831,20 @@ fn a_ranger_is_a_name_or_a_table_of_differences() {
         parse(&text).unwrap().robot
     };
     let named = robot("ranger = \"lv_maxsonar\" #");
-    assert_eq!(named.ranger.kind, RangerKind::Pulse(PulseTiming::LV_MAXSONAR));
-    assert_eq!(named.localizer.sonar.timing.cycle, Duration::millis(50));
+    assert_eq!(named.rangers.first.kind, RangerKind::Pulse(PulseTiming::LV_MAXSONAR));
+    assert_eq!(named.localizer.rangers.first.timing.cycle, Duration::millis(50));
     let blanking = Duration::micros(250);
     let other = robot(
         "temperature = \"12.5 degC\"\nranger = { kind = \"hc_sr04\", blanking = \"250 us\" } #",
     );
     let timing = PulseTiming { blanking, ..PulseTiming::HC_SR04 };
-    assert_eq!(other.ranger.kind, RangerKind::Pulse(timing));
-    assert!((other.ranger.temperature.0 - 12.5).abs() < 1e-6);
-    assert_eq!(other.localizer.sonar.timing.cycle, Duration::millis(60));
+    assert_eq!(other.rangers.first.kind, RangerKind::Pulse(timing));
+    assert!((other.rangers.first.temperature.0 - 12.5).abs() < 1e-6);
+    assert_eq!(other.localizer.rangers.first.timing.cycle, Duration::millis(60));
     let srf = robot("ranger = { kind = \"srf02\", address = 0x72 } #");
-    assert_eq!(srf.ranger.kind, RangerKind::Srf { address: 0x72 });
+    assert_eq!(srf.rangers.first.kind, RangerKind::Srf { address: 0x72 });
     let custom = robot("cycle = \"33 ms\"\nranger = \"custom\" #");
-    assert_eq!(custom.ranger.kind, RangerKind::Custom);
+    assert_eq!(custom.rangers.first.kind, RangerKind::Custom);
 }
 
 /// A VL53L1X has a beam, whose settings a file may change; a custom ranger may have one, a sonar none.
@@ -851,18 +856,18 @@ fn a_time_of_flight_ranger_has_a_beam() {
         let text = lines.collect::<Vec<_>>().join("\n");
         parse(&text.replace("cone = \"12 deg\"", &format!("cone = \"30 deg\"\n{ranger}")))
     };
-    let sonar = |ranger: &str| with(ranger).unwrap().robot.localizer.sonar;
+    let sonar = |ranger: &str| with(ranger).unwrap().robot.localizer.rangers.first;
     assert_eq!(sonar("ranger = \"hc_sr04\"").ranging, Ranging::Sound);
     assert_eq!(sonar("ranger = \"vl53l1x\"").ranging, Ranging::Light(LightBeam::VL53L1X));
     let wide = sonar("ranger = \"vl53l1x\"\nbeam = { spot = \"10 deg\" }").ranging;
     let spot = Radians::from_degrees(10.0);
     assert_eq!(wide, Ranging::Light(LightBeam { spot, ..LightBeam::VL53L1X }));
     let robot = with("ranger = { kind = \"vl53l1x\", address = 0x30 }").unwrap().robot;
-    assert_eq!(robot.ranger.kind, RangerKind::Vl53l1x { address: 0x30 });
+    assert_eq!(robot.rangers.first.kind, RangerKind::Vl53l1x { address: 0x30 });
     assert_eq!(sonar("ranger = \"vl53l0x\"").ranging, Ranging::Light(devices::VL53L0X_BEAM));
     let robot = with("ranger = { kind = \"vl53l0x\", address = 0x31 }").unwrap().robot;
-    assert_eq!(robot.ranger.kind, RangerKind::Vl53l0x { address: 0x31 });
-    assert_eq!(robot.localizer.sonar.timing.cycle, Duration::millis(60));
+    assert_eq!(robot.rangers.first.kind, RangerKind::Vl53l0x { address: 0x31 });
+    assert_eq!(robot.localizer.rangers.first.timing.cycle, Duration::millis(60));
     let custom = "ranger = \"custom\"\ncycle = \"30 ms\"\n";
     assert_eq!(sonar(custom).ranging, Ranging::Sound);
     let beam = "beam = { spot = \"2 deg\", pointing = \"1 deg\" }";
@@ -884,8 +889,8 @@ fn a_robot_that_is_written_is_read_back() {
     let classroom = Scenario::parse(CLASSROOM, "classroom.toml", Path::new("")).unwrap().robot;
     let mut odd = classroom;
     odd.left_wheel = odd.left_wheel.mirrored();
-    odd.ranger.kind = RangerKind::Srf { address: 0x31 };
-    odd.localizer.sonar.timing.schedule = PingSchedule::AsFastAsPossible;
+    odd.rangers.first.kind = RangerKind::Srf { address: 0x31 };
+    odd.localizer.rangers.first.timing.schedule = PingSchedule::AsFastAsPossible;
     odd.localizer.echo = devices::NXT_ECHO;
     odd.localizer.echo.short = 0.04;
     odd.motors = MotorPolicy {
@@ -896,22 +901,22 @@ fn a_robot_that_is_written_is_read_back() {
     };
     let region = Region { from: Point::new(0.5, -1.0), to: Point::new(2.0, 3.25) };
     let mut lit = odd;
-    lit.ranger.kind = RangerKind::Vl53l1x { address: 0x29 };
-    lit.localizer.sonar.ranging = Ranging::Light(LightBeam::VL53L1X);
+    lit.rangers.first.kind = RangerKind::Vl53l1x { address: 0x29 };
+    lit.localizer.rangers.first.ranging = Ranging::Light(LightBeam::VL53L1X);
     let mut searching = odd;
     searching.motors.lost = true;
     searching.start = StartPose::Unknown { region: Some(region) };
     let mut fixed = classroom;
-    fixed.localizer.sonar.servo = (Radians(-1.25), Radians(-1.25));
-    fixed.localizer.sonar.timing.servo = ServoTiming::INSTANT;
-    fixed.ranger.servo_pulses = RangerConfig::NO_PULSES;
+    fixed.localizer.rangers.first.servo = (Radians(-1.25), Radians(-1.25));
+    fixed.localizer.rangers.first.timing.servo = ServoTiming::INSTANT;
+    fixed.rangers.first.servo_pulses = RangerConfig::NO_PULSES;
     for robot in [classroom, odd, lit, searching, fixed, parse(PAPER).unwrap().robot] {
         let text = robot_text(&robot);
         let mut read = robot_file::parse(&text, "written.toml").unwrap();
         let near = |a: Radians, b: Radians| (a - b).abs() < Radians(1e-6);
         let angles = |robot: &RobotConfig| {
-            let sonar = &robot.localizer.sonar;
-            let [one, other] = robot.ranger.servo_pulses;
+            let sonar = &robot.localizer.rangers.first;
+            let [one, other] = robot.rangers.first.servo_pulses;
             let spot = match sonar.ranging {
                 Ranging::Sound => Radians(0.0),
                 Ranging::Light(beam) => beam.spot + beam.pointing,
@@ -920,10 +925,10 @@ fn a_robot_that_is_written_is_read_back() {
         };
         let pairs = angles(&read).into_iter().zip(angles(&robot));
         assert!(pairs.into_iter().all(|(a, b)| near(a, b)), "{text}");
-        read.localizer.sonar.servo = robot.localizer.sonar.servo;
-        read.localizer.sonar.cone = robot.localizer.sonar.cone;
-        read.localizer.sonar.ranging = robot.localizer.sonar.ranging;
-        read.ranger.servo_pulses = robot.ranger.servo_pulses;
+        read.localizer.rangers.first.servo = robot.localizer.rangers.first.servo;
+        read.localizer.rangers.first.cone = robot.localizer.rangers.first.cone;
+        read.localizer.rangers.first.ranging = robot.localizer.rangers.first.ranging;
+        read.rangers.first.servo_pulses = robot.rangers.first.servo_pulses;
         assert_eq!(read, robot, "{text}");
     }
 }
@@ -1031,12 +1036,16 @@ fn a_configuration_from_elsewhere_is_within_the_limits_of_its_keys() {
         ("drive.wheel_noise", |c| c.localizer.drive.wheel_noise.0.0 = f32::NAN),
         ("drive.encoder_period", |c| c.encoder_period = Duration::from_ticks(u64::MAX)),
         ("drive.left_wheel.travel_per_edge", |c| c.left_wheel.travel_per_edge = Metres(2.0)),
-        ("sonar.mount[1]", |c| c.localizer.sonar.mount.y = Metres(-11.0)),
-        ("sonar.cycle", |c| c.localizer.sonar.timing.cycle = Duration::secs(61)),
-        ("sonar.servo_timing.frame", |c| c.localizer.sonar.timing.servo.frame = Duration::secs(11)),
-        ("sonar.servo_pulses[0].width", |c| c.ranger.servo_pulses[0].width = Duration::secs(1)),
+        ("sonar.mount[1]", |c| c.localizer.rangers.first.mount.y = Metres(-11.0)),
+        ("sonar.cycle", |c| c.localizer.rangers.first.timing.cycle = Duration::secs(61)),
+        ("sonar.servo_timing.frame", |c| {
+            c.localizer.rangers.first.timing.servo.frame = Duration::secs(11);
+        }),
+        ("sonar.servo_pulses[0].width", |c| {
+            c.rangers.first.servo_pulses[0].width = Duration::secs(1);
+        }),
         ("sonar.fix_period", |c| {
-            c.localizer.sonar.timing.schedule = PingSchedule::Every(Duration::secs(3_601));
+            c.localizer.rangers.first.timing.schedule = PingSchedule::Every(Duration::secs(3_601));
         }),
         ("gating.confidence", |c| c.localizer.gating.confidence = f32::INFINITY),
         ("echo.free_path", |c| c.localizer.echo.free_path = Metres(2e4)),

@@ -10,7 +10,7 @@ use std::fs;
 use std::path::Path;
 
 use proptest::prelude::*;
-use sonarfix::config::{Config, Sonar};
+use sonarfix::config::{Config, RangerParameters};
 use sonarfix::geometry::units::Metres;
 use sonarfix_map::{
     Finding, Flaw, Floor, Limits, MapFile, NamedWall, PAPER, Severity, bake, flaws, simplify,
@@ -24,8 +24,8 @@ fn floor(walls: &[[f64; 4]]) -> Floor {
 }
 
 /// A cone of 15° and 5 cm to the nearest range: a gap of 2·0.05·tan 15° = 26.8 mm fills it.
-fn sonar() -> Sonar {
-    Config::for_track_width(Metres(0.16)).sonar
+fn sonar() -> RangerParameters {
+    Config::for_track_width(Metres(0.16)).rangers.first
 }
 
 fn findings(walls: &[[f64; 4]]) -> Vec<Finding> {

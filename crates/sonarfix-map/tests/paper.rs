@@ -94,13 +94,13 @@ fn the_robot_is_that_of_the_paper() {
     config.drive.scale_walk = PerRootMetre(5e-6);
     config.drive.track_width_walk = PerRootMetre(Metres(5e-6));
     config.max_wheel_speed = MetresPerSecond(2.0);
-    config.sonar.mount = Point::new(0.0, 0.0);
-    config.sonar.servo = (-half_turn, half_turn);
-    config.sonar.cone = Radians(std::f32::consts::PI / 12.0);
-    config.sonar.min_range = Metres(0.05);
-    config.sonar.max_range = Metres(10.0);
-    config.sonar.noise = RangeNoise { floor: Metres(0.0024), per_metre: 0.0 };
-    config.sonar.timing = PingTiming {
+    config.rangers.first.mount = Point::new(0.0, 0.0);
+    config.rangers.first.servo = (-half_turn, half_turn);
+    config.rangers.first.cone = Radians(std::f32::consts::PI / 12.0);
+    config.rangers.first.min_range = Metres(0.05);
+    config.rangers.first.max_range = Metres(10.0);
+    config.rangers.first.noise = RangeNoise { floor: Metres(0.0024), per_metre: 0.0 };
+    config.rangers.first.timing = PingTiming {
         schedule: PingSchedule::Every(Duration::secs(1)),
         servo: INSTANT_SERVO,
         cycle: Duration::millis(100),

@@ -37,7 +37,7 @@ pub fn devices<'w>(
     let Wires { right, left, rangers: [first, further @ ..], gyro } = wires;
     let frame_of = |ranger: usize| {
         let ranger = u8::try_from(ranger).map_or(RangerId::FIRST, RangerId);
-        let timing = config.localizer.sonar_of(ranger).map(|sonar| sonar.timing.servo);
+        let timing = config.localizer.rangers.get(ranger).map(|sonar| sonar.timing.servo);
         PwmFrame::of(timing.unwrap_or(ServoTiming::INSTANT).frame)
     };
     let ranger = |wires: &'w RangerWires| {

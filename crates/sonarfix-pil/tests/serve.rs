@@ -76,8 +76,8 @@ fn begin(kind: SessionKind) -> Begin {
 
 fn config() -> RobotConfig {
     let mut localizer = Config::for_track_width(Metres(0.16));
-    localizer.sonar.servo = (Radians::from_degrees(-90.0), Radians::from_degrees(90.0));
-    localizer.sonar.timing.servo = ServoTiming::SG90;
+    localizer.rangers.first.servo = (Radians::from_degrees(-90.0), Radians::from_degrees(90.0));
+    localizer.rangers.first.timing.servo = ServoTiming::SG90;
     let config = RobotConfig::with_common_parts(localizer);
     RobotConfig { left_wheel: config.left_wheel.mirrored(), ..config }
 }
@@ -161,7 +161,7 @@ fn a_loop_drives_its_devices() {
     let ask = |polls: &[Sensors]| {
         let mut begin = begin(SessionKind::Loop);
         // Only the wall ahead is in reach of the servo.
-        begin.config.localizer.sonar.servo =
+        begin.config.localizer.rangers.first.servo =
             (Radians::from_degrees(-45.0), Radians::from_degrees(45.0));
         let begin = Request::Begin(begin, &map);
         let polls = polls.iter().copied().map(Request::Poll);
@@ -203,7 +203,7 @@ fn an_unsupported_session_is_refused_and_the_next_begins() {
     let mut damaged = map.clone();
     damaged[40] ^= 1;
     let mut other = begin(SessionKind::Loop);
-    other.config.ranger.kind = RangerKind::Custom;
+    other.config.rangers.first.kind = RangerKind::Custom;
     let answers = asked(&[
         Request::Aim,
         Request::Begin(begin(SessionKind::Localizer), &damaged),

@@ -82,7 +82,7 @@ const DECORRELATED: f32 = 2.0;
 /// #     position_deviation: Metres(0.05),
 /// #     heading_deviation: Radians(0.02),
 /// # };
-/// let mut search: Search = Search::new(&config.sonar, map, SearchParameters::default());
+/// let mut search: Search = Search::new(&config.rangers.first, map, SearchParameters::default());
 /// let localizer = Localizer::new(config, map, start, Instant::from_ticks(0))?;
 /// let mut navigator = Navigator::new(localizer);
 /// navigator.search(&mut search);
@@ -344,7 +344,7 @@ impl<'m> Navigator<'m> {
         range: Option<Metres>,
         search: &mut Search<'m>,
     ) -> Result<bool, InvalidInput> {
-        let shortest = self.localizer.config().sonar.min_range;
+        let shortest = self.localizer.config().rangers.first.min_range;
         // The search refuses what is not finite.
         search.ping(bearing, range.filter(|range| *range >= shortest || !range.is_finite()))
     }

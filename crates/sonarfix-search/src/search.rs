@@ -25,7 +25,7 @@ mod state;
 mod trial;
 mod window;
 
-use sonarfix::config::{Config, Ranging, Sonar};
+use sonarfix::config::{Config, RangerParameters, Ranging};
 use sonarfix::geometry::pose::{Point, Pose};
 use sonarfix::geometry::trig::atan2;
 use sonarfix::geometry::units::{Metres, Radians};
@@ -127,7 +127,7 @@ fn is_near(number: f32) -> bool {
 /// let walls = [Wall::new(Point::new(0.0, 0.0), Point::new(4.0, 0.0))?];
 /// let config = Config::for_track_width(Metres(0.16));
 /// let mut search: Search =
-///     Search::new(&config.sonar, Map::new(&walls), SearchParameters::default());
+///     Search::new(&config.rangers.first, Map::new(&walls), SearchParameters::default());
 /// search.odometry(Metres(0.01), Radians(0.0))?;
 /// search.ping(search.aim(), Some(Metres(1.0)))?;
 /// search.poll(100);
@@ -158,7 +158,7 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Default for Search<'_, PINGS, 
     #[expect(clippy::inline_always, reason = "a copy on a microcontroller's stack is large")]
     #[inline(always)]
     fn default() -> Self {
-        let sonar = Config::for_track_width(Metres(0.0)).sonar;
+        let sonar = Config::for_track_width(Metres(0.0)).rangers.first;
         Self::new(&sonar, Map::new(&[]), SearchParameters::default())
     }
 }
@@ -175,7 +175,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
     #[expect(clippy::inline_always, reason = "a copy on a microcontroller's stack is large")]
     #[inline(always)]
     #[must_use]
-    pub fn new(sonar: &Sonar, map: Map<'m>, parameters: SearchParameters) -> Self {
+    pub fn new(sonar: &RangerParameters, map: Map<'m>, parameters: SearchParameters) -> Self {
         let (right, left) = (sonar.servo.0.0, sonar.servo.1.0);
         Self {
             parameters,
@@ -198,7 +198,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
     /// Begins again for a robot, without a ping, a hypothesis or an answer. It changes the state in
     /// place, because a copy of it on a microcontroller's stack is large.
     pub fn restart(&mut self, config: &Config, parameters: SearchParameters, map: Map<'m>) {
-        let sonar = &config.sonar;
+        let sonar = &config.rangers.first;
         self.parameters = parameters;
         let (right, left) = (sonar.servo.0.0, sonar.servo.1.0);
         self.echoes = EchoModel::new(map, sonar, &self.parameters.echo);

@@ -48,7 +48,7 @@ const REFERENCE: [f64; 2] = [0.005, 0.01];
 /// The robot of a file as the estimator takes it.
 #[must_use]
 pub fn nominal(robot: &RobotConfig, has_servo: bool) -> Nominal {
-    let (drive, sonar) = (&robot.localizer.drive, &robot.localizer.sonar);
+    let (drive, sonar) = (&robot.localizer.drive, &robot.localizer.rangers.first);
     let Point { x, y } = sonar.mount;
     let [position, heading] = REFERENCE;
     Nominal {
@@ -235,7 +235,7 @@ impl LogReader<'_> {
         if time < self.next_scan {
             return;
         }
-        let sonar = &self.robot.localizer.sonar;
+        let sonar = &self.robot.localizer.rangers.first;
         let period = match sonar.timing.schedule {
             PingSchedule::Every(period) => period,
             PingSchedule::AsFastAsPossible => sonar.timing.cycle,

@@ -95,7 +95,7 @@ fn export_log(args: &Args, floor: &Floor) -> anyhow::Result<()> {
     let mut rows = Rows::new(&walls, outputs.sinks());
     let summary = replay(args, &robot, floor, &mut rows)?;
     rows.end()?;
-    let mount = robot.localizer.sonar.mount;
+    let mount = robot.localizer.rangers.first.mount;
     let mount = [mount.x.0.into(), mount.y.0.into()];
     if let Some(mcap) = &mut outputs.mcap {
         mcap.take_log(open(&args.file)?, mount)?;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Subcommand;
-use sonarfix::config::{Config, Sonar};
+use sonarfix::config::{Config, RangerParameters};
 use sonarfix::geometry::units::Metres;
 use sonarfix::map::Map;
 use sonarfix_map::{Limits, MapFile, Severity, bake, flaws, robot_file, simplify, symmetries};
@@ -125,7 +125,7 @@ impl Source {
 
 fn check(map: &MapFile, robot: Option<&Path>) -> anyhow::Result<()> {
     let sonar = match robot {
-        Some(robot) => robot_file::read(robot)?.localizer.sonar,
+        Some(robot) => robot_file::read(robot)?.localizer.rangers.first,
         None => map.sonar().unwrap_or_else(usual_sonar),
     };
     let findings = flaws(&map.floor, &sonar)?;
@@ -166,8 +166,8 @@ fn count(findings: &[sonarfix_map::Finding], severity: Severity) -> usize {
     findings.iter().filter(|finding| finding.severity() == severity).count()
 }
 
-fn usual_sonar() -> Sonar {
-    Config::for_track_width(Metres(0.16)).sonar
+fn usual_sonar() -> RangerParameters {
+    Config::for_track_width(Metres(0.16)).rangers.first
 }
 
 fn write_image(map: &MapFile, out: &Path) -> anyhow::Result<()> {

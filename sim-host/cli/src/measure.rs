@@ -51,7 +51,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     println!("Switch the supply of the motors off and lift the robot.");
     let right = wheel(&mut robot, "right", args.revolutions)?;
     let left = wheel(&mut robot, "left", args.revolutions)?;
-    let has_servo = config.localizer.sonar.fixed_bearing().is_none();
+    let has_servo = config.localizer.rangers.first.fixed_bearing().is_none();
     let servo = has_servo.then(|| servo(&mut robot, &config, args.passes)).transpose()?;
     if let Some(out) = &args.out {
         let text = robot_edit::measured(&text, &config, &[right, left], servo.as_ref())?;
@@ -84,7 +84,7 @@ fn servo(robot: &mut Robot, config: &RobotConfig, passes: u32) -> anyhow::Result
         "Put the robot on the floor in a corner of a room, 30 cm to 80 cm from a wall ahead and from a wall at its left,\n\
          its front square to the wall ahead and nothing else near it, and press Enter. Then do not touch it."
     );
-    let (rightmost, leftmost) = config.localizer.sonar.servo;
+    let (rightmost, leftmost) = config.localizer.rangers.first.servo;
     let swept = robot.sweep([rightmost.0.into(), leftmost.0.into()], passes)?;
     let found = corner::bearings(&swept)?;
     println!(

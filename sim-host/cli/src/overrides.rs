@@ -148,7 +148,7 @@ const LIGHT_CONE: f32 = 40.0;
 
 /// Whether the sonar of a robot is on a servo, which an option replaces.
 pub fn has_servo(scenario: &Scenario) -> anyhow::Result<()> {
-    let is_fixed = scenario.robot.localizer.sonar.fixed_bearing().is_some();
+    let is_fixed = scenario.robot.localizer.rangers.first.fixed_bearing().is_some();
     anyhow::ensure!(!is_fixed, "--servo: the robot's sonar has a fixed bearing and no servo");
     Ok(())
 }
@@ -157,12 +157,12 @@ impl Overrides {
     /// Applies the changes to a scenario.
     pub fn apply(&self, scenario: &mut Scenario) -> anyhow::Result<()> {
         if let Some(preset) = self.sensor {
-            let schedule = scenario.robot.localizer.sonar.timing.schedule;
+            let schedule = scenario.robot.localizer.rangers.first.timing.schedule;
             preset.fit(scenario);
             scenario.robot.localizer.set_ping_schedule(schedule);
         }
         if self.light {
-            let sonar = &mut scenario.robot.localizer.sonar;
+            let sonar = &mut scenario.robot.localizer.rangers.first;
             sonar.ranging = Ranging::Light(LightBeam::VL53L1X);
             sonar.cone = Radians::from_degrees(LIGHT_CONE);
             scenario.hardware.sonar = SonarName::Ideal;

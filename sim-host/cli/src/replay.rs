@@ -71,7 +71,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         replay(args, &with, &mut paced)?;
         paced.end();
     }
-    let mut trace = Thinned::new(&floor, robot.localizer.sonar.cone, CAPACITY);
+    let mut trace = Thinned::new(&floor, robot.localizer.rangers.first.cone, CAPACITY);
     let summary = replay(args, &with, &mut trace)?;
     if let Some(file) = &args.trace {
         sonarfix_files::write_with(file, |out| trace_csv::write(trace.trace(), out))?;

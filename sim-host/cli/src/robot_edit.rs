@@ -40,7 +40,8 @@ pub fn calibrated(text: &str, robot: &RobotConfig, found: &Calibration) -> anyho
         pulses(sonar, robot, |bearing| found.constants.bearing(bearing))?;
     }
     if is_known(Name::RangeScale) && sonar.contains_key("temperature") {
-        let corrected = temperature(robot.ranger.temperature, constants.get(Name::RangeScale));
+        let corrected =
+            temperature(robot.rangers.first.temperature, constants.get(Name::RangeScale));
         if let Some(Celsius(celsius)) = corrected {
             set(sonar, "temperature", format!("{celsius:.1} degC"));
         }
@@ -150,14 +151,14 @@ fn pulses(
     robot: &RobotConfig,
     truth: impl Fn(f64) -> f64,
 ) -> anyhow::Result<()> {
-    if let Some(bearing) = robot.localizer.sonar.fixed_bearing() {
+    if let Some(bearing) = robot.localizer.rangers.first.fixed_bearing() {
         let bearing = truth(bearing.0.into()).to_degrees();
         set(sonar, "bearing", format!("{bearing:.2} deg"));
         return Ok(());
     }
     let pulses = sonar.get_mut("servo_pulses").and_then(Item::as_array_mut);
     let pulses = pulses.context("the robot file has no servo_pulses")?;
-    for (pulse, measured) in pulses.iter_mut().zip(robot.ranger.servo_pulses) {
+    for (pulse, measured) in pulses.iter_mut().zip(robot.rangers.first.servo_pulses) {
         let pulse = pulse.as_inline_table_mut().context("servo_pulses must be tables")?;
         let bearing = truth(measured.bearing.0.into()).to_degrees();
         if let Some(value) = pulse.get_mut("bearing") {

@@ -63,7 +63,7 @@ impl PacedArgs {
 
 /// What a page shows of a run on a floor.
 pub fn scene(title: String, source: &'static str, floor: &Floor, robot: &RobotConfig) -> Scene {
-    let trace = Trace::of(floor, robot.localizer.sonar.cone);
+    let trace = Trace::of(floor, robot.localizer.rangers.first.cone);
     let track = f64::from(robot.localizer.drive.track_width.0);
     Scene {
         title,
@@ -87,7 +87,7 @@ pub fn scene_of_robot(
 ) -> anyhow::Result<(Scene, [f64; 2])> {
     let robot = robot.map(robot_file::read).transpose()?;
     let floor = map.map(|map| MapFile::read(map, None)).transpose()?.map(|file| file.floor);
-    let sonar = robot.as_ref().map(|robot| robot.localizer.sonar);
+    let sonar = robot.as_ref().map(|robot| robot.localizer.rangers.first);
     let cone = sonar.map(|sonar| sonar.cone).unwrap_or_default();
     let walls = floor.map_or_else(Vec::new, |floor| Trace::of(&floor, cone).walls);
     let track = robot.map_or(0.0, |robot| f64::from(robot.localizer.drive.track_width.0));

@@ -75,7 +75,7 @@ fn flaser_and_odom_of_a_corrected_log() {
     let out = dir.path().join("out");
     assert_eq!(Floor::read(&out.join("map.toml")).unwrap().named_walls()[1].name(), "wall 2");
     let robot = robot_file::read(&out.join("robot.toml")).unwrap();
-    assert!((robot.localizer.sonar.servo.1.0 - std::f32::consts::FRAC_PI_2).abs() < 1e-3);
+    assert!((robot.localizer.rangers.first.servo.1.0 - std::f32::consts::FRAC_PI_2).abs() < 1e-3);
 }
 
 #[test]
@@ -93,7 +93,7 @@ fn robotlaser_of_a_raw_log_gives_the_mount_and_no_reference() {
     assert_eq!(records(&dir)[3], "scan,100.000000,-1.000000000,0.500000000000,1.500 2.500 80.500");
     assert!(!dir.path().join("out/reference.csv").exists());
     let robot = robot_file::read(&dir.path().join("out/robot.toml")).unwrap();
-    assert!((robot.localizer.sonar.mount.x.0 - 0.2).abs() < 1e-6);
+    assert!((robot.localizer.rangers.first.mount.x.0 - 0.2).abs() < 1e-6);
 }
 
 #[test]

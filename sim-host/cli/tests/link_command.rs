@@ -254,7 +254,7 @@ fn a_configuration_is_baked_checked_and_shown() {
     assert!(shown.contains(&checksum), "{shown}");
     let shown = robot_file::parse(&shown, "shown").unwrap();
     assert_eq!(shown.left_wheel, config.left_wheel);
-    assert_eq!(shown.ranger, config.ranger);
+    assert_eq!(shown.rangers.first, config.rangers.first);
     assert_eq!(shown.localizer.gating, config.localizer.gating);
 
     let mut damaged = fs::read(&baked_file).unwrap();

@@ -195,7 +195,7 @@ fn wheels_and_servo_are_measured_and_written() {
     assert!(written.contains("edges_per_revolution = 1500, mirrored = true }\n"), "{written}");
     assert!(written.contains("edges_per_revolution = 1439.0 } # the left one\n"), "{written}");
     let robot = sonarfix_map::robot_file::parse(&written, "measured.toml").unwrap();
-    for (pulse, nominal) in robot.ranger.servo_pulses.iter().zip([-110.0, 110.0]) {
+    for (pulse, nominal) in robot.rangers.first.servo_pulses.iter().zip([-110.0, 110.0]) {
         let expected = SERVO[0] + SERVO[1] * nominal;
         let found = f64::from(pulse.bearing.0).to_degrees();
         assert!((found - expected).abs() < 2.0, "{found} instead of {expected}: {text}");

@@ -25,7 +25,7 @@ fn replay(seconds: u32) {
     let floor = Floor::parse(MAP, "map.toml").unwrap();
     let robot = robot_file::parse(ROBOT, "robot.toml").unwrap();
     let walls = floor.walls();
-    let mut trace = Thinned::new(&floor, robot.localizer.sonar.cone, CAPACITY);
+    let mut trace = Thinned::new(&floor, robot.localizer.rangers.first.cone, CAPACITY);
     let log = Endless::new(seconds, |s| second(s, Sonar::Scans).0);
     let reference = Endless::new(seconds, |s| second(s, Sonar::Scans).1);
     let replay = Replay { robot: &robot, walls: &walls, strict: true };

@@ -79,7 +79,7 @@ fn a_forecast_equals_the_error_of_runs() {
     let mut scenario = paper();
     let forecast = forecast(&scenario, 2);
     let config = scenario.robot.localizer;
-    scenario.truth.range_noise = config.sonar.noise.floor.0.into();
+    scenario.truth.range_noise = config.rangers.first.noise.floor.0.into();
     let (mut squares, runs) = (0.0, 40_u32);
     for seed in 0..u64::from(runs) {
         // The systematic errors of the wheels are quantiles of the prior, evenly spaced, in a
@@ -141,7 +141,7 @@ fn errors_and_obstacles_do_not_enter_a_forecast() {
 #[test]
 fn missed_echoes_increase_the_bound() {
     let mut scenario = paper();
-    scenario.robot.localizer.sonar.max_range.0 = 3.5;
+    scenario.robot.localizer.rangers.first.max_range.0 = 3.5;
     let all = forecast(&scenario, 4);
     let robot = scenario.robot;
     SonarPreset::HcSr04.fit(&mut scenario);

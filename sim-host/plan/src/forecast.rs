@@ -165,7 +165,7 @@ fn as_told(scenario: &Scenario) -> Scenario {
     error_free.truth.wheel_noise = 0.0;
     error_free.truth.scale_walk = 0.0;
     error_free.truth.track_width_walk = 0.0;
-    error_free.truth.cone = error_free.robot.localizer.sonar.cone.0.into();
+    error_free.truth.cone = error_free.robot.localizer.rangers.first.cone.0.into();
     // The noise of a gyro remains: one without noise would count as stuck.
     error_free.truth.gyro = GyroTruth { bias: Some(0.0), scale: 0.0 };
     let AbsoluteSensors { heading, position } = &mut error_free.absolute;
@@ -174,7 +174,7 @@ fn as_told(scenario: &Scenario) -> Scenario {
     of_heading.chain(of_position).for_each(|sampling| sampling.outliers = 0.0);
     error_free.upsets = Upsets::default();
     error_free.surroundings = Surroundings {
-        temperature: error_free.robot.ranger.temperature.0.into(),
+        temperature: error_free.robot.rangers.first.temperature.0.into(),
         obstacles: Vec::new(),
     };
     error_free.faults = Vec::new();

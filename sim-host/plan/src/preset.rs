@@ -143,7 +143,7 @@ impl SonarPreset {
         let filter = self.filter_parameters();
         scenario.hardware.sonar = filter.sonar;
         scenario.robot.localizer.set_ping_schedule(PingSchedule::AsFastAsPossible);
-        let sonar = &mut scenario.robot.localizer.sonar;
+        let sonar = &mut scenario.robot.localizer.rangers.first;
         sonar.cone = Radians::from_degrees(filter.cone);
         sonar.min_range = Metres(filter.reach.0);
         sonar.max_range = Metres(filter.reach.1);
@@ -155,7 +155,7 @@ impl SonarPreset {
         if let Some(echo) = model.filter(|_| beam.is_some()).and_then(|model| model.echo) {
             scenario.robot.localizer.echo = echo;
         }
-        let ranger = &mut scenario.robot.ranger;
+        let ranger = &mut scenario.robot.rangers.first;
         ranger.kind = match self {
             Self::HcSr04 => RangerKind::Pulse(PulseTiming::HC_SR04),
             Self::LvMaxsonar => RangerKind::Pulse(PulseTiming::LV_MAXSONAR),

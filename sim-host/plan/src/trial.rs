@@ -127,7 +127,11 @@ fn drive(
     let image = simulation.baked_map()?;
     let config = simulation.config();
     let mut drive = Drive {
-        search: Search::new(&config.sonar, Map::read(&image)?, SearchParameters::of(&config)),
+        search: Search::new(
+            &config.rangers.first,
+            Map::read(&image)?,
+            SearchParameters::of(&config),
+        ),
         plant: Plant::new(&simulation.scenario, simulation.range_scale()),
         track_width: config.drive.track_width.0.into(),
         simulation: &simulation,
@@ -195,7 +199,7 @@ impl Drive<'_> {
         let echo = world.echo(&ping, sensor, &mut self.noise, &mut self.luck);
         let stretch = 1.0 + self.simulation.range_scale();
         let range = echo.map(|echo| Metres((echo.range * stretch) as f32));
-        let shortest = self.simulation.config().sonar.min_range;
+        let shortest = self.simulation.config().rangers.first.min_range;
         _ = self.search.ping(bearing, range.filter(|range| *range >= shortest));
         let has_begun = self.search.pings() >= LEAST_PINGS;
         for _ in 0..EVALUATIONS / EVALUATIONS_PER_MILLISECOND {

@@ -3,7 +3,7 @@
 use std::io::BufRead;
 
 use serde::Serialize;
-use sonarfix::config::{RangerId, Sonar};
+use sonarfix::config::{RangerId, RangerParameters};
 use sonarfix::geometry::units::{Metres, Radians};
 use sonarfix::map::{Map, Wall};
 use sonarfix_hal::config::RobotConfig;
@@ -96,7 +96,7 @@ struct Run<'a> {
     waiting: Vec<(i64, Heard)>,
     sweep: Sweep,
     computing: ComputingTime,
-    sonar: Sonar,
+    sonar: RangerParameters,
     unique_after: Option<f64>,
     pings: u64,
 }
@@ -126,7 +126,7 @@ impl Find<'_> {
 
 impl<'a> Run<'a> {
     fn new(robot: &RobotConfig, walls: &'a [Wall]) -> Self {
-        let sonar = &robot.localizer.sonar;
+        let sonar = &robot.localizer.rangers.first;
         let signed = [robot.right_wheel.signed_travel(), robot.left_wheel.signed_travel()];
         Self {
             search: Search::new(sonar, Map::new(walls), SearchParameters::of(&robot.localizer)),

@@ -1,6 +1,6 @@
 //! A scan, and the range of a sonar with a wide cone in its place.
 
-use sonarfix::config::Sonar;
+use sonarfix::config::RangerParameters;
 use sonarfix::geometry::units::Radians;
 use sonarfix_sim::angle;
 
@@ -101,7 +101,7 @@ impl Scan {
 impl Cone {
     /// That of a robot's sonar at a bearing.
     #[must_use]
-    pub fn of(sonar: &Sonar, bearing: Radians) -> Self {
+    pub fn of(sonar: &RangerParameters, bearing: Radians) -> Self {
         Self {
             bearing: bearing.0.into(),
             cone: sonar.cone.0.into(),

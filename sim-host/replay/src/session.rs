@@ -6,7 +6,7 @@ use std::iter::Peekable;
 use std::vec::IntoIter;
 
 use sonarfix::aim::{Aim, NoAim, Reason};
-use sonarfix::config::{PingSchedule, RangerId, Sonar};
+use sonarfix::config::{PingSchedule, RangerId, RangerParameters};
 use sonarfix::filter::ekf::{STATES, StandardDeviations, StateEstimate};
 use sonarfix::geometry::units::{Duration, Instant, Metres, Radians, SquareMetres};
 use sonarfix::localizer::{Fix, Localizer, Start};
@@ -292,7 +292,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
     }
 
     fn fix_period(&self) -> i64 {
-        let timing = &self.robot.localizer.sonar.timing;
+        let timing = &self.robot.localizer.rangers.first.timing;
         let period = match timing.schedule {
             PingSchedule::Every(period) => period,
             // A recording has no servo to wait for.
@@ -484,7 +484,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
                         estimators.adopt(*mode, *state, *deviation)?;
                     }
                     echo if estimators.is_searching() => {
-                        sweep(estimators, echo, &self.robot.localizer.sonar);
+                        sweep(estimators, echo, &self.robot.localizer.rangers.first);
                     }
                     Echo::Scan { is_due: false, .. } => {}
                     _ => self.measure(estimators, &measurement),
@@ -559,10 +559,10 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         let localizer = navigator.localizer();
         let pose = localizer.pose();
         let sonar = match pending.echo {
-            Echo::At { ranger, .. } => self.robot.localizer.sonar_of(ranger),
+            Echo::At { ranger, .. } => self.robot.localizer.rangers.get(ranger),
             _ => None,
         };
-        let sonar = sonar.unwrap_or(&self.robot.localizer.sonar);
+        let sonar = sonar.unwrap_or(&self.robot.localizer.rangers.first);
         let mount = pose.to_map(sonar.mount);
         let mut measurement = Measurement {
             time: seconds(pending.time - estimators.epoch),
@@ -668,7 +668,7 @@ impl Echo {
 }
 
 /// The pings of a robot that searches.
-fn sweep(estimators: &mut Estimators, echo: &Echo, sonar: &Sonar) {
+fn sweep(estimators: &mut Estimators, echo: &Echo, sonar: &RangerParameters) {
     match echo {
         Echo::At { bearing, range, .. } => {
             let [bearing] = single([*bearing]);

@@ -10,7 +10,7 @@
 use std::ops::Range;
 
 use nalgebra::{SMatrix, SVector};
-use sonarfix::config::{Config, Ranging, Sonar};
+use sonarfix::config::{Config, RangerParameters, Ranging};
 
 use crate::angle;
 
@@ -95,10 +95,10 @@ impl Model {
             wheel_variance: square(config.drive.wheel_noise.0.0),
             scale_variance: square(config.drive.scale_walk.0),
             width_variance: square(config.drive.track_width_walk.0.0),
-            mount: [config.sonar.mount.x.0.into(), config.sonar.mount.y.0.into()],
-            noise_floor: config.sonar.noise.floor.0.into(),
-            noise_per_metre: config.sonar.noise.per_metre.into(),
-            pointing: match config.sonar.ranging {
+            mount: [config.rangers.first.mount.x.0.into(), config.rangers.first.mount.y.0.into()],
+            noise_floor: config.rangers.first.noise.floor.0.into(),
+            noise_per_metre: config.rangers.first.noise.per_metre.into(),
+            pointing: match config.rangers.first.ranging {
                 Ranging::Sound => None,
                 Ranging::Light(beam) => Some(beam.pointing.0.into()),
             },
@@ -107,9 +107,9 @@ impl Model {
 
     /// The same with another ranger of the robot.
     #[must_use]
-    pub fn of_ranger(config: &Config, sonar: &Sonar) -> Self {
+    pub fn of_ranger(config: &Config, sonar: &RangerParameters) -> Self {
         let mut config = *config;
-        config.sonar = *sonar;
+        config.rangers.first = *sonar;
         Self::of(&config)
     }
 

@@ -148,7 +148,7 @@ impl<'a> Drive<'a> {
 
     /// Whether servo and sonar reach a point, and no wall is before it.
     fn is_in_reach(&self, from: Point, at: Point, heading: f64) -> bool {
-        let sonar = &self.scenario.robot.localizer.sonar;
+        let sonar = &self.scenario.robot.localizer.rangers.first;
         let range = distance(from, at);
         let bearing = angle::wrap(direction(from, at) - heading);
         let (right, left) = (f64::from(sonar.servo.0.0), f64::from(sonar.servo.1.0));

@@ -151,9 +151,9 @@ pub fn trial(seed: u64, metres: f64, errors: Errors) -> Result<Trial, Calibratio
     let [mount, offset, scale] =
         [errors.mount, errors.bearing, 1.0 + errors.servo].map(|value| value as f32);
     let true_robot = &mut scenario.robot;
-    let at = true_robot.localizer.sonar.mount;
-    true_robot.localizer.sonar.mount = Point::new(at.x.0 + mount, at.y.0 - mount);
-    for pulse in &mut true_robot.ranger.servo_pulses {
+    let at = true_robot.localizer.rangers.first.mount;
+    true_robot.localizer.rangers.first.mount = Point::new(at.x.0 + mount, at.y.0 - mount);
+    for pulse in &mut true_robot.rangers.first.servo_pulses {
         pulse.bearing = Radians(offset + scale * pulse.bearing.0);
     }
     let width = scenario.truth.track_width;

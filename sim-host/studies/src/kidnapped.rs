@@ -79,7 +79,7 @@ pub fn trials(trials: u64, progress: &impl Progress) -> Result<Vec<Outcome>, Tri
     // An ideal sonar with a noise of 5 mm and a maximum range of 4 m.
     let mut scenario = Scenario::paper()?;
     scenario.truth.range_noise = 0.005;
-    scenario.robot.localizer.sonar.max_range = Metres(4.0);
+    scenario.robot.localizer.rangers.first.max_range = Metres(4.0);
     let (walls, world) = (floor.walls(), World::new(&floor));
     let sensor = SensorModel::ideal(&scenario);
     (0..trials)

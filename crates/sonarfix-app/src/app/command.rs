@@ -338,7 +338,7 @@ impl<'m, F: NorFlash> App<'m, F> {
         let State::Waiting(check) = &mut self.state else { return Err(CommandError::Running) };
         if let Some(bearing) = bearing {
             let (config, _) = self.config.as_ref().ok_or(CommandError::NoConfiguration)?;
-            let (rightmost, leftmost) = config.localizer.sonar.servo;
+            let (rightmost, leftmost) = config.localizer.rangers.first.servo;
             if !(bearing >= rightmost && bearing <= leftmost) {
                 return Err(CommandError::OutOfReach);
             }

@@ -342,7 +342,7 @@ fn a_stored_configuration_that_cannot_start_is_not_used() {
         |config| {
             config.localizer.max_wheel_speed = MetresPerSecond(-1.0);
         },
-        |config| config.localizer.sonar.servo = (Radians(-3.0), Radians(3.0)),
+        |config| config.localizer.rangers.first.servo = (Radians(-3.0), Radians(3.0)),
     ];
     for make_bad in bad {
         let mut sent = config();

@@ -68,7 +68,7 @@ fn readings_are_those_of_the_devices() {
         };
         let servo = shown.iter().find(at).and_then(|shown| shown.servo);
         let micros = servo.unwrap_or_else(|| panic!("never at {bearing:?}")).micros;
-        let [one, other] = config().ranger.servo_pulses;
+        let [one, other] = config().rangers.first.servo_pulses;
         let [from, to] = [one, other].map(|pulse| pulse.width.to_micros() as f32);
         let slope = (to - from) / (other.bearing - one.bearing).0;
         assert!((micros - from - slope * (bearing - one.bearing).0).abs() < 1.0, "{micros}");

@@ -58,7 +58,7 @@ fn any_config(random: &mut Random) -> RobotConfig {
             2 => localizer.prior.track_width = Metres(number),
             3 => (localizer.prior.scale_left, localizer.prior.scale_right) = (number, number),
             4 => localizer.max_wheel_speed.0 = number,
-            5 => localizer.sonar.servo = (Radians(-number), Radians(number)),
+            5 => localizer.rangers.first.servo = (Radians(-number), Radians(number)),
             6 => {
                 any.encoder_period =
                     sonarfix::geometry::units::Duration::from_ticks(random.next() % 200_000);
@@ -170,7 +170,7 @@ fn sequence(baked: &Baked, seed: u64) {
 /// The configuration of the robot in the room, which pings as fast as it can.
 fn tracking() -> RobotConfig {
     let mut config = config();
-    config.localizer.sonar.timing.schedule = PingSchedule::AsFastAsPossible;
+    config.localizer.rangers.first.timing.schedule = PingSchedule::AsFastAsPossible;
     config
 }
 

@@ -195,8 +195,8 @@ impl Baked {
 pub fn config() -> RobotConfig {
     let mut localizer = Config::for_track_width(Metres(0.16));
     localizer.prior.range_scale = 0.02;
-    localizer.sonar.servo = (Radians::from_degrees(-90.0), Radians::from_degrees(90.0));
-    localizer.sonar.timing.servo = ServoTiming::SG90;
+    localizer.rangers.first.servo = (Radians::from_degrees(-90.0), Radians::from_degrees(90.0));
+    localizer.rangers.first.timing.servo = ServoTiming::SG90;
     let wheel = WheelConfig::of_diameter(Metres(0.065), 1_024.0);
     let config = RobotConfig::with_common_parts(localizer);
     RobotConfig { right_wheel: wheel, left_wheel: wheel, ..config }

@@ -72,20 +72,20 @@ pub trait Hardware {
         if !(right && left) {
             return Err(Unsupported::Counter);
         }
-        for (ranger, _) in config.localizer.sonars() {
+        for (ranger, _) in config.localizer.rangers.iter() {
             let known = self.has_ranger(ranger).then(|| config.ranger_of(ranger)).flatten();
             let (sonar, driver) = known.ok_or(Unsupported::Rangers)?;
             if let Some(servo) = driver.servo_settings(sonar) {
                 self.servo_of(ranger).check(&servo).map_err(Unsupported::Servo)?;
             }
         }
-        for (ranger, _) in config.localizer.sonars() {
+        for (ranger, _) in config.localizer.rangers.iter() {
             let Some((sonar, driver)) = config.ranger_of(ranger) else { continue };
             let configured = self.ranger_of(ranger).configure(&driver.settings(sonar));
             configured.map_err(|_| Unsupported::Ranger)?;
         }
         self.configure_gyro(config.localizer.gyro.as_ref())?;
-        for (ranger, _) in config.localizer.sonars() {
+        for (ranger, _) in config.localizer.rangers.iter() {
             let Some((sonar, driver)) = config.ranger_of(ranger) else { continue };
             match driver.servo_settings(sonar) {
                 None => self.servo_of(ranger).fix(sonar.servo.0),

@@ -109,7 +109,7 @@ impl<'m> Robot<'m> {
             self.cycle = Cycle::Idle { until: self.ticks.next() };
             return;
         }
-        let aimed = if self.localizer().config().has_several_sonars() {
+        let aimed = if self.localizer().config().rangers.are_several() {
             self.choose_among(poll)
         } else {
             self.tracker.aim().inspect(|aim| {
@@ -133,7 +133,7 @@ impl<'m> Robot<'m> {
     fn choose_among(&mut self, poll: &mut Poll<'_, 'm, impl Hardware>) -> Result<Aim, NoAim> {
         let config = self.localizer().config();
         let mut aims = [None; MAX_RANGERS];
-        for ((ranger, _), aim) in config.sonars().zip(&mut aims) {
+        for ((ranger, _), aim) in config.rangers.iter().zip(&mut aims) {
             let standing = rangers::standing(config, ranger, poll.now, poll.hardware);
             *aim = self.tracker.aim_of(ranger, &standing).ok();
         }
@@ -206,7 +206,7 @@ impl<'m> Robot<'m> {
     /// Ends the measurement cycle. If there was no ping, nothing changes before the next tick.
     pub(super) fn end_cycle(&mut self, now: Instant, pinged: bool) {
         let is_sweeping = self.mode() == Mode::Searching;
-        let until = match self.localizer().config().sonar.timing.schedule {
+        let until = match self.localizer().config().rangers.first.timing.schedule {
             PingSchedule::Every(_) if !is_sweeping => {
                 self.pings.take(now);
                 self.pings.next()

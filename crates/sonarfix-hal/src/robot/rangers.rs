@@ -21,14 +21,14 @@ pub(super) fn can_ping_at(
 /// The instant at which the echoes of all pings that a ranger hears have decayed.
 fn quiet_at(config: &Config, ranger: RangerId, hardware: &mut impl Hardware) -> Instant {
     let own = hardware.ranger_of(ranger).ready_at();
-    if !config.has_several_sonars() {
+    if !config.rangers.are_several() {
         return own;
     }
     let heard = |other: RangerId| {
-        let sonars = config.sonar_of(ranger).zip(config.sonar_of(other));
+        let sonars = config.rangers.get(ranger).zip(config.rangers.get(other));
         other != ranger && sonars.is_some_and(|(sonar, other)| sonar.hears(other))
     };
-    let others = config.sonars().map(|(other, _)| other).filter(|other| heard(*other));
+    let others = config.rangers.iter().map(|(other, _)| other).filter(|other| heard(*other));
     others.fold(own, |quiet, other| quiet.max(hardware.ranger_of(other).ready_at()))
 }
 
@@ -51,9 +51,9 @@ pub(super) fn standing(
 /// that end and decay while its servo turns.
 pub(super) fn first_of(config: &Config, aims: &[Option<Aim>; MAX_RANGERS]) -> Option<Aim> {
     let best = highest(config, aims.iter().flatten())?;
-    let is_free = config.sonar.timing.schedule == PingSchedule::AsFastAsPossible;
+    let is_free = config.rangers.first.timing.schedule == PingSchedule::AsFastAsPossible;
     let ends_before = |aim: &&Aim| {
-        let sonar = config.sonar_of(aim.ranger);
+        let sonar = config.rangers.get(aim.ranger);
         let decayed = sonar.and_then(|sonar| aim.why.time.checked_add(sonar.timing.cycle));
         is_free && aim.ranger != best.ranger && decayed.is_some_and(|end| end <= best.why.time)
     };

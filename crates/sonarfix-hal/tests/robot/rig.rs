@@ -285,8 +285,8 @@ pub fn walls() -> Vec<Wall> {
 /// The loop, at the origin of the room at time zero. `tick` is the length of an encoder tick.
 pub fn robot(walls: &[Wall], tick: f32, schedule: PingSchedule, settings: Settings) -> Robot<'_> {
     let mut config = Config::for_track_width(Metres(0.16));
-    config.sonar.timing.schedule = schedule;
-    config.sonar.servo = (Radians::from_degrees(-95.0), Radians::from_degrees(95.0));
+    config.rangers.first.timing.schedule = schedule;
+    config.rangers.first.servo = (Radians::from_degrees(-95.0), Radians::from_degrees(95.0));
     let start = Start {
         pose: Pose::new(0.0, 0.0, Radians(0.0)),
         position_deviation: Metres(0.02),

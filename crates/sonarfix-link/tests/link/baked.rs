@@ -13,8 +13,8 @@ use crate::wire::{crc32, to_stdvec};
 
 fn example() -> RobotConfig {
     let mut localizer = Config::for_track_width(Metres(0.35));
-    localizer.sonar.servo = (Radians(-1.5), Radians(1.75));
-    localizer.sonar.timing.servo = ServoTiming::SG90;
+    localizer.rangers.first.servo = (Radians(-1.5), Radians(1.75));
+    localizer.rangers.first.timing.servo = ServoTiming::SG90;
     localizer.policy = Policy::Nearest;
     RobotConfig::with_common_parts(localizer)
 }

@@ -158,8 +158,8 @@ fn every_variant_has_the_number_of_its_version() {
 fn a_baked_configuration_has_the_bytes_of_its_version() {
     assert_eq!(baked::VERSION, 8);
     let mut localizer = Config::for_track_width(Metres(0.35));
-    localizer.sonar.servo = (Radians(-1.5), Radians(1.5));
-    localizer.sonar.timing.servo = ServoTiming::SG90;
+    localizer.rangers.first.servo = (Radians(-1.5), Radians(1.5));
+    localizer.rangers.first.timing.servo = ServoTiming::SG90;
     let config = RobotConfig::with_common_parts(localizer);
     let mut buffer = [0; baked::LENGTH_MAX];
     let bytes = baked::write(&config, &mut buffer).unwrap();

@@ -4,7 +4,7 @@ use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
 use sonarfix::aim::{Aim, NoAim, Reason};
 use sonarfix::config::{
-    Config, LightBeam, MAX_RANGERS, PingSchedule, PingTiming, Policy, RangerId, Ranging,
+    Config, LightBeam, MAX_RANGERS, PingSchedule, PingTiming, Policy, RangerId, Rangers, Ranging,
     ServoTiming,
 };
 use sonarfix::filter::ekf::{EkfError, Innovation, STATES, StandardDeviations, StateEstimate};
@@ -482,9 +482,9 @@ pub fn config(source: &mut impl Source) -> RobotConfig {
         wheel.is_mirrored = source.pick(2) == 0;
     }
     config.encoder_period = source.duration();
-    config.ranger = ranger(source);
-    for _ in config.localizer.further_sonars.iter() {
-        config.further_rangers.push(ranger(source)).unwrap();
+    config.rangers = Rangers::one(ranger(source));
+    for _ in config.localizer.rangers.iter().skip(1) {
+        config.rangers.push(ranger(source)).unwrap();
     }
     let [lost, dead_encoder, lost_link] = [0; 3].map(|_| source.pick(2) == 0);
     config.motors = MotorPolicy { lost, dead_encoder, lost_link, link_timeout: source.duration() };
@@ -526,18 +526,19 @@ fn localizer(source: &mut impl Source) -> Config {
     config.drive.scale_walk = PerRootMetre(source.single());
     config.drive.track_width_walk = PerRootMetre(Metres(source.single()));
     config.max_wheel_speed = MetresPerSecond(source.single());
-    config.sonar.mount = Point::new(source.single(), source.single());
-    config.sonar.servo = (Radians(source.single()), Radians(source.single()));
-    config.sonar.cone = Radians(source.single());
-    config.sonar.min_range = Metres(source.single());
-    config.sonar.max_range = Metres(source.single());
-    config.sonar.noise.floor = Metres(source.single());
-    config.sonar.noise.per_metre = source.single();
+    config.rangers.first.mount = Point::new(source.single(), source.single());
+    config.rangers.first.servo = (Radians(source.single()), Radians(source.single()));
+    config.rangers.first.cone = Radians(source.single());
+    config.rangers.first.min_range = Metres(source.single());
+    config.rangers.first.max_range = Metres(source.single());
+    config.rangers.first.noise.floor = Metres(source.single());
+    config.rangers.first.noise.per_metre = source.single();
     if source.pick(2) == 0 {
         let (spot, pointing) = (Radians(source.single()), Radians(source.single()));
-        config.sonar.ranging = Ranging::Light(LightBeam { spot, pointing, ..LightBeam::VL53L1X });
+        config.rangers.first.ranging =
+            Ranging::Light(LightBeam { spot, pointing, ..LightBeam::VL53L1X });
     }
-    config.sonar.timing = PingTiming {
+    config.rangers.first.timing = PingTiming {
         schedule: match source.pick(2) {
             0 => PingSchedule::Every(source.duration()),
             _ => PingSchedule::AsFastAsPossible,
@@ -551,7 +552,7 @@ fn localizer(source: &mut impl Source) -> Config {
     };
     let has_several = source.pick(2) == 0;
     for _ in 1..if has_several { MAX_RANGERS } else { 1 } {
-        config.further_sonars.push(config.sonar).unwrap();
+        config.rangers.push(config.rangers.first).unwrap();
     }
     config.prior.scale_right = source.single();
     config.prior.scale_left = source.single();

@@ -1,6 +1,6 @@
 //! Reads and writes the ranger of a robot file: its name, or its name with different settings.
 
-use sonarfix::config::{LightBeam, LightLinked, Ranging, Sonar};
+use sonarfix::config::{LightBeam, LightLinked, RangerParameters, Ranging};
 use sonarfix::geometry::units::{Duration, Radians};
 use sonarfix_hal::config::RangerConfig;
 use sonarfix_hal::ranger::{PulseTiming, RangerKind, RangerSettings};
@@ -15,7 +15,7 @@ use crate::sonar_model::{self, CUSTOM};
 /// A ranger as its table describes it.
 #[derive(Clone, Copy)]
 pub(crate) struct Ranger {
-    pub sonar: Sonar,
+    pub sonar: RangerParameters,
     pub driver: RangerConfig,
     /// That of a sonar without a servo, radians.
     pub bearing: Option<f32>,
@@ -23,7 +23,11 @@ pub(crate) struct Ranger {
 
 impl Ranger {
     pub(crate) fn usual() -> Self {
-        Self { sonar: usual().localizer.sonar, driver: usual().ranger, bearing: None }
+        Self {
+            sonar: usual().localizer.rangers.first,
+            driver: usual().rangers.first,
+            bearing: None,
+        }
     }
 }
 

@@ -88,17 +88,21 @@ pub(crate) fn read(node: Node<'_>, config: &mut RobotConfig) {
         if index == 0 {
             table.require("fix_period");
             let Ranger { sonar, driver, .. } = read_sonar(&table, Ranger::usual());
-            (config.localizer.sonar, config.ranger) = (sonar, driver);
+            (config.localizer.rangers.first, config.rangers.first) = (sonar, driver);
             continue;
         }
         for node in SHARED.iter().filter_map(|key| table.get(key)) {
             node.report("is one for all sonars: write it in the first only");
         }
-        let first = Ranger { sonar: config.localizer.sonar, driver: config.ranger, bearing: None };
+        let first = Ranger {
+            sonar: config.localizer.rangers.first,
+            driver: config.rangers.first,
+            bearing: None,
+        };
         let Ranger { sonar, driver, .. } = read_sonar(&table, first);
         // Too many are a mistake that has been reported.
-        _ = config.localizer.further_sonars.push(sonar);
-        _ = config.further_rangers.push(driver);
+        _ = config.localizer.rangers.push(sonar);
+        _ = config.rangers.push(driver);
     }
 }
 
@@ -131,8 +135,8 @@ fn read_sonar(table: &Table<'_>, usual: Ranger) -> Ranger {
 
 /// The tables of all sonars; the first has what they share.
 pub(crate) fn text(config: &RobotConfig) -> String {
-    let header = if config.localizer.has_several_sonars() { "[[sonar]]" } else { "[sonar]" };
-    let tables = config.localizer.sonars().filter_map(|(id, _)| {
+    let header = if config.localizer.rangers.are_several() { "[[sonar]]" } else { "[sonar]" };
+    let tables = config.localizer.rangers.iter().filter_map(|(id, _)| {
         let (&sonar, &driver) = config.ranger_of(id)?;
         let bearing = sonar.fixed_bearing().map(|bearing| bearing.0);
         let shared: &[&str] = if id == RangerId::FIRST { &[] } else { &SHARED };

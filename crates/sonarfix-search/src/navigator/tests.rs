@@ -24,8 +24,8 @@ fn walls() -> Vec<Wall> {
 
 fn config() -> Config {
     let mut config = Config::for_track_width(Metres(0.2));
-    config.sonar.max_range = Metres(3.5);
-    config.sonar.min_range = Metres(0.05);
+    config.rangers.first.max_range = Metres(3.5);
+    config.rangers.first.min_range = Metres(0.05);
     config
 }
 
@@ -43,7 +43,7 @@ struct Robot<'m> {
 impl<'m> Robot<'m> {
     fn new(walls: &'m [Wall]) -> Self {
         let (config, map) = (config(), Map::new(walls));
-        let search = Box::new(Search::new(&config.sonar, map, SearchParameters::default()));
+        let search = Box::new(Search::new(&config.rangers.first, map, SearchParameters::default()));
         let localizer = Localizer::new(config, map, start(here()), Instant::from_ticks(0)).unwrap();
         Self { navigator: Navigator::new(localizer), search, ticks: 0 }
     }

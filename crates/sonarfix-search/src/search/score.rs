@@ -8,7 +8,7 @@ use heapless::Vec;
 use sonarfix::association::reflector::{
     Beam, Heard, Lit, Place, REFLECTORS, Reflector, Reflectors,
 };
-use sonarfix::config::{Ranging, Sonar};
+use sonarfix::config::{RangerParameters, Ranging};
 use sonarfix::geometry::elementary::{ln, sqrt};
 use sonarfix::geometry::numeric::at_least;
 use sonarfix::geometry::vector::Vector;
@@ -119,8 +119,8 @@ pub(super) struct EchoModel<'m> {
 
 impl<'m> EchoModel<'m> {
     #[inline(never)]
-    pub fn new(map: Map<'m>, sonar: &Sonar, echo: &EchoParameters) -> Self {
-        let Sonar { cone, max_range, ranging, .. } = *sonar;
+    pub fn new(map: Map<'m>, sonar: &RangerParameters, echo: &EchoParameters) -> Self {
+        let RangerParameters { cone, max_range, ranging, .. } = *sonar;
         let is_light = ranging != Ranging::Sound;
         Self {
             reflectors: Reflectors::new(map, sonar),

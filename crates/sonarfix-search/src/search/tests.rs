@@ -75,7 +75,7 @@ fn room() -> Vec<Wall> {
 
 fn search(walls: &[Wall]) -> Small<'_> {
     let config = Config::for_track_width(Metres(0.2));
-    Search::new(&config.sonar, Map::new(walls), SearchParameters::of(&config))
+    Search::new(&config.rangers.first, Map::new(walls), SearchParameters::of(&config))
 }
 
 fn line(angle: f32, support: u16) -> Line {

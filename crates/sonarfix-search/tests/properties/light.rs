@@ -1,6 +1,6 @@
 //! The search with a time-of-flight ranger.
 
-use sonarfix::config::{LightBeam, Ranging, Sonar};
+use sonarfix::config::{LightBeam, RangerParameters, Ranging};
 use sonarfix::geometry::pose::{Point, Pose};
 use sonarfix::geometry::units::{Metres, Radians};
 use sonarfix::map::{Map, Wall};
@@ -21,7 +21,12 @@ fn crossing(wall: &Wall, from: (f64, f64), u: (f64, f64)) -> Option<f64> {
 }
 
 /// The range along a beam in a room, `None` beyond the reach.
-fn range_in(walls: &[Wall], sonar: &Sonar, pose: Pose, bearing: Radians) -> Option<Metres> {
+fn range_in(
+    walls: &[Wall],
+    sonar: &RangerParameters,
+    pose: Pose,
+    bearing: Radians,
+) -> Option<Metres> {
     let mount = pose.to_map(sonar.mount);
     let angle = f64::from(pose.heading.radians().0) + f64::from(bearing.0);
     let from = (f64::from(mount.x.0), f64::from(mount.y.0));

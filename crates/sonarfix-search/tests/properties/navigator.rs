@@ -30,9 +30,9 @@ impl<'a> Robot<'a> {
     /// A robot at `truth` that tracks the pose `estimate`.
     fn new(room: &'a Room, truth: Pose, estimate: Pose) -> Self {
         let mut config = Config::for_track_width(Metres(TRACK_WIDTH));
-        config.sonar = sonar();
+        config.rangers.first = sonar();
         let map = Map::new(&room.walls);
-        let search = Search::new(&config.sonar, map, SearchParameters::of(&config));
+        let search = Search::new(&config.rangers.first, map, SearchParameters::of(&config));
         let start = Start {
             pose: estimate,
             position_deviation: Metres(0.02),

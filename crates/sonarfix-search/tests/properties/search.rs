@@ -1,7 +1,7 @@
 //! The search for the pose: constructed rooms, symmetric poses, and windows of random pings.
 
 use proptest::prelude::*;
-use sonarfix::config::{Config, Sonar};
+use sonarfix::config::{Config, RangerParameters};
 use sonarfix::geometry::pose::{Heading, Point, Pose};
 use sonarfix::geometry::units::{Metres, Radians};
 use sonarfix::map::{Map, Wall};
@@ -10,8 +10,8 @@ use sonarfix_search::search::{Answer, Hypothesis, InvalidInput, Region, Search, 
 /// Evaluations after each ping: a cycle or two in a room of a few walls.
 pub(crate) const EVALUATIONS: u16 = 10_000;
 
-pub(crate) fn sonar() -> Sonar {
-    let mut sonar = Config::for_track_width(Metres(0.2)).sonar;
+pub(crate) fn sonar() -> RangerParameters {
+    let mut sonar = Config::for_track_width(Metres(0.2)).rangers.first;
     sonar.mount = Point::new(0.08, 0.0);
     sonar.servo = (Radians::from_degrees(-100.0), Radians::from_degrees(100.0));
     sonar.cone = Radians::from_degrees(15.0);

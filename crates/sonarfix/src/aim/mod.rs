@@ -25,7 +25,7 @@ mod light;
 mod ranking;
 
 use crate::association::visibility::{Beam, Sight, Viewpoint};
-use crate::config::{Config, RangerId, Ranging, Sonar};
+use crate::config::{Config, RangerId, RangerParameters, Ranging};
 use crate::filter::ekf::Ekf;
 use crate::geometry::pose::Heading;
 use crate::geometry::units::{Duration, Instant, Metres, Radians, SquareMetres, seconds};
@@ -133,11 +133,11 @@ impl<'a> Situation<'a> {
     /// # Errors
     /// [`NoAim`] if no ranger has a wall to measure.
     pub fn choose(&self) -> Result<Aim, NoAim> {
-        if !self.config.has_several_sonars() {
-            return Planner::new(self, RangerId::FIRST, &self.config.sonar).choose();
+        if !self.config.rangers.are_several() {
+            return Planner::new(self, RangerId::FIRST, &self.config.rangers.first).choose();
         }
         let mut best = Err(NoAim::NoWall);
-        for (ranger, sonar) in self.config.sonars() {
+        for (ranger, sonar) in self.config.rangers.iter() {
             if !self.rests(ranger) {
                 best = better(self.policy, best, Planner::new(self, ranger, sonar).choose());
             }
@@ -174,7 +174,7 @@ impl<'a> Situation<'a> {
     }
 
     fn planner(&self, ranger: RangerId) -> Result<Planner<'a>, NoAim> {
-        let sonar = self.config.sonar_of(ranger).ok_or(NoAim::NoWall)?;
+        let sonar = self.config.rangers.get(ranger).ok_or(NoAim::NoWall)?;
         Ok(Planner::new(self, ranger, sonar))
     }
 }
@@ -186,7 +186,7 @@ pub struct Standing {
     /// The bearing to which its servo is commanded; `None` before the first command.
     pub bearing: Option<Radians>,
     /// Time until it can ping there: its servo has settled, and the echoes of earlier pings that it
-    /// [hears](Sonar::hears) have decayed.
+    /// [hears](RangerParameters::hears) have decayed.
     pub ready_in: Duration,
 }
 
@@ -211,7 +211,7 @@ struct Planner<'a> {
     now: Instant,
     policy: Policy,
     ranger: RangerId,
-    sonar: &'a Sonar,
+    sonar: &'a RangerParameters,
     slot: Slot,
     view: Viewpoint<'a>,
     duration: PingDuration,
@@ -237,7 +237,7 @@ struct Pointing {
 }
 
 impl<'a> Planner<'a> {
-    fn new(situation: &Situation<'a>, ranger: RangerId, sonar: &'a Sonar) -> Self {
+    fn new(situation: &Situation<'a>, ranger: RangerId, sonar: &'a RangerParameters) -> Self {
         let Situation { config, map, ekf, history, now, policy } = *situation;
         let view = Viewpoint::new(config, sonar, ekf);
         let duration = PingDuration::new(sonar);

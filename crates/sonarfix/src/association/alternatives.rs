@@ -11,7 +11,7 @@ use heapless::Vec;
 use crate::association::echo::{Others, density};
 use crate::association::history::History;
 use crate::association::reflector::{Beam, Reflector, Reflectors};
-use crate::config::{Config, Sonar};
+use crate::config::{Config, RangerParameters};
 use crate::filter::ekf::Ekf;
 use crate::geometry::elementary::sqrt;
 use crate::geometry::units::{Metres, Radians, SquareMetres};
@@ -39,7 +39,7 @@ pub(crate) struct Target<'a> {
 /// The robot in its map.
 pub(crate) struct Scene<'a, 'm> {
     pub config: &'a Config,
-    pub sonar: &'a Sonar,
+    pub sonar: &'a RangerParameters,
     pub map: Map<'m>,
     pub ekf: &'a Ekf,
     pub history: &'a History,
@@ -152,9 +152,9 @@ mod tests {
                 walls[1] = walls[1].with_accuracy(Metres(1e-3 * f32::from(accuracy)));
             }
             let mut config = Config::for_track_width(Metres(0.2));
-            config.sonar.cone = Radians::from_degrees(12.0);
-            config.sonar.max_range = Metres(6.0);
-            config.sonar.mount = Point::default();
+            config.rangers.first.cone = Radians::from_degrees(12.0);
+            config.rangers.first.max_range = Metres(6.0);
+            config.rangers.first.mount = Point::default();
             config.echo.map_accuracy = Metres(0.03);
             let deviation = StandardDeviations {
                 x: Metres(0.08), y: Metres(0.05), heading: Radians(0.01), ..StandardDeviations::default()
@@ -175,12 +175,12 @@ mod tests {
             prop_assert!(known.is_none_or(|known| (known.0 - travelled).abs() < 1e-6));
             prop_assert!(history.travelled_since(WallId(2)).is_none());
 
-            let position = SonarPosition::new(config.sonar.mount, &ekf.state());
+            let position = SonarPosition::new(config.rangers.first.mount, &ekf.state());
             let expected = ExpectedRange::from_sonar(&walls[0], &position);
             // So wide that every end of a wall is within reach of the measured range.
             let target = Target { expected: &expected, variance: SquareMetres(1.0), answers };
             let range = Metres(distances[which] + off);
-            let scene = Scene { config: &config, sonar: &config.sonar, map, ekf: &ekf, history: &history };
+            let scene = Scene { config: &config, sonar: &config.rangers.first, map, ekf: &ekf, history: &history };
             let others = scene.others(&target, Radians(0.0), range);
 
             let wide = f64::from;
@@ -188,7 +188,7 @@ mod tests {
             let (mut density, mut silent, mut before) = (0.0, 1.0, 1.0);
             let axis = Vector::of_angle(0.0);
             let beam = Beam { from: Vector::new(0.0, 0.0), axis, range: Some(range.0) };
-            let reflectors = Reflectors::new(map, &config.sonar);
+            let reflectors = Reflectors::new(map, &config.rangers.first);
             let (found, _) = reflectors.in_beam(&beam, 9.0, 3.0);
             let mut compared = 0;
             for it in found.iter().filter(|it| it.wall != WallId(0)) {
@@ -200,7 +200,7 @@ mod tests {
                 let p = (0.08 * x).powi(2) + (0.05 * y).powi(2);
                 let ratio = 2.0 / wide(travelled);
                 let map_error = if is_used && it.wall == used { (1.0 + ratio * ratio).sqrt() } else { 1.0 };
-                let noise = &config.sonar.noise;
+                let noise = &config.rangers.first.noise;
                 let sonar = wide(noise.floor.0).powi(2) + (wide(noise.per_metre) * h).powi(2);
                 let own = accuracy.filter(|_| it.wall == WallId(1));
                 let map = own.map_or(0.03, |accuracy| 1e-3 * f64::from(accuracy));

@@ -152,14 +152,6 @@ impl ExpectedEcho {
         (1.0 - self.occluded) * self.geometry * parameters.heard()
     }
 
-    /// What a ping of a ranger that works returns here, if no earlier ping has revealed an object.
-    pub fn shares(&self, parameters: &EchoParameters) -> Shares {
-        let (g, occluded) = (self.geometry, parameters.prior_occlusion(self.range));
-        let explained = g * (1.0 - occluded) * parameters.heard();
-        let silent = (1.0 - occluded) * parameters.missed + occluded * NO_ECHO_OCCLUDED;
-        Shares::working(explained, g * silent + (1.0 - g) * NO_ECHO_OFF_WALL)
-    }
-
     fn of_echo(&self, parameters: &EchoParameters, innovation: f32) -> Densities {
         let EchoParameters { short, long, .. } = *parameters;
         let (g, s) = (self.geometry, self.variance.0);
@@ -204,6 +196,15 @@ impl ExpectedEcho {
                 + self.occluded * NO_ECHO_OCCLUDED,
         }
     }
+}
+
+/// What a ping of a ranger that works returns from a wall at `range` that is square with a probability of `geometry`, if no
+/// earlier ping has revealed an object.
+pub(crate) fn shares(parameters: &EchoParameters, geometry: f32, range: Metres) -> Shares {
+    let (g, occluded) = (geometry, parameters.prior_occlusion(range));
+    let explained = g * (1.0 - occluded) * parameters.heard();
+    let silent = (1.0 - occluded) * parameters.missed + occluded * NO_ECHO_OCCLUDED;
+    Shares::working(explained, g * silent + (1.0 - g) * NO_ECHO_OFF_WALL)
 }
 
 /// N'(ν; 0, S): the density of the echo of a wall. The error of an estimate that an outlier or a slip of the

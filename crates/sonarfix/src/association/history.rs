@@ -174,7 +174,7 @@ impl History {
     /// Whether a ranger has probably failed, and more probably than another one of the robot.
     pub fn has_failed(&self, ranger: RangerId, config: &Config) -> bool {
         let Some(own) = self.reliability.get(ranger.index()) else { return false };
-        let others = self.reliability.iter().zip(config.sonars());
+        let others = self.reliability.iter().zip(config.rangers.iter());
         others.map(|(other, _)| other).any(|other| own.has_failed(other))
     }
 
@@ -195,7 +195,7 @@ impl History {
             if self.latest == ranger {
                 return duration.rest_after(latest.range);
             }
-            let sonars = config.sonar_of(ranger).zip(config.sonar_of(self.latest));
+            let sonars = config.rangers.get(ranger).zip(config.rangers.get(self.latest));
             let heard = sonars.filter(|(sonar, latest)| sonar.hears(latest));
             heard.map_or(0.0, |(_, other)| PingDuration::new(other).rest_after(latest.range))
         };

@@ -8,7 +8,7 @@
 
 use heapless::Vec;
 
-use crate::config::Sonar;
+use crate::config::RangerParameters;
 use crate::geometry::elementary::sqrt;
 use crate::geometry::trig::sin_cos;
 use crate::geometry::units::Metres;
@@ -121,8 +121,8 @@ impl<'m> Reflectors<'m> {
     /// The reflectors of a map as this ranger hears them.
     #[inline(never)]
     #[must_use]
-    pub fn new(map: Map<'m>, sonar: &Sonar) -> Self {
-        let Sonar { cone, max_range, .. } = *sonar;
+    pub fn new(map: Map<'m>, sonar: &RangerParameters) -> Self {
+        let RangerParameters { cone, max_range, .. } = *sonar;
         let cos = |angle| sin_cos(angle).1;
         Self { map, cos_cone: cos(cone), cos_rim: cos(cone * RIM), max_range: max_range.0 }
     }

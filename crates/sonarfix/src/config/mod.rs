@@ -13,10 +13,11 @@ use crate::geometry::units::{Duration, Metres, MetresPerSecond, PerRootMetre, Ra
 use crate::sensor::gyro::GyroParameters;
 
 pub use crate::sensor::echo::EchoParameters;
-pub use crate::sensor::further::{Further, MAX_RANGERS, TooMany};
 pub use crate::sensor::ranger::{
-    LightBeam, LightLinked, PingSchedule, PingTiming, RangerId, Ranging, ServoTiming, Sonar,
+    LightBeam, LightLinked, PingSchedule, PingTiming, RangerId, RangerParameters, Ranging,
+    ServoTiming,
 };
+pub use crate::sensor::rangers::{MAX_RANGERS, Rangers, TooMany};
 
 /// Largest angle of incidence of light: beyond it the range along the beam diverges.
 const MAX_INCIDENCE: Radians = Radians(75.0 * core::f32::consts::PI / 180.0);
@@ -155,8 +156,8 @@ pub struct Config {
     pub drive: Drive,
     /// Fastest speed of a wheel; a faster travel is a fault of an encoder.
     pub max_wheel_speed: MetresPerSecond,
-    /// The sonar.
-    pub sonar: Sonar,
+    /// The rangers. They share one ping schedule: there is one ping at a time.
+    pub rangers: Rangers<RangerParameters>,
     /// Uncertainty of the robot's systematic errors.
     pub prior: CalibrationPrior,
     /// Gates and margins.
@@ -169,8 +170,6 @@ pub struct Config {
     pub weights: Weights,
     /// The gyro, if the robot has one.
     pub gyro: Option<GyroParameters>,
-    /// The rangers beside [`Self::sonar`]. They have its ping schedule: there is one ping at a time.
-    pub further_sonars: Further<Sonar>,
 }
 
 /// A field that [`Config::check`] refused, and its rule.
@@ -178,7 +177,7 @@ pub struct Config {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct ConfigError {
-    /// The field, as a path from [`Config`]: `"sonar.cone"`.
+    /// The field, as a path from [`Config`]; that of a ranger begins with `sonar`, as in a robot file: `"sonar.cone"`.
     pub field: &'static str,
     /// What it must be.
     pub rule: &'static str,
@@ -233,9 +232,9 @@ impl Config {
     /// use sonarfix::config::Config;
     /// use sonarfix::geometry::units::Metres;
     /// let mut config = Config::for_track_width(Metres(0.16));
-    /// config.sonar.max_range = Metres(3.0);
+    /// config.rangers.first.max_range = Metres(3.0);
     /// assert!(config.check().is_ok());
-    /// config.sonar.max_range = Metres(f32::NAN);
+    /// config.rangers.first.max_range = Metres(f32::NAN);
     /// assert_eq!(config.check().unwrap_err().field, "sonar.max_range");
     /// ```
     #[must_use]
@@ -249,42 +248,19 @@ impl Config {
                 track_width_walk: PerRootMetre(Metres(1e-5)),
             },
             max_wheel_speed: MetresPerSecond(2.0),
-            sonar: Sonar::default(),
+            rangers: Rangers::one(RangerParameters::default()),
             prior: CalibrationPrior::for_track_width(track_width),
             gating: GatingParameters::default(),
             echo: EchoParameters::default(),
             policy: Policy::default(),
             weights: Weights::default(),
             gyro: None,
-            further_sonars: Further::NONE,
         }
-    }
-
-    /// A ranger of this robot; `None` if it has no such one.
-    #[must_use]
-    pub fn sonar_of(&self, ranger: RangerId) -> Option<&Sonar> {
-        match ranger.index().checked_sub(1) {
-            None => Some(&self.sonar),
-            Some(further) => self.further_sonars.get(further),
-        }
-    }
-
-    /// All rangers, in the order of the robot file.
-    pub fn sonars(&self) -> impl Iterator<Item = (RangerId, &Sonar)> {
-        let all = core::iter::once(&self.sonar).chain(self.further_sonars.iter());
-        (0..).map(RangerId).zip(all)
     }
 
     /// Sets the ping schedule, which all rangers share.
     pub fn set_ping_schedule(&mut self, schedule: PingSchedule) {
-        self.sonar.timing.schedule = schedule;
-        self.further_sonars.iter_mut().for_each(|sonar| sonar.timing.schedule = schedule);
-    }
-
-    /// Whether the robot has more than one ranger.
-    #[must_use]
-    pub fn has_several_sonars(&self) -> bool {
-        !self.further_sonars.is_empty()
+        self.rangers.iter_mut().for_each(|ranger| ranger.timing.schedule = schedule);
     }
 
     /// Checks every field.
@@ -293,8 +269,7 @@ impl Config {
     /// [`ConfigError`] with the first field that breaks its rule.
     pub fn check(&self) -> Result<(), ConfigError> {
         self.check_drive()?;
-        check_sonar(&self.sonar)?;
-        self.check_further_sonars()?;
+        self.check_rangers()?;
         let prior = &self.prior;
         let weights = &self.weights;
         not_negative(
@@ -403,18 +378,18 @@ impl Config {
         )
     }
 
-    fn check_further_sonars(&self) -> Result<(), ConfigError> {
-        for sonar in self.further_sonars.iter() {
-            let is_shared = sonar.timing.schedule == self.sonar.timing.schedule;
-            require("further_sonars.timing.schedule", is_shared, "that of the first ranger")?;
-            check_sonar(sonar)?;
+    fn check_rangers(&self) -> Result<(), ConfigError> {
+        for (_, ranger) in self.rangers.iter() {
+            let is_shared = ranger.timing.schedule == self.rangers.first.timing.schedule;
+            require("rangers.timing.schedule", is_shared, "that of the first ranger")?;
+            check_ranger(ranger)?;
         }
         Ok(())
     }
 }
 
 /// Checks the fields of one ranger.
-fn check_sonar(sonar: &Sonar) -> Result<(), ConfigError> {
+fn check_ranger(sonar: &RangerParameters) -> Result<(), ConfigError> {
     let is_near = |offset: f32| (-LARGEST..=LARGEST).contains(&offset);
     let is_near = is_near(sonar.mount.x.0) && is_near(sonar.mount.y.0);
     require("sonar.mount", is_near, "at most 10,000 m from the middle of the axle")?;

@@ -32,7 +32,7 @@ pub struct EchoParameters {
     /// By how much more per radian between the axis and the normal.
     pub late_per_radian: Metres,
     /// Angle between the axis of a sonar and the normal of a wall at which it answers half as often as on the normal. Zero: not
-    /// known, and the [cone](crate::sensor::ranger::Sonar::cone) is taken for it.
+    /// known, and the [cone](crate::sensor::ranger::RangerParameters::cone) is taken for it.
     pub half_angle: Radians,
     /// Standard deviation of that angle from ping to ping: the width of a soft rim.
     pub rim: Radians,

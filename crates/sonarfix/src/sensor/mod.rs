@@ -2,9 +2,9 @@
 
 pub mod absolute;
 pub mod echo;
-pub mod further;
 pub mod gyro;
 pub mod range;
 pub mod ranger;
+pub mod rangers;
 pub mod servo;
 pub mod timing;

@@ -55,14 +55,14 @@ impl LightBeam {
         Self { spot: Radians(0.12), pointing: Radians(0.02), linked: LightLinked };
 }
 
-/// One of a robot's rangers, by its place in the robot file: 0 is [`Config::sonar`](crate::config::Config::sonar).
+/// One of a robot's rangers, by its place in the robot file, from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RangerId(pub u8);
 
 impl RangerId {
-    /// The first one, [`Config::sonar`](crate::config::Config::sonar).
+    /// The first one.
     pub const FIRST: Self = Self(0);
 
     /// The number as an index.
@@ -77,7 +77,7 @@ impl RangerId {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
-pub struct Sonar {
+pub struct RangerParameters {
     /// Position of the sonar's axis in the robot frame.
     pub mount: Point,
     /// Rightmost and leftmost bearing of the servo, relative to the heading of the robot; −π and π
@@ -98,16 +98,16 @@ pub struct Sonar {
     pub ranging: Ranging,
 }
 
-impl Sonar {
+impl RangerParameters {
     /// The bearing of a sonar without a servo; `None` for one with a servo.
     ///
     /// ```
     /// use sonarfix::config::Config;
     /// use sonarfix::geometry::units::{Metres, Radians};
     /// let mut config = Config::for_track_width(Metres(0.16));
-    /// assert_eq!(config.sonar.fixed_bearing(), None);
-    /// config.sonar.servo = (Radians(1.5), Radians(1.5));
-    /// assert_eq!(config.sonar.fixed_bearing(), Some(Radians(1.5)));
+    /// assert_eq!(config.rangers.first.fixed_bearing(), None);
+    /// config.rangers.first.servo = (Radians(1.5), Radians(1.5));
+    /// assert_eq!(config.rangers.first.fixed_bearing(), Some(Radians(1.5)));
     /// assert!(config.check().is_ok());
     /// ```
     #[must_use]
@@ -123,7 +123,7 @@ impl Sonar {
     }
 }
 
-impl Default for Sonar {
+impl Default for RangerParameters {
     /// An ideal ranger at the centre of the robot, on a servo without limits or delay: one
     /// ping per second.
     fn default() -> Self {

@@ -5,7 +5,7 @@
 //! duration from NaN or from a negative number is zero.
 
 use crate::geometry::units::{Duration, Metres, Radians, seconds};
-use crate::sensor::ranger::{PingSchedule, Ranging, Sonar};
+use crate::sensor::ranger::{PingSchedule, RangerParameters, Ranging};
 use crate::sensor::servo::ServoMotion;
 
 /// Speed of sound in air of 20 °C, m/s (331.3 + 0.606 · 20). Planning needs no better value.
@@ -34,7 +34,7 @@ pub(crate) struct PingDuration {
 }
 
 impl PingDuration {
-    pub fn new(sonar: &Sonar) -> Self {
+    pub fn new(sonar: &RangerParameters) -> Self {
         let timing = &sonar.timing;
         let (period, cycle) = match timing.schedule {
             PingSchedule::Every(period) => (seconds(period), 0.0),

@@ -32,13 +32,13 @@ impl Margins {
     fn safe(config: &Config, localizer: &Localizer) -> Self {
         let confidence = f64::from(config.gating.confidence);
         let heading = f64::from(localizer.filter().standard_deviations().heading.0);
-        let cone = f64::from(config.sonar.cone.0) + (confidence * heading).min(0.3);
+        let cone = f64::from(config.rangers.first.cone.0) + (confidence * heading).min(0.3);
         Self { least: 0.7, confidence, cone }
     }
 
     /// When no wall is safe.
     fn none(config: &Config) -> Self {
-        Self { least: 0.2, confidence: 0.0, cone: 0.7 * f64::from(config.sonar.cone.0) }
+        Self { least: 0.2, confidence: 0.0, cone: 0.7 * f64::from(config.rangers.first.cone.0) }
     }
 }
 
@@ -66,7 +66,7 @@ impl Rules {
             config,
             state: state_of(localizer.filter()),
             p: covariance_of(localizer.filter()),
-            views: ends.iter().map(|e| View::new(e.0, e.1, config.sonar.mount)).collect(),
+            views: ends.iter().map(|e| View::new(e.0, e.1, config.rangers.first.mount)).collect(),
         }
     }
 
@@ -109,7 +109,7 @@ impl Rules {
         let sigma = self.deviation_along(tx, ty).hypot(0.02);
         let foot = between(-along / sigma, (length - along) / sigma);
         let range = view.expected_range(&self.state);
-        let sonar = &self.config.sonar;
+        let sonar = &self.config.rangers.first;
         let sigma = self.deviation_along(-ty, tx).hypot(0.001);
         let (nearest, farthest) = (f64::from(sonar.min_range.0), f64::from(sonar.max_range.0));
         (foot, between((nearest - range) / sigma, (farthest - range) / sigma))
@@ -123,7 +123,7 @@ impl Rules {
 
     /// Distance of the square bearing from the travel of the servo.
     fn beyond_the_servo(&self, wall: usize) -> f64 {
-        let (right, left) = self.config.sonar.servo;
+        let (right, left) = self.config.rangers.first.servo;
         let (right, left) = (f64::from(right.0), f64::from(left.0));
         let bearing = self.bearing(wall);
         if (right..=left).contains(&bearing) {
@@ -134,7 +134,7 @@ impl Rules {
 
     /// Within the servo's reach, or so near that the foot is in the cone.
     fn reachable(&self, wall: usize) -> f64 {
-        f64::from(self.config.sonar.cone.0) - self.beyond_the_servo(wall)
+        f64::from(self.config.rangers.first.cone.0) - self.beyond_the_servo(wall)
     }
 
     /// No occlusion.
@@ -198,7 +198,7 @@ impl Rules {
     /// The decrease of the weighted sum of variances, by an actual correction.
     fn gain(&self, wall: usize) -> f64 {
         let range = self.views[wall].expected_range(&self.state);
-        let noise = &self.config.sonar.noise;
+        let noise = &self.config.rangers.first.noise;
         let r = f64::from(noise.floor.0).powi(2) + (f64::from(noise.per_metre) * range).powi(2);
         let (_, after) = corrected(&self.p, &self.jacobian(wall), r);
         let drop = |state: usize| self.p[(state, state)] - after[(state, state)];
@@ -212,7 +212,7 @@ impl Rules {
 
     /// Probability of foot, range and squareness.
     fn success(&self, wall: usize, off: f64) -> f64 {
-        let cone = f64::from(self.config.sonar.cone.0);
+        let cone = f64::from(self.config.rangers.first.cone.0);
         let sigma = self.heading_deviation().hypot(0.01);
         let (foot, range) = self.foot_and_range(wall);
         foot * range * between((-cone - off) / sigma, (cone - off) / sigma)
@@ -301,9 +301,9 @@ prop_compose! {
     ) -> Config {
         let mut config = config_for_rooms(mount);
         config.policy = policy;
-        config.sonar.cone = Radians(cone);
-        config.sonar.max_range = Metres(max);
-        config.sonar.servo = (Radians(right), Radians(left));
+        config.rangers.first.cone = Radians(cone);
+        config.rangers.first.max_range = Metres(max);
+        config.rangers.first.servo = (Radians(right), Radians(left));
         config.gating.confidence = confidence;
         config.weights.heading = Metres(heading);
         config.weights.wheels = Metres(wheels);
@@ -357,7 +357,7 @@ proptest! {
         let bearings: Vec<_> =
             counting.iter().map(|&w| rules.bearing(w) + 0.1).chain([f64::from(askew)]).collect();
         for bearing in bearings {
-            let cone = f64::from(config.sonar.cone.0);
+            let cone = f64::from(config.rangers.first.cone.0);
             let square = |rules: &Rules, wall| {
                 let off = turn_between(rules.bearing(wall), bearing).abs();
                 rules.eligible(wall).min(cone - off)
@@ -448,7 +448,7 @@ proptest! {
         let aim = started(&config, &walls, room.robot, metres, (0.0, 0.0, 0)).aim().unwrap();
         // The cone is 15°, and 0.01 rad more for the heading; the apex may be one deviation nearer
         // and aside.
-        let tangent = (config.sonar.cone.0 + 0.01).tan();
+        let tangent = (config.rangers.first.cone.0 + 0.01).tan();
         let inside = tangent * (near * angle.cos() + metres) + metres - near * angle.sin();
         prop_assume!(inside.abs() > 1e-3);
         prop_assert_eq!(aim.wall != target.wall, inside > 0.0);
@@ -504,8 +504,8 @@ proptest! {
     #[test]
     fn a_wall_out_of_range_is_never_chosen(direction in -3.1_f32..3.1, distance in 0.06_f32..6.0, min in 0.05_f32..1.0, max in 2.0_f32..5.0) {
         let mut config = config_for_rooms(Point::default());
-        config.sonar.min_range = Metres(min);
-        config.sonar.max_range = Metres(max);
+        config.rangers.first.min_range = Metres(min);
+        config.rangers.first.max_range = Metres(max);
         let sight = Sight { direction, distance, foot: 0.5, length: 4.0, flipped: false };
         let walls = [sight.wall(Point::default())];
         let localizer = started(&config, &walls, Pose::default(), 0.02, (0.0, 0.0, 0));
@@ -520,13 +520,13 @@ proptest! {
     fn the_bearing_is_within_the_travel_of_the_servo(direction in -3.1_f32..3.1, right in -3.0_f32..0.0, reach in 0.1_f32..3.0) {
         let mut config = config_for_rooms(Point::default());
         let left = right + reach;
-        config.sonar.servo = (Radians(right), Radians(left));
+        config.rangers.first.servo = (Radians(right), Radians(left));
         let sight = Sight { direction, distance: 2.0, foot: 0.5, length: 4.0, flipped: false };
         let walls = [sight.wall(Point::default())];
         let localizer = started(&config, &walls, Pose::default(), 0.02, (0.0, 0.0, 0));
         let beyond = |limit: f32| turn_between(direction.into(), limit.into()).abs();
         let off = if (right..=left).contains(&direction) { 0.0 } else { beyond(right).min(beyond(left)) };
-        let slack = f64::from(config.sonar.cone.0) - off;
+        let slack = f64::from(config.rangers.first.cone.0) - off;
         prop_assume!(slack.abs() > 1e-4);
         let aim = localizer.aim();
         prop_assert_eq!(aim.is_ok(), slack > 0.0);
@@ -538,12 +538,12 @@ proptest! {
     #[test]
     fn a_fixed_sonar_measures_what_is_in_its_cone(direction in -3.1_f32..3.1, fixed in -3.1_f32..3.1) {
         let mut config = config_for_rooms(Point::default());
-        config.sonar.servo = (Radians(fixed), Radians(fixed));
+        config.rangers.first.servo = (Radians(fixed), Radians(fixed));
         let sight = Sight { direction, distance: 2.0, foot: 0.5, length: 4.0, flipped: false };
         let walls = [sight.wall(Point::default())];
         let localizer = started(&config, &walls, Pose::default(), 0.02, (0.0, 0.0, 0));
         let off = turn_between(direction.into(), fixed.into()).abs();
-        let slack = f64::from(config.sonar.cone.0) - off;
+        let slack = f64::from(config.rangers.first.cone.0) - off;
         prop_assume!(slack.abs() > 1e-4);
         let aim = localizer.aim();
         prop_assert_eq!(aim.is_ok(), slack > 0.0);
@@ -560,7 +560,7 @@ proptest! {
         let localizer = Localizer::new(config, Map::new(&walls), start, Instant::from_ticks(0)).unwrap();
         let aim = localizer.aim().unwrap();
         let sigma = f64::from(deviation).hypot(0.01);
-        let cone = f64::from(config.sonar.cone.0);
+        let cone = f64::from(config.rangers.first.cone.0);
         let square = between(-cone / sigma, cone / sigma);
         prop_assert!((f64::from(aim.why.success) - square).abs() < 2e-2 * square, "{aim:?}");
     }
@@ -625,7 +625,8 @@ const SLOW_SERVO: ServoTiming =
 fn with_servo(servo: ServoTiming) -> Config {
     let mut config = config_for_rooms(Point::default());
     let cycle = Duration::from_ticks(60_000);
-    config.sonar.timing = PingTiming { schedule: PingSchedule::AsFastAsPossible, servo, cycle };
+    config.rangers.first.timing =
+        PingTiming { schedule: PingSchedule::AsFastAsPossible, servo, cycle };
     config
 }
 
@@ -698,7 +699,7 @@ proptest! {
         let mut config = with_servo(SLOW_SERVO);
         // Ranges contain information on the position only.
         config.prior.range_scale = 0.0;
-        let noise = config.sonar.noise;
+        let noise = config.rangers.first.noise;
         let r = f64::from(noise.floor.0).powi(2) + f64::from(2.0 * noise.per_metre).powi(2);
         // A ping without a turn takes the cycle of the sonar; one after a turn by 90° a frame,
         // settling, 0.17 s/60°, and the flight of the sound.
@@ -750,9 +751,9 @@ fn waiting_for_a_wall_counts_once_a_second() {
         localizer.health().silent_in_a_row
     };
     let back = core::f32::consts::PI;
-    config.sonar.servo = (Radians(back), Radians(back));
+    config.rangers.first.servo = (Radians(back), Radians(back));
     assert_eq!(silent(config, &|it| it.skip()), 5);
-    config.sonar.servo = (Radians(back - 0.1), Radians(back));
+    config.rangers.first.servo = (Radians(back - 0.1), Radians(back));
     assert_eq!(silent(config, &|it| it.skip()), 50);
     assert_eq!(silent(config, &|it| it.skip_unplanned()), 5);
 }

@@ -210,7 +210,7 @@ proptest! {
     ) {
         let walls = one_wall();
         let mut localizer = new_localizer(&walls);
-        let sonar = localizer.config().sonar;
+        let sonar = localizer.config().rangers.first;
         let mut oracle = PageOracle::new(2.0, (sonar.min_range, sonar.max_range));
         for outcome in outcomes {
             let aim = localizer.aim().unwrap();
@@ -311,7 +311,7 @@ fn uncertainty_of_position_or_heading_degrades() {
         (Tracking, Degraded)
     );
     // The heading's limit is a quarter of the cone.
-    let limit = 0.25 * config_for_rooms(Point::default()).sonar.cone.0;
+    let limit = 0.25 * config_for_rooms(Point::default()).rangers.first.cone.0;
     assert_eq!(
         (
             skipped(only_ranges_degrade(), 0.99 * limit),

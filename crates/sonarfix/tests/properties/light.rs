@@ -77,8 +77,8 @@ fn light() -> Ranging {
 
 fn config_with_light(mount: Point) -> Config {
     let mut config = config_for_rooms(mount);
-    config.sonar.ranging = light();
-    config.sonar.cone = Radians::from_degrees(45.0);
+    config.rangers.first.ranging = light();
+    config.rangers.first.cone = Radians::from_degrees(45.0);
     config
 }
 
@@ -177,7 +177,7 @@ proptest! {
         let off = f64::from(aim.range.0) - along;
         prop_assert!(off > -1e-4 && off < 1e-4 + 7.6e-4 * along, "{along} {aim:?}");
         let score = aim.why.gain.0 * aim.why.success;
-        let (right, left) = config.sonar.servo;
+        let (right, left) = config.rangers.first.servo;
         for number in 0_u8..17 {
             let bearing = right + (left - right) * (f32::from(number) / 16.0);
             if let Ok(other) = localizer.aim_at(bearing) {
@@ -191,7 +191,7 @@ proptest! {
     fn a_beam_corrects_the_heading(room in any_room(), bearing in -3.0_f32..3.0) {
         let walls = room.walls();
         let mut config = config_with_light(Point::default());
-        config.sonar.ranging = Ranging::Light(LightBeam { pointing: Radians(0.002), ..LightBeam::VL53L1X });
+        config.rangers.first.ranging = Ranging::Light(LightBeam { pointing: Radians(0.002), ..LightBeam::VL53L1X });
         config.prior.range_scale = 0.0;
         let mut start = room.start();
         start.heading_deviation = Radians(0.03);
@@ -289,7 +289,8 @@ fn a_beam_has_limits() {
     let with = |spot, pointing| {
         let mut config = config_with_light(Point::default());
         let (spot, pointing) = (Radians(spot), Radians(pointing));
-        config.sonar.ranging = Ranging::Light(LightBeam { spot, pointing, ..LightBeam::VL53L1X });
+        config.rangers.first.ranging =
+            Ranging::Light(LightBeam { spot, pointing, ..LightBeam::VL53L1X });
         config.check().map_err(|error| error.field)
     };
     assert_eq!(with(0.1, 0.0), Ok(()));
@@ -300,6 +301,6 @@ fn a_beam_has_limits() {
         assert_eq!(with(0.1, pointing), Err("sonar.ranging.pointing"));
     }
     let mut config = config_with_light(Point::default());
-    config.sonar.cone = Radians(1.4);
+    config.rangers.first.cone = Radians(1.4);
     assert_eq!(config.check().unwrap_err().field, "sonar.cone");
 }

@@ -65,25 +65,25 @@ fn a_configuration_is_refused_at_its_limits() {
             |it| (it.echo.missed, it.echo.short, it.echo.long) = (0.4, 0.3, 0.5),
         ),
         (
-            |it| it.sonar.servo = (Radians(0.3), Radians(0.3)),
-            |it| it.sonar.servo = (Radians(0.3), Radians(0.299_999_98)),
+            |it| it.rangers.first.servo = (Radians(0.3), Radians(0.3)),
+            |it| it.rangers.first.servo = (Radians(0.3), Radians(0.299_999_98)),
         ),
         (
-            |it| it.sonar.servo = (Radians(3.0), Radians(3.0)),
-            |it| it.sonar.servo = (Radians(3.2), Radians(3.2)),
+            |it| it.rangers.first.servo = (Radians(3.0), Radians(3.0)),
+            |it| it.rangers.first.servo = (Radians(3.2), Radians(3.2)),
         ),
         (
-            |it| it.sonar.servo = (Radians(-3.0), Radians(-3.0)),
-            |it| it.sonar.servo = (Radians(f32::NAN), Radians(f32::NAN)),
+            |it| it.rangers.first.servo = (Radians(-3.0), Radians(-3.0)),
+            |it| it.rangers.first.servo = (Radians(f32::NAN), Radians(f32::NAN)),
         ),
-        (|it| it.sonar.cone = Radians(1e-3), |it| it.sonar.cone = Radians(0.0)),
+        (|it| it.rangers.first.cone = Radians(1e-3), |it| it.rangers.first.cone = Radians(0.0)),
         (
-            |it| it.sonar.cone = Radians(1.57),
-            |it| it.sonar.cone = Radians(core::f32::consts::FRAC_PI_2),
+            |it| it.rangers.first.cone = Radians(1.57),
+            |it| it.rangers.first.cone = Radians(core::f32::consts::FRAC_PI_2),
         ),
         (
-            |it| it.sonar.max_range.0 = it.sonar.min_range.0 + 0.1,
-            |it| it.sonar.max_range = it.sonar.min_range,
+            |it| it.rangers.first.max_range.0 = it.rangers.first.min_range.0 + 0.1,
+            |it| it.rangers.first.max_range = it.rangers.first.min_range,
         ),
     ];
     for (number, (permitted, refused)) in rules.into_iter().enumerate() {

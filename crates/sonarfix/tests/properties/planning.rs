@@ -26,10 +26,10 @@ fn config() -> Config {
     let mut config = config_for_rooms(Point::new(0.07, 0.03));
     (config.weights.heading, config.weights.wheels) = (Metres(1.7), Metres(13.0));
     config.echo.map_accuracy = Metres(MAP_ACCURACY);
-    config.sonar.max_range = Metres(8.0);
-    config.sonar.timing.schedule = PingSchedule::AsFastAsPossible;
-    config.sonar.timing.cycle = Duration::from_ticks(60_000);
-    config.sonar.timing.servo = ServoTiming::SG90;
+    config.rangers.first.max_range = Metres(8.0);
+    config.rangers.first.timing.schedule = PingSchedule::AsFastAsPossible;
+    config.rangers.first.timing.cycle = Duration::from_ticks(60_000);
+    config.rangers.first.timing.servo = ServoTiming::SG90;
     config
 }
 
@@ -82,7 +82,7 @@ fn distance(localizer: &Localizer, x: f64) -> f64 {
 
 /// R of a range, with the error of the map after this distance since the last range of the wall.
 fn noise(range: f64, travelled: Option<f64>) -> f64 {
-    let sonar = config().sonar.noise;
+    let sonar = config().rangers.first.noise;
     let proportional = f64::from(sonar.per_metre) * range;
     let repeated = travelled.map_or(1.0, |travelled| {
         let ratio = (2.0 * CORRELATION / travelled).min(50.0);
@@ -215,7 +215,7 @@ proptest! {
         prop_assert_eq!(next.bearing, first.bearing);
         // With a fixed period a turn costs nothing, and it is made.
         let mut config = config();
-        config.sonar.timing.schedule = PingSchedule::Every(Duration::from_ticks(1_000_000));
+        config.rangers.first.timing.schedule = PingSchedule::Every(Duration::from_ticks(1_000_000));
         let state = StateEstimate::default();
         let mut localizer = Localizer::resume(config, Map::new(&walls), state, deviation, at(0)).unwrap();
         let first = localizer.aim().unwrap();
@@ -263,8 +263,8 @@ proptest! {
         near in 1.1_f32..2.0, further in 1.3_f32..2.5, half in 11.0_f32..13.0, is_first in any::<bool>(),
     ) {
         let mut config = config();
-        config.sonar.cone = Radians::from_degrees(15.0);
-        config.sonar.mount = Point::default();
+        config.rangers.first.cone = Radians::from_degrees(15.0);
+        config.rangers.first.mount = Point::default();
         let (one, other) = (at_angle(near, half, 0.2), at_angle(near * further, -half, 0.2));
         let walls = if is_first { [one, other] } else { [other, one] };
         let deviation = StandardDeviations {
@@ -282,8 +282,8 @@ proptest! {
 #[test]
 fn of_equal_walls_the_first_is_measured() {
     let mut config = config();
-    config.sonar.mount = Point::default();
-    config.sonar.timing.schedule = PingSchedule::Every(Duration::from_ticks(1_000_000));
+    config.rangers.first.mount = Point::default();
+    config.rangers.first.timing.schedule = PingSchedule::Every(Duration::from_ticks(1_000_000));
     let beside = |y: f32| Wall::new(Point::new(-3.0, y), Point::new(3.0, y)).unwrap();
     let deviation = StandardDeviations { y: Metres(0.05), ..StandardDeviations::default() };
     for walls in [[beside(1.0), beside(-1.0)], [beside(-1.0), beside(1.0)]] {
@@ -305,7 +305,7 @@ fn the_limits_of_the_sonar_are_inside_its_reach() {
         let aim = localizer.aim().unwrap();
         localizer.fix(&aim, Some(Metres(range)))
     };
-    let sonar = config().sonar;
+    let sonar = config().rangers.first;
     for (limit, outside) in [
         (sonar.min_range.0, sonar.min_range.0.next_down()),
         (sonar.max_range.0, sonar.max_range.0.next_up()),

@@ -1,7 +1,7 @@
 //! Several rangers: the choice among them, and their ranges.
 
 use proptest::prelude::*;
-use sonarfix::config::{Config, RangerId, Sonar};
+use sonarfix::config::{Config, RangerId, RangerParameters};
 use sonarfix::filter::motion::WheelTravel;
 use sonarfix::geometry::pose::{Point, Pose};
 use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
@@ -11,8 +11,8 @@ use sonarfix::map::Map;
 use crate::strategies::{Room, any_room, bits, config_for_rooms};
 
 /// A ranger at a mount, on a servo with these limits.
-fn sonar(mount: (f32, f32), (right, left): (f32, f32), floor: f32) -> Sonar {
-    let mut sonar = config_for_rooms(Point::new(mount.0, mount.1)).sonar;
+fn sonar(mount: (f32, f32), (right, left): (f32, f32), floor: f32) -> RangerParameters {
+    let mut sonar = config_for_rooms(Point::new(mount.0, mount.1)).rangers.first;
     sonar.servo = (Radians(right), Radians(left));
     sonar.noise.floor = Metres(floor);
     sonar
@@ -22,16 +22,16 @@ prop_compose! {
     fn any_sonar()(
         mount in (-0.2_f32..0.2, -0.2_f32..0.2), right in -3.1_f32..1.0, width in 0.0_f32..2.0,
         is_fixed in any::<bool>(), floor in 0.002_f32..0.02,
-    ) -> Sonar {
+    ) -> RangerParameters {
         sonar(mount, (right, if is_fixed { right } else { right + width }), floor)
     }
 }
 
-fn robot(sonars: &[Sonar]) -> Config {
+fn robot(sonars: &[RangerParameters]) -> Config {
     let mut config = config_for_rooms(Point::default());
-    config.sonar = sonars[0];
+    config.rangers.first = sonars[0];
     for sonar in &sonars[1..] {
-        config.further_sonars.push(*sonar).unwrap();
+        config.rangers.push(*sonar).unwrap();
     }
     config
 }
@@ -65,7 +65,7 @@ proptest! {
         let now = Instant::from_ticks(0);
         let mut turned = sonars;
         turned.rotate_left(turn);
-        let begin = |sonars: &[Sonar]| Localizer::new(robot(sonars), Map::new(&walls), room.start(), now).unwrap();
+        let begin = |sonars: &[RangerParameters]| Localizer::new(robot(sonars), Map::new(&walls), room.start(), now).unwrap();
         let (mut one, mut other) = (begin(&sonars), begin(&turned));
         for (step, noise) in (1..).zip(noise) {
             let at = Instant::from_ticks(0).checked_add_duration(Duration::from_ticks(step * 100_000)).unwrap();

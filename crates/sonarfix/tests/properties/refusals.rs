@@ -94,7 +94,7 @@ proptest! {
         let mut localizer = started(&room, &walls, mount);
         let before = estimate(&localizer);
         let aim = localizer.aim().unwrap();
-        let cone = localizer.config().sonar.cone;
+        let cone = localizer.config().rangers.first.cone;
         let askew = |by: Radians| Aim { bearing: aim.bearing + by, ..aim };
         let good = Some(aim.range);
         let mut cases = vec![
@@ -130,11 +130,11 @@ proptest! {
         let aim = localizer.aim().unwrap();
         let ekf = localizer.filter();
         let expected = ExpectedRange::new(&walls[aim.wall.0 as usize], mount, &ekf.state());
-        let noise = config.sonar.noise.variance(expected.range);
+        let noise = config.rangers.first.noise.variance(expected.range);
         let innovation = ekf.innovation(aim.range, &expected, noise);
         let off = sigmas * innovation.variance.0.sqrt() * if far { 1.0 } else { -1.0 };
         let range = aim.range + Metres(off);
-        prop_assume!(range > config.sonar.min_range && range < config.sonar.max_range);
+        prop_assume!(range > config.rangers.first.min_range && range < config.rangers.first.max_range);
         let mut gated = localizer.clone();
         let fix = gated.fix(&aim, Some(range));
         prop_assert!(matches!(fix, Fix::Gated(_)), "{fix:?}");

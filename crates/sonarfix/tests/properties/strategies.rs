@@ -264,8 +264,8 @@ pub fn any_room() -> impl Strategy<Value = Room> {
 /// A configuration whose sonar reaches every wall of such a room.
 pub fn config_for_rooms(mount: Point) -> Config {
     let mut config = Config::for_track_width(Metres(0.2));
-    config.sonar.mount = mount;
-    config.sonar.max_range = Metres(12.0);
+    config.rangers.first.mount = mount;
+    config.rangers.first.max_range = Metres(12.0);
     config.prior.range_scale = 0.01;
     // No clutter, which has its own tests.
     config.echo = EchoParameters::NONE;

@@ -42,7 +42,7 @@ pub fn all(answers: &Answers) -> anyhow::Result<[(&'static str, String); 4]> {
 fn replacements(answers: &Answers) -> anyhow::Result<Vec<(&'static str, String)>> {
     let mut fitted = Scenario::paper()?;
     answers.sonar.fit(&mut fitted);
-    let sonar = fitted.robot.localizer.sonar;
+    let sonar = fitted.robot.localizer.rangers.first;
     let (board, pins) = (&answers.board, &answers.board.pins);
     let hexadecimal = |address: u32| format!("{address:#010X}").replace("0X", "0x");
     Ok(vec![

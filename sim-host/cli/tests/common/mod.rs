@@ -202,7 +202,7 @@ pub fn try_replay(log: &[u8], reference: &str, strict: bool) -> Result<Replayed,
     let floor = Floor::parse(MAP, "map.toml").unwrap();
     let robot = robot_file::parse(ROBOT, "robot.toml").unwrap();
     let walls = floor.walls();
-    let mut trace = Thinned::new(&floor, robot.localizer.sonar.cone, 1000);
+    let mut trace = Thinned::new(&floor, robot.localizer.rangers.first.cone, 1000);
     let mut complaints = Vec::new();
     let mut report = |complaint: &Complaint| complaints.push(complaint.to_string());
     let replay = Replay { robot: &robot, walls: &walls, strict };

@@ -1,7 +1,7 @@
 //! The devices of a scenario on the world's side of the wires. What the drivers know of them is the
 //! robot's configuration.
 
-use sonarfix::config::{ServoTiming, Sonar};
+use sonarfix::config::{RangerParameters, ServoTiming};
 use sonarfix::geometry::units::Duration;
 use sonarfix_hal::config::{RangerConfig, RobotConfig};
 use sonarfix_hal::ranger::{PulseTiming, RangerKind};
@@ -31,7 +31,7 @@ pub fn servo_model(name: ServoName) -> ServoModel {
 
 /// The servo of a sonar, of this name; or the fixed mount, at the configured bearing.
 #[must_use]
-pub fn servo(sonar: &Sonar, name: ServoName) -> ServoPlant {
+pub fn servo(sonar: &RangerParameters, name: ServoName) -> ServoPlant {
     match sonar.fixed_bearing() {
         None => ServoPlant::new(servo_model(name)),
         Some(bearing) => ServoPlant::fixed(bearing.0.into()),
@@ -40,7 +40,7 @@ pub fn servo(sonar: &Sonar, name: ServoName) -> ServoPlant {
 
 /// Where a duty sends the servo, radians: the simulated servo is as it was measured.
 #[must_use]
-pub fn bearing(duty: u16, sonar: &Sonar, driver: &RangerConfig) -> f64 {
+pub fn bearing(duty: u16, sonar: &RangerParameters, driver: &RangerConfig) -> f64 {
     let frame = micros(sonar.timing.servo.frame);
     let pulse = f64::from(duty) / f64::from(FULL_DUTY) * frame;
     let [one, other] = driver.servo_pulses;
@@ -64,10 +64,10 @@ pub fn mount_servo(scenario: &mut Scenario, name: ServoName) {
     };
     scenario.hardware.servo = name;
     let robot = &mut scenario.robot;
-    let (rightmost, leftmost) = robot.localizer.sonar.servo;
+    let (rightmost, leftmost) = robot.localizer.rangers.first.servo;
     let pulse = |width, bearing| MeasuredPulse { width: Duration::from_ticks(width), bearing };
-    robot.localizer.sonar.timing.servo = timing;
-    robot.ranger.servo_pulses = [pulse(shortest, rightmost), pulse(longest, leftmost)];
+    robot.localizer.rangers.first.timing.servo = timing;
+    robot.rangers.first.servo_pulses = [pulse(shortest, rightmost), pulse(longest, leftmost)];
 }
 
 /// How long the driver of a sonar listens, µs. At the fidelity of pins there are rangers

@@ -1,6 +1,6 @@
 //! A sonar with its board and its servo, on the world's side of the wires.
 
-use sonarfix::config::{RangerId, Sonar};
+use sonarfix::config::{RangerId, RangerParameters};
 use sonarfix_hal::config::{RangerConfig, RobotConfig};
 use sonarfix_map::ServoName;
 use sonarfix_pil::{EchoSignals, RangerActuators};
@@ -20,7 +20,7 @@ const GIVES_UP_AFTER: u64 = 6_000;
 pub struct SonarDevice<'a> {
     /// Which one.
     pub ranger: RangerId,
-    sonar: &'a Sonar,
+    sonar: &'a RangerParameters,
     driver: &'a RangerConfig,
     servo: ServoPlant,
     /// A commanded bearing that the servo has not started to move to.
@@ -40,7 +40,7 @@ impl<'a> SonarDevice<'a> {
     /// All sonars of a robot, on servos of this name or fixed.
     #[must_use]
     pub fn all(robot: &'a RobotConfig, name: ServoName) -> Vec<Self> {
-        let rangers = robot.localizer.sonars().filter_map(|(ranger, _)| {
+        let rangers = robot.localizer.rangers.iter().filter_map(|(ranger, _)| {
             let (sonar, driver) = robot.ranger_of(ranger)?;
             Some(Self {
                 ranger,
@@ -162,10 +162,10 @@ mod tests {
     /// Two sonars, 20 cm apart.
     fn robot() -> RobotConfig {
         let mut robot = Scenario::parse(CLASSROOM, "classroom.toml", "".as_ref()).unwrap().robot;
-        let mut other = robot.localizer.sonar;
+        let mut other = robot.localizer.rangers.first;
         other.mount.y.0 += 0.2;
-        robot.localizer.further_sonars.push(other).unwrap();
-        robot.further_rangers.push(robot.ranger).unwrap();
+        robot.localizer.rangers.push(other).unwrap();
+        robot.rangers.push(robot.rangers.first).unwrap();
         robot
     }
 
@@ -193,7 +193,7 @@ mod tests {
             sonars[0].answer(0, 10_000);
             assert_eq!(cross_talk(RangerId(1), &mut sonars, 10_000, 9_000, 340.0), 9_000);
         }
-        robot.localizer.sonar.ranging =
+        robot.localizer.rangers.first.ranging =
             sonarfix::config::Ranging::Light(sonarfix::config::LightBeam::VL53L1X);
         let mut sonars = SonarDevice::all(&robot, ServoName::Ideal);
         sonars[0].answer(0, 10_000);

@@ -174,7 +174,7 @@ impl Computer for ThisProcess<'_> {
         };
         let localizer = simulation.localizer(start.unwrap_or_else(no_pose), at)?;
         let mut search = config.start.is_unknown().then(|| {
-            let (sonar, map) = (&config.localizer.sonar, localizer.map());
+            let (sonar, map) = (&config.localizer.rangers.first, localizer.map());
             Search::new(sonar, map, SearchParameters::default())
         });
         let mut robot = Robot::new(localizer, config.wheels()?, settings)?;

@@ -1,7 +1,7 @@
 //! A scenario, prepared to be run.
 
 use rand_chacha::ChaCha8Rng;
-use sonarfix::config::{Config, PingSchedule, PingTiming, RangerId, Ranging, Sonar};
+use sonarfix::config::{Config, PingSchedule, PingTiming, RangerId, RangerParameters, Ranging};
 use sonarfix::geometry::pose::Pose;
 use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
 use sonarfix::localizer::{Localizer, Start};
@@ -93,8 +93,8 @@ impl Simulation {
         let world = World::new(&scenario.floor)
             .with_obstacles(around.obstacles.iter().map(obstacle).collect())
             .at_temperature(around.temperature);
-        let assumed = air::speed_of_sound(scenario.robot.ranger.temperature.0.into());
-        let stretch = match scenario.robot.localizer.sonar.ranging {
+        let assumed = air::speed_of_sound(scenario.robot.rangers.first.temperature.0.into());
+        let stretch = match scenario.robot.localizer.rangers.first.ranging {
             Ranging::Sound => assumed / world.speed_of_sound(),
             Ranging::Light(_) => 1.0,
         };
@@ -194,7 +194,8 @@ impl Simulation {
     /// An empty trace of this scenario.
     #[must_use]
     pub fn empty_trace(&self) -> Trace {
-        let trace = Trace::of(&self.scenario.floor, self.scenario.robot.localizer.sonar.cone);
+        let trace =
+            Trace::of(&self.scenario.floor, self.scenario.robot.localizer.rangers.first.cone);
         Trace { obstacles: self.world.obstacles().to_vec(), ..trace }
     }
 
@@ -249,8 +250,7 @@ impl Simulation {
     #[must_use]
     pub fn config(&self) -> Config {
         let mut config = self.assumed.unwrap_or(self.scenario.robot).localizer;
-        config.sonar.timing = self.timing(&config.sonar);
-        for sonar in config.further_sonars.iter_mut() {
+        for sonar in config.rangers.iter_mut() {
             sonar.timing = self.timing(sonar);
         }
         config
@@ -263,7 +263,7 @@ impl Simulation {
     }
 
     /// The measurement timing: at the ideal fidelity there is no servo.
-    fn timing(&self, sonar: &Sonar) -> PingTiming {
+    fn timing(&self, sonar: &RangerParameters) -> PingTiming {
         match self.scenario.fidelity {
             Fidelity::Pins => sonar.timing,
             Fidelity::Ideal => PingTiming {
@@ -276,7 +276,7 @@ impl Simulation {
     /// Period of the measurements at the ideal fidelity. As fast as possible means once in a cycle of
     /// the ranger, or with every encoder tick if the cycle is zero.
     pub(super) fn ideal_period(&self) -> Duration {
-        let timing = &self.scenario.robot.localizer.sonar.timing;
+        let timing = &self.scenario.robot.localizer.rangers.first.timing;
         match timing.schedule {
             PingSchedule::Every(period) => period,
             PingSchedule::AsFastAsPossible if timing.cycle.is_zero() => {
@@ -317,7 +317,7 @@ impl Simulation {
 }
 
 fn models(config: &Config) -> Vec<Model> {
-    config.sonars().map(|(_, sonar)| Model::of_ranger(config, sonar)).collect()
+    config.rangers.iter().map(|(_, sonar)| Model::of_ranger(config, sonar)).collect()
 }
 
 fn sensor(scenario: &Scenario) -> SensorModel {

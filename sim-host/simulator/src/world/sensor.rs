@@ -135,7 +135,7 @@ impl SensorModel {
     /// at the foot of the perpendicular, the nearest one inside the cone.
     #[must_use]
     pub fn ideal(scenario: &Scenario) -> Self {
-        let (truth, sonar) = (&scenario.truth, &scenario.robot.localizer.sonar);
+        let (truth, sonar) = (&scenario.truth, &scenario.robot.localizer.rangers.first);
         let reach = (sonar.min_range.0.into(), sonar.max_range.0.into());
         let light = match sonar.ranging {
             Ranging::Sound => None,

@@ -27,8 +27,8 @@ fn walls(inside: [(f32, f32, f32); 2]) -> Vec<Wall> {
     ends.into_iter().map(|(from, to)| Wall::new(point(from), point(to)).unwrap()).collect()
 }
 
-fn sonar(cone: f32) -> Sonar {
-    let mut sonar = sonarfix::config::Config::for_track_width(Metres(0.2)).sonar;
+fn sonar(cone: f32) -> RangerParameters {
+    let mut sonar = sonarfix::config::Config::for_track_width(Metres(0.2)).rangers.first;
     (sonar.cone, sonar.max_range) = (Radians(cone), Metres(3.5));
     sonar
 }

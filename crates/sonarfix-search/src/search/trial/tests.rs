@@ -118,7 +118,7 @@ proptest! {
     ) {
         let walls = walls();
         let config = Config::for_track_width(Metres(0.2));
-        let echoes = EchoModel::new(Map::new(&walls), &config.sonar, &EchoParameters::HC_SR04);
+        let echoes = EchoModel::new(Map::new(&walls), &config.rangers.first, &EchoParameters::HC_SR04);
         let prior = Prior { drift: 0.05, turn_scale: 0.03 };
         let odometry = Odometry { prior, per_metre };
         let (window, placement) = drive(turn, pings, &noise);

@@ -201,7 +201,7 @@ proptest! {
         let point = |(x, y)| Point::new(x, y);
         let walls: Vec<Wall> =
             ends.iter().map(|&(from, to)| Wall::new(point(from), point(to)).unwrap()).collect();
-        let mut sonar = Config::for_track_width(Metres(0.2)).sonar;
+        let mut sonar = Config::for_track_width(Metres(0.2)).rangers.first;
         (sonar.cone, sonar.max_range) = (Radians::from_degrees(cone), Metres(3.0));
         let reflectors = Reflectors::new(Map::new(&walls), &sonar);
         let from = Vector::new(sx * width, sy * height);
@@ -226,7 +226,7 @@ fn wall(from: (f32, f32), to: (f32, f32)) -> Wall {
 }
 
 fn reflectors(walls: &[Wall], degrees: f32) -> Reflectors<'_> {
-    let mut sonar = Config::for_track_width(Metres(0.2)).sonar;
+    let mut sonar = Config::for_track_width(Metres(0.2)).rangers.first;
     (sonar.cone, sonar.max_range) = (Radians::from_degrees(degrees), Metres(4.0));
     Reflectors::new(Map::new(walls), &sonar)
 }

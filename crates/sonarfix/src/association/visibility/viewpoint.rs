@@ -4,7 +4,7 @@
 //! Comparisons are written so that a wall whose numbers are NaN cannot be measured.
 
 use crate::association::outcome::Refusal;
-use crate::config::{Config, EchoParameters, Ranging, Sonar};
+use crate::config::{Config, EchoParameters, RangerParameters, Ranging};
 use crate::filter::ekf::{Ekf, PoseCovariance};
 use crate::geometry::elementary::{inverse_sqrt, sqrt};
 use crate::geometry::numeric::positive_part;
@@ -62,7 +62,7 @@ pub(crate) struct Sight {
 
 /// The estimate of the filter as seen from the sonar: computed once for all walls.
 pub(crate) struct Viewpoint<'a> {
-    pub sonar: &'a Sonar,
+    pub sonar: &'a RangerParameters,
     position: SonarPosition,
     pub heading: Heading,
     /// Cone in which other walls occlude the target, without the uncertainty of the heading.
@@ -79,7 +79,7 @@ pub(crate) struct Viewpoint<'a> {
 }
 
 impl<'a> Viewpoint<'a> {
-    pub fn new(config: &'a Config, sonar: &'a Sonar, ekf: &Ekf) -> Self {
+    pub fn new(config: &'a Config, sonar: &'a RangerParameters, ekf: &Ekf) -> Self {
         let state = ekf.state();
         Self {
             sonar,
@@ -249,14 +249,13 @@ impl<'a> Viewpoint<'a> {
 
 /// Largest deviation of the heading at which the estimate counts as tracking: that of the least demanding ranger.
 pub(crate) fn max_heading_deviation_of(config: &Config) -> Radians {
-    let of = |sonar: &Sonar| max_heading_deviation(sonar, &config.echo);
-    let first = of(&config.sonar);
-    let others = config.further_sonars.iter().map(of);
+    let of = |ranger: &RangerParameters| max_heading_deviation(ranger, &config.echo);
+    let (first, others) = (of(&config.rangers.first), config.rangers.after_first().map(of));
     others.fold(first, |most, other| if other > most { other } else { most })
 }
 
 /// The same of one ranger.
-fn max_heading_deviation(sonar: &Sonar, echo: &EchoParameters) -> Radians {
+fn max_heading_deviation(sonar: &RangerParameters, echo: &EchoParameters) -> Radians {
     match sonar.ranging {
         Ranging::Sound => half_angle(sonar, echo) * MAX_HEADING_DEVIATION,
         Ranging::Light(_) => MAX_LIGHT_HEADING_DEVIATION,
@@ -264,7 +263,7 @@ fn max_heading_deviation(sonar: &Sonar, echo: &EchoParameters) -> Radians {
 }
 
 /// Angle off the perpendicular at which a ranger hears half of the walls: that of its echo model, otherwise its cone.
-fn half_angle(sonar: &Sonar, echo: &EchoParameters) -> Radians {
+fn half_angle(sonar: &RangerParameters, echo: &EchoParameters) -> Radians {
     let is_known = sonar.ranging == Ranging::Sound && echo.half_angle > Radians(0.0);
     if is_known { echo.half_angle } else { sonar.cone }
 }
@@ -273,7 +272,10 @@ fn half_angle(sonar: &Sonar, echo: &EchoParameters) -> Radians {
 ///
 /// # Errors
 /// [`Refusal::NoEcho`], [`Refusal::NotFinite`] or [`Refusal::OutOfRange`].
-pub(crate) fn check_range(sonar: &Sonar, range: Option<Metres>) -> Result<Metres, Refusal> {
+pub(crate) fn check_range(
+    sonar: &RangerParameters,
+    range: Option<Metres>,
+) -> Result<Metres, Refusal> {
     let range = range.ok_or(Refusal::NoEcho)?;
     if !range.is_finite() {
         return Err(Refusal::NotFinite);
@@ -340,7 +342,7 @@ mod tests {
     fn a_heading_is_known_up_to_its_limit() {
         use crate::filter::ekf::{Ekf, StandardDeviations, StateEstimate};
         let config = Config::for_track_width(Metres(0.2));
-        let limit = max_heading_deviation(&config.sonar, &config.echo);
+        let limit = max_heading_deviation(&config.rangers.first, &config.echo);
         for (share, is_known) in
             [(0.0, true), (0.5, true), (0.99, true), (1.01, false), (9.0, false)]
         {
@@ -348,7 +350,7 @@ mod tests {
             let deviation = StandardDeviations { heading, ..StandardDeviations::default() };
             let ekf = Ekf::new(config.drive, StateEstimate::default(), deviation).unwrap();
             assert_eq!(
-                Viewpoint::new(&config, &config.sonar, &ekf).is_heading_known(),
+                Viewpoint::new(&config, &config.rangers.first, &ekf).is_heading_known(),
                 is_known,
                 "{share}"
             );
@@ -369,9 +371,9 @@ mod tests {
         let ekf = ekf_with(0.02);
         for cone in [8.0_f32, 12.0, 20.0, 40.0] {
             let mut config = Config::for_track_width(Metres(0.2));
-            config.sonar.cone = Radians::from_degrees(cone);
+            config.rangers.first.cone = Radians::from_degrees(cone);
             (config.echo.half_angle, config.echo.rim) = (Radians(0.56), Radians(0.03));
-            let view = Viewpoint::new(&config, &config.sonar, &ekf);
+            let view = Viewpoint::new(&config, &config.rangers.first, &ekf);
             let (half, rim) = (f64::from(config.echo.half_angle.0), f64::from(config.echo.rim.0));
             let sigma = (0.02_f64.powi(2) + 0.01_f64.powi(2) + rim * rim).sqrt()
                 * core::f64::consts::SQRT_2;
@@ -385,9 +387,9 @@ mod tests {
             }
             assert_eq!(view.is_square(Radians(0.5)), cone > 30.0);
             config.echo = EchoParameters::HC_SR04;
-            let view = Viewpoint::new(&config, &config.sonar, &ekf);
+            let view = Viewpoint::new(&config, &config.rangers.first, &ekf);
             let [inside, outside] =
-                [0.99, 1.01].map(|share| view.may_answer(config.sonar.cone * share));
+                [0.99, 1.01].map(|share| view.may_answer(config.rangers.first.cone * share));
             assert!(inside && !outside, "{cone}");
         }
     }
@@ -400,7 +402,7 @@ mod tests {
         let mut config = Config::for_track_width(Metres(0.2));
         let wall = Wall::new(Point::new(2.0, -2.0), Point::new(2.0, 2.0)).unwrap();
         let expected = |config: &Config, bearing: f32| {
-            let view = Viewpoint::new(config, &config.sonar, &ekf).of_echo();
+            let view = Viewpoint::new(config, &config.rangers.first, &ekf).of_echo();
             view.sight(&wall, Radians(bearing)).unwrap().expected.range.0
         };
         config.echo = EchoParameters::NONE;

@@ -102,7 +102,7 @@ fn drive() -> Result<bool, EkfError> {
         let heard = Heard {
             range: expected.range + Metres(0.004),
             expected,
-            noise: config.sonar.noise.variance(expected.range),
+            noise: config.rangers.first.noise.variance(expected.range),
             gate: 4.0,
         };
         meter.measure(&mut gates, probe_gate, &mut filter, &heard);

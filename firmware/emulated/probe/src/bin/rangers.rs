@@ -60,15 +60,15 @@ type Fix = extern "C" fn(&mut Robot, &Metres);
 
 fn drives() -> Option<bool> {
     let mut light = Config::for_track_width(Metres(0.16));
-    light.sonar.ranging = Ranging::Light(LightBeam::VL53L1X);
+    light.rangers.first.ranging = Ranging::Light(LightBeam::VL53L1X);
     let (with_light, [aim, fix]) = drive(&light, probe_light_aim, probe_light_fix)?;
     report::cost(c"light_aim", &aim);
     report::cost(c"light_fix", &fix);
 
     let mut pair = Config::for_track_width(Metres(0.16));
-    let mut second = pair.sonar;
+    let mut second = pair.rangers.first;
     second.mount = Point::new(0.05, 0.08);
-    pair.further_sonars.push(second).ok()?;
+    pair.rangers.push(second).ok()?;
     let (with_pair, [aim, fix]) = drive(&pair, probe_pair_aim, probe_pair_fix)?;
     report::cost(c"pair_aim", &aim);
     report::cost(c"pair_fix", &fix);

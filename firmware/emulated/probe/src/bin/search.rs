@@ -53,7 +53,7 @@ fn drive() -> Option<()> {
     };
     // Without noise and fixes it is the truth.
     let mut truth = Localizer::new(config, map, start, Instant::from_ticks(0)).ok()?;
-    let mut search: Search = Search::new(&config.sonar, map, SearchParameters::default());
+    let mut search: Search = Search::new(&config.rangers.first, map, SearchParameters::default());
 
     let mut meter = Meter::start();
     let [mut slices, mut pings] = [Cost::default(); 2];

@@ -41,7 +41,7 @@ extern "C" fn probe_search(searcher: &mut Searcher, range: &Metres) {
 /// Links the search of a robot at the pose of this localizer.
 pub fn link(localizer: Localizer, config: &Config) {
     let map = localizer.map();
-    let search = Search::new(&config.sonar, map, SearchParameters::default());
+    let search = Search::new(&config.rangers.first, map, SearchParameters::default());
     let mut searcher = Searcher { navigator: Navigator::new(localizer), search };
     probe_search(&mut searcher, &black_box(Metres(1.0)));
 }
