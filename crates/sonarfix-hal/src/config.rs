@@ -389,7 +389,15 @@ impl RobotConfig {
     /// # Errors
     /// [`NotLinked`] with the first that it does not link.
     pub fn check_linked(&self) -> Result<(), NotLinked> {
-        let missing = Feature::ALL.into_iter().filter(|feature| !feature.is_linked());
+        self.check_features(Feature::is_linked)
+    }
+
+    /// Checks that a program with these features has every part that the robot needs.
+    ///
+    /// # Errors
+    /// [`NotLinked`], by the first part that it lacks.
+    pub fn check_features(&self, is_linked: impl Fn(Feature) -> bool) -> Result<(), NotLinked> {
+        let missing = Feature::ALL.into_iter().filter(|feature| !is_linked(*feature));
         let mut asked = missing.filter(|feature| self.uses(*feature));
         asked.next().map_or(Ok(()), |feature| Err(NotLinked(feature)))
     }

@@ -2,8 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
-use sonarfix_hal::config::RobotConfig;
+use anyhow::{Context, anyhow, ensure};
+use sonarfix_boards::Board;
+use sonarfix_hal::config::{Feature, RobotConfig};
+use sonarfix_hal::ranger::RangerKind;
 use sonarfix_link::baked;
 use sonarfix_map::{robot_file, robot_text};
 
@@ -24,6 +26,13 @@ enum What {
         /// The image to write.
         #[arg(long, value_name = "CONFIG.bin")]
         out: PathBuf,
+        /// The board that gets the image: refuses a robot that its firmware cannot drive.
+        #[arg(long, value_name = "NAME")]
+        board: Option<String>,
+        /// The features of a program of your own, separated by commas: refuses a robot that needs another one. The released
+        /// programs have all.
+        #[arg(long, value_delimiter = ',', value_parser = feature)]
+        features: Option<Vec<Feature>>,
     },
     /// Checks a configuration image.
     Check {
@@ -39,9 +48,17 @@ enum What {
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
     match &args.what {
-        What::Bake { robot, out } => {
+        What::Bake { robot, out, board, features } => {
             check_file("--out", out)?;
             let config = robot_file::read(robot)?;
+            if let Some(features) = features {
+                config.check_features(|feature| features.contains(&feature)).map_err(|lacks| {
+                    anyhow!("the robot needs `{}`, which --features does not name", lacks.0.name())
+                })?;
+            }
+            if let Some(board) = board {
+                check_board(&board_named(board)?, &config)?;
+            }
             let mut buffer = [0; baked::LENGTH_MAX];
             let bytes = baked::write(&config, &mut buffer)?;
             sonarfix_files::write(out, bytes)?;
@@ -55,6 +72,33 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
             println!("# {}, {}\n{}", file.display(), checksum(&config), robot_text(&config));
         }
     }
+    Ok(())
+}
+
+fn board_named(name: &str) -> anyhow::Result<Board> {
+    let boards = sonarfix_boards::all()?;
+    let names: Vec<_> = boards.iter().map(|board| board.name.as_str()).collect();
+    let known = format!("--board: there is no `{name}`; there are {}", names.join(", "));
+    boards.iter().find(|board| board.name == name).cloned().context(known)
+}
+
+fn feature(name: &str) -> anyhow::Result<Feature> {
+    let names = Feature::ALL.map(Feature::name).join(", ");
+    let found = Feature::ALL.into_iter().find(|feature| feature.name() == name);
+    found.with_context(|| format!("no such feature; there are {names}"))
+}
+
+/// Refuses a robot that the firmware of a board cannot drive.
+fn check_board(board: &Board, config: &RobotConfig) -> anyhow::Result<()> {
+    let title = &board.title;
+    let (rangers, most) = (config.rangers.iter().count(), 1 + usize::from(board.second.is_some()));
+    ensure!(rangers <= most, "the {title} drives {most} ranger(s), and the robot has {rangers}");
+    let is_on_bus = |kind: RangerKind| !matches!(kind, RangerKind::Pulse(_) | RangerKind::Custom);
+    let has_bus = board.bus.is_some();
+    let needs_bus = config.rangers.iter().any(|(_, ranger)| is_on_bus(ranger.kind));
+    ensure!(has_bus || !needs_bus, "the {title} has no I2C bus for the ranger");
+    let has_gyro = config.localizer.gyro.is_some();
+    ensure!(has_bus || !has_gyro, "the {title} has no I2C bus for the gyro");
     Ok(())
 }
 

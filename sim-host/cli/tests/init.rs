@@ -69,6 +69,27 @@ fn the_files_of_every_robot_are_used_without_an_error() {
     }
 }
 
+/// A robot with two rangers of light is not baked for a board without a bus, nor for a program without these features.
+fn refused_by_others(robot: &Path) {
+    let refusal = |options: &[&str]| {
+        let bake = ["config", "bake", "robot.toml", "--out", "refused.bin"];
+        let error = refusal(robot, &[&bake[..], options].concat());
+        assert!(!robot.join("refused.bin").exists(), "{error}");
+        error
+    };
+    for board in boards().iter().filter(|board| !board.contains_key("bus")) {
+        let error = refusal(&["--board", text(board, "name")]);
+        assert!(error.contains(text(board, "title")) && error.contains("ranger"), "{error}");
+    }
+    for (features, missing) in [("rangers,informative", "light"), ("light,informative", "rangers")]
+    {
+        let error = refusal(&["--features", features]);
+        assert!(error.contains(&format!("`{missing}`")), "{error}");
+    }
+    assert!(refusal(&["--board", "pico3"]).contains("pico2"));
+    assert!(refusal(&["--features", "lights"]).contains("light, gyro"));
+}
+
 /// A ranger of light, alone or with a second one: on the boards that have a bus, with its pins; refused by name on the others.
 #[test]
 fn the_files_of_a_robot_with_light_are_used_without_an_error() {
@@ -90,7 +111,9 @@ fn the_files_of_a_robot_with_light_are_used_without_an_error() {
             let robot = dir.path().join(&name);
             let checked = run(&robot, &["map", "check", "map.toml", "--robot", "robot.toml"]);
             assert!(checked.contains("0 errors, 0 warnings"), "{name}: {checked}");
-            run(&robot, &["config", "bake", "robot.toml", "--out", "config.bin"]);
+            refused_by_others(&robot);
+            let bake = ["config", "bake", "robot.toml", "--out", "config.bin"];
+            run(&robot, &[&bake[..], &["--board", text(board, "name")]].concat());
             run(&robot, &["map", "bake", "map.toml", "--out", "map.bin"]);
             let json = run(&robot, &["run", "scenario.toml", "--runs", "2", "--json"]);
             let summary: serde_json::Value = serde_json::from_str(&json).unwrap();

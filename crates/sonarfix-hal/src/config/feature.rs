@@ -22,7 +22,7 @@ pub enum Feature {
 
 impl Feature {
     /// All of them.
-    pub(super) const ALL: [Self; 6] =
+    pub const ALL: [Self; 6] =
         [Self::Light, Self::Gyro, Self::Rangers, Self::Absolute, Self::Informative, Self::Search];
 
     /// The name of the Cargo feature.
