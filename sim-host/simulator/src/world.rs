@@ -4,7 +4,7 @@
 //! obstacles, and over two walls. The earliest echo that is detected is reported.
 //! - [`segment`], [`vertex`], [`obstacle`], [`air`], `scene`: the geometry of the world;
 //! - `index`, `grid`, `wedge`: the walls near the sonar, along a line, and in the cone;
-//! - [`reflector`]: the reflectors that can answer a ping (deterministic);
+//! - [`reflector`], `sector`: the reflectors that can answer a ping (deterministic);
 //! - [`sensor`]: the parameters of a sonar (deterministic);
 //! - `light`: the range of a time-of-flight ranger (random);
 //! - `detection`: which reflector is detected, and with what error (random).
@@ -17,6 +17,7 @@ mod light;
 pub mod obstacle;
 pub mod reflector;
 mod scene;
+mod sector;
 pub mod segment;
 pub mod sensor;
 pub mod vertex;
@@ -93,7 +94,7 @@ impl World {
         }
         let aside = detection::scatter_angle(off, sensor, rng);
         let met = segment.hit(from, towards_normal + aside)?;
-        let mut obstacles = self.obstacles.iter();
+        let mut obstacles = self.obstacles_at(ping.time).iter();
         if obstacles.any(|obstacle| obstacle.outline_at(ping.time).blocks(from, met)) {
             return None;
         }

@@ -126,6 +126,20 @@ impl Simulation {
         Self { assumed: Some(robot), walls, image, ..self }
     }
 
+    /// The same with another true sonar than the scenario's.
+    #[must_use]
+    pub fn heard_by(self, sensor: SensorModel) -> Self {
+        let scale = self.sensor.scale;
+        Self { sensor: SensorModel { scale, ..sensor }, ..self }
+    }
+
+    /// The same with other unmapped obstacles from a time on, seconds since the run began.
+    #[must_use]
+    pub fn rearranged(self, from: f64, obstacles: &[sonarfix_map::Obstacle]) -> Self {
+        let obstacles = obstacles.iter().map(obstacle).collect();
+        Self { world: self.world.rearranged(from, obstacles), ..self }
+    }
+
     /// The same with a baked map, as on a robot.
     ///
     /// # Errors

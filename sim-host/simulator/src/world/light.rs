@@ -78,7 +78,7 @@ impl World {
     /// What the ranger reports without noise: the mean of the nearest surfaces with enough light.
     fn target(&self, from: Point, axis: f64, light: &LightModel, time: f64) -> Option<Return> {
         let outlines: Vec<Outline> =
-            self.obstacles.iter().map(|obstacle| obstacle.outline_at(time)).collect();
+            self.obstacles_at(time).iter().map(|obstacle| obstacle.outline_at(time)).collect();
         if light.half_view <= 0.0 {
             return self.met(from, axis, 1.0, &outlines);
         }

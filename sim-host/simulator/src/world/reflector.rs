@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::obstacle::Outline;
 use super::scene::{Ping, World};
+use super::sector::Sector;
 use super::segment::{Point, Segment, direction, distance};
 use super::sensor::SensorModel;
 use super::vertex::Shape;
@@ -49,6 +50,9 @@ const FLIGHT_ROUNDS: usize = 2;
 /// robot is slower than a quarter of the speed of sound.
 const MOTION: f64 = 1.5;
 
+/// Share of the way to an obstacle up to which it does not occlude itself.
+const BEFORE: f64 = 1.0 - 1e-6;
+
 /// The search for the reflectors of one ping.
 pub(super) struct Search<'a> {
     world: &'a World,
@@ -66,7 +70,8 @@ pub(super) struct Search<'a> {
 impl<'a> Search<'a> {
     /// The search for a ping from this place.
     pub fn new(world: &'a World, sensor: &'a SensorModel, ping: &'a Ping<'a>, from: Point) -> Self {
-        let obstacles = world.obstacles.iter().map(|o| o.outline_at(ping.time)).collect();
+        let obstacles = world.obstacles_at(ping.time).iter();
+        let obstacles = obstacles.map(|obstacle| obstacle.outline_at(ping.time)).collect();
         let radius = MOTION * sensor.reach.1;
         let near = world.walls_index.near(from, radius);
         let cone = Wedge::new(from, ping.direction, sensor.cone);
@@ -75,7 +80,10 @@ impl<'a> Search<'a> {
 
     /// All reflectors, the earliest first; ties in the order of the map.
     pub fn run(&self) -> Vec<Reflector> {
-        let mut found: Vec<Reflector> = self.walls().chain(self.obstacles()).collect();
+        let mut found: Vec<Reflector> = match self.sensor.sector {
+            Some(half) => self.in_sector(half),
+            None => self.walls().chain(self.obstacles()).collect(),
+        };
         if self.sensor.corner > 0.0 || self.sensor.edge > 0.0 {
             found.extend(self.vertices());
         }
@@ -92,6 +100,31 @@ impl<'a> Search<'a> {
             let half_way = |to| segment.half_way_over(self.from, to);
             self.reflector_at(Source::Wall(wall), foot, 1.0, half_way, &[wall])
         })
+    }
+
+    /// The nearest points of walls and obstacles in the sector of a sonar that hears them at any angle.
+    fn in_sector(&self, half: f64) -> Vec<Reflector> {
+        let sector = Sector { from: self.from, axis: self.ping.direction, half };
+        let walls = self.near_walls().filter_map(|(wall, segment)| {
+            self.answer(Source::Wall(wall), sector.nearest_of(segment)?, &[wall])
+        });
+        let obstacles = self.obstacles.iter().filter_map(|outline| {
+            self.answer(Source::Obstacle, sector.nearest(outline)?, &[])
+        });
+        walls.chain(obstacles).collect()
+    }
+
+    /// The echo of a point at an angle between axis and normal, if it is within reach and not occluded.
+    fn answer(&self, source: Source, (at, off): (Point, f64), own: &[usize]) -> Option<Reflector> {
+        let distance = self.flown(|to| half_way_by(self.from, at, to));
+        let (nearest, farthest) = self.sensor.reach;
+        let audible = self.sensor.mirror.at(distance, off);
+        let is_in_reach = distance >= nearest && distance <= farthest;
+        let before = towards(self.from, at, BEFORE);
+        let off_axis = angle::wrap(direction(self.from, at) - self.ping.direction);
+        (is_in_reach && audible > 0.0 && !self.is_hidden(self.from, before, own)).then_some(
+            Reflector { source, distance, off_axis, audible },
+        )
     }
 
     fn near_walls(&self) -> impl Iterator<Item = (usize, &'a Segment)> {
@@ -116,8 +149,7 @@ impl<'a> Search<'a> {
         self.obstacles.iter().filter_map(|outline| {
             let near = outline.nearest(self.from);
             let strength = if outline.faces(self.from) { 1.0 } else { self.sensor.edge };
-            // Slightly before its surface, so that it does not occlude itself.
-            let before = towards(self.from, near, 1.0 - 1e-6);
+            let before = towards(self.from, near, BEFORE);
             let half_way = |to| half_way_by(self.from, near, to);
             self.reflector_at(Source::Obstacle, before, strength, half_way, &[])
         })

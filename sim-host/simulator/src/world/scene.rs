@@ -33,6 +33,8 @@ pub struct World {
     pub(super) walls_index: Index,
     pub(super) vertices_index: Index,
     pub(super) obstacles: Vec<Obstacle>,
+    /// The obstacles from a time on, seconds since the run began, if they change.
+    rearranged: Option<(f64, Vec<Obstacle>)>,
     /// m/s.
     pub(super) speed_of_sound: f64,
 }
@@ -53,13 +55,28 @@ impl World {
         let places: Vec<_> = vertices.iter().map(|vertex| (vertex.at, vertex.at)).collect();
         let vertices_index = Index::new(&places);
         let speed_of_sound = air::speed_of_sound(ROOM);
-        Self { walls, vertices, walls_index, vertices_index, obstacles: Vec::new(), speed_of_sound }
+        Self {
+            walls,
+            vertices,
+            walls_index,
+            vertices_index,
+            obstacles: Vec::new(),
+            rearranged: None,
+            speed_of_sound,
+        }
     }
 
     /// The same world with unmapped obstacles.
     #[must_use]
     pub fn with_obstacles(self, obstacles: Vec<Obstacle>) -> Self {
         Self { obstacles, ..self }
+    }
+
+    /// The same world with other obstacles from a time on, seconds since the run began: a box that somebody has moved, a door
+    /// that somebody has opened.
+    #[must_use]
+    pub fn rearranged(self, from: f64, obstacles: Vec<Obstacle>) -> Self {
+        Self { rearranged: Some((from, obstacles)), ..self }
     }
 
     /// The same world at another air temperature.
@@ -80,7 +97,16 @@ impl World {
         &self.vertices
     }
 
-    /// The unmapped obstacles.
+    /// The unmapped obstacles at a time, seconds since the run began.
+    #[must_use]
+    pub fn obstacles_at(&self, time: f64) -> &[Obstacle] {
+        match &self.rearranged {
+            Some((from, obstacles)) if time >= *from => obstacles,
+            _ => &self.obstacles,
+        }
+    }
+
+    /// The unmapped obstacles at the start.
     #[must_use]
     pub fn obstacles(&self) -> &[Obstacle] {
         &self.obstacles
