@@ -14,6 +14,7 @@ use crate::association::reflector::{Beam, Reflector, Reflectors};
 use crate::config::{Config, RangerParameters};
 use crate::filter::ekf::Ekf;
 use crate::geometry::elementary::sqrt;
+use crate::geometry::pose::Point;
 use crate::geometry::units::{Metres, Radians, SquareMetres};
 use crate::geometry::vector::Vector;
 use crate::map::Map;
@@ -26,6 +27,14 @@ const MATCH: f32 = 3.0;
 const SAME_DIRECTION: f32 = 0.999;
 /// The same for distances, metres.
 const SAME_DISTANCE: f32 = 0.02;
+
+/// Share of the pings without an echo of the target that return one over a second wall: between an ideal sonar and one that
+/// hears each (assumed).
+const HEARD_OVER_TWO_WALLS: f32 = 0.3;
+/// Standard deviation of its range beside the noise: of two reflections and two walls, metres (assumed).
+const OVER_TWO_WALLS: f32 = 0.005;
+/// Least length by which it is longer than the range of the target, metres.
+const BEHIND: f32 = 0.1;
 
 /// The target of a ping.
 pub(crate) struct Target<'a> {
@@ -75,7 +84,8 @@ impl Scene<'_, '_> {
         let mut sum = Sum::new(target);
         for reflector in found.iter().filter(|reflector| !is_target(reflector)) {
             let Some(heard) = reflectors.heard(&beam, reflector) else { continue };
-            let visible = 1.0 - echo.prior_occlusion(Metres(reflector.distance));
+            let visible =
+                1.0 - self.history.clutter.prior_occlusion(echo, Metres(reflector.distance));
             let answers = visible * heard.probability(echo.heard());
             let expected =
                 ExpectedRange::from_point(reflector.toward, reflector.distance, &position);
@@ -87,7 +97,41 @@ impl Scene<'_, '_> {
             let is_behind = reflector.distance > distance;
             sum.add(answers, density(innovation), is_behind);
         }
+        self.add_over_two_walls(target, &position, range, &mut sum);
         sum.others
+    }
+
+    // ===== Eq. (52): the echo over the target and a wall behind the robot =====
+    /// Adds the path from the target perpendicularly onto another wall and back over the target, which is heard where the target itself
+    /// is not: the other wall is seen from the mirror image of the sonar in the target.
+    fn add_over_two_walls(
+        &self,
+        target: &Target,
+        position: &SonarPosition,
+        range: Metres,
+        sum: &mut Sum,
+    ) {
+        let toward = Vector::of_angle(target.expected.direction.radians().0);
+        let twice = 2.0 * target.expected.by_range_scale;
+        let image = position.point;
+        let image = Point::new(image.x.0 + twice * toward.x, image.y.0 + twice * toward.y);
+        let shortest = target.expected.range.0 + BEHIND;
+        let margin = MATCH * sqrt(target.variance.0) + OVER_TWO_WALLS;
+        let is_near = |path: f32| {
+            let expected = position.stretch * path;
+            expected > shortest && (range.0 - expected).abs() < margin
+        };
+        for (_, wall) in self.map.near(position.point, self.sonar.max_range) {
+            let (path, along) = (wall.signed_distance(image).0.abs(), wall.along(image).0);
+            if !is_near(path) || along < 0.0 || along > wall.length().0 {
+                continue;
+            }
+            let expected = ExpectedRange::from_point(toward, path, position);
+            let noise = self.sonar.noise.variance(expected.range).0;
+            let noise = SquareMetres(noise + OVER_TWO_WALLS * OVER_TWO_WALLS);
+            let innovation = self.ekf.innovation(range, &expected, noise);
+            sum.add(HEARD_OVER_TWO_WALLS, density(innovation), true);
+        }
     }
 }
 

@@ -25,9 +25,6 @@ use crate::sensor::range::Innovation;
 
 /// Share of pings without an echo if the beam is not square to the wall, or its foot not on it.
 const NO_ECHO_OFF_WALL: f32 = 0.4;
-/// Share of pings that agree with a wrong pose by chance: another wall at that range, or an error along
-/// the wall.
-const AGREEMENT_WRONG_POSE: f32 = 0.3;
 /// Share of the density of a wall's echo for an estimate that is displaced, and its deviation over that
 /// of the innovation. Chosen on simulated runs (`docs/schedule.md`).
 const DISPLACED: f32 = 0.02;
@@ -72,6 +69,8 @@ pub(crate) struct ExpectedEcho {
     pub source: Option<Source>,
     /// The shortest and the longest range that the sonar reports.
     pub limits: (Metres, Metres),
+    /// Probability that it agrees with a wrong pose by chance.
+    pub by_chance: f32,
 }
 
 /// The explanation of what one ping returned.
@@ -140,7 +139,7 @@ impl ExpectedEcho {
         }
         let unrepeated = total - occluded + hidden * d.unrepeated;
         let ratio = d.wrong_pose / unrepeated;
-        let ratio = AGREEMENT_WRONG_POSE + (1.0 - AGREEMENT_WRONG_POSE) * ratio;
+        let ratio = self.by_chance + (1.0 - self.by_chance) * ratio;
         let evidence = if ratio < MAX_RATIO { ln(ratio) } else { MAX_EVIDENCE };
         let (association, occluded) = (wall / total, occluded / total);
         let mapped = association + others.density / total;
@@ -283,7 +282,7 @@ mod tests {
         ) -> ExpectedEcho {
             let variance = SquareMetres(sigma * sigma);
             let limits = (Metres(0.1), Metres(4.0));
-            ExpectedEcho { range: Metres(range), variance, geometry, occluded, source: None, limits }
+            ExpectedEcho { range: Metres(range), variance, geometry, occluded, source: None, limits, by_chance: 0.3 }
         }
     }
 
@@ -411,8 +410,15 @@ mod tests {
         for deviation in [0.03_f32, 0.05, 0.07, 0.08, 0.09] {
             let variance = SquareMetres(deviation * deviation);
             let limits = (Metres(0.05), Metres(4.0));
-            let expected =
-                ExpectedEcho { range: h, variance, geometry: 1.0, occluded, source, limits };
+            let expected = ExpectedEcho {
+                range: h,
+                variance,
+                geometry: 1.0,
+                occluded,
+                source,
+                limits,
+                by_chance: 0.3,
+            };
             let found = expected.explain(&parameters, Some(z), Others::NONE);
             assert!(found.association < 0.4, "{found:?}");
             occluded = found.occluded.max(0.8 * occluded);
@@ -430,6 +436,7 @@ mod tests {
             occluded: parameters.prior_occlusion(Metres(2.0)),
             source: None,
             limits: (Metres(0.05), Metres(4.0)),
+            by_chance: 0.3,
         };
         let short = Some(Metres(1.0));
         let first = expected.explain(&parameters, short, Others::NONE);

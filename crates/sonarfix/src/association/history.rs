@@ -9,10 +9,12 @@
 //! Bearing, range and foot come from a finite state. For a wall far beyond any range the square of the
 //! distance may be infinite; the probability is then the prior.
 
+use crate::association::clutter::Clutter;
 use crate::association::echo::Source;
 use crate::association::reliability::{Reliability, Returned, Shares};
 use crate::config::{Config, MAX_RANGERS, RangerId};
-use crate::geometry::units::{Instant, Metres, Radians, seconds};
+use crate::geometry::elementary::sqrt;
+use crate::geometry::units::{Instant, Metres, Radians, SquareMetres, seconds};
 use crate::map::WallId;
 use crate::sensor::echo::EchoParameters;
 use crate::sensor::timing::PingDuration;
@@ -29,6 +31,15 @@ const MAX_OCCLUSION: f32 = 0.95;
 const HALVED_WITHIN: Metres = Metres(0.25);
 /// Time in seconds that halves the deviation from the prior: people and chairs move.
 const HALVED_AFTER: f32 = 5.0;
+
+/// Probability that a ping agrees with a wrong pose, if the last one that agreed was in the same direction: the error may
+/// be along the wall.
+const AGREES_ALONG: f32 = 0.3;
+/// The same in another direction: this, and so much per metre of the innovation's deviation for a wall that happens to be at that range.
+const AGREES_ACROSS: f32 = 0.01;
+const PER_METRE: f32 = 1.0;
+/// Two directions whose cosine exceeds this are the same: 37°.
+const SAME_DIRECTION: f32 = 0.8;
 
 /// Time constant of the turn rate, seconds: a single step between two close instants is quantised by
 /// whole encoder ticks.
@@ -137,9 +148,30 @@ pub(crate) struct History {
     recent: [Option<RecentWall>; RECENT_WALLS],
     /// The slot that was filled last.
     newest: usize,
+    /// How cluttered the place is.
+    pub clutter: Clutter,
+    /// Derivatives by x and y of the range that was used last.
+    used: Option<(f32, f32)>,
 }
 
 impl History {
+    // ===== Eq. (53) =====
+    /// Probability that a ping agrees by chance with a wrong pose, for a range with these derivatives by x and y and an
+    /// innovation of this variance.
+    pub fn by_chance(&self, (x, y): (f32, f32), variance: SquareMetres) -> f32 {
+        let Some((used_x, used_y)) = self.used else { return AGREES_ALONG };
+        if (x * used_x + y * used_y).abs() > SAME_DIRECTION {
+            return AGREES_ALONG;
+        }
+        let across = AGREES_ACROSS + PER_METRE * sqrt(variance.0);
+        if across < AGREES_ALONG { across } else { AGREES_ALONG }
+    }
+
+    /// Records the derivatives by x and y of a range that was the wall's.
+    pub fn record_used(&mut self, by: (f32, f32)) {
+        self.used = Some(by);
+    }
+
     /// Records a turn of the robot over a time in seconds.
     pub fn record_turn(&mut self, turn: Radians, seconds: f32) {
         self.turn_rate = (self.turn_rate * TURN_RATE_TIME + turn.0) / (TURN_RATE_TIME + seconds);
@@ -223,7 +255,7 @@ impl History {
         range: Metres,
         now: Instant,
     ) -> Entry {
-        let prior = parameters.prior_occlusion(range);
+        let prior = self.clutter.prior_occlusion(parameters, range);
         let place = Place { wall, ranger, foot, prior };
         let is_same =
             |slot: &Option<RecentWall>| matches!(slot, Some(recent) if recent.wall == wall);

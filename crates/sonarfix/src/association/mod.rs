@@ -1,6 +1,7 @@
 //! What a ping returned: which walls can be measured, what of the map may answer, and how far an echo is believed.
 
 pub(crate) mod alternatives;
+pub(crate) mod clutter;
 pub mod echo;
 pub(crate) mod gating;
 pub(crate) mod history;

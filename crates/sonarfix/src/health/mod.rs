@@ -66,14 +66,14 @@ const DEGRADED_AT: f32 = 2.5;
 /// The evidence at which the verdict is [`Verdict::Lost`], and the maximum. Chosen so that a robot
 /// kidnapped by 1 m and 90° is lost within 15 pings in 97 % of trials, and one among unmapped
 /// furniture in less than one run of 500 (`docs/health.md`).
-pub const LOST_AT: f32 = 6.5;
+pub const LOST_AT: f32 = 7.5;
 /// The evidence below which the verdict can improve.
 const BETTER_BELOW: f32 = 0.5;
 
 /// Inflations of the covariance up to which the verdict can become [`Verdict::Tracking`] again. After
 /// more of them the filter may have converged to another place at which the ranges agree; only a new
 /// start can confirm the pose.
-const MAX_CONFIRMABLE_INFLATIONS: u16 = 3;
+const MAX_CONFIRMABLE_INFLATIONS: u16 = 1;
 /// Pings in a row without an accepted range after which the verdict is [`Verdict::Lost`], if the
 /// uncertainty of the pose is too large for any wall to be measured.
 const LOST_AFTER_UNUSED: u16 = 30;

@@ -128,6 +128,7 @@ impl Measurement for Ping<'_> {
             occluded: seen.entry.occlusion,
             source: seen.entry.source,
             limits: seen.limits,
+            by_chance: robot.history.by_chance((view.expected.by_x, view.expected.by_y), variance),
         };
         let alone = echo.explain(parameters, measured, Others::NONE);
         let is_clear = gating::use_of(alone.association) == Use::Accept;
@@ -163,6 +164,12 @@ impl Measurement for Ping<'_> {
             Err(_) => Origin::Silence,
         };
         history.record_echo(entry, found.occluded, origin, now);
+        if origin == Origin::Wall {
+            history.record_used((view.expected.by_x, view.expected.by_y));
+        }
+        if view.measured.is_ok() && !is_repeated {
+            history.clutter.record(view.expected.range, found.occluded);
+        }
         News { contradicts: gating::contradicts(found.mapped, entry.occlusion), is_repeated }
     }
 

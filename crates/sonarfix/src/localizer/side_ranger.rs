@@ -60,6 +60,7 @@ impl Measurement for SideDistance {
             occluded: 0.01,
             source: None,
             limits: (Metres(0.02), Metres(2.0)),
+            by_chance: 0.3,
         };
         echo.explain(&EchoParameters::HC_SR04, Some(self.distance), Others::NONE)
     }

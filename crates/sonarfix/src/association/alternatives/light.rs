@@ -50,7 +50,7 @@ impl Scene<'_, '_> {
             let (sonar, echo) = (self.sonar, &self.config.echo);
             let is_weak = spot.incidence > sonar.cone || at > FADES * sonar.max_range.0;
             let heard = if is_weak { Heard::Rim } else { Heard::Foot };
-            let visible = 1.0 - echo.prior_occlusion(Metres(at));
+            let visible = 1.0 - self.history.clutter.prior_occlusion(echo, Metres(at));
             let map_variance = echo.map_variance(wall.accuracy(), self.history.travelled_since(id));
             let noise = SquareMetres(spot.noise + map_variance * spot.of_map);
             let innovation = self.ekf.innovation(range, &spot.expected, noise);
