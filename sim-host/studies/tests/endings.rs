@@ -16,7 +16,7 @@ const PRINTING: [&[&str]; 10] = [
     &["reality", "--help"],
     &["faults", "--runs", "1"],
     &["health", "--runs", "1"],
-    &["rooms", "--runs", "1"],
+    &["rooms", "--runs", "1", "--family", "arena", "--sensor", "nxt"],
     &["floor-plans", "--plans", "1", "--runs", "1"],
 ];
 

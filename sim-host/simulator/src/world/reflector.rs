@@ -108,9 +108,10 @@ impl<'a> Search<'a> {
         let walls = self.near_walls().filter_map(|(wall, segment)| {
             self.answer(Source::Wall(wall), sector.nearest_of(segment)?, &[wall])
         });
-        let obstacles = self.obstacles.iter().filter_map(|outline| {
-            self.answer(Source::Obstacle, sector.nearest(outline)?, &[])
-        });
+        let obstacles = self
+            .obstacles
+            .iter()
+            .filter_map(|outline| self.answer(Source::Obstacle, sector.nearest(outline)?, &[]));
         walls.chain(obstacles).collect()
     }
 
@@ -122,9 +123,8 @@ impl<'a> Search<'a> {
         let is_in_reach = distance >= nearest && distance <= farthest;
         let before = towards(self.from, at, BEFORE);
         let off_axis = angle::wrap(direction(self.from, at) - self.ping.direction);
-        (is_in_reach && audible > 0.0 && !self.is_hidden(self.from, before, own)).then_some(
-            Reflector { source, distance, off_axis, audible },
-        )
+        (is_in_reach && audible > 0.0 && !self.is_hidden(self.from, before, own))
+            .then_some(Reflector { source, distance, off_axis, audible })
     }
 
     fn near_walls(&self) -> impl Iterator<Item = (usize, &'a Segment)> {

@@ -63,9 +63,8 @@ impl Sector {
     }
 
     fn nearest_among(&self, points: impl Iterator<Item = Point>) -> Option<Point> {
-        points.min_by(|one, other| {
-            distance(self.from, *one).total_cmp(&distance(self.from, *other))
-        })
+        points
+            .min_by(|one, other| distance(self.from, *one).total_cmp(&distance(self.from, *other)))
     }
 }
 
@@ -76,7 +75,9 @@ mod tests {
     #[test]
     fn an_oblique_wall_answers_from_the_edge_of_the_sector() {
         let wall = Segment::new([1.0, -50.0], [1.0, 50.0]);
-        for (degrees, expected) in [(0.0, 0.0), (10.0, 0.0), (15.0, 0.0), (25.0, 10.0), (45.0, 30.0)] {
+        for (degrees, expected) in
+            [(0.0, 0.0), (10.0, 0.0), (15.0, 0.0), (25.0, 10.0), (45.0, 30.0)]
+        {
             let axis = f64::to_radians(degrees);
             let sector = Sector { from: [0.0, 0.0], axis, half: f64::to_radians(15.0) };
             let (at, off) = sector.nearest_of(&wall).unwrap();
