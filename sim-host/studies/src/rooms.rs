@@ -7,11 +7,15 @@
 //! | `text` | a room as a scenario |
 //! | `cell` | the runs of a family with objects, a sensor and a robot |
 //! | `watch`, `sums` | the judgement of a run, and the statistics of some |
+//! | `measure`, `picture`, [`page`] | the page |
 //! | `polygon` | plane geometry |
 
 mod cell;
 mod family;
+mod measure;
 mod objects;
+pub mod page;
+mod picture;
 mod polygon;
 mod robot;
 mod sensor;
@@ -19,14 +23,13 @@ mod sums;
 mod text;
 mod watch;
 
-use std::fmt::Write;
-
 use rayon::prelude::*;
 use sonarfix_sim::progress::Progress;
 
 pub use cell::{Cell, RoomError};
 pub use family::Family;
 pub use objects::Objects;
+pub use picture::svg;
 pub use robot::Robot;
 pub use sensor::Sensor;
 pub use sums::Sums;
@@ -56,41 +59,4 @@ pub fn run(
     };
     let all: Results = cells.par_iter().map(of).collect::<Result<_, RoomError>>()?;
     Ok(all.into_iter().filter(|(_, sums)| sums.runs > 0).collect())
-}
-
-const HEAD: &str = "\
-| room | objects | sensor | runs | NEES/7 | median | NIS | range scale, σ | RMS, mm | bound, mm | lost | `Lost` | falsely | above 20 cm | noticed after, s \
-| wrong and `Tracking`, s | not `Tracking` |
-|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|
-";
-
-/// The results as a table.
-#[must_use]
-pub fn markdown(results: &Results) -> String {
-    let mut page = HEAD.to_owned();
-    for (cell, sums) in results {
-        // Writing to a String does not fail.
-        let _ = writeln!(
-            page,
-            "| {} | {} | {} | {} | {:.2} | {:.2} | {:.2} | {:+.2} | {:.1} | {:.1} | {} | {} | {} | {} | {:.1} | {:.2} | {:.2} % |",
-            cell.family.name(),
-            cell.objects.name(),
-            cell.sensor.name(),
-            sums.runs,
-            sums.nees(),
-            sums.median_nees(),
-            sums.nis(),
-            sums.range_scale(),
-            1e3 * sums.rms(),
-            1e3 * sums.bound(),
-            sums.lost,
-            sums.called,
-            sums.falsely,
-            sums.far,
-            sums.longest_unnoticed,
-            sums.wrong_tracking(),
-            100.0 * sums.untracked(),
-        );
-    }
-    page
 }

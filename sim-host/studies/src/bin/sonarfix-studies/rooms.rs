@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use anyhow::Context;
-use sonarfix_studies::rooms::{self, Cell, Family, Objects, Robot, Sensor};
+use sonarfix_studies::rooms::{self, Cell, Family, Objects, Robot, Sensor, page};
 
+use sonarfix_terminal::output::check_file;
 use sonarfix_terminal::progress::Runs;
 
 #[derive(Debug, clap::Args)]
@@ -24,6 +25,12 @@ pub struct Args {
     /// Only this sensor; repeatable.
     #[arg(long)]
     sensor: Vec<String>,
+    /// Prints a row for each cell instead of the page.
+    #[arg(long)]
+    cells: bool,
+    /// The picture of all cells to write, as SVG.
+    #[arg(long, value_name = "FILE.svg")]
+    figure: Option<PathBuf>,
     /// Writes the scenario of the first cell and seed, and runs nothing.
     #[arg(long, value_name = "FILE.toml")]
     toml: Option<PathBuf>,
@@ -31,6 +38,9 @@ pub struct Args {
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
     anyhow::ensure!(args.runs > 0, "--runs must be at least 1");
+    if let Some(file) = &args.figure {
+        check_file("--figure", file)?;
+    }
     let cells = cells(args)?;
     if let Some(file) = &args.toml {
         let cell = cells.first().context("no cell")?;
@@ -40,7 +50,14 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let progress = Runs::new(args.runs.saturating_mul(count));
     let results = rooms::run(&cells, args.seed, args.runs, &progress)?;
     progress.end()?;
-    print!("{}", rooms::markdown(&results));
+    if let Some(file) = &args.figure {
+        sonarfix_files::write(file, rooms::svg(&results))?;
+    }
+    if args.cells {
+        print!("{}", page::cells(&results));
+    } else {
+        print!("{}{}", page::markdown(&results), page::command(args.seed, args.runs));
+    }
     Ok(())
 }
 
