@@ -9,7 +9,7 @@ const SHARE: f64 = 0.95;
 
 #[test]
 fn a_kidnapped_robot_is_detected() {
-    let outcomes = kidnapped::trials(TRIALS, &|| ()).unwrap();
+    let outcomes = kidnapped::trials(0, TRIALS, &|| ()).unwrap();
     assert!(outcomes.iter().all(|o| o.tracked_before), "before the kidnapping");
     let mut cycles: Vec<_> =
         outcomes.iter().map(|o| o.called_after.unwrap_or(WATCHED + 1)).collect();

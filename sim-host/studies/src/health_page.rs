@@ -37,22 +37,22 @@ pub struct Findings {
     pub trials: Vec<Outcome>,
 }
 
-/// Runs both scenarios, and trials with kidnapped robots, with the seeds 0 to `runs` − 1 each.
+/// Runs both scenarios, and trials with kidnapped robots, with `runs` seeds from `first` on each.
 /// Reports every run and every trial, [`SETS`] times `runs` in all. After an interruption, sets without a finished run are
 /// missing.
 ///
 /// # Errors
 /// The [`PageError`] of the first run that fails.
-pub fn findings(runs: u32, progress: &impl Progress) -> Result<Findings, PageError> {
+pub fn findings(first: u64, runs: u32, progress: &impl Progress) -> Result<Findings, PageError> {
     let classroom = Scenario::parse(CLASSROOM, "classroom.toml", std::path::Path::new(""))?;
     let scenarios = [("paper", Scenario::paper()?), ("classroom", classroom)];
     let conduct = |(name, scenario)| {
-        Ok((name, monte_carlo::results(&Simulation::new(scenario), 0, runs, progress)?))
+        Ok((name, monte_carlo::results(&Simulation::new(scenario), first, runs, progress)?))
     };
     let mut scenarios =
         scenarios.into_iter().map(conduct).collect::<Result<Vec<_>, PageError>>()?;
     scenarios.retain(|(_, results)| !results.is_empty());
-    Ok(Findings { scenarios, trials: kidnapped::trials(runs.into(), progress)? })
+    Ok(Findings { scenarios, trials: kidnapped::trials(first, runs.into(), progress)? })
 }
 
 const HEAD: &str = "\
@@ -102,7 +102,9 @@ pub fn markdown(findings: &Findings) -> String {
     page
 }
 
-fn kidnapped_section(trials: &[Outcome]) -> String {
+/// The section of the page with the kidnapped robots.
+#[must_use]
+pub fn kidnapped_section(trials: &[Outcome]) -> String {
     let share = |holds: &dyn Fn(&Outcome) -> bool| {
         100.0 * count(trials.iter().filter(|outcome| holds(outcome)).count()) / count(trials.len())
     };

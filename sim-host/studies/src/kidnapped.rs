@@ -70,11 +70,15 @@ pub struct Outcome {
     pub tracks_wrong_pose: bool,
 }
 
-/// Runs the seeds 0 to `trials` − 1, unless it is interrupted.
+/// Runs `trials` seeds from `first` on, unless it is interrupted.
 ///
 /// # Errors
 /// The [`TrialError`] of the first trial that fails.
-pub fn trials(trials: u64, progress: &impl Progress) -> Result<Vec<Outcome>, TrialError> {
+pub fn trials(
+    first: u64,
+    trials: u64,
+    progress: &impl Progress,
+) -> Result<Vec<Outcome>, TrialError> {
     let floor = Floor::parse(ROOM, "room.toml")?;
     // An ideal sonar with a noise of 5 mm and a maximum range of 4 m.
     let mut scenario = Scenario::paper()?;
@@ -85,7 +89,8 @@ pub fn trials(trials: u64, progress: &impl Progress) -> Result<Vec<Outcome>, Tri
     (0..trials)
         .into_par_iter()
         .filter(|_| !progress.is_interrupted())
-        .map(|seed| {
+        .map(|trial| {
+            let seed = first.wrapping_add(trial);
             let outcome = Trial::new(seed, Map::new(&walls), &world, &sensor)?.watch();
             progress.finished();
             outcome

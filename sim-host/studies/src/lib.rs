@@ -7,7 +7,8 @@
 //! | [`floor_plan`] | `docs/floor-plans.md` |
 //! | [`health_page`], [`kidnapped`] | `docs/health.md` |
 //! | [`reality`] | `docs/reality.md` |
-//! | [`rooms`] | none: a table of generated rooms |
+//! | [`recordings`] | none: a table of recordings with their robot files |
+//! | [`rooms`] | `docs/rooms.md` |
 //! | [`search_study`] | `docs/search.md` |
 //! | [`sonar_model`] | `docs/sonar-model.md` |
 
@@ -18,6 +19,7 @@ pub mod floor_plan;
 pub mod health_page;
 pub mod kidnapped;
 pub mod reality;
+pub mod recordings;
 pub mod relocalization;
 pub mod rooms;
 pub mod search_study;

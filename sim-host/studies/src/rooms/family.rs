@@ -1,28 +1,15 @@
-//! Families of rooms: a seed gives the same room, path and true robot on every machine.
+//! Families of rooms: a seed gives the same walls and path on every machine.
 
-use std::fmt::Write;
-
-use rand::{RngExt, SeedableRng};
+use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
-use sonarfix_map::{FileError, Scenario};
 
-/// The tables that are the same for every room.
-const ROBOT: &str = include_str!("scenario.toml");
-/// How long a run lasts, seconds; whole laps, so that it is a little longer.
-const DURATION: f64 = 600.0;
-/// The robot's speed, m/s, and the duration of a turn of 90°, seconds.
-const SPEED: f64 = 0.2;
-const QUARTER_TURN: f64 = 2.0;
+use super::polygon::{Point, Side, distance, sides};
+use super::watch::Unobservable;
 
-/// Largest true errors of the robot: of a wheel's scale, and of the track width, metres.
-const SCALE: f64 = 0.01;
-const TRACK_WIDTH: f64 = 0.12;
-const TRACK_WIDTH_ERROR: f64 = 0.0036;
-/// Air that the driver of the sonar assumes, °C, and how far it is off at most.
-const ROOM: f64 = 20.0;
-const COLDER_OR_WARMER: f64 = 6.0;
-
-type Point = [f64; 2];
+/// Clear width of an inner door, metres.
+const DOOR: f64 = 0.9;
+/// Distance between a pillar and the path, metres.
+const BESIDE_PATH: f64 = 0.35;
 
 /// A family of rooms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,16 +20,69 @@ pub enum Family {
     Arena,
     /// A closed corridor, 1.6 m to 2.2 m wide and 8 m to 12 m long.
     Corridor,
+    /// The middle of a corridor whose ends are out of range.
+    OpenCorridor,
     /// A hall of 8 m to 12 m, whose opposite walls are out of range.
     Hall,
+    /// A hall of which one long wall is in range.
+    LongWall,
     /// A room with four walls of which no two are parallel or square.
     Slanted,
+    /// Six rooms with doors between them.
+    Home,
+    /// A room with four to eight mapped pillars.
+    Pillars,
+    /// A square, which looks the same from four places.
+    Symmetric,
+    /// A square with a niche.
+    NearlySymmetric,
+}
+
+/// The walls of a room and a path in it, metres.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Room {
+    /// The corners of its outer walls, counter-clockwise.
+    pub outline: Vec<Point>,
+    /// Its further walls.
+    pub inner: Vec<Side>,
+    /// The corners of the path, of which every lap ends at the first.
+    pub path: Vec<Point>,
+    /// The direction that no wall in range measures.
+    pub unobservable: Unobservable,
+}
+
+impl Room {
+    /// A room without further walls, of which every direction is observable.
+    fn of((outline, path): (Vec<Point>, Vec<Point>)) -> Self {
+        Self { outline, inner: Vec::new(), path, unobservable: Unobservable::None }
+    }
+
+    /// All walls, the outer ones first.
+    pub fn walls(&self) -> Vec<Side> {
+        sides(&self.outline).chain(self.inner.iter().copied()).collect()
+    }
+
+    /// The least distance between a line and the path, metres.
+    pub fn beside_path(&self, side: Side) -> f64 {
+        sides(&self.path).map(|leg| distance(leg, side)).fold(f64::INFINITY, f64::min)
+    }
 }
 
 impl Family {
     /// All of them.
-    pub const ALL: [Self; 5] =
-        [Self::Corner, Self::Arena, Self::Corridor, Self::Hall, Self::Slanted];
+    pub const ALL: [Self; 11] = [
+        Self::Corner,
+        Self::Arena,
+        Self::Corridor,
+        Self::OpenCorridor,
+        Self::Hall,
+        Self::LongWall,
+        Self::Slanted,
+        Self::Home,
+        Self::Pillars,
+        Self::Symmetric,
+        Self::NearlySymmetric,
+    ];
 
     /// Its name.
     #[must_use]
@@ -51,59 +91,38 @@ impl Family {
             Self::Corner => "L-room",
             Self::Arena => "arena",
             Self::Corridor => "corridor",
+            Self::OpenCorridor => "open corridor",
             Self::Hall => "hall",
+            Self::LongWall => "one long wall",
             Self::Slanted => "slanted walls",
+            Self::Home => "six rooms",
+            Self::Pillars => "pillars",
+            Self::Symmetric => "square",
+            Self::NearlySymmetric => "square with niche",
         }
     }
 
-    /// The corners of the room and of the path, metres.
-    fn outline(self, rng: &mut ChaCha8Rng) -> (Vec<Point>, Vec<Point>) {
+    /// A room of the family.
+    pub(super) fn room(self, rng: &mut ChaCha8Rng) -> Room {
         let mut between = |least: f64, most: f64| rng.random_range(least..most);
         match self {
-            Self::Corner => {
-                let (w, h) = (between(4.0, 6.0), between(4.0, 6.0));
-                let (x, y) = (between(0.4, 0.6) * w, between(0.4, 0.6) * h);
-                let room = vec![[0.0, 0.0], [w, 0.0], [w, y], [x, y], [x, h], [0.0, h]];
-                let (u, v) = (0.5 * x, 0.5 * y);
-                (room, vec![[u, v], [w - u, v], [u, v], [u, h - v]])
+            Self::Corner => Room::of(corner(&mut between)),
+            Self::Arena => Room::of(rectangle(between(1.5, 2.5), between(1.5, 2.5), 0.4)),
+            Self::Corridor => Room::of(rectangle(between(8.0, 12.0), between(1.6, 2.2), 0.5)),
+            Self::OpenCorridor => open_corridor(between(1.6, 2.2)),
+            Self::Hall => {
+                Room::of(rectangle(between(8.0, 12.0), between(8.0, 12.0), between(1.0, 2.0)))
             }
-            Self::Arena => rectangle(between(1.5, 2.5), between(1.5, 2.5), 0.4),
-            Self::Corridor => rectangle(between(8.0, 12.0), between(1.6, 2.2), 0.5),
-            Self::Hall => rectangle(between(8.0, 12.0), between(8.0, 12.0), between(1.0, 2.0)),
-            Self::Slanted => {
-                let (w, h) = (between(3.5, 6.0), between(3.5, 6.0));
-                let mut bent = || between(0.03, 0.2);
-                let (a, b, c, d) = (bent() * h, bent() * w, bent() * h, bent() * w);
-                let room = vec![[0.0, 0.0], [w, -a], [w - b, h + c], [d, h]];
-                let path = vec![
-                    [0.3 * w, 0.25 * h],
-                    [0.7 * w, 0.25 * h],
-                    [0.7 * w, 0.75 * h],
-                    [0.3 * w, 0.75 * h],
-                ];
-                (room, path)
+            Self::LongWall => long_wall(between(0.8, 1.5)),
+            Self::Slanted => Room::of(slanted(&mut between)),
+            Self::Home => home([(); 6].map(|()| between(3.0, 4.5))),
+            Self::Pillars => pillars(rng),
+            Self::Symmetric => {
+                let side = between(3.5, 6.0);
+                Room::of(rectangle(side, side, 0.25 * side))
             }
+            Self::NearlySymmetric => Room::of(niche(&mut between)),
         }
-    }
-
-    /// The room of a seed as the text of a scenario.
-    #[must_use]
-    pub fn toml(self, seed: u64) -> String {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let (room, path) = self.outline(&mut rng);
-        let mut text = String::new();
-        // Writing to a String does not fail.
-        let _ = write_scenario(&mut text, (self.name(), seed), &room, &path, &mut rng);
-        text
-    }
-
-    /// The room of a seed.
-    ///
-    /// # Errors
-    /// [`FileError`], if the scenario is invalid.
-    pub fn scenario(self, seed: u64) -> Result<Scenario, FileError> {
-        let name = format!("{} {seed}", self.name());
-        Scenario::parse(&self.toml(seed), &name, std::path::Path::new(""))
     }
 }
 
@@ -113,69 +132,104 @@ fn rectangle(w: f64, h: f64, inside: f64) -> (Vec<Point>, Vec<Point>) {
     (corners(0.0), corners(inside))
 }
 
-fn write_scenario(
-    text: &mut String,
-    (name, seed): (&str, u64),
-    room: &[Point],
-    path: &[Point],
-    rng: &mut ChaCha8Rng,
-) -> std::fmt::Result {
-    writeln!(text, "format = 1\nname = \"{name} {seed}\"\nfidelity = \"pins\"")?;
-    writeln!(text, "description = \"The {name} of seed {seed}\"\n\n[map]\nunit = \"m\"\nwall = [")?;
-    for (n, (from, to)) in closed(room).enumerate() {
-        writeln!(text, "    {{ name = \"wall {n}\", from = {}, to = {} }},", at(from), at(to))?;
+fn corner(between: &mut impl FnMut(f64, f64) -> f64) -> (Vec<Point>, Vec<Point>) {
+    let (w, h) = (between(4.0, 6.0), between(4.0, 6.0));
+    let (x, y) = (between(0.4, 0.6) * w, between(0.4, 0.6) * h);
+    let room = vec![[0.0, 0.0], [w, 0.0], [w, y], [x, y], [x, h], [0.0, h]];
+    let (u, v) = (0.5 * x, 0.5 * y);
+    (room, vec![[u, v], [w - u, v], [u, v], [u, h - v]])
+}
+
+fn slanted(between: &mut impl FnMut(f64, f64) -> f64) -> (Vec<Point>, Vec<Point>) {
+    let (w, h) = (between(3.5, 6.0), between(3.5, 6.0));
+    let mut bent = || between(0.03, 0.2);
+    let (a, b, c, d) = (bent() * h, bent() * w, bent() * h, bent() * w);
+    let room = vec![[0.0, 0.0], [w, -a], [w - b, h + c], [d, h]];
+    let path =
+        vec![[0.3 * w, 0.25 * h], [0.7 * w, 0.25 * h], [0.7 * w, 0.75 * h], [0.3 * w, 0.75 * h]];
+    (room, path)
+}
+
+/// There and back in the middle of 24 m.
+fn open_corridor(width: f64) -> Room {
+    let (outline, _) = rectangle(24.0, width, 0.0);
+    let path = vec![[9.0, 0.5 * width], [15.0, 0.5 * width]];
+    Room { unobservable: Unobservable::X, ..Room::of((outline, path)) }
+}
+
+/// There and back in the middle of 24 m, at a distance from the wall; the opposite one is 14 m away.
+fn long_wall(away: f64) -> Room {
+    let (outline, _) = rectangle(24.0, 14.0, 0.0);
+    let path = vec![[8.0, away], [16.0, away]];
+    Room { unobservable: Unobservable::X, ..Room::of((outline, path)) }
+}
+
+/// A square with a niche in its eastern wall.
+fn niche(between: &mut impl FnMut(f64, f64) -> f64) -> (Vec<Point>, Vec<Point>) {
+    let side = between(3.5, 6.0);
+    let (wide, deep) = (between(0.8, 1.2), between(0.3, 0.5));
+    let from = between(0.3, side - wide - 0.3);
+    let (mut outline, path) = rectangle(side, side, 0.25 * side);
+    let corners =
+        [[side, from], [side + deep, from], [side + deep, from + wide], [side, from + wide]];
+    outline.splice(2..2, corners);
+    (outline, path)
+}
+
+/// Three columns and two rows of rooms. The path leads through six doors in a circle.
+fn home([a, b, c, d, e, shift]: [f64; 6]) -> Room {
+    let (x1, x2, w) = (a, a + b, a + b + c);
+    let (y1, h) = (d, d + e);
+    let (outline, _) = rectangle(w, h, 0.0);
+    // The legs pass the rooms off their middle.
+    let (west, east) = (0.12 * shift * a, x2 + (1.0 - 0.12 * shift) * c);
+    let (south, north) = (0.12 * shift * d, y1 + (1.0 - 0.12 * shift) * e);
+    let path = vec![[west, south], [east, south], [east, north], [west, north]];
+    let half = 0.5 * DOOR;
+    let upright = |x: f64| {
+        let ends = [0.0, south - half, south + half, north - half, north + half, h];
+        ends.map(|y| [x, y])
+    };
+    let level = [0.0, west - half, west + half, east - half, east + half, w].map(|x| [x, y1]);
+    let pairs = [upright(x1), upright(x2), level].into_iter();
+    let inner = pairs.flat_map(|[a, b, c, d, e, f]| [[a, b], [c, d], [e, f]]).collect();
+    Room { inner, ..Room::of((outline, path)) }
+}
+
+fn pillars(rng: &mut ChaCha8Rng) -> Room {
+    let (w, h) = (rng.random_range(5.0..7.0), rng.random_range(5.0..7.0));
+    let mut room = Room::of(rectangle(w, h, 1.2));
+    for _ in 0..rng.random_range(4..=8) {
+        let side: f64 = rng.random_range(0.2..0.4);
+        let (x, y) = (rng.random_range(0.3..w - 0.7), rng.random_range(0.3..h - 0.7));
+        let corners = [[x, y], [x + side, y], [x + side, y + side], [x, y + side]];
+        let is_free = sides(&corners).all(|face| {
+            let nearest = room.inner.iter().map(|other| distance(face, *other));
+            room.beside_path(face) > BESIDE_PATH && nearest.fold(f64::INFINITY, f64::min) > 0.2
+        });
+        if is_free {
+            room.inner.extend(sides(&corners));
+        }
     }
-    let (first, others) = path.split_first().unwrap_or((&[0.0; 2], &[]));
-    let corners: Vec<String> = others.iter().chain([first]).map(at).collect();
-    let metres: f64 = closed(path).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).sum();
-    let lap = metres / SPEED + QUARTER_TURN * 4.0;
-    let laps = (DURATION / lap).ceil();
-    writeln!(text, "]\n\n[path]\nunit = \"m\"\nstart = {}\nclearance = \"20 cm\"", at(first))?;
-    writeln!(text, "corners = [{}]\nlaps = {laps}", corners.join(", "))?;
-    writeln!(text, "speed = \"{SPEED} m/s\"\nturn_rate = \"45 deg/s\"\nfollow = \"estimate\"\n")?;
-    write_truth(text, rng)?;
-    text.push_str(ROBOT);
-    Ok(())
-}
-
-/// The walks and, with slips and bumps by variance, the noise of the wheels are those that the robot file assumes.
-fn write_truth(text: &mut String, rng: &mut ChaCha8Rng) -> std::fmt::Result {
-    let mut within = |most: f64| rng.random_range(-most..most);
-    let width = TRACK_WIDTH + within(TRACK_WIDTH_ERROR);
-    let (right, left) = (within(SCALE), within(SCALE));
-    let celsius = ROOM + within(COLDER_OR_WARMER);
-    writeln!(text, "[truth]\ntrack_width = \"{width:.5} m\"")?;
-    writeln!(text, "scale_right = {right:.5}\nscale_left = {left:.5}\nrange_scale = \"0 %\"")?;
-    writeln!(text, "wheel_noise = \"2 mm/sqrt(m)\"\nscale_walk = \"1e-4 /sqrt(m)\"")?;
-    writeln!(text, "slip = {{ every = \"20 m\", by = \"3 mm\" }}")?;
-    writeln!(text, "bump = {{ every = \"20 m\", by = \"3 mm\" }}")?;
-    writeln!(text, "track_width_walk = \"2e-5 m/sqrt(m)\"\nrange_noise = \"3 mm\"")?;
-    writeln!(text, "range_noise_per_metre = \"0 mm/m\"\ncone = \"15 deg\"\n")?;
-    writeln!(text, "[world]\ntemperature = \"{celsius:.1} degC\"\n")
-}
-
-/// The sides of a polygon.
-fn closed(corners: &[Point]) -> impl Iterator<Item = (&Point, &Point)> {
-    corners.iter().zip(corners.iter().cycle().skip(1))
-}
-
-fn at([x, y]: &Point) -> String {
-    format!("[{x:.3}, {y:.3}]")
+    room
 }
 
 #[cfg(test)]
 mod tests {
+    use rand::SeedableRng;
+
+    use super::super::polygon::contains;
     use super::*;
 
     #[test]
-    fn every_family_gives_valid_rooms_that_differ_by_seed() {
+    fn every_path_is_inside_its_room_and_clear_of_its_walls() {
         for family in Family::ALL {
-            for seed in 0..20 {
-                let scenario = family.scenario(seed).unwrap();
-                assert!(scenario.path.duration() >= DURATION, "{} {seed}", family.name());
+            for seed in 0..50 {
+                let room = family.room(&mut ChaCha8Rng::seed_from_u64(seed));
+                let name = format!("{} {seed}", family.name());
+                assert!(room.path.iter().all(|at| contains(&room.outline, *at)), "{name}");
+                assert!(room.walls().iter().all(|wall| room.beside_path(*wall) > 0.2), "{name}");
             }
-            assert_ne!(family.toml(0), family.toml(1));
-            assert_eq!(family.toml(7), family.toml(7));
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use sonarfix_studies::health_page;
+use sonarfix_studies::{health_page, kidnapped};
 
 use sonarfix_terminal::output::check_file;
 use sonarfix_terminal::progress::Runs;
@@ -12,6 +12,12 @@ pub struct Args {
     /// Number of runs of each scenario, and of trials with kidnapped robots.
     #[arg(long, default_value_t = 1_000)]
     runs: u32,
+    /// Seed of the first run of each scenario, and of the first trial; the others count up from it.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Only the trials with kidnapped robots.
+    #[arg(long, conflicts_with = "figure")]
+    kidnapped: bool,
     /// The figure of the detection time to write, as SVG.
     #[arg(long, value_name = "FILE.svg")]
     figure: Option<PathBuf>,
@@ -22,8 +28,11 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     if let Some(file) = &args.figure {
         check_file("--figure", file)?;
     }
+    if args.kidnapped {
+        return only_kidnapped(args);
+    }
     let runs = Runs::new(args.runs.saturating_mul(health_page::SETS));
-    let findings = health_page::findings(args.runs, &runs)?;
+    let findings = health_page::findings(args.seed, args.runs, &runs)?;
     runs.end()?;
     if let Some(file) = &args.figure {
         let called_after: Vec<_> =
@@ -33,5 +42,16 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         sonarfix_files::write(file, svg)?;
     }
     print!("{}", health_page::markdown(&findings));
+    Ok(())
+}
+
+/// Prints the section of the kidnapped robots alone.
+fn only_kidnapped(args: &Args) -> anyhow::Result<()> {
+    let runs = Runs::new(args.runs);
+    let trials = kidnapped::trials(args.seed, args.runs.into(), &runs)?;
+    runs.end()?;
+    if !trials.is_empty() {
+        print!("{}", health_page::kidnapped_section(&trials));
+    }
     Ok(())
 }

@@ -9,6 +9,7 @@ mod find;
 mod floor_plans;
 mod health;
 mod reality;
+mod recordings;
 mod relocalize;
 mod rooms;
 mod sonar_model;
@@ -40,6 +41,8 @@ enum Command {
     Health(health::Args),
     /// Replays all recordings of a folder; prints markdown.
     Reality(reality::Args),
+    /// Replays the recordings of a folder with the robot files beside them; prints markdown.
+    Recordings(recordings::Args),
     /// Measures how robots that lose their pose, or start without one, find it in random floor plans.
     Relocalize(relocalize::Args),
     /// Measures consistency and verdicts in generated rooms; prints markdown.
@@ -68,6 +71,7 @@ fn execute(command: Command) -> anyhow::Result<()> {
         Command::FloorPlans(args) => floor_plans::execute(&args),
         Command::Health(args) => health::execute(&args),
         Command::Reality(args) => reality::execute(&args),
+        Command::Recordings(args) => recordings::execute(&args),
         Command::Relocalize(args) => relocalize::execute(&args),
         Command::Rooms(args) => rooms::execute(&args),
         Command::SonarModel(args) => sonar_model::execute(&args),
