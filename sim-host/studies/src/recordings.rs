@@ -81,9 +81,8 @@ fn replay(folder: &Path, cone: Option<f32>) -> Result<Summary, String> {
 
 fn with_cone(mut robot: RobotConfig, cone: Option<f32>) -> RobotConfig {
     if let Some(cone) = cone.map(Radians::from_degrees) {
-        robot.localizer.sonar.cone = cone;
-        for sonar in robot.localizer.further_sonars.iter_mut() {
-            sonar.cone = cone;
+        for ranger in robot.localizer.rangers.iter_mut() {
+            ranger.cone = cone;
         }
     }
     robot

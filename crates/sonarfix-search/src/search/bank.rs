@@ -3,9 +3,10 @@
 use heapless::Vec;
 
 use super::candidates::Placement;
-use super::ranked::{insert_ranked, remove_at};
+use super::ranked::insert_ranked;
 use super::refine::Spread;
 use super::window::{Bend, Station};
+use sonarfix::geometry::list::remove_at;
 use sonarfix::geometry::vector::Vector;
 
 /// Placements within this distance, metres, and this cosine of rotation (25°) are one mode.

@@ -4,9 +4,10 @@
 
 use heapless::Vec;
 
-use super::ranked::{insert_ranked, remove_at};
+use super::ranked::insert_ranked;
 use super::window::Ping;
 use sonarfix::geometry::elementary::sqrt;
+use sonarfix::geometry::list::remove_at;
 use sonarfix::geometry::trig::sin_cos;
 use sonarfix::geometry::units::Radians;
 use sonarfix::geometry::vector::Vector;

@@ -12,7 +12,7 @@
 
 use heapless::Vec;
 
-use super::ranked::remove_at;
+use sonarfix::geometry::list::remove_at;
 use sonarfix::geometry::pose::Heading;
 use sonarfix::geometry::units::Radians;
 use sonarfix::geometry::vector::Vector;

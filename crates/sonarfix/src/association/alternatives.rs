@@ -87,15 +87,11 @@ impl Scene<'_, '_> {
             let visible =
                 1.0 - self.history.clutter.prior_occlusion(echo, Metres(reflector.distance));
             let answers = visible * heard.probability(echo.heard());
-            let expected =
-                ExpectedRange::from_point(reflector.toward, reflector.distance, &position);
             let travelled = self.history.travelled_since(reflector.wall);
-            let noise = sonar.noise.variance(expected.range).0
-                + echo.map_variance(reflector.accuracy, travelled);
-            let noise = SquareMetres(noise);
-            let innovation = self.ekf.innovation(range, &expected, noise);
-            let is_behind = reflector.distance > distance;
-            sum.add(answers, density(innovation), is_behind);
+            let noise = echo.map_variance(reflector.accuracy, travelled);
+            let point = (reflector.toward, reflector.distance);
+            let density = self.density_of(point, noise, &position, range);
+            sum.add(answers, density, reflector.distance > distance);
         }
         self.add_over_two_walls(target, &position, range, &mut sum);
         sum.others
@@ -126,12 +122,24 @@ impl Scene<'_, '_> {
             if !is_near(path) || along < 0.0 || along > wall.length().0 {
                 continue;
             }
-            let expected = ExpectedRange::from_point(toward, path, position);
-            let noise = self.sonar.noise.variance(expected.range).0;
-            let noise = SquareMetres(noise + OVER_TWO_WALLS * OVER_TWO_WALLS);
-            let innovation = self.ekf.innovation(range, &expected, noise);
-            sum.add(HEARD_OVER_TWO_WALLS, density(innovation), true);
+            let noise = OVER_TWO_WALLS * OVER_TWO_WALLS;
+            let density = self.density_of((toward, path), noise, position, range);
+            sum.add(HEARD_OVER_TWO_WALLS, density, true);
         }
+    }
+
+    /// Density of an echo at `range` from a distance along a unit vector, with this variance beside the noise, m².
+    #[inline(never)]
+    fn density_of(
+        &self,
+        (toward, distance): (Vector, f32),
+        variance: f32,
+        position: &SonarPosition,
+        range: Metres,
+    ) -> f32 {
+        let expected = ExpectedRange::from_point(toward, distance, position);
+        let noise = SquareMetres(self.sonar.noise.variance(expected.range).0 + variance);
+        density(self.ekf.innovation(range, &expected, noise))
     }
 }
 

@@ -23,10 +23,12 @@ pub(crate) struct Clutter {
 
 impl Clutter {
     // ===== Eq. (51) =====
-    /// Probability that an unmapped object occludes a reflector at this range, before a ping at it.
+    /// Probability that an unmapped object occludes a reflector at this range, before a ping at it. The free path is at
+    /// least that of the echo model: a wrong pose looks as if it was cluttered.
     pub fn prior_occlusion(&self, parameters: &EchoParameters, range: Metres) -> f32 {
         let given = parameters.free_path.0;
-        let path = (PRIOR_OBJECTS * given + self.free) / (PRIOR_OBJECTS + self.objects);
+        let learned = (PRIOR_OBJECTS * given + self.free) / (PRIOR_OBJECTS + self.objects);
+        let path = if learned > given { learned } else { given };
         if given > 0.0 { range.0 / (range.0 + path) } else { 0.0 }
     }
 
@@ -53,13 +55,18 @@ mod tests {
     /// Against the sums of the geometric series in `f64`.
     #[test]
     fn the_free_path_is_the_mean_of_the_beams_and_of_half_a_given_one() {
-        for (pings, occluded) in [(0, 0.0), (1, 0.3), (20, 0.0), (20, 1.0), (300, 0.1)] {
+        for (pings, occluded) in [(0, 0.0), (1, 0.02), (20, 0.0), (300, 0.1)] {
             let sum = (1.0 - 0.98_f64.powi(pings)) / (1.0 - 0.98);
             let hit = f64::from(occluded);
             let path = (5.0 + 2.0 * (1.0 - hit) * sum) / (0.5 + hit * sum);
             let found = f64::from(after(u32::try_from(pings).unwrap(), occluded));
             assert!((found - 2.0 / (2.0 + path)).abs() < 1e-5, "{pings} {occluded}: {found}");
         }
+    }
+
+    #[test]
+    fn the_free_path_is_at_least_the_given_one() {
+        assert!((after(20, 1.0) - 2.0 / 12.0).abs() < 1e-6);
     }
 
     #[test]

@@ -13,7 +13,6 @@ use crate::association::clutter::Clutter;
 use crate::association::echo::Source;
 use crate::association::reliability::{Reliability, Returned, Shares};
 use crate::config::{Config, MAX_RANGERS, RangerId};
-use crate::geometry::elementary::sqrt;
 use crate::geometry::units::{Instant, Metres, Radians, SquareMetres, seconds};
 use crate::map::WallId;
 use crate::sensor::echo::EchoParameters;
@@ -35,9 +34,10 @@ const HALVED_AFTER: f32 = 5.0;
 /// Probability that a ping agrees with a wrong pose, if the last one that agreed was in the same direction: the error may
 /// be along the wall.
 const AGREES_ALONG: f32 = 0.3;
-/// The same in another direction: this, and so much per metre of the innovation's deviation for a wall that happens to be at that range.
+/// The same in another direction: this, and so much per square metre of the innovation's variance for a wall that happens to
+/// be at that range.
 const AGREES_ACROSS: f32 = 0.01;
-const PER_METRE: f32 = 1.0;
+const PER_SQUARE_METRE: f32 = 20.0;
 /// Two directions whose cosine exceeds this are the same: 37°.
 const SAME_DIRECTION: f32 = 0.8;
 
@@ -159,12 +159,15 @@ impl History {
     /// Probability that a ping agrees by chance with a wrong pose, for a range with these derivatives by x and y and an
     /// innovation of this variance.
     pub fn by_chance(&self, (x, y): (f32, f32), variance: SquareMetres) -> f32 {
-        let Some((used_x, used_y)) = self.used else { return AGREES_ALONG };
-        if (x * used_x + y * used_y).abs() > SAME_DIRECTION {
-            return AGREES_ALONG;
+        let across = AGREES_ACROSS + PER_SQUARE_METRE * variance.0;
+        match self.used {
+            Some((used_x, used_y))
+                if (x * used_x + y * used_y).abs() < SAME_DIRECTION && across < AGREES_ALONG =>
+            {
+                across
+            }
+            _ => AGREES_ALONG,
         }
-        let across = AGREES_ACROSS + PER_METRE * sqrt(variance.0);
-        if across < AGREES_ALONG { across } else { AGREES_ALONG }
     }
 
     /// Records the derivatives by x and y of a range that was the wall's.

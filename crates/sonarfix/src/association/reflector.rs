@@ -10,6 +10,7 @@ use heapless::Vec;
 
 use crate::config::RangerParameters;
 use crate::geometry::elementary::sqrt;
+use crate::geometry::list::{insert_at, remove_at};
 use crate::geometry::trig::sin_cos;
 use crate::geometry::units::Metres;
 use crate::geometry::vector::Vector;
@@ -295,7 +296,7 @@ fn insert(into: &mut Vec<Reflector, REFLECTORS>, reflector: Reflector) {
             if !known.is_some_and(|known| is_before(arm, known)) {
                 return;
             }
-            into.remove(at);
+            remove_at(into, at);
         }
     }
     if into.is_full() {
@@ -307,8 +308,7 @@ fn insert(into: &mut Vec<Reflector, REFLECTORS>, reflector: Reflector) {
         }
     }
     let at = into.iter().position(|other| reflector.is_before(other));
-    // There is room: it was made above.
-    let _ = into.insert(at.unwrap_or(into.len()), reflector);
+    insert_at(into, at.unwrap_or(into.len()), reflector);
 }
 
 impl Reflector {

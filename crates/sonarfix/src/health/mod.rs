@@ -3,22 +3,23 @@
 //! The covariance is the filter's own uncertainty; it does not show that the filter is wrong. The
 //! measurements do. The evidence of each ping is the logarithm of its likelihood at a wrong pose over
 //! that at the estimated one, by the [echo model](crate::association::echo). A ping that agrees counts at most −1.2,
-//! because a wrong pose agrees by chance in three of ten pings; one that contradicts counts between 1 and
-//! 4, less or nothing if the wall is already known to be occluded: the occluding object returns its echo at
+//! because a wrong pose that is displaced along a wall agrees as well (three of ten pings); it counts up to −4 if the last one that
+//! agreed was in another direction, since both agree by chance with a wrong pose as seldom as the deviation of the range is small. One
+//! that contradicts counts between 1 and 4, less or nothing if the wall is already known to be occluded: the occluding object returns its echo at
 //! a wrong pose as well, so that such a ping is no evidence for the pose either. That knowledge fades with the distance
 //! along the wall and with time, so that a wall that contradicts everywhere counts again.
 //!
 //! This is Page's cumulative sum test, eq. (23) of `docs/model.md`. The sum, never below 0, decides:
 //!
 //! ```text
-//!              2.5, or 8 pings in a row without an    6.5, or 30 pings without
+//!              2.5, or 8 pings in a row without an    8.5, or 30 pings without
 //!              accepted range, or mean NIS above 3,   an accepted range while
 //!              or too far without a fix, or uncertain unmeasurable
 //!   Tracking ────────────────────────────▶ Degraded ──────────────────────▶ Lost
 //!      ▲                                    │   ▲                             │
 //!      └── below 0.5, 3 accepted in a   ────┘   └── below 0.5, 3 accepted in a row
 //!          row, none of the others,
-//!          at most 3 inflations
+//!          at most one inflation
 //! ```
 //!
 //! - *Mean NIS*: mean of ν²/S over the accepted ranges, with a weight of 1/16 for the latest. 1 if the
@@ -66,7 +67,7 @@ const DEGRADED_AT: f32 = 2.5;
 /// The evidence at which the verdict is [`Verdict::Lost`], and the maximum. Chosen so that a robot
 /// kidnapped by 1 m and 90° is lost within 15 pings in 97 % of trials, and one among unmapped
 /// furniture in less than one run of 500 (`docs/health.md`).
-pub const LOST_AT: f32 = 7.5;
+pub const LOST_AT: f32 = 8.5;
 /// The evidence below which the verdict can improve.
 const BETTER_BELOW: f32 = 0.5;
 

@@ -120,9 +120,9 @@ fn an_improvement_has_each_of_its_conditions() {
         (0..ranges).for_each(|_| health.record_fix(&accepted(1.0), 0.0, false, CERTAIN, &LIMITS));
         health.verdict == Verdict::Tracking
     };
-    assert!(improved(0.499, 3, 3));
+    assert!(improved(0.499, 1, 3));
     assert!(!improved(BETTER_BELOW, 0, 3));
-    assert!(!improved(0.0, 4, 3));
+    assert!(!improved(0.0, 2, 3));
     assert!(!improved(0.0, 0, 2));
 }
 

@@ -170,7 +170,10 @@ impl Measurement for Ping<'_> {
         if view.measured.is_ok() && !is_repeated {
             history.clutter.record(view.expected.range, found.occluded);
         }
-        News { contradicts: gating::contradicts(found.mapped, entry.occlusion), is_repeated }
+        // A ranger that has fallen silent does not tell where the robot is not.
+        let is_echo = view.measured.is_ok();
+        let contradicts = is_echo && gating::contradicts(found.mapped, entry.occlusion);
+        News { contradicts, is_repeated }
     }
 
     fn has_failed(&self, config: &Config, history: &History) -> bool {
