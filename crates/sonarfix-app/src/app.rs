@@ -170,7 +170,10 @@ impl<'m, F: NorFlash> App<'m, F> {
                 self.faults.clock = self.faults.clock.saturating_add(1);
                 return self.at_rest;
             }
-            Reading::SetBack => self.set_clock(now),
+            Reading::SetBack => {
+                hardware.set_clock(now);
+                self.set_clock(now);
+            }
         }
         let frame = self.wire.next(link);
         if let State::Running(running) = &mut self.state
@@ -333,7 +336,14 @@ impl<'m, F: NorFlash> App<'m, F> {
         let (Some(localizer), Some((config, _))) = (self.localizer(), &self.config) else {
             return false;
         };
-        config.motors.permits(localizer, now, self.heard)
+        self.can_see_wheels(config) && config.motors.permits(localizer, now, self.heard)
+    }
+
+    /// Whether the encoders have been read since the loop started, or need not be.
+    fn can_see_wheels(&self, config: &RobotConfig) -> bool {
+        let has_read =
+            matches!(&self.state, State::Running(running) if running.robot.has_read_encoders());
+        config.motors.dead_encoder || has_read
     }
 
     /// The localizer, while the loop runs.

@@ -379,6 +379,12 @@ impl<'m> Robot<'m> {
         self.tracker.localizer()
     }
 
+    /// Whether both encoders have been read since the loop started.
+    #[must_use]
+    pub fn has_read_encoders(&self) -> bool {
+        self.odometer.has_begun()
+    }
+
     /// The faults since the start.
     #[must_use]
     pub fn faults(&self) -> Faults {

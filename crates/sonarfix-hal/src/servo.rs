@@ -210,6 +210,15 @@ impl<P> Servo<P> {
         self.target().is_some() && now >= self.settles_at()
     }
 
+    /// The clock was set back to `now`: it settles as from an unknown bearing.
+    pub fn set_clock(&mut self, now: Instant) {
+        match &mut self.mounting {
+            Mounting::Turning(setup) => setup.motion.set_clock(now, setup.settings.limits),
+            Mounting::Fixed { pointed_at, .. } => *pointed_at = pointed_at.map(|_| now),
+            Mounting::Unknown => {}
+        }
+    }
+
     /// The instant at which it has settled at its target; centuries ahead before the first
     /// [`Self::point`]. A fixed ranger has settled with the command.
     #[must_use]

@@ -147,6 +147,23 @@ fn an_interruption_while_the_encoders_are_dead_keeps_their_growth() {
     assert!(bench.app.is_running());
 }
 
+/// A robot that starts with a dead encoder enables its motors when the encoder has been read.
+#[test]
+fn a_robot_drives_after_it_has_read_its_encoders() {
+    let baked = Baked::new(&config());
+    let mut bench = Bench::switched_on(&baked, SimFlash::new());
+    assert_eq!(bench.order(&Command::SetPose(start())), DONE);
+    let left = bench.hardware.left.0.take();
+    assert_eq!(bench.order(&Command::Start), DONE);
+    for _ in 0..300 {
+        let polled = bench.poll();
+        assert!(polled.is_running && !polled.may_drive);
+    }
+    bench.hardware.left.0 = left;
+    bench.wait(200);
+    assert!(bench.poll().may_drive);
+}
+
 /// A new pose while an encoder is dead: the travel before it, which the counter returns later, does not move it.
 #[test]
 fn a_new_pose_without_odometry_is_not_moved_by_earlier_travel() {

@@ -34,6 +34,10 @@ pub trait Ranger {
         None
     }
 
+    /// The clock was set back to `now`: the last ping counts as one of now. The default implementation does
+    /// nothing, which suits a driver that keeps no time.
+    fn set_clock(&mut self, _now: Instant) {}
+
     /// Configures the driver for the ranger of the robot's configuration. The default implementation accepts
     /// [`RangerKind::Custom`] and ignores the other settings.
     ///

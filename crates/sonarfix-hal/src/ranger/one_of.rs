@@ -71,6 +71,11 @@ impl<A: Ranger, B: Ranger> Ranger for OneOf<A, B> {
         if self.is_second { self.second.poll_at() } else { self.first.poll_at() }
     }
 
+    fn set_clock(&mut self, now: Instant) {
+        self.first.set_clock(now);
+        self.second.set_clock(now);
+    }
+
     fn configure(&mut self, settings: &RangerSettings) -> Result<(), UnsupportedKind> {
         let is_first = self.first.configure(settings).is_ok();
         if !is_first {

@@ -266,6 +266,10 @@ impl<T: OutputPin, L: EchoLine> Ranger for PulseRanger<T, L> {
         }
     }
 
+    fn set_clock(&mut self, now: Instant) {
+        self.triggered = self.triggered.map(|_| now);
+    }
+
     fn configure(&mut self, settings: &RangerSettings) -> Result<(), UnsupportedKind> {
         let RangerSettings { kind: RangerKind::Pulse(timing), cycle, air } = *settings else {
             return Err(UnsupportedKind);

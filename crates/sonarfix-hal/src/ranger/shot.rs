@@ -41,6 +41,11 @@ impl Shot {
         self.started.filter(|_| self.in_flight)
     }
 
+    /// The clock was set back to `now`: the last one counts as started now.
+    pub fn set_clock(&mut self, now: Instant) {
+        self.started = self.started.map(|_| now);
+    }
+
     /// The range in flight has ended.
     pub fn end(&mut self) {
         self.in_flight = false;

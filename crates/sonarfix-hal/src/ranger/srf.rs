@@ -156,6 +156,10 @@ impl<I: I2c> Ranger for Srf<I> {
         Some(sent.map_or(NEVER, |sent| after(sent, RANGING)))
     }
 
+    fn set_clock(&mut self, now: Instant) {
+        self.triggered = self.triggered.map(|_| now);
+    }
+
     fn configure(&mut self, settings: &RangerSettings) -> Result<(), UnsupportedKind> {
         let RangerSettings { kind: RangerKind::Srf { address }, cycle, air } = *settings else {
             return Err(UnsupportedKind);

@@ -394,6 +394,10 @@ impl<I: I2c> Ranger for Vl53l0x<I> {
         Some(self.shot.in_flight_since().map_or(NEVER, |started| after(started, RANGING)))
     }
 
+    fn set_clock(&mut self, now: Instant) {
+        self.shot.set_clock(now);
+    }
+
     fn configure(&mut self, settings: &RangerSettings) -> Result<(), UnsupportedKind> {
         let RangerSettings { kind: RangerKind::Vl53l0x { address }, cycle, .. } = *settings else {
             return Err(UnsupportedKind);

@@ -1,8 +1,8 @@
 //! The devices that the loop uses.
 
 use embedded_hal::pwm::SetDutyCycle;
-use sonarfix::config::RangerId;
-use sonarfix::geometry::units::{Metres, RadiansPerSecond};
+use sonarfix::config::{MAX_RANGERS, RangerId};
+use sonarfix::geometry::units::{Instant, Metres, RadiansPerSecond};
 use sonarfix::sensor::gyro::GyroParameters;
 
 use crate::config::{RobotConfig, Unsupported};
@@ -52,6 +52,16 @@ pub trait Hardware {
     /// The rate of the gyro now; `None` without a gyro.
     fn yaw_rate(&mut self) -> Option<Result<RadiansPerSecond, Unreadable>> {
         None
+    }
+
+    /// The clock was set back to `now`: no device waits for a time of the clock before.
+    fn set_clock(&mut self, now: Instant) {
+        let mut ranger = RangerId::FIRST;
+        while ranger.index() < MAX_RANGERS && self.has_ranger(ranger) {
+            self.ranger_of(ranger).set_clock(now);
+            self.servo_of(ranger).set_clock(now);
+            ranger.0 = ranger.0.saturating_add(1);
+        }
     }
 
     /// Configures the gyro of this robot.

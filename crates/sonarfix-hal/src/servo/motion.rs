@@ -42,6 +42,13 @@ impl Motion {
         self.bearing(now).unwrap_or(farther)
     }
 
+    /// The clock was set back to `now`: a whole turn begins now.
+    pub fn set_clock(&mut self, now: Instant, limits: (Radians, Radians)) {
+        if let Some(turn) = self.turn.take() {
+            self.start(now, turn.to, limits);
+        }
+    }
+
     pub fn target(&self) -> Option<Radians> {
         self.turn.map(|turn| turn.to)
     }

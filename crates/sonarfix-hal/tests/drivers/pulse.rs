@@ -62,6 +62,23 @@ fn an_echo_by_polling() {
     echo.done();
 }
 
+/// A clock that is set back does not make the ranger wait for the old time.
+#[test]
+fn a_ranger_pings_a_cycle_after_the_clock_was_set_back() {
+    let mut trigger = pulses(2);
+    let mut echo = levels(&[Low, Low, High, Low, Low, Low]);
+    let mut ranger = hc_sr04(&trigger, &echo);
+    let hour = 3_600_000_000;
+    assert!(ping(&mut ranger, hour, &[hour + 500, hour + 1_500]).is_some());
+    ranger.set_clock(at(1_000));
+    assert_eq!(ranger.ready_at(), at(61_000));
+    assert_eq!(ranger.trigger(at(60_999)), Err(TriggerError::TooSoon));
+    ranger.trigger(at(61_000)).unwrap();
+    assert_eq!(ranger.poll(at(61_010)), Ok(None));
+    trigger.done();
+    echo.done();
+}
+
 #[test]
 fn bleed_through_is_ignored() {
     let mut trigger = pulses(1);

@@ -66,6 +66,26 @@ fn the_same_duty_is_set_once_and_does_not_unsettle() {
     pwm.done();
 }
 
+/// A clock that is set back does not make the servo wait for the old time: it settles as from an unknown bearing.
+#[test]
+fn a_servo_settles_after_the_clock_was_set_back() {
+    let mut servo =
+        Servo::configured(Pwm { counts: 40_000 }, settings(degrees(80.0), ServoTiming::SG90))
+            .unwrap();
+    servo.set_clock(at(0));
+    assert!(!servo.is_settled(at(10_000_000)), "it was never told where to point");
+    servo.point(at(0), Radians(0.0)).unwrap();
+    let settles_in = servo.settles_at();
+    servo.point(at(3_600_000_000), Radians(0.5)).unwrap();
+    servo.point(at(3_600_000_000), Radians(0.0)).unwrap();
+    servo.set_clock(at(0));
+    assert_eq!(servo.settles_at(), settles_in);
+    servo.fix(Radians(0.3));
+    servo.point(at(3_600_000_000), Radians(0.3)).unwrap();
+    servo.set_clock(at(5));
+    assert!(servo.is_settled(at(5)));
+}
+
 #[test]
 fn out_of_reach_touches_nothing() {
     let mut pwm = Mock::new(&[]);
