@@ -192,6 +192,23 @@ fn dropped_events_are_counted() {
     assert_eq!((batch.missed, batch.lines.len(), batch.next), (2, 4, 8));
 }
 
+/// A reader does not wait while there are events, and the last batch of many is the end.
+#[test]
+fn events_that_wait_are_returned_at_once() {
+    let ring = Ring::default();
+    for _ in 0..600 {
+        ring.push("x");
+    }
+    let begun = Instant::now();
+    let batch = ring.next(0, 6 * PATIENCE);
+    assert!(begun.elapsed() < PATIENCE, "waited {:?}", begun.elapsed());
+    ring.close();
+    let again = ring.next(0, Duration::ZERO);
+    assert_eq!((again.lines.len(), again.is_end), (batch.lines.len(), false));
+    let rest = ring.next(batch.next, Duration::ZERO);
+    assert_eq!((rest.next, rest.is_end), (600, true));
+}
+
 /// The page reads the number in an event before the others.
 #[test]
 fn missed_events_are_reported_to_the_page() {
