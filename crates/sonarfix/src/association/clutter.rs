@@ -6,7 +6,7 @@
 use crate::geometry::units::Metres;
 use crate::sensor::echo::EchoParameters;
 
-/// Objects that the free path of the echo model counts for. Chosen on generated rooms with the seeds below 10,000
+/// Objects that the free path of the echo model counts for. Chosen on generated rooms with the seeds 1000 to 1059
 /// (`docs/rooms.md`).
 const PRIOR_OBJECTS: f32 = 0.5;
 /// What remains of the sums after a ping: a memory of fifty pings.
