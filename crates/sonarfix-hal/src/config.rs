@@ -145,7 +145,7 @@ pub struct RangerConfig {
     /// Temperature of the air that the driver computes ranges with; the same for all rangers.
     pub temperature: Celsius,
     /// Two pulses of the servo, and the bearing of the ranger that was measured with each. Without effect on a ranger at a
-    /// fixed bearing ([`Sonar::fixed_bearing`]).
+    /// fixed bearing ([`RangerParameters::fixed_bearing`]).
     pub servo_pulses: [MeasuredPulse; 2],
 }
 

@@ -25,7 +25,7 @@ impl Clutter {
     // ===== Eq. (51) =====
     /// Probability that an unmapped object occludes a reflector at this range, before a ping at it. The free path is at
     /// least that of the echo model: a wrong pose looks as if it was cluttered.
-    pub fn prior_occlusion(&self, parameters: &EchoParameters, range: Metres) -> f32 {
+    pub fn prior_occlusion(self, parameters: &EchoParameters, range: Metres) -> f32 {
         let given = parameters.free_path.0;
         let learned = (PRIOR_OBJECTS * given + self.free) / (PRIOR_OBJECTS + self.objects);
         let path = if learned > given { learned } else { given };

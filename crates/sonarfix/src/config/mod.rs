@@ -226,7 +226,7 @@ fn require(field: &'static str, holds: bool, rule: &'static str) -> Result<(), C
 
 impl Config {
     /// The configuration of a small differential-drive robot with an ideal ranger, to be adapted: moderate
-    /// noise, range scale not estimated, [`Sonar::default`].
+    /// noise, range scale not estimated, [`RangerParameters::default`].
     ///
     /// ```
     /// use sonarfix::config::Config;

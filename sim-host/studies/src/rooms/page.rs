@@ -24,7 +24,8 @@ the level of pins, and steers by its estimate. Parameters are chosen on seeds be
   along them; errors in that direction do not count.
 - **Objects**: furniture of all sizes, a third of it round; clutter, posts of 2 cm to 8 cm; a board parallel to a wall, 30 cm before it where the path leaves room; a
   door that is open while the map says closed, or the converse, or that is opened during the run; one to three people who walk to and fro beside
-  the path; a box that is moved once. Objects are smaller in rooms narrower than 3 m. Nothing crosses the path: the simulated robot collides with nothing.
+  the path; a box that is moved once. Objects are smaller in rooms narrower than 3 m. Nothing crosses the path: the simulated robot collides with nothing. Arenas and
+  corridors seldom have room for people beside it.
 - **Sensors**: HC-SR04, LEGO NXT, LV-MaxSonar-EZ and VL53L1X as in [hardware.md](hardware.md); the EV3 reports the nearest point of a cone of ±15°.
 
 | column | meaning |
