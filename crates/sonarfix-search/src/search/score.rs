@@ -6,7 +6,7 @@
 use heapless::Vec;
 
 use sonarfix::association::reflector::{
-    Beam, Heard, Lit, Place, REFLECTORS, Reflector, Reflectors,
+    Audibility, Beam, BeamHit, Place, REFLECTORS, Reflector, Reflectors,
 };
 use sonarfix::config::{RangerParameters, Ranging};
 use sonarfix::geometry::elementary::{ln, sqrt};
@@ -26,7 +26,7 @@ struct Audible {
     miss: f32,
 }
 
-/// Of [`Heard::probability`].
+/// Of [`Audibility::probability`].
 const CORNER: Audible = Audible { hit: -0.288, miss: -1.386 };
 const RIM: Audible = Audible { hit: -0.916, miss: -0.511 };
 const WEAK: Audible = Audible { hit: -2.303, miss: -0.105 };
@@ -222,7 +222,7 @@ impl<'m> EchoModel<'m> {
             let score = at_least(SILENCE + missed, self.shares.silence);
             return Explanation { score, target: None };
         };
-        let Some(Lit { distance, away }) = met else {
+        let Some(BeamHit { distance, away }) = met else {
             return Explanation { score: at_least(self.shares.before, LEAST_ECHO), target: None };
         };
         // The deviation is across the wall: a place that is wrong by it changes an oblique range by more.
@@ -242,10 +242,10 @@ impl<'m> EchoModel<'m> {
     /// How well a reflector is heard, `None` if a wall hides it.
     fn audible(&self, beam: &Beam, reflector: &Reflector) -> Option<Audible> {
         Some(match self.reflectors.heard(beam, reflector)? {
-            Heard::End => WEAK,
-            Heard::Rim => RIM,
-            Heard::Corner => CORNER,
-            Heard::Foot => Audible { hit: self.shares.answers, miss: self.shares.misses },
+            Audibility::End => WEAK,
+            Audibility::Rim => RIM,
+            Audibility::Corner => CORNER,
+            Audibility::Foot => Audible { hit: self.shares.answers, miss: self.shares.misses },
         })
     }
 }

@@ -25,11 +25,11 @@ struct Ray {
     until_ping: f32,
     direction: Heading,
     axis: Vector,
-    met: Option<Met>,
+    met: Option<NearestWall>,
 }
 
 #[derive(Clone, Copy)]
-struct Met {
+struct NearestWall {
     id: WallId,
     distance: f32,
 }
@@ -44,7 +44,7 @@ impl Ray {
         let approach = wall.a() * self.axis.x + wall.b() * self.axis.y;
         let distance = -wall.signed_distance(from).0 / approach;
         if distance >= 0.0 && self.met.is_none_or(|met| distance < met.distance) {
-            self.met = Some(Met { id, distance });
+            self.met = Some(NearestWall { id, distance });
         }
     }
 }
@@ -128,7 +128,7 @@ impl Planner<'_> {
     #[inline(never)]
     fn by_beam(&self, beam: LightBeam, ray: &Ray) -> Option<(WallId, Candidate)> {
         let Ray { bearing, until_ping, direction, met, .. } = *ray;
-        let Met { id, .. } = met?;
+        let NearestWall { id, .. } = met?;
         let sight = self.view.lit(&self.map.wall(id)?, beam, direction).ok()?;
         if !self.view.is_square(sight.off) {
             return None;

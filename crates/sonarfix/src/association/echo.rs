@@ -44,7 +44,7 @@ const MIN_SPAN: f32 = 0.05;
 
 /// What returned the latest echo of a ping at a wall that was probably not the wall's.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Source {
+pub(crate) struct EchoSource {
     /// Its range at that ping.
     pub range: Metres,
     /// Distance travelled since.
@@ -66,7 +66,7 @@ pub(crate) struct ExpectedEcho {
     /// o: probability that an unmapped object occludes the wall.
     pub occluded: f32,
     /// What returned an echo instead of the wall before.
-    pub source: Option<Source>,
+    pub source: Option<EchoSource>,
     /// The shortest and the longest range that the sonar reports.
     pub limits: (Metres, Metres),
     /// Probability that it agrees with a wrong pose by chance.
@@ -217,7 +217,7 @@ pub(crate) fn density(innovation: Innovation) -> f32 {
     ONE_OVER_ROOT_TWO_PI * per_sigma * (narrow + wide)
 }
 
-impl Source {
+impl EchoSource {
     /// Probability that it returns its echo again, if the wall is occluded.
     fn probability(&self) -> f32 {
         let ratio = self.travelled.0 / SOURCE_HALVED_WITHIN;
@@ -309,7 +309,7 @@ mod tests {
     }
 
     /// q' of eq. (26) in `f64`.
-    fn repeated(q: f64, source: Source, z: f64) -> f64 {
+    fn repeated(q: f64, source: EchoSource, z: f64) -> f64 {
         let s = f64::from(source.travelled.0);
         let w = 0.7 / ((1.0 + (s / 0.05).powi(2)) * (1.0 + f64::from(source.age) / 5.0));
         let variance = 0.015_f64.powi(2) + s * s;
@@ -326,7 +326,7 @@ mod tests {
             expected in any_expectation(), parameters in any_parameters(),
             at in 0.3_f32..3.5, off in -0.1_f32..0.1, travelled in 0.0_f32..0.3, age in 0.0_f32..20.0,
         ) {
-            let source = Source { range: Metres(at), travelled: Metres(travelled), age };
+            let source = EchoSource { range: Metres(at), travelled: Metres(travelled), age };
             let z = at + off;
             let [wall, clutter, occluded, wrong] = densities(&expected, &parameters, Some(Metres(z)));
             let (o, far) = (f64::from(expected.occluded), f64::from(expected.occluded).max(1e-9));
@@ -422,7 +422,7 @@ mod tests {
             let found = expected.explain(&parameters, Some(z), Others::NONE);
             assert!(found.association < 0.4, "{found:?}");
             occluded = found.occluded.max(0.8 * occluded);
-            source = Some(Source { range: z, travelled: Metres(0.015), age: 0.06 });
+            source = Some(EchoSource { range: z, travelled: Metres(0.015), age: 0.06 });
         }
     }
 

@@ -10,7 +10,7 @@
 //! distance may be infinite; the probability is then the prior.
 
 use crate::association::clutter::Clutter;
-use crate::association::echo::Source;
+use crate::association::echo::EchoSource;
 use crate::association::reliability::{Reliability, Returned, Shares};
 use crate::config::{Config, MAX_RANGERS, RangerId};
 use crate::geometry::units::{Instant, Metres, Radians, SquareMetres, seconds};
@@ -81,7 +81,7 @@ impl RecentWall {
 
 /// A wall seen from a ranger.
 #[derive(Debug, Clone, Copy)]
-struct Place {
+struct WallPoint {
     wall: WallId,
     ranger: RangerId,
     /// Place of the foot along the wall.
@@ -94,13 +94,13 @@ struct Place {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Entry {
     slot: Option<usize>,
-    place: Place,
+    place: WallPoint,
     used_at: Option<Metres>,
     other: Option<OtherEcho>,
     /// Probability that an unmapped object occludes the wall.
     pub occlusion: f32,
     /// What returned the latest echo that was probably not the wall's.
-    pub source: Option<Source>,
+    pub source: Option<EchoSource>,
     /// Distance travelled since a range of the wall was last used.
     pub travelled: Option<Metres>,
 }
@@ -259,7 +259,7 @@ impl History {
         now: Instant,
     ) -> Entry {
         let prior = self.clutter.prior_occlusion(parameters, range);
-        let place = Place { wall, ranger, foot, prior };
+        let place = WallPoint { wall, ranger, foot, prior };
         let is_same =
             |slot: &Option<RecentWall>| matches!(slot, Some(recent) if recent.wall == wall);
         let slot = self.recent.iter().position(is_same);
@@ -277,7 +277,7 @@ impl History {
         let occlusion = (prior + recent.above_prior(foot, now)).clamp(0.0, MAX_OCCLUSION);
         let travelled = recent.used_at.map(|used_at| self.odometer - used_at);
         let own = recent.other.filter(|other| other.ranger == ranger);
-        let source = own.map(|other| Source {
+        let source = own.map(|other| EchoSource {
             range: other.range,
             travelled: self.odometer - other.odometer,
             age: now.checked_duration_since(other.at).map_or(0.0, seconds),
@@ -289,7 +289,7 @@ impl History {
     /// Records that the wall of this entry is occluded with a probability of `occluded`, and what
     /// returned the echo.
     pub fn record_echo(&mut self, entry: &Entry, occluded: f32, echo: Origin, now: Instant) {
-        let Place { wall, ranger, foot, prior } = entry.place;
+        let WallPoint { wall, ranger, foot, prior } = entry.place;
         let persistent = PERSISTENCE * entry.occlusion;
         let occluded = if occluded > persistent { occluded } else { persistent };
         let occluded = if occluded < MAX_OCCLUSION { occluded } else { MAX_OCCLUSION };

@@ -72,7 +72,7 @@ pub struct Place {
 
 /// Where a beam of light meets a wall.
 #[derive(Debug, Clone, Copy)]
-pub struct Lit {
+pub struct BeamHit {
     /// Metres along the beam.
     pub distance: f32,
     /// Change of the distance by the position of the ranger, with the opposite sign: the normal over the cosine of the
@@ -82,7 +82,7 @@ pub struct Lit {
 
 /// How a reflector is heard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Heard {
+pub enum Audibility {
     /// The foot of a perpendicular, in the cone.
     Foot,
     /// A concave corner, in the cone.
@@ -93,7 +93,7 @@ pub enum Heard {
     End,
 }
 
-impl Heard {
+impl Audibility {
     /// Probability that a reflector answers, if a foot in the cone answers with a probability of `foot`.
     /// Chosen, between an HC-SR04 and the NXT's recorded shares.
     #[must_use]
@@ -214,8 +214,8 @@ impl<'m> Reflectors<'m> {
 
     /// The wall that a beam of light meets first.
     #[must_use]
-    pub fn lit(&self, beam: &Beam) -> Option<Lit> {
-        let mut first: Option<Lit> = None;
+    pub fn lit(&self, beam: &Beam) -> Option<BeamHit> {
+        let mut first: Option<BeamHit> = None;
         for (_, wall) in self.map.near(beam.from.into(), Metres(self.max_range)) {
             let tangent = Vector::new(wall.b(), -wall.a());
             let normal = tangent.left();
@@ -225,7 +225,7 @@ impl<'m> Reflectors<'m> {
             let along = distance * beam.axis.dot(tangent) - to_start.dot(tangent);
             let is_met = distance > 0.0 && along >= 0.0 && along <= wall.length().0;
             if is_met && first.is_none_or(|first| distance < first.distance) {
-                first = Some(Lit { distance, away: normal.times(by_approach) });
+                first = Some(BeamHit { distance, away: normal.times(by_approach) });
             }
         }
         first.filter(|first| first.distance <= self.max_range)
@@ -233,7 +233,7 @@ impl<'m> Reflectors<'m> {
 
     /// How a reflector is heard, `None` if a wall hides it.
     #[must_use]
-    pub fn heard(&self, beam: &Beam, reflector: &Reflector) -> Option<Heard> {
+    pub fn heard(&self, beam: &Beam, reflector: &Reflector) -> Option<Audibility> {
         let at = beam.from.plus(reflector.toward.times(reflector.distance));
         let mut is_corner = false;
         for (_, wall) in self.map.near(beam.from.into(), Metres(reflector.distance)) {
@@ -270,13 +270,13 @@ impl<'m> Reflectors<'m> {
         let fades = reflector.distance > FADES * self.max_range;
         let is_weak = reflector.arm.is_some() && !is_corner;
         Some(if is_weak {
-            Heard::End
+            Audibility::End
         } else if fades || !reflector.is_central {
-            Heard::Rim
+            Audibility::Rim
         } else if is_corner {
-            Heard::Corner
+            Audibility::Corner
         } else {
-            Heard::Foot
+            Audibility::Foot
         })
     }
 }

@@ -9,7 +9,7 @@ use crate::association::outcome::{AbsoluteFix, AbsoluteRefusal, Agreement};
 use crate::filter::ekf::EkfError;
 use crate::filter::gyro_fusion::GyroFusion;
 use crate::geometry::units::Instant;
-use crate::sensor::absolute::{AbsoluteMeasurement, Explained, MeasurementError, OutsideStep};
+use crate::sensor::absolute::{AbsoluteMeasurement, MeasurementError, OutsideStep, Probabilities};
 
 impl Localizer<'_> {
     /// Corrects the estimate by a heading, position or pose that was measured at the time `at`, through the same gate and
@@ -34,7 +34,7 @@ impl Localizer<'_> {
         let fit = prediction.fit().ok_or(indefinite)?;
         let now = self.time;
         let outliers = self.sources.of(measured.has_position).outliers(now);
-        let Explained { association, evidence } = fit.explain(outliers);
+        let Probabilities { association, evidence } = fit.explain(outliers);
         let agreement = Agreement { nis: fit.nis, dimensions: measured.dimensions() };
         let used = gating::use_of(association);
         let fix = if used == Use::Reject {

@@ -36,10 +36,10 @@ use crate::geometry::units::Metres;
 /// # Ok::<(), sonarfix::map::WallError>(())
 /// ```
 #[derive(Debug, Clone, Copy)]
-pub struct Map<'a>(Source<'a>);
+pub struct Map<'a>(Storage<'a>);
 
 #[derive(Debug, Clone, Copy)]
-enum Source<'a> {
+enum Storage<'a> {
     Walls(&'a [Wall]),
     Image(Image<'a>),
 }
@@ -49,7 +49,7 @@ impl<'a> Map<'a> {
     /// of them. Walls beyond the 2³²-th have no [`WallId`] and are ignored.
     #[must_use]
     pub const fn new(walls: &'a [Wall]) -> Self {
-        Self(Source::Walls(walls))
+        Self(Storage::Walls(walls))
     }
 
     /// Reads a baked map in place.
@@ -63,15 +63,15 @@ impl<'a> Map<'a> {
     /// # Panics
     /// Never.
     pub fn read(image: &'a [u8]) -> Result<Self, MapError> {
-        Image::read(image).map(|image| Self(Source::Image(image)))
+        Image::read(image).map(|image| Self(Storage::Image(image)))
     }
 
     /// The number of walls; ids are smaller than it.
     #[must_use]
     pub fn count(&self) -> u32 {
         match self.0 {
-            Source::Walls(walls) => u32::try_from(walls.len()).unwrap_or(u32::MAX),
-            Source::Image(image) => image.count(),
+            Storage::Walls(walls) => u32::try_from(walls.len()).unwrap_or(u32::MAX),
+            Storage::Image(image) => image.count(),
         }
     }
 
@@ -79,8 +79,8 @@ impl<'a> Map<'a> {
     #[must_use]
     pub fn wall(&self, id: WallId) -> Option<Wall> {
         match self.0 {
-            Source::Walls(walls) => walls.get(usize::try_from(id.0).ok()?).copied(),
-            Source::Image(image) => image.wall(id),
+            Storage::Walls(walls) => walls.get(usize::try_from(id.0).ok()?).copied(),
+            Storage::Image(image) => image.wall(id),
         }
     }
 
@@ -101,8 +101,8 @@ impl<'a> Map<'a> {
         reach: Metres,
     ) -> impl Iterator<Item = (WallId, Wall)> + use<'a> {
         match self.0 {
-            Source::Walls(_) => Near::All(self.walls()),
-            Source::Image(image) => Near::Window(Window::new(image, point, reach)),
+            Storage::Walls(_) => Near::All(self.walls()),
+            Storage::Image(image) => Near::Window(Window::new(image, point, reach)),
         }
     }
 
@@ -110,8 +110,8 @@ impl<'a> Map<'a> {
     #[must_use]
     pub fn grid(&self) -> Option<Grid> {
         match self.0 {
-            Source::Walls(_) => None,
-            Source::Image(image) => Some(image.grid()),
+            Storage::Walls(_) => None,
+            Storage::Image(image) => Some(image.grid()),
         }
     }
 }

@@ -13,7 +13,7 @@ use crate::geometry::units::{Metres, Radians};
 
 pub(crate) use decorrelation::{PoseMatrix, PoseVector};
 pub(crate) use motion::{LastStep, OutsideStep, Return};
-pub(crate) use source::{Explained, Fit, Sources};
+pub(crate) use source::{Fit, Probabilities, Sources};
 
 /// Covariance of the noise of a measured position in the map frame, m².
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -60,13 +60,13 @@ prop_compose! {
 }
 
 /// Logarithms of the probabilities that a reflector answers, and that it does not.
-fn answers(model: &EchoModel, heard: Heard) -> (f64, f64) {
+fn answers(model: &EchoModel, heard: Audibility) -> (f64, f64) {
     let of = |probability: f64| (probability.ln(), (1.0 - probability).ln());
     match heard {
-        Heard::Foot => (model.shares.answers.into(), model.shares.misses.into()),
-        Heard::Corner => of(0.75),
-        Heard::Rim => of(0.4),
-        Heard::End => of(0.1),
+        Audibility::Foot => (model.shares.answers.into(), model.shares.misses.into()),
+        Audibility::Corner => of(0.75),
+        Audibility::Rim => of(0.4),
+        Audibility::End => of(0.1),
     }
 }
 
@@ -235,9 +235,9 @@ fn what_is_certain_to_answer_ends_the_list_of_reflectors() {
     let model = EchoModel::new(Map::new(&walls), &sonar(0.5), &echo);
     let beam = Beam { from: Vector::new(5.0, 3.7), axis: Vector::new(1.0, 0.0), range: None };
     let (reflectors, _) = in_beam(&model.reflectors, &beam, 3.5, 3.0);
-    let heard: Vec<Option<Heard>> =
+    let heard: Vec<Option<Audibility>> =
         reflectors.iter().map(|reflector| model.reflectors.heard(&beam, reflector)).collect();
-    assert_eq!(heard, [Some(Heard::Foot), Some(Heard::Corner)]);
+    assert_eq!(heard, [Some(Audibility::Foot), Some(Audibility::Corner)]);
     let is = f64::from(model.explain(&beam, Sharpness::new(1.0, 0.0)).score);
     assert!((is - (0.7 + 0.01_f64.ln())).abs() < 1e-3, "{is}");
 }

@@ -8,7 +8,7 @@ use heapless::Vec;
 
 use super::{MATCH, SAME_DISTANCE, Scene, Sum, Target};
 use crate::association::echo::{Others, density};
-use crate::association::reflector::{FADES, Heard, REFLECTORS};
+use crate::association::reflector::{Audibility, FADES, REFLECTORS};
 use crate::association::visibility::Viewpoint;
 use crate::config::LightBeam;
 use crate::geometry::elementary::sqrt;
@@ -18,7 +18,7 @@ use crate::geometry::units::{Metres, SquareMetres};
 const POSSIBLE: f32 = 0.05;
 
 /// A wall that may have returned the light.
-struct Lit {
+struct WallInBeam {
     distance: f32,
     /// Probability that it returns the light if nothing before it does.
     answers: f32,
@@ -38,7 +38,7 @@ impl Scene<'_, '_> {
     ) -> Others {
         let reach = Metres(range.0 + MATCH * sqrt(target.variance.0));
         let distance = target.expected.by_range_scale;
-        let mut found: Vec<Lit, REFLECTORS> = Vec::new();
+        let mut found: Vec<WallInBeam, REFLECTORS> = Vec::new();
         for (id, wall) in self.map.near(view.position(), reach) {
             let Some(spot) = view.spot(&wall, beam, target.expected.direction) else { continue };
             let at = spot.expected.by_range_scale;
@@ -49,13 +49,13 @@ impl Scene<'_, '_> {
             }
             let (sonar, echo) = (self.sonar, &self.config.echo);
             let is_weak = spot.incidence > sonar.cone || at > FADES * sonar.max_range.0;
-            let heard = if is_weak { Heard::Rim } else { Heard::Foot };
+            let heard = if is_weak { Audibility::Rim } else { Audibility::Foot };
             let visible = 1.0 - self.history.clutter.prior_occlusion(echo, Metres(at));
             let map_variance = echo.map_variance(wall.accuracy(), self.history.travelled_since(id));
             let noise = SquareMetres(spot.noise + map_variance * spot.of_map);
             let innovation = self.ekf.innovation(range, &spot.expected, noise);
             let answers = visible * spot.on_wall * heard.probability(echo.heard());
-            insert(&mut found, Lit { distance: at, answers, density: density(innovation) });
+            insert(&mut found, WallInBeam { distance: at, answers, density: density(innovation) });
         }
         let mut sum = Sum::new(target);
         for lit in &found {
@@ -66,7 +66,7 @@ impl Scene<'_, '_> {
 }
 
 /// Inserts by distance; the farthest drops out of a full list.
-fn insert(into: &mut Vec<Lit, REFLECTORS>, lit: Lit) {
+fn insert(into: &mut Vec<WallInBeam, REFLECTORS>, lit: WallInBeam) {
     let mut carried = lit;
     let mut is_placed = false;
     for slot in into.iter_mut() {

@@ -114,7 +114,7 @@ impl Scene {
         &self,
         reach: f64,
         beam: (Option<f64>, f64),
-    ) -> Result<Vec<(f64, Option<Heard>)>, TestCaseError> {
+    ) -> Result<Vec<(f64, Option<Audibility>)>, TestCaseError> {
         let mut expected = Vec::new();
         for (place, kind) in self.places()? {
             let sight = minus(place, self.sonar);
@@ -136,10 +136,10 @@ impl Scene {
             }
             let fades = clear(distance, 0.8 * self.max_range, EDGE)?;
             let heard = match kind {
-                Kind::End => Heard::End,
-                _ if fades || !is_central => Heard::Rim,
-                Kind::Corner => Heard::Corner,
-                Kind::Foot => Heard::Foot,
+                Kind::End => Audibility::End,
+                _ if fades || !is_central => Audibility::Rim,
+                Kind::Corner => Audibility::Corner,
+                Kind::Foot => Audibility::Foot,
             };
             expected.push((distance, (!self.is_hidden(place)?).then_some(heard)));
         }
@@ -243,10 +243,10 @@ fn a_convex_corner_is_an_end() {
             };
             let walls = [ends(1, right), ends(2, up)];
             for (from, kind) in [
-                ((2.5_f32, 1.0_f32), Heard::End),
-                ((1.0, 2.5), Heard::End),
+                ((2.5_f32, 1.0_f32), Audibility::End),
+                ((1.0, 2.5), Audibility::End),
                 // From the other side of both walls it is concave.
-                ((2.3, 2.3), Heard::Corner),
+                ((2.3, 2.3), Audibility::Corner),
             ] {
                 let from = Vector::new(from.0, from.1);
                 let toward = Vector::new(corner.0, corner.1).minus(from);
@@ -275,7 +275,7 @@ fn a_junction_is_a_corner() {
             let reflectors = reflectors(&walls, 10.0);
             let (found, _) = reflectors.in_beam(&beam, 4.0, 0.1);
             let at = found.iter().find(|it| it.arm.is_some()).unwrap();
-            assert_eq!(reflectors.heard(&beam, at), Some(Heard::Corner), "{x}");
+            assert_eq!(reflectors.heard(&beam, at), Some(Audibility::Corner), "{x}");
         }
     }
 }

@@ -34,7 +34,7 @@ pub(crate) struct Beam {
 
 /// A point in the frame of the beam.
 #[derive(Clone, Copy)]
-struct Place {
+struct BeamPoint {
     ahead: f32,
     aside: f32,
 }
@@ -73,22 +73,22 @@ impl Beam {
             || self.has_nearer_foot(wall)
     }
 
-    fn place(&self, point: Point) -> Place {
+    fn place(&self, point: Point) -> BeamPoint {
         let (dx, dy) = ((point.x - self.origin.x).0, (point.y - self.origin.y).0);
         let (cos, sin) = self.axis;
-        Place { ahead: cos * dx + sin * dy, aside: cos * dy - sin * dx }
+        BeamPoint { ahead: cos * dx + sin * dy, aside: cos * dy - sin * dx }
     }
 
     /// Worst-case distances of a point from the right and the left edge of the cone, positive
     /// inside.
-    fn margins(&self, place: Place) -> (f32, f32) {
+    fn margins(&self, place: BeamPoint) -> (f32, f32) {
         let half_width =
             self.tangent_of_cone * (place.ahead + self.uncertainty_ahead) + self.uncertainty_aside;
         (half_width + place.aside, half_width - place.aside)
     }
 
     /// Whether both ends of a wall are on the outer side of one boundary of the occluding region.
-    fn is_beside(&self, from: Place, to: Place) -> bool {
+    fn is_beside(&self, from: BeamPoint, to: BeamPoint) -> bool {
         let ((right_a, left_a), (right_b, left_b)) = (self.margins(from), self.margins(to));
         (from.ahead >= self.distance && to.ahead >= self.distance)
             || (right_a < 0.0 && right_b < 0.0)
@@ -99,7 +99,7 @@ impl Beam {
 
     /// Whether the wall between two points crosses the beam, displaced by at most the uncertainty
     /// aside, before the target.
-    fn is_crossed(&self, from: Place, to: Place) -> bool {
+    fn is_crossed(&self, from: BeamPoint, to: BeamPoint) -> bool {
         let (right, left) = if from.aside < to.aside { (from, to) } else { (to, from) };
         let band = self.uncertainty_aside;
         if right.aside > band || left.aside < -band {
@@ -115,7 +115,7 @@ impl Beam {
     }
 
     /// Whether a reflector at this point may be inside the cone and nearer than the target.
-    fn answers_first(&self, place: Place) -> bool {
+    fn answers_first(&self, place: BeamPoint) -> bool {
         let (right, left) = self.margins(place);
         let nearer_by = self.distance - place.ahead;
         let is_candidate = right >= 0.0

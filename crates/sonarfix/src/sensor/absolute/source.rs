@@ -31,7 +31,7 @@ pub struct Fit {
 
 /// Probabilities of a measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Explained {
+pub struct Probabilities {
     /// β, the probability that it is no outlier.
     pub association: f32,
     /// Evidence against the pose, eq. (23).
@@ -51,12 +51,12 @@ impl Fit {
 
     // ===== Eqs. (41) and (23): outlier or not =====
     /// The probabilities, if an outlier has this prior probability.
-    pub fn explain(&self, outliers: f32) -> Explained {
+    pub fn explain(&self, outliers: f32) -> Probabilities {
         let ratio = self.outlier_density() * exp(at_most(0.5 * self.nis, MAX_EXPONENT));
         let (right, wrong) = (1.0 - outliers, outliers * ratio);
         let likelihood = (right + wrong) / ratio;
         let evidence = ln(BY_CHANCE + (1.0 - BY_CHANCE) / likelihood);
-        Explained { association: right / (right + wrong), evidence }
+        Probabilities { association: right / (right + wrong), evidence }
     }
 }
 

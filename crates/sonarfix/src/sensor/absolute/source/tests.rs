@@ -28,7 +28,7 @@ proptest! {
         let (right, outlier) = densities(&fit);
         let prior = f64::from(outliers);
         let all = (1.0 - prior) * right + prior * outlier;
-        let Explained { association, evidence } = fit.explain(outliers);
+        let Probabilities { association, evidence } = fit.explain(outliers);
         let expected = (1.0 - prior) * right / all;
         prop_assert!((f64::from(association) - expected).abs() <= 1e-4 * expected, "{association} {expected}");
         let expected = (0.3 + 0.7 * outlier / all).ln();
@@ -61,7 +61,7 @@ proptest! {
 fn the_largest_innovation_has_finite_evidence() {
     for nis in [161.0, 1e6, f32::MAX] {
         let fit = Fit { nis, determinant: 1e-6, has_position: true, has_heading: true };
-        let Explained { association, evidence } = fit.explain(0.05);
+        let Probabilities { association, evidence } = fit.explain(0.05);
         assert!((0.0..1e-20).contains(&association), "{association}");
         // ln(0.3 + 0.7/0.05).
         assert!((evidence - 2.660_26).abs() < 1e-4, "{evidence}");
