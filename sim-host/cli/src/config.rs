@@ -92,7 +92,10 @@ fn feature(name: &str) -> anyhow::Result<Feature> {
 fn check_board(board: &Board, config: &RobotConfig) -> anyhow::Result<()> {
     let title = &board.title;
     let (rangers, most) = (config.rangers.iter().count(), 1 + usize::from(board.second.is_some()));
-    ensure!(rangers <= most, "the {title} drives {most} ranger(s), and the robot has {rangers}");
+    ensure!(
+        rangers <= most,
+        "the firmware of the {title} drives at most {most} of the {rangers} rangers of the robot"
+    );
     let is_on_bus = |kind: RangerKind| !matches!(kind, RangerKind::Pulse(_) | RangerKind::Custom);
     let has_bus = board.bus.is_some();
     let needs_bus = config.rangers.iter().any(|(_, ranger)| is_on_bus(ranger.kind));

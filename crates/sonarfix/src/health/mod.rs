@@ -3,7 +3,7 @@
 //! The covariance is the filter's own uncertainty; it does not show that the filter is wrong. The
 //! measurements do. The evidence of each ping is the logarithm of its likelihood at a wrong pose over
 //! that at the estimated one, by the [echo model](crate::association::echo). A ping that agrees counts at most −1.2,
-//! because a wrong pose that is displaced along a wall agrees as well (three of ten pings); it counts up to −4 if the last one that
+//! because a wrong pose that is displaced along a wall agrees as well (three of ten pings); it counts down to −4.6 if the last one that
 //! agreed was in another direction, since both agree by chance with a wrong pose as seldom as the deviation of the range is small. One
 //! that contradicts counts between 1 and 4, less or nothing if the wall is already known to be occluded: the occluding object returns its echo at
 //! a wrong pose as well, so that such a ping is no evidence for the pose either. That knowledge fades with the distance

@@ -34,7 +34,7 @@ pub(super) struct View {
     pub expected: ExpectedRange,
     /// Variance of the number.
     pub noise: SquareMetres,
-    /// The number, or the reason for which there is none. Its absence is explained, too.
+    /// The measured number, or the reason for which it is missing. The sensor explains a missing number as well.
     pub measured: Result<Metres, Refusal>,
 }
 
@@ -94,7 +94,7 @@ impl Localizer<'_> {
     /// Corrects the estimate by a measurement, or records why it was not used.
     pub(super) fn measure(&mut self, measurement: &impl Measurement) -> Fix {
         self.association = 0.0;
-        let news = News { contradicts: false, is_repeated: false };
+        let news = News::default();
         let mut outcome = Outcome { fix: Fix::Refused(Refusal::NoEcho), evidence: 0.0, news };
         if let Err(refusal) = self.try_measure(measurement, &mut outcome) {
             outcome.fix = Fix::Refused(refusal);

@@ -11,8 +11,6 @@ mod absolute;
 mod measurement;
 mod mode;
 mod ping;
-#[cfg(test)]
-mod side_ranger;
 mod travel;
 pub(crate) mod unseen;
 
@@ -380,3 +378,6 @@ fn filter(
         None => ekf,
     })
 }
+
+#[cfg(test)]
+mod tests;

@@ -170,7 +170,7 @@ impl Measurement for Ping<'_> {
         if view.measured.is_ok() && !is_repeated {
             history.clutter.record(view.expected.range, found.occluded);
         }
-        // A ranger that has fallen silent does not tell where the robot is not.
+        // A missing echo may come from a failed ranger, at a right pose as well.
         let is_echo = view.measured.is_ok();
         let contradicts = is_echo && gating::contradicts(found.mapped, entry.occlusion);
         News { contradicts, is_repeated }

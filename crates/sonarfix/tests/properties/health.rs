@@ -360,8 +360,8 @@ fn ranges_too_far_out_on_average_degrade() {
     assert!(degraded);
 }
 
-/// Pings without an echo contradict the pose; they do not inflate the covariance of a lost robot, because a ranger that has
-/// fallen silent does not tell where the robot is not.
+/// Pings without an echo contradict the pose; they do not inflate the covariance of a lost robot, because a failed ranger
+/// causes them at a right pose as well.
 #[test]
 fn a_missing_echo_does_not_inflate_the_covariance_of_a_lost_robot() {
     let walls = one_wall();

@@ -92,7 +92,7 @@ fn chosen<T: Copy>(
         let found = all.iter().copied().find(|one| name(*one).eq_ignore_ascii_case(wanted));
         found.with_context(|| {
             let known: Vec<&str> = all.iter().map(|one| name(*one)).collect();
-            format!("\"{wanted}\" is none of {}", known.join(", "))
+            format!("there is no \"{wanted}\": choose one of {}", known.join(", "))
         })
     };
     names.iter().map(named).collect()

@@ -2,10 +2,8 @@
 //! measured by a ranger without a servo, as wall followers have it.
 //!
 //! # Non-finite policy
-//! That of the [localizer](super).
+//! That of the [localizer](crate::localizer).
 
-use super::measurement::{Measurement, News, Past, View};
-use super::{Localizer, Start};
 use crate::aim::Situation;
 use crate::association::echo::{ExpectedEcho, Explanation, Others};
 use crate::association::outcome::{Fix, Refusal};
@@ -13,6 +11,8 @@ use crate::config::Config;
 use crate::filter::motion::WheelTravel;
 use crate::geometry::pose::{Point, Pose};
 use crate::geometry::units::{Instant, Metres, Radians, SquareMetres};
+use crate::localizer::measurement::{Measurement, News, Past, View};
+use crate::localizer::{Localizer, Start};
 use crate::map::{Map, Wall, WallId};
 use crate::sensor::echo::EchoParameters;
 use crate::sensor::range::ExpectedRange;

@@ -1,0 +1,3 @@
+//! Tests of what the public interface does not show.
+
+mod side_ranger;
