@@ -28,8 +28,7 @@ impl Clutter {
     pub fn prior_occlusion(self, parameters: &EchoParameters, range: Metres) -> f32 {
         let given = parameters.free_path.0;
         let learned = (PRIOR_OBJECTS * given + self.free) / (PRIOR_OBJECTS + self.objects);
-        let path = if learned > given { learned } else { given };
-        if given > 0.0 { range.0 / (range.0 + path) } else { 0.0 }
+        parameters.occlusion_within(range, if learned > given { learned } else { given })
     }
 
     /// Records an echo from a reflector at `range` that an object has occluded with the probability `occluded`.

@@ -90,7 +90,14 @@ impl EchoParameters {
     #[must_use]
     #[inline]
     pub fn prior_occlusion(&self, range: Metres) -> f32 {
-        if self.free_path > Metres(0.0) { range.0 / (range.0 + self.free_path.0) } else { 0.0 }
+        self.occlusion_within(range, self.free_path.0)
+    }
+
+    /// The same for another free path of the beams, metres, which is not zero. Zero in the parameters: there are no such objects.
+    #[must_use]
+    #[inline]
+    pub(crate) fn occlusion_within(&self, range: Metres, free_path: f32) -> f32 {
+        if self.free_path > Metres(0.0) { range.0 / (range.0 + free_path) } else { 0.0 }
     }
 
     /// Variance of the map error in a range to a wall with this accuracy of its own, if the last range to

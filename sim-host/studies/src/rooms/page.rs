@@ -51,9 +51,7 @@ const COLUMNS: &str = " runs | NEES | scale | NIS | RMS, mm | bound, mm | far, %
 pub fn markdown(results: &Results) -> String {
     let mut page = ABOUT.to_owned();
     // Writing to a String does not fail.
-    let _ = write_sensors(&mut page, results);
-    let _ = write_families(&mut page, results);
-    let _ = write_objects(&mut page, results);
+    let _ = write_tables(&mut page, results);
     let _ = write_worst(&mut page, results);
     page
 }
@@ -111,49 +109,38 @@ fn write_sum(
     if sums.runs == 0 { Ok(()) } else { write_row(page, name, &sums) }
 }
 
-fn write_sensors(page: &mut String, results: &Results) -> std::fmt::Result {
-    writeln!(page, "## All rooms")?;
-    write_head(page, "sensor | rooms", 2)?;
+/// A table with a row for each sensor and each of `kinds`.
+fn write_table<T: Copy>(
+    page: &mut String,
+    (title, column): (&str, &str),
+    results: &Results,
+    kinds: &[(&str, T)],
+    is: impl Fn(&Cell, T) -> bool,
+) -> std::fmt::Result {
+    writeln!(page, "## {title}")?;
+    write_head(page, &format!("sensor | {column}"), 2)?;
     for sensor in Sensor::ALL {
-        for (objects, is_empty) in [("empty", true), ("with objects", false)] {
-            let name = format!("{} | {objects}", sensor.name());
-            write_sum(page, &name, results, |cell| {
-                cell.sensor == sensor && (cell.objects == Objects::Nothing) == is_empty
-            })?;
+        for &(name, kind) in kinds {
+            let name = format!("{} | {name}", sensor.name());
+            write_sum(page, &name, results, |cell| cell.sensor == sensor && is(cell, kind))?;
         }
     }
     page.push('\n');
     Ok(())
 }
 
-fn write_families(page: &mut String, results: &Results) -> std::fmt::Result {
-    writeln!(page, "## Empty rooms, by family")?;
-    write_head(page, "sensor | family", 2)?;
-    for sensor in Sensor::ALL {
-        for family in Family::ALL {
-            let name = format!("{} | {}", sensor.name(), family.name());
-            write_sum(page, &name, results, |cell| {
-                cell.sensor == sensor && cell.family == family && cell.objects == Objects::Nothing
-            })?;
-        }
-    }
-    page.push('\n');
-    Ok(())
-}
-
-fn write_objects(page: &mut String, results: &Results) -> std::fmt::Result {
-    writeln!(page, "## All families, by objects")?;
-    write_head(page, "sensor | objects", 2)?;
-    for sensor in Sensor::ALL {
-        for objects in Objects::ALL {
-            let name = format!("{} | {}", sensor.name(), objects.name());
-            write_sum(page, &name, results, |cell| {
-                cell.sensor == sensor && cell.objects == objects
-            })?;
-        }
-    }
-    page.push('\n');
-    Ok(())
+fn write_tables(page: &mut String, results: &Results) -> std::fmt::Result {
+    let is_empty = |cell: &Cell| cell.objects == Objects::Nothing;
+    let (all, kinds) = (("All rooms", "rooms"), [("empty", true), ("with objects", false)]);
+    write_table(page, all, results, &kinds, |cell, empty| is_empty(cell) == empty)?;
+    let families = Family::ALL.map(|family| (family.name(), family));
+    let by_family = ("Empty rooms, by family", "family");
+    write_table(page, by_family, results, &families, |cell, family| {
+        is_empty(cell) && cell.family == family
+    })?;
+    let objects = Objects::ALL.map(|objects| (objects.name(), objects));
+    let by_objects = ("All families, by objects", "objects");
+    write_table(page, by_objects, results, &objects, |cell, objects| cell.objects == objects)
 }
 
 fn write_worst(page: &mut String, results: &Results) -> std::fmt::Result {

@@ -19,9 +19,7 @@ pub struct Sums {
     mean_bound: f64,
     /// Runs that are lost at the end.
     pub lost: u32,
-    /// Runs in which the verdict became `Lost`, and in which it did so at a right pose.
-    pub called: u32,
-    /// See `called`.
+    /// Runs in which the verdict became `Lost` at a right pose.
     pub falsely: u32,
     /// Runs with an error above 20 cm in an observable direction.
     pub far: u32,
@@ -48,7 +46,6 @@ impl Sums {
             mean_square: watch.mean_square(),
             mean_bound: watch.mean_bound(),
             lost: is_lost.into(),
-            called: u32::from(result.integrity.called_lost() > 0),
             falsely: u32::from(result.integrity.false_alarms() > 0),
             far: watch.went_far().into(),
             wrong_tracking: watch.wrong_tracking(),
@@ -68,7 +65,6 @@ impl Sums {
             mean_square: self.mean_square + other.mean_square,
             mean_bound: self.mean_bound + other.mean_bound,
             lost: self.lost + other.lost,
-            called: self.called + other.called,
             falsely: self.falsely + other.falsely,
             far: self.far + other.far,
             wrong_tracking: self.wrong_tracking + other.wrong_tracking,
@@ -82,14 +78,6 @@ impl Sums {
     #[must_use]
     pub fn nees(&self) -> f64 {
         mean(&self.nees)
-    }
-
-    /// Its median; 0.91 of a consistent filter with seven states.
-    #[must_use]
-    pub fn median_nees(&self) -> f64 {
-        let mut sorted = self.nees.clone();
-        sorted.sort_by(f64::total_cmp);
-        sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
     }
 
     /// Mean normalised innovation squared.
