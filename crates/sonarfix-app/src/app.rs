@@ -41,7 +41,7 @@ use crate::boots;
 use crate::check::Check;
 use crate::flash_contents::{self, FlashContents};
 use crate::store::{Resumed, Saved, Store};
-use crate::time::{NEVER, after, since};
+use crate::time::{NEVER, after, before, since};
 
 use clock::{Clock, Reading};
 use poll::Poll;
@@ -259,7 +259,9 @@ impl<'m, F: NorFlash> App<'m, F> {
     #[inline(never)]
     fn set_clock(&mut self, now: Instant) {
         self.store.limit().set_clock(now);
-        (self.started, self.heard, self.time) = (now, now, now);
+        // A link that was silent stays silent: the motors of a robot that depends on it must not run longer.
+        self.heard = before(now, since(self.time, self.heard));
+        (self.started, self.time) = (now, now);
         (self.rests_until, self.expected) = (now, now);
         self.wire.set_clock();
         match &mut self.state {

@@ -14,3 +14,8 @@ pub(crate) fn since(now: Instant, then: Instant) -> Duration {
 pub(crate) fn after(instant: Instant, span: Duration) -> Instant {
     instant.checked_add_duration(span).unwrap_or(NEVER)
 }
+
+/// The instant `span` before `instant`, which may be one before the clock's zero: instants wrap around.
+pub(crate) fn before(instant: Instant, span: Duration) -> Instant {
+    instant.checked_sub_duration(span).unwrap_or(instant)
+}

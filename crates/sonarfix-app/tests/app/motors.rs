@@ -79,3 +79,21 @@ fn a_lost_link_stops_the_motors_if_the_policy_says_so() {
         assert!(bench.poll().may_drive);
     }
 }
+
+/// A clock that is set back does not begin the time-out of the link anew; one that is set ahead ends it.
+#[test]
+fn a_lost_link_stops_the_motors_over_a_leap_of_the_clock() {
+    let link_timeout = Duration::from_ticks(2_000_000);
+    let baked = baked(MotorPolicy { lost_link: false, link_timeout, ..MotorPolicy::DEFAULT });
+    for (clock, drives_on) in [(0, true), (3_600_000_000, false)] {
+        let mut bench = started(&baked);
+        bench.send(&Command::MapChecksum);
+        bench.wait(1_500);
+        assert!(bench.poll().may_drive);
+        bench.set_now(clock);
+        bench.wait(400);
+        assert_eq!(bench.poll().may_drive, drives_on, "at {clock}");
+        bench.wait(200);
+        assert!(!bench.poll().may_drive, "at {clock}");
+    }
+}
