@@ -247,12 +247,11 @@ impl Simulation {
         is_known.then(|| estimated_start(&self.scenario, truth, rng))
     }
 
-    /// A localizer in this process.
-    pub(super) fn localizer(
-        &self,
-        start: Start,
-        at: Instant,
-    ) -> Result<Localizer<'_>, SimulationError> {
+    /// A localizer in this process, with the robot's map and configuration.
+    ///
+    /// # Errors
+    /// [`SimulationError::Start`] or [`SimulationError::Map`], by what the localizer rejects.
+    pub fn localizer(&self, start: Start, at: Instant) -> Result<Localizer<'_>, SimulationError> {
         let map = match &self.image {
             None => Map::new(&self.walls),
             Some(image) => Map::read(image)?,

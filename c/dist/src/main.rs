@@ -1,0 +1,43 @@
+//! Makes the packages of the C library, and its portable C source.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+use clap::{Parser, Subcommand};
+
+mod header;
+mod portable;
+
+#[derive(Debug, Parser)]
+#[command(about = "Makes the packages of the C library")]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Writes the portable C source; needs `wasm2c` (wabt).
+    Portable {
+        /// Features of the library, separated by commas.
+        #[arg(long)]
+        features: String,
+        /// The file.
+        #[arg(long)]
+        out: PathBuf,
+    },
+}
+
+fn main() -> Result<()> {
+    match Arguments::parse().command {
+        Command::Portable { features, out } => {
+            let workspace = std::env::current_dir()?;
+            let header = workspace.join("include/sonarfix.h");
+            let header = std::fs::read_to_string(&header)
+                .with_context(|| format!("{}", header.display()))?;
+            let prototypes = header::prototypes(&header)?;
+            let source = portable::source(&workspace, &features, &prototypes)?;
+            Ok(std::fs::write(out, source)?)
+        }
+    }
+}
