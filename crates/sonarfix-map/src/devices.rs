@@ -1,5 +1,5 @@
 //! Presets of devices that have a name in files, each with its source. The core has those that a program without files needs as
-//! well: [`EchoParameters::HC_SR04`], its default, [`LightBeam::VL53L1X`], [`ServoTiming::SG90`] and the MPU-6050.
+//! well: [`EchoParameters::HC_SR04`], its default, [`EchoParameters::VL53L1X`], [`LightBeam::VL53L1X`], [`ServoTiming::SG90`] and the MPU-6050.
 
 use sonarfix::config::{LightBeam, ServoTiming};
 use sonarfix::geometry::units::{Duration, Radians};
@@ -24,13 +24,8 @@ pub const LV_MAXSONAR_ECHO: EchoParameters = EchoParameters::HC_SR04;
 /// Polaroid 6500: assumed like the HC-SR04, with fewer misses.
 pub const POLAROID_6500_ECHO: EchoParameters = echo(0.02, 0.02, 0.02);
 
-/// VL53L1X in a furnished room, whose walls are plaster, wood and some glass: assumed, no recordings. A narrow beam meets
-/// fewer objects than a cone.
-pub const VL53L1X_ECHO: EchoParameters = {
-    let mut light = on_time(echo(0.04, 0.01, 0.01));
-    light.free_path.0 = 15.0;
-    light
-};
+/// VL53L1X in a furnished room.
+pub const VL53L1X_ECHO: EchoParameters = EchoParameters::VL53L1X;
 
 /// VL53L0X: assumed like the VL53L1X.
 pub const VL53L0X_ECHO: EchoParameters = VL53L1X_ECHO;

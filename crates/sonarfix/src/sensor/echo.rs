@@ -66,6 +66,11 @@ impl EchoParameters {
         rim: Radians(0.0),
     };
 
+    /// VL53L1X in a furnished room, whose walls are plaster, wood and some glass: assumed, no recordings. A narrow beam meets
+    /// fewer objects than a cone.
+    pub const VL53L1X: Self =
+        Self { missed: 0.04, short: 0.01, long: 0.01, free_path: Metres(15.0), ..Self::NONE };
+
     /// Probability that a wall within range, square to the beam and not occluded, returns its range.
     #[must_use]
     #[inline]

@@ -1,0 +1,16 @@
+//! `libsonarfix.a`: the functions of [`sonarfix_c`], and what every static library needs.
+
+#![no_std]
+
+pub use sonarfix_c::*;
+
+#[cfg(all(target_arch = "arm", target_os = "none"))]
+use sonarfix_soft_float as _;
+
+/// The library contains no call of it: `cargo xtask c` checks that.
+#[panic_handler]
+fn panicked(_: &core::panic::PanicInfo) -> ! {
+    loop {
+        core::hint::spin_loop();
+    }
+}
