@@ -39,7 +39,7 @@ fn compile(workspace: &Path, features: &str, base: u32) -> Result<PathBuf> {
     let flags = [&link[..], &["-Cstrip=none".to_owned()]].concat().join("\u{1f}");
     let mut cargo = Command::new("cargo");
     cargo.current_dir(workspace).env("CARGO_ENCODED_RUSTFLAGS", flags);
-    cargo.args(["rustc", "--release", "--package", "sonarfix-c-library", "--lib"]);
+    cargo.args(["rustc", "--release", "--package", "sonarfix-staticlib", "--lib"]);
     cargo.args(["--crate-type", "cdylib", "--target", "wasm32-unknown-unknown"]);
     cargo.args(["--no-default-features", "--features", features]);
     output(cargo.arg("--target-dir").arg(&target))?;

@@ -16,7 +16,7 @@ const RUNTIME: &str = include_str!("runtime.c");
 /// Writes the portable source of a module whose constants begin at `base`.
 ///
 /// # Errors
-/// If the module is not as expected, or exports another set of functions than the header declares.
+/// If the module is not as expected.
 pub fn emit(
     module: &Module,
     accesses: Accesses,
@@ -36,7 +36,12 @@ pub fn emit(
     ensure!(translator.accesses.is_empty(), "the source has fewer accesses than the module");
     let stacks = Stacks::new(&module.functions)?;
     for prototype in prototypes {
-        let bytes = stacks.of(&format!("w2c_{}", prototype.name))?;
+        let name = format!("w2c_{}", prototype.name);
+        // A composition lacks the functions of the parts that it leaves out.
+        if !module.functions.iter().any(|function| function.name == name) {
+            continue;
+        }
+        let bytes = stacks.of(&name)?;
         text += &exported(prototype, bytes)?;
     }
     Ok(text)
@@ -142,7 +147,7 @@ impl<'m> Translator<'m> {
     }
 
     fn function(&mut self, function: &Function) -> Result<String> {
-        let mut text = format!("\n/* {} */\n{} {{\n  (void)sp;\n", rust_name(function), signature(function));
+        let mut text = format!("\n/* {} */\n{} {{\n", rust_name(function), signature(function));
         for line in &function.body {
             if !matches!(line.trim(), "FUNC_PROLOGUE;" | "FUNC_EPILOGUE;") {
                 text += &self.line(line)?;

@@ -25,6 +25,10 @@
 #pragma GCC optimize("fp-contract=off")
 #endif
 
+#if defined(__GNUC__)
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+#endif
+
 typedef uint8_t u8;
 typedef uint16_t u16;
 typedef uint32_t u32;
@@ -38,6 +42,8 @@ typedef double f64;
 
 #define ADDRESS(pointer) ((u32)(uintptr_t)(pointer))
 #define CONSTANT(at) ((u32)(uintptr_t)((const u8 *)constants + (at)))
+#define INFINITY __builtin_inff()
+#define NAN __builtin_nanf("")
 #define LIKELY(x) __builtin_expect(!!(x), 1)
 #define UNLIKELY(x) __builtin_expect(!!(x), 0)
 
