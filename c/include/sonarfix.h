@@ -82,6 +82,25 @@
 #define SONARFIX_MAP_WORDS 8
 #endif
 
+/*
+ Bytes of the store of a robot.
+ */
+#define SONARFIX_STORE_SIZE 4096
+
+#if defined(SONARFIX_64_BIT)
+/*
+ 64-bit words of a robot.
+ */
+#define SONARFIX_ROBOT_WORDS 1385
+#endif
+
+#if !defined(SONARFIX_64_BIT)
+/*
+ 64-bit words of a robot.
+ */
+#define SONARFIX_ROBOT_WORDS 1351
+#endif
+
 #if defined(SONARFIX_64_BIT)
 /*
  64-bit words of a search.
@@ -262,6 +281,18 @@ enum sonarfix_status_t
    The search has no such hypothesis.
    */
   SONARFIX_ERROR_NO_HYPOTHESIS = 62,
+  /*
+   The robot's loop does not run: start it first.
+   */
+  SONARFIX_ERROR_NOT_RUNNING = 70,
+  /*
+   An earlier command, or an earlier measurement of this kind, waits for its poll.
+   */
+  SONARFIX_ERROR_OCCUPIED = 71,
+  /*
+   The drivers do not support the robot: a servo, or an encoder that is too fast for its period.
+   */
+  SONARFIX_ERROR_UNSUPPORTED = 72,
   /*
    Another error, of a newer core.
    */
@@ -505,6 +536,63 @@ typedef int32_t sonarfix_turn_use_t;
 #endif // __cplusplus
 
 /*
+ The result of a command.
+ */
+enum sonarfix_command_result_t
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /*
+   No command was waiting.
+   */
+  SONARFIX_COMMAND_NONE = 0,
+  /*
+   It was executed.
+   */
+  SONARFIX_COMMAND_DONE = 1,
+  /*
+   Refused: the configuration breaks a rule.
+   */
+  SONARFIX_COMMAND_CONFIGURATION = 2,
+  /*
+   Refused: the pose or a deviation is not finite, negative or too large.
+   */
+  SONARFIX_COMMAND_POSE = 3,
+  /*
+   Refused: there is no valid map.
+   */
+  SONARFIX_COMMAND_NO_MAP = 4,
+  /*
+   Refused: there is no valid configuration.
+   */
+  SONARFIX_COMMAND_NO_CONFIGURATION = 5,
+  /*
+   Refused: the pose is unknown; set it first.
+   */
+  SONARFIX_COMMAND_NO_POSE = 6,
+  /*
+   Refused: the drivers do not support the robot.
+   */
+  SONARFIX_COMMAND_UNSUPPORTED = 7,
+  /*
+   Refused: the configuration does not let the robot search for its pose.
+   */
+  SONARFIX_COMMAND_NO_SEARCH = 8,
+  /*
+   Refused for another reason.
+   */
+  SONARFIX_COMMAND_REFUSED = 9,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum sonarfix_command_result_t sonarfix_command_result_t;
+#else
+typedef int32_t sonarfix_command_result_t;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/*
  What a search has found.
  */
 enum sonarfix_answer_kind_t
@@ -538,6 +626,43 @@ enum sonarfix_answer_kind_t
 typedef enum sonarfix_answer_kind_t sonarfix_answer_kind_t;
 #else
 typedef int32_t sonarfix_answer_kind_t;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/*
+ How a ranger is read.
+ */
+enum sonarfix_driver_t
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /*
+   By a trigger pin and an echo pin, whose edges the program stamps: an HC-SR04, an LV-MaxSonar.
+   */
+  SONARFIX_DRIVER_PULSE = 0,
+  /*
+   Any other one, by the program, which starts a range when it is asked to, and reports it in metres.
+   */
+  SONARFIX_DRIVER_CUSTOM = 1,
+  /*
+   SRF02 or SRF08, read by the program.
+   */
+  SONARFIX_DRIVER_SRF = 2,
+  /*
+   VL53L1X, read by the program.
+   */
+  SONARFIX_DRIVER_VL53L1X = 3,
+  /*
+   VL53L0X, read by the program.
+   */
+  SONARFIX_DRIVER_VL53L0X = 4,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum sonarfix_driver_t sonarfix_driver_t;
+#else
+typedef int32_t sonarfix_driver_t;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -588,6 +713,39 @@ enum sonarfix_ranging_t
 typedef enum sonarfix_ranging_t sonarfix_ranging_t;
 #else
 typedef int32_t sonarfix_ranging_t;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/*
+ What the program has read from a ranger that it reads itself.
+ */
+enum sonarfix_reading_t
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /*
+   Nothing since the last poll.
+   */
+  SONARFIX_READING_NONE = 0,
+  /*
+   A range.
+   */
+  SONARFIX_READING_RANGE = 1,
+  /*
+   No echo, or too little light.
+   */
+  SONARFIX_READING_NO_ECHO = 2,
+  /*
+   The ranger has failed.
+   */
+  SONARFIX_READING_FAILED = 3,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum sonarfix_reading_t sonarfix_reading_t;
+#else
+typedef int32_t sonarfix_reading_t;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -1250,6 +1408,397 @@ typedef struct {
 } sonarfix_segment_t;
 
 /*
+ A robot in memory of the caller. It must not be copied or moved.
+ */
+typedef struct {
+  /*
+   Only for this library.
+   */
+  uint64_t opaque[SONARFIX_ROBOT_WORDS];
+} sonarfix_robot_t;
+
+/*
+ A wheel and its encoder.
+ */
+typedef struct {
+  /*
+   Travel of the wheel from one count of its encoder to the next, metres.
+   */
+  float travel_per_count_m;
+  /*
+   Not zero if the encoder counts down while the robot drives ahead.
+   */
+  uint8_t is_mirrored;
+} sonarfix_wheel_config_t;
+
+/*
+ The drivers of a ranger and of its servo.
+ */
+typedef struct {
+  /*
+   A sonarfix_driver_t.
+   */
+  int32_t driver;
+  /*
+   SRF, VL53L1X, VL53L0X: address in seven bits.
+   */
+  uint32_t address;
+  /*
+   Pulse: shortest trigger pulse, microseconds.
+   */
+  uint32_t trigger_us;
+  /*
+   Pulse: echoes shorter than this are the direct burst, microseconds.
+   */
+  uint32_t blanking_us;
+  /*
+   Pulse: longest reliable time of flight, microseconds.
+   */
+  uint32_t longest_us;
+  /*
+   Pulse: width from which on a pulse means that there was no echo, microseconds.
+   */
+  uint32_t silence_us;
+  /*
+   Pulse: time to wait for the echo after the trigger, microseconds.
+   */
+  uint32_t listen_us;
+  /*
+   Pulse: time after a trigger from which on a high line counts as stuck, microseconds.
+   */
+  uint32_t stuck_us;
+  /*
+   Pulse: temperature of the air, degrees Celsius, the same for all rangers; it determines the speed of sound.
+   */
+  float temperature_c;
+  /*
+   Two widths of the servo's pulse, microseconds, as far apart as possible.
+   */
+  uint32_t servo_pulse_us[2];
+  /*
+   The bearing of the ranger that was measured with each, radians.
+   */
+  float servo_bearing_rad[2];
+} sonarfix_driver_config_t;
+
+/*
+ A rectangle of the map, parallel to its axes.
+ */
+typedef struct {
+  /*
+   Smallest x, metres.
+   */
+  float from_x_m;
+  /*
+   Smallest y, metres.
+   */
+  float from_y_m;
+  /*
+   Largest x, metres.
+   */
+  float to_x_m;
+  /*
+   Largest y, metres.
+   */
+  float to_y_m;
+} sonarfix_region_t;
+
+/*
+ The configuration of a robot. Start from sonarfix_robot_config_default, and set what was measured.
+ */
+typedef struct {
+  /*
+   The parameters of the localizer, its rangers and their servos.
+   */
+  sonarfix_config_t localizer;
+  /*
+   The right wheel.
+   */
+  sonarfix_wheel_config_t right_wheel;
+  /*
+   The left wheel.
+   */
+  sonarfix_wheel_config_t left_wheel;
+  /*
+   Time from one sample of the encoders to the next, microseconds.
+   */
+  uint32_t encoder_period_us;
+  /*
+   The drivers of localizer.rangers, in the same order.
+   */
+  sonarfix_driver_config_t drivers[SONARFIX_RANGERS];
+  /*
+   Time without a frame over the link after which it counts as lost, microseconds.
+   */
+  uint32_t link_timeout_us;
+  /*
+   Not zero if a lost robot may drive.
+   */
+  uint8_t may_drive_lost;
+  /*
+   Not zero if a robot without odometry may drive.
+   */
+  uint8_t may_drive_without_encoder;
+  /*
+   Not zero if a robot without link may drive.
+   */
+  uint8_t may_drive_without_link;
+  /*
+   Not zero if the robot searches for its pose when it starts without one, and when it is lost.
+   */
+  uint8_t searches;
+  /*
+   Not zero if it starts in a part of the map.
+   */
+  uint8_t has_start_region;
+  /*
+   That part.
+   */
+  sonarfix_region_t start_region;
+} sonarfix_robot_config_t;
+
+/*
+ The counter of an encoder.
+ */
+typedef struct {
+  /*
+   Its count, which wraps around after 2^32.
+   */
+  uint32_t count;
+  /*
+   Illegal transitions that it has counted, which wraps around; 0 if it does not.
+   */
+  uint32_t illegal;
+  /*
+   Not zero if it could not be read.
+   */
+  uint8_t has_failed;
+} sonarfix_encoder_input_t;
+
+/*
+ What a ranger has reported since the last poll.
+ */
+typedef struct {
+  /*
+   Pulse: when the echo line went high, microseconds.
+   */
+  uint64_t rose_us;
+  /*
+   Pulse: when it went low after that, microseconds.
+   */
+  uint64_t fell_us;
+  /*
+   Other: the instant to which range_m belongs, microseconds, between the start and now: of sound its reflection, of light the
+   middle of the time in which it was collected.
+   */
+  uint64_t measured_us;
+  /*
+   Other: a sonarfix_reading_t.
+   */
+  int32_t reading;
+  /*
+   Other: the range, metres.
+   */
+  float range_m;
+  /*
+   Pulse: not zero if the echo line went high since the last poll.
+   */
+  uint8_t has_risen;
+  /*
+   Pulse: not zero if it went low after that.
+   */
+  uint8_t has_fallen;
+} sonarfix_ranger_input_t;
+
+/*
+ What was sensed and received since the last poll. All zero except for the time and the counts: nothing new.
+ */
+typedef struct {
+  /*
+   The time, microseconds.
+   */
+  uint64_t now_us;
+  /*
+   The right wheel.
+   */
+  sonarfix_encoder_input_t right;
+  /*
+   The left wheel.
+   */
+  sonarfix_encoder_input_t left;
+  /*
+   The rangers.
+   */
+  sonarfix_ranger_input_t rangers[SONARFIX_RANGERS];
+  /*
+   The yaw rate now, radians per second, counter-clockwise.
+   */
+  float yaw_rate_rad_per_s;
+  /*
+   Not zero if yaw_rate_rad_per_s was read; zero of a robot with a gyro: the gyro has failed.
+   */
+  uint8_t has_yaw_rate;
+  /*
+   Bytes that were received over the link; NULL if there are none.
+   */
+  const uint8_t *received;
+  /*
+   Their number. A poll takes some of them: pass the others again.
+   */
+  size_t received_length;
+  /*
+   Memory for bytes to be sent over the link; NULL without a link.
+   */
+  uint8_t *to_send;
+  /*
+   Its length. A poll builds no telemetry while less than 600 bytes are free.
+   */
+  size_t to_send_length;
+} sonarfix_inputs_t;
+
+/*
+ What to do with a ranger and its servo.
+ */
+typedef struct {
+  /*
+   Width of the pulse to which the servo is to be set, microseconds, if has_servo_pulse is not zero.
+   */
+  float servo_pulse_us;
+  /*
+   Not zero if the servo is to be set.
+   */
+  uint8_t has_servo_pulse;
+  /*
+   Pulse: the level of the trigger pin from now on.
+   */
+  uint8_t trigger;
+  /*
+   Not zero if a ping begins with this poll: the trigger has fallen, or another ranger is to be started now.
+   */
+  uint8_t starts;
+} sonarfix_ranger_output_t;
+
+/*
+ What to do after a poll.
+ */
+typedef struct {
+  /*
+   When to poll next, microseconds, unless a byte or an edge of an echo arrives earlier.
+   */
+  uint64_t next_poll_us;
+  /*
+   The rangers and their servos.
+   */
+  sonarfix_ranger_output_t rangers[SONARFIX_RANGERS];
+  /*
+   The estimated pose in the map frame, while the loop runs.
+   */
+  sonarfix_pose_t pose;
+  /*
+   The verdict, while the loop runs; otherwise Lost.
+   */
+  sonarfix_verdict_t verdict;
+  /*
+   What determines the pose.
+   */
+  sonarfix_mode_t mode;
+  /*
+   The result of the command that was waiting.
+   */
+  sonarfix_command_result_t command;
+  /*
+   The ping that this poll has started or ended, if has_pinged or has_fix is not zero.
+   */
+  sonarfix_aim_t aim;
+  /*
+   What the localizer did with the ping that this poll has ended, if has_fix is not zero.
+   */
+  sonarfix_fix_t fix;
+  /*
+   How many of the received bytes were taken.
+   */
+  size_t received_taken;
+  /*
+   How many bytes are to be sent.
+   */
+  size_t to_send;
+  /*
+   Not zero while the loop runs.
+   */
+  uint8_t is_running;
+  /*
+   Not zero if the motors may be enabled.
+   */
+  uint8_t may_drive;
+  /*
+   Not zero if a deadline was met: the condition for feeding a watchdog.
+   */
+  uint8_t is_on_time;
+  /*
+   Not zero if the poll has done anything in the loop: the estimate may have changed.
+   */
+  uint8_t has_worked;
+  /*
+   Not zero if a ping was started: aim.
+   */
+  uint8_t has_pinged;
+  /*
+   Not zero if a ping along an aim has ended: aim and fix.
+   */
+  uint8_t has_fix;
+  /*
+   Not zero if the store has changed: save it.
+   */
+  uint8_t store_has_changed;
+} sonarfix_outputs_t;
+
+/*
+ Counts of faults since the robot was opened.
+ */
+typedef struct {
+  /*
+   Samples of the right encoder that failed.
+   */
+  uint32_t right_errors;
+  /*
+   Illegal transitions of the right encoder.
+   */
+  uint32_t right_illegal;
+  /*
+   Samples of the left encoder that failed.
+   */
+  uint32_t left_errors;
+  /*
+   Illegal transitions of the left encoder.
+   */
+  uint32_t left_illegal;
+  /*
+   Commands that a servo could not follow.
+   */
+  uint32_t servo;
+  /*
+   Pings that a ranger could not make.
+   */
+  uint32_t ranger;
+  /*
+   Travels that the localizer refused.
+   */
+  uint32_t travel;
+  /*
+   Samples of the encoders that were late.
+   */
+  uint32_t deadlines;
+  /*
+   Times that ran backwards or leapt.
+   */
+  uint32_t clock;
+  /*
+   Samples of the gyro that failed.
+   */
+  uint32_t gyro;
+} sonarfix_faults_t;
+
+/*
  A search for the pose in memory of the caller. It must not be copied.
  */
 typedef struct {
@@ -1314,28 +1863,6 @@ typedef struct {
    */
   float explained;
 } sonarfix_hypothesis_t;
-
-/*
- A rectangle of the map, parallel to its axes.
- */
-typedef struct {
-  /*
-   Smallest x, metres.
-   */
-  float from_x_m;
-  /*
-   Smallest y, metres.
-   */
-  float from_y_m;
-  /*
-   Largest x, metres.
-   */
-  float to_x_m;
-  /*
-   Largest y, metres.
-   */
-  float to_y_m;
-} sonarfix_region_t;
 
 #ifdef __cplusplus
 extern "C" {
@@ -1853,6 +2380,238 @@ sonarfix_status_t sonarfix_map_count(const sonarfix_map_t *map, uint32_t *count)
 sonarfix_status_t sonarfix_map_close(sonarfix_map_t *map);
 
 /*
+ Opens a robot that waits: its loop starts by sonarfix_robot_start, or by a command over the link.
+
+ @param robot  memory for the robot, which stays where it is until the robot is closed
+ @param config  the configuration, which is copied
+ @param map  an open map; that of a baked image can be compared with the one of a monitor
+ @param store  SONARFIX_STORE_SIZE bytes that survive a power loss if the program saves them when an output says so: all 0xFF at
+   first, later what was saved. They stay where they are until the robot is closed
+ @param now_us  the time, microseconds
+ @return SONARFIX_OK; SONARFIX_ERROR_CONFIG, _VALUE or _NOT_LINKED by what is wrong with the configuration
+   (sonarfix_robot_config_check names the field); SONARFIX_ERROR_UNSUPPORTED; SONARFIX_ERROR_TIME; or an error of a pointer or a
+   handle. After an error the robot is closed
+ Threads: one at a time for the robot.
+ */
+sonarfix_status_t sonarfix_robot_init(sonarfix_robot_t *robot,
+                                      const sonarfix_robot_config_t *config,
+                                      const sonarfix_map_t *map,
+                                      uint8_t *store,
+                                      uint64_t now_us);
+
+/*
+ Closes a robot.
+
+ @param robot  an open robot
+ @return SONARFIX_OK, or an error of the pointer or the handle
+ Threads: one at a time for the robot.
+ */
+sonarfix_status_t sonarfix_robot_close(sonarfix_robot_t *robot);
+
+/*
+ Sets the pose of the robot in the next poll; outputs.command has the result.
+
+ @param robot  an open robot
+ @param start  the pose in the map frame, metres and radians, with its standard deviations
+ @return SONARFIX_OK; SONARFIX_ERROR_OCCUPIED if another command waits; or an error of a pointer or the handle
+ Threads: one at a time for the robot.
+ */
+sonarfix_status_t sonarfix_robot_set_pose(sonarfix_robot_t *robot, const sonarfix_start_t *start);
+
+/*
+ Starts the loop in the next poll: from the pose that was set or stored, or with a search; outputs.command has the result.
+
+ @param robot  an open robot
+ @return SONARFIX_OK; SONARFIX_ERROR_OCCUPIED if another command waits; or an error of the pointer or the handle
+ Threads: one at a time for the robot.
+ */
+sonarfix_status_t sonarfix_robot_start(sonarfix_robot_t *robot);
+
+/*
+ Stops the loop in the next poll; outputs.command has the result.
+
+ @param robot  an open robot
+ @return as sonarfix_robot_start
+ Threads: one at a time for the robot.
+ */
+sonarfix_status_t sonarfix_robot_stop(sonarfix_robot_t *robot);
+
+/*
+ Declares the pose unknown in the next poll, and begins the search; outputs.command has the result.
+
+ @param robot  an open robot whose configuration searches
+ @return as sonarfix_robot_start
+ Threads: one at a time for the robot.
+ */
+sonarfix_status_t sonarfix_robot_search(sonarfix_robot_t *robot);
+
+/*
+ Discards the learned calibration in the next poll; outputs.command has the result.
+
+ @param robot  an open robot
+ @return as sonarfix_robot_start
+ Threads: one at a time for the robot.
+ */
+sonarfix_status_t sonarfix_robot_reset_calibration(sonarfix_robot_t *robot);
+
+/*
+ Passes a heading to the running loop, which uses it at the next sample of the encoders.
+
+ @param robot  an open robot
+ @param at_us  when it was measured, microseconds
+ @param heading_rad  the heading, radians, counter-clockwise from map x
+ @param deviation_rad  standard deviation of its noise, radians
+ @return SONARFIX_OK; SONARFIX_ERROR_NOT_RUNNING; SONARFIX_ERROR_OCCUPIED if an earlier one waits; SONARFIX_ERROR_NOT_LINKED;
+   SONARFIX_ERROR_TIME; SONARFIX_ERROR_NOT_FINITE; or an error of the pointer or the handle
+ Threads: one at a time for the robot.
+ */
+sonarfix_status_t sonarfix_robot_heading(sonarfix_robot_t *robot,
+                                         uint64_t at_us,
+                                         float heading_rad,
+                                         float deviation_rad);
+
+/*
+ Passes a position of the midpoint between the wheels to the running loop, which uses it at the next sample of the encoders.
+
+ @param robot  an open robot
+ @param at_us  when it was measured, microseconds
+ @param measured  the position in the map frame, metres; the heading is ignored
+ @param noise  covariance of its noise; of the heading it is ignored
+ @return as sonarfix_robot_heading
+ Threads: one at a time for the robot.
+ */
+sonarfix_status_t sonarfix_robot_position(sonarfix_robot_t *robot,
+                                          uint64_t at_us,
+                                          const sonarfix_pose_t *measured,
+                                          const sonarfix_pose_noise_t *noise);
+
+/*
+ Passes a pose that was measured independently to the running loop, which uses it at the next sample of the encoders.
+
+ @param robot  an open robot
+ @param at_us  when it was measured, microseconds
+ @param measured  the pose in the map frame, metres and radians
+ @param noise  covariance of its noise
+ @return as sonarfix_robot_heading
+ Threads: one at a time for the robot.
+ */
+sonarfix_status_t sonarfix_robot_measured_pose(sonarfix_robot_t *robot,
+                                               uint64_t at_us,
+                                               const sonarfix_pose_t *measured,
+                                               const sonarfix_pose_noise_t *noise);
+
+/*
+ Fills the configuration of a robot with common parts: 65 mm wheels with 1,496.6 counts a revolution, read every 100 ms, and an
+ HC-SR04 on an SG90 for which pulses of 1 ms and 2 ms are -45 and 45 degrees. A start for one's own: the parts must be measured.
+
+ @param track_width_m  distance between the contact points of the wheels, metres
+ @param config  gets the defaults, the same in all rangers
+ @return SONARFIX_OK; SONARFIX_ERROR_NOT_FINITE; or an error of the pointer
+ Threads: any number at a time.
+ */
+sonarfix_status_t sonarfix_robot_config_default(float track_width_m,
+                                                sonarfix_robot_config_t *config);
+
+/*
+ Reads a baked configuration: written by `sonarfix config bake`.
+
+ @param image  the image; bytes after it are ignored
+ @param length  bytes from image on
+ @param config  gets the configuration, in metres, radians and microseconds
+ @return as sonarfix_config_from_image
+ Threads: any number at a time.
+ */
+sonarfix_status_t sonarfix_robot_config_from_image(const uint8_t *image,
+                                                   size_t length,
+                                                   sonarfix_robot_config_t *config);
+
+/*
+ Checks every field of the configuration of a robot, as sonarfix_config_check does.
+
+ @param config  the configuration
+ @param error  gets the field and its rule as texts; empty texts if every rule is met
+ @return as sonarfix_config_check
+ Threads: any number at a time.
+ */
+sonarfix_status_t sonarfix_robot_config_check(const sonarfix_robot_config_t *config, sonarfix_config_error_t *error);
+
+/*
+ Handles what is due: at most one command, one poll of the loop, and telemetry. It never waits. A poll at any other time does
+ nothing, so that a program may poll as often as it likes.
+
+ @param robot  an open robot
+ @param inputs  what was sensed and received since the last poll
+ @param outputs  gets what to do and to send
+ @return SONARFIX_OK; SONARFIX_ERROR_TIME, SONARFIX_ERROR_NOT_FINITE, SONARFIX_ERROR_VALUE or SONARFIX_ERROR_LENGTH by a wrong input;
+   or an error of a pointer or the handle. After an error the poll has not taken place
+ Threads: one at a time for the robot.
+ */
+sonarfix_status_t sonarfix_robot_poll(sonarfix_robot_t *robot,
+                                      const sonarfix_inputs_t *inputs,
+                                      sonarfix_outputs_t *outputs);
+
+/*
+ Works on the search for the pose in time that is left after a poll: 39 slices, each less than 0.1 ms on a Cortex-M4F at
+ 168 MHz. Nothing happens while the robot does not search.
+
+ @param robot  an open robot
+ @param now_us  the time of the latest poll, microseconds
+ @return SONARFIX_OK; SONARFIX_ERROR_TIME; or an error of the pointer or the handle
+ Threads: one at a time for the robot.
+ */
+sonarfix_status_t sonarfix_robot_work(sonarfix_robot_t *robot, uint64_t now_us);
+
+/*
+ Reads pose and calibration of a running robot.
+
+ @param robot  an open robot
+ @param state  gets the seven states, in metres, radians and dimensionless
+ @return SONARFIX_OK; SONARFIX_ERROR_NOT_RUNNING; or an error of a pointer or the handle
+ Threads: one at a time for the robot.
+ */
+sonarfix_status_t sonarfix_robot_state(const sonarfix_robot_t *robot, sonarfix_state_t *state);
+
+/*
+ Reads the standard deviations of pose and calibration of a running robot.
+
+ @param robot  an open robot
+ @param deviations  gets the standard deviation of each of the seven states, in its unit
+ @return SONARFIX_OK; SONARFIX_ERROR_NOT_RUNNING; or an error of a pointer or the handle
+ Threads: one at a time for the robot.
+ */
+sonarfix_status_t sonarfix_robot_deviations(const sonarfix_robot_t *robot, sonarfix_state_t *deviations);
+
+/*
+ Reads the covariance of the seven states of a running robot.
+
+ @param robot  an open robot
+ @param covariance  gets the upper triangle; sonarfix_covariance_t has order and units
+ @return SONARFIX_OK; SONARFIX_ERROR_NOT_RUNNING; or an error of a pointer or the handle
+ Threads: one at a time for the robot.
+ */
+sonarfix_status_t sonarfix_robot_covariance(const sonarfix_robot_t *robot, sonarfix_covariance_t *covariance);
+
+/*
+ Reads the verdict of a running robot and the numbers behind it.
+
+ @param robot  an open robot
+ @param health  gets the verdict, with metres, radians and microseconds
+ @return SONARFIX_OK; SONARFIX_ERROR_NOT_RUNNING; or an error of a pointer or the handle
+ Threads: one at a time for the robot.
+ */
+sonarfix_status_t sonarfix_robot_health(const sonarfix_robot_t *robot, sonarfix_health_t *health);
+
+/*
+ Reads the counts of faults, running or not.
+
+ @param robot  an open robot
+ @param faults  gets the counts since it was opened
+ @return SONARFIX_OK, or an error of a pointer or the handle
+ Threads: one at a time for the robot.
+ */
+sonarfix_status_t sonarfix_robot_faults(const sonarfix_robot_t *robot, sonarfix_faults_t *faults);
+
+/*
  Opens a search. It works for the localizer to which it is attached.
 
  @param search  memory for the search
@@ -1987,10 +2746,12 @@ const char *sonarfix_status_text(int32_t status);
 #define SONARFIX_MAP_SIZE (8 * SONARFIX_MAP_WORDS)
 #define SONARFIX_LOCALIZER_SIZE (8 * SONARFIX_LOCALIZER_WORDS)
 #define SONARFIX_SEARCH_SIZE (8 * SONARFIX_SEARCH_WORDS)
+#define SONARFIX_ROBOT_SIZE (8 * SONARFIX_ROBOT_WORDS)
 
 SONARFIX_STATIC_ASSERT(sizeof(float) == 4, "floats are those of IEEE 754");
 SONARFIX_STATIC_ASSERT(sizeof(sonarfix_wall_t) == SONARFIX_WALL_SIZE, "size of a wall");
 SONARFIX_STATIC_ASSERT(sizeof(sonarfix_map_t) == SONARFIX_MAP_SIZE, "size of a map");
 SONARFIX_STATIC_ASSERT(sizeof(sonarfix_localizer_t) == SONARFIX_LOCALIZER_SIZE, "size of a localizer");
 SONARFIX_STATIC_ASSERT(sizeof(sonarfix_search_t) == SONARFIX_SEARCH_SIZE, "size of a search");
+SONARFIX_STATIC_ASSERT(sizeof(sonarfix_robot_t) == SONARFIX_ROBOT_SIZE, "size of a robot");
 #endif /* SONARFIX_SIZES */

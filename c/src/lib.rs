@@ -14,3 +14,8 @@ fn panicked(_: &core::panic::PanicInfo) -> ! {
         core::hint::spin_loop();
     }
 }
+
+/// The standard library of a computer refers to this name, by which a panic would unwind. Nothing unwinds here.
+#[cfg(not(target_os = "none"))]
+#[unsafe(no_mangle)]
+extern "C" fn rust_eh_personality() {}

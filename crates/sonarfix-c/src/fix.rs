@@ -6,8 +6,8 @@ use sonarfix::geometry::units::Radians;
 use sonarfix::localizer::{AbsoluteFix, AbsoluteRefusal, Fix, Refusal};
 use sonarfix::sensor::absolute::{AbsoluteMeasurement, PoseNoise, PositionNoise};
 
-use crate::state::sonarfix_pose_t;
-use crate::status::sonarfix_status_t;
+use crate::state::{finite, sonarfix_pose_t};
+use crate::status::{Result, sonarfix_status_t};
 
 /// What the localizer did with a measurement.
 #[repr(i32)]
@@ -86,7 +86,7 @@ pub struct sonarfix_fix_t {
 }
 
 impl sonarfix_fix_t {
-    fn of(outcome: sonarfix_outcome_t) -> Self {
+    pub(crate) fn of(outcome: sonarfix_outcome_t) -> Self {
         Self {
             outcome,
             refusal: SONARFIX_REFUSAL_NONE,
@@ -219,16 +219,35 @@ impl sonarfix_pose_noise_t {
     }
 }
 
-pub(crate) fn heading(heading_rad: f32, deviation_rad: f32) -> AbsoluteMeasurement {
-    AbsoluteMeasurement::Heading { angle: Radians(heading_rad), deviation: Radians(deviation_rad) }
+/// A heading, of finite numbers.
+pub(crate) fn heading(heading_rad: f32, deviation_rad: f32) -> Result<AbsoluteMeasurement> {
+    let (angle, deviation) = (Radians(finite(heading_rad)?), Radians(finite(deviation_rad)?));
+    Ok(AbsoluteMeasurement::Heading { angle, deviation })
 }
 
-pub(crate) fn position(pose: sonarfix_pose_t, noise: sonarfix_pose_noise_t) -> AbsoluteMeasurement {
-    AbsoluteMeasurement::Position { point: Point::new(pose.x_m, pose.y_m), noise: noise.position() }
+/// A position, of finite numbers.
+pub(crate) fn position(
+    pose: sonarfix_pose_t,
+    noise: sonarfix_pose_noise_t,
+) -> Result<AbsoluteMeasurement> {
+    for number in [pose.x_m, pose.y_m, noise.xx_m2, noise.xy_m2, noise.yy_m2] {
+        finite(number)?;
+    }
+    let point = Point::new(pose.x_m, pose.y_m);
+    Ok(AbsoluteMeasurement::Position { point, noise: noise.position() })
 }
 
-pub(crate) fn pose(pose: sonarfix_pose_t, noise: sonarfix_pose_noise_t) -> AbsoluteMeasurement {
-    let (position, hh) = (noise.position(), noise.hh_rad2);
-    let noise = PoseNoise { position, xh: noise.xh_m_rad, yh: noise.yh_m_rad, hh };
-    AbsoluteMeasurement::Pose { pose: Pose::from(pose), noise }
+/// A pose, of finite numbers.
+pub(crate) fn pose(
+    pose: sonarfix_pose_t,
+    noise: sonarfix_pose_noise_t,
+) -> Result<AbsoluteMeasurement> {
+    let sonarfix_pose_noise_t { xx_m2, xy_m2, yy_m2, xh_m_rad, yh_m_rad, hh_rad2 } = noise;
+    let noises = [xx_m2, xy_m2, yy_m2, xh_m_rad, yh_m_rad, hh_rad2];
+    for number in [pose.x_m, pose.y_m, pose.heading_rad].into_iter().chain(noises) {
+        finite(number)?;
+    }
+    let position = noise.position();
+    let noise = PoseNoise { position, xh: xh_m_rad, yh: yh_m_rad, hh: hh_rad2 };
+    Ok(AbsoluteMeasurement::Pose { pose: Pose::from(pose), noise })
 }

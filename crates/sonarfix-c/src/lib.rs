@@ -31,6 +31,8 @@ pub mod fix;
 pub mod localizer;
 pub mod map;
 mod memory;
+#[cfg(feature = "robot")]
+pub mod robot;
 #[cfg(feature = "search")]
 pub mod search;
 pub mod state;

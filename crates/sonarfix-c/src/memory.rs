@@ -87,18 +87,27 @@ pub(crate) unsafe fn slice<'a, T>(first: *const T, count: usize) -> Result<&'a [
     Ok(unsafe { core::slice::from_raw_parts(first, count) })
 }
 
-/// The memory for the elements that a pointer leads to.
+/// The elements that a pointer leads to, to be changed.
 ///
 /// # Safety
-/// A pointer that passes [`check`] leads to memory for so many elements, which nothing else uses for `'a`.
+/// A pointer that passes [`check`] leads to so many elements, which nothing else uses for `'a`.
+pub(crate) unsafe fn slice_mut<'a, T>(first: *mut T, count: usize) -> Result<&'a mut [T]> {
+    // SAFETY: by the caller.
+    unsafe { slice(first.cast_const(), count) }?;
+    // SAFETY: checked; otherwise by the caller.
+    Ok(unsafe { core::slice::from_raw_parts_mut(first, count) })
+}
+
+/// The memory for the elements that a pointer leads to, which may be uninitialised.
+///
+/// # Safety
+/// As of [`slice_mut`].
 pub(crate) unsafe fn memory<'a, T>(
     first: *mut T,
     count: usize,
 ) -> Result<&'a mut [MaybeUninit<T>]> {
-    // SAFETY: the memory may be uninitialised; otherwise by the caller.
-    unsafe { slice(first.cast_const().cast::<MaybeUninit<T>>(), count) }?;
-    // SAFETY: checked; otherwise by the caller.
-    Ok(unsafe { core::slice::from_raw_parts_mut(first.cast(), count) })
+    // SAFETY: by the caller.
+    unsafe { slice_mut(first.cast(), count) }
 }
 
 /// Writes a result, unless it is an error.
@@ -129,17 +138,33 @@ pub(crate) unsafe fn held<'a, H: Handle>(handle: *const H) -> Result<&'a H::Held
     }
 }
 
+/// The place of what an open handle holds.
+///
+/// # Safety
+/// As of [`held`].
+pub(crate) unsafe fn place<H: Handle>(handle: *mut H) -> Result<*mut H::Held> {
+    // SAFETY: by the caller.
+    unsafe { held(handle.cast_const()) }?;
+    // SAFETY: it was checked.
+    Ok(unsafe { place_in(handle) })
+}
+
+/// The place of what a handle holds, or is to hold.
+///
+/// # Safety
+/// The pointer passes [`check`] and leads to the memory of a handle.
+unsafe fn place_in<H: Handle>(handle: *mut H) -> *mut H::Held {
+    // SAFETY: the handle is large enough.
+    unsafe { &raw mut (*handle.cast::<Slot<H::Held>>()).held }.cast()
+}
+
 /// What an open handle holds, to be changed.
 ///
 /// # Safety
 /// A pointer that passes [`check`] leads to a handle, which nothing else uses for `'a`.
 pub(crate) unsafe fn held_mut<'a, H: Handle>(handle: *mut H) -> Result<&'a mut H::Held> {
-    // SAFETY: by the caller.
-    unsafe { held(handle.cast_const()) }?;
-    // SAFETY: it has just been shared, but no longer is.
-    let slot = unsafe { &mut *handle.cast::<Slot<H::Held>>() };
-    // SAFETY: it is open.
-    Ok(unsafe { slot.held.assume_init_mut() })
+    // SAFETY: by the caller; it is open.
+    Ok(unsafe { &mut *place(handle)? })
 }
 
 /// Reads from a handle.
@@ -189,15 +214,54 @@ pub(crate) unsafe fn open<H: Handle>(
     handle: *mut H,
     held: impl FnOnce() -> Result<H::Held>,
 ) -> sonarfix_status_t {
-    let () = H::FITS;
     let opened = check(handle).and_then(|()| held()).map(|held| {
-        let slot = handle.cast::<Slot<H::Held>>();
-        // SAFETY: checked, and the handle is large enough; otherwise by the caller.
-        unsafe { (&raw mut (*slot).held).cast::<H::Held>().write(held) };
-        // SAFETY: the same.
-        unsafe { (&raw mut (*slot).mark).write(mark_at(handle)) };
+        // SAFETY: it was checked.
+        unsafe { place_in(handle).write(held) };
+        // SAFETY: the value is in its place.
+        unsafe { mark_open(handle) };
     });
     status_of(opened)
+}
+
+/// Opens a handle with a value that is built in its place. After an error the handle is closed.
+///
+/// # Safety
+/// As of [`open`]. `build` writes the value, unless it is an error.
+#[cfg(feature = "robot")]
+pub(crate) unsafe fn open_in_place<H: Handle>(
+    handle: *mut H,
+    build: impl FnOnce(*mut H::Held) -> Result<()>,
+) -> sonarfix_status_t {
+    let opened = check(handle).and_then(|()| {
+        // SAFETY: it was checked.
+        unsafe { mark_closed(handle) };
+        // SAFETY: it was checked.
+        build(unsafe { place_in(handle) })
+    });
+    let opened = opened.map(|()| {
+        // SAFETY: the value is in its place.
+        unsafe { mark_open(handle) };
+    });
+    status_of(opened)
+}
+
+/// Marks a handle as open.
+///
+/// # Safety
+/// The pointer passes [`check`] and leads to the memory of a handle, with its value.
+unsafe fn mark_open<H: Handle>(handle: *mut H) {
+    let () = H::FITS;
+    // SAFETY: the mark is the first word.
+    unsafe { handle.cast::<u32>().write(mark_at(handle)) };
+}
+
+/// Marks a handle as closed.
+///
+/// # Safety
+/// The pointer passes [`check`] and leads to the memory of a handle.
+unsafe fn mark_closed<H>(handle: *mut H) {
+    // SAFETY: the mark is the first word.
+    unsafe { handle.cast::<u32>().write(0) };
 }
 
 /// Closes an open handle.
@@ -207,8 +271,8 @@ pub(crate) unsafe fn open<H: Handle>(
 pub(crate) unsafe fn close<H: Handle>(handle: *mut H) -> sonarfix_status_t {
     // SAFETY: by the caller.
     let closed = unsafe { held(handle.cast_const()) }.map(|_| {
-        // SAFETY: it is open, and its value has no destructor that matters: it owns nothing.
-        unsafe { (&raw mut (*handle.cast::<Slot<H::Held>>()).mark).write(0) };
+        // SAFETY: it is open, and owns nothing that would have to be released.
+        unsafe { mark_closed(handle) };
     });
     status_of(closed)
 }

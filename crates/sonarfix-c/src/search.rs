@@ -42,6 +42,12 @@ pub struct sonarfix_region_t {
     pub to_y_m: f32,
 }
 
+impl From<&Region> for sonarfix_region_t {
+    fn from(Region { from, to }: &Region) -> Self {
+        Self { from_x_m: from.x.0, from_y_m: from.y.0, to_x_m: to.x.0, to_y_m: to.y.0 }
+    }
+}
+
 impl sonarfix_region_t {
     pub(crate) fn region(&self) -> Result<Region> {
         let from = Point::new(self.from_x_m, self.from_y_m);

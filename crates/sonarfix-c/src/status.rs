@@ -96,6 +96,13 @@ pub enum sonarfix_status_t {
     /// The search has no such hypothesis.
     SONARFIX_ERROR_NO_HYPOTHESIS = 62,
 
+    /// The robot's loop does not run: start it first.
+    SONARFIX_ERROR_NOT_RUNNING = 70,
+    /// An earlier command, or an earlier measurement of this kind, waits for its poll.
+    SONARFIX_ERROR_OCCUPIED = 71,
+    /// The drivers do not support the robot: a servo, or an encoder that is too fast for its period.
+    SONARFIX_ERROR_UNSUPPORTED = 72,
+
     /// Another error, of a newer core.
     SONARFIX_ERROR_OTHER = 99,
 }
@@ -130,7 +137,7 @@ fn text(status: i32) -> &'static CStr {
     TEXTS.iter().find(|(code, _)| is(status, *code)).map_or(c"unknown status", |(_, text)| text)
 }
 
-const TEXTS: [(sonarfix_status_t, &CStr); 38] = [
+const TEXTS: [(sonarfix_status_t, &CStr); 41] = [
     (SONARFIX_OK, c"no error"),
     (SONARFIX_ERROR_NULL, c"a pointer is NULL"),
     (SONARFIX_ERROR_MISALIGNED, c"a pointer is not aligned for its type"),
@@ -168,6 +175,9 @@ const TEXTS: [(sonarfix_status_t, &CStr); 38] = [
     (SONARFIX_ERROR_NO_WALL, c"no wall can be measured from here"),
     (SONARFIX_ERROR_NO_SEARCH, c"no search is attached to the localizer"),
     (SONARFIX_ERROR_NO_HYPOTHESIS, c"the search has no such hypothesis"),
+    (SONARFIX_ERROR_NOT_RUNNING, c"the robot's loop does not run"),
+    (SONARFIX_ERROR_OCCUPIED, c"an earlier command or measurement waits for its poll"),
+    (SONARFIX_ERROR_UNSUPPORTED, c"the drivers do not support the robot"),
     (SONARFIX_ERROR_OTHER, c"another error"),
 ];
 

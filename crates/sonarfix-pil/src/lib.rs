@@ -20,6 +20,7 @@
 //! | [`session`] | executes requests: a localizer alone, or the shipped loop |
 //! | [`meter`] | counts the instructions and the stack of a call |
 //! | [`line`](mod@line) | frames of messages over a stream of bytes |
+//! | [`ram_flash`] | a flash in RAM |
 //! | [`serve`](mod@serve) | the microcontroller's program |
 
 #![no_std]
@@ -30,7 +31,7 @@ pub mod line;
 pub mod load;
 pub mod message;
 pub mod meter;
-mod ram_flash;
+pub mod ram_flash;
 pub mod serve;
 pub mod session;
 pub mod wires;
@@ -39,6 +40,7 @@ pub use line::{Line, LineError};
 pub use load::Load;
 pub use message::{Answer, Begin, Request, RequestError, SessionKind, Snapshot};
 pub use meter::{Meter, Unmetered};
+pub use ram_flash::RamFlash;
 pub use serve::serve;
 pub use session::Session;
 pub use wires::{

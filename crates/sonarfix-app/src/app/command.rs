@@ -17,7 +17,7 @@ use sonarfix_link::message::{CommandError, CommandResult};
 use sonarfix_link::reporter;
 use sonarfix_link::{Command, Frame, Reporter, SessionCommand, Telemetry, baked};
 
-use super::{App, Link, Poll, Running, State};
+use super::{App, Link, Poll, Polled, Running, State};
 use crate::check::Check;
 use crate::flash_contents;
 use crate::store::{MAX_HEADING_DEVIATION, MAX_POSITION_DEVIATION, Resumed, SavePolicy, Saved};
@@ -50,20 +50,9 @@ impl<'m, F: NorFlash> App<'m, F> {
         let mut began = None;
         let mut session = self.wire.session;
         let answer = session.answer(frame, self.next_session(poll.now), |command| {
-            let next = self.act(poll, command);
-            let message = next.and_then(|next| match next {
-                Next::Nothing => Ok(None),
-                Next::Report(message) => Ok(Some(message)),
-                Next::Begin(known) => self.begin(poll.now, &known).map(Some),
-            });
-            match message {
-                Ok(message) => began = message,
-                Err(error) => return CommandResult::Refused(error),
-            }
-            match command {
-                Command::MapChecksum => CommandResult::Map(flash_contents::map_status(&self.map)),
-                _ => CommandResult::Done,
-            }
+            let (result, message) = self.execute(poll, command);
+            began = message;
+            result
         });
         self.wire.session = session;
         if let Telemetry::Ack(ack) = answer {
@@ -72,6 +61,46 @@ impl<'m, F: NorFlash> App<'m, F> {
         self.wire.send(&answer, poll.link);
         if let Some(began) = began {
             self.wire.send(&began, poll.link);
+        }
+    }
+
+    /// Executes a command of the program around the application, without a session: its result is not sent, but what it reports
+    /// is. The application must have been polled before.
+    #[inline(never)]
+    pub fn command(
+        &mut self,
+        now: Instant,
+        hardware: &mut impl Hardware,
+        link: &mut impl Link,
+        command: &Command,
+    ) -> CommandResult {
+        let mut poll = Poll { now, hardware, link, polled: Polled::default() };
+        let (result, began) = self.execute(&mut poll, command);
+        if let Some(began) = began {
+            self.wire.send(&began, poll.link);
+        }
+        self.rests_until = now;
+        result
+    }
+
+    /// Executes a command; returns its result, and the telemetry of a loop that starts.
+    fn execute(
+        &mut self,
+        poll: &mut Poll<impl Hardware, impl Link>,
+        command: &Command,
+    ) -> (CommandResult, Option<Telemetry>) {
+        let next = self.act(poll, command);
+        let message = next.and_then(|next| match next {
+            Next::Nothing => Ok(None),
+            Next::Report(message) => Ok(Some(message)),
+            Next::Begin(known) => self.begin(poll.now, &known).map(Some),
+        });
+        match (message, command) {
+            (Err(error), _) => (CommandResult::Refused(error), None),
+            (Ok(began), Command::MapChecksum) => {
+                (CommandResult::Map(flash_contents::map_status(&self.map)), began)
+            }
+            (Ok(began), _) => (CommandResult::Done, began),
         }
     }
 

@@ -191,11 +191,7 @@ pub unsafe extern "C" fn sonarfix_localizer_heading(
     fix: *mut sonarfix_absolute_fix_t,
 ) -> sonarfix_status_t {
     // SAFETY: the contract of the crate.
-    unsafe {
-        absolute(localizer, at_us, fix, || {
-            Ok(heading(finite(heading_rad)?, finite(deviation_rad)?))
-        })
-    }
+    unsafe { absolute(localizer, at_us, fix, || heading(heading_rad, deviation_rad)) }
 }
 
 /// Corrects the estimate by a position of the midpoint between the wheels that was measured independently, as by a beacon.
@@ -216,15 +212,7 @@ pub unsafe extern "C" fn sonarfix_localizer_position(
     fix: *mut sonarfix_absolute_fix_t,
 ) -> sonarfix_status_t {
     // SAFETY: the contract of the crate.
-    unsafe {
-        absolute(localizer, at_us, fix, || {
-            let (measured, noise) = (value(measured)?, value(noise)?);
-            for number in [measured.x_m, measured.y_m, noise.xx_m2, noise.xy_m2, noise.yy_m2] {
-                finite(number)?;
-            }
-            Ok(position(measured, noise))
-        })
-    }
+    unsafe { absolute(localizer, at_us, fix, || position(value(measured)?, value(noise)?)) }
 }
 
 /// Corrects the estimate by a pose that was measured independently, as by a camera.
@@ -245,18 +233,7 @@ pub unsafe extern "C" fn sonarfix_localizer_measured_pose(
     fix: *mut sonarfix_absolute_fix_t,
 ) -> sonarfix_status_t {
     // SAFETY: the contract of the crate.
-    unsafe {
-        absolute(localizer, at_us, fix, || {
-            let (measured, noise) = (value(measured)?, value(noise)?);
-            let sonarfix_pose_noise_t { xx_m2, xy_m2, yy_m2, xh_m_rad, yh_m_rad, hh_rad2 } = noise;
-            let noises = [xx_m2, xy_m2, yy_m2, xh_m_rad, yh_m_rad, hh_rad2];
-            let numbers = [measured.x_m, measured.y_m, measured.heading_rad];
-            for number in numbers.into_iter().chain(noises) {
-                finite(number)?;
-            }
-            Ok(pose(measured, noise))
-        })
-    }
+    unsafe { absolute(localizer, at_us, fix, || pose(value(measured)?, value(noise)?)) }
 }
 
 /// Changes a localizer in a way that does not fail.
