@@ -8,10 +8,11 @@ use sonarfix_exchange::row::{
     Kind, Row as TraceRow, Sink, Value, columns, fix_columns, pass, state_columns,
 };
 use sonarfix_sim::row::{COUNTS, REALS, Row};
+use sonarfix_sim::statistics::Totals;
 use sonarfix_sim::trace::Trace;
 
-use crate::errors;
 use crate::table::Table;
+use crate::{errors, values};
 
 /// The rows of runs, in the order of the columns of `run --rows`. With `names` a first column tells whose row it is.
 pub fn of_rows(rows: &[Row], names: Option<&[String]>) -> PyResult<Table> {
@@ -30,6 +31,52 @@ pub fn of_rows(rows: &[Row], names: Option<&[String]>) -> PyResult<Table> {
         columns.push((name.to_owned(), Arc::new(Float64Array::from_iter_values(reals))));
     }
     Table::of(columns)
+}
+
+/// The rows of a table of runs.
+fn rows_of(table: &Table) -> PyResult<Vec<Row>> {
+    let whole = |name: &str| table.column::<UInt64Array>(name);
+    let real = |name: &str| table.column::<Float64Array>(name);
+    let seeds = whole("seed")?;
+    let counts = COUNTS.into_iter().map(whole).collect::<PyResult<Vec<_>>>()?;
+    let reals = REALS.into_iter().map(real).collect::<PyResult<Vec<_>>>()?;
+    let mut rows = Vec::new();
+    for (at, seed) in seeds.values().iter().enumerate() {
+        let mut row = Row { seed: *seed, reals: [0.0; REALS.len()], counts: [0; COUNTS.len()] };
+        row.counts.iter_mut().zip(&counts).for_each(|(to, of)| *to = of.value(at));
+        row.reals.iter_mut().zip(&reals).for_each(|(to, of)| *to = of.value(at));
+        rows.push(row);
+    }
+    Ok(rows)
+}
+
+/// The statistics of the rows of ``monte_carlo``, a dict with the numbers of ``sonarfix run --json``: mean, deviation, RMS and
+/// bound of each state, NEES, NIS, outcomes, RMS along the path; SI units.
+///
+/// A table with several estimators is summed up for one of them, by default the localizer.
+#[pyfunction]
+#[pyo3(signature = (rows, estimator=None))]
+pub fn summary<'py>(
+    py: Python<'py>,
+    rows: &Table,
+    estimator: Option<&str>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let mut of = rows_of(rows)?;
+    let name = estimator.unwrap_or("sonarfix");
+    if let Ok(names) = rows.column::<StringArray>("estimator") {
+        let mut is_theirs = names.iter().map(|held| held == Some(name));
+        of.retain(|_| is_theirs.next().unwrap_or(false));
+    } else if estimator.is_some() {
+        return Err(errors::input("the table has no column estimator"));
+    }
+    if of.is_empty() {
+        return Err(errors::input("there are no rows"));
+    }
+    let mut totals = Totals::default();
+    of.iter().for_each(|row| totals.add(row));
+    let mut deviations = totals.deviations();
+    of.iter().for_each(|row| deviations.add(row));
+    values::of_json(py, &deviations.summary())
 }
 
 /// A column that grows.
@@ -130,4 +177,3 @@ pub fn of_reals(columns: Vec<(&str, Vec<f64>)>) -> PyResult<Table> {
     };
     Table::of(columns.into_iter().map(column).collect())
 }
-

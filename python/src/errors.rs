@@ -81,3 +81,13 @@ pub fn unreadable(file: &str, text: String, message: String) -> PyErr {
         }
     })
 }
+
+/// An error of work with a recording.
+pub fn recorded(error: &anyhow::Error) -> PyErr {
+    if error.is::<FileError>() { any(error) } else { recording(format!("{error:#}")) }
+}
+
+/// A robot that does not answer, or refuses.
+pub fn connection(error: &anyhow::Error) -> PyErr {
+    Python::attach(|py| raise(class!(py, "ConnectionFailed"), format!("{error:#}")))
+}

@@ -69,7 +69,9 @@ impl Map {
     fn new(walls: &Bound<'_, PyAny>, names: Option<Vec<String>>) -> PyResult<Self> {
         let (numbers, shape) = values::reals(walls, "walls")?;
         let &[count, 2, 2] = shape.as_slice() else {
-            return Err(errors::input(format!("walls must have the shape (n, 2, 2), not {shape:?}")));
+            return Err(errors::input(format!(
+                "walls must have the shape (n, 2, 2), not {shape:?}"
+            )));
         };
         let names = names.unwrap_or_else(|| (1..=count).map(|n| format!("wall {n}")).collect());
         let mut unique = std::collections::HashSet::new();
@@ -208,9 +210,8 @@ impl Map {
             Arc::new(Float64Array::from_iter_values(walls.iter().map(of))) as ArrayRef
         };
         let names = StringArray::from_iter_values(walls.iter().map(NamedWall::name));
-        let length = |wall: &NamedWall| {
-            (wall.to()[0] - wall.from()[0]).hypot(wall.to()[1] - wall.from()[1])
-        };
+        let length =
+            |wall: &NamedWall| (wall.to()[0] - wall.from()[0]).hypot(wall.to()[1] - wall.from()[1]);
         let columns: [(&str, ArrayRef); 6] = [
             ("name", Arc::new(names)),
             ("from_x_m", reals(&|wall| wall.from()[0])),
@@ -235,7 +236,8 @@ impl Map {
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
         let (py, map) = (slf.py(), slf.get());
-        let arguments = PyTuple::new(py, [map.walls(py)?, map.names().into_pyobject(py)?.into_any()])?;
+        let arguments =
+            PyTuple::new(py, [map.walls(py)?, map.names().into_pyobject(py)?.into_any()])?;
         PyTuple::new(py, [slf.get_type().into_any(), arguments.into_any()])
     }
 

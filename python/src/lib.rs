@@ -31,6 +31,8 @@ mod work;
 #[pyo3::pymodule(name = "_sonarfix")]
 mod module {
     #[pymodule_export]
+    use crate::columns::summary;
+    #[pymodule_export]
     use crate::floor::Map;
     #[pymodule_export]
     use crate::guest::{Setup, View};

@@ -165,7 +165,8 @@ impl Fix {
     }
 
     fn __repr__(&self) -> String {
-        let reason = if self.reason.is_empty() { String::new() } else { format!(": {}", self.reason) };
+        let reason =
+            if self.reason.is_empty() { String::new() } else { format!(": {}", self.reason) };
         format!("<sonarfix.Fix: {}{reason}>", self.outcome)
     }
 }
@@ -317,8 +318,7 @@ impl Localizer {
     ) -> PyResult<()> {
         let now = values::instant(time)?;
         let (travel, turn) = travel(right, left, turn)?;
-        let taken =
-            self.0.with_dependent_mut(|_, of| of.odometry_with_turn(now, travel, turn));
+        let taken = self.0.with_dependent_mut(|_, of| of.odometry_with_turn(now, travel, turn));
         taken.map_err(|error| errors::input(error.to_string()))
     }
 

@@ -3,11 +3,12 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use numpy::{PyArray2, PyArrayMethods};
+use numpy::PyArray2;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use sonarfix_map::{CLASSROOM, Fidelity, PAPER, Scenario as Read};
 use sonarfix_monitor::simulated;
+use sonarfix_plan::bare;
 use sonarfix_plan::edit::{self, Edit};
 use sonarfix_plan::overrides::Overrides;
 use sonarfix_rows::{Plan, Shard};
@@ -52,8 +53,9 @@ impl Source {
 /// The error of the command's options, without its hint at `--help`.
 fn first_of(error: &clap::Error) -> String {
     let text = error.to_string();
+    let text = text.split("\n\nUsage").next().unwrap_or_default();
     let text = text.split("\n\nFor more information").next().unwrap_or_default();
-    text.trim_start_matches("error: ").to_owned()
+    text.trim_start_matches("error: ").trim_end().to_owned()
 }
 
 /// A text may stand for a number or a truth value, as in `run --sweep`.
@@ -137,6 +139,35 @@ impl Scenario {
         };
         let keys = keys.map(values::toml_keys).transpose()?.unwrap_or_default();
         Self::of(Source { text, file, keys, options: options_of(options)? })
+    }
+
+    /// A scenario on a map alone: a robot of the size that drives through doors, at the fidelity "pins", along a path: an array
+    /// of shape (n, 2) of points, x and y in metres, the start first. ``keys`` and keywords are those of Scenario.
+    #[staticmethod]
+    #[pyo3(signature = (map, path, keys=None, **options))]
+    fn on_map(
+        map: &Map,
+        path: &Bound<'_, PyAny>,
+        keys: Option<&Bound<'_, PyDict>>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let (numbers, shape) = values::reals(path, "the path")?;
+        let is_path = matches!(shape.as_slice(), &[points, 2] if points > 1);
+        if !is_path || !numbers.iter().all(|number| number.is_finite()) {
+            let text = "the path must be finite points of shape (n, 2), the start first";
+            return Err(errors::input(text));
+        }
+        let points: Vec<toml::Value> =
+            numbers.chunks_exact(2).map(|point| point.to_vec().into()).collect();
+        let (start, corners) = (points.first().cloned(), points.get(1..).map(<[_]>::to_vec));
+        let floor: toml::Table = map.floor.to_toml().parse().map_err(values::no_toml)?;
+        let mut all = vec![("name".to_owned(), "on a map".into())];
+        all.extend(floor.get("map").map(|walls| ("map".to_owned(), walls.clone())));
+        all.extend(start.map(|start| ("path.start".to_owned(), start)));
+        all.extend(corners.map(|corners| ("path.corners".to_owned(), corners.into())));
+        all.extend(keys.map(values::toml_keys).transpose()?.unwrap_or_default());
+        let (text, file) = (bare::text(), PathBuf::from("scenario.toml"));
+        Self::of(Source { text, file, keys: all, options: options_of(options)? })
     }
 
     /// The same scenario with other keys and options, on top of those that it has.
@@ -306,7 +337,8 @@ impl Scenario {
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
         let (py, Source { text, file, keys, options }) = (slf.py(), &slf.get().source);
-        let keys = serde_json::to_string(keys).map_err(|error| errors::internal(error.to_string()))?;
+        let keys =
+            serde_json::to_string(keys).map_err(|error| errors::internal(error.to_string()))?;
         let file = file.to_string_lossy();
         let arguments = (text.as_str(), file.as_ref(), keys, options.clone()).into_pyobject(py)?;
         let again = slf.get_type().getattr("_again")?;

@@ -15,7 +15,6 @@ use crate::robot::Robot;
 use crate::table::Table;
 use crate::{columns, errors, values};
 
-
 type Searching<'m> = core::Search<'m>;
 
 self_cell!(

@@ -37,6 +37,12 @@ impl Table {
         batch.map(|batch| Self { batch }).map_err(|error| PyValueError::new_err(error.to_string()))
     }
 
+    /// The column of this name, if there is one of this type.
+    pub fn column<A: Array + Clone + 'static>(&self, name: &str) -> PyResult<&A> {
+        let values = self.batch.column(self.place(name)?).as_any().downcast_ref::<A>();
+        values.ok_or_else(|| PyTypeError::new_err(format!("the column {name} has another type")))
+    }
+
     fn array<'py>(&self, py: Python<'py>, column: usize) -> PyResult<Bound<'py, PyAny>> {
         let values = self.batch.column(column);
         if let Some(reals) = values.as_any().downcast_ref::<PrimitiveArray<Float64Type>>() {
@@ -151,14 +157,14 @@ impl Table {
         let _ = requested_schema;
         let reader = RecordBatchIterator::new([Ok(self.batch.clone())], self.batch.schema());
         let stream = FFI_ArrowArrayStream::new(Box::new(reader));
-        PyCapsule::new(py, stream, Some(c"arrow_array_stream".to_owned()))
+        PyCapsule::new_with_value(py, stream, c"arrow_array_stream")
     }
 
     /// The schema of the Arrow PyCapsule interface.
     fn __arrow_c_schema__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyCapsule>> {
         let schema = FFI_ArrowSchema::try_from(self.batch.schema_ref().as_ref());
         let schema = schema.map_err(|error| PyValueError::new_err(error.to_string()))?;
-        PyCapsule::new(py, schema, Some(c"arrow_schema".to_owned()))
+        PyCapsule::new_with_value(py, schema, c"arrow_schema")
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
@@ -216,7 +222,9 @@ fn column_of(values: &Bound<'_, PyAny>, unknown: Option<&[bool]>) -> PyResult<Ar
     }
     let texts = values.call_method0("tolist").and_then(|list| list.extract::<Vec<String>>());
     let texts = texts.map_err(|_| {
-        PyTypeError::new_err("a column is an array of float64, int64, uint64 or texts, of shape (n,)")
+        PyTypeError::new_err(
+            "a column is an array of float64, int64, uint64 or texts, of shape (n,)",
+        )
     })?;
     let known = texts.iter().enumerate().map(|(row, v)| (!hidden(row)).then_some(v));
     Ok(Arc::new(known.collect::<StringArray>()))

@@ -19,6 +19,11 @@ fn toml_value(value: &Bound<'_, PyAny>) -> PyResult<toml::Value> {
     serde_json::from_str(&text).map_err(|error| errors::input(format!("no value of TOML: {error}")))
 }
 
+/// A text that is no TOML.
+pub fn no_toml(error: toml::de::Error) -> PyErr {
+    errors::input(error.to_string())
+}
+
 /// A dict as the text of a file.
 pub fn toml_text(table: &Bound<'_, PyDict>) -> PyResult<String> {
     Ok(toml_value(table)?.to_string())

@@ -18,8 +18,8 @@ use sonarfix_sim::simulate::{Simulation, SimulationError};
 use sonarfix_sim::statistics::{FixCounts, PathSum, RunResult};
 use sonarfix_sim::trace::Tick;
 
-use super::view::{Setup, View};
 use super::Invited;
+use super::view::{Setup, View};
 use crate::{errors, values};
 
 /// A covariance so large that every error is inside its ellipse, m².
@@ -57,14 +57,11 @@ pub struct Score {
 }
 
 impl<'py> Guest<'py> {
-    pub fn new(
-        py: Python<'py>,
-        simulation: &'py Simulation,
-        invited: &Invited,
-    ) -> PyResult<Self> {
+    pub fn new(py: Python<'py>, simulation: &'py Simulation, invited: &Invited) -> PyResult<Self> {
         let is_pins = simulation.scenario.fidelity == Fidelity::Pins;
         if invited.policy.is_some() && is_pins {
-            let text = "a policy of your own needs fidelity=\"ideal\": the robot's loop has its own";
+            let text =
+                "a policy of your own needs fidelity=\"ideal\": the robot's loop has its own";
             return Err(errors::input(text));
         }
         let bound = |of: &Option<Py<PyAny>>| of.as_ref().map(|of| of.bind(py).clone());
@@ -128,7 +125,8 @@ impl<'py> Guest<'py> {
         let Some(of) = &self.estimator else { return Ok(()) };
         let range = range.map(|range| f64::from(range.0));
         let called = of.fix.call1((f64::from(aim.bearing.0), range));
-        let is_used = called.and_then(|used| if used.is_none() { Ok(true) } else { used.is_truthy() });
+        let is_used =
+            called.and_then(|used| if used.is_none() { Ok(true) } else { used.is_truthy() });
         let is_used = self.kept(is_used)?;
         *match (range, is_used) {
             (None, _) => &mut self.score.fixes.refused,
@@ -262,7 +260,8 @@ fn square_to(wall: WallId, localizer: &Localizer) -> PyResult<Radians> {
 
 /// What `pose()` returns.
 fn numbers(pose: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
-    let numbers: Vec<f64> = pose.try_iter()?.map(|number| number?.extract()).collect::<PyResult<_>>()?;
+    let numbers: Vec<f64> =
+        pose.try_iter()?.map(|number| number?.extract()).collect::<PyResult<_>>()?;
     if (3..=7).contains(&numbers.len()) && numbers.iter().all(|number| number.is_finite()) {
         return Ok(numbers);
     }
