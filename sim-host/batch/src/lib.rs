@@ -20,6 +20,8 @@
 //! | [`calibration`] | what a calibration needs, and what it results in |
 //! | `fit` | windows, association, checks |
 //! | [`calibrate`] | the calibration: attempts, intervals |
+//! | [`robot_edit`] | what was found, in the text of a robot file |
+//! | [`turned`] | a wheel that was turned by hand |
 
 pub mod bearings;
 pub mod calibrate;
@@ -33,5 +35,7 @@ pub mod noise;
 pub mod odometry;
 pub mod problem;
 pub mod recording;
+pub mod robot_edit;
 pub mod solve;
+pub mod turned;
 pub mod wall;

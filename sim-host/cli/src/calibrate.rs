@@ -12,6 +12,7 @@ use sonarfix_batch::constants::Name;
 use sonarfix_batch::log;
 use sonarfix_batch::noise::INLIER;
 use sonarfix_batch::recording::StartPose;
+use sonarfix_batch::robot_edit;
 use sonarfix_batch::wall::Wall;
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_map::{MapFile, robot_file};
@@ -19,7 +20,6 @@ use sonarfix_replay::REFERENCE_HEADER;
 use sonarfix_report::Table;
 use sonarfix_report::residuals::{Residual, residuals};
 
-use crate::robot_edit;
 use sonarfix_terminal::output::check_file;
 
 /// Maximum number of skipped lines that are printed.

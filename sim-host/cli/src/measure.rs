@@ -8,16 +8,16 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use sonarfix_batch::bearings::Bearings;
+use sonarfix_batch::robot_edit;
+use sonarfix_batch::turned::Turned;
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_link::Command;
 use sonarfix_map::robot_file;
 
 use crate::monitor::PortArgs;
-use crate::robot_edit;
 use sonarfix_terminal::output::check_file;
 
 use robot::Robot;
-use wheel::Turned;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {

@@ -1,9 +1,9 @@
 //! `sonarfix paper`: the reference scenario, with the results beside the paper's Table 1.
 
 use sonarfix_map::Scenario;
+use sonarfix_plan::overrides::Overrides;
 use sonarfix_sim::simulate::Simulation;
 
-use crate::overrides::Overrides;
 use crate::provenance;
 use crate::run::{Experiment, Output};
 

@@ -10,9 +10,9 @@ use sonarfix_pil_host::pair::Pair;
 use sonarfix_pil_host::progress::Progress;
 use sonarfix_pil_host::tally::Tally;
 use sonarfix_pil_host::{Emulated, Load};
+use sonarfix_plan::overrides::Overrides;
 use sonarfix_sim::simulate::Simulation;
 
-use crate::overrides::Overrides;
 use sonarfix_terminal::output::check_file;
 
 #[derive(Debug, clap::Args)]

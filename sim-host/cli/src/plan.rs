@@ -3,13 +3,13 @@
 use std::path::{Path as FilePath, PathBuf};
 
 use sonarfix_map::{MapFile, Scenario, SonarModel, robot_file};
+use sonarfix_plan::overrides::has_servo;
 use sonarfix_plan::preset::{ServoPreset, SonarPreset};
 use sonarfix_plan::starts::{LegShare, Share, Starts};
 use sonarfix_plan::{BLIND_AFTER, Forecast, HeadingAid, Spread, bare, route};
 use sonarfix_report::Table;
 use sonarfix_report::heat_map::{Heat, HeatMap};
 
-use crate::overrides::has_servo;
 use sonarfix_terminal::output::check_file;
 use sonarfix_terminal::progress::Runs;
 

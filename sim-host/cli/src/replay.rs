@@ -8,13 +8,13 @@ use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 use sonarfix_exchange::trace_csv;
 use sonarfix_map::{MapFile, robot_file};
+use sonarfix_plan::overrides::PolicyName;
 use sonarfix_replay::fault::Complaint;
 use sonarfix_replay::thinned::{CAPACITY, Thinned};
 use sonarfix_replay::{ByVerdict, Figures, Replay, Summary};
 use sonarfix_report::{Report, Table};
 use sonarfix_sim::trace::Recorder;
 
-use crate::overrides::PolicyName;
 use crate::provenance;
 use crate::run::Output;
 use crate::serve::{self, PacedArgs};

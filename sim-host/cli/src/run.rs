@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use cpu_time::ProcessTime;
 use sonarfix_exchange::trace_csv;
 use sonarfix_map::Scenario;
+use sonarfix_monitor::simulated;
+use sonarfix_plan::overrides::Overrides;
 use sonarfix_report::Report;
 use sonarfix_rows::{Plan, Shard};
 use sonarfix_sim::monte_carlo;
@@ -13,7 +15,6 @@ use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::spread::Spread;
 use sonarfix_sim::trace::Trace;
 
-use crate::overrides::Overrides;
 use crate::provenance;
 use crate::rows::{self, Counted};
 use crate::serve::{self, PacedArgs};
@@ -38,9 +39,16 @@ pub struct Args {
     /// Writes the trace of the first run as CSV (docs/formats.md).
     #[arg(long, value_name = "FILE.csv")]
     trace: Option<PathBuf>,
+    /// Writes the log that the robot of the first run would have recorded, and beside it reference.csv with the true poses,
+    /// robot.toml and map.toml. Needs the fidelity "pins".
+    #[arg(long, value_name = "LOG.csv")]
+    record: Option<PathBuf>,
+    /// Replaces files that exist by the recording.
+    #[arg(long, requires = "record")]
+    force: bool,
     /// Runs the scenario with several values of a key of the scenario or robot file: KEY=A,B,… or KEY=A..B:N, like
     /// sonar.noise=2mm..10mm:5. With several sweeps, all combinations.
-    #[arg(long, value_name = "KEY=VALUES", conflicts_with_all = ["trace", "worst"])]
+    #[arg(long, value_name = "KEY=VALUES", conflicts_with_all = ["trace", "worst", "record"])]
     pub sweep: Vec<Sweep>,
     #[command(flatten)]
     pub rows: rows::RowsArgs,
@@ -94,6 +102,10 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     if let Some(file) = &args.trace {
         check_file("--trace", file)?;
         write_trace(&experiment.trace()?, file)?;
+    }
+    if let Some(file) = &args.record {
+        check_file("--record", file)?;
+        simulated::record(&experiment.simulation, experiment.seed, file, None, args.force)?;
     }
     let counted = experiment.counted(&args.rows)?;
     experiment.show(&counted.measured, &args.output)?;

@@ -1,12 +1,11 @@
 //! `sonarfix run --sweep`: a scenario with several values of some of its keys.
 
-mod edit;
-
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use serde::Serialize;
 use sonarfix_map::Scenario;
+use sonarfix_plan::edit::{self, Edit};
 use sonarfix_report::Table;
 use sonarfix_report::sweep::{Line, Picture};
 use sonarfix_rows::{Plan, Shard};
@@ -38,7 +37,9 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let combinations = sweep_values::combinations(&args.sweep);
     // Before the work: a value that cannot be read is found at once.
     let scenarios = combinations.iter().map(|values| {
-        let mut scenario = edit::scenario(&args.scenario, &text, values)?;
+        let values: Vec<_> =
+            values.iter().map(|(key, value)| (key.clone(), Edit::Text(value.clone()))).collect();
+        let mut scenario = edit::scenario(&args.scenario, &text, &values, "--sweep ")?;
         args.overrides.apply(&mut scenario)?;
         Ok(scenario)
     });

@@ -2,7 +2,7 @@
 
 use anyhow::ensure;
 use sonarfix::health::Verdict;
-use sonarfix_sim::trace::{AbsoluteRecord, FixRecord, Outcome, Recorder, Tick, Wall};
+use sonarfix_sim::trace::{AbsoluteRecord, FixRecord, Outcome, Recorder, Tick, Trace, Wall};
 
 /// The type of a column's values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -358,6 +358,26 @@ impl<'a> Rows<'a> {
             self.error = self.instant(tick).err();
         }
     }
+}
+
+/// Passes the rows of a recorded trace on, as [`Rows`] does those of a run; the start is the first, if it is known.
+///
+/// # Errors
+/// The first error of the sink.
+pub fn pass(trace: &Trace, sink: &mut dyn Sink) -> anyhow::Result<()> {
+    let mut rows = Rows::new(&trace.walls, vec![sink]);
+    let mut fixes = trace.fixes.iter().peekable();
+    let mut absolutes = trace.absolutes.iter().peekable();
+    for tick in trace.start.iter().chain(&trace.ticks) {
+        while let Some(fix) = fixes.next_if(|fix| fix.time <= tick.time) {
+            rows.fix(|| fix.clone());
+        }
+        while let Some(absolute) = absolutes.next_if(|absolute| absolute.time <= tick.time) {
+            rows.absolute(|| absolute.clone());
+        }
+        rows.tick(|| *tick);
+    }
+    rows.end()
 }
 
 impl Recorder for Rows<'_> {

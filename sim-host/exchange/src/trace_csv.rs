@@ -4,9 +4,9 @@
 use std::io::{Read, Write};
 
 use anyhow::{Context, bail, ensure};
-use sonarfix_sim::trace::{Recorder, Trace};
+use sonarfix_sim::trace::Trace;
 
-use crate::row::{Kind, Row, Rows, Sink, Value, columns};
+use crate::row::{self, Kind, Row, Sink, Value, columns};
 
 /// Writes a trace. The first line is the start, if it is known. A measurement cycle is in the line of the first tick at or after it, and so is a
 /// measurement from outside; several before one tick have a line each, with the same state. Unknown values are empty cells.
@@ -16,19 +16,7 @@ use crate::row::{Kind, Row, Rows, Sink, Value, columns};
 pub fn write(trace: &Trace, out: impl Write) -> anyhow::Result<()> {
     let mut csv = Lines { csv: csv::Writer::from_writer(out) };
     csv.csv.write_record(columns().map(|(name, _)| name))?;
-    let mut rows = Rows::new(&trace.walls, vec![&mut csv]);
-    let mut fixes = trace.fixes.iter().peekable();
-    let mut absolutes = trace.absolutes.iter().peekable();
-    for tick in trace.start.iter().chain(&trace.ticks) {
-        while let Some(fix) = fixes.next_if(|fix| fix.time <= tick.time) {
-            rows.fix(|| fix.clone());
-        }
-        while let Some(absolute) = absolutes.next_if(|absolute| absolute.time <= tick.time) {
-            rows.absolute(|| absolute.clone());
-        }
-        rows.tick(|| *tick);
-    }
-    rows.end()?;
+    row::pass(trace, &mut csv)?;
     csv.csv.flush()?;
     Ok(())
 }

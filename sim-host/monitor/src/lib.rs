@@ -12,6 +12,7 @@
 //! | [`request`] | one command |
 //! | [`wheels`] | the travel of the wheels |
 //! | [`hints`] | what the telemetry suggests to check |
+//! | [`simulated`] | a simulated drive as such a log |
 //! | [`signs`] | signs of life: the devices of a robot on the bench, with hints |
 
 pub mod conversation;
@@ -21,6 +22,7 @@ pub mod recording;
 pub mod request;
 pub mod sealed;
 pub mod signs;
+pub mod simulated;
 pub mod terminal;
 pub mod view;
 pub mod wheels;

@@ -15,8 +15,8 @@ const TIMEOUT: Duration = Duration::from_millis(100);
 
 /// A connection to a robot.
 pub struct Port {
-    reader: Box<dyn Read>,
-    writer: Option<Box<dyn Write>>,
+    reader: Box<dyn Read + Send>,
+    writer: Option<Box<dyn Write + Send>>,
 }
 
 impl Port {

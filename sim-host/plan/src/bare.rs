@@ -43,11 +43,17 @@ temperature = "20 degC"
 
 "#;
 
+/// The text of the scenario whose map and path are to be replaced.
+#[must_use]
+pub fn text() -> String {
+    format!("{PLACE}{ROBOT}")
+}
+
 /// The robot of the floor plans on a map, on a path that is to be replaced.
 ///
 /// # Errors
 /// Never: the text is tested.
 pub fn scenario(floor: Floor, name: String) -> Result<Scenario, FileError> {
-    let whole = Scenario::parse(&format!("{PLACE}{ROBOT}"), "the robot of a map", Path::new(""))?;
+    let whole = Scenario::parse(&text(), "the robot of a map", Path::new(""))?;
     Ok(Scenario { floor, name, ..whole })
 }

@@ -13,11 +13,14 @@
 //! | [`preset`] | presets of common sonars and servos |
 //! | [`route`] | a path on the command line |
 //! | [`bare`] | the scenario of a map without a robot |
+//! | [`overrides`], [`edit`] | a scenario changed by options, and by keys of its file |
 //! | [`trial`], [`starts`] | starts without a pose: from where the search finds it, and after how many metres |
 
 pub mod bare;
+pub mod edit;
 mod forecast;
 mod heading_aid;
+pub mod overrides;
 pub mod preset;
 pub mod route;
 pub mod starts;

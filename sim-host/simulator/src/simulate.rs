@@ -22,7 +22,7 @@ use crate::statistics::RunResult;
 use crate::trace::Recorder;
 
 pub use error::SimulationError;
-pub use simulation::Simulation;
+pub use simulation::{MANY, Simulation};
 
 impl Simulation {
     /// Runs once.

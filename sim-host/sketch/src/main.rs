@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Parser;
 use sonarfix_map::Scenario;
+use sonarfix_plan::overrides::Overrides;
 use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::statistics::RunResult;
 
@@ -35,6 +36,8 @@ struct Arguments {
     /// Seconds of a run, if it shall be shorter than the scenario.
     #[arg(long)]
     seconds: Option<f64>,
+    #[command(flatten)]
+    overrides: Overrides,
 }
 
 /// The root mean square of the position errors of some runs, metres, and how many of them were lost.
@@ -59,7 +62,9 @@ impl Errors {
 
 fn main() -> Result<()> {
     let arguments = Arguments::parse();
-    let mut simulation = Simulation::new(Scenario::read(&arguments.scenario)?);
+    let mut scenario = Scenario::read(&arguments.scenario)?;
+    arguments.overrides.apply(&mut scenario)?;
+    let mut simulation = Simulation::new(scenario);
     if let Some(seconds) = arguments.seconds {
         simulation = simulation.shortened(seconds);
     }

@@ -46,10 +46,7 @@ fn keys(text: &str) -> anyhow::Result<Keys> {
         value(key).map(|text| number(key, &text)).transpose()
     };
     let resolution = real("resolution")?.context("`resolution` is missing")?;
-    ensure!(
-        (1e-3..=10.0).contains(&resolution),
-        "resolution: {resolution} m is not within 1 mm and 10 m"
-    );
+    check_resolution(resolution)?;
     let origin = value("origin").context("`origin` is missing")?;
     let origin = origin.trim_matches(['[', ']']).split(',').map(|text| number("origin", text));
     let origin: Vec<f64> = origin.collect::<anyhow::Result<_>>()?;
@@ -78,11 +75,62 @@ pub fn read(yaml: &Path, frame: &Frame, shortest: f64) -> anyhow::Result<Importe
     let image = sonarfix_map::read_bytes(&file).map_err(anyhow::Error::new);
     let image = image.and_then(|bytes| Image::read(&bytes));
     let image = image.with_context(|| format!("the image {}", file.display()))?;
-    let mut bitmap = occupied(&image, &keys);
+    let bitmap = occupied(&image, &keys);
     drop(image);
+    walls(bitmap, &Place { resolution: keys.resolution, origin: keys.origin }, frame, shortest)
+}
+
+/// The place of a grid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// The size of a cell, metres.
+    pub resolution: f64,
+    /// The lower left corner: x and y, metres, and the turn, radians.
+    pub origin: [f64; 3],
+}
+
+/// Finds the walls among occupied cells, rows from the bottom, as [`read`] does.
+///
+/// # Errors
+/// If the grid is too large or not of this size, its resolution is out of range, or it has no wall.
+pub fn of_cells(
+    occupied: &[bool],
+    [width, height]: [usize; 2],
+    place: &Place,
+    frame: &Frame,
+    shortest: f64,
+) -> anyhow::Result<Imported> {
+    check_resolution(place.resolution)?;
+    let is_whole = width.checked_mul(height) == Some(occupied.len());
+    ensure!(
+        is_whole && occupied.len() as u64 <= MAX_PIXELS,
+        "the grid has more than {MAX_PIXELS} cells"
+    );
+    let mut bitmap = Bitmap::new(width, height);
+    for (at, _) in occupied.iter().enumerate().filter(|(_, is_occupied)| **is_occupied) {
+        let (column, row) = (i32::try_from(at % width)?, i32::try_from(at / width)?);
+        bitmap.set((column, row), true);
+    }
+    walls(bitmap, place, frame, shortest)
+}
+
+fn check_resolution(resolution: f64) -> anyhow::Result<()> {
+    ensure!(
+        (1e-3..=10.0).contains(&resolution),
+        "resolution: {resolution} m is not within 1 mm and 10 m"
+    );
+    Ok(())
+}
+
+fn walls(
+    mut bitmap: Bitmap,
+    place: &Place,
+    frame: &Frame,
+    shortest: f64,
+) -> anyhow::Result<Imported> {
     let mut drawing = Drawing::default();
-    let [x0, y0, yaw] = keys.origin;
-    let r = keys.resolution;
+    let [x0, y0, yaw] = place.origin;
+    let r = place.resolution;
     drawing.note(format!(
         "scale: a pixel is {r} m; the lower left corner is at ({x0}, {y0}) m, turned by {yaw} rad"
     ));

@@ -24,7 +24,7 @@ use crate::world::sensor::SensorModel;
 use crate::world::{World, air};
 
 /// Above this number of walls the localizer reads a baked map, as on a robot: without its index an aim tests every wall.
-const MANY: usize = 128;
+pub const MANY: usize = 128;
 
 /// A scenario, prepared to be run any number of times.
 #[derive(Debug, Clone)]

@@ -1,6 +1,6 @@
-//! Changes of a scenario on the command line.
+//! Changes of a scenario by options, of the command and of the Python package.
 
-use clap::ValueEnum;
+use clap::{Parser, ValueEnum};
 use sonarfix::aim::Policy;
 use sonarfix::config::{LightBeam, PingSchedule, Ranging};
 use sonarfix::geometry::units::{Duration, Radians};
@@ -10,8 +10,9 @@ use sonarfix_map::{
     AbsoluteSensors, Fidelity, HeadingSensor, HeadingSlip, PositionSensor, Sampling, Scenario,
     ServoName, SonarName,
 };
-use sonarfix_plan::preset::SonarPreset;
 use sonarfix_sim::pins::devices;
+
+use crate::preset::SonarPreset;
 
 /// Changes of a scenario; by default it stays as it is.
 #[derive(Debug, clap::Args)]
@@ -61,6 +62,15 @@ enum StartName {
     Unknown,
 }
 
+/// The options alone.
+#[derive(Debug, Parser)]
+#[command(no_binary_name = true, disable_help_flag = true)]
+struct Alone {
+    #[command(flatten)]
+    overrides: Overrides,
+}
+
+/// The policy by its name.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub enum PolicyName {
     /// The nearest wall, as in the paper.
@@ -147,6 +157,9 @@ fn sensor(name: &str) -> Result<SonarPreset, String> {
 const LIGHT_CONE: f32 = 40.0;
 
 /// Whether the sonar of a robot is on a servo, which an option replaces.
+///
+/// # Errors
+/// If it is not.
 pub fn has_servo(scenario: &Scenario) -> anyhow::Result<()> {
     let is_fixed = scenario.robot.localizer.rangers.first.fixed_bearing().is_some();
     anyhow::ensure!(!is_fixed, "--servo: the robot's sonar has a fixed bearing and no servo");
@@ -154,7 +167,18 @@ pub fn has_servo(scenario: &Scenario) -> anyhow::Result<()> {
 }
 
 impl Overrides {
+    /// Reads options, as on the command line.
+    ///
+    /// # Errors
+    /// The error of the command.
+    pub fn parse(options: impl IntoIterator<Item = String>) -> Result<Self, clap::Error> {
+        Alone::try_parse_from(options).map(|alone| alone.overrides)
+    }
+
     /// Applies the changes to a scenario.
+    ///
+    /// # Errors
+    /// If an option does not fit the scenario, or its value is out of range.
     pub fn apply(&self, scenario: &mut Scenario) -> anyhow::Result<()> {
         if let Some(preset) = self.sensor {
             let schedule = scenario.robot.localizer.rangers.first.timing.schedule;

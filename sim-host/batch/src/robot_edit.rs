@@ -1,17 +1,20 @@
 //! Writes what was measured into the text of a robot file and keeps its comments.
 
 use anyhow::Context;
-use sonarfix_batch::calibrate::{Calibration, Determined};
-use sonarfix_batch::constants::Name;
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_hal::ranger::{Air, Celsius};
 use toml_edit::{DocumentMut, Item, Table, TableLike, Value};
 
-use crate::measure::wheel::Turned;
-use sonarfix_batch::bearings::Bearings;
+use crate::bearings::Bearings;
+use crate::calibrate::{Calibration, Determined};
+use crate::constants::Name;
+use crate::turned::Turned;
 
 /// The robot file with the calibration: wheels, track width and mount; the bearings of the servo's pulses and the
 /// temperature if they are determined; and the deviations of the prior.
+///
+/// # Errors
+/// If the text is no robot file.
 pub fn calibrated(text: &str, robot: &RobotConfig, found: &Calibration) -> anyhow::Result<String> {
     let mut document: DocumentMut = text.parse().context("the robot file is not TOML")?;
     let constants = &found.constants;
@@ -104,6 +107,9 @@ fn wheel(drive: &mut Table, key: &str, scale: f64) -> anyhow::Result<()> {
 }
 
 /// The robot file with what was measured on the bench: the wheels, right and left, and the servo.
+///
+/// # Errors
+/// If the text is no robot file.
 pub fn measured(
     text: &str,
     robot: &RobotConfig,

@@ -1,13 +1,41 @@
 //! Sets keys of a scenario or of its robot in the text of the file.
 
+use std::fmt;
 use std::path::Path;
 
 use anyhow::{Context, bail};
 use sonarfix_map::{Scenario, scenario_keys};
 use toml::{Table, Value};
 
-/// The scenario of a file with these values of its keys.
-pub fn scenario(file: &Path, text: &str, values: &[(String, String)]) -> anyhow::Result<Scenario> {
+/// The new value of a key.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Edit {
+    /// A text, which becomes a number or a truth value where the key has no text.
+    Text(String),
+    /// A value as in the file.
+    Value(Value),
+}
+
+impl fmt::Display for Edit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Text(text) => f.write_str(text),
+            Self::Value(value) => value.fmt(f),
+        }
+    }
+}
+
+/// The scenario of a file with these values of its keys. A key is one of the scenario or else of its robot. `option` begins
+/// the errors about a key.
+///
+/// # Errors
+/// If the file is no scenario with these values, or has no such place.
+pub fn scenario(
+    file: &Path,
+    text: &str,
+    values: &[(String, Edit)],
+    option: &str,
+) -> anyhow::Result<Scenario> {
     let base = file.parent().unwrap_or(Path::new(""));
     let mut root: Table = text.parse().with_context(|| file.display().to_string())?;
     for (key, value) in values {
@@ -20,7 +48,7 @@ pub fn scenario(file: &Path, text: &str, values: &[(String, String)]) -> anyhow:
             read_in(&mut root, first, base)?;
         }
         let place = place(Value::Table(std::mem::take(&mut root)), &path, value);
-        root = place.with_context(|| format!("--sweep {key}={value}"))?;
+        root = place.with_context(|| format!("{option}{key}={value}"))?;
     }
     let name = file.display().to_string();
     Ok(Scenario::parse(&root.to_string(), &name, base)?)
@@ -42,7 +70,7 @@ fn read_in(root: &mut Table, key: &str, base: &Path) -> anyhow::Result<()> {
 }
 
 /// The document with the value at a path.
-fn place(mut root: Value, path: &[&str], text: &str) -> anyhow::Result<Table> {
+fn place(mut root: Value, path: &[&str], edit: &Edit) -> anyhow::Result<Table> {
     let mut here = &mut root;
     for &key in path {
         here = match here {
@@ -54,7 +82,10 @@ fn place(mut root: Value, path: &[&str], text: &str) -> anyhow::Result<Table> {
             _ => bail!("\"{key}\" is not a key"),
         };
     }
-    *here = of_the_same_type(here, text);
+    *here = match edit {
+        Edit::Text(text) => of_the_same_type(here, text),
+        Edit::Value(value) => value.clone(),
+    };
     match root {
         Value::Table(table) => Ok(table),
         _ => bail!("the file is not a table"),
