@@ -1,4 +1,4 @@
-/* The part of Pololu's library VL53L1X that the example uses. The simulated sensor is that of the second ranger. */
+/* The part of Pololu's library VL53L1X that the example uses. The simulated sensor is that of the first ranger. */
 #ifndef VL53L1X_H
 #define VL53L1X_H
 

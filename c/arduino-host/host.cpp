@@ -13,7 +13,7 @@
 namespace {
 
 constexpr int PINS = 64;
-constexpr int LIGHT = 1;
+constexpr int LIGHT = 0;
 
 struct Pin {
     bool is_high = false;
@@ -175,8 +175,10 @@ bool VL53L1X::dataReady() { return is_lit && inputs.light[LIGHT].status != 0; }
 uint16_t VL53L1X::read(bool) {
     const Light &light = inputs.light[LIGHT];
     is_lit = false;
-    ranging_data = {light.millimetres, light.status == 9 ? RangeValid : SignalFail};
-    return light.millimetres;
+    /* The correction gain that Pololu's library applies to the sensor's register. */
+    const uint16_t range = uint16_t((light.millimetres * 2011u + 0x400) / 0x800);
+    ranging_data = {range, light.status == 9 ? RangeValid : SignalFail};
+    return range;
 }
 
 int main() {

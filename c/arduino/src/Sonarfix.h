@@ -166,8 +166,7 @@ template <class Sensor> class SonarfixVl53l1x {
         const bool is_valid = sensor.ranging_data.range_status == Sensor::RangeValid;
         input.reading = is_valid ? SONARFIX_READING_RANGE : SONARFIX_READING_NO_ECHO;
         input.range_m = 0.001f * sensor.ranging_data.range_mm;
-        /* The middle of the time in which the light was collected. */
-        input.measured_us = clock.at(started) + BUDGET / 2;
+        input.measured_us = clock.at(started) + MIDDLE;
         const uint64_t now = clock.now();
         if (input.measured_us > now) input.measured_us = now;
         return input;
@@ -183,6 +182,8 @@ template <class Sensor> class SonarfixVl53l1x {
 
   private:
     static constexpr uint32_t BUDGET = 50000;
+    /* From the start to the middle of the time in which the light is collected. */
+    static constexpr uint32_t MIDDLE = 27000;
     Sensor &sensor;
     uint32_t started = 0;
     bool is_measuring = false;

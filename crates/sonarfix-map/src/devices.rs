@@ -46,12 +46,6 @@ pub const INSTANT_SERVO: ServoTiming =
 pub(crate) const SERVOS: [(&str, ServoTiming); 3] =
     [("instant", INSTANT_SERVO), ("sg90", ServoTiming::SG90), ("mg996r", MG996R)];
 
-/// The same without lateness.
-const fn on_time(mut echo: EchoParameters) -> EchoParameters {
-    (echo.late.0, echo.late_per_radian.0) = (0.0, 0.0);
-    echo
-}
-
 /// A sonar with these probabilities of a missed, a short and a long echo, among the objects of a furnished room.
 const fn echo(missed: f32, short: f32, long: f32) -> EchoParameters {
     let mut echo = EchoParameters::HC_SR04;

@@ -5,9 +5,9 @@
 
 use std::path::PathBuf;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::Parser;
-use sonarfix_map::Scenario;
+use sonarfix_plan::edit::{self, Edit};
 use sonarfix_plan::overrides::Overrides;
 use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::statistics::RunResult;
@@ -36,33 +36,57 @@ struct Arguments {
     /// Seconds of a run, if it shall be shorter than the scenario.
     #[arg(long)]
     seconds: Option<f64>,
+    /// Sets a key of the scenario or of its robot; repeatable.
+    #[arg(long, value_name = "KEY=VALUE", value_parser = key_and_value)]
+    set: Vec<(String, Edit)>,
     #[command(flatten)]
     overrides: Overrides,
 }
 
-/// The root mean square of the position errors of some runs, metres, and how many of them were lost.
+/// A key, and its value as in a file or as a text.
+fn key_and_value(text: &str) -> Result<(String, Edit)> {
+    let (key, value) = text.split_once('=').context("no `=`")?;
+    let table: Result<toml::Table, _> = format!("value = {value}").parse();
+    let given = table.ok().and_then(|mut table| table.remove("value"));
+    Ok((key.to_owned(), given.map_or_else(|| Edit::Text(value.to_owned()), Edit::Value)))
+}
+
+/// Position errors of some runs.
 #[derive(Debug, Default)]
 struct Errors {
-    mean_squares: f64,
-    lost: u64,
+    /// Sums over the runs of the mean square along the path, and of the square at the end of those that are not lost.
+    along: f64,
+    at_end: f64,
     runs: u32,
+    lost: u32,
 }
 
 impl Errors {
     fn add(&mut self, result: &RunResult) {
-        self.mean_squares += result.path.position_mean_square();
-        self.lost += u64::from(result.lost);
+        self.along += result.path.position_mean_square();
         self.runs += 1;
+        if result.lost {
+            self.lost += 1;
+        } else {
+            self.at_end += result.error[0].powi(2) + result.error[1].powi(2);
+        }
     }
 
-    fn rms(&self) -> f64 {
-        (self.mean_squares / f64::from(self.runs)).sqrt()
+    fn summary(&self) -> serde_json::Value {
+        let rms = |sum: f64, runs: u32| (sum / f64::from(runs)).sqrt();
+        serde_json::json!({
+            "lost": self.lost,
+            "rms_along": rms(self.along, self.runs),
+            "rms_at_end": rms(self.at_end, self.runs - self.lost),
+        })
     }
 }
 
 fn main() -> Result<()> {
     let arguments = Arguments::parse();
-    let mut scenario = Scenario::read(&arguments.scenario)?;
+    let file = &arguments.scenario;
+    let text = std::fs::read_to_string(file).with_context(|| file.display().to_string())?;
+    let mut scenario = edit::scenario(file, &text, &arguments.set, "--set ")?;
     arguments.overrides.apply(&mut scenario)?;
     let mut simulation = Simulation::new(scenario);
     if let Some(seconds) = arguments.seconds {
@@ -75,11 +99,7 @@ fn main() -> Result<()> {
         firmware.add(&simulation.run(seed, &mut ())?);
     }
     let summary = serde_json::json!({
-        "runs": arguments.runs,
-        "program_rms": program.rms(),
-        "program_lost": program.lost,
-        "firmware_rms": firmware.rms(),
-        "firmware_lost": firmware.lost,
+        "runs": arguments.runs, "program": program.summary(), "firmware": firmware.summary(),
     });
     println!("{summary}");
     Ok(())
