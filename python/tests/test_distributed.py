@@ -92,18 +92,14 @@ def test_dask(expected):
 
 @pytest.mark.parametrize("size", [1, 7, 1_000])
 def test_the_size_of_the_parts_does_not_matter(expected, size):
-    table = distributed.monte_carlo(
-        sf.Scenario("paper"), 20, 0, engine=distributed.Processes(2), size=size
-    )
+    table = distributed.monte_carlo(sf.Scenario("paper"), 20, 0, engine=distributed.Processes(2), size=size)
     assert table["seed"].tolist() == list(range(20))
     assert table["nees"].tobytes() == expected["nees"][:20].tobytes()
 
 
 def test_a_worker_that_always_dies_is_an_error():
     with pytest.raises(sf.SonarfixError, match="died"):
-        distributed.monte_carlo(
-            sf.Scenario("paper"), 2, 0, engine=distributed.Processes(1), estimator=Deadly
-        )
+        distributed.monte_carlo(sf.Scenario("paper"), 2, 0, engine=distributed.Processes(1), estimator=Deadly)
 
 
 class Deadly:
@@ -144,9 +140,7 @@ def test_a_sweep():
     keys = {"sonar.noise": ["2 mm", "5 mm"], "truth.scale_right": [0.0, 0.01]}
     points = distributed.sweep(paper, keys, 3, 1, engine=distributed.Processes(2), size=2)
     assert [point for point, _ in points] == [
-        {"sonar.noise": noise, "truth.scale_right": scale}
-        for noise in ["2 mm", "5 mm"]
-        for scale in [0.0, 0.01]
+        {"sonar.noise": noise, "truth.scale_right": scale} for noise in ["2 mm", "5 mm"] for scale in [0.0, 0.01]
     ]
     for point, table in points:
         assert_same(table, paper.replace(point).monte_carlo(3, 1))
