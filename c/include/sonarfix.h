@@ -872,11 +872,11 @@ typedef struct {
   /*
    Not zero if the robot has a gyro. The other fields are then those of an MPU-6050 by default.
    */
-  uint8_t is_fitted;
+  uint32_t is_fitted;
   /*
    Not zero if it is mounted upside down.
    */
-  uint8_t is_inverted;
+  uint32_t is_inverted;
 } sonarfix_gyro_config_t;
 
 /*

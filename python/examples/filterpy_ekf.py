@@ -7,7 +7,7 @@ The state is x, y, heading, scale errors of the right and the left wheel, error 
 from __future__ import annotations
 
 import math
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
@@ -64,7 +64,7 @@ class FilterpyEkf:
         self.ekf.predict(moved)
         self.ekf.x[2] = wrapped(self.ekf.x[2])
 
-    def fix(self, bearing: float, measured: Optional[float]) -> bool:
+    def fix(self, bearing: float, measured: float | None) -> bool:
         wall = self.wall_along(bearing)
         if measured is None or wall is None:
             return False
@@ -107,15 +107,14 @@ class FilterpyEkf:
         h[0, 6] = abs(signed)
         return (1.0 + x[6]) * abs(signed), h
 
-    def wall_along(self, bearing: float) -> Optional[Wall]:
+    def wall_along(self, bearing: float) -> Wall | None:
         """The nearest wall that a beam at a bearing is square to."""
         x = self.ekf.x
         at_x, at_y, _, _ = self.sonar(x)
         within = [
             wall
             for wall in self.walls
-            if wall.has_foot(at_x, at_y)
-            and abs(wrapped(wall.direction(at_x, at_y) - x[2] - bearing)) < self.model["cone"]
+            if wall.has_foot(at_x, at_y) and abs(wrapped(wall.direction(at_x, at_y) - x[2] - bearing)) < self.model["cone"]
         ]
         return min(within, key=lambda wall: abs(wall.distance(at_x, at_y)), default=None)
 

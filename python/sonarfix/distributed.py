@@ -14,7 +14,7 @@ from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any, NamedTuple, Optional, Union
+from typing import Any, NamedTuple, Union
 
 from ._sonarfix import Scenario, Table
 from .errors import InputError, SonarfixError
@@ -50,8 +50,8 @@ class Part(NamedTuple):
 
 def parts(
     scenario: Scenario,
-    runs: Optional[int] = None,
-    seed: Optional[int] = None,
+    runs: int | None = None,
+    seed: int | None = None,
     *,
     size: int = PART,
     **options: Any,
@@ -88,7 +88,7 @@ class Processes(Engine):
     not finished are computed again. With an ``executor`` of your own (for example of mpi4py) a broken one is not replaced.
     """
 
-    def __init__(self, workers: Optional[int] = None, *, executor: Optional[Executor] = None) -> None:
+    def __init__(self, workers: int | None = None, *, executor: Executor | None = None) -> None:
         self._workers = workers
         self._executor = executor
 
@@ -161,17 +161,17 @@ class Dask(Engine):
 
 def monte_carlo(
     scenario: Scenario,
-    runs: Optional[int] = None,
-    seed: Optional[int] = None,
+    runs: int | None = None,
+    seed: int | None = None,
     *,
-    engine: Optional[Engine] = None,
+    engine: Engine | None = None,
     size: int = PART,
-    progress: Optional[Progress] = None,
+    progress: Progress | None = None,
     **options: Any,
 ) -> Table:
     """The rows of Scenario.monte_carlo, in the order of the seeds, computed by an engine, by default Processes()."""
     work = parts(scenario, runs, seed, size=size, **options)
-    tables: list[Optional[Table]] = [None] * len(work)
+    tables: list[Table | None] = [None] * len(work)
     for number, table in (engine or Processes()).compute(work):
         tables[number] = table
         if progress:
@@ -186,12 +186,12 @@ StrPath = Union[str, "os.PathLike[str]"]
 def to_parquet(
     scenario: Scenario,
     folder: StrPath,
-    runs: Optional[int] = None,
-    seed: Optional[int] = None,
+    runs: int | None = None,
+    seed: int | None = None,
     *,
-    engine: Optional[Engine] = None,
+    engine: Engine | None = None,
     size: int = PART,
-    progress: Optional[Progress] = None,
+    progress: Progress | None = None,
     **options: Any,
 ) -> Path:
     """Writes the rows into a folder of Parquet files, one a part, as the parts are finished; returns the folder.
@@ -237,12 +237,12 @@ def _write(table: Table, file: Path) -> None:
 def sweep(
     scenario: Scenario,
     keys: Mapping[str, Iterable[Any]],
-    runs: Optional[int] = None,
-    seed: Optional[int] = None,
+    runs: int | None = None,
+    seed: int | None = None,
     *,
-    engine: Optional[Engine] = None,
+    engine: Engine | None = None,
     size: int = PART,
-    progress: Optional[Progress] = None,
+    progress: Progress | None = None,
     **options: Any,
 ) -> list[tuple[dict[str, Any], Table]]:
     """All combinations of values of keys, each with the rows of its runs; the last key changes fastest, as in ``run --sweep``.
@@ -252,13 +252,10 @@ def sweep(
     points = [dict(zip(keys, values)) for values in itertools.product(*keys.values())]
     work = [parts(scenario.replace(point), runs, seed, size=size, **options) for point in points]
     flat = list(itertools.chain.from_iterable(work))
-    tables: list[Optional[Table]] = [None] * len(flat)
+    tables: list[Table | None] = [None] * len(flat)
     for number, table in (engine or Processes()).compute(flat):
         tables[number] = table
         if progress:
             progress(flat[number].runs)
     found = iter([table for table in tables if table is not None])
-    return [
-        (point, Table.concat(list(itertools.islice(found, len(of_point)))))
-        for point, of_point in zip(points, work)
-    ]
+    return [(point, Table.concat(list(itertools.islice(found, len(of_point))))) for point, of_point in zip(points, work)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Optional
+from typing import NamedTuple
 
 
 class SonarfixError(Exception):
@@ -18,7 +18,7 @@ class Mistake(NamedTuple):
 
     file: str
     """The file."""
-    line: Optional[int]
+    line: int | None
     """The line, from 1; None if the file could not be read."""
     key: str
     """The full key, for example ``robot.sonar.cone``; empty if the text is not TOML."""

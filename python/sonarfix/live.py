@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from typing import Any, NamedTuple, Optional, Union
+from typing import Any, NamedTuple
 
 from . import _sonarfix
 from ._sonarfix import Robot
@@ -33,7 +33,7 @@ class Monitor(Iterator[Message]):
         port: str,
         baud: int = 115_200,
         *,
-        record: Optional[Union[str, os.PathLike[str]]] = None,
+        record: str | os.PathLike[str] | None = None,
         force: bool = False,
     ) -> None:
         """Opens a port: a serial port, ``tcp:HOST:PORT``, or a file of recorded bytes.
@@ -56,7 +56,7 @@ class Monitor(Iterator[Message]):
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def receive(self, seconds: Optional[float] = None) -> Optional[Message]:
+    def receive(self, seconds: float | None = None) -> Message | None:
         """The next message; None if there is none within so many seconds. Raises StopIteration at the end of the stream."""
         message = self._monitor.receive(seconds)
         return None if message is None else Message(*message)
@@ -85,19 +85,15 @@ class Monitor(Iterator[Message]):
         """Turns the servo of a robot that waits to a bearing, radians from the heading."""
         self._monitor.point(bearing)
 
-    def set_pose(
-        self, pose: Any, *, position_deviation: float = 0.05, heading_deviation: float = 0.05
-    ) -> None:
+    def set_pose(self, pose: Any, *, position_deviation: float = 0.05, heading_deviation: float = 0.05) -> None:
         """Restarts the localizer from a pose of shape (3,): x, y (m), heading (rad); with its deviations (m, rad)."""
-        self._monitor.set_pose(
-            pose, position_deviation=position_deviation, heading_deviation=heading_deviation
-        )
+        self._monitor.set_pose(pose, position_deviation=position_deviation, heading_deviation=heading_deviation)
 
     def absolute(
         self,
         *,
-        heading: Optional[float] = None,
-        position: Optional[tuple[float, float]] = None,
+        heading: float | None = None,
+        position: tuple[float, float] | None = None,
         position_deviation: float = 0.05,
         heading_deviation: float = 0.05,
         age: float = 0.0,
@@ -120,7 +116,7 @@ def monitor(
     port: str,
     baud: int = 115_200,
     *,
-    record: Optional[Union[str, os.PathLike[str]]] = None,
+    record: str | os.PathLike[str] | None = None,
     force: bool = False,
 ) -> Monitor:
     """Opens the telemetry of a robot: ``for message in sonarfix.monitor("/dev/ttyUSB0"): …`` (docs/live.md)."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Optional, Union
+from typing import Any, Union
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ class Plan:
     """The numbers of ``sonarfix plan --json``: position and heading (RMS and worst), legs, blind stretches; m, rad, s."""
     samples: Table
     """The bound at each tenth of a second: place, deviations of x, y (m) and heading (rad), whether the robot is blind."""
-    starts: Optional[dict[str, Any]]
+    starts: dict[str, Any] | None
     """What starts without a pose lead to, if they were asked for."""
 
     def plot(self, ax: Any = None) -> Any:
@@ -38,10 +38,10 @@ class Plan:
 def plan(
     scenario: Scenario,
     runs: int = 10,
-    starts: Optional[int] = None,
+    starts: int | None = None,
     *,
-    workers: Optional[int] = None,
-    progress: Optional[Callable[[int], object]] = None,
+    workers: int | None = None,
+    progress: Callable[[int], object] | None = None,
 ) -> Plan:
     """Forecasts how well a robot would know its pose along the path of a scenario (docs/plan.md).
 
@@ -66,9 +66,9 @@ class Replay:
 
 def replay(
     log: StrPath,
-    robot: Optional[Robot] = None,
-    map: Optional[Map] = None,
-    reference: Optional[StrPath] = None,
+    robot: Robot | None = None,
+    map: Map | None = None,
+    reference: StrPath | None = None,
     *,
     strict: bool = False,
 ) -> Replay:
@@ -115,19 +115,17 @@ class Calibration:
 
 def calibrate(
     log: StrPath,
-    robot: Optional[Robot] = None,
-    map: Optional[Map] = None,
-    reference: Optional[StrPath] = None,
-    start: Optional[tuple[float, float, float]] = None,
+    robot: Robot | None = None,
+    map: Map | None = None,
+    reference: StrPath | None = None,
+    start: tuple[float, float, float] | None = None,
 ) -> Calibration:
     """Estimates wheels, track width, range scale, mount and servo from one recorded drive (docs/calibrate.md).
 
     Robot and map are by default ``robot.toml`` and ``map.toml`` beside the log. ``start`` replaces the start pose of the log:
     x, y (m), heading (rad). Raises RecordingError if the recording does not determine a calibration.
     """
-    estimates, trajectory, calibrated, (inliers, expected) = _sonarfix.calibrate(
-        log, robot, map, reference, start
-    )
+    estimates, trajectory, calibrated, (inliers, expected) = _sonarfix.calibrate(log, robot, map, reference, start)
     return Calibration([Estimate(*one) for one in estimates], calibrated, trajectory, inliers, expected)
 
 
@@ -154,7 +152,7 @@ class Survey:
         return not self.reasons
 
 
-def survey(log: StrPath, robot: Optional[Robot] = None) -> Survey:
+def survey(log: StrPath, robot: Robot | None = None) -> Survey:
     """Makes a map of the walls from the recording of a drive with a sweeping sonar (docs/survey.md).
 
     The robot is by default ``robot.toml`` beside the log. Raises RecordingError.
@@ -175,13 +173,13 @@ class Found:
     """The hypotheses at the end, the best first, shape (n, 3): x, y (m), heading (rad)."""
     answers: int
     """How many of them, from the first, are answers."""
-    unique_after: Optional[float]
+    unique_after: float | None
     """Seconds until the first unique answer."""
     summary: dict[str, Any]
     """The numbers of ``sonarfix find --json``."""
 
 
-def find(log: StrPath, robot: Optional[Robot] = None, map: Optional[Map] = None) -> Found:
+def find(log: StrPath, robot: Robot | None = None, map: Map | None = None) -> Found:
     """Searches for the pose in a log without a start pose (docs/search.md).
 
     Robot and map are by default ``robot.toml`` and ``map.toml`` beside the log.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Optional
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -52,7 +52,7 @@ def _walls(ax: Any, walls: Any) -> None:
         ax.plot(wall[:, 0], wall[:, 1], color=COLOURS["wall"], linewidth=2.5, label=label)
 
 
-def plot_map(map: Map, ax: Optional[Any] = None, *, names: bool = False) -> Any:
+def plot_map(map: Map, ax: Any | None = None, *, names: bool = False) -> Any:
     """Draws the walls of a map, metres; with ``names`` their names. Returns the axes."""
     ax = _axes(ax)
     _walls(ax, map.walls)
@@ -63,7 +63,7 @@ def plot_map(map: Map, ax: Optional[Any] = None, *, names: bool = False) -> Any:
     return _style(ax, "x (m)", "y (m)")
 
 
-def plot_run(run: Run, ax: Optional[Any] = None, *, odometry: bool = True, pings: bool = False) -> Any:
+def plot_run(run: Run, ax: Any | None = None, *, odometry: bool = True, pings: bool = False) -> Any:
     """Draws walls, true path, estimate and dead reckoning of a run, metres; with ``pings`` the measured points.
 
     Returns the axes.
@@ -125,7 +125,7 @@ def plot_errors(run: Run) -> Any:
     return figure
 
 
-def plot_plan(plan: Plan, ax: Optional[Any] = None) -> Any:
+def plot_plan(plan: Plan, ax: Any | None = None) -> Any:
     """Draws the bound on the position along the path of a forecast, millimetres; returns the axes."""
     ax = _axes(ax)
     samples = plan.samples

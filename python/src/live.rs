@@ -135,7 +135,7 @@ impl Monitor {
         py: Python<'py>,
         seconds: Option<f64>,
     ) -> PyResult<Option<Message<'py>>> {
-        let patience = seconds.map(|seconds| Duration::try_from_secs_f64(seconds.max(0.0)));
+        let patience = seconds.map(Duration::try_from_secs_f64);
         let patience = patience.transpose().map_err(|error| errors::input(error.to_string()))?;
         let until = patience.and_then(|patience| Instant::now().checked_add(patience));
         loop {

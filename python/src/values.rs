@@ -26,7 +26,7 @@ pub fn no_toml(error: toml::de::Error) -> PyErr {
 
 /// A dict as the text of a file.
 pub fn toml_text(table: &Bound<'_, PyDict>) -> PyResult<String> {
-    Ok(toml_value(table)?.to_string())
+    toml::to_string(&toml_value(table)?).map_err(|error| errors::input(error.to_string()))
 }
 
 /// The keys of a dict with their values.

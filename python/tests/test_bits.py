@@ -160,9 +160,7 @@ def test_the_golden_trace_step_by_step(paper):
     paper.replace(policy="informative").run(0, estimator=Setups)
     (begin, _), *exchanges = golden("localizer.golden")
     x, y, heading, position, turn = struct.unpack_from("<5f", begin, 3)
-    localizer = sf.Localizer(
-        Setups.robot, paper.map, (x, y, heading), position_deviation=position, heading_deviation=turn
-    )
+    localizer = sf.Localizer(Setups.robot, paper.map, (x, y, heading), position_deviation=position, heading_deviation=turn)
     upper = np.triu_indices(7)
     aim, compared = None, 0
     for request, answer in exchanges:
@@ -191,9 +189,7 @@ class Twin:
     def __init__(self, setup):
         walls = sf.Scenario("paper").map
         sigma = np.sqrt(np.diag(setup.covariance))
-        self.localizer = sf.Localizer(
-            setup.robot, walls, setup.pose, position_deviation=sigma[0], heading_deviation=sigma[2]
-        )
+        self.localizer = sf.Localizer(setup.robot, walls, setup.pose, position_deviation=sigma[0], heading_deviation=sigma[2])
         self.odometry = self.localizer.odometry
 
     def fix(self, bearing, measured):

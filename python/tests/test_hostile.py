@@ -207,14 +207,9 @@ def test_a_fork_after_a_monte_carlo():
 @pytest.mark.parametrize("name", ["paper", "classroom"])
 def test_ctrl_c_ends_long_work_within_a_second(name):
     program = (
-        "import sonarfix as sf\n"
-        f"scenario = sf.Scenario({name!r})\n"
-        "print('ready', flush=True)\n"
-        "scenario.monte_carlo(1_000_000)\n"
+        f"import sonarfix as sf\nscenario = sf.Scenario({name!r})\nprint('ready', flush=True)\nscenario.monte_carlo(1_000_000)\n"
     )
-    child = subprocess.Popen(
-        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+    child = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert child.stdout.readline() == "ready\n"
     time.sleep(0.3)
     start = time.monotonic()

@@ -96,9 +96,9 @@ pub struct sonarfix_gyro_config_t {
     /// Time from sample to sample, microseconds.
     pub period_us: u32,
     /// Not zero if the robot has a gyro. The other fields are then those of an MPU-6050 by default.
-    pub is_fitted: u8,
+    pub is_fitted: u32,
     /// Not zero if it is mounted upside down.
-    pub is_inverted: u8,
+    pub is_inverted: u32,
 }
 
 impl From<&Option<GyroParameters>> for sonarfix_gyro_config_t {
@@ -120,7 +120,7 @@ impl sonarfix_gyro_config_t {
             scale: gyro.scale,
             period_us: micros(gyro.period),
             is_fitted: 0,
-            is_inverted: u8::from(gyro.is_inverted),
+            is_inverted: u32::from(gyro.is_inverted),
         }
     }
 
