@@ -178,6 +178,11 @@ enum sonarfix_status_t
    */
   SONARFIX_ERROR_WALL_TOO_SHORT = 10,
   /*
+   The program computes other bits than this library: compile with -ffp-contract=off and without -ffast-math, and link the
+   floating point of the compiler.
+   */
+  SONARFIX_ERROR_ARITHMETIC = 11,
+  /*
    The bytes are no baked map.
    */
   SONARFIX_ERROR_MAP_MISSING = 20,
@@ -1961,7 +1966,7 @@ sonarfix_status_t sonarfix_config_check(const sonarfix_config_t *config,
  @param now_us  the time, microseconds of any clock that does not run backwards
  @return SONARFIX_OK; SONARFIX_ERROR_CONFIG, _VALUE or _NOT_LINKED by what is wrong with the configuration (sonarfix_config_check
    names the field); SONARFIX_ERROR_NOT_FINITE, _NEGATIVE_VARIANCE or _VARIANCE_TOO_LARGE by what is wrong with the start;
-   SONARFIX_ERROR_TIME; or an error of a pointer or a handle
+   SONARFIX_ERROR_TIME; SONARFIX_ERROR_ARITHMETIC; or an error of a pointer or a handle
  Threads: one at a time for the localizer.
  */
 sonarfix_status_t sonarfix_localizer_init(sonarfix_localizer_t *localizer,
@@ -2389,8 +2394,8 @@ sonarfix_status_t sonarfix_map_close(sonarfix_map_t *map);
    first, later what was saved. They stay where they are until the robot is closed
  @param now_us  the time, microseconds
  @return SONARFIX_OK; SONARFIX_ERROR_CONFIG, _VALUE or _NOT_LINKED by what is wrong with the configuration
-   (sonarfix_robot_config_check names the field); SONARFIX_ERROR_UNSUPPORTED; SONARFIX_ERROR_TIME; or an error of a pointer or a
-   handle. After an error the robot is closed
+   (sonarfix_robot_config_check names the field); SONARFIX_ERROR_UNSUPPORTED; SONARFIX_ERROR_TIME; SONARFIX_ERROR_ARITHMETIC; or
+   an error of a pointer or a handle. After an error the robot is closed
  Threads: one at a time for the robot.
  */
 sonarfix_status_t sonarfix_robot_init(sonarfix_robot_t *robot,

@@ -26,6 +26,7 @@
 )]
 
 pub mod aim;
+mod arithmetic;
 pub mod config;
 pub mod fix;
 pub mod localizer;

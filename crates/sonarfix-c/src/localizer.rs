@@ -10,6 +10,7 @@ use sonarfix::geometry::units::{Duration, Radians};
 use sonarfix::localizer::Localizer;
 use sonarfix::sensor::gyro::MeasuredTurn;
 
+use crate::arithmetic;
 use crate::config::{config_of, sonarfix_config_t};
 use crate::map::{map_of, sonarfix_map_t};
 use crate::memory::{close, handle, open, update, value};
@@ -44,7 +45,7 @@ handle!(sonarfix_localizer_t: Tracker, b"Sloc");
 /// @param now_us  the time, microseconds of any clock that does not run backwards
 /// @return SONARFIX_OK; SONARFIX_ERROR_CONFIG, _VALUE or _NOT_LINKED by what is wrong with the configuration (sonarfix_config_check
 ///   names the field); SONARFIX_ERROR_NOT_FINITE, _NEGATIVE_VARIANCE or _VARIANCE_TOO_LARGE by what is wrong with the start;
-///   SONARFIX_ERROR_TIME; or an error of a pointer or a handle
+///   SONARFIX_ERROR_TIME; SONARFIX_ERROR_ARITHMETIC; or an error of a pointer or a handle
 /// Threads: one at a time for the localizer.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sonarfix_localizer_init(
@@ -58,6 +59,7 @@ pub unsafe extern "C" fn sonarfix_localizer_init(
     unsafe {
         open(localizer, || {
             let (config, map, start) = (config_of(config)?, map_of(map)?, value(start)?);
+            arithmetic::check()?;
             let localizer = Localizer::new(config, map, start.into(), instant(now_us)?)?;
             Ok(Tracker::new(localizer))
         })
@@ -89,6 +91,7 @@ pub unsafe extern "C" fn sonarfix_localizer_resume(
             let (config, map) = (config_of(config)?, map_of(map)?);
             let (state, deviations) = (value(state)?.into(), value(deviations)?.into());
             let now = instant(now_us)?;
+            arithmetic::check()?;
             let localizer = Localizer::resume(config, map, state, deviations, now)?;
             Ok(Tracker::new(localizer))
         })

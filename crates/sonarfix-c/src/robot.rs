@@ -20,6 +20,7 @@ use sonarfix_link::message::ResetCause;
 use sonarfix_pil::RamFlash;
 use sonarfix_pil::ram_flash::CAPACITY;
 
+use crate::arithmetic;
 use crate::map::{Chart, sonarfix_map_t};
 use crate::memory::{close, handle, held, open_in_place, place, slice_mut, value};
 use crate::state::instant;
@@ -99,8 +100,8 @@ unsafe fn read<T>(
 ///   first, later what was saved. They stay where they are until the robot is closed
 /// @param now_us  the time, microseconds
 /// @return SONARFIX_OK; SONARFIX_ERROR_CONFIG, _VALUE or _NOT_LINKED by what is wrong with the configuration
-///   (sonarfix_robot_config_check names the field); SONARFIX_ERROR_UNSUPPORTED; SONARFIX_ERROR_TIME; or an error of a pointer or a
-///   handle. After an error the robot is closed
+///   (sonarfix_robot_config_check names the field); SONARFIX_ERROR_UNSUPPORTED; SONARFIX_ERROR_TIME; SONARFIX_ERROR_ARITHMETIC; or
+///   an error of a pointer or a handle. After an error the robot is closed
 /// Threads: one at a time for the robot.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sonarfix_robot_init(
@@ -116,6 +117,7 @@ pub unsafe extern "C" fn sonarfix_robot_init(
             let (config, now) = (value(config)?.config()?, instant(now_us)?);
             config.check_linked().map_err(|_| sonarfix_status_t::SONARFIX_ERROR_NOT_LINKED)?;
             config.check()?;
+            arithmetic::check()?;
             let &Chart { map, checksum } = held(map)?;
             let flash = RamFlash::new(slice_mut(store, CAPACITY)?);
             (&raw mut (*robot).signals).write(Signals::default());

@@ -38,6 +38,9 @@ pub enum sonarfix_status_t {
     SONARFIX_ERROR_CONFIG = 9,
     /// A wall is shorter than 0.1 mm.
     SONARFIX_ERROR_WALL_TOO_SHORT = 10,
+    /// The program computes other bits than this library: compile with -ffp-contract=off and without -ffast-math, and link the
+    /// floating point of the compiler.
+    SONARFIX_ERROR_ARITHMETIC = 11,
 
     /// The bytes are no baked map.
     SONARFIX_ERROR_MAP_MISSING = 20,
@@ -137,7 +140,7 @@ fn text(status: i32) -> &'static CStr {
     TEXTS.iter().find(|(code, _)| is(status, *code)).map_or(c"unknown status", |(_, text)| text)
 }
 
-const TEXTS: [(sonarfix_status_t, &CStr); 41] = [
+const TEXTS: [(sonarfix_status_t, &CStr); 42] = [
     (SONARFIX_OK, c"no error"),
     (SONARFIX_ERROR_NULL, c"a pointer is NULL"),
     (SONARFIX_ERROR_MISALIGNED, c"a pointer is not aligned for its type"),
@@ -149,6 +152,10 @@ const TEXTS: [(sonarfix_status_t, &CStr); 41] = [
     (SONARFIX_ERROR_NOT_LINKED, c"the library was built without a part that this needs"),
     (SONARFIX_ERROR_CONFIG, c"the configuration breaks a rule"),
     (SONARFIX_ERROR_WALL_TOO_SHORT, c"a wall is shorter than 0.1 mm"),
+    (
+        SONARFIX_ERROR_ARITHMETIC,
+        c"the program computes other bits than the library: compile with -ffp-contract=off",
+    ),
     (SONARFIX_ERROR_MAP_MISSING, c"the bytes are no baked map"),
     (SONARFIX_ERROR_MAP_VERSION, c"the baked map has another format"),
     (SONARFIX_ERROR_MAP_CHECKSUM, c"the baked map is damaged or cut off"),
