@@ -8,7 +8,7 @@ pub use sonarfix_c::*;
 use sonarfix_soft_float as _;
 
 /// The library for a microcontroller contains no call of it, which `cargo xtask c` checks.
-#[cfg(target_os = "none")]
+#[cfg(not(unix))]
 #[panic_handler]
 fn panicked(_: &core::panic::PanicInfo) -> ! {
     loop {
@@ -17,7 +17,7 @@ fn panicked(_: &core::panic::PanicInfo) -> ! {
 }
 
 /// Ends the program, so that a test fails.
-#[cfg(not(target_os = "none"))]
+#[cfg(unix)]
 #[panic_handler]
 fn panicked(_: &core::panic::PanicInfo) -> ! {
     unsafe extern "C" {
@@ -27,6 +27,6 @@ fn panicked(_: &core::panic::PanicInfo) -> ! {
 }
 
 /// The standard library of a computer refers to this name, by which a panic would unwind. Nothing unwinds here.
-#[cfg(not(target_os = "none"))]
+#[cfg(unix)]
 #[unsafe(no_mangle)]
 extern "C" fn rust_eh_personality() {}

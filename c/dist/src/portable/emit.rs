@@ -26,23 +26,26 @@ pub fn emit(
     let constants = Constants::new(&module.segments, base)?;
     let mut text = RUNTIME.to_owned();
     text += &constants.array()?;
-    for function in &module.functions {
+    let stacks = Stacks::new(&module.functions)?;
+    // A composition lacks the functions of the parts that it leaves out.
+    let names: Vec<_> = prototypes.iter().map(|one| format!("w2c_{}", one.name)).collect();
+    let reached = stacks.reached(names.iter().map(String::as_str));
+    let is_reached = |function: &&Function| reached.contains(function.name.as_str());
+    for function in module.functions.iter().filter(is_reached) {
         writeln!(text, "{};", signature(function))?;
     }
     let mut translator = Translator::new(accesses, &constants)?;
     for function in &module.functions {
-        text += &translator.function(function)?;
+        let translated = translator.function(function)?;
+        if is_reached(&function) {
+            text += &translated;
+        }
     }
     ensure!(translator.accesses.is_empty(), "the source has fewer accesses than the module");
-    let stacks = Stacks::new(&module.functions)?;
-    for prototype in prototypes {
-        let name = format!("w2c_{}", prototype.name);
-        // A composition lacks the functions of the parts that it leaves out.
-        if !module.functions.iter().any(|function| function.name == name) {
-            continue;
+    for (prototype, name) in prototypes.iter().zip(&names) {
+        if reached.contains(name.as_str()) {
+            text += &exported(prototype, stacks.of(name)?)?;
         }
-        let bytes = stacks.of(&name)?;
-        text += &exported(prototype, bytes)?;
     }
     Ok(text)
 }

@@ -123,7 +123,7 @@ static inline f32 wasm_ceilf(f32 x) { return __builtin_ceilf(x); }
 static inline f32 wasm_truncf(f32 x) { return __builtin_truncf(x); }
 static inline f64 wasm_sqrt(f64 x) { return __builtin_sqrt(x); }
 
-#define TRAP(reason) (__builtin_trap(), 0)
+#define TRAP(reason) (__builtin_trap(), 0u)
 #define UNREACHABLE __builtin_trap()
 #define I32_CLZ(x) ((x) ? (u32)__builtin_clzl(x) : 32u)
 #define I64_CLZ(x) ((x) ? (u64)__builtin_clzll(x) : 64u)

@@ -1,6 +1,6 @@
 //! The stack that a function of the portable source needs beside that of C.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use anyhow::{Context, Result, ensure};
 use regex::Regex;
@@ -35,6 +35,19 @@ impl<'m> Stacks<'m> {
     /// If it is not in the module, or if it calls itself, directly or not.
     pub fn of(&self, name: &str) -> Result<u32> {
         self.below(name, self.functions.len())
+    }
+
+    /// The functions that these functions call, directly or not, and themselves.
+    pub fn reached<'n>(&self, from: impl Iterator<Item = &'n str>) -> HashSet<&'m str> {
+        let mut reached = HashSet::new();
+        let mut left: Vec<&str> =
+            from.filter_map(|name| Some(*self.functions.get_key_value(name)?.0)).collect();
+        while let Some(name) = left.pop() {
+            if reached.insert(name) {
+                left.extend(self.functions.get(name).iter().flat_map(|(_, called)| called));
+            }
+        }
+        reached
     }
 
     fn below(&self, name: &str, levels: usize) -> Result<u32> {
