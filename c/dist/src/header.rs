@@ -21,8 +21,19 @@ pub struct Prototype {
 pub struct Parameter {
     /// Its name.
     pub name: String,
-    /// Whether it is a pointer.
-    pub is_pointer: bool,
+    /// Its type.
+    pub kind: Kind,
+}
+
+/// The type of a parameter, as far as its translation depends on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// A pointer.
+    Pointer,
+    /// An integer of at most 32 bits.
+    Integer,
+    /// A number that is passed as it is.
+    Other,
 }
 
 /// The functions of the header whose name begins with `sonarfix_`, in its order.
@@ -51,7 +62,12 @@ fn parameters(list: &str) -> Result<Vec<Parameter>> {
         .map(|parameter| {
             let at = parameter.rfind(|c: char| !(c.is_ascii_alphanumeric() || c == '_'));
             let (kind, name) = parameter.split_at(at.context("a parameter without a type")? + 1);
-            Ok(Parameter { name: name.to_owned(), is_pointer: kind.contains('*') })
+            let kind = match kind.trim() {
+                kind if kind.ends_with('*') => Kind::Pointer,
+                "float" | "double" | "uint64_t" | "int64_t" => Kind::Other,
+                _ => Kind::Integer,
+            };
+            Ok(Parameter { name: name.to_owned(), kind })
         })
         .collect()
 }

@@ -5,8 +5,13 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
 
+mod command;
 mod header;
+mod library;
+mod package;
+mod packages;
 mod portable;
+mod target;
 
 #[derive(Debug, Parser)]
 #[command(about = "Makes the packages of the C library")]
@@ -26,18 +31,25 @@ enum Command {
         #[arg(long)]
         out: PathBuf,
     },
+    /// Makes all packages.
+    Packages {
+        /// The folder.
+        #[arg(long)]
+        out: PathBuf,
+    },
 }
 
 fn main() -> Result<()> {
+    let workspace = std::env::current_dir()?;
     match Arguments::parse().command {
         Command::Portable { features, out } => {
-            let workspace = std::env::current_dir()?;
             let header = workspace.join("include/sonarfix.h");
             let header = std::fs::read_to_string(&header)
-                .with_context(|| format!("{}", header.display()))?;
+                .with_context(|| format!("{}: run this in the folder c", header.display()))?;
             let prototypes = header::prototypes(&header)?;
             let source = portable::source(&workspace, &features, &prototypes)?;
             Ok(std::fs::write(out, source)?)
         }
+        Command::Packages { out } => packages::make(&workspace, &out).map(|_| ()),
     }
 }

@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Result, ensure};
+
+use crate::command::output;
 
 /// The version of wasm2c whose output is taken apart.
 const WASM2C: &str = "1.0.32";
@@ -44,14 +46,4 @@ fn compile(workspace: &Path, features: &str, base: u32) -> Result<PathBuf> {
     cargo.args(["--no-default-features", "--features", features]);
     output(cargo.arg("--target-dir").arg(&target))?;
     Ok(target.join("wasm32-unknown-unknown/release/sonarfix.wasm"))
-}
-
-/// What a command prints.
-fn output(command: &mut Command) -> Result<String> {
-    let program = command.get_program().to_string_lossy().into_owned();
-    let done = command.output().with_context(|| format!("cannot start `{program}`"))?;
-    if !done.status.success() {
-        bail!("`{program}` has failed:\n{}", String::from_utf8_lossy(&done.stderr));
-    }
-    Ok(String::from_utf8(done.stdout)?)
 }

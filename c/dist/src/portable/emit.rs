@@ -8,7 +8,7 @@ use regex::{Captures, Regex};
 use super::access::Accesses;
 use super::module::{Function, Module, Segment};
 use super::stack::Stacks;
-use crate::header::Prototype;
+use crate::header::{Kind, Parameter, Prototype};
 
 /// What the functions of the module need: loads, stores and numbers as WebAssembly defines them.
 const RUNTIME: &str = include_str!("runtime.c");
@@ -72,8 +72,12 @@ fn exported(prototype: &Prototype, bytes: u32) -> Result<String> {
         writeln!(text, "    u32 sp = ADDRESS(stack + {});", bytes.div_ceil(8))?;
     }
     let arguments = prototype.parameters.iter().map(|parameter| {
-        let argument = if parameter.is_pointer { "ADDRESS" } else { "" };
-        format!(", {argument}({})", parameter.name)
+        let Parameter { name, kind } = parameter;
+        match kind {
+            Kind::Pointer => format!(", ADDRESS({name})"),
+            Kind::Integer => format!(", (u32){name}"),
+            Kind::Other => format!(", {name}"),
+        }
     });
     let arguments: String = arguments.collect();
     let call = format!("w2c_{}({stack}{arguments})", prototype.name);

@@ -1,0 +1,40 @@
+//! Builds the compiled libraries.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::Result;
+
+use crate::command::output;
+
+/// The compositions, by the names of their features in `c/Cargo.toml`, and what is added to the name of the library.
+pub const COMPOSITIONS: [(&str, &str); 2] = [("full", ""), ("small", "_small")];
+
+/// Builds the library of a composition for a target; returns its file.
+///
+/// Paths of this computer are left out, so that two folders give the same bytes.
+///
+/// # Errors
+/// If cargo fails.
+pub fn build(
+    workspace: &Path,
+    triple: &str,
+    rustflags: &str,
+    composition: &str,
+) -> Result<PathBuf> {
+    let root = workspace.canonicalize()?.join("..").canonicalize()?;
+    let home = std::env::var("CARGO_HOME")
+        .or_else(|_| std::env::var("HOME").map(|home| format!("{home}/.cargo")))?;
+    let mut flags: Vec<String> = rustflags.split_whitespace().map(str::to_owned).collect();
+    flags.push(format!("--remap-path-prefix={}=sonarfix", root.display()));
+    flags.push(format!("--remap-path-prefix={home}=cargo"));
+    // A folder of its own for each set of flags: cargo would build all again at each change.
+    let folder = format!("target/dist/{triple}{}", rustflags.replace(['=', '+', ' '], ""));
+    let target = workspace.join(folder);
+    let mut cargo = Command::new("cargo");
+    cargo.current_dir(workspace).env("CARGO_ENCODED_RUSTFLAGS", flags.join("\u{1f}"));
+    cargo.args(["build", "--quiet", "--release", "--package", "sonarfix-staticlib"]);
+    cargo.args(["--target", triple, "--no-default-features", "--features", composition]);
+    output(cargo.arg("--target-dir").arg(&target))?;
+    Ok(target.join(triple).join("release/libsonarfix.a"))
+}
