@@ -6,12 +6,13 @@ use crate::ci;
 use crate::workspace::Workspace;
 
 /// The crates that run on a robot.
-const NO_STD_CRATES: [&str; 7] = [
+const NO_STD_CRATES: [&str; 8] = [
     "sonarfix",
     "sonarfix-search",
     "sonarfix-hal",
     "sonarfix-link",
     "sonarfix-app",
+    "sonarfix-c",
     "sonarfix-pil",
     "sonarfix-soft-float",
 ];

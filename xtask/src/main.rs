@@ -7,6 +7,7 @@ use clap::{Parser, Subcommand};
 
 mod bench;
 mod budgets;
+mod c_library;
 mod cargo;
 mod checks;
 mod ci;
@@ -93,6 +94,8 @@ enum Task {
     Budgets,
     /// Flash, memory and instructions of what a robot links: writes docs/compositions.md.
     Compositions(compositions::Args),
+    /// The C library: its header, its programs on this computer and on emulated cores, hostile calls, its size.
+    C(c_library::Args),
     /// Programs for emulated boards: formatting, Clippy.
     LintEmulated,
     /// Sonarfix and every peer compute the same.
@@ -128,7 +131,7 @@ enum Task {
 }
 
 /// The steps of CI, by job.
-fn steps() -> [Step<Task>; 28] {
+fn steps() -> [Step<Task>; 29] {
     [
         ("lint", "format", Task::Format),
         ("lint", "circles", Task::Circles),
@@ -141,6 +144,7 @@ fn steps() -> [Step<Task>; 28] {
         ("crates", "features", Task::Features),
         ("crates", "msrv", Task::Msrv),
         ("crates", "package", Task::Package),
+        ("c", "c", Task::C(c_library::Args::CHECK)),
         ("firmware", "test-firmware", Task::TestFirmware),
         ("firmware", "boards", Task::Boards(firmware::BoardsArgs::COMPARE)),
         ("firmware", "template", Task::Template),
@@ -210,6 +214,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Panics => panics::check(),
         Task::Budgets => budgets::check(),
         Task::Compositions(args) => compositions::run(&args),
+        Task::C(args) => c_library::run(&args),
         Task::LintEmulated => checks::lint_emulated(),
         Task::Peers => checks::peers(),
         Task::Msrv => publish::msrv(),

@@ -14,6 +14,8 @@ use crate::cargo;
 pub enum Workspace {
     /// The crates, the simulator, the tests and this program.
     Main,
+    /// The C library.
+    C,
     /// The firmware of the boards.
     Firmware,
     /// Programs for emulated boards.
@@ -26,13 +28,14 @@ pub enum Workspace {
 
 impl Workspace {
     /// All of them.
-    pub const ALL: [Self; 5] =
-        [Self::Main, Self::Firmware, Self::Emulated, Self::Bench, Self::Fuzz];
+    pub const ALL: [Self; 6] =
+        [Self::Main, Self::C, Self::Firmware, Self::Emulated, Self::Bench, Self::Fuzz];
 
     /// The folder with its `Cargo.toml`.
     pub fn folder(self) -> PathBuf {
         cargo::root().join(match self {
             Self::Main => "",
+            Self::C => "c",
             Self::Firmware => "firmware",
             Self::Emulated => "firmware/emulated",
             Self::Bench => "bench",
@@ -44,6 +47,7 @@ impl Workspace {
     pub fn target_folder(self) -> PathBuf {
         cargo::target_folder().join(match self {
             Self::Main => "",
+            Self::C => "c",
             Self::Firmware => "firmware",
             Self::Emulated => "emulated",
             Self::Bench => "bench",

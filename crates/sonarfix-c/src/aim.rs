@@ -74,16 +74,29 @@ impl sonarfix_aim_t {
         }
     }
 
-    pub(crate) fn aim(&self) -> Result<Aim> {
+    /// The aim with the numbers behind it.
+    fn aim(&self) -> Result<Aim> {
+        let why = Reason {
+            gain: SquareMetres(self.gain_m2),
+            success: self.success,
+            time: Duration::from_ticks(u64::from(self.duration_us)),
+            candidates: u16::try_from(self.candidates).unwrap_or(u16::MAX),
+        };
+        Ok(Aim { why, ..self.target()? })
+    }
+
+    /// The aim for a measurement, to which the numbers behind it do not matter.
+    #[inline]
+    pub(crate) fn target(&self) -> Result<Aim> {
         Ok(Aim {
             wall: WallId(self.wall),
             bearing: Radians(finite(self.bearing_rad)?),
             range: Metres(finite(self.range_m)?),
             why: Reason {
-                gain: SquareMetres(self.gain_m2),
-                success: self.success,
-                time: Duration::from_ticks(u64::from(self.duration_us)),
-                candidates: u16::try_from(self.candidates).unwrap_or(u16::MAX),
+                gain: SquareMetres(0.0),
+                success: 0.0,
+                time: Duration::from_ticks(0),
+                candidates: 0,
             },
             ranger: ranger_of(self.ranger)?,
         })

@@ -52,7 +52,7 @@ impl Tracker {
     }
 
     pub fn fix(&mut self, aim: &sonarfix_aim_t, range: Option<Metres>) -> Result<sonarfix_fix_t> {
-        Ok(self.0.fix(&aim.aim()?, range).into())
+        Ok(self.0.fix(&aim.target()?, range).into())
     }
 
     pub fn absolute(&mut self, at: Instant, measured: &AbsoluteMeasurement) -> AbsoluteFix {

@@ -56,6 +56,16 @@ pub(crate) unsafe fn value<T: Copy>(at: *const T) -> Result<T> {
     Ok(unsafe { at.read() })
 }
 
+/// The value that a pointer leads to, where it is.
+///
+/// # Safety
+/// As of [`value`], and nothing changes it for `'a`.
+pub(crate) unsafe fn borrowed<'a, T>(at: *const T) -> Result<&'a T> {
+    check(at)?;
+    // SAFETY: checked; otherwise by the caller.
+    Ok(unsafe { &*at })
+}
+
 /// Changes the value that a pointer leads to, unless the change is an error.
 ///
 /// # Safety

@@ -70,6 +70,10 @@ impl Tracker {
         travel: WheelTravel,
         turn: Option<MeasuredTurn>,
     ) -> Result<()> {
+        if self.search.is_null() {
+            // The navigator would prepare what only a search needs.
+            return Ok(self.localizer_mut().odometry_with_turn(now, travel, turn)?);
+        }
         let (navigator, search) = self.parts()?;
         Ok(navigator.odometry_with_turn(now, travel, turn, search)?)
     }
@@ -90,7 +94,7 @@ impl Tracker {
     }
 
     pub fn fix(&mut self, aim: &sonarfix_aim_t, range: Option<Metres>) -> Result<sonarfix_fix_t> {
-        let aimed = aim.aim()?;
+        let aimed = aim.target()?;
         if self.mode() == Mode::Searching {
             let (navigator, search) = self.searching()?;
             let taken = navigator.ping(Radians(aim.bearing_rad), range, search);

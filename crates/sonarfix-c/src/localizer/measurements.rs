@@ -10,7 +10,7 @@ use crate::aim::{ranger_of, sonarfix_aim_t, sonarfix_standing_t};
 use crate::fix::{
     heading, pose, position, sonarfix_absolute_fix_t, sonarfix_fix_t, sonarfix_pose_noise_t,
 };
-use crate::memory::{change, update, value};
+use crate::memory::{borrowed, change, update, value};
 use crate::state::{finite, instant, sonarfix_pose_t};
 use crate::status::{Result, sonarfix_status_t};
 use crate::tracker::Tracker;
@@ -103,8 +103,8 @@ pub unsafe extern "C" fn sonarfix_localizer_fix(
     // SAFETY: the contract of the crate.
     unsafe {
         change(localizer, fix, |tracker| {
-            let (aim, range) = (value(aim)?, Metres(finite(range_m)?));
-            tracker.fix(&aim, Some(range))
+            let (aim, range) = (borrowed(aim)?, Metres(finite(range_m)?));
+            tracker.fix(aim, Some(range))
         })
     }
 }
@@ -123,7 +123,7 @@ pub unsafe extern "C" fn sonarfix_localizer_no_echo(
     fix: *mut sonarfix_fix_t,
 ) -> sonarfix_status_t {
     // SAFETY: the contract of the crate.
-    unsafe { change(localizer, fix, |tracker| tracker.fix(&value(aim)?, None)) }
+    unsafe { change(localizer, fix, |tracker| tracker.fix(borrowed(aim)?, None)) }
 }
 
 /// Records that sonarfix_localizer_aim found no wall when a ping was due.
