@@ -10,7 +10,7 @@ use crate::command::output;
 /// The compositions, by the names of their features in `c/Cargo.toml`, and what is added to the name of the library.
 pub const COMPOSITIONS: [(&str, &str); 2] = [("full", ""), ("small", "_small")];
 
-/// Builds the library of a composition for a target; returns its file.
+/// Builds the library of a composition for a target and strips its debug information by the tools with this prefix; returns its file.
 ///
 /// Paths of this computer are left out, so that two folders give the same bytes.
 ///
@@ -20,6 +20,7 @@ pub fn build(
     workspace: &Path,
     triple: &str,
     rustflags: &str,
+    tools: &str,
     composition: &str,
 ) -> Result<PathBuf> {
     let root = workspace.canonicalize()?.join("..").canonicalize()?;
@@ -36,5 +37,10 @@ pub fn build(
     cargo.args(["build", "--quiet", "--release", "--package", "sonarfix-staticlib"]);
     cargo.args(["--target", triple, "--no-default-features", "--features", composition]);
     output(cargo.arg("--target-dir").arg(&target))?;
-    Ok(target.join(triple).join("release/libsonarfix.a"))
+    let built = target.join(triple).join("release/libsonarfix.a");
+    let stripped = target.join(format!("libsonarfix_{composition}.a"));
+    let mut strip = Command::new(format!("{tools}strip"));
+    strip.args(["--strip-debug", "--enable-deterministic-archives", "-o"]);
+    output(strip.arg(&stripped).arg(built))?;
+    Ok(stripped)
 }

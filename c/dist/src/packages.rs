@@ -8,7 +8,7 @@ use crate::header;
 use crate::library::{self, COMPOSITIONS};
 use crate::package::Package;
 use crate::portable;
-use crate::target::{HOST, TARGETS};
+use crate::target::{HOST, TARGETS, Target};
 
 /// The packages, and where they are unpacked.
 #[derive(Debug)]
@@ -91,13 +91,14 @@ fn libraries(workspace: &Path, arduino: &mut Package, c: &mut Package) -> Result
         let name = format!("libsonarfix{suffix}.a");
         for target in &TARGETS {
             eprintln!("library for {}, {composition}", target.folder);
-            let file = library::build(workspace, target.triple, target.rustflags, composition)?;
+            let Target { triple, rustflags, compiler, .. } = target;
+            let file = library::build(workspace, triple, rustflags, compiler, composition)?;
             if suffix.is_empty() {
                 arduino.add_file(format!("src/{}/{name}", target.folder), &file)?;
             }
             c.add_file(format!("lib/{}/{name}", target.name()), &file)?;
         }
-        let file = library::build(workspace, HOST, "", composition)?;
+        let file = library::build(workspace, HOST, "", "", composition)?;
         c.add_file(format!("lib/{HOST}/{name}"), &file)?;
     }
     Ok(())
