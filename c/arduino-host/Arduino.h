@@ -2,11 +2,18 @@
 #ifndef ARDUINO_H
 #define ARDUINO_H
 
-#include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <cstdio>
-#include <cstring>
+#include <stddef.h>
+#include <stdint.h>
+#if __has_include(<string.h>)
+#include <string.h>
+#else
+/* A compiler without a C library. */
+extern "C" {
+void *memmove(void *to, const void *from, size_t count);
+void *memset(void *to, int value, size_t count);
+size_t strlen(const char *text);
+}
+#endif
 
 #define ARDUINO 10819
 #define HIGH 1

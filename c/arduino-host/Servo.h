@@ -2,7 +2,7 @@
 #ifndef SERVO_H
 #define SERVO_H
 
-#include <cstdint>
+#include <stdint.h>
 
 class Servo {
   public:

@@ -2,7 +2,7 @@
 #ifndef VL53L1X_H
 #define VL53L1X_H
 
-#include <cstdint>
+#include <stdint.h>
 
 class VL53L1X {
   public:

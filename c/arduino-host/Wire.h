@@ -2,7 +2,7 @@
 #ifndef TWO_WIRE_H
 #define TWO_WIRE_H
 
-#include <cstdint>
+#include <stdint.h>
 
 class TwoWire {
   public:

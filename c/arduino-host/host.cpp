@@ -1,6 +1,8 @@
 /* Runs a program for Arduino in steps of the simulator: the signals of the sensors become levels and interrupts, then `loop` runs
  * once, and what it did to the actuators is returned. Simulated time stands still while the program computes. */
 #include <algorithm>
+#include <cmath>
+#include <cstdio>
 #include <string>
 #include <vector>
 

@@ -3,7 +3,7 @@
 #ifndef WIRE_H
 #define WIRE_H
 
-#include <cstdint>
+#include <stdint.h>
 
 constexpr int RANGERS = 3;
 

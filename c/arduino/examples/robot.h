@@ -20,6 +20,9 @@ inline sonarfix_robot_config_t measured() {
     sonarfix_robot_config_default(0.12f, &config); /* the track width */
     config.right_wheel.travel_per_count_m = config.left_wheel.travel_per_count_m = 0.0004887f;
     config.localizer.wheel_noise_m = 0.003f;
+    config.localizer.scale_walk = 1e-4f;
+    config.localizer.track_width_walk_m = 2e-5f;
+    config.localizer.max_wheel_speed_m_per_s = 1;
     config.localizer.prior_scale_right = config.localizer.prior_scale_left = 0.015f;
     config.localizer.prior_track_width_m = 0.005f;
     config.localizer.prior_range_scale = 0.015f;

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
 
+mod check;
 mod command;
 mod header;
 mod library;
@@ -36,6 +37,9 @@ enum Command {
         /// The folder.
         #[arg(long)]
         out: PathBuf,
+        /// Checks them, too: builds everything that a user would build, and drives the examples in the simulator.
+        #[arg(long)]
+        check: bool,
     },
 }
 
@@ -50,6 +54,12 @@ fn main() -> Result<()> {
             let source = portable::source(&workspace, &features, &prototypes)?;
             Ok(std::fs::write(out, source)?)
         }
-        Command::Packages { out } => packages::make(&workspace, &out).map(|_| ()),
+        Command::Packages { out, check } => {
+            let packages = packages::make(&workspace, &out)?;
+            if check {
+                check::run(&workspace, &packages, &workspace.join("target/check"))?;
+            }
+            Ok(())
+        }
     }
 }
