@@ -13,6 +13,7 @@ mod checks;
 mod ci;
 mod circles;
 mod compositions;
+mod dist;
 mod elf;
 mod emulator;
 mod endurance;
@@ -96,6 +97,8 @@ enum Task {
     Compositions(compositions::Args),
     /// The C library: its header, its programs on this computer and on emulated cores, hostile calls, its size.
     C(c_library::Args),
+    /// The packages of the C library: Arduino, PlatformIO, CMake, pkg-config, ESP-IDF, Zephyr.
+    Dist(dist::Args),
     /// Programs for emulated boards: formatting, Clippy.
     LintEmulated,
     /// Sonarfix and every peer compute the same.
@@ -131,7 +134,7 @@ enum Task {
 }
 
 /// The steps of CI, by job.
-fn steps() -> [Step<Task>; 29] {
+fn steps() -> [Step<Task>; 30] {
     [
         ("lint", "format", Task::Format),
         ("lint", "circles", Task::Circles),
@@ -145,6 +148,7 @@ fn steps() -> [Step<Task>; 29] {
         ("crates", "msrv", Task::Msrv),
         ("crates", "package", Task::Package),
         ("c", "c", Task::C(c_library::Args::CHECK)),
+        ("c", "dist", Task::Dist(dist::Args::check())),
         ("firmware", "test-firmware", Task::TestFirmware),
         ("firmware", "boards", Task::Boards(firmware::BoardsArgs::COMPARE)),
         ("firmware", "template", Task::Template),
@@ -215,6 +219,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Budgets => budgets::check(),
         Task::Compositions(args) => compositions::run(&args),
         Task::C(args) => c_library::run(&args),
+        Task::Dist(args) => dist::run(&args),
         Task::LintEmulated => checks::lint_emulated(),
         Task::Peers => checks::peers(),
         Task::Msrv => publish::msrv(),

@@ -30,8 +30,8 @@ pub fn build(
     flags.push(format!("--remap-path-prefix={}=sonarfix", root.display()));
     flags.push(format!("--remap-path-prefix={home}=cargo"));
     // A folder of its own for each set of flags: cargo would build all again at each change.
-    let folder = format!("target/dist/{triple}{}", rustflags.replace(['=', '+', ' '], ""));
-    let target = workspace.join(folder);
+    let folder = format!("dist/{triple}{}", rustflags.replace(['=', '+', ' '], ""));
+    let target = built(workspace).join(folder);
     let mut cargo = Command::new("cargo");
     cargo.current_dir(workspace).env("CARGO_ENCODED_RUSTFLAGS", flags.join("\u{1f}"));
     cargo.args(["build", "--quiet", "--release", "--package", "sonarfix-staticlib"]);
@@ -43,4 +43,10 @@ pub fn build(
     strip.args(["--strip-debug", "--enable-deterministic-archives", "-o"]);
     output(strip.arg(&stripped).arg(built))?;
     Ok(stripped)
+}
+
+/// The folder in which cargo builds this workspace.
+pub fn built(workspace: &Path) -> PathBuf {
+    let chosen = std::env::var_os("CARGO_TARGET_DIR");
+    workspace.join(chosen.unwrap_or_else(|| "target".into()))
 }

@@ -57,7 +57,7 @@ fn main() -> Result<()> {
         Command::Packages { out, check } => {
             let packages = packages::make(&workspace, &out)?;
             if check {
-                check::run(&workspace, &packages, &workspace.join("target/check"))?;
+                check::run(&workspace, &packages, &library::built(&workspace).join("check"))?;
             }
             Ok(())
         }

@@ -6,6 +6,7 @@ use std::process::Command;
 use anyhow::{Result, ensure};
 
 use crate::command::output;
+use crate::library::built;
 
 /// The version of wasm2c whose output is taken apart.
 const WASM2C: &str = "1.0.32";
@@ -35,7 +36,7 @@ pub fn translate(workspace: &Path, features: &str, base: u32) -> Result<Translat
 
 /// Compiles the library. The module has no memory of its own: its addresses are those of the machine.
 fn compile(workspace: &Path, features: &str, base: u32) -> Result<PathBuf> {
-    let target = workspace.join("target/portable");
+    let target = built(workspace).join("portable");
     let link = ["--no-stack-first", "--max-memory=4294967296", &format!("--global-base={base}")]
         .map(|argument| format!("-Clink-arg={argument}"));
     let flags = [&link[..], &["-Cstrip=none".to_owned()]].concat().join("\u{1f}");
