@@ -58,9 +58,8 @@ fn traces() -> anyhow::Result<Vec<std::path::PathBuf>> {
     std::fs::create_dir_all(&folder).context("cannot create the folder of the C programs")?;
     let convert = |name: &&str| {
         let file = folder.join(format!("{name}.trace"));
-        let mut command = cargo::command(
-            "run --quiet --release --package sonarfix-pil-host --example golden_in_c --",
-        );
+        let mut command =
+            cargo::command("run --quiet --package sonarfix-pil-host --example golden_in_c --");
         command.arg(cargo::root().join(format!("tests/golden/{name}.golden"))).arg(&file);
         cargo::check(command).map(|()| file)
     };

@@ -40,14 +40,19 @@ const UNITS: [&str; 3] = ["_m", "_rad", "_us"];
 
 /// Every function has a comment on each argument, its results and its threads; every number has a unit.
 fn check_comments(header: &str) -> anyhow::Result<()> {
-    let function = Regex::new(r"(?s)/\*([^/]*?)\*/\n(\w[\w \*]*?)\b(sonarfix_\w+)\(([^)]*)\);")?;
+    let function = Regex::new(r"\*/\n[a-z][a-z_ \*]*(sonarfix_[a-z0-9_]+)\(([^)]*)\);")?;
     let mut count = 0;
     for found in function.captures_iter(header) {
-        let [_, comment, _, name, arguments] = [0, 1, 2, 3, 4].map(|group| &found[group]);
+        let [declaration, name, arguments] = [0, 1, 2].map(|group| found.get(group));
+        let (declaration, name) = declaration.zip(name).context("no declaration")?;
+        let arguments = arguments.map_or("", |arguments| arguments.as_str());
+        let before = header.get(..declaration.start()).unwrap_or_default();
+        let comment = before.rfind("/*").and_then(|start| before.get(start..));
+        let (comment, name) = (comment.unwrap_or_default(), name.as_str());
         check_function(comment, arguments).with_context(|| format!("{HEADER}: {name}"))?;
         count += 1;
     }
-    let all = Regex::new(r"(?m)^\w[\w \*]*\bsonarfix_\w+\(")?.find_iter(header).count();
+    let all = Regex::new(r"(?m)^[a-z][a-z_ \*]*sonarfix_[a-z0-9_]+\(")?.find_iter(header).count();
     ensure!(count == all && count > 0, "{HEADER}: {} functions have no comment", all - count);
     println!("{count} functions, each with its arguments, results and threads");
     Ok(())
