@@ -23,6 +23,7 @@ impl Args {
 }
 
 pub fn run(args: &Args) -> anyhow::Result<()> {
+    cargo::check(Workspace::C.cargo("clippy --quiet --package sonarfix-dist -- -D warnings"))?;
     let mut command = Workspace::C.cargo("run --quiet --package sonarfix-dist -- packages");
     command.arg("--out").arg(cargo::root().join(&args.out));
     if args.check {

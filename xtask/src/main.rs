@@ -97,7 +97,7 @@ enum Task {
     Compositions(compositions::Args),
     /// The C library: its header, its programs on this computer and on emulated cores, hostile calls, its size.
     C(c_library::Args),
-    /// The packages of the C library: Arduino, PlatformIO, CMake, pkg-config, ESP-IDF, Zephyr.
+    /// The packages of the C library: for Arduino and for other builds.
     Dist(dist::Args),
     /// Programs for emulated boards: formatting, Clippy.
     LintEmulated,
