@@ -74,6 +74,7 @@ pub struct sonarfix_map_t {
 /// A map with the checksum of its image; zero without one.
 pub struct Chart {
     pub(crate) map: Map<'static>,
+    #[cfg_attr(not(feature = "robot"), expect(dead_code, reason = "the link sends it"))]
     pub(crate) checksum: u32,
 }
 

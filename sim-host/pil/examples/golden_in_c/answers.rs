@@ -109,11 +109,15 @@ impl Hash {
         self.word(u32::from_le_bytes([t4, t5, t6, t7]));
         self.word((health.verdict as i32).cast_unsigned());
         let numbers = [health.evidence, health.nis, health.rolled_since_fix_m];
-        numbers.into_iter().for_each(|number| self.number(number));
+        for number in numbers {
+            self.number(number);
+        }
         self.number(health.position_deviation_m);
         self.number(health.heading_deviation_rad);
         let counts = [health.accepted_in_a_row, health.gated_in_a_row, health.silent_in_a_row];
-        counts.into_iter().for_each(|count| self.word(u32::from(count)));
+        for count in counts {
+            self.word(u32::from(count));
+        }
         self.word(u32::from(health.inflations));
     }
 

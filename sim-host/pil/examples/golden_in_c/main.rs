@@ -45,7 +45,9 @@ fn converted(exchanges: &[Exchange]) -> anyhow::Result<Vec<u8>> {
     }
     let commands = commands(&begin);
     bytes.extend(u32::try_from(commands.len())?.to_le_bytes());
-    commands.iter().for_each(|frame| block(&mut bytes, frame));
+    for frame in &commands {
+        block(&mut bytes, frame);
+    }
     let mut records = Records::new(&begin.config)?;
     let mut hash = Hash::default();
     for Exchange { request, answer } in rest {

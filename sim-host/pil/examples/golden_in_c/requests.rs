@@ -7,7 +7,7 @@ use sonarfix::sensor::absolute::AbsoluteMeasurement;
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_hal::gyro::{Mpu6050, YawRate};
 use sonarfix_hal::ranger::RangerKind;
-use sonarfix_pil::{Request, Sensors, Wires};
+use sonarfix_pil::{GyroSignal, Request, Sensors, Wires};
 
 const ODOMETRY: u8 = 1;
 const AIM: u8 = 2;
@@ -75,7 +75,9 @@ impl Records {
     }
 
     fn numbers(&mut self, numbers: &[f32]) {
-        numbers.iter().for_each(|number| self.bytes.extend(number.to_le_bytes()));
+        for number in numbers {
+            self.bytes.extend(number.to_le_bytes());
+        }
     }
 
     /// The kind, three numbers of the pose, six of its noise.
@@ -123,7 +125,7 @@ impl Records {
     fn yaw_rate(&self, sensors: &Sensors) -> anyhow::Result<Option<f32>> {
         let Some(parameters) = &self.config.localizer.gyro else { return Ok(None) };
         let mut gyro = Mpu6050::new(&self.wires.gyro);
-        self.wires.apply(&Sensors { gyro: Default::default(), ..*sensors });
+        self.wires.apply(&Sensors { gyro: GyroSignal::default(), ..*sensors });
         if gyro.configure(parameters).is_err() {
             bail!("the gyro of the trace is no MPU-6050");
         }
