@@ -29,20 +29,29 @@ pub fn build(
     let mut flags: Vec<String> = rustflags.split_whitespace().map(str::to_owned).collect();
     flags.push(format!("--remap-path-prefix={}=sonarfix", root.display()));
     flags.push(format!("--remap-path-prefix={home}=cargo"));
-    // A folder of its own for each set of flags: cargo would build all again at each change.
-    let folder = format!("dist/{triple}{}", rustflags.replace(['=', '+', ' '], ""));
-    let target = built(workspace).join(folder);
+    let target = folder(workspace, triple, rustflags);
     let mut cargo = Command::new("cargo");
     cargo.current_dir(workspace).env("CARGO_ENCODED_RUSTFLAGS", flags.join("\u{1f}"));
     cargo.args(["build", "--quiet", "--release", "--package", "sonarfix-staticlib"]);
     cargo.args(["--target", triple, "--no-default-features", "--features", composition]);
     output(cargo.arg("--target-dir").arg(&target))?;
     let built = target.join(triple).join("release/libsonarfix.a");
-    let stripped = target.join(format!("libsonarfix_{composition}.a"));
+    let stripped = file(workspace, triple, rustflags, composition);
     let mut strip = Command::new(format!("{tools}strip"));
     strip.args(["--strip-debug", "--enable-deterministic-archives", "-o"]);
     output(strip.arg(&stripped).arg(built))?;
     Ok(stripped)
+}
+
+/// The library that [`build`] has built.
+pub fn file(workspace: &Path, triple: &str, rustflags: &str, composition: &str) -> PathBuf {
+    folder(workspace, triple, rustflags).join(format!("libsonarfix_{composition}.a"))
+}
+
+/// Where it is built. Each set of flags has a folder of its own: cargo would build all again at each change of them.
+fn folder(workspace: &Path, triple: &str, rustflags: &str) -> PathBuf {
+    let name = format!("dist/{triple}{}", rustflags.replace(['=', '+', ' '], ""));
+    built(workspace).join(name)
 }
 
 /// The folder in which cargo builds this workspace.

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
 
 use crate::header;
 use crate::library::{self, COMPOSITIONS};
@@ -85,14 +85,21 @@ fn portable_sources(workspace: &Path, arduino: &mut Package, c: &mut Package) ->
     Ok(())
 }
 
-/// The compiled libraries.
+/// The compiled libraries. Two are built at a time: the last step of each has one thread.
 fn libraries(workspace: &Path, arduino: &mut Package, c: &mut Package) -> Result<()> {
+    let (one, other) = TARGETS.split_at(TARGETS.len() / 2);
+    let build = |targets: &'static [Target]| -> Result<()> {
+        targets.iter().try_for_each(|target| build_all(workspace, target))
+    };
+    std::thread::scope(|scope| {
+        let beside = scope.spawn(|| build(one));
+        build(other)?;
+        beside.join().map_err(|_| anyhow!("a build has panicked"))?
+    })?;
     for (composition, suffix) in COMPOSITIONS {
         let name = format!("libsonarfix{suffix}.a");
         for target in &TARGETS {
-            eprintln!("library for {}, {composition}", target.folder);
-            let Target { triple, rustflags, compiler, .. } = target;
-            let file = library::build(workspace, triple, rustflags, compiler, composition)?;
+            let file = library::file(workspace, target.triple, target.rustflags, composition);
             if suffix.is_empty() {
                 arduino.add_file(format!("src/{}/{name}", target.folder), &file)?;
             }
@@ -100,6 +107,16 @@ fn libraries(workspace: &Path, arduino: &mut Package, c: &mut Package) -> Result
         }
         let file = library::build(workspace, HOST, "", "", composition)?;
         c.add_file(format!("lib/{HOST}/{name}"), &file)?;
+    }
+    Ok(())
+}
+
+/// Builds all compositions for a target.
+fn build_all(workspace: &Path, target: &Target) -> Result<()> {
+    let Target { folder, triple, rustflags, compiler, .. } = target;
+    for (composition, _) in COMPOSITIONS {
+        eprintln!("library for {folder}, {composition}");
+        library::build(workspace, triple, rustflags, compiler, composition)?;
     }
     Ok(())
 }
