@@ -10,6 +10,8 @@ mod header;
 mod programs;
 mod size;
 
+use std::path::PathBuf;
+
 use anyhow::Context;
 
 use crate::cargo;
@@ -43,17 +45,31 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     cargo::check(Workspace::C.cargo("clippy --release -- -D warnings"))?;
     let traces = traces()?;
     on_this_computer(args, &traces)?;
+    let portable = portable()?;
+    for trace in &traces {
+        programs::replay_portably(&portable, trace)?;
+    }
     for core in &CORES {
-        core.build("full")?;
-        for trace in &traces {
-            core.replay(trace)?;
+        for library in [core.build("full")?, core.compile_portable(&portable)?] {
+            for trace in &traces {
+                core.replay(&library, trace)?;
+            }
         }
     }
     size::check(&CORES)
 }
 
+/// The portable source of all parts.
+fn portable() -> anyhow::Result<PathBuf> {
+    let file = Workspace::C.target_folder().join("portable.c");
+    let mut command =
+        Workspace::C.cargo("run --quiet --package sonarfix-dist -- portable --features full --out");
+    command.arg(&file);
+    cargo::check(command).map(|()| file)
+}
+
 /// The traces in the form that the C programs read, as files.
-fn traces() -> anyhow::Result<Vec<std::path::PathBuf>> {
+fn traces() -> anyhow::Result<Vec<PathBuf>> {
     let folder = Workspace::C.target_folder();
     std::fs::create_dir_all(&folder).context("cannot create the folder of the C programs")?;
     let convert = |name: &&str| {
@@ -67,7 +83,7 @@ fn traces() -> anyhow::Result<Vec<std::path::PathBuf>> {
 }
 
 /// The programs in C and C++, the traces, and the hostile calls, with sanitizers.
-fn on_this_computer(args: &Args, traces: &[std::path::PathBuf]) -> anyhow::Result<()> {
+fn on_this_computer(args: &Args, traces: &[PathBuf]) -> anyhow::Result<()> {
     for composition in ["small", "full"] {
         let host = Host::build("release", composition)?;
         host.run_example()?;

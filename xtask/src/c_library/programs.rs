@@ -10,6 +10,8 @@ use crate::workspace::Workspace;
 
 const WARNINGS: &str = "-Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror";
 const C: &str = "-std=c11 -Wstrict-prototypes";
+/// Of WebAssembly the portable source keeps that parameters are not used, and that names of locals come again.
+const PORTABLE: &str = "-Wno-unused-parameter -Wno-shadow";
 const CPP: &str = "-std=c++17 -fno-exceptions -fno-rtti";
 /// Seconds after which a program on an emulated core is killed.
 const TIME_OUT: &str = "120";
@@ -77,6 +79,18 @@ impl Host {
         println!("{}", output.trim());
         Ok(())
     }
+}
+
+/// The trace with the portable source, on this computer with pointers of 32 bits.
+pub fn replay_portably(source: &Path, trace: &Path) -> anyhow::Result<()> {
+    let program = Workspace::C.target_folder().join("program");
+    // The alignment and the arithmetic of the processors that the source is for.
+    let options =
+        format!("{C} -O1 -m32 -malign-double -msse2 -mfpmath=sse {PORTABLE} {}", traced(trace));
+    let mut command = compile("cc", &options, "tests/replay.c tests/replay_pc.c tests/trace.S");
+    command.arg(source).args(["-lm", "-o"]).arg(&program);
+    cargo::check(command)?;
+    cargo::printed(Command::new(&program)).map(drop)
 }
 
 fn build(profile: &str, composition: &str, target: &str) -> anyhow::Result<()> {
@@ -163,12 +177,25 @@ pub const CORES: [Core; 5] = [
 ];
 
 impl Core {
-    pub fn build(&self, composition: &str) -> anyhow::Result<()> {
-        build("release", composition, &format!("--target {}", self.triple))
+    /// Builds the library; returns its file.
+    pub fn build(&self, composition: &str) -> anyhow::Result<PathBuf> {
+        build("release", composition, &format!("--target {}", self.triple))?;
+        Ok(Workspace::C.target_folder().join(self.triple).join("release/libsonarfix.a"))
     }
 
-    /// Links a program with the library that was built last.
-    pub fn link(&self, options: &str, sources: &str) -> anyhow::Result<PathBuf> {
+    /// Compiles the portable source; returns the object.
+    pub fn compile_portable(&self, source: &Path) -> anyhow::Result<PathBuf> {
+        let object = Workspace::C.target_folder().join("portable.o");
+        let options =
+            format!("{C} -ffreestanding -Os -ffunction-sections {} {PORTABLE}", self.options);
+        let mut command = compile(self.compiler, &options, "tests/cores/memory.c");
+        command.arg(source).args(["-nostdlib", "-r", "-o"]).arg(&object);
+        cargo::check(command)?;
+        Ok(object)
+    }
+
+    /// Links a program with this library.
+    pub fn link(&self, library: &Path, options: &str, sources: &str) -> anyhow::Result<PathBuf> {
         let folder = Workspace::C.target_folder();
         let program = folder.join("program.elf");
         let board = cargo::root().join("firmware/emulated/board");
@@ -178,16 +205,15 @@ impl Core {
         command.args(["-nostdlib", "-T"]).arg(board.join(self.memory));
         command.args(["-T", &format!("tests/cores/{}", self.sections)]);
         command.args(["-Wl,--gc-sections", "-Wl,--no-warn-rwx-segments", "-Wl,-z,noexecstack"]);
-        command.arg(folder.join(self.triple).join("release/libsonarfix.a"));
-        command.args(["-lgcc", "-o"]).arg(&program);
+        command.arg(library).args(["-lgcc", "-o"]).arg(&program);
         let installed = || format!("{}: is `{}` installed?", self.name, self.compiler);
         cargo::check(command).with_context(installed)?;
         Ok(program)
     }
 
-    pub fn replay(&self, trace: &Path) -> anyhow::Result<()> {
+    pub fn replay(&self, library: &Path, trace: &Path) -> anyhow::Result<()> {
         let sources = "tests/replay.c tests/trace.S tests/cores/replay_core.c tests/cores/core.c";
-        let program = self.link(&traced(trace), sources)?;
+        let program = self.link(library, &traced(trace), sources)?;
         let mut command = Command::new("timeout");
         command.arg(TIME_OUT).args(self.emulator.split(' '));
         command.args(["-display", "none", "-monitor", "none", "-serial", "none"]);

@@ -12,9 +12,9 @@ const LIMITS: [(&str, u64); 2] = [("small", 34_000), ("full", 66 * 1024)];
 pub fn check(cores: &[Core]) -> anyhow::Result<()> {
     let core = cores.first().context("there is no core")?;
     for (composition, limit) in LIMITS {
-        core.build(composition)?;
+        let library = core.build(composition)?;
         let sources = "examples/one_fix.c tests/cores/one_fix_core.c tests/cores/core.c";
-        let program = core.link("", sources)?;
+        let program = core.link(&library, "", sources)?;
         let bytes = std::fs::read(&program)?;
         let file = object::File::parse(bytes.as_slice())?;
         let code = code(&file);
