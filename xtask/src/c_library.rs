@@ -49,6 +49,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
             core.replay(trace)?;
         }
     }
+    if let ([core, ..], [trace, ..]) = (&CORES, traces.as_slice()) {
+        core.print_cost(trace)?;
+    }
     size::check(&CORES)
 }
 
