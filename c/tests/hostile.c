@@ -11,7 +11,7 @@
 
 enum { MAPS = 3, LOCALIZERS = 3, SEARCHES = 2, ROBOTS = 2, WALLS = 8, GUARD = 32, LINK = 700 };
 
-/* An object between guards, and once more at a wrong alignment. */
+/* An object between guards. */
 #define GUARDED(type)      \
   struct {                 \
     uint8_t before[GUARD]; \

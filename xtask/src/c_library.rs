@@ -56,6 +56,11 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
             }
         }
     }
+    if let ([core, ..], [trace, ..]) = (&CORES, traces.as_slice()) {
+        for library in [core.build("full")?, core.compile_portable(&portable)?] {
+            core.print_cost(&library, trace)?;
+        }
+    }
     size::check(&CORES)
 }
 

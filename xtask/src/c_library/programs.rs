@@ -213,14 +213,30 @@ impl Core {
 
     pub fn replay(&self, library: &Path, trace: &Path) -> anyhow::Result<()> {
         let sources = "tests/replay.c tests/trace.S tests/cores/replay_core.c tests/cores/core.c";
-        let program = self.link(library, &traced(trace), sources)?;
-        let mut command = Command::new("timeout");
-        command.arg(TIME_OUT).args(self.emulator.split(' '));
-        command.args(["-display", "none", "-monitor", "none", "-serial", "none"]);
-        command.args(["-semihosting-config", "enable=on,target=native", "-kernel"]).arg(program);
-        let output = cargo::output(command)
-            .with_context(|| format!("{} with {}", self.name, trace.display()))?;
+        let output = self.run(&self.link(library, &traced(trace), sources)?)?;
         ensure!(output.trim() == "equal", "{} with {}: {output}", self.name, trace.display());
         Ok(())
+    }
+
+    /// Prints the instructions of the calls of a Cortex-M4F in a trace of a localizer alone.
+    pub fn print_cost(&self, library: &Path, trace: &Path) -> anyhow::Result<()> {
+        let wrapped =
+            ["odometry", "aim", "fix"].map(|call| format!("-Wl,--wrap=sonarfix_localizer_{call}"));
+        let options = format!("{} {}", traced(trace), wrapped.join(" "));
+        let sources = "tests/replay.c tests/trace.S tests/cores/cost.c tests/cores/core.c";
+        let output = self.run(&self.link(library, &options, sources)?)?;
+        let name = library.file_name().unwrap_or_default().display();
+        println!("instructions of a call of {name} on a {}, on average:\n{output}", self.name);
+        Ok(())
+    }
+
+    fn run(&self, program: &Path) -> anyhow::Result<String> {
+        let mut command = Command::new("timeout");
+        command.arg(TIME_OUT).args(self.emulator.split(' '));
+        // 2⁷ ns pass with every instruction.
+        command.args(["-icount", "shift=7"]);
+        command.args(["-display", "none", "-monitor", "none", "-serial", "none"]);
+        command.args(["-semihosting-config", "enable=on,target=native", "-kernel"]).arg(program);
+        cargo::output(command).with_context(|| self.name)
     }
 }

@@ -6,7 +6,7 @@ use object::{Object, ObjectSection, ObjectSymbol, SectionKind};
 use super::Core;
 
 /// The compositions, and the largest code of `one_fix.c` with each, bytes.
-const LIMITS: [(&str, u64); 2] = [("small", 34_000), ("full", 66 * 1024)];
+const LIMITS: [(&str, u64); 2] = [("small", 35_500), ("full", 66 * 1024)];
 
 /// Links `one_fix.c` with both libraries for the first core.
 pub fn check(cores: &[Core]) -> anyhow::Result<()> {
