@@ -1376,6 +1376,38 @@ typedef struct {
 } sonarfix_gyro_status_t;
 
 /*
+ A search for the pose in memory of the caller. It must not be copied.
+ */
+typedef struct {
+  /*
+   Only for this library.
+   */
+  uint64_t opaque[SONARFIX_SEARCH_WORDS];
+} sonarfix_search_t;
+
+/*
+ A rectangle of the map, parallel to its axes.
+ */
+typedef struct {
+  /*
+   Smallest x, metres.
+   */
+  float from_x_m;
+  /*
+   Smallest y, metres.
+   */
+  float from_y_m;
+  /*
+   Largest x, metres.
+   */
+  float to_x_m;
+  /*
+   Largest y, metres.
+   */
+  float to_y_m;
+} sonarfix_region_t;
+
+/*
  A wall of a map in memory of the caller; sonarfix_map_from_walls fills it.
  */
 typedef struct {
@@ -1485,28 +1517,6 @@ typedef struct {
    */
   float servo_bearing_rad[2];
 } sonarfix_driver_config_t;
-
-/*
- A rectangle of the map, parallel to its axes.
- */
-typedef struct {
-  /*
-   Smallest x, metres.
-   */
-  float from_x_m;
-  /*
-   Smallest y, metres.
-   */
-  float from_y_m;
-  /*
-   Largest x, metres.
-   */
-  float to_x_m;
-  /*
-   Largest y, metres.
-   */
-  float to_y_m;
-} sonarfix_region_t;
 
 /*
  The configuration of a robot. Start from sonarfix_robot_config_default, and set what was measured.
@@ -1802,16 +1812,6 @@ typedef struct {
    */
   uint32_t gyro;
 } sonarfix_faults_t;
-
-/*
- A search for the pose in memory of the caller. It must not be copied.
- */
-typedef struct {
-  /*
-   Only for this library.
-   */
-  uint64_t opaque[SONARFIX_SEARCH_WORDS];
-} sonarfix_search_t;
 
 /*
  What a search has found, with its numbers.
@@ -2337,6 +2337,62 @@ sonarfix_status_t sonarfix_localizer_gyro(const sonarfix_localizer_t *localizer,
                                           sonarfix_gyro_status_t *gyro);
 
 /*
+ Attaches a search to a localizer, which from then on begins it when the verdict is Lost, and uses it in every call. A search is
+ attached to one localizer at a time.
+
+ @param localizer  an open localizer
+ @param search  an open search, which stays where it is until it is detached or the localizer is closed; NULL detaches the present one
+ @return SONARFIX_OK, or an error of a pointer or a handle
+ Threads: one at a time for the localizer and the search together, from now on.
+ */
+sonarfix_status_t sonarfix_localizer_attach_search(sonarfix_localizer_t *localizer,
+                                                   sonarfix_search_t *search);
+
+/*
+ Declares the pose unknown and begins the search; the present pose is proposed to it.
+
+ @param localizer  an open localizer with a search
+ @return SONARFIX_OK; SONARFIX_ERROR_NO_SEARCH; or an error of the pointer or a handle
+ Threads: one at a time for the localizer and its search.
+ */
+sonarfix_status_t sonarfix_localizer_search(sonarfix_localizer_t *localizer);
+
+/*
+ Begins the search of a localizer that was opened with sonarfix_start_unknown, anywhere on the map.
+
+ @param localizer  an open localizer with a search
+ @return SONARFIX_OK; SONARFIX_ERROR_NO_SEARCH; or an error of the pointer or a handle
+ Threads: one at a time for the localizer and its search.
+ */
+sonarfix_status_t sonarfix_localizer_search_anywhere(sonarfix_localizer_t *localizer);
+
+/*
+ Begins the search of a localizer that was opened with sonarfix_start_unknown, in a part of the map.
+
+ @param localizer  an open localizer with a search
+ @param region  where the robot starts, metres in the map frame
+ @return SONARFIX_OK; SONARFIX_ERROR_NO_SEARCH; SONARFIX_ERROR_VALUE if the region is empty or not finite; or an error of a pointer or
+   a handle
+ Threads: one at a time for the localizer and its search.
+ */
+sonarfix_status_t sonarfix_localizer_search_in(sonarfix_localizer_t *localizer,
+                                               const sonarfix_region_t *region);
+
+/*
+ Works on the search while the pose is not confirmed, and changes the mode when it is time. To be called after each input, and
+ in any time that is left.
+
+ @param localizer  an open localizer with a search
+ @param evaluations  number of slices of work; one takes less than 0.1 ms on a Cortex-M4F at 168 MHz
+ @param mode  gets what determines the pose now
+ @return SONARFIX_OK; SONARFIX_ERROR_NO_SEARCH; or an error of a pointer or a handle
+ Threads: one at a time for the localizer and its search.
+ */
+sonarfix_status_t sonarfix_localizer_work(sonarfix_localizer_t *localizer,
+                                          uint16_t evaluations,
+                                          sonarfix_mode_t *mode);
+
+/*
  Opens a map of walls, which suits a room: every call considers all of them.
 
  @param map  memory for the map
@@ -2656,62 +2712,6 @@ sonarfix_status_t sonarfix_search_answer(const sonarfix_search_t *search, sonarf
 sonarfix_status_t sonarfix_search_hypothesis(const sonarfix_search_t *search,
                                              uint32_t rank,
                                              sonarfix_hypothesis_t *hypothesis);
-
-/*
- Attaches a search to a localizer, which from then on begins it when the verdict is Lost, and uses it in every call. A search is
- attached to one localizer at a time.
-
- @param localizer  an open localizer
- @param search  an open search, which stays where it is until it is detached or the localizer is closed; NULL detaches the present one
- @return SONARFIX_OK, or an error of a pointer or a handle
- Threads: one at a time for the localizer and the search together, from now on.
- */
-sonarfix_status_t sonarfix_localizer_attach_search(sonarfix_localizer_t *localizer,
-                                                   sonarfix_search_t *search);
-
-/*
- Declares the pose unknown and begins the search; the present pose is proposed to it.
-
- @param localizer  an open localizer with a search
- @return SONARFIX_OK; SONARFIX_ERROR_NO_SEARCH; or an error of the pointer or a handle
- Threads: one at a time for the localizer and its search.
- */
-sonarfix_status_t sonarfix_localizer_search(sonarfix_localizer_t *localizer);
-
-/*
- Begins the search of a localizer that was opened with sonarfix_start_unknown, anywhere on the map.
-
- @param localizer  an open localizer with a search
- @return SONARFIX_OK; SONARFIX_ERROR_NO_SEARCH; or an error of the pointer or a handle
- Threads: one at a time for the localizer and its search.
- */
-sonarfix_status_t sonarfix_localizer_search_anywhere(sonarfix_localizer_t *localizer);
-
-/*
- Begins the search of a localizer that was opened with sonarfix_start_unknown, in a part of the map.
-
- @param localizer  an open localizer with a search
- @param region  where the robot starts, metres in the map frame
- @return SONARFIX_OK; SONARFIX_ERROR_NO_SEARCH; SONARFIX_ERROR_VALUE if the region is empty or not finite; or an error of a pointer or
-   a handle
- Threads: one at a time for the localizer and its search.
- */
-sonarfix_status_t sonarfix_localizer_search_in(sonarfix_localizer_t *localizer,
-                                               const sonarfix_region_t *region);
-
-/*
- Works on the search while the pose is not confirmed, and changes the mode when it is time. To be called after each input, and
- in any time that is left.
-
- @param localizer  an open localizer with a search
- @param evaluations  number of slices of work; one takes less than 0.1 ms on a Cortex-M4F at 168 MHz
- @param mode  gets what determines the pose now
- @return SONARFIX_OK; SONARFIX_ERROR_NO_SEARCH; or an error of a pointer or a handle
- Threads: one at a time for the localizer and its search.
- */
-sonarfix_status_t sonarfix_localizer_work(sonarfix_localizer_t *localizer,
-                                          uint16_t evaluations,
-                                          sonarfix_mode_t *mode);
 
 /*
  The start of a robot that does not know where it is: the deviations of an unknown pose.

@@ -20,7 +20,7 @@
     reason = "the contract of every function is that of the crate"
 )]
 #![expect(clippy::doc_markdown, reason = "the comments are those of the header")]
-#![expect(
+#![allow(
     clippy::enum_glob_use,
     reason = "the names of enumerators are those of the header, each with its prefix"
 )]

@@ -4,6 +4,8 @@
 
 mod measurements;
 mod readings;
+#[cfg(feature = "search")]
+mod searching;
 
 use sonarfix::filter::motion::WheelTravel;
 use sonarfix::geometry::units::{Duration, Radians};

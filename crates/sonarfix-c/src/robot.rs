@@ -7,11 +7,11 @@
 pub mod commands;
 pub mod config;
 mod devices;
+pub mod held;
 pub mod poll;
 pub mod readings;
 pub mod signals;
 
-use sonarfix::config::MAX_RANGERS;
 use sonarfix_app::store::Store;
 use sonarfix_app::{App, Board, FlashContents};
 use sonarfix_hal::config::Unsupported;
@@ -22,74 +22,13 @@ use sonarfix_pil::ram_flash::CAPACITY;
 
 use crate::arithmetic;
 use crate::map::{Chart, sonarfix_map_t};
-use crate::memory::{close, handle, held, open_in_place, place, slice_mut, value};
+use crate::memory::{close, held, open_in_place, slice_mut, value};
 use crate::state::instant;
-use crate::status::{Result, sonarfix_status_t};
+use crate::status::sonarfix_status_t;
 
-use commands::Pending;
+use self::held::{Core, sonarfix_robot_t};
 use config::sonarfix_robot_config_t;
-use devices::{SignalDevices, Signals};
-
-/// Bytes of the store of a robot.
-pub const SONARFIX_STORE_SIZE: usize = 4096;
-
-const _: () = assert!(SONARFIX_STORE_SIZE == CAPACITY);
-
-/// 64-bit words of a robot.
-#[cfg(target_pointer_width = "64")]
-pub const SONARFIX_ROBOT_WORDS: usize = 1385;
-/// 64-bit words of a robot.
-#[cfg(not(target_pointer_width = "64"))]
-pub const SONARFIX_ROBOT_WORDS: usize = 1351;
-
-/// A robot in memory of the caller. It must not be copied or moved.
-#[repr(C)]
-#[derive(Debug)]
-pub struct sonarfix_robot_t {
-    /// Only for this library.
-    pub opaque: [u64; SONARFIX_ROBOT_WORDS],
-}
-
-/// The signals, and what refers to them.
-pub struct Robot {
-    signals: Signals,
-    core: Core,
-}
-
-/// The application with its drivers.
-pub struct Core {
-    app: App<'static, RamFlash<&'static mut [u8]>>,
-    devices: SignalDevices,
-    /// The periods of the servos, microseconds.
-    frames: [f32; MAX_RANGERS],
-    pending: Option<Pending>,
-}
-
-handle!(sonarfix_robot_t: Robot, b"Srob");
-
-/// The parts of an open robot. The whole of it is never borrowed for a change, because the drivers refer to the signals.
-///
-/// # Safety
-/// As of [`crate::memory::held_mut`].
-unsafe fn parts<'a>(robot: *mut sonarfix_robot_t) -> Result<(&'a Signals, &'a mut Core)> {
-    // SAFETY: by the caller.
-    let robot = unsafe { place(robot) }?;
-    // SAFETY: it is open, and the two are separate.
-    Ok(unsafe { (&(*robot).signals, &mut (*robot).core) })
-}
-
-/// Reads from an open robot.
-///
-/// # Safety
-/// As of [`crate::memory::read`].
-unsafe fn read<T>(
-    robot: *const sonarfix_robot_t,
-    to: *mut T,
-    read: impl FnOnce(&Core) -> Result<T>,
-) -> sonarfix_status_t {
-    // SAFETY: by the caller.
-    unsafe { crate::memory::read(robot, to, |robot| read(&robot.core)) }
-}
+use devices::Signals;
 
 /// Opens a robot that waits: its loop starts by sonarfix_robot_start, or by a command over the link.
 ///

@@ -2,12 +2,10 @@
 
 #![expect(unsafe_code, reason = "exports functions to C")]
 
-use sonarfix::localizer::Start;
 use sonarfix::sensor::absolute::AbsoluteMeasurement;
-use sonarfix_link::Command;
 use sonarfix_link::message::{CommandError, CommandResult};
 
-use super::{parts, sonarfix_robot_t};
+use super::held::{Pending, parts, sonarfix_robot_t};
 use crate::fix::{heading, pose, position, sonarfix_pose_noise_t};
 use crate::memory::value;
 use crate::state::{instant, sonarfix_pose_t, sonarfix_start_t};
@@ -53,28 +51,6 @@ impl From<CommandResult> for sonarfix_command_result_t {
             CommandError::Unsupported(_) => SONARFIX_COMMAND_UNSUPPORTED,
             CommandError::NoSearch => SONARFIX_COMMAND_NO_SEARCH,
             _ => SONARFIX_COMMAND_REFUSED,
-        }
-    }
-}
-
-/// A command that waits for the next poll.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Pending {
-    SetPose(Start),
-    Start,
-    Stop,
-    Search,
-    ResetCalibration,
-}
-
-impl Pending {
-    pub(super) fn command(&self) -> Command {
-        match *self {
-            Self::SetPose(start) => Command::SetPose(start),
-            Self::Start => Command::Start,
-            Self::Stop => Command::Stop,
-            Self::Search => Command::Search,
-            Self::ResetCalibration => Command::ResetCalibration,
         }
     }
 }

@@ -10,8 +10,9 @@ use sonarfix_hal::robot::Report;
 use sonarfix_link::frame::TELEMETRY_FRAME_MAX;
 
 use super::commands::sonarfix_command_result_t;
+use super::devices::Signals;
+use super::held::{Core, parts, sonarfix_robot_t};
 use super::signals::{self, sonarfix_inputs_t, sonarfix_outputs_t};
-use super::{Core, Signals, parts, sonarfix_robot_t};
 use crate::aim::sonarfix_aim_t;
 use crate::fix::{sonarfix_fix_t, sonarfix_outcome_t};
 use crate::memory::{give, slice, slice_mut, value};

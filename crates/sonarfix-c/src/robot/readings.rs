@@ -5,7 +5,7 @@
 use sonarfix::localizer::Localizer;
 use sonarfix_hal::robot::Faults;
 
-use super::{Core, read, sonarfix_robot_t};
+use super::held::{Core, read, sonarfix_robot_t};
 use crate::state::{sonarfix_covariance_t, sonarfix_health_t, sonarfix_state_t};
 use crate::status::{Result, sonarfix_status_t};
 
