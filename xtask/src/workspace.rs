@@ -22,12 +22,14 @@ pub enum Workspace {
     Bench,
     /// Fuzz targets.
     Fuzz,
+    /// The Python package.
+    Python,
 }
 
 impl Workspace {
     /// All of them.
-    pub const ALL: [Self; 5] =
-        [Self::Main, Self::Firmware, Self::Emulated, Self::Bench, Self::Fuzz];
+    pub const ALL: [Self; 6] =
+        [Self::Main, Self::Firmware, Self::Emulated, Self::Bench, Self::Fuzz, Self::Python];
 
     /// The folder with its `Cargo.toml`.
     pub fn folder(self) -> PathBuf {
@@ -37,6 +39,7 @@ impl Workspace {
             Self::Emulated => "firmware/emulated",
             Self::Bench => "bench",
             Self::Fuzz => "fuzz",
+            Self::Python => "python",
         })
     }
 
@@ -48,6 +51,7 @@ impl Workspace {
             Self::Emulated => "emulated",
             Self::Bench => "bench",
             Self::Fuzz => "fuzz",
+            Self::Python => "python",
         })
     }
 
