@@ -1,6 +1,7 @@
 """Executes the notebooks of docs/python from empty to end; ``--keep`` keeps their outputs there."""
 
 import argparse
+import os
 import re
 import sys
 import tempfile
@@ -11,6 +12,7 @@ import nbformat
 from nbclient import NotebookClient
 
 FOLDER = Path(__file__).resolve().parents[1] / "docs/python"
+EXAMPLES = FOLDER.parents[1] / "python/examples"
 MOST_BYTES = 600_000
 """Largest notebook with its outputs."""
 
@@ -61,6 +63,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--keep", action="store_true", help="keep the outputs")
     arguments = parser.parse_args()
+    # Figures are shown in the notebook.
+    os.environ.pop("MPLBACKEND", None)
+    os.environ["PYTHONPATH"] = str(EXAMPLES)
     files = sorted(FOLDER.glob("*.ipynb"))
     if not files:
         sys.exit(f"there is no notebook in {FOLDER}")

@@ -200,7 +200,8 @@ impl<'py> Guest<'py> {
     pub fn result(&self, ours: &RunResult) -> PyResult<RunResult> {
         let score = &self.score;
         let covariance = self.estimator.as_ref().and_then(|of| of.covariance.as_ref());
-        let p = covariance.map(|of| of.call0()).transpose()?.as_ref().map(matrix).transpose()?;
+        let p =
+            covariance.map(PyAnyMethods::call0).transpose()?.as_ref().map(matrix).transpose()?;
         let nees = p.and_then(|p| observe::nees(&score.error, &p));
         let (nees, estimated_states) = nees.unwrap_or((f64::NAN, 0));
         let mut result = RunResult {
