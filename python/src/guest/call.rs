@@ -18,7 +18,6 @@ use sonarfix_sim::simulate::{Simulation, SimulationError};
 use sonarfix_sim::statistics::{FixCounts, PathSum, RunResult};
 use sonarfix_sim::trace::Tick;
 
-use super::Invited;
 use super::view::{Setup, View};
 use crate::{errors, values};
 
@@ -57,19 +56,24 @@ pub struct Score {
 }
 
 impl<'py> Guest<'py> {
-    pub fn new(py: Python<'py>, simulation: &'py Simulation, invited: &Invited) -> PyResult<Self> {
+    pub fn new(
+        py: Python<'py>,
+        simulation: &'py Simulation,
+        estimator: Option<&Py<PyAny>>,
+        policy: Option<&Py<PyAny>>,
+    ) -> PyResult<Self> {
         let is_pins = simulation.scenario.fidelity == Fidelity::Pins;
-        if invited.policy.is_some() && is_pins {
+        if policy.is_some() && is_pins {
             let text =
                 "a policy of your own needs fidelity=\"ideal\": the robot's loop has its own";
             return Err(errors::input(text));
         }
-        let bound = |of: &Option<Py<PyAny>>| of.as_ref().map(|of| of.bind(py).clone());
+        let bound = |of: Option<&Py<PyAny>>| of.map(|of| of.bind(py).clone());
         Ok(Self {
             py,
             simulation,
-            factory: bound(&invited.estimator),
-            policy: bound(&invited.policy),
+            factory: bound(estimator),
+            policy: bound(policy),
             estimator: None,
             error: None,
             score: Score::default(),
