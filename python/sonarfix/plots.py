@@ -81,7 +81,7 @@ def plot_run(run: Run, ax: Any | None = None, *, odometry: bool = True, pings: b
     if pings:
         _pings(ax, run)
     ax.set_aspect("equal")
-    ax.legend(frameon=False, loc="best")
+    ax.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
     return _style(ax, "x (m)", "y (m)")
 
 

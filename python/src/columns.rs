@@ -73,9 +73,13 @@ pub fn summary<'py>(
         return Err(errors::input("there are no rows"));
     }
     let mut totals = Totals::default();
-    of.iter().for_each(|row| totals.add(row));
+    for row in &of {
+        totals.add(row);
+    }
     let mut deviations = totals.deviations();
-    of.iter().for_each(|row| deviations.add(row));
+    for row in &of {
+        deviations.add(row);
+    }
     values::of_json(py, &deviations.summary())
 }
 

@@ -55,7 +55,7 @@ pub fn any(error: &anyhow::Error) -> PyErr {
         return simulation(error);
     }
     let text = format!("{error:#}");
-    if error.chain().any(|cause| cause.is::<ReplayError>()) {
+    if error.chain().any(<dyn std::error::Error>::is::<ReplayError>) {
         return recording(text);
     }
     Python::attach(|py| raise(class!(py, "InputError"), text))

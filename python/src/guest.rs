@@ -49,7 +49,12 @@ pub fn run(
     invited: &Invited,
     recorder: &mut impl Recorder,
 ) -> PyResult<(Rows, Vec<[f64; 3]>)> {
-    let guest = RefCell::new(Guest::new(py, simulation, invited)?);
+    let guest = RefCell::new(Guest::new(
+        py,
+        simulation,
+        invited.estimator.as_ref(),
+        invited.policy.as_ref(),
+    )?);
     let mut judge = Judge { inner: recorder, guest: &guest };
     let result = simulation.run_on(&mut Accompanied::new(simulation, &guest), seed, &mut judge);
     let mut guest = guest.into_inner();

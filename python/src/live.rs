@@ -99,8 +99,8 @@ impl Monitor {
         done.map_err(|error| errors::connection(&error))
     }
 
-    fn command(&self, py: Python<'_>, command: Command) -> PyResult<()> {
-        match self.with(py, |line| line.ask(&command))? {
+    fn command(&self, py: Python<'_>, command: &Command) -> PyResult<()> {
+        match self.with(py, |line| line.ask(command))? {
             CommandResult::Refused(reason) => {
                 Err(errors::connection(&anyhow::anyhow!("the robot refuses: {reason}")))
             }
@@ -165,28 +165,28 @@ impl Monitor {
 
     /// Runs the robot's loop.
     fn start(&self, py: Python<'_>) -> PyResult<()> {
-        self.command(py, Command::Start)
+        self.command(py, &Command::Start)
     }
 
     /// Stops the loop.
     fn stop(&self, py: Python<'_>) -> PyResult<()> {
-        self.command(py, Command::Stop)
+        self.command(py, &Command::Stop)
     }
 
     /// Declares the pose unknown, and searches for it.
     fn search(&self, py: Python<'_>) -> PyResult<()> {
-        self.command(py, Command::Search)
+        self.command(py, &Command::Search)
     }
 
     /// Discards the estimated calibration of wheels and ranger.
     fn reset_calibration(&self, py: Python<'_>) -> PyResult<()> {
-        self.command(py, Command::ResetCalibration)
+        self.command(py, &Command::ResetCalibration)
     }
 
     /// Turns the servo of a robot that waits to a bearing, radians.
     fn point(&self, py: Python<'_>, bearing: f64) -> PyResult<()> {
         let bearing = Radians(values::single(bearing, "the bearing")?);
-        self.command(py, Command::Point(bearing))
+        self.command(py, &Command::Point(bearing))
     }
 
     /// Restarts the localizer from a pose: x, y (metres), heading (radians).
@@ -200,7 +200,7 @@ impl Monitor {
     ) -> PyResult<()> {
         let pose = localizer::pose_of(pose)?;
         let start = localizer::start(pose, position_deviation, heading_deviation)?;
-        self.command(py, Command::SetPose(start))
+        self.command(py, &Command::SetPose(start))
     }
 
     /// Passes a heading (radians), a position (metres) or both, ``age`` seconds old, to the running localizer.
@@ -217,11 +217,11 @@ impl Monitor {
         let of = localizer::absolute;
         let measurement = of(heading, position, position_deviation, heading_deviation)?;
         let age = RobotDuration::from_ticks(values::instant(age)?.ticks());
-        self.command(py, Command::Absolute { age, measurement })
+        self.command(py, &Command::Absolute { age, measurement })
     }
 
     /// Stores a robot's configuration, and restarts the localizer with it.
     fn set_configuration(&self, py: Python<'_>, robot: &Robot) -> PyResult<()> {
-        self.command(py, Command::SetConfiguration(robot.config))
+        self.command(py, &Command::SetConfiguration(robot.config))
     }
 }

@@ -195,6 +195,9 @@ fn estimates(found: &of_batch::Calibration) -> Estimates {
     found.estimates.iter().map(row).collect()
 }
 
+/// Estimates, smoothed poses, robot, and the echoes that fit and that were expected.
+type Calibrated<'py> = (Estimates, Bound<'py, PyArray2<f64>>, Robot, (usize, usize));
+
 /// Wrapped by sonarfix.calibrate: estimates, the smoothed poses (time, x, y, heading), the calibrated robot, echoes that fit
 /// and that were expected.
 #[pyfunction]
@@ -206,7 +209,7 @@ pub fn calibrate<'py>(
     map: Option<&Map>,
     reference: Option<PathBuf>,
     start: Option<(f64, f64, f64)>,
-) -> PyResult<(Estimates, Bound<'py, PyArray2<f64>>, Robot, (usize, usize))> {
+) -> PyResult<Calibrated<'py>> {
     let recording = Recording::new(log, robot, map)?;
     let found = work::done(py, Some(1), None, move |_| -> anyhow::Result<_> {
         let Recording { log: path, robot, floor } = recording;

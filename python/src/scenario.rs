@@ -69,7 +69,7 @@ fn edit_of(value: &toml::Value) -> Edit {
 /// The options of the command for these keywords.
 fn options_of(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<String>> {
     let mut options = Vec::new();
-    for (name, value) in keywords.into_iter().flat_map(|keywords| keywords.iter()) {
+    for (name, value) in keywords.into_iter().flat_map(PyDictMethods::iter) {
         let name = format!("--{}", name.extract::<String>()?.replace('_', "-"));
         if value.is_none() {
             continue;

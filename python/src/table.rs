@@ -248,6 +248,6 @@ fn joined(parts: &[ArrayRef]) -> PyResult<ArrayRef> {
         StringArray,
         BooleanArray
     );
-    let types: Vec<&DataType> = parts.iter().map(|part| part.data_type()).collect();
+    let types: Vec<&DataType> = parts.iter().map(Array::data_type).collect();
     Err(PyTypeError::new_err(format!("columns of different types: {types:?}")))
 }

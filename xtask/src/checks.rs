@@ -85,7 +85,7 @@ pub fn deny() -> anyhow::Result<()> {
 
 /// These checks of cargo-deny in both workspaces that make products.
 fn deny_in_all(checks: &str) -> anyhow::Result<()> {
-    for workspace in [Workspace::Main, Workspace::Firmware] {
+    for workspace in [Workspace::Main, Workspace::Firmware, Workspace::Python] {
         let manifest = workspace.folder().join("Cargo.toml");
         let mut command = cargo::command("deny --log-level error --manifest-path");
         command.arg(manifest).args(["check"]).args(checks.split(' '));

@@ -29,6 +29,7 @@ mod pil;
 mod playground;
 mod program;
 mod publish;
+mod python;
 mod search_windows;
 mod template;
 mod thumb;
@@ -109,6 +110,8 @@ enum Task {
     Package,
     /// The simulator as a web page, `target/playground/index.html`; in Chromium it computes the same bits as here.
     Playground,
+    /// The Python package: its wheel in an empty environment, its tests, types, style and notebooks.
+    Python(python::Args),
     /// Licences of all dependencies, and advisories if their database can be reached.
     Deny,
     /// Records the golden traces, writes the fuzz inputs of messages, and measures and writes `budgets.toml`.
@@ -134,7 +137,7 @@ enum Task {
 }
 
 /// The steps of CI, by job.
-fn steps() -> [Step<Task>; 30] {
+fn steps() -> [Step<Task>; 31] {
     [
         ("lint", "format", Task::Format),
         ("lint", "circles", Task::Circles),
@@ -162,6 +165,7 @@ fn steps() -> [Step<Task>; 30] {
         ("budgets", "figures", Task::Figures(figures::Args::CHECK)),
         ("budgets", "peers", Task::Peers),
         ("budgets", "playground", Task::Playground),
+        ("python", "python", Task::Python(python::Args::CHECK)),
         ("random", "endurance", Task::Endurance(endurance::Args::SHORT)),
         ("random", "search-windows", Task::SearchWindows(search_windows::Args::SHORT)),
         ("random", "fuzz", Task::Fuzz(fuzz::Args::short())),
@@ -225,6 +229,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Msrv => publish::msrv(),
         Task::Package => publish::package(),
         Task::Playground => playground::build_and_check(),
+        Task::Python(args) => python::check(args),
         Task::Deny => checks::deny(),
         Task::Bless(args) => bless(&args),
         Task::Bench => bench::run(),

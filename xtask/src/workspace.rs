@@ -24,12 +24,21 @@ pub enum Workspace {
     Bench,
     /// Fuzz targets.
     Fuzz,
+    /// The Python package.
+    Python,
 }
 
 impl Workspace {
     /// All of them.
-    pub const ALL: [Self; 6] =
-        [Self::Main, Self::C, Self::Firmware, Self::Emulated, Self::Bench, Self::Fuzz];
+    pub const ALL: [Self; 7] = [
+        Self::Main,
+        Self::C,
+        Self::Firmware,
+        Self::Emulated,
+        Self::Bench,
+        Self::Fuzz,
+        Self::Python,
+    ];
 
     /// The folder with its `Cargo.toml`.
     pub fn folder(self) -> PathBuf {
@@ -40,6 +49,7 @@ impl Workspace {
             Self::Emulated => "firmware/emulated",
             Self::Bench => "bench",
             Self::Fuzz => "fuzz",
+            Self::Python => "python",
         })
     }
 
@@ -52,6 +62,7 @@ impl Workspace {
             Self::Emulated => "emulated",
             Self::Bench => "bench",
             Self::Fuzz => "fuzz",
+            Self::Python => "python",
         })
     }
 

@@ -18,7 +18,6 @@ use sonarfix_sim::simulate::{Simulation, SimulationError};
 use sonarfix_sim::statistics::{FixCounts, PathSum, RunResult};
 use sonarfix_sim::trace::Tick;
 
-use super::Invited;
 use super::view::{Setup, View};
 use crate::{errors, values};
 
@@ -57,19 +56,24 @@ pub struct Score {
 }
 
 impl<'py> Guest<'py> {
-    pub fn new(py: Python<'py>, simulation: &'py Simulation, invited: &Invited) -> PyResult<Self> {
+    pub fn new(
+        py: Python<'py>,
+        simulation: &'py Simulation,
+        estimator: Option<&Py<PyAny>>,
+        policy: Option<&Py<PyAny>>,
+    ) -> PyResult<Self> {
         let is_pins = simulation.scenario.fidelity == Fidelity::Pins;
-        if invited.policy.is_some() && is_pins {
+        if policy.is_some() && is_pins {
             let text =
                 "a policy of your own needs fidelity=\"ideal\": the robot's loop has its own";
             return Err(errors::input(text));
         }
-        let bound = |of: &Option<Py<PyAny>>| of.as_ref().map(|of| of.bind(py).clone());
+        let bound = |of: Option<&Py<PyAny>>| of.map(|of| of.bind(py).clone());
         Ok(Self {
             py,
             simulation,
-            factory: bound(&invited.estimator),
-            policy: bound(&invited.policy),
+            factory: bound(estimator),
+            policy: bound(policy),
             estimator: None,
             error: None,
             score: Score::default(),
@@ -200,7 +204,8 @@ impl<'py> Guest<'py> {
     pub fn result(&self, ours: &RunResult) -> PyResult<RunResult> {
         let score = &self.score;
         let covariance = self.estimator.as_ref().and_then(|of| of.covariance.as_ref());
-        let p = covariance.map(|of| of.call0()).transpose()?.as_ref().map(matrix).transpose()?;
+        let p =
+            covariance.map(PyAnyMethods::call0).transpose()?.as_ref().map(matrix).transpose()?;
         let nees = p.and_then(|p| observe::nees(&score.error, &p));
         let (nees, estimated_states) = nees.unwrap_or((f64::NAN, 0));
         let mut result = RunResult {

@@ -68,7 +68,8 @@ impl Errors {
         if result.lost {
             self.lost += 1;
         } else {
-            self.at_end += result.error[0].powi(2) + result.error[1].powi(2);
+            let [x, y, ..]: [f64; 7] = result.error.into();
+            self.at_end += x * x + y * y;
         }
     }
 
