@@ -146,7 +146,9 @@ fn style_and_types(tools: &Environment) -> anyhow::Result<()> {
 fn tests(tools: &Environment) -> anyhow::Result<()> {
     cargo::run("build --release --bin sonarfix")?;
     let mut command = tools.command("pytest")?;
-    command.args(["-p", "no:cacheprovider", "--durations=5", "tests"]);
+    // Beside the sources Python would import them in place of the installed package.
+    command.current_dir(source().join("tests"));
+    command.args(["-p", "no:cacheprovider", "--durations=5", "."]);
     command.env("SONARFIX_COMMAND", cargo::target_folder().join("release/sonarfix"));
     cargo::check(command)
 }

@@ -99,12 +99,14 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     if let Some(file) = &args.rows.rows {
         check_file("--rows", file)?;
     }
+    if let Some(file) = &args.record {
+        check_file("--record", file)?;
+    }
     if let Some(file) = &args.trace {
         check_file("--trace", file)?;
         write_trace(&experiment.trace()?, file)?;
     }
     if let Some(file) = &args.record {
-        check_file("--record", file)?;
         simulated::record(&experiment.simulation, experiment.seed, file, None, args.force)?;
     }
     let counted = experiment.counted(&args.rows)?;

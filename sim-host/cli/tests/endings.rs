@@ -273,13 +273,14 @@ fn a_long_line_is_not_echoed() {
 }
 
 /// The options that name a result, each in a command that would otherwise end with another error, or work for hours.
-const WRITING: [(&[&str], &str); 29] = [
+const WRITING: [(&[&str], &str); 30] = [
     (&["measure", "--port", "missing"], "--out"),
     (&["paper", "--runs", "4000000"], "--out"),
     (&["run", CLASSROOM, "--runs", "4000000"], "--out"),
     (&["run", CLASSROOM, "--runs", "4000000"], "--trace"),
     (&["run", CLASSROOM, "--runs", "4000000", "--rows", "/dev/null", "--worst", "1"], "--traces"),
     (&["run", CLASSROOM, "--runs", "4000000"], "--rows"),
+    (&["run", CLASSROOM, "--runs", "4000000"], "--record"),
     (&["run", CLASSROOM, "--runs", "4000000", "--sweep", "sonar.noise=1mm,2mm"], "--out"),
     (&["merge", "missing.csv"], "--rows"),
     (&["pil", CLASSROOM, "--machine", "host"], "--record"),
