@@ -7,6 +7,7 @@
 //! | [`baked_map`] | a baked map, whole or damaged, or walls to bake |
 //! | [`map_file`], [`scenario_file`], [`robot_file`] | the text of such a file |
 //! | [`replay_log`] | the lines of a log |
+//! | [`c_interface`] | calls of the functions of the C header, with pointers that are NULL or misaligned |
 //! | [`link`] | a message, and line noise before it |
 //!
 //! `cargo xtask fuzz` searches for a bounded time, `cargo fuzz run TARGET` without limit; `cargo test --no-default-features` runs
@@ -14,12 +15,14 @@
 
 mod baked;
 mod bytes;
+mod c_interface;
 mod calls;
 mod files;
 mod link;
 mod search;
 
 pub use baked::baked_map;
+pub use c_interface::c_interface;
 pub use calls::localizer;
 pub use files::{map_file, replay_log, robot_file, scenario_file};
 pub use link::link;
@@ -29,7 +32,7 @@ pub use search::search;
 pub type Target = (&'static str, fn(&[u8]));
 
 /// Every target.
-pub const TARGETS: [Target; 8] = [
+pub const TARGETS: [Target; 9] = [
     ("localizer", localizer),
     ("search", search),
     ("baked_map", baked_map),
@@ -38,4 +41,5 @@ pub const TARGETS: [Target; 8] = [
     ("robot_file", robot_file),
     ("replay_log", replay_log),
     ("link", link),
+    ("c_interface", c_interface),
 ];

@@ -30,8 +30,16 @@ impl Args {
     }
 }
 
-const ALL: [&str; 7] =
-    ["localizer", "baked_map", "map_file", "scenario_file", "robot_file", "replay_log", "link"];
+const ALL: [&str; 8] = [
+    "localizer",
+    "baked_map",
+    "map_file",
+    "scenario_file",
+    "robot_file",
+    "replay_log",
+    "link",
+    "c_interface",
+];
 
 /// The instrumentation that guides libFuzzer: coverage counters and comparisons.
 const INSTRUMENTED: &str = "-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \

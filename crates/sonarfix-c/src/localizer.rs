@@ -2,10 +2,10 @@
 
 #![expect(unsafe_code, reason = "exports functions to C")]
 
-mod measurements;
-mod readings;
+pub mod measurements;
+pub mod readings;
 #[cfg(feature = "search")]
-mod searching;
+pub mod searching;
 
 use sonarfix::filter::motion::WheelTravel;
 use sonarfix::geometry::units::{Duration, Radians};
