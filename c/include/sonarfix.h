@@ -1082,7 +1082,8 @@ typedef struct {
 } sonarfix_config_t;
 
 /*
- A field of a configuration that breaks its rule, as texts that end with zero. Both are empty if there is none.
+ The first field of a configuration that breaks a rule, and the rule, as texts that end with zero. Both are empty if all fields are
+ right.
  */
 typedef struct {
   /*

@@ -57,7 +57,7 @@ class Monitor(Iterator[Message]):
         self.close()
 
     def receive(self, seconds: float | None = None) -> Message | None:
-        """The next message; None if there is none within so many seconds. Raises StopIteration at the end of the stream."""
+        """The next message; None if none arrives within so many seconds. Raises StopIteration at the end of the stream."""
         message = self._monitor.receive(seconds)
         return None if message is None else Message(*message)
 

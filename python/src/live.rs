@@ -18,7 +18,7 @@ use sonarfix_monitor::{Monitor as Receiver, Received, request};
 use crate::robot::Robot;
 use crate::{errors, localizer, values};
 
-/// Longest time without a look at the signals.
+/// Longest time between two checks for a signal.
 const LOOK: Duration = Duration::from_millis(200);
 
 /// The connection, and what has arrived.
@@ -127,7 +127,7 @@ impl Monitor {
         Ok(Self(Mutex::new(line)))
     }
 
-    /// The next message: kind, content, lost frames; None if there is none within ``seconds``. Raises StopIteration at the
+    /// The next message: kind, content, lost frames; None if none arrives within ``seconds``. Raises StopIteration at the
     /// end of the stream.
     #[pyo3(signature = (seconds=None))]
     fn receive<'py>(

@@ -248,6 +248,12 @@ pub fn verdict(verdict: Verdict) -> &'static str {
     }
 }
 
+/// The estimated pose of a localizer as an array.
+pub fn pose<'py>(py: Python<'py>, localizer: &of_core::Localizer) -> Bound<'py, PyArray1<f32>> {
+    let pose = localizer.pose();
+    PyArray1::from_slice(py, &[pose.x.0, pose.y.0, pose.heading.radians().0])
+}
+
 pub fn state<'py>(py: Python<'py>, of: &of_core::Localizer) -> Bound<'py, PyArray1<f32>> {
     PyArray1::from_slice(py, &of.filter().state().to_array())
 }
@@ -327,7 +333,7 @@ impl Localizer {
         self.get().aim().ok().map(Aim)
     }
 
-    /// The wall to which a beam at a bearing (radians from the heading) is square; None if there is none.
+    /// The wall to which a beam at a bearing (radians from the heading) is square; None if it is square to no wall.
     fn aim_at(&self, bearing: f64) -> PyResult<Option<Aim>> {
         let bearing = Radians(values::single(bearing, "the bearing")?);
         Ok(self.get().aim_at(bearing).ok().map(Aim))
@@ -391,8 +397,7 @@ impl Localizer {
     /// The estimated pose: x, y (metres), heading (radians in (−π, π]) in the map frame; a float32 array of shape (3,).
     #[getter]
     fn pose<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f32>> {
-        let pose = self.get().pose();
-        PyArray1::from_slice(py, &[pose.x.0, pose.y.0, pose.heading.radians().0])
+        pose(py, self.get())
     }
 
     /// The state, a float32 array of shape (7,): x, y (m), heading (rad), scale errors of the right and the left wheel, error of

@@ -322,8 +322,7 @@ impl Navigator {
     /// The estimated pose: x, y (metres), heading (radians) in the map frame; a float32 array of shape (3,).
     #[getter]
     fn pose<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f32>> {
-        let pose = self.localizer().pose();
-        PyArray1::from_slice(py, &[pose.x.0, pose.y.0, pose.heading.radians().0])
+        localizer::pose(py, self.localizer())
     }
 
     /// The state, a float32 array of shape (7,), as Localizer.state.

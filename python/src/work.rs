@@ -91,7 +91,7 @@ pub fn done<T: Send + 'static>(
     }
 }
 
-/// The result, or that there is none yet.
+/// The result, or that the work has not ended.
 fn next<T>(receiver: &Mutex<Receiver<T>>) -> Result<T, RecvTimeoutError> {
     match receiver.lock() {
         Ok(receiver) => receiver.recv_timeout(LOOK),

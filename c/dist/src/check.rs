@@ -24,6 +24,7 @@ pub fn run(workspace: &Path, packages: &Packages, work: &Path) -> Result<()> {
     std::fs::create_dir_all(work)?;
     rules::check(&packages.arduino)?;
     builds::check(&packages.c, work)?;
+    examples::compare(workspace, packages, work)?;
     examples::compile(workspace, &packages.arduino, work)?;
     examples::drive(workspace, packages, work)
 }

@@ -46,6 +46,17 @@ impl Package {
         Ok(())
     }
 
+    /// Replaces a mark in all texts.
+    pub fn replace(&mut self, mark: &str, by: &str) {
+        for content in self.0.values_mut() {
+            if let Ok(text) = std::str::from_utf8(content)
+                && text.contains(mark)
+            {
+                *content = text.replace(mark, by).into_bytes();
+            }
+        }
+    }
+
     /// Writes the files into a folder, which is made.
     ///
     /// # Errors

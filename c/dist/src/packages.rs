@@ -34,6 +34,9 @@ pub fn make(workspace: &Path, out: &Path) -> Result<Packages> {
     examples(workspace, &mut arduino)?;
     c.add_folder("", &workspace.join("package"))?;
     c.add_folder("examples/", &workspace.join("examples"))?;
+    for package in [&mut arduino, &mut c] {
+        package.replace("@VERSION@", &version);
+    }
     let root = format!("sonarfix-c-{version}");
     let archives = [
         (format!("Sonarfix-{version}.zip"), arduino.zip("Sonarfix")?),

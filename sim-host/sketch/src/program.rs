@@ -15,7 +15,7 @@ use sonarfix_pil::wires::FULL_DUTY;
 use sonarfix_pil::{Actuators, RangerActuators, Sensors, Wires};
 use sonarfix_search::navigator::Mode;
 use sonarfix_search::search::Search;
-use sonarfix_sim::simulate::computer::{Computer, Controller};
+use sonarfix_sim::simulate::computer::{Computer, Controller, no_pose};
 use sonarfix_sim::simulate::{Simulation, SimulationError};
 
 use crate::estimate::{Listener, Reported};
@@ -47,12 +47,7 @@ impl<'s> Program<'s> {
             .with_context(|| format!("cannot start {}", self.path.display()))?;
         let to = BufWriter::new(child.stdin.take().context("no standard input")?);
         let from = BufReader::new(child.stdout.take().context("no standard output")?);
-        let unknown = Start {
-            pose: sonarfix::geometry::pose::Pose::default(),
-            position_deviation: sonarfix_search::navigator::UNKNOWN_POSITION,
-            heading_deviation: sonarfix_search::navigator::UNKNOWN_HEADING,
-        };
-        let mirror = self.simulation.localizer(start.unwrap_or(unknown), at)?;
+        let mirror = self.simulation.localizer(start.unwrap_or_else(no_pose), at)?;
         let mode = if start.is_some() { Mode::Tracking } else { Mode::Searching };
         let listener = Listener::default();
         Ok(Running { child, to, from, listener, mirror, mode, polled: at, is_pinging: false })

@@ -7,7 +7,7 @@ use sonarfix::config::MAX_RANGERS;
 use sonarfix::geometry::units::Instant;
 use sonarfix_pil::{EchoSignals, Sensors};
 
-/// What a ranger on a servo is told in a step.
+/// The outputs for a ranger and its servo in a step.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct RangerOutput {
     /// The servo's pulse, µs; zero if it is unchanged.

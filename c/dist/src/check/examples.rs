@@ -113,6 +113,21 @@ pub fn compile(workspace: &Path, package: &Path, work: &Path) -> Result<()> {
     Ok(())
 }
 
+/// Compares a robot by Arduino's classes with one by the functions of C.
+///
+/// # Errors
+/// If they differ.
+pub fn compare(workspace: &Path, packages: &Packages, work: &Path) -> Result<()> {
+    let (host, program) = (workspace.join("arduino-host"), work.join("same_bits"));
+    let mut command = Command::new("g++");
+    command.args(CPP.split(' ')).args(WARNINGS.split(' ')).arg("-I").arg(&host).arg("-I");
+    command.arg(packages.arduino.join("src")).arg(host.join("same_bits.cpp"));
+    command.arg(packages.c.join(format!("lib/{HOST}/libsonarfix.a"))).arg("-o").arg(&program);
+    output(&mut command)?;
+    print!("Arduino's classes and C: {}", output(&mut Command::new(program))?);
+    Ok(())
+}
+
 /// Drives each example in the simulator, beside the loop of the firmware.
 ///
 /// # Errors

@@ -13,7 +13,8 @@ pub const SONARFIX_FIELD_LENGTH: usize = 48;
 /// Bytes of a rule.
 pub const SONARFIX_RULE_LENGTH: usize = 96;
 
-/// A field of a configuration that breaks its rule, as texts that end with zero. Both are empty if there is none.
+/// The first field of a configuration that breaks a rule, and the rule, as texts that end with zero. Both are empty if all fields are
+/// right.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct sonarfix_config_error_t {

@@ -121,7 +121,7 @@ impl Records {
         Ok(())
     }
 
-    /// The rate as the driver of an MPU-6050 reads it; `None` if it fails or there is none.
+    /// The rate as the driver of an MPU-6050 reads it; `None` if it fails or the robot has no gyro.
     fn yaw_rate(&self, sensors: &Sensors) -> anyhow::Result<Option<f32>> {
         let Some(parameters) = &self.config.localizer.gyro else { return Ok(None) };
         let mut gyro = Mpu6050::new(&self.wires.gyro);

@@ -130,7 +130,8 @@ pub trait Controller {
 }
 
 /// The start of a localizer without a pose.
-pub(super) fn no_pose() -> Start {
+#[must_use]
+pub fn no_pose() -> Start {
     Start {
         pose: Pose::new(0.0, 0.0, Radians(0.0)),
         position_deviation: UNKNOWN_POSITION,
