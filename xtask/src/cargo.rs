@@ -18,9 +18,15 @@ pub fn command(arguments: &str) -> Command {
     command
 }
 
-/// Installs a program of this version; does nothing if it is there.
+/// Installs a program of this version; does nothing if it is there. Without optimization, which would take longer than a check
+/// that uses the program.
 pub fn install(name: &str, version: &str) -> anyhow::Result<()> {
-    run(&format!("install {name} --version {version} --locked --quiet"))
+    let installed = printed(command("install --list"))?;
+    let line = format!("{name} v{version}:");
+    if installed.lines().any(|it| it == line) {
+        return Ok(());
+    }
+    run(&format!("install {name} --version {version} --locked --quiet --debug"))
 }
 
 /// Where builds go, whatever folder cargo runs in.

@@ -1,8 +1,12 @@
 //! Runs the steps of CI, also after one has failed, and reports each with its time.
 
+use std::collections::{BTreeMap, VecDeque};
+use std::env;
 use std::fmt::Write as _;
-use std::fs;
-use std::process::ExitCode;
+use std::fs::{self, File};
+use std::process::{Command, ExitCode};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::thread;
 use std::time::Instant;
 
 use anyhow::ensure;
@@ -25,12 +29,12 @@ struct Outcome {
     failure: Option<String>,
 }
 
-/// Runs the steps of these names, or of jobs of these names, or all if there is no name. The last line that it prints is
-/// `N passed, N failed`, with `, N skipped` if parts of checks were skipped.
-pub fn run<T>(
+/// Runs the steps of these names, or of jobs of these names, or all if there is no name, two at a time. The last line that it
+/// prints is `N passed, N failed`, with `, N skipped` if parts of checks were skipped.
+pub fn run<T: Sync>(
     steps: &[Step<T>],
     names: &[String],
-    run: impl Fn(&T) -> anyhow::Result<()>,
+    run: impl Fn(&Step<T>, Output) -> anyhow::Result<()> + Sync,
 ) -> anyhow::Result<ExitCode> {
     for name in names {
         let is_known = steps.iter().any(|step| step.job == name || step.name == name);
@@ -41,12 +45,73 @@ pub fn run<T>(
     let is_chosen = |step: &&Step<T>| {
         names.is_empty() || names.iter().any(|name| step.job == name || step.name == name)
     };
-    let outcomes: Vec<Outcome> =
-        steps.iter().filter(is_chosen).map(|step| outcome(step, &run)).collect();
+    let chosen: Vec<&Step<T>> = steps.iter().filter(is_chosen).collect();
+    let outcomes = outcomes(&chosen, &run);
     let skipped = fs::read_to_string(cargo::skipped_file())?;
     println!("{}", report(&outcomes, &skipped.lines().collect::<Vec<_>>()));
     let has_passed = outcomes.iter().all(|outcome| outcome.failure.is_none());
     Ok(if has_passed { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// Where the output of a step goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Output {
+    /// To the terminal, while the step runs.
+    AtOnce,
+    /// To the terminal in one piece when the step has ended: another step runs beside it.
+    AtTheEnd,
+}
+
+/// One thread takes steps from the front and one from the back, so that steps of different workspaces run beside each other: each
+/// workspace has a target folder, and cargo locks it while it builds. Much of a step has one thread: links, emulators.
+fn outcomes<T: Sync>(
+    steps: &[&Step<T>],
+    run: &(impl Fn(&Step<T>, Output) -> anyhow::Result<()> + Sync),
+) -> Vec<Outcome> {
+    if let [step] = steps {
+        return vec![outcome(step, |step| run(step, Output::AtOnce))];
+    }
+    let left: Mutex<VecDeque<_>> = Mutex::new(steps.iter().enumerate().collect());
+    let next = |is_front| {
+        let mut left = locked(&left);
+        if is_front { left.pop_front() } else { left.pop_back() }
+    };
+    let ended = Mutex::new(BTreeMap::new());
+    let worker = |is_front| {
+        while let Some((number, step)) = next(is_front) {
+            let outcome = outcome(step, |step| run(step, Output::AtTheEnd));
+            locked(&ended).insert(number, outcome);
+        }
+    };
+    thread::scope(|scope| {
+        scope.spawn(|| worker(true));
+        worker(false);
+    });
+    ended.into_inner().unwrap_or_else(PoisonError::into_inner).into_values().collect()
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Runs a step as a process of its own (`cargo xtask step`).
+pub fn run_in_a_process<T>(step: &Step<T>, output: Output) -> anyhow::Result<()> {
+    let mut process = Command::new(env::current_exe()?);
+    process.args(["step", step.name]);
+    if output == Output::AtOnce {
+        let status = process.status()?;
+        ensure!(status.success(), "see its output");
+        return Ok(());
+    }
+    let path = cargo::target_folder().join(format!("{}.log", step.name));
+    let log = File::create(&path)?;
+    let status = process.stdout(log.try_clone()?).stderr(log).status()?;
+    let log = fs::read(&path)?;
+    let text = String::from_utf8_lossy(&log);
+    eprintln!("══ output of {}\n{text}", step.name);
+    let error = text.lines().rev().find_map(|line| line.strip_prefix("error: "));
+    ensure!(status.success(), "{}", error.unwrap_or("see its output"));
+    Ok(())
 }
 
 /// Reports that a check, or a part of it, is skipped.
@@ -58,11 +123,11 @@ pub fn skip(why: &str) {
         .and_then(|mut file| std::io::Write::write_all(&mut file, format!("{why}\n").as_bytes()));
 }
 
-fn outcome<T>(step: &Step<T>, run: impl Fn(&T) -> anyhow::Result<()>) -> Outcome {
+fn outcome<T>(step: &Step<T>, run: impl Fn(&Step<T>) -> anyhow::Result<()>) -> Outcome {
     let name = step.name;
     eprintln!("══ {name}");
     let start = Instant::now();
-    let failure = run(&step.task).err().map(|error| format!("{error:#}"));
+    let failure = run(step).err().map(|error| format!("{error:#}"));
     let seconds = start.elapsed().as_secs();
     eprintln!("══ {name}: {} after {seconds} s", word(failure.as_ref()));
     Outcome { name, seconds, failure }
@@ -98,8 +163,6 @@ fn report(outcomes: &[Outcome], skipped: &[&str]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use std::cell::RefCell;
-
     use super::*;
 
     fn steps() -> Vec<Step<u32>> {
@@ -108,16 +171,34 @@ mod tests {
             .into()
     }
 
-    /// The tasks that run for these names, of which the second fails.
+    /// The tasks that run for these names, in order, of which the second fails.
     fn ran(names: &[&str]) -> (Vec<u32>, String) {
         let names: Vec<String> = names.iter().map(|&name| name.to_owned()).collect();
-        let seen = RefCell::new(Vec::new());
-        let code = run(&steps(), &names, |&task| {
-            seen.borrow_mut().push(task);
-            ensure!(task != 2, "broken");
+        let seen = Mutex::new(Vec::new());
+        let code = run(&steps(), &names, |step, _| {
+            locked(&seen).push(step.task);
+            ensure!(step.task != 2, "broken");
             Ok(())
         });
-        (seen.into_inner(), format!("{:?}", code.unwrap()))
+        let mut seen = locked(&seen).clone();
+        seen.sort_unstable();
+        (seen, format!("{:?}", code.unwrap()))
+    }
+
+    /// Two steps that wait for each other both pass.
+    #[test]
+    fn two_steps_run_beside_each_other() {
+        let both = std::sync::Barrier::new(2);
+        let chosen = ["a", "c"].map(str::to_owned);
+        let wait = |_: &Step<u32>, output| {
+            both.wait();
+            ensure!(output == Output::AtTheEnd);
+            Ok(())
+        };
+        assert_eq!(
+            format!("{:?}", run(&steps(), &chosen, wait).unwrap()),
+            format!("{:?}", ExitCode::SUCCESS)
+        );
     }
 
     #[test]
@@ -126,7 +207,7 @@ mod tests {
         assert_eq!(ran(&[]), (vec![1, 2, 3], failed.clone()));
         assert_eq!(ran(&["one"]), (vec![1, 2], failed));
         assert_eq!(ran(&["two", "a"]), (vec![1, 3], passed));
-        assert!(run(&steps(), &["three".to_owned()], |_| Ok(())).is_err());
+        assert!(run(&steps(), &["three".to_owned()], |_, _| Ok(())).is_err());
     }
 
     #[test]

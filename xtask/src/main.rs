@@ -2,6 +2,7 @@
 
 use std::process::ExitCode;
 
+use anyhow::Context;
 use ci::Step;
 use clap::{Parser, Subcommand};
 
@@ -51,6 +52,8 @@ enum Command {
         /// Jobs or steps by name; all if none is given.
         names: Vec<String>,
     },
+    /// One step of CI.
+    Step { name: String },
     #[command(flatten)]
     Task(Task),
 }
@@ -176,13 +179,20 @@ fn steps() -> [Step<Task>; 31] {
 
 fn main() -> ExitCode {
     let result = match Xtask::parse().command {
-        Command::Ci { names } => ci::run(&steps(), &names, |task| run(task.clone())),
+        Command::Ci { names } => ci::run(&steps(), &names, ci::run_in_a_process),
+        Command::Step { name } => step(&name),
         Command::Task(task) => run(task).map(|()| ExitCode::SUCCESS),
     };
     result.unwrap_or_else(|error| {
         eprintln!("error: {error:#}");
         ExitCode::FAILURE
     })
+}
+
+fn step(name: &str) -> anyhow::Result<ExitCode> {
+    let step = steps().into_iter().find(|step| step.name == name);
+    run(step.with_context(|| format!("there is no step {name}"))?.task)?;
+    Ok(ExitCode::SUCCESS)
 }
 
 /// What is renewed.
