@@ -154,7 +154,7 @@ impl<'m, F: NorFlash> App<'m, F> {
     /// for the flash when a record is written.
     ///
     /// A `now` that leaps ahead or back is counted as a fault of the clock and has no other effect, unless the next poll
-    /// confirms it: then the loop continues at the new time.
+    /// confirms it: then the loop continues at the new time. The motors are off while each poll has another time.
     ///
     /// # Panics
     /// Never.
@@ -166,9 +166,10 @@ impl<'m, F: NorFlash> App<'m, F> {
     ) -> Polled {
         match self.clock.read(now) {
             Reading::Usual => {}
-            Reading::Unconfirmed => {
+            reading @ (Reading::Unconfirmed | Reading::Erratic) => {
                 self.faults.clock = self.faults.clock.saturating_add(1);
-                return self.at_rest;
+                let is_trusted = reading == Reading::Unconfirmed;
+                return Polled { may_drive: self.at_rest.may_drive && is_trusted, ..self.at_rest };
             }
             Reading::SetBack => {
                 hardware.set_clock(now);

@@ -79,7 +79,7 @@ use sonarfix::localizer::{Localizer, Mode, Start};
 use sonarfix::sensor::absolute::AbsoluteMeasurement;
 
 use crate::encoder::Wheels;
-use crate::time::{AT_ONCE, after};
+use crate::time::{AT_ONCE, after, before, since};
 
 use cycle::{Cycle, PingEnd};
 pub use faults::{EncoderFaults, Faults};
@@ -278,7 +278,9 @@ impl<'m> Robot<'m> {
     /// Continues at `now` after the clock was set back: travel and turn since the last step belong to the next one, a ping
     /// in flight is aborted, and measurements that wait are dropped.
     pub fn set_clock(&mut self, now: Instant) {
-        self.tracker.localizer_mut().set_clock(now);
+        // Wheels that could not be read are not seen now: the motors must not run longer for it.
+        let unseen = since(self.time, self.localizer().time());
+        self.tracker.localizer_mut().set_clock(before(now, unseen));
         self.ticks = Schedule::new(now, self.settings.encoder_period);
         self.pings = match self.localizer().config().rangers.first.timing.schedule {
             PingSchedule::Every(period) => Schedule::new(now, period),

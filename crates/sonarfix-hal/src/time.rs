@@ -22,6 +22,11 @@ pub(crate) fn after(instant: Instant, span: Duration) -> Instant {
     instant.checked_add_duration(span).unwrap_or(NEVER)
 }
 
+/// The instant `span` before `instant`, which may be one before the clock's zero: instants wrap around.
+pub(crate) fn before(instant: Instant, span: Duration) -> Instant {
+    instant.checked_sub_duration(span).unwrap_or(instant)
+}
+
 /// Microseconds as a float. Exact below 16 s, which no time of flight, pulse or servo turn reaches.
 #[expect(clippy::cast_precision_loss, reason = "exact for the spans it is used on")]
 pub(crate) fn micros(span: Duration) -> f32 {

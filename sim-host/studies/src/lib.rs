@@ -3,6 +3,7 @@
 //! | module | page |
 //! |---|---|
 //! | [`calibration`] | `docs/calibrate.md` |
+//! | [`fault_campaign`] | none: `docs/faults.md` describes it |
 //! | [`fault_table`] | `docs/faults.md` |
 //! | [`floor_plan`] | `docs/floor-plans.md` |
 //! | [`health_page`], [`kidnapped`] | `docs/health.md` |
@@ -13,6 +14,7 @@
 //! | [`sonar_model`] | `docs/sonar-model.md` |
 
 pub mod calibration;
+pub mod fault_campaign;
 pub mod fault_search;
 pub mod fault_table;
 pub mod floor_plan;

@@ -22,6 +22,8 @@ pub(super) enum Reading {
     Usual,
     /// A leap that no other poll has confirmed.
     Unconfirmed,
+    /// Another leap instead of a confirmation.
+    Erratic,
     /// The clock has been set back.
     SetBack,
 }
@@ -50,8 +52,8 @@ impl Clock {
             .leapt_to
             .is_some_and(|leapt_to| now >= leapt_to && since(now, leapt_to) <= CONFIRMED_WITHIN);
         if !is_confirmed {
-            self.leapt_to = Some(now);
-            return Reading::Unconfirmed;
+            let is_first = self.leapt_to.replace(now).is_none();
+            return if is_first { Reading::Unconfirmed } else { Reading::Erratic };
         }
         *self = Self::new(now);
         if is_back { Reading::SetBack } else { Reading::Usual }

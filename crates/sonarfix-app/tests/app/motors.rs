@@ -97,3 +97,28 @@ fn a_lost_link_stops_the_motors_over_a_leap_of_the_clock() {
         assert!(!bench.poll().may_drive, "at {clock}");
     }
 }
+
+/// A clock that is set back while an encoder cannot be read does not enable the motors.
+#[test]
+fn dead_encoders_stop_the_motors_over_a_leap_of_the_clock() {
+    let baked = baked(MotorPolicy::DEFAULT);
+    let mut bench = started(&baked);
+    bench.hardware.right.0 = None;
+    bench.wait(700);
+    assert!(!bench.poll().may_drive);
+    bench.set_now(0);
+    for _ in 0..1_000 {
+        assert!(!bench.poll().may_drive);
+    }
+}
+
+/// A clock of which each reading is another time says nothing about the age of an estimate.
+#[test]
+fn a_clock_that_always_leaps_stops_the_motors() {
+    let baked = baked(MotorPolicy::DEFAULT);
+    let mut bench = started(&baked);
+    for poll in 1..20 {
+        bench.set_now((1 << 40) * (20 - poll));
+        assert_eq!(bench.poll().may_drive, poll == 1, "poll {poll}");
+    }
+}

@@ -119,8 +119,9 @@ impl Localizer<'_> {
         self.recorded = self.recorded.max(now);
     }
 
-    /// Continues at `now` after the clock was set back. The next travel is that since the last accepted one; times of
-    /// earlier pings are forgotten, and measurements from before are refused.
+    /// Continues after the clock was set back: `now` is the time of the last accepted travel by the new clock, or the present time if
+    /// that is unknown. The next travel is that since the last accepted one; times of earlier pings are forgotten, and
+    /// measurements from before are refused.
     pub fn set_clock(&mut self, now: Instant) {
         (self.time, self.recorded, self.pinged) = (now, now, now);
         self.step = LastStep::none(now);
