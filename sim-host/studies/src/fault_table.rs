@@ -235,9 +235,9 @@ impl Row {
     }
 }
 
-/// The page, of the rows without and with the search, and with a gyro.
+/// The page, of the rows without and with the search and with a gyro, and the section of the robots with several rangers.
 #[must_use]
-pub fn markdown(rows: &[Row], searching: &[Row], with_gyro: &[Row]) -> String {
+pub fn markdown(rows: &[Row], searching: &[Row], with_gyro: &[Row], rangers: &str) -> String {
     let mut page = HEAD.to_owned();
     write_table(&mut page, rows);
     page.push_str(REMARKS);
@@ -245,6 +245,7 @@ pub fn markdown(rows: &[Row], searching: &[Row], with_gyro: &[Row]) -> String {
     write_table(&mut page, searching);
     page.push_str(GYRO_HEAD);
     write_table(&mut page, with_gyro);
+    page.push_str(rangers);
     page.push_str(ATTACKS);
     page
 }

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`calibration`] | `docs/calibrate.md` |
 //! | [`fault_campaign`] | none: `docs/faults.md` describes it |
-//! | [`fault_table`] | `docs/faults.md` |
+//! | [`fault_table`], [`fault_search`], [`fault_rangers`] | `docs/faults.md` |
 //! | [`floor_plan`] | `docs/floor-plans.md` |
 //! | [`health_page`], [`kidnapped`] | `docs/health.md` |
 //! | [`reality`] | `docs/reality.md` |
@@ -15,6 +15,7 @@
 
 pub mod calibration;
 pub mod fault_campaign;
+pub mod fault_rangers;
 pub mod fault_search;
 pub mod fault_table;
 pub mod floor_plan;

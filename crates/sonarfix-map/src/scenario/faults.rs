@@ -20,6 +20,8 @@ pub enum FaultKind {
     LostEchoes(f64),
     /// In this fraction of the pings the ping of another robot is detected first.
     CrossTalk(f64),
+    /// In this fraction of the pings the range is any, whatever is there.
+    FalseRanges(f64),
     /// The echo line stays high.
     StuckEcho,
     /// The sonar does not answer.
@@ -114,6 +116,7 @@ fn kind(table: &Table<'_>, keys: &FaultKeys) -> Option<FaultKind> {
     Some(match node.text() {
         "lost_echoes" => FaultKind::LostEchoes(share()),
         "cross_talk" => FaultKind::CrossTalk(share()),
+        "false_ranges" => FaultKind::FalseRanges(share()),
         "stuck_echo" => FaultKind::StuckEcho,
         "dead_sonar" => FaultKind::DeadSonar,
         "dead_encoder" => FaultKind::DeadEncoder(wheel()),

@@ -71,6 +71,8 @@ pub(crate) struct ExpectedEcho {
     pub limits: (Metres, Metres),
     /// Probability that it agrees with a wrong pose by chance.
     pub by_chance: f32,
+    /// Odds that the ranger returns any range, whatever is there.
+    pub lying: f32,
 }
 
 /// The explanation of what one ping returned.
@@ -112,6 +114,8 @@ struct Densities {
     unrepeated: f32,
     /// Anything, at a wrong pose. An object that occluded the wall before returns its echo there as well.
     wrong_pose: f32,
+    /// Anything, of a ranger whose ranges are false.
+    lie: f32,
 }
 
 impl ExpectedEcho {
@@ -131,14 +135,15 @@ impl ExpectedEcho {
         let before = others.silent_before;
         let (free, hidden) = (before * (1.0 - o), before * o);
         let (wall, occluded) = (free * d.wall, hidden * d.occluded);
-        let total = wall + free * d.clutter + occluded + others.density;
+        let lies = self.lying * d.lie;
+        let total = wall + free * d.clutter + occluded + others.density + lies;
         if total <= 0.0 {
             // No clutter is configured, and the echo is too far off to be the wall's.
             let evidence = MAX_EVIDENCE;
             return Explanation { association: 0.0, occluded: o, mapped: 0.0, evidence };
         }
         let unrepeated = total - occluded + hidden * d.unrepeated;
-        let ratio = d.wrong_pose / unrepeated;
+        let ratio = (d.wrong_pose + lies) / unrepeated;
         let ratio = self.by_chance + (1.0 - self.by_chance) * ratio;
         let evidence = if ratio < MAX_RATIO { ln(ratio) } else { MAX_EVIDENCE };
         let (association, occluded) = (wall / total, occluded / total);
@@ -181,6 +186,7 @@ impl ExpectedEcho {
             } else {
                 anywhere
             },
+            lie: everywhere,
         }
     }
 
@@ -193,6 +199,7 @@ impl ExpectedEcho {
             unrepeated: NO_ECHO_OCCLUDED,
             wrong_pose: (1.0 - self.occluded) * NO_ECHO_WRONG_POSE
                 + self.occluded * NO_ECHO_OCCLUDED,
+            lie: 0.0,
         }
     }
 }
@@ -282,7 +289,7 @@ mod tests {
         ) -> ExpectedEcho {
             let variance = SquareMetres(sigma * sigma);
             let limits = (Metres(0.1), Metres(4.0));
-            ExpectedEcho { range: Metres(range), variance, geometry, occluded, source: None, limits, by_chance: 0.3 }
+            ExpectedEcho { range: Metres(range), variance, geometry, occluded, source: None, limits, by_chance: 0.3, lying: 0.0 }
         }
     }
 
@@ -418,6 +425,7 @@ mod tests {
                 source,
                 limits,
                 by_chance: 0.3,
+                lying: 0.0,
             };
             let found = expected.explain(&parameters, Some(z), Others::NONE);
             assert!(found.association < 0.4, "{found:?}");
@@ -437,6 +445,7 @@ mod tests {
             source: None,
             limits: (Metres(0.05), Metres(4.0)),
             by_chance: 0.3,
+            lying: 0.0,
         };
         let short = Some(Metres(1.0));
         let first = expected.explain(&parameters, short, Others::NONE);

@@ -13,6 +13,7 @@ use crate::association::clutter::Clutter;
 use crate::association::echo::EchoSource;
 use crate::association::reliability::{Reliability, Returned, Shares};
 use crate::config::{Config, MAX_RANGERS, RangerId};
+use crate::geometry::numeric::at_least;
 use crate::geometry::units::{Instant, Metres, Radians, SquareMetres, seconds};
 use crate::map::WallId;
 use crate::sensor::echo::EchoParameters;
@@ -211,6 +212,15 @@ impl History {
         let Some(own) = self.reliability.get(ranger.index()) else { return false };
         let others = self.reliability.iter().zip(config.rangers.iter());
         others.map(|(other, _)| other).any(|other| own.has_failed(other))
+    }
+
+    /// Odds that the ranges of a ranger are false, and not the pose or the map; zero of the only one.
+    pub fn lying(&self, ranger: RangerId, config: &Config) -> f32 {
+        let own = self.reliability.get(ranger.index());
+        let others = self.reliability.iter().zip(config.rangers.iter());
+        let others = others.filter(|(_, (other, _))| *other != ranger).map(|(other, _)| other);
+        let odds = others.filter_map(|other| Some(own?.lying_beside(other)));
+        odds.reduce(at_least).unwrap_or(0.0)
     }
 
     /// Whether a ranger is not to be tried at `now`, because it has failed.

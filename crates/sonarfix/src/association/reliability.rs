@@ -18,8 +18,8 @@ const MOST_SILENT: f32 = 1_000.0;
 const MOST_FALSE: f32 = 200.0;
 /// The odds above which a ranger counts as failed: a probability of 99 %.
 const FAILED: f32 = 99.0;
-/// The time after which a failed ranger is tried again.
-const PROBE_PERIOD: Duration = Duration::from_ticks(12_000_000);
+/// The time after which a failed ranger is tried again: at one ping a second one in 25 is lost to it.
+const PROBE_PERIOD: Duration = Duration::from_ticks(25_000_000);
 /// What a silent ranger returns, by its shares. An echo may be cross-talk of another one.
 const OF_SILENT: Shares = Shares { silent: 0.94, unexplained: 0.05, explained: 0.01 };
 /// What a ranger with false ranges returns. A range may fit by chance.
@@ -93,6 +93,11 @@ impl Reliability {
         }
     }
 
+    /// The odds that its ranges are false. Where those of another one do not fit either, the pose is wrong or the map.
+    pub fn lying_beside(&self, other: &Self) -> f32 {
+        self.false_ranges * LEAST_ODDS / other.failed()
+    }
+
     /// The odds of its more probable failure.
     fn failed(&self) -> f32 {
         at_least(self.silent, self.false_ranges)
@@ -136,9 +141,9 @@ mod tests {
             }
             let noticed = (1..=12).find(|_| { ranger.record(wrong, &working, at(2)); ranger.has_failed(&Reliability::default()) });
             prop_assert!(noticed.is_some_and(|pings| pings >= 2), "{noticed:?}");
-            prop_assert!(ranger.is_tried(at(2)) && ranger.is_tried(at(13)) && !ranger.is_tried(at(14)));
+            prop_assert!(ranger.is_tried(at(2)) && ranger.is_tried(at(26)) && !ranger.is_tried(at(27)));
             prop_assert!(!ranger.has_failed(&ranger), "none is better than itself");
-            let works = (1..=5).find(|_| { ranger.record(Returned::Explained, &working, at(15)); !ranger.has_failed(&Reliability::default()) });
+            let works = (1..=5).find(|_| { ranger.record(Returned::Explained, &working, at(28)); !ranger.has_failed(&Reliability::default()) });
             prop_assert!(works.is_some());
         }
 

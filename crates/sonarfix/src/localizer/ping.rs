@@ -129,6 +129,7 @@ impl Measurement for Ping<'_> {
             source: seen.entry.source,
             limits: seen.limits,
             by_chance: robot.history.by_chance((view.expected.by_x, view.expected.by_y), variance),
+            lying: robot.history.lying(self.aim.ranger, robot.config),
         };
         let alone = echo.explain(parameters, measured, Others::NONE);
         let is_clear = gating::use_of(alone.association) == Use::Accept;

@@ -2,6 +2,7 @@
 //! every poll.
 
 mod rules;
+mod since;
 mod wiring;
 
 use std::collections::VecDeque;
@@ -14,17 +15,17 @@ use sonarfix::health::{Health, Verdict};
 use sonarfix::localizer::{Fix, Mode, Start};
 use sonarfix::sensor::absolute::{AbsoluteMeasurement, PositionNoise};
 use sonarfix_app::{App, Link, Polled};
-use sonarfix_hal::robot::{Devices, Hardware as _, WithGyro, WithRangers};
+use sonarfix_hal::robot::Hardware as _;
 use sonarfix_link::message::CommandResult;
 use sonarfix_link::{Command, Receiver, Sender, SessionCommand, Telemetry, frame};
 
 use super::case::{Composition, Fault, Part};
 use super::flash::Flash;
-use super::parts::{Channel, Encoder, Gyro, SimRanger};
+use super::parts::{Channel, SimRanger};
 use super::room::Place;
-use rules::Since;
+use since::Since;
 pub use wiring::Baked;
-use wiring::{app, hardware, servo};
+use wiring::{Hardware, MOUNTS, POLL, app, hardware, servo};
 
 /// Metres.
 const TRACK_WIDTH: f64 = 0.16;
@@ -32,11 +33,6 @@ const TRACK_WIDTH: f64 = 0.16;
 const SPEED: f64 = 0.15;
 /// Radius of the circle that it drives, metres.
 const RADIUS: f64 = 0.5;
-/// Longest time between two polls while nothing stalls the program, µs.
-const POLL: u64 = 20_000;
-/// How far each ranger is mounted ahead of the axle, metres.
-const MOUNTS: [f32; 3] = [0.0, 0.03, -0.03];
-type Hardware = WithGyro<WithRangers<Devices<Encoder, Encoder, Channel, SimRanger>, 2>, Gyro>;
 
 /// The link.
 #[derive(Default)]

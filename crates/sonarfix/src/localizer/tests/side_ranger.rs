@@ -61,6 +61,7 @@ impl Measurement for SideDistance {
             source: None,
             limits: (Metres(0.02), Metres(2.0)),
             by_chance: 0.3,
+            lying: 0.0,
         };
         echo.explain(&EchoParameters::HC_SR04, Some(self.distance), Others::NONE)
     }

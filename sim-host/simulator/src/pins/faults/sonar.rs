@@ -6,7 +6,7 @@ use sonarfix_map::FaultKind;
 
 use super::timed::Timed;
 
-/// Shortest time of flight caused by cross-talk, µs: 5 cm.
+/// Shortest time of flight of an echo that is none, µs: 5 cm.
 const NEAREST: u64 = 300;
 
 /// A fault of the echo line.
@@ -14,6 +14,7 @@ const NEAREST: u64 = 300;
 pub(super) enum Wrong {
     Lost(f64),
     CrossTalk(f64),
+    False(f64),
     Stuck,
     Dead,
 }
@@ -22,6 +23,7 @@ pub(super) fn of(kind: FaultKind) -> Option<Wrong> {
     match kind {
         FaultKind::LostEchoes(share) => Some(Wrong::Lost(share)),
         FaultKind::CrossTalk(share) => Some(Wrong::CrossTalk(share)),
+        FaultKind::FalseRanges(share) => Some(Wrong::False(share)),
         FaultKind::StuckEcho => Some(Wrong::Stuck),
         FaultKind::DeadSonar => Some(Wrong::Dead),
         _ => None,
@@ -55,7 +57,10 @@ impl SonarFaults {
                 Wrong::Lost(share) if self.rng.random::<f64>() < share => silence,
                 // The earlier echo ends the pulse, whichever robot sent its ping.
                 Wrong::CrossTalk(share) if self.rng.random::<f64>() < share => {
-                    pulse.min(self.rng.random_range(NEAREST..silence.max(NEAREST + 1)))
+                    pulse.min(any_before(&mut self.rng, silence))
+                }
+                Wrong::False(share) if self.rng.random::<f64>() < share => {
+                    any_before(&mut self.rng, silence)
                 }
                 Wrong::Stuck => fault.to - now,
                 _ => pulse,
@@ -63,4 +68,9 @@ impl SonarFaults {
         }
         pulse
     }
+}
+
+/// A time of flight shorter than `silence`, µs.
+fn any_before(rng: &mut ChaCha8Rng, silence: u64) -> u64 {
+    rng.random_range(NEAREST..silence.max(NEAREST + 1))
 }

@@ -1,7 +1,7 @@
 //! `sonarfix-studies faults`: the effects of hardware faults; `faults campaign`: random sequences of faults against rules.
 
 use anyhow::Context;
-use sonarfix_studies::{fault_campaign, fault_search, fault_table};
+use sonarfix_studies::{fault_campaign, fault_rangers, fault_search, fault_table};
 
 use sonarfix_terminal::progress::Runs;
 
@@ -37,12 +37,15 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         return execute_campaign(campaign);
     }
     anyhow::ensure!(args.runs > 0, "--runs must be at least 1");
-    let runs = Runs::new(args.runs.saturating_mul(fault_table::CASES + fault_search::CASES));
+    let runs = Runs::new(
+        args.runs.saturating_mul(fault_table::CASES + fault_search::CASES + fault_rangers::CASES),
+    );
     let rows = fault_table::rows(args.runs, &runs)?;
     let searching = fault_search::rows(args.runs, &runs)?;
     let with_gyro = fault_table::gyro_rows(args.runs, &runs)?;
+    let rangers = fault_rangers::markdown(&fault_rangers::rows(args.runs, &runs)?);
     runs.end()?;
-    print!("{}", fault_table::markdown(&rows, &searching, &with_gyro));
+    print!("{}", fault_table::markdown(&rows, &searching, &with_gyro, &rangers));
     Ok(())
 }
 

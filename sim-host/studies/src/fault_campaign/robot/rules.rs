@@ -6,7 +6,8 @@ use sonarfix::localizer::Localizer;
 use sonarfix_app::Polled;
 use sonarfix_hal::robot::Faults;
 
-use super::{POLL, Robot};
+use super::Robot;
+use super::wiring::POLL;
 
 /// Time after which an unreadable encoder is reported and the motors are off, µs: half a second, a sample of the encoders, and
 /// a ping that delays it.
@@ -16,27 +17,6 @@ const NO_RANGE: u64 = 61_500_000;
 /// Longest time from tick to tick and from one status of the loop to the next, µs: its period, and a second after a leap of the
 /// clock.
 const PERIODIC: u64 = 2_000_000;
-
-/// Since when something has held, real time in µs.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Since {
-    /// An encoder cannot be read.
-    pub blind: Option<u64>,
-    /// No ranger measures.
-    pub no_range: Option<u64>,
-    /// The start of the loop.
-    pub began: u64,
-    /// The latest command, which may have set the pose.
-    pub told: u64,
-    /// The latest tick, or the start of the loop.
-    pub tick: u64,
-    /// The latest status of the loop, or the start.
-    pub status: u64,
-    /// The latest valid frame.
-    pub heard: u64,
-    /// In how many polls in a row, up to the latest one, the clock has leapt.
-    pub leaps: u32,
-}
 
 impl Robot<'_> {
     pub fn failures(&self) -> Failures {

@@ -15,11 +15,17 @@ use sonarfix_hal::servo::{PwmFrame, Servo};
 use sonarfix_link::baked;
 use sonarfix_link::message::ResetCause;
 
-use super::{Hardware, MOUNTS};
 use crate::fault_campaign::case::Composition;
 use crate::fault_campaign::flash::{self, Flash};
 use crate::fault_campaign::parts::{Channel, Encoder, Gyro, SimRanger};
 use crate::fault_campaign::room;
+
+/// Longest time between two polls while nothing stalls the program, µs.
+pub const POLL: u64 = 20_000;
+/// How far each ranger is mounted ahead of the axle, metres.
+pub const MOUNTS: [f32; 3] = [0.0, 0.03, -0.03];
+
+pub type Hardware = WithGyro<WithRangers<Devices<Encoder, Encoder, Channel, SimRanger>, 2>, Gyro>;
 
 /// What is flashed beside the store.
 #[derive(Debug)]
