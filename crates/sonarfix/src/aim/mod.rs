@@ -73,7 +73,7 @@ pub struct Reason {
     /// Expected decrease of the variance of the position, and of the other weighted states
     /// ([`Weights`](crate::config::Weights)).
     pub gain: SquareMetres,
-    /// Probability of success: the foot lies on the wall, its range is within the limits of the sonar and
+    /// Probability of success: the ranger works, the foot lies on the wall, its range is within the limits of the sonar and
     /// the beam is square, given the uncertainty of the estimate, and no unmapped object occludes the
     /// wall, given earlier pings.
     pub success: f32,
@@ -213,6 +213,8 @@ struct Planner<'a> {
     ranger: RangerId,
     sonar: &'a RangerParameters,
     slot: Slot,
+    /// Probability that the ranger works.
+    works: f32,
     view: Viewpoint<'a>,
     duration: PingDuration,
 }
@@ -242,7 +244,8 @@ impl<'a> Planner<'a> {
         let view = Viewpoint::new(config, sonar, ekf);
         let duration = PingDuration::new(sonar);
         let slot = history.slot(ranger, config, &duration);
-        Self { config, map, ekf, history, now, policy, ranger, sonar, slot, view, duration }
+        let works = history.works(ranger, config, now);
+        Self { config, map, ekf, history, now, policy, ranger, sonar, slot, works, view, duration }
     }
 
     /// The best ping of this ranger.
@@ -374,7 +377,7 @@ impl<'a> Planner<'a> {
         Candidate {
             bearing: pointing.bearing,
             gain: expected_gain(&prediction, wheels, noise, self.config.weights),
-            success: (1.0 - entry.occlusion) * on_wall * square,
+            success: self.works * (1.0 - entry.occlusion) * on_wall * square,
             seconds: self.duration.ping(pointing.until_ping, range),
             score: 0.0,
             expected,

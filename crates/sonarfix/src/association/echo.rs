@@ -16,7 +16,6 @@
 //! the measured range is finite. The density of clutter is positive, so that no quotient is 0/0; if
 //! all clutter is configured away and the echo is too far off to be the wall's, it is not used.
 
-use crate::association::reliability::Shares;
 use crate::geometry::elementary::{exp, inverse_sqrt, ln};
 use crate::geometry::numeric::at_least;
 use crate::geometry::units::{Metres, SquareMetres};
@@ -80,6 +79,8 @@ pub(crate) struct ExpectedEcho {
 pub(crate) struct Explanation {
     /// β: probability that the echo is the wall's.
     pub association: f32,
+    /// p(z), 1/m, or p(none) of a ranger that works.
+    pub density: f32,
     /// Probability that an unmapped object occluded the wall.
     pub occluded: f32,
     /// Probability that the map explains the echo: the wall or another reflector.
@@ -136,11 +137,18 @@ impl ExpectedEcho {
         let (free, hidden) = (before * (1.0 - o), before * o);
         let (wall, occluded) = (free * d.wall, hidden * d.occluded);
         let lies = self.lying * d.lie;
-        let total = wall + free * d.clutter + occluded + others.density + lies;
+        let density = wall + free * d.clutter + occluded + others.density;
+        let total = density + lies;
         if total <= 0.0 {
             // No clutter is configured, and the echo is too far off to be the wall's.
             let evidence = MAX_EVIDENCE;
-            return Explanation { association: 0.0, occluded: o, mapped: 0.0, evidence };
+            return Explanation {
+                association: 0.0,
+                density: 0.0,
+                occluded: o,
+                mapped: 0.0,
+                evidence,
+            };
         }
         let unrepeated = total - occluded + hidden * d.unrepeated;
         let ratio = (d.wrong_pose + lies) / unrepeated;
@@ -148,7 +156,7 @@ impl ExpectedEcho {
         let evidence = if ratio < MAX_RATIO { ln(ratio) } else { MAX_EVIDENCE };
         let (association, occluded) = (wall / total, occluded / total);
         let mapped = association + others.density / total;
-        Explanation { association, occluded, mapped, evidence }
+        Explanation { association, density, occluded, mapped, evidence }
     }
 
     /// Probability that the target answers.
@@ -202,15 +210,6 @@ impl ExpectedEcho {
             lie: 0.0,
         }
     }
-}
-
-/// What a ping of a ranger that works returns from a wall at `range` that is square with a probability of `geometry`, if no
-/// earlier ping has revealed an object.
-pub(crate) fn shares(parameters: &EchoParameters, geometry: f32, range: Metres) -> Shares {
-    let (g, occluded) = (geometry, parameters.prior_occlusion(range));
-    let explained = g * (1.0 - occluded) * parameters.heard();
-    let silent = (1.0 - occluded) * parameters.missed + occluded * NO_ECHO_OCCLUDED;
-    Shares::working(explained, g * silent + (1.0 - g) * NO_ECHO_OFF_WALL)
 }
 
 /// N'(ν; 0, S): the density of the echo of a wall. The error of an estimate that an outlier or a slip of the

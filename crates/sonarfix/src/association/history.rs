@@ -11,7 +11,7 @@
 
 use crate::association::clutter::Clutter;
 use crate::association::echo::EchoSource;
-use crate::association::reliability::{Reliability, Returned, Shares};
+use crate::association::reliability::{Reliability, Returned};
 use crate::config::{Config, MAX_RANGERS, RangerId};
 use crate::geometry::numeric::at_least;
 use crate::geometry::units::{Instant, Metres, Radians, SquareMetres, seconds};
@@ -194,16 +194,10 @@ impl History {
         }
     }
 
-    /// Records what a ping of a ranger returned, and with which shares one that works does.
-    pub fn record_returned(
-        &mut self,
-        ranger: RangerId,
-        returned: Returned,
-        working: &Shares,
-        now: Instant,
-    ) {
+    /// Records what a ping of a ranger returned.
+    pub fn record_returned(&mut self, ranger: RangerId, returned: &Returned, now: Instant) {
         if let Some(reliability) = self.reliability.get_mut(ranger.index()) {
-            reliability.record(returned, working, now);
+            reliability.record(returned, now);
         }
     }
 
@@ -221,6 +215,12 @@ impl History {
         let others = others.filter(|(_, (other, _))| *other != ranger).map(|(other, _)| other);
         let odds = others.filter_map(|other| Some(own?.lying_beside(other)));
         odds.reduce(at_least).unwrap_or(0.0)
+    }
+
+    /// Probability that a ranger of several works, for the choice of a ping; 1 where it is to be tried.
+    pub fn works(&self, ranger: RangerId, config: &Config, now: Instant) -> f32 {
+        let own = self.reliability.get(ranger.index()).filter(|_| config.rangers.are_several());
+        own.filter(|own| own.is_tried(now)).map_or(1.0, Reliability::works)
     }
 
     /// Whether a ranger is not to be tried at `now`, because it has failed.

@@ -12,53 +12,48 @@ use crate::geometry::units::{Duration, Instant};
 
 /// The odds of a failure before the first ping, and the least ones: the ranger can fail at any time.
 const LEAST_ODDS: f32 = 0.01;
-/// The largest odds of silence: four explained echoes end them.
-const MOST_SILENT: f32 = 1_000.0;
-/// The largest odds of false ranges. A flat object before the wall looks alike, so that they stay below those of silence.
-const MOST_FALSE: f32 = 200.0;
+/// The largest odds: two explained echoes bring them below [`FAILED`].
+const MOST_ODDS: f32 = 1_000.0;
 /// The odds above which a ranger counts as failed: a probability of 99 %.
 const FAILED: f32 = 99.0;
 /// The time after which a failed ranger is tried again: at one ping a second one in 25 is lost to it.
 const PROBE_PERIOD: Duration = Duration::from_ticks(25_000_000);
-/// What a silent ranger returns, by its shares. An echo may be cross-talk of another one.
-const OF_SILENT: Shares = Shares { silent: 0.94, unexplained: 0.05, explained: 0.01 };
-/// What a ranger with false ranges returns. A range may fit by chance.
-const OF_FALSE: Shares = Shares { silent: 0.05, unexplained: 0.85, explained: 0.1 };
-/// The least share of what a ranger that works returns: of people that stand around the robot.
+/// Probability that a silent ranger returns an echo: cross-talk of another one.
+const ECHO_OF_SILENT: f32 = 0.06;
+/// Probability that a ranger with false ranges returns one that is not too long or too short.
+const ECHO_OF_FALSE: f32 = 0.7;
+/// The least probability of what a ranger that works returns: of people that stand around the robot.
 const LEAST_SHARE: f32 = 0.05;
 
-/// Probabilities of what a ping returns.
+/// What a ping returned, as the likelihoods of a ranger that works, a silent one and one with false ranges.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Shares {
-    /// No echo.
-    pub silent: f32,
-    /// An echo that is not of the target.
-    pub unexplained: f32,
-    /// The echo of the target, or again of an object that returned one before.
-    pub explained: f32,
+pub(crate) struct Returned {
+    works: f32,
+    silent: f32,
+    false_range: f32,
+    is_explained: bool,
 }
 
-impl Shares {
-    /// Of a ranger that works, whose target answers with the probability `explained` and is silent with `silent`.
-    pub fn working(explained: f32, silent: f32) -> Self {
-        Self { explained, silent, unexplained: 1.0 - explained - silent }
-    }
-
-    fn of(&self, returned: Returned) -> f32 {
-        match returned {
-            Returned::Silence => self.silent,
-            Returned::Unexplained => self.unexplained,
-            Returned::Explained => self.explained,
+impl Returned {
+    /// An echo, with its density for a ranger that works, and that of any range, 1/m.
+    pub fn echo(works: f32, anywhere: f32, is_explained: bool) -> Self {
+        Self {
+            works: at_least(works, LEAST_SHARE * anywhere),
+            silent: ECHO_OF_SILENT * anywhere,
+            false_range: ECHO_OF_FALSE * anywhere,
+            is_explained,
         }
     }
-}
 
-/// What a ping returned.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Returned {
-    Silence,
-    Unexplained,
-    Explained,
+    /// No echo, with its probability for a ranger that works.
+    pub fn silence(works: f32) -> Self {
+        Self {
+            works: at_least(works, LEAST_SHARE),
+            silent: 1.0 - ECHO_OF_SILENT,
+            false_range: 1.0 - ECHO_OF_FALSE,
+            is_explained: false,
+        }
+    }
 }
 
 /// The reliability of one ranger.
@@ -80,27 +75,35 @@ impl Default for Reliability {
 }
 
 impl Reliability {
-    /// Takes what a ping returned, which a ranger that works returns with these shares.
-    pub fn record(&mut self, returned: Returned, working: &Shares, now: Instant) {
-        let works = at_least(working.of(returned), LEAST_SHARE);
-        let updated = |odds: f32, failed: &Shares, most: f32| {
-            at_most(at_least(odds * failed.of(returned) / works, LEAST_ODDS), most)
+    /// Takes what a ping returned.
+    pub fn record(&mut self, returned: &Returned, now: Instant) {
+        let updated = |odds: f32, failed: f32| {
+            at_most(at_least(odds * failed / returned.works, LEAST_ODDS), MOST_ODDS)
         };
-        self.silent = updated(self.silent, &OF_SILENT, MOST_SILENT);
-        self.false_ranges = updated(self.false_ranges, &OF_FALSE, MOST_FALSE);
-        if returned != Returned::Explained {
+        self.silent = updated(self.silent, returned.silent);
+        self.false_ranges = updated(self.false_ranges, returned.false_range);
+        if !returned.is_explained {
             self.missed = now;
         }
     }
 
-    /// The odds that its ranges are false. Where those of another one do not fit either, the pose is wrong or the map.
+    /// The odds that its ranges are false. Where those of another one do not fit either, the pose is wrong or the map, unless
+    /// this one has failed before.
     pub fn lying_beside(&self, other: &Self) -> f32 {
+        if self.has_failed(other) {
+            return self.failed();
+        }
         self.false_ranges * LEAST_ODDS / other.failed()
     }
 
     /// The odds of its more probable failure.
     fn failed(&self) -> f32 {
         at_least(self.silent, self.false_ranges)
+    }
+
+    /// Probability that it works.
+    pub fn works(&self) -> f32 {
+        1.0 / (1.0 + self.failed())
     }
 
     /// Whether it has probably failed, and more probably than another one.
@@ -125,36 +128,46 @@ mod tests {
         Instant::from_ticks(1_000_000 * seconds)
     }
 
+    /// One over the difference of the limits of the sonar, 1/m.
+    const ANYWHERE: f32 = 0.25;
+
+    /// The echo of the target, with a density of a deviation of some centimetres.
+    fn explained(density: f32) -> Returned {
+        Returned::echo(density, ANYWHERE, true)
+    }
+
     proptest! {
         /// A ranger that returns nothing, or nothing that fits, is noticed within twelve pings at walls that answer; one that
         /// works again within five.
         #[test]
         fn a_failure_and_its_end_are_noticed(
-            explained in 0.75_f32..0.9, silent in 0.02_f32..0.08, is_silent in any::<bool>(), before in 0_usize..50,
+            density in 4.0_f32..100.0, missed in 0.02_f32..0.1, is_silent in any::<bool>(), before in 0_usize..50,
         ) {
-            let working = Shares::working(explained, silent);
-            let wrong = if is_silent { Returned::Silence } else { Returned::Unexplained };
+            let wrong =
+                if is_silent { Returned::silence(missed) } else { Returned::echo(missed * ANYWHERE, ANYWHERE, false) };
             let mut ranger = Reliability::default();
             for _ in 0..before {
-                ranger.record(Returned::Explained, &working, at(1));
+                ranger.record(&explained(density), at(1));
                 prop_assert!(!ranger.has_failed(&Reliability::default()));
             }
-            let noticed = (1..=12).find(|_| { ranger.record(wrong, &working, at(2)); ranger.has_failed(&Reliability::default()) });
+            let works = ranger.works();
+            let noticed = (1..=12).find(|_| { ranger.record(&wrong, at(2)); ranger.has_failed(&Reliability::default()) });
             prop_assert!(noticed.is_some_and(|pings| pings >= 2), "{noticed:?}");
+            prop_assert!(works > 0.98 && ranger.works() < 0.02);
             prop_assert!(ranger.is_tried(at(2)) && ranger.is_tried(at(26)) && !ranger.is_tried(at(27)));
             prop_assert!(!ranger.has_failed(&ranger), "none is better than itself");
-            let works = (1..=5).find(|_| { ranger.record(Returned::Explained, &working, at(28)); !ranger.has_failed(&Reliability::default()) });
+            let works = (1..=5).find(|_| { ranger.record(&explained(density), at(28)); !ranger.has_failed(&Reliability::default()) });
             prop_assert!(works.is_some());
         }
 
         /// Half of the pings may be unexplained, as among furniture, without a failure.
         #[test]
-        fn furniture_is_no_failure(explained in 0.6_f32..0.8, pings in 1_usize..200) {
-            let working = Shares::working(explained, 0.08);
+        fn furniture_is_no_failure(density in 4.0_f32..100.0, missed in 0.05_f32..0.2, pings in 1_usize..200) {
+            let unexplained = Returned::echo(missed * ANYWHERE, ANYWHERE, false);
             let mut ranger = Reliability::default();
             for ping in 0..pings {
-                let returned = if ping % 2 == 0 { Returned::Unexplained } else { Returned::Explained };
-                ranger.record(returned, &working, at(1));
+                let returned = if ping % 2 == 0 { unexplained } else { explained(density) };
+                ranger.record(&returned, at(1));
                 prop_assert!(!ranger.has_failed(&Reliability::default()), "{ping}");
             }
         }

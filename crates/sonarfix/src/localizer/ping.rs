@@ -7,11 +7,11 @@ use super::measurement::{Measurement, News, Past, View};
 use super::{Localizer, NO_TIME};
 use crate::aim::{Aim, Situation};
 use crate::association::alternatives::{Scene, Target};
-use crate::association::echo::{self, ExpectedEcho, Explanation, Others};
+use crate::association::echo::{ExpectedEcho, Explanation, Others};
 use crate::association::gating::{self, Use};
 use crate::association::history::{Entry, History, Origin};
 use crate::association::outcome::{Fix, Refusal};
-use crate::association::reliability::{Returned, Shares};
+use crate::association::reliability::Returned;
 use crate::association::visibility::{Viewpoint, check_range};
 use crate::config::{Config, RangerId, RangerParameters, Ranging};
 use crate::geometry::units::{Duration, Metres, SquareMetres};
@@ -34,8 +34,7 @@ impl Localizer<'_> {
 
     /// Records that a ranger could not ping, because it or its servo has failed.
     pub fn ranger_failed(&mut self, ranger: RangerId) {
-        let silence = Shares::working(1.0, 0.0);
-        self.history.record_returned(ranger, Returned::Silence, &silence, self.time);
+        self.history.record_returned(ranger, &Returned::silence(0.0), self.time);
     }
 
     /// Records that [`Self::aim`] found no wall to measure when a ping was due, so that the verdict of
@@ -145,19 +144,19 @@ impl Measurement for Ping<'_> {
 
     fn record(&self, past: Past<'_>, view: &View, seen: &Seen, found: &Explanation) -> News {
         let Past { config, history, now } = past;
-        let Seen { geometry, entry, .. } = seen;
+        let Seen { limits, entry, .. } = seen;
         let is_repeated = view
             .measured
             .is_ok_and(|range| entry.source.is_some_and(|source| source.repeats(range)));
         let is_of_wall = found.association > 0.5;
         if config.rangers.are_several() {
+            let (nearest, farthest) = *limits;
+            let anywhere = 1.0 / (farthest - nearest).0;
             let returned = match view.measured {
-                Ok(_) if is_of_wall || is_repeated => Returned::Explained,
-                Ok(_) => Returned::Unexplained,
-                Err(_) => Returned::Silence,
+                Ok(_) => Returned::echo(found.density, anywhere, is_of_wall || is_repeated),
+                Err(_) => Returned::silence(found.density),
             };
-            let working = echo::shares(&config.echo, *geometry, view.expected.range);
-            history.record_returned(self.aim.ranger, returned, &working, now);
+            history.record_returned(self.aim.ranger, &returned, now);
         }
         let origin = match view.measured {
             Ok(_) if is_of_wall => Origin::Wall,
