@@ -217,7 +217,7 @@ impl History {
         odds.reduce(at_least).unwrap_or(0.0)
     }
 
-    /// Probability that a ranger of several works, for the choice of a ping; 1 where it is to be tried.
+    /// Probability that a ranger of several works, over the largest one, for the choice of a ping; 1 where it is to be tried.
     pub fn works(&self, ranger: RangerId, config: &Config, now: Instant) -> f32 {
         let own = self.reliability.get(ranger.index()).filter(|_| config.rangers.are_several());
         own.filter(|own| own.is_tried(now)).map_or(1.0, Reliability::works)

@@ -101,9 +101,9 @@ impl Reliability {
         at_least(self.silent, self.false_ranges)
     }
 
-    /// Probability that it works.
+    /// Probability that it works, over the largest one.
     pub fn works(&self) -> f32 {
-        1.0 / (1.0 + self.failed())
+        (1.0 + LEAST_ODDS) / (1.0 + self.failed())
     }
 
     /// Whether it has probably failed, and more probably than another one.
