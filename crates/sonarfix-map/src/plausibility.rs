@@ -95,7 +95,7 @@ pub(crate) fn suspects(text: &str, name: &str, mistakes: &[Mistake]) -> Vec<Mist
     let is_known =
         |warning: &Mistake| mistakes.iter().any(|mistake| mistake.key().starts_with(warning.key()));
     let warnings = of_facts(&Facts::of_one(text, name)).into_iter();
-    warnings.filter(|warning| !is_known(warning)).map(|warning| warning.suspected()).collect()
+    warnings.filter(|warning| !is_known(warning)).map(Mistake::suspected).collect()
 }
 
 fn is_csv(path: &Path) -> bool {

@@ -153,11 +153,11 @@ impl Dimension {
     /// The number of a text and the name of its unit, which is empty for a bare number.
     pub fn split<'t>(&self, text: &'t str) -> Option<(f64, &'t str)> {
         let text = text.trim();
-        let units = self.units.iter().filter_map(|unit| {
+        let mut units = self.units.iter().filter_map(|unit| {
             let number = text.strip_suffix(unit.name)?;
             Some((finite(number.trim_end())?, text.get(number.len()..)?))
         });
-        units.last().or_else(|| Some((finite(text)?, "")))
+        units.next_back().or_else(|| Some((finite(text)?, "")))
     }
 
     /// The same number in each other unit: the text, and its value in the SI unit.

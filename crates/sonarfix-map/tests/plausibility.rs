@@ -18,7 +18,7 @@ fn diagnosis(text: &str, name: &str) -> String {
         return error.to_string();
     }
     let warnings = plausibility::of_text(text, name, Path::new(""));
-    warnings.iter().map(|warning| format!("{warning}\n")).collect()
+    warnings.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
 }
 
 /// A file with one edit, and the text that its diagnosis has.

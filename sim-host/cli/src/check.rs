@@ -36,7 +36,9 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let errors: usize = checked.iter().map(|file| file.errors.len()).sum();
     for Checked { file, kind, errors, warnings } in checked.iter().filter(|_| !args.json) {
         let show = |severity: &str, found: &[Warning]| {
-            found.iter().for_each(|found| println!("{severity}: {found}"));
+            for found in found {
+                println!("{severity}: {found}");
+            }
         };
         show("error", errors);
         show("warning", warnings);

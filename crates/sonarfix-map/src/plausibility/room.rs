@@ -8,7 +8,7 @@ use super::rule::short;
 use crate::clearance::Collision;
 use crate::error::Mistake;
 use crate::flaws::{Flaw, TOLERANCE, flaws};
-use crate::floor::Floor;
+use crate::floor::{Floor, NamedWall};
 use crate::geometry::{Point, Segment, distance};
 use crate::path::PathPlan;
 use crate::scenario::Scenario;
@@ -108,7 +108,7 @@ struct Room {
 
 impl Room {
     fn new(floor: &Floor) -> Self {
-        let walls: Vec<_> = floor.named_walls().iter().map(|wall| wall.segment()).collect();
+        let walls: Vec<_> = floor.named_walls().iter().map(NamedWall::segment).collect();
         let (least, most) = bounds(walls.iter().copied());
         let is_closed = walls.len() <= MOST_WALLS
             && (0..walls.len())
@@ -238,7 +238,7 @@ fn gaps(facts: &Facts, room: &Room) -> Vec<Mistake> {
             && let Some(fact) = facts.wall(wall)
             && facts.report(fact)
         {
-            let name = facts.wall(other).map_or_else(String::new, |fact| fact.quoted());
+            let name = facts.wall(other).map_or_else(String::new, Fact::quoted);
             let [x, y] = end.map(short);
             found.push(fact.warn(format!(
                 "the wall ends at ({x}, {y}) m, {} cm from the wall {name}: the corner does not close; let both \

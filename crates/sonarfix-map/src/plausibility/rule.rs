@@ -192,7 +192,7 @@ impl Rule {
         let shifts = [10.0, 0.1, 100.0, 0.01, 1e3, 1e-3].map(shift);
         let by_cause = self.causes.iter().find_map(|cause| {
             let value = (cause.undo)(Reading { number, si });
-            is_usual(value).then(|| (value, cause.why, cause.is_exact))
+            is_usual(value).then_some((value, cause.why, cause.is_exact))
         });
         let by_shift = || {
             let (factor, _) = shifts.into_iter().find(|(_, is_usual)| *is_usual)?;
