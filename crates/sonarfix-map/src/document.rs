@@ -12,6 +12,7 @@ use toml::de::{DeTable, DeValue};
 use crate::error::{FileError, Mistake};
 use crate::example;
 use crate::geometry::{TOO_FAR, is_near_enough};
+use crate::plausibility;
 use crate::quantity::{Dimension, LENGTH, Limits, METRE, Unit};
 use crate::spelling::{alternatives, nearest};
 
@@ -35,7 +36,8 @@ impl File<'_> {
     }
 }
 
-fn line(text: &str, at: usize) -> usize {
+/// The line of a position in a text; lines count from 1.
+pub(crate) fn line(text: &str, at: usize) -> usize {
     text.bytes().take(at).filter(|&byte| byte == b'\n').count() + 1
 }
 
@@ -80,8 +82,10 @@ impl<'a> Document<'a> {
         let root = Node::new(file, String::new(), 0, Some(&self.root)).any_table();
         let value =
             root.has_known_format().then(|| read(&root.only(&[&["format"], keys].concat())));
-        match (FileError::of(self.mistakes.take()), value.flatten()) {
-            (Some(error), _) => Err(error),
+        let mistakes = self.mistakes.take();
+        let suspects = plausibility::suspects(self.text, self.name, &mistakes);
+        match (FileError::of(mistakes), value.flatten()) {
+            (Some(error), _) => Err(error.followed_by(suspects)),
             (None, Some(value)) => Ok(value),
             (None, None) => Err(FileError::of_file(self.name, "cannot be read")),
         }
@@ -120,6 +124,11 @@ impl<'a> Node<'a> {
     /// Records a mistake in this value, unless one has been recorded.
     pub fn report(&self, message: impl Into<String>) {
         if !self.is_reported.replace(true) {
+            let text = self.as_text().or_else(|| self.number_text()).unwrap_or_default();
+            let message = match plausibility::meant(&self.key, text, self.as_text().is_none()) {
+                Some(meant) => format!("{}; did you mean {meant}?", message.into()),
+                None => message.into(),
+            };
             self.file.record(self.at, &self.key, message);
         }
     }

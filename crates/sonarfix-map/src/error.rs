@@ -17,6 +17,11 @@ impl Mistake {
         Self { file: file.into(), line: Some(line), key: key.into(), message: message.into() }
     }
 
+    /// The same as a probable cause of other mistakes.
+    pub(crate) fn suspected(self) -> Self {
+        Self { message: format!("perhaps this is the cause: {}", self.message), ..self }
+    }
+
     /// The file, as named by the caller.
     #[must_use]
     pub fn file(&self) -> &str {
@@ -77,6 +82,12 @@ impl FileError {
         let mut mistakes = mistakes.into_iter();
         let first = mistakes.next()?;
         Some(Self { first, others: mistakes.collect() })
+    }
+
+    /// The same with probable causes at the end.
+    pub(crate) fn followed_by(mut self, causes: Vec<Mistake>) -> Self {
+        self.others.extend(causes);
+        self
     }
 
     /// All mistakes: file by file, in the order of the lines.

@@ -14,7 +14,7 @@
 //! | scenario | [`Scenario::read`] | both, a path, and the true parameters |
 //! | any with a map | [`MapFile::read`] | the walls, and the line of each |
 //!
-//! [`flaws`] finds contradictions between walls, [`simplify`] joins collinear pieces, and [`bake`] creates the image that a
+//! [`plausibility`] warns of values that are valid and improbable. [`flaws`] finds contradictions between walls, [`simplify`] joins collinear pieces, and [`bake`] creates the image that a
 //! robot reads in place.
 //!
 //! Parameters of the localizer are `f32` in the types of [`sonarfix`]; all others are `f64` in metres, seconds and radians.
@@ -37,6 +37,7 @@ mod keys;
 mod map_file;
 mod neighbours;
 mod path;
+pub mod plausibility;
 mod quantity;
 pub mod robot_file;
 mod scenario;

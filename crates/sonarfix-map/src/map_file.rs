@@ -21,6 +21,7 @@ pub struct MapFile {
     name: String,
     /// The line of each wall; none in a baked map.
     lines: Vec<usize>,
+    is_toml: bool,
 }
 
 impl MapFile {
@@ -38,8 +39,18 @@ impl MapFile {
             let base = path.parent().unwrap_or(Path::new(""));
             return Self::of_scenario(text, &document, name.clone(), base);
         }
+        Self::parse(bytes, path, unit)
+    }
+
+    /// Reads a map that is no scenario from the bytes of a file.
+    pub(crate) fn parse(
+        bytes: Vec<u8>,
+        path: &Path,
+        unit: Option<&str>,
+    ) -> Result<Self, FileError> {
         let WallFile { floor, lines } = WallFile::parse(bytes, path, unit)?;
-        Ok(Self { floor, scenario: None, name, lines })
+        let is_toml = path.extension().is_some_and(|extension| extension == "toml");
+        Ok(Self { floor, scenario: None, name: file::name(path), lines, is_toml })
     }
 
     fn of_scenario(
@@ -61,13 +72,18 @@ impl MapFile {
             Ok(places) => (name, document::lines(text, &places)),
             Err(file) => (file::name(&file), WallFile::read(&file, None)?.lines),
         };
-        Ok(Self { floor, scenario: Some(scenario), name, lines })
+        Ok(Self { floor, scenario: Some(scenario), name, lines, is_toml: true })
     }
 
     /// The sonar of the robot, if the file is a scenario.
     #[must_use]
     pub fn sonar(&self) -> Option<RangerParameters> {
         self.scenario.as_ref().map(|scenario| scenario.robot.localizer.rangers.first)
+    }
+
+    /// Whether the walls are in TOML.
+    pub(crate) fn is_toml(&self) -> bool {
+        self.is_toml
     }
 
     /// The name of the file in error messages.

@@ -150,12 +150,36 @@ impl Dimension {
         Some(text)
     }
 
+    /// The number of a text and the name of its unit, which is empty for a bare number.
+    pub fn split<'t>(&self, text: &'t str) -> Option<(f64, &'t str)> {
+        let text = text.trim();
+        let mut units = self.units.iter().filter_map(|unit| {
+            let number = text.strip_suffix(unit.name)?;
+            Some((finite(number.trim_end())?, text.get(number.len()..)?))
+        });
+        units.next_back().or_else(|| Some((finite(text)?, "")))
+    }
+
+    /// The same number in each other unit: the text, and its value in the SI unit.
+    pub fn readings(&self, text: &str) -> Vec<(String, f64)> {
+        let Some((number, name)) = self.split(text) else { return Vec::new() };
+        let digits = text.trim().strip_suffix(name).unwrap_or(text).trim_end();
+        let others = self.units.iter().filter(|unit| unit.name != name);
+        others.map(|unit| (format!("{digits} {}", unit.name), unit.in_si(number))).collect()
+    }
+
+    /// A value of the SI unit with four digits in the unit of this name; bare without one.
+    pub fn written(&self, si: f64, name: &str) -> String {
+        let Some(unit) = self.unit(name) else { return rounded(si) };
+        format!("{} {}", rounded(si * unit.over / unit.times), unit.name)
+    }
+
     fn refusal(&self, text: &str) -> String {
         if finite(text).is_some() {
             return self.missing_unit(text);
         }
         let (name, units) = (self.name, self.unit_names());
-        let example = self.examples("1").swap_remove(0);
+        let example = self.examples("1").into_iter().next().unwrap_or_default();
         format!(
             "\"{text}\" is not {name}: write a finite number with a unit ({units}), as in {example}"
         )
@@ -261,6 +285,12 @@ impl Number for Duration {
     fn digits(&self, number: f64) -> String {
         number.to_string()
     }
+}
+
+/// The digits of a number with at most four significant ones.
+fn rounded(number: f64) -> String {
+    let text = format!("{number:.3e}");
+    text.parse::<f64>().map_or(text, |number| number.to_string())
 }
 
 fn finite(text: &str) -> Option<f64> {

@@ -6,5 +6,6 @@ mod formats;
 mod maps;
 mod paper;
 mod path;
+mod plausibility;
 mod rooms;
 mod symmetry;

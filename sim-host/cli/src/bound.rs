@@ -32,6 +32,7 @@ struct Row {
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
     let scenario = Scenario::read(&args.scenario)?;
+    crate::warnings::show(&[&args.scenario]);
     let seed = args.seed.unwrap_or(scenario.run.seed);
     let every = args.every.unwrap_or(scenario.path.duration() / 24.0);
     anyhow::ensure!(every > 0.0, "--every must be positive");

@@ -70,6 +70,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     }
     let robot_path = args.robot.clone().unwrap_or_else(|| args.log.with_file_name("robot.toml"));
     let robot = robot_file::read(&robot_path)?;
+    crate::warnings::show(&[&robot_path]);
     let text =
         sonarfix_map::read_text(&robot_path).with_context(|| robot_path.display().to_string())?;
     let read = read_log(args, &robot)?;

@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::{
-    bound, calibrate, command, config, convert, export, find, init, map, measure, merge, monitor,
-    paper, pil, plan, replay, run, survey, sweep,
+    bound, calibrate, check, command, config, convert, export, find, init, map, measure, merge,
+    monitor, paper, pil, plan, replay, run, survey, sweep,
 };
 
 /// Simulates, measures, replays and operates the Sonarfix localizer for small wheeled robots.
@@ -19,6 +19,8 @@ pub struct Cli {
 enum Command {
     /// Writes the files of a new robot into a folder: robot, map, and a scenario that runs at once.
     Init(init::Args),
+    /// Checks scenario, robot and map files: errors, and values that are improbable.
+    Check(check::Args),
     /// Runs the paper's scenario and prints the results beside the paper's Table 1.
     Paper(paper::Args),
     /// Runs a scenario.
@@ -64,6 +66,7 @@ impl Cli {
     pub fn execute(self) -> anyhow::Result<()> {
         match self.command {
             Command::Init(args) => init::execute(&args),
+            Command::Check(args) => check::execute(&args),
             Command::Paper(args) => paper::execute(&args),
             Command::Run(args) if !args.sweep.is_empty() => sweep::execute(&args),
             Command::Run(args) => run::execute(&args),

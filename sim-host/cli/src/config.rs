@@ -9,6 +9,7 @@ use sonarfix_hal::ranger::RangerKind;
 use sonarfix_link::baked;
 use sonarfix_map::{robot_file, robot_text};
 
+use crate::warnings;
 use sonarfix_terminal::output::check_file;
 
 #[derive(Debug, clap::Args)]
@@ -51,6 +52,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         What::Bake { robot, out, board, features } => {
             check_file("--out", out)?;
             let config = robot_file::read(robot)?;
+            warnings::show(&[robot]);
             if let Some(features) = features {
                 config.check_features(|feature| features.contains(&feature)).map_err(|lacks| {
                     anyhow!("the robot needs `{}`, which --features does not name", lacks.0.name())

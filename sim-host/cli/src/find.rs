@@ -28,8 +28,11 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let beside = |given: &Option<PathBuf>, name: &str| {
         given.clone().unwrap_or_else(|| args.log.with_file_name(name))
     };
-    let floor = MapFile::read(&beside(&args.map, "map.toml"), None)?.floor;
-    let robot = robot_file::read(&beside(&args.config, "robot.toml"))?;
+    let map = beside(&args.map, "map.toml");
+    let config = beside(&args.config, "robot.toml");
+    let floor = MapFile::read(&map, None)?.floor;
+    let robot = robot_file::read(&config)?;
+    crate::warnings::show(&[&map, &config]);
     let walls = floor.walls();
     let file = File::open(&args.log).with_context(|| args.log.display().to_string())?;
     let found = Find { robot: &robot, walls: &walls }.run(BufReader::new(file))?;

@@ -5,6 +5,7 @@ extern crate sonarfix_terminal;
 
 mod bound;
 mod calibrate;
+mod check;
 mod cli;
 mod command;
 mod config;
@@ -30,6 +31,7 @@ mod survey;
 mod sweep;
 mod sweep_values;
 mod table;
+mod warnings;
 
 use std::process::ExitCode;
 

@@ -7,7 +7,9 @@ use clap::Subcommand;
 use sonarfix::config::{Config, RangerParameters};
 use sonarfix::geometry::units::Metres;
 use sonarfix::map::Map;
-use sonarfix_map::{Limits, MapFile, Severity, bake, flaws, robot_file, simplify, symmetries};
+use sonarfix_map::{
+    Limits, MapFile, Mistake, Severity, bake, flaws, plausibility, robot_file, simplify, symmetries,
+};
 
 use crate::map_exchange;
 use sonarfix_terminal::output::check_file;
@@ -144,6 +146,14 @@ fn check(map: &MapFile, robot: Option<&Path>) -> anyhow::Result<()> {
     if findings.len() > SHOWN {
         println!("and {} more", findings.len() - SHOWN);
     }
+    let is_new = |warning: &Mistake| {
+        !findings.iter().any(|finding| warning.message().ends_with(&finding.flaw.to_string()))
+    };
+    let improbable = plausibility::of_file(Path::new(map.name())).into_iter().filter(is_new);
+    let improbable: Vec<_> = improbable.collect();
+    for warning in &improbable {
+        println!("warning: {warning}");
+    }
     let symmetries = symmetries(&map.floor)?;
     for symmetry in &symmetries {
         println!("{}: warning: {symmetry}", map.name());
@@ -155,7 +165,7 @@ fn check(map: &MapFile, robot: Option<&Path>) -> anyhow::Result<()> {
         );
     }
     let errors = count(&findings, Severity::Error);
-    let warnings = count(&findings, Severity::Warning) + symmetries.len();
+    let warnings = count(&findings, Severity::Warning) + improbable.len() + symmetries.len();
     let walls = map.floor.named_walls().len();
     println!("{}: {walls} walls, {errors} errors, {warnings} warnings", map.name());
     anyhow::ensure!(errors == 0, "the map has errors");

@@ -38,6 +38,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         seed: args.seed,
         beside_paper: true,
         provenance: provenance::table(&[]),
+        warnings: Vec::new(),
     };
     experiment.conduct(&args.output)
 }

@@ -10,6 +10,7 @@ use sonarfix_plan::{BLIND_AFTER, Forecast, HeadingAid, Spread, bare, route};
 use sonarfix_report::Table;
 use sonarfix_report::heat_map::{Heat, HeatMap};
 
+use crate::warnings::{self, Warning};
 use sonarfix_terminal::output::check_file;
 use sonarfix_terminal::progress::Runs;
 
@@ -67,6 +68,8 @@ struct Candidate {
     /// With `--starts`, what starts without a pose lead to.
     #[serde(skip_serializing_if = "Option::is_none")]
     starts: Option<Starts>,
+    /// Improbable values of the files.
+    warnings: Vec<Warning>,
 }
 
 /// A robot to be compared.
@@ -106,6 +109,9 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         check_file("--out", file)?;
     }
     let scenario = scenario(args)?;
+    let robot = args.sensor.as_deref().map(FilePath::new).filter(|file| file.exists());
+    let files: Vec<_> = std::iter::once(args.map.as_path()).chain(robot).collect();
+    let warnings = warnings::show(&files);
     let fitted = fitted(args, &scenario)?;
     let forecasts = fitted.len() * if args.need.is_some() { 2 } else { 1 };
     let count = u32::try_from(forecasts).unwrap_or(u32::MAX);
@@ -121,7 +127,15 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         scenario.start.heading = KNOWN_HEADING;
         let known = args.need.map(|_| Forecast::new(&scenario, args.runs, &runs)).transpose()?;
         let from_known_start = known.flatten().map(|forecast| forecast.position);
-        candidates.push(Candidate { sensor, heading_aid, forecast, from_known_start, starts });
+        let warnings = warnings.clone();
+        candidates.push(Candidate {
+            sensor,
+            heading_aid,
+            forecast,
+            from_known_start,
+            starts,
+            warnings,
+        });
     }
     runs.end()?;
     candidates.sort_by(|a, b| a.forecast.position.rms.total_cmp(&b.forecast.position.rms));

@@ -18,6 +18,7 @@ use sonarfix_sim::trace::Recorder;
 use crate::provenance;
 use crate::run::Output;
 use crate::serve::{self, PacedArgs};
+use crate::warnings::{self, Warned};
 use sonarfix_terminal::output::{check_file, check_folder};
 
 /// Maximum number of skipped lines that are printed.
@@ -58,8 +59,11 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     if let Some(file) = &args.trace {
         check_file("--trace", file)?;
     }
-    let floor = MapFile::read(&beside(&args.log, args.map.as_ref(), "map.toml"), None)?.floor;
-    let mut robot = robot_file::read(&beside(&args.log, args.config.as_ref(), "robot.toml"))?;
+    let map = beside(&args.log, args.map.as_ref(), "map.toml");
+    let config = beside(&args.log, args.config.as_ref(), "robot.toml");
+    let floor = MapFile::read(&map, None)?.floor;
+    let mut robot = robot_file::read(&config)?;
+    let warnings = warnings::show(&[&map, &config]);
     if let Some(policy) = args.policy {
         robot.localizer.policy = policy.into();
     }
@@ -78,7 +82,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     }
     let tables = tables(&summary);
     if args.output.json {
-        sonarfix_terminal::json::print(&summary)?;
+        sonarfix_terminal::json::print(&Warned { result: &summary, warnings: &warnings })?;
     } else {
         let texts: Vec<_> = tables.iter().map(Table::text).collect();
         println!("{}", texts.join("\n\n"));

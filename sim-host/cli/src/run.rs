@@ -20,6 +20,7 @@ use crate::rows::{self, Counted};
 use crate::serve::{self, PacedArgs};
 use crate::sweep_values::Sweep;
 use crate::table::{self, Beside, Measured};
+use crate::warnings::{self, Warned, Warning};
 use sonarfix_terminal::output::{check_file, check_folder};
 use sonarfix_terminal::progress::Runs;
 
@@ -73,6 +74,7 @@ pub struct Output {
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
     let mut scenario = Scenario::read(&args.scenario)?;
+    let warnings = warnings::show(&[&args.scenario]);
     args.overrides.apply(&mut scenario)?;
     let experiment = Experiment {
         runs: args.runs.unwrap_or(scenario.run.runs),
@@ -80,6 +82,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         simulation: Simulation::new(scenario),
         beside_paper: false,
         provenance: provenance::of_scenario(&args.scenario),
+        warnings,
     };
     anyhow::ensure!(experiment.runs > 0, "--runs must be at least 1");
     let scenario = &experiment.simulation.scenario;
@@ -128,6 +131,8 @@ pub struct Experiment {
     pub beside_paper: bool,
     /// Where the report comes from.
     pub provenance: sonarfix_report::Table,
+    /// Improbable values of its files.
+    pub warnings: Vec<Warning>,
 }
 
 impl Experiment {
@@ -142,7 +147,8 @@ impl Experiment {
 
     fn show(&self, measured: &Measured, output: &Output) -> anyhow::Result<()> {
         if output.json {
-            sonarfix_terminal::json::print(measured)?;
+            let warned = Warned { result: measured, warnings: &self.warnings };
+            sonarfix_terminal::json::print(&warned)?;
         } else {
             println!("{}", self.table(measured).text());
         }

@@ -6,7 +6,7 @@
 //! - What cannot be written to standard error is dropped.
 
 use std::fmt::Arguments;
-use std::io::{self, ErrorKind, Write};
+use std::io::{self, ErrorKind, IsTerminal, Write};
 use std::path::Path;
 use std::process::exit;
 
@@ -30,9 +30,12 @@ macro_rules! eprintln {
     ($($argument:tt)*) => { $crate::output::report(format_args!($($argument)*)) };
 }
 
-/// The longest line of an error message, characters: one line of a screen or two. Files that are no
-/// text have lines of any length, and messages quote them.
-const LONGEST_LINE: usize = 160;
+/// The longest line of an error message, characters. Files that are no text have lines of any length, and messages quote
+/// them; every other message is shorter.
+const LONGEST_LINE: usize = 4_000;
+
+/// Columns of a terminal of unknown width.
+const USUAL_WIDTH: usize = 80;
 
 /// Writes to standard output; ends the command if that fails.
 pub fn print(text: Arguments) {
@@ -46,12 +49,41 @@ pub fn print(text: Arguments) {
     }
 }
 
-/// Writes lines to standard error, each shortened to one that a screen holds.
+/// Writes lines to standard error: on a terminal wrapped between words, into a pipe as they are.
 pub fn report(text: Arguments) {
-    let mut error = io::stderr().lock();
+    let error = io::stderr();
+    let width = error.is_terminal().then(width);
+    let mut error = error.lock();
     for line in text.to_string().lines() {
-        let _ = writeln!(error, "{}", shortened(line));
+        let line = shortened(line);
+        let line = width.map_or_else(|| line.clone(), |width| wrapped(&line, width));
+        let _ = writeln!(error, "{line}");
     }
+}
+
+/// Columns of the terminal.
+fn width() -> usize {
+    let columns = std::env::var("COLUMNS").ok().and_then(|columns| columns.parse().ok());
+    let columns = columns.or_else(|| Some(console::Term::stderr().size_checked()?.1.into()));
+    columns.filter(|columns| *columns >= 20).unwrap_or(USUAL_WIDTH)
+}
+
+/// A line in pieces of at most this many characters, broken between words; those after the first are indented.
+fn wrapped(line: &str, width: usize) -> String {
+    let mut text = String::new();
+    let mut column = 0;
+    for word in line.split(' ') {
+        let length = word.chars().count();
+        let separator = match column {
+            0 => "",
+            _ if column + 1 + length > width => "\n    ",
+            _ => " ",
+        };
+        column = if separator.len() > 1 { 4 } else { column + separator.len() } + length;
+        text += separator;
+        text += word;
+    }
+    text
 }
 
 /// Checks that a file can be written, before the work whose result it is to hold; its contents stay.
@@ -76,5 +108,19 @@ fn shortened(line: &str) -> String {
     match line.char_indices().nth(LONGEST_LINE) {
         Some((end, _)) => format!("{} …", line.get(..end).unwrap_or_default()),
         None => line.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_is_wrapped_between_words_and_loses_none() {
+        let line = "error: a remedy at the end of a long line";
+        let lines = wrapped(line, 20);
+        assert!(lines.lines().all(|line| line.chars().count() <= 20), "{lines}");
+        assert_eq!(lines.split_whitespace().collect::<Vec<_>>().join(" "), line);
+        assert_eq!(wrapped("short", 20), "short");
     }
 }

@@ -1,0 +1,250 @@
+//! The values of a scenario and of the files that it names, as flat lists with their lines.
+
+use std::cell::RefCell;
+use std::collections::BTreeSet;
+use std::path::Path as FilePath;
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use crate::error::Mistake;
+use crate::map_file::MapFile;
+use crate::quantity::Dimension;
+use crate::scenario::Scenario;
+use crate::{document, file};
+
+/// A comment with this word accepts the values of its line.
+const ACCEPTED: &str = "# plausible";
+
+/// The key at which a wall is reported.
+const WALL: &str = "map.wall.name";
+
+/// A number in a file.
+#[derive(Debug, Clone)]
+pub(super) struct Fact {
+    file: String,
+    line: usize,
+    /// The whole key, as in `robot.sonar.mount[0]`.
+    key: String,
+    /// The key by which rules find it, as in `sonar.mount[0]`.
+    pub id: String,
+    /// The index of its table in an array of tables.
+    pub table: usize,
+    /// The value as written, without quotes.
+    pub text: String,
+    is_number: bool,
+    is_accepted: bool,
+}
+
+impl Fact {
+    /// A value that its reader has refused.
+    pub fn refused(key: &str, text: &str, is_number: bool) -> Self {
+        Self {
+            file: String::new(),
+            line: 0,
+            key: key.to_owned(),
+            id: id(key),
+            table: 0,
+            text: text.to_owned(),
+            is_number,
+            is_accepted: false,
+        }
+    }
+
+    /// The value in the SI unit; `None` if it is not of this dimension.
+    pub fn value(&self, dimension: &Dimension) -> Option<f64> {
+        let is_possible = if self.is_number { dimension.is_bare } else { dimension.has_units() };
+        if !is_possible {
+            return None;
+        }
+        Some(dimension.number(&self.text)).filter(|value| value.is_finite())
+    }
+
+    /// The value as it is quoted in messages.
+    pub fn quoted(&self) -> String {
+        if self.is_number { self.text.clone() } else { format!("\"{}\"", self.text) }
+    }
+
+    /// Another value, written as this one is.
+    pub fn quoted_as(&self, text: &str) -> String {
+        if self.is_number && text.parse::<f64>().is_ok() {
+            text.to_owned()
+        } else {
+            format!("\"{text}\"")
+        }
+    }
+
+    /// A warning at this value.
+    pub fn warn(&self, message: String) -> Mistake {
+        Mistake::new(&self.file, self.line, &self.key, message)
+    }
+}
+
+/// All numbers and words of a scenario, a robot file or a map file.
+#[derive(Debug, Default)]
+pub(super) struct Facts {
+    all: Vec<Fact>,
+    /// The scenario, if the file is one without mistakes.
+    pub scenario: Option<Box<Scenario>>,
+    /// The values that a warning is about: another one about the same value has the same cause.
+    reported: RefCell<BTreeSet<usize>>,
+}
+
+impl Facts {
+    /// The values of a file and of the map and robot files that it names.
+    pub fn of(text: &str, name: &str, base: &FilePath) -> Self {
+        let mut facts = Self::default();
+        facts.add(text, name, base);
+        facts
+    }
+
+    /// The values of a file without those of the files that it names.
+    pub fn of_one(text: &str, name: &str) -> Self {
+        let mut facts = Self::default();
+        facts.add_values(text, name);
+        facts
+    }
+
+    /// The walls of a map without keys, by their lines.
+    pub fn of_walls(name: &str, lines: impl IntoIterator<Item = usize>) -> Self {
+        let wall = |(table, line): (usize, usize)| Fact {
+            file: name.to_owned(),
+            line,
+            id: WALL.to_owned(),
+            table,
+            ..Fact::refused(&format!("map.wall[{table}]"), "", false)
+        };
+        Self { all: lines.into_iter().enumerate().map(wall).collect(), ..Self::default() }
+    }
+
+    /// Adds the values of a file; returns the names of the other files.
+    fn add_values(&mut self, text: &str, name: &str) -> Vec<String> {
+        let Ok(root) = DeTable::parse(text) else { return Vec::new() };
+        let mut reader = Reader { text, name, all: &mut self.all };
+        let mut others = Vec::new();
+        for (key, value) in root.get_ref() {
+            let key: &str = key.get_ref();
+            match value.get_ref() {
+                DeValue::String(other) if matches!(key, "map" | "robot") => {
+                    others.push(other.as_ref().to_owned());
+                }
+                _ => reader.value(key.to_owned(), 0, value),
+            }
+        }
+        others
+    }
+
+    fn add(&mut self, text: &str, name: &str, base: &FilePath) {
+        for path in self.add_values(text, name).iter().map(|other| base.join(other)) {
+            if let Ok(map) = MapFile::read(&path, None)
+                && !map.is_toml()
+            {
+                let lines = (0..map.floor.named_walls().len()).filter_map(|wall| map.line(wall));
+                self.all.extend(Self::of_walls(map.name(), lines).all);
+            } else if let Ok(text) = file::read(&path) {
+                self.add(&text, &file::name(&path), base);
+            }
+        }
+    }
+
+    /// The values with this key, of all tables of an array.
+    pub fn with(&self, id: &str) -> impl Iterator<Item = &Fact> {
+        let reported = self.reported.borrow().clone();
+        let all = self.all.iter().enumerate();
+        all.filter(move |(index, fact)| fact.id == id && !reported.contains(index))
+            .map(|(_, fact)| fact)
+    }
+
+    /// The value with this key, of the same table of an array if it is in one.
+    pub fn beside(&self, fact: &Fact, id: &str) -> Option<&Fact> {
+        let in_table = self.with(id).find(|other| other.table == fact.table);
+        in_table.or_else(|| self.with(id).next())
+    }
+
+    /// A number by its key.
+    pub fn number(&self, id: &str, dimension: &Dimension) -> Option<f64> {
+        self.with(id).next()?.value(dimension)
+    }
+
+    /// A word by its key.
+    pub fn word(&self, id: &str) -> Option<&str> {
+        self.with(id).next().map(|fact| fact.text.as_str())
+    }
+
+    /// The name of a wall.
+    pub fn wall(&self, wall: usize) -> Option<&Fact> {
+        self.with(WALL).find(|fact| fact.table == wall)
+    }
+
+    /// The value with this key in a table of an array.
+    pub fn in_table(&self, id: &str, table: usize) -> Option<&Fact> {
+        self.with(id).find(|fact| fact.table == table)
+    }
+
+    /// Marks a value as reported; whether a warning about it is to be shown.
+    pub fn report(&self, fact: &Fact) -> bool {
+        let index = self.all.iter().position(|other| {
+            (&other.file, other.line, &other.key) == (&fact.file, fact.line, &fact.key)
+        });
+        let is_new = index.is_some_and(|index| self.reported.borrow_mut().insert(index));
+        is_new && !fact.is_accepted
+    }
+}
+
+struct Reader<'r> {
+    text: &'r str,
+    name: &'r str,
+    all: &'r mut Vec<Fact>,
+}
+
+impl Reader<'_> {
+    fn value(&mut self, key: String, table: usize, value: &Spanned<DeValue<'_>>) {
+        let (text, is_number) = match value.get_ref() {
+            DeValue::Table(entries) => {
+                for (name, value) in entries {
+                    let name: &str = name.get_ref();
+                    self.value(format!("{key}.{name}"), table, value);
+                }
+                return;
+            }
+            DeValue::Array(items) => {
+                for (index, item) in items.iter().enumerate() {
+                    let is_table = item.get_ref().as_table().is_some();
+                    let table = if is_table { index } else { table };
+                    self.value(format!("{key}[{index}]"), table, item);
+                }
+                return;
+            }
+            DeValue::String(text) => (text.trim().to_owned(), false),
+            DeValue::Integer(integer) => (integer.as_str().to_owned(), true),
+            DeValue::Float(float) => (float.as_str().to_owned(), true),
+            _ => return,
+        };
+        let line = document::line(self.text, value.span().start);
+        let source = self.text.lines().nth(line - 1).unwrap_or_default();
+        self.all.push(Fact {
+            file: self.name.to_owned(),
+            line,
+            id: id(&key),
+            key,
+            table,
+            text,
+            is_number,
+            is_accepted: source.contains(ACCEPTED),
+        });
+    }
+}
+
+/// A key without the indices of its tables, and without `robot`: rules concern a robot file and the robot of a scenario.
+pub(super) fn id(key: &str) -> String {
+    let mut id = String::new();
+    for part in key.split('.') {
+        let name = part.split('[').next().unwrap_or(part);
+        id = if id.is_empty() { name.to_owned() } else { format!("{id}.{name}") };
+    }
+    let index = key.rsplit('.').next().and_then(|last| last.split_once('['));
+    if let Some((_, index)) = index {
+        id = format!("{id}[{index}");
+    }
+    id.strip_prefix("robot.").map_or(id.clone(), str::to_owned)
+}

@@ -1,0 +1,412 @@
+//! The rules for walls, and for a path and a robot among them.
+
+use sonarfix::config::{Config, RangerParameters};
+use sonarfix::geometry::units::Metres;
+
+use super::facts::{Fact, Facts};
+use super::rule::short;
+use crate::clearance::Collision;
+use crate::error::Mistake;
+use crate::flaws::{Flaw, TOLERANCE, flaws};
+use crate::floor::{Floor, NamedWall};
+use crate::geometry::{Point, Segment, distance};
+use crate::path::PathPlan;
+use crate::scenario::Scenario;
+use crate::scenario::surroundings::Outline;
+
+/// The usual length of the longer side of a place, metres: a table top to a large hall.
+const USUAL_SIZE: (f64, f64) = (0.5, 300.0);
+/// The largest gap between two ends that are meant to meet, metres: no door is as narrow.
+const WIDEST_GAP: f64 = 0.12;
+/// Most walls that are compared in pairs.
+const MOST_WALLS: usize = 2_000;
+/// The shortest usual run, seconds.
+const SHORTEST_RUN: f64 = 5.0;
+/// Share of the instants of a path at which a robot has to measure a wall.
+const LEAST_SEEN: f64 = 0.02;
+/// Instants of a path, and directions from a place, that are tested.
+const SAMPLES: u16 = 200;
+
+/// A change of coordinates that undoes a mistake.
+struct Change {
+    why: &'static str,
+    undo: fn(Point) -> Point,
+}
+
+/// Mistakes in the coordinates of a path or an obstacle.
+#[rustfmt::skip]
+static CHANGES: [Change; 9] = [
+    Change { why: "x and y are swapped", undo: |[x, y]| [y, x] },
+    Change { why: "the sign of y is that of a picture, whose y axis points down", undo: |[x, y]| [x, -y] },
+    Change { why: "the sign of x is wrong", undo: |[x, y]| [-x, y] },
+    Change { why: "the coordinates are in centimetres, those of the map are not", undo: |[x, y]| [0.01 * x, 0.01 * y] },
+    Change { why: "the coordinates are in millimetres, those of the map are not", undo: |[x, y]| [0.001 * x, 0.001 * y] },
+    Change { why: "the unit is 100 times too small for the map", undo: |[x, y]| [100.0 * x, 100.0 * y] },
+    Change { why: "the unit is 10 times too small for the map", undo: |[x, y]| [10.0 * x, 10.0 * y] },
+    Change { why: "the unit is 10 times too large for the map", undo: |[x, y]| [0.1 * x, 0.1 * y] },
+    Change { why: "the unit is 1000 times too small for the map", undo: |[x, y]| [1000.0 * x, 1000.0 * y] },
+];
+
+/// The warnings about the walls of a map.
+pub(super) fn of_map(facts: &Facts, floor: &Floor) -> Vec<Mistake> {
+    let sonar = match &facts.scenario {
+        Some(scenario) => scenario.robot.localizer.rangers.first,
+        None => Config::for_track_width(Metres(0.16)).rangers.first,
+    };
+    let room = Room::new(floor);
+    let mut warnings: Vec<_> = size(facts, &room).into_iter().collect();
+    if room.walls.len() <= MOST_WALLS {
+        warnings.extend(outliers(facts, &room));
+        warnings.extend(gaps(facts, &room));
+        warnings.extend(contradictions(facts, floor, &sonar));
+    }
+    warnings
+}
+
+/// The warnings about a scenario: its walls, and its path and objects among them.
+pub(super) fn of_scenario(facts: &Facts) -> Vec<Mistake> {
+    let Some(scenario) = &facts.scenario else { return Vec::new() };
+    let mut warnings = of_map(facts, &scenario.floor);
+    let room = Room::new(&scenario.floor);
+    warnings.extend(start(facts, scenario, &room));
+    warnings.extend(duration(facts, scenario));
+    warnings.extend(objects(facts, scenario, &room));
+    if warnings.is_empty() {
+        warnings.extend(reach(facts, scenario, &room));
+    }
+    warnings
+}
+
+/// The probable reason for which a path comes too close to a wall.
+pub(crate) fn intention(floor: &Floor, plan: &PathPlan, clearance: f64) -> Option<String> {
+    let room = Room::new(floor);
+    let is_free = |plan: &PathPlan, clearance: f64| {
+        Collision::first(plan, floor, clearance).is_none() && room.has_inside(plan.start)
+    };
+    if let Some(change) = CHANGES.iter().find(|change| is_free(&changed(plan, change), clearance)) {
+        return Some(format!("; is it that {}?", change.why));
+    }
+    let smaller = [0.1, 0.01, 0.001].map(|factor| factor * clearance);
+    let clearance = smaller.into_iter().find(|smaller| is_free(plan, *smaller));
+    let clearance = clearance.filter(|clearance| *clearance >= 0.01)?;
+    Some(format!("; did you mean a clearance of {} m?", short(clearance)))
+}
+
+fn changed(plan: &PathPlan, change: &Change) -> PathPlan {
+    let corners = plan.corners.iter().map(|corner| (change.undo)(*corner)).collect();
+    PathPlan { start: (change.undo)(plan.start), corners, ..plan.clone() }
+}
+
+/// The walls as segments, and their bounding box.
+struct Room {
+    walls: Vec<Segment>,
+    least: Point,
+    most: Point,
+    /// Whether every end of a wall meets another wall, as around a room.
+    is_closed: bool,
+}
+
+impl Room {
+    fn new(floor: &Floor) -> Self {
+        let walls: Vec<_> = floor.named_walls().iter().map(NamedWall::segment).collect();
+        let (least, most) = bounds(walls.iter().copied());
+        let is_closed = walls.len() <= MOST_WALLS
+            && (0..walls.len())
+                .all(|wall| ends(&walls, wall).all(|end| nearest(&walls, wall, end) <= WIDEST_GAP));
+        Self { walls, least, most, is_closed }
+    }
+
+    fn sides(&self) -> Point {
+        [self.most[0] - self.least[0], self.most[1] - self.least[1]]
+    }
+
+    fn size(&self) -> f64 {
+        self.sides()[0].max(self.sides()[1])
+    }
+
+    /// Whether a point is within a closed room; true if the walls do not close.
+    fn has_inside(&self, point: Point) -> bool {
+        let far = 3.0 * self.size() + 1.0;
+        let is_hit = |index: u16| {
+            // Off the axes, so that no beam runs along a wall.
+            let angle = (f64::from(index) + 0.37) * std::f64::consts::TAU / f64::from(SAMPLES);
+            let to = [point[0] + far * angle.cos(), point[1] + far * angle.sin()];
+            let beam = Segment { from: point, to };
+            self.walls.iter().any(|wall| wall.distance(beam) <= TOLERANCE)
+        };
+        let hits = (0..SAMPLES).filter(|index| is_hit(*index)).count();
+        !self.is_closed || hits * 100 >= usize::from(SAMPLES) * 97
+    }
+
+    /// Whether a point is in the bounding box, with a margin.
+    fn bounds(&self, [x, y]: Point) -> bool {
+        let margin = 0.1 * self.size();
+        let is_in = |value: f64, axis: usize| {
+            let edge = |point: &Point| point.get(axis).copied().unwrap_or_default();
+            value >= edge(&self.least) - margin && value <= edge(&self.most) + margin
+        };
+        is_in(x, 0) && is_in(y, 1)
+    }
+}
+
+fn ends(walls: &[Segment], wall: usize) -> impl Iterator<Item = Point> {
+    walls.get(wall).into_iter().flat_map(|wall| [wall.from, wall.to])
+}
+
+fn bounds(walls: impl Iterator<Item = Segment>) -> (Point, Point) {
+    let all = walls.flat_map(|wall| [wall.from, wall.to]);
+    all.fold(([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]), |(least, most), [x, y]| {
+        ([least[0].min(x), least[1].min(y)], [most[0].max(x), most[1].max(y)])
+    })
+}
+
+/// The distance of a point from the nearest other wall.
+fn nearest(walls: &[Segment], wall: usize, point: Point) -> f64 {
+    let others = walls.iter().enumerate().filter(|(other, _)| *other != wall);
+    others.map(|(_, other)| other.distance_to(point)).fold(f64::INFINITY, f64::min)
+}
+
+fn size(facts: &Facts, room: &Room) -> Option<Mistake> {
+    let (least, most) = USUAL_SIZE;
+    let size = room.size();
+    let fact = facts.with("map.unit").next().or_else(|| facts.wall(0))?;
+    if (least..=most).contains(&size) || !facts.report(fact) {
+        return None;
+    }
+    let [width, height] = room.sides().map(short);
+    let units = [("m", 1.0), ("cm", 0.01), ("mm", 0.001)];
+    let now = units.iter().find(|(name, _)| *name == fact.text).map_or(1.0, |(_, unit)| *unit);
+    let is_usual = |unit: f64| (1.0..=100.0).contains(&(size * unit / now));
+    let meant = units.iter().find(|(_, unit)| is_usual(*unit));
+    let advice = meant.map_or_else(
+        || "check the unit".to_owned(),
+        |(name, _)| format!("did you mean unit = \"{name}\"?"),
+    );
+    Some(fact.warn(format!(
+        "the walls measure {width} m x {height} m; usual are {least} m to {most} m: {advice}"
+    )))
+}
+
+/// A wall that reaches far beyond all others, by a wrong digit or a lost decimal point.
+fn outliers(facts: &Facts, room: &Room) -> Vec<Mistake> {
+    let is_far = |wall: usize| {
+        let others = room.walls.iter().enumerate().filter(|(other, _)| *other != wall);
+        let (least, most) = bounds(others.map(|(_, other)| *other));
+        let size = (most[0] - least[0]).max(most[1] - least[1]);
+        let beyond =
+            |[x, y]: Point| (least[0] - x).max(x - most[0]).max(least[1] - y).max(y - most[1]);
+        room.walls.len() > 3 && ends(&room.walls, wall).any(|end| beyond(end) > 2.0 * size)
+    };
+    let far = (0..room.walls.len()).filter(|wall| is_far(*wall));
+    let facts_of = far.filter_map(|wall| facts.wall(wall)).filter(|fact| facts.report(fact));
+    facts_of
+        .map(|fact| {
+            fact.warn(
+                "the wall reaches far beyond all others: check its coordinates, for example for a \
+                 lost decimal point"
+                    .to_owned(),
+            )
+        })
+        .collect()
+}
+
+/// Ends that nearly meet.
+fn gaps(facts: &Facts, room: &Room) -> Vec<Mistake> {
+    let walls = &room.walls;
+    let all = || (0..walls.len()).flat_map(|wall| ends(walls, wall).map(move |end| (wall, end)));
+    let is_surveyed = |wall: usize| facts.in_table("map.wall.accuracy", wall).is_some();
+    let is_loose = |&(wall, end): &(usize, Point)| nearest(walls, wall, end) > TOLERANCE;
+    let loose: Vec<_> = all().filter(is_loose).filter(|(wall, _)| !is_surveyed(*wall)).collect();
+    let widest = if loose.len() <= 2 { 5.0 * WIDEST_GAP } else { WIDEST_GAP };
+    let widest = widest.min(0.2 * room.size());
+    let mut found = Vec::new();
+    for (index, &(wall, end)) in loose.iter().enumerate() {
+        let later = loose.iter().skip(index + 1).filter(|(other, _)| *other != wall);
+        let partner = later
+            .map(|&(other, there)| (other, distance(end, there)))
+            .filter(|&(other, gap)| {
+                gap < WIDEST_GAP.min(widest)
+                    || (gap < widest && !is_doorway(walls, wall, other, end))
+            })
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        let is_beside =
+            |other: &Segment| other.distance_to(end) < WIDEST_GAP && is_across(walls, wall, *other);
+        let beside =
+            walls.iter().enumerate().find(|(other, segment)| *other != wall && is_beside(segment));
+        let beside = beside.map(|(other, segment)| (other, segment.distance_to(end)));
+        if let Some((other, gap)) = partner.or(beside)
+            && let Some(fact) = facts.wall(wall)
+            && facts.report(fact)
+        {
+            let name = facts.wall(other).map_or_else(String::new, Fact::quoted);
+            let [x, y] = end.map(short);
+            found.push(fact.warn(format!(
+                "the wall ends at ({x}, {y}) m, {} cm from the wall {name}: the corner does not close; let both \
+                 walls end at the same point",
+                short(100.0 * gap)
+            )));
+        }
+    }
+    found
+}
+
+/// Whether another wall is not parallel to this one, so that their ends may meet in a corner.
+fn is_across(walls: &[Segment], wall: usize, other: Segment) -> bool {
+    let Some(wall) = walls.get(wall) else { return false };
+    let ([ax, ay], [bx, by]) = (wall.tangent(), other.tangent());
+    (ax * by - ay * bx).abs() > 0.3
+}
+
+/// Whether the gap from the end of a wall to another one is along the wall, as a door is.
+fn is_doorway(walls: &[Segment], wall: usize, other: usize, end: Point) -> bool {
+    let place = |wall: usize, point: Point| walls.get(wall).map(|wall| wall.place(point)[1].abs());
+    let other_end = walls.get(other).map(|wall| {
+        if distance(wall.from, end) < distance(wall.to, end) { wall.from } else { wall.to }
+    });
+    let is_along = |offset: Option<f64>| offset.is_some_and(|offset| offset < 0.05);
+    other_end.is_some_and(|there| is_along(place(wall, there)) || is_along(place(other, end)))
+}
+
+/// Walls that contradict each other.
+fn contradictions(facts: &Facts, floor: &Floor, sonar: &RangerParameters) -> Vec<Mistake> {
+    let found = flaws(floor, sonar).unwrap_or_default().into_iter();
+    let is_wrong = |flaw: &Flaw| {
+        matches!(flaw, Flaw::Duplicate { .. } | Flaw::Overlap { .. } | Flaw::Crossing { .. })
+    };
+    let found = found.filter(|finding| is_wrong(&finding.flaw));
+    let warning = found.filter_map(|finding| {
+        let fact = facts.wall(finding.wall)?;
+        let other = finding.other().and_then(|other| facts.wall(other)).map(Fact::quoted);
+        let message = format!("with the wall {}: {}", other.unwrap_or_default(), finding.flaw);
+        facts.report(fact).then(|| fact.warn(message))
+    });
+    warning.collect()
+}
+
+fn start(facts: &Facts, scenario: &Scenario, room: &Room) -> Option<Mistake> {
+    let plan = scenario.path.plan();
+    let fact = facts.with("path.start[0]").next()?;
+    if room.has_inside(plan.start) || !facts.report(fact) {
+        return None;
+    }
+    let [x, y] = plan.start.map(short);
+    let advice = intention(&scenario.floor, plan, 0.0)
+        .unwrap_or_else(|| ": check start, corners and unit, and the unit of the map".to_owned());
+    let ([x0, y0], [x1, y1]) = (room.least.map(short), room.most.map(short));
+    Some(fact.warn(format!(
+        "the start ({x}, {y}) m is outside of the room, whose walls are from ({x0}, {y0}) to ({x1}, {y1}) m{advice}"
+    )))
+}
+
+fn duration(facts: &Facts, scenario: &Scenario) -> Option<Mistake> {
+    let (seconds, length) = (scenario.path.duration(), scenario.path.length());
+    let fact = facts.with("path.speed").next()?;
+    (seconds < SHORTEST_RUN && facts.report(fact)).then(|| {
+        fact.warn(format!(
+            "the whole path of {} m takes {} s, too short for a robot to localize: check the unit of the path, the speed and the laps",
+            short(length),
+            short(seconds)
+        ))
+    })
+}
+
+/// Objects outside of the map, and in the way.
+fn objects(facts: &Facts, scenario: &Scenario, room: &Room) -> Vec<Mistake> {
+    let plan = scenario.path.plan();
+    let starts = std::iter::once(plan.start).chain(plan.corners.iter().copied());
+    let legs: Vec<_> =
+        starts.zip(&plan.corners).map(|(from, to)| Segment { from, to: *to }).collect();
+    let warning = |(index, obstacle): (usize, &crate::scenario::surroundings::Obstacle)| {
+        let (key, at, ahead) = match obstacle.outline {
+            Outline::Circle { centre, radius } => {
+                let is_ahead = |leg: &Segment| leg.distance_to(centre) < radius;
+                ("world.obstacle.centre[0]", centre, legs.iter().any(is_ahead))
+            }
+            Outline::Face { from, to } => {
+                let face = Segment { from, to };
+                let is_ahead = |leg: &Segment| leg.distance(face) <= 0.0;
+                ("world.obstacle.from[0]", from, legs.iter().any(is_ahead))
+            }
+        };
+        let fact = facts.in_table(key, index)?;
+        let [x, y] = at.map(short);
+        let message = if !room.bounds(at) {
+            let change = CHANGES.iter().find(|change| room.bounds((change.undo)(at)));
+            let advice =
+                change.map_or_else(String::new, |change| format!(": is it that {}?", change.why));
+            format!("the obstacle at ({x}, {y}) m is outside of the map{advice}")
+        } else if ahead && obstacle.walk.is_none() {
+            format!(
+                "the path leads through the obstacle at ({x}, {y}) m: check its place and its radius"
+            )
+        } else {
+            return None;
+        };
+        facts.report(fact).then(|| fact.warn(message))
+    };
+    scenario.surroundings.obstacles.iter().enumerate().filter_map(warning).collect()
+}
+
+/// A ranger with which the robot measures no wall from its path.
+fn reach(facts: &Facts, scenario: &Scenario, room: &Room) -> Option<Mistake> {
+    let count = |sees: &dyn Fn(&RangerParameters, f64, f64) -> bool| {
+        let seen = (0..SAMPLES).filter(|index| {
+            let share = f64::from(*index) / f64::from(SAMPLES);
+            let pose = scenario.path.pose_at(share * scenario.path.duration());
+            let rangers = scenario.robot.localizer.rangers;
+            let hits = |wall: &Segment| {
+                let [along, aside] = wall.place([pose.x, pose.y]);
+                let [tx, ty] = wall.tangent();
+                let (nx, ny) = (aside.signum() * ty, -aside.signum() * tx);
+                let bearing = crate::geometry::wrap(libm::atan2(ny, nx) - pose.heading);
+                let faces = along >= 0.0 && along <= wall.length();
+                faces && rangers.iter().any(|(_, ranger)| sees(ranger, aside.abs(), bearing))
+            };
+            room.walls.iter().any(hits)
+        });
+        let share = f64::from(u16::try_from(seen.count()).unwrap_or(SAMPLES)) / f64::from(SAMPLES);
+        share >= LEAST_SEEN
+    };
+    let is_near =
+        |ranger: &RangerParameters, range: f64| range <= f64::from(ranger.max_range.0) + 0.3;
+    let is_far = |ranger: &RangerParameters, range: f64| range >= f64::from(ranger.min_range.0);
+    let is_ahead = |ranger: &RangerParameters, bearing: f64| {
+        let (right, left) = ranger.servo;
+        let cone = f64::from(ranger.cone.0);
+        let (right, left) = (f64::from(right.0) - cone, f64::from(left.0) + cone);
+        (-1..=1).any(|turn| {
+            let bearing = bearing + f64::from(turn) * std::f64::consts::TAU;
+            bearing >= right && bearing <= left
+        })
+    };
+    let message = |key: &str, text: &str| {
+        let fact = facts.with(key).next()?;
+        facts.report(fact).then(|| fact.warn(format!("{} {text}", fact.quoted())))
+    };
+    if !count(&|ranger, range, _| is_near(ranger, range)) {
+        return message(
+            "sonar.max_range",
+            "never reaches a wall from the path: check the unit of max_range, of the map and of the path",
+        );
+    }
+    if !count(&|ranger, range, _| is_near(ranger, range) && is_far(ranger, range)) {
+        return message(
+            "sonar.min_range",
+            "is farther than every wall from the path: check the unit of min_range",
+        );
+    }
+    if !count(&|ranger, range, bearing| {
+        is_near(ranger, range) && is_far(ranger, range) && is_ahead(ranger, bearing)
+    }) {
+        let key = if facts.with("sonar.bearing").next().is_some() {
+            "sonar.bearing"
+        } else {
+            "sonar.servo[0]"
+        };
+        return message(
+            key,
+            "points to no wall from the path: a bearing is 0 ahead and positive to the left",
+        );
+    }
+    None
+}
