@@ -34,7 +34,14 @@ macro_rules! messages {
             const PACKAGE: &'static str = stringify!($package);
             const NAME: &'static str = stringify!($name);
         }
-    )* };
+        )*
+
+        /// Every message by its name (`nav_msgs/msg/Odometry`), with its definition.
+        #[must_use]
+        pub fn definitions() -> Vec<(String, String)> {
+            vec![$((<$name as Message>::type_name(), <$name as Message>::definition())),*]
+        }
+    };
 }
 
 /// A covariance of x, y, z, roll, pitch and yaw, row by row.
@@ -72,6 +79,7 @@ messages! {
     geometry_msgs / Transform { translation: Vector3, rotation: Quaternion }
     geometry_msgs / PoseWithCovariance { pose: Pose, covariance: Covariance }
     geometry_msgs / TwistWithCovariance { twist: Twist, covariance: Covariance }
+    geometry_msgs / PoseStamped { header: Header, pose: Pose }
     geometry_msgs / PoseWithCovarianceStamped { header: Header, pose: PoseWithCovariance }
     geometry_msgs / TransformStamped { header: Header, child_frame_id: String, transform: Transform }
     tf2_msgs / TFMessage { transforms: Vec<TransformStamped> }

@@ -1,0 +1,21 @@
+//! Recordings of ROS 2 (rosbag2): read, converted to a log, and written (`docs/bags.md`).
+//!
+//! | module | what |
+//! |---|---|
+//! | [`bag`] | a bag and its messages, whatever its storage |
+//! | [`sqlite`], `db3` | databases of SQLite, and bags in them |
+//! | `mcap_file` | bags in MCAP |
+//! | `packed` | what zstd and lz4 have packed |
+//! | [`definition`], `known` | the definition of a message, from the bag or known |
+//! | [`decode`] | a message as values by the names of its fields |
+//! | [`error`] | why a bag cannot be read or written |
+
+pub mod bag;
+mod db3;
+pub mod decode;
+pub mod definition;
+pub mod error;
+mod known;
+mod mcap_file;
+mod packed;
+pub mod sqlite;
