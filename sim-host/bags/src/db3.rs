@@ -1,4 +1,4 @@
-//! Messages in databases of SQLite.
+//! Messages in databases of `SQLite`.
 
 use std::collections::HashMap;
 use std::io::{Read, Seek};

@@ -243,7 +243,7 @@ mod tests {
         assert_eq!(value.number("header.stamp.sec"), Ok(-3.0));
         assert_eq!(value.text("header.frame_id"), Ok("odom"));
         assert_eq!(value.number("pose.pose.position.y"), Ok(0.1));
-        assert_eq!(value.numbers("pose.covariance").unwrap()[35], 0.25);
+        assert_eq!(value.numbers("pose.covariance").unwrap()[35].to_bits(), 0.25_f64.to_bits());
         assert_eq!(value.number("twist.twist.angular.z"), Ok(-1.5));
         for wrong in ["pose.x", "pose", "header.stamp.sec.x", ""] {
             assert_eq!(value.number(wrong), Err(Undecodable::Missing(wrong.into())));
@@ -262,8 +262,8 @@ mod tests {
         for (start, z) in [(little, 5_i64.to_le_bytes()), (big, 5_i64.to_be_bytes())] {
             let bytes = [start.as_slice(), &z, &[1]].concat();
             let value = Value::read(&definition, &bytes).unwrap();
-            let numbers = ["x", "y", "z", "w"].map(|name| value.number(name).unwrap());
-            assert_eq!(numbers, [-2.0, 1.0, 5.0, 1.0]);
+            let numbers = ["x", "y", "z", "w"].map(|name| value.number(name).unwrap().to_string());
+            assert_eq!(numbers, ["-2", "1", "5", "1"]);
         }
     }
 

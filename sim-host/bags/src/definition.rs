@@ -194,19 +194,17 @@ fn field(
     };
     // A text may have a bound: string<=10.
     let kind = kind.split('<').next().unwrap_or_default();
-    let element = match plain(kind) {
-        Some(plain) => Element::Plain(plain),
-        None => {
-            let name = match kind {
-                "Header" => "std_msgs/Header".to_owned(),
-                "time" => "builtin_interfaces/Time".to_owned(),
-                kind if kind.contains('/') => plain_name(kind),
-                kind => format!("{package}/{kind}"),
-            };
-            let number = numbers.get(name.as_str());
-            Element::Message(*number.ok_or(NoDefinition::Missing(name))?)
-        }
+    let message = || {
+        let name = match kind {
+            "Header" => "std_msgs/Header".to_owned(),
+            "time" => "builtin_interfaces/Time".to_owned(),
+            kind if kind.contains('/') => plain_name(kind),
+            kind => format!("{package}/{kind}"),
+        };
+        let number = numbers.get(name.as_str()).copied();
+        number.map(Element::Message).ok_or(NoDefinition::Missing(name))
     };
+    let element = plain(kind).map_or_else(message, |plain| Ok(Element::Plain(plain)))?;
     Ok(Field { name: line.name.to_owned(), element, count })
 }
 

@@ -48,6 +48,7 @@ impl Defect {
     }
 
     /// This defect of a file.
+    #[must_use]
     pub fn of(self, path: &Path) -> BagError {
         BagError { path: path.to_owned(), why: self }
     }

@@ -73,11 +73,9 @@ impl Messages<'_> {
             Record::Schema { header, data } => {
                 self.schemas.entry(header.id).or_insert((header, data.into_owned()));
             }
-            Record::Channel(channel) => {
-                if !self.topics.contains_key(&channel.id) {
-                    let topic = self.topic(&channel)?;
-                    self.topics.insert(channel.id, topic);
-                }
+            Record::Channel(channel) if !self.topics.contains_key(&channel.id) => {
+                let topic = self.topic(&channel)?;
+                self.topics.insert(channel.id, topic);
             }
             Record::Message { header, data } => {
                 self.number += 1;
@@ -95,13 +93,13 @@ impl Messages<'_> {
                 let value = Value::read(&topic.definition, &bytes);
                 self.take.take(&Message { file: self.path, number, topic, time, value })?;
             }
-            Record::Chunk { header, data } => self.chunk(header, &data)?,
+            Record::Chunk { header, data } => self.chunk(&header, &data)?,
             _ => {}
         }
         Ok(())
     }
 
-    fn chunk(&mut self, header: ChunkHeader, data: &[u8]) -> Result<(), Defect> {
+    fn chunk(&mut self, header: &ChunkHeader, data: &[u8]) -> Result<(), Defect> {
         let bytes = match header.compression.as_str() {
             "" => Cow::Borrowed(data),
             by => Cow::Owned(packed::part(by, data, &mut self.left)?),
@@ -115,7 +113,7 @@ impl Messages<'_> {
             return Err(Defect::content(why));
         }
         let unpacked =
-            ChunkHeader { compression: String::new(), compressed_size: length, ..header };
+            ChunkHeader { compression: String::new(), compressed_size: length, ..header.clone() };
         ChunkReader::new(unpacked, &bytes)?.try_for_each(|record| match record? {
             Record::Chunk { .. } => Err(Defect::content("a chunk has a chunk in it")),
             record => self.record(record),

@@ -1,4 +1,4 @@
-//! Databases of SQLite, read only: the rows of a table, from the first to the last (<https://sqlite.org/fileformat2.html>).
+//! Databases of `SQLite`, read only: the rows of a table, from the first to the last (<https://sqlite.org/fileformat2.html>).
 //!
 //! Nothing of a file is trusted. Every page of a table and every page of its long rows is read at most once, so that the work is
 //! bounded by the size of the file, and a row by [`MOST_ROW`].
@@ -25,7 +25,7 @@ use record::{integer, varint};
 
 /// The largest row that is read, bytes.
 pub const MOST_ROW: u64 = 64 << 20;
-/// The deepest tree. One of SQLite's is less deep, whatever its size.
+/// The deepest tree. Those of `SQLite` are less deep, whatever their size.
 const DEEPEST: usize = 24;
 /// Types of pages: inner page and leaf of a table.
 const INNER: u8 = 5;
@@ -40,7 +40,7 @@ pub enum SqlError {
     /// It does not begin as a database does.
     #[error("is no SQLite database: it does not begin with `SQLite format 3`")]
     Magic,
-    /// The header has a value that SQLite does not write.
+    /// The header has a value that `SQLite` does not write.
     #[error("the header of the database is damaged: its {0} is {1}")]
     Header(&'static str, u64),
     /// Texts are in UTF-16.

@@ -6,8 +6,10 @@
 //! | [`schema`] | a message's definition as text (`ros2msg`), made from its type |
 //! | [`cdr`] | a message as bytes |
 //! | [`geometry`] | planar poses, headings and covariances in messages |
+//! | [`transforms`] | the tree of frames |
 
 pub mod cdr;
 pub mod geometry;
 pub mod messages;
 pub mod schema;
+pub mod transforms;

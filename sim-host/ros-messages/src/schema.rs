@@ -38,7 +38,8 @@ pub trait Message: Field {
         Self::messages(&mut known);
         let mut own = known.pop().map(|own| own.fields.join("\n")).unwrap_or_default();
         for Definition { name, fields } in &known {
-            own += &format!("\n{}\nMSG: {name}\n{}", "=".repeat(80), fields.join("\n"));
+            let bar = "=".repeat(80);
+            own.extend([format!("\n{bar}\nMSG: {name}\n"), fields.join("\n")]);
         }
         own + "\n"
     }

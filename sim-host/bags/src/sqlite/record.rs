@@ -68,7 +68,7 @@ fn value(kind: u64, bytes: &[u8]) -> SqlValue {
         7 => SqlValue::Real(f64::from_bits(u64::from_ne_bytes(signed(bytes).to_ne_bytes()))),
         8 => SqlValue::Integer(0),
         9 => SqlValue::Integer(1),
-        _ if kind % 2 == 0 => SqlValue::Blob(bytes.to_owned()),
+        _ if kind.is_multiple_of(2) => SqlValue::Blob(bytes.to_owned()),
         _ => SqlValue::Text(String::from_utf8_lossy(bytes).into_owned()),
     }
 }
