@@ -78,9 +78,25 @@ impl<W: Write + Seek> Writer<W> {
         time: Nanoseconds,
         message: &M,
     ) -> anyhow::Result<()> {
+        let kind = (M::type_name(), M::definition());
+        self.write_bytes(topic, &kind, durability, time, &cdr::write(message)?)
+    }
+
+    /// Writes the bytes of a message of a type with this name and definition.
+    ///
+    /// # Errors
+    /// As [`Self::write`].
+    pub fn write_bytes(
+        &mut self,
+        topic: &str,
+        kind: &(String, String),
+        durability: Durability,
+        time: Nanoseconds,
+        bytes: &[u8],
+    ) -> anyhow::Result<()> {
         let time = u64::try_from(time).context("MCAP has no times before zero")?;
         if !self.channels.contains_key(topic) {
-            let channel = self.declare::<M>(topic, durability)?;
+            let channel = self.declare(topic, kind, durability)?;
             self.channels.insert(topic.to_owned(), channel);
         }
         let channel = self.channels.get_mut(topic).context("a topic is not declared")?;
@@ -94,19 +110,19 @@ impl<W: Write + Seek> Writer<W> {
         };
         let (first, last) = self.span.unwrap_or((time, time));
         self.span = Some((first.min(time), last.max(time)));
-        Ok(self.out.write_to_known_channel(&header, &cdr::write(message)?)?)
+        Ok(self.out.write_to_known_channel(&header, bytes)?)
     }
 
-    fn declare<M: Message>(
+    fn declare(
         &mut self,
         topic: &str,
+        (kind, definition): &(String, String),
         durability: Durability,
     ) -> anyhow::Result<Channel> {
-        let kind = M::type_name();
-        let schema = self.out.add_schema(&kind, "ros2msg", M::definition().as_bytes())?;
+        let schema = self.out.add_schema(kind, "ros2msg", definition.as_bytes())?;
         let qos = [("offered_qos_profiles".to_owned(), durability.qos())];
         let number = self.out.add_channel(schema, topic, "cdr", &BTreeMap::from(qos))?;
-        Ok(Channel { number, kind, durability, count: 0 })
+        Ok(Channel { number, kind: kind.clone(), durability, count: 0 })
     }
 
     /// Ends the file, and returns it with the text of its `metadata.yaml`. `name` is the name of the file.

@@ -120,7 +120,7 @@ fn convert(
         converted;
     eprintln!(
         "{}: {encoders} encoder records ({repeated} repeated ones left out), {ranges} ranges, {scans} scans, \
-         {reference} rows of reference; {skipped} lines or messages skipped, {restamped} stamps repaired, \
+         {reference} rows of reference;\n{skipped} lines or messages skipped, {restamped} stamps repaired, \
          {bridged} steps of implausible odometry replaced",
         out.display()
     );

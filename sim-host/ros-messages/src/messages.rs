@@ -4,6 +4,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::cdr::{self, CdrError};
 use crate::schema::{Definition, Field, Message};
 
 macro_rules! messages {
@@ -40,6 +41,14 @@ macro_rules! messages {
         #[must_use]
         pub fn definitions() -> Vec<(String, String)> {
             vec![$((<$name as Message>::type_name(), <$name as Message>::definition())),*]
+        }
+
+        /// Every message by its name, and its bytes when all of its fields are zero or empty.
+        ///
+        /// # Errors
+        /// [`CdrError`], never.
+        pub fn zeros() -> Result<Vec<(String, Vec<u8>)>, CdrError> {
+            Ok(vec![$((<$name as Message>::type_name(), cdr::write(&$name::default())?)),*])
         }
     };
 }
