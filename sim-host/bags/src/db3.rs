@@ -85,7 +85,6 @@ fn definitions<R: Read + Seek>(
         if let (SqlValue::Text(kind), SqlValue::Text(encoding), SqlValue::Text(text)) =
             (kind.take(&mut row), encoding.take(&mut row), text.take(&mut row))
             && encoding == "ros2msg"
-            && !text.is_empty()
             && texts.len() < MOST_TOPICS
         {
             texts.insert(kind, text);
