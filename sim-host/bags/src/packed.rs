@@ -11,6 +11,8 @@ use crate::error::Defect;
 
 /// The largest file that is unpacked, bytes.
 pub const MOST_FILE: u64 = 4 << 30;
+/// How many bytes of chunks and messages are unpacked of a file.
+pub const MOST_PARTS: u64 = 16 << 30;
 /// The largest chunk or message that is unpacked, bytes.
 pub const MOST_PART: u64 = 256 << 20;
 
@@ -67,5 +69,37 @@ fn zstd<R: Read>(bytes: R) -> Result<StreamingDecoder<R, ruzstd::decoding::Frame
     StreamingDecoder::new(bytes).map_err(|error| Defect::content(format!("zstd: {error}")))
 }
 
-/// How many bytes of parts are unpacked of a file.
-pub const MOST_PARTS: u64 = 16 << 30;
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use lz4_flex::frame::FrameEncoder;
+    use ruzstd::encoding::{CompressionLevel, compress_to_vec};
+
+    use super::*;
+
+    #[test]
+    fn what_is_packed_is_unpacked_up_to_a_limit() {
+        let content: Vec<u8> = (0..100_000_u32).flat_map(|n| (n / 7).to_le_bytes()).collect();
+        let mut lz4 = FrameEncoder::new(Vec::new());
+        lz4.write_all(&content).unwrap();
+        let lz4 = lz4.finish().unwrap();
+        let zstd = compress_to_vec(content.as_slice(), CompressionLevel::Fastest);
+        for (by, packed) in [("lz4", &lz4), ("zstd", &zstd)] {
+            let mut left = 1_000_000;
+            assert_eq!(part(by, packed, &mut left).unwrap(), content);
+            assert_eq!(left, 600_000);
+            // A second time it is beyond what is left.
+            assert_eq!(part(by, packed, &mut left).unwrap(), content);
+            let more = part(by, packed, &mut left).unwrap_err().to_string();
+            assert!(more.contains("too many bytes"), "{more}");
+            assert!(part(by, &packed[..packed.len() / 2], &mut 1_000_000).is_err());
+            assert!(part(by, &content, &mut 1_000_000).is_err());
+        }
+        let mut left = 1_000_000;
+        assert_eq!(message(&zstd, &mut left).unwrap(), content);
+        assert_eq!(message(&content, &mut left).unwrap(), content, "not packed");
+        let other = part("brotli", &lz4, &mut left).unwrap_err().to_string();
+        assert!(other.contains("packed by `brotli`"), "{other}");
+    }
+}
