@@ -5,9 +5,10 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use serde_json::{Value as Json, json};
-use sonarfix_bags::bag::{Bag, Message, Take};
+use sonarfix_bags::bag::Bag;
 use sonarfix_bags::decode::Value;
 use sonarfix_bags::error::Defect;
+use sonarfix_bags::message::{Message, Take};
 
 /// Prints what it takes.
 struct Printer<W: Write>(W);

@@ -2,16 +2,17 @@
 //!
 //! | module | what |
 //! |---|---|
+//! | `options` | what the caller chooses |
 //! | `wheels` | odometry and joints as travel of two wheels |
 //! | `sensors` | places and bearings of rangers, by frames or as given |
 //! | `robot` | the robot file |
 //! | this one | which topics are used, and the log |
 
+mod options;
 mod robot;
 mod sensors;
 mod wheels;
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
 use sonarfix_replay::convert::{
@@ -22,7 +23,9 @@ use sonarfix_sim::trace::Pose;
 
 use crate::bag::Bag;
 use crate::error::BagError;
-use crate::recording::{Joints, Recording, Track};
+use crate::recording::{Recording, Track};
+pub use options::Rosbag;
+use options::seconds;
 use sensors::{Measurement, Sensors};
 use wheels::Wheels;
 
@@ -30,35 +33,6 @@ use wheels::Wheels;
 const START_SIGMA: [f64; 2] = [0.05, 0.03];
 /// The topics from which a start is taken.
 const STARTS: [&str; 2] = ["/initialpose", "/amcl_pose"];
-
-/// A conversion. Topics that are not named are found, if there is only one of their kind.
-#[derive(Debug, Clone, Default)]
-pub struct Rosbag<'a> {
-    /// The topic with the odometry: `Odometry`, or `JointState` with a radius of the wheels.
-    pub odometry: Option<&'a str>,
-    /// The joints of the wheels.
-    pub joints: Option<Joints>,
-    /// The radius of the wheels, metres: takes the joints in place of the odometry.
-    pub radius: Option<f64>,
-    /// The distance between the wheels, metres.
-    pub track_width: Option<f64>,
-    /// The topics with ranges; all if it is empty.
-    pub ranges: &'a [String],
-    /// The topic with scans, in place of ranges.
-    pub scan: Option<&'a str>,
-    /// The bearings of the beams that are taken of a scan, radians from the heading; the whole scan if it is empty.
-    pub beams: &'a [f64],
-    /// The robot's frame.
-    pub base: Option<&'a str>,
-    /// Places of rangers: topic, and metres ahead, metres to the left and bearing in radians.
-    pub mounts: &'a [(String, [f64; 3])],
-    /// The pose at the begin.
-    pub start: Option<Pose>,
-    /// The topic with the true poses.
-    pub reference: Option<&'a str>,
-    /// The walls as CSV.
-    pub walls: Option<&'a Path>,
-}
 
 /// A record of the log, in the order in which those of the same time are written.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -151,39 +125,6 @@ impl Rosbag<'_> {
         let (time, pose, deviations) = published?;
         Some((first.max(*time), *pose, deviations.unwrap_or(START_SIGMA)))
     }
-}
-
-/// A topic by its name; else the only one, or the one with the usual name.
-fn choose<'t, T>(
-    topics: &'t BTreeMap<String, T>,
-    named: Option<&str>,
-    usual: &str,
-    (what, option): (&str, &str),
-) -> Result<Option<(&'t str, &'t T)>, String> {
-    let names = || topics.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
-    let with_name = |(name, topic): (&'t String, &'t T)| (name.as_str(), topic);
-    if let Some(name) = named {
-        let found = topics.get_key_value(name).map(with_name);
-        let why = || {
-            if topics.is_empty() {
-                return format!("has no {what}, thus none on {name} ({option})");
-            }
-            format!("has no {what} on {name} ({option}), but on: {}", names())
-        };
-        return found.ok_or_else(why).map(Some);
-    }
-    if topics.len() > 1 {
-        let found = topics.get_key_value(usual).map(with_name);
-        let why = || format!("has {what} on several topics: choose one with {option}: {}", names());
-        return found.ok_or_else(why).map(Some);
-    }
-    Ok(topics.iter().next().map(with_name))
-}
-
-/// Nanoseconds as seconds of the log.
-#[expect(clippy::cast_precision_loss, reason = "exact to a microsecond for 285 years")]
-fn seconds(time: Nanoseconds) -> f64 {
-    time as f64 * 1e-9
 }
 
 fn write_log(

@@ -4,10 +4,10 @@ use std::collections::HashMap;
 use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
 
-use crate::bag::{Message, Take, Topic};
 use crate::decode::Value;
 use crate::error::Defect;
 use crate::known;
+use crate::message::{Message, Take, Topic};
 use crate::packed::{self, MOST_PARTS};
 use crate::sqlite::{Database, Row, SqlValue};
 

@@ -2,7 +2,7 @@
 //!
 //! | module | what |
 //! |---|---|
-//! | [`bag`] | a bag and its messages, whatever its storage |
+//! | [`bag`], [`message`] | a bag and its messages, whatever its storage |
 //! | [`sqlite`], `db3` | databases of `SQLite`, and bags in them |
 //! | `mcap_file` | bags in MCAP |
 //! | `packed` | what zstd and lz4 have packed |
@@ -23,6 +23,7 @@ pub mod error;
 pub mod export;
 mod known;
 mod mcap_file;
+pub mod message;
 mod packed;
 pub mod recording;
 pub mod sqlite;

@@ -9,10 +9,10 @@ use mcap::read::ChunkReader;
 use mcap::records::{Channel, ChunkHeader, Record, SchemaHeader};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
-use crate::bag::{Message, Take, Topic};
 use crate::decode::Value;
 use crate::error::Defect;
 use crate::known;
+use crate::message::{Message, Take, Topic};
 use crate::packed::{self, MOST_PARTS};
 
 /// The largest record, bytes.

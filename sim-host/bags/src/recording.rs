@@ -9,9 +9,9 @@ use sonarfix_ros_messages::messages::{
 use sonarfix_ros_messages::transforms::Nanoseconds;
 use sonarfix_sim::trace::Pose;
 
-use crate::bag::{Message, Take};
 use crate::decode::{Undecodable, Value};
 use crate::error::Defect;
+use crate::message::{Message, Take};
 
 const ODOMETRY: &str = "nav_msgs/msg/Odometry";
 const JOINTS: &str = "sensor_msgs/msg/JointState";

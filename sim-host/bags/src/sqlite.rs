@@ -8,9 +8,11 @@
 //! | `pages` | the pages of a file |
 //! | `record` | the values of a row |
 //! | `columns` | the names of a table's columns, from the text that made it |
+//! | `error` | why a database cannot be read |
 //! | this one | the tree of a table |
 
 mod columns;
+mod error;
 mod pages;
 mod record;
 
@@ -19,69 +21,16 @@ use std::io::{self, Read, Seek};
 use std::path::Path;
 
 pub use columns::Columns;
+pub use error::{MOST_ROW, SqlError};
 use pages::{Page, Pages};
-pub use record::SqlValue;
+pub use record::{Row, SqlValue};
 use record::{integer, varint};
 
-/// The largest row that is read, bytes.
-pub const MOST_ROW: u64 = 64 << 20;
 /// The deepest tree. Those of `SQLite` are less deep, whatever their size.
 const DEEPEST: usize = 24;
 /// Types of pages: inner page and leaf of a table.
 const INNER: u8 = 5;
 const LEAF: u8 = 13;
-
-/// Why a database cannot be read.
-#[derive(Debug, thiserror::Error)]
-pub enum SqlError {
-    /// The file cannot be read.
-    #[error(transparent)]
-    Io(#[from] io::Error),
-    /// It does not begin as a database does.
-    #[error("is no SQLite database: it does not begin with `SQLite format 3`")]
-    Magic,
-    /// The header has a value that `SQLite` does not write.
-    #[error("the header of the database is damaged: its {0} is {1}")]
-    Header(&'static str, u64),
-    /// Texts are in UTF-16.
-    #[error(
-        "the texts of the database are UTF-16, and only UTF-8 is read: copy it with `sqlite3 OLD .dump | sqlite3 NEW`"
-    )]
-    Utf16,
-    /// There is no such table.
-    #[error("the database has no table `{0}`")]
-    NoTable(String),
-    /// There is no such column.
-    #[error("the table `{0}` has no column `{1}`")]
-    NoColumn(String, String),
-    /// A page is damaged.
-    #[error(
-        "page {page} of the database is damaged: {what}; `sqlite3 OLD .recover | sqlite3 NEW` saves what can be read"
-    )]
-    Page {
-        /// Its number, from 1.
-        page: u32,
-        /// The defect.
-        what: &'static str,
-    },
-    /// A row is larger than [`MOST_ROW`].
-    #[error("row {row} has {bytes} bytes, and at most {MOST_ROW} are read")]
-    LongRow {
-        /// Its number.
-        row: i64,
-        /// Its size.
-        bytes: u64,
-    },
-}
-
-/// A row of a table.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Row {
-    /// Its number.
-    pub number: i64,
-    /// Its values in the order of the columns; those at the end may be missing.
-    pub values: Vec<SqlValue>,
-}
 
 /// A database.
 #[derive(Debug)]

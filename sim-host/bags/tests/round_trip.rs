@@ -152,7 +152,7 @@ fn odometry(out: &mut Writer<Cursor<Vec<u8>>>) -> anyhow::Result<()> {
     for tick in 0_u8..10 {
         let seconds = 1.0 + f64::from(tick) / 10.0;
         let mut message = Odometry { header: stamped(seconds, "odom"), ..Odometry::default() };
-        message.child_frame_id = "base_footprint".to_owned();
+        "base_footprint".clone_into(&mut message.child_frame_id);
         message.pose.pose = geometry::pose([seconds, 0.0, 0.0]);
         out.write("/odom", Durability::Volatile, i64::from(tick), &message)?;
     }

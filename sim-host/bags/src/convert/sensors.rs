@@ -5,7 +5,7 @@ use sonarfix_replay::scan::Scan;
 use sonarfix_ros_messages::transforms::{Nanoseconds, NoTransform, Placement, Transforms};
 use sonarfix_sim::angle;
 
-use super::{Rosbag, choose, seconds};
+use super::options::{Rosbag, choose, seconds};
 use crate::recording::{Ranger, Recording, Scanner, Swept};
 
 /// How old the last transform of a moving frame may be, nanoseconds.

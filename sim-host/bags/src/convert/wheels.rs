@@ -5,7 +5,7 @@ use sonarfix_replay::convert::carmen::TRACK_WIDTH;
 use sonarfix_ros_messages::transforms::Nanoseconds;
 use sonarfix_sim::trace::Pose;
 
-use super::{Rosbag, choose, seconds};
+use super::options::{Rosbag, choose, seconds};
 use crate::recording::Recording;
 
 /// The robot's frame where neither an option nor the odometry names it.

@@ -1,6 +1,7 @@
 //! The names of a table's columns, from the text that made the table.
 
-use super::{Row, SqlError, SqlValue};
+use super::error::SqlError;
+use super::record::{Row, SqlValue};
 
 /// Words that begin a rule of a table in place of a column.
 const RULES: [&str; 5] = ["CONSTRAINT", "PRIMARY", "UNIQUE", "CHECK", "FOREIGN"];

@@ -2,7 +2,7 @@
 
 use std::io::{Read, Seek, SeekFrom};
 
-use super::SqlError;
+use super::error::SqlError;
 
 const MAGIC: &[u8; 16] = b"SQLite format 3\0";
 /// The length of the file's header, which is on its first page.

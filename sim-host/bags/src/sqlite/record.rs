@@ -15,6 +15,15 @@ pub enum SqlValue {
     Blob(Vec<u8>),
 }
 
+/// A row of a table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// Its number.
+    pub number: i64,
+    /// Its values in the order of the columns; those at the end may be missing.
+    pub values: Vec<SqlValue>,
+}
+
 /// Reads a number of one to nine bytes, seven bits a byte and all of the ninth; `None` if it is cut off.
 pub fn varint(bytes: &mut &[u8]) -> Option<u64> {
     let mut value = 0;
