@@ -113,8 +113,10 @@ def printed(bag: Path) -> list[Any]:
 def read(bag: Path) -> list[Any]:
     """The messages of a bag as rosbags reads them, by the definitions in the bag."""
     with AnyReader([bag]) as reader:
-        return [(connection.topic, connection.msgtype, time, reader.deserialize(raw, connection.msgtype))
-                for connection, time, raw in reader.messages()]
+        return [
+            (connection.topic, connection.msgtype, time, reader.deserialize(raw, connection.msgtype))
+            for connection, time, raw in reader.messages()
+        ]
 
 
 STORAGES: dict[str, tuple[int, StoragePlugin, CompressionMode]] = {
@@ -148,10 +150,14 @@ def write(bag: Path, storage: str, messages: list[Any]) -> None:
 
 def every_type() -> None:
     """Every type that rosbags knows, in every storage, read by ours; every type that ours knows, read by rosbags."""
-    messages = [(f"/{kind}", kind, 10 * number + turn, message(kind))
-                for number, kind in enumerate(sorted(STORE.fielddefs)) for turn in range(3)]
-    expected = [{"topic": topic, "type": kind, "time": float(time), "fields": plain(message)}
-                for topic, kind, time, message in messages]
+    messages = [
+        (f"/{kind}", kind, 10 * number + turn, message(kind))
+        for number, kind in enumerate(sorted(STORE.fielddefs))
+        for turn in range(3)
+    ]
+    expected = [
+        {"topic": topic, "type": kind, "time": float(time), "fields": plain(message)} for topic, kind, time, message in messages
+    ]
     for storage in STORAGES:
         bag = FOLDER / f"types-{storage}"
         write(bag, storage, messages)
@@ -165,15 +171,22 @@ def every_type() -> None:
         if kind in STORE.fielddefs:
             # The definition is that of ROS. nav2 and bond are not known to rosbags.
             assert names(STORE.types[kind]) == names(message_read), kind
-    print(f"every type: {len(STORE.fielddefs)} types in {len(STORAGES)} storages, "
-          f"{len(read(ours))} of ours read by rosbags")
+    print(f"every type: {len(STORE.fielddefs)} types in {len(STORAGES)} storages, {len(read(ours))} of ours read by rosbags")
 
 
 def without_definitions() -> None:
     """A database without definitions, as ROS's Humble writes it: of the types that ours knows."""
-    kinds = [f"{package}/msg/{name}" for package, name in [
-        ("nav_msgs", "Odometry"), ("sensor_msgs", "JointState"), ("sensor_msgs", "LaserScan"),
-        ("tf2_msgs", "TFMessage"), ("geometry_msgs", "PoseWithCovarianceStamped"), ("geometry_msgs", "PoseStamped")]]
+    kinds = [
+        f"{package}/msg/{name}"
+        for package, name in [
+            ("nav_msgs", "Odometry"),
+            ("sensor_msgs", "JointState"),
+            ("sensor_msgs", "LaserScan"),
+            ("tf2_msgs", "TFMessage"),
+            ("geometry_msgs", "PoseWithCovarianceStamped"),
+            ("geometry_msgs", "PoseStamped"),
+        ]
+    ]
     messages = [(f"/{kind}", kind, number, message(kind)) for number, kind in enumerate(kinds)]
     bag = FOLDER / "humble"
     write(bag, "sqlite-8", messages)
@@ -189,9 +202,10 @@ def databases() -> None:
     """Trees of every shape: pages of every size, rows over many pages, deleted rows, vacuumed files."""
     kind, rows = "std_msgs/msg/String", 0
     for size in [512, 1024, 4096, 65536]:
-        messages = [("/text", kind, time, STORE.types[kind]("x" * (random.randrange(300) if time % 50 else
-                                                                   random.randrange(200_000))))
-                    for time in range(1, 1500)]
+        messages = [
+            ("/text", kind, time, STORE.types[kind]("x" * (random.randrange(300) if time % 50 else random.randrange(200_000))))
+            for time in range(1, 1500)
+        ]
         bag = FOLDER / f"pages-{size}"
         write(bag, "sqlite-9", messages)
         database = sqlite3.connect(bag / f"pages-{size}.db3", isolation_level=None)
@@ -201,8 +215,7 @@ def databases() -> None:
         assert database.execute("PRAGMA page_size").fetchone() == (size,)
         database.execute("DELETE FROM messages WHERE id % 7 = 3")
         database.execute("UPDATE messages SET timestamp = -timestamp WHERE id % 11 = 5")
-        expected = [(time, len(data)) for time, data in
-                    database.execute("SELECT timestamp, data FROM messages ORDER BY id")]
+        expected = [(time, len(data)) for time, data in database.execute("SELECT timestamp, data FROM messages ORDER BY id")]
         database.close()
         # The text of a message is its bytes without header, length and zero.
         found = [(message["time"], len(message["fields"]["data"]) + 9) for message in printed(bag)]
@@ -227,11 +240,11 @@ def logs() -> None:
         other = FOLDER / f"run-{storage}"
         write(other, storage, begin)
         again = convert(other, f"from-{storage}", "--reference", "/pose/true").joinpath("log.csv").read_text()
-        assert len(again) > 10_000 and lines.startswith(again), storage
+        assert len(again) > 10_000, storage
+        assert lines.startswith(again), storage
     for file in ["map.toml", "robot.toml"]:
         shutil.copy(log.parent / file, converted / file)
-    [own, other] = [json.loads(run(SONARFIX, "replay", path, "--json").stdout)
-                    for path in [log, converted / "log.csv"]]
+    [own, other] = [json.loads(run(SONARFIX, "replay", path, "--json").stdout) for path in [log, converted / "log.csv"]]
     [own, other] = [summary["position_rms"] for summary in [own, other]]
     assert abs(own - other) < 0.02 * own + 2e-4, (own, other)
     print(f"replay: {1e3 * own:.2f} mm of the log, {1e3 * other:.2f} mm of the bag (RMS)")
@@ -265,10 +278,11 @@ def check_ours(log: Path, messages: list[Any]) -> None:
     odometry = [message for topic, _, _, message in messages if topic == "/odom"]
     assert len(wheels) == len(odometry)
     # The distance between two poses is that of the wheels, up to the bend.
-    driven = sum(math.dist((a.pose.pose.position.x, a.pose.pose.position.y), (b.pose.pose.position.x, b.pose.pose.position.y))
-                 for a, b in zip(odometry, odometry[1:], strict=False))
-    rolled = sum(abs(sum(float(b[side]) - float(a[side]) for side in (2, 3))) / 2
-                 for a, b in zip(wheels, wheels[1:], strict=False))
+    driven = sum(
+        math.dist((a.pose.pose.position.x, a.pose.pose.position.y), (b.pose.pose.position.x, b.pose.pose.position.y))
+        for a, b in zip(odometry, odometry[1:], strict=False)
+    )
+    rolled = sum(abs(sum(float(b[side]) - float(a[side]) for side in (2, 3))) / 2 for a, b in zip(wheels, wheels[1:], strict=False))
     assert abs(driven - rolled) < 1e-3 * rolled, (driven, rolled)
 
 
@@ -307,16 +321,18 @@ def scans(folder: Path) -> None:
     bag = FOLDER / "scans"
     run(SONARFIX, "export", log, "--rosbag", bag)
     out = convert(bag, "from-scans").joinpath("log.csv").read_text()
-    assert out.count("scan,") == 20 and "1.500 - 2.250 0.750" in out, out
+    assert out.count("scan,") == 20, out
+    assert "1.500 - 2.250 0.750" in out, out
     out = convert(bag, "from-beams", "--beams", "-90,30").joinpath("log.csv").read_text()
     found = [line.split(",")[2:] for line in out.splitlines() if line.startswith("range")]
-    # The nearest beams to −90° and 30° are those at −1.5 and 0.5 rad.
+    # The nearest beams to -90° and 30° are those at -1.5 and 0.5 rad.
     assert found[:2] == [["-1.500000", "1.5"], ["0.500000", "2.25"]], found[:2]
     print("scans: 20, whole and as beams")
 
 
 def damaged() -> None:
     """Torn and changed bags: an error in a bounded time and memory, never a panic."""
+
     def limit() -> None:
         resource.setrlimit(resource.RLIMIT_AS, (BYTES, BYTES))
 
@@ -328,13 +344,13 @@ def damaged() -> None:
         for turn in range(DAMAGED // 5):
             content = bytearray(whole)
             if turn % 3 == 0:
-                del content[random.randrange(len(content)):]
+                del content[random.randrange(len(content)) :]
             else:
                 for _ in range(1 + turn):
                     content[random.randrange(len(content))] = random.randrange(256)
             if turn % 5 == 4:
                 at = random.randrange(len(content) - 8)
-                content[at:at + 8] = b"\xff" * 8
+                content[at : at + 8] = b"\xff" * 8
             file.write_bytes(content)
             done = subprocess.run([str(PRINT), str(file)], capture_output=True, timeout=SECONDS, preexec_fn=limit)
             assert done.returncode in (0, 1), (name, turn, done.returncode, done.stderr[-500:])

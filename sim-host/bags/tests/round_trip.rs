@@ -338,6 +338,9 @@ fn damaged_bags_are_errors() {
     let packed = error(&chunk);
     assert!(packed.contains("zstd") || packed.contains("claims"), "{packed}");
     assert!(error(b"SQLite format 3\0 and no more").contains("no SQLite database"));
+    // A part of a database is in the file beside it.
+    fs::write(dir.path().join("damaged.mcap-wal"), "pages").unwrap();
+    assert!(error(b"SQLite format 3\0").contains("the recording was interrupted"));
     let folder = TempDir::new().unwrap();
     assert!(read(folder.path()).unwrap_err().contains("it is no bag of ROS 2"));
     let mut metadata = fs::File::create(folder.path().join("metadata.yaml")).unwrap();
