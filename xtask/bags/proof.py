@@ -26,7 +26,7 @@ SONARFIX, PRINT, EVERY_TYPE, FOLDER = (Path(argument) for argument in sys.argv[1
 SCENARIO = Path(__file__).parents[2] / "crates/sonarfix-map/scenarios/classroom.toml"
 STORE = get_typestore(Stores.ROS2_JAZZY)
 # Damaged bags: how many, how long one may take, and the memory of the process.
-DAMAGED = 150
+DAMAGED = 100
 SECONDS = 10
 BYTES = 1 << 30
 
@@ -153,7 +153,7 @@ def every_type() -> None:
     messages = [
         (f"/{kind}", kind, 10 * number + turn, message(kind))
         for number, kind in enumerate(sorted(STORE.fielddefs))
-        for turn in range(3)
+        for turn in range(2)
     ]
     expected = [
         {"topic": topic, "type": kind, "time": float(time), "fields": plain(message)} for topic, kind, time, message in messages
@@ -204,7 +204,7 @@ def databases() -> None:
     for size in [512, 1024, 4096, 65536]:
         messages = [
             ("/text", kind, time, STORE.types[kind]("x" * (random.randrange(300) if time % 50 else random.randrange(200_000))))
-            for time in range(1, 1500)
+            for time in range(1, 700)
         ]
         bag = FOLDER / f"pages-{size}"
         write(bag, "sqlite-9", messages)

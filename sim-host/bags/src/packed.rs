@@ -46,9 +46,9 @@ pub fn message<'m>(bytes: &'m [u8], left: &mut u64) -> Result<Cow<'m, [u8]>, Def
 pub fn part(by: &str, bytes: &[u8], left: &mut u64) -> Result<Vec<u8>, Defect> {
     let most = MOST_PART.min(*left);
     let mut unpacked = Vec::new();
-    match by {
-        "zstd" => zstd(bytes)?.take(most).read_to_end(&mut unpacked)?,
-        "lz4" => FrameDecoder::new(bytes).take(most).read_to_end(&mut unpacked)?,
+    let read = match by {
+        "zstd" => zstd(bytes)?.take(most).read_to_end(&mut unpacked),
+        "lz4" => FrameDecoder::new(bytes).take(most).read_to_end(&mut unpacked),
         other => {
             let why = format!(
                 "a chunk is packed by `{other}`, and only zstd and lz4 are read: unpack it with `mcap compress --compression none`"
@@ -56,6 +56,12 @@ pub fn part(by: &str, bytes: &[u8], left: &mut u64) -> Result<Vec<u8>, Defect> {
             return Err(Defect::content(why));
         }
     };
+    read.map_err(|error| {
+        let why = format!(
+            "what {by} has packed is damaged: {error}; `mcap recover` saves what can be read"
+        );
+        Defect::content(why)
+    })?;
     *left -= unpacked.len() as u64;
     if unpacked.len() as u64 == most {
         let why = "is unpacked to too many bytes (256 MiB a chunk, 16 GiB in all): take the topics that are needed \
