@@ -1,4 +1,4 @@
-//! Writes a bag with a message of every type that this program knows, all of zeros, into a folder: for `xtask/bags/proof.py`, by
+//! Writes a bag with a message of every type of this program, all of zeros, into a folder: for `xtask/bags/proof.py`, by
 //! which another program reads them.
 
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! The definition of a message: that of the bag, else the one that this program knows.
+//! The definition of a message: that of the bag, else that of this program.
 
 use sonarfix_ros_messages::messages;
 
@@ -23,7 +23,7 @@ pub fn definition(kind: &str, text: Option<&str>) -> Result<Definition, Defect> 
     };
     let Some(text) = text.map(str::to_owned).or_else(known) else {
         let why = format!(
-            "has no definition of {kind} as ros2msg, and this program knows none: convert the bag to MCAP with `ros2 bag convert`"
+            "has no definition of {kind} as ros2msg, and this program has none either: convert the bag to MCAP with `ros2 bag convert`"
         );
         return Err(Defect::content(why));
     };

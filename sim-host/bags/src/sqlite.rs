@@ -117,15 +117,15 @@ impl<R: Read + Seek> Database<R> {
     ) -> Result<(), E> {
         let count = self.pages.count();
         let mut left = count;
-        let mut spare = Spare { pages: count, bytes: 0 };
+        let mut left_over = LeftOver { pages: count, bytes: 0 };
         // Pages with the number of the next cell.
         let mut path: Vec<(Page, u32)> = vec![(self.pages.read(root)?, 0)];
         while let Some((page, next)) = path.last_mut() {
             let tree = Tree::of(page)?;
             if tree.kind == LEAF {
-                spare.bytes = self.pages.usable();
+                left_over.bytes = self.pages.usable();
                 for cell in 0..tree.cells {
-                    take(row(&mut self.pages, page, tree.cell(page, cell)?, &mut spare)?)?;
+                    take(row(&mut self.pages, page, tree.cell(page, cell)?, &mut left_over)?)?;
                 }
                 path.pop();
                 continue;
@@ -184,7 +184,7 @@ impl Tree {
 }
 
 /// What may still be read of the rows of a table whose rows do not overlap.
-struct Spare {
+struct LeftOver {
     /// Pages of long rows.
     pages: u32,
     /// Bytes on this leaf.
@@ -196,7 +196,7 @@ fn row<R: Read + Seek>(
     pages: &mut Pages<R>,
     page: &Page,
     at: usize,
-    spare: &mut Spare,
+    left_over: &mut LeftOver,
 ) -> Result<Row, SqlError> {
     let mut rest = page.from(at)?;
     let short = || page.damage("a row is cut off");
@@ -209,14 +209,14 @@ fn row<R: Read + Seek>(
     let here = pages.part_on_leaf(length);
     let overlap = || page.damage("its rows overlap");
     // A row of no bytes has a cell of two bytes.
-    spare.bytes = spare.bytes.checked_sub(here + 2).ok_or_else(overlap)?;
+    left_over.bytes = left_over.bytes.checked_sub(here + 2).ok_or_else(overlap)?;
     let mut payload = rest.get(..here).ok_or_else(short)?.to_vec();
     if here < length {
         let link = rest.get(here..here + 4).and_then(|link| link.try_into().ok());
         let mut next = u32::from_be_bytes(link.ok_or_else(short)?);
         while payload.len() < length {
             let looped = || page.damage("a long row has a loop");
-            spare.pages = spare.pages.checked_sub(1).ok_or_else(looped)?;
+            left_over.pages = left_over.pages.checked_sub(1).ok_or_else(looped)?;
             let long = pages.read(next)?;
             next = long.word(0)?;
             let part = long.from(4)?;

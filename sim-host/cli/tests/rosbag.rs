@@ -14,7 +14,7 @@ fn run(arguments: &[&str], folder: &Path) -> (bool, String) {
     (output.status.success(), String::from_utf8_lossy(&output.stderr).into_owned())
 }
 
-/// A bag of a log is converted into a log that replays, and neither is replaced without being told.
+/// A bag of a log is converted into a log that replays, and neither is replaced without `--force`.
 #[test]
 fn a_log_becomes_a_bag_and_a_log_again() {
     let files = endings::files();

@@ -1,4 +1,4 @@
-//! The robot file: what the bag tells, and values of an unknown robot for what it does not.
+//! The robot file: what is in the bag, and values of an unknown robot for the rest.
 
 use std::path::Path;
 
