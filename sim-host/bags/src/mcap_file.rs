@@ -5,8 +5,7 @@ use std::collections::HashMap;
 use std::io::Read;
 use std::path::Path;
 
-use mcap::read::ChunkReader;
-use mcap::records::{Channel, ChunkHeader, Record, SchemaHeader};
+use mcap::records::{Channel, ChunkHeader, Record, SchemaHeader, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use crate::decode::Value;
@@ -45,10 +44,10 @@ pub fn read(mut bytes: impl Read, path: &Path, take: &mut dyn Take) -> Result<()
             }
             LinearReadEvent::Record { data, opcode } => {
                 // The summary begins here, and has no messages.
-                if opcode == mcap::records::op::DATA_END {
+                if opcode == op::DATA_END {
                     return Ok(());
                 }
-                messages.record(mcap::parse_record(opcode, data)?)?;
+                messages.raw(opcode, data)?;
             }
         }
     }
@@ -68,6 +67,27 @@ struct Messages<'t> {
 }
 
 impl Messages<'_> {
+    /// A record as bytes. Only those that are needed are parsed, and only if their texts are not longer than they are themselves: the
+    /// parser allocates what a text claims.
+    fn raw(&mut self, opcode: u8, body: &[u8]) -> Result<(), Defect> {
+        // Where the first text begins, how many follow each other, and whether a list of texts is behind them.
+        let (mut at, texts, has_list) = match opcode {
+            op::SCHEMA => (2, 3, false),
+            op::CHANNEL => (4, 2, true),
+            op::MESSAGE => (0, 0, false),
+            op::CHUNK => (28, 1, false),
+            _ => return Ok(()),
+        };
+        for _ in 0..texts {
+            at = end_of_text(body, at)?;
+        }
+        at += if has_list { 4 } else { 0 };
+        while has_list && at < body.len() {
+            at = end_of_text(body, at)?;
+        }
+        self.record(mcap::parse_record(opcode, body)?)
+    }
+
     fn record(&mut self, record: Record) -> Result<(), Defect> {
         match record {
             Record::Schema { header, data } => {
@@ -112,12 +132,23 @@ impl Messages<'_> {
             );
             return Err(Defect::content(why));
         }
-        let unpacked =
-            ChunkHeader { compression: String::new(), compressed_size: length, ..header.clone() };
-        ChunkReader::new(unpacked, &bytes)?.try_for_each(|record| match record? {
-            Record::Chunk { .. } => Err(Defect::content("a chunk has a chunk in it")),
-            record => self.record(record),
-        })
+        if header.uncompressed_crc != 0 && crc32fast::hash(&bytes) != header.uncompressed_crc {
+            let why = "a chunk has another checksum than its bytes; `mcap recover` saves what can be read";
+            return Err(Defect::content(why));
+        }
+        let mut rest = bytes.as_ref();
+        while let Some((&opcode, behind)) = rest.split_first() {
+            let cut_off = || Defect::content("a chunk ends within a record");
+            let (length, behind) = behind.split_first_chunk().ok_or_else(cut_off)?;
+            let length = usize::try_from(u64::from_le_bytes(*length)).map_err(|_| cut_off())?;
+            let (body, behind) = behind.split_at_checked(length).ok_or_else(cut_off)?;
+            rest = behind;
+            if opcode == op::CHUNK {
+                return Err(Defect::content("a chunk has a chunk in it"));
+            }
+            self.raw(opcode, body)?;
+        }
+        Ok(())
     }
 
     /// The topic of a channel, if it is wanted.
@@ -141,4 +172,16 @@ impl Messages<'_> {
         let definition = known::definition(&kind, text)?;
         Ok(Some(Topic { name: name.clone(), kind, definition }))
     }
+}
+
+/// Where a text at a place of a record ends: four bytes of length, and as many as that.
+fn end_of_text(body: &[u8], at: usize) -> Result<usize, Defect> {
+    let length = body.get(at..).and_then(|rest| rest.first_chunk());
+    let length = length.and_then(|length| usize::try_from(u32::from_le_bytes(*length)).ok());
+    let end = length.and_then(|length| at.checked_add(4)?.checked_add(length));
+    end.filter(|end| *end <= body.len()).ok_or_else(|| {
+        Defect::content(
+            "a record claims a text that is longer than it; `mcap recover` saves what can be read",
+        )
+    })
 }

@@ -321,6 +321,13 @@ fn damaged_bags_are_errors() {
     let huge = [mcap::MAGIC, &[1], &[0xfe; 8], &[0; 100]].concat();
     let huge = error(&huge);
     assert!(huge.contains("exceeds limit") || huge.contains("claims"), "{huge}");
+    // A schema and a channel whose texts claim 3 GiB.
+    for (opcode, ids) in [(3, 2), (4, 4)] {
+        let body = [[1; 4].get(..ids).unwrap(), &(3_u32 << 30).to_le_bytes(), &[0; 40]].concat();
+        let length = (body.len() as u64).to_le_bytes();
+        let bytes = [mcap::MAGIC, &[opcode], &length, &body, &[0; 99]].concat();
+        assert!(error(&bytes).contains("claims a text that is longer than it"));
+    }
     let mut chunk = [mcap::MAGIC, &[6]].concat();
     let body = [
         [0; 16].as_slice(),
