@@ -6,6 +6,7 @@ use anyhow::Context;
 use ci::Step;
 use clap::{Parser, Subcommand};
 
+mod bags;
 mod bench;
 mod budgets;
 mod c_library;
@@ -115,6 +116,8 @@ enum Task {
     Playground,
     /// The Python package: its wheel in an empty environment, its tests, types, style and notebooks.
     Python(python::Args),
+    /// Bags of ROS 2 against rosbags in Python: ours read by it, its own and damaged ones read by ours.
+    Bags,
     /// Licences of all dependencies, and advisories if their database can be reached.
     Deny,
     /// Records the golden traces, writes the fuzz inputs of messages, and measures and writes `budgets.toml`.
@@ -140,7 +143,7 @@ enum Task {
 }
 
 /// The steps of CI, by job.
-fn steps() -> [Step<Task>; 31] {
+fn steps() -> [Step<Task>; 32] {
     [
         ("lint", "format", Task::Format),
         ("lint", "circles", Task::Circles),
@@ -169,6 +172,7 @@ fn steps() -> [Step<Task>; 31] {
         ("budgets", "peers", Task::Peers),
         ("budgets", "playground", Task::Playground),
         ("python", "python", Task::Python(python::Args::CHECK)),
+        ("python", "bags", Task::Bags),
         ("random", "endurance", Task::Endurance(endurance::Args::SHORT)),
         ("random", "search-windows", Task::SearchWindows(search_windows::Args::SHORT)),
         ("random", "fuzz", Task::Fuzz(fuzz::Args::short())),
@@ -240,6 +244,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Package => publish::package(),
         Task::Playground => playground::build_and_check(),
         Task::Python(args) => python::check(args),
+        Task::Bags => bags::check(),
         Task::Deny => checks::deny(),
         Task::Bless(args) => bless(&args),
         Task::Bench => bench::run(),

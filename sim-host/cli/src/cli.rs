@@ -39,7 +39,7 @@ enum Command {
     Survey(survey::Args),
     /// Converts recordings of other formats for `replay`.
     Convert(convert::Args),
-    /// Writes logs, recordings and traces for other programs: MCAP and Parquet.
+    /// Writes logs, recordings and traces for other programs: MCAP, Parquet and bags of ROS 2.
     Export(export::Args),
     /// Shows the telemetry of a robot and records it for `replay`.
     Monitor(monitor::Args),

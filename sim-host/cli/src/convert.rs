@@ -11,6 +11,8 @@ use sonarfix_replay::convert::{ConvertError, Converted};
 
 use sonarfix_terminal::output::check_folder;
 
+use crate::convert_rosbag;
+
 /// Maximum number of skipped or implausible lines that are printed.
 const SHOWN: u64 = 10;
 
@@ -47,6 +49,8 @@ enum Format {
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
     },
+    /// A bag of ROS 2 (rosbag2): MCAP or `SQLite`, a folder or a file.
+    Rosbag(Box<convert_rosbag::Args>),
     /// Sweeps of a LEGO NXT's rotating sonar (the data set `nxt_rotating_sonar`), for `find`.
     Nxt {
         /// The folder with sweeps.csv, `walls_cm.csv` and sweeps.
@@ -89,6 +93,10 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
             let carmen = Carmen { from, walls: walls.as_deref(), to: out };
             convert(out, |report| carmen.convert(report))
         }
+        Format::Rosbag(args) => {
+            args.check()?;
+            convert(args.out(), |report| args.convert(report))
+        }
         Format::Nxt { from, out } => convert(out, |_| Nxt { from, to: out }.convert()),
     }
 }
@@ -108,10 +116,11 @@ fn convert(
     if reported > SHOWN {
         eprintln!("{} more such lines", reported - SHOWN);
     }
-    let Converted { encoders, scans, reference, repeated, skipped, restamped, bridged } = converted;
+    let Converted { encoders, ranges, scans, reference, repeated, skipped, restamped, bridged } =
+        converted;
     eprintln!(
-        "{}: {encoders} encoder records ({repeated} repeated ones left out), {scans} scans, \
-         {reference} rows of reference; {skipped} lines skipped, {restamped} stamps repaired, \
+        "{}: {encoders} encoder records ({repeated} repeated ones left out), {ranges} ranges, {scans} scans, \
+         {reference} rows of reference;\n{skipped} lines or messages skipped, {restamped} stamps repaired, \
          {bridged} steps of implausible odometry replaced",
         out.display()
     );

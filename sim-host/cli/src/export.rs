@@ -4,7 +4,8 @@ use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
+use anyhow::{Context, bail, ensure};
+use sonarfix_bags::export::Export;
 use sonarfix_exchange::row::{Rows, Sink};
 use sonarfix_exchange::{mcap_file, trace_csv, trace_parquet};
 use sonarfix_files::Output;
@@ -13,7 +14,10 @@ use sonarfix_map::{Floor, MapFile, robot_file};
 use sonarfix_replay::{Replay, Summary, log};
 use sonarfix_sim::trace::{Recorder, Wall};
 
-use sonarfix_terminal::output::check_file;
+use sonarfix_terminal::output::{check_file, check_folder};
+
+/// The file of a bag that describes it.
+const METADATA: &str = "metadata.yaml";
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -29,18 +33,26 @@ pub struct Args {
     #[arg(long, value_name = "REF.csv")]
     reference: Option<PathBuf>,
     /// Writes MCAP, for Foxglove (docs/exchange.md).
-    #[arg(long, value_name = "FILE.mcap", required_unless_present = "parquet")]
+    #[arg(long, value_name = "FILE.mcap", required_unless_present_any = ["parquet", "rosbag"])]
     mcap: Option<PathBuf>,
     /// Writes the columns of a trace as Parquet, for pandas and polars (docs/exchange.md).
     #[arg(long, value_name = "FILE.parquet")]
     parquet: Option<PathBuf>,
+    /// Writes a log and its replay as a bag of ROS 2 (docs/bags.md): a folder with an MCAP file and metadata.yaml.
+    #[arg(long, value_name = "DIR")]
+    rosbag: Option<PathBuf>,
+    /// Replaces a bag that is in the folder.
+    #[arg(long, requires = "rosbag")]
+    force: bool,
 }
 
+type Bag<'r> = Export<'r, Output>;
 type Mcap = mcap_file::File<Output>;
 type Parquet = trace_parquet::File<Output>;
 
 /// The files that are written.
-struct Outputs {
+struct Outputs<'r> {
+    bag: Option<(&'r Path, Bag<'r>)>,
     mcap: Option<Mcap>,
     parquet: Option<Parquet>,
 }
@@ -50,6 +62,15 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         if let Some(file) = file {
             check_file(option, file)?;
         }
+    }
+    if let Some(folder) = &args.rosbag {
+        check_folder("--rosbag", folder)?;
+        let metadata = folder.join(METADATA);
+        ensure!(
+            args.force || !metadata.exists(),
+            "--rosbag: {} exists: name another folder, or replace it with --force",
+            metadata.display()
+        );
     }
     let map = args.map.clone().unwrap_or_else(|| args.file.with_file_name("map.toml"));
     let floor = MapFile::read(&map, None)?.floor;
@@ -77,7 +98,11 @@ fn walls(floor: &Floor) -> Vec<Wall> {
 }
 
 fn export_trace(args: &Args, floor: &Floor) -> anyhow::Result<()> {
-    let mut outputs = Outputs::new(args, 0.0, &walls(floor))?;
+    if args.rosbag.is_some() {
+        let file = args.file.display();
+        bail!("--rosbag: {file} is a trace, which has no odometry and no ranges: export the log");
+    }
+    let mut outputs = Outputs::new(args, 0.0, &walls(floor), None)?;
     let rows = trace_csv::read(open(&args.file)?, &mut outputs.sinks());
     let rows = rows.with_context(|| args.file.display().to_string())?;
     outputs.end()?;
@@ -91,7 +116,11 @@ fn export_log(args: &Args, floor: &Floor) -> anyhow::Result<()> {
     // The start is known after a replay: MCAP needs its time on the log's clock.
     let start = replay(args, &robot, floor, &mut ())?.started_at;
     let walls = walls(floor);
-    let mut outputs = Outputs::new(args, start, &walls)?;
+    let mut outputs = Outputs::new(args, start, &walls, Some(&robot))?;
+    let mut left_out = 0;
+    if let Some((_, bag)) = &mut outputs.bag {
+        left_out = bag.take_log(open(&args.file)?)?;
+    }
     let mut rows = Rows::new(&walls, outputs.sinks());
     let summary = replay(args, &robot, floor, &mut rows)?;
     rows.end()?;
@@ -103,6 +132,11 @@ fn export_log(args: &Args, floor: &Floor) -> anyhow::Result<()> {
     outputs.end()?;
     let (lines, skipped) = (summary.lines, summary.lines_skipped);
     println!("{lines} lines, {skipped} of them skipped; {:.1} s", summary.duration);
+    if left_out > 0 {
+        eprintln!(
+            "{left_out} records are not in the bag: ROS has no message for them (docs/bags.md)"
+        );
+    }
     Ok(())
 }
 
@@ -121,8 +155,19 @@ fn replay(
     summary.with_context(|| args.file.display().to_string())
 }
 
-impl Outputs {
-    fn new(args: &Args, epoch: f64, walls: &[Wall]) -> anyhow::Result<Self> {
+/// The name of the only file with messages of a bag, as rosbag2 names it.
+fn bag_file(folder: &Path) -> String {
+    let name = folder.file_name().map_or_else(|| "bag".into(), |name| name.to_string_lossy());
+    format!("{name}_0.mcap")
+}
+
+impl<'r> Outputs<'r> {
+    fn new(
+        args: &'r Args,
+        epoch: f64,
+        walls: &[Wall],
+        robot: Option<&'r RobotConfig>,
+    ) -> anyhow::Result<Self> {
         let create = |file: &PathBuf| -> anyhow::Result<_> {
             Output::create(file).with_context(|| format!("cannot write {}", file.display()))
         };
@@ -133,16 +178,27 @@ impl Outputs {
         ];
         let mcap = args.mcap.as_ref().map(|file| Mcap::new(create(file)?, epoch, walls, &metadata));
         let parquet = args.parquet.as_ref().map(|file| Parquet::new(create(file)?));
-        Ok(Self { mcap: mcap.transpose()?, parquet: parquet.transpose()? })
+        let mut bag = None;
+        if let (Some(folder), Some(robot)) = (&args.rosbag, robot) {
+            let file = create(&folder.join(bag_file(folder)))?;
+            bag = Some((folder.as_path(), Bag::new(file, robot, epoch, walls)?));
+        }
+        Ok(Self { bag, mcap: mcap.transpose()?, parquet: parquet.transpose()? })
     }
 
     fn sinks(&mut self) -> Vec<&mut dyn Sink> {
         let mcap = self.mcap.iter_mut().map(|file| file as &mut dyn Sink);
         let parquet = self.parquet.iter_mut().map(|file| file as &mut dyn Sink);
-        mcap.chain(parquet).collect()
+        let bag = self.bag.iter_mut().map(|(_, bag)| bag as &mut dyn Sink);
+        mcap.chain(parquet).chain(bag).collect()
     }
 
     fn end(self) -> anyhow::Result<()> {
+        if let Some((folder, bag)) = self.bag {
+            let (file, metadata) = bag.end(&bag_file(folder))?;
+            file.finish()?;
+            sonarfix_files::write(&folder.join(METADATA), metadata)?;
+        }
         if let Some(file) = self.mcap {
             file.end()?.finish()?;
         }

@@ -10,6 +10,7 @@ mod cli;
 mod command;
 mod config;
 mod convert;
+mod convert_rosbag;
 mod export;
 mod find;
 mod init;

@@ -25,7 +25,7 @@ const PAPER: &str = "../../crates/sonarfix-map/scenarios/paper.toml";
 
 /// Every subcommand, with arguments for the shortest output. In `FILES` are a short log with its map and robot, a drive for
 /// the calibration, a recorded stream of a robot's bytes, rows, and room for results; `ROBOT` is the port of a robot.
-const PRINTING: [&[&str]; 39] = [
+const PRINTING: [&[&str]; 41] = [
     &["--help"],
     &["init", "FILES/robot"],
     &["paper", "--runs", "1"],
@@ -36,7 +36,9 @@ const PRINTING: [&[&str]; 39] = [
     &["calibrate", "FILES/drive.csv"],
     &["survey", "FILES/survey/log.csv"],
     &["export", "FILES/log.csv", "--mcap", "FILES/log.mcap"],
+    &["export", "FILES/log.csv", "--rosbag", "FILES/bag"],
     &["convert", "carmen", "FILES/carmen.log", "--out", "FILES/converted"],
+    &["convert", "rosbag", "FILES/recorded", "--out", "FILES/of_bag"],
     // These need a recording.
     &["convert", "lego", "--help"],
     &["convert", "nxt", "--help"],
@@ -80,6 +82,8 @@ pub fn files() -> tempfile::TempDir {
         "log.csv",
         &format!("sonarfix-log,1\nstart,0,2,1.5,0,0.02,0.01\n{}", wheels.collect::<String>()),
     );
+    let pings = "start,0,2,1.5,0,0.02,0.01\nwheels,0,0,0\nrange,0.05,0,1.5\nwheels,0.1,0,0\n";
+    write("pings.csv", &format!("sonarfix-log,1\n{pings}"));
     write("drive.csv", &crate::calibrate::log());
     let flaser = "FLASER 3 2.0 9.0 2.0 5.0 6.0 0.5 0.5 0 0 10.5 host 0.6\n";
     let odom = |x, time| format!("ODOM {x} 0 0 0.5 0 0 {time} host 0\n");
@@ -89,6 +93,7 @@ pub fn files() -> tempfile::TempDir {
     write("room.geojson", geojson);
     for arguments in [
         ["run", CLASSROOM, "--runs", "1", "--rows", "FILES/rows.csv"].as_slice(),
+        &["export", "FILES/pings.csv", "--rosbag", "FILES/recorded"],
         &["config", "bake", "tests/robot.toml", "--out", "FILES/config.bin"],
     ] {
         assert!(printing(arguments, dir.path()).stdout(Stdio::null()).status().unwrap().success());
@@ -273,7 +278,7 @@ fn a_long_line_is_not_echoed() {
 }
 
 /// The options that name a result, each in a command that would otherwise end with another error, or work for hours.
-const WRITING: [(&[&str], &str); 30] = [
+const WRITING: [(&[&str], &str); 32] = [
     (&["measure", "--port", "missing"], "--out"),
     (&["paper", "--runs", "4000000"], "--out"),
     (&["run", CLASSROOM, "--runs", "4000000"], "--out"),
@@ -294,6 +299,7 @@ const WRITING: [(&[&str], &str); 30] = [
     (&["survey", "missing.csv"], "--drawing"),
     (&["export", "missing.csv"], "--mcap"),
     (&["export", "missing.csv"], "--parquet"),
+    (&["export", "missing.csv"], "--rosbag"),
     (&["map", "bake", "missing.toml"], "--out"),
     (&["map", "draw", "missing.toml"], "--out"),
     (&["map", "simplify", "missing.toml"], "--out"),
@@ -302,6 +308,7 @@ const WRITING: [(&[&str], &str); 30] = [
     (&["config", "bake", "missing.toml"], "--out"),
     (&["convert", "carmen", "missing.log"], "--out"),
     (&["convert", "lego", "missing"], "--out"),
+    (&["convert", "rosbag", "missing"], "--out"),
     (&["convert", "nxt", "missing"], "--out"),
     (&["monitor", "--port", "missing"], "--record"),
 ];

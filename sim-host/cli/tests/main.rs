@@ -21,6 +21,7 @@ mod recordings;
 mod replay;
 mod replay_command;
 mod report_in_chromium;
+mod rosbag;
 mod rows;
 mod signs_of_life;
 mod skipped;

@@ -1,11 +1,12 @@
 //! Converts recordings of other formats to a folder for `sonarfix replay`: `log.csv`, `reference.csv`,
 //! `map.toml`, `robot.toml` (`docs/formats.md`).
 
+pub mod arc;
 pub mod carmen;
 pub mod given;
 pub mod lego;
 pub mod nxt;
-mod robot_file;
+pub mod robot_file;
 
 use std::fmt::Write as _;
 use std::fs::File;
@@ -51,15 +52,18 @@ pub enum ConvertError {
 }
 
 impl ConvertError {
-    fn read(path: &Path) -> impl FnOnce(io::Error) -> Self {
+    /// That a file cannot be read.
+    pub fn read(path: &Path) -> impl FnOnce(io::Error) -> Self {
         move |error| Self::Read { path: path.into(), error }
     }
 
-    fn write(path: &Path) -> impl FnOnce(io::Error) -> Self {
+    /// That a file cannot be written.
+    pub fn write(path: &Path) -> impl FnOnce(io::Error) -> Self {
         move |error| Self::Write { path: path.into(), error }
     }
 
-    fn content(path: &Path, message: impl Into<String>) -> Self {
+    /// That the content of a file or folder is wrong.
+    pub fn content(path: &Path, message: impl Into<String>) -> Self {
         Self::Content { path: path.into(), message: message.into() }
     }
 }
@@ -69,6 +73,8 @@ impl ConvertError {
 pub struct Converted {
     /// Encoder records written.
     pub encoders: u64,
+    /// Single ranges written.
+    pub ranges: u64,
     /// Scans written.
     pub scans: u64,
     /// Rows of the reference written.
@@ -139,20 +145,32 @@ impl Out {
 }
 
 /// The log being written.
-struct Log(Out);
+pub struct Log(Out);
 
 impl Log {
-    fn create(dir: &Path) -> Result<Self, ConvertError> {
+    /// Begins `log.csv` in a folder.
+    ///
+    /// # Errors
+    /// [`ConvertError::Write`].
+    pub fn create(dir: &Path) -> Result<Self, ConvertError> {
         let mut out = Out::create(dir.join("log.csv"))?;
         out.line(HEADER)?;
         Ok(Self(out))
     }
 
-    fn comment(&mut self, comment: &str) -> Result<(), ConvertError> {
+    /// A comment.
+    ///
+    /// # Errors
+    /// [`ConvertError::Write`].
+    pub fn comment(&mut self, comment: &str) -> Result<(), ConvertError> {
         self.0.line(format_args!("# {comment}"))
     }
 
-    fn start(&mut self, time: f64, pose: &Pose, sigmas: [f64; 2]) -> Result<(), ConvertError> {
+    /// The initial estimate: seconds, pose, deviations in metres and radians.
+    ///
+    /// # Errors
+    /// [`ConvertError::Write`].
+    pub fn start(&mut self, time: f64, pose: &Pose, sigmas: [f64; 2]) -> Result<(), ConvertError> {
         let Pose { x, y, heading } = pose;
         let [position, turn] = sigmas;
         self.0.line(format_args!("start,{time:.6},{x:.6},{y:.6},{heading:.6},{position},{turn}"))
@@ -162,7 +180,11 @@ impl Log {
         self.0.line(format_args!("ticks,{time:.6},{right},{left}"))
     }
 
-    fn wheels(&mut self, time: f64, [right, left]: [f64; 2]) -> Result<(), ConvertError> {
+    /// Travel of the right and the left wheel up to a time, metres.
+    ///
+    /// # Errors
+    /// [`ConvertError::Write`].
+    pub fn wheels(&mut self, time: f64, [right, left]: [f64; 2]) -> Result<(), ConvertError> {
         self.0.line(format_args!("wheels,{time:.6},{right:.6},{left:.6}"))
     }
 
@@ -171,7 +193,11 @@ impl Log {
         self.0.line(format_args!("range,{time:.6},{bearing:.6},{range}"))
     }
 
-    fn scan(&mut self, time: f64, scan: &Scan) -> Result<(), ConvertError> {
+    /// A scan.
+    ///
+    /// # Errors
+    /// [`ConvertError::Write`].
+    pub fn scan(&mut self, time: f64, scan: &Scan) -> Result<(), ConvertError> {
         let mut ranges = String::new();
         for range in &scan.ranges {
             if !ranges.is_empty() {
@@ -186,30 +212,77 @@ impl Log {
         }
         self.0.line(format_args!("scan,{time:.6},{:.9},{:.12},{ranges}", scan.first, scan.step))
     }
+
+    /// A range of one of several rangers: bearing in radians, range in metres with all its digits.
+    ///
+    /// # Errors
+    /// [`ConvertError::Write`].
+    pub fn range_of(
+        &mut self,
+        ranger: u8,
+        time: f64,
+        bearing: f64,
+        range: Option<f32>,
+    ) -> Result<(), ConvertError> {
+        let range = range.map_or_else(String::new, |range| range.to_string());
+        let ranger = if ranger == 0 { String::new() } else { format!(",,{ranger}") };
+        self.0.line(format_args!("range,{time:.6},{bearing:.6},{range}{ranger}"))
+    }
+
+    /// Ends the log.
+    ///
+    /// # Errors
+    /// [`ConvertError::Write`].
+    pub fn close(self) -> Result<(), ConvertError> {
+        self.0.close()
+    }
 }
 
 /// The reference being written.
-struct ReferenceFile(Out);
+pub struct ReferenceFile(Out);
 
 impl ReferenceFile {
-    fn create(dir: &Path) -> Result<Self, ConvertError> {
+    /// Begins `reference.csv` in a folder.
+    ///
+    /// # Errors
+    /// [`ConvertError::Write`].
+    pub fn create(dir: &Path) -> Result<Self, ConvertError> {
         let mut out = Out::create(dir.join("reference.csv"))?;
         out.line(REFERENCE_HEADER)?;
         Ok(Self(out))
     }
 
-    fn row(&mut self, time: f64, pose: &Pose) -> Result<(), ConvertError> {
+    /// A true pose.
+    ///
+    /// # Errors
+    /// [`ConvertError::Write`].
+    pub fn row(&mut self, time: f64, pose: &Pose) -> Result<(), ConvertError> {
         let Pose { x, y, heading } = pose;
         self.0.line(format_args!("{time:.6},{x:.6},{y:.6},{heading:.6}"))
     }
+
+    /// Ends the reference.
+    ///
+    /// # Errors
+    /// [`ConvertError::Write`].
+    pub fn close(self) -> Result<(), ConvertError> {
+        self.0.close()
+    }
 }
 
-fn make_dir(dir: &Path) -> Result<(), ConvertError> {
+/// Makes a folder.
+///
+/// # Errors
+/// [`ConvertError::Write`].
+pub fn make_dir(dir: &Path) -> Result<(), ConvertError> {
     std::fs::create_dir_all(dir).map_err(ConvertError::write(dir))
 }
 
 /// Writes `map.toml`.
-fn write_map(dir: &Path, comment: &str, walls: &[NamedWall]) -> Result<(), ConvertError> {
+///
+/// # Errors
+/// [`ConvertError::Write`].
+pub fn write_map(dir: &Path, comment: &str, walls: &[NamedWall]) -> Result<(), ConvertError> {
     let mut out = Out::create(dir.join("map.toml"))?;
     out.line(format_args!("# {comment}\nformat = 1\n\n[map]\nunit = \"m\"\nwall = ["))?;
     for wall in walls {
@@ -224,7 +297,10 @@ fn write_map(dir: &Path, comment: &str, walls: &[NamedWall]) -> Result<(), Conve
 }
 
 /// Reads walls from a CSV file: the columns x1, y1, x2, y2 in one unit, and an optional name.
-fn read_walls(path: &Path, metres: f64) -> Result<Vec<NamedWall>, ConvertError> {
+///
+/// # Errors
+/// [`ConvertError`], if it cannot be read or is no such file.
+pub fn read_walls(path: &Path, metres: f64) -> Result<Vec<NamedWall>, ConvertError> {
     let content = |message: String| ConvertError::content(path, message);
     let mut csv = csv::Reader::from_path(path).map_err(|error| content(error.to_string()))?;
     let columns = csv.headers().map_err(|error| content(error.to_string()))?.clone();

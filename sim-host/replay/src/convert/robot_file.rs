@@ -8,6 +8,8 @@ use crate::convert::{ConvertError, Out};
 pub struct Value(pub String, pub &'static str);
 
 impl Value {
+    /// A text, in quotation marks.
+    #[must_use]
     pub fn text(value: &str, source: &'static str) -> Self {
         Self(format!("\"{value}\""), source)
     }
@@ -16,7 +18,8 @@ impl Value {
 /// A robot file: tables of keys.
 pub type Tables = Vec<(&'static str, Vec<(&'static str, Value)>)>;
 
-/// The keys of a servo and a ranger, for a recording that has neither: a replay uses none of them.
+/// The keys of a servo and a ranger, for a recording that has neither: a replay uses none of them. Bearings in degrees.
+#[must_use]
 pub fn no_servo(rightmost: f64, leftmost: f64) -> [(&'static str, Value); 3] {
     let pulse = |width: &str, bearing: f64| {
         format!("{{ width = \"{width}\", bearing = \"{bearing:.1} deg\" }}")
@@ -33,6 +36,9 @@ pub fn no_servo(rightmost: f64, leftmost: f64) -> [(&'static str, Value); 3] {
 }
 
 /// Writes a robot file.
+///
+/// # Errors
+/// [`ConvertError::Write`].
 pub fn write(dir: &Path, name: &str, comment: &str, tables: Tables) -> Result<(), ConvertError> {
     let mut out = Out::create(dir.join(name))?;
     out.line(format_args!("# {comment}\nformat = 1"))?;

@@ -11,6 +11,7 @@ use sonarfix_sim::trace::Pose;
 
 use super::stamps::JITTER;
 use crate::convert::Converted;
+use crate::convert::arc::Arc;
 
 /// Assumed track width, metres: that of a Pioneer, the robot of most of these logs.
 pub const TRACK_WIDTH: f64 = 0.38;
@@ -78,13 +79,8 @@ struct Step {
 
 impl Step {
     fn between(from: &Sample, to: &Sample) -> Self {
-        let turn = angle::wrap(to.pose.heading - from.pose.heading);
-        let (sin, cos) = (from.pose.heading + turn / 2.0).sin_cos();
-        let (dx, dy) = (to.pose.x - from.pose.x, to.pose.y - from.pose.y);
-        let advance = cos * dx + sin * dy;
-        let half = turn * TRACK_WIDTH / 2.0;
-        let travel = [advance + half, advance - half];
-        Self { seconds: to.time - from.time, travel, turn, sideways: cos * dy - sin * dx }
+        let Arc { travel, turn, sideways } = Arc::between(&from.pose, &to.pose, TRACK_WIDTH);
+        Self { seconds: to.time - from.time, travel, turn, sideways }
     }
 
     fn is_plausible(&self) -> bool {
