@@ -210,6 +210,9 @@ impl History {
 
     /// Odds that the ranges of a ranger are false, and not the pose or the map; zero of the only one.
     pub fn lying(&self, ranger: RangerId, config: &Config) -> f32 {
+        if !config.rangers.are_several() {
+            return 0.0;
+        }
         let own = self.reliability.get(ranger.index());
         let others = self.reliability.iter().zip(config.rangers.iter());
         let others = others.filter(|(_, (other, _))| *other != ranger).map(|(other, _)| other);
