@@ -12,9 +12,10 @@ use toml::de::{DeTable, DeValue};
 use crate::error::{FileError, Mistake};
 use crate::example;
 use crate::geometry::{TOO_FAR, is_near_enough};
-use crate::plausibility;
+use crate::plausibility::values::{meant, suspects};
 use crate::quantity::{Dimension, LENGTH, Limits, METRE, Unit};
 use crate::spelling::{alternatives, nearest};
+use crate::text_lines;
 
 /// The version of the formats that this crate reads.
 const FORMAT: u64 = 1;
@@ -31,14 +32,9 @@ struct File<'a> {
 
 impl File<'_> {
     fn record(self, at: usize, key: &str, message: impl Into<String>) {
-        let mistake = Mistake::new(self.name, line(self.text, at), key, message);
+        let mistake = Mistake::new(self.name, text_lines::line(self.text, at), key, message);
         self.mistakes.borrow_mut().push(mistake);
     }
-}
-
-/// The line of a position in a text; lines count from 1.
-pub(crate) fn line(text: &str, at: usize) -> usize {
-    text.bytes().take(at).filter(|&byte| byte == b'\n').count() + 1
 }
 
 /// A parsed file.
@@ -57,7 +53,7 @@ impl<'a> Document<'a> {
             let rest = text.get(span.start..).unwrap_or_default();
             let near = rest.lines().next().unwrap_or_default();
             let message = format!("this is not TOML at `{near}`: {}", error.message());
-            FileError::from(Mistake::new(name, line(text, span.start), "", message))
+            FileError::from(Mistake::new(name, text_lines::line(text, span.start), "", message))
         })?;
         let root = DeValue::Table(root.into_inner());
         Ok(Self { name, text, mistakes: RefCell::default(), root })
@@ -83,25 +79,13 @@ impl<'a> Document<'a> {
         let value =
             root.has_known_format().then(|| read(&root.only(&[&["format"], keys].concat())));
         let mistakes = self.mistakes.take();
-        let suspects = plausibility::suspects(self.text, self.name, &mistakes);
+        let suspects = suspects(self.text, self.name, &mistakes);
         match (FileError::of(mistakes), value.flatten()) {
             (Some(error), _) => Err(error.followed_by(suspects)),
             (None, Some(value)) => Ok(value),
             (None, None) => Err(FileError::of_file(self.name, "cannot be read")),
         }
     }
-}
-
-/// The line of each position in a text, both in ascending order; lines count from 1.
-pub(crate) fn lines(text: &str, places: &[usize]) -> Vec<usize> {
-    let mut line = 1;
-    let mut from = 0;
-    let mut line_at = |&place: &usize| {
-        line += text.get(from..place).unwrap_or_default().matches('\n').count();
-        from = place.max(from);
-        line
-    };
-    places.iter().map(&mut line_at).collect()
 }
 
 /// A value, with its place in the file; or the place where a value is missing.
@@ -125,7 +109,7 @@ impl<'a> Node<'a> {
     pub fn report(&self, message: impl Into<String>) {
         if !self.is_reported.replace(true) {
             let text = self.as_text().or_else(|| self.number_text()).unwrap_or_default();
-            let message = match plausibility::meant(&self.key, text, self.as_text().is_none()) {
+            let message = match meant(&self.key, text, self.as_text().is_none()) {
                 Some(meant) => format!("{}; did you mean {meant}?", message.into()),
                 None => message.into(),
             };

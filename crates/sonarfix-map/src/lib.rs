@@ -45,6 +45,7 @@ mod simplify;
 mod sonar_model;
 mod spelling;
 mod symmetry;
+mod text_lines;
 mod wall_file;
 
 pub use addition::{Addition, with_cabinet};

@@ -4,11 +4,12 @@ use std::path::Path;
 
 use sonarfix::config::RangerParameters;
 
-use crate::document::{self, Document};
+use crate::document::Document;
 use crate::error::FileError;
 use crate::file;
 use crate::floor::{Floor, NamedWall};
 use crate::scenario::{Scenario, scenario_keys};
+use crate::text_lines;
 use crate::wall_file::WallFile;
 
 /// A map, with the position of each wall in its file.
@@ -69,7 +70,7 @@ impl MapFile {
             })
         });
         let (name, lines) = match map? {
-            Ok(places) => (name, document::lines(text, &places)),
+            Ok(places) => (name, text_lines::lines(text, &places)),
             Err(file) => (file::name(&file), WallFile::read(&file, None)?.lines),
         };
         Ok(Self { floor, scenario: Some(scenario), name, lines, is_toml: true })

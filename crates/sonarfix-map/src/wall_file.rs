@@ -6,12 +6,13 @@ use std::path::Path;
 use sonarfix::geometry::pose::Point;
 use sonarfix::map::{Map, WallError, image};
 
-use crate::document::{self, Document};
+use crate::document::Document;
 use crate::error::{FileError, Mistake};
 use crate::file;
 use crate::floor::{Floor, NamedWall};
 use crate::geometry::TOO_FAR;
 use crate::quantity::{LENGTH, Unit};
+use crate::text_lines;
 
 /// The walls of a map.
 pub(crate) struct WallFile {
@@ -44,7 +45,7 @@ impl WallFile {
         let document = Document::parse(text, name)?;
         let read = document.read(&["map"], |root| Some(Floor::from_node(root.require("map"))));
         let (floor, places) = read?;
-        Ok(Self { floor, lines: document::lines(text, &places) })
+        Ok(Self { floor, lines: text_lines::lines(text, &places) })
     }
 
     /// Reads a baked map. Its walls are named by their numbers.

@@ -11,11 +11,14 @@ use crate::warnings::Warning;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Scenarios, robot files and maps (docs/formats.md).
-    #[arg(required = true)]
+    #[arg(required_unless_present = "rules")]
     files: Vec<PathBuf>,
     /// Prints JSON instead of lines.
     #[arg(long)]
     json: bool,
+    /// Prints the usual values and their sources, as a page of the documentation.
+    #[arg(long, conflicts_with_all = ["files", "json"])]
+    rules: bool,
 }
 
 /// What was found in a file.
@@ -29,6 +32,10 @@ struct Checked {
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
+    if args.rules {
+        print!("{}", plausibility::table());
+        return Ok(());
+    }
     let checked: Vec<_> = args.files.iter().map(|file| check(file)).collect();
     if args.json {
         sonarfix_terminal::json::print(&checked)?;

@@ -2,16 +2,13 @@
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
-use std::path::Path as FilePath;
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use crate::error::Mistake;
-use crate::map_file::MapFile;
 use crate::quantity::Dimension;
-use crate::scenario::Scenario;
-use crate::{document, file};
+use crate::text_lines::line;
 
 /// A comment with this word accepts the values of its line.
 const ACCEPTED: &str = "# plausible";
@@ -84,20 +81,13 @@ impl Fact {
 #[derive(Debug, Default)]
 pub(super) struct Facts {
     all: Vec<Fact>,
-    /// The scenario, if the file is one without mistakes.
-    pub scenario: Option<Box<Scenario>>,
+    /// The duration of the path in seconds, if the file is a scenario without mistakes.
+    pub duration: Option<f64>,
     /// The values that a warning is about: another one about the same value has the same cause.
     reported: RefCell<BTreeSet<usize>>,
 }
 
 impl Facts {
-    /// The values of a file and of the map and robot files that it names.
-    pub fn of(text: &str, name: &str, base: &FilePath) -> Self {
-        let mut facts = Self::default();
-        facts.add(text, name, base);
-        facts
-    }
-
     /// The values of a file without those of the files that it names.
     pub fn of_one(text: &str, name: &str) -> Self {
         let mut facts = Self::default();
@@ -118,7 +108,7 @@ impl Facts {
     }
 
     /// Adds the values of a file; returns the names of the other files.
-    fn add_values(&mut self, text: &str, name: &str) -> Vec<String> {
+    pub fn add_values(&mut self, text: &str, name: &str) -> Vec<String> {
         let Ok(root) = DeTable::parse(text) else { return Vec::new() };
         let mut reader = Reader { text, name, all: &mut self.all };
         let mut others = Vec::new();
@@ -134,17 +124,9 @@ impl Facts {
         others
     }
 
-    fn add(&mut self, text: &str, name: &str, base: &FilePath) {
-        for path in self.add_values(text, name).iter().map(|other| base.join(other)) {
-            if let Ok(map) = MapFile::read(&path, None)
-                && !map.is_toml()
-            {
-                let lines = (0..map.floor.named_walls().len()).filter_map(|wall| map.line(wall));
-                self.all.extend(Self::of_walls(map.name(), lines).all);
-            } else if let Ok(text) = file::read(&path) {
-                self.add(&text, &file::name(&path), base);
-            }
-        }
+    /// Adds the values of other files.
+    pub fn extend(&mut self, others: Self) {
+        self.all.extend(others.all);
     }
 
     /// The values with this key, of all tables of an array.
@@ -220,7 +202,7 @@ impl Reader<'_> {
             DeValue::Float(float) => (float.as_str().to_owned(), true),
             _ => return,
         };
-        let line = document::line(self.text, value.span().start);
+        let line = line(self.text, value.span().start);
         let source = self.text.lines().nth(line - 1).unwrap_or_default();
         self.all.push(Fact {
             file: self.name.to_owned(),

@@ -1,7 +1,8 @@
 //! The table of typical values. Each row is a key, a quantity, its usual interval, and where the interval comes from.
 
 use super::facts::{Fact, Facts};
-use super::rule::{Cause, Reading, Rule, cause};
+use super::rule::{Cause, Measure, Reading, Rule, cause};
+use crate::error::Mistake;
 use crate::quantity::{
     ANGLE, ANGLE_WALK, FRACTION, LENGTH, LENGTH_PER_LENGTH, LENGTH_WALK, NUMBER, SCALE_WALK, SPEED,
     TEMPERATURE, TIME, TURN_RATE, TURN_RATE_WALK,
@@ -127,7 +128,7 @@ fn true_wheel_noise(facts: &Facts, _: &Fact) -> Option<f64> {
 }
 
 fn duration(facts: &Facts, _: &Fact) -> Option<f64> {
-    facts.scenario.as_ref().map(|scenario| scenario.path.duration())
+    facts.duration
 }
 
 fn path_turn_rate(facts: &Facts, _: &Fact) -> Option<f64> {
@@ -300,3 +301,64 @@ pub(super) const ANGLES: [&str; 5] = [
     "sonar.bearing",
     "sonar.cone",
 ];
+
+/// What a value that its reader refuses was probably meant to be, as it is written in a file.
+pub(crate) fn meant(key: &str, text: &str, is_number: bool) -> Option<String> {
+    let fact = Fact::refused(key, text, is_number);
+    RULES.iter().filter(|rule| rule.key == fact.id).find_map(|rule| rule.suggestion(&fact))
+}
+
+/// The improbable values of a file with mistakes, besides them: one of them may be the cause of a mistake.
+pub(crate) fn suspects(text: &str, name: &str, mistakes: &[Mistake]) -> Vec<Mistake> {
+    if mistakes.is_empty() {
+        return Vec::new();
+    }
+    let is_known =
+        |warning: &Mistake| mistakes.iter().any(|mistake| mistake.key().starts_with(warning.key()));
+    let warnings = of_facts(&Facts::of_one(text, name)).into_iter();
+    warnings.filter(|warning| !is_known(warning)).map(Mistake::suspected).collect()
+}
+
+/// The warnings about the numbers of a file.
+pub(super) fn of_facts(facts: &Facts) -> Vec<Mistake> {
+    let mut warnings = Vec::new();
+    let mut warn = |fact: &Fact, message: String| {
+        if facts.report(fact) {
+            warnings.push(fact.warn(message));
+        }
+    };
+    for fact in ANGLES.iter().flat_map(|id| facts.with(id)) {
+        if let Some(message) = radians(fact) {
+            warn(fact, message);
+        }
+    }
+    // A value that is wrong by itself is not compared with others.
+    let is_first = |rule: &&Rule| matches!(rule.measure, Measure::Value);
+    let (first, second): (Vec<&Rule>, Vec<&Rule>) = RULES.iter().partition(is_first);
+    for rule in first.into_iter().chain(second) {
+        for fact in facts.with(rule.key) {
+            if let Some(message) = rule.judge(facts, fact) {
+                warn(fact, message);
+            }
+        }
+    }
+    warnings
+}
+
+/// The message for an angle in degrees whose number is a usual one in radians: a multiple of 15° with two decimals.
+fn radians(fact: &Fact) -> Option<String> {
+    let (number, unit) = ANGLE.split(&fact.text)?;
+    let steps = number.to_degrees() / 15.0;
+    let decimals = fact.text.split('.').nth(1)?.chars().take_while(char::is_ascii_digit).count();
+    let precision = 0.6 * 10_f64.powi(-i32::try_from(decimals).ok()?);
+    let distance = ((steps.round() * 15.0).to_radians() - number).abs();
+    let is_radians = unit == "deg" && decimals >= 2 && steps.round().abs() >= 1.0;
+    (is_radians && number.abs() < 3.2 && distance < precision).then(|| {
+        let degrees = 15.0 * steps.round();
+        format!(
+            "{} is {degrees} degrees in radians; did you mean {}?",
+            fact.quoted(),
+            fact.quoted_as(&format!("{degrees} deg"))
+        )
+    })
+}

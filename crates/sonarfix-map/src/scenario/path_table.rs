@@ -7,7 +7,7 @@ use crate::document::{Node, Table};
 use crate::floor::Floor;
 use crate::keys::{Key, Section, Value, number, optional, other};
 use crate::path::{Path, PathPlan};
-use crate::plausibility;
+use crate::plausibility::outline::intention;
 use crate::quantity::{LENGTH, SPEED, TURN_RATE};
 
 /// How the robot follows its path.
@@ -110,7 +110,7 @@ fn check_clearance(path: &Path, corners: &[Node<'_>], floor: &Floor, clearance: 
     if let Some(collision) = Collision::first(path.plan(), floor, clearance)
         && let Some(corner) = corners.get(collision.corner)
     {
-        let intention = plausibility::intention(floor, path.plan(), clearance);
+        let intention = intention(floor, path.plan(), clearance);
         corner.report(format!("{collision}{}", intention.unwrap_or_default()));
     }
 }
