@@ -9,9 +9,11 @@
 //! | [`motion`] · [`turns`] · [`ranges`] · [`walls`] | messages as travels of wheels, turns, ranges along bearings, and walls |
 //! | [`timeline`] | the localizer, which takes late ranges at their time |
 //! | [`view`] · [`markers`] · [`report`] | the estimate as messages |
+//! | [`drive`] | a simulated drive as messages, for tests and measurements |
 //! | [`node`] | the node: messages in, messages out; no DDS, no clock |
 
 pub mod arguments;
+pub mod drive;
 pub mod lifecycle;
 pub mod markers;
 pub mod motion;

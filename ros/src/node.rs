@@ -172,12 +172,7 @@ impl Node {
             max_speed: f64::from(config.localizer.max_wheel_speed.0),
             radius: parameters.number("wheel_radius"),
         };
-        let text = |name: &str| parameters.text(name).to_owned();
-        let frames = Frames {
-            map: text("global_frame_id"),
-            odom: text("odom_frame_id"),
-            base: text("base_frame_id"),
-        };
+        let frames = Frames::of(parameters);
         Ok(Self {
             begin: begin(parameters),
             odometer: Odometer::new(wheels, parameters.nanoseconds("odometry_timeout")),

@@ -10,10 +10,11 @@ use sonarfix_ros_messages::messages::{
 use sonarfix_search::search::Search;
 
 use crate::motion::{Planar, between, moved};
+use crate::parameters::Parameters;
 use crate::problem::Nanoseconds;
 
 /// The names of the frames.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Frames {
     /// The map.
     pub map: String,
@@ -21,6 +22,19 @@ pub struct Frames {
     pub odom: String,
     /// The robot.
     pub base: String,
+}
+
+impl Frames {
+    /// The names that the parameters set.
+    #[must_use]
+    pub fn of(parameters: &Parameters) -> Self {
+        let text = |name: &str| parameters.text(name).to_owned();
+        Self {
+            map: text("global_frame_id"),
+            odom: text("odom_frame_id"),
+            base: text("base_frame_id"),
+        }
+    }
 }
 
 /// The estimate at one time.

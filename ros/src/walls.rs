@@ -33,6 +33,12 @@ impl Walls {
         Self { list, image, notes, is_from_grid }
     }
 
+    /// The walls of a map.
+    #[must_use]
+    pub fn new(floor: &Floor) -> Self {
+        Self::of(floor, Vec::new(), false)
+    }
+
     /// Reads a map file.
     ///
     /// # Errors
