@@ -70,8 +70,7 @@ impl Drive {
             ..PoseWithCovarianceStamped::default()
         };
         let state = start.state;
-        message.pose.pose =
-            geometry::pose([state.x.0, state.y.0, state.heading.0].map(f64::from));
+        message.pose.pose = geometry::pose([state.x.0, state.y.0, state.heading.0].map(f64::from));
         let [x, y, turn] = [start.deviation.x.0, start.deviation.y.0, start.deviation.heading.0]
             .map(|deviation| f64::from(deviation).powi(2));
         message.pose.covariance =
@@ -90,10 +89,27 @@ impl Drive {
     /// # Errors
     /// If the scenario cannot be parsed, or the run fails.
     pub fn classroom(seconds: f64, begin: Nanoseconds, frames: &Frames) -> anyhow::Result<Self> {
-        const TEXT: &str = include_str!("../../crates/sonarfix-map/scenarios/classroom.toml");
-        let scenario = Scenario::parse(TEXT, "classroom.toml", std::path::Path::new("."))?;
+        Self::simulate(&Simulation::new(classroom()?).shortened(seconds), 0, begin, frames)
+    }
+
+    /// As [`Self::classroom`], without the furniture that is not in the map.
+    ///
+    /// # Errors
+    /// As [`Self::classroom`].
+    pub fn empty_classroom(
+        seconds: f64,
+        begin: Nanoseconds,
+        frames: &Frames,
+    ) -> anyhow::Result<Self> {
+        let mut scenario = classroom()?;
+        scenario.surroundings.obstacles.clear();
         Self::simulate(&Simulation::new(scenario).shortened(seconds), 0, begin, frames)
     }
+}
+
+fn classroom() -> anyhow::Result<Scenario> {
+    const TEXT: &str = include_str!("../../crates/sonarfix-map/scenarios/classroom.toml");
+    Ok(Scenario::parse(TEXT, "classroom.toml", std::path::Path::new("."))?)
 }
 
 /// Records the messages of a run.

@@ -44,6 +44,8 @@ pub struct Part {
     pub left: f64,
     /// The turn that a gyro has measured, radians.
     pub turn: Option<f64>,
+    /// Whether the path in between is not known, but only its end.
+    pub is_gap: bool,
     /// Whether the wheels were not observed meanwhile: the travel is the least one.
     pub is_unobserved: bool,
 }
@@ -75,13 +77,22 @@ pub struct Odometer {
     /// Positions of the right and the left joint, radians.
     joints: Option<[f64; 2]>,
     old_in_a_row: u32,
+    /// The stamp of the first of them.
+    first_old: Nanoseconds,
 }
 
 impl Odometer {
     /// An odometer without a message; `timeout` is the time without one that is a gap.
     #[must_use]
     pub fn new(wheels: Wheels, timeout: Nanoseconds) -> Self {
-        Self { wheels, timeout, poses: VecDeque::new(), joints: None, old_in_a_row: 0 }
+        Self {
+            wheels,
+            timeout,
+            poses: VecDeque::new(),
+            joints: None,
+            old_in_a_row: 0,
+            first_old: 0,
+        }
     }
 
     /// Time and pose in the odometry frame of the last message.
@@ -158,39 +169,46 @@ impl Odometer {
         travel: impl FnOnce(Option<Planar>, &Wheels) -> Option<(Planar, Vec<[f64; 2]>)>,
     ) -> Motion {
         let last = self.last();
-        let mut is_clock_reset = false;
-        if let Some((before, _)) = last
-            && at <= before
-        {
-            self.old_in_a_row += 1;
-            if self.old_in_a_row < OLD_IN_A_ROW {
-                let is_repeated = at == before;
-                let problem = if is_repeated {
-                    Problem::OdometryRepeated
-                } else {
-                    Problem::OdometryReordered
-                };
-                return Motion::refused(problem);
-            }
-            is_clock_reset = true;
-        }
+        let since = match last {
+            Some((before, _)) if at <= before => match self.old(at, before) {
+                Ok(since) => Some(since),
+                Err(problem) => return Motion::refused(problem),
+            },
+            _ => None,
+        };
         self.old_in_a_row = 0;
         let Some((pose, travels)) = travel(last.map(|(_, pose)| pose), &self.wheels) else {
             return Motion::refused(Problem::OdometryNotFinite);
         };
-        if is_clock_reset {
+        if since.is_some() {
             self.poses.clear();
         }
         self.keep(at, pose);
-        match last {
-            Some((from, _)) if !is_clock_reset => self.motion(from, at, &travels),
-            Some(_) => Motion {
-                problem: Some(Problem::OdometryClockReset),
-                is_clock_reset,
-                parts: Vec::new(),
-            },
-            None => Motion { parts: Vec::new(), problem: None, is_clock_reset },
+        let Some((before, _)) = last else {
+            return Motion { parts: Vec::new(), problem: None, is_clock_reset: false };
+        };
+        let motion = self.motion(since.unwrap_or(before), at, &travels);
+        let problem =
+            if since.is_some() { Some(Problem::OdometryClockReset) } else { motion.problem };
+        Motion { is_clock_reset: since.is_some(), problem, ..motion }
+    }
+
+    /// A message that is not newer than the one before. After several in a row the clock of the odometry was set back; returns the
+    /// time of the last message before, by the new clock.
+    fn old(&mut self, at: Nanoseconds, before: Nanoseconds) -> Result<Nanoseconds, Problem> {
+        if self.old_in_a_row == 0 {
+            self.first_old = at;
         }
+        self.old_in_a_row += 1;
+        if self.old_in_a_row < OLD_IN_A_ROW || at <= self.first_old {
+            return Err(if at == before {
+                Problem::OdometryRepeated
+            } else {
+                Problem::OdometryReordered
+            });
+        }
+        let period = (at - self.first_old) / Nanoseconds::from(self.old_in_a_row - 1);
+        Ok(self.first_old - period)
     }
 
     fn keep(&mut self, at: Nanoseconds, pose: Planar) {
@@ -206,7 +224,15 @@ impl Odometer {
         let total: f64 = travels.iter().map(|&travel| largest(travel)).sum();
         let elapsed = seconds(to - from);
         if total > self.wheels.max_speed * elapsed + JITTER {
-            let rest = Part { from, to, right: 0.0, left: 0.0, turn: None, is_unobserved: true };
+            let rest = Part {
+                from,
+                to,
+                right: 0.0,
+                left: 0.0,
+                turn: None,
+                is_gap: true,
+                is_unobserved: true,
+            };
             return Motion {
                 parts: vec![rest],
                 problem: Some(Problem::OdometryReset),
@@ -223,7 +249,15 @@ impl Odometer {
             let end = if begin == from && travels.len() == 1 { to } else { end.clamp(begin, to) };
             // The wheels do not tell the path of a gap, while a pose does.
             let is_unobserved = is_gap && self.joints.is_some();
-            parts.push(Part { from: begin, to: end, right, left, turn: None, is_unobserved });
+            parts.push(Part {
+                from: begin,
+                to: end,
+                right,
+                left,
+                turn: None,
+                is_gap,
+                is_unobserved,
+            });
             begin = end;
         }
         if let Some(last) = parts.last_mut() {
@@ -346,8 +380,10 @@ mod tests {
             let at = Nanoseconds::from(n) * 1_000_000;
             assert_eq!(problem(at, &mut odometer), Some(Problem::OdometryReordered));
         }
-        let motion = odometer.take(&message(100_000_000, [0.0; 3]));
-        assert!(motion.is_clock_reset && motion.parts.is_empty());
+        let motion = odometer.take(&message(10_000_000, [0.035, 0.0, 0.0]));
+        assert!(motion.is_clock_reset);
+        assert_eq!((motion.parts[0].from, motion.parts[0].to), (0, 10_000_000));
+        assert!((motion.parts[0].right - 0.005).abs() < 1e-12);
     }
 
     #[test]

@@ -312,7 +312,8 @@ impl Node {
             self.locate(at);
         } else if is_first || motion.is_clock_reset {
             self.turns.forget();
-            self.with_timeline(|timeline| timeline.set_clock(at));
+            let since = motion.parts.first().map_or(at, |part| part.from);
+            self.with_timeline(|timeline| timeline.set_clock(since));
         }
         let has_gyro =
             self.config.localizer.gyro.is_some() && !self.parameters.text("imu_topic").is_empty();
@@ -327,6 +328,9 @@ impl Node {
                 Some(Err(_)) => self.report(Problem::OdometryRefused),
                 None => {}
             }
+        }
+        for _ in 0..self.with_timeline(|timeline| timeline.take_unplaced()).unwrap_or(0) {
+            self.report(Problem::RangeUnplaced);
         }
         if is_new || is_first {
             self.publish_estimate(false, out);

@@ -81,6 +81,8 @@ pub struct Timeline<'m> {
     waiting: VecDeque<Beam>,
     /// The last travel.
     speed: Option<Part>,
+    /// Ranges of gaps of the odometry.
+    unplaced: u32,
 }
 
 impl<'m> Timeline<'m> {
@@ -98,6 +100,7 @@ impl<'m> Timeline<'m> {
             steps: VecDeque::new(),
             waiting: VecDeque::new(),
             speed: None,
+            unplaced: 0,
         }
     }
 
@@ -142,7 +145,12 @@ impl<'m> Timeline<'m> {
     /// [`OdometryError`], by what is wrong with the travel; the estimate is unchanged.
     pub fn advance(&mut self, part: &Part) -> Result<Vec<Heard>, OdometryError> {
         let due = self.waiting.partition_point(|beam| beam.at <= part.to);
-        let beams: Vec<Beam> = self.waiting.drain(..due).collect();
+        let mut beams: Vec<Beam> = self.waiting.drain(..due).collect();
+        if part.is_gap {
+            let before = beams.len();
+            beams.retain(|beam| beam.at == part.to);
+            self.unplaced += u32::try_from(before - beams.len()).unwrap_or(u32::MAX);
+        }
         let is_tracking = self.navigator.mode() == Mode::Tracking;
         let before = self.navigator.clone();
         let clock = Clock { epoch: self.epoch };
@@ -154,6 +162,11 @@ impl<'m> Timeline<'m> {
         }
         self.work(part.to - part.from);
         Ok(heard)
+    }
+
+    /// The number of ranges that were measured in gaps of the odometry since the last call; they are not used.
+    pub fn take_unplaced(&mut self) -> u32 {
+        std::mem::take(&mut self.unplaced)
     }
 
     fn keep(&mut self, step: Step<'m>) {
@@ -227,6 +240,9 @@ impl<'m> Timeline<'m> {
     /// Returns to the step at `place`, and takes it with the range, and the later ones again.
     fn insert(&mut self, place: usize, beam: Beam) -> Result<Vec<Heard>, Problem> {
         let Some(step) = self.steps.get_mut(place) else { return Ok(Vec::new()) };
+        if step.part.is_gap && beam.at != step.part.to {
+            return Err(Problem::RangeUnplaced);
+        }
         if step.beams.iter().any(|other| other.is_same(&beam)) {
             return Err(Problem::RangeRepeated);
         }
@@ -252,14 +268,22 @@ impl<'m> Timeline<'m> {
     #[must_use]
     pub fn ahead(&self) -> Option<Ahead<'m>> {
         let at = self.waiting.back()?.at;
-        let speed = self.speed.filter(|part| part.to > part.from && !part.is_unobserved)?;
+        let speed = self.speed.filter(|part| part.to > part.from && !part.is_gap)?;
         if at - self.last > MOST_AHEAD || self.navigator.mode() == Mode::Searching {
             return None;
         }
         let share = seconds(at - self.last) / seconds(speed.to - speed.from);
         let (right, left) = (share * speed.right, share * speed.left);
         let turn = speed.turn.map(|turn| share * turn);
-        let part = Part { from: self.last, to: at, right, left, turn, is_unobserved: false };
+        let part = Part {
+            from: self.last,
+            to: at,
+            right,
+            left,
+            turn,
+            is_gap: false,
+            is_unobserved: false,
+        };
         let mut navigator = self.navigator.clone();
         let beams: Vec<Beam> = self.waiting.iter().copied().collect();
         let clock = Clock { epoch: self.epoch };
