@@ -9,18 +9,30 @@
 //! | [`motion`] · [`turns`] · [`ranges`] · [`walls`] | messages as travels of wheels, turns, ranges along bearings, and walls |
 //! | [`timeline`] | the localizer, which takes late ranges at their time |
 //! | [`view`] · [`markers`] · [`report`] | the estimate as messages |
+//! | [`publication`] · [`interfaces`] · [`descriptors`] | what is published; the services' messages; parameters as such |
+//! | [`bridge`] | a robot with our firmware behind a serial link |
+//! | [`managed`] | the node with its states, parameters and services; no DDS, no clock |
+//! | [`graph`] · [`port`] · [`program`] | topics and services over DDS; the robot's port; the program |
 //! | [`drive`] | a simulated drive as messages, for tests and measurements |
 //! | [`node`] | the node: messages in, messages out; no DDS, no clock |
 
 pub mod arguments;
+pub mod bridge;
+pub mod descriptors;
 pub mod drive;
+pub mod graph;
+pub mod interfaces;
 pub mod lifecycle;
+pub mod managed;
 pub mod markers;
 pub mod motion;
 pub mod names;
 pub mod node;
 pub mod parameters;
+pub mod port;
 pub mod problem;
+pub mod program;
+pub mod publication;
 pub mod ranges;
 pub mod report;
 pub mod timeline;

@@ -13,8 +13,8 @@ use sonarfix_hal::config::RobotConfig;
 use sonarfix_map::robot_file;
 use sonarfix_ros_messages::geometry;
 use sonarfix_ros_messages::messages::{
-    DiagnosticArray, Imu, JointState, LaserScan, MarkerArray, OccupancyGrid, Odometry,
-    ParticleCloud, PoseWithCovarianceStamped, Range, RangeHeard, TFMessage,
+    Imu, JointState, LaserScan, OccupancyGrid, Odometry, PoseWithCovarianceStamped, RangeHeard,
+    TFMessage,
 };
 use sonarfix_search::navigator::Navigator;
 use sonarfix_search::search::{Search, SearchParameters};
@@ -23,6 +23,7 @@ use crate::markers::{self, Drawn};
 use crate::motion::{Motion, Odometer, Planar, Wheels, between, moved};
 use crate::parameters::Parameters;
 use crate::problem::{Nanoseconds, Problem, Problems};
+use crate::publication::Output;
 use crate::ranges::Ranges;
 use crate::report::{self, Outcomes};
 use crate::timeline::{Ahead, Heard, Timeline};
@@ -60,27 +61,6 @@ pub enum Input {
     Undecodable,
     /// Nothing: time has passed.
     Tick,
-}
-
-/// A message of the node.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Output {
-    /// To `pose_topic`.
-    Pose(Box<PoseWithCovarianceStamped>),
-    /// To `/tf`.
-    Transforms(TFMessage),
-    /// To `/diagnostics`.
-    Diagnostics(DiagnosticArray),
-    /// To `~/markers`.
-    Markers(MarkerArray),
-    /// To `~/calibration`.
-    Calibration(DiagnosticArray),
-    /// To `particle_cloud`.
-    Particles(ParticleCloud),
-    /// To `odom`, of a robot behind the link.
-    Odometry(Box<Odometry>),
-    /// To `~/range`, of a robot behind the link.
-    Range(Range),
 }
 
 self_cell!(
@@ -329,7 +309,11 @@ impl Node {
                 None => {}
             }
         }
-        for _ in 0..self.with_timeline(|timeline| timeline.take_unplaced()).unwrap_or(0) {
+        let unplaced = self.with_timeline(|timeline| {
+            // A method's path has one lifetime, and this closure any.
+            timeline.take_unplaced()
+        });
+        for _ in 0..unplaced.unwrap_or(0) {
             self.report(Problem::RangeUnplaced);
         }
         if is_new || is_first {
@@ -558,17 +542,19 @@ impl Node {
         self.watch_silence();
         let timeline = self.located.as_ref().map(Located::borrow_dependent);
         let navigator = timeline.map(Timeline::navigator);
-        let localizer = navigator.map(|it| (it.localizer(), it.mode()));
+        let localizer = navigator.map(Navigator::localizer);
+        let health = navigator.map(|it| (it.localizer().health(), it.mode()));
         let has_walls = self.walls.is_some() || localizer.is_some();
         let waits_for = if has_walls { "odometry" } else { "a map" };
-        let mut statuses = vec![
-            report::localization(localizer, waits_for),
-            report::inputs(&self.problems, self.now),
-        ];
+        let mut statuses =
+            vec![report::localization(health, waits_for), report::inputs(&self.problems, self.now)];
         statuses.extend(self.outcomes.iter().enumerate().map(|(n, of)| report::ranger(n, of)));
         out.push(Output::Diagnostics(report::array(self.now, statuses)));
-        if let Some((localizer, _)) = localizer {
-            out.push(Output::Calibration(report::calibration(localizer, self.now)));
+        if let Some(localizer) = localizer {
+            let (filter, width) = (localizer.filter(), localizer.config().drive.track_width);
+            let (state, deviation) = (filter.state(), filter.standard_deviations());
+            let message = report::calibration(width, &state, &deviation, self.now);
+            out.push(Output::Calibration(message));
         }
         self.draw(out);
     }

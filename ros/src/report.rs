@@ -1,15 +1,18 @@
 //! Diagnostics and calibration as messages.
 
-use sonarfix::health::Verdict;
-use sonarfix::localizer::{Fix, Localizer, Mode};
+use sonarfix::filter::ekf::{StandardDeviations, StateEstimate};
+use sonarfix::geometry::units::Metres;
+use sonarfix::health::{Health, Verdict};
+use sonarfix::localizer::{Fix, Mode};
 use sonarfix_ros_messages::messages::{DiagnosticArray, DiagnosticStatus, KeyValue};
 
 use crate::problem::{Nanoseconds, Problem, Problems};
 use crate::timeline::Heard;
 use crate::view::header;
 
-/// Levels of `diagnostic_msgs/DiagnosticStatus`.
-const OK: u8 = 0;
+/// Everything is as it should be.
+pub const OK: u8 = 0;
+/// `diagnostic_msgs/DiagnosticStatus`'s further levels.
 const WARN: u8 = 1;
 const ERROR: u8 = 2;
 /// How long a problem raises the level, nanoseconds.
@@ -94,10 +97,10 @@ pub fn status(level: u8, name: &str, message: &str, values: Vec<KeyValue>) -> Di
     }
 }
 
-/// The status of the estimate; without a localizer, what it waits for.
+/// The status of the estimate; without one, what it waits for.
 #[must_use]
-pub fn localization(localizer: Option<(&Localizer, Mode)>, waits_for: &str) -> DiagnosticStatus {
-    let Some((localizer, of)) = localizer else {
+pub fn localization(health: Option<(Health, Mode)>, waits_for: &str) -> DiagnosticStatus {
+    let Some((health, of)) = health else {
         return status(
             ERROR,
             "localization",
@@ -105,7 +108,6 @@ pub fn localization(localizer: Option<(&Localizer, Mode)>, waits_for: &str) -> D
             Vec::new(),
         );
     };
-    let health = localizer.health();
     let level = match health.verdict {
         Verdict::Tracking => OK,
         Verdict::Degraded => WARN,
@@ -146,12 +148,15 @@ pub fn array(at: Nanoseconds, status: Vec<DiagnosticStatus>) -> DiagnosticArray 
     DiagnosticArray { header: header(at, ""), status }
 }
 
-/// The calibration with its standard deviations.
+/// The calibration of a robot with this nominal track width, with its standard deviations.
 #[must_use]
-pub fn calibration(localizer: &Localizer, at: Nanoseconds) -> DiagnosticArray {
-    let filter = localizer.filter();
-    let (state, deviation) = (filter.state(), filter.standard_deviations());
-    let width = localizer.config().drive.track_width + state.track_width_error;
+pub fn calibration(
+    nominal: Metres,
+    state: &StateEstimate,
+    deviation: &StandardDeviations,
+    at: Nanoseconds,
+) -> DiagnosticArray {
+    let width = nominal + state.track_width_error;
     let values = vec![
         value("scale_right", state.scale_right),
         value("scale_right_deviation", deviation.scale_right),

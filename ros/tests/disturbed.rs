@@ -4,9 +4,10 @@
 use sonarfix::health::Verdict;
 use sonarfix_ros::drive::Drive;
 use sonarfix_ros::motion::between;
-use sonarfix_ros::node::{Input, Node, Output};
+use sonarfix_ros::node::{Input, Node};
 use sonarfix_ros::parameters::Parameters;
 use sonarfix_ros::problem::{Nanoseconds, Problem};
+use sonarfix_ros::publication::Output;
 use sonarfix_ros::view::Frames;
 use sonarfix_ros::walls::Walls;
 use sonarfix_ros_messages::messages::{Odometry, RangeHeard, Time};
