@@ -1,6 +1,12 @@
 //! Inputs that are late, repeated, reordered, ahead of the clock, not finite, in wrong frames or missing, at five times of a drive
 //! each: every case has a named problem, and the pose is right at the end.
 
+#![expect(
+    clippy::indexing_slicing,
+    clippy::unwrap_used,
+    reason = "all of this file is a test, its helpers too"
+)]
+
 use sonarfix::health::Verdict;
 use sonarfix_ros::drive::Drive;
 use sonarfix_ros::motion::between;
