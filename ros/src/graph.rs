@@ -1,11 +1,13 @@
 //! Topics and services over DDS.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, VecDeque};
 use std::rc::Rc;
+use std::time::Duration;
 
 use anyhow::Context as _;
 use async_channel::Sender;
 use futures_util::StreamExt;
+use ros2_client::gid::Gid;
 use ros2_client::qos::QosProfile;
 use ros2_client::{
     Context, Message, MessageTypeName, Name, Node, NodeName, NodeOptions, Publisher,
@@ -15,7 +17,7 @@ use rustdds::QosPolicyBuilder;
 use rustdds::policy::{Durability, History, Reliability};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use smol::{LocalExecutor, Task};
+use smol::{LocalExecutor, Task, Timer};
 use sonarfix_ros_messages::schema;
 
 use crate::names::Names;
@@ -53,6 +55,29 @@ impl Quality {
 const DEPTH: i32 = 10;
 /// As ROS keeps of transforms.
 const TRANSFORMS: i32 = 100;
+
+/// How long the first response to a client waits: a client asks as soon as it has found the service, and DDS loses a response to
+/// a reader that the service has not found yet.
+const FIRST_RESPONSE: Duration = Duration::from_millis(100);
+/// The most clients that a service remembers.
+const MOST_CLIENTS: usize = 100;
+
+/// The clients that a service has answered, the last one last.
+#[derive(Debug, Default)]
+struct Clients(VecDeque<Gid>);
+
+impl Clients {
+    fn is_new(&mut self, client: Gid) -> bool {
+        if self.0.contains(&client) {
+            return false;
+        }
+        if self.0.len() >= MOST_CLIENTS {
+            self.0.pop_front();
+        }
+        self.0.push_back(client);
+        true
+    }
+}
 
 /// The node in the graph of ROS.
 pub struct Graph {
@@ -235,6 +260,7 @@ impl Graph {
             policies(),
         )?;
         let queue = queue.clone();
+        let mut clients = Clients::default();
         let answer = async move {
             let mut requests = std::pin::pin!(server.receive_request_stream());
             while let Some(request) = requests.next().await {
@@ -244,6 +270,9 @@ impl Graph {
                     break;
                 }
                 if let Ok(response) = answered.recv().await {
+                    if clients.is_new(id.writer_gid) {
+                        Timer::after(FIRST_RESPONSE).await;
+                    }
                     // A client that has gone gets no answer.
                     _ = server.async_send_response(id, response).await;
                 }

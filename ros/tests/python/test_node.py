@@ -71,7 +71,7 @@ def test_a_client_like_nav2_brings_the_node_up_and_follows_it(
     for topic in ("/odom", "/range", "/tf", "/initialpose", "/clock"):
         graph.matched(topic)
     player.play(0, SECOND)
-    initial.write(drive.start)
+    initial.write(pose_at(*drive.true_pose(SECOND)))
     follower = localized(player)
     player.play(SECOND, 20 * SECOND, watch=follower.watch)
     follower.check(100)
@@ -93,15 +93,14 @@ def test_a_client_like_nav2_brings_the_node_up_and_follows_it(
         graph.matched(topic)
     player.play(20 * SECOND, 21 * SECOND)
     x, y, turn = drive.true_pose(21 * SECOND)
-    start = pose_at(x, y, turn)
-    node.set_pose(start)
+    node.set_pose(pose_at(x, y, turn))
     follower = localized(player)
     player.play(21 * SECOND, 35 * SECOND, watch=follower.watch)
     follower.check(100)
 
     # The clock is set back, as a simulation does that begins again.
     player.play(0, SECOND)
-    initial.write(drive.start)
+    initial.write(pose_at(*drive.true_pose(SECOND)))
     follower = localized(player)
     player.play(SECOND, 15 * SECOND, watch=follower.watch)
     follower.check(100)
@@ -144,9 +143,10 @@ def test_the_clock_jumps_ahead(
     for topic in ("/odom", "/range", "/clock"):
         graph.matched(topic)
     player.play(0, SECOND)
-    node.set_pose(drive.start)
+    node.set_pose(pose_at(*drive.true_pose(SECOND)))
     player.play(SECOND, 10 * SECOND)
     offset = 3600 * SECOND
+    time.sleep(0.2)
     follower = localized(player, offset)
     player.play(10 * SECOND, 20 * SECOND, watch=follower.watch, offset=offset)
     follower.check(80)
@@ -227,7 +227,7 @@ def test_a_map_comes_from_a_map_server(
     for topic in ("/odom", "/range", "/clock", "/map"):
         graph.matched(topic)
     player.play(0, SECOND)
-    node.set_pose(drive.start)
+    node.set_pose(pose_at(*drive.true_pose(SECOND)))
     follower = localized(player)
     player.play(SECOND, 15 * SECOND, watch=follower.watch)
     follower.check(100)
@@ -243,7 +243,7 @@ def test_a_lost_robot_searches_on_demand(graph: Graph, drive: Drive, start_node:
     for topic in ("/odom", "/range", "/clock"):
         graph.matched(topic)
     player.play(0, SECOND)
-    node.set_pose(drive.start)
+    node.set_pose(pose_at(*drive.true_pose(SECOND)))
     player.play(SECOND, 3 * SECOND)
     graph.reader("/amcl_pose", POSE, quality(latched=True))
     graph.next("/amcl_pose")
