@@ -1,13 +1,11 @@
 //! Topics and services over DDS.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::HashMap;
 use std::rc::Rc;
-use std::time::Duration;
 
 use anyhow::Context as _;
 use async_channel::Sender;
 use futures_util::StreamExt;
-use ros2_client::gid::Gid;
 use ros2_client::qos::QosProfile;
 use ros2_client::{
     Context, Message, MessageTypeName, Name, Node, NodeName, NodeOptions, Publisher,
@@ -17,9 +15,10 @@ use rustdds::QosPolicyBuilder;
 use rustdds::policy::{Durability, History, Reliability};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use smol::{LocalExecutor, Task, Timer};
+use smol::{LocalExecutor, Task};
 use sonarfix_ros_messages::schema;
 
+use crate::discovered::Discovered;
 use crate::names::Names;
 
 /// The qualities of service, as AMCL and the drivers of sensors have them.
@@ -56,33 +55,12 @@ const DEPTH: i32 = 10;
 /// As ROS keeps of transforms.
 const TRANSFORMS: i32 = 100;
 
-/// How long the first response to a client waits: a client asks as soon as it has found the service, and DDS loses a response to
-/// a reader that the service has not found yet.
-const FIRST_RESPONSE: Duration = Duration::from_millis(100);
-/// The most clients that a service remembers.
-const MOST_CLIENTS: usize = 100;
-
-/// The clients that a service has answered, the last one last.
-#[derive(Debug, Default)]
-struct Clients(VecDeque<Gid>);
-
-impl Clients {
-    fn is_new(&mut self, client: Gid) -> bool {
-        if self.0.contains(&client) {
-            return false;
-        }
-        if self.0.len() >= MOST_CLIENTS {
-            self.0.pop_front();
-        }
-        self.0.push_back(client);
-        true
-    }
-}
-
 /// The node in the graph of ROS.
 pub struct Graph {
     node: Node,
+    name: NodeName,
     names: Names,
+    discovered: Discovered,
     mapping: ServiceMapping,
     executor: Rc<LocalExecutor<'static>>,
 }
@@ -128,16 +106,17 @@ impl Graph {
     ) -> anyhow::Result<Self> {
         let participant = rustdds::DomainParticipantBuilder::new(domain).build();
         let participant = participant.context("cannot join the network of DDS")?;
+        let discovered = Discovered::watch(&participant, &executor);
         let context = Context::from_domain_participant(participant)?;
         let name = NodeName::new(&names.namespace, &names.node);
         let name = name.map_err(|error| anyhow::anyhow!("the node's name: {error:?}"))?;
         let options = NodeOptions::new().enable_rosout(false).start_parameter_services(false);
-        let node = context.new_node(name, options);
+        let node = context.new_node(name.clone(), options);
         let node = node.map_err(|error| anyhow::anyhow!("cannot create the node: {error:?}"))?;
-        Ok(Self { node, names, mapping, executor })
+        Ok(Self { node, name, names, discovered, mapping, executor })
     }
 
-    fn name(&self, name: &str) -> anyhow::Result<Name> {
+    fn parsed(&self, name: &str) -> anyhow::Result<Name> {
         let full = self.names.resolve(name);
         Name::parse(&full).map_err(|error| anyhow::anyhow!("the name {full}: {error:?}"))
     }
@@ -178,7 +157,7 @@ impl Graph {
     {
         let depth = if kind == "TFMessage" { TRANSFORMS } else { DEPTH };
         let policies = quality.policies(depth);
-        let name = self.name(topic)?;
+        let name = self.parsed(topic)?;
         let topic =
             self.node.create_topic(&name, MessageTypeName::new(package, kind), &policies)?;
         let subscription = self.node.create_subscription::<T>(&topic, Some(policies))?;
@@ -226,7 +205,7 @@ impl Graph {
             _ => DEPTH,
         };
         let policies = quality.policies(depth);
-        let name = self.name(topic)?;
+        let name = self.parsed(topic)?;
         let topic =
             self.node.create_topic(&name, MessageTypeName::new(package, kind), &policies)?;
         let publisher = self.node.create_publisher::<T>(&topic, Some(policies))?;
@@ -251,7 +230,7 @@ impl Graph {
         E: 'static,
     {
         let policies = || Quality::Reliable.policies(DEPTH);
-        let (name, kind) = (self.name(service)?, ServiceTypeName::new(package, kind));
+        let (name, kind) = (self.parsed(service)?, ServiceTypeName::new(package, kind));
         let server = self.node.create_server::<Req, Resp>(
             self.mapping,
             &name,
@@ -260,7 +239,8 @@ impl Graph {
             policies(),
         )?;
         let queue = queue.clone();
-        let mut clients = Clients::default();
+        let responses = name.to_dds_name("rr", &self.name, "Reply");
+        let discovered = self.discovered.clone();
         let answer = async move {
             let mut requests = std::pin::pin!(server.receive_request_stream());
             while let Some(request) = requests.next().await {
@@ -270,9 +250,7 @@ impl Graph {
                     break;
                 }
                 if let Ok(response) = answered.recv().await {
-                    if clients.is_new(id.writer_gid) {
-                        Timer::after(FIRST_RESPONSE).await;
-                    }
+                    discovered.reader_of(&responses, id.writer_gid).await;
                     // A client that has gone gets no answer.
                     _ = server.async_send_response(id, response).await;
                 }

@@ -12,13 +12,14 @@
 //! | [`publication`] · [`interfaces`] · [`descriptors`] | what is published; the services' messages; parameters as such |
 //! | [`bridge`] | a robot with our firmware behind a serial link |
 //! | [`managed`] | the node with its states, parameters and services; no DDS, no clock |
-//! | [`graph`] · [`port`] · [`program`] | topics and services over DDS; the robot's port; the program |
+//! | [`discovered`] · [`graph`] · [`port`] · [`program`] | the readers of others, topics and services over DDS; the robot's port; the program |
 //! | [`drive`] | a simulated drive as messages, for tests and measurements |
 //! | [`node`] | the node: messages in, messages out; no DDS, no clock |
 
 pub mod arguments;
 pub mod bridge;
 pub mod descriptors;
+pub mod discovered;
 pub mod drive;
 pub mod graph;
 pub mod interfaces;

@@ -3,6 +3,7 @@
 
 #![expect(
     clippy::indexing_slicing,
+    clippy::semicolon_if_nothing_returned,
     clippy::unwrap_used,
     reason = "all of this file is a test, its helpers too"
 )]
@@ -232,12 +233,11 @@ fn every_disturbance_is_named_and_harmless() {
             let node = course.run(change, BEGIN + second * SECOND + SECOND / 7);
             let counts = node.problems().values();
             let context = format!("{name} at {second} s: {counts:?}");
-            match problem {
-                Some(problem) => assert!(node.problems().count(problem) > 0, "{context}"),
-                None => {
-                    let usual = [Problem::NoOdometry, Problem::RangeBeforeStart];
-                    assert!(node.problems().occurred().all(|it| usual.contains(&it)), "{context}");
-                }
+            if let Some(problem) = problem {
+                assert!(node.problems().count(problem) > 0, "{context}");
+            } else {
+                let usual = [Problem::NoOdometry, Problem::RangeBeforeStart];
+                assert!(node.problems().occurred().all(|it| usual.contains(&it)), "{context}");
             }
             let view = node.view().unwrap();
             let [x, y, heading] = between(truth, view.pose);

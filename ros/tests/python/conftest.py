@@ -152,9 +152,12 @@ def drive(folder: Path) -> Drive:
 
 
 @pytest.fixture
-def graph() -> Graph:
+def graph() -> Iterator[Graph]:
     """A participant of its own for each test."""
-    return Graph()
+    graph = Graph()
+    yield graph
+    # A failed test keeps its objects, and a writer that lives would send its requests to the node of the next test.
+    graph.close()
 
 
 @pytest.fixture
@@ -188,6 +191,8 @@ class Follower:
     def __init__(self, graph: Graph, player: Player, offset: int) -> None:
         self.graph, self.player, self.offset = graph, player, offset
         self.errors: list[float] = []
+        # What was published before the pose was set is on its way.
+        time.sleep(0.3)
         graph.take("/tf")
 
     def watch(self, _: int = 0) -> None:

@@ -53,6 +53,12 @@ class Graph:
         self.client = random.getrandbits(63)
         self.sequence = itertools.count(1)
 
+    def close(self) -> None:
+        """Leaves the graph."""
+        self.writers.clear()
+        self.readers.clear()
+        del self.participant
+
     def writer(self, topic: str, name: str, qos: Qos | None = None) -> DataWriter:
         """A writer of a topic."""
         if topic not in self.writers:
