@@ -14,6 +14,7 @@
 //! | [`managed`] | the node with its states, parameters and services; no DDS, no clock |
 //! | [`discovered`] · [`graph`] · [`port`] · [`program`] | the readers of others, topics and services over DDS; the robot's port; the program |
 //! | [`drive`] | a simulated drive as messages, for tests and measurements |
+//! | [`hostile`] | bytes that are no messages, for tests and measurements |
 //! | [`node`] | the node: messages in, messages out; no DDS, no clock |
 
 pub mod arguments;
@@ -22,6 +23,7 @@ pub mod descriptors;
 pub mod discovered;
 pub mod drive;
 pub mod graph;
+pub mod hostile;
 pub mod interfaces;
 pub mod lifecycle;
 pub mod managed;

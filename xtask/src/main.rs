@@ -31,6 +31,7 @@ mod playground;
 mod program;
 mod publish;
 mod python;
+mod ros;
 mod search_windows;
 mod template;
 mod thumb;
@@ -115,6 +116,8 @@ enum Task {
     Playground,
     /// The Python package: its wheel in an empty environment, its tests, types, style and notebooks.
     Python(python::Args),
+    /// The ROS 2 node: its tests, and a client over Eclipse Cyclone DDS that behaves like nav2.
+    Ros(ros::Args),
     /// Licences of all dependencies, and advisories if their database can be reached.
     Deny,
     /// Records the golden traces, writes the fuzz inputs of messages, and measures and writes `budgets.toml`.
@@ -140,7 +143,7 @@ enum Task {
 }
 
 /// The steps of CI, by job.
-fn steps() -> [Step<Task>; 31] {
+fn steps() -> [Step<Task>; 32] {
     [
         ("lint", "format", Task::Format),
         ("lint", "circles", Task::Circles),
@@ -169,6 +172,7 @@ fn steps() -> [Step<Task>; 31] {
         ("budgets", "peers", Task::Peers),
         ("budgets", "playground", Task::Playground),
         ("python", "python", Task::Python(python::Args::CHECK)),
+        ("ros", "ros", Task::Ros(ros::Args::CHECK)),
         ("random", "endurance", Task::Endurance(endurance::Args::SHORT)),
         ("random", "search-windows", Task::SearchWindows(search_windows::Args::SHORT)),
         ("random", "fuzz", Task::Fuzz(fuzz::Args::short())),
@@ -240,6 +244,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Package => publish::package(),
         Task::Playground => playground::build_and_check(),
         Task::Python(args) => python::check(args),
+        Task::Ros(args) => ros::run(&args),
         Task::Deny => checks::deny(),
         Task::Bless(args) => bless(&args),
         Task::Bench => bench::run(),

@@ -81,7 +81,7 @@ def struct(name: str) -> Any:
 
 @cache
 def with_header(name: str) -> Any:
-    """The type of a service's request or response, behind what Cyclone puts before it: who has asked, and which request it is."""
+    """The type of a request or response of a service, behind what Cyclone puts before it: the client and its request."""
     package, _, short = name.split("/")
     fields = {"client": types.uint64, "sequence": types.int64, **_fields(name)}
     made = make_idl_struct(short + "_", f"{package}.srv.dds_.{short}_", fields)

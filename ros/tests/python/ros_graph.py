@@ -17,6 +17,7 @@ from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
+
 from interfaces import make, struct, with_header
 
 T = TypeVar("T")
@@ -52,6 +53,7 @@ class Graph:
         self.readers: dict[str, DataReader] = {}
         self.client = random.getrandbits(63)
         self.sequence = itertools.count(1)
+        self.repeated = 0
 
     def close(self) -> None:
         """Leaves the graph."""
@@ -111,6 +113,8 @@ class Graph:
                     if getattr(sample, "client", None) == self.client and sample.sequence == sequence:
                         return sample
                 time.sleep(0.002)
+            self.repeated += 1
+            print(f"{service}: request {sequence} repeated")
         raise AssertionError(f"{service} does not answer")
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
 from conftest import Drive, Node, Player, nanoseconds, stamp
 from interfaces import filled, make, plain
 from ros_graph import Graph, Process, quality, wait_for
