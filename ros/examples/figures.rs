@@ -61,7 +61,7 @@ fn hostile(parameters: &Parameters, tries: u32) -> anyhow::Result<()> {
     let drive = Drive::empty_classroom(5.0, BEGIN, &Frames::of(parameters))?;
     let mut node = node(&drive, parameters)?;
     let (begin, mut decoded, mut before) = (Instant::now(), 0_u64, 0);
-    for round in 0..2 {
+    for round in 0..2_u32 {
         for (number, target) in targets().into_iter().enumerate() {
             let mut random = Random::new(number as u64 + 7);
             // The first round is a warm-up, of a tenth.

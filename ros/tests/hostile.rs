@@ -1,7 +1,5 @@
 //! Hostile bytes to the decoder of each subscription, and what they decode to, to the node: no panic, and still right afterwards.
 
-#![expect(clippy::unwrap_used, reason = "all of this file is a test, its helpers too")]
-
 use sonarfix_ros::drive::Drive;
 use sonarfix_ros::hostile::{Random, targets};
 use sonarfix_ros::motion::between;
