@@ -21,7 +21,7 @@ use crate::parameters::Parameters;
 use crate::problem::{Nanoseconds, Problem, Problems};
 use crate::publication::Output;
 use crate::report;
-use crate::view::{Frames, View, header};
+use crate::view::{Frames, View, header, transform};
 
 /// Silence of the robot that is reported, nanoseconds.
 const SILENCE: Nanoseconds = 3_000_000_000;
@@ -233,8 +233,12 @@ impl Bridge {
         let at = self.difference.time(ping.at.ticks(), now);
         let Some(sonar) = self.config.localizer.rangers.get(ping.aim.ranger) else { return };
         let echo = ping.outcome.map(|echo| echo.range.0);
+        let frame = format!("sonar_{}", ping.aim.ranger.0);
+        let placement = [sonar.mount.x.0, sonar.mount.y.0, ping.aim.bearing.0].map(f64::from);
+        let transforms = vec![transform(at, [&self.frames.base, &frame], placement)];
+        out.push(Output::Transforms(TFMessage { transforms }));
         out.push(Output::Range(Range {
-            header: header(at, &format!("sonar_{}", ping.aim.ranger.0)),
+            header: header(at, &frame),
             radiation_type: ULTRASOUND,
             field_of_view: 2.0 * sonar.cone.0,
             min_range: sonar.min_range.0,

@@ -13,7 +13,7 @@ use smol::{LocalExecutor, Timer};
 
 /// How long a response waits for the reader of its client at most.
 const PATIENCE: Duration = Duration::from_secs(3);
-/// How often it looks.
+/// Time between two checks.
 const PERIOD: Duration = Duration::from_millis(5);
 
 /// The first half of a reader's or writer's number, which names its participant.

@@ -20,7 +20,7 @@ use sonarfix_search::navigator::Navigator;
 use sonarfix_search::search::{Search, SearchParameters};
 
 use crate::markers::{self, Drawn};
-use crate::motion::{Motion, Odometer, Planar, Wheels, between, moved};
+use crate::motion::{Motion, Odometer, Planar, Wheels, between, moved, seconds};
 use crate::parameters::Parameters;
 use crate::problem::{Nanoseconds, Problem, Problems};
 use crate::publication::Output;
@@ -105,6 +105,8 @@ pub struct Node {
     begin: Begin,
     problems: Problems,
     outcomes: Vec<Outcomes>,
+    /// When the last range of each ranger arrived.
+    heard_ranges: Vec<Option<Nanoseconds>>,
     drawn: VecDeque<Drawn>,
     now: Nanoseconds,
     /// When the last odometry arrived.
@@ -158,6 +160,7 @@ impl Node {
             odometer: Odometer::new(wheels, parameters.nanoseconds("odometry_timeout")),
             ranges: Ranges::new(&frames.base, bearings, parameters.numbers("scan_bearings")),
             outcomes: vec![Outcomes::default(); rangers],
+            heard_ranges: vec![None; rangers],
             parameters: parameters.clone(),
             config,
             frames,
@@ -366,6 +369,7 @@ impl Node {
             return self.report(Problem::RangeFuture);
         }
         let Ok(ranger) = u8::try_from(place) else { return };
+        self.hear_from(place);
         match self.ranges.range(RangerId(ranger), message, self.now) {
             Ok(()) => self.hear_waiting(out),
             Err(problem) => self.report(problem),
@@ -376,9 +380,16 @@ impl Node {
         if self.is_future(message.header.stamp.nanoseconds()) {
             return self.report(Problem::RangeFuture);
         }
+        self.hear_from(RangerId::FIRST.index());
         match self.ranges.scan(message, self.now) {
             Ok(()) => self.hear_waiting(out),
             Err(problem) => self.report(problem),
+        }
+    }
+
+    fn hear_from(&mut self, ranger: usize) {
+        if let Some(heard) = self.heard_ranges.get_mut(ranger) {
+            *heard = Some(self.now);
         }
     }
 
@@ -548,7 +559,11 @@ impl Node {
         let waits_for = if has_walls { "odometry" } else { "a map" };
         let mut statuses =
             vec![report::localization(health, waits_for), report::inputs(&self.problems, self.now)];
-        statuses.extend(self.outcomes.iter().enumerate().map(|(n, of)| report::ranger(n, of)));
+        for (number, (outcomes, heard)) in self.outcomes.iter().zip(&self.heard_ranges).enumerate()
+        {
+            let silent_for = heard.map(|last| seconds(self.now.saturating_sub(last)));
+            statuses.push(report::ranger(number, outcomes, silent_for));
+        }
         out.push(Output::Diagnostics(report::array(self.now, statuses)));
         if let Some(localizer) = localizer {
             let (filter, width) = (localizer.filter(), localizer.config().drive.track_width);

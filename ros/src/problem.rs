@@ -74,7 +74,7 @@ problems! {
     RangeTransform "range_transform", true, "check the publisher of the ranger's joint";
     /// A range was measured before the first odometry, or before the pose was set.
     RangeBeforeStart "range_before_start", false, "nothing: it happens at each start";
-    /// A range was measured while no odometry was: nobody knows where.
+    /// A range was measured in a gap of the odometry: the pose then is unknown.
     RangeUnplaced "range_unplaced", true, "check the connection of the robot's base";
     /// More ranges wait for odometry or transforms than fit.
     RangeQueue "range_queue", true, "check that odometry and transforms arrive";

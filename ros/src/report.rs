@@ -18,6 +18,9 @@ const ERROR: u8 = 2;
 /// How long a problem raises the level, nanoseconds.
 const RECENT: Nanoseconds = 5_000_000_000;
 
+/// Time without a range that is reported, seconds.
+const SILENCE: f64 = 5.0;
+
 /// The outcomes of the pings of one ranger.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Outcomes {
@@ -135,11 +138,19 @@ pub fn inputs(problems: &Problems, now: Nanoseconds) -> DiagnosticStatus {
     status(level, "inputs", &message, problems.values())
 }
 
-/// The status of a ranger.
+/// The status of a ranger of which nothing was heard for so many seconds; `None`: never anything.
 #[must_use]
-pub fn ranger(number: usize, outcomes: &Outcomes) -> DiagnosticStatus {
+pub fn ranger(number: usize, outcomes: &Outcomes, silent_for: Option<f64>) -> DiagnosticStatus {
+    let name = format!("ranger {number}");
     let message = format!("{} ranges used", outcomes.used());
-    status(OK, &format!("ranger {number}"), &message, outcomes.values())
+    match silent_for {
+        Some(seconds) if seconds < SILENCE => status(OK, &name, &message, outcomes.values()),
+        Some(seconds) => {
+            let message = format!("no range for {seconds:.0} s: check its topic; {message}");
+            status(WARN, &name, &message, outcomes.values())
+        }
+        None => status(WARN, &name, "no range yet: check range_topics", outcomes.values()),
+    }
 }
 
 /// The statuses as a message.

@@ -120,7 +120,9 @@ pub fn header(at: Nanoseconds, frame: &str) -> Header {
     Header { stamp: Time::of_nanoseconds(at), frame_id: frame.to_owned() }
 }
 
-fn transform(
+/// The placement of a frame in its parent: metres, metres, radians.
+#[must_use]
+pub fn transform(
     at: Nanoseconds,
     [parent, child]: [&str; 2],
     [x, y, heading]: Planar,

@@ -284,6 +284,7 @@ def test_a_robot_behind_the_link(graph: Graph, drive: Drive, start_node: Callabl
         assert graph.next("/sonarfix/range").max_range == pytest.approx(3.5)
         children = {part.child_frame_id for part in graph.next("/tf", lambda tf: len(tf.transforms) == 2).transforms}
         assert children == {"odom", "base_footprint"}
+        assert graph.next("/tf", lambda tf: tf.transforms[0].child_frame_id == "sonar_0")
         assert graph.next("/odom").header.frame_id == "odom"
         assert graph.call("/sonarfix/start", "std_srvs/msg/Trigger").success
         graph.matched("/initialpose")
