@@ -12,11 +12,12 @@ from typing import Any
 
 import pytest
 
-from interfaces import make
+from interfaces import make, plain
 from ros_graph import PROGRAMS, Graph, Process, quality, wait_for
 
 SECONDS = 60
-STATIC_EVERY = 20_000_000
+CLOCK_EVERY = 20_000_000
+POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
 
 
 def stamp(nanoseconds: int) -> dict[str, int]:
@@ -59,7 +60,7 @@ class Drive:
         self.truth = {line["at"]: tuple(line["pose"]) for line in lines if line["topic"] == "truth"}
         lines = [line for line in lines if line["topic"] != "truth"]
         self.messages = [(line["at"], line["topic"], make(line["type"], line["message"])) for line in lines]
-        self.start = make("geometry_msgs/msg/PoseWithCovarianceStamped", json.loads((folder / "start.json").read_text()))
+        self.start = make(POSE, json.loads((folder / "start.json").read_text()))
 
     def true_pose(self, at: int) -> tuple[float, float, float]:
         """The true pose at the tick that is nearest to a time."""
@@ -87,7 +88,7 @@ class Player:
                 continue
             while (time.monotonic() - wall) * 1e9 * speed < at - begin:
                 time.sleep(0.0005)
-            if last is None or at - last >= STATIC_EVERY:
+            if last is None or at - last >= CLOCK_EVERY:
                 self.clock.write(make("rosgraph_msgs/msg/Clock", clock=stamp(at + offset)))
                 last = at
             self.write(topic, message, at + offset)
@@ -135,10 +136,18 @@ class Node:
         self.graph.call("/set_initial_pose", "nav2_msgs/msg/SetInitialPose", pose=pose_values(pose))
 
 
+def pose_at(x: float, y: float, turn: float) -> Any:
+    """An initial pose."""
+    covariance = [0.0] * 36
+    covariance[0] = covariance[7] = 0.02**2
+    covariance[35] = 0.03**2
+    orientation = {"x": 0.0, "y": 0.0, "z": math.sin(turn / 2), "w": math.cos(turn / 2)}
+    pose = {"pose": {"position": {"x": x, "y": y}, "orientation": orientation}, "covariance": covariance}
+    return make(POSE, {"header": {"frame_id": "map"}, "pose": pose})
+
+
 def pose_values(message: Any) -> dict[str, Any]:
     """A pose with its covariance as nested values, for a request."""
-    from interfaces import plain
-
     return plain(message)
 
 
@@ -186,7 +195,7 @@ def start_node(graph: Graph, folder: Path, tmp_path: Path) -> Iterator[Callable[
 def localized(graph: Graph) -> Callable[..., Any]:
     """Checks what is published against the truth."""
     graph.reader("/tf", "tf2_msgs/msg/TFMessage")
-    graph.reader("/amcl_pose", "geometry_msgs/msg/PoseWithCovarianceStamped", quality(latched=True))
+    graph.reader("/amcl_pose", POSE, quality(latched=True))
     return lambda player, offset=0: Follower(graph, player, offset)
 
 

@@ -11,11 +11,10 @@ import time
 from pathlib import Path
 from typing import Any
 
-from conftest import Drive, Node, Player, stamp
+from conftest import POSE, Drive, Node, Player, pose_at, pose_values, stamp
 from interfaces import make
 from ros_graph import PROGRAMS, Graph, quality, wait_for
 
-POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
 SECOND = 10**9
 # Rates of the odometry and of the ranges, Hz.
 RATES = (50, 20)
@@ -111,10 +110,11 @@ def long_run(folder: Path, seconds: float) -> dict[str, float]:
             for topic in ("/odom", "/range", "/clock"):
                 peer.matched(topic)
             player.play(0, SECOND)
-            peer.call("/set_initial_pose", "nav2_msgs/msg/SetInitialPose")
+            pose = pose_values(pose_at(*drive.true_pose(SECOND)))
+            peer.call("/set_initial_pose", "nav2_msgs/msg/SetInitialPose", pose=pose)
             player.play(SECOND, 60 * SECOND)
             wait_for("pose", lambda peer=peer: peer.take("/amcl_pose") or None)
-            states.add(Node.state(node))
+            states.add(node.state())
             peer.close()
             rounds, simulated = rounds + 1, simulated + 60.0
             memory.append(node.process.resources()[1])

@@ -9,12 +9,11 @@ from typing import Any
 
 import pytest
 
-from conftest import Drive, Node, Player, nanoseconds, stamp
+from conftest import POSE, Drive, Node, Player, nanoseconds, pose_at, stamp
 from interfaces import filled, make, plain
 from ros_graph import Graph, Process, quality, wait_for
 
 SECOND = 10**9
-POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
 SIMULATED = ("use_sim_time:=true",)
 
 MESSAGES = [
@@ -121,18 +120,6 @@ def test_a_client_like_nav2_brings_the_node_up_and_follows_it(
     assert node.change("deactivate") and node.change("cleanup") and node.state() == "unconfigured"
     assert node.change("shutdown")
     wait_for("end", lambda: not node.process.is_running() or None)
-
-
-def pose_at(x: float, y: float, turn: float) -> Any:
-    """An initial pose."""
-    import math
-
-    covariance = [0.0] * 36
-    covariance[0] = covariance[7] = 0.02**2
-    covariance[35] = 0.03**2
-    orientation = {"x": 0.0, "y": 0.0, "z": math.sin(turn / 2), "w": math.cos(turn / 2)}
-    pose = {"pose": {"position": {"x": x, "y": y}, "orientation": orientation}, "covariance": covariance}
-    return make(POSE, {"header": {"frame_id": "map"}, "pose": pose})
 
 
 def test_the_clock_jumps_ahead(
