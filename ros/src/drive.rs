@@ -62,7 +62,14 @@ impl Drive {
         let is_pins = simulation.scenario.fidelity == Fidelity::Pins;
         ensure!(is_pins, "only a robot of the fidelity \"pins\" has telemetry");
         let width = f64::from(simulation.scenario.robot.localizer.drive.track_width.0);
-        let mut recorder = Recorded { begin, width, frames: frames.clone(), ..Recorded::default() };
+        let frames_of_messages = frames.clone();
+        let mut recorder = Recorded {
+            begin,
+            last: begin,
+            width,
+            frames: frames_of_messages,
+            ..Recorded::default()
+        };
         simulation.run(seed, &mut recorder)?;
         let start = recorder.start.context("the robot did not start")?;
         let mut message = PoseWithCovarianceStamped {

@@ -1,5 +1,7 @@
 //! A robot behind the link, without a port: its telemetry as bytes, and what the node publishes of it.
 
+#![expect(clippy::unwrap_used, reason = "all of this file is a test, its helpers too")]
+
 use std::time::Instant;
 
 use sonarfix_link::message::Ack;
