@@ -14,6 +14,8 @@ pub struct Arguments {
     pub remaps: Vec<Remap>,
     /// The parameters.
     pub parameters: Parameters,
+    /// Parameters for every node that this one does not have.
+    pub skipped: Vec<String>,
     /// What stands outside of `--ros-args`.
     pub others: Vec<String>,
 }
@@ -58,6 +60,7 @@ impl Arguments {
             namespace: "/".to_owned(),
             remaps: Vec::new(),
             parameters: Parameters::default(),
+            skipped: Vec::new(),
             others: Vec::new(),
         };
         let (mut settings, mut is_ros) = (Vec::new(), false);
@@ -111,7 +114,7 @@ impl Arguments {
                     let content = read(&file);
                     let content =
                         content.map_err(|error| ArgumentError::File(file.clone(), error))?;
-                    self.parameters.read(&file, &content, &full)?;
+                    self.skipped.extend(self.parameters.read(&file, &content, &full)?);
                 }
             }
         }

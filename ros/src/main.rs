@@ -26,6 +26,9 @@ fn main() -> ExitCode {
 fn run() -> anyhow::Result<()> {
     let arguments =
         Arguments::parse(std::env::args().skip(1), |file| std::fs::read_to_string(file))?;
+    for name in &arguments.skipped {
+        eprintln!("a parameter for every node is none of this one and is skipped: {name}");
+    }
     match arguments.others.first().map(String::as_str) {
         None => program::run(&arguments),
         Some("parameters") => {

@@ -156,11 +156,11 @@ fn files() -> Vec<Parameter> {
                 "`host` runs the localizer here, `bridge` publishes what a robot estimates",
             )
         },
-        text("robot_file", "", "Robot file (docs/formats.md); needed by `host`"),
+        text("robot_file", "", "Robot file (docs/formats.md); needed in both modes"),
         text(
             "map_file",
             "",
-            "Map file of walls (docs/formats.md). Empty: the walls are found in the grid of map_topic",
+            "Map file of walls (docs/formats.md). Empty: the walls are found in the grid of `map_topic`",
         ),
         text("port", "", "`bridge`: serial port of the robot, or `tcp:HOST:PORT`"),
         Parameter {
@@ -502,36 +502,36 @@ impl Parameters {
     }
 
     /// Sets the parameters of a file as ROS has them: for each node, `ros__parameters`. Nodes of other names are skipped;
-    /// `/**` and `*` match every node.
+    /// `/**` and `*` match every node: what such a section sets for other nodes is skipped, and returned by name.
     ///
     /// # Errors
     /// [`ParameterError`], by the reason.
-    pub fn read(&mut self, file: &str, content: &str, node: &str) -> Result<(), ParameterError> {
+    pub fn read(
+        &mut self,
+        file: &str,
+        content: &str,
+        node: &str,
+    ) -> Result<Vec<String>, ParameterError> {
         let wrong = |reason: String| ParameterError::File { file: file.to_owned(), reason };
         let yaml: serde_yaml::Value =
             serde_yaml::from_str(content).map_err(|error| wrong(error.to_string()))?;
         let nodes = yaml.as_mapping().ok_or_else(|| wrong("it has no nodes".to_owned()))?;
+        let mut skipped = Vec::new();
         for (name, content) in nodes {
             let name = name.as_str().unwrap_or_default();
-            let is_ours = ["/**", "/*", "*"].contains(&name)
+            let is_of_all = ["/**", "/*", "*"].contains(&name);
+            let is_ours = is_of_all
                 || name.trim_start_matches('/') == node.trim_start_matches('/')
                 || node.rsplit('/').next() == Some(name);
             let Some(own) = content.get("ros__parameters").filter(|_| is_ours) else { continue };
-            self.read_tree("", own)?;
-        }
-        Ok(())
-    }
-
-    fn read_tree(&mut self, prefix: &str, tree: &serde_yaml::Value) -> Result<(), ParameterError> {
-        for (key, value) in tree.as_mapping().into_iter().flatten() {
-            let name = format!("{prefix}{}", key.as_str().unwrap_or_default());
-            if value.is_mapping() {
-                self.read_tree(&format!("{name}."), value)?;
-            } else {
-                self.set_yaml(&name, value)?;
+            for (name, value) in leaves("", own) {
+                match self.set_yaml(&name, value) {
+                    Err(ParameterError::Unknown(name)) if is_of_all => skipped.push(name),
+                    result => result?,
+                }
             }
         }
-        Ok(())
+        Ok(skipped)
     }
 
     /// A text.
@@ -578,6 +578,20 @@ impl Parameters {
     }
 }
 
+/// The names and values of a tree, whose branches are joined by dots.
+fn leaves<'y>(prefix: &str, tree: &'y serde_yaml::Value) -> Vec<(String, &'y serde_yaml::Value)> {
+    let mut found = Vec::new();
+    for (key, value) in tree.as_mapping().into_iter().flatten() {
+        let name = format!("{prefix}{}", key.as_str().unwrap_or_default());
+        if value.is_mapping() {
+            found.extend(leaves(&format!("{name}."), value));
+        } else {
+            found.push((name, value));
+        }
+    }
+    found
+}
+
 /// The table as Markdown, for `docs/ros.md`.
 #[must_use]
 pub fn markdown() -> String {
@@ -621,10 +635,11 @@ mod tests {
     #[test]
     fn a_file_of_ros_is_read() {
         let mut parameters = Parameters::default();
-        let file = "/**:\n  ros__parameters:\n    use_sim_time: true\nsonarfix:\n  ros__parameters:\n    \
+        let file = "/**:\n  ros__parameters:\n    use_sim_time: true\n    speed: {limit: 1.0}\nsonarfix:\n  ros__parameters:\n    \
                     initial_pose: {x: 1, yaw: 0.5}\n    range_topics: [left, right]\n    scan_bearings: []\nother:\n  \
                     ros__parameters: {nonsense: 1}\n";
-        parameters.read("nav2.yaml", file, "/sonarfix").unwrap();
+        let skipped = parameters.read("nav2.yaml", file, "/sonarfix").unwrap();
+        assert_eq!(skipped, ["speed.limit"]);
         assert!(parameters.flag("use_sim_time"));
         assert_eq!(parameters.numbers("initial_pose.x"), [1.0]);
         assert_eq!(parameters.texts("range_topics"), ["left", "right"]);
