@@ -66,6 +66,10 @@ impl Discovered {
                 found.topics.remove(&guid);
                 found.matched.remove(&guid);
             }
+            DomainParticipantStatusEvent::ParticipantLost { id, .. } => {
+                found.topics.retain(|guid, _| guid.prefix != id);
+                found.matched.retain(|guid| guid.prefix != id);
+            }
             _ => {}
         }
     }

@@ -86,6 +86,8 @@ const JUMP_AHEAD: Nanoseconds = 5_000_000_000;
 const JUMP_BACK: Nanoseconds = 500_000_000;
 /// The least deviations of a pose that is set: metres, radians. `RViz` and many programs send zeros.
 const LEAST: (f64, f64) = (0.01, 0.01);
+/// Longest time between two transforms: odometry alone changes none, but its validity must go on.
+const TRANSFORM_PERIOD: Nanoseconds = 100_000_000;
 /// The pings that are drawn.
 const DRAWN: usize = 30;
 
@@ -112,6 +114,7 @@ pub struct Node {
     /// When the last odometry arrived.
     heard_odometry: Option<Nanoseconds>,
     published_pose: Option<Nanoseconds>,
+    published_transform: Option<Nanoseconds>,
     published_report: Option<Nanoseconds>,
 }
 
@@ -174,6 +177,7 @@ impl Node {
             now: 0,
             heard_odometry: None,
             published_pose: None,
+            published_transform: None,
             published_report: None,
         })
     }
@@ -249,7 +253,8 @@ impl Node {
             self.turns.forget();
             self.ranges.forget();
             self.odometer.forget();
-            (self.heard_odometry, self.published_pose, self.published_report) = (None, None, None);
+            (self.heard_odometry, self.published_report) = (None, None);
+            (self.published_pose, self.published_transform) = (None, None);
         } else if now > before + JUMP_AHEAD {
             self.report(Problem::ClockAhead);
         }
@@ -520,8 +525,13 @@ impl Node {
     fn publish_estimate(&mut self, has_news: bool, out: &mut Vec<Output>) {
         let Some(view) = self.newest() else { return };
         let mut transforms = Vec::new();
-        if self.parameters.flag("tf_broadcast") && view.has_pose() {
-            let tolerance = self.parameters.nanoseconds("transform_tolerance");
+        let tolerance = self.parameters.nanoseconds("transform_tolerance");
+        let period = TRANSFORM_PERIOD.min(tolerance / 2);
+        // The stamps of the odometry may be set back without the clock.
+        let is_early = |last: Nanoseconds| (last..last + period).contains(&view.at);
+        let is_needed = has_news || !self.published_transform.is_some_and(is_early);
+        if is_needed && self.parameters.flag("tf_broadcast") && view.has_pose() {
+            self.published_transform = Some(view.at);
             transforms.push(view.map_to_odom(&self.frames, tolerance));
         }
         if self.parameters.flag("publish_odom_tf") {
@@ -531,7 +541,8 @@ impl Node {
             out.push(Output::Transforms(TFMessage { transforms }));
         }
         let period = self.parameters.nanoseconds("pose_period");
-        let is_due = self.published_pose.is_none_or(|last| view.at - last >= period);
+        let is_due =
+            self.published_pose.is_none_or(|last| view.at < last || view.at - last >= period);
         if has_news || is_due {
             self.publish_pose(out);
         }

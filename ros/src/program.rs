@@ -31,7 +31,7 @@ use crate::publication::Output;
 use crate::view::header;
 
 /// Period of the node's own work.
-const TICK: std::time::Duration = std::time::Duration::from_millis(20);
+const TICK: std::time::Duration = std::time::Duration::from_millis(50);
 /// Messages that wait for the node; the readers wait then, and DDS keeps the latest.
 const QUEUE: usize = 1000;
 /// The timeout that the bond's messages name, seconds, as nav2 has it.
