@@ -83,9 +83,9 @@ pub fn deny() -> anyhow::Result<()> {
     deny_in_all("advisories")
 }
 
-/// These checks of cargo-deny in both workspaces that make products.
+/// These checks of cargo-deny in the workspaces that make products.
 fn deny_in_all(checks: &str) -> anyhow::Result<()> {
-    for workspace in [Workspace::Main, Workspace::Firmware, Workspace::Python] {
+    for workspace in [Workspace::Main, Workspace::Firmware, Workspace::Python, Workspace::Ros] {
         let manifest = workspace.folder().join("Cargo.toml");
         let mut command = cargo::command("deny --log-level error --manifest-path");
         command.arg(manifest).args(["check"]).args(checks.split(' '));

@@ -32,6 +32,7 @@ mod playground;
 mod program;
 mod publish;
 mod python;
+mod ros;
 mod search_windows;
 mod template;
 mod thumb;
@@ -118,6 +119,8 @@ enum Task {
     Python(python::Args),
     /// Bags of ROS 2 against rosbags in Python: ours read by it, its own and damaged ones read by ours.
     Bags,
+    /// The ROS 2 node: its tests, and a client over Eclipse Cyclone DDS that behaves like nav2.
+    Ros(ros::Args),
     /// Licences of all dependencies, and advisories if their database can be reached.
     Deny,
     /// Records the golden traces, writes the fuzz inputs of messages, and measures and writes `budgets.toml`.
@@ -143,7 +146,7 @@ enum Task {
 }
 
 /// The steps of CI, by job.
-fn steps() -> [Step<Task>; 32] {
+fn steps() -> [Step<Task>; 33] {
     [
         ("lint", "format", Task::Format),
         ("lint", "circles", Task::Circles),
@@ -173,6 +176,7 @@ fn steps() -> [Step<Task>; 32] {
         ("budgets", "playground", Task::Playground),
         ("python", "python", Task::Python(python::Args::CHECK)),
         ("python", "bags", Task::Bags),
+        ("ros", "ros", Task::Ros(ros::Args::CHECK)),
         ("random", "endurance", Task::Endurance(endurance::Args::SHORT)),
         ("random", "search-windows", Task::SearchWindows(search_windows::Args::SHORT)),
         ("random", "fuzz", Task::Fuzz(fuzz::Args::short())),
@@ -245,6 +249,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Playground => playground::build_and_check(),
         Task::Python(args) => python::check(args),
         Task::Bags => bags::check(),
+        Task::Ros(args) => ros::run(&args),
         Task::Deny => checks::deny(),
         Task::Bless(args) => bless(&args),
         Task::Bench => bench::run(),

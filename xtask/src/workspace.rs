@@ -26,11 +26,13 @@ pub enum Workspace {
     Fuzz,
     /// The Python package.
     Python,
+    /// The ROS 2 node.
+    Ros,
 }
 
 impl Workspace {
     /// All of them.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Main,
         Self::C,
         Self::Firmware,
@@ -38,6 +40,7 @@ impl Workspace {
         Self::Bench,
         Self::Fuzz,
         Self::Python,
+        Self::Ros,
     ];
 
     /// The folder with its `Cargo.toml`.
@@ -50,6 +53,7 @@ impl Workspace {
             Self::Bench => "bench",
             Self::Fuzz => "fuzz",
             Self::Python => "python",
+            Self::Ros => "ros",
         })
     }
 
@@ -63,6 +67,7 @@ impl Workspace {
             Self::Bench => "bench",
             Self::Fuzz => "fuzz",
             Self::Python => "python",
+            Self::Ros => "ros",
         })
     }
 
