@@ -37,6 +37,9 @@ impl File<'_> {
     }
 }
 
+/// The longest TOML that is parsed, which takes 60 times its length in memory.
+const MAX_TOML_BYTES: usize = 4 * 1024 * 1024;
+
 /// A parsed file.
 pub(crate) struct Document<'a> {
     name: &'a str,
@@ -48,6 +51,12 @@ pub(crate) struct Document<'a> {
 impl<'a> Document<'a> {
     /// Parses the text of the file `name`.
     pub fn parse(text: &'a str, name: &'a str) -> Result<Self, FileError> {
+        if text.len() > MAX_TOML_BYTES {
+            let limit = MAX_TOML_BYTES / (1024 * 1024);
+            let message =
+                format!("it has more than {limit} MiB: write a map of so many walls as CSV");
+            return Err(FileError::of_file(name, message));
+        }
         let root = DeTable::parse(text).map_err(|error| {
             let span = error.span().unwrap_or_default();
             let rest = text.get(span.start..).unwrap_or_default();

@@ -10,6 +10,9 @@ use crate::error::FileError;
 /// end is no file.
 pub const MAX_FILE_BYTES: u64 = 256 * 1024 * 1024;
 
+/// The largest text that is read whole: a hundred times that of a large map.
+const MAX_TEXT_BYTES: u64 = 64 * 1024 * 1024;
+
 /// The name of a file in error messages.
 pub(crate) fn name(path: &Path) -> String {
     path.display().to_string()
@@ -32,20 +35,24 @@ pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>, FileError> {
 /// # Errors
 /// Those of the file system; [`io::ErrorKind::FileTooLarge`].
 pub fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
+    read_at_most(path, MAX_FILE_BYTES)
+}
+
+fn read_at_most(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    File::open(path)?.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > MAX_FILE_BYTES {
-        let reason = format!("it has more than {} MiB", MAX_FILE_BYTES / (1024 * 1024));
+    File::open(path)?.take(most + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > most {
+        let reason = format!("it has more than {} MiB", most / (1024 * 1024));
         return Err(io::Error::new(io::ErrorKind::FileTooLarge, reason));
     }
     Ok(bytes)
 }
 
-/// The text of a file of at most [`MAX_FILE_BYTES`].
+/// The text of a file of at most 64 MiB.
 ///
 /// # Errors
 /// Those of [`read_bytes`]; [`io::ErrorKind::InvalidData`] if it is not UTF-8.
 pub fn read_text(path: &Path) -> io::Result<String> {
-    String::from_utf8(read_bytes(path)?)
+    String::from_utf8(read_at_most(path, MAX_TEXT_BYTES)?)
         .map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is no text in UTF-8"))
 }

@@ -21,6 +21,11 @@ pub(crate) struct WallFile {
     pub lines: Vec<usize>,
 }
 
+/// The most walls of a CSV: an imported map has half of them.
+const MOST_WALLS: u32 = 400_000;
+/// So many mistakes end the reading of a CSV.
+const MOST_MISTAKES: usize = 100;
+
 impl WallFile {
     /// Reads a map: a baked map if the file starts with its signature, a CSV of segments if its name ends in `.csv`,
     /// otherwise TOML. `unit` is that of a CSV without a unit in its header.
@@ -78,6 +83,14 @@ impl WallFile {
             let record = record.map_err(|error| of_csv(name, &error))?;
             let byte = record.position().and_then(|position| usize::try_from(position.byte()).ok());
             let line = counter.advance_to(text.len().saturating_sub(byte.unwrap_or(0)));
+            if number > MOST_WALLS {
+                let message =
+                    format!("there are more than {MOST_WALLS} walls: remove what is no wall");
+                mistakes.push(Mistake::new(name, line, "", message));
+            }
+            if number > MOST_WALLS || mistakes.len() >= MOST_MISTAKES {
+                break;
+            }
             let wall = columns.wall(&record, number).and_then(|wall| {
                 let is_new = names.insert(wall.name().to_owned());
                 let message = || format!("another wall is already called \"{}\"", wall.name());
