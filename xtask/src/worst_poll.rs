@@ -34,7 +34,7 @@ const CORES: [(&str, &str, u64); 2] =
     [("Cortex-M4F", "m4f", 50_000), ("Cortex-M0+", "m0plus", 900_000)];
 
 /// What runs, and the arguments of `sonarfix pil`; `C` is `classroom`, `T` the folder of the tests' scenarios.
-const SCENARIOS: [(&str, &str); 25] = [
+const SCENARIOS: [(&str, &str); 26] = [
     ("one sonar, informative", "C"),
     ("nearest wall", "C --policy nearest"),
     ("the paper's robot", "paper --fidelity pins"),
@@ -62,6 +62,7 @@ const SCENARIOS: [(&str, &str); 25] = [
     ),
     ("lost and found", "C --start relocalize --heading-slips 5"),
     ("garbage on the link", "C --load garbage"),
+    ("more garbage than a poll reads", "C --load saturated"),
     ("commands, a new pose while pinging", "C --load commands"),
     (
         "commands and all sensors",

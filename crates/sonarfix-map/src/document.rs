@@ -9,13 +9,13 @@ use std::ops::RangeInclusive;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::error::{FileError, Mistake};
+use crate::error::{FileError, MOST_MISTAKES, Mistake};
 use crate::example;
 use crate::geometry::{TOO_FAR, is_near_enough};
 use crate::plausibility::values::{meant, suspects};
 use crate::quantity::{Dimension, LENGTH, Limits, METRE, Unit};
 use crate::spelling::{alternatives, nearest};
-use crate::text_lines;
+use crate::text_lines::Lines;
 
 /// The version of the formats that this crate reads.
 const FORMAT: u64 = 1;
@@ -26,15 +26,23 @@ const PLACEHOLDER: f64 = 1.0;
 #[derive(Clone, Copy)]
 struct File<'a> {
     name: &'a str,
-    text: &'a str,
+    lines: &'a Lines,
     mistakes: &'a RefCell<Vec<Mistake>>,
 }
 
 impl File<'_> {
     fn record(self, at: usize, key: &str, message: impl Into<String>) {
-        let mistake = Mistake::new(self.name, text_lines::line(self.text, at), key, message);
-        self.mistakes.borrow_mut().push(mistake);
+        let mut mistakes = self.mistakes.borrow_mut();
+        if mistakes.len() < MOST_MISTAKES {
+            mistakes.push(Mistake::new(self.name, self.lines.of(at), key, message));
+        }
     }
+}
+
+/// The beginning of a line, as it is quoted in a message: a file that is no text may have control characters.
+fn shown(line: &str) -> String {
+    let visible = |character: char| if character.is_control() { '\u{fffd}' } else { character };
+    line.chars().take(60).map(visible).collect()
 }
 
 /// The longest TOML that is parsed, which takes 60 times its length in memory.
@@ -44,6 +52,7 @@ const MAX_TOML_BYTES: usize = 4 * 1024 * 1024;
 pub(crate) struct Document<'a> {
     name: &'a str,
     text: &'a str,
+    lines: Lines,
     mistakes: RefCell<Vec<Mistake>>,
     root: DeValue<'a>,
 }
@@ -57,15 +66,16 @@ impl<'a> Document<'a> {
                 format!("it has more than {limit} MiB: write a map of so many walls as CSV");
             return Err(FileError::of_file(name, message));
         }
+        let lines = Lines::new(text);
         let root = DeTable::parse(text).map_err(|error| {
             let span = error.span().unwrap_or_default();
             let rest = text.get(span.start..).unwrap_or_default();
-            let near = rest.lines().next().unwrap_or_default();
+            let near = shown(rest.lines().next().unwrap_or_default());
             let message = format!("this is not TOML at `{near}`: {}", error.message());
-            FileError::from(Mistake::new(name, text_lines::line(text, span.start), "", message))
+            FileError::from(Mistake::new(name, lines.of(span.start), "", message))
         })?;
         let root = DeValue::Table(root.into_inner());
-        Ok(Self { name, text, mistakes: RefCell::default(), root })
+        Ok(Self { name, text, lines, mistakes: RefCell::default(), root })
     }
 
     /// Whether the file has a value at this key.
@@ -77,13 +87,13 @@ impl<'a> Document<'a> {
     /// may have other keys.
     ///
     /// # Errors
-    /// All mistakes that were recorded, by line.
+    /// The mistakes that were recorded, by line: at most [`MOST_MISTAKES`].
     pub fn read<T>(
         &self,
         keys: &[&str],
         read: impl FnOnce(&Table<'_>) -> Option<T>,
     ) -> Result<T, FileError> {
-        let file = File { name: self.name, text: self.text, mistakes: &self.mistakes };
+        let file = File { name: self.name, lines: &self.lines, mistakes: &self.mistakes };
         let root = Node::new(file, String::new(), 0, Some(&self.root)).any_table();
         let value =
             root.has_known_format().then(|| read(&root.only(&[&["format"], keys].concat())));

@@ -2,6 +2,9 @@
 
 use std::fmt;
 
+/// So many mistakes, or warnings, of one file are reported.
+pub(crate) const MOST_MISTAKES: usize = 100;
+
 /// One mistake in a file: `paper.toml:45: robot.sonar.cone: must be …`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Mistake {

@@ -9,7 +9,7 @@ use crate::error::FileError;
 use crate::file;
 use crate::floor::{Floor, NamedWall};
 use crate::scenario::{Scenario, scenario_keys};
-use crate::text_lines;
+use crate::text_lines::Lines;
 use crate::wall_file::WallFile;
 
 /// A map, with the position of each wall in its file.
@@ -70,7 +70,7 @@ impl MapFile {
             })
         });
         let (name, lines) = match map? {
-            Ok(places) => (name, text_lines::lines(text, &places)),
+            Ok(places) => (name, Lines::new(text).of_each(&places)),
             Err(file) => (file::name(&file), WallFile::read(&file, None)?.lines),
         };
         Ok(Self { floor, scenario: Some(scenario), name, lines, is_toml: true })

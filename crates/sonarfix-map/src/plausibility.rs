@@ -13,7 +13,7 @@ pub(crate) mod values;
 use std::path::Path;
 
 use crate::document::Document;
-use crate::error::Mistake;
+use crate::error::{MOST_MISTAKES, Mistake};
 use crate::map_file::MapFile;
 use crate::scenario::Scenario;
 use crate::{file, robot_file};
@@ -60,6 +60,7 @@ fn find(text: &str, name: &str, base: &Path) -> Option<Vec<Mistake>> {
         }
     };
     warnings.sort_by(|a, b| (a.file(), a.line()).cmp(&(b.file(), b.line())));
+    warnings.truncate(MOST_MISTAKES);
     Some(warnings)
 }
 

@@ -1,18 +1,29 @@
 //! Lines of positions in a text.
 
-/// The line of a position in a text; lines count from 1.
-pub(crate) fn line(text: &str, at: usize) -> usize {
-    text.bytes().take(at).filter(|&byte| byte == b'\n').count() + 1
+/// Where the lines of a text begin.
+pub(crate) struct Lines {
+    starts: Vec<usize>,
 }
 
-/// The line of each position in a text, both in ascending order; lines count from 1.
-pub(crate) fn lines(text: &str, places: &[usize]) -> Vec<usize> {
-    let mut line = 1;
-    let mut from = 0;
-    let mut line_at = |&place: &usize| {
-        line += text.get(from..place).unwrap_or_default().matches('\n').count();
-        from = place.max(from);
-        line
-    };
-    places.iter().map(&mut line_at).collect()
+impl Lines {
+    pub fn new(text: &str) -> Self {
+        let ends = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n');
+        Self { starts: std::iter::once(0).chain(ends.map(|(at, _)| at + 1)).collect() }
+    }
+
+    /// The line of a position; lines count from 1.
+    pub fn of(&self, at: usize) -> usize {
+        self.starts.partition_point(|&start| start <= at)
+    }
+
+    /// The line of each position.
+    pub fn of_each(&self, places: &[usize]) -> Vec<usize> {
+        places.iter().map(|&place| self.of(place)).collect()
+    }
+
+    /// A line of the text; empty if there is no such line.
+    pub fn text<'t>(&self, text: &'t str, line: usize) -> &'t str {
+        let start = self.starts.get(line.wrapping_sub(1)).copied();
+        start.and_then(|start| text.get(start..)?.lines().next()).unwrap_or_default()
+    }
 }

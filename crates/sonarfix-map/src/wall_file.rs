@@ -7,12 +7,12 @@ use sonarfix::geometry::pose::Point;
 use sonarfix::map::{Map, WallError, image};
 
 use crate::document::Document;
-use crate::error::{FileError, Mistake};
+use crate::error::{FileError, MOST_MISTAKES, Mistake};
 use crate::file;
 use crate::floor::{Floor, NamedWall};
 use crate::geometry::TOO_FAR;
 use crate::quantity::{LENGTH, Unit};
-use crate::text_lines;
+use crate::text_lines::Lines;
 
 /// The walls of a map.
 pub(crate) struct WallFile {
@@ -23,8 +23,6 @@ pub(crate) struct WallFile {
 
 /// The most walls of a CSV: an imported map has half of them.
 const MOST_WALLS: u32 = 400_000;
-/// So many mistakes end the reading of a CSV.
-const MOST_MISTAKES: usize = 100;
 
 impl WallFile {
     /// Reads a map: a baked map if the file starts with its signature, a CSV of segments if its name ends in `.csv`,
@@ -50,7 +48,7 @@ impl WallFile {
         let document = Document::parse(text, name)?;
         let read = document.read(&["map"], |root| Some(Floor::from_node(root.require("map"))));
         let (floor, places) = read?;
-        Ok(Self { floor, lines: text_lines::lines(text, &places) })
+        Ok(Self { floor, lines: Lines::new(text).of_each(&places) })
     }
 
     /// Reads a baked map. Its walls are named by their numbers.

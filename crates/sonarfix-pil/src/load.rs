@@ -14,6 +14,8 @@ pub enum Load {
     Garbage,
     /// Valid commands at the rate of the line.
     Commands,
+    /// Random bytes without an end: more than a poll reads.
+    Saturated,
     /// Nothing, and what is sent is lost.
     Unplugged,
 }
@@ -51,7 +53,8 @@ impl Traffic {
         self.polls = self.polls.wrapping_add(1);
         match self.load {
             Load::Quiet | Load::Unplugged => &[],
-            Load::Garbage => self.garbage(),
+            Load::Garbage => self.garbage(BYTES),
+            Load::Saturated => self.garbage(frame::FRAME_MAX),
             Load::Commands => match self.command(localizer) {
                 Some(command) => self.framed(&command),
                 None => &[],
@@ -59,8 +62,8 @@ impl Traffic {
         }
     }
 
-    fn garbage(&mut self) -> &[u8] {
-        let (garbage, _) = self.frame.split_at_mut(BYTES.min(frame::FRAME_MAX));
+    fn garbage(&mut self, count: usize) -> &[u8] {
+        let (garbage, _) = self.frame.split_at_mut(count.min(frame::FRAME_MAX));
         for byte in garbage.iter_mut() {
             // Marsaglia's xorshift.
             self.random ^= self.random << 13;

@@ -60,6 +60,8 @@ enum Traffic {
     Garbage,
     /// Valid commands.
     Commands,
+    /// Random bytes, more than a poll reads.
+    Saturated,
     /// Nothing arrives, and telemetry is lost.
     Unplugged,
 }
@@ -70,6 +72,7 @@ impl From<Traffic> for Load {
             Traffic::Quiet => Self::Quiet,
             Traffic::Garbage => Self::Garbage,
             Traffic::Commands => Self::Commands,
+            Traffic::Saturated => Self::Saturated,
             Traffic::Unplugged => Self::Unplugged,
         }
     }

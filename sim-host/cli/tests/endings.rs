@@ -258,8 +258,9 @@ fn endless_input_is_an_error_of_a_few_lines() {
         let output = printing(arguments, files.path()).stdout(Stdio::null()).output().unwrap();
         let errors = errors(&output);
         assert_eq!(output.status.code(), Some(1), "{arguments:?}: {errors}");
-        let has_size =
-            ["256 MiB", "64 MiB", "64 KiB"].iter().any(|size| errors.contains(&format!("more than {size}")));
+        let has_size = ["256 MiB", "64 MiB", "64 KiB"]
+            .iter()
+            .any(|size| errors.contains(&format!("more than {size}")));
         assert!(has_size, "{arguments:?}: {errors}");
         assert!(errors.lines().all(|line| line.chars().count() < 200), "{arguments:?}: {errors}");
     }

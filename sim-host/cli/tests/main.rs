@@ -9,6 +9,7 @@ mod endings;
 mod export;
 mod find;
 mod guide;
+mod hostile_files;
 mod init;
 mod link_command;
 mod live;

@@ -5,6 +5,7 @@
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use sonarfix::geometry::pose::Pose;
@@ -134,6 +135,66 @@ fn silent_clients_keep_nobody_out() {
     let mut text = String::new();
     events.read_to_string(&mut text).unwrap();
     assert!(text.contains("{\"event\":1}\n") && text.contains("\"end\""), "{text}");
+}
+
+/// A client that sends a byte each second, and connects again when it is closed.
+fn slow_client(host: &str, number: u64, is_over: &AtomicBool) {
+    let start: &[u8] = if number % 2 == 0 { b"GET / HTTP/1.1\r\nX: " } else { b"" };
+    let mut stream = None;
+    // Not all in the same instant.
+    std::thread::sleep(Duration::from_millis(number % 1000));
+    while !is_over.load(Ordering::Relaxed) {
+        let mut sender = stream.take().or_else(|| {
+            let mut stream = TcpStream::connect(host).ok()?;
+            stream.write_all(start).ok()?;
+            Some(stream)
+        });
+        stream = sender.take_if(|stream| stream.write_all(b"x").is_ok());
+        std::thread::sleep(Duration::from_secs(1));
+    }
+}
+
+/// A thousand slow clients: a page that is open misses no event, and another one can be opened. `SONARFIX_CROWD=60` takes a
+/// minute.
+#[test]
+fn a_thousand_slow_clients_disturb_no_page() {
+    const CLIENTS: u64 = 1_000;
+    let seconds = std::env::var("SONARFIX_CROWD").ok().map_or(3, |text| text.parse().unwrap());
+    let (ring, _orders, host, headers) = page();
+    let mut events = connected(&host);
+    events.write_all(format!("GET /events HTTP/1.1\r\n{headers}\r\n").as_bytes()).unwrap();
+    events.read_exact(&mut [0; 12]).unwrap();
+    let is_over = AtomicBool::new(false);
+    let (mut pushed, mut opened) = (0, 0);
+    let text = std::thread::scope(|scope| {
+        for number in 0..CLIENTS {
+            let (host, is_over) = (&host, &is_over);
+            scope.spawn(move || slow_client(host, number, is_over));
+        }
+        let reader = scope.spawn(move || {
+            let mut text = String::new();
+            events.read_to_string(&mut text).unwrap();
+            text
+        });
+        let begun = Instant::now();
+        while begun.elapsed() < Duration::from_secs(seconds) {
+            for _ in 0..10 {
+                ring.push(&format!("{{\"event\":{pushed}}}"));
+                pushed += 1;
+                std::thread::sleep(Duration::from_millis(20));
+            }
+            assert_eq!(status(&host, &format!("GET / HTTP/1.1\r\n{headers}\r\n")), "200");
+            opened += 1;
+        }
+        ring.close();
+        is_over.store(true, Ordering::Relaxed);
+        reader.join().unwrap()
+    });
+    let lines: Vec<&str> = text.lines().filter(|line| line.starts_with("{\"event\"")).collect();
+    let expected: Vec<String> = (0..pushed).map(|event| format!("{{\"event\":{event}}}")).collect();
+    assert_eq!(lines, expected);
+    assert!(opened > 0 && pushed > 0);
+    println!("{CLIENTS} slow clients, {seconds} s: {opened} pages opened, {pushed} events read");
 }
 
 /// With the token there are at most so many; one that has ended makes room.

@@ -127,7 +127,7 @@ impl ComparedDevice<'_> {
 
     /// When the next bytes arrive over the link.
     fn next_bytes(&self) -> Option<Instant> {
-        let is_loaded = matches!(self.load, Load::Garbage | Load::Commands);
+        let is_loaded = matches!(self.load, Load::Garbage | Load::Commands | Load::Saturated);
         is_loaded.then(|| self.polled.checked_add_duration(BYTES_PERIOD)).flatten()
     }
 

@@ -104,10 +104,13 @@ pub fn check_folder(option: &str, folder: &Path) -> anyhow::Result<()> {
     std::fs::create_dir_all(folder).with_context(|| format!("{option} {}", folder.display()))
 }
 
+/// A line as it is printed: what it quotes of a file may be long, and may have characters that control a terminal.
 fn shortened(line: &str) -> String {
+    let line: String =
+        line.chars().map(|it| if it.is_control() { '\u{fffd}' } else { it }).collect();
     match line.char_indices().nth(LONGEST_LINE) {
         Some((end, _)) => format!("{} …", line.get(..end).unwrap_or_default()),
-        None => line.to_owned(),
+        None => line,
     }
 }
 

@@ -194,6 +194,28 @@ fn a_day_of(command: impl Fn(u64) -> Command) -> SimFlash {
     bench.switched_off()
 }
 
+/// A day of a robot that gets a pose and starts, and is switched off a minute later, again and again; the flash after it, and
+/// the writes that the robot has counted.
+fn a_day_of_resets() -> (SimFlash, u32) {
+    let baked = Baked::new(&config());
+    let mut flash = SimFlash::new();
+    let mut counted = 0;
+    for number in 0..DAY / 60 {
+        let mut bench = Bench::switched_on(&baked, flash);
+        assert_eq!(bench.order(&another_pose(number)), CommandResult::Done);
+        assert_eq!(bench.order(&Command::Start), CommandResult::Done);
+        assert_eq!(bench.order(&Command::Stop), CommandResult::Done);
+        for _ in 0..59 {
+            bench.now += 1_000_000;
+            let _ = bench.poll();
+            bench.received();
+        }
+        counted = bench.app.store().status().writes;
+        flash = bench.switched_off();
+    }
+    (flash, counted)
+}
+
 /// Seconds.
 const DAY: u64 = 86_400;
 /// Bytes of a record and of a configuration in flash.
@@ -234,6 +256,17 @@ fn a_day_of_commands_wears_the_flash_at_the_permitted_rate() {
     // A sector also holds its header and the copies of the newest records.
     assert!((DAY / 60..=DAY / 60 + 120 + 2 * erases).contains(&writes), "{writes}");
     assert!(erases <= writes / per_sector(RECORD, 2 * RECORD) + 2, "{erases}");
+}
+
+/// A bucket that were full after each reset would permit three writes a minute here.
+#[test]
+fn a_day_of_resets_wears_the_flash_at_the_permitted_rate() {
+    let (flash, counted) = a_day_of_resets();
+    let (writes, erases) = (flash.written as u64 / RECORD, flash.erased as u64);
+    println!("{writes} writes, {counted} of them counted, and {erases} erases in a day of resets");
+    assert!(writes <= DAY / 60 + 120 + 2 * erases, "{writes}");
+    assert!(u64::from(counted) <= DAY / 60 + 120, "{counted}");
+    assert!(u64::from(counted) >= DAY / 120, "{counted}: the robot has stored its poses");
 }
 
 /// The same over both keys: no sequence of commands wears the flash faster than one configuration a minute.

@@ -1,14 +1,14 @@
 //! The values of a scenario and of the files that it names, as flat lists with their lines.
 
-use std::cell::RefCell;
-use std::collections::BTreeSet;
+use std::cell::Cell;
+use std::collections::BTreeMap;
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use crate::error::Mistake;
 use crate::quantity::Dimension;
-use crate::text_lines::line;
+use crate::text_lines::Lines;
 
 /// A comment with this word accepts the values of its line.
 const ACCEPTED: &str = "# plausible";
@@ -31,6 +31,8 @@ pub(super) struct Fact {
     pub text: String,
     is_number: bool,
     is_accepted: bool,
+    /// Whether a warning is about this value: another one about the same value has the same cause.
+    is_reported: Cell<bool>,
 }
 
 impl Fact {
@@ -45,6 +47,7 @@ impl Fact {
             text: text.to_owned(),
             is_number,
             is_accepted: false,
+            is_reported: Cell::new(false),
         }
     }
 
@@ -71,6 +74,11 @@ impl Fact {
         }
     }
 
+    /// Marks the value as reported; whether a warning about it is to be shown.
+    pub fn report(&self) -> bool {
+        !self.is_reported.replace(true) && !self.is_accepted
+    }
+
     /// A warning at this value.
     pub fn warn(&self, message: String) -> Mistake {
         Mistake::new(&self.file, self.line, &self.key, message)
@@ -80,11 +88,10 @@ impl Fact {
 /// All numbers and words of a scenario, a robot file or a map file.
 #[derive(Debug, Default)]
 pub(super) struct Facts {
-    all: Vec<Fact>,
+    /// By the key by which rules find them.
+    all: BTreeMap<String, Vec<Fact>>,
     /// The duration of the path in seconds, if the file is a scenario without mistakes.
     pub duration: Option<f64>,
-    /// The values that a warning is about: another one about the same value has the same cause.
-    reported: RefCell<BTreeSet<usize>>,
 }
 
 impl Facts {
@@ -104,13 +111,14 @@ impl Facts {
             table,
             ..Fact::refused(&format!("map.wall[{table}]"), "", false)
         };
-        Self { all: lines.into_iter().enumerate().map(wall).collect(), ..Self::default() }
+        let walls = lines.into_iter().enumerate().map(wall).collect();
+        Self { all: BTreeMap::from([(WALL.to_owned(), walls)]), ..Self::default() }
     }
 
     /// Adds the values of a file; returns the names of the other files.
     pub fn add_values(&mut self, text: &str, name: &str) -> Vec<String> {
         let Ok(root) = DeTable::parse(text) else { return Vec::new() };
-        let mut reader = Reader { text, name, all: &mut self.all };
+        let mut reader = Reader { text, lines: Lines::new(text), name, all: &mut self.all };
         let mut others = Vec::new();
         for (key, value) in root.get_ref() {
             let key: &str = key.get_ref();
@@ -126,15 +134,14 @@ impl Facts {
 
     /// Adds the values of other files.
     pub fn extend(&mut self, others: Self) {
-        self.all.extend(others.all);
+        for (id, facts) in others.all {
+            self.all.entry(id).or_default().extend(facts);
+        }
     }
 
     /// The values with this key, of all tables of an array.
     pub fn with(&self, id: &str) -> impl Iterator<Item = &Fact> {
-        let reported = self.reported.borrow().clone();
-        let all = self.all.iter().enumerate();
-        all.filter(move |(index, fact)| fact.id == id && !reported.contains(index))
-            .map(|(_, fact)| fact)
+        self.all.get(id).into_iter().flatten().filter(|fact| !fact.is_reported.get())
     }
 
     /// The value with this key, of the same table of an array if it is in one.
@@ -162,21 +169,13 @@ impl Facts {
     pub fn in_table(&self, id: &str, table: usize) -> Option<&Fact> {
         self.with(id).find(|fact| fact.table == table)
     }
-
-    /// Marks a value as reported; whether a warning about it is to be shown.
-    pub fn report(&self, fact: &Fact) -> bool {
-        let index = self.all.iter().position(|other| {
-            (&other.file, other.line, &other.key) == (&fact.file, fact.line, &fact.key)
-        });
-        let is_new = index.is_some_and(|index| self.reported.borrow_mut().insert(index));
-        is_new && !fact.is_accepted
-    }
 }
 
 struct Reader<'r> {
     text: &'r str,
+    lines: Lines,
     name: &'r str,
-    all: &'r mut Vec<Fact>,
+    all: &'r mut BTreeMap<String, Vec<Fact>>,
 }
 
 impl Reader<'_> {
@@ -202,17 +201,19 @@ impl Reader<'_> {
             DeValue::Float(float) => (float.as_str().to_owned(), true),
             _ => return,
         };
-        let line = line(self.text, value.span().start);
-        let source = self.text.lines().nth(line - 1).unwrap_or_default();
-        self.all.push(Fact {
+        let line = self.lines.of(value.span().start);
+        let is_accepted = self.lines.text(self.text, line).contains(ACCEPTED);
+        let id = id(&key);
+        self.all.entry(id.clone()).or_default().push(Fact {
             file: self.name.to_owned(),
             line,
-            id: id(&key),
+            id,
             key,
             table,
             text,
             is_number,
-            is_accepted: source.contains(ACCEPTED),
+            is_accepted,
+            is_reported: Cell::new(false),
         });
     }
 }

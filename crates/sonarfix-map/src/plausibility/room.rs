@@ -57,7 +57,7 @@ fn size(facts: &Facts, room: &Room) -> Option<Mistake> {
     let (least, most) = USUAL_SIZE;
     let size = room.size();
     let fact = facts.with("map.unit").next().or_else(|| facts.wall(0))?;
-    if (least..=most).contains(&size) || !facts.report(fact) {
+    if (least..=most).contains(&size) || !fact.report() {
         return None;
     }
     let [width, height] = room.sides().map(short);
@@ -85,7 +85,7 @@ fn outliers(facts: &Facts, room: &Room) -> Vec<Mistake> {
         room.walls.len() > 3 && ends(&room.walls, wall).any(|end| beyond(end) > 2.0 * size)
     };
     let far = (0..room.walls.len()).filter(|wall| is_far(*wall));
-    let facts_of = far.filter_map(|wall| facts.wall(wall)).filter(|fact| facts.report(fact));
+    let facts_of = far.filter_map(|wall| facts.wall(wall)).filter(|fact| fact.report());
     facts_of
         .map(|fact| {
             fact.warn(
@@ -123,7 +123,7 @@ fn gaps(facts: &Facts, room: &Room) -> Vec<Mistake> {
         let beside = beside.map(|(other, segment)| (other, segment.distance_to(end)));
         if let Some((other, gap)) = partner.or(beside)
             && let Some(fact) = facts.wall(wall)
-            && facts.report(fact)
+            && fact.report()
         {
             let name = facts.wall(other).map_or_else(String::new, Fact::quoted);
             let [x, y] = end.map(short);
@@ -165,7 +165,7 @@ fn contradictions(facts: &Facts, floor: &Floor, sonar: &RangerParameters) -> Vec
         let fact = facts.wall(finding.wall)?;
         let other = finding.other().and_then(|other| facts.wall(other)).map(Fact::quoted);
         let message = format!("with the wall {}: {}", other.unwrap_or_default(), finding.flaw);
-        facts.report(fact).then(|| fact.warn(message))
+        fact.report().then(|| fact.warn(message))
     });
     warning.collect()
 }
@@ -173,7 +173,7 @@ fn contradictions(facts: &Facts, floor: &Floor, sonar: &RangerParameters) -> Vec
 fn start(facts: &Facts, scenario: &Scenario, room: &Room) -> Option<Mistake> {
     let plan = scenario.path.plan();
     let fact = facts.with("path.start[0]").next()?;
-    if room.has_inside(plan.start) || !facts.report(fact) {
+    if room.has_inside(plan.start) || !fact.report() {
         return None;
     }
     let [x, y] = plan.start.map(short);
@@ -188,7 +188,7 @@ fn start(facts: &Facts, scenario: &Scenario, room: &Room) -> Option<Mistake> {
 fn duration(facts: &Facts, scenario: &Scenario) -> Option<Mistake> {
     let (seconds, length) = (scenario.path.duration(), scenario.path.length());
     let fact = facts.with("path.speed").next()?;
-    (seconds < SHORTEST_RUN && facts.report(fact)).then(|| {
+    (seconds < SHORTEST_RUN && fact.report()).then(|| {
         fact.warn(format!(
             "the whole path of {} m takes {} s, too short for a robot to localize: check the unit of the path, the speed and the laps",
             short(length),
@@ -229,7 +229,7 @@ fn objects(facts: &Facts, scenario: &Scenario, room: &Room) -> Vec<Mistake> {
         } else {
             return None;
         };
-        facts.report(fact).then(|| fact.warn(message))
+        fact.report().then(|| fact.warn(message))
     };
     scenario.surroundings.obstacles.iter().enumerate().filter_map(warning).collect()
 }
@@ -268,7 +268,7 @@ fn reach(facts: &Facts, scenario: &Scenario, room: &Room) -> Option<Mistake> {
     };
     let message = |key: &str, text: &str| {
         let fact = facts.with(key).next()?;
-        facts.report(fact).then(|| fact.warn(format!("{} {text}", fact.quoted())))
+        fact.report().then(|| fact.warn(format!("{} {text}", fact.quoted())))
     };
     if !count(&|ranger, range, _| is_near(ranger, range)) {
         return message(

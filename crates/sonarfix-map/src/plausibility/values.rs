@@ -323,7 +323,7 @@ pub(crate) fn suspects(text: &str, name: &str, mistakes: &[Mistake]) -> Vec<Mist
 pub(super) fn of_facts(facts: &Facts) -> Vec<Mistake> {
     let mut warnings = Vec::new();
     let mut warn = |fact: &Fact, message: String| {
-        if facts.report(fact) {
+        if fact.report() {
             warnings.push(fact.warn(message));
         }
     };
