@@ -25,7 +25,7 @@ mod light;
 mod ranking;
 
 use crate::association::visibility::{Beam, Sight, Viewpoint};
-use crate::config::{Config, RangerId, RangerParameters, Ranging};
+use crate::config::{Config, MAX_RANGERS, RangerId, RangerParameters, Ranging};
 use crate::filter::ekf::Ekf;
 use crate::geometry::pose::Heading;
 use crate::geometry::units::{Duration, Instant, Metres, Radians, SquareMetres, seconds};
@@ -367,6 +367,7 @@ impl<'a> Planner<'a> {
     #[inline(always)]
     fn candidate(&self, id: WallId, sight: &Sight, pointing: &Pointing) -> Candidate {
         let Sight { expected, on_wall, square, place, .. } = *sight;
+        let works = if MAX_RANGERS > 1 { self.works } else { 1.0 };
         let range = expected.range;
         let echo = &self.config.echo;
         let entry = self.history.entry(echo, self.ranger, id, place, range, self.now);
@@ -377,7 +378,7 @@ impl<'a> Planner<'a> {
         Candidate {
             bearing: pointing.bearing,
             gain: expected_gain(&prediction, wheels, noise, self.config.weights),
-            success: self.works * (1.0 - entry.occlusion) * on_wall * square,
+            success: works * (1.0 - entry.occlusion) * on_wall * square,
             seconds: self.duration.ping(pointing.until_ping, range),
             score: 0.0,
             expected,

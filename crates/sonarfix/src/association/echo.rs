@@ -16,6 +16,7 @@
 //! the measured range is finite. The density of clutter is positive, so that no quotient is 0/0; if
 //! all clutter is configured away and the echo is too far off to be the wall's, it is not used.
 
+use crate::config::MAX_RANGERS;
 use crate::geometry::elementary::{exp, inverse_sqrt, ln};
 use crate::geometry::numeric::at_least;
 use crate::geometry::units::{Metres, SquareMetres};
@@ -136,7 +137,8 @@ impl ExpectedEcho {
         let before = others.silent_before;
         let (free, hidden) = (before * (1.0 - o), before * o);
         let (wall, occluded) = (free * d.wall, hidden * d.occluded);
-        let lies = self.lying * d.lie;
+        // -0 is what adds nothing, so that a robot with one ranger has no code for it.
+        let lies = if MAX_RANGERS > 1 { self.lying * d.lie } else { -0.0 };
         let density = wall + free * d.clutter + occluded + others.density;
         let total = density + lies;
         if total <= 0.0 {

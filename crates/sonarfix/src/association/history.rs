@@ -213,11 +213,10 @@ impl History {
         if !config.rangers.are_several() {
             return 0.0;
         }
-        let own = self.reliability.get(ranger.index());
+        let Some(own) = self.reliability.get(ranger.index()) else { return 0.0 };
         let others = self.reliability.iter().zip(config.rangers.iter());
         let others = others.filter(|(_, (other, _))| *other != ranger).map(|(other, _)| other);
-        let odds = others.filter_map(|other| Some(own?.lying_beside(other)));
-        odds.reduce(at_least).unwrap_or(0.0)
+        others.map(|other| own.lying_beside(other)).fold(0.0, at_least)
     }
 
     /// Probability that a ranger of several works, over the largest one, for the choice of a ping; 1 where it is to be tried.
