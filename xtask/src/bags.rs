@@ -11,10 +11,11 @@ use crate::cargo;
 
 /// Ours read by rosbags; its own of every type and storage, and damaged ones, read by ours.
 pub fn check() -> anyhow::Result<()> {
-    cargo::run("build --package sonarfix-bags --examples")?;
-    cargo::run("build --bin sonarfix")?;
+    // Optimized, as other steps build it.
+    cargo::run("build --release --bin sonarfix")?;
+    cargo::run("build --release --package sonarfix-bags --examples")?;
     let source = cargo::root().join("xtask/bags");
-    let programs = cargo::target_folder().join("debug");
+    let programs = cargo::target_folder().join("release");
     let examples = programs.join("examples");
     let mut proof = Command::new(python()?);
     proof.arg(source.join("proof.py")).arg(programs.join("sonarfix"));

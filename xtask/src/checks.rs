@@ -26,15 +26,15 @@ pub fn docs() -> anyhow::Result<()> {
     cargo::check(command)
 }
 
-/// Builds the `no_std` crates for microcontrollers, without features and with all; checks that the
-/// simulator compiles for WebAssembly, without terminal and processes.
+/// Checks that the `no_std` crates compile for microcontrollers, without features and with all, and the simulator for WebAssembly,
+/// without terminal and processes.
 pub fn embedded() -> anyhow::Result<()> {
     let packages: Vec<String> =
         NO_STD_CRATES.iter().map(|name| format!("--package {name}")).collect();
     let packages = packages.join(" ");
     for target in TARGETS {
         for features in ["", "--all-features"] {
-            cargo::run(&format!("build --release {packages} --target {target} {features}"))?;
+            cargo::run(&format!("check --release {packages} --target {target} {features}"))?;
         }
     }
     cargo::run("check --package sonarfix-sim --target wasm32-unknown-unknown")

@@ -19,6 +19,8 @@ pub struct Step<T> {
     pub job: &'static str,
     pub name: &'static str,
     pub task: T,
+    /// Whether it runs only if it or its job is named, because it takes long.
+    pub is_long: bool,
 }
 
 /// How a step ended.
@@ -29,7 +31,7 @@ struct Outcome {
     failure: Option<String>,
 }
 
-/// Runs the steps of these names, or of jobs of these names, or all if there is no name, two at a time. The last line that it
+/// Runs the steps of these names, or of jobs of these names, or all but the long ones if there is no name, two at a time. The last line that it
 /// prints is `N passed, N failed`, with `, N skipped` if parts of checks were skipped.
 pub fn run<T: Sync>(
     steps: &[Step<T>],
@@ -43,10 +45,15 @@ pub fn run<T: Sync>(
     fs::create_dir_all(cargo::target_folder())?;
     fs::write(cargo::skipped_file(), "")?;
     let is_chosen = |step: &&Step<T>| {
-        names.is_empty() || names.iter().any(|name| step.job == name || step.name == name)
+        let is_named = names.iter().any(|name| step.job == name || step.name == name);
+        is_named || (names.is_empty() && !step.is_long)
     };
     let chosen: Vec<&Step<T>> = steps.iter().filter(is_chosen).collect();
     let outcomes = outcomes(&chosen, &run);
+    if names.is_empty() {
+        let long: Vec<&str> = steps.iter().filter(|it| it.is_long).map(|it| it.name).collect();
+        println!("not run, because they take long: cargo xtask ci {}", long.join(" "));
+    }
     let skipped = fs::read_to_string(cargo::skipped_file())?;
     println!("{}", report(&outcomes, &skipped.lines().collect::<Vec<_>>()));
     let has_passed = outcomes.iter().all(|outcome| outcome.failure.is_none());
@@ -166,8 +173,8 @@ mod tests {
     use super::*;
 
     fn steps() -> Vec<Step<u32>> {
-        [("one", "a", 1), ("one", "b", 2), ("two", "c", 3)]
-            .map(|(job, name, task)| Step { job, name, task })
+        [("one", "a", 1), ("one", "b", 2), ("two", "c", 3), ("two", "d", 4)]
+            .map(|(job, name, task)| Step { job, name, task, is_long: name == "d" })
             .into()
     }
 
@@ -206,7 +213,7 @@ mod tests {
         let [passed, failed] = [ExitCode::SUCCESS, ExitCode::FAILURE].map(|it| format!("{it:?}"));
         assert_eq!(ran(&[]), (vec![1, 2, 3], failed.clone()));
         assert_eq!(ran(&["one"]), (vec![1, 2], failed));
-        assert_eq!(ran(&["two", "a"]), (vec![1, 3], passed));
+        assert_eq!(ran(&["two", "a"]), (vec![1, 3, 4], passed));
         assert!(run(&steps(), &["three".to_owned()], |_, _| Ok(())).is_err());
     }
 

@@ -51,7 +51,7 @@ struct Xtask {
 enum Command {
     /// The checks of CI; a failure does not keep the following ones from running.
     Ci {
-        /// Jobs or steps by name; all if none is given.
+        /// Jobs or steps by name; all but the long ones if none is given.
         names: Vec<String>,
     },
     /// One step of CI.
@@ -145,6 +145,9 @@ enum Task {
     Miri,
 }
 
+/// The steps that run only by their names or those of their jobs.
+const LONG: [&str; 3] = ["dist", "fuzz", "mutants"];
+
 /// The steps of CI, by job.
 fn steps() -> [Step<Task>; 33] {
     [
@@ -182,7 +185,7 @@ fn steps() -> [Step<Task>; 33] {
         ("random", "fuzz", Task::Fuzz(fuzz::Args::short())),
         ("random", "mutants", Task::Mutants(mutants::Args::short())),
     ]
-    .map(|(job, name, task)| Step { job, name, task })
+    .map(|(job, name, task)| Step { job, name, is_long: LONG.contains(&name), task })
 }
 
 fn main() -> ExitCode {

@@ -122,7 +122,8 @@ fn scenario(text: &str, mounts: &[&str]) -> Result<Scenario, TableError> {
 #[must_use]
 pub fn markdown(rows: &[Row]) -> String {
     let mut page = HEAD.to_owned();
-    for row in rows {
+    // An interrupted command has no runs of some of them.
+    for row in rows.iter().filter(|row| row.failed.runs > 0 && row.without > 0.0) {
         // Writing to a String does not fail.
         let _ = writeln!(
             page,
