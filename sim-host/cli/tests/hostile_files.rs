@@ -10,8 +10,8 @@ use std::process::{Command, Output, Stdio};
 
 use crate::endings::{CLASSROOM, files, printing};
 
-/// Bounds of the address space and of the processor time of a command without optimization.
-const LIMITS: &str = "ulimit -v 1500000 && ulimit -t 60 && exec \"$@\"";
+/// Bounds of the address space in KiB, and of the processor time in seconds, of a command without optimization.
+const LIMITS: &str = "ulimit -v 400000 && ulimit -t 30 && exec \"$@\"";
 
 /// The files that a command writes itself, and the command that reads `FILES/FILE`.
 const KINDS: [(&str, &[&str]); 15] = [
@@ -24,7 +24,7 @@ const KINDS: [(&str, &[&str]); 15] = [
     ("log.csv", &["replay", "FILE", "--map", "FILES/map.toml", "--config", "FILES/robot.toml"]),
     ("carmen.log", &["convert", "carmen", "FILE", "--out", "FILES/converted"]),
     ("carmen.log.gz", &["convert", "carmen", "FILE", "--out", "FILES/converted"]),
-    ("log.mcap", &["convert", "rosbag", "FILE", "--out", "FILES/converted"]),
+    ("log.mcap", &["convert", "rosbag", "FILE", "--force", "--out", "FILES/converted"]),
     ("rows.csv", &["merge", "FILE"]),
     ("map.geojson", &["map", "import", "FILE", "--unit", "m", "--out", "FILES/imported.toml"]),
     ("map.svg", &["map", "import", "FILE", "--unit", "m", "--out", "FILES/imported.toml"]),
