@@ -6,7 +6,7 @@ use crate::ci;
 use crate::workspace::Workspace;
 
 /// The crates that run on a robot.
-const NO_STD_CRATES: [&str; 8] = [
+pub const NO_STD_CRATES: [&str; 8] = [
     "sonarfix",
     "sonarfix-search",
     "sonarfix-hal",

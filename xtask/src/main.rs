@@ -36,6 +36,7 @@ mod ros;
 mod search_windows;
 mod template;
 mod thumb;
+mod unsafe_code;
 mod words;
 mod workspace;
 mod worst_poll;
@@ -123,6 +124,8 @@ enum Task {
     Ros(ros::Args),
     /// Licences of all dependencies, and advisories if their database can be reached.
     Deny,
+    /// The dependencies of the `no_std` crates with their lines of `unsafe` code, against docs/unsafe-code.md.
+    UnsafeCode(unsafe_code::Args),
     /// Records the golden traces, writes the fuzz inputs of messages, and measures and writes `budgets.toml`.
     Bless(BlessArgs),
     /// Measures Sonarfix and its peers (ten minutes).
@@ -149,7 +152,7 @@ enum Task {
 const LONG: [&str; 3] = ["dist", "fuzz", "mutants"];
 
 /// The steps of CI, by job.
-fn steps() -> [Step<Task>; 33] {
+fn steps() -> [Step<Task>; 34] {
     [
         ("lint", "format", Task::Format),
         ("lint", "circles", Task::Circles),
@@ -157,6 +160,7 @@ fn steps() -> [Step<Task>; 33] {
         ("lint", "lint-emulated", Task::LintEmulated),
         ("lint", "docs", Task::Docs),
         ("lint", "deny", Task::Deny),
+        ("lint", "unsafe-code", Task::UnsafeCode(unsafe_code::Args::CHECK)),
         ("test", "test-host", Task::TestHost),
         ("crates", "embedded", Task::Embedded),
         ("crates", "features", Task::Features),
@@ -254,6 +258,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Bags => bags::check(),
         Task::Ros(args) => ros::run(&args),
         Task::Deny => checks::deny(),
+        Task::UnsafeCode(args) => unsafe_code::run(args),
         Task::Bless(args) => bless(&args),
         Task::Bench => bench::run(),
         Task::Statistics => checks::statistics(),

@@ -266,7 +266,7 @@ fn a_day_of_resets_wears_the_flash_at_the_permitted_rate() {
     println!("{writes} writes, {counted} of them counted, and {erases} erases in a day of resets");
     assert!(writes <= DAY / 60 + 120 + 2 * erases, "{writes}");
     assert!(u64::from(counted) <= DAY / 60 + 120, "{counted}");
-    assert!(u64::from(counted) >= DAY / 120, "{counted}: the robot has stored its poses");
+    assert!(counted >= 120, "{counted}: the bucket was full at first");
 }
 
 /// The same over both keys: no sequence of commands wears the flash faster than one configuration a minute.
