@@ -67,7 +67,8 @@ pub fn run(args: Args) -> anyhow::Result<()> {
 
 fn page() -> anyhow::Result<String> {
     let linked = linked()?;
-    let metadata = cargo::printed(cargo::command("metadata --all-features --format-version 1 --locked"))?;
+    let metadata =
+        cargo::printed(cargo::command("metadata --all-features --format-version 1 --locked"))?;
     let metadata: Metadata =
         serde_json::from_str(&metadata).context("cannot read cargo's metadata")?;
     let of_others = metadata.packages.iter().filter(|package| package.source.is_some());

@@ -161,7 +161,7 @@ fn a_file_that_would_become_large_is_refused() {
     refused("walls.toml", walls(5 << 20).as_bytes(), check, "it has more than 4 MiB");
     let lines = format!("x1,y1,x2,y2\n{}", "0,0,1,x\n".repeat(1 << 18));
     refused("walls.csv", lines.as_bytes(), &["map", "check", "FILE", "--unit", "m"], "error");
-    let bomb = packed(&[b'1'; 1 << 20], 300);
+    let bomb = packed(&vec![b'1'; 1 << 20], 300);
     let convert = ["convert", "carmen", "FILE", "--out", "FILES/converted"].as_slice();
     refused("bomb.log.gz", &bomb, convert, "more than 256 MiB");
     let lines = packed("ODOM 1 0 0 0.5 0 0 1 host 0\n".repeat(1 << 16).as_bytes(), 200);
