@@ -139,7 +139,7 @@ fn silent_clients_keep_nobody_out() {
 
 /// A client that sends a byte each second, and connects again when it is closed.
 fn slow_client(host: &str, number: u64, is_over: &AtomicBool) {
-    let start: &[u8] = if number % 2 == 0 { b"GET / HTTP/1.1\r\nX: " } else { b"" };
+    let start: &[u8] = if number.is_multiple_of(2) { b"GET / HTTP/1.1\r\nX: " } else { b"" };
     let mut stream = None;
     // Not all in the same instant.
     std::thread::sleep(Duration::from_millis(number % 1000));
