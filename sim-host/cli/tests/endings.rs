@@ -16,7 +16,7 @@ fn sonarfix(arguments: &[&str]) -> Command {
     command
 }
 
-fn errors(output: &Output) -> String {
+pub fn errors(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 

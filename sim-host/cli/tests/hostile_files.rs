@@ -8,7 +8,7 @@ use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-use crate::endings::{CLASSROOM, files, printing};
+use crate::endings::{CLASSROOM, errors, files, printing};
 
 /// Bounds of the address space in KiB, and of the processor time in seconds, of a command without optimization.
 const LIMITS: &str = "ulimit -v 400000 && ulimit -t 30 && exec \"$@\"";
@@ -63,10 +63,6 @@ fn packed(bytes: &[u8], times: usize) -> Vec<u8> {
         encoder.write_all(bytes).unwrap();
     }
     encoder.finish().unwrap()
-}
-
-fn errors(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 /// Runs a command on a file with these bytes, within [`LIMITS`].
