@@ -1,4 +1,7 @@
-//! The packages of the C library for other builds, and the check that their users can build and run them.
+//! What a release consists of: archives of the command, and the packages of the C library; and the check that their users can
+//! run and build them.
+
+mod program;
 
 use std::path::PathBuf;
 
@@ -13,16 +16,30 @@ pub struct Args {
     /// Checks them, too.
     #[arg(long)]
     check: bool,
+    /// Only the archives of the command.
+    #[arg(long)]
+    program: bool,
 }
 
 impl Args {
     /// Those of CI.
     pub fn check() -> Self {
-        Self { out: PathBuf::from("target/dist"), check: true }
+        Self { out: PathBuf::from("target/dist"), check: true, program: false }
     }
 }
 
 pub fn run(args: &Args) -> anyhow::Result<()> {
+    let out = cargo::root().join(&args.out);
+    std::fs::create_dir_all(&out)?;
+    let archives = program::archives(&out)?;
+    program::checksums(&out, &archives)?;
+    if args.check {
+        program::check(&out)?;
+    }
+    if args.program { Ok(()) } else { packages(args) }
+}
+
+fn packages(args: &Args) -> anyhow::Result<()> {
     cargo::check(Workspace::C.cargo("clippy --quiet --package sonarfix-dist -- -D warnings"))?;
     let mut command = Workspace::C.cargo("run --quiet --package sonarfix-dist -- packages");
     command.arg("--out").arg(cargo::root().join(&args.out));

@@ -104,7 +104,7 @@ enum Task {
     Compositions(compositions::Args),
     /// The C library: its header, its programs on this computer and on emulated cores, hostile calls, its size.
     C(c_library::Args),
-    /// The packages of the C library: for Arduino and for other builds.
+    /// Archives of the command for a PC without Rust, and the packages of the C library for Arduino and other builds.
     Dist(dist::Args),
     /// Programs for emulated boards: formatting, Clippy.
     LintEmulated,

@@ -49,7 +49,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     }
     // The tests pass without a mutant: other checks run them.
     let mut mutants = cargo::command("mutants --baseline skip --timeout 120 --colors never");
-    mutants.args(&chosen).arg(format!("--shard={}/{parts}", args.part % parts));
+    // A part is spread over all files, so that it is a sample of all.
+    mutants.args(&chosen).arg("--sharding=round-robin");
+    mutants.arg(format!("--shard={}/{parts}", args.part % parts));
     mutants.arg("--output").arg(cargo::target_folder());
     cargo::check(mutants).context("mutants survive: add a test, or a reason to .cargo/mutants.toml")
 }

@@ -1,10 +1,10 @@
 //! The command line.
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::{
     bound, calibrate, check, command, config, convert, export, find, init, map, measure, merge,
-    monitor, paper, pil, plan, replay, run, survey, sweep,
+    monitor, paper, pil, plan, replay, run, shell, survey, sweep,
 };
 
 /// Simulates, measures, replays and operates the Sonarfix localizer for small wheeled robots.
@@ -56,6 +56,10 @@ enum Command {
     Bound(bound::Args),
     /// Forecasts the localization accuracy along a path, before a robot is built.
     Plan(plan::Args),
+    /// Prints the completions of this command for a shell.
+    Completions(shell::CompletionsArgs),
+    /// Writes the manual pages of this command into a folder.
+    Man(shell::ManArgs),
 }
 
 impl Cli {
@@ -85,6 +89,8 @@ impl Cli {
             Command::Map(args) => map::execute(&args),
             Command::Bound(args) => bound::execute(&args),
             Command::Plan(args) => plan::execute(&args),
+            Command::Completions(args) => shell::completions(&args, Self::command()),
+            Command::Man(args) => shell::man(&args, Self::command()),
         }
     }
 }

@@ -27,6 +27,7 @@ mod replay;
 mod rows;
 mod run;
 mod serve;
+mod shell;
 mod signs_of_life;
 mod survey;
 mod sweep;

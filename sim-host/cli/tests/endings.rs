@@ -25,7 +25,7 @@ const PAPER: &str = "../../crates/sonarfix-map/scenarios/paper.toml";
 
 /// Every subcommand, with arguments for the shortest output. In `FILES` are a short log with its map and robot, a drive for
 /// the calibration, a recorded stream of a robot's bytes, rows, and room for results; `ROBOT` is the port of a robot.
-const PRINTING: [&[&str]; 41] = [
+const PRINTING: [&[&str]; 43] = [
     &["--help"],
     &["init", "FILES/robot"],
     &["paper", "--runs", "1"],
@@ -69,6 +69,8 @@ const PRINTING: [&[&str]; 41] = [
     &["merge", "FILES/rows.csv"],
     &["plan", CLASSROOM, "--runs", "1"],
     &["plan", CLASSROOM, "--runs", "1", "--starts", "1"],
+    &["completions", "bash"],
+    &["man", "--out", "FILES/man"],
 ];
 
 /// The files of [`PRINTING`].
@@ -279,7 +281,8 @@ fn a_long_line_is_not_echoed() {
 }
 
 /// The options that name a result, each in a command that would otherwise end with another error, or work for hours.
-const WRITING: [(&[&str], &str); 32] = [
+const WRITING: [(&[&str], &str); 33] = [
+    (&["man"], "--out"),
     (&["measure", "--port", "missing"], "--out"),
     (&["paper", "--runs", "4000000"], "--out"),
     (&["run", CLASSROOM, "--runs", "4000000"], "--out"),

@@ -5,6 +5,7 @@ mod chromium;
 mod command;
 mod common;
 mod convert;
+mod diagnosis;
 mod endings;
 mod export;
 mod find;

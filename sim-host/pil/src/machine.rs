@@ -106,9 +106,12 @@ impl Machine {
     }
 }
 
-/// The repository that this command was built in.
+/// The repository around this program or the current folder; a released program has none, and contains no path of its build.
 fn repository() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+    let places = [std::env::current_exe(), std::env::current_dir()];
+    let folders = places.iter().flatten().flat_map(|place| place.ancestors());
+    let mut repositories = folders.filter(|it| it.join("firmware/emulated/Cargo.toml").exists());
+    repositories.next().unwrap_or(Path::new(".")).to_owned()
 }
 
 impl Build {

@@ -122,6 +122,13 @@ impl Find<'_> {
         }
         Ok(run.end(skipped))
     }
+
+    /// Searches through some records.
+    pub(crate) fn run_records<'r>(&self, records: impl Iterator<Item = &'r Record>) -> Found {
+        let mut run = Run::new(self.robot, self.walls);
+        records.for_each(|record| run.take(record));
+        run.end(0)
+    }
 }
 
 impl<'a> Run<'a> {

@@ -22,10 +22,12 @@
 //! | `score`, `median` | errors, and the health verdicts over time |
 //! | [`thinned`] | a trace of bounded size |
 //! | [`fault`] | errors |
+//! | [`diagnosis`] | what is wrong with a log and its files |
 //! | [`find`] | the search for the pose on a log |
 //! | [`convert`] | recordings of other formats |
 
 pub mod convert;
+pub mod diagnosis;
 mod estimators;
 pub mod fault;
 pub mod find;

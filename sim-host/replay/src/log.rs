@@ -123,6 +123,26 @@ pub enum Record {
     },
 }
 
+impl Record {
+    /// Its time, seconds.
+    #[must_use]
+    pub fn time(&self) -> f64 {
+        match *self {
+            Self::Ticks { time, .. }
+            | Self::Wheels { time, .. }
+            | Self::Turn { time, .. }
+            | Self::Range { time, .. }
+            | Self::Absolute { time, .. }
+            | Self::Skip { time }
+            | Self::Scan { time, .. }
+            | Self::Start { time, .. }
+            | Self::Pose { time, .. }
+            | Self::Mode { time, .. }
+            | Self::Resume { time, .. } => time,
+        }
+    }
+}
+
 /// Why a line cannot be parsed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Malformed {

@@ -595,7 +595,8 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
             Ok(aim) => aim,
             Err(no_aim) => {
                 let localizer = navigator.localizer_mut();
-                if matches!(pending.echo, Echo::At { .. }) {
+                if let Echo::At { range, .. } = pending.echo {
+                    measurement.range = range;
                     localizer.skip_unplanned();
                 } else {
                     localizer.skip();

@@ -172,7 +172,7 @@ pub fn no_aim_record(measurement: Measurement, no_aim: NoAim) -> FixRecord {
         sonar: measurement.sonar,
         direction: measurement.heading,
         bearing: 0.0,
-        range: None,
+        range: measurement.range,
         source: None,
         why: None,
         outcome: Outcome::Refused,

@@ -103,6 +103,8 @@ proptest! {
         let deviation = StandardDeviations::from_array([0.0, 0.0, 0.0, right, left, width, range]);
         let without = Resumed { state, deviation, has_pose: false, ..known };
         prop_assert_eq!(known.without_pose(), without);
+        let stored = Resumed { is_pose_stored: true, ..known };
+        prop_assert_eq!(stored.without_pose(), without);
 
         let part = |pose: [f32; STATES], calibration: [f32; STATES]| {
             std::array::from_fn(|at| if at < CALIBRATION { pose[at] } else { calibration[at] })

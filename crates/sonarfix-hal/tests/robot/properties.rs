@@ -2,8 +2,9 @@
 
 use proptest::prelude::*;
 use sonarfix::config::PingSchedule;
-use sonarfix::geometry::units::{Duration, Instant};
+use sonarfix::geometry::units::{Duration, Instant, Metres};
 use sonarfix::localizer::Fix;
+use sonarfix_hal::config::{Feature, NotLinked, WheelConfig};
 use sonarfix_hal::ranger::NoEcho;
 use sonarfix_hal::robot::{Report, Settings, Stamp, StepResult};
 use sonarfix_hal::servo::ServoTiming;
@@ -287,4 +288,21 @@ fn fixes_keep_their_schedule() {
     assert_eq!(aims, [500_250, 1_000_250, 1_500_250, 2_000_250, 2_500_250]);
     let silent = reports.iter().filter_map(|(_, report)| report.ping_result);
     assert!(silent.filter(|heard| heard.outcome == Err(NoEcho::Nothing)).count() == 0);
+}
+
+#[test]
+fn a_mirrored_wheel_counts_the_other_way() {
+    let wheel = WheelConfig::of_diameter(Metres(0.065), 360.0);
+    assert_eq!(wheel.mirrored().signed_travel(), Metres(-wheel.signed_travel().0));
+    assert_eq!(wheel.mirrored().mirrored(), wheel);
+}
+
+#[test]
+fn a_part_that_is_not_linked_is_named_as_its_feature() {
+    let manifest = include_str!("../../Cargo.toml");
+    for feature in Feature::ALL {
+        let text = NotLinked(feature).to_string();
+        let name = text.split('`').nth(1).unwrap();
+        assert!(manifest.contains(&format!("\n{name} = [")), "{text}");
+    }
 }

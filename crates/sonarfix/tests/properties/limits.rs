@@ -343,5 +343,6 @@ proptest! {
         prop_assert!(!Pose::new(x, f32::INFINITY, Radians(heading)).is_finite());
         prop_assert!(!Pose::new(x, y, Radians(f32::NAN)).is_finite());
         prop_assert!((Radians(heading).to_degrees() - heading * 57.295_78).abs() < 1e-4);
+        prop_assert!((RadiansPerSecond(heading).to_degrees() - heading * 57.295_78).abs() < 1e-4);
     }
 }

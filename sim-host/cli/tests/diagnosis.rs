@@ -1,0 +1,173 @@
+//! What `sonarfix replay` says is wrong with a log: a simulated drive, whose log or files are wrong in one way each.
+#![expect(
+    clippy::unwrap_used,
+    clippy::indexing_slicing,
+    reason = "all of this file is a test, its helpers too"
+)]
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::command::assert_documented;
+use crate::endings::CLASSROOM;
+
+/// Seconds of the drive that are replayed.
+const SECONDS: f64 = 120.0;
+
+/// A recorded drive, without its checksums, which a change would make wrong.
+fn recorded() -> TempDir {
+    let dir = TempDir::new().unwrap();
+    let log = dir.path().join("log.csv");
+    let arguments = ["run", CLASSROOM, "--runs", "1", "--seed", "77", "--fidelity", "pins"];
+    let output = Command::new(env!("CARGO_BIN_EXE_sonarfix"))
+        .args(arguments)
+        .arg("--record")
+        .arg(&log)
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = fs::read_to_string(&log).unwrap();
+    let is_early = |line: &&str| {
+        let time = line.split(',').nth(1).and_then(|time| time.parse::<f64>().ok());
+        !line.starts_with('#') && time.is_none_or(|time| time < SECONDS)
+    };
+    let lines: Vec<_> = text.lines().filter(is_early).collect();
+    fs::write(log, lines.join("\n") + "\n").unwrap();
+    dir
+}
+
+/// The names of what is wrong, the surest first.
+fn causes(dir: &Path) -> Vec<String> {
+    let log = dir.join("log.csv");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sonarfix"));
+    let output = command.arg("replay").arg(log).arg("--json").output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_documented(&found["diagnosis"]);
+    let findings = found["diagnosis"]["findings"].as_array().unwrap();
+    let documented = fs::read_to_string("../../docs/diagnosis.md").unwrap();
+    let cause = |finding: &Value| {
+        let cause = finding["cause"].as_str().unwrap().to_owned();
+        assert!(documented.contains(&format!("`{cause}`")), "docs/diagnosis.md has no {cause}");
+        cause
+    };
+    findings.iter().map(cause).collect()
+}
+
+/// A change of the numbers of a record behind its kind; the first one is its time.
+type Change = fn(&mut [f64]);
+
+/// The log with a change of all records of a kind.
+fn changed(log: &str, kind: &str, change: impl Fn(&mut [f64])) -> String {
+    let line = |line: &str| {
+        let mut fields: Vec<_> = line.split(',').map(str::to_owned).collect();
+        if fields[0] != kind {
+            return line.to_owned();
+        }
+        let mut numbers: Vec<_> =
+            fields[1..].iter().map(|field| field.parse().unwrap_or(f64::NAN)).collect();
+        change(&mut numbers);
+        for (field, number) in fields[1..].iter_mut().zip(numbers) {
+            if !number.is_nan() {
+                *field = number.to_string();
+            }
+        }
+        fields.join(",")
+    };
+    log.lines().map(line).collect::<Vec<_>>().join("\n") + "\n"
+}
+
+/// Mistakes in the log: the cause that must be named first, the kind of the records, and what is wrong with them.
+const MISTAKES: [(&str, &str, Change); 20] = [
+    ("wheels_swapped", "wheels", |it| it.swap(1, 2)),
+    ("encoder_mirrored", "wheels", |it| it[1] = -it[1]),
+    ("encoder_mirrored", "wheels", |it| it[2] = -it[2]),
+    ("encoder_mirrored", "wheels", |it| it[1..].iter_mut().for_each(|travel| *travel = -*travel)),
+    ("wheel_travel", "wheels", |it| it[1] *= 2.0),
+    ("wheel_travel", "wheels", |it| it[2] *= 0.8),
+    ("wheel_travel", "wheels", |it| it[1..].iter_mut().for_each(|travel| *travel *= 1.3)),
+    ("encoder_stopped", "wheels", |it| it[2] = 0.0),
+    ("bearing_mirrored", "range", |it| it[1] = -it[1]),
+    ("bearing_offset", "range", |it| it[1] -= 0.6),
+    ("bearing_unit", "range", |it| it[1] = it[1].to_degrees()),
+    ("range_unit", "range", |it| it[2] *= 1e3),
+    ("range_unit", "range", |it| it[2] *= 2.0),
+    ("range_offset", "range", |it| it[2] += 0.15),
+    ("start_heading", "resume", |it| it[3] += 1.6),
+    ("start_pose", "resume", |it| {
+        it[1] += 0.5;
+        it[2] -= 0.6;
+    }),
+    ("clock_back", "range", |it| it[0] -= if it[0] > 60.0 { 30.0 } else { 0.0 }),
+    ("clock_gap", "wheels", |it| it[0] += if it[0] > 60.0 { 45.0 } else { 0.0 }),
+    ("range_stuck", "range", |it| it[2] = if it[0] > 50.0 { 0.731 } else { it[2] }),
+    ("range_noise", "range", |it| it[2] = 0.2 + (it[0] * 997.3).fract() * 2.2),
+];
+
+/// Mistakes in the files: the cause, the file, what is written in it, and what is read.
+const FILES: [(&str, &str, &str, &str); 2] = [
+    ("map_unit", "map.toml", "unit = \"m\"", "unit = \"cm\""),
+    ("track_width", "robot.toml", "\ntrack_width = \"12 cm\"", "\ntrack_width = \"6 cm\""),
+];
+
+#[test]
+fn each_mistake_is_named_first_and_a_right_log_has_none() {
+    let dir = recorded();
+    assert_eq!(causes(dir.path()), Vec::<String>::new());
+    let log = dir.path().join("log.csv");
+    let right = fs::read_to_string(&log).unwrap();
+    let mut wrong = Vec::new();
+    let mut check = |expected: &str, what: String| {
+        let found = causes(dir.path());
+        if found.first().is_none_or(|first| first != expected) {
+            wrong.push(format!("{what}: {expected} expected, found {found:?}"));
+        }
+    };
+    for (number, (expected, kind, change)) in MISTAKES.iter().enumerate() {
+        fs::write(&log, changed(&right, kind, change)).unwrap();
+        check(expected, format!("mistake {number} of {kind}"));
+    }
+    let kinds = ["resume", "wheels", "range", "skip", "turn", "mode"];
+    let in_milliseconds =
+        kinds.iter().fold(right.clone(), |log, kind| changed(&log, kind, |it| it[0] *= 1e3));
+    fs::write(&log, in_milliseconds).unwrap();
+    check("time_unit", "milliseconds".to_owned());
+    // Half a line, as from a serial port that loses bytes.
+    let torn = right.lines().enumerate().map(|(n, line)| match n % 9 {
+        5 => &line[..line.len() / 2],
+        _ => line,
+    });
+    fs::write(&log, torn.collect::<Vec<_>>().join("\n") + "\n").unwrap();
+    check("malformed_lines", "torn lines".to_owned());
+    fs::write(&log, &right).unwrap();
+    for (expected, name, from, to) in FILES {
+        let file = dir.path().join(name);
+        let text = fs::read_to_string(&file).unwrap();
+        assert!(text.contains(from), "{name} has no {from}: {text}");
+        fs::write(&file, text.replacen(from, to, 1)).unwrap();
+        check(expected, format!("{to} in {name}"));
+        fs::write(&file, text).unwrap();
+    }
+    assert_eq!(wrong, Vec::<String>::new());
+}
+
+#[test]
+fn a_finding_states_its_line_and_the_remedy() {
+    let dir = recorded();
+    let log = dir.path().join("log.csv");
+    let right = fs::read_to_string(&log).unwrap();
+    let turned = changed(&right, "resume", |it| it[3] += 1.6);
+    fs::write(&log, turned).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sonarfix"));
+    let output = command.arg("replay").arg(&log).output().unwrap();
+    let printed = String::from_utf8_lossy(&output.stdout);
+    let found =
+        printed.split("probable cause: line 2: the heading at the start is wrong by ").nth(1);
+    let degrees: f64 = found.unwrap().split(' ').next().unwrap().parse().unwrap();
+    assert!((-105.0..-80.0).contains(&degrees), "{printed}");
+    assert!(printed.contains("% of the ranges then fit)\n    add -1."), "{printed}");
+}

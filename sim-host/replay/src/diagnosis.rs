@@ -1,0 +1,322 @@
+//! What is wrong with a log, or with the robot file, the map and the start that it is replayed with.
+//!
+//! Some faults are visible in the records: gaps of the clock, counters that overflow, an encoder that stands still. Others are
+//! found by trying them: the robot, the map, the start or the log is changed as if the cause were right, and the log is
+//! replayed. The cause that makes its ranges most probable is named, if it explains them much better than the files as they
+//! are. A log that its files explain is not examined further.
+
+mod causes;
+mod change;
+mod evidence;
+mod finding;
+mod recording;
+mod report;
+mod visible;
+
+use std::io::BufRead;
+
+use serde::Serialize;
+use sonarfix::map::Wall;
+use sonarfix_hal::config::RobotConfig;
+use sonarfix_sim::odometry::DeadReckoning;
+use sonarfix_sim::trace::Pose;
+
+use crate::fault::ReplayError;
+use crate::find::Find;
+use crate::log::Record;
+use causes::Candidate;
+use change::Change;
+use evidence::{Broken, Evidence};
+use recording::{Entry, Recording};
+use visible::Visible;
+
+pub use finding::Finding;
+
+/// Fewer echoes say nothing about a cause.
+const LEAST_ECHOES: usize = 12;
+/// Files that explain so many of the echoes are right.
+const RIGHT: f64 = 0.93;
+/// Files with another start explain less.
+const STARTED_ELSEWHERE: f64 = 0.8;
+/// A cause must explain at least this share of the echoes.
+const LEAST_EXPLAINED: f64 = 0.6;
+/// The logarithm of the likelihood that a cause must gain: in all, and for each echo.
+const LEAST_GAIN: f64 = 15.0;
+const LEAST_GAIN_PER_ECHO: f64 = 0.3;
+/// Records in which causes are tried: five minutes of a robot with 10 encoder records and 2 ranges a second.
+const TRIED: usize = 3_600;
+/// Records in which candidates are compared first, and how many are examined further.
+const SCREENED: usize = 1_200;
+const KEPT: usize = 24;
+/// Halvings of the step of a varied quantity, and the candidates that are refined.
+const REFINEMENTS: i32 = 4;
+const REFINED: usize = 6;
+/// Prefixes of the log in which the start is searched, seconds.
+const SEARCHED: [f64; 3] = [40.0, 90.0, 200.0];
+
+/// A diagnosis.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Diagnosis {
+    /// The share of the echoes that the files explain as they are; `None` with too few of them.
+    pub explained: Option<f64>,
+    /// What is wrong, the surest first.
+    pub findings: Vec<Finding>,
+}
+
+/// Looks for what is wrong with a log and its files. Ten minutes of a robot are examined.
+///
+/// # Errors
+/// [`ReplayError`], if the log cannot be read or is of another format.
+pub fn diagnose(
+    robot: &RobotConfig,
+    walls: &[Wall],
+    log: impl BufRead,
+) -> Result<Diagnosis, ReplayError> {
+    let mut visible = Visible::new(robot);
+    let recording = Recording::read(log, |entry| visible.see(entry))?;
+    let entries = recording::thinned(&recording.entries);
+    let whole = Trial { robot, walls, entries: &entries };
+    let as_is = whole.as_is();
+    let is_enough = as_is.echoes.len() >= LEAST_ECHOES;
+    let explained = is_enough.then(|| as_is.explained());
+    let mut findings = visible.findings(&recording);
+    // A time in another unit makes each wheel too slow or too fast: nothing else can be tried.
+    let is_readable = findings.iter().all(|found| found.cause != "time_unit");
+    let is_right = explained.is_none_or(|share| share >= RIGHT) && !as_is.is_too_fast();
+    if is_enough && is_readable && !is_right {
+        // A jump of a counter may be the effect of a wrong unit.
+        let jumps = findings.extract_if(.., |it| it.cause == "counter_jump").collect::<Vec<_>>();
+        findings.extend(whole.causes(&as_is));
+        let is_explained = findings.iter().any(|it| it.explained.is_some() || it.cause == "moved");
+        findings.extend(jumps);
+        if !is_explained {
+            findings.extend(visible.noise().or_else(|| report::unexplained(&as_is)));
+        }
+    }
+    findings.extend(visible::edited(&recording));
+    Ok(Diagnosis { explained, findings })
+}
+
+/// The files and the log on which causes are tried.
+struct Trial<'a> {
+    robot: &'a RobotConfig,
+    walls: &'a [Wall],
+    entries: &'a [Entry],
+}
+
+/// A cause that was tried.
+struct Tried {
+    candidate: Candidate,
+    evidence: Evidence,
+    /// The logarithm of its likelihood against that of the files as they are.
+    gain: f64,
+}
+
+impl<'a> Trial<'a> {
+    fn of(&self, change: &Change) -> Option<Evidence> {
+        let walls = change.walls(self.walls);
+        let records = change.records(self.entries, self.robot);
+        Evidence::of(&change.robot(self.robot), &walls, records.into_iter())
+    }
+
+    fn try_one(&self, candidate: Candidate, as_is: &Evidence) -> Option<Tried> {
+        let evidence = self.of(&candidate.change)?;
+        let gain = evidence.gain(as_is);
+        Some(Tried { candidate, evidence, gain })
+    }
+
+    /// The files and the log as they are.
+    fn as_is(&self) -> Evidence {
+        let none = Change::default();
+        self.of(&none).unwrap_or_else(|| Evidence::none(&none.records(self.entries, self.robot)))
+    }
+
+    /// As much of the log as is enough to try causes.
+    fn beginning(&self) -> Trial<'a> {
+        let entries = self.entries.get(..TRIED).unwrap_or(self.entries);
+        Trial { entries, ..*self }
+    }
+
+    /// The causes that explain the log, best first. What lasts from the start on is no cause if much of the log is right.
+    fn causes(&self, as_is: &Evidence) -> Vec<Finding> {
+        let Some(broken) = as_is.broken() else { return self.beginning().lasting() };
+        let mut moves = self.moves(broken, as_is);
+        best_of_each(&mut moves);
+        let named = self.named(&moves, as_is);
+        if named.is_empty() { vec![report::broken(broken, self.entries)] } else { named }
+    }
+
+    /// The causes that explain the log from its start on.
+    fn lasting(&self) -> Vec<Finding> {
+        let as_is = &self.as_is();
+        let start = self.start();
+        let mut candidates = causes::all();
+        candidates.extend(start.into_iter().flat_map(causes::starts_around));
+        candidates.extend(start.and_then(causes::start_unit));
+        let mut tried: Vec<_> = self
+            .screened(candidates)
+            .into_iter()
+            .filter_map(|it| self.try_one(it, as_is))
+            .collect();
+        best_of_each(&mut tried);
+        // The search takes seconds, and a wrong start explains little.
+        if as_is.explained() < STARTED_ELSEWHERE
+            && tried.iter().all(|it| it.evidence.explained() < RIGHT || !it.is_enough(as_is))
+        {
+            tried.extend(self.starts(as_is));
+            best_of_each(&mut tried);
+        }
+        for best in tried.iter_mut().take(REFINED) {
+            self.refine(best, as_is);
+        }
+        best_of_each(&mut tried);
+        self.named(&tried, as_is)
+    }
+
+    /// The best of what was tried, and one that is nearly as good.
+    fn named(&self, tried: &[Tried], as_is: &Evidence) -> Vec<Finding> {
+        let is_enough = |it: &&Tried| it.is_enough(as_is) && !it.candidate.is_usual(self.robot);
+        let named: Vec<_> = tried.iter().filter(is_enough).collect();
+        let Some(first) = named.first() else { return Vec::new() };
+        let near: Vec<_> =
+            named.iter().filter(|it| it.value() > 0.9 * first.value() - 4.0).collect();
+        // Several varied quantities that all fit a little are signs of something else.
+        let are_vague = near.len() > 1 && near.iter().all(|it| it.candidate.is_varied());
+        if are_vague && first.evidence.explained() < RIGHT {
+            return Vec::new();
+        }
+        let finding =
+            |it: &Tried| report::finding(&it.candidate, &it.evidence, self.robot, self.entries);
+        near.into_iter().copied().take(2).map(finding).collect()
+    }
+
+    /// Varies the value of a candidate in steps that become finer.
+    fn refine(&self, best: &mut Tried, as_is: &Evidence) {
+        for fineness in 0..REFINEMENTS {
+            for candidate in causes::finer(&best.candidate, fineness) {
+                if let Some(tried) = self.try_one(candidate, as_is)
+                    && tried.gain > best.gain
+                {
+                    *best = tried;
+                }
+            }
+        }
+    }
+
+    /// The pose of the start record.
+    fn start(&self) -> Option<Pose> {
+        self.entries.iter().find_map(|entry| match entry.record {
+            Record::Start { pose, .. } => Some(pose),
+            Record::Resume { state: [x, y, heading, ..], .. } => Some(Pose { x, y, heading }),
+            _ => None,
+        })
+    }
+
+    /// The candidates that explain the first part of the log best, and the best one of each cause.
+    fn screened(&self, candidates: Vec<Candidate>) -> Vec<Candidate> {
+        let entries = self.entries.get(..SCREENED).unwrap_or(self.entries);
+        let first = Trial { entries, ..*self };
+        let as_is = first.as_is();
+        let tried = candidates.into_iter().filter_map(|it| first.try_one(it, &as_is));
+        let mut tried: Vec<_> = tried.collect();
+        tried.sort_by(|a, b| b.value().total_cmp(&a.value()));
+        let mut seen = Vec::new();
+        let mut kept = Vec::new();
+        for it in tried {
+            let is_new = !seen.contains(&it.candidate.cause);
+            seen.push(it.candidate.cause);
+            if is_new || kept.len() < KEPT {
+                kept.push(it.candidate);
+            }
+        }
+        kept
+    }
+
+    /// Starts that the search finds in the first part of the log.
+    fn starts(&self, as_is: &Evidence) -> Vec<Tried> {
+        let begin = self.entries.first().map_or(0.0, |entry| entry.record.time());
+        let poses = SEARCHED.iter().flat_map(|seconds| self.found(begin, *seconds));
+        poses.filter_map(|pose| self.try_one(causes::start_at(pose), as_is)).collect()
+    }
+
+    /// Other poses from the moment on at which the ranges no longer fit.
+    fn moves(&self, broken: Broken, as_is: &Evidence) -> Vec<Tried> {
+        let begin = self.entries.first().map_or(0.0, |entry| entry.record.time());
+        let time = begin + broken.from;
+        let poses = SEARCHED.iter().flat_map(|seconds| self.found(time, *seconds));
+        poses.filter_map(|pose| self.try_one(causes::moved_to(time, pose), as_is)).collect()
+    }
+
+    /// The poses at a time that the search finds in the seconds after it.
+    fn found(&self, from: f64, seconds: f64) -> Vec<Pose> {
+        let within = || {
+            let records = self.entries.iter().map(|entry| &entry.record);
+            records.filter(move |record| (from..=from + seconds).contains(&record.time()))
+        };
+        let found = Find { robot: self.robot, walls: self.walls }.run_records(within());
+        let moved = moved(within(), self.robot);
+        found.hypotheses.iter().take(4).map(|it| before(it.pose, moved)).collect()
+    }
+}
+
+impl Tried {
+    /// The gain without what a cause of its kind gains by chance. A varied quantity fits a little better than what is right.
+    fn value(&self) -> f64 {
+        let share = if self.candidate.is_varied() { 0.95 } else { 1.0 };
+        share * self.gain - self.candidate.cost()
+    }
+
+    fn is_enough(&self, as_is: &Evidence) -> bool {
+        #[expect(clippy::cast_precision_loss, reason = "a number of echoes")]
+        let echoes = as_is.echoes.len() as f64;
+        let gain = self.value();
+        gain >= LEAST_GAIN
+            && gain >= LEAST_GAIN_PER_ECHO * echoes
+            && self.evidence.explained() >= LEAST_EXPLAINED
+    }
+}
+
+/// Keeps the best candidate of each cause, best first.
+fn best_of_each(tried: &mut Vec<Tried>) {
+    let value = Tried::value;
+    tried.sort_by(|a, b| value(b).total_cmp(&value(a)));
+    let mut seen = Vec::new();
+    tried.retain(|it| {
+        let is_new = !seen.contains(&it.candidate.cause);
+        seen.push(it.candidate.cause);
+        is_new
+    });
+}
+
+/// The pose relative to the start after some records, by the encoders alone.
+fn moved<'r>(records: impl Iterator<Item = &'r Record>, robot: &RobotConfig) -> Pose {
+    let width = robot.localizer.drive.track_width.0.into();
+    let mut odometry = DeadReckoning::new(Pose::default(), width);
+    let mut last: Option<[f64; 2]> = None;
+    for record in records {
+        let wheels = match *record {
+            #[expect(clippy::cast_precision_loss, reason = "counts stay below 2^53")]
+            Record::Ticks { right, left, .. } => [
+                right as f64 * f64::from(robot.right_wheel.signed_travel().0),
+                left as f64 * f64::from(robot.left_wheel.signed_travel().0),
+            ],
+            Record::Wheels { right, left, .. } => [right, left],
+            _ => continue,
+        };
+        if let Some(last) = last.replace(wheels) {
+            odometry.moved([wheels[0] - last[0], wheels[1] - last[1]]);
+        }
+    }
+    odometry.pose()
+}
+
+/// The pose from which a robot has moved to `end`.
+fn before(end: Pose, moved: Pose) -> Pose {
+    let heading = end.heading - moved.heading;
+    let (sin, cos) = heading.sin_cos();
+    Pose {
+        x: end.x - cos * moved.x + sin * moved.y,
+        y: end.y - sin * moved.x - cos * moved.y,
+        heading,
+    }
+}

@@ -1,0 +1,268 @@
+//! The causes that are tried on a log, one after another.
+
+use std::f64::consts::{PI, TAU};
+
+use sonarfix_hal::config::RobotConfig;
+use sonarfix_sim::trace::Pose;
+
+use crate::diagnosis::change::Change;
+
+/// What may be wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cause {
+    /// The right and the left wheel are exchanged.
+    WheelsSwapped,
+    /// The right encoder counts backwards.
+    RightMirrored,
+    /// The left encoder counts backwards.
+    LeftMirrored,
+    /// Both encoders count backwards.
+    BothMirrored,
+    /// The travel of the right wheel per count is another.
+    RightTravel,
+    /// The travel of the left wheel per count is another.
+    LeftTravel,
+    /// The travel of both wheels per count is another.
+    Travel,
+    /// The track width is another.
+    TrackWidth,
+    /// The servo turns the other way.
+    BearingMirrored,
+    /// The zero of the servo is another.
+    BearingOffset,
+    /// Bearings are in degrees.
+    BearingUnit,
+    /// Ranges are in another unit.
+    RangeUnit,
+    /// All ranges are too long or too short by a length.
+    RangeOffset,
+    /// The times of the ranges are late or early.
+    RangeDelay,
+    /// The heading at the start is another.
+    StartHeading,
+    /// The heading at the start is in degrees.
+    StartUnit,
+    /// The pose at the start is another.
+    StartPose,
+    /// The robot was carried, or its wheels slipped.
+    Moved,
+    /// The map is a mirror image.
+    MapMirrored,
+    /// The map has another unit.
+    MapUnit,
+}
+
+/// A change that explains the log if the cause is right.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Candidate {
+    pub cause: Cause,
+    pub change: Change,
+    /// What was varied: a factor, radians, metres or seconds; 0 if nothing.
+    pub value: f64,
+}
+
+/// A quantity that is varied.
+struct Varied {
+    cause: Cause,
+    values: &'static [f64],
+    /// Half the distance of two values, as a factor or as a difference.
+    half_step: f64,
+    is_factor: bool,
+    change: fn(f64) -> Change,
+}
+
+const FACTORS: &[f64] = &[
+    0.1, 0.2, 0.25, 0.32, 0.4, 0.5, 0.58, 0.67, 0.76, 0.83, 0.9, 1.1, 1.2, 1.35, 1.5, 1.75, 2.0,
+    2.5, 3.0, 3.2, 4.0, 5.0, 10.0,
+];
+
+const WIDTHS: &[f64] = &[
+    0.1, 0.2, 0.25, 0.4, 0.5, 0.6, 0.7, 0.8, 0.88, 1.13, 1.25, 1.4, 1.6, 1.8, 2.0, 2.3, 4.0, 10.0,
+];
+
+const VARIED: [Varied; 8] = [
+    Varied {
+        cause: Cause::RightTravel,
+        values: FACTORS,
+        half_step: 1.05,
+        is_factor: true,
+        change: |by| Change { wheels: [by, 1.0], ..Change::default() },
+    },
+    Varied {
+        cause: Cause::LeftTravel,
+        values: FACTORS,
+        half_step: 1.05,
+        is_factor: true,
+        change: |by| Change { wheels: [1.0, by], ..Change::default() },
+    },
+    Varied {
+        cause: Cause::Travel,
+        values: FACTORS,
+        half_step: 1.05,
+        is_factor: true,
+        change: |by| Change { wheels: [by, by], ..Change::default() },
+    },
+    Varied {
+        cause: Cause::TrackWidth,
+        values: WIDTHS,
+        half_step: 1.06,
+        is_factor: true,
+        change: |by| Change { track_width: by, ..Change::default() },
+    },
+    Varied {
+        cause: Cause::BearingOffset,
+        values: &[
+            -165.0, -150.0, -135.0, -120.0, -105.0, -90.0, -75.0, -60.0, -45.0, -35.0, -25.0,
+            -15.0, -8.0, 8.0, 15.0, 25.0, 35.0, 45.0, 60.0, 75.0, 90.0, 105.0, 120.0, 135.0, 150.0,
+            165.0, 180.0,
+        ],
+        half_step: 5.0,
+        is_factor: false,
+        change: |by| Change { bearing_offset: by.to_radians(), ..Change::default() },
+    },
+    Varied {
+        cause: Cause::RangeOffset,
+        values: &[-0.5, -0.3, -0.2, -0.12, -0.07, -0.04, 0.04, 0.07, 0.12, 0.2, 0.3, 0.5],
+        half_step: 0.02,
+        is_factor: false,
+        change: |by| Change { range_offset: by, ..Change::default() },
+    },
+    Varied {
+        cause: Cause::RangeDelay,
+        values: &[-5.0, -3.0, -2.0, -1.2, -0.7, -0.4, 0.4, 0.7, 1.2, 2.0, 3.0, 5.0],
+        half_step: 0.2,
+        is_factor: false,
+        change: |by| Change { delay: by, ..Change::default() },
+    },
+    Varied {
+        cause: Cause::StartHeading,
+        values: &[
+            -160.0, -140.0, -120.0, -105.0, -90.0, -75.0, -60.0, -45.0, -30.0, -20.0, -10.0, 10.0,
+            20.0, 30.0, 45.0, 60.0, 75.0, 90.0, 105.0, 120.0, 140.0, 160.0, 180.0,
+        ],
+        half_step: 5.0,
+        is_factor: false,
+        change: |by| Change { heading_offset: by.to_radians(), ..Change::default() },
+    },
+];
+
+/// Factors of the ranges: of metres from other units, of half and double the way, and of both ways.
+const RANGE_UNITS: [f64; 12] =
+    [1e-3, 1e-2, 0.1, 10.0, 100.0, 1e3, 0.0254, 0.3048, 39.37, 3.2808, 0.5, 2.0];
+/// Factors of a map's unit.
+const MAP_UNITS: [f64; 10] = [1e-3, 1e-2, 0.1, 10.0, 100.0, 1e3, 0.0254, 0.3048, 39.37, 3.2808];
+
+/// All candidates that need no search for the pose.
+pub fn all() -> Vec<Candidate> {
+    let none = Change::default();
+    let fixed = |cause, change| Candidate { cause, change, value: 0.0 };
+    let mut all = vec![
+        fixed(Cause::WheelsSwapped, Change { is_swapped: true, ..none }),
+        fixed(Cause::RightMirrored, Change { wheels: [-1.0, 1.0], ..none }),
+        fixed(Cause::LeftMirrored, Change { wheels: [1.0, -1.0], ..none }),
+        fixed(Cause::BothMirrored, Change { wheels: [-1.0, -1.0], ..none }),
+        fixed(Cause::BearingMirrored, Change { bearing: -1.0, ..none }),
+        fixed(Cause::BearingUnit, Change { bearing: PI / 180.0, ..none }),
+        fixed(Cause::MapMirrored, Change { map: [-1.0, 1.0], ..none }),
+        fixed(Cause::MapMirrored, Change { map: [1.0, -1.0], ..none }),
+        fixed(Cause::MapMirrored, Change { is_transposed: true, ..none }),
+    ];
+    let units = RANGE_UNITS.map(|by| (Cause::RangeUnit, by, Change { range: by, ..none }));
+    let maps = MAP_UNITS.map(|by| (Cause::MapUnit, by, Change { map: [by, by], ..none }));
+    let units = units.into_iter().chain(maps);
+    all.extend(units.map(|(cause, value, change)| Candidate { cause, change, value }));
+    for varied in &VARIED {
+        let values = varied.values.iter();
+        all.extend(values.map(|&value| Candidate {
+            cause: varied.cause,
+            change: (varied.change)(value),
+            value,
+        }));
+    }
+    all
+}
+
+/// Candidates between a value of a varied quantity and its neighbours; none of what is not varied. `fineness` halves the step.
+pub fn finer(candidate: &Candidate, fineness: i32) -> Vec<Candidate> {
+    let Some(varied) = VARIED.iter().find(|varied| varied.cause == candidate.cause) else {
+        return Vec::new();
+    };
+    let share = 0.5_f64.powi(fineness);
+    let values = if varied.is_factor {
+        let step = varied.half_step.powf(share);
+        [candidate.value / step, candidate.value * step]
+    } else {
+        let step = share * varied.half_step;
+        [candidate.value - step, candidate.value + step]
+    };
+    let finer =
+        values.map(|value| Candidate { change: (varied.change)(value), value, ..*candidate });
+    finer.into()
+}
+
+/// A start elsewhere.
+pub fn start_at(pose: Pose) -> Candidate {
+    let change = Change { start: Some(pose), ..Change::default() };
+    Candidate { cause: Cause::StartPose, change, value: 0.0 }
+}
+
+/// The heading of the start in degrees, if it is more than a turn.
+pub fn start_unit(pose: Pose) -> Option<Candidate> {
+    let change = Change { heading: PI / 180.0, ..Change::default() };
+    let candidate = Candidate { cause: Cause::StartUnit, change, value: 0.0 };
+    (pose.heading.abs() > TAU).then_some(candidate)
+}
+
+/// Starts around the one of the log.
+pub fn starts_around(pose: Pose) -> impl Iterator<Item = Candidate> {
+    const STEPS: [f64; 7] = [-1.0, -0.6, -0.3, 0.0, 0.3, 0.6, 1.0];
+    let offsets = STEPS.into_iter().flat_map(|x| STEPS.map(|y| (x, y)));
+    let others = offsets.filter(|offset| *offset != (0.0, 0.0));
+    others.map(move |(x, y)| start_at(Pose { x: pose.x + x, y: pose.y + y, ..pose }))
+}
+
+/// A robot that was carried at a time.
+pub fn moved_to(time: f64, pose: Pose) -> Candidate {
+    let change = Change { moved: Some((time, pose)), ..Change::default() };
+    Candidate { cause: Cause::Moved, change, value: time }
+}
+
+impl Candidate {
+    /// Whether its value is one of many.
+    pub fn is_varied(&self) -> bool {
+        VARIED.iter().any(|varied| varied.cause == self.cause)
+    }
+
+    /// The logarithm of how many candidates there are of its kind: a varied quantity, and a start anywhere, fit by chance.
+    pub fn cost(&self) -> f64 {
+        match self.cause {
+            Cause::StartPose => 10.0,
+            Cause::Moved => 15.0,
+            // A robot that hardly moves, by its log, can follow any ranges.
+            Cause::RightTravel | Cause::LeftTravel | Cause::Travel => {
+                5.0 + 40.0 * self.value.ln().abs()
+            }
+            Cause::TrackWidth => 5.0 + 20.0 * self.value.ln().abs(),
+            _ if self.is_varied() => 5.0,
+            _ => 1.0,
+        }
+    }
+
+    /// Whether the value is so near to what the robot file states that the localizer estimates it by itself.
+    pub fn is_usual(&self, robot: &RobotConfig) -> bool {
+        let prior = &robot.localizer.prior;
+        let width = f64::from(robot.localizer.drive.track_width.0);
+        let permitted = match self.cause {
+            Cause::RightTravel => (self.value - 1.0, 3.0 * f64::from(prior.scale_right)),
+            Cause::LeftTravel | Cause::Travel => {
+                (self.value - 1.0, 3.0 * f64::from(prior.scale_left))
+            }
+            Cause::TrackWidth => (self.value - 1.0, 3.0 * f64::from(prior.track_width.0) / width),
+            Cause::BearingOffset | Cause::StartHeading => (self.value, 6.0),
+            Cause::RangeOffset => (self.value, 0.025),
+            Cause::RangeDelay => (self.value, 0.15),
+            _ => return false,
+        };
+        permitted.0.abs() <= permitted.1
+    }
+}

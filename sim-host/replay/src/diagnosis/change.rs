@@ -1,0 +1,183 @@
+//! A change of a robot, a map, a start or a log, which is tried as the explanation of the log.
+
+use sonarfix::geometry::pose::Point;
+use sonarfix::geometry::units::Metres;
+use sonarfix::map::Wall;
+use sonarfix_hal::config::RobotConfig;
+use sonarfix_sim::trace::Pose;
+
+use crate::diagnosis::recording::Entry;
+use crate::log::Record;
+
+/// A change; by default none. Factors multiply what the robot file, the map or the log states.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Change {
+    /// The log's right and left wheel are exchanged.
+    pub is_swapped: bool,
+    /// Of the travel of the right and of the left wheel; negative for a mirrored encoder.
+    pub wheels: [f64; 2],
+    pub track_width: f64,
+    /// Factor of the bearings of the sonar; −1 for a mirrored servo.
+    pub bearing: f64,
+    /// Added to the bearings, radians.
+    pub bearing_offset: f64,
+    pub range: f64,
+    /// Added to the ranges, metres.
+    pub range_offset: f64,
+    /// The delay of the ranges' times, seconds.
+    pub delay: f64,
+    /// The start, if it is another.
+    pub start: Option<Pose>,
+    /// The time at which the robot was carried to another pose, and that pose.
+    pub moved: Option<(f64, Pose)>,
+    /// Of the start's heading.
+    pub heading: f64,
+    /// Added to the start's heading, radians.
+    pub heading_offset: f64,
+    /// Of the map's coordinates; negative for a mirrored axis.
+    pub map: [f64; 2],
+    /// Whether x and y of the map are exchanged.
+    pub is_transposed: bool,
+}
+
+impl Default for Change {
+    fn default() -> Self {
+        Self {
+            is_swapped: false,
+            wheels: [1.0; 2],
+            track_width: 1.0,
+            bearing: 1.0,
+            bearing_offset: 0.0,
+            range: 1.0,
+            range_offset: 0.0,
+            delay: 0.0,
+            start: None,
+            moved: None,
+            heading: 1.0,
+            heading_offset: 0.0,
+            map: [1.0; 2],
+            is_transposed: false,
+        }
+    }
+}
+
+impl Change {
+    /// The robot with the change.
+    pub fn robot(&self, robot: &RobotConfig) -> RobotConfig {
+        let mut changed = *robot;
+        let width = &mut changed.localizer.drive.track_width;
+        *width = single(f64::from(width.0) * self.track_width, Metres);
+        changed
+    }
+
+    /// The map with the change. Walls that cannot be are left out.
+    pub fn walls(&self, walls: &[Wall]) -> Vec<Wall> {
+        let [by_x, by_y] = self.map;
+        let changed = |wall: &Wall| {
+            let ends = [wall.from(), wall.to()].map(|point| {
+                let (x, y) = (by_x * f64::from(point.x.0), by_y * f64::from(point.y.0));
+                let (x, y) = if self.is_transposed { (y, x) } else { (x, y) };
+                Point { x: single(x, Metres), y: single(y, Metres) }
+            });
+            let changed = Wall::new(ends[0], ends[1]).ok()?;
+            Some(wall.accuracy().map_or(changed, |accuracy| changed.with_accuracy(accuracy)))
+        };
+        walls.iter().filter_map(changed).collect()
+    }
+
+    /// The records with the change, in the order of their times. Encoder counts become the travel of the wheels of `robot`,
+    /// and a range is of no certain wall: the robot chose one by what may be wrong.
+    pub fn records(&self, entries: &[Entry], robot: &RobotConfig) -> Vec<Record> {
+        let mut records: Vec<_> =
+            entries.iter().map(|entry| self.record(&entry.record, robot)).collect();
+        if self.delay != 0.0 {
+            records.sort_by(|a, b| a.time().total_cmp(&b.time()));
+        }
+        if let Some((time, pose)) = self.moved {
+            let at = records.iter().position(|record| record.time() >= time);
+            let (position_deviation, heading_deviation) = (FOUND_POSITION, FOUND_HEADING);
+            let moved = Record::Pose { time, pose, position_deviation, heading_deviation };
+            records.insert(at.unwrap_or(records.len()), moved);
+        }
+        records
+    }
+
+    fn record(&self, record: &Record, robot: &RobotConfig) -> Record {
+        match *record {
+            Record::Ticks { time, right, left } => {
+                let [right, left] = self.counts([right, left]);
+                let wheels = [&robot.right_wheel, &robot.left_wheel];
+                let [per_right, per_left] = wheels.map(|wheel| f64::from(wheel.signed_travel().0));
+                self.travel(time, right * per_right, left * per_left)
+            }
+            Record::Wheels { time, right, left } => {
+                let (right, left) = if self.is_swapped { (left, right) } else { (right, left) };
+                self.travel(time, right, left)
+            }
+            Record::Range { time, bearing, range, ranger, .. } => Record::Range {
+                time: time - self.delay,
+                bearing: self.bearing * bearing + self.bearing_offset,
+                range: range.map(|range| self.range * range + self.range_offset),
+                wall: None,
+                ranger,
+            },
+            Record::Scan { time, ref scan } => {
+                let mut scan = scan.clone();
+                scan.first = self.bearing * scan.first + self.bearing_offset;
+                scan.step *= self.bearing;
+                for range in scan.ranges.iter_mut().filter(|range| **range > 0.0) {
+                    let changed = self.range * f64::from(*range) + self.range_offset;
+                    *range = single(changed.max(0.0), |range| range);
+                }
+                Record::Scan { time: time - self.delay, scan }
+            }
+            Record::Skip { time } => Record::Skip { time: time - self.delay },
+            Record::Start { time, pose, position_deviation, heading_deviation } => {
+                let (pose, is_known) = self.pose(pose);
+                let [position_deviation, heading_deviation] = if is_known {
+                    [position_deviation, heading_deviation]
+                } else {
+                    [FOUND_POSITION, FOUND_HEADING]
+                };
+                Record::Start { time, pose, position_deviation, heading_deviation }
+            }
+            Record::Resume { time, mut state, mut deviation } => {
+                let [x, y, heading, ..] = state;
+                let (pose, is_known) = self.pose(Pose { x, y, heading });
+                state[..3].copy_from_slice(&[pose.x, pose.y, pose.heading]);
+                if !is_known {
+                    let found = [FOUND_POSITION, FOUND_POSITION, FOUND_HEADING];
+                    deviation[..3].copy_from_slice(&found);
+                }
+                Record::Resume { time, state, deviation }
+            }
+            ref other => other.clone(),
+        }
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "counts stay below 2^53")]
+    fn counts(&self, [right, left]: [i64; 2]) -> [f64; 2] {
+        let [right, left] = if self.is_swapped { [left, right] } else { [right, left] };
+        [right as f64, left as f64]
+    }
+
+    fn travel(&self, time: f64, right: f64, left: f64) -> Record {
+        let [by_right, by_left] = self.wheels;
+        Record::Wheels { time, right: by_right * right, left: by_left * left }
+    }
+
+    /// The start, and whether it is as accurate as the log says.
+    fn pose(&self, pose: Pose) -> (Pose, bool) {
+        let heading = self.heading * pose.heading + self.heading_offset;
+        self.start.map_or((Pose { heading, ..pose }, true), |start| (start, false))
+    }
+}
+
+/// Deviations of a start that the search has found: metres, radians.
+const FOUND_POSITION: f64 = 0.1;
+const FOUND_HEADING: f64 = 0.1;
+
+#[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
+fn single<T>(value: f64, of: impl Fn(f32) -> T) -> T {
+    of(value as f32)
+}

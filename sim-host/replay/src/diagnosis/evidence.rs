@@ -1,0 +1,190 @@
+//! How well a robot, a map and a start explain the ranges of a log.
+
+use std::io::Empty;
+
+use sonarfix::health::Verdict;
+use sonarfix::map::Wall;
+use sonarfix_hal::config::{RobotConfig, StartPose};
+use sonarfix_sim::trace::{FixRecord, Recorder, Tick};
+
+use crate::fault::Fault;
+use crate::log::Record;
+use crate::session::{Session, Trouble};
+
+/// The share of echoes that come from what is not in the map, in a usual room.
+const FOREIGN: f64 = 0.1;
+/// The least variance of an innovation, m²: 2 cm. A wall of a map is not known better, and a narrower density would reward
+/// a sure filter, not a right one.
+const LEAST_VARIANCE: f64 = 4e-4;
+/// An echo that is e times as probable as by chance is explained.
+const EXPLAINED: f64 = 1.0;
+
+/// The fewest echoes that say something of a share.
+const LEAST_COMPARED: usize = 12;
+/// The fewest echoes before a stretch that is not explained, and in it.
+const LEAST_BEFORE: usize = 20;
+const LEAST_WITHIN: usize = 8;
+
+/// A stretch whose echoes are not explained, seconds since the start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Broken {
+    pub from: f64,
+    /// `None` if it ends with the log.
+    pub until: Option<f64>,
+}
+
+/// One echo: its time, and the logarithm of its likelihood against that of an echo from anywhere in range.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Echo {
+    /// Seconds since the start.
+    pub time: f64,
+    pub weight: f64,
+    /// Whether a wall was expected, so that the range could be compared.
+    pub is_compared: bool,
+}
+
+/// What a replay says of its ranges.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Evidence {
+    pub echoes: Vec<Echo>,
+    /// Encoder records that a wheel cannot roll.
+    pub too_fast: u64,
+    /// Encoder records, and seconds of the replay.
+    pub ticks: u64,
+    max_range: f64,
+    is_sure: bool,
+}
+
+impl Evidence {
+    /// A localizer that knows less expects any range: such an echo supports nothing.
+    fn most_variance(&self) -> f64 {
+        (0.06 * self.max_range).max(0.12).powi(2)
+    }
+
+    /// Of a robot, a map or a start that the localizer rejects: no echo is explained.
+    pub fn none(records: &[Record]) -> Self {
+        let echo = |record: &Record| match record {
+            Record::Range { time, range: Some(_), .. } => {
+                Some(Echo { time: *time, weight: FOREIGN.ln(), is_compared: true })
+            }
+            _ => None,
+        };
+        Self { echoes: records.iter().filter_map(echo).collect(), ..Self::default() }
+    }
+
+    /// Replays records. `None` if they hold no start, or the localizer rejects it.
+    pub fn of(
+        robot: &RobotConfig,
+        walls: &[Wall],
+        records: impl Iterator<Item = Record>,
+    ) -> Option<Self> {
+        // A search would find the pose again, and hide what is wrong.
+        let robot = RobotConfig { start: StartPose::Known, ..*robot };
+        let max_range = f64::from(robot.localizer.rangers.first.max_range.0);
+        let mut evidence = Self { max_range, ..Self::default() };
+        let mut too_fast = 0;
+        let mut session =
+            Session::<std::io::BufReader<Empty>, _>::new(&robot, walls, None, &mut evidence);
+        for record in records {
+            match session.take(record, &mut |_, _| Ok(())) {
+                Err(Trouble::End(_)) => return None,
+                Err(Trouble::Skip(Fault::TooFast)) => too_fast += 1,
+                Ok(()) | Err(Trouble::Skip(_)) => {}
+            }
+        }
+        session.end().ok()?;
+        evidence.too_fast = too_fast;
+        Some(evidence)
+    }
+
+    /// The logarithm of the likelihood ratio of all echoes.
+    pub fn total(&self) -> f64 {
+        self.echoes.iter().map(|echo| echo.weight).sum()
+    }
+
+    /// The share of the compared echoes that are explained; of all, if few could be compared.
+    pub fn explained(&self) -> f64 {
+        let compared: Vec<_> = self.echoes.iter().copied().filter(|it| it.is_compared).collect();
+        let are_many = compared.len() >= LEAST_COMPARED && 10 * compared.len() >= self.echoes.len();
+        if are_many { share(&compared) } else { share(&self.echoes) }
+    }
+}
+
+/// The share of some echoes that are explained; 1 without any.
+fn share(echoes: &[Echo]) -> f64 {
+    if echoes.is_empty() {
+        return 1.0;
+    }
+    let explained = echoes.iter().filter(|echo| echo.weight >= EXPLAINED).count();
+    #[expect(clippy::cast_precision_loss, reason = "counts of echoes")]
+    let share = explained as f64 / echoes.len() as f64;
+    share
+}
+
+impl Recorder for Evidence {
+    fn tick(&mut self, make: impl FnOnce() -> Tick) {
+        self.ticks += 1;
+        self.is_sure = make().estimate.verdict != Verdict::Lost;
+    }
+
+    fn fix(&mut self, make: impl FnOnce() -> FixRecord) {
+        let record = make();
+        if record.range.is_none() {
+            return;
+        }
+        let density = match (record.innovation, record.innovation_variance) {
+            (Some(innovation), Some(variance)) if variance < self.most_variance() => {
+                let variance = variance.max(LEAST_VARIANCE);
+                let exponent = -0.5 * innovation * innovation / variance;
+                exponent.exp() / (std::f64::consts::TAU * variance).sqrt()
+            }
+            _ => 0.0,
+        };
+        let weight = (FOREIGN + (1.0 - FOREIGN) * density * self.max_range).ln();
+        // A localizer that has lost the pose follows any range.
+        let weight = if self.is_sure { weight } else { weight.min(0.0) };
+        let is_compared = record.innovation.is_some();
+        self.echoes.push(Echo { time: record.time, weight, is_compared });
+    }
+}
+
+impl Evidence {
+    /// The logarithm of the likelihood against that of another replay, for as many echoes as that one has.
+    pub fn gain(&self, other: &Self) -> f64 {
+        let missing = other.echoes.len().saturating_sub(self.echoes.len());
+        #[expect(clippy::cast_precision_loss, reason = "numbers of echoes")]
+        let [own, missing, all] =
+            [self.echoes.len(), missing, other.echoes.len()].map(|count| count as f64);
+        let total = self.total() + missing * FOREIGN.ln();
+        total * all / (own + missing).max(1.0) - other.total()
+    }
+
+    /// The stretch in which the echoes are explained least, if they are well explained for long before it.
+    pub fn broken(&self) -> Option<Broken> {
+        let (mut begin, mut sum) = (0, 0.0);
+        let (mut worst, mut stretch) = (0.0, 0..0);
+        for (index, echo) in self.echoes.iter().enumerate() {
+            sum -= echo.weight;
+            if sum <= 0.0 {
+                (begin, sum) = (index + 1, 0.0);
+            } else if sum > worst {
+                (worst, stretch) = (sum, begin..index + 1);
+            }
+        }
+        let before = self.echoes.get(..stretch.start)?;
+        let within = self.echoes.get(stretch.clone())?;
+        let is_late = before.len() >= LEAST_BEFORE && 5 * before.len() >= 2 * self.echoes.len();
+        let is_long = within.len() >= LEAST_WITHIN;
+        let is_broken = is_late && is_long && share(before) >= 0.95 && share(within) < 0.4;
+        let to_end = stretch.end + LEAST_WITHIN >= self.echoes.len();
+        is_broken.then_some(Broken {
+            from: within.first()?.time,
+            until: (!to_end).then_some(within.last()?.time),
+        })
+    }
+
+    /// Whether wheels are often faster than they can be.
+    pub fn is_too_fast(&self) -> bool {
+        20 * self.too_fast > self.ticks
+    }
+}

@@ -1,0 +1,258 @@
+//! The causes in words, with the corrected line.
+
+use sonarfix_hal::config::RobotConfig;
+
+use crate::diagnosis::causes::{Candidate, Cause};
+use crate::diagnosis::evidence::{Broken, Evidence};
+use crate::diagnosis::finding::Finding;
+use crate::diagnosis::recording::Entry;
+use crate::log::Record;
+
+/// A cause as a finding.
+pub fn finding(
+    candidate: &Candidate,
+    evidence: &Evidence,
+    robot: &RobotConfig,
+    entries: &[Entry],
+) -> Finding {
+    let (cause, message, remedy) = words(candidate, robot);
+    let line = match candidate.change.moved {
+        Some((time, _)) => line_at(time, entries),
+        None => candidate.is_of_start().then(|| start_line(entries)).flatten(),
+    };
+    Finding { cause, line, message, remedy, explained: Some(evidence.explained()) }
+}
+
+/// The name of a cause, what is wrong, and what to do.
+type Words = (&'static str, String, String);
+
+fn words(candidate: &Candidate, robot: &RobotConfig) -> Words {
+    wheels(candidate, robot).or_else(|| sonar(candidate)).unwrap_or_else(|| place(candidate))
+}
+
+/// Causes at the wheels.
+fn wheels(candidate: &Candidate, robot: &RobotConfig) -> Option<Words> {
+    let value = candidate.value;
+    let factor = factor(value);
+    let words = match candidate.cause {
+        Cause::WheelsSwapped => (
+            "wheels_swapped",
+            "the right and the left encoder are exchanged".to_owned(),
+            "exchange the two columns of the log, or the two encoders".to_owned(),
+        ),
+        Cause::RightMirrored => ("encoder_mirrored", mirrored("right"), negate("right")),
+        Cause::LeftMirrored => ("encoder_mirrored", mirrored("left"), negate("left")),
+        Cause::BothMirrored => (
+            "encoder_mirrored",
+            "both encoders count backwards".to_owned(),
+            "change the sign of both, `mirrored` of `drive.right_wheel` and of `drive.left_wheel`"
+                .to_owned(),
+        ),
+        Cause::RightTravel => (
+            "wheel_travel",
+            format!("the right wheel drives {factor} as far per count as the robot file states"),
+            travel("right_wheel", f64::from(robot.right_wheel.travel_per_edge.0), value),
+        ),
+        Cause::LeftTravel => (
+            "wheel_travel",
+            format!("the left wheel drives {factor} as far per count as the robot file states"),
+            travel("left_wheel", f64::from(robot.left_wheel.travel_per_edge.0), value),
+        ),
+        Cause::Travel => (
+            "wheel_travel",
+            format!("both wheels drive {factor} as far per count as the robot file states"),
+            format!(
+                "{}; {}",
+                travel("right_wheel", f64::from(robot.right_wheel.travel_per_edge.0), value),
+                travel("left_wheel", f64::from(robot.left_wheel.travel_per_edge.0), value)
+            ),
+        ),
+        Cause::TrackWidth => {
+            let width = 1e3 * f64::from(robot.localizer.drive.track_width.0);
+            (
+                "track_width",
+                format!("the track width is {factor} that of the robot file"),
+                format!(
+                    "drive.track_width = \"{:.0} mm\" instead of \"{width:.0} mm\"",
+                    width * value
+                ),
+            )
+        }
+        _ => return None,
+    };
+    Some(words)
+}
+
+/// Causes at the ranger and its servo.
+fn sonar(candidate: &Candidate) -> Option<Words> {
+    let value = candidate.value;
+    let words = match candidate.cause {
+        Cause::BearingMirrored => (
+            "bearing_mirrored",
+            "the sonar turns the other way: its bearings have the wrong sign".to_owned(),
+            "counter-clockwise is positive: exchange the two `sonar.servo_pulses`, or change the sign of the bearings of the log"
+                .to_owned(),
+        ),
+        Cause::BearingOffset => (
+            "bearing_offset",
+            format!("the sonar points {value:+.0} deg from where the log and the robot file say"),
+            format!("add {value:.0} deg to `sonar.bearing` or to the bearings of `sonar.servo_pulses`"),
+        ),
+        Cause::BearingUnit => (
+            "bearing_unit",
+            "the bearings are in degrees".to_owned(),
+            "write the bearings in radians".to_owned(),
+        ),
+        Cause::RangeUnit => (
+            "range_unit",
+            format!("the ranges are right if they are multiplied by {value}"),
+            range_unit(value),
+        ),
+        Cause::RangeOffset => (
+            "range_offset",
+            format!("all ranges are {:.0} mm too {}", 1e3 * value.abs(), if value > 0.0 { "short" } else { "long" }),
+            format!("add {:.0} mm to the ranges, or correct `sonar.mount`", 1e3 * value),
+        ),
+        Cause::RangeDelay => (
+            "range_delay",
+            format!(
+                "the ranges are stamped {:.2} s too {}, compared with the encoders",
+                value.abs(),
+                if value > 0.0 { "late" } else { "early" }
+            ),
+            "stamp both by one clock: a range at its reflection, the encoders when they are read".to_owned(),
+        ),
+        _ => return None,
+    };
+    Some(words)
+}
+
+/// Causes of the start, the course and the map.
+fn place(candidate: &Candidate) -> Words {
+    let value = candidate.value;
+    match candidate.cause {
+        Cause::StartHeading => (
+            "start_heading",
+            format!("the heading at the start is wrong by {value:.0} deg"),
+            format!("add {:.3} rad to the heading of the start record", value.to_radians()),
+        ),
+        Cause::StartUnit => (
+            "start_unit",
+            "the heading at the start is in degrees".to_owned(),
+            "write it in radians".to_owned(),
+        ),
+        Cause::StartPose => {
+            let start = candidate.change.start.unwrap_or_default();
+            (
+                "start_pose",
+                "the robot starts elsewhere than the start record says".to_owned(),
+                format!(
+                    "x {:.2} m, y {:.2} m, heading {:.3} rad explain the ranges",
+                    start.x,
+                    start.y,
+                    sonarfix_sim::angle::wrap(start.heading)
+                ),
+            )
+        }
+        Cause::Moved => (
+            "moved",
+            format!(
+                "the ranges fit until {value:.1} s, and then from another place on: the robot was carried, or its wheels slipped"
+            ),
+            MOVED.to_owned(),
+        ),
+        Cause::MapMirrored => (
+            "map_mirrored",
+            "the map is a mirror image of the room".to_owned(),
+            if candidate.change.is_transposed {
+                "exchange x and y of its coordinates".to_owned()
+            } else {
+                let axis = if candidate.change.map[0] < 0.0 { "x" } else { "y" };
+                format!("change the sign of its {axis} coordinates")
+            },
+        ),
+        _ => (
+            "map_unit",
+            format!("the map is right if its coordinates are multiplied by {value}"),
+            "correct `map.unit`".to_owned(),
+        ),
+    }
+}
+
+fn factor(value: f64) -> String {
+    format!("{value:.2} times")
+}
+
+fn mirrored(side: &str) -> String {
+    format!("the {side} encoder counts backwards")
+}
+
+fn negate(side: &str) -> String {
+    format!("change `mirrored` of `drive.{side}_wheel`, or the sign of its counts in the log")
+}
+
+fn travel(wheel: &str, metres: f64, by: f64) -> String {
+    let now = 1e3 * metres;
+    format!(
+        "drive.{wheel}: travel per edge {:.4} mm instead of {now:.4} mm; check its diameter and edges_per_revolution",
+        now * by
+    )
+}
+
+fn range_unit(by: f64) -> String {
+    const NAMED: [(f64, &str); 8] = [
+        (1e-3, "they are in millimetres: write metres"),
+        (1e-2, "they are in centimetres: write metres"),
+        (0.1, "they are in decimetres: write metres"),
+        (0.0254, "they are in inches: write metres"),
+        (0.3048, "they are in feet: write metres"),
+        (0.5, "they are the way there and back: halve them"),
+        (2.0, "they were halved twice: double them"),
+        (1e3, "they were divided by 1,000 twice: write metres"),
+    ];
+    let named = NAMED.iter().find(|(factor, _)| (factor / by - 1.0).abs() < 1e-6);
+    named.map_or("write metres", |(_, text)| text).to_owned()
+}
+
+impl Candidate {
+    fn is_of_start(&self) -> bool {
+        matches!(self.cause, Cause::StartHeading | Cause::StartUnit | Cause::StartPose)
+    }
+}
+
+fn start_line(entries: &[Entry]) -> Option<u64> {
+    let is_start =
+        |entry: &&Entry| matches!(entry.record, Record::Start { .. } | Record::Resume { .. });
+    entries.iter().find(is_start).map(|entry| entry.line)
+}
+
+fn line_at(time: f64, entries: &[Entry]) -> Option<u64> {
+    entries.iter().find(|entry| entry.record.time() >= time).map(|entry| entry.line)
+}
+
+/// A stretch that nothing explains, of a log that is right before it.
+pub fn broken(broken: Broken, entries: &[Entry]) -> Finding {
+    let begin = entries.first().map_or(0.0, |entry| entry.record.time());
+    let until = broken.until.map_or_else(String::new, |until| format!(" until {until:.1} s"));
+    let message = format!(
+        "the ranges fit for {:.1} s, and then not{until}: the robot was carried, or its wheels slipped",
+        broken.from
+    );
+    let line = line_at(begin + broken.from, entries);
+    Finding { line, ..Finding::new("moved", message, MOVED.to_owned()) }
+}
+
+/// What to do with a robot that was carried.
+const MOVED: &str = "add a pose record there, or let the robot search: `start = \"unknown\"`";
+
+/// No cause explains the log.
+pub fn unexplained(as_is: &Evidence) -> Option<Finding> {
+    (as_is.explained() < 0.5).then(|| {
+        Finding::new(
+            "map_or_start",
+            "no pose and no single correction explains the ranges".to_owned(),
+            "is it the map of this room? Are furniture, glass or people in it that are not in the map? Measure two walls by hand"
+                .to_owned(),
+        )
+    })
+}
