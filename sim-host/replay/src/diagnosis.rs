@@ -77,7 +77,8 @@ pub fn diagnose(
     let entries = recording::thinned(&recording.entries);
     let whole = Trial { robot, walls, entries: &entries };
     let as_is = whole.as_is();
-    let is_enough = as_is.echoes.len() >= LEAST_ECHOES;
+    // Without a start no echo can be compared with a wall.
+    let is_enough = as_is.echoes.len() >= LEAST_ECHOES && whole.start().is_some();
     let explained = is_enough.then(|| as_is.explained());
     let mut findings = visible.findings(&recording);
     // A time in another unit makes each wheel too slow or too fast: nothing else can be tried.
