@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context, bail};
+use serde::Deserialize;
 
 /// Runs cargo with these arguments, none of which contains a space.
 pub fn run(arguments: &str) -> anyhow::Result<()> {
@@ -44,6 +45,36 @@ pub fn skipped_file() -> PathBuf {
 pub fn root() -> &'static Path {
     let xtask = Path::new(env!("CARGO_MANIFEST_DIR"));
     xtask.parent().unwrap_or(xtask)
+}
+
+/// Where cargo keeps the sources of dependencies.
+pub fn home() -> anyhow::Result<PathBuf> {
+    let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
+    let home = home.or_else(|| Some(std::env::home_dir()?.join(".cargo")));
+    home.context("there is neither CARGO_HOME nor a home")
+}
+
+/// A package that another project publishes.
+#[derive(Debug, Deserialize)]
+pub struct Dependency {
+    pub name: String,
+    pub version: String,
+    pub license: Option<String>,
+    pub manifest_path: PathBuf,
+    /// None for a package of this repository.
+    source: Option<String>,
+}
+
+/// All dependencies of the main workspace, with all features.
+pub fn dependencies() -> anyhow::Result<Vec<Dependency>> {
+    #[derive(Deserialize)]
+    struct Metadata {
+        packages: Vec<Dependency>,
+    }
+    let metadata = printed(command("metadata --all-features --format-version 1 --locked"))?;
+    let metadata: Metadata =
+        serde_json::from_str(&metadata).context("cannot read cargo's metadata")?;
+    Ok(metadata.packages.into_iter().filter(|package| package.source.is_some()).collect())
 }
 
 /// Prints a command and runs it; fails if it fails.

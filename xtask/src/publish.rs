@@ -1,7 +1,5 @@
 //! The published crates: their packages, and their minimum supported Rust version.
 
-use std::path::PathBuf;
-
 use anyhow::{Context, ensure};
 
 use crate::cargo;
@@ -34,9 +32,7 @@ pub fn package() -> anyhow::Result<()> {
 
 /// Removes the sources of these crates that an earlier `cargo package` has unpacked into cargo's home.
 fn remove_stale_sources(crates: &[Package]) -> anyhow::Result<()> {
-    let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
-    let home = home.or_else(|| Some(std::env::home_dir()?.join(".cargo")));
-    let sources = home.context("there is neither CARGO_HOME nor a home")?.join("registry/src");
+    let sources = cargo::home()?.join("registry/src");
     let Ok(registries) = std::fs::read_dir(&sources) else { return Ok(()) };
     for registry in registries {
         let registry = registry?;

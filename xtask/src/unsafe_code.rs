@@ -7,9 +7,8 @@ use std::path::Path;
 
 use anyhow::{Context, ensure};
 use regex::Regex;
-use serde::Deserialize;
 
-use crate::cargo;
+use crate::cargo::{self, Dependency};
 use crate::checks::NO_STD_CRATES;
 
 /// The page.
@@ -38,21 +37,6 @@ impl Args {
     pub const CHECK: Self = Self { write: false };
 }
 
-#[derive(Debug, Deserialize)]
-struct Metadata {
-    packages: Vec<Dependency>,
-}
-
-#[derive(Debug, Deserialize)]
-struct Dependency {
-    name: String,
-    version: String,
-    license: Option<String>,
-    manifest_path: String,
-    /// None for a package of this repository.
-    source: Option<String>,
-}
-
 /// Writes the page, or compares it.
 pub fn run(args: Args) -> anyhow::Result<()> {
     let page = page()?;
@@ -67,19 +51,14 @@ pub fn run(args: Args) -> anyhow::Result<()> {
 
 fn page() -> anyhow::Result<String> {
     let linked = linked()?;
-    let metadata =
-        cargo::printed(cargo::command("metadata --all-features --format-version 1 --locked"))?;
-    let metadata: Metadata =
-        serde_json::from_str(&metadata).context("cannot read cargo's metadata")?;
-    let of_others = metadata.packages.iter().filter(|package| package.source.is_some());
     let word = word()?;
     let mut page = HEAD.to_owned();
-    for package in of_others {
+    for package in cargo::dependencies()? {
         let Dependency { name, version, license, manifest_path, .. } = package;
         if !linked.contains(&format!("{name} v{version}")) {
             continue;
         }
-        let source = Path::new(manifest_path).with_file_name("src");
+        let source = manifest_path.with_file_name("src");
         let lines = count(&source, &word)?;
         let license = license.as_deref().unwrap_or("none stated");
         // Writing to a string does not fail.

@@ -24,6 +24,7 @@ use sonarfix_sim::trace::Pose;
 use crate::fault::ReplayError;
 use crate::find::Find;
 use crate::log::Record;
+use crate::wheels;
 use causes::Candidate;
 use change::Change;
 use evidence::{Broken, Evidence};
@@ -142,9 +143,13 @@ impl<'a> Trial<'a> {
     fn causes(&self, as_is: &Evidence) -> Vec<Finding> {
         let Some(broken) = as_is.broken() else { return self.beginning().lasting() };
         let mut moves = self.moves(broken, as_is);
-        best_of_each(&mut moves);
+        keep_best(&mut moves, 0);
         let named = self.named(&moves, as_is);
-        if named.is_empty() { vec![report::broken(broken, self.entries)] } else { named }
+        if named.is_empty() {
+            vec![report::broken(broken, self.begin(), self.entries)]
+        } else {
+            named
+        }
     }
 
     /// The causes that explain the log from its start on.
@@ -159,18 +164,18 @@ impl<'a> Trial<'a> {
             .into_iter()
             .filter_map(|it| self.try_one(it, as_is))
             .collect();
-        best_of_each(&mut tried);
+        keep_best(&mut tried, 0);
         // The search takes seconds, and a wrong start explains little.
         if as_is.explained() < STARTED_ELSEWHERE
             && tried.iter().all(|it| it.evidence.explained() < RIGHT || !it.is_enough(as_is))
         {
             tried.extend(self.starts(as_is));
-            best_of_each(&mut tried);
+            keep_best(&mut tried, 0);
         }
         for best in tried.iter_mut().take(REFINED) {
             self.refine(best, as_is);
         }
-        best_of_each(&mut tried);
+        keep_best(&mut tried, 0);
         self.named(&tried, as_is)
     }
 
@@ -204,6 +209,11 @@ impl<'a> Trial<'a> {
         }
     }
 
+    /// The time of the first record.
+    fn begin(&self) -> f64 {
+        self.entries.first().map_or(0.0, |entry| entry.record.time())
+    }
+
     /// The pose of the start record.
     fn start(&self) -> Option<Pose> {
         self.entries.iter().find_map(|entry| match entry.record {
@@ -219,31 +229,20 @@ impl<'a> Trial<'a> {
         let first = Trial { entries, ..*self };
         let as_is = first.as_is();
         let tried = candidates.into_iter().filter_map(|it| first.try_one(it, &as_is));
-        let mut tried: Vec<_> = tried.collect();
-        tried.sort_by(|a, b| b.value().total_cmp(&a.value()));
-        let mut seen = Vec::new();
-        let mut kept = Vec::new();
-        for it in tried {
-            let is_new = !seen.contains(&it.candidate.cause);
-            seen.push(it.candidate.cause);
-            if is_new || kept.len() < KEPT {
-                kept.push(it.candidate);
-            }
-        }
-        kept
+        let mut tried = tried.collect();
+        keep_best(&mut tried, KEPT);
+        tried.into_iter().map(|it| it.candidate).collect()
     }
 
     /// Starts that the search finds in the first part of the log.
     fn starts(&self, as_is: &Evidence) -> Vec<Tried> {
-        let begin = self.entries.first().map_or(0.0, |entry| entry.record.time());
-        let poses = SEARCHED.iter().flat_map(|seconds| self.found(begin, *seconds));
+        let poses = SEARCHED.iter().flat_map(|seconds| self.found(self.begin(), *seconds));
         poses.filter_map(|pose| self.try_one(causes::start_at(pose), as_is)).collect()
     }
 
     /// Other poses from the moment on at which the ranges no longer fit.
     fn moves(&self, broken: Broken, as_is: &Evidence) -> Vec<Tried> {
-        let begin = self.entries.first().map_or(0.0, |entry| entry.record.time());
-        let time = begin + broken.from;
+        let time = self.begin() + broken.from;
         let poses = SEARCHED.iter().flat_map(|seconds| self.found(time, *seconds));
         poses.filter_map(|pose| self.try_one(causes::moved_to(time, pose), as_is)).collect()
     }
@@ -277,15 +276,16 @@ impl Tried {
     }
 }
 
-/// Keeps the best candidate of each cause, best first.
-fn best_of_each(tried: &mut Vec<Tried>) {
-    let value = Tried::value;
-    tried.sort_by(|a, b| value(b).total_cmp(&value(a)));
-    let mut seen = Vec::new();
+/// Sorts what was tried, and keeps the best of each cause, and so many others that are as good.
+fn keep_best(tried: &mut Vec<Tried>, others: usize) {
+    tried.sort_by(|a, b| b.value().total_cmp(&a.value()));
+    let (mut seen, mut kept) = (Vec::new(), 0);
     tried.retain(|it| {
         let is_new = !seen.contains(&it.candidate.cause);
         seen.push(it.candidate.cause);
-        is_new
+        let is_kept = is_new || kept < others;
+        kept += usize::from(is_kept);
+        is_kept
     });
 }
 
@@ -297,10 +297,9 @@ fn moved<'r>(records: impl Iterator<Item = &'r Record>, robot: &RobotConfig) -> 
     for record in records {
         let wheels = match *record {
             #[expect(clippy::cast_precision_loss, reason = "counts stay below 2^53")]
-            Record::Ticks { right, left, .. } => [
-                right as f64 * f64::from(robot.right_wheel.signed_travel().0),
-                left as f64 * f64::from(robot.left_wheel.signed_travel().0),
-            ],
+            Record::Ticks { right, left, .. } => {
+                wheels::of_counts(robot, [right as f64, left as f64])
+            }
             Record::Wheels { right, left, .. } => [right, left],
             _ => continue,
         };

@@ -28,7 +28,7 @@ use crate::log::Record;
 use crate::reference::{Reference, micros, seconds};
 use crate::scan::{Cone, Scan, Sweep};
 use crate::score::{Score, Verdicts};
-use crate::wheels::Reading;
+use crate::wheels::{self, Reading};
 
 /// Ranges that may wait for the next encoder record: a sonar that pings for a minute.
 const MOST_HELD: usize = 1024;
@@ -209,8 +209,9 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
                 let begin = Begin { time, pose, state, deviation, is_unknown, is_own };
                 self.take_start(begin, complain)
             }
+            #[expect(clippy::cast_precision_loss, reason = "counts stay below 2^53")]
             Record::Ticks { time, right, left } => {
-                let wheels = self.rolled([right, left]);
+                let wheels = wheels::of_counts(self.robot, [right as f64, left as f64]);
                 self.take_wheels(micros(time), wheels, Encoder::Ticks, complain)
             }
             Record::Turn { time, angle, breaks } => {
@@ -267,16 +268,6 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         let deviation = self.with_prior([position, position, UNKNOWN_HEADING.0.into()]);
         let (pose, state) = (Pose::default(), estimate([0.0; STATES]));
         Some(Begin { time, pose, state, deviation, is_unknown: true, is_own: false })
-    }
-
-    fn rolled(&self, ticks: [i64; 2]) -> [f64; 2] {
-        let (right_wheel, left_wheel) = (&self.robot.right_wheel, &self.robot.left_wheel);
-        #[expect(clippy::cast_precision_loss, reason = "counts stay below 2^53")]
-        let [right, left] = ticks.map(|count| count as f64);
-        [
-            right * f64::from(right_wheel.signed_travel().0),
-            left * f64::from(left_wheel.signed_travel().0),
-        ]
     }
 
     fn take_start(&mut self, begin: Begin, complain: &mut Complain) -> Result<(), Trouble> {

@@ -1,5 +1,16 @@
 //! Wheel travel between two readings of the encoders.
 
+use sonarfix_hal::config::RobotConfig;
+
+/// The travel of the right and of the left wheel at these counts, metres.
+#[must_use]
+pub fn of_counts(robot: &RobotConfig, counts: [f64; 2]) -> [f64; 2] {
+    let [right, left] = counts;
+    let wheels = [&robot.right_wheel, &robot.left_wheel];
+    let [per_right, per_left] = wheels.map(|wheel| f64::from(wheel.signed_travel().0));
+    [right * per_right, left * per_left]
+}
+
 /// A reading of the encoders.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Reading {

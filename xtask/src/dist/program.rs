@@ -7,9 +7,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context, ensure};
-use serde::Deserialize;
 
-use crate::cargo;
+use crate::cargo::{self, Dependency};
 
 /// Where the program is built and checked.
 const HOST: &str = "x86_64-unknown-linux-musl";
@@ -52,10 +51,8 @@ fn archive(target: &str, host: &Path, out: &Path) -> anyhow::Result<PathBuf> {
         fs::write(folder.join("completions").join(format!("sonarfix.{shell}")), text)?;
     }
     let mut pages = Command::new(host);
-    cargo::check({
-        pages.args(["man", "--out"]).arg(folder.join("man/man1"));
-        pages
-    })?;
+    pages.args(["man", "--out"]).arg(folder.join("man/man1"));
+    cargo::check(pages)?;
     fs::write(folder.join("LICENSES.txt"), licences(target)?)?;
     let packed = out.join(format!("{name}.tar.gz"));
     pack(out, &name, &packed)?;
@@ -72,9 +69,7 @@ fn build(target: &str, root: &Path) -> anyhow::Result<PathBuf> {
     let mut rustup = Command::new("rustup");
     rustup.args(["target", "add", target]);
     cargo::check(rustup)?;
-    let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
-    let home = home.or_else(|| Some(std::env::home_dir()?.join(".cargo")));
-    let home = home.context("there is neither CARGO_HOME nor a home")?;
+    let home = cargo::home()?;
     let remap = |from: &Path, to| format!("--remap-path-prefix={}={to}", from.display());
     let flags = [remap(root, "/sonarfix"), remap(&home, "/cargo")].join("\u{1f}");
     let folder = cargo::target_folder().join("static");
@@ -99,20 +94,6 @@ fn pack(parent: &Path, name: &str, packed: &Path) -> anyhow::Result<()> {
     cargo::check(tar)
 }
 
-#[derive(Debug, Deserialize)]
-struct Metadata {
-    packages: Vec<Dependency>,
-}
-
-#[derive(Debug, Deserialize)]
-struct Dependency {
-    name: String,
-    version: String,
-    license: Option<String>,
-    manifest_path: PathBuf,
-    source: Option<String>,
-}
-
 /// The licences of all that is linked: a list, and each text once.
 fn licences(target: &str) -> anyhow::Result<String> {
     let tree = format!(
@@ -121,9 +102,8 @@ fn licences(target: &str) -> anyhow::Result<String> {
     let tree = cargo::printed(cargo::command(&tree))?;
     let linked: Vec<_> =
         tree.lines().filter_map(|line| line.split_once(" v")).map(|(name, _)| name).collect();
-    let metadata = cargo::printed(cargo::command("metadata --locked --format-version 1"))?;
-    let mut packages = serde_json::from_str::<Metadata>(&metadata)?.packages;
-    packages.retain(|it| it.source.is_some() && linked.contains(&it.name.as_str()));
+    let mut packages = cargo::dependencies()?;
+    packages.retain(|it| linked.contains(&it.name.as_str()));
     packages.sort_by(|a, b| (&a.name, &a.version).cmp(&(&b.name, &b.version)));
     let mut list =
         "The program contains these libraries, under the licences behind them.\n\n".to_owned();
@@ -164,8 +144,7 @@ pub fn check(out: &Path) -> anyhow::Result<()> {
     let mut paper = Command::new("unshare");
     paper.args(["--map-root-user", "chroot"]).arg(&folder);
     paper.args(["/sonarfix", "paper", "--out", "/report"]);
-    let printed = cargo::printed(paper)?;
-    ensure!(printed.contains("Table 1"), "`sonarfix paper` printed no table: {printed}");
+    cargo::check(paper)?;
     ensure!(folder.join("report/report.html").is_file(), "`sonarfix paper` wrote no report");
     fs::remove_dir_all(folder.join("report"))?;
     let copy = cargo::target_folder().join("another folder");

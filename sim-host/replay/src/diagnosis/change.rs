@@ -8,6 +8,11 @@ use sonarfix_sim::trace::Pose;
 
 use crate::diagnosis::recording::Entry;
 use crate::log::Record;
+use crate::wheels;
+
+/// Deviations of a start that the search has found: metres, radians.
+const FOUND_POSITION: f64 = 0.1;
+const FOUND_HEADING: f64 = 0.1;
 
 /// A change; by default none. Factors multiply what the robot file, the map or the log states.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -104,16 +109,10 @@ impl Change {
 
     fn record(&self, record: &Record, robot: &RobotConfig) -> Record {
         match *record {
-            Record::Ticks { time, right, left } => {
-                let [right, left] = self.counts([right, left]);
-                let wheels = [&robot.right_wheel, &robot.left_wheel];
-                let [per_right, per_left] = wheels.map(|wheel| f64::from(wheel.signed_travel().0));
-                self.travel(time, right * per_right, left * per_left)
-            }
-            Record::Wheels { time, right, left } => {
-                let (right, left) = if self.is_swapped { (left, right) } else { (right, left) };
-                self.travel(time, right, left)
-            }
+            #[expect(clippy::cast_precision_loss, reason = "counts stay below 2^53")]
+            Record::Ticks { time, right, left } => self
+                .travel(time, wheels::of_counts(robot, self.ordered([right as f64, left as f64]))),
+            Record::Wheels { time, right, left } => self.travel(time, self.ordered([right, left])),
             Record::Range { time, bearing, range, ranger, .. } => Record::Range {
                 time: time - self.delay,
                 bearing: self.bearing * bearing + self.bearing_offset,
@@ -155,13 +154,11 @@ impl Change {
         }
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "counts stay below 2^53")]
-    fn counts(&self, [right, left]: [i64; 2]) -> [f64; 2] {
-        let [right, left] = if self.is_swapped { [left, right] } else { [right, left] };
-        [right as f64, left as f64]
+    fn ordered(&self, [right, left]: [f64; 2]) -> [f64; 2] {
+        if self.is_swapped { [left, right] } else { [right, left] }
     }
 
-    fn travel(&self, time: f64, right: f64, left: f64) -> Record {
+    fn travel(&self, time: f64, [right, left]: [f64; 2]) -> Record {
         let [by_right, by_left] = self.wheels;
         Record::Wheels { time, right: by_right * right, left: by_left * left }
     }
@@ -172,10 +169,6 @@ impl Change {
         self.start.map_or((Pose { heading, ..pose }, true), |start| (start, false))
     }
 }
-
-/// Deviations of a start that the search has found: metres, radians.
-const FOUND_POSITION: f64 = 0.1;
-const FOUND_HEADING: f64 = 0.1;
 
 #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
 fn single<T>(value: f64, of: impl Fn(f32) -> T) -> T {

@@ -48,10 +48,12 @@ pub struct Echo {
 pub struct Evidence {
     pub echoes: Vec<Echo>,
     /// Encoder records that a wheel cannot roll.
-    pub too_fast: u64,
-    /// Encoder records, and seconds of the replay.
-    pub ticks: u64,
+    too_fast: u64,
+    /// Encoder records that were replayed.
+    ticks: u64,
+    /// Of the ranger, metres.
     max_range: f64,
+    /// Whether the verdict is not `Lost`.
     is_sure: bool,
 }
 
@@ -108,47 +110,7 @@ impl Evidence {
         let are_many = compared.len() >= LEAST_COMPARED && 10 * compared.len() >= self.echoes.len();
         if are_many { share(&compared) } else { share(&self.echoes) }
     }
-}
 
-/// The share of some echoes that are explained; 1 without any.
-fn share(echoes: &[Echo]) -> f64 {
-    if echoes.is_empty() {
-        return 1.0;
-    }
-    let explained = echoes.iter().filter(|echo| echo.weight >= EXPLAINED).count();
-    #[expect(clippy::cast_precision_loss, reason = "counts of echoes")]
-    let share = explained as f64 / echoes.len() as f64;
-    share
-}
-
-impl Recorder for Evidence {
-    fn tick(&mut self, make: impl FnOnce() -> Tick) {
-        self.ticks += 1;
-        self.is_sure = make().estimate.verdict != Verdict::Lost;
-    }
-
-    fn fix(&mut self, make: impl FnOnce() -> FixRecord) {
-        let record = make();
-        if record.range.is_none() {
-            return;
-        }
-        let density = match (record.innovation, record.innovation_variance) {
-            (Some(innovation), Some(variance)) if variance < self.most_variance() => {
-                let variance = variance.max(LEAST_VARIANCE);
-                let exponent = -0.5 * innovation * innovation / variance;
-                exponent.exp() / (std::f64::consts::TAU * variance).sqrt()
-            }
-            _ => 0.0,
-        };
-        let weight = (FOREIGN + (1.0 - FOREIGN) * density * self.max_range).ln();
-        // A localizer that has lost the pose follows any range.
-        let weight = if self.is_sure { weight } else { weight.min(0.0) };
-        let is_compared = record.innovation.is_some();
-        self.echoes.push(Echo { time: record.time, weight, is_compared });
-    }
-}
-
-impl Evidence {
     /// The logarithm of the likelihood against that of another replay, for as many echoes as that one has.
     pub fn gain(&self, other: &Self) -> f64 {
         let missing = other.echoes.len().saturating_sub(self.echoes.len());
@@ -186,5 +148,43 @@ impl Evidence {
     /// Whether wheels are often faster than they can be.
     pub fn is_too_fast(&self) -> bool {
         20 * self.too_fast > self.ticks
+    }
+}
+
+/// The share of some echoes that are explained; 1 without any.
+fn share(echoes: &[Echo]) -> f64 {
+    if echoes.is_empty() {
+        return 1.0;
+    }
+    let explained = echoes.iter().filter(|echo| echo.weight >= EXPLAINED).count();
+    #[expect(clippy::cast_precision_loss, reason = "counts of echoes")]
+    let share = explained as f64 / echoes.len() as f64;
+    share
+}
+
+impl Recorder for Evidence {
+    fn tick(&mut self, make: impl FnOnce() -> Tick) {
+        self.ticks += 1;
+        self.is_sure = make().estimate.verdict != Verdict::Lost;
+    }
+
+    fn fix(&mut self, make: impl FnOnce() -> FixRecord) {
+        let record = make();
+        if record.range.is_none() {
+            return;
+        }
+        let density = match (record.innovation, record.innovation_variance) {
+            (Some(innovation), Some(variance)) if variance < self.most_variance() => {
+                let variance = variance.max(LEAST_VARIANCE);
+                let exponent = -0.5 * innovation * innovation / variance;
+                exponent.exp() / (std::f64::consts::TAU * variance).sqrt()
+            }
+            _ => 0.0,
+        };
+        let weight = (FOREIGN + (1.0 - FOREIGN) * density * self.max_range).ln();
+        // A localizer that has lost the pose follows any range.
+        let weight = if self.is_sure { weight } else { weight.min(0.0) };
+        let is_compared = record.innovation.is_some();
+        self.echoes.push(Echo { time: record.time, weight, is_compared });
     }
 }

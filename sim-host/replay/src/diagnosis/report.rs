@@ -230,15 +230,15 @@ fn line_at(time: f64, entries: &[Entry]) -> Option<u64> {
     entries.iter().find(|entry| entry.record.time() >= time).map(|entry| entry.line)
 }
 
-/// A stretch that nothing explains, of a log that is right before it.
-pub fn broken(broken: Broken, entries: &[Entry]) -> Finding {
-    let begin = entries.first().map_or(0.0, |entry| entry.record.time());
-    let until = broken.until.map_or_else(String::new, |until| format!(" until {until:.1} s"));
+/// A stretch that nothing explains, of a log that is right before it and begins at `begin`, seconds.
+pub fn broken(broken: Broken, begin: f64, entries: &[Entry]) -> Finding {
+    let from = begin + broken.from;
+    let until =
+        broken.until.map_or_else(String::new, |until| format!(", to {:.1} s", begin + until));
     let message = format!(
-        "the ranges fit for {:.1} s, and then not{until}: the robot was carried, or its wheels slipped",
-        broken.from
+        "the ranges fit until {from:.1} s, and not from then on{until}: the robot was carried, or its wheels slipped"
     );
-    let line = line_at(begin + broken.from, entries);
+    let line = line_at(from, entries);
     Finding { line, ..Finding::new("moved", message, MOVED.to_owned()) }
 }
 

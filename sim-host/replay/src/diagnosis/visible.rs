@@ -23,7 +23,6 @@ pub struct Visible<'a> {
     right: Wheel,
     left: Wheel,
     ranges: Ranges,
-    heading: Option<(u64, f64)>,
 }
 
 impl<'a> Visible<'a> {
@@ -32,14 +31,7 @@ impl<'a> Visible<'a> {
             let per_count = f64::from(wheel.travel_per_edge.0);
             Wheel::new(per_count, f64::from(robot.localizer.max_wheel_speed.0))
         });
-        Self {
-            robot,
-            clock: Clock::default(),
-            right,
-            left,
-            ranges: Ranges::default(),
-            heading: None,
-        }
+        Self { robot, clock: Clock::default(), right, left, ranges: Ranges::default() }
     }
 
     /// Takes the next record.
@@ -62,9 +54,8 @@ impl<'a> Visible<'a> {
                 let width = f64::from(self.robot.localizer.drive.track_width.0);
                 let heading = (self.right.signed - self.left.signed) / width;
                 self.clock.range(line, time);
-                self.ranges.add(line, time, bearing + heading, bearing, range, moved);
+                self.ranges.add(line, time, bearing + heading, range, moved);
             }
-            Record::Start { pose, .. } => self.heading = Some((line, pose.heading)),
             _ => {}
         }
     }
@@ -89,15 +80,6 @@ impl<'a> Visible<'a> {
         self.clock.findings(self.robot, &mut findings);
         self.right.findings("right", &mut findings);
         self.left.findings("left", &mut findings);
-        if let Some((line, heading)) = self.heading.filter(|(_, heading)| heading.abs() > 6.3) {
-            let right = heading.to_radians();
-            findings.push(Finding::at(
-                line,
-                "start_unit",
-                format!("the heading at the start is {heading} rad, more than a turn: it is probably in degrees"),
-                format!("write {right:.4}"),
-            ));
-        }
         let travelled = self.right.travelled + self.left.travelled;
         self.ranges.findings(self.robot, travelled, &mut findings);
         if travelled == 0.0 && self.clock.records > STANDING && self.ranges.spread() > 0.3 {

@@ -15,11 +15,8 @@ const NOISE: f64 = 0.12;
 pub struct Ranges {
     pings: u64,
     echoes: u64,
-    /// Echoes beyond 1.5 times the longest range would need the robot: the values are kept.
-    values: Median,
     least: Option<f64>,
     most: Option<f64>,
-    wide_bearings: u64,
     /// The run of one value, and how far the robot has driven since.
     run: Option<Run>,
     longest: Option<Run>,
@@ -60,17 +57,9 @@ impl Run {
 }
 
 impl Ranges {
-    pub fn add(
-        &mut self,
-        line: u64,
-        time: f64,
-        direction: f64,
-        bearing: f64,
-        range: Option<f64>,
-        moved: f64,
-    ) {
+    /// Takes a ping: its direction against that of the start, radians, and the travel of both wheels before it, metres.
+    pub fn add(&mut self, line: u64, time: f64, direction: f64, range: Option<f64>, moved: f64) {
         self.pings += 1;
-        self.wide_bearings += u64::from(bearing.abs() > 6.3);
         let Some(range) = range else {
             let silence = self.silence.get_or_insert(Run::begin(line, time, 0.0, direction, moved));
             silence.pings += 1;
@@ -88,7 +77,6 @@ impl Ranges {
             self.compared += 1;
         }
         self.echoes += 1;
-        self.values.add(range.max(0.0));
         self.least = Some(self.least.map_or(range, |least| least.min(range)));
         self.most = Some(self.most.map_or(range, |most| most.max(range)));
         match &mut self.run {
@@ -148,13 +136,6 @@ impl Ranges {
                     silence.pings, silence.from
                 ),
                 "the ranger or its cable failed there: check its supply".to_owned(),
-            ));
-        }
-        if 2 * self.wide_bearings > self.pings {
-            findings.push(Finding::new(
-                "bearing_unit",
-                "the bearings are more than a turn: they are probably in degrees".to_owned(),
-                "write the bearings in radians".to_owned(),
             ));
         }
         if let Some(run) = self.longest.filter(|run| run.is_stuck(max_range, travelled)) {

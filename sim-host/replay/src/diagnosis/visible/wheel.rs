@@ -101,9 +101,7 @@ impl Wheel {
             self.stopped = Some((standing.0, standing.1, time));
         }
     }
-}
 
-impl Wheel {
     pub fn findings(&self, side: &str, findings: &mut Vec<Finding>) {
         if let Some((line, from, to)) = self.stopped {
             findings.push(Finding::at(
