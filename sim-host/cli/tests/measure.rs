@@ -42,17 +42,16 @@ enum Defect {
 /// A robot that is measured: what it sends depends on the last command.
 struct Robot {
     defect: Defect,
-    rng: ChaCha8Rng,
-    /// Wheels that have been turned, and messages since the last command.
+    /// Wheels that have been turned, bearings that were asked for, and messages since the last command.
     wheels: usize,
+    bearings: u32,
     messages: u32,
     last: Order,
 }
 
 impl Robot {
     fn new(defect: Defect) -> Self {
-        let rng = ChaCha8Rng::seed_from_u64(1);
-        Self { defect, rng, wheels: 0, messages: 0, last: Order::Stop }
+        Self { defect, wheels: 0, bearings: 0, messages: 0, last: Order::Stop }
     }
 
     fn take(&mut self, order: &Order) -> CommandResult {
@@ -60,6 +59,7 @@ impl Robot {
             return CommandResult::Refused(CommandError::OutOfReach);
         }
         self.wheels += usize::from(*order == Order::ShowDevices);
+        self.bearings += u32::from(matches!(order, Order::Point(_)));
         (self.last, self.messages) = (*order, 0);
         CommandResult::Done
     }
@@ -100,20 +100,21 @@ impl Robot {
         }
     }
 
-    /// A ping at the bearing that was asked for.
-    fn ping(&mut self, at: Instant, bearing: f64) -> Sweep {
+    /// A ping at the bearing that was asked for. Its errors depend on its number at this bearing alone: how many pings are sent
+    /// before the next command depends on the speed of the machine.
+    fn ping(&self, at: Instant, bearing: f64) -> Sweep {
+        let mut rng = ChaCha8Rng::seed_from_u64(1_000 * u64::from(self.bearings));
+        rng.set_stream(self.messages.into());
         let truth = SERVO[0] + SERVO[1] * bearing;
         // The rim of the cone is blurred.
-        let blur = 6.0 * (self.rng.random::<f64>() + self.rng.random::<f64>() - 1.0);
+        let blur = 6.0 * (rng.random::<f64>() + rng.random::<f64>() - 1.0);
         let off = |perpendicular: f64| (truth - perpendicular).abs() + blur;
         let corner = WALLS[0].hypot(WALLS[1]);
         let reflectors = [(0.0, WALLS[0]), (90.0, WALLS[1]), (48.0, corner), (-70.0, 2.5)];
         let mut heard = reflectors.iter().filter(|(perpendicular, _)| off(*perpendicular) < CONE);
-        let is_heard = self.defect != Defect::Deaf && self.rng.random::<f64>() < 0.95;
-        let range = heard
-            .next()
-            .filter(|_| is_heard)
-            .map(|(_, range)| range + 0.01 * self.rng.random::<f64>());
+        let is_heard = self.defect != Defect::Deaf && rng.random::<f64>() < 0.95;
+        let range =
+            heard.next().filter(|_| is_heard).map(|(_, range)| range + 0.01 * rng.random::<f64>());
         #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
         let (bearing, range) = (bearing as f32, range.map(|range| range as f32));
         let echo = |range| Echo { sent: at, heard: at, range: Metres(range) };

@@ -52,8 +52,10 @@ const KEPT: usize = 24;
 /// Halvings of the step of a varied quantity, and the candidates that are refined.
 const REFINEMENTS: i32 = 4;
 const REFINED: usize = 6;
-/// Prefixes of the log in which the start is searched, seconds.
+/// Prefixes of the log in which the start is searched, seconds, until one explains the log.
 const SEARCHED: [f64; 3] = [40.0, 90.0, 200.0];
+/// The longest of them in a map of many walls: a search takes as long as seconds times walls.
+const MOST_WALL_SECONDS: f64 = 12_000.0;
 
 /// A diagnosis.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -236,15 +238,33 @@ impl<'a> Trial<'a> {
 
     /// Starts that the search finds in the first part of the log.
     fn starts(&self, as_is: &Evidence) -> Vec<Tried> {
-        let poses = SEARCHED.iter().flat_map(|seconds| self.found(self.begin(), *seconds));
-        poses.filter_map(|pose| self.try_one(causes::start_at(pose), as_is)).collect()
+        self.searched(self.begin(), as_is, causes::start_at)
     }
 
     /// Other poses from the moment on at which the ranges no longer fit.
     fn moves(&self, broken: Broken, as_is: &Evidence) -> Vec<Tried> {
         let time = self.begin() + broken.from;
-        let poses = SEARCHED.iter().flat_map(|seconds| self.found(time, *seconds));
-        poses.filter_map(|pose| self.try_one(causes::moved_to(time, pose), as_is)).collect()
+        self.searched(time, as_is, |pose| causes::moved_to(time, pose))
+    }
+
+    /// The candidates of the poses that the search finds from a time on.
+    fn searched(
+        &self,
+        from: f64,
+        as_is: &Evidence,
+        candidate: impl Fn(Pose) -> Candidate,
+    ) -> Vec<Tried> {
+        #[expect(clippy::cast_precision_loss, reason = "a number of walls")]
+        let longest = MOST_WALL_SECONDS / self.walls.len() as f64;
+        let mut tried = Vec::new();
+        for seconds in SEARCHED.into_iter().filter(|it| *it <= longest) {
+            let poses = self.found(from, seconds).into_iter();
+            tried.extend(poses.filter_map(|pose| self.try_one(candidate(pose), as_is)));
+            if tried.iter().any(|it| it.is_enough(as_is) && it.evidence.explained() >= RIGHT) {
+                break;
+            }
+        }
+        tried
     }
 
     /// The poses at a time that the search finds in the seconds after it.
