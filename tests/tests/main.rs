@@ -2,6 +2,7 @@
 
 mod absolute;
 mod baked;
+mod built;
 mod consistency;
 mod failed_ranger;
 mod gyro;

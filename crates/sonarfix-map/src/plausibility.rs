@@ -2,8 +2,9 @@
 //!
 //! A rule is a quantity, its usual interval, and causes. A value outside of the interval is explained by the first cause that
 //! leads to a usual one: another unit, a cause of the table, the sign, the decimal point. `values` has the rules for the
-//! numbers of a file, `room` those for its walls and its path. A line with the comment `# plausible` has no warnings.
+//! numbers of a file, `room` those for its walls and its path, `built` compares a robot file with the true robot of a scenario. A line with the comment `# plausible` has no warnings.
 
+mod built;
 mod facts;
 pub(crate) mod outline;
 mod room;
@@ -55,6 +56,7 @@ fn find(text: &str, name: &str, base: &Path) -> Option<Vec<Mistake>> {
             let scenario = Scenario::parse(text, name, base).ok()?;
             facts.duration = Some(scenario.path.duration());
             let mut warnings = of_facts(&facts);
+            warnings.extend(built::of_scenario(&facts, &scenario));
             warnings.extend(room::of_scenario(&facts, &scenario));
             warnings
         }

@@ -2,10 +2,10 @@
 //! table of keys.
 
 mod common_parts;
-mod drive;
+pub(crate) mod drive;
 mod echo;
 mod ranger;
-mod sonar;
+pub(crate) mod sonar;
 
 use std::collections::HashMap;
 use std::path::Path;

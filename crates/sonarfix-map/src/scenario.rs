@@ -154,7 +154,7 @@ impl Scenario {
         let drive = || Some(PATH.read_from(&path_table, Drive::default()));
         let drive = path_table.faultless(drive);
         let path = path_table::read(&path_table, drive, floor.as_ref(), robot.as_ref());
-        let (truth, upsets) = TRUTH.read(root.require("truth"), Default::default());
+        let (truth, upsets) = truth::read(root.require("truth"), robot.as_ref());
         let (sensor, servo) = (root.get("sensor"), root.get("servo"));
         let (sonar, name) = (SonarName::default(), ServoName::default());
         let scenario = Self {

@@ -137,6 +137,8 @@ fn start_truth_and_runs_are_those_of_the_paper() {
         range_noise: 0.0024,
         range_noise_per_metre: 0.0,
         cone: PI / 12.0,
+        mount: [None; 2],
+        servo_pulses: None,
         gyro: GyroTruth::default(),
     };
     assert_eq!(paper.truth, truth);

@@ -210,6 +210,55 @@ fn shipped_files_are_accepted() {
     assert!(count >= 8, "{count}");
 }
 
+/// The classroom with its robot as it is instead of scale errors.
+fn with_built_robot() -> String {
+    let built = "right_wheel = { travel_per_edge = \"0.4936 mm\" }\n\
+        left_wheel = { travel_per_edge = \"0.4838 mm\" }\n\
+        mount = [\"60 mm\", \"0 mm\"]\n\
+        servo_pulses = [{ width = \"500 us\", bearing = \"-100 deg\" }, { width = \"2500 us\", bearing = \"100 deg\" }]";
+    edited(CLASSROOM, "scale_right = \"1 %\"\nscale_left = \"-1 %\"", built)
+}
+
+#[test]
+fn a_robot_file_is_compared_with_the_true_robot() {
+    let base = with_built_robot();
+    assert_eq!(diagnosis(&base, "scenario.toml"), "");
+    let edits: &[Edit] = &[
+        (
+            "right_wheel = { travel_per_edge = \"0.4887 mm\" }",
+            "right_wheel = { travel_per_edge = \"0.6 mm\" }",
+            "\"0.6 mm\" is that of a wheel that rolls 1.22 times as far per edge as truth.right_wheel with \"0.4936 mm\"",
+        ),
+        (
+            "left_wheel = { travel_per_edge = \"0.4887 mm\" }",
+            "left_wheel = { travel_per_edge = \"0.4887 mm\", mirrored = true }",
+            "counts in the other direction than truth.left_wheel",
+        ),
+        ("mount = [\"60 mm\", \"0 mm\"]", "mount = [\"0 mm\", \"0 mm\"]", "6 cm from truth.mount"),
+        (
+            "servo_pulses = [{ width = \"500 us\", bearing = \"-100 deg\" }",
+            "servo_pulses = [{ width = \"500 us\", bearing = \"-75 deg\" }",
+            "up to 25° from those of truth.servo_pulses",
+        ),
+        ("right_wheel = { travel_per_edge = \"0.4936 mm\" }", "", "truth.scale_right: is missing"),
+        (
+            "range_scale = \"0 %\"",
+            "scale_left = 0\nrange_scale = \"0 %\"",
+            "contradicts scale_left",
+        ),
+    ];
+    assert_eq!(unnamed(&base, "scenario.toml", edits), Vec::<String>::new());
+    let fixed = edited(&base, "servo = [\"-100 deg\", \"100 deg\"]", "bearing = \"0 deg\"");
+    let fixed = fixed.replacen("servo_pulses", "# servo_pulses", 1).replacen(
+        "servo_timing",
+        "# servo_timing",
+        1,
+    );
+    assert!(
+        diagnosis(&fixed, "scenario.toml").contains("truth.servo_pulses: is of a sonar on a servo")
+    );
+}
+
 #[test]
 fn a_comment_accepts_a_line() {
     let text =

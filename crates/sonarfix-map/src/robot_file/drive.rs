@@ -46,7 +46,7 @@ pub(crate) struct Wheel {
 }
 
 /// A wheel: by its diameter and the edges per revolution of its encoder, or by its travel per edge.
-fn read_wheel(node: Node<'_>) -> WheelConfig {
+pub(crate) fn read_wheel(node: Node<'_>) -> WheelConfig {
     let table = node.table(&WHEEL.names());
     let Wheel { diameter, edges, travel, is_mirrored } = WHEEL.read_from(&table, Wheel::default());
     let wheel = if let Some(travel) = travel {

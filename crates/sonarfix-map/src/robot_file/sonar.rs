@@ -31,7 +31,7 @@ pub(crate) static SONAR: Section<Ranger> = Section { name: "sonar", usual: Range
     depends(Key::new("servo", Value::Pair(&ANGLE, ("-180 deg", "180 deg"), |r| [&mut r.sonar.servo.0.0, &mut r.sonar.servo.1.0]),
         "bearings that the servo may turn to: the rightmost, then the leftmost. Ahead is 0. A wall is measured only if the bearing perpendicular to it is within these limits, so a \
         robot that drives along walls needs a few degrees more than 90")),
-    depends(Key::new("servo_pulses", Value::Own("two tables of `width` and `bearing`", |node, r| read_pulses(&node, r), |r| Some(pulses_text(r))),
+    depends(Key::new("servo_pulses", Value::Own("two tables of `width` and `bearing`", |node, r| r.driver.servo_pulses = read_pulses(&node), |r| Some(pulses_text(r))),
         "two pulses and the measured bearing of the sonar at each. The farther apart, the more accurate. The pulses at both limits of `servo` must fit \
         into the frame and be supported by the [board](firmware.md#what-a-board-can-do)")),
     depends(Key::new("servo_timing", Value::Own("`\"instant\"`, `\"sg90\"`, `\"mg996r\"` or a table of times", read_timing, |r| Some(SERVO_TIMING.inline(&r.sonar.timing.servo))),
@@ -184,8 +184,8 @@ fn read_timing(node: Node<'_>, ranger: &mut Ranger) {
     }
 }
 
-fn read_pulses(node: &Node<'_>, ranger: &mut Ranger) {
-    ranger.driver.servo_pulses = node.pair().map(|node| PULSE.read(node, (PULSE.usual)()));
+pub(crate) fn read_pulses(node: &Node<'_>) -> [MeasuredPulse; 2] {
+    node.pair().map(|node| PULSE.read(node, (PULSE.usual)()))
 }
 
 fn pulses_text(ranger: &Ranger) -> String {

@@ -1,17 +1,23 @@
 //! The `[truth]` table of a scenario: the true parameters.
 
+use sonarfix_hal::config::{RobotConfig, WheelConfig};
+use sonarfix_hal::servo::MeasuredPulse;
+
 use super::upsets::{self, UPSET, Upset, Upsets};
-use crate::keys::{Key, Section, Value, number, optional};
+use crate::document::Node;
+use crate::keys::{Key, Section, Value, depends, number, optional};
 use crate::quantity::{
     ANGLE, FRACTION, LENGTH, LENGTH_PER_LENGTH, LENGTH_WALK, SCALE_WALK, TURN_RATE,
 };
+use crate::robot_file::drive::read_wheel;
+use crate::robot_file::sonar::read_pulses;
 
 /// The true parameters of the robot, which the filter does not receive.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Truth {
     /// Track width, metres.
     pub track_width: f64,
-    /// Scale error of the right wheel, dimensionless.
+    /// Scale error of the right wheel, dimensionless; −2 for an encoder that is mirrored otherwise than the robot file says.
     pub scale_right: f64,
     /// Scale error of the left wheel, dimensionless.
     pub scale_left: f64,
@@ -29,8 +35,38 @@ pub struct Truth {
     pub range_noise_per_metre: f64,
     /// Half of the sonar's cone, radians.
     pub cone: f64,
+    /// Where the first ranger is mounted, ahead and to the left, metres; `None` for where the robot file says.
+    pub mount: [Option<f64>; 2],
+    /// Two pulses of the first servo with the bearings of the ranger; `None` for those of the robot file.
+    pub servo_pulses: Option<[MeasuredPulse; 2]>,
     /// The gyro; without effect on a robot that has none.
     pub gyro: GyroTruth,
+}
+
+impl Truth {
+    /// The robot with the true mount and servo of its first ranger.
+    #[must_use]
+    pub fn robot(&self, robot: &RobotConfig) -> RobotConfig {
+        let mut built = *robot;
+        let mount = &mut built.localizer.rangers.first.mount;
+        for (assumed, built) in [&mut mount.x.0, &mut mount.y.0].into_iter().zip(self.mount) {
+            #[expect(clippy::cast_possible_truncation, reason = "as in the robot file")]
+            let built = built.map(|built| built as f32);
+            *assumed = built.unwrap_or(*assumed);
+        }
+        let pulses = &mut built.rangers.first.servo_pulses;
+        *pulses = self.servo_pulses.unwrap_or(*pulses);
+        built
+    }
+}
+
+/// The table as it is written: a wheel by its scale error, or as somebody has measured it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Stated {
+    truth: Truth,
+    upsets: Upsets,
+    right_wheel: Option<WheelConfig>,
+    left_wheel: Option<WheelConfig>,
 }
 
 /// The true parameters of a gyro.
@@ -43,29 +79,67 @@ pub struct GyroTruth {
 }
 
 #[rustfmt::skip]
-pub(crate) static TRUTH: Section<(Truth, Upsets)> = Section { name: "truth", usual: <(Truth, Upsets)>::default, keys: &[
-    number("track_width", &LENGTH, ("1 cm", "10 m"), |t| &mut t.0.track_width, "true track width"),
-    number("scale_right", &FRACTION, ("-99 %", "1000 %"), |t| &mut t.0.scale_right,
-        "scale error of the right wheel, a fraction. It rolls 1 + this times the encoder reading"),
-    number("scale_left", &FRACTION, ("-99 %", "1000 %"), |t| &mut t.0.scale_left, "scale error of the left wheel"),
-    number("range_scale", &FRACTION, ("-99 %", "1000 %"), |t| &mut t.0.range_scale,
+pub(crate) static TRUTH: Section<Stated> = Section { name: "truth", usual: Stated::default, keys: &[
+    number("track_width", &LENGTH, ("1 cm", "10 m"), |t| &mut t.truth.track_width, "true track width"),
+    depends(number("scale_right", &FRACTION, ("-99 %", "1000 %"), |t| &mut t.truth.scale_right,
+        "scale error of the right wheel, a fraction. It rolls 1 + this times the encoder reading")),
+    depends(number("scale_left", &FRACTION, ("-99 %", "1000 %"), |t| &mut t.truth.scale_left, "scale error of the left wheel")),
+    depends(Key::new("right_wheel", Value::Own("a table as in `[drive]`", |node, t| t.right_wheel = Some(read_wheel(node)), |_| None),
+        "instead of `scale_right`: the right wheel and its encoder as they are")),
+    depends(Key::new("left_wheel", Value::Own("a table as in `[drive]`", |node, t| t.left_wheel = Some(read_wheel(node)), |_| None),
+        "instead of `scale_left`: the left wheel and its encoder as they are")),
+    optional(Key::new("mount", Value::Pair(&LENGTH, ("-10 m", "10 m"), |t| { let [x, y] = &mut t.truth.mount; [x, y] }),
+        "where the first sonar is, otherwise where the robot file says")),
+    optional(Key::new("servo_pulses", Value::Own("two tables of `width` and `bearing`", |node, t| t.truth.servo_pulses = Some(read_pulses(&node)), |_| None),
+        "two pulses of the first servo and the true bearing of the sonar at each, otherwise those of the robot file")),
+    number("range_scale", &FRACTION, ("-99 %", "1000 %"), |t| &mut t.truth.range_scale,
         "scale error of the ranger, a fraction. It reports 1 + this times the distance"),
-    number("wheel_noise", &LENGTH_WALK, ("0 m/sqrt(m)", "1 m/sqrt(m)"), |t| &mut t.0.wheel_noise, "true value of the key of `[drive]`"),
-    number("scale_walk", &SCALE_WALK, ("0 /sqrt(m)", "1 /sqrt(m)"), |t| &mut t.0.scale_walk, "the same"),
-    number("track_width_walk", &LENGTH_WALK, ("0 m/sqrt(m)", "1 m/sqrt(m)"), |t| &mut t.0.track_width_walk, "the same"),
-    number("range_noise", &LENGTH, ("0 m", "10 m"), |t| &mut t.0.range_noise, "true value of `noise` of `[sonar]`"),
-    number("range_noise_per_metre", &LENGTH_PER_LENGTH, ("0 m/m", "1 m/m"), |t| &mut t.0.range_noise_per_metre, "true value of `noise_per_metre`"),
-    number("cone", &ANGLE, ("0.1 deg", "89 deg"), |t| &mut t.0.cone, "half of the cone in which the sonar receives echoes"),
-    optional(Key::new("slip", Value::Own("a table of `every` and `by`", |node, t| t.1.slip = UPSET.read(node, Upset::default()), |_| None),
+    number("wheel_noise", &LENGTH_WALK, ("0 m/sqrt(m)", "1 m/sqrt(m)"), |t| &mut t.truth.wheel_noise, "true value of the key of `[drive]`"),
+    number("scale_walk", &SCALE_WALK, ("0 /sqrt(m)", "1 /sqrt(m)"), |t| &mut t.truth.scale_walk, "the same"),
+    number("track_width_walk", &LENGTH_WALK, ("0 m/sqrt(m)", "1 m/sqrt(m)"), |t| &mut t.truth.track_width_walk, "the same"),
+    number("range_noise", &LENGTH, ("0 m", "10 m"), |t| &mut t.truth.range_noise, "true value of `noise` of `[sonar]`"),
+    number("range_noise_per_metre", &LENGTH_PER_LENGTH, ("0 m/m", "1 m/m"), |t| &mut t.truth.range_noise_per_metre, "true value of `noise_per_metre`"),
+    number("cone", &ANGLE, ("0.1 deg", "89 deg"), |t| &mut t.truth.cone, "half of the cone in which the sonar receives echoes"),
+    optional(Key::new("slip", Value::Own("a table of `every` and `by`", |node, t| t.upsets.slip = UPSET.read(node, Upset::default()), |_| None),
         "random slips: a wheel turns by `by` without rolling")),
-    optional(Key::new("bump", Value::Own("a table of `every` and `by`", |node, t| t.1.bump = UPSET.read(node, Upset::default()), |_| None),
+    optional(Key::new("bump", Value::Own("a table of `every` and `by`", |node, t| t.upsets.bump = UPSET.read(node, Upset::default()), |_| None),
         "random bumps that change the travel of a wheel by a normally distributed amount, whose standard deviation is `by`")),
-    optional(Key::new("heading_slip", Value::Own("a table of `every`, `least` and `most`", |node, t| upsets::read_heading_slip(node, &mut t.1.heading_slip), |_| None),
+    optional(Key::new("heading_slip", Value::Own("a table of `every`, `least` and `most`", |node, t| upsets::read_heading_slip(node, &mut t.upsets.heading_slip), |_| None),
         "slips of one of the wheels while the robot drives. The wheel spins for 0.5 s, so that the odometry turns by `least` to `most` and the robot does \
         not")),
-    optional(Key::new("gyro", Value::Own("a table of `bias` and `scale`", |node, t| t.0.gyro = GYRO.read(node, GyroTruth::default()), |_| None),
+    optional(Key::new("gyro", Value::Own("a table of `bias` and `scale`", |node, t| t.truth.gyro = GYRO.read(node, GyroTruth::default()), |_| None),
         "errors of the gyro")),
 ] };
+
+/// Reads the table of a scenario with this robot.
+pub(crate) fn read(node: Node<'_>, robot: Option<&RobotConfig>) -> (Truth, Upsets) {
+    let table = node.table(&TRUTH.names());
+    let Stated { mut truth, upsets, right_wheel, left_wheel } =
+        TRUTH.read_from(&table, Stated::default());
+    let wheels = [
+        (&mut truth.scale_right, ["scale_right", "right_wheel"], right_wheel),
+        (&mut truth.scale_left, ["scale_left", "left_wheel"], left_wheel),
+    ];
+    let assumed = robot.map_or([None; 2], |robot| [robot.right_wheel, robot.left_wheel].map(Some));
+    for ((scale, [by_scale, by_wheel], wheel), assumed) in wheels.into_iter().zip(assumed) {
+        match (table.get(by_scale), table.get(by_wheel)) {
+            (None, None) => drop(table.require(by_scale)),
+            (Some(_), Some(node)) => {
+                node.report(format!("contradicts {by_scale}: remove one of them"));
+            }
+            _ => {}
+        }
+        if let (Some(wheel), Some(assumed)) = (wheel, assumed) {
+            let [wheel, assumed] = [wheel, assumed].map(|it| f64::from(it.signed_travel().0));
+            *scale = wheel / assumed - 1.0;
+        }
+    }
+    let is_fixed = |robot: &RobotConfig| robot.localizer.rangers.first.fixed_bearing().is_some();
+    if let Some(node) = table.get("servo_pulses").filter(|_| robot.is_some_and(is_fixed)) {
+        node.report("is of a sonar on a servo, and that of the robot file has none");
+    }
+    (truth, upsets)
+}
 
 #[rustfmt::skip]
 pub(crate) static GYRO: Section<GyroTruth> = Section { name: "gyro_truth", usual: GyroTruth::default, keys: &[

@@ -1,5 +1,7 @@
 //! The files of a new robot.
 
+use std::f64::consts::PI;
+
 use sonarfix_map::{Scenario, with_comments};
 
 use super::answers::Answers;
@@ -10,8 +12,9 @@ const MAP: &str = include_str!("../../templates/map.toml");
 const SCENARIO: &str = include_str!("../../templates/scenario.toml");
 const README: &str = include_str!("../../templates/README.md");
 
-/// The simulated track width, as a multiple of the configured one.
+/// The simulated track width and diameters of the right and the left wheel, as multiples of the configured ones.
 const TRUE_TRACK_WIDTH: f64 = 1.02;
+const TRUE_DIAMETERS: [f64; 2] = [1.01, 0.99];
 
 /// Name and text of each file.
 ///
@@ -26,10 +29,15 @@ pub fn all(answers: &Answers) -> anyhow::Result<[(&'static str, String); 4]> {
     };
     let robot = with_comments(&filled(ROBOT));
     // The simulated wheels differ from the configured ones.
-    let track_width =
-        sonarfix_map::robot_file::parse(&robot, "robot.toml")?.localizer.drive.track_width;
-    let true_width = TRUE_TRACK_WIDTH * f64::from(track_width.0);
-    let scenario = filled(SCENARIO).replace("@true_track_width@", &format!("{true_width:.5}"));
+    let configured = sonarfix_map::robot_file::parse(&robot, "robot.toml")?;
+    let width = TRUE_TRACK_WIDTH * f64::from(configured.localizer.drive.track_width.0);
+    let circumference =
+        answers.ticks_per_revolution * f64::from(configured.right_wheel.travel_per_edge.0);
+    let [right, left] = TRUE_DIAMETERS.map(|factor| factor * circumference / PI);
+    let built = [("true_track_width", width), ("true_right", right), ("true_left", left)];
+    let scenario = built.into_iter().fold(filled(SCENARIO), |text, (key, metres)| {
+        text.replace(&format!("@{key}@"), &format!("{:.2}", 1e3 * metres))
+    });
     Ok([
         ("robot.toml", robot),
         ("map.toml", MAP.to_owned()),

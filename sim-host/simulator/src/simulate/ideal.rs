@@ -1,6 +1,7 @@
 //! A run that passes travel and ranges directly and on time to the localizer.
 
 use sonarfix::aim::Aim;
+use sonarfix::config::RangerId;
 use sonarfix::filter::motion::WheelTravel;
 use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
 use sonarfix::sensor::gyro::MeasuredTurn;
@@ -12,6 +13,7 @@ use super::simulation::Simulation;
 use super::streams::RandomStreams;
 use crate::angle;
 use crate::observe::{self, Measurement};
+use crate::pins::devices;
 use crate::plant::absolute::Absolute;
 use crate::plant::follower::Follower;
 use crate::plant::gyro::Gyro;
@@ -178,10 +180,19 @@ impl<T: LocalizerInputs> Run<'_, T> {
         let ping = Ping {
             time: self.time(),
             sonar_after: &|_| from,
-            direction: angle::wrap(heading + f64::from(aim.bearing.0)),
+            direction: angle::wrap(heading + self.bearing(aim)),
         };
         let RandomStreams { ranges, echoes, .. } = &mut self.streams;
         self.simulation.world.echo(&ping, &self.sensor, ranges, echoes)
+    }
+
+    /// The true bearing of a ping.
+    fn bearing(&self, aim: &Aim) -> f64 {
+        let Simulation { scenario, .. } = self.simulation;
+        let commanded = f64::from(aim.bearing.0);
+        let of_servo = scenario.truth.servo_pulses.filter(|_| aim.ranger == RangerId::FIRST);
+        let driver = scenario.robot.rangers.first.servo_pulses;
+        of_servo.map_or(commanded, |servo| devices::bearing_with(commanded, driver, servo))
     }
 
     fn end_tick(&mut self, recorder: &mut impl Recorder) -> Result<(), SimulationError> {

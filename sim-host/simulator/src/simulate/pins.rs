@@ -112,7 +112,7 @@ impl<'a> SimulatedHardware<'a> {
             streams,
             plant,
             discs: [EncoderDisc::new(right, right_tick), EncoderDisc::new(left, left_tick)],
-            sonars: SonarDevice::all(&scenario.robot, scenario.hardware.servo),
+            sonars: SonarDevice::all(&simulation.built, scenario.hardware.servo),
             faults: Faults::new(&scenario.faults, seed),
             follower: simulation.follower(),
             score,

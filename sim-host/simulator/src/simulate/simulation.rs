@@ -53,6 +53,8 @@ pub struct Simulation {
     pub(super) put_down: Vec<PutDown>,
     /// The robot file of the robot's software, if it is not that of the true robot.
     assumed: Option<RobotConfig>,
+    /// The robot of the scenario with the true mount and servo.
+    pub(super) built: RobotConfig,
 }
 
 /// A robot that is carried along its path.
@@ -115,6 +117,7 @@ impl Simulation {
             slipped: None,
             put_down: Vec::new(),
             assumed: None,
+            built: scenario.truth.robot(&scenario.robot),
             scenario,
         }
     }
@@ -323,9 +326,11 @@ impl Simulation {
     /// Position of a ranger on a robot at a pose.
     #[must_use]
     pub fn ranger_at(&self, ranger: RangerId, pose: &trace::Pose) -> Point {
-        let mount = self.model_of(ranger).mount;
+        let rangers = &self.built.localizer.rangers;
+        let mount = rangers.get(ranger).unwrap_or(&rangers.first).mount;
+        let [ahead, aside] = [mount.x.0, mount.y.0].map(f64::from);
         let (sin, cos) = libm::sincos(pose.heading);
-        [pose.x + cos * mount[0] - sin * mount[1], pose.y + sin * mount[0] + cos * mount[1]]
+        [pose.x + cos * ahead - sin * aside, pose.y + sin * ahead + cos * aside]
     }
 }
 
