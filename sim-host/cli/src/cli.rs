@@ -3,8 +3,8 @@
 use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::{
-    bound, calibrate, check, command, config, convert, export, find, init, map, measure, merge,
-    monitor, paper, pil, plan, replay, run, shell, survey, sweep,
+    bound, calibrate, check, command, config, convert, doctor, export, find, init, map, measure,
+    merge, monitor, paper, pil, plan, replay, run, shell, survey, sweep,
 };
 
 /// Simulates, measures, replays and operates the Sonarfix localizer for small wheeled robots.
@@ -56,6 +56,8 @@ enum Command {
     Bound(bound::Args),
     /// Forecasts the localization accuracy along a path, before a robot is built.
     Plan(plan::Args),
+    /// Lists the programs and serial ports of this computer that a robot needs, and what to do about the missing ones.
+    Doctor(doctor::Args),
     /// Prints the completions of this command for a shell.
     Completions(shell::CompletionsArgs),
     /// Writes the manual pages of this command into a folder.
@@ -89,6 +91,7 @@ impl Cli {
             Command::Map(args) => map::execute(&args),
             Command::Bound(args) => bound::execute(&args),
             Command::Plan(args) => plan::execute(&args),
+            Command::Doctor(args) => doctor::execute(&args),
             Command::Completions(args) => shell::completions(&args, Self::command()),
             Command::Man(args) => shell::man(&args, Self::command()),
         }

@@ -11,6 +11,7 @@ mod command;
 mod config;
 mod convert;
 mod convert_rosbag;
+mod doctor;
 mod export;
 mod find;
 mod init;

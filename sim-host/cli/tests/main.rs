@@ -6,6 +6,7 @@ mod command;
 mod common;
 mod convert;
 mod diagnosis;
+mod doctor;
 mod endings;
 mod export;
 mod find;

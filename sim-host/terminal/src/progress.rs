@@ -3,18 +3,25 @@
 use std::process::ExitCode;
 use std::sync::Once;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use sonarfix_sim::progress::Progress;
 
 /// Exit code after Ctrl-C, as of a shell: 128 + the number of SIGINT.
 const INTERRUPTED: u8 = 130;
+/// How long runs that have begun may take after Ctrl-C: with the end of the program less than a second.
+const LAST_RUNS: Duration = Duration::from_millis(800);
 
 static IS_INTERRUPTED: AtomicBool = AtomicBool::new(false);
+/// Whether there are [`Runs`] that have not ended.
+static IS_RUNNING: AtomicBool = AtomicBool::new(false);
 static HANDLER: Once = Once::new();
 
-/// A bar that counts runs. Where standard error is not a terminal there is none. After Ctrl-C no further run begins; a second
-/// Ctrl-C ends the command at once.
+/// A bar that counts runs. Where standard error is not a terminal there is none. After Ctrl-C no further run begins, and the
+/// results are those of the finished ones. Runs that take longer than a second are not waited for: then there are no results,
+/// because those of the shorter runs alone would be biased.
 #[derive(Debug)]
 pub struct Runs {
     bar: ProgressBar,
@@ -33,6 +40,7 @@ impl Runs {
     #[must_use]
     pub fn weighted(runs: u32, weight: u64) -> Self {
         catch_interrupt();
+        IS_RUNNING.store(true, Ordering::Relaxed);
         // indicatif hides the bar by itself where standard error is not a terminal.
         let bar = ProgressBar::with_draw_target(Some(runs.into()), ProgressDrawTarget::stderr());
         let bar = match ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {eta} left") {
@@ -47,6 +55,7 @@ impl Runs {
     /// # Errors
     /// If it was interrupted before the first run was finished.
     pub fn end(self) -> anyhow::Result<()> {
+        IS_RUNNING.store(false, Ordering::Relaxed);
         let (finished, all) = (self.bar.position(), self.bar.length().unwrap_or(0));
         self.bar.finish_and_clear();
         if is_interrupted() {
@@ -67,7 +76,7 @@ impl Progress for Runs {
     }
 }
 
-/// From now on the first Ctrl-C only sets [`is_interrupted`], and a second one ends the command at once.
+/// From now on the first Ctrl-C sets [`is_interrupted`], and a second one ends the command at once.
 pub fn catch_interrupt() {
     // Without a handler Ctrl-C ends the command at once.
     HANDLER.call_once(|| drop(ctrlc::set_handler(interrupt)));
@@ -83,6 +92,16 @@ fn interrupt() {
     if IS_INTERRUPTED.swap(true, Ordering::Relaxed) {
         std::process::exit(INTERRUPTED.into());
     }
+    thread::spawn(|| {
+        thread::sleep(LAST_RUNS);
+        if IS_RUNNING.load(Ordering::Relaxed) {
+            eprintln!(
+                "interrupted: a run takes longer than a second, so that there are no results; `run --rows FILE` keeps each \
+                 run that has ended"
+            );
+            std::process::exit(INTERRUPTED.into());
+        }
+    });
 }
 
 /// The exit code of a command that has succeeded, perhaps with fewer runs than requested.
