@@ -7,18 +7,20 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail, ensure};
 use sonarfix_exchange::maps::geojson::Anchor;
 use sonarfix_exchange::maps::{
-    Frame, Imported, MAX_JSON_BYTES, MAX_TEXT_BYTES, dxf, geojson, grid, svg,
+    Frame, Imported, MAX_JSON_BYTES, MAX_TEXT_BYTES, dxf, geojson, grid, plan, scan, svg,
 };
 use sonarfix_map::Floor;
+use sonarfix_terminal::output::check_file;
 
 #[derive(Debug, clap::Args)]
 pub struct Import {
-    /// A grid of ROS's `map_server` (.yaml), a drawing (.dxf, .svg) or `GeoJSON` (.geojson, .json).
+    /// A grid of ROS's `map_server` (.yaml), a drawing (.dxf, .svg), `GeoJSON` (.geojson, .json) or a scanned plan (.png, .pgm).
     file: PathBuf,
     /// The map to write: .csv, or else TOML.
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
-    /// The length of one unit of the drawing: m, cm, mm, in, ft, or metres as a number. By default that of the file.
+    /// The length of one unit of the drawing, or of a pixel of a scanned plan: m, cm, mm, in, ft, or metres as a number. By default
+    /// that of the file.
     #[arg(long, value_parser = unit)]
     unit: Option<f64>,
     /// The place of the drawing's origin in the map, metres.
@@ -30,9 +32,26 @@ pub struct Import {
     /// Reads only this layer of a DXF; may be repeated.
     #[arg(long, value_name = "NAME")]
     layer: Vec<String>,
-    /// The shortest wall that is read from a grid, metres.
-    #[arg(long, value_name = "M", default_value_t = 0.1)]
-    shortest: f64,
+    /// The shortest wall that is read from a grid or an image, metres: by default 0.1, of a plan 0.25.
+    #[arg(long, value_name = "M")]
+    shortest: Option<f64>,
+    /// The drawing is a floor plan: double lines, thick lines and copies become one wall each; text and furniture are left out.
+    /// Always so for a .png or .pgm.
+    #[arg(long)]
+    plan: bool,
+    /// Draws what was found in a plan, before and after.
+    #[arg(long, value_name = "FILE.svg")]
+    picture: Option<PathBuf>,
+}
+
+impl Import {
+    fn is_image(&self) -> bool {
+        matches!(ending(&self.file).as_str(), "png" | "pgm")
+    }
+
+    fn is_plan(&self) -> bool {
+        self.plan || self.is_image()
+    }
 }
 
 #[derive(Debug, clap::Args)]
@@ -84,7 +103,24 @@ fn ending(file: &Path) -> String {
 }
 
 pub fn import(args: &Import) -> anyhow::Result<()> {
-    let imported = read(args).with_context(|| args.file.display().to_string())?;
+    ensure!(args.picture.is_none() || args.is_plan(), "--picture shows a floor plan: add --plan");
+    if let Some(picture) = &args.picture {
+        check_file("--picture", picture)?;
+    }
+    let mut imported = read(args).with_context(|| args.file.display().to_string())?;
+    let lines = plan::lines(&imported);
+    if args.is_plan() {
+        let found = plan::walls(lines, imported.resolution)?;
+        if let Some(picture) = &args.picture {
+            sonarfix_files::write(picture, found.picture())?;
+        }
+        imported.floor = found.floor().with_context(|| args.file.display().to_string())?;
+        imported.notes.extend(found.notes);
+    } else if let Some(walls) = plan::fewer(lines, imported.resolution) {
+        imported.notes.push(format!(
+            "hint: as a floor plan (--plan) it has {walls} walls, because of double lines, copies or furniture"
+        ));
+    }
     for note in &imported.notes {
         println!("{note}");
     }
@@ -111,20 +147,24 @@ pub fn import(args: &Import) -> anyhow::Result<()> {
 
 fn read(args: &Import) -> anyhow::Result<Imported> {
     let frame = Frame { unit: args.unit, origin: args.origin };
-    let is_length = args.shortest.is_finite() && args.shortest >= 0.0;
+    let shortest = args.shortest.unwrap_or(if args.is_plan() { 0.25 } else { 0.1 });
+    let is_length = shortest.is_finite() && shortest >= 0.0;
     ensure!(is_length, "--shortest must be zero or positive");
     let ending = ending(&args.file);
     let is_json = matches!(ending.as_str(), "geojson" | "json");
     ensure!(args.anchor.is_none() || is_json, "--anchor is for GeoJSON");
     ensure!(args.layer.is_empty() || ending == "dxf", "--layer is for DXF");
     match ending.as_str() {
-        "yaml" | "yml" => grid::read(&args.file, &frame, args.shortest),
+        "yaml" | "yml" if !args.plan => grid::read(&args.file, &frame, shortest),
+        "yaml" | "yml" | "png" | "pgm" => scan::read(&args.file, &frame, shortest),
         "dxf" => dxf::read(BufReader::new(File::open(&args.file)?), &frame, &args.layer),
         "svg" => svg::read(&text(&args.file, MAX_TEXT_BYTES)?, &frame),
         _ if is_json => {
             geojson::read(&text(&args.file, MAX_JSON_BYTES)?, &frame, anchor(args.anchor)?)
         }
-        other => bail!("unknown ending `{other}`: expected yaml, dxf, svg, geojson or json"),
+        other => {
+            bail!("unknown ending `{other}`: expected yaml, png, pgm, dxf, svg, geojson or json")
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! `sonarfix doctor` on computers with and without programs.
 
 #![cfg(unix)]
-#![expect(clippy::unwrap_used, reason = "a test should stop")]
+#![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "a test should stop")]
 
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;

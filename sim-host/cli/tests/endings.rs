@@ -282,7 +282,7 @@ fn a_long_line_is_not_echoed() {
 }
 
 /// The options that name a result, each in a command that would otherwise end with another error, or work for hours.
-const WRITING: [(&[&str], &str); 33] = [
+const WRITING: [(&[&str], &str); 34] = [
     (&["man"], "--out"),
     (&["measure", "--port", "missing"], "--out"),
     (&["paper", "--runs", "4000000"], "--out"),
@@ -309,6 +309,7 @@ const WRITING: [(&[&str], &str); 33] = [
     (&["map", "draw", "missing.toml"], "--out"),
     (&["map", "simplify", "missing.toml"], "--out"),
     (&["map", "import", "missing.svg"], "--out"),
+    (&["map", "import", "missing.svg", "--plan", "--out", "map.toml"], "--picture"),
     (&["map", "export", "missing.toml"], "--out"),
     (&["config", "bake", "missing.toml"], "--out"),
     (&["convert", "carmen", "missing.log"], "--out"),

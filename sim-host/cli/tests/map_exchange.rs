@@ -296,3 +296,132 @@ fn hostile_files_are_refused_with_a_reason() {
         assert!(error.contains(expected), "{error}");
     }
 }
+
+/// The middles of the walls of a flat of two rooms and a corridor, with two doors, metres.
+const FLAT: [[[f64; 2]; 2]; 8] = [
+    [[1.0, 1.0], [9.0, 1.0]],
+    [[9.0, 1.0], [9.0, 7.0]],
+    [[9.0, 7.0], [1.0, 7.0]],
+    [[1.0, 7.0], [1.0, 1.0]],
+    [[5.0, 1.0], [5.0, 3.0]],
+    [[5.0, 3.9], [5.0, 7.0]],
+    [[5.0, 4.5], [6.5, 4.5]],
+    [[7.4, 4.5], [9.0, 4.5]],
+];
+/// A bed and a table.
+const FURNITURE: [[[f64; 2]; 2]; 2] = [[[1.5, 5.0], [3.4, 6.2]], [[6.5, 2.0], [7.7, 2.8]]];
+/// The thickness of its walls, metres.
+const WALL: f64 = 0.16;
+
+fn to_segment([x, y]: [f64; 2], [[x1, y1], [x2, y2]]: [[f64; 2]; 2]) -> f64 {
+    let (dx, dy) = (x2 - x1, y2 - y1);
+    let part = (((x - x1) * dx + (y - y1) * dy) / (dx * dx + dy * dy)).clamp(0.0, 1.0);
+    (x - x1 - part * dx).hypot(y - y1 - part * dy)
+}
+
+fn nearest(point: [f64; 2], segments: impl Iterator<Item = [[f64; 2]; 2]>) -> f64 {
+    segments.map(|segment| to_segment(point, segment)).fold(f64::INFINITY, f64::min)
+}
+
+/// The sides of a rectangle.
+fn sides([[x1, y1], [x2, y2]]: [[f64; 2]; 2]) -> [[[f64; 2]; 2]; 4] {
+    let [a, b, c, d] = [[x1, y1], [x2, y1], [x2, y2], [x1, y2]];
+    [[a, b], [b, c], [c, d], [d, a]]
+}
+
+/// A scan of the flat, 2 cm a pixel, turned by a degree, whose paper is grey and dirty. `is_wall` draws the walls by the distance
+/// from their middles.
+fn scanned(is_wall: impl Fn(f64) -> bool) -> Vec<u8> {
+    const SIZE: [u32; 2] = [520, 420];
+    let mut bytes = format!("P5\n{} {}\n255\n", SIZE[0], SIZE[1]).into_bytes();
+    let (sin, cos) = 1_f64.to_radians().sin_cos();
+    let pixels = (0..SIZE[1]).flat_map(|row| (0..SIZE[0]).map(move |column| (column, row)));
+    for (column, row) in pixels {
+        let [x, y] = [0.02 * (f64::from(column) + 0.5), 0.02 * (f64::from(SIZE[1] - row) - 0.5)];
+        let point = [x * cos + y * sin, y * cos - x * sin];
+        let furniture = nearest(point, FURNITURE.into_iter().flat_map(sides));
+        let is_ink = is_wall(nearest(point, FLAT.into_iter())) || furniture < 0.012;
+        // Dirt: every 997th pixel.
+        let is_dirt = (row * SIZE[0] + column).is_multiple_of(997);
+        let noise = (column * 7 + row * 13) % 11;
+        let grey = 215 + noise - if is_ink || is_dirt { 180 } else { 0 };
+        bytes.push(u8::try_from(grey).unwrap());
+    }
+    bytes
+}
+
+/// Asserts that the walls are those of the flat turned by an angle: at most two more or fewer, within 3 cm.
+fn assert_flat(floor: &Floor, degrees: f64, name: &str) {
+    let walls = FLAT.iter().map(|[from, to]| NamedWall::new("wall".into(), *from, *to).unwrap());
+    let flat = rotated(&Floor::new(walls.collect()), degrees);
+    let found = || floor.named_walls().iter().map(|wall| [wall.from(), wall.to()]);
+    assert!(floor.named_walls().len().abs_diff(FLAT.len()) <= 2, "{name}: {floor:?}");
+    for wall in flat.named_walls() {
+        for part in [0.1, 0.3, 0.5, 0.7, 0.9] {
+            let ([x1, y1], [x2, y2]) = (wall.from(), wall.to());
+            let point = [x1 + part * (x2 - x1), y1 + part * (y2 - y1)];
+            let off = nearest(point, found());
+            assert!(off <= 0.03, "{name}: {wall:?} is {off} m off at {part}: {floor:?}");
+        }
+    }
+}
+
+#[test]
+fn a_scanned_plan_has_one_wall_for_each_wall() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let half = 0.5 * WALL;
+    let kinds = [
+        ("thick", scanned(|off| off < half)),
+        ("double", scanned(|off| (off - half).abs() < 0.016)),
+        ("single", scanned(|off| off < 0.016)),
+    ];
+    for (name, image) in kinds {
+        fs::write(dir.join("scan.pgm"), image).unwrap();
+        let import = ["import", "scan.pgm", "--out", "map.toml", "--picture", "plan.svg"];
+        let printed = map(dir, &[&import[..], &["--unit", "0.02"]].concat()).unwrap();
+        assert!(printed.contains("plan: "), "{name}: {printed}");
+        assert_flat(&Floor::read(&dir.join("map.toml")).unwrap(), 1.0, name);
+        assert!(fs::read_to_string(dir.join("plan.svg")).unwrap().contains("walls; red"));
+    }
+    let error = map(dir, &["import", "scan.pgm", "--out", "map.toml"]).unwrap_err();
+    assert!(error.contains("--unit: the length of a pixel is unknown"), "{error}");
+}
+
+#[test]
+fn a_drawn_plan_with_double_lines_and_copies_has_one_wall_for_each_wall() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let mut svg = String::from("<svg width=\"10m\" viewBox=\"0 0 10 8\">");
+    let mut line = |[[x1, y1], [x2, y2]]: [[f64; 2]; 2]| {
+        // Each line twice.
+        for _ in 0..2 {
+            writeln!(svg, "<line x1=\"{x1}\" y1=\"{y1}\" x2=\"{x2}\" y2=\"{y2}\"/>").unwrap();
+        }
+    };
+    for [[x1, y1], [x2, y2]] in FLAT {
+        let length = (x2 - x1).hypot(y2 - y1);
+        let (nx, ny) = (0.5 * WALL * (y1 - y2) / length, 0.5 * WALL * (x2 - x1) / length);
+        for side in [1.0, -1.0] {
+            line([[x1 + side * nx, y1 + side * ny], [x2 + side * nx, y2 + side * ny]]);
+        }
+    }
+    FURNITURE.into_iter().flat_map(sides).for_each(&mut line);
+    fs::write(dir.join("plan.svg"), svg + "</svg>").unwrap();
+    let import = ["import", "plan.svg", "--out", "map.toml", "--unit", "m"];
+    let printed = map(dir, &import).unwrap();
+    assert!(printed.contains("hint: as a floor plan (--plan) it has 8 walls"), "{printed}");
+    let printed = map(dir, &[&import[..], &["--plan", "--picture", "p.svg"]].concat()).unwrap();
+    assert!(printed.contains("faces of walls") && printed.contains("16 cm thick"), "{printed}");
+    let floor = Floor::read(&dir.join("map.toml")).unwrap();
+    // An SVG points down.
+    let up = |wall: &NamedWall| {
+        let [from, to] = [wall.from(), wall.to()].map(|[x, y]| [x, -y]);
+        NamedWall::new(wall.name().to_owned(), from, to).unwrap()
+    };
+    let floor = Floor::new(floor.named_walls().iter().map(up).collect());
+    assert_eq!(floor.named_walls().len(), FLAT.len(), "{printed}");
+    assert_flat(&floor, 0.0, "svg");
+    let error = map(dir, &[&import[..], &["--picture", "p.svg"]].concat()).unwrap_err();
+    assert!(error.contains("add --plan"), "{error}");
+}

@@ -6,6 +6,8 @@
 //! | [`svg`] | drawings in SVG |
 //! | [`geojson`] | GeoJSON |
 //! | [`grid`] | occupancy grids of ROS's `map_server` |
+//! | [`scan`] | scanned floor plans |
+//! | [`plan`] | one wall for each wall of a floor plan |
 //! | `image` | their images: PGM and PNG |
 //! | `thin` | lines of one pixel from thick ones |
 //! | `lines` | straight lines in an image |
@@ -17,6 +19,8 @@ pub mod geojson;
 pub mod grid;
 mod image;
 mod lines;
+pub mod plan;
+pub mod scan;
 pub mod svg;
 mod thin;
 

@@ -42,6 +42,10 @@ pub struct Imported {
     pub floor: Floor,
     /// Scale and origin, what was dropped, and what is uncertain; one line each.
     pub notes: Vec<String>,
+    /// How thick the line of each wall is, metres; empty if the drawing does not say.
+    pub strokes: Vec<f64>,
+    /// The size of a pixel, metres; 0 of a drawing.
+    pub resolution: f64,
     /// What must be added to the map's coordinates for those of the drawing in its frame, metres; `None` if the walls are where the
     /// drawing has them.
     pub offset: Option<[f64; 2]>,
@@ -58,9 +62,17 @@ pub struct Drawing {
     names: HashSet<String>,
     dropped: BTreeMap<String, u64>,
     notes: Vec<String>,
+    strokes: Vec<f64>,
+    /// The size of a pixel, metres; 0 of a drawing.
+    resolution: f64,
 }
 
 impl Drawing {
+    /// A drawing of pixels of this size, metres.
+    pub fn of_pixels(resolution: f64) -> Self {
+        Self { resolution, ..Self::default() }
+    }
+
     /// Counts something that is dropped, by its kind and the reason.
     pub fn drop(&mut self, what: impl Into<String>) {
         let what = what.into();
@@ -97,6 +109,16 @@ impl Drawing {
         ensure!(is_known, "the segment {from:?} to {to:?}: it is too far from the origin");
         self.names.insert(name.clone());
         self.walls.push((name, [from, to]));
+        Ok(())
+    }
+
+    /// Adds a wall as [`Self::wall`] does, whose line is so thick, metres.
+    ///
+    /// # Errors
+    /// Those of [`Self::wall`].
+    pub fn stroke(&mut self, from: [f64; 2], to: [f64; 2], thickness: f64) -> anyhow::Result<()> {
+        self.wall("", from, to)?;
+        self.strokes.resize(self.walls.len(), thickness);
         Ok(())
     }
 
@@ -141,7 +163,13 @@ impl Drawing {
             ));
         }
         let floor = Floor::new(moved(self.walls, offset.unwrap_or_default())?);
-        Ok(Imported { floor, notes: self.notes, offset })
+        Ok(Imported {
+            floor,
+            notes: self.notes,
+            strokes: self.strokes,
+            resolution: self.resolution,
+            offset,
+        })
     }
 
     /// The point that becomes the origin if a wall is too far from the drawing's: the lower left corner, rounded down.

@@ -70,14 +70,22 @@ fn keys(text: &str) -> anyhow::Result<Keys> {
 /// If a file cannot be read, is too large, or has no wall.
 pub fn read(yaml: &Path, frame: &Frame, shortest: f64) -> anyhow::Result<Imported> {
     ensure!(frame.unit.is_none(), "--unit: the unit of a grid is its resolution, in metres");
+    let (bitmap, place) = ink(yaml)?;
+    walls(bitmap, &place, frame, shortest)
+}
+
+/// The occupied pixels of a grid, and its place.
+///
+/// # Errors
+/// If a file cannot be read or is too large.
+pub(super) fn ink(yaml: &Path) -> anyhow::Result<(Bitmap, Place)> {
     let keys = keys(&sonarfix_map::read_text(yaml)?)?;
     let file = yaml.with_file_name(&keys.image);
     let image = sonarfix_map::read_bytes(&file).map_err(anyhow::Error::new);
     let image = image.and_then(|bytes| Image::read(&bytes));
     let image = image.with_context(|| format!("the image {}", file.display()))?;
-    let bitmap = occupied(&image, &keys);
-    drop(image);
-    walls(bitmap, &Place { resolution: keys.resolution, origin: keys.origin }, frame, shortest)
+    let place = Place { resolution: keys.resolution, origin: keys.origin };
+    Ok((occupied(&image, &keys), place))
 }
 
 /// The place of a grid.
@@ -87,6 +95,24 @@ pub struct Place {
     pub resolution: f64,
     /// The lower left corner: x and y, metres, and the turn, radians.
     pub origin: [f64; 3],
+}
+
+impl Place {
+    /// The place of a pixel in the map.
+    pub(super) fn of(&self, [column, row]: [f64; 2], frame: &Frame) -> [f64; 2] {
+        let [x0, y0, yaw] = self.origin;
+        let (sin, cos) = yaw.sin_cos();
+        let (x, y) = ((column + 0.5) * self.resolution, (row + 0.5) * self.resolution);
+        frame.place(1.0, [x0 + x * cos - y * sin, y0 + x * sin + y * cos])
+    }
+
+    /// The note about it.
+    pub(super) fn note(&self) -> String {
+        let (r, [x0, y0, yaw]) = (self.resolution, self.origin);
+        format!(
+            "scale: a pixel is {r} m; the lower left corner is at ({x0}, {y0}) m, turned by {yaw} rad"
+        )
+    }
 }
 
 /// Finds the walls among occupied cells, rows from the bottom, as [`read`] does.
@@ -114,7 +140,7 @@ pub fn of_cells(
     walls(bitmap, place, frame, shortest)
 }
 
-fn check_resolution(resolution: f64) -> anyhow::Result<()> {
+pub(super) fn check_resolution(resolution: f64) -> anyhow::Result<()> {
     ensure!(
         (1e-3..=10.0).contains(&resolution),
         "resolution: {resolution} m is not within 1 mm and 10 m"
@@ -128,12 +154,9 @@ fn walls(
     frame: &Frame,
     shortest: f64,
 ) -> anyhow::Result<Imported> {
-    let mut drawing = Drawing::default();
-    let [x0, y0, yaw] = place.origin;
+    let mut drawing = Drawing::of_pixels(place.resolution);
     let r = place.resolution;
-    drawing.note(format!(
-        "scale: a pixel is {r} m; the lower left corner is at ({x0}, {y0}) m, turned by {yaw} rad"
-    ));
+    drawing.note(place.note());
     drawing.note(format!(
         "uncertain: each end by {r} m, the direction of a wall of length L by {r} m / L"
     ));
@@ -147,11 +170,7 @@ fn walls(
         drawing
             .note(format!("dropped: pixels of no straight line of {shortest} m ({unexplained})"));
     }
-    let (sin, cos) = yaw.sin_cos();
-    let place = |[column, row]: [f64; 2]| {
-        let (x, y) = ((column + 0.5) * r, (row + 0.5) * r);
-        frame.place(1.0, [x0 + x * cos - y * sin, y0 + x * sin + y * cos])
-    };
+    let place = |pixel: [f64; 2]| place.of(pixel, frame);
     for line in &found {
         if line.scatter > 0.5 {
             drawing.note(format!(
@@ -167,21 +186,26 @@ fn walls(
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 300")]
-fn pixels(count: f64) -> usize {
+pub(super) fn pixels(count: f64) -> usize {
     count.ceil().clamp(0.0, 300.0) as usize
 }
 
 /// The occupied pixels.
 fn occupied(image: &Image, keys: &Keys) -> Bitmap {
-    let mut bitmap = Bitmap::new(image.width, image.height);
-    for (at, &grey) in image.grey.iter().enumerate() {
+    bitmap(image, |grey| {
         let light = f64::from(grey) / 255.0;
         let occupancy = if keys.is_negated { light } else { 1.0 - light };
-        if occupancy > keys.occupied {
-            let (column, row) = (at % image.width, image.height - 1 - at / image.width);
-            let coordinate = |value| i32::try_from(value).unwrap_or(i32::MAX);
-            bitmap.set((coordinate(column), coordinate(row)), true);
-        }
+        occupancy > keys.occupied
+    })
+}
+
+/// The pixels of these greys.
+pub(super) fn bitmap(image: &Image, is_on: impl Fn(u8) -> bool) -> Bitmap {
+    let mut bitmap = Bitmap::new(image.width, image.height);
+    for (at, _) in image.grey.iter().enumerate().filter(|(_, grey)| is_on(**grey)) {
+        let (column, row) = (at % image.width, image.height - 1 - at / image.width);
+        let coordinate = |value| i32::try_from(value).unwrap_or(i32::MAX);
+        bitmap.set((coordinate(column), coordinate(row)), true);
     }
     bitmap
 }

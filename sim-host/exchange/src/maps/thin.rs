@@ -48,6 +48,76 @@ impl Bitmap {
         on.map(|(at, _)| (coordinate(at % self.width), coordinate(at / self.width))).collect()
     }
 
+    /// Switches each group of connected pixels that are `on`, or off, and whose box is at most `most` pixels wide and high. Returns
+    /// the number of pixels.
+    pub fn switch_small(&mut self, on: bool, most: usize) -> usize {
+        let mut seen = vec![false; self.on.len()];
+        let mut count = 0;
+        for start in 0..self.on.len() {
+            let is_new = self.on.get(start) == Some(&on) && seen.get(start) == Some(&false);
+            if is_new && let Some(group) = self.small_group(start, on, most, &mut seen) {
+                count += group.len();
+                for at in group {
+                    if let Some(pixel) = self.on.get_mut(at) {
+                        *pixel = !on;
+                    }
+                }
+            }
+        }
+        count
+    }
+
+    /// The pixels that are connected with one; `None` if their box is larger than `most`. Pixels that are on are connected by
+    /// corners, too.
+    fn small_group(
+        &self,
+        start: usize,
+        on: bool,
+        most: usize,
+        seen: &mut [bool],
+    ) -> Option<Vec<usize>> {
+        let step = if on { 1 } else { 2 };
+        let (mut open, mut group) = (vec![start], Vec::new());
+        let mut limits = [usize::MAX, 0, usize::MAX, 0];
+        if let Some(seen) = seen.get_mut(start) {
+            *seen = true;
+        }
+        while let Some(at) = open.pop() {
+            let (x, y) = (at % self.width, at / self.width);
+            let [left, right, bottom, top] = limits;
+            limits = [left.min(x), right.max(x), bottom.min(y), top.max(y)];
+            // Those of a large group are not needed.
+            if group.len() <= most * most {
+                group.push(at);
+            }
+            let coordinate = |value: usize| i32::try_from(value).unwrap_or(i32::MAX);
+            let near = beside((coordinate(x), coordinate(y))).into_iter().step_by(step);
+            for next in near.filter_map(|pixel| self.index(pixel)) {
+                if self.on.get(next) == Some(&on)
+                    && let Some(seen) = seen.get_mut(next).filter(|seen| !**seen)
+                {
+                    *seen = true;
+                    open.push(next);
+                }
+            }
+        }
+        let [left, right, bottom, top] = limits;
+        (right - left < most && top - bottom < most).then_some(group)
+    }
+
+    /// The image with pixels that are so many times as large: on where one of theirs is.
+    #[must_use]
+    pub fn coarser(&self, times: usize) -> Self {
+        let mut coarse = Self::new(self.width.div_ceil(times), self.height.div_ceil(times));
+        for (at, _) in self.on.iter().enumerate().filter(|(_, on)| **on) {
+            let (x, y) = (at % self.width / times, at / self.width / times);
+            if let Some(pixel) = coarse.on.get_mut(y * coarse.width + x) {
+                *pixel = true;
+            }
+        }
+        coarse
+    }
+
     /// Turns solid areas off: all pixels of squares whose side is longer than `thickest`. Returns the number of pixels.
     pub fn remove_solid(&mut self, thickest: usize) -> usize {
         let corners = self.corners(thickest);
