@@ -149,7 +149,7 @@ enum Task {
 }
 
 /// The steps that run only by their names or those of their jobs.
-const LONG: [&str; 3] = ["dist", "fuzz", "mutants"];
+const LONG: [&str; 5] = ["dist", "fuzz", "msrv", "mutants", "package"];
 
 /// The steps of CI, by job.
 fn steps() -> [Step<Task>; 34] {
