@@ -13,6 +13,7 @@ use sonarfix_sim::monte_carlo;
 use sonarfix_sim::row::Row;
 use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::spread::Spread;
+use sonarfix_sim::statistics::Summary;
 use sonarfix_sim::trace::Trace;
 
 use crate::provenance;
@@ -152,11 +153,37 @@ impl Experiment {
         } else {
             println!("{}", self.table(measured).text());
         }
+        self.explain_losses(&measured.summary);
         if let Some(dir) = &output.out {
             let page = self.report(measured, &self.trace()?, dir)?;
             eprintln!("open {}", page.display());
         }
         Ok(())
+    }
+
+    /// Says that runs ended lost, and why as far as the scenario shows it.
+    fn explain_losses(&self, summary: &Summary) {
+        let Summary { lost_runs, runs, .. } = summary;
+        if *lost_runs == 0 {
+            return;
+        }
+        let scenario = &self.simulation.scenario;
+        let symmetries = sonarfix_map::symmetries(&scenario.floor).unwrap_or_default();
+        let reason = match symmetries.first() {
+            _ if !scenario.robot.start.is_unknown() => {
+                "`--out report` shows where, `--start relocalize` lets a lost robot search, and `sonarfix check` names \
+                 improbable values"
+                    .to_owned()
+            }
+            Some(symmetry) => format!(
+                "{symmetry}. Its search finds several poses there and no unique one: `sonarfix map check` proposes an \
+                 addition to the room, or give `start_region` in the robot file"
+            ),
+            None => "no pose was unique until the end of the path: drive longer, past more corners, and nearer to the walls \
+                     (`sonarfix plan --starts` forecasts how far)"
+                .to_owned(),
+        };
+        eprintln!("warning: {lost_runs} of {runs} runs ended lost: {reason}");
     }
 
     /// The runs, through a file of rows if one is requested.

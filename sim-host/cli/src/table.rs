@@ -101,15 +101,15 @@ fn state_row(state: &StateSummary, shown: &Shown, truth: f64) -> Vec<String> {
 fn note(Measured { summary: s, cpu_seconds }: &Measured) -> String {
     let path = &s.rms_path;
     let runs = f64::from(u32::try_from(s.runs).unwrap_or(u32::MAX));
+    let nis = if s.nis_mean.is_nan() { "–".to_owned() } else { format!("{:.3}", s.nis_mean) };
     format!(
-        "{} runs, {:.0} % sampling error on a deviation; NEES/{} {:.3}, NIS {:.3}; \
+        "{} runs, {:.0} % sampling error on a deviation; NEES/{} {:.3}, NIS {nis}; \
          RMS along the path x {:.1} mm, y {:.1} mm, heading {:.2}°; \
          ranges accepted {}, gated {}, refused {}; runs lost {}; {cpu_seconds:.2} s of CPU time",
         s.runs,
         100.0 / (2.0 * (runs - 1.0).max(1.0)).sqrt(),
         s.nees_states,
         s.nees_mean / f64::from(u32::try_from(s.nees_states).unwrap_or(u32::MAX)),
-        s.nis_mean,
         path.x * 1e3,
         path.y * 1e3,
         path.heading.to_degrees(),

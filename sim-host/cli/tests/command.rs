@@ -51,6 +51,18 @@ pub fn assert_documented(value: &Value) {
 }
 
 #[test]
+fn runs_that_end_lost_are_explained() {
+    let classroom =
+        concat!(env!("CARGO_MANIFEST_DIR"), "/../../crates/sonarfix-map/scenarios/classroom.toml");
+    let output = sonarfix(&["run", classroom, "--runs", "1", "--start", "unknown"]);
+    let errors = String::from_utf8(output.stderr).unwrap();
+    // A rectangle is itself after half a turn.
+    assert!(errors.contains("1 of 1 runs ended lost: rotated by 180°"), "{errors}");
+    assert!(errors.contains("start_region"), "{errors}");
+    assert!(!String::from_utf8(output.stdout).unwrap().contains("NaN"));
+}
+
+#[test]
 fn paper_answers_in_json_as_documented() {
     let answer = json(&["paper", "--runs", "3", "--policy", "informative", "--json"]);
     assert_documented(&answer);
