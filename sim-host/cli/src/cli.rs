@@ -3,8 +3,8 @@
 use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::{
-    bound, calibrate, check, command, config, convert, doctor, export, find, init, map, measure,
-    merge, monitor, paper, pil, plan, replay, run, shell, survey, sweep,
+    bound, calibrate, check, command, config, convert, doctor, examples, export, find, init, map,
+    measure, merge, monitor, paper, pil, plan, replay, run, shell, survey, sweep,
 };
 
 /// Simulates, measures, replays and operates the Sonarfix localizer for small wheeled robots.
@@ -65,6 +65,11 @@ enum Command {
 }
 
 impl Cli {
+    /// The command line, with examples in its help.
+    pub fn with_examples() -> clap::Command {
+        examples::added(Self::command())
+    }
+
     /// Executes the command.
     ///
     /// # Errors
@@ -92,8 +97,8 @@ impl Cli {
             Command::Bound(args) => bound::execute(&args),
             Command::Plan(args) => plan::execute(&args),
             Command::Doctor(args) => doctor::execute(&args),
-            Command::Completions(args) => shell::completions(&args, Self::command()),
-            Command::Man(args) => shell::man(&args, Self::command()),
+            Command::Completions(args) => shell::completions(&args, Self::with_examples()),
+            Command::Man(args) => shell::man(&args, Self::with_examples()),
         }
     }
 }

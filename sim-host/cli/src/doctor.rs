@@ -8,7 +8,7 @@ use serial2::SerialPort;
 
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  sonarfix doctor\n  sonarfix doctor --json\n\nNothing that is missing is needed to simulate, to replay or to check files."
+    after_help = "Nothing that is missing is needed to simulate, to replay or to check files."
 )]
 pub struct Args {
     /// Prints JSON.

@@ -12,6 +12,7 @@ mod config;
 mod convert;
 mod convert_rosbag;
 mod doctor;
+mod examples;
 mod export;
 mod find;
 mod init;
@@ -38,12 +39,15 @@ mod warnings;
 
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::FromArgMatches;
 use cli::Cli;
 use sonarfix_terminal::progress;
 
 fn main() -> ExitCode {
-    match Cli::parse().execute() {
+    // Examples are a part of the help, which is printed without a command, too.
+    let arguments = Cli::with_examples().get_matches();
+    let cli = Cli::from_arg_matches(&arguments).unwrap_or_else(|error| error.exit());
+    match cli.execute() {
         Ok(()) => progress::exit_code(),
         Err(error) => {
             eprintln!("error: {error:#}");

@@ -136,6 +136,27 @@ fn subcommands(of: &[String]) -> Vec<Vec<String>> {
     if all.is_empty() { vec![of.to_vec()] } else { all }
 }
 
+/// The help of every subcommand, or of the one above it, has examples, whose arguments exist.
+#[test]
+fn every_subcommand_has_examples() {
+    let mut tried = 0;
+    for subcommand in subcommands(&[]) {
+        let above = subcommand.split_last().map_or(Vec::new(), |(_, above)| above.to_vec());
+        let of_above = if above.is_empty() { String::new() } else { help(&above) };
+        let text = help(&subcommand) + &of_above;
+        let lines = text.lines().filter_map(|line| line.strip_prefix("  sonarfix "));
+        let examples: Vec<&str> = lines.collect();
+        assert!(!examples.is_empty(), "{subcommand:?}");
+        for example in examples.iter().filter(|example| !example.contains('>')) {
+            let arguments: Vec<&str> = example.split_whitespace().chain(["--help"]).collect();
+            let output = sonarfix(&arguments).output().unwrap();
+            assert!(output.status.success(), "{example}: {}", errors(&output));
+            tried += 1;
+        }
+    }
+    assert!(tried > 40, "{tried}");
+}
+
 /// No subcommand is missing in [`PRINTING`].
 #[test]
 fn every_subcommand_is_in_the_table() {
