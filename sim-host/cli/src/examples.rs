@@ -95,11 +95,9 @@ pub fn added(command: Command) -> Command {
 
 /// The command with a text after the help of a subcommand.
 fn at(command: Command, path: &[&str], text: String) -> Command {
-    match path {
-        [first, rest @ ..] => command.mut_subcommand(first, |below| at(below, rest, text)),
-        [] => {
-            let before = command.get_after_help().map(|text| format!("{text}\n\n"));
-            command.after_help(before.unwrap_or_default() + &text)
-        }
+    if let [first, rest @ ..] = path {
+        return command.mut_subcommand(first, |below| at(below, rest, text));
     }
+    let before = command.get_after_help().map(|text| format!("{text}\n\n"));
+    command.after_help(before.unwrap_or_default() + &text)
 }
