@@ -128,6 +128,33 @@ fn a_range_is_started_waited_for_and_read() {
     assert_eq!(bus.0.borrow().transfers - before, 2);
 }
 
+/// The rate of photons that ST's driver aims at is 20 · 128 in units of 1/128 Mcps; numbers of detectors are in 1/256.
+#[test]
+fn the_next_range_has_detectors_for_the_rate_that_is_aimed_at() {
+    let cases = [
+        (0x0900, 0x0100, 200, 200.0),
+        (0x0600, 0x0E00, 200, 100.0),
+        (0x0100, 0x0180, 100, 255.996),
+        // Without detectors or without light: half of them.
+        (0, 0, 100, 128.0),
+        (0x0900, 0x0100, 0, 128.0),
+    ];
+    for (signal, ambient, detectors, expected) in cases {
+        let bus = Bus::booted();
+        let mut ranger = Vl53l1x::new(bus.clone());
+        ranger.trigger(at(0)).unwrap();
+        for (register, word) in [(0x008C, 256 * detectors), (0x0090, ambient), (0x0098, signal)] {
+            let [high, low] = u16::to_be_bytes(word);
+            bus.set(register, high);
+            bus.set(register + 1, low);
+        }
+        bus.answer(9, 500);
+        ranger.poll(at(DUE)).unwrap().unwrap().unwrap();
+        let found = f64::from(bus.word(0x0054)) / 256.0;
+        assert!((found / expected - 1.0).abs() < 1e-3, "{signal} {ambient}: {found}");
+    }
+}
+
 #[test]
 fn a_status_is_the_reason_for_no_range() {
     for (status, outcome) in [

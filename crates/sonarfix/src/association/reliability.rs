@@ -136,6 +136,21 @@ mod tests {
         Returned::echo(density, ANYWHERE, true)
     }
 
+    /// Bayes' rule by hand: no echo is 0.94 of a silent ranger and 0.3 of one with false ranges.
+    #[test]
+    fn no_echo_multiplies_the_odds_by_the_ratio_of_its_probabilities() {
+        let mut ranger = Reliability::default();
+        for (works, silent, false_ranges) in [(0.1, 0.094, 0.03), (0.5, 0.17672, 0.018)] {
+            ranger.record(&Returned::silence(works), at(1));
+            assert!((ranger.silent / silent - 1.0).abs() < 1e-5, "{ranger:?}");
+            assert!((ranger.false_ranges / false_ranges - 1.0).abs() < 1e-5, "{ranger:?}");
+        }
+        // However improbable no echo is, the odds grow by no more than a factor of 1/0.05.
+        ranger.record(&Returned::silence(0.0), at(1));
+        assert!((ranger.silent / (0.17672 * 0.94 / 0.05) - 1.0).abs() < 1e-5, "{ranger:?}");
+        assert_eq!(ranger.missed, at(1));
+    }
+
     proptest! {
         /// A ranger that returns nothing, or nothing that fits, is noticed within twelve pings at walls that answer; one that
         /// works again within five.

@@ -88,6 +88,13 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_vector_is_turned_counter_clockwise() {
+        // cos and sin of the angle whose tangent is 4/3.
+        let turned = Vector::new(2.0, 1.0).turned(Vector::new(0.6, 0.8));
+        assert!((turned.x - 0.4).abs() < 1e-6 && (turned.y - 2.2).abs() < 1e-6, "{turned:?}");
+    }
+
+    #[test]
     fn a_point_is_converted_both_ways() {
         let point = Point::new(1.5, -2.5);
         assert_eq!(Point::from(Vector::from(point)), point);
