@@ -151,43 +151,44 @@ enum Task {
 /// The steps that run only by their names or those of their jobs.
 const LONG: [&str; 5] = ["dist", "fuzz", "msrv", "mutants", "package"];
 
-/// The steps of CI, by job.
+/// The steps of CI. Those of the main workspace come first and those of other workspaces last: two run beside each other, one from each
+/// end ([`ci::run`]), and cargo locks the target folder of a workspace.
 fn steps() -> [Step<Task>; 34] {
     [
         ("lint", "format", Task::Format),
         ("lint", "circles", Task::Circles),
         ("lint", "lint", Task::Lint),
-        ("lint", "lint-emulated", Task::LintEmulated),
         ("lint", "docs", Task::Docs),
         ("lint", "deny", Task::Deny),
         ("lint", "unsafe-code", Task::UnsafeCode(unsafe_code::Args::CHECK)),
         ("test", "test-host", Task::TestHost),
+        ("random", "endurance", Task::Endurance(endurance::Args::SHORT)),
+        ("random", "search-windows", Task::SearchWindows(search_windows::Args::SHORT)),
+        ("python", "bags", Task::Bags),
         ("crates", "embedded", Task::Embedded),
         ("crates", "features", Task::Features),
         ("crates", "msrv", Task::Msrv),
         ("crates", "package", Task::Package),
-        ("c", "c", Task::C(c_library::Args::CHECK)),
-        ("c", "dist", Task::Dist(dist::Args::check())),
-        ("firmware", "test-firmware", Task::TestFirmware),
-        ("firmware", "boards", Task::Boards(firmware::BoardsArgs::COMPARE)),
-        ("firmware", "template", Task::Template),
+        ("budgets", "figures", Task::Figures(figures::Args::CHECK)),
+        ("budgets", "compositions", Task::Compositions(compositions::Args { check: true })),
+        ("budgets", "budgets", Task::Budgets),
+        ("budgets", "panics", Task::Panics),
         ("emulated", "golden", Task::Golden),
         ("emulated", "pil", Task::Pil),
         ("emulated", "worst-poll", Task::WorstPoll(worst_poll::Args::CHECK)),
         ("emulated", "guide", Task::Guide),
-        ("budgets", "panics", Task::Panics),
-        ("budgets", "budgets", Task::Budgets),
-        ("budgets", "compositions", Task::Compositions(compositions::Args { check: true })),
-        ("budgets", "figures", Task::Figures(figures::Args::CHECK)),
         ("budgets", "peers", Task::Peers),
         ("budgets", "playground", Task::Playground),
-        ("python", "python", Task::Python(python::Args::CHECK)),
-        ("python", "bags", Task::Bags),
-        ("ros", "ros", Task::Ros(ros::Args::CHECK)),
-        ("random", "endurance", Task::Endurance(endurance::Args::SHORT)),
-        ("random", "search-windows", Task::SearchWindows(search_windows::Args::SHORT)),
         ("random", "fuzz", Task::Fuzz(fuzz::Args::short())),
         ("random", "mutants", Task::Mutants(mutants::Args::short())),
+        ("c", "dist", Task::Dist(dist::Args::check())),
+        ("firmware", "template", Task::Template),
+        ("firmware", "boards", Task::Boards(firmware::BoardsArgs::COMPARE)),
+        ("firmware", "test-firmware", Task::TestFirmware),
+        ("lint", "lint-emulated", Task::LintEmulated),
+        ("c", "c", Task::C(c_library::Args::CHECK)),
+        ("ros", "ros", Task::Ros(ros::Args::CHECK)),
+        ("python", "python", Task::Python(python::Args::CHECK)),
     ]
     .map(|(job, name, task)| Step { job, name, is_long: LONG.contains(&name), task })
 }
