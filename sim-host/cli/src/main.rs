@@ -51,7 +51,7 @@ fn main() -> ExitCode {
         Ok(()) => progress::exit_code(),
         Err(error) => {
             eprintln!("error: {error:#}");
-            ExitCode::FAILURE
+            progress::exit_code_of_error()
         }
     }
 }

@@ -23,10 +23,12 @@ use crate::sweep_values::Sweep;
 use crate::table::{self, Beside, Measured};
 use crate::warnings::{self, Warned, Warning};
 use sonarfix_terminal::output::{check_file, check_folder};
-use sonarfix_terminal::progress::Runs;
+use sonarfix_terminal::progress::{Runs, is_interrupted};
 
 /// Most runs whose spread is in a report: they are computed again, with all their ticks.
 const MOST_SPREAD: u32 = 100;
+/// The same after Ctrl-C, when the command should end within a second.
+const LAST_SPREAD: u32 = 10;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -252,7 +254,8 @@ impl Experiment {
 
     fn report(&self, measured: &Measured, trace: &Trace, dir: &Path) -> anyhow::Result<PathBuf> {
         let scenario = &self.simulation.scenario;
-        let spread = Spread::of(&self.simulation, self.seed, self.runs.min(MOST_SPREAD))?;
+        let most = if is_interrupted() { LAST_SPREAD } else { MOST_SPREAD };
+        let spread = Spread::of(&self.simulation, self.seed, self.runs.min(most))?;
         let report = Report {
             title: format!("Sonarfix: {}", scenario.name),
             subtitle: format!(

@@ -109,3 +109,9 @@ fn interrupt() {
 pub fn exit_code() -> ExitCode {
     if is_interrupted() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS }
 }
+
+/// The exit code of a command that has failed, perhaps because it was interrupted before it had a result.
+#[must_use]
+pub fn exit_code_of_error() -> ExitCode {
+    if is_interrupted() { ExitCode::from(INTERRUPTED) } else { ExitCode::FAILURE }
+}
