@@ -10,7 +10,7 @@ use sonarfix_sim::trace::{Tick, Trace};
 const WHEEL: &str = "right_wheel = { travel_per_edge = \"0.4887 mm\" }";
 const SERVO: &str = "servo_pulses = [{ width = \"500 us\", bearing = \"-100 deg\" }, { width = \"2500 us\", bearing = \"100 deg\" }]";
 
-/// The classroom with its robot as it is instead of scale errors, and an edit of what the robot file says.
+/// The classroom with its robot as it is instead of scale errors, and an edit of its robot file.
 fn stated(old: &str, new: &str) -> Scenario {
     let text = CLASSROOM
         .replace("scale_right = \"1 %\"\nscale_left = \"-1 %\"", &truth())

@@ -41,6 +41,7 @@ pub mod plausibility;
 mod quantity;
 pub mod robot_file;
 mod scenario;
+pub mod servo;
 mod simplify;
 mod sonar_model;
 mod spelling;

@@ -386,6 +386,9 @@ fn a_scanned_plan_has_one_wall_for_each_wall() {
     }
     let error = map(dir, &["import", "scan.pgm", "--out", "map.toml"]).unwrap_err();
     assert!(error.contains("--unit: the length of a pixel is unknown"), "{error}");
+    map(dir, &["export", "map.toml", "--out", "grid.yaml"]).unwrap();
+    let grid = ["import", "grid.yaml", "--plan", "--out", "map.toml", "--unit", "m"];
+    assert!(map(dir, &grid).unwrap_err().contains("--unit: the unit of a grid"));
 }
 
 #[test]

@@ -19,8 +19,8 @@ static IS_INTERRUPTED: AtomicBool = AtomicBool::new(false);
 static IS_RUNNING: AtomicBool = AtomicBool::new(false);
 static HANDLER: Once = Once::new();
 
-/// A bar that counts runs. Where standard error is not a terminal there is none. After Ctrl-C no further run begins, and the
-/// results are those of the finished ones. Runs that take longer than a second are not waited for: then there are no results,
+/// A progress bar, which is hidden if standard error is not a terminal. After Ctrl-C no further run is started, and the results
+/// are those of the finished ones. Runs that take longer than a second are not waited for: then there are no results,
 /// because those of the shorter runs alone would be biased.
 #[derive(Debug)]
 pub struct Runs {

@@ -1,12 +1,11 @@
 //! A robot file that differs from the true robot of a scenario by more than a measurement with a ruler does.
 
-use sonarfix_hal::servo::MeasuredPulse;
-
 use super::facts::{Fact, Facts};
 use super::rule::short;
 use crate::error::Mistake;
 use crate::geometry::wrap;
 use crate::scenario::Scenario;
+use crate::servo::{bearing_of, width_of};
 
 /// The usual ratio of the true travel of a wheel to that of the robot file.
 const USUAL_RATIO: (f64, f64) = (0.85, 1.15);
@@ -62,10 +61,11 @@ fn mount(facts: &Facts, scenario: &Scenario) -> Option<Mistake> {
 
 fn servo(facts: &Facts, scenario: &Scenario) -> Option<Mistake> {
     let assumed = scenario.robot.rangers.first.servo_pulses;
-    let errors = scenario
-        .truth
-        .servo_pulses?
-        .map(|pulse| wrap(f64::from(pulse.bearing.0) - bearing(assumed, pulse.width.to_micros())));
+    let built = scenario.truth.servo_pulses?;
+    let errors = built.map(|pulse| {
+        let bearing = f64::from(pulse.bearing.0);
+        wrap(bearing - bearing_of(assumed, width_of(built, bearing)))
+    });
     let worst = errors.into_iter().max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
     let fact: &Fact = facts.with("sonar.servo_pulses.bearing").next()?;
     let is_off = worst.abs() > BEARING && fact.report();
@@ -75,12 +75,4 @@ fn servo(facts: &Facts, scenario: &Scenario) -> Option<Mistake> {
             short(worst.abs().to_degrees())
         ))
     })
-}
-
-/// Where a pulse of so many µs sends the servo of these pulses, radians.
-#[expect(clippy::cast_precision_loss, reason = "a pulse has some thousand µs")]
-fn bearing([one, other]: [MeasuredPulse; 2], width: u64) -> f64 {
-    let [from, to] = [one, other].map(|pulse| f64::from(pulse.bearing.0));
-    let [shorter, longer] = [one, other].map(|pulse| pulse.width.to_micros() as f64);
-    from + (to - from) * (width as f64 - shorter) / (longer - shorter)
 }

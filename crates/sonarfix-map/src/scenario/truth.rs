@@ -17,7 +17,7 @@ use crate::robot_file::sonar::read_pulses;
 pub struct Truth {
     /// Track width, metres.
     pub track_width: f64,
-    /// Scale error of the right wheel, dimensionless; −2 for an encoder that is mirrored otherwise than the robot file says.
+    /// Scale error of the right wheel, dimensionless; −2 for an encoder that counts in the other direction than in the robot file.
     pub scale_right: f64,
     /// Scale error of the left wheel, dimensionless.
     pub scale_left: f64,
@@ -35,7 +35,7 @@ pub struct Truth {
     pub range_noise_per_metre: f64,
     /// Half of the sonar's cone, radians.
     pub cone: f64,
-    /// Where the first ranger is mounted, ahead and to the left, metres; `None` for where the robot file says.
+    /// Where the first ranger is mounted, ahead and to the left, metres; `None` for the place in the robot file.
     pub mount: [Option<f64>; 2],
     /// Two pulses of the first servo with the bearings of the ranger; `None` for those of the robot file.
     pub servo_pulses: Option<[MeasuredPulse; 2]>,
@@ -89,9 +89,9 @@ pub(crate) static TRUTH: Section<Stated> = Section { name: "truth", usual: State
     depends(Key::new("left_wheel", Value::Own("a table as in `[drive]`", |node, t| t.left_wheel = Some(read_wheel(node)), |_| None),
         "instead of `scale_left`: the left wheel and its encoder as they are")),
     optional(Key::new("mount", Value::Pair(&LENGTH, ("-10 m", "10 m"), |t| { let [x, y] = &mut t.truth.mount; [x, y] }),
-        "where the first sonar is, otherwise where the robot file says")),
+        "place of the first sonar, by default that of the robot file")),
     optional(Key::new("servo_pulses", Value::Own("two tables of `width` and `bearing`", |node, t| t.truth.servo_pulses = Some(read_pulses(&node)), |_| None),
-        "two pulses of the first servo and the true bearing of the sonar at each, otherwise those of the robot file")),
+        "two pulses of the first servo and the true bearing of the sonar at each, by default those of the robot file")),
     number("range_scale", &FRACTION, ("-99 %", "1000 %"), |t| &mut t.truth.range_scale,
         "scale error of the ranger, a fraction. It reports 1 + this times the distance"),
     number("wheel_noise", &LENGTH_WALK, ("0 m/sqrt(m)", "1 m/sqrt(m)"), |t| &mut t.truth.wheel_noise, "true value of the key of `[drive]`"),

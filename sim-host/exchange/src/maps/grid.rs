@@ -69,16 +69,16 @@ fn keys(text: &str) -> anyhow::Result<Keys> {
 /// # Errors
 /// If a file cannot be read, is too large, or has no wall.
 pub fn read(yaml: &Path, frame: &Frame, shortest: f64) -> anyhow::Result<Imported> {
-    ensure!(frame.unit.is_none(), "--unit: the unit of a grid is its resolution, in metres");
-    let (bitmap, place) = ink(yaml)?;
+    let (bitmap, place) = ink(yaml, frame)?;
     walls(bitmap, &place, frame, shortest)
 }
 
 /// The occupied pixels of a grid, and its place.
 ///
 /// # Errors
-/// If a file cannot be read or is too large.
-pub(super) fn ink(yaml: &Path) -> anyhow::Result<(Bitmap, Place)> {
+/// If a file cannot be read or is too large, or the frame has a unit.
+pub(super) fn ink(yaml: &Path, frame: &Frame) -> anyhow::Result<(Bitmap, Place)> {
+    ensure!(frame.unit.is_none(), "--unit: the unit of a grid is its resolution, in metres");
     let keys = keys(&sonarfix_map::read_text(yaml)?)?;
     let file = yaml.with_file_name(&keys.image);
     let image = sonarfix_map::read_bytes(&file).map_err(anyhow::Error::new);

@@ -34,8 +34,8 @@ const SAMPLES: u16 = 25;
 pub fn read(file: &Path, frame: &Frame, shortest: f64) -> anyhow::Result<Imported> {
     let is_grid = file.extension().is_some_and(|ending| ending == "yaml" || ending == "yml");
     if is_grid {
-        let (ink, place) = grid::ink(file)?;
-        return of_ink(ink, &place, &Frame { unit: None, ..*frame }, shortest);
+        let (ink, place) = grid::ink(file, frame)?;
+        return of_ink(ink, &place, frame, shortest);
     }
     let resolution = frame.unit.context(
         "--unit: the length of a pixel is unknown. Measure a wall, divide its length in metres by its pixels, and give the result",
@@ -43,7 +43,7 @@ pub fn read(file: &Path, frame: &Frame, shortest: f64) -> anyhow::Result<Importe
     grid::check_resolution(resolution)?;
     let image = Image::read(&sonarfix_map::read_bytes(file)?)?;
     let place = grid::Place { resolution, origin: [0.0; 3] };
-    of_ink(dark(&image), &place, &Frame { unit: None, ..*frame }, shortest)
+    of_ink(dark(&image), &place, frame, shortest)
 }
 
 /// The dark pixels of an image, or the bright ones of a dark one. The threshold lies between the grey of the paper, which is the

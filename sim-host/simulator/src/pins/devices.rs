@@ -7,6 +7,7 @@ use sonarfix_hal::config::{RangerConfig, RobotConfig};
 use sonarfix_hal::ranger::{PulseTiming, RangerKind};
 use sonarfix_hal::servo::MeasuredPulse;
 use sonarfix_map::devices::{INSTANT_SERVO, MG996R};
+use sonarfix_map::servo::bearing_of;
 use sonarfix_map::{Scenario, ServoName};
 use sonarfix_pil::wires::FULL_DUTY;
 
@@ -42,23 +43,7 @@ pub fn servo(sonar: &RangerParameters, name: ServoName) -> ServoPlant {
 #[must_use]
 pub fn bearing(duty: u16, sonar: &RangerParameters, driver: &RangerConfig) -> f64 {
     let frame = micros(sonar.timing.servo.frame);
-    bearing_of(f64::from(duty) / f64::from(FULL_DUTY) * frame, driver.servo_pulses)
-}
-
-/// Where a pulse of a width in µs sends a servo that was measured at two pulses, radians.
-fn bearing_of(pulse: f64, [one, other]: [MeasuredPulse; 2]) -> f64 {
-    let (from, to) = (f64::from(one.bearing.0), f64::from(other.bearing.0));
-    let (shorter, longer) = (micros(one.width), micros(other.width));
-    from + (to - from) * (pulse - shorter) / (longer - shorter)
-}
-
-/// Where a servo points whose driver has other pulses than it, at a commanded bearing, radians.
-#[must_use]
-pub fn bearing_with(commanded: f64, driver: [MeasuredPulse; 2], servo: [MeasuredPulse; 2]) -> f64 {
-    let [one, other] = driver;
-    let (from, to) = (f64::from(one.bearing.0), f64::from(other.bearing.0));
-    let (shorter, longer) = (micros(one.width), micros(other.width));
-    bearing_of(shorter + (longer - shorter) * (commanded - from) / (to - from), servo)
+    bearing_of(driver.servo_pulses, f64::from(duty) / f64::from(FULL_DUTY) * frame)
 }
 
 #[expect(clippy::cast_precision_loss, reason = "a frame has some thousand µs")]

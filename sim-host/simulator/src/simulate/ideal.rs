@@ -5,6 +5,7 @@ use sonarfix::config::RangerId;
 use sonarfix::filter::motion::WheelTravel;
 use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
 use sonarfix::sensor::gyro::MeasuredTurn;
+use sonarfix_map::servo::{bearing_of, width_of};
 
 use super::computer::{Computer, LocalizerInputs};
 use super::error::SimulationError;
@@ -13,7 +14,6 @@ use super::simulation::Simulation;
 use super::streams::RandomStreams;
 use crate::angle;
 use crate::observe::{self, Measurement};
-use crate::pins::devices;
 use crate::plant::absolute::Absolute;
 use crate::plant::follower::Follower;
 use crate::plant::gyro::Gyro;
@@ -192,7 +192,7 @@ impl<T: LocalizerInputs> Run<'_, T> {
         let commanded = f64::from(aim.bearing.0);
         let of_servo = scenario.truth.servo_pulses.filter(|_| aim.ranger == RangerId::FIRST);
         let driver = scenario.robot.rangers.first.servo_pulses;
-        of_servo.map_or(commanded, |servo| devices::bearing_with(commanded, driver, servo))
+        of_servo.map_or(commanded, |servo| bearing_of(servo, width_of(driver, commanded)))
     }
 
     fn end_tick(&mut self, recorder: &mut impl Recorder) -> Result<(), SimulationError> {
