@@ -19,8 +19,8 @@ pub struct Step<T> {
     pub job: &'static str,
     pub name: &'static str,
     pub task: T,
-    /// Whether it runs only if it or its job is named, because it takes long.
-    pub is_long: bool,
+    /// Whether it runs without being named.
+    pub is_short: bool,
 }
 
 /// How a step ended.
@@ -31,7 +31,7 @@ struct Outcome {
     failure: Option<String>,
 }
 
-/// Runs the steps of these names, or of jobs of these names, or all but the long ones if there is no name, two at a time. The last line that it
+/// Runs the steps of these names, or of jobs of these names, or the short ones if there is no name, two at a time. The last line that it
 /// prints is `N passed, N failed`, with `, N skipped` if parts of checks were skipped.
 pub fn run<T: Sync>(
     steps: &[Step<T>],
@@ -46,13 +46,13 @@ pub fn run<T: Sync>(
     fs::write(cargo::skipped_file(), "")?;
     let is_chosen = |step: &&Step<T>| {
         let is_named = names.iter().any(|name| step.job == name || step.name == name);
-        is_named || (names.is_empty() && !step.is_long)
+        is_named || (names.is_empty() && step.is_short)
     };
     let chosen: Vec<&Step<T>> = steps.iter().filter(is_chosen).collect();
     let outcomes = outcomes(&chosen, &run);
     if names.is_empty() {
-        let long: Vec<&str> = steps.iter().filter(|it| it.is_long).map(|it| it.name).collect();
-        println!("not run, because they take long: cargo xtask ci {}", long.join(" "));
+        let others: Vec<&str> = steps.iter().filter(|it| !it.is_short).map(|it| it.name).collect();
+        println!("not run: cargo xtask ci {}", others.join(" "));
     }
     let skipped = fs::read_to_string(cargo::skipped_file())?;
     println!("{}", report(&outcomes, &skipped.lines().collect::<Vec<_>>()));
@@ -176,7 +176,7 @@ mod tests {
 
     fn steps() -> Vec<Step<u32>> {
         [("one", "a", 1), ("one", "b", 2), ("two", "c", 3), ("two", "d", 4)]
-            .map(|(job, name, task)| Step { job, name, task, is_long: name == "d" })
+            .map(|(job, name, task)| Step { job, name, task, is_short: name != "d" })
             .into()
     }
 
