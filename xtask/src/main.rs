@@ -150,7 +150,7 @@ enum Task {
 
 /// The steps that run if none is named: half an hour on a fresh machine with two cores. The others run by their names or those of their
 /// jobs, as on GitHub.
-const SHORT: [&str; 13] = [
+const SHORT: [&str; 9] = [
     "format",
     "circles",
     "lint",
@@ -158,12 +158,8 @@ const SHORT: [&str; 13] = [
     "unsafe-code",
     "test-host",
     "embedded",
-    "panics",
-    "golden",
     "lint-emulated",
     "c",
-    "ros",
-    "python",
 ];
 
 /// The steps of CI. Those of the main workspace come first and those of other workspaces last: two run beside each other, one from each
