@@ -66,7 +66,7 @@ pub struct Hypothesis {
 pub enum Answer {
     /// No cycle is complete, or too few pings are in the window.
     Searching,
-    /// So many hypotheses are not excluded, the first ones of [`Search::hypotheses`].
+    /// So many hypotheses are within half the odds of a unique answer, the first ones of [`Search::hypotheses`].
     Several(usize),
     /// The position along this wall is undetermined.
     Along {

@@ -7,6 +7,7 @@ use super::ranked::insert_ranked;
 use super::refine::Spread;
 use super::window::{Bend, Station};
 use sonarfix::geometry::list::remove_at;
+use sonarfix::geometry::numeric::at_least;
 use sonarfix::geometry::vector::Vector;
 
 /// Placements within this distance, metres, and this cosine of rotation (25°) are one mode.
@@ -71,6 +72,8 @@ impl Entry {
 
 /// So many windows of pings after which the past has faded to 1/e: odometry drifts, and a robot may be carried.
 const MEMORY: f32 = 5.0;
+/// Logarithm of the odds against a pose that was not found in earlier cycles: half of those of an answer.
+const MISSED: f32 = 12.0;
 
 #[derive(Debug, Clone)]
 pub(super) struct Bank<const HYPOTHESES: usize> {
@@ -130,10 +133,13 @@ impl<const HYPOTHESES: usize> Bank<HYPOTHESES> {
         if self.entries.is_full() { self.entries.last().map(|entry| entry.score) } else { None }
     }
 
-    /// What earlier pings tell for a newcomer: as little as for any entry, because it would have been found with more.
+    /// What earlier pings tell for a newcomer: as little as for any entry, because it would have been found with more; but at most
+    /// [`MISSED`] less than for the best, because the search does not find everything at once.
     pub fn least_past(&self) -> f32 {
         let pasts = self.entries.iter().map(|entry| entry.past);
-        pasts.reduce(|least, past| if past < least { past } else { least }).unwrap_or(0.0)
+        let least = pasts.reduce(|least, past| if past < least { past } else { least });
+        let best = self.entries.first().map_or(0.0, |entry| entry.past);
+        at_least(best - MISSED, least.unwrap_or(0.0))
     }
 
     /// Whether a placement is near one of the bank, so that refining it leads there.

@@ -54,7 +54,7 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
             return;
         };
         let odds = self.parameters.odds;
-        let least = best.evidence - odds;
+        let least = best.evidence - 0.5 * odds;
         let rivals = self.bank.entries().iter().filter(|entry| entry.evidence > least).count();
         let spread = &best.spread;
         let variance = largest(spread.xx, spread.xy, spread.yy);

@@ -174,10 +174,10 @@ proptest! {
         // From 0.4 to 0.6 a ping the evidence counts more and more.
         let trust = ((f64::from(best.score) / f64::from(best.pings) - 0.4) / 0.2).clamp(0.0, 1.0);
         let lead = trust * (evidence[0] - rival);
-        prop_assume!(evidence.iter().skip(1).all(|other| is_clear(evidence[0] - other, odds)));
+        prop_assume!(evidence.iter().skip(1).all(|other| is_clear(evidence[0] - other, 0.5 * odds)));
         prop_assume!(is_clear(lead, odds) && is_clear(evidence[0], 0.0) && is_clear(variance, 0.09));
         prop_assume!(is_clear(variance / sharpness.0, 1.0) && is_clear(rotation / sharpness.1, 1.0));
-        let rivals = evidence.iter().filter(|other| evidence[0] - **other < odds).count();
+        let rivals = evidence.iter().filter(|other| evidence[0] - **other < 0.5 * odds).count();
         let is_anywhere = evidence[0] > 0.0;
         let is_determined = variance < 0.09;
         let is_sharp = variance < sharpness.0 && rotation < sharpness.1;
