@@ -31,8 +31,8 @@ struct Outcome {
     failure: Option<String>,
 }
 
-/// Runs the steps of these names, or of jobs of these names, or the short ones if there is no name, two at a time. The last line that it
-/// prints is `N passed, N failed`, with `, N skipped` if parts of checks were skipped.
+/// Runs the steps of these names, or of jobs of these names, or the short ones if there is no name, two at a time. The last line
+/// that it prints is `N passed, N failed`, with `, N skipped` if parts of checks were skipped.
 pub fn run<T: Sync>(
     steps: &[Step<T>],
     names: &[String],
@@ -235,6 +235,13 @@ mod tests {
                  1 passed, 1 failed, 2 skipped"
             )
         );
+    }
+
+    /// A name that is no step would leave one out without a word.
+    #[test]
+    fn every_short_name_is_a_step() {
+        let short = crate::steps().iter().filter(|step| step.is_short).count();
+        assert_eq!(short, crate::SHORT.len());
     }
 
     /// The workflow runs every job.
