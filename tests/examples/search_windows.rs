@@ -3,7 +3,7 @@
 //!
 //! A window is a random drive with 12 to 40 pings in a random room of 4 to 12 walls. In every second one
 //! the ranges are random; in the others they are those of a single wall with noise and missed echoes. The
-//! search answers as soon as one cycle has found a single answer, without persistence, so that a wrong one
+//! search answers as soon as one cycle has found a single answer at low odds, so that a wrong one
 //! is not hidden by it.
 //!
 //! `cargo xtask search-windows` runs it. A seed determines a window: `--seed N --windows 1` repeats it.
@@ -71,7 +71,7 @@ enum Ranges {
 fn window(seed: u64) -> Result<(), String> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let walls = walls(&mut rng);
-    let parameters = SearchParameters { persistence: 0, ..SearchParameters::default() };
+    let parameters = SearchParameters { odds: 8.0, ..SearchParameters::default() };
     let mut search: Small = Search::new(&sonar(), Map::new(&walls), parameters);
     let ranges = if seed.is_multiple_of(2) {
         Ranges::Any

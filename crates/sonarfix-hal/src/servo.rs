@@ -219,6 +219,16 @@ impl<P> Servo<P> {
         }
     }
 
+    /// The instant at which it is at its target and still oscillates by a few degrees; centuries ahead before the first
+    /// [`Self::point`]. A fixed ranger is there with the command.
+    #[must_use]
+    pub fn arrives_at(&self) -> Instant {
+        match &self.mounting {
+            Mounting::Turning(setup) => setup.motion.arrives_at(),
+            Mounting::Unknown | Mounting::Fixed { .. } => self.settles_at(),
+        }
+    }
+
     /// The instant at which it has settled at its target; centuries ahead before the first
     /// [`Self::point`]. A fixed ranger has settled with the command.
     #[must_use]

@@ -7,7 +7,7 @@
 //!      ▲                            ▲             Lost                │
 //!      │                            └─────────────────────────────────┤
 //!      └──────────────────────────────────────────────────────────────┘
-//!          2 m and 20 accepted ranges with the verdict Tracking
+//!          2 m and 20 accepted ranges with the verdict Tracking, and no other hypothesis
 //! ```
 //!
 //! - *Tracking*: the localizer alone.
@@ -413,7 +413,7 @@ impl<'m> Navigator<'m> {
                 self.begin_confirmation();
                 return None;
             }
-            Mode::Provisional if self.is_confirmed() => self.track(),
+            Mode::Provisional if self.is_confirmed(search) => self.track(),
             Mode::Tracking | Mode::Provisional => return None,
         }
         Some(self.mode)
@@ -440,8 +440,11 @@ impl<'m> Navigator<'m> {
         self.accepted = 0;
     }
 
-    fn is_confirmed(&self) -> bool {
-        self.accepted >= CONFIRMED_BY && self.driven >= CONFIRMED_AFTER
+    /// Whether the ranges confirm the pose, and the search has excluded every other: a pose of a nearly symmetric room takes ranges of
+    /// the right one.
+    fn is_confirmed(&self, search: &Search) -> bool {
+        let has_rivals = matches!(search.answer(), Answer::Several(2..));
+        self.accepted >= CONFIRMED_BY && self.driven >= CONFIRMED_AFTER && !has_rivals
     }
 
     /// Takes the best hypothesis of each complete cycle as the pose that is unknown, if the pings fit it at all: only the

@@ -66,7 +66,7 @@ pub struct Hypothesis {
 pub enum Answer {
     /// No cycle is complete, or too few pings are in the window.
     Searching,
-    /// So many hypotheses fit, the first ones of [`Search::hypotheses`].
+    /// So many hypotheses are within half the odds of a unique answer, the first ones of [`Search::hypotheses`].
     Several(usize),
     /// The position along this wall is undetermined.
     Along {
@@ -116,7 +116,7 @@ fn is_near(number: f32) -> bool {
     number.abs() <= FARTHEST
 }
 
-/// The search for the pose.
+/// The search for the pose, with so many pings, at most 255, in its window.
 ///
 /// ```
 /// use sonarfix::config::Config;
@@ -176,6 +176,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
     #[inline(always)]
     #[must_use]
     pub fn new(sonar: &RangerParameters, map: Map<'m>, parameters: SearchParameters) -> Self {
+        const { assert!(PINGS <= 255, "entries of the bank count pings in a byte") };
         let (right, left) = (sonar.servo.0.0, sonar.servo.1.0);
         Self {
             parameters,
@@ -275,7 +276,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         // Back from the robot's place to the reference.
         let rotation = Vector::of_angle(turn.0);
         let at = Vector::from(pose.position()).minus(self.window.robot().at.turned(rotation));
-        self.bank.offer(Entry::proposed(Placement { at, rotation, bend }));
+        self.bank.offer(Entry::proposed(Placement { at, rotation, bend }, self.bank.least_past()));
         Ok(())
     }
 
@@ -380,7 +381,7 @@ impl Sweep {
 }
 
 /// A count as a divisor.
-fn at_least_one(count: u16) -> f32 {
+fn at_least_one(count: u8) -> f32 {
     f32::from(if count > 0 { count } else { 1 })
 }
 

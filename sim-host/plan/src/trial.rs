@@ -18,11 +18,11 @@ use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::trace::Pose;
 use sonarfix_sim::world::Ping;
 
-/// Time of one ping of an HC-SR04 on an SG90 with steps of 20°, seconds: a frame of the servo, the
-/// turn, settling and the cycle of the sonar.
-pub const PERIOD: f64 = 0.12;
-/// Evaluations between two pings, which are 120 ms apart.
-const EVALUATIONS: u16 = 120 * EVALUATIONS_PER_MILLISECOND;
+/// Time of one ping of an HC-SR04 on an SG90 with steps of 10°, seconds: the cycle of the sonar, in which the servo turns, and
+/// polls of the loop. A test of the studies compares it with the simulated loop.
+pub const PERIOD: f64 = 0.066;
+/// Evaluations between two pings, which are 66 ms apart.
+const EVALUATIONS: u16 = 66 * EVALUATIONS_PER_MILLISECOND;
 /// Pings with which a search begins.
 const LEAST_PINGS: usize = 12;
 /// The largest systematic error of a wheel.

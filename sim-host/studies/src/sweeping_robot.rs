@@ -99,3 +99,26 @@ impl Recorder for Sweeps {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use sonarfix_plan::trial::PERIOD;
+
+    use super::*;
+    use crate::floor_plan::FloorPlan;
+
+    /// The trials of the search ping as often as the loop at the fidelity of pins.
+    #[test]
+    #[expect(clippy::cast_precision_loss, reason = "some thousand pings")]
+    fn a_sweep_has_the_period_of_the_trials() -> Result<(), Box<dyn core::error::Error>> {
+        for seed in 0..2 {
+            let scenario = FloorPlan::new(seed).scenario()?;
+            let robot = scenario.robot.clone();
+            let pings = drive(scenario, robot, seed)?.0.recording.pings;
+            let end = pings.last().map_or(0.0, |ping| ping.time);
+            let period = end / pings.len() as f64;
+            assert!((period / PERIOD - 1.0).abs() < 0.05, "{period} s");
+        }
+        Ok(())
+    }
+}

@@ -11,7 +11,7 @@ use crate::ranger::Outcome;
 /// The state of a measurement cycle.
 ///
 /// ```text
-///          due: choose, turn the servo        settled, ranger ready, a wall is square: ping
+///          due: choose, turn the servo        settled, ranger ready, a wall is square (or a sweep): ping
 ///   Idle ───────────────────────────▶ Turning ─────────────────────────────────▶ Listening
 ///   ▲  ▲ │ no wall                       │                                           │
 ///   │  └─┘                               │ no wall is square any more,               │

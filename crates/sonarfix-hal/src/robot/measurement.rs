@@ -145,7 +145,7 @@ impl<'m> Robot<'m> {
         Ok(chosen)
     }
 
-    /// Starts a ping once the servo has settled and the ranger is ready ([`can_ping_at`]), if a wall is square to
+    /// Starts a ping once the servo has settled, or is there in a sweep, and the ranger is ready ([`can_ping_at`]), if a wall is square to
     /// the sonar (the robot may have turned in the meantime) or the sonar sweeps.
     pub(super) fn start_ping(
         &mut self,
@@ -161,7 +161,7 @@ impl<'m> Robot<'m> {
             self.abort_cycle(now);
             return;
         };
-        let ready_at = can_ping_at(self.localizer().config(), ranger, poll.hardware);
+        let ready_at = can_ping_at(self.localizer().config(), ranger, &target, poll.hardware);
         if now < ready_at {
             return;
         }

@@ -5,17 +5,24 @@ use sonarfix::config::{Config, MAX_RANGERS, PingSchedule, RangerId};
 use sonarfix::geometry::units::Instant;
 
 use super::Hardware;
+use super::cycle::Target;
 use crate::ranger::Ranger;
 use crate::time::{NEVER, since};
 
-/// The instant at which the servo of a ranger has settled, and the echoes of all pings that the ranger hears have decayed.
-pub(super) fn can_ping_at(
+/// The instant at which the servo of a ranger has settled, and the echoes of all pings that the ranger hears have decayed. A ping of a
+/// sweep need not wait for the servo to settle: the oscillation is far below the cone within which the search expects an echo.
+pub(super) fn can_ping_at<W>(
     config: &Config,
     ranger: RangerId,
+    target: &Target<W>,
     hardware: &mut impl Hardware,
 ) -> Instant {
-    let settled_at = hardware.servo_of(ranger).settles_at();
-    settled_at.max(quiet_at(config, ranger, hardware))
+    let servo = hardware.servo_of(ranger);
+    let is_there_at = match target {
+        Target::Wall(_) => servo.settles_at(),
+        Target::Sweep(_) => servo.arrives_at(),
+    };
+    is_there_at.max(quiet_at(config, ranger, hardware))
 }
 
 /// The instant at which the echoes of all pings that a ranger hears have decayed.

@@ -51,8 +51,9 @@ impl Robot<'_> {
             // Ticks are delayed until it has ended.
             Cycle::Listening { .. } => NEVER,
             Cycle::Idle { until } => until.min(self.ticks.next()),
-            Cycle::Turning { ranger, .. } => {
-                can_ping_at(self.localizer().config(), ranger, hardware).min(self.ticks.next())
+            Cycle::Turning { ranger, target } => {
+                let ready_at = can_ping_at(self.localizer().config(), ranger, &target, hardware);
+                ready_at.min(self.ticks.next())
             }
         };
         self.yaw.as_ref().map_or(next, |yaw| next.min(yaw.next()))

@@ -64,6 +64,10 @@ impl Motion {
         Some(turn.from + (turn.to - turn.from) * (done / whole))
     }
 
+    pub fn arrives_at(&self) -> Instant {
+        self.turn.map_or(NEVER, |turn| turn.arrives)
+    }
+
     pub fn settles_at(&self) -> Instant {
         self.turn.map_or(NEVER, |turn| after(turn.arrives, self.timing.settle))
     }
@@ -89,6 +93,7 @@ mod tests {
         assert_eq!(motion.bearing(at(0)), None);
         // From an unknown bearing: 1.5 + 1.047 rad at worst, 292 ms.
         motion.start(at(0), Radians::from_degrees(60.0), LIMITS);
+        assert!(about(motion.arrives_at(), 20 + 292), "{motion:?}");
         assert!(about(motion.settles_at(), 20 + 292 + 60), "{motion:?}");
         // From 60° to 0°: 120 ms, 30° after 20 + 60.
         motion.start(at(1_000), Radians(0.0), LIMITS);

@@ -1,4 +1,4 @@
-//! The bank: the best placements, one per mode.
+//! The bank: the placements with the most evidence, one per mode.
 
 use heapless::Vec;
 
@@ -7,6 +7,7 @@ use super::ranked::insert_ranked;
 use super::refine::Spread;
 use super::window::{Bend, Station};
 use sonarfix::geometry::list::remove_at;
+use sonarfix::geometry::numeric::at_least;
 use sonarfix::geometry::vector::Vector;
 
 /// Placements within this distance, metres, and this cosine of rotation (25°) are one mode.
@@ -17,16 +18,19 @@ const SAME_ROTATION: f32 = 0.906;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Entry {
     pub placement: Placement,
-    /// Sum of the scores of all pings.
+    /// Sum of the scores of all pings of the window.
     pub score: f32,
+    /// What the pings of earlier cycles tell for it, relative to a place without walls; a ping counts in parts while it moves through
+    /// the window ([`Entry::age`]).
+    pub past: f32,
+    /// That and what the pings of the window tell: the logarithm of the odds against a place without walls.
+    pub evidence: f32,
     /// Pings that were scored, those of them with an echo, and those that a reflector of the map
     /// explains.
-    pub pings: u16,
-    pub echoes: u16,
-    pub explained: u16,
+    pub pings: u8,
+    pub echoes: u8,
+    pub explained: u8,
     pub spread: Spread,
-    /// Novel pings while it was the only answer.
-    pub streak: u16,
     pub state: State,
 }
 
@@ -43,19 +47,33 @@ pub(super) enum State {
 
 impl Entry {
     /// A placement that was not scored yet.
-    pub fn proposed(placement: Placement) -> Self {
+    pub fn proposed(placement: Placement, past: f32) -> Self {
         Self {
             placement,
             score: f32::MIN,
+            past,
+            evidence: f32::MIN,
             pings: 0,
             echoes: 0,
             explained: 0,
             spread: Spread::default(),
-            streak: 0,
             state: State::Stale,
         }
     }
 }
+
+impl Entry {
+    /// Counts so much of the window's pings as past: the share of the window that new pings have filled. Each ping so counts once in
+    /// the time that it takes from one end of a full window to the other. The past fades with [`MEMORY`].
+    pub fn age(&mut self, gain: f32, share: f32) {
+        self.past += share * (gain - self.past / MEMORY);
+    }
+}
+
+/// So many windows of pings after which the past has faded to 1/e: odometry drifts, and a robot may be carried.
+const MEMORY: f32 = 5.0;
+/// Logarithm of the odds against a pose that was not found in earlier cycles: half of those of an answer.
+const MISSED: f32 = 12.0;
 
 #[derive(Debug, Clone)]
 pub(super) struct Bank<const HYPOTHESES: usize> {
@@ -115,12 +133,21 @@ impl<const HYPOTHESES: usize> Bank<HYPOTHESES> {
         if self.entries.is_full() { self.entries.last().map(|entry| entry.score) } else { None }
     }
 
+    /// What earlier pings tell for a newcomer: as little as for any entry, because it would have been found with more; but at most
+    /// [`MISSED`] less than for the best, because the search does not find everything at once.
+    pub fn least_past(&self) -> f32 {
+        let pasts = self.entries.iter().map(|entry| entry.past);
+        let least = pasts.reduce(|least, past| if past < least { past } else { least });
+        let best = self.entries.first().map_or(0.0, |entry| entry.past);
+        at_least(best - MISSED, least.unwrap_or(0.0))
+    }
+
     /// Whether a placement is near one of the bank, so that refining it leads there.
     pub fn has_near(&self, placement: &Placement, distance: f32) -> bool {
         self.entries.iter().any(|entry| is_near(&entry.placement, placement, distance))
     }
 
-    /// Adds an entry, or lets it replace those of its mode if it is better.
+    /// Adds an entry, or lets it replace those of its mode if the pings of the window fit it better.
     #[inline(never)]
     pub fn offer(&mut self, mut entry: Entry) {
         let placement = entry.placement;
@@ -129,10 +156,13 @@ impl<const HYPOTHESES: usize> Bank<HYPOTHESES> {
             if other.score >= entry.score {
                 return;
             }
-            entry.streak = if other.streak > entry.streak { other.streak } else { entry.streak };
+            if other.past > entry.past {
+                entry.evidence += other.past - entry.past;
+                entry.past = other.past;
+            }
         }
         self.remove(is_same);
-        insert_ranked(&mut self.entries, entry, |entry| entry.score);
+        insert_ranked(&mut self.entries, entry, |entry| entry.evidence);
     }
 
     /// Moves all placements to a new reference of the odometry frame, of which `bend` is taken out.

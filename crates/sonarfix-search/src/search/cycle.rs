@@ -170,7 +170,7 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
         let full = self.bank.least_score().unwrap_or(0.0);
         let least = if full > rivalry * best { full } else { rivalry * best };
         let least = if least > 0.0 { least } else { 0.0 };
-        self.work = Work::Trial(Trial::of_candidate(placement, least));
+        self.work = Work::Trial(Trial::of_candidate(placement, least, self.bank.least_past()));
     }
 
     /// The pairs of this cycle: the best ones, then others that take turns.

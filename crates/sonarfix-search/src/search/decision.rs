@@ -5,19 +5,16 @@ use sonarfix::geometry::units::Metres;
 use sonarfix::geometry::vector::Vector;
 use sonarfix::map::WallId;
 
-use super::bank::Entry;
+use super::bank::{Entry, State};
 use super::state::{Decision, Work};
-use super::trial::Trial;
+use super::trial::{Trial, count};
 use super::{Search, at_least_one, largest};
 
-/// Below this mean log-likelihood per ping, relative to echoes anywhere, much that is around is not in the map: the
-/// answer has to persist for so many times longer, unless it leads by so many margins.
-const UNCERTAIN_SCORE: f32 = 0.3;
-const UNCERTAIN_FOR: u16 = 3;
-const CLEAR_LEAD: f32 = 4.0;
-/// An answer that leads by so many margins need not persist longer than for half of the novel pings.
-const LARGE_LEAD: f32 = 8.0;
-/// A global check is made when a hypothesis has persisted, and at least once in so many cycles.
+/// Mean scores per ping at which the evidence counts not at all, and fully: where much of what is around is not in the map, pings
+/// that no wall explains come in groups.
+const UNTRUSTED: f32 = 0.4;
+const TRUSTED: f32 = 0.6;
+/// A global check is made before an answer, and at least once in so many cycles.
 const CHECK_EVERY: u32 = 4;
 /// A position with a larger deviation than this is undetermined, metres.
 const UNDETERMINED: f32 = 0.3;
@@ -25,8 +22,12 @@ const UNDETERMINED: f32 = 0.3;
 impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> {
     /// Mean log-likelihood per ping, relative to a place without walls.
     pub(super) fn fit_of(&self, entry: &Entry) -> f32 {
-        let nothing = self.echoes.nothing(entry.pings, entry.echoes);
-        (entry.score - nothing) / at_least_one(entry.pings)
+        self.gain(entry) / at_least_one(entry.pings)
+    }
+
+    /// What the pings of the window tell for an entry, relative to a place without walls.
+    fn gain(&self, entry: &Entry) -> f32 {
+        entry.score - self.echoes.nothing(entry.pings.into(), entry.echoes.into())
     }
 
     /// Whether the lines are more than one wall.
@@ -52,31 +53,27 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
             self.is_check_due = true;
             return;
         };
-        let least = best.score - self.parameters.margin;
-        let rivals = self.bank.entries().iter().filter(|entry| entry.score > least).count();
+        let odds = self.parameters.odds;
+        let least = best.evidence - 0.5 * odds;
+        let rivals = self.bank.entries().iter().filter(|entry| entry.evidence > least).count();
         let spread = &best.spread;
-        let is_fit = self.fit_of(&best) >= self.parameters.least_fit;
         let variance = largest(spread.xx, spread.xy, spread.yy);
         let is_determined = variance < UNDETERMINED * UNDETERMINED;
         let (position, heading) = self.parameters.sharpness;
         let is_sharp =
             variance < position.0 * position.0 && spread.rotation < heading.0 * heading.0;
-        let has_lines = self.has_separate_lines();
-        let is_sole = rivals == 1 && is_fit && is_determined && has_lines;
-        for (n, entry) in self.bank.entries_mut().iter_mut().enumerate() {
-            let streak = entry.streak.saturating_add(fresh);
-            entry.streak = if n == 0 && is_sole { streak } else { 0 };
-        }
-        let persistence = self.persistence(&best);
-        let has_persisted = is_sole && best.streak.saturating_add(fresh) >= persistence && is_sharp;
+        let is_clear = self.lead(&best) >= odds && is_sharp && self.has_separate_lines();
+        self.age(fresh);
         let was_unique = matches!(self.answer, Decision::Unique(_));
         self.is_check_due =
-            has_persisted && !is_checked && !was_unique || self.cycles.is_multiple_of(CHECK_EVERY);
-        self.answer = if !is_fit {
+            is_clear && !is_checked && !was_unique || self.cycles.is_multiple_of(CHECK_EVERY);
+        // False for NaN.
+        let is_anywhere = best.evidence > 0.0;
+        self.answer = if !is_anywhere {
             Decision::Nowhere
         } else if let Some(along) = self.along(&best).filter(|_| !is_determined) {
             along
-        } else if has_persisted && (is_checked || was_unique) {
+        } else if is_clear && (is_checked || was_unique) {
             // The answer before stays until this one is refined.
             self.work = Work::Trial(Trial::of_answer(&best));
             return;
@@ -85,19 +82,25 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
         };
     }
 
-    /// Novel pings during which the best entry must be the only answer: the fewer, the farther it leads.
-    pub(super) fn persistence(&self, best: &Entry) -> u16 {
-        let nothing = self.echoes.nothing(best.pings, best.echoes);
-        let second = self.bank.entries().get(1).map_or(nothing, |entry| entry.score);
-        let lead = (best.score - at_least(second, nothing)) / self.parameters.margin;
-        let is_low = best.score < UNCERTAIN_SCORE * f32::from(best.pings);
-        let persistence = self.parameters.persistence;
-        if lead >= LARGE_LEAD {
-            persistence / 2
-        } else if is_low && lead < CLEAR_LEAD {
-            persistence.saturating_mul(UNCERTAIN_FOR)
-        } else {
-            persistence
+    /// Logarithm of the odds of the best entry against the next, or a place without walls if that is more probable; less if
+    /// the pings hardly fit it.
+    pub(super) fn lead(&self, best: &Entry) -> f32 {
+        let second = self.bank.entries().get(1).map_or(0.0, |entry| entry.evidence);
+        let mean = best.score / at_least_one(best.pings);
+        let trust = at_least((mean - UNTRUSTED) / (TRUSTED - UNTRUSTED), 0.0);
+        let trust = if trust < 1.0 { trust } else { 1.0 };
+        trust * (best.evidence - at_least(second, 0.0))
+    }
+
+    /// Counts what so many new pings have moved through the window as past.
+    fn age(&mut self, fresh: u16) {
+        let share = f32::from(fresh) / count(PINGS);
+        let share = if share < 1.0 { share } else { 1.0 };
+        // One that was proposed in this cycle has no score.
+        let scored = self.bank.entries_mut().iter_mut().filter(|it| it.state == State::Fresh);
+        for entry in scored {
+            let gain = entry.score - self.echoes.nothing(entry.pings.into(), entry.echoes.into());
+            entry.age(gain, share);
         }
     }
 

@@ -8,10 +8,10 @@ use sonarfix::sensor::echo::EchoParameters;
 /// What the search is tuned with.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SearchParameters {
-    /// A ping is novel if none was sent from within 30 cm in a direction within this angle. The
+    /// A ping is novel if none was sent from within 20 cm in a direction within this angle. The
     /// plain sweep has steps of this angle.
     pub novel_angle: Radians,
-    /// The same before the robot has driven 30 cm: with nothing else to measure, more pings help.
+    /// The same before the robot has driven 20 cm: with nothing else to measure, more pings help.
     pub novel_angle_at_rest: Radians,
     /// Deviation of the odometry's heading drift per metre of travel.
     pub drift: Radians,
@@ -21,12 +21,9 @@ pub struct SearchParameters {
     pub odometry: f32,
     /// What a ping returns besides the range of its wall.
     pub echo: EchoParameters,
-    /// Hypotheses within this log-likelihood of the best are answers, too.
-    pub margin: f32,
-    /// The mean log-likelihood per ping, relative to a place without walls, of a hypothesis that fits.
-    pub least_fit: f32,
-    /// Novel pings during which one hypothesis must be the only answer before it is unique.
-    pub persistence: u16,
+    /// Logarithm of the odds by which a unique answer leads every other hypothesis and a place without walls. Pings near each other share
+    /// the errors of map and odometry, so that it is far above that of odds of 1,000 to 1, 6.9.
+    pub odds: f32,
     /// Largest deviations of position and heading of a unique answer.
     pub sharpness: (Metres, Radians),
 }
@@ -34,15 +31,13 @@ pub struct SearchParameters {
 impl Default for SearchParameters {
     fn default() -> Self {
         Self {
-            novel_angle: Radians::from_degrees(20.0),
+            novel_angle: Radians::from_degrees(10.0),
             novel_angle_at_rest: Radians::from_degrees(3.8),
             drift: Radians::from_degrees(2.0),
             turn_scale: 0.02,
             odometry: 0.015,
             echo: EchoParameters::HC_SR04,
-            margin: 8.0,
-            least_fit: 0.5,
-            persistence: 20,
+            odds: 24.0,
             sharpness: (Metres(0.05), Radians::from_degrees(3.0)),
         }
     }

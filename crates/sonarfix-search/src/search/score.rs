@@ -54,7 +54,7 @@ impl Sharpness {
     /// and odometry nearby together.
     pub const COARSE: f32 = 0.15;
     pub const MEDIUM: f32 = 0.08;
-    pub const FINE: f32 = 0.05;
+    pub const FINE: f32 = 0.035;
     /// Of an answer: the hand-over is as exact as the nearest pings.
     pub const SHARP: f32 = 0.025;
 

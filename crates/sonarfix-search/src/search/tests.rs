@@ -26,11 +26,12 @@ impl Search<'_> {
         let rotation = Vector::of_angle(turn.0);
         let at = Vector::from(pose.position()).minus(self.window.robot().at.turned(rotation));
         let placement = Placement { at, rotation, bend: self.window.bend() };
-        let (pings, (position, heading)) = (10, deviation);
-        let score = self.echoes.nothing(pings, pings) + fit * f32::from(pings);
+        let (pings, (position, heading)) = (10_u8, deviation);
+        let score = self.echoes.nothing(pings.into(), pings.into()) + fit * f32::from(pings);
         let (xx, rotation) = (position * position, heading * heading);
         let spread = Spread { xx, xy: 0.0, yy: xx, rotation };
-        let entry = Entry { score, pings, echoes: pings, spread, ..Entry::proposed(placement) };
+        let entry =
+            Entry { score, pings, echoes: pings, spread, ..Entry::proposed(placement, 0.0) };
         self.bank = Bank::of(&[entry]);
         self.answer = Decision::Several(1);
         self.cycles += 1;
@@ -109,15 +110,15 @@ prop_compose! {
 prop_compose! {
     fn entry()(
         (x, y, angle) in (0.5_f32..5.5, 0.5_f32..3.5, -3.1_f32..3.1), score in 0.0_f32..1.5,
-        pings in 12_u16..96, silent in 0_u16..6, spread in spread(),
-        streak in prop_oneof![0_u16..15, 0_u16..90],
+        pings in 12_u8..96, silent in 0_u8..6, spread in spread(),
+        past in 0.0_f32..30.0, evidence in -10.0_f32..120.0,
     ) -> Entry {
         let placement = Placement {
             at: Vector::new(x, y), rotation: Vector::of_angle(angle), bend: Bend::default(),
         };
         Entry {
             placement, score: score * f32::from(pings), pings, echoes: pings - silent, explained: pings / 2,
-            spread, streak, state: State::Fresh,
+            spread, past, evidence, state: State::Fresh,
         }
     }
 }
@@ -133,7 +134,7 @@ proptest! {
 
     #[test]
     fn a_cycle_ends_by_the_rules(
-        best in entry(), leads in prop::collection::vec(0.0_f32..90.0, 0..3), other in entry(),
+        best in entry(), leads in prop::collection::vec(0.0_f32..60.0, 0..3), other in entry(),
         fresh in prop_oneof![0_u16..10, 0_u16..40], taken in 0_u16..500, cycles in 0_u32..50, are_separate in any::<bool>(),
         (is_checked, was_unique) in (any::<bool>(), any::<bool>()),
         is_sharp_entry in any::<bool>(),
@@ -146,10 +147,10 @@ proptest! {
             best.spread = Spread { xx: 1e-3, xy: 2e-4, yy: 5e-4, rotation: 1e-4 };
         }
         let mut bank: Vec<Entry> = Vec::from([best]);
-        let mut score = best.score;
+        let mut evidence = best.evidence;
         for lead in leads {
-            score -= lead;
-            bank.push(Entry { score, ..other });
+            evidence -= lead;
+            bank.push(Entry { evidence, ..other });
         }
         search.bank = Bank::of(&bank);
         let second = if are_separate { 1.6 } else { 0.1 };
@@ -162,48 +163,44 @@ proptest! {
         search.work = Work::None;
 
         let parameters = search.parameters;
-        let margin = f64::from(parameters.margin);
-        let scores: Vec<f64> = bank.iter().map(|entry| f64::from(entry.score)).collect();
-        let nothing = f64::from(search.echoes.nothing(best.pings, best.echoes));
-        let fit = (scores[0] - nothing) / f64::from(best.pings);
+        let odds = f64::from(parameters.odds);
+        let evidence: Vec<f64> = bank.iter().map(|entry| f64::from(entry.evidence)).collect();
         let (variance, axis) = largest_of(&best.spread);
         let sharpness = (
             f64::from(parameters.sharpness.0.0).powi(2), f64::from(parameters.sharpness.1.0).powi(2),
         );
         let rotation = f64::from(best.spread.rotation);
-        let rival = scores.get(1).copied().unwrap_or(nothing).max(nothing);
-        let lead = (scores[0] - rival) / margin;
-        let pings = f64::from(best.pings);
-        prop_assume!(scores.iter().skip(1).all(|score| is_clear(scores[0] - score, margin)));
-        prop_assume!(is_clear(fit, parameters.least_fit.into()) && is_clear(variance, 0.09));
+        let rival = evidence.get(1).copied().unwrap_or(0.0).max(0.0);
+        // From 0.4 to 0.6 a ping the evidence counts more and more.
+        let trust = ((f64::from(best.score) / f64::from(best.pings) - 0.4) / 0.2).clamp(0.0, 1.0);
+        let lead = trust * (evidence[0] - rival);
+        prop_assume!(evidence.iter().skip(1).all(|other| is_clear(evidence[0] - other, 0.5 * odds)));
+        prop_assume!(is_clear(lead, odds) && is_clear(evidence[0], 0.0) && is_clear(variance, 0.09));
         prop_assume!(is_clear(variance / sharpness.0, 1.0) && is_clear(rotation / sharpness.1, 1.0));
-        prop_assume!(is_clear(lead, 8.0) && is_clear(lead, 4.0) && is_clear(scores[0], 0.3 * pings));
-        let rivals = scores.iter().filter(|score| scores[0] - **score < margin).count();
-        let is_fit = fit > parameters.least_fit.into();
+        let rivals = evidence.iter().filter(|other| evidence[0] - **other < 0.5 * odds).count();
+        let is_anywhere = evidence[0] > 0.0;
         let is_determined = variance < 0.09;
-        let is_sole = rivals == 1 && is_fit && is_determined && are_separate;
-        let persistence = if lead > 8.0 {
-            parameters.persistence / 2
-        } else if scores[0] < 0.3 * pings && lead < 4.0 {
-            parameters.persistence * 3
-        } else {
-            parameters.persistence
-        };
         let is_sharp = variance < sharpness.0 && rotation < sharpness.1;
-        let streak = best.streak + fresh;
-        let has_persisted = is_sole && is_sharp && streak >= persistence;
+        let is_unique_one = lead > odds && is_sharp && are_separate;
+        // What has moved through the window of 16 pings; the past fades in five windows.
+        let share = (f64::from(fresh) / 16.0).min(1.0);
+        let pasts: Vec<f64> = bank.iter().map(|entry| {
+            let nothing = f64::from(search.echoes.nothing(entry.pings.into(), entry.echoes.into()));
+            let past = f64::from(entry.past);
+            past * (1.0 - share / 5.0) + share * (f64::from(entry.score) - nothing)
+        }).collect();
 
         search.decide(is_checked);
         prop_assert_eq!(search.cycles, cycles + 1);
         prop_assert_eq!(search.taken, search.window.taken());
-        let streaks: Vec<u16> = search.bank.entries().iter().map(|entry| entry.streak).collect();
-        let first = if is_sole { streak } else { 0 };
-        prop_assert!(streaks[0] == first && streaks.iter().skip(1).all(|streak| *streak == 0));
-        let is_due = has_persisted && !is_checked && !was_unique || (cycles + 1) % 4 == 0;
+        for (entry, past) in search.bank.entries().iter().zip(pasts) {
+            prop_assert!((f64::from(entry.past) - past).abs() < 1e-3, "{} {past}", entry.past);
+        }
+        let is_due = is_unique_one && !is_checked && !was_unique || (cycles + 1) % 4 == 0;
         prop_assert_eq!(search.is_check_due, is_due);
-        let is_unique = is_fit && has_persisted && (is_checked || was_unique);
+        let is_unique = is_anywhere && is_unique_one && (is_checked || was_unique);
         prop_assert_eq!(matches!(search.work, Work::Trial(_)), is_unique);
-        if !is_fit {
+        if !is_anywhere {
             prop_assert_eq!(search.answer, Decision::Nowhere);
         } else if is_unique {
             prop_assert_eq!(search.answer, before);
@@ -320,7 +317,7 @@ fn a_position_is_undetermined_along_the_nearest_parallel_wall() {
         let at = Vector::new(at.0, at.1);
         let placement = Placement { at, rotation, bend: Bend::default() };
         let spread = Spread { xx, xy: 0.0, yy, rotation: 1e-4 };
-        let entry = Entry { spread, ..Entry::proposed(placement) };
+        let entry = Entry { spread, ..Entry::proposed(placement, 0.0) };
         assert_eq!(search.along(&entry), Some(Decision::Along(WallId(expected), 1.0)));
     }
 }

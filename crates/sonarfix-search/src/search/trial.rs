@@ -56,14 +56,14 @@ pub(super) struct Trial {
     /// The final score that must be within reach.
     least: f32,
     equations: Equations,
-    streak: u16,
+    past: f32,
     /// Whether the placement becomes an answer.
     pub is_answer: bool,
 }
 
 impl Trial {
-    /// A new candidate that has to reach a final score.
-    pub fn of_candidate(placement: Placement, least: f32) -> Self {
+    /// A new candidate that has to reach a final score; `past` is what earlier pings tell for it.
+    pub fn of_candidate(placement: Placement, least: f32, past: f32) -> Self {
         Self {
             placement,
             stage: Stage::Coarse,
@@ -74,7 +74,7 @@ impl Trial {
             sum: 0.0,
             least,
             equations: Equations::default(),
-            streak: 0,
+            past,
             is_answer: false,
         }
     }
@@ -83,8 +83,7 @@ impl Trial {
     pub fn of_entry(entry: &Entry) -> Self {
         Self {
             stage: Stage::Step(0),
-            streak: entry.streak,
-            ..Self::of_candidate(entry.placement, f32::NEG_INFINITY)
+            ..Self::of_candidate(entry.placement, f32::NEG_INFINITY, entry.past)
         }
     }
 
@@ -102,7 +101,7 @@ impl Trial {
         odometry: &Odometry,
     ) -> Verdict {
         let Some(ping) = window.newest(usize::from(self.seen)) else {
-            return self.end_stage(odometry.prior);
+            return self.end_stage(odometry.prior, echoes, PINGS);
         };
         let sharpness =
             Sharpness::new(self.deviation(), odometry.per_metre * ping.station.travelled);
@@ -169,21 +168,28 @@ impl Trial {
         rate * f32::from(self.seen) - LEAD
     }
 
-    fn end_stage(&mut self, prior: Prior) -> Verdict {
+    fn end_stage(&mut self, prior: Prior, echoes: &EchoModel, most: usize) -> Verdict {
         match self.stage {
             Stage::Coarse => self.step(0, prior),
             Stage::Step(number) => self.step(number + 1, prior),
             Stage::Fine => Verdict::Scored(Entry {
                 placement: self.placement,
                 score: self.sum,
-                pings: self.seen,
-                echoes: self.echoes,
-                explained: self.equations.count,
+                past: self.past,
+                evidence: self.evidence(echoes, most),
+                pings: narrow(self.seen),
+                echoes: narrow(self.echoes),
+                explained: narrow(self.equations.count),
                 spread: self.equations.spread(prior),
-                streak: self.streak,
                 state: State::Fresh,
             }),
         }
+    }
+
+    /// The past, and what it does not hold of the pings: the newer, the more ([`Entry::age`]); of a full window half, on the mean.
+    fn evidence(&self, echoes: &EchoModel, most: usize) -> f32 {
+        let left = 1.0 - 0.5 * f32::from(self.seen) / count(most);
+        self.past + left * (self.sum - echoes.nothing(self.seen, self.echoes))
     }
 
     /// Takes the Gauss–Newton step of a stage and begins the next.
@@ -206,6 +212,11 @@ impl Trial {
         self.equations = Equations::default();
         Verdict::Running
     }
+}
+
+/// A number of pings in a byte: a window holds at most 255.
+fn narrow(count: u16) -> u8 {
+    u8::try_from(count).unwrap_or(u8::MAX)
 }
 
 /// A number of pings as `f32`.

@@ -18,7 +18,7 @@ use sonarfix::geometry::units::Radians;
 use sonarfix::geometry::vector::Vector;
 
 /// A ping is novel if no ping of the window was sent from within this distance, metres, in the same direction.
-const NOVEL_DISTANCE: f32 = 0.3;
+const NOVEL_DISTANCE: f32 = 0.2;
 
 /// How the heading by odometry departs from the true one: by wheels of unequal size, and by an error
 /// of the track width.

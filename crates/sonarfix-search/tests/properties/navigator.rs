@@ -80,6 +80,14 @@ impl<'a> Robot<'a> {
         panic!("the mode is still {mode:?} after {driven} m");
     }
 
+    /// Carries it along the circle by this angle.
+    fn carry(&mut self, angle: f32) {
+        let (sin, cos) = angle.sin_cos();
+        let (dx, dy) = (self.truth.x.0 - 1.6, self.truth.y.0 - 2.0);
+        let at = Pose::new(1.6 + cos * dx - sin * dy, 2.0 + sin * dx + cos * dy, Radians(0.0));
+        self.truth = Pose { heading: self.truth.heading.turned(Radians(angle)), ..at };
+    }
+
     fn error(&self) -> f32 {
         let pose = self.navigator.localizer().pose();
         (pose.x - self.truth.x).0.hypot((pose.y - self.truth.y).0)
@@ -149,13 +157,24 @@ fn a_provisional_pose_that_fails_leads_back_to_the_search() {
     robot.navigator.search(&mut robot.search);
     robot.until_changed(400);
     assert_eq!(robot.navigator.mode(), Mode::Provisional);
-    // Carried to the other side of the circle.
-    let (dx, dy) = (robot.truth.x.0 - 1.6, robot.truth.y.0 - 2.0);
-    let turned = robot.truth.heading.turned(Radians(core::f32::consts::PI));
-    robot.truth = Pose { heading: turned, ..Pose::new(1.6 - dx, 2.0 - dy, Radians(0.0)) };
+    robot.carry(core::f32::consts::FRAC_PI_2);
     robot.until_changed(200);
     assert_eq!(robot.navigator.mode(), Mode::Searching);
     assert_eq!(robot.verdict(), Verdict::Lost);
+}
+
+/// On the other side of the circle the room is nearly the same: ranges confirm the wrong pose, and the right one remains a hypothesis.
+#[test]
+fn a_pose_with_a_rival_is_not_confirmed() {
+    let room = Room::irregular();
+    let mut robot = Robot::new(&room, on_circle(), on_circle());
+    robot.navigator.search(&mut robot.search);
+    robot.until_changed(400);
+    robot.carry(core::f32::consts::PI);
+    for _ in 0..200 {
+        robot.step();
+        assert!(robot.navigator.mode() != Mode::Tracking || robot.error() < 0.1);
+    }
 }
 
 #[test]

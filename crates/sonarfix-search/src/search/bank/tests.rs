@@ -28,15 +28,18 @@ prop_compose! {
 }
 
 prop_compose! {
-    fn entry()(placement in placement(), score in 0_u8..20, streak in 0_u16..30) -> Entry {
-        Entry { score: f32::from(score), streak, state: State::Fresh, ..Entry::proposed(placement) }
+    fn entry()(placement in placement(), score in 0_u8..20, past in 0_u8..30) -> Entry {
+        let (score, past) = (f32::from(score), f32::from(past));
+        let evidence = past + 0.5 * score;
+        Entry { score, evidence, state: State::Fresh, ..Entry::proposed(placement, past) }
     }
 }
 
 proptest! {
     #![proptest_config(ProptestConfig { max_global_rejects: 50_000, ..ProptestConfig::default() })]
 
-    /// One entry for each mode, with the longest streak of it; the first ones of equal scores stay.
+    /// One entry for each mode, the one with the best score of it and the largest past, ranked by evidence; the first ones of equal
+    /// evidence stay.
     #[test]
     fn the_bank_holds_the_best_of_each_mode(entries in prop::collection::vec(entry(), 1..30)) {
         let mut bank: Bank<4> = Bank::new();
@@ -52,17 +55,21 @@ proptest! {
             prop_assert_eq!(bank.has_near(&entry.placement, 0.3), of_mode().count() > 0);
             bank.offer(entry);
             if of_mode().all(|other| other.score < entry.score) {
-                let streak = of_mode().map(|other| other.streak).chain([entry.streak]).max();
+                let past = of_mode().map(|other| other.past).fold(entry.past, f32::max);
                 let mut same = same.iter();
                 expected.retain(|_| same.next() == Some(&false));
-                expected.push(Entry { streak: streak.unwrap_or(0), ..entry });
+                expected.push(Entry { past, evidence: entry.evidence + past - entry.past, ..entry });
                 // Stable.
-                expected.sort_by(|one, other| other.score.total_cmp(&one.score));
+                expected.sort_by(|one, other| other.evidence.total_cmp(&one.evidence));
                 expected.truncate(4);
             }
             prop_assert_eq!(bank.entries(), &expected[..]);
             let least = (expected.len() == 4).then(|| expected[3].score);
             prop_assert_eq!(bank.least_score(), least);
+            let least = expected.iter().map(|entry| entry.past).fold(f32::INFINITY, f32::min);
+            // No more than 12 below the best.
+            let least = least.max(expected[0].past - 12.0);
+            prop_assert_eq!(bank.least_past(), least);
         }
     }
 
@@ -84,7 +91,7 @@ proptest! {
         );
         let (sin, cos) = (angle + turn).sin_cos();
         let bend = Bend { drift: taken.0, turn_scale: taken.1 };
-        let mut bank: Bank<4> = Bank::of(&[Entry::proposed(placement)]);
+        let mut bank: Bank<4> = Bank::of(&[Entry::proposed(placement, 0.0)]);
         bank.rebase(&station, bend);
         let moved = bank.entries()[0].placement;
         for (is, expected) in [
@@ -101,7 +108,7 @@ proptest! {
     ) {
         let expected = is_one_mode(&one, &other, distance);
         prop_assume!(expected.is_some());
-        let bank: Bank<4> = Bank::of(&[Entry::proposed(one)]);
+        let bank: Bank<4> = Bank::of(&[Entry::proposed(one, 0.0)]);
         prop_assert_eq!(Some(bank.has_near(&other, distance)), expected);
     }
 }
@@ -112,7 +119,7 @@ fn entries_are_tried_one_after_the_other() {
     let entry = |x: f32, score| {
         let rotation = Vector::new(1.0, 0.0);
         let placement = Placement { at: Vector::new(x, 0.0), rotation, bend: Bend::NONE };
-        Entry { score, ..Entry::proposed(placement) }
+        Entry { score, evidence: score, ..Entry::proposed(placement, 0.0) }
     };
     let mut bank: Bank<4> = Bank::of(&[entry(0.0, 3.0), entry(1.0, 2.0), entry(2.0, 1.0)]);
     for entry in bank.entries_mut() {

@@ -113,7 +113,7 @@ fn a_hypothesis_has_the_figures_of_its_entry() {
         echoes: 16,
         explained: 12,
         spread,
-        ..Entry::proposed(placement)
+        ..Entry::proposed(placement, 0.0)
     };
     search.bank = Bank::of(&[entry]);
     let nothing = f64::from(search.echoes.nothing(20, 16));
@@ -156,7 +156,7 @@ fn pings_and_lines_are_placed_by_the_best_hypothesis() {
     assert_eq!((search.placed_pings().count(), search.placed_lines().count()), (0, 0));
     let rotation = Vector::new(0.0, 1.0);
     let placement = Placement { at: Vector::new(3.0, 1.0), rotation, bend: Bend::NONE };
-    search.bank = Bank::of(&[Entry::proposed(placement)]);
+    search.bank = Bank::of(&[Entry::proposed(placement, 0.0)]);
     let is_at = |point: Point, x: f32, y: f32| (point.x.0 - x).hypot(point.y.0 - y) < 1e-5;
     let pings: Vec<(Point, Option<Point>)> = search.placed_pings().collect();
     assert!(is_at(pings[0].0, 3.0, 0.0) && is_at(pings[1].0, 3.0, 0.0), "{pings:?}");
@@ -220,7 +220,7 @@ proptest! {
             let placement = Placement {
                 at: Vector::new(f32::from(n), 1.0), rotation: Vector::of_angle(0.0), bend: Bend::NONE,
             };
-            Entry { score: *score, ..Entry::proposed(placement) }
+            Entry { score: *score, ..Entry::proposed(placement, 0.0) }
         }).collect();
         search.bank = Bank::of(&entries);
         // Forth and back: the start stays where it is.
@@ -250,7 +250,7 @@ proptest! {
         search.try_candidate(placement, near, rivalry);
         let is_tried = !is_known && (!has_region || outside < 0.0);
         let expected =
-            if is_tried { Work::Trial(Trial::of_candidate(placement, least)) } else { Work::None };
+            if is_tried { Work::Trial(Trial::of_candidate(placement, least, 0.0)) } else { Work::None };
         prop_assert_eq!(format!("{:?}", search.work), format!("{:?}", expected));
     }
 }

@@ -109,12 +109,12 @@ fn run(
 }
 
 proptest! {
-    /// Stages of 15, 8 and 5 cm with a step after each, and a final one; an answer has two steps at 2.5 cm more.
+    /// Stages of 15, 8 and 3.5 cm with a step after each, and a final one; an answer has two steps at 2.5 cm more.
     #[test]
     fn a_trial_refines_a_placement_and_scores_it(
         turn in -0.1_f32..0.1, pings in 5_usize..32, noise in prop::collection::vec(-0.06_f32..0.06, 5),
         (dx, dy, angle) in (-0.2_f32..0.2, -0.2_f32..0.2, -0.1_f32..0.1), wanted in prop::option::of(0.0_f32..80.0),
-        kind in 0_u8..3, streak in 0_u16..50, per_metre in 0.0_f32..0.05,
+        kind in 0_u8..3, past in 0.0_f32..50.0, per_metre in 0.0_f32..0.05,
     ) {
         let walls = walls();
         let config = Config::for_track_width(Metres(0.2));
@@ -129,13 +129,13 @@ proptest! {
             rotation: placement.rotation.turned(Vector::of_angle(angle)),
             ..placement
         };
-        let entry = Entry { streak, ..Entry::proposed(placement) };
+        let entry = Entry::proposed(placement, past);
         // Deviation of each stage, share of the wanted mean and slack.
         let coarse = (0.15, 0.5, 0.3);
-        let steps = [(0.08, 0.7, 0.15), (0.05, 0.9, 0.1), (0.025, 0.9, 0.1), (0.025, 0.9, 0.1)];
+        let steps = [(0.08, 0.7, 0.15), (0.035, 0.9, 0.1), (0.025, 0.9, 0.1), (0.025, 0.9, 0.1)];
         let least = if kind == 0 { wanted.unwrap_or(f32::NEG_INFINITY) } else { f32::NEG_INFINITY };
         let (trial, stages) = match kind {
-            0 => (Trial::of_candidate(placement, least), Vec::from([coarse, steps[0], steps[1]])),
+            0 => (Trial::of_candidate(placement, least, past), Vec::from([coarse, steps[0], steps[1]])),
             1 => (Trial::of_entry(&entry), Vec::from([steps[0], steps[1]])),
             _ => (Trial::of_answer(&entry), Vec::from(steps)),
         };
@@ -143,6 +143,7 @@ proptest! {
         prop_assert_eq!(trial.is_answer, kind == 2);
         let (mut at, mut evaluations) = (placement, 0);
         let mut expected = None;
+        let mut evidence = f64::NAN;
         let number = stages.len();
         for (n, (deviation, share, slack)) in stages.into_iter().chain([last]).enumerate() {
             let sum = stage(&echoes, &window, &odometry, &at, deviation);
@@ -166,19 +167,28 @@ proptest! {
                 at = sum.equations.step(&at, prior).unwrap();
                 continue;
             }
+            let nothing = f64::from(echoes.nothing(u16::try_from(pings).unwrap(), sum.echoes));
+            evidence = f64::from(past)
+                + (1.0 - pings as f64 / (2.0 * 32.0)) * (f64::from(sum.score) - nothing);
             let entry = Entry {
                 placement: at,
                 score: sum.score,
-                pings: u16::try_from(pings).unwrap(),
-                echoes: sum.echoes,
-                explained: sum.equations.count,
+                pings: u8::try_from(pings).unwrap(),
+                echoes: u8::try_from(sum.echoes).unwrap(),
+                explained: u8::try_from(sum.equations.count).unwrap(),
                 spread: sum.equations.spread(prior),
-                streak: if kind == 0 { 0 } else { streak },
+                past,
+                evidence: 0.0,
                 state: State::Fresh,
             };
             expected = Some((evaluations, Verdict::Scored(entry)));
         }
-        let is = run(trial, &echoes, &window, &odometry);
+        let (evaluations, mut verdict) = run(trial, &echoes, &window, &odometry);
+        if let Verdict::Scored(entry) = &mut verdict {
+            prop_assert!((f64::from(entry.evidence) - evidence).abs() < 1e-3, "{entry:?} {evidence}");
+            entry.evidence = 0.0;
+        }
+        let is = (evaluations, verdict);
         prop_assert_eq!(Some(is), expected);
     }
 }

@@ -189,13 +189,13 @@ proptest! {
             robot.drive(&step, Bend::NONE);
             let direction = robot.heading + f64::from(step.bearing);
             let first = sent.first().map_or(robot.travelled, |ping| ping.robot.travelled);
-            let left = robot.travelled - first - 0.3;
+            let left = robot.travelled - first - 0.2;
             prop_assume!(left.abs() > 1e-4);
             let novel = f64::from(if left > 0.0 { driving } else { at_rest });
             let mut is_known = false;
             for ping in &sent {
                 let agreement = (ping.direction - direction).cos() - novel.cos();
-                let distance = (ping.robot.sonar(mount) - robot.sonar(mount)).norm() - 0.3;
+                let distance = (ping.robot.sonar(mount) - robot.sonar(mount)).norm() - 0.2;
                 prop_assume!(agreement.abs() > 1e-4 && distance.abs() > 1e-4);
                 is_known |= agreement > 0.0 && distance < 0.0;
             }
