@@ -440,11 +440,11 @@ impl<'m> Navigator<'m> {
         self.accepted = 0;
     }
 
-    /// Whether the ranges confirm the pose, and the search has excluded every other: a pose of a nearly symmetric room takes ranges of
+    /// Whether the ranges confirm the pose, and the search still excludes every other: a pose of a nearly symmetric room takes ranges of
     /// the right one.
     fn is_confirmed(&self, search: &Search) -> bool {
-        let has_rivals = matches!(search.answer(), Answer::Several(2..));
-        self.accepted >= CONFIRMED_BY && self.driven >= CONFIRMED_AFTER && !has_rivals
+        let is_unique = matches!(search.answer(), Answer::Unique(_));
+        self.accepted >= CONFIRMED_BY && self.driven >= CONFIRMED_AFTER && is_unique
     }
 
     /// Takes the best hypothesis of each complete cycle as the pose that is unknown, if the pings fit it at all: only the

@@ -149,6 +149,8 @@ pub struct Search<'m, const PINGS: usize = 96, const HYPOTHESES: usize = 8> {
     /// Novel pings when the last cycle ended.
     taken: u16,
     is_check_due: bool,
+    /// Global checks since the last rival, which take turns with the lines.
+    checks: u8,
     answer: Decision,
     region: Option<Region>,
 }
@@ -191,6 +193,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
             cycles: 0,
             taken: 0,
             is_check_due: true,
+            checks: 0,
             answer: Decision::Searching,
             region: None,
         }
@@ -213,6 +216,7 @@ impl<'m, const PINGS: usize, const HYPOTHESES: usize> Search<'m, PINGS, HYPOTHES
         self.cycles = 0;
         self.taken = 0;
         self.is_check_due = true;
+        self.checks = 0;
         self.answer = Decision::Searching;
         self.region = None;
     }

@@ -238,6 +238,23 @@ fn a_wrong_map_does_not_mislead() {
     }
 }
 
+/// A map of two short walls in a corner contradicts no echo, and explains hardly any.
+#[test]
+fn a_path_beside_the_map_is_refused() {
+    let corner =
+        [Wall::new([0.0, 0.0], [1.0, 0.0]).unwrap(), Wall::new([0.0, 1.0], [0.0, 0.0]).unwrap()];
+    let exact = Robot {
+        wheels: [0.0; 2],
+        track: 0.0,
+        range: 0.0,
+        mount: NOMINAL.mount,
+        bearing: 0.0,
+        ..ROBOT
+    };
+    let refused = calibrate(&record(&exact, 12.0, 6), &corner, &NOMINAL);
+    assert!(matches!(refused, Err(CalibrateError::Unexplained { .. })), "{refused:?}");
+}
+
 #[test]
 fn unusable_recordings_have_typed_errors() {
     let recording = record(&ROBOT, 4.0, 7);

@@ -224,7 +224,7 @@ mod tests {
                 trial.longest_cycle * u64::from(trial.cycles) >= trial.evaluations,
                 "{trial:?}"
             );
-            assert!(trial.evaluations <= 4_800 * (83 - 11), "{trial:?}");
+            assert!(trial.evaluations <= 2_640 * (152 - 11), "{trial:?}");
         }
         Ok(())
     }

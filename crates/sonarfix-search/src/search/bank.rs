@@ -72,8 +72,8 @@ impl Entry {
 
 /// So many windows of pings after which the past has faded to 1/e: odometry drifts, and a robot may be carried.
 const MEMORY: f32 = 5.0;
-/// Logarithm of the odds against a pose that was not found in earlier cycles: half of those of an answer.
-const MISSED: f32 = 12.0;
+/// Logarithm of the odds against a pose that was not found in earlier cycles: three quarters of those of an answer.
+const MISSED: f32 = 18.0;
 
 #[derive(Debug, Clone)]
 pub(super) struct Bank<const HYPOTHESES: usize> {

@@ -142,7 +142,8 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
 
     #[inline(never)]
     pub(super) fn check(&mut self, line: u8, mut along: AlongWalls) -> Task {
-        let checked = self.lines.all().get(usize::from(line)).copied();
+        let nth = usize::from(line) + usize::from(CHECKED_LINES) * usize::from(self.checks % 2);
+        let checked = self.lines.all().get(nth).copied();
         let Some(checked) = checked.filter(|_| line < CHECKED_LINES) else {
             self.decide(true);
             return Task::Rebase;

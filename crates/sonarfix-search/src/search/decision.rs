@@ -14,7 +14,9 @@ use super::{Search, at_least_one, largest};
 /// that no wall explains come in groups.
 const UNTRUSTED: f32 = 0.4;
 const TRUSTED: f32 = 0.6;
-/// A global check is made before an answer, and at least once in so many cycles.
+/// So many global checks are made before an answer since the last rival, the last one with a clear lead.
+const CHECKS: u8 = 3;
+/// A global check is made at least once in so many cycles.
 const CHECK_EVERY: u32 = 4;
 /// A position with a larger deviation than this is undetermined, metres.
 const UNDETERMINED: f32 = 0.3;
@@ -51,6 +53,7 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
         let Some(best) = self.bank.entries().first().copied() else {
             self.answer = Decision::Nowhere;
             self.is_check_due = true;
+            self.checks = 0;
             return;
         };
         let odds = self.parameters.odds;
@@ -65,15 +68,19 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
         let is_clear = self.lead(&best) >= odds && is_sharp && self.has_separate_lines();
         self.age(fresh);
         let was_unique = matches!(self.answer, Decision::Unique(_));
-        self.is_check_due =
-            is_clear && !is_checked && !was_unique || self.cycles.is_multiple_of(CHECK_EVERY);
+        self.checks = match rivals {
+            1 => self.checks.saturating_add(is_checked.into()),
+            _ => 0,
+        };
+        let is_checked = was_unique || is_checked && self.checks >= CHECKS;
+        self.is_check_due = is_clear && !is_checked || self.cycles.is_multiple_of(CHECK_EVERY);
         // False for NaN.
         let is_anywhere = best.evidence > 0.0;
         self.answer = if !is_anywhere {
             Decision::Nowhere
         } else if let Some(along) = self.along(&best).filter(|_| !is_determined) {
             along
-        } else if is_clear && (is_checked || was_unique) {
+        } else if is_clear && is_checked {
             // The answer before stays until this one is refined.
             self.work = Work::Trial(Trial::of_answer(&best));
             return;
