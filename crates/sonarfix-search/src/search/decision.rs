@@ -51,9 +51,9 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
         let fresh = taken.wrapping_sub(self.taken);
         self.taken = taken;
         let Some(best) = self.bank.entries().first().copied() else {
+            self.checks = 0;
             self.answer = Decision::Nowhere;
             self.is_check_due = true;
-            self.checks = 0;
             return;
         };
         let odds = self.parameters.odds;
@@ -94,15 +94,13 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
     pub(super) fn lead(&self, best: &Entry) -> f32 {
         let second = self.bank.entries().get(1).map_or(0.0, |entry| entry.evidence);
         let mean = best.score / at_least_one(best.pings);
-        let trust = at_least((mean - UNTRUSTED) / (TRUSTED - UNTRUSTED), 0.0);
-        let trust = if trust < 1.0 { trust } else { 1.0 };
+        let trust = at_most_one(at_least((mean - UNTRUSTED) / (TRUSTED - UNTRUSTED), 0.0));
         trust * (best.evidence - at_least(second, 0.0))
     }
 
     /// Counts what so many new pings have moved through the window as past.
     fn age(&mut self, fresh: u16) {
-        let share = f32::from(fresh) / count(PINGS);
-        let share = if share < 1.0 { share } else { 1.0 };
+        let share = at_most_one(f32::from(fresh) / count(PINGS));
         // One that was proposed in this cycle has no score.
         let scored = self.bank.entries_mut().iter_mut().filter(|it| it.state == State::Fresh);
         for entry in scored {
@@ -135,4 +133,9 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
         }
         nearest.map(|(_, id)| Decision::Along(id, libm::sqrtf(most)))
     }
+}
+
+/// A share, but not above 1.
+fn at_most_one(share: f32) -> f32 {
+    if share < 1.0 { share } else { 1.0 }
 }

@@ -131,6 +131,7 @@ impl<'m> EchoModel<'m> {
     }
 
     /// The score of so many pings, some of them with an echo, where the map has no wall.
+    #[inline(never)]
     pub fn nothing(&self, pings: u16, echoes: u16) -> f32 {
         let silent = f32::from(pings) - f32::from(echoes);
         let echo = at_least(self.shares.before, LEAST_ECHO);
