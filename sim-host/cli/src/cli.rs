@@ -3,8 +3,8 @@
 use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::{
-    bound, calibrate, check, command, config, convert, doctor, examples, export, find, init, map,
-    measure, merge, monitor, paper, pil, plan, replay, run, shell, survey, sweep,
+    bound, calibrate, check, command, config, convert, doctor, examples, export, find, flash, init,
+    map, measure, merge, monitor, paper, pil, plan, replay, run, shell, survey, sweep,
 };
 
 /// Simulates, measures, replays and operates the Sonarfix localizer for small wheeled robots.
@@ -50,6 +50,8 @@ enum Command {
     Merge(merge::Args),
     /// Bakes a robot file into the configuration image for the robot's flash.
     Config(config::Args),
+    /// Writes the program with the map and the configuration of a robot into the flash of its board.
+    Flash(flash::Args),
     /// Checks, bakes, draws, simplifies, imports and exports maps.
     Map(map::Args),
     /// Prints the Cramér–Rao bound on each state over time.
@@ -93,6 +95,7 @@ impl Cli {
             Command::Monitor(args) => monitor::execute(&args),
             Command::Send(args) => command::execute(&args),
             Command::Config(args) => config::execute(&args),
+            Command::Flash(args) => flash::execute(&args),
             Command::Map(args) => map::execute(&args),
             Command::Bound(args) => bound::execute(&args),
             Command::Plan(args) => plan::execute(&args),

@@ -15,6 +15,7 @@ mod doctor;
 mod examples;
 mod export;
 mod find;
+mod flash;
 mod init;
 mod map;
 mod map_exchange;

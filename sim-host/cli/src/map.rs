@@ -180,12 +180,20 @@ fn usual_sonar() -> RangerParameters {
     Config::for_track_width(Metres(0.16)).rangers.first
 }
 
-fn write_image(map: &MapFile, out: &Path) -> anyhow::Result<()> {
+/// The image of a map.
+///
+/// # Errors
+/// If the map has errors; they are not listed.
+pub fn image(map: &MapFile) -> anyhow::Result<Vec<u8>> {
     let findings = flaws(&map.floor, &map.sonar().unwrap_or_else(usual_sonar))?;
     let errors = count(&findings, Severity::Error);
     let name = map.name();
     anyhow::ensure!(errors == 0, "{name}: {errors} errors; run `sonarfix map check {name}`");
-    let image = bake(&map.floor.walls())?;
+    Ok(bake(&map.floor.walls())?)
+}
+
+fn write_image(map: &MapFile, out: &Path) -> anyhow::Result<()> {
+    let image = image(map)?;
     sonarfix_files::write(out, &image)?;
     let (walls, bytes) = (map.floor.named_walls().len(), image.len());
     if let Some(grid) = Map::read(&image)?.grid() {

@@ -10,6 +10,7 @@ mod doctor;
 mod endings;
 mod export;
 mod find;
+mod flash;
 mod guide;
 mod hostile_files;
 mod init;
