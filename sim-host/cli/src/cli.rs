@@ -1,6 +1,7 @@
 //! The command line.
 
 use clap::{CommandFactory, Parser, Subcommand};
+use sonarfix_terminal::output::{self, Detail};
 
 use crate::{
     bound, calibrate, check, command, config, convert, doctor, examples, export, find, flash, init,
@@ -11,6 +12,12 @@ use crate::{
 #[derive(Debug, Parser)]
 #[command(name = "sonarfix", version, about)]
 pub struct Cli {
+    /// Prints results and errors alone: no progress and no remarks.
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Also prints what else is done, as the files that are read and written.
+    #[arg(short, long, global = true)]
+    verbose: bool,
     #[command(subcommand)]
     command: Command,
 }
@@ -77,6 +84,13 @@ impl Cli {
     /// # Errors
     /// Any error, with a message for the user.
     pub fn execute(self) -> anyhow::Result<()> {
+        match (self.quiet, self.verbose) {
+            (true, _) => output::choose(Detail::Quiet),
+            (_, true) => output::choose(Detail::Verbose),
+            _ => {}
+        }
+        sonarfix_map::on_read(|file| detail!("read {}", file.display()));
+        sonarfix_files::on_written(|file| detail!("wrote {}", file.display()));
         match self.command {
             Command::Init(args) => init::execute(&args),
             Command::Check(args) => check::execute(&args),

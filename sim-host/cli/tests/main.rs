@@ -14,6 +14,7 @@ mod flash;
 mod guide;
 mod hostile_files;
 mod init;
+mod json;
 mod link_command;
 mod live;
 mod map_command;
