@@ -65,15 +65,14 @@ pub struct Dependency {
     source: Option<String>,
 }
 
-/// All dependencies of the main workspace, with all features.
-pub fn dependencies() -> anyhow::Result<Vec<Dependency>> {
+/// All dependencies in the metadata that a command prints.
+pub fn dependencies(metadata: Command) -> anyhow::Result<Vec<Dependency>> {
     #[derive(Deserialize)]
     struct Metadata {
         packages: Vec<Dependency>,
     }
-    let metadata = printed(command("metadata --all-features --format-version 1 --locked"))?;
     let metadata: Metadata =
-        serde_json::from_str(&metadata).context("cannot read cargo's metadata")?;
+        serde_json::from_str(&printed(metadata)?).context("cannot read cargo's metadata")?;
     Ok(metadata.packages.into_iter().filter(|package| package.source.is_some()).collect())
 }
 

@@ -1,9 +1,13 @@
-//! What a release consists of: archives of the command, and the packages of the C library; and the check that their users can
-//! run and build them.
+//! What a release consists of: archives of the command, programs of the boards, and the packages of the C library; and the
+//! check that their users can run and build them.
 
+mod firmware;
+mod licences;
 mod program;
 
-use std::path::PathBuf;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use crate::cargo;
 use crate::workspace::Workspace;
@@ -16,7 +20,7 @@ pub struct Args {
     /// Checks them, too.
     #[arg(long)]
     check: bool,
-    /// Only the archives of the command.
+    /// Only the archives of the command and the programs of the boards.
     #[arg(long)]
     program: bool,
 }
@@ -30,13 +34,44 @@ impl Args {
 
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let out = cargo::root().join(&args.out);
-    std::fs::create_dir_all(&out)?;
-    let archives = program::archives(&out)?;
-    program::checksums(&out, &archives)?;
+    fs::create_dir_all(&out)?;
+    let firmware = firmware::programs(&out)?;
+    let archives = program::archives(&out, &firmware)?;
+    checksums(&out, &[archives, firmware].concat())?;
     if args.check {
-        program::check(&out)?;
+        let copy = copy()?;
+        program::check(&out, &copy)?;
+        firmware::check(&out, &copy)?;
+        fs::remove_dir_all(copy)?;
     }
     if args.program { Ok(()) } else { packages(args) }
+}
+
+/// Makes a build from the sources in `root` the same in every folder: neither that of the sources nor that of cargo is in it.
+fn reproducible(build: &mut Command, root: &Path) -> anyhow::Result<()> {
+    let remap = |from: &Path, to| format!("--remap-path-prefix={}={to}", from.display());
+    let flags = [remap(root, "/sonarfix"), remap(&cargo::home()?, "/cargo")].join("\u{1f}");
+    build.env("CARGO_ENCODED_RUSTFLAGS", flags);
+    Ok(())
+}
+
+/// The sums of the files, as `sha256sum --check` reads them.
+fn checksums(out: &Path, files: &[PathBuf]) -> anyhow::Result<()> {
+    let mut sums = Command::new("sha256sum");
+    sums.current_dir(out).args(files.iter().filter_map(|file| file.strip_prefix(out).ok()));
+    Ok(fs::write(out.join("SHA256SUMS"), cargo::printed(sums)?)?)
+}
+
+/// A copy of the committed sources in another folder.
+fn copy() -> anyhow::Result<PathBuf> {
+    let copy = cargo::target_folder().join("another folder");
+    if copy.exists() {
+        fs::remove_dir_all(&copy)?;
+    }
+    let mut clone = Command::new("git");
+    clone.args(["clone", "--quiet"]).arg(cargo::root()).arg(&copy);
+    cargo::check(clone)?;
+    Ok(copy)
 }
 
 fn packages(args: &Args) -> anyhow::Result<()> {

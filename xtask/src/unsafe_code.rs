@@ -53,7 +53,8 @@ fn page() -> anyhow::Result<String> {
     let linked = linked()?;
     let word = word()?;
     let mut page = HEAD.to_owned();
-    for package in cargo::dependencies()? {
+    let metadata = cargo::command("metadata --all-features --format-version 1 --locked");
+    for package in cargo::dependencies(metadata)? {
         let Dependency { name, version, license, manifest_path, .. } = package;
         if !linked.contains(&format!("{name} v{version}")) {
             continue;

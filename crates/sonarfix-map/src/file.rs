@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
+use std::sync::OnceLock;
 
 use crate::error::FileError;
 
@@ -38,12 +39,22 @@ pub fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
     read_at_most(path, MAX_FILE_BYTES)
 }
 
+static OBSERVER: OnceLock<fn(&Path)> = OnceLock::new();
+
+/// From now on calls a function with the name of each file that is read: the first function that is given.
+pub fn on_read(observer: fn(&Path)) {
+    let _ = OBSERVER.set(observer);
+}
+
 fn read_at_most(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     File::open(path)?.take(most + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > most {
         let reason = format!("it has more than {} MiB", most / (1024 * 1024));
         return Err(io::Error::new(io::ErrorKind::FileTooLarge, reason));
+    }
+    if let Some(observer) = OBSERVER.get() {
+        observer(path);
     }
     Ok(bytes)
 }

@@ -54,7 +54,7 @@ pub use bake::{BakeError, bake};
 pub use clearance::Collision;
 pub use documentation::{documentation, with_comments};
 pub use error::{FileError, Mistake};
-pub use file::{MAX_FILE_BYTES, read_bytes, read_text};
+pub use file::{MAX_FILE_BYTES, on_read, read_bytes, read_text};
 pub use flaws::{Finding, Flaw, Severity, flaws};
 pub use floor::{Floor, NamedWall};
 pub use map_file::MapFile;

@@ -1,4 +1,18 @@
-//! The boards that have firmware: the table `firmware/boards.toml`.
+//! The boards that have firmware: the table `firmware/boards.toml`, and the files of their programs.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`image`] | contents of flash by address: of an ELF, with further parts |
+//! | [`uf2`] | the file that a board takes on its USB drive |
+//! | [`drive`] | that drive |
+//! | [`esp`] | the file that the bootloader of an ESP32-C6 starts |
+//! | [`made`] | made ELF files, for tests |
+
+pub mod drive;
+pub mod esp;
+pub mod image;
+pub mod made;
+pub mod uf2;
 
 use anyhow::Context;
 use serde::Deserialize;
@@ -26,6 +40,8 @@ pub struct Board {
     pub memory: String,
     /// Whether programs and images can be written over USB.
     pub usb: bool,
+    /// Its USB drive, if it takes UF2 files.
+    pub uf2: Option<Uf2>,
     /// Where the PC meets the link.
     pub port: String,
     /// Where the board takes 5 V.
@@ -38,6 +54,15 @@ pub struct Board {
     pub bus: Option<Bus>,
     /// The pins of a second ranger, if it has them.
     pub second: Option<Second>,
+}
+
+/// What a board takes on its USB drive.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Uf2 {
+    /// The family of its chip in a UF2 file.
+    pub family: u32,
+    /// Its `Board-ID` in the file `INFO_UF2.TXT` of the drive.
+    pub drive: String,
 }
 
 /// The pins of an I²C bus.
@@ -102,6 +127,17 @@ pub struct Pins {
     pub tx: String,
     /// The link, to the board.
     pub rx: String,
+}
+
+/// The board of this name.
+///
+/// # Errors
+/// If there is none; the message names those that there are.
+pub fn named(name: &str) -> anyhow::Result<Board> {
+    let boards = all()?;
+    let names: Vec<_> = boards.iter().map(|board| board.name.as_str()).collect();
+    let known = format!("--board: there is no `{name}`; there are {}", names.join(", "));
+    boards.iter().find(|board| board.name == name).cloned().context(known)
 }
 
 /// All boards.

@@ -1,8 +1,7 @@
 //! `sonarfix calibrate`: the calibration of a robot from a recording.
 
-use std::fs::File;
 use std::io::{BufReader, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::Context;
 use nalgebra::Vector3;
@@ -20,7 +19,7 @@ use sonarfix_replay::REFERENCE_HEADER;
 use sonarfix_report::Table;
 use sonarfix_report::residuals::{Residual, residuals};
 
-use sonarfix_terminal::output::check_file;
+use sonarfix_terminal::output::{check_file, open};
 
 /// Maximum number of skipped lines that are printed.
 const SHOWN: usize = 10;
@@ -106,11 +105,8 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
 }
 
 fn read_log(args: &Args, robot: &RobotConfig) -> anyhow::Result<log::Read> {
-    let open = |path: &Path| {
-        File::open(path).map(BufReader::new).with_context(|| path.display().to_string())
-    };
-    let mut read =
-        log::read(open(&args.log)?, robot).with_context(|| args.log.display().to_string())?;
+    let mut read = log::read(BufReader::new(open(&args.log)?), robot)
+        .with_context(|| args.log.display().to_string())?;
     for (line, reason) in read.skipped.iter().take(SHOWN) {
         eprintln!("skipped: log line {line}: {reason}");
     }
@@ -118,7 +114,7 @@ fn read_log(args: &Args, robot: &RobotConfig) -> anyhow::Result<log::Read> {
         eprintln!("skipped: {} more lines", read.skipped.len() - SHOWN);
     }
     if let Some(reference) = &args.reference {
-        read.recording.references = log::read_reference(open(reference)?)
+        read.recording.references = log::read_reference(BufReader::new(open(reference)?))
             .with_context(|| reference.display().to_string())?;
     }
     if let Some(start) = &args.start {

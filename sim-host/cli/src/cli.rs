@@ -1,16 +1,23 @@
 //! The command line.
 
 use clap::{CommandFactory, Parser, Subcommand};
+use sonarfix_terminal::output::{self, Detail};
 
 use crate::{
-    bound, calibrate, check, command, config, convert, doctor, examples, export, find, init, map,
-    measure, merge, monitor, paper, pil, plan, replay, run, shell, survey, sweep,
+    bound, calibrate, check, command, config, convert, doctor, examples, export, find, flash, init,
+    map, measure, merge, monitor, paper, pil, plan, replay, run, shell, survey, sweep,
 };
 
 /// Simulates, measures, replays and operates the Sonarfix localizer for small wheeled robots.
 #[derive(Debug, Parser)]
 #[command(name = "sonarfix", version, about)]
 pub struct Cli {
+    /// Prints results and errors alone: no progress and no remarks.
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Also prints what else is done, as the files that are read and written.
+    #[arg(short, long, global = true)]
+    verbose: bool,
     #[command(subcommand)]
     command: Command,
 }
@@ -50,6 +57,8 @@ enum Command {
     Merge(merge::Args),
     /// Bakes a robot file into the configuration image for the robot's flash.
     Config(config::Args),
+    /// Writes the program with the map and the configuration of a robot into the flash of its board.
+    Flash(flash::Args),
     /// Checks, bakes, draws, simplifies, imports and exports maps.
     Map(map::Args),
     /// Prints the Cramér–Rao bound on each state over time.
@@ -75,6 +84,13 @@ impl Cli {
     /// # Errors
     /// Any error, with a message for the user.
     pub fn execute(self) -> anyhow::Result<()> {
+        match (self.quiet, self.verbose) {
+            (true, _) => output::choose(Detail::Quiet),
+            (_, true) => output::choose(Detail::Verbose),
+            _ => {}
+        }
+        sonarfix_map::on_read(|file| detail!("read {}", file.display()));
+        sonarfix_files::on_written(|file| detail!("wrote {}", file.display()));
         match self.command {
             Command::Init(args) => init::execute(&args),
             Command::Check(args) => check::execute(&args),
@@ -93,6 +109,7 @@ impl Cli {
             Command::Monitor(args) => monitor::execute(&args),
             Command::Send(args) => command::execute(&args),
             Command::Config(args) => config::execute(&args),
+            Command::Flash(args) => flash::execute(&args),
             Command::Map(args) => map::execute(&args),
             Command::Bound(args) => bound::execute(&args),
             Command::Plan(args) => plan::execute(&args),

@@ -51,20 +51,14 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     match &args.what {
         What::Bake { robot, out, board, features } => {
             check_file("--out", out)?;
-            let config = robot_file::read(robot)?;
-            warnings::show(&[robot]);
-            if let Some(features) = features {
-                config.check_features(|feature| features.contains(&feature)).map_err(|lacks| {
-                    anyhow!("the robot needs `{}`, which --features does not name", lacks.0.name())
-                })?;
-            }
-            if let Some(board) = board {
-                check_board(&board_named(board)?, &config)?;
-            }
-            let mut buffer = [0; baked::LENGTH_MAX];
-            let bytes = baked::write(&config, &mut buffer)?;
-            sonarfix_files::write(out, bytes)?;
-            println!("{}: {} bytes, {}", out.display(), bytes.len(), checksum(&config));
+            let baked = bake(robot, features.as_deref(), board.as_deref())?;
+            sonarfix_files::write(out, &baked.bytes)?;
+            println!(
+                "{}: {} bytes, checksum {:08x}",
+                out.display(),
+                baked.bytes.len(),
+                baked.checksum
+            );
         }
         What::Check { config: file } => {
             println!("{}: valid configuration, {}", file.display(), checksum(&read(file)?));
@@ -77,11 +71,36 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn board_named(name: &str) -> anyhow::Result<Board> {
-    let boards = sonarfix_boards::all()?;
-    let names: Vec<_> = boards.iter().map(|board| board.name.as_str()).collect();
-    let known = format!("--board: there is no `{name}`; there are {}", names.join(", "));
-    boards.iter().find(|board| board.name == name).cloned().context(known)
+/// A configuration image, and the checksum that a robot reports for it.
+#[derive(Debug)]
+pub struct Baked {
+    pub bytes: Vec<u8>,
+    pub checksum: u32,
+}
+
+/// The configuration image of a robot file. Refuses a robot that needs another feature than these, or that the firmware of
+/// the board cannot drive.
+///
+/// # Errors
+/// What is wrong with the file, or which of these it is.
+pub fn bake(
+    robot: &Path,
+    features: Option<&[Feature]>,
+    board: Option<&str>,
+) -> anyhow::Result<Baked> {
+    let config = robot_file::read(robot)?;
+    warnings::show(&[robot]);
+    if let Some(features) = features {
+        config.check_features(|feature| features.contains(&feature)).map_err(|lacks| {
+            anyhow!("the robot needs `{}`, which --features does not name", lacks.0.name())
+        })?;
+    }
+    if let Some(board) = board {
+        check_board(&sonarfix_boards::named(board)?, &config)?;
+    }
+    let mut buffer = [0; baked::LENGTH_MAX];
+    let bytes = baked::write(&config, &mut buffer)?.to_vec();
+    Ok(Baked { bytes, checksum: baked::checksum(&config) })
 }
 
 fn feature(name: &str) -> anyhow::Result<Feature> {

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Subcommand, ValueEnum};
+use serde::Serialize;
 
 use sonarfix_replay::convert::carmen::Carmen;
 use sonarfix_replay::convert::lego::{ENCODER_LAG, Lego, Nominal};
@@ -20,6 +21,17 @@ const SHOWN: u64 = 10;
 pub struct Args {
     #[command(subcommand)]
     format: Format,
+    /// Prints the counts as JSON.
+    #[arg(long, global = true)]
+    json: bool,
+}
+
+/// What was converted, as JSON.
+#[derive(Debug, Serialize)]
+struct Json<'a> {
+    out: &'a Path,
+    #[serde(flatten)]
+    converted: Converted,
 }
 
 #[derive(Debug, Subcommand)]
@@ -82,27 +94,29 @@ impl From<NominalName> for Nominal {
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
+    let json = args.json;
     match &args.format {
         Format::Lego { from, out, nominal, encoder_lag } => {
             anyhow::ensure!(encoder_lag.is_finite(), "--encoder-lag must be finite");
             let nominal = (*nominal).into();
             let lego = Lego { from, to: out, nominal, encoder_lag: *encoder_lag };
-            convert(out, |report| lego.convert(report))
+            convert(out, json, |report| lego.convert(report))
         }
         Format::Carmen { from, walls, out } => {
             let carmen = Carmen { from, walls: walls.as_deref(), to: out };
-            convert(out, |report| carmen.convert(report))
+            convert(out, json, |report| carmen.convert(report))
         }
         Format::Rosbag(args) => {
             args.check()?;
-            convert(args.out(), |report| args.convert(report))
+            convert(args.out(), json, |report| args.convert(report))
         }
-        Format::Nxt { from, out } => convert(out, |_| Nxt { from, to: out }.convert()),
+        Format::Nxt { from, out } => convert(out, json, |_| Nxt { from, to: out }.convert()),
     }
 }
 
 fn convert(
     out: &Path,
+    json: bool,
     run: impl FnOnce(&mut dyn FnMut(String)) -> Result<Converted, ConvertError>,
 ) -> anyhow::Result<()> {
     check_folder("--out", out)?;
@@ -115,6 +129,9 @@ fn convert(
     })?;
     if reported > SHOWN {
         eprintln!("{} more such lines", reported - SHOWN);
+    }
+    if json {
+        return sonarfix_terminal::json::print(&Json { out, converted });
     }
     let Converted { encoders, ranges, scans, reference, repeated, skipped, restamped, bridged } =
         converted;

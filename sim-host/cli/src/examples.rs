@@ -3,7 +3,7 @@
 use clap::Command;
 
 /// A subcommand, and examples of it.
-pub const EXAMPLES: [(&str, &[&str]); 31] = [
+pub const EXAMPLES: [(&str, &[&str]); 32] = [
     ("init", &["sonarfix init robot --board pico"]),
     ("check", &["sonarfix check scenario.toml", "sonarfix check robot.toml map.toml --json"]),
     (
@@ -61,6 +61,14 @@ pub const EXAMPLES: [(&str, &[&str]); 31] = [
     ("config bake", &["sonarfix config bake robot.toml --out config.bin"]),
     ("config check", &["sonarfix config check config.bin"]),
     ("config show", &["sonarfix config show config.bin"]),
+    (
+        "flash",
+        &[
+            "sonarfix flash robot --board pico",
+            "sonarfix flash robot --board pico2 --out robot.uf2",
+            "sonarfix flash robot --board esp32c6 --dry-run",
+        ],
+    ),
     ("map check", &["sonarfix map check map.toml"]),
     ("map bake", &["sonarfix map bake map.toml --out map.bin"]),
     ("map draw", &["sonarfix map draw map.toml --out map.svg"]),

@@ -14,7 +14,7 @@ use sonarfix_map::{Floor, MapFile, robot_file};
 use sonarfix_replay::{Replay, Summary, log};
 use sonarfix_sim::trace::{Recorder, Wall};
 
-use sonarfix_terminal::output::{check_file, check_folder};
+use sonarfix_terminal::output::{self, check_file, check_folder};
 
 /// The file of a bag that describes it.
 const METADATA: &str = "metadata.yaml";
@@ -85,7 +85,7 @@ fn is_log(file: &Path) -> anyhow::Result<bool> {
 }
 
 fn open(file: &Path) -> anyhow::Result<BufReader<File>> {
-    Ok(BufReader::new(File::open(file).with_context(|| file.display().to_string())?))
+    Ok(BufReader::new(output::open(file)?))
 }
 
 fn walls(floor: &Floor) -> Vec<Wall> {

@@ -1,13 +1,12 @@
 //! `sonarfix find`: searches for the pose of a robot without a start pose.
 
-use std::fs::File;
 use std::io::BufReader;
 use std::path::PathBuf;
 
-use anyhow::Context;
 use sonarfix_map::{MapFile, robot_file};
 use sonarfix_replay::find::{Find, Found};
 use sonarfix_report::Table;
+use sonarfix_terminal::output::open;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -34,7 +33,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let robot = robot_file::read(&config)?;
     crate::warnings::show(&[&map, &config]);
     let walls = floor.walls();
-    let file = File::open(&args.log).with_context(|| args.log.display().to_string())?;
+    let file = open(&args.log)?;
     let found = Find { robot: &robot, walls: &walls }.run(BufReader::new(file))?;
     if args.json {
         return sonarfix_terminal::json::print(&found);

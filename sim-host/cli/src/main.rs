@@ -15,6 +15,7 @@ mod doctor;
 mod examples;
 mod export;
 mod find;
+mod flash;
 mod init;
 mod map;
 mod map_exchange;
@@ -41,7 +42,7 @@ use std::process::ExitCode;
 
 use clap::FromArgMatches;
 use cli::Cli;
-use sonarfix_terminal::progress;
+use sonarfix_terminal::{output, progress};
 
 fn main() -> ExitCode {
     // Examples are a part of the help, which is printed without a command, too.
@@ -50,7 +51,7 @@ fn main() -> ExitCode {
     match cli.execute() {
         Ok(()) => progress::exit_code(),
         Err(error) => {
-            eprintln!("error: {error:#}");
+            output::report_error(format_args!("error: {error:#}"));
             progress::exit_code_of_error()
         }
     }

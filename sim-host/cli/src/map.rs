@@ -4,14 +4,19 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Subcommand;
+use serde::Serialize;
 use sonarfix::config::{Config, RangerParameters};
 use sonarfix::geometry::units::Metres;
 use sonarfix::map::Map;
+use sonarfix::map::image::checksum;
 use sonarfix_map::{
-    Limits, MapFile, Mistake, Severity, bake, flaws, plausibility, robot_file, simplify, symmetries,
+    Finding, Limits, MapFile, Mistake, NamedWall, Severity, Symmetry, bake, flaws, plausibility,
+    robot_file, simplify, symmetries,
 };
 
 use crate::map_exchange;
+use crate::warnings::Warning;
+use sonarfix_terminal::json;
 use sonarfix_terminal::output::check_file;
 
 /// Maximum number of findings that are printed.
@@ -42,6 +47,9 @@ enum Task {
         /// The robot whose sonar measures the walls; by default the scenario's, or a typical one.
         #[arg(long, value_name = "ROBOT.toml")]
         robot: Option<PathBuf>,
+        /// Prints the findings as JSON.
+        #[arg(long)]
+        json: bool,
     },
     /// Writes the map image, which a robot reads in place from flash.
     Bake {
@@ -50,6 +58,9 @@ enum Task {
         /// The image to write.
         #[arg(long, value_name = "MAP.bin")]
         out: PathBuf,
+        /// Prints the result as JSON.
+        #[arg(long)]
+        json: bool,
     },
     /// Draws a map as SVG.
     Draw {
@@ -75,6 +86,9 @@ enum Task {
         /// Minimum length of a wall, after pieces are joined.
         #[arg(long, value_name = "MM", default_value_t = 0.0)]
         shortest: f64,
+        /// Prints the result as JSON.
+        #[arg(long)]
+        json: bool,
     },
     /// Reads a grid, a drawing or `GeoJSON` of another program as a map; prints what was dropped and what is uncertain.
     Import(map_exchange::Import),
@@ -98,16 +112,16 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         check_file("--out", out)?;
     }
     match &args.task {
-        Task::Check { from, robot } => check(&from.read()?, robot.as_deref()),
-        Task::Bake { from, out } => write_image(&from.read()?, out),
+        Task::Check { from, robot, json } => check(&from.read()?, robot.as_deref(), *json),
+        Task::Bake { from, out, json } => write_image(&from.read()?, out, *json),
         Task::Draw { from, out, grid } => draw(&from.read()?, &from.title(), out, *grid),
-        Task::Simplify { from, out, tolerance, shortest } => {
+        Task::Simplify { from, out, tolerance, shortest, json } => {
             for (name, value) in [("tolerance", tolerance), ("shortest", shortest)] {
                 let is_length = value.is_finite() && *value >= 0.0;
                 anyhow::ensure!(is_length, "--{name} must be zero or positive");
             }
             let limits = Limits { tolerance: tolerance / 1e3, shortest: shortest / 1e3 };
-            write_simplified(&from.read()?, limits, out)
+            write_simplified(&from.read()?, limits, out, *json)
         }
         Task::Import(import) => map_exchange::import(import),
         Task::Export { from, to } => map_exchange::export(&from.read()?.floor, to),
@@ -125,54 +139,137 @@ impl Source {
     }
 }
 
-fn check(map: &MapFile, robot: Option<&Path>) -> anyhow::Result<()> {
-    let sonar = match robot {
-        Some(robot) => robot_file::read(robot)?.localizer.rangers.first,
-        None => map.sonar().unwrap_or_else(usual_sonar),
-    };
-    let findings = flaws(&map.floor, &sonar)?;
-    for finding in findings.iter().take(SHOWN) {
-        let beside = match (finding.other(), finding.other().and_then(|other| map.line(other))) {
-            (Some(other), Some(line)) => format!(" and {} (line {line})", map.quoted(other)),
-            (Some(other), None) => format!(" and {}", map.quoted(other)),
-            (None, _) => String::new(),
+/// What `check` finds.
+struct Checked {
+    findings: Vec<Finding>,
+    improbable: Vec<Mistake>,
+    symmetries: Vec<Symmetry>,
+}
+
+impl Checked {
+    fn of(map: &MapFile, robot: Option<&Path>) -> anyhow::Result<Self> {
+        let sonar = match robot {
+            Some(robot) => robot_file::read(robot)?.localizer.rangers.first,
+            None => map.sonar().unwrap_or_else(usual_sonar),
         };
-        let severity = match finding.severity() {
-            Severity::Error => "error",
-            Severity::Warning => "warning",
+        let findings = flaws(&map.floor, &sonar)?;
+        let is_new = |warning: &Mistake| {
+            !findings.iter().any(|finding| warning.message().ends_with(&finding.flaw.to_string()))
         };
-        println!("{}{beside}: {severity}: {}", map.place(finding.wall), finding.flaw);
+        let improbable = plausibility::of_file(Path::new(map.name()));
+        let improbable = improbable.into_iter().filter(is_new).collect();
+        Ok(Self { improbable, symmetries: symmetries(&map.floor)?, findings })
     }
-    if findings.len() > SHOWN {
-        println!("and {} more", findings.len() - SHOWN);
+
+    fn errors(&self) -> usize {
+        count(&self.findings, Severity::Error)
     }
-    let is_new = |warning: &Mistake| {
-        !findings.iter().any(|finding| warning.message().ends_with(&finding.flaw.to_string()))
-    };
-    let improbable = plausibility::of_file(Path::new(map.name())).into_iter().filter(is_new);
-    let improbable: Vec<_> = improbable.collect();
-    for warning in &improbable {
-        println!("warning: {warning}");
+
+    fn warnings(&self) -> usize {
+        count(&self.findings, Severity::Warning) + self.improbable.len() + self.symmetries.len()
     }
-    let symmetries = symmetries(&map.floor)?;
-    for symmetry in &symmetries {
-        println!("{}: warning: {symmetry}", map.name());
+
+    fn print(&self, map: &MapFile) {
+        for finding in self.findings.iter().take(SHOWN) {
+            let beside = match (finding.other(), finding.other().and_then(|other| map.line(other)))
+            {
+                (Some(other), Some(line)) => format!(" and {} (line {line})", map.quoted(other)),
+                (Some(other), None) => format!(" and {}", map.quoted(other)),
+                (None, _) => String::new(),
+            };
+            let severity = severity(finding);
+            println!("{}{beside}: {severity}: {}", map.place(finding.wall), finding.flaw);
+        }
+        if self.findings.len() > SHOWN {
+            println!("and {} more", self.findings.len() - SHOWN);
+        }
+        for warning in &self.improbable {
+            println!("warning: {warning}");
+        }
+        for symmetry in &self.symmetries {
+            println!("{}: warning: {symmetry}", map.name());
+        }
+        if let Some(remedy) = self.remedy(map) {
+            println!("    {remedy}");
+        }
+        let (walls, errors, warnings) =
+            (map.floor.named_walls().len(), self.errors(), self.warnings());
+        println!("{}: {walls} walls, {errors} errors, {warnings} warnings", map.name());
     }
-    if let Some(remedy) = symmetries.first().and_then(|symmetry| symmetry.remedy.as_ref()) {
+
+    /// What ends the symmetries.
+    fn remedy(&self, map: &MapFile) -> Option<String> {
+        let remedy = self.symmetries.first()?.remedy.as_ref()?;
         let (addition, [x, y], wall) = (remedy.addition, remedy.at, map.quoted(remedy.wall));
-        println!(
-            "    {addition} at ({x:.1}, {y:.1}) m on {wall}, mapped and not hidden by furniture, ends that"
-        );
+        Some(format!(
+            "{addition} at ({x:.1}, {y:.1}) m on {wall}, mapped and not hidden by furniture, ends that"
+        ))
     }
-    let errors = count(&findings, Severity::Error);
-    let warnings = count(&findings, Severity::Warning) + improbable.len() + symmetries.len();
-    let walls = map.floor.named_walls().len();
-    println!("{}: {walls} walls, {errors} errors, {warnings} warnings", map.name());
-    anyhow::ensure!(errors == 0, "the map has errors");
+
+    fn json<'a>(&self, map: &'a MapFile) -> JsonCheck<'a> {
+        let wall = |index: usize| map.floor.named_walls().get(index).map_or("", NamedWall::name);
+        let finding = |it: &Finding| JsonFinding {
+            severity: severity(it),
+            wall: wall(it.wall),
+            line: map.line(it.wall),
+            other: it.other().map(wall),
+            message: it.flaw.to_string(),
+        };
+        JsonCheck {
+            file: map.name(),
+            walls: map.floor.named_walls().len(),
+            errors: self.errors(),
+            findings: self.findings.iter().map(finding).collect(),
+            symmetries: self.symmetries.iter().map(ToString::to_string).collect(),
+            remedy: self.remedy(map),
+            warnings: self.improbable.iter().map(Warning::from).collect(),
+        }
+    }
+}
+
+/// What `check` finds, as JSON.
+#[derive(Serialize)]
+struct JsonCheck<'a> {
+    file: &'a str,
+    walls: usize,
+    errors: usize,
+    findings: Vec<JsonFinding<'a>>,
+    symmetries: Vec<String>,
+    /// What ends the symmetries.
+    remedy: Option<String>,
+    /// Improbable values.
+    warnings: Vec<Warning>,
+}
+
+#[derive(Serialize)]
+struct JsonFinding<'a> {
+    severity: &'static str,
+    wall: &'a str,
+    line: Option<usize>,
+    /// The other wall of two.
+    other: Option<&'a str>,
+    message: String,
+}
+
+fn severity(finding: &Finding) -> &'static str {
+    match finding.severity() {
+        Severity::Error => "error",
+        Severity::Warning => "warning",
+    }
+}
+
+fn check(map: &MapFile, robot: Option<&Path>, is_json: bool) -> anyhow::Result<()> {
+    let checked = Checked::of(map, robot)?;
+    if is_json {
+        json::print(&checked.json(map))?;
+    } else {
+        checked.print(map);
+    }
+    anyhow::ensure!(checked.errors() == 0, "the map has errors");
     Ok(())
 }
 
-fn count(findings: &[sonarfix_map::Finding], severity: Severity) -> usize {
+fn count(findings: &[Finding], severity: Severity) -> usize {
     findings.iter().filter(|finding| finding.severity() == severity).count()
 }
 
@@ -180,18 +277,53 @@ fn usual_sonar() -> RangerParameters {
     Config::for_track_width(Metres(0.16)).rangers.first
 }
 
-fn write_image(map: &MapFile, out: &Path) -> anyhow::Result<()> {
+/// The image of a map.
+///
+/// # Errors
+/// If the map has errors; they are not listed.
+pub fn image(map: &MapFile) -> anyhow::Result<Vec<u8>> {
     let findings = flaws(&map.floor, &map.sonar().unwrap_or_else(usual_sonar))?;
     let errors = count(&findings, Severity::Error);
     let name = map.name();
     anyhow::ensure!(errors == 0, "{name}: {errors} errors; run `sonarfix map check {name}`");
-    let image = bake(&map.floor.walls())?;
+    Ok(bake(&map.floor.walls())?)
+}
+
+/// A baked map, as JSON.
+#[derive(Serialize)]
+struct JsonImage<'a> {
+    out: &'a Path,
+    walls: usize,
+    bytes: usize,
+    /// That which a robot reports.
+    checksum: String,
+    grid: Option<JsonGrid>,
+}
+
+/// The index of a baked map.
+#[derive(Serialize)]
+struct JsonGrid {
+    columns: u16,
+    rows: u16,
+    cell_size: f32,
+}
+
+fn write_image(map: &MapFile, out: &Path, is_json: bool) -> anyhow::Result<()> {
+    let image = image(map)?;
     sonarfix_files::write(out, &image)?;
     let (walls, bytes) = (map.floor.named_walls().len(), image.len());
-    if let Some(grid) = Map::read(&image)?.grid() {
-        let (columns, rows, cell) = (grid.columns(), grid.rows(), grid.cell_size().0);
+    let grid = Map::read(&image)?.grid().map(|grid| JsonGrid {
+        columns: grid.columns(),
+        rows: grid.rows(),
+        cell_size: grid.cell_size().0,
+    });
+    if is_json {
+        let checksum = format!("{:08x}", checksum(&image));
+        return json::print(&JsonImage { out, walls, bytes, checksum, grid });
+    }
+    if let Some(JsonGrid { columns, rows, cell_size }) = grid {
         let out = out.display();
-        eprintln!("{out}: {walls} walls, {bytes} bytes, {columns} x {rows} cells of {cell} m");
+        eprintln!("{out}: {walls} walls, {bytes} bytes, {columns} x {rows} cells of {cell_size} m");
     }
     Ok(())
 }
@@ -203,12 +335,43 @@ fn draw(map: &MapFile, title: &str, out: &Path, with_grid: bool) -> anyhow::Resu
     sonarfix_files::write(out, sonarfix_report::map::svg(&title, &map.floor, grid))
 }
 
-fn write_simplified(map: &MapFile, limits: Limits, out: &Path) -> anyhow::Result<()> {
+/// A simplified map, as JSON.
+#[derive(Serialize)]
+struct JsonSimplified<'a> {
+    out: &'a Path,
+    walls: usize,
+    walls_before: usize,
+    /// The pieces of each wall that was joined.
+    joined: Vec<Vec<&'a str>>,
+    /// What was left out, too short.
+    dropped: Vec<Vec<&'a str>>,
+}
+
+fn write_simplified(
+    map: &MapFile,
+    limits: Limits,
+    out: &Path,
+    is_json: bool,
+) -> anyhow::Result<()> {
     let simplified = simplify(&map.floor, limits).context("nothing is left of the map")?;
     let is_csv = out.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
     let floor = &simplified.floor;
     let text = if is_csv { floor.to_csv() } else { floor.to_toml() };
     sonarfix_files::write(out, text)?;
+    let (before, after) = (map.floor.named_walls().len(), floor.named_walls().len());
+    if is_json {
+        let name = |&wall: &usize| map.floor.named_walls().get(wall).map_or("", NamedWall::name);
+        let names = |groups: &[Vec<usize>]| {
+            groups.iter().map(|walls| walls.iter().map(name).collect()).collect()
+        };
+        return json::print(&JsonSimplified {
+            out,
+            walls: after,
+            walls_before: before,
+            joined: names(&simplified.joined),
+            dropped: names(&simplified.dropped),
+        });
+    }
     let pieces =
         |walls: &[usize]| walls.iter().map(|&wall| map.quoted(wall)).collect::<Vec<_>>().join(", ");
     for joined in simplified.joined.iter().take(SHOWN) {
@@ -222,7 +385,6 @@ fn write_simplified(map: &MapFile, limits: Limits, out: &Path) -> anyhow::Result
     if all > reported {
         println!("and {} more", all - reported);
     }
-    let (before, after) = (map.floor.named_walls().len(), floor.named_walls().len());
     println!("{}: {after} walls of {before}", out.display());
     Ok(())
 }

@@ -5,11 +5,13 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
+use serde::Serialize;
 use sonarfix_exchange::maps::geojson::Anchor;
 use sonarfix_exchange::maps::{
     Frame, Imported, MAX_JSON_BYTES, MAX_TEXT_BYTES, dxf, geojson, grid, plan, scan, svg,
 };
 use sonarfix_map::Floor;
+use sonarfix_terminal::json;
 use sonarfix_terminal::output::check_file;
 
 #[derive(Debug, clap::Args)]
@@ -42,6 +44,9 @@ pub struct Import {
     /// Draws what was found in a plan, before and after.
     #[arg(long, value_name = "FILE.svg")]
     picture: Option<PathBuf>,
+    /// Prints the result as JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 impl Import {
@@ -121,7 +126,7 @@ pub fn import(args: &Import) -> anyhow::Result<()> {
             "hint: as a floor plan (--plan) it has {walls} walls, because of double lines, copies or furniture"
         ));
     }
-    for note in &imported.notes {
+    for note in imported.notes.iter().filter(|_| !args.json) {
         println!("{note}");
     }
     let floor = &imported.floor;
@@ -141,8 +146,23 @@ pub fn import(args: &Import) -> anyhow::Result<()> {
         }
     };
     sonarfix_files::write(&args.out, text)?;
-    println!("{}: {} walls", args.out.display(), floor.named_walls().len());
+    let walls = floor.named_walls().len();
+    if args.json {
+        let Imported { notes, offset, .. } = &imported;
+        return json::print(&Json { out: &args.out, walls, offset: *offset, notes });
+    }
+    println!("{}: {walls} walls", args.out.display());
     Ok(())
+}
+
+/// What was imported, as JSON.
+#[derive(Debug, Serialize)]
+struct Json<'a> {
+    out: &'a Path,
+    walls: usize,
+    /// What must be added to the map's coordinates for those of the drawing, metres.
+    offset: Option<[f64; 2]>,
+    notes: &'a [String],
 }
 
 fn read(args: &Import) -> anyhow::Result<Imported> {

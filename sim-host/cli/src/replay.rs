@@ -1,6 +1,5 @@
 //! `sonarfix replay`: replays the recording of a robot through the localizer.
 
-use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -22,7 +21,8 @@ use crate::provenance;
 use crate::run::Output;
 use crate::serve::{self, PacedArgs};
 use crate::warnings::{self, Warned};
-use sonarfix_terminal::output::{check_file, check_folder};
+use sonarfix_terminal::output::{check_file, check_folder, open};
+use sonarfix_terminal::progress::bar;
 
 /// Maximum number of skipped lines that are printed.
 const SHOWN: u64 = 10;
@@ -121,8 +121,10 @@ fn diagnose(args: &Args, with: &Replay) -> anyhow::Result<Diagnosis> {
     if !args.log.is_file() {
         return Ok(Diagnosis::default());
     }
-    let log = File::open(&args.log).with_context(|| args.log.display().to_string())?;
-    let progress = ProgressBar::new_spinner().with_message("comparing the log with its files");
+    let log = open(&args.log)?;
+    let progress = bar(None)
+        .with_style(ProgressStyle::default_spinner())
+        .with_message("comparing the log with its files");
     progress.enable_steady_tick(Duration::from_millis(200));
     let diagnosis = diagnosis::diagnose(with.robot, with.walls, BufReader::new(log));
     progress.finish_and_clear();
@@ -156,7 +158,6 @@ fn beside(log: &Path, given: Option<&PathBuf>, name: &str) -> PathBuf {
 }
 
 fn replay(args: &Args, replay: &Replay, trace: &mut impl Recorder) -> anyhow::Result<Summary> {
-    let open = |path: &Path| File::open(path).with_context(|| path.display().to_string());
     let usual = args.log.with_file_name("reference.csv");
     let reference = match &args.reference {
         Some(given) => Some(open(given)?),
@@ -188,7 +189,7 @@ fn replay(args: &Args, replay: &Replay, trace: &mut impl Recorder) -> anyhow::Re
 /// A progress bar of the bytes read; only on a terminal.
 fn progress(bytes: u64) -> ProgressBar {
     let style = "{bar:40} {bytes} of {total_bytes}, {eta} left";
-    let bar = ProgressBar::new(bytes);
+    let bar = bar(Some(bytes));
     match ProgressStyle::with_template(style) {
         Ok(style) => bar.with_style(style),
         Err(_) => bar,

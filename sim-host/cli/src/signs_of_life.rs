@@ -11,6 +11,8 @@ use sonarfix_monitor::port::Port;
 use sonarfix_monitor::signs::hints::Hint;
 use sonarfix_monitor::signs::{Row, Signs};
 use sonarfix_monitor::{Monitor, request};
+use sonarfix_sim::text::wrapped;
+use sonarfix_terminal::output::width;
 
 /// The robot shows its devices for a minute; it is asked again in time.
 const ASK_AGAIN: Duration = Duration::from_secs(30);
@@ -122,7 +124,12 @@ impl Screen {
 
     fn show(&mut self, rows: &[Row; 6]) {
         match self {
-            Self::Terminal(bar) => bar.set_message(rows.each_ref().map(Row::to_string).join("\n")),
+            Self::Terminal(bar) => {
+                // The bar cuts a line that is longer than the terminal.
+                let wrap = |row: &Row| wrapped(&row.to_string(), width(), 15);
+                let lines: Vec<_> = rows.iter().flat_map(wrap).collect();
+                bar.set_message(lines.join("\n"));
+            }
             Self::Lines(shown) => {
                 for (row, shown) in rows.iter().zip(shown) {
                     if *shown != Some(row.hint) {

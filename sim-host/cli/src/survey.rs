@@ -1,12 +1,12 @@
 //! `sonarfix survey`: a map of walls from a recording.
 
-use std::fs::File;
 use std::io::BufReader;
 use std::path::PathBuf;
 
 use anyhow::Context;
+use serde::Serialize;
 use sonarfix_batch::log;
-use sonarfix_map::{MapFile, NamedWall, robot_file};
+use sonarfix_map::{MapFile, robot_file};
 use sonarfix_report::Table;
 use sonarfix_survey::comparison::{alignment, counterpart};
 use sonarfix_survey::drawing::{draw, name};
@@ -15,7 +15,7 @@ use sonarfix_survey::problem::Robot;
 use sonarfix_survey::survey::{Survey, survey};
 use sonarfix_survey::walls::MappedWall;
 
-use sonarfix_terminal::output::check_file;
+use sonarfix_terminal::output::{check_file, open};
 
 /// Accuracy from which on a wall should be driven along again, metres.
 const POOR: f64 = 0.03;
@@ -39,6 +39,9 @@ pub struct Args {
     /// A map in the frame of the start pose, with which the walls are compared.
     #[arg(long, value_name = "MAP.toml")]
     compare: Option<PathBuf>,
+    /// Prints the survey as JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
@@ -51,7 +54,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let map = args.compare.as_deref().map(|file| MapFile::read(file, None)).transpose()?;
     let robot_path = args.robot.clone().unwrap_or_else(|| args.log.with_file_name("robot.toml"));
     let robot = robot_file::read(&robot_path)?;
-    let file = File::open(&args.log).with_context(|| args.log.display().to_string())?;
+    let file = open(&args.log)?;
     let read =
         log::read(BufReader::new(file), &robot).with_context(|| args.log.display().to_string())?;
     for (line, reason) in read.skipped.iter().take(10) {
@@ -70,9 +73,13 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     if let Some(out) = &args.drawing {
         sonarfix_files::write(out, draw(&found))?;
     }
+    let compared = map.as_ref().map(|map| comparison(&found, map));
+    if args.json {
+        return sonarfix_terminal::json::print(&Json::of(&found, compared));
+    }
     println!("{}", walls(&found).text());
-    if let Some(map) = &map {
-        println!("\n{}", comparison(&found, map).text());
+    if let (Some(map), Some(compared)) = (&map, &compared) {
+        println!("\n{}", comparison_table(compared, map).text());
     }
     println!("\n{}", verdict(&found));
     Ok(())
@@ -147,8 +154,34 @@ fn walls(found: &Survey) -> Table {
     }
 }
 
-/// Each wall of the survey beside that of a map, as it is and after the motion that fits best; the note counts those without one.
-fn comparison(found: &Survey, map: &MapFile) -> Table {
+/// A wall of the survey beside that of a map.
+#[derive(Debug, Serialize)]
+struct Beside {
+    name: String,
+    /// The wall of the map; `None` if it has none there.
+    wall_of_map: Option<String>,
+    /// As it is.
+    offset: Option<f64>,
+    angle: Option<f64>,
+    /// After the motion that fits best.
+    offset_moved: Option<f64>,
+    angle_moved: Option<f64>,
+}
+
+/// The walls of the survey beside those of a map.
+#[derive(Debug, Serialize)]
+struct Comparison {
+    walls: Vec<Beside>,
+    /// Walls of the map, and those that the survey has.
+    walls_of_map: usize,
+    found: usize,
+    /// The motion of the survey that fits best: metres, radians.
+    shift: [f64; 2],
+    turn: f64,
+}
+
+/// Each wall of the survey beside that of a map, as it is and after the motion that fits best.
+fn comparison(found: &Survey, map: &MapFile) -> Comparison {
     let named = map.floor.named_walls();
     let ends: Vec<_> = named.iter().map(|wall| [wall.from().into(), wall.to().into()]).collect();
     let motion = alignment(&found.walls, &ends);
@@ -157,36 +190,131 @@ fn comparison(found: &Survey, map: &MapFile) -> Table {
         to: motion.of(&wall.to),
         ..*wall
     };
+    let beside = |(index, wall): (usize, &MappedWall)| {
+        let (its, moved) = (counterpart(wall, &ends), counterpart(&moved(wall), &ends));
+        Beside {
+            name: name(index),
+            wall_of_map: its.and_then(|its| named.get(its.index)).map(|it| it.name().to_owned()),
+            offset: its.map(|its| its.offset),
+            angle: its.map(|its| its.angle),
+            offset_moved: moved.map(|its| its.offset),
+            angle_moved: moved.map(|its| its.angle),
+        }
+    };
     let matches: Vec<_> = found.walls.iter().map(|wall| counterpart(wall, &ends)).collect();
     let is_found = |index: usize| matches.iter().flatten().any(|found| found.index == index);
-    let row = |(index, wall): (usize, &MappedWall)| {
-        let its = counterpart(wall, &ends);
-        let wall_of_map = its.and_then(|its| named.get(its.index)).map_or("", NamedWall::name);
-        let mut row = vec![name(index), wall_of_map.to_owned()];
-        for its in [its, counterpart(&moved(wall), &ends)] {
-            row.extend(its.map_or_else(<[String; 2]>::default, |its| {
-                [format!("{:.1}", 1e3 * its.offset), format!("{:.2}", its.angle.to_degrees())]
-            }));
-        }
-        row
+    Comparison {
+        walls: found.walls.iter().enumerate().map(beside).collect(),
+        walls_of_map: named.len(),
+        found: (0..named.len()).filter(|&index| is_found(index)).count(),
+        shift: [motion.shift.x, motion.shift.y],
+        turn: motion.turn,
+    }
+}
+
+/// The comparison as a table; the note counts the walls without a counterpart.
+fn comparison_table(compared: &Comparison, map: &MapFile) -> Table {
+    let Comparison { walls, walls_of_map, found, shift, turn } = compared;
+    let millimetres =
+        |value: Option<f64>| value.map_or(String::new(), |it| format!("{:.1}", 1e3 * it));
+    let degrees =
+        |value: Option<f64>| value.map_or(String::new(), |it| format!("{:.2}", it.to_degrees()));
+    let row = |it: &Beside| {
+        vec![
+            it.name.clone(),
+            it.wall_of_map.clone().unwrap_or_default(),
+            millimetres(it.offset),
+            degrees(it.angle),
+            millimetres(it.offset_moved),
+            degrees(it.angle_moved),
+        ]
     };
     Table {
         title: format!("Compared with {}", map.name()),
         note: format!(
-            "{} of {} walls of the map are found, {} other walls; offset in mm, angle in degrees, both also after the \
-             motion of the survey that fits best, {:+.0} mm, {:+.0} mm and {:+.2}°",
-            (0..named.len()).filter(|&index| is_found(index)).count(),
-            named.len(),
-            matches.iter().filter(|found| found.is_none()).count(),
-            1e3 * motion.shift.x,
-            1e3 * motion.shift.y,
-            motion.turn.to_degrees()
+            "{found} of {walls_of_map} walls of the map are found, {} other walls; offset in mm, angle in degrees, both \
+             also after the motion of the survey that fits best, {:+.0} mm, {:+.0} mm and {:+.2}°",
+            walls.iter().filter(|it| it.offset.is_none()).count(),
+            1e3 * shift[0],
+            1e3 * shift[1],
+            turn.to_degrees()
         ),
         columns: ["", "wall of the map", "offset", "angle", "offset moved", "angle moved"]
             .map(str::to_owned)
             .to_vec(),
-        rows: found.walls.iter().enumerate().map(row).collect(),
+        rows: walls.iter().map(row).collect(),
     }
+}
+
+/// The survey as JSON.
+#[derive(Debug, Serialize)]
+struct Json {
+    walls: Vec<JsonWall>,
+    sure: bool,
+    /// Why it is not.
+    reasons: Vec<String>,
+    /// Echoes that fit a wall, and all.
+    echoes_explained: usize,
+    echoes: usize,
+    distance: f64,
+    /// Largest distance between the paths forwards and backwards in time.
+    differs: f64,
+    /// From and to, where the paths differ.
+    disputed: Option<[f64; 2]>,
+    /// Relative.
+    wheel_difference: f64,
+    track_width_error: f64,
+    drive_again: Vec<String>,
+    compared: Option<Comparison>,
+}
+
+/// A wall of the survey.
+#[derive(Debug, Serialize)]
+struct JsonWall {
+    name: String,
+    from: [f64; 2],
+    to: [f64; 2],
+    accuracy: f64,
+    echoes: usize,
+    /// Whether both ends are corners with other walls.
+    corners: [bool; 2],
+    confirmed: bool,
+}
+
+impl Json {
+    fn of(found: &Survey, compared: Option<Comparison>) -> Self {
+        let wall = |(index, wall): (usize, &MappedWall)| JsonWall {
+            name: name(index),
+            from: wall.from.into(),
+            to: wall.to.into(),
+            accuracy: wall.accuracy,
+            echoes: wall.echoes,
+            corners: wall.corners,
+            confirmed: wall.is_confirmed,
+        };
+        let [wheel_difference, track_width_error] = found.drive;
+        Self {
+            walls: found.walls.iter().enumerate().map(wall).collect(),
+            sure: found.is_sure(),
+            reasons: found.reasons.iter().map(ToString::to_string).collect(),
+            echoes_explained: found.explained.0,
+            echoes: found.explained.1,
+            distance: found.distance,
+            differs: found.differs,
+            disputed: found.disputed.map(Into::into),
+            wheel_difference,
+            track_width_error,
+            drive_again: poor(found),
+            compared,
+        }
+    }
+}
+
+/// The walls along which should be driven again.
+fn poor(found: &Survey) -> Vec<String> {
+    let walls = found.walls.iter().enumerate();
+    let poor = walls.filter(|(_, wall)| wall.accuracy > POOR || !wall.is_confirmed);
+    poor.map(|(index, _)| name(index)).collect()
 }
 
 /// The verdict, and what to drive again.
@@ -215,13 +343,7 @@ fn verdict(found: &Survey) -> String {
     if let Some((from, to)) = found.disputed {
         lines.push(format!("Drive again what was driven from {from:.0} s to {to:.0} s."));
     }
-    let poor: Vec<String> = found
-        .walls
-        .iter()
-        .enumerate()
-        .filter(|(_, wall)| wall.accuracy > POOR || !wall.is_confirmed)
-        .map(|(index, _)| name(index))
-        .collect();
+    let poor = poor(found);
     if !poor.is_empty() {
         lines.push(format!("Drive along these walls again: {}.", poor.join(", ")));
     }

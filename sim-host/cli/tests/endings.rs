@@ -5,6 +5,7 @@
 
 use std::process::{Command, Output, Stdio};
 
+use sonarfix_boards::made;
 use sonarfix_link::CommandResult;
 use sonarfix_studies::surveys::{self, Place};
 
@@ -25,7 +26,7 @@ const PAPER: &str = "../../crates/sonarfix-map/scenarios/paper.toml";
 
 /// Every subcommand, with arguments for the shortest output. In `FILES` are a short log with its map and robot, a drive for
 /// the calibration, a recorded stream of a robot's bytes, rows, and room for results; `ROBOT` is the port of a robot.
-const PRINTING: [&[&str]; 44] = [
+const PRINTING: [&[&str]; 45] = [
     &["--help"],
     &["doctor", "--json"],
     &["init", "FILES/robot"],
@@ -60,6 +61,15 @@ const PRINTING: [&[&str]; 44] = [
     &["config", "bake", "tests/robot.toml", "--out", "FILES/config.bin"],
     &["config", "check", "FILES/config.bin"],
     &["config", "show", "FILES/config.bin"],
+    &[
+        "flash",
+        "FILES/board",
+        "--board",
+        "stm32f405",
+        "--program",
+        "FILES/board/program.elf",
+        "--dry-run",
+    ],
     &["map", "check", PAPER],
     &["map", "bake", "FILES/map.toml", "--out", "FILES/map.bin"],
     &["map", "draw", "FILES/map.toml", "--out", "FILES/map.svg"],
@@ -92,6 +102,11 @@ pub fn files() -> tempfile::TempDir {
     let odom = |x, time| format!("ODOM {x} 0 0 0.5 0 0 {time} host 0\n");
     write("carmen.log", &[&odom(0, 10), flaser, &odom(1, 11), flaser, &odom(2, 12)].concat());
     write("bytes", "");
+    std::fs::create_dir(dir.path().join("board")).unwrap();
+    write("board/map.toml", MAP);
+    write("board/robot.toml", ROBOT);
+    let program = made::elf(0, &[made::segment(0x0800_0000, &[0; 8])]);
+    std::fs::write(dir.path().join("board/program.elf"), program).unwrap();
     let geojson = r#"{"type": "LineString", "coordinates": [[0, 0], [4, 0], [4, 3]]}"#;
     write("room.geojson", geojson);
     for arguments in [
@@ -303,7 +318,7 @@ fn a_long_line_is_not_echoed() {
 }
 
 /// The options that name a result, each in a command that would otherwise end with another error, or work for hours.
-const WRITING: [(&[&str], &str); 34] = [
+const WRITING: [(&[&str], &str); 35] = [
     (&["man"], "--out"),
     (&["measure", "--port", "missing"], "--out"),
     (&["paper", "--runs", "4000000"], "--out"),
@@ -333,6 +348,7 @@ const WRITING: [(&[&str], &str); 34] = [
     (&["map", "import", "missing.svg", "--plan", "--out", "map.toml"], "--picture"),
     (&["map", "export", "missing.toml"], "--out"),
     (&["config", "bake", "missing.toml"], "--out"),
+    (&["flash", "missing", "--board", "pico"], "--out"),
     (&["convert", "carmen", "missing.log"], "--out"),
     (&["convert", "lego", "missing"], "--out"),
     (&["convert", "rosbag", "missing"], "--out"),

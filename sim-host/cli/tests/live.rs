@@ -480,12 +480,10 @@ fn an_interruption_ends_with_a_summary() {
     assert!(dir.path().join("run.csv").exists());
 }
 
-/// A page with something of everything, after which its stream ends.
-fn filled() -> Page {
-    let page = page();
-    let feed = Feed::new(Arc::clone(&page.ring));
+/// A robot between two walls.
+fn scene() -> Scene {
     let wall = |name: &str, from, to| Wall { name: name.into(), from, to };
-    feed.scene(&Scene {
+    Scene {
         title: "A <b>robot</b>".into(),
         source: "robot",
         commands: true,
@@ -496,7 +494,14 @@ fn filled() -> Page {
             wall("north", [0.0, 3.0], [4.0, 3.0]),
         ],
         obstacles: Vec::new(),
-    });
+    }
+}
+
+/// A page with something of everything, after which its stream ends.
+fn filled() -> Page {
+    let page = page();
+    let feed = Feed::new(Arc::clone(&page.ring));
+    feed.scene(&scene());
     for number in 0..200_u32 {
         let time = f64::from(number) * 0.1;
         let x = 0.5 + 0.015 * f64::from(number);
@@ -603,6 +608,32 @@ fn the_page_draws_without_an_error() {
         assert!(!dom.contains("<b>robot"));
     }
     assert!(orders.next().is_none());
+}
+
+/// Before the first estimate the page shows the map, and what the estimate waits for.
+#[test]
+fn a_page_without_an_estimate_says_what_it_waits_for() {
+    for (hints, needs) in [
+        (vec!["the loop is stopped: start it".to_owned()], "the loop is stopped: start it"),
+        (Vec::new(), "needs a robot that sends, a pose (Set pose) and a loop that runs (Start)"),
+    ] {
+        let Page { url, ring, orders: _orders, .. } = page();
+        let feed = Feed::new(ring);
+        feed.scene(&scene());
+        let lines = vec!["robot   1.2.3".to_owned()];
+        let (time, longest_poll, deadlines, recording) = (0.0, None, None, None);
+        feed.status(&Status { time, longest_poll, deadlines, lines, hints, recording });
+        feed.end();
+        let label = format!("aria-label=\"waiting for the first estimate: {needs}\"");
+        let shown = [label.as_str(), ">waiting for the first estimate</b>", ">ended<"];
+        let flags = ["--window-size=400,1800"];
+        let Some(dom) = chromium::opened_until(&url, &flags, &shown) else { return };
+        chromium::assert_ready(&dom);
+        chromium::picture(&url, "live-waiting", &flags);
+        for text in shown {
+            assert!(dom.contains(text), "the page does not show {text}: {dom}");
+        }
+    }
 }
 
 /// A page of another origin, with the token: its script can neither read nor command.

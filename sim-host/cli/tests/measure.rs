@@ -152,7 +152,7 @@ impl Robot {
 }
 
 /// The command with a robot; Enter is pressed whenever it waits for that.
-fn measure(defect: Defect, folder: &Path) -> Output {
+fn measure(defect: Defect, folder: &Path, options: &[&str]) -> Output {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let port = format!("tcp:{}", listener.local_addr().unwrap());
     thread::spawn(move || Robot::new(defect).serve(listener.accept().unwrap().0));
@@ -170,6 +170,7 @@ fn measure(defect: Defect, folder: &Path) -> Output {
     std::fs::write(&robot, wheels).unwrap();
     let mut child = Command::new(env!("CARGO_BIN_EXE_sonarfix"))
         .args(["measure", "--port", &port, "--robot", &robot, "--out", &out, "--passes", "2"])
+        .args(options)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -182,7 +183,7 @@ fn measure(defect: Defect, folder: &Path) -> Output {
 #[test]
 fn wheels_and_servo_are_measured_and_written() {
     let folder = tempfile::tempdir().unwrap();
-    let output = measure(Defect::None, folder.path());
+    let output = measure(Defect::None, folder.path(), &[]);
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(output.status.success(), "{text} {}", String::from_utf8_lossy(&output.stderr));
     for line in [
@@ -204,6 +205,23 @@ fn wheels_and_servo_are_measured_and_written() {
 }
 
 #[test]
+fn the_results_are_one_json_value() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = measure(Defect::None, folder.path(), &["--json", "--quiet"]);
+    let errors = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{errors}");
+    // The steps remain, of a quiet command, too.
+    assert!(errors.contains("Turn the right wheel forwards by 10 revolutions"), "{errors}");
+    let value: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    crate::json::assert_documented(&value);
+    assert_eq!(value["right_wheel"]["edges_per_revolution"], 1496.6);
+    assert_eq!(value["right_wheel"]["mirrored"], true);
+    assert_eq!(value["left_wheel"]["mirrored"], false);
+    let offset = value["servo"]["offset"].as_f64().unwrap().to_degrees();
+    assert!((offset - SERVO[0]).abs() < 2.0, "{offset}");
+}
+
+#[test]
 fn what_prevents_a_measurement_is_named() {
     let cases = [
         (Defect::Exchanged, "exchange the encoders' connectors"),
@@ -212,7 +230,7 @@ fn what_prevents_a_measurement_is_named() {
     ];
     for (defect, reason) in cases {
         let folder = tempfile::tempdir().unwrap();
-        let output = measure(defect, folder.path());
+        let output = measure(defect, folder.path(), &[]);
         let errors = String::from_utf8(output.stderr).unwrap();
         assert!(!output.status.success() && errors.contains(reason), "{errors}");
         assert!(!folder.path().join("measured.toml").exists());

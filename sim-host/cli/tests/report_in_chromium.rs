@@ -187,3 +187,25 @@ fn the_page_of_a_run_without_ticks_has_a_placeholder() {
     assert!(dom.contains("there is nothing to draw"));
     assert!(!dom.contains("<svg"));
 }
+
+/// A pose that moves farther than the wheels jumps: its path has a gap there, and between both ticks the robot stays.
+#[test]
+fn a_jump_is_found_by_the_wheels() {
+    let script = r#"
+      const column = (x) => ({ x, y: x.map(() => 0), heading: x.map(() => 0) });
+      const still = [0, 0, 0, 0], none = { time: [] };
+      const ticks = {
+        time: [0, 1, 2, 3], encoders: column([0, 0.1, 0.2, 3.2]), estimate: column([0, 0.1, 1, 4]), truth: column([0, null, 1, 4]),
+        sigma_x: still, sigma_y: still, sigma_heading: still, correlation: still,
+      };
+      const jumps = (role) => [0, 1, 2, 3].filter((index) => Moment.isJump(ticks, role, index)).join();
+      const { estimate } = Moment.momentAt({ ticks, fixes: none, gyro: none, absolutes: none }, 1.5);
+      document.title = `${jumps("estimate")};${jumps("truth")};${jumps("encoders")};${estimate.x}`;
+    "#;
+    let dir = tempfile::tempdir().unwrap();
+    let page = dir.path().join("jumps.html");
+    let drawing = sonarfix_report::DRAWING;
+    std::fs::write(&page, format!("<script>{drawing}{script}</script>")).unwrap();
+    let Some(dom) = chromium::opened(&format!("file://{}", page.display()), &[]) else { return };
+    assert!(dom.contains("<title>2;;;0.1</title>"), "{dom}");
+}

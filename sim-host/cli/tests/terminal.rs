@@ -6,14 +6,27 @@ use std::path::Path;
 
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
-use sonarfix::filter::ekf::{StandardDeviations, StateEstimate};
-use sonarfix::geometry::units::Instant;
-use sonarfix_link::message::{ImageStatus, Odometry, ResetCause};
-use sonarfix_link::{Hello, Reporter, Sender, Telemetry, frame};
+use sonarfix::aim::{Aim, Reason};
+use sonarfix::config::RangerId;
+use sonarfix::filter::ekf::{EkfError, StandardDeviations, StateEstimate};
+use sonarfix::geometry::pose::Pose;
+use sonarfix::geometry::units::{Duration, Instant, Metres, Radians, SquareMetres};
+use sonarfix::health::Verdict;
+use sonarfix::localizer::{Fix, Refusal};
+use sonarfix::map::WallId;
+use sonarfix_hal::ranger::NoEcho;
+use sonarfix_hal::robot::{EncoderFaults, Faults};
+use sonarfix_link::message::{
+    FlashStatus, ImageStatus, LoopStatus, Odometry, RankedHypothesis, ResetCause, SearchAnswer,
+    SearchStatus,
+};
+use sonarfix_link::{Hello, Ping, ReceiverCounters, Reporter, Sender, Telemetry, frame};
 use sonarfix_map::{CLASSROOM, Fidelity, Scenario};
 use sonarfix_monitor::Monitor;
 use sonarfix_monitor::hints::hints;
 use sonarfix_monitor::terminal::{History, Screen};
+use sonarfix_monitor::view;
+use sonarfix_search::navigator::Mode;
 use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::trace::{FixRecord, Recorder, Tick, Trace};
 
@@ -69,9 +82,66 @@ fn shown(received: &Received, trace: &Trace, width: u16, height: u16) -> String 
         recording: Some(Path::new("run.csv")),
         notice: "start: done",
     };
-    let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
+    // Made for another size, and resized.
+    let mut terminal = Terminal::new(TestBackend::new(width + 7, height + 3)).unwrap();
+    terminal.draw(|frame| screen.draw(frame)).unwrap();
+    terminal.backend_mut().resize(width, height);
     terminal.draw(|frame| screen.draw(frame)).unwrap();
     terminal.backend().to_string()
+}
+
+/// The words of a screen, without borders and line ends.
+fn words(screen: &str) -> String {
+    let lines = screen.lines().map(|line| line.trim_matches('"').trim_matches('│'));
+    lines.flat_map(str::split_whitespace).collect::<Vec<_>>().join(" ")
+}
+
+/// A robot that has lost its pose, whose last ping was refused for the longest reason, with these faults.
+fn troubled(faults: Faults) -> (Received, Trace) {
+    let mut received = Received::default();
+    received.send(&Telemetry::Hello(Hello {
+        firmware: [10, 20, 30],
+        map: ImageStatus::Valid(0x8f3a_5c11),
+        configuration: ImageStatus::Version(17),
+        reset: ResetCause::Unknown,
+    }));
+    let at = Instant::from_ticks(123_456_789_000);
+    let state = StateEstimate { x: Metres(-1234.567), y: Metres(-234.567), ..Default::default() };
+    let (_, began) = Reporter::resume(at, state, StandardDeviations::default());
+    let Telemetry::Initialized(mut estimate) = began else { unreachable!("{began:?}") };
+    received.send(&began);
+    estimate.health.verdict = Verdict::Lost;
+    estimate.health.silent_in_a_row = 12_345;
+    estimate.health.gated_in_a_row = 12_345;
+    received.send(&Telemetry::Estimate(estimate));
+    let why = Reason {
+        gain: SquareMetres(0.0),
+        success: 1.0,
+        time: Duration::from_ticks(0),
+        candidates: 1,
+    };
+    let (wall, bearing, range) = (WallId(0), Radians(-2.0), Metres(2.0));
+    received.send(&Telemetry::Ping(Ping {
+        at,
+        aim: Aim { wall, bearing, range, why, ranger: RangerId(0) },
+        outcome: Err(NoEcho::Mistimed),
+        fix: Fix::Refused(Refusal::Filter(EkfError::JacobianTooLarge)),
+    }));
+    received.send(&Telemetry::LoopStatus(LoopStatus {
+        at,
+        running: true,
+        faults,
+        worst_poll: Duration::from_ticks(123_456),
+        commands: ReceiverCounters::default(),
+        flash: FlashStatus { writes: 100, failures: 12_345 },
+    }));
+    let name = "behind the blackboard, left of the door".to_owned();
+    let wall = sonarfix_sim::trace::Wall { name, from: [0.0, 0.0], to: [4.0, 0.0] };
+    (received, Trace { walls: vec![wall], ..Trace::default() })
+}
+
+fn encoder(errors: u32, illegal: u32) -> EncoderFaults {
+    EncoderFaults { errors, illegal }
 }
 
 #[test]
@@ -97,6 +167,101 @@ fn the_terminal_names_walls_and_draws_map_and_innovations() {
     assert!(dots > 100, "{dots} characters of the map:\n{wide}");
     let narrow = shown(&received, &trace, 80, 40);
     assert!(narrow.contains("tracking") && narrow.contains(" map "), "{narrow}");
+}
+
+/// Pose, verdict, the last ping with its reason, faults, and everything to check are whole on the smallest usual terminal.
+#[test]
+fn a_terminal_of_80_by_24_has_all_reasons() {
+    let faults = Faults { travel: 12_345, servo: 12_345, ..Faults::default() };
+    let (received, trace) = troubled(faults);
+    let screen = shown(&received, &trace, 80, 24);
+    let text = words(&screen);
+    let found = hints(&received.monitor);
+    assert_eq!(found.len(), 5, "{found:?}");
+    let refusal = Refusal::Filter(EkfError::JacobianTooLarge).to_string();
+    let more = [
+        "✖ lost",
+        "5 to check",
+        "x -1234.567 m",
+        "wall behind the blackboard, left of the door at -114.6°",
+        &NoEcho::Mistimed.to_string(),
+        &format!("refused, {refusal}"),
+        "faults: servo 12345, travel 12345",
+        "12345 writes failed, what changes is lost at power off",
+        "recording run.csv start: done",
+    ];
+    for part in found.iter().map(String::as_str).chain(more) {
+        assert!(text.contains(part), "no {part}:\n{screen}");
+    }
+}
+
+/// With more to check than there is room, the most important is there, and a line states that there is more.
+#[test]
+fn what_matters_least_is_left_out_first() {
+    let every = Faults {
+        right: encoder(1, 2),
+        left: encoder(3, 4),
+        servo: 5,
+        ranger: 6,
+        travel: 7,
+        deadlines: 8,
+        clock: 9,
+        gyro: 10,
+    };
+    let (received, trace) = troubled(every);
+    let screen = words(&shown(&received, &trace, 80, 24));
+    let first = hints(&received.monitor).first().unwrap().clone();
+    for part in ["more lines on a larger terminal", "pose x", "health lost", "ping wall", &first] {
+        assert!(screen.contains(part), "no {part}:\n{screen}");
+    }
+    assert!(!screen.contains("cycles in a row"), "{screen}");
+    let large = words(&shown(&received, &trace, 80, 70));
+    assert!(large.contains("cycles in a row") && !large.contains("larger terminal"), "{large}");
+}
+
+#[test]
+fn a_terminal_of_80_by_24_has_the_answers_of_the_search() {
+    let (mut received, trace) = troubled(Faults::default());
+    let at = Instant::from_ticks(0);
+    let answer = SearchAnswer::Along(WallId(0));
+    received.send(&Telemetry::Search(SearchStatus {
+        at,
+        mode: Mode::Searching,
+        answer,
+        pings: 12_345,
+        cycles: 123_456,
+    }));
+    for rank in 0..8 {
+        let pose = Pose::new(-1234.5, -1234.5, Radians(-3.0));
+        received.send(&Telemetry::Hypothesis(RankedHypothesis {
+            at,
+            rank,
+            pose,
+            position_deviation: Metres(123.4),
+            heading_deviation: Radians(1.0),
+            fit: -12.34,
+            explained: 1.0,
+        }));
+    }
+    let screen = words(&shown(&received, &trace, 80, 24));
+    let status = view::search(received.monitor.search().unwrap(), &[trace.walls[0].name.clone()]);
+    for part in
+        [words(&status), "1 x -1234.50 m".to_owned(), "fit -12.34, 100 % explained".to_owned()]
+    {
+        assert!(screen.contains(&part), "no {part}:\n{screen}");
+    }
+}
+
+#[test]
+fn no_line_is_cut_at_any_width() {
+    let (received, trace) = troubled(Faults { servo: 1, ..Faults::default() });
+    let names: Vec<_> = trace.walls.iter().map(|wall| wall.name.clone()).collect();
+    let whole = words(&view::page(&received.monitor, &names));
+    for width in [20, 33, 78, 118] {
+        let lines = view::fitted(&received.monitor, &names, width, 500);
+        assert!(lines.iter().all(|line| line.chars().count() <= width), "{width}: {lines:?}");
+        assert_eq!(words(&lines.join("\n")), whole, "{width}");
+    }
 }
 
 /// No size makes it panic.

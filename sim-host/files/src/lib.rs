@@ -9,11 +9,19 @@ mod checksum;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, BufWriter, ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use anyhow::Context;
 use tempfile::TempPath;
 
 pub use checksum::Checksum;
+
+static OBSERVER: OnceLock<fn(&Path)> = OnceLock::new();
+
+/// From now on calls a function with the name of each file that is whole: the first function that is given.
+pub fn on_written(observer: fn(&Path)) {
+    let _ = OBSERVER.set(observer);
+}
 
 /// A file that is being written. Dropping it without [`Self::finish`] leaves the old one.
 #[derive(Debug)]
@@ -67,6 +75,9 @@ impl Output {
         file.sync_all()?;
         part.persist(&to)?;
         sync_folder(&to);
+        if let Some(observer) = OBSERVER.get() {
+            observer(&to);
+        }
         Ok(())
     }
 }

@@ -8,7 +8,8 @@
   const DROPPED_AT_ONCE = 4_000;
   const MOST_NOTICES = 100;
   const RETRY = 1_000;         // ms until a lost connection is tried again
-  const REFRESH = 200;         // ticks after which the usual deviation is computed again
+  const REFRESH = 200;         // ticks after which extent and usual deviation are computed again
+  const REFRESH_OUTSIDE = 20;  // the same while the picture does not hold the estimate
   const VERDICTS = ["tracking", "degraded", "lost"];
 
   const root = document.documentElement;
@@ -17,6 +18,8 @@
     ["stage", "view", "exaggeration", "window", "speed", "record", "drag", "tap", "pause", "pose"].map(element);
   const readout = Object.fromEntries(
     [...document.querySelectorAll("#readout [data-value]")].map((dd) => [dd.dataset.value, dd]));
+
+  const STAGE = stage.getAttribute("aria-label");
 
   // The token is in the address at first; a reload finds it in the storage of this tab.
   const token = new URLSearchParams(location.hash.slice(1)).get("token") ?? sessionStorage.getItem("token") ?? "";
@@ -38,7 +41,7 @@
   });
 
   const run = emptyRun();
-  const state = { next: 0, search: "", isDue: false, ticks: 0, placing: null, isRobot: false, isEnded: false };
+  const state = { next: 0, search: "", isDue: false, ticks: 0, placing: null, hints: [], isRobot: false, isEnded: false };
 
   const changed = () => { state.isDue = true; };
 
@@ -138,6 +141,7 @@
       append(run.loop, { time: [status.time], longest: [1e3 * status.longest_poll], deadlines: [status.deadlines] });
     }
     say("lines", status.lines.join("\n"));
+    state.hints = status.hints;
     fill(element("hints"), status.hints);
     element("check").hidden = status.hints.length === 0;
     record.setAttribute("aria-pressed", String(status.recording !== null));
@@ -224,21 +228,34 @@
   const picture = Drawing.picture(stage, run, settings);
   picture.navigate(changed, () => state.placing !== null);
 
+  // What the first estimate waits for.
+  function waiting() {
+    const needs = state.hints.length > 0 ? state.hints.join("; ")
+      : state.isRobot ? "needs a robot that sends, a pose (Set pose) and a loop that runs (Start)" : "needs the first travel of the wheels";
+    return `waiting for the first estimate: ${needs}`;
+  }
+
   function draw() {
-    if (run.ticks.time.length > 0) {
+    if (run.ticks.time.length === 0) {
+      picture.drawWaiting(waiting());
+      stage.setAttribute("aria-label", waiting());
+      say("verdict", "waiting for the first estimate");
+    } else {
       const time = run.ticks.time.at(-1);
-      if (state.ticks > REFRESH) { picture.refresh(); state.ticks = 0; }
       const moment = Moment.momentAt(run, time);
+      const isOutside = view.value === "map" && moment.estimate && picture.isOutside(moment.estimate);
+      if (state.ticks > (isOutside ? REFRESH_OUTSIDE : REFRESH)) { picture.refresh(); state.ticks = 0; }
+      stage.setAttribute("aria-label", STAGE);
       // A range may be later than the last tick.
       moment.fix = Moment.momentAt(run, Math.max(time, run.fixes.time.at(-1) ?? time)).fix;
       moment.absolute = Moment.momentAt(run, Math.max(time, run.absolutes.time.at(-1) ?? time)).absolute;
       picture.draw(moment);
-      if (state.placing?.to) drawPlaced();
       showNumbers(moment);
       const from = Math.max(run.ticks.time[0], time - Number(windowMenu.value));
       const colours = picture.colours();
       curves.forEach((curve) => curve.draw(from, Math.max(time, from + 1), colours));
     }
+    if (state.placing?.to) drawPlaced();
     root.dataset.ready = "true";
   }
 
@@ -295,7 +312,7 @@
   }
 
   stage.addEventListener("pointerdown", (event) => {
-    if (!state.placing || run.ticks.time.length === 0) return;
+    if (!state.placing) return;
     state.placing.at = picture.floorAt(event.offsetX, event.offsetY);
     if (state.placing.isTap) {
       sendPosition(state.placing.at);

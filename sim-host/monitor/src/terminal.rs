@@ -7,12 +7,13 @@ use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Style, Stylize};
 use ratatui::symbols::Marker;
-use ratatui::text::Line;
+use ratatui::text::{Line, Span};
 use ratatui::widgets::canvas::{Canvas, Circle, Line as Segment, Points};
-use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph, Wrap};
+use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph};
 use sonarfix::health::Verdict;
 use sonarfix::localizer::Fix;
 use sonarfix_link::Telemetry;
+use sonarfix_sim::text::wrapped;
 use sonarfix_sim::trace::Wall;
 
 use crate::hints::hints;
@@ -26,6 +27,10 @@ const POSITIONS: usize = 600;
 const RADIUS: f64 = 0.08;
 /// Width from which map and innovations are beside the numbers.
 const WIDE: u16 = 120;
+
+/// Colours of what the filter uses and of what is uncertain. Blue and yellow differ for everybody.
+const USED: Color = Color::Cyan;
+const UNCERTAIN: Color = Color::Yellow;
 
 /// What the terminal draws of the past.
 #[derive(Debug, Clone, Default)]
@@ -87,59 +92,77 @@ pub struct Screen<'a> {
 impl Screen<'_> {
     /// Draws everything.
     pub fn draw(&self, frame: &mut Frame) {
-        let rows =
-            Layout::vertical([Constraint::Length(1), Constraint::Min(10), Constraint::Length(1)]);
+        let footer = self.footer(frame.area().width);
+        let rows = Layout::vertical([
+            Constraint::Length(1),
+            Constraint::Min(10),
+            Constraint::Length(u16::try_from(footer.len()).unwrap_or(1)),
+        ]);
         let [top, middle, bottom] = rows.areas(frame.area());
         frame.render_widget(self.title(), top);
-        frame.render_widget(self.footer(), bottom);
-        let lines = view::page(self.monitor, self.names);
-        let height = u16::try_from(lines.lines().count()).unwrap_or(u16::MAX).saturating_add(2);
-        let numbers = Paragraph::new(lines.clone()).wrap(Wrap { trim: false });
-        let numbers = numbers.block(Block::bordered().title(" telemetry "));
+        frame.render_widget(text(footer), bottom);
         if frame.area().width >= WIDE {
             let [left, right] =
                 Layout::horizontal([Constraint::Min(60), Constraint::Percentage(40)]).areas(middle);
             let [above, below] =
                 Layout::vertical([Constraint::Percentage(60), Constraint::Percentage(40)])
                     .areas(right);
-            frame.render_widget(numbers, left);
+            self.draw_numbers(frame, left);
             self.draw_map(frame, above);
             self.draw_innovations(frame, below);
         } else {
-            // Long lines are wrapped on a narrow terminal, which takes about half as many rows more.
-            let rows = height.saturating_add(height / 2).min(middle.height);
+            let rows = self.numbers(middle).len().saturating_add(2).min(middle.height.into());
+            let rows = u16::try_from(rows).unwrap_or(u16::MAX);
             let [above, below] =
                 Layout::vertical([Constraint::Length(rows), Constraint::Min(0)]).areas(middle);
-            frame.render_widget(numbers, above);
+            self.draw_numbers(frame, above);
             if below.height >= 6 {
                 self.draw_map(frame, below);
             }
         }
     }
 
+    /// The telemetry in an area with a border.
+    fn numbers(&self, area: Rect) -> Vec<String> {
+        let [width, height] = [area.width, area.height].map(|it| usize::from(it.saturating_sub(2)));
+        view::fitted(self.monitor, self.names, width, height)
+    }
+
+    fn draw_numbers(&self, frame: &mut Frame, area: Rect) {
+        let numbers = text(self.numbers(area)).block(Block::bordered().title(" telemetry "));
+        frame.render_widget(numbers, area);
+    }
+
+    /// The verdict has a sign beside its colour, and colours that differ in brightness and between blue and yellow.
     fn title(&self) -> Line<'_> {
         let verdict = self.monitor.estimate().map(|estimate| estimate.health.verdict);
-        let (text, colour) = match verdict {
-            None => ("no estimate yet", Color::DarkGray),
-            Some(Verdict::Tracking) => (view::verdict(Verdict::Tracking), Color::Green),
-            Some(Verdict::Degraded) => (view::verdict(Verdict::Degraded), Color::Yellow),
-            Some(Verdict::Lost) => (view::verdict(Verdict::Lost), Color::Red),
+        let (sign, text, style) = match verdict {
+            None => ("○", "no estimate yet", Style::default().fg(Color::DarkGray)),
+            Some(Verdict::Tracking) => {
+                ("●", view::verdict(Verdict::Tracking), Style::default().fg(USED))
+            }
+            Some(Verdict::Degraded) => {
+                ("▲", view::verdict(Verdict::Degraded), Style::default().fg(UNCERTAIN))
+            }
+            Some(Verdict::Lost) => {
+                ("✖", view::verdict(Verdict::Lost), Style::default().fg(Color::Magenta).reversed())
+            }
         };
         let count = hints(self.monitor).len();
         let check = if count == 0 { String::new() } else { format!("  {count} to check") };
-        Line::from(vec![" sonarfix monitor  ".bold(), text.fg(colour).bold(), check.yellow()])
+        let verdict = Span::styled(format!("{sign} {text}"), style).bold();
+        Line::from(vec![" sonarfix monitor  ".bold(), verdict, check.fg(UNCERTAIN)])
     }
 
-    fn footer(&self) -> Line<'_> {
+    /// The keys, the recording and the answer to the last command, wrapped.
+    fn footer(&self, width: u16) -> Vec<String> {
         let recording = self.recording.map_or_else(
             || "not recording".to_owned(),
             |path| format!("recording {}", path.display()),
         );
-        Line::from(vec![
-            " q ends  r records  s starts  x stops  ".into(),
-            recording.bold(),
-            format!("  {}", self.notice).italic(),
-        ])
+        let keys = " q ends  r records  s starts  x stops";
+        let line = format!("{keys}  {recording}  {}", self.notice);
+        wrapped(line.trim_end(), width.into(), 1)
     }
 
     fn draw_map(&self, frame: &mut Frame, area: Rect) {
@@ -179,17 +202,17 @@ impl Screen<'_> {
         let most = used.iter().map(|(_, value)| value.abs()).fold(10.0, f64::max);
         let last = f64::from(self.history.pings.max(1));
         let first = self.history.innovations.front().map_or(0.0, |of| of.0);
-        let data = |name, points, colour| {
+        let data = |name, marker, points, colour| {
             Dataset::default()
                 .name(name)
-                .marker(Marker::Dot)
+                .marker(marker)
                 .graph_type(GraphType::Scatter)
                 .style(Style::default().fg(colour))
                 .data(points)
         };
         let chart = Chart::new(vec![
-            data("used", &used, Color::Green),
-            data("gated", &gated, Color::Yellow),
+            data("used", Marker::Dot, &used, USED),
+            data("gated", Marker::Bar, &gated, UNCERTAIN),
         ])
         .block(Block::bordered().title(" innovations (mm) "))
         .x_axis(Axis::default().bounds([first, last.max(first + 1.0)]))
@@ -200,6 +223,11 @@ impl Screen<'_> {
         ]));
         frame.render_widget(chart, area);
     }
+}
+
+/// Lines as they are.
+fn text(lines: Vec<String>) -> Paragraph<'static> {
+    Paragraph::new(lines.into_iter().map(Line::from).collect::<Vec<_>>())
 }
 
 /// The extent of map or path with a margin, widened so that a metre is as long in x as in y: a character is twice as high as wide.

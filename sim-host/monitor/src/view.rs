@@ -11,32 +11,95 @@ use sonarfix_link::message::{
 };
 use sonarfix_link::{Estimate, Hello, Ping};
 use sonarfix_search::navigator::Mode;
+use sonarfix_sim::text::wrapped;
 
 use crate::Monitor;
 use crate::hints::hints;
 
-/// All telemetry, one line per subject, of at most 100 characters. `walls` has the names of the map's walls; without them
-/// walls have numbers.
+/// Columns of a subject's name.
+const INDENT: usize = 8;
+
+/// Lines of the telemetry about one subject.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Subject {
+    /// How much it matters, from 0, the most: a small screen leaves out the others first.
+    pub rank: u8,
+    /// Its text, one or more lines.
+    pub text: String,
+}
+
+/// All telemetry, in the order of a page. `walls` has the names of the map's walls; without them walls have numbers.
+#[must_use]
+pub fn subjects(monitor: &Monitor, walls: &[String]) -> Vec<Subject> {
+    let subject = |rank, text| Subject { rank, text };
+    let mut all =
+        vec![subject(2, monitor.hello.as_ref().map_or("robot   none yet".to_owned(), hello))];
+    match &monitor.estimate {
+        None => all.push(subject(0, "pose    none yet".to_owned())),
+        Some(estimate) => {
+            let [pose, wheels, sonar, health, cycles] = estimated(estimate);
+            for (rank, text) in [(0, pose), (3, wheels), (4, sonar), (0, health), (4, cycles)] {
+                all.push(subject(rank, text));
+            }
+        }
+    }
+    match &monitor.ping {
+        None => all.push(subject(0, "ping    none yet".to_owned())),
+        Some(last) => {
+            all.extend([subject(0, ping(last, walls)), subject(2, pings(monitor))]);
+        }
+    }
+    all.push(subject(1, monitor.state.as_ref().map_or("loop    none yet".to_owned(), state)));
+    all.push(subject(2, link(monitor)));
+    all.extend(monitor.gyro.as_ref().map(|it| subject(3, gyro(it))));
+    all.extend(monitor.absolute.as_ref().map(|it| subject(3, absolute(it))));
+    if monitor.mode != Mode::Tracking {
+        all.extend(monitor.search.as_ref().map(|status| subject(0, search(status, walls))));
+        let hypotheses = (0..).zip(&monitor.hypotheses);
+        all.extend(hypotheses.map(|(place, it)| subject(place, hypothesis(it))));
+    }
+    let hints = (0..).zip(hints(monitor));
+    all.extend(hints.map(|(place, hint)| subject(place.min(1), format!("check   {hint}"))));
+    all
+}
+
+/// All telemetry, one line per subject, of at most 100 characters.
 #[must_use]
 pub fn page(monitor: &Monitor, walls: &[String]) -> String {
-    let mut lines = vec![
-        monitor.hello.as_ref().map_or("robot   none yet".to_owned(), hello),
-        monitor.estimate.as_ref().map_or("pose    none yet".to_owned(), estimate),
-        monitor
-            .ping
-            .as_ref()
-            .map_or("ping    none yet".to_owned(), |last| ping(monitor, last, walls)),
-        monitor.state.as_ref().map_or("loop    none yet".to_owned(), state),
-        link(monitor),
-    ];
-    lines.extend(monitor.gyro.as_ref().map(gyro));
-    lines.extend(monitor.absolute.as_ref().map(absolute));
-    if monitor.mode != Mode::Tracking {
-        lines.extend(monitor.search.as_ref().map(|status| search(status, walls)));
-        lines.extend(monitor.hypotheses.iter().map(hypothesis));
-    }
-    lines.extend(hints(monitor).into_iter().map(|hint| format!("check   {hint}")));
+    let lines: Vec<_> = subjects(monitor, walls).into_iter().map(|it| it.text).collect();
     lines.join("\n")
+}
+
+/// The telemetry on a screen of this size: lines are wrapped, and what matters least is left out if not all fits.
+#[must_use]
+pub fn fitted(monitor: &Monitor, walls: &[String], width: usize, height: usize) -> Vec<String> {
+    let wrap = |it: Subject| (it.rank, wrapped(&it.text, width, INDENT));
+    let all: Vec<_> = subjects(monitor, walls).into_iter().map(wrap).collect();
+    let rows = |of: &[usize]| -> usize {
+        of.iter().filter_map(|&index| all.get(index)).map(|(_, lines)| lines.len()).sum()
+    };
+    let mut order: Vec<usize> = (0..all.len()).collect();
+    let is_whole = rows(&order) <= height;
+    order.sort_by_key(|&index| all.get(index).map(|(rank, _)| *rank));
+    let mut kept = Vec::new();
+    for index in order {
+        kept.push(index);
+        // One row states that something is left out.
+        if rows(&kept) > height.saturating_sub(usize::from(!is_whole)) {
+            kept.pop();
+        }
+    }
+    kept.sort_unstable();
+    let left_out = all.len() - kept.len();
+    let mut shown: Vec<String> = kept
+        .iter()
+        .filter_map(|&index| all.get(index))
+        .flat_map(|(_, lines)| lines.clone())
+        .collect();
+    if left_out > 0 {
+        shown.push(format!("        {left_out} more lines on a larger terminal"));
+    }
+    shown
 }
 
 /// The estimate in one line.
@@ -139,44 +202,52 @@ pub fn flashed(flashed: ImageStatus) -> String {
     }
 }
 
-fn estimate(e: &Estimate) -> String {
+/// Pose, wheels, range scale, health and cycles.
+fn estimated(e: &Estimate) -> [String; 5] {
     let (s, d, h) = (&e.state, &e.deviation, &e.health);
     let mm = |metres: f32| 1e3 * metres;
     let percent = |fraction: f32| 100.0 * fraction;
-    format!(
-        "pose    x {:.3} m ± {:.1} mm, y {:.3} m ± {:.1} mm, heading {:.2}° ± {:.2}°, at {:.1} s\n\
-         wheels  S_R {:+.3} ± {:.3} %, S_L {:+.3} ± {:.3} %, track width {:+.2} ± {:.2} mm\n\
-         sonar   range scale {:+.3} ± {:.3} %\n\
-         health  {}: evidence {:.1} of {LOST_AT}, NIS {:.1}; last accepted range {:.1} m and {:.1} s ago\n\
-         cycles  in a row {} accepted, {} gated, {} silent; {} inflations",
-        s.x.0,
-        mm(d.x.0),
-        s.y.0,
-        mm(d.y.0),
-        s.heading.to_degrees(),
-        d.heading.to_degrees(),
-        seconds(e.at),
-        percent(s.scale_right),
-        percent(d.scale_right),
-        percent(s.scale_left),
-        percent(d.scale_left),
-        mm(s.track_width_error.0),
-        mm(d.track_width_error.0),
-        percent(s.range_scale),
-        percent(d.range_scale),
-        verdict(h.verdict),
-        h.evidence,
-        h.nis,
-        h.rolled_since_fix.0,
-        seconds(Instant::from_ticks(h.time_since_fix.ticks())),
-        h.accepted_in_a_row,
-        h.gated_in_a_row,
-        h.silent_in_a_row,
-        h.inflations,
-    )
+    [
+        format!(
+            "pose    x {:.3} m ± {:.1} mm, y {:.3} m ± {:.1} mm, heading {:.2}° ± {:.2}°, at {:.1} s",
+            s.x.0,
+            mm(d.x.0),
+            s.y.0,
+            mm(d.y.0),
+            s.heading.to_degrees(),
+            d.heading.to_degrees(),
+            seconds(e.at),
+        ),
+        format!(
+            "wheels  S_R {:+.3} ± {:.3} %, S_L {:+.3} ± {:.3} %, track width {:+.2} ± {:.2} mm",
+            percent(s.scale_right),
+            percent(d.scale_right),
+            percent(s.scale_left),
+            percent(d.scale_left),
+            mm(s.track_width_error.0),
+            mm(d.track_width_error.0),
+        ),
+        format!(
+            "sonar   range scale {:+.3} ± {:.3} %",
+            percent(s.range_scale),
+            percent(d.range_scale)
+        ),
+        format!(
+            "health  {}: evidence {:.1} of {LOST_AT}, NIS {:.1}; last accepted range {:.1} m and {:.1} s ago",
+            verdict(h.verdict),
+            h.evidence,
+            h.nis,
+            h.rolled_since_fix.0,
+            seconds(Instant::from_ticks(h.time_since_fix.ticks())),
+        ),
+        format!(
+            "cycles  in a row {} accepted, {} gated, {} silent; {} inflations",
+            h.accepted_in_a_row, h.gated_in_a_row, h.silent_in_a_row, h.inflations,
+        ),
+    ]
 }
 
-fn ping(monitor: &Monitor, ping: &Ping, walls: &[String]) -> String {
+fn ping(ping: &Ping, walls: &[String]) -> String {
     let range = match ping.outcome {
         Ok(echo) => format!("{:.3} m", echo.range.0),
         Err(reason) => reason.to_string(),
@@ -189,12 +260,12 @@ fn ping(monitor: &Monitor, ping: &Ping, walls: &[String]) -> String {
         other => format!("{other:?}"),
     };
     let (wall, bearing) = (wall(ping.aim.wall, walls), ping.aim.bearing.0.to_degrees());
+    format!("ping    {wall} at {bearing:.1}°: {range}; {fix}")
+}
+
+fn pings(monitor: &Monitor) -> String {
     let f = &monitor.fixes;
-    format!(
-        "ping    {wall} at {bearing:.1}°: {range}; {fix}\n\
-         pings   {} accepted, {} gated, {} refused",
-        f.accepted, f.gated, f.refused
-    )
+    format!("pings   {} accepted, {} gated, {} refused", f.accepted, f.gated, f.refused)
 }
 
 fn state(state: &LoopStatus) -> String {

@@ -4,6 +4,7 @@ use std::io::IsTerminal;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use sonarfix::geometry::units::Instant;
+use sonarfix_terminal::progress::bar;
 
 /// Progress of a run.
 #[derive(Debug)]
@@ -26,7 +27,7 @@ impl Progress {
     )]
     pub fn of(seconds: f64) -> Self {
         let length = seconds.round() as u64;
-        let bar = ProgressBar::new(length);
+        let bar = bar(Some(length));
         let style = ProgressStyle::with_template("{bar:40} {pos} of {len} s, {eta} left");
         let bar = style.map_or_else(|_| bar.clone(), |style| bar.clone().with_style(style));
         let printed = (!std::io::stderr().is_terminal()).then_some(0);
@@ -45,7 +46,7 @@ impl Progress {
             && tenth > *printed
         {
             *printed = tenth;
-            eprintln!("{seconds} of {} s", self.length);
+            sonarfix_terminal::eprintln!("{seconds} of {} s", self.length);
         }
     }
 }

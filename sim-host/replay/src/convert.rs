@@ -14,6 +14,7 @@ use std::io::{self, BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
 use flate2::bufread::MultiGzDecoder;
+use serde::Serialize;
 use sonarfix_files::Output;
 use sonarfix_map::NamedWall;
 use sonarfix_sim::trace::Pose;
@@ -69,7 +70,7 @@ impl ConvertError {
 }
 
 /// The result of a conversion.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Converted {
     /// Encoder records written.
     pub encoders: u64,

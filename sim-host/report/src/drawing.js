@@ -5,7 +5,7 @@
 // depend on the time (grid, walls) and what only grows (paths) are layers, which are painted when their view changes.
 
 const Drawing = (() => {
-  const { OUTCOMES, SIGMAS, isUnusual, searchAt } = Moment;
+  const { OUTCOMES, SIGMAS, isJump, isUnusual, searchAt } = Moment;
   const LEAST_ROBOT = 7;       // pixels: the least radius at which a heading can be seen
   const TRACK = 0.35;          // metres, where the run does not know
   const SILENT_BEAM = 1.5;     // metres: how far a beam is drawn that heard nothing
@@ -17,14 +17,26 @@ const Drawing = (() => {
 
   // ---- The visible part of the floor ----
 
-  // The extent of the whole map: the walls; without any, the path.
+  // The extent of the whole map: the walls, and the estimate as far as it is not farther from them than they are wide; without
+  // walls, the path.
   function bounds({ walls, ticks }) {
-    const ends = walls.map((wall) => wall.ends);
-    const path = ends.length ? null : ticks.estimate;
-    const xs = path ? path.x : ends.flatMap((end) => [end[0], end[2]]);
-    const ys = path ? path.y : ends.flatMap((end) => [end[1], end[3]]);
-    const [left, right] = extent(xs), [bottom, top] = extent(ys);
+    const ends = walls.map((wall) => wall.ends), path = ticks.estimate;
+    let [left, right] = extent(ends.length ? ends.flatMap((end) => [end[0], end[2]]) : path.x);
+    let [bottom, top] = extent(ends.length ? ends.flatMap((end) => [end[1], end[3]]) : path.y);
+    if (ends.length) {
+      const room = Math.max(right - left, top - bottom);
+      const isNear = (value, low, high) => value !== null && value >= low - room && value <= high + room;
+      const near = path.x.map((x, i) => [x, path.y[i]]).filter(([x, y]) => isNear(x, left, right) && isNear(y, bottom, top));
+      [left, right] = widened([left, right], near.map(([x]) => x));
+      [bottom, top] = widened([bottom, top], near.map(([, y]) => y));
+    }
     return { x: (left + right) / 2, y: (bottom + top) / 2, width: right - left, height: top - bottom };
+  }
+
+  // A range that also holds some values, with a margin.
+  function widened([low, high], values) {
+    const [least, most] = values.length ? extent(values) : [low, high];
+    return [Math.min(low, least), Math.max(high, most)];
   }
 
   function extent(values) {
@@ -146,7 +158,7 @@ const Drawing = (() => {
       if (moment.truth) drawRobot(g, cam, moment.truth, "truth", true);
       if (moment.estimate && (!search || search.provisional)) drawEstimate(g, cam, moment, magnified);
       if (moment.absolute) drawAbsolute(g, cam, moment);
-      drawNotes(g, cam, magnified);
+      drawNotes(g, cam, magnified, moment.estimate);
       if (search) drawSearchNote(g, search);
     }
 
@@ -189,7 +201,8 @@ const Drawing = (() => {
       g.stroke();
     }
 
-    // Draws the part of a path that its layer lacks; all of it when the time went back. It is interrupted where it is unknown.
+    // Draws the part of a path that its layer lacks; all of it when the time went back. It is interrupted where it is unknown
+    // and where it jumps.
     function extendPath(g, cam, role, width, moment, found) {
       const poses = data.ticks[role];
       const dropped = data.dropped ?? 0; // ticks that a live page has dropped at the front: the layer keeps them
@@ -206,6 +219,7 @@ const Drawing = (() => {
       for (let i = Math.max(0, found.length - 1 - dropped); i <= moment.index; i++) {
         const x = poses.x[i], y = poses.y[i];
         if (x === null || y === null) { pen = g.moveTo; continue; }
+        if (isJump(data.ticks, role, i)) pen = g.moveTo;
         pen.call(g, ...onScreen(cam, x, y));
         pen = g.lineTo;
       }
@@ -267,14 +281,41 @@ const Drawing = (() => {
       const text = search.provisional
         ? `provisional pose${decided ? `, decided at ${decided.time.toFixed(1)} s` : ""}`
         : `searching: ${count} ${count === 1 ? "hypothesis" : "hypotheses"}${window}`;
+      drawNote(g, [text]);
+    }
+
+    // Lines of text in the upper left corner.
+    function drawNote(g, lines) {
       g.font = "14px system-ui, sans-serif";
       g.textBaseline = "middle";
       g.globalAlpha = 0.85;
       g.fillStyle = state.colours.paper;
-      g.fillRect(4, 6, g.measureText(text).width + 16, 26);
+      g.fillRect(4, 6, Math.max(...lines.map((line) => g.measureText(line).width)) + 16, 8 + 18 * lines.length);
       g.globalAlpha = 1;
       g.fillStyle = state.colours.ink;
-      g.fillText(text, 12, 19);
+      lines.forEach((line, index) => g.fillText(line, 12, 19 + 18 * index));
+    }
+
+    // The floor before the first moment, and why there is none yet.
+    function drawWaiting(text) {
+      const { g, width, height } = prepare(canvas);
+      if (width === 0 || height === 0) return;
+      const cam = state.cam = camera({ truth: null, estimate: null }, width, height);
+      drawFloor(g, cam);
+      g.font = "14px system-ui, sans-serif";
+      const lines = [""];
+      for (const word of text.split(" ")) {
+        const longer = `${lines.at(-1)} ${word}`.trim();
+        if (lines.at(-1) && g.measureText(longer).width > width - 32) lines.push(word); else lines[lines.length - 1] = longer;
+      }
+      drawNote(g, lines);
+    }
+
+    // Whether a pose is outside of the picture.
+    function isOutside({ x, y }) {
+      if (!state.cam) return false;
+      const [left, top] = onScreen(state.cam, x, y);
+      return left < 0 || top < 0 || left > state.cam.width || top > state.cam.height;
     }
 
     function drawGrid(g, cam) {
@@ -383,13 +424,16 @@ const Drawing = (() => {
       g.stroke();
     }
 
-    // The magnification and the scale bar.
-    function drawNotes(g, cam, magnified) {
+    // The magnification and the scale bar, and where an estimate is that the picture does not hold.
+    function drawNotes(g, cam, magnified, estimate) {
       const bar = roundLength(Math.min(160, cam.width / 4) / cam.scale);
       const label = bar >= 1 ? `${bar} m` : bar >= 0.01 ? `${Math.round(bar * 100)} cm` : `${Math.round(bar * 1000)} mm`;
       const notes = [`3σ ellipse ×${magnified}`];
       const enlarged = radiusOnScreen(cam) / cam.scale / robotRadius;
       if (enlarged > 1.05) notes.push(`robot ×${enlarged.toFixed(1)}`);
+      if (estimate && isOutside(estimate)) {
+        notes.push(`estimate outside of the picture, at ${estimate.x.toFixed(1)} m, ${estimate.y.toFixed(1)} m`);
+      }
       g.font = "13px system-ui, sans-serif";
       g.textBaseline = "middle";
       g.lineWidth = 2;
@@ -459,7 +503,7 @@ const Drawing = (() => {
 
     refresh();
     return {
-      draw, refresh, navigate, zoomBy, resetView,
+      draw, drawWaiting, isOutside, refresh, navigate, zoomBy, resetView,
       colours: () => state.colours,
       floorAt: (left, top) => onFloor(state.cam, left, top),
       screenAt: (x, y) => onScreen(state.cam, x, y),

@@ -34,6 +34,8 @@ const FLOOR_HEIGHT: Range<u16> = 400..780;
 
 /// Margin around the map, as a fraction of its larger side.
 const MARGIN: f64 = 0.04;
+/// How much farther than the wheels a pose moves in a jump, metres.
+const JUMP: f64 = 0.25;
 /// Minimum extent of the trajectory figure, metres, for a robot that does not move.
 const LEAST_SPAN: f64 = 1.0;
 
@@ -69,8 +71,8 @@ const PLANS: [Plan; 13] = [
         number: Some(2),
         file: "trajectory.svg",
         caption: "The path over the floor: with the localizer and by the encoders \
-                  alone. Both axes have the same scale. A path that leaves the \
-                  map is cut off. Furniture and people are not in the map; a dotted line is where one walks.",
+                  alone. Both axes have the same scale. A path that is far \
+                  off the map is cut off; where a pose jumps, it has a gap. Furniture and people are not in the map; a dotted line is where one walks.",
         paper: " In the paper, A is the localizer and B the encoders alone.",
         chart: |data, width| Some(trajectory(data.trace, width)),
     },
@@ -194,17 +196,17 @@ pub(super) fn draw(data: Data<'_>) -> Result<Vec<Figure>, (&'static str, DrawErr
 
 /// Figure 2.
 fn trajectory(trace: &Trace, width: u16) -> Chart<'static> {
-    let truth = places(trace, |tick| tick.truth.map(|truth| truth.pose));
-    let estimate = places(trace, |tick| Some(tick.estimate.pose));
-    let encoders = places(trace, |tick| Some(tick.odometry));
-    let (bounds_x, bounds_y) = floor(trace, &truth, &estimate);
-    let start = truth.first().or(estimate.first()).copied();
+    let truth = pieces(trace, |tick| tick.truth.map(|truth| truth.pose));
+    let estimate = pieces(trace, |tick| Some(tick.estimate.pose));
+    let encoders = pieces(trace, |tick| Some(tick.odometry)).concat();
+    let (bounds_x, bounds_y) = floor(trace, &truth.concat(), &estimate.concat());
+    let start = truth.iter().chain(&estimate).flatten().next().copied();
 
     let mut layers: Vec<Layer<'static>> = trace.walls.iter().map(wall).collect();
     layers.extend(trace.obstacles.iter().flat_map(obstacle));
     layers.push(path("encoders alone", Role::Encoders, LINE, encoders));
-    layers.extend((!truth.is_empty()).then(|| path("true", Role::Truth, BROAD, truth)));
-    layers.push(path("estimated", Role::Estimate, LINE, estimate));
+    layers.extend(truth.into_iter().map(|piece| path("true", Role::Truth, BROAD, piece)));
+    layers.extend(estimate.into_iter().map(|piece| path("estimated", Role::Estimate, LINE, piece)));
     let dot = |at| Layer { label: "start", role: Role::Ink, shape: Shape::Dot(at) };
     layers.extend(start.map(dot));
     let height = floor_height(&bounds_x, &bounds_y, width, &layers);
@@ -285,9 +287,28 @@ fn wall(wall: &sonarfix_sim::trace::Wall) -> Layer<'static> {
     line("walls", Role::Wall, BROAD, vec![wall.from.into(), wall.to.into()])
 }
 
-fn places(trace: &Trace, pose: impl Fn(&Tick) -> Option<Pose>) -> Vec<Point> {
-    let points = trace.ticks.iter().filter_map(pose).map(|pose| (pose.x, pose.y));
-    points.filter(|(x, y)| x.is_finite() && y.is_finite()).collect()
+/// The places of a pose. A new piece begins where it moves farther than the wheels: the robot was carried away, or has found
+/// another pose, which is no path.
+fn pieces(trace: &Trace, pose: impl Fn(&Tick) -> Option<Pose>) -> Vec<Vec<Point>> {
+    let distance = |from: Point, to: Point| (to.0 - from.0).hypot(to.1 - from.1);
+    let mut pieces: Vec<Vec<Point>> = Vec::new();
+    let mut last: Option<(Point, Point)> = None;
+    for tick in &trace.ticks {
+        let place = |pose: Pose| (pose.x, pose.y);
+        let Some(at) = pose(tick).map(place).filter(|(x, y)| x.is_finite() && y.is_finite()) else {
+            continue;
+        };
+        let wheels = place(tick.odometry);
+        let is_jump = last.is_some_and(|(before, wheels_before)| {
+            distance(before, at) > distance(wheels_before, wheels) + JUMP
+        });
+        match pieces.last_mut() {
+            Some(piece) if !is_jump => piece.push(at),
+            _ => pieces.push(vec![at]),
+        }
+        last = Some((at, wheels));
+    }
+    pieces
 }
 
 fn deviation<const STATE: usize>(tick: &Tick) -> f64 {
@@ -299,16 +320,23 @@ fn wrap(angle: f64) -> f64 {
     PI - (PI - angle).rem_euclid(TAU)
 }
 
-/// The extent of the trajectory figure: the map and the truth; without a map, the paths. Dead
-/// reckoning is excluded, because it may drift arbitrarily far.
+/// The extent of the trajectory figure: the map and the truth, and the estimate as far as it is not farther from them than they
+/// are wide; without a map, the paths. Dead reckoning is excluded, because it may drift arbitrarily far.
 fn floor(trace: &Trace, truth: &[Point], estimate: &[Point]) -> (Range<f64>, Range<f64>) {
     let walls = trace.walls.iter().flat_map(|wall| [wall.from, wall.to]).map(Point::from);
     let mut points: Vec<Point> = walls.chain(truth.iter().copied()).collect();
     if points.is_empty() {
         points.extend_from_slice(estimate);
     }
-    let x = span(points.iter().map(|point| point.0)).unwrap_or(0.0..0.0);
-    let y = span(points.iter().map(|point| point.1)).unwrap_or(0.0..0.0);
+    let extent = |points: &[Point]| {
+        let x = span(points.iter().map(|point| point.0)).unwrap_or(0.0..0.0);
+        (x, span(points.iter().map(|point| point.1)).unwrap_or(0.0..0.0))
+    };
+    let (x, y) = extent(&points);
+    let room = (x.end - x.start).max(y.end - y.start);
+    let is_near = |at: f64, of: &Range<f64>| at >= of.start - room && at <= of.end + room;
+    points.extend(estimate.iter().filter(|at| is_near(at.0, &x) && is_near(at.1, &y)));
+    let (x, y) = extent(&points);
     let margin = MARGIN * (x.end - x.start).max(y.end - y.start);
     let blank = |range: Range<f64>| widened(range.start - margin..range.end + margin, LEAST_SPAN);
     (blank(x), blank(y))

@@ -286,6 +286,27 @@ mod tests {
         }
     }
 
+    /// A jump of the estimate is a gap between two pieces of its path.
+    #[test]
+    fn a_jump_is_no_path() {
+        let pieces = |trace: &Trace| {
+            let html = html(trace);
+            let figure = html.split("<svg").nth(1).unwrap().split("</svg>").next().unwrap();
+            figure.matches("<polyline").count()
+        };
+        let straight = pieces(&trace(100));
+        let mut jumping = trace(100);
+        jumping.ticks.iter_mut().skip(50).for_each(|tick| tick.estimate.pose.y += 0.5);
+        assert_eq!(pieces(&jumping), straight + 1);
+        // All three move as far as the wheels.
+        let mut fast = trace(100);
+        for tick in fast.ticks.iter_mut().skip(50) {
+            tick.estimate.pose.y += 0.5;
+            tick.odometry.y += 0.5;
+        }
+        assert_eq!(pieces(&fast), straight);
+    }
+
     #[test]
     fn a_replay_without_truth_omits_the_errors() {
         let mut trace = trace(100);

@@ -4,6 +4,8 @@
 const Moment = (() => {
   const OUTCOMES = ["accepted", "gated", "refused"];
   const SIGMAS = 3;            // the ellipse holds 98.9 % of a normal distribution in the plane
+  const JUMP = 0.25;           // metres: how much farther than the wheels a pose moves in a jump
+  const FASTEST = 2;           // metres a second, where the wheels are not known
   const SEARCH_LASTS = 1.5;    // seconds after which a record of the search no longer holds
 
   // ---- The run at one time ----
@@ -26,7 +28,22 @@ const Moment = (() => {
     return a === null || b === null ? null : a + part * (b - a);
   }
 
-  function poseAt(poses, at) {
+  // How far a pose moved since the tick before; null where that is unknown.
+  function step({ x, y }, index) {
+    const known = [x[index - 1], x[index], y[index - 1], y[index]];
+    return known.some((value) => (value ?? null) === null) ? null : Math.hypot(x[index] - x[index - 1], y[index] - y[index - 1]);
+  }
+
+  // Whether a pose moved farther than the wheels since the tick before: the robot was carried away, or has found another pose.
+  function isJump(ticks, role, index) {
+    const moved = step(ticks[role], index);
+    const rolled = step(ticks.encoders, index) ?? FASTEST * (ticks.time[index] - ticks.time[index - 1]);
+    return moved !== null && moved > rolled + JUMP;
+  }
+
+  // A pose between two ticks; at a jump that of the first.
+  function poseAt(ticks, role, tick) {
+    const poses = ticks[role], at = isJump(ticks, role, tick.index + 1) ? { ...tick, part: 0 } : tick;
     const x = between(poses.x, at), y = between(poses.y, at);
     const a = poses.heading[at.index], b = poses.heading[Math.min(at.index + 1, poses.heading.length - 1)];
     if (x === null || y === null || a === null || b === null) return null;
@@ -40,9 +57,9 @@ const Moment = (() => {
     const at = { index, part: length > 0 ? Math.min(1, Math.max(0, (time - ticks.time[index]) / length)) : 0 };
     return {
       time, index,
-      truth: poseAt(ticks.truth, at),
-      estimate: poseAt(ticks.estimate, at),
-      encoders: poseAt(ticks.encoders, at),
+      truth: poseAt(ticks, "truth", at),
+      estimate: poseAt(ticks, "estimate", at),
+      encoders: poseAt(ticks, "encoders", at),
       ellipse: ellipse(between(ticks.sigma_x, at), between(ticks.sigma_y, at), between(ticks.correlation, at)),
       sigmaHeading: between(ticks.sigma_heading, at),
       fix: recordAt(fixes, lastBefore(fixes.time, time)),
@@ -137,6 +154,6 @@ const Moment = (() => {
   }
 
   return {
-    OUTCOMES, SIGMAS, lastBefore, momentAt, searchAt, walkedBy, wrap, isUnusual, unknown, millimetres, degrees, length, distance, fixNumbers, inputNumbers, show,
+    OUTCOMES, SIGMAS, lastBefore, momentAt, isJump, searchAt, walkedBy, wrap, isUnusual, unknown, millimetres, degrees, length, distance, fixNumbers, inputNumbers, show,
   };
 })();

@@ -22,6 +22,7 @@ mod run_result;
 pub mod simulate;
 pub mod spread;
 pub mod statistics;
+pub mod text;
 pub mod time;
 pub mod trace;
 pub mod world;

@@ -9,6 +9,8 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use sonarfix_sim::progress::Progress;
 
+use crate::output;
+
 /// Exit code after Ctrl-C, as of a shell: 128 + the number of SIGINT.
 const INTERRUPTED: u8 = 130;
 /// How long runs that have begun may take after Ctrl-C: with the end of the program less than a second.
@@ -41,8 +43,7 @@ impl Runs {
     pub fn weighted(runs: u32, weight: u64) -> Self {
         catch_interrupt();
         IS_RUNNING.store(true, Ordering::Relaxed);
-        // indicatif hides the bar by itself where standard error is not a terminal.
-        let bar = ProgressBar::with_draw_target(Some(runs.into()), ProgressDrawTarget::stderr());
+        let bar = bar(Some(runs.into()));
         let bar = match ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {eta} left") {
             Ok(style) => bar.with_style(style),
             Err(_) => bar,
@@ -60,10 +61,21 @@ impl Runs {
         self.bar.finish_and_clear();
         if is_interrupted() {
             anyhow::ensure!(finished > 0, "interrupted before the first run was finished");
-            eprintln!("interrupted: the results are those of {finished} of {all} runs");
+            output::report_error(format_args!(
+                "interrupted: the results are those of {finished} of {all} runs"
+            ));
         }
         Ok(())
     }
+}
+
+/// A bar of this length, or one of unknown length. It is hidden if the command is quiet, and by indicatif itself where
+/// standard error is not a terminal.
+#[must_use]
+pub fn bar(length: Option<u64>) -> ProgressBar {
+    let is_shown = output::is_shown(output::Detail::Usual);
+    let target = if is_shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+    ProgressBar::with_draw_target(length, target)
 }
 
 impl Progress for Runs {
@@ -95,10 +107,10 @@ fn interrupt() {
     thread::spawn(|| {
         thread::sleep(LAST_RUNS);
         if IS_RUNNING.load(Ordering::Relaxed) {
-            eprintln!(
+            output::report_error(format_args!(
                 "interrupted: a run takes longer than a second, so that there are no results; `run --rows FILE` keeps each \
                  run that has ended"
-            );
+            ));
             std::process::exit(INTERRUPTED.into());
         }
     });

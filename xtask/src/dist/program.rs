@@ -1,14 +1,16 @@
 //! Archives of the command for a PC without Rust: a static program, completions, manual pages, scenarios, licences.
 
-use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 use anyhow::{Context, ensure};
 
-use crate::cargo::{self, Dependency};
+use sonarfix_boards::uf2;
+
+use super::reproducible;
+use crate::cargo;
+use crate::workspace::Workspace;
 
 /// Where the program is built and checked.
 const HOST: &str = "x86_64-unknown-linux-musl";
@@ -19,14 +21,14 @@ const MOST_ARCHIVE: u64 = 25_000_000;
 const MOST_PROGRAM: u64 = 11_000_000;
 const SHELLS: [&str; 4] = ["bash", "zsh", "fish", "powershell"];
 
-/// Writes an archive for each target into a folder; returns them.
-pub fn archives(out: &Path) -> anyhow::Result<Vec<PathBuf>> {
+/// Writes an archive for each target into a folder, with the programs of the boards; returns them.
+pub fn archives(out: &Path, firmware: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
     // Completions and manual pages are those of the program of this PC.
     let host = build(HOST, cargo::root())?;
-    TARGETS.iter().map(|target| archive(target, &host, out)).collect()
+    TARGETS.iter().map(|target| archive(target, &host, out, firmware)).collect()
 }
 
-fn archive(target: &str, host: &Path, out: &Path) -> anyhow::Result<PathBuf> {
+fn archive(target: &str, host: &Path, out: &Path, firmware: &[PathBuf]) -> anyhow::Result<PathBuf> {
     let program = if target == HOST { host.to_owned() } else { build(target, cargo::root())? };
     let name = format!("sonarfix-{}-{target}", env!("CARGO_PKG_VERSION"));
     let folder = out.join(&name);
@@ -53,7 +55,13 @@ fn archive(target: &str, host: &Path, out: &Path) -> anyhow::Result<PathBuf> {
     let mut pages = Command::new(host);
     pages.args(["man", "--out"]).arg(folder.join("man/man1"));
     cargo::check(pages)?;
-    fs::write(folder.join("LICENSES.txt"), licences(target)?)?;
+    let packages = format!("--package sonarfix-cli --target {target}");
+    fs::write(folder.join("LICENSES.txt"), super::licences::of(Workspace::Main, &packages)?)?;
+    for file in firmware {
+        let name = file.strip_prefix(out)?;
+        fs::create_dir_all(folder.join(name.parent().unwrap_or(name)))?;
+        fs::copy(file, folder.join(name))?;
+    }
     let packed = out.join(format!("{name}.tar.gz"));
     pack(out, &name, &packed)?;
     for (file, most) in [(&folder.join("sonarfix"), MOST_PROGRAM), (&packed, MOST_ARCHIVE)] {
@@ -64,20 +72,17 @@ fn archive(target: &str, host: &Path, out: &Path) -> anyhow::Result<PathBuf> {
     Ok(packed)
 }
 
-/// Builds the program from the sources in `root`. Neither the folder of the sources nor that of cargo is in it.
+/// Builds the program from the sources in `root`.
 fn build(target: &str, root: &Path) -> anyhow::Result<PathBuf> {
     let mut rustup = Command::new("rustup");
     rustup.args(["target", "add", target]);
     cargo::check(rustup)?;
-    let home = cargo::home()?;
-    let remap = |from: &Path, to| format!("--remap-path-prefix={}={to}", from.display());
-    let flags = [remap(root, "/sonarfix"), remap(&home, "/cargo")].join("\u{1f}");
     let folder = cargo::target_folder().join("static");
     let mut command = cargo::command(&format!(
         "build --locked --package sonarfix-cli --profile dist --target {target}"
     ));
     command.current_dir(root).env("CARGO_TARGET_DIR", &folder);
-    command.env("CARGO_ENCODED_RUSTFLAGS", flags);
+    reproducible(&mut command, root)?;
     // The linker of Rust, which knows every processor.
     let linker = format!("CARGO_TARGET_{}_LINKER", target.replace('-', "_").to_uppercase());
     command.env(linker, "rust-lld");
@@ -94,68 +99,29 @@ fn pack(parent: &Path, name: &str, packed: &Path) -> anyhow::Result<()> {
     cargo::check(tar)
 }
 
-/// The licences of all that is linked: a list, and each text once.
-fn licences(target: &str) -> anyhow::Result<String> {
-    let tree = format!(
-        "tree --locked --package sonarfix-cli --edges normal --target {target} --prefix none --format {{p}}"
-    );
-    let tree = cargo::printed(cargo::command(&tree))?;
-    let linked: Vec<_> =
-        tree.lines().filter_map(|line| line.split_once(" v")).map(|(name, _)| name).collect();
-    let mut packages = cargo::dependencies()?;
-    packages.retain(|it| linked.contains(&it.name.as_str()));
-    packages.sort_by(|a, b| (&a.name, &a.version).cmp(&(&b.name, &b.version)));
-    let mut list =
-        "The program contains these libraries, under the licences behind them.\n\n".to_owned();
-    let mut texts = BTreeMap::<String, Vec<String>>::new();
-    for Dependency { name, version, license, manifest_path, .. } in &packages {
-        let licence = license.as_deref().unwrap_or("see its text");
-        writeln!(list, "{name} {version}: {licence}")?;
-        let folder = manifest_path.parent().context("a package without a folder")?;
-        let mut files: Vec<_> = fs::read_dir(folder)?.filter_map(Result::ok).collect();
-        files.sort_by_key(fs::DirEntry::file_name);
-        for file in files {
-            let file_name = file.file_name().to_string_lossy().to_uppercase();
-            let is_licence = ["LICENSE", "LICENCE", "COPYING", "NOTICE"];
-            if is_licence.iter().any(|start| file_name.starts_with(start)) && file.path().is_file()
-            {
-                let text = fs::read_to_string(file.path()).unwrap_or_default();
-                texts.entry(text.trim().to_owned()).or_default().push(format!("{name} {version}"));
-            }
-        }
-    }
-    for (text, names) in texts {
-        write!(list, "\n{}\n{}\n\n{text}\n", "-".repeat(78), names.join(", "))?;
-    }
-    Ok(list)
-}
-
-/// The sums of the archives, as `sha256sum --check` reads them.
-pub fn checksums(out: &Path, archives: &[PathBuf]) -> anyhow::Result<()> {
-    let mut sums = Command::new("sha256sum");
-    sums.current_dir(out).args(archives.iter().filter_map(|archive| archive.file_name()));
-    Ok(fs::write(out.join("SHA256SUMS"), cargo::printed(sums)?)?)
-}
-
 /// Checks the archive of this PC: the program runs in a root that has nothing else, and a build of the same sources in another
 /// folder has the same bytes.
-pub fn check(out: &Path) -> anyhow::Result<()> {
+pub fn check(out: &Path, copy: &Path) -> anyhow::Result<()> {
     let folder = out.join(format!("sonarfix-{}-{HOST}", env!("CARGO_PKG_VERSION")));
-    let mut paper = Command::new("unshare");
-    paper.args(["--map-root-user", "chroot"]).arg(&folder);
-    paper.args(["/sonarfix", "paper", "--out", "/report"]);
-    cargo::check(paper)?;
+    let alone = |arguments: &[&str]| {
+        let mut command = Command::new("unshare");
+        command.args(["--map-root-user", "chroot"]).arg(&folder).arg("/sonarfix").args(arguments);
+        command.stdin(Stdio::null());
+        cargo::check(command)
+    };
+    alone(&["paper", "--out", "/report"])?;
     ensure!(folder.join("report/report.html").is_file(), "`sonarfix paper` wrote no report");
-    fs::remove_dir_all(folder.join("report"))?;
-    let copy = cargo::target_folder().join("another folder");
-    if copy.exists() {
-        fs::remove_dir_all(&copy)?;
+    alone(&["init", "/robot", "--board", "pico"])?;
+    alone(&["flash", "/robot", "--board", "pico", "--out", "/robot/pico.uf2", "--dry-run"])?;
+    ensure!(!folder.join("robot/pico.uf2").exists(), "`--dry-run` wrote a file");
+    alone(&["flash", "/robot", "--board", "pico", "--out", "/robot/pico.uf2"])?;
+    let (image, _) = uf2::read(&fs::read(folder.join("robot/pico.uf2"))?)?;
+    ensure!(image.parts().count() > 1, "`sonarfix flash` wrote no program");
+    for made in ["report", "robot"] {
+        fs::remove_dir_all(folder.join(made))?;
     }
-    let mut clone = Command::new("git");
-    clone.args(["clone", "--quiet"]).arg(cargo::root()).arg(&copy);
-    cargo::check(clone)?;
     let first = fs::read(folder.join("sonarfix"))?;
-    let second = fs::read(build(HOST, &copy)?)?;
+    let second = fs::read(build(HOST, copy)?)?;
     ensure!(first == second, "the program of another folder has other bytes");
-    Ok(fs::remove_dir_all(copy)?)
+    Ok(())
 }

@@ -55,6 +55,7 @@ fn replacements(answers: &Answers) -> anyhow::Result<Vec<(&'static str, String)>
     let hexadecimal = |address: u32| format!("{address:#010X}").replace("0X", "0x");
     Ok(vec![
         ("title", board.title.clone()),
+        ("board", board.name.clone()),
         ("package", board.package.clone()),
         ("target", board.target.clone()),
         ("chip", board.chip.clone()),

@@ -7,11 +7,11 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
-use indicatif::ProgressBar;
 use sonarfix::geometry::units::Radians;
 use sonarfix_link::{Command, CommandResult, Receiver, Telemetry};
 use sonarfix_monitor::port::Port;
 use sonarfix_monitor::request;
+use sonarfix_terminal::progress::bar;
 
 use super::corner::{self, SweptPing};
 use super::wheel::Edges;
@@ -85,18 +85,18 @@ impl Robot {
     pub fn sweep(&mut self, limits: [f64; 2], passes: u32) -> anyhow::Result<Vec<SweptPing>> {
         self.presses.recv().context(NO_INPUT)?;
         let mut bearings = corner::pass(limits);
-        let bar = ProgressBar::new(u64::from(passes) * bearings.len() as u64);
+        let progress = bar(Some(u64::from(passes) * bearings.len() as u64));
         let mut pings = Vec::new();
         let mut moved = 1.0;
         for _ in 0..passes {
             for &bearing in &bearings {
                 pings.extend(self.pings(bearing, moved)?);
-                bar.inc(1);
+                progress.inc(1);
             }
             bearings.reverse();
             moved = -moved;
         }
-        bar.finish_and_clear();
+        progress.finish_and_clear();
         Ok(pings)
     }
 

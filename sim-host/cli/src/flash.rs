@@ -1,0 +1,203 @@
+//! `sonarfix flash`: program, configuration and map into the flash of a board.
+
+mod tool;
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, ensure};
+use sonarfix::map::image::checksum;
+use sonarfix_boards::drive::{self, Drive};
+use sonarfix_boards::image::Image;
+use sonarfix_boards::{Board, Region, Uf2, uf2};
+use sonarfix_map::MapFile;
+
+use crate::{config, map};
+
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "A Pico or Pico 2 takes one file on its USB drive: hold BOOTSEL while you plug it in. For other boards the command of \
+                  probe-rs or espflash is printed and run. What the robot has stored, as its calibration, stays."
+)]
+pub struct Args {
+    /// The folder with `robot.toml` and `map.toml`, as `sonarfix init` writes it.
+    #[arg(value_name = "ROBOT_DIR")]
+    robot: PathBuf,
+    /// The board.
+    #[arg(long, value_name = "NAME")]
+    board: String,
+    /// The program: UF2 or ELF; by default the released one, in the folder `firmware` beside this command.
+    #[arg(long, value_name = "PROGRAM")]
+    program: Option<PathBuf>,
+    /// The drive of the board; by default it is looked for where Linux and macOS mount drives.
+    #[arg(long, value_name = "DRIVE")]
+    to: Option<PathBuf>,
+    /// Writes the combined file here, and onto the drive only with --to.
+    #[arg(long, value_name = "FILE.uf2")]
+    out: Option<PathBuf>,
+    /// Checks everything, prints what would be done, and writes nothing.
+    #[arg(long)]
+    dry_run: bool,
+}
+
+/// What goes into the flash beside the program.
+struct Part {
+    what: &'static str,
+    region: Region,
+    bytes: Vec<u8>,
+}
+
+pub fn execute(args: &Args) -> anyhow::Result<()> {
+    let board = sonarfix_boards::named(&args.board)?;
+    if let (Some(out), false) = (&args.out, args.dry_run) {
+        sonarfix_terminal::output::check_file("--out", out)?;
+    }
+    let parts = parts(args, &board)?;
+    let program = program(args, &board)?;
+    match &board.uf2 {
+        Some(usb) => over_usb(args, &board, usb, &program, &parts),
+        None => {
+            ensure!(
+                args.to.is_none() && args.out.is_none(),
+                "the {} takes no UF2: leave out --to and --out",
+                board.title
+            );
+            tool::flash(args, &board, &program, &parts)
+        }
+    }
+}
+
+/// The baked configuration and map of the robot; prints what a robot reports of them.
+fn parts(args: &Args, board: &Board) -> anyhow::Result<[Part; 2]> {
+    let (robot, map) = (args.robot.join("robot.toml"), args.robot.join("map.toml"));
+    ensure!(
+        robot.is_file() && map.is_file(),
+        "{} has no robot.toml and map.toml: `sonarfix init` writes such a folder",
+        args.robot.display()
+    );
+    let baked = config::bake(&robot, None, Some(board.name.as_str()))?;
+    let image = map::image(&MapFile::read(&map, None)?)?;
+    let sums = [baked.checksum, checksum(&image)];
+    let parts = [
+        Part { what: "the configuration", region: board.config, bytes: baked.bytes },
+        Part { what: "the map", region: board.map, bytes: image },
+    ];
+    for ((part, file), sum) in parts.iter().zip([&robot, &map]).zip(sums) {
+        let Part { what, region: Region { address, bytes: most }, bytes } = part;
+        let length = bytes.len();
+        ensure!(
+            length <= *most as usize,
+            "{}: {what} has {length} bytes, and the {} has room for {most}",
+            file.display(),
+            board.title
+        );
+        println!(
+            "{}: {what}, {length} bytes at {address:#010x}, checksum {sum:08x}",
+            file.display()
+        );
+    }
+    Ok(parts)
+}
+
+/// The file of the program.
+fn program(args: &Args, board: &Board) -> anyhow::Result<PathBuf> {
+    if let Some(program) = &args.program {
+        return Ok(program.clone());
+    }
+    let ending = if board.uf2.is_some() { "uf2" } else { "elf" };
+    let name = format!("{}.{ending}", board.package);
+    // Without /proc the system does not know its file.
+    let here = std::env::current_exe().ok();
+    let here = here.or_else(|| std::env::args_os().next().map(PathBuf::from));
+    let folder = here.as_deref().and_then(Path::parent).map(|folder| folder.join("firmware"));
+    let found = folder.map(|folder| folder.join(&name)).filter(|file| file.is_file());
+    found.with_context(|| {
+        format!(
+            "there is no firmware/{name} beside this command: name the program by --program; the archives of a release have \
+             it, and `cargo build --release --package {} --target {}` in the folder firmware of the sources builds it",
+            board.package, board.target
+        )
+    })
+}
+
+/// The contents of the program's file, checked against the board.
+fn read(program: &Path, board: &Board, usb: &Uf2) -> anyhow::Result<Image> {
+    let name = program.display();
+    let bytes = std::fs::read(program).with_context(|| name.to_string())?;
+    if !uf2::is_uf2(&bytes) {
+        return Image::of_elf(&bytes).with_context(|| format!("{name} is neither UF2 nor ELF"));
+    }
+    let (image, family) = uf2::read(&bytes).with_context(|| name.to_string())?;
+    if family != usb.family {
+        let others = sonarfix_boards::all()?;
+        let has_it = |it: &&Board| it.uf2.as_ref().is_some_and(|uf2| uf2.family == family);
+        let other = others.iter().find(has_it);
+        let other = other.map_or_else(|| "another chip".to_owned(), |it| format!("a {}", it.title));
+        anyhow::bail!(
+            "{name} is for {other} (family {family:#010x}), not for the {} ({:#010x}): name its board by --board, or \
+             another file by --program",
+            board.title,
+            usb.family
+        );
+    }
+    Ok(image)
+}
+
+fn over_usb(
+    args: &Args,
+    board: &Board,
+    usb: &Uf2,
+    program: &Path,
+    parts: &[Part],
+) -> anyhow::Result<()> {
+    let mut image = read(program, board, usb)?;
+    let name = program.display();
+    let (first, _) = image.parts().next().context("the program is empty")?;
+    let end = image.parts().map(|(address, bytes)| address as usize + bytes.len()).max();
+    ensure!(
+        first >= start_of_flash(board)
+            && end.is_some_and(|end| end <= board.config.address as usize),
+        "{name} is no program for the {}: it does not lie between {:#010x} and {:#010x}",
+        board.title,
+        start_of_flash(board),
+        board.config.address
+    );
+    println!("{name}: the program, {} bytes at {first:#010x}", image.flat().len());
+    for Part { what, region, bytes } in parts {
+        image.add(what, region.address, bytes)?;
+    }
+    let file = uf2::write(&image, usb.family)?;
+    let blocks = file.len() / uf2::BLOCK;
+    let does = if args.dry_run { "would write" } else { "wrote" };
+    let wrote = |to: &Path| {
+        println!("{does} {}: {blocks} blocks for family {:#010x}", to.display(), usb.family);
+    };
+    if let Some(out) = &args.out {
+        if !args.dry_run {
+            sonarfix_files::write(out, &file)?;
+        }
+        wrote(out);
+        if args.to.is_none() {
+            println!("copy it to the drive {} of the board in its boot mode", usb.drive);
+            return Ok(());
+        }
+    }
+    let drive = Drive::find(args.to.as_deref(), board, usb)?;
+    let to = drive.file(&board.package);
+    if !args.dry_run {
+        drive::copy(&file, &to)?;
+    }
+    wrote(&to);
+    print_next(args.dry_run);
+    Ok(())
+}
+
+/// The address at which the flash of a board starts: a multiple of 16 MiB, below the configuration.
+fn start_of_flash(board: &Board) -> u32 {
+    board.config.address & 0xFF00_0000
+}
+
+fn print_next(is_dry: bool) {
+    if !is_dry {
+        println!("the board restarts; next: sonarfix monitor --port PORT --signs-of-life");
+    }
+}
