@@ -34,6 +34,7 @@ mod publish;
 mod python;
 mod ros;
 mod search_windows;
+mod site;
 mod template;
 mod thumb;
 mod unsafe_code;
@@ -116,6 +117,8 @@ enum Task {
     Package,
     /// The simulator as a web page, `target/playground/index.html`; in Chromium it computes the same bits as here.
     Playground,
+    /// The site, `target/site`: the docs as a book, and the playground; `--check` opens each page in Chromium.
+    Site(site::Args),
     /// The Python package: its wheel in an empty environment, its tests, types, style and notebooks.
     Python(python::Args),
     /// Bags of ROS 2 against rosbags in Python: ours read by it, its own and damaged ones read by ours.
@@ -164,7 +167,7 @@ const SHORT: [&str; 9] = [
 
 /// The steps of CI. Those of the main workspace come first and those of other workspaces last: two run beside each other, one from each
 /// end ([`ci::run`]), and cargo locks the target folder of a workspace.
-fn steps() -> [Step<Task>; 34] {
+fn steps() -> [Step<Task>; 35] {
     [
         ("lint", "format", Task::Format),
         ("lint", "circles", Task::Circles),
@@ -190,6 +193,7 @@ fn steps() -> [Step<Task>; 34] {
         ("emulated", "guide", Task::Guide),
         ("budgets", "peers", Task::Peers),
         ("budgets", "playground", Task::Playground),
+        ("budgets", "site", Task::Site(site::Args::CHECK)),
         ("random", "fuzz", Task::Fuzz(fuzz::Args::short())),
         ("random", "mutants", Task::Mutants(mutants::Args::short())),
         ("c", "dist", Task::Dist(dist::Args::check())),
@@ -266,6 +270,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Msrv => publish::msrv(),
         Task::Package => publish::package(),
         Task::Playground => playground::build_and_check(),
+        Task::Site(args) => site::run(args),
         Task::Python(args) => python::check(args),
         Task::Bags => bags::check(),
         Task::Ros(args) => ros::run(&args),

@@ -40,7 +40,7 @@ pub fn build_and_check() -> anyhow::Result<()> {
 }
 
 /// Builds the simulator for WebAssembly, and the page with it.
-fn build() -> anyhow::Result<PathBuf> {
+pub fn build() -> anyhow::Result<PathBuf> {
     cargo::run(
         "build --package sonarfix-playground --lib --target wasm32-unknown-unknown --profile playground",
     )?;

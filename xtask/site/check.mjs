@@ -1,0 +1,105 @@
+// Opens every page of the site in Chromium, 400 pixels wide: in the light scheme from the disk, in the dark one from a web server.
+//
+// node check.mjs MODULES SITE BROWSER [FLAG…]: MODULES is a folder with node_modules. Prints each fault, and ends with 1 if there is one.
+import { existsSync, readFileSync, readdirSync } from "node:fs";
+import { createServer } from "node:http";
+import { createRequire } from "node:module";
+import { delimiter, extname, join } from "node:path";
+import { pathToFileURL } from "node:url";
+
+const [modules, site, browserName, ...flags] = process.argv.slice(2);
+const require = createRequire(join(modules, "x.js"));
+const { chromium } = require("playwright-core");
+const axe = readFileSync(require.resolve("axe-core/axe.min.js"), "utf8");
+const WIDTH = 400; // CSS pixels: a phone
+const PATIENCE = 300_000; // milliseconds: beyond these the page hangs
+const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml" };
+
+const pages = readdirSync(site, { recursive: true }).filter((name) => extname(name) === ".html").sort();
+let faults = 0;
+
+function fault(where, text) {
+  faults += 1;
+  console.error(`${where}: ${text}`);
+}
+
+function serve() {
+  const server = createServer((request, response) => {
+    const path = join(site, decodeURIComponent(new URL(request.url, "http://x").pathname));
+    if (request.url === "/favicon.ico") { response.writeHead(204).end(); return; } // the browser asks for it, not the page
+    if (!existsSync(path)) { response.writeHead(404).end(); return; }
+    response.writeHead(200, { "Content-Type": TYPES[extname(path)] ?? "application/octet-stream" }).end(readFileSync(path));
+  });
+  return new Promise((resolve) => { server.listen(0, "127.0.0.1", () => resolve(server)); });
+}
+
+// Checks the page as it is now.
+async function check(page, where) {
+  const wide = await page.evaluate(() => {
+    const whole = [...document.querySelectorAll("html, body, .page, .content, main, section, form")]; // not a table or a block of code
+    const names = whole.filter((it) => it.clientWidth > 0 && it.scrollWidth > it.clientWidth + 1);
+    return names.map((it) => `${it.localName}#${it.id} has ${it.scrollWidth} of ${it.clientWidth} pixels`);
+  });
+  if (wide.length > 0) fault(where, `scrolls sideways: ${wide.join(", ")}`);
+  const { violations } = await page.evaluate(() => axe.run({ preload: location.protocol !== "file:" })); // a page on a disk may not read its style sheets
+  for (const { id, help, nodes } of violations) {
+    const places = nodes.slice(0, 3).map(({ target, any }) => `${target.join(" ")} ${any[0]?.message ?? ""}`);
+    fault(where, `${id}: ${help}: ${nodes.length} × ${places.join(" | ")}`);
+  }
+}
+
+// The table of contents and the search, opened.
+async function useBook(page, where) {
+  await page.click("#mdbook-sidebar-toggle");
+  await page.waitForSelector("#mdbook-sidebar .chapter a", { state: "visible" });
+  await page.waitForTimeout(500); // it slides in
+  await check(page, `${where}, contents`);
+  await page.click("#mdbook-sidebar-toggle");
+  await page.waitForTimeout(500);
+  await page.click("#mdbook-search-toggle");
+  await page.locator("#mdbook-searchbar").pressSequentially("covariance");
+  await page.waitForSelector("#mdbook-searchresults li a");
+  await check(page, `${where}, search`);
+  const found = await page.$$eval("#mdbook-searchresults li a", (links) => links.map((link) => link.href));
+  if (!found.some((link) => link.includes("docs/model.html"))) fault(where, `the search does not find the model`);
+}
+
+async function open(page, base, name, where) {
+  await page.goto(base + name, { waitUntil: "load" });
+  await page.evaluate(axe);
+  await check(page, where);
+  if (name === "index.html") await useBook(page, where);
+}
+
+async function visit(browser, scheme, base) {
+  const context = await browser.newContext({ viewport: { width: WIDTH, height: 800 }, colorScheme: scheme });
+  const page = await context.newPage();
+  page.setDefaultTimeout(PATIENCE);
+  let where = "";
+  page.on("console", (message) => { if (message.type() === "error") fault(where, message.text()); });
+  page.on("pageerror", (error) => fault(where, error.message));
+  page.on("requestfailed", (request) => fault(where, `${request.url()} cannot be loaded`));
+  page.on("request", (request) => {
+    const isOwn = request.url().startsWith(base) || /^(data|blob):/.test(request.url());
+    if (!isOwn) fault(where, `loads ${request.url()}`);
+  });
+  for (const name of pages) {
+    where = `${name}, ${scheme}`;
+    try {
+      await open(page, base, name, where);
+    } catch (error) {
+      fault(where, error.message);
+    }
+  }
+  await context.close();
+}
+
+const executablePath = process.env.PATH.split(delimiter).map((folder) => join(folder, browserName)).find(existsSync);
+const server = await serve();
+const browser = await chromium.launch({ executablePath, args: flags });
+await visit(browser, "light", `${pathToFileURL(site)}/`);
+await visit(browser, "dark", `http://127.0.0.1:${server.address().port}/`);
+await browser.close();
+server.close();
+console.log(`${pages.length} pages in 2 colour schemes, ${faults} faults`);
+process.exitCode = faults > 0 ? 1 : 0;

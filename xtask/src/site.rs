@@ -1,0 +1,81 @@
+//! The site: the docs as a book, and the playground; static files that open from a disk and from any web server.
+
+mod links;
+mod stage;
+mod theme;
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::Context;
+
+use crate::{cargo, ci, playground};
+
+/// The version of mdBook: `theme` changes its pages, so that another version may need other changes.
+const MDBOOK: &str = "0.5.4";
+/// The rules of accessibility, and what drives Chromium; packages of npm.
+const PACKAGES: [&str; 2] = ["axe-core@4.14.1", "playwright-core@1.65.1"];
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::Args)]
+pub struct Args {
+    /// Opens each page in Chromium, too: rules of accessibility, errors of scripts, width of a phone, dark mode.
+    #[arg(long)]
+    check: bool,
+}
+
+impl Args {
+    pub const CHECK: Self = Self { check: true };
+}
+
+/// Writes the site into `target/site`, and checks its links.
+pub fn run(args: Args) -> anyhow::Result<()> {
+    let site = build()?;
+    links::check(&site)?;
+    println!("{}", site.join("index.html").display());
+    if args.check { check(&site) } else { Ok(()) }
+}
+
+fn build() -> anyhow::Result<PathBuf> {
+    cargo::install("mdbook", MDBOOK)?;
+    let (source, site) =
+        (cargo::target_folder().join("site-source"), cargo::target_folder().join("site"));
+    stage::write(&source)?;
+    if site.exists() {
+        std::fs::remove_dir_all(&site)?;
+    }
+    let mut mdbook = Command::new("mdbook");
+    mdbook.arg("build").arg(&source).arg("--dest-dir").arg(&site);
+    mdbook.env("MDBOOK_OUTPUT__HTML__GIT_REPOSITORY_URL", env!("CARGO_PKG_REPOSITORY"));
+    cargo::check(mdbook)?;
+    theme::change(&site)?;
+    stage::own_page(&playground::build()?, &site.join("playground/index.html"))?;
+    Ok(site)
+}
+
+/// Opens each page in Chromium.
+fn check(site: &Path) -> anyhow::Result<()> {
+    let Some(browser) = sonarfix_chromium::headless() else {
+        ci::skip(&format!(
+            "the site in a browser: none of {:?} is there",
+            sonarfix_chromium::NAMES
+        ));
+        return Ok(());
+    };
+    if Command::new("npm").arg("--version").output().is_err() {
+        ci::skip(
+            "the site in a browser: npm, which installs the rules of accessibility, is not there",
+        );
+        return Ok(());
+    }
+    let tools = cargo::target_folder().join("site-check");
+    std::fs::create_dir_all(&tools)?;
+    let mut install = Command::new("npm");
+    install.args(["install", "--no-save", "--no-audit", "--no-fund", "--silent"]);
+    install.args(PACKAGES).arg("--prefix").arg(&tools);
+    cargo::check(install).context("cannot install the rules of accessibility")?;
+    let mut node = Command::new("node");
+    node.arg(cargo::root().join("xtask/site/check.mjs")).arg(&tools).arg(site);
+    node.arg(browser.get_program());
+    node.args(browser.get_args().filter(|flag| *flag != "--headless"));
+    cargo::check(node)
+}
