@@ -132,8 +132,8 @@ impl Simulation {
     /// The same with another true sonar than the scenario's.
     #[must_use]
     pub fn heard_by(self, sensor: SensorModel) -> Self {
-        let scale = self.sensor.scale;
-        Self { sensor: SensorModel { scale, ..sensor }, ..self }
+        let SensorModel { scale, offset, .. } = self.sensor;
+        Self { sensor: SensorModel { scale, offset, ..sensor }, ..self }
     }
 
     /// The same with other unmapped obstacles from a time on, seconds since the run began.
@@ -349,7 +349,8 @@ fn sensor(scenario: &Scenario) -> SensorModel {
         SonarName::Vl53l1x => SensorModel::vl53l1x(),
         SonarName::Vl53l0x => SensorModel::vl53l0x(),
     };
-    SensorModel { scale: scenario.truth.range_scale, ..model }
+    let truth = &scenario.truth;
+    SensorModel { scale: truth.range_scale, offset: truth.range_offset, ..model }
 }
 
 fn obstacle(plan: &sonarfix_map::Obstacle) -> Obstacle {
