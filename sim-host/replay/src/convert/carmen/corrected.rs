@@ -99,7 +99,7 @@ pub fn trail<'a>(
     converted.restamped += restamped;
     if 2 * restamped > count {
         let what = format!(
-            "the stamps of {restamped} of {count} messages do not advance: their times are those of a drive at {FAST} m/s"
+            "the stamps of {restamped} of {count} messages do not advance: their times are those of a drive at {FAST} metres per second"
         );
         report(first.unwrap_or_default(), &what);
     }
