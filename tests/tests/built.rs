@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use sonarfix_map::{CLASSROOM, Scenario};
+use sonarfix_map::{CLASSROOM, Fidelity, Scenario, SonarName};
 use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::trace::{Tick, Trace};
 
@@ -79,10 +79,72 @@ fn a_wrong_robot_file_fails() {
 fn a_wrong_servo_fails_without_pins() {
     let ideal = |wrong: &str| {
         let mut scenario = stated(SERVO, wrong);
-        scenario.fidelity = sonarfix_map::Fidelity::Ideal;
+        scenario.fidelity = Fidelity::Ideal;
         scenario
     };
     assert!(!run(ideal(SERVO)).0);
     let mirrored = "servo_pulses = [{ width = \"500 us\", bearing = \"100 deg\" }, { width = \"2500 us\", bearing = \"-100 deg\" }]";
     assert!(run(ideal(mirrored)).0);
+}
+
+/// The classroom with true errors instead of its scale error of the ranger.
+fn with_errors(errors: &str) -> Scenario {
+    let text =
+        CLASSROOM.replace("laps = 7 ", "laps = 1 ").replace("range_scale = \"0 %\" ", errors);
+    Scenario::parse(&text, "test.toml", Path::new("")).unwrap()
+}
+
+fn traced(scenario: Scenario) -> Trace {
+    let mut trace = Trace::default();
+    Simulation::new(scenario).run(0, &mut trace).unwrap();
+    trace
+}
+
+/// Without noise each range of a wall is that from the true mount, with scale and offset.
+#[test]
+fn the_sonar_is_where_the_truth_says() {
+    let errors = "mount = [\"75 mm\", \"-9 mm\"]\nrange_offset = \"13 mm\"\nrange_scale = \"2 %\"";
+    let mut scenario = with_errors(errors);
+    scenario.fidelity = Fidelity::Ideal;
+    scenario.hardware.sonar = SonarName::Ideal;
+    (scenario.truth.range_noise, scenario.truth.range_noise_per_metre) = (0.0, 0.0);
+    scenario.surroundings.temperature = scenario.robot.rangers.first.temperature.0.into();
+    scenario.surroundings.obstacles.clear();
+    let trace = traced(scenario);
+    let mut compared = 0;
+    for fix in &trace.fixes {
+        let Some(range) = fix.range else { continue };
+        let tick = trace.ticks.iter().find(|tick| (tick.time - fix.time).abs() < 1e-9).unwrap();
+        let pose = tick.truth.unwrap().pose;
+        let (sin, cos) = pose.heading.sin_cos();
+        let sonar = [pose.x + 0.075 * cos + 0.009 * sin, pose.y + 0.075 * sin - 0.009 * cos];
+        // The room is 6 m × 8 m.
+        let distances = [sonar[0], 6.0 - sonar[0], sonar[1], 8.0 - sonar[1]];
+        let error = distances.map(|distance| (1.02 * distance + 0.013 - range).abs());
+        assert!(error.iter().any(|error| *error < 1e-6), "{fix:?}: {error:?}");
+        compared += 1;
+    }
+    assert!(compared > 50, "{compared}");
+}
+
+/// A servo stated by its errors turns as one stated by the pulses that follow, at both fidelities.
+#[test]
+fn a_servo_is_stated_by_its_errors_or_by_its_pulses() {
+    let by_errors = "servo_zero = \"4 deg\"\nservo_scale = \"-2.5 %\"\nrange_scale = \"0 %\"";
+    let by_pulses = "range_scale = \"0 %\"\nservo_pulses = [{ width = \"500 us\", bearing = \"-93.5 deg\" }, \
+        { width = \"2500 us\", bearing = \"101.5 deg\" }]";
+    for fidelity in [Fidelity::Ideal, Fidelity::Pins] {
+        let [by_errors, by_pulses, right] =
+            [by_errors, by_pulses, "range_scale = \"0 %\""].map(|errors| {
+                let scenario = with_errors(errors);
+                traced(Scenario { fidelity, ..scenario })
+            });
+        // The bearings of both differ in the last bit of single precision.
+        let ranges = |trace: &Trace| -> Vec<Option<i64>> {
+            let millimetres = |range: f64| (1e3 * range).round() as i64;
+            trace.fixes.iter().take(60).map(|fix| fix.range.map(millimetres)).collect()
+        };
+        assert_eq!(ranges(&by_errors), ranges(&by_pulses), "{fidelity:?}");
+        assert_ne!(ranges(&by_errors), ranges(&right), "{fidelity:?}");
+    }
 }

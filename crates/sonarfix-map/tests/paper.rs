@@ -131,6 +131,7 @@ fn start_truth_and_runs_are_those_of_the_paper() {
         scale_right: -0.0065,
         scale_left: 2.0e-4,
         range_scale: 0.0,
+        range_offset: 0.0,
         wheel_noise: 0.0005,
         scale_walk: 0.0,
         track_width_walk: 0.0,
@@ -139,6 +140,8 @@ fn start_truth_and_runs_are_those_of_the_paper() {
         cone: PI / 12.0,
         mount: [None; 2],
         servo_pulses: None,
+        servo_zero: 0.0,
+        servo_scale: 0.0,
         gyro: GyroTruth::default(),
     };
     assert_eq!(paper.truth, truth);

@@ -246,6 +246,11 @@ fn a_robot_file_is_compared_with_the_true_robot() {
             "scale_left = 0\nrange_scale = \"0 %\"",
             "contradicts scale_left",
         ),
+        (
+            "range_scale = \"0 %\"",
+            "servo_zero = \"3 deg\"\nrange_scale = \"0 %\"",
+            "truth.servo_zero: contradicts servo_pulses",
+        ),
     ];
     assert_eq!(unnamed(&base, "scenario.toml", edits), Vec::<String>::new());
     let fixed = edited(&base, "servo = [\"-100 deg\", \"100 deg\"]", "bearing = \"0 deg\"");
@@ -256,6 +261,19 @@ fn a_robot_file_is_compared_with_the_true_robot() {
     );
     assert!(
         diagnosis(&fixed, "scenario.toml").contains("truth.servo_pulses: is of a sonar on a servo")
+    );
+    let by_error = |key: &str| {
+        edited(CLASSROOM, "range_scale = \"0 %\"", &format!("{key}\nrange_scale = \"0 %\""))
+    };
+    let found = diagnosis(&by_error("servo_zero = \"25 deg\""), "scenario.toml");
+    assert!(
+        found.contains("up to 25° from those of truth.servo_zero and truth.servo_scale"),
+        "{found}"
+    );
+    let found = diagnosis(&by_error("servo_scale = \"20 %\""), "scenario.toml");
+    assert!(
+        found.contains("up to 20° from those of truth.servo_zero and truth.servo_scale"),
+        "{found}"
     );
 }
 

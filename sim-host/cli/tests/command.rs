@@ -141,6 +141,62 @@ fn bound_grows_where_nothing_is_measured() {
     assert!(y(120.1) < 0.003, "{}", y(120.1));
 }
 
+/// The reference scenario with other noise of the robot file and of the simulation, as multiples of its own.
+fn with_noise(assumed: f64, simulated: f64) -> String {
+    let mut text = String::new();
+    let mut factor = assumed;
+    for line in sonarfix_map::PAPER.lines() {
+        let key = line.split(" =").next().unwrap_or_default();
+        factor = if line == "[truth]" { simulated } else { factor };
+        let noise = match key {
+            "wheel_noise" => format!("{key} = \"{} mm/sqrt(m)\"", 0.5 * factor),
+            "noise" | "range_noise" => format!("{key} = \"{} mm\"", 2.4 * factor),
+            "scale_walk" => format!("{key} = \"{} /sqrt(m)\"", 5e-6 * factor),
+            "track_width_walk" => format!("{key} = \"{} m/sqrt(m)\"", 5e-6 * factor),
+            // No range is gated, so that all runs have the same measurements.
+            "confidence" => format!("{key} = 10"),
+            _ => line.to_owned(),
+        };
+        text = text + &noise + "\n";
+    }
+    text
+}
+
+#[test]
+fn the_bound_is_that_of_the_simulation_and_that_of_the_filter_stands_beside_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let bound = |assumed: f64, simulated: f64| {
+        let scenario = write(dir.path(), "noise.toml", &with_noise(assumed, simulated));
+        let rows = json(&["bound", &scenario, "--every", "20", "--json"]);
+        assert_documented(&rows);
+        let text = String::from_utf8(sonarfix(&["bound", &scenario]).stdout).unwrap();
+        (rows.as_array().unwrap().last().unwrap().clone(), text)
+    };
+    let (usual, text) = bound(1.0, 1.0);
+    assert!(usual["with_filter_noise"].is_null(), "{usual}");
+    assert!(text.contains("noise of the simulation: wheels 0.500 mm/sqrt(m)"), "{text}");
+    assert!(!text.contains("that the filter assumes"), "{text}");
+    let (noisy, text) = bound(1.0, 3.0);
+    assert!(text.contains("noise of the simulation: wheels 1.500 mm/sqrt(m)"), "{text}");
+    assert!(text.contains("The same with the noise that the filter assumes"), "{text}");
+    assert!(text.contains("with seed 0; wheels 0.500 mm/sqrt(m)"), "{text}");
+    let (known, _) = bound(3.0, 3.0);
+    let close = |one: &Value, other: &Value| {
+        let [one, other] = [one, other].map(|value| value.as_f64().unwrap());
+        (one / other - 1.0).abs() < 0.03
+    };
+    for state in ["x", "y", "heading", "scale_right", "track_width"] {
+        let of_filter = &noisy["with_filter_noise"][state];
+        // The bound is that of a filter which knows the noise, and the other one that of a simulation with little noise.
+        assert!(close(&noisy[state], &known[state]), "{state}: {noisy} {known}");
+        assert!(close(of_filter, &usual[state]), "{state}: {noisy} {usual}");
+    }
+    // After eight hundred ranges little is left of the start: all noise is three times as large.
+    let x = |of: &Value| of["x"].as_f64().unwrap();
+    let ratio = x(&noisy) / x(&noisy["with_filter_noise"]);
+    assert!((2.7..3.1).contains(&ratio), "{ratio}");
+}
+
 #[test]
 fn a_wrong_scenario_is_refused_with_file_line_and_key() {
     let dir = tempfile::tempdir().unwrap();

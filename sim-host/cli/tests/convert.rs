@@ -199,6 +199,96 @@ fn odometry_that_is_corrected_at_every_scan_is_bridged() {
     assert!((right - TRAVELLED).abs() < 0.05 * TRAVELLED, "{right}");
 }
 
+/// A robot that drives ahead at 0.5 m/s with an `ODOM` record every 0.2 s, and turns at the end. Each scan is stamped as the record before
+/// it, replaces the pose by one 3 cm to the side and 1° turned, and is followed by a record of that pose with this stamp.
+fn chained(stamp: &str) -> String {
+    format!(
+        "PARAM robot_length 0.5 nohost 0\n\
+         ODOM 0 0 0 0 0 0 10.0 host 10.0\n\
+         ODOM 0.1 0 0 0 0 0 10.2 host 10.2\n\
+         FLASER 3 2.0 9.0 2.0 0.1 0.03 0.0175 0.1 0.03 0.0175 10.2 host 10.2\n\
+         ODOM 0.1 0.03 0.0175 0 0 0 {stamp} host {stamp}\n\
+         NEFF 22.1 {stamp} host {stamp}\n\
+         ODOM 0.199984687 0.031749911 0.0175 0 0 0 10.4 host 10.4\n\
+         FLASER 3 2.0 8.9 2.0 0.2 0 0 0.2 0 0 10.4 host 10.4\n\
+         ODOM 0.2 0 0 0 0 0 {stamp} host {stamp}\n\
+         ODOM 0.3 0 0 0 0 0 10.6 host 10.6\n\
+         ODOM 0.3 0 0.5 0 0 0 11.0 host 11.0\n"
+    )
+}
+
+#[test]
+fn corrections_of_a_log_that_continues_from_each_scan_are_no_travel() {
+    for stamp in ["0", "10.0", "10.4", "99999.0"] {
+        let (dir, converted, reported) = carmen(&chained(stamp));
+        let expected =
+            Converted { encoders: 5, scans: 2, reference: 2, repeated: 2, ..Converted::default() };
+        assert_eq!(converted.unwrap(), expected, "{stamp}");
+        assert_eq!(reported.len(), 1, "{reported:?}");
+        assert!(
+            reported[0].starts_with(
+                "made.log line 4: recognised: the odometry continues from the corrected pose of each scan (2 of 2 scans)"
+            ),
+            "{reported:?}"
+        );
+        let scan =
+            |time, ahead| format!("scan,{time},-1.570796327,1.570796326795,2.000 {ahead} 2.000");
+        // Ahead by 0.3 m in all; 0.5 rad with the assumed track width of 0.38 m is 0.095 m per wheel.
+        let expected = [
+            "sonarfix-log,1".to_owned(),
+            "wheels,10.000000,0.000000,0.000000".to_owned(),
+            "start,10.200000,0.100000,0.030000,0.017500,0.05,0.03".to_owned(),
+            "wheels,10.200000,0.100000,0.100000".to_owned(),
+            scan("10.200000", "9.000"),
+            "wheels,10.400000,0.200000,0.200000".to_owned(),
+            scan("10.400000", "8.900"),
+            "wheels,10.600000,0.300000,0.300000".to_owned(),
+            "wheels,11.000000,0.395000,0.205000".to_owned(),
+        ];
+        assert_eq!(records(&dir), expected, "{stamp}");
+        assert!(read(&dir, "reference.csv").ends_with("\n10.400000,0.200000,0.000000,0.000000\n"));
+    }
+}
+
+#[test]
+fn stamps_of_a_continued_log_that_go_back_get_the_time_that_the_travel_needs() {
+    // The record before the second scan is stamped 0.3 s early, as is the scan.
+    let log = chained("0").replace(" 10.4 host 10.4", " 10.1 host 10.1");
+    let (dir, converted, reported) = carmen(&log);
+    assert_eq!((converted.unwrap().restamped, reported.len()), (4, 2), "{reported:?}");
+    assert!(reported[1].contains("the stamps of 4 of 7 messages do not advance"), "{reported:?}");
+    let records = records(&dir);
+    let wheels: Vec<&String> = records.iter().filter(|line| line.starts_with("wheels")).collect();
+    // The mean of 10.2, 10.2, 10.1 and 10.1; then 0.1 m at 2.5 m/s.
+    assert_eq!(*wheels[1], "wheels,10.150000,0.100000,0.100000");
+    assert_eq!(*wheels[2], "wheels,10.190000,0.200000,0.200000");
+    assert!(records.iter().any(|line| line.starts_with("scan,10.190000,")), "{records:?}");
+    // A jump that no stamp explains is no travel either.
+    let log = chained("0")
+        .replace("ODOM 0.3 0 0 ", "ODOM 5.3 0 0 ")
+        .replace("ODOM 0.3 0 0.5", "ODOM 5.3 0 0.5");
+    let (dir, converted, reported) = carmen(&log);
+    assert_eq!(converted.unwrap().bridged, 1);
+    assert!(
+        reported[1].starts_with("made.log line 10: the odometry is implausible: 5.1"),
+        "{reported:?}"
+    );
+    assert!((travelled(&dir)[1] - 0.205).abs() < 1e-6, "{:?}", travelled(&dir));
+}
+
+#[test]
+fn a_raw_log_with_one_pose_in_a_scan_and_the_record_after_it_is_no_continued_one() {
+    let mut log = "ODOM 0 0 0 0 0 0 9.0 host 9.0\n".to_owned();
+    for second in 10_u32..20 {
+        let x = f64::from(second - 9) * 0.3;
+        writeln!(log, "FLASER 3 2 9 2 {x} 0 0 {x} 0 0 {second} host {second}").unwrap();
+        writeln!(log, "ODOM {x} 0 0 0.3 0 0 {second} host {second}").unwrap();
+    }
+    let (dir, converted, reported) = carmen(&log);
+    assert_eq!((converted.unwrap().reference, reported.len()), (0, 0), "{reported:?}");
+    assert!((travelled(&dir)[0] - 3.0).abs() < 1e-6, "{:?}", travelled(&dir));
+}
+
 #[test]
 fn corrected_poses_without_odometry_are_refused() {
     let log = driven(

@@ -115,3 +115,77 @@ fn freiburg_is_lost_and_found_again() {
     let known = number(within, "tracking") + number(within, "degraded");
     assert!(known > 0.25, "{within}");
 }
+
+/// The numbers of the records of one kind in a log, packed or not. No return, 0 and a range beyond the reach of the scanner are the same.
+fn records(log: &Path, kind: &str) -> Vec<Vec<f64>> {
+    const REACH: f64 = 80.0;
+    let mut text = String::new();
+    let mut log = sonarfix_replay::convert::open(log).unwrap();
+    std::io::Read::read_to_string(&mut log, &mut text).unwrap();
+    let number = |(index, field): (usize, &str)| {
+        let number = field.parse().unwrap_or(0.0);
+        if kind == "scan" && index > 0 && number > REACH { 0.0 } else { number }
+    };
+    let numbers = |line: &str| line.split([',', ' ']).skip(1).enumerate().map(number).collect();
+    text.lines().filter(|line| line.split(',').next() == Some(kind)).map(numbers).collect()
+}
+
+/// The largest difference of the numbers of two lists of records. The last line of a log without a newline is left out as torn.
+fn apart(one: &[Vec<f64>], other: &[Vec<f64>]) -> f64 {
+    assert!(other.len() - one.len() <= 1, "{} {}", one.len(), other.len());
+    let mut apart = 0.0_f64;
+    for (one, other) in one.iter().zip(other) {
+        assert_eq!(one.len(), other.len());
+        let differences = one.iter().zip(other).map(|(one, other)| (one - other).abs());
+        apart = differences.fold(apart, f64::max);
+    }
+    apart
+}
+
+/// The public corrected logs give the recordings that were made of them without this converter.
+#[test]
+fn public_corrected_logs_give_the_recordings() {
+    let Some(public) = skipped::unless_recorded("carmen_public") else { return };
+    let Some(folder) = skipped::unless_recorded("carmen") else { return };
+    let convert = |log: &Path| {
+        let dir = TempDir::new().unwrap();
+        let to = dir.path().to_str().unwrap();
+        let output = sonarfix(&["convert", "carmen", log.to_str().unwrap(), "--out", to]);
+        (dir, String::from_utf8(output.stderr).unwrap())
+    };
+    for name in ["intel", "seattle", "freiburg-101"] {
+        let (dir, told) = convert(&public.join(format!("{name}-corrected.log.gz")));
+        assert!(told.contains("recognised: the odometry continues"), "{name}: {told}");
+        let log = dir.path().join("log.csv");
+        let expected = folder.join(format!("{name}_log.csv.gz"));
+        // Both have micrometres and microseconds; bearings of the beams have seven digits.
+        for (kind, rounding) in [("wheels", 2e-6), ("scan", 2e-6), ("start", 1e-5)] {
+            let apart = apart(&records(&log, kind), &records(&expected, kind));
+            assert!(apart < rounding, "{name}, {kind}: {apart}");
+        }
+        let reference = |path: &Path| -> Vec<Vec<f64>> {
+            let text = std::fs::read_to_string(path).unwrap();
+            let row = |line: &str| {
+                let mut row: Vec<f64> =
+                    line.split(',').map(|field| field.parse().unwrap()).collect();
+                row[3] = row[3].rem_euclid(std::f64::consts::TAU);
+                row
+            };
+            text.lines().skip(1).map(row).collect()
+        };
+        let expected = reference(&folder.join(format!("{name}_reference.csv")));
+        let apart = apart(&reference(&dir.path().join("reference.csv")), &expected);
+        assert!(apart < 1e-5, "{name}: {apart}");
+    }
+    // This recording has poses of four digits instead of wheel travel: up to 0.1 mm and 10 µrad from record to record.
+    let (public, _) = convert(&public.join("freiburg-079-corrected.log.gz"));
+    let (shared, _) = convert(&folder.join("freiburg-079_rawodo.txt.gz"));
+    let steps = |dir: &TempDir| -> Vec<Vec<f64>> {
+        let wheels = records(&dir.path().join("log.csv"), "wheels");
+        let step =
+            |pair: &[Vec<f64>]| (1..3).map(|field| pair[1][field] - pair[0][field]).collect();
+        wheels.windows(2).map(step).collect()
+    };
+    let apart = apart(&steps(&public), &steps(&shared));
+    assert!(apart < 2e-4, "{apart}");
+}

@@ -163,7 +163,10 @@ fn as_told(scenario: &Scenario) -> Scenario {
     error_free.truth.scale_left = 0.0;
     error_free.truth.mount = [None; 2];
     error_free.truth.servo_pulses = None;
+    error_free.truth.servo_zero = 0.0;
+    error_free.truth.servo_scale = 0.0;
     error_free.truth.range_scale = 0.0;
+    error_free.truth.range_offset = 0.0;
     error_free.truth.wheel_noise = 0.0;
     error_free.truth.scale_walk = 0.0;
     error_free.truth.track_width_walk = 0.0;

@@ -61,7 +61,13 @@ fn mount(facts: &Facts, scenario: &Scenario) -> Option<Mistake> {
 
 fn servo(facts: &Facts, scenario: &Scenario) -> Option<Mistake> {
     let assumed = scenario.robot.rangers.first.servo_pulses;
-    let built = scenario.truth.servo_pulses?;
+    let truth = &scenario.truth;
+    let [by_pulses, by_error] = [
+        truth.servo_pulses.is_some(),
+        truth.servo_zero.abs() > 0.0 || truth.servo_scale.abs() > 0.0,
+    ];
+    let built =
+        (by_pulses || by_error).then(|| truth.robot(&scenario.robot).rangers.first.servo_pulses)?;
     let errors = built.map(|pulse| {
         let bearing = f64::from(pulse.bearing.0);
         wrap(bearing - bearing_of(assumed, width_of(built, bearing)))
@@ -71,8 +77,9 @@ fn servo(facts: &Facts, scenario: &Scenario) -> Option<Mistake> {
     let is_off = worst.abs() > BEARING && fact.report();
     is_off.then(|| {
         fact.warn(format!(
-            "the bearings of servo_pulses are up to {}° from those of truth.servo_pulses: correct the ones that are wrong",
-            short(worst.abs().to_degrees())
+            "the bearings of servo_pulses are up to {}° from those of {}: correct the ones that are wrong",
+            short(worst.abs().to_degrees()),
+            if by_pulses { "truth.servo_pulses" } else { "truth.servo_zero and truth.servo_scale" }
         ))
     })
 }

@@ -1,5 +1,6 @@
 //! The `[truth]` table of a scenario: the true parameters.
 
+use sonarfix::geometry::units::Radians;
 use sonarfix_hal::config::{RobotConfig, WheelConfig};
 use sonarfix_hal::servo::MeasuredPulse;
 
@@ -23,6 +24,8 @@ pub struct Truth {
     pub scale_left: f64,
     /// Scale error of the ranger, dimensionless.
     pub range_scale: f64,
+    /// Added to each range, metres.
+    pub range_offset: f64,
     /// White noise of each wheel's travel, m/√m.
     pub wheel_noise: f64,
     /// Random walk of the wheels' scale errors, 1/√m.
@@ -39,6 +42,10 @@ pub struct Truth {
     pub mount: [Option<f64>; 2],
     /// Two pulses of the first servo with the bearings of the ranger; `None` for those of the robot file.
     pub servo_pulses: Option<[MeasuredPulse; 2]>,
+    /// Bearing of the first ranger where the robot file states 0, radians.
+    pub servo_zero: f64,
+    /// Scale error of the first servo, dimensionless: it turns 1 + this times the angle from 0 that the robot file states.
+    pub servo_scale: f64,
     /// The gyro; without effect on a robot that has none.
     pub gyro: GyroTruth,
 }
@@ -56,9 +63,20 @@ impl Truth {
         }
         let pulses = &mut built.rangers.first.servo_pulses;
         *pulses = self.servo_pulses.unwrap_or(*pulses);
+        for pulse in pulses {
+            let bearing = (1.0 + self.servo_scale) * f64::from(pulse.bearing.0) + self.servo_zero;
+            #[expect(clippy::cast_possible_truncation, reason = "as in the robot file")]
+            let bearing = Radians(bearing as f32);
+            pulse.bearing = bearing;
+        }
         built
     }
 }
+
+/// The errors of a servo, instead of its pulses.
+const BY_ERROR: [&str; 2] = ["servo_zero", "servo_scale"];
+/// The keys of a sonar on a servo.
+const OF_SERVO: [&str; 3] = ["servo_pulses", BY_ERROR[0], BY_ERROR[1]];
 
 /// The table as it is written: a wheel by its scale error, or as somebody has measured it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -92,8 +110,13 @@ pub(crate) static TRUTH: Section<Stated> = Section { name: "truth", usual: State
         "place of the first sonar, by default that of the robot file")),
     optional(Key::new("servo_pulses", Value::Own("two tables of `width` and `bearing`", |node, t| t.truth.servo_pulses = Some(read_pulses(&node)), |_| None),
         "two pulses of the first servo and the true bearing of the sonar at each, by default those of the robot file")),
+    optional(number("servo_zero", &ANGLE, ("-90 deg", "90 deg"), |t| &mut t.truth.servo_zero,
+        "instead of `servo_pulses`: bearing of the first sonar where the robot file states 0, by default 0")),
+    optional(number("servo_scale", &FRACTION, ("-50 %", "50 %"), |t| &mut t.truth.servo_scale,
+        "instead of `servo_pulses`: scale error of the first servo, by default 0. It turns 1 + this times the angle from 0 that the robot file states")),
     number("range_scale", &FRACTION, ("-99 %", "1000 %"), |t| &mut t.truth.range_scale,
         "scale error of the ranger, a fraction. It reports 1 + this times the distance"),
+    optional(number("range_offset", &LENGTH, ("-1 m", "1 m"), |t| &mut t.truth.range_offset, "added to each range, by default 0")),
     number("wheel_noise", &LENGTH_WALK, ("0 m/sqrt(m)", "1 m/sqrt(m)"), |t| &mut t.truth.wheel_noise, "true value of the key of `[drive]`"),
     number("scale_walk", &SCALE_WALK, ("0 /sqrt(m)", "1 /sqrt(m)"), |t| &mut t.truth.scale_walk, "the same"),
     number("track_width_walk", &LENGTH_WALK, ("0 m/sqrt(m)", "1 m/sqrt(m)"), |t| &mut t.truth.track_width_walk, "the same"),
@@ -134,9 +157,17 @@ pub(crate) fn read(node: Node<'_>, robot: Option<&RobotConfig>) -> (Truth, Upset
             *scale = wheel / assumed - 1.0;
         }
     }
-    let is_fixed = |robot: &RobotConfig| robot.localizer.rangers.first.fixed_bearing().is_some();
-    if let Some(node) = table.get("servo_pulses").filter(|_| robot.is_some_and(is_fixed)) {
-        node.report("is of a sonar on a servo, and that of the robot file has none");
+    let is_fixed =
+        robot.is_some_and(|robot| robot.localizer.rangers.first.fixed_bearing().is_some());
+    for name in OF_SERVO {
+        if let Some(node) = table.get(name).filter(|_| is_fixed) {
+            node.report("is of a sonar on a servo, and that of the robot file has none");
+        }
+    }
+    for name in BY_ERROR {
+        if let Some(node) = table.get(name).filter(|_| table.get("servo_pulses").is_some()) {
+            node.report("contradicts servo_pulses: remove one of them");
+        }
     }
     (truth, upsets)
 }

@@ -23,8 +23,10 @@
 //! constant, it becomes the mount of the scanner, and there is no reference.
 //!
 //! **Stamps.** Messages are put in the order of their stamps. A stamp that is earlier than that of the message before it from the
-//! same device, by up to `stamps::JITTER`, is repaired; a message that goes back farther is left out.
+//! same device, by up to `stamps::JITTER`, is repaired; a message that goes back farther is left out. A log whose odometry continues from
+//! the corrected poses of its scans is read in the order of its lines (`corrected`).
 
+mod corrected;
 mod message;
 mod odometry;
 pub(super) mod robot;
@@ -39,6 +41,7 @@ use crate::convert::{
     ConvertError, Converted, Log, ReferenceFile, make_dir, open, read_walls, write_map,
 };
 use crate::lines::Lines;
+use crate::log::Malformed;
 use crate::scan::Scan;
 use message::Message;
 use odometry::{Sample, Source, Trail};
@@ -85,28 +88,40 @@ pub struct Carmen<'a> {
 /// Most ranges and poses of a log, which are all in memory: fifty times those of the largest public logs.
 const MOST_NUMBERS: usize = 16 << 20;
 
-/// Numbers of a pose with its time and place in the log.
+/// Numbers of a pose with its time and place in the log, and of a complaint.
 const POSE: usize = 8;
 
 /// A scan with the pose of its scanner.
 struct Scanned {
+    line: u64,
     time: f64,
     laser: Pose,
     robot: Pose,
     scan: Scan,
 }
 
-/// What the log contains, in the order of the stamps.
+/// Why a line is left out.
+#[derive(Debug, thiserror::Error)]
+enum Complaint {
+    #[error(transparent)]
+    Malformed(#[from] Malformed),
+    #[error("{0}")]
+    Message(&'static str),
+}
+
+/// What the log contains.
 #[derive(Default)]
 struct Content {
     samples: Vec<Sample>,
     scans: Vec<Scanned>,
+    /// What is left out: lines with the reasons.
+    complaints: Vec<(u64, Complaint)>,
     /// Those of ranges and poses.
     numbers: usize,
 }
 
 impl Carmen<'_> {
-    /// Converts. What is left out or implausible is reported to `report`, line by line.
+    /// Converts. What is left out or implausible is reported to `report`, line by line, and what was recognised.
     ///
     /// # Errors
     /// [`ConvertError`], if a file is missing, has no scans or no odometry, or cannot be written.
@@ -115,11 +130,10 @@ impl Carmen<'_> {
         let mut converted = Converted::default();
         let name = self.from.display();
         let mut report = |line: u64, what: &str| report(format!("{name} line {line}: {what}"));
-        let content = self.read(&mut converted, &mut report)?;
+        let mut content = self.read()?;
+        let trail = self.trail(&mut content, &mut converted, &mut report)?;
         let field_of_view = field_of_view(&content)
             .ok_or_else(|| ConvertError::content(self.from, "has no scans"))?;
-        let trail = Trail::of(content.samples, &mut converted, &mut report)
-            .map_err(|why| ConvertError::content(self.from, why))?;
         // Scans that contain another pose than the odometry contain the corrected one.
         let mount = if trail.scans_are_corrected { None } else { mount(&content.scans) };
         make_dir(self.to)?;
@@ -134,57 +148,90 @@ impl Carmen<'_> {
         Ok(converted)
     }
 
-    fn read(
+    /// The wheel travel; makes the stamps of the scans ascend.
+    fn trail(
         &self,
+        content: &mut Content,
         converted: &mut Converted,
         report: &mut dyn FnMut(u64, &str),
-    ) -> Result<Content, ConvertError> {
+    ) -> Result<Trail, ConvertError> {
+        let recognised = corrected::recognise(&content.samples);
+        if recognised.is_none() {
+            content.leave_out_late();
+        }
+        content.complaints.sort_by_key(|(line, _)| *line);
+        for (line, complaint) in &content.complaints {
+            converted.skipped += 1;
+            report(*line, &complaint.to_string());
+        }
+        if let Some(recognised) = recognised {
+            let line = content.scans.first().map_or(0, |scan| scan.line);
+            report(line, &recognised.to_string());
+            let scans = content.scans.iter_mut().map(|scan| &mut scan.time);
+            return Ok(corrected::trail(&content.samples, scans, converted, report));
+        }
+        content.in_order_of_time(converted);
+        let samples = std::mem::take(&mut content.samples);
+        Trail::of(samples, converted, report).map_err(|why| ConvertError::content(self.from, why))
+    }
+
+    /// Reads all messages, in the order of the file.
+    fn read(&self) -> Result<Content, ConvertError> {
         let mut lines = Lines::of(open(self.from)?);
         let mut content = Content::default();
-        let mut clocks = [stamps::Clock::default(); 2];
-        loop {
-            let line = lines.next().map_err(ConvertError::read(self.from))?;
-            let Some(line) = line else { break };
+        while let Some(line) = lines.next().map_err(ConvertError::read(self.from))? {
             let message = match line {
-                Err(malformed) => Err(malformed.to_string()),
-                Ok(line) => message::parse(line).ok_or_else(|| "is no complete message".to_owned()),
-            };
-            let line = lines.number();
-            let taken = message.and_then(|message| {
-                let [odometry, laser] = &mut clocks;
-                match message {
-                    Message::Other => {}
-                    Message::Odometry { time, robot } => {
-                        odometry.check(time)?;
-                        content.numbers += POSE;
-                        let source = Source::Odometry;
-                        content.samples.push(Sample { line, time, pose: robot, source });
-                    }
-                    Message::Laser { time, robot, laser: scanner, scan } => {
-                        laser.check(time)?;
-                        content.numbers += POSE + scan.ranges.len();
-                        let source = Source::Scan;
-                        content.samples.push(Sample { line, time, pose: robot, source });
-                        content.scans.push(Scanned { time, laser: scanner, robot, scan });
-                    }
+                Err(malformed) => Err(malformed.into()),
+                Ok(line) => {
+                    message::parse(line).ok_or(Complaint::Message("is no complete message"))
                 }
-                Ok(())
-            });
+            };
+            match message {
+                Ok(message) => content.take(lines.number(), message),
+                Err(complaint) => {
+                    content.numbers += POSE;
+                    content.complaints.push((lines.number(), complaint));
+                }
+            }
             if content.numbers > MOST_NUMBERS {
                 let why = format!("has more than {MOST_NUMBERS} ranges: split it");
                 return Err(ConvertError::content(self.from, why));
             }
-            if let Err(reason) = taken {
-                converted.skipped += 1;
-                report(line, &reason);
-            }
         }
-        content.in_order_of_time(converted);
         Ok(content)
     }
 }
 
 impl Content {
+    fn take(&mut self, line: u64, message: Message) {
+        match message {
+            Message::Other => {}
+            Message::Odometry { time, robot } => {
+                self.numbers += POSE;
+                self.samples.push(Sample { line, time, pose: robot, source: Source::Odometry });
+            }
+            Message::Laser { time, robot, laser, scan } => {
+                self.numbers += POSE + scan.ranges.len();
+                self.samples.push(Sample { line, time, pose: robot, source: Source::Scan });
+                self.scans.push(Scanned { line, time, laser, robot, scan });
+            }
+        }
+    }
+
+    /// Leaves out messages that go back in time by more than jitter, of each device.
+    fn leave_out_late(&mut self) {
+        let Self { samples, scans, complaints, .. } = self;
+        let mut clocks = [stamps::Clock::default(); 2];
+        samples.retain(|sample| {
+            let [odometry, laser] = &mut clocks;
+            let clock = if sample.source == Source::Odometry { odometry } else { laser };
+            let checked = clock.check(sample.time).map_err(Complaint::Message);
+            checked.map_err(|complaint| complaints.push((sample.line, complaint))).is_ok()
+        });
+        let mut laser = stamps::Clock::default();
+        scans.retain(|scan| laser.check(scan.time).is_ok());
+    }
+
     /// Repairs the stamps of each device, and puts everything in their order.
     fn in_order_of_time(&mut self, converted: &mut Converted) {
         let scans = self.scans.iter_mut().map(|scan| &mut scan.time);

@@ -188,11 +188,15 @@ impl<T: LocalizerInputs> Run<'_, T> {
 
     /// The true bearing of a ping.
     fn bearing(&self, aim: &Aim) -> f64 {
-        let Simulation { scenario, .. } = self.simulation;
+        let Simulation { scenario, built, .. } = self.simulation;
         let commanded = f64::from(aim.bearing.0);
-        let of_servo = scenario.truth.servo_pulses.filter(|_| aim.ranger == RangerId::FIRST);
-        let driver = scenario.robot.rangers.first.servo_pulses;
-        of_servo.map_or(commanded, |servo| bearing_of(servo, width_of(driver, commanded)))
+        let [driver, servo] =
+            [&scenario.robot, built].map(|robot| robot.rangers.first.servo_pulses);
+        if aim.ranger == RangerId::FIRST && servo != driver {
+            bearing_of(servo, width_of(driver, commanded))
+        } else {
+            commanded
+        }
     }
 
     fn end_tick(&mut self, recorder: &mut impl Recorder) -> Result<(), SimulationError> {

@@ -11,6 +11,7 @@ use sonarfix_hal::robot::Stamp;
 use sonarfix_map::{BakeError, Fidelity, Follow, NamedWall, Scenario, SonarName};
 
 use super::error::SimulationError;
+use crate::bound::Noise;
 use crate::dense::{Line, Model, Vector};
 use crate::plant::Plant;
 use crate::plant::follower::Follower;
@@ -41,8 +42,8 @@ pub struct Simulation {
     pub(super) sensor: SensorModel,
     /// Scale error of the ranger, including that of the speed of sound.
     pub(super) range_scale: f64,
-    /// The filter's model with each ranger.
-    pub(super) models: Vec<Model>,
+    /// Whether the bound is computed with the noise that the filter assumes.
+    bound_of_filter: bool,
     /// When the run ends, microseconds.
     end: u64,
     /// When the robot is carried along its path, and how far.
@@ -111,7 +112,7 @@ impl Simulation {
             sensor: sensor(&scenario),
             // (1 + scale) · stretch − 1, arranged so that a stretch of one changes no bit.
             range_scale: scenario.truth.range_scale * stretch + (stretch - 1.0),
-            models: models(&scenario.robot.localizer),
+            bound_of_filter: false,
             end: micros(scenario.path.duration()),
             carried: None,
             slipped: None,
@@ -132,8 +133,8 @@ impl Simulation {
     /// The same with another true sonar than the scenario's.
     #[must_use]
     pub fn heard_by(self, sensor: SensorModel) -> Self {
-        let scale = self.sensor.scale;
-        Self { sensor: SensorModel { scale, ..sensor }, ..self }
+        let SensorModel { scale, offset, .. } = self.sensor;
+        Self { sensor: SensorModel { scale, offset, ..sensor }, ..self }
     }
 
     /// The same with other unmapped obstacles from a time on, seconds since the run began.
@@ -174,6 +175,12 @@ impl Simulation {
         self.put_down.push(PutDown { at: micros(at), pose });
         self.put_down.sort_by_key(|put_down| put_down.at);
         self
+    }
+
+    /// The same with the bound for the noise that the filter assumes, instead of that of the simulation.
+    #[must_use]
+    pub fn bound_of_filter(self) -> Self {
+        Self { bound_of_filter: true, ..self }
     }
 
     /// The same, limited to a duration in seconds.
@@ -317,10 +324,28 @@ impl Simulation {
         self.ranger_at(RangerId::FIRST, pose)
     }
 
-    /// The filter's model with a ranger of the robot; with the first, if it has no such one.
+    /// The model of the bound with a ranger of the robot; with the first, if it has no such one.
     pub(super) fn model_of(&self, ranger: RangerId) -> Model {
-        let model = self.models.get(ranger.index()).or(self.models.first());
-        model.copied().unwrap_or_else(|| Model::of(&self.scenario.robot.localizer))
+        let assumed = self.assumed_model(ranger);
+        if self.bound_of_filter { assumed } else { self.true_noise().of(assumed) }
+    }
+
+    /// The true robot with the noise that its filter assumes.
+    fn assumed_model(&self, ranger: RangerId) -> Model {
+        let config = &self.built.localizer;
+        Model::of_ranger(config, config.rangers.get(ranger).unwrap_or(&config.rangers.first))
+    }
+
+    /// The noise of the simulation, with which the bound is computed.
+    #[must_use]
+    pub fn true_noise(&self) -> Noise {
+        Noise::simulated(&self.scenario.truth, &self.sensor)
+    }
+
+    /// The noise that the filter assumes, with the first ranger.
+    #[must_use]
+    pub fn assumed_noise(&self) -> Noise {
+        Noise::assumed(&self.assumed_model(RangerId::FIRST))
     }
 
     /// Position of a ranger on a robot at a pose.
@@ -334,10 +359,6 @@ impl Simulation {
     }
 }
 
-fn models(config: &Config) -> Vec<Model> {
-    config.rangers.iter().map(|(_, sonar)| Model::of_ranger(config, sonar)).collect()
-}
-
 fn sensor(scenario: &Scenario) -> SensorModel {
     let model = match scenario.hardware.sonar {
         SonarName::Ideal => SensorModel::ideal(scenario),
@@ -349,7 +370,8 @@ fn sensor(scenario: &Scenario) -> SensorModel {
         SonarName::Vl53l1x => SensorModel::vl53l1x(),
         SonarName::Vl53l0x => SensorModel::vl53l0x(),
     };
-    SensorModel { scale: scenario.truth.range_scale, ..model }
+    let truth = &scenario.truth;
+    SensorModel { scale: truth.range_scale, offset: truth.range_offset, ..model }
 }
 
 fn obstacle(plan: &sonarfix_map::Obstacle) -> Obstacle {

@@ -46,7 +46,7 @@ pub(super) fn distorted(of: Reflector, sensor: &SensorModel, rng: &mut impl Rng)
 /// The reported range of a distance, given a standard normal draw for its noise.
 pub(super) fn reported(distance: f64, sensor: &SensorModel, normal: f64) -> f64 {
     let sigma = libm::hypot(sensor.noise, sensor.noise_per_metre * distance);
-    let range = (1.0 + sensor.scale) * distance + sigma * normal;
+    let range = (1.0 + sensor.scale) * distance + sensor.offset + sigma * normal;
     if sensor.quantum > 0.0 { (range / sensor.quantum).round() * sensor.quantum } else { range }
 }
 

@@ -111,6 +111,8 @@ pub struct SensorModel {
     pub noise_per_metre: f64,
     /// Scale error of the range, apart from that of the speed of sound.
     pub scale: f64,
+    /// Added to each range, metres.
+    pub offset: f64,
     /// Resolution of the reported range, metres; zero for none.
     pub quantum: f64,
     /// Of a time-of-flight ranger its light; of a sonar none.
@@ -151,6 +153,7 @@ impl SensorModel {
             noise: truth.range_noise,
             noise_per_metre: truth.range_noise_per_metre,
             scale: truth.range_scale,
+            offset: truth.range_offset,
             light,
             ..Self::of_mirrors(truth.cone, reach, Sensitivity::perfect())
         }
@@ -214,6 +217,7 @@ impl SensorModel {
             noise: 0.0015,
             noise_per_metre: 0.001,
             scale: 0.0,
+            offset: 0.0,
             quantum: 0.003,
             light: None,
         }
@@ -334,6 +338,7 @@ impl SensorModel {
             noise: 0.0,
             noise_per_metre: 0.0,
             scale: 0.0,
+            offset: 0.0,
             quantum: 0.0,
             light: None,
         }
@@ -370,6 +375,7 @@ impl SensorModel {
             noise: 0.013,
             noise_per_metre: 0.0,
             scale: 0.0,
+            offset: 0.0,
             quantum: 0.01,
             light: None,
         }

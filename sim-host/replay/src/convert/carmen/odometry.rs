@@ -17,7 +17,7 @@ use crate::convert::arc::Arc;
 pub const TRACK_WIDTH: f64 = 0.38;
 
 /// A wheel speed above this is implausible, m/s: the `max_wheel_speed` of the robot file, less a rounding.
-const MAX_SPEED: f64 = 2.9;
+pub const MAX_SPEED: f64 = 2.9;
 /// A turn rate above this is implausible, rad/s.
 const MAX_TURN_RATE: f64 = 4.0;
 /// Median distance of the poses of the scans from the `ODOM` records from which they are other poses, metres and
@@ -68,24 +68,43 @@ pub struct Trail {
 
 /// A step between two samples.
 #[derive(Debug, Clone, Copy)]
-struct Step {
-    seconds: f64,
+pub struct Step {
+    pub seconds: f64,
     /// Travel of the right and the left wheel, metres.
-    travel: [f64; 2],
+    pub travel: [f64; 2],
     turn: f64,
     /// Displacement across the mean heading, metres.
-    sideways: f64,
+    pub sideways: f64,
 }
 
 impl Step {
-    fn between(from: &Sample, to: &Sample) -> Self {
+    pub fn between(from: &Sample, to: &Sample) -> Self {
         let Arc { travel, turn, sideways } = Arc::between(&from.pose, &to.pose, TRACK_WIDTH);
         Self { seconds: to.time - from.time, travel, turn, sideways }
     }
 
     fn is_plausible(&self) -> bool {
-        let farther = self.travel[0].abs().max(self.travel[1].abs());
-        farther <= MAX_SPEED * self.seconds && self.turn.abs() <= MAX_TURN_RATE * self.seconds
+        self.farther() <= MAX_SPEED * self.seconds
+            && self.turn.abs() <= MAX_TURN_RATE * self.seconds
+    }
+
+    fn farther(&self) -> f64 {
+        self.travel[0].abs().max(self.travel[1].abs())
+    }
+
+    /// The time that the step takes at a speed of its faster wheel, seconds.
+    pub fn needs(&self, speed: f64) -> f64 {
+        self.farther() / speed
+    }
+
+    /// The report that this step was replaced.
+    pub fn implausible(&self) -> String {
+        format!(
+            "the odometry is implausible: {:.2} m and {:.0} deg in {:.2} s; replaced by the speed before",
+            0.5 * (self.travel[0] + self.travel[1]),
+            self.turn.to_degrees(),
+            self.seconds,
+        )
     }
 
     fn speeds(&self) -> [f64; 2] {
@@ -287,15 +306,7 @@ fn records(
         } else {
             let at = waiting.unwrap_or(to);
             converted.bridged += 1;
-            report(
-                at.line,
-                &format!(
-                    "the odometry is implausible: {:.2} m and {:.0} deg in {:.2} s; replaced by the speed before",
-                    0.5 * (step.travel[0] + step.travel[1]),
-                    step.turn.to_degrees(),
-                    step.seconds,
-                ),
-            );
+            report(at.line, &step.implausible());
             speeds.map(|speed| speed * step.seconds)
         };
         waiting = None;

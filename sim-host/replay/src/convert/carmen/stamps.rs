@@ -14,9 +14,9 @@ impl Clock {
     ///
     /// # Errors
     /// The reason for which the message is left out: its stamp goes back by more than [`JITTER`].
-    pub fn check(&mut self, time: f64) -> Result<(), String> {
+    pub fn check(&mut self, time: f64) -> Result<(), &'static str> {
         match self.latest {
-            Some(latest) if time < latest - JITTER => Err("goes back in time".to_owned()),
+            Some(latest) if time < latest - JITTER => Err("goes back in time"),
             _ => {
                 self.latest = Some(self.latest.map_or(time, |latest| latest.max(time)));
                 Ok(())
