@@ -13,6 +13,7 @@ use sonarfix_link::{Hello, Reporter, Sender, Telemetry, frame};
 use sonarfix_map::{CLASSROOM, Fidelity, Scenario};
 use sonarfix_monitor::Monitor;
 use sonarfix_monitor::hints::hints;
+use sonarfix_monitor::teleoperation::{Direction, Teleoperation};
 use sonarfix_monitor::terminal::{History, Screen};
 use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::trace::{FixRecord, Recorder, Tick, Trace};
@@ -60,6 +61,15 @@ impl Recorder for Received {
 
 /// What a terminal of this size shows of a run of `classroom`, or before anything was received.
 fn shown(received: &Received, trace: &Trace, width: u16, height: u16) -> String {
+    shown_with(received, trace, None, (width, height))
+}
+
+fn shown_with(
+    received: &Received,
+    trace: &Trace,
+    teleoperation: Option<&Teleoperation>,
+    (width, height): (u16, u16),
+) -> String {
     let names: Vec<_> = trace.walls.iter().map(|wall| wall.name.clone()).collect();
     let screen = Screen {
         monitor: &received.monitor,
@@ -68,6 +78,7 @@ fn shown(received: &Received, trace: &Trace, width: u16, height: u16) -> String 
         names: &names,
         recording: Some(Path::new("run.csv")),
         notice: "start: done",
+        teleoperation,
     };
     let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
     terminal.draw(|frame| screen.draw(frame)).unwrap();
@@ -97,6 +108,21 @@ fn the_terminal_names_walls_and_draws_map_and_innovations() {
     assert!(dots > 100, "{dots} characters of the map:\n{wide}");
     let narrow = shown(&received, &trace, 80, 40);
     assert!(narrow.contains("tracking") && narrow.contains(" map "), "{narrow}");
+}
+
+/// A robot that is driven is not overlooked, and neither is the key that stops it.
+#[test]
+fn the_terminal_says_that_a_robot_is_driven_and_how_to_stop_it() {
+    let (received, trace) = (Received::default(), Trace::default());
+    let mut keys = Teleoperation::default();
+    let shown = |keys: Option<&Teleoperation>| shown_with(&received, &trace, keys, (80, 24));
+    assert!(!shown(None).contains("arrows"), "a file cannot be driven");
+    assert!(shown(Some(&keys)).contains("arrows drive: 0.10 m/s"));
+    keys.press(Direction::Left, std::time::Instant::now());
+    let driven = shown(Some(&keys));
+    assert!(driven.contains("LEFT 45 deg/s  SPACE STOPS"), "{driven}");
+    keys.stop();
+    assert!(shown(Some(&keys)).contains("STANDS"));
 }
 
 /// No size makes it panic.

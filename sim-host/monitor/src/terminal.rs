@@ -16,6 +16,7 @@ use sonarfix_link::Telemetry;
 use sonarfix_sim::trace::Wall;
 
 use crate::hints::hints;
+use crate::teleoperation::Teleoperation;
 use crate::{Monitor, Received, view};
 
 /// Innovations that are drawn.
@@ -82,6 +83,8 @@ pub struct Screen<'a> {
     pub recording: Option<&'a Path>,
     /// The answer to the last command.
     pub notice: &'a str,
+    /// The keys that drive the robot; `None` for a connection that can only be read.
+    pub teleoperation: Option<&'a Teleoperation>,
 }
 
 impl Screen<'_> {
@@ -127,7 +130,17 @@ impl Screen<'_> {
         };
         let count = hints(self.monitor).len();
         let check = if count == 0 { String::new() } else { format!("  {count} to check") };
-        Line::from(vec![" sonarfix monitor  ".bold(), text.fg(colour).bold(), check.yellow()])
+        let mut title =
+            vec![" sonarfix monitor  ".bold(), text.fg(colour).bold(), check.yellow(), "  ".into()];
+        if let Some(teleoperation) = self.teleoperation {
+            let (text, drives) = teleoperation.text();
+            title.push(if drives {
+                format!(" {text} ").black().on_red().bold()
+            } else {
+                text.into()
+            });
+        }
+        Line::from(title)
     }
 
     fn footer(&self) -> Line<'_> {
