@@ -4,7 +4,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::{
     bound, calibrate, check, command, config, convert, doctor, examples, export, find, init, map,
-    measure, merge, monitor, paper, pil, plan, replay, run, shell, survey, sweep,
+    measure, merge, monitor, paper, pil, plan, replay, run, shell, survey, sweep, virtual_robot,
 };
 
 /// Simulates, measures, replays and operates the Sonarfix localizer for small wheeled robots.
@@ -46,6 +46,8 @@ enum Command {
     /// Sends a command to a robot.
     #[command(name = "command")]
     Send(command::Args),
+    /// Is a simulated robot on a pseudo-terminal, for `monitor`, `command` and `measure`.
+    VirtualRobot(virtual_robot::Args),
     /// Joins the rows of `run --shard`.
     Merge(merge::Args),
     /// Bakes a robot file into the configuration image for the robot's flash.
@@ -92,6 +94,7 @@ impl Cli {
             Command::Export(args) => export::execute(&args),
             Command::Monitor(args) => monitor::execute(&args),
             Command::Send(args) => command::execute(&args),
+            Command::VirtualRobot(args) => virtual_robot::execute(&args),
             Command::Config(args) => config::execute(&args),
             Command::Map(args) => map::execute(&args),
             Command::Bound(args) => bound::execute(&args),

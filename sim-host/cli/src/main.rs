@@ -35,6 +35,7 @@ mod survey;
 mod sweep;
 mod sweep_values;
 mod table;
+mod virtual_robot;
 mod warnings;
 
 use std::process::ExitCode;
