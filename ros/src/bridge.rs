@@ -159,13 +159,13 @@ impl Bridge {
 
     fn note(&mut self, outcome: Outcome, now: Nanoseconds) {
         self.last_command = match outcome {
-            Outcome::Answered(CommandResult::Refused(error)) => format!("refused: {error}"),
-            Outcome::Answered(_) => "executed".to_owned(),
-            Outcome::Silence => "not answered".to_owned(),
+            Outcome::Answered(result) | Outcome::Driven(Some(result)) => match result {
+                CommandResult::Refused(error) => format!("refused: {error}"),
+                _ => "executed".to_owned(),
+            },
+            Outcome::Silence | Outcome::Driven(None) => "not answered".to_owned(),
         };
-        let is_done =
-            !matches!(outcome, Outcome::Silence | Outcome::Answered(CommandResult::Refused(_)));
-        if !is_done {
+        if self.last_command != "executed" {
             self.problems.add(Problem::CommandFailed, now);
         }
     }

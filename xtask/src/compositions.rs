@@ -107,13 +107,14 @@ const CHOOSING: &str = "\
 | a compass, a beacon, a camera, or a person who taps on the map | `absolute` |
 | a room with many corners and pillars | `reflectors`: they explain echoes that are not of the chosen wall |
 | to find its pose by itself | the crate `sonarfix-search`; of `sonarfix-hal` and `sonarfix-app` the feature `search` |
+| a PC that drives it | of `sonarfix-app` the feature `drive`, which is not a default: [link.md](link.md#driving) |
 
 ```toml
 [dependencies]
 sonarfix = { version = \"0.1\", default-features = false, features = [\"informative\"] }
 ```
 
-All features are on by default. The released firmware has all of them, so that one program serves every robot of a board.
+All other features are on by default. The released firmware has all of those, so that one program serves every robot of a board.
 ";
 
 /// The measured figures of a composition on a target.

@@ -12,11 +12,13 @@
 //! its motor driver by [`Polled::may_drive`].
 //!
 //! This file composes; `running` polls the loop; `command` executes commands; `flash` decides what is read from the store and
-//! written to it; `search` has the search for the pose; `wire` reads the link and schedules telemetry. The deadline check is
-//! [`Polled::is_on_time`].
+//! written to it; `search` has the search for the pose; `drive` has the motion that the PC commands; `wire` reads the link and
+//! schedules telemetry. The deadline check is [`Polled::is_on_time`].
 
 mod clock;
 mod command;
+#[cfg_attr(not(feature = "drive"), path = "app/no_drive.rs")]
+mod drive;
 mod flash;
 mod poll;
 mod running;
@@ -44,6 +46,7 @@ use crate::store::{Resumed, Saved, Store};
 use crate::time::{NEVER, after, before, since};
 
 use clock::{Clock, Reading};
+use drive::Drive;
 use poll::Poll;
 pub use poll::Polled;
 use running::Running;
@@ -90,6 +93,7 @@ pub struct App<'m, F: NorFlash> {
     state: State<'m>,
     /// The search for the pose. It is not part of the state, because it is large and must not be moved.
     search: PoseSearch<'m>,
+    drive: Drive,
     wire: Wire,
     /// When the last frame was received, or the app began.
     heard: Instant,
@@ -136,6 +140,7 @@ impl<'m, F: NorFlash> App<'m, F> {
             known: None,
             state: State::Waiting(Check::new(now)),
             search: PoseSearch::default(),
+            drive: Drive::default(),
             wire: Wire::default(),
             heard: now,
             faults: Faults::default(),
@@ -260,6 +265,7 @@ impl<'m, F: NorFlash> App<'m, F> {
     #[inline(never)]
     fn set_clock(&mut self, now: Instant) {
         self.store.limit().set_clock(now);
+        self.drive.stop();
         // A link that was silent stays silent: the motors of a robot that depends on it must not run longer.
         self.heard = before(now, since(self.time, self.heard));
         (self.started, self.time) = (now, now);
@@ -293,7 +299,8 @@ impl<'m, F: NorFlash> App<'m, F> {
             .localizer()
             .map_or(NEVER, |localizer| after(localizer.time(), DEGRADED_WITHOUT_ODOMETRY));
         // What these decide does not change once they have passed.
-        let changes = [after(self.started, boots::SETTLED_AFTER), link_timeout, odometry];
+        let settled = after(self.started, boots::SETTLED_AFTER);
+        let changes = [settled, link_timeout, odometry, self.drive.deadline()];
         let next = self.wire.next_deadline().min(self.next_write());
         changes.into_iter().filter(|&at| at >= now).fold(next, Instant::min)
     }
@@ -340,6 +347,18 @@ impl<'m, F: NorFlash> App<'m, F> {
             return false;
         };
         self.can_see_wheels(config) && config.motors.permits(localizer, now, self.heard)
+    }
+
+    /// The motion that the PC commands ([`Command::Drive`](sonarfix_link::Command::Drive)), after each poll. `None`: nothing
+    /// is commanded, the command was not renewed in time, or the motors may not be enabled; then the motor code stops the
+    /// robot, or drives it by its own rules.
+    ///
+    /// A board that enables its motors polls at least every 10 ms, and when [`Self::next_poll`] asks for it, which is also
+    /// the end of a motion.
+    #[cfg(feature = "drive")]
+    #[must_use]
+    pub fn motion(&self) -> Option<sonarfix_link::Motion> {
+        self.drive.motion(self.time).filter(|_| self.at_rest.may_drive)
     }
 
     /// Whether the encoders have been read since the loop started, or need not be.

@@ -12,6 +12,7 @@
 //! | [`FlashContents`] | map and configuration in flash |
 //!
 //! # Features
+//! - `drive`: `App::motion`, the motion that the PC commands. Not a default: the motor code must obey it.
 //! - `defmt`: derives `defmt::Format` for the public types that hold data, and logs
 //!   events (`log`).
 

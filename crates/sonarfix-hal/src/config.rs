@@ -411,7 +411,7 @@ impl RobotConfig {
             }
             Feature::Gyro => localizer.gyro.is_some(),
             Feature::Rangers => localizer.rangers.are_several(),
-            Feature::Absolute => false,
+            Feature::Absolute | Feature::Drive => false,
             Feature::Informative => localizer.policy == Policy::Informative,
             Feature::Search => self.start.is_unknown(),
         }

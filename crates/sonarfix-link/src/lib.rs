@@ -63,7 +63,9 @@ pub mod session;
 pub use counters::ReceiverCounters;
 pub use frame::{Frame, Sender, VERSION};
 pub use gaps::Gaps;
-pub use message::{Ack, Command, CommandResult, Estimate, Hello, Ping, SessionCommand, Telemetry};
+pub use message::{
+    Ack, Command, CommandResult, Estimate, Hello, Motion, Ping, SessionCommand, Telemetry,
+};
 pub use receiver::Receiver;
 pub use reporter::Reporter;
 pub use session::Session;

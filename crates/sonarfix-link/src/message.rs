@@ -12,7 +12,9 @@ use serde::{Deserialize, Serialize};
 use sonarfix::aim::{Aim, NoAim};
 use sonarfix::filter::ekf::{StandardDeviations, StateEstimate};
 use sonarfix::geometry::pose::Pose;
-use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
+use sonarfix::geometry::units::{
+    Duration, Instant, Metres, MetresPerSecond, Radians, RadiansPerSecond,
+};
 use sonarfix::health::Health;
 use sonarfix::localizer::{Fix, GyroStatus, Mode, Start};
 use sonarfix::map::WallId;
@@ -419,6 +421,9 @@ pub enum CommandError {
     Occupied,
     /// The bearing is not within the limits of the servo.
     OutOfReach,
+    /// The motion is not finite, or a wheel would be faster than
+    /// [`max_wheel_speed`](sonarfix::config::Config::max_wheel_speed).
+    Motion,
 }
 
 impl core::fmt::Display for CommandError {
@@ -435,6 +440,9 @@ impl core::fmt::Display for CommandError {
             Self::Waiting => "the loop does not run: start it first",
             Self::Occupied => "an earlier measurement of this kind waits for its encoder sample",
             Self::OutOfReach => "the servo does not reach this bearing",
+            Self::Motion => {
+                "the motion is not finite, or a wheel would be faster than max_wheel_speed"
+            }
             Self::Unsupported(reason) => return write!(f, "{reason}"),
         })
     }
@@ -485,8 +493,34 @@ pub enum Command {
     /// As [`Self::ShowDevices`], with the servo at this bearing: once it has settled, the ranger pings, and each ping is a
     /// [`Telemetry::Sweep`].
     Point(Radians),
+    /// Drives with this motion, for [`Motion::LASTS`] after the robot has read the frame. A program that drives on sends
+    /// the command again before that, as a new frame: a repeated frame is executed once. Refused while the loop does
+    /// not run.
+    Drive(Motion),
     /// Stands for a [`Self::SetConfiguration`] that a program received and cannot decode, because it was built without a part
     /// of it. It is refused, and never sent.
     #[serde(skip)]
     SetUnusable(NotLinked),
+}
+
+/// A motion over the floor, with the nominal track width.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Motion {
+    /// Forward speed; negative: backwards.
+    pub speed: MetresPerSecond,
+    /// Turn rate, counter-clockwise.
+    pub turn: RadiansPerSecond,
+}
+
+impl Motion {
+    /// The time after which a robot stops if its [`Command::Drive`] is not renewed.
+    pub const LASTS: Duration = Duration::from_ticks(300_000);
+
+    /// The speeds of the right and the left wheel of a robot with this track width.
+    #[must_use]
+    pub fn wheels(&self, track_width: Metres) -> [MetresPerSecond; 2] {
+        let half_turn = 0.5 * track_width.0 * self.turn.0;
+        [MetresPerSecond(self.speed.0 + half_turn), MetresPerSecond(self.speed.0 - half_turn)]
+    }
 }

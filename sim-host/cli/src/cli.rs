@@ -6,6 +6,7 @@ use sonarfix_terminal::output::{self, Detail};
 use crate::{
     bound, calibrate, check, command, config, convert, doctor, examples, export, find, flash, init,
     map, measure, merge, monitor, paper, pil, plan, replay, run, shell, survey, sweep,
+    virtual_robot,
 };
 
 /// Simulates, measures, replays and operates the Sonarfix localizer for small wheeled robots.
@@ -53,6 +54,8 @@ enum Command {
     /// Sends a command to a robot.
     #[command(name = "command")]
     Send(command::Args),
+    /// Is a simulated robot on a pseudo-terminal, for `monitor`, `command` and `measure`.
+    VirtualRobot(virtual_robot::Args),
     /// Joins the rows of `run --shard`.
     Merge(merge::Args),
     /// Bakes a robot file into the configuration image for the robot's flash.
@@ -108,6 +111,7 @@ impl Cli {
             Command::Export(args) => export::execute(&args),
             Command::Monitor(args) => monitor::execute(&args),
             Command::Send(args) => command::execute(&args),
+            Command::VirtualRobot(args) => virtual_robot::execute(&args),
             Command::Config(args) => config::execute(&args),
             Command::Flash(args) => flash::execute(&args),
             Command::Map(args) => map::execute(&args),

@@ -1,14 +1,18 @@
 //! `sonarfix command`: sends a command to a robot.
 
 use std::path::PathBuf;
+use std::time::Instant;
 
+use anyhow::Context;
 use sonarfix::geometry::pose::{Point, Pose};
-use sonarfix::geometry::units::{Duration, Metres, Radians};
+use sonarfix::geometry::units::{Duration, Metres, MetresPerSecond, Radians, RadiansPerSecond};
 use sonarfix::localizer::Start;
 use sonarfix::sensor::absolute::{AbsoluteMeasurement, PoseNoise, PositionNoise};
-use sonarfix_link::{Command, CommandResult};
+use sonarfix_link::{Command, CommandResult, Motion};
 use sonarfix_map::robot_file;
+use sonarfix_monitor::port::Port;
 use sonarfix_monitor::{request, view};
+use sonarfix_terminal::progress::{catch_interrupt, is_interrupted};
 
 use crate::monitor::PortArgs;
 
@@ -77,6 +81,20 @@ enum What {
     Point {
         /// Degrees, counter-clockwise from the robot's heading.
         bearing: f32,
+    },
+    /// Drive; at the end, and after Ctrl-C, the robot stands. The command is renewed meanwhile: without it the robot stops by
+    /// itself after 0.3 s.
+    #[command(allow_negative_numbers = true)]
+    Drive {
+        /// Forward speed, metres per second; negative: backwards.
+        #[arg(long, default_value_t = 0.0)]
+        speed: f32,
+        /// Turn rate, degrees per second, counter-clockwise.
+        #[arg(long, default_value_t = 0.0)]
+        turn: f32,
+        /// For how long; by default until Ctrl-C.
+        #[arg(long)]
+        seconds: Option<f64>,
     },
 }
 
@@ -148,8 +166,27 @@ impl What {
             Self::Search => Command::Search,
             Self::MapChecksum => Command::MapChecksum,
             Self::Point { bearing } => Command::Point(Radians::from_degrees(*bearing)),
+            Self::Drive { speed, turn, .. } => Command::Drive(Motion {
+                speed: MetresPerSecond(*speed),
+                turn: RadiansPerSecond(turn.to_radians()),
+            }),
         })
     }
+}
+
+/// Drives until Ctrl-C or the end of the given time.
+fn drive(port: &mut Port, motion: Motion, what: &What) -> anyhow::Result<CommandResult> {
+    let limit = match what {
+        What::Drive { seconds, .. } => *seconds,
+        _ => None,
+    };
+    let limit = limit.map(std::time::Duration::try_from_secs_f64).transpose();
+    let limit = limit.context("--seconds: not a duration")?;
+    catch_interrupt();
+    let began = Instant::now();
+    request::drive(port, motion, || {
+        is_interrupted() || limit.is_some_and(|limit| began.elapsed() >= limit)
+    })
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
@@ -157,6 +194,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let mut port = args.port.open()?;
     let (result, response) = match command {
         Command::Absolute { .. } => request::ask_absolute(&mut port, &command)?,
+        Command::Drive(motion) => (drive(&mut port, motion, &args.what)?, None),
         _ => (request::ask(&mut port, &command)?, None),
     };
     match result {

@@ -55,6 +55,14 @@ pub const EXAMPLES: [(&str, &[&str]); 32] = [
         &[
             "sonarfix command --port /dev/ttyACM0 set-pose 1.5 0.8 90",
             "sonarfix command --port /dev/ttyACM0 start",
+            "sonarfix command --port /dev/ttyACM0 drive --speed 0.1 --turn 20 --seconds 3",
+        ],
+    ),
+    (
+        "virtual-robot",
+        &[
+            "sonarfix virtual-robot scenario.toml --link robot.port",
+            "sonarfix virtual-robot scenario.toml --tcp 5000 --stand --running",
         ],
     ),
     ("merge", &["sonarfix merge shard-1.csv shard-2.csv --json"]),

@@ -36,6 +36,7 @@ mod survey;
 mod sweep;
 mod sweep_values;
 mod table;
+mod virtual_robot;
 mod warnings;
 
 use std::process::ExitCode;

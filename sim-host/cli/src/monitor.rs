@@ -8,10 +8,11 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, ensure};
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyModifiers};
-use sonarfix_link::Telemetry;
+use sonarfix_link::{Motion, Telemetry};
 use sonarfix_live::order::{Order, Orders, Reply};
 use sonarfix_live::robot::Robot;
 use sonarfix_monitor::port::Port;
+use sonarfix_monitor::teleoperation::{Direction, Teleoperation};
 use sonarfix_monitor::terminal::{self, History};
 use sonarfix_monitor::{Monitor, Received, view};
 use sonarfix_sim::trace::Wall;
@@ -147,6 +148,7 @@ fn watch(
             if is_interrupted() || screen.show(robot)?.is_break() {
                 return Ok(ControlFlow::Break(Next::End));
             }
+            screen.drive(robot, Instant::now());
             let bytes = robot.obey(orders, Instant::now());
             Ok(bytes
                 .map_or(ControlFlow::Continue(()), |bytes| ControlFlow::Break(Next::Send(bytes))))
@@ -192,8 +194,17 @@ struct Screen {
 }
 
 enum Output {
-    Terminal { terminal: DefaultTerminal, history: History, drawn: Option<Instant> },
-    Lines { next: u64 },
+    Terminal {
+        terminal: DefaultTerminal,
+        history: History,
+        drawn: Option<Instant>,
+        keys: Teleoperation,
+        /// The motion of the keys that was last passed on.
+        passed: Option<Motion>,
+    },
+    Lines {
+        next: u64,
+    },
 }
 
 impl Screen {
@@ -201,9 +212,13 @@ impl Screen {
         let names = walls.iter().map(|wall| wall.name.clone()).collect();
         let terminal = if stdout().is_terminal() { ratatui::try_init().ok() } else { None };
         let output = match terminal {
-            Some(terminal) => {
-                Output::Terminal { terminal, history: History::default(), drawn: None }
-            }
+            Some(terminal) => Output::Terminal {
+                terminal,
+                history: History::default(),
+                drawn: None,
+                keys: Teleoperation::default(),
+                passed: None,
+            },
             None => Output::Lines { next: 0 },
         };
         Self { walls, names, output }
@@ -231,7 +246,7 @@ impl Screen {
 
     /// Draws the terminal, if it is due, and takes its keys; breaks to end.
     fn show(&mut self, robot: &mut Robot) -> anyhow::Result<ControlFlow<()>> {
-        let Output::Terminal { terminal, history, drawn } = &mut self.output else {
+        let Output::Terminal { terminal, history, drawn, keys, .. } = &mut self.output else {
             return Ok(ControlFlow::Continue(()));
         };
         if drawn.is_some_and(|drawn| drawn.elapsed() < REDRAW) {
@@ -240,7 +255,7 @@ impl Screen {
         *drawn = Some(Instant::now());
         while event::poll(Duration::ZERO)? {
             if let Event::Key(key) = event::read()?
-                && obey_key(key.code, key.modifiers, robot).is_break()
+                && obey_key(key.code, key.modifiers, robot, keys).is_break()
             {
                 return Ok(ControlFlow::Break(()));
             }
@@ -252,9 +267,20 @@ impl Screen {
             names: &self.names,
             recording: robot.recording(),
             notice: robot.notice(),
+            teleoperation: robot.can_be_commanded().then_some(&*keys),
         };
         terminal.draw(|frame| screen.draw(frame))?;
         Ok(ControlFlow::Continue(()))
+    }
+
+    /// Tells the robot what the keys say, if it has changed: the motion that a page commands stays otherwise.
+    fn drive(&mut self, robot: &mut Robot, now: Instant) {
+        let Output::Terminal { keys, passed, .. } = &mut self.output else { return };
+        let motion = keys.motion(now);
+        if *passed != motion {
+            *passed = motion;
+            robot.drive(motion);
+        }
     }
 
     /// Restores the terminal; the names of the walls.
@@ -267,14 +293,30 @@ impl Screen {
 }
 
 /// A key of the terminal, where Ctrl-C is one as well.
-fn obey_key(key: KeyCode, modifiers: KeyModifiers, robot: &mut Robot) -> ControlFlow<()> {
+fn obey_key(
+    key: KeyCode,
+    modifiers: KeyModifiers,
+    robot: &mut Robot,
+    keys: &mut Teleoperation,
+) -> ControlFlow<()> {
     match key {
         KeyCode::Char('c') if modifiers.contains(KeyModifiers::CONTROL) => ControlFlow::Break(()),
         KeyCode::Char('q') => ControlFlow::Break(()),
         _ => {
             match key {
                 KeyCode::Char('s') => robot.ask(Order::Start),
-                KeyCode::Char('x') => robot.ask(Order::Stop),
+                KeyCode::Char('x') => {
+                    keys.release();
+                    robot.ask(Order::Stop);
+                }
+                KeyCode::Char(' ') => keys.stop(),
+                KeyCode::Esc => keys.release(),
+                KeyCode::Char('+') => keys.change_speed(true),
+                KeyCode::Char('-') => keys.change_speed(false),
+                KeyCode::Up => keys.press(Direction::Ahead, Instant::now()),
+                KeyCode::Down => keys.press(Direction::Back, Instant::now()),
+                KeyCode::Left => keys.press(Direction::Left, Instant::now()),
+                KeyCode::Right => keys.press(Direction::Right, Instant::now()),
                 KeyCode::Char('r') => robot.ask(Order::Record { on: robot.recording().is_none() }),
                 _ => {}
             }

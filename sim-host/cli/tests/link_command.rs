@@ -12,14 +12,14 @@ use std::thread::{self, JoinHandle};
 use sonarfix::config::Policy;
 use sonarfix::filter::ekf::{StandardDeviations, StateEstimate};
 use sonarfix::geometry::pose::{Point, Pose};
-use sonarfix::geometry::units::{Instant, Metres, Radians};
+use sonarfix::geometry::units::{Instant, Metres, MetresPerSecond, Radians, RadiansPerSecond};
 use sonarfix::localizer::{AbsoluteFix, Agreement};
 use sonarfix::sensor::absolute::{AbsoluteMeasurement, PoseNoise, PositionNoise};
 use sonarfix_hal::robot::AbsoluteResult;
 use sonarfix_link::message::{CommandError, ImageStatus, Odometry, ResetCause};
 use sonarfix_link::{
-    Command as Order, CommandResult, Hello, Receiver, Reporter, Sender, Session, SessionCommand,
-    Telemetry, baked, frame,
+    Command as Order, CommandResult, Hello, Motion, Receiver, Reporter, Sender, Session,
+    SessionCommand, Telemetry, baked, frame,
 };
 use sonarfix_map::robot_file;
 
@@ -68,6 +68,56 @@ fn send(stream: &mut TcpStream, sender: &mut Sender<Telemetry>, ack: &Telemetry,
     }
     // The other end may already be closed.
     let _ = stream.write_all(&wire);
+}
+
+#[test]
+fn a_drive_ends_with_a_robot_that_stands() {
+    let (port, robot) = robot(0, CommandResult::Done);
+    let drive = ["drive", "--speed", "0.2", "--turn", "-90", "--seconds", "0.5"];
+    let output = sonarfix(&[&["command", "--port", &port], &drive[..]].concat());
+    let (stdout, stderr) = printed(&output);
+    assert!(output.status.success(), "{stderr}");
+    assert_eq!(stdout, "done\n");
+    let done = robot.join().unwrap();
+    let (last, driven) = done.split_last().unwrap();
+    assert_eq!(*last, Order::Drive(Motion::default()));
+    let turn = RadiansPerSecond(-std::f32::consts::FRAC_PI_2);
+    let motion = Order::Drive(Motion { speed: MetresPerSecond(0.2), turn });
+    assert!(!driven.is_empty() && driven.iter().all(|order| *order == motion), "{done:?}");
+}
+
+#[test]
+fn a_refused_drive_is_not_renewed() {
+    let reason = CommandError::Motion;
+    let (port, robot) = robot(0, CommandResult::Refused(reason));
+    let output = sonarfix(&["command", "--port", &port, "drive", "--speed", "90"]);
+    let (_, stderr) = printed(&output);
+    assert!(!output.status.success() && stderr.contains(&reason.to_string()), "{stderr}");
+    assert_eq!(robot.join().unwrap().len(), 1);
+}
+
+/// Ctrl-C is a stop, not the end of a program that leaves a robot to its dead-man.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_interrupted_drive_ends_with_a_robot_that_stands() {
+    let (port, robot) = robot(0, CommandResult::Done);
+    let drive = ["command", "--port", &port, "drive", "--speed", "0.2"];
+    let mut child = Command::new(env!("CARGO_BIN_EXE_sonarfix")).args(drive).spawn().unwrap();
+    let has_begun = || {
+        let signals = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
+        // Ctrl-C is caught (SIGINT, signal 2) before the first command is sent.
+        signals
+            .lines()
+            .find_map(|line| line.strip_prefix("SigCgt:\t"))
+            .is_some_and(|mask| u64::from_str_radix(mask, 16).unwrap() & 0b10 != 0)
+    };
+    while !has_begun() {
+        thread::yield_now();
+    }
+    let interrupt = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(interrupt.success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert_eq!(robot.join().unwrap().last(), Some(&Order::Drive(Motion::default())));
 }
 
 #[test]

@@ -32,4 +32,5 @@ mod signs_of_life;
 mod skipped;
 mod survey;
 mod terminal;
+mod virtual_robot;
 mod whole_files;

@@ -24,6 +24,7 @@ use sonarfix_link::{Hello, Ping, ReceiverCounters, Reporter, Sender, Telemetry, 
 use sonarfix_map::{CLASSROOM, Fidelity, Scenario};
 use sonarfix_monitor::Monitor;
 use sonarfix_monitor::hints::hints;
+use sonarfix_monitor::teleoperation::{Direction, Teleoperation};
 use sonarfix_monitor::terminal::{History, Screen};
 use sonarfix_monitor::view;
 use sonarfix_search::navigator::Mode;
@@ -73,6 +74,15 @@ impl Recorder for Received {
 
 /// What a terminal of this size shows of a run of `classroom`, or before anything was received.
 fn shown(received: &Received, trace: &Trace, width: u16, height: u16) -> String {
+    shown_with(received, trace, None, (width, height))
+}
+
+fn shown_with(
+    received: &Received,
+    trace: &Trace,
+    teleoperation: Option<&Teleoperation>,
+    (width, height): (u16, u16),
+) -> String {
     let names: Vec<_> = trace.walls.iter().map(|wall| wall.name.clone()).collect();
     let screen = Screen {
         monitor: &received.monitor,
@@ -81,6 +91,7 @@ fn shown(received: &Received, trace: &Trace, width: u16, height: u16) -> String 
         names: &names,
         recording: Some(Path::new("run.csv")),
         notice: "start: done",
+        teleoperation,
     };
     // Made for another size, and resized.
     let mut terminal = Terminal::new(TestBackend::new(width + 7, height + 3)).unwrap();
@@ -264,6 +275,21 @@ fn no_line_is_cut_at_any_width() {
         assert!(lines.iter().all(|line| line.chars().count() <= width), "{width}: {lines:?}");
         assert_eq!(joined(&lines.join("\n")), whole, "{width}");
     }
+}
+
+/// A robot that is driven is not overlooked, and neither is the key that stops it.
+#[test]
+fn the_terminal_says_that_a_robot_is_driven_and_how_to_stop_it() {
+    let (received, trace) = (Received::default(), Trace::default());
+    let mut keys = Teleoperation::default();
+    let shown = |keys: Option<&Teleoperation>| shown_with(&received, &trace, keys, (80, 24));
+    assert!(!shown(None).contains("arrows"), "a file cannot be driven");
+    assert!(shown(Some(&keys)).contains("arrows drive: 0.10 m/s"));
+    keys.press(Direction::Left, std::time::Instant::now());
+    let driven = shown(Some(&keys));
+    assert!(driven.contains("LEFT 45 deg/s  SPACE STOPS"), "{driven}");
+    keys.stop();
+    assert!(shown(Some(&keys)).contains("STANDS"));
 }
 
 /// No size makes it panic.

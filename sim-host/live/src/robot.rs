@@ -9,7 +9,7 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 use anyhow::Context;
 use sonarfix_hal::robot::AbsoluteResult;
 use sonarfix_link::message::Odometry;
-use sonarfix_link::{CommandResult, Estimate, Telemetry};
+use sonarfix_link::{CommandResult, Estimate, Motion, Telemetry};
 use sonarfix_monitor::conversation::{Conversation, Due, Outcome};
 use sonarfix_monitor::recording::Recording;
 use sonarfix_monitor::signs::Signs;
@@ -194,16 +194,43 @@ impl Robot {
     }
 
     fn answer(&mut self, outcome: Outcome) {
+        if let Outcome::Driven(result) = outcome {
+            return self.driven(result);
+        }
         let Some(ordered) = self.waiting.pop_front() else { return };
         let reply = match outcome {
             Outcome::Answered(CommandResult::Refused(reason)) => {
                 Reply::refused(&format!("the robot refuses: {reason}"))
             }
             Outcome::Answered(_) => Reply::done("done"),
-            Outcome::Silence => Reply::refused("the robot does not answer"),
+            Outcome::Silence | Outcome::Driven(_) => Reply::refused("the robot does not answer"),
         };
         self.note(&format!("{}: {}", ordered.order.name(), reply.text));
         ordered.answer(reply);
+    }
+
+    /// The answer to a motion: another one than done ends the motion.
+    fn driven(&mut self, result: Option<CommandResult>) {
+        match result {
+            Some(CommandResult::Refused(reason)) => {
+                self.drive(None);
+                self.note(&format!("drive: the robot refuses: {reason}"));
+            }
+            Some(_) => {}
+            None => self.note("drive: the robot does not answer"),
+        }
+    }
+
+    /// Whether it takes commands at all.
+    #[must_use]
+    pub fn can_be_commanded(&self) -> bool {
+        self.scene.commands
+    }
+
+    /// Drives with this motion, which is renewed until another call; `None` renews it no more. Without effect on a
+    /// connection that can only be read.
+    pub fn drive(&mut self, motion: Option<Motion>) {
+        self.conversation.drive(motion.filter(|_| self.scene.commands));
     }
 
     fn note(&mut self, text: &str) {

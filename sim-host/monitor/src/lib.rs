@@ -10,6 +10,7 @@
 //! | [`sealed`] | the file of a log, with checksums and an end |
 //! | [`conversation`] | the commands of a session, repeated until they are acknowledged |
 //! | [`request`] | one command |
+//! | [`teleoperation`] | driving by keys |
 //! | [`wheels`] | the travel of the wheels |
 //! | [`hints`] | what the telemetry suggests to check |
 //! | [`simulated`] | a simulated drive as such a log |
@@ -23,6 +24,7 @@ pub mod request;
 pub mod sealed;
 pub mod signs;
 pub mod simulated;
+pub mod teleoperation;
 pub mod terminal;
 pub mod view;
 pub mod wheels;

@@ -1,11 +1,11 @@
-//! A command, repeated until it is acknowledged.
+//! A command, repeated until it is acknowledged, and a motion, renewed until it is over.
 
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use sonarfix_hal::robot::AbsoluteResult;
-use sonarfix_link::{Command, CommandResult, Receiver, Telemetry};
+use sonarfix_link::{Command, CommandResult, Motion, Receiver, ReceiverCounters, Telemetry};
 
 use crate::conversation::{ATTEMPTS, Conversation, Due, Outcome};
 use crate::port::Port;
@@ -74,7 +74,7 @@ pub fn ask_and_watch(
         match due {
             Due::Send(bytes) => port.send(&bytes)?,
             Due::End(Outcome::Answered(result)) => return Ok(result),
-            Due::End(Outcome::Silence) => break,
+            Due::End(Outcome::Silence | Outcome::Driven(_)) => break,
             Due::Nothing => {}
         }
         let next = port.read(|bytes| -> anyhow::Result<ControlFlow<Due>> {
@@ -91,8 +91,52 @@ pub fn ask_and_watch(
         })?;
         due = next.context("the port was closed before an answer came")?;
     }
-    let counters = receiver.counters();
-    anyhow::bail!(
+    Err(silence(receiver.counters()))
+}
+
+/// Drives with this motion, which is renewed until `is_over`; then the robot stands. Returns how it ended: `Done`, or the
+/// refusal.
+///
+/// # Errors
+/// As [`ask`].
+pub fn drive(
+    port: &mut Port,
+    motion: Motion,
+    mut is_over: impl FnMut() -> bool,
+) -> anyhow::Result<CommandResult> {
+    let mut conversation = Conversation::default();
+    let mut receiver = Receiver::<Telemetry>::new();
+    let mut is_stopping = false;
+    conversation.drive(Some(motion));
+    loop {
+        if !is_stopping && is_over() {
+            is_stopping = true;
+            conversation.drive(Some(Motion::default()));
+        }
+        let mut due = conversation.poll(Instant::now());
+        if due == Due::Nothing {
+            let answer = port.read(|bytes| {
+                let answers = bytes.iter().filter_map(|&byte| match receiver.push(byte)?.message {
+                    Telemetry::Ack(ack) => conversation.take(&ack),
+                    _ => None,
+                });
+                Ok(ControlFlow::Break(answers.last()))
+            })?;
+            let answer = answer.context("the port was closed while the robot drives")?;
+            due = answer.map_or(Due::Nothing, Due::End);
+        }
+        match due {
+            Due::Send(bytes) => port.send(&bytes)?,
+            Due::End(Outcome::Driven(Some(CommandResult::Done))) if !is_stopping => {}
+            Due::End(Outcome::Driven(Some(result))) => return Ok(result),
+            Due::End(_) => return Err(silence(receiver.counters())),
+            Due::Nothing => {}
+        }
+    }
+}
+
+fn silence(counters: ReceiverCounters) -> anyhow::Error {
+    anyhow::anyhow!(
         "no answer after {ATTEMPTS} attempts ({} frames received, {} skipped, {} of them foreign): \
          is the robot on, with the same version of the link?",
         counters.frames,

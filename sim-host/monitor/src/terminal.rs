@@ -17,6 +17,7 @@ use sonarfix_sim::text::wrapped;
 use sonarfix_sim::trace::Wall;
 
 use crate::hints::hints;
+use crate::teleoperation::Teleoperation;
 use crate::{Monitor, Received, view};
 
 /// Innovations that are drawn.
@@ -87,6 +88,8 @@ pub struct Screen<'a> {
     pub recording: Option<&'a Path>,
     /// The answer to the last command.
     pub notice: &'a str,
+    /// The keys that drive the robot; `None` for a connection that can only be read.
+    pub teleoperation: Option<&'a Teleoperation>,
 }
 
 impl Screen<'_> {
@@ -151,7 +154,17 @@ impl Screen<'_> {
         let count = hints(self.monitor).len();
         let check = if count == 0 { String::new() } else { format!("  {count} to check") };
         let verdict = Span::styled(format!("{sign} {text}"), style).bold();
-        Line::from(vec![" sonarfix monitor  ".bold(), verdict, check.fg(UNCERTAIN)])
+        let mut title =
+            vec![" sonarfix monitor  ".bold(), verdict, check.fg(UNCERTAIN), "  ".into()];
+        if let Some(teleoperation) = self.teleoperation {
+            let (text, drives) = teleoperation.text();
+            title.push(if drives {
+                format!(" {text} ").black().on_red().bold()
+            } else {
+                text.into()
+            });
+        }
+        Line::from(title)
     }
 
     /// The keys, the recording and the answer to the last command, wrapped.

@@ -2,7 +2,7 @@
 //!
 //! - [`Simulation`]: a scenario, prepared to be run;
 //! - `ideal`: a run that passes travel and ranges directly and on time to the localizer;
-//! - `pins`: a run through pins, drivers and the shipped loop;
+//! - `pins`: a run through pins, drivers and the shipped loop; [`Hardware`]: its hardware step by step;
 //! - `score`: the result of a run;
 //! - [`computer`]: the computer that runs the robot's software;
 //! - `streams`: the random streams of a run.
@@ -22,6 +22,7 @@ use crate::statistics::RunResult;
 use crate::trace::Recorder;
 
 pub use error::SimulationError;
+pub use pins::hardware::Hardware;
 pub use simulation::{MANY, Simulation};
 
 impl Simulation {

@@ -15,7 +15,7 @@ use sonarfix_hal::robot::{Hardware, Report, Robot, Settings, Tick};
 use sonarfix_link::baked::BakedError;
 use sonarfix_link::message::{CommandError, CommandResult};
 use sonarfix_link::reporter;
-use sonarfix_link::{Command, Frame, Reporter, SessionCommand, Telemetry, baked};
+use sonarfix_link::{Command, Frame, Motion, Reporter, SessionCommand, Telemetry, baked};
 
 use super::{App, Link, Poll, Polled, Running, State};
 use crate::check::Check;
@@ -137,6 +137,7 @@ impl<'m, F: NorFlash> App<'m, F> {
                 let at = Instant::from_ticks(now.ticks().saturating_sub(age.ticks()));
                 self.absolute(at, measurement).map(|()| Next::Nothing)
             }
+            Command::Drive(motion) => self.drive(now, motion).map(|()| Next::Nothing),
             Command::MapChecksum | Command::OpenSession => Ok(Next::Nothing),
         }
     }
@@ -358,6 +359,15 @@ impl<'m, F: NorFlash> App<'m, F> {
         running.robot.absolute(at, measurement).map_err(|_| CommandError::Occupied)
     }
 
+    /// Drives with this motion until it is renewed or has ended.
+    fn drive(&mut self, now: Instant, motion: Motion) -> Result<(), CommandError> {
+        if !self.is_running() {
+            return Err(CommandError::Waiting);
+        }
+        let (config, _) = self.config.as_ref().ok_or(CommandError::NoConfiguration)?;
+        self.drive.command(now, motion, config)
+    }
+
     /// With the servo at `bearing`, or in turn ahead and at its limits.
     fn show_devices(
         &mut self,
@@ -381,6 +391,7 @@ impl<'m, F: NorFlash> App<'m, F> {
             return;
         }
         self.known = self.known_now();
+        self.drive.stop();
         self.faults = self.faults();
         self.state = State::Waiting(Check::new(now));
         self.owes_record = true;
@@ -481,7 +492,7 @@ impl<'m, F: NorFlash> App<'m, F> {
 }
 
 /// The answer to a request for a part that is not linked.
-fn refused(reason: NotLinked) -> CommandError {
+pub(super) fn refused(reason: NotLinked) -> CommandError {
     CommandError::Unsupported(Unsupported::NotLinked(reason))
 }
 

@@ -54,6 +54,20 @@ fn it_starts_only_on_command_and_with_map_configuration_and_pose() {
     assert!(!bench.poll().is_running);
 }
 
+/// A motion that the motor code would not obey is not acknowledged.
+#[cfg(not(feature = "drive"))]
+#[test]
+fn a_program_without_the_commanded_motion_refuses_it_by_name() {
+    let baked = Baked::new(&config());
+    let mut bench = Bench::switched_on(&baked, SimFlash::new());
+    for command in [Command::SetPose(start()), Command::Start] {
+        assert_eq!(bench.order(&command), DONE);
+    }
+    let result = bench.order(&Command::Drive(sonarfix_link::Motion::default()));
+    let CommandResult::Refused(reason) = result else { panic!("{result:?}") };
+    assert_eq!(reason.to_string(), "this program was built without `drive`");
+}
+
 #[test]
 fn hello_reports_the_checksums_of_map_and_configuration() {
     let baked = Baked::new(&config());

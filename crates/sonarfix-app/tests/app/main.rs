@@ -9,6 +9,8 @@
 mod attacks;
 mod commands;
 mod devices;
+#[cfg(feature = "drive")]
+mod drive;
 mod facts;
 mod flash;
 mod journal;

@@ -18,12 +18,21 @@ pub enum Feature {
     Informative,
     /// The search for an unknown pose.
     Search,
+    /// A motion that a PC commands.
+    Drive,
 }
 
 impl Feature {
     /// All of them.
-    pub const ALL: [Self; 6] =
-        [Self::Light, Self::Gyro, Self::Rangers, Self::Absolute, Self::Informative, Self::Search];
+    pub const ALL: [Self; 7] = [
+        Self::Light,
+        Self::Gyro,
+        Self::Rangers,
+        Self::Absolute,
+        Self::Informative,
+        Self::Search,
+        Self::Drive,
+    ];
 
     /// The name of the Cargo feature.
     #[must_use]
@@ -35,6 +44,7 @@ impl Feature {
             Self::Absolute => "absolute",
             Self::Informative => "informative",
             Self::Search => "search",
+            Self::Drive => "drive",
         }
     }
 
@@ -48,6 +58,7 @@ impl Feature {
             Self::Absolute => cfg!(feature = "absolute"),
             Self::Informative => cfg!(feature = "informative"),
             Self::Search => cfg!(feature = "search"),
+            Self::Drive => cfg!(feature = "drive"),
         }
     }
 }

@@ -63,6 +63,7 @@ fn name_of_command(message: &Command) -> &'static str {
         Command::ShowDevices => "show devices",
         Command::Absolute { .. } => "absolute",
         Command::Point(_) => "point",
+        Command::Drive(_) => "drive",
         Command::SetUnusable(_) => "never sent",
     }
 }
@@ -144,6 +145,7 @@ fn every_variant_has_the_number_of_its_version() {
         Feature::Absolute,
         Feature::Informative,
         Feature::Search,
+        Feature::Drive,
     ]);
     numbered(&[SettingError::Calibration, limits, SettingError::Pulse, SettingError::Frame]);
     numbered(&[

@@ -30,7 +30,8 @@ use sonarfix_link::message::{
     SkippedPing, Sweep,
 };
 use sonarfix_link::{
-    Ack, Command, CommandResult, Estimate, Hello, Ping, ReceiverCounters, SessionCommand, Telemetry,
+    Ack, Command, CommandResult, Estimate, Hello, Motion, Ping, ReceiverCounters, SessionCommand,
+    Telemetry,
 };
 use sonarfix_search::navigator::Mode;
 use sonarfix_search::search::Region;
@@ -126,7 +127,7 @@ impl Source for Largest {
 
 /// The numbers of kinds of telemetry and of commands.
 pub const TELEMETRY: u32 = 17;
-pub const COMMANDS: u32 = 11;
+pub const COMMANDS: u32 = 12;
 
 pub fn any_telemetry(rng: &mut ChaCha8Rng) -> Telemetry {
     let kind = rng.pick(TELEMETRY);
@@ -236,7 +237,11 @@ pub fn command(kind: u32, source: &mut impl Source) -> SessionCommand {
         7 => Command::Search,
         8 => Command::ShowDevices,
         9 => Command::Absolute { age: source.duration(), measurement: absolute(source) },
-        _ => Command::Point(Radians(source.single())),
+        10 => Command::Point(Radians(source.single())),
+        _ => Command::Drive(Motion {
+            speed: MetresPerSecond(source.single()),
+            turn: RadiansPerSecond(source.single()),
+        }),
     };
     SessionCommand { session: source.bits32(), command }
 }
@@ -451,7 +456,7 @@ fn reset(source: &mut impl Source) -> ResetCause {
     source.choose(&RESETS)
 }
 
-pub const REFUSED: [CommandError; 12] = [
+pub const REFUSED: [CommandError; 13] = [
     CommandError::Configuration,
     CommandError::Pose,
     CommandError::NoMap,
@@ -464,6 +469,7 @@ pub const REFUSED: [CommandError; 12] = [
     CommandError::Waiting,
     CommandError::Occupied,
     CommandError::OutOfReach,
+    CommandError::Motion,
 ];
 
 fn command_result(source: &mut impl Source) -> CommandResult {

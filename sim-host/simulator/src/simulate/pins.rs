@@ -1,5 +1,7 @@
 //! A run through pins, drivers and the shipped loop, as a discrete-event simulation.
 
+pub mod hardware;
+
 use sonarfix::config::{MAX_RANGERS, RangerId};
 use sonarfix::geometry::units::{Instant, Metres, Radians};
 use sonarfix::localizer::{Localizer, Start};
@@ -153,7 +155,7 @@ impl<'a> SimulatedHardware<'a> {
             let has_failed = self.read_fails();
             if self.now < next_poll && !self.has_edges() && !has_arrived {
                 recorder.polled(&Report::default(), controller.localizer()?);
-                let next = self.next_step(controller);
+                let next = self.next_step(controller.idle_until());
                 self.advance(next);
                 continue;
             }
@@ -171,7 +173,7 @@ impl<'a> SimulatedHardware<'a> {
                 return Ok(None);
             }
             next_poll = controller.next_poll().ticks();
-            let next = self.next_step(controller);
+            let next = self.next_step(controller.idle_until());
             self.advance(next);
         }
     }
@@ -433,8 +435,8 @@ impl<'a> SimulatedHardware<'a> {
 
     /// Time of the next step of the simulated hardware: the next deadline of the loop; while it listens, the next interrupt or
     /// [`LISTEN_STEP`].
-    fn next_step(&mut self, controller: &mut impl Controller) -> u64 {
-        let at = match controller.idle_until() {
+    fn next_step(&mut self, idle_until: Option<Instant>) -> u64 {
+        let at = match idle_until {
             Some(idle_until) => idle_until.ticks(),
             None if self.sonars.iter().any(|sonar| sonar.is_raised) => self.now + TRIGGER,
             None => {
