@@ -82,7 +82,7 @@ fn header(file: &mut Vec<u8>, entry: u32) {
     file.extend([NO_PIN, 0, 0, 0]);
     file.extend(CHIP.to_le_bytes());
     file.push(0);
-    REVISIONS.iter().for_each(|revision| file.extend(revision.to_le_bytes()));
+    file.extend(REVISIONS.iter().flat_map(|revision| revision.to_le_bytes()));
     // Four reserved bytes; the hash of all before it ends the file.
     file.extend([0, 0, 0, 0, 1]);
 }

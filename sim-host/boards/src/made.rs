@@ -49,6 +49,6 @@ pub fn elf(entry: u32, segments: &[Segment]) -> Vec<u8> {
         }
         offset += length;
     }
-    segments.iter().for_each(|it| file.extend(it.bytes));
+    file.extend(segments.iter().flat_map(|it| it.bytes));
     file
 }

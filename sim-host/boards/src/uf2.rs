@@ -11,6 +11,8 @@ use crate::image::{ERASED, Image};
 pub const BLOCK: usize = 512;
 /// Bytes of contents of a block.
 pub const PAGE: usize = 256;
+/// The same as a field of the format.
+const PAGE_BYTES: u32 = 256;
 /// Bytes that the flash erases at once.
 const SECTOR: u32 = 4096;
 
@@ -42,7 +44,7 @@ pub fn write(image: &Image, family: u32) -> anyhow::Result<Vec<u8>> {
                     (sector..=sector + (SECTOR - 1)).step_by(PAGE).map(|at| (at, [ERASED; PAGE])),
                 );
             }
-            let page = pages.get_mut(&(address - address % PAGE as u32));
+            let page = pages.get_mut(&(address - address % PAGE_BYTES));
             *page.and_then(|page| page.get_mut(address as usize % PAGE)).context("no page")? = byte;
         }
     }
@@ -51,7 +53,7 @@ pub fn write(image: &Image, family: u32) -> anyhow::Result<Vec<u8>> {
     let mut file = Vec::with_capacity(pages.len() * BLOCK);
     for (number, (address, page)) in (0..).zip(&pages) {
         let [first, second] = MAGIC;
-        for word in [first, second, HAS_FAMILY, *address, PAGE as u32, number, count, family] {
+        for word in [first, second, HAS_FAMILY, *address, PAGE_BYTES, number, count, family] {
             file.extend(u32::to_le_bytes(word));
         }
         file.extend(page);
@@ -115,7 +117,9 @@ mod tests {
 
     fn image(parts: &[(u32, Vec<u8>)]) -> Image {
         let mut image = Image::default();
-        parts.iter().for_each(|(address, bytes)| image.add("a part", *address, bytes).unwrap());
+        for (address, bytes) in parts {
+            image.add("a part", *address, bytes).unwrap();
+        }
         image
     }
 

@@ -3,7 +3,7 @@
 use clap::Command;
 
 /// A subcommand, and examples of it.
-pub const EXAMPLES: [(&str, &[&str]); 32] = [
+pub const EXAMPLES: [(&str, &[&str]); 33] = [
     ("init", &["sonarfix init robot --board pico"]),
     ("check", &["sonarfix check scenario.toml", "sonarfix check robot.toml map.toml --json"]),
     (

@@ -53,17 +53,15 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     }
     let parts = parts(args, &board)?;
     let program = program(args, &board)?;
-    match &board.uf2 {
-        Some(usb) => over_usb(args, &board, usb, &program, &parts),
-        None => {
-            ensure!(
-                args.to.is_none() && args.out.is_none(),
-                "the {} takes no UF2: leave out --to and --out",
-                board.title
-            );
-            tool::flash(args, &board, &program, &parts)
-        }
+    if let Some(usb) = &board.uf2 {
+        return over_usb(args, &board, usb, &program, &parts);
     }
+    ensure!(
+        args.to.is_none() && args.out.is_none(),
+        "the {} takes no UF2: leave out --to and --out",
+        board.title
+    );
+    tool::flash(args, &board, &program, &parts)
 }
 
 /// The baked configuration and map of the robot; prints what a robot reports of them.

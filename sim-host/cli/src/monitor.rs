@@ -195,7 +195,7 @@ struct Screen {
 
 enum Output {
     Terminal {
-        terminal: DefaultTerminal,
+        terminal: Box<DefaultTerminal>,
         history: History,
         drawn: Option<Instant>,
         keys: Teleoperation,
@@ -213,7 +213,7 @@ impl Screen {
         let terminal = if stdout().is_terminal() { ratatui::try_init().ok() } else { None };
         let output = match terminal {
             Some(terminal) => Output::Terminal {
-                terminal,
+                terminal: Box::new(terminal),
                 history: History::default(),
                 drawn: None,
                 keys: Teleoperation::default(),

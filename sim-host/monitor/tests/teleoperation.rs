@@ -1,5 +1,4 @@
 //! Driving by keys.
-#![expect(clippy::unwrap_used, reason = "a test should stop")]
 
 use std::time::{Duration, Instant};
 

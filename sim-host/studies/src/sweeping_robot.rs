@@ -113,7 +113,7 @@ mod tests {
     fn a_sweep_has_the_period_of_the_trials() -> Result<(), Box<dyn core::error::Error>> {
         for seed in 0..2 {
             let scenario = FloorPlan::new(seed).scenario()?;
-            let robot = scenario.robot.clone();
+            let robot = scenario.robot;
             let pings = drive(scenario, robot, seed)?.0.recording.pings;
             let end = pings.last().map_or(0.0, |ping| ping.time);
             let period = end / pings.len() as f64;

@@ -72,7 +72,7 @@ impl Client {
                 received.extend_from_slice(bytes);
                 Ok(ControlFlow::Break(()))
             };
-            self.port.read(read).unwrap().expect("the robot has closed its port");
+            self.port.read(read).unwrap().unwrap();
             for byte in received {
                 let Some(message) = self.monitor.push(byte) else { continue };
                 if let Telemetry::Ack(ack) = &message.telemetry {

@@ -169,7 +169,7 @@ proptest! {
             }
             let nothing = f64::from(echoes.nothing(u16::try_from(pings).unwrap(), sum.echoes));
             evidence = f64::from(past)
-                + (1.0 - pings as f64 / (2.0 * 32.0)) * (f64::from(sum.score) - nothing);
+                + (1.0 - f64::from(u16::try_from(pings).unwrap()) / (2.0 * 32.0)) * (f64::from(sum.score) - nothing);
             let entry = Entry {
                 placement: at,
                 score: sum.score,
