@@ -91,7 +91,7 @@
 /*
  64-bit words of a robot.
  */
-#define SONARFIX_ROBOT_WORDS 1385
+#define SONARFIX_ROBOT_WORDS 1388
 #endif
 
 #if !defined(SONARFIX_64_BIT)

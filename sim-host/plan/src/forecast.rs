@@ -121,7 +121,8 @@ impl Forecast {
         runs: u32,
         progress: &impl Progress,
     ) -> Result<Option<Self>, SimulationError> {
-        let simulation = Simulation::new(as_told(scenario)).undistorted();
+        // The drive has no noise, so that its bound is that of the noise which the filter assumes.
+        let simulation = Simulation::new(as_told(scenario)).undistorted().bound_of_filter();
         let runs = (0..u64::from(runs)).into_par_iter().map(|seed| {
             if progress.is_interrupted() {
                 return Ok(None);
