@@ -292,7 +292,9 @@ mod tests {
         let pieces = |trace: &Trace| {
             let html = html(trace);
             let figure = html.split("<svg").nth(1).unwrap().split("</svg>").next().unwrap();
-            figure.matches("<polyline").count()
+            let is_estimate =
+                |line: &&str| line.starts_with("<polyline") && line.contains("#0072B2");
+            figure.lines().filter(is_estimate).count()
         };
         let straight = pieces(&trace(100));
         let mut jumping = trace(100);

@@ -266,15 +266,21 @@ fn another_unique_answer_becomes_the_provisional_pose() {
 }
 
 #[test]
-fn a_pose_is_confirmed_by_two_metres_and_twenty_ranges() {
+fn a_pose_is_confirmed_by_two_metres_twenty_ranges_and_the_search() {
     let walls = walls();
-    for (accepted, driven, mode) in [
-        (20, 2.0, Mode::Tracking),
-        (19, 5.0, Mode::Provisional),
-        (90, 1.99, Mode::Provisional),
-        (21, 2.1, Mode::Tracking),
+    for (accepted, driven, is_unique, mode) in [
+        (20, 2.0, true, Mode::Tracking),
+        (19, 5.0, true, Mode::Provisional),
+        (90, 1.99, true, Mode::Provisional),
+        (90, 5.0, false, Mode::Provisional),
+        (21, 2.1, true, Mode::Tracking),
     ] {
         let mut robot = Robot::in_mode(&walls, Mode::Provisional);
+        if is_unique {
+            robot.search.find_unique(here(), (0.01, 0.01));
+        } else {
+            robot.search.find(here(), (0.01, 0.01), 1.0);
+        }
         (robot.navigator.accepted, robot.navigator.driven) = (accepted, Metres(driven));
         let changed = (mode == Mode::Tracking).then_some(mode);
         assert_eq!((robot.update(), robot.navigator.mode()), (changed, mode));
@@ -414,6 +420,7 @@ fn work_ends_when_the_pose_is_tracked() {
     let walls = walls();
     let mut robot = Robot::in_mode(&walls, Mode::Provisional);
     (robot.navigator.accepted, robot.navigator.driven) = (20, Metres(2.0));
+    robot.search.find_unique(here(), (0.01, 0.01));
     assert_eq!(robot.navigator.work(5, &mut robot.search), Some(Mode::Tracking));
     assert_eq!(robot.navigator.work(5, &mut robot.search), None);
     robot.navigator.search(&mut robot.search);
