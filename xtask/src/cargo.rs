@@ -47,6 +47,14 @@ pub fn root() -> &'static Path {
     xtask.parent().unwrap_or(xtask)
 }
 
+/// Makes a build from the sources in `root` the same in every folder: neither that of the sources nor that of cargo is in it.
+pub fn reproducible(build: &mut Command, root: &Path) -> anyhow::Result<()> {
+    let remap = |from: &Path, to| format!("--remap-path-prefix={}={to}", from.display());
+    let flags = [remap(root, "/sonarfix"), remap(&home()?, "/cargo")].join("\u{1f}");
+    build.env("CARGO_ENCODED_RUSTFLAGS", flags);
+    Ok(())
+}
+
 /// Where cargo keeps the sources of dependencies.
 pub fn home() -> anyhow::Result<PathBuf> {
     let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);

@@ -47,14 +47,6 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     if args.program { Ok(()) } else { packages(args) }
 }
 
-/// Makes a build from the sources in `root` the same in every folder: neither that of the sources nor that of cargo is in it.
-fn reproducible(build: &mut Command, root: &Path) -> anyhow::Result<()> {
-    let remap = |from: &Path, to| format!("--remap-path-prefix={}={to}", from.display());
-    let flags = [remap(root, "/sonarfix"), remap(&cargo::home()?, "/cargo")].join("\u{1f}");
-    build.env("CARGO_ENCODED_RUSTFLAGS", flags);
-    Ok(())
-}
-
 /// The sums of the files, as `sha256sum --check` reads them.
 fn checksums(out: &Path, files: &[PathBuf]) -> anyhow::Result<()> {
     let mut sums = Command::new("sha256sum");

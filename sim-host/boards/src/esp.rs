@@ -1,7 +1,7 @@
 //! The application image that the bootloader of an ESP32-C6 starts, as Espressif's documentation of `esptool` describes it
 //! (<https://docs.espressif.com/projects/esptool/en/latest/esp32c6/advanced-topics/firmware-image-format.html>).
 //!
-//! The bootloader maps what lies in [`MAPPED`] from flash in pages, so that such a segment lies in the file at the same offset
+//! The bootloader maps what lies in `MAPPED` from flash in pages, so that such a segment lies in the file at the same offset
 //! within a page as in memory; the rest is copied to RAM.
 
 use std::ops::Range;

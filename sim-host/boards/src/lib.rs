@@ -56,6 +56,14 @@ pub struct Board {
     pub second: Option<Second>,
 }
 
+impl Board {
+    /// The address at which its flash starts: a multiple of 16 MiB, below the configuration.
+    #[must_use]
+    pub fn start_of_flash(&self) -> u32 {
+        self.config.address & 0xFF00_0000
+    }
+}
+
 /// What a board takes on its USB drive.
 #[derive(Debug, Clone, Deserialize)]
 pub struct Uf2 {

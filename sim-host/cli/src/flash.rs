@@ -61,7 +61,10 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         "the {} takes no UF2: leave out --to and --out",
         board.title
     );
-    tool::flash(args, &board, &program, &parts)
+    let images = parts.each_ref().map(|part| (part.region.address, part.bytes.as_slice()));
+    tool::flash(&args.robot, args.dry_run, &board, &program, images)?;
+    print_next(args.dry_run);
+    Ok(())
 }
 
 /// The baked configuration and map of the robot; prints what a robot reports of them.
@@ -152,11 +155,11 @@ fn over_usb(
     let (first, _) = image.parts().next().context("the program is empty")?;
     let end = image.parts().map(|(address, bytes)| address as usize + bytes.len()).max();
     ensure!(
-        first >= start_of_flash(board)
+        first >= board.start_of_flash()
             && end.is_some_and(|end| end <= board.config.address as usize),
         "{name} is no program for the {}: it does not lie between {:#010x} and {:#010x}",
         board.title,
-        start_of_flash(board),
+        board.start_of_flash(),
         board.config.address
     );
     println!("{name}: the program, {} bytes at {first:#010x}", image.flat().len());
@@ -187,11 +190,6 @@ fn over_usb(
     wrote(&to);
     print_next(args.dry_run);
     Ok(())
-}
-
-/// The address at which the flash of a board starts: a multiple of 16 MiB, below the configuration.
-fn start_of_flash(board: &Board) -> u32 {
-    board.config.address & 0xFF00_0000
 }
 
 fn print_next(is_dry: bool) {

@@ -7,7 +7,6 @@ use anyhow::{Context, ensure};
 use sonarfix_boards::image::Image;
 use sonarfix_boards::{Board, Uf2, esp, uf2};
 
-use super::reproducible;
 use crate::cargo;
 use crate::workspace::Workspace;
 
@@ -52,7 +51,7 @@ fn build(board: &Board, root: &Path) -> anyhow::Result<PathBuf> {
     let build = format!("build --locked --package {package} --profile dist --target {target}");
     let mut command = Workspace::Firmware.cargo(&build);
     command.current_dir(root.join("firmware"));
-    reproducible(&mut command, root)?;
+    cargo::reproducible(&mut command, root)?;
     cargo::check(command)?;
     Ok(Workspace::Firmware.target_folder().join(target).join("dist").join(package))
 }

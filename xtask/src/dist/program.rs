@@ -8,7 +8,6 @@ use anyhow::{Context, ensure};
 
 use sonarfix_boards::uf2;
 
-use super::reproducible;
 use crate::cargo;
 use crate::workspace::Workspace;
 
@@ -82,7 +81,7 @@ fn build(target: &str, root: &Path) -> anyhow::Result<PathBuf> {
         "build --locked --package sonarfix-cli --profile dist --target {target}"
     ));
     command.current_dir(root).env("CARGO_TARGET_DIR", &folder);
-    reproducible(&mut command, root)?;
+    cargo::reproducible(&mut command, root)?;
     // The linker of Rust, which knows every processor.
     let linker = format!("CARGO_TARGET_{}_LINKER", target.replace('-', "_").to_uppercase());
     command.env(linker, "rust-lld");

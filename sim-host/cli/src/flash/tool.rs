@@ -7,20 +7,25 @@ use anyhow::{Context, ensure};
 use sonarfix_boards::Board;
 use sonarfix_boards::image::Image;
 
-use super::{Args, Part, print_next, start_of_flash};
-
-/// Writes program, configuration and map by the tool of the board: prints its commands, and runs them if it is installed.
-pub fn flash(args: &Args, board: &Board, program: &Path, parts: &[Part]) -> anyhow::Result<()> {
+/// Writes program, configuration and map by the tool of the board: prints its commands, and runs them if it is installed and this is
+/// no dry run. The addresses and contents of configuration and map go through files in the folder of the robot.
+pub fn flash(
+    robot: &Path,
+    is_dry: bool,
+    board: &Board,
+    program: &Path,
+    parts: [(u32, &[u8]); 2],
+) -> anyhow::Result<()> {
     check(board, program)?;
-    let files = ["config.bin", "map.bin"].map(|name| args.robot.join(name));
-    for (file, part) in files.iter().zip(parts) {
-        if !args.dry_run {
-            sonarfix_files::write(file, &part.bytes)?;
+    let files = ["config.bin", "map.bin"].map(|name| robot.join(name));
+    for (file, (_, bytes)) in files.iter().zip(parts) {
+        if !is_dry {
+            sonarfix_files::write(file, bytes)?;
         }
-        let does = if args.dry_run { "would write" } else { "wrote" };
+        let does = if is_dry { "would write" } else { "wrote" };
         println!("{does} {}", file.display());
     }
-    let images = files.iter().zip(parts).map(|(file, part)| (part.region.address, file.as_path()));
+    let images = files.iter().zip(parts).map(|(file, (address, _))| (address, file.as_path()));
     let images: Vec<_> = images.collect();
     let commands = if is_esp(board) {
         espflash(program, &images)
@@ -31,11 +36,11 @@ pub fn flash(args: &Args, board: &Board, program: &Path, parts: &[Part]) -> anyh
     let is_there = Command::new(tool).arg("--version").output().is_ok();
     for command in &commands {
         println!("{}", shown(command));
-        if is_there && !args.dry_run {
+        if is_there && !is_dry {
             run(command)?;
         }
     }
-    if args.dry_run {
+    if is_dry {
         return Ok(());
     }
     ensure!(
@@ -43,7 +48,6 @@ pub fn flash(args: &Args, board: &Board, program: &Path, parts: &[Part]) -> anyh
         "{tool} is not installed: run these commands where it is, or install it by `cargo install {} --locked`",
         if tool == "probe-rs" { "probe-rs-tools" } else { tool.as_str() }
     );
-    print_next(args.dry_run);
     Ok(())
 }
 
@@ -59,7 +63,7 @@ fn check(board: &Board, program: &Path) -> anyhow::Result<()> {
         format!("{name}: the {} takes an ELF, as firmware/{}.elf", board.title, board.package)
     })?;
     // The addresses of an ESP32-C6 are those at which the flash is mapped, not those in flash.
-    let start = start_of_flash(board);
+    let start = board.start_of_flash();
     let is_in = image.parts().all(|(address, _)| address & 0xFF00_0000 == start);
     ensure!(
         is_esp(board) || is_in,
