@@ -13,6 +13,7 @@ pub const BLOCK: usize = 512;
 pub const PAGE: usize = 256;
 /// The same as a field of the format.
 const PAGE_BYTES: u32 = 256;
+const _: () = assert!(PAGE == PAGE_BYTES as usize);
 /// Bytes that the flash erases at once.
 const SECTOR: u32 = 4096;
 

@@ -23,7 +23,7 @@ use crate::trace::Recorder;
 
 pub use error::SimulationError;
 pub use pins::hardware::Hardware;
-pub use simulation::{MANY, Simulation};
+pub use simulation::{MANY, Simulation, start_at};
 
 impl Simulation {
     /// Runs once.

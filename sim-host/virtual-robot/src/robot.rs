@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use anyhow::{anyhow, bail, ensure};
-use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
+use sonarfix::geometry::units::{Duration, Instant};
 use sonarfix::localizer::{Mode, Start};
 use sonarfix_app::store::Store;
 use sonarfix_app::{App, Board, FlashContents, Link};
@@ -15,7 +15,7 @@ use sonarfix_pil::board::{self, WiredDevices};
 use sonarfix_pil::{RamFlash, Wires};
 use sonarfix_sim::pins::wires::EncoderWires;
 use sonarfix_sim::plant::follower;
-use sonarfix_sim::simulate::{Hardware, Simulation};
+use sonarfix_sim::simulate::{Hardware, Simulation, start_at};
 use sonarfix_sim::trace::Pose;
 
 /// The longest time between two polls while the motors are enabled, as on the boards.
@@ -60,16 +60,9 @@ impl Parts {
     /// The true pose at the start, with the deviations of the scenario; `None` for a robot that is to search for it.
     #[must_use]
     pub fn start(&self) -> Option<Start> {
-        let Scenario { path, start, .. } = &self.simulation.scenario;
-        let pose = path.pose_at(0.0);
-        #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
-        let [x, y, heading, position, doubt] =
-            [pose.x, pose.y, pose.heading, start.position, start.heading].map(|v| v as f32);
-        (!start.is_unknown).then(|| Start {
-            pose: sonarfix::geometry::pose::Pose::new(x, y, Radians(heading)),
-            position_deviation: Metres(position),
-            heading_deviation: Radians(doubt),
-        })
+        let scenario = &self.simulation.scenario;
+        let pose = scenario.path.pose_at(0.0);
+        (!scenario.start.is_unknown).then(|| start_at(scenario, [pose.x, pose.y, pose.heading]))
     }
 }
 

@@ -1,6 +1,6 @@
 //! What a cycle has found.
 
-use sonarfix::geometry::numeric::at_least;
+use sonarfix::geometry::numeric::{at_least, at_most};
 use sonarfix::geometry::units::Metres;
 use sonarfix::geometry::vector::Vector;
 use sonarfix::map::WallId;
@@ -94,13 +94,13 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
     pub(super) fn lead(&self, best: &Entry) -> f32 {
         let second = self.bank.entries().get(1).map_or(0.0, |entry| entry.evidence);
         let mean = best.score / at_least_one(best.pings);
-        let trust = at_most_one(at_least((mean - UNTRUSTED) / (TRUSTED - UNTRUSTED), 0.0));
+        let trust = at_most(at_least((mean - UNTRUSTED) / (TRUSTED - UNTRUSTED), 0.0), 1.0);
         trust * (best.evidence - at_least(second, 0.0))
     }
 
     /// Counts what so many new pings have moved through the window as past.
     fn age(&mut self, fresh: u16) {
-        let share = at_most_one(f32::from(fresh) / count(PINGS));
+        let share = at_most(f32::from(fresh) / count(PINGS), 1.0);
         // One that was proposed in this cycle has no score.
         let scored = self.bank.entries_mut().iter_mut().filter(|it| it.state == State::Fresh);
         for entry in scored {
@@ -133,9 +133,4 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
         }
         nearest.map(|(_, id)| Decision::Along(id, libm::sqrtf(most)))
     }
-}
-
-/// A share, but not above 1.
-fn at_most_one(share: f32) -> f32 {
-    if share < 1.0 { share } else { 1.0 }
 }

@@ -394,12 +394,19 @@ fn estimated_start(scenario: &Scenario, truth: &Vector, rng: &mut ChaCha8Rng) ->
         truth[1] + draw(start.position),
         truth[2] + draw(start.heading),
     ];
+    start_at(scenario, pose)
+}
+
+/// A start at a pose, metres and radians, with the deviations of the scenario.
+#[must_use]
+pub fn start_at(scenario: &Scenario, pose: [f64; 3]) -> Start {
+    let deviations = &scenario.start;
     #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
-    let [x, y, heading, position, doubt] =
-        [pose[0], pose[1], pose[2], start.position, start.heading].map(|v| v as f32);
+    let single = |value: f64| value as f32;
+    let [x, y, heading] = pose.map(single);
     Start {
         pose: Pose::new(x, y, Radians(heading)),
-        position_deviation: Metres(position),
-        heading_deviation: Radians(doubt),
+        position_deviation: Metres(single(deviations.position)),
+        heading_deviation: Radians(single(deviations.heading)),
     }
 }
