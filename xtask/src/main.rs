@@ -153,17 +153,8 @@ enum Task {
 
 /// The steps that run if none is named: half an hour on a fresh machine with two cores. The others run by their names or those of their
 /// jobs, as on GitHub.
-const SHORT: [&str; 9] = [
-    "format",
-    "circles",
-    "lint",
-    "docs",
-    "unsafe-code",
-    "test-host",
-    "embedded",
-    "lint-emulated",
-    "c",
-];
+const SHORT: [&str; 8] =
+    ["format", "circles", "lint", "docs", "unsafe-code", "test-host", "embedded", "lint-emulated"];
 
 /// The steps of CI. Those of the main workspace come first and those of other workspaces last: two run beside each other, one from each
 /// end ([`ci::run`]), and cargo locks the target folder of a workspace.
