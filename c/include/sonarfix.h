@@ -1056,6 +1056,10 @@ typedef struct {
    */
   float echo_rim_rad;
   /*
+   Range up to which hardly any echo is missed or spurious, metres; zero: echo_missed, echo_short and echo_long hold at every range.
+   */
+  float echo_sure_within_m;
+  /*
    Metres of position error that an error of one radian of heading is worth to the policy.
    */
   float weight_heading_m;

@@ -90,6 +90,7 @@ fn config(bytes: &mut Bytes) -> Config {
     echo.late_per_radian = Metres(bytes.between(0.0, 0.1));
     echo.half_angle = Radians(bytes.between(0.0, 1.5));
     echo.rim = Radians(bytes.between(0.0, 0.2));
+    echo.sure_within = Metres(bytes.between(0.0, 2.0));
     config.policy = policy(bytes);
     config.weights.heading = Metres(bytes.between(0.0, 1.0));
     config.weights.wheels = Metres(bytes.between(0.0, 10.0));

@@ -102,6 +102,8 @@ pub struct sonarfix_config_t {
     pub echo_half_angle_rad: f32,
     /// Standard deviation of that angle from ping to ping, radians.
     pub echo_rim_rad: f32,
+    /// Range up to which hardly any echo is missed or spurious, metres; zero: echo_missed, echo_short and echo_long hold at every range.
+    pub echo_sure_within_m: f32,
 
     /// Metres of position error that an error of one radian of heading is worth to the policy.
     pub weight_heading_m: f32,
@@ -151,6 +153,7 @@ impl From<&Config> for sonarfix_config_t {
             echo_late_m_per_rad: echo.late_per_radian.0,
             echo_half_angle_rad: echo.half_angle.0,
             echo_rim_rad: echo.rim.0,
+            echo_sure_within_m: echo.sure_within.0,
             weight_heading_m: weights.heading.0,
             weight_wheels_m: weights.wheels.0,
             policy: number_of(config.policy),
@@ -222,6 +225,7 @@ impl sonarfix_config_t {
         echo.late_per_radian.0 = self.echo_late_m_per_rad;
         echo.half_angle.0 = self.echo_half_angle_rad;
         echo.rim.0 = self.echo_rim_rad;
+        echo.sure_within.0 = self.echo_sure_within_m;
     }
 
     fn set_echo_model(&mut self, echo: &sonarfix::config::EchoParameters) {
@@ -232,6 +236,7 @@ impl sonarfix_config_t {
         self.echo_late_m_per_rad = echo.late_per_radian.0;
         self.echo_half_angle_rad = echo.half_angle.0;
         self.echo_rim_rad = echo.rim.0;
+        self.echo_sure_within_m = echo.sure_within.0;
     }
 
     fn ranger_mut(&mut self, ranger: u32) -> Result<&mut sonarfix_ranger_config_t> {

@@ -2,14 +2,15 @@
 //! well: [`EchoParameters::HC_SR04`], its default, [`EchoParameters::VL53L1X`], [`LightBeam::VL53L1X`], [`ServoTiming::SG90`] and the MPU-6050.
 
 use sonarfix::config::{LightBeam, ServoTiming};
-use sonarfix::geometry::units::{Duration, Radians};
+use sonarfix::geometry::units::{Duration, Metres, Radians};
 use sonarfix::sensor::echo::EchoParameters;
 
-/// LEGO NXT: shares of its recorded sweeps within 20° of the normal (`docs/sonar-model.md`), averaged over the ranges. It hears
-/// walls up to 38° off the normal at 0.3 m, and up to 30° at 0.8 m. It reports 14 mm more at
+/// LEGO NXT: shares of its recorded sweeps within 20° of the normal (`docs/sonar-model.md`) from 1.1 m on, up to which hardly any
+/// echo is missed. It hears walls up to 38° off the normal at 0.3 m, and up to 30° at 0.8 m. It reports 14 mm more at
 /// 22° off the normal in the sweeps, and less at the smaller angles of a drive.
 pub const NXT_ECHO: EchoParameters = {
-    let mut nxt = echo(0.08, 0.04, 0.03);
+    let mut nxt = echo(0.24, 0.09, 0.10);
+    nxt.sure_within = Metres(1.1);
     (nxt.late.0, nxt.late_per_radian.0) = (0.0, 0.020);
     (nxt.half_angle, nxt.rim) = (Radians(0.56), Radians(0.03));
     nxt

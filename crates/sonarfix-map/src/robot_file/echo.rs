@@ -30,6 +30,9 @@ pub(crate) static ECHO: Section<RobotConfig> = Section { name: "echo", usual, ke
         0: the `cone` is taken")),
     optional(number("rim", &ANGLE, ("0 deg", "90 deg"), |c| &mut c.localizer.echo.rim.0,
         "standard deviation of that angle from ping to ping")),
+    optional(number("sure_within", &LENGTH, ("0 m", "10 m"), |c| &mut c.localizer.echo.sure_within.0,
+        "range up to which hardly any echo is missed or spurious: 4 % of `missed`, `short` and `long`, which are those of longer ranges. 0: they are the \
+        same at every range")),
 ] };
 
 /// Reads `sensor` of `[echo]`: the usual parameters of its echoes.

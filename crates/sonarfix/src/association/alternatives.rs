@@ -84,9 +84,9 @@ impl Scene<'_, '_> {
         let mut sum = Sum::new(target);
         for reflector in found.iter().filter(|reflector| !is_target(reflector)) {
             let Some(heard) = reflectors.heard(&beam, reflector) else { continue };
-            let visible =
-                1.0 - self.history.clutter.prior_occlusion(echo, Metres(reflector.distance));
-            let answers = visible * heard.probability(echo.heard());
+            let at = Metres(reflector.distance);
+            let visible = 1.0 - self.history.clutter.prior_occlusion(echo, at);
+            let answers = visible * heard.probability(echo.heard(at));
             let travelled = self.history.travelled_since(reflector.wall);
             let noise = echo.map_variance(reflector.accuracy, travelled);
             let point = (reflector.toward, reflector.distance);
@@ -247,7 +247,7 @@ mod tests {
                 let Some(heard) = reflectors.heard(&beam, it) else { continue };
                 let h = wide(it.distance);
                 let free = wide(config.echo.free_path.0);
-                let a = wide(heard.probability(config.echo.heard())) * (1.0 - h / (h + free));
+                let a = wide(heard.probability(config.echo.heard(Metres(it.distance)))) * (1.0 - h / (h + free));
                 let (x, y) = (wide(it.toward.x), wide(it.toward.y));
                 let p = (0.08 * x).powi(2) + (0.05 * y).powi(2);
                 let ratio = 2.0 / wide(travelled);

@@ -163,11 +163,12 @@ impl ExpectedEcho {
 
     /// Probability that the target answers.
     pub fn answers(&self, parameters: &EchoParameters) -> f32 {
-        (1.0 - self.occluded) * self.geometry * parameters.heard()
+        (1.0 - self.occluded) * self.geometry * parameters.heard(self.range)
     }
 
     fn of_echo(&self, parameters: &EchoParameters, innovation: f32) -> Densities {
-        let EchoParameters { short, long, .. } = *parameters;
+        let share = parameters.share_at(self.range);
+        let (short, long) = (share * parameters.short, share * parameters.long);
         let (g, s) = (self.geometry, self.variance.0);
         let density = density(Innovation { value: Metres(innovation), variance: SquareMetres(s) });
         let (nearest, farthest) = (self.limits.0.0, self.limits.1.0);
@@ -187,7 +188,7 @@ impl ExpectedEcho {
             (1.0 - same) * by_object + same * again
         });
         Densities {
-            wall: g * parameters.heard() * density,
+            wall: g * parameters.heard(self.range) * density,
             clutter: g * spurious + (1.0 - g) * (1.0 - NO_ECHO_OFF_WALL) * everywhere,
             occluded: repeated,
             unrepeated: if innovation < 0.0 { repeated } else { by_object },
@@ -204,7 +205,8 @@ impl ExpectedEcho {
         let g = self.geometry;
         Densities {
             wall: 0.0,
-            clutter: g * parameters.missed + (1.0 - g) * NO_ECHO_OFF_WALL,
+            clutter: g * parameters.share_at(self.range) * parameters.missed
+                + (1.0 - g) * NO_ECHO_OFF_WALL,
             occluded: NO_ECHO_OCCLUDED,
             unrepeated: NO_ECHO_OCCLUDED,
             wrong_pose: (1.0 - self.occluded) * NO_ECHO_WRONG_POSE
@@ -278,9 +280,10 @@ mod tests {
     prop_compose! {
         fn any_parameters()(
             missed in 0.0_f32..0.3, short in 0.0_f32..0.3, long in 0.0_f32..0.3, path in 0.5_f32..20.0,
+            sure in 0.0_f32..4.0,
         ) -> EchoParameters {
-            let map_accuracy = Metres(0.01);
-            EchoParameters { missed, short, long, free_path: Metres(path), map_accuracy, ..EchoParameters::NONE }
+            let (free_path, map_accuracy, sure_within) = (Metres(path), Metres(0.01), Metres(sure));
+            EchoParameters { missed, short, long, free_path, map_accuracy, sure_within, ..EchoParameters::NONE }
         }
     }
 
@@ -297,7 +300,8 @@ mod tests {
     /// Eq. (15) in `f64`: the shares of wall, clutter and occluding object, and the wrong pose.
     fn densities(e: &ExpectedEcho, p: &EchoParameters, echo: Option<Metres>) -> [f64; 4] {
         let (g, o) = (f64::from(e.geometry), f64::from(e.occluded));
-        let [missed, short, long] = [p.missed, p.short, p.long].map(f64::from);
+        let share = if e.range < p.sure_within { 0.04 } else { 1.0 };
+        let [missed, short, long] = [p.missed, p.short, p.long].map(|it| share * f64::from(it));
         let (h, s) = (f64::from(e.range.0), f64::from(e.variance.0));
         let Some(z) = echo else {
             return [0.0, (1.0 - o) * (g * missed + (1.0 - g) * 0.4), o * 0.2, 0.3];
@@ -460,7 +464,7 @@ mod tests {
     proptest! {
         /// The logarithms of the score, by the definitions of their fields.
         #[test]
-        fn log_shares_are_those_of_the_mixture_at_half_the_longest_range(
+        fn log_shares_are_those_of_the_mixture_over_the_ranges(
             parameters in any_parameters(), longest in 1.0_f32..6.0, anywhere in 0.05_f32..0.5,
         ) {
             let shares = parameters.log_shares(Metres(longest), anywhere);
@@ -468,8 +472,9 @@ mod tests {
             let range = 0.5 * wide(longest);
             let occluded = range / (range + wide(parameters.free_path.0));
             let per_metre = 1.0 / (range * wide(anywhere));
-            let (missed, short, long) =
-                (wide(parameters.missed), wide(parameters.short), wide(parameters.long));
+            let sure = (wide(parameters.sure_within.0) / wide(longest)).min(1.0);
+            let [missed, short, long] = [parameters.missed, parameters.short, parameters.long]
+                .map(|it| (0.04 * sure + 1.0 - sure) * wide(it));
             let expected = [
                 (shares.answers, 1.0 - missed - short - long),
                 (shares.misses, missed + short + long),

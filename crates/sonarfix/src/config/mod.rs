@@ -346,6 +346,7 @@ impl Config {
                 "echo.late",
                 "echo.late_per_radian",
                 "echo.rim",
+                "echo.sure_within",
             ],
             &[
                 echo.missed,
@@ -356,6 +357,7 @@ impl Config {
                 echo.late.0,
                 echo.late_per_radian.0,
                 echo.rim.0,
+                echo.sure_within.0,
             ],
         )?;
         let some_are_right = echo.missed + echo.short + echo.long < 1.0;

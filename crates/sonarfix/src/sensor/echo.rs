@@ -5,7 +5,7 @@
 //! The parameters are checked by [`Config::check`](crate::config::Config::check).
 
 use crate::geometry::elementary::{ln, sqrt};
-use crate::geometry::numeric::at_least;
+use crate::geometry::numeric::{at_least, at_most};
 use crate::geometry::units::{Metres, Radians};
 
 /// Parameters of clutter: of the sensor, of the unmapped objects around it, and of the map.
@@ -36,6 +36,9 @@ pub struct EchoParameters {
     pub half_angle: Radians,
     /// Standard deviation of that angle from ping to ping: the width of a soft rim.
     pub rim: Radians,
+    /// Range up to which hardly any echo is missed or spurious: `missed`, `short` and `long` are those of longer ranges. Zero:
+    /// they are the same at every range.
+    pub sure_within: Metres,
 }
 
 impl EchoParameters {
@@ -50,6 +53,7 @@ impl EchoParameters {
         late_per_radian: Metres(0.0),
         half_angle: Radians(0.0),
         rim: Radians(0.0),
+        sure_within: Metres(0.0),
     };
 
     /// An HC-SR04 in a furnished room: assumed, no recordings. It misses a cycle, half a wavelength of 4.3 mm, of one echo in
@@ -64,6 +68,7 @@ impl EchoParameters {
         late_per_radian: Metres(0.014_3),
         half_angle: Radians(0.0),
         rim: Radians(0.0),
+        sure_within: Metres(0.0),
     };
 
     /// VL53L1X in a furnished room, whose walls are plaster, wood and some glass: assumed, no recordings. A narrow beam meets
@@ -71,11 +76,19 @@ impl EchoParameters {
     pub const VL53L1X: Self =
         Self { missed: 0.04, short: 0.01, long: 0.01, free_path: Metres(15.0), ..Self::NONE };
 
-    /// Probability that a wall within range, square to the beam and not occluded, returns its range.
+    /// Probability that a wall at this range, square to the beam and not occluded, returns its range.
     #[must_use]
     #[inline]
-    pub fn heard(&self) -> f32 {
-        1.0 - self.missed - self.short - self.long
+    pub fn heard(&self, range: Metres) -> f32 {
+        let share = self.share_at(range);
+        1.0 - share * self.missed - share * self.short - share * self.long
+    }
+
+    /// Factor on [`missed`](Self::missed), [`short`](Self::short) and [`long`](Self::long) at this range.
+    #[must_use]
+    #[inline]
+    pub fn share_at(&self, range: Metres) -> f32 {
+        if range < self.sure_within { SHARE_WHERE_SURE } else { 1.0 }
     }
 
     // ===== Eq. (49) =====
@@ -127,7 +140,7 @@ impl EchoParameters {
 }
 
 /// Logarithms of probabilities and of densities over that of an echo anywhere, for a score of many
-/// pings. Those that depend on the range hold at half of the longest one.
+/// pings. Occlusion is that of half of the longest range, missed and spurious echoes are means over the ranges.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LogShares {
     /// A reflector answers.
@@ -149,19 +162,26 @@ impl EchoParameters {
         let range = 0.5 * longest.0;
         let occluded = self.prior_occlusion(Metres(range));
         let per_metre = 1.0 / (range * anywhere);
-        let before = self.short + occluded * (1.0 - NO_ECHO_OCCLUDED - BEYOND_OCCLUDED);
-        let behind = self.long + occluded * BEYOND_OCCLUDED;
-        let silence = self.missed + occluded * NO_ECHO_OCCLUDED;
+        let sure = at_most(self.sure_within.0 / longest.0, 1.0);
+        let share = 1.0 - sure * (1.0 - SHARE_WHERE_SURE);
+        let [missed, short, long] = [self.missed, self.short, self.long].map(|it| share * it);
+        let before = short + occluded * (1.0 - NO_ECHO_OCCLUDED - BEYOND_OCCLUDED);
+        let behind = long + occluded * BEYOND_OCCLUDED;
+        let silence = missed + occluded * NO_ECHO_OCCLUDED;
         let log = |share: f32| ln(at_least(share, LEAST_SHARE));
         LogShares {
-            answers: log(1.0 - self.missed - self.short - self.long),
-            misses: log(self.missed + self.short + self.long),
+            answers: log(1.0 - missed - short - long),
+            misses: log(missed + short + long),
             before: log(before * per_metre),
             behind: log(behind * per_metre),
             silence: log(silence / NO_ECHO_WRONG_POSE),
         }
     }
 }
+
+/// Share of the missed and spurious echoes that remains at a range at which hardly any is: that of an NXT
+/// (`docs/sonar-model.md`).
+const SHARE_WHERE_SURE: f32 = 0.04;
 
 /// Least share of which a logarithm is taken: one ping does not decide.
 const LEAST_SHARE: f32 = 0.01;

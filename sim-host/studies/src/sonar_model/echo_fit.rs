@@ -14,8 +14,8 @@ const AUDIBLE: usize = 9;
 pub struct EchoFit {
     /// For each range: the number of pings, and the shares without an echo, of shorter and of longer ranges.
     pub by_range: Vec<(u32, [f64; 3])>,
-    /// The mean of the shares over the ranges: `missed`, `short`, `long`.
-    pub mean: [f64; 3],
+    /// The shares of the longest ranges: `missed`, `short`, `long`.
+    pub far: [f64; 3],
     /// The share of perpendicular returns by row, relative to that within 15°, mean over the ranges.
     pub audible: Vec<f64>,
     /// Angle at which it is one half, degrees; infinite if it never is.
@@ -27,14 +27,10 @@ impl EchoFit {
     #[must_use]
     pub fn of(measured: &Cells) -> Self {
         let by_range: Vec<_> = (0..3).map(|column| shares(measured, column)).collect();
-        let mut mean = [0.0; 3];
-        for (sum, column) in mean.iter_mut().zip(0..) {
-            let shares = by_range.iter().filter_map(|(_, shares)| shares.get::<usize>(column));
-            *sum = shares.sum::<f64>() / 3.0;
-        }
+        let far = by_range.last().map_or([f64::NAN; 3], |(_, shares)| *shares);
         let audible: Vec<f64> = (0..AUDIBLE).map(|row| audible(measured, row)).collect();
         let half_angle = half_angle(&audible);
-        Self { by_range, mean, audible, half_angle }
+        Self { by_range, far, audible, half_angle }
     }
 }
 
@@ -99,7 +95,7 @@ mod tests {
     use super::*;
     use crate::sonar_model::cells::Beam;
 
-    /// At each range, of 20 pings within 20° one is missed, two are short and three long; at 32° half of the walls are heard.
+    /// At the longest range, of 20 pings within 20° one is missed, two are short and three long; at 32° half of the walls are heard.
     #[test]
     fn a_fit_returns_the_shares_that_it_was_given() {
         let mut cells = Cells::default();
@@ -111,6 +107,7 @@ mod tests {
             };
             for n in 0..20_u32 {
                 let reading = match n {
+                    _ if distance < 1.1 => Some(distance),
                     0 => None,
                     1 | 2 => Some(0.5 * distance),
                     3..=5 => Some(1.5 * distance),
@@ -126,12 +123,14 @@ mod tests {
             }
         }
         let fit = EchoFit::of(&cells);
-        for (found, expected) in fit.mean.into_iter().zip([0.05, 0.1, 0.15]) {
+        for (found, expected) in fit.far.into_iter().zip([0.05, 0.1, 0.15]) {
             assert!((found - expected).abs() < 1e-12, "{fit:?}");
         }
         assert_eq!(fit.by_range[1].0, 20);
-        // Within 15° 10 of 15 pings are heard; at 30–35° one half: 0.75 of it.
-        assert!((fit.audible[6] - 0.75).abs() < 1e-12 && fit.audible[7] < 1e-12, "{fit:?}");
-        assert!((fit.half_angle - (32.5 + 5.0 / 3.0)).abs() < 1e-9, "{}", fit.half_angle);
+        // Within 15° all pings are heard, at the longest range 10 of 15; at 30–35° one half: 0.75 of it.
+        let at_32 = (0.5 + 0.5 + 0.75) / 3.0;
+        assert!((fit.audible[6] - at_32).abs() < 1e-12 && fit.audible[7] < 1e-12, "{fit:?}");
+        let half = 32.5 + 5.0 * (at_32 - 0.5) / at_32;
+        assert!((fit.half_angle - half).abs() < 1e-9, "{}", fit.half_angle);
     }
 }

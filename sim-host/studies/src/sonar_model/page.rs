@@ -154,8 +154,8 @@ pub fn mean_difference(comparison: &Comparison) -> f64 {
 const ECHO: &str = "
 ## The parameters of the echo model
 The table `[echo]` of a robot file ([formats.md](formats.md#echo), [model.md](model.md#echo-model)), from the measured pings within 20° of the normal: the shares of
-pings without an echo, with a shorter and with a longer range than the wall's; a range along the axis counts as the wall's. The parameters
-are means over the three ranges with equal weights, because most pings of the sweeps are at short range. The room has no unmapped objects, so
+pings without an echo, with a shorter and with a longer range than the wall's; a range along the axis counts as the wall's. Hardly any
+echo is missed or spurious below 1.1 m (`sure_within`); the parameters are those of the longer ranges. The room has no unmapped objects, so
 `free_path` and `map_accuracy` are not from this recording. For the other sensors there is no recording; their parameters are assumed.
 
 | range | pings | missed | short | long |
@@ -173,11 +173,10 @@ fn echo_table(fit: &EchoFit) -> String {
     for (name, (pings, shares)) in names.iter().zip(&fit.by_range) {
         text.push_str(&row(name, &pings.to_string(), *shares));
     }
-    text.push_str(&row("mean", "", fit.mean));
-    let [missed, short, long] = fit.mean;
+    let [missed, short, long] = fit.far;
     let _ = write!(
         text,
-        "\n```toml\n[echo]\nsensor = \"nxt\"\nmissed = {missed:.2}\nshort = {short:.2}\nlong = {long:.2}\n```\n\n\
+        "\n```toml\n[echo]\nsensor = \"nxt\"\nmissed = {missed:.2}\nshort = {short:.2}\nlong = {long:.2}\nsure_within = \"1.1 m\"\n```\n\n\
          Audibility of a wall by the angle between beam and normal: the share of pings that return its perpendicular distance, relative to that within \
          15°, mean over the ranges. Half of it is left at {:.0}°; a `cone` of a robot file is the angle up to which a wall is measured, \
          and should be smaller.\n\n| off normal |",

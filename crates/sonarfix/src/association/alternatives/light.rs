@@ -50,12 +50,16 @@ impl Scene<'_, '_> {
             let (sonar, echo) = (self.sonar, &self.config.echo);
             let is_weak = spot.incidence > sonar.cone || at > FADES * sonar.max_range.0;
             let heard = if is_weak { Audibility::Rim } else { Audibility::Foot };
-            let visible = 1.0 - self.history.clutter.prior_occlusion(echo, Metres(at));
+            let at = Metres(at);
+            let visible = 1.0 - self.history.clutter.prior_occlusion(echo, at);
             let map_variance = echo.map_variance(wall.accuracy(), self.history.travelled_since(id));
             let noise = SquareMetres(spot.noise + map_variance * spot.of_map);
             let innovation = self.ekf.innovation(range, &spot.expected, noise);
-            let answers = visible * spot.on_wall * heard.probability(echo.heard());
-            insert(&mut found, WallInBeam { distance: at, answers, density: density(innovation) });
+            let answers = visible * spot.on_wall * heard.probability(echo.heard(at));
+            insert(
+                &mut found,
+                WallInBeam { distance: at.0, answers, density: density(innovation) },
+            );
         }
         let mut sum = Sum::new(target);
         for lit in &found {
