@@ -281,6 +281,10 @@ unsafe fn HardFault() -> ! {
 
 /// The end of the program by an interrupt that nothing handles.
 #[cortex_m_rt::exception]
+#[allow(
+    unsafe_code,
+    reason = "the vector table calls it; the macro makes a second function, which is not unsafe"
+)]
 unsafe fn DefaultHandler(_number: i16) -> ! {
     restart()
 }
