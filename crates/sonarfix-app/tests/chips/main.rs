@@ -173,7 +173,7 @@ fn a_program_that_stops_stops_the_motors() {
         assert_eq!(pico.hello().reset, cause, "{end}");
         assert!(!pico.loop_status().running);
         assert!(!pico.state().is_enabled);
-        // It drives again when it is told to.
+        // It drives again after these commands.
         done(pico.order(&Command::SetPose(start())));
         done(pico.order(&Command::Start));
         pico.run(1_000, &[]);

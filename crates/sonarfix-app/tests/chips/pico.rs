@@ -1,4 +1,4 @@
-//! A Pico on an emulated chip, and the PC at the other end of its link, in lock step: the chip executes for as long as it is told to.
+//! A Pico on an emulated chip, and the PC at the other end of its link, in lock step: each order states for how long the chip executes.
 
 use std::collections::VecDeque;
 use std::fmt::Write as _;
