@@ -205,8 +205,8 @@ fn the_slowest_flash_does_not_reset_the_chip() {
 fn a_power_cut_loses_no_record() {
     let pose = |x: f32| Start { pose: Pose::new(x, 1.3, Radians(0.0)), ..start() };
     let mut cuts = 0;
-    // The record takes about a hundred steps.
-    for step in (1..130).step_by(5) {
+    // The record takes between 91 and 96 steps.
+    for step in (1..100).step_by(4) {
         let mut pico = Pico::switched_on(ELF, &world(), &map(), &image(&configuration()));
         pico.hello();
         done(pico.order(&Command::SetPose(pose(1.0))));
