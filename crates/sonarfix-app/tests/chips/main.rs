@@ -81,13 +81,14 @@ fn without_images_it_says_so_and_does_not_start() {
     for program in [ELF, UF2] {
         let mut pico = Pico::switched_on(program, &world(), &[], &[]);
         let hello = pico.hello();
+        let said = pico.state().ms;
         assert_eq!((hello.map, hello.configuration), (ImageStatus::Missing, ImageStatus::Missing));
         assert_eq!(hello.reset, ResetCause::PowerOn);
         let refused = CommandResult::Refused(CommandError::NoMap);
         assert_eq!(pico.order(&Command::Start), Some(refused));
         assert!(!pico.loop_status().running);
         let counters = pico.counters();
-        println!("{program}: Hello after {:.0} ms, {counters:?}", pico.state().ms);
+        println!("{program}: Hello after {said:.0} ms, {counters:?}");
         assert_eq!((counters.overruns, counters.lost_bytes), (0, 0));
         // An open line would be noise.
         assert_eq!(pico.ask("pull 1"), "up", "the receiver's pin");

@@ -85,7 +85,7 @@ pub struct Pico {
     pending: VecDeque<Telemetry>,
     /// The longest wait for a message, milliseconds of the chip.
     pub patience: u32,
-    _files: TempDir,
+    files: TempDir,
 }
 
 impl Pico {
@@ -114,12 +114,12 @@ impl Pico {
             session: 0,
             pending: VecDeque::new(),
             patience: PATIENCE,
-            _files: files,
+            files,
         };
         pico.ask(&format!("image {program}"));
         for (name, bytes, at) in [("map", map, MAP_AT), ("config", config, CONFIG_AT)] {
             if !bytes.is_empty() {
-                let file = pico._files.path().join(name);
+                let file = pico.files.path().join(name);
                 std::fs::write(&file, bytes).unwrap();
                 pico.ask(&format!("image {at} {}", file.display()));
             }
