@@ -21,7 +21,7 @@ use crate::workspace::Workspace;
 pub use boards::Args as BoardsArgs;
 
 mod boards;
-mod build;
+pub mod build;
 mod lines;
 mod memory;
 mod panics;

@@ -8,10 +8,12 @@ use clap::{Parser, Subcommand};
 
 mod bags;
 mod bench;
+mod board_page;
 mod budgets;
 mod c_library;
 mod cargo;
 mod checks;
+mod chips;
 mod ci;
 mod circles;
 mod compositions;
@@ -83,6 +85,10 @@ enum Task {
     /// The firmware of all further boards: lints it, builds it, searches it for panics, prints its flash, RAM and stack, and
     /// compares them with docs/firmware.md.
     Boards(firmware::BoardsArgs),
+    /// The firmware of the Raspberry Pi Pico on an emulated RP2040, with a robot in a room.
+    Chips,
+    /// Writes docs/boards.md: what has been shown of each board; `--check` compares it.
+    BoardPage(board_page::Args),
     /// The template of a further board: instantiated, built, and refused without each of its parts.
     Template,
     /// Flash and RAM of the shipped firmware, by crate.
@@ -158,7 +164,7 @@ const SHORT: [&str; 8] =
 
 /// The steps of CI. Those of the main workspace come first and those of other workspaces last: two run beside each other, one from each
 /// end ([`ci::run`]), and cargo locks the target folder of a workspace.
-fn steps() -> [Step<Task>; 35] {
+fn steps() -> [Step<Task>; 37] {
     [
         ("lint", "format", Task::Format),
         ("lint", "circles", Task::Circles),
@@ -188,6 +194,8 @@ fn steps() -> [Step<Task>; 35] {
         ("random", "fuzz", Task::Fuzz(fuzz::Args::short())),
         ("random", "mutants", Task::Mutants(mutants::Args::short())),
         ("c", "dist", Task::Dist(dist::Args::check())),
+        ("emulated", "chips", Task::Chips),
+        ("firmware", "board-page", Task::BoardPage(board_page::Args::CHECK)),
         ("firmware", "template", Task::Template),
         ("firmware", "boards", Task::Boards(firmware::BoardsArgs::COMPARE)),
         ("firmware", "test-firmware", Task::TestFirmware),
@@ -244,6 +252,8 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Features => features::check(),
         Task::TestFirmware => firmware::test(),
         Task::Boards(args) => firmware::boards(&args),
+        Task::BoardPage(args) => board_page::run(args),
+        Task::Chips => chips::check(),
         Task::Template => template::check(),
         Task::Size => firmware::size(),
         Task::Stack(args) => firmware::stack(&args),

@@ -25,6 +25,11 @@ const CORES: [Core; 5] = [
     Core { machine: "rv32", name: "RV32IMAC", clock: 160, bar: None },
 ];
 
+/// The name of the core of this machine.
+pub fn name_of(machine: &str) -> Option<&'static str> {
+    CORES.iter().find(|core| core.machine == machine).map(|core| core.name)
+}
+
 /// Encoder period, microseconds.
 const TICK: u64 = 100_000;
 

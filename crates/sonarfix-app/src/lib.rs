@@ -8,6 +8,7 @@
 //! | this one | [`App`]: starts and stops the loop, executes commands, sends telemetry |
 //! | [`store`] | calibration, last pose and a sent configuration in flash |
 //! | [`boots`] | resets in a row, after which the store is not used |
+//! | [`watchdog`] | when a board feeds its watchdog |
 //! | [`Check`] | the check of the devices while the loop does not run |
 //! | [`FlashContents`] | map and configuration in flash |
 //!
@@ -27,6 +28,7 @@ mod flash_contents;
 pub mod log;
 pub mod store;
 mod time;
+pub mod watchdog;
 
 pub use app::{App, Board, Link, Polled};
 pub use check::Check;

@@ -559,7 +559,8 @@ fn a_robot_that_waits_sleeps_until_something_is_due() {
         "sleeps of {mean:.0} ms on average, at most {:.0} ms",
         sleeps.iter().copied().fold(0.0, f64::max)
     );
-    assert!(mean > 100.0, "sleeps of {mean} ms");
+    // The watchdog needs a pass every 50 ms.
+    assert!(mean > 35.0, "sleeps of {mean} ms");
 }
 
 /// The motor code runs in the firmware: forwards while the motors are enabled, and neither before nor after. The emulator

@@ -35,9 +35,9 @@ use esp_hal::mcpwm::{McPwm, PeripheralClockConfig};
 use esp_hal::pcnt::Pcnt;
 use esp_hal::pcnt::channel::{CtrlMode, EdgeMode};
 use esp_hal::pcnt::unit::Unit;
-use esp_hal::peripherals::{GPIO, MCPWM0};
-use esp_hal::rtc_cntl::{Rtc, RwdtStage, RwdtStageAction, SocResetReason};
-use esp_hal::system::reset_reason;
+use esp_hal::peripherals::{GPIO, LP_ANA, MCPWM0, RTC_TIMER};
+use esp_hal::rtc_cntl::{Rtc, Rwdt, RwdtStage, RwdtStageAction, SocResetReason};
+use esp_hal::system::{reset_reason, software_reset};
 use esp_hal::time::Duration;
 use esp_hal::timer::PeriodicTimer;
 use esp_hal::timer::systimer::SystemTimer;
@@ -48,12 +48,14 @@ use heapless::Deque;
 use portable_atomic::{AtomicU32, Ordering};
 use sonarfix::geometry::units::Instant;
 use sonarfix_app::store::Store;
+use sonarfix_app::watchdog::Liveness;
 use sonarfix_app::{App, FlashContents, Link, boots, log};
 use sonarfix_hal::encoder::Counter;
 use sonarfix_hal::ranger::{Captured, EchoCapture, PulseRanger, StampedEdges, Stamps};
 use sonarfix_hal::robot::Devices;
 use sonarfix_link::message::ResetCause;
 use sonarfix_motors::{Drive, Pattern};
+use sonarfix_robot::guarded::{Guard, Guarded};
 use sonarfix_robot::{NextPoll, memory};
 use static_cell::ConstStaticCell;
 
@@ -64,8 +66,11 @@ esp_bootloader_esp_idf::esp_app_desc!();
 const LONGEST_SLEEP: u64 = 5_000;
 /// The longest sleep while the stamps of an echo are to be read or bytes are to be sent, microseconds.
 const SHORT_SLEEP: u64 = 1_000;
-/// Longer than the erasure of a sector (at most 0.4 s), which delays the loop.
-const WATCHDOG: Duration = Duration::from_secs(2);
+/// The window of the watchdog: the longest time from a pass of the loop to the reset. `esp-hal` measures the watchdog's oscillator
+/// against the crystal.
+const WINDOW: Duration = Duration::from_millis(200);
+/// That of the start and of the erasure of a sector (at most 0.4 s). The motors are disabled meanwhile.
+const LONG_WINDOW: Duration = Duration::from_secs(1);
 /// Number of the pin that is high while the robot may drive.
 const DRIVE: u32 = 3;
 /// Periods of 12.5 ns: shorter pulses on an encoder line are interference.
@@ -280,19 +285,67 @@ fn reset() -> ResetCause {
     }
 }
 
-/// The end of the program by a panic; an exception of the core panics. The motors are disabled until the watchdog restarts
-/// the program.
-#[panic_handler]
+/// Disables the motors; the next poll may enable them again.
 #[expect(unsafe_code, reason = "each bit of the register is a pin")]
-fn panicked(info: &core::panic::PanicInfo) -> ! {
+fn disable_motors() {
     // SAFETY: any pattern of bits is valid; a set bit makes its pin low.
     GPIO::regs().out_w1tc().write(|w| unsafe { w.bits(1 << DRIVE) });
+}
+
+/// The watchdog of the RTC, which the loop feeds and the flash gives another window.
+#[expect(unsafe_code, reason = "the flash is part of what the loop polls")]
+fn watchdog() -> Rwdt {
+    // SAFETY: nothing else uses the timer of the RTC, and no interrupt uses the watchdog.
+    Rtc::new(unsafe { RTC_TIMER::steal() }).rwdt
+}
+
+/// Starts the watchdog's window again, with this length.
+fn feed(window: Duration) {
+    let mut watchdog = watchdog();
+    watchdog.set_timeout(RwdtStage::Stage0, window);
+    watchdog.feed();
+}
+
+/// Lets a supply that breaks down reset the system, which has a reason of its own; `esp-hal` leaves the detector off (ESP32-C6 Technical
+/// Reference Manual, brown-out detector: `LP_ANA_BOD_MODE0_INTR_ENA` switches it on, `RESET_SEL` 1 is a reset of the system). Its
+/// threshold remains that of the chip.
+#[expect(unsafe_code, reason = "the field has ten bits, all of which are valid")]
+fn watch_supply() {
+    LP_ANA::regs().bod_mode0_cntl().modify(|_, w| {
+        // SAFETY: the longest wait before the reset.
+        unsafe { w.bod_mode0_reset_wait().bits(0x3ff) };
+        w.bod_mode0_reset_sel().set_bit();
+        w.bod_mode0_reset_ena().set_bit();
+        w.bod_mode0_intr_ena().set_bit()
+    });
+}
+
+/// The flash of the store.
+type StoreFlash = Guarded<FlashStorage<'static>, Erasure>;
+
+/// The erasure of a sector, which takes longer than the watchdog's window.
+struct Erasure;
+
+impl Guard for Erasure {
+    fn begins() {
+        disable_motors();
+        feed(LONG_WINDOW);
+    }
+
+    fn ended() {
+        feed(WINDOW);
+    }
+}
+
+/// The end of the program by a panic: the motors are disabled, and the chip restarts. An exception of the core panics, as does an
+/// overflow of the stack, which a watchpoint at its end detects (`stack-guard-monitoring` of `esp-hal`).
+#[panic_handler]
+fn panicked(info: &core::panic::PanicInfo) -> ! {
+    disable_motors();
     if let Some(at) = info.location() {
         defmt::error!("panicked at {}:{}", at.file(), at.line());
     }
-    loop {
-        core::hint::spin_loop();
-    }
+    software_reset()
 }
 
 type Pulses = PwmPin<'static, MCPWM0<'static>, 0, true>;
@@ -324,7 +377,7 @@ type Hardware =
 
 /// The state of the loop.
 struct Board {
-    app: App<'static, FlashStorage<'static>>,
+    app: App<'static, StoreFlash>,
     hardware: Hardware,
     stamper: Stamper,
     link: Serial,
@@ -332,7 +385,7 @@ struct Board {
     motors: Motors,
     /// The example of motor code: your own controller takes its place.
     pattern: Pattern,
-    watchdog: Rtc<'static>,
+    liveness: Liveness,
     next_poll: NextPoll,
 }
 
@@ -341,7 +394,14 @@ impl Board {
     // Inlined, its stack frame would remain for the whole runtime.
     #[inline(never)]
     fn new() -> Option<Self> {
+        // It stops the watchdog of the bootloader. All pins are inputs.
         let board = esp_hal::init(esp_hal::Config::default().with_cpu_clock(CpuClock::max()));
+        let mut watchdog = watchdog();
+        watchdog.enable();
+        // The count of resets survives this one.
+        watchdog.set_stage_action(RwdtStage::Stage0, RwdtStageAction::ResetCore);
+        feed(LONG_WINDOW);
+        watch_supply();
         let drive = Output::new(board.GPIO3, Level::Low, OutputConfig::default());
         let reset = reset();
         let resets = boots::resets(BOOTS.load(Ordering::Relaxed));
@@ -379,7 +439,7 @@ impl Board {
         let config = CONFIG.try_take()?.read(&mut flash, &memory::config_in(0));
         let contents = FlashContents::read(map, config);
         log::flash_contents(&contents);
-        let store = Store::new(flash, memory::store(0)).ok()?;
+        let store = Store::new(Guarded::new(flash), memory::store(0)).ok()?;
         let mut alarm = PeriodicTimer::new(SystemTimer::new(board.SYSTIMER).alarm0);
         alarm.set_interrupt_handler(woken);
         alarm.listen();
@@ -392,11 +452,6 @@ impl Board {
         // The default is 115,200 baud, 8N1.
         let uart = Uart::new(board.UART0, uart::Config::default()).ok()?;
         let uart = uart.with_tx(board.GPIO16).with_rx(board.GPIO17);
-        let mut watchdog = Rtc::new(board.RTC_TIMER);
-        watchdog.rwdt.enable();
-        watchdog.rwdt.set_timeout(RwdtStage::Stage0, WATCHDOG);
-        // The count of resets survives this one.
-        watchdog.rwdt.set_stage_action(RwdtStage::Stage0, RwdtStageAction::ResetCore);
         Some(Self {
             app,
             hardware: Devices { right, left, servo, ranger },
@@ -405,7 +460,7 @@ impl Board {
             drive,
             motors,
             pattern: Pattern::default(),
-            watchdog,
+            liveness: Liveness::new(now()),
             next_poll: NextPoll::AT_ONCE,
         })
     }
@@ -416,9 +471,6 @@ impl Board {
         self.stamper.update(&ECHO);
         let polled = self.app.poll(start, &mut self.hardware, &mut self.link);
         self.drive.set_level(polled.may_drive.into());
-        if polled.is_on_time {
-            self.watchdog.rwdt.feed();
-        }
         if polled.is_settled {
             BOOTS.store(boots::register(0), Ordering::Relaxed);
         }
@@ -433,6 +485,9 @@ impl Board {
         self.app.work(start, now);
         let (app, hardware) = (&self.app, &mut self.hardware);
         self.next_poll = sonarfix_robot::next_poll(app, hardware, start, polled.may_drive);
+        if self.liveness.is_alive(start, &polled) {
+            feed(WINDOW);
+        }
     }
 
     /// How long the board may sleep, microseconds: `None` if the next poll is due, a byte has arrived or an edge of the echo
@@ -456,9 +511,7 @@ impl Board {
 fn main() -> ! {
     let Some(mut board) = Board::new() else {
         defmt::error!("the memory map has no store, or a setting of the board is invalid");
-        loop {
-            core::hint::spin_loop();
-        }
+        software_reset();
     };
     loop {
         board.poll();

@@ -18,6 +18,9 @@ pub const QUEUE: FifoJoin = FifoJoin::RxOnly;
 /// Size of the flash, bytes.
 pub const FLASH_SIZE: usize = 2 * 1024 * 1024;
 
+/// Counts of the watchdog in a microsecond: it counts twice with each tick (RP2040 data sheet, erratum RP2040-E1).
+pub const WATCHDOG_COUNTS: u32 = 2;
+
 /// An encoder, counted by a state machine.
 pub struct Encoder<const SM: usize>(pub EncoderMachine<SM>);
 

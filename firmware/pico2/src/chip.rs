@@ -18,6 +18,9 @@ pub const QUEUE: FifoJoin = FifoJoin::RxAsStatus;
 /// Size of the flash, bytes.
 pub const FLASH_SIZE: usize = 4 * 1024 * 1024;
 
+/// Counts of the watchdog in a microsecond: one with each tick (RP2350 data sheet, section 12.9).
+pub const WATCHDOG_COUNTS: u32 = 1;
+
 /// An encoder, counted by a state machine.
 pub struct Encoder<const SM: usize>(pub EncoderMachine<SM>);
 

@@ -28,7 +28,7 @@ use embassy_executor::{Executor, Spawner};
 use embassy_rp::flash::{self, Flash};
 use embassy_rp::gpio::{Level, Output, OutputOpenDrain, Pin};
 use embassy_rp::interrupt::typelevel::{Handler, Interrupt, UART0_IRQ};
-use embassy_rp::peripherals::{FLASH, PIO0, PIO1};
+use embassy_rp::peripherals::{FLASH, PIO0, PIO1, WATCHDOG};
 use embassy_rp::pio::{InterruptHandler, Pio};
 use embassy_rp::pwm::{self, Pwm};
 use embassy_rp::uart::{self, Uart};
@@ -43,12 +43,14 @@ use heapless::Deque;
 use panic_probe as _;
 use sonarfix::geometry::units::Instant;
 use sonarfix_app::store::Store;
+use sonarfix_app::watchdog::Liveness;
 use sonarfix_app::{App, FlashContents, Link, boots, log};
 use sonarfix_hal::bus::{SharedBus, TwoWire};
 use sonarfix_hal::gyro::Mpu6050;
 use sonarfix_hal::ranger::EchoCapture;
 use sonarfix_hal::robot::{Devices, WithGyro, WithRangers};
 use sonarfix_motors::{Drive, Estimate, Pattern};
+use sonarfix_robot::guarded::{Guard, Guarded};
 use sonarfix_robot::{AnyRanger, NextPoll, memory};
 
 // The other chip has its module beside its memory map.
@@ -60,8 +62,11 @@ use chip::{Encoder, FLASH_SIZE, QUEUE, Stamper, reset};
 
 /// Period at which the loop reads the stamps of the echo while a ping is in flight, and fills the UART's queue while it sends.
 const STEP: Duration = Duration::from_millis(1);
-/// Longer than the erasure of a sector (at most 0.4 s), which delays the loop.
-const WATCHDOG: Duration = Duration::from_secs(2);
+/// The window of the watchdog, microseconds: the longest time from a pass of the loop to the reset. Its clock is that of the crystal.
+const WINDOW: u32 = 200_000;
+/// That of the start and of the erasure of a sector, microseconds: longer than an erasure, at most 0.4 s (`tSE` of the
+/// W25Q16JV's data sheet). The motors are disabled meanwhile.
+const LONG_WINDOW: u32 = 1_000_000;
 
 /// Number of the pin that is high while the robot may drive.
 const DRIVE: u32 = 9;
@@ -228,24 +233,71 @@ impl Link for Serial {
     }
 }
 
-/// The end of the program by a panic or another fault. The motors are disabled until the watchdog restarts it.
-#[cortex_m_rt::exception(trampoline = false)]
-#[expect(unsafe_code, reason = "the vector table calls it; it does nothing that is unsafe")]
-unsafe fn HardFault() -> ! {
+/// Disables the motors; the next poll may enable them again.
+fn disable_motors() {
     pac::SIO.gpio_out(0).value_clr().write_value(1 << DRIVE);
+}
+
+/// Starts the watchdog's window again, with this length in microseconds.
+fn feed(window: u32) {
+    let counts = window.saturating_mul(chip::WATCHDOG_COUNTS);
+    pac::WATCHDOG.load().write_value(pac::watchdog::regs::Load(counts));
+}
+
+/// The flash of the store.
+type StoreFlash = Guarded<Flash<'static, FLASH, flash::Blocking, FLASH_SIZE>, Erasure>;
+
+/// The erasure of a sector, which takes longer than the watchdog's window.
+struct Erasure;
+
+impl Guard for Erasure {
+    fn begins() {
+        disable_motors();
+        feed(LONG_WINDOW);
+    }
+
+    fn ended() {
+        feed(WINDOW);
+    }
+}
+
+/// The end of the program: the motors are disabled, and the chip restarts. If it does not, the watchdog restarts it.
+#[expect(unsafe_code, reason = "after a fault the watchdog has no owner")]
+fn restart() -> ! {
+    disable_motors();
+    // SAFETY: no other code runs after a fault.
+    Watchdog::new(unsafe { WATCHDOG::steal() }).trigger_reset();
     loop {
         cortex_m::asm::nop();
     }
 }
 
+/// The end of the program by a panic, another fault or an overflow of the stack, which is below all variables.
+#[cortex_m_rt::exception(trampoline = false)]
+#[expect(unsafe_code, reason = "the vector table calls it; it does nothing that is unsafe")]
+unsafe fn HardFault() -> ! {
+    restart()
+}
+
+/// The end of the program by an interrupt that nothing handles.
+#[cortex_m_rt::exception]
+#[allow(
+    unsafe_code,
+    reason = "the vector table calls it; the macro makes a second function, which is not unsafe"
+)]
+unsafe fn DefaultHandler(_number: i16) -> ! {
+    restart()
+}
+
 /// The state of the loop.
 struct Board {
-    app: App<'static, Flash<'static, FLASH, flash::Blocking, FLASH_SIZE>>,
+    app: App<'static, StoreFlash>,
     hardware: Hardware,
     stampers: (Stamper<0>, Stamper<1>),
     link: Serial,
     drive: Output<'static>,
     watchdog: Watchdog,
+    liveness: Liveness,
     next_poll: NextPoll,
 }
 
@@ -254,9 +306,12 @@ impl Board {
     // Inlined, its stack frame would remain for the whole runtime.
     #[inline(never)]
     fn new(buses: &'static mut Option<Buses>) -> Option<(Self, Motors)> {
+        // Before, the watchdog has no clock, and all pins are inputs.
         let board = embassy_rp::init(embassy_rp::config::Config::default());
         let mut watchdog = Watchdog::new(board.WATCHDOG);
         let reset = reset(&watchdog);
+        watchdog.start(Duration::from_micros(LONG_WINDOW.into()));
+        let drive = Output::new(board.PIN_9, Level::Low);
         let resets = boots::resets(watchdog.get_scratch(0));
         watchdog.set_scratch(0, boots::register(resets.saturating_add(1)));
         let Pio { common: mut pio, sm0, sm1, .. } = Pio::new(board.PIO0, Interrupts);
@@ -289,20 +344,26 @@ impl Board {
 
         let flash = FlashContents::read(memory::map(), memory::config());
         log::flash_contents(&flash);
-        let store = Store::new(Flash::new_blocking(board.FLASH), memory::store(FLASH_BASE)).ok()?;
+        let flash_of_store = Guarded::new(Flash::new_blocking(board.FLASH));
+        let store = Store::new(flash_of_store, memory::store(FLASH_BASE)).ok()?;
         let app = App::new(sonarfix_robot::board(reset, resets), flash, store, now());
         // The default is 115,200 baud, 8N1.
         let uart = uart::Config::default();
         let uart = Uart::new_blocking(board.UART0, board.PIN_0, board.PIN_1, uart);
+        // The driver leaves the pins without pull-ups; an open line would be received as noise (PADS_BANK0_GPIO1: PUE).
+        pac::PADS_BANK0.gpio(1).modify(|w| {
+            w.set_pue(true);
+            w.set_pde(false);
+        });
         listen_to_uart();
-        watchdog.start(WATCHDOG);
         let board = Self {
             app,
             hardware: WithGyro { devices, gyro: Mpu6050::new(first) },
             stampers,
             link: Serial { uart, to_send: Deque::new() },
-            drive: Output::new(board.PIN_9, Level::Low),
+            drive,
             watchdog,
+            liveness: Liveness::new(now()),
             next_poll: NextPoll::AT_ONCE,
         };
         Some((board, motors))
@@ -314,9 +375,6 @@ impl Board {
         let polled = self.app.poll(start, &mut self.hardware, &mut self.link);
         self.drive.set_level(polled.may_drive.into());
         ESTIMATE.signal(sonarfix_robot::estimate(&self.app, &polled));
-        if polled.is_on_time {
-            self.watchdog.feed(WATCHDOG);
-        }
         if polled.is_settled {
             self.watchdog.set_scratch(0, boots::register(0));
         }
@@ -328,6 +386,9 @@ impl Board {
         self.app.work(start, now);
         let (app, hardware) = (&self.app, &mut self.hardware);
         self.next_poll = sonarfix_robot::next_poll(app, hardware, start, polled.may_drive);
+        if self.liveness.is_alive(start, &polled) {
+            feed(WINDOW);
+        }
     }
 
     /// The latest time until which the board may sleep: `None` if the next poll is due, a byte has arrived or an edge of

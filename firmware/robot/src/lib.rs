@@ -6,12 +6,14 @@
 
 #![no_std]
 
+pub mod guarded;
 pub mod memory;
 
 use embedded_hal::digital::OutputPin;
 use embedded_hal::i2c::I2c;
 use embedded_storage::nor_flash::NorFlash;
 use sonarfix::geometry::units::{Duration, Instant};
+use sonarfix_app::watchdog::POLL_AT_LEAST_EVERY;
 use sonarfix_app::{App, Board, Polled};
 use sonarfix_hal::ranger::{Captured, EchoCapture, OneOf, PulseRanger, Vl53l0x, Vl53l1x};
 use sonarfix_hal::robot::{Hardware, PACE};
@@ -65,16 +67,16 @@ pub fn estimate<F: NorFlash>(app: &App<F>, polled: &Polled) -> Option<Estimate> 
 }
 
 /// When a board polls again, after a poll at `polled`: when something is due ([`App::next_poll`]), and in time for the motor
-/// code. Bytes that have arrived wait until several can be read together.
+/// code and for the watchdog. Bytes that have arrived wait until several can be read together.
 pub fn next_poll<F: NorFlash>(
     app: &App<F>,
     hardware: &mut impl Hardware,
     polled: Instant,
     may_drive: bool,
 ) -> NextPoll {
-    let drive = if may_drive { Some(after(polled, sonarfix_motors::PERIOD)) } else { None };
-    let due = app.next_poll(hardware);
-    NextPoll { due: drive.map_or(due, |drive| due.min(drive)), with_bytes: after(polled, PACE) }
+    let longest = if may_drive { sonarfix_motors::PERIOD } else { POLL_AT_LEAST_EVERY };
+    let due = app.next_poll(hardware).min(after(polled, longest));
+    NextPoll { due, with_bytes: after(polled, PACE) }
 }
 
 /// When a board polls again.

@@ -40,6 +40,7 @@ use sonarfix_hal::bus::{SharedBus, TwoWire};
 use sonarfix_hal::encoder::Counter;
 use sonarfix_hal::ranger::EchoCapture;
 use sonarfix_motors::Drive;
+use sonarfix_robot::guarded::{Guard, Guarded};
 use sonarfix_robot::memory;
 use stm32f4xx_hal::gpio::{ErasedPin, OpenDrain, Output, Pin, Pull};
 use stm32f4xx_hal::pac::{self, tim1};
@@ -50,10 +51,14 @@ static ECHO: EchoCapture = EchoCapture::new();
 static SECOND_ECHO: EchoCapture = EchoCapture::new();
 
 /// The clocks: the internal oscillator at 16 MHz with an error of 1 %, which scales all ranges and is estimated as the
-/// filter's range scale. With a crystal of 8 MHz: 48 MHz.
+/// filter's range scale. With a crystal of 8 MHz, or a clock of 8 MHz at its pin: 48 MHz.
 fn clocks() -> rcc::Config {
-    if cfg!(feature = "crystal") {
-        rcc::Config::hse(fugit::HertzU32::MHz(8)).sysclk(fugit::HertzU32::MHz(48))
+    let external = || rcc::Config::hse(fugit::HertzU32::MHz(8)).sysclk(fugit::HertzU32::MHz(48));
+    if cfg!(feature = "external-clock") {
+        // The oscillator of the crystal is off (RM0090, RCC_CR: HSEBYP).
+        external().bypass_hse_oscillator()
+    } else if cfg!(feature = "crystal") {
+        external()
     } else {
         rcc::Config::hsi()
     }
@@ -407,16 +412,126 @@ mod sectors {
     }
 }
 
-/// The end of the program by a panic or another fault. The motors are disabled until the watchdog restarts it.
-#[cortex_m_rt::exception(trampoline = false)]
-#[expect(unsafe_code, reason = "after a fault the port has no owner")]
-unsafe fn HardFault() -> ! {
-    // SAFETY: no other code runs after a fault.
+/// Disables the motors; the next poll may enable them again.
+#[expect(unsafe_code, reason = "the loop owns the pin, which faults and erasures clear")]
+fn disable_motors() {
+    // SAFETY: a write to this register changes this pin only, in one access.
     let port = unsafe { &*pac::GPIOB::ptr() };
     port.bsrr().write(|w| w.br7().set_bit());
-    loop {
-        cortex_m::asm::nop();
+}
+
+/// The independent watchdog: an oscillator of its own clocks it. The loop feeds it, and the flash changes its window.
+#[expect(unsafe_code, reason = "the flash is part of what the loop polls")]
+mod watchdog {
+    use stm32f4xx_hal::pac::{self, iwdg};
+
+    /// Its oscillator, kHz: 17 to 47, 32 as a rule (STM32F405 data sheet, table 41: `f_LSI`).
+    const OSCILLATOR: u32 = 32;
+    /// Divides it, by the value 3 of the field `PR` (RM0090, 21.4.2).
+    const DIVIDER: u32 = 32;
+
+    /// From a pass of the loop to the reset: 226 ms with the slowest oscillator, 82 ms with the fastest.
+    pub const WINDOW: u16 = counts(120);
+    /// That of the start and of the erasure of a sector, at most 0.5 s: 1.02 s with the fastest oscillator. The motors are
+    /// disabled meanwhile.
+    pub const LONG_WINDOW: u16 = counts(1_500);
+
+    const fn counts(milliseconds: u32) -> u16 {
+        let counts = milliseconds * OSCILLATOR / DIVIDER;
+        assert!(counts < 1 << 12);
+        #[expect(clippy::cast_possible_truncation, reason = "the field has 12 bits")]
+        let counts = counts as u16;
+        counts
     }
+
+    fn registers() -> &'static iwdg::RegisterBlock {
+        // SAFETY: each access is one write or one read, and no interrupt makes any.
+        unsafe { &*pac::IWDG::ptr() }
+    }
+
+    /// Starts it. It cannot be stopped.
+    pub fn start(window: u16) {
+        registers().kr().write(|w| w.key().start());
+        set(window);
+    }
+
+    /// Starts its window again, with this length.
+    pub fn set(window: u16) {
+        let watchdog = registers();
+        watchdog.kr().write(|w| w.key().unlock());
+        watchdog.pr().write(|w| w.pr().divide_by32());
+        watchdog.rlr().write(|w| w.rl().set(window));
+        // Until the registers are updated, at most five periods of the oscillator, the window before would start again.
+        while watchdog.sr().read().bits() != 0 {}
+        watchdog.kr().write(|w| w.key().feed());
+    }
+
+    /// Starts its window again. The first pass of the loop ends the long one of the start.
+    pub fn feed() {
+        if registers().rlr().read().rl().bits() == WINDOW {
+            registers().kr().write(|w| w.key().feed());
+        } else {
+            set(WINDOW);
+        }
+    }
+}
+
+/// The flash of the store.
+type StoreFlash = Guarded<Sectors, Erasure>;
+
+/// The erasure of a sector, which takes longer than the watchdog's window.
+struct Erasure;
+
+impl Guard for Erasure {
+    fn begins() {
+        disable_motors();
+        watchdog::set(watchdog::LONG_WINDOW);
+    }
+
+    fn ended() {
+        forget_second_echo();
+        watchdog::set(watchdog::WINDOW);
+    }
+}
+
+/// Forgets the edges that TIM12 has stamped and its interrupt has not read. Its count wraps after 65 ms, and only an erasure, which
+/// stalls the core, delays the interrupt for longer: it would take an old edge for a later one.
+#[expect(unsafe_code, reason = "the interrupt owns the timer")]
+fn forget_second_echo() {
+    // SAFETY: flags are cleared by one write of 0; the interrupt reads each flag before its stamp.
+    let timer = unsafe { &*pac::TIM12::ptr() };
+    timer.sr().write(|w| w.cc1if().clear_bit().cc2if().clear_bit());
+}
+
+/// Lets the interrupt of the voltage detector end the program when the supply falls below 2.9 V: the level of brown-out resets would be
+/// an option of the chip, which a program can set only for good (RM0090, 5.2.3; PWR_CR: PLS = 7; line 16 of EXTI).
+fn watch_supply(power: &pac::PWR, lines: &pac::EXTI) {
+    power.cr().modify(|_, w| w.pls().set(7).pvde().set_bit());
+    lines.rtsr().modify(|_, w| w.tr16().set_bit());
+    lines.imr().modify(|_, w| w.mr16().set_bit());
+}
+
+/// The end of the program: the motors are disabled, and the chip restarts.
+fn restart() -> ! {
+    disable_motors();
+    cortex_m::peripheral::SCB::sys_reset()
+}
+
+/// The end of the program by a panic, another fault or an overflow of the stack, which is below all variables.
+#[cortex_m_rt::exception(trampoline = false)]
+#[expect(unsafe_code, reason = "the vector table calls it; it does nothing that is unsafe")]
+unsafe fn HardFault() -> ! {
+    restart()
+}
+
+/// The end of the program by an interrupt that nothing handles.
+#[cortex_m_rt::exception]
+#[allow(
+    unsafe_code,
+    reason = "the vector table calls it; the macro makes a second function, which is not unsafe"
+)]
+unsafe fn DefaultHandler(_number: i16) -> ! {
+    restart()
 }
 
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
@@ -424,28 +539,26 @@ mod app {
     use heapless::spsc::{Consumer, Producer};
     use sonarfix::geometry::units::Instant;
     use sonarfix_app::store::Store;
+    use sonarfix_app::watchdog::Liveness;
     use sonarfix_app::{App, FlashContents, boots, log};
     use sonarfix_hal::gyro::Mpu6050;
     use sonarfix_hal::robot::{Devices, WithGyro, WithRangers};
     use sonarfix_link::message::ResetCause;
     use sonarfix_motors::Pattern;
+    use sonarfix_robot::guarded::Guarded;
     use sonarfix_robot::{AnyRanger, NextPoll, memory};
-    use stm32f4xx_hal::gpio::{ErasedPin, GpioExt, Output, Pin};
+    use stm32f4xx_hal::gpio::{ErasedPin, GpioExt, Output, Pin, Pull};
     use stm32f4xx_hal::hal_02::serial::{Read, Write};
     use stm32f4xx_hal::pac::{self, PWR, RTC, TIM1, TIM3, TIM5, TIM8, TIM10, TIM11, TIM12, USART2};
     use stm32f4xx_hal::rcc::{Enable, RccExt};
     use stm32f4xx_hal::serial::{self, Rx, RxListen, SerialExt, Tx, TxISR, TxListen};
     use stm32f4xx_hal::time::Bps;
-    use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
     use super::alarm::Alarm;
     use super::{
-        Bus, ECHO, Encoder, MotorPwm, Received, SECOND_ECHO, Sectors, ServoPwm, ToSend, Uart, bus,
-        line, microseconds,
+        Bus, ECHO, Encoder, MotorPwm, Received, SECOND_ECHO, Sectors, ServoPwm, StoreFlash, ToSend,
+        Uart, bus, line, microseconds, restart, watch_supply, watchdog,
     };
-
-    /// Longer than the erasure of a sector (at most 0.5 s), which delays the loop.
-    const WATCHDOG: fugit::MillisDurationU32 = fugit::MillisDurationU32::from_ticks(2_000);
 
     type Hardware = WithGyro<
         WithRangers<Devices<Encoder<TIM1>, Encoder<TIM8>, ServoPwm, Ranger>, 1>,
@@ -461,11 +574,11 @@ mod app {
 
     #[local]
     struct Local {
-        app: App<'static, Sectors>,
+        app: App<'static, StoreFlash>,
         hardware: Hardware,
         link: Uart,
         drive: Pin<'B', 7, Output>,
-        watchdog: IndependentWatchdog,
+        liveness: Liveness,
         alarm: Alarm,
         backup: RTC,
         motors: MotorPwm,
@@ -482,10 +595,14 @@ mod app {
     // Inlined, its stack frame would remain for the whole runtime.
     #[inline(never)]
     fn init(context: init::Context) -> (Shared, Local) {
+        // Before anything that can hang, as the start of a clock. All pins are inputs.
+        watchdog::start(watchdog::LONG_WINDOW);
         let board = context.device;
         let reset = reset(&board.RCC);
         // The log can be read while the core sleeps.
         board.DBGMCU.cr().modify(|_, w| w.dbg_sleep().set_bit());
+        // A program that a probe has halted is not restarted.
+        board.DBGMCU.apb1_fz().modify(|_, w| w.dbg_iwdg_stop().set_bit());
         let mut rcc = board.RCC.freeze(super::clocks());
         TIM1::enable(&mut rcc);
         TIM3::enable(&mut rcc);
@@ -510,18 +627,23 @@ mod app {
         start_stamps(&board.TIM12, microseconds(timer_clock));
 
         let uart = serial::Config::default().baudrate(Bps(115_200));
-        let uart = board.USART2.serial((a.pa2, a.pa3), uart, &mut rcc);
+        // An open line would be received as noise.
+        let receiver = a.pa3.into_alternate::<7>().internal_resistor(Pull::Up);
+        let uart = board.USART2.serial((a.pa2, receiver), uart, &mut rcc);
         let pulses = [ServoPwm::First(board.TIM10), ServoPwm::Second(board.TIM11)];
         let [first, second] = pulses.map(|pwm| pwm.started(rcc.clocks.timclk2()));
         let servos = (sonarfix_robot::servo(first), sonarfix_robot::servo(second));
         let flash = FlashContents::read(memory::map(), memory::config());
         log::flash_contents(&flash);
-        let store = Store::new(Sectors(board.FLASH), memory::store(Sectors::BASE));
+        let flash_of_store = Guarded::new(Sectors(board.FLASH));
+        let store = Store::new(flash_of_store, memory::store(Sectors::BASE));
         let (Ok(uart), Ok(store)) = (uart, store) else {
-            stop();
+            defmt::error!("the store's region or the UART cannot be set up");
+            restart();
         };
         PWR::enable(&mut rcc);
         board.PWR.cr().modify(|_, w| w.dbp().set_bit());
+        watch_supply(&board.PWR, &board.EXTI);
         let resets = boots::resets(board.RTC.bkpr(0).read().bkp().bits());
         set_resets(&board.RTC, resets.saturating_add(1));
         let board_info = sonarfix_robot::board(reset, resets);
@@ -546,14 +668,12 @@ mod app {
         rx.listen();
         let (received, incoming) = context.local.received.split();
         let (to_send, outgoing) = context.local.to_send.split();
-        let mut watchdog = IndependentWatchdog::new(board.IWDG);
-        watchdog.start(WATCHDOG);
         let local = Local {
             app,
             hardware,
             link: Uart { received: incoming, to_send },
             drive: b.pb7.into_push_pull_output(),
-            watchdog,
+            liveness: Liveness::new(Instant::from_ticks(0)),
             backup: board.RTC,
             alarm,
             second_echo: board.TIM12,
@@ -565,7 +685,7 @@ mod app {
     }
 
     /// Polls when something is due, and sleeps until then.
-    #[idle(shared = [clock], local = [app, hardware, link, drive, watchdog, alarm, backup, motors])]
+    #[idle(shared = [clock], local = [app, hardware, link, drive, liveness, alarm, backup, motors])]
     #[inline(never)]
     fn idle(mut context: idle::Context) -> ! {
         let idle::LocalResources {
@@ -573,7 +693,7 @@ mod app {
             hardware,
             link,
             drive,
-            watchdog,
+            liveness,
             alarm,
             backup,
             motors,
@@ -604,9 +724,6 @@ mod app {
             if polled.is_settled {
                 set_resets(backup, 0);
             }
-            if polled.is_on_time {
-                watchdog.feed();
-            }
             log::polled(&polled, app.report());
             // The motor code: your own controller takes the place of the example. The loop waits for it, and the telemetry
             // reports its time as that of the poll.
@@ -618,7 +735,16 @@ mod app {
             }
             app.work(now, clock);
             next_poll = sonarfix_robot::next_poll(app, hardware, now, polled.may_drive);
+            if liveness.is_alive(now, &polled) {
+                watchdog::feed();
+            }
         }
+    }
+
+    /// The supply falls.
+    #[task(binds = PVD, priority = 3)]
+    fn supply_falls(_: supply_falls::Context) {
+        restart();
     }
 
     /// Reads the edges of the echo, which the timer has stamped.
@@ -638,7 +764,8 @@ mod app {
         });
     }
 
-    /// Reads the edges of the second echo. The timer has 16 bits; the interrupt is served long before they wrap.
+    /// Reads the edges of the second echo. The timer has 16 bits; the interrupt is served long before they wrap, but for edges
+    /// during an erasure, which are forgotten.
     #[task(binds = TIM8_BRK_TIM12, shared = [clock], local = [second_echo], priority = 2)]
     fn second_echo(mut context: second_echo::Context) {
         let timer = context.local.second_echo;
@@ -745,14 +872,6 @@ mod app {
             ResetCause::Pin
         } else {
             ResetCause::Unknown
-        }
-    }
-
-    /// Ends the program: the memory map has no store, or the UART no such speed.
-    fn stop() -> ! {
-        defmt::error!("the store's region or the UART cannot be set up");
-        loop {
-            rtic::export::wfi();
         }
     }
 }

@@ -10,6 +10,7 @@ use core::ops::Range;
 use defmt_rtt as _;
 use panic_probe as _;
 use sonarfix_app::store::Store;
+use sonarfix_app::watchdog::Liveness;
 use sonarfix_app::{App, FlashContents, boots, log};
 use sonarfix_hal::robot::Devices;
 use sonarfix_motors::Pattern;
@@ -52,6 +53,7 @@ fn main() -> ! {
     // The motor code: your own controller takes the place of the example, which drives to and fro.
     let mut pattern = Pattern::default();
     let mut next_poll = NextPoll::AT_ONCE;
+    let mut liveness = Liveness::new(clock.now());
     loop {
         // Until something is due, a byte has arrived or an edge of the echo is stamped. On a chip whose timer, UART and echo pin
         // interrupt, the end of this loop is the place of an instruction that sleeps.
@@ -61,9 +63,6 @@ fn main() -> ! {
         let start = clock.now();
         let polled = app.poll(start, &mut hardware, &mut link);
         enable.set(polled.may_drive);
-        if polled.is_on_time {
-            watchdog.feed();
-        }
         if polled.is_settled {
             resets.write(boots::register(0));
         }
@@ -75,5 +74,8 @@ fn main() -> ! {
         }
         app.work(start, || clock.now());
         next_poll = sonarfix_robot::next_poll(&app, &mut hardware, start, polled.may_drive);
+        if liveness.is_alive(start, &polled) {
+            watchdog.feed();
+        }
     }
 }

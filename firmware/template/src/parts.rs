@@ -278,7 +278,8 @@ impl Motors {
     pub fn set(&mut self, _drive: Drive) {}
 }
 
-/// The watchdog (2 s), and the cause of the reset. The emulated board has none.
+/// The watchdog, and the cause of the reset: a window of at most 250 ms, and a longer one for the start and while a sector of flash is
+/// erased, when the motors are disabled (`sonarfix_robot::guarded`). The emulated board has none.
 pub struct Watchdog;
 
 impl Watchdog {

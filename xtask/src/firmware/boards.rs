@@ -8,8 +8,8 @@ use anyhow::{Context, ensure};
 use object::{Object, ObjectSection, SectionKind};
 
 use super::{build, memory, panics, stack};
-use crate::cargo;
 use crate::workspace::Workspace;
+use crate::{board_page, cargo};
 use sonarfix_boards::Board;
 
 /// Largest difference between a figure of the docs and the measured one, as a part of it: flash contains source paths, whose
@@ -104,8 +104,11 @@ fn row(board: &Board, program: &[u8]) -> anyhow::Result<String> {
         format!("not bounded; has {region}")
     };
     let (own, build) = (lines_of(board)?, lines_of_build(board)?);
-    let shown =
-        if board.package == build::NAME { "building and emulation" } else { "building only" };
+    let shown = if board_page::is_emulated(&board.name) {
+        "building and emulation"
+    } else {
+        "building only"
+    };
     Ok(format!(
         "| {} | {flash} | {variables} | {stack} | {}, {} | {build} | {shown} |",
         board.title, own.0, own.1

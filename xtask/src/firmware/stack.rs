@@ -18,8 +18,8 @@ use crate::elf::{Function, Program};
 
 /// The entry point.
 const START: &str = "Reset";
-/// Handlers that do not return.
-const ENDS: [&str; 3] = [START, "HardFault", "DefaultHandler"];
+/// Handlers that do not return; that of the voltage detector restarts the chip.
+const ENDS: [&str; 4] = [START, "HardFault", "DefaultHandler", "PVD"];
 /// The exception frame: 26 words with the floating-point registers, and one for alignment to eight bytes (`ARMv7-M
 /// Architecture Reference Manual`, B1.5.7). A core without floating-point unit saves less.
 const EXCEPTION: u64 = 4 * 27;

@@ -42,6 +42,6 @@ pub struct Polled {
     pub may_drive: bool,
     /// Whether the loop has been started or stopped in this poll.
     pub has_changed: bool,
-    /// Whether a deadline was met: the only condition for feeding the watchdog.
+    /// Whether a deadline was met, by which [`Liveness`](crate::watchdog::Liveness) decides whether the watchdog is fed.
     pub is_on_time: bool,
 }

@@ -1,0 +1,261 @@
+//! A Pico on an emulated chip, and the PC at the other end of its link, in lock step: each order states for how long the chip executes.
+
+use std::collections::VecDeque;
+use std::fmt::Write as _;
+use std::io::{BufRead, BufReader, Write as _};
+use std::path::Path;
+use std::process::{Child, ChildStdin, ChildStdout, Command as Process, Stdio};
+
+use sonarfix_link::message::{CommandResult, LoopStatus};
+use sonarfix_link::{Ack, Command, Hello, Receiver, Sender, SessionCommand, Telemetry, frame};
+use tempfile::TempDir;
+
+/// Where `memory.x` has the regions.
+const CONFIG_AT: &str = "0x10100000";
+const MAP_AT: &str = "0x10180000";
+/// The time of the chip that passes at once, milliseconds.
+const SLICE: u32 = 10;
+/// The longest wait for a message that comes, milliseconds of the chip: that for `Hello`.
+const PATIENCE: u32 = 15_000;
+
+/// What happens around the chip.
+pub struct World {
+    /// Segments of two points.
+    pub walls: Vec<[f32; 4]>,
+    pub pose: [f32; 3],
+    pub seed: u32,
+}
+
+/// A robot as the room has it.
+#[derive(Debug, Clone, Copy)]
+pub struct Truth {
+    pub x: f64,
+    pub y: f64,
+    pub heading: f64,
+}
+
+impl Truth {
+    /// The distance of a position from it, metres.
+    pub fn distance(self, x: f32, y: f32) -> f64 {
+        (f64::from(x) - self.x).hypot(f64::from(y) - self.y)
+    }
+
+    /// The distance to another place, metres.
+    pub fn distance_from(self, other: Self) -> f64 {
+        (other.x - self.x).hypot(other.y - self.y)
+    }
+}
+
+/// What the board and the robot have done.
+#[derive(Debug, Clone, Copy)]
+pub struct State {
+    /// Time since power-on, milliseconds.
+    pub ms: f64,
+    pub truth: Truth,
+    pub pings: u32,
+    pub is_enabled: bool,
+}
+
+/// Counters of the chip.
+#[derive(Debug, Clone, Copy)]
+pub struct Counters {
+    /// Executed instructions.
+    pub instructions: u64,
+    pub overruns: u64,
+    pub lost_bytes: u64,
+    pub erased: u64,
+    pub programmed: u64,
+    pub short_triggers: u64,
+}
+
+/// Something that happened, at milliseconds since power-on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Event {
+    pub what: String,
+    pub ms: f64,
+}
+
+pub struct Pico {
+    emulator: Child,
+    orders: ChildStdin,
+    answers: BufReader<ChildStdout>,
+    receiver: Receiver<Telemetry>,
+    sender: Sender<SessionCommand>,
+    session: u32,
+    pending: VecDeque<Telemetry>,
+    /// The longest wait for a message, milliseconds of the chip.
+    pub patience: u32,
+    files: TempDir,
+}
+
+impl Pico {
+    /// Switches a board on, with the program of this variable of the environment, and these bytes in its regions.
+    pub fn switched_on(variable: &str, world: &World, map: &[u8], config: &[u8]) -> Self {
+        let files = TempDir::new().unwrap();
+        let path = |name: &str| files.path().join(name);
+        let walls: Vec<String> = world.walls.iter().map(|wall| format!("{wall:?}")).collect();
+        let (walls, pose, seed) = (walls.join(","), world.pose, world.seed);
+        let world = format!(r#"{{"walls":[{walls}],"pose":{pose:?},"seed":{seed}}}"#);
+        std::fs::write(path("world.json"), world).unwrap();
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../firmware/chips");
+        let mut command = Process::new("node");
+        command.arg(folder.join("serve.mjs")).arg(path("world.json"));
+        command.stdin(Stdio::piped()).stdout(Stdio::piped());
+        let mut emulator = command.spawn().expect("is node installed?");
+        let orders = emulator.stdin.take().unwrap();
+        let answers = BufReader::new(emulator.stdout.take().unwrap());
+        let program = std::env::var(variable).expect("run `cargo xtask chips`");
+        let mut pico = Self {
+            emulator,
+            orders,
+            answers,
+            receiver: Receiver::new(),
+            sender: Sender::starting_at(100),
+            session: 0,
+            pending: VecDeque::new(),
+            patience: PATIENCE,
+            files,
+        };
+        pico.ask(&format!("image {program}"));
+        for (name, bytes, at) in [("map", map, MAP_AT), ("config", config, CONFIG_AT)] {
+            if !bytes.is_empty() {
+                let file = pico.files.path().join(name);
+                std::fs::write(&file, bytes).unwrap();
+                pico.ask(&format!("image {at} {}", file.display()));
+            }
+        }
+        pico.ask("start");
+        pico
+    }
+
+    /// Gives an order; returns the answer.
+    pub fn ask(&mut self, order: &str) -> String {
+        writeln!(self.orders, "{order}").unwrap();
+        let mut answer = String::new();
+        self.answers.read_line(&mut answer).unwrap();
+        assert!(!answer.is_empty() && !answer.starts_with("error"), "{order}: {answer}");
+        answer.trim().to_owned()
+    }
+
+    /// Lets the chip execute for so many milliseconds, while the line takes these bytes to it.
+    pub fn run(&mut self, ms: u32, bytes: &[u8]) {
+        let mut order = format!("run {} ", 1_000 * ms);
+        for byte in bytes {
+            write!(order, "{byte:02x}").unwrap();
+        }
+        let sent = self.ask(&order);
+        for pair in sent.as_bytes().chunks(2).filter(|pair| pair.len() == 2) {
+            let byte = u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap();
+            self.pending.extend(self.receiver.push(byte).map(|frame| frame.message));
+        }
+    }
+
+    /// The messages so far that were not yet taken.
+    pub fn messages(&mut self) -> Vec<Telemetry> {
+        self.pending.drain(..).collect()
+    }
+
+    /// Waits for the first message for which `find` returns something; earlier ones are lost.
+    pub fn wait_for<T>(&mut self, find: impl Fn(&Telemetry) -> Option<T>) -> Option<T> {
+        for _ in 0..self.patience / SLICE {
+            while let Some(message) = self.pending.pop_front() {
+                if let Some(found) = find(&message) {
+                    return Some(found);
+                }
+            }
+            self.run(SLICE, &[]);
+        }
+        None
+    }
+
+    pub fn hello(&mut self) -> Hello {
+        self.wait_for(|it| if let Telemetry::Hello(hello) = it { Some(*hello) } else { None })
+            .expect("no Hello")
+    }
+
+    pub fn loop_status(&mut self) -> LoopStatus {
+        self.wait_for(|it| if let Telemetry::LoopStatus(it) = it { Some(*it) } else { None })
+            .expect("no LoopStatus")
+    }
+
+    /// Sends a command; returns the answer, if one comes.
+    pub fn order(&mut self, command: &Command) -> Option<CommandResult> {
+        if self.session == 0 {
+            let Some(CommandResult::Session(session)) = self.request(&Command::OpenSession) else {
+                return None;
+            };
+            self.session = session;
+        }
+        self.request(command)
+    }
+
+    fn request(&mut self, command: &Command) -> Option<CommandResult> {
+        let sequence = self.sender.next();
+        let bytes = self.frame(sequence, command);
+        self.sender = Sender::starting_at(sequence + 1);
+        self.run(SLICE, &bytes);
+        self.wait_for(|message| match message {
+            Telemetry::Ack(Ack { sequence: of, result }) if *of == sequence => Some(*result),
+            _ => None,
+        })
+    }
+
+    fn frame(&self, sequence: u16, command: &Command) -> Vec<u8> {
+        let command = SessionCommand { session: self.session, command: *command };
+        Sender::starting_at(sequence).frame(&command, &mut frame::EMPTY.clone()).to_vec()
+    }
+
+    /// After a reset: the robot has another session.
+    pub fn forget_session(&mut self) {
+        self.session = 0;
+        self.pending.clear();
+        self.patience = PATIENCE;
+    }
+
+    pub fn state(&mut self) -> State {
+        let answer = self.ask("state");
+        let [us, x, y, heading, pings, enabled] = numbers(&answer)[..] else { panic!("{answer}") };
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
+        let pings = pings as u32;
+        State { ms: us / 1e3, truth: Truth { x, y, heading }, pings, is_enabled: enabled > 0.0 }
+    }
+
+    /// The robot at a time of the chip's clock.
+    pub fn truth(&mut self, at: sonarfix::geometry::units::Instant) -> Truth {
+        let answer = self.ask(&format!("truth {}", at.ticks()));
+        let [x, y, heading] = numbers(&answer)[..] else { panic!("{answer}") };
+        Truth { x, y, heading }
+    }
+
+    pub fn counters(&mut self) -> Counters {
+        let answer = self.ask("chip");
+        let counts: Vec<u64> = answer.split(' ').map(|word| word.parse().unwrap()).collect();
+        let [instructions, overruns, lost_bytes, erased, programmed, short_triggers] = counts[..]
+        else {
+            panic!("{answer}")
+        };
+        Counters { instructions, overruns, lost_bytes, erased, programmed, short_triggers }
+    }
+
+    /// What has happened since the last time.
+    pub fn events(&mut self) -> Vec<Event> {
+        let answer = self.ask("events");
+        let words: Vec<&str> = answer.split(' ').collect();
+        let event = |pair: &[&str]| Event {
+            what: pair[0].to_owned(),
+            ms: pair[1].parse::<f64>().unwrap() / 1e6,
+        };
+        words.chunks(2).filter(|pair| pair.len() == 2).map(event).collect()
+    }
+}
+
+fn numbers(answer: &str) -> Vec<f64> {
+    answer.split(' ').map(|word| word.parse().unwrap_or_else(|_| panic!("{answer}"))).collect()
+}
+
+impl Drop for Pico {
+    fn drop(&mut self) {
+        let _ = self.emulator.kill();
+        let _ = self.emulator.wait();
+    }
+}

@@ -1,0 +1,144 @@
+// The Pico with its robot, as wired in docs/firmware.md, and the PC's end of its link. Times in nanoseconds since power-on.
+import { Chip, Flash } from './chip.mjs';
+import { Room, STEP, numbers } from './room.mjs';
+
+const PINS = { right: [2, 3], left: [4, 5], trigger: 7, echo: 8, enable: 9 };
+/** Slices of the PWM, channels A and B. */
+const SLICES = { servo: 3, right: 5, left: 6 };
+/** Levels of A and B by the two low bits of the count; A leads when a wheel rolls forwards. */
+const QUADRATURE = [[false, false], [true, false], [true, true], [false, true]];
+/** How long the truth is kept: longer than a message waits. */
+const HISTORY = 10e9;
+
+export class Board {
+  constructor(walls, pose, seed) {
+    this.random = numbers(seed);
+    this.flash = new Flash(numbers(seed + 1));
+    this.room = new Room(walls, pose, numbers(seed + 2));
+    /** Time at which the present life of the chip began. */
+    this.began = 0;
+    this.next = STEP;
+    this.received = [];
+    this.lineFree = 0;
+    this.toSend = [];
+    this.isNoisy = false;
+    this.events = [];
+    this.truth = [];
+    this.isEnabled = false;
+    this.chip = null;
+  }
+
+  /** Power-on, or a reset that keeps these registers. */
+  start(kept = null) {
+    this.began = this.now;
+    this.chip = new Chip(this.flash, {
+      sent: (byte) => this.received.push(byte),
+      wait: (nanos) => this.wait(nanos),
+    }, kept);
+    this.levels = null;
+    this.setEncoders();
+    this.chip.setInput(PINS.echo, false);
+    this.chip.rp2040.gpio[PINS.trigger].addListener((level) => this.room.trigger(level === 1, this.now));
+    this.chip.rp2040.gpio[PINS.enable].addListener(() => this.watchEnable());
+    // The 20 kHz of the motors are read as duties, and not as edges.
+    for (const slice of [SLICES.right, SLICES.left]) {
+      this.chip.rp2040.pwm.channels[slice].updateEnable = function () { this.timer.enable = false; };
+    }
+    this.watchEnable();
+  }
+
+  get now() {
+    return this.began + (this.chip?.clock.nanos ?? 0);
+  }
+
+  watchEnable() {
+    const isEnabled = this.chip.isHigh(PINS.enable);
+    if (isEnabled === this.isEnabled) return;
+    this.isEnabled = isEnabled;
+    this.events.push(`${isEnabled ? 'enabled' : 'disabled'} ${this.now}`);
+  }
+
+  setEncoders() {
+    const { right, left } = PINS;
+    this.room.counts.forEach((count, side) => QUADRATURE[count & 3].forEach((level, channel) => {
+      this.chip.setInput((side ? left : right)[channel], level);
+    }));
+  }
+
+  /** Runs until a time. */
+  run(until) {
+    while (this.now < until) {
+      const reset = this.chip.run(this.nextEvent(until) - this.began);
+      if (reset) this.reset(reset);
+      else this.happen();
+    }
+  }
+
+  /** Time passes while the core is stalled. */
+  wait(nanos) {
+    const until = this.now + nanos;
+    while (this.now < until) {
+      this.chip.clock.tick(Math.max(0, this.nextEvent(until) - this.now));
+      this.happen();
+    }
+  }
+
+  nextEvent(until) {
+    const edge = this.room.edges[0]?.at ?? Infinity;
+    const byte = this.toSend.length || this.isNoisy ? this.lineFree : Infinity;
+    return Math.max(this.now, Math.min(until, this.next, edge, byte));
+  }
+
+  /** What is due now. */
+  happen() {
+    const { now, room, chip } = this;
+    while (room.edges.length && room.edges[0].at <= now) chip.setInput(PINS.echo, room.edges.shift().isHigh);
+    if (now >= this.lineFree && (this.toSend.length || this.isNoisy)) {
+      const byte = this.toSend.length ? this.toSend.shift() : Math.floor(256 * this.random());
+      chip.uart.receive(byte);
+      this.lineFree = now + 10e9 / 115200;
+    }
+    while (now >= this.next) {
+      this.next += STEP;
+      const before = room.counts;
+      room.move(this.voltages(), this.target());
+      if (before.some((count, side) => count !== room.counts[side])) this.setEncoders();
+      this.truth.push([this.next - STEP - this.began, room.x, room.y, room.heading]);
+      if (this.truth.length > HISTORY / STEP) this.truth.splice(0, this.truth.length / 2);
+    }
+  }
+
+  /** The voltages of both motors as parts of the full one. */
+  voltages() {
+    if (!this.isEnabled) return [0, 0];
+    return [SLICES.right, SLICES.left].map((slice) => {
+      const { csr, cc, top } = this.chip.rp2040.pwm.channels[slice];
+      return csr & 1 ? ((cc & 0xffff) - (cc >>> 16)) / (top + 1) : 0;
+    });
+  }
+
+  /** Where the servo's pulses point: 45° at 2 ms, −45° at 1 ms. */
+  target() {
+    const { csr, cc, div } = this.chip.rp2040.pwm.channels[SLICES.servo];
+    const pulse = csr & 1 ? ((cc & 0xffff) * (div / 16) * 8e-3) : 0;
+    return pulse > 400 ? ((pulse - 1500) / 500) * (Math.PI / 4) : this.room.bearing;
+  }
+
+  /** The chip has been reset: its pins are inputs, and the pull-down of the enable pin disables the motors. */
+  reset(cause) {
+    const { now } = this;
+    if (this.isEnabled) this.events.push(`disabled ${now}`);
+    this.isEnabled = false;
+    this.events.push(`reset-by-${cause} ${now}`);
+    this.chip.clearTrap();
+    const { kept } = this.chip;
+    this.truth = [];
+    this.start(cause === 'power' ? null : kept);
+  }
+
+  /** The pose at a time of the chip's clock. */
+  poseAt(nanos) {
+    const first = this.truth[0]?.[0] ?? 0;
+    return this.truth[Math.max(0, Math.min(this.truth.length - 1, Math.round((nanos - first) / STEP)))];
+  }
+}

@@ -1,0 +1,166 @@
+// The parts that the emulator lacks, against the figures of the data sheets. `node --test`
+import assert from 'node:assert/strict';
+import { createRequire } from 'node:module';
+import test from 'node:test';
+import { Flash, PowerCut, TIMES } from './flash.mjs';
+import { attach } from './pio.mjs';
+import { crc32 } from './rom.mjs';
+import { Room, STEP, numbers } from './room.mjs';
+import { Uart } from './uart.mjs';
+
+const { FIFO, RP2040 } = createRequire(import.meta.url)('rp2040js');
+
+const quiet = (rp2040) => Object.assign(rp2040, { logger: { debug() {}, info() {}, warn() {}, error() {} } });
+
+/** A block with one machine that runs this program, and what runs it to a clock. */
+function machine(program, { divider = 1, shift = 0b11 << 18, wrap = program.length - 1 } = {}) {
+  const rp2040 = quiet(new RP2040());
+  const pio = rp2040.pio[0];
+  let now = 0;
+  const run = attach(pio, () => now, FIFO);
+  const write = (at, value) => pio.writeUint32Atomic(at, value, 0);
+  program.forEach((code, i) => write(0x48 + 4 * i, code));
+  write(0xc8, divider << 16);
+  write(0xcc, wrap << 12);
+  write(0xd0, shift);
+  write(0x00, 1);
+  const until = (clock) => { now = clock; run(); };
+  return { rp2040, pio, state: pio.machines[0], until, read: (at) => pio.readUint32(at) };
+}
+
+const JMP_X_DECREMENT = (to) => 0x0040 | to;
+const NOP = (delay) => 0xa042 | (delay << 8);
+const PUSH_NOBLOCK = 0x8000;
+const MOV_ISR_X = 0xa0c1;
+
+test('a machine takes a clock an instruction, and one more for each of its delay', () => {
+  // Two instructions and three clocks of delay: five clocks a round.
+  const { state, until } = machine([JMP_X_DECREMENT(1), NOP(3)]);
+  for (const [clock, rounds] of [[5, 1], [50, 10], [500, 100], [5_000_000, 1_000_000]]) {
+    until(clock);
+    assert.equal(-state.x >>> 0, rounds, `${clock} clocks`);
+  }
+});
+
+test('the divider counts clocks, and a machine sees an input as long as it lasts', () => {
+  const { state, until } = machine([JMP_X_DECREMENT(1), NOP(3)], { divider: 25 });
+  until(125_000_000);
+  assert.equal(-state.x >>> 0, 1_000_000);
+});
+
+test('a count is the same in one leap and in many', () => {
+  const [leap, steps] = [0, 1].map(() => machine([JMP_X_DECREMENT(1), NOP(2), MOV_ISR_X, PUSH_NOBLOCK]));
+  leap.until(1_000_003);
+  for (let clock = 0; clock < 1_000_003; clock += 17) steps.until(clock);
+  steps.until(1_000_003);
+  assert.equal(leap.state.x, steps.state.x);
+  assert.equal(leap.state.pc, steps.state.pc);
+});
+
+test('a queue has four places, and eight if it is joined', () => {
+  for (const [shift, places] of [[0b11 << 18, 4], [(0b11 << 18) | (1 << 31), 8]]) {
+    const { until, read } = machine([MOV_ISR_X, PUSH_NOBLOCK], { shift });
+    until(10_000);
+    assert.equal((read(0x0c) >> 4) & 15, places);
+    // It keeps what it has.
+    for (let i = 0; i < places; i++) assert.equal(read(0x20), 0);
+  }
+});
+
+/** A UART of a chip at 125 MHz and 115,200 baud. */
+function uart() {
+  const rp2040 = quiet(new RP2040());
+  const sent = [];
+  const interrupts = [];
+  rp2040.setInterrupt = (_, value) => interrupts.push([rp2040.clock.nanos, value]);
+  const port = new Uart({ rp2040, clock: rp2040.clock, sent: (byte) => sent.push(byte) }, rp2040.uart[0]);
+  const write = (at, value) => rp2040.uart[0].writeUint32Atomic(at, value, 0);
+  write(0x24, 67);
+  write(0x28, 52);
+  return { port, sent, interrupts, write, read: (at) => rp2040.uart[0].readUint32(at), pass: (nanos) => rp2040.clock.tick(nanos) };
+}
+
+test('a byte takes ten bits of 115,200 baud, and 32 wait', () => {
+  const { sent, write, read, pass } = uart();
+  for (let i = 0; i < 40; i++) if (!(read(0x18) & (1 << 5))) write(0x00, i);
+  // One is on the line.
+  assert.equal(sent.length, 33);
+  pass(86_800);
+  assert.equal(read(0x18) & (1 << 5), 1 << 5);
+  pass(100);
+  assert.equal(read(0x18) & (1 << 5), 0);
+});
+
+test('half a queue, or the time of 32 bits, interrupts; the 33rd byte is an overrun', () => {
+  const { port, interrupts, write, read, pass } = uart();
+  write(0x38, (1 << 4) | (1 << 6));
+  const isPending = () => interrupts.at(-1)[1];
+  port.receive(1);
+  assert.equal(isPending(), false);
+  pass(277_000);
+  assert.equal(isPending(), false);
+  pass(1_000);
+  assert.equal(isPending(), true);
+  assert.equal(read(0x00), 1);
+  assert.equal(isPending(), false);
+  for (let i = 0; i < 15; i++) port.receive(i);
+  assert.equal(isPending(), false);
+  port.receive(15);
+  assert.equal(isPending(), true);
+  for (let i = 16; i < 32; i++) port.receive(i);
+  assert.equal(port.overruns, 0);
+  port.receive(32);
+  assert.equal(port.overruns, 1);
+  assert.equal(read(0x00), 1 << 11);
+  assert.equal(read(0x00), 1);
+});
+
+test('a page clears bits, a sector sets them, and both take their time', () => {
+  const flash = new Flash(numbers(1));
+  let time = 0;
+  flash.wait = (nanos) => { time += nanos; };
+  flash.program(0x1000, () => 0x0f, 256);
+  flash.program(0x1000, () => 0xf3, 256);
+  assert.equal(flash.bytes[0x1000], 0x03);
+  assert.equal(time, 2 * TIMES.typical.page);
+  flash.erase(0x1000, 4096);
+  assert.equal(time, 2 * TIMES.typical.page + TIMES.typical.erase);
+  assert.ok(flash.bytes.subarray(0x1000, 0x2000).every((byte) => byte === 0xff));
+  assert.throws(() => flash.erase(0x1100, 4096));
+  assert.throws(() => flash.program(0x10, () => 0, 256));
+});
+
+test('a cut leaves whole bytes before it, and none behind it', () => {
+  const flash = new Flash(numbers(1));
+  flash.stepsLeft = 10;
+  assert.throws(() => flash.program(0, () => 0, 256), PowerCut);
+  assert.ok(flash.bytes.subarray(0, 9).every((byte) => byte === 0));
+  assert.ok(flash.bytes.subarray(10, 256).every((byte) => byte === 0xff));
+});
+
+test('the checksum of a second stage is that of CRC-32/MPEG-2', () => {
+  assert.equal(crc32(Buffer.from('123456789')), 0x0376e6e7);
+});
+
+test('a robot drives as its wheels do, and a wall answers square to it only', () => {
+  const room = new Room([[3, -1, 3, 1]], [0, 0, 0], numbers(1));
+  const drive = (voltages, seconds) => { for (let t = 0; t < seconds * 1e9; t += STEP) room.move(voltages, 0); };
+  drive([0.5, 0.5], 4);
+  // 0.25 m/s, reached with a lag of 80 ms.
+  assert.ok(Math.abs(room.x - 0.98) < 0.001 && Math.abs(room.y) < 1e-9, `${room.x}`);
+  assert.ok(Math.abs(room.range() - (3 - room.x - 0.06)) < 1e-9);
+  room.bearing = (11.9 * Math.PI) / 180;
+  assert.notEqual(room.range(), null);
+  room.bearing = (12.1 * Math.PI) / 180;
+  assert.equal(room.range(), null);
+  // Right forwards and left backwards is a turn to the left.
+  drive([0.2, -0.2], 1);
+  assert.ok(room.heading > 1);
+});
+
+test('a wall behind another is not heard', () => {
+  const room = new Room([[3, -1, 3, 1], [2, -1, 2, 1]], [0, 0, 0], numbers(1));
+  assert.equal(room.range(), 2 - 0.06);
+  room.walls[1] = [2, 0.1, 2, 1];
+  assert.equal(room.range(), 3 - 0.06);
+});

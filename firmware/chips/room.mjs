@@ -1,0 +1,114 @@
+// What is around the board: wheels with motors and encoders, a sonar on a servo, and a room. Metres, radians, seconds, nanoseconds where it says so.
+
+/** How often wheels and servo move on, nanoseconds: at 0.5 m/s a wheel turns by a third of an edge meanwhile. */
+export const STEP = 100e3;
+const SPEED_OF_SOUND = 343.4;
+/** From the end of the trigger to the burst of an HC-SR04, and its pulse without an echo, nanoseconds. */
+const BURST = 460e3;
+const NO_ECHO = 38e6;
+
+/** The robot as it is, beside what its robot file says: wheels, track width and speed of sound are a little different. */
+const ROBOT = {
+  track: 0.1234,
+  edge: [1.008, 0.994].map((scale) => (scale * Math.PI * 0.065) / 1496.6),
+  mount: 0.06,
+  /** Speed at full voltage, and the time in which a wheel reaches it. */
+  speed: 0.5,
+  lag: 0.08,
+  servo: (500 * Math.PI) / 180,
+  cone: (12 * Math.PI) / 180,
+  range: 4,
+  noise: 0.003,
+};
+
+/** Numbers below 1 that are the same in each run (mulberry32). */
+export function numbers(seed) {
+  let state = seed >>> 0;
+  return () => {
+    state = (state + 0x6d2b79f5) >>> 0;
+    let t = Math.imul(state ^ (state >>> 15), state | 1);
+    t ^= t + Math.imul(t ^ (t >>> 7), t | 61);
+    return ((t ^ (t >>> 14)) >>> 0) / 2 ** 32;
+  };
+}
+
+export class Room {
+  /** `walls`: two points each. The robot stands at a pose. */
+  constructor(walls, [x, y, heading], random) {
+    Object.assign(this, { walls, x, y, heading, random });
+    this.speeds = [0, 0];
+    this.travels = [0, 0];
+    this.counts = [0, 0];
+    this.bearing = 0;
+    this.pings = 0;
+    this.busyUntil = 0;
+    this.shortTriggers = 0;
+    this.triggeredAt = null;
+    /** Edges of the echo that are to come: time and level. */
+    this.edges = [];
+  }
+
+  /** Moves on by a step. `voltages` of right and left wheel are parts of the full one; `target` is that of the servo. */
+  move(voltages, target) {
+    const dt = STEP / 1e9;
+    for (const side of [0, 1]) {
+      this.speeds[side] += ((voltages[side] * ROBOT.speed - this.speeds[side]) * dt) / ROBOT.lag;
+      if (Math.abs(this.speeds[side]) < 1e-6) this.speeds[side] = 0;
+      this.travels[side] += this.speeds[side] * dt;
+    }
+    const [right, left] = this.speeds.map((speed) => speed * dt);
+    const turn = (right - left) / ROBOT.track;
+    this.x += ((right + left) / 2) * Math.cos(this.heading + turn / 2);
+    this.y += ((right + left) / 2) * Math.sin(this.heading + turn / 2);
+    this.heading += turn;
+    // The left wheel is a mirror image of the right one.
+    this.counts = this.travels.map((travel, side) => Math.floor(travel / ROBOT.edge[side]) * (side ? -1 : 1));
+    const most = ROBOT.servo * dt;
+    this.bearing += Math.max(-most, Math.min(most, target - this.bearing));
+  }
+
+  /** The trigger has changed, at a time in nanoseconds. */
+  trigger(isHigh, now) {
+    if (isHigh) {
+      this.triggeredAt = now;
+      return;
+    }
+    if (this.triggeredAt === null) return;
+    const isLong = now - this.triggeredAt >= 10e3;
+    this.triggeredAt = null;
+    if (!isLong) this.shortTriggers++;
+    if (!isLong || now < this.busyUntil) return;
+    this.pings++;
+    const range = this.range();
+    const noise = ROBOT.noise * Math.sqrt(-2 * Math.log(1 - this.random())) * Math.cos(2 * Math.PI * this.random());
+    const pulse = range === null ? NO_ECHO : (2e9 * (range + noise)) / SPEED_OF_SOUND;
+    this.busyUntil = now + BURST + pulse;
+    this.edges.push({ at: now + BURST, isHigh: true }, { at: this.busyUntil, isHigh: false });
+  }
+
+  /** The distance of the nearest wall that is square to the beam within its cone, and in sight. */
+  range() {
+    const [x, y] = [this.x + ROBOT.mount * Math.cos(this.heading), this.y + ROBOT.mount * Math.sin(this.heading)];
+    const beam = this.heading + this.bearing;
+    let nearest = null;
+    for (const wall of this.walls) {
+      const [ax, ay, bx, by] = wall;
+      const along = ((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / ((bx - ax) ** 2 + (by - ay) ** 2);
+      if (along < 0 || along > 1) continue;
+      const [dx, dy] = [ax + along * (bx - ax) - x, ay + along * (by - ay) - y];
+      const distance = Math.hypot(dx, dy);
+      const off = Math.atan2(dy, dx) - beam;
+      if (Math.abs(Math.atan2(Math.sin(off), Math.cos(off))) > ROBOT.cone || distance > ROBOT.range) continue;
+      const isHidden = this.walls.some((other) => other !== wall && crosses([x, y, x + dx, y + dy], other));
+      if (!isHidden && (nearest === null || distance < nearest)) nearest = distance;
+    }
+    return nearest;
+  }
+}
+
+/** Whether two segments cross. */
+function crosses([ax, ay, bx, by], [cx, cy, dx, dy]) {
+  const side = (px, py, qx, qy, rx, ry) => Math.sign((qx - px) * (ry - py) - (qy - py) * (rx - px));
+  return side(ax, ay, bx, by, cx, cy) !== side(ax, ay, bx, by, dx, dy)
+    && side(cx, cy, dx, dy, ax, ay) !== side(cx, cy, dx, dy, bx, by);
+}

@@ -1,0 +1,67 @@
+// A Pico on an emulated chip, for a program that is the PC at the other end of its link: an order a line, an answer a line.
+//
+//   image ADDRESS FILE      writes a file into the flash; the program as ELF or UF2 without an address
+//   start                   power-on
+//   run MICROSECONDS [HEX]  the line takes these bytes; answers with the bytes sent: hexadecimal, or -
+//   truth MICROSECONDS      the pose at a time of the chip's clock
+//   state                   time in microseconds, pose, pings, whether the motors are enabled
+//   events                  what has happened since the last time: words and nanoseconds
+//   chip                    instructions, overruns, lost bytes, erased sectors, programmed pages, short triggers
+//   pull PIN                up, down or none
+//   hang | fault | overflow at the next instruction
+//   noise on|off            random bytes at the full rate of the line
+//   cut STEPS               cuts the power in this step of the flash from now
+//   slow-flash              the longest times of the flash's data sheet
+//   unknown                 what the emulator lacks
+import fs from 'node:fs';
+import readline from 'node:readline';
+import { Board } from './board.mjs';
+import { TIMES } from './flash.mjs';
+import { load } from './rom.mjs';
+
+const [, , worldFile] = process.argv;
+const world = JSON.parse(fs.readFileSync(worldFile, 'utf8'));
+const board = new Board(world.walls, world.pose, world.seed);
+
+const orders = {
+  image(at, file) {
+    if (file === undefined) load(fs.readFileSync(at), board.flash.bytes);
+    else board.flash.bytes.set(fs.readFileSync(file), Number(at) - 0x10000000);
+  },
+  start: () => board.start(),
+  run(micros, hex = '') {
+    board.toSend.push(...Buffer.from(hex, 'hex'));
+    board.run(board.now + 1e3 * Number(micros));
+    return Buffer.from(board.received.splice(0)).toString('hex') || '-';
+  },
+  truth: (micros) => board.poseAt(1e3 * Number(micros)).slice(1).join(' '),
+  state() {
+    const { room } = board;
+    return [board.now / 1e3, room.x, room.y, room.heading, room.pings, Number(board.isEnabled)].join(' ');
+  },
+  events: () => board.events.splice(0).join(' ') || '-',
+  chip() {
+    const { chip, flash, room } = board;
+    return [chip.instructions, chip.uart.overruns, chip.uart.lost, flash.erased, flash.programmed, room.shortTriggers].join(' ');
+  },
+  pull(pin) {
+    const { pullupEnabled, pulldownEnabled } = board.chip.rp2040.gpio[Number(pin)];
+    return pullupEnabled ? 'up' : pulldownEnabled ? 'down' : 'none';
+  },
+  hang: () => board.chip.hang(),
+  fault: () => board.chip.failAtInstruction(),
+  overflow: () => board.chip.overflowStack(),
+  noise(state) { board.isNoisy = state === 'on'; },
+  cut(steps) { board.flash.stepsLeft = Number(steps); },
+  'slow-flash': () => { board.flash.times = TIMES.longest; },
+  unknown: () => [...board.chip.unknown].map(([text, count]) => `${text} (${count})`).join('; ') || '-',
+};
+
+for await (const line of readline.createInterface({ input: process.stdin })) {
+  const [order, ...words] = line.trim().split(' ');
+  try {
+    console.log(orders[order](...words) ?? 'ok');
+  } catch (error) {
+    console.log(`error ${order}: ${error.stack.replaceAll('\n', ' | ')}`);
+  }
+}
