@@ -3,6 +3,8 @@
 //! | module | input | output |
 //! |---|---|---|
 //! | [`wheel`] | ticks of an encoder, a wheel speed | the duty of the motor |
+//! | [`pursuit`] | the estimate, a route | the motion, and why the robot stands |
+//! | [`obstacles`] | pings, the map | the distance of an unmapped object ahead, for [`pursuit`] |
 //!
 //! # Features
 //! - `defmt`: derives `defmt::Format` for the public types.
@@ -10,4 +12,6 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+pub mod obstacles;
+pub mod pursuit;
 pub mod wheel;

@@ -2,4 +2,6 @@
 #![expect(clippy::unwrap_used, reason = "a test should stop")]
 
 mod motor;
+mod obstacles;
+mod pursuit;
 mod wheel;
