@@ -34,7 +34,7 @@ impl Settings {
         half_width: Metres(0.12),
         reach: Metres(1.0),
         margin: Metres(0.15),
-        memory: Duration::from_ticks(20_000_000),
+        memory: Duration::from_ticks(60_000_000),
     };
 }
 
@@ -109,7 +109,7 @@ impl Obstacles {
         // Also false for NaN.
         if range.0 >= 0.0 && !cone.has_wall(map, range + margin) {
             let place = cone.from.plus(cone.axis.times(range.0)).into();
-            self.remember(Object { place, met: ping.at });
+            self.record(Object { place, met: ping.at });
         }
     }
 
@@ -129,7 +129,7 @@ impl Obstacles {
     }
 
     /// In a free place, or in that of the oldest object.
-    fn remember(&mut self, object: Object) {
+    fn record(&mut self, object: Object) {
         let met = |object: &Option<Object>| object.map(|object| object.met);
         if let Some(place) = self.objects.iter_mut().min_by_key(|object| met(object)) {
             *place = Some(object);

@@ -21,6 +21,8 @@
 //!   Arrived, which stays
 //! ```
 //!
+//! At the end the pose must be more certain than on the route: until it is, the robot stands and its ranges correct the pose.
+//!
 //! It avoids nothing: the route has a clearance of L and half of the robot from every wall. It is an example of a controller,
 //! to be replaced by a planner where a robot needs one.
 //!
@@ -56,6 +58,9 @@ pub struct Limits {
     pub turn_first: Radians,
     /// The largest deviation of the position with which the robot drives.
     pub max_deviation: Metres,
+    /// The largest deviation of the position with which it has arrived: with a larger one it stands at the end until ranges have
+    /// reduced it, and drives on if the end is then elsewhere.
+    pub end_deviation: Metres,
     /// The robot does not drive ahead while an object is nearer than this ([`Situation::ahead`]).
     pub clearance: Metres,
 }
@@ -70,6 +75,7 @@ impl Limits {
         approach: Duration::from_ticks(500_000),
         turn_first: Radians(0.5),
         max_deviation: Metres(0.1),
+        end_deviation: Metres(0.02),
         clearance: Metres(0.3),
     };
 }
@@ -123,7 +129,7 @@ pub struct Situation {
 pub enum Reason {
     /// The verdict is [`Verdict::Lost`], or the pose is not finite.
     Lost,
-    /// The deviation of the position is larger than [`Limits::max_deviation`].
+    /// The deviation of the position is larger than [`Limits::max_deviation`], or at the end than [`Limits::end_deviation`].
     Uncertain,
     /// An object is nearer than [`Limits::clearance`].
     Obstructed,
@@ -211,6 +217,9 @@ impl<'r> Pursuit<'r> {
             return (Progress::Stopped(reason), stand);
         }
         let Some(target) = self.target(situation.pose.position()) else {
+            if situation.deviation > self.limits.end_deviation {
+                return (Progress::Stopped(Reason::Uncertain), stand);
+            }
             self.has_arrived = true;
             return (Progress::Arrived, stand);
         };
@@ -312,6 +321,7 @@ fn check(limits: &Limits) -> Result<(), RouteError> {
         approach,
         turn_first,
         max_deviation,
+        end_deviation,
         clearance,
     } = *limits;
     let numbers = [
@@ -321,6 +331,7 @@ fn check(limits: &Limits) -> Result<(), RouteError> {
         tolerance.0,
         turn_first.0,
         max_deviation.0,
+        end_deviation.0,
         clearance.0,
         seconds(approach),
     ];

@@ -157,6 +157,21 @@ fn each_reason_stops_the_robot_and_ends() {
     assert_eq!(pursuit.drive(&far).0, Progress::Driving);
 }
 
+/// At its end the robot waits for a certain pose, and corrects its place by it.
+#[test]
+fn an_uncertain_robot_has_not_arrived() {
+    let route = [Point::new(2.0, 0.0)];
+    let mut pursuit = Pursuit::new(&route, LIMITS).unwrap();
+    let at = |x, deviation| Situation {
+        deviation: Metres(deviation),
+        ..tracking(Pose::new(x, 0.0, Radians(0.0)))
+    };
+    let uncertain = (Progress::Stopped(Reason::Uncertain), Motion::default());
+    assert_eq!(pursuit.drive(&at(1.99, 0.03)), uncertain);
+    assert_eq!(pursuit.drive(&at(1.9, 0.015)).0, Progress::Driving);
+    assert_eq!(pursuit.drive(&at(1.99, 0.015)).0, Progress::Arrived);
+}
+
 /// With an object ahead, a robot whose route leads elsewhere turns on the spot.
 #[test]
 fn the_robot_turns_away_from_an_object() {
