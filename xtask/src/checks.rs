@@ -6,12 +6,13 @@ use crate::ci;
 use crate::workspace::Workspace;
 
 /// The crates that run on a robot.
-pub const NO_STD_CRATES: [&str; 8] = [
+pub const NO_STD_CRATES: [&str; 9] = [
     "sonarfix",
     "sonarfix-search",
     "sonarfix-hal",
     "sonarfix-link",
     "sonarfix-app",
+    "sonarfix-drive",
     "sonarfix-c",
     "sonarfix-pil",
     "sonarfix-soft-float",

@@ -368,6 +368,12 @@ impl<'m, F: NorFlash> App<'m, F> {
         config.motors.dead_encoder || has_read
     }
 
+    /// The configuration in use, if there is one.
+    #[must_use]
+    pub fn configuration(&self) -> Option<&RobotConfig> {
+        self.config.as_ref().map(|(config, _)| config)
+    }
+
     /// The localizer, while the loop runs.
     #[must_use]
     pub fn localizer(&self) -> Option<&Localizer<'m>> {

@@ -15,7 +15,6 @@ mod counter;
 mod quadrature;
 mod wheel;
 
-pub(crate) use counter::Unwrapped;
-pub use counter::{Count16, Count32, Counter};
+pub use counter::{Count16, Count32, Counter, Unwrapped};
 pub use quadrature::{Quadrature, TickCount};
 pub use wheel::{GeometryError, WheelGeometry, Wheels};

@@ -5,8 +5,12 @@
 //! `cargo test --package sonarfix-tests --test main motor` tests it on the PC.
 //!
 //! The motor driver's enable pin is not controlled here: the loop sets it, by the motor policy of the robot file.
+//!
+//! [`commanded`] has motor code for a board that a PC drives: it obeys the commanded motion, by the speeds of the wheels.
 
 #![no_std]
+
+pub mod commanded;
 
 use sonarfix::geometry::pose::Pose;
 use sonarfix::geometry::trig;

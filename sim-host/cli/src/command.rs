@@ -14,6 +14,7 @@ use sonarfix_monitor::port::Port;
 use sonarfix_monitor::{request, view};
 use sonarfix_terminal::progress::{catch_interrupt, is_interrupted};
 
+use crate::goto;
 use crate::monitor::PortArgs;
 
 #[derive(Debug, clap::Args)]
@@ -26,6 +27,17 @@ pub struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum What {
+    #[command(flatten)]
+    Single(Single),
+    /// Drive to a point, or along several, by the estimates of the robot. It stands while it is lost, while its pose is too
+    /// uncertain, and in front of objects that are not on the map (docs/driving.md).
+    #[command(allow_negative_numbers = true)]
+    Goto(goto::Args),
+}
+
+// A command of the link. Without a comment of documentation, which would become the help of `command`.
+#[derive(Debug, clap::Subcommand)]
+enum Single {
     /// Restart the localizer from this pose.
     #[command(allow_negative_numbers = true)]
     SetPose(PoseArgs),
@@ -139,7 +151,7 @@ impl Age {
     }
 }
 
-impl What {
+impl Single {
     fn command(&self) -> anyhow::Result<Command> {
         Ok(match self {
             Self::SetPose(pose) => Command::SetPose(pose.start()),
@@ -175,9 +187,9 @@ impl What {
 }
 
 /// Drives until Ctrl-C or the end of the given time.
-fn drive(port: &mut Port, motion: Motion, what: &What) -> anyhow::Result<CommandResult> {
+fn drive(port: &mut Port, motion: Motion, what: &Single) -> anyhow::Result<CommandResult> {
     let limit = match what {
-        What::Drive { seconds, .. } => *seconds,
+        Single::Drive { seconds, .. } => *seconds,
         _ => None,
     };
     let limit = limit.map(std::time::Duration::try_from_secs_f64).transpose();
@@ -190,11 +202,15 @@ fn drive(port: &mut Port, motion: Motion, what: &What) -> anyhow::Result<Command
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
-    let command = args.what.command()?;
+    let what = match &args.what {
+        What::Single(what) => what,
+        What::Goto(route) => return goto::execute(route, &mut args.port.open()?),
+    };
+    let command = what.command()?;
     let mut port = args.port.open()?;
     let (result, response) = match command {
         Command::Absolute { .. } => request::ask_absolute(&mut port, &command)?,
-        Command::Drive(motion) => (drive(&mut port, motion, &args.what)?, None),
+        Command::Drive(motion) => (drive(&mut port, motion, what)?, None),
         _ => (request::ask(&mut port, &command)?, None),
     };
     match result {

@@ -56,6 +56,7 @@ pub const EXAMPLES: [(&str, &[&str]); 33] = [
             "sonarfix command --port /dev/ttyACM0 set-pose 1.5 0.8 90",
             "sonarfix command --port /dev/ttyACM0 start",
             "sonarfix command --port /dev/ttyACM0 drive --speed 0.1 --turn 20 --seconds 3",
+            "sonarfix command --port /dev/ttyACM0 goto 2.5 1.5 2.5 4 --map map.toml --robot robot.toml",
         ],
     ),
     (

@@ -16,6 +16,7 @@ mod examples;
 mod export;
 mod find;
 mod flash;
+mod goto;
 mod init;
 mod map;
 mod map_exchange;

@@ -304,10 +304,10 @@ fn obey_key(
         KeyCode::Char('q') => ControlFlow::Break(()),
         _ => {
             match key {
-                KeyCode::Char('s') => robot.ask(Order::Start),
+                KeyCode::Char('s') => robot.ask(Order::Start, Instant::now()),
                 KeyCode::Char('x') => {
                     keys.release();
-                    robot.ask(Order::Stop);
+                    robot.ask(Order::Stop, Instant::now());
                 }
                 KeyCode::Char(' ') => keys.stop(),
                 KeyCode::Esc => keys.release(),
@@ -317,7 +317,10 @@ fn obey_key(
                 KeyCode::Down => keys.press(Direction::Back, Instant::now()),
                 KeyCode::Left => keys.press(Direction::Left, Instant::now()),
                 KeyCode::Right => keys.press(Direction::Right, Instant::now()),
-                KeyCode::Char('r') => robot.ask(Order::Record { on: robot.recording().is_none() }),
+                KeyCode::Char('r') => {
+                    let on = robot.recording().is_none();
+                    robot.ask(Order::Record { on }, Instant::now());
+                }
                 _ => {}
             }
             ControlFlow::Continue(())

@@ -59,6 +59,7 @@ const PRINTING: [&[&str]; 47] = [
     &["command", "--port", "ROBOT", "map-checksum"],
     &["command", "--port", "ROBOT", "point", "-30"],
     &["command", "--port", "ROBOT", "drive", "--speed", "0.1", "--seconds", "0"],
+    &["command", "--port", "ROBOT", "goto", "1", "-2", "--seconds", "0"],
     &["virtual-robot", CLASSROOM, "--running", "--speed", "50", "--seconds", "1"],
     &["config", "bake", "tests/robot.toml", "--out", "FILES/config.bin"],
     &["config", "check", "FILES/config.bin"],

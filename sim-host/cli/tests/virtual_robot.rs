@@ -65,6 +65,13 @@ fn the_commands_work_on_it_as_on_a_robot() {
     assert!(!is_done && text.contains("max_wheel_speed"), "{text}");
     let (is_done, text) = printed(&["drive", "--speed", "0.2", "--turn", "-10", "--seconds", "2"]);
     assert!(is_done && text == "done\n", "{text}");
+    let (is_done, text) = printed(&["goto", "1.9", "1.7", "--end-deviation", "0.1"]);
+    assert!(is_done && text == "arrived\n", "{text}");
+    let (is_done, text) =
+        printed(&["goto", "1.5", "1.5", "--max-deviation", "1e-6", "--patience", "0.5"]);
+    assert!(!is_done && text.contains("stands: the pose is too uncertain"), "{text}");
+    let (is_done, text) = printed(&["goto", "1", "2", "3"]);
+    assert!(!is_done && text.contains("no y"), "{text}");
     let (is_done, text) = printed(&["stop"]);
     assert!(is_done, "{text}");
 }

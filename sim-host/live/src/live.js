@@ -72,7 +72,7 @@
     element("paced").hidden = state.isRobot;
     poseForm.hidden = !scene.commands;
     document.querySelectorAll("[data-order]").forEach((button) => { button.hidden = !scene.commands; });
-    drag.hidden = tap.hidden = !scene.commands;
+    drag.hidden = tap.hidden = element("drive").hidden = !scene.commands;
     element("keys").textContent = scene.commands ? ", P sets the pose by dragging, T sends a position by a tap" : "";
   }
 
@@ -330,6 +330,92 @@
     if (state.placing?.to) setPose(placed());
     if (state.placing?.at) setPlacing(false);
     changed();
+  });
+
+  // ---- Driving ----
+
+  const REPEAT = 100;           // ms after which a held motion is ordered again
+  const TURN = Math.PI / 4;     // rad/s at 0.1 m/s, as in the terminal
+  const [pad, knob, fastest] = ["pad", "knob", "fastest"].map(element);
+  const ARROWS = { ArrowUp: [1, 0], ArrowDown: [-1, 0], ArrowLeft: [0, 1], ArrowRight: [0, -1] };
+  const held = new Set();       // the arrow keys that are down
+  let repeats = null;
+  let wanted = [0, 0];          // ahead and to the left, −1 to 1
+
+  // What is held now. At nothing the robot is ordered to stand, once.
+  function hold(ahead, left) {
+    const holds = ahead !== 0 || left !== 0;
+    wanted = [ahead, left];
+    knob.style.transform = `translate(${-60 * left}px, ${-60 * ahead}px)`;
+    pad.classList.toggle("held", holds);
+    if (holds && repeats === null) {
+      repeats = setInterval(sendMotion, REPEAT);
+      sendMotion();
+    } else if (!holds && repeats !== null) {
+      clearInterval(repeats);
+      repeats = null;
+      sendMotion();
+    }
+  }
+
+  async function sendMotion() {
+    const speed = wanted[0] * Number(fastest.value), turn = wanted[1] * TURN * Number(fastest.value) / 0.1;
+    const holds = repeats !== null;
+    say("motion", holds ? `${speed.toFixed(2)} m/s, ${(turn * DEGREES).toFixed(0)} °/s` : "stands");
+    try {
+      // An order that is late is worth nothing.
+      const signal = AbortSignal.timeout(3 * REPEAT);
+      const body = JSON.stringify({ order: "drive", speed, turn });
+      const response = await fetch("/order", { method: "POST", headers: authorization, body, signal });
+      const { done, text } = response.ok ? await response.json() : { done: false, text: await response.text() };
+      if (holds || !done) say("answer", text);
+    } catch {
+      if (holds) say("answer", "no answer to a motion: the robot stands");
+    }
+  }
+
+  function holdKeys() {
+    const sum = [...held].map((key) => ARROWS[key]).reduce(([a, b], [c, d]) => [a + c, b + d], [0, 0]);
+    hold(...sum);
+  }
+
+  function release() {
+    held.clear();
+    hold(0, 0);
+  }
+
+  // Within a tenth of an axis the motion is straight, or on the spot.
+  function holdPointer(event) {
+    const { left, top, width, height } = pad.getBoundingClientRect();
+    const share = (at, from, size) => Math.min(1, Math.max(-1, (2 * (at - from)) / size - 1));
+    const free = (value) => Math.abs(value) < 0.1 ? 0 : value;
+    hold(free(-share(event.clientY, top, height)), free(-share(event.clientX, left, width)));
+  }
+
+  pad.addEventListener("keydown", (event) => {
+    if (!(event.key in ARROWS)) return;
+    event.preventDefault();
+    held.add(event.key);
+    holdKeys();
+  });
+  pad.addEventListener("keyup", (event) => { if (held.delete(event.key)) holdKeys(); });
+  pad.addEventListener("blur", release);
+  pad.addEventListener("pointerdown", (event) => {
+    pad.setPointerCapture(event.pointerId);
+    holdPointer(event);
+  });
+  pad.addEventListener("pointermove", (event) => { if (pad.hasPointerCapture(event.pointerId)) holdPointer(event); });
+  pad.addEventListener("lostpointercapture", release);
+  window.addEventListener("blur", release);
+  document.addEventListener("visibilitychange", () => { if (document.hidden) release(); });
+  element("halt").addEventListener("click", () => {
+    release();
+    sendMotion();
+    order({ order: "stop" });
+  });
+  element("leave").addEventListener("click", () => {
+    release();
+    order({ order: "leave" });
   });
 
   // ---- Control ----

@@ -46,6 +46,15 @@ pub enum Order {
         /// Standard deviation of x and of y, metres.
         deviation: f32,
     },
+    /// Drive with this motion. A page repeats the order as long as it holds the motion; without it the robot stands soon.
+    Drive {
+        /// Forward speed, m/s; negative: backwards.
+        speed: f32,
+        /// Turn rate, rad/s, counter-clockwise.
+        turn: f32,
+    },
+    /// Command no motion any more: the robot is left to its motor code.
+    Leave,
     /// Begin or end a recording.
     Record {
         /// Whether it is to begin.
@@ -75,13 +84,15 @@ impl Order {
             Self::ShowDevices => "show devices",
             Self::SetPose { .. } => "set pose",
             Self::Position { .. } => "position",
+            Self::Drive { .. } => "drive",
+            Self::Leave => "leave",
             Self::Record { .. } => "recording",
             Self::Pause { .. } => "pause",
             Self::Speed { .. } => "speed",
         }
     }
 
-    /// The robot's command; `None` for an order to this program.
+    /// The robot's command; `None` for an order to this program, and for a motion, which is renewed.
     #[must_use]
     pub fn command(&self) -> Option<Command> {
         Some(match *self {
@@ -104,6 +115,7 @@ impl Order {
                     noise: PositionNoise::circular(Metres(deviation)),
                 },
             },
+            Self::Drive { .. } | Self::Leave => return None,
             Self::Record { .. } | Self::Pause { .. } | Self::Speed { .. } => return None,
         })
     }

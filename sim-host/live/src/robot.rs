@@ -4,9 +4,10 @@ use std::collections::VecDeque;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::sync_channel;
-use std::time::{Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::Context;
+use sonarfix::geometry::units::{MetresPerSecond, RadiansPerSecond};
 use sonarfix_hal::robot::AbsoluteResult;
 use sonarfix_link::message::Odometry;
 use sonarfix_link::{CommandResult, Estimate, Motion, Telemetry};
@@ -26,6 +27,17 @@ mod records;
 /// Period of the status, µs of the robot's clock.
 const EVERY: u64 = 500_000;
 
+/// A motion of a page ends this long after its last order: three of its periods.
+const HELD: Duration = Duration::from_millis(300);
+
+/// A motion that a page holds.
+#[derive(Debug, Clone, Copy)]
+struct Held {
+    motion: Motion,
+    until: Instant,
+    is_refused: bool,
+}
+
 /// A robot on a page.
 #[derive(Debug)]
 pub struct Robot {
@@ -37,6 +49,7 @@ pub struct Robot {
     conversation: Conversation,
     /// The orders whose commands wait, in their order.
     waiting: VecDeque<Ordered>,
+    held: Option<Held>,
     signs: Signs,
     /// Whether the robot has sent the readings of its devices.
     shows_devices: bool,
@@ -64,6 +77,7 @@ impl Robot {
             monitor: Monitor::default(),
             conversation: Conversation::default(),
             waiting: VecDeque::new(),
+            held: None,
             signs: Signs::default(),
             shows_devices: false,
             recording: None,
@@ -105,7 +119,13 @@ impl Robot {
     /// Takes the orders of pages, and returns the bytes to send to the robot now.
     pub fn obey(&mut self, orders: Option<&Orders>, now: Instant) -> Option<Vec<u8>> {
         while let Some(ordered) = orders.and_then(Orders::next) {
-            self.order(ordered);
+            self.order(ordered, now);
+        }
+        if let Some(held) = self.held.take_if(|held| now >= held.until)
+            && !held.is_refused
+        {
+            // As after a key of the terminal: the robot stands until it is left to itself.
+            self.drive(Some(Motion::default()));
         }
         match self.conversation.poll(now) {
             Due::Send(bytes) => Some(bytes),
@@ -139,9 +159,9 @@ impl Robot {
     }
 
     /// Takes an order of this program; its answer is the next [`Self::notice`].
-    pub fn ask(&mut self, order: Order) {
+    pub fn ask(&mut self, order: Order, now: Instant) {
         let (nobody, _) = sync_channel(1);
-        self.order(Ordered::new(order, nobody));
+        self.order(Ordered::new(order, nobody), now);
     }
 
     /// The answer to the last order, in words; empty before the first.
@@ -156,10 +176,19 @@ impl Robot {
         self.recording.as_ref().map(|(_, path)| path.as_path())
     }
 
-    fn order(&mut self, ordered: Ordered) {
+    fn order(&mut self, ordered: Ordered, now: Instant) {
         let reply = match (ordered.order, ordered.order.command()) {
-            (_, Some(_)) if !self.scene.commands => {
+            (_, Some(_)) | (Order::Drive { .. } | Order::Leave, _) if !self.scene.commands => {
                 Reply::refused("this connection can only be read")
+            }
+            (Order::Drive { speed, turn }, _) => {
+                let (speed, turn) = (MetresPerSecond(speed), RadiansPerSecond(turn));
+                return ordered.answer(self.hold(Motion { speed, turn }, now));
+            }
+            (Order::Leave, _) => {
+                self.held = None;
+                self.drive(None);
+                Reply::done("the robot is left to itself")
             }
             (_, Some(command)) if self.conversation.add(command) => {
                 self.waiting.push_back(ordered);
@@ -209,11 +238,28 @@ impl Robot {
         ordered.answer(reply);
     }
 
+    /// Drives with a motion as long as a page repeats it.
+    fn hold(&mut self, motion: Motion, now: Instant) -> Reply {
+        let until = now + HELD;
+        match &mut self.held {
+            Some(held) if held.motion == motion => held.until = until,
+            _ => {
+                self.held = Some(Held { motion, until, is_refused: false });
+                self.drive(Some(motion));
+            }
+        }
+        let is_refused = self.held.is_some_and(|held| held.is_refused);
+        if is_refused { Reply::refused(&self.notice) } else { Reply::done("") }
+    }
+
     /// The answer to a motion: another one than done ends the motion.
     fn driven(&mut self, result: Option<CommandResult>) {
         match result {
             Some(CommandResult::Refused(reason)) => {
                 self.drive(None);
+                if let Some(held) = &mut self.held {
+                    held.is_refused = true;
+                }
                 self.note(&format!("drive: the robot refuses: {reason}"));
             }
             Some(_) => {}

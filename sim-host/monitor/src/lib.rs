@@ -10,6 +10,7 @@
 //! | [`sealed`] | the file of a log, with checksums and an end |
 //! | [`conversation`] | the commands of a session, repeated until they are acknowledged |
 //! | [`request`] | one command |
+//! | [`route`] | driving along a route |
 //! | [`teleoperation`] | driving by keys |
 //! | [`wheels`] | the travel of the wheels |
 //! | [`hints`] | what the telemetry suggests to check |
@@ -21,6 +22,7 @@ pub mod hints;
 pub mod port;
 pub mod recording;
 pub mod request;
+pub mod route;
 pub mod sealed;
 pub mod signs;
 pub mod simulated;

@@ -94,6 +94,17 @@ pub fn ask_and_watch(
     Err(silence(receiver.counters()))
 }
 
+/// What a program that drives does next.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Control {
+    /// The motion before stays.
+    Keep,
+    /// The robot drives with this motion.
+    Drive(Motion),
+    /// The robot stands, and the program ends.
+    Stop,
+}
+
 /// Drives with this motion, which is renewed until `is_over`; then the robot stands. Returns how it ended: `Done`, or the
 /// refusal.
 ///
@@ -104,20 +115,49 @@ pub fn drive(
     motion: Motion,
     mut is_over: impl FnMut() -> bool,
 ) -> anyhow::Result<CommandResult> {
+    let mut has_begun = false;
+    steer(port, |_| {
+        if is_over() {
+            Control::Stop
+        } else if std::mem::replace(&mut has_begun, true) {
+            Control::Keep
+        } else {
+            Control::Drive(motion)
+        }
+    })
+}
+
+/// Drives as `control` decides, with each message of the robot, and without one at least every 100 ms. A motion is renewed until
+/// another one. Returns how it ended: `Done`, or the refusal of a motion.
+///
+/// # Errors
+/// As [`ask`].
+pub fn steer(
+    port: &mut Port,
+    mut control: impl FnMut(Option<&Telemetry>) -> Control,
+) -> anyhow::Result<CommandResult> {
     let mut conversation = Conversation::default();
     let mut receiver = Receiver::<Telemetry>::new();
     let mut is_stopping = false;
-    conversation.drive(Some(motion));
+    let mut received = Vec::new();
     loop {
-        if !is_stopping && is_over() {
-            is_stopping = true;
-            conversation.drive(Some(Motion::default()));
+        for message in received.drain(..).map(Some).chain([None]) {
+            match (is_stopping, control(message.as_ref())) {
+                (true, _) | (_, Control::Keep) => {}
+                (false, Control::Drive(motion)) => conversation.drive(Some(motion)),
+                (false, Control::Stop) => {
+                    is_stopping = true;
+                    conversation.drive(Some(Motion::default()));
+                }
+            }
         }
         let mut due = conversation.poll(Instant::now());
         if due == Due::Nothing {
             let answer = port.read(|bytes| {
-                let answers = bytes.iter().filter_map(|&byte| match receiver.push(byte)?.message {
-                    Telemetry::Ack(ack) => conversation.take(&ack),
+                let messages = bytes.iter().filter_map(|&byte| receiver.push(byte));
+                received.extend(messages.map(|frame| frame.message));
+                let answers = received.iter().filter_map(|message| match message {
+                    Telemetry::Ack(ack) => conversation.take(ack),
                     _ => None,
                 });
                 Ok(ControlFlow::Break(answers.last()))

@@ -1,75 +1,21 @@
 //! A virtual robot by its own time, without a port.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test should stop")]
 
-use std::path::Path;
+#[path = "support/bench.rs"]
+mod bench;
 
 use sonarfix::geometry::units::{MetresPerSecond, RadiansPerSecond};
 use sonarfix_link::message::CommandError;
-use sonarfix_link::{
-    Command, CommandResult, Motion, Receiver, Sender, SessionCommand, Telemetry, frame,
-};
-use sonarfix_map::Scenario;
+use sonarfix_link::{Command, CommandResult, Motion, Telemetry};
 use sonarfix_sim::trace::Pose;
-use sonarfix_virtual_robot::robot::{Parts, VirtualRobot};
+use sonarfix_virtual_robot::robot::Parts;
 
-const SECOND: u64 = 1_000_000;
+use bench::{Bench, SECOND};
+
 const AHEAD: Motion = Motion { speed: MetresPerSecond(0.2), turn: RadiansPerSecond(0.5) };
 
 fn classroom() -> Parts {
-    let scenarios =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../crates/sonarfix-map/scenarios");
-    Parts::new(Scenario::read(&scenarios.join("classroom.toml")).unwrap()).unwrap()
-}
-
-/// A robot with a PC at its link.
-struct Bench<'p> {
-    robot: VirtualRobot<'p>,
-    sender: Sender<SessionCommand>,
-    receiver: Receiver<Telemetry>,
-    session: u32,
-}
-
-impl<'p> Bench<'p> {
-    fn new(parts: &'p Parts, stands: bool) -> Self {
-        let robot = VirtualRobot::switched_on(parts, 1, stands).unwrap();
-        let (sender, receiver) = (Sender::starting_at(1), Receiver::new());
-        let mut bench = Self { robot, sender, receiver, session: 0 };
-        let CommandResult::Session(session) = bench.order(&Command::OpenSession) else {
-            panic!("no session")
-        };
-        bench.session = session;
-        bench
-    }
-
-    fn wait(&mut self, micros: u64) -> Vec<Telemetry> {
-        self.robot.run_to(self.robot.now() + micros);
-        let sent = self.robot.take_sent();
-        let frames = sent.into_iter().filter_map(|byte| self.receiver.push(byte));
-        frames.map(|frame| frame.message).collect()
-    }
-
-    fn order(&mut self, command: &Command) -> CommandResult {
-        let message = SessionCommand { session: self.session, command: *command };
-        let sequence = self.sender.next();
-        self.robot.receive(self.sender.frame(&message, &mut frame::EMPTY.clone()));
-        for _ in 0..100 {
-            for telemetry in self.wait(1_000) {
-                match telemetry {
-                    Telemetry::Ack(ack) if ack.sequence == sequence => return ack.result,
-                    _ => {}
-                }
-            }
-        }
-        panic!("no answer to {command:?}")
-    }
-
-    fn run(&mut self, parts: &Parts) {
-        let start = parts.start().unwrap();
-        for command in [Command::SetPose(start), Command::Start] {
-            assert_eq!(self.order(&command), CommandResult::Done);
-        }
-        self.wait(SECOND / 2);
-    }
+    Parts::new(bench::classroom()).unwrap()
 }
 
 fn distance(one: Pose, other: Pose) -> f64 {
@@ -80,8 +26,8 @@ fn distance(one: Pose, other: Pose) -> f64 {
 #[test]
 fn the_wheels_stop_within_350_ms_of_the_last_command() {
     let parts = classroom();
-    let mut bench = Bench::new(&parts, true);
-    bench.run(&parts);
+    let mut bench = Bench::new(&parts, 1, true);
+    bench.run(parts.start().unwrap());
     let begin = bench.robot.pose();
     for _ in 0..20 {
         assert_eq!(bench.order(&Command::Drive(AHEAD)), CommandResult::Done);
@@ -102,14 +48,14 @@ fn the_wheels_stop_within_350_ms_of_the_last_command() {
 #[test]
 fn a_robot_waits_for_commands_and_then_tracks_the_commanded_motion() {
     let parts = classroom();
-    let mut bench = Bench::new(&parts, true);
+    let mut bench = Bench::new(&parts, 1, true);
     // `Hello` comes every ten seconds.
     let telemetry = bench.wait(11 * SECOND);
     assert!(telemetry.iter().any(|message| matches!(message, Telemetry::Hello(_))));
     assert!(!telemetry.iter().any(|message| matches!(message, Telemetry::Estimate(_))));
     let waiting = CommandResult::Refused(CommandError::Waiting);
     assert_eq!(bench.order(&Command::Drive(AHEAD)), waiting);
-    bench.run(&parts);
+    bench.run(parts.start().unwrap());
     for _ in 0..100 {
         assert_eq!(bench.order(&Command::Drive(AHEAD)), CommandResult::Done);
         bench.wait(100_000);
@@ -128,8 +74,8 @@ fn a_robot_waits_for_commands_and_then_tracks_the_commanded_motion() {
 fn without_a_command_it_follows_the_path_of_the_scenario_or_stands() {
     let parts = classroom();
     let driven = [true, false].map(|stands| {
-        let mut bench = Bench::new(&parts, stands);
-        bench.run(&parts);
+        let mut bench = Bench::new(&parts, 1, stands);
+        bench.run(parts.start().unwrap());
         let begin = bench.robot.pose();
         bench.wait(5 * SECOND);
         let driven = distance(begin, bench.robot.pose());
@@ -156,8 +102,8 @@ fn without_a_command_it_follows_the_path_of_the_scenario_or_stands() {
 #[test]
 fn a_stopped_loop_stops_the_wheels() {
     let parts = classroom();
-    let mut bench = Bench::new(&parts, false);
-    bench.run(&parts);
+    let mut bench = Bench::new(&parts, 1, false);
+    bench.run(parts.start().unwrap());
     assert_eq!(bench.order(&Command::Stop), CommandResult::Done);
     let there = bench.robot.pose();
     bench.wait(5 * SECOND);

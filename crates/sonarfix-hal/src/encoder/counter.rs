@@ -72,9 +72,10 @@ impl<F: FnMut() -> u32> Counter for Count32<F> {
     }
 }
 
-/// Unwraps a counter.
+/// The position of a counter, without its wrap-around.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Unwrapped {
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Unwrapped {
     last: Option<u32>,
     position: i64,
 }

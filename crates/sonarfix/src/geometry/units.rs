@@ -21,7 +21,8 @@ pub type Duration = fugit::Duration<u64, 1, 1_000_000>;
     clippy::cast_precision_loss,
     reason = "durations are a small part of an hour, where microseconds are negligible"
 )]
-pub(crate) fn seconds(duration: Duration) -> f32 {
+#[must_use]
+pub fn seconds(duration: Duration) -> f32 {
     // The conversion of 64 bits would be a call on a microcontroller.
     u32::try_from(duration.to_micros()).unwrap_or(u32::MAX) as f32 * 1e-6
 }

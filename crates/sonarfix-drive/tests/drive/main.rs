@@ -1,0 +1,7 @@
+//! The controllers on models of what they control.
+#![expect(clippy::unwrap_used, reason = "a test should stop")]
+
+mod motor;
+mod obstacles;
+mod pursuit;
+mod wheel;
