@@ -14,6 +14,7 @@ const axe = readFileSync(require.resolve("axe-core/axe.min.js"), "utf8");
 const WIDTH = 400; // CSS pixels: a phone
 const PATIENCE = 300_000; // milliseconds: beyond these the page hangs
 const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml" };
+const PLAYGROUND = "playground/index.html";
 
 const pages = readdirSync(site, { recursive: true }).filter((name) => extname(name) === ".html").sort();
 let faults = 0;
@@ -64,8 +65,21 @@ async function useBook(page, where) {
   if (!found.some((link) => link.includes("docs/model.html"))) fault(where, `the search does not find the model`);
 }
 
+// The first scene moves in the first frames.
+async function usePlayground(page, where) {
+  const [start, later] = await page.evaluate(async () => {
+    const { data, state } = playground.player();
+    for (let frame = 0; frame < 3; frame += 1) await new Promise(requestAnimationFrame);
+    return [data.ticks.time[0], state.time];
+  });
+  if (!(later > start)) fault(where, "the scene does not move");
+  const paint = await page.evaluate(() => performance.getEntriesByName("first-contentful-paint")[0]?.startTime);
+  console.log(`${where}: first paint after ${paint?.toFixed(0)} ms`);
+}
+
 async function open(page, base, name, where) {
   await page.goto(base + name, { waitUntil: "load" });
+  if (name === PLAYGROUND) await usePlayground(page, where);
   await page.evaluate(axe);
   await check(page, where);
   if (name === "index.html") await useBook(page, where);

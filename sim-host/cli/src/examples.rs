@@ -74,6 +74,7 @@ pub const EXAMPLES: [(&str, &[&str]); 33] = [
         "flash",
         &[
             "sonarfix flash robot --board pico",
+            "sonarfix flash robot --board pico --port /dev/ttyUSB0",
             "sonarfix flash robot --board pico2 --out robot.uf2",
             "sonarfix flash robot --board esp32c6 --dry-run",
         ],

@@ -1,22 +1,25 @@
 //! `sonarfix flash`: program, configuration and map into the flash of a board.
 
+mod hello;
 mod tool;
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use anyhow::{Context, ensure};
-use sonarfix::map::image::checksum;
 use sonarfix_boards::drive::{self, Drive};
 use sonarfix_boards::image::Image;
 use sonarfix_boards::{Board, Region, Uf2, uf2};
 use sonarfix_map::MapFile;
 
 use crate::{config, map};
+use hello::{Flashed, Link};
 
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "A Pico or Pico 2 takes one file on its USB drive: hold BOOTSEL while you plug it in. For other boards the command of \
-                  probe-rs or espflash is printed and run. What the robot has stored, as its calibration, stays."
+                  probe-rs or espflash is printed and run. What the robot has stored, as its calibration, stays. With --port the first \
+                  Hello of the robot is compared with what was flashed."
 )]
 pub struct Args {
     /// The folder with `robot.toml` and `map.toml`, as `sonarfix init` writes it.
@@ -37,6 +40,15 @@ pub struct Args {
     /// Checks everything, prints what would be done, and writes nothing.
     #[arg(long)]
     dry_run: bool,
+    /// The robot's link: a serial port or `tcp:HOST:PORT`, at which its `Hello` is waited for after flashing.
+    #[arg(long)]
+    port: Option<String>,
+    /// Baud rate of a serial port.
+    #[arg(long, default_value_t = 115_200, requires = "port")]
+    baud: u32,
+    /// How long the robot's `Hello` is waited for.
+    #[arg(long, value_name = "SECONDS", default_value_t = 30, requires = "port")]
+    wait: u32,
 }
 
 /// What goes into the flash beside the program.
@@ -44,6 +56,7 @@ struct Part {
     what: &'static str,
     region: Region,
     bytes: Vec<u8>,
+    checksum: u32,
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
@@ -54,17 +67,30 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let parts = parts(args, &board)?;
     let program = program(args, &board)?;
     if let Some(usb) = &board.uf2 {
-        return over_usb(args, &board, usb, &program, &parts);
+        over_usb(args, &board, usb, &program, &parts)?;
+    } else {
+        ensure!(
+            args.to.is_none() && args.out.is_none(),
+            "the {} takes no UF2: leave out --to and --out",
+            board.title
+        );
+        let images = parts.each_ref().map(|part| (part.region.address, part.bytes.as_slice()));
+        tool::flash(&args.robot, args.dry_run, &board, &program, images)?;
     }
-    ensure!(
-        args.to.is_none() && args.out.is_none(),
-        "the {} takes no UF2: leave out --to and --out",
-        board.title
-    );
-    let images = parts.each_ref().map(|part| (part.region.address, part.bytes.as_slice()));
-    tool::flash(&args.robot, args.dry_run, &board, &program, images)?;
-    print_next(args.dry_run);
-    Ok(())
+    if args.dry_run { Ok(()) } else { check(args, &parts) }
+}
+
+/// Compares the robot with what was flashed, if its port is named.
+fn check(args: &Args, [configuration, map]: &[Part; 2]) -> anyhow::Result<()> {
+    let Some(port) = &args.port else {
+        if args.out.is_none() || args.to.is_some() {
+            println!("the board restarts; next: sonarfix monitor --port PORT --signs-of-life");
+        }
+        return Ok(());
+    };
+    let flashed = Flashed { configuration: configuration.checksum, map: map.checksum };
+    let link = Link { name: port, baud: args.baud };
+    hello::check(link, Duration::from_secs(args.wait.into()), flashed, &args.robot)
 }
 
 /// The baked configuration and map of the robot; prints what a robot reports of them.
@@ -77,13 +103,18 @@ fn parts(args: &Args, board: &Board) -> anyhow::Result<[Part; 2]> {
     );
     let baked = config::bake(&robot, None, Some(board.name.as_str()))?;
     let image = map::image(&MapFile::read(&map, None)?)?;
-    let sums = [baked.checksum, checksum(&image)];
+    let checksum = map::seal(&image);
     let parts = [
-        Part { what: "the configuration", region: board.config, bytes: baked.bytes },
-        Part { what: "the map", region: board.map, bytes: image },
+        Part {
+            what: "the configuration",
+            region: board.config,
+            bytes: baked.bytes,
+            checksum: baked.checksum,
+        },
+        Part { what: "the map", region: board.map, bytes: image, checksum },
     ];
-    for ((part, file), sum) in parts.iter().zip([&robot, &map]).zip(sums) {
-        let Part { what, region: Region { address, bytes: most }, bytes } = part;
+    for (part, file) in parts.iter().zip([&robot, &map]) {
+        let Part { what, region: Region { address, bytes: most }, bytes, checksum } = part;
         let length = bytes.len();
         ensure!(
             length <= *most as usize,
@@ -92,7 +123,7 @@ fn parts(args: &Args, board: &Board) -> anyhow::Result<[Part; 2]> {
             board.title
         );
         println!(
-            "{}: {what}, {length} bytes at {address:#010x}, checksum {sum:08x}",
+            "{}: {what}, {length} bytes at {address:#010x}, checksum {checksum:08x}",
             file.display()
         );
     }
@@ -163,7 +194,7 @@ fn over_usb(
         board.config.address
     );
     println!("{name}: the program, {} bytes at {first:#010x}", image.flat().len());
-    for Part { what, region, bytes } in parts {
+    for Part { what, region, bytes, .. } in parts {
         image.add(what, region.address, bytes)?;
     }
     let file = uf2::write(&image, usb.family)?;
@@ -188,12 +219,5 @@ fn over_usb(
         drive::copy(&file, &to)?;
     }
     wrote(&to);
-    print_next(args.dry_run);
     Ok(())
-}
-
-fn print_next(is_dry: bool) {
-    if !is_dry {
-        println!("the board restarts; next: sonarfix monitor --port PORT --signs-of-life");
-    }
 }

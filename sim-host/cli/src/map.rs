@@ -8,7 +8,6 @@ use serde::Serialize;
 use sonarfix::config::{Config, RangerParameters};
 use sonarfix::geometry::units::Metres;
 use sonarfix::map::Map;
-use sonarfix::map::image::checksum;
 use sonarfix_map::{
     Finding, Limits, MapFile, Mistake, NamedWall, Severity, Symmetry, bake, flaws, plausibility,
     robot_file, simplify, symmetries,
@@ -277,6 +276,11 @@ fn usual_sonar() -> RangerParameters {
     Config::for_track_width(Metres(0.16)).rangers.first
 }
 
+/// The checksum at the end of an image, which a robot reports.
+pub fn seal(image: &[u8]) -> u32 {
+    image.last_chunk().copied().map_or(0, u32::from_le_bytes)
+}
+
 /// The image of a map.
 ///
 /// # Errors
@@ -318,7 +322,7 @@ fn write_image(map: &MapFile, out: &Path, is_json: bool) -> anyhow::Result<()> {
         cell_size: grid.cell_size().0,
     });
     if is_json {
-        let checksum = format!("{:08x}", checksum(&image));
+        let checksum = format!("{:08x}", seal(&image));
         return json::print(&JsonImage { out, walls, bytes, checksum, grid });
     }
     if let Some(JsonGrid { columns, rows, cell_size }) = grid {

@@ -3,6 +3,8 @@
 #![expect(clippy::unwrap_used, reason = "a test should stop")]
 
 use std::fs;
+use std::io::{BufRead, BufReader};
+use std::net::TcpListener;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
@@ -13,6 +15,7 @@ use tempfile::TempDir;
 
 use crate::common::{MAP, ROBOT};
 use crate::endings::errors;
+use crate::virtual_robot::Robot;
 
 /// The addresses of docs/firmware.md, and the families of the UF2 list.
 const PICO: Place = Place { config: 0x1010_0000, map: 0x1018_0000, family: 0xe48b_ff56 };
@@ -207,4 +210,85 @@ fn a_board_without_a_drive_is_flashed_by_its_tool() {
         assert!(made.last().unwrap().starts_with(last), "{made:?}");
         assert!(made.iter().all(|call| text.contains(call)), "{text}");
     }
+}
+
+/// The output of flashing a drive with the robot of a folder that `init` has made, whose `Hello` arrives at a port.
+fn flash_and_wait(dir: &TempDir, port: &str, seconds: u32) -> Result<String, String> {
+    let to = "robot --board pico --program pico.uf2 --to drive";
+    run(dir, &format!("{to} --port {port} --wait {seconds}"))
+}
+
+/// A folder with the robot of `init`, and that robot at a socket, with the configuration and the map of its scenario.
+fn virtual_robot() -> (TempDir, Robot, String) {
+    let dir = folder();
+    drive(&dir, "RPI-RP2");
+    fs::remove_dir_all(dir.path().join("robot")).unwrap();
+    let mut init = Command::new(env!("CARGO_BIN_EXE_sonarfix"));
+    init.args(["init", "robot", "--board", "pico"]).current_dir(dir.path()).stdin(Stdio::null());
+    assert!(init.output().unwrap().status.success());
+    let scenario = dir.path().join("robot/scenario.toml").display().to_string();
+    let robot = Robot::with(&[&scenario, "--stand", "--tcp", "0"]);
+    let port = robot.ports.last().unwrap().clone();
+    (dir, robot, port)
+}
+
+#[test]
+fn the_hello_of_the_robot_is_compared_with_what_was_flashed() {
+    let (dir, _robot, port) = virtual_robot();
+    let text = flash_and_wait(&dir, &port, 60).unwrap();
+    assert!(text.contains("has this configuration and this map"), "{text}");
+    for (file, from, to, reasons) in [
+        (
+            "robot/robot.toml",
+            "track_width = \"121 mm\"",
+            "track_width = \"122 mm\"",
+            ["the robot's configuration is", "set-configuration"],
+        ),
+        ("robot/map.toml", "[4.0, 0.0]", "[4.01, 0.0]", ["the robot's map is", "flash it again"]),
+    ] {
+        let path = dir.path().join(file);
+        let text = fs::read_to_string(&path).unwrap();
+        assert!(text.contains(from), "{text}");
+        fs::write(&path, text.replace(from, to)).unwrap();
+        let error = flash_and_wait(&dir, &port, 60).unwrap_err();
+        assert!(reasons.iter().all(|reason| error.contains(reason)), "{error}");
+        let differs = error.lines().filter(|line| line.contains("as flashed")).count();
+        assert_eq!(differs, 1, "{error}");
+        fs::write(&path, text).unwrap();
+    }
+}
+
+#[test]
+fn a_robot_that_is_silent_or_absent_is_an_error_with_its_causes() {
+    let dir = folder();
+    drive(&dir, "RPI-RP2");
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = format!("tcp:{}", listener.local_addr().unwrap());
+    let silent = flash_and_wait(&dir, &port, 1).unwrap_err();
+    let reasons = ["1 s at most", "no Hello", "TX and RX"];
+    assert!(reasons.iter().all(|reason| silent.contains(reason)), "{silent}");
+    drop(listener);
+    let absent = flash_and_wait(&dir, &port, 1).unwrap_err();
+    assert!(absent.contains("cannot open the port"), "{absent}");
+    // The file is written all the same.
+    check(&dir, &dir.path().join("drive/sonarfix-pico.uf2"), &PICO);
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_ends_the_wait() {
+    use std::os::unix::process::ExitStatusExt;
+    let dir = folder();
+    drive(&dir, "RPI-RP2");
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = format!("tcp:{}", listener.local_addr().unwrap());
+    let to = "flash robot --board pico --program pico.uf2 --to drive --wait 600 --port";
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sonarfix"));
+    command.args(to.split(' ')).arg(port).current_dir(dir.path()).stdout(Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    lines.find(|line| line.as_ref().unwrap().contains("waiting for Hello")).unwrap().unwrap();
+    let id = child.id().to_string();
+    assert!(Command::new("kill").args(["-s", "INT", &id]).status().unwrap().success());
+    assert_eq!(child.wait().unwrap().signal(), Some(2));
 }

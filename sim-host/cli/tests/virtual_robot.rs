@@ -8,17 +8,22 @@ use std::process::{Child, ChildStdout, Command, Output, Stdio};
 use crate::endings::CLASSROOM;
 
 /// A virtual robot that ends with the test.
-struct Robot {
+pub struct Robot {
     child: Child,
-    ports: Vec<String>,
+    pub ports: Vec<String>,
     /// Open until the robot ends: it may print more.
     _printed: Lines<BufReader<ChildStdout>>,
 }
 
 impl Robot {
     fn new() -> Self {
+        Self::with(&[CLASSROOM, "--stand"])
+    }
+
+    pub fn with(arguments: &[&str]) -> Self {
         let mut child = Command::new(env!("CARGO_BIN_EXE_sonarfix"))
-            .args(["virtual-robot", CLASSROOM, "--stand"])
+            .arg("virtual-robot")
+            .args(arguments)
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();

@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read, Seek, Write};
-use std::net::TcpStream;
+use std::net::{TcpStream, ToSocketAddrs};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Duration;
@@ -12,6 +12,9 @@ use serial2::SerialPort;
 
 /// Timeout of a read, so that the reader can check the time.
 const TIMEOUT: Duration = Duration::from_millis(100);
+
+/// Timeout of a connection to a socket.
+const CONNECTION: Duration = Duration::from_secs(5);
 
 /// A connection to a robot.
 pub struct Port {
@@ -50,7 +53,14 @@ impl Port {
     }
 
     fn socket(address: &str) -> io::Result<Self> {
-        let stream = TcpStream::connect(address)?;
+        let mut stream = Err(io::Error::new(ErrorKind::InvalidInput, "the host has no address"));
+        for address in address.to_socket_addrs()? {
+            stream = TcpStream::connect_timeout(&address, CONNECTION);
+            if stream.is_ok() {
+                break;
+            }
+        }
+        let stream = stream?;
         stream.set_read_timeout(Some(TIMEOUT))?;
         let writer = stream.try_clone()?;
         Ok(Self { reader: Box::new(stream), writer: Some(Box::new(writer)) })

@@ -1,7 +1,7 @@
 //! The functions that the page calls: plain C functions, so that no tool has to generate glue code.
 //!
 //! The page asks for room for a request (`request`), writes it there, and calls `run`, which returns the length of the
-//! answer at `answer`. `classroom` makes the scenario the answer.
+//! answer at `answer`. `scenes` makes the scenes of the tour the answer.
 
 #![expect(unsafe_code, reason = "a function that WebAssembly exports by name needs `no_mangle`")]
 
@@ -42,10 +42,10 @@ pub extern "C" fn file() -> usize {
     answer_with(crate::file(&String::from_utf8_lossy(&request)))
 }
 
-/// Makes the scenario `classroom` the answer, and returns its length.
+/// Makes the scenes of the tour the answer, and returns its length.
 #[unsafe(no_mangle)]
-pub extern "C" fn classroom() -> usize {
-    answer_with(crate::classroom())
+pub extern "C" fn scenes() -> usize {
+    answer_with(crate::scenes())
 }
 
 /// The address of the answer, UTF-8.

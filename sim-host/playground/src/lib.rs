@@ -7,6 +7,7 @@
 //! | module | what |
 //! |---|---|
 //! | [`request`] | what the page asks for, and how it becomes a simulation |
+//! | [`scenes`](mod@scenes) | the scenes of the tour |
 //! | [`digest`] | a hash of all bits of a run, to compare machines |
 //! | `exports` | the functions that the page calls, in WebAssembly |
 //! | `main.rs` | the program that writes the page |
@@ -15,6 +16,7 @@ pub mod digest;
 #[cfg(target_arch = "wasm32")]
 mod exports;
 pub mod request;
+pub mod scenes;
 
 use serde::Serialize;
 use sonarfix_sim::simulate::SimulationError;
@@ -85,11 +87,10 @@ pub fn file(request: &str) -> String {
     request.map(|request| request.scenario.to_string()).unwrap_or_default()
 }
 
-/// The scenario `classroom` as JSON, with the keys of its file.
+/// The scenes of the tour in JSON.
 #[must_use]
-pub fn classroom() -> String {
-    let table = sonarfix_map::CLASSROOM.parse::<toml::Table>().unwrap_or_default();
-    serde_json::to_string(&table).unwrap_or_default()
+pub fn scenes() -> String {
+    serde_json::to_string(&scenes::all().unwrap_or_default()).unwrap_or_default()
 }
 
 #[cfg(test)]
@@ -97,7 +98,7 @@ mod tests {
     use super::*;
 
     fn request(change: impl Fn(&mut serde_json::Value)) -> String {
-        let scenario: serde_json::Value = serde_json::from_str(&classroom()).unwrap();
+        let scenario = sonarfix_map::CLASSROOM.parse::<toml::Table>().unwrap();
         let mut request =
             serde_json::json!({ "scenario": scenario, "seed": 0, "seconds": 20.0, "moves": [] });
         change(&mut request);

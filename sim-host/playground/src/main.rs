@@ -6,7 +6,7 @@ use anyhow::{Context, bail};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use sonarfix_playground::request::Request;
-use sonarfix_playground::{classroom, run};
+use sonarfix_playground::run;
 use sonarfix_report::{DRAWING, SCRIPT, fill, player, style};
 
 /// The seeds that the page checks with `#check`.
@@ -36,6 +36,7 @@ fn write(program: &Path, page: &Path) -> anyhow::Result<()> {
         ("player-script", SCRIPT),
         ("simulator", include_str!("simulator.js")),
         ("handles", include_str!("handles.js")),
+        ("address", include_str!("address.js")),
         ("script", include_str!("playground.js")),
     ];
     let text = fill(include_str!("page.html"), &values.map(|(name, text)| (name, text.into())));
@@ -44,7 +45,7 @@ fn write(program: &Path, page: &Path) -> anyhow::Result<()> {
 
 /// The hashes of runs of `classroom` on this computer, in one line.
 fn print(seconds: f64) -> anyhow::Result<()> {
-    let scenario: toml::Table = serde_json::from_str(&classroom())?;
+    let scenario: toml::Table = toml::from_str(sonarfix_map::CLASSROOM)?;
     let digest = |seed| {
         let request =
             Request { scenario: scenario.clone(), seed, seconds, moves: vec![], searches: false };

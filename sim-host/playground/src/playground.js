@@ -13,6 +13,7 @@ const playground = (() => {
   const FIELDS = [
     { label: "Policy", keys: ["robot.schedule.policy"], options: ["informative", "nearest"] },
     { label: "Sonar", keys: ["sensor.model", "robot.echo.sensor"], options: SONARS },
+    { label: "Reach of the sonar", keys: ["robot.sonar.max_range"], unit: "m", step: 0.5, from: 0.2, to: 10 },
     { label: "Range noise of the sonar \"ideal\"", keys: ["truth.range_noise"], unit: "mm", step: 1, from: 0, to: 100 },
     { label: "Range noise that the robot assumes", keys: ["robot.sonar.noise"], unit: "mm", step: 1, from: 1, to: 100 },
     { label: "Time between pings", keys: ["robot.sonar.fix_period"], unit: "ms", step: 50, from: 100, to: 5000 },
@@ -28,8 +29,9 @@ const playground = (() => {
     { label: "Seed", run: "seed", step: 1, from: 0, to: 999999 },
   ];
 
+  const scenes = simulator.scenes();
   const state = {
-    request: { scenario: simulator.classroom(), seed: 0, seconds: 120, moves: [], searches: false },
+    scene: null, request: null,
     past: [],                  // earlier requests as JSON, for `undo`
     handles: [], selected: null, dragged: null, place: null,
   };
@@ -60,6 +62,7 @@ const playground = (() => {
     if (answer.error) { player?.draw(); return; }
     if (player) player.replace(answer.run); else player = openPlayer(answer.run, { overlay, isBusy: () => state.dragged !== null });
     showResult(answer.summary, took);
+    history.replaceState(null, "", Address.write(state.scene, state.request));
   }
 
   function showResult({ digest, verdict, position_rms: rms, cycles }, took) {
@@ -71,6 +74,40 @@ const playground = (() => {
     };
     for (const [name, text] of Object.entries(texts)) document.querySelector(`[data-result="${name}"]`).textContent = text;
   }
+
+  // ---- Scenes ----
+
+  // Shows the scene of an address with its changes, and plays it.
+  function open(address) {
+    Object.assign(state, Address.read(address, scenes), { past: [], selected: null });
+    compute();
+    if (!player) {             // the changes in the address have no run
+      const { textContent } = element("error");
+      state.request = structuredClone(state.scene.request);
+      compute();
+      Object.assign(element("error"), { textContent, hidden: false });
+    }
+    showScene();
+    showFields();
+    player.goTo(-Infinity);
+    if (!player.state.playing && !matchMedia("(prefers-reduced-motion: reduce)").matches) player.setPlaying(true);
+  }
+
+  function showScene() {
+    const { name, title, shows, exercise } = state.scene;
+    Object.entries({ title, shows, exercise }).forEach(([part, text]) => { element(`scene-${part}`).textContent = text; });
+    for (const link of document.querySelectorAll("#scenes a")) {
+      if (link.hash === `#scene=${name}`) link.setAttribute("aria-current", "page"); else link.removeAttribute("aria-current");
+    }
+  }
+
+  function sceneLink({ name, title }) {
+    const item = document.createElement("li");
+    item.append(Object.assign(document.createElement("a"), { href: `#scene=${name}`, textContent: title }));
+    return item;
+  }
+
+  // ---- Changes ----
 
   // Applies a change that can be undone.
   function change(apply) {
@@ -199,7 +236,9 @@ const playground = (() => {
 
   // The path to follow and the handles, while the run is paused.
   function overlay(g) {
-    if (!player || player.state.playing) return;
+    const isPaused = Boolean(player) && !player.state.playing;
+    element("stage").classList.toggle("paused", isPaused);
+    if (!isPaused) return;
     const { screenAt, colours } = player.picture;
     const { scenario: { path, map } } = state.request;
     g.save();
@@ -264,7 +303,7 @@ const playground = (() => {
     "add-box": () => { const [x, y] = free(); add({ from: Handles.rounded([x - 0.4, y]), to: Handles.rounded([x + 0.4, y]) }); },
     delete: () => { const handle = selected(); if (handle?.remove) change(() => handle.remove()); },
     download,
-    reset: () => change((request) => Object.assign(request, { scenario: simulator.classroom(), moves: [] })),
+    reset: () => change((request) => Object.assign(request, structuredClone(state.scene.request))),
   };
 
   const KEYS = {
@@ -276,8 +315,9 @@ const playground = (() => {
   };
 
   FIELDS.forEach(makeField);
-  compute();
-  showFields();
+  element("scenes").append(...scenes.map(sceneLink));
+  open(location.hash);
+  window.addEventListener("hashchange", () => open(location.hash));
   element("scenario").addEventListener("submit", (event) => event.preventDefault());
   for (const [id, act] of Object.entries(BUTTONS)) element(id).addEventListener("click", act);
   const stage = element("stage");
@@ -285,5 +325,5 @@ const playground = (() => {
   stage.addEventListener("pointermove", onMove);
   for (const name of ["pointerup", "pointercancel"]) stage.addEventListener(name, onUp);
   stage.addEventListener("keydown", (event) => KEYS[event.key.toLowerCase()]?.(event));
-  return { simulator, state, player: () => player };
+  return { scenes, simulator, state, open, player: () => player };
 })();

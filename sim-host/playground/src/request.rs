@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use sonarfix_map::{Fidelity, FileError, Follow, Scenario};
 use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::trace::Pose;
@@ -14,7 +14,7 @@ pub const MOST_SECONDS: f64 = 3_600.0;
 const FARTHEST: f64 = 1_000.0;
 
 /// A request.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Request {
     /// The scenario, with the keys of a scenario file.
     pub scenario: toml::Table,
@@ -31,7 +31,7 @@ pub struct Request {
 }
 
 /// A kidnapping: the robot is moved elsewhere, without odometry.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Move {
     /// When, seconds since the run began.
     pub at: f64,

@@ -14,8 +14,8 @@ const openSimulator = (base64) => {
     new Uint8Array(wasm.memory.buffer, address, bytes.length).set(bytes);
   }
 
-  // The scenario `classroom`.
-  const classroom = () => JSON.parse(answer(wasm.classroom()));
+  // The scenes of the tour.
+  const scenes = () => JSON.parse(answer(wasm.scenes()));
 
   // The run of a request, or an error.
   function run(request) {
@@ -34,5 +34,5 @@ const openSimulator = (base64) => {
     return answer(wasm.file());
   }
 
-  return { classroom, run, file };
+  return { scenes, run, file };
 };

@@ -3,14 +3,25 @@
 // failure to `data-error`.
 {
   const root = document.documentElement;
-  const { simulator, state } = playground;
+  const { scenes, simulator, state } = playground;
   const player = playground.player();
   const assert = (holds, what) => { if (!holds) throw new Error(what); };
   const element = (id) => document.getElementById(id);
   const stage = element("stage");
 
+  // The first scene is played at once; each has a run, a sentence and one thing to try.
+  assert(player.state.playing && state.scene === scenes[0], "the first scene is not played");
+  for (const { name } of scenes) {
+    playground.open(`#scene=${name}`);
+    assert(element("error").hidden && state.scene.name === name, `the scene ${name} has no run`);
+    assert(player.state.playing && player.state.time === player.data.ticks.time[0], `the scene ${name} is not played from its start`);
+    assert(document.querySelectorAll("#scenes [aria-current]").length === 1, "one scene is the current one");
+  }
+  playground.open("#scene=furniture");
+  player.setPlaying(false);
+  const { scenario } = structuredClone(state.request);
+
   const began = performance.now();
-  const scenario = simulator.classroom();
   const runs = [0, 1, 2].map((seed) => simulator.run({ scenario, seed, seconds: Number(root.dataset.seconds), moves: [] }));
   root.dataset.digests = runs.map(({ summary, error }) => summary?.digest ?? error).join(" ");
   root.dataset.milliseconds = (performance.now() - began).toFixed(0);
@@ -58,6 +69,20 @@
   changes("the sonar", () => set("Sonar", "ideal"));
   changes("the noise of the wheels", () => set("Noise of the wheels", "20"));
   changes("undoing", () => element("undo").click());
+
+  // The address has the scene and all changes: opening it gives the same run.
+  const shared = location.hash, sharedDigest = digest();
+  playground.open("#scene=drift");
+  assert(digest() !== sharedDigest, "another scene has another run");
+  playground.open(shared);
+  assert(digest() === sharedDigest && state.scene.name === "furniture", "a shared address has the same run");
+  assert(location.hash === shared, "an opened address stays the same");
+  player.setPlaying(false);
+  changes("a setting", () => set("Seed", "7"));
+  playground.open("#scene=furniture&scenario.robot.sonar.cone=120+deg");
+  assert(!element("error").hidden && element("error").textContent.includes("robot.sonar.cone"), "a mistake in an address is shown");
+  playground.open("#scene=furniture");
+  player.setPlaying(false);
 
   // A wall across the path has no run: the mistake is shown, the last run stays, and undoing removes it.
   const last = digest();
