@@ -120,7 +120,8 @@ proptest! {
         let (progress, motion) = pursuit.drive(&situation);
         prop_assert!((0.0..=LIMITS.speed.0).contains(&motion.speed.0));
         prop_assert!(motion.turn.0.abs() <= LIMITS.turn.0 * 1.001);
-        let must_stand = verdict == Verdict::Lost || !(deviation <= LIMITS.max_deviation.0);
+        let is_certain = deviation <= LIMITS.max_deviation.0;
+        let must_stand = verdict == Verdict::Lost || !is_certain;
         prop_assert!(!must_stand || motion == Motion::default());
         prop_assert_eq!(must_stand, matches!(progress, Progress::Stopped(Reason::Lost | Reason::Uncertain)));
         prop_assert!(progress == Progress::Driving || motion == Motion::default());
