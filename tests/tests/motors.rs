@@ -166,7 +166,7 @@ fn the_wheels_have_the_commanded_speeds() {
             }
         }
         assert_eq!(robot.code.drive(Some(robot.inputs(None))), Drive::STOP);
-        assert_eq!(robot.drive(1_000, None), [0.0; 2]);
+        assert!(robot.drive(1_000, None).iter().all(|speed| speed.abs() < 1e-9));
     }
 }
 

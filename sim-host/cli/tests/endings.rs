@@ -26,7 +26,7 @@ const PAPER: &str = "../../crates/sonarfix-map/scenarios/paper.toml";
 
 /// Every subcommand, with arguments for the shortest output. In `FILES` are a short log with its map and robot, a drive for
 /// the calibration, a recorded stream of a robot's bytes, rows, and room for results; `ROBOT` is the port of a robot.
-const PRINTING: [&[&str]; 47] = [
+const PRINTING: [&[&str]; 48] = [
     &["--help"],
     &["doctor", "--json"],
     &["init", "FILES/robot"],

@@ -115,8 +115,11 @@ impl Order {
                     noise: PositionNoise::circular(Metres(deviation)),
                 },
             },
-            Self::Drive { .. } | Self::Leave => return None,
-            Self::Record { .. } | Self::Pause { .. } | Self::Speed { .. } => return None,
+            Self::Drive { .. }
+            | Self::Leave
+            | Self::Record { .. }
+            | Self::Pause { .. }
+            | Self::Speed { .. } => return None,
         })
     }
 }

@@ -1,5 +1,4 @@
 //! A trip by telemetry and time, without a port.
-#![expect(clippy::unwrap_used, reason = "a test should stop")]
 
 use std::time::{Duration, Instant};
 

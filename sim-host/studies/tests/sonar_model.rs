@@ -38,7 +38,7 @@ fn the_echo_parameters_of_the_nxt_are_fitted() {
     let Some(comparison) = nxt() else {
         return;
     };
-    let fit = EchoFit::of(&comparison.measured).mean;
+    let fit = EchoFit::of(&comparison.measured).far;
     let preset = NXT_ECHO;
     let preset = [preset.missed, preset.short, preset.long].map(f64::from);
     for (fit, preset) in fit.into_iter().zip(preset) {

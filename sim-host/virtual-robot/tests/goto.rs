@@ -1,11 +1,6 @@
 //! Routes in the classroom, by the telemetry and the commands of the link: the robot of the scenario, with bad wheels, in a room with
 //! furniture that is not on its map.
-#![expect(
-    clippy::unwrap_used,
-    clippy::indexing_slicing,
-    clippy::panic,
-    reason = "a test should stop"
-)]
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a test should stop")]
 
 #[path = "support/bench.rs"]
 mod bench;
@@ -234,7 +229,7 @@ fn anywhere_none_collides() {
 #[test]
 fn the_robot_stops_in_front_of_a_box() {
     let mut scenario = classroom();
-    let mut added = scenario.surroundings.obstacles[3].clone();
+    let mut added = scenario.surroundings.obstacles[3];
     added.outline = Outline::Face { from: [3.0, 1.2], to: [3.0, 1.8] };
     scenario.surroundings.obstacles = vec![added];
     let surroundings = surroundings(&scenario);
