@@ -55,8 +55,8 @@ pub struct Inputs {
 #[derive(Debug, Clone, Default)]
 pub struct Commanded {
     pattern: Pattern,
-    /// Whether a motion was commanded since the motors were enabled.
-    was_commanded: bool,
+    /// Whether a motion has been commanded since the motors were enabled.
+    has_moved: bool,
     /// The controllers of the right and the left wheel, while a motion is commanded.
     running: Option<Running>,
 }
@@ -78,10 +78,10 @@ impl Commanded {
         };
         let Some(speeds) = inputs.speeds else {
             self.running = None;
-            let is_free = !self.was_commanded;
+            let is_free = !self.has_moved;
             return if is_free { self.pattern.drive(Some(inputs.estimate)) } else { Drive::STOP };
         };
-        self.was_commanded = true;
+        self.has_moved = true;
         self.running = inputs.wheels.and_then(|wheels| {
             let running = self.running.take();
             obey(running, inputs.now, speeds, wheels)
