@@ -504,7 +504,7 @@ fn forget_second_echo() {
 }
 
 /// Lets the interrupt of the voltage detector end the program when the supply falls below 2.9 V: the level of brown-out resets would be
-/// an option of the chip, which a program can set only for good (RM0090, 5.2.3; PWR_CR: PLS = 7; line 16 of EXTI).
+/// an option of the chip, which a program can set only for good (RM0090, 5.2.3; `PWR_CR`: PLS = 7; line 16 of EXTI).
 fn watch_supply(power: &pac::PWR, lines: &pac::EXTI) {
     power.cr().modify(|_, w| w.pls().set(7).pvde().set_bit());
     lines.rtsr().modify(|_, w| w.tr16().set_bit());
