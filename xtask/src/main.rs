@@ -28,6 +28,7 @@ mod fuzz;
 mod golden;
 mod miri;
 mod mutants;
+mod page;
 mod panics;
 mod pil;
 mod playground;
@@ -88,7 +89,7 @@ enum Task {
     /// The firmware of the Raspberry Pi Pico on an emulated RP2040, with a robot in a room.
     Chips,
     /// Writes docs/boards.md: what has been shown of each board; `--check` compares it.
-    BoardPage(board_page::Args),
+    BoardPage(page::Args),
     /// The template of a further board: instantiated, built, and refused without each of its parts.
     Template,
     /// Flash and RAM of the shipped firmware, by crate.
@@ -134,7 +135,7 @@ enum Task {
     /// Licences of all dependencies, and advisories if their database can be reached.
     Deny,
     /// The dependencies of the `no_std` crates with their lines of `unsafe` code, against docs/unsafe-code.md.
-    UnsafeCode(unsafe_code::Args),
+    UnsafeCode(page::Args),
     /// Records the golden traces, writes the fuzz inputs of messages, and measures and writes `budgets.toml`.
     Bless(BlessArgs),
     /// Measures Sonarfix and its peers (ten minutes).
@@ -171,7 +172,7 @@ fn steps() -> [Step<Task>; 37] {
         ("lint", "lint", Task::Lint),
         ("lint", "docs", Task::Docs),
         ("lint", "deny", Task::Deny),
-        ("lint", "unsafe-code", Task::UnsafeCode(unsafe_code::Args::CHECK)),
+        ("lint", "unsafe-code", Task::UnsafeCode(page::Args::CHECK)),
         ("test", "test-host", Task::TestHost),
         ("random", "endurance", Task::Endurance(endurance::Args::SHORT)),
         ("random", "search-windows", Task::SearchWindows(search_windows::Args::SHORT)),
@@ -195,7 +196,7 @@ fn steps() -> [Step<Task>; 37] {
         ("random", "mutants", Task::Mutants(mutants::Args::short())),
         ("c", "dist", Task::Dist(dist::Args::check())),
         ("emulated", "chips", Task::Chips),
-        ("firmware", "board-page", Task::BoardPage(board_page::Args::CHECK)),
+        ("firmware", "board-page", Task::BoardPage(page::Args::CHECK)),
         ("firmware", "template", Task::Template),
         ("firmware", "boards", Task::Boards(firmware::BoardsArgs::COMPARE)),
         ("firmware", "test-firmware", Task::TestFirmware),

@@ -5,11 +5,12 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use anyhow::{Context, ensure};
+use anyhow::Context;
 use regex::Regex;
 
 use crate::cargo::{self, Dependency};
 use crate::checks::NO_STD_CRATES;
+use crate::page;
 
 /// The page.
 const PAGE: &str = "docs/unsafe-code.md";
@@ -25,28 +26,9 @@ project calls it or not. Boards link a HAL and a runtime besides, which access r
 |---|---|---|---:|
 ";
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::Args)]
-pub struct Args {
-    /// Write docs/unsafe-code.md.
-    #[arg(long)]
-    write: bool,
-}
-
-impl Args {
-    /// What CI runs.
-    pub const CHECK: Self = Self { write: false };
-}
-
 /// Writes the page, or compares it.
-pub fn run(args: Args) -> anyhow::Result<()> {
-    let page = page()?;
-    let path = cargo::root().join(PAGE);
-    if args.write {
-        return Ok(fs::write(path, page)?);
-    }
-    let is_same = fs::read_to_string(path).is_ok_and(|committed| committed == page);
-    ensure!(is_same, "{PAGE} is not up to date: run `cargo xtask unsafe-code --write`");
-    Ok(())
+pub fn run(args: page::Args) -> anyhow::Result<()> {
+    page::update(args, PAGE, &page()?, "unsafe-code")
 }
 
 fn page() -> anyhow::Result<String> {
