@@ -12,6 +12,13 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+use sonarfix::geometry::numeric::{at_least, at_most};
+
 pub mod obstacles;
 pub mod pursuit;
 pub mod wheel;
+
+/// The value within ± the limit.
+fn clamped(value: f32, limit: f32) -> f32 {
+    at_least(at_most(value, limit), -limit)
+}

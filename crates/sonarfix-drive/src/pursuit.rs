@@ -40,6 +40,8 @@ use sonarfix::geometry::vector::Vector;
 use sonarfix::health::Verdict;
 use sonarfix_link::Motion;
 
+use crate::clamped;
+
 /// How a robot drives along a route, and when it stops.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -66,7 +68,7 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Those of a small slow robot: 0.2 m/s, 60° a second, a look-ahead distance of 15 cm, a tolerance of 2 cm.
+    /// For a robot 20 cm wide: 0.2 m/s, 60°/s, L = 15 cm, tolerance 2 cm.
     pub const SMALL: Self = Self {
         speed: MetresPerSecond(0.2),
         turn: RadiansPerSecond(1.05),
@@ -213,7 +215,7 @@ impl<'r> Pursuit<'r> {
         if self.has_arrived {
             return (Progress::Arrived, stand);
         }
-        if let Some(reason) = self.doubt(situation) {
+        if let Some(reason) = self.reason_to_stand(situation) {
             return (Progress::Stopped(reason), stand);
         }
         let Some(target) = self.target(situation.pose.position()) else {
@@ -233,7 +235,7 @@ impl<'r> Pursuit<'r> {
     }
 
     /// Why the robot must not move at all.
-    fn doubt(&self, situation: &Situation) -> Option<Reason> {
+    fn reason_to_stand(&self, situation: &Situation) -> Option<Reason> {
         if situation.verdict == Verdict::Lost || !situation.pose.is_finite() {
             return Some(Reason::Lost);
         }
@@ -280,7 +282,7 @@ impl<'r> Pursuit<'r> {
         self.is_turning = bearing.abs() > threshold;
         let per_second = 1.0 / seconds(approach);
         if self.is_turning {
-            let rate = within(bearing * per_second, turn.0);
+            let rate = clamped(bearing * per_second, turn.0);
             return Motion { turn: RadiansPerSecond(rate), ..Motion::default() };
         }
         let speed = target.left.map_or(speed.0, |left| at_most(left * per_second, speed.0));
@@ -305,11 +307,6 @@ struct Target {
 fn length(vector: Vector) -> f32 {
     let square = vector.length_squared();
     if square > f32::MIN_POSITIVE { sqrt(square) } else { 0.0 }
-}
-
-/// The value, or the limit of its sign.
-fn within(value: f32, limit: f32) -> f32 {
-    at_least(at_most(value, limit), -limit)
 }
 
 fn check(limits: &Limits) -> Result<(), RouteError> {

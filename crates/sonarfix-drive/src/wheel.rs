@@ -25,8 +25,9 @@
 //! [`SpeedController::new`] refuses NaN and infinity. [`SpeedController::update`] refuses a speed that is not finite, and changes
 //! nothing.
 
-use sonarfix::geometry::numeric::{at_least, at_most};
 use sonarfix::geometry::units::{Duration, Metres, MetresPerSecond, seconds};
+
+use crate::clamped;
 
 /// The longest period of [`SpeedController::update`].
 pub const LONGEST_PERIOD: Duration = Duration::from_ticks(200_000);
@@ -176,7 +177,7 @@ impl SpeedController {
     /// A controller at rest.
     ///
     /// # Errors
-    /// [`SettingsError`] names the first value that is not valid.
+    /// [`SettingsError`] of the first value that is not valid.
     pub fn new(motor: Motor, limits: Limits) -> Result<Self, SettingsError> {
         check(&motor, &limits)?;
         let time_constant = seconds(motor.time_constant);
@@ -256,9 +257,9 @@ impl SpeedController {
     /// Moves the reference towards the commanded speed; returns its acceleration, m/s².
     fn follow(&mut self, speed: f32, period: f32) -> f32 {
         let full = self.motor.full_speed.0;
-        let change = at_least(at_most(speed, full), -full) - self.reference;
+        let change = clamped(speed, full) - self.reference;
         let most = self.gains.ramp * period;
-        let change = at_least(at_most(change, most), -most);
+        let change = clamped(change, most);
         self.reference += change;
         change / period
     }
@@ -274,7 +275,7 @@ impl SpeedController {
         let most = self.limits.duty;
         let behind = self.behind + missing;
         let duty = without + self.gains.integral * behind;
-        let limited = at_least(at_most(duty, most), -most);
+        let limited = clamped(duty, most);
         self.is_saturated = duty.abs() > most;
         if !self.is_saturated || missing * duty < 0.0 {
             self.behind = behind;

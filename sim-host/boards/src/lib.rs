@@ -140,7 +140,7 @@ pub struct Pins {
 /// The board of this name.
 ///
 /// # Errors
-/// If there is none; the message names all boards.
+/// No board has this name; the message lists all names.
 pub fn named(name: &str) -> anyhow::Result<Board> {
     let boards = all()?;
     let names: Vec<_> = boards.iter().map(|board| board.name.as_str()).collect();

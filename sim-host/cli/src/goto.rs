@@ -21,20 +21,20 @@ pub struct Args {
     #[arg(required = true, num_args = 2.., value_names = ["X", "Y"])]
     coordinates: Vec<f32>,
     /// Speed on a straight line, metres per second.
-    #[arg(long, default_value_t = 0.2)]
+    #[arg(long, default_value_t = Limits::SMALL.speed.0)]
     speed: f32,
     /// The fastest turn, degrees per second.
-    #[arg(long, default_value_t = 60.0)]
+    #[arg(long, default_value_t = Limits::SMALL.turn.0.to_degrees().round())]
     turn: f32,
     /// The robot stands while the standard deviation of its position is larger, metres.
-    #[arg(long, value_name = "METRES", default_value_t = 0.1)]
+    #[arg(long, value_name = "METRES", default_value_t = Limits::SMALL.max_deviation.0)]
     max_deviation: f32,
     /// The robot has arrived with at most this standard deviation of its position, metres. Until then it stands at the end, and
     /// its ranges correct the pose.
-    #[arg(long, value_name = "METRES", default_value_t = 0.05)]
+    #[arg(long, value_name = "METRES", default_value_t = Limits::SMALL.end_deviation.0)]
     end_deviation: f32,
     /// The robot stands while an object that is not on the map is nearer than this ahead of its axle, metres. Needs `--map` and `--robot`.
-    #[arg(long, value_name = "METRES", default_value_t = 0.3)]
+    #[arg(long, value_name = "METRES", default_value_t = Limits::SMALL.clearance.0)]
     clearance: f32,
     /// The robot's map, to recognize objects that are not on it.
     #[arg(long, value_name = "MAP", requires = "robot")]
@@ -94,7 +94,7 @@ pub fn execute(args: &Args, port: &mut Port) -> anyhow::Result<()> {
     let mut shown = Progress::Driving;
     let result = request::steer(port, |telemetry| {
         if is_interrupted() || limit.is_some_and(|limit| began.elapsed() >= limit) {
-            return trip.stop(End::Asked);
+            return trip.stop(End::Interrupted);
         }
         let control = trip.control(telemetry, Instant::now());
         show(trip.progress(), &mut shown);
@@ -105,7 +105,7 @@ pub fn execute(args: &Args, port: &mut Port) -> anyhow::Result<()> {
         (_, Some(End::Arrived)) => println!("arrived"),
         (_, Some(End::Stopped(reason))) => bail!("the robot has not arrived: {reason}"),
         (_, Some(End::Silent)) => bail!("the robot sends no estimates: does its loop run?"),
-        (_, Some(End::Asked) | None) => println!("ended before the end of the route"),
+        (_, Some(End::Interrupted) | None) => println!("ended before the end of the route"),
     }
     Ok(())
 }

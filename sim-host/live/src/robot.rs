@@ -124,7 +124,7 @@ impl Robot {
         if let Some(held) = self.held.take_if(|held| now >= held.until)
             && !held.is_refused
         {
-            // As after a key of the terminal: the robot stands until it is left to itself.
+            // As after a key of the terminal: the robot is commanded to stand.
             self.drive(Some(Motion::default()));
         }
         match self.conversation.poll(now) {
@@ -188,7 +188,7 @@ impl Robot {
             (Order::Leave, _) => {
                 self.held = None;
                 self.drive(None);
-                Reply::done("the robot is left to itself")
+                Reply::done("no motion is commanded")
             }
             (_, Some(command)) if self.conversation.add(command) => {
                 self.waiting.push_back(ordered);

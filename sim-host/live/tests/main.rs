@@ -343,8 +343,8 @@ impl Driven {
 const DRIVE: Order = Order::Drive { speed: 0.1, turn: 0.5 };
 const HELD: Motion = Motion { speed: MetresPerSecond(0.1), turn: RadiansPerSecond(0.5) };
 
-/// A motion is renewed while a page repeats its order. Without the page the robot is commanded to stand after 300 ms, until it is
-/// left to itself.
+/// A motion is renewed while a page repeats its order. Without the page the robot is commanded to stand after 300 ms, until the
+/// page ends its commands.
 #[test]
 fn a_motion_of_a_page_ends_without_its_orders() {
     let mut driven = Driven::new(CommandResult::Done);

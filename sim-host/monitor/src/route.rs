@@ -21,9 +21,9 @@ use sonarfix_search::navigator::Mode;
 use crate::request::Control;
 
 /// A motion without a newer estimate ends after this time: some encoder samples.
-const STALE: Duration = Duration::from_millis(500);
-/// A robot without estimates for this time has stopped its loop, or is gone.
-const SILENT: Duration = Duration::from_secs(3);
+const MOTION_TIMEOUT: Duration = Duration::from_millis(500);
+/// After this time without an estimate the loop has stopped, or the link is cut.
+const ESTIMATE_TIMEOUT: Duration = Duration::from_secs(3);
 
 /// The robot's map and rangers, by which objects that are not on the map are recognized.
 #[derive(Debug, Clone)]
@@ -97,7 +97,7 @@ impl<'r> RouteDriver<'r> {
         Situation { pose, deviation, verdict, ahead: self.obstacles.ahead(estimate.at, pose) }
     }
 
-    /// Takes a ping, at the pose of the last estimate. A ranger that failed shows nothing.
+    /// Takes a ping, at the pose of the last estimate. The ping of a failed ranger is ignored.
     fn take_ping(&mut self, ping: &Ping) {
         let (Some(surroundings), Some(estimate)) = (self.surroundings, &self.estimate) else {
             return;
@@ -125,12 +125,12 @@ impl<'r> RouteDriver<'r> {
 pub enum End {
     /// The robot is at the end of its route.
     Arrived,
-    /// It stood for this reason for too long.
+    /// It stood for this reason for longer than permitted.
     Stopped(Reason),
     /// It sends no estimates.
     Silent,
     /// The program has ended it.
-    Asked,
+    Interrupted,
 }
 
 /// A robot on a route, and the time.
@@ -142,7 +142,7 @@ pub struct Trip<'r> {
     /// When the last estimate came, or the trip began.
     heard: Instant,
     /// Whether the motion of the last estimate is still commanded.
-    is_fresh: bool,
+    is_commanded: bool,
     progress: Progress,
     /// Since when the progress is what it is.
     since: Instant,
@@ -158,7 +158,7 @@ impl<'r> Trip<'r> {
             driver,
             patience,
             heard,
-            is_fresh: true,
+            is_commanded: true,
             progress: Progress::Driving,
             since,
             end: None,
@@ -172,7 +172,7 @@ impl<'r> Trip<'r> {
             return self.wait(now);
         };
         self.heard = now;
-        self.is_fresh = true;
+        self.is_commanded = true;
         if progress != self.progress {
             (self.progress, self.since) = (progress, now);
         }
@@ -185,14 +185,14 @@ impl<'r> Trip<'r> {
         }
     }
 
-    /// Without a new estimate the robot stands after a while.
+    /// Without a new estimate the robot is commanded to stand after [`MOTION_TIMEOUT`].
     fn wait(&mut self, now: Instant) -> Control {
         let age = now.saturating_duration_since(self.heard);
-        if age > SILENT {
+        if age > ESTIMATE_TIMEOUT {
             return self.stop(End::Silent);
         }
-        if age > STALE && self.is_fresh {
-            self.is_fresh = false;
+        if age > MOTION_TIMEOUT && self.is_commanded {
+            self.is_commanded = false;
             return Control::Drive(Motion::default());
         }
         Control::Keep

@@ -43,7 +43,7 @@ pub struct Teleoperation {
 
 #[derive(Debug, Clone, Copy)]
 enum State {
-    /// The robot is left to itself.
+    /// No motion is commanded.
     Released,
     /// It is commanded to stand.
     Standing,
@@ -68,7 +68,7 @@ impl Teleoperation {
         self.state = State::Standing;
     }
 
-    /// Leaves the robot to itself.
+    /// Ends the commands of motions.
     pub fn release(&mut self) {
         self.state = State::Released;
     }
@@ -106,7 +106,7 @@ impl Teleoperation {
             State::Released => {
                 return (format!("arrows drive: {speed:.2} m/s, {turn:.0} deg/s, + -"), false);
             }
-            State::Standing => return ("STANDS  Esc leaves it to itself".to_owned(), true),
+            State::Standing => return ("STANDS  Esc releases control".to_owned(), true),
             State::Driving(Direction::Ahead, _) => format!("AHEAD {speed:.2} m/s"),
             State::Driving(Direction::Back, _) => format!("BACK {speed:.2} m/s"),
             State::Driving(Direction::Left, _) => format!("LEFT {turn:.0} deg/s"),

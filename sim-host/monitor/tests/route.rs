@@ -47,13 +47,13 @@ fn a_robot_without_estimates_stands_and_then_ends_the_trip() {
     let (route, began) = ([Point::new(2.0, 0.0)], Instant::now());
     let driver = RouteDriver::new(&route, Limits::SMALL, None).unwrap();
     let mut trip = Trip::new(driver, PATIENCE, began);
-    let fresh = Telemetry::Estimate(estimate(0.0, 0.01));
-    assert!(drives(trip.control(Some(&fresh), at(100, began))));
+    let message = Telemetry::Estimate(estimate(0.0, 0.01));
+    assert!(drives(trip.control(Some(&message), at(100, began))));
     assert_eq!(trip.control(None, at(550, began)), Control::Keep);
     assert_eq!(trip.control(None, at(650, began)), STANDS);
     assert_eq!(trip.control(None, at(750, began)), Control::Keep);
     // It goes on with the next estimate.
-    assert!(drives(trip.control(Some(&fresh), at(900, began))));
+    assert!(drives(trip.control(Some(&message), at(900, began))));
     assert_eq!(trip.control(None, at(1_500, began)), STANDS);
     assert_eq!(trip.control(None, at(4_000, began)), Control::Stop);
     assert_eq!(trip.end(), Some(End::Silent));

@@ -15,6 +15,7 @@ use sonarfix_drive::pursuit::{Limits, Progress, Reason};
 use sonarfix_link::{Command, CommandResult};
 use sonarfix_map::{Outline, Scenario};
 use sonarfix_monitor::route::{RouteDriver, Surroundings};
+use sonarfix_sim::world::segment::{Segment, distance};
 use sonarfix_virtual_robot::robot::Parts;
 
 use bench::{Bench, SECOND, classroom};
@@ -65,10 +66,7 @@ struct Legs {
 
 /// The distance of a point from a segment.
 fn aside(point: [f64; 2], [from, to]: [[f64; 2]; 2]) -> f64 {
-    let (x, y) = (to[0] - from[0], to[1] - from[1]);
-    let (px, py) = (point[0] - from[0], point[1] - from[1]);
-    let share = ((px * x + py * y) / (x * x + y * y)).clamp(0.0, 1.0);
-    (px - share * x).hypot(py - share * y)
+    distance(point, Segment::new(from, to).nearest(point))
 }
 
 /// Distance of two segments of which none crosses the other in this room: the least of their ends.

@@ -34,14 +34,14 @@ pub struct Flashed {
 
 /// Waits for `Hello` and prints whether the robot has what was flashed from its folder. Without a handler of Ctrl-C, which
 /// therefore ends the command at once.
-pub fn check(link: Link, patience: Duration, flashed: Flashed, robot: &Path) -> anyhow::Result<()> {
+pub fn check(link: Link, timeout: Duration, flashed: Flashed, robot: &Path) -> anyhow::Result<()> {
     let name = link.name;
-    println!("waiting for Hello at {name}, {} s at most; Ctrl-C ends it", patience.as_secs());
-    let Some(hello) = Wait::new(patience)?.hello(link)? else {
+    println!("waiting for Hello at {name}, {} s at most; Ctrl-C ends it", timeout.as_secs());
+    let Some(hello) = Wait::new(timeout)?.hello(link)? else {
         bail!(
             "no Hello at {name} within {} s: is this the port of the robot's link and not of its USB drive, are TX and RX crossed, \
              and is no other program at the port? A board that still shows its drive has not taken the file: it is for another board",
-            patience.as_secs()
+            timeout.as_secs()
         );
     };
     println!("{}", view::hello(&hello));
@@ -53,27 +53,27 @@ pub fn check(link: Link, patience: Duration, flashed: Flashed, robot: &Path) -> 
     bail!("{}", differences.join("\n"))
 }
 
-/// The time that is left.
+/// A wait with a timeout.
 struct Wait {
     began: Instant,
-    patience: Duration,
+    timeout: Duration,
     bar: ProgressBar,
 }
 
 impl Wait {
-    fn new(patience: Duration) -> anyhow::Result<Self> {
+    fn new(timeout: Duration) -> anyhow::Result<Self> {
         let style = ProgressStyle::with_template("{bar:40} {pos}/{len} s {msg}")?;
-        let bar = progress::bar(Some(patience.as_secs())).with_style(style);
-        Ok(Self { began: Instant::now(), patience, bar })
+        let bar = progress::bar(Some(timeout.as_secs())).with_style(style);
+        Ok(Self { began: Instant::now(), timeout, bar })
     }
 
     fn is_over(&self) -> bool {
         let elapsed = self.began.elapsed();
         self.bar.set_position(elapsed.as_secs());
-        elapsed >= self.patience
+        elapsed >= self.timeout
     }
 
-    /// The first `Hello` at a port; `None` if there is none in time. A port that is missing or closed is opened again.
+    /// The first `Hello` at a port; `None` after the timeout. A port that is absent or was closed is opened again.
     ///
     /// # Errors
     /// Why the port could not be opened at the end.
