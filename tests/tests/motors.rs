@@ -94,7 +94,7 @@ fn the_inputs_of_the_motor_driver_have_the_sign_of_the_voltage() {
     assert_eq!(Drive { right: 9.0, left: f32::INFINITY }.inputs(u16::MAX), [65_535, 0, 65_535, 0]);
 }
 
-/// A robot on a floor with friction, whose motor code obeys a PC.
+/// A robot on a floor with friction, that a PC drives.
 struct CommandedRobot {
     code: Commanded,
     strengths: [f32; 2],
@@ -183,7 +183,7 @@ fn a_robot_that_was_commanded_stands_afterwards() {
     assert_eq!(robot.code.drive(Some(robot.inputs(None))), pattern);
 }
 
-/// Without encoders no motion is obeyed, and a pause of the polls begins at rest: the travel of the pause is no speed.
+/// Without encoders no motion is followed, and a pause of the polls begins at rest: the travel of the pause is no speed.
 #[test]
 fn an_encoder_that_cannot_be_read_stops_the_wheels() {
     let mut robot = CommandedRobot::new([1.0; 2]);

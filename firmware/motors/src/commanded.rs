@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   motors enabled                       a motion is commanded
-//!   ─────────────▶ Pattern ──────────────────────────────────▶ Obeys: the wheels have its speeds
+//!   ─────────────▶ Pattern ──────────────────────────────────▶ Follows: the wheels have its speeds
 //!                     ▲                                          │   ▲
 //!                     │                               it has ended ▼   │ another one
 //!                     └──────────────────────────────────────── Stands
@@ -51,7 +51,7 @@ pub struct Inputs {
     pub wheels: Option<[Wheel; 2]>,
 }
 
-/// Obeys the commanded motion. Before the first one it drives the example [`Pattern`].
+/// Follows the commanded motion. Before the first one it drives the example [`Pattern`].
 #[derive(Debug, Clone, Default)]
 pub struct Commanded {
     pattern: Pattern,
@@ -84,14 +84,14 @@ impl Commanded {
         self.has_moved = true;
         self.running = inputs.wheels.and_then(|wheels| {
             let running = self.running.take();
-            obey(running, inputs.now, speeds, wheels)
+            controlled(running, inputs.now, speeds, wheels)
         });
         self.running.as_ref().map_or(Drive::STOP, |running| running.drive)
     }
 }
 
 /// The next voltages; `None` if a wheel cannot be controlled.
-fn obey(
+fn controlled(
     running: Option<Running>,
     now: Instant,
     speeds: [MetresPerSecond; 2],

@@ -6,7 +6,7 @@
 //!
 //! The motor driver's enable pin is not controlled here: the loop sets it, by the motor policy of the robot file.
 //!
-//! [`commanded`] has motor code for a board that a PC drives: it obeys the commanded motion, by the speeds of the wheels.
+//! [`commanded`] has motor code for a board that a PC drives: it follows the commanded motion, by the speeds of the wheels.
 
 #![no_std]
 

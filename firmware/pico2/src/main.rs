@@ -46,10 +46,12 @@ use sonarfix_app::store::Store;
 use sonarfix_app::watchdog::Liveness;
 use sonarfix_app::{App, FlashContents, Link, boots, log};
 use sonarfix_hal::bus::{SharedBus, TwoWire};
+use sonarfix_hal::encoder::Unwrapped;
 use sonarfix_hal::gyro::Mpu6050;
 use sonarfix_hal::ranger::EchoCapture;
 use sonarfix_hal::robot::{Devices, WithGyro, WithRangers};
-use sonarfix_motors::{Drive, Estimate, Pattern};
+use sonarfix_motors::Drive;
+use sonarfix_motors::commanded::{Commanded, Inputs};
 use sonarfix_robot::guarded::{Guard, Guarded};
 use sonarfix_robot::{AnyRanger, NextPoll, memory};
 
@@ -101,8 +103,8 @@ fn line(pin: Peri<'static, impl Pin>) -> OutputOpenDrain<'static> {
 static ECHO: EchoCapture = EchoCapture::new();
 static SECOND_ECHO: EchoCapture = EchoCapture::new();
 
-/// The newest estimate, from the loop; `None` while the motors are disabled.
-static ESTIMATE: Signal<CriticalSectionRawMutex, Option<Estimate>> = Signal::new();
+/// The inputs of the motor code, from the loop; `None` while the motors are disabled.
+static INPUTS: Signal<CriticalSectionRawMutex, Option<Inputs>> = Signal::new();
 
 /// Bytes have arrived.
 static RECEIVED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
@@ -272,27 +274,14 @@ fn restart() -> ! {
     }
 }
 
-/// The end of the program by a panic, another fault or an overflow of the stack, which is below all variables.
-#[cortex_m_rt::exception(trampoline = false)]
-#[expect(unsafe_code, reason = "the vector table calls it; it does nothing that is unsafe")]
-unsafe fn HardFault() -> ! {
-    restart()
-}
-
-/// The end of the program by an interrupt that nothing handles.
-#[cortex_m_rt::exception]
-#[allow(
-    unsafe_code,
-    reason = "the vector table calls it; the macro makes a second function, which is not unsafe"
-)]
-unsafe fn DefaultHandler(_number: i16) -> ! {
-    restart()
-}
+sonarfix_robot::restart_after_faults!(restart);
 
 /// The state of the loop.
 struct Board {
     app: App<'static, StoreFlash>,
     hardware: Hardware,
+    /// The positions of the right and the left wheel, for the motor code.
+    positions: [Unwrapped; 2],
     stampers: (Stamper<0>, Stamper<1>),
     link: Serial,
     drive: Output<'static>,
@@ -359,6 +348,7 @@ impl Board {
         let board = Self {
             app,
             hardware: WithGyro { devices, gyro: Mpu6050::new(first) },
+            positions: Default::default(),
             stampers,
             link: Serial { uart, to_send: Deque::new() },
             drive,
@@ -374,7 +364,10 @@ impl Board {
         let start = now();
         let polled = self.app.poll(start, &mut self.hardware, &mut self.link);
         self.drive.set_level(polled.may_drive.into());
-        ESTIMATE.signal(sonarfix_robot::estimate(&self.app, &polled));
+        let devices = &mut self.hardware.devices.devices;
+        let counters = (&mut devices.right, &mut devices.left);
+        let positions = &mut self.positions;
+        INPUTS.signal(sonarfix_robot::inputs(&self.app, &polled, start, counters, positions));
         if polled.is_settled {
             self.watchdog.set_scratch(0, boots::register(0));
         }
@@ -437,14 +430,14 @@ async fn polls(mut board: Board) -> ! {
     }
 }
 
-/// The motors, after each poll. Your own controller takes the place of the example `Pattern`. The loop waits for it: a task
+/// The motors, after each poll. Your own controller takes the place of the example `Commanded`. The loop waits for it: a task
 /// that computes for long must be divided by `await`.
 #[embassy_executor::task]
 async fn motors(mut motors: Motors) -> ! {
-    let mut pattern = Pattern::default();
+    let mut commanded = Commanded::default();
     loop {
-        let estimate = ESTIMATE.wait().await;
-        motors.set(pattern.drive(estimate));
+        let inputs = INPUTS.wait().await;
+        motors.set(commanded.drive(inputs));
     }
 }
 

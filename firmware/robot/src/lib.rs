@@ -6,6 +6,7 @@
 
 #![no_std]
 
+pub mod faults;
 pub mod guarded;
 pub mod memory;
 
@@ -15,11 +16,17 @@ use embedded_storage::nor_flash::NorFlash;
 use sonarfix::geometry::units::{Duration, Instant};
 use sonarfix_app::watchdog::POLL_AT_LEAST_EVERY;
 use sonarfix_app::{App, Board, Polled};
+#[cfg(feature = "drive")]
+use sonarfix_hal::config::WheelConfig;
+#[cfg(feature = "drive")]
+use sonarfix_hal::encoder::{Counter, Unwrapped};
 use sonarfix_hal::ranger::{Captured, EchoCapture, OneOf, PulseRanger, Vl53l0x, Vl53l1x};
 use sonarfix_hal::robot::{Hardware, PACE};
 use sonarfix_hal::servo::{PwmFrame, Servo};
 use sonarfix_link::message::ResetCause;
 use sonarfix_motors::Estimate;
+#[cfg(feature = "drive")]
+use sonarfix_motors::commanded::{Inputs, Wheel};
 
 /// The pulses of the boards' servo channels: 50 Hz, and the widths that hobby servos accept without running against
 /// their stops (0.5 to 2.5 ms by their datasheets).
@@ -64,6 +71,33 @@ pub fn any_ranger<T: OutputPin, B: I2c + Copy>(
 pub fn estimate<F: NorFlash>(app: &App<F>, polled: &Polled) -> Option<Estimate> {
     let localizer = app.localizer().filter(|_| polled.may_drive)?;
     Some(Estimate { pose: localizer.pose(), verdict: localizer.health().verdict })
+}
+
+/// The inputs of the motor code of a board that a PC drives; `None` while the motors are disabled. It reads both encoders, of
+/// which `positions` are those without wrap-around.
+#[cfg(feature = "drive")]
+pub fn inputs<F: NorFlash>(
+    app: &App<F>,
+    polled: &Polled,
+    now: Instant,
+    (right, left): (&mut impl Counter, &mut impl Counter),
+    positions: &mut [Unwrapped; 2],
+) -> Option<Inputs> {
+    let estimate = estimate(app, polled)?;
+    let config = app.configuration()?;
+    let track_width = config.localizer.drive.track_width;
+    let [right_position, left_position] = positions;
+    let positions = (right_position.read(right).ok(), left_position.read(left).ok());
+    let wheel =
+        |position, wheel: &WheelConfig| Wheel { position, travel_per_tick: wheel.signed_travel() };
+    let wheels = match positions {
+        (Some(right), Some(left)) => {
+            Some([wheel(right, &config.right_wheel), wheel(left, &config.left_wheel)])
+        }
+        _ => None,
+    };
+    let speeds = app.motion().map(|motion| motion.wheels(track_width));
+    Some(Inputs { now, estimate, speeds, wheels })
 }
 
 /// When a board polls again, after a poll at `polled`: when something is due ([`App::next_poll`]), and in time for the motor

@@ -517,22 +517,7 @@ fn restart() -> ! {
     cortex_m::peripheral::SCB::sys_reset()
 }
 
-/// The end of the program by a panic, another fault or an overflow of the stack, which is below all variables.
-#[cortex_m_rt::exception(trampoline = false)]
-#[expect(unsafe_code, reason = "the vector table calls it; it does nothing that is unsafe")]
-unsafe fn HardFault() -> ! {
-    restart()
-}
-
-/// The end of the program by an interrupt that nothing handles.
-#[cortex_m_rt::exception]
-#[allow(
-    unsafe_code,
-    reason = "the vector table calls it; the macro makes a second function, which is not unsafe"
-)]
-unsafe fn DefaultHandler(_number: i16) -> ! {
-    restart()
-}
+sonarfix_robot::restart_after_faults!(restart);
 
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod app {
