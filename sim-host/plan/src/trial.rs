@@ -81,17 +81,44 @@ pub struct Trial {
     pub longest_cycle: u64,
 }
 
+/// One ping of a trial, and where the robot truly was.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Heard {
+    /// Seconds since the start of the trial.
+    pub time: f64,
+    /// The true pose of the robot, map frame.
+    pub pose: Pose,
+    /// The bearing that the search asked for, radians, robot frame.
+    pub bearing: f64,
+    /// The measured range, metres; `None` without an echo.
+    pub range: Option<f64>,
+}
+
 /// Simulates one trial of at most `seconds`: the seed chooses the wheel errors and the place on the
 /// path.
 ///
 /// # Errors
 /// [`TrialError`], if the map cannot be used.
 pub fn trial(scenario: Scenario, seed: u64, seconds: f64) -> Result<Trial, TrialError> {
+    observed_trial(scenario, seed, seconds, |_| false)
+}
+
+/// The same, and every ping goes to an observer. The trial goes on after a unique answer, of which the result tells, as long as the
+/// observer returns `true`.
+///
+/// # Errors
+/// As of [`trial`].
+pub fn observed_trial(
+    scenario: Scenario,
+    seed: u64,
+    seconds: f64,
+    observer: impl FnMut(Heard) -> bool,
+) -> Result<Trial, TrialError> {
     let mut rng = stream(seed, 0);
     let errors = wheel_errors(&mut rng);
     let spare = scenario.path.duration() - seconds;
     let start = if spare > 1.0 { rng.random_range(0.0..spare) } else { 0.0 };
-    drive(scenario, seed, errors, start, seconds)
+    drive(scenario, seed, errors, start, seconds, observer)
 }
 
 /// As [`trial`], from a given time of the path on.
@@ -105,7 +132,7 @@ pub fn trial_from(
     seconds: f64,
 ) -> Result<Trial, TrialError> {
     let errors = wheel_errors(&mut stream(seed, 0));
-    drive(scenario, seed, errors, start, seconds)
+    drive(scenario, seed, errors, start, seconds, |_| false)
 }
 
 /// Errors of the right and of the left wheel.
@@ -119,6 +146,7 @@ fn drive(
     errors: [f64; 2],
     start: f64,
     seconds: f64,
+    mut observer: impl FnMut(Heard) -> bool,
 ) -> Result<Trial, TrialError> {
     [scenario.truth.scale_right, scenario.truth.scale_left] = errors;
     // There is no estimate to follow.
@@ -150,15 +178,20 @@ fn drive(
     let end = simulation.scenario.path.duration().min(start + seconds);
     let mut time = start + PERIOD;
     let mut unique = None;
-    while time < end && unique.is_none() {
-        drive.ping(time);
-        if let Answer::Unique(hypothesis) = drive.search.answer() {
-            unique = Some((time - start, hypothesis));
+    let mut is_observed = true;
+    while time < end && (unique.is_none() || is_observed) {
+        let (bearing, range) = drive.ping(time);
+        if unique.is_none() {
+            drive.note_twins(&symmetries);
+            if let Answer::Unique(hypothesis) = drive.search.answer() {
+                unique = Some(drive.result(seed, Some((time - start, hypothesis))));
+            }
         }
-        drive.note_twins(&symmetries);
+        let pose = drive.plant.pose();
+        is_observed = observer(Heard { time: time - start, pose, bearing, range });
         time += PERIOD;
     }
-    Ok(drive.result(seed, unique))
+    Ok(unique.unwrap_or_else(|| drive.result(seed, None)))
 }
 
 struct Drive<'a> {
@@ -180,9 +213,9 @@ struct Drive<'a> {
 }
 
 impl Drive<'_> {
-    /// Drives on to a time, pings and searches.
+    /// Drives on to a time, pings and searches. Returns bearing and range of the ping.
     #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
-    fn ping(&mut self, time: f64) {
+    fn ping(&mut self, time: f64) -> (f64, Option<f64>) {
         let [right, left] = self.plant.drive_to(time, &mut self.wheels, &mut self.slips).measured;
         let turn = (right - left) / self.track_width;
         let advance = f64::midpoint(right, left);
@@ -200,7 +233,8 @@ impl Drive<'_> {
         let stretch = 1.0 + self.simulation.range_scale();
         let range = echo.map(|echo| Metres((echo.range * stretch) as f32));
         let shortest = self.simulation.config().rangers.first.min_range;
-        _ = self.search.ping(bearing, range.filter(|range| *range >= shortest));
+        let range = range.filter(|range| *range >= shortest);
+        _ = self.search.ping(bearing, range);
         let has_begun = self.search.pings() >= LEAST_PINGS;
         for _ in 0..EVALUATIONS / EVALUATIONS_PER_MILLISECOND {
             let cycles = self.search.cycles();
@@ -212,6 +246,7 @@ impl Drive<'_> {
                 self.cycle = 0;
             }
         }
+        (bearing.0.into(), range.map(|range| range.0.into()))
     }
 
     /// Notes whether the true pose and its images under every motion are among several answers.
@@ -259,14 +294,28 @@ impl Drive<'_> {
 }
 
 fn is_right(hypothesis: &Hypothesis, truth: &Pose) -> bool {
-    let (position, heading) = errors(hypothesis, truth);
+    are_one(&pose_of(hypothesis), truth)
+}
+
+/// Whether a pose is within the errors of a right answer of another.
+#[must_use]
+pub fn are_one(found: &Pose, other: &Pose) -> bool {
+    let (position, heading) = differences(found, other);
     position < RIGHT.0 && heading < RIGHT.1
 }
 
 fn errors(hypothesis: &Hypothesis, truth: &Pose) -> (f64, f64) {
+    differences(&pose_of(hypothesis), truth)
+}
+
+fn pose_of(hypothesis: &Hypothesis) -> Pose {
     let found = hypothesis.pose;
-    let position = (f64::from(found.x.0) - truth.x).hypot(f64::from(found.y.0) - truth.y);
-    (position, angle::wrap(f64::from(found.heading.radians().0) - truth.heading).abs())
+    Pose { x: found.x.0.into(), y: found.y.0.into(), heading: found.heading.radians().0.into() }
+}
+
+fn differences(found: &Pose, other: &Pose) -> (f64, f64) {
+    let position = (found.x - other.x).hypot(found.y - other.y);
+    (position, angle::wrap(found.heading - other.heading).abs())
 }
 
 fn stream(seed: u64, number: u64) -> ChaCha8Rng {

@@ -45,6 +45,12 @@ pub struct Echo {
 }
 
 impl World {
+    /// All that can answer a ping of a sonar, the earliest first, whether it is detected or not.
+    #[must_use]
+    pub fn reflectors(&self, ping: &Ping, sensor: &SensorModel) -> Vec<Reflector> {
+        Search::new(self, sensor, ping, (ping.sonar_after)(0.0)).run()
+    }
+
     /// The echo of a ping, if one is detected. `noise` gives exactly one draw per ping, with or
     /// without an echo, so that runs stay comparable ping by ping; `rng` gives all other draws.
     pub fn echo(

@@ -25,6 +25,7 @@ pub mod reality;
 pub mod recordings;
 pub mod relocalization;
 pub mod rooms;
+pub mod search_bound;
 pub mod search_study;
 pub mod sonar_model;
 pub mod surveys;

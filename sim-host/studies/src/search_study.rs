@@ -23,7 +23,7 @@ pub struct Plans {
 
 impl Plans {
     /// Each with its scenario.
-    fn scenarios(&self) -> Result<Vec<(u64, Scenario)>, TrialError> {
+    pub(crate) fn scenarios(&self) -> Result<Vec<(u64, Scenario)>, TrialError> {
         let seeds = (0..u64::MAX).map(|n| self.first.wrapping_add(n));
         let plans = seeds.map(FloorPlan::new);
         let plans = plans.filter(|plan| self.kind.is_none_or(|kind| plan.kind == kind));

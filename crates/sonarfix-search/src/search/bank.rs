@@ -11,7 +11,7 @@ use sonarfix::geometry::numeric::at_least;
 use sonarfix::geometry::vector::Vector;
 
 /// Placements within this distance, metres, and this cosine of rotation (25°) are one mode.
-const SAME_PLACE: f32 = 0.3;
+pub(super) const SAME_PLACE: f32 = 0.3;
 const SAME_ROTATION: f32 = 0.906;
 
 /// A placement with its score.

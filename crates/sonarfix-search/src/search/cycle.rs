@@ -1,9 +1,10 @@
 //! The stages of a cycle, in bounded slices: lines, the bank, pairs of lines on pairs of walls, and lines along every wall.
 
+use sonarfix::geometry::numeric::at_least;
 use sonarfix::geometry::units::Metres;
 
 use super::Search;
-use super::bank::moved;
+use super::bank::{Entry, SAME_PLACE, moved};
 use super::candidates::{AlongWalls, Generated, Pairs, Placement, make_a_pair};
 use super::lines::{Line, TILTS};
 use super::refine::Prior;
@@ -17,6 +18,11 @@ pub(super) const BEST_PAIRS: u8 = 4;
 pub(super) const OTHER_PAIRS: u8 = 4;
 /// Lines that are moved along every wall.
 pub(super) const CHECKED_LINES: u8 = 2;
+
+/// Candidates are rejected below this share of the best score, and so much below it: those of pairs, and those of the global check. A
+/// rival whose score is by more than the second lower is by more than half of the odds of an answer less probable.
+const OF_PAIR: (f32, f32) = (0.25, f32::MAX);
+const OF_CHECK: (f32, f32) = (0.6, 30.0);
 
 /// How far beside its region a start may seem to lie: metres, and metres per metre travelled since.
 pub(super) const REGION_MARGIN: f32 = 0.1;
@@ -42,7 +48,7 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
                 match trial.advance(&self.echoes, &self.window, &odometry) {
                     Verdict::Running => return,
                     Verdict::Rejected => self.bank.end_trial(),
-                    Verdict::Scored(entry) if is_answer => self.answer = Decision::Unique(entry),
+                    Verdict::Scored(entry) if is_answer => self.conclude(entry),
                     Verdict::Scored(entry) => {
                         self.bank.end_trial();
                         self.bank.offer(entry);
@@ -50,6 +56,13 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
                 }
                 self.work = Work::None;
             }
+        }
+    }
+
+    /// Makes a refined entry the answer. One that the refinement has led elsewhere is none: the pings do not determine it.
+    pub(super) fn conclude(&mut self, entry: Entry) {
+        if self.bank.has_near(&entry.placement, SAME_PLACE) {
+            self.answer = Decision::Unique(entry);
         }
     }
 
@@ -133,7 +146,7 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
         };
         let bend = self.window.bend();
         match pairs.next(&self.echoes.reflectors.map, &first, &second, bend) {
-            Generated::Candidate(placement) => self.try_candidate(placement, 0.15, 0.25),
+            Generated::Candidate(placement) => self.try_candidate(placement, 0.15, OF_PAIR),
             Generated::Nothing => {}
             Generated::Done => return Task::Pairs { pair: pair + 1, pairs: Pairs::default() },
         }
@@ -150,7 +163,7 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
         };
         let bend = self.window.bend();
         match along.next(&self.echoes.reflectors.map, &checked, bend) {
-            Generated::Candidate(placement) => self.try_candidate(placement, 0.25, 0.6),
+            Generated::Candidate(placement) => self.try_candidate(placement, 0.25, OF_CHECK),
             Generated::Nothing => {}
             Generated::Done => {
                 return Task::Along { line: line + 1, along: AlongWalls::default() };
@@ -159,7 +172,14 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
         Task::Along { line, along }
     }
 
-    pub(super) fn try_candidate(&mut self, placement: Placement, near: f32, rivalry: f32) {
+    /// Tries a placement that is not within `near` of one of the bank, and is rejected once it cannot reach the share `rivalry` of the best
+    /// score, nor come within `within` of it.
+    pub(super) fn try_candidate(
+        &mut self,
+        placement: Placement,
+        near: f32,
+        (rivalry, within): (f32, f32),
+    ) {
         let start = placement.at.plus(self.window.start().turned(placement.rotation));
         let margin = REGION_MARGIN * (1.0 + self.window.since_start());
         let is_outside =
@@ -169,8 +189,8 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
         }
         let best = self.bank.entries().first().map_or(0.0, |entry| entry.score);
         let full = self.bank.least_score().unwrap_or(0.0);
-        let least = if full > rivalry * best { full } else { rivalry * best };
-        let least = if least > 0.0 { least } else { 0.0 };
+        let rival = at_least(rivalry * best, best - within);
+        let least = at_least(at_least(full, rival), 0.0);
         self.work = Work::Trial(Trial::of_candidate(placement, least, self.bank.least_past()));
     }
 

@@ -11,6 +11,7 @@ use sonarfix::association::reflector::{
 use sonarfix::config::{RangerParameters, Ranging};
 use sonarfix::geometry::elementary::{ln, sqrt};
 use sonarfix::geometry::numeric::at_least;
+use sonarfix::geometry::units::Metres;
 use sonarfix::geometry::vector::Vector;
 use sonarfix::map::Map;
 use sonarfix::sensor::echo::{EchoParameters, LogShares};
@@ -50,13 +51,13 @@ const ANYWHERE: f32 = 0.25;
 const ONE_OVER_ROOT_TWO_PI: f32 = 0.398_942_3;
 
 impl Sharpness {
-    /// Deviations, metres: of candidates, of placements that were refined once, and of map, sonar
-    /// and odometry nearby together.
+    /// Deviations, metres: of candidates, and of placements that were refined once.
     pub const COARSE: f32 = 0.15;
     pub const MEDIUM: f32 = 0.08;
-    pub const FINE: f32 = 0.035;
-    /// Of an answer: the hand-over is as exact as the nearest pings.
-    pub const SHARP: f32 = 0.025;
+    /// Of a score, without the noise of the sonar and the error of the map.
+    const FINE: f32 = 0.02;
+    /// The same of an answer: the hand-over is as exact as the nearest pings.
+    const SHARP: f32 = 0.015;
 
     /// Of a ping that was sent so far from the reference that odometry adds a deviation of its own.
     pub fn new(deviation: f32, odometry: f32) -> Self {
@@ -115,6 +116,8 @@ pub(super) struct EchoModel<'m> {
     pub by_beam: f32,
     /// Whether the range is along the axis.
     pub is_light: bool,
+    /// Variance of a range at a metre by the noise of the sonar and the error of the map, m².
+    noise: f32,
 }
 
 impl<'m> EchoModel<'m> {
@@ -122,12 +125,24 @@ impl<'m> EchoModel<'m> {
     pub fn new(map: Map<'m>, sonar: &RangerParameters, echo: &EchoParameters) -> Self {
         let RangerParameters { cone, max_range, ranging, .. } = *sonar;
         let is_light = ranging != Ranging::Sound;
+        let of_map = echo.map_accuracy.0 * echo.map_accuracy.0;
         Self {
             reflectors: Reflectors::new(map, sonar),
             shares: echo.log_shares(max_range, ANYWHERE),
             by_beam: if is_light { 0.0 } else { 1.0 / (BEAM * cone.0) },
             is_light,
+            noise: sonar.noise.variance(Metres(1.0)).0 + of_map,
         }
+    }
+
+    /// Deviation of the ranges of a placement that is scored, metres.
+    pub fn fine(&self) -> f32 {
+        sqrt(Sharpness::FINE * Sharpness::FINE + self.noise)
+    }
+
+    /// The same of an answer.
+    pub fn sharp(&self) -> f32 {
+        sqrt(Sharpness::SHARP * Sharpness::SHARP + self.noise)
     }
 
     /// The score of so many pings, some of them with an echo, where the map has no wall.

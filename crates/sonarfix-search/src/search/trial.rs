@@ -104,7 +104,7 @@ impl Trial {
             return self.end_stage(odometry.prior, echoes, PINGS);
         };
         let sharpness =
-            Sharpness::new(self.deviation(), odometry.per_metre * ping.station.travelled);
+            Sharpness::new(self.deviation(echoes), odometry.per_metre * ping.station.travelled);
         if self.hearing.is_none() {
             self.chain.add(&window.link(ping, self.placement.bend.minus(window.bend())));
         }
@@ -145,14 +145,14 @@ impl Trial {
     }
 
     /// Expected deviation of the ranges in this stage, metres.
-    fn deviation(&self) -> f32 {
+    fn deviation(&self, echoes: &EchoModel) -> f32 {
         match self.stage {
             Stage::Coarse => Sharpness::COARSE,
             Stage::Step(0) => Sharpness::MEDIUM,
-            Stage::Step(1) => Sharpness::FINE,
-            Stage::Step(_) => Sharpness::SHARP,
-            Stage::Fine if self.is_answer => Sharpness::SHARP,
-            Stage::Fine => Sharpness::FINE,
+            Stage::Step(1) => echoes.fine(),
+            Stage::Step(_) => echoes.sharp(),
+            Stage::Fine if self.is_answer => echoes.sharp(),
+            Stage::Fine => echoes.fine(),
         }
     }
 

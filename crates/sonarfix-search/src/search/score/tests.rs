@@ -241,3 +241,26 @@ fn what_is_certain_to_answer_ends_the_list_of_reflectors() {
     let is = f64::from(model.explain(&beam, Sharpness::new(1.0, 0.0)).score);
     assert!((is - (0.7 + 0.01_f64.ln())).abs() < 1e-3, "{is}");
 }
+
+/// The deviations of a score by the noise of the sonar at a metre and the error of the map, in quadrature.
+#[test]
+fn a_coarser_sonar_or_map_has_a_less_sharp_score() {
+    use sonarfix::sensor::range::RangeNoise;
+    let of = |floor: f32, per_metre: f32, map: f32| {
+        let mut sonar = sonar(0.3);
+        sonar.noise = RangeNoise { floor: Metres(floor), per_metre };
+        let mut echo = EchoParameters::HC_SR04;
+        echo.map_accuracy = Metres(map);
+        let model = EchoModel::new(Map::new(&[]), &sonar, &echo);
+        [model.fine(), model.sharp()].map(f64::from)
+    };
+    for (floor, per_metre, map) in
+        [(0.0, 0.0, 0.0), (0.003, 0.004, 0.0), (0.015, 0.0, 0.0), (0.003, 0.01, 0.03)]
+    {
+        let [floor_, slope, of_map] = [floor, per_metre, map].map(f64::from);
+        let other = floor_.powi(2) + slope.powi(2) + of_map.powi(2);
+        for (is, least) in of(floor, per_metre, map).into_iter().zip([0.02_f64, 0.015]) {
+            assert!((is - (least.powi(2) + other).sqrt()).abs() < 1e-6, "{is}");
+        }
+    }
+}

@@ -209,7 +209,7 @@ proptest! {
     #[test]
     fn a_candidate_has_to_reach_a_share_of_the_best_score(
         scores in prop::collection::vec(-50.0_f32..100.0, 0..5), x in 0.0_f32..5.9, angle in -3.1_f32..3.1,
-        (start, since) in ((-1.0_f32..1.0, -1.0_f32..1.0), 0_u8..20), near in 0.1_f32..0.5, rivalry in 0.1_f32..0.9,
+        (start, since) in ((-1.0_f32..1.0, -1.0_f32..1.0), 0_u8..20), near in 0.1_f32..0.5, rivalry in 0.1_f32..0.9, within in 1.0_f32..80.0,
         has_region in any::<bool>(),
     ) {
         let walls = room();
@@ -245,12 +245,29 @@ proptest! {
         let is_known = search.bank.has_near(&placement, near);
         let full = if scores.len() == 4 { scores[3] } else { 0.0 };
         let best = scores.first().copied().unwrap_or(0.0);
-        let least = full.max(rivalry * best).max(0.0);
+        let least = full.max(rivalry * best).max(best - within).max(0.0);
         search.work = Work::None;
-        search.try_candidate(placement, near, rivalry);
+        search.try_candidate(placement, near, (rivalry, within));
         let is_tried = !is_known && (!has_region || outside < 0.0);
         let expected =
             if is_tried { Work::Trial(Trial::of_candidate(placement, least, 0.0)) } else { Work::None };
         prop_assert_eq!(format!("{:?}", search.work), format!("{:?}", expected));
+    }
+}
+
+/// An answer is one of the hypotheses, refined: not a place beside them, to which the refinement has led.
+#[test]
+fn an_answer_is_near_a_hypothesis() {
+    let walls = room();
+    for (moved, is_answer) in [(0.2, true), (0.4, false)] {
+        let mut search = search(&walls);
+        let placement = |x: f32| Placement {
+            at: Vector::new(x, 1.0),
+            rotation: Vector::of_angle(0.0),
+            bend: Bend::NONE,
+        };
+        search.bank = Bank::of(&[Entry::proposed(placement(1.0), 0.0)]);
+        search.conclude(Entry::proposed(placement(1.0 + moved), 0.0));
+        assert_eq!(matches!(search.answer(), Answer::Unique(_)), is_answer, "{moved}");
     }
 }

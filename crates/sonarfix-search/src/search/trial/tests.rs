@@ -109,7 +109,7 @@ fn run(
 }
 
 proptest! {
-    /// Stages of 15, 8 and 3.5 cm with a step after each, and a final one; an answer has two steps at 2.5 cm more.
+    /// Stages of 15 and 8 cm and of the score with a step after each, and a final one; an answer has two steps at its deviation more.
     #[test]
     fn a_trial_refines_a_placement_and_scores_it(
         turn in -0.1_f32..0.1, pings in 5_usize..32, noise in prop::collection::vec(-0.06_f32..0.06, 5),
@@ -132,7 +132,8 @@ proptest! {
         let entry = Entry::proposed(placement, past);
         // Deviation of each stage, share of the wanted mean and slack.
         let coarse = (0.15, 0.5, 0.3);
-        let steps = [(0.08, 0.7, 0.15), (0.035, 0.9, 0.1), (0.025, 0.9, 0.1), (0.025, 0.9, 0.1)];
+        let (fine, sharp) = (echoes.fine(), echoes.sharp());
+        let steps = [(0.08, 0.7, 0.15), (fine, 0.9, 0.1), (sharp, 0.9, 0.1), (sharp, 0.9, 0.1)];
         let least = if kind == 0 { wanted.unwrap_or(f32::NEG_INFINITY) } else { f32::NEG_INFINITY };
         let (trial, stages) = match kind {
             0 => (Trial::of_candidate(placement, least, past), Vec::from([coarse, steps[0], steps[1]])),

@@ -7,6 +7,7 @@ use sonarfix_map::{Scenario, with_cabinet};
 use sonarfix_plan::trial::Trial;
 use sonarfix_report::Table;
 use sonarfix_studies::floor_plan::Kind;
+use sonarfix_studies::search_bound::{self, Bounded, Quantiles, Times};
 use sonarfix_studies::search_study::{self, Plans, Summary};
 use sonarfix_terminal::progress::Runs;
 
@@ -36,6 +37,9 @@ pub struct Args {
     /// Walls of the map of each floor plan: those of other plans stand beside it, and a plan with more is left out.
     #[arg(long, requires = "floor_plans", value_parser = clap::value_parser!(u16).range(1..))]
     walls: Option<u16>,
+    /// Computes for each trial how soon its pings allow to find the pose: a grid of poses, with the odometry known exactly.
+    #[arg(long, requires = "floor_plans")]
+    bound: bool,
     /// Prints every trial.
     #[arg(long)]
     trials: bool,
@@ -52,6 +56,9 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
             let kind = args.homes.then_some(Kind::Home);
             let walls = args.walls.map(usize::from);
             let plans = Plans { first: args.seed, trials, kind, walls };
+            if args.bound {
+                return bound(&plans, args, runs);
+            }
             search_study::floor_plans(&plans, args.seconds, &runs)?
         }
         (Some(file), None) => {
@@ -76,6 +83,58 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     }
     println!("{}", summary_table(&summary, args.seconds).text());
     Ok(())
+}
+
+/// The trials, each with its bound.
+fn bound(plans: &Plans, args: &Args, runs: Runs) -> anyhow::Result<()> {
+    let trials = search_bound::floor_plans(plans, args.seconds, &runs)?;
+    runs.end()?;
+    anyhow::ensure!(!trials.is_empty(), "at least 1 trial is needed");
+    let times = Times::new(&trials);
+    if args.json {
+        let answer = serde_json::json!({ "times": times, "trials": trials });
+        return sonarfix_terminal::json::print(&answer);
+    }
+    if args.trials {
+        println!("{}\n", bound_table(&trials).text());
+    }
+    println!("{}", times_table(&times, args.seconds).text());
+    Ok(())
+}
+
+fn bound_table(trials: &[Bounded]) -> Table {
+    let row = |bounded: &Bounded| {
+        let possible = bounded.possible_after.map_or("-".to_owned(), |after| {
+            format!("{after:.1} s{}", if bounded.is_right { "" } else { ", wrong" })
+        });
+        let found = bounded.trial.unique_after;
+        let found = found.map_or("-".to_owned(), |after| format!("{after:.1} s"));
+        vec![bounded.trial.seed.to_string(), possible, found]
+    };
+    Table {
+        title: "Trials".to_owned(),
+        note: String::new(),
+        columns: ["seed", "possible after", "found after"].map(str::to_owned).into(),
+        rows: trials.iter().map(row).collect(),
+    }
+}
+
+fn times_table(times: &Times, seconds: f64) -> Table {
+    let time = |after: Option<f64>| after.map_or("-".to_owned(), |after| format!("{after:.1} s"));
+    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+    let row = |share: &str, of: &Quantiles| {
+        let times = [of.half, of.four_fifths, of.nineteen_twentieths].map(time);
+        [vec![share.to_owned()], times.into(), vec![percent(of.wrong)]].concat()
+    };
+    Table {
+        title: format!("{} trials of at most {seconds} s", times.trials),
+        note: format!(
+            "time of the search over the bound, median: {}",
+            times.ratio.map_or("-".to_owned(), |ratio| format!("{ratio:.2}"))
+        ),
+        columns: ["", "50 %", "80 %", "95 %", "wrong"].map(str::to_owned).into(),
+        rows: vec![row("bound", &times.possible), row("search", &times.found)],
+    }
 }
 
 /// A point as `X,Y`, metres.
