@@ -15,6 +15,7 @@ use sonarfix_sim::progress::Progress;
 use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::trace::Pose;
 use sonarfix_sim::world::reflector::Reflector;
+use sonarfix_sim::world::segment::Segment;
 use sonarfix_sim::world::sensor::{Curve, SensorModel, WAVELENGTH};
 use sonarfix_sim::world::{Ping, World};
 
@@ -333,14 +334,9 @@ const LEAST_SPAN: f64 = 0.05;
 
 /// The centres of the cells over the box of the walls, in all directions.
 fn first_grid(world: &World) -> Vec<Cell> {
-    let ends = || world.walls().iter().flat_map(sonarfix_sim::world::segment::Segment::ends);
-    let centres = |axis: usize| {
-        let values = || ends().map(|end| end[axis]);
-        let (least, most) =
-            (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
-        steps(least + 0.5 * FIRST_CELL.0, most, FIRST_CELL.0)
-    };
-    let (columns, rows) = (centres(0), centres(1));
+    let ends = || world.walls().iter().flat_map(Segment::ends);
+    let columns = centres(ends().map(|[x, _]| x));
+    let rows = centres(ends().map(|[_, y]| y));
     let headings = steps(0.5 * FIRST_CELL.1, TAU - 0.25 * FIRST_CELL.1, FIRST_CELL.1);
     let mut cells = Vec::with_capacity(columns.len() * rows.len() * headings.len());
     for &x in &columns {
@@ -350,6 +346,13 @@ fn first_grid(world: &World) -> Vec<Cell> {
         }
     }
     cells
+}
+
+/// The centres of cells from the least of some coordinates to the greatest.
+fn centres(of: impl Iterator<Item = f64> + Clone) -> Vec<f64> {
+    let (least, most) =
+        (of.clone().fold(f64::INFINITY, f64::min), of.fold(f64::NEG_INFINITY, f64::max));
+    steps(least + 0.5 * FIRST_CELL.0, most, FIRST_CELL.0)
 }
 
 /// From `first` on, below `end`.

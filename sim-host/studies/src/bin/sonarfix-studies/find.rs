@@ -12,6 +12,7 @@ use sonarfix_studies::search_study::{self, Plans, Summary};
 use sonarfix_terminal::progress::Runs;
 
 #[derive(Debug, clap::Args)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub struct Args {
     /// A scenario (docs/formats.md).
     #[arg(required_unless_present = "floor_plans")]
