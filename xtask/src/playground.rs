@@ -17,7 +17,7 @@ const SECONDS: u32 = 60;
 const MOST_BYTES: usize = 2_000_000;
 /// Builds the page, and checks its size and, in a browser, that it computes the same bits as this computer.
 pub fn build_and_check() -> anyhow::Result<()> {
-    let page = build()?;
+    let page = build(cargo::root())?;
     let bytes = compressed(&page)?;
     println!("{}: {bytes} bytes compressed with gzip", page.display());
     ensure!(bytes <= MOST_BYTES, "the limit is {MOST_BYTES} bytes");
@@ -39,18 +39,21 @@ pub fn build_and_check() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Builds the simulator for WebAssembly, and the page with it.
-pub fn build() -> anyhow::Result<PathBuf> {
-    cargo::run(
-        "build --package sonarfix-playground --lib --target wasm32-unknown-unknown --profile playground",
-    )?;
+/// Builds the simulator of the sources in `root` for WebAssembly, and the page with it: the same bytes in every folder.
+pub fn build(root: &Path) -> anyhow::Result<PathBuf> {
     let target = cargo::target_folder();
+    let mut simulator = cargo::command(
+        "build --package sonarfix-playground --lib --target wasm32-unknown-unknown --profile playground",
+    );
+    simulator.current_dir(root).env("CARGO_TARGET_DIR", &target);
+    cargo::reproducible(&mut simulator, root)?;
+    cargo::check(simulator)?;
     let program = target.join("wasm32-unknown-unknown/playground/sonarfix_playground.wasm");
     let folder = target.join("playground");
     std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
     let page = folder.join("index.html");
     let mut command = cargo::command("run --package sonarfix-playground -- page");
-    command.args([&program, &page]);
+    command.current_dir(root).env("CARGO_TARGET_DIR", &target).args([&program, &page]);
     cargo::check(command)?;
     Ok(page)
 }

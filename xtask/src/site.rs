@@ -4,7 +4,7 @@ mod links;
 mod stage;
 mod theme;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 use anyhow::Context;
@@ -29,31 +29,31 @@ impl Args {
 
 /// Writes the site into `target/site`, and checks its links.
 pub fn run(args: Args) -> anyhow::Result<()> {
-    let site = build()?;
-    links::check(&site)?;
+    let site = cargo::target_folder().join("site");
+    build(cargo::root(), &site)?;
     println!("{}", site.join("index.html").display());
     if args.check { check(&site) } else { Ok(()) }
 }
 
-fn build() -> anyhow::Result<PathBuf> {
+/// Writes the site of the sources in `root` into a folder, which is emptied first, and checks its links.
+pub fn build(root: &Path, site: &Path) -> anyhow::Result<()> {
     cargo::install("mdbook", MDBOOK)?;
-    let (source, site) =
-        (cargo::target_folder().join("site-source"), cargo::target_folder().join("site"));
-    stage::write(&source)?;
+    let source = cargo::target_folder().join("site-source");
+    stage::write(root, &source)?;
     if site.exists() {
-        std::fs::remove_dir_all(&site)?;
+        std::fs::remove_dir_all(site)?;
     }
     let mut mdbook = Command::new("mdbook");
-    mdbook.arg("build").arg(&source).arg("--dest-dir").arg(&site);
+    mdbook.arg("build").arg(&source).arg("--dest-dir").arg(site);
     mdbook.env("MDBOOK_OUTPUT__HTML__GIT_REPOSITORY_URL", env!("CARGO_PKG_REPOSITORY"));
     cargo::check(mdbook)?;
-    theme::change(&site)?;
-    stage::own_page(&playground::build()?, &site.join("playground/index.html"))?;
-    Ok(site)
+    theme::change(site)?;
+    stage::own_page(&playground::build(root)?, &site.join("playground/index.html"))?;
+    links::check(site)
 }
 
 /// Opens each page in Chromium.
-fn check(site: &Path) -> anyhow::Result<()> {
+pub fn check(site: &Path) -> anyhow::Result<()> {
     let Some(browser) = sonarfix_chromium::headless() else {
         ci::skip(&format!(
             "the site in a browser: none of {:?} is there",

@@ -8,22 +8,20 @@ use std::path::{Component, Path, PathBuf};
 use anyhow::{Context, bail, ensure};
 use regex::{Captures, Regex};
 
-use crate::cargo;
-
 /// Where files of the repository are on the web.
 const REPOSITORY: &str = env!("CARGO_PKG_REPOSITORY");
 
 /// Files of the book beside its pages; their folder is `xtask/site`.
 const OWN: [&str; 3] = ["book.toml", "site.css", "site.js"];
 
-/// Writes the source of the book into a folder, which is emptied first.
-pub fn write(folder: &Path) -> anyhow::Result<()> {
+/// Writes the source of the book of the sources in `root` into a folder, which is emptied first.
+pub fn write(root: &Path, folder: &Path) -> anyhow::Result<()> {
     if folder.exists() {
         std::fs::remove_dir_all(folder)?;
     }
-    let own = cargo::root().join("xtask/site");
+    let own = root.join("xtask/site");
     let summary = std::fs::read_to_string(own.join("SUMMARY.md"))?;
-    let source = Source { root: cargo::root(), pages: pages(&summary)? };
+    let source = Source { root, pages: pages(&summary)? };
     source.has_all_docs()?;
     for name in OWN {
         copy(&own.join(name), &folder.join(name))?;
