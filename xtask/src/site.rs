@@ -1,5 +1,6 @@
 //! The site: the docs as a book, and the playground; static files that open from a disk and from any web server.
 
+mod form;
 mod links;
 mod stage;
 mod theme;
@@ -30,13 +31,14 @@ impl Args {
 /// Writes the site into `target/site`, and checks its links.
 pub fn run(args: Args) -> anyhow::Result<()> {
     let site = cargo::target_folder().join("site");
-    build(cargo::root(), &site)?;
+    build(cargo::root(), &site, None)?;
     println!("{}", site.join("index.html").display());
     if args.check { check(&site) } else { Ok(()) }
 }
 
-/// Writes the site of the sources in `root` into a folder, which is emptied first, and checks its links.
-pub fn build(root: &Path, site: &Path) -> anyhow::Result<()> {
+/// Writes the site of the sources in `root` into a folder, which is emptied first, and checks its links. `firmware` is a folder with
+/// released programs for the form of a new robot.
+pub fn build(root: &Path, site: &Path, firmware: Option<&Path>) -> anyhow::Result<()> {
     cargo::install("mdbook", MDBOOK)?;
     let source = cargo::target_folder().join("site-source");
     stage::write(root, &source)?;
@@ -48,7 +50,10 @@ pub fn build(root: &Path, site: &Path) -> anyhow::Result<()> {
     mdbook.env("MDBOOK_OUTPUT__HTML__GIT_REPOSITORY_URL", env!("CARGO_PKG_REPOSITORY"));
     cargo::check(mdbook)?;
     theme::change(site)?;
-    stage::own_page(&playground::build(root)?, &site.join("playground/index.html"))?;
+    let pages = playground::build(root, firmware)?;
+    for (from, to) in playground::PAGES.iter().zip(["playground", "new-robot"]) {
+        stage::own_page(&pages.join(from), &site.join(to).join("index.html"))?;
+    }
     links::check(site)
 }
 
@@ -73,9 +78,11 @@ pub fn check(site: &Path) -> anyhow::Result<()> {
     install.args(["install", "--no-save", "--no-audit", "--no-fund", "--silent"]);
     install.args(PACKAGES).arg("--prefix").arg(&tools);
     cargo::check(install).context("cannot install the rules of accessibility")?;
+    form::prepare(&tools)?;
     let mut node = Command::new("node");
     node.arg(cargo::root().join("xtask/site/check.mjs")).arg(&tools).arg(site);
     node.arg(browser.get_program());
     node.args(browser.get_args().filter(|flag| *flag != "--headless"));
-    cargo::check(node)
+    cargo::check(node)?;
+    form::check(&tools)
 }

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::ensure;
 
-use super::{licences, program};
+use super::{firmware, licences, program};
 use crate::workspace::Workspace;
 use crate::{cargo, site};
 
-/// What the site has beside the pages and the libraries of the playground.
+/// What the site has beside the pages and the libraries of the programs in them.
 const BOOK: &str = "The book has scripts, style sheets and fonts of mdBook, https://github.com/rust-lang/mdBook, under the Mozilla Public \
                     License 2.0; the licences of its fonts are in the folder `fonts`.\n\n";
 
@@ -17,13 +17,17 @@ const BOOK: &str = "The book has scripts, style sheets and fonts of mdBook, http
 pub fn archive(out: &Path, root: &Path) -> anyhow::Result<PathBuf> {
     let name = format!("sonarfix-{}-site", env!("CARGO_PKG_VERSION"));
     let folder = out.join(&name);
-    site::build(root, &folder)?;
+    let programs = cargo::target_folder().join("site-firmware");
+    firmware::for_drives(root, &programs)?;
+    site::build(root, &folder, Some(&programs))?;
     for file in ["LICENSE-MIT", "LICENSE-APACHE"] {
         fs::copy(root.join(file), folder.join(file))?;
     }
     let packages = "--package sonarfix-playground --target wasm32-unknown-unknown";
     let licences = licences::of(Workspace::Main, packages)?;
     fs::write(folder.join("LICENSES.txt"), BOOK.to_owned() + &licences)?;
+    let licences = licences::of(Workspace::Firmware, "--workspace --target all")?;
+    fs::write(folder.join("LICENSES-firmware.txt"), licences)?;
     let packed = out.join(format!("{name}.tar.gz"));
     program::pack(out, &name, &packed)?;
     eprintln!("{}: {} bytes", packed.display(), fs::metadata(&packed)?.len());
