@@ -112,7 +112,7 @@ fn ranger<'b>(
 }
 
 /// The first ranger, and the second one.
-fn rangers<'b>(board: &'b Board, rangers: Rangers) -> Vec<Part<'b>> {
+fn rangers(board: &Board, rangers: Rangers) -> Vec<Part<'_>> {
     let Rangers { name, is_light, has_second } = rangers;
     let (pins, divider) = (&board.pins, &board.divider);
     let kind = if is_light { "ranger" } else { "sonar" };
@@ -378,7 +378,7 @@ mod tests {
             let rounded: Vec<_> =
                 of("<rect x").into_iter().filter(|line| line.contains("rx=")).collect();
             let boxes: Vec<[f64; 4]> = rounded.iter().map(rectangle).collect();
-            assert!(boxes.len() >= 9, "{}", board);
+            assert!(boxes.len() >= 9, "{board}");
             let overlap = |one: &[f64; 4], other: &[f64; 4]| {
                 let apart = |low, high| one[high] <= other[low] || other[high] <= one[low];
                 !(apart(0, 2) || apart(1, 3))
@@ -406,7 +406,7 @@ mod tests {
                 let is_in_one = boxes.iter().any(|outer| holds(outer, &space));
                 let is_beside =
                     text.ends_with('Ω') && !boxes.iter().any(|outer| overlap(outer, &space));
-                assert!(is_in_one || is_beside, "{}: {text}", board);
+                assert!(is_in_one || is_beside, "{board}: {text}");
             }
         }
     }
