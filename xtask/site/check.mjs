@@ -1,6 +1,7 @@
 // Opens every page of the site in Chromium, 400 pixels wide: in the light scheme from the disk, in the dark one from a web server.
 //
-// node check.mjs MODULES SITE BROWSER [FLAG…]: MODULES is a folder with node_modules. Prints each fault, and ends with 1 if there is one.
+// node check.mjs MODULES SITE BROWSER [FLAG…]: MODULES is a folder with node_modules and program.uf2, a program for a Pico 2. Prints each fault,
+// and ends with 1 if there is one.
 import { existsSync, readFileSync, readdirSync } from "node:fs";
 import { createServer } from "node:http";
 import { createRequire } from "node:module";
@@ -15,6 +16,7 @@ const WIDTH = 400; // CSS pixels: a phone
 const PATIENCE = 300_000; // milliseconds: beyond these the page hangs
 const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml" };
 const PLAYGROUND = "playground/index.html";
+const FORM = "new-robot/index.html";
 
 const pages = readdirSync(site, { recursive: true }).filter((name) => extname(name) === ".html").sort();
 let faults = 0;
@@ -77,9 +79,29 @@ async function usePlayground(page, where) {
   console.log(`${where}: first paint after ${paint?.toFixed(0)} ms`);
 }
 
-async function open(page, base, name, where) {
+// The form of a new robot is filled in by the keys alone; its archive becomes SCHEME.zip in the folder MODULES, with a UF2 of the program there.
+async function useForm(page, where, scheme) {
+  const answers = ["pico2", "lv_maxsonar", "90 deg", "mg996r", "900", "68 mm", "14 cm", "5 x 3.5"]; // in the order of the fields
+  const first = page.locator("#fields select").first();
+  while (!await first.evaluate((it) => it === document.activeElement)) await page.keyboard.press("Tab");
+  for (const answer of answers) {
+    await page.keyboard.type(answer);
+    await page.keyboard.press("Tab");
+  }
+  const typed = await page.$$eval("#fields input, #fields select", (fields) => fields.map(({ value }) => value));
+  if (typed.join() !== answers.join()) fault(where, `the fields have ${typed}`);
+  await page.setInputFiles("#program", join(modules, "program.uf2"));
+  await page.waitForFunction(() => document.getElementById("flash-hint").textContent.includes("robot.uf2"));
+  while (!await page.evaluate(() => document.activeElement.id === "download")) await page.keyboard.press("Tab");
+  const [download] = await Promise.all([page.waitForEvent("download"), page.keyboard.press("Enter")]);
+  await download.saveAs(join(modules, `${scheme}.zip`));
+  await page.$$eval("#files details", (files) => files.forEach((it) => { it.open = true; }));
+}
+
+async function open(page, base, name, where, scheme) {
   await page.goto(base + name, { waitUntil: "load" });
   if (name === PLAYGROUND) await usePlayground(page, where);
+  if (name === FORM) await useForm(page, where, scheme);
   await page.evaluate(axe);
   await check(page, where);
   if (name === "index.html") await useBook(page, where);
@@ -100,7 +122,7 @@ async function visit(browser, scheme, base) {
   for (const name of pages) {
     where = `${name}, ${scheme}`;
     try {
-      await open(page, base, name, where);
+      await open(page, base, name, where, scheme);
     } catch (error) {
       fault(where, error.message);
     }

@@ -1,9 +1,10 @@
-//! What a release consists of: archives of the command, programs of the boards, and the packages of the C library; and the
-//! check that their users can run and build them.
+//! What a release consists of: archives of the command, programs of the boards, the site, and the packages of the C library; and
+//! the check that their users can run and build them.
 
 mod firmware;
 mod licences;
 mod program;
+mod site;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -23,21 +24,27 @@ pub struct Args {
     /// Only the archives of the command and the programs of the boards.
     #[arg(long)]
     program: bool,
+    /// Only the archive of the site.
+    #[arg(long, conflicts_with = "program")]
+    site: bool,
 }
 
 impl Args {
     /// Those of CI.
     pub fn check() -> Self {
-        Self { out: PathBuf::from("target/dist"), check: true, program: false }
+        Self { out: PathBuf::from("target/dist"), check: true, program: false, site: false }
     }
 }
 
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let out = cargo::root().join(&args.out);
     fs::create_dir_all(&out)?;
+    if args.site {
+        return site(args, &out);
+    }
     let firmware = firmware::programs(&out)?;
-    let archives = program::archives(&out, &firmware)?;
-    checksums(&out, &[archives, firmware].concat())?;
+    program::archives(&out, &firmware)?;
+    checksums(&out)?;
     if args.check {
         let copy = copy()?;
         program::check(&out, &copy)?;
@@ -47,8 +54,31 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     if args.program { Ok(()) } else { packages(args) }
 }
 
-/// The sums of the files, as `sha256sum --check` reads them.
-fn checksums(out: &Path, files: &[PathBuf]) -> anyhow::Result<()> {
+fn site(args: &Args, out: &Path) -> anyhow::Result<()> {
+    let archive = site::archive(out, cargo::root())?;
+    checksums(out)?;
+    if args.check {
+        let copy = copy()?;
+        site::check(&archive, &copy)?;
+        fs::remove_dir_all(copy)?;
+    }
+    Ok(())
+}
+
+/// The sums of all archives of this version and of the programs of the boards, as `sha256sum --check` reads them.
+fn checksums(out: &Path) -> anyhow::Result<()> {
+    let mut files = Vec::new();
+    for folder in [out.to_owned(), out.join(firmware::FOLDER)] {
+        let entries = fs::read_dir(folder).into_iter().flatten();
+        files.extend(entries.filter_map(|entry| Some(entry.ok()?.path())));
+    }
+    let own = format!("sonarfix-{}-", env!("CARGO_PKG_VERSION"));
+    files.retain(|file| {
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        let is_archive = name.starts_with(&own) && name.ends_with(".tar.gz");
+        file.is_file() && (is_archive || file.parent() != Some(out))
+    });
+    files.sort();
     let mut sums = Command::new("sha256sum");
     sums.current_dir(out).args(files.iter().filter_map(|file| file.strip_prefix(out).ok()));
     Ok(fs::write(out.join("SHA256SUMS"), cargo::printed(sums)?)?)

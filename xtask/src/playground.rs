@@ -1,4 +1,4 @@
-//! The simulator as a static web page, and its check in a headless browser.
+//! The simulator and the form of a new robot as static web pages, and their check in a headless browser.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -13,46 +13,63 @@ use crate::ci;
 
 /// Simulated seconds of each run that browser and computer compare.
 const SECONDS: u32 = 60;
-/// Limit of the page, compressed with gzip, bytes.
+/// Limit of a page, compressed with gzip, bytes.
 const MOST_BYTES: usize = 2_000_000;
-/// Builds the page, and checks its size and, in a browser, that it computes the same bits as this computer.
+/// The pages in the folder of [`build`], and the scripts in `sim-host/playground/tests` that use them.
+pub const PAGES: [&str; 2] = ["index.html", "new-robot.html"];
+const CHECKS: [&str; 2] = ["check.js", "check_new_robot.js"];
+
+/// Builds the pages, and checks their size and, in a browser, their use, and that the simulator computes the same bits as this computer.
 pub fn build_and_check() -> anyhow::Result<()> {
-    let page = build()?;
-    let bytes = compressed(&page)?;
-    println!("{}: {bytes} bytes compressed with gzip", page.display());
-    ensure!(bytes <= MOST_BYTES, "the limit is {MOST_BYTES} bytes");
+    let folder = build(cargo::root(), None)?;
+    let pages = PAGES.map(|name| folder.join(name));
+    for page in &pages {
+        let bytes = compressed(page)?;
+        println!("{}: {bytes} bytes compressed with gzip", page.display());
+        ensure!(bytes <= MOST_BYTES, "the limit is {MOST_BYTES} bytes");
+    }
     let native = digests()?;
-    let Some(browser) = sonarfix_chromium::headless() else {
-        ci::skip(&format!(
-            "the page in a browser: none of {:?} is there",
-            sonarfix_chromium::NAMES
-        ));
-        return Ok(());
-    };
-    let root = opened(browser, &page)?;
-    ensure!(attribute(&root, "data-error").is_none(), "a script failed: {root}");
-    let computed = attribute(&root, "data-digests").context("the page has not computed a run")?;
-    let time = attribute(&root, "data-milliseconds").unwrap_or("?");
-    println!("{native}: {} runs of {SECONDS} s in {time} ms", native.split(' ').count());
-    ensure!(attribute(&root, "data-checked").is_some(), "the check has not ended: {root}");
-    ensure!(computed == native, "the browser computed {computed}, this computer {native}");
+    for (page, script) in pages.iter().zip(CHECKS) {
+        let Some(browser) = sonarfix_chromium::headless() else {
+            ci::skip(&format!(
+                "the pages in a browser: none of {:?} is there",
+                sonarfix_chromium::NAMES
+            ));
+            return Ok(());
+        };
+        let root = opened(browser, page, script)?;
+        ensure!(attribute(&root, "data-error").is_none(), "a script failed: {root}");
+        ensure!(attribute(&root, "data-checked").is_some(), "{script} has not ended: {root}");
+        if let Some(computed) = attribute(&root, "data-digests") {
+            let time = attribute(&root, "data-milliseconds").unwrap_or("?");
+            println!("{native}: {} runs of {SECONDS} s in {time} ms", native.split(' ').count());
+            ensure!(computed == native, "the browser computed {computed}, this computer {native}");
+        }
+    }
     Ok(())
 }
 
-/// Builds the simulator for WebAssembly, and the page with it.
-pub fn build() -> anyhow::Result<PathBuf> {
-    cargo::run(
-        "build --package sonarfix-playground --lib --target wasm32-unknown-unknown --profile playground",
-    )?;
+/// Builds the simulator of the sources in `root` for WebAssembly, and the pages with it: the same bytes in every folder.
+/// Returns their folder. `firmware` is a folder with released programs for the form of a new robot.
+pub fn build(root: &Path, firmware: Option<&Path>) -> anyhow::Result<PathBuf> {
     let target = cargo::target_folder();
+    let mut simulator = cargo::command(
+        "build --package sonarfix-playground --lib --target wasm32-unknown-unknown --profile playground",
+    );
+    simulator.current_dir(root).env("CARGO_TARGET_DIR", &target);
+    cargo::reproducible(&mut simulator, root)?;
+    cargo::check(simulator)?;
     let program = target.join("wasm32-unknown-unknown/playground/sonarfix_playground.wasm");
     let folder = target.join("playground");
     std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
-    let page = folder.join("index.html");
-    let mut command = cargo::command("run --package sonarfix-playground -- page");
-    command.args([&program, &page]);
+    let mut command = cargo::command("run --package sonarfix-playground -- pages");
+    command
+        .current_dir(root)
+        .env("CARGO_TARGET_DIR", &target)
+        .args([&program, &folder])
+        .args(firmware);
     cargo::check(command)?;
-    Ok(page)
+    Ok(folder)
 }
 
 fn compressed(page: &Path) -> anyhow::Result<usize> {
@@ -67,11 +84,11 @@ fn digests() -> anyhow::Result<String> {
     Ok(cargo::printed(cargo::command(&command))?.trim().to_owned())
 }
 
-/// The opening tag of the page with a script that uses it, after its scripts ran.
-fn opened(mut browser: Command, page: &Path) -> anyhow::Result<String> {
+/// The opening tag of a page with a script that uses it, after its scripts ran.
+fn opened(mut browser: Command, page: &Path, script: &str) -> anyhow::Result<String> {
     let (profile, checked) = (page.with_file_name("profile"), page.with_file_name("check.html"));
-    let script = cargo::root().join("sim-host/playground/tests/check.js");
-    let script = std::fs::read_to_string(&script).context("tests/check.js")?;
+    let path = cargo::root().join("sim-host/playground/tests").join(script);
+    let script = std::fs::read_to_string(path).context(script.to_owned())?;
     let text = std::fs::read_to_string(page)?
         .replacen("<html", &format!("<html data-seconds=\"{SECONDS}\""), 1)
         .replace("</body>", &format!("<script>\n{script}</script>\n</body>"));

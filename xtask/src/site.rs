@@ -1,10 +1,11 @@
 //! The site: the docs as a book, and the playground; static files that open from a disk and from any web server.
 
+mod form;
 mod links;
 mod stage;
 mod theme;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 use anyhow::Context;
@@ -29,31 +30,35 @@ impl Args {
 
 /// Writes the site into `target/site`, and checks its links.
 pub fn run(args: Args) -> anyhow::Result<()> {
-    let site = build()?;
-    links::check(&site)?;
+    let site = cargo::target_folder().join("site");
+    build(cargo::root(), &site, None)?;
     println!("{}", site.join("index.html").display());
     if args.check { check(&site) } else { Ok(()) }
 }
 
-fn build() -> anyhow::Result<PathBuf> {
+/// Writes the site of the sources in `root` into a folder, which is emptied first, and checks its links. `firmware` is a folder with
+/// released programs for the form of a new robot.
+pub fn build(root: &Path, site: &Path, firmware: Option<&Path>) -> anyhow::Result<()> {
     cargo::install("mdbook", MDBOOK)?;
-    let (source, site) =
-        (cargo::target_folder().join("site-source"), cargo::target_folder().join("site"));
-    stage::write(&source)?;
+    let source = cargo::target_folder().join("site-source");
+    stage::write(root, &source)?;
     if site.exists() {
-        std::fs::remove_dir_all(&site)?;
+        std::fs::remove_dir_all(site)?;
     }
     let mut mdbook = Command::new("mdbook");
-    mdbook.arg("build").arg(&source).arg("--dest-dir").arg(&site);
+    mdbook.arg("build").arg(&source).arg("--dest-dir").arg(site);
     mdbook.env("MDBOOK_OUTPUT__HTML__GIT_REPOSITORY_URL", env!("CARGO_PKG_REPOSITORY"));
     cargo::check(mdbook)?;
-    theme::change(&site)?;
-    stage::own_page(&playground::build()?, &site.join("playground/index.html"))?;
-    Ok(site)
+    theme::change(site)?;
+    let pages = playground::build(root, firmware)?;
+    for (from, to) in playground::PAGES.iter().zip(["playground", "new-robot"]) {
+        stage::own_page(&pages.join(from), &site.join(to).join("index.html"))?;
+    }
+    links::check(site)
 }
 
 /// Opens each page in Chromium.
-fn check(site: &Path) -> anyhow::Result<()> {
+pub fn check(site: &Path) -> anyhow::Result<()> {
     let Some(browser) = sonarfix_chromium::headless() else {
         ci::skip(&format!(
             "the site in a browser: none of {:?} is there",
@@ -73,9 +78,11 @@ fn check(site: &Path) -> anyhow::Result<()> {
     install.args(["install", "--no-save", "--no-audit", "--no-fund", "--silent"]);
     install.args(PACKAGES).arg("--prefix").arg(&tools);
     cargo::check(install).context("cannot install the rules of accessibility")?;
+    form::prepare(&tools)?;
     let mut node = Command::new("node");
     node.arg(cargo::root().join("xtask/site/check.mjs")).arg(&tools).arg(site);
     node.arg(browser.get_program());
     node.args(browser.get_args().filter(|flag| *flag != "--headless"));
-    cargo::check(node)
+    cargo::check(node)?;
+    form::check(&tools)
 }

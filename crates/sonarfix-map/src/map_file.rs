@@ -43,12 +43,11 @@ impl MapFile {
         Self::parse(bytes, path, unit)
     }
 
-    /// Reads a map that is no scenario from the bytes of a file.
-    pub(crate) fn parse(
-        bytes: Vec<u8>,
-        path: &Path,
-        unit: Option<&str>,
-    ) -> Result<Self, FileError> {
+    /// Reads a map that is no scenario from the bytes of a file. Only the name of `path` is used.
+    ///
+    /// # Errors
+    /// [`FileError`] with all mistakes.
+    pub fn parse(bytes: Vec<u8>, path: &Path, unit: Option<&str>) -> Result<Self, FileError> {
         let WallFile { floor, lines } = WallFile::parse(bytes, path, unit)?;
         let is_toml = path.extension().is_some_and(|extension| extension == "toml");
         Ok(Self { floor, scenario: None, name: file::name(path), lines, is_toml })

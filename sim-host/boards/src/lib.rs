@@ -6,6 +6,7 @@
 //! | [`uf2`] | the file that a board takes on its USB drive |
 //! | [`drive`] | that drive |
 //! | [`esp`] | the file that the bootloader of an ESP32-C6 starts |
+//! | [`wiring`] | a drawing of the parts beside the board |
 //! | [`made`] | made ELF files, for tests |
 
 pub mod drive;
@@ -13,6 +14,7 @@ pub mod esp;
 pub mod image;
 pub mod made;
 pub mod uf2;
+pub mod wiring;
 
 use anyhow::Context;
 use serde::Deserialize;

@@ -2,12 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, anyhow, ensure};
-use sonarfix_boards::Board;
+use anyhow::{Context, anyhow};
 use sonarfix_hal::config::{Feature, RobotConfig};
-use sonarfix_hal::ranger::RangerKind;
 use sonarfix_link::baked;
 use sonarfix_map::{robot_file, robot_text};
+use sonarfix_new_robot::flash;
 
 use crate::warnings;
 use sonarfix_terminal::output::check_file;
@@ -96,34 +95,15 @@ pub fn bake(
         })?;
     }
     if let Some(board) = board {
-        check_board(&sonarfix_boards::named(board)?, &config)?;
+        flash::check_board(&sonarfix_boards::named(board)?, &config)?;
     }
-    let mut buffer = [0; baked::LENGTH_MAX];
-    let bytes = baked::write(&config, &mut buffer)?.to_vec();
-    Ok(Baked { bytes, checksum: baked::checksum(&config) })
+    Ok(Baked { bytes: flash::configuration(&config)?, checksum: baked::checksum(&config) })
 }
 
 fn feature(name: &str) -> anyhow::Result<Feature> {
     let names = Feature::ALL.map(Feature::name).join(", ");
     let found = Feature::ALL.into_iter().find(|feature| feature.name() == name);
     found.with_context(|| format!("no such feature; there are {names}"))
-}
-
-/// Refuses a robot that the firmware of a board cannot drive.
-fn check_board(board: &Board, config: &RobotConfig) -> anyhow::Result<()> {
-    let title = &board.title;
-    let (rangers, most) = (config.rangers.iter().count(), 1 + usize::from(board.second.is_some()));
-    ensure!(
-        rangers <= most,
-        "the firmware of the {title} drives at most {most} of the {rangers} rangers of the robot"
-    );
-    let is_on_bus = |kind: RangerKind| !matches!(kind, RangerKind::Pulse(_) | RangerKind::Custom);
-    let has_bus = board.bus.is_some();
-    let needs_bus = config.rangers.iter().any(|(_, ranger)| is_on_bus(ranger.kind));
-    ensure!(has_bus || !needs_bus, "the {title} has no I2C bus for the ranger");
-    let has_gyro = config.localizer.gyro.is_some();
-    ensure!(has_bus || !has_gyro, "the {title} has no I2C bus for the gyro");
-    Ok(())
 }
 
 fn read(file: &Path) -> anyhow::Result<RobotConfig> {

@@ -8,11 +8,11 @@ use std::time::Duration;
 
 use anyhow::{Context, ensure};
 use sonarfix_boards::drive::{self, Drive};
-use sonarfix_boards::image::Image;
-use sonarfix_boards::{Board, Region, Uf2, uf2};
-use sonarfix_map::MapFile;
+use sonarfix_boards::{Board, Uf2, uf2};
+use sonarfix_map::{MapFile, robot_file};
+use sonarfix_new_robot::flash::{self, Part};
 
-use crate::{config, map};
+use crate::warnings;
 use hello::{Flashed, Link};
 
 #[derive(Debug, clap::Args)]
@@ -49,14 +49,6 @@ pub struct Args {
     /// How long the robot's `Hello` is waited for.
     #[arg(long, value_name = "SECONDS", default_value_t = 30, requires = "port")]
     wait: u32,
-}
-
-/// What goes into the flash beside the program.
-struct Part {
-    what: &'static str,
-    region: Region,
-    bytes: Vec<u8>,
-    checksum: u32,
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
@@ -101,30 +93,20 @@ fn parts(args: &Args, board: &Board) -> anyhow::Result<[Part; 2]> {
         "{} has no robot.toml and map.toml: `sonarfix init` writes such a folder",
         args.robot.display()
     );
-    let baked = config::bake(&robot, None, Some(board.name.as_str()))?;
-    let image = map::image(&MapFile::read(&map, None)?)?;
-    let checksum = map::seal(&image);
+    let config = robot_file::read(&robot)?;
+    warnings::show(&[&robot]);
     let parts = [
-        Part {
-            what: "the configuration",
-            region: board.config,
-            bytes: baked.bytes,
-            checksum: baked.checksum,
-        },
-        Part { what: "the map", region: board.map, bytes: image, checksum },
+        Part::configuration(&config, board, &robot.display().to_string())?,
+        Part::map(&MapFile::read(&map, None)?, board, &map.display().to_string())?,
     ];
     for (part, file) in parts.iter().zip([&robot, &map]) {
-        let Part { what, region: Region { address, bytes: most }, bytes, checksum } = part;
-        let length = bytes.len();
-        ensure!(
-            length <= *most as usize,
-            "{}: {what} has {length} bytes, and the {} has room for {most}",
-            file.display(),
-            board.title
-        );
         println!(
-            "{}: {what}, {length} bytes at {address:#010x}, checksum {checksum:08x}",
-            file.display()
+            "{}: {}, {} bytes at {:#010x}, checksum {:08x}",
+            file.display(),
+            part.what,
+            part.bytes.len(),
+            part.region.address,
+            part.checksum
         );
     }
     Ok(parts)
@@ -151,29 +133,6 @@ fn program(args: &Args, board: &Board) -> anyhow::Result<PathBuf> {
     })
 }
 
-/// The contents of the program's file, checked against the board.
-fn read(program: &Path, board: &Board, usb: &Uf2) -> anyhow::Result<Image> {
-    let name = program.display();
-    let bytes = std::fs::read(program).with_context(|| name.to_string())?;
-    if !uf2::is_uf2(&bytes) {
-        return Image::of_elf(&bytes).with_context(|| format!("{name} is neither UF2 nor ELF"));
-    }
-    let (image, family) = uf2::read(&bytes).with_context(|| name.to_string())?;
-    if family != usb.family {
-        let others = sonarfix_boards::all()?;
-        let has_it = |it: &&Board| it.uf2.as_ref().is_some_and(|uf2| uf2.family == family);
-        let other = others.iter().find(has_it);
-        let other = other.map_or_else(|| "another chip".to_owned(), |it| format!("a {}", it.title));
-        anyhow::bail!(
-            "{name} is for {other} (family {family:#010x}), not for the {} ({:#010x}): name its board by --board, or \
-             another file by --program",
-            board.title,
-            usb.family
-        );
-    }
-    Ok(image)
-}
-
 fn over_usb(
     args: &Args,
     board: &Board,
@@ -181,23 +140,12 @@ fn over_usb(
     program: &Path,
     parts: &[Part],
 ) -> anyhow::Result<()> {
-    let mut image = read(program, board, usb)?;
     let name = program.display();
-    let (first, _) = image.parts().next().context("the program is empty")?;
-    let end = image.parts().map(|(address, bytes)| address as usize + bytes.len()).max();
-    ensure!(
-        first >= board.start_of_flash()
-            && end.is_some_and(|end| end <= board.config.address as usize),
-        "{name} is no program for the {}: it does not lie between {:#010x} and {:#010x}",
-        board.title,
-        board.start_of_flash(),
-        board.config.address
-    );
+    let bytes = std::fs::read(program).with_context(|| name.to_string())?;
+    let image = flash::program(&bytes, &name.to_string(), board, usb)?;
+    let first = image.parts().next().map_or(0, |(address, _)| address);
     println!("{name}: the program, {} bytes at {first:#010x}", image.flat().len());
-    for Part { what, region, bytes, .. } in parts {
-        image.add(what, region.address, bytes)?;
-    }
-    let file = uf2::write(&image, usb.family)?;
+    let file = flash::combined(image, parts, usb)?;
     let blocks = file.len() / uf2::BLOCK;
     let does = if args.dry_run { "would write" } else { "wrote" };
     let wrote = |to: &Path| {

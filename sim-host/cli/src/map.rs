@@ -5,13 +5,12 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::Subcommand;
 use serde::Serialize;
-use sonarfix::config::{Config, RangerParameters};
-use sonarfix::geometry::units::Metres;
 use sonarfix::map::Map;
 use sonarfix_map::{
     Finding, Limits, MapFile, Mistake, NamedWall, Severity, Symmetry, bake, flaws, plausibility,
     robot_file, simplify, symmetries,
 };
+use sonarfix_new_robot::flash;
 
 use crate::map_exchange;
 use crate::warnings::Warning;
@@ -149,7 +148,7 @@ impl Checked {
     fn of(map: &MapFile, robot: Option<&Path>) -> anyhow::Result<Self> {
         let sonar = match robot {
             Some(robot) => robot_file::read(robot)?.localizer.rangers.first,
-            None => map.sonar().unwrap_or_else(usual_sonar),
+            None => map.sonar().unwrap_or_else(flash::usual_sonar),
         };
         let findings = flaws(&map.floor, &sonar)?;
         let is_new = |warning: &Mistake| {
@@ -272,27 +271,6 @@ fn count(findings: &[Finding], severity: Severity) -> usize {
     findings.iter().filter(|finding| finding.severity() == severity).count()
 }
 
-fn usual_sonar() -> RangerParameters {
-    Config::for_track_width(Metres(0.16)).rangers.first
-}
-
-/// The checksum at the end of an image, which a robot reports.
-pub fn seal(image: &[u8]) -> u32 {
-    image.last_chunk().copied().map_or(0, u32::from_le_bytes)
-}
-
-/// The image of a map.
-///
-/// # Errors
-/// If the map has errors; they are not listed.
-pub fn image(map: &MapFile) -> anyhow::Result<Vec<u8>> {
-    let findings = flaws(&map.floor, &map.sonar().unwrap_or_else(usual_sonar))?;
-    let errors = count(&findings, Severity::Error);
-    let name = map.name();
-    anyhow::ensure!(errors == 0, "{name}: {errors} errors; run `sonarfix map check {name}`");
-    Ok(bake(&map.floor.walls())?)
-}
-
 /// A baked map, as JSON.
 #[derive(Serialize)]
 struct JsonImage<'a> {
@@ -313,7 +291,7 @@ struct JsonGrid {
 }
 
 fn write_image(map: &MapFile, out: &Path, is_json: bool) -> anyhow::Result<()> {
-    let image = image(map)?;
+    let image = flash::image(map)?;
     sonarfix_files::write(out, &image)?;
     let (walls, bytes) = (map.floor.named_walls().len(), image.len());
     let grid = Map::read(&image)?.grid().map(|grid| JsonGrid {
@@ -322,7 +300,7 @@ fn write_image(map: &MapFile, out: &Path, is_json: bool) -> anyhow::Result<()> {
         cell_size: grid.cell_size().0,
     });
     if is_json {
-        let checksum = format!("{:08x}", seal(&image));
+        let checksum = format!("{:08x}", flash::seal(&image));
         return json::print(&JsonImage { out, walls, bytes, checksum, grid });
     }
     if let Some(JsonGrid { columns, rows, cell_size }) = grid {

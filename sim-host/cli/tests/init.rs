@@ -176,6 +176,22 @@ fn the_written_robot_finds_its_way() {
     assert!(rms("x").hypot(rms("y")) < 0.03, "{summary}");
 }
 
+/// A rectangular room is the map, and the simulated drive in it is valid.
+#[test]
+fn a_room_is_the_map_and_has_a_path() {
+    let dir = tempfile::tempdir().unwrap();
+    run(dir.path(), &["init", "robot", "--room", "5 x 3.5"]);
+    let robot = dir.path().join("robot");
+    let map = fs::read_to_string(robot.join("map.toml")).unwrap();
+    assert_eq!(map.matches("name = ").count(), 4, "{map}");
+    assert!(map.contains("to = [5.0, 3.5]"), "{map}");
+    let drawing = fs::read_to_string(robot.join("wiring.svg")).unwrap();
+    assert!(drawing.contains("Raspberry Pi Pico 2") && drawing.contains("HC-SR04"), "{drawing}");
+    let json = run(&robot, &["run", "scenario.toml", "--runs", "2", "--json"]);
+    let summary: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(summary.get("lost_runs").unwrap(), 0, "{summary}");
+}
+
 /// A robot that is to find its pose needs motors that run while it is lost, and the file states it.
 #[test]
 fn the_written_robot_can_be_changed_to_find_its_pose() {
@@ -207,7 +223,7 @@ fn a_folder_with_files_is_left_alone() {
 #[test]
 fn wrong_answers_are_refused_and_leave_no_folder() {
     let dir = tempfile::tempdir().unwrap();
-    let cases: [(&[&str], &str); 8] = [
+    let cases: [(&[&str], &str); 10] = [
         (&["--board", "arduino"], "pico2"),
         (&["--sonar", "srf08"], "hc_sr04, lv_maxsonar, vl53l1x, vl53l0x"),
         (&["--second-at", "90"], "a unit is missing"),
@@ -216,6 +232,8 @@ fn wrong_answers_are_refused_and_leave_no_folder() {
         (&["--wheel-diameter", "0 mm"], "must be from 1 mm to 10 m"),
         (&["--track-width", "12\" }"], "is no value"),
         (&["--ticks-per-revolution", "nan"], "is not a positive number"),
+        (&["--room", "4 m"], "write, for example, 4 x 3"),
+        (&["--room", "4 x 0"], "write, for example, 4 x 3"),
     ];
     for (options, message) in cases {
         let error = refusal(dir.path(), &[&["init", "robot"], options].concat());

@@ -1,4 +1,4 @@
-//! The simulator as a static web page, without a server: `cargo xtask playground`.
+//! The simulator and the form of a new robot as static web pages, without a server: `cargo xtask playground`.
 //!
 //! The page keeps a scenario as JSON, with the keys of a scenario file. For each change it passes the scenario to [`answer`],
 //! which runs it from start to end, and plays the result. A run is a function of its [`request`], so picking
@@ -8,13 +8,15 @@
 //! |---|---|
 //! | [`request`] | what the page asks for, and how it becomes a simulation |
 //! | [`scenes`](mod@scenes) | the scenes of the tour |
+//! | [`new_robot`] | the form of a new robot |
 //! | [`digest`] | a hash of all bits of a run, to compare machines |
 //! | `exports` | the functions that the page calls, in WebAssembly |
-//! | `main.rs` | the program that writes the page |
+//! | `main.rs` | the program that writes the pages |
 
 pub mod digest;
 #[cfg(target_arch = "wasm32")]
 mod exports;
+pub mod new_robot;
 pub mod request;
 pub mod scenes;
 

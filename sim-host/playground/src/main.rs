@@ -1,10 +1,11 @@
-//! Writes the page of the playground, or prints the hashes that it must compute.
+//! Writes the pages, or prints the hashes that the playground must compute.
 
 use std::path::Path;
 
 use anyhow::{Context, bail};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
+use sonarfix_boards::Board;
 use sonarfix_playground::request::Request;
 use sonarfix_playground::run;
 use sonarfix_report::{DRAWING, SCRIPT, fill, player, style};
@@ -12,35 +13,64 @@ use sonarfix_report::{DRAWING, SCRIPT, fill, player, style};
 /// The seeds that the page checks with `#check`.
 const SEEDS: [u64; 3] = [0, 1, 2];
 
-const USAGE: &str = "usage: sonarfix-playground page PROGRAM.wasm PAGE.html | digests SECONDS";
+const USAGE: &str =
+    "usage: sonarfix-playground pages PROGRAM.wasm FOLDER [FIRMWARE] | digests SECONDS";
 
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     match arguments.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
-        ["page", program, page] => write(program.as_ref(), page.as_ref()),
+        ["pages", program, folder] => write(program.as_ref(), folder.as_ref(), ""),
+        ["pages", program, folder, firmware] => {
+            write(program.as_ref(), folder.as_ref(), &programs(firmware.as_ref())?)
+        }
         ["digests", seconds] => print(seconds.parse().context(USAGE)?),
         _ => bail!(USAGE),
     }
 }
 
-fn write(program: &Path, page: &Path) -> anyhow::Result<()> {
+/// The programs of the boards that take UF2 files, from a folder of a release, as elements of the page.
+fn programs(firmware: &Path) -> anyhow::Result<String> {
+    let boards = sonarfix_boards::all()?;
+    let elements =
+        boards.iter().filter(|board| board.uf2.is_some()).map(|Board { name, package, .. }| {
+            let file = firmware.join(format!("{package}.uf2"));
+            let bytes = std::fs::read(&file).with_context(|| file.display().to_string())?;
+            let bytes = STANDARD.encode(bytes);
+            Ok(format!("<script id=\"program-{name}\" type=\"text/plain\">{bytes}</script>\n"))
+        });
+    elements.collect()
+}
+
+/// Writes the pages into a folder, with the elements of the programs of boards.
+fn write(program: &Path, folder: &Path, programs: &str) -> anyhow::Result<()> {
     let program = std::fs::read(program).with_context(|| program.display().to_string())?;
-    let (style, player) = (style(), player());
     let program = STANDARD.encode(program);
-    let values = [
-        ("style", style.as_str()),
+    let (style, player) = (style(), player());
+    let simulator = include_str!("simulator.js");
+    let common = [("style", style.as_str()), ("wasm", &program), ("simulator", simulator)];
+    let playground = [
         ("own-style", include_str!("page.css")),
         ("player", &player),
-        ("wasm", &program),
         ("drawing", DRAWING),
         ("player-script", SCRIPT),
-        ("simulator", include_str!("simulator.js")),
         ("handles", include_str!("handles.js")),
         ("address", include_str!("address.js")),
         ("script", include_str!("playground.js")),
     ];
-    let text = fill(include_str!("page.html"), &values.map(|(name, text)| (name, text.into())));
-    sonarfix_files::write(page, text)
+    let new_robot = [
+        ("own-style", concat!(include_str!("page.css"), include_str!("new_robot.css"))),
+        ("programs", programs),
+        ("script", include_str!("new_robot.js")),
+    ];
+    for (name, template, own) in [
+        ("index.html", include_str!("page.html"), playground.as_slice()),
+        ("new-robot.html", include_str!("new_robot.html"), &new_robot),
+    ] {
+        let values = common.iter().chain(own).map(|(name, text)| (*name, (*text).into()));
+        let text = fill(template, &values.collect::<Vec<_>>());
+        sonarfix_files::write(&folder.join(name), text)?;
+    }
+    Ok(())
 }
 
 /// The hashes of runs of `classroom` on this computer, in one line.

@@ -1,18 +1,23 @@
 "use strict";
 // The simulator in WebAssembly: plain functions, texts in UTF-8 in its memory.
 
+// The bytes of a text in base64.
+const decoded = (base64) => Uint8Array.from(atob(base64.trim()), (letter) => letter.charCodeAt(0));
+
 const openSimulator = (base64) => {
-  const module = new WebAssembly.Module(Uint8Array.from(atob(base64.trim()), (letter) => letter.charCodeAt(0)));
+  const module = new WebAssembly.Module(decoded(base64));
   const start = () => new WebAssembly.Instance(module, {}).exports;
   let wasm = start();
 
   const answer = (length) => new TextDecoder().decode(new Uint8Array(wasm.memory.buffer, wasm.answer(), length));
 
-  function write(request) {
-    const bytes = new TextEncoder().encode(JSON.stringify(request));
-    const address = wasm.request(bytes.length); // may move the memory
+  // Copies bytes into the room that a function makes for them.
+  function put(bytes, room) {
+    const address = room(bytes.length); // may move the memory
     new Uint8Array(wasm.memory.buffer, address, bytes.length).set(bytes);
   }
+
+  const write = (request) => put(new TextEncoder().encode(JSON.stringify(request)), wasm.request);
 
   // The scenes of the tour.
   const scenes = () => JSON.parse(answer(wasm.scenes()));
@@ -34,5 +39,24 @@ const openSimulator = (base64) => {
     return answer(wasm.file());
   }
 
-  return { scenes, run, file };
+  // The questions of a new robot.
+  const questions = () => JSON.parse(answer(wasm.questions()));
+
+  // The program for the UF2 of a new robot; no bytes are none.
+  const setProgram = (bytes) => put(bytes, wasm.program);
+
+  // The files of a new robot with the warnings about them, or an error.
+  function robot(answers) {
+    write(answers);
+    return JSON.parse(answer(wasm.robot()));
+  }
+
+  // The files of a new robot as an archive; empty if there are none.
+  function zip(answers) {
+    write(answers);
+    const length = wasm.zip();
+    return new Uint8Array(wasm.memory.buffer, wasm.answer(), length).slice();
+  }
+
+  return { scenes, run, file, questions, setProgram, robot, zip };
 };

@@ -42,6 +42,19 @@ pub fn programs(out: &Path) -> anyhow::Result<Vec<PathBuf>> {
     Ok(written)
 }
 
+/// Builds the programs of the boards that take UF2 files from the sources in `root`, and writes these files into a folder.
+pub fn for_drives(root: &Path, folder: &Path) -> anyhow::Result<()> {
+    fs::create_dir_all(folder)?;
+    for board in &sonarfix_boards::all()? {
+        if let Some(Uf2 { family, .. }) = board.uf2 {
+            let image = Image::of_elf(&fs::read(build(board, root)?)?)?;
+            let file = folder.join(board.package.clone() + ".uf2");
+            fs::write(file, uf2::write(&image, family)?)?;
+        }
+    }
+    Ok(())
+}
+
 /// Builds the program of a board from the sources in `root`; returns the linked file.
 fn build(board: &Board, root: &Path) -> anyhow::Result<PathBuf> {
     let mut rustup = std::process::Command::new("rustup");

@@ -20,14 +20,14 @@ const MOST_ARCHIVE: u64 = 25_000_000;
 const MOST_PROGRAM: u64 = 11_000_000;
 const SHELLS: [&str; 4] = ["bash", "zsh", "fish", "powershell"];
 
-/// Writes an archive for each target into a folder, with the programs of the boards; returns them.
-pub fn archives(out: &Path, firmware: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
+/// Writes an archive for each target into a folder, with the programs of the boards.
+pub fn archives(out: &Path, firmware: &[PathBuf]) -> anyhow::Result<()> {
     // Completions and manual pages are those of the program of this PC.
     let host = build(HOST, cargo::root())?;
-    TARGETS.iter().map(|target| archive(target, &host, out, firmware)).collect()
+    TARGETS.iter().try_for_each(|target| archive(target, &host, out, firmware))
 }
 
-fn archive(target: &str, host: &Path, out: &Path, firmware: &[PathBuf]) -> anyhow::Result<PathBuf> {
+fn archive(target: &str, host: &Path, out: &Path, firmware: &[PathBuf]) -> anyhow::Result<()> {
     let program = if target == HOST { host.to_owned() } else { build(target, cargo::root())? };
     let name = format!("sonarfix-{}-{target}", env!("CARGO_PKG_VERSION"));
     let folder = out.join(&name);
@@ -68,7 +68,7 @@ fn archive(target: &str, host: &Path, out: &Path, firmware: &[PathBuf]) -> anyho
         eprintln!("{}: {bytes} bytes", file.display());
         ensure!(bytes <= most, "{} has more than {most} bytes", file.display());
     }
-    Ok(packed)
+    Ok(())
 }
 
 /// Builds the program from the sources in `root`.
@@ -90,7 +90,7 @@ fn build(target: &str, root: &Path) -> anyhow::Result<PathBuf> {
 }
 
 /// Packs a folder; the archive has the same bytes for the same files.
-fn pack(parent: &Path, name: &str, packed: &Path) -> anyhow::Result<()> {
+pub fn pack(parent: &Path, name: &str, packed: &Path) -> anyhow::Result<()> {
     let mut tar = Command::new("tar");
     tar.args(["--sort=name", "--mtime=@0", "--owner=0", "--group=0", "--numeric-owner"]);
     tar.args(["--mode=go=rX,u+rw", "--use-compress-program=gzip --no-name --best"]);

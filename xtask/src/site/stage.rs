@@ -8,22 +8,23 @@ use std::path::{Component, Path, PathBuf};
 use anyhow::{Context, bail, ensure};
 use regex::{Captures, Regex};
 
-use crate::cargo;
-
 /// Where files of the repository are on the web.
 const REPOSITORY: &str = env!("CARGO_PKG_REPOSITORY");
 
 /// Files of the book beside its pages; their folder is `xtask/site`.
 const OWN: [&str; 3] = ["book.toml", "site.css", "site.js"];
 
-/// Writes the source of the book into a folder, which is emptied first.
-pub fn write(folder: &Path) -> anyhow::Result<()> {
+/// Pages of the site that are not of the book.
+const APART: [&str; 2] = ["playground/index.html", "new-robot/index.html"];
+
+/// Writes the source of the book of the sources in `root` into a folder, which is emptied first.
+pub fn write(root: &Path, folder: &Path) -> anyhow::Result<()> {
     if folder.exists() {
         std::fs::remove_dir_all(folder)?;
     }
-    let own = cargo::root().join("xtask/site");
+    let own = root.join("xtask/site");
     let summary = std::fs::read_to_string(own.join("SUMMARY.md"))?;
-    let source = Source { root: cargo::root(), pages: pages(&summary)? };
+    let source = Source { root, pages: pages(&summary)? };
     source.has_all_docs()?;
     for name in OWN {
         copy(&own.join(name), &folder.join(name))?;
@@ -101,8 +102,9 @@ impl Source<'_> {
 
     fn target(&self, page: &Path, target: &str) -> anyhow::Result<Target> {
         let (file, _anchor) = target.split_once('#').unwrap_or((target, ""));
-        // Of another host, of this page, or a part of the site that is no page of the book.
-        if file.contains(':') || file.is_empty() || file.ends_with("playground/index.html") {
+        // Of another host, of this page, or a page of the site that is none of the book.
+        let is_apart = APART.iter().any(|page| file.ends_with(page));
+        if file.contains(':') || file.is_empty() || is_apart {
             return Ok(Target::Kept);
         }
         let path = resolved(page, file)?;
@@ -187,7 +189,8 @@ mod tests {
 
     #[test]
     fn links_to_pages_stay_and_others_lead_to_the_repository() {
-        let text = "[1](a.md#x) [2](#y) [3](https://example.org/a) ![4](images/a.svg)";
+        let text = "[1](a.md#x) [2](#y) [3](https://example.org/a) ![4](images/a.svg) \
+                    [5](../new-robot/index.html)";
         assert_eq!(
             converted(text).unwrap(),
             (text.to_owned(), vec![PathBuf::from("docs/images/a.svg")])

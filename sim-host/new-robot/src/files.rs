@@ -1,35 +1,106 @@
 //! The files of a new robot.
 
 use std::f64::consts::PI;
+use std::path::Path;
 
-use sonarfix_map::{Scenario, with_comments};
+use anyhow::Context;
+use sonarfix_boards::wiring::{self, Rangers};
+use sonarfix_boards::{Board, Bus, Uf2};
+use sonarfix_map::{MapFile, Mistake, Scenario, plausibility, robot_file, with_comments};
 
-use super::answers::Answers;
-use sonarfix_boards::Bus;
+use crate::answers::Answers;
+use crate::flash::{self, Part};
+use crate::question::Refusal;
 
-const ROBOT: &str = include_str!("../../templates/robot.toml");
-const MAP: &str = include_str!("../../templates/map.toml");
-const SCENARIO: &str = include_str!("../../templates/scenario.toml");
-const README: &str = include_str!("../../templates/README.md");
+const ROBOT: &str = include_str!("../templates/robot.toml");
+const MAP: &str = include_str!("../templates/map.toml");
+const SCENARIO: &str = include_str!("../templates/scenario.toml");
+const README: &str = include_str!("../templates/README.md");
 
 /// The simulated track width and diameters of the right and the left wheel, as multiples of the configured ones.
 const TRUE_TRACK_WIDTH: f64 = 1.02;
 const TRUE_DIAMETERS: [f64; 2] = [1.01, 0.99];
 
-/// Name and text of each file.
-///
-/// # Errors
-/// If the built-in scenario were invalid.
-pub fn all(answers: &Answers) -> anyhow::Result<[(&'static str, String); 4]> {
+/// Their texts, which are valid.
+#[derive(Debug, Clone)]
+pub struct Files {
+    robot: String,
+    map: String,
+    scenario: String,
+    readme: String,
+    wiring: String,
+}
+
+impl Files {
+    /// The files of these answers.
+    ///
+    /// # Errors
+    /// If they are no valid robot: a length may have no unit, a path may be too near to the walls.
+    pub fn of(answers: &Answers) -> anyhow::Result<Self> {
+        let files = filled(answers).context(NO_ROBOT)?;
+        Scenario::parse(&files.whole()?, "scenario.toml", Path::new("")).context(NO_ROBOT)?;
+        Ok(files)
+    }
+
+    /// Name and text of each file.
+    #[must_use]
+    pub fn all(&self) -> [(&'static str, &str); 5] {
+        [
+            ("robot.toml", &self.robot),
+            ("map.toml", &self.map),
+            ("scenario.toml", &self.scenario),
+            ("README.md", &self.readme),
+            ("wiring.svg", &self.wiring),
+        ]
+    }
+
+    /// The improbable values in them.
+    ///
+    /// # Errors
+    /// None of files that are valid.
+    pub fn warnings(&self) -> anyhow::Result<Vec<Mistake>> {
+        Ok(plausibility::of_text(&self.whole()?, "scenario.toml", Path::new("")))
+    }
+
+    /// The UF2 that a board with a USB drive takes: a program, UF2 or ELF, with the configuration and the map.
+    ///
+    /// # Errors
+    /// [`Refusal`], if the program is none for the board.
+    pub fn uf2(&self, board: &Board, usb: &Uf2, program: &[u8]) -> anyhow::Result<Vec<u8>> {
+        let image = flash::program(program, "the file", board, usb)
+            .map_err(|error| Refusal { option: "program", reason: format!("{error:#}") })?;
+        let (robot, map) = ("robot.toml", "map.toml");
+        let config = robot_file::parse(&self.robot, robot)?;
+        let walls = MapFile::parse(self.map.clone().into_bytes(), Path::new(map), None)?;
+        let parts = [Part::configuration(&config, board, robot)?, Part::map(&walls, board, map)?];
+        flash::combined(image, &parts, usb)
+    }
+
+    /// The scenario with the map and the robot that it names in it.
+    fn whole(&self) -> anyhow::Result<String> {
+        let table = |text: &str| text.parse::<toml::Table>();
+        let mut scenario = table(&self.scenario)?;
+        let (mut robot, mut map) = (table(&self.robot)?, table(&self.map)?);
+        robot.remove("format");
+        let walls = map.remove("map").context("a map has a table `map`")?;
+        scenario.insert("robot".to_owned(), robot.into());
+        scenario.insert("map".to_owned(), walls);
+        Ok(scenario.to_string())
+    }
+}
+
+const NO_ROBOT: &str = "these answers give no valid robot";
+
+fn filled(answers: &Answers) -> anyhow::Result<Files> {
     let replacements = replacements(answers)?;
     let filled = |template: &str| {
         replacements.iter().fold(template.to_owned(), |text, (key, value)| {
             text.replace(&format!("@{key}@"), value)
         })
     };
-    let robot = with_comments(&filled(ROBOT));
+    let (robot, map) = (with_comments(&filled(ROBOT)), filled(MAP));
+    let configured = robot_file::parse(&robot, "robot.toml")?;
     // The simulated wheels differ from the configured ones.
-    let configured = sonarfix_map::robot_file::parse(&robot, "robot.toml")?;
     let width = TRUE_TRACK_WIDTH * f64::from(configured.localizer.drive.track_width.0);
     let circumference =
         answers.ticks_per_revolution * f64::from(configured.right_wheel.travel_per_edge.0);
@@ -38,12 +109,13 @@ pub fn all(answers: &Answers) -> anyhow::Result<[(&'static str, String); 4]> {
     let scenario = built.into_iter().fold(filled(SCENARIO), |text, (key, metres)| {
         text.replace(&format!("@{key}@"), &format!("{:.2}", 1e3 * metres))
     });
-    Ok([
-        ("robot.toml", robot),
-        ("map.toml", MAP.to_owned()),
-        ("scenario.toml", scenario),
-        ("README.md", filled(README)),
-    ])
+    let rangers = Rangers {
+        name: answers.sonar.name(),
+        is_light: answers.sonar.is_light(),
+        has_second: answers.second_at.is_some(),
+    };
+    let wiring = wiring::drawing(&answers.board, rangers);
+    Ok(Files { robot, map, scenario, readme: filled(README), wiring })
 }
 
 /// The text for each key of the templates.
@@ -51,7 +123,7 @@ fn replacements(answers: &Answers) -> anyhow::Result<Vec<(&'static str, String)>
     let mut fitted = Scenario::paper()?;
     answers.sonar.fit(&mut fitted);
     let sonar = fitted.robot.localizer.rangers.first;
-    let (board, pins) = (&answers.board, &answers.board.pins);
+    let (board, pins, room) = (&answers.board, &answers.board.pins, &answers.room);
     let hexadecimal = |address: u32| format!("{address:#010X}").replace("0X", "0x");
     Ok(vec![
         ("title", board.title.clone()),
@@ -89,6 +161,11 @@ fn replacements(answers: &Answers) -> anyhow::Result<Vec<(&'static str, String)>
         ("max_range", sonar.max_range.0.to_string()),
         ("noise", sonar.noise.floor.0.to_string()),
         ("noise_per_metre", sonar.noise.per_metre.to_string()),
+        ("walls", room.walls.clone()),
+        ("start", format!("{:?}", room.start)),
+        ("corners", room.corners.clone()),
+        ("obstacles", room.obstacles.clone()),
+        ("pose", format!("{:?} {:?}", room.start[0], room.start[1])),
     ])
 }
 
