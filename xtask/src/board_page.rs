@@ -127,7 +127,7 @@ fn core(board: &Board) -> anyhow::Result<&'static str> {
 /// The names of the tests in a file that a command runs, as words; with the option of the command that runs them.
 fn scenarios(source: &str) -> anyhow::Result<Vec<String>> {
     let test = Regex::new(
-        r#"#\[ignore = "cargo xtask [a-z-]+(?: (--[a-z]+))?"\]\s+(?:#\[.*\]\s+)*fn ([a-z0-9_]+)"#,
+        r#"#\[ignore = "cargo xtask [a-z-]+(?: (--[a-z]+))?"\][ \n]+(?:#\[[^\n]*\][ \n]+)*fn ([a-z0-9_]+)"#,
     )?;
     let name = |test: regex::Captures| {
         let option = test.get(1).map_or(String::new(), |it| format!(" (`{}`)", it.as_str()));

@@ -139,7 +139,7 @@ fn a_robot_whose_link_is_cut_stands() {
         ],
     );
     assert!(unpowered > 250.0 && unpowered <= UNPOWERED_WITHIN, "{unpowered} ms");
-    // It stands, and does not drive its own way.
+    // It stands, and does not drive the example's line.
     let stood = state.truth;
     pico.run(3_000, &[]);
     assert!(pico.state().truth.distance_from(stood) < 1e-3);
