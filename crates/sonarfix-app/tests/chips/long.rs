@@ -89,7 +89,11 @@ impl Cut {
     }
 
     /// Sets a pose, and another one, which a cut interrupts at some step of its record.
-    #[expect(clippy::cast_possible_truncation, reason = "a pose has f32")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a pose has f32, and a step is a small number"
+    )]
     fn round(&mut self, round: u32) {
         let pico = &mut self.pico;
         let seed = pico.seed;
