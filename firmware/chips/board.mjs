@@ -1,4 +1,5 @@
 // The Pico with its robot, as wired in docs/firmware.md, and the PC's end of its link. Times in nanoseconds since power-on.
+import { Calls } from './calls.mjs';
 import { Chip, Flash } from './chip.mjs';
 import { Room, STEP, numbers } from './room.mjs';
 
@@ -26,6 +27,11 @@ export class Board {
     this.truth = [];
     this.isEnabled = false;
     this.chip = null;
+    /** The polls of the program's loop. */
+    this.polls = new Calls();
+    /** When a motor last had a voltage, and when an encoder last changed. */
+    this.poweredAt = 0;
+    this.rolledAt = 0;
   }
 
   /** Power-on, or a reset that keeps these registers. */
@@ -34,8 +40,8 @@ export class Board {
     this.chip = new Chip(this.flash, {
       sent: (byte) => this.received.push(byte),
       wait: (nanos) => this.wait(nanos),
-    }, kept);
-    this.levels = null;
+    }, this.polls, kept);
+    this.polls.leave();
     this.setEncoders();
     this.chip.setInput(PINS.echo, false);
     this.chip.rp2040.gpio[PINS.trigger].addListener((level) => this.room.trigger(level === 1, this.now));
@@ -55,6 +61,7 @@ export class Board {
     const isEnabled = this.chip.isHigh(PINS.enable);
     if (isEnabled === this.isEnabled) return;
     this.isEnabled = isEnabled;
+    this.polls.isDriving = isEnabled;
     this.events.push(`${isEnabled ? 'enabled' : 'disabled'} ${this.now}`);
   }
 
@@ -101,8 +108,13 @@ export class Board {
     while (now >= this.next) {
       this.next += STEP;
       const before = room.counts;
-      room.move(this.voltages(), this.target());
-      if (before.some((count, side) => count !== room.counts[side])) this.setEncoders();
+      const voltages = this.voltages();
+      if (voltages.some((voltage) => voltage)) this.poweredAt = now;
+      room.move(voltages, this.target());
+      if (before.some((count, side) => count !== room.counts[side])) {
+        this.rolledAt = now;
+        this.setEncoders();
+      }
       this.truth.push([this.next - STEP - this.began, room.x, room.y, room.heading]);
       if (this.truth.length > HISTORY / STEP) this.truth.splice(0, this.truth.length / 2);
     }
@@ -129,6 +141,7 @@ export class Board {
     const { now } = this;
     if (this.isEnabled) this.events.push(`disabled ${now}`);
     this.isEnabled = false;
+    this.polls.isDriving = false;
     this.events.push(`reset-by-${cause} ${now}`);
     this.chip.clearTrap();
     const { kept } = this.chip;

@@ -19,10 +19,11 @@ const UNDEFINED = 0xde00;
 const HAD_POR = 1 << 8;
 
 export class Chip {
-  /** `io` is told of sent bytes, and lets the time of an operation of the flash pass. */
-  constructor(flash, io, kept = null) {
+  /** `io` is told of sent bytes, and lets the time of an operation of the flash pass. `calls` counts those of a function. */
+  constructor(flash, io, calls, kept = null) {
     this.flash = flash;
     this.io = io;
+    this.calls = calls;
     this.rp2040 = new RP2040();
     const { rp2040 } = this;
     this.clock = rp2040.clock;
@@ -39,7 +40,9 @@ export class Chip {
       if (/invalid memory|undefined address/.test(text)) this.fault = true;
       this.unknown.set(`${from}: ${text}`, (this.unknown.get(`${from}: ${text}`) ?? 0) + 1);
     };
-    rp2040.logger = { debug() {}, info() {}, warn: log, error: log };
+    // The emulator reports SEV, and does not execute it.
+    const info = (_, text) => { if (text === 'SEV') rp2040.core.eventRegistered = true; };
+    rp2040.logger = { debug() {}, info, warn: log, error: log };
     this.rom = new Rom(this);
     rp2040.loadBootrom(this.rom.words);
     rp2040.flash.set(flash.bytes);
@@ -108,6 +111,7 @@ export class Chip {
 
   step(core) {
     const at = core.PC;
+    this.calls.follow(core, this.instructions);
     if (at < 0x4000) this.rom.call(at);
     if (this.trap !== null && core.IPSR === 0 && at > XIP && at < FLASH_END) this.setTrap(at);
     if (this.trapped?.at === at && this.trapped.code === ENDLESS_LOOP) {

@@ -2,6 +2,8 @@
 import assert from 'node:assert/strict';
 import { createRequire } from 'node:module';
 import test from 'node:test';
+import { Calls } from './calls.mjs';
+import { Chip } from './chip.mjs';
 import { Flash, PowerCut, TIMES } from './flash.mjs';
 import { attach } from './pio.mjs';
 import { crc32 } from './rom.mjs';
@@ -140,6 +142,39 @@ test('a cut leaves whole bytes before it, and none behind it', () => {
 
 test('the checksum of a second stage is that of CRC-32/MPEG-2', () => {
   assert.equal(crc32(Buffer.from('123456789')), 0x0376e6e7);
+});
+
+test('a call lasts from its first instruction to the return to its caller', () => {
+  const calls = new Calls();
+  calls.at = 0x100;
+  let instructions = 0;
+  const at = (PC, SP, LR = 0) => calls.follow({ PC, SP, LR }, instructions++);
+  // The function calls itself, and each call returns to the same place.
+  for (const [PC, SP, LR] of [[0x10, 64], [0x100, 64, 0x13], [0x102, 48], [0x100, 48, 0x13], [0x12, 48], [0x104, 48]]) at(PC, SP, LR);
+  assert.equal(calls.returned, 0);
+  at(0x12, 64);
+  assert.deepEqual([calls.returned, calls.waiting, calls.driving], [1, 5, 0]);
+  // One that a reset ends does not count.
+  calls.isDriving = true;
+  for (const [PC, LR] of [[0x100, 0x13], [0x102], [0x12], [0x100, 0x13]]) at(PC, 64, LR);
+  calls.leave();
+  at(0x12, 64);
+  assert.deepEqual([calls.returned, calls.waiting, calls.driving], [2, 5, 2]);
+});
+
+test('an event that the program has sent itself ends its next sleep', () => {
+  const flash = new Flash(numbers(1));
+  // A second stage: SEV; WFE; WFE; a loop.
+  const stage = new DataView(flash.bytes.buffer);
+  [0xbf40, 0xbf20, 0xbf20, 0xe7fe].forEach((code, i) => stage.setUint16(2 * i, code, true));
+  stage.setUint32(252, crc32(flash.bytes.subarray(0, 252)), true);
+  const chip = new Chip(flash, {}, new Calls());
+  const { core } = chip.rp2040;
+  const start = core.PC;
+  for (let i = 0; i < 2; i++) chip.step(core);
+  assert.deepEqual([core.PC - start, core.waiting], [4, false]);
+  chip.step(core);
+  assert.equal(core.waiting, true);
 });
 
 test('a robot drives as its wheels do, and a wall answers square to it only', () => {

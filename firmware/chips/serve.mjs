@@ -4,11 +4,15 @@
 //   start                   power-on
 //   run MICROSECONDS [HEX]  the line takes these bytes; answers with the bytes sent: hexadecimal, or -
 //   truth MICROSECONDS      the pose at a time of the chip's clock
-//   state                   time in microseconds, pose, pings, whether the motors are enabled
+//   state                   time in microseconds, pose, pings, whether the motors are enabled; when a motor last had a voltage, and when
+//                           an encoder last changed, in microseconds
 //   events                  what has happened since the last time: words and nanoseconds
 //   chip                    instructions, overruns, lost bytes, erased sectors, programmed pages, short triggers
+//   count ADDRESS           counts the calls of the function there
+//   calls                   how many have returned; the instructions of the longest one with the motors enabled, and of the longest other one
 //   pull PIN                up, down or none
 //   hang | fault | overflow at the next instruction
+//   off-and-on              the power goes and comes again
 //   noise on|off            random bytes at the full rate of the line
 //   cut STEPS               cuts the power in this step of the flash from now
 //   slow-flash              the longest times of the flash's data sheet
@@ -37,13 +41,16 @@ const orders = {
   truth: (micros) => board.poseAt(1e3 * Number(micros)).slice(1).join(' '),
   state() {
     const { room } = board;
-    return [board.now / 1e3, room.x, room.y, room.heading, room.pings, Number(board.isEnabled)].join(' ');
+    const last = [board.poweredAt, board.rolledAt].map((nanos) => nanos / 1e3);
+    return [board.now / 1e3, room.x, room.y, room.heading, room.pings, Number(board.isEnabled), ...last].join(' ');
   },
   events: () => board.events.splice(0).join(' ') || '-',
   chip() {
     const { chip, flash, room } = board;
     return [chip.instructions, chip.uart.overruns, chip.uart.lost, flash.erased, flash.programmed, room.shortTriggers].join(' ');
   },
+  count(at) { board.polls.at = Number(at); },
+  calls: () => [board.polls.returned, board.polls.driving, board.polls.waiting].join(' '),
   pull(pin) {
     const { pullupEnabled, pulldownEnabled } = board.chip.rp2040.gpio[Number(pin)];
     return pullupEnabled ? 'up' : pulldownEnabled ? 'down' : 'none';
@@ -51,6 +58,7 @@ const orders = {
   hang: () => board.chip.hang(),
   fault: () => board.chip.failAtInstruction(),
   overflow: () => board.chip.overflowStack(),
+  'off-and-on': () => board.reset('power'),
   noise(state) { board.isNoisy = state === 'on'; },
   cut(steps) { board.flash.stepsLeft = Number(steps); },
   'slow-flash': () => { board.flash.times = TIMES.longest; },

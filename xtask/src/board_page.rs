@@ -46,8 +46,8 @@ struct Emulated {
     board: &'static str,
     emulator: &'static str,
     command: &'static str,
-    /// The file with the scenarios.
-    tests: &'static str,
+    /// The files with the scenarios.
+    tests: &'static [&'static str],
     has: &'static str,
     lacks: &'static str,
 }
@@ -57,7 +57,11 @@ const EMULATED: [Emulated; 2] = [
         board: "pico",
         emulator: "`rp2040js` with the parts in `firmware/chips`",
         command: "cargo xtask chips",
-        tests: "crates/sonarfix-app/tests/chips/main.rs",
+        tests: &[
+            "crates/sonarfix-app/tests/chips/main.rs",
+            "crates/sonarfix-app/tests/chips/commands.rs",
+            "crates/sonarfix-app/tests/chips/long.rs",
+        ],
         has: "core, interrupts, timer, PIO, PWM, pins, UART, watchdog, flash and its power cuts, second stage of the boot; around it wheels, servo, sonar and room",
         lacks: "the boot ROM (a stub has its functions), DMA, USB, I²C devices, the voltages of the pins, jitter of the clocks",
     },
@@ -65,7 +69,7 @@ const EMULATED: [Emulated; 2] = [
         board: "stm32f405",
         emulator: "QEMU, `netduinoplus2`",
         command: "cargo xtask test-firmware",
-        tests: "crates/sonarfix-app/tests/emulated.rs",
+        tests: &["crates/sonarfix-app/tests/emulated.rs"],
         has: "core, interrupts, SysTick, USART2, the registers of the timers",
         lacks: "encoders, stamps of edges, PWM, pins, flash, watchdog, crystal",
     },
@@ -91,10 +95,12 @@ fn page() -> anyhow::Result<String> {
             page,
             "\n**{title}**, {emulator}: `{command}`. Emulated: {has}. Not emulated: {lacks}. Scenarios:\n"
         )?;
-        let names = scenarios(&fs::read_to_string(cargo::root().join(tests))?)?;
-        ensure!(!names.is_empty(), "{tests} has no scenario");
-        for name in names {
-            writeln!(page, "- {name}")?;
+        for tests in *tests {
+            let names = scenarios(&fs::read_to_string(cargo::root().join(tests))?)?;
+            ensure!(!names.is_empty(), "{tests} has no scenario");
+            for name in names {
+                writeln!(page, "- {name}")?;
+            }
         }
     }
     page.push_str(REPORT);
@@ -118,10 +124,16 @@ fn core(board: &Board) -> anyhow::Result<&'static str> {
     pil::name_of(machine).with_context(|| format!("`cargo xtask pil` has no core {machine}"))
 }
 
-/// The names of the tests in a file that a command runs, as words.
+/// The names of the tests in a file that a command runs, as words; with the option of the command that runs them.
 fn scenarios(source: &str) -> anyhow::Result<Vec<String>> {
-    let test = Regex::new(r#"#\[ignore = "cargo xtask [a-z-]+"\][ \n]+fn ([a-z0-9_]+)"#)?;
-    Ok(test.captures_iter(source).map(|test| test[1].replace('_', " ")).collect())
+    let test = Regex::new(
+        r#"#\[ignore = "cargo xtask [a-z-]+(?: (--[a-z]+))?"\][ \n]+(?:#\[[^\n]*\][ \n]+)*fn ([a-z0-9_]+)"#,
+    )?;
+    let name = |test: regex::Captures| {
+        let option = test.get(1).map_or(String::new(), |it| format!(" (`{}`)", it.as_str()));
+        format!("{}{option}", test[2].replace('_', " "))
+    };
+    Ok(test.captures_iter(source).map(name).collect())
 }
 
 #[cfg(test)]
@@ -136,8 +148,12 @@ mod tests {
             fn a_hang_ends() {}
             #[test]
             fn other() {}
+            #[test]
+            #[ignore = "cargo xtask chips --long"]
+            #[expect(clippy::cast_precision_loss, reason = "a count")]
+            fn a_long_drive() {}
         "#;
-        assert_eq!(scenarios(source).unwrap(), ["a hang ends"]);
+        assert_eq!(scenarios(source).unwrap(), ["a hang ends", "a long drive (`--long`)"]);
     }
 
     #[test]

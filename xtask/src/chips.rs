@@ -1,19 +1,67 @@
 //! `cargo xtask chips`: the firmware of the Raspberry Pi Pico on an emulated RP2040 (`firmware/chips`), with a robot in a room.
 
+use std::fmt::Write as _;
+use std::fs;
+use std::path::PathBuf;
 use std::process::Command;
 
-use anyhow::{Context, ensure};
+use anyhow::{Context, bail, ensure};
 use sonarfix_boards::image::Image;
 use sonarfix_boards::uf2;
 
+use crate::elf::Program;
 use crate::firmware::build;
 use crate::{cargo, ci};
 
 /// The board whose chip is emulated.
 const BOARD: &str = "pico";
+/// The page with what the scenarios measure.
+const PAGE: &str = "docs/chips.md";
+/// The function of the program that is a poll, as the end of its name.
+const POLL: &str = "::Board::poll";
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::Args)]
+pub struct Args {
+    /// Also twenty drives of 90 s and a hundred power cuts (a quarter of an hour).
+    #[arg(long)]
+    long: bool,
+    /// Write docs/chips.md.
+    #[arg(long, requires = "long")]
+    write: bool,
+}
+
+impl Args {
+    /// What CI runs.
+    pub const CHECK: Self = Self { long: false, write: false };
+}
+
+/// The tables of the page: their names in `crates/sonarfix-app/tests/chips/results.rs`, what precedes them, and their heads.
+const TABLES: [(&str, &str, &str); 4] = [
+    ("Measured", "## Times and errors", "| | |\n|---|---|\n"),
+    (
+        "Polls",
+        "## The longest poll\n\nInstructions of the longest poll of each scenario, interrupts included: application with drivers and link, work of the search,\n\
+         inputs of the motor code. That of a robot that drives chooses the next wall. *Waiting* is without motors: the poll after a reset reads the store, one that stores the first record in a\n\
+         new flash reads all of it, another one starts the loop. The functions of the boot ROM are not counted: erasures and writes of the\n\
+         flash have no instructions.",
+        "| scenario | polls | driving | waiting |\n|---|---:|---:|---:|\n",
+    ),
+    (
+        "Drives",
+        "## Twenty drives of 90 s\n\nThe largest error of all estimates of a drive, against the robot in the room at the same time. None may exceed 15 mm, and each\n\
+         estimate has the bits of the core on the PC with the same wheel travels and pings.",
+        "| seed | start | distance | pings | position within | heading within |\n|---:|---|---:|---:|---:|---:|\n",
+    ),
+    (
+        "Cuts",
+        "## A hundred power cuts\n\nRobots whose power is cut again and again while they store a pose, at some step of the write or of the erasure. Afterwards a robot\n\
+         has the pose before, or the new one; *lost*: neither.",
+        "| robot | writes | cuts | has the pose before | has the new one | lost | erasures |\n|---:|---:|---:|---:|---:|---:|---:|\n",
+    ),
+];
 
 /// Tests the emulated chip, then runs the scenarios of `crates/sonarfix-app/tests/chips` with the ELF, and one with the UF2 of a release.
-pub fn check() -> anyhow::Result<()> {
+pub fn run(args: Args) -> anyhow::Result<()> {
     for tool in ["node", "npm"] {
         if Command::new(tool).arg("--version").output().is_err() {
             ci::skip(&format!("the Pico on an emulated chip: {tool} is not there"));
@@ -30,15 +78,72 @@ pub fn check() -> anyhow::Result<()> {
 
     let board = sonarfix_boards::named(BOARD)?;
     let elf = build::of(&board)?;
+    let bytes = build::read(&elf)?;
+    let poll = address_of_poll(&Program::parse(&bytes)?)?;
     let usb = board.uf2.as_ref().context("the board takes no UF2")?;
     let uf2 = cargo::target_folder().join("chips.uf2");
-    let bytes = uf2::write(&Image::of_elf(&build::read(&elf)?)?, usb.family)?;
+    let bytes = uf2::write(&Image::of_elf(&bytes)?, usb.family)?;
     ensure!(uf2::is_uf2(&bytes), "what is written is no UF2");
-    std::fs::write(&uf2, bytes)?;
+    fs::write(&uf2, bytes)?;
+    let rows = empty_file()?;
     // One after another: each takes a processor, and another step of CI the second one.
     let tests =
         "test --package sonarfix-app --test chips -- --ignored --nocapture --test-threads 1";
     let mut command = cargo::command(tests);
+    if !args.long {
+        command.args(["--skip", "long::"]);
+    }
     command.env("SONARFIX_PICO_ELF", elf).env("SONARFIX_PICO_UF2", uf2);
-    cargo::check(command)
+    command.env("SONARFIX_PICO_POLL", poll.to_string()).env("SONARFIX_CHIPS_ROWS", &rows);
+    cargo::check(command)?;
+    let page = page(&fs::read_to_string(&rows)?, args.long)?;
+    println!("{page}");
+    if args.write {
+        fs::write(cargo::root().join(PAGE), page)?;
+    }
+    Ok(())
+}
+
+/// The file for the rows of the tables, which is empty.
+fn empty_file() -> anyhow::Result<PathBuf> {
+    let rows = cargo::target_folder().join("chips.rows");
+    fs::write(&rows, "")?;
+    Ok(rows)
+}
+
+/// The address of the function that is counted.
+fn address_of_poll(program: &Program) -> anyhow::Result<u64> {
+    let is_poll = |name: &String| name.ends_with(POLL);
+    let mut found = program.functions().filter(|(_, function)| function.names.iter().any(is_poll));
+    match (found.next(), found.next()) {
+        (Some((at, _)), None) => Ok(at),
+        (None, _) => bail!("the program has no function {POLL}"),
+        _ => bail!("the program has several functions {POLL}"),
+    }
+}
+
+/// The page with these rows, each after the name of its table.
+fn page(rows: &str, is_long: bool) -> anyhow::Result<String> {
+    let mut page = "\
+# The Pico on an emulated chip
+Generated by `cargo xtask chips --long --write`; change the code, not this page.
+
+The program that is flashed, on an emulated RP2040 with a robot in a room ([boards.md](boards.md) has what is emulated, and what is not).
+Times are those of the chip.
+"
+    .to_owned();
+    for (name, text, head) in TABLES {
+        let prefix = format!("{name}: ");
+        let rows: Vec<&str> = rows.lines().filter_map(|line| line.strip_prefix(&prefix)).collect();
+        let is_of_long = ["Drives", "Cuts"].contains(&name);
+        ensure!(
+            rows.is_empty() == (is_of_long && !is_long),
+            "table {name} has {} rows",
+            rows.len()
+        );
+        if !rows.is_empty() {
+            writeln!(page, "\n{text}\n\n{head}{}", rows.join("\n"))?;
+        }
+    }
+    Ok(page)
 }

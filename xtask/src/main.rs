@@ -86,8 +86,8 @@ enum Task {
     /// The firmware of all further boards: lints it, builds it, searches it for panics, prints its flash, RAM and stack, and
     /// compares them with docs/firmware.md.
     Boards(firmware::BoardsArgs),
-    /// The firmware of the Raspberry Pi Pico on an emulated RP2040, with a robot in a room.
-    Chips,
+    /// The firmware of the Raspberry Pi Pico on an emulated RP2040, with a robot in a room; `--long` has many drives and power cuts.
+    Chips(chips::Args),
     /// Writes docs/boards.md: what has been shown of each board; `--check` compares it.
     BoardPage(page::Args),
     /// The template of a further board: instantiated, built, and refused without each of its parts.
@@ -195,7 +195,7 @@ fn steps() -> [Step<Task>; 37] {
         ("random", "fuzz", Task::Fuzz(fuzz::Args::short())),
         ("random", "mutants", Task::Mutants(mutants::Args::short())),
         ("c", "dist", Task::Dist(dist::Args::check())),
-        ("emulated", "chips", Task::Chips),
+        ("emulated", "chips", Task::Chips(chips::Args::CHECK)),
         ("firmware", "board-page", Task::BoardPage(page::Args::CHECK)),
         ("firmware", "template", Task::Template),
         ("firmware", "boards", Task::Boards(firmware::BoardsArgs::COMPARE)),
@@ -254,7 +254,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::TestFirmware => firmware::test(),
         Task::Boards(args) => firmware::boards(&args),
         Task::BoardPage(args) => board_page::run(args),
-        Task::Chips => chips::check(),
+        Task::Chips(args) => chips::run(args),
         Task::Template => template::check(),
         Task::Size => firmware::size(),
         Task::Stack(args) => firmware::stack(&args),

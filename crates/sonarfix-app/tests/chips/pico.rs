@@ -7,14 +7,20 @@ use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command as Process, Stdio};
 
 use sonarfix_link::message::{CommandResult, LoopStatus};
-use sonarfix_link::{Ack, Command, Hello, Receiver, Sender, SessionCommand, Telemetry, frame};
+use sonarfix_link::{
+    Ack, Command, Frame, Gaps, Hello, Receiver, Sender, SessionCommand, Telemetry, frame,
+};
 use tempfile::TempDir;
 
 /// Where `memory.x` has the regions.
 const CONFIG_AT: &str = "0x10100000";
 const MAP_AT: &str = "0x10180000";
+/// The address of the function that is a poll.
+const POLL: &str = "SONARFIX_PICO_POLL";
 /// The time of the chip that passes at once, milliseconds.
 const SLICE: u32 = 10;
+/// The time after which a command without an answer is repeated, milliseconds.
+const REPEATED_AFTER: u32 = 200;
 /// The longest wait for a message that comes, milliseconds of the chip: that for `Hello`.
 const PATIENCE: u32 = 15_000;
 
@@ -54,6 +60,31 @@ pub struct State {
     pub truth: Truth,
     pub pings: u32,
     pub is_enabled: bool,
+    /// When a motor last had a voltage, milliseconds since power-on.
+    pub powered: f64,
+    /// When an encoder last changed.
+    pub rolled: f64,
+}
+
+/// The polls of the program's loop.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Polls {
+    pub count: u64,
+    /// Instructions of the longest one with the motors enabled.
+    pub driving: u64,
+    /// Instructions of the longest other one.
+    pub waiting: u64,
+}
+
+impl Polls {
+    /// With those of another chip.
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            count: self.count + other.count,
+            driving: self.driving.max(other.driving),
+            waiting: self.waiting.max(other.waiting),
+        }
+    }
 }
 
 /// Counters of the chip.
@@ -80,11 +111,15 @@ pub struct Pico {
     orders: ChildStdin,
     answers: BufReader<ChildStdout>,
     receiver: Receiver<Telemetry>,
+    gaps: Gaps,
     sender: Sender<SessionCommand>,
     session: u32,
     pending: VecDeque<Telemetry>,
+    /// All messages since power-on.
+    pub heard: Vec<Telemetry>,
     /// The longest wait for a message, milliseconds of the chip.
     pub patience: u32,
+    pub seed: u32,
     files: TempDir,
 }
 
@@ -104,16 +139,19 @@ impl Pico {
         let mut emulator = command.spawn().expect("is node installed?");
         let orders = emulator.stdin.take().unwrap();
         let answers = BufReader::new(emulator.stdout.take().unwrap());
-        let program = std::env::var(variable).expect("run `cargo xtask chips`");
+        let program = passed(variable);
         let mut pico = Self {
             emulator,
             orders,
             answers,
             receiver: Receiver::new(),
+            gaps: Gaps::default(),
             sender: Sender::starting_at(100),
             session: 0,
             pending: VecDeque::new(),
+            heard: Vec::new(),
             patience: PATIENCE,
+            seed,
             files,
         };
         pico.ask(&format!("image {program}"));
@@ -124,6 +162,7 @@ impl Pico {
                 pico.ask(&format!("image {at} {}", file.display()));
             }
         }
+        pico.ask(&format!("count {}", passed(POLL)));
         pico.ask("start");
         pico
     }
@@ -146,7 +185,11 @@ impl Pico {
         let sent = self.ask(&order);
         for pair in sent.as_bytes().chunks(2).filter(|pair| pair.len() == 2) {
             let byte = u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap();
-            self.pending.extend(self.receiver.push(byte).map(|frame| frame.message));
+            if let Some(Frame { sequence, message, .. }) = self.receiver.push(byte) {
+                self.gaps.take(sequence);
+                self.heard.push(message);
+                self.pending.push_back(message);
+            }
         }
     }
 
@@ -193,11 +236,18 @@ impl Pico {
         let sequence = self.sender.next();
         let bytes = self.frame(sequence, command);
         self.sender = Sender::starting_at(sequence + 1);
-        self.run(SLICE, &bytes);
-        self.wait_for(|message| match message {
-            Telemetry::Ack(Ack { sequence: of, result }) if *of == sequence => Some(*result),
-            _ => None,
-        })
+        let until = self.patience;
+        self.patience = until.min(REPEATED_AFTER);
+        // A robot whose line has no room drops the answer.
+        let answer = (0..until / self.patience).find_map(|_| {
+            self.run(SLICE, &bytes);
+            self.wait_for(|message| match message {
+                Telemetry::Ack(Ack { sequence: of, result }) if *of == sequence => Some(*result),
+                _ => None,
+            })
+        });
+        self.patience = until;
+        answer
     }
 
     fn frame(&self, sequence: u16, command: &Command) -> Vec<u8> {
@@ -214,10 +264,19 @@ impl Pico {
 
     pub fn state(&mut self) -> State {
         let answer = self.ask("state");
-        let [us, x, y, heading, pings, enabled] = numbers(&answer)[..] else { panic!("{answer}") };
+        let [us, x, y, heading, pings, enabled, powered, rolled] = numbers(&answer)[..] else {
+            panic!("{answer}")
+        };
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
         let pings = pings as u32;
-        State { ms: us / 1e3, truth: Truth { x, y, heading }, pings, is_enabled: enabled > 0.0 }
+        State {
+            ms: us / 1e3,
+            truth: Truth { x, y, heading },
+            pings,
+            is_enabled: enabled > 0.0,
+            powered: powered / 1e3,
+            rolled: rolled / 1e3,
+        }
     }
 
     /// The robot at a time of the chip's clock.
@@ -237,6 +296,18 @@ impl Pico {
         Counters { instructions, overruns, lost_bytes, erased, programmed, short_triggers }
     }
 
+    pub fn polls(&mut self) -> Polls {
+        let answer = self.ask("calls");
+        let counts: Vec<u64> = answer.split(' ').map(|word| word.parse().unwrap()).collect();
+        let [count, driving, waiting] = counts[..] else { panic!("{answer}") };
+        Polls { count, driving, waiting }
+    }
+
+    /// Frames of the robot that were damaged, that this program cannot decode, or for which the line had no room.
+    pub fn missing(&self) -> u32 {
+        self.receiver.counters().skipped() + self.gaps.lost()
+    }
+
     /// What has happened since the last time.
     pub fn events(&mut self) -> Vec<Event> {
         let answer = self.ask("events");
@@ -247,6 +318,11 @@ impl Pico {
         };
         words.chunks(2).filter(|pair| pair.len() == 2).map(event).collect()
     }
+}
+
+/// What `cargo xtask chips` passes in a variable of the environment.
+fn passed(variable: &str) -> String {
+    std::env::var(variable).expect("run `cargo xtask chips`")
 }
 
 fn numbers(answer: &str) -> Vec<f64> {
