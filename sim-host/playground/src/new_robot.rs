@@ -182,8 +182,8 @@ mod tests {
     fn improbable_values_are_warned_of_with_the_intention() {
         for (change, key, reason) in [
             (("wheel-diameter", "650 mm"), "wheel", "65 mm"),
-            (("track-width", "1.21 m"), "track_width", "121 mm"),
-            (("ticks-per-revolution", "0.36"), "edges_per_revolution", "0.36"),
+            (("track-width", "1.21 m"), "track_width", "usual are 0.15 to 16"),
+            (("ticks-per-revolution", "3"), "edges_per_revolution", "implausible"),
         ] {
             let shown = answered(&[change]);
             let warnings = shown["warnings"].as_array().cloned().unwrap_or_default();
