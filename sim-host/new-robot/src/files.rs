@@ -65,7 +65,7 @@ impl Files {
     /// The UF2 that a board with a USB drive takes: a program, UF2 or ELF, with the configuration and the map.
     ///
     /// # Errors
-    /// [`Refusal`], if the program is none for the board.
+    /// [`Refusal`], if the program is not for this board.
     pub fn uf2(&self, board: &Board, usb: &Uf2, program: &[u8]) -> anyhow::Result<Vec<u8>> {
         let image = flash::program(program, "the file", board, usb)
             .map_err(|error| Refusal { option: "program", reason: format!("{error:#}") })?;

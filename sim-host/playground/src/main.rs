@@ -41,34 +41,60 @@ fn programs(firmware: &Path) -> anyhow::Result<String> {
     elements.collect()
 }
 
+/// What one page has besides the simulator.
+struct Page<'a> {
+    file: &'a str,
+    title: &'a str,
+    style: &'a str,
+    body: String,
+    /// Elements with the programs of boards.
+    programs: &'a str,
+    /// In the order in which they are read.
+    scripts: &'a [&'a str],
+}
+
 /// Writes the pages into a folder, with the elements of the programs of boards.
 fn write(program: &Path, folder: &Path, programs: &str) -> anyhow::Result<()> {
     let program = std::fs::read(program).with_context(|| program.display().to_string())?;
     let program = STANDARD.encode(program);
     let (style, player) = (style(), player());
     let simulator = include_str!("simulator.js");
-    let common = [("style", style.as_str()), ("wasm", &program), ("simulator", simulator)];
-    let playground = [
-        ("own-style", include_str!("page.css")),
-        ("player", &player),
-        ("drawing", DRAWING),
-        ("player-script", SCRIPT),
-        ("handles", include_str!("handles.js")),
-        ("address", include_str!("address.js")),
-        ("script", include_str!("playground.js")),
+    let pages = [
+        Page {
+            file: "index.html",
+            title: "Sonarfix playground",
+            style: include_str!("page.css"),
+            body: fill(include_str!("page.html"), &[("player", player.into())]),
+            programs: "",
+            scripts: &[
+                DRAWING,
+                SCRIPT,
+                simulator,
+                include_str!("handles.js"),
+                include_str!("address.js"),
+                include_str!("playground.js"),
+            ],
+        },
+        Page {
+            file: "new-robot.html",
+            title: "Sonarfix: a new robot",
+            style: concat!(include_str!("page.css"), include_str!("new_robot.css")),
+            body: include_str!("new_robot.html").to_owned(),
+            programs,
+            scripts: &[simulator, include_str!("new_robot.js")],
+        },
     ];
-    let new_robot = [
-        ("own-style", concat!(include_str!("page.css"), include_str!("new_robot.css"))),
-        ("programs", programs),
-        ("script", include_str!("new_robot.js")),
-    ];
-    for (name, template, own) in [
-        ("index.html", include_str!("page.html"), playground.as_slice()),
-        ("new-robot.html", include_str!("new_robot.html"), &new_robot),
-    ] {
-        let values = common.iter().chain(own).map(|(name, text)| (*name, (*text).into()));
-        let text = fill(template, &values.collect::<Vec<_>>());
-        sonarfix_files::write(&folder.join(name), text)?;
+    for page in pages {
+        let values = [
+            ("title", page.title.into()),
+            ("style", style.as_str().into()),
+            ("own-style", page.style.into()),
+            ("body", page.body.into()),
+            ("wasm", program.as_str().into()),
+            ("programs", page.programs.into()),
+            ("scripts", page.scripts.join("\n").into()),
+        ];
+        sonarfix_files::write(&folder.join(page.file), fill(include_str!("frame.html"), &values))?;
     }
     Ok(())
 }

@@ -42,7 +42,7 @@ struct Made {
 }
 
 impl Made {
-    /// `request` has the answers in JSON, by their options. A program of 0 bytes is none.
+    /// `request` has the answers in JSON, by their options. An empty `program` means that no program was chosen.
     fn of(request: &str, program: &[u8]) -> anyhow::Result<Self> {
         let chosen: Chosen = serde_json::from_str(request)?;
         let answers = Answers::new(&chosen)?;

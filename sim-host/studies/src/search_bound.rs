@@ -7,7 +7,6 @@
 
 use std::f64::consts::TAU;
 
-use rayon::prelude::*;
 use serde::Serialize;
 use sonarfix_map::Scenario;
 use sonarfix_plan::trial::{Heard, Trial, TrialError, are_one, observed_trial};
@@ -54,13 +53,7 @@ pub fn floor_plans(
     seconds: f64,
     progress: &impl Progress,
 ) -> Result<Vec<Bounded>, TrialError> {
-    let one = |(seed, scenario)| {
-        let bounded = bounded(scenario, seed, seconds);
-        progress.finished();
-        bounded
-    };
-    let scenarios = plans.scenarios()?.into_par_iter();
-    scenarios.filter(|_| !progress.is_interrupted()).map(one).collect()
+    plans.each(progress, |scenario, seed| bounded(scenario, seed, seconds))
 }
 
 /// The time within which a share of the trials is found right; `None` if fewer are.

@@ -23,7 +23,7 @@ pub struct Plans {
 
 impl Plans {
     /// Each with its scenario.
-    pub(crate) fn scenarios(&self) -> Result<Vec<(u64, Scenario)>, TrialError> {
+    fn scenarios(&self) -> Result<Vec<(u64, Scenario)>, TrialError> {
         let seeds = (0..u64::MAX).map(|n| self.first.wrapping_add(n));
         let plans = seeds.map(FloorPlan::new);
         let plans = plans.filter(|plan| self.kind.is_none_or(|kind| plan.kind == kind));
@@ -40,6 +40,26 @@ impl Plans {
             Ok((seed, scenario))
         });
         filled.take(self.trials as usize).collect()
+    }
+}
+
+impl Plans {
+    /// What is computed of each plan with its seed, on all cores.
+    ///
+    /// # Errors
+    /// [`TrialError`] of the first plan that cannot be used.
+    pub(crate) fn each<T: Send>(
+        &self,
+        progress: &impl Progress,
+        of: impl Fn(Scenario, u64) -> Result<T, TrialError> + Sync + Send,
+    ) -> Result<Vec<T>, TrialError> {
+        let one = |(seed, scenario)| {
+            let result = of(scenario, seed);
+            progress.finished();
+            result
+        };
+        let scenarios = self.scenarios()?.into_par_iter();
+        scenarios.filter(|_| !progress.is_interrupted()).map(one).collect()
     }
 }
 
@@ -76,13 +96,7 @@ pub fn floor_plans(
     seconds: f64,
     progress: &impl Progress,
 ) -> Result<Vec<Trial>, TrialError> {
-    let one = |(seed, scenario)| {
-        let trial = trial(scenario, seed, seconds);
-        progress.finished();
-        trial
-    };
-    let scenarios = plans.scenarios()?.into_par_iter();
-    scenarios.filter(|_| !progress.is_interrupted()).map(one).collect()
+    plans.each(progress, |scenario, seed| trial(scenario, seed, seconds))
 }
 
 /// Trials in one scenario.

@@ -102,7 +102,7 @@ impl Source<'_> {
 
     fn target(&self, page: &Path, target: &str) -> anyhow::Result<Target> {
         let (file, _anchor) = target.split_once('#').unwrap_or((target, ""));
-        // Of another host, of this page, or a page of the site that is none of the book.
+        // A link to another host, within this page, or to a page of the site that is not in the book.
         let is_apart = APART.iter().any(|page| file.ends_with(page));
         if file.contains(':') || file.is_empty() || is_apart {
             return Ok(Target::Kept);

@@ -59,7 +59,7 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
         }
     }
 
-    /// Makes a refined entry the answer. One that the refinement has led elsewhere is none: the pings do not determine it.
+    /// Makes a refined entry the answer, unless the refinement has moved it away from every hypothesis: the pings do not determine it then.
     pub(super) fn conclude(&mut self, entry: Entry) {
         if self.bank.has_near(&entry.placement, SAME_PLACE) {
             self.answer = Decision::Unique(entry);

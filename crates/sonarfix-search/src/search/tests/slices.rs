@@ -255,7 +255,7 @@ proptest! {
     }
 }
 
-/// An answer is one of the hypotheses, refined: not a place beside them, to which the refinement has led.
+/// The refinement of an answer may not move it away from its hypothesis.
 #[test]
 fn an_answer_is_near_a_hypothesis() {
     let walls = room();
