@@ -53,14 +53,14 @@
 /*
  64-bit words of a localizer.
  */
-#define SONARFIX_LOCALIZER_WORDS 220
+#define SONARFIX_LOCALIZER_WORDS 231
 #endif
 
 #if !defined(SONARFIX_64_BIT)
 /*
  64-bit words of a localizer.
  */
-#define SONARFIX_LOCALIZER_WORDS 215
+#define SONARFIX_LOCALIZER_WORDS 226
 #endif
 
 /*
@@ -91,14 +91,14 @@
 /*
  64-bit words of a robot.
  */
-#define SONARFIX_ROBOT_WORDS 1388
+#define SONARFIX_ROBOT_WORDS 1401
 #endif
 
 #if !defined(SONARFIX_64_BIT)
 /*
  64-bit words of a robot.
  */
-#define SONARFIX_ROBOT_WORDS 1351
+#define SONARFIX_ROBOT_WORDS 1364
 #endif
 
 #if defined(SONARFIX_64_BIT)
@@ -1003,6 +1003,11 @@ typedef struct {
    That of the scale of the ranger; zero: it is exact and not estimated.
    */
   float prior_range_scale;
+  /*
+   That of each coordinate of the mount of a ranger, metres; zero: it is exact and not estimated, the only value of a library
+   without it.
+   */
+  float prior_mount_m;
   /*
    A wall is measured only if no other can answer first, even if the pose is wrong by this many standard deviations.
    */

@@ -75,6 +75,7 @@ fn config(bytes: &mut Bytes) -> Config {
     config.prior.scale_left = bytes.between(1e-4, 0.05);
     config.prior.track_width = Metres(bytes.between(0.0, 0.02));
     config.prior.range_scale = bytes.between(0.0, 0.05);
+    config.prior.mount = Metres(bytes.between(0.0, 0.02));
     let gating = &mut config.gating;
     gating.confidence = bytes.between(0.0, 4.0);
     gating.inflation = Metres(bytes.between(0.0, 0.1));

@@ -38,8 +38,8 @@ const BARS: [Bar; 11] = [
     Bar {
         section: "cortex-m4f",
         key: "predict_instructions",
-        most: 450,
-        why: "state and P of a tick of the encoders at 1 kHz should take about 1 % of a 48 MHz core",
+        most: 460,
+        why: "state and P of a tick of the encoders at 1 kHz should take about 1 % of a 48 MHz core: 450, and 10 to ask for a mount",
     },
     Bar {
         section: "cortex-m4f",
@@ -50,8 +50,8 @@ const BARS: [Bar; 11] = [
     Bar {
         section: "cortex-m4f",
         key: "fix_instructions",
-        most: 2_000,
-        why: "a fix, its explanation and the health together should take 0.1 % of a period of 100 ms at 16 MHz",
+        most: 2_200,
+        why: "a fix, its explanation and the health together should take 2,000 instructions, and 200 with a mount",
     },
     Bar {
         section: "cortex-m4f",
@@ -68,8 +68,8 @@ const BARS: [Bar; 11] = [
     Bar {
         section: "cortex-m4f",
         key: "filter_bytes",
-        most: 184,
-        why: "a filter should be copied as a value",
+        most: 248,
+        why: "a filter should be copied as a value: 184 bytes, and 64 for a mount",
     },
     Bar {
         section: "cortex-m4f",
@@ -387,7 +387,7 @@ mod tests {
     fn ratios_have_bars() {
         let good = on_the_bars();
         let mut bad = good.clone();
-        set(&mut bad, "cortex-m4f-small", "predict_instructions", 676);
+        set(&mut bad, "cortex-m4f-small", "predict_instructions", 691);
         assert_eq!(lost_bars(&good, &bad).len(), 1);
         let mut bad = good.clone();
         for (walls, is) in [(100, 1000), (100_000, 1201)] {

@@ -64,7 +64,7 @@ const COMPOSITIONS: [Composition; 5] = [
         name: "without search",
         contents: "all features of `sonarfix`",
         program: "composition",
-        features: "informative,reflectors,rangers,gyro,light,absolute",
+        features: "informative,mount,reflectors,rangers,gyro,light,absolute",
         probes: LOCALIZER,
         most: 49_152,
     },
@@ -72,7 +72,7 @@ const COMPOSITIONS: [Composition; 5] = [
         name: "everything",
         contents: "all features and `sonarfix-search`: the released firmware",
         program: "composition",
-        features: "informative,reflectors,rangers,gyro,light,absolute,search",
+        features: "informative,mount,reflectors,rangers,gyro,light,absolute,search",
         probes: SEARCHING,
         most: 67_584,
     },
@@ -106,6 +106,7 @@ const CHOOSING: &str = "\
 | a gyro | `gyro` |
 | a compass, a beacon, a camera, or a person who taps on the map | `absolute` |
 | a room with many corners and pillars | `reflectors`: they explain echoes that are not of the chosen wall |
+| a mount that was measured with a ruler | `mount`; without it the mount is exact, and `prior.mount` must be zero |
 | to find its pose by itself | the crate `sonarfix-search`; of `sonarfix-hal` and `sonarfix-app` the feature `search` |
 | a PC that drives it | of `sonarfix-app` the feature `drive`, which is not a default: [link.md](link.md#driving) |
 

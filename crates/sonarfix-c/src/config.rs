@@ -74,6 +74,9 @@ pub struct sonarfix_config_t {
     pub prior_track_width_m: f32,
     /// That of the scale of the ranger; zero: it is exact and not estimated.
     pub prior_range_scale: f32,
+    /// That of each coordinate of the mount of a ranger, metres; zero: it is exact and not estimated, the only value of a library
+    /// without it.
+    pub prior_mount_m: f32,
 
     /// A wall is measured only if no other can answer first, even if the pose is wrong by this many standard deviations.
     pub gating_confidence: f32,
@@ -140,6 +143,7 @@ impl From<&Config> for sonarfix_config_t {
             prior_scale_difference: prior.scale_difference.unwrap_or(0.0),
             prior_track_width_m: prior.track_width.0,
             prior_range_scale: prior.range_scale,
+            prior_mount_m: prior.mount.0,
             gating_confidence: gating.confidence,
             gating_inflation_m: gating.inflation.0,
             gating_max_distance_without_fix_m: gating.max_distance_without_fix.0,
@@ -206,6 +210,7 @@ impl sonarfix_config_t {
         prior.scale_difference = (difference.to_bits() != 0).then_some(difference);
         prior.track_width.0 = self.prior_track_width_m;
         prior.range_scale = self.prior_range_scale;
+        prior.mount.0 = self.prior_mount_m;
     }
 
     fn set_gating(&self, config: &mut Config) {

@@ -413,6 +413,7 @@ impl RobotConfig {
             Feature::Rangers => localizer.rangers.are_several(),
             Feature::Absolute | Feature::Drive => false,
             Feature::Informative => localizer.policy == Policy::Informative,
+            Feature::Mount => localizer.prior.mount.0 > 0.0,
             Feature::Search => self.start.is_unknown(),
         }
     }

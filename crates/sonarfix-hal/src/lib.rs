@@ -26,7 +26,7 @@
 //!
 //! # Features
 //! - `async`: `embedded-hal-async` functions over the same drivers (module `asynch`).
-//! - `light`, `gyro`, `rangers`, `absolute`, `reflectors`, `informative` (default): the parts of the localizer. A configuration
+//! - `light`, `gyro`, `rangers`, `absolute`, `reflectors`, `informative`, `mount` (default): the parts of the localizer. A configuration
 //!   that asks for one that is not linked is refused by name ([`config::RobotConfig::check_linked`]).
 //! - `search` (default): a loop that searches for its pose when it does not know it, by `sonarfix-search`.
 //! - `defmt`: derives `defmt::Format` for the public types that hold data.

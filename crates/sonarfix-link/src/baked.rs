@@ -17,7 +17,7 @@ use sonarfix::sensor::gyro::GyroParameters;
 use sonarfix_hal::config::{Feature, NotLinked, RobotConfig, RobotConfigError};
 
 /// The version of the image. It is raised whenever the bytes of a configuration change.
-pub const VERSION: u16 = 9;
+pub const VERSION: u16 = 10;
 /// Largest size of an image, bytes.
 pub const LENGTH_MAX: usize = HEADER + POSTCARD_MAX + CHECKSUM;
 

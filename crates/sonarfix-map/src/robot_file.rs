@@ -67,6 +67,8 @@ static PRIOR: Section<RobotConfig> = Section { name: "prior", usual, keys: &[
     number("track_width", &LENGTH, ("0 m", "5 m"), |c| &mut c.localizer.prior.track_width.0, "error of the track width. Below half the track width"),
     number("range_scale", &FRACTION, ("0 %", "100 %"), |c| &mut c.localizer.prior.range_scale,
         "scale error of the ranges: the speed of sound changes by 0.18 %/°C. Zero: not estimated"),
+    optional(number("mount", &LENGTH, ("0 m", "1 m"), |c| &mut c.localizer.prior.mount.0,
+        "error of each coordinate of `mount`; that of the first ranger is estimated ([model.md](model.md#mount)). Zero: exact")),
 ] };
 
 #[rustfmt::skip]

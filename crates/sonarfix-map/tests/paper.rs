@@ -109,6 +109,7 @@ fn the_robot_is_that_of_the_paper() {
     config.prior.scale_left = 0.01;
     config.prior.track_width = Metres(0.01);
     config.prior.range_scale = 0.0;
+    config.prior.mount = Metres(0.0);
     config.gating.confidence = 3.0;
     config.echo = EchoParameters::NONE;
     config.policy = Policy::Nearest;

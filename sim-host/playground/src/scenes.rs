@@ -136,7 +136,8 @@ mod tests {
     #[test]
     fn one_wall_gives_one_coordinate() {
         let [along, across] = most_deviations(&trace("one-wall"));
-        assert!(along > 0.1 && across < 0.03, "{along} m, {across} m");
+        // One wall does not determine the place of the sonar, which is uncertain by 5 mm.
+        assert!(along > 0.1 && across < 0.035, "{along} m, {across} m");
     }
 
     /// Both coordinates. By the nearest wall the robot seldom measures the farther one.

@@ -8,6 +8,8 @@ use crate::dense::Vector;
 
 /// The 99.9 % quantile of χ² with two degrees of freedom.
 const ELLIPSE: f64 = 13.8;
+/// The 99 % quantile.
+const ELLIPSE_99: f64 = 9.21;
 
 /// A heading error up to this is tolerable, rad: half of the cone of the narrowest sonar of the
 /// scenarios.
@@ -25,6 +27,7 @@ const RIGHT_HEADING: f64 = 0.052;
 pub struct Integrity {
     ticks: u32,
     outside: u32,
+    within_99: u32,
     /// Current time outside the ellipse with the verdict `Tracking`, seconds.
     undetected: f64,
     longest_undetected: f64,
@@ -52,13 +55,15 @@ impl Integrity {
 
     /// Adds the error and the covariance of x and y after a tick of a length in seconds.
     pub fn add(&mut self, seconds: f64, error: &Vector, p: &Matrix2<f64>, verdict: Verdict) {
-        let is_inside = distance_squared(error, p) <= ELLIPSE;
+        let squared = distance_squared(error, p);
+        let is_inside = squared <= ELLIPSE;
         let off = libm::hypot(error[0], error[1]);
         self.ticks += 1;
         if verdict == Verdict::Tracking && off > POSITION {
             self.undetected_error += seconds;
         }
         self.outside += u32::from(!is_inside);
+        self.within_99 += u32::from(squared <= ELLIPSE_99);
         let is_undetected = !is_inside && verdict == Verdict::Tracking;
         self.undetected = if is_undetected { self.undetected + seconds } else { 0.0 };
         self.longest_undetected = self.longest_undetected.max(self.undetected);
@@ -78,6 +83,12 @@ impl Integrity {
     #[must_use]
     pub fn share_outside(&self) -> f64 {
         f64::from(self.outside) / f64::from(self.ticks.max(1))
+    }
+
+    /// Share of the ticks with the position inside the 99 % ellipse.
+    #[must_use]
+    pub fn share_within_99(&self) -> f64 {
+        f64::from(self.within_99) / f64::from(self.ticks.max(1))
     }
 
     /// Time with a position error of more than 10 cm and the verdict `Tracking`, seconds.

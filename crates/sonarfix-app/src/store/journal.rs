@@ -32,7 +32,8 @@
 //! In the last two cases, and after an interrupted copy, [`Journal::open`] copies everything to the
 //! next sector before it returns, so that every later start reads the same records.
 //! If only *written* has a 0 in a header, its *trusted* is written before that. A next sector whose
-//! header was begun and is not an older one counts as an interrupted copy.
+//! header was begun and is not an older one counts as an interrupted copy. The header of a sector is overwritten with zeros before the
+//! sector is erased, so that an interrupted erase leaves no header that counts without its records.
 //!
 //! Assumptions: a write changes only the bytes that are written, and reading changes nothing.
 //!
@@ -377,6 +378,7 @@ impl<F: NorFlash> Journal<F> {
             None => (self.region.start, 1),
         };
         let end = sector.saturating_add(Self::sector_size());
+        self.invalidate(sector)?;
         self.flash.erase(sector, end).map_err(|_| StoreError::Flash)?;
         let mut view = View {
             sector,
@@ -399,6 +401,15 @@ impl<F: NorFlash> Journal<F> {
         self.put(sector, &header, &mut buffer)?;
         self.view = Some(view);
         Ok(())
+    }
+
+    /// Makes the header of a sector unreadable before the sector is erased: a header of an interrupted copy counts, and an erase
+    /// that is interrupted as well can leave it whole and the records damaged.
+    fn invalidate(&mut self, sector: u32) -> Result<(), StoreError> {
+        let mut begun = [0; 4];
+        self.load(sector, &mut begun)?;
+        // Key, sequence number and CRC-32: that of zeros is not zero.
+        if begun == [BLANK; 4] { Ok(()) } else { self.store(sector + WORD, &[0; 12]) }
     }
 
     /// Appends a record to the active sector.

@@ -20,11 +20,13 @@ pub enum Feature {
     Search,
     /// A motion that a PC commands.
     Drive,
+    /// The place of the first ranger as two states.
+    Mount,
 }
 
 impl Feature {
     /// All of them.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Light,
         Self::Gyro,
         Self::Rangers,
@@ -32,6 +34,7 @@ impl Feature {
         Self::Informative,
         Self::Search,
         Self::Drive,
+        Self::Mount,
     ];
 
     /// The name of the Cargo feature.
@@ -43,6 +46,7 @@ impl Feature {
             Self::Rangers => "rangers",
             Self::Absolute => "absolute",
             Self::Informative => "informative",
+            Self::Mount => "mount",
             Self::Search => "search",
             Self::Drive => "drive",
         }
@@ -57,6 +61,7 @@ impl Feature {
             Self::Rangers => cfg!(feature = "rangers"),
             Self::Absolute => cfg!(feature = "absolute"),
             Self::Informative => cfg!(feature = "informative"),
+            Self::Mount => cfg!(feature = "mount"),
             Self::Search => cfg!(feature = "search"),
             Self::Drive => cfg!(feature = "drive"),
         }

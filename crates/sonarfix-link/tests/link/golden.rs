@@ -21,7 +21,7 @@ use crate::messages::{
 use crate::wire::to_stdvec;
 
 /// The version of the bytes below.
-const OF_VERSION: u8 = 9;
+const OF_VERSION: u8 = 10;
 
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().fold(String::new(), |hex, byte| format!("{hex}{byte:02x}"))
@@ -146,6 +146,7 @@ fn every_variant_has_the_number_of_its_version() {
         Feature::Informative,
         Feature::Search,
         Feature::Drive,
+        Feature::Mount,
     ]);
     numbered(&[SettingError::Calibration, limits, SettingError::Pulse, SettingError::Frame]);
     numbered(&[
@@ -158,7 +159,7 @@ fn every_variant_has_the_number_of_its_version() {
 
 #[test]
 fn a_baked_configuration_has_the_bytes_of_its_version() {
-    assert_eq!(baked::VERSION, 9);
+    assert_eq!(baked::VERSION, 10);
     let mut localizer = Config::for_track_width(Metres(0.35));
     localizer.rangers.first.servo = (Radians(-1.5), Radians(1.5));
     localizer.rangers.first.timing.servo = ServoTiming::SG90;

@@ -579,6 +579,7 @@ fn localizer(source: &mut impl Source) -> Config {
     config.echo.half_angle = Radians(source.single());
     config.echo.rim = Radians(source.single());
     config.echo.sure_within = Metres(source.single());
+    config.prior.mount = Metres(source.single());
     config.policy = if source.pick(2) == 0 { Policy::Nearest } else { Policy::Informative };
     config.weights.heading = Metres(source.single());
     config.weights.wheels = Metres(source.single());

@@ -226,6 +226,7 @@ pub(super) static RULES: &[Rule] = &[
     Rule::new("prior.scale_left", "the deviation of a wheel's scale", &FRACTION, ("0.02 %", "15 %"), "a calliper measures a wheel to 1 %").or_zero().because(&[FRACTION_OF_ONE, PERCENT]),
     Rule::new("prior.scale_difference", "the deviation of the difference of the wheels", &FRACTION, ("0.005 %", "15 %"), "wheels of one type: 0.5 %").because(&[FRACTION_OF_ONE, PERCENT]),
     Rule::new("prior.range_scale", "the deviation of the ranges' scale", &FRACTION, ("0.02 %", "12 %"), "0.18 % per °C").or_zero().because(&[FRACTION_OF_ONE, PERCENT]),
+    Rule::new("prior.mount", "the deviation of the sonar's place", &LENGTH, ("0.5 mm", "30 mm"), "a ruler measures it to 5 mm").or_zero(),
     Rule::new("prior.track_width", "the deviation of the track width", &LENGTH, ("0.0005", "0.2"), "a tape measures it to 1 % to 5 %").or_zero()
         .per("the track width", track_width),
     Rule::new("gating.confidence", "the confidence of the gate", &NUMBER, ("1", "10"), "2 to 3 standard deviations").or_zero().because(&[PROBABILITY]),

@@ -372,9 +372,11 @@ impl<'a> Planner<'a> {
         let echo = &self.config.echo;
         let entry = self.history.entry(echo, self.ranger, id, place, range, self.now);
         let map_variance = echo.map_variance(sight.accuracy, entry.travelled);
-        let noise = SquareMetres(sight.noise + map_variance * sight.of_map);
-        let prediction = self.ekf.predict_measurement(&expected);
-        let wheels = self.ekf.cross_covariance_of_wheels(&expected);
+        let of_mount = self.config.mount_noise(self.ranger);
+        let noise = SquareMetres(sight.noise + map_variance * sight.of_map + of_mount);
+        let ahead = self.view.ahead_of(self.ranger);
+        let prediction = self.ekf.predict_measurement(&expected, ahead);
+        let wheels = self.ekf.cross_covariance_of_wheels(&prediction);
         Candidate {
             bearing: pointing.bearing,
             gain: expected_gain(&prediction, wheels, noise, self.config.weights),

@@ -43,10 +43,14 @@ pub struct CalibrationPrior {
     pub track_width: Metres,
     /// Of the ranger's scale error, dimensionless. Zero: not estimated, as in the paper.
     pub range_scale: f32,
+    /// Of each coordinate of the mount of a ranger. That of the first is estimated, those of others are white noise of their ranges.
+    /// Zero: exact; other values only with the feature `mount`, else [`Config::check`] refuses them.
+    pub mount: Metres,
 }
 
 impl CalibrationPrior {
-    /// Wheels known to 1 %, a track width known to 3 %, an exact ranger.
+    /// Wheels known to 1 %, a track width known to 3 %, an exact ranger; with the feature `mount` its place is known to 5 mm, as a
+    /// ruler measures it.
     #[must_use]
     pub fn for_track_width(track_width: Metres) -> Self {
         Self {
@@ -55,6 +59,7 @@ impl CalibrationPrior {
             scale_difference: None,
             track_width: track_width * 0.03,
             range_scale: 0.0,
+            mount: if cfg!(feature = "mount") { Metres(0.005) } else { Metres(0.0) },
         }
     }
 
@@ -258,6 +263,13 @@ impl Config {
         }
     }
 
+    /// What the mount of a ranger adds to the variance of its ranges, m²: that of a further ranger is not estimated.
+    #[inline]
+    pub(crate) fn mount_noise(&self, ranger: RangerId) -> f32 {
+        let is_estimated = MAX_RANGERS == 1 || ranger == RangerId::FIRST;
+        if is_estimated { 0.0 } else { self.prior.mount.0 * self.prior.mount.0 }
+    }
+
     /// Sets the ping schedule, which all rangers share.
     pub fn set_ping_schedule(&mut self, schedule: PingSchedule) {
         self.rangers.iter_mut().for_each(|ranger| ranger.timing.schedule = schedule);
@@ -297,6 +309,12 @@ impl Config {
         let is_positive =
             difference.is_none_or(|difference| difference > 0.0 && difference <= LARGEST);
         require("prior.scale_difference", is_positive, "positive, and at most 10,000, if given")?;
+        if cfg!(feature = "mount") {
+            not_negative(&["prior.mount"], &[prior.mount.0])?;
+        } else {
+            let is_zero = prior.mount.0 == 0.0;
+            require("prior.mount", is_zero, "zero: this program was built without `mount`")?;
+        }
         let width = self.drive.track_width.0;
         let below_width = prior.track_width.0 < 0.5 * width;
         require("prior.track_width", below_width, "less than half the track width")?;

@@ -17,7 +17,9 @@
 //! | `propagation` | eqs. (5) and (10): P ← F P Fᵀ + Q |
 //! | `projection` | P Hᵀ and H P Hᵀ, eq. (14) |
 //! | `correction` | eqs. (6) and (18) to (20): gain, state and covariance |
+//! | `column` | covariances of a quantity beside P |
 //! | `bias` | bias of a gyro beside P, eqs. (37) and (38) |
+//! | `mount` | place of the sonar beside P, eq. (55) |
 //!
 //! # Non-finite policy
 //! No value is refused here, except by [`Covariance::correct`]: it reports derivatives that are NaN
@@ -26,7 +28,9 @@
 
 mod bias;
 mod blocks;
+mod column;
 mod correction;
+mod mount;
 mod projection;
 mod propagation;
 mod transition;
@@ -34,5 +38,6 @@ mod transition;
 pub use bias::{GyroBias, TurnDifference};
 pub use blocks::{Covariance, PoseBlock};
 pub use correction::{Correction, Gain};
+pub use mount::Mount;
 pub use projection::PredictedMeasurement;
 pub use transition::Transition;

@@ -22,6 +22,7 @@
 
 mod absolute;
 mod error;
+mod mounted;
 mod pose;
 mod prediction;
 mod turn;
@@ -33,14 +34,16 @@ use crate::filter::covariance::{Covariance, PoseBlock, PredictedMeasurement};
 use crate::filter::motion::Drive;
 use crate::filter::process_noise::{AccumulatedRandomWalk, NoiseDensities};
 use crate::geometry::elementary::sqrt;
-use crate::geometry::pose::{Heading, Pose};
+use crate::geometry::pose::{Heading, Point, Pose};
 use crate::geometry::units::{Metres, Radians, SquareMetres};
+use crate::geometry::vector::Vector;
 use crate::sensor::range::ExpectedRange;
 use crate::state::estimate::FilterEstimate;
 
 pub use crate::sensor::range::Innovation;
 pub use crate::state::{STATES, StandardDeviations, StateEstimate};
 pub use error::EkfError;
+use mounted::Mounted;
 pub(crate) use pose::{PoseCovariance, PoseUncertainty, PoseVariances};
 pub(crate) use turn::{GyroTurn, SlipLimits, TurnAgreement};
 
@@ -85,6 +88,8 @@ pub struct Ekf {
     distance_since_update: f32,
     track_width: f32,
     densities: NoiseDensities,
+    /// The place of the sonar, if it is estimated.
+    mounted: Mounted,
 }
 
 impl Ekf {
@@ -122,6 +127,7 @@ impl Ekf {
             distance_since_update: 0.0,
             track_width: drive.track_width.0,
             densities,
+            mounted: Mounted::EXACT,
         })
     }
 
@@ -131,6 +137,23 @@ impl Ekf {
     pub(crate) fn with_scale_difference(mut self, deviation: f32) -> Self {
         self.p_without_walk.calibration.correlate_wheels(deviation);
         self
+    }
+
+    /// Estimates the place of the sonar as well: two further states. At a deviation of zero it is exact.
+    pub(crate) fn estimate_mount(&mut self, place: Point, deviation: Metres) {
+        self.mounted.estimate(place, deviation);
+    }
+
+    /// The place of the sonar, if it is estimated.
+    #[inline]
+    pub(crate) fn place_of_sonar(&self) -> Option<Point> {
+        self.mounted.get().map(|mount| mount.place)
+    }
+
+    /// The place of the sonar in the robot frame, if it is estimated, and the standard deviations of its coordinates.
+    #[must_use]
+    pub fn mount(&self) -> Option<(Point, (Metres, Metres))> {
+        self.mounted.get().map(|mount| (mount.place, mount.deviations()))
     }
 
     /// The estimate X̂.
@@ -267,6 +290,9 @@ impl Ekf {
         let p = &mut self.p_without_walk;
         p.pose = block;
         p.range_scale.forget_pose();
+        if let Some(mount) = self.mounted.get_mut() {
+            mount.forget_pose();
+        }
         self.estimate.set_pose(pose);
         Ok(())
     }
@@ -280,21 +306,29 @@ impl Ekf {
         expected: &ExpectedRange,
         noise: SquareMetres,
     ) -> Innovation {
-        self.predict_measurement(expected).innovation(range, noise)
+        self.predict_measurement(expected, None).innovation(range, noise)
     }
 
-    /// H, P Hᵀ and H P Hᵀ of an expected range; none of them depends on the random walk.
-    #[inline]
+    // ===== Eqs. (14) and (55): P Hᵀ, H P Hᵀ and L =====
+    /// H, P Hᵀ and H P Hᵀ of an expected range; none of them depends on the random walk. `ahead`: for a range of the ranger whose
+    /// mount is estimated, the unit vector ahead of the robot in map axes.
+    #[cfg_attr(not(feature = "mount"), inline)]
     pub(crate) fn predict_measurement<'e>(
         &self,
         expected: &'e ExpectedRange,
+        ahead: Option<Vector>,
     ) -> PredictedMeasurement<'e> {
-        self.p_without_walk.project(expected)
+        let mut prediction = self.p_without_walk.project(expected);
+        if let Some((mount, ahead)) = self.mounted.get().zip(ahead) {
+            let by = Vector::new(expected.by_x, expected.by_y);
+            mount.add_to(&mut prediction, (by.dot(ahead), by.dot(ahead.left())));
+        }
+        prediction
     }
 
     /// Covariance of an expected range with the mean and the difference of the scale errors.
-    pub(crate) fn cross_covariance_of_wheels(&self, expected: &ExpectedRange) -> (f32, f32) {
-        self.p_without_walk.cross_covariance_of_wheels(expected)
+    pub(crate) fn cross_covariance_of_wheels(&self, of: &PredictedMeasurement) -> (f32, f32) {
+        self.p_without_walk.cross_covariance_of_wheels(of)
     }
 }
 

@@ -14,9 +14,8 @@ use crate::geometry::numeric::is_valid_variance;
 pub struct NoiseDensities {
     /// Of the advance Δs: `σ_w²`/4, m²/m.
     advance: f32,
-    /// Of the mean and the difference of the scale errors: `σ_S²`/4 and `σ_S²`, 1/m. The mean of two
-    /// independent random walks has half the variance of one, the difference twice.
-    scale_common: f32,
+    /// Of the difference of the scale errors: `σ_S²`, 1/m. The difference of two independent random walks has twice the variance of
+    /// one, their mean half of it.
     scale_difference: f32,
     /// Of the track-width error: `σ_D²`/2, m²/m.
     track_width_error: f32,
@@ -27,11 +26,9 @@ impl NoiseDensities {
     #[must_use]
     pub fn new(drive: &Drive) -> Self {
         let square = |sigma: f32| sigma * sigma;
-        let scale = square(drive.scale_walk.0);
         Self {
             advance: 0.25 * square(drive.wheel_noise.0.0),
-            scale_common: 0.25 * scale,
-            scale_difference: scale,
+            scale_difference: square(drive.scale_walk.0),
             track_width_error: 0.5 * square(drive.track_width_walk.0.0),
         }
     }
@@ -39,8 +36,7 @@ impl NoiseDensities {
     /// Whether every density is within the limits of a variance.
     #[must_use]
     pub fn is_valid(&self) -> bool {
-        let densities =
-            [self.advance, self.scale_common, self.scale_difference, self.track_width_error];
+        let densities = [self.advance, self.scale_difference, self.track_width_error];
         densities.into_iter().all(is_valid_variance)
     }
 }
@@ -61,9 +57,10 @@ impl AccumulatedRandomWalk {
     #[inline]
     #[must_use]
     pub fn new(densities: &NoiseDensities, distance: f32) -> Self {
+        let scale_difference = distance * densities.scale_difference;
         Self {
-            scale_common: distance * densities.scale_common,
-            scale_difference: distance * densities.scale_difference,
+            scale_common: 0.25 * scale_difference,
+            scale_difference,
             track_width_error: distance * densities.track_width_error,
         }
     }

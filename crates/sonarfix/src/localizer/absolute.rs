@@ -45,6 +45,7 @@ impl Localizer<'_> {
             let corrected = self.ekf.update_absolute(&prediction, weight, bias);
             corrected.map_err(AbsoluteRefusal::Filter)?;
             self.pose_changed();
+            self.mount_changed();
             match used {
                 Use::Accept => AbsoluteFix::Accepted(agreement),
                 _ => AbsoluteFix::Downweighted(agreement),

@@ -25,6 +25,7 @@ use crate::filter::covariance::{GyroBias, PredictedMeasurement};
 use crate::filter::ekf::Ekf;
 use crate::filter::gyro_fusion::GyroFusion;
 use crate::geometry::units::{Instant, Metres, SquareMetres};
+use crate::geometry::vector::Vector;
 use crate::health::Verdict;
 use crate::sensor::range::{ExpectedRange, Innovation};
 
@@ -34,6 +35,8 @@ pub(super) struct View {
     pub expected: ExpectedRange,
     /// Variance of the number.
     pub noise: SquareMetres,
+    /// For a range of the ranger whose mount is estimated: the unit vector ahead of the robot, in map axes.
+    pub ahead: Option<Vector>,
     /// The measured number, or the reason for which it is missing. The sensor explains a missing number as well.
     pub measured: Result<Metres, Refusal>,
 }
@@ -121,7 +124,7 @@ impl Localizer<'_> {
     ) -> Result<(), Refusal> {
         let robot = self.situation();
         let (view, seen) = measurement.view(&robot)?;
-        let prediction = robot.ekf.predict_measurement(&view.expected);
+        let prediction = robot.ekf.predict_measurement(&view.expected, view.ahead);
         let value = view.measured.unwrap_or(view.expected.range);
         let innovation = prediction.innovation(value, view.noise);
         let found = measurement.explain(&robot, &view, &seen, innovation.variance);
@@ -134,6 +137,7 @@ impl Localizer<'_> {
         };
         if fix.innovation_used().is_some() {
             self.pose_changed();
+            self.mount_changed();
         }
         self.association = found.association;
         let past = Past { config: &self.config, history: &mut self.history, now: self.time };

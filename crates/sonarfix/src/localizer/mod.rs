@@ -248,6 +248,14 @@ impl<'m> Localizer<'m> {
         }
     }
 
+    /// The mount of the first ranger is where the filter has estimated it.
+    #[inline]
+    fn mount_changed(&mut self) {
+        if let Some(place) = self.ekf.place_of_sonar() {
+            self.config.rangers.first.mount = place;
+        }
+    }
+
     /// Declares the pose unknown: the verdict is `Lost`.
     pub fn declare_lost(&mut self) {
         self.health = Health::lost(self.ekf.pose_uncertainty());
@@ -352,7 +360,8 @@ impl<'m> Localizer<'m> {
         GyroFusion::status_of(&self.gyro)
     }
 
-    /// The configuration.
+    /// The configuration. The mount of the first ranger is the estimated one, if
+    /// [`CalibrationPrior::mount`](crate::config::CalibrationPrior::mount) is not zero.
     #[must_use]
     pub fn config(&self) -> &Config {
         &self.config
@@ -371,7 +380,8 @@ fn filter(
     state: StateEstimate,
     deviation: StandardDeviations,
 ) -> Result<Ekf, EkfError> {
-    let ekf = Ekf::new(config.drive, state, deviation)?;
+    let mut ekf = Ekf::new(config.drive, state, deviation)?;
+    ekf.estimate_mount(config.rangers.first.mount, config.prior.mount);
     let difference = config.prior.difference_of(deviation.scale_right, deviation.scale_left);
     Ok(match difference {
         Some(difference) => ekf.with_scale_difference(difference),

@@ -107,8 +107,10 @@ impl Measurement for Ping<'_> {
             is_heading_known: viewpoint.is_heading_known(),
         };
         let map_variance = parameters.map_variance(sight.accuracy, seen.entry.travelled);
-        let noise = SquareMetres(sight.noise + map_variance * sight.of_map);
-        Ok((View { expected, noise, measured }, seen))
+        let of_mount = robot.config.mount_noise(aim.ranger);
+        let noise = SquareMetres(sight.noise + map_variance * sight.of_map + of_mount);
+        let ahead = viewpoint.ahead_of(aim.ranger);
+        Ok((View { expected, noise, ahead, measured }, seen))
     }
 
     fn explain(

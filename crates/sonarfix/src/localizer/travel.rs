@@ -97,7 +97,9 @@ impl Localizer<'_> {
     ) -> Result<(), EkfError> {
         match (&mut self.gyro, &self.config.gyro) {
             (Some(gyro), Some(parameters)) => {
-                gyro.predict(&mut self.ekf, travel, elapsed, turn, parameters)
+                gyro.predict(&mut self.ekf, travel, elapsed, turn, parameters)?;
+                self.mount_changed();
+                Ok(())
             }
             _ => self.ekf.predict(travel),
         }

@@ -55,6 +55,8 @@ pub(crate) struct SonarPosition {
     pub lever: (f32, f32),
     /// 1 + κ.
     pub stretch: f32,
+    /// The unit vector ahead of the robot, in map axes.
+    pub ahead: Vector,
 }
 
 impl SonarPosition {
@@ -65,7 +67,8 @@ impl SonarPosition {
         let x = cos * mount.x.0 - sin * mount.y.0;
         let y = sin * mount.x.0 + cos * mount.y.0;
         let point = Point::new(state.x.0 + x, state.y.0 + y);
-        Self { point, lever: (x, y), stretch: 1.0 + state.range_scale }
+        let ahead = Vector::new(cos, sin);
+        Self { point, lever: (x, y), stretch: 1.0 + state.range_scale, ahead }
     }
 }
 

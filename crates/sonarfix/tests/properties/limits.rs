@@ -18,7 +18,9 @@ use sonarfix::sensor::gyro::GyroParameters;
 use crate::strategies::{any_deviation, any_drive, any_state, bits, config_for_rooms};
 
 fn config() -> Config {
-    config_for_rooms(Point::new(0.03, 0.01))
+    let mut config = config_for_rooms(Point::new(0.03, 0.01));
+    config.prior.mount = Metres(0.005);
+    config
 }
 
 /// A wall 1 m ahead of a robot at the origin.

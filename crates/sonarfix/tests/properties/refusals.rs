@@ -39,6 +39,7 @@ fn walls_and_one_aside(room: &Room) -> Vec<Wall> {
 /// A localizer after some travel and a fix, so that no number in it is round.
 fn started<'m>(room: &Room, walls: &'m [Wall], mount: Point) -> Localizer<'m> {
     let mut config = config_for_rooms(mount);
+    config.prior.mount = Metres(0.005);
     // The covariance of a lost robot stays.
     config.gating.inflation = Metres(0.0);
     let start = Instant::from_ticks(1_000_000);
@@ -125,6 +126,7 @@ proptest! {
     ) {
         let walls = walls_and_one_aside(&room);
         let mut config = config_for_rooms(mount);
+        config.prior.mount = Metres(0.005);
         config.echo = EchoParameters::HC_SR04;
         let localizer = Localizer::new(config, Map::new(&walls), room.start(), Instant::from_ticks(0)).unwrap();
         let aim = localizer.aim().unwrap();
@@ -179,6 +181,7 @@ proptest! {
     fn a_lost_robot_inflates_its_pose_covariance(room in any_room(), mount in any_mount(), inflation in 0.005_f32..0.03) {
         let walls = walls_and_one_aside(&room);
         let mut config = config_for_rooms(mount);
+        config.prior.mount = Metres(0.005);
         config.gating.inflation = Metres(inflation);
         config.echo = EchoParameters::HC_SR04;
         let mut localizer = Localizer::new(config, Map::new(&walls), room.start(), Instant::from_ticks(0)).unwrap();

@@ -181,7 +181,8 @@ impl SixStateFilter {
         let dot = |m: &[f32; 6]| h[0] * m[0] + h[1] * m[1] + h[2] * m[2];
         let m = self.cross(h);
         let Some(noise) = self.limited_noise(noise, h, &m) else { return };
-        let per_variance = 1.0 / (noise + dot(&m));
+        let variance = noise + dot(&m);
+        let per_variance = 1.0 / variance;
         let gain = m.map(|m| m * per_variance);
         let innovation = range - expected;
         for i in 0..3 {
@@ -190,17 +191,14 @@ impl SixStateFilter {
         for i in 3..6 {
             self.x[i] += gain[i] * innovation;
         }
-        self.each(|i, j, p| p - gain[i] * m[j]);
-        if dot(&m) <= 255.0 * noise {
+        self.each(|i, j, p| p + (-variance * gain[i]) * gain[j]);
+        if variance <= 256.0 * noise {
             return;
         }
         let left_over = self.cross(h);
-        let d: [f32; 6] = core::array::from_fn(|i| gain[i] * noise - left_over[i]);
-        let half = 0.5 * dot(&d);
-        let d: [f32; 6] = core::array::from_fn(|i| {
-            if i < 3 { d[i] - half * gain[i] } else { gain[i] * (noise - half) - left_over[i] }
-        });
-        self.each(|i, j, p| p + d[i] * gain[j] + gain[i] * d[j]);
+        let rest = noise - 0.5 * (dot(&gain) * noise - dot(&left_over));
+        let e: [f32; 6] = core::array::from_fn(|i| gain[i] * rest - left_over[i]);
+        self.each(|i, j, p| p + (e[i] * gain[j] + gain[i] * e[j]));
     }
 
     /// Eq. (20).

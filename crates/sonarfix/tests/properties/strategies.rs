@@ -267,6 +267,8 @@ pub fn config_for_rooms(mount: Point) -> Config {
     config.rangers.first.mount = mount;
     config.rangers.first.max_range = Metres(12.0);
     config.prior.range_scale = 0.01;
+    // Oracles have seven states.
+    config.prior.mount = Metres(0.0);
     // No clutter, which has its own tests.
     config.echo = EchoParameters::NONE;
     config.gating.confidence = 1.0;

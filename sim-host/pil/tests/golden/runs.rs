@@ -136,7 +136,7 @@ fn a_search_in_a_region() {
     let region = Region { from: Point::new(0.9, 1.0), to: Point::new(2.2, 2.1) };
     scenario.start.is_unknown = true;
     scenario.robot.start = StartPose::Unknown { region: Some(region) };
-    assert!(assert_recorded("region", scenario, 60.0) >= 1);
+    assert!(assert_recorded("region", scenario, 120.0) >= 1);
 }
 
 /// Encoders that cannot be read for some seconds, with a search after it.

@@ -41,6 +41,13 @@ pub struct Cell {
 }
 
 impl Cell {
+    /// Whether the page has it: a robot whose file is wrong has an HC-SR04 there, and an empty room.
+    #[must_use]
+    pub fn is_of_page(&self) -> bool {
+        let is_plain = self.sensor == Sensor::HcSr04 && self.objects == Objects::Nothing;
+        self.robot.is_nominal() || is_plain
+    }
+
     /// The run of a seed.
     ///
     /// # Errors
@@ -79,10 +86,10 @@ impl Cell {
     }
 
     fn simulation(&self, text: &str, scene: &Scene) -> Result<Simulation, RoomError> {
-        let scenario = Scenario::parse(text, "room.toml", std::path::Path::new(""))?;
+        let mut scenario = Scenario::parse(text, "room.toml", std::path::Path::new(""))?;
         let map = Floor::parse(&text::map(&scene.map), "map.toml")?;
-        let mut robot = scenario.robot;
-        (self.robot.believes)(&mut robot);
+        self.robot.drive(&mut scenario);
+        let robot = scenario.robot;
         let mut simulation = Simulation::new(scenario).believing(robot, map.walls());
         if let Some((from, obstacles)) = &scene.later {
             simulation = simulation.rearranged(*from, obstacles);

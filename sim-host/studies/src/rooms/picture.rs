@@ -39,8 +39,10 @@ const LEGEND: [(Level, &str); 5] = [
 /// The picture as SVG.
 #[must_use]
 pub fn svg(results: &[(Cell, Sums)]) -> String {
+    let is_shown = |(cell, _): &&(Cell, Sums)| cell.robot.is_nominal();
+    let results: Vec<&(Cell, Sums)> = results.iter().filter(is_shown).collect();
     let rows = distinct(results.iter().map(|(cell, _)| (cell.family.name(), cell.objects.name())));
-    let blocks = distinct(results.iter().map(|(cell, _)| (cell.robot.name, cell.sensor.name())));
+    let blocks = distinct(results.iter().map(|(cell, _)| (cell.robot.name(), cell.sensor.name())));
     let (tops, bottom) = tops(&rows);
     let block_width = Measure::ALL.len() * CELL + GAP;
     let (width, height) = (LABELS + blocks.len() * block_width, bottom + FOOT);
@@ -53,9 +55,9 @@ pub fn svg(results: &[(Cell, Sums)]) -> String {
     for (number, block) in blocks.iter().enumerate() {
         let _ = write_head(&mut svg, LABELS + number * block_width, *block);
     }
-    for (cell, sums) in results {
+    for (cell, sums) in &results {
         let of_row = (cell.family.name(), cell.objects.name());
-        let of_block = (cell.robot.name, cell.sensor.name());
+        let of_block = (cell.robot.name(), cell.sensor.name());
         let top = rows.iter().zip(&tops).find(|(row, _)| **row == of_row).map(|(_, top)| *top);
         let block = blocks.iter().position(|block| *block == of_block);
         if let (Some(top), Some(block)) = (top, block) {

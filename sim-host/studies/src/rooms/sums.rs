@@ -28,6 +28,8 @@ pub struct Sums {
     /// The longest time until such an error was noticed, seconds.
     pub longest_unnoticed: f64,
     untracked: f64,
+    /// Sum of the shares of the time with the position inside the 99 % ellipse.
+    inside: f64,
 }
 
 impl Sums {
@@ -51,6 +53,7 @@ impl Sums {
             wrong_tracking: watch.wrong_tracking(),
             longest_unnoticed: watch.longest_unnoticed(),
             untracked: watch.share_untracked(),
+            inside: result.integrity.share_within_99(),
         }
     }
 
@@ -70,6 +73,7 @@ impl Sums {
             wrong_tracking: self.wrong_tracking + other.wrong_tracking,
             longest_unnoticed: self.longest_unnoticed.max(other.longest_unnoticed),
             untracked: self.untracked + other.untracked,
+            inside: self.inside + other.inside,
             ..self
         }
     }
@@ -114,6 +118,12 @@ impl Sums {
     #[must_use]
     pub fn untracked(&self) -> f64 {
         self.untracked / f64::from(self.runs)
+    }
+
+    /// Share of the time with the position inside the 99 % ellipse.
+    #[must_use]
+    pub fn inside(&self) -> f64 {
+        self.inside / f64::from(self.runs)
     }
 
     /// Share of the runs.

@@ -4,12 +4,13 @@
 //! Comparisons are written so that a wall whose numbers are NaN cannot be measured.
 
 use crate::association::outcome::Refusal;
-use crate::config::{Config, EchoParameters, RangerParameters, Ranging};
+use crate::config::{Config, EchoParameters, RangerId, RangerParameters, Ranging};
 use crate::filter::ekf::{Ekf, PoseCovariance};
 use crate::geometry::elementary::{inverse_sqrt, sqrt};
 use crate::geometry::numeric::positive_part;
 use crate::geometry::pose::{Heading, Point};
 use crate::geometry::units::{Metres, Radians};
+use crate::geometry::vector::Vector;
 use crate::map::Wall;
 use crate::sensor::range::{ExpectedRange, SonarPosition};
 
@@ -112,6 +113,12 @@ impl<'a> Viewpoint<'a> {
     /// The sonar at the estimate.
     pub(super) fn sonar_position(&self) -> &SonarPosition {
         &self.position
+    }
+
+    /// For the ranger whose mount is estimated: the unit vector ahead of the robot, in map axes.
+    #[inline]
+    pub fn ahead_of(&self, ranger: RangerId) -> Option<Vector> {
+        (cfg!(feature = "mount") && ranger == RangerId::FIRST).then_some(self.position.ahead)
     }
 
     /// Variance of the heading, rad².

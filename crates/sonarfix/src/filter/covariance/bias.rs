@@ -6,7 +6,9 @@
 //! No value is refused here. The variance of the bias is at least [`MIN_VARIANCE`]; the caller checks the variances of P.
 
 use super::blocks::Covariance;
+use super::column::StateColumn;
 use super::correction::Gain;
+use super::mount::MountCovariance;
 use super::projection::PredictedMeasurement;
 use crate::filter::motion::LinearizedMotion;
 use crate::geometry::numeric::{at_least, at_most};
@@ -20,14 +22,10 @@ const MIN_VARIANCE: f32 = 1e-14;
 pub struct GyroBias {
     /// The estimate, rad/s.
     pub(crate) rate: f32,
-    xb: f32,
-    yb: f32,
-    hb: f32,
-    cb: f32,
-    db: f32,
-    wb: f32,
-    kb: f32,
-    bb: f32,
+    pub(super) states: StateColumn,
+    /// Covariances with the errors of the mount, ahead and to the left.
+    pub(super) mount: MountCovariance,
+    pub(super) bb: f32,
 }
 
 /// Turn by the gyro less turn by the wheels, as a linear measurement of the errors that both do not share.
@@ -68,7 +66,8 @@ impl TurnDifference {
         wheels + self.by_w * estimate.track_width_error + self.by_b * bias.rate
     }
 
-    fn times(&self, c: f32, d: f32, w: f32, b: f32) -> f32 {
+    /// Covariance of the difference with a quantity that has these covariances with c, d, w and b.
+    pub(super) fn times(&self, c: f32, d: f32, w: f32, b: f32) -> f32 {
         self.by_c * c + self.by_d * d + self.by_w * w + self.by_b * b
     }
 }
@@ -77,7 +76,7 @@ impl GyroBias {
     /// A bias of zero with this standard deviation, rad/s.
     pub fn unknown(deviation: f32) -> Self {
         let bb = at_least(deviation * deviation, MIN_VARIANCE);
-        Self { rate: 0.0, xb: 0.0, yb: 0.0, hb: 0.0, cb: 0.0, db: 0.0, wb: 0.0, kb: 0.0, bb }
+        Self { rate: 0.0, states: StateColumn::NONE, mount: (0.0, 0.0), bb }
     }
 
     /// The same estimate, independent of all states, with this standard deviation, rad/s.
@@ -93,7 +92,7 @@ impl GyroBias {
 
     /// Removes the covariance with the pose.
     pub fn forget_pose(&mut self) {
-        (self.xb, self.yb, self.hb) = (0.0, 0.0, 0.0);
+        self.states.forget_pose();
     }
 
     /// Variance, (rad/s)².
@@ -113,67 +112,68 @@ impl GyroBias {
     #[inline]
     pub fn turn(&mut self, p: &mut Covariance, factor: f32) {
         let (pose, k) = (&mut p.pose, &mut p.range_scale);
-        pose.hc += factor * self.cb;
-        pose.hd += factor * self.db;
-        pose.hw += factor * self.wb;
-        pose.xh += factor * self.xb;
-        pose.yh += factor * self.yb;
-        k.hk += factor * self.kb;
+        pose.hc += factor * self.states.c;
+        pose.hd += factor * self.states.d;
+        pose.hw += factor * self.states.w;
+        pose.xh += factor * self.states.x;
+        pose.yh += factor * self.states.y;
+        k.hk += factor * self.states.k;
         let more = factor * self.bb;
-        pose.hh += factor * (self.hb + self.hb + more);
-        self.hb += more;
+        pose.hh += factor * (self.states.h + self.states.h + more);
+        self.states.h += more;
     }
 
     // ===== Eq. (10): column of the bias =====
     /// Propagates this column through the motion by the wheels.
     #[inline]
     pub fn propagate(&mut self, motion: &LinearizedMotion) {
-        let tb =
-            motion.turn_by_c * self.cb + motion.turn_by_d * self.db + motion.turn_by_w * self.wb;
-        let sb = motion.advance_by_c * self.cb + motion.advance_by_d * self.db;
-        let bm = self.hb + 0.5 * tb;
-        self.xb += motion.cos * sb - motion.dy * bm;
-        self.yb += motion.sin * sb + motion.dx * bm;
-        self.hb += tb;
+        self.states.propagate(motion);
     }
 
     // ===== Eqs. (6) and (16): the bias in the correction by a range =====
-    /// Corrects bias and column by a range whose gain has corrected P. `share`: of K mᵀ that P has lost, eq. (16).
+    /// Corrects bias and column by a measurement whose gain has corrected P, and with which the mount has the covariances `own`.
+    /// `share`: of K mᵀ that P has lost, eq. (16).
     pub fn correct(
         &mut self,
         prediction: &PredictedMeasurement,
+        own: MountCovariance,
         gain: &Gain,
         innovation: f32,
         share: f32,
     ) {
-        let h = &prediction.expected.jacobian();
-        let m = self.xb * h.x + self.yb * h.y + self.hb * h.h + self.kb * h.k;
+        let mut m = self.states.times(&prediction.expected.jacobian());
+        if let Some(mount) = prediction.mount() {
+            m += mount.times(self.mount);
+        }
+        self.subtract(m, own, gain, innovation, share);
+    }
+
+    /// Corrects by a measurement with which the bias has the covariance `m`.
+    fn subtract(&mut self, m: f32, own: MountCovariance, gain: &Gain, innovation: f32, share: f32) {
         let k = m * gain.per_variance;
-        let lost = m * share;
-        self.xb -= gain.x * lost;
-        self.yb -= gain.y * lost;
-        self.hb -= gain.h * lost;
-        self.cb -= gain.c * lost;
-        self.db -= gain.d * lost;
-        self.wb -= gain.w * lost;
-        self.kb -= gain.k * lost;
-        self.bb = at_least(self.bb - k * lost, MIN_VARIANCE);
+        self.states.subtract(gain, m * share);
+        self.mount.0 -= k * own.0 * share;
+        self.mount.1 -= k * own.1 * share;
+        self.bb = at_least(self.bb - k * m * share, MIN_VARIANCE);
         self.rate += k * innovation;
     }
 }
 
 impl GyroBias {
     // ===== Eq. (44): column of the bias =====
-    /// Adds `amount` times the outer product of a correction of all states and of the bias since `before`.
-    pub fn add_along(&mut self, before: &Self, correction: &Gain, amount: f32) {
+    /// Adds `amount` times the outer product of a correction of all states, of the bias since `before`, and of the mount, which has
+    /// moved by `moved`.
+    pub fn add_along(
+        &mut self,
+        before: &Self,
+        correction: &Gain,
+        moved: MountCovariance,
+        amount: f32,
+    ) {
         let scaled = amount * (self.rate - before.rate);
-        self.xb += scaled * correction.x;
-        self.yb += scaled * correction.y;
-        self.hb += scaled * correction.h;
-        self.cb += scaled * correction.c;
-        self.db += scaled * correction.d;
-        self.wb += scaled * correction.w;
-        self.kb += scaled * correction.k;
+        self.states.subtract(correction, -scaled);
+        self.mount.0 += scaled * moved.0;
+        self.mount.1 += scaled * moved.1;
         self.bb += scaled * (self.rate - before.rate);
     }
 }
@@ -184,33 +184,29 @@ impl Covariance {
     #[must_use]
     pub fn variance_of(&self, difference: &TurnDifference, bias: &GyroBias) -> f32 {
         let (q, b, a) = (&self.calibration, bias, difference);
-        let c = a.times(q.cc, q.cd, q.cw, b.cb);
-        let d = a.times(q.cd, q.dd, q.dw, b.db);
-        let w = a.times(q.cw, q.dw, q.ww, b.wb);
-        a.times(c, d, w, a.times(b.cb, b.db, b.wb, b.bb))
+        let c = a.times(q.cc, q.cd, q.cw, b.states.c);
+        let d = a.times(q.cd, q.dd, q.dw, b.states.d);
+        let w = a.times(q.cw, q.dw, q.ww, b.states.w);
+        a.times(c, d, w, a.times(b.states.c, b.states.d, b.states.w, b.bb))
     }
 
     // ===== Eq. (38): correction by a difference of turns =====
-    /// Corrects P and the bias, with its column, by a difference of turns. `innovation` is the difference less its expected
+    /// Corrects P and the bias, with its column, by a difference of turns with which the mount has the covariances `own`. `innovation` is the difference less its expected
     /// value. Returns the gain; without a gain nothing has changed.
     pub fn correct_by_turns(
         &mut self,
         bias: &mut GyroBias,
         difference: &TurnDifference,
+        own: MountCovariance,
         innovation: f32,
     ) -> Option<Gain> {
         let (before, column) = (*self, *bias);
-        let a = difference;
-        let (p, q, r) = (&mut self.pose, &mut self.calibration, &mut self.range_scale);
-        let b = bias;
-        let mx = a.times(p.xc, p.xd, p.xw, b.xb);
-        let my = a.times(p.yc, p.yd, p.yw, b.yb);
-        let mh = a.times(p.hc, p.hd, p.hw, b.hb);
-        let mc = a.times(q.cc, q.cd, q.cw, b.cb);
-        let md = a.times(q.cd, q.dd, q.dw, b.db);
-        let mw = a.times(q.cw, q.dw, q.ww, b.wb);
-        let mk = a.times(r.ck, r.dk, r.wk, b.kb);
-        let mb = a.times(b.cb, b.db, b.wb, b.bb);
+        let (a, b) = (difference, bias);
+        let (p, q, r) = (&self.pose, &self.calibration, &self.range_scale);
+        let (mc, md) =
+            (a.times(q.cc, q.cd, q.cw, b.states.c), a.times(q.cd, q.dd, q.dw, b.states.d));
+        let mw = a.times(q.cw, q.dw, q.ww, b.states.w);
+        let mb = a.times(b.states.c, b.states.d, b.states.w, b.bb);
         let s = a.times(mc, md, mw, mb) + a.noise;
         // False for NaN.
         let is_positive = s >= f32::MIN_POSITIVE;
@@ -219,52 +215,18 @@ impl Covariance {
         }
         let v = 1.0 / s;
         let gain = Gain {
-            x: mx * v,
-            y: my * v,
-            h: mh * v,
+            x: a.times(p.xc, p.xd, p.xw, b.states.x) * v,
+            y: a.times(p.yc, p.yd, p.yw, b.states.y) * v,
+            h: a.times(p.hc, p.hd, p.hw, b.states.h) * v,
             c: mc * v,
             d: md * v,
             w: mw * v,
-            k: mk * v,
+            k: a.times(r.ck, r.dk, r.wk, b.states.k) * v,
             per_variance: v,
         };
-        p.xx -= gain.x * mx;
-        p.xy -= gain.x * my;
-        p.xh -= gain.x * mh;
-        p.xc -= gain.x * mc;
-        p.xd -= gain.x * md;
-        p.xw -= gain.x * mw;
-        r.xk -= gain.x * mk;
-        b.xb -= gain.x * mb;
-        p.yy -= gain.y * my;
-        p.yh -= gain.y * mh;
-        p.yc -= gain.y * mc;
-        p.yd -= gain.y * md;
-        p.yw -= gain.y * mw;
-        r.yk -= gain.y * mk;
-        b.yb -= gain.y * mb;
-        p.hh -= gain.h * mh;
-        p.hc -= gain.h * mc;
-        p.hd -= gain.h * md;
-        p.hw -= gain.h * mw;
-        r.hk -= gain.h * mk;
-        b.hb -= gain.h * mb;
-        q.cc -= gain.c * mc;
-        q.cd -= gain.c * md;
-        q.cw -= gain.c * mw;
-        r.ck -= gain.c * mk;
-        b.cb -= gain.c * mb;
-        q.dd -= gain.d * md;
-        q.dw -= gain.d * mw;
-        r.dk -= gain.d * mk;
-        b.db -= gain.d * mb;
-        q.ww -= gain.w * mw;
-        r.wk -= gain.w * mk;
-        b.wb -= gain.w * mb;
-        r.kk -= gain.k * mk;
-        b.kb -= gain.k * mb;
-        b.bb = at_least(b.bb - mb * v * mb, MIN_VARIANCE);
-        b.rate += mb * v * innovation;
+        // K m = S K Kᵀ.
+        self.add_along_gain(&gain, -s);
+        b.subtract(mb, own, &gain, innovation, 1.0);
         if self.is_valid() && b.rate.is_finite() {
             return Some(gain);
         }

@@ -1,6 +1,7 @@
 //! Correction by one range (`docs/model.md`, eqs. 6 and 18 to 20).
 
 use super::blocks::Covariance;
+use super::column::StateColumn;
 use super::projection::{CrossCovariance, PredictedMeasurement};
 use crate::sensor::range::MeasurementJacobian;
 use crate::state::estimate::FilterEstimate;
@@ -88,18 +89,17 @@ impl Column {
     }
 }
 
-/// R, 1/S, K and the diagonal of P − K mᵀ, after eq. (20).
-struct FirstPass {
+/// R, S and K, as far as it concerns the states that a range depends on, after eq. (20).
+struct Raised {
     noise: f32,
-    per_variance: f32,
-    gain: Column,
-    variances: Column,
+    variance: f32,
+    scaled: Scaled,
 }
 
-/// e of eq. (19), and R − ½ H d, with which the remaining columns compute theirs.
-struct SecondPass {
-    e: Column,
-    remaining_noise: f32,
+/// P Hᵀ/S, and 1/S.
+struct Scaled {
+    gain: Column,
+    per_variance: f32,
 }
 
 impl Covariance {
@@ -113,146 +113,110 @@ impl Covariance {
         if !is_positive {
             return Correction::Indefinite;
         }
-        let Some(first) = self.first_pass(h, prediction, noise) else {
+        let Some(Raised { noise, variance, scaled }) = self.raised(h, prediction, noise) else {
             return Correction::Saturated;
         };
-        let m = &prediction.cross_covariance;
-        let is_sharp = prediction.variance > (PLAIN_UP_TO - 1.0) * first.noise;
-        let second = self.correct_range_states(h, m, &first, is_sharp);
-        let [c, d, w] = self.correct_calibration(h, &first, second.as_ref());
-        let Column { x, y, h, k } = first.gain;
-        Correction::Applied(Gain { x, y, h, c, d, w, k, per_variance: first.per_variance })
+        let gain = self.gain_of(prediction, scaled);
+        // P₁ = P − S K Kᵀ.
+        self.add_along_gain(&gain, -variance);
+        if variance > PLAIN_UP_TO * noise {
+            self.second_pass(prediction, &gain, noise);
+        }
+        Correction::Applied(gain)
     }
 
-    // ===== Eqs. (18) and (20): K = P Hᵀ/S, with R raised where f32 would lose definiteness =====
+    // ===== Eq. (20): R raised where f32 would lose definiteness =====
     #[inline]
-    fn first_pass(
+    fn raised(
         &self,
         h: &MeasurementJacobian,
         prediction: &PredictedMeasurement,
         noise: f32,
-    ) -> Option<FirstPass> {
+    ) -> Option<Raised> {
         let m = &prediction.cross_covariance;
         let along = prediction.variance;
-        let variances = |gain: &Column| Column {
+        let variance = noise + along;
+        let scaled = Scaled::new(m, variance);
+        let Scaled { gain, per_variance } = &scaled;
+        let after = Column {
             x: self.pose.xx - gain.x * m.x,
             y: self.pose.yy - gain.y * m.y,
             h: self.pose.hh - gain.h * m.h,
             k: self.range_scale.kk - gain.k * m.k,
         };
-        let per_variance = 1.0 / (noise + along);
-        let gain = scaled(m, per_variance);
-        let first = FirstPass { noise, per_variance, gain, variances: variances(&gain) };
-        let least = MIN_VARIANCE_SHARE * first.variances.times(&h.squared());
+        let least = MIN_VARIANCE_SHARE * after.times(&h.squared());
         if noise * along * per_variance >= least {
-            return Some(first);
+            return Some(Raised { noise, variance, scaled });
         }
         if along <= least {
             return None;
         }
         // The noise that leaves v R/(v + R) = least.
         let noise = along * least / (along - least);
-        let per_variance = 1.0 / (noise + along);
-        let gain = scaled(m, per_variance);
-        Some(FirstPass { noise, per_variance, gain, variances: variances(&gain) })
+        let variance = noise + along;
+        Some(Raised { noise, variance, scaled: Scaled::new(m, variance) })
     }
 
-    // ===== Eq. (19), block of the states that the range depends on =====
-    /// The second pass only for a sharp range.
-    #[inline]
-    fn correct_range_states(
-        &mut self,
-        h: &MeasurementJacobian,
-        m: &CrossCovariance,
-        first: &FirstPass,
-        is_sharp: bool,
-    ) -> Option<SecondPass> {
-        let FirstPass { noise, gain, variances, .. } = first;
-        let (p, r) = (&mut self.pose, &mut self.range_scale);
-        // P₁ = P − K mᵀ.
-        (p.xx, p.yy, p.hh, r.kk) = (variances.x, variances.y, variances.h, variances.k);
-        p.xy -= gain.x * m.y;
-        p.xh -= gain.x * m.h;
-        r.xk -= gain.x * m.k;
-        p.yh -= gain.y * m.h;
-        r.yk -= gain.y * m.k;
-        r.hk -= gain.h * m.k;
-        if !is_sharp {
-            return None;
-        }
-        // d = K R − P₁ Hᵀ; zero in exact arithmetic.
-        let d = Column {
-            x: gain.x * noise - (p.xx * h.x + p.xy * h.y + p.xh * h.h + r.xk * h.k),
-            y: gain.y * noise - (p.xy * h.x + p.yy * h.y + p.yh * h.h + r.yk * h.k),
-            h: gain.h * noise - (p.xh * h.x + p.yh * h.y + p.hh * h.h + r.hk * h.k),
-            k: gain.k * noise - (r.xk * h.x + r.yk * h.y + r.hk * h.h + r.kk * h.k),
-        };
-        // e = d − ½ K (H d).
-        let half = 0.5 * d.times(h);
-        let e = Column {
-            x: d.x - half * gain.x,
-            y: d.y - half * gain.y,
-            h: d.h - half * gain.h,
-            k: d.k - half * gain.k,
-        };
-        // P⁺ = P₁ + e Kᵀ + K eᵀ.
-        p.xx = p.xx + e.x * gain.x + e.x * gain.x;
-        p.xy = p.xy + e.x * gain.y + gain.x * e.y;
-        p.xh = p.xh + e.x * gain.h + gain.x * e.h;
-        r.xk = r.xk + e.x * gain.k + gain.x * e.k;
-        p.yy = p.yy + e.y * gain.y + e.y * gain.y;
-        p.yh = p.yh + e.y * gain.h + gain.y * e.h;
-        r.yk = r.yk + e.y * gain.k + gain.y * e.k;
-        p.hh = p.hh + e.h * gain.h + e.h * gain.h;
-        r.hk = r.hk + e.h * gain.k + gain.h * e.k;
-        r.kk = r.kk + e.k * gain.k + e.k * gain.k;
-        Some(SecondPass { e, remaining_noise: noise - half })
-    }
-
-    // ===== Eq. (19), columns of the calibration =====
-    /// Corrects the columns of c, d and w, and returns their gains.
-    #[inline]
-    fn correct_calibration(
-        &mut self,
-        h: &MeasurementJacobian,
-        first: &FirstPass,
-        second: Option<&SecondPass>,
-    ) -> [f32; 3] {
-        let FirstPass { per_variance, gain, .. } = first;
+    // ===== Eq. (19): P⁺ = P₁ + e Kᵀ + K eᵀ =====
+    #[inline(never)]
+    fn second_pass(&mut self, prediction: &PredictedMeasurement, gain: &Gain, noise: f32) {
+        let h = &prediction.expected.jacobian();
         let (p, q, r) = (&mut self.pose, &mut self.calibration, &mut self.range_scale);
-        let column = |x: &mut f32, y: &mut f32, h_: &mut f32, k: &mut f32| {
-            let m = *x * h.x + *y * h.y + *h_ * h.h + *k * h.k;
-            let g = m * per_variance;
-            *x -= gain.x * m;
-            *y -= gain.y * m;
-            *h_ -= gain.h * m;
-            *k -= gain.k * m;
-            let Some(SecondPass { e, remaining_noise }) = second else { return (m, g, 0.0) };
-            let e_j = g * remaining_noise - (*x * h.x + *y * h.y + *h_ * h.h + *k * h.k);
-            *x = *x + e.x * g + gain.x * e_j;
-            *y = *y + e.y * g + gain.y * e_j;
-            *h_ = *h_ + e.h * g + gain.h * e_j;
-            *k = *k + e.k * g + gain.k * e_j;
-            (m, g, e_j)
+        // P₁ Hᵀ, and what the mount adds to it.
+        let mut m = StateColumn {
+            x: p.xx * h.x + p.xy * h.y + p.xh * h.h + r.xk * h.k,
+            y: p.xy * h.x + p.yy * h.y + p.yh * h.h + r.yk * h.k,
+            h: p.xh * h.x + p.yh * h.y + p.hh * h.h + r.hk * h.k,
+            c: p.xc * h.x + p.yc * h.y + p.hc * h.h + r.ck * h.k,
+            d: p.xd * h.x + p.yd * h.y + p.hd * h.h + r.dk * h.k,
+            w: p.xw * h.x + p.yw * h.y + p.hw * h.h + r.wk * h.k,
+            k: r.xk * h.x + r.yk * h.y + r.hk * h.h + r.kk * h.k,
         };
-        let (mc, gc, ec) = column(&mut p.xc, &mut p.yc, &mut p.hc, &mut r.ck);
-        let (md, gd, ed) = column(&mut p.xd, &mut p.yd, &mut p.hd, &mut r.dk);
-        let (mw, gw, ew) = column(&mut p.xw, &mut p.yw, &mut p.hw, &mut r.wk);
-        q.cc -= gc * mc;
-        q.cd -= gc * md;
-        q.dd -= gd * md;
-        q.cw -= gc * mw;
-        q.dw -= gd * mw;
-        q.ww -= gw * mw;
-        if second.is_some() {
-            q.cc = q.cc + ec * gc + ec * gc;
-            q.cd = q.cd + ec * gd + gc * ed;
-            q.dd = q.dd + ed * gd + ed * gd;
-            q.cw = q.cw + ec * gw + gc * ew;
-            q.dw = q.dw + ed * gw + gd * ew;
-            q.ww = q.ww + ew * gw + ew * gw;
+        if let Some(mount) = prediction.mount() {
+            m.add(&mount.states);
+            m.subtract(gain, mount.along);
         }
-        [gc, gd, gw]
+        // d = K R − P₁ Hᵀ; zero in exact arithmetic. e = d − ½ K (H d).
+        let Gain { x, y, h: hh, c, d, w, k, .. } = *gain;
+        let along = h.x * x + h.y * y + h.h * hh + h.k * k;
+        let rest = noise - 0.5 * (along * noise - m.times(h));
+        let e = StateColumn {
+            x: x * rest - m.x,
+            y: y * rest - m.y,
+            h: hh * rest - m.h,
+            c: c * rest - m.c,
+            d: d * rest - m.d,
+            w: w * rest - m.w,
+            k: k * rest - m.k,
+        };
+        p.xx += e.x * x + e.x * x;
+        p.xy += e.x * y + x * e.y;
+        p.xh += e.x * hh + x * e.h;
+        p.xc += e.x * c + x * e.c;
+        p.xd += e.x * d + x * e.d;
+        p.xw += e.x * w + x * e.w;
+        r.xk += e.x * k + x * e.k;
+        p.yy += e.y * y + e.y * y;
+        p.yh += e.y * hh + y * e.h;
+        p.yc += e.y * c + y * e.c;
+        p.yd += e.y * d + y * e.d;
+        p.yw += e.y * w + y * e.w;
+        r.yk += e.y * k + y * e.k;
+        p.hh += e.h * hh + e.h * hh;
+        p.hc += e.h * c + hh * e.c;
+        p.hd += e.h * d + hh * e.d;
+        p.hw += e.h * w + hh * e.w;
+        r.hk += e.h * k + hh * e.k;
+        q.cc += e.c * c + e.c * c;
+        q.cd += e.c * d + c * e.d;
+        q.cw += e.c * w + c * e.w;
+        r.ck += e.c * k + c * e.k;
+        q.dd += e.d * d + e.d * d;
+        q.dw += e.d * w + d * e.w;
+        r.dk += e.d * k + d * e.k;
+        q.ww += e.w * w + e.w * w;
+        r.wk += e.w * k + w * e.k;
+        r.kk += e.k * k + e.k * k;
     }
 }
 
@@ -261,16 +225,23 @@ impl Covariance {
     /// The gain of a measurement with innovation variance `s`.
     #[must_use]
     pub fn gain(&self, prediction: &PredictedMeasurement, s: f32) -> Gain {
+        self.gain_of(prediction, Scaled::new(&prediction.cross_covariance, s))
+    }
+
+    fn gain_of(&self, prediction: &PredictedMeasurement, scaled: Scaled) -> Gain {
         let h = &prediction.expected.jacobian();
         let (p, r) = (&self.pose, &self.range_scale);
-        let per_variance = 1.0 / s;
-        let Column { x, y, h: hh, k } = scaled(&prediction.cross_covariance, per_variance);
-        let column = |x: f32, y: f32, hh: f32, k: f32| {
-            (x * h.x + y * h.y + hh * h.h + k * h.k) * per_variance
-        };
-        let c = column(p.xc, p.yc, p.hc, r.ck);
-        let d = column(p.xd, p.yd, p.hd, r.dk);
-        let w = column(p.xw, p.yw, p.hw, r.wk);
+        let Scaled { gain: Column { x, y, h: hh, k }, per_variance } = scaled;
+        let column = |x: f32, y: f32, hh: f32, k: f32| x * h.x + y * h.y + hh * h.h + k * h.k;
+        let mut c = column(p.xc, p.yc, p.hc, r.ck);
+        let mut d = column(p.xd, p.yd, p.hd, r.dk);
+        let mut w = column(p.xw, p.yw, p.hw, r.wk);
+        if let Some(mount) = prediction.mount() {
+            c += mount.states.c;
+            d += mount.states.d;
+            w += mount.states.w;
+        }
+        let (c, d, w) = (c * per_variance, d * per_variance, w * per_variance);
         Gain { x, y, h: hh, c, d, w, k, per_variance }
     }
 
@@ -313,6 +284,11 @@ impl Covariance {
     }
 }
 
-fn scaled(m: &CrossCovariance, factor: f32) -> Column {
-    Column { x: m.x * factor, y: m.y * factor, h: m.h * factor, k: m.k * factor }
+impl Scaled {
+    /// For an innovation variance `s`.
+    #[inline]
+    fn new(m: &CrossCovariance, s: f32) -> Self {
+        let v = 1.0 / s;
+        Self { gain: Column { x: m.x * v, y: m.y * v, h: m.h * v, k: m.k * v }, per_variance: v }
+    }
 }

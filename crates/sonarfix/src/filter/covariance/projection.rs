@@ -1,6 +1,7 @@
 //! Projection of P onto a measurement: P Hᵀ and H P Hᵀ (`docs/model.md`, eq. 14).
 
 use super::blocks::Covariance;
+use super::mount::MountShare;
 use crate::geometry::units::{Metres, SquareMetres};
 use crate::sensor::range::{ExpectedRange, Innovation};
 
@@ -26,9 +27,17 @@ pub struct PredictedMeasurement<'e> {
     pub cross_covariance: CrossCovariance,
     /// H P Hᵀ, m²: variance of the expected range.
     pub variance: f32,
+    /// What the mount adds to both, if it is estimated.
+    pub(super) mount: Option<MountShare>,
 }
 
 impl PredictedMeasurement<'_> {
+    /// What the mount has added. Without the feature the compiler knows that it is nothing.
+    #[inline]
+    pub(super) fn mount(&self) -> Option<&MountShare> {
+        if cfg!(feature = "mount") { self.mount.as_ref() } else { None }
+    }
+
     // ===== Eq. (14): ν and S =====
     /// The innovation of a measured `range` with noise variance `noise`.
     #[inline]
@@ -55,17 +64,19 @@ impl Covariance {
         };
         let m = &cross_covariance;
         let variance = h.x * m.x + h.y * m.y + h.h * m.h + h.k * m.k;
-        PredictedMeasurement { expected, cross_covariance, variance }
+        PredictedMeasurement { expected, cross_covariance, variance, mount: None }
     }
 
     /// P Hᵀ for the mean and the difference of the scale errors.
     #[must_use]
-    pub fn cross_covariance_of_wheels(&self, expected: &ExpectedRange) -> (f32, f32) {
-        let h = expected.jacobian();
+    pub fn cross_covariance_of_wheels(&self, of: &PredictedMeasurement) -> (f32, f32) {
+        let h = of.expected.jacobian();
         let (p, k) = (&self.pose, &self.range_scale);
-        (
-            p.xc * h.x + p.yc * h.y + p.hc * h.h + k.ck * h.k,
-            p.xd * h.x + p.yd * h.y + p.hd * h.h + k.dk * h.k,
-        )
+        let c = p.xc * h.x + p.yc * h.y + p.hc * h.h + k.ck * h.k;
+        let d = p.xd * h.x + p.yd * h.y + p.hd * h.h + k.dk * h.k;
+        match of.mount() {
+            Some(mount) => (c + mount.states.c, d + mount.states.d),
+            None => (c, d),
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! Correction by an absolute measurement (`docs/model.md`, "Heading, position and pose").
 
-use super::{Ekf, EkfError, invalid};
+use super::{Ekf, EkfError, Mounted, invalid};
 use crate::filter::covariance::{Gain, GyroBias};
 use crate::geometry::pose::Heading;
 use crate::geometry::units::{Metres, Radians, SquareMetres};
@@ -55,8 +55,8 @@ impl Ekf {
             ExpectedRange::linear(0.0, 1.0, lever.1),
             ExpectedRange::linear(0.0, 0.0, 1.0),
         ];
-        let (px, py) = (self.predict_measurement(&x), self.predict_measurement(&y));
-        let ph = self.predict_measurement(&h);
+        let (px, py) = (self.predict_measurement(&x, None), self.predict_measurement(&y, None));
+        let ph = self.predict_measurement(&h, None);
         let (mx, my) = (&px.cross_covariance, &py.cross_covariance);
         let mut s = measured.noise;
         if measured.has_position {
@@ -107,7 +107,7 @@ impl Ekf {
         association: f32,
         mut bias: Option<&mut GyroBias>,
     ) -> Result<(), EkfError> {
-        let before = self.estimate;
+        let (before, mounted) = (self.estimate, self.mounted);
         let column = bias.as_deref().copied();
         let unlikely = (1.0 - association) / association;
         let Components { noise, has_position, has_heading, .. } = prediction.measured;
@@ -121,12 +121,12 @@ impl Ekf {
             let corrected = self.estimate.pose_since(&before);
             let corrected = h.x * corrected.0 + h.y * corrected.1 + h.h * corrected.2;
             let innovation = Metres(row.dot(&prediction.innovation) - corrected);
-            let predicted = self.predict_measurement(&expected);
+            let predicted = self.predict_measurement(&expected, None);
             let variance = SquareMetres(variance);
             self.update_predicted(&predicted, innovation, variance, 1.0, bias.as_deref_mut())?;
         }
         if unlikely > 0.0 {
-            self.spread_along(&before, unlikely, bias.zip(column))?;
+            self.spread_along(&before, &mounted, unlikely, bias.zip(column))?;
         }
         Ok(())
     }
@@ -136,6 +136,7 @@ impl Ekf {
     fn spread_along(
         &mut self,
         before: &FilterEstimate,
+        mounted: &Mounted,
         amount: f32,
         bias: Option<(&mut GyroBias, GyroBias)>,
     ) -> Result<(), EkfError> {
@@ -145,8 +146,13 @@ impl Ekf {
         if !p.is_valid() {
             return Err(invalid(p));
         }
+        let mount = self.mounted.get_mut().zip(mounted.get());
+        let moved = mount.as_ref().map(|(mount, before)| mount.moved_since(before));
         if let Some((bias, column)) = bias {
-            bias.add_along(&column, &correction, amount);
+            bias.add_along(&column, &correction, moved.unwrap_or_default(), amount);
+        }
+        if let (Some((mount, _)), Some(moved)) = (mount, moved) {
+            mount.add_along(&correction, moved, amount);
         }
         Ok(())
     }

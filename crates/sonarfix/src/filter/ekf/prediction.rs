@@ -1,7 +1,7 @@
 //! Prediction from wheel travel: state and covariance move with every increment.
 
 use super::{Ekf, EkfError, invalid};
-use crate::filter::covariance::{Covariance, Transition};
+use crate::filter::covariance::{Covariance, GyroBias, Transition};
 use crate::filter::motion::{LinearizedMotion, WheelTravel};
 use crate::filter::process_noise::ProcessNoise;
 use crate::geometry::numeric::is_within;
@@ -26,6 +26,15 @@ impl Ekf {
     /// # Panics
     /// Never.
     pub fn predict(&mut self, travel: WheelTravel) -> Result<(), EkfError> {
+        self.predict_by_wheels(travel, None)
+    }
+
+    /// [`Self::predict`], with the covariances of the bias of a gyro.
+    pub(super) fn predict_by_wheels(
+        &mut self,
+        travel: WheelTravel,
+        bias: Option<&mut GyroBias>,
+    ) -> Result<(), EkfError> {
         let distance = travel.right.abs().0 + travel.left.abs().0;
         if distance <= 0.0 {
             return Ok(());
@@ -45,6 +54,12 @@ impl Ekf {
         }
         p.pose = pose;
         p.range_scale.propagate(&transition);
+        if let Some(mount) = self.mounted.get_mut() {
+            mount.propagate(&motion);
+        }
+        if let Some(bias) = bias {
+            bias.propagate(&motion);
+        }
         self.distance_since_update += distance;
         motion.advance(&mut self.estimate);
         Ok(())

@@ -24,7 +24,7 @@ fn clutter_spreads_the_bias_too() {
         ekf.predict_with_turn(WheelTravel::new(0.02, 0.02), &turn, limits, &mut bias).unwrap();
     }
     let heading = ExpectedRange::linear(0.0, 0.0, 1.0);
-    let prediction = ekf.predict_measurement(&heading);
+    let prediction = ekf.predict_measurement(&heading, None);
     let noise = SquareMetres(1e-4);
     let s = f64::from(prediction.variance + noise.0);
     for (deviations, association) in [(3.0, 0.5), (4.0, 0.3), (-5.0, 0.7)] {

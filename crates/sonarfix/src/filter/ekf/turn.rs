@@ -104,11 +104,7 @@ impl Ekf {
         travel: WheelTravel,
         bias: &mut GyroBias,
     ) -> Result<(), EkfError> {
-        let estimate = self.estimate;
-        let motion = LinearizedMotion::new(self.track_width, &estimate, travel, sin_cos_within);
-        self.predict(travel)?;
-        bias.propagate(&motion);
-        Ok(())
+        self.predict_by_wheels(travel, Some(bias))
     }
 
     // ===== Eq. (37): half of the turn by the bias, the motion, the other half =====
@@ -132,6 +128,11 @@ impl Ekf {
             (*p, *bias) = (before, column);
             return Err(error);
         }
+        if let Some(mount) = self.mounted.get_mut() {
+            mount.turn(bias, by_bias);
+            mount.propagate(motion);
+            mount.turn(bias, by_bias);
+        }
         self.distance_since_update += travel.right.abs().0 + travel.left.abs().0;
         motion.advance(&mut self.estimate);
         Ok(())
@@ -151,8 +152,13 @@ impl Ekf {
         let variance = difference.noise + p.variance_of(difference, bias);
         // False for NaN.
         let agrees = innovation * innovation <= deviations * deviations * variance;
-        if agrees && let Some(gain) = p.correct_by_turns(bias, difference, innovation) {
+        let own = self.mounted.get().map(|mount| mount.covariance_with_turns(difference, bias));
+        let of_mount = own.unwrap_or_default();
+        if agrees && let Some(gain) = p.correct_by_turns(bias, difference, of_mount, innovation) {
             gain.correct(&mut self.estimate, innovation);
+            if let Some(mount) = self.mounted.get_mut() {
+                mount.correct(of_mount, &gain, innovation, 1.0);
+            }
             self.p_without_walk = p;
             self.distance_since_update = 0.0;
         }

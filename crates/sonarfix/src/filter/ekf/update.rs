@@ -1,7 +1,7 @@
 //! Correction by a range: equation (6), certain or by probabilistic data association.
 
 use super::{Ekf, EkfError, invalid};
-use crate::filter::covariance::{Correction, Covariance, GyroBias, PredictedMeasurement};
+use crate::filter::covariance::{Correction, Covariance, Gain, GyroBias, PredictedMeasurement};
 use crate::geometry::numeric::is_within;
 use crate::geometry::units::{Metres, SquareMetres};
 use crate::sensor::range::ExpectedRange;
@@ -36,7 +36,7 @@ impl Ekf {
     ) -> Result<(), EkfError> {
         let innovation = range - expected.range;
         check_measurement(expected, innovation, noise)?;
-        let prediction = self.predict_measurement(expected);
+        let prediction = self.predict_measurement(expected, None);
         self.correct(&prediction, innovation, noise, 1.0, None)
     }
 
@@ -59,7 +59,7 @@ impl Ekf {
         noise: SquareMetres,
         association: f32,
     ) -> Result<(), EkfError> {
-        let prediction = self.predict_measurement(expected);
+        let prediction = self.predict_measurement(expected, None);
         self.update_predicted(&prediction, range - expected.range, noise, association, None)
     }
 
@@ -130,9 +130,7 @@ impl Ekf {
         p.add_along_gain(&gain, growth * s);
         if p.is_valid() {
             gain.correct(&mut self.estimate, innovation.0);
-            if let Some(bias) = bias {
-                bias.correct(prediction, &gain, innovation.0, -growth);
-            }
+            self.correct_beside(prediction, &gain, innovation.0, -growth, bias);
             return Ok(());
         }
         let error = invalid(p);
@@ -157,9 +155,7 @@ impl Ekf {
             Correction::Applied(gain) if p.is_valid() => {
                 self.distance_since_update = 0.0;
                 gain.correct(&mut self.estimate, innovation.0);
-                if let Some(bias) = bias {
-                    bias.correct(prediction, &gain, innovation.0, 1.0);
-                }
+                self.correct_beside(prediction, &gain, innovation.0, 1.0, bias);
                 return Ok(());
             }
             Correction::Saturated => {
@@ -173,6 +169,27 @@ impl Ekf {
         p.calibration = calibration;
         p.range_scale = range_scale;
         Err(error)
+    }
+}
+
+impl Ekf {
+    /// Corrects what stands beside P after P; `share` of K mᵀ is what P has lost.
+    #[inline]
+    fn correct_beside(
+        &mut self,
+        prediction: &PredictedMeasurement,
+        gain: &Gain,
+        innovation: f32,
+        share: f32,
+        bias: Option<&mut GyroBias>,
+    ) {
+        let own = self.mounted.get().map(|mount| mount.covariance_with(prediction));
+        if let Some(bias) = bias {
+            bias.correct(prediction, own.unwrap_or_default(), gain, innovation, share);
+        }
+        if let (Some(mount), Some(own)) = (self.mounted.get_mut(), own) {
+            mount.correct(own, gain, innovation, share);
+        }
     }
 }
 

@@ -25,6 +25,9 @@ pub struct Args {
     /// Only this sensor; repeatable.
     #[arg(long)]
     sensor: Vec<String>,
+    /// Only this robot; repeatable. Without it, robots with a wrong file drive with an HC-SR04 in empty rooms only.
+    #[arg(long)]
+    robot: Vec<String>,
     /// Prints a row for each cell instead of the page.
     #[arg(long)]
     cells: bool,
@@ -66,8 +69,9 @@ fn cells(args: &Args) -> anyhow::Result<Vec<Cell>> {
     let families = chosen(&args.family, &Family::ALL, Family::name)?;
     let objects = chosen(&args.objects, &Objects::ALL, Objects::name)?;
     let sensors = chosen(&args.sensor, &Sensor::ALL, Sensor::name)?;
+    let robots = chosen(&args.robot, &Robot::all(), Robot::name)?;
     let mut cells = Vec::new();
-    for robot in Robot::ALL {
+    for robot in robots {
         for &sensor in &sensors {
             for &family in &families {
                 for &objects in &objects {
@@ -75,6 +79,9 @@ fn cells(args: &Args) -> anyhow::Result<Vec<Cell>> {
                 }
             }
         }
+    }
+    if args.robot.is_empty() {
+        cells.retain(Cell::is_of_page);
     }
     Ok(cells)
 }

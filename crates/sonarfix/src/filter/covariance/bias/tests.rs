@@ -36,13 +36,16 @@ fn covariance(numbers: &[f32]) -> (Covariance, GyroBias) {
         (at(0, 6), at(1, 6), at(2, 6), at(3, 6), at(4, 6), at(5, 6), at(6, 6));
     let bias = GyroBias {
         rate: 0.01,
-        xb: at(0, 7),
-        yb: at(1, 7),
-        hb: at(2, 7),
-        cb: at(3, 7),
-        db: at(4, 7),
-        wb: at(5, 7),
-        kb: at(6, 7),
+        states: StateColumn {
+            x: at(0, 7),
+            y: at(1, 7),
+            h: at(2, 7),
+            c: at(3, 7),
+            d: at(4, 7),
+            w: at(5, 7),
+            k: at(6, 7),
+        },
+        mount: (0.0, 0.0),
         bb: at(7, 7),
     };
     (covariance, bias)
@@ -52,14 +55,14 @@ fn covariance(numbers: &[f32]) -> (Covariance, GyroBias) {
 fn dense(p: &Covariance, b: &GyroBias) -> Matrix {
     let (p, q, r) = (&p.pose, &p.calibration, &p.range_scale);
     SMatrix::from([
-        [p.xx, p.xy, p.xh, p.xc, p.xd, p.xw, r.xk, b.xb],
-        [p.xy, p.yy, p.yh, p.yc, p.yd, p.yw, r.yk, b.yb],
-        [p.xh, p.yh, p.hh, p.hc, p.hd, p.hw, r.hk, b.hb],
-        [p.xc, p.yc, p.hc, q.cc, q.cd, q.cw, r.ck, b.cb],
-        [p.xd, p.yd, p.hd, q.cd, q.dd, q.dw, r.dk, b.db],
-        [p.xw, p.yw, p.hw, q.cw, q.dw, q.ww, r.wk, b.wb],
-        [r.xk, r.yk, r.hk, r.ck, r.dk, r.wk, r.kk, b.kb],
-        [b.xb, b.yb, b.hb, b.cb, b.db, b.wb, b.kb, b.bb],
+        [p.xx, p.xy, p.xh, p.xc, p.xd, p.xw, r.xk, b.states.x],
+        [p.xy, p.yy, p.yh, p.yc, p.yd, p.yw, r.yk, b.states.y],
+        [p.xh, p.yh, p.hh, p.hc, p.hd, p.hw, r.hk, b.states.h],
+        [p.xc, p.yc, p.hc, q.cc, q.cd, q.cw, r.ck, b.states.c],
+        [p.xd, p.yd, p.hd, q.cd, q.dd, q.dw, r.dk, b.states.d],
+        [p.xw, p.yw, p.hw, q.cw, q.dw, q.ww, r.wk, b.states.w],
+        [r.xk, r.yk, r.hk, r.ck, r.dk, r.wk, r.kk, b.states.k],
+        [b.states.x, b.states.y, b.states.h, b.states.c, b.states.d, b.states.w, b.states.k, b.bb],
     ].map(|row| row.map(f64::from)))
 }
 
@@ -152,7 +155,7 @@ proptest! {
             x: gain(0), y: gain(1), h: gain(2), c: gain(3), d: gain(4), w: gain(5), k: gain(6), per_variance: per_variance as f32,
         };
         let mut corrected = bias;
-        corrected.correct(&prediction, &gain, innovation, share);
+        corrected.correct(&prediction, (0.0, 0.0), &gain, innovation, share);
         let is = dense(&p, &corrected).column(B).clone_owned();
         for i in 0..8 {
             let size = (before[(i, i)] * before[(B, B)]).sqrt();
@@ -174,7 +177,7 @@ proptest! {
         let mut after = GyroBias { rate: before.rate + by_bias, ..before };
         let expected = dense(&p, &before).column(B)
             + Vector::from([x, y, h, c, d, w, k, by_bias].map(f64::from)) * f64::from(amount) * f64::from(by_bias);
-        after.add_along(&before, &correction, amount);
+        after.add_along(&before, &correction, (0.0, 0.0), amount);
         let is = dense(&p, &after).column(B).clone_owned();
         prop_assert!((is - expected).norm() < 1e-6, "{is} {expected}");
     }
@@ -190,7 +193,7 @@ proptest! {
         let variance = h.dot(&m);
         prop_assert!((f64::from(p.variance_of(&difference, &bias)) - variance).abs() < 1e-4 * variance);
         let s = variance + f64::from(difference.noise);
-        let gain = p.correct_by_turns(&mut bias, &difference, innovation);
+        let gain = p.correct_by_turns(&mut bias, &difference, (0.0, 0.0), innovation);
         let Gain { x, y, h, c, d, w, k, per_variance } = gain.unwrap();
         let expected = before - m * m.transpose() / s;
         prop_assert!(is_near(&dense(&p, &bias), &expected, &before));
@@ -224,13 +227,13 @@ proptest! {
     fn what_is_forgotten_has_no_covariance(numbers in numbers(), deviation in 1e-3_f32..1.0) {
         let (_, bias) = covariance(&numbers);
         let unknown = GyroBias::unknown(deviation);
-        let zero = GyroBias { rate: 0.0, xb: 0.0, yb: 0.0, hb: 0.0, cb: 0.0, db: 0.0, wb: 0.0, kb: 0.0, bb: deviation * deviation };
+        let zero = GyroBias { rate: 0.0, states: StateColumn::NONE, mount: (0.0, 0.0), bb: deviation * deviation };
         prop_assert_eq!(unknown, zero);
         prop_assert_eq!(bias.forgotten(deviation), GyroBias { rate: bias.rate, ..zero });
         prop_assert_eq!(bias.independent(), GyroBias { rate: bias.rate, bb: bias.bb, ..zero });
         let mut without_pose = bias;
         without_pose.forget_pose();
-        prop_assert_eq!(without_pose, GyroBias { xb: 0.0, yb: 0.0, hb: 0.0, ..bias });
+        prop_assert_eq!(without_pose, GyroBias { states: StateColumn { x: 0.0, y: 0.0, h: 0.0, ..bias.states }, ..bias });
         prop_assert_eq!(GyroBias::unknown(0.0).variance().to_bits(), 1e-14_f32.to_bits());
     }
 
@@ -261,7 +264,10 @@ fn a_correction_to_an_invalid_covariance_is_none() {
         (difference, f32::NAN),
     ] {
         let (mut after, mut column) = (p, bias);
-        assert!(after.correct_by_turns(&mut column, &change, innovation).is_none(), "{change:?}");
+        assert!(
+            after.correct_by_turns(&mut column, &change, (0.0, 0.0), innovation).is_none(),
+            "{change:?}"
+        );
         assert_eq!((after, column), (p, bias));
     }
 }
