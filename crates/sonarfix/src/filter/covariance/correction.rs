@@ -97,6 +97,7 @@ struct Raised {
 }
 
 /// P Hᵀ/S, and 1/S.
+#[derive(Clone, Copy)]
 struct Scaled {
     gain: Column,
     per_variance: f32,
