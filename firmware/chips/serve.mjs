@@ -1,4 +1,4 @@
-// A Pico on an emulated chip, for a program that is the PC at the other end of its link: an order a line, an answer a line.
+// A board on an emulated chip, for a program that is the PC at the other end of its link: an order a line, an answer a line.
 //
 //   image ADDRESS FILE      writes a file into the flash; the program as ELF or UF2 without an address
 //   start                   power-on
@@ -10,6 +10,7 @@
 //   chip                    instructions, overruns, lost bytes, erased sectors, programmed pages, short triggers
 //   count ADDRESS           counts the calls of the function there
 //   calls                   how many have returned; the instructions of the longest one with the motors enabled, and of the longest other one
+//   gyro                    how many samples of the gyro have been read
 //   pull PIN                up, down or none
 //   hang | fault | overflow at the next instruction
 //   off-and-on              the power goes and comes again
@@ -25,7 +26,7 @@ import { load } from './rom.mjs';
 
 const [, , worldFile] = process.argv;
 const world = JSON.parse(fs.readFileSync(worldFile, 'utf8'));
-const board = new Board(world.walls, world.pose, world.seed);
+const board = new Board(world);
 
 const orders = {
   image(at, file) {
@@ -51,6 +52,7 @@ const orders = {
   },
   count(at) { board.polls.at = Number(at); },
   calls: () => [board.polls.returned, board.polls.driving, board.polls.waiting].join(' '),
+  gyro: () => board.gyro.readings,
   pull(pin) {
     const { pullupEnabled, pulldownEnabled } = board.chip.rp2040.gpio[Number(pin)];
     return pullupEnabled ? 'up' : pulldownEnabled ? 'down' : 'none';

@@ -52,7 +52,7 @@ struct Emulated {
     lacks: &'static str,
 }
 
-const EMULATED: [Emulated; 2] = [
+const EMULATED: [Emulated; 3] = [
     Emulated {
         board: "pico",
         emulator: "`rp2040js` with the parts in `firmware/chips`",
@@ -64,6 +64,14 @@ const EMULATED: [Emulated; 2] = [
         ],
         has: "core, interrupts, timer, PIO, PWM, pins, UART, watchdog, flash and its power cuts, second stage of the boot; around it wheels, servo, sonar and room",
         lacks: "the boot ROM (a stub has its functions), DMA, USB, I²C devices, the voltages of the pins, jitter of the clocks",
+    },
+    Emulated {
+        board: "xrp",
+        emulator: "`rp2040js` with the parts in `firmware/chips`",
+        command: "cargo xtask chips",
+        tests: &["crates/sonarfix-app/tests/chips/xrp.rs"],
+        has: "as for the Pico, with the pins of this board, its motor drivers and its gyro on I²C; the robot in the room has its wheels",
+        lacks: "as for the Pico, except for the gyro",
     },
     Emulated {
         board: "stm32f405",

@@ -33,7 +33,12 @@ pub fn row(table: Table, cells: &[&dyn Display]) {
 
 /// Reports the polls of a scenario, and compares the longest one with its limit.
 pub fn polls(scenario: &str, polls: Polls) {
+    polls_within(LONGEST_POLL, scenario, polls);
+}
+
+/// The same with another limit.
+pub fn polls_within(limit: u64, scenario: &str, polls: Polls) {
     let Polls { count, driving, waiting } = polls;
     row(Table::Polls, &[&scenario, &count, &driving, &waiting]);
-    assert!(count > 0 && driving <= LONGEST_POLL, "{scenario}: {polls:?}");
+    assert!(count > 0 && driving <= limit, "{scenario}: {polls:?}");
 }
