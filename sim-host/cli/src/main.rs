@@ -24,6 +24,7 @@ mod measure;
 mod merge;
 mod monitor;
 mod paper;
+mod patrol;
 mod pil;
 mod plan;
 mod provenance;

@@ -75,6 +75,15 @@ fn the_commands_work_on_it_as_on_a_robot() {
     let (is_done, text) =
         printed(&["goto", "1.5", "1.5", "--max-deviation", "1e-6", "--patience", "0.5"]);
     assert!(!is_done && text.contains("stands: the pose is too uncertain"), "{text}");
+    let patrol = ["patrol", "1.9", "1.7", "1.6", "1.6", "--end-deviation", "0.1"];
+    let (is_done, text) = printed(&[&patrol[..], &["--rounds", "2", "--pause", "0.2"]].concat());
+    assert!(is_done, "{text}");
+    for part in ["round 1: at 1.9 1.7", "round 1: at 1.6 1.6", "round 2: at 1.6 1.6"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    let uncertain = ["--max-deviation", "1e-6", "--patience", "0.3"];
+    let (is_done, text) = printed(&[&patrol[..], &uncertain].concat());
+    assert!(!is_done && text.contains("has reached no point of round 1"), "{text}");
     let (is_done, text) = printed(&["goto", "1", "2", "3"]);
     assert!(!is_done && text.contains("no y"), "{text}");
     let (is_done, text) = printed(&["stop"]);
