@@ -7,6 +7,8 @@ import { WIRINGS } from './wirings.mjs';
 
 /** Levels of A and B by the two low bits of the count; A leads when a wheel rolls forwards. */
 const QUADRATURE = [[false, false], [true, false], [true, true], [false, true]];
+/** From pulse to pulse of the servo. */
+const FRAME = 20e6;
 /** How long the truth is kept: longer than a message waits. */
 const HISTORY = 10e9;
 
@@ -24,6 +26,8 @@ export class Board {
     this.lineFree = 0;
     this.toSend = [];
     this.isNoisy = false;
+    /** When the next pulse of the servo begins at the echo, which a wire connects with it instead of the sonar. */
+    this.nextPulse = Infinity;
     this.events = [];
     this.truth = [];
     this.isEnabled = false;
@@ -95,13 +99,18 @@ export class Board {
   nextEvent(until) {
     const edge = this.room.edges[0]?.at ?? Infinity;
     const byte = this.toSend.length || this.isNoisy ? this.lineFree : Infinity;
-    return Math.max(this.now, Math.min(until, this.next, edge, byte));
+    return Math.max(this.now, Math.min(until, this.next, edge, byte, this.nextPulse));
   }
 
   /** What is due now. */
   happen() {
     const { now, room, chip } = this;
     while (room.edges.length && room.edges[0].at <= now) chip.setInput(this.wiring.pins.echo, room.edges.shift().isHigh);
+    if (now >= this.nextPulse) {
+      const width = 1e3 * this.pulse();
+      if (width) room.edges.push({ at: this.nextPulse, isHigh: true }, { at: this.nextPulse + width, isHigh: false });
+      this.nextPulse += FRAME;
+    }
     if (now >= this.lineFree && (this.toSend.length || this.isNoisy)) {
       const byte = this.toSend.length ? this.toSend.shift() : Math.floor(256 * this.random());
       chip.uart.receive(byte);
@@ -128,10 +137,21 @@ export class Board {
     return this.isEnabled ? this.wiring.voltages(this.chip) : [0, 0];
   }
 
+  /** The width of the servo's pulses, microseconds. */
+  pulse() {
+    const { csr, cc, div } = this.chip.rp2040.pwm.channels[this.wiring.slices.servo];
+    return csr & 1 ? (cc & 0xffff) * (div / 16) * 8e-3 : 0;
+  }
+
+  /** A wire from the servo's pin to that of the echo; the sonar is unplugged. */
+  loop() {
+    this.room.busyUntil = Infinity;
+    this.nextPulse = this.now;
+  }
+
   /** Where the servo's pulses point: 45° at 2 ms, −45° at 1 ms. */
   target() {
-    const { csr, cc, div } = this.chip.rp2040.pwm.channels[this.wiring.slices.servo];
-    const pulse = csr & 1 ? ((cc & 0xffff) * (div / 16) * 8e-3) : 0;
+    const pulse = this.pulse();
     return pulse > 400 ? ((pulse - 1500) / 500) * (Math.PI / 4) : this.room.bearing;
   }
 

@@ -14,6 +14,7 @@
 //   pull PIN                up, down or none
 //   hang | fault | overflow at the next instruction
 //   off-and-on              the power goes and comes again
+//   loop                    a wire from the pin of the servo to that of the echo, and no sonar
 //   noise on|off            random bytes at the full rate of the line
 //   cut STEPS               cuts the power in this step of the flash from now
 //   slow-flash              the longest times of the flash's data sheet
@@ -61,6 +62,7 @@ const orders = {
   fault: () => board.chip.failAtInstruction(),
   overflow: () => board.chip.overflowStack(),
   'off-and-on': () => board.reset('power'),
+  loop: () => board.loop(),
   noise(state) { board.isNoisy = state === 'on'; },
   cut(steps) { board.flash.stepsLeft = Number(steps); },
   'slow-flash': () => { board.flash.times = TIMES.longest; },

@@ -31,6 +31,7 @@ mod provenance;
 mod replay;
 mod rows;
 mod run;
+mod self_test;
 mod serve;
 mod shell;
 mod signs_of_life;

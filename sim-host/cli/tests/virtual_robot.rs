@@ -90,6 +90,32 @@ fn the_commands_work_on_it_as_on_a_robot() {
     assert!(is_done, "{text}");
 }
 
+/// The report of a board: its clock depends on the load of this computer, and is only shown.
+#[cfg(unix)]
+#[test]
+fn a_board_reports_what_a_self_test_finds() {
+    let robot = Robot::new();
+    let output = robot.command(&["self-test", "--seconds", "11"]);
+    let text = String::from_utf8_lossy(&output.stdout);
+    for (part, verdict) in [
+        ("board", "passed"),
+        ("link", "passed"),
+        ("right encoder", "passed"),
+        ("left encoder", "passed"),
+        ("servo pulses", "passed"),
+        ("capture", "not tested"),
+        ("flash", "passed"),
+    ] {
+        let line = text.lines().find(|line| line.starts_with(part));
+        assert!(line.is_some_and(|line| line.contains(verdict)), "{part}: {text}");
+    }
+    assert!(text.contains("against this PC"), "{text}");
+    assert!(robot.command(&["set-pose", "1.5", "1.5", "0"]).status.success());
+    assert!(robot.command(&["start"]).status.success());
+    let refused = robot.command(&["self-test", "--seconds", "1"]);
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("refuses"), "{refused:?}");
+}
+
 #[test]
 fn a_scenario_without_pins_is_refused() {
     let paper = "../../crates/sonarfix-map/scenarios/paper.toml";

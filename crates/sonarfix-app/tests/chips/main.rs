@@ -10,6 +10,7 @@ mod commands;
 mod long;
 mod pico;
 mod results;
+mod search;
 mod xrp;
 
 use pico::{Counters, Event, Pico, Polls, World};
