@@ -146,6 +146,13 @@ pub struct Weights {
     pub wheels: Metres,
 }
 
+impl Weights {
+    /// Whether anything but the position has a weight.
+    pub(crate) fn are_set(self) -> bool {
+        self.heading.0.abs() > 0.0 || self.wheels.0.abs() > 0.0
+    }
+}
+
 /// The configuration of a localizer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
