@@ -1,21 +1,24 @@
-// The Pico with its robot, as wired in docs/firmware.md, and the PC's end of its link. Times in nanoseconds since power-on.
+// A board with its robot, and the PC's end of its link. Times in nanoseconds since power-on.
 import { Calls } from './calls.mjs';
 import { Chip, Flash } from './chip.mjs';
+import { Gyro } from './gyro.mjs';
 import { Room, STEP, numbers } from './room.mjs';
+import { WIRINGS } from './wirings.mjs';
 
-const PINS = { right: [2, 3], left: [4, 5], trigger: 7, echo: 8, enable: 9 };
-/** Slices of the PWM, channels A and B. */
-const SLICES = { servo: 3, right: 5, left: 6 };
 /** Levels of A and B by the two low bits of the count; A leads when a wheel rolls forwards. */
 const QUADRATURE = [[false, false], [true, false], [true, true], [false, true]];
+/** From pulse to pulse of the servo. */
+const FRAME = 20e6;
 /** How long the truth is kept: longer than a message waits. */
 const HISTORY = 10e9;
 
 export class Board {
-  constructor(walls, pose, seed) {
+  constructor({ board = 'pico', walls, pose, seed }) {
+    this.wiring = WIRINGS[board];
     this.random = numbers(seed);
     this.flash = new Flash(numbers(seed + 1));
-    this.room = new Room(walls, pose, numbers(seed + 2));
+    this.room = new Room(walls, pose, numbers(seed + 2), this.wiring);
+    this.gyro = new Gyro(() => this.room.turnRate, numbers(seed + 3));
     /** Time at which the present life of the chip began. */
     this.began = 0;
     this.next = STEP;
@@ -23,6 +26,8 @@ export class Board {
     this.lineFree = 0;
     this.toSend = [];
     this.isNoisy = false;
+    /** When the next pulse of the servo begins at the echo, which a wire connects with it instead of the sonar. */
+    this.nextPulse = Infinity;
     this.events = [];
     this.truth = [];
     this.isEnabled = false;
@@ -43,11 +48,12 @@ export class Board {
     }, this.polls, kept);
     this.polls.leave();
     this.setEncoders();
-    this.chip.setInput(PINS.echo, false);
-    this.chip.rp2040.gpio[PINS.trigger].addListener((level) => this.room.trigger(level === 1, this.now));
-    this.chip.rp2040.gpio[PINS.enable].addListener(() => this.watchEnable());
+    const { pins, slices } = this.wiring;
+    this.chip.setInput(pins.echo, false);
+    this.chip.rp2040.gpio[pins.trigger].addListener((level) => this.room.trigger(level === 1, this.now));
+    if (pins.clock) this.gyro.connect(this.chip.rp2040.gpio, pins.clock, pins.data);
     // The 20 kHz of the motors are read as duties, and not as edges.
-    for (const slice of [SLICES.right, SLICES.left]) {
+    for (const slice of [slices.right, slices.left]) {
       this.chip.rp2040.pwm.channels[slice].updateEnable = function () { this.timer.enable = false; };
     }
     this.watchEnable();
@@ -58,7 +64,7 @@ export class Board {
   }
 
   watchEnable() {
-    const isEnabled = this.chip.isHigh(PINS.enable);
+    const isEnabled = this.wiring.isEnabled(this.chip);
     if (isEnabled === this.isEnabled) return;
     this.isEnabled = isEnabled;
     this.polls.isDriving = isEnabled;
@@ -66,7 +72,7 @@ export class Board {
   }
 
   setEncoders() {
-    const { right, left } = PINS;
+    const { right, left } = this.wiring.pins;
     this.room.counts.forEach((count, side) => QUADRATURE[count & 3].forEach((level, channel) => {
       this.chip.setInput((side ? left : right)[channel], level);
     }));
@@ -93,13 +99,18 @@ export class Board {
   nextEvent(until) {
     const edge = this.room.edges[0]?.at ?? Infinity;
     const byte = this.toSend.length || this.isNoisy ? this.lineFree : Infinity;
-    return Math.max(this.now, Math.min(until, this.next, edge, byte));
+    return Math.max(this.now, Math.min(until, this.next, edge, byte, this.nextPulse));
   }
 
   /** What is due now. */
   happen() {
     const { now, room, chip } = this;
-    while (room.edges.length && room.edges[0].at <= now) chip.setInput(PINS.echo, room.edges.shift().isHigh);
+    while (room.edges.length && room.edges[0].at <= now) chip.setInput(this.wiring.pins.echo, room.edges.shift().isHigh);
+    if (now >= this.nextPulse) {
+      const width = 1e3 * this.pulse();
+      if (width) room.edges.push({ at: this.nextPulse, isHigh: true }, { at: this.nextPulse + width, isHigh: false });
+      this.nextPulse += FRAME;
+    }
     if (now >= this.lineFree && (this.toSend.length || this.isNoisy)) {
       const byte = this.toSend.length ? this.toSend.shift() : Math.floor(256 * this.random());
       chip.uart.receive(byte);
@@ -107,6 +118,7 @@ export class Board {
     }
     while (now >= this.next) {
       this.next += STEP;
+      this.watchEnable();
       const before = room.counts;
       const voltages = this.voltages();
       if (voltages.some((voltage) => voltage)) this.poweredAt = now;
@@ -122,21 +134,28 @@ export class Board {
 
   /** The voltages of both motors as parts of the full one. */
   voltages() {
-    if (!this.isEnabled) return [0, 0];
-    return [SLICES.right, SLICES.left].map((slice) => {
-      const { csr, cc, top } = this.chip.rp2040.pwm.channels[slice];
-      return csr & 1 ? ((cc & 0xffff) - (cc >>> 16)) / (top + 1) : 0;
-    });
+    return this.isEnabled ? this.wiring.voltages(this.chip) : [0, 0];
+  }
+
+  /** The width of the servo's pulses, microseconds. */
+  pulse() {
+    const { csr, cc, div } = this.chip.rp2040.pwm.channels[this.wiring.slices.servo];
+    return csr & 1 ? (cc & 0xffff) * (div / 16) * 8e-3 : 0;
+  }
+
+  /** A wire from the servo's pin to that of the echo; the sonar is unplugged. */
+  loop() {
+    this.room.busyUntil = Infinity;
+    this.nextPulse = this.now;
   }
 
   /** Where the servo's pulses point: 45° at 2 ms, −45° at 1 ms. */
   target() {
-    const { csr, cc, div } = this.chip.rp2040.pwm.channels[SLICES.servo];
-    const pulse = csr & 1 ? ((cc & 0xffff) * (div / 16) * 8e-3) : 0;
+    const pulse = this.pulse();
     return pulse > 400 ? ((pulse - 1500) / 500) * (Math.PI / 4) : this.room.bearing;
   }
 
-  /** The chip has been reset: its pins are inputs, and the pull-down of the enable pin disables the motors. */
+  /** The chip has been reset: its pins are inputs, and pull-downs disable the motors. */
   reset(cause) {
     const { now } = this;
     if (this.isEnabled) this.events.push(`disabled ${now}`);

@@ -5,10 +5,12 @@ import test from 'node:test';
 import { Calls } from './calls.mjs';
 import { Chip } from './chip.mjs';
 import { Flash, PowerCut, TIMES } from './flash.mjs';
+import { Gyro } from './gyro.mjs';
 import { attach } from './pio.mjs';
 import { crc32 } from './rom.mjs';
 import { Room, STEP, numbers } from './room.mjs';
 import { Uart } from './uart.mjs';
+import { WIRINGS } from './wirings.mjs';
 
 const { FIFO, RP2040 } = createRequire(import.meta.url)('rp2040js');
 
@@ -198,4 +200,84 @@ test('a wall behind another is not heard', () => {
   assert.equal(room.range(), 2 - 0.06);
   room.walls[1] = [2, 0.1, 2, 1];
   assert.equal(room.range(), 3 - 0.06);
+});
+
+/** A master of a bus, by the figures of UM10204, 3.1. */
+class Master {
+  constructor(device) { this.device = device; }
+
+  bit(level) {
+    for (const [clock, data] of [[false, level], [true, level]]) this.device.set(clock, data);
+    const { data } = this.device;
+    this.device.set(false, level);
+    return data;
+  }
+
+  start() {
+    for (const [clock, data] of [[false, true], [true, true], [true, false], [false, false]]) this.device.set(clock, data);
+  }
+
+  stop() {
+    for (const [clock, data] of [[false, false], [true, false], [true, true]]) this.device.set(clock, data);
+  }
+
+  /** Sends a byte; returns whether it was acknowledged. */
+  write(byte) {
+    for (let i = 7; i >= 0; i--) this.bit(Boolean((byte >> i) & 1));
+    return !this.bit(true);
+  }
+
+  read(isLast) {
+    let byte = 0;
+    for (let i = 0; i < 8; i++) byte = (byte << 1) | Number(this.bit(true));
+    this.bit(isLast);
+    return byte;
+  }
+}
+
+test('a gyro answers at its address only, and a count is 8.75 thousandths of a degree per second in the smallest range', () => {
+  let rate = 0;
+  const gyro = new Gyro(() => rate, () => 0);
+  const master = new Master(gyro.device);
+  const read = (register, count) => {
+    master.start();
+    assert.deepEqual([0xd6, register].map((byte) => master.write(byte)), [true, true]);
+    master.start();
+    assert.ok(master.write(0xd7));
+    const bytes = Array.from({ length: count }, (_, i) => master.read(i + 1 === count));
+    master.stop();
+    return bytes;
+  };
+  const write = (...bytes) => {
+    master.start();
+    assert.ok([0xd6, ...bytes].every((byte) => master.write(byte)));
+    master.stop();
+  };
+  master.start();
+  assert.equal(master.write(0xd4), false);
+  master.stop();
+  assert.deepEqual(read(0x0f, 1), [0x6c]);
+  // It is off after power-on.
+  assert.deepEqual(read(0x26, 2), [0, 0]);
+  write(0x12, 0x44);
+  for (const [range, degrees] of [[0, 100], [0, -100], [3, 1000]]) {
+    write(0x11, 0x60 | (range << 2));
+    rate = (degrees * Math.PI) / 180;
+    const [low, high] = read(0x26, 2);
+    const count = ((high << 24) >> 16) | low;
+    // The bias is 0.6°/s.
+    assert.ok(Math.abs(count * 8.75e-3 * 2 ** range - degrees - 0.6) < 0.1, `${count}`);
+  }
+});
+
+test('the inputs of an XRP are phase and enable, and its motors are mirror images', () => {
+  const channels = Object.fromEntries([0, 3, 7].map((slice) => [slice, { csr: 1, cc: 0, top: 99 }]));
+  const chip = { rp2040: { pwm: { channels } } };
+  const set = (slice, a, b) => { channels[slice].cc = a | (b << 16); };
+  set(7, 0, 50);
+  set(3, 100, 25);
+  assert.deepEqual(WIRINGS.xrp.voltages(chip), [0.5, 0.25]);
+  set(7, 100, 100);
+  set(3, 0, 100);
+  assert.deepEqual(WIRINGS.xrp.voltages(chip), [-1, -1]);
 });

@@ -7,7 +7,7 @@ const SPEED_OF_SOUND = 343.4;
 const BURST = 460e3;
 const NO_ECHO = 38e6;
 
-/** The robot as it is, beside what its robot file says: wheels, track width and speed of sound are a little different. */
+/** The usual robot as it is, beside what its robot file says: wheels, track width and speed of sound are a little different. */
 const ROBOT = {
   track: 0.1234,
   edge: [1.008, 0.994].map((scale) => (scale * Math.PI * 0.065) / 1496.6),
@@ -33,9 +33,12 @@ export function numbers(seed) {
 }
 
 export class Room {
-  /** `walls`: two points each. The robot stands at a pose. */
-  constructor(walls, [x, y, heading], random) {
-    Object.assign(this, { walls, x, y, heading, random });
+  /** `walls`: two points each. The robot stands at a pose; `robot` has what differs from the usual one, whose left encoder is mirrored. */
+  constructor(walls, [x, y, heading], random, { robot = {}, mirrored = 1 } = {}) {
+    Object.assign(this, { walls, x, y, heading, random, mirrored });
+    this.robot = { ...ROBOT, ...robot };
+    /** Radians per second. */
+    this.turnRate = 0;
     this.speeds = [0, 0];
     this.travels = [0, 0];
     this.counts = [0, 0];
@@ -51,19 +54,21 @@ export class Room {
   /** Moves on by a step. `voltages` of right and left wheel are parts of the full one; `target` is that of the servo. */
   move(voltages, target) {
     const dt = STEP / 1e9;
+    const { robot } = this;
     for (const side of [0, 1]) {
-      this.speeds[side] += ((voltages[side] * ROBOT.speed - this.speeds[side]) * dt) / ROBOT.lag;
+      this.speeds[side] += ((voltages[side] * robot.speed - this.speeds[side]) * dt) / robot.lag;
       if (Math.abs(this.speeds[side]) < 1e-6) this.speeds[side] = 0;
       this.travels[side] += this.speeds[side] * dt;
     }
     const [right, left] = this.speeds.map((speed) => speed * dt);
-    const turn = (right - left) / ROBOT.track;
+    const turn = (right - left) / robot.track;
     this.x += ((right + left) / 2) * Math.cos(this.heading + turn / 2);
     this.y += ((right + left) / 2) * Math.sin(this.heading + turn / 2);
     this.heading += turn;
-    // The left wheel is a mirror image of the right one.
-    this.counts = this.travels.map((travel, side) => Math.floor(travel / ROBOT.edge[side]) * (side ? -1 : 1));
-    const most = ROBOT.servo * dt;
+    this.turnRate = turn / dt;
+    // One wheel is a mirror image of the other one.
+    this.counts = this.travels.map((travel, side) => Math.floor(travel / robot.edge[side]) * (side === this.mirrored ? -1 : 1));
+    const most = robot.servo * dt;
     this.bearing += Math.max(-most, Math.min(most, target - this.bearing));
   }
 
@@ -80,7 +85,7 @@ export class Room {
     if (!isLong || now < this.busyUntil) return;
     this.pings++;
     const range = this.range();
-    const noise = ROBOT.noise * Math.sqrt(-2 * Math.log(1 - this.random())) * Math.cos(2 * Math.PI * this.random());
+    const noise = this.robot.noise * Math.sqrt(-2 * Math.log(1 - this.random())) * Math.cos(2 * Math.PI * this.random());
     const pulse = range === null ? NO_ECHO : (2e9 * (range + noise)) / SPEED_OF_SOUND;
     this.busyUntil = now + BURST + pulse;
     this.edges.push({ at: now + BURST, isHigh: true }, { at: this.busyUntil, isHigh: false });
@@ -88,7 +93,8 @@ export class Room {
 
   /** The distance of the nearest wall that is square to the beam within its cone, and in sight. */
   range() {
-    const [x, y] = [this.x + ROBOT.mount * Math.cos(this.heading), this.y + ROBOT.mount * Math.sin(this.heading)];
+    const { robot } = this;
+    const [x, y] = [this.x + robot.mount * Math.cos(this.heading), this.y + robot.mount * Math.sin(this.heading)];
     const beam = this.heading + this.bearing;
     let nearest = null;
     for (const wall of this.walls) {
@@ -98,7 +104,7 @@ export class Room {
       const [dx, dy] = [ax + along * (bx - ax) - x, ay + along * (by - ay) - y];
       const distance = Math.hypot(dx, dy);
       const off = Math.atan2(dy, dx) - beam;
-      if (Math.abs(Math.atan2(Math.sin(off), Math.cos(off))) > ROBOT.cone || distance > ROBOT.range) continue;
+      if (Math.abs(Math.atan2(Math.sin(off), Math.cos(off))) > robot.cone || distance > robot.range) continue;
       const isHidden = this.walls.some((other) => other !== wall && crosses([x, y, x + dx, y + dy], other));
       if (!isHidden && (nearest === null || distance < nearest)) nearest = distance;
     }

@@ -1,4 +1,4 @@
-// A Pico on an emulated chip, for a program that is the PC at the other end of its link: an order a line, an answer a line.
+// A board on an emulated chip, for a program that is the PC at the other end of its link: an order a line, an answer a line.
 //
 //   image ADDRESS FILE      writes a file into the flash; the program as ELF or UF2 without an address
 //   start                   power-on
@@ -10,9 +10,11 @@
 //   chip                    instructions, overruns, lost bytes, erased sectors, programmed pages, short triggers
 //   count ADDRESS           counts the calls of the function there
 //   calls                   how many have returned; the instructions of the longest one with the motors enabled, and of the longest other one
+//   gyro                    how many samples of the gyro have been read
 //   pull PIN                up, down or none
 //   hang | fault | overflow at the next instruction
 //   off-and-on              the power goes and comes again
+//   loop                    a wire from the pin of the servo to that of the echo, and no sonar
 //   noise on|off            random bytes at the full rate of the line
 //   cut STEPS               cuts the power in this step of the flash from now
 //   slow-flash              the longest times of the flash's data sheet
@@ -25,7 +27,7 @@ import { load } from './rom.mjs';
 
 const [, , worldFile] = process.argv;
 const world = JSON.parse(fs.readFileSync(worldFile, 'utf8'));
-const board = new Board(world.walls, world.pose, world.seed);
+const board = new Board(world);
 
 const orders = {
   image(at, file) {
@@ -51,6 +53,7 @@ const orders = {
   },
   count(at) { board.polls.at = Number(at); },
   calls: () => [board.polls.returned, board.polls.driving, board.polls.waiting].join(' '),
+  gyro: () => board.gyro.readings,
   pull(pin) {
     const { pullupEnabled, pulldownEnabled } = board.chip.rp2040.gpio[Number(pin)];
     return pullupEnabled ? 'up' : pulldownEnabled ? 'down' : 'none';
@@ -59,6 +62,7 @@ const orders = {
   fault: () => board.chip.failAtInstruction(),
   overflow: () => board.chip.overflowStack(),
   'off-and-on': () => board.reset('power'),
+  loop: () => board.loop(),
   noise(state) { board.isNoisy = state === 'on'; },
   cut(steps) { board.flash.stepsLeft = Number(steps); },
   'slow-flash': () => { board.flash.times = TIMES.longest; },

@@ -1,10 +1,20 @@
-//! Gives the linker the board's memory map, which lies beside this file.
+//! Gives the linker the memory map of the board, and the program what differs between the boards that it is built for.
 
 fn main() {
-    let here = env!("CARGO_MANIFEST_DIR");
-    println!("cargo:rustc-check-cfg=cfg(rp2040)");
-    println!("cargo:rustc-link-search={here}");
-    println!("cargo:rerun-if-changed={here}/memory.x");
+    // Of each package the folder of its memory map, and its names in `cfg`.
+    let (folder, names): (&str, &[&str]) = match env!("CARGO_PKG_NAME") {
+        "sonarfix-pico" => ("pico", &["rp2040"]),
+        "sonarfix-xrp" => ("pico", &["rp2040", "xrp"]),
+        "sonarfix-xrp-rp2350" => ("pico2", &["xrp"]),
+        _ => ("pico2", &[]),
+    };
+    println!("cargo:rustc-check-cfg=cfg(rp2040, xrp)");
+    for name in names {
+        println!("cargo:rustc-cfg={name}");
+    }
+    let memory = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
+    println!("cargo:rustc-link-search={memory}/{folder}");
+    println!("cargo:rerun-if-changed={memory}/{folder}/memory.x");
     // The scripts of cortex-m-rt and defmt. The relocations stay in the linked program, so that `cargo xtask`
     // can read which function calls which.
     for argument in ["-Tlink.x", "-Tdefmt.x", "--emit-relocs"] {

@@ -35,9 +35,11 @@ const REPORT: &str = "
 An issue with the following, also if something failed, becomes an entry of the last column:
 
 1. the board with its revision, the release or commit, and how it is wired if that differs from [firmware.md](firmware.md);
-2. the output of `sonarfix monitor --signs-of-life` with the wheels off the ground, each turned by hand: `Hello`, edges, servo, echoes;
-3. a recording of a drive of some minutes (`sonarfix monitor --record drive.csv`), with the robot file and the map;
-4. the pose at its end, by a tape measure.
+2. the output of `sonarfix command --port PORT self-test` with the wheels at rest: link, clock, encoders, pulses, flash; with `--loop`, a wire from the servo's pin to that of the
+   echo and the sonar unplugged, also the capture;
+3. the output of `sonarfix monitor --signs-of-life` with the wheels off the ground, each turned by hand: `Hello`, edges, servo, echoes;
+4. a recording of a drive of some minutes (`sonarfix monitor --record drive.csv`), with the robot file and the map;
+5. the pose at its end, by a tape measure.
 ";
 
 /// Chips that are emulated: the program of a board runs on it in tests.
@@ -52,7 +54,7 @@ struct Emulated {
     lacks: &'static str,
 }
 
-const EMULATED: [Emulated; 2] = [
+const EMULATED: [Emulated; 3] = [
     Emulated {
         board: "pico",
         emulator: "`rp2040js` with the parts in `firmware/chips`",
@@ -60,10 +62,19 @@ const EMULATED: [Emulated; 2] = [
         tests: &[
             "crates/sonarfix-app/tests/chips/main.rs",
             "crates/sonarfix-app/tests/chips/commands.rs",
+            "crates/sonarfix-app/tests/chips/search.rs",
             "crates/sonarfix-app/tests/chips/long.rs",
         ],
         has: "core, interrupts, timer, PIO, PWM, pins, UART, watchdog, flash and its power cuts, second stage of the boot; around it wheels, servo, sonar and room",
         lacks: "the boot ROM (a stub has its functions), DMA, USB, I²C devices, the voltages of the pins, jitter of the clocks",
+    },
+    Emulated {
+        board: "xrp",
+        emulator: "`rp2040js` with the parts in `firmware/chips`",
+        command: "cargo xtask chips",
+        tests: &["crates/sonarfix-app/tests/chips/xrp.rs"],
+        has: "as for the Pico, with the pins of this board, its motor drivers and its gyro on I²C; the robot in the room has its wheels",
+        lacks: "as for the Pico, except for the gyro",
     },
     Emulated {
         board: "stm32f405",

@@ -32,10 +32,12 @@ struct Composition {
 
 const LOCALIZER: &[&str] =
     &["probe_odometry", "probe_aim", "probe_fix", "probe_start", "probe_rest"];
+const DRIVING: &[&str] =
+    &["probe_odometry", "probe_aim", "probe_fix", "probe_start", "probe_rest", "probe_drive"];
 const SEARCHING: &[&str] =
     &["probe_odometry", "probe_aim", "probe_fix", "probe_start", "probe_rest", "probe_search"];
 
-const COMPOSITIONS: [Composition; 5] = [
+const COMPOSITIONS: [Composition; 6] = [
     Composition {
         name: "paper robot",
         contents: "`Ekf`, nearest wall, gate: the example `paper_robot`",
@@ -59,6 +61,14 @@ const COMPOSITIONS: [Composition; 5] = [
         features: "informative,search",
         probes: SEARCHING,
         most: 49_152,
+    },
+    Composition {
+        name: "sonar robot that drives",
+        contents: "the sonar robot with `sonarfix-drive`: a route, objects on it, the speeds of two wheels",
+        program: "composition",
+        features: "informative,drive",
+        probes: DRIVING,
+        most: 32_768,
     },
     Composition {
         name: "without search",
@@ -90,7 +100,7 @@ of that part have no value, and the compiler removes every branch that depends o
 is not linked is refused by name when the robot starts.
 
 `cargo xtask compositions` measures this table and writes this page. *Text* is the code that the calls of the localizer reach, *RAM*
-the localizer with its search. *Tick*, *aim* and *fix* are the instructions of the most expensive call in a drive through a room
+the localizer with its search and its controllers. *Tick*, *aim* and *fix* are the instructions of the most expensive call in a drive through a room
 of eight walls. All is built with `opt-level = \"s\"`, as the firmware of the boards.
 
 ";
@@ -109,6 +119,7 @@ const CHOOSING: &str = "\
 | a mount that was measured with a ruler | `mount`; without it the mount is exact, and `prior.mount` must be zero |
 | to find its pose by itself | the crate `sonarfix-search`; of `sonarfix-hal` and `sonarfix-app` the feature `search` |
 | a PC that drives it | of `sonarfix-app` the feature `drive`, which is not a default: [link.md](link.md#driving) |
+| a route that it drives by itself | the crate `sonarfix-drive`: [driving.md](driving.md) |
 
 ```toml
 [dependencies]

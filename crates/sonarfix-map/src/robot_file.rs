@@ -98,7 +98,8 @@ static SCHEDULE: Section<RobotConfig> = Section { name: "schedule", usual, keys:
 
 #[rustfmt::skip]
 static GYRO: Section<GyroParameters> = Section { name: "gyro", usual: || GyroParameters::MPU_6050, keys: &[
-    Key::new("sensor", Value::Word(&["mpu6050"], |_| 0, |_, _| {}), "the sensor. Also for an MPU-6500 or MPU-9250"),
+    Key::new("sensor", Value::Word(&["mpu6050", "lsm6dso"], |_| 0, |_, _| {}),
+        "the sensor. The program of a board has the driver of one of them; both have these defaults. An MPU-6500 or MPU-9250 is an `mpu6050`, an LSM6DSOX is an `lsm6dso`"),
     optional(number("range", &TURN_RATE, ("1 deg/s", "2000 deg/s"), |g| &mut g.range.0,
         "largest rate. The driver sets the smallest range of the sensor that includes it")),
     optional(number("noise", &ANGLE_WALK, ("0.000001 deg/sqrt(s)", "100 deg/sqrt(s)"), |g| &mut g.noise.0.0,

@@ -19,15 +19,45 @@ use crate::{Drive, Estimate, Pattern};
 /// The least time between two updates of the controllers: some ticks of an encoder with 360 edges in a revolution.
 pub const UPDATE: Duration = Duration::from_ticks(20_000);
 
-/// Gear motors of 200 turns a minute with wheels of 65 mm. Measure yours: docs/driving.md.
-const FULL_SPEED: MetresPerSecond = MetresPerSecond(0.6);
-const DEAD_BAND: f32 = 0.15;
-const TIME_CONSTANT: Duration = Duration::from_ticks(80_000);
 const LIMITS: Limits = Limits {
     response: Duration::from_ticks(150_000),
     ramp: Duration::from_ticks(500_000),
     duty: 1.0,
 };
+
+/// A gear motor with its wheel, on the floor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GearMotor {
+    /// Speed at the full voltage.
+    pub full_speed: MetresPerSecond,
+    /// The fraction of the voltage below which the wheel does not turn.
+    pub dead_band: f32,
+    /// The time from rest to 63 % of the speed.
+    pub time_constant: Duration,
+}
+
+impl GearMotor {
+    /// 200 turns a minute, wheels of 65 mm. Measure yours: docs/driving.md.
+    pub const USUAL: Self = Self {
+        full_speed: MetresPerSecond(0.6),
+        dead_band: 0.15,
+        time_constant: Duration::from_ticks(80_000),
+    };
+
+    /// That of the XRP: 90 turns a minute without load at 4.5 V by its documentation, which are 120 at the 6 V of four new cells; wheels of 60 mm. Assumed:
+    /// a fifth less on the floor; the dead band; the time constant.
+    pub const XRP: Self = Self {
+        full_speed: MetresPerSecond(0.3),
+        dead_band: 0.15,
+        time_constant: Duration::from_ticks(80_000),
+    };
+}
+
+impl Default for GearMotor {
+    fn default() -> Self {
+        Self::USUAL
+    }
+}
 
 /// A wheel and its encoder.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,6 +84,7 @@ pub struct Inputs {
 /// Follows the commanded motion. Before the first one it drives the example [`Pattern`].
 #[derive(Debug, Clone, Default)]
 pub struct Commanded {
+    motor: GearMotor,
     pattern: Pattern,
     /// Whether a motion has been commanded since the motors were enabled.
     has_moved: bool,
@@ -70,10 +101,16 @@ struct Running {
 }
 
 impl Commanded {
+    /// That of a robot with two of these motors.
+    #[must_use]
+    pub fn new(motor: GearMotor) -> Self {
+        Self { motor, ..Self::default() }
+    }
+
     /// What the motors do now. `None`: they are disabled, or there is no estimate.
     pub fn drive(&mut self, inputs: Option<Inputs>) -> Drive {
         let Some(inputs) = inputs else {
-            *self = Self::default();
+            *self = Self::new(self.motor);
             return Drive::STOP;
         };
         let Some(speeds) = inputs.speeds else {
@@ -84,7 +121,7 @@ impl Commanded {
         self.has_moved = true;
         self.running = inputs.wheels.and_then(|wheels| {
             let running = self.running.take();
-            controlled(running, inputs.now, speeds, wheels)
+            controlled(self.motor, running, inputs.now, speeds, wheels)
         });
         self.running.as_ref().map_or(Drive::STOP, |running| running.drive)
     }
@@ -92,6 +129,7 @@ impl Commanded {
 
 /// The next voltages; `None` if a wheel cannot be controlled.
 fn controlled(
+    motor: GearMotor,
     running: Option<Running>,
     now: Instant,
     speeds: [MetresPerSecond; 2],
@@ -108,7 +146,7 @@ fn controlled(
             }
             (running, age)
         }
-        None => (Running::new(now, right, left)?, UPDATE),
+        None => (Running::new(motor, now, right, left)?, UPDATE),
     };
     next.updated = now;
     let [right_speed, left_speed] = speeds;
@@ -121,12 +159,12 @@ fn controlled(
 
 impl Running {
     /// Both wheels at rest.
-    fn new(now: Instant, right: Wheel, left: Wheel) -> Option<Self> {
+    fn new(motor: GearMotor, now: Instant, right: Wheel, left: Wheel) -> Option<Self> {
         let controller = |wheel: Wheel| {
             let motor = Motor {
-                full_speed: FULL_SPEED,
-                dead_band: DEAD_BAND,
-                time_constant: TIME_CONSTANT,
+                full_speed: motor.full_speed,
+                dead_band: motor.dead_band,
+                time_constant: motor.time_constant,
                 travel_per_tick: wheel.travel_per_tick,
             };
             SpeedController::new(motor, LIMITS).ok()

@@ -1,5 +1,5 @@
 //! The state machines of the encoders and of the echoes, as far as both chips configure them alike. The programs are those
-//! of the board that is built.
+//! of the chip that is built for.
 
 use embassy_rp::Peri;
 use embassy_rp::peripherals::{PIO0, PIO1};
@@ -18,7 +18,11 @@ pub type EchoMachine<const SM: usize> = StateMachine<'static, PIO1, SM>;
 // `cargo xtask test-firmware` checks.
 #[inline(never)]
 pub fn encoder_program(pio: &mut Common<'static, PIO0>) -> LoadedProgram<'static, PIO0> {
-    pio.load_program(&pio_file!("src/quadrature.pio").program)
+    #[cfg(rp2040)]
+    let program = pio_file!("../pico/src/quadrature.pio").program;
+    #[cfg(not(rp2040))]
+    let program = pio_file!("../pico2/src/quadrature.pio").program;
+    pio.load_program(&program)
 }
 
 /// Starts the counting of every edge of both channels. `queue` is the use of the machine's queues.
@@ -47,7 +51,11 @@ pub fn encoder<const SM: usize>(
 // As above.
 #[inline(never)]
 pub fn echo_program(pio: &mut Common<'static, PIO1>) -> LoadedProgram<'static, PIO1> {
-    pio.load_program(&pio_file!("src/echo.pio").program)
+    #[cfg(rp2040)]
+    let program = pio_file!("../pico/src/echo.pio").program;
+    #[cfg(not(rp2040))]
+    let program = pio_file!("../pico2/src/echo.pio").program;
+    pio.load_program(&program)
 }
 
 /// Prepares the stamping of an echo's edges, which begins when the machine is enabled.

@@ -1,18 +1,7 @@
-//! A Raspberry Pi Pico 2 or Pico with two encoders, two rangers on servos, a gyro and a UART.
+//! A Raspberry Pi Pico 2 or Pico with two encoders, two rangers on servos, a gyro and a UART; or an XRP robot, whose boards have the same chips.
 //!
-//! This file is the board, except for what differs between its chips, which is in the module `chip`. The robot is described by the baked configuration, and its behaviour is in `sonarfix-app`.
-//! The wiring is a table in `docs/firmware.md`.
-//!
-//! | | for | pins |
-//! |---|---|---|
-//! | PIO0 | right and left encoder, a state machine each | GP2 GP3, GP4 GP5 |
-//! | PIO1 | the stamps of the edges of both echoes, 1 µs, a state machine each | GP8, GP17 |
-//! | PWM slices 3 and 1, channel A | the pulses of the servos of both rangers | GP6, GP18 |
-//! | PWM slices 5 and 6 | the inputs of the motor driver, right and left motor, 20 kHz | GP10 GP11, GP12 GP13 |
-//! | TIMER0 | the clock, 1 µs, and the alarm of the next poll | |
-//! | UART0 | the link, 115,200 baud | GP0 GP1 |
-//! | | the triggers of both rangers; high while the robot may drive | GP7, GP16; GP9 |
-//! | | the buses of both rangers, clock and data, for light; the gyro is on the first | GP15 GP14, GP21 GP20 |
+//! This file is the board, except for what differs: between the chips in the module `chip`, between the boards in `pins` and `enable`. The robot is
+//! described by the baked configuration, and its behaviour is in `sonarfix-app`. The wiring is a table in `pins`.
 //!
 //! State machines count the wheels and stamp the edges, however long a poll or a write to flash takes. One executor is
 //! therefore sufficient, and no interrupts but those of the clock and of received bytes, which end its sleep. It runs two tasks in
@@ -30,14 +19,13 @@ use embassy_rp::gpio::{Level, Output, OutputOpenDrain, Pin};
 use embassy_rp::interrupt::typelevel::{Handler, Interrupt, UART0_IRQ};
 use embassy_rp::peripherals::{FLASH, PIO0, PIO1, WATCHDOG};
 use embassy_rp::pio::{InterruptHandler, Pio};
-use embassy_rp::pwm::{self, Pwm};
+use embassy_rp::pwm::{self, ChannelAPin, ChannelBPin, Pwm, PwmOutput, Slice};
 use embassy_rp::uart::{self, Uart};
 use embassy_rp::watchdog::Watchdog;
 use embassy_rp::{Peri, bind_interrupts, pac};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Delay, Duration, with_deadline};
-use embedded_hal::pwm::SetDutyCycle;
 use embedded_hal_02::serial::{Read, Write};
 use heapless::Deque;
 use panic_probe as _;
@@ -47,7 +35,6 @@ use sonarfix_app::watchdog::Liveness;
 use sonarfix_app::{App, FlashContents, Link, boots, log};
 use sonarfix_hal::bus::{SharedBus, TwoWire};
 use sonarfix_hal::encoder::Unwrapped;
-use sonarfix_hal::gyro::Mpu6050;
 use sonarfix_hal::ranger::EchoCapture;
 use sonarfix_hal::robot::{Devices, WithGyro, WithRangers};
 use sonarfix_motors::Drive;
@@ -58,9 +45,17 @@ use sonarfix_robot::{AnyRanger, NextPoll, memory};
 // The other chip has its module beside its memory map.
 #[cfg_attr(rp2040, path = "../../pico/src/chip.rs")]
 mod chip;
+#[cfg_attr(xrp, path = "../../xrp/src/enable.rs")]
+mod enable;
 mod machines;
+#[macro_use]
+#[cfg_attr(all(xrp, rp2040), path = "../../xrp/src/pins.rs")]
+#[cfg_attr(all(xrp, not(rp2040)), path = "../../xrp-rp2350/src/pins.rs")]
+mod pins;
 
 use chip::{Encoder, FLASH_SIZE, QUEUE, Stamper, reset};
+use enable::{Enable, disable_motors};
+use pins::Gyro;
 
 /// Period at which the loop reads the stamps of the echo while a ping is in flight, and fills the UART's queue while it sends.
 const STEP: Duration = Duration::from_millis(1);
@@ -70,16 +65,13 @@ const WINDOW: u32 = 200_000;
 /// W25Q16JV's data sheet). The motors are disabled meanwhile.
 const LONG_WINDOW: u32 = 1_000_000;
 
-/// Number of the pin that is high while the robot may drive.
-const DRIVE: u32 = 9;
-
 /// Address of the flash.
 const FLASH_BASE: u32 = 0x1000_0000;
 
 /// The gyro is read and configured only if the robot file has one.
 type Hardware = WithGyro<
-    WithRangers<Devices<Encoder<0>, Encoder<1>, Pwm<'static>, Ranger>, 1>,
-    Mpu6050<&'static Bus>,
+    WithRangers<Devices<Encoder<0>, Encoder<1>, PwmOutput<'static>, Ranger>, 1>,
+    Gyro<&'static Bus>,
 >;
 
 type Ranger = AnyRanger<Output<'static>, &'static Bus>;
@@ -168,23 +160,41 @@ fn motor_pulses() -> pwm::Config {
     config
 }
 
-/// The inputs of the motor driver.
-struct Motors {
-    right: Pwm<'static>,
-    left: Pwm<'static>,
+/// The inputs of the motor driver for a motor.
+struct MotorInputs {
+    slice: usize,
+    /// Dropped, it would stop the slice.
+    _pwm: Pwm<'static>,
 }
+
+impl MotorInputs {
+    fn new<S: Slice>(
+        (slice, a, b): (
+            Peri<'static, S>,
+            Peri<'static, impl ChannelAPin<S>>,
+            Peri<'static, impl ChannelBPin<S>>,
+        ),
+    ) -> Self {
+        let number = slice.number();
+        Self { slice: number, _pwm: Pwm::new_output_ab(slice, a, b, motor_pulses()) }
+    }
+
+    /// The counts of a period for which both channels are high. A whole period is a level that is always high.
+    fn set(&mut self, [a, b]: [u16; 2]) {
+        pac::PWM.ch(self.slice).cc().write(|w| {
+            w.set_a(a);
+            w.set_b(b);
+        });
+    }
+}
+
+/// Those of the right and the left motor.
+struct Motors([MotorInputs; 2]);
 
 impl Motors {
     fn set(&mut self, drive: Drive) {
-        // The driver accepts a count less than the period's.
-        let [right_1, right_2, left_1, left_2] = drive.inputs(motor_period().saturating_sub(1));
-        for (pwm, first, second) in
-            [(&mut self.right, right_1, right_2), (&mut self.left, left_1, left_2)]
-        {
-            if let (Some(mut a), Some(mut b)) = pwm.split_by_ref() {
-                // Both are within the period.
-                let _ = (a.set_duty_cycle(first), b.set_duty_cycle(second));
-            }
+        for (motor, counts) in self.0.iter_mut().zip(pins::inputs(drive, motor_period())) {
+            motor.set(counts);
         }
     }
 }
@@ -235,11 +245,6 @@ impl Link for Serial {
     }
 }
 
-/// Disables the motors; the next poll may enable them again.
-fn disable_motors() {
-    pac::SIO.gpio_out(0).value_clr().write_value(1 << DRIVE);
-}
-
 /// Starts the watchdog's window again, with this length in microseconds.
 fn feed(window: u32) {
     let counts = window.saturating_mul(chip::WATCHDOG_COUNTS);
@@ -284,14 +289,14 @@ struct Board {
     positions: [Unwrapped; 2],
     stampers: (Stamper<0>, Stamper<1>),
     link: Serial,
-    drive: Output<'static>,
+    enable: Enable,
     watchdog: Watchdog,
     liveness: Liveness,
     next_poll: NextPoll,
 }
 
 impl Board {
-    /// Initializes the board; `None` if the memory map has no store.
+    /// Initializes the board; `None` if the memory map has no store, or a servo no channel.
     // Inlined, its stack frame would remain for the whole runtime.
     #[inline(never)]
     fn new(buses: &'static mut Option<Buses>) -> Option<(Self, Motors)> {
@@ -300,35 +305,38 @@ impl Board {
         let mut watchdog = Watchdog::new(board.WATCHDOG);
         let reset = reset(&watchdog);
         watchdog.start(Duration::from_micros(LONG_WINDOW.into()));
-        let drive = Output::new(board.PIN_9, Level::Low);
         let resets = boots::resets(watchdog.get_scratch(0));
         watchdog.set_scratch(0, boots::register(resets.saturating_add(1)));
         let Pio { common: mut pio, sm0, sm1, .. } = Pio::new(board.PIO0, Interrupts);
         let program = machines::encoder_program(&mut pio);
-        let right = machines::encoder(sm0, &mut pio, &program, board.PIN_2, board.PIN_3, QUEUE);
-        let left = machines::encoder(sm1, &mut pio, &program, board.PIN_4, board.PIN_5, QUEUE);
+        let (a, b) = part!(board.right_encoder);
+        let right = machines::encoder(sm0, &mut pio, &program, a, b, QUEUE);
+        let (a, b) = part!(board.left_encoder);
+        let left = machines::encoder(sm1, &mut pio, &program, a, b, QUEUE);
         let (right, left) = (Encoder(right), Encoder(left));
         let Pio { common: mut pio, sm0, sm1, .. } = Pio::new(board.PIO1, Interrupts);
         let (program, divider) = (machines::echo_program(&mut pio), clock_divider(5_000_000));
-        let first = machines::echo(sm0, &mut pio, &program, board.PIN_8, divider, QUEUE);
-        let second = machines::echo(sm1, &mut pio, &program, board.PIN_17, divider, QUEUE);
+        let (first, second) = part!(board.echoes);
+        let first = machines::echo(sm0, &mut pio, &program, first, divider, QUEUE);
+        let second = machines::echo(sm1, &mut pio, &program, second, divider, QUEUE);
         let stampers = (Stamper::start(first, now()), Stamper::start(second, now()));
-        let pulses = Pwm::new_output_a(board.PWM_SLICE3, board.PIN_6, servo_pulses());
-        let second_pulses = Pwm::new_output_a(board.PWM_SLICE1, board.PIN_18, servo_pulses());
-        let (slice, pins) = (board.PWM_SLICE5, (board.PIN_10, board.PIN_11));
-        let right_motor = Pwm::new_output_ab(slice, pins.0, pins.1, motor_pulses());
-        let (slice, pins) = (board.PWM_SLICE6, (board.PIN_12, board.PIN_13));
-        let left_motor = Pwm::new_output_ab(slice, pins.0, pins.1, motor_pulses());
-        let motors = Motors { right: right_motor, left: left_motor };
-        let made = [bus(board.PIN_15, board.PIN_14), bus(board.PIN_21, board.PIN_20)];
+        let [pulses, second_pulses] = part!(board.servos);
+        let motors = Motors([
+            MotorInputs::new(part!(board.right_motor)),
+            MotorInputs::new(part!(board.left_motor)),
+        ]);
+        // An XRP's are those that the PWM has taken.
+        let enable = Enable::new(part!(board.enable));
+        let made = part!(board.buses);
         let [first, second] = &**buses.insert(ManuallyDrop::new(made));
-        let trigger = Output::new(board.PIN_7, Level::Low);
-        let servo = sonarfix_robot::servo(pulses);
+        let (trigger, second_trigger) = part!(board.triggers);
+        let trigger = Output::new(trigger, Level::Low);
+        let servo = sonarfix_robot::servo(pulses?);
         let ranger = sonarfix_robot::any_ranger(trigger, &ECHO, first);
         let devices = Devices { right, left, servo, ranger };
-        let trigger = Output::new(board.PIN_16, Level::Low);
+        let trigger = Output::new(second_trigger, Level::Low);
         let ranger = sonarfix_robot::any_ranger(trigger, &SECOND_ECHO, second);
-        let servos = [sonarfix_robot::servo(second_pulses)];
+        let servos = [sonarfix_robot::servo(second_pulses?)];
         let devices = WithRangers { devices, servos, rangers: [ranger] };
 
         let flash = FlashContents::read(memory::map(), memory::config());
@@ -338,20 +346,21 @@ impl Board {
         let app = App::new(sonarfix_robot::board(reset, resets), flash, store, now());
         // The default is 115,200 baud, 8N1.
         let uart = uart::Config::default();
-        let uart = Uart::new_blocking(board.UART0, board.PIN_0, board.PIN_1, uart);
-        // The driver leaves the pins without pull-ups; an open line would be received as noise (PADS_BANK0_GPIO1: PUE).
-        pac::PADS_BANK0.gpio(1).modify(|w| {
+        let (block, sends, receives) = part!(board.link);
+        let uart = Uart::new_blocking(block, sends, receives, uart);
+        // The driver leaves the pins without pull-ups; an open line would be received as noise (PADS_BANK0_GPIOn: PUE).
+        pac::PADS_BANK0.gpio(pins::RECEIVES).modify(|w| {
             w.set_pue(true);
             w.set_pde(false);
         });
         listen_to_uart();
         let board = Self {
             app,
-            hardware: WithGyro { devices, gyro: Mpu6050::new(first) },
+            hardware: WithGyro { devices, gyro: Gyro::new(first) },
             positions: Default::default(),
             stampers,
             link: Serial { uart, to_send: Deque::new() },
-            drive,
+            enable,
             watchdog,
             liveness: Liveness::new(now()),
             next_poll: NextPoll::AT_ONCE,
@@ -365,7 +374,7 @@ impl Board {
     fn poll(&mut self) {
         let start = now();
         let polled = self.app.poll(start, &mut self.hardware, &mut self.link);
-        self.drive.set_level(polled.may_drive.into());
+        self.enable.set(polled.may_drive);
         let devices = &mut self.hardware.devices.devices;
         let counters = (&mut devices.right, &mut devices.left);
         let positions = &mut self.positions;
@@ -436,7 +445,7 @@ async fn polls(mut board: Board) -> ! {
 /// that computes for long must be divided by `await`.
 #[embassy_executor::task]
 async fn motors(mut motors: Motors) -> ! {
-    let mut commanded = Commanded::default();
+    let mut commanded = Commanded::new(pins::MOTOR);
     loop {
         let inputs = INPUTS.wait().await;
         motors.set(commanded.drive(inputs));
@@ -448,7 +457,7 @@ async fn motors(mut motors: Motors) -> ! {
 #[inline(never)]
 fn start(spawner: Spawner, buses: &'static mut Option<Buses>) {
     let Some((board, inputs)) = Board::new(buses) else {
-        defmt::error!("the memory map has no store");
+        defmt::error!("the memory map has no store, or a servo no channel");
         return;
     };
     // Each task is spawned once, for which there is room.

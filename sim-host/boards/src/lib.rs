@@ -48,14 +48,23 @@ pub struct Board {
     pub port: String,
     /// Where the board takes 5 V.
     pub feed: String,
-    /// The resistors between echo and ground, upper and lower.
-    pub divider: [String; 2],
+    /// The resistors between echo and ground, upper and lower; none where the sonar has 3.3 V.
+    pub divider: Option<[String; 2]>,
+    /// What both inputs of the motor driver for a motor are.
+    #[serde(default = "inputs_by_direction")]
+    pub inputs: String,
     /// Its pins.
     pub pins: Pins,
     /// The I²C bus of the first ranger and of the gyro, if it has one.
     pub bus: Option<Bus>,
     /// The pins of a second ranger, if it has them.
     pub second: Option<Second>,
+    /// The robot that the board is sold with.
+    pub kit: Option<Kit>,
+}
+
+fn inputs_by_direction() -> String {
+    "forwards, backwards".to_owned()
 }
 
 impl Board {
@@ -73,6 +82,33 @@ pub struct Uf2 {
     pub family: u32,
     /// Its `Board-ID` in the file `INFO_UF2.TXT` of the drive.
     pub drive: String,
+}
+
+/// A robot that is sold with its board.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Kit {
+    /// The connector of the right motor and its encoder.
+    pub right: String,
+    /// That of the left ones.
+    pub left: String,
+    /// That of the sonar.
+    pub sonar: String,
+    /// That of the servo.
+    pub servo: String,
+    /// That of the link.
+    pub link: String,
+    /// With its unit.
+    pub wheel_diameter: String,
+    /// With its unit.
+    pub track_width: String,
+    /// Edges of both channels of an encoder per revolution of the wheel.
+    pub edges_per_revolution: String,
+    /// With its unit.
+    pub max_wheel_speed: String,
+    /// The wheel whose encoder counts backwards: `right` or `left`.
+    pub mirrored: String,
+    /// The gyro on the board, as a robot file names it.
+    pub gyro: String,
 }
 
 /// The pins of an I²C bus.
@@ -123,15 +159,15 @@ pub struct Pins {
     pub trigger: String,
     /// Echo of the sonar, behind the divider.
     pub echo: String,
-    /// Enable of the motor driver.
-    pub enable: String,
-    /// First input of the motor driver for the right motor: forwards.
+    /// Enable of the motor driver, if it has one.
+    pub enable: Option<String>,
+    /// First input of the motor driver for the right motor.
     pub right_1: String,
-    /// Second input of the motor driver for the right motor: backwards.
+    /// Second input of the motor driver for the right motor.
     pub right_2: String,
-    /// First input of the motor driver for the left motor: forwards.
+    /// First input of the motor driver for the left motor.
     pub left_1: String,
-    /// Second input of the motor driver for the left motor: backwards.
+    /// Second input of the motor driver for the left motor.
     pub left_2: String,
     /// The link, from the board.
     pub tx: String,

@@ -74,19 +74,28 @@ fn around<'t>(texts: impl Iterator<Item = &'t str>) -> f64 {
 }
 
 fn left(board: &Board) -> Vec<Part<'_>> {
-    let pins = &board.pins;
-    let encoder = |title, a, b| {
-        let supply = Row::text("3.3 V of the board, GND");
-        part(title, vec![Row::wire("A", a), Row::wire("B", b), supply])
+    let (pins, kit) = (&board.pins, board.kit.as_ref());
+    let encoder = |title: &str, a, b, connector: Option<&String>| {
+        let supply = connector.map_or_else(|| "3.3 V of the board, GND".to_owned(), connected);
+        part(title, vec![Row::wire("A", a), Row::wire("B", b), Row::text(supply)])
     };
+    let [right, left] = if kit.is_some() {
+        ["right motor with encoder", "left motor with encoder"]
+    } else {
+        ["right encoder", "left encoder"]
+    };
+    let mut link = vec![Row::wire("RX", &pins.tx), Row::wire("TX", &pins.rx), Row::text("GND")];
+    link.extend(kit.map(|kit| Row::text(connected(&kit.link))));
     vec![
-        encoder("right encoder", &pins.right_a, &pins.right_b),
-        encoder("left encoder", &pins.left_a, &pins.left_b),
-        part(
-            "PC: serial port, 3.3 V",
-            vec![Row::wire("RX", &pins.tx), Row::wire("TX", &pins.rx), Row::text("GND")],
-        ),
+        encoder(right, &pins.right_a, &pins.right_b, kit.map(|kit| &kit.right)),
+        encoder(left, &pins.left_a, &pins.left_b, kit.map(|kit| &kit.left)),
+        part("PC: serial port, 3.3 V", link),
     ]
+}
+
+/// The line of a part that is plugged into a connector.
+fn connected(connector: &String) -> String {
+    format!("connector: {connector}")
 }
 
 fn part<'b>(title: &str, rows: Vec<Row<'b>>) -> Part<'b> {
@@ -98,15 +107,17 @@ fn ranger<'b>(
     title: String,
     [trigger, echo]: [&'b str; 2],
     bus: Option<&'b Bus>,
-    divider: &'b [String; 2],
+    divider: Option<&'b [String; 2]>,
 ) -> Part<'b> {
     let rows = if let Some(Bus { scl, sda }) = bus {
         vec![Row::wire("SCL", scl), Row::wire("SDA", sda), Row::text("3.3 V of the board, GND")]
-    } else {
-        let [upper, lower] = divider;
+    } else if let Some([upper, lower]) = divider {
         let echo = Row { resistors: [Some(upper), Some(lower)], ..Row::wire("ECHO, 5 V", echo) };
         let supply = [Row::text("5 V of the regulator"), Row::text("GND")];
         [Row::wire("TRIG", trigger), echo].into_iter().chain(supply).collect()
+    } else {
+        let supply = Row::text("3.3 V of the board, GND");
+        vec![Row::wire("TRIG", trigger), Row::wire("ECHO", echo), supply]
     };
     Part(title, rows)
 }
@@ -114,7 +125,7 @@ fn ranger<'b>(
 /// The first ranger, and the second one.
 fn rangers(board: &Board, rangers: Rangers) -> Vec<Part<'_>> {
     let Rangers { name, is_light, has_second } = rangers;
-    let (pins, divider) = (&board.pins, &board.divider);
+    let (pins, divider) = (&board.pins, board.divider.as_ref());
     let kind = if is_light { "ranger" } else { "sonar" };
     let bus = board.bus.as_ref().filter(|_| is_light);
     let first = ranger(format!("{kind} {name}"), [&pins.trigger, &pins.echo], bus, divider);
@@ -127,38 +138,38 @@ fn rangers(board: &Board, rangers: Rangers) -> Vec<Part<'_>> {
 
 fn right(board: &Board, of: Rangers) -> Vec<Part<'_>> {
     let pins = &board.pins;
-    let enable =
-        Row { resistors: [None, Some("10 kΩ")], ..Row::wire("enable, STBY, SLP", &pins.enable) };
     let mut parts = rangers(board, of);
-    parts.extend([
-        part(
-            "servo",
-            vec![
-                Row::wire("signal", &pins.servo),
-                Row::text("5 V of the regulator"),
-                Row::text("GND"),
-            ],
-        ),
-        part(
-            "motor driver",
-            vec![
-                Row::wire("AIN1", &pins.right_1),
-                Row::wire("AIN2", &pins.right_2),
-                Row::wire("BIN1", &pins.left_1),
-                Row::wire("BIN2", &pins.left_2),
-                enable,
-                Row::text("VM: cells, GND"),
-                Row::text("TB6612FNG: VCC, PWMA,"),
-                Row::text("PWMB to 3.3 V"),
-            ],
-        ),
-    ]);
+    let signal = Row::wire("signal", &pins.servo);
+    if let Some(kit) = &board.kit {
+        if let Some(Part(_, rows)) = parts.first_mut().filter(|_| !of.is_light) {
+            rows.push(Row::text(connected(&kit.sonar)));
+        }
+        parts.push(part("servo", vec![signal, Row::text(connected(&kit.servo))]));
+        parts.push(part("gyro, motor drivers", vec![Row::text("on the board")]));
+        return parts;
+    }
+    let supply = [Row::text("5 V of the regulator"), Row::text("GND")];
+    parts.push(part("servo", [signal].into_iter().chain(supply).collect()));
+    let inputs = ["AIN1", "AIN2", "BIN1", "BIN2"];
+    let wired = [&pins.right_1, &pins.right_2, &pins.left_1, &pins.left_2];
+    let mut rows: Vec<_> =
+        inputs.into_iter().zip(wired).map(|(it, pin)| Row::wire(it, pin)).collect();
+    rows.extend(pins.enable.as_ref().map(|pin| Row {
+        resistors: [None, Some("10 kΩ")],
+        ..Row::wire("enable, STBY, SLP", pin)
+    }));
+    let supply = ["VM: cells, GND", "TB6612FNG: VCC, PWMA,", "PWMB to 3.3 V"];
+    rows.extend(supply.map(Row::text));
+    parts.push(part("motor driver", rows));
     parts
 }
 
 /// The lines of the box of the supply.
-fn supply(board: &Board) -> [String; 4] {
-    [
+fn supply(board: &Board) -> Vec<String> {
+    if board.kit.is_some() {
+        return vec![format!("cells of the kit: {}", board.feed)];
+    }
+    vec![
         "cells: VM of the motor driver, regulator".to_owned(),
         "regulator 5 V, 3 A: sonar; servo, 470 µF beside it".to_owned(),
         format!("and the board: {}", board.feed),
@@ -167,11 +178,16 @@ fn supply(board: &Board) -> [String; 4] {
 }
 
 /// The lines of the box of the motors.
-const MOTORS: [&str; 3] = [
-    "right motor: AOUT1, AOUT2 of the motor driver",
-    "left motor: BOUT1, BOUT2",
-    "a wheel turns backwards: swap its motor's wires",
-];
+fn motors(board: &Board) -> Vec<&'static str> {
+    if board.kit.is_some() {
+        return vec!["the other connectors stay free"];
+    }
+    vec![
+        "right motor: AOUT1, AOUT2 of the motor driver",
+        "left motor: BOUT1, BOUT2",
+        "a wheel turns backwards: swap its motor's wires",
+    ]
+}
 
 /// The wiring of a robot as an SVG.
 #[must_use]
@@ -194,11 +210,11 @@ pub fn drawing(board: &Board, rangers: Rangers) -> String {
     let board_at = MARGIN + left_width + GAP;
     let right_at = board_at + board_width + GAP;
     let all = (right_at + right_width + MARGIN, board_height + 2.0 * MARGIN);
-    let lines = supply(board);
-    let supply_height = TITLE + ROW * count(lines.len()) + MARGIN;
+    let (lines, motors) = (supply(board), motors(board));
+    let supply_height = TITLE + ROW * count(lines.len().max(motors.len())) + MARGIN;
     let supply_width = around(lines.iter().map(String::as_str));
     let motors_at = MARGIN + supply_width + BETWEEN;
-    let motors_width = around(MOTORS.into_iter());
+    let motors_width = around(motors.iter().copied());
     let below = motors_at + motors_width + MARGIN;
     let mut svg = Svg::new(all.0.max(below), all.1 + supply_height + MARGIN);
     svg.part(board_at, MARGIN, board_width, board_height, &board.title);
@@ -209,7 +225,7 @@ pub fn drawing(board: &Board, rangers: Rangers) -> String {
     let at = all.1;
     let boxes: [(f64, f64, &str, Vec<&str>); 2] = [
         (MARGIN, supply_width, "supply", lines.iter().map(String::as_str).collect()),
-        (motors_at, motors_width, "motors", MOTORS.to_vec()),
+        (motors_at, motors_width, "motors", motors),
     ];
     for (x, width, title, lines) in boxes {
         svg.part(x, at, width, supply_height, title);

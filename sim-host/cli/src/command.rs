@@ -14,8 +14,8 @@ use sonarfix_monitor::port::Port;
 use sonarfix_monitor::{request, view};
 use sonarfix_terminal::progress::{catch_interrupt, is_interrupted};
 
-use crate::goto;
 use crate::monitor::PortArgs;
+use crate::{goto, patrol, self_test};
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -33,6 +33,12 @@ enum What {
     /// uncertain, and in front of objects that are not on the map (docs/driving.md).
     #[command(allow_negative_numbers = true)]
     Goto(goto::Args),
+    /// Drive from point to point of a list, again and again: an example of a program that drives a robot by trips as those of `goto`.
+    #[command(allow_negative_numbers = true)]
+    Patrol(patrol::Args),
+    /// Test the board of a robot that waits with its wheels at rest: link, clock, encoders, pulses of the servo, capture, flash. Prints a
+    /// report that can be sent in.
+    SelfTest(self_test::Args),
 }
 
 // A command of the link. Without a comment of documentation, which would become the help of `command`.
@@ -205,6 +211,8 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let what = match &args.what {
         What::Single(what) => what,
         What::Goto(route) => return goto::execute(route, &mut args.port.open()?),
+        What::SelfTest(test) => return self_test::execute(test, &mut args.port.open()?),
+        What::Patrol(points) => return patrol::execute(points, &mut args.port.open()?),
     };
     let command = what.command()?;
     let mut port = args.port.open()?;

@@ -57,6 +57,8 @@ pub const EXAMPLES: [(&str, &[&str]); 33] = [
             "sonarfix command --port /dev/ttyACM0 start",
             "sonarfix command --port /dev/ttyACM0 drive --speed 0.1 --turn 20 --seconds 3",
             "sonarfix command --port /dev/ttyACM0 goto 2.5 1.5 2.5 4 --map map.toml --robot robot.toml",
+            "sonarfix command --port /dev/ttyACM0 self-test --loop",
+            "sonarfix command --port /dev/ttyACM0 patrol 1 1 2.5 1 2.5 4 --pause 5 --rounds 3",
         ],
     ),
     (

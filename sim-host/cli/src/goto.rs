@@ -51,7 +51,8 @@ pub struct Args {
 }
 
 impl Args {
-    fn route(&self) -> anyhow::Result<Vec<Point>> {
+    /// The points.
+    pub fn route(&self) -> anyhow::Result<Vec<Point>> {
         let pairs = self.coordinates.chunks_exact(2);
         ensure!(pairs.remainder().is_empty(), "the last point has no y");
         Ok(pairs.filter_map(|pair| Some(Point::new(*pair.first()?, *pair.last()?))).collect())
@@ -79,33 +80,67 @@ impl Args {
     }
 }
 
+/// How the robot is driven, and until when.
+pub struct Journey {
+    limits: Limits,
+    surroundings: Option<Surroundings>,
+    patience: Duration,
+    limit: Option<Duration>,
+    began: Instant,
+}
+
+impl Journey {
+    /// One that begins now.
+    pub fn new(args: &Args) -> anyhow::Result<Self> {
+        let limit = args.seconds.map(|limit| seconds(limit, "--seconds")).transpose()?;
+        catch_interrupt();
+        Ok(Self {
+            limits: args.limits(),
+            surroundings: args.surroundings()?,
+            patience: seconds(args.patience, "--patience")?,
+            limit,
+            began: Instant::now(),
+        })
+    }
+
+    /// Whether it is to end: Ctrl-C, or its time.
+    pub fn is_over(&self) -> bool {
+        is_interrupted() || self.limit.is_some_and(|limit| self.began.elapsed() >= limit)
+    }
+
+    /// Drives along a route until the robot has arrived or the trip is given up.
+    pub fn drive(&self, route: &[Point], port: &mut Port) -> anyhow::Result<End> {
+        let driver = RouteDriver::new(route, self.limits, self.surroundings.as_ref())?;
+        let mut trip = Trip::new(driver, self.patience, Instant::now());
+        let mut shown = Progress::Driving;
+        let result = request::steer(port, |telemetry| {
+            if self.is_over() {
+                return trip.stop(End::Interrupted);
+            }
+            let control = trip.control(telemetry, Instant::now());
+            show(trip.progress(), &mut shown);
+            control
+        })?;
+        match (result, trip.end()) {
+            (CommandResult::Refused(reason), _) => bail!("the robot refuses: {reason}"),
+            (_, Some(End::Silent)) => bail!("the robot sends no estimates: does its loop run?"),
+            (_, end) => Ok(end.unwrap_or(End::Interrupted)),
+        }
+    }
+}
+
+/// A time in seconds.
+pub fn seconds(seconds: f64, option: &str) -> anyhow::Result<Duration> {
+    Duration::try_from_secs_f64(seconds).with_context(|| format!("{option}: not a duration"))
+}
+
 /// Drives until the robot has arrived or the trip is given up.
 pub fn execute(args: &Args, port: &mut Port) -> anyhow::Result<()> {
-    let (route, surroundings) = (args.route()?, args.surroundings()?);
-    let seconds = |seconds: f64, option| {
-        Duration::try_from_secs_f64(seconds).with_context(|| format!("{option}: not a duration"))
-    };
-    let patience = seconds(args.patience, "--patience")?;
-    let limit = args.seconds.map(|limit| seconds(limit, "--seconds")).transpose()?;
-    let driver = RouteDriver::new(&route, args.limits(), surroundings.as_ref())?;
-    catch_interrupt();
-    let began = Instant::now();
-    let mut trip = Trip::new(driver, patience, began);
-    let mut shown = Progress::Driving;
-    let result = request::steer(port, |telemetry| {
-        if is_interrupted() || limit.is_some_and(|limit| began.elapsed() >= limit) {
-            return trip.stop(End::Interrupted);
-        }
-        let control = trip.control(telemetry, Instant::now());
-        show(trip.progress(), &mut shown);
-        control
-    })?;
-    match (result, trip.end()) {
-        (CommandResult::Refused(reason), _) => bail!("the robot refuses: {reason}"),
-        (_, Some(End::Arrived)) => println!("arrived"),
-        (_, Some(End::Stopped(reason))) => bail!("the robot has not arrived: {reason}"),
-        (_, Some(End::Silent)) => bail!("the robot sends no estimates: does its loop run?"),
-        (_, Some(End::Interrupted) | None) => println!("ended before the end of the route"),
+    let route = args.route()?;
+    match Journey::new(args)?.drive(&route, port)? {
+        End::Arrived => println!("arrived"),
+        End::Stopped(reason) => bail!("the robot has not arrived: {reason}"),
+        End::Silent | End::Interrupted => println!("ended before the end of the route"),
     }
     Ok(())
 }

@@ -38,7 +38,7 @@ pub struct Args {
     #[arg(long, value_name = "EDGES")]
     ticks_per_revolution: Option<f64>,
     /// A rectangular room of this length and width, metres, for example "4 x 3"; without this option a room of 4 m by 3 m with
-    /// cupboards in one corner.
+    /// cupboards in one corner; for an XRP the walls of an arena on a table.
     #[arg(long, value_name = "LENGTH x WIDTH")]
     room: Option<String>,
 }
@@ -65,7 +65,7 @@ impl Args {
         for question in question::all()? {
             let answer = match self.given(question.option) {
                 None if question.is_optional => continue,
-                None => ask::ask(&question)?,
+                None => ask::ask(&question, chosen.get("board").map(String::as_str))?,
                 Some(given) => given,
             };
             chosen.insert(question.option.to_owned(), question.check(&answer)?);

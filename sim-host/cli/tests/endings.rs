@@ -26,7 +26,7 @@ const PAPER: &str = "../../crates/sonarfix-map/scenarios/paper.toml";
 
 /// Every subcommand, with arguments for the shortest output. In `FILES` are a short log with its map and robot, a drive for
 /// the calibration, a recorded stream of a robot's bytes, rows, and room for results; `ROBOT` is the port of a robot.
-const PRINTING: [&[&str]; 48] = [
+const PRINTING: [&[&str]; 50] = [
     &["--help"],
     &["doctor", "--json"],
     &["init", "FILES/robot"],
@@ -60,6 +60,9 @@ const PRINTING: [&[&str]; 48] = [
     &["command", "--port", "ROBOT", "point", "-30"],
     &["command", "--port", "ROBOT", "drive", "--speed", "0.1", "--seconds", "0"],
     &["command", "--port", "ROBOT", "goto", "1", "-2", "--seconds", "0"],
+    // This takes seconds.
+    &["command", "--port", "ROBOT", "self-test", "--help"],
+    &["command", "--port", "ROBOT", "patrol", "1", "-2", "--seconds", "0"],
     &["virtual-robot", CLASSROOM, "--running", "--speed", "50", "--seconds", "1"],
     &["config", "bake", "tests/robot.toml", "--out", "FILES/config.bin"],
     &["config", "check", "FILES/config.bin"],

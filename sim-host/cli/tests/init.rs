@@ -81,7 +81,8 @@ fn refused_by_others(robot: &Path) {
         let error = refusal(&["--board", text(board, "name")]);
         assert!(error.contains(text(board, "title")) && error.contains("ranger"), "{error}");
     }
-    for (features, missing) in [("rangers,informative", "light"), ("light,informative", "rangers")]
+    for (features, missing) in
+        [("rangers,gyro,informative", "light"), ("light,gyro,informative", "rangers")]
     {
         let error = refusal(&["--features", features]);
         assert!(error.contains(&format!("`{missing}`")), "{error}");
@@ -176,6 +177,21 @@ fn the_written_robot_finds_its_way() {
     assert!(rms("x").hypot(rms("y")) < 0.03, "{summary}");
 }
 
+/// The robot file of an XRP in the repository, which is tested on an emulated chip, is the one that is written.
+#[test]
+fn the_robot_file_of_the_xrp_is_the_written_one() {
+    let dir = tempfile::tempdir().unwrap();
+    run(dir.path(), &["init", ".", "--board", "xrp"]);
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../firmware/xrp/robot.toml");
+    let written = fs::read_to_string(dir.path().join("robot.toml")).unwrap();
+    assert_eq!(fs::read_to_string(file).unwrap(), written, "copy it to firmware/xrp");
+    let json = run(dir.path(), &["run", "scenario.toml", "--json"]);
+    let summary: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(summary.get("lost_runs").unwrap(), 0, "{summary}");
+    let rms = |axis: &str| summary["rms_path"][axis].as_f64().unwrap();
+    assert!(rms("x").hypot(rms("y")) < 0.01, "{summary}");
+}
+
 /// A rectangular room is the map, and the simulated drive in it is valid.
 #[test]
 fn a_room_is_the_map_and_has_a_path() {
@@ -268,7 +284,7 @@ fn the_docs_have_the_table_of_boards() {
         fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs").join(page))
             .unwrap()
     };
-    let (firmware, guide) = (docs("firmware.md"), docs("build-a-robot.md"));
+    let (firmware, guide, kit) = (docs("firmware.md"), docs("build-a-robot.md"), docs("xrp.md"));
     for board in boards() {
         let number = |key: &str, what: &str| board[key][what].as_integer().unwrap();
         let row = format!(
@@ -282,6 +298,7 @@ fn the_docs_have_the_table_of_boards() {
             number("map", "bytes"),
         );
         assert!(firmware.contains(&row), "docs/firmware.md lacks {row}");
+        let guide = if board.contains_key("kit") { &kit } else { &guide };
         let name = format!("`{}`", text(&board, "name"));
         let header = guide.lines().find(|line| line.starts_with("| signal |")).unwrap();
         let column = header.split('|').position(|cell| cell.contains(&name)).unwrap();
@@ -299,7 +316,7 @@ fn the_docs_have_the_table_of_boards() {
             let Some(pin) = pin.as_str() else { continue };
             assert!(rows.iter().any(|cell| cell.contains(pin)), "{name} {signal}: {pin}");
         }
-        for resistor in board["divider"].as_array().unwrap() {
+        for resistor in board.get("divider").and_then(toml::Value::as_array).into_iter().flatten() {
             assert!(guide.contains(resistor.as_str().unwrap()), "{name}: {resistor}");
         }
     }

@@ -75,10 +75,45 @@ fn the_commands_work_on_it_as_on_a_robot() {
     let (is_done, text) =
         printed(&["goto", "1.5", "1.5", "--max-deviation", "1e-6", "--patience", "0.5"]);
     assert!(!is_done && text.contains("stands: the pose is too uncertain"), "{text}");
+    let patrol = ["patrol", "1.9", "1.7", "1.6", "1.6", "--end-deviation", "0.1"];
+    let (is_done, text) = printed(&[&patrol[..], &["--rounds", "2", "--pause", "0.2"]].concat());
+    assert!(is_done, "{text}");
+    for part in ["round 1: at 1.9 1.7", "round 1: at 1.6 1.6", "round 2: at 1.6 1.6"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    let uncertain = ["--max-deviation", "1e-6", "--patience", "0.3"];
+    let (is_done, text) = printed(&[&patrol[..], &uncertain].concat());
+    assert!(!is_done && text.contains("has reached no point of round 1"), "{text}");
     let (is_done, text) = printed(&["goto", "1", "2", "3"]);
     assert!(!is_done && text.contains("no y"), "{text}");
     let (is_done, text) = printed(&["stop"]);
     assert!(is_done, "{text}");
+}
+
+/// The report of a board: its clock depends on the load of this computer, and is only shown.
+#[cfg(unix)]
+#[test]
+fn a_board_reports_what_a_self_test_finds() {
+    let robot = Robot::new();
+    let output = robot.command(&["self-test", "--seconds", "11"]);
+    let text = String::from_utf8_lossy(&output.stdout);
+    for (part, verdict) in [
+        ("board", "passed"),
+        ("link", "passed"),
+        ("right encoder", "passed"),
+        ("left encoder", "passed"),
+        ("servo pulses", "passed"),
+        ("capture", "not tested"),
+        ("flash", "passed"),
+    ] {
+        let line = text.lines().find(|line| line.starts_with(part));
+        assert!(line.is_some_and(|line| line.contains(verdict)), "{part}: {text}");
+    }
+    assert!(text.contains("against this PC"), "{text}");
+    assert!(robot.command(&["set-pose", "1.5", "1.5", "0"]).status.success());
+    assert!(robot.command(&["start"]).status.success());
+    let refused = robot.command(&["self-test", "--seconds", "1"]);
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("refuses"), "{refused:?}");
 }
 
 #[test]

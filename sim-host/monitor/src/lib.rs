@@ -7,6 +7,7 @@
 //! | [`view`] | the latest telemetry as text |
 //! | [`terminal`] | the latest telemetry on a terminal |
 //! | [`recording`] | telemetry as a log |
+//! | [`self_test`] | a report of a board |
 //! | [`sealed`] | the file of a log, with checksums and an end |
 //! | [`conversation`] | the commands of a session, repeated until they are acknowledged |
 //! | [`request`] | one command |
@@ -24,6 +25,7 @@ pub mod recording;
 pub mod request;
 pub mod route;
 pub mod sealed;
+pub mod self_test;
 pub mod signs;
 pub mod simulated;
 pub mod teleoperation;

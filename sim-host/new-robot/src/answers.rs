@@ -52,6 +52,11 @@ impl Answers {
         };
         let board = sonarfix_boards::named(&answer("board")?)?;
         let (sonar, servo) = (answer("sonar")?, answer("servo")?);
+        let room = match checked.get("room") {
+            Some(room) => Room::rectangle(room)?,
+            None if board.kit.is_some() => Room::arena(),
+            None => Room::example(),
+        };
         let answers = Self {
             board,
             sonar: SONARS
@@ -63,7 +68,7 @@ impl Answers {
             wheel_diameter: answer("wheel-diameter")?,
             track_width: answer("track-width")?,
             ticks_per_revolution: positive(&answer("ticks-per-revolution")?)?,
-            room: checked.get("room").map_or(Ok(Room::example()), |room| Room::rectangle(room))?,
+            room,
         };
         answers.check()?;
         Ok(answers)

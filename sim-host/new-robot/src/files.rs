@@ -124,6 +124,9 @@ fn replacements(answers: &Answers) -> anyhow::Result<Vec<(&'static str, String)>
     answers.sonar.fit(&mut fitted);
     let sonar = fitted.robot.localizer.rangers.first;
     let (board, pins, room) = (&answers.board, &answers.board.pins, &answers.room);
+    let kit = board.kit.as_ref();
+    let mirrored = kit.map_or("left", |kit| &kit.mirrored);
+    let is_mirrored = |side| if side == mirrored { ", mirrored = true" } else { "" };
     let hexadecimal = |address: u32| format!("{address:#010X}").replace("0X", "0x");
     Ok(vec![
         ("title", board.title.clone()),
@@ -141,11 +144,7 @@ fn replacements(answers: &Answers) -> anyhow::Result<Vec<(&'static str, String)>
         ("left_a", pins.left_a.clone()),
         ("left_b", pins.left_b.clone()),
         ("servo_pin", pins.servo.clone()),
-        ("enable", pins.enable.clone()),
-        ("right_1", pins.right_1.clone()),
-        ("right_2", pins.right_2.clone()),
-        ("left_1", pins.left_1.clone()),
-        ("left_2", pins.left_2.clone()),
+        ("motors", motors(board)),
         ("rangers", wiring(answers)),
         ("table", if answers.second_at.is_some() { "[[sonar]]" } else { "[sonar]" }.to_owned()),
         ("second", second(answers)),
@@ -153,6 +152,14 @@ fn replacements(answers: &Answers) -> anyhow::Result<Vec<(&'static str, String)>
         ("rx", pins.rx.clone()),
         ("sonar", answers.sonar.file_name().to_owned()),
         ("servo", answers.servo.0.to_owned()),
+        ("max_wheel_speed", kit.map_or("1 m/s", |kit| &kit.max_wheel_speed).to_owned()),
+        ("mirrored", mirrored.to_owned()),
+        ("right_mirrored", is_mirrored("right").to_owned()),
+        ("left_mirrored", is_mirrored("left").to_owned()),
+        (
+            "gyro",
+            kit.map_or_else(String::new, |kit| format!("\n[gyro]\nsensor = \"{}\"\n", kit.gyro)),
+        ),
         ("wheel_diameter", answers.wheel_diameter.clone()),
         ("track_width", answers.track_width.clone()),
         ("edges", answers.ticks_per_revolution.to_string()),
@@ -169,18 +176,35 @@ fn replacements(answers: &Answers) -> anyhow::Result<Vec<(&'static str, String)>
     ])
 }
 
+/// The rows of the motor driver in the table of signals.
+fn motors(board: &Board) -> String {
+    let (pins, inputs) = (&board.pins, &board.inputs);
+    let enable = pins.enable.as_ref().map_or_else(String::new, |pin| {
+        format!("| enable of the motor driver, with a pull-down | {pin} |\n")
+    });
+    let motor = |side, first, second| {
+        format!("| inputs of the motor driver: {side} motor {inputs} | {first}, {second} |\n")
+    };
+    let right = motor("right", &pins.right_1, &pins.right_2);
+    enable + &right + &motor("left", &pins.left_1, &pins.left_2)
+}
+
 /// The rows of the rangers in the table of signals.
 fn wiring(answers: &Answers) -> String {
     let Answers { board, sonar, second_at, .. } = answers;
     let pins = &board.pins;
-    let [upper, lower] = &board.divider;
     let rows = |which: &str, trigger: &str, echo: &str, bus: Option<&Bus>| match bus {
         Some(Bus { scl, sda }) if sonar.is_light() => {
             format!("| {which}, which gets 3.3 V: SCL, SDA | {scl}, {sda} |\n")
         }
-        _ => format!(
-            "| trigger of the {which} | {trigger} |\n| echo of the {which}, through {upper} with {lower} to ground | {echo} |\n"
-        ),
+        _ => {
+            let through = board.divider.as_ref().map_or_else(String::new, |[upper, lower]| {
+                format!(", through {upper} with {lower} to ground")
+            });
+            format!(
+                "| trigger of the {which} | {trigger} |\n| echo of the {which}{through} | {echo} |\n"
+            )
+        }
     };
     let kind = if sonar.is_light() { "ranger" } else { "sonar" };
     let first = rows(kind, &pins.trigger, &pins.echo, board.bus.as_ref());

@@ -1,6 +1,9 @@
 //! What is asked.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
+use sonarfix_boards::{Board, Kit};
 use sonarfix_plan::preset::{ServoPreset, SonarPreset};
 use thiserror::Error;
 
@@ -15,6 +18,8 @@ pub struct Question {
     pub known: Vec<String>,
     /// The usual answer, or an example of an optional one.
     pub default: &'static str,
+    /// The usual answer of each board that is sold with a robot.
+    pub of_kits: BTreeMap<String, String>,
     /// Whether a robot may have no answer.
     pub is_optional: bool,
 }
@@ -41,7 +46,12 @@ pub(crate) const SERVOS: [(&str, ServoPreset); 2] =
 /// # Errors
 /// If the table of the boards is invalid.
 pub fn all() -> anyhow::Result<[Question; 8]> {
-    let boards = sonarfix_boards::all()?.into_iter().map(|board| board.name).collect();
+    let boards = sonarfix_boards::all()?;
+    let of_kits = |answer: fn(&Kit) -> &String| {
+        let of = |board: &Board| Some((board.name.clone(), answer(board.kit.as_ref()?).clone()));
+        boards.iter().filter_map(of).collect()
+    };
+    let names = boards.iter().map(|board| board.name.clone()).collect();
     let sonars = SONARS.map(|sonar| sonar.file_name().to_owned()).to_vec();
     let servos = SERVOS.map(|(name, _)| name.to_owned()).to_vec();
     let choice = |option, what, known, default| Question {
@@ -49,28 +59,45 @@ pub fn all() -> anyhow::Result<[Question; 8]> {
         what,
         known,
         default,
+        of_kits: BTreeMap::new(),
         is_optional: false,
     };
     let text = |option, what, default| choice(option, what, Vec::new(), default);
     let optional =
         |option, what, default| Question { is_optional: true, ..text(option, what, default) };
     Ok([
-        choice("board", "board", boards, "pico2"),
+        choice("board", "board", names, "pico2"),
         choice("sonar", "sonar", sonars, "hc_sr04"),
         optional("second-at", "bearing of a second, fixed sonar", "90 deg"),
         choice("servo", "servo of the sonar", servos, "sg90"),
-        text(
-            "ticks-per-revolution",
-            "encoder edges of both channels per revolution of the wheel",
-            "1496.6",
-        ),
-        text("wheel-diameter", "diameter of the wheels", "65 mm"),
-        text("track-width", "distance between the wheels' points of contact", "121 mm"),
+        Question {
+            of_kits: of_kits(|kit| &kit.edges_per_revolution),
+            ..text(
+                "ticks-per-revolution",
+                "encoder edges of both channels per revolution of the wheel",
+                "1496.6",
+            )
+        },
+        Question {
+            of_kits: of_kits(|kit| &kit.wheel_diameter),
+            ..text("wheel-diameter", "diameter of the wheels", "65 mm")
+        },
+        Question {
+            of_kits: of_kits(|kit| &kit.track_width),
+            ..text("track-width", "distance between the wheels' points of contact", "121 mm")
+        },
         optional("room", "length and width of a rectangular room, metres", "4 x 3"),
     ])
 }
 
 impl Question {
+    /// The usual answer for a board, if it is known.
+    #[must_use]
+    pub fn usual(&self, board: Option<&str>) -> &str {
+        let of_kit = board.and_then(|board| self.of_kits.get(board));
+        of_kit.map_or(self.default, String::as_str)
+    }
+
     /// An answer without the space around it.
     ///
     /// # Errors

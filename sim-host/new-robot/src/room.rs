@@ -43,6 +43,26 @@ impl Room {
         }
     }
 
+    /// An arena of 1.8 m by 1.2 m on a table, with a block in one corner: it looks the same from no two places.
+    #[must_use]
+    pub fn arena() -> Self {
+        let walls = [
+            wall("south", [0.0, 0.0], [1.8, 0.0]),
+            wall("east", [1.8, 0.0], [1.8, 1.2]),
+            wall("north", [1.8, 1.2], [0.5, 1.2]),
+            wall("side of the block", [0.5, 1.2], [0.5, 0.8]),
+            wall("front of the block", [0.5, 0.8], [0.0, 0.8]),
+            wall("west", [0.0, 0.8], [0.0, 0.0]),
+        ];
+        let corners = [[1.4, 0.4], [1.4, 0.8], [0.8, 0.8], [0.8, 0.4], [0.4, 0.4]];
+        Self {
+            walls: walls.concat(),
+            start: [0.4, 0.4],
+            corners: format!("{corners:?}"),
+            obstacles: String::new(),
+        }
+    }
+
     /// A rectangle of this length and width, as `4 x 3`, metres, and a path along its walls.
     ///
     /// # Errors

@@ -5,6 +5,7 @@ const newRobot = (() => {
   const element = (id) => document.getElementById(id);
   const simulator = openSimulator(element("wasm").textContent);
   const inputs = new Map(); // by option
+  const questions = simulator.questions();
 
   function makeField({ option, what, known, default: usual, is_optional: isOptional }) {
     const label = document.createElement("label");
@@ -13,9 +14,21 @@ const newRobot = (() => {
     if (isOptional) input.placeholder = `none, or ${usual}`; else input.value = usual;
     const text = what[0].toUpperCase() + what.slice(1);
     label.append(text, input);
-    input.addEventListener("input", option === "board" ? loadProgram : show);
+    input.addEventListener("input", option === "board" ? changeBoard : show);
     inputs.set(option, input);
     return label;
+  }
+
+  // A board that is sold with a robot has answers of its own; the others have the usual ones again.
+  let kit = null;
+  function changeBoard() {
+    const board = inputs.get("board").value;
+    for (const { option, default: usual, of_kits: ofKits } of questions) {
+      const before = ofKits[kit] ?? usual, input = inputs.get(option);
+      if (Object.keys(ofKits).length > 0 && input.value === before) input.value = ofKits[board] ?? usual;
+    }
+    kit = board;
+    loadProgram();
   }
 
   const answers = () => Object.fromEntries([...inputs].map(([option, { value }]) => [option, value]));
@@ -89,7 +102,7 @@ const newRobot = (() => {
     URL.revokeObjectURL(link.href);
   }
 
-  element("fields").append(...simulator.questions().map(makeField));
+  element("fields").append(...questions.map(makeField));
   element("program").addEventListener("input", loadProgram);
   element("robot").addEventListener("submit", download);
   loadProgram();

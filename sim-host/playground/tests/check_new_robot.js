@@ -21,7 +21,12 @@
   set("board", "esp32c6");
   set("sonar", "vl53l1x");
   assert(element("error").textContent.includes("ESP32-C6"), "a board without a bus");
+  set("sonar", "hc_sr04");
+  set("board", "xrp");
+  assert(inputs.get("wheel-diameter").value === "60 mm" && warned() === "", `a kit: ${warned()}`);
   set("board", "pico");
+  assert(inputs.get("wheel-diameter").value === "65 mm", "the usual wheels again");
+  set("sonar", "vl53l1x");
   set("second-at", "90 deg");
   set("room", "5 x 3.5");
   assert(element("error").hidden && warned() === "", `a robot with two rangers: ${element("error").textContent}${warned()}`);

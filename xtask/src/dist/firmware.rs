@@ -119,7 +119,13 @@ mod tests {
             .iter()
             .filter_map(|board| Some((board.name.as_str(), board.uf2.as_ref()?.family)))
             .collect();
-        assert_eq!(families, [("pico2", 0xe48b_ff59), ("pico", 0xe48b_ff56)]);
+        let expected = [
+            ("pico2", 0xe48b_ff59),
+            ("pico", 0xe48b_ff56),
+            ("xrp", 0xe48b_ff56),
+            ("xrp-rp2350", 0xe48b_ff59),
+        ];
+        assert_eq!(families, expected);
         assert!(boards.iter().all(|board| board.usb == board.uf2.is_some()));
     }
 }

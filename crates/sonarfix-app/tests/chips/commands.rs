@@ -8,7 +8,7 @@ use sonarfix_link::{Command, Motion, Telemetry, baked};
 
 use crate::pico::Pico;
 use crate::results::{Table, polls, row};
-use crate::{ELF, beside, configuration, done, driving, map, start, world};
+use crate::{ELF, beside, configuration, done, driving, image, map, start, world};
 
 /// From the last motion that the PC commands to motors without voltage, milliseconds: the motion lasts 300.
 const UNPOWERED_WITHIN: f64 = 350.0;
@@ -53,6 +53,39 @@ fn a_configuration_that_was_sent_survives_resets_of_every_kind() {
         done(pico.order(&Command::Stop));
     }
     polls("configuration over the link, resets", pico.polls());
+}
+
+/// What `sonarfix command self-test --loop` reads: the captured widths are those of the pulses, by the clock of the chip.
+#[test]
+#[ignore = "cargo xtask chips"]
+fn a_wire_from_the_servo_to_the_echo_shows_its_pulses() {
+    let mut pico = Pico::switched_on(ELF, &world(), &map(), &image(&configuration()));
+    pico.ask("loop");
+    pico.hello();
+    done(pico.order(&Command::ShowDevices));
+    let (mut steady, mut before, mut captured, mut worst) = (0, 0.0, 0, 0.0_f64);
+    for _ in 0..90 {
+        pico.run(100, &[]);
+        for message in pico.messages() {
+            let Telemetry::Devices(readings) = message else { continue };
+            let pulse = f64::from(readings.servo.unwrap().micros);
+            steady = if (pulse - before).abs() < 0.1 { steady + 1 } else { 0 };
+            before = pulse;
+            let Some(Ok(echo)) = readings.ping.filter(|_| steady >= 5) else { continue };
+            let width = echo.heard.checked_duration_since(echo.sent).unwrap().to_micros();
+            #[expect(clippy::cast_precision_loss, reason = "some milliseconds")]
+            let off = (width as f64 - pulse).abs();
+            (captured, worst) = (captured + 1, worst.max(off));
+        }
+    }
+    row(
+        Table::Measured,
+        &[
+            &"width of the servo's pulses, captured by the echo's pin: off by at most",
+            &format!("{worst:.1} µs"),
+        ],
+    );
+    assert!(captured > 20 && worst <= 3.0, "{captured} pulses, {worst} µs");
 }
 
 /// A pose beside the robot, then the right one: the estimate follows both, and nothing else is disturbed.

@@ -1,4 +1,4 @@
-//! The shipped firmware of the Raspberry Pi Pico on an emulated RP2040, with a robot in a room, over its UART.
+//! The shipped firmware of the Raspberry Pi Pico and of the XRP on an emulated RP2040, with a robot in a room, over its UART.
 //!
 //! `cargo xtask chips` builds it and runs these. `firmware/chips` is the chip: `rp2040js`, with what it lacks. All times are those of the
 //! chip, and each run is the same.
@@ -10,6 +10,8 @@ mod commands;
 mod long;
 mod pico;
 mod results;
+mod search;
+mod xrp;
 
 use pico::{Counters, Event, Pico, Polls, World};
 use results::{Table, polls, row};
@@ -34,14 +36,22 @@ const CORNERS: [(f32, f32); 7] =
 const POSE: [f32; 3] = [1.1, 1.3, 0.0];
 
 fn world() -> World {
-    let wall = |ends: &[(f32, f32)]| [ends[0].0, ends[0].1, ends[1].0, ends[1].1];
-    World { walls: CORNERS.windows(2).map(wall).collect(), pose: POSE, seed: 1 }
+    World { board: "pico", walls: segments(&CORNERS), pose: POSE, seed: 1 }
+}
+
+/// The walls between these corners.
+fn segments(corners: &[(f32, f32)]) -> Vec<[f32; 4]> {
+    corners.windows(2).map(|ends| [ends[0].0, ends[0].1, ends[1].0, ends[1].1]).collect()
 }
 
 fn map() -> Vec<u8> {
+    map_of(&CORNERS)
+}
+
+fn map_of(corners: &[(f32, f32)]) -> Vec<u8> {
     let point = |(x, y): (f32, f32)| Point::new(x, y);
     let wall = |ends: &[(f32, f32)]| Wall::new(point(ends[0]), point(ends[1])).unwrap();
-    sonarfix_map::bake(&CORNERS.windows(2).map(wall).collect::<Vec<_>>()).unwrap()
+    sonarfix_map::bake(&corners.windows(2).map(wall).collect::<Vec<_>>()).unwrap()
 }
 
 /// The robot of the wiring in docs/firmware.md.

@@ -1,4 +1,4 @@
-//! A Pico on an emulated chip, and the PC at the other end of its link, in lock step: each order states for how long the chip executes.
+//! A Pico, or an XRP with a Pico, on an emulated chip, and the PC at the other end of its link, in lock step: each order states for how long the chip executes.
 
 use std::collections::VecDeque;
 use std::fmt::Write as _;
@@ -15,8 +15,6 @@ use tempfile::TempDir;
 /// Where `memory.x` has the regions.
 const CONFIG_AT: &str = "0x10100000";
 const MAP_AT: &str = "0x10180000";
-/// The address of the function that is a poll.
-const POLL: &str = "SONARFIX_PICO_POLL";
 /// The time of the chip that passes at once, milliseconds.
 const SLICE: u32 = 10;
 /// The time after which a command without an answer is repeated, milliseconds.
@@ -26,6 +24,8 @@ const PATIENCE: u32 = 15_000;
 
 /// What happens around the chip.
 pub struct World {
+    /// The wiring of the board and its robot, by its name in `firmware/chips/wirings.mjs`.
+    pub board: &'static str,
     /// Segments of two points.
     pub walls: Vec<[f32; 4]>,
     pub pose: [f32; 3],
@@ -129,8 +129,10 @@ impl Pico {
         let files = TempDir::new().unwrap();
         let path = |name: &str| files.path().join(name);
         let walls: Vec<String> = world.walls.iter().map(|wall| format!("{wall:?}")).collect();
-        let (walls, pose, seed) = (walls.join(","), world.pose, world.seed);
-        let world = format!(r#"{{"walls":[{walls}],"pose":{pose:?},"seed":{seed}}}"#);
+        let (board, walls) = (world.board, walls.join(","));
+        let (pose, seed) = (world.pose, world.seed);
+        let world =
+            format!(r#"{{"board":"{board}","walls":[{walls}],"pose":{pose:?},"seed":{seed}}}"#);
         std::fs::write(path("world.json"), world).unwrap();
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../firmware/chips");
         let mut command = Process::new("node");
@@ -162,7 +164,9 @@ impl Pico {
                 pico.ask(&format!("image {at} {}", file.display()));
             }
         }
-        pico.ask(&format!("count {}", passed(POLL)));
+        // The address of its function that is a poll.
+        let (board, _) = variable.rsplit_once('_').unwrap();
+        pico.ask(&format!("count {}", passed(&format!("{board}_POLL"))));
         pico.ask("start");
         pico
     }
@@ -301,6 +305,11 @@ impl Pico {
         let counts: Vec<u64> = answer.split(' ').map(|word| word.parse().unwrap()).collect();
         let [count, driving, waiting] = counts[..] else { panic!("{answer}") };
         Polls { count, driving, waiting }
+    }
+
+    /// How many samples of the gyro were read.
+    pub fn gyro_samples(&mut self) -> u64 {
+        self.ask("gyro").parse().unwrap()
     }
 
     /// Frames of the robot that were damaged, that this program cannot decode, or for which the line had no room.

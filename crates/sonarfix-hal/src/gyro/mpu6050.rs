@@ -8,7 +8,7 @@ use embedded_hal::i2c::I2c;
 use sonarfix::geometry::units::RadiansPerSecond;
 use sonarfix::sensor::gyro::GyroParameters;
 
-use super::{Unreadable, YawRate};
+use super::{GyroError, SMALLEST_RANGE, Unreadable, YawRate, range, times_two};
 
 /// The address with AD0 low; with AD0 high it is one more.
 const ADDRESS: u8 = 0x68;
@@ -28,36 +28,8 @@ const AWAKE: u8 = 1;
 const FILTER: u8 = 2;
 /// The filter's output has 1,000 samples a second, each of which is kept.
 const EVERY_SAMPLE: u8 = 0;
-/// The smallest range, °/s; each of the three others has twice the one before.
-const SMALLEST_RANGE: f32 = 250.0;
-const RANGES: u8 = 4;
 /// Counts at the end of the range.
 const FULL_SCALE: f32 = 32_768.0;
-
-/// Why an MPU-6050 cannot be used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum Mpu6050Error {
-    /// It does not respond on the bus.
-    Bus,
-    /// Another device responds, with this identity.
-    Identity(u8),
-    /// The configured range is larger than its largest, 2,000°/s.
-    Range,
-}
-
-impl core::fmt::Display for Mpu6050Error {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Bus => f.write_str("the gyro does not respond on the bus"),
-            Self::Identity(found) => write!(f, "{found:#04x} responds instead of an MPU-6050"),
-            Self::Range => f.write_str("the range of the gyro exceeds 2,000 degrees per second"),
-        }
-    }
-}
-
-impl core::error::Error for Mpu6050Error {}
 
 /// The driver.
 ///
@@ -78,7 +50,7 @@ impl core::error::Error for Mpu6050Error {}
 /// // 131 counts are 1°/s in the range of 250°/s.
 /// assert!((gyro.rate().unwrap().to_degrees() - 1.0).abs() < 1e-3);
 /// bus.done();
-/// # Ok::<(), sonarfix_hal::gyro::Mpu6050Error>(())
+/// # Ok::<(), sonarfix_hal::gyro::GyroError>(())
 /// ```
 #[derive(Debug)]
 pub struct Mpu6050<B> {
@@ -100,32 +72,28 @@ impl<B: I2c> Mpu6050<B> {
         Self { address: ADDRESS + 1, ..self }
     }
 
-    fn write(&mut self, register: u8, value: u8) -> Result<(), Mpu6050Error> {
-        self.bus.write(self.address, &[register, value]).map_err(|_| Mpu6050Error::Bus)
+    fn write(&mut self, register: u8, value: u8) -> Result<(), GyroError> {
+        self.bus.write(self.address, &[register, value]).map_err(|_| GyroError::Bus)
     }
 }
 
 impl<B: I2c> YawRate for Mpu6050<B> {
-    type Error = Mpu6050Error;
+    type Error = GyroError;
 
-    fn configure(&mut self, parameters: &GyroParameters) -> Result<(), Mpu6050Error> {
-        let wanted = parameters.range.to_degrees();
-        // Half a per mille for the conversion to radians and back.
-        let range = |number: u8| SMALLEST_RANGE * f32::from(1_u8 << number) * 1.0005;
-        let number = (0..RANGES).find(|&number| wanted <= range(number));
-        let number = number.ok_or(Mpu6050Error::Range)?;
+    fn configure(&mut self, parameters: &GyroParameters) -> Result<(), GyroError> {
+        let number = range(parameters)?;
         let mut identity = [0];
         let read = self.bus.write_read(self.address, &[WHO_AM_I], &mut identity);
-        read.map_err(|_| Mpu6050Error::Bus)?;
+        read.map_err(|_| GyroError::Bus)?;
         let [identity] = identity;
         if !IDENTITIES.contains(&identity) {
-            return Err(Mpu6050Error::Identity(identity));
+            return Err(GyroError::Identity(identity));
         }
         self.write(POWER, AWAKE)?;
         self.write(SAMPLE_RATE_DIVIDER, EVERY_SAMPLE)?;
         self.write(CONFIG, FILTER)?;
         self.write(GYRO_CONFIG, number << 3)?;
-        let full = RadiansPerSecond::from_degrees(SMALLEST_RANGE * f32::from(1_u8 << number));
+        let full = RadiansPerSecond::from_degrees(times_two(SMALLEST_RANGE, number));
         let sign = if parameters.is_inverted { -1.0 } else { 1.0 };
         self.per_count = sign * full.0 / FULL_SCALE;
         Ok(())

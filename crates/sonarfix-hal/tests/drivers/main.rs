@@ -4,6 +4,7 @@
 
 #[cfg(feature = "async")]
 mod asynch;
+mod lsm6dso;
 mod mpu6050;
 mod pulse;
 mod quadrature;

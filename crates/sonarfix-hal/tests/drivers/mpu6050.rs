@@ -5,7 +5,7 @@ use embedded_hal_mock::eh1::i2c::{Mock, Transaction as I2c};
 use proptest::prelude::*;
 use sonarfix::geometry::units::RadiansPerSecond;
 use sonarfix::sensor::gyro::GyroParameters;
-use sonarfix_hal::gyro::{Mpu6050, Mpu6050Error, Unreadable, YawRate};
+use sonarfix_hal::gyro::{GyroError, Mpu6050, Unreadable, YawRate};
 
 /// The transfers that configure the sensor at this address for a range.
 fn configuration(address: u8, identity: u8, range: u8) -> Vec<I2c> {
@@ -56,8 +56,8 @@ fn its_relatives_have_the_same_registers_and_ad0_another_address() {
 fn another_device_and_a_range_beyond_its_own_are_refused() {
     let mut bus = Mock::new(&[I2c::write_read(0x68, vec![0x75], vec![0x12])]);
     let mut gyro = Mpu6050::new(bus.clone());
-    assert_eq!(gyro.configure(&GyroParameters::MPU_6050), Err(Mpu6050Error::Identity(0x12)));
-    assert_eq!(gyro.configure(&parameters(2_100.0, false)), Err(Mpu6050Error::Range));
+    assert_eq!(gyro.configure(&GyroParameters::MPU_6050), Err(GyroError::Identity(0x12)));
+    assert_eq!(gyro.configure(&parameters(2_100.0, false)), Err(GyroError::Range));
     bus.done();
 }
 
@@ -68,7 +68,7 @@ fn a_bus_without_an_answer_is_an_error() {
     transfers.push(I2c::write_read(0x68, vec![0x47], vec![0, 0]).with_error(lost()));
     let mut bus = Mock::new(&transfers);
     let mut gyro = Mpu6050::new(bus.clone());
-    assert_eq!(gyro.configure(&GyroParameters::MPU_6050), Err(Mpu6050Error::Bus));
+    assert_eq!(gyro.configure(&GyroParameters::MPU_6050), Err(GyroError::Bus));
     assert_eq!(gyro.configure(&GyroParameters::MPU_6050), Ok(()));
     assert_eq!(gyro.rate(), Err(Unreadable));
     bus.done();

@@ -229,6 +229,17 @@ struct Candidate {
     score: f32,
 }
 
+/// The best candidates.
+struct Shortlist {
+    /// Best first.
+    ranked: [Option<Ranked>; SHORTLIST],
+    /// The first of them as a whole: it is nearly always the one that is chosen, and to compute a candidate again is an eighth of the
+    /// cost of a choice.
+    first: Option<Candidate>,
+    /// The number of all candidates.
+    count: u16,
+}
+
 /// Bearing of the servo for a wall.
 struct Pointing {
     bearing: Radians,
@@ -278,41 +289,43 @@ impl<'a> Planner<'a> {
     fn best(&self, candidate: impl Fn(WallId, &Wall) -> Option<Candidate>) -> Result<Aim, NoAim> {
         let mut after = None;
         loop {
-            let (shortlist, count) = self.shortlist(&candidate, after);
-            for ranked in shortlist.iter().flatten() {
-                let best =
-                    self.map.wall(ranked.wall).and_then(|wall| candidate(ranked.wall, &wall));
-                if let Some(best) = best.filter(|best| !self.is_occluded(ranked.wall, best)) {
-                    return Ok(best.aim(self.ranger, ranked.wall, count));
+            let Shortlist { ranked, mut first, count } = self.shortlist(&candidate, after);
+            for &Ranked { wall: id, .. } in ranked.iter().flatten() {
+                let again = || self.map.wall(id).and_then(|wall| candidate(id, &wall));
+                let best = first.take().or_else(again);
+                if let Some(best) = best.filter(|best| !self.is_occluded(id, best)) {
+                    return Ok(best.aim(self.ranger, id, count));
                 }
             }
             // The list is not full: there are no more candidates.
-            after = *shortlist.last().ok_or(NoAim::NoWall)?;
+            after = *ranked.last().ok_or(NoAim::NoWall)?;
             if after.is_none() {
                 return Err(NoAim::NoWall);
             }
         }
     }
 
-    /// The best candidates that rank after `after`, and the number of all candidates.
+    /// The best candidates that rank after `after`.
     fn shortlist(
         &self,
         candidate: impl Fn(WallId, &Wall) -> Option<Candidate>,
         after: Option<Ranked>,
-    ) -> ([Option<Ranked>; SHORTLIST], u16) {
-        let mut shortlist = [None; SHORTLIST];
-        let mut count = 0_u16;
+    ) -> Shortlist {
+        let mut list = Shortlist { ranked: [None; SHORTLIST], first: None, count: 0 };
         for (wall, segment) in self.map.near(self.view.position(), self.sonar.max_range) {
             let Some(candidate) = candidate(wall, &segment) else {
                 continue;
             };
-            count = count.saturating_add(1);
+            list.count = list.count.saturating_add(1);
             let ranked = Ranked { wall, score: candidate.score };
             if after.is_none_or(|after| after.is_before(ranked)) {
-                ranked.insert(&mut shortlist);
+                ranked.insert(&mut list.ranked);
+                if matches!(list.ranked, [Some(first), ..] if first.wall == wall) {
+                    list.first = Some(candidate);
+                }
             }
         }
-        (shortlist, count)
+        list
     }
 
     /// A wall with the servo turned to it.
@@ -376,10 +389,11 @@ impl<'a> Planner<'a> {
         let noise = SquareMetres(sight.noise + map_variance * sight.of_map + of_mount);
         let ahead = self.view.ahead_of(self.ranger);
         let prediction = self.ekf.predict_measurement(&expected, ahead);
-        let wheels = self.ekf.cross_covariance_of_wheels(&prediction);
+        let weights = self.config.weights;
+        let wheels = weights.are_set().then(|| self.ekf.cross_covariance_of_wheels(&prediction));
         Candidate {
             bearing: pointing.bearing,
-            gain: expected_gain(&prediction, wheels, noise, self.config.weights),
+            gain: expected_gain(&prediction, wheels, noise, weights),
             success: works * (1.0 - entry.occlusion) * on_wall * square,
             seconds: self.duration.ping(pointing.until_ping, range),
             score: 0.0,
@@ -396,15 +410,16 @@ impl<'a> Planner<'a> {
         let target = self.reachable(bearing_after(0.0));
         let turn = self.duration.turn(target - current);
         let until_ping = if turn > rest { turn } else { rest };
-        let off_without_turn = bearing_after(rest) - current;
         let range = expected.range;
-        let is_faster = self.duration.ping(rest, range) < self.duration.ping(until_ping, range);
-        if is_faster && off_without_turn.abs() <= self.sonar.cone * DEAD_BAND {
+        // Most walls are far from where the servo stands, and most servos turn for longer than the ranger rests.
+        let is_faster = || self.duration.ping(rest, range) < self.duration.ping(until_ping, range);
+        let off_without_turn = bearing_after(rest) - current;
+        if off_without_turn.abs() <= self.sonar.cone * DEAD_BAND && is_faster() {
             return Pointing { bearing: current, off: off_without_turn, until_ping: rest };
         }
         let square = bearing_after(until_ping);
         let bearing = self.reachable(square);
-        let off = Heading::new(square).from(Heading::new(bearing));
+        let off = turn_to(square, bearing);
         Pointing { bearing, off, until_ping }
     }
 
@@ -426,8 +441,7 @@ impl<'a> Planner<'a> {
         if bearing >= right && bearing <= left {
             return bearing;
         }
-        let beyond = |limit: Radians| Heading::new(bearing).from(Heading::new(limit)).abs();
-        if beyond(right) < beyond(left) { right } else { left }
+        if turn_to(bearing, right).abs() < turn_to(bearing, left).abs() { right } else { left }
     }
 
     /// Whether another wall of the map returns an earlier echo.
@@ -437,6 +451,12 @@ impl<'a> Planner<'a> {
             .near(self.view.position(), beam.reach())
             .any(|(id, wall)| id != target && beam.is_occluded_by(&wall))
     }
+}
+
+/// The smallest turn to a bearing from another one. Not inlined, because it is needed at several places.
+#[inline(never)]
+fn turn_to(to: Radians, from: Radians) -> Radians {
+    Heading::new(to).from(Heading::new(from))
 }
 
 // ===== Eq. (22): score =====

@@ -151,6 +151,13 @@ pub struct Weights {
     pub wheels: Metres,
 }
 
+impl Weights {
+    /// Whether anything but the position has a weight.
+    pub(crate) fn are_set(self) -> bool {
+        self.heading.0.abs() > 0.0 || self.wheels.0.abs() > 0.0
+    }
+}
+
 /// The configuration of a localizer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -264,7 +271,6 @@ impl Config {
     }
 
     /// What the mount of a ranger adds to the variance of its ranges, m²: that of a further ranger is not estimated.
-    #[inline]
     pub(crate) fn mount_noise(&self, ranger: RangerId) -> f32 {
         let is_estimated = MAX_RANGERS == 1 || ranger == RangerId::FIRST;
         if is_estimated { 0.0 } else { self.prior.mount.0 * self.prior.mount.0 }

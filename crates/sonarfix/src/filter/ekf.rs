@@ -319,9 +319,10 @@ impl Ekf {
         ahead: Option<Vector>,
     ) -> PredictedMeasurement<'e> {
         let mut prediction = self.p_without_walk.project(expected);
-        if let Some((mount, ahead)) = self.mounted.get().zip(ahead) {
+        if let Some(mount) = self.mounted.get() {
             let by = Vector::new(expected.by_x, expected.by_y);
-            mount.add_to(&mut prediction, (by.dot(ahead), by.dot(ahead.left())));
+            let by = ahead.map_or((0.0, 0.0), |ahead| (by.dot(ahead), by.dot(ahead.left())));
+            mount.add_to(&mut prediction, by);
         }
         prediction
     }

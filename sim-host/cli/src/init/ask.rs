@@ -4,9 +4,10 @@ use std::io::{IsTerminal, Write, stderr, stdin};
 
 use sonarfix_new_robot::Question;
 
-/// The answer on a terminal, which may be empty for the default; without a terminal the default, at once.
-pub fn ask(question: &Question) -> anyhow::Result<String> {
-    let Question { option, what, known, default, .. } = question;
+/// The answer on a terminal, which may be empty for the usual one of the board; without a terminal that one, at once.
+pub fn ask(question: &Question, board: Option<&str>) -> anyhow::Result<String> {
+    let Question { option, what, known, .. } = question;
+    let default = question.usual(board);
     let mut answer = String::new();
     if stdin().is_terminal() && stderr().is_terminal() {
         let list =
@@ -19,5 +20,5 @@ pub fn ask(question: &Question) -> anyhow::Result<String> {
         eprintln!("{what}: {default} (--{option} is not given)");
     }
     let answer = answer.trim();
-    Ok(if answer.is_empty() { (*default).to_owned() } else { answer.to_owned() })
+    Ok(if answer.is_empty() { default.to_owned() } else { answer.to_owned() })
 }

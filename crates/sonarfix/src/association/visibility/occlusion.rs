@@ -89,12 +89,14 @@ impl Beam {
 
     /// Whether both ends of a wall are on the outer side of one boundary of the occluding region.
     fn is_beside(&self, from: BeamPoint, to: BeamPoint) -> bool {
-        let ((right_a, left_a), (right_b, left_b)) = (self.margins(from), self.margins(to));
-        (from.ahead >= self.distance && to.ahead >= self.distance)
-            || (right_a < 0.0 && right_b < 0.0)
-            || (left_a < 0.0 && left_b < 0.0)
+        if (from.ahead >= self.distance && to.ahead >= self.distance)
             || (from.ahead + self.uncertainty_ahead <= 0.0
                 && to.ahead + self.uncertainty_ahead <= 0.0)
+        {
+            return true;
+        }
+        let ((right_a, left_a), (right_b, left_b)) = (self.margins(from), self.margins(to));
+        (right_a < 0.0 && right_b < 0.0) || (left_a < 0.0 && left_b < 0.0)
     }
 
     /// Whether the wall between two points crosses the beam, displaced by at most the uncertainty

@@ -72,6 +72,8 @@ pub(crate) struct Viewpoint<'a> {
     /// Least probability of foot and range.
     pub(super) least: f32,
     covariance: PoseCovariance,
+    /// Square of a distance from a limit at which it is certain to hold, whatever the direction of the wall.
+    certain_squared: f32,
     /// What the echo model knows of the sensor.
     echo: &'a EchoParameters,
     /// Angle off the perpendicular at which half of the walls answer, and its variance, rad².
@@ -81,8 +83,10 @@ pub(crate) struct Viewpoint<'a> {
 
 impl<'a> Viewpoint<'a> {
     pub fn new(config: &'a Config, sonar: &'a RangerParameters, ekf: &Ekf) -> Self {
-        let state = ekf.state();
+        let (state, covariance) = (ekf.state(), ekf.pose_covariance());
         Self {
+            certain_squared: certain_squared(&covariance),
+            covariance,
             sonar,
             position: SonarPosition::new(sonar.mount, &state),
             heading: ekf.heading(),
@@ -92,7 +96,6 @@ impl<'a> Viewpoint<'a> {
             },
             confidence: config.gating.confidence,
             least: SAFE,
-            covariance: ekf.pose_covariance(),
             echo: &config.echo,
             half_angle: half_angle(sonar, &config.echo),
             rim_squared: config.echo.rim.0 * config.echo.rim.0,
@@ -189,8 +192,8 @@ impl<'a> Viewpoint<'a> {
     pub fn expected_range(&self, wall: &Wall) -> Result<(ExpectedRange, f32), Refusal> {
         let position = self.position();
         let along = wall.along(position).0;
-        let variance = self.variance(wall.b(), -wall.a()) + FOOT_MARGIN * FOOT_MARGIN;
-        let on_wall = probability_within(along, wall.length().0 - along, variance);
+        let rest = wall.length().0 - along;
+        let on_wall = self.probability_along((wall.b(), -wall.a()), FOOT_MARGIN, along, rest);
         // Neither comparison holds for NaN.
         let is_on_wall = on_wall >= self.least;
         if !is_on_wall {
@@ -199,13 +202,22 @@ impl<'a> Viewpoint<'a> {
         let distance = wall.signed_distance(position).0.abs();
         let range = self.position.stretch * distance;
         let (nearest, farthest) = (self.sonar.min_range.0, self.sonar.max_range.0);
-        let variance = self.variance(wall.a(), wall.b()) + RANGE_MARGIN * RANGE_MARGIN;
-        let in_range = probability_within(range - nearest, farthest - range, variance);
+        let (below, above) = (range - nearest, farthest - range);
+        let in_range = self.probability_along((wall.a(), wall.b()), RANGE_MARGIN, below, above);
         let is_in_range = in_range >= self.least;
         if !is_in_range {
             return Err(Refusal::OutOfRange);
         }
         Ok((ExpectedRange::from_sonar(wall, &self.position), on_wall * in_range))
+    }
+
+    /// [`probability_within`] of the position along a unit vector, with a margin. The variance is computed only if it matters.
+    fn probability_along(&self, (x, y): (f32, f32), margin: f32, below: f32, above: f32) -> f32 {
+        let least = if below < above { below } else { above };
+        if least > 0.0 && least * least >= self.certain_squared {
+            return 1.0;
+        }
+        probability_within(below, above, self.variance(x, y) + margin * margin)
     }
 
     /// Whether the heading is known well enough to tell what is in a beam.
@@ -295,6 +307,14 @@ pub(crate) fn check_range(
 
 /// Standard deviations beyond which a limit is certain to hold: the probability that it does not is 3e-5.
 const CERTAIN: f32 = 4.0;
+
+/// From this on [`probability_within`] is 1 with every variance of the position: none exceeds the sum of those of x and y by more than
+/// its rounding.
+fn certain_squared(covariance: &PoseCovariance) -> f32 {
+    const ROUNDING: f32 = 1.001;
+    let most = covariance.xx + covariance.yy + FOOT_MARGIN * FOOT_MARGIN;
+    CERTAIN * CERTAIN * ROUNDING * most
+}
 
 /// Probability that a normal variable with this variance lies less than `below` below its mean and less than
 /// `above` above it.

@@ -41,7 +41,7 @@ pub struct MountShare {
     /// Covariances of the seven states with L e, where e are the errors of the mount.
     pub(super) states: StateColumn,
     /// Covariances of the errors of the mount with the measurement, ahead and to the left, m².
-    own: MountCovariance,
+    pub(super) own: MountCovariance,
     /// L.
     by: (f32, f32),
     /// Covariance of L e with the measurement, m².
@@ -130,13 +130,6 @@ impl Mount {
         m.k += states.k;
         prediction.variance += of_states + along;
         prediction.mount = Some(MountShare { states, own, by, along });
-    }
-
-    /// Covariances of the errors with a measurement.
-    pub fn covariance_with(&self, prediction: &PredictedMeasurement) -> MountCovariance {
-        let h = &prediction.expected.jacobian();
-        let of_states = || (self.ahead.times(h), self.left.times(h));
-        prediction.mount().map_or_else(of_states, |mount| mount.own)
     }
 
     /// Covariances of the errors with a difference of turns.

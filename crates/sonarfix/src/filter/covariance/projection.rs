@@ -1,7 +1,7 @@
 //! Projection of P onto a measurement: P Hᵀ and H P Hᵀ (`docs/model.md`, eq. 14).
 
 use super::blocks::Covariance;
-use super::mount::MountShare;
+use super::mount::{MountCovariance, MountShare};
 use crate::geometry::units::{Metres, SquareMetres};
 use crate::sensor::range::{ExpectedRange, Innovation};
 
@@ -36,6 +36,12 @@ impl PredictedMeasurement<'_> {
     #[inline]
     pub(super) fn mount(&self) -> Option<&MountShare> {
         if cfg!(feature = "mount") { self.mount.as_ref() } else { None }
+    }
+
+    /// Covariances of the errors of the mount with the measurement, if the mount is estimated.
+    #[inline]
+    pub fn covariance_with_mount(&self) -> Option<MountCovariance> {
+        self.mount().map(|mount| mount.own)
     }
 
     // ===== Eq. (14): ν and S =====

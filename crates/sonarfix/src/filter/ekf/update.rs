@@ -174,7 +174,6 @@ impl Ekf {
 
 impl Ekf {
     /// Corrects what stands beside P after P; `share` of K mᵀ is what P has lost.
-    #[inline]
     fn correct_beside(
         &mut self,
         prediction: &PredictedMeasurement,
@@ -183,7 +182,7 @@ impl Ekf {
         share: f32,
         bias: Option<&mut GyroBias>,
     ) {
-        let own = self.mounted.get().map(|mount| mount.covariance_with(prediction));
+        let own = prediction.covariance_with_mount();
         if let Some(bias) = bias {
             bias.correct(prediction, own.unwrap_or_default(), gain, innovation, share);
         }

@@ -3,6 +3,8 @@
 #![no_std]
 #![no_main]
 
+#[cfg(feature = "drive")]
+mod driving;
 #[cfg(feature = "search")]
 mod searching;
 
@@ -119,10 +121,13 @@ fn drive() -> Option<bool> {
     link_the_rest(&mut robot, &config);
     #[cfg(feature = "search")]
     searching::link(robot.localizer.clone(), &config);
-    #[cfg(feature = "search")]
-    let bytes = size_of::<Localizer>() + searching::BYTES;
-    #[cfg(not(feature = "search"))]
+    #[cfg(feature = "drive")]
+    driving::link(&robot.localizer);
     let bytes = size_of::<Localizer>();
+    #[cfg(feature = "search")]
+    let bytes = bytes + searching::BYTES;
+    #[cfg(feature = "drive")]
+    let bytes = bytes + driving::BYTES;
     report::line(c"object", u32::try_from(bytes).unwrap_or(u32::MAX));
     Some(well)
 }

@@ -1,0 +1,63 @@
+//! A robot that starts without a pose: it searches while a PC drives it.
+
+use sonarfix::geometry::units::{MetresPerSecond, RadiansPerSecond};
+use sonarfix_hal::config::{RobotConfig, StartPose};
+use sonarfix_link::{Command, Motion, Telemetry};
+use sonarfix_search::navigator::Mode;
+
+use crate::pico::{Pico, World};
+use crate::results::{Table, polls_within, row};
+use crate::{ELF, configuration, done, image, map, world};
+
+/// The longest search, seconds. A cycle of the search takes a Cortex-M0+ seconds, and an answer needs several.
+const FOUND_WITHIN: f64 = 120.0;
+/// The largest error of the pose that was found, metres.
+const OFF: f64 = 0.1;
+/// The most instructions of a poll of a robot that drives and searches.
+const LONGEST_POLL: u64 = 200_000;
+/// A circle of 0.7 m, which stays within the room.
+const MOTION: Motion = Motion { speed: MetresPerSecond(0.15), turn: RadiansPerSecond(0.43) };
+
+/// The robot of the other scenarios, which searches and may drive meanwhile.
+fn searching() -> RobotConfig {
+    let mut config = RobotConfig { start: StartPose::Unknown { region: None }, ..configuration() };
+    config.motors.lost = true;
+    config
+}
+
+#[test]
+#[ignore = "cargo xtask chips --long"]
+fn a_robot_without_a_pose_finds_it_within_two_minutes() {
+    let world = World { pose: [1.1, 1.1, 0.6], ..world() };
+    let mut pico = Pico::switched_on(ELF, &world, &map(), &image(&searching()));
+    pico.hello();
+    done(pico.order(&Command::Start));
+    let began = pico.state().ms;
+    let mut found = None;
+    while found.is_none() {
+        let seconds = (pico.state().ms - began) / 1e3;
+        assert!(seconds <= FOUND_WITHIN, "no pose was found");
+        done(pico.order(&Command::Drive(MOTION)));
+        pico.run(80, &[]);
+        let unique = pico.messages().into_iter().find_map(|message| match message {
+            Telemetry::ModeChanged(it) if it.mode == Mode::Provisional => Some(it.estimate),
+            _ => None,
+        });
+        found = unique.map(|estimate| {
+            let pose = estimate.state.pose();
+            (seconds, pico.truth(estimate.at).distance(pose.x.0, pose.y.0))
+        });
+    }
+    let (after, off) = found.unwrap();
+    row(
+        Table::Measured,
+        &[
+            &"search from nothing: a unique answer after; off by",
+            &format!("{after:.1} s; {:.0} mm", 1e3 * off),
+        ],
+    );
+    assert!(off <= OFF, "{off} m");
+    let (counters, status) = (pico.counters(), pico.loop_status());
+    assert_eq!((status.faults.deadlines, counters.overruns, counters.lost_bytes), (0, 0, 0));
+    polls_within(LONGEST_POLL, "search from nothing", pico.polls());
+}
