@@ -122,9 +122,9 @@ enum Task {
     Msrv,
     /// The packages of the published crates build from their own files.
     Package,
-    /// The simulator as a web page, `target/playground/index.html`; in Chromium it computes the same bits as here.
+    /// What the site computes in the browser, `target/playground`: simulator, form of a new robot, live page; in Chromium it computes the same bits as here.
     Playground,
-    /// The site, `target/site`: the docs as a book, and the playground; `--check` opens each page in Chromium.
+    /// The site, `target/site`: the docs as a book, and the pages of `playground`; `--check` opens each page in Chromium.
     Site(site::Args),
     /// The Python package: its wheel in an empty environment, its tests, types, style and notebooks.
     Python(python::Args),
