@@ -38,6 +38,7 @@ mod python;
 mod ros;
 mod search_windows;
 mod site;
+mod symbols;
 mod template;
 mod thumb;
 mod unsafe_code;
@@ -209,11 +210,11 @@ fn steps() -> [Step<Task>; 37] {
 }
 
 fn main() -> ExitCode {
-    let result = match Xtask::parse().command {
+    let result = symbols::run_as_rustc().unwrap_or_else(|| match Xtask::parse().command {
         Command::Ci { names } => ci::run(&steps(), &names, ci::run_in_a_process),
         Command::Step { name } => step(&name),
         Command::Task(task) => run(task).map(|()| ExitCode::SUCCESS),
-    };
+    });
     result.unwrap_or_else(|error| {
         eprintln!("error: {error:#}");
         ExitCode::FAILURE
