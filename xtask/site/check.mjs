@@ -168,6 +168,8 @@ async function useLive(page, where) {
     await shows("motion", "stands");
     const [download] = await Promise.all([page.waitForEvent("download"), page.click("#record")]);
     if (!readFileSync(await download.path(), "utf8").endsWith("\n# end\n")) fault(where, "the recording is not whole");
+    const [picture] = await Promise.all([page.waitForEvent("download"), page.click("#save-picture")]);
+    if (!readFileSync(await picture.path()).subarray(1, 4).equals(Buffer.from("PNG"))) fault(where, "the saved picture is no PNG");
     await page.evaluate(() => unplug());
     await shows("connection", "unplugged");
     const time = parseFloat(await read("time"));

@@ -580,7 +580,7 @@ fn fix(time: f64, sonar: [f64; 2], number: u32) -> FixRecord {
 }
 
 /// What the page shows of [`filled`].
-const SHOWN: [&str; 12] = [
+const SHOWN: [&str; 14] = [
     "A &lt;b&gt;robot&lt;/b&gt;",
     "tracking</b>",
     "19.9 s",
@@ -593,6 +593,8 @@ const SHOWN: [&str; 12] = [
     "1.145°/s ± 0.057°/s",
     "slips <",
     "0.1 s ago, 3.47 m,",
+    ", north, accepted",
+    "verdict tracking",
 ];
 
 #[test]

@@ -157,7 +157,12 @@
     value: (i) => run.fixes.innovation[i] === null ? NaN : 1e3 * run.fixes.innovation[i],
     band: (i) => run.fixes.spread[i] === null ? NaN : 3e3 * run.fixes.spread[i],
     dots: (i) => OUTCOMES[run.fixes.outcome[i]],
+    text: (i) => {
+      const { innovation, wall, outcome } = Moment.fixNumbers(Moment.recordAt(run.fixes, i), 0, run.walls);
+      return `${innovation}, ${wall}, ${outcome}`;
+    },
   };
+  const verdicts = { ...states("verdict", 1), text: (i) => VERDICTS[run.states.verdict[i]] };
   const DEGREES = 180 / Math.PI;
   const gyro = (value) => ({ time: () => run.gyro.time, value });
   const absolutes = {
@@ -167,6 +172,7 @@
   };
   const curves = [
     ["Innovation in its 3σ band; rejected ones at the edge", "mm", [["innovation", "accepted", fixes]]],
+    ["Verdict: 0 tracking, 1 degraded, 2 lost", "", [["verdict", "estimate", verdicts]]],
     ["Deviation of the position", "mm", [["σ of x", "estimate", sigma(0, 1e3)], ["σ of y", "encoders", sigma(1, 1e3)]]],
     ["Deviation of the heading", "°", [["σ", "estimate", sigma(2, 180 / Math.PI)]]],
     ["Scale errors", "%", [["right", "estimate", states("scale_right", 100)], ["left", "encoders", states("scale_left", 100)],
