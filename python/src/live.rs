@@ -11,9 +11,11 @@ use pyo3::prelude::*;
 use serde_json::Value;
 use sonarfix::geometry::units::{Duration as RobotDuration, Radians};
 use sonarfix_link::{Command, CommandResult, Telemetry};
+use sonarfix_monitor::log_files::LogFiles;
 use sonarfix_monitor::port::Port;
-use sonarfix_monitor::recording::Recording;
-use sonarfix_monitor::{Monitor as Receiver, Received, request};
+use sonarfix_monitor::request;
+use sonarfix_telemetry::recording::Recording;
+use sonarfix_telemetry::{Monitor as Receiver, Received};
 
 use crate::robot::Robot;
 use crate::{errors, localizer, values};
@@ -121,7 +123,7 @@ impl Monitor {
         force: bool,
     ) -> PyResult<Self> {
         let port = py.detach(|| Port::open(port, baud)).map_err(|e| errors::connection(&e))?;
-        let recording = record.map(|path| Recording::new(path).forced(force));
+        let recording = record.map(|path| Recording::new(LogFiles::new(path, force)));
         let (receiver, arrived) = (Receiver::default(), VecDeque::new());
         let line = Line { port, receiver, arrived, recording, is_over: false };
         Ok(Self(Mutex::new(line)))

@@ -1,7 +1,7 @@
 //! A robot with our firmware behind a serial link, as the node publishes it: what it estimates, heard and is asked to do. No port,
 //! no DDS and no clock: bytes and the time of their arrival go in.
 
-use std::time::Instant;
+use std::time::Duration;
 
 use sonarfix::geometry::pose::Pose;
 use sonarfix::geometry::units::{Metres, Radians};
@@ -10,10 +10,11 @@ use sonarfix::map::Wall;
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_link::message::Telemetry;
 use sonarfix_link::{Command, CommandResult, Estimate, Ping};
-use sonarfix_monitor::Monitor;
-use sonarfix_monitor::conversation::{Conversation, Due, Outcome};
+use sonarfix_monitor::request;
 use sonarfix_ros_messages::geometry;
 use sonarfix_ros_messages::messages::{PoseWithCovarianceStamped, Range, TFMessage};
+use sonarfix_telemetry::Monitor;
+use sonarfix_telemetry::conversation::{Conversation, Due, Outcome};
 
 use crate::markers::{self, Drawn};
 use crate::motion::{Planar, moved};
@@ -80,7 +81,7 @@ impl Bridge {
             walls,
             is_active: false,
             monitor: Monitor::default(),
-            conversation: Conversation::default(),
+            conversation: request::conversation(),
             difference: Difference::default(),
             wheels: None,
             odometry: [0.0; 3],
@@ -145,9 +146,9 @@ impl Bridge {
         self.command(Command::SetPose(start(pose, deviations)));
     }
 
-    /// The bytes to send now, if some are due.
-    pub fn to_send(&mut self, instant: Instant, now: Nanoseconds) -> Option<Vec<u8>> {
-        match self.conversation.poll(instant) {
+    /// The bytes to send now, if some are due. `time` is that since any fixed moment, and never goes back.
+    pub fn to_send(&mut self, time: Duration, now: Nanoseconds) -> Option<Vec<u8>> {
+        match self.conversation.poll(time) {
             Due::Send(bytes) => Some(bytes),
             Due::End(outcome) => {
                 self.note(outcome, now);

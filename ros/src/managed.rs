@@ -1,7 +1,7 @@
 //! The managed node: its states, its parameters, and the answers to its services. No DDS and no clock.
 
 use std::path::Path;
-use std::time::Instant;
+use std::time::Duration;
 
 use anyhow::{Context, ensure};
 use sonarfix_link::Command;
@@ -109,10 +109,10 @@ impl Managed {
         }
     }
 
-    /// The bytes to send to the robot now.
-    pub fn to_send(&mut self, instant: Instant, now: Nanoseconds) -> Option<Vec<u8>> {
+    /// The bytes to send to the robot now. `time` is that since any fixed moment, and never goes back.
+    pub fn to_send(&mut self, time: Duration, now: Nanoseconds) -> Option<Vec<u8>> {
         match &mut self.core {
-            Some(Core::Bridge(bridge)) => bridge.to_send(instant, now),
+            Some(Core::Bridge(bridge)) => bridge.to_send(time, now),
             _ => None,
         }
     }

@@ -69,6 +69,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
 
 struct Program {
     managed: Managed,
+    began: Instant,
     graph: Graph,
     /// Those that exist as long as the program.
     always: Publishers,
@@ -102,6 +103,7 @@ impl Program {
         let is_simulated = parameters.flag("use_sim_time");
         let mut program = Self {
             managed: Managed::new(names.full_name(), parameters),
+            began: Instant::now(),
             graph,
             always: Publishers::default(),
             publishers: Publishers::default(),
@@ -314,7 +316,8 @@ impl Program {
         if self.simulated != Some(0) {
             self.managed.take(Input::Tick, now);
         }
-        if let (Some(link), Some(bytes)) = (&self.link, self.managed.to_send(Instant::now(), now)) {
+        let to_send = self.managed.to_send(self.began.elapsed(), now);
+        if let (Some(link), Some(bytes)) = (&self.link, to_send) {
             link.send(bytes);
         }
         let period = self.managed.parameters().number("bond_heartbeat_period");

@@ -1,10 +1,13 @@
 // Opens every page of the site in Chromium, 400 pixels wide: in the light scheme from the disk, in the dark one from a web server.
 //
-// node check.mjs MODULES SITE BROWSER [FLAG…]: MODULES is a folder with node_modules and program.uf2, a program for a Pico 2. Prints each fault,
-// and ends with 1 if there is one.
+// node check.mjs MODULES SITE BROWSER [FLAG…]: MODULES is a folder with node_modules; program.uf2, a program for a Pico 2; and sonarfix with the
+// files of a robot in live-robot. Prints each fault, and ends with 1 if there is one.
+import { spawn } from "node:child_process";
+import { once } from "node:events";
 import { existsSync, readFileSync, readdirSync } from "node:fs";
 import { createServer } from "node:http";
 import { createRequire } from "node:module";
+import { connect } from "node:net";
 import { delimiter, extname, join } from "node:path";
 import { pathToFileURL } from "node:url";
 
@@ -17,6 +20,7 @@ const PATIENCE = 300_000; // milliseconds: beyond these the page hangs
 const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml" };
 const PLAYGROUND = "playground/index.html";
 const FORM = "new-robot/index.html";
+const LIVE = "live/index.html";
 
 const pages = readdirSync(site, { recursive: true }).filter((name) => extname(name) === ".html").sort();
 let faults = 0;
@@ -98,10 +102,94 @@ async function useForm(page, where, scheme) {
   await page.$$eval("#files details", (files) => files.forEach((it) => { it.open = true; }));
 }
 
+// In the live page: a serial port whose other end is `toRobot` and `fromRobot`, and which can be unplugged.
+function playPort() {
+  if (!location.pathname.endsWith("live/index.html")) return;
+  const serial = new EventTarget();
+  let controller = null;
+  const port = {
+    readable: null,
+    getInfo: () => ({ usbVendorId: 0x2e8a, usbProductId: 10 }),
+    async open({ baudRate }) {
+      if (baudRate !== 115200) throw new Error(`opened with ${baudRate} baud`);
+      this.readable = new ReadableStream({ start: (it) => { controller = it; } });
+      this.writable = new WritableStream({ write: (bytes) => window.toRobot([...bytes]) });
+    },
+    async close() { this.readable = controller = null; },
+  };
+  serial.requestPort = async () => port;
+  window.fromRobot = (bytes) => controller?.enqueue(new Uint8Array(bytes));
+  window.unplug = () => {
+    port.readable = null;
+    controller.error(new DOMException("The device has been lost.", "NetworkError"));
+  };
+  window.plug = () => serial.dispatchEvent(Object.defineProperty(new Event("connect"), "target", { value: port }));
+  Object.defineProperty(navigator, "serial", { value: serial });
+}
+
+// A virtual robot that stands; it prints its socket and its pose.
+async function startRobot() {
+  const robot = spawn(join(modules, "sonarfix"), ["virtual-robot", join(modules, "live-robot/scenario.toml"), "--tcp", "0", "--stand"]);
+  const expected = /tcp:127\.0\.0\.1:(\d+)[^]*set-pose (\S+) (\S+) (\S+)\n/;
+  let printed = "";
+  while (!expected.test(printed)) printed += (await once(robot.stdout, "data"))[0];
+  const [, port, x, y, heading] = printed.match(expected);
+  return { robot, socket: connect(Number(port), "127.0.0.1"), pose: { x, y, heading } };
+}
+
+// A virtual robot is connected, started, driven, recorded, unplugged, plugged in again and stopped.
+async function useLive(page, where) {
+  const { robot, socket, pose } = await startRobot();
+  const read = (name) => page.locator(`[data-value="${name}"]`).textContent();
+  const shows = (id, text) => page.waitForFunction(([of, part]) => document.getElementById(of).textContent.includes(part), [id, text]);
+  const exceeds = (name, least) => page.waitForFunction(
+    ([of, bound]) => parseFloat(document.querySelector(`[data-value="${of}"]`).textContent) > bound, [name, least]);
+  await page.exposeFunction("toRobot", (bytes) => { socket.write(Buffer.from(bytes)); });
+  socket.on("data", (data) => page.evaluate((bytes) => fromRobot(bytes), [...data]).catch(() => {}));
+  try {
+    await page.setInputFiles("#map-file", join(modules, "live-robot/map.toml"));
+    await page.setInputFiles("#robot-file", join(modules, "live-robot/robot.toml"));
+    await page.focus("#connect");
+    await page.keyboard.press("Enter");
+    await shows("connection", "connected");
+    await shows("lines", "robot");
+    for (const [name, value] of Object.entries(pose)) await page.fill(`#pose [name="${name}"]`, value);
+    await page.click("#pose button");
+    await shows("answer", "done");
+    await page.click('[data-order="start"]');
+    await shows("answer", "done");
+    await exceeds("time", 0);
+    await page.click("#record");
+    await shows("answer", "recording");
+    await page.focus("#pad");
+    await page.keyboard.down("ArrowUp");
+    await exceeds("pose", Number(pose.x) + 0.05);
+    await page.keyboard.up("ArrowUp");
+    await shows("motion", "stands");
+    const [download] = await Promise.all([page.waitForEvent("download"), page.click("#record")]);
+    if (!readFileSync(await download.path(), "utf8").endsWith("\n# end\n")) fault(where, "the recording is not whole");
+    const [picture] = await Promise.all([page.waitForEvent("download"), page.click("#save-picture")]);
+    if (!readFileSync(await picture.path()).subarray(1, 4).equals(Buffer.from("PNG"))) fault(where, "the saved picture is no PNG");
+    await page.evaluate(() => unplug());
+    await shows("connection", "unplugged");
+    const time = parseFloat(await read("time"));
+    await page.evaluate(() => plug());
+    await exceeds("time", time + 1);
+    await page.click("#halt");
+    await shows("answer", "done");
+    await page.$eval("#unsupported", (text) => { text.hidden = false; }); // as in another browser
+  } finally {
+    socket.destroy();
+    robot.kill();
+  }
+  console.log(`${where}: a robot at ${await read("pose")}`);
+}
+
 async function open(page, base, name, where, scheme) {
   await page.goto(base + name, { waitUntil: "load" });
   if (name === PLAYGROUND) await usePlayground(page, where);
   if (name === FORM) await useForm(page, where, scheme);
+  if (name === LIVE) await useLive(page, where);
   await page.evaluate(axe);
   await check(page, where);
   if (name === "index.html") await useBook(page, where);
@@ -111,6 +199,7 @@ async function visit(browser, scheme, base) {
   const context = await browser.newContext({ viewport: { width: WIDTH, height: 800 }, colorScheme: scheme });
   const page = await context.newPage();
   page.setDefaultTimeout(PATIENCE);
+  await page.addInitScript(playPort);
   let where = "";
   page.on("console", (message) => { if (message.type() === "error") fault(where, message.text()); });
   page.on("pageerror", (error) => fault(where, error.message));

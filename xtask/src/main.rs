@@ -38,6 +38,7 @@ mod python;
 mod ros;
 mod search_windows;
 mod site;
+mod symbols;
 mod template;
 mod thumb;
 mod unsafe_code;
@@ -122,9 +123,9 @@ enum Task {
     Msrv,
     /// The packages of the published crates build from their own files.
     Package,
-    /// The simulator as a web page, `target/playground/index.html`; in Chromium it computes the same bits as here.
+    /// What the site computes in the browser, `target/playground`: simulator, form of a new robot, live page; in Chromium it computes the same bits as here.
     Playground,
-    /// The site, `target/site`: the docs as a book, and the playground; `--check` opens each page in Chromium.
+    /// The site, `target/site`: the docs as a book, and the pages of `playground`; `--check` opens each page in Chromium.
     Site(site::Args),
     /// The Python package: its wheel in an empty environment, its tests, types, style and notebooks.
     Python(python::Args),
@@ -209,11 +210,11 @@ fn steps() -> [Step<Task>; 37] {
 }
 
 fn main() -> ExitCode {
-    let result = match Xtask::parse().command {
+    let result = symbols::run_as_rustc().unwrap_or_else(|| match Xtask::parse().command {
         Command::Ci { names } => ci::run(&steps(), &names, ci::run_in_a_process),
         Command::Step { name } => step(&name),
         Command::Task(task) => run(task).map(|()| ExitCode::SUCCESS),
-    };
+    });
     result.unwrap_or_else(|error| {
         eprintln!("error: {error:#}");
         ExitCode::FAILURE

@@ -1,4 +1,5 @@
-//! The simulator and the form of a new robot as static web pages, and their check in a headless browser.
+//! The simulator, the form of a new robot and the live page of a robot on a serial port as static web pages, and their check in a
+//! headless browser.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -16,8 +17,8 @@ const SECONDS: u32 = 60;
 /// Limit of a page, compressed with gzip, bytes.
 const MOST_BYTES: usize = 2_000_000;
 /// The pages in the folder of [`build`], and the scripts in `sim-host/playground/tests` that use them.
-pub const PAGES: [&str; 2] = ["index.html", "new-robot.html"];
-const CHECKS: [&str; 2] = ["check.js", "check_new_robot.js"];
+pub const PAGES: [&str; 3] = ["index.html", "new-robot.html", "live.html"];
+const CHECKS: [&str; 3] = ["check.js", "check_new_robot.js", "check_live.js"];
 
 /// Builds the pages, and checks their size and, in a browser, their use, and that the simulator computes the same bits as this computer.
 pub fn build_and_check() -> anyhow::Result<()> {

@@ -2,6 +2,7 @@
 
 mod form;
 mod links;
+mod live;
 mod stage;
 mod theme;
 
@@ -51,7 +52,7 @@ pub fn build(root: &Path, site: &Path, firmware: Option<&Path>) -> anyhow::Resul
     cargo::check(mdbook)?;
     theme::change(site)?;
     let pages = playground::build(root, firmware)?;
-    for (from, to) in playground::PAGES.iter().zip(["playground", "new-robot"]) {
+    for (from, to) in playground::PAGES.iter().zip(["playground", "new-robot", "live"]) {
         stage::own_page(&pages.join(from), &site.join(to).join("index.html"))?;
     }
     links::check(site)
@@ -79,6 +80,7 @@ pub fn check(site: &Path) -> anyhow::Result<()> {
     install.args(PACKAGES).arg("--prefix").arg(&tools);
     cargo::check(install).context("cannot install the rules of accessibility")?;
     form::prepare(&tools)?;
+    live::prepare(&tools)?;
     let mut node = Command::new("node");
     node.arg(cargo::root().join("xtask/site/check.mjs")).arg(&tools).arg(site);
     node.arg(browser.get_program());

@@ -69,6 +69,8 @@ const IN_ROBOT: &[Edit] = &[
     ("cone = \"12 deg\"", "cone = \"30 deg\"", "full angle"),
     ("cone = \"12 deg\"", "cone = \"0.21 deg\"", "did you mean"),
     ("cone = \"12 deg\"", "cone = \"12 rad\"", "did you mean \"12 deg\""),
+    ("cone = \"12 deg\"", "cone = \"120 deg\"", "did you mean \"12 deg\""),
+    ("servo = [\"-90 deg\", \"90 deg\"]", "servo = [\"-900 deg\", \"900 deg\"]", "did you mean \"-90 deg\""),
     ("max_range = \"3.5 m\"", "max_range = \"350 m\"", "did you mean \"350 cm\""),
     ("max_range = \"3.5 m\"", "max_range = \"35 cm\"", "decimal point"),
     ("max_range = \"3.5 m\"", "max_range = \"12 m\"", "feet"),

@@ -11,7 +11,8 @@ use sonarfix::sensor::absolute::{AbsoluteMeasurement, PoseNoise, PositionNoise};
 use sonarfix_link::{Command, CommandResult, Motion};
 use sonarfix_map::robot_file;
 use sonarfix_monitor::port::Port;
-use sonarfix_monitor::{request, view};
+use sonarfix_monitor::request;
+use sonarfix_telemetry::view;
 use sonarfix_terminal::progress::{catch_interrupt, is_interrupted};
 
 use crate::monitor::PortArgs;

@@ -3,19 +3,22 @@
 use std::io::{IsTerminal, stdout};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context, ensure};
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyModifiers};
 use sonarfix_link::{Motion, Telemetry};
-use sonarfix_live::order::{Order, Orders, Reply};
-use sonarfix_live::robot::Robot;
+use sonarfix_monitor::log_files::LogFiles;
 use sonarfix_monitor::port::Port;
+use sonarfix_monitor::request;
 use sonarfix_monitor::teleoperation::{Direction, Teleoperation};
 use sonarfix_monitor::terminal::{self, History};
-use sonarfix_monitor::{Monitor, Received, view};
 use sonarfix_sim::trace::Wall;
+use sonarfix_telemetry::order::{Order, Orders, Reply};
+use sonarfix_telemetry::recording::Recording;
+use sonarfix_telemetry::robot::Robot;
+use sonarfix_telemetry::{Monitor, Received, view};
 
 use crate::serve::{self, ServeArgs};
 use crate::signs_of_life;
@@ -100,9 +103,9 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     scene.commands = port.can_send();
     let (feed, orders) = args.page.start()?;
     let mut screen = Screen::new(scene.walls.clone());
-    let mut robot = Robot::new(feed, scene, mount);
+    let mut robot = Robot::new(feed, scene, mount, request::conversation(), new_recording);
     if let Some(path) = &args.record {
-        robot.record(path.clone(), args.force);
+        robot.record(Recording::new(LogFiles::new(path.clone(), args.force)));
     }
     catch_interrupt();
     let ended = watch(&mut port, &mut robot, orders.as_ref(), &mut screen);
@@ -142,14 +145,15 @@ fn watch(
     orders: Option<&Orders>,
     screen: &mut Screen,
 ) -> anyhow::Result<End> {
+    let began = Instant::now();
     loop {
         let next = port.read(|bytes| -> anyhow::Result<ControlFlow<Next>> {
             robot.take(bytes, |monitor, received| screen.take(monitor, received))?;
-            if is_interrupted() || screen.show(robot)?.is_break() {
+            if is_interrupted() || screen.show(robot, began.elapsed())?.is_break() {
                 return Ok(ControlFlow::Break(Next::End));
             }
             screen.drive(robot, Instant::now());
-            let bytes = robot.obey(orders, Instant::now());
+            let bytes = robot.obey(orders, began.elapsed());
             Ok(bytes
                 .map_or(ControlFlow::Continue(()), |bytes| ControlFlow::Break(Next::Send(bytes))))
         })?;
@@ -168,13 +172,19 @@ fn summarize(robot: &mut Robot, names: &[String]) -> anyhow::Result<()> {
         eprintln!("{text}");
     }
     let Some((path, logs)) = robot.end_recording() else { return Ok(()) };
-    let path = path.display();
     match logs.with_context(|| format!("cannot write {path}"))? {
         0 => eprintln!("nothing was recorded: the robot sent no estimate"),
         1 => eprintln!("recorded {path}"),
         logs => eprintln!("recorded {path} and {} more, one for each start", logs - 1),
     }
     Ok(())
+}
+
+/// A recording into a new file in the working folder.
+fn new_recording() -> Recording {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let path = PathBuf::from(format!("recording-{}.csv", now.as_secs()));
+    Recording::new(LogFiles::new(path, false))
 }
 
 /// Keeps the page until Ctrl-C.
@@ -245,7 +255,7 @@ impl Screen {
     }
 
     /// Draws the terminal, if it is due, and takes its keys; breaks to end.
-    fn show(&mut self, robot: &mut Robot) -> anyhow::Result<ControlFlow<()>> {
+    fn show(&mut self, robot: &mut Robot, time: Duration) -> anyhow::Result<ControlFlow<()>> {
         let Output::Terminal { terminal, history, drawn, keys, .. } = &mut self.output else {
             return Ok(ControlFlow::Continue(()));
         };
@@ -255,17 +265,18 @@ impl Screen {
         *drawn = Some(Instant::now());
         while event::poll(Duration::ZERO)? {
             if let Event::Key(key) = event::read()?
-                && obey_key(key.code, key.modifiers, robot, keys).is_break()
+                && obey_key(key.code, key.modifiers, robot, keys, time).is_break()
             {
                 return Ok(ControlFlow::Break(()));
             }
         }
+        let recording = robot.recording();
         let screen = terminal::Screen {
             monitor: robot.monitor(),
             history,
             walls: &self.walls,
             names: &self.names,
-            recording: robot.recording(),
+            recording: recording.as_deref(),
             notice: robot.notice(),
             teleoperation: robot.can_be_commanded().then_some(&*keys),
         };
@@ -298,16 +309,17 @@ fn obey_key(
     modifiers: KeyModifiers,
     robot: &mut Robot,
     keys: &mut Teleoperation,
+    time: Duration,
 ) -> ControlFlow<()> {
     match key {
         KeyCode::Char('c') if modifiers.contains(KeyModifiers::CONTROL) => ControlFlow::Break(()),
         KeyCode::Char('q') => ControlFlow::Break(()),
         _ => {
             match key {
-                KeyCode::Char('s') => robot.ask(Order::Start, Instant::now()),
+                KeyCode::Char('s') => robot.ask(Order::Start, time),
                 KeyCode::Char('x') => {
                     keys.release();
-                    robot.ask(Order::Stop, Instant::now());
+                    robot.ask(Order::Stop, time);
                 }
                 KeyCode::Char(' ') => keys.stop(),
                 KeyCode::Esc => keys.release(),
@@ -319,7 +331,7 @@ fn obey_key(
                 KeyCode::Right => keys.press(Direction::Right, Instant::now()),
                 KeyCode::Char('r') => {
                     let on = robot.recording().is_none();
-                    robot.ask(Order::Record { on }, Instant::now());
+                    robot.ask(Order::Record { on }, time);
                 }
                 _ => {}
             }

@@ -4,13 +4,13 @@ use std::path::Path;
 use std::sync::Arc;
 
 use sonarfix_hal::config::RobotConfig;
-use sonarfix_live::feed::{Feed, Scene};
-use sonarfix_live::order::Orders;
 use sonarfix_live::paced::Paced;
 use sonarfix_live::ring::Ring;
 use sonarfix_live::server::Server;
 use sonarfix_map::{Floor, MapFile, robot_file};
 use sonarfix_sim::trace::Trace;
+use sonarfix_telemetry::feed::{Feed, Scene};
+use sonarfix_telemetry::order::Orders;
 
 /// The page.
 #[derive(Debug, clap::Args)]
@@ -87,19 +87,5 @@ pub fn scene_of_robot(
 ) -> anyhow::Result<(Scene, [f64; 2])> {
     let robot = robot.map(robot_file::read).transpose()?;
     let floor = map.map(|map| MapFile::read(map, None)).transpose()?.map(|file| file.floor);
-    let sonar = robot.as_ref().map(|robot| robot.localizer.rangers.first);
-    let cone = sonar.map(|sonar| sonar.cone).unwrap_or_default();
-    let walls = floor.map_or_else(Vec::new, |floor| Trace::of(&floor, cone).walls);
-    let track = robot.map_or(0.0, |robot| f64::from(robot.localizer.drive.track_width.0));
-    let mount = sonar.map_or([0.0; 2], |of| [of.mount.x.0.into(), of.mount.y.0.into()]);
-    let scene = Scene {
-        title,
-        source: "robot",
-        commands: true,
-        cone: cone.0.into(),
-        track,
-        walls,
-        obstacles: Vec::new(),
-    };
-    Ok((scene, mount))
+    Ok(Scene::of_robot(title, floor.as_ref(), robot.as_ref()))
 }

@@ -8,10 +8,11 @@ use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 use sonarfix_link::{Command, CommandResult};
 use sonarfix_monitor::port::Port;
-use sonarfix_monitor::signs::hints::Hint;
-use sonarfix_monitor::signs::{Row, Signs};
-use sonarfix_monitor::{Monitor, request};
+use sonarfix_monitor::request;
 use sonarfix_sim::text::wrapped;
+use sonarfix_telemetry::Monitor;
+use sonarfix_telemetry::signs::hints::Hint;
+use sonarfix_telemetry::signs::{Row, Signs};
 use sonarfix_terminal::output::width;
 
 /// The robot shows its devices for a minute; it is asked again in time.

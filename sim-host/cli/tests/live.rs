@@ -25,13 +25,14 @@ use sonarfix_link::{
     Command as Order, CommandResult, Estimate, Receiver, Reporter, Sender, Session, SessionCommand,
     Telemetry, frame,
 };
-use sonarfix_live::feed::{Feed, Scene, Status};
-use sonarfix_live::order::{Orders, Reply};
 use sonarfix_live::ring::{CAPACITY, Ring};
 use sonarfix_live::server::Server;
 use sonarfix_sim::trace::{
     AbsoluteRecord, FixRecord, GyroEstimate, Hypothesis, Outcome, Pose, SearchRecord, Tick, Wall,
 };
+
+use sonarfix_telemetry::feed::{Events as _, Feed, Scene, Status};
+use sonarfix_telemetry::order::{Orders, Reply};
 
 use crate::chromium;
 use crate::skipped;
@@ -500,7 +501,7 @@ fn scene() -> Scene {
 /// A page with something of everything, after which its stream ends.
 fn filled() -> Page {
     let page = page();
-    let feed = Feed::new(Arc::clone(&page.ring));
+    let feed = Feed::new(page.ring.clone());
     feed.scene(&scene());
     for number in 0..200_u32 {
         let time = f64::from(number) * 0.1;
@@ -579,7 +580,7 @@ fn fix(time: f64, sonar: [f64; 2], number: u32) -> FixRecord {
 }
 
 /// What the page shows of [`filled`].
-const SHOWN: [&str; 12] = [
+const SHOWN: [&str; 14] = [
     "A &lt;b&gt;robot&lt;/b&gt;",
     "tracking</b>",
     "19.9 s",
@@ -592,6 +593,8 @@ const SHOWN: [&str; 12] = [
     "1.145°/s ± 0.057°/s",
     "slips <",
     "0.1 s ago, 3.47 m,",
+    ", north, accepted",
+    "verdict tracking",
 ];
 
 #[test]

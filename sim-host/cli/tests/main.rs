@@ -7,6 +7,7 @@ mod common;
 mod convert;
 mod diagnosis;
 mod doctor;
+mod documented;
 mod endings;
 mod export;
 mod find;

@@ -23,13 +23,14 @@ use sonarfix_map::{
     AbsoluteSensors, CLASSROOM, Fault, FaultKind, Fidelity, HeadingSensor, HeadingSlip, PAPER,
     PositionSensor, Sampling, Scenario,
 };
-use sonarfix_monitor::recording::{Log, Recording};
-use sonarfix_monitor::{Monitor, Received, view};
+use sonarfix_monitor::log_files::LogFiles;
 use sonarfix_replay::fault::Complaint;
 use sonarfix_replay::{Replay, Summary};
 use sonarfix_sim::observe;
 use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::trace::{Estimate, FixRecord, Recorder, Tick, Trace};
+use sonarfix_telemetry::recording::{Log, Recording};
+use sonarfix_telemetry::{Monitor, Received, view};
 
 /// A robot with telemetry, and its estimates at every encoder tick.
 #[derive(Default)]
@@ -221,7 +222,7 @@ fn a_pose_that_is_set_while_running_replays_to_the_bit() {
     }
     let (received, _) = received_from(&robot.frames.concat());
     let (dir, path) = folder();
-    let mut recording = Recording::new(path.clone());
+    let mut recording = Recording::new(LogFiles::new(path.clone(), false));
     for received in &received {
         recording.take(received).unwrap();
     }
@@ -358,7 +359,7 @@ fn a_restart_begins_another_log() {
     let (dir, path) = folder();
     let other = dir.path().join("run-2.csv");
     fs::write(&other, "a recording of another day").unwrap();
-    let mut recording = Recording::new(path.clone());
+    let mut recording = Recording::new(LogFiles::new(path.clone(), false));
     let (received, _) = received_from(&robot.frames.concat());
     for received in &received {
         recording.take(received).unwrap();
@@ -376,7 +377,7 @@ fn a_restart_begins_another_log() {
 #[test]
 fn a_restart_whose_first_frames_are_lost_begins_another_log() {
     let (_dir, path) = folder();
-    let mut recording = Recording::new(path);
+    let mut recording = Recording::new(LogFiles::new(path, false));
     let at = |seconds: u64| Instant::from_ticks(seconds * 1_000_000);
     let step = |seconds| {
         Telemetry::Odometry(Odometry { at: at(seconds), right_metres: 1.0, left_metres: 1.0 })
@@ -398,7 +399,7 @@ fn a_monitor_that_connects_late_records_from_an_estimate() {
     let scenario = scenario(CLASSROOM);
     let robot = Robot::of(&scenario, 1);
     let (_dir, path) = folder();
-    let mut recording = Recording::new(path.clone());
+    let mut recording = Recording::new(LogFiles::new(path.clone(), false));
     let (_, late) = robot.frames.split_at(robot.frames.len() / 2);
     let (received, _) = received_from(&late.concat());
     for received in &received {

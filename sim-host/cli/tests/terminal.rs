@@ -22,14 +22,14 @@ use sonarfix_link::message::{
 };
 use sonarfix_link::{Hello, Ping, ReceiverCounters, Reporter, Sender, Telemetry, frame};
 use sonarfix_map::{CLASSROOM, Fidelity, Scenario};
-use sonarfix_monitor::Monitor;
-use sonarfix_monitor::hints::hints;
 use sonarfix_monitor::teleoperation::{Direction, Teleoperation};
 use sonarfix_monitor::terminal::{History, Screen};
-use sonarfix_monitor::view;
 use sonarfix_search::navigator::Mode;
 use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::trace::{FixRecord, Recorder, Tick, Trace};
+use sonarfix_telemetry::Monitor;
+use sonarfix_telemetry::hints::hints;
+use sonarfix_telemetry::view;
 
 /// The telemetry of a simulated robot, received.
 #[derive(Default)]
@@ -89,7 +89,7 @@ fn shown_with(
         history: &received.history,
         walls: &trace.walls,
         names: &names,
-        recording: Some(Path::new("run.csv")),
+        recording: Some("run.csv"),
         notice: "start: done",
         teleoperation,
     };

@@ -9,7 +9,8 @@ const Curves = (() => {
     return [Math.max(0, Moment.lastBefore(time, from)), Moment.lastBefore(time, to)];
   }
 
-  // A curve in a container. `series` are { name, colour, time: () => column, value: (index) => number, dots, band }.
+  // A curve in a container. `series` are { name, colour, time: () => column, value: (index) => number, dots, band, text }; what the
+  // pointer reads is `text(index)`, or else the value.
   function curve(container, title, series, unit) {
     const figure = document.createElement("figure");
     figure.className = "curve panel";
@@ -59,7 +60,8 @@ const Curves = (() => {
       const texts = series.map((of, index) => {
         const found = Moment.lastBefore(of.time(), at);
         const value = found < 0 ? null : of.value(found);
-        const text = Number.isFinite(value) ? `${value.toPrecision(3)} ${unit}`.replace(/^-/, "−") : "—";
+        const number = Number.isFinite(value) ? `${value.toPrecision(3)} ${unit}` : Moment.unknown;
+        const text = (found >= 0 && of.text ? of.text(found) : number).replace(/^-/, "−");
         values[index].textContent = text;
         return `${of.name} ${text}`;
       });

@@ -1,12 +1,14 @@
 //! A page on this computer that shows a robot, a recording or a simulation as it runs.
 //!
 //! ```text
-//! telemetry ──▶ robot ──┐                    ┌──▶ a page
-//! replay    ──▶ paced ──┼──▶ feed ──▶ ring ──┤
-//! simulation ─▶ paced ──┘                    └──▶ a page
-//!                 ▲                               │
-//!                 └──────────── order ────────────┘
+//! robot ──────────────┐                    ┌──▶ a page
+//! replay    ──▶ paced ┼──▶ feed ──▶ ring ──┤
+//! simulation ─▶ paced ┘                    └──▶ a page
+//!    ▲            ▲                               │
+//!    └────────────┴──────────── order ────────────┘
 //! ```
+//!
+//! Robot, feed and order are those of `sonarfix_telemetry`.
 //!
 //! | module | what |
 //! |---|---|
@@ -15,19 +17,13 @@
 //! | [`access`] | who may ask: this computer, a page of this server, with the token |
 //! | [`http`] | requests and answers |
 //! | [`ring`] | the latest events, in bounded memory |
-//! | [`feed`] | records of a run as events |
-//! | [`robot`] | a robot's telemetry as events; commands to it |
 //! | [`paced`] | a simulation or a replay at a speed |
-//! | [`order`] | what a page may ask for |
-//! | [`page`] | the page: `live.html`, `live.css`, `live.js`, `curves.js`, and the drawing of the report's player |
+//! | [`page`] | the page: `live.html`, `live.css`, `live.js`, `curves.js`, the drawing of the report's player, and `server.js`, its connection to the server |
 
 pub mod access;
 pub mod connection;
-pub mod feed;
 pub mod http;
-pub mod order;
 pub mod paced;
 pub mod page;
 pub mod ring;
-pub mod robot;
 pub mod server;

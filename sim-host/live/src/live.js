@@ -7,7 +7,6 @@
   const MOST_ROWS = 24_000;    // of a column: 40 minutes at ten ticks a second
   const DROPPED_AT_ONCE = 4_000;
   const MOST_NOTICES = 100;
-  const RETRY = 1_000;         // ms until a lost connection is tried again
   const REFRESH = 200;         // ticks after which extent and usual deviation are computed again
   const REFRESH_OUTSIDE = 20;  // the same while the picture does not hold the estimate
   const VERDICTS = ["tracking", "degraded", "lost"];
@@ -20,12 +19,6 @@
     [...document.querySelectorAll("#readout [data-value]")].map((dd) => [dd.dataset.value, dd]));
 
   const STAGE = stage.getAttribute("aria-label");
-
-  // The token is in the address at first; a reload finds it in the storage of this tab.
-  const token = new URLSearchParams(location.hash.slice(1)).get("token") ?? sessionStorage.getItem("token") ?? "";
-  sessionStorage.setItem("token", token);
-  history.replaceState(null, "", location.pathname);
-  const authorization = { Authorization: `Bearer ${token}` };
 
   const poses = () => ({ x: [], y: [], heading: [] });
   const emptyRun = () => ({
@@ -41,7 +34,7 @@
   });
 
   const run = emptyRun();
-  const state = { next: 0, search: "", isDue: false, ticks: 0, placing: null, hints: [], isRobot: false, isEnded: false };
+  const state = { search: "", isDue: false, ticks: 0, placing: null, hints: [], isRobot: false };
 
   const changed = () => { state.isDue = true; };
 
@@ -92,40 +85,8 @@
       case "status": showStatus(event.status); break;
       case "notice": showNotice(event.text); break;
       case "missed": showNotice(`${event.count} events were missed: this page was too slow`); break;
-      case "end": state.isEnded = true; break;
     }
     state.isDue = true;
-  }
-
-  async function listen() {
-    while (!state.isEnded) {
-      try {
-        const response = await fetch(`/events?from=${state.next}`, { headers: authorization, cache: "no-store" });
-        if (response.status === 401) return say("connection", "open the address that the program has printed");
-        if (!response.ok) throw new Error(response.statusText);
-        say("connection", "connected");
-        await read(response.body.pipeThrough(new TextDecoderStream()).getReader());
-      } catch {
-        // The program has ended, or the connection was lost.
-      }
-      say("connection", state.isEnded ? "ended" : "no connection: trying again");
-      if (!state.isEnded) await new Promise((resolve) => setTimeout(resolve, RETRY));
-    }
-  }
-
-  async function read(reader) {
-    let rest = "";
-    for (;;) {
-      const { done, value } = await reader.read();
-      if (done) return;
-      const lines = (rest + value).split("\n");
-      rest = lines.pop();
-      for (const line of lines.filter((text) => text !== "")) {
-        const event = JSON.parse(line);
-        if (event.kind === "missed") state.next += event.count; else if (event.kind !== "end") state.next++;
-        take(event);
-      }
-    }
   }
 
   // ---- Text ----
@@ -196,7 +157,12 @@
     value: (i) => run.fixes.innovation[i] === null ? NaN : 1e3 * run.fixes.innovation[i],
     band: (i) => run.fixes.spread[i] === null ? NaN : 3e3 * run.fixes.spread[i],
     dots: (i) => OUTCOMES[run.fixes.outcome[i]],
+    text: (i) => {
+      const { innovation, wall, outcome } = Moment.fixNumbers(Moment.recordAt(run.fixes, i), 0, run.walls);
+      return `${innovation}, ${wall}, ${outcome}`;
+    },
   };
+  const verdicts = { ...states("verdict", 1), text: (i) => VERDICTS[run.states.verdict[i]] };
   const DEGREES = 180 / Math.PI;
   const gyro = (value) => ({ time: () => run.gyro.time, value });
   const absolutes = {
@@ -206,6 +172,7 @@
   };
   const curves = [
     ["Innovation in its 3σ band; rejected ones at the edge", "mm", [["innovation", "accepted", fixes]]],
+    ["Verdict: 0 tracking, 1 degraded, 2 lost", "", [["verdict", "estimate", verdicts]]],
     ["Deviation of the position", "mm", [["σ of x", "estimate", sigma(0, 1e3)], ["σ of y", "encoders", sigma(1, 1e3)]]],
     ["Deviation of the heading", "°", [["σ", "estimate", sigma(2, 180 / Math.PI)]]],
     ["Scale errors", "%", [["right", "estimate", states("scale_right", 100)], ["left", "encoders", states("scale_left", 100)],
@@ -270,8 +237,7 @@
   async function order(body) {
     say("answer", "…");
     try {
-      const response = await fetch("/order", { method: "POST", headers: authorization, body: JSON.stringify(body) });
-      say("answer", response.ok ? (await response.json()).text : await response.text());
+      say("answer", (await Connection.order(body)).text);
     } catch {
       say("answer", "no connection");
     }
@@ -365,9 +331,7 @@
     try {
       // An order that is late is worth nothing.
       const signal = AbortSignal.timeout(3 * REPEAT);
-      const body = JSON.stringify({ order: "drive", speed, turn });
-      const response = await fetch("/order", { method: "POST", headers: authorization, body, signal });
-      const { done, text } = response.ok ? await response.json() : { done: false, text: await response.text() };
+      const { done, text } = await Connection.order({ order: "drive", speed, turn }, signal);
       if (holds || !done) say("answer", text);
     } catch {
       if (holds) say("answer", "no answer to a motion: the robot stands");
@@ -459,5 +423,5 @@
   new ResizeObserver(changed).observe(stage);
   document.addEventListener("pointermove", changed);
   requestAnimationFrame(frame);
-  listen();
+  Connection.listen(take, (text) => say("connection", text));
 })();

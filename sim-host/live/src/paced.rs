@@ -4,8 +4,8 @@ use std::time::{Duration, Instant};
 
 use sonarfix_sim::trace::{AbsoluteRecord, FixRecord, Recorder, SearchRecord, Tick};
 
-use crate::feed::Feed;
-use crate::order::{Order, Ordered, Orders, Reply};
+use sonarfix_telemetry::feed::Feed;
+use sonarfix_telemetry::order::{Order, Ordered, Orders, Reply};
 
 /// The least and the largest speed.
 const SPEEDS: std::ops::RangeInclusive<f64> = 0.01..=10_000.0;

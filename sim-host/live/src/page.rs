@@ -1,4 +1,4 @@
-//! The page: it holds no data, and loads none but the events of its server.
+//! The page: it holds no data, and draws the events of its connection.
 
 use std::borrow::Cow;
 
@@ -6,14 +6,38 @@ const TEMPLATE: &str = include_str!("live.html");
 const STYLE: &str = include_str!("live.css");
 const SCRIPTS: &str = concat!(include_str!("curves.js"), include_str!("live.js"));
 
-/// The page.
+/// What connects a page to what it shows.
+#[derive(Debug, Clone, Copy)]
+pub struct Connection<'a> {
+    /// An element of the head: what the page may load. The server says so in its answer.
+    pub policy: &'a str,
+    /// Rules of its elements.
+    pub style: &'a str,
+    /// Its elements, above the map.
+    pub controls: &'a str,
+    /// A script that defines `Connection`, an object with two functions. `listen(take, say)` passes each event to `take`, and the state
+    /// of the connection in words to `say`. `order(body, signal)` sends an order, and gives its answer.
+    pub script: &'a str,
+}
+
+impl Connection<'static> {
+    /// To the server that the page comes from.
+    pub const SERVER: Self =
+        Self { policy: "", style: "", controls: "", script: include_str!("server.js") };
+}
+
+/// The page with a connection.
 #[must_use]
-pub fn html() -> String {
-    let values: [(&str, Cow<'_, str>); 5] = [
+pub fn html(connection: &Connection<'_>) -> String {
+    let values: [(&str, Cow<'_, str>); 9] = [
+        ("policy", connection.policy.into()),
         ("palette", sonarfix_report::palette_css().into()),
         ("style", STYLE.into()),
+        ("connection-style", connection.style.into()),
+        ("controls", connection.controls.into()),
         ("view", sonarfix_report::VIEW.into()),
         ("drawing", sonarfix_report::DRAWING.into()),
+        ("connection", connection.script.into()),
         ("script", SCRIPTS.into()),
     ];
     sonarfix_report::fill(TEMPLATE, &values)

@@ -4,6 +4,8 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use sonarfix_telemetry::feed::Events;
+
 /// Most bytes of events: about a quarter of an hour at ten ticks a second.
 pub const CAPACITY: usize = 8 << 20;
 
@@ -14,12 +16,12 @@ const MOST_AT_ONCE: usize = 512;
 /// missed.
 #[derive(Debug, Default)]
 pub struct Ring {
-    events: Mutex<Events>,
+    events: Mutex<Kept>,
     arrived: Condvar,
 }
 
 #[derive(Debug, Default)]
-struct Events {
+struct Kept {
     lines: VecDeque<Arc<str>>,
     bytes: usize,
     /// Number of the first line.
@@ -40,9 +42,8 @@ pub struct Batch {
     pub is_end: bool,
 }
 
-impl Ring {
-    /// Appends an event.
-    pub fn push(&self, line: &str) {
+impl Events for Ring {
+    fn push(&self, line: &str) {
         let mut events = self.lock();
         events.bytes += line.len();
         events.lines.push_back(line.into());
@@ -55,12 +56,13 @@ impl Ring {
         self.arrived.notify_all();
     }
 
-    /// No event will follow.
-    pub fn close(&self) {
+    fn close(&self) {
         self.lock().is_closed = true;
         self.arrived.notify_all();
     }
+}
 
+impl Ring {
     /// The bytes of all events.
     #[must_use]
     pub fn bytes(&self) -> usize {
@@ -72,7 +74,7 @@ impl Ring {
     pub fn next(&self, from: u64, patience: Duration) -> Batch {
         let events = self.lock();
         let is_waiting =
-            |events: &mut Events| !events.is_closed && from >= events.first + events.count();
+            |events: &mut Kept| !events.is_closed && from >= events.first + events.count();
         let waited = self.arrived.wait_timeout_while(events, patience, is_waiting);
         let (events, _) = waited.unwrap_or_else(PoisonError::into_inner);
         let start = from.max(events.first);
@@ -83,13 +85,13 @@ impl Ring {
         Batch { missed: start - from, lines, next, is_end }
     }
 
-    fn lock(&self) -> MutexGuard<'_, Events> {
+    fn lock(&self) -> MutexGuard<'_, Kept> {
         // An event is complete or absent, also after a panic of another thread.
         self.events.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Events {
+impl Kept {
     fn count(&self) -> u64 {
         self.lines.len() as u64
     }

@@ -15,12 +15,12 @@ use std::thread;
 use std::time::Duration;
 
 use anyhow::Context;
+use sonarfix_telemetry::order::{Ordered, Orders, Reply};
 
 use crate::access::{Access, Refusal};
 use crate::connection::{Connections, PATIENCE, Timed};
 use crate::http::{self, Request};
-use crate::order::{Ordered, Orders, Reply};
-use crate::page;
+use crate::page::{self, Connection};
 use crate::ring::Ring;
 
 /// Time for a robot to answer a command: all attempts of the command and of its session.
@@ -59,7 +59,7 @@ impl Server {
         let url = format!("http://{address}/#token={}", access.token());
         let shared = Arc::new(Shared { access, ring, orders, connections: Connections::default() });
         thread::spawn(move || accept(&listener, &shared));
-        Ok((Self { address: url }, Orders(received)))
+        Ok((Self { address: url }, Orders::new(received)))
     }
 
     /// The address of the page, with the token after `#`, which a browser does not send.
@@ -105,7 +105,7 @@ fn serve(stream: TcpStream, number: u64, shared: &Shared) -> io::Result<()> {
         return refuse(&mut connection, refusal);
     }
     if path == "/" && request.method == "GET" {
-        let page = page::html();
+        let page = page::html(&Connection::SERVER);
         return http::answer(&mut connection, "200 OK", "text/html; charset=utf-8", &page);
     }
     let Some(_seat) = shared.connections.seat(number) else {

@@ -8,20 +8,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use sonarfix::geometry::pose::Pose;
-use sonarfix::geometry::units::{Metres, MetresPerSecond, Radians, RadiansPerSecond};
-use sonarfix::localizer::Start;
-use sonarfix_link::message::{Ack, CommandError};
-use sonarfix_link::{
-    Command, CommandResult, Motion, Receiver, Sender, SessionCommand, Telemetry, frame,
-};
 use sonarfix_live::connection::{MOST_ARRIVING, MOST_SEATS, PATIENCE};
-use sonarfix_live::feed::{Feed, Scene};
 use sonarfix_live::http::Request;
-use sonarfix_live::order::{Order, Orders};
 use sonarfix_live::ring::{CAPACITY, Ring};
-use sonarfix_live::robot::Robot;
 use sonarfix_live::server::Server;
+use sonarfix_telemetry::feed::Events as _;
+use sonarfix_telemetry::order::Orders;
 
 /// A server, its ring, its orders, and what every request to it needs.
 fn page() -> (Arc<Ring>, Orders, String, String) {
@@ -225,20 +217,6 @@ fn the_pages_are_limited() {
     }
 }
 
-/// Each number of the page's order is at its place in the command.
-#[test]
-fn the_numbers_of_set_pose_are_not_exchanged() {
-    let text = r#"{"order": "set_pose", "x": 1, "y": 2, "heading": 0.5,
-        "position_deviation": 0.25, "heading_deviation": 0.125}"#;
-    let order: Order = serde_json::from_str(text).unwrap();
-    let expected = Start {
-        pose: Pose::new(1.0, 2.0, Radians(0.5)),
-        position_deviation: Metres(0.25),
-        heading_deviation: Radians(0.125),
-    };
-    assert_eq!(order.command(), Some(Command::SetPose(expected)));
-}
-
 /// A reader that is too slow gets the number of the events that it has missed, and the next one after them.
 #[test]
 fn dropped_events_are_counted() {
@@ -290,90 +268,4 @@ fn missed_events_are_reported_to_the_page() {
     stream.read_to_string(&mut text).unwrap();
     let body = text.split_once("\r\n\r\n").unwrap().1;
     assert!(body.starts_with("{\"kind\":\"missed\",\"count\":2}\nxxx"), "{}", &body[..60]);
-}
-
-/// A robot of a page with a session, which answers each command; its commands.
-struct Driven {
-    robot: Robot,
-    receiver: Receiver<SessionCommand>,
-    telemetry: Sender<Telemetry>,
-    result: CommandResult,
-}
-
-impl Driven {
-    fn new(result: CommandResult) -> Self {
-        let scene = Scene {
-            title: String::new(),
-            source: "robot",
-            commands: true,
-            cone: 0.0,
-            track: 0.0,
-            walls: Vec::new(),
-            obstacles: Vec::new(),
-        };
-        let robot = Robot::new(Feed::nowhere(), scene, [0.0; 2]);
-        Self { robot, receiver: Receiver::new(), telemetry: Sender::new(), result }
-    }
-
-    /// The motions that are sent at this time.
-    fn motions(&mut self, now: Instant) -> Vec<Motion> {
-        let mut motions = Vec::new();
-        // A frame is sent, answered, and its answer may have a consequence.
-        for _ in 0..8 {
-            let Some(bytes) = self.robot.obey(None, now) else { continue };
-            for frame in bytes.into_iter().filter_map(|byte| self.receiver.push(byte)) {
-                let result = match frame.message.command {
-                    Command::OpenSession => CommandResult::Session(1),
-                    Command::Drive(motion) => {
-                        motions.push(motion);
-                        self.result
-                    }
-                    other => unreachable!("{other:?}"),
-                };
-                let ack = Telemetry::Ack(Ack { sequence: frame.sequence, result });
-                let mut buffer = frame::EMPTY;
-                let bytes = self.telemetry.frame(&ack, &mut buffer);
-                self.robot.take(bytes, |_, _| {}).unwrap();
-            }
-        }
-        motions
-    }
-}
-
-const DRIVE: Order = Order::Drive { speed: 0.1, turn: 0.5 };
-const HELD: Motion = Motion { speed: MetresPerSecond(0.1), turn: RadiansPerSecond(0.5) };
-
-/// A motion is renewed while a page repeats its order. Without the page the robot is commanded to stand after 300 ms, until the
-/// page ends its commands.
-#[test]
-fn a_motion_of_a_page_ends_without_its_orders() {
-    let mut driven = Driven::new(CommandResult::Done);
-    let began = Instant::now();
-    let at = |millis| began + Duration::from_millis(millis);
-    for millis in (0..=1_000).step_by(100) {
-        driven.robot.ask(DRIVE, at(millis));
-        assert_eq!(driven.motions(at(millis)), [HELD], "after {millis} ms");
-    }
-    assert_eq!(driven.motions(at(1_290)), [HELD]);
-    for millis in [1_300, 1_400, 9_000] {
-        assert_eq!(driven.motions(at(millis)), [Motion::default()], "after {millis} ms");
-    }
-    driven.robot.ask(Order::Leave, at(9_100));
-    assert_eq!(driven.motions(at(9_500)), []);
-}
-
-/// A refused motion is not sent again while it is held, and the page receives the reason.
-#[test]
-fn a_refused_motion_is_not_repeated() {
-    let mut driven = Driven::new(CommandResult::Refused(CommandError::Waiting));
-    let began = Instant::now();
-    let at = |millis| began + Duration::from_millis(millis);
-    driven.robot.ask(DRIVE, at(0));
-    assert_eq!(driven.motions(at(0)), [HELD]);
-    for millis in (100..=500).step_by(100) {
-        driven.robot.ask(DRIVE, at(millis));
-        assert_eq!(driven.motions(at(millis)), [], "after {millis} ms");
-    }
-    assert!(driven.robot.notice().contains("start it first"), "{}", driven.robot.notice());
-    assert_eq!(driven.motions(at(2_000)), []);
 }

@@ -1,14 +1,23 @@
 //! A command, repeated until it is acknowledged, and a motion, renewed until it is over.
 
 use std::ops::ControlFlow;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::Context;
 use sonarfix_hal::robot::AbsoluteResult;
 use sonarfix_link::{Command, CommandResult, Motion, Receiver, ReceiverCounters, Telemetry};
 
-use crate::conversation::{ATTEMPTS, Conversation, Due, Outcome};
+use sonarfix_telemetry::conversation::{ATTEMPTS, Conversation, Due, Outcome};
+
 use crate::port::Port;
+
+/// A conversation of this process: its first sequence number differs from that of the process before, except in one of 32,768
+/// cases.
+#[must_use]
+pub fn conversation() -> Conversation {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    Conversation::new(u16::try_from(now.as_micros() % (1 << 15)).unwrap_or(0))
+}
 
 /// Opens a session and sends a command in it, each repeatedly until the robot acknowledges it; the robot executes it
 /// once ([`Session`](sonarfix_link::Session)).
@@ -66,10 +75,10 @@ pub fn ask_and_watch(
     command: &Command,
     mut watch: impl FnMut(u8),
 ) -> anyhow::Result<CommandResult> {
-    let mut conversation = Conversation::default();
+    let (mut conversation, began) = (conversation(), Instant::now());
     let mut receiver = Receiver::<Telemetry>::new();
     conversation.add(*command);
-    let mut due = conversation.poll(Instant::now());
+    let mut due = conversation.poll(began.elapsed());
     loop {
         match due {
             Due::Send(bytes) => port.send(&bytes)?,
@@ -85,7 +94,7 @@ pub fn ask_and_watch(
                     _ => None,
                 }
             });
-            let due = answers.last().map_or_else(|| conversation.poll(Instant::now()), Due::End);
+            let due = answers.last().map_or_else(|| conversation.poll(began.elapsed()), Due::End);
             let is_nothing = due == Due::Nothing;
             Ok(if is_nothing { ControlFlow::Continue(()) } else { ControlFlow::Break(due) })
         })?;
@@ -136,7 +145,7 @@ pub fn steer(
     port: &mut Port,
     mut control: impl FnMut(Option<&Telemetry>) -> Control,
 ) -> anyhow::Result<CommandResult> {
-    let mut conversation = Conversation::default();
+    let (mut conversation, began) = (conversation(), Instant::now());
     let mut receiver = Receiver::<Telemetry>::new();
     let mut is_stopping = false;
     let mut received = Vec::new();
@@ -151,7 +160,7 @@ pub fn steer(
                 }
             }
         }
-        let mut due = conversation.poll(Instant::now());
+        let mut due = conversation.poll(began.elapsed());
         if due == Due::Nothing {
             let answer = port.read(|bytes| {
                 let messages = bytes.iter().filter_map(|&byte| receiver.push(byte));

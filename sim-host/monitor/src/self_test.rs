@@ -9,8 +9,8 @@ use std::time::Duration;
 use sonarfix_link::message::{DeviceReadings, EncoderReading, FlashStatus, LoopStatus, Telemetry};
 use sonarfix_link::{CommandResult, Hello, ReceiverCounters};
 
-use crate::signs::difference;
-use crate::view;
+use sonarfix_telemetry::signs::difference;
+use sonarfix_telemetry::view;
 
 /// The largest error of a board's clock: that of an internal oscillator with some margin.
 const CLOCK: f64 = 0.02;

@@ -12,8 +12,10 @@ use sonarfix_replay::REFERENCE_HEADER;
 use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::trace::{FixRecord, Recorder, Tick};
 
-use crate::Received;
-use crate::recording::Recording;
+use sonarfix_telemetry::Received;
+use sonarfix_telemetry::recording::Recording;
+
+use crate::log_files::LogFiles;
 
 /// Simulates a drive, at the fidelity of pins; writes the log, and the true poses at the encoder ticks into `truth`, by default
 /// `reference.csv` beside it, so that `replay` finds them. Beside the log it writes `robot.toml` and `map.toml`, which are what
@@ -39,7 +41,7 @@ pub fn record(
         let is_free = is_forced || !file.exists();
         ensure!(is_free, "--record: {} exists: name another file, or use --force", file.display());
     }
-    let mut recorder = Recorded::new(Recording::new(log.to_owned()).forced(is_forced));
+    let mut recorder = Recorded::new(Recording::new(LogFiles::new(log.to_owned(), is_forced)));
     simulation.run(seed, &mut recorder)?;
     recorder.end().with_context(|| log.display().to_string())?;
     sonarfix_files::write(truth, recorder.truth)?;

@@ -1,7 +1,6 @@
 //! The latest telemetry on a terminal: numbers, map, innovations and what to check.
 
 use std::collections::VecDeque;
-use std::path::Path;
 
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -16,9 +15,10 @@ use sonarfix_link::Telemetry;
 use sonarfix_sim::text::wrapped;
 use sonarfix_sim::trace::Wall;
 
-use crate::hints::hints;
+use sonarfix_telemetry::hints::hints;
+use sonarfix_telemetry::{Monitor, Received, view};
+
 use crate::teleoperation::Teleoperation;
-use crate::{Monitor, Received, view};
 
 /// Innovations that are drawn.
 const INNOVATIONS: usize = 200;
@@ -85,7 +85,7 @@ pub struct Screen<'a> {
     /// The names of its walls.
     pub names: &'a [String],
     /// The file that is recorded.
-    pub recording: Option<&'a Path>,
+    pub recording: Option<&'a str>,
     /// The answer to the last command.
     pub notice: &'a str,
     /// The keys that drive the robot; `None` for a connection that can only be read.
@@ -169,10 +169,9 @@ impl Screen<'_> {
 
     /// The keys, the recording and the answer to the last command, wrapped.
     fn footer(&self, width: u16) -> Vec<String> {
-        let recording = self.recording.map_or_else(
-            || "not recording".to_owned(),
-            |path| format!("recording {}", path.display()),
-        );
+        let recording = self
+            .recording
+            .map_or_else(|| "not recording".to_owned(), |name| format!("recording {name}"));
         let keys = " q ends  r records  s starts  x stops";
         let line = format!("{keys}  {recording}  {}", self.notice);
         wrapped(line.trim_end(), width.into(), 1)

@@ -2,16 +2,21 @@
 //!
 //! The page asks for room for a request (`request`), writes it there, and calls `run`, which returns the length of the
 //! answer at `answer`. `scenes` makes the scenes of the tour the answer. `questions`, `program`, `robot` and
-//! `zip` are those of the form.
+//! `zip` are those of the form; `connect`, `receive`, `order`, `due` and `events` those of a robot on a serial port. Times are
+//! milliseconds since any fixed moment.
 
 #![expect(unsafe_code, reason = "a function that WebAssembly exports by name needs `no_mangle`")]
 
 use std::cell::RefCell;
+use std::time::Duration;
+
+use crate::live::Live;
 
 thread_local! {
     static REQUEST: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
     static PROGRAM: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
     static ANSWER: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
+    static LIVE: RefCell<Option<Live>> = const { RefCell::new(None) };
 }
 
 fn answer_with(answer: impl Into<Vec<u8>>) -> usize {
@@ -83,7 +88,55 @@ pub extern "C" fn zip() -> usize {
     PROGRAM.with_borrow(|program| answer_to(|request| crate::new_robot::zip(request, program)))
 }
 
-/// The address of the answer, UTF-8 or an archive.
+fn since(millis: f64) -> Duration {
+    Duration::try_from_secs_f64(1e-3 * millis).unwrap_or_default()
+}
+
+/// Passes a value of the robot on, if there is one.
+fn with_live<A: Default>(take: impl FnOnce(&mut Live) -> A) -> A {
+    LIVE.with_borrow_mut(|live| live.as_mut().map(take).unwrap_or_default())
+}
+
+/// Begins with a robot of which nothing was received, as the request says. The answer is what is wrong with the request; its length
+/// is returned, and 0 if nothing is.
+#[unsafe(no_mangle)]
+pub extern "C" fn connect() -> usize {
+    answer_to(|request| match Live::new(request) {
+        Ok(live) => {
+            LIVE.set(Some(live));
+            String::new()
+        }
+        Err(error) => format!("{error:#}"),
+    })
+}
+
+/// Takes the request as bytes that the robot has sent.
+#[unsafe(no_mangle)]
+pub extern "C" fn receive() {
+    let bytes = REQUEST.take();
+    with_live(|live| live.receive(&bytes));
+}
+
+/// Takes the request as an order with this number.
+#[unsafe(no_mangle)]
+pub extern "C" fn order(number: u32, millis: f64) {
+    let request = REQUEST.take();
+    with_live(|live| live.order(number, &String::from_utf8_lossy(&request), since(millis)));
+}
+
+/// Makes the bytes that are to be sent to the robot now the answer, and returns their number.
+#[unsafe(no_mangle)]
+pub extern "C" fn due(millis: f64) -> usize {
+    answer_with(with_live(|live| live.due(since(millis))))
+}
+
+/// Makes the events since the last call the answer, a line of JSON each, and returns its length.
+#[unsafe(no_mangle)]
+pub extern "C" fn events() -> usize {
+    answer_with(with_live(Live::events))
+}
+
+/// The address of the answer: UTF-8, an archive, or bytes for a robot.
 #[unsafe(no_mangle)]
 pub extern "C" fn answer() -> *const u8 {
     ANSWER.with_borrow(|answer| answer.as_ptr())

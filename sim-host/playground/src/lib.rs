@@ -1,4 +1,5 @@
-//! The simulator and the form of a new robot as static web pages, without a server: `cargo xtask playground`.
+//! The simulator, the form of a new robot and the live page of a robot on a serial port as static web pages, without a server:
+//! `cargo xtask playground`.
 //!
 //! The page keeps a scenario as JSON, with the keys of a scenario file. For each change it passes the scenario to [`answer`],
 //! which runs it from start to end, and plays the result. A run is a function of its [`request`], so picking
@@ -9,6 +10,7 @@
 //! | [`request`] | what the page asks for, and how it becomes a simulation |
 //! | [`scenes`](mod@scenes) | the scenes of the tour |
 //! | [`new_robot`] | the form of a new robot |
+//! | [`live`] | a robot on a serial port of the browser |
 //! | [`digest`] | a hash of all bits of a run, to compare machines |
 //! | `exports` | the functions that the page calls, in WebAssembly |
 //! | `main.rs` | the program that writes the pages |
@@ -16,6 +18,7 @@
 pub mod digest;
 #[cfg(target_arch = "wasm32")]
 mod exports;
+pub mod live;
 pub mod new_robot;
 pub mod request;
 pub mod scenes;

@@ -6,12 +6,17 @@ use anyhow::{Context, bail};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use sonarfix_boards::Board;
+use sonarfix_live::page::Connection;
 use sonarfix_playground::request::Request;
 use sonarfix_playground::run;
 use sonarfix_report::{DRAWING, SCRIPT, fill, player, style};
 
 /// The seeds that the page checks with `#check`.
 const SEEDS: [u64; 3] = [0, 1, 2];
+
+/// What a page may load and run: itself.
+const POLICY: &str = "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; \
+                      script-src 'unsafe-inline' 'wasm-unsafe-eval'\">";
 
 const USAGE: &str =
     "usage: sonarfix-playground pages PROGRAM.wasm FOLDER [FIRMWARE] | digests SECONDS";
@@ -86,6 +91,7 @@ fn write(program: &Path, folder: &Path, programs: &str) -> anyhow::Result<()> {
     ];
     for page in pages {
         let values = [
+            ("policy", POLICY.into()),
             ("title", page.title.into()),
             ("style", style.as_str().into()),
             ("own-style", page.style.into()),
@@ -96,7 +102,19 @@ fn write(program: &Path, folder: &Path, programs: &str) -> anyhow::Result<()> {
         ];
         sonarfix_files::write(&folder.join(page.file), fill(include_str!("frame.html"), &values))?;
     }
-    Ok(())
+    sonarfix_files::write(&folder.join("live.html"), live(&program, simulator))
+}
+
+/// The live page of a robot on a serial port of the browser, with the program in WebAssembly.
+fn live(program: &str, simulator: &str) -> String {
+    let controls = fill(include_str!("serial.html"), &[("wasm", program.into())]);
+    let connection = Connection {
+        policy: POLICY,
+        style: include_str!("serial.css"),
+        controls: &controls,
+        script: &[simulator, include_str!("serial.js")].join("\n"),
+    };
+    sonarfix_live::page::html(&connection)
 }
 
 /// The hashes of runs of `classroom` on this computer, in one line.

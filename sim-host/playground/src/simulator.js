@@ -1,5 +1,5 @@
 "use strict";
-// The simulator in WebAssembly: plain functions, texts in UTF-8 in its memory.
+// What the pages compute in WebAssembly: plain functions, texts in UTF-8 in its memory.
 
 // The bytes of a text in base64.
 const decoded = (base64) => Uint8Array.from(atob(base64.trim()), (letter) => letter.charCodeAt(0));
@@ -9,7 +9,8 @@ const openSimulator = (base64) => {
   const start = () => new WebAssembly.Instance(module, {}).exports;
   let wasm = start();
 
-  const answer = (length) => new TextDecoder().decode(new Uint8Array(wasm.memory.buffer, wasm.answer(), length));
+  const bytesOf = (length) => new Uint8Array(wasm.memory.buffer, wasm.answer(), length).slice();
+  const answer = (length) => new TextDecoder().decode(bytesOf(length));
 
   // Copies bytes into the room that a function makes for them.
   function put(bytes, room) {
@@ -54,9 +55,32 @@ const openSimulator = (base64) => {
   // The files of a new robot as an archive; empty if there are none.
   function zip(answers) {
     write(answers);
-    const length = wasm.zip();
-    return new Uint8Array(wasm.memory.buffer, wasm.answer(), length).slice();
+    return bytesOf(wasm.zip());
   }
 
-  return { scenes, run, file, questions, setProgram, robot, zip };
+  // A robot on a serial port, of which nothing was received; what is wrong with the request, or nothing.
+  function connect(request) {
+    write(request);
+    return answer(wasm.connect());
+  }
+
+  // Bytes that it has sent.
+  function receive(bytes) {
+    put(bytes, wasm.request);
+    wasm.receive();
+  }
+
+  // An order with a number, at a time in milliseconds.
+  function order(number, body, time) {
+    write(body);
+    wasm.order(number, time);
+  }
+
+  // The bytes to send to it now.
+  const due = (time) => bytesOf(wasm.due(time));
+
+  // The events since the last call.
+  const events = () => answer(wasm.events()).split("\n").filter((line) => line !== "").map((line) => JSON.parse(line));
+
+  return { scenes, run, file, questions, setProgram, robot, zip, serial: { connect, receive, order, due, events } };
 };

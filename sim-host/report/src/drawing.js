@@ -477,7 +477,15 @@ const Drawing = (() => {
 
     const resetView = () => Object.assign(state, { zoom: 1, panX: 0, panY: 0 });
 
-    // The wheel zooms, dragging pans, a double click shows the usual view again. `changed` draws; where `isBusy` the pointer
+    function save() {
+      canvas.toBlob((image) => {
+        const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(image), download: "sonarfix.png" });
+        link.click();
+        URL.revokeObjectURL(link.href);
+      });
+    }
+
+    // The button of `view.html` saves the picture; the wheel zooms, dragging pans, a double click shows the usual view again. `changed` draws; where `isBusy` the pointer
     // has another use.
     function navigate(changed, isBusy = () => false) {
       let last = null;
@@ -499,6 +507,7 @@ const Drawing = (() => {
       });
       for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, () => { last = null; });
       canvas.addEventListener("dblclick", () => { resetView(); changed(); });
+      document.getElementById("save-picture").addEventListener("click", save);
     }
 
     refresh();

@@ -154,6 +154,6 @@ const Moment = (() => {
   }
 
   return {
-    OUTCOMES, SIGMAS, lastBefore, momentAt, isJump, searchAt, walkedBy, wrap, isUnusual, unknown, millimetres, degrees, length, distance, fixNumbers, inputNumbers, show,
+    OUTCOMES, SIGMAS, lastBefore, momentAt, recordAt, isJump, searchAt, walkedBy, wrap, isUnusual, unknown, millimetres, degrees, length, distance, fixNumbers, inputNumbers, show,
   };
 })();

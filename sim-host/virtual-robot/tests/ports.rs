@@ -14,9 +14,10 @@ use sonarfix::geometry::units::{Metres, MetresPerSecond, Radians, RadiansPerSeco
 use sonarfix::localizer::Start;
 use sonarfix_link::{Command, CommandResult, Motion, Telemetry};
 use sonarfix_map::Scenario;
-use sonarfix_monitor::conversation::{Conversation, Due, Outcome};
 use sonarfix_monitor::port::Port;
-use sonarfix_monitor::{Monitor, request};
+use sonarfix_monitor::request;
+use sonarfix_telemetry::Monitor;
+use sonarfix_telemetry::conversation::{Conversation, Due, Outcome};
 use sonarfix_virtual_robot::ports::Ports;
 use sonarfix_virtual_robot::robot::{Parts, VirtualRobot};
 
@@ -47,6 +48,7 @@ struct Client {
     port: Port,
     monitor: Monitor,
     conversation: Conversation,
+    began: Instant,
     outcomes: Vec<Outcome>,
 }
 
@@ -55,7 +57,8 @@ impl Client {
         Self {
             port: Port::open(port, 115_200).unwrap(),
             monitor: Monitor::default(),
-            conversation: Conversation::default(),
+            conversation: request::conversation(),
+            began: Instant::now(),
             outcomes: Vec::new(),
         }
     }
@@ -64,7 +67,7 @@ impl Client {
     fn watch(&mut self, seconds: u64, mut is_last: impl FnMut(&Self, &Telemetry) -> bool) {
         let began = self.time();
         while self.time() < began + 1_000_000 * seconds {
-            if let Due::Send(bytes) = self.conversation.poll(Instant::now()) {
+            if let Due::Send(bytes) = self.conversation.poll(self.began.elapsed()) {
                 self.port.send(&bytes).unwrap();
             }
             let mut received = Vec::new();

@@ -7,8 +7,8 @@ use anyhow::{Context, ensure};
 use sonarfix_boards::image::Image;
 use sonarfix_boards::{Board, Uf2, esp, uf2};
 
-use crate::cargo;
 use crate::workspace::Workspace;
+use crate::{cargo, symbols};
 
 /// Its folder in a release and in each archive.
 pub const FOLDER: &str = "firmware";
@@ -65,6 +65,7 @@ fn build(board: &Board, root: &Path) -> anyhow::Result<PathBuf> {
     let mut command = Workspace::Firmware.cargo(&build);
     command.current_dir(root.join("firmware"));
     cargo::reproducible(&mut command, root)?;
+    symbols::same_in_every_folder(&mut command, root)?;
     cargo::check(command)?;
     Ok(Workspace::Firmware.target_folder().join(target).join("dist").join(package))
 }

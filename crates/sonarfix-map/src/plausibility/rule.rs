@@ -182,7 +182,9 @@ impl Rule {
         // Of an interval around zero, a value of a third.
         let centre = if least > 0.0 { (least * most).sqrt() } else { most.abs() / 3.0 };
         let far = |value: f64| (value / per / centre).abs().ln().abs();
+        // Nobody writes milliradians by mistake.
         let units = self.dimension.readings(&fact.text).into_iter();
+        let units = units.filter(|(text, _)| !text.ends_with("mrad"));
         let unit_meant = units.filter(|(_, value)| is_usual(*value));
         let unit_meant = unit_meant.min_by(|(_, a), (_, b)| far(*a).total_cmp(&far(*b)));
         if let Some((text, _)) = unit_meant {

@@ -10,7 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use sonarfix_link::message::ImageStatus;
 use sonarfix_link::{Hello, Telemetry};
 use sonarfix_monitor::port::Port;
-use sonarfix_monitor::{Monitor, view};
+use sonarfix_telemetry::{Monitor, view};
 use sonarfix_terminal::progress;
 
 /// Time between two attempts to open a port: that of a board is missing while the board restarts.

@@ -1,7 +1,7 @@
 //! The edges of the encoder of a wheel that is turned by hand.
 
 use sonarfix_link::message::EncoderReading;
-use sonarfix_monitor::signs::difference;
+use sonarfix_telemetry::signs::difference;
 
 /// The edges of an encoder since the first reading.
 #[derive(Debug, Default, Clone, Copy)]

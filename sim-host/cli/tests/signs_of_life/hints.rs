@@ -4,7 +4,7 @@ use sonarfix::geometry::units::{Instant, Metres, Radians};
 use sonarfix_hal::ranger::{Echo, NoEcho, Outcome};
 use sonarfix_link::message::{ImageStatus, ResetCause, ServoReading};
 use sonarfix_link::{Hello, ReceiverCounters};
-use sonarfix_monitor::signs::hints::{
+use sonarfix_telemetry::signs::hints::{
     Board, Counted, Heard, Hint, Servo, State, Supply, of_board, of_encoder, of_servo, of_sonar,
     of_supply,
 };

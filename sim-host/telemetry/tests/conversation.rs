@@ -1,12 +1,12 @@
 //! A motion in a conversation: when it is sent, renewed and given up.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test should stop")]
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use sonarfix::geometry::units::{MetresPerSecond, RadiansPerSecond};
 use sonarfix_link::message::{Ack, CommandError};
 use sonarfix_link::{Command, CommandResult, Motion, Receiver, SessionCommand};
-use sonarfix_monitor::conversation::{ATTEMPTS, Conversation, Due, Outcome};
+use sonarfix_telemetry::conversation::{ATTEMPTS, Conversation, Due, Outcome};
 
 const AHEAD: Motion = Motion { speed: MetresPerSecond(0.2), turn: RadiansPerSecond(0.0) };
 const LEFT: Motion = Motion { speed: MetresPerSecond(0.0), turn: RadiansPerSecond(1.0) };
@@ -15,17 +15,16 @@ const DONE: CommandResult = CommandResult::Done;
 /// A conversation with a robot that the test is, at a time of the test.
 struct Talk {
     conversation: Conversation,
-    began: Instant,
     millis: u64,
 }
 
 impl Talk {
     fn new() -> Self {
-        Self { conversation: Conversation::default(), began: Instant::now(), millis: 0 }
+        Self { conversation: Conversation::new(0), millis: 0 }
     }
 
     fn poll(&mut self) -> Due {
-        self.conversation.poll(self.began + Duration::from_millis(self.millis))
+        self.conversation.poll(Duration::from_millis(self.millis))
     }
 
     /// The frame that is sent now.

@@ -1,10 +1,10 @@
 //! Sends the commands of a session, one after the other: repeats each until the robot acknowledges it.
 //!
 //! It reads neither port nor clock: bytes to send are returned, acknowledgements and the time are arguments. So a program that
-//! shows telemetry can send commands beside it.
+//! shows telemetry can send commands beside it. The time is that since any fixed moment.
 
 use std::collections::VecDeque;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
 use sonarfix_link::message::{Ack, CommandError};
 use sonarfix_link::{Command, CommandResult, Motion, Sender, SessionCommand, frame};
@@ -49,7 +49,7 @@ struct Sent {
     sequence: u16,
     kind: Kind,
     attempts: u32,
-    at: Option<Instant>,
+    at: Option<Duration>,
 }
 
 /// What a frame is for.
@@ -68,7 +68,7 @@ enum Kind {
 struct Renewed {
     motion: Motion,
     /// When it was sent last.
-    at: Option<Instant>,
+    at: Option<Duration>,
     /// Frames since the last answer.
     unanswered: u32,
 }
@@ -83,19 +83,20 @@ pub struct Conversation {
     sent: Option<Sent>,
 }
 
-impl Default for Conversation {
-    fn default() -> Self {
+impl Conversation {
+    /// A conversation whose first frame has this sequence number. It should differ from that of the program before: a robot takes a
+    /// frame with the number of the last one for its repetition.
+    #[must_use]
+    pub fn new(first_sequence: u16) -> Self {
         Self {
-            sender: Sender::starting_at(first_sequence()),
+            sender: Sender::starting_at(first_sequence),
             session: None,
             waiting: VecDeque::new(),
             motion: None,
             sent: None,
         }
     }
-}
 
-impl Conversation {
     /// Adds a command; whether there was room for it.
     pub fn add(&mut self, command: Command) -> bool {
         let has_room = self.waiting.len() < MOST_WAITING;
@@ -115,7 +116,7 @@ impl Conversation {
     }
 
     /// The frame to send now, if one is due, or the outcome of a command that was given up.
-    pub fn poll(&mut self, now: Instant) -> Due {
+    pub fn poll(&mut self, now: Duration) -> Due {
         if self.is_motion_due(now, OVERDUE) {
             if self.motion.is_some_and(|renewed| renewed.unanswered >= ATTEMPTS) {
                 return self.end_motion();
@@ -128,7 +129,7 @@ impl Conversation {
         let Some(sent) = &mut self.sent else {
             return Due::Nothing;
         };
-        if sent.at.is_some_and(|at| now.saturating_duration_since(at) < TIMEOUT) {
+        if sent.at.is_some_and(|at| now.saturating_sub(at) < TIMEOUT) {
             return Due::Nothing;
         }
         if sent.attempts < ATTEMPTS {
@@ -156,8 +157,8 @@ impl Conversation {
         Due::End(Outcome::Driven(None))
     }
 
-    fn is_motion_due(&self, now: Instant, after: Duration) -> bool {
-        let is_due = |at| now.saturating_duration_since(at) >= after;
+    fn is_motion_due(&self, now: Duration, after: Duration) -> bool {
+        let is_due = |at| now.saturating_sub(at) >= after;
         self.motion.is_some_and(|renewed| renewed.at.is_none_or(is_due))
     }
 
@@ -196,7 +197,7 @@ impl Conversation {
     }
 
     /// The frame of the first waiting command, else of the motion if it is due, or of the session that they need.
-    fn prepare(&mut self, now: Instant) {
+    fn prepare(&mut self, now: Duration) {
         let is_due = self.is_motion_due(now, RENEWAL);
         let (command, kind) = match (self.waiting.front(), self.motion) {
             (Some(command), _) => (*command, Kind::Command),
@@ -218,11 +219,4 @@ impl Conversation {
         let bytes = self.sender.frame(&message, &mut buffer).to_vec();
         self.sent = Some(Sent { bytes, sequence, kind, attempts: 0, at: None });
     }
-}
-
-/// First sequence number of this process; it differs from that of the previous process, except in
-/// one of 32,768 cases.
-fn first_sequence() -> u16 {
-    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-    u16::try_from(now.as_micros() % (1 << 15)).unwrap_or(0)
 }

@@ -3,8 +3,8 @@
 //! The log has all inputs of the localizer, so a replay reproduces its estimates bit for bit if no
 //! frame was lost. A log has one start; when the robot restarts, a new log begins.
 
+use std::fmt::Debug;
 use std::io::{self, ErrorKind, Write};
-use std::path::PathBuf;
 
 use sonarfix::config::RangerId;
 use sonarfix::geometry::units::Instant;
@@ -18,15 +18,26 @@ use sonarfix_replay::log::HEADER;
 use sonarfix_search::navigator::{Mode, UNKNOWN_POSITION};
 
 use crate::Received;
-use crate::sealed::Sealed;
+use crate::sealed::{Output, Sealed};
 
-/// Writes logs to files: the first to the given path, further ones with a number in the name. Files that exist are kept.
+/// Where the logs of a recording go.
+pub trait Logs: Debug + Send {
+    /// The name of the first one.
+    fn name(&self) -> String;
+
+    /// Begins the log of this number, from 1.
+    ///
+    /// # Errors
+    /// If it cannot be written, or there is one that is to stay ([`ErrorKind::AlreadyExists`]).
+    fn create(&mut self, number: u32) -> io::Result<Box<dyn Output>>;
+}
+
+/// Writes logs: the first one, and another one at each further start of the robot.
 #[derive(Debug)]
 pub struct Recording {
-    path: PathBuf,
-    is_forced: bool,
+    logs: Box<dyn Logs>,
     written: u32,
-    /// In the name of the last file.
+    /// Of the last log.
     number: u32,
     log: Option<Log<Sealed>>,
     /// The last odometry, for a log that begins during a run or when the pose is set before one began.
@@ -34,16 +45,16 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// A recording to `path`, which is created when the robot starts or its first estimate arrives.
+    /// A recording whose first log is created when the robot starts or its first estimate arrives.
     #[must_use]
-    pub fn new(path: PathBuf) -> Self {
-        Self { path, is_forced: false, written: 0, number: 0, log: None, step: None }
+    pub fn new(logs: impl Logs + 'static) -> Self {
+        Self { logs: Box::new(logs), written: 0, number: 0, log: None, step: None }
     }
 
-    /// Replaces files that exist.
+    /// The name of the first log.
     #[must_use]
-    pub fn forced(self, is_forced: bool) -> Self {
-        Self { is_forced, ..self }
+    pub fn name(&self) -> String {
+        self.logs.name()
     }
 
     /// Ends the last log, whole; returns the number of logs.
@@ -62,7 +73,7 @@ impl Recording {
     /// Records a message.
     ///
     /// # Errors
-    /// If a file cannot be written, or the first one exists.
+    /// If a log cannot be written, or the first one exists.
     pub fn take(&mut self, received: &Received) -> io::Result<()> {
         if let Telemetry::Odometry(step) = &received.telemetry {
             // The robot has restarted, and the frame that reports it was lost.
@@ -73,7 +84,7 @@ impl Recording {
         }
         match (&received.telemetry, &mut self.log) {
             (Telemetry::Initialized(began), _) => {
-                let file = self.next_file()?;
+                let file = self.next_log()?;
                 self.log = Some(Log::begin(file, began)?);
             }
             (Telemetry::ModeChanged(change), Some(log)) if change.estimate.at >= log.last => {
@@ -89,14 +100,14 @@ impl Recording {
                 _,
             ) => {
                 if let Some(step) = self.step.filter(|step| step.at == estimate.at) {
-                    let file = self.next_file()?;
+                    let file = self.next_log()?;
                     self.log = Some(Log::join(file, estimate, &step)?);
                 }
             }
             (_, Some(log)) => log.take(received)?,
             (Telemetry::Estimate(estimate), None) => {
                 if let Some(step) = self.step.filter(|step| step.at == estimate.at) {
-                    let file = self.next_file()?;
+                    let file = self.next_log()?;
                     self.log = Some(Log::join(file, estimate, &step)?);
                 }
             }
@@ -105,32 +116,20 @@ impl Recording {
         Ok(())
     }
 
-    /// The file of the next log. A further log takes the next number that is free.
-    fn next_file(&mut self) -> io::Result<Sealed> {
+    /// The next log. A further one takes the next number that is free.
+    fn next_log(&mut self) -> io::Result<Sealed> {
         self.end_log()?;
         loop {
             self.number += 1;
-            match Sealed::create(&self.numbered(), self.is_forced) {
+            match self.logs.create(self.number) {
                 Err(error) if error.kind() == ErrorKind::AlreadyExists && self.number > 1 => {}
                 created => {
-                    let file = created?;
+                    let out = created?;
                     self.written += 1;
-                    return Ok(file);
+                    return Ok(Sealed::new(out));
                 }
             }
         }
-    }
-
-    fn numbered(&self) -> PathBuf {
-        let mut path = self.path.clone();
-        if self.number > 1 {
-            let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
-            path.set_file_name(format!("{stem}-{}", self.number));
-            if let Some(extension) = self.path.extension() {
-                path.set_extension(extension);
-            }
-        }
-        path
     }
 }
 

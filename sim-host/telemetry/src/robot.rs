@@ -1,25 +1,24 @@
-//! A robot: its telemetry as events, the commands of pages to it, and its recording.
+//! A robot: its telemetry as events, the commands of pages to it, and its recording. The time is that since any fixed moment.
 
 use std::collections::VecDeque;
 use std::io;
-use std::path::{Path, PathBuf};
 use std::sync::mpsc::sync_channel;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
 use anyhow::Context;
 use sonarfix::geometry::units::{MetresPerSecond, RadiansPerSecond};
 use sonarfix_hal::robot::AbsoluteResult;
 use sonarfix_link::message::Odometry;
 use sonarfix_link::{CommandResult, Estimate, Motion, Telemetry};
-use sonarfix_monitor::conversation::{Conversation, Due, Outcome};
-use sonarfix_monitor::recording::Recording;
-use sonarfix_monitor::signs::Signs;
-use sonarfix_monitor::{Monitor, Received, hints, view};
 use sonarfix_search::navigator::Mode;
 use sonarfix_sim::observe;
 
+use crate::conversation::{Conversation, Due, Outcome};
 use crate::feed::{Feed, Scene, Status};
 use crate::order::{Order, Ordered, Orders, Reply};
+use crate::recording::Recording;
+use crate::signs::Signs;
+use crate::{Monitor, Received, hints, view};
 use records::Geometry;
 
 mod records;
@@ -34,12 +33,11 @@ const HELD: Duration = Duration::from_millis(300);
 #[derive(Debug, Clone, Copy)]
 struct Held {
     motion: Motion,
-    until: Instant,
+    until: Duration,
     is_refused: bool,
 }
 
 /// A robot on a page.
-#[derive(Debug)]
 pub struct Robot {
     feed: Feed,
     scene: Scene,
@@ -53,7 +51,9 @@ pub struct Robot {
     signs: Signs,
     /// Whether the robot has sent the readings of its devices.
     shows_devices: bool,
-    recording: Option<(Recording, PathBuf)>,
+    recording: Option<Recording>,
+    /// Makes the recording that a page orders.
+    new_recording: Box<dyn Fn() -> Recording>,
     /// What was recorded, in words.
     recorded: Vec<String>,
     notice: String,
@@ -65,9 +65,16 @@ pub struct Robot {
 }
 
 impl Robot {
-    /// A robot of which nothing was received.
+    /// A robot of which nothing was received, with the place of its sonar, the commands to it, and what makes the recording that a page
+    /// orders.
     #[must_use]
-    pub fn new(feed: Feed, scene: Scene, mount: [f64; 2]) -> Self {
+    pub fn new(
+        feed: Feed,
+        scene: Scene,
+        mount: [f64; 2],
+        conversation: Conversation,
+        new_recording: impl Fn() -> Recording + 'static,
+    ) -> Self {
         feed.scene(&scene);
         Self {
             feed,
@@ -75,12 +82,13 @@ impl Robot {
             geometry: Geometry { mount, track: scene.track, ..Geometry::default() },
             scene,
             monitor: Monitor::default(),
-            conversation: Conversation::default(),
+            conversation,
             waiting: VecDeque::new(),
             held: None,
             signs: Signs::default(),
             shows_devices: false,
             recording: None,
+            new_recording: Box::new(new_recording),
             recorded: Vec::new(),
             notice: String::new(),
             odometry: records::DeadReckoning::default(),
@@ -106,9 +114,9 @@ impl Robot {
     ) -> anyhow::Result<()> {
         for &byte in bytes {
             let Some(received) = self.monitor.push(byte) else { continue };
-            if let Some((recording, path)) = &mut self.recording {
+            if let Some(recording) = &mut self.recording {
                 let taken = recording.take(&received);
-                taken.with_context(|| format!("cannot write {}", path.display()))?;
+                taken.with_context(|| format!("cannot write {}", recording.name()))?;
             }
             self.publish(&received);
             show(&self.monitor, &received);
@@ -117,9 +125,9 @@ impl Robot {
     }
 
     /// Takes the orders of pages, and returns the bytes to send to the robot now.
-    pub fn obey(&mut self, orders: Option<&Orders>, now: Instant) -> Option<Vec<u8>> {
+    pub fn obey(&mut self, orders: Option<&Orders>, now: Duration) -> Option<Vec<u8>> {
         while let Some(ordered) = orders.and_then(Orders::next) {
-            self.order(ordered, now);
+            self.take_order(ordered, now);
         }
         if let Some(held) = self.held.take_if(|held| now >= held.until)
             && !held.is_refused
@@ -137,15 +145,15 @@ impl Robot {
         }
     }
 
-    /// Begins a recording, which replaces files only if `is_forced`.
-    pub fn record(&mut self, path: PathBuf, is_forced: bool) {
-        self.recording = Some((Recording::new(path.clone()).forced(is_forced), path));
+    /// Begins a recording.
+    pub fn record(&mut self, recording: Recording) {
+        self.recording = Some(recording);
     }
 
-    /// Ends a recording, if there is one; the first file of it, and how many there are, or why the last one is not whole.
-    pub fn end_recording(&mut self) -> Option<(PathBuf, io::Result<u32>)> {
-        let (recording, path) = self.recording.take()?;
-        Some((path, recording.end()))
+    /// Ends a recording, if there is one; the name of its first log, and how many there are, or why the last one is not whole.
+    pub fn end_recording(&mut self) -> Option<(String, io::Result<u32>)> {
+        let recording = self.recording.take()?;
+        Some((recording.name(), recording.end()))
     }
 
     /// Publishes that the robot is gone, with the reason.
@@ -159,9 +167,9 @@ impl Robot {
     }
 
     /// Takes an order of this program; its answer is the next [`Self::notice`].
-    pub fn ask(&mut self, order: Order, now: Instant) {
+    pub fn ask(&mut self, order: Order, now: Duration) {
         let (nobody, _) = sync_channel(1);
-        self.order(Ordered::new(order, nobody), now);
+        self.take_order(Ordered::new(order, nobody), now);
     }
 
     /// The answer to the last order, in words; empty before the first.
@@ -170,13 +178,14 @@ impl Robot {
         &self.notice
     }
 
-    /// The file that is recorded.
+    /// The name of the first log of the recording, if there is one.
     #[must_use]
-    pub fn recording(&self) -> Option<&Path> {
-        self.recording.as_ref().map(|(_, path)| path.as_path())
+    pub fn recording(&self) -> Option<String> {
+        self.recording.as_ref().map(Recording::name)
     }
 
-    fn order(&mut self, ordered: Ordered, now: Instant) {
+    /// Takes an order of a page.
+    pub fn take_order(&mut self, ordered: Ordered, now: Duration) {
         let reply = match (ordered.order, ordered.order.command()) {
             (_, Some(_)) | (Order::Drive { .. } | Order::Leave, _) if !self.scene.commands => {
                 Reply::refused("this connection can only be read")
@@ -198,19 +207,19 @@ impl Robot {
                 Reply::refused("it is recorded already")
             }
             (Order::Record { on: true }, _) => {
-                let path = new_file();
-                let text = format!("recording {}", path.display());
-                self.record(path, false);
+                let recording = (self.new_recording)();
+                let text = format!("recording {}", recording.name());
+                self.record(recording);
                 Reply::done(&text)
             }
             (Order::Record { on: false }, _) => match self.end_recording() {
-                Some((path, Ok(1..))) => {
-                    let text = format!("recorded {}", path.display());
+                Some((name, Ok(1..))) => {
+                    let text = format!("recorded {name}");
                     self.recorded.push(text.clone());
                     Reply::done(&text)
                 }
-                Some((path, Err(error))) => {
-                    Reply::refused(&format!("cannot write {}: {error}", path.display()))
+                Some((name, Err(error))) => {
+                    Reply::refused(&format!("cannot write {name}: {error}"))
                 }
                 Some((_, Ok(0))) => Reply::done("nothing was recorded: no estimate came"),
                 None => Reply::refused("nothing is recorded"),
@@ -239,7 +248,7 @@ impl Robot {
     }
 
     /// Drives with a motion as long as a page repeats it.
-    fn hold(&mut self, motion: Motion, now: Instant) -> Reply {
+    fn hold(&mut self, motion: Motion, now: Duration) -> Reply {
         let until = now + HELD;
         match &mut self.held {
             Some(held) if held.motion == motion => held.until = until,
@@ -377,7 +386,7 @@ impl Robot {
             deadlines: status.map(|status| status.faults.deadlines),
             lines: self.lines(),
             hints: hints::hints(&self.monitor),
-            recording: self.recording.as_ref().map(|(_, path)| path.display().to_string()),
+            recording: self.recording(),
         });
     }
 
@@ -397,10 +406,4 @@ impl Robot {
     pub fn recorded(&self) -> &[String] {
         &self.recorded
     }
-}
-
-/// A new file in the working folder.
-fn new_file() -> PathBuf {
-    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-    PathBuf::from(format!("recording-{}.csv", now.as_secs()))
 }

@@ -170,9 +170,15 @@ impl Ordered {
 
 /// The orders of all pages.
 #[derive(Debug)]
-pub struct Orders(pub(crate) Receiver<Ordered>);
+pub struct Orders(Receiver<Ordered>);
 
 impl Orders {
+    /// Those that this end of a channel receives.
+    #[must_use]
+    pub fn new(received: Receiver<Ordered>) -> Self {
+        Self(received)
+    }
+
     /// The next order, if there is one.
     #[must_use]
     pub fn next(&self) -> Option<Ordered> {

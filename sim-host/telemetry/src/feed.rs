@@ -3,16 +3,19 @@
 //! A record has the columns of the report's player (`sonarfix_player::columns`), which the page appends to its own, and `more` for
 //! the curves. All values are in SI units, in the map frame.
 
+use std::fmt::Debug;
 use std::sync::Arc;
 
 use serde::Serialize;
 use serde_json::json;
 use sonarfix::health::Verdict;
+use sonarfix_hal::config::RobotConfig;
+use sonarfix_map::Floor;
 use sonarfix_player::columns;
-use sonarfix_sim::trace::{AbsoluteRecord, FixRecord, GyroEstimate, SearchRecord, Tick, Wall};
+use sonarfix_sim::trace::{
+    AbsoluteRecord, FixRecord, GyroEstimate, SearchRecord, Tick, Trace, Wall,
+};
 use sonarfix_sim::world::obstacle::Obstacle;
-
-use crate::ring::Ring;
 
 /// What the page shows, and what it may ask for.
 #[derive(Debug, Clone, Serialize)]
@@ -35,6 +38,32 @@ pub struct Scene {
     pub obstacles: Vec<Obstacle>,
 }
 
+impl Scene {
+    /// A robot, as far as its map and its configuration are known; and the place of its sonar, metres.
+    #[must_use]
+    pub fn of_robot(
+        title: String,
+        floor: Option<&Floor>,
+        robot: Option<&RobotConfig>,
+    ) -> (Self, [f64; 2]) {
+        let sonar = robot.map(|robot| robot.localizer.rangers.first);
+        let cone = sonar.map(|sonar| sonar.cone).unwrap_or_default();
+        let walls = floor.map_or_else(Vec::new, |floor| Trace::of(floor, cone).walls);
+        let track = robot.map_or(0.0, |robot| f64::from(robot.localizer.drive.track_width.0));
+        let mount = sonar.map_or([0.0; 2], |of| [of.mount.x.0.into(), of.mount.y.0.into()]);
+        let scene = Self {
+            title,
+            source: "robot",
+            commands: true,
+            cone: cone.0.into(),
+            track,
+            walls,
+            obstacles: Vec::new(),
+        };
+        (scene, mount)
+    }
+}
+
 /// The loop, the link and what to check.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Status {
@@ -52,15 +81,24 @@ pub struct Status {
     pub recording: Option<String>,
 }
 
+/// Where events go.
+pub trait Events: Debug + Send + Sync {
+    /// Appends an event, a line of JSON.
+    fn push(&self, line: &str);
+
+    /// No event will follow.
+    fn close(&self);
+}
+
 /// Publishes events.
 #[derive(Debug, Clone)]
-pub struct Feed(Option<Arc<Ring>>);
+pub struct Feed(Option<Arc<dyn Events>>);
 
 impl Feed {
-    /// Into this ring.
+    /// To these events.
     #[must_use]
-    pub fn new(ring: Arc<Ring>) -> Self {
-        Self(Some(ring))
+    pub fn new(events: Arc<dyn Events>) -> Self {
+        Self(Some(events))
     }
 
     /// To nobody.
@@ -157,14 +195,14 @@ impl Feed {
 
     /// No event will follow.
     pub fn end(&self) {
-        if let Some(ring) = &self.0 {
-            ring.close();
+        if let Some(events) = &self.0 {
+            events.close();
         }
     }
 
     fn push(&self, event: &serde_json::Value) {
-        if let Some(ring) = &self.0 {
-            ring.push(&event.to_string());
+        if let Some(events) = &self.0 {
+            events.push(&event.to_string());
         }
     }
 }
