@@ -15,6 +15,7 @@
 //! | `blocks` | the numbers, and their conversion to a matrix |
 //! | `transition` | F and Q of a motion, eqs. (8) and (9) |
 //! | `propagation` | eqs. (5) and (10): P ← F P Fᵀ + Q |
+//! | `gain` | K |
 //! | `projection` | P Hᵀ and H P Hᵀ, eq. (14) |
 //! | `correction` | eqs. (6) and (18) to (20): gain, state and covariance |
 //! | `column` | covariances of a quantity beside P |
@@ -30,6 +31,7 @@ mod bias;
 mod blocks;
 mod column;
 mod correction;
+mod gain;
 mod mount;
 mod projection;
 mod propagation;
@@ -37,7 +39,8 @@ mod transition;
 
 pub use bias::{GyroBias, TurnDifference};
 pub use blocks::{Covariance, PoseBlock};
-pub use correction::{Correction, Gain};
+pub use correction::Correction;
+pub use gain::Gain;
 pub use mount::Mount;
 pub use projection::PredictedMeasurement;
 pub use transition::Transition;

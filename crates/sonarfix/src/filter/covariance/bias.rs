@@ -7,9 +7,8 @@
 
 use super::blocks::Covariance;
 use super::column::StateColumn;
-use super::correction::Gain;
-use super::mount::MountCovariance;
-use super::projection::PredictedMeasurement;
+use super::gain::Gain;
+use super::projection::{MountCovariance, PredictedMeasurement};
 use crate::filter::motion::LinearizedMotion;
 use crate::geometry::numeric::{at_least, at_most};
 use crate::state::estimate::FilterEstimate;

@@ -1,6 +1,6 @@
 //! Covariances of a quantity beside P with the seven states of P.
 
-use super::correction::Gain;
+use super::gain::Gain;
 use crate::filter::motion::LinearizedMotion;
 use crate::sensor::range::MeasurementJacobian;
 

@@ -8,8 +8,8 @@
 
 use super::bias::{GyroBias, TurnDifference};
 use super::column::StateColumn;
-use super::correction::Gain;
-use super::projection::PredictedMeasurement;
+use super::gain::Gain;
+use super::projection::{MountCovariance, MountShare, PredictedMeasurement};
 use crate::filter::motion::LinearizedMotion;
 use crate::geometry::elementary::sqrt;
 use crate::geometry::numeric::at_least;
@@ -30,29 +30,6 @@ pub struct Mount {
     aa: f32,
     al: f32,
     ll: f32,
-}
-
-/// One number for each coordinate of the mount, ahead and to the left.
-pub type MountCovariance = (f32, f32);
-
-/// What the mount adds to a measurement: its derivatives L by the mount, and its covariances.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MountShare {
-    /// Covariances of the seven states with L e, where e are the errors of the mount.
-    pub(super) states: StateColumn,
-    /// Covariances of the errors of the mount with the measurement, ahead and to the left, m².
-    pub(super) own: MountCovariance,
-    /// L.
-    by: (f32, f32),
-    /// Covariance of L e with the measurement, m².
-    pub(super) along: f32,
-}
-
-impl MountShare {
-    /// L times the covariances of another quantity with the errors of the mount.
-    pub(super) fn times(&self, covariance: MountCovariance) -> f32 {
-        self.by.0 * covariance.0 + self.by.1 * covariance.1
-    }
 }
 
 impl Mount {

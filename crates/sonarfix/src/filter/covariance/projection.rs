@@ -1,7 +1,7 @@
 //! Projection of P onto a measurement: P Hᵀ and H P Hᵀ (`docs/model.md`, eq. 14).
 
 use super::blocks::Covariance;
-use super::mount::{MountCovariance, MountShare};
+use super::column::StateColumn;
 use crate::geometry::units::{Metres, SquareMetres};
 use crate::sensor::range::{ExpectedRange, Innovation};
 
@@ -16,6 +16,29 @@ pub struct CrossCovariance {
     pub h: f32,
     /// With the range scale error, m.
     pub k: f32,
+}
+
+/// One number for each coordinate of the mount, ahead and to the left.
+pub type MountCovariance = (f32, f32);
+
+/// What the mount adds to a measurement: its derivatives L by the mount, and its covariances.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MountShare {
+    /// Covariances of the seven states with L e, where e are the errors of the mount.
+    pub(super) states: StateColumn,
+    /// Covariances of the errors of the mount with the measurement, ahead and to the left, m².
+    pub(super) own: MountCovariance,
+    /// L.
+    pub(super) by: (f32, f32),
+    /// Covariance of L e with the measurement, m².
+    pub(super) along: f32,
+}
+
+impl MountShare {
+    /// L times the covariances of another quantity with the errors of the mount.
+    pub(super) fn times(&self, covariance: MountCovariance) -> f32 {
+        self.by.0 * covariance.0 + self.by.1 * covariance.1
+    }
 }
 
 /// An expected range seen from the filter: computed once, used by innovation, gate and correction.
