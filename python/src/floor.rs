@@ -10,7 +10,7 @@ use pyo3::types::{PyDict, PyTuple};
 use sonarfix::config::{Config, RangerParameters};
 use sonarfix::geometry::units::Metres;
 use sonarfix::map::{Map as CoreMap, Wall};
-use sonarfix_exchange::maps::{Frame, grid};
+use sonarfix_drawings::{Frame, grid};
 use sonarfix_map::{Finding, Floor, Limits, MapFile, NamedWall, Severity, bake, flaws, symmetries};
 use sonarfix_sim::simulate::MANY;
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, ensure};
 use sonarfix::map::{Map, Wall};
-use sonarfix_exchange::maps::{Frame, grid};
+use sonarfix_drawings::{Frame, grid};
 use sonarfix_map::{Floor, MapFile, bake};
 use sonarfix_ros_messages::geometry;
 use sonarfix_ros_messages::messages::OccupancyGrid;

@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
 use serde::Serialize;
-use sonarfix_exchange::maps::geojson::Anchor;
-use sonarfix_exchange::maps::{
-    Frame, Imported, MAX_JSON_BYTES, MAX_TEXT_BYTES, dxf, geojson, grid, plan, scan, svg,
+use sonarfix_drawings::geojson::Anchor;
+use sonarfix_drawings::{
+    Frame, Imported, MAX_JSON_BYTES, MAX_TEXT_BYTES, SHORTEST_OF_PLAN, dxf, geojson, grid, plan,
+    scan, svg, unit,
 };
 use sonarfix_map::Floor;
 use sonarfix_terminal::json;
@@ -72,21 +73,6 @@ pub struct Target {
     anchor: Option<[f64; 2]>,
 }
 
-fn unit(text: &str) -> Result<f64, String> {
-    match text {
-        "m" => Ok(1.0),
-        "cm" => Ok(1e-2),
-        "mm" => Ok(1e-3),
-        "in" => Ok(0.0254),
-        "ft" => Ok(0.3048),
-        other => {
-            let metres =
-                other.parse().ok().filter(|metres: &f64| metres.is_finite() && *metres > 0.0);
-            metres.ok_or_else(|| "m, cm, mm, in, ft or a positive number is expected".to_owned())
-        }
-    }
-}
-
 fn pair(text: &str) -> Result<[f64; 2], String> {
     let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
     let numbers = numbers.filter(|numbers| numbers.iter().all(|number| number.is_finite()));
@@ -113,15 +99,14 @@ pub fn import(args: &Import) -> anyhow::Result<()> {
         check_file("--picture", picture)?;
     }
     let mut imported = read(args).with_context(|| args.file.display().to_string())?;
-    let lines = plan::lines(&imported);
     if args.is_plan() {
-        let found = plan::walls(lines, imported.resolution)?;
+        let (of_plan, found) =
+            plan::of(imported).with_context(|| args.file.display().to_string())?;
+        imported = of_plan;
         if let Some(picture) = &args.picture {
             sonarfix_files::write(picture, found.picture())?;
         }
-        imported.floor = found.floor().with_context(|| args.file.display().to_string())?;
-        imported.notes.extend(found.notes);
-    } else if let Some(walls) = plan::fewer(lines, imported.resolution) {
+    } else if let Some(walls) = plan::fewer(&imported) {
         imported.notes.push(format!(
             "hint: as a floor plan (--plan) it has {walls} walls, because of double lines, copies or furniture"
         ));
@@ -167,7 +152,7 @@ struct Json<'a> {
 
 fn read(args: &Import) -> anyhow::Result<Imported> {
     let frame = Frame { unit: args.unit, origin: args.origin };
-    let shortest = args.shortest.unwrap_or(if args.is_plan() { 0.25 } else { 0.1 });
+    let shortest = args.shortest.unwrap_or(if args.is_plan() { SHORTEST_OF_PLAN } else { 0.1 });
     let is_length = shortest.is_finite() && shortest >= 0.0;
     ensure!(is_length, "--shortest must be zero or positive");
     let ending = ending(&args.file);
@@ -202,10 +187,18 @@ pub fn export(floor: &Floor, args: &Target) -> anyhow::Result<()> {
     let is_size = args.resolution.is_finite() && args.resolution >= 1e-3;
     ensure!(is_size, "--resolution must be at least 0.001");
     let text = match ending.as_str() {
-        "yaml" => return grid::write(floor, &args.out, args.resolution),
+        "yaml" => return write_grid(floor, args),
         "svg" => svg::write(floor),
         "geojson" => geojson::write(floor, anchor(args.anchor)?),
         other => bail!("--out: unknown ending `{other}`: expected yaml, svg or geojson"),
     };
     sonarfix_files::write(&args.out, text)
+}
+
+fn write_grid(floor: &Floor, args: &Target) -> anyhow::Result<()> {
+    let image = args.out.with_extension("pgm");
+    let name = image.file_name().and_then(|name| name.to_str()).context("the name is no text")?;
+    let (yaml, pgm) = grid::write(floor, name, args.resolution)?;
+    sonarfix_files::write(&image, pgm)?;
+    sonarfix_files::write(&args.out, yaml)
 }

@@ -1,4 +1,4 @@
-//! Recordings, traces and maps in the formats of other programs (`docs/exchange.md`).
+//! Recordings and traces in the formats of other programs (`docs/exchange.md`).
 //!
 //! | module | what |
 //! |---|---|
@@ -8,11 +8,9 @@
 //! | [`mcap_file`] | rows and the records of a log as MCAP |
 //! | `scene` | the messages for a picture: poses, map, beam |
 //! | `schema` | the JSON schemas of the messages |
-//! | [`maps`] | maps: DXF, SVG, GeoJSON, occupancy grids |
 //! | `log_messages` | the records of a log as messages |
 
 mod log_messages;
-pub mod maps;
 pub mod mcap_file;
 pub mod row;
 mod scene;

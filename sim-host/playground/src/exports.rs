@@ -1,7 +1,7 @@
 //! The functions that the page calls: plain C functions, so that no tool has to generate glue code.
 //!
 //! The page asks for room for a request (`request`), writes it there, and calls `run`, which returns the length of the
-//! answer at `answer`. `scenes` makes the scenes of the tour the answer. `questions`, `program`, `robot` and
+//! answer at `answer`. `drawing` and `own_map` read a map, and `map_file` writes one. `scenes` makes the scenes of the tour the answer. `questions`, `program`, `robot` and
 //! `zip` are those of the form; `connect`, `receive`, `order`, `due` and `events` those of a robot on a serial port. Times are
 //! milliseconds since any fixed moment.
 
@@ -14,6 +14,7 @@ use crate::live::Live;
 
 thread_local! {
     static REQUEST: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
+    static DRAWING: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
     static PROGRAM: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
     static ANSWER: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
     static LIVE: RefCell<Option<Live>> = const { RefCell::new(None) };
@@ -55,6 +56,25 @@ pub extern "C" fn run() -> usize {
 #[unsafe(no_mangle)]
 pub extern "C" fn file() -> usize {
     answer_to(crate::file)
+}
+
+/// Makes room for a file with a map, of this many bytes, and returns its address.
+#[unsafe(no_mangle)]
+pub extern "C" fn drawing(length: usize) -> *mut u8 {
+    DRAWING.with_borrow_mut(|drawing| room(drawing, length))
+}
+
+/// Makes the map in the file, read as the request says, the answer, and returns its length.
+#[unsafe(no_mangle)]
+pub extern "C" fn own_map() -> usize {
+    let drawing = DRAWING.take();
+    answer_to(|request| crate::own_map::answer(request, drawing))
+}
+
+/// Makes the map of the request's scenario, as a map file, the answer, and returns its length.
+#[unsafe(no_mangle)]
+pub extern "C" fn map_file() -> usize {
+    answer_to(crate::own_map::file)
 }
 
 /// Makes the scenes of the tour the answer, and returns its length.

@@ -41,7 +41,9 @@ const Handles = (() => {
         shift(wallEnds(scenario), from, plus(from, by));
         shift(wallEnds(scenario), to, plus(to, by));
       };
-      return { kind: "wall", name: `wall ${wall.name}`, at, move };
+      const list = scenario.map.wall;
+      const remove = list.length > 1 ? () => list.splice(list.indexOf(wall), 1) : undefined;
+      return { kind: "wall", name: `wall ${wall.name}`, at, move, remove };
     });
   }
 

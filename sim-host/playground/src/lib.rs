@@ -10,6 +10,7 @@
 //! | [`request`] | what the page asks for, and how it becomes a simulation |
 //! | [`scenes`](mod@scenes) | the scenes of the tour |
 //! | [`new_robot`] | the form of a new robot |
+//! | [`own_map`] | a map from a file of one's own |
 //! | [`live`] | a robot on a serial port of the browser |
 //! | [`digest`] | a hash of all bits of a run, to compare machines |
 //! | `exports` | the functions that the page calls, in WebAssembly |
@@ -20,6 +21,7 @@ pub mod digest;
 mod exports;
 pub mod live;
 pub mod new_robot;
+pub mod own_map;
 pub mod request;
 pub mod scenes;
 

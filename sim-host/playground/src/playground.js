@@ -8,6 +8,7 @@ const playground = (() => {
   const NEAR = { mouse: 12, pen: 18, touch: 26 }; // pixels from a handle at which it is grasped
   const STEP = 0.1;            // metres of one key
   const UNDOS = 100;
+  const MOST_BYTES = 32 << 20; // of a file with a map
 
   // Of the scenario: its key, or keys that have the same value. Of the run: a name.
   const FIELDS = [
@@ -283,6 +284,20 @@ const playground = (() => {
     player.draw();
   }
 
+  // A wall of a metre in the middle of the walls; its ends can be dragged to other walls.
+  function addWall() {
+    const [x, y] = free();
+    change(({ scenario: { map } }) => {
+      const names = new Set(map.wall.map(({ name }) => name));
+      let number = map.wall.length + 1;
+      while (names.has(`wall ${number}`)) number += 1;
+      map.wall.push({ name: `wall ${number}`, from: Handles.rounded([x - 0.5, y]), to: Handles.rounded([x + 0.5, y]) });
+    });
+    state.selected = state.handles.findLast(({ kind }) => kind === "wall")?.name ?? null;
+    showFields();
+    player.draw();
+  }
+
   // Where the robot is not: the middle of the walls.
   function free() {
     const ends = state.request.scenario.map.wall.flatMap(({ from, to }) => [from, to]);
@@ -290,15 +305,63 @@ const playground = (() => {
     return [mean(0), mean(1)];
   }
 
-  function download() {
-    const file = new Blob([simulator.file(state.request)], { type: "text/plain" });
-    const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(file), download: "playground.toml" });
+  function save(text, name) {
+    const file = new Blob([text], { type: "text/plain" });
+    const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(file), download: name });
     link.click();
     URL.revokeObjectURL(link.href);
   }
 
+  const download = () => save(simulator.file(state.request), "playground.toml");
+
+  // ---- Own maps ----
+
+  function showMap({ error = "", title = "", notes = [] }) {
+    Object.assign(element("map-error"), { textContent: error, hidden: error === "" });
+    const list = document.createElement("ul");
+    list.append(...notes.map((note) => Object.assign(document.createElement("li"), { textContent: note })));
+    element("map-result").replaceChildren(title, ...(notes.length > 0 ? [list] : []));
+  }
+
+  // Makes the map in a file that of the scene; the objects and kidnappings of the old room are removed.
+  async function useMap(file) {
+    const options = { name: file.name, unit: element("map-unit").value, is_plan: element("map-plan").checked };
+    if (file.size > MOST_BYTES) {
+      showMap({ error: `${file.name}: it has more than ${MOST_BYTES >> 20} MiB: remove what is no wall, or use sonarfix map import` });
+      return;
+    }
+    const bytes = new Uint8Array(await file.arrayBuffer());
+    const { error, map, path, notes } = simulator.ownMap(options, bytes);
+    if (error) { showMap({ error: `${file.name}: ${error}` }); return; }
+    change((request) => {
+      Object.assign(request.scenario, { map });
+      Object.assign(request.scenario.path, path);
+      request.scenario.world.obstacle = []; // the address can state this, but not that a key is missing
+      request.moves = [];
+    });
+    state.selected = null;
+    player.goTo(-Infinity);
+    showMap({ title: `${file.name}: ${map.wall.length} walls`, notes });
+  }
+
+  function downloadMap() {
+    const { error, text } = simulator.mapFile(state.request);
+    if (error) showMap({ error }); else save(text, "map.toml");
+  }
+
+  const hasFile = (event) => event.dataTransfer?.types.includes("Files");
+
+  function onDrop(event) {
+    if (!hasFile(event)) return;
+    event.preventDefault();
+    const [file] = event.dataTransfer.files;
+    if (file) useMap(file);
+  }
+
   const BUTTONS = {
     undo,
+    "download-map": downloadMap,
+    "add-wall": addWall,
     "add-post": () => add({ centre: Handles.rounded(free()), radius: "10 cm" }),
     "add-box": () => { const [x, y] = free(); add({ from: Handles.rounded([x - 0.4, y]), to: Handles.rounded([x + 0.4, y]) }); },
     delete: () => { const handle = selected(); if (handle?.remove) change(() => handle.remove()); },
@@ -320,10 +383,17 @@ const playground = (() => {
   window.addEventListener("hashchange", () => open(location.hash));
   element("scenario").addEventListener("submit", (event) => event.preventDefault());
   for (const [id, act] of Object.entries(BUTTONS)) element(id).addEventListener("click", act);
+  element("map-file").addEventListener("change", ({ target }) => {
+    const [file] = target.files;
+    target.value = ""; // the same file can be chosen again, with another unit
+    if (file) useMap(file);
+  });
+  window.addEventListener("dragover", (event) => { if (hasFile(event)) event.preventDefault(); });
+  window.addEventListener("drop", onDrop);
   const stage = element("stage");
   stage.addEventListener("pointerdown", onDown, true); // before the player decides whether it pans
   stage.addEventListener("pointermove", onMove);
   for (const name of ["pointerup", "pointercancel"]) stage.addEventListener(name, onUp);
   stage.addEventListener("keydown", (event) => KEYS[event.key.toLowerCase()]?.(event));
-  return { scenes, simulator, state, open, player: () => player };
+  return { scenes, simulator, state, open, useMap, player: () => player };
 })();

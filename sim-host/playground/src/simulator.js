@@ -40,6 +40,24 @@ const openSimulator = (base64) => {
     return answer(wasm.file());
   }
 
+  // The map in the bytes of a file, or an error.
+  function ownMap(options, bytes) {
+    try {
+      put(bytes, wasm.drawing);
+      write(options);
+      return JSON.parse(answer(wasm.own_map()));
+    } catch (failure) {
+      wasm = start();
+      return { error: `the file cannot be read: ${failure.message}` };
+    }
+  }
+
+  // The map of a request as a map file, TOML, or an error.
+  function mapFile(request) {
+    write(request);
+    return JSON.parse(answer(wasm.map_file()));
+  }
+
   // The questions of a new robot.
   const questions = () => JSON.parse(answer(wasm.questions()));
 
@@ -82,5 +100,5 @@ const openSimulator = (base64) => {
   // The events since the last call.
   const events = () => answer(wasm.events()).split("\n").filter((line) => line !== "").map((line) => JSON.parse(line));
 
-  return { scenes, run, file, questions, setProgram, robot, zip, serial: { connect, receive, order, due, events } };
+  return { scenes, run, file, ownMap, mapFile, questions, setProgram, robot, zip, serial: { connect, receive, order, due, events } };
 };

@@ -49,6 +49,13 @@
   changes("moving a corner of the room", () => drag([6, 8], [6.5, 8.4]));
   const ends = state.request.scenario.map.wall.flatMap(({ from, to }) => [from, to]).filter((end) => near(end, [6.5, 8.4]));
   assert(ends.length === 2, "both walls of the corner move");
+  changes("adding a wall", () => element("add-wall").click());
+  assert(state.request.scenario.map.wall.length === 5, "no wall was added");
+  const added = state.request.scenario.map.wall[4], [right, up] = added.to;
+  changes("dragging its end", () => drag([right, up], [right + 0.3, up + 0.4]));
+  assert(near(state.request.scenario.map.wall[4].to, [right + 0.3, up + 0.4]), "the end of the wall moves");
+  changes("deleting it", () => { state.selected = "wall wall 5"; stage.dispatchEvent(new KeyboardEvent("keydown", { key: "Delete" })); });
+  assert(state.request.scenario.map.wall.length === 4, "the wall is not deleted");
   changes("moving the bin", () => drag([0.5, 4], [3, 2]));
   changes("moving the start", () => drag([1.5, 1.5], [1.8, 1.2]));
   const { path } = state.request.scenario;
@@ -91,5 +98,41 @@
   assert(digest() === last, "the last run stays");
   element("undo").click();
   assert(element("error").hidden, "undoing removes the mistake");
-  root.dataset.checked = "true";
+
+  // A file with a map. The browser prints the page when it is loaded, which may be before it has read a file: here the contents are
+  // there at once.
+  const contents = new Map();
+  Blob.prototype.arrayBuffer = async function arrayBuffer() { return new TextEncoder().encode(contents.get(this.name)).buffer; };
+  async function ownMaps() {
+    const room = "x1_m,y1_m,x2_m,y2_m,name\n0,0,5,0,a\n5,0,5,4,b\n5,4,0,4,c\n0,4,0,0,d\n";
+    const of = (name, text) => { contents.set(name, text); return new File([text], name); };
+    const before = digest();
+    await playground.useMap(of("room.csv", room));
+    const { map, path, world } = state.request.scenario;
+    assert(element("map-error").hidden && element("error").hidden, `a CSV: ${element("map-error").textContent}${element("error").textContent}`);
+    assert(element("map-result").textContent === "room.csv: 4 walls", `what was read: ${element("map-result").textContent}`);
+    assert(map.wall.length === 4 && path.start.length === 2 && world.obstacle.length === 0 && digest() !== before, "the room is not that of the run");
+    assert(simulator.mapFile(state.request).text.includes("to = [5.0, 4.0]"), "the map cannot be saved");
+    const address = location.hash, own = digest();
+    playground.open("#scene=drift");
+    playground.open(address);
+    player.setPlaying(false);
+    assert(digest() === own, "the address has the map, but not the same run");
+
+    await playground.useMap(of("room.dxf", "no drawing"));
+    assert(!element("map-error").hidden && element("map-error").textContent.startsWith("room.dxf: "), "a wrong file is not named");
+    assert(digest() === own, "a wrong file changes the map");
+
+    const files = new DataTransfer();
+    files.items.add(of("dropped.csv", room.replaceAll("5,", "6,")));
+    const drop = new DragEvent("drop", { dataTransfer: files, cancelable: true });
+    window.dispatchEvent(drop);
+    assert(drop.defaultPrevented, "the browser opens a dropped file instead of the page");
+    for (let turn = 0; turn < 1000 && digest() === own; turn++) await null;
+    assert(state.request.scenario.map.wall[0].to[0] === 6 && element("map-error").hidden, "a dropped file is not read");
+    const input = element("map-file");
+    assert(input.labels.length === 1 && input.tabIndex === 0, "the file input has no label, or no key reaches it");
+    root.dataset.checked = "true";
+  }
+  ownMaps().catch(({ message }) => { root.dataset.error = message; });
 }

@@ -1,4 +1,4 @@
-//! Maps from and for other programs.
+//! Maps from and for other programs (`docs/exchange.md`). The command reads files with it, and the playground what is dropped on it.
 //!
 //! | module | what |
 //! |---|---|
@@ -26,8 +26,30 @@ mod thin;
 
 pub use drawn::{Frame, Imported, MAX_SEGMENTS};
 
+/// The metres of a unit: its name, or a number.
+///
+/// # Errors
+/// If it is neither.
+pub fn unit(text: &str) -> Result<f64, String> {
+    match text {
+        "m" => Ok(1.0),
+        "cm" => Ok(1e-2),
+        "mm" => Ok(1e-3),
+        "in" => Ok(0.0254),
+        "ft" => Ok(0.3048),
+        other => {
+            let metres =
+                other.parse().ok().filter(|metres: &f64| metres.is_finite() && *metres > 0.0);
+            metres.ok_or_else(|| "m, cm, mm, in, ft or a positive number is expected".to_owned())
+        }
+    }
+}
+
 /// Largest text of a drawing that is read at once, bytes: SVG.
 pub const MAX_TEXT_BYTES: u64 = 32 * 1024 * 1024;
+
+/// The shortest wall that is read from an image or a drawing of a plan, metres.
+pub const SHORTEST_OF_PLAN: f64 = 0.25;
 
 /// Largest `GeoJSON`, bytes: thirty times as much is in memory.
 pub const MAX_JSON_BYTES: u64 = 8 * 1024 * 1024;

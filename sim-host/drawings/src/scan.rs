@@ -37,11 +37,19 @@ pub fn read(file: &Path, frame: &Frame, shortest: f64) -> anyhow::Result<Importe
         let (ink, place) = grid::ink(file, frame)?;
         return of_ink(ink, &place, frame, shortest);
     }
+    of_image(&sonarfix_map::read_bytes(file)?, frame, shortest)
+}
+
+/// Reads the lines of a scanned plan, as [`read`] does, from the bytes of an image.
+///
+/// # Errors
+/// If it is no image, is too large, or has no line.
+pub fn of_image(bytes: &[u8], frame: &Frame, shortest: f64) -> anyhow::Result<Imported> {
     let resolution = frame.unit.context(
         "--unit: the length of a pixel is unknown. Measure a wall, divide its length in metres by its pixels, and give the result",
     )?;
     grid::check_resolution(resolution)?;
-    let image = Image::read(&sonarfix_map::read_bytes(file)?)?;
+    let image = Image::read(bytes)?;
     let place = grid::Place { resolution, origin: [0.0; 3] };
     of_ink(dark(&image), &place, frame, shortest)
 }

@@ -210,11 +210,11 @@ pub(super) fn bitmap(image: &Image, is_on: impl Fn(u8) -> bool) -> Bitmap {
     bitmap
 }
 
-/// Writes a map as a grid: the YAML file, and an image in PGM with the same name beside it. Walls are lines of one pixel.
+/// A map as a grid: the text of the YAML file, and its image in PGM, whose file is called `name`. Walls are lines of one pixel.
 ///
 /// # Errors
-/// If the image would be too large, or a file cannot be written.
-pub fn write(floor: &Floor, yaml: &Path, resolution: f64) -> anyhow::Result<()> {
+/// If the image would be too large.
+pub fn write(floor: &Floor, name: &str, resolution: f64) -> anyhow::Result<(String, Vec<u8>)> {
     let ends = || floor.named_walls().iter().flat_map(|wall| [wall.from(), wall.to()]);
     let fold = |of: fn([f64; 2]) -> f64| {
         ends().map(of).fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)))
@@ -234,14 +234,11 @@ pub fn write(floor: &Floor, yaml: &Path, resolution: f64) -> anyhow::Result<()> 
         let pixel = |[x, y]: [f64; 2]| [(x - left) / resolution, (y - bottom) / resolution];
         draw(&mut image, pixel(wall.from()), pixel(wall.to()));
     }
-    let file = yaml.with_extension("pgm");
-    let name = file.file_name().and_then(|name| name.to_str()).context("the name is no text")?;
     let text = format!(
         "image: {name}\nmode: trinary\nresolution: {resolution}\norigin: [{left}, {bottom}, 0.0]\n\
          negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n"
     );
-    sonarfix_files::write(&file, image.pgm())?;
-    sonarfix_files::write(yaml, text)
+    Ok((text, image.pgm()))
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count of pixels")]

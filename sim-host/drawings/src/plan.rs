@@ -55,7 +55,7 @@ pub struct Plan {
 
 /// The lines of a drawing that was imported.
 #[must_use]
-pub fn lines(drawing: &Imported) -> Vec<Piece> {
+fn lines(drawing: &Imported) -> Vec<Piece> {
     let line = |(wall, thickness): (&NamedWall, f64)| Piece {
         name: wall.name().to_owned(),
         from: wall.from(),
@@ -66,11 +66,22 @@ pub fn lines(drawing: &Imported) -> Vec<Piece> {
     drawing.floor.named_walls().iter().zip(strokes).map(line).collect()
 }
 
+/// The drawing with one wall for each wall of the plan, and the plan.
+///
+/// # Errors
+/// If there are too many lines, or no wall.
+pub fn of(mut drawing: Imported) -> anyhow::Result<(Imported, Plan)> {
+    let plan = walls(lines(&drawing), drawing.resolution)?;
+    drawing.floor = plan.floor()?;
+    drawing.notes.extend(plan.notes.iter().cloned());
+    Ok((drawing, plan))
+}
+
 /// Finds the walls among the lines of a plan. `resolution` is the size of a pixel, metres, and 0 of a drawing.
 ///
 /// # Errors
 /// If there are too many lines.
-pub fn walls(lines: Vec<Piece>, resolution: f64) -> anyhow::Result<Plan> {
+fn walls(lines: Vec<Piece>, resolution: f64) -> anyhow::Result<Plan> {
     anyhow::ensure!(
         lines.len() <= MOST_LINES,
         "a plan with {} lines: at most {MOST_LINES} are compared. Remove what is no wall",
@@ -109,9 +120,9 @@ pub fn walls(lines: Vec<Piece>, resolution: f64) -> anyhow::Result<Plan> {
 
 /// The number of walls of a drawing as a plan, if it has at least a third fewer walls than lines.
 #[must_use]
-pub fn fewer(lines: Vec<Piece>, resolution: f64) -> Option<usize> {
-    let drawn = lines.len();
-    let walls = walls(lines, resolution).ok()?.walls.len();
+pub fn fewer(drawing: &Imported) -> Option<usize> {
+    let drawn = drawing.floor.named_walls().len();
+    let walls = walls(lines(drawing), drawing.resolution).ok()?.walls.len();
     (walls > 0 && 3 * walls < 2 * drawn).then_some(walls)
 }
 
