@@ -82,7 +82,7 @@ fn changed(log: &str, kind: &str, change: impl Fn(&mut [f64])) -> String {
 }
 
 /// Mistakes in the log: the cause that must be named first, the kind of the records, and what is wrong with them.
-const MISTAKES: [(&str, &str, Change); 20] = [
+const MISTAKES: [(&str, &str, Change); 22] = [
     ("wheels_swapped", "wheels", |it| it.swap(1, 2)),
     ("encoder_mirrored", "wheels", |it| it[1] = -it[1]),
     ("encoder_mirrored", "wheels", |it| it[2] = -it[2]),
@@ -96,6 +96,8 @@ const MISTAKES: [(&str, &str, Change); 20] = [
     ("bearing_unit", "range", |it| it[1] = it[1].to_degrees()),
     ("range_unit", "range", |it| it[2] *= 1e3),
     ("range_unit", "range", |it| it[2] *= 2.0),
+    ("range_unit", "range", |it| it[2] *= 0.394),
+    ("range_unit", "range", |it| it[2] *= 2.54),
     ("range_offset", "range", |it| it[2] += 0.15),
     ("start_heading", "resume", |it| it[3] += 1.6),
     ("start_pose", "resume", |it| {

@@ -146,9 +146,27 @@ const VARIED: [Varied; 8] = [
     },
 ];
 
-/// Factors of the ranges: of metres from other units, of half and double the way, and of both ways.
-const RANGE_UNITS: [f64; 12] =
-    [1e-3, 1e-2, 0.1, 10.0, 100.0, 1e3, 0.0254, 0.3048, 39.37, 3.2808, 0.5, 2.0];
+/// Factor of ranges in inches that were converted as centimetres.
+pub const INCHES_AS_CENTIMETRES: f64 = 2.54;
+/// Factor of ranges in centimetres that were converted as inches.
+pub const CENTIMETRES_AS_INCHES: f64 = 1.0 / INCHES_AS_CENTIMETRES;
+/// Factors of the ranges: of metres from other units, of a unit taken for another one, and of half and double the way.
+const RANGE_UNITS: [f64; 14] = [
+    1e-3,
+    1e-2,
+    0.1,
+    10.0,
+    100.0,
+    1e3,
+    0.0254,
+    0.3048,
+    39.37,
+    3.2808,
+    INCHES_AS_CENTIMETRES,
+    CENTIMETRES_AS_INCHES,
+    0.5,
+    2.0,
+];
 /// Factors of a map's unit.
 const MAP_UNITS: [f64; 10] = [1e-3, 1e-2, 0.1, 10.0, 100.0, 1e3, 0.0254, 0.3048, 39.37, 3.2808];
 

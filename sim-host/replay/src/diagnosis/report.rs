@@ -2,7 +2,7 @@
 
 use sonarfix_hal::config::RobotConfig;
 
-use crate::diagnosis::causes::{Candidate, Cause};
+use crate::diagnosis::causes::{CENTIMETRES_AS_INCHES, Candidate, Cause, INCHES_AS_CENTIMETRES};
 use crate::diagnosis::evidence::{Broken, Evidence};
 use crate::diagnosis::finding::Finding;
 use crate::diagnosis::recording::Entry;
@@ -105,7 +105,7 @@ fn sonar(candidate: &Candidate) -> Option<Words> {
         ),
         Cause::RangeUnit => (
             "range_unit",
-            format!("the ranges are right if they are multiplied by {value}"),
+            format!("the ranges are right if they are multiplied by {}", (1e4 * value).round() / 1e4),
             range_unit(value),
         ),
         Cause::RangeOffset => (
@@ -200,12 +200,14 @@ fn travel(wheel: &str, metres: f64, by: f64) -> String {
 }
 
 fn range_unit(by: f64) -> String {
-    const NAMED: [(f64, &str); 8] = [
+    const NAMED: [(f64, &str); 10] = [
         (1e-3, "they are in millimetres: write metres"),
         (1e-2, "they are in centimetres: write metres"),
         (0.1, "they are in decimetres: write metres"),
         (0.0254, "they are in inches: write metres"),
         (0.3048, "they are in feet: write metres"),
+        (INCHES_AS_CENTIMETRES, "they are inches, converted as centimetres: 1 in is 0.0254 m"),
+        (CENTIMETRES_AS_INCHES, "they are centimetres, converted as inches: 1 cm is 0.01 m"),
         (0.5, "they are the way there and back: halve them"),
         (2.0, "they were halved twice: double them"),
         (1e3, "they were divided by 1,000 twice: write metres"),
