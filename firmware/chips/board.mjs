@@ -12,6 +12,14 @@ const FRAME = 20e6;
 /** How long the truth is kept: longer than a message waits. */
 const HISTORY = 10e9;
 
+/**
+ * Nanoseconds until an event, at a time of a chip whose life began at `began`. The difference is that of the two sums: `event - began` may be
+ * rounded to the time of the chip before the event is due, so that time would stand still.
+ */
+export function ahead(began, nanos, event) {
+  return Math.max(0, event - (began + nanos));
+}
+
 export class Board {
   constructor({ board = 'pico', walls, pose, seed }) {
     this.wiring = WIRINGS[board];
@@ -78,10 +86,14 @@ export class Board {
     }));
   }
 
+  ahead(until) {
+    return ahead(this.began, this.chip.clock.nanos, this.nextEvent(until));
+  }
+
   /** Runs until a time. */
   run(until) {
     while (this.now < until) {
-      const reset = this.chip.run(this.nextEvent(until) - this.began);
+      const reset = this.chip.run(this.chip.clock.nanos + this.ahead(until));
       if (reset) this.reset(reset);
       else this.happen();
     }
@@ -91,7 +103,7 @@ export class Board {
   wait(nanos) {
     const until = this.now + nanos;
     while (this.now < until) {
-      this.chip.clock.tick(Math.max(0, this.nextEvent(until) - this.now));
+      this.chip.clock.tick(this.ahead(until));
       this.happen();
     }
   }

@@ -2,6 +2,7 @@
 import assert from 'node:assert/strict';
 import { createRequire } from 'node:module';
 import test from 'node:test';
+import { ahead } from './board.mjs';
 import { Calls } from './calls.mjs';
 import { Chip } from './chip.mjs';
 import { Flash, PowerCut, TIMES } from './flash.mjs';
@@ -280,4 +281,17 @@ test('the inputs of an XRP are phase and enable, and its motors are mirror image
   set(7, 100, 100);
   set(3, 0, 100);
   assert.deepEqual(WIRINGS.xrp.voltages(chip), [-1, -1]);
+});
+
+test('a life of the chip that began at any time reaches every event', () => {
+  const random = numbers(7);
+  for (let n = 0; n < 100_000; n++) {
+    const began = 1e10 * random(), event = began + 1e10 * random();
+    let nanos = event - began - 1e-6 * random(), steps = 0;
+    while (began + nanos < event && steps < 3) {
+      nanos += ahead(began, nanos, event);
+      steps++;
+    }
+    assert.ok(began + nanos >= event && nanos <= event - began + 1e-5, `${began} ${event}`);
+  }
 });
