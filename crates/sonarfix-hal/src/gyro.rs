@@ -5,6 +5,7 @@
 
 mod lsm6dso;
 mod mpu6050;
+mod registers;
 
 use sonarfix::geometry::units::RadiansPerSecond;
 use sonarfix::sensor::gyro::GyroParameters;

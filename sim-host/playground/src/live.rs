@@ -275,7 +275,7 @@ mod tests {
         assert!(text.contains("\nwheels,") && text.ends_with("\n# end\n"), "{text}");
     }
 
-    /// What no robot answers ends, and an order that is none is refused.
+    /// A command that no robot acknowledges expires; text that is not a command is refused.
     #[test]
     fn an_order_without_a_robot_is_answered() {
         let parts = Parts::new(classroom()).unwrap();

@@ -8,6 +8,7 @@ use embedded_hal::i2c::I2c;
 use sonarfix::geometry::units::RadiansPerSecond;
 use sonarfix::sensor::gyro::GyroParameters;
 
+use super::registers::Registers;
 use super::{GyroError, Unreadable, YawRate, range, times_two};
 
 /// The address with SA0 high, as on the boards of the XRP; with SA0 low it is one less.
@@ -56,8 +57,7 @@ const COUNT: f32 = 8.75e-3;
 /// ```
 #[derive(Debug)]
 pub struct Lsm6dso<B> {
-    bus: B,
-    address: u8,
+    registers: Registers<B>,
     /// Radians per second of one count, negative if the sensor is mounted upside down.
     per_count: f32,
 }
@@ -65,17 +65,14 @@ pub struct Lsm6dso<B> {
 impl<B: I2c> Lsm6dso<B> {
     /// A driver for the sensor with SA0 high.
     pub fn new(bus: B) -> Self {
-        Self { bus, address: ADDRESS, per_count: 0.0 }
+        Self { registers: Registers { bus, address: ADDRESS }, per_count: 0.0 }
     }
 
     /// The same with SA0 low.
     #[must_use]
-    pub fn with_sa0_low(self) -> Self {
-        Self { address: ADDRESS - 1, ..self }
-    }
-
-    fn write(&mut self, register: u8, value: u8) -> Result<(), GyroError> {
-        self.bus.write(self.address, &[register, value]).map_err(|_| GyroError::Bus)
+    pub fn with_sa0_low(mut self) -> Self {
+        self.registers.address = ADDRESS - 1;
+        self
     }
 }
 
@@ -84,26 +81,20 @@ impl<B: I2c> YawRate for Lsm6dso<B> {
 
     fn configure(&mut self, parameters: &GyroParameters) -> Result<(), GyroError> {
         let number = range(parameters)?;
-        let mut identity = [0];
-        let read = self.bus.write_read(self.address, &[WHO_AM_I], &mut identity);
-        read.map_err(|_| GyroError::Bus)?;
-        let [identity] = identity;
-        if identity != IDENTITY {
-            return Err(GyroError::Identity(identity));
-        }
-        self.write(CTRL3_C, BOTH_BYTES)?;
-        self.write(CTRL4_C, AWAKE)?;
-        self.write(CTRL7_G, UNFILTERED)?;
-        self.write(CTRL2_G, SAMPLES | number << 2)?;
+        self.registers.identify(WHO_AM_I, &[IDENTITY])?;
+        self.registers.write([
+            (CTRL3_C, BOTH_BYTES),
+            (CTRL4_C, AWAKE),
+            (CTRL7_G, UNFILTERED),
+            (CTRL2_G, SAMPLES | number << 2),
+        ])?;
         let sign = if parameters.is_inverted { -1.0 } else { 1.0 };
         self.per_count = sign * RadiansPerSecond::from_degrees(times_two(COUNT, number)).0;
         Ok(())
     }
 
     fn rate(&mut self) -> Result<RadiansPerSecond, Unreadable> {
-        let mut bytes = [0; 2];
-        let read = self.bus.write_read(self.address, &[GYRO_Z], &mut bytes);
-        read.map_err(|_| Unreadable)?;
+        let bytes = self.registers.two_bytes(GYRO_Z)?;
         Ok(RadiansPerSecond(self.per_count * f32::from(i16::from_le_bytes(bytes))))
     }
 }

@@ -8,6 +8,7 @@ use embedded_hal::i2c::I2c;
 use sonarfix::geometry::units::RadiansPerSecond;
 use sonarfix::sensor::gyro::GyroParameters;
 
+use super::registers::Registers;
 use super::{GyroError, SMALLEST_RANGE, Unreadable, YawRate, range, times_two};
 
 /// The address with AD0 low; with AD0 high it is one more.
@@ -54,8 +55,7 @@ const FULL_SCALE: f32 = 32_768.0;
 /// ```
 #[derive(Debug)]
 pub struct Mpu6050<B> {
-    bus: B,
-    address: u8,
+    registers: Registers<B>,
     /// Radians per second of one count, negative if the sensor is mounted upside down.
     per_count: f32,
 }
@@ -63,17 +63,14 @@ pub struct Mpu6050<B> {
 impl<B: I2c> Mpu6050<B> {
     /// A driver for the sensor with AD0 low.
     pub fn new(bus: B) -> Self {
-        Self { bus, address: ADDRESS, per_count: 0.0 }
+        Self { registers: Registers { bus, address: ADDRESS }, per_count: 0.0 }
     }
 
     /// The same with AD0 high.
     #[must_use]
-    pub fn with_ad0_high(self) -> Self {
-        Self { address: ADDRESS + 1, ..self }
-    }
-
-    fn write(&mut self, register: u8, value: u8) -> Result<(), GyroError> {
-        self.bus.write(self.address, &[register, value]).map_err(|_| GyroError::Bus)
+    pub fn with_ad0_high(mut self) -> Self {
+        self.registers.address = ADDRESS + 1;
+        self
     }
 }
 
@@ -82,17 +79,13 @@ impl<B: I2c> YawRate for Mpu6050<B> {
 
     fn configure(&mut self, parameters: &GyroParameters) -> Result<(), GyroError> {
         let number = range(parameters)?;
-        let mut identity = [0];
-        let read = self.bus.write_read(self.address, &[WHO_AM_I], &mut identity);
-        read.map_err(|_| GyroError::Bus)?;
-        let [identity] = identity;
-        if !IDENTITIES.contains(&identity) {
-            return Err(GyroError::Identity(identity));
-        }
-        self.write(POWER, AWAKE)?;
-        self.write(SAMPLE_RATE_DIVIDER, EVERY_SAMPLE)?;
-        self.write(CONFIG, FILTER)?;
-        self.write(GYRO_CONFIG, number << 3)?;
+        self.registers.identify(WHO_AM_I, &IDENTITIES)?;
+        self.registers.write([
+            (POWER, AWAKE),
+            (SAMPLE_RATE_DIVIDER, EVERY_SAMPLE),
+            (CONFIG, FILTER),
+            (GYRO_CONFIG, number << 3),
+        ])?;
         let full = RadiansPerSecond::from_degrees(times_two(SMALLEST_RANGE, number));
         let sign = if parameters.is_inverted { -1.0 } else { 1.0 };
         self.per_count = sign * full.0 / FULL_SCALE;
@@ -100,9 +93,7 @@ impl<B: I2c> YawRate for Mpu6050<B> {
     }
 
     fn rate(&mut self) -> Result<RadiansPerSecond, Unreadable> {
-        let mut bytes = [0; 2];
-        let read = self.bus.write_read(self.address, &[GYRO_Z], &mut bytes);
-        read.map_err(|_| Unreadable)?;
+        let bytes = self.registers.two_bytes(GYRO_Z)?;
         Ok(RadiansPerSecond(self.per_count * f32::from(i16::from_be_bytes(bytes))))
     }
 }

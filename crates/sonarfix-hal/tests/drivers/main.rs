@@ -4,8 +4,7 @@
 
 #[cfg(feature = "async")]
 mod asynch;
-mod lsm6dso;
-mod mpu6050;
+mod gyro;
 mod pulse;
 mod quadrature;
 mod servo;

@@ -31,6 +31,8 @@ mod bias;
 mod blocks;
 mod column;
 mod correction;
+#[cfg(test)]
+mod dense;
 mod gain;
 mod mount;
 mod projection;

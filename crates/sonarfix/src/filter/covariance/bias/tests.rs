@@ -3,6 +3,7 @@
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
 
+use super::super::dense::{self, is_near};
 use super::*;
 use crate::geometry::pose::Heading;
 use crate::geometry::units::{Metres, Radians};
@@ -14,66 +15,17 @@ type Vector = SVector<f64, 8>;
 const H: usize = 2;
 const B: usize = 7;
 
-/// A covariance with a bias, and the same in `f64`: correlated, with deviations of the usual sizes.
+/// A covariance with a bias: correlated, with deviations of the usual sizes.
 fn covariance(numbers: &[f32]) -> (Covariance, GyroBias) {
-    let sigma = Vector::from([0.1, 0.1, 0.05, 0.01, 0.01, 0.005, 0.01, 0.02]);
-    let a = Matrix::from_iterator(numbers.iter().map(|number| f64::from(*number)));
-    let p = a * a.transpose() + Matrix::identity() * 0.1;
-    let p = Matrix::from_diagonal(&sigma) * p * Matrix::from_diagonal(&sigma);
+    let p = dense::correlated([0.1, 0.1, 0.05, 0.01, 0.01, 0.005, 0.01, 0.02], numbers);
     #[expect(clippy::cast_possible_truncation, reason = "numbers of the filter")]
     let at = |i: usize, j: usize| p[(i, j)] as f32;
-    let mut covariance = Covariance::default();
-    let (pose, q, r) =
-        (&mut covariance.pose, &mut covariance.calibration, &mut covariance.range_scale);
-    (pose.xx, pose.xy, pose.xh, pose.yy, pose.yh, pose.hh) =
-        (at(0, 0), at(0, 1), at(0, 2), at(1, 1), at(1, 2), at(2, 2));
-    (pose.xc, pose.xd, pose.xw) = (at(0, 3), at(0, 4), at(0, 5));
-    (pose.yc, pose.yd, pose.yw) = (at(1, 3), at(1, 4), at(1, 5));
-    (pose.hc, pose.hd, pose.hw) = (at(2, 3), at(2, 4), at(2, 5));
-    (q.cc, q.cd, q.cw, q.dd, q.dw, q.ww) =
-        (at(3, 3), at(3, 4), at(3, 5), at(4, 4), at(4, 5), at(5, 5));
-    (r.xk, r.yk, r.hk, r.ck, r.dk, r.wk, r.kk) =
-        (at(0, 6), at(1, 6), at(2, 6), at(3, 6), at(4, 6), at(5, 6), at(6, 6));
-    let bias = GyroBias {
-        rate: 0.01,
-        states: StateColumn {
-            x: at(0, 7),
-            y: at(1, 7),
-            h: at(2, 7),
-            c: at(3, 7),
-            d: at(4, 7),
-            w: at(5, 7),
-            k: at(6, 7),
-        },
-        mount: (0.0, 0.0),
-        bb: at(7, 7),
-    };
-    (covariance, bias)
+    let states = dense::column(|i| at(i, B));
+    (dense::blocks(at), GyroBias { rate: 0.01, states, mount: (0.0, 0.0), bb: at(B, B) })
 }
 
-#[rustfmt::skip]
 fn dense(p: &Covariance, b: &GyroBias) -> Matrix {
-    let (p, q, r) = (&p.pose, &p.calibration, &p.range_scale);
-    SMatrix::from([
-        [p.xx, p.xy, p.xh, p.xc, p.xd, p.xw, r.xk, b.states.x],
-        [p.xy, p.yy, p.yh, p.yc, p.yd, p.yw, r.yk, b.states.y],
-        [p.xh, p.yh, p.hh, p.hc, p.hd, p.hw, r.hk, b.states.h],
-        [p.xc, p.yc, p.hc, q.cc, q.cd, q.cw, r.ck, b.states.c],
-        [p.xd, p.yd, p.hd, q.cd, q.dd, q.dw, r.dk, b.states.d],
-        [p.xw, p.yw, p.hw, q.cw, q.dw, q.ww, r.wk, b.states.w],
-        [r.xk, r.yk, r.hk, r.ck, r.dk, r.wk, r.kk, b.states.k],
-        [b.states.x, b.states.y, b.states.h, b.states.c, b.states.d, b.states.w, b.states.k, b.bb],
-    ].map(|row| row.map(f64::from)))
-}
-
-/// Whether all entries are near, by the deviations of their states.
-fn is_near(is: &Matrix, expected: &Matrix, scale: &Matrix) -> bool {
-    (0..8).all(|i| {
-        (0..8).all(|j| {
-            let size = (scale[(i, i)] * scale[(j, j)]).sqrt();
-            (is[(i, j)] - expected[(i, j)]).abs() < 1e-4 * size
-        })
-    })
+    dense::joint(p, [&b.states], [[b.bb]])
 }
 
 fn numbers() -> impl Strategy<Value = std::vec::Vec<f32>> {

@@ -4,6 +4,7 @@
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
 
+use super::super::dense::{self, is_near};
 use super::*;
 use crate::filter::covariance::{Correction, Covariance};
 use crate::geometry::pose::Heading;
@@ -20,33 +21,11 @@ const BIAS: usize = 9;
 
 /// A covariance with a mount and a bias: correlated, with deviations of the usual sizes.
 fn covariance(numbers: &[f32]) -> (Covariance, Mount, GyroBias) {
-    let sigma = Vector::from([0.1, 0.1, 0.05, 0.01, 0.01, 0.005, 0.01, 0.005, 0.005, 0.02]);
-    let a = Matrix::from_iterator(numbers.iter().map(|number| f64::from(*number)));
-    let p = a * a.transpose() + Matrix::identity() * 0.1;
-    let p = Matrix::from_diagonal(&sigma) * p * Matrix::from_diagonal(&sigma);
+    let sigma = [0.1, 0.1, 0.05, 0.01, 0.01, 0.005, 0.01, 0.005, 0.005, 0.02];
+    let p = dense::correlated(sigma, numbers);
     #[expect(clippy::cast_possible_truncation, reason = "numbers of the filter")]
     let at = |i: usize, j: usize| p[(i, j)] as f32;
-    let mut covariance = Covariance::default();
-    let (pose, q, r) =
-        (&mut covariance.pose, &mut covariance.calibration, &mut covariance.range_scale);
-    (pose.xx, pose.xy, pose.xh, pose.yy, pose.yh, pose.hh) =
-        (at(0, 0), at(0, 1), at(0, 2), at(1, 1), at(1, 2), at(2, 2));
-    (pose.xc, pose.xd, pose.xw) = (at(0, 3), at(0, 4), at(0, 5));
-    (pose.yc, pose.yd, pose.yw) = (at(1, 3), at(1, 4), at(1, 5));
-    (pose.hc, pose.hd, pose.hw) = (at(2, 3), at(2, 4), at(2, 5));
-    (q.cc, q.cd, q.cw, q.dd, q.dw, q.ww) =
-        (at(3, 3), at(3, 4), at(3, 5), at(4, 4), at(4, 5), at(5, 5));
-    (r.xk, r.yk, r.hk, r.ck, r.dk, r.wk, r.kk) =
-        (at(0, 6), at(1, 6), at(2, 6), at(3, 6), at(4, 6), at(5, 6), at(6, 6));
-    let column = |j: usize| StateColumn {
-        x: at(0, j),
-        y: at(1, j),
-        h: at(2, j),
-        c: at(3, j),
-        d: at(4, j),
-        w: at(5, j),
-        k: at(6, j),
-    };
+    let column = |j: usize| dense::column(|i| at(i, j));
     let mount = Mount {
         place: Point::new(0.06, 0.0),
         ahead: column(AHEAD),
@@ -61,35 +40,13 @@ fn covariance(numbers: &[f32]) -> (Covariance, Mount, GyroBias) {
         mount: (at(AHEAD, BIAS), at(LEFT, BIAS)),
         bb: at(BIAS, BIAS),
     };
-    (covariance, mount, bias)
+    (dense::blocks(at), mount, bias)
 }
 
-#[rustfmt::skip]
 fn dense(p: &Covariance, m: &Mount, b: &GyroBias) -> Matrix {
-    let (p, q, r, a, l, (ba, bl), b, bb) =
-        (&p.pose, &p.calibration, &p.range_scale, &m.ahead, &m.left, b.mount, &b.states, b.bb);
-    SMatrix::from([
-        [p.xx, p.xy, p.xh, p.xc, p.xd, p.xw, r.xk, a.x, l.x, b.x],
-        [p.xy, p.yy, p.yh, p.yc, p.yd, p.yw, r.yk, a.y, l.y, b.y],
-        [p.xh, p.yh, p.hh, p.hc, p.hd, p.hw, r.hk, a.h, l.h, b.h],
-        [p.xc, p.yc, p.hc, q.cc, q.cd, q.cw, r.ck, a.c, l.c, b.c],
-        [p.xd, p.yd, p.hd, q.cd, q.dd, q.dw, r.dk, a.d, l.d, b.d],
-        [p.xw, p.yw, p.hw, q.cw, q.dw, q.ww, r.wk, a.w, l.w, b.w],
-        [r.xk, r.yk, r.hk, r.ck, r.dk, r.wk, r.kk, a.k, l.k, b.k],
-        [a.x, a.y, a.h, a.c, a.d, a.w, a.k, m.aa, m.al, ba],
-        [l.x, l.y, l.h, l.c, l.d, l.w, l.k, m.al, m.ll, bl],
-        [b.x, b.y, b.h, b.c, b.d, b.w, b.k, ba, bl, bb],
-    ].map(|row| row.map(f64::from)))
-}
-
-/// Whether all entries are near, by the deviations of their states before.
-fn is_near(is: &Matrix, expected: &Matrix, before: &Matrix) -> bool {
-    (0..10).all(|i| {
-        (0..10).all(|j| {
-            let size = (before[(i, i)] * before[(j, j)]).sqrt();
-            (is[(i, j)] - expected[(i, j)]).abs() < 1e-4 * size
-        })
-    })
+    let (ba, bl) = b.mount;
+    let own = [[m.aa, m.al, ba], [m.al, m.ll, bl], [ba, bl, b.bb]];
+    dense::joint(p, [&m.ahead, &m.left, &b.states], own)
 }
 
 fn numbers() -> impl Strategy<Value = std::vec::Vec<f32>> {

@@ -1,27 +1,16 @@
 //! The driver of the LSM6DSO on a bus.
 
-use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
 use embedded_hal_mock::eh1::i2c::{Mock, Transaction as I2c};
 use proptest::prelude::*;
-use sonarfix::geometry::units::RadiansPerSecond;
 use sonarfix::sensor::gyro::GyroParameters;
 use sonarfix_hal::gyro::{GyroError, Lsm6dso, Unreadable, YawRate};
 
+use super::{lost, parameters};
+
 /// The transfers that configure the sensor at this address for a range.
 fn configuration(address: u8, range: u8) -> Vec<I2c> {
-    let mut transfers = vec![I2c::write_read(address, vec![0x0f], vec![0x6c])];
-    let registers = [(0x12, 0x44), (0x13, 0), (0x16, 0), (0x11, 0x60 | range << 2)];
-    transfers.extend(registers.map(|(register, value)| I2c::write(address, vec![register, value])));
-    transfers
-}
-
-fn parameters(range: f32, is_inverted: bool) -> GyroParameters {
-    let range = RadiansPerSecond::from_degrees(range);
-    GyroParameters { range, is_inverted, ..GyroParameters::MPU_6050 }
-}
-
-fn lost() -> ErrorKind {
-    ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address)
+    let values = [(0x12, 0x44), (0x13, 0), (0x16, 0), (0x11, 0x60 | range << 2)];
+    super::configuration(address, (0x0f, 0x6c), values)
 }
 
 proptest! {
