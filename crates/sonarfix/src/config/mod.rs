@@ -296,6 +296,7 @@ impl Config {
                 "prior.scale_left",
                 "prior.track_width",
                 "prior.range_scale",
+                "prior.mount",
                 "weights.heading",
                 "weights.wheels",
             ],
@@ -304,6 +305,7 @@ impl Config {
                 prior.scale_left,
                 prior.track_width.0,
                 prior.range_scale,
+                prior.mount.0,
                 weights.heading.0,
                 weights.wheels.0,
             ],
@@ -315,12 +317,8 @@ impl Config {
         let is_positive =
             difference.is_none_or(|difference| difference > 0.0 && difference <= LARGEST);
         require("prior.scale_difference", is_positive, "positive, and at most 10,000, if given")?;
-        if cfg!(feature = "mount") {
-            not_negative(&["prior.mount"], &[prior.mount.0])?;
-        } else {
-            let is_zero = prior.mount.0 == 0.0;
-            require("prior.mount", is_zero, "zero: this program was built without `mount`")?;
-        }
+        let is_linked = cfg!(feature = "mount") || prior.mount.0 <= 0.0;
+        require("prior.mount", is_linked, "zero: this program was built without `mount`")?;
         let width = self.drive.track_width.0;
         let below_width = prior.track_width.0 < 0.5 * width;
         require("prior.track_width", below_width, "less than half the track width")?;

@@ -319,10 +319,9 @@ impl Ekf {
         ahead: Option<Vector>,
     ) -> PredictedMeasurement<'e> {
         let mut prediction = self.p_without_walk.project(expected);
-        if let Some(mount) = self.mounted.get() {
+        if let Some((mount, ahead)) = self.mounted.get().zip(ahead) {
             let by = Vector::new(expected.by_x, expected.by_y);
-            let by = ahead.map_or((0.0, 0.0), |ahead| (by.dot(ahead), by.dot(ahead.left())));
-            mount.add_to(&mut prediction, by);
+            mount.add_to(&mut prediction, (by.dot(ahead), by.dot(ahead.left())));
         }
         prediction
     }

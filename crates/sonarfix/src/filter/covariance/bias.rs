@@ -140,10 +140,7 @@ impl GyroBias {
         innovation: f32,
         share: f32,
     ) {
-        let mut m = self.states.times(&prediction.expected.jacobian());
-        if let Some(mount) = prediction.mount() {
-            m += mount.times(self.mount);
-        }
+        let m = prediction.covariance_with(&self.states, self.mount);
         self.subtract(m, own, gain, innovation, share);
     }
 

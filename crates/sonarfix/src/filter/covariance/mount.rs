@@ -95,18 +95,23 @@ impl Mount {
             w: sum(a.w, l.w),
             k: sum(a.k, l.k),
         };
-        let (aa, ll) = (sum(self.aa, self.al), sum(self.al, self.ll));
-        let own = (a.times(h) + aa, l.times(h) + ll);
-        // L times both covariances, computed without them: where only the variance is needed, they are not.
         let of_states = states.times(h);
-        let along = of_states + sum(aa, ll);
+        let along = of_states + sum(sum(self.aa, self.al), sum(self.al, self.ll));
         let m = &mut prediction.cross_covariance;
         m.x += states.x;
         m.y += states.y;
         m.h += states.h;
         m.k += states.k;
         prediction.variance += of_states + along;
-        prediction.mount = Some(MountShare { states, own, by, along });
+        prediction.mount = Some(MountShare { states, by, along });
+    }
+
+    /// Covariances of the errors with a measurement: Cᵀ Hᵀ + E Lᵀ.
+    pub fn covariance_with(&self, prediction: &PredictedMeasurement) -> MountCovariance {
+        (
+            prediction.covariance_with(&self.ahead, (self.aa, self.al)),
+            prediction.covariance_with(&self.left, (self.al, self.ll)),
+        )
     }
 
     /// Covariances of the errors with a difference of turns.

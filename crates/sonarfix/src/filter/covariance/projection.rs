@@ -26,8 +26,6 @@ pub type MountCovariance = (f32, f32);
 pub struct MountShare {
     /// Covariances of the seven states with L e, where e are the errors of the mount.
     pub(super) states: StateColumn,
-    /// Covariances of the errors of the mount with the measurement, ahead and to the left, m².
-    pub(super) own: MountCovariance,
     /// L.
     pub(super) by: (f32, f32),
     /// Covariance of L e with the measurement, m².
@@ -61,10 +59,10 @@ impl PredictedMeasurement<'_> {
         if cfg!(feature = "mount") { self.mount.as_ref() } else { None }
     }
 
-    /// Covariances of the errors of the mount with the measurement, if the mount is estimated.
-    #[inline]
-    pub fn covariance_with_mount(&self) -> Option<MountCovariance> {
-        self.mount().map(|mount| mount.own)
+    /// Covariance of the measurement with a quantity that has these covariances with the states and with the errors of the mount.
+    pub(super) fn covariance_with(&self, states: &StateColumn, mount: MountCovariance) -> f32 {
+        let of_states = states.times(&self.expected.jacobian());
+        self.mount().map_or(of_states, |share| of_states + share.times(mount))
     }
 
     // ===== Eq. (14): ν and S =====

@@ -182,7 +182,7 @@ impl Ekf {
         share: f32,
         bias: Option<&mut GyroBias>,
     ) {
-        let own = prediction.covariance_with_mount();
+        let own = self.mounted.get().map(|mount| mount.covariance_with(prediction));
         if let Some(bias) = bias {
             bias.correct(prediction, own.unwrap_or_default(), gain, innovation, share);
         }

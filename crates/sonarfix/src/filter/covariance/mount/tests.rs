@@ -92,7 +92,7 @@ proptest! {
         let Correction::Applied(gain) = p.correct(&prediction, noise) else {
             return Err(TestCaseError::fail("not applied"));
         };
-        let own = prediction.covariance_with_mount().unwrap();
+        let own = mount.covariance_with(&prediction);
         bias.correct(&prediction, own, &gain, innovation, 1.0);
         mount.correct(own, &gain, innovation, 1.0);
         let expected = before - m * m.transpose() / s;
