@@ -93,7 +93,9 @@ impl<'m> Robot<'m> {
     ) {
         let now = poll.now;
         let is_due = matches!(self.cycle, Cycle::Idle { until } if now >= until);
-        if !is_due || report.has_ended_ping() || report.tick.is_some() {
+        // The choice is the longest step, and waits for a poll of its own: reading a gyro on a software bus takes half as long.
+        let is_busy = report.has_ended_ping() || report.tick.is_some() || poll.has_read_gyro;
+        if !is_due || is_busy {
             return;
         }
         if let (Mode::Searching, Some(search)) = (self.mode(), poll.search.as_deref()) {

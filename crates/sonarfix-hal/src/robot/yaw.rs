@@ -34,6 +34,7 @@ impl YawLedger {
         if self.samples.take(poll.now).is_none() {
             return;
         }
+        poll.has_read_gyro = true;
         let is_faulty = if let Some(Ok(rate)) = poll.hardware.yaw_rate() {
             self.integral.sample(poll.now, rate).is_err()
         } else {
