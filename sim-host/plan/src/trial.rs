@@ -88,6 +88,8 @@ pub struct Heard {
     pub time: f64,
     /// The true pose of the robot, map frame.
     pub pose: Pose,
+    /// What the encoders have counted since the last ping: metres along the mean heading, and radians.
+    pub travel: [f64; 2],
     /// The bearing that the search asked for, radians, robot frame.
     pub bearing: f64,
     /// The measured range, metres; `None` without an echo.
@@ -180,7 +182,7 @@ fn drive(
     let mut unique = None;
     let mut is_observed = true;
     while time < end && (unique.is_none() || is_observed) {
-        let (bearing, range) = drive.ping(time);
+        let Measured { travel, bearing, range } = drive.ping(time);
         if unique.is_none() {
             drive.note_twins(&symmetries);
             if let Answer::Unique(hypothesis) = drive.search.answer() {
@@ -188,7 +190,7 @@ fn drive(
             }
         }
         let pose = drive.plant.pose();
-        is_observed = observer(Heard { time: time - start, pose, bearing, range });
+        is_observed = observer(Heard { time: time - start, pose, travel, bearing, range });
         time += PERIOD;
     }
     Ok(unique.unwrap_or_else(|| drive.result(seed, None)))
@@ -212,10 +214,17 @@ struct Drive<'a> {
     longest_cycle: u64,
 }
 
+/// What the robot has measured at a ping: as in [`Heard`].
+struct Measured {
+    travel: [f64; 2],
+    bearing: f64,
+    range: Option<f64>,
+}
+
 impl Drive<'_> {
-    /// Drives on to a time, pings and searches. Returns bearing and range of the ping.
+    /// Drives on to a time, pings and searches.
     #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
-    fn ping(&mut self, time: f64) -> (f64, Option<f64>) {
+    fn ping(&mut self, time: f64) -> Measured {
         let [right, left] = self.plant.drive_to(time, &mut self.wheels, &mut self.slips).measured;
         let turn = (right - left) / self.track_width;
         let advance = f64::midpoint(right, left);
@@ -246,7 +255,11 @@ impl Drive<'_> {
                 self.cycle = 0;
             }
         }
-        (bearing.0.into(), range.map(|range| range.0.into()))
+        Measured {
+            travel: [advance, turn],
+            bearing: bearing.0.into(),
+            range: range.map(|range| range.0.into()),
+        }
     }
 
     /// Notes whether the true pose and its images under every motion are among several answers.

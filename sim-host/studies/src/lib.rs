@@ -7,6 +7,7 @@
 //! | [`fault_table`], [`fault_search`], [`fault_rangers`] | `docs/faults.md` |
 //! | [`floor_plan`] | `docs/floor-plans.md` |
 //! | [`health_page`], [`kidnapped`] | `docs/health.md` |
+//! | [`peers`] | `docs/peers.md` |
 //! | [`reality`] | `docs/reality.md` |
 //! | [`recordings`] | none: a table of recordings with their robot files |
 //! | [`rooms`] | `docs/rooms.md` |
@@ -21,6 +22,7 @@ pub mod fault_table;
 pub mod floor_plan;
 pub mod health_page;
 pub mod kidnapped;
+pub mod peers;
 pub mod reality;
 pub mod recordings;
 pub mod relocalization;

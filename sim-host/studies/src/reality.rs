@@ -17,6 +17,7 @@ use discover::Recording;
 use rayon::prelude::*;
 
 pub use replays::Row;
+pub(crate) use replays::replay_converted;
 
 /// The result of the study.
 #[derive(Debug)]

@@ -9,9 +9,11 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use sonarfix::geometry::units::Radians;
+use sonarfix::map::Wall;
 use sonarfix_hal::config::RobotConfig;
-use sonarfix_map::{Floor, robot_file};
+use sonarfix_map::{FileError, Floor, robot_file};
 use sonarfix_replay::{Replay, Summary};
+use sonarfix_sim::trace::Recorder;
 
 /// How deep folders are searched.
 const DEEPEST: usize = 4;
@@ -32,23 +34,31 @@ pub struct Row {
 /// # Errors
 /// If the folder cannot be read. An error of one recording is a row.
 pub fn rows(data: &Path, cones: &[f32]) -> io::Result<Vec<Row>> {
-    let mut folders = Vec::new();
-    fs::read_dir(data)?;
-    search(data, 0, &mut folders);
+    let folders = folders(data)?;
     let cones: Vec<Option<f32>> =
         [None].into_iter().chain(cones.iter().copied().map(Some)).collect();
-    let of = |folder: &PathBuf| {
-        let name = folder.strip_prefix(data).unwrap_or(folder).display().to_string();
+    let of = |(name, folder): &(String, PathBuf)| {
         let row = |cone: &Option<f32>| {
             let (name, cone) = (name.clone(), *cone);
-            Row { name, cone, outcome: replay(folder, cone) }
+            Row { name, cone, outcome: replay_with(folder, cone) }
         };
         cones.iter().map(row).collect::<Vec<_>>()
     };
     Ok(folders.par_iter().flat_map(of).collect())
 }
 
-/// The folders with a log, in the order of their names.
+/// The folders with a log, in the order of their names, each with its path in the folder.
+///
+/// # Errors
+/// If the folder cannot be read.
+pub(crate) fn folders(data: &Path) -> io::Result<Vec<(String, PathBuf)>> {
+    fs::read_dir(data)?;
+    let mut found = Vec::new();
+    search(data, 0, &mut found);
+    let name = |folder: &Path| folder.strip_prefix(data).unwrap_or(folder).display().to_string();
+    Ok(found.into_iter().map(|folder| (name(&folder), folder)).collect())
+}
+
 fn search(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) {
     let has = |name: &str| folder.join(name).is_file();
     if has("log.csv") && has("robot.toml") && has("map.toml") {
@@ -66,17 +76,30 @@ fn search(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) {
     }
 }
 
-fn replay(folder: &Path, cone: Option<f32>) -> Result<Summary, String> {
-    let text = |error: &dyn std::fmt::Display| error.to_string();
-    let floor = Floor::read(&folder.join("map.toml")).map_err(|error| text(&error))?;
-    let robot = robot_file::read(&folder.join("robot.toml")).map_err(|error| text(&error))?;
-    let robot = with_cone(robot, cone);
-    let walls = floor.walls();
-    let replay = Replay { robot: &robot, walls: &walls, strict: false };
+fn replay_with(folder: &Path, cone: Option<f32>) -> Result<Summary, String> {
+    let (robot, floor) = read(folder, "robot.toml")?;
+    replay(folder, &with_cone(robot, cone), &floor.walls(), &mut ())
+}
+
+/// A robot file of a folder, and its map.
+pub(crate) fn read(folder: &Path, robot: &str) -> Result<(RobotConfig, Floor), String> {
+    let text = |error: FileError| error.to_string();
+    let floor = Floor::read(&folder.join("map.toml")).map_err(text)?;
+    Ok((robot_file::read(&folder.join(robot)).map_err(text)?, floor))
+}
+
+/// Replays the log of a folder, with its reference if there is one.
+pub(crate) fn replay(
+    folder: &Path,
+    robot: &RobotConfig,
+    walls: &[Wall],
+    recorder: &mut impl Recorder,
+) -> Result<Summary, String> {
     let open = |name: &str| File::open(folder.join(name)).map(BufReader::new);
-    let log = open("log.csv").map_err(|error| text(&error))?;
+    let log = open("log.csv").map_err(|error| error.to_string())?;
     let reference = open("reference.csv").ok();
-    replay.run(log, reference, &mut (), &mut |_| {}).map_err(|error| text(&error))
+    let replay = Replay { robot, walls, strict: false };
+    replay.run(log, reference, recorder, &mut |_| {}).map_err(|error| error.to_string())
 }
 
 fn with_cone(mut robot: RobotConfig, cone: Option<f32>) -> RobotConfig {

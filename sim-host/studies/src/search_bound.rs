@@ -424,7 +424,8 @@ mod tests {
                 let found = posterior.world.reflectors(&ping, simulation.sensor());
                 let first = found.iter().find(|reflector| reflector.audible > 0.5);
                 let range = first.map(|first| first.distance * (1.0 + simulation.range_scale()));
-                posterior.add(Heard { time: f64::from(n) * 0.066, pose: truth, bearing, range });
+                let (time, travel) = (f64::from(n) * 0.066, [0.0; 2]);
+                posterior.add(Heard { time, pose: truth, travel, bearing, range });
             }
             let found = posterior.found();
             assert_eq!(found.is_some(), is_unique, "{found:?}");

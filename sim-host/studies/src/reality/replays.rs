@@ -1,17 +1,16 @@
 //! Conversion and replay of one recording.
 
-use std::fs::File;
-use std::io::{self, BufReader};
+use std::io;
 use std::path::Path;
 
 use sonarfix::config::Policy;
-use sonarfix_map::{Floor, robot_file};
+use sonarfix_replay::Summary;
 use sonarfix_replay::convert::carmen::Carmen;
 use sonarfix_replay::convert::given::Given;
 use sonarfix_replay::convert::lego::{ENCODER_LAG, Lego, Nominal};
-use sonarfix_replay::{Replay, Summary};
 
 use super::discover::{Format, Recording};
+use crate::recordings;
 
 /// The replay of a recording, or why there is none.
 #[derive(Debug)]
@@ -106,15 +105,32 @@ fn convert(format: &Format, to: &Path, report: &mut dyn FnMut(String)) -> Result
 }
 
 fn replay_with(folder: &Path, robot: &str, policy: Policy) -> Result<Summary, String> {
-    let text = |error: &dyn std::fmt::Display| error.to_string();
-    let floor = Floor::read(&folder.join("map.toml")).map_err(|error| text(&error))?;
-    let mut robot = robot_file::read(&folder.join(robot)).map_err(|error| text(&error))?;
+    check_reference(folder)?;
+    let (mut robot, floor) = recordings::read(folder, robot)?;
     robot.localizer.policy = policy;
-    let walls = floor.walls();
-    let replay = Replay { robot: &robot, walls: &walls, strict: false };
-    let open = |name: &str| File::open(folder.join(name)).map(BufReader::new);
-    let log = open("log.csv").map_err(|error| text(&error))?;
-    let reference = open("reference.csv")
-        .map_err(|_| "has no reference: its poses are raw odometry".to_owned())?;
-    replay.run(log, Some(reference), &mut (), &mut |_| {}).map_err(|error| text(&error))
+    recordings::replay(folder, &robot, &floor.walls(), &mut ())
+}
+
+fn check_reference(folder: &Path) -> Result<(), String> {
+    let has_reference = folder.join("reference.csv").is_file();
+    has_reference
+        .then_some(())
+        .ok_or_else(|| "has no reference: its poses are raw odometry".to_owned())
+}
+
+/// Converts a recording into a temporary folder and passes that to `replay` with the name of its first robot file.
+///
+/// # Errors
+/// If no temporary folder can be created.
+pub fn replay_converted<T>(
+    recording: &Recording,
+    replay: impl Fn(&Path, &str) -> Result<T, String>,
+) -> io::Result<Result<T, String>> {
+    let folder = tempfile::tempdir()?;
+    let robots = convert(&recording.format, folder.path(), &mut |_| {});
+    Ok(robots.and_then(|robots| {
+        check_reference(folder.path())?;
+        let (_, robot) = robots.first().ok_or("has no robot file")?;
+        replay(folder.path(), robot)
+    }))
 }

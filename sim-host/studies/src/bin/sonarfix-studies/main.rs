@@ -8,6 +8,7 @@ mod faults;
 mod find;
 mod floor_plans;
 mod health;
+mod peers;
 mod reality;
 mod recordings;
 mod relocalize;
@@ -39,6 +40,8 @@ enum Command {
     FloorPlans(floor_plans::Args),
     /// Measures the reliability of the health verdict; prints markdown.
     Health(health::Args),
+    /// Compares the localizer and the search with a particle filter on the same pings; prints markdown.
+    Peers(peers::Args),
     /// Replays all recordings of a folder; prints markdown.
     Reality(reality::Args),
     /// Replays the recordings of a folder with the robot files beside them; prints markdown.
@@ -70,6 +73,7 @@ fn execute(command: Command) -> anyhow::Result<()> {
         Command::Find(args) => find::execute(&args),
         Command::FloorPlans(args) => floor_plans::execute(&args),
         Command::Health(args) => health::execute(&args),
+        Command::Peers(args) => peers::execute(&args),
         Command::Reality(args) => reality::execute(&args),
         Command::Recordings(args) => recordings::execute(&args),
         Command::Relocalize(args) => relocalize::execute(&args),
