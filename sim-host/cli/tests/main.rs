@@ -4,6 +4,7 @@ mod calibrate;
 mod chromium;
 mod command;
 mod common;
+mod compare;
 mod convert;
 mod diagnosis;
 mod doctor;
