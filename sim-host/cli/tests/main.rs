@@ -9,6 +9,7 @@ mod convert;
 mod diagnosis;
 mod doctor;
 mod documented;
+mod documented_runs;
 mod endings;
 mod export;
 mod find;
