@@ -409,7 +409,8 @@ fn readers(made: &Made) -> Vec<(BTreeSet<&'static str>, usize, Vec<String>)> {
             results.push((reader.met, reader.tried, reader.wrong));
         }
     };
-    let workers = thread::available_parallelism().unwrap().get();
+    // Half of the time a page waits for a robot.
+    let workers = 2 * thread::available_parallelism().unwrap().get();
     thread::scope(|scope| {
         let workers: Vec<_> = (0..workers).map(|_| scope.spawn(read)).collect();
         workers.into_iter().flat_map(|worker| worker.join().unwrap()).collect()

@@ -199,7 +199,9 @@
 
   const settings = { view: () => view.value, exaggeration: () => exaggeration.value };
   const picture = Drawing.picture(stage, run, settings);
-  const besidePicture = Drawing.picture(element("beside-stage"), beside, settings);
+  // Both ellipses are magnified as much.
+  const besideSettings = { ...settings, usualSigma: () => picture.usualSigma() };
+  const besidePicture = Drawing.picture(element("beside-stage"), beside, besideSettings);
   const pictures = [picture, besidePicture];
   // Shows both pictures as one of them is shown.
   const follow = (of) => { pictures.forEach((other) => other.setZoom(of.zoom())); changed(); };

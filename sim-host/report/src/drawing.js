@@ -513,6 +513,7 @@ const Drawing = (() => {
     refresh();
     return {
       canvas, draw, drawWaiting, isOutside, refresh, navigate, save, zoomBy, resetView, setZoom,
+      usualSigma: () => state.usualSigma,
       zoom: () => state,
       colours: () => state.colours,
       floorAt: (left, top) => onFloor(state.cam, left, top),
