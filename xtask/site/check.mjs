@@ -1,7 +1,8 @@
 // Opens every page of the site in Chromium, 400 pixels wide: in the light scheme from the disk, in the dark one from a web server.
 //
-// node check.mjs MODULES SITE BROWSER [FLAG…]: MODULES is a folder with node_modules; program.uf2, a program for a Pico 2; and sonarfix with the
-// files of a robot in live-robot. Prints each fault, and ends with 1 if there is one.
+// node check.mjs MODULES SITE BROWSER [FLAG…]: MODULES is a folder with node_modules; program.uf2, a program for a Pico 2; sonarfix with the
+// files of a robot in live-robot; and pages that it has written in reports, which are opened, too, as is the page of a run that it serves. Prints each
+// fault, and ends with 1 if there is one.
 import { spawn } from "node:child_process";
 import { once } from "node:events";
 import { existsSync, readFileSync, readdirSync } from "node:fs";
@@ -21,8 +22,11 @@ const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/cs
 const PLAYGROUND = "playground/index.html";
 const FORM = "new-robot/index.html";
 const LIVE = "live/index.html";
+const COMPARISON = "comparison/comparison.html";
+const SERVED = ""; // the page of a run that is served
 
-const pages = readdirSync(site, { recursive: true }).filter((name) => extname(name) === ".html").sort();
+const reports = join(modules, "reports");
+const pagesIn = (folder) => readdirSync(folder, { recursive: true }).filter((name) => extname(name) === ".html").sort();
 let faults = 0;
 
 function fault(where, text) {
@@ -30,9 +34,9 @@ function fault(where, text) {
   console.error(`${where}: ${text}`);
 }
 
-function serve() {
+function serve(folder) {
   const server = createServer((request, response) => {
-    const path = join(site, decodeURIComponent(new URL(request.url, "http://x").pathname));
+    const path = join(folder, decodeURIComponent(new URL(request.url, "http://x").pathname));
     if (request.url === "/favicon.ico") { response.writeHead(204).end(); return; } // the browser asks for it, not the page
     if (!existsSync(path)) { response.writeHead(404).end(); return; }
     response.writeHead(200, { "Content-Type": TYPES[extname(path)] ?? "application/octet-stream" }).end(readFileSync(path));
@@ -185,17 +189,51 @@ async function useLive(page, where) {
   console.log(`${where}: a robot at ${await read("pose")}`);
 }
 
+// The keys move both runs of a comparison.
+async function useComparison(page, where) {
+  await page.focus(".map");
+  await page.keyboard.press("ArrowRight");
+  await page.keyboard.press("Shift+ArrowRight");
+  const times = await page.$$eval('[data-value="time"]', (places) => places.map((place) => parseFloat(place.textContent)));
+  if (times.length !== 2 || times.some((time) => Math.abs(time - 11) > 0.2)) fault(where, `the keys lead to ${times}`);
+  await page.keyboard.press("Space");
+  await page.waitForFunction(() => parseFloat(document.querySelector('[data-value="time"]').textContent) > 12);
+  await page.keyboard.press("Space");
+}
+
+// A run that is served, with another one beside it; its address.
+async function startServer() {
+  const options = ["--serve", "--speed", "20", "--beside", "drive.csv"];
+  const server = spawn(join(modules, "sonarfix"), ["run", "scenario.toml", ...options], { cwd: reports });
+  let printed = "";
+  while (!/^open \S+\n/m.test(printed)) printed += (await once(server.stderr, "data"))[0];
+  return { server, address: printed.match(/^open (\S+)\n/m)[1] };
+}
+
+// Both runs of a page that is served are at the same time.
+async function useServed(page, where) {
+  await page.waitForFunction(() => parseFloat(document.querySelector('[data-value="time"]').textContent) > 10);
+  await page.click("#pause");
+  await page.waitForFunction(() => document.getElementById("answer").textContent === "paused");
+  await page.waitForTimeout(200); // the last events are drawn
+  const [time, beside] = await page.evaluate(() => ['[data-value="time"]', "#beside-numbers"].map((of) => parseFloat(document.querySelector(of).textContent)));
+  if (!(Math.abs(time - beside) < 0.2)) fault(where, `the runs are at ${time} s and ${beside} s`);
+}
+
 async function open(page, base, name, where, scheme) {
   await page.goto(base + name, { waitUntil: "load" });
   if (name === PLAYGROUND) await usePlayground(page, where);
   if (name === FORM) await useForm(page, where, scheme);
   if (name === LIVE) await useLive(page, where);
+  if (name === COMPARISON) await useComparison(page, where);
+  if (name === SERVED) await useServed(page, where);
   await page.evaluate(axe);
   await check(page, where);
   if (name === "index.html") await useBook(page, where);
 }
 
-async function visit(browser, scheme, base) {
+async function visit(browser, scheme, base, names) {
+  const [own] = base.split("#"); // the address of a page that is served has a token
   const context = await browser.newContext({ viewport: { width: WIDTH, height: 800 }, colorScheme: scheme });
   const page = await context.newPage();
   page.setDefaultTimeout(PATIENCE);
@@ -205,11 +243,11 @@ async function visit(browser, scheme, base) {
   page.on("pageerror", (error) => fault(where, error.message));
   page.on("requestfailed", (request) => fault(where, `${request.url()} cannot be loaded`));
   page.on("request", (request) => {
-    const isOwn = request.url().startsWith(base) || /^(data|blob):/.test(request.url());
+    const isOwn = request.url().startsWith(own) || /^(data|blob):/.test(request.url());
     if (!isOwn) fault(where, `loads ${request.url()}`);
   });
-  for (const name of pages) {
-    where = `${name}, ${scheme}`;
+  for (const name of names) {
+    where = `${name || "served"}, ${scheme}`;
     try {
       await open(page, base, name, where, scheme);
     } catch (error) {
@@ -220,11 +258,20 @@ async function visit(browser, scheme, base) {
 }
 
 const executablePath = process.env.PATH.split(delimiter).map((folder) => join(folder, browserName)).find(existsSync);
-const server = await serve();
 const browser = await chromium.launch({ executablePath, args: flags });
-await visit(browser, "light", `${pathToFileURL(site)}/`);
-await visit(browser, "dark", `http://127.0.0.1:${server.address().port}/`);
+let count = 0;
+for (const folder of [site, reports]) {
+  const names = pagesIn(folder), server = await serve(folder);
+  await visit(browser, "light", `${pathToFileURL(folder)}/`, names);
+  await visit(browser, "dark", `http://127.0.0.1:${server.address().port}/`, names);
+  server.close();
+  count += names.length;
+}
+for (const scheme of ["light", "dark"]) {
+  const { server, address } = await startServer();
+  await visit(browser, scheme, address, [SERVED]);
+  server.kill();
+}
 await browser.close();
-server.close();
-console.log(`${pages.length} pages in 2 colour schemes, ${faults} faults`);
+console.log(`${count + 1} pages in 2 colour schemes, ${faults} faults`);
 process.exitCode = faults > 0 ? 1 : 0;

@@ -3,6 +3,7 @@
 mod form;
 mod links;
 mod live;
+mod reports;
 mod stage;
 mod theme;
 
@@ -81,6 +82,7 @@ pub fn check(site: &Path) -> anyhow::Result<()> {
     cargo::check(install).context("cannot install the rules of accessibility")?;
     form::prepare(&tools)?;
     live::prepare(&tools)?;
+    reports::prepare(&tools)?;
     let mut node = Command::new("node");
     node.arg(cargo::root().join("xtask/site/check.mjs")).arg(&tools).arg(site);
     node.arg(browser.get_program());

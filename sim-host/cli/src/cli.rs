@@ -4,8 +4,8 @@ use clap::{CommandFactory, Parser, Subcommand};
 use sonarfix_terminal::output::{self, Detail};
 
 use crate::{
-    bound, calibrate, check, command, config, convert, doctor, examples, export, find, flash, init,
-    map, measure, merge, monitor, paper, pil, plan, replay, run, shell, survey, sweep,
+    bound, calibrate, check, command, compare, config, convert, doctor, examples, export, find,
+    flash, init, map, measure, merge, monitor, paper, pil, plan, replay, run, shell, survey, sweep,
     virtual_robot,
 };
 
@@ -37,6 +37,8 @@ enum Command {
     Pil(pil::Args),
     /// Replays the recording of a robot through the localizer.
     Replay(replay::Args),
+    /// Compares two runs: logs, traces or scenarios, on a page with both maps at one time, and as a table.
+    Compare(compare::Args),
     /// Searches for the pose of a robot without a start pose on a log.
     Find(find::Args),
     /// Estimates the calibration of a robot from a recording, with a known map or true poses.
@@ -103,6 +105,7 @@ impl Cli {
             Command::Merge(args) => merge::execute(&args),
             Command::Pil(args) => pil::execute(&args),
             Command::Replay(args) => replay::execute(&args),
+            Command::Compare(args) => compare::execute(&args),
             Command::Find(args) => find::execute(&args),
             Command::Calibrate(args) => calibrate::execute(&args),
             Command::Measure(args) => measure::execute(&args),

@@ -3,7 +3,7 @@
 use clap::Command;
 
 /// A subcommand, and examples of it.
-pub const EXAMPLES: [(&str, &[&str]); 33] = [
+pub const EXAMPLES: [(&str, &[&str]); 34] = [
     ("init", &["sonarfix init robot --board pico"]),
     ("check", &["sonarfix check scenario.toml", "sonarfix check robot.toml map.toml --json"]),
     (
@@ -25,6 +25,13 @@ pub const EXAMPLES: [(&str, &[&str]); 33] = [
         &[
             "sonarfix replay drive.csv --map map.toml --config robot.toml --out report",
             "sonarfix replay drive.csv --json",
+        ],
+    ),
+    (
+        "compare",
+        &[
+            "sonarfix compare before.csv after.csv --out comparison",
+            "sonarfix compare drive.csv drive.csv --config robot.toml --config calibrated.toml --out comparison",
         ],
     ),
     ("find", &["sonarfix find drive.csv --map map.toml"]),

@@ -1,7 +1,7 @@
 //! `sonarfix export`: writes logs and traces for other programs.
 
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
@@ -11,9 +11,10 @@ use sonarfix_exchange::{mcap_file, trace_csv, trace_parquet};
 use sonarfix_files::Output;
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_map::{Floor, MapFile, robot_file};
-use sonarfix_replay::{Replay, Summary, log};
+use sonarfix_replay::{Replay, Summary};
 use sonarfix_sim::trace::{Recorder, Wall};
 
+use crate::recorded::{is_log, walls};
 use sonarfix_terminal::output::{self, check_file, check_folder};
 
 /// The file of a bag that describes it.
@@ -77,24 +78,8 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     if is_log(&args.file)? { export_log(args, &floor) } else { export_trace(args, &floor) }
 }
 
-/// Whether a file starts like a log.
-fn is_log(file: &Path) -> anyhow::Result<bool> {
-    let mut start = String::new();
-    let opened = open(file)?.take(log::HEADER.len() as u64).read_to_string(&mut start);
-    Ok(opened.is_ok() && start == log::HEADER)
-}
-
 fn open(file: &Path) -> anyhow::Result<BufReader<File>> {
     Ok(BufReader::new(output::open(file)?))
-}
-
-fn walls(floor: &Floor) -> Vec<Wall> {
-    let wall = |wall: &sonarfix_map::NamedWall| Wall {
-        name: wall.name().to_owned(),
-        from: wall.from(),
-        to: wall.to(),
-    };
-    floor.named_walls().iter().map(wall).collect()
 }
 
 fn export_trace(args: &Args, floor: &Floor) -> anyhow::Result<()> {

@@ -20,6 +20,7 @@ use sonarfix_telemetry::recording::Recording;
 use sonarfix_telemetry::robot::Robot;
 use sonarfix_telemetry::{Monitor, Received, view};
 
+use crate::recorded::Sources;
 use crate::serve::{self, ServeArgs};
 use crate::signs_of_life;
 use sonarfix_terminal::output::check_file;
@@ -101,7 +102,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         return signs_of_life::execute(&mut port, args.seconds);
     }
     scene.commands = port.can_send();
-    let (feed, orders) = args.page.start()?;
+    let (feed, orders) = args.page.start(Sources { map, robot })?;
     let mut screen = Screen::new(scene.walls.clone());
     let mut robot = Robot::new(feed, scene, mount, request::conversation(), new_recording);
     if let Some(path) = &args.record {

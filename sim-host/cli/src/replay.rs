@@ -18,6 +18,7 @@ use sonarfix_report::{Report, Table};
 use sonarfix_sim::trace::Recorder;
 
 use crate::provenance;
+use crate::recorded::Sources;
 use crate::run::Output;
 use crate::serve::{self, PacedArgs};
 use crate::warnings::{self, Warned};
@@ -74,7 +75,9 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let with = Replay { robot: &robot, walls: &walls, strict: args.strict };
     let title = format!("Sonarfix: {}", args.log.display());
     let scene = serve::scene(title, "recording", &floor, &robot);
-    if let Some(mut paced) = args.paced.start(&scene)? {
+    if let Some(mut paced) =
+        args.paced.start(&scene, Sources { map: Some(&map), robot: Some(&config) })?
+    {
         replay(args, &with, &mut paced)?;
         paced.end();
     }

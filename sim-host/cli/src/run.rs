@@ -17,6 +17,7 @@ use sonarfix_sim::statistics::Summary;
 use sonarfix_sim::trace::Trace;
 
 use crate::provenance;
+use crate::recorded::Sources;
 use crate::rows::{self, Counted};
 use crate::serve::{self, PacedArgs};
 use crate::sweep_values::Sweep;
@@ -92,7 +93,9 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let title = format!("Sonarfix: {}, seed {}", scenario.name, experiment.seed);
     let mut scene = serve::scene(title, "simulation", &scenario.floor, &scenario.robot);
     scene.obstacles = experiment.simulation.empty_trace().obstacles;
-    if let Some(mut paced) = args.paced.start(&scene)? {
+    if let Some(mut paced) =
+        args.paced.start(&scene, Sources { map: Some(&args.scenario), robot: None })?
+    {
         experiment.simulation.run(experiment.seed, &mut paced)?;
         paced.end();
     }

@@ -1,4 +1,5 @@
-//! The commands that the pages print: each has a subcommand and options that exist, and each test that a page names exists.
+//! The commands that the pages print: each has a subcommand and options that exist, and each test that a page names exists. `documented_runs.rs`
+//! runs them.
 
 #![expect(clippy::unwrap_used, reason = "all of this file is a test, its helpers too")]
 
@@ -6,12 +7,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-fn root() -> PathBuf {
+pub fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
 /// The name and the text of each page.
-fn pages() -> Vec<(String, String)> {
+pub fn pages() -> Vec<(String, String)> {
     let docs = fs::read_dir(root().join("docs")).unwrap().map(|entry| entry.unwrap().path());
     let pages = docs.chain([root().join("README.md"), root().join("CONTRIBUTING.md")]);
     let pages = pages.filter(|path| path.extension().is_some_and(|it| it == "md"));
@@ -20,7 +21,7 @@ fn pages() -> Vec<(String, String)> {
 }
 
 /// The commands in the blocks of code of a page, each in a line or behind `&&`.
-fn in_blocks(page: &str) -> impl Iterator<Item = &str> {
+pub fn in_blocks(page: &str) -> impl Iterator<Item = &str> {
     let blocks = page.split("```").skip(1).step_by(2).filter(|block| !block.starts_with("toml"));
     let commands = blocks.flat_map(str::lines).flat_map(|line| line.split(" && "));
     commands.map(|line| {
@@ -35,7 +36,7 @@ fn in_text(page: &str) -> impl Iterator<Item = &str> {
 }
 
 /// The arguments of a command `sonarfix`, as a shell passes them.
-fn arguments(command: &str) -> Option<Vec<String>> {
+pub fn arguments(command: &str) -> Option<Vec<String>> {
     let starts = ["sonarfix ", "./sonarfix ", "cargo run --release --bin sonarfix -- "];
     let rest = starts.iter().find_map(|start| command.strip_prefix(start))?;
     let mut words = vec![String::new()];

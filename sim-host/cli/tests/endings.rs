@@ -26,7 +26,7 @@ const PAPER: &str = "../../crates/sonarfix-map/scenarios/paper.toml";
 
 /// Every subcommand, with arguments for the shortest output. In `FILES` are a short log with its map and robot, a drive for
 /// the calibration, a recorded stream of a robot's bytes, rows, and room for results; `ROBOT` is the port of a robot.
-const PRINTING: [&[&str]; 50] = [
+const PRINTING: [&[&str]; 51] = [
     &["--help"],
     &["doctor", "--json"],
     &["init", "FILES/robot"],
@@ -34,6 +34,7 @@ const PRINTING: [&[&str]; 50] = [
     &["run", CLASSROOM, "--runs", "1", "--json"],
     &["pil", CLASSROOM, "--seconds", "1", "--machine", "host"],
     &["replay", "FILES/log.csv"],
+    &["compare", "FILES/log.csv", "FILES/log.csv"],
     &["find", "FILES/log.csv", "--json"],
     &["calibrate", "FILES/drive.csv"],
     &["survey", "FILES/survey/log.csv"],
@@ -324,7 +325,7 @@ fn a_long_line_is_not_echoed() {
 }
 
 /// The options that name a result, each in a command that would otherwise end with another error, or work for hours.
-const WRITING: [(&[&str], &str); 35] = [
+const WRITING: [(&[&str], &str); 36] = [
     (&["man"], "--out"),
     (&["measure", "--port", "missing"], "--out"),
     (&["paper", "--runs", "4000000"], "--out"),
@@ -337,6 +338,7 @@ const WRITING: [(&[&str], &str); 35] = [
     (&["merge", "missing.csv"], "--rows"),
     (&["pil", CLASSROOM, "--machine", "host"], "--record"),
     (&["replay", "missing.csv"], "--out"),
+    (&["compare", "missing.csv", "missing.csv"], "--out"),
     (&["replay", "missing.csv"], "--trace"),
     (&["plan", CLASSROOM, "--runs", "4000000"], "--out"),
     (&["calibrate", "missing.csv"], "--out"),

@@ -28,7 +28,7 @@ struct Place {
 }
 
 /// A folder with a robot, and a program of 5,000 bytes for each family.
-fn folder() -> TempDir {
+pub fn folder() -> TempDir {
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| dir.path().join(name);
     fs::create_dir(at("robot")).unwrap();
@@ -49,7 +49,7 @@ fn program() -> Vec<u8> {
 }
 
 /// A drive of a board in its boot mode.
-fn drive(dir: &TempDir, id: &str) {
+pub fn drive(dir: &TempDir, id: &str) {
     fs::create_dir(dir.path().join("drive")).unwrap();
     let text = format!("UF2 Bootloader v3.0\r\nModel: Raspberry Pi\r\nBoard-ID: {id}\r\n");
     fs::write(dir.path().join("drive/INFO_UF2.TXT"), text).unwrap();

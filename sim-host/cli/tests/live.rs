@@ -19,6 +19,7 @@ use serde_json::Value;
 use sonarfix::filter::ekf::{StandardDeviations, StateEstimate};
 use sonarfix::geometry::pose::Point;
 use sonarfix::geometry::units::{Instant, Metres, Radians};
+use sonarfix::health::Verdict;
 use sonarfix::sensor::absolute::{AbsoluteMeasurement, PositionNoise};
 use sonarfix_link::message::Odometry;
 use sonarfix_link::{
@@ -28,7 +29,8 @@ use sonarfix_link::{
 use sonarfix_live::ring::{CAPACITY, Ring};
 use sonarfix_live::server::Server;
 use sonarfix_sim::trace::{
-    AbsoluteRecord, FixRecord, GyroEstimate, Hypothesis, Outcome, Pose, SearchRecord, Tick, Wall,
+    AbsoluteRecord, FixRecord, GyroEstimate, Hypothesis, Outcome, Pose, SearchRecord, Tick, Trace,
+    Wall,
 };
 
 use sonarfix_telemetry::feed::{Events as _, Feed, Scene, Status};
@@ -633,6 +635,43 @@ fn a_page_without_an_estimate_says_what_it_waits_for() {
         let Some(dom) = chromium::opened_until(&url, &flags, &shown) else { return };
         chromium::assert_ready(&dom);
         chromium::picture(&url, "live-waiting", &flags);
+        for text in shown {
+            assert!(dom.contains(text), "the page does not show {text}: {dom}");
+        }
+    }
+}
+
+/// A run beside is shown at the same time since its start: the robot's clock is at 1000 s when the run begins.
+#[test]
+fn another_run_is_shown_beside_at_the_same_time() {
+    let Page { url, ring, orders: _orders, .. } = page();
+    let feed = Feed::new(ring);
+    let at = |time, verdict| {
+        let deviation = [0.01; 7];
+        let estimate = sonarfix_sim::trace::Estimate { verdict, deviation, ..Default::default() };
+        Tick { time, truth: None, estimate, bound: None, odometry: Pose::default() }
+    };
+    let other = Trace {
+        walls: scene().walls,
+        ticks: (0..100).map(|n| at(f64::from(n) * 0.1, Verdict::Degraded)).collect(),
+        ..Trace::default()
+    };
+    feed.beside("yesterday <b>.csv", &other).unwrap();
+    feed.scene(&scene());
+    for n in 0..50 {
+        feed.tick(&at(1000.0 + f64::from(n) * 0.1, Verdict::Tracking));
+    }
+    feed.end();
+    let shown = [
+        ">Beside: yesterday &lt;b&gt;.csv<",
+        ">4.9 s of 9.9 s, degraded<",
+        "Verdict: 0 tracking, 1 degraded, 2 lost: verdict tracking, beside degraded\"",
+        ">ended<",
+    ];
+    for flags in [&["--window-size=1300,1500"][..], &["--window-size=400,1800"]] {
+        let Some(dom) = chromium::opened_until(&url, flags, &shown) else { return };
+        chromium::assert_ready(&dom);
+        chromium::picture(&url, "live-beside", flags);
         for text in shown {
             assert!(dom.contains(text), "the page does not show {text}: {dom}");
         }

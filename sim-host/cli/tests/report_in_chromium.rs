@@ -3,6 +3,8 @@
 
 use std::f64::consts::FRAC_PI_2;
 
+use sonarfix::health::Verdict;
+use sonarfix_report::comparison::Comparison;
 use sonarfix_report::{Report, Table};
 use sonarfix_sim::trace::{
     AbsoluteRecord, Calibration, Estimate, FixRecord, GyroEstimate, Outcome, Pose, Tick, Trace,
@@ -176,6 +178,76 @@ fn the_page_draws_without_an_error() {
         );
         assert!(dom.contains("0.0 s of 19.9 s"), "the player shows no time");
     }
+}
+
+/// Both runs at one time: the slider, a key, and a click in a curve move both; a zoom of one map zooms the other.
+const USES_A_COMPARISON: &str = r#"<script>{
+  const assert = (holds, what) => { if (!holds) throw new Error(what); };
+  const shown = (name) => [...document.querySelectorAll(`[data-value="${name}"]`)].map((place) => place.textContent);
+  const maps = [...document.querySelectorAll(".map")], painted = (map) => map.toDataURL();
+  const input = (time) => { const it = document.getElementById("scrub"); it.value = time; it.dispatchEvent(new Event("input")); };
+  const key = (name) => maps[0].dispatchEvent(new KeyboardEvent("keydown", { key: name, bubbles: true }));
+  input(5);
+  assert(shown("time").join("; ") === "5.0 s of 19.9 s; 5.0 s of 9.9 s", `both are at 5 s: ${shown("time")}`);
+  assert(shown("error").join("; ") === "2.0 mm; —", `the error of each: ${shown("error")}`);
+  assert(shown("verdict").join("; ") === "tracking; lost", `the verdict of each: ${shown("verdict")}`);
+  key("ArrowRight");
+  assert(shown("time")[1].startsWith("6.0 s"), "a key moves both");
+  input(15);
+  assert(shown("time").join("; ") === "15.0 s of 19.9 s; ended at 9.9 s", `one has ended: ${shown("time")}`);
+  key("+"), key("0"); // a path that is painted at once has other pixels than one that grew
+  const before = maps.map(painted);
+  key("+");
+  assert(maps.every((map, n) => painted(map) !== before[n]), "a key zooms both");
+  key("0");
+  assert(maps.every((map, n) => painted(map) === before[n]), "both are shown as before");
+  const curves = [...document.querySelectorAll(".curve:not([hidden])")];
+  const titles = curves.map((curve) => curve.querySelector("b").textContent).join("; ");
+  assert(titles.startsWith("Position error; Heading error; Verdict"), titles);
+  assert(titles.includes("Distance between the estimates"), titles);
+  const verdict = curves[2], canvas = verdict.querySelector("canvas");
+  assert(/first tracking.*second lost/.test(verdict.textContent), verdict.textContent);
+  const box = canvas.getBoundingClientRect();
+  canvas.dispatchEvent(new MouseEvent("click", { clientX: box.left + 46, clientY: box.top + 5, bubbles: true }));
+  assert(shown("time")[0].startsWith("0.0 s"), `a click in a curve goes there: ${shown("time")}`);
+  document.documentElement.dataset.used = "true";
+}</script>"#;
+
+/// The first has true poses and the second has none, ends earlier and is lost.
+#[test]
+fn two_runs_are_side_by_side_at_one_time() {
+    let (first, mut second) = (trace(true), trace(false));
+    second.ticks.truncate(100);
+    second.ticks.iter_mut().for_each(|tick| tick.estimate.verdict = Verdict::Lost);
+    let table = Table {
+        title: "Differences".into(),
+        columns: vec![String::new(), "first".into()],
+        rows: vec![vec![HOSTILE.into(), "1.5".into()]],
+        ..Table::default()
+    };
+    let comparison = Comparison {
+        title: "Two <runs>".into(),
+        subtitle: HOSTILE.into(),
+        names: [HOSTILE.to_owned(), "b.csv".to_owned()],
+        runs: [&first, &second],
+        tables: vec![table],
+        provenance: Table::default(),
+    };
+    let dir = tempfile::tempdir().unwrap();
+    let page = comparison.write(dir.path()).unwrap();
+    let html = std::fs::read_to_string(&page).unwrap();
+    assert!(!html.contains("<b>wall") && !html.contains("{{"), "a text became markup");
+    std::fs::write(&page, html.replace("</body>", &format!("{USES_A_COMPARISON}</body>"))).unwrap();
+    let url = format!("file://{}", page.display());
+    for flags in [&["--window-size=1300,1500"][..], &["--window-size=400,1800"]] {
+        let Some(dom) = chromium::opened(&url, flags) else { return };
+        assert_ready(&dom);
+        assert!(chromium::root(&dom).contains("data-used=\"true\""), "{}", chromium::root(&dom));
+        chromium::picture(&url, "comparison", flags);
+    }
+    let empty = Trace::default();
+    let error = Comparison { runs: [&first, &empty], ..comparison }.html().unwrap_err();
+    assert!(error.to_string().starts_with("b.csv has no encoder tick"), "{error}");
 }
 
 #[test]

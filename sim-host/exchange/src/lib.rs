@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`row`] | the columns of a trace, and its rows as a run proceeds |
 //! | [`trace_csv`] | rows as CSV |
+//! | [`recorded`] | the records of a run from the rows of its trace |
 //! | [`trace_parquet`] | rows as Parquet |
 //! | [`mcap_file`] | rows and the records of a log as MCAP |
 //! | `scene` | the messages for a picture: poses, map, beam |
@@ -12,6 +13,7 @@
 
 mod log_messages;
 pub mod mcap_file;
+pub mod recorded;
 pub mod row;
 mod scene;
 mod schema;

@@ -18,7 +18,7 @@
 //! | [`http`] | requests and answers |
 //! | [`ring`] | the latest events, in bounded memory |
 //! | [`paced`] | a simulation or a replay at a speed |
-//! | [`page`] | the page: `live.html`, `live.css`, `live.js`, `curves.js`, the drawing of the report's player, and `server.js`, its connection to the server |
+//! | [`page`] | the page: `live.html`, `live.css`, `live.js`, the drawing and the curves of the report, and `server.js`, its connection to the server |
 
 pub mod access;
 pub mod connection;

@@ -2,39 +2,39 @@
 // The page of a robot, a recording or a simulation as it runs: takes events, appends them to the columns of a run, and draws.
 
 (() => {
-  const { OUTCOMES, SIGMAS, degrees, length, unknown } = Moment;
+  const { OUTCOMES, SIGMAS, VERDICTS, degrees, distance, length, unknown } = Moment;
   const FOLLOW = "8";          // the view that F follows with, metres across
   const MOST_ROWS = 24_000;    // of a column: 40 minutes at ten ticks a second
   const DROPPED_AT_ONCE = 4_000;
   const MOST_NOTICES = 100;
   const REFRESH = 200;         // ticks after which extent and usual deviation are computed again
   const REFRESH_OUTSIDE = 20;  // the same while the picture does not hold the estimate
-  const VERDICTS = ["tracking", "degraded", "lost"];
 
   const root = document.documentElement;
   const element = (id) => document.getElementById(id);
   const [stage, view, exaggeration, windowMenu, speed, record, drag, tap, pause, poseForm] =
     ["stage", "view", "exaggeration", "window", "speed", "record", "drag", "tap", "pause", "pose"].map(element);
-  const readout = Object.fromEntries(
-    [...document.querySelectorAll("#readout [data-value]")].map((dd) => [dd.dataset.value, dd]));
+  const readout = Moment.readout(element("readout"));
 
   const STAGE = stage.getAttribute("aria-label");
 
   const poses = () => ({ x: [], y: [], heading: [] });
   const emptyRun = () => ({
     walls: [], obstacles: [], cone: 0, track: 0, dropped: 0, searches: [],
-    ticks: { time: [], truth: poses(), estimate: poses(), encoders: poses(), sigma_x: [], sigma_y: [], sigma_heading: [], correlation: [] },
+    ticks: { time: [], truth: poses(), estimate: poses(), encoders: poses(), sigma_x: [], sigma_y: [], sigma_heading: [], correlation: [], verdict: [] },
     fixes: { time: [], wall: [], x: [], y: [], direction: [], range: [], source: [], outcome: [], reason: [], innovation: [], spread: [] },
     gyro: { time: [], bias: [], sigma: [], slips: [] },
     absolutes: { time: [], x: [], y: [], heading: [], outcome: [], reason: [], sigmas: [] },
-    states: { time: [], verdict: [], scale_right: [], scale_left: [], track_width: [], range_scale: [], sigma: [] },
+    states: { time: [], scale_right: [], scale_left: [], track_width: [], range_scale: [] },
     weights: { weight: [], bearing: [] },
     wheels: { time: [], right: [], left: [] },
     loop: { time: [], longest: [], deadlines: [] },
   });
 
   const run = emptyRun();
-  const state = { search: "", isDue: false, ticks: 0, placing: null, hints: [], isRobot: false };
+  const beside = emptyRun();   // another run, complete; without ticks if there is none
+  // `began`: the time of the first tick, which may have been dropped
+  const state = { search: "", isDue: false, ticks: 0, placing: null, hints: [], isRobot: false, began: null };
 
   const changed = () => { state.isDue = true; };
 
@@ -58,7 +58,7 @@
   function begin({ scene, walls, obstacles }) {
     Object.assign(run, emptyRun(), { walls, obstacles, cone: scene.cone, track: scene.track });
     picture.refresh();
-    state.search = "";
+    Object.assign(state, { search: "", began: null });
     element("title").textContent = document.title = scene.title;
     state.isRobot = scene.source === "robot";
     element("robot").hidden = !state.isRobot;
@@ -69,14 +69,26 @@
     element("keys").textContent = scene.commands ? ", P sets the pose by dragging, T sends a position by a tap" : "";
   }
 
+  // Another run is shown beside this one, or none any more.
+  function beginBeside({ name, run: other }) {
+    Object.assign(beside, emptyRun(), other ? Moment.complete(other) : {});
+    say("beside-name", `Beside: ${name}`);
+    element("beside").hidden = !other;
+    besidePicture.refresh();
+  }
+
   function take(event) {
     switch (event.kind) {
       case "scene": begin(event); break;
+      case "beside": beginBeside(event); break;
       case "record":
         append(run, event.columns);
         if (event.more) append(run, event.more);
         if (event.search) state.search = event.search;
-        if (event.columns.ticks) state.ticks++;
+        if (event.columns.ticks) {
+          state.ticks++;
+          state.began ??= event.columns.ticks.time[0];
+        }
         run.dropped += trim(run.ticks);
         [run.states, run.wheels, run.loop, run.gyro, run.absolutes].forEach(trim);
         [run.fixes, run.weights].forEach(trim);
@@ -130,9 +142,8 @@
       search: state.search || unknown,
       ...Moment.inputNumbers(moment),
     };
-    Moment.show(readout, values);
-    readout.outcome.style.setProperty("--of", fix ? `var(--${OUTCOMES[fix.outcome]})` : "transparent");
-    const verdict = run.states.verdict.at(-1);
+    Moment.show(readout, values, fix);
+    const verdict = run.ticks.verdict.at(-1);
     element("verdict").dataset.verdict = verdict ?? "none";
     say("verdict", VERDICTS[verdict] ?? "no estimate yet");
   }
@@ -147,22 +158,10 @@
   // ---- Curves ----
 
   const states = (name, scale) => ({ time: () => run.states.time, value: (i) => scale * run.states[name][i] });
-  const sigma = (index, scale) => ({ time: () => run.states.time, value: (i) => scale * run.states.sigma[i]?.[index] });
   const travel = (name) => ({
     time: () => run.wheels.time,
     value: (i) => i < 1 ? NaN : 1e3 * (run.wheels[name][i] - run.wheels[name][i - 1]) / (run.wheels.time[i] - run.wheels.time[i - 1]),
   });
-  const fixes = {
-    time: () => run.fixes.time,
-    value: (i) => run.fixes.innovation[i] === null ? NaN : 1e3 * run.fixes.innovation[i],
-    band: (i) => run.fixes.spread[i] === null ? NaN : 3e3 * run.fixes.spread[i],
-    dots: (i) => OUTCOMES[run.fixes.outcome[i]],
-    text: (i) => {
-      const { innovation, wall, outcome } = Moment.fixNumbers(Moment.recordAt(run.fixes, i), 0, run.walls);
-      return `${innovation}, ${wall}, ${outcome}`;
-    },
-  };
-  const verdicts = { ...states("verdict", 1), text: (i) => VERDICTS[run.states.verdict[i]] };
   const DEGREES = 180 / Math.PI;
   const gyro = (value) => ({ time: () => run.gyro.time, value });
   const absolutes = {
@@ -170,11 +169,18 @@
     value: (i) => run.absolutes.sigmas[i] ?? NaN,
     dots: (i) => OUTCOMES[run.absolutes.outcome[i]],
   };
+  // By how much the run beside is later than its own clock: both began at the same time.
+  const besideShift = () => (state.began ?? 0) - (beside.ticks.time[0] ?? 0);
+  // The same of this run and of the one beside it.
+  const both = (name, series) => [[name, "estimate", series(run)], ["beside", "error", { ...series(beside), shift: besideShift }]];
+  const sigma = (column, scale) => (of) => Curves.deviation(of, column, scale);
   const curves = [
-    ["Innovation in its 3σ band; rejected ones at the edge", "mm", [["innovation", "accepted", fixes]]],
-    ["Verdict: 0 tracking, 1 degraded, 2 lost", "", [["verdict", "estimate", verdicts]]],
-    ["Deviation of the position", "mm", [["σ of x", "estimate", sigma(0, 1e3)], ["σ of y", "encoders", sigma(1, 1e3)]]],
-    ["Deviation of the heading", "°", [["σ", "estimate", sigma(2, 180 / Math.PI)]]],
+    ["Position error", "mm", both("error", Curves.positionError)],
+    ["Innovation in its 3σ band; rejected ones at the edge", "mm", [["innovation", "accepted", Curves.innovation(run)]]],
+    ["Verdict: 0 tracking, 1 degraded, 2 lost", "", both("verdict", Curves.verdict)],
+    ["Deviation of x", "mm", both("σ", sigma("sigma_x", 1e3))],
+    ["Deviation of y", "mm", both("σ", sigma("sigma_y", 1e3))],
+    ["Deviation of the heading", "°", both("σ", sigma("sigma_heading", DEGREES))],
     ["Scale errors", "%", [["right", "estimate", states("scale_right", 100)], ["left", "encoders", states("scale_left", 100)],
       ["range", "accepted", states("range_scale", 100)]]],
     ["Track width", "mm", [["estimate", "estimate", states("track_width", 1e3)]]],
@@ -193,7 +199,14 @@
 
   const settings = { view: () => view.value, exaggeration: () => exaggeration.value };
   const picture = Drawing.picture(stage, run, settings);
-  picture.navigate(changed, () => state.placing !== null);
+  // Both ellipses are magnified as much.
+  const besideSettings = { ...settings, usualSigma: () => picture.usualSigma() };
+  const besidePicture = Drawing.picture(element("beside-stage"), beside, besideSettings);
+  const pictures = [picture, besidePicture];
+  // Shows both pictures as one of them is shown.
+  const follow = (of) => { pictures.forEach((other) => other.setZoom(of.zoom())); changed(); };
+  picture.navigate(() => follow(picture), () => state.placing !== null);
+  besidePicture.navigate(() => follow(besidePicture));
 
   // What the first estimate waits for.
   function waiting() {
@@ -202,7 +215,19 @@
     return `waiting for the first estimate: ${needs}`;
   }
 
+  function drawBeside(time) {
+    const end = beside.ticks.time.at(-1);
+    if (end === undefined) return;
+    const at = Math.max(beside.ticks.time[0], Math.min(time - besideShift(), end));
+    const moment = Moment.momentAt(beside, at);
+    besidePicture.draw(moment);
+    const error = distance(moment.truth, moment.estimate);
+    const texts = [`${at.toFixed(1)} s of ${end.toFixed(1)} s`, VERDICTS[moment.verdict], error === null ? "" : `position error ${length(error)}`];
+    say("beside-numbers", texts.filter((text) => text).join(", "));
+  }
+
   function draw() {
+    drawBeside(run.ticks.time.at(-1) ?? 0);
     if (run.ticks.time.length === 0) {
       picture.drawWaiting(waiting());
       stage.setAttribute("aria-label", waiting());
@@ -386,9 +411,9 @@
 
   const KEYS = {
     f: () => { view.value = view.value === "map" ? FOLLOW : "map"; changed(); },
-    "+": () => { picture.zoomBy(Drawing.ZOOM_STEP); changed(); },
-    "-": () => { picture.zoomBy(1 / Drawing.ZOOM_STEP); changed(); },
-    0: () => { picture.resetView(); changed(); },
+    "+": () => { picture.zoomBy(Drawing.ZOOM_STEP); follow(picture); },
+    "-": () => { picture.zoomBy(1 / Drawing.ZOOM_STEP); follow(picture); },
+    0: () => { picture.resetView(); follow(picture); },
     p: () => setPlacing(!state.placing),
     t: () => setPlacing(!state.placing, true),
     Escape: () => { setPlacing(false); say("answer", ""); },
@@ -418,9 +443,11 @@
     setPose({ x: value("x"), y: value("y"), heading: value("heading") * Math.PI / 180 });
   });
   for (const menu of [view, exaggeration, windowMenu]) menu.addEventListener("change", changed);
-  const refresh = () => { picture.refresh(); changed(); };
+  element("save-picture").addEventListener("click", () => picture.save("sonarfix.png"));
+  const refresh = () => { pictures.forEach((of) => of.refresh()); changed(); };
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", refresh);
-  new ResizeObserver(changed).observe(stage);
+  const sizes = new ResizeObserver(changed);
+  pictures.forEach(({ canvas }) => sizes.observe(canvas));
   document.addEventListener("pointermove", changed);
   requestAnimationFrame(frame);
   Connection.listen(take, (text) => say("connection", text));

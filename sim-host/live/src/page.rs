@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 const TEMPLATE: &str = include_str!("live.html");
 const STYLE: &str = include_str!("live.css");
-const SCRIPTS: &str = concat!(include_str!("curves.js"), include_str!("live.js"));
+const SCRIPT: &str = include_str!("live.js");
 
 /// What connects a page to what it shows.
 #[derive(Debug, Clone, Copy)]
@@ -29,16 +29,18 @@ impl Connection<'static> {
 /// The page with a connection.
 #[must_use]
 pub fn html(connection: &Connection<'_>) -> String {
-    let values: [(&str, Cow<'_, str>); 9] = [
+    let values: [(&str, Cow<'_, str>); 11] = [
         ("policy", connection.policy.into()),
         ("palette", sonarfix_report::palette_css().into()),
         ("style", STYLE.into()),
+        ("curves-style", sonarfix_report::CURVES_STYLE.into()),
         ("connection-style", connection.style.into()),
         ("controls", connection.controls.into()),
         ("view", sonarfix_report::VIEW.into()),
         ("drawing", sonarfix_report::DRAWING.into()),
         ("connection", connection.script.into()),
-        ("script", SCRIPTS.into()),
+        ("curves", sonarfix_report::CURVES.into()),
+        ("script", SCRIPT.into()),
     ];
     sonarfix_report::fill(TEMPLATE, &values)
 }

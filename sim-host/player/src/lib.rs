@@ -4,6 +4,7 @@
 
 use serde::Serialize;
 
+use sonarfix::health::Verdict;
 use sonarfix_map::Oscillation;
 use sonarfix_sim::trace::{
     AbsoluteRecord, FixRecord, GyroEstimate, Hypothesis, Outcome, Pose, SearchRecord, Tick, Trace,
@@ -111,6 +112,8 @@ struct Ticks {
     sigma_y: Vec<Number>,
     sigma_heading: Vec<Number>,
     correlation: Vec<Number>,
+    /// 0 tracking, 1 degraded, 2 lost.
+    verdict: Vec<u8>,
 }
 
 #[derive(Serialize, Default)]
@@ -317,6 +320,15 @@ impl<'a> Absolutes<'a> {
     }
 }
 
+/// 0 tracking, 1 degraded, 2 lost.
+fn verdict(verdict: Verdict) -> u8 {
+    match verdict {
+        Verdict::Tracking => 0,
+        Verdict::Degraded => 1,
+        Verdict::Lost => 2,
+    }
+}
+
 /// 0 accepted, 1 gated, 2 refused.
 fn outcome(outcome: Outcome) -> u8 {
     match outcome {
@@ -346,6 +358,7 @@ impl Ticks {
         self.sigma_heading.push(rounded(sigma_heading, DEVIATION));
         let correlation = tick.estimate.covariance_xy / (sigma_x * sigma_y);
         self.correlation.push(rounded(correlation, FRACTION));
+        self.verdict.push(verdict(tick.estimate.verdict));
     }
 }
 

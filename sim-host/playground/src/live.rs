@@ -7,9 +7,14 @@ use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use anyhow::{Context, bail, ensure};
 use serde::Deserialize;
 use serde_json::{Value, json};
-use sonarfix_map::{MapFile, robot_file};
+use sonarfix_hal::config::RobotConfig;
+use sonarfix_map::{Floor, MapFile, robot_file};
+use sonarfix_replay::Replay;
+use sonarfix_replay::thinned::{CAPACITY, Thinned};
+use sonarfix_sim::trace::Trace;
 use sonarfix_telemetry::conversation::Conversation;
 use sonarfix_telemetry::feed::{Events, Feed, Scene};
 use sonarfix_telemetry::order::{Ordered, Reply};
@@ -26,6 +31,8 @@ struct Request {
     first_sequence: u16,
     map: Option<File>,
     robot: Option<File>,
+    /// A recording of this robot on this map, which is replayed.
+    beside: Option<File>,
 }
 
 /// A file that was chosen on the page.
@@ -48,7 +55,8 @@ impl Live {
     /// # Errors
     /// If map or robot file are wrong.
     pub fn new(request: &str) -> anyhow::Result<Self> {
-        let Request { commands, first_sequence, map, robot } = serde_json::from_str(request)?;
+        let Request { commands, first_sequence, map, robot, beside } =
+            serde_json::from_str(request)?;
         let parse = |map: File| MapFile::parse(map.text.into_bytes(), Path::new(&map.name), None);
         let map = map.map(parse).transpose()?;
         let robot = robot.map(|robot| robot_file::parse(&robot.text, &robot.name)).transpose()?;
@@ -56,6 +64,10 @@ impl Live {
         let (scene, mount) = Scene::of_robot("Sonarfix live".to_owned(), floor, robot.as_ref());
         let lines = Arc::new(Lines::default());
         let feed = Feed::new(lines.clone());
+        if let Some(recording) = beside {
+            let run = replayed(&recording, floor, robot.as_ref())?;
+            feed.beside(&recording.name, &run)?;
+        }
         let conversation = Conversation::new(first_sequence);
         let logs = PageLogs(Arc::clone(&lines));
         let new_recording = move || Recording::new(logs.clone());
@@ -101,6 +113,28 @@ impl Live {
         });
         lines.take()
     }
+}
+
+/// A recording as its replay.
+fn replayed(
+    recording: &File,
+    floor: Option<&Floor>,
+    robot: Option<&RobotConfig>,
+) -> anyhow::Result<Trace> {
+    let (Some(floor), Some(robot)) = (floor, robot) else {
+        bail!(
+            "{}: choose the map and the robot file, too: a recording is replayed",
+            recording.name
+        );
+    };
+    let walls = floor.walls();
+    let mut run = Thinned::new(floor, robot.localizer.rangers.first.cone, CAPACITY);
+    let replay = Replay { robot, walls: &walls, strict: false };
+    replay
+        .run(recording.text.as_bytes(), None::<&[u8]>, &mut run, &mut |_| {})
+        .with_context(|| recording.name.clone())?;
+    ensure!(!run.trace().ticks.is_empty(), "{}: no encoder tick", recording.name);
+    Ok(run.trace().clone())
 }
 
 /// Events that the page has not taken yet.
@@ -179,6 +213,16 @@ mod tests {
         Scenario::parse(sonarfix_map::CLASSROOM, "", "".as_ref()).unwrap()
     }
 
+    /// The request of a page with map and robot file.
+    fn request(scenario: &Scenario) -> Value {
+        json!({
+            "commands": true,
+            "first_sequence": 7,
+            "map": { "name": "map.toml", "text": scenario.floor.to_toml() },
+            "robot": { "name": "robot.toml", "text": robot_file::text(&scenario.robot) },
+        })
+    }
+
     /// A page that is connected to a virtual robot.
     struct Bench<'p> {
         live: Live,
@@ -189,13 +233,7 @@ mod tests {
 
     impl<'p> Bench<'p> {
         fn new(parts: &'p Parts) -> Self {
-            let scenario = classroom();
-            let request = json!({
-                "commands": true,
-                "first_sequence": 7,
-                "map": { "name": "map.toml", "text": scenario.floor.to_toml() },
-                "robot": { "name": "robot.toml", "text": robot_file::text(&scenario.robot) },
-            });
+            let request = request(&classroom());
             let robot = VirtualRobot::switched_on(parts, 1, true).unwrap();
             Self {
                 live: Live::new(&request.to_string()).unwrap(),
@@ -273,6 +311,25 @@ mod tests {
         let log = bench.until(|event| event["kind"] == "log");
         let text = log["text"].as_str().unwrap();
         assert!(text.contains("\nwheels,") && text.ends_with("\n# end\n"), "{text}");
+        a_recording_is_shown_beside(text, x);
+    }
+
+    /// With map and robot file the recording is replayed; its estimate begins where the robot was.
+    fn a_recording_is_shown_beside(log: &str, x: f64) {
+        let mut request = request(&classroom());
+        request["beside"] = json!({ "name": "first.csv", "text": log });
+        let mut live = Live::new(&request.to_string()).unwrap();
+        let events = live.events();
+        let events = events.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
+        let beside = events.into_iter().find(|event| event["kind"] == "beside").unwrap();
+        assert_eq!(beside["name"], "first.csv");
+        let ticks = &beside["run"]["ticks"];
+        let begun = ticks["estimate"]["x"][0].as_f64().unwrap();
+        assert!((begun - x).abs() < 0.05, "{ticks}");
+        assert_eq!(ticks["verdict"][0], 0);
+        request["robot"] = Value::Null;
+        let Err(error) = Live::new(&request.to_string()) else { panic!("there is no robot file") };
+        assert!(error.to_string().starts_with("first.csv: choose the map and"), "{error}");
     }
 
     /// A command that no robot acknowledges expires; text that is not a command is refused.

@@ -6,8 +6,9 @@ const Connection = (() => {
   const NO_ROBOT = "no robot is connected: press Connect";
 
   const element = (id) => document.getElementById(id);
-  const [connectButton, disconnectButton, baud, mapFile, robotFile, wrong] =
-    ["connect", "disconnect", "baud", "map-file", "robot-file", "wrong"].map(element);
+  const [connectButton, disconnectButton, baud, mapFile, robotFile, besideFile, wrong] =
+    ["connect", "disconnect", "baud", "map-file", "robot-file", "beside-file", "wrong"].map(element);
+  const files = [mapFile, robotFile, besideFile];
   const { serial: robot } = openSimulator(element("wasm").textContent);
   const serial = navigator.serial;  // none in a browser without Web Serial
 
@@ -26,9 +27,10 @@ const Connection = (() => {
 
   // Begins with a robot of which nothing was received; whether its files are right.
   async function begin() {
-    const [map, robotText] = [await text(mapFile), await text(robotFile)];
+    const [map, robotText, beside] = await Promise.all(files.map(text));
     const [first_sequence] = crypto.getRandomValues(new Uint16Array(1));
-    const mistake = robot.connect({ commands: Boolean(serial), first_sequence: first_sequence >> 1, map, robot: robotText });
+    const mistake = robot.connect({ commands: Boolean(serial), first_sequence: first_sequence >> 1, map, robot: robotText, beside });
+    if (!beside) take({ kind: "beside", run: null });
     wrong.textContent = mistake;
     wrong.hidden = !mistake;
     pass();
@@ -73,7 +75,7 @@ const Connection = (() => {
 
   function show(isOpen) {
     disconnectButton.disabled = !isOpen;
-    connectButton.disabled = baud.disabled = mapFile.disabled = robotFile.disabled = isOpen;
+    for (const it of [connectButton, baud, ...files]) it.disabled = isOpen;
   }
 
   async function connect() {
@@ -148,7 +150,7 @@ const Connection = (() => {
     if (!serial) return;
     connectButton.addEventListener("click", connect);
     disconnectButton.addEventListener("click", disconnect);
-    for (const input of [mapFile, robotFile]) input.addEventListener("change", begin);
+    for (const input of files) input.addEventListener("change", begin);
     serial.addEventListener("connect", reopen);
   }
 

@@ -48,4 +48,4 @@ pub use estimators::Searches;
 pub use lines::{LONGEST, Lines};
 pub use reference::HEADER as REFERENCE_HEADER;
 pub use replay::{Replay, Summary};
-pub use score::{ByVerdict, Consistency, Figures, FiguresByVerdict, Loss, Verdicts};
+pub use score::{ByVerdict, Consistency, Figures, FiguresByVerdict, Loss, Score, Verdicts};

@@ -10,7 +10,7 @@ const Drawing = (() => {
   const TRACK = 0.35;          // metres, where the run does not know
   const SILENT_BEAM = 1.5;     // metres: how far a beam is drawn that heard nothing
   const FADE = 1.5;            // seconds after which a beam has faded to its least
-  const COLOURS = ["paper", "ink", "grid", "wall", "obstacle", "truth", "estimate", "encoders", ...OUTCOMES];
+  const COLOURS = ["paper", "ink", "grid", "wall", "obstacle", "truth", "estimate", "encoders", "error", ...OUTCOMES];
   const PATHS = [["encoders", 1.25, 0.7], ["truth", 3, 0.3], ["estimate", 1.5, 0.7]]; // role, width, opacity
   const ZOOM_STEP = 1.25;
   const ZOOMS = [0.2, 200];    // the least and the largest factor
@@ -83,7 +83,7 @@ const Drawing = (() => {
   }
 
   // The picture of a run on a canvas. `settings` has the values of the menus `view` ("map", or the metres across when it
-  // follows the robot) and `exaggeration` ("auto" or a factor of the ellipse).
+  // follows the robot) and `exaggeration` ("auto" or a factor of the ellipse); `usualSigma`, if there is one, gives the deviation that "auto" suits.
   function picture(canvas, data, settings) {
     const state = { colours: {}, wholeMap: null, usualSigma: NaN, zoom: 1, panX: 0, panY: 0, cam: null };
     const layers = new Map();
@@ -114,7 +114,7 @@ const Drawing = (() => {
     function exaggerationFor(cam) {
       if (settings.exaggeration() !== "auto") return Number(settings.exaggeration());
       const across = Math.min(cam.width, cam.height) / cam.scale;
-      const wanted = across / 50 / (SIGMAS * state.usualSigma);
+      const wanted = across / 50 / (SIGMAS * (settings.usualSigma?.() ?? state.usualSigma));
       return wanted > 1 && Number.isFinite(wanted) ? 10 ** Math.ceil(Math.log10(wanted)) : 1;
     }
 
@@ -475,18 +475,19 @@ const Drawing = (() => {
       state.panY += down / state.cam.scale;
     }
 
-    const resetView = () => Object.assign(state, { zoom: 1, panX: 0, panY: 0 });
+    const setZoom = ({ zoom, panX, panY }) => Object.assign(state, { zoom, panX, panY });
+    const resetView = () => setZoom({ zoom: 1, panX: 0, panY: 0 });
 
-    function save() {
+    // Saves the picture as a PNG file.
+    function save(download) {
       canvas.toBlob((image) => {
-        const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(image), download: "sonarfix.png" });
+        const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(image), download });
         link.click();
         URL.revokeObjectURL(link.href);
       });
     }
 
-    // The button of `view.html` saves the picture; the wheel zooms, dragging pans, a double click shows the usual view again. `changed` draws; where `isBusy` the pointer
-    // has another use.
+    // The wheel zooms, dragging pans, a double click shows the usual view again. `changed` draws; where `isBusy` the pointer has another use.
     function navigate(changed, isBusy = () => false) {
       let last = null;
       canvas.addEventListener("wheel", (event) => {
@@ -507,12 +508,13 @@ const Drawing = (() => {
       });
       for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, () => { last = null; });
       canvas.addEventListener("dblclick", () => { resetView(); changed(); });
-      document.getElementById("save-picture").addEventListener("click", save);
     }
 
     refresh();
     return {
-      draw, drawWaiting, isOutside, refresh, navigate, zoomBy, resetView,
+      canvas, draw, drawWaiting, isOutside, refresh, navigate, save, zoomBy, resetView, setZoom,
+      usualSigma: () => state.usualSigma,
+      zoom: () => state,
       colours: () => state.colours,
       floorAt: (left, top) => onFloor(state.cam, left, top),
       screenAt: (x, y) => onScreen(state.cam, x, y),
@@ -520,5 +522,5 @@ const Drawing = (() => {
     };
   }
 
-  return { ZOOM_STEP, prepare, readColours, picture, roundLength };
+  return { ZOOM_STEP, prepare, readColours, picture, roundLength, usualSigma };
 })();

@@ -227,7 +227,7 @@ const openFigures = (goTo) => {
     const buttons = document.createElement("div");
     buttons.className = "zoom";
     const acts = [
-      ["+", "Magnify", (of) => of.zoom(STEP)], ["−", "Reduce", (of) => of.zoom(1 / STEP)], ["0", "Show all", (of) => of.reset()],
+      ["+", "Magnify", (of) => of.zoom(STEP)], ["−", "Reduce", (of) => of.zoom(1 / STEP)], ["All", "Show all", (of) => of.reset()],
     ];
     for (const [text, name, act] of acts) {
       const button = Object.assign(document.createElement("button"), { type: "button", textContent: text, title: name });

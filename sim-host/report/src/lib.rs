@@ -12,7 +12,10 @@
 //! | `called_lost` | the figure of `sonarfix-studies health` |
 //! | `chart`, `axis`, `points` | drawing of a figure |
 //! | [`heat_map`] | a map with a quantity along a path |
-//! | `moment.js`, `drawing.js` | the drawing of a run, shared with the live page and the playground; the report's player is `player.js` |
+//! | `moment.js`, `drawing.js` | the drawing of a run, shared with the live page and the playground |
+//! | `playback.js`, `strip.js`, `player.js` | the player of a run, shared with the playground; `playback.js` and `strip.js` with the comparison |
+//! | `curves.js` | curves over time, of the live page and the comparison |
+//! | [`comparison`] | the page of two runs side by side |
 //! | `palette` | one colour per role, in figures and player |
 //! | [`map`] | the drawing of a map |
 //! | `page`, `escape` | tables, figures and data as HTML |
@@ -23,6 +26,7 @@
 mod axis;
 mod called_lost;
 mod chart;
+pub mod comparison;
 mod escape;
 mod figures;
 pub mod heat_map;
@@ -65,8 +69,22 @@ const FIGURES: &str = include_str!("figures.js");
 /// The controls of the view of [`DRAWING`]: what is shown of the map, and the scale of the ellipse.
 pub const VIEW: &str = include_str!("view.html");
 
+/// The scripts that play runs, after [`DRAWING`]: time, bar of measurement cycles.
+const PLAYER: &str = concat!(include_str!("playback.js"), include_str!("strip.js"));
+
 /// The script of the player, after [`DRAWING`].
-pub const SCRIPT: &str = include_str!("player.js");
+pub const SCRIPT: &str =
+    concat!(include_str!("playback.js"), include_str!("strip.js"), include_str!("player.js"));
+
+/// The script that draws curves over time, after [`DRAWING`].
+pub const CURVES: &str = include_str!("curves.js");
+
+/// The style sheet of [`CURVES`].
+pub const CURVES_STYLE: &str = include_str!("curves.css");
+
+/// The list of the numbers of a run at one time, and what the colours of its picture mean.
+const NUMBERS: &str = include_str!("numbers.html");
+const LEGEND: &str = include_str!("legend.html");
 
 /// The scripts that draw a run on a canvas; the player and the live page use them.
 pub const DRAWING: &str = concat!(include_str!("moment.js"), include_str!("drawing.js"));
@@ -102,8 +120,14 @@ pub enum ReportError {
         source: Box<dyn Error + Send + Sync>,
     },
     /// The run cannot be written as JSON.
-    #[error("the data of {FILE} cannot be written as JSON")]
+    #[error("the data of the page cannot be written as JSON")]
     Data(#[from] serde_json::Error),
+    /// A run that should be compared has no ticks.
+    #[error("{name} has no encoder tick, so that there is nothing to compare")]
+    Empty {
+        /// The run.
+        name: String,
+    },
     /// A file or the directory cannot be written.
     #[error("{} cannot be written", path.display())]
     Write {
@@ -166,7 +190,14 @@ impl Report<'_> {
 /// The player as HTML. The page that includes it calls `openPlayer(data)` of [`SCRIPT`].
 #[must_use]
 pub fn player() -> String {
-    page::fill(include_str!("player.html"), &[("view", VIEW.into())])
+    let values =
+        [("playback", playback().into()), ("numbers", NUMBERS.into()), ("legend", LEGEND.into())];
+    page::fill(include_str!("player.html"), &values)
+}
+
+/// Slider, buttons and menus of the time and the view.
+fn playback() -> String {
+    page::fill(include_str!("playback.html"), &[("view", VIEW.into())])
 }
 
 /// The style sheet of the report's page and of the player, with the palette.

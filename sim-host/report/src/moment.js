@@ -8,7 +8,14 @@ const Moment = (() => {
   const FASTEST = 2;           // metres a second, where the wheels are not known
   const SEARCH_LASTS = 1.5;    // seconds after which a record of the search no longer holds
 
+  const VERDICTS = ["tracking", "degraded", "lost"];
+
   // ---- The run at one time ----
+
+  // A run with the columns that it lacks, empty.
+  const complete = (run) => Object.assign(run, {
+    searches: run.searches ?? [], gyro: run.gyro ?? { time: [] }, absolutes: run.absolutes ?? { time: [] },
+  });
 
   // Index of the last of some ascending times that is not later than a given one; −1 if none.
   function lastBefore(times, time) {
@@ -62,6 +69,7 @@ const Moment = (() => {
       encoders: poseAt(ticks, "encoders", at),
       ellipse: ellipse(between(ticks.sigma_x, at), between(ticks.sigma_y, at), between(ticks.correlation, at)),
       sigmaHeading: between(ticks.sigma_heading, at),
+      verdict: ticks.verdict?.[index] ?? null,
       fix: recordAt(fixes, lastBefore(fixes.time, time)),
       gyro: recordAt(gyro, lastBefore(gyro.time, time)),
       absolute: recordAt(absolutes, lastBefore(absolutes.time, time)),
@@ -144,16 +152,35 @@ const Moment = (() => {
     };
   }
 
-  // Writes texts into the list of numbers; a row without a text is hidden.
-  function show(readout, texts) {
+  // The numbers of a run whose true pose may be known, as text.
+  function numbers(moment, { walls }) {
+    const { truth, estimate, encoders, ellipse: shape, fix, sigmaHeading } = moment;
+    return {
+      error: length(distance(truth, estimate)),
+      axes: shape ? `${length(SIGMAS * shape.major)} × ${length(SIGMAS * shape.minor)}` : unknown,
+      heading: degrees(truth && estimate ? wrap(estimate.heading - truth.heading) : null),
+      sigma: degrees(sigmaHeading === null ? null : SIGMAS * sigmaHeading),
+      encoders: length(distance(truth ?? estimate, encoders)),
+      verdict: VERDICTS[moment.verdict] ?? unknown,
+      ...fixNumbers(fix, moment.time, walls),
+      ...inputNumbers(moment),
+    };
+  }
+
+  // The places of the numbers in an element, by their names.
+  const readout = (of) => Object.fromEntries([...of.querySelectorAll("[data-value]")].map((place) => [place.dataset.value, place]));
+
+  // Writes texts into the list of numbers, and shows the outcome of a measurement cycle in its colour; a row without a text is hidden.
+  function show(readout, texts, fix) {
     for (const [name, text] of Object.entries(texts)) {
       const row = readout[name];
       row.hidden = row.previousElementSibling.hidden = text === null;
       row.textContent = (text ?? "").replace(/-(?=\d)/g, "−");
     }
+    readout.outcome.style.setProperty("--of", fix ? `var(--${OUTCOMES[fix.outcome]})` : "transparent");
   }
 
   return {
-    OUTCOMES, SIGMAS, lastBefore, momentAt, recordAt, isJump, searchAt, walkedBy, wrap, isUnusual, unknown, millimetres, degrees, length, distance, fixNumbers, inputNumbers, show,
+    OUTCOMES, SIGMAS, VERDICTS, complete, lastBefore, momentAt, recordAt, isJump, searchAt, walkedBy, wrap, isUnusual, unknown, millimetres, degrees, length, distance, fixNumbers, inputNumbers, numbers, readout, show,
   };
 })();

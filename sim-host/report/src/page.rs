@@ -37,16 +37,20 @@ pub(super) fn tables(tables: &[Table]) -> String {
 }
 
 fn table(table: &Table) -> String {
-    let head: String =
-        table.columns.iter().map(|name| cell("th scope=\"col\"", "th", name)).collect();
+    let head: String = table.columns.iter().map(|name| column_head(name)).collect();
     let rows: String = table.rows.iter().map(|cells| row(cells)).collect();
     let (title, note) = (escape(&table.title), escape(&table.note));
     let note = if note.is_empty() { note } else { format!("<p class=\"note\">{note}</p>") };
     format!(
         "<section class=\"table\"><h2>{title}</h2>\n\
-         <div class=\"scroll\"><table><caption>{title}</caption>\n\
+         <div class=\"scroll\" tabindex=\"0\" role=\"group\" aria-label=\"{title}\"><table><caption>{title}</caption>\n\
          <thead><tr>{head}</tr></thead>\n<tbody>\n{rows}</tbody></table></div>{note}</section>\n"
     )
+}
+
+/// The head of a column; that of the names of the rows may be empty.
+fn column_head(name: &str) -> String {
+    if name.is_empty() { "<td></td>".to_owned() } else { cell("th scope=\"col\"", "th", name) }
 }
 
 /// A row with its first cell as header.

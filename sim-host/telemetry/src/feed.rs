@@ -8,7 +8,6 @@ use std::sync::Arc;
 
 use serde::Serialize;
 use serde_json::json;
-use sonarfix::health::Verdict;
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_map::Floor;
 use sonarfix_player::columns;
@@ -120,6 +119,16 @@ impl Feed {
         );
     }
 
+    /// Another run beside that of the scene, with its name: the page shows it at the same time since its start.
+    ///
+    /// # Errors
+    /// If it cannot be written as JSON.
+    pub fn beside(&self, name: &str, run: &Trace) -> serde_json::Result<()> {
+        let run: serde_json::Value = serde_json::from_str(&sonarfix_player::json(run)?)?;
+        self.push(&json!({ "kind": "beside", "name": name, "run": run }));
+        Ok(())
+    }
+
     /// An encoder tick, and the gyro if the estimate contains one.
     pub fn tick(&self, tick: &Tick) {
         if let Some(gyro) = &tick.estimate.gyro {
@@ -127,22 +136,15 @@ impl Feed {
         }
         let estimate = &tick.estimate;
         let c = &estimate.calibration;
-        let verdict = match estimate.verdict {
-            Verdict::Tracking => 0,
-            Verdict::Degraded => 1,
-            Verdict::Lost => 2,
-        };
         self.push(&json!({
             "kind": "record",
             "columns": { "ticks": columns::tick(tick) },
             "more": { "states": {
                 "time": [tick.time],
-                "verdict": [verdict],
                 "scale_right": [c.scale_right],
                 "scale_left": [c.scale_left],
                 "track_width": [c.track_width],
                 "range_scale": [c.range_scale],
-                "sigma": [estimate.deviation],
             } },
         }));
     }
