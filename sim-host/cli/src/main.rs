@@ -11,6 +11,7 @@ mod command;
 mod config;
 mod convert;
 mod convert_rosbag;
+mod diagnosis;
 mod doctor;
 mod examples;
 mod export;
