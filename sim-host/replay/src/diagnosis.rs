@@ -168,9 +168,10 @@ impl<'a> Trial<'a> {
         if explained(&moved) >= RIGHT {
             return moved;
         }
-        // What lasts may show in a part of the drive alone, as a wrong track width in its turns.
+        // A wrong track width shows in the turns alone; a wrong travel shows on the first leg.
         let lasting = self.beginning().lasting();
-        if explained(&lasting) >= RIGHT.max(explained(&moved)) {
+        let is_of_turns = lasting.first().is_some_and(|it| it.cause == "track_width");
+        if is_of_turns && explained(&lasting) >= RIGHT.max(explained(&moved)) {
             lasting
         } else if moved.is_empty() {
             vec![report::broken(broken, self.begin(), self.entries)]
