@@ -14,11 +14,14 @@ use sonarfix_batch::recording::StartPose;
 use sonarfix_batch::robot_edit;
 use sonarfix_batch::wall::Wall;
 use sonarfix_hal::config::RobotConfig;
-use sonarfix_map::{MapFile, robot_file};
+use sonarfix_map::{Floor, MapFile, robot_file};
 use sonarfix_replay::REFERENCE_HEADER;
+use sonarfix_replay::diagnosis::Diagnosis;
 use sonarfix_report::Table;
 use sonarfix_report::residuals::{Residual, residuals};
+use sonarfix_sim::trace::Pose;
 
+use crate::diagnosis;
 use sonarfix_terminal::output::{check_file, open};
 
 /// Maximum number of skipped lines that are printed.
@@ -73,10 +76,13 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let text =
         sonarfix_map::read_text(&robot_path).with_context(|| robot_path.display().to_string())?;
     let read = read_log(args, &robot)?;
-    let walls = walls(args)?;
+    let floor = floor(args)?;
     let nominal = log::nominal(&robot, !read.has_scans);
-    let found = calibrate(&read.recording, &walls, &nominal)
-        .with_context(|| args.log.display().to_string())?;
+    let found = calibrate(&read.recording, &fitted_walls(floor.as_ref()), &nominal);
+    let walls = floor.map(|floor| floor.walls()).unwrap_or_default();
+    let diagnosis = diagnosis::diagnose(&args.log, &robot, &walls, given_start(args)?)?;
+    let found = found.inspect_err(|_| eprint!("{}", diagnosis::paragraphs(&diagnosis)));
+    let found = found.with_context(|| args.log.display().to_string())?;
     if let Some(out) = &args.out {
         let text = robot_edit::calibrated(&text, &robot, &found)?;
         robot_file::parse(&text, &out.display().to_string())?;
@@ -96,10 +102,11 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         sonarfix_files::write(out, svg)?;
     }
     if args.json {
-        sonarfix_terminal::json::print(&Json::of(&found))
+        sonarfix_terminal::json::print(&Json::of(&found, &diagnosis))
     } else {
         println!("{}", estimates(&found, &robot).text());
         println!("\n{}", statement(&found));
+        print!("{}", diagnosis::paragraphs(&diagnosis));
         Ok(())
     }
 }
@@ -117,28 +124,38 @@ fn read_log(args: &Args, robot: &RobotConfig) -> anyhow::Result<log::Read> {
         read.recording.references = log::read_reference(BufReader::new(open(reference)?))
             .with_context(|| reference.display().to_string())?;
     }
-    if let Some(start) = &args.start {
-        let &[x, y, heading] = start.as_slice() else {
-            anyhow::bail!("--start must be x, y and heading, for example 1.5,2,90");
-        };
+    if let Some(Pose { x, y, heading }) = given_start(args)? {
         let time = read.recording.readings.first().map_or(0.0, |reading| reading.time);
-        let pose = Vector3::new(x, y, heading.to_radians());
+        let pose = Vector3::new(x, y, heading);
         read.recording.start = Some(StartPose { time, pose, position: 0.05, heading: 0.05 });
     }
     Ok(read)
 }
 
-/// The walls of the map; none if there is no map.
-fn walls(args: &Args) -> anyhow::Result<Vec<Wall>> {
+/// The start pose of the command line.
+fn given_start(args: &Args) -> anyhow::Result<Option<Pose>> {
+    let Some(start) = &args.start else { return Ok(None) };
+    let &[x, y, heading] = start.as_slice() else {
+        anyhow::bail!("--start must be x, y and heading, for example 1.5,2,90");
+    };
+    Ok(Some(Pose { x, y, heading: heading.to_radians() }))
+}
+
+/// The map, if there is one.
+fn floor(args: &Args) -> anyhow::Result<Option<Floor>> {
     let usual = args.log.with_file_name("map.toml");
     let map = match &args.map {
         Some(map) => map,
         None if usual.exists() => &usual,
-        None => return Ok(Vec::new()),
+        None => return Ok(None),
     };
-    let floor = MapFile::read(map, None)?.floor;
-    let walls = floor.named_walls().iter();
-    Ok(walls.filter_map(|wall| Wall::new(wall.from(), wall.to())).collect())
+    Ok(Some(MapFile::read(map, None)?.floor))
+}
+
+/// The walls to which the recording is fitted; none without a map.
+fn fitted_walls(floor: Option<&Floor>) -> Vec<Wall> {
+    let walls = floor.into_iter().flat_map(|floor| floor.named_walls().iter());
+    walls.filter_map(|wall| Wall::new(wall.from(), wall.to())).collect()
 }
 
 fn write_trajectory(out: &mut impl Write, found: &Calibration) -> anyhow::Result<()> {
@@ -275,7 +292,7 @@ fn statement(found: &Calibration) -> String {
 
 /// The result in SI units.
 #[derive(Serialize)]
-struct Json {
+struct Json<'a> {
     estimates: Vec<JsonEstimate>,
     bearing_offset: Option<[f64; 2]>,
     bearing_scale: Option<[f64; 2]>,
@@ -287,6 +304,7 @@ struct Json {
     referenced: usize,
     turned: [f64; 2],
     distance: f64,
+    diagnosis: &'a Diagnosis,
 }
 
 #[derive(Serialize)]
@@ -298,8 +316,8 @@ struct JsonEstimate {
     determined: &'static str,
 }
 
-impl Json {
-    fn of(found: &Calibration) -> Self {
+impl<'a> Json<'a> {
+    fn of(found: &Calibration, diagnosis: &'a Diagnosis) -> Self {
         let estimates = found.estimates.iter().map(|estimate| JsonEstimate {
             name: estimate.name.label(),
             value: estimate.value,
@@ -324,6 +342,7 @@ impl Json {
             referenced: found.referenced,
             turned: found.turned,
             distance: found.distance,
+            diagnosis,
         }
     }
 }

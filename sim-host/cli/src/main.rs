@@ -13,6 +13,7 @@ mod config;
 mod convert;
 mod convert_rosbag;
 mod course;
+mod diagnosis;
 mod doctor;
 mod examples;
 mod export;

@@ -2,7 +2,6 @@
 
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -10,13 +9,14 @@ use serde::Serialize;
 use sonarfix_exchange::trace_csv;
 use sonarfix_map::{MapFile, robot_file};
 use sonarfix_plan::overrides::PolicyName;
-use sonarfix_replay::diagnosis::{self, Diagnosis, Finding};
+use sonarfix_replay::diagnosis::Diagnosis;
 use sonarfix_replay::fault::Complaint;
 use sonarfix_replay::thinned::{CAPACITY, Thinned};
 use sonarfix_replay::{ByVerdict, Figures, Replay, Summary};
 use sonarfix_report::{Report, Table};
 use sonarfix_sim::trace::Recorder;
 
+use crate::diagnosis;
 use crate::provenance;
 use crate::recorded::Sources;
 use crate::run::Output;
@@ -86,7 +86,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     if let Some(file) = &args.trace {
         sonarfix_files::write_with(file, |out| trace_csv::write(trace.trace(), out))?;
     }
-    let diagnosis = diagnose(args, &with)?;
+    let diagnosis = diagnosis::diagnose(&args.log, with.robot, with.walls, None)?;
     let tables = tables(&summary);
     if args.output.json {
         let result = Diagnosed { summary: &summary, diagnosis: &diagnosis };
@@ -94,7 +94,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     } else {
         let texts: Vec<_> = tables.iter().map(Table::text).collect();
         println!("{}", texts.join("\n\n"));
-        print!("{}", paragraphs(&diagnosis));
+        print!("{}", diagnosis::paragraphs(&diagnosis));
     }
     if let Some(dir) = &args.output.out {
         let report = Report {
@@ -117,34 +117,6 @@ struct Diagnosed<'a> {
     #[serde(flatten)]
     summary: &'a Summary,
     diagnosis: &'a Diagnosis,
-}
-
-/// Reads the log again, and looks for what is wrong; nothing is found in a pipe, which is read once.
-fn diagnose(args: &Args, with: &Replay) -> anyhow::Result<Diagnosis> {
-    if !args.log.is_file() {
-        return Ok(Diagnosis::default());
-    }
-    let log = open(&args.log)?;
-    let progress = bar(None)
-        .with_style(ProgressStyle::default_spinner())
-        .with_message("comparing the log with its files");
-    progress.enable_steady_tick(Duration::from_millis(200));
-    let diagnosis = diagnosis::diagnose(with.robot, with.walls, BufReader::new(log));
-    progress.finish_and_clear();
-    diagnosis.with_context(|| args.log.display().to_string())
-}
-
-/// What is wrong, a paragraph each; nothing if nothing is.
-fn paragraphs(diagnosis: &Diagnosis) -> String {
-    let paragraph = |finding: &Finding| {
-        let place = finding.line.map(|line| format!("line {line}: ")).unwrap_or_default();
-        let explains = finding
-            .explained
-            .map(|share| format!(" ({:.0} % of the ranges then fit)", 100.0 * share));
-        let explains = explains.unwrap_or_default();
-        format!("\nprobable cause: {place}{}{explains}\n    {}\n", finding.message, finding.remedy)
-    };
-    diagnosis.findings.iter().map(paragraph).collect()
 }
 
 /// The log, and what is read with it.

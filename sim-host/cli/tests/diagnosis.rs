@@ -18,11 +18,14 @@ use crate::endings::CLASSROOM;
 /// Seconds of the drive that are replayed.
 const SECONDS: f64 = 120.0;
 
-/// A recorded drive, without its checksums, which a change would make wrong.
-fn recorded() -> TempDir {
+/// The robot of the classroom with two fixed sonars.
+const FIXED: &str = "../../tests/scenarios/classroom-left-right.toml";
+
+/// A recorded drive of a scenario, without its checksums, which a change would make wrong.
+fn recorded(scenario: &str) -> TempDir {
     let dir = TempDir::new().unwrap();
     let log = dir.path().join("log.csv");
-    let arguments = ["run", CLASSROOM, "--runs", "1", "--seed", "77", "--fidelity", "pins"];
+    let arguments = ["run", scenario, "--runs", "1", "--seed", "77", "--fidelity", "pins"];
     let output = Command::new(env!("CARGO_BIN_EXE_sonarfix"))
         .args(arguments)
         .arg("--record")
@@ -61,7 +64,7 @@ fn causes(dir: &Path) -> Vec<String> {
 /// A change of the numbers of a record behind its kind; the first one is its time.
 type Change = fn(&mut [f64]);
 
-/// The log with a change of all records of a kind.
+/// The log with a change of all records of a kind; those whose time becomes −1 are left out.
 fn changed(log: &str, kind: &str, change: impl Fn(&mut [f64])) -> String {
     let line = |line: &str| {
         let mut fields: Vec<_> = line.split(',').map(str::to_owned).collect();
@@ -78,11 +81,12 @@ fn changed(log: &str, kind: &str, change: impl Fn(&mut [f64])) -> String {
         }
         fields.join(",")
     };
-    log.lines().map(line).collect::<Vec<_>>().join("\n") + "\n"
+    let is_kept = |line: &String| line.split(',').nth(1) != Some("-1");
+    log.lines().map(line).filter(is_kept).collect::<Vec<_>>().join("\n") + "\n"
 }
 
 /// Mistakes in the log: the cause that must be named first, the kind of the records, and what is wrong with them.
-const MISTAKES: [(&str, &str, Change); 22] = [
+const MISTAKES: [(&str, &str, Change); 30] = [
     ("wheels_swapped", "wheels", |it| it.swap(1, 2)),
     ("encoder_mirrored", "wheels", |it| it[1] = -it[1]),
     ("encoder_mirrored", "wheels", |it| it[2] = -it[2]),
@@ -107,18 +111,28 @@ const MISTAKES: [(&str, &str, Change); 22] = [
     ("clock_back", "range", |it| it[0] -= if it[0] > 60.0 { 30.0 } else { 0.0 }),
     ("clock_gap", "wheels", |it| it[0] += if it[0] > 60.0 { 45.0 } else { 0.0 }),
     ("range_stuck", "range", |it| it[2] = if it[0] > 50.0 { 0.731 } else { it[2] }),
+    ("wheel_travel", "wheels", |it| it[1..].iter_mut().for_each(|travel| *travel *= 1e3)),
+    ("wheels_swapped", "wheels", |it| (it[1], it[2]) = (-it[2], -it[1])),
+    ("bearing_scale", "range", |it| it[1] *= 0.7),
+    ("bearing_stuck", "range", |it| it[1] = 0.0),
+    ("range_scale", "range", |it| it[2] *= 1.25),
+    ("range_placeholder", "range", |it| it[2] = if it[0] % 4.0 < 1.0 { 9.99 } else { it[2] }),
+    ("start_unit", "resume", |it| it[1..3].iter_mut().for_each(|metres| *metres *= 1e3)),
+    ("echoes_end", "range", |it| it[0] = if it[0] > 50.0 { -1.0 } else { it[0] }),
     ("range_noise", "range", |it| it[2] = 0.2 + (it[0] * 997.3).fract() * 2.2),
 ];
 
 /// Mistakes in the files: the cause, the file, what is written in it, and what is read.
-const FILES: [(&str, &str, &str, &str); 2] = [
+const FILES: [(&str, &str, &str, &str); 4] = [
     ("map_unit", "map.toml", "unit = \"m\"", "unit = \"cm\""),
+    ("map_unit", "map.toml", "unit = \"m\"", "unit = \"mm\""),
+    ("mount", "robot.toml", "mount = [\"6 cm\", \"0 m\"]", "mount = [\"6 cm\", \"20 cm\"]"),
     ("track_width", "robot.toml", "\ntrack_width = \"12 cm\"", "\ntrack_width = \"6 cm\""),
 ];
 
 #[test]
 fn each_mistake_is_named_first_and_a_right_log_has_none() {
-    let dir = recorded();
+    let dir = recorded(CLASSROOM);
     assert_eq!(causes(dir.path()), Vec::<String>::new());
     let log = dir.path().join("log.csv");
     let right = fs::read_to_string(&log).unwrap();
@@ -157,9 +171,51 @@ fn each_mistake_is_named_first_and_a_right_log_has_none() {
     assert_eq!(wrong, Vec::<String>::new());
 }
 
+/// Mistakes in the log of two fixed sonars.
+const FIXED_MISTAKES: [(&str, &str, Change); 5] = [
+    ("bearing_offset", "range", |it| it[1] += 0.5),
+    ("bearing_mirrored", "range", |it| it[1] = -it[1]),
+    ("bearing_unit", "range", |it| it[1] = it[1].to_degrees()),
+    ("wheels_swapped", "wheels", |it| it.swap(1, 2)),
+    ("wheel_travel", "wheels", |it| it[1] *= 1.25),
+];
+
+#[test]
+fn mistakes_of_a_robot_with_fixed_sonars_are_named() {
+    let dir = recorded(FIXED);
+    assert_eq!(causes(dir.path()), Vec::<String>::new());
+    let log = dir.path().join("log.csv");
+    let right = fs::read_to_string(&log).unwrap();
+    let found = FIXED_MISTAKES.map(|(expected, kind, change)| {
+        fs::write(&log, changed(&right, kind, change)).unwrap();
+        (expected, causes(dir.path()).first().cloned())
+    });
+    let wrong: Vec<_> =
+        found.iter().filter(|(expected, first)| first.as_deref() != Some(*expected)).collect();
+    assert!(wrong.is_empty(), "{wrong:?}");
+}
+
+#[test]
+fn calibrate_names_the_mistake_too() {
+    let dir = recorded(CLASSROOM);
+    let log = dir.path().join("log.csv");
+    let calibrate = || {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_sonarfix"));
+        let output = command.arg("calibrate").arg(&log).output().unwrap();
+        [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap()).concat()
+    };
+    let printed = calibrate();
+    assert!(!printed.contains("probable cause"), "{printed}");
+    let right = fs::read_to_string(&log).unwrap();
+    fs::write(&log, changed(&right, "wheels", |it| it.swap(1, 2))).unwrap();
+    let printed = calibrate();
+    let named = "probable cause: the right and the left encoder are exchanged";
+    assert!(printed.contains(named), "{printed}");
+}
+
 #[test]
 fn a_finding_states_its_line_and_the_remedy() {
-    let dir = recorded();
+    let dir = recorded(CLASSROOM);
     let log = dir.path().join("log.csv");
     let right = fs::read_to_string(&log).unwrap();
     let turned = changed(&right, "resume", |it| it[3] += 1.6);

@@ -66,7 +66,8 @@ pub struct Diagnosis {
     pub findings: Vec<Finding>,
 }
 
-/// Looks for what is wrong with a log and its files. Ten minutes of a robot are examined.
+/// Looks for what is wrong with a log and its files. Ten minutes of a robot are examined. `start` replaces the start of the log.
+/// Without walls the records alone are examined.
 ///
 /// # Errors
 /// [`ReplayError`], if the log cannot be read or is of another format.
@@ -74,27 +75,42 @@ pub fn diagnose(
     robot: &RobotConfig,
     walls: &[Wall],
     log: impl BufRead,
+    start: Option<Pose>,
 ) -> Result<Diagnosis, ReplayError> {
     let mut visible = Visible::new(robot);
-    let recording = Recording::read(log, |entry| visible.see(entry))?;
+    let mut recording = Recording::read(log, |entry| visible.see(entry))?;
+    if let Some(pose) = start {
+        recording.start_at(pose);
+    }
     let entries = recording::thinned(&recording.entries);
-    let whole = Trial { robot, walls, entries: &entries };
+    let whole = Trial { robot, walls, entries: &entries, are_too_fast: visible.are_too_fast() };
     let as_is = whole.as_is();
-    // Without a start no echo can be compared with a wall.
-    let is_enough = as_is.echoes.len() >= LEAST_ECHOES && whole.start().is_some();
+    // Without a start and a map no echo can be compared with a wall.
+    let is_comparable = whole.start().is_some() && !walls.is_empty();
+    let is_enough = is_comparable && as_is.count() >= LEAST_ECHOES;
     let explained = is_enough.then(|| as_is.explained());
     let mut findings = visible.findings(&recording);
     // A time in another unit makes each wheel too slow or too fast: nothing else can be tried.
     let is_readable = findings.iter().all(|found| found.cause != "time_unit");
-    let is_right = explained.is_none_or(|share| share >= RIGHT) && !as_is.is_too_fast();
+    let is_right = explained.is_none_or(|share| share >= RIGHT)
+        && !as_is.is_too_fast()
+        && !as_is.is_strained();
     if is_enough && is_readable && !is_right {
+        if let Some(clipped) = visible.clipped() {
+            findings.retain(|it| it.cause != "range_stuck");
+            findings.push(clipped);
+        }
         // A jump of a counter may be the effect of a wrong unit.
         let jumps = findings.extract_if(.., |it| it.cause == "counter_jump").collect::<Vec<_>>();
+        // Random numbers fit a robot that hardly moves.
+        findings.extend(visible.certain_noise());
         findings.extend(whole.causes(&as_is));
-        let is_explained = findings.iter().any(|it| it.explained.is_some() || it.cause == "moved");
+        let is_named =
+            |it: &Finding| it.explained.is_some() || ["moved", "range_noise"].contains(&it.cause);
+        let is_explained = findings.iter().any(is_named);
         findings.extend(jumps);
         if !is_explained {
-            findings.extend(visible.noise().or_else(|| report::unexplained(&as_is)));
+            findings.extend(visible.unexplained().or_else(|| report::unexplained(&as_is, walls)));
         }
     }
     findings.extend(visible::edited(&recording));
@@ -106,6 +122,8 @@ struct Trial<'a> {
     robot: &'a RobotConfig,
     walls: &'a [Wall],
     entries: &'a [Entry],
+    /// Whether both wheels are often faster than they can be.
+    are_too_fast: bool,
 }
 
 /// A cause that was tried.
@@ -141,16 +159,24 @@ impl<'a> Trial<'a> {
         Trial { entries, ..*self }
     }
 
-    /// The causes that explain the log, best first. What lasts from the start on is no cause if much of the log is right.
+    /// The causes that explain the log, best first. If much of the log is right before the rest, the robot was probably moved.
     fn causes(&self, as_is: &Evidence) -> Vec<Finding> {
         let Some(broken) = as_is.broken() else { return self.beginning().lasting() };
         let mut moves = self.moves(broken, as_is);
         keep_best(&mut moves, 0);
-        let named = self.named(&moves, as_is);
-        if named.is_empty() {
+        let moved = self.named(&moves, as_is);
+        if explained(&moved) >= RIGHT {
+            return moved;
+        }
+        // A wrong track width shows in the turns alone; a wrong travel shows on the first leg.
+        let lasting = self.beginning().lasting();
+        let is_of_turns = lasting.first().is_some_and(|it| it.cause == "track_width");
+        if is_of_turns && explained(&lasting) >= RIGHT.max(explained(&moved)) {
+            lasting
+        } else if moved.is_empty() {
             vec![report::broken(broken, self.begin(), self.entries)]
         } else {
-            named
+            moved
         }
     }
 
@@ -159,8 +185,11 @@ impl<'a> Trial<'a> {
         let as_is = &self.as_is();
         let start = self.start();
         let mut candidates = causes::all();
+        // A robot that hardly moves, by its log, can follow any ranges.
+        candidates.retain(|it| !it.is_of_slow_wheels() || self.are_too_fast);
         candidates.extend(start.into_iter().flat_map(causes::starts_around));
         candidates.extend(start.and_then(causes::start_unit));
+        candidates.extend(start.into_iter().flat_map(causes::start_positions));
         let mut tried: Vec<_> = self
             .screened(candidates)
             .into_iter()
@@ -288,12 +317,19 @@ impl Tried {
 
     fn is_enough(&self, as_is: &Evidence) -> bool {
         #[expect(clippy::cast_precision_loss, reason = "a number of echoes")]
-        let echoes = as_is.echoes.len() as f64;
+        let echoes = as_is.count() as f64;
         let gain = self.value();
+        // What makes a robot file right that the localizer has to bend need not explain more echoes.
+        let is_relaxed = as_is.is_strained() && !self.evidence.is_strained();
         gain >= LEAST_GAIN
-            && gain >= LEAST_GAIN_PER_ECHO * echoes
+            && (is_relaxed || gain >= LEAST_GAIN_PER_ECHO * echoes)
             && self.evidence.explained() >= LEAST_EXPLAINED
     }
+}
+
+/// The share that the first finding explains; 0 without one.
+fn explained(findings: &[Finding]) -> f64 {
+    findings.first().and_then(|it| it.explained).unwrap_or(0.0)
 }
 
 /// Sorts what was tried, and keeps the best of each cause, and so many others that are as good.

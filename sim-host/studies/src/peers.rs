@@ -174,6 +174,8 @@ pub fn of_recordings(data: &Path) -> Result<Vec<Row>, PeerError> {
         })
         .collect::<io::Result<_>>()?;
     let own = recordings::folders(data)?;
+    // A recording in the project's own format has its map beside it, and not its walls.
+    rows.retain(|row| !own.iter().any(|(name, _)| row.name.starts_with(name)));
     rows.par_extend(own.par_iter().map(|(name, folder)| Row {
         name: name.clone(),
         runs: 1,

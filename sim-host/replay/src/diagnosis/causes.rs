@@ -24,32 +24,58 @@ pub enum Cause {
     LeftTravel,
     /// The travel of both wheels per count is another.
     Travel,
+    /// The travel of both wheels is in another unit.
+    TravelUnit,
     /// The track width is another.
     TrackWidth,
     /// The servo turns the other way.
     BearingMirrored,
     /// The zero of the servo is another.
     BearingOffset,
+    /// The servo turns farther or less far.
+    BearingScale,
     /// Bearings are in degrees.
     BearingUnit,
+    /// The columns of bearing and range are exchanged.
+    Columns,
+    /// The sonar is farther ahead or back.
+    MountAhead,
+    /// The sonar is farther to a side.
+    MountLeft,
     /// Ranges are in another unit.
     RangeUnit,
+    /// All ranges are too long or too short by a factor.
+    RangeScale,
     /// All ranges are too long or too short by a length.
     RangeOffset,
     /// The times of the ranges are late or early.
     RangeDelay,
+    /// The clock of the ranges is too fast or too slow.
+    RangeClock,
+    /// Each range is that of an earlier ping.
+    LatePings,
     /// The heading at the start is another.
     StartHeading,
-    /// The heading at the start is in degrees.
+    /// The heading at the start is in degrees, or its position in another unit.
     StartUnit,
+    /// x and y of the start are exchanged.
+    StartAxes,
     /// The pose at the start is another.
     StartPose,
     /// The robot was carried, or its wheels slipped.
     Moved,
     /// The map is a mirror image.
     MapMirrored,
+    /// The map is turned.
+    MapTurned,
     /// The map has another unit.
     MapUnit,
+    /// The map has another scale.
+    MapScale,
+    /// The x axis of the map has another scale.
+    MapScaleX,
+    /// The y axis of the map has another scale.
+    MapScaleY,
 }
 
 /// A change that explains the log if the cause is right.
@@ -80,7 +106,7 @@ const WIDTHS: &[f64] = &[
     0.1, 0.2, 0.25, 0.4, 0.5, 0.6, 0.7, 0.8, 0.88, 1.13, 1.25, 1.4, 1.6, 1.8, 2.0, 2.3, 4.0, 10.0,
 ];
 
-const VARIED: [Varied; 8] = [
+const VARIED: [Varied; 16] = [
     Varied {
         cause: Cause::RightTravel,
         values: FACTORS,
@@ -144,7 +170,66 @@ const VARIED: [Varied; 8] = [
         is_factor: false,
         change: |by| Change { heading_offset: by.to_radians(), ..Change::default() },
     },
+    Varied {
+        cause: Cause::BearingScale,
+        values: &[0.4, 0.5, 0.6, 0.7, 0.8, 1.25, 1.45, 1.7, 2.0],
+        half_step: 1.08,
+        is_factor: true,
+        change: |by| Change { bearing: by, ..Change::default() },
+    },
+    Varied {
+        cause: Cause::RangeScale,
+        values: SCALES,
+        half_step: 1.06,
+        is_factor: true,
+        change: |by| Change { range: by, ..Change::default() },
+    },
+    Varied {
+        cause: Cause::MapScale,
+        values: SCALES,
+        half_step: 1.06,
+        is_factor: true,
+        change: |by| Change { map: [[by, 0.0], [0.0, by]], ..Change::default() },
+    },
+    Varied {
+        cause: Cause::MapScaleX,
+        values: SCALES,
+        half_step: 1.06,
+        is_factor: true,
+        change: |by| Change { map: [[by, 0.0], [0.0, 1.0]], ..Change::default() },
+    },
+    Varied {
+        cause: Cause::MapScaleY,
+        values: SCALES,
+        half_step: 1.06,
+        is_factor: true,
+        change: |by| Change { map: [[1.0, 0.0], [0.0, by]], ..Change::default() },
+    },
+    Varied {
+        cause: Cause::MountAhead,
+        values: MOUNTS,
+        half_step: 0.03,
+        is_factor: false,
+        change: |by| Change { mount: [by, 0.0], ..Change::default() },
+    },
+    Varied {
+        cause: Cause::MountLeft,
+        values: MOUNTS,
+        half_step: 0.03,
+        is_factor: false,
+        change: |by| Change { mount: [0.0, by], ..Change::default() },
+    },
+    Varied {
+        cause: Cause::RangeClock,
+        values: &[-0.1, -0.06, -0.035, -0.02, -0.012, 0.012, 0.02, 0.035, 0.06, 0.1],
+        half_step: 0.006,
+        is_factor: false,
+        change: |by| Change { clock_gain: by, ..Change::default() },
+    },
 ];
+
+const MOUNTS: &[f64] = &[-0.3, -0.2, -0.13, -0.07, 0.07, 0.13, 0.2, 0.3];
+const SCALES: &[f64] = &[0.6, 0.7, 0.78, 0.87, 1.15, 1.28, 1.45, 1.65];
 
 /// Factor of ranges in inches that were converted as centimetres.
 pub const INCHES_AS_CENTIMETRES: f64 = 2.54;
@@ -170,6 +255,18 @@ const RANGE_UNITS: [f64; 14] = [
 /// Factors of a map's unit.
 const MAP_UNITS: [f64; 10] = [1e-3, 1e-2, 0.1, 10.0, 100.0, 1e3, 0.0254, 0.3048, 39.37, 3.2808];
 
+/// Factors of the travel of wheels in other units.
+const TRAVEL_UNITS: [f64; 5] = [1e-3, 1e-2, 0.0254, 100.0, 1e3];
+/// Matrices of maps that are mirrored, and of those that are turned.
+const MIRRORS: [[[f64; 2]; 2]; 4] = [
+    [[-1.0, 0.0], [0.0, 1.0]],
+    [[1.0, 0.0], [0.0, -1.0]],
+    [[0.0, 1.0], [1.0, 0.0]],
+    [[0.0, -1.0], [-1.0, 0.0]],
+];
+const TURNS: [[[f64; 2]; 2]; 3] =
+    [[[0.0, 1.0], [-1.0, 0.0]], [[0.0, -1.0], [1.0, 0.0]], [[-1.0, 0.0], [0.0, -1.0]]];
+
 /// All candidates that need no search for the pose.
 pub fn all() -> Vec<Candidate> {
     let none = Change::default();
@@ -181,13 +278,28 @@ pub fn all() -> Vec<Candidate> {
         fixed(Cause::BothMirrored, Change { wheels: [-1.0, -1.0], ..none }),
         fixed(Cause::BearingMirrored, Change { bearing: -1.0, ..none }),
         fixed(Cause::BearingUnit, Change { bearing: PI / 180.0, ..none }),
-        fixed(Cause::MapMirrored, Change { map: [-1.0, 1.0], ..none }),
-        fixed(Cause::MapMirrored, Change { map: [1.0, -1.0], ..none }),
-        fixed(Cause::MapMirrored, Change { is_transposed: true, ..none }),
+        fixed(Cause::WheelsSwapped, Change { is_swapped: true, wheels: [-1.0; 2], ..none }),
+        fixed(Cause::WheelsSwapped, Change { is_swapped: true, wheels: [-1.0, 1.0], ..none }),
+        fixed(Cause::WheelsSwapped, Change { is_swapped: true, wheels: [1.0, -1.0], ..none }),
+        fixed(Cause::Columns, Change { is_exchanged: true, ..none }),
     ];
+    for is_about_centre in [false, true] {
+        let maps = MIRRORS.map(|map| (Cause::MapMirrored, map)).into_iter();
+        let maps = maps.chain(TURNS.map(|map| (Cause::MapTurned, map)));
+        all.extend(maps.map(|(cause, map)| fixed(cause, Change { map, is_about_centre, ..none })));
+    }
+    let late = (1_u8..=10).map(|pings| Candidate {
+        cause: Cause::LatePings,
+        change: Change { late_pings: pings.into(), ..none },
+        value: pings.into(),
+    });
+    all.extend(late);
+    let travels =
+        TRAVEL_UNITS.map(|by| (Cause::TravelUnit, by, Change { wheels: [by; 2], ..none }));
     let units = RANGE_UNITS.map(|by| (Cause::RangeUnit, by, Change { range: by, ..none }));
-    let maps = MAP_UNITS.map(|by| (Cause::MapUnit, by, Change { map: [by, by], ..none }));
-    let units = units.into_iter().chain(maps);
+    let maps =
+        MAP_UNITS.map(|by| (Cause::MapUnit, by, Change { map: [[by, 0.0], [0.0, by]], ..none }));
+    let units = units.into_iter().chain(maps).chain(travels);
     all.extend(units.map(|(cause, value, change)| Candidate { cause, change, value }));
     for varied in &VARIED {
         let values = varied.values.iter();
@@ -231,6 +343,18 @@ pub fn start_unit(pose: Pose) -> Option<Candidate> {
     (pose.heading.abs() > TAU).then_some(candidate)
 }
 
+/// The position of the start in another unit, and with exchanged axes.
+pub fn start_positions(pose: Pose) -> impl Iterator<Item = Candidate> {
+    let at = move |cause, value, x, y| {
+        let change = Change { start: Some(Pose { x, y, ..pose }), ..Change::default() };
+        Candidate { cause, change, value }
+    };
+    let exchanged = at(Cause::StartAxes, 0.0, pose.y, pose.x);
+    let units = [1e-3, 1e-2, 0.0254, 100.0, 1e3].into_iter();
+    let units = units.map(move |by| at(Cause::StartUnit, by, by * pose.x, by * pose.y));
+    units.chain(std::iter::once(exchanged))
+}
+
 /// Starts around the one of the log.
 pub fn starts_around(pose: Pose) -> impl Iterator<Item = Candidate> {
     const STEPS: [f64; 7] = [-1.0, -0.6, -0.3, 0.0, 0.3, 0.6, 1.0];
@@ -251,10 +375,15 @@ impl Candidate {
         VARIED.iter().any(|varied| varied.cause == self.cause)
     }
 
+    /// Whether it makes wheels slow that are too fast.
+    pub fn is_of_slow_wheels(&self) -> bool {
+        self.cause == Cause::TravelUnit && self.value < 1.0
+    }
+
     /// The logarithm of how many candidates there are of its kind: a varied quantity, and a start anywhere, fit by chance.
     pub fn cost(&self) -> f64 {
         match self.cause {
-            Cause::StartPose => 10.0,
+            Cause::StartPose | Cause::TravelUnit => 10.0,
             Cause::Moved => 15.0,
             // A robot that hardly moves, by its log, can follow any ranges.
             Cause::RightTravel | Cause::LeftTravel | Cause::Travel => {
@@ -277,6 +406,12 @@ impl Candidate {
             }
             Cause::TrackWidth => (self.value - 1.0, 3.0 * f64::from(prior.track_width.0) / width),
             Cause::BearingOffset | Cause::StartHeading => (self.value, 6.0),
+            Cause::BearingScale => (self.value - 1.0, 0.08),
+            Cause::RangeScale | Cause::MapScale | Cause::MapScaleX | Cause::MapScaleY => {
+                (self.value - 1.0, (3.0 * f64::from(prior.range_scale)).max(0.03))
+            }
+            Cause::MountAhead | Cause::MountLeft => (self.value, 0.03),
+            Cause::RangeClock => (self.value, 0.004),
             Cause::RangeOffset => (self.value, 0.025),
             Cause::RangeDelay => (self.value, 0.15),
             _ => return false,

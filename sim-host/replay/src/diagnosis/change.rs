@@ -31,6 +31,14 @@ pub struct Change {
     pub range_offset: f64,
     /// The delay of the ranges' times, seconds.
     pub delay: f64,
+    /// Seconds by which the clock of the ranges gains on that of the encoders in a second.
+    pub clock_gain: f64,
+    /// By so many pings a range is older than its record.
+    pub late_pings: usize,
+    /// Whether the log's bearing and range are exchanged.
+    pub is_exchanged: bool,
+    /// Added to the mount of each ranger, metres ahead and to the left.
+    pub mount: [f64; 2],
     /// The start, if it is another.
     pub start: Option<Pose>,
     /// The time at which the robot was carried to another pose, and that pose.
@@ -39,10 +47,10 @@ pub struct Change {
     pub heading: f64,
     /// Added to the start's heading, radians.
     pub heading_offset: f64,
-    /// Of the map's coordinates; negative for a mirrored axis.
-    pub map: [f64; 2],
-    /// Whether x and y of the map are exchanged.
-    pub is_transposed: bool,
+    /// The map's coordinates are multiplied by this matrix, row by row.
+    pub map: [[f64; 2]; 2],
+    /// Whether that is about the centre of the map instead of its origin.
+    pub is_about_centre: bool,
 }
 
 impl Default for Change {
@@ -56,12 +64,16 @@ impl Default for Change {
             range: 1.0,
             range_offset: 0.0,
             delay: 0.0,
+            clock_gain: 0.0,
+            late_pings: 0,
+            is_exchanged: false,
+            mount: [0.0; 2],
             start: None,
             moved: None,
             heading: 1.0,
             heading_offset: 0.0,
-            map: [1.0; 2],
-            is_transposed: false,
+            map: [[1.0, 0.0], [0.0, 1.0]],
+            is_about_centre: false,
         }
     }
 }
@@ -72,19 +84,24 @@ impl Change {
         let mut changed = *robot;
         let width = &mut changed.localizer.drive.track_width;
         *width = single(f64::from(width.0) * self.track_width, Metres);
+        let [ahead, left] = self.mount;
+        for ranger in changed.localizer.rangers.iter_mut() {
+            let Point { x, y } = ranger.mount;
+            ranger.mount = point(f64::from(x.0) + ahead, f64::from(y.0) + left);
+        }
         changed
     }
 
     /// The map with the change. Walls that cannot be are left out.
     pub fn walls(&self, walls: &[Wall]) -> Vec<Wall> {
-        let [by_x, by_y] = self.map;
+        let pivot = if self.is_about_centre { centre(walls) } else { [0.0; 2] };
+        let moved = |of: Point| {
+            let from = [f64::from(of.x.0) - pivot[0], f64::from(of.y.0) - pivot[1]];
+            let [x, y] = self.map.map(|row| row[0] * from[0] + row[1] * from[1]);
+            point(x + pivot[0], y + pivot[1])
+        };
         let changed = |wall: &Wall| {
-            let ends = [wall.from(), wall.to()].map(|point| {
-                let (x, y) = (by_x * f64::from(point.x.0), by_y * f64::from(point.y.0));
-                let (x, y) = if self.is_transposed { (y, x) } else { (x, y) };
-                Point { x: single(x, Metres), y: single(y, Metres) }
-            });
-            let changed = Wall::new(ends[0], ends[1]).ok()?;
+            let changed = Wall::new(moved(wall.from()), moved(wall.to())).ok()?;
             Some(wall.accuracy().map_or(changed, |accuracy| changed.with_accuracy(accuracy)))
         };
         walls.iter().filter_map(changed).collect()
@@ -93,9 +110,11 @@ impl Change {
     /// The records with the change, in the order of their times. Encoder counts become the travel of the wheels of `robot`,
     /// and a range is of no certain wall: the robot chose one by what may be wrong.
     pub fn records(&self, entries: &[Entry], robot: &RobotConfig) -> Vec<Record> {
+        let begin = entries.first().map_or(0.0, |entry| entry.record.time());
         let mut records: Vec<_> =
-            entries.iter().map(|entry| self.record(&entry.record, robot)).collect();
-        if self.delay != 0.0 {
+            entries.iter().map(|entry| self.record(&entry.record, robot, begin)).collect();
+        self.advance_ranges(&mut records);
+        if self.delay != 0.0 || self.clock_gain != 0.0 {
             records.sort_by(|a, b| a.time().total_cmp(&b.time()));
         }
         if let Some((time, pose)) = self.moved {
@@ -107,14 +126,44 @@ impl Change {
         records
     }
 
-    fn record(&self, record: &Record, robot: &RobotConfig) -> Record {
+    /// Each record of a range gets the range that came later, of the same ranger.
+    fn advance_ranges(&self, records: &mut [Record]) {
+        if self.late_pings == 0 {
+            return;
+        }
+        let all = records.iter().filter_map(|record| match record {
+            Record::Range { range, ranger, .. } => Some((*ranger, *range)),
+            _ => None,
+        });
+        let all: Vec<_> = all.collect();
+        let mut own = 0;
+        for record in records {
+            let Record::Range { range, ranger, .. } = record else { continue };
+            let later = all.get(own + 1..).unwrap_or_default().iter();
+            let mut later = later.filter(|(other, _)| other == ranger);
+            *range = later.nth(self.late_pings - 1).and_then(|(_, range)| *range);
+            own += 1;
+        }
+    }
+
+    /// The time of a range by the clock of the encoders.
+    fn range_time(&self, time: f64, begin: f64) -> f64 {
+        time - self.delay - self.clock_gain * (time - begin)
+    }
+
+    fn record(&self, record: &Record, robot: &RobotConfig, begin: f64) -> Record {
         match *record {
             #[expect(clippy::cast_precision_loss, reason = "counts stay below 2^53")]
             Record::Ticks { time, right, left } => self
                 .travel(time, wheels::of_counts(robot, self.ordered([right as f64, left as f64]))),
             Record::Wheels { time, right, left } => self.travel(time, self.ordered([right, left])),
+            Record::Range { time, bearing, range: Some(range), ranger, .. }
+                if self.is_exchanged =>
+            {
+                Record::Range { time, bearing: range, range: Some(bearing), wall: None, ranger }
+            }
             Record::Range { time, bearing, range, ranger, .. } => Record::Range {
-                time: time - self.delay,
+                time: self.range_time(time, begin),
                 bearing: self.bearing * bearing + self.bearing_offset,
                 range: range.map(|range| self.range * range + self.range_offset),
                 wall: None,
@@ -128,9 +177,9 @@ impl Change {
                     let changed = self.range * f64::from(*range) + self.range_offset;
                     *range = single(changed.max(0.0), |range| range);
                 }
-                Record::Scan { time: time - self.delay, scan }
+                Record::Scan { time: self.range_time(time, begin), scan }
             }
-            Record::Skip { time } => Record::Skip { time: time - self.delay },
+            Record::Skip { time } => Record::Skip { time: self.range_time(time, begin) },
             Record::Start { time, pose, position_deviation, heading_deviation } => {
                 let (pose, is_known) = self.pose(pose);
                 let [position_deviation, heading_deviation] = if is_known {
@@ -168,6 +217,22 @@ impl Change {
         let heading = self.heading * pose.heading + self.heading_offset;
         self.start.map_or((Pose { heading, ..pose }, true), |start| (start, false))
     }
+}
+
+/// The centre of a box around the walls, metres.
+fn centre(walls: &[Wall]) -> [f64; 2] {
+    let ends = || walls.iter().flat_map(|wall| [wall.from(), wall.to()]);
+    [ends().map(|end| end.x.0).collect::<Vec<_>>(), ends().map(|end| end.y.0).collect()].map(
+        |all| {
+            let least = all.iter().copied().fold(f32::INFINITY, f32::min);
+            let most = all.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+            0.5 * (f64::from(least) + f64::from(most))
+        },
+    )
+}
+
+fn point(x: f64, y: f64) -> Point {
+    Point { x: single(x, Metres), y: single(y, Metres) }
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]

@@ -47,6 +47,8 @@ pub struct Echo {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Evidence {
     pub echoes: Vec<Echo>,
+    /// Records of echoes, of which a localizer without encoder records takes none.
+    recorded: usize,
     /// Encoder records that a wheel cannot roll.
     too_fast: u64,
     /// Encoder records that were replayed.
@@ -55,7 +57,15 @@ pub struct Evidence {
     max_range: f64,
     /// Whether the verdict is not `Lost`.
     is_sure: bool,
+    /// Deviations of the prior of the two wheels, the track width and the range scale, and the estimates at the end.
+    prior: [f64; 4],
+    calibration: [f64; 4],
+    /// That of the robot file, metres.
+    track_width: f64,
 }
+
+/// A calibration so many deviations of its prior away from the robot file is not that of the robot file.
+const STRAINED: f64 = 5.0;
 
 impl Evidence {
     /// A localizer that knows less expects any range: such an echo supports nothing.
@@ -71,7 +81,8 @@ impl Evidence {
             }
             _ => None,
         };
-        Self { echoes: records.iter().filter_map(echo).collect(), ..Self::default() }
+        let echoes: Vec<_> = records.iter().filter_map(echo).collect();
+        Self { recorded: echoes.len(), echoes, ..Self::default() }
     }
 
     /// Replays records. `None` if they hold no start, or the localizer rejects it.
@@ -83,11 +94,16 @@ impl Evidence {
         // A search would find the pose again, and hide what is wrong.
         let robot = RobotConfig { start: StartPose::Known, ..*robot };
         let max_range = f64::from(robot.localizer.rangers.first.max_range.0);
-        let mut evidence = Self { max_range, ..Self::default() };
-        let mut too_fast = 0;
+        let prior = &robot.localizer.prior;
+        let prior = [prior.scale_right, prior.scale_left, prior.track_width.0, prior.range_scale];
+        let prior = prior.map(f64::from);
+        let track_width = robot.localizer.drive.track_width.0.into();
+        let mut evidence = Self { max_range, prior, track_width, ..Self::default() };
+        let (mut too_fast, mut recorded) = (0, 0);
         let mut session =
             Session::<std::io::BufReader<Empty>, _>::new(&robot, walls, None, &mut evidence);
         for record in records {
+            recorded += usize::from(matches!(record, Record::Range { range: Some(_), .. }));
             match session.take(record, &mut |_, _| Ok(())) {
                 Err(Trouble::End(_)) => return None,
                 Err(Trouble::Skip(Fault::TooFast)) => too_fast += 1,
@@ -95,28 +111,47 @@ impl Evidence {
             }
         }
         session.end().ok()?;
-        evidence.too_fast = too_fast;
+        (evidence.too_fast, evidence.recorded) = (too_fast, recorded);
         Some(evidence)
     }
 
-    /// The logarithm of the likelihood ratio of all echoes.
+    /// All echoes, those that were not taken, too.
+    pub fn count(&self) -> usize {
+        self.recorded.max(self.echoes.len())
+    }
+
+    /// By how many deviations of its prior each quantity differs from the robot file.
+    fn strains(&self) -> impl Iterator<Item = f64> {
+        let pairs = self.calibration.into_iter().zip(self.prior);
+        pairs.filter(|(_, deviation)| *deviation > 0.0).map(|(value, by)| (value / by).abs())
+    }
+
+    /// Whether the localizer has estimated a robot that the robot file excludes.
+    pub fn is_strained(&self) -> bool {
+        self.strains().any(|strain| strain > STRAINED)
+    }
+
+    /// The logarithm of the likelihood ratio of all echoes, with the prior of the calibration at the end. An echo that was not taken is foreign.
     pub fn total(&self) -> f64 {
-        self.echoes.iter().map(|echo| echo.weight).sum()
+        #[expect(clippy::cast_precision_loss, reason = "numbers of echoes")]
+        let untaken = (self.count() - self.echoes.len()) as f64;
+        let echoes = self.echoes.iter().map(|echo| echo.weight).sum::<f64>();
+        let prior = -0.5 * self.strains().map(|strain| strain * strain).sum::<f64>();
+        echoes + untaken * FOREIGN.ln() + prior
     }
 
     /// The share of the compared echoes that are explained; of all, if few could be compared.
     pub fn explained(&self) -> f64 {
         let compared: Vec<_> = self.echoes.iter().copied().filter(|it| it.is_compared).collect();
-        let are_many = compared.len() >= LEAST_COMPARED && 10 * compared.len() >= self.echoes.len();
-        if are_many { share(&compared) } else { share(&self.echoes) }
+        let are_many = compared.len() >= LEAST_COMPARED && 10 * compared.len() >= self.count();
+        if are_many { share(&compared) } else { share_of(&self.echoes, self.count()) }
     }
 
     /// The logarithm of the likelihood against that of another replay, for as many echoes as that one has.
     pub fn gain(&self, other: &Self) -> f64 {
-        let missing = other.echoes.len().saturating_sub(self.echoes.len());
+        let missing = other.count().saturating_sub(self.count());
         #[expect(clippy::cast_precision_loss, reason = "numbers of echoes")]
-        let [own, missing, all] =
-            [self.echoes.len(), missing, other.echoes.len()].map(|count| count as f64);
+        let [own, missing, all] = [self.count(), missing, other.count()].map(|count| count as f64);
         let total = self.total() + missing * FOREIGN.ln();
         total * all / (own + missing).max(1.0) - other.total()
     }
@@ -153,19 +188,28 @@ impl Evidence {
 
 /// The share of some echoes that are explained; 1 without any.
 fn share(echoes: &[Echo]) -> f64 {
-    if echoes.is_empty() {
+    share_of(echoes, echoes.len())
+}
+
+/// The share of all echoes that are explained, if the others are not; 1 without any.
+fn share_of(echoes: &[Echo], all: usize) -> f64 {
+    if all == 0 {
         return 1.0;
     }
     let explained = echoes.iter().filter(|echo| echo.weight >= EXPLAINED).count();
     #[expect(clippy::cast_precision_loss, reason = "counts of echoes")]
-    let share = explained as f64 / echoes.len() as f64;
+    let share = explained as f64 / all as f64;
     share
 }
 
 impl Recorder for Evidence {
     fn tick(&mut self, make: impl FnOnce() -> Tick) {
         self.ticks += 1;
-        self.is_sure = make().estimate.verdict != Verdict::Lost;
+        let estimate = make().estimate;
+        self.is_sure = estimate.verdict != Verdict::Lost;
+        let of = estimate.calibration;
+        let track_width = of.track_width - self.track_width;
+        self.calibration = [of.scale_right, of.scale_left, track_width, of.range_scale];
     }
 
     fn fix(&mut self, make: impl FnOnce() -> FixRecord) {

@@ -2,6 +2,8 @@
 
 use std::io::BufRead;
 
+use sonarfix_sim::trace::Pose;
+
 use crate::fault::{ReplayError, Source};
 use crate::lines::Lines;
 use crate::log::{self, Malformed, Record};
@@ -85,7 +87,20 @@ impl Recording {
         recording.lines = lines.number();
         Ok(recording)
     }
+
+    /// Replaces the start.
+    pub fn start_at(&mut self, pose: Pose) {
+        self.entries
+            .retain(|it| !matches!(it.record, Record::Start { .. } | Record::Resume { .. }));
+        let time = self.entries.first().map_or(0.0, |entry| entry.record.time());
+        let (position_deviation, heading_deviation) = GIVEN;
+        let record = Record::Start { time, pose, position_deviation, heading_deviation };
+        self.entries.insert(0, Entry { line: 0, record });
+    }
 }
+
+/// Deviations of a start that somebody has measured: metres, radians.
+const GIVEN: (f64, f64) = (0.05, 0.05);
 
 /// The share of the whole way that the robot drives between two pings in one direction that are both used.
 const APART: f64 = 0.005;

@@ -1,8 +1,10 @@
 //! The causes in words, with the corrected line.
 
+use sonarfix::map::Wall;
 use sonarfix_hal::config::RobotConfig;
 
 use crate::diagnosis::causes::{CENTIMETRES_AS_INCHES, Candidate, Cause, INCHES_AS_CENTIMETRES};
+use crate::diagnosis::change::Change;
 use crate::diagnosis::evidence::{Broken, Evidence};
 use crate::diagnosis::finding::Finding;
 use crate::diagnosis::recording::Entry;
@@ -35,10 +37,11 @@ fn wheels(candidate: &Candidate, robot: &RobotConfig) -> Option<Words> {
     let value = candidate.value;
     let factor = factor(value);
     let words = match candidate.cause {
-        Cause::WheelsSwapped => (
-            "wheels_swapped",
-            "the right and the left encoder are exchanged".to_owned(),
-            "exchange the two columns of the log, or the two encoders".to_owned(),
+        Cause::WheelsSwapped => swapped(candidate.change.wheels),
+        Cause::TravelUnit => (
+            "wheel_travel",
+            format!("both wheels drive {value} times as far per count as the log and the robot file state: the travel is in another unit"),
+            "write `wheels` records in metres, or correct the unit of the diameter or of `travel_per_edge` of both wheels".to_owned(),
         ),
         Cause::RightMirrored => ("encoder_mirrored", mirrored("right"), negate("right")),
         Cause::LeftMirrored => ("encoder_mirrored", mirrored("left"), negate("left")),
@@ -98,10 +101,37 @@ fn sonar(candidate: &Candidate) -> Option<Words> {
             format!("the sonar points {value:+.0} deg from where the log and the robot file say"),
             format!("add {value:.0} deg to `sonar.bearing` or to the bearings of `sonar.servo_pulses`"),
         ),
-        Cause::BearingUnit => (
-            "bearing_unit",
-            "the bearings are in degrees".to_owned(),
-            "write the bearings in radians".to_owned(),
+        Cause::BearingScale => (
+            "bearing_scale",
+            format!("the servo turns {} as far as the bearings of the log state", factor(value)),
+            "measure the bearings of the two `sonar.servo_pulses` again".to_owned(),
+        ),
+        Cause::BearingUnit => (BEARING_UNIT, IN_DEGREES.to_owned(), IN_RADIANS.to_owned()),
+        Cause::Columns => (
+            "range_columns",
+            "the columns of bearing and range are exchanged".to_owned(),
+            "a range record has the time, the bearing and then the range".to_owned(),
+        ),
+        Cause::MountAhead => mount(value, if value > 0.0 { "farther ahead" } else { "farther back" }, 0),
+        Cause::MountLeft => mount(value, if value > 0.0 { "farther to the left" } else { "farther to the right" }, 1),
+        Cause::RangeScale => (
+            "range_scale",
+            format!("all ranges are right if they are multiplied by {value:.2}"),
+            "check the speed of sound and the ticks per second with which the ranger's times are converted".to_owned(),
+        ),
+        Cause::RangeClock => (
+            "range_delay",
+            format!(
+                "the clock of the ranges runs {:.1} % too {}, compared with that of the encoders",
+                1e2 * value.abs(),
+                if value > 0.0 { "fast" } else { "slow" }
+            ),
+            STAMP.to_owned(),
+        ),
+        Cause::LatePings => (
+            "range_delay",
+            format!("each range is that of {value:.0} pings before"),
+            "log a range with the bearing and the time of its own ping".to_owned(),
         ),
         Cause::RangeUnit => (
             "range_unit",
@@ -120,11 +150,45 @@ fn sonar(candidate: &Candidate) -> Option<Words> {
                 value.abs(),
                 if value > 0.0 { "late" } else { "early" }
             ),
-            "stamp both by one clock: a range at its reflection, the encoders when they are read".to_owned(),
+            STAMP.to_owned(),
         ),
         _ => return None,
     };
     Some(words)
+}
+
+/// What to do with ranges whose times are wrong.
+const STAMP: &str =
+    "stamp both by one clock: a range at its reflection, the encoders when they are read";
+
+/// Bearings in degrees: the cause, what is wrong, and what to do.
+pub const BEARING_UNIT: &str = "bearing_unit";
+pub const IN_DEGREES: &str = "the bearings are in degrees";
+pub const IN_RADIANS: &str = "write the bearings in radians";
+
+/// A sonar at another place of the robot, by a length along an axis.
+fn mount(by: f64, direction: &str, axis: u8) -> Words {
+    let coordinate = if axis == 0 { "first" } else { "second" };
+    (
+        "mount",
+        format!("the sonar is {:.0} mm {direction} than the robot file states", 1e3 * by.abs()),
+        format!("add {:.0} mm to the {coordinate} coordinate of `sonar.mount`", 1e3 * by),
+    )
+}
+
+/// Exchanged encoders, some of which also count backwards.
+fn swapped([right, left]: [f64; 2]) -> Words {
+    let and_backwards = match (right < 0.0, left < 0.0) {
+        (false, false) => "",
+        (true, false) => ", and the right wheel then counts backwards",
+        (false, true) => ", and the left wheel then counts backwards",
+        (true, true) => ", and both count backwards",
+    };
+    (
+        "wheels_swapped",
+        format!("the right and the left encoder are exchanged{and_backwards}"),
+        "exchange the two columns of the log, or the two encoders; `mirrored` of a wheel changes its sign".to_owned(),
+    )
 }
 
 /// Causes of the start, the course and the map.
@@ -136,10 +200,20 @@ fn place(candidate: &Candidate) -> Words {
             format!("the heading at the start is wrong by {value:.0} deg"),
             format!("add {:.3} rad to the heading of the start record", value.to_radians()),
         ),
-        Cause::StartUnit => (
+        Cause::StartUnit if value == 0.0 => (
             "start_unit",
             "the heading at the start is in degrees".to_owned(),
             "write it in radians".to_owned(),
+        ),
+        Cause::StartUnit => (
+            "start_unit",
+            format!("the position at the start is right if it is multiplied by {value}"),
+            "write it in metres".to_owned(),
+        ),
+        Cause::StartAxes => (
+            "start_axes",
+            "x and y of the start are exchanged".to_owned(),
+            "exchange them in the start record".to_owned(),
         ),
         Cause::StartPose => {
             let start = candidate.change.start.unwrap_or_default();
@@ -164,19 +238,52 @@ fn place(candidate: &Candidate) -> Words {
         Cause::MapMirrored => (
             "map_mirrored",
             "the map is a mirror image of the room".to_owned(),
-            if candidate.change.is_transposed {
-                "exchange x and y of its coordinates".to_owned()
-            } else {
-                let axis = if candidate.change.map[0] < 0.0 { "x" } else { "y" };
-                format!("change the sign of its {axis} coordinates")
-            },
+            mirrored_map(&candidate.change),
         ),
+        Cause::MapTurned => (
+            "map_turned",
+            format!(
+                "the map is turned by {:.0} deg against the room, or the start is",
+                turn(&candidate.change)
+            ),
+            "measure the heading of the start in the frame of the map, or turn the map".to_owned(),
+        ),
+        Cause::MapScale => map_scale(value, "its coordinates"),
+        Cause::MapScaleX => map_scale(value, "its x coordinates"),
+        Cause::MapScaleY => map_scale(value, "its y coordinates"),
         _ => (
             "map_unit",
             format!("the map is right if its coordinates are multiplied by {value}"),
             "correct `map.unit`".to_owned(),
         ),
     }
+}
+
+/// A map of another size.
+fn map_scale(by: f64, coordinates: &str) -> Words {
+    (
+        "map_scale",
+        format!("the map is right if {coordinates} are multiplied by {by:.2}"),
+        "measure the room again: one long wall of each direction".to_owned(),
+    )
+}
+
+/// What makes a mirrored map right.
+fn mirrored_map(change: &Change) -> String {
+    let how = match change.map {
+        [[x, _], _] if x < 0.0 => "change the sign of its x coordinates",
+        [_, [_, y]] if y < 0.0 => "change the sign of its y coordinates",
+        [[_, by], _] if by < 0.0 => "exchange x and y of its coordinates, and change both signs",
+        _ => "exchange x and y of its coordinates",
+    };
+    let then = if change.is_about_centre { ", and shift it to its old place" } else { "" };
+    format!("{how}{then}")
+}
+
+/// The turn of a map that a change takes back, degrees counter-clockwise.
+fn turn(change: &Change) -> f64 {
+    let [[cos, sin], _] = change.map;
+    sin.atan2(cos).to_degrees()
 }
 
 fn factor(value: f64) -> String {
@@ -218,7 +325,10 @@ fn range_unit(by: f64) -> String {
 
 impl Candidate {
     fn is_of_start(&self) -> bool {
-        matches!(self.cause, Cause::StartHeading | Cause::StartUnit | Cause::StartPose)
+        matches!(
+            self.cause,
+            Cause::StartHeading | Cause::StartUnit | Cause::StartPose | Cause::StartAxes
+        )
     }
 }
 
@@ -248,8 +358,9 @@ pub fn broken(broken: Broken, begin: f64, entries: &[Entry]) -> Finding {
 const MOVED: &str = "add a pose record there, or let the robot search: `start = \"unknown\"`";
 
 /// No cause explains the log.
-pub fn unexplained(as_is: &Evidence) -> Option<Finding> {
-    (as_is.explained() < 0.5).then(|| {
+pub fn unexplained(as_is: &Evidence, walls: &[Wall]) -> Option<Finding> {
+    // Fewer walls enclose no room: most echoes may come from what the map leaves out.
+    (as_is.explained() < 0.5 && walls.len() >= 3).then(|| {
         Finding::new(
             "map_or_start",
             "no pose and no single correction explains the ranges".to_owned(),

@@ -1,6 +1,8 @@
 //! Faults that the records show without a replay, read in one pass.
 
+mod bearings;
 mod clock;
+mod longest;
 mod ranges;
 mod wheel;
 
@@ -9,7 +11,9 @@ use sonarfix_hal::config::RobotConfig;
 use crate::diagnosis::finding::Finding;
 use crate::diagnosis::recording::{Entry, Recording};
 use crate::log::{Malformed, Record};
+use bearings::Bearings;
 use clock::Clock;
+use longest::Longest;
 use ranges::Ranges;
 use wheel::Wheel;
 
@@ -23,6 +27,8 @@ pub struct Visible<'a> {
     right: Wheel,
     left: Wheel,
     ranges: Ranges,
+    bearings: Bearings,
+    longest: Longest,
 }
 
 impl<'a> Visible<'a> {
@@ -31,7 +37,9 @@ impl<'a> Visible<'a> {
             let per_count = f64::from(wheel.travel_per_edge.0);
             Wheel::new(per_count, f64::from(robot.localizer.max_wheel_speed.0))
         });
-        Self { robot, clock: Clock::default(), right, left, ranges: Ranges::default() }
+        let (clock, ranges) = (Clock::default(), Ranges::default());
+        let (bearings, longest) = (Bearings::default(), Longest::default());
+        Self { robot, clock, right, left, ranges, bearings, longest }
     }
 
     /// Takes the next record.
@@ -49,13 +57,18 @@ impl<'a> Visible<'a> {
             Record::Wheels { time, right, left } => {
                 self.wheels(line, time, [right, left], [1.0; 2], false);
             }
-            Record::Range { time, bearing, range, .. } => {
+            Record::Range { time, bearing, range, ranger, .. } => {
+                self.bearings.add(line, bearing, ranger, self.robot);
+                if let Some(range) = range {
+                    self.longest.add(line, range);
+                }
                 let moved = self.right.travelled + self.left.travelled;
                 let width = f64::from(self.robot.localizer.drive.track_width.0);
                 let heading = (self.right.signed - self.left.signed) / width;
                 self.clock.range(line, time);
                 self.ranges.add(line, time, bearing + heading, range, moved);
             }
+            Record::Skip { time } | Record::Scan { time, .. } => self.ranges.alive(time),
             _ => {}
         }
     }
@@ -71,6 +84,7 @@ impl<'a> Visible<'a> {
             1.5 * std::f64::consts::TAU * f64::from(self.robot.localizer.drive.track_width.0);
         self.right.stand(line, time, self.left.travelled - before[1], circle);
         self.left.stand(line, time, self.right.travelled - before[0], circle);
+        self.ranges.drive(line, time, self.right.travelled + self.left.travelled);
     }
 
     /// What is wrong.
@@ -82,7 +96,10 @@ impl<'a> Visible<'a> {
         self.left.findings("left", &mut findings);
         let travelled = self.right.travelled + self.left.travelled;
         self.ranges.findings(self.robot, travelled, &mut findings);
-        if travelled == 0.0 && self.clock.records > STANDING && self.ranges.spread() > 0.3 {
+        findings.extend(self.longest.placeholder(self.max_range()));
+        self.bearings.findings(&mut findings);
+        let are_constant = !self.right.has_changed && !self.left.has_changed;
+        if are_constant && self.clock.records > STANDING && self.ranges.spread() > 0.3 {
             findings.push(Finding::new(
                 "encoders_stopped",
                 format!(
@@ -95,27 +112,75 @@ impl<'a> Visible<'a> {
         findings
     }
 
-    /// Ranges that have nothing to do with each other, if no cause explains them.
-    pub fn noise(&self) -> Option<Finding> {
-        self.ranges.noise()
+    /// What the records show of a log that no cause explains.
+    pub fn unexplained(&self) -> Option<Finding> {
+        let constant = || self.bearings.constant(self.robot);
+        self.too_fast().or_else(constant).or_else(|| self.ranges.noise())
     }
+
+    /// Ranges that have as little to do with each other as random numbers.
+    pub fn certain_noise(&self) -> Option<Finding> {
+        self.ranges.is_noise().then(|| self.ranges.noise()).flatten()
+    }
+
+    /// Ranges that are cut to a longest one, in a log that its files do not explain.
+    pub fn clipped(&self) -> Option<Finding> {
+        self.longest.clipped(self.max_range())
+    }
+
+    fn max_range(&self) -> f64 {
+        f64::from(self.robot.localizer.rangers.first.max_range.0)
+    }
+
+    /// Whether both wheels are faster than they can be again and again.
+    pub fn are_too_fast(&self) -> bool {
+        self.right.is_often_too_fast() && self.left.is_often_too_fast()
+    }
+
+    /// Wheels that are faster than they can be again and again.
+    fn too_fast(&self) -> Option<Finding> {
+        let wheels = [("right", &self.right), ("left", &self.left)];
+        let mut fast = wheels.into_iter().filter(|(_, wheel)| wheel.is_often_too_fast());
+        let (first, second) = (fast.next(), fast.next());
+        let (side, wheel) = first?;
+        let (who, drives) = match second {
+            Some(_) => ("both wheels".to_owned(), "drive"),
+            None => (format!("the {side} wheel"), "drives"),
+        };
+        let factor = wheel.excess();
+        Some(Finding::new(
+            "wheel_travel",
+            format!("{who} {drives} up to {factor:.0} times as fast as max_wheel_speed: the travel per count or its unit is too large, or counts are lost"),
+            "check diameter and edges_per_revolution of the wheels, and the unit of `wheels` records, metres".to_owned(),
+        ))
+    }
+}
+
+/// Whether it is a number that programs write instead of no echo.
+fn is_placeholder(text: &str) -> bool {
+    text.trim().parse().is_ok_and(|value: f64| [0.0, -1.0].contains(&value))
 }
 
 /// Lines that are no records.
 fn malformed(recording: &Recording) -> Option<Finding> {
     let skipped = &recording.skipped;
     let (line, malformed) = skipped.first.as_ref()?;
-    (*malformed != Malformed::Changed).then(|| {
-        Finding::at(
-            *line,
-            "malformed_lines",
-            format!(
-                "{} of {} lines are no records; the first: {malformed}",
-                skipped.lines, recording.lines
-            ),
-            "correct the program that writes the log (docs/formats.md)".to_owned(),
-        )
-    })
+    let cause = match malformed {
+        Malformed::Changed => return None,
+        Malformed::Field { field: "range", text, .. } if is_placeholder(text) => {
+            "range_placeholder"
+        }
+        _ => "malformed_lines",
+    };
+    Some(Finding::at(
+        *line,
+        cause,
+        format!(
+            "{} of {} lines are no records; the first: {malformed}",
+            skipped.lines, recording.lines
+        ),
+        "correct the program that writes the log (docs/formats.md)".to_owned(),
+    ))
 }
 
 /// A log whose checksums do not match.

@@ -9,6 +9,10 @@ use crate::median::Median;
 const CONSTANT: u64 = 20;
 /// Differences of ranges by this share of all their spread are noise.
 const NOISE: f64 = 0.12;
+const CERTAIN_NOISE: f64 = 0.2;
+/// The name of a ranger that fails, and what to do.
+const ECHOES_END: &str = "echoes_end";
+const RANGER_FAILED: &str = "the ranger or its cable failed there: check its supply";
 
 /// What their records show.
 #[derive(Debug, Default)]
@@ -26,6 +30,21 @@ pub struct Ranges {
     last: Option<Echo>,
     differences: Median,
     compared: u64,
+    /// The last ping or cycle without one, and how long the pause before a ping usually is.
+    heard: Option<f64>,
+    longest_pause: f64,
+    /// The encoder record after it, and the travel of both wheels then and now.
+    pause: Option<Pause>,
+}
+
+/// Encoder records without a ping.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Pause {
+    line: u64,
+    from: f64,
+    until: f64,
+    began: f64,
+    moved: f64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,6 +79,7 @@ impl Ranges {
     /// Takes a ping: its direction against that of the start, radians, and the travel of both wheels before it, metres.
     pub fn add(&mut self, line: u64, time: f64, direction: f64, range: Option<f64>, moved: f64) {
         self.pings += 1;
+        self.alive(time);
         let Some(range) = range else {
             let silence = self.silence.get_or_insert(Run::begin(line, time, 0.0, direction, moved));
             silence.pings += 1;
@@ -94,16 +114,57 @@ impl Ranges {
         }
     }
 
+    /// Notes that the ranger pings, or that the robot found no wall to measure.
+    pub fn alive(&mut self, time: f64) {
+        if let Some(heard) = self.heard.replace(time) {
+            self.longest_pause = self.longest_pause.max(time - heard);
+        }
+        self.pause = None;
+    }
+
+    /// Notes the travel of both wheels at an encoder record.
+    pub fn drive(&mut self, line: u64, time: f64, moved: f64) {
+        let new = Pause { line, from: time, until: time, began: moved, moved };
+        let pause = self.pause.get_or_insert(new);
+        (pause.until, pause.moved) = (time, moved);
+    }
+
+    /// A log that goes on without pings for longer than any pause before.
+    fn end_of_pings(&self) -> Option<Finding> {
+        let pause = self.pause?;
+        let seconds = pause.until - pause.from;
+        let is_long = seconds > 3.0 * self.longest_pause.max(1.0);
+        let is_end = is_long && self.pings >= CONSTANT && pause.moved - pause.began > 1.0;
+        is_end.then(|| {
+            Finding::at(
+                pause.line,
+                ECHOES_END,
+                format!("the log has no range from {:.1} s on, but encoder records for another {seconds:.1} s", pause.from),
+                RANGER_FAILED.to_owned(),
+            )
+        })
+    }
+
     /// Between the shortest and the longest range, metres.
     pub fn spread(&self) -> f64 {
         self.most.unwrap_or(0.0) - self.least.unwrap_or(0.0)
     }
 
+    /// Whether ranges in nearly the same direction differ by this share of the spread of all of them in the median.
+    fn differ_by(&self, share: f64) -> bool {
+        let is_more = |difference| difference > share * self.spread();
+        self.compared > CONSTANT && self.differences.value().is_some_and(is_more)
+    }
+
+    /// Whether they differ nearly as much as random numbers, whose differences have a median of 0.29 of their spread.
+    pub fn is_noise(&self) -> bool {
+        self.differ_by(CERTAIN_NOISE)
+    }
+
     /// Ranges that have nothing to do with each other, which are noise.
     pub fn noise(&self) -> Option<Finding> {
         let difference = self.differences.value()?;
-        let is_noise = self.compared > CONSTANT && difference > NOISE * self.spread();
-        is_noise.then(|| {
+        self.differ_by(NOISE).then(|| {
             Finding::new(
                 "range_noise",
                 format!("successive ranges in nearly the same direction differ by {difference:.2} m in the median: they are noise"),
@@ -130,14 +191,15 @@ impl Ranges {
         {
             findings.push(Finding::at(
                 silence.line,
-                "echoes_end",
+                ECHOES_END,
                 format!(
                     "the last {} pings, from {:.1} s on, have no echo",
                     silence.pings, silence.from
                 ),
-                "the ranger or its cable failed there: check its supply".to_owned(),
+                RANGER_FAILED.to_owned(),
             ));
         }
+        findings.extend(self.end_of_pings());
         if let Some(run) = self.longest.filter(|run| run.is_stuck(max_range, travelled)) {
             findings.push(Finding::at(
                 run.line,

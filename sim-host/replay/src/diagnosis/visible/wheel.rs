@@ -12,6 +12,10 @@ pub struct Wheel {
     /// Plausible travel, metres: its length, and forward less backward.
     pub travelled: f64,
     pub signed: f64,
+    /// Whether its value has ever changed.
+    pub has_changed: bool,
+    /// The largest travel against the largest possible one.
+    excess: f64,
     steps: u64,
     jumps: Vec<(u64, f64, Jump)>,
     all_jumps: u64,
@@ -42,6 +46,8 @@ impl Wheel {
             last: None,
             travelled: 0.0,
             signed: 0.0,
+            has_changed: false,
+            excess: 0.0,
             steps: 0,
             jumps: Vec::new(),
             all_jumps: 0,
@@ -64,6 +70,7 @@ impl Wheel {
         let Some(last) = self.last.replace(value) else { return };
         self.steps += 1;
         let change = value - last;
+        self.has_changed |= change != 0.0;
         let most = 1.2 * self.max_speed * elapsed.max(0.0) / unit;
         if elapsed <= 0.0 || change.abs() <= most {
             self.travelled += unit * change.abs();
@@ -71,6 +78,7 @@ impl Wheel {
             return;
         }
         self.all_jumps += 1;
+        self.excess = self.excess.max(1.2 * change.abs() / most);
         let wrap = [8, 16, 32].into_iter().find(|&bits| {
             let period = 2_f64.powi(bits);
             let is_within = value.abs() <= period && last.abs() <= period;
@@ -78,7 +86,7 @@ impl Wheel {
         });
         let jump = match wrap {
             Some(bits) => Jump::Wrap(bits.unsigned_abs()),
-            None if value.abs() <= most.max(1.0) && last.abs() > 4.0 * most => Jump::Reset,
+            None if value.abs() <= most.max(1.0).min(0.1 * last.abs()) => Jump::Reset,
             None => Jump::Other(change),
         };
         if self.jumps.len() < SHOWN {
@@ -102,6 +110,16 @@ impl Wheel {
         }
     }
 
+    /// Whether it is often faster than it can be.
+    pub fn is_often_too_fast(&self) -> bool {
+        20 * self.all_jumps > self.steps
+    }
+
+    /// How many times as fast as it can be it is at most.
+    pub fn excess(&self) -> f64 {
+        self.excess
+    }
+
     pub fn findings(&self, side: &str, findings: &mut Vec<Finding>) {
         if let Some((line, from, to)) = self.stopped {
             findings.push(Finding::at(
@@ -115,7 +133,7 @@ impl Wheel {
             ));
         }
         // With many of them the unit is wrong, which the causes find.
-        if 20 * self.all_jumps > self.steps {
+        if self.is_often_too_fast() {
             return;
         }
         for (line, time, jump) in &self.jumps {
