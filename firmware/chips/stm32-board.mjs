@@ -231,6 +231,7 @@ export class Stm32Board extends Robot {
     return this.jumpTo(UNDEFINED);
   }
 
+  /** As those of another board; the stops stand for the instructions, which QEMU does not count. */
   counters() {
     const { flash } = this.parts;
     return [this.stops, 0, this.lost, flash.erased, flash.programmed, this.room.shortTriggers];
