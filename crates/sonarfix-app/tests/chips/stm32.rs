@@ -10,7 +10,7 @@ use crate::stops::stop;
 use crate::{configuration, drive, image, map, world_of};
 
 /// The boards, and what precedes their measurements.
-const BOARDS: [(&Board, &str); 2] = [(STM32F405, "STM32F405, "), (NUCLEO, "Nucleo, ")];
+const BOARDS: [(&Board, &str); 2] = [(NUCLEO, "Nucleo, "), (STM32F405, "STM32F405, ")];
 
 /// Each of the boards in the room.
 fn each() -> impl Iterator<Item = (World, &'static str)> {
