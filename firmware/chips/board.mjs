@@ -1,16 +1,19 @@
-// A board with its robot, and the PC's end of its link. Times in nanoseconds since power-on.
+// A board with an RP2040 and its robot, and the PC's end of its link. Times in nanoseconds since power-on.
 import { Calls } from './calls.mjs';
 import { Chip, Flash } from './chip.mjs';
+import { TIMES } from './flash.mjs';
 import { Gyro } from './gyro.mjs';
-import { Room, STEP, numbers } from './room.mjs';
+import { Robot } from './robot.mjs';
+import { load } from './rom.mjs';
+import { numbers } from './room.mjs';
 import { WIRINGS } from './wirings.mjs';
+
+const XIP = 0x10000000;
 
 /** Levels of A and B by the two low bits of the count; A leads when a wheel rolls forwards. */
 const QUADRATURE = [[false, false], [true, false], [true, true], [false, true]];
 /** From pulse to pulse of the servo. */
 const FRAME = 20e6;
-/** How long the truth is kept: longer than a message waits. */
-const HISTORY = 10e9;
 
 /**
  * Nanoseconds until an event, at a time of a chip whose life began at `began`. The difference is that of the two sums: `event - began` may be
@@ -20,31 +23,27 @@ export function ahead(began, nanos, event) {
   return Math.max(0, event - (began + nanos));
 }
 
-export class Board {
+export class Board extends Robot {
   constructor({ board = 'pico', walls, pose, seed }) {
-    this.wiring = WIRINGS[board];
+    super(walls, pose, numbers(seed + 2), WIRINGS[board]);
     this.random = numbers(seed);
     this.flash = new Flash(numbers(seed + 1));
-    this.room = new Room(walls, pose, numbers(seed + 2), this.wiring);
     this.gyro = new Gyro(() => this.room.turnRate, numbers(seed + 3));
-    /** Time at which the present life of the chip began. */
-    this.began = 0;
-    this.next = STEP;
     this.received = [];
     this.lineFree = 0;
     this.toSend = [];
     this.isNoisy = false;
     /** When the next pulse of the servo begins at the echo, which a wire connects with it instead of the sonar. */
     this.nextPulse = Infinity;
-    this.events = [];
-    this.truth = [];
-    this.isEnabled = false;
     this.chip = null;
     /** The polls of the program's loop. */
     this.polls = new Calls();
-    /** When a motor last had a voltage, and when an encoder last changed. */
-    this.poweredAt = 0;
-    this.rolledAt = 0;
+  }
+
+  /** Writes a file into the flash: the program as ELF or UF2, or other bytes to an address. */
+  load(file, at = null) {
+    if (at === null) load(file, this.flash.bytes);
+    else this.flash.bytes.set(file, at - XIP);
   }
 
   /** Power-on, or a reset that keeps these registers. */
@@ -72,11 +71,8 @@ export class Board {
   }
 
   watchEnable() {
-    const isEnabled = this.wiring.isEnabled(this.chip);
-    if (isEnabled === this.isEnabled) return;
-    this.isEnabled = isEnabled;
-    this.polls.isDriving = isEnabled;
-    this.events.push(`${isEnabled ? 'enabled' : 'disabled'} ${this.now}`);
+    this.setEnabled(this.wiring.isEnabled(this.chip), this.now);
+    this.polls.isDriving = this.isEnabled;
   }
 
   setEncoders() {
@@ -129,24 +125,10 @@ export class Board {
       this.lineFree = now + 10e9 / 115200;
     }
     while (now >= this.next) {
-      this.next += STEP;
       this.watchEnable();
-      const before = room.counts;
-      const voltages = this.voltages();
-      if (voltages.some((voltage) => voltage)) this.poweredAt = now;
-      room.move(voltages, this.target());
-      if (before.some((count, side) => count !== room.counts[side])) {
-        this.rolledAt = now;
-        this.setEncoders();
-      }
-      this.truth.push([this.next - STEP - this.began, room.x, room.y, room.heading]);
-      if (this.truth.length > HISTORY / STEP) this.truth.splice(0, this.truth.length / 2);
+      const hasRolled = this.step(this.isEnabled ? this.wiring.voltages(chip) : [0, 0], this.pulse());
+      if (hasRolled) this.setEncoders();
     }
-  }
-
-  /** The voltages of both motors as parts of the full one. */
-  voltages() {
-    return this.isEnabled ? this.wiring.voltages(this.chip) : [0, 0];
   }
 
   /** The width of the servo's pulses, microseconds. */
@@ -161,28 +143,30 @@ export class Board {
     this.nextPulse = this.now;
   }
 
-  /** Where the servo's pulses point: 45° at 2 ms, −45° at 1 ms. */
-  target() {
-    const pulse = this.pulse();
-    return pulse > 400 ? ((pulse - 1500) / 500) * (Math.PI / 4) : this.room.bearing;
-  }
-
   /** The chip has been reset: its pins are inputs, and pull-downs disable the motors. */
   reset(cause) {
-    const { now } = this;
-    if (this.isEnabled) this.events.push(`disabled ${now}`);
-    this.isEnabled = false;
+    this.endLife(cause, this.now);
     this.polls.isDriving = false;
-    this.events.push(`reset-by-${cause} ${now}`);
     this.chip.clearTrap();
     const { kept } = this.chip;
-    this.truth = [];
     this.start(cause === 'power' ? null : kept);
   }
 
-  /** The pose at a time of the chip's clock. */
-  poseAt(nanos) {
-    const first = this.truth[0]?.[0] ?? 0;
-    return this.truth[Math.max(0, Math.min(this.truth.length - 1, Math.round((nanos - first) / STEP)))];
+  hang() {
+    this.chip.hang();
+  }
+
+  failAtInstruction() {
+    this.chip.failAtInstruction();
+  }
+
+  /** The longest times of the flash's data sheet. */
+  slowFlash() {
+    this.flash.times = TIMES.longest;
+  }
+
+  counters() {
+    const { chip, flash, room } = this;
+    return [chip.instructions, chip.uart.overruns, chip.uart.lost, flash.erased, flash.programmed, room.shortTriggers];
   }
 }

@@ -10,6 +10,8 @@ import { Gyro } from './gyro.mjs';
 import { attach } from './pio.mjs';
 import { crc32 } from './rom.mjs';
 import { Room, STEP, numbers } from './room.mjs';
+import { peripherals } from './stm32.mjs';
+import { access } from './thumb.mjs';
 import { Uart } from './uart.mjs';
 import { WIRINGS } from './wirings.mjs';
 
@@ -294,4 +296,73 @@ test('a life of the chip that began at any time reaches every event', () => {
     }
     assert.ok(began + nanos >= event && nanos <= event - began + 1e-5, `${began} ${event}`);
   }
+});
+
+test('a load or store of Thumb-2 has its register, address, size and length (ARMv7-M, A7.7)', () => {
+  const registers = Array.from({ length: 16 }, (_, i) => 0x1000 * i);
+  const at = (first, second = 0) => access(first, second, registers);
+  // ldr r2, [r1, #36]; str r3, [r0, #4]; strh r5, [r4, #6]; ldrb r6, [r7, #1]; str r1, [r2, r3]
+  assert.deepEqual(at(0x6a4a), { base: null, isLoad: true, register: 2, address: 0x1024, size: 4, length: 2 });
+  assert.deepEqual(at(0x6043), { base: null, isLoad: false, register: 3, address: 4, size: 4, length: 2 });
+  assert.deepEqual(at(0x80e5), { base: null, isLoad: false, register: 5, address: 0x4006, size: 2, length: 2 });
+  assert.deepEqual(at(0x787e), { base: null, isLoad: true, register: 6, address: 0x7001, size: 1, length: 2 });
+  assert.deepEqual(at(0x50d1), { base: null, isLoad: false, register: 1, address: 0x5000, size: 4, length: 2 });
+  // str.w r0, [r10, #20]; ldrh.w r1, [r2, #0x424]; str r3, [r4], #8; ldr.w r5, [r6, r7, lsl #2]
+  assert.deepEqual(at(0xf8ca, 0x0014), { base: null, isLoad: false, register: 0, address: 0xa014, size: 4, length: 4 });
+  assert.deepEqual(at(0xf8b2, 0x1424), { base: null, isLoad: true, register: 1, address: 0x2424, size: 2, length: 4 });
+  assert.deepEqual(at(0xf844, 0x3b08), { base: { number: 4, value: 0x4008 }, isLoad: false, register: 3, address: 0x4000, size: 4, length: 4 });
+  assert.deepEqual(at(0xf856, 0x5027), { base: null, isLoad: true, register: 5, address: 0x22000, size: 4, length: 4 });
+  assert.throws(() => at(0xbf00), /no load or store/);
+});
+
+/** The parts of an STM32F4 around a board that only has a time. */
+function stm32() {
+  const board = {
+    room: { counts: [-3, 7], trigger() {} },
+    now: 0,
+    erased: [],
+    setEnabled(isEnabled) { this.isEnabled = isEnabled; },
+    fill(sector) { this.erased.push(sector); },
+  };
+  return { board, parts: peripherals(board) };
+}
+
+test('a timer counts edges in encoder mode 3 while it is enabled, in 16 bits (RM0090, 17.4)', () => {
+  const { parts: { right, left } } = stm32();
+  assert.equal(right.read(0x24), 0);
+  right.write(0x08, 3);
+  right.write(0x00, 1);
+  assert.equal(right.read(0x24), 0xfffd);
+  left.write(0x00, 1);
+  assert.equal(left.read(0x24), 0);
+});
+
+test('the flash is locked until both keys come, and erases by SER with STRT only (RM0090, 3.6)', async () => {
+  const { board, parts: { flash } } = stm32();
+  const [KEYR, CR] = [0x04, 0x10];
+  const erase = async (lock) => {
+    await flash.write(CR, 0x212 | lock);
+    await flash.write(CR, 0x10212 | lock);
+  };
+  await erase(0);
+  assert.deepEqual(board.erased, []);
+  for (const key of [0x45670123, 0xcdef89ab]) await flash.write(KEYR, key);
+  // A write that sets LOCK locks it: what follows has no effect.
+  await erase(0x80000000);
+  assert.deepEqual(board.erased, []);
+  for (const key of [0x45670123, 0xcdef89ab]) await flash.write(KEYR, key);
+  await erase(0);
+  assert.deepEqual(board.erased, [2]);
+  assert.equal(flash.isProgramming, false);
+  await flash.write(CR, 0x201);
+  assert.equal(flash.isProgramming, true);
+});
+
+test('the watchdog expires after its window at the slowest oscillator (STM32F405 data sheet, f_LSI)', () => {
+  const { board, parts: { watchdog } } = stm32();
+  for (const [offset, value] of [[0, 0xcccc], [0, 0x5555], [4, 3], [8, 120], [0, 0xaaaa]]) watchdog.write(offset, value);
+  assert.equal(Math.round(watchdog.expiresAt / 1e6), 226);
+  board.now = 1e9;
+  watchdog.write(0, 0xaaaa);
+  assert.equal(Math.round(watchdog.expiresAt / 1e6), 1226);
 });

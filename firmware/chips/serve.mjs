@@ -20,24 +20,25 @@
 //   slow-flash              the longest times of the flash's data sheet
 //   unknown                 what the emulator lacks
 import fs from 'node:fs';
+import path from 'node:path';
 import readline from 'node:readline';
 import { Board } from './board.mjs';
-import { TIMES } from './flash.mjs';
-import { load } from './rom.mjs';
+import { Stm32Board } from './stm32-board.mjs';
+import { WIRINGS } from './wirings.mjs';
 
 const [, , worldFile] = process.argv;
 const world = JSON.parse(fs.readFileSync(worldFile, 'utf8'));
-const board = new Board(world);
+const board = world.board in WIRINGS ? new Board(world) : new Stm32Board(world, path.dirname(worldFile));
 
 const orders = {
-  image(at, file) {
-    if (file === undefined) load(fs.readFileSync(at), board.flash.bytes);
-    else board.flash.bytes.set(fs.readFileSync(file), Number(at) - 0x10000000);
+  image(...words) {
+    const [file, at] = words.reverse();
+    board.load(fs.readFileSync(file), at === undefined ? null : Number(at), file);
   },
   start: () => board.start(),
-  run(micros, hex = '') {
+  async run(micros, hex = '') {
     board.toSend.push(...Buffer.from(hex, 'hex'));
-    board.run(board.now + 1e3 * Number(micros));
+    await board.run(board.now + 1e3 * Number(micros));
     return Buffer.from(board.received.splice(0)).toString('hex') || '-';
   },
   truth: (micros) => board.poseAt(1e3 * Number(micros)).slice(1).join(' '),
@@ -47,10 +48,7 @@ const orders = {
     return [board.now / 1e3, room.x, room.y, room.heading, room.pings, Number(board.isEnabled), ...last].join(' ');
   },
   events: () => board.events.splice(0).join(' ') || '-',
-  chip() {
-    const { chip, flash, room } = board;
-    return [chip.instructions, chip.uart.overruns, chip.uart.lost, flash.erased, flash.programmed, room.shortTriggers].join(' ');
-  },
+  chip: () => board.counters().join(' '),
   count(at) { board.polls.at = Number(at); },
   calls: () => [board.polls.returned, board.polls.driving, board.polls.waiting].join(' '),
   gyro: () => board.gyro.readings,
@@ -58,21 +56,21 @@ const orders = {
     const { pullupEnabled, pulldownEnabled } = board.chip.rp2040.gpio[Number(pin)];
     return pullupEnabled ? 'up' : pulldownEnabled ? 'down' : 'none';
   },
-  hang: () => board.chip.hang(),
-  fault: () => board.chip.failAtInstruction(),
+  hang: () => board.hang(),
+  fault: () => board.failAtInstruction(),
   overflow: () => board.chip.overflowStack(),
   'off-and-on': () => board.reset('power'),
   loop: () => board.loop(),
   noise(state) { board.isNoisy = state === 'on'; },
   cut(steps) { board.flash.stepsLeft = Number(steps); },
-  'slow-flash': () => { board.flash.times = TIMES.longest; },
+  'slow-flash': () => board.slowFlash(),
   unknown: () => [...board.chip.unknown].map(([text, count]) => `${text} (${count})`).join('; ') || '-',
 };
 
 for await (const line of readline.createInterface({ input: process.stdin })) {
   const [order, ...words] = line.trim().split(' ');
   try {
-    console.log(orders[order](...words) ?? 'ok');
+    console.log((await orders[order](...words)) ?? 'ok');
   } catch (error) {
     console.log(`error ${order}: ${error.stack.replaceAll('\n', ' | ')}`);
   }

@@ -47,42 +47,57 @@ struct Emulated {
     /// The board in firmware/boards.toml.
     board: &'static str,
     emulator: &'static str,
-    command: &'static str,
-    /// The files with the scenarios.
-    tests: &'static [&'static str],
+    /// The commands that run it, and their files with the scenarios.
+    commands: &'static [(&'static str, &'static [&'static str])],
     has: &'static str,
     lacks: &'static str,
 }
 
-const EMULATED: [Emulated; 3] = [
+/// What runs the boards in QEMU.
+const IN_QEMU: &[(&str, &[&str])] = &[
+    ("cargo xtask test-firmware", &["crates/sonarfix-app/tests/emulated.rs"]),
+    ("cargo xtask chips", &["crates/sonarfix-app/tests/chips/stm32.rs"]),
+];
+
+const EMULATED: [Emulated; 4] = [
     Emulated {
         board: "pico",
         emulator: "`rp2040js` with the parts in `firmware/chips`",
-        command: "cargo xtask chips",
-        tests: &[
-            "crates/sonarfix-app/tests/chips/main.rs",
-            "crates/sonarfix-app/tests/chips/commands.rs",
-            "crates/sonarfix-app/tests/chips/search.rs",
-            "crates/sonarfix-app/tests/chips/long.rs",
-        ],
+        commands: &[(
+            "cargo xtask chips",
+            &[
+                "crates/sonarfix-app/tests/chips/main.rs",
+                "crates/sonarfix-app/tests/chips/stops.rs",
+                "crates/sonarfix-app/tests/chips/commands.rs",
+                "crates/sonarfix-app/tests/chips/search.rs",
+                "crates/sonarfix-app/tests/chips/long.rs",
+            ],
+        )],
         has: "core, interrupts, timer, PIO, PWM, pins, UART, watchdog, flash and its power cuts, second stage of the boot; around it wheels, servo, sonar and room",
         lacks: "the boot ROM (a stub has its functions), DMA, USB, I²C devices, the voltages of the pins, jitter of the clocks",
     },
     Emulated {
         board: "xrp",
         emulator: "`rp2040js` with the parts in `firmware/chips`",
-        command: "cargo xtask chips",
-        tests: &["crates/sonarfix-app/tests/chips/xrp.rs"],
+        commands: &[("cargo xtask chips", &["crates/sonarfix-app/tests/chips/xrp.rs"])],
         has: "as for the Pico, with the pins of this board, its motor drivers and its gyro on I²C; the robot in the room has its wheels",
         lacks: "as for the Pico, except for the gyro",
     },
     Emulated {
         board: "stm32f405",
         emulator: "QEMU, `netduinoplus2`",
-        command: "cargo xtask test-firmware",
-        tests: &["crates/sonarfix-app/tests/emulated.rs"],
-        has: "core, interrupts, SysTick, USART2, the registers of the timers",
-        lacks: "encoders, stamps of edges, PWM, pins, flash, watchdog, crystal",
+        commands: IN_QEMU,
+        has: "core, interrupts, SysTick, USART2, clock and PWM of the motors (TIM5, TIM3). In a room (`cargo xtask chips`) the machine stops before each access of the core to what it \
+            lacks, and is fed: counts of the encoders (TIM1, TIM8), flags of the stamps of edges (TIM5; their times are written to its capture registers), servo (TIM10), trigger and enable pin \
+            (GPIOA, GPIOB), watchdog, causes of a reset, flash controller and store",
+        lacks: "levels of pins, filters and input stages of the timers, I²C devices, crystal, voltage detector, backup registers; erasures and writes of the flash take no time; an overflow of the stack ends QEMU",
+    },
+    Emulated {
+        board: "nucleo_f446re",
+        emulator: "QEMU, `netduinoplus2`",
+        commands: IN_QEMU,
+        has: "as for the STM32F405: the machine has that chip, and the program uses nothing in which they differ but the address of the map",
+        lacks: "as for the STM32F405, and what only an STM32F446 has",
     },
 ];
 
@@ -100,17 +115,17 @@ fn page() -> anyhow::Result<String> {
         writeln!(page, "| {} | yes | {core} | {core} | {chip} | none |", board.title)?;
     }
     page.push_str("\n## Programs on emulated chips\n");
-    for Emulated { board, emulator, command, tests, has, lacks } in &EMULATED {
+    for Emulated { board, emulator, commands, has, lacks } in &EMULATED {
         let title = sonarfix_boards::named(board)?.title;
-        writeln!(
-            page,
-            "\n**{title}**, {emulator}: `{command}`. Emulated: {has}. Not emulated: {lacks}. Scenarios:\n"
-        )?;
-        for tests in *tests {
-            let names = scenarios(&fs::read_to_string(cargo::root().join(tests))?)?;
-            ensure!(!names.is_empty(), "{tests} has no scenario");
-            for name in names {
-                writeln!(page, "- {name}")?;
+        writeln!(page, "\n**{title}**, {emulator}. Emulated: {has}. Not emulated: {lacks}.")?;
+        for (command, tests) in *commands {
+            writeln!(page, "\nScenarios of `{command}`:\n")?;
+            for tests in *tests {
+                let names = scenarios(&fs::read_to_string(cargo::root().join(tests))?)?;
+                ensure!(!names.is_empty(), "{tests} has no scenario");
+                for name in names {
+                    writeln!(page, "- {name}")?;
+                }
             }
         }
     }

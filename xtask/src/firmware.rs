@@ -13,7 +13,10 @@
 //! | `size` | flash and RAM |
 //! | `stack` | the deepest stack |
 
+use std::path::Path;
+
 use anyhow::{Context, ensure};
+use sonarfix_boards::Board;
 
 use crate::cargo;
 use crate::workspace::Workspace;
@@ -38,14 +41,23 @@ pub fn test() -> anyhow::Result<()> {
     memory::check(&bytes)?;
     panics::check(&bytes)?;
     size::check(&bytes)?;
-    let deepest = stack::check(&bytes)?;
-    let tests = "test --package sonarfix-app --test emulated -- --ignored --nocapture";
-    let mut command = cargo::command(tests);
-    command.env("SONARFIX_FIRMWARE", &program).env("SONARFIX_STACK", deepest.to_string());
-    cargo::check(command)?;
+    emulate(&sonarfix_boards::named("stm32f405")?, &program, stack::check(&bytes)?)?;
+    let nucleo = sonarfix_boards::named("nucleo_f446re")?;
+    let program_of_nucleo = build::of(&nucleo)?;
+    let deepest = stack::print(&build::read(&program_of_nucleo)?)?;
+    emulate(&nucleo, &program_of_nucleo, deepest)?;
     let page = "test --package sonarfix-cli --test main emulated_firmware -- --ignored --nocapture";
     let mut command = cargo::command(page);
     command.env("SONARFIX_FIRMWARE", &program);
+    cargo::check(command)
+}
+
+/// Runs the program of a board in an emulator, whose stack has this bound.
+fn emulate(board: &Board, program: &Path, deepest: u64) -> anyhow::Result<()> {
+    let tests = "test --package sonarfix-app --test emulated -- --ignored --nocapture";
+    let mut command = cargo::command(tests);
+    command.env("SONARFIX_FIRMWARE", program).env("SONARFIX_STACK", deepest.to_string());
+    command.env("SONARFIX_MAP_AT", format!("{:#x}", board.map.address));
     cargo::check(command)
 }
 

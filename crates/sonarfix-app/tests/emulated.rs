@@ -1,4 +1,4 @@
-//! The shipped firmware of the reference board, in an emulator, over its UART.
+//! The shipped firmware of the STM32F405 and of the Nucleo-F446RE, in an emulator, over its UART.
 //!
 //! `cargo xtask test-firmware` builds it and runs these. The emulator has the core, the clock,
 //! the interrupts and the UART; encoders, servo and echo read zero there, and its flash cannot be
@@ -29,9 +29,9 @@ use sonarfix_link::{
 };
 use tempfile::TempDir;
 
-/// Where `memory.x` has the regions.
+/// Where both boards have the configuration; that of the map is in this variable of the environment.
 const CONFIG_AT: &str = "0x08004000";
-const MAP_AT: &str = "0x080E0000";
+const MAP_AT: &str = "SONARFIX_MAP_AT";
 /// Flash, which starts with the stack's top, and memory of the board.
 const FLASH_AT: u32 = 0x0800_0000;
 const RAM_AT: u32 = 0x2000_0000;
@@ -63,7 +63,8 @@ struct Robot {
 impl Robot {
     /// Switches the board on, with these bytes in its regions.
     fn switched_on(map: &[u8], config: &[u8]) -> Self {
-        let elf = std::env::var("SONARFIX_FIRMWARE").expect("run `cargo xtask test-firmware`");
+        let passed = |name| std::env::var(name).expect("run `cargo xtask test-firmware`");
+        let (elf, map_at) = (passed("SONARFIX_FIRMWARE"), passed(MAP_AT));
         let files = TempDir::new().unwrap();
         let path = |name: &str| files.path().join(name);
         let mut command = Process::new("timeout");
@@ -78,7 +79,7 @@ impl Robot {
         let monitor = path("monitor");
         command.args(["-display", "none", "-kernel", &elf, "-monitor"]);
         command.arg(format!("unix:{},server=on,wait=off", monitor.display()));
-        for (name, bytes, at) in [("map", map, MAP_AT), ("config", config, CONFIG_AT)] {
+        for (name, bytes, at) in [("map", map, &*map_at), ("config", config, CONFIG_AT)] {
             if !bytes.is_empty() {
                 std::fs::write(path(name), bytes).unwrap();
                 let file = path(name).display().to_string();

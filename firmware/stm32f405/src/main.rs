@@ -373,7 +373,8 @@ impl NorFlash for Sectors {
 
     fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
         self.unlocked(|flash| {
-            flash.cr().write(|w| w.psize().psize32().pg().set_bit());
+            // Without this, the value after a reset would lock the controller again.
+            flash.cr().write(|w| w.lock().clear_bit().psize().psize32().pg().set_bit());
             let (words, _) = bytes.as_chunks::<4>();
             for (address, word) in (Self::BASE + offset..).step_by(4).zip(words) {
                 sectors::write(flash, address, u32::from_le_bytes(*word));
@@ -398,9 +399,9 @@ mod sectors {
     /// Selects the sector to erase.
     pub fn select(controller: &mut pac::FLASH, sector: u8) {
         // SAFETY: `Store` keeps to its region, whose sectors hold neither code nor constants.
-        controller
-            .cr()
-            .write(|w| unsafe { w.psize().psize32().ser().set_bit().snb().bits(sector) });
+        controller.cr().write(|w| unsafe {
+            w.lock().clear_bit().psize().psize32().ser().set_bit().snb().bits(sector)
+        });
     }
 
     /// Writes a word of the store. The caller has unlocked the controller.

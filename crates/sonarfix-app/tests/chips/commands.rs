@@ -6,9 +6,9 @@ use sonarfix::localizer::Start;
 use sonarfix_link::message::{CommandResult, ImageStatus, ResetCause};
 use sonarfix_link::{Command, Motion, Telemetry, baked};
 
-use crate::pico::Pico;
+use crate::pico::{Pico, Polls, World};
 use crate::results::{Table, polls, row};
-use crate::{ELF, beside, configuration, done, driving, image, map, start, world};
+use crate::{ELF, beside, configuration, done, driving_in, image, map, start, world};
 
 /// From the last motion that the PC commands to motors without voltage, milliseconds: the motion lasts 300.
 const UNPOWERED_WITHIN: f64 = 350.0;
@@ -22,8 +22,13 @@ fn checksum(image: &[u8]) -> ImageStatus {
 #[test]
 #[ignore = "cargo xtask chips"]
 fn a_configuration_that_was_sent_survives_resets_of_every_kind() {
+    let counted = configuration_is_kept(&world());
+    polls("configuration over the link, resets", counted);
+}
+
+pub fn configuration_is_kept(world: &World) -> Polls {
     let mut config = configuration();
-    let mut pico = Pico::switched_on(ELF, &world(), &map(), &[]);
+    let mut pico = Pico::switched_on(world.board.elf, world, &map(), &[]);
     assert_eq!(pico.hello().configuration, ImageStatus::Missing);
     // Not that of the file in the repository: another track width, and a sonar for nearer walls.
     config.localizer.drive.track_width = Metres(0.1234);
@@ -52,7 +57,7 @@ fn a_configuration_that_was_sent_survives_resets_of_every_kind() {
         assert!(compared.estimates > 20, "{compared:?}");
         done(pico.order(&Command::Stop));
     }
-    polls("configuration over the link, resets", pico.polls());
+    pico.polls()
 }
 
 /// What `sonarfix command self-test --loop` reads: the captured widths are those of the pulses, by the clock of the chip.
@@ -92,7 +97,13 @@ fn a_wire_from_the_servo_to_the_echo_shows_its_pulses() {
 #[test]
 #[ignore = "cargo xtask chips"]
 fn a_pose_that_is_set_while_driving_is_taken() {
-    let mut pico = driving();
+    let counted = poses_are_taken(&world(), "");
+    polls("poses set while driving", counted);
+}
+
+/// Sets poses; `robot` precedes what is measured.
+pub fn poses_are_taken(world: &World, robot: &str) -> Polls {
+    let mut pico = driving_in(world);
     pico.run(5_000, &[]);
     let set = |pico: &mut Pico, aside: f32| {
         let truth = pico.state().truth;
@@ -123,7 +134,7 @@ fn a_pose_that_is_set_while_driving_is_taken() {
     row(
         Table::Measured,
         &[
-            &"position in 20 s after a pose was set while driving, at most",
+            &format!("{robot}position in 20 s after a pose was set while driving, at most"),
             &format!("{:.1} mm", 1e3 * worst),
         ],
     );
@@ -131,14 +142,14 @@ fn a_pose_that_is_set_while_driving_is_taken() {
     assert!(compared.estimates > 450, "{compared:?}");
     assert!(status.running && status.faults.deadlines == 0, "{status:?}");
     assert_eq!(pico.events(), []);
-    polls("poses set while driving", pico.polls());
+    pico.polls()
 }
 
 /// The PC drives, then the link is cut.
 #[test]
 #[ignore = "cargo xtask chips"]
 fn a_robot_whose_link_is_cut_stands() {
-    let mut pico = driving();
+    let mut pico = driving_in(&world());
     let motion = Motion { speed: MetresPerSecond(0.15), turn: RadiansPerSecond(0.3) };
     let renew = |pico: &mut Pico| {
         done(pico.order(&Command::Drive(motion)));

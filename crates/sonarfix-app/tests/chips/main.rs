@@ -11,10 +11,12 @@ mod long;
 mod pico;
 mod results;
 mod search;
+mod stm32;
+mod stops;
 mod xrp;
 
-use pico::{Counters, Event, Pico, Polls, World};
-use results::{Table, polls, row};
+use pico::{Board, Counters, PICO, Pico, Polls, World};
+use results::polls;
 use sonarfix::geometry::pose::{Point, Pose};
 use sonarfix::geometry::units::{Metres, Radians};
 use sonarfix::health::Verdict;
@@ -24,11 +26,8 @@ use sonarfix_hal::config::RobotConfig;
 use sonarfix_link::message::{CommandError, CommandResult, ImageStatus, ResetCause};
 use sonarfix_link::{Command, Telemetry, baked};
 
-const ELF: &str = "SONARFIX_PICO_ELF";
+const ELF: &str = PICO.elf;
 const UF2: &str = "SONARFIX_PICO_UF2";
-
-/// The most that the motors may run after a program has stopped, milliseconds.
-const STOPS_WITHIN: f64 = 250.0;
 
 /// A room with an alcove.
 const CORNERS: [(f32, f32); 7] =
@@ -36,7 +35,12 @@ const CORNERS: [(f32, f32); 7] =
 const POSE: [f32; 3] = [1.1, 1.3, 0.0];
 
 fn world() -> World {
-    World { board: "pico", walls: segments(&CORNERS), pose: POSE, seed: 1 }
+    world_of(PICO)
+}
+
+/// The room with a robot that has this board.
+fn world_of(board: &'static Board) -> World {
+    World { board, walls: segments(&CORNERS), pose: POSE, seed: 1 }
 }
 
 /// The walls between these corners.
@@ -78,14 +82,9 @@ fn done(result: Option<CommandResult>) {
     assert_eq!(result, Some(CommandResult::Done));
 }
 
-/// A robot that drives.
-fn driving() -> Pico {
-    driving_in(&world())
-}
-
 /// A robot that drives in this world, with the pose that it has there.
 fn driving_in(world: &World) -> Pico {
-    let mut pico = Pico::switched_on(ELF, world, &map(), &image(&configuration()));
+    let mut pico = Pico::switched_on(world.board.elf, world, &map(), &image(&configuration()));
     pico.hello();
     let [x, y, heading] = world.pose;
     let pose = Pose::new(x, y, Radians(heading));
@@ -190,49 +189,6 @@ fn ninety_seconds_of_driving_stay_within_15_mm_and_have_the_bits_of_the_pc() {
     polls("ninety seconds of driving", counted);
 }
 
-/// Whatever ends the program, the motors are off and the chip is reset in time, and the robot waits for the PC.
-#[test]
-#[ignore = "cargo xtask chips"]
-fn a_program_that_stops_stops_the_motors() {
-    let mut counted = Polls::default();
-    for (end, cause) in [
-        ("hang", ResetCause::Watchdog),
-        ("fault", ResetCause::Software),
-        ("overflow", ResetCause::Watchdog),
-    ] {
-        let mut pico = driving();
-        let began = pico.state().ms;
-        pico.ask(end);
-        pico.run(1_000, &[]);
-        let events = pico.events();
-        let after = |what: &str| {
-            let find = |event: &&Event| event.what.starts_with(what);
-            events.iter().find(find).map(|event| event.ms - began)
-        };
-        let (off, reset) = (after("disabled").unwrap(), after("reset").unwrap());
-        row(
-            Table::Measured,
-            &[
-                &format!("{end}: motors off after; reset after"),
-                &format!("{off:.0} ms; {reset:.0} ms"),
-            ],
-        );
-        assert!(off <= STOPS_WITHIN && reset <= STOPS_WITHIN, "{end}: {events:?}");
-        assert!(after("enabled").is_none(), "{end}: {events:?}");
-        pico.forget_session();
-        assert_eq!(pico.hello().reset, cause, "{end}");
-        assert!(!pico.loop_status().running);
-        assert!(!pico.state().is_enabled);
-        // It drives again after these commands.
-        done(pico.order(&Command::SetPose(start())));
-        done(pico.order(&Command::Start));
-        pico.run(1_000, &[]);
-        assert!(pico.state().is_enabled);
-        counted = counted.and(pico.polls());
-    }
-    polls("a program that stops", counted);
-}
-
 /// The erasure of a sector takes longer than the watchdog's window.
 #[test]
 #[ignore = "cargo xtask chips"]
@@ -296,7 +252,7 @@ fn a_power_cut_loses_no_record() {
 #[test]
 #[ignore = "cargo xtask chips"]
 fn noise_at_the_full_rate_of_the_line_costs_no_deadline() {
-    let mut pico = driving();
+    let mut pico = driving_in(&world());
     pico.ask("noise on");
     pico.run(20_000, &[]);
     pico.ask("noise off");

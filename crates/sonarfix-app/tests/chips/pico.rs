@@ -1,4 +1,4 @@
-//! A Pico, or an XRP with a Pico, on an emulated chip, and the PC at the other end of its link, in lock step: each order states for how long the chip executes.
+//! A board on an emulated chip, and the PC at the other end of its link, in lock step: each order states for how long the chip executes.
 
 use std::collections::VecDeque;
 use std::fmt::Write as _;
@@ -12,9 +12,6 @@ use sonarfix_link::{
 };
 use tempfile::TempDir;
 
-/// Where `memory.x` has the regions.
-const CONFIG_AT: &str = "0x10100000";
-const MAP_AT: &str = "0x10180000";
 /// The time of the chip that passes at once, milliseconds.
 const SLICE: u32 = 10;
 /// The time after which a command without an answer is repeated, milliseconds.
@@ -22,10 +19,48 @@ const REPEATED_AFTER: u32 = 200;
 /// The longest wait for a message that comes, milliseconds of the chip: that for `Hello`.
 const PATIENCE: u32 = 15_000;
 
+/// A board.
+pub struct Board {
+    /// Its name in `firmware/chips/wirings.mjs`, for an RP2040, or in `firmware/boards.toml`.
+    name: &'static str,
+    /// The variable of the environment with the path of its program.
+    pub elf: &'static str,
+    /// Where its flash has the regions.
+    config_at: &'static str,
+    map_at: &'static str,
+    /// The variable with the address of the function that is a poll, if the emulator counts its instructions.
+    poll: Option<&'static str>,
+}
+
+/// An RP2040: where `memory.x` has the regions.
+const RP2040: Board = Board {
+    name: "pico",
+    elf: "SONARFIX_PICO_ELF",
+    config_at: "0x10100000",
+    map_at: "0x10180000",
+    poll: Some("SONARFIX_PICO_POLL"),
+};
+pub const PICO: &Board = &RP2040;
+pub const XRP: &Board =
+    &Board { name: "xrp", elf: "SONARFIX_XRP_ELF", poll: Some("SONARFIX_XRP_POLL"), ..RP2040 };
+/// Boards in QEMU, which does not count the instructions of a poll; `cargo xtask worst-poll` does.
+pub const STM32F405: &Board = &Board {
+    name: "stm32f405",
+    elf: "SONARFIX_STM32F405_ELF",
+    config_at: "0x08004000",
+    map_at: "0x080E0000",
+    poll: None,
+};
+pub const NUCLEO: &Board = &Board {
+    name: "nucleo_f446re",
+    elf: "SONARFIX_NUCLEO_F446RE_ELF",
+    map_at: "0x08060000",
+    ..*STM32F405
+};
+
 /// What happens around the chip.
 pub struct World {
-    /// The wiring of the board and its robot, by its name in `firmware/chips/wirings.mjs`.
-    pub board: &'static str,
+    pub board: &'static Board,
     /// Segments of two points.
     pub walls: Vec<[f32; 4]>,
     pub pose: [f32; 3],
@@ -120,6 +155,7 @@ pub struct Pico {
     /// The longest wait for a message, milliseconds of the chip.
     pub patience: u32,
     pub seed: u32,
+    counts_polls: bool,
     files: TempDir,
 }
 
@@ -129,10 +165,10 @@ impl Pico {
         let files = TempDir::new().unwrap();
         let path = |name: &str| files.path().join(name);
         let walls: Vec<String> = world.walls.iter().map(|wall| format!("{wall:?}")).collect();
-        let (board, walls) = (world.board, walls.join(","));
-        let (pose, seed) = (world.pose, world.seed);
+        let &World { board, pose, seed, .. } = world;
+        let (name, walls) = (board.name, walls.join(","));
         let world =
-            format!(r#"{{"board":"{board}","walls":[{walls}],"pose":{pose:?},"seed":{seed}}}"#);
+            format!(r#"{{"board":"{name}","walls":[{walls}],"pose":{pose:?},"seed":{seed}}}"#);
         std::fs::write(path("world.json"), world).unwrap();
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../firmware/chips");
         let mut command = Process::new("node");
@@ -154,19 +190,20 @@ impl Pico {
             heard: Vec::new(),
             patience: PATIENCE,
             seed,
+            counts_polls: board.poll.is_some(),
             files,
         };
         pico.ask(&format!("image {program}"));
-        for (name, bytes, at) in [("map", map, MAP_AT), ("config", config, CONFIG_AT)] {
+        for (name, bytes, at) in [("map", map, board.map_at), ("config", config, board.config_at)] {
             if !bytes.is_empty() {
                 let file = pico.files.path().join(name);
                 std::fs::write(&file, bytes).unwrap();
                 pico.ask(&format!("image {at} {}", file.display()));
             }
         }
-        // The address of its function that is a poll.
-        let (board, _) = variable.rsplit_once('_').unwrap();
-        pico.ask(&format!("count {}", passed(&format!("{board}_POLL"))));
+        if let Some(poll) = board.poll {
+            pico.ask(&format!("count {}", passed(poll)));
+        }
         pico.ask("start");
         pico
     }
@@ -301,6 +338,9 @@ impl Pico {
     }
 
     pub fn polls(&mut self) -> Polls {
+        if !self.counts_polls {
+            return Polls::default();
+        }
         let answer = self.ask("calls");
         let counts: Vec<u64> = answer.split(' ').map(|word| word.parse().unwrap()).collect();
         let [count, driving, waiting] = counts[..] else { panic!("{answer}") };

@@ -8,18 +8,17 @@ use sonarfix_hal::config::RobotConfig;
 use sonarfix_link::message::{ImageStatus, ResetCause};
 use sonarfix_link::{Command, Motion, Telemetry, baked};
 
-use crate::pico::{Event, Pico, World};
+use crate::pico::{Event, Pico, World, XRP};
 use crate::results::{Table, polls_within, row};
-use crate::{STOPS_WITHIN, done, image, map_of, segments, start};
-
-const ELF: &str = "SONARFIX_XRP_ELF";
+use crate::stops::STOPS_WITHIN;
+use crate::{done, image, map_of, segments, start};
 
 /// The arena that `sonarfix init --board xrp` writes.
 const CORNERS: [(f32, f32); 7] =
     [(0.0, 0.0), (1.8, 0.0), (1.8, 1.2), (0.5, 1.2), (0.5, 0.8), (0.0, 0.8), (0.0, 0.0)];
 const POSE: [f32; 3] = [0.5, 0.5, 0.0];
-/// The most instructions of a poll: a gyro on a bus in software takes 40,000 of them, most of which wait.
-const LONGEST_POLL: u64 = 190_000;
+/// The most instructions of a poll: the choice among six walls that the sonar reaches at once. The gyro is read in another poll.
+const LONGEST_POLL: u64 = 189_000;
 /// A circle of 0.25 m, which stays within the arena.
 const MOTION: Motion = Motion { speed: MetresPerSecond(0.12), turn: RadiansPerSecond(0.48) };
 
@@ -31,9 +30,9 @@ fn configuration() -> RobotConfig {
 
 /// An XRP whose motors are enabled, with the pose that it has.
 fn driving() -> Pico {
-    let world = World { board: "xrp", walls: segments(&CORNERS), pose: POSE, seed: 1 };
+    let world = World { board: XRP, walls: segments(&CORNERS), pose: POSE, seed: 1 };
     let config = configuration();
-    let mut xrp = Pico::switched_on(ELF, &world, &map_of(&CORNERS), &image(&config));
+    let mut xrp = Pico::switched_on(XRP.elf, &world, &map_of(&CORNERS), &image(&config));
     let hello = xrp.hello();
     assert_eq!(hello.configuration, ImageStatus::Valid(baked::checksum(&config)));
     assert!(matches!(hello.map, ImageStatus::Valid(_)), "{hello:?}");
