@@ -133,7 +133,7 @@ pub fn scenario(
     let run = |seed: u64| {
         let simulation = Simulation::new(of(seed)?);
         let walls = segments(&simulation.scenario.floor.walls());
-        let mut beside = Beside::new(simulation.config(), walls, seed);
+        let mut beside = Beside::new(&simulation.config(), walls, seed);
         simulation.run(seed, &mut beside)?;
         progress.finished();
         Ok::<_, PeerError>(beside.compared())
@@ -161,7 +161,7 @@ pub fn of_recordings(data: &Path) -> Result<Vec<Row>, PeerError> {
     let replay = |folder: &Path, robot: &str| {
         let (robot, floor) = recordings::read(folder, robot)?;
         let walls = floor.walls();
-        let mut beside = Beside::new(robot.localizer, segments(&walls), 0);
+        let mut beside = Beside::new(&robot.localizer, segments(&walls), 0);
         recordings::replay(folder, &robot, &walls, &mut beside)?;
         Ok(beside.compared())
     };

@@ -41,9 +41,9 @@ pub struct Beside {
 }
 
 impl Beside {
-    pub fn new(config: Config, walls: Vec<Segment>, seed: u64) -> Self {
+    pub fn new(config: &Config, walls: Vec<Segment>, seed: u64) -> Self {
         Self {
-            config,
+            config: *config,
             walls,
             seed,
             filter: None,

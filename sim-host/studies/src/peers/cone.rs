@@ -80,7 +80,6 @@ mod tests {
 
     /// A fan of rays in the cone meets nothing nearer than the nearest point, and one of them comes as near.
     #[test]
-    #[expect(clippy::unwrap_used, reason = "a room has walls around")]
     fn a_fan_of_rays_finds_the_same_point() {
         let corners = [[0.0, 0.0], [5.0, 0.0], [5.0, 3.0], [2.0, 3.0], [2.0, 4.0], [0.0, 4.0]];
         let side = |at: usize| [corners[at], corners[(at + 1) % corners.len()]];

@@ -90,6 +90,7 @@ pub struct ParticleFilter {
 impl ParticleFilter {
     /// A filter that knows its pose: deviations in metres and radians. It has no recovery, which makes it worse where much is not in the
     /// map.
+    #[must_use]
     pub fn at(
         config: &Config,
         walls: Vec<Segment>,
@@ -109,6 +110,7 @@ impl ParticleFilter {
     }
 
     /// A filter that knows nothing.
+    #[must_use]
     pub fn anywhere(config: &Config, walls: Vec<Segment>, seed: u64) -> Self {
         let drive = &config.drive;
         let robot = Robot {
@@ -127,6 +129,7 @@ impl ParticleFilter {
     }
 
     /// How many particles there are.
+    #[must_use]
     pub fn count(&self) -> usize {
         self.particles.len()
     }
@@ -136,12 +139,12 @@ impl ParticleFilter {
         let Robot { track_width, noise, .. } = self.robot;
         let half = 0.5 * turn * track_width;
         let wheels = [advance + half, advance - half];
-        let deviations = wheels.map(|travel| noise * travel.abs().sqrt());
+        let [by_right, by_left] = wheels.map(|travel| (travel, noise * travel.abs().sqrt()));
         for particle in &mut self.particles {
-            let [right, left] = [0, 1].map(|wheel| {
-                let (travel, deviation) = (wheels[wheel], deviations[wheel]);
-                travel * (1.0 + particle.scales[wheel])
-                    + deviation * self.rng.sample::<f64, _>(StandardNormal)
+            let [of_right, of_left] = particle.scales;
+            let wheels = [(by_right, of_right), (by_left, of_left)];
+            let [right, left] = wheels.map(|((travel, deviation), scale)| {
+                travel * (1.0 + scale) + deviation * self.rng.sample::<f64, _>(StandardNormal)
             });
             let turn = (right - left) / track_width;
             let pose = &mut particle.pose;
@@ -195,7 +198,8 @@ impl ParticleFilter {
         while drawn.len() < MOST && (drawn.len() < FEWEST || drawn.len() < required(bins.len())) {
             let at = sum * self.rng.random::<f64>();
             let number = cumulated.partition_point(|sum| *sum < at);
-            let mut particle = self.particles[number.min(self.particles.len() - 1)];
+            let chosen = self.particles.get(number).or(self.particles.last());
+            let Some(mut particle) = chosen.copied() else { return };
             for (scale, deviation) in particle.scales.iter_mut().zip(self.robot.scales) {
                 *scale += JITTER * deviation * self.rng.sample::<f64, _>(StandardNormal);
             }
@@ -206,11 +210,14 @@ impl ParticleFilter {
             drawn.push(particle);
         }
         let weight = 1.0 / count(drawn.len());
-        drawn.iter_mut().for_each(|particle| particle.weight = weight);
+        for particle in &mut drawn {
+            particle.weight = weight;
+        }
         self.particles = drawn;
     }
 
     /// The mean of the heaviest cluster.
+    #[must_use]
     pub fn belief(&self) -> Belief {
         let mut weights: HashMap<_, f64> = HashMap::new();
         for Particle { pose, weight, .. } in &self.particles {
@@ -299,13 +306,12 @@ fn required(bins: usize) -> usize {
 
 /// A pose anywhere in the rectangle around the walls.
 fn anywhere(walls: &[Segment], rng: &mut ChaCha8Rng) -> Pose {
-    let mut within = |axis: usize| {
-        let ends = || walls.iter().flatten().map(|end| end[axis]);
-        let (least, most) =
-            (ends().fold(f64::INFINITY, f64::min), ends().fold(f64::NEG_INFINITY, f64::max));
-        least + (most - least) * rng.random::<f64>()
-    };
-    let (x, y) = (within(0), within(1));
+    let ends = || walls.iter().flatten().copied();
+    let least = ends().fold([f64::INFINITY; 2], |[x, y], [a, b]| [x.min(a), y.min(b)]);
+    let most = ends().fold([f64::NEG_INFINITY; 2], |[x, y], [a, b]| [x.max(a), y.max(b)]);
+    let mut within = |(least, most): (f64, f64)| least + (most - least) * rng.random::<f64>();
+    let ([left, below], [right, above]) = (least, most);
+    let (x, y) = (within((left, right)), within((below, above)));
     let turn = std::f64::consts::PI;
     Pose { x, y, heading: rng.random_range(-turn..turn) }
 }
