@@ -5,10 +5,11 @@
 //! |---|---|
 //! | [`particle_filter`] | Monte Carlo localization |
 //! | [`cone`] | its model of a beam |
-//! | `beside` | both filters in one run |
+//! | `beside`, `compared` | both filters in one run, and their errors |
 //! | [`page`] | the page |
 
 mod beside;
+mod compared;
 pub mod cone;
 pub mod page;
 pub mod particle_filter;
@@ -32,6 +33,8 @@ use crate::search_study::Plans;
 
 use beside::Beside;
 use cone::Segment;
+
+pub use compared::{Compared, Errors};
 use particle_filter::ParticleFilter;
 
 /// Why a comparison cannot be made.
@@ -52,60 +55,6 @@ pub enum PeerError {
     /// The recordings cannot be read.
     #[error("cannot read the recordings")]
     Recordings(#[from] io::Error),
-}
-
-/// How well a filter knew the pose. Sums over runs; seconds, and metres squared times seconds.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-pub struct Errors {
-    /// Time with a reference.
-    pub seconds: f64,
-    /// Part of it within half a metre.
-    pub within: f64,
-    /// Part of it beyond half a metre, although the filter says that its pose is right.
-    pub wrong_and_sure: f64,
-    /// Sum of the squared position errors.
-    pub squares: f64,
-}
-
-impl Errors {
-    fn plus(self, other: Self) -> Self {
-        Self {
-            seconds: self.seconds + other.seconds,
-            within: self.within + other.within,
-            wrong_and_sure: self.wrong_and_sure + other.wrong_and_sure,
-            squares: self.squares + other.squares,
-        }
-    }
-
-    /// RMS position error, metres.
-    #[must_use]
-    pub fn rms(&self) -> f64 {
-        (self.squares / self.seconds).sqrt()
-    }
-}
-
-/// Both filters in one or several runs.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-pub struct Compared {
-    /// The localizer of this project.
-    pub localizer: Errors,
-    /// The particle filter.
-    pub particles: Errors,
-    /// Pings.
-    pub pings: u64,
-    /// Sum over the pings of the particles.
-    pub weighed: u64,
-}
-
-impl Compared {
-    fn plus(self, other: Self) -> Self {
-        Self {
-            localizer: self.localizer.plus(other.localizer),
-            particles: self.particles.plus(other.particles),
-            pings: self.pings + other.pings,
-            weighed: self.weighed + other.weighed,
-        }
-    }
 }
 
 /// The comparison in one place.

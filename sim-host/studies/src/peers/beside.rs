@@ -5,9 +5,9 @@ use sonarfix::health::Verdict;
 use sonarfix_sim::angle;
 use sonarfix_sim::trace::{FixRecord, Pose, Recorder, Tick};
 
+use super::compared::{Compared, Errors};
 use super::cone::Segment;
 use super::particle_filter::ParticleFilter;
-use super::{Compared, Errors};
 
 /// A pose is right within this distance, metres.
 const RIGHT: f64 = 0.5;
