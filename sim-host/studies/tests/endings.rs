@@ -6,7 +6,7 @@ use std::process::{Command, Output, Stdio};
 const CLASSROOM: &str = "../../crates/sonarfix-map/scenarios/classroom.toml";
 
 /// Every subcommand, with arguments for the shortest output.
-const PRINTING: [&[&str]; 11] = [
+const PRINTING: [&[&str]; 12] = [
     &["find", "--floor-plans", "1", "--walls", "30", "--seconds", "5"],
     &["relocalize", "--runs", "1", "--seconds", "5"],
     &["calibration", "--runs", "1", "--metres", "5"],
@@ -15,6 +15,8 @@ const PRINTING: [&[&str]; 11] = [
     &["sonar-model", "--help"],
     &["reality", "--help"],
     &["recordings", "--help"],
+    // This has two dozen runs of ten minutes.
+    &["peers", "--help"],
     &["faults", "--runs", "1"],
     &["health", "--runs", "1"],
     &["rooms", "--runs", "1", "--family", "arena", "--sensor", "nxt"],
