@@ -65,3 +65,5 @@ const openComparison = (runs) => {
   document.getElementById("curves").addEventListener("pointerout", playback.show);
   return playback;
 };
+
+openComparison(JSON.parse(document.getElementById("data").textContent));

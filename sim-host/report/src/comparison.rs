@@ -13,7 +13,7 @@ use super::{CURVES, CURVES_STYLE, DRAWING, PLAYER, ReportError, page, playback, 
 /// The name of the page's file.
 const FILE: &str = "comparison.html";
 
-const TEMPLATE: &str = include_str!("comparison.html");
+const BODY: &str = include_str!("comparison.html");
 const SIDE: &str = include_str!("side.html");
 const STYLE: &str = include_str!("comparison.css");
 const SCRIPT: &str = include_str!("comparison.js");
@@ -47,23 +47,23 @@ impl Comparison<'_> {
             return Err(ReportError::Empty { name });
         }
         let [first, second] = self.runs.map(sonarfix_player::json);
-        let data = page::json_in_script(&format!("[{},{}]", first?, second?));
-        let values: [(&str, Cow<'_, str>); 13] = [
-            ("title", escape(&self.title).into()),
-            ("subtitle", escape(&self.subtitle).into()),
-            ("style", (style() + CURVES_STYLE + STYLE).into()),
+        let parts = [
             ("sides", self.sides().into()),
             ("playback", playback().into()),
             ("legend", super::LEGEND.into()),
             ("tables", page::tables(&self.tables).into()),
-            ("provenance", page::tables(std::slice::from_ref(&self.provenance)).into()),
-            ("data", data.into()),
-            ("drawing", DRAWING.into()),
-            ("player", PLAYER.into()),
-            ("curves", CURVES.into()),
-            ("script", SCRIPT.into()),
         ];
-        Ok(page::fill(TEMPLATE, &values))
+        let page = page::Page {
+            title: &self.title,
+            subtitle: &self.subtitle,
+            style: &(style() + CURVES_STYLE + STYLE),
+            body: &page::fill(BODY, &parts),
+            provenance: &self.provenance,
+            without_scripts: "Maps and curves need JavaScript; the tables do not.",
+            data: &format!("[{},{}]", first?, second?),
+            scripts: &[DRAWING, PLAYER, CURVES, SCRIPT],
+        };
+        Ok(page.html())
     }
 
     /// Writes `comparison.html` into a directory, which is created if missing. Returns the path of the page.

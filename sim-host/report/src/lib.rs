@@ -38,7 +38,6 @@ pub mod residuals;
 pub mod sweep;
 mod table;
 
-use std::borrow::Cow;
 use std::error::Error;
 use std::fs;
 use std::io::{self, Write as _};
@@ -49,7 +48,6 @@ use sonarfix_sim::spread::Spread;
 use sonarfix_sim::trace::Trace;
 use thiserror::Error;
 
-use escape::escape;
 use figures::Figure;
 
 pub use called_lost::called_lost;
@@ -60,7 +58,7 @@ pub use table::Table;
 /// The name of the report's file.
 const FILE: &str = "report.html";
 
-const TEMPLATE: &str = include_str!("template.html");
+const BODY: &str = include_str!("report.html");
 const STYLE: &str = include_str!("report.css");
 
 /// Values, zoom and pan of the figures.
@@ -169,21 +167,22 @@ impl Report<'_> {
     }
 
     fn page(&self, figures: &[Figure]) -> Result<String, ReportError> {
-        let data = page::json_in_script(&sonarfix_player::json(self.trace)?);
-        let values: [(&str, Cow<'_, str>); 11] = [
-            ("title", escape(&self.title).into()),
-            ("subtitle", escape(&self.subtitle).into()),
-            ("style", style().into()),
+        let parts = [
             ("tables", page::tables(&self.tables).into()),
             ("figures", page::figures(figures, self.of_paper).into()),
             ("player", player().into()),
-            ("provenance", page::tables(std::slice::from_ref(&self.provenance)).into()),
-            ("figures-script", FIGURES.into()),
-            ("data", data.into()),
-            ("drawing", DRAWING.into()),
-            ("script", SCRIPT.into()),
         ];
-        Ok(page::fill(TEMPLATE, &values))
+        let page = page::Page {
+            title: &self.title,
+            subtitle: &self.subtitle,
+            style: &style(),
+            body: &page::fill(BODY, &parts),
+            provenance: &self.provenance,
+            without_scripts: "The player needs JavaScript; the tables and figures do not.",
+            data: &sonarfix_player::json(self.trace)?,
+            scripts: &[DRAWING, SCRIPT, FIGURES, include_str!("report.js")],
+        };
+        Ok(page.html())
     }
 }
 

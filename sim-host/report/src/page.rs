@@ -26,9 +26,40 @@ pub fn fill(template: &str, values: &[(&str, Cow<'_, str>)]) -> String {
     page
 }
 
+/// A page of its own: what a report and a comparison have in common.
+pub(super) struct Page<'a> {
+    pub title: &'a str,
+    pub subtitle: &'a str,
+    pub style: &'a str,
+    /// The middle, as HTML.
+    pub body: &'a str,
+    pub provenance: &'a Table,
+    /// What a browser without JavaScript shows.
+    pub without_scripts: &'a str,
+    /// The data of the scripts, as JSON.
+    pub data: &'a str,
+    pub scripts: &'a [&'a str],
+}
+
+impl Page<'_> {
+    pub fn html(&self) -> String {
+        let values: [(&str, Cow<'_, str>); 8] = [
+            ("title", escape(self.title).into()),
+            ("subtitle", escape(self.subtitle).into()),
+            ("style", self.style.into()),
+            ("body", self.body.into()),
+            ("provenance", tables(std::slice::from_ref(self.provenance)).into()),
+            ("without-scripts", self.without_scripts.into()),
+            ("data", json_in_script(self.data).into()),
+            ("scripts", self.scripts.join("\n").into()),
+        ];
+        fill(include_str!("frame.html"), &values)
+    }
+}
+
 /// JSON that is safe inside a script element: without `<` there is no `</script>` and no `<!--`. In
 /// JSON a `<` can only be part of a string, where its escape is equivalent.
-pub(super) fn json_in_script(json: &str) -> String {
+fn json_in_script(json: &str) -> String {
     json.replace('<', "\\u003c")
 }
 

@@ -1,5 +1,5 @@
-//! The localizer beside a particle filter with the same odometry and the same pings: in simulated rooms and recordings from a known start,
-//! and in floor plans from nothing.
+//! Comparison of the localizer with a particle filter that has the same odometry and the same pings: from a known start in simulated rooms
+//! and recordings, and with an unknown start in floor plans.
 //!
 //! | module | what |
 //! |---|---|
@@ -60,11 +60,11 @@ pub enum PeerError {
 /// The comparison in one place.
 #[derive(Debug, Clone, Serialize)]
 pub struct Row {
-    /// Which.
+    /// The scenario, kind of room or recording.
     pub name: String,
     /// Runs.
     pub runs: u32,
-    /// The result, or why there is none.
+    /// The result, or the error as text.
     pub compared: Result<Compared, String>,
 }
 
@@ -141,7 +141,7 @@ fn segments(walls: &[Wall]) -> Vec<Segment> {
 /// The particle filter has an answer when it has been sure for so long, seconds.
 const SURE_FOR: f64 = 5.0;
 
-/// How soon both find a pose that is unknown.
+/// The times until both have determined an unknown pose.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Found {
     /// Seconds until the search of this project has a unique answer, and whether it is right.
@@ -150,7 +150,7 @@ pub struct Found {
     pub particles: Option<(f64, bool)>,
 }
 
-/// Trials in floor plans: the search with its own pings, and a particle filter that begins everywhere with the same ones.
+/// Trials in floor plans: the search with its own pings, and a particle filter with the same ones, whose particles begin everywhere.
 ///
 /// # Errors
 /// [`PeerError`] of the first plan that cannot be used.

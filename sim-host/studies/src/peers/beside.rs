@@ -25,7 +25,7 @@ struct Ping {
     range: Option<f64>,
 }
 
-/// The particle filter, once the start is known, and both errors.
+/// The particle filter, from the start record on, and the errors of both.
 #[derive(Debug)]
 pub struct Beside {
     config: Config,
@@ -73,7 +73,7 @@ impl Beside {
             done = share;
             filter.ping(ranger, ping.bearing, ping.range);
             self.compared.pings += 1;
-            self.compared.weighed += filter.count() as u64;
+            self.compared.particle_updates += filter.count() as u64;
         }
         filter.drive((1.0 - done) * advance, (1.0 - done) * turn);
         self.last = (tick.time, tick.odometry);

@@ -2,14 +2,14 @@
 
 use serde::Serialize;
 
-/// How well a filter knew the pose. Sums over runs; seconds, and metres squared times seconds.
+/// Position errors of a filter. Sums over runs; seconds, and metres squared times seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Errors {
     /// Time with a reference.
     pub seconds: f64,
     /// Part of it within half a metre.
     pub within: f64,
-    /// Part of it beyond half a metre, although the filter says that its pose is right.
+    /// Part of it beyond half a metre, although the filter reports a right pose.
     pub wrong_and_sure: f64,
     /// Sum of the squared position errors.
     pub squares: f64,
@@ -32,17 +32,17 @@ impl Errors {
     }
 }
 
-/// Both filters in one or several runs.
+/// The errors of both filters in one or several runs.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Compared {
-    /// The localizer of this project.
+    /// Those of the localizer.
     pub localizer: Errors,
-    /// The particle filter.
+    /// Those of the particle filter.
     pub particles: Errors,
     /// Pings.
     pub pings: u64,
-    /// Sum over the pings of the particles.
-    pub weighed: u64,
+    /// Updates of a particle by a ping: the sum of the particles over the pings.
+    pub particle_updates: u64,
 }
 
 impl Compared {
@@ -51,7 +51,7 @@ impl Compared {
             localizer: self.localizer.plus(other.localizer),
             particles: self.particles.plus(other.particles),
             pings: self.pings + other.pings,
-            weighed: self.weighed + other.weighed,
+            particle_updates: self.particle_updates + other.particle_updates,
         }
     }
 }

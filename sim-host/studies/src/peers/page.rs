@@ -10,13 +10,13 @@ use super::{Errors, Found, Row};
 /// Trials of the search in one kind of floor plans.
 #[derive(Debug, Clone, Serialize)]
 pub struct Searched {
-    /// Which.
+    /// Its name.
     pub name: &'static str,
     /// Each trial.
     pub found: Vec<Found>,
 }
 
-/// All that the page tells.
+/// The content of the page.
 #[derive(Debug, Clone, Serialize)]
 pub struct Page {
     /// From a known start, in simulation.
@@ -92,7 +92,7 @@ fn table(page: &mut String, rows: &[Row]) {
         let share = |part: f64, of: &Errors| format!("{:.1} %", 100.0 * part / of.seconds);
         let (ours, theirs) = (&compared.localizer, &compared.particles);
         #[expect(clippy::cast_precision_loss, reason = "far fewer than 2^53")]
-        let mean = compared.weighed as f64 / compared.pings as f64;
+        let mean = compared.particle_updates as f64 / compared.pings as f64;
         let _ = writeln!(
             page,
             "| {name} | {runs} | {} | {} | {} | {} | {:.0} mm | {:.0} mm | {mean:.0} |",

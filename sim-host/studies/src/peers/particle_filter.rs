@@ -39,7 +39,7 @@ const RIM: f64 = 1.6;
 const EMPTY: f64 = 0.9;
 /// Least deviation of a range, metres: that of the map, and for the distance between particles.
 const LEAST_DEVIATION: f64 = 0.1;
-/// The power of a ping's likelihood: what a ping tells is in part what the ones before it told.
+/// Exponent of a ping's likelihood: the errors of consecutive pings are correlated.
 const INDEPENDENT: f64 = 0.3;
 /// Size of a cluster around the bin with the most weight, metres and radians.
 const CLUSTER: (f64, f64) = (1.0, 0.8);
@@ -54,7 +54,7 @@ struct Particle {
     weight: f64,
 }
 
-/// The robot as the filter knows it.
+/// Parameters of the robot.
 #[derive(Debug, Clone, Copy)]
 struct Robot {
     track_width: f64,
@@ -64,12 +64,12 @@ struct Robot {
     scales: [f64; 2],
 }
 
-/// A pose that the filter believes.
+/// The estimated pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Belief {
     /// The mean.
     pub pose: Pose,
-    /// Whether nearly all particles are there.
+    /// Whether nearly all of the weight is there.
     pub is_sure: bool,
 }
 
@@ -88,7 +88,7 @@ pub struct ParticleFilter {
 }
 
 impl ParticleFilter {
-    /// A filter that knows its pose: deviations in metres and radians. It has no recovery, which makes it worse where much is not in the
+    /// A filter with a known start: the pose and its deviations in metres and radians. It has no recovery, which makes it worse where much is not in the
     /// map.
     #[must_use]
     pub fn at(
@@ -109,7 +109,7 @@ impl ParticleFilter {
         filter
     }
 
-    /// A filter that knows nothing.
+    /// A filter with an unknown start: particles anywhere within the rectangle around the walls.
     #[must_use]
     pub fn anywhere(config: &Config, walls: Vec<Segment>, seed: u64) -> Self {
         let drive = &config.drive;
@@ -156,7 +156,7 @@ impl ParticleFilter {
         }
     }
 
-    /// Weighs all particles by a ping at a bearing, radians, and its range, metres; `None`: no echo.
+    /// Updates the weights by a ping at a bearing, radians, robot frame, and its range, metres; `None`: no echo.
     pub fn ping(&mut self, ranger: &RangerParameters, bearing: f64, range: Option<f64>) {
         let mut sum = 0.0;
         for particle in &mut self.particles {
