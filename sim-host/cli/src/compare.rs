@@ -11,10 +11,10 @@ use sonarfix_report::Table;
 use sonarfix_report::comparison::Comparison;
 use sonarfix_terminal::output::check_folder;
 
-use crate::course::Figures;
 use crate::provenance;
 use crate::recorded::{Run, Sources};
 use crate::run::Output;
+use crate::statistics::Figures;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -67,7 +67,7 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let first = Run::read(&args.first, Sources { map: first_map, robot: first_robot })?;
     let second = Run::read(&args.second, Sources { map: second_map, robot: second_robot })?;
     let settings = first.robot.zip(second.robot).map(|(first, second)| settings(&first, &second));
-    let figures = [&first, &second].map(|run| run.course.figures());
+    let figures = [&first, &second].map(|run| run.statistics.figures());
     let tables: Vec<_> =
         std::iter::once(differences(&figures)).chain(settings.as_deref().map(table)).collect();
     if args.output.json {
@@ -238,7 +238,7 @@ fn table(settings: &[Setting]) -> Table {
     let cell = |value: &Option<String>| value.clone().unwrap_or_else(|| "–".to_owned());
     let row =
         |setting: &Setting| vec![setting.key.clone(), cell(&setting.first), cell(&setting.second)];
-    let note = if settings.is_empty() { "both robot files say the same" } else { "" };
+    let note = if settings.is_empty() { "the robot files have the same values" } else { "" };
     Table {
         title: "Settings of the robot that differ".to_owned(),
         note: note.to_owned(),

@@ -15,7 +15,7 @@ use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::trace::{Trace, Wall};
 use sonarfix_terminal::output;
 
-use crate::course::Course;
+use crate::statistics::RunStatistics;
 
 /// The files that a run needs beside itself, where they are not beside it.
 #[derive(Debug, Clone, Copy, Default)]
@@ -26,7 +26,7 @@ pub struct Sources<'a> {
     pub robot: Option<&'a Path>,
 }
 
-/// A run, and what is known of it.
+/// A run with its statistics, robot and files.
 #[derive(Debug)]
 pub struct Run {
     /// The name of its file.
@@ -34,7 +34,7 @@ pub struct Run {
     /// Its records.
     pub trace: Trace,
     /// Errors, outcomes and verdicts.
-    pub course: Course,
+    pub statistics: RunStatistics,
     /// The robot as configured; unknown of a trace.
     pub robot: Option<RobotConfig>,
     /// The files that were read.
@@ -90,10 +90,10 @@ fn simulated(file: &Path) -> anyhow::Result<Run> {
     let (seed, robot) = (scenario.run.seed, scenario.robot);
     let simulation = Simulation::new(scenario);
     let mut trace = simulation.empty_trace();
-    let mut course = Course::default();
-    simulation.run(seed, &mut course.of(&mut trace))?;
+    let mut statistics = RunStatistics::default();
+    simulation.run(seed, &mut statistics.of(&mut trace))?;
     let robot = Some(robot);
-    Ok(Run { name: name(file), trace, course, robot, files: vec![file.to_owned()] })
+    Ok(Run { name: name(file), trace, statistics, robot, files: vec![file.to_owned()] })
 }
 
 fn replayed(file: &Path, sources: Sources<'_>) -> anyhow::Result<Run> {
@@ -106,22 +106,22 @@ fn replayed(file: &Path, sources: Sources<'_>) -> anyhow::Result<Run> {
     let walls = floor.walls();
     let replay = Replay { robot: &robot, walls: &walls, strict: false };
     let mut thinned = Thinned::new(&floor, robot.localizer.rangers.first.cone, CAPACITY);
-    let mut course = Course::default();
+    let mut statistics = RunStatistics::default();
     replay
-        .run(open(file)?, truth, &mut course.of(&mut thinned), &mut |_| {})
+        .run(open(file)?, truth, &mut statistics.of(&mut thinned), &mut |_| {})
         .with_context(|| name(file))?;
     let trace = thinned.trace().clone();
     let files = vec![file.to_owned(), map, config, reference];
-    Ok(Run { name: name(file), trace, course, robot: Some(robot), files })
+    Ok(Run { name: name(file), trace, statistics, robot: Some(robot), files })
 }
 
 fn traced(file: &Path, sources: Sources<'_>) -> anyhow::Result<Run> {
     let map = beside(file, sources.map, "map.toml");
     let walls = walls(&MapFile::read(&map, None)?.floor);
     let mut trace = Trace { walls: walls.clone(), ..Trace::default() };
-    let mut course = Course::default();
-    let mut measured = course.of(&mut trace);
+    let mut statistics = RunStatistics::default();
+    let mut measured = statistics.of(&mut trace);
     let mut records = Recorded::new(&mut measured, &walls);
     trace_csv::read(open(file)?, &mut [&mut records]).with_context(|| name(file))?;
-    Ok(Run { name: name(file), trace, course, robot: None, files: vec![file.to_owned(), map] })
+    Ok(Run { name: name(file), trace, statistics, robot: None, files: vec![file.to_owned(), map] })
 }

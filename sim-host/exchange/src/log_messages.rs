@@ -6,12 +6,12 @@ use sonarfix_replay::log::Record;
 use sonarfix_search::navigator::Mode;
 use sonarfix_sim::STATES;
 
-use crate::row::Kind;
+use crate::row::{DEVIATIONS, Kind};
 use crate::scene;
 use crate::schema::{self, Schema};
 
 const REAL: Kind = Kind::Real;
-const STATE_FIELDS: [&str; 14] = [
+const STATE_FIELDS: [&str; 7] = [
     "x_m",
     "y_m",
     "heading_rad",
@@ -19,14 +19,12 @@ const STATE_FIELDS: [&str; 14] = [
     "scale_left",
     "track_width_error_m",
     "range_scale",
-    "sigma_x_m",
-    "sigma_y_m",
-    "sigma_heading_rad",
-    "sigma_scale_right",
-    "sigma_scale_left",
-    "sigma_track_width_m",
-    "sigma_range_scale",
 ];
+/// The names of the state and of its deviations.
+fn state_fields() -> impl Iterator<Item = &'static str> {
+    STATE_FIELDS.into_iter().chain(DEVIATIONS)
+}
+
 const POSE_FIELDS: [(&str, Kind); 6] = [
     ("time_s", REAL),
     ("x_m", REAL),
@@ -79,7 +77,8 @@ fn numbers(
 /// The topics and their schemas.
 pub fn topics() -> Vec<(&'static str, Schema)> {
     let whole = Kind::Whole;
-    let states = || std::iter::once(("time_s", REAL)).chain(STATE_FIELDS.map(|name| (name, REAL)));
+    let states =
+        || std::iter::once(("time_s", REAL)).chain(state_fields().map(|name| (name, REAL)));
     let ticks = [("time_s", REAL), ("right", whole), ("left", whole)];
     let wheels = [("time_s", REAL), ("right_m", REAL), ("left_m", REAL)];
     let turn = [("time_s", REAL), ("angle", whole), ("breaks", whole)];
@@ -212,7 +211,7 @@ fn start(time: f64, [x, y, heading]: [f64; 3], position: f64, deviation: f64) ->
 }
 
 fn states(time: f64, state: &[f64; STATES.len()], deviation: &[f64; STATES.len()]) -> Value {
-    let fields = STATE_FIELDS.into_iter().zip(state.iter().chain(deviation));
+    let fields = state_fields().zip(state.iter().chain(deviation));
     let fields = fields.map(|(name, value)| (name.to_owned(), json!(value)));
     std::iter::once(("time_s".to_owned(), json!(time))).chain(fields).collect()
 }

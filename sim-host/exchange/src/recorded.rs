@@ -6,7 +6,7 @@ use sonarfix_sim::trace::{
     Truth, Wall, Why,
 };
 
-use crate::row::{Row, Sink, Value};
+use crate::row::{DEVIATIONS, Row, Sink, Value};
 
 /// Passes the records of each row on; the first row is the start. What a trace does not have stays unknown: the source of an echo, the search, and all of the bound.
 #[derive(Debug)]
@@ -47,16 +47,7 @@ fn tick(row: &Row) -> Tick {
     let estimate = Estimate {
         pose: pose(row, ["x_m", "y_m", "heading_rad"]).unwrap_or_default(),
         calibration: calibration(row, "").unwrap_or_default(),
-        deviation: [
-            "sigma_x_m",
-            "sigma_y_m",
-            "sigma_heading_rad",
-            "sigma_scale_right",
-            "sigma_scale_left",
-            "sigma_track_width_m",
-            "sigma_range_scale",
-        ]
-        .map(|column| number(row, column)),
+        deviation: DEVIATIONS.map(|column| number(row, column)),
         covariance_xy: number(row, "covariance_xy_m2"),
         gyro: gyro(row),
         verdict: match row.text("verdict") {

@@ -28,6 +28,17 @@ pub enum Value {
     Unknown,
 }
 
+/// The columns of the deviations of the states.
+pub(crate) const DEVIATIONS: [&str; 7] = [
+    "sigma_x_m",
+    "sigma_y_m",
+    "sigma_heading_rad",
+    "sigma_scale_right",
+    "sigma_scale_left",
+    "sigma_track_width_m",
+    "sigma_range_scale",
+];
+
 /// The columns of an instant: name with unit, and type.
 const STATE_COLUMNS: [(&str, Kind); 35] = [
     ("time_s", Kind::Real),

@@ -1,4 +1,4 @@
-//! What a run comes to: errors against the truth, outcomes of the measurement cycles, verdicts, and the state at the end.
+//! Statistics of a run: errors against the truth, outcomes of the measurement cycles, verdicts, and the state at the end.
 
 use serde::Serialize;
 use sonarfix::health::Verdict;
@@ -10,9 +10,9 @@ use sonarfix_sim::trace::{
     AbsoluteRecord, Calibration, FixRecord, Outcome, Recorder, SearchRecord, Tick,
 };
 
-/// A run as it is measured.
+/// The statistics of a run, while its records arrive.
 #[derive(Debug, Default)]
-pub struct Course {
+pub struct RunStatistics {
     score: Score,
     health: Verdicts,
     verdict: Verdict,
@@ -49,10 +49,10 @@ pub struct Figures {
     pub final_pose_deviation: [f64; 3],
 }
 
-impl Course {
-    /// A recorder that also measures.
+impl RunStatistics {
+    /// A recorder that passes the records on and counts them here.
     pub fn of<'a, R: Recorder>(&'a mut self, recorder: &'a mut R) -> Measured<'a, R> {
-        Measured { course: self, recorder }
+        Measured { statistics: self, recorder }
     }
 
     fn tick(&mut self, tick: &Tick) {
@@ -101,10 +101,10 @@ impl Course {
     }
 }
 
-/// Passes the records of a run on, and measures them.
+/// Passes the records of a run on, and counts them.
 #[derive(Debug)]
 pub struct Measured<'a, R> {
-    course: &'a mut Course,
+    statistics: &'a mut RunStatistics,
     recorder: &'a mut R,
 }
 
@@ -115,13 +115,13 @@ impl<R: Recorder> Recorder for Measured<'_, R> {
 
     fn tick(&mut self, make: impl FnOnce() -> Tick) {
         let tick = make();
-        self.course.tick(&tick);
+        self.statistics.tick(&tick);
         self.recorder.tick(|| tick);
     }
 
     fn fix(&mut self, make: impl FnOnce() -> FixRecord) {
         let fix = make();
-        self.course.fix(fix.outcome);
+        self.statistics.fix(fix.outcome);
         self.recorder.fix(|| fix);
     }
 
