@@ -23,7 +23,7 @@ pub struct Page {
     pub known: Vec<Row>,
     /// The same on recordings.
     pub recordings: Vec<Row>,
-    /// From nothing, in simulation.
+    /// With an unknown start, in simulation.
     pub searched: Vec<Searched>,
 }
 
@@ -50,11 +50,11 @@ Robots with a laser are usually localized by a particle filter. The one of this 
 localization with {FEWEST} to {MOST} particles by KLD sampling, and a beam model: hit, something before the wall, no echo, anywhere. The
 expected range is that of the nearest point of a wall in the cone and its rim; a wall that is not square to the beam mostly gives no echo.
 Each particle has its own errors of the wheels, from the prior of the robot file. If the start is unknown, random particles are added when
-the pings fit worse than they did (augmented MCL). It gets the odometry and the pings of the localizer and of the search, which choose the
-bearings for themselves and not for it. It needs {} KB for its particles, in 64 bits.
+the pings fit worse than they did (augmented MCL). It gets the odometry and the pings of the localizer and of the search; the bearings
+are those that these two choose. It needs {} KB for its particles, in 64 bits.
 
-Its settings were chosen on the seeds 20000 to 20019. There, random particles made it worse from a known start; on a log of a building, where
-encoders miss a turn, it does not find back without them.
+Its settings were chosen on the seeds 20000 to 20019. Random particles increased its errors from a known start there; without
+them it does not relocalize after the turn that the encoders miss in the log `carmen/seattle`.
 
 *Sure*: the localizer's verdict is `Tracking`; 95 % of the weight of the particles is within a metre, with a deviation below 25 cm.
 
@@ -67,7 +67,7 @@ encoders miss a turn, it does not find back without them.
             page += "\n## Recordings\nFrom the start of each, where it has one. A robot that is lost sweeps with its sonar: those pings are not counted here.\n\n";
             table(&mut page, &self.recordings);
         }
-        page += "\n## From nothing\nThe time until the first answer: a unique one of the search, or five seconds in which the particle filter is sure.\n\n";
+        page += "\n## With an unknown start\nThe time until the first answer: a unique one of the search, or five seconds in which the particle filter is sure.\n\n";
         page += SEARCH_HEAD;
         for Searched { name, found } in &self.searched {
             let row = |of: &dyn Fn(&Found) -> Option<(f64, bool)>| answers(found.iter().map(of));
