@@ -48,10 +48,13 @@ pub fn root() -> &'static Path {
 }
 
 /// Makes a build from the sources in `root` the same in every folder: neither that of the sources nor that of cargo is in it.
-pub fn reproducible(build: &mut Command, root: &Path) -> anyhow::Result<()> {
+/// `others` are further flags of the compiler.
+pub fn reproducible(build: &mut Command, root: &Path, others: &[&str]) -> anyhow::Result<()> {
     let remap = |from: &Path, to| format!("--remap-path-prefix={}={to}", from.display());
-    let flags = [remap(root, "/sonarfix"), remap(&home()?, "/cargo")].join("\u{1f}");
-    build.env("CARGO_ENCODED_RUSTFLAGS", flags);
+    let remaps = [remap(root, "/sonarfix"), remap(&home()?, "/cargo")];
+    let flags: Vec<&str> =
+        remaps.iter().map(String::as_str).chain(others.iter().copied()).collect();
+    build.env("CARGO_ENCODED_RUSTFLAGS", flags.join("\u{1f}"));
     Ok(())
 }
 

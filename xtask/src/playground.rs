@@ -58,7 +58,7 @@ pub fn build(root: &Path, firmware: Option<&Path>) -> anyhow::Result<PathBuf> {
         "build --package sonarfix-playground --lib --target wasm32-unknown-unknown --profile playground",
     );
     simulator.current_dir(root).env("CARGO_TARGET_DIR", &target);
-    cargo::reproducible(&mut simulator, root)?;
+    cargo::reproducible(&mut simulator, root, &[])?;
     cargo::check(simulator)?;
     let program = target.join("wasm32-unknown-unknown/playground/sonarfix_playground.wasm");
     let folder = target.join("playground");

@@ -64,7 +64,7 @@ fn build(board: &Board, root: &Path) -> anyhow::Result<PathBuf> {
     let build = format!("build --locked --package {package} --profile dist --target {target}");
     let mut command = Workspace::Firmware.cargo(&build);
     command.current_dir(root.join("firmware"));
-    cargo::reproducible(&mut command, root)?;
+    cargo::reproducible(&mut command, root, &[])?;
     symbols::same_in_every_folder(&mut command, root)?;
     cargo::check(command)?;
     Ok(Workspace::Firmware.target_folder().join(target).join("dist").join(package))

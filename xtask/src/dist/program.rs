@@ -81,7 +81,8 @@ fn build(target: &str, root: &Path) -> anyhow::Result<PathBuf> {
         "build --locked --package sonarfix-cli --profile dist --target {target}"
     ));
     command.current_dir(root).env("CARGO_TARGET_DIR", &folder);
-    cargo::reproducible(&mut command, root)?;
+    // A panic ends the program (Cargo.toml), and a backtrace without symbols has no use.
+    cargo::reproducible(&mut command, root, &["-Cforce-unwind-tables=no"])?;
     // The linker of Rust, which knows every processor.
     let linker = format!("CARGO_TARGET_{}_LINKER", target.replace('-', "_").to_uppercase());
     command.env(linker, "rust-lld");
