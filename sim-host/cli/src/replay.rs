@@ -82,11 +82,15 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         paced.end();
     }
     let mut trace = Thinned::new(&floor, robot.localizer.rangers.first.cone, CAPACITY);
-    let summary = replay(args, &with, &mut trace)?;
+    let diagnose = || diagnosis::diagnose(&args.log, with.robot, with.walls, None);
+    let summary = replay(args, &with, &mut trace).inspect_err(|_| {
+        // Without a start nothing is replayed: the records say why.
+        eprint!("{}", diagnose().map(|it| diagnosis::paragraphs(&it)).unwrap_or_default());
+    })?;
     if let Some(file) = &args.trace {
         sonarfix_files::write_with(file, |out| trace_csv::write(trace.trace(), out))?;
     }
-    let diagnosis = diagnosis::diagnose(&args.log, with.robot, with.walls, None)?;
+    let diagnosis = diagnose()?;
     let tables = tables(&summary);
     if args.output.json {
         let result = Diagnosed { summary: &summary, diagnosis: &diagnosis };

@@ -123,7 +123,9 @@ const MISTAKES: [(&str, &str, Change); 30] = [
 ];
 
 /// Mistakes in the files: the cause, the file, what is written in it, and what is read.
-const FILES: [(&str, &str, &str, &str); 4] = [
+const FILES: [(&str, &str, &str, &str); 6] = [
+    ("map_wall", "map.toml", "    { name = \"board\", from = [6.0, 0.0], to = [6.0, 8.0] },\n", ""),
+    ("map_wall", "map.toml", "[6.0, 0.0], to = [6.0, 8.0]", "[6.4, 0.0], to = [6.4, 8.0]"),
     ("map_unit", "map.toml", "unit = \"m\"", "unit = \"cm\""),
     ("map_unit", "map.toml", "unit = \"m\"", "unit = \"mm\""),
     ("mount", "robot.toml", "mount = [\"6 cm\", \"0 m\"]", "mount = [\"6 cm\", \"20 cm\"]"),
@@ -169,6 +171,49 @@ fn each_mistake_is_named_first_and_a_right_log_has_none() {
         fs::write(&file, text).unwrap();
     }
     assert_eq!(wrong, Vec::<String>::new());
+}
+
+/// The log of a robot that is carried from where it is at one time to where it is at a later one.
+fn carried(log: &str, from: f64, until: f64) -> String {
+    let value = |line: &str, field: usize| line.split(',').nth(field)?.parse::<f64>().ok();
+    let is = |line: &&str, kind: &str| line.split(',').next() == Some(kind);
+    let time = |line: &str| value(line, 1).unwrap_or(0.0);
+    let mut wheels = log.lines().filter(|line| is(line, "wheels"));
+    let before = wheels.clone().take_while(|line| time(line) < from).last().unwrap();
+    let after = wheels.find(|line| time(line) >= until).unwrap();
+    let way = [2, 3].map(|field| value(after, field).unwrap() - value(before, field).unwrap());
+    let begin = log.lines().filter(|line| time(line) < from);
+    let end: Vec<_> = log.lines().filter(|line| time(line) >= until).collect();
+    let end = changed(&end.join("\n"), "wheels", |it| {
+        it[1] -= way[0];
+        it[2] -= way[1];
+    });
+    let kinds = ["wheels", "range", "skip", "turn", "mode"];
+    let earlier =
+        kinds.iter().fold(end, |log, kind| changed(&log, kind, |it| it[0] -= until - from));
+    begin.chain(earlier.lines()).collect::<Vec<_>>().join("\n") + "\n"
+}
+
+#[test]
+fn a_robot_that_is_carried_is_named() {
+    let dir = recorded(CLASSROOM);
+    let log = dir.path().join("log.csv");
+    let right = fs::read_to_string(&log).unwrap();
+    fs::write(&log, carried(&right, 50.0, 65.0)).unwrap();
+    assert_eq!(causes(dir.path()), ["moved"]);
+}
+
+#[test]
+fn a_log_without_a_start_is_examined() {
+    let dir = recorded(CLASSROOM);
+    let log = dir.path().join("log.csv");
+    let right = fs::read_to_string(&log).unwrap();
+    fs::write(&log, right.replacen("resume,", "resume;", 1)).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sonarfix"));
+    let output = command.arg("replay").arg(log).output().unwrap();
+    let printed = String::from_utf8_lossy(&output.stderr);
+    assert!(!output.status.success());
+    assert!(printed.contains("probable cause: line 2: 1 of"), "{printed}");
 }
 
 /// Mistakes in the log of two fixed sonars.

@@ -12,6 +12,7 @@ mod finding;
 mod recording;
 mod report;
 mod visible;
+mod walls;
 
 use std::io::BufRead;
 
@@ -25,7 +26,7 @@ use crate::fault::ReplayError;
 use crate::find::Find;
 use crate::log::Record;
 use crate::wheels;
-use causes::Candidate;
+use causes::{Candidate, Cause};
 use change::Change;
 use evidence::{Broken, Evidence};
 use recording::{Entry, Recording};
@@ -41,9 +42,13 @@ const RIGHT: f64 = 0.93;
 const STARTED_ELSEWHERE: f64 = 0.8;
 /// A cause must explain at least this share of the echoes.
 const LEAST_EXPLAINED: f64 = 0.6;
+const LEAST_EXPLAINED_STANDING: f64 = 0.75;
+/// The share of all echoes that a cause may explain less than the files as they are, and that of the echoes that are compared.
+const LOST: f64 = 0.03;
+const LOST_OF_COMPARED: f64 = 0.1;
 /// The logarithm of the likelihood that a cause must gain: in all, and for each echo.
-const LEAST_GAIN: f64 = 15.0;
-const LEAST_GAIN_PER_ECHO: f64 = 0.3;
+const LEAST_GAIN: f64 = 7.0;
+const LEAST_GAIN_PER_ECHO: f64 = 0.08;
 /// Records in which causes are tried: five minutes of a robot with 10 encoder records and 2 ranges a second.
 const TRIED: usize = 3_600;
 /// Records in which candidates are compared first, and how many are examined further.
@@ -95,26 +100,51 @@ pub fn diagnose(
     let is_right = explained.is_none_or(|share| share >= RIGHT)
         && !as_is.is_too_fast()
         && !as_is.is_strained();
-    if is_enough && is_readable && !is_right {
-        if let Some(clipped) = visible.clipped() {
-            findings.retain(|it| it.cause != "range_stuck");
-            findings.push(clipped);
-        }
-        // A jump of a counter may be the effect of a wrong unit.
-        let jumps = findings.extract_if(.., |it| it.cause == "counter_jump").collect::<Vec<_>>();
-        // Random numbers fit a robot that hardly moves.
-        findings.extend(visible.certain_noise());
-        findings.extend(whole.causes(&as_is));
-        let is_named =
-            |it: &Finding| it.explained.is_some() || ["moved", "range_noise"].contains(&it.cause);
-        let is_explained = findings.iter().any(is_named);
-        findings.extend(jumps);
-        if !is_explained {
+    if is_enough && is_readable {
+        add_unexplained(&visible, is_right, &mut findings);
+        let causes = whole.causes(&as_is);
+        let are_none = causes.is_empty();
+        add(causes, &mut findings);
+        if are_none && !is_right && !findings.iter().any(|it| it.cause == RANGE_NOISE) {
             findings.extend(visible.unexplained().or_else(|| report::unexplained(&as_is, walls)));
         }
     }
     findings.extend(visible::edited(&recording));
     Ok(Diagnosis { explained, findings })
+}
+
+const RANGE_NOISE: &str = "range_noise";
+
+/// Adds what the records show of ranges that the files do not explain.
+fn add_unexplained(visible: &Visible, is_right: bool, findings: &mut Vec<Finding>) {
+    if is_right {
+        return;
+    }
+    if let Some(clipped) = visible.clipped() {
+        findings.retain(|it| it.cause != "range_stuck");
+        findings.push(clipped);
+    }
+    let is_placed =
+        findings.iter().any(|it| ["range_placeholder", "range_stuck"].contains(&it.cause));
+    findings.extend(visible.repeated().filter(|_| !is_placed));
+    findings.extend(visible.certain_noise());
+}
+
+/// Adds the causes that were found by trying. What the records show may be their effect.
+fn add(causes: Vec<Finding>, findings: &mut Vec<Finding>) {
+    let is_certain =
+        causes.first().and_then(|it| it.explained).is_some_and(|it| it >= STARTED_ELSEWHERE);
+    if is_certain {
+        // Random numbers explain less, but wheels that count backwards make ranges look random.
+        findings.retain(|it| it.cause != RANGE_NOISE);
+    }
+    if causes.iter().any(|it| it.cause == "range_unit") {
+        findings.retain(|it| it.cause != "range_placeholder");
+    }
+    // A jump of a counter may be the effect of a wrong unit.
+    let jumps: Vec<_> = findings.extract_if(.., |it| it.cause == "counter_jump").collect();
+    findings.extend(causes);
+    findings.extend(jumps);
 }
 
 /// The files and the log on which causes are tried.
@@ -124,6 +154,13 @@ struct Trial<'a> {
     entries: &'a [Entry],
     /// Whether both wheels are often faster than they can be.
     are_too_fast: bool,
+}
+
+/// The causes that explain a log, best first, and by how much the first one is more probable: the logarithm of the likelihood ratio.
+#[derive(Default)]
+struct Named {
+    findings: Vec<Finding>,
+    value: f64,
 }
 
 /// A cause that was tried.
@@ -161,32 +198,27 @@ impl<'a> Trial<'a> {
 
     /// The causes that explain the log, best first. If much of the log is right before the rest, the robot was probably moved.
     fn causes(&self, as_is: &Evidence) -> Vec<Finding> {
-        let Some(broken) = as_is.broken() else { return self.beginning().lasting() };
+        let lasting = self.beginning().lasting();
+        let Some(broken) = as_is.broken() else { return lasting.findings };
         let mut moves = self.moves(broken, as_is);
         keep_best(&mut moves, 0);
         let moved = self.named(&moves, as_is);
-        if explained(&moved) >= RIGHT {
-            return moved;
-        }
-        // A wrong track width shows in the turns alone; a wrong travel shows on the first leg.
-        let lasting = self.beginning().lasting();
-        let is_of_turns = lasting.first().is_some_and(|it| it.cause == "track_width");
-        if is_of_turns && explained(&lasting) >= RIGHT.max(explained(&moved)) {
-            lasting
-        } else if moved.is_empty() {
+        let best = if moved.value > lasting.value { moved } else { lasting };
+        if best.findings.is_empty() && broken.is_sharp {
             vec![report::broken(broken, self.begin(), self.entries)]
         } else {
-            moved
+            best.findings
         }
     }
 
     /// The causes that explain the log from its start on.
-    fn lasting(&self) -> Vec<Finding> {
+    fn lasting(&self) -> Named {
         let as_is = &self.as_is();
         let start = self.start();
         let mut candidates = causes::all();
         // A robot that hardly moves, by its log, can follow any ranges.
         candidates.retain(|it| !it.is_of_slow_wheels() || self.are_too_fast);
+        candidates.extend(walls::candidates(self.walls));
         candidates.extend(start.into_iter().flat_map(causes::starts_around));
         candidates.extend(start.and_then(causes::start_unit));
         candidates.extend(start.into_iter().flat_map(causes::start_positions));
@@ -211,20 +243,28 @@ impl<'a> Trial<'a> {
     }
 
     /// The best of what was tried, and one that is nearly as good.
-    fn named(&self, tried: &[Tried], as_is: &Evidence) -> Vec<Finding> {
+    fn named(&self, tried: &[Tried], as_is: &Evidence) -> Named {
         let is_enough = |it: &&Tried| it.is_enough(as_is) && !it.candidate.is_usual(self.robot);
         let named: Vec<_> = tried.iter().filter(is_enough).collect();
-        let Some(first) = named.first() else { return Vec::new() };
+        let Some(first) = named.first() else { return Named::default() };
         let near: Vec<_> =
             named.iter().filter(|it| it.value() > 0.9 * first.value() - 4.0).collect();
         // Several varied quantities that all fit a little are signs of something else.
-        let are_vague = near.len() > 1 && near.iter().all(|it| it.candidate.is_varied());
+        let kind = first.candidate.kind();
+        let are_alike = kind.is_some() && near.iter().all(|it| it.candidate.kind() == kind);
+        let are_vague =
+            near.len() > 1 && !are_alike && near.iter().all(|it| it.candidate.is_varied());
         if are_vague && first.evidence.explained() < RIGHT {
-            return Vec::new();
+            return Named::default();
         }
-        let finding =
-            |it: &Tried| report::finding(&it.candidate, &it.evidence, self.robot, self.entries);
-        near.into_iter().copied().take(2).map(finding).collect()
+        let shown = if are_alike { 3 } else { 2 };
+        let finding = |it: &Tried| {
+            report::finding(&it.candidate, &it.evidence, self.robot, self.walls, self.entries)
+        };
+        Named {
+            value: first.value(),
+            findings: near.into_iter().copied().take(shown).map(finding).collect(),
+        }
     }
 
     /// Varies the value of a candidate in steps that become finer.
@@ -273,7 +313,15 @@ impl<'a> Trial<'a> {
     /// Other poses from the moment on at which the ranges no longer fit.
     fn moves(&self, broken: Broken, as_is: &Evidence) -> Vec<Tried> {
         let time = self.begin() + broken.from;
-        self.searched(time, as_is, |pose| causes::moved_to(time, pose))
+        let mut tried = self.searched(time, as_is, |pose| causes::moved_to(time, pose));
+        let around = broken.pose.into_iter().flat_map(|pose| causes::moves_around(time, pose));
+        tried.extend(around.filter_map(|it| self.try_one(it, as_is)));
+        tried.sort_by(|a, b| b.value().total_cmp(&a.value()));
+        tried.truncate(REFINED);
+        for best in &mut tried {
+            self.refine(best, as_is);
+        }
+        tried
     }
 
     /// The candidates of the poses that the search finds from a time on.
@@ -311,7 +359,7 @@ impl<'a> Trial<'a> {
 impl Tried {
     /// The gain without what a cause of its kind gains by chance. A varied quantity fits a little better than what is right.
     fn value(&self) -> f64 {
-        let share = if self.candidate.is_varied() { 0.95 } else { 1.0 };
+        let share = if self.candidate.is_fitted() { 0.95 } else { 1.0 };
         share * self.gain - self.candidate.cost()
     }
 
@@ -323,13 +371,29 @@ impl Tried {
         let is_relaxed = as_is.is_strained() && !self.evidence.is_strained();
         gain >= LEAST_GAIN
             && (is_relaxed || gain >= LEAST_GAIN_PER_ECHO * echoes)
-            && self.evidence.explained() >= LEAST_EXPLAINED
+            && self.evidence.explained() >= self.least_explained()
+            && self.explains_no_less(as_is)
     }
 }
 
-/// The share that the first finding explains; 0 without one.
-fn explained(findings: &[Finding]) -> f64 {
-    findings.first().and_then(|it| it.explained).unwrap_or(0.0)
+impl Tried {
+    /// A robot that hardly moves, by its log, can follow many ranges.
+    fn least_explained(&self) -> f64 {
+        if self.candidate.is_standing() { LEAST_EXPLAINED_STANDING } else { LEAST_EXPLAINED }
+    }
+
+    /// A cause takes no explanation away, but other echoes are compared.
+    fn explains_no_less(&self, as_is: &Evidence) -> bool {
+        let lost = as_is.explained_of_all() - self.evidence.explained_of_all();
+        let lost_of_compared = as_is.explained() - self.evidence.explained();
+        let permitted = match self.candidate.cause {
+            Cause::Moved => LOST,
+            // Of few compared echoes all may be explained.
+            _ if as_is.are_mostly_compared() || self.candidate.is_of_wall() => LOST_OF_COMPARED,
+            _ => 1.0,
+        };
+        lost <= LOST && lost_of_compared <= permitted
+    }
 }
 
 /// Sorts what was tried, and keeps the best of each cause, and so many others that are as good.

@@ -6,6 +6,7 @@ use sonarfix_hal::config::RobotConfig;
 use sonarfix_sim::trace::Pose;
 
 use crate::diagnosis::change::Change;
+use crate::diagnosis::walls;
 
 /// What may be wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,6 +77,21 @@ pub enum Cause {
     MapScaleX,
     /// The y axis of the map has another scale.
     MapScaleY,
+    /// A wall is at another place than in the map.
+    WallShifted,
+    /// A wall of the map is not there.
+    WallRemoved,
+    /// A wall is missing in the map.
+    WallAdded,
+}
+
+/// What causes have in common that a drive may not tell apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// All ranges are longer or shorter.
+    Length,
+    /// Ranges belong to another time.
+    Time,
 }
 
 /// A change that explains the log if the cause is right.
@@ -290,7 +306,7 @@ pub fn all() -> Vec<Candidate> {
     }
     let late = (1_u8..=10).map(|pings| Candidate {
         cause: Cause::LatePings,
-        change: Change { late_pings: pings.into(), ..none },
+        change: Change { late_pings: pings, ..none },
         value: pings.into(),
     });
     all.extend(late);
@@ -315,7 +331,8 @@ pub fn all() -> Vec<Candidate> {
 /// Candidates between a value of a varied quantity and its neighbours; none of what is not varied. `fineness` halves the step.
 pub fn finer(candidate: &Candidate, fineness: i32) -> Vec<Candidate> {
     let Some(varied) = VARIED.iter().find(|varied| varied.cause == candidate.cause) else {
-        return Vec::new();
+        return poses_around(candidate, fineness)
+            .unwrap_or_else(|| walls::finer(candidate, fineness));
     };
     let share = 0.5_f64.powi(fineness);
     let values = if varied.is_factor {
@@ -328,6 +345,11 @@ pub fn finer(candidate: &Candidate, fineness: i32) -> Vec<Candidate> {
     let finer =
         values.map(|value| Candidate { change: (varied.change)(value), value, ..*candidate });
     finer.into()
+}
+
+/// How improbable a value is, of a normal distribution around zero.
+fn unusual(value: f64, deviation: f64) -> f64 {
+    0.5 * (value / deviation).powi(2)
 }
 
 /// A start elsewhere.
@@ -343,6 +365,9 @@ pub fn start_unit(pose: Pose) -> Option<Candidate> {
     (pose.heading.abs() > TAU).then_some(candidate)
 }
 
+/// A start farther from the origin may be in another unit than metres.
+const FAR: f64 = 10.0;
+
 /// The position of the start in another unit, and with exchanged axes.
 pub fn start_positions(pose: Pose) -> impl Iterator<Item = Candidate> {
     let at = move |cause, value, x, y| {
@@ -350,7 +375,9 @@ pub fn start_positions(pose: Pose) -> impl Iterator<Item = Candidate> {
         Candidate { cause, change, value }
     };
     let exchanged = at(Cause::StartAxes, 0.0, pose.y, pose.x);
-    let units = [1e-3, 1e-2, 0.0254, 100.0, 1e3].into_iter();
+    // Near the origin a start in another unit is hardly another start.
+    let is_far = pose.x.hypot(pose.y) > FAR;
+    let units = [1e-3, 1e-2, 0.0254, 100.0, 1e3].into_iter().filter(move |by| is_far || *by > 1.0);
     let units = units.map(move |by| at(Cause::StartUnit, by, by * pose.x, by * pose.y));
     units.chain(std::iter::once(exchanged))
 }
@@ -361,6 +388,34 @@ pub fn starts_around(pose: Pose) -> impl Iterator<Item = Candidate> {
     let offsets = STEPS.into_iter().flat_map(|x| STEPS.map(|y| (x, y)));
     let others = offsets.filter(|offset| *offset != (0.0, 0.0));
     others.map(move |(x, y)| start_at(Pose { x: pose.x + x, y: pose.y + y, ..pose }))
+}
+
+/// The poses next to that of a candidate. `fineness` halves the step.
+fn poses_around(candidate: &Candidate, fineness: i32) -> Option<Vec<Candidate>> {
+    let step = 0.2 * 0.5_f64.powi(fineness);
+    let around = |pose: Pose| {
+        [-step, step].into_iter().flat_map(move |by| {
+            let (x, y, heading) = (pose.x + by, pose.y + by, pose.heading + by);
+            [Pose { x, ..pose }, Pose { y, ..pose }, Pose { heading, ..pose }]
+        })
+    };
+    match (candidate.change.moved, candidate.change.start) {
+        (Some((time, pose)), _) => Some(around(pose).map(|pose| moved_to(time, pose)).collect()),
+        (None, Some(pose)) if candidate.cause == Cause::StartPose => {
+            Some(around(pose).map(start_at).collect())
+        }
+        _ => None,
+    }
+}
+
+/// Poses around the one at which the ranges no longer fit: a robot that slips or is pushed stays near.
+pub fn moves_around(time: f64, pose: Pose) -> impl Iterator<Item = Candidate> {
+    const TURNS: [f64; 8] = [0.0, 45.0, -45.0, 90.0, -90.0, 135.0, -135.0, 180.0];
+    let at = move |turn: f64| Pose { heading: pose.heading + turn.to_radians(), ..pose };
+    let turned = TURNS.into_iter().skip(1).map(at);
+    let all = TURNS.into_iter().flat_map(move |turn| starts_around(at(turn)));
+    let moved = all.filter_map(|it| it.change.start);
+    turned.chain(moved).map(move |pose| moved_to(time, pose))
 }
 
 /// A robot that was carried at a time.
@@ -375,6 +430,35 @@ impl Candidate {
         VARIED.iter().any(|varied| varied.cause == self.cause)
     }
 
+    /// Whether it has numbers that were fitted to the log.
+    pub fn is_fitted(&self) -> bool {
+        self.cause == Cause::WallShifted || self.is_varied()
+    }
+
+    /// Causes of one kind have similar effects, which many drives do not tell apart.
+    pub fn kind(&self) -> Option<Kind> {
+        match self.cause {
+            Cause::RangeOffset
+            | Cause::RangeScale
+            | Cause::RangeUnit
+            | Cause::MountAhead
+            | Cause::MountLeft => Some(Kind::Length),
+            Cause::RangeDelay | Cause::RangeClock | Cause::LatePings => Some(Kind::Time),
+            _ => None,
+        }
+    }
+
+    /// Whether it makes a robot drive less than half of what its log says.
+    pub fn is_standing(&self) -> bool {
+        let of_wheels = [Cause::RightTravel, Cause::LeftTravel, Cause::Travel];
+        of_wheels.contains(&self.cause) && self.value < 0.5
+    }
+
+    /// Whether it is one wall of the map.
+    pub fn is_of_wall(&self) -> bool {
+        self.change.wall.is_some()
+    }
+
     /// Whether it makes wheels slow that are too fast.
     pub fn is_of_slow_wheels(&self) -> bool {
         self.cause == Cause::TravelUnit && self.value < 1.0
@@ -383,13 +467,20 @@ impl Candidate {
     /// The logarithm of how many candidates there are of its kind: a varied quantity, and a start anywhere, fit by chance.
     pub fn cost(&self) -> f64 {
         match self.cause {
-            Cause::StartPose | Cause::TravelUnit => 10.0,
-            Cause::Moved => 15.0,
+            Cause::TravelUnit | Cause::WallShifted => 10.0,
+            Cause::WallRemoved | Cause::WallAdded | Cause::StartAxes => 12.0,
+            Cause::StartPose => 15.0,
+            Cause::Moved => 25.0,
+            Cause::RangeUnit => 3.0,
             // A robot that hardly moves, by its log, can follow any ranges.
             Cause::RightTravel | Cause::LeftTravel | Cause::Travel => {
                 5.0 + 40.0 * self.value.ln().abs()
             }
             Cause::TrackWidth => 5.0 + 20.0 * self.value.ln().abs(),
+            Cause::RangeScale => 5.0 + unusual(self.value.ln(), 0.15),
+            Cause::RangeOffset | Cause::MountAhead | Cause::MountLeft => {
+                5.0 + unusual(self.value, 0.1)
+            }
             _ if self.is_varied() => 5.0,
             _ => 1.0,
         }
@@ -414,6 +505,7 @@ impl Candidate {
             Cause::RangeClock => (self.value, 0.004),
             Cause::RangeOffset => (self.value, 0.025),
             Cause::RangeDelay => (self.value, 0.15),
+            Cause::WallShifted => (self.value, 0.05),
             _ => return false,
         };
         permitted.0.abs() <= permitted.1

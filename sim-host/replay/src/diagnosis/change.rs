@@ -7,6 +7,7 @@ use sonarfix_hal::config::RobotConfig;
 use sonarfix_sim::trace::Pose;
 
 use crate::diagnosis::recording::Entry;
+use crate::diagnosis::walls::WallChange;
 use crate::log::Record;
 use crate::wheels;
 
@@ -34,7 +35,7 @@ pub struct Change {
     /// Seconds by which the clock of the ranges gains on that of the encoders in a second.
     pub clock_gain: f64,
     /// By so many pings a range is older than its record.
-    pub late_pings: usize,
+    pub late_pings: u8,
     /// Whether the log's bearing and range are exchanged.
     pub is_exchanged: bool,
     /// Added to the mount of each ranger, metres ahead and to the left.
@@ -51,6 +52,8 @@ pub struct Change {
     pub map: [[f64; 2]; 2],
     /// Whether that is about the centre of the map instead of its origin.
     pub is_about_centre: bool,
+    /// One wall that is another.
+    pub wall: Option<WallChange>,
 }
 
 impl Default for Change {
@@ -74,6 +77,7 @@ impl Default for Change {
             heading_offset: 0.0,
             map: [[1.0, 0.0], [0.0, 1.0]],
             is_about_centre: false,
+            wall: None,
         }
     }
 }
@@ -104,7 +108,11 @@ impl Change {
             let changed = Wall::new(moved(wall.from()), moved(wall.to())).ok()?;
             Some(wall.accuracy().map_or(changed, |accuracy| changed.with_accuracy(accuracy)))
         };
-        walls.iter().filter_map(changed).collect()
+        let walls: Vec<_> = walls.iter().filter_map(changed).collect();
+        match self.wall {
+            Some(wall) => wall.of(walls),
+            None => walls,
+        }
     }
 
     /// The records with the change, in the order of their times. Encoder counts become the travel of the wheels of `robot`,
@@ -141,7 +149,7 @@ impl Change {
             let Record::Range { range, ranger, .. } = record else { continue };
             let later = all.get(own + 1..).unwrap_or_default().iter();
             let mut later = later.filter(|(other, _)| other == ranger);
-            *range = later.nth(self.late_pings - 1).and_then(|(_, range)| *range);
+            *range = later.nth(usize::from(self.late_pings) - 1).and_then(|(_, range)| *range);
             own += 1;
         }
     }

@@ -5,7 +5,7 @@ use std::io::Empty;
 use sonarfix::health::Verdict;
 use sonarfix::map::Wall;
 use sonarfix_hal::config::{RobotConfig, StartPose};
-use sonarfix_sim::trace::{FixRecord, Recorder, Tick};
+use sonarfix_sim::trace::{FixRecord, Pose, Recorder, Tick};
 
 use crate::fault::Fault;
 use crate::log::Record;
@@ -24,6 +24,8 @@ const LEAST_COMPARED: usize = 12;
 /// The fewest echoes before a stretch that is not explained, and in it.
 const LEAST_BEFORE: usize = 20;
 const LEAST_WITHIN: usize = 8;
+/// The share that is explained before it, in a room with furniture.
+const MOSTLY: f64 = 0.7;
 
 /// A stretch whose echoes are not explained, seconds since the start.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,6 +33,10 @@ pub struct Broken {
     pub from: f64,
     /// `None` if it ends with the log.
     pub until: Option<f64>,
+    /// The estimate when it begins.
+    pub pose: Option<Pose>,
+    /// Whether nearly all echoes before it are explained.
+    pub is_sharp: bool,
 }
 
 /// One echo: its time, and the logarithm of its likelihood against that of an echo from anywhere in range.
@@ -41,6 +47,8 @@ pub struct Echo {
     pub weight: f64,
     /// Whether a wall was expected, so that the range could be compared.
     pub is_compared: bool,
+    /// The last estimate before it; `None` before the first encoder record.
+    pub pose: Option<Pose>,
 }
 
 /// What a replay says of its ranges.
@@ -55,7 +63,8 @@ pub struct Evidence {
     ticks: u64,
     /// Of the ranger, metres.
     max_range: f64,
-    /// Whether the verdict is not `Lost`.
+    /// The last estimate, and whether its verdict is not `Lost`.
+    pose: Option<Pose>,
     is_sure: bool,
     /// Deviations of the prior of the two wheels, the track width and the range scale, and the estimates at the end.
     prior: [f64; 4],
@@ -77,7 +86,7 @@ impl Evidence {
     pub fn none(records: &[Record]) -> Self {
         let echo = |record: &Record| match record {
             Record::Range { time, range: Some(_), .. } => {
-                Some(Echo { time: *time, weight: FOREIGN.ln(), is_compared: true })
+                Some(Echo { time: *time, weight: FOREIGN.ln(), is_compared: true, pose: None })
             }
             _ => None,
         };
@@ -147,6 +156,16 @@ impl Evidence {
         if are_many { share(&compared) } else { share_of(&self.echoes, self.count()) }
     }
 
+    /// The share of all echoes that are explained.
+    pub fn explained_of_all(&self) -> f64 {
+        share_of(&self.echoes, self.count())
+    }
+
+    /// Whether a wall was expected by at least half of all echoes.
+    pub fn are_mostly_compared(&self) -> bool {
+        2 * self.echoes.iter().filter(|it| it.is_compared).count() >= self.count()
+    }
+
     /// The logarithm of the likelihood against that of another replay, for as many echoes as that one has.
     pub fn gain(&self, other: &Self) -> f64 {
         let missing = other.count().saturating_sub(self.count());
@@ -172,11 +191,13 @@ impl Evidence {
         let within = self.echoes.get(stretch.clone())?;
         let is_late = before.len() >= LEAST_BEFORE && 5 * before.len() >= 2 * self.echoes.len();
         let is_long = within.len() >= LEAST_WITHIN;
-        let is_broken = is_late && is_long && share(before) >= 0.95 && share(within) < 0.4;
+        let is_broken = is_late && is_long && share(before) >= MOSTLY && share(within) < 0.4;
         let to_end = stretch.end + LEAST_WITHIN >= self.echoes.len();
         is_broken.then_some(Broken {
             from: within.first()?.time,
+            pose: within.first()?.pose,
             until: (!to_end).then_some(within.last()?.time),
+            is_sharp: share(before) >= 0.95,
         })
     }
 
@@ -206,6 +227,7 @@ impl Recorder for Evidence {
     fn tick(&mut self, make: impl FnOnce() -> Tick) {
         self.ticks += 1;
         let estimate = make().estimate;
+        self.pose = Some(estimate.pose);
         self.is_sure = estimate.verdict != Verdict::Lost;
         let of = estimate.calibration;
         let track_width = of.track_width - self.track_width;
@@ -229,6 +251,6 @@ impl Recorder for Evidence {
         // A localizer that has lost the pose follows any range.
         let weight = if self.is_sure { weight } else { weight.min(0.0) };
         let is_compared = record.innovation.is_some();
-        self.echoes.push(Echo { time: record.time, weight, is_compared });
+        self.echoes.push(Echo { time: record.time, weight, is_compared, pose: self.pose });
     }
 }

@@ -1,5 +1,6 @@
 //! The causes in words, with the corrected line.
 
+use sonarfix::geometry::pose::Point;
 use sonarfix::map::Wall;
 use sonarfix_hal::config::RobotConfig;
 
@@ -8,6 +9,7 @@ use crate::diagnosis::change::Change;
 use crate::diagnosis::evidence::{Broken, Evidence};
 use crate::diagnosis::finding::Finding;
 use crate::diagnosis::recording::Entry;
+use crate::diagnosis::walls::WallChange;
 use crate::log::Record;
 
 /// A cause as a finding.
@@ -15,9 +17,10 @@ pub fn finding(
     candidate: &Candidate,
     evidence: &Evidence,
     robot: &RobotConfig,
+    walls: &[Wall],
     entries: &[Entry],
 ) -> Finding {
-    let (cause, message, remedy) = words(candidate, robot);
+    let (cause, message, remedy) = words(candidate, robot, walls);
     let line = match candidate.change.moved {
         Some((time, _)) => line_at(time, entries),
         None => candidate.is_of_start().then(|| start_line(entries)).flatten(),
@@ -28,8 +31,8 @@ pub fn finding(
 /// The name of a cause, what is wrong, and what to do.
 type Words = (&'static str, String, String);
 
-fn words(candidate: &Candidate, robot: &RobotConfig) -> Words {
-    wheels(candidate, robot).or_else(|| sonar(candidate)).unwrap_or_else(|| place(candidate))
+fn words(candidate: &Candidate, robot: &RobotConfig, walls: &[Wall]) -> Words {
+    wheels(candidate, robot).or_else(|| sonar(candidate)).unwrap_or_else(|| place(candidate, walls))
 }
 
 /// Causes at the wheels.
@@ -192,7 +195,7 @@ fn swapped([right, left]: [f64; 2]) -> Words {
 }
 
 /// Causes of the start, the course and the map.
-fn place(candidate: &Candidate) -> Words {
+fn place(candidate: &Candidate, walls: &[Wall]) -> Words {
     let value = candidate.value;
     match candidate.cause {
         Cause::StartHeading => (
@@ -248,6 +251,9 @@ fn place(candidate: &Candidate) -> Words {
             ),
             "measure the heading of the start in the frame of the map, or turn the map".to_owned(),
         ),
+        Cause::WallShifted | Cause::WallRemoved | Cause::WallAdded => {
+            wall(&candidate.change, walls)
+        }
         Cause::MapScale => map_scale(value, "its coordinates"),
         Cause::MapScaleX => map_scale(value, "its x coordinates"),
         Cause::MapScaleY => map_scale(value, "its y coordinates"),
@@ -255,6 +261,34 @@ fn place(candidate: &Candidate) -> Words {
             "map_unit",
             format!("the map is right if its coordinates are multiplied by {value}"),
             "correct `map.unit`".to_owned(),
+        ),
+    }
+}
+
+/// One wall of the map that is wrong.
+fn wall(change: &Change, walls: &[Wall]) -> Words {
+    const CAUSE: &str = "map_wall";
+    let ends = |wall: &Wall| {
+        let end = |at: Point| format!("({:.2}, {:.2})", at.x.0, at.y.0);
+        format!("from {} to {} m", end(wall.from()), end(wall.to()))
+    };
+    let stated = |index: usize| walls.get(index).map(ends).unwrap_or_default();
+    let corrected = |index: usize| change.walls(walls).get(index).map(ends).unwrap_or_default();
+    match change.wall {
+        Some(WallChange::Shifted(index, by)) => (
+            CAUSE,
+            format!("the wall {} of the map is {:.2} m elsewhere", stated(index), by.abs()),
+            format!("measure it again; {} explains the ranges", corrected(index)),
+        ),
+        Some(WallChange::Removed(index)) => (
+            CAUSE,
+            format!("the wall {} of the map is not in the room", stated(index)),
+            "remove it, or what is open of it: a door".to_owned(),
+        ),
+        _ => (
+            CAUSE,
+            format!("the map has no wall {}", corrected(walls.len())),
+            "measure it, and add it to the map".to_owned(),
         ),
     }
 }

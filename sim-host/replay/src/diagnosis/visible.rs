@@ -128,6 +128,11 @@ impl<'a> Visible<'a> {
         self.longest.clipped(self.max_range())
     }
 
+    /// A number in place of no echo within the other ranges, in a log that its files do not explain.
+    pub fn repeated(&self) -> Option<Finding> {
+        self.longest.repeated()
+    }
+
     fn max_range(&self) -> f64 {
         f64::from(self.robot.localizer.rangers.first.max_range.0)
     }

@@ -14,6 +14,9 @@ const BELOW: u64 = 25;
 /// Different ranges among them of a ranger of a fine resolution.
 const MANY: usize = 5;
 
+const PLACEHOLDER: &str = "range_placeholder";
+const LEAVE_EMPTY: &str = "leave the range empty where there is no echo";
+
 /// The ranges by their value, millimetres.
 #[derive(Debug, Default)]
 pub struct Longest {
@@ -58,9 +61,9 @@ impl Longest {
         (metres >= 0.98 * max_range || self.is_apart(longest)).then(|| {
             Finding::at(
                 count.line,
-                "range_placeholder",
+                PLACEHOLDER,
                 format!("{}: the ranger writes it instead of no echo", self.shown(longest, count)),
-                "leave the range empty where there is no echo".to_owned(),
+                LEAVE_EMPTY.to_owned(),
             )
         })
     }
@@ -78,6 +81,24 @@ impl Longest {
                     self.shown(longest, count)
                 ),
                 format!("leave the range empty where there is no echo, and check the ranger's time-out; or state max_range = \"{:.2} m\"", 0.98 * metres),
+            )
+        })
+    }
+
+    /// A range within the others that is far more frequent than any of them: walls do not repeat a range to the millimetre.
+    pub fn repeated(&self) -> Option<Finding> {
+        let mut counts: Vec<_> = self.counts.iter().collect();
+        counts.sort_by_key(|(_, count)| std::cmp::Reverse(count.echoes));
+        let [(range, first), (_, second), ..] = counts.as_slice() else { return None };
+        let is_frequent = 10 * first.echoes >= self.echoes && first.runs >= 8;
+        let is_alone = first.echoes > 4 * second.echoes && counts.len() >= MANY;
+        (self.echoes >= ECHOES && is_frequent && is_alone).then(|| {
+            let (echoes, all) = (first.echoes, self.echoes);
+            Finding::at(
+                first.line,
+                PLACEHOLDER,
+                format!("{echoes} of {all} ranges are exactly {:.3} m, again and again: the ranger writes it instead of no echo", metres(**range)),
+                LEAVE_EMPTY.to_owned(),
             )
         })
     }
