@@ -244,7 +244,12 @@ impl<'a> Trial<'a> {
 
     /// The best of what was tried, and one that is nearly as good.
     fn named(&self, tried: &[Tried], as_is: &Evidence) -> Named {
-        let is_enough = |it: &&Tried| it.is_enough(as_is) && !it.candidate.is_usual(self.robot);
+        // A start near that of the log is none but for its larger deviation.
+        let start = self.start();
+        let is_enough = |it: &&Tried| {
+            let is_unusual = !it.candidate.is_usual(self.robot);
+            is_unusual && it.candidate.is_elsewhere(start) && it.is_enough(as_is)
+        };
         let named: Vec<_> = tried.iter().filter(is_enough).collect();
         let Some(first) = named.first() else { return Named::default() };
         let near: Vec<_> =

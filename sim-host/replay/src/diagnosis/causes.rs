@@ -367,6 +367,8 @@ pub fn start_unit(pose: Pose) -> Option<Candidate> {
 
 /// A start farther from the origin may be in another unit than metres.
 const FAR: f64 = 10.0;
+/// A start that is moved and turned less is the same, metres and radians.
+const ELSEWHERE: f64 = 0.15;
 
 /// The position of the start in another unit, and with exchanged axes.
 pub fn start_positions(pose: Pose) -> impl Iterator<Item = Candidate> {
@@ -377,7 +379,7 @@ pub fn start_positions(pose: Pose) -> impl Iterator<Item = Candidate> {
     let exchanged = at(Cause::StartAxes, 0.0, pose.y, pose.x);
     // Near the origin a start in another unit is hardly another start.
     let is_far = pose.x.hypot(pose.y) > FAR;
-    let units = [1e-3, 1e-2, 0.0254, 100.0, 1e3].into_iter().filter(move |by| is_far || *by > 1.0);
+    let units = [1e-3, 1e-2, 0.0254].into_iter().filter(move |_| is_far);
     let units = units.map(move |by| at(Cause::StartUnit, by, by * pose.x, by * pose.y));
     units.chain(std::iter::once(exchanged))
 }
@@ -454,6 +456,13 @@ impl Candidate {
         of_wheels.contains(&self.cause) && self.value < 0.5
     }
 
+    /// Whether its start differs from that of the log, or it has none.
+    pub fn is_elsewhere(&self, start: Option<Pose>) -> bool {
+        let (Some(to), Some(from)) = (self.change.start, start) else { return true };
+        let turn = sonarfix_sim::angle::wrap(to.heading - from.heading).abs();
+        (to.x - from.x).hypot(to.y - from.y) > ELSEWHERE || turn > ELSEWHERE
+    }
+
     /// Whether it is one wall of the map.
     pub fn is_of_wall(&self) -> bool {
         self.change.wall.is_some()
@@ -472,6 +481,7 @@ impl Candidate {
             Cause::StartPose => 15.0,
             Cause::Moved => 25.0,
             Cause::RangeUnit => 3.0,
+            Cause::WheelsSwapped if self.change.wheels.iter().any(|by| *by < 0.0) => 4.0,
             // A robot that hardly moves, by its log, can follow any ranges.
             Cause::RightTravel | Cause::LeftTravel | Cause::Travel => {
                 5.0 + 40.0 * self.value.ln().abs()
