@@ -91,14 +91,14 @@
 /*
  64-bit words of a robot.
  */
-#define SONARFIX_ROBOT_WORDS 1401
+#define SONARFIX_ROBOT_WORDS 1415
 #endif
 
 #if !defined(SONARFIX_64_BIT)
 /*
  64-bit words of a robot.
  */
-#define SONARFIX_ROBOT_WORDS 1364
+#define SONARFIX_ROBOT_WORDS 1381
 #endif
 
 #if defined(SONARFIX_64_BIT)

@@ -15,7 +15,8 @@
 //! | `rest` (private) | when a poll has something to do; `schedule`: periodic deadlines |
 //!
 //! *Tick*: one sample of both encoders (every 100 ms by default), passed to the localizer.
-//! *Measurement cycle*: choose a wall, turn the servo, wait until it has settled, ping, listen, fuse.
+//! *Measurement cycle*: choose a wall, a slice of the choice in each poll, turn the servo, wait until it has settled, ping, listen,
+//! fuse.
 //!
 //! # Several rangers
 //! There is one ping at a time. A ranger pings when its servo has settled and the echoes of all pings that it
@@ -145,9 +146,9 @@ use yaw::YawLedger;
 ///     ranger: PulseRanger::new(trigger, Captured::new(&echo)),
 /// };
 ///
-/// // The loop chooses the wall; 302 ms later the servo has settled, and it pings.
-/// assert!(robot.poll(at(0), &mut devices).aimed.is_some());
-/// assert!(robot.poll(at(302), &mut devices).pinged.is_some());
+/// // The loop chooses the wall in some polls; 302 ms later the servo has settled, and it pings.
+/// while robot.poll(at(0), &mut devices).aimed.is_none() {}
+/// while robot.poll(at(302), &mut devices).pinged.is_none() {}
 /// robot.poll(at(303), &mut devices); // ends the trigger pulse
 /// echo.rose(at(304)); // the interrupt stamps the edges of the echo,
 /// echo.fell(at(310));
@@ -308,7 +309,7 @@ impl<'m> Robot<'m> {
         Ok(())
     }
 
-    /// Handles what is due at `now`: the end of one ping, or one tick, or the choice of one wall, and the start of one
+    /// Handles what is due at `now`: the end of one ping, or one tick, or a slice of the choice of a wall, or the start of one
     /// ping. It never waits. Of several that are due, the next poll handles the next one, so that no poll takes as long
     /// as all of them.
     ///

@@ -29,7 +29,7 @@
 //! That of [`Localizer`] and [`Search`]: a NaN or infinity is refused and changes nothing.
 
 use crate::search::{Answer, Hypothesis, InvalidInput, Region, Search, SearchParameters};
-use sonarfix::aim::{Aim, NoAim, Standing};
+use sonarfix::aim::{Aim, Choice, NoAim, Standing};
 use sonarfix::config::{Policy, RangerId};
 use sonarfix::filter::ekf::{EkfError, StandardDeviations, StateEstimate};
 use sonarfix::filter::motion::WheelTravel;
@@ -291,6 +291,11 @@ impl<'m> Navigator<'m> {
     /// [`NoAim`], by the reason.
     pub fn aim_of(&self, ranger: RangerId, standing: &Standing) -> Result<Aim, NoAim> {
         self.localizer.aim_of_by(self.policy(), ranger, standing)
+    }
+
+    /// As [`Localizer::choose`], while the mode is not [`Mode::Searching`].
+    pub fn choose(&self, choice: &mut Choice) -> Option<Result<Aim, NoAim>> {
+        self.localizer.choose_by(self.policy(), choice)
     }
 
     /// The policy of the configuration; [`Policy::Nearest`] after [`UNUSED`] pings of a provisional pose without an accepted

@@ -8,9 +8,8 @@ use crate::pico::Polls;
 
 /// The file to which the rows are added, if there is one.
 const FILE: &str = "SONARFIX_CHIPS_ROWS";
-/// The most instructions of a poll of a robot that drives: 1.16 ms, by which the motor code is late. The longest one chooses the next wall,
-/// with the mount as two states.
-const LONGEST_POLL: u64 = 145_000;
+/// The most instructions of a poll of a robot that drives: 1.04 ms, by which the motor code is late.
+const LONGEST_POLL: u64 = 130_000;
 
 /// A table of the page, by its name in `xtask/src/chips.rs`.
 #[derive(Debug, Clone, Copy)]
@@ -34,12 +33,7 @@ pub fn row(table: Table, cells: &[&dyn Display]) {
 
 /// Reports the polls of a scenario, and compares the longest one with its limit.
 pub fn polls(scenario: &str, polls: Polls) {
-    polls_within(LONGEST_POLL, scenario, polls);
-}
-
-/// The same with another limit.
-pub fn polls_within(limit: u64, scenario: &str, polls: Polls) {
     let Polls { count, driving, waiting } = polls;
     row(Table::Polls, &[&scenario, &count, &driving, &waiting]);
-    assert!(count > 0 && driving <= limit, "{scenario}: {polls:?}");
+    assert!(count > 0 && driving <= LONGEST_POLL, "{scenario}: {polls:?}");
 }

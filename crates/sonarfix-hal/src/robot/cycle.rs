@@ -1,7 +1,7 @@
 //! The state machine of a measurement cycle.
 
-use sonarfix::aim::{Aim, Reason};
-use sonarfix::config::RangerId;
+use sonarfix::aim::{Aim, Choice, Reason};
+use sonarfix::config::{MAX_RANGERS, RangerId};
 use sonarfix::geometry::units::Instant;
 
 use super::odometer::Reading;
@@ -11,12 +11,13 @@ use crate::ranger::Outcome;
 /// The state of a measurement cycle.
 ///
 /// ```text
-///          due: choose, turn the servo        settled, ranger ready, a wall is square (or a sweep): ping
-///   Idle ───────────────────────────▶ Turning ─────────────────────────────────▶ Listening
-///   ▲  ▲ │ no wall                       │                                           │
-///   │  └─┘                               │ no wall is square any more,               │
-///   ├────────────────────────────────────┘ or the ranger cannot be triggered         │
-///   └────────────────────────── echo, no echo, failure, or timeout ──────────────────┘
+///        due              chosen: turn the servo      settled, ranger ready, a wall is square: ping
+///   Idle ─────▶ Choosing ───────────────────────▶ Turning ─────────────────────────────────▶ Listening
+///   ▲ ▲ ▲          │ no wall                       ▲ │                                           │
+///   │ │ └──────────┘                               │ │ no wall is square any more,               │
+///   │ ├─ a bearing of a sweep ─────────────────────┘ │ or the ranger cannot be triggered         │
+///   │ └──────────────────────────────────────────────┘                                           │
+///   └────────────────────────── echo, no echo, failure, or timeout ──────────────────────────────┘
 /// ```
 ///
 /// While it listens the encoders are not sampled (see [`robot`](super)).
@@ -27,12 +28,21 @@ pub(super) enum Cycle {
         /// The start of the next cycle.
         until: Instant,
     },
+    /// The rangers choose their walls, one after the other, a slice in each poll.
+    Choosing {
+        /// The choice of the ranger whose turn it is.
+        choice: Choice,
+        /// Those of the rangers before it.
+        aims: [Option<Aim>; MAX_RANGERS],
+    },
     /// The servo turns, or has settled and waits for the ranger.
     Turning {
         /// The ranger that pings next.
         ranger: RangerId,
         /// What it measures.
         target: Target<Reason>,
+        /// The choice of the wall along its bearing, a slice in each poll, once it is ready.
+        along: Option<Choice>,
     },
     /// A ping is in flight.
     Listening {

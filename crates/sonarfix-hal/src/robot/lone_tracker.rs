@@ -4,8 +4,7 @@
 use core::convert::Infallible;
 use core::marker::PhantomData;
 
-use sonarfix::aim::{Aim, NoAim, Standing};
-use sonarfix::config::RangerId;
+use sonarfix::aim::{Aim, Choice, NoAim};
 use sonarfix::filter::ekf::EkfError;
 use sonarfix::filter::motion::WheelTravel;
 use sonarfix::geometry::units::{Instant, Metres, Radians};
@@ -92,12 +91,8 @@ impl<'m> Tracker<'m> {
         self.0.odometry_with_turn(now, travel, turn)
     }
 
-    pub fn aim(&self) -> Result<Aim, NoAim> {
-        self.0.aim()
-    }
-
-    pub fn aim_of(&self, ranger: RangerId, standing: &Standing) -> Result<Aim, NoAim> {
-        self.0.aim_of(ranger, standing)
+    pub fn choose(&self, choice: &mut Choice) -> Option<Result<Aim, NoAim>> {
+        self.0.choose(choice)
     }
 
     pub fn fix(&mut self, aim: &Aim, range: Option<Metres>, _: Option<&mut Search<'m>>) -> Fix {

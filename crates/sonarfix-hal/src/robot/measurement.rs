@@ -1,6 +1,6 @@
 //! The steps of a measurement cycle.
 
-use sonarfix::aim::{Aim, NoAim};
+use sonarfix::aim::{Aim, Choice, NoAim};
 use sonarfix::config::{MAX_RANGERS, PingSchedule, RangerId};
 use sonarfix::geometry::units::Instant;
 use sonarfix::localizer::Mode;
@@ -84,7 +84,7 @@ impl<'m> Robot<'m> {
         true
     }
 
-    /// Chooses a wall, or the next bearing of the sweep, if a ping is due, and turns the servo.
+    /// Makes a slice of the choice of a wall, or takes the next bearing of the sweep, if a ping is due; then turns the servo.
     #[inline(never)]
     pub(super) fn choose_bearing(
         &mut self,
@@ -92,10 +92,9 @@ impl<'m> Robot<'m> {
         report: &mut Report,
     ) {
         let now = poll.now;
-        let is_due = matches!(self.cycle, Cycle::Idle { until } if now >= until);
-        // The choice is the longest step, and waits for a poll of its own: reading a gyro on a software bus takes half as long.
-        let is_busy = report.has_ended_ping() || report.tick.is_some() || poll.has_read_gyro;
-        if !is_due || is_busy {
+        let is_choosing = matches!(self.cycle, Cycle::Choosing { .. });
+        let is_due = matches!(self.cycle, Cycle::Idle { until } if now >= until) || is_choosing;
+        if !is_due || is_busy(poll, report) {
             return;
         }
         if let (Mode::Searching, Some(search)) = (self.mode(), poll.search.as_deref()) {
@@ -103,7 +102,7 @@ impl<'m> Robot<'m> {
             let turned = poll.hardware.servo().point(now, bearing);
             poll.faults.servo += u32::from(turned.is_err());
             let target = Target::Sweep(sweep);
-            self.cycle = Cycle::Turning { ranger: RangerId::FIRST, target };
+            self.cycle = Cycle::Turning { ranger: RangerId::FIRST, target, along: None };
             return;
         }
         if self.localizer().is_odometry_missing() {
@@ -111,17 +110,17 @@ impl<'m> Robot<'m> {
             self.cycle = Cycle::Idle { until: self.ticks.next() };
             return;
         }
-        let aimed = if self.localizer().config().rangers.are_several() {
-            self.choose_among(poll)
-        } else {
-            self.tracker.aim().inspect(|aim| {
-                let turned = poll.hardware.servo().point(now, aim.bearing);
-                // If it does not turn, the wall at its last bearing is measured.
-                poll.faults.servo += u32::from(turned.is_err());
-            })
+        if !is_choosing {
+            let choice = self.choice_of(RangerId::FIRST, poll);
+            self.cycle = Cycle::Choosing { choice, aims: [None; MAX_RANGERS] };
+        }
+        let Some(aimed) = self.choose(poll) else {
+            report.is_choosing = true;
+            return;
         };
         if let Ok(aim) = aimed {
-            self.cycle = Cycle::Turning { ranger: aim.ranger, target: Target::Wall(aim.why) };
+            let target = Target::Wall(aim.why);
+            self.cycle = Cycle::Turning { ranger: aim.ranger, target, along: None };
         } else {
             self.tracker.localizer_mut().skip();
             self.end_cycle(now, false);
@@ -129,22 +128,41 @@ impl<'m> Robot<'m> {
         report.aimed = Some(aimed);
     }
 
-    /// Chooses ranger and wall of the next ping of a robot with several rangers. The servos of the others turn to their
-    /// walls meanwhile.
-    #[inline(never)]
-    fn choose_among(&mut self, poll: &mut Poll<'_, 'm, impl Hardware>) -> Result<Aim, NoAim> {
+    /// The choice of a ranger before its first slice. A loop with several knows where their servos stand.
+    fn choice_of(&self, ranger: RangerId, poll: &mut Poll<'_, 'm, impl Hardware>) -> Choice {
         let config = self.localizer().config();
-        let mut aims = [None; MAX_RANGERS];
-        for ((ranger, _), aim) in config.rangers.iter().zip(&mut aims) {
+        if config.rangers.are_several() {
             let standing = rangers::standing(config, ranger, poll.now, poll.hardware);
-            *aim = self.tracker.aim_of(ranger, &standing).ok();
+            return Choice::standing(ranger, standing);
         }
-        let chosen = rangers::first_of(config, &aims).ok_or(NoAim::NoWall)?;
+        Choice::new(ranger)
+    }
+
+    /// Makes a slice of the choice; after the last one of the last ranger returns ranger and wall of the next ping. The servos of the
+    /// others turn to their walls meanwhile.
+    #[inline(never)]
+    fn choose(&mut self, poll: &mut Poll<'_, 'm, impl Hardware>) -> Option<Result<Aim, NoAim>> {
+        let Cycle::Choosing { choice, aims } = &mut self.cycle else { return None };
+        let aim = self.tracker.choose(choice)?.ok();
+        let ranger = choice.ranger();
+        if let Some(slot) = aims.get_mut(ranger.index()) {
+            *slot = aim;
+        }
+        let aims = *aims;
+        let is_later = |other: &RangerId| other.index() > ranger.index();
+        let next =
+            self.localizer().config().rangers.iter().map(|(ranger, _)| ranger).find(is_later);
+        if let Some(next) = next {
+            self.cycle = Cycle::Choosing { choice: self.choice_of(next, poll), aims };
+            return None;
+        }
+        let chosen = rangers::first_of(self.localizer().config(), &aims);
         for aim in aims.iter().flatten() {
+            // If it does not turn, the wall at its last bearing is measured.
             let turned = poll.hardware.servo_of(aim.ranger).point(poll.now, aim.bearing);
             poll.faults.servo += u32::from(turned.is_err());
         }
-        Ok(chosen)
+        Some(chosen.ok_or(NoAim::NoWall))
     }
 
     /// Starts a ping once the servo has settled, or is there in a sweep, and the ranger is ready ([`can_ping_at`]), if a wall is square to
@@ -154,23 +172,33 @@ impl<'m> Robot<'m> {
         poll: &mut Poll<'_, 'm, impl Hardware>,
         report: &mut Report,
     ) {
-        let Cycle::Turning { ranger, target } = self.cycle else {
+        let Cycle::Turning { ranger, target, along } = &mut self.cycle else {
             return;
         };
-        let now = poll.now;
+        let (ranger, target, now) = (*ranger, *target, poll.now);
         let Some(bearing) = poll.hardware.servo_of(ranger).target() else {
             self.tracker.localizer_mut().ranger_failed(ranger);
             self.abort_cycle(now);
             return;
         };
-        let ready_at = can_ping_at(self.localizer().config(), ranger, &target, poll.hardware);
+        let config = self.tracker.localizer().config();
+        let ready_at = can_ping_at(config, ranger, &target, poll.hardware);
         if now < ready_at {
             return;
         }
         let target = match target {
             Target::Sweep(sweep) => Target::Sweep(sweep.along(bearing)),
             Target::Wall(why) => {
-                let Ok(aim) = self.localizer().aim_along(ranger, bearing) else {
+                if report.aimed.is_some() || is_busy(poll, report) {
+                    return;
+                }
+                let choice = along.get_or_insert(Choice::along(ranger, bearing));
+                let Some(end) = self.tracker.choose(choice) else {
+                    report.is_choosing = true;
+                    return;
+                };
+                *along = None;
+                let Ok(aim) = end else {
                     self.end_cycle(now, false);
                     return;
                 };
@@ -219,6 +247,11 @@ impl<'m> Robot<'m> {
         self.cycle = Cycle::Idle { until };
         (self.rests_until, self.ping_end) = (AT_ONCE, None);
     }
+}
+
+/// Whether a poll leaves the slice of a choice, its longest step, to the next one: reading a gyro on a software bus takes half as long.
+fn is_busy<H>(poll: &Poll<'_, '_, H>, report: &Report) -> bool {
+    report.has_ended_ping() || report.tick.is_some() || poll.has_read_gyro
 }
 
 /// The echo, if its times are between the trigger and now.

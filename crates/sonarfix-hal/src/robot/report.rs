@@ -18,6 +18,8 @@ pub struct Report {
     pub swept: Option<SweepResult>,
     /// The encoders were sampled.
     pub tick: Option<Tick>,
+    /// A part of the choice of a wall was made.
+    pub is_choosing: bool,
     /// The wall that the localizer has chosen; the servo turns there.
     pub aimed: Option<Result<Aim, NoAim>>,
     /// A ping was started, at the bearing of the servo, which differs from that of the choice by the
@@ -35,9 +37,10 @@ pub struct Report {
 impl Report {
     /// Empties it in place: only the discriminants are written, of half a kilobyte.
     pub(super) fn clear(&mut self) {
-        let Self { ping_result, swept, tick, aimed, pinged, absolute, mode, faults } = self;
+        let Self { ping_result, swept, tick, is_choosing, aimed, pinged, absolute, mode, faults } =
+            self;
         (*ping_result, *swept, *tick) = (None, None, None);
-        (*aimed, *pinged, *mode) = (None, None, None);
+        (*is_choosing, *aimed, *pinged, *mode) = (false, None, None, None);
         let [first, second] = absolute;
         (*first, *second) = (None, None);
         *faults = Faults::default();
@@ -54,6 +57,7 @@ impl Report {
     pub fn has_worked(&self) -> bool {
         let has_pinged = self.has_ended_ping() || self.pinged.is_some();
         has_pinged
+            || self.is_choosing
             || self.tick.is_some()
             || self.aimed.is_some()
             || self.mode.is_some()

@@ -50,8 +50,9 @@ impl Robot<'_> {
         let next = match self.cycle {
             // Ticks are delayed until it has ended.
             Cycle::Listening { .. } => NEVER,
+            Cycle::Choosing { .. } => AT_ONCE,
             Cycle::Idle { until } => until.min(self.ticks.next()),
-            Cycle::Turning { ranger, target } => {
+            Cycle::Turning { ranger, target, .. } => {
                 let ready_at = can_ping_at(self.localizer().config(), ranger, &target, hardware);
                 ready_at.min(self.ticks.next())
             }

@@ -142,7 +142,8 @@ fn a_servo_dead_from_the_start_leaves_odometry() {
     world.broken.set(Broken { pwm: true, ..Broken::default() });
     let mut robot = robot(&walls, TICK, SCHEDULE, Settings::default());
     let mut pins = pins(&world, ServoTiming::SG90);
-    let reports = run(&world, &mut robot, &mut pins, millis(0, 3_002));
+    // The choice that is due at the end takes some polls.
+    let reports = run(&world, &mut robot, &mut pins, millis(0, 3_006));
     assert_eq!(robot.faults().servo, 6);
     assert!(fixes(&reports).is_empty());
     let counted = world.ticks(3_000_000) as f64 * f64::from(TICK);
@@ -249,8 +250,7 @@ fn a_loop_that_sleeps_until_the_next_deadline_misses_nothing() {
         polls += 1;
         let next = robot.idle_until(&mut pins).map(|until| until.ticks());
         // What else is due is done by the next poll.
-        let is_busy = report.ping_result.is_some() || report.tick.is_some();
-        assert!(is_busy || next.is_none_or(|next| next > now), "{next:?} at {now}");
+        assert!(report.has_worked() || next.is_none_or(|next| next > now), "{next:?} at {now}");
         now = next.unwrap_or(now + 500).max(now + 1);
     }
     assert_eq!(accepted, 5);

@@ -284,8 +284,8 @@ fn fixes_keep_their_schedule() {
     let (reports, _) = reports_with(schedule, Settings::default(), drive, TICK);
     let aims = reports.iter().filter(|(_, report)| report.aimed.is_some());
     let aims: Vec<_> = aims.map(|&(time, _)| time).collect();
-    // A tick is due at the same time and precedes the choice by a poll; the schedule is unaffected.
-    assert_eq!(aims, [500_250, 1_000_250, 1_500_250, 2_000_250, 2_500_250]);
+    // A tick is due at the same time and precedes the choice by a poll, of which there are three; the schedule is unaffected.
+    assert_eq!(aims, [500_750, 1_000_750, 1_500_750, 2_000_750, 2_500_750]);
     let silent = reports.iter().filter_map(|(_, report)| report.ping_result);
     assert!(silent.filter(|heard| heard.outcome == Err(NoEcho::Nothing)).count() == 0);
 }

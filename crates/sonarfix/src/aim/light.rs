@@ -5,7 +5,7 @@
 //! # Non-finite policy
 //! Comparisons are written so that a beam whose numbers are NaN is not chosen.
 
-use super::{Aim, Candidate, HYSTERESIS, NoAim, Planner, Pointing};
+use super::{Candidate, Choice, Planner, Pointer, Pointing};
 use crate::config::LightBeam;
 use crate::geometry::pose::{Heading, Point};
 use crate::geometry::units::Radians;
@@ -13,9 +13,11 @@ use crate::geometry::vector::Vector;
 use crate::map::{Wall, WallId};
 
 /// Bearings of the fan: 12.5° apart on a servo of 200°.
-const FAN: usize = 17;
+const FAN: u32 = 17;
 /// Those and the bearing of the last ping.
-const BEAMS: usize = FAN + 1;
+const BEAMS: u32 = FAN + 1;
+/// Beams of a slice of the choice: as many as cost what a slice with a sonar costs.
+const SLICE: usize = 3;
 
 /// A beam, and the wall that it meets first.
 #[derive(Clone, Copy)]
@@ -53,73 +55,66 @@ fn aside(axis: Vector, from: Point, to: Point) -> f32 {
     axis.left().dot(Vector::from(to).minus(from.into()))
 }
 
-impl Planner<'_> {
-    /// The best beam of the fan. Not inlined: its stack is not that of a sonar.
+impl<P: Pointer> Planner<'_, P> {
+    /// Lists the next beams of the fan; returns whether they are the last. Not inlined: its stack is not that of a sonar.
     #[inline(never)]
-    pub(super) fn best_beam(&self, beam: LightBeam) -> Result<Aim, NoAim> {
-        self.best_of(beam, self.fan())
+    pub(super) fn list_beams(&self, beam: LightBeam, choice: &mut Choice) -> bool {
+        if !P::CHOOSES {
+            choice.take(0, Some(0.0));
+            return true;
+        }
+        let mut number = choice.taken;
+        let mut rays = [(); SLICE].map(|()| {
+            let ray = self.numbered(number);
+            number += 1;
+            ray
+        });
+        self.cast(&mut rays);
+        for ray in &rays {
+            let candidate = self.by_beam(beam, ray).map(|(_, candidate)| candidate.score);
+            choice.take(choice.taken, candidate);
+        }
+        choice.taken >= BEAMS
     }
 
-    /// A beam along a bearing that the planner does not choose.
+    /// The candidate of the beam with this number, and its wall. Not inlined, as above.
     #[inline(never)]
-    pub(super) fn beam_at(&self, beam: LightBeam, bearing: Radians) -> Result<Aim, NoAim> {
-        self.best_of(beam, [self.ray(bearing, 0.0)])
+    pub(super) fn by_light(&self, beam: LightBeam, number: u32) -> Option<(WallId, Candidate)> {
+        let mut rays = [self.numbered(number)];
+        self.cast(&mut rays);
+        let [ray] = &rays;
+        self.by_beam(beam, ray)
     }
 
-    fn ray(&self, bearing: Radians, until_ping: f32) -> Ray {
+    /// The beam with this number: those of the fan, then that along the bearing of the servo; or the one whose bearing the planner
+    /// does not choose.
+    #[inline(never)]
+    fn numbered(&self, number: u32) -> Ray {
+        let (current, rest) = self.standing();
+        let (bearing, until_ping) = if let Some(bearing) = self.pointer.bearing() {
+            (bearing, 0.0)
+        } else if number >= FAN {
+            (current, rest)
+        } else {
+            let (right, left) = self.sonar.servo;
+            #[expect(clippy::cast_precision_loss, reason = "a few bearings")]
+            let (number, last) = (number as f32, (FAN - 1) as f32);
+            let bearing = right + (left - right) * (1.0 / last) * number;
+            let turn = self.duration.turn(bearing - current);
+            (bearing, if turn > rest { turn } else { rest })
+        };
         let direction = self.heading_after(until_ping).turned(bearing);
         let axis = Vector::of_angle(direction.radians().0);
         Ray { bearing, until_ping, direction, axis, met: None }
     }
 
-    fn fan(&self) -> [Ray; BEAMS] {
-        let (current, rest) = self.standing();
-        let (right, left) = self.sonar.servo;
-        let step = (left - right) * (1.0 / LAST_OF_FAN);
-        let mut number = 0.0;
-        [(); BEAMS].map(|()| {
-            let place = number;
-            number += 1.0;
-            if place > LAST_OF_FAN {
-                return self.ray(current, rest);
-            }
-            let bearing = right + step * place;
-            let turn = self.duration.turn(bearing - current);
-            self.ray(bearing, if turn > rest { turn } else { rest })
-        })
-    }
-
-    /// The best of these beams whose wall is not occluded. Only scores are kept, so that the stack is small; the candidate of the
-    /// best one is computed again.
-    fn best_of<const N: usize>(&self, beam: LightBeam, mut rays: [Ray; N]) -> Result<Aim, NoAim> {
+    /// Finds the wall that each ray meets first.
+    #[inline(never)]
+    fn cast(&self, rays: &mut [Ray]) {
         let from = self.view.position();
         for (id, wall) in self.map.near(from, self.sonar.max_range) {
-            for ray in &mut rays {
+            for ray in &mut *rays {
                 ray.meet(from, id, &wall);
-            }
-        }
-        let mut scores = [NOT_MEASURED; N];
-        let mut count = 0_u16;
-        for (score, ray) in scores.iter_mut().zip(&rays) {
-            if let Some((_, candidate)) = self.by_beam(beam, ray) {
-                *score = candidate.score;
-                count = count.saturating_add(1);
-            }
-        }
-        loop {
-            let mut best: Option<(&mut f32, &Ray)> = None;
-            for (score, ray) in scores.iter_mut().zip(&rays) {
-                let least = best.as_ref().map_or(NOT_MEASURED, |(best, _)| **best);
-                if *score > least {
-                    best = Some((score, ray));
-                }
-            }
-            let (score, ray) = best.ok_or(NoAim::NoWall)?;
-            *score = NOT_MEASURED;
-            if let Some((id, candidate)) = self.by_beam(beam, ray)
-                && !self.is_occluded(id, &candidate)
-            {
-                return Ok(candidate.aim(self.ranger, id, count));
             }
         }
     }
@@ -135,17 +130,8 @@ impl Planner<'_> {
         }
         let pointing = Pointing { bearing, off: sight.off, until_ping };
         let mut candidate = self.candidate(id, &sight, &pointing);
-        candidate.score = candidate.score_by(self.config.policy);
-        if self.slot.wall == Some(id) {
-            candidate.score *= HYSTERESIS;
-        }
+        candidate.score = self.score_of(&candidate, id, self.config.policy);
         // False for NaN.
         (candidate.score >= 0.0).then_some((id, candidate))
     }
 }
-
-/// Below every score.
-const NOT_MEASURED: f32 = -1.0;
-/// Number of the last bearing of the fan.
-#[expect(clippy::cast_precision_loss, reason = "a few bearings")]
-const LAST_OF_FAN: f32 = (FAN - 1) as f32;

@@ -11,21 +11,23 @@
 //!
 //! | module | contents |
 //! |---|---|
+//! | `choice` | the choice, which a loop makes in slices |
 //! | `gain` | expected decrease of the variance |
 //! | `light` | beams of a time-of-flight ranger |
 //! | `ranking` | order of the candidates |
-//! | this one | candidates, scores and the choice |
+//! | this one | candidates and scores |
 //!
 //! # Non-finite policy
 //! The state of the filter is finite. Comparisons are written so that a candidate whose numbers are
 //! NaN is not chosen.
 
+mod choice;
 mod gain;
 mod light;
 mod ranking;
 
 use crate::association::visibility::{Beam, Sight, Viewpoint};
-use crate::config::{Config, MAX_RANGERS, RangerId, RangerParameters, Ranging};
+use crate::config::{Config, MAX_RANGERS, RangerId, RangerParameters};
 use crate::filter::ekf::Ekf;
 use crate::geometry::pose::Heading;
 use crate::geometry::units::{Duration, Instant, Metres, Radians, SquareMetres, seconds};
@@ -35,9 +37,9 @@ use crate::sensor::range::ExpectedRange;
 use crate::association::history::{History, Slot};
 use crate::sensor::timing::PingDuration;
 use gain::expected_gain;
-use ranking::Ranked;
 
 pub use crate::config::Policy;
+pub use choice::Choice;
 
 /// One ping of one ranger at one wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -112,10 +114,6 @@ const HYSTERESIS: f32 = 1.02;
 /// Share of the cone within which the servo stays where it is if that saves time.
 const DEAD_BAND: f32 = 0.125;
 
-/// Number of candidates that are kept at a time, best first. They are tested for occlusion in that
-/// order; if all are occluded, the next ones are searched.
-const SHORTLIST: usize = 8;
-
 /// The robot in its map, for the choice of a ping.
 #[derive(Clone, Copy)]
 pub(crate) struct Situation<'a> {
@@ -125,58 +123,6 @@ pub(crate) struct Situation<'a> {
     pub history: &'a History,
     pub now: Instant,
     pub policy: Policy,
-}
-
-impl<'a> Situation<'a> {
-    /// Chooses ranger and wall.
-    ///
-    /// # Errors
-    /// [`NoAim`] if no ranger has a wall to measure.
-    pub fn choose(&self) -> Result<Aim, NoAim> {
-        if !self.config.rangers.are_several() {
-            return Planner::new(self, RangerId::FIRST, &self.config.rangers.first).choose();
-        }
-        let mut best = Err(NoAim::NoWall);
-        for (ranger, sonar) in self.config.rangers.iter() {
-            if !self.rests(ranger) {
-                best = better(self.policy, best, Planner::new(self, ranger, sonar).choose());
-            }
-        }
-        best
-    }
-
-    /// Chooses the wall of one ranger whose servo and schedule slot are known.
-    ///
-    /// # Errors
-    /// [`NoAim`] if no wall can be measured, or the robot has no such ranger.
-    pub fn choose_of(&self, ranger: RangerId, standing: &Standing) -> Result<Aim, NoAim> {
-        if self.rests(ranger) {
-            return Err(NoAim::NoWall);
-        }
-        let mut planner = self.planner(ranger)?;
-        let Standing { bearing, ready_in } = *standing;
-        planner.slot = Slot { bearing, ready_in: seconds(ready_in), ..planner.slot };
-        planner.choose()
-    }
-
-    /// Finds the nearest wall to which a beam of a ranger at `bearing` is square.
-    ///
-    /// # Errors
-    /// [`NoAim`] if no wall can be measured, or the robot has no such ranger.
-    pub fn at(&self, ranger: RangerId, bearing: Radians) -> Result<Aim, NoAim> {
-        let planner = self.planner(ranger)?;
-        planner.nearest_at(bearing).or_else(|_| planner.without_margins().nearest_at(bearing))
-    }
-
-    /// Whether a ranger of several is not to be tried, because it has failed.
-    fn rests(&self, ranger: RangerId) -> bool {
-        self.history.rests(ranger, self.config, self.now)
-    }
-
-    fn planner(&self, ranger: RangerId) -> Result<Planner<'a>, NoAim> {
-        let sonar = self.config.rangers.get(ranger).ok_or(NoAim::NoWall)?;
-        Ok(Planner::new(self, ranger, sonar))
-    }
 }
 
 /// Where the servo of a ranger stands, and when it can ping.
@@ -190,20 +136,8 @@ pub struct Standing {
     pub ready_in: Duration,
 }
 
-/// The better one of two pings; the first of two equal ones.
-fn better(
-    policy: Policy,
-    one: Result<Aim, NoAim>,
-    other: Result<Aim, NoAim>,
-) -> Result<Aim, NoAim> {
-    let (Ok(first), Ok(second)) = (&one, &other) else {
-        return one.or(other);
-    };
-    if second.score(policy) > first.score(policy) { other } else { one }
-}
-
 /// Everything that the scores of the candidates depend on.
-struct Planner<'a> {
+struct Planner<'a, P> {
     config: &'a Config,
     map: &'a Map<'a>,
     ekf: &'a Ekf,
@@ -212,6 +146,7 @@ struct Planner<'a> {
     policy: Policy,
     ranger: RangerId,
     sonar: &'a RangerParameters,
+    pointer: P,
     slot: Slot,
     /// Probability that the ranger works.
     works: f32,
@@ -229,17 +164,6 @@ struct Candidate {
     score: f32,
 }
 
-/// The best candidates.
-struct Shortlist {
-    /// Best first.
-    ranked: [Option<Ranked>; SHORTLIST],
-    /// The first of them as a whole: it is nearly always the one that is chosen, and to compute a candidate again is an eighth of the
-    /// cost of a choice.
-    first: Option<Candidate>,
-    /// The number of all candidates.
-    count: u16,
-}
-
 /// Bearing of the servo for a wall.
 struct Pointing {
     bearing: Radians,
@@ -249,112 +173,70 @@ struct Pointing {
     until_ping: f32,
 }
 
-impl<'a> Planner<'a> {
-    fn new(situation: &Situation<'a>, ranger: RangerId, sonar: &'a RangerParameters) -> Self {
-        let Situation { config, map, ekf, history, now, policy } = *situation;
-        let view = Viewpoint::new(config, sonar, ekf);
-        let duration = PingDuration::new(sonar);
-        let slot = history.slot(ranger, config, &duration);
-        let works = history.works(ranger, config, now);
-        Self { config, map, ekf, history, now, policy, ranger, sonar, slot, works, view, duration }
-    }
+/// Who chooses the bearing of a ping.
+trait Pointer: Copy {
+    /// Whether the planner does.
+    const CHOOSES: bool;
+    /// The bearing, if the planner does not.
+    fn bearing(self) -> Option<Radians>;
+}
 
-    /// The best ping of this ranger.
-    fn choose(self) -> Result<Aim, NoAim> {
-        self.choice().or_else(|_| self.without_margins().choice())
-    }
+/// The planner, by the policy.
+#[derive(Clone, Copy)]
+struct ByPolicy;
 
-    /// The same planner without the margins for the uncertainty of the estimate.
-    fn without_margins(self) -> Self {
-        Self { view: self.view.without_margins(), ..self }
-    }
+/// Whatever has turned the servo to this bearing.
+#[derive(Clone, Copy)]
+struct Along(Radians);
 
-    /// The best ping.
-    fn choice(&self) -> Result<Aim, NoAim> {
-        match self.sonar.ranging {
-            Ranging::Sound => self.best(|id, wall| self.by_policy(id, wall)),
-            Ranging::Light(beam) => self.best_beam(beam),
-        }
-    }
+impl Pointer for ByPolicy {
+    const CHOOSES: bool = true;
 
-    /// The ping at the nearest wall along a bearing that the planner does not choose.
-    fn nearest_at(&self, bearing: Radians) -> Result<Aim, NoAim> {
-        match self.sonar.ranging {
-            Ranging::Sound => self.best(|id, wall| self.at_bearing(id, wall, bearing)),
-            Ranging::Light(beam) => self.beam_at(beam, bearing),
-        }
+    fn bearing(self) -> Option<Radians> {
+        None
     }
+}
 
-    /// The best candidate that is not occluded. `candidate` scores a wall, if it can be measured.
-    fn best(&self, candidate: impl Fn(WallId, &Wall) -> Option<Candidate>) -> Result<Aim, NoAim> {
-        let mut after = None;
-        loop {
-            let Shortlist { ranked, mut first, count } = self.shortlist(&candidate, after);
-            for &Ranked { wall: id, .. } in ranked.iter().flatten() {
-                let again = || self.map.wall(id).and_then(|wall| candidate(id, &wall));
-                let best = first.take().or_else(again);
-                if let Some(best) = best.filter(|best| !self.is_occluded(id, best)) {
-                    return Ok(best.aim(self.ranger, id, count));
-                }
-            }
-            // The list is not full: there are no more candidates.
-            after = *ranked.last().ok_or(NoAim::NoWall)?;
-            if after.is_none() {
-                return Err(NoAim::NoWall);
-            }
-        }
+impl Pointer for Along {
+    const CHOOSES: bool = false;
+
+    fn bearing(self) -> Option<Radians> {
+        Some(self.0)
     }
+}
 
-    /// The best candidates that rank after `after`.
-    fn shortlist(
-        &self,
-        candidate: impl Fn(WallId, &Wall) -> Option<Candidate>,
-        after: Option<Ranked>,
-    ) -> Shortlist {
-        let mut list = Shortlist { ranked: [None; SHORTLIST], first: None, count: 0 };
-        for (wall, segment) in self.map.near(self.view.position(), self.sonar.max_range) {
-            let Some(candidate) = candidate(wall, &segment) else {
-                continue;
-            };
-            list.count = list.count.saturating_add(1);
-            let ranked = Ranked { wall, score: candidate.score };
-            if after.is_none_or(|after| after.is_before(ranked)) {
-                ranked.insert(&mut list.ranked);
-                if matches!(list.ranked, [Some(first), ..] if first.wall == wall) {
-                    list.first = Some(candidate);
-                }
-            }
-        }
-        list
-    }
-
-    /// A wall with the servo turned to it.
-    fn by_policy(&self, id: WallId, wall: &Wall) -> Option<Candidate> {
+impl<P: Pointer> Planner<'_, P> {
+    /// A wall as a candidate, if it can be measured: with the servo turned to it, or along the bearing that it has.
+    #[inline(never)]
+    fn by_sound(&self, id: WallId, wall: &Wall) -> Option<Candidate> {
         let (expected, on_wall) = self.view.expected_range(wall).ok()?;
-        let pointing = self.point(&expected);
-        if !self.view.is_square(pointing.off) {
+        let (pointing, is_seen) = if let Some(bearing) = self.pointer.bearing() {
+            let off = self.view.off_square(&expected, bearing);
+            (Pointing { bearing, off, until_ping: 0.0 }, self.view.may_answer(off))
+        } else {
+            let pointing = self.point(&expected);
+            let is_square = self.view.is_square(pointing.off);
+            (pointing, is_square)
+        };
+        if !is_seen {
             return None;
         }
         let sight = self.heard(wall, (expected, on_wall), pointing.off);
         let mut candidate = self.candidate(id, &sight, &pointing);
-        candidate.score = candidate.score_by(self.policy);
-        if self.slot.wall == Some(id) {
-            candidate.score *= HYSTERESIS;
-        }
+        candidate.score = if P::CHOOSES {
+            self.score_of(&candidate, id, self.policy)
+        } else {
+            // The nearest that may answer is the best.
+            1.0 / candidate.expected.range.0
+        };
         Some(candidate)
     }
 
-    /// A wall along a bearing that the planner does not choose: the nearest that may answer is the best.
-    fn at_bearing(&self, id: WallId, wall: &Wall, bearing: Radians) -> Option<Candidate> {
-        let (expected, on_wall) = self.view.expected_range(wall).ok()?;
-        let off = self.view.off_square(&expected, bearing);
-        if !self.view.may_answer(off) {
-            return None;
-        }
-        let score = 1.0 / expected.range.0;
-        let pointing = Pointing { bearing, off, until_ping: 0.0 };
-        let sight = self.heard(wall, (expected, on_wall), off);
-        Some(Candidate { score, ..self.candidate(id, &sight, &pointing) })
+    /// The score of a candidate that the policy chooses.
+    fn score_of(&self, candidate: &Candidate, id: WallId, policy: Policy) -> f32 {
+        let Candidate { gain, success, ref expected, seconds, .. } = *candidate;
+        let score = score(policy, gain, success, expected.range, seconds);
+        if self.slot.wall == Some(id) { score * HYSTERESIS } else { score }
     }
 
     /// A wall that a sonar measures along a bearing.
@@ -465,10 +347,6 @@ fn score(policy: Policy, gain: SquareMetres, success: f32, range: Metres, second
 }
 
 impl Candidate {
-    fn score_by(&self, policy: Policy) -> f32 {
-        score(policy, self.gain, self.success, self.expected.range, self.seconds)
-    }
-
     fn aim(&self, ranger: RangerId, wall: WallId, candidates: u16) -> Aim {
         let why = Reason {
             gain: self.gain,

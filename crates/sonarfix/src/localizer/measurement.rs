@@ -122,7 +122,7 @@ impl Localizer<'_> {
         measurement: &M,
         outcome: &mut Outcome,
     ) -> Result<(), Refusal> {
-        let robot = self.situation();
+        let robot = self.situation(self.config.policy);
         let (view, seen) = measurement.view(&robot)?;
         let prediction = robot.ekf.predict_measurement(&view.expected, view.ahead);
         let value = view.measured.unwrap_or(view.expected.range);

@@ -15,7 +15,7 @@ mod travel;
 pub(crate) mod unseen;
 
 use self::unseen::Unseen;
-use crate::aim::{Aim, NoAim, Situation, Standing};
+use crate::aim::{Aim, Choice, NoAim, Situation, Standing};
 use crate::association::history::History;
 use crate::association::visibility::max_heading_deviation_of;
 use crate::config::{Config, ConfigError, Policy, RangerId};
@@ -276,7 +276,7 @@ impl<'m> Localizer<'m> {
     /// # Errors
     /// [`NoAim`], by the reason for which there is no wall to measure.
     pub fn aim_by(&self, policy: Policy) -> Result<Aim, NoAim> {
-        Situation { policy, ..self.situation() }.choose()
+        self.situation(policy).choose()
     }
 
     /// As [`Self::aim`] for one ranger whose servo stands as given: for a robot with several, whose loop turns all servos
@@ -298,7 +298,18 @@ impl<'m> Localizer<'m> {
         ranger: RangerId,
         standing: &Standing,
     ) -> Result<Aim, NoAim> {
-        Situation { policy, ..self.situation() }.choose_of(ranger, standing)
+        self.situation(policy).decide(Choice::standing(ranger, *standing))
+    }
+
+    /// Makes a slice of the choice of a ping, for a loop that must not wait for a whole one; returns what [`Self::aim_of`]
+    /// returns after the last slice. Travel and other measurements may be taken between two slices.
+    pub fn choose(&self, choice: &mut Choice) -> Option<Result<Aim, NoAim>> {
+        self.choose_by(self.config.policy, choice)
+    }
+
+    /// As [`Self::choose`], by another policy.
+    pub fn choose_by(&self, policy: Policy, choice: &mut Choice) -> Option<Result<Aim, NoAim>> {
+        self.situation(policy).proceed(choice)
     }
 
     /// The wall to which a beam of the first ranger at `bearing` (relative to the heading) is square, for a range whose
@@ -315,12 +326,12 @@ impl<'m> Localizer<'m> {
     /// # Errors
     /// [`NoAim`], by the reason for which no wall can be measured.
     pub fn aim_along(&self, ranger: RangerId, bearing: Radians) -> Result<Aim, NoAim> {
-        self.situation().at(ranger, bearing)
+        self.situation(self.config.policy).at(ranger, bearing)
     }
 
-    fn situation(&self) -> Situation<'_> {
+    fn situation(&self, policy: Policy) -> Situation<'_> {
         let Self { config, map, ekf, history, time, .. } = self;
-        Situation { config, map, ekf, history, now: *time, policy: config.policy }
+        Situation { config, map, ekf, history, now: *time, policy }
     }
 
     /// The time of the last accepted travel.

@@ -15,7 +15,7 @@ use sonarfix::sensor::range::ExpectedRange;
 use crate::oracle::{
     HEADING, Matrix, Row, Vector, View, corrected, covariance_of, state_of, turn_between,
 };
-use crate::strategies::{Sight, any_mount, any_room, any_sight, bits, config_for_rooms};
+use crate::strategies::{Sight, any_mount, any_room, any_sight, bits, config_for_rooms, in_slices};
 
 /// What a wall must withstand to be measured.
 #[derive(Clone, Copy)]
@@ -342,6 +342,10 @@ proptest! {
         let counting = counting.unwrap();
         let aim = localizer.aim();
         is_best(&rules, &counting, |wall| rules.score(wall), aim)?;
+        // A slice lists three of them, the last one tests one; the wall is the same.
+        let (sliced, slices) = in_slices(&localizer);
+        prop_assert_eq!(sliced, aim);
+        prop_assert!(slices as usize > counting.len().div_ceil(3), "{slices} slices");
         if let Ok(aim) = aim {
             // Square to within the rounding of two angles, or as near as the servo reaches.
             let wall = aim.wall.0 as usize;

@@ -15,7 +15,7 @@ use crate::oracle::{
     is_positive_definite, jacobian_of, state_of,
 };
 use crate::strategies::{
-    any_ekf, any_mount, any_room, any_sight, any_state, bits, config_for_rooms, start_at,
+    any_ekf, any_mount, any_room, any_sight, any_state, bits, config_for_rooms, in_slices, start_at,
 };
 
 /// A beam and a wall, in `f64`.
@@ -160,6 +160,10 @@ proptest! {
         let walls = room.walls();
         let localizer = localizer(&walls, room.start(), mount);
         let Ok(aim) = localizer.aim() else { return Err(TestCaseError::reject("no wall")) };
+        // Six slices list three beams each.
+        let (sliced, slices) = in_slices(&localizer);
+        prop_assert_eq!(sliced, Ok(aim));
+        prop_assert!(slices > 6, "{slices} slices");
         let config = localizer.config();
         let state = state_of(localizer.filter());
         let met = |bearing: f32| {

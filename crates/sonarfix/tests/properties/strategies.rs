@@ -1,12 +1,13 @@
 //! Random robots, walls and travels, and the runs made from them.
 
 use proptest::prelude::*;
-use sonarfix::config::Config;
+use sonarfix::aim::{Aim, Choice, NoAim};
+use sonarfix::config::{Config, RangerId};
 use sonarfix::filter::ekf::{Ekf, StandardDeviations, StateEstimate};
 use sonarfix::filter::motion::{Drive, WheelTravel};
 use sonarfix::geometry::pose::{Point, Pose};
 use sonarfix::geometry::units::{Metres, PerRootMetre, Radians, SquareMetres};
-use sonarfix::localizer::Start;
+use sonarfix::localizer::{Localizer, Start};
 use sonarfix::map::Wall;
 use sonarfix::sensor::echo::EchoParameters;
 use sonarfix::sensor::range::ExpectedRange;
@@ -273,4 +274,17 @@ pub fn config_for_rooms(mount: Point) -> Config {
     config.echo = EchoParameters::NONE;
     config.gating.confidence = 1.0;
     config
+}
+
+/// The choice of the first ranger in slices, as a loop makes it, and the number of slices.
+pub fn in_slices(localizer: &Localizer) -> (Result<Aim, NoAim>, u32) {
+    let mut choice = Choice::new(RangerId::FIRST);
+    let mut slices = 0;
+    loop {
+        slices += 1;
+        if let Some(end) = localizer.choose(&mut choice) {
+            return (end, slices);
+        }
+        assert!(slices < 1_000, "the choice does not end");
+    }
 }

@@ -102,10 +102,10 @@ impl<'a> Viewpoint<'a> {
         }
     }
 
-    /// The same estimate without margins, for when no wall is safe.
-    pub fn without_margins(self) -> Self {
-        let cone = self.cone * CORE_OF_CONE;
-        Self { cone, confidence: 0.0, least: LIKELY, ..self }
+    /// Drops the margins, for when no wall is safe.
+    pub fn drop_margins(&mut self) {
+        self.cone = self.cone * CORE_OF_CONE;
+        (self.confidence, self.least) = (0.0, LIKELY);
     }
 
     /// The same estimate for an echo that has arrived.
