@@ -72,7 +72,7 @@ pub fn licences(folder: &Path) -> anyhow::Result<String> {
     let packages = cargo::dependencies(metadata)?;
     let espflash = packages.iter().find(|it| it.name == "espflash").context("no espflash")?;
     let mut list = format!(
-        "The page that flashes an ESP32-C6 contains these files of others.\n\n\
+        "The page that flashes an ESP32-C6 contains these parts of other projects.\n\n\
          Bootloader of ESP-IDF, https://github.com/espressif/esp-idf, as espflash {} packs it: Apache-2.0\n",
         espflash.version
     );

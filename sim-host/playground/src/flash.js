@@ -7,7 +7,7 @@ const flashing = (() => {
   // Starts the program: IO9 stays high (DTR off), EN is low (RTS on) for 100 ms. `hard_reset` of esptool-js only ends such a reset.
   const START = "D0|R1|W100|R0";
   const PATIENCE = 1000;        // ms: a port that was unplugged does not close
-  const WRITING = "is written";
+  const WRITING = "writing …";
 
   const element = (id) => document.getElementById(id);
   const simulator = openSimulator(element("wasm").textContent);
