@@ -1,8 +1,8 @@
 // Opens every page of the site in Chromium, 400 pixels wide: in the light scheme from the disk, in the dark one from a web server.
 //
 // node check.mjs MODULES SITE BROWSER [FLAG…]: MODULES is a folder with node_modules; program.uf2, a program for a Pico 2; sonarfix with the
-// files of a robot in live-robot; and pages that it has written in reports, which are opened, too, as is the page of a run that it serves. Prints each
-// fault, and ends with 1 if there is one.
+// files of a robot in live-robot; in flash what a board with an ESP32-C6 must have of them; and pages that it has written in reports, which are opened, too,
+// as is the page of a run that it serves. Prints each fault, and ends with 1 if there is one.
 import { spawn } from "node:child_process";
 import { once } from "node:events";
 import { existsSync, readFileSync, readdirSync } from "node:fs";
@@ -11,6 +11,7 @@ import { createRequire } from "node:module";
 import { connect } from "node:net";
 import { delimiter, extname, join } from "node:path";
 import { pathToFileURL } from "node:url";
+import { Board } from "./esp32c6.mjs";
 
 const [modules, site, browserName, ...flags] = process.argv.slice(2);
 const require = createRequire(join(modules, "x.js"));
@@ -21,6 +22,7 @@ const PATIENCE = 300_000; // milliseconds: beyond these the page hangs
 const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml" };
 const PLAYGROUND = "playground/index.html";
 const FORM = "new-robot/index.html";
+const FLASH = "flash/index.html";
 const LIVE = "live/index.html";
 const COMPARISON = "comparison/comparison.html";
 const SERVED = ""; // the page of a run that is served
@@ -106,30 +108,47 @@ async function useForm(page, where, scheme) {
   await page.$$eval("#files details", (files) => files.forEach((it) => { it.open = true; }));
 }
 
-// In the live page: a serial port whose other end is `toRobot` and `fromRobot`, and which can be unplugged.
+// In the pages with a serial port: one whose other end is `toPort`, `setSignals` and `fromPort`, which can be unplugged, and can be in use elsewhere. None
+// behind `#without-ports`. `modules` counts the scripts that the page loads later.
 function playPort() {
-  if (!location.pathname.endsWith("live/index.html")) return;
+  if (!/(live|flash)\/index\.html$/.test(location.pathname)) return;
+  const ofSerial = (value) => Object.defineProperty(navigator, "serial", { value });
+  if (location.hash === "#without-ports") { ofSerial(undefined); return; }
   const serial = new EventTarget();
+  const say = (name) => serial.dispatchEvent(Object.defineProperty(new Event(name), "target", { value: port }));
   let controller = null;
   const port = {
     readable: null,
+    writable: null,
     getInfo: () => ({ usbVendorId: 0x2e8a, usbProductId: 10 }),
     async open({ baudRate }) {
+      if (window.isPortBusy) throw new DOMException("Failed to open serial port.", "NetworkError");
       if (baudRate !== 115200) throw new Error(`opened with ${baudRate} baud`);
       this.readable = new ReadableStream({ start: (it) => { controller = it; } });
-      this.writable = new WritableStream({ write: (bytes) => window.toRobot([...bytes]) });
+      this.writable = new WritableStream({ write: (bytes) => window.toPort([...bytes]) });
     },
-    async close() { this.readable = controller = null; },
+    setSignals: (signals) => window.setSignals(signals),
+    async close() { this.readable = this.writable = controller = null; },
   };
   serial.requestPort = async () => port;
-  window.fromRobot = (bytes) => controller?.enqueue(new Uint8Array(bytes));
+  window.fromPort = (bytes) => controller?.enqueue(new Uint8Array(bytes));
   window.unplug = () => {
-    port.readable = null;
+    port.readable = port.writable = null;
     controller.error(new DOMException("The device has been lost.", "NetworkError"));
+    say("disconnect");
   };
-  window.plug = () => serial.dispatchEvent(Object.defineProperty(new Event("connect"), "target", { value: port }));
-  Object.defineProperty(navigator, "serial", { value: serial });
+  window.plug = () => say("connect");
+  ofSerial(serial);
+  window.modules = 0;
+  const { createObjectURL } = URL;
+  URL.createObjectURL = (blob) => {
+    if (blob.type === "text/javascript") window.modules += 1;
+    return createObjectURL.call(URL, blob);
+  };
 }
+
+// The other end of the port of the page: functions that take bytes and signals.
+let otherEnd = null;
 
 // A virtual robot that stands; it prints its socket and its pose.
 async function startRobot() {
@@ -148,8 +167,8 @@ async function useLive(page, where) {
   const shows = (id, text) => page.waitForFunction(([of, part]) => document.getElementById(of).textContent.includes(part), [id, text]);
   const exceeds = (name, least) => page.waitForFunction(
     ([of, bound]) => parseFloat(document.querySelector(`[data-value="${of}"]`).textContent) > bound, [name, least]);
-  await page.exposeFunction("toRobot", (bytes) => { socket.write(Buffer.from(bytes)); });
-  socket.on("data", (data) => page.evaluate((bytes) => fromRobot(bytes), [...data]).catch(() => {}));
+  otherEnd = { receive: (bytes) => socket.write(bytes) };
+  socket.on("data", (data) => page.evaluate((bytes) => fromPort(bytes), [...data]).catch(() => {}));
   try {
     await page.setInputFiles("#map-file", join(modules, "live-robot/map.toml"));
     await page.setInputFiles("#robot-file", join(modules, "live-robot/robot.toml"));
@@ -189,6 +208,86 @@ async function useLive(page, where) {
   console.log(`${where}: a robot at ${await read("pose")}`);
 }
 
+// A board is flashed by the keys alone, after each thing that can go wrong: its flash then has the bytes of the files in the folder MODULES/flash, and nothing
+// else is changed.
+async function useFlash(page, where, scheme) {
+  const file = (name) => readFileSync(join(modules, "flash", name));
+  const isShown = (id, text) => page.waitForFunction(([of, part]) => {
+    const it = document.getElementById(of);
+    return it.checkVisibility() && it.textContent.includes(part);
+  }, [id, text]).catch(() => { throw new Error(`“${text}” is not shown`); });
+  const reload = async (hash) => {
+    await page.evaluate((it) => { location.hash = it; }, hash);
+    await page.reload();
+  };
+  await reload("without-ports");
+  await isShown("unsupported", "cannot open serial ports");
+  await page.evaluate(axe);
+  await check(page, `${where}, without ports`);
+  await reload("");
+  await page.evaluate(axe);
+
+  const robot = scheme === "light" ? ["robot.toml", "map.toml"].map((name) => join(modules, "live-robot", name)) : join(modules, "flash/robot.zip");
+  await page.setInputFiles("#robot-files", robot);
+  // That of a release is written unless another one is chosen.
+  const released = scheme === "dark" && await page.evaluate(() => document.getElementById("program-esp32c6")?.textContent);
+  if (!released) await page.setInputFiles("#program", join(modules, "flash", scheme === "light" ? "program.bin" : "program.elf"));
+  await isShown("state", "ready to be written");
+  if (await page.evaluate(() => window.modules) !== 0) fault(where, "the library is loaded before somebody connects");
+  while (!await page.evaluate(() => document.activeElement.id === "flash")) await page.keyboard.press("Tab");
+
+  // Connects a board by the key; the board.
+  async function connectBoard(faults) {
+    const send = (bytes) => { page.evaluate((it) => fromPort(it), [...bytes]).catch(() => {}); };
+    const board = new Board(send, () => page.evaluate(() => unplug()), faults);
+    otherEnd = board;
+    await page.waitForFunction(() => document.getElementById("flash").getAttribute("aria-disabled") !== "true");
+    await page.keyboard.press("Enter");
+    return board;
+  }
+
+  const untouched = new Board().flash;
+  for (const [faults, text, isWritten] of [
+    [{ isBusy: true }, "another program"],
+    [{ deaf: true }, "Hold its button BOOT"],
+    [{ chip: 5 }, "an ESP32-C3 and not an ESP32-C6"],
+    [{ chip: 99 }, "a chip that is not known"],
+    [{ flips: 0x110010 }, "differs from what was sent (MD5)", true],
+    [{ unplugsAt: 0x10000 }, "was unplugged", true],
+  ]) {
+    await page.evaluate((isBusy) => { window.isPortBusy = isBusy; }, Boolean(faults.isBusy));
+    const board = await connectBoard(faults);
+    await isShown("error", text);
+    await check(page, `${where}, ${text}`);
+    if (!isWritten && !board.flash.equals(untouched)) fault(where, `${text}: something was written`);
+    if (await page.locator("#next").isVisible()) fault(where, `${text}: the page says what comes next`);
+    if (isWritten && !(await page.locator("#parts").textContent()).includes("not complete")) fault(where, `${text}: no part is said to be incomplete`);
+  }
+
+  const board = await connectBoard({});
+  await isShown("state", "Written and verified: the ESP32-C6 (revision 1) starts");
+  if (await page.locator("#error").isVisible()) fault(where, "the page shows an error of another board");
+  const loader = JSON.parse(file("loader.json"));
+  for (const [bytes, address] of [[loader.text, loader.text_start], [loader.data, loader.data_start]]) {
+    if (!board.memory.get(address)?.equals(Buffer.from(bytes, "base64"))) fault(where, "the loader was not sent as it is");
+  }
+  if (board.entry !== loader.entry) fault(where, `the loader starts at ${board.entry}`);
+  const expected = Buffer.from(untouched);
+  const places = [["bootloader.bin", 0], ["partitions.bin", 0x8000], ["program.bin", 0x10000], ["config.bin", 0x100000], ["map.bin", 0x110000]];
+  for (const [name, address] of places) {
+    const bytes = released && name === "program.bin" ? Buffer.from(released, "base64") : file(name), end = address + bytes.length;
+    expected.fill(0xff, address, Math.ceil(end / 4096) * 4096); // whole sectors are erased
+    bytes.copy(expected, address);
+    if (!board.flash.subarray(address, end).equals(bytes)) fault(where, `${name} is not at ${address.toString(16)}`);
+  }
+  if (!board.flash.equals(expected)) fault(where, "the flash is changed elsewhere");
+  if (board.starts !== 1) fault(where, `the program was started ${board.starts} times`);
+  if (await page.evaluate(() => document.activeElement.id) !== "flash") fault(where, "the focus is lost");
+  const live = await page.$eval("#live", ({ href }) => href);
+  if (!live.endsWith("/" + LIVE)) fault(where, `the live page is at ${live}`);
+  await page.$eval("#log", (it) => { it.open = true; });
+}
+
 // The keys move both runs of a comparison.
 async function useComparison(page, where) {
   await page.focus(".map");
@@ -224,6 +323,7 @@ async function open(page, base, name, where, scheme) {
   await page.goto(base + name, { waitUntil: "load" });
   if (name === PLAYGROUND) await usePlayground(page, where);
   if (name === FORM) await useForm(page, where, scheme);
+  if (name === FLASH) await useFlash(page, where, scheme);
   if (name === LIVE) await useLive(page, where);
   if (name === COMPARISON) await useComparison(page, where);
   if (name === SERVED) await useServed(page, where);
@@ -238,6 +338,8 @@ async function visit(browser, scheme, base, names) {
   const page = await context.newPage();
   page.setDefaultTimeout(PATIENCE);
   await page.addInitScript(playPort);
+  await page.exposeFunction("toPort", (bytes) => { otherEnd.receive(Buffer.from(bytes)); });
+  await page.exposeFunction("setSignals", (signals) => { otherEnd.signals(signals); });
   let where = "";
   page.on("console", (message) => { if (message.type() === "error") fault(where, message.text()); });
   page.on("pageerror", (error) => fault(where, error.message));

@@ -47,14 +47,15 @@ pub fn root() -> &'static Path {
     xtask.parent().unwrap_or(xtask)
 }
 
-/// Makes a build from the sources in `root` the same in every folder: neither that of the sources nor that of cargo is in it.
+/// Makes a build from the sources in `root` the same in every folder and at every time: neither that of the sources nor that of cargo is in
+/// it, and the time of the build that Espressif's description of a program has is 1970.
 /// `others` are further flags of the compiler.
 pub fn reproducible(build: &mut Command, root: &Path, others: &[&str]) -> anyhow::Result<()> {
     let remap = |from: &Path, to| format!("--remap-path-prefix={}={to}", from.display());
     let remaps = [remap(root, "/sonarfix"), remap(&home()?, "/cargo")];
     let flags: Vec<&str> =
         remaps.iter().map(String::as_str).chain(others.iter().copied()).collect();
-    build.env("CARGO_ENCODED_RUSTFLAGS", flags.join("\u{1f}"));
+    build.env("CARGO_ENCODED_RUSTFLAGS", flags.join("\u{1f}")).env("SOURCE_DATE_EPOCH", "0");
     Ok(())
 }
 

@@ -24,6 +24,7 @@ mod endurance;
 mod features;
 mod figures;
 mod firmware;
+mod flash_page;
 mod fuzz;
 mod golden;
 mod miri;

@@ -1,5 +1,5 @@
-//! The simulator, the form of a new robot and the live page of a robot on a serial port as static web pages, and their check in a
-//! headless browser.
+//! The simulator, the form of a new robot, the page that flashes a board and the live page of a robot on a serial port as static web
+//! pages, and their check in a headless browser.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -11,14 +11,15 @@ use flate2::write::GzEncoder;
 
 use crate::cargo;
 use crate::ci;
+use crate::flash_page;
 
 /// Simulated seconds of each run that browser and computer compare.
 const SECONDS: u32 = 60;
 /// Limit of a page, compressed with gzip, bytes.
 const MOST_BYTES: usize = 2_000_000;
 /// The pages in the folder of [`build`], and the scripts in `sim-host/playground/tests` that use them.
-pub const PAGES: [&str; 3] = ["index.html", "new-robot.html", "live.html"];
-const CHECKS: [&str; 3] = ["check.js", "check_new_robot.js", "check_live.js"];
+pub const PAGES: [&str; 4] = ["index.html", "new-robot.html", "flash.html", "live.html"];
+const CHECKS: [&str; 4] = ["check.js", "check_new_robot.js", "check_flash.js", "check_live.js"];
 
 /// Builds the pages, and checks their size and, in a browser, their use, and that the simulator computes the same bits as this computer.
 pub fn build_and_check() -> anyhow::Result<()> {
@@ -51,7 +52,7 @@ pub fn build_and_check() -> anyhow::Result<()> {
 }
 
 /// Builds the simulator of the sources in `root` for WebAssembly, and the pages with it: the same bytes in every folder.
-/// Returns their folder. `firmware` is a folder with released programs for the form of a new robot.
+/// Returns their folder. `firmware` is a folder with released programs for the pages.
 pub fn build(root: &Path, firmware: Option<&Path>) -> anyhow::Result<PathBuf> {
     let target = cargo::target_folder();
     let mut simulator = cargo::command(
@@ -67,7 +68,7 @@ pub fn build(root: &Path, firmware: Option<&Path>) -> anyhow::Result<PathBuf> {
     command
         .current_dir(root)
         .env("CARGO_TARGET_DIR", &target)
-        .args([&program, &folder])
+        .args([&program, &folder, &flash_page::prepare(root)?])
         .args(firmware);
     cargo::check(command)?;
     Ok(folder)

@@ -1,5 +1,6 @@
 //! The site: the docs as a book, and the playground; static files that open from a disk and from any web server.
 
+mod flash;
 mod form;
 mod links;
 mod live;
@@ -39,7 +40,7 @@ pub fn run(args: Args) -> anyhow::Result<()> {
 }
 
 /// Writes the site of the sources in `root` into a folder, which is emptied first, and checks its links. `firmware` is a folder with
-/// released programs for the form of a new robot.
+/// released programs for the pages.
 pub fn build(root: &Path, site: &Path, firmware: Option<&Path>) -> anyhow::Result<()> {
     cargo::install("mdbook", MDBOOK)?;
     let source = cargo::target_folder().join("site-source");
@@ -53,7 +54,7 @@ pub fn build(root: &Path, site: &Path, firmware: Option<&Path>) -> anyhow::Resul
     cargo::check(mdbook)?;
     theme::change(site)?;
     let pages = playground::build(root, firmware)?;
-    for (from, to) in playground::PAGES.iter().zip(["playground", "new-robot", "live"]) {
+    for (from, to) in playground::PAGES.iter().zip(["playground", "new-robot", "flash", "live"]) {
         stage::own_page(&pages.join(from), &site.join(to).join("index.html"))?;
     }
     links::check(site)
@@ -68,12 +69,6 @@ pub fn check(site: &Path) -> anyhow::Result<()> {
         ));
         return Ok(());
     };
-    if Command::new("npm").arg("--version").output().is_err() {
-        ci::skip(
-            "the site in a browser: npm, which installs the rules of accessibility, is not there",
-        );
-        return Ok(());
-    }
     let tools = cargo::target_folder().join("site-check");
     std::fs::create_dir_all(&tools)?;
     let mut install = Command::new("npm");
@@ -82,6 +77,7 @@ pub fn check(site: &Path) -> anyhow::Result<()> {
     cargo::check(install).context("cannot install the rules of accessibility")?;
     form::prepare(&tools)?;
     live::prepare(&tools)?;
+    flash::prepare(&tools)?;
     reports::prepare(&tools)?;
     let mut node = Command::new("node");
     node.arg(cargo::root().join("xtask/site/check.mjs")).arg(&tools).arg(site);

@@ -11,11 +11,22 @@ use sha2::{Digest, Sha256};
 
 use crate::image::{self, Image};
 
+/// Where the boot ROM finds the bootloader in flash.
+pub const BOOTLOADER: u32 = 0;
+/// Where the bootloader finds the table of partitions: its usual place.
+pub const PARTITIONS: u32 = 0x8000;
+/// Where the application image lies: the partition `factory` of `firmware/esp32c6/partitions.csv`.
+pub const PROGRAM: u32 = 0x1_0000;
+
 /// The addresses at which the flash is mapped.
 const MAPPED: Range<u32> = 0x4200_0000..0x4300_0000;
+/// RAM: that of the processor, and that of the low-power one (technical reference manual of the chip, 5.3).
+const RAM: [Range<u32>; 2] = [0x4080_0000..0x4088_0000, 0x5000_0000..0x5000_4000];
 /// Bytes of a mapped page.
 const PAGE: u32 = 0x1_0000;
 const MAGIC: u8 = 0xE9;
+/// Bytes of the header of an image.
+const HEADER: usize = 24;
 /// The most segments of an image.
 const MOST_SEGMENTS: usize = 16;
 /// Two lines for data; 4 MiB at 80 MHz.
@@ -72,6 +83,33 @@ pub fn write(elf: &[u8]) -> anyhow::Result<Vec<u8>> {
     let hash = Sha256::digest(&file);
     file.extend(hash);
     Ok(file)
+}
+
+/// The image in the file of a program: an ELF, or an image, whose header and hash are checked.
+///
+/// # Errors
+/// If it is neither, for another chip, cut off or damaged.
+pub fn read(file: &[u8]) -> anyhow::Result<Vec<u8>> {
+    if file.starts_with(b"\x7fELF") {
+        let is_of_chip = |address: &u32| RAM.iter().chain([&MAPPED]).any(|it| it.contains(address));
+        let program = Image::of_elf(file)?;
+        let other = program.parts().find(|(address, _)| !is_of_chip(address));
+        ensure!(
+            other.is_none(),
+            "it is for another chip: a part of it lies at {:#010x}",
+            other.map_or(0, |(address, _)| address)
+        );
+        return write(file);
+    }
+    let header = file.first_chunk::<HEADER>().filter(|[magic, ..]| *magic == MAGIC);
+    let header = header.context("it is neither an ELF nor an application image")?;
+    let [.., low, high, _, _, _, _, _, _, _, _, _, _] = *header;
+    let chip = u16::from_le_bytes([low, high]);
+    ensure!(chip == CHIP, "it is for another chip: number {chip} of Espressif, and not {CHIP}");
+    let hashed = file.split_last_chunk::<32>();
+    let is_whole = hashed.is_some_and(|(contents, hash)| Sha256::digest(contents)[..] == hash[..]);
+    ensure!(is_whole, "it is cut off or damaged: its hash differs");
+    Ok(file.to_vec())
 }
 
 fn header(file: &mut Vec<u8>, entry: u32) {
@@ -136,5 +174,28 @@ mod tests {
         let file = write(&program).unwrap();
         assert_eq!(file[1], 3);
         assert_eq!(file[0x1_0034..0x1_0038], [2; 4]);
+    }
+
+    #[test]
+    fn an_image_is_made_of_an_elf_and_read_again() {
+        let program = elf(0x4080_0010, &[segment(0x4200_0020, &[7; 100])]);
+        let image = read(&program).unwrap();
+        assert_eq!((&image, &image), (&write(&program).unwrap(), &read(&image).unwrap()));
+        let mut of_a_c3 = image.clone();
+        of_a_c3[12] = 5;
+        let mut damaged = image.clone();
+        damaged[60] ^= 1;
+        for (file, reason) in [
+            (elf(0, &[segment(0x0800_0000, &[1; 8])]), "lies at 0x08000000"),
+            (of_a_c3, "number 5 of Espressif, and not 13"),
+            (damaged, "damaged"),
+            (image[..image.len() - 1].to_vec(), "cut off"),
+            (vec![MAGIC; 8], "neither"),
+            (b"UF2\n".to_vec(), "neither"),
+            (Vec::new(), "neither"),
+        ] {
+            let error = read(&file).unwrap_err().to_string();
+            assert!(error.contains(reason), "{error}");
+        }
     }
 }

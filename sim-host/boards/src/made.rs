@@ -1,4 +1,4 @@
-//! ELF files that are made instead of linked: for tests.
+//! ELF files that are made instead of linked: for tests, and where a program is asked for that does not matter.
 
 /// A segment.
 #[derive(Debug)]

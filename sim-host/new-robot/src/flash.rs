@@ -4,7 +4,7 @@ use anyhow::{Context, ensure};
 use sonarfix::config::{Config, RangerParameters};
 use sonarfix::geometry::units::Metres;
 use sonarfix_boards::image::Image;
-use sonarfix_boards::{Board, Region, Uf2, uf2};
+use sonarfix_boards::{Board, Region, Uf2, esp, uf2};
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_hal::ranger::RangerKind;
 use sonarfix_link::baked;
@@ -134,6 +134,21 @@ pub fn program(file: &[u8], name: &str, board: &Board, usb: &Uf2) -> anyhow::Res
         board.title,
         board.start_of_flash(),
         board.config.address
+    );
+    Ok(image)
+}
+
+/// The application image of a program's file, ELF or image, for the board with a chip of Espressif; it lies at [`esp::PROGRAM`].
+///
+/// # Errors
+/// If it is no such file, for another chip or too large; the messages name it `name`.
+pub fn esp_program(file: &[u8], name: &str, board: &Board) -> anyhow::Result<Vec<u8>> {
+    let title = &board.title;
+    let image = esp::read(file).with_context(|| format!("{name} is no program for the {title}"))?;
+    let (length, most) = (image.len(), board.config.address - esp::PROGRAM);
+    ensure!(
+        length <= most as usize,
+        "{name} has {length} bytes, and the {title} has room for {most}"
     );
     Ok(image)
 }

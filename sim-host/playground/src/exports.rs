@@ -2,7 +2,7 @@
 //!
 //! The page asks for room for a request (`request`), writes it there, and calls `run`, which returns the length of the
 //! answer at `answer`. `drawing` and `own_map` read a map, and `map_file` writes one. `scenes` makes the scenes of the tour the answer. `questions`, `program`, `robot` and
-//! `zip` are those of the form; `connect`, `receive`, `order`, `due` and `events` those of a robot on a serial port. Times are
+//! `zip` are those of the form; `parts`, `part` and `md5` those of a board that is flashed; `connect`, `receive`, `order`, `due` and `events` those of a robot on a serial port. Times are
 //! milliseconds since any fixed moment.
 
 #![expect(unsafe_code, reason = "a function that WebAssembly exports by name needs `no_mangle`")]
@@ -16,6 +16,7 @@ thread_local! {
     static REQUEST: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
     static DRAWING: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
     static PROGRAM: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
+    static PARTS: RefCell<Vec<Vec<u8>>> = const { RefCell::new(Vec::new()) };
     static ANSWER: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
     static LIVE: RefCell<Option<Live>> = const { RefCell::new(None) };
 }
@@ -58,7 +59,7 @@ pub extern "C" fn file() -> usize {
     answer_to(crate::file)
 }
 
-/// Makes room for a file with a map, of this many bytes, and returns its address.
+/// Makes room for a file with a map, or an archive of a robot, of this many bytes, and returns its address.
 #[unsafe(no_mangle)]
 pub extern "C" fn drawing(length: usize) -> *mut u8 {
     DRAWING.with_borrow_mut(|drawing| room(drawing, length))
@@ -106,6 +107,31 @@ pub extern "C" fn robot() -> usize {
 #[unsafe(no_mangle)]
 pub extern "C" fn zip() -> usize {
     PROGRAM.with_borrow(|program| answer_to(|request| crate::new_robot::zip(request, program)))
+}
+
+/// Makes the parts of the flash of the request's robot, whose archive is in the file, the answer, and returns its length.
+#[unsafe(no_mangle)]
+pub extern "C" fn parts() -> usize {
+    let archive = DRAWING.take();
+    PROGRAM.with_borrow(|program| {
+        answer_to(|request| {
+            let (shown, parts) = crate::flash::answer(request, &archive, program);
+            PARTS.set(parts);
+            shown
+        })
+    })
+}
+
+/// Makes the bytes of a part the answer, and returns their number.
+#[unsafe(no_mangle)]
+pub extern "C" fn part(index: usize) -> usize {
+    answer_with(PARTS.with_borrow(|parts| parts.get(index).cloned().unwrap_or_default()))
+}
+
+/// Makes the MD5 of the request's bytes the answer, and returns its length.
+#[unsafe(no_mangle)]
+pub extern "C" fn md5() -> usize {
+    answer_with(crate::flash::md5(&REQUEST.take()))
 }
 
 fn since(millis: f64) -> Duration {

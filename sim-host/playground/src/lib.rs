@@ -1,4 +1,4 @@
-//! The simulator, the form of a new robot and the live page of a robot on a serial port as static web pages, without a server:
+//! The simulator, the form of a new robot, the page that flashes a board and the live page of a robot on a serial port as static web pages, without a server:
 //! `cargo xtask playground`.
 //!
 //! The page keeps a scenario as JSON, with the keys of a scenario file. For each change it passes the scenario to [`answer`],
@@ -10,20 +10,26 @@
 //! | [`request`] | what the page asks for, and how it becomes a simulation |
 //! | [`scenes`](mod@scenes) | the scenes of the tour |
 //! | [`new_robot`] | the form of a new robot |
+//! | [`flash`] | what an ESP32-C6 gets on its serial port |
+//! | [`archive`] | ZIP archives of the files of a robot |
+//! | [`warning`] | improbable values of such files |
 //! | [`own_map`] | a map from a file of one's own |
 //! | [`live`] | a robot on a serial port of the browser |
 //! | [`digest`] | a hash of all bits of a run, to compare machines |
 //! | `exports` | the functions that the page calls, in WebAssembly |
 //! | `main.rs` | the program that writes the pages |
 
+pub mod archive;
 pub mod digest;
 #[cfg(target_arch = "wasm32")]
 mod exports;
+pub mod flash;
 pub mod live;
 pub mod new_robot;
 pub mod own_map;
 pub mod request;
 pub mod scenes;
+pub mod warning;
 
 use serde::Serialize;
 use sonarfix_sim::simulate::SimulationError;

@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Context, bail};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use sonarfix_boards::Board;
+use sonarfix_boards::{Board, esp};
 use sonarfix_live::page::Connection;
 use sonarfix_playground::request::Request;
 use sonarfix_playground::run;
@@ -18,32 +18,60 @@ const SEEDS: [u64; 3] = [0, 1, 2];
 const POLICY: &str = "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; \
                       script-src 'unsafe-inline' 'wasm-unsafe-eval'\">";
 
+/// The same, and a module in the page.
+const POLICY_WITH_MODULE: &str = "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; \
+                                  script-src 'unsafe-inline' 'wasm-unsafe-eval' blob:\">";
+
 const USAGE: &str =
-    "usage: sonarfix-playground pages PROGRAM.wasm FOLDER [FIRMWARE] | digests SECONDS";
+    "usage: sonarfix-playground pages PROGRAM.wasm FOLDER PARTS [FIRMWARE] | digests SECONDS";
 
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     match arguments.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
-        ["pages", program, folder] => write(program.as_ref(), folder.as_ref(), ""),
-        ["pages", program, folder, firmware] => {
-            write(program.as_ref(), folder.as_ref(), &programs(firmware.as_ref())?)
+        ["pages", program, folder, parts] => {
+            write(program.as_ref(), folder.as_ref(), parts.as_ref(), None)
+        }
+        ["pages", program, folder, parts, firmware] => {
+            write(program.as_ref(), folder.as_ref(), parts.as_ref(), Some(firmware.as_ref()))
         }
         ["digests", seconds] => print(seconds.parse().context(USAGE)?),
         _ => bail!(USAGE),
     }
 }
 
-/// The programs of the boards that take UF2 files, from a folder of a release, as elements of the page.
-fn programs(firmware: &Path) -> anyhow::Result<String> {
+/// An element of a page with the bytes of a file, which is no script.
+fn element(attributes: &str, file: &Path) -> anyhow::Result<String> {
+    let bytes = std::fs::read(file).with_context(|| file.display().to_string())?;
+    Ok(format!("<script {attributes} type=\"text/plain\">{}</script>\n", STANDARD.encode(bytes)))
+}
+
+/// The programs of the boards that take UF2 files, from a folder of a release.
+fn programs_of_drives(firmware: &Path) -> anyhow::Result<String> {
     let boards = sonarfix_boards::all()?;
     let elements =
         boards.iter().filter(|board| board.uf2.is_some()).map(|Board { name, package, .. }| {
             let file = firmware.join(format!("{package}.uf2"));
-            let bytes = std::fs::read(&file).with_context(|| file.display().to_string())?;
-            let bytes = STANDARD.encode(bytes);
-            Ok(format!("<script id=\"program-{name}\" type=\"text/plain\">{bytes}</script>\n"))
+            element(&format!("id=\"program-{name}\""), &file)
         });
     elements.collect()
+}
+
+/// What the page that flashes an ESP32-C6 has of `parts`, a folder that `cargo xtask` makes, and of a folder of a release.
+fn flash_elements(parts: &Path, firmware: Option<&Path>) -> anyhow::Result<String> {
+    let part = |what, address, file| {
+        element(&format!("data-what=\"{what}\" data-address=\"{address}\""), &parts.join(file))
+    };
+    let Board { name, package, .. } = sonarfix_boards::named("esp32c6")?;
+    let program = firmware.map(|folder| {
+        element(&format!("id=\"program-{name}\""), &folder.join(format!("{package}.bin")))
+    });
+    Ok([
+        element("id=\"esptool\"", &parts.join("esptool.js"))?,
+        part("the bootloader", esp::BOOTLOADER, "bootloader.bin")?,
+        part("the table of partitions", esp::PARTITIONS, "partitions.bin")?,
+        program.transpose()?.unwrap_or_default(),
+    ]
+    .concat())
 }
 
 /// What one page has besides the simulator.
@@ -52,14 +80,20 @@ struct Page<'a> {
     title: &'a str,
     style: &'a str,
     body: String,
-    /// Elements with the programs of boards.
-    programs: &'a str,
+    policy: &'a str,
+    /// Elements with programs.
+    programs: String,
     /// In the order in which they are read.
     scripts: &'a [&'a str],
 }
 
-/// Writes the pages into a folder, with the elements of the programs of boards.
-fn write(program: &Path, folder: &Path, programs: &str) -> anyhow::Result<()> {
+/// Writes the pages into a folder. `parts` has what the page that flashes a board needs, `firmware` the programs of a release.
+fn write(
+    program: &Path,
+    folder: &Path,
+    parts: &Path,
+    firmware: Option<&Path>,
+) -> anyhow::Result<()> {
     let program = std::fs::read(program).with_context(|| program.display().to_string())?;
     let program = STANDARD.encode(program);
     let (style, player) = (style(), player());
@@ -70,7 +104,8 @@ fn write(program: &Path, folder: &Path, programs: &str) -> anyhow::Result<()> {
             title: "Sonarfix playground",
             style: include_str!("page.css"),
             body: fill(include_str!("page.html"), &[("player", player.into())]),
-            programs: "",
+            policy: POLICY,
+            programs: String::new(),
             scripts: &[
                 DRAWING,
                 SCRIPT,
@@ -85,13 +120,23 @@ fn write(program: &Path, folder: &Path, programs: &str) -> anyhow::Result<()> {
             title: "Sonarfix: a new robot",
             style: concat!(include_str!("page.css"), include_str!("new_robot.css")),
             body: include_str!("new_robot.html").to_owned(),
-            programs,
+            policy: POLICY,
+            programs: firmware.map(programs_of_drives).transpose()?.unwrap_or_default(),
             scripts: &[simulator, include_str!("new_robot.js")],
+        },
+        Page {
+            file: "flash.html",
+            title: "Sonarfix: flash an ESP32-C6",
+            style: concat!(include_str!("page.css"), include_str!("flash.css")),
+            body: include_str!("flash.html").to_owned(),
+            policy: POLICY_WITH_MODULE,
+            programs: flash_elements(parts, firmware)?,
+            scripts: &[simulator, include_str!("flash.js")],
         },
     ];
     for page in pages {
         let values = [
-            ("policy", POLICY.into()),
+            ("policy", page.policy.into()),
             ("title", page.title.into()),
             ("style", style.as_str().into()),
             ("own-style", page.style.into()),

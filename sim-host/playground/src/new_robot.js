@@ -75,6 +75,8 @@ const newRobot = (() => {
       : `With ${name}.uf2 of a release, or one of your own, the archive has the file that the board takes.`;
     const command = document.createElement("code");
     command.textContent = `sonarfix flash robot --board ${board}`;
+    const page = element("flash-page"); // on the site only
+    if (page) page.hidden = board !== "esp32c6";
     element("flash-hint").replaceChildren(...uf2
       ? [`Hold BOOTSEL while you plug the board in, and drop robot.uf2 on the drive ${drive}: it has program, configuration and map.`]
       : [command, " writes it to the board."]);

@@ -1,11 +1,12 @@
 //! The form of a new robot: the questions and the files of `sonarfix init`.
 
-use std::io::Write as _;
-
 use serde::Serialize;
 use sonarfix_boards::Board;
 use sonarfix_new_robot::answers::Chosen;
 use sonarfix_new_robot::{Answers, Files, Refusal, question};
+
+use crate::archive;
+use crate::warning::Warning;
 
 /// What the page shows for its answers.
 #[derive(Debug, Serialize)]
@@ -25,13 +26,6 @@ enum Shown {
         error: String,
         option: Option<&'static str>,
     },
-}
-
-/// An improbable value.
-#[derive(Debug, Serialize)]
-struct Warning {
-    key: String,
-    message: String,
 }
 
 /// The files of a robot, and its UF2 if there are a program and a board that takes one.
@@ -55,11 +49,8 @@ impl Made {
     fn shown(self) -> anyhow::Result<Shown> {
         let Self { board, files, uf2 } = self;
         let warnings = files.warnings()?;
-        let warnings = warnings
-            .iter()
-            .map(|it| Warning { key: it.key().to_owned(), message: it.message().to_owned() });
         Ok(Shown::Robot {
-            warnings: warnings.collect(),
+            warnings: warnings.iter().map(Warning::from).collect(),
             files: files.all().map(|(name, text)| (name, text.to_owned())).to_vec(),
             package: board.package,
             drive: board.uf2.map(|usb| usb.drive),
@@ -97,52 +88,7 @@ pub fn zip(request: &str, program: &[u8]) -> Vec<u8> {
     let uf2 = uf2.as_ref().map(|uf2| ("robot.uf2", uf2.as_slice()));
     let all = texts.into_iter().chain(uf2).map(|(name, bytes)| (format!("robot/{name}"), bytes));
     // Writing to memory does not fail.
-    zip_of(&all.collect::<Vec<_>>()).unwrap_or_default()
-}
-
-/// 1980-01-01, the first date of the format: the same answers give the same bytes.
-const DATE: u16 = 0x21;
-/// Version 2.0 of the format: folders.
-const VERSION: u16 = 20;
-
-/// A ZIP archive of files that are stored as they are (APPNOTE.TXT of PKWARE, 4.3).
-fn zip_of(files: &[(String, &[u8])]) -> std::io::Result<Vec<u8>> {
-    let (mut archive, mut directory) = (Vec::new(), Vec::new());
-    for (name, bytes) in files {
-        let at = length(&archive);
-        // Version, flags, method, time, date; sum, sizes, length of the name, no further fields.
-        let mut entry = Vec::new();
-        for field in [VERSION, 0, 0, 0, DATE] {
-            entry.write_all(&field.to_le_bytes())?;
-        }
-        for field in [crc32fast::hash(bytes), length(bytes), length(bytes), length(name.as_bytes())]
-        {
-            entry.write_all(&field.to_le_bytes())?;
-        }
-        archive.write_all(b"PK\x03\x04")?;
-        for part in [entry.as_slice(), name.as_bytes(), bytes] {
-            archive.write_all(part)?;
-        }
-        directory.write_all(b"PK\x01\x02")?;
-        directory.write_all(&VERSION.to_le_bytes())?;
-        directory.write_all(&entry)?;
-        // Comment, disk, attributes.
-        directory.write_all(&[0; 10])?;
-        directory.write_all(&at.to_le_bytes())?;
-        directory.write_all(name.as_bytes())?;
-    }
-    let count = u16::try_from(files.len()).unwrap_or(u16::MAX).to_le_bytes();
-    let (at, size) = (length(&archive).to_le_bytes(), length(&directory).to_le_bytes());
-    archive.write_all(&directory)?;
-    archive.write_all(b"PK\x05\x06\0\0\0\0")?;
-    for part in [&count[..], &count, &size, &at, &[0, 0]] {
-        archive.write_all(part)?;
-    }
-    Ok(archive)
-}
-
-fn length(bytes: &[u8]) -> u32 {
-    u32::try_from(bytes.len()).unwrap_or(u32::MAX)
+    archive::write(&all.collect::<Vec<_>>()).unwrap_or_default()
 }
 
 #[cfg(test)]

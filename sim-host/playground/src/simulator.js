@@ -76,6 +76,22 @@ const openSimulator = (base64) => {
     return bytesOf(wasm.zip());
   }
 
+  // The parts of the flash of a robot, whose files may be in an archive, with the warnings about them, or an error.
+  function flashParts(request, archive) {
+    put(archive, wasm.drawing);
+    write(request);
+    return JSON.parse(answer(wasm.parts()));
+  }
+
+  // The bytes of such a part.
+  const flashPart = (index) => bytesOf(wasm.part(index));
+
+  // The MD5 of some bytes, in hexadecimal digits.
+  function md5(bytes) {
+    put(bytes, wasm.request);
+    return answer(wasm.md5());
+  }
+
   // A robot on a serial port, of which nothing was received; what is wrong with the request, or nothing.
   function connect(request) {
     write(request);
@@ -100,5 +116,5 @@ const openSimulator = (base64) => {
   // The events since the last call.
   const events = () => answer(wasm.events()).split("\n").filter((line) => line !== "").map((line) => JSON.parse(line));
 
-  return { scenes, run, file, ownMap, mapFile, questions, setProgram, robot, zip, serial: { connect, receive, order, due, events } };
+  return { scenes, run, file, ownMap, mapFile, questions, setProgram, robot, zip, flashParts, flashPart, md5, serial: { connect, receive, order, due, events } };
 };

@@ -42,17 +42,22 @@ pub fn programs(out: &Path) -> anyhow::Result<Vec<PathBuf>> {
     Ok(written)
 }
 
-/// Builds the programs of the boards that take UF2 files from the sources in `root`, and writes these files into a folder.
-pub fn for_drives(root: &Path, folder: &Path) -> anyhow::Result<()> {
+/// Builds the programs of the boards that the pages of the site write or combine, from the sources in `root`, and writes their files
+/// into a folder: UF2 for those with a USB drive, the application image for the ESP32-C6.
+pub fn for_pages(root: &Path, folder: &Path) -> anyhow::Result<()> {
     fs::create_dir_all(folder)?;
-    for board in &sonarfix_boards::all()? {
-        if let Some(Uf2 { family, .. }) = board.uf2 {
-            let image = Image::of_elf(&fs::read(build(board, root)?)?)?;
-            let file = folder.join(board.package.clone() + ".uf2");
-            fs::write(file, uf2::write(&image, family)?)?;
+    let boards = sonarfix_boards::all()?;
+    for board in boards.iter().filter(|board| board.uf2.is_some() || is_esp(board)) {
+        let elf = fs::read(build(board, root)?)?;
+        for (ending, bytes) in files(board, &elf)? {
+            fs::write(folder.join(board.package.clone() + ending), bytes)?;
         }
     }
     Ok(())
+}
+
+fn is_esp(board: &Board) -> bool {
+    board.target.starts_with("riscv")
 }
 
 /// Builds the program of a board from the sources in `root`; returns the linked file.
@@ -73,8 +78,7 @@ fn build(board: &Board, root: &Path) -> anyhow::Result<PathBuf> {
 /// The files of a program, each with the ending of its name.
 fn files(board: &Board, elf: &[u8]) -> anyhow::Result<Vec<(&'static str, Vec<u8>)>> {
     let image = Image::of_elf(elf).context(board.package.clone())?;
-    let is_esp = board.target.starts_with("riscv");
-    let bin = if is_esp { esp::write(elf)? } else { image.flat() };
+    let bin = if is_esp(board) { esp::write(elf)? } else { image.flat() };
     let mut files = vec![(".elf", elf.to_vec()), (".bin", bin)];
     if let Some(Uf2 { family, .. }) = board.uf2 {
         files.push((".uf2", uf2::write(&image, family)?));

@@ -7,7 +7,7 @@ use anyhow::ensure;
 
 use super::{firmware, licences, program};
 use crate::workspace::Workspace;
-use crate::{cargo, site};
+use crate::{cargo, flash_page, site};
 
 /// What the site has beside the pages and the libraries of the programs in them.
 const BOOK: &str = "The book has scripts, style sheets and fonts of mdBook, https://github.com/rust-lang/mdBook, under the Mozilla Public \
@@ -18,14 +18,15 @@ pub fn archive(out: &Path, root: &Path) -> anyhow::Result<PathBuf> {
     let name = format!("sonarfix-{}-site", env!("CARGO_PKG_VERSION"));
     let folder = out.join(&name);
     let programs = cargo::target_folder().join("site-firmware");
-    firmware::for_drives(root, &programs)?;
+    firmware::for_pages(root, &programs)?;
     site::build(root, &folder, Some(&programs))?;
     for file in ["LICENSE-MIT", "LICENSE-APACHE"] {
         fs::copy(root.join(file), folder.join(file))?;
     }
     let packages = "--package sonarfix-playground --target wasm32-unknown-unknown";
     let licences = licences::of(Workspace::Main, packages)?;
-    fs::write(folder.join("LICENSES.txt"), BOOK.to_owned() + &licences)?;
+    let of_flashing = flash_page::licences(&flash_page::prepare(root)?)?;
+    fs::write(folder.join("LICENSES.txt"), [BOOK, &licences, "\n", &of_flashing].concat())?;
     let licences = licences::of(Workspace::Firmware, "--workspace --target all")?;
     fs::write(folder.join("LICENSES-firmware.txt"), licences)?;
     let packed = out.join(format!("{name}.tar.gz"));

@@ -15,7 +15,8 @@ const REPOSITORY: &str = env!("CARGO_PKG_REPOSITORY");
 const OWN: [&str; 3] = ["book.toml", "site.css", "site.js"];
 
 /// Pages of the site that are not of the book.
-const APART: [&str; 3] = ["playground/index.html", "new-robot/index.html", "live/index.html"];
+const APART: [&str; 4] =
+    ["playground/index.html", "new-robot/index.html", "flash/index.html", "live/index.html"];
 
 /// Writes the source of the book of the sources in `root` into a folder, which is emptied first.
 pub fn write(root: &Path, folder: &Path) -> anyhow::Result<()> {
