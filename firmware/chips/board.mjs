@@ -6,6 +6,7 @@ import { Gyro } from './gyro.mjs';
 import { Robot } from './robot.mjs';
 import { load } from './rom.mjs';
 import { numbers } from './room.mjs';
+import { UsbHost } from './usb.mjs';
 import { WIRINGS } from './wirings.mjs';
 
 const XIP = 0x10000000;
@@ -36,6 +37,10 @@ export class Board extends Robot {
     /** When the next pulse of the servo begins at the echo, which a wire connects with it instead of the sonar. */
     this.nextPulse = Infinity;
     this.chip = null;
+    /** The other end of the USB socket, whether it is plugged, and what it has received. */
+    this.usb = null;
+    this.isPlugged = false;
+    this.receivedByUsb = [];
     /** The polls of the program's loop. */
     this.polls = new Calls();
   }
@@ -54,6 +59,8 @@ export class Board extends Robot {
       wait: (nanos) => this.wait(nanos),
     }, this.polls, kept);
     this.polls.leave();
+    this.usb = new UsbHost(this.chip, (bytes) => this.receivedByUsb.push(...bytes));
+    if (this.isPlugged) this.usb.plug();
     this.setEncoders();
     const { pins, slices } = this.wiring;
     this.chip.setInput(pins.echo, false);
@@ -150,6 +157,16 @@ export class Board extends Robot {
     this.chip.clearTrap();
     const { kept } = this.chip;
     this.start(cause === 'power' ? null : kept);
+  }
+
+  plug() {
+    this.isPlugged = true;
+    this.usb.plug();
+  }
+
+  unplug() {
+    this.isPlugged = false;
+    this.usb.unplug();
   }
 
   hang() {

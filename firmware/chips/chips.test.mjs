@@ -13,6 +13,7 @@ import { Room, STEP, numbers } from './room.mjs';
 import { peripherals } from './stm32.mjs';
 import { access } from './thumb.mjs';
 import { Uart } from './uart.mjs';
+import { UsbHost, pipes } from './usb.mjs';
 import { WIRINGS } from './wirings.mjs';
 
 const { FIFO, RP2040 } = createRequire(import.meta.url)('rp2040js');
@@ -365,4 +366,91 @@ test('the watchdog expires after its window at the slowest oscillator (STM32F405
   board.now = 1e9;
   watchdog.write(0, 0xaaaa);
   assert.equal(Math.round(watchdog.expiresAt / 1e6), 1226);
+});
+
+/** Configuration of a serial port: control interface with its notifications, data interface with both pipes. */
+const CONFIGURATION = Uint8Array.of(
+  9, 2, 39, 0, 2, 1, 0, 0xc0, 50, 9, 4, 0, 0, 1, 2, 2, 0, 0, 7, 5, 0x81, 3, 8, 0, 255,
+  9, 4, 1, 0, 2, 10, 0, 0, 0, 7, 5, 0x02, 2, 64, 0, 0, 7, 5, 0x83, 2, 64, 0, 0,
+);
+/** Registers of the buffers of the pipes above, their controls, and where their buffers lie. */
+const [IN_BUFFER, OUT_BUFFER] = [0x80 + 8 * 3, 0x84 + 8 * 2];
+const [IN_CONTROL, OUT_CONTROL] = [0x8 + 8 * 2, 0xc + 8];
+const [IN_BYTES, OUT_BYTES] = [0x200, 0x240];
+const USB_AVAILABLE = 1 << 10;
+
+/** A host whose serial port is open, at a device with buffers. */
+function openPort() {
+  const rp2040 = quiet(new RP2040());
+  const heard = [];
+  const host = new UsbHost({ rp2040, clock: rp2040.clock }, (bytes) => heard.push(...bytes));
+  Object.assign(host, { isPlugged: true, isOpen: true, pipes: pipes(CONFIGURATION) });
+  const view = rp2040.usbDPRAMView;
+  view.setUint32(IN_CONTROL, IN_BYTES, true);
+  view.setUint32(OUT_CONTROL, OUT_BYTES, true);
+  const offer = (register, value) => rp2040.writeUint32(0x50100000 + register, value | USB_AVAILABLE);
+  const isTaken = (register) => !(view.getUint32(register, true) & USB_AVAILABLE);
+  return { rp2040, host, heard, offer, isTaken, wait: (nanos) => rp2040.clock.tick(nanos) };
+}
+
+test('the pipes of a serial port are those of its data interface', () => {
+  assert.deepEqual(pipes(CONFIGURATION), { in: 3, out: 2 });
+});
+
+test('a packet to the host takes the time of its bytes at 12 Mbit/s', () => {
+  const { rp2040, heard, offer, isTaken, wait } = openPort();
+  rp2040.usbDPRAM.set([1, 2, 3], IN_BYTES);
+  offer(IN_BUFFER, 3);
+  wait(3 * 667 + 9_000);
+  assert.ok(!isTaken(IN_BUFFER));
+  wait(1_100);
+  assert.ok(isTaken(IN_BUFFER));
+  assert.deepEqual(heard, [1, 2, 3]);
+  assert.equal(rp2040.usbCtrl.buffStatus, 1 << 6);
+});
+
+test('a device waits for bytes of the host, for its cable and while it sleeps', () => {
+  const { rp2040, host, heard, offer, isTaken, wait } = openPort();
+  offer(OUT_BUFFER, 64);
+  wait(1e6);
+  assert.ok(!isTaken(OUT_BUFFER));
+  host.send([7, 8]);
+  wait(1e5);
+  assert.ok(isTaken(OUT_BUFFER));
+  assert.deepEqual([...rp2040.usbDPRAM.subarray(OUT_BYTES, OUT_BYTES + 2)], [7, 8]);
+  host.suspend();
+  offer(IN_BUFFER, 1);
+  wait(5e6);
+  assert.ok(!isTaken(IN_BUFFER) && rp2040.usbCtrl.sieStatus & (1 << 4));
+  // The driver clears it by writing it.
+  rp2040.usbCtrl.writeUint32Atomic(0x50, 1 << 4, 0);
+  assert.equal(rp2040.usbCtrl.sieStatus & (1 << 4), 0);
+  host.resume();
+  wait(1e5);
+  assert.ok(isTaken(IN_BUFFER));
+  host.unplug();
+  offer(IN_BUFFER, 1);
+  wait(5e6);
+  assert.ok(!isTaken(IN_BUFFER) && heard.length === 1);
+});
+
+test('a host resets the bus, asks for the device and opens its port', () => {
+  const { rp2040, host, wait } = openPort();
+  const requests = [];
+  rp2040.usbCtrl.sendSetupPacket = (packet) => {
+    requests.push([packet[0], packet[1]]);
+    // The status at once, and no answer is longer than a packet.
+    if (packet[0] & 0x80) {
+      host.answered(packet[3] === 2 ? CONFIGURATION : new Uint8Array(18));
+      host.bytesFor(0);
+    } else host.answered(new Uint8Array());
+  };
+  Object.assign(host, { isOpen: false, pipes: {} });
+  host.plug();
+  wait(11e6);
+  assert.ok(rp2040.usbCtrl.sieStatus & (1 << 19));
+  for (let i = 0; i < 20; i++) wait(1e6);
+  assert.deepEqual(requests, [[0x80, 6], [0, 5], [0x80, 6], [0, 9], [0x21, 0x20], [0x21, 0x22]]);
+  assert.ok(host.isOpen);
+  assert.deepEqual(host.pipes, { in: 3, out: 2 });
 });

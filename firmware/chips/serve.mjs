@@ -3,6 +3,9 @@
 //   image ADDRESS FILE      writes a file into the flash; the program as ELF or UF2 without an address
 //   start                   power-on
 //   run MICROSECONDS [HEX]  the line takes these bytes; answers with the bytes sent: hexadecimal, or -
+//   usb MICROSECONDS [HEX]  the same with the serial port at the USB socket
+//   plug | unplug           the cable of the USB socket
+//   suspend | resume        the PC at it sleeps, and wakes
 //   truth MICROSECONDS      the pose at a time of the chip's clock
 //   state                   time in microseconds, pose, pings, whether the motors are enabled; when a motor last had a voltage, and when
 //                           an encoder last changed, in microseconds
@@ -41,6 +44,15 @@ const orders = {
     await board.run(board.now + 1e3 * Number(micros));
     return Buffer.from(board.received.splice(0)).toString('hex') || '-';
   },
+  async usb(micros, hex = '') {
+    board.usb.send(Buffer.from(hex, 'hex'));
+    await board.run(board.now + 1e3 * Number(micros));
+    return Buffer.from(board.receivedByUsb.splice(0)).toString('hex') || '-';
+  },
+  plug: () => board.plug(),
+  unplug: () => board.unplug(),
+  suspend: () => board.usb.suspend(),
+  resume: () => board.usb.resume(),
   truth: (micros) => board.poseAt(1e3 * Number(micros)).slice(1).join(' '),
   state() {
     const { room } = board;

@@ -28,6 +28,7 @@ mod flash_contents;
 pub mod log;
 pub mod store;
 mod time;
+pub mod two_links;
 pub mod watchdog;
 
 pub use app::{App, Board, Link, Polled};

@@ -4,20 +4,21 @@
 //! described by the baked configuration, and its behaviour is in `sonarfix-app`. The wiring is a table in `pins`.
 //!
 //! State machines count the wheels and stamp the edges, however long a poll or a write to flash takes. One executor is
-//! therefore sufficient, and no interrupts but those of the clock and of received bytes, which end its sleep. It runs two tasks in
-//! turn: the loop, and after each of its polls the motor code (`sonarfix-motors`).
+//! therefore sufficient, and no interrupts but those of the clock, of received bytes, which end its sleep, and of USB. It runs two
+//! tasks in turn, the loop, and after each of its polls the motor code (`sonarfix-motors`); while they wait, those of [`usb`].
 
 #![no_std]
 #![no_main]
 
 use core::mem::ManuallyDrop;
+use core::task::Poll;
 
 use defmt_rtt as _;
 use embassy_executor::{Executor, Spawner};
 use embassy_rp::flash::{self, Flash};
 use embassy_rp::gpio::{Level, Output, OutputOpenDrain, Pin};
 use embassy_rp::interrupt::typelevel::{Handler, Interrupt, UART0_IRQ};
-use embassy_rp::peripherals::{FLASH, PIO0, PIO1, WATCHDOG};
+use embassy_rp::peripherals::{FLASH, PIO0, PIO1, USB, WATCHDOG};
 use embassy_rp::pio::{InterruptHandler, Pio};
 use embassy_rp::pwm::{self, ChannelAPin, ChannelBPin, Pwm, PwmOutput, Slice};
 use embassy_rp::uart::{self, Uart};
@@ -31,6 +32,7 @@ use heapless::Deque;
 use panic_probe as _;
 use sonarfix::geometry::units::Instant;
 use sonarfix_app::store::Store;
+use sonarfix_app::two_links::{Pluggable, TwoLinks};
 use sonarfix_app::watchdog::Liveness;
 use sonarfix_app::{App, FlashContents, Link, boots, log};
 use sonarfix_hal::bus::{SharedBus, TwoWire};
@@ -52,10 +54,12 @@ mod machines;
 #[cfg_attr(all(xrp, rp2040), path = "../../xrp/src/pins.rs")]
 #[cfg_attr(all(xrp, not(rp2040)), path = "../../xrp-rp2350/src/pins.rs")]
 mod pins;
+mod usb;
 
 use chip::{Encoder, FLASH_SIZE, QUEUE, Stamper, reset};
 use enable::{Enable, disable_motors};
 use pins::Gyro;
+use usb::UsbLink;
 
 /// Period at which the loop reads the stamps of the echo while a ping is in flight, and fills the UART's queue while it sends.
 const STEP: Duration = Duration::from_millis(1);
@@ -127,6 +131,7 @@ bind_interrupts!(struct Interrupts {
     UART0_IRQ => ReceivedBytes;
     PIO0_IRQ_0 => InterruptHandler<PIO0>;
     PIO1_IRQ_0 => InterruptHandler<PIO1>;
+    USBCTRL_IRQ => embassy_rp::usb::InterruptHandler<USB>;
 });
 
 /// The time since the start.
@@ -199,7 +204,7 @@ impl Motors {
     }
 }
 
-/// The link. The UART's FIFOs of 32 bytes last 2.8 ms; an interrupt wakes the loop when 16 have arrived, or fewer and then none.
+/// The link over the UART, whose FIFOs of 32 bytes last 2.8 ms; an interrupt wakes the loop when 16 have arrived, or fewer and then none.
 struct Serial {
     uart: Uart<'static, uart::Blocking>,
     /// A poll sends at most 400 bytes.
@@ -288,7 +293,7 @@ struct Board {
     /// The positions of the right and the left wheel, for the motor code.
     positions: [Unwrapped; 2],
     stampers: (Stamper<0>, Stamper<1>),
-    link: Serial,
+    link: TwoLinks<Serial, UsbLink>,
     enable: Enable,
     watchdog: Watchdog,
     liveness: Liveness,
@@ -299,7 +304,7 @@ impl Board {
     /// Initializes the board; `None` if the memory map has no store, or a servo no channel.
     // Inlined, its stack frame would remain for the whole runtime.
     #[inline(never)]
-    fn new(buses: &'static mut Option<Buses>) -> Option<(Self, Motors)> {
+    fn new(buses: &'static mut Option<Buses>) -> Option<(Self, Motors, Peri<'static, USB>)> {
         // Before, the watchdog has no clock, and all pins are inputs.
         let board = embassy_rp::init(embassy_rp::config::Config::default());
         let mut watchdog = Watchdog::new(board.WATCHDOG);
@@ -354,25 +359,26 @@ impl Board {
             w.set_pde(false);
         });
         listen_to_uart();
-        let board = Self {
+        let robot = Self {
             app,
             hardware: WithGyro { devices, gyro: Gyro::new(first) },
             positions: Default::default(),
             stampers,
-            link: Serial { uart, to_send: Deque::new() },
+            link: TwoLinks::new(Serial { uart, to_send: Deque::new() }, UsbLink),
             enable,
             watchdog,
             liveness: Liveness::new(now()),
             next_poll: NextPoll::AT_ONCE,
         };
-        Some((board, motors))
+        Some((robot, motors, board.USB))
     }
 
-    /// One poll.
+    /// One poll; returns when it began.
     // `cargo xtask chips` counts its instructions.
     #[inline(never)]
-    fn poll(&mut self) {
+    fn poll(&mut self) -> Instant {
         let start = now();
+        self.link.begin(start);
         let polled = self.app.poll(start, &mut self.hardware, &mut self.link);
         self.enable.set(polled.may_drive);
         let devices = &mut self.hardware.devices.devices;
@@ -382,17 +388,17 @@ impl Board {
         if polled.is_settled {
             self.watchdog.set_scratch(0, boots::register(0));
         }
-        self.link.transmit();
+        self.link.fixed.transmit();
         log::polled(&polled, self.app.report());
         if let Some(took) = now().checked_duration_since(start) {
             self.app.took(took);
         }
-        self.app.work(start, now);
         let (app, hardware) = (&self.app, &mut self.hardware);
         self.next_poll = sonarfix_robot::next_poll(app, hardware, start, polled.may_drive);
         if self.liveness.is_alive(start, &polled) {
             feed(WINDOW);
         }
+        start
     }
 
     /// The latest time until which the board may sleep: `None` if the next poll is due, a byte has arrived or an edge of
@@ -401,13 +407,13 @@ impl Board {
         let time = now();
         self.stampers.0.update(&ECHO, time);
         self.stampers.1.update(&SECOND_ECHO, time);
-        let has_bytes = Serial::has_bytes();
+        let has_bytes = Serial::has_bytes() || self.link.plugged.has_received();
         let next = self.next_poll.at(has_bytes);
         if ECHO.take_edge() | SECOND_ECHO.take_edge() || time >= next {
             return None;
         }
         let is_listening = self.app.idle_until(&mut self.hardware).is_none();
-        let is_sending = !self.link.to_send.is_empty();
+        let is_sending = !self.link.fixed.to_send.is_empty();
         let mut wake = embassy_time::Instant::from_micros(next.ticks());
         if is_listening || is_sending {
             wake = wake.min(embassy_time::Instant::now().saturating_add(STEP));
@@ -431,14 +437,31 @@ fn listen_to_uart() {
 #[embassy_executor::task]
 async fn polls(mut board: Board) -> ! {
     loop {
-        board.poll();
-        // An `async fn` that returns could panic if it were polled again.
+        let start = board.poll();
+        other_tasks().await;
+        board.app.work(start, now);
+        // Neither is this an `async fn` of its own.
         while let Some(wake) = board.sleeps_until() {
             // Whatever ends the sleep is found by the next call.
             let _ = with_deadline(wake, RECEIVED.wait()).await;
-            board.link.transmit();
+            board.link.fixed.transmit();
         }
     }
+}
+
+/// Lets the other tasks have their turn, the motor code before all. The executor takes the tasks that are ready in reverse order, so that the one
+/// that has waited twice comes after all others.
+// An `async fn` that returns could panic if it were polled again.
+fn other_tasks() -> impl Future<Output = ()> {
+    let mut waits = 2_u8;
+    core::future::poll_fn(move |context| {
+        if waits == 0 {
+            return Poll::Ready(());
+        }
+        waits = waits.saturating_sub(1);
+        context.waker().wake_by_ref();
+        Poll::Pending
+    })
 }
 
 /// The motors, after each poll. Your own controller takes the place of the example `Commanded`. The loop waits for it: a task
@@ -452,11 +475,15 @@ async fn motors(mut motors: Motors) -> ! {
     }
 }
 
-/// Initializes the board and starts both tasks.
+/// Initializes the board and starts the tasks.
 // Inlined, its stack frame, which holds copies of the board, would remain for the whole runtime.
 #[inline(never)]
-fn start(spawner: Spawner, buses: &'static mut Option<Buses>) {
-    let Some((board, inputs)) = Board::new(buses) else {
+fn start(
+    spawner: Spawner,
+    buses: &'static mut Option<Buses>,
+    usb_memory: &'static mut usb::Memory,
+) {
+    let Some((board, inputs, usb)) = Board::new(buses) else {
         defmt::error!("the memory map has no store, or a servo no channel");
         return;
     };
@@ -467,11 +494,13 @@ fn start(spawner: Spawner, buses: &'static mut Option<Buses>) {
     if let Ok(motors) = motors(inputs) {
         spawner.spawn(motors);
     }
+    usb::start(spawner, usb, Interrupts, usb_memory, &RECEIVED);
 }
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
     static mut EXECUTOR: Option<Executor> = None;
     static mut BUSES: Option<Buses> = None;
-    EXECUTOR.get_or_insert_with(Executor::new).run(|spawner| start(spawner, BUSES))
+    static mut USB_MEMORY: usb::Memory = usb::Memory::new();
+    EXECUTOR.get_or_insert_with(Executor::new).run(|spawner| start(spawner, BUSES, USB_MEMORY))
 }

@@ -86,6 +86,7 @@ fn left(board: &Board) -> Vec<Part<'_>> {
     };
     let mut link = vec![Row::wire("RX", &pins.tx), Row::wire("TX", &pins.rx), Row::text("GND")];
     link.extend(kit.map(|kit| Row::text(connected(&kit.link))));
+    link.extend(board.usb.then(|| Row::text("or the USB socket of the board".to_owned())));
     vec![
         encoder(right, &pins.right_a, &pins.right_b, kit.map(|kit| &kit.right)),
         encoder(left, &pins.left_a, &pins.left_b, kit.map(|kit| &kit.left)),

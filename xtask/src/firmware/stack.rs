@@ -24,9 +24,12 @@ const ENDS: [&str; 4] = [START, "HardFault", "DefaultHandler", "PVD"];
 /// Architecture Reference Manual`, B1.5.7). A core without floating-point unit saves less.
 const EXCEPTION: u64 = 4 * 27;
 /// Functions whose address is taken, and the only ones that call them through a register, by parts of their names: an executor
-/// polls its tasks, and nothing else does.
-const ONLY_BY: [(&str, &str); 1] =
-    [("embassy_executor::raw::TaskStorage<F>::poll", "embassy_executor::platform::")];
+/// polls its tasks, and nothing else does; the USB device, which a task runs, tells its handlers what has happened.
+const ONLY_BY: [(&str, &[&str]); 2] = [
+    (TASK, &["embassy_executor::platform::"]),
+    ("as embassy_usb::Handler>::", &["embassy_usb::UsbDevice", "embassy_usb::Inner", TASK]),
+];
+const TASK: &str = "embassy_executor::raw::TaskStorage<F>::poll";
 /// Limit of all RAM with everything linked, bytes. A commit that raises it says what a user gets for it. The map stays in
 /// flash.
 const BAR: u64 = 21_248;
@@ -159,7 +162,8 @@ impl<'a> Depths<'a> {
         if function.stack.calls_by_register {
             let may_call = |taken: &u64| {
                 let rule = ONLY_BY.iter().find(|(part, _)| self.name(*taken).contains(part));
-                rule.is_none_or(|(_, caller)| function.name().contains(caller))
+                let calls = |caller: &&str| function.name().contains(*caller);
+                rule.is_none_or(|(_, callers)| callers.iter().any(calls))
             };
             called.extend(self.taken.iter().copied().filter(may_call));
         }

@@ -30,6 +30,9 @@ pub trait Link {
     /// The next received byte, if any.
     fn receive(&mut self) -> Option<u8>;
 
+    /// The bytes so far have completed a frame.
+    fn understood(&mut self) {}
+
     /// Queues a whole frame, or nothing if there is no room for it.
     fn send(&mut self, frame: &[u8]);
 
@@ -79,6 +82,7 @@ impl Wire {
             };
             let frame = self.receiver.push(byte);
             if frame.is_some() {
+                link.understood();
                 return frame;
             }
         }

@@ -25,3 +25,4 @@ mod robot_file;
 mod room;
 mod save_policy;
 mod search;
+mod two_links;

@@ -13,6 +13,7 @@ mod results;
 mod search;
 mod stm32;
 mod stops;
+mod usb;
 mod xrp;
 
 use pico::{Board, Counters, PICO, Pico, Polls, World};

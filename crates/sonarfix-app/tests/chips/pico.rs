@@ -141,7 +141,26 @@ pub struct Event {
     pub ms: f64,
 }
 
+/// A link of a board.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Wire {
+    Uart,
+    Usb,
+}
+
+impl Wire {
+    /// The order that lets time pass with it.
+    fn order(self) -> &'static str {
+        match self {
+            Self::Uart => "run",
+            Self::Usb => "usb",
+        }
+    }
+}
+
 pub struct Pico {
+    /// The link that the PC uses.
+    wire: Wire,
     emulator: Child,
     orders: ChildStdin,
     answers: BufReader<ChildStdout>,
@@ -179,6 +198,7 @@ impl Pico {
         let answers = BufReader::new(emulator.stdout.take().unwrap());
         let program = passed(variable);
         let mut pico = Self {
+            wire: Wire::Uart,
             emulator,
             orders,
             answers,
@@ -219,7 +239,7 @@ impl Pico {
 
     /// Lets the chip execute for so many milliseconds, while the line takes these bytes to it.
     pub fn run(&mut self, ms: u32, bytes: &[u8]) {
-        let mut order = format!("run {} ", 1_000 * ms);
+        let mut order = format!("{} {} ", self.wire.order(), 1_000 * ms);
         for byte in bytes {
             write!(order, "{byte:02x}").unwrap();
         }
@@ -232,6 +252,21 @@ impl Pico {
                 self.pending.push_back(message);
             }
         }
+    }
+
+    /// The PC uses another link from now on, with another program: the one before and what it has received are forgotten.
+    pub fn speak_over(&mut self, wire: Wire) {
+        self.wire = wire;
+        (self.receiver, self.gaps) = (Receiver::new(), Gaps::default());
+        self.ask(&format!("{} 0", wire.order()));
+        self.pending.clear();
+    }
+
+    /// How many bytes have arrived at the link that the PC does not use.
+    pub fn arrived_elsewhere(&mut self) -> usize {
+        let other = if self.wire == Wire::Uart { Wire::Usb } else { Wire::Uart };
+        let bytes = self.ask(&format!("{} 0", other.order()));
+        if bytes == "-" { 0 } else { bytes.len() / 2 }
     }
 
     /// The messages so far that were not yet taken.
@@ -289,6 +324,12 @@ impl Pico {
         });
         self.patience = until;
         answer
+    }
+
+    /// The frame that the next command would have.
+    pub fn next_frame(&mut self, command: &Command) -> Vec<u8> {
+        let sequence = self.sender.next();
+        self.frame(sequence, command)
     }
 
     fn frame(&self, sequence: u16, command: &Command) -> Vec<u8> {
