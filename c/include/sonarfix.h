@@ -91,7 +91,7 @@
 /*
  64-bit words of a robot.
  */
-#define SONARFIX_ROBOT_WORDS 1415
+#define SONARFIX_ROBOT_WORDS 1418
 #endif
 
 #if !defined(SONARFIX_64_BIT)

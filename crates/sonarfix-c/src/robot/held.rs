@@ -20,7 +20,7 @@ const _: () = assert!(SONARFIX_STORE_SIZE == CAPACITY);
 
 /// 64-bit words of a robot.
 #[cfg(target_pointer_width = "64")]
-pub const SONARFIX_ROBOT_WORDS: usize = 1415;
+pub const SONARFIX_ROBOT_WORDS: usize = 1418;
 /// 64-bit words of a robot.
 #[cfg(not(target_pointer_width = "64"))]
 pub const SONARFIX_ROBOT_WORDS: usize = 1381;
