@@ -110,19 +110,25 @@ fn twenty_minutes_take_less_than_half_a_second() {
 /// 10,000 runs are a command (`docs/results.md`).
 #[test]
 fn the_classroom_is_crossed() {
-    let summary = classroom(|_| ());
-    let position = summary.rms_path.x.hypot(summary.rms_path.y);
+    let summary = classroom(CLASSROOM_RUNS, |_| ());
     assert_eq!((summary.lost_runs, summary.called_lost), (0, 0));
     assert!(summary.undetected_error < 0.05, "{}", summary.undetected_error);
     assert!((0.8..1.2).contains(&summary.nis_mean), "{}", summary.nis_mean);
-    assert!(position < 0.008, "{position}");
     assert!(summary.nees_mean < 7.0 + 4.0 * SAMPLING, "{}", summary.nees_mean);
+}
+
+/// One run in some hundred is wrong by 5 cm for a while, which 200 runs show as 0.8 mm.
+#[test]
+fn the_classroom_is_crossed_accurately() {
+    let rms = classroom(5 * CLASSROOM_RUNS, |_| ()).rms_path;
+    let position = rms.x.hypot(rms.y);
+    assert!(position < 0.008, "{position}");
 }
 
 /// With the noise that the wheels have, slips and bumps by variance, the filter is consistent in the classroom.
 #[test]
 fn with_the_true_noise_of_the_wheels_the_filter_is_consistent() {
-    let summary = classroom(|scenario| {
+    let summary = classroom(CLASSROOM_RUNS, |scenario| {
         scenario.robot.localizer.drive.wheel_noise = PerRootMetre(Metres(2.2e-3));
     });
     assert!((summary.nees_mean - 7.0).abs() < 4.0 * SAMPLING, "{}", summary.nees_mean);
@@ -133,11 +139,11 @@ const CLASSROOM_RUNS: u32 = 200;
 /// Sampling error of the mean NEES of seven states over these runs: each has the deviation √14.
 const SAMPLING: f64 = 0.2646;
 
-fn classroom(change: impl Fn(&mut Scenario)) -> Summary {
+fn classroom(runs: u32, change: impl Fn(&mut Scenario)) -> Summary {
     let mut scenario = scenario(CLASSROOM);
     change(&mut scenario);
     let simulation = Simulation::new(scenario);
-    let results = monte_carlo::results(&simulation, 200_000, CLASSROOM_RUNS, &|| ());
+    let results = monte_carlo::results(&simulation, 200_000, runs, &|| ());
     Summary::of(&results.unwrap())
 }
 

@@ -104,6 +104,9 @@ pub fn diagnose(
         add_unexplained(&visible, is_right, &mut findings);
         let causes = whole.causes(&as_is);
         let are_none = causes.is_empty();
+        // Of one bearing another one may explain much.
+        let is_of_bearing = causes.first().is_some_and(|it| it.cause.starts_with("bearing"));
+        findings.extend(visible.constant_bearing().filter(|_| is_of_bearing));
         add(causes, &mut findings);
         if are_none && !is_right && !findings.iter().any(|it| it.cause == RANGE_NOISE) {
             findings.extend(visible.unexplained().or_else(|| report::unexplained(&as_is, walls)));

@@ -114,8 +114,12 @@ impl<'a> Visible<'a> {
 
     /// What the records show of a log that no cause explains.
     pub fn unexplained(&self) -> Option<Finding> {
-        let constant = || self.bearings.constant(self.robot);
-        self.too_fast().or_else(constant).or_else(|| self.ranges.noise())
+        self.too_fast().or_else(|| self.constant_bearing()).or_else(|| self.ranges.noise())
+    }
+
+    /// A servo whose bearings never change.
+    pub fn constant_bearing(&self) -> Option<Finding> {
+        self.bearings.constant(self.robot)
     }
 
     /// Ranges that have as little to do with each other as random numbers.
