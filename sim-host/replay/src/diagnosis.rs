@@ -221,7 +221,7 @@ impl<'a> Trial<'a> {
         let mut candidates = causes::all();
         // A robot that hardly moves, by its log, can follow any ranges.
         candidates.retain(|it| !it.is_of_slow_wheels() || self.are_too_fast);
-        candidates.extend(walls::candidates(self.walls));
+        candidates.extend(causes::of_walls(self.walls));
         candidates.extend(start.into_iter().flat_map(causes::starts_around));
         candidates.extend(start.and_then(causes::start_unit));
         candidates.extend(start.into_iter().flat_map(causes::start_positions));

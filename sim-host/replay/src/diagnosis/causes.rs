@@ -2,11 +2,12 @@
 
 use std::f64::consts::{PI, TAU};
 
+use sonarfix::map::Wall;
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_sim::trace::Pose;
 
 use crate::diagnosis::change::Change;
-use crate::diagnosis::walls;
+use crate::diagnosis::walls::{self, WallChange};
 
 /// What may be wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -331,8 +332,11 @@ pub fn all() -> Vec<Candidate> {
 /// Candidates between a value of a varied quantity and its neighbours; none of what is not varied. `fineness` halves the step.
 pub fn finer(candidate: &Candidate, fineness: i32) -> Vec<Candidate> {
     let Some(varied) = VARIED.iter().find(|varied| varied.cause == candidate.cause) else {
-        return poses_around(candidate, fineness)
-            .unwrap_or_else(|| walls::finer(candidate, fineness));
+        let shifts = || {
+            let shift = candidate.change.wall.into_iter();
+            shift.flat_map(|it| walls::finer(it, fineness)).map(of_wall).collect()
+        };
+        return poses_around(candidate, fineness).unwrap_or_else(shifts);
     };
     let share = 0.5_f64.powi(fineness);
     let values = if varied.is_factor {
@@ -390,6 +394,20 @@ pub fn starts_around(pose: Pose) -> impl Iterator<Item = Candidate> {
     let offsets = STEPS.into_iter().flat_map(|x| STEPS.map(|y| (x, y)));
     let others = offsets.filter(|offset| *offset != (0.0, 0.0));
     others.map(move |(x, y)| start_at(Pose { x: pose.x + x, y: pose.y + y, ..pose }))
+}
+
+/// Candidates of single walls.
+pub fn of_walls(walls: &[Wall]) -> impl Iterator<Item = Candidate> {
+    walls::changes(walls).into_iter().map(of_wall)
+}
+
+fn of_wall(wall: WallChange) -> Candidate {
+    let (cause, value) = match wall {
+        WallChange::Shifted(_, by) => (Cause::WallShifted, by),
+        WallChange::Removed(_) => (Cause::WallRemoved, 0.0),
+        WallChange::Added(..) => (Cause::WallAdded, 0.0),
+    };
+    Candidate { cause, change: Change { wall: Some(wall), ..Change::default() }, value }
 }
 
 /// The poses next to that of a candidate. `fineness` halves the step.

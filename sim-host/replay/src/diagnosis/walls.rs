@@ -4,9 +4,6 @@ use sonarfix::geometry::pose::Point;
 use sonarfix::geometry::units::Metres;
 use sonarfix::map::Wall;
 
-use crate::diagnosis::causes::{Candidate, Cause};
-use crate::diagnosis::change::Change;
-
 /// In a map of more walls single ones are not tried: it takes too long, and one of many fits by chance.
 const MOST: usize = 24;
 /// Shifts to the left of a wall, seen from its first end, metres.
@@ -44,34 +41,23 @@ impl WallChange {
     }
 }
 
-/// All candidates of single walls.
-pub fn candidates(walls: &[Wall]) -> Vec<Candidate> {
+/// All changes of single walls that are tried.
+pub fn changes(walls: &[Wall]) -> Vec<WallChange> {
     if walls.len() > MOST {
         return Vec::new();
     }
-    let shifted = |index| SHIFTS.map(move |by| candidate(WallChange::Shifted(index, by)));
-    let removed = |index| candidate(WallChange::Removed(index));
-    let added =
-        closing(walls).into_iter().map(|wall| candidate(WallChange::Added(wall.from(), wall.to())));
+    let shifted = |index| SHIFTS.map(move |by| WallChange::Shifted(index, by));
     let indices = 0..walls.len();
-    let moved = indices.clone().flat_map(shifted).chain(indices.map(removed));
+    let moved = indices.clone().flat_map(shifted).chain(indices.map(WallChange::Removed));
+    let added = closing(walls).into_iter().map(|wall| WallChange::Added(wall.from(), wall.to()));
     moved.chain(added).collect()
 }
 
-/// Candidates between the shift of a wall and its neighbours. `fineness` halves the step.
-pub fn finer(coarse: &Candidate, fineness: i32) -> Vec<Candidate> {
-    let Some(WallChange::Shifted(index, by)) = coarse.change.wall else { return Vec::new() };
+/// Shifts between one of a wall and its neighbours. `fineness` halves the step.
+pub fn finer(coarse: WallChange, fineness: i32) -> Vec<WallChange> {
+    let WallChange::Shifted(index, by) = coarse else { return Vec::new() };
     let step = HALF_STEP * 0.5_f64.powi(fineness);
-    [by - step, by + step].map(|by| candidate(WallChange::Shifted(index, by))).into()
-}
-
-fn candidate(wall: WallChange) -> Candidate {
-    let (cause, value) = match wall {
-        WallChange::Shifted(_, by) => (Cause::WallShifted, by),
-        WallChange::Removed(_) => (Cause::WallRemoved, 0.0),
-        WallChange::Added(..) => (Cause::WallAdded, 0.0),
-    };
-    Candidate { cause, change: Change { wall: Some(wall), ..Change::default() }, value }
+    [by - step, by + step].map(|by| WallChange::Shifted(index, by)).into()
 }
 
 fn shifted(wall: &Wall, by: f64) -> Wall {
