@@ -56,7 +56,7 @@ enum Shown {
 }
 
 /// Answers a request in JSON with JSON, `{"parts": …, "warnings": …}` or `{"error": …, "option": …}`, and the bytes of each part:
-/// configuration, map, and program if one was chosen. No bytes of an archive or of a program mean that there is none.
+/// configuration, map, and program if one was chosen. An empty `archive` or `program` was not chosen.
 #[must_use]
 pub fn answer(request: &str, archive: &[u8], program: &[u8]) -> (String, Vec<Vec<u8>>) {
     let shown = parts(request, archive, program).unwrap_or_else(|error| {

@@ -247,7 +247,7 @@ impl<'a> Trial<'a> {
 
     /// The best of what was tried, and one that is nearly as good.
     fn named(&self, tried: &[Tried], as_is: &Evidence) -> Named {
-        // A start near that of the log is none but for its larger deviation.
+        // A start near that of the log gains only by its larger deviation.
         let start = self.start();
         let is_enough = |it: &&Tried| {
             let is_unusual = !it.candidate.is_usual(self.robot);

@@ -1,4 +1,4 @@
-//! Single walls that the map has at another place, does not have, or has in vain.
+//! Changes of single walls: shifted, removed, added.
 
 use sonarfix::geometry::pose::Point;
 use sonarfix::geometry::units::Metres;
