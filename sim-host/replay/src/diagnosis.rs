@@ -104,7 +104,7 @@ pub fn diagnose(
         add_unexplained(&visible, is_right, &mut findings);
         let causes = whole.causes(&as_is);
         let are_none = causes.is_empty();
-        // Of one bearing another one may explain much.
+        // A wrong bearing explains the ranges of a servo that does not turn.
         let is_of_bearing = causes.first().is_some_and(|it| it.cause.starts_with("bearing"));
         findings.extend(visible.constant_bearing().filter(|_| is_of_bearing));
         add(causes, &mut findings);
@@ -133,7 +133,7 @@ fn add_unexplained(visible: &Visible, is_right: bool, findings: &mut Vec<Finding
     findings.extend(visible.certain_noise());
 }
 
-/// Adds the causes that were found by trying. What the records show may be their effect.
+/// Adds the causes that were found by trying, and removes findings in the records that are effects of them.
 fn add(causes: Vec<Finding>, findings: &mut Vec<Finding>) {
     let is_certain =
         causes.first().and_then(|it| it.explained).is_some_and(|it| it >= STARTED_ELSEWHERE);
@@ -324,8 +324,7 @@ impl<'a> Trial<'a> {
         let mut tried = self.searched(time, as_is, |pose| causes::moved_to(time, pose));
         let around = broken.pose.into_iter().flat_map(|pose| causes::moves_around(time, pose));
         tried.extend(around.filter_map(|it| self.try_one(it, as_is)));
-        tried.sort_by(|a, b| b.value().total_cmp(&a.value()));
-        tried.truncate(REFINED);
+        keep_best(&mut tried, REFINED);
         for best in &mut tried {
             self.refine(best, as_is);
         }
@@ -382,21 +381,19 @@ impl Tried {
             && self.evidence.explained() >= self.least_explained()
             && self.explains_no_less(as_is)
     }
-}
 
-impl Tried {
-    /// A robot that hardly moves, by its log, can follow many ranges.
+    /// The least share: ranges fit by chance to a robot that hardly moves by its log.
     fn least_explained(&self) -> f64 {
         if self.candidate.is_standing() { LEAST_EXPLAINED_STANDING } else { LEAST_EXPLAINED }
     }
 
-    /// A cause takes no explanation away, but other echoes are compared.
+    /// Whether it explains as many echoes as the files as they are, but for those that are compared with other walls.
     fn explains_no_less(&self, as_is: &Evidence) -> bool {
         let lost = as_is.explained_of_all() - self.evidence.explained_of_all();
         let lost_of_compared = as_is.explained() - self.evidence.explained();
         let permitted = match self.candidate.cause {
             Cause::Moved => LOST,
-            // Of few compared echoes all may be explained.
+            // The share of few compared echoes means little.
             _ if as_is.are_mostly_compared() || self.candidate.is_of_wall() => LOST_OF_COMPARED,
             _ => 1.0,
         };

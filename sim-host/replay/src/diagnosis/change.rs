@@ -52,7 +52,7 @@ pub struct Change {
     pub map: [[f64; 2]; 2],
     /// Whether that is about the centre of the map instead of its origin.
     pub is_about_centre: bool,
-    /// One wall that is another.
+    /// A change of a single wall.
     pub wall: Option<WallChange>,
 }
 

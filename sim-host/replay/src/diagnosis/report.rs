@@ -265,7 +265,7 @@ fn place(candidate: &Candidate, walls: &[Wall]) -> Words {
     }
 }
 
-/// One wall of the map that is wrong.
+/// A single wrong wall of the map.
 fn wall(change: &Change, walls: &[Wall]) -> Words {
     const CAUSE: &str = "map_wall";
     let ends = |wall: &Wall| {
@@ -277,13 +277,17 @@ fn wall(change: &Change, walls: &[Wall]) -> Words {
     match change.wall {
         Some(WallChange::Shifted(index, by)) => (
             CAUSE,
-            format!("the wall {} of the map is {:.2} m elsewhere", stated(index), by.abs()),
+            format!(
+                "the wall {} is {:.2} m away from its place in the map",
+                stated(index),
+                by.abs()
+            ),
             format!("measure it again; {} explains the ranges", corrected(index)),
         ),
         Some(WallChange::Removed(index)) => (
             CAUSE,
             format!("the wall {} of the map is not in the room", stated(index)),
-            "remove it, or what is open of it: a door".to_owned(),
+            "remove it from the map; of an open door, only the opening".to_owned(),
         ),
         _ => (
             CAUSE,

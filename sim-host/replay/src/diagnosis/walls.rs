@@ -4,7 +4,7 @@ use sonarfix::geometry::pose::Point;
 use sonarfix::geometry::units::Metres;
 use sonarfix::map::Wall;
 
-/// In a map of more walls single ones are not tried: it takes too long, and one of many fits by chance.
+/// With more walls in the map, single walls are not tried: it takes too long, and one of many fits by chance.
 const MOST: usize = 24;
 /// Shifts to the left of a wall, seen from its first end, metres.
 const SHIFTS: [f64; 8] = [-0.8, -0.5, -0.3, -0.15, 0.15, 0.3, 0.5, 0.8];
