@@ -4,7 +4,7 @@
 //! slices, between which the loop does what else is due. The estimate may change in between; a candidate has the score of its slice.
 
 use super::ranking::Ranked;
-use super::{Aim, Along, ByPolicy, NoAim, Planner, Pointer, Policy, Situation, Standing};
+use super::{Aim, Along, BearingRule, ByPolicy, NoAim, Planner, Policy, Situation, Standing};
 use crate::association::history::Slot;
 use crate::association::visibility::Viewpoint;
 use crate::config::{RangerId, Ranging};
@@ -127,7 +127,7 @@ impl<'a> Situation<'a> {
         self.decide_for(choice, ByPolicy)
     }
 
-    fn decide_for<P: Pointer>(&self, mut choice: Choice, pointer: P) -> Result<Aim, NoAim> {
+    fn decide_for<P: BearingRule>(&self, mut choice: Choice, pointer: P) -> Result<Aim, NoAim> {
         let mut planner = self.planner(&choice, pointer)?;
         loop {
             if let Some(end) = planner.proceed(&mut choice, u32::MAX) {
@@ -144,7 +144,7 @@ impl<'a> Situation<'a> {
         }
     }
 
-    fn proceed_for<P: Pointer>(
+    fn proceed_for<P: BearingRule>(
         &self,
         choice: &mut Choice,
         pointer: P,
@@ -161,7 +161,11 @@ impl<'a> Situation<'a> {
     }
 
     /// The planner of a choice; none if the robot has no such ranger, or it is not to be tried, because it has failed.
-    fn planner<P: Pointer>(&self, choice: &Choice, pointer: P) -> Result<Planner<'a, P>, NoAim> {
+    fn planner<P: BearingRule>(
+        &self,
+        choice: &Choice,
+        pointer: P,
+    ) -> Result<Planner<'a, P>, NoAim> {
         let Situation { config, map, ekf, history, now, policy } = *self;
         let &Choice { ranger, standing, .. } = choice;
         let is_one_of_several = P::CHOOSES && config.rangers.are_several();
@@ -192,7 +196,7 @@ impl<'a> Situation<'a> {
     }
 }
 
-impl<P: Pointer> Planner<'_, P> {
+impl<P: BearingRule> Planner<'_, P> {
     /// Makes a slice of a choice: lists candidates by this much work, or tests one of the list.
     #[inline(never)]
     fn proceed(&mut self, choice: &mut Choice, work: u32) -> Option<Result<Aim, NoAim>> {

@@ -5,7 +5,7 @@
 //! # Non-finite policy
 //! Comparisons are written so that a beam whose numbers are NaN is not chosen.
 
-use super::{Candidate, Choice, Planner, Pointer, Pointing};
+use super::{BearingRule, Candidate, Choice, Planner, Pointing};
 use crate::config::LightBeam;
 use crate::geometry::pose::{Heading, Point};
 use crate::geometry::units::Radians;
@@ -55,7 +55,7 @@ fn aside(axis: Vector, from: Point, to: Point) -> f32 {
     axis.left().dot(Vector::from(to).minus(from.into()))
 }
 
-impl<P: Pointer> Planner<'_, P> {
+impl<P: BearingRule> Planner<'_, P> {
     /// Lists the next beams of the fan; returns whether they are the last. Not inlined: its stack is not that of a sonar.
     #[inline(never)]
     pub(super) fn list_beams(&self, beam: LightBeam, choice: &mut Choice) -> bool {

@@ -173,11 +173,11 @@ struct Pointing {
     until_ping: f32,
 }
 
-/// Who chooses the bearing of a ping.
-trait Pointer: Copy {
-    /// Whether the planner does.
+/// What determines the bearing of a ping.
+trait BearingRule: Copy {
+    /// Whether the planner chooses it.
     const CHOOSES: bool;
-    /// The bearing, if the planner does not.
+    /// The bearing, if the planner does not choose it.
     fn bearing(self) -> Option<Radians>;
 }
 
@@ -189,7 +189,7 @@ struct ByPolicy;
 #[derive(Clone, Copy)]
 struct Along(Radians);
 
-impl Pointer for ByPolicy {
+impl BearingRule for ByPolicy {
     const CHOOSES: bool = true;
 
     fn bearing(self) -> Option<Radians> {
@@ -197,7 +197,7 @@ impl Pointer for ByPolicy {
     }
 }
 
-impl Pointer for Along {
+impl BearingRule for Along {
     const CHOOSES: bool = false;
 
     fn bearing(self) -> Option<Radians> {
@@ -205,7 +205,7 @@ impl Pointer for Along {
     }
 }
 
-impl<P: Pointer> Planner<'_, P> {
+impl<P: BearingRule> Planner<'_, P> {
     /// A wall as a candidate, if it can be measured: with the servo turned to it, or along the bearing that it has.
     #[inline(never)]
     fn by_sound(&self, id: WallId, wall: &Wall) -> Option<Candidate> {
