@@ -206,6 +206,19 @@ test('a wall behind another is not heard', () => {
   assert.equal(room.range(), 3 - 0.06);
 });
 
+test('a right-angled corner answers from within it, and no other end of a wall', () => {
+  const room = new Room([[2, -1, 2, 1], [2, 1, -1, 1]], [0, 0, 0], numbers(1));
+  const corner = Math.atan2(1, 2 - 0.06);
+  room.bearing = corner;
+  assert.ok(Math.abs(room.range() - Math.hypot(1, 2 - 0.06)) < 1e-9);
+  // Seen from outside it is an edge.
+  Object.assign(room, { x: 3, y: 2, bearing: Math.atan2(1 - 2, 2 - 3.06) });
+  assert.equal(room.range(), null);
+  // At 60 degrees sound does not return.
+  Object.assign(room, { x: 0, y: 0, bearing: corner, walls: [[2, -1, 2, 1], [2, 1, 0.268, 2]] });
+  assert.equal(room.range(), null);
+});
+
 /** A master of a bus, by the figures of UM10204, 3.1. */
 class Master {
   constructor(device) { this.device = device; }

@@ -91,24 +91,43 @@ export class Room {
     this.edges.push({ at: now + BURST, isHigh: true }, { at: this.busyUntil, isHigh: false });
   }
 
-  /** The distance of the nearest wall that is square to the beam within its cone, and in sight. */
+  /** The distance of what is nearest in the cone and in sight: a wall that is square to the beam, or a corner of two walls. */
   range() {
     const { robot } = this;
     const [x, y] = [this.x + robot.mount * Math.cos(this.heading), this.y + robot.mount * Math.sin(this.heading)];
     const beam = this.heading + this.bearing;
-    let nearest = null;
-    for (const wall of this.walls) {
-      const [ax, ay, bx, by] = wall;
-      const along = ((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / ((bx - ax) ** 2 + (by - ay) ** 2);
-      if (along < 0 || along > 1) continue;
-      const [dx, dy] = [ax + along * (bx - ax) - x, ay + along * (by - ay) - y];
+    const distances = [...this.feet(x, y), ...this.corners(x, y)].flatMap(({ at, walls }) => {
+      const [dx, dy] = [at[0] - x, at[1] - y];
       const distance = Math.hypot(dx, dy);
       const off = Math.atan2(dy, dx) - beam;
-      if (Math.abs(Math.atan2(Math.sin(off), Math.cos(off))) > robot.cone || distance > robot.range) continue;
-      const isHidden = this.walls.some((other) => other !== wall && crosses([x, y, x + dx, y + dy], other));
-      if (!isHidden && (nearest === null || distance < nearest)) nearest = distance;
-    }
-    return nearest;
+      const isHeard = Math.abs(Math.atan2(Math.sin(off), Math.cos(off))) <= robot.cone && distance <= robot.range;
+      const isHidden = () => this.walls.some((other) => !walls.includes(other) && crosses([x, y, ...at], other));
+      return isHeard && !isHidden() ? [distance] : [];
+    });
+    return distances.length ? Math.min(...distances) : null;
+  }
+
+  /** The feet of the perpendiculars from a place on the walls. */
+  feet(x, y) {
+    return this.walls.flatMap((wall) => {
+      const [ax, ay, bx, by] = wall;
+      const along = ((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / ((bx - ax) ** 2 + (by - ay) ** 2);
+      return along < 0 || along > 1 ? [] : [{ at: [ax + along * (bx - ax), ay + along * (by - ay)], walls: [wall] }];
+    });
+  }
+
+  /** The right-angled corners that are open to a place: sound returns from one wall to the other, whatever its direction. */
+  corners(x, y) {
+    return this.walls.flatMap((one, n) => this.walls.slice(n + 1).flatMap((other) => {
+      const ends = (wall) => [[wall.slice(0, 2), wall.slice(2)], [wall.slice(2), wall.slice(0, 2)]];
+      return ends(one).flatMap(([at, from]) => ends(other).flatMap(([same, to]) => {
+        if (at[0] !== same[0] || at[1] !== same[1]) return [];
+        const [u, v] = [from, to].map((end) => [end[0] - at[0], end[1] - at[1]]);
+        const isRight = Math.abs(u[0] * v[0] + u[1] * v[1]) < 0.01 * Math.hypot(...u) * Math.hypot(...v);
+        const isOpen = [u, v].every((side) => side[0] * (x - at[0]) + side[1] * (y - at[1]) > 0);
+        return isRight && isOpen ? [{ at, walls: [one, other] }] : [];
+      }));
+    }));
   }
 }
 
