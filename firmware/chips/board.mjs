@@ -25,8 +25,9 @@ export function ahead(began, nanos, event) {
 }
 
 export class Board extends Robot {
-  constructor({ board = 'pico', walls, pose, seed }) {
-    super(walls, pose, numbers(seed + 2), WIRINGS[board]);
+  constructor(world) {
+    const { board = 'pico', seed } = world;
+    super(world, numbers(seed + 2), WIRINGS[board]);
     this.random = numbers(seed);
     this.flash = new Flash(numbers(seed + 1));
     this.gyro = new Gyro(() => this.room.turnRate, numbers(seed + 3));
@@ -63,14 +64,22 @@ export class Board extends Robot {
     if (this.isPlugged) this.usb.plug();
     this.setEncoders();
     const { pins, slices } = this.wiring;
-    this.chip.setInput(pins.echo, false);
-    this.chip.rp2040.gpio[pins.trigger].addListener((level) => this.room.trigger(level === 1, this.now));
+    this.room.sonars.forEach((sonar, n) => {
+      const { trigger, echo } = pins.sonars[n];
+      this.chip.setInput(echo, false);
+      this.chip.rp2040.gpio[trigger].addListener((level) => sonar.trigger(level === 1, this.now));
+    });
     if (pins.clock) this.gyro.connect(this.chip.rp2040.gpio, pins.clock, pins.data);
     // The 20 kHz of the motors are read as duties, and not as edges.
     for (const slice of [slices.right, slices.left]) {
       this.chip.rp2040.pwm.channels[slice].updateEnable = function () { this.timer.enable = false; };
     }
     this.watchEnable();
+  }
+
+  /** Those of the flash. */
+  get steps() {
+    return this.flash.steps;
   }
 
   get now() {
@@ -112,18 +121,19 @@ export class Board extends Robot {
   }
 
   nextEvent(until) {
-    const edge = this.room.edges[0]?.at ?? Infinity;
     const byte = this.toSend.length || this.isNoisy ? this.lineFree : Infinity;
-    return Math.max(this.now, Math.min(until, this.next, edge, byte, this.nextPulse));
+    return Math.max(this.now, Math.min(until, this.next, this.room.nextEdge, byte, this.nextPulse));
   }
 
   /** What is due now. */
   happen() {
     const { now, room, chip } = this;
-    while (room.edges.length && room.edges[0].at <= now) chip.setInput(this.wiring.pins.echo, room.edges.shift().isHigh);
+    room.sonars.forEach(({ edges }, n) => {
+      while (edges.length && edges[0].at <= now) chip.setInput(this.wiring.pins.sonars[n].echo, edges.shift().isHigh);
+    });
     if (now >= this.nextPulse) {
       const width = 1e3 * this.pulse();
-      if (width) room.edges.push({ at: this.nextPulse, isHigh: true }, { at: this.nextPulse + width, isHigh: false });
+      if (width) this.sonar.edges.push({ at: this.nextPulse, isHigh: true }, { at: this.nextPulse + width, isHigh: false });
       this.nextPulse += FRAME;
     }
     if (now >= this.lineFree && (this.toSend.length || this.isNoisy)) {
@@ -146,7 +156,7 @@ export class Board extends Robot {
 
   /** A wire from the servo's pin to that of the echo; the sonar is unplugged. */
   loop() {
-    this.room.busyUntil = Infinity;
+    this.sonar.busyUntil = Infinity;
     this.nextPulse = this.now;
   }
 
@@ -184,6 +194,7 @@ export class Board extends Robot {
 
   counters() {
     const { chip, flash, room } = this;
-    return [chip.instructions, chip.uart.overruns, chip.uart.lost, flash.erased, flash.programmed, room.shortTriggers];
+    const shortTriggers = room.sonars.reduce((sum, sonar) => sum + sonar.shortTriggers, 0);
+    return [chip.instructions, chip.uart.overruns, chip.uart.lost, flash.erased, flash.programmed, shortTriggers];
   }
 }

@@ -140,7 +140,7 @@ test('a page clears bits, a sector sets them, and both take their time', () => {
 
 test('a cut leaves whole bytes before it, and none behind it', () => {
   const flash = new Flash(numbers(1));
-  flash.stepsLeft = 10;
+  flash.steps.left = 10;
   assert.throws(() => flash.program(0, () => 0, 256), PowerCut);
   assert.ok(flash.bytes.subarray(0, 9).every((byte) => byte === 0));
   assert.ok(flash.bytes.subarray(10, 256).every((byte) => byte === 0xff));
@@ -189,11 +189,11 @@ test('a robot drives as its wheels do, and a wall answers square to it only', ()
   drive([0.5, 0.5], 4);
   // 0.25 m/s, reached with a lag of 80 ms.
   assert.ok(Math.abs(room.x - 0.98) < 0.001 && Math.abs(room.y) < 1e-9, `${room.x}`);
-  assert.ok(Math.abs(room.range() - (3 - room.x - 0.06)) < 1e-9);
+  assert.ok(Math.abs(room.sonars[0].range() - (3 - room.x - 0.06)) < 1e-9);
   room.bearing = (11.9 * Math.PI) / 180;
-  assert.notEqual(room.range(), null);
+  assert.notEqual(room.sonars[0].range(), null);
   room.bearing = (12.1 * Math.PI) / 180;
-  assert.equal(room.range(), null);
+  assert.equal(room.sonars[0].range(), null);
   // Right forwards and left backwards is a turn to the left.
   drive([0.2, -0.2], 1);
   assert.ok(room.heading > 1);
@@ -201,22 +201,31 @@ test('a robot drives as its wheels do, and a wall answers square to it only', ()
 
 test('a wall behind another is not heard', () => {
   const room = new Room([[3, -1, 3, 1], [2, -1, 2, 1]], [0, 0, 0], numbers(1));
-  assert.equal(room.range(), 2 - 0.06);
+  assert.equal(room.sonars[0].range(), 2 - 0.06);
   room.walls[1] = [2, 0.1, 2, 1];
-  assert.equal(room.range(), 3 - 0.06);
+  assert.equal(room.sonars[0].range(), 3 - 0.06);
 });
 
 test('a right-angled corner answers from within it, and no other end of a wall', () => {
   const room = new Room([[2, -1, 2, 1], [2, 1, -1, 1]], [0, 0, 0], numbers(1));
   const corner = Math.atan2(1, 2 - 0.06);
   room.bearing = corner;
-  assert.ok(Math.abs(room.range() - Math.hypot(1, 2 - 0.06)) < 1e-9);
+  assert.ok(Math.abs(room.sonars[0].range() - Math.hypot(1, 2 - 0.06)) < 1e-9);
   // Seen from outside it is an edge.
   Object.assign(room, { x: 3, y: 2, bearing: Math.atan2(1 - 2, 2 - 3.06) });
-  assert.equal(room.range(), null);
+  assert.equal(room.sonars[0].range(), null);
   // At 60 degrees sound does not return.
   Object.assign(room, { x: 0, y: 0, bearing: corner, walls: [[2, -1, 2, 1], [2, 1, 0.268, 2]] });
-  assert.equal(room.range(), null);
+  assert.equal(room.sonars[0].range(), null);
+});
+
+test('a second sonar has its own place and bearing, and does not turn', () => {
+  const walls = [[3, -1, 3, 1], [-1, 2, 1, 2]];
+  const room = new Room(walls, [0, 0, 0], numbers(1), {}, { mount: [0.05, 0.04], bearing: Math.PI / 2 });
+  assert.equal(room.sonars[0].range(), 3 - 0.06);
+  assert.ok(Math.abs(room.sonars[1].range() - (2 - 0.04)) < 1e-9);
+  room.bearing = 1;
+  assert.ok(Math.abs(room.sonars[1].range() - (2 - 0.04)) < 1e-9);
 });
 
 /** A master of a bus, by the figures of UM10204, 3.1. */
@@ -332,11 +341,12 @@ test('a load or store of Thumb-2 has its register, address, size and length (ARM
 /** The parts of an STM32F4 around a board that only has a time. */
 function stm32() {
   const board = {
-    room: { counts: [-3, 7], trigger() {} },
+    room: { counts: [-3, 7] },
+    sonar: { trigger() {} },
     now: 0,
     erased: [],
     setEnabled(isEnabled) { this.isEnabled = isEnabled; },
-    fill(sector) { this.erased.push(sector); },
+    erase(sector) { this.erased.push(sector); },
   };
   return { board, parts: peripherals(board) };
 }

@@ -4,7 +4,7 @@
 const SECTOR = 4096;
 const PAGE = 256;
 /** Steps of an erasure at which power can be cut; a page has one for each byte. */
-const ERASE_STEPS = 8;
+export const ERASE_STEPS = 8;
 
 export const TIMES = {
   typical: { erase: 45e6, page: 0.4e6 },
@@ -14,23 +14,43 @@ export const TIMES = {
 /** The power was cut. */
 export class PowerCut extends Error {}
 
+/** The steps of writes and erasures, in one of which the power is cut. */
+export class Steps {
+  /** `random` gives numbers below 1. */
+  constructor(random) {
+    this.random = random;
+    this.left = Infinity;
+  }
+
+  /** One step; whether the power is cut in it. */
+  isCut() {
+    if (--this.left > 0) return false;
+    this.left = Infinity;
+    return true;
+  }
+
+  /** Eight bits, each set with this probability: those that an interrupted step has not cleared, or has set. */
+  bits(probability) {
+    let bits = 0;
+    for (let i = 0; i < 8; i++) bits |= (this.random() < probability ? 1 : 0) << i;
+    return bits;
+  }
+}
+
 export class Flash {
   /** `wait` lets nanoseconds pass in which the core is stalled; `random` gives numbers below 1. */
   constructor(random) {
     this.bytes = new Uint8Array(16 << 20).fill(0xff);
-    this.random = random;
+    this.steps = new Steps(random);
     this.times = TIMES.typical;
     this.wait = () => {};
     this.erased = 0;
     this.programmed = 0;
-    /** Steps until the power is cut. */
-    this.stepsLeft = Infinity;
   }
 
   /** One step; `partly` leaves behind what an interrupted step leaves. */
   step(partly) {
-    if (--this.stepsLeft > 0) return;
-    this.stepsLeft = Infinity;
+    if (!this.steps.isCut()) return;
     partly();
     throw new PowerCut();
   }
@@ -41,7 +61,7 @@ export class Flash {
       const sector = this.bytes.subarray(at, at + SECTOR);
       for (let i = 0; i < ERASE_STEPS; i++) {
         const share = i / ERASE_STEPS;
-        this.step(() => sector.forEach((byte, k) => { sector[k] = byte | this.bits(share); }));
+        this.step(() => sector.forEach((byte, k) => { sector[k] = byte | this.steps.bits(share); }));
         this.wait(this.times.erase / ERASE_STEPS);
       }
       sector.fill(0xff);
@@ -54,17 +74,10 @@ export class Flash {
     for (let i = 0; i < bytes; i++) {
       const value = byte(i);
       // A byte that changes nothing is no step.
-      if (this.bytes[at + i] & ~value) this.step(() => { this.bytes[at + i] &= value | this.bits(0.5); });
+      if (this.bytes[at + i] & ~value) this.step(() => { this.bytes[at + i] &= value | this.steps.bits(0.5); });
       this.bytes[at + i] &= value;
       if (i % PAGE === PAGE - 1) this.wait(this.times.page);
     }
     this.programmed += bytes / PAGE;
-  }
-
-  /** Eight bits, each set with this probability. */
-  bits(probability) {
-    let bits = 0;
-    for (let i = 0; i < 8; i++) bits |= (this.random() < probability ? 1 : 0) << i;
-    return bits;
   }
 }

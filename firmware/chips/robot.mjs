@@ -5,9 +5,9 @@ import { Room, STEP } from './room.mjs';
 const HISTORY = 10e9;
 
 export class Robot {
-  constructor(walls, pose, random, wiring) {
+  constructor({ walls, pose, second }, random, wiring) {
     this.wiring = wiring;
-    this.room = new Room(walls, pose, random, wiring);
+    this.room = new Room(walls, pose, random, wiring, second);
     /** Time at which the present life of the chip began. */
     this.began = 0;
     /** The next step of the room. */
@@ -24,6 +24,11 @@ export class Robot {
     if (isEnabled === this.isEnabled) return;
     this.isEnabled = isEnabled;
     this.events.push(`${isEnabled ? 'enabled' : 'disabled'} ${now}`);
+  }
+
+  /** The sonar on the servo. */
+  get sonar() {
+    return this.room.sonars[0];
   }
 
   /** The room moves on by a step, with these voltages of the motors and this width of the servo's pulses; returns whether an encoder has changed. */

@@ -1,4 +1,4 @@
-// What is around the board: wheels with motors and encoders, a sonar on a servo, and a room. Metres, radians, seconds, nanoseconds where it says so.
+// What is around the board: wheels with motors and encoders, a sonar on a servo, perhaps a fixed one, and a room. Metres, radians, seconds, nanoseconds where it says so.
 
 /** How often wheels and servo move on, nanoseconds: at 0.5 m/s a wheel turns by a third of an edge meanwhile. */
 export const STEP = 100e3;
@@ -11,7 +11,7 @@ const NO_ECHO = 38e6;
 const ROBOT = {
   track: 0.1234,
   edge: [1.008, 0.994].map((scale) => (scale * Math.PI * 0.065) / 1496.6),
-  mount: 0.06,
+  mount: [0.06, 0],
   /** Speed at full voltage, and the time in which a wheel reaches it. */
   speed: 0.5,
   lag: 0.08,
@@ -32,9 +32,63 @@ export function numbers(seed) {
   };
 }
 
+/** A sonar of the robot: on the servo, or at a fixed bearing. */
+class Sonar {
+  /** `mount`: where it is, ahead and to the left. */
+  constructor(room, mount, bearing = null) {
+    Object.assign(this, { room, mount, bearing });
+    this.pings = 0;
+    this.busyUntil = 0;
+    this.shortTriggers = 0;
+    this.triggeredAt = null;
+    /** Edges of the echo that are to come: time and level. */
+    this.edges = [];
+  }
+
+  /** The trigger has changed, at a time in nanoseconds. */
+  trigger(isHigh, now) {
+    if (isHigh) {
+      this.triggeredAt = now;
+      return;
+    }
+    if (this.triggeredAt === null) return;
+    const isLong = now - this.triggeredAt >= 10e3;
+    this.triggeredAt = null;
+    if (!isLong) this.shortTriggers++;
+    if (!isLong || now < this.busyUntil) return;
+    this.pings++;
+    const range = this.range();
+    const { random, robot } = this.room;
+    const noise = robot.noise * Math.sqrt(-2 * Math.log(1 - random())) * Math.cos(2 * Math.PI * random());
+    const pulse = range === null ? NO_ECHO : (2e9 * (range + noise)) / SPEED_OF_SOUND;
+    this.busyUntil = now + BURST + pulse;
+    this.edges.push({ at: now + BURST, isHigh: true }, { at: this.busyUntil, isHigh: false });
+  }
+
+  /** The distance of what is nearest in the cone and in sight: a wall that is square to the beam, or a corner of two walls. */
+  range() {
+    const { room, mount: [ahead, left] } = this;
+    const [cos, sin] = [Math.cos(room.heading), Math.sin(room.heading)];
+    const [x, y] = [room.x + ahead * cos - left * sin, room.y + ahead * sin + left * cos];
+    const beam = room.heading + (this.bearing ?? room.bearing);
+    const distances = [...room.feet(x, y), ...room.corners(x, y)].flatMap(({ at, walls }) => {
+      const [dx, dy] = [at[0] - x, at[1] - y];
+      const distance = Math.hypot(dx, dy);
+      const off = Math.atan2(dy, dx) - beam;
+      const isHeard = Math.abs(Math.atan2(Math.sin(off), Math.cos(off))) <= room.robot.cone && distance <= room.robot.range;
+      const isHidden = () => room.walls.some((other) => !walls.includes(other) && crosses([x, y, ...at], other));
+      return isHeard && !isHidden() ? [distance] : [];
+    });
+    return distances.length ? Math.min(...distances) : null;
+  }
+}
+
 export class Room {
-  /** `walls`: two points each. The robot stands at a pose; `robot` has what differs from the usual one, whose left encoder is mirrored. */
-  constructor(walls, [x, y, heading], random, { robot = {}, mirrored = 1 } = {}) {
+  /**
+   * `walls`: two points each. The robot stands at a pose; `robot` has what differs from the usual one, whose left encoder is mirrored. A
+   * second sonar has a mount and a bearing.
+   */
+  constructor(walls, [x, y, heading], random, { robot = {}, mirrored = 1 } = {}, second = null) {
     Object.assign(this, { walls, x, y, heading, random, mirrored });
     this.robot = { ...ROBOT, ...robot };
     /** Radians per second. */
@@ -43,12 +97,12 @@ export class Room {
     this.travels = [0, 0];
     this.counts = [0, 0];
     this.bearing = 0;
-    this.pings = 0;
-    this.busyUntil = 0;
-    this.shortTriggers = 0;
-    this.triggeredAt = null;
-    /** Edges of the echo that are to come: time and level. */
-    this.edges = [];
+    this.sonars = [new Sonar(this, this.robot.mount), ...second ? [new Sonar(this, second.mount, second.bearing)] : []];
+  }
+
+  /** The time of the next edge of an echo. */
+  get nextEdge() {
+    return Math.min(...this.sonars.map(({ edges }) => edges[0]?.at ?? Infinity));
   }
 
   /** Moves on by a step. `voltages` of right and left wheel are parts of the full one; `target` is that of the servo. */
@@ -70,41 +124,6 @@ export class Room {
     this.counts = this.travels.map((travel, side) => Math.floor(travel / robot.edge[side]) * (side === this.mirrored ? -1 : 1));
     const most = robot.servo * dt;
     this.bearing += Math.max(-most, Math.min(most, target - this.bearing));
-  }
-
-  /** The trigger has changed, at a time in nanoseconds. */
-  trigger(isHigh, now) {
-    if (isHigh) {
-      this.triggeredAt = now;
-      return;
-    }
-    if (this.triggeredAt === null) return;
-    const isLong = now - this.triggeredAt >= 10e3;
-    this.triggeredAt = null;
-    if (!isLong) this.shortTriggers++;
-    if (!isLong || now < this.busyUntil) return;
-    this.pings++;
-    const range = this.range();
-    const noise = this.robot.noise * Math.sqrt(-2 * Math.log(1 - this.random())) * Math.cos(2 * Math.PI * this.random());
-    const pulse = range === null ? NO_ECHO : (2e9 * (range + noise)) / SPEED_OF_SOUND;
-    this.busyUntil = now + BURST + pulse;
-    this.edges.push({ at: now + BURST, isHigh: true }, { at: this.busyUntil, isHigh: false });
-  }
-
-  /** The distance of what is nearest in the cone and in sight: a wall that is square to the beam, or a corner of two walls. */
-  range() {
-    const { robot } = this;
-    const [x, y] = [this.x + robot.mount * Math.cos(this.heading), this.y + robot.mount * Math.sin(this.heading)];
-    const beam = this.heading + this.bearing;
-    const distances = [...this.feet(x, y), ...this.corners(x, y)].flatMap(({ at, walls }) => {
-      const [dx, dy] = [at[0] - x, at[1] - y];
-      const distance = Math.hypot(dx, dy);
-      const off = Math.atan2(dy, dx) - beam;
-      const isHeard = Math.abs(Math.atan2(Math.sin(off), Math.cos(off))) <= robot.cone && distance <= robot.range;
-      const isHidden = () => this.walls.some((other) => !walls.includes(other) && crosses([x, y, ...at], other));
-      return isHeard && !isHidden() ? [distance] : [];
-    });
-    return distances.length ? Math.min(...distances) : null;
   }
 
   /** The feet of the perpendiculars from a place on the walls. */

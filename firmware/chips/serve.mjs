@@ -13,6 +13,7 @@
 //   chip                    instructions, overruns, lost bytes, erased sectors, programmed pages, short triggers
 //   count ADDRESS           counts the calls of the function there
 //   calls                   how many have returned; the instructions of the longest one with the motors enabled, and of the longest other one
+//   pings                   how many pings each sonar has sent
 //   gyro                    how many samples of the gyro have been read
 //   pull PIN                up, down or none
 //   hang | fault | overflow at the next instruction
@@ -57,12 +58,13 @@ const orders = {
   state() {
     const { room } = board;
     const last = [board.poweredAt, board.rolledAt].map((nanos) => nanos / 1e3);
-    return [board.now / 1e3, room.x, room.y, room.heading, room.pings, Number(board.isEnabled), ...last].join(' ');
+    return [board.now / 1e3, room.x, room.y, room.heading, board.sonar.pings, Number(board.isEnabled), ...last].join(' ');
   },
   events: () => board.events.splice(0).join(' ') || '-',
   chip: () => board.counters().join(' '),
   count(at) { board.polls.at = Number(at); },
   calls: () => [board.polls.returned, board.polls.driving, board.polls.waiting].join(' '),
+  pings: () => board.room.sonars.map((sonar) => sonar.pings).join(' '),
   gyro: () => board.gyro.readings,
   pull(pin) {
     const { pullupEnabled, pulldownEnabled } = board.chip.rp2040.gpio[Number(pin)];
@@ -74,7 +76,7 @@ const orders = {
   'off-and-on': () => board.reset('power'),
   loop: () => board.loop(),
   noise(state) { board.isNoisy = state === 'on'; },
-  cut(steps) { board.flash.stepsLeft = Number(steps); },
+  cut(steps) { board.steps.left = Number(steps); },
   'slow-flash': () => board.slowFlash(),
   unknown: () => [...board.chip.unknown].map(([text, count]) => `${text} (${count})`).join('; ') || '-',
 };

@@ -2,6 +2,7 @@
 // catches up with the clock of the chip. A sleep of the core ends in time for the next event. Times in nanoseconds since power-on.
 import { spawn } from 'node:child_process';
 import { Debugger, Line, Tester } from './debugger.mjs';
+import { ERASE_STEPS, Steps } from './flash.mjs';
 import { Robot } from './robot.mjs';
 import { numbers } from './room.mjs';
 import { peripherals } from './stm32.mjs';
@@ -31,9 +32,12 @@ const LONGEST = 2000;
 
 export class Stm32Board extends Robot {
   /** `folder` has room for the sockets. */
-  constructor({ walls, pose, seed }, folder) {
-    super(walls, pose, numbers(seed + 2), WIRING);
+  constructor(world, folder) {
+    const { seed } = world;
+    super(world, numbers(seed + 2), WIRING);
     this.folder = folder;
+    /** Of the flash: a word that changes, and the parts of an erasure. */
+    this.steps = new Steps(numbers(seed + 1));
     this.images = [];
     this.received = [];
     this.lineFree = 0;
@@ -146,7 +150,7 @@ export class Stm32Board extends Robot {
 
   /** What is due now. */
   async happen() {
-    const { edges } = this.room;
+    const { edges } = this.sonar;
     const { stamps } = this.parts;
     while (edges.length && edges[0].at <= this.now) {
       const { at, isHigh } = edges.shift();
@@ -176,7 +180,7 @@ export class Stm32Board extends Robot {
     const [RELOAD, CURRENT, SHORTEST] = [4, 8, 64];
     const { hasInterrupt, length } = this.systick;
     const byte = this.toSend.length ? this.lineFree : Infinity;
-    const next = Math.min(this.until, byte, this.room.edges[0]?.at ?? Infinity);
+    const next = Math.min(this.until, byte, this.room.nextEdge);
     const counts = Math.max(SHORTEST, Math.ceil((next - this.now) * SYSTICK_RATE));
     // Without its interrupt it is no alarm: the program measures its rate.
     const isShortened = hasInterrupt && counts < length;
@@ -185,16 +189,36 @@ export class Stm32Board extends Robot {
     ]);
   }
 
-  /** Erases a sector of the store. */
+  /** A sector of the store that is erased. */
   fill(sector) {
     return this.debugger.write(SECTORS[sector], new Uint8Array(SECTOR).fill(0xff));
   }
 
-  /** Writes a word of the store, which clears bits only. */
+  /** Erases a sector of the store, of which a power cut leaves a part. */
+  async erase(sector) {
+    for (let step = 0; step < ERASE_STEPS; step++) {
+      if (!this.steps.isCut()) continue;
+      const bytes = await this.debugger.read(SECTORS[sector], SECTOR);
+      const partly = bytes.map((byte) => byte | this.steps.bits(step / ERASE_STEPS));
+      await this.debugger.write(SECTORS[sector], partly);
+      this.resetBy = 'power';
+      return;
+    }
+    await this.fill(sector);
+  }
+
+  /** Writes a word of the store, which clears bits only; a power cut leaves some of them. */
   async program(address, value) {
     this.parts.flash.programmed++;
     const bytes = await this.debugger.read(address, 4);
-    bytes.writeUInt32LE((bytes.readUInt32LE(0) & value) >>> 0);
+    const before = bytes.readUInt32LE(0);
+    let after = (before & value) >>> 0;
+    if (after !== before && this.steps.isCut()) {
+      const kept = Buffer.from(Array.from({ length: 4 }, () => this.steps.bits(0.5))).readUInt32LE(0);
+      after = (before & (value | kept)) >>> 0;
+      this.resetBy = 'power';
+    }
+    bytes.writeUInt32LE(after);
     await this.debugger.write(address, bytes);
   }
 
@@ -234,6 +258,6 @@ export class Stm32Board extends Robot {
   /** As those of another board; the stops stand for the instructions, which QEMU does not count. */
   counters() {
     const { flash } = this.parts;
-    return [this.stops, 0, this.lost, flash.erased, flash.programmed, this.room.shortTriggers];
+    return [this.stops, 0, this.lost, flash.erased, flash.programmed, this.sonar.shortTriggers];
   }
 }

@@ -155,13 +155,13 @@ class FlashController extends Kept {
 export function peripherals(board) {
   const { room } = board;
   const now = () => board.now;
-  const flash = new FlashController((sector) => board.fill(sector));
+  const flash = new FlashController((sector) => board.erase(sector));
   return {
     flash,
     right: new Encoder(0x40010000, () => room.counts[0]),
     left: new Encoder(0x40010400, () => room.counts[1]),
     servo: new Pulses(0x40014400),
-    trigger: new Port(0x40020000, 1, (isHigh) => room.trigger(isHigh, board.now)),
+    trigger: new Port(0x40020000, 1, (isHigh) => board.sonar.trigger(isHigh, board.now)),
     enable: new Port(0x40020400, 7, (isHigh) => board.setEnabled(isHigh, board.now)),
     watchdog: new Watchdog(now),
     causes: new Causes(),

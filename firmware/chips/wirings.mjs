@@ -7,7 +7,7 @@ function counts(chip, slice) {
 }
 
 const pico = {
-  pins: { right: [2, 3], left: [4, 5], trigger: 7, echo: 8 },
+  pins: { right: [2, 3], left: [4, 5], sonars: [{ trigger: 7, echo: 8 }, { trigger: 16, echo: 17 }] },
   /** Slices of the PWM. */
   slices: { servo: 3, right: 5, left: 6 },
   /** The wheel whose encoder counts backwards. */
@@ -24,7 +24,7 @@ const pico = {
 const GPIO_PWM = 4;
 
 const xrp = {
-  pins: { right: [12, 13], left: [4, 5], trigger: 20, echo: 21, clock: 19, data: 18 },
+  pins: { right: [12, 13], left: [4, 5], sonars: [{ trigger: 20, echo: 21 }], clock: 19, data: 18 },
   slices: { servo: 0, right: 7, left: 3 },
   mirrored: 0,
   // Wheels of 60 mm, 585 edges, 155 mm between them, 120 turns a minute.

@@ -70,11 +70,12 @@ const EMULATED: [Emulated; 4] = [
                 "crates/sonarfix-app/tests/chips/stops.rs",
                 "crates/sonarfix-app/tests/chips/commands.rs",
                 "crates/sonarfix-app/tests/chips/usb.rs",
+                "crates/sonarfix-app/tests/chips/two_sonars.rs",
                 "crates/sonarfix-app/tests/chips/search.rs",
                 "crates/sonarfix-app/tests/chips/long.rs",
             ],
         )],
-        has: "core, interrupts, timer, PIO, PWM, pins, UART, USB with a PC at its socket, watchdog, flash and its power cuts, second stage of the boot; around it wheels, servo, sonar and room",
+        has: "core, interrupts, timer, PIO, PWM, pins, UART, USB with a PC at its socket, watchdog, flash and its power cuts, second stage of the boot; around it wheels, servo, one or two sonars, and room",
         lacks: "the boot ROM (a stub has its functions), DMA, I²C devices, the voltages of the pins and of the USB lines, jitter of the clocks",
     },
     Emulated {
@@ -90,7 +91,7 @@ const EMULATED: [Emulated; 4] = [
         commands: IN_QEMU,
         has: "core, interrupts, SysTick, USART2, clock and PWM of the motors (TIM5, TIM3). In a room (`cargo xtask chips`) the machine stops before each access of the core to what it \
             lacks, and is fed: counts of the encoders (TIM1, TIM8), flags of the stamps of edges (TIM5; their times are written to its capture registers), servo (TIM10), trigger and enable pin \
-            (GPIOA, GPIOB), watchdog, causes of a reset, flash controller and store",
+            (GPIOA, GPIOB), watchdog, causes of a reset, flash controller, store and its power cuts",
         lacks: "levels of pins, filters and input stages of the timers, I²C devices, crystal, voltage detector, backup registers; erasures and writes of the flash take no time; an overflow of the stack ends QEMU",
     },
     Emulated {

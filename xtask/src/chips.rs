@@ -25,7 +25,7 @@ const POLL: &str = "::Board::poll";
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::Args)]
 pub struct Args {
-    /// Also twenty drives of 90 s, a hundred power cuts and a search for the pose (some 20 minutes).
+    /// Also twenty drives of 90 s and a hundred power cuts (some 40 minutes).
     #[arg(long)]
     long: bool,
     /// Write docs/chips.md.
@@ -85,7 +85,7 @@ pub fn run(args: Args) -> anyhow::Result<()> {
         "test --package sonarfix-app --test chips -- --ignored --nocapture --test-threads 1";
     let mut command = cargo::command(tests);
     if !args.long {
-        command.args(["--skip", "long::", "--skip", "search::"]);
+        command.args(["--skip", "long::"]);
     }
     command.env("SONARFIX_CHIPS_ROWS", &rows);
     for board in RP2040 {

@@ -13,6 +13,7 @@ mod results;
 mod search;
 mod stm32;
 mod stops;
+mod two_sonars;
 mod usb;
 mod xrp;
 
@@ -41,7 +42,7 @@ fn world() -> World {
 
 /// The room with a robot that has this board.
 fn world_of(board: &'static Board) -> World {
-    World { board, walls: segments(&CORNERS), pose: POSE, seed: 1 }
+    World { board, walls: segments(&CORNERS), pose: POSE, seed: 1, second: None }
 }
 
 /// The walls between these corners.
@@ -85,7 +86,12 @@ fn done(result: Option<CommandResult>) {
 
 /// A robot that drives in this world, with the pose that it has there.
 fn driving_in(world: &World) -> Pico {
-    let mut pico = Pico::switched_on(world.board.elf, world, &map(), &image(&configuration()));
+    driving_with(world, &configuration())
+}
+
+/// The same with another robot.
+fn driving_with(world: &World, config: &RobotConfig) -> Pico {
+    let mut pico = Pico::switched_on(world.board.elf, world, &map(), &image(config));
     pico.hello();
     let [x, y, heading] = world.pose;
     let pose = Pose::new(x, y, Radians(heading));
@@ -141,10 +147,15 @@ struct Drive {
     polls: Polls,
 }
 
+/// Drives for 90 s.
+fn drive(world: &World) -> Drive {
+    drive_with(world, &configuration()).1
+}
+
 /// Drives for 90 s, and compares each estimate with the robot in the room at the same time of the chip, and with the core on
 /// this computer.
-fn drive(world: &World) -> Drive {
-    let mut pico = driving_in(world);
+fn drive_with(world: &World, config: &RobotConfig) -> (Pico, Drive) {
+    let mut pico = driving_with(world, config);
     let (mut estimates, mut worst, mut turn) = (0, 0.0_f64, 0.0_f64);
     let mut travelled = 0.0;
     let mut last = pico.state().truth;
@@ -163,7 +174,7 @@ fn drive(world: &World) -> Drive {
             estimates += 1;
         }
     }
-    let compared = beside::compare(&pico.heard, &map(), &configuration());
+    let compared = beside::compare(&pico.heard, &map(), config);
     let (status, counters, pings) = (pico.loop_status(), pico.counters(), pico.state().pings);
     println!(
         "{estimates} estimates over {travelled:.1} m and {pings} pings: position within {:.1} mm, heading within {:.2}°; {:?}, worst poll {}, {counters:?}; {compared:?}",
@@ -178,7 +189,8 @@ fn drive(world: &World) -> Drive {
     assert_eq!((status.faults.deadlines, counters.overruns, counters.lost_bytes), (0, 0, 0));
     assert_eq!((counters.short_triggers, pico.missing()), (0, 0));
     assert_eq!(pico.events(), []);
-    Drive { worst, turn, travelled, pings, counters, polls: pico.polls() }
+    let driven = Drive { worst, turn, travelled, pings, counters, polls: pico.polls() };
+    (pico, driven)
 }
 
 #[test]
@@ -209,15 +221,23 @@ fn the_slowest_flash_does_not_reset_the_chip() {
     polls("the slowest flash", pico.polls());
 }
 
-/// The power is cut while a pose is written: afterwards the robot has the pose before or the new one, and takes another.
+/// The record of a pose takes between 91 and 96 steps.
 #[test]
 #[ignore = "cargo xtask chips"]
 fn a_power_cut_loses_no_record() {
+    let (cuts, counted) = cut_while_a_pose_is_written(&world(), (1..100).step_by(4));
+    assert!(cuts >= 20, "{cuts} cuts");
+    polls("power cuts", counted);
+}
+
+/// The power is cut in each of these steps while a pose is written: afterwards the robot has the pose before or the new one, and takes
+/// another. Returns how often there were so many steps.
+fn cut_while_a_pose_is_written(world: &World, steps: impl Iterator<Item = u32>) -> (u32, Polls) {
     let pose = |x: f32| Start { pose: Pose::new(x, 1.3, Radians(0.0)), ..start() };
     let (mut cuts, mut counted) = (0, Polls::default());
-    // The record takes between 91 and 96 steps.
-    for step in (1..100).step_by(4) {
-        let mut pico = Pico::switched_on(ELF, &world(), &map(), &image(&configuration()));
+    for step in steps {
+        let config = image(&configuration());
+        let mut pico = Pico::switched_on(world.board.elf, world, &map(), &config);
         pico.hello();
         done(pico.order(&Command::SetPose(pose(1.0))));
         pico.run(100, &[]);
@@ -225,6 +245,7 @@ fn a_power_cut_loses_no_record() {
         // The answer comes at once or not at all.
         pico.patience = 200;
         let answer = pico.order(&Command::SetPose(pose(2.0)));
+        pico.ask("cut Infinity");
         if pico.events().iter().all(|event| event.what != "reset-by-power") {
             done(answer);
             continue;
@@ -245,8 +266,7 @@ fn a_power_cut_loses_no_record() {
         counted = counted.and(pico.polls());
     }
     println!("{cuts} cuts, and each left the pose before or the new one");
-    assert!(cuts >= 20, "{cuts} cuts");
-    polls("power cuts", counted);
+    (cuts, counted)
 }
 
 /// Random bytes at the full rate of the line cost no deadline, and commands are executed afterwards.

@@ -65,6 +65,17 @@ pub struct World {
     pub walls: Vec<[f32; 4]>,
     pub pose: [f32; 3],
     pub seed: u32,
+    /// A second sonar, which does not turn.
+    pub second: Option<FixedSonar>,
+}
+
+/// A sonar at a fixed bearing.
+#[derive(Debug, Clone, Copy)]
+pub struct FixedSonar {
+    /// Ahead and to the left, metres.
+    pub mount: [f32; 2],
+    /// Radians.
+    pub bearing: f32,
 }
 
 /// A robot as the room has it.
@@ -184,10 +195,14 @@ impl Pico {
         let files = TempDir::new().unwrap();
         let path = |name: &str| files.path().join(name);
         let walls: Vec<String> = world.walls.iter().map(|wall| format!("{wall:?}")).collect();
-        let &World { board, pose, seed, .. } = world;
+        let &World { board, pose, seed, second, .. } = world;
         let (name, walls) = (board.name, walls.join(","));
-        let world =
-            format!(r#"{{"board":"{name}","walls":[{walls}],"pose":{pose:?},"seed":{seed}}}"#);
+        let second = second.map_or("null".to_owned(), |FixedSonar { mount, bearing }| {
+            format!(r#"{{"mount":{mount:?},"bearing":{bearing}}}"#)
+        });
+        let world = format!(
+            r#"{{"board":"{name}","walls":[{walls}],"pose":{pose:?},"seed":{seed},"second":{second}}}"#
+        );
         std::fs::write(path("world.json"), world).unwrap();
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../firmware/chips");
         let mut command = Process::new("node");
@@ -386,6 +401,11 @@ impl Pico {
         let counts: Vec<u64> = answer.split(' ').map(|word| word.parse().unwrap()).collect();
         let [count, driving, waiting] = counts[..] else { panic!("{answer}") };
         Polls { count, driving, waiting }
+    }
+
+    /// How many pings each sonar has sent.
+    pub fn pings(&mut self) -> Vec<f64> {
+        numbers(&self.ask("pings"))
     }
 
     /// How many samples of the gyro were read.

@@ -6,8 +6,9 @@ use sonarfix_link::message::{ImageStatus, ResetCause};
 use crate::commands::{configuration_is_kept, poses_are_taken};
 use crate::pico::{Board, NUCLEO, Pico, STM32F405, World};
 use crate::results::{Table, row};
+use crate::search::find_from_nothing;
 use crate::stops::stop;
-use crate::{configuration, drive, image, map, world_of};
+use crate::{configuration, cut_while_a_pose_is_written, drive, image, map, world_of};
 
 /// The boards, and what precedes their measurements.
 const BOARDS: [(&Board, &str); 2] = [(NUCLEO, "Nucleo, "), (STM32F405, "STM32F405, ")];
@@ -72,5 +73,24 @@ fn a_configuration_that_was_sent_survives_resets_of_every_kind() {
 fn a_program_that_stops_stops_the_motors() {
     for (world, name) in each() {
         stop(&world, name, &[("hang", ResetCause::Watchdog), ("fault", ResetCause::Software)]);
+    }
+}
+
+/// A step is a word that changes; the record of a pose has at least 22 and at most 24.
+#[test]
+#[ignore = "cargo xtask chips"]
+fn a_power_cut_loses_no_record() {
+    for (world, name) in each() {
+        let (cuts, _) = cut_while_a_pose_is_written(&world, (1..25).step_by(2));
+        assert!(cuts >= 11, "{name}{cuts} cuts");
+    }
+}
+
+/// The motor code drives, because these programs take no motions from a PC.
+#[test]
+#[ignore = "cargo xtask chips"]
+fn a_robot_without_a_pose_finds_it_within_a_minute() {
+    for (world, name) in each() {
+        find_from_nothing(&world, name, None);
     }
 }

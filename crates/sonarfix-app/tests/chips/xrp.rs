@@ -28,7 +28,7 @@ fn configuration() -> RobotConfig {
 
 /// An XRP whose motors are enabled, with the pose that it has.
 fn driving() -> Pico {
-    let world = World { board: XRP, walls: segments(&CORNERS), pose: POSE, seed: 1 };
+    let world = World { board: XRP, walls: segments(&CORNERS), pose: POSE, seed: 1, second: None };
     let config = configuration();
     let mut xrp = Pico::switched_on(XRP.elf, &world, &map_of(&CORNERS), &image(&config));
     let hello = xrp.hello();
