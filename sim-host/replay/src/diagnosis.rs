@@ -47,7 +47,7 @@ const LEAST_EXPLAINED_STANDING: f64 = 0.75;
 const LOST: f64 = 0.03;
 const LOST_OF_COMPARED: f64 = 0.1;
 /// The logarithm of the likelihood that a cause must gain: in all, and for each echo.
-const LEAST_GAIN: f64 = 7.0;
+const LEAST_GAIN: f64 = 10.0;
 const LEAST_GAIN_PER_ECHO: f64 = 0.08;
 /// Records in which causes are tried: five minutes of a robot with 10 encoder records and 2 ranges a second.
 const TRIED: usize = 3_600;
@@ -103,9 +103,10 @@ pub fn diagnose(
     if is_enough && is_readable {
         add_unexplained(&visible, is_right, &mut findings);
         let causes = whole.causes(&as_is);
-        let are_none = causes.is_empty();
+        let are_none = causes.findings.is_empty();
         // A wrong bearing explains the ranges of a servo that does not turn.
-        let is_of_bearing = causes.first().is_some_and(|it| it.cause.starts_with("bearing"));
+        let is_of_bearing =
+            causes.findings.first().is_some_and(|it| it.cause.starts_with("bearing"));
         findings.extend(visible.constant_bearing().filter(|_| is_of_bearing));
         add(causes, &mut findings);
         if are_none && !is_right && !findings.iter().any(|it| it.cause == RANGE_NOISE) {
@@ -134,13 +135,12 @@ fn add_unexplained(visible: &Visible, is_right: bool, findings: &mut Vec<Finding
 }
 
 /// Adds the causes that were found by trying, and removes findings in the records that are effects of them.
-fn add(causes: Vec<Finding>, findings: &mut Vec<Finding>) {
-    let is_certain =
-        causes.first().and_then(|it| it.explained).is_some_and(|it| it >= STARTED_ELSEWHERE);
-    if is_certain {
-        // Random numbers explain less, but wheels that count backwards make ranges look random.
+fn add(causes: Named, findings: &mut Vec<Finding>) {
+    // No cause makes random numbers probable, but wheels that count backwards make ranges look random.
+    if causes.total > 0.0 {
         findings.retain(|it| it.cause != RANGE_NOISE);
     }
+    let causes = causes.findings;
     if causes.iter().any(|it| it.cause == "range_unit") {
         findings.retain(|it| it.cause != "range_placeholder");
     }
@@ -164,6 +164,8 @@ struct Trial<'a> {
 struct Named {
     findings: Vec<Finding>,
     value: f64,
+    /// The logarithm of the likelihood with the first one against that of random ranges.
+    total: f64,
 }
 
 /// A cause that was tried.
@@ -178,7 +180,7 @@ impl<'a> Trial<'a> {
     fn of(&self, change: &Change) -> Option<Evidence> {
         let walls = change.walls(self.walls);
         let records = change.records(self.entries, self.robot);
-        Evidence::of(&change.robot(self.robot), &walls, records.into_iter())
+        Evidence::of(&change.robot(self.robot), &walls, records.into_iter(), change.range)
     }
 
     fn try_one(&self, candidate: Candidate, as_is: &Evidence) -> Option<Tried> {
@@ -200,17 +202,18 @@ impl<'a> Trial<'a> {
     }
 
     /// The causes that explain the log, best first. If much of the log is right before the rest, the robot was probably moved.
-    fn causes(&self, as_is: &Evidence) -> Vec<Finding> {
+    fn causes(&self, as_is: &Evidence) -> Named {
         let lasting = self.beginning().lasting();
-        let Some(broken) = as_is.broken() else { return lasting.findings };
+        let Some(broken) = as_is.broken() else { return lasting };
         let mut moves = self.moves(broken, as_is);
         keep_best(&mut moves, 0);
         let moved = self.named(&moves, as_is);
         let best = if moved.value > lasting.value { moved } else { lasting };
         if best.findings.is_empty() && broken.is_sharp {
-            vec![report::broken(broken, self.begin(), self.entries)]
+            let findings = vec![report::broken(broken, self.begin(), self.entries)];
+            Named { findings, ..Named::default() }
         } else {
-            best.findings
+            best
         }
     }
 
@@ -256,13 +259,13 @@ impl<'a> Trial<'a> {
         let named: Vec<_> = tried.iter().filter(is_enough).collect();
         let Some(first) = named.first() else { return Named::default() };
         let near: Vec<_> =
-            named.iter().filter(|it| it.value() > 0.9 * first.value() - 4.0).collect();
+            named.iter().filter(|it| it.value() > 0.95 * first.value() - 4.0).collect();
         // Several varied quantities that all fit a little are signs of something else.
         let kind = first.candidate.kind();
         let are_alike = kind.is_some() && near.iter().all(|it| it.candidate.kind() == kind);
         let are_vague =
             near.len() > 1 && !are_alike && near.iter().all(|it| it.candidate.is_varied());
-        if are_vague && first.evidence.explained() < RIGHT {
+        if are_vague && first.is_little() && first.evidence.explained() < RIGHT {
             return Named::default();
         }
         let shown = if are_alike { 3 } else { 2 };
@@ -271,6 +274,7 @@ impl<'a> Trial<'a> {
         };
         Named {
             value: first.value(),
+            total: first.evidence.total() - first.candidate.cost(),
             findings: near.into_iter().copied().take(shown).map(finding).collect(),
         }
     }
@@ -366,8 +370,14 @@ impl<'a> Trial<'a> {
 impl Tried {
     /// The gain without what a cause of its kind gains by chance. A varied quantity fits a little better than what is right.
     fn value(&self) -> f64 {
-        let share = if self.candidate.is_fitted() { 0.95 } else { 1.0 };
-        share * self.gain - self.candidate.cost()
+        self.gain - self.candidate.cost()
+    }
+
+    /// Whether each echo becomes less than e times as probable.
+    fn is_little(&self) -> bool {
+        #[expect(clippy::cast_precision_loss, reason = "a number of echoes")]
+        let echoes = self.evidence.count() as f64;
+        self.value() < echoes
     }
 
     fn is_enough(&self, as_is: &Evidence) -> bool {
@@ -391,6 +401,12 @@ impl Tried {
     fn explains_no_less(&self, as_is: &Evidence) -> bool {
         let lost = as_is.explained_of_all() - self.evidence.explained_of_all();
         let lost_of_compared = as_is.explained() - self.evidence.explained();
+        // A search of the whole map finds a pose at which a part fits, in the map of another room, too.
+        if self.candidate.cause == Cause::StartPose
+            && self.evidence.explained_of_all() < LEAST_EXPLAINED
+        {
+            return false;
+        }
         let permitted = match self.candidate.cause {
             Cause::Moved => LOST,
             // The share of few compared echoes means little.
@@ -443,5 +459,25 @@ fn before(end: Pose, moved: Pose) -> Pose {
         x: end.x - cos * moved.x + sin * moved.y,
         y: end.y - sin * moved.x - cos * moved.y,
         heading,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is left of ranges that look random, with a cause that makes them so probable.
+    fn left(total: f64) -> Vec<&'static str> {
+        let finding = |cause| Finding::new(cause, String::new(), String::new());
+        let mut findings = vec![finding(RANGE_NOISE)];
+        let causes = Named { findings: vec![finding("encoder_mirrored")], value: 50.0, total };
+        add(causes, &mut findings);
+        findings.iter().map(|it| it.cause).collect()
+    }
+
+    #[test]
+    fn ranges_that_a_cause_makes_probable_are_not_random() {
+        assert_eq!(left(20.0), ["encoder_mirrored"]);
+        assert_eq!(left(-20.0), [RANGE_NOISE, "encoder_mirrored"]);
     }
 }

@@ -6,7 +6,7 @@ use sonarfix::map::Wall;
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_sim::trace::Pose;
 
-use crate::diagnosis::change::Change;
+use crate::diagnosis::change::{Change, Start};
 use crate::diagnosis::walls::{self, WallChange};
 
 /// What may be wrong.
@@ -358,7 +358,7 @@ fn unusual(value: f64, deviation: f64) -> f64 {
 
 /// A start elsewhere.
 pub fn start_at(pose: Pose) -> Candidate {
-    let change = Change { start: Some(pose), ..Change::default() };
+    let change = Change { start: Some(Start { pose, is_found: true }), ..Change::default() };
     Candidate { cause: Cause::StartPose, change, value: 0.0 }
 }
 
@@ -369,6 +369,8 @@ pub fn start_unit(pose: Pose) -> Option<Candidate> {
     (pose.heading.abs() > TAU).then_some(candidate)
 }
 
+/// A ruler measures a track width better than this, whatever prior the robot file states.
+const MEASURED: f64 = 0.15;
 /// A start farther from the origin may be in another unit than metres.
 const FAR: f64 = 10.0;
 /// A start that is moved and turned less is the same, metres and radians.
@@ -377,7 +379,8 @@ const ELSEWHERE: f64 = 0.15;
 /// The position of the start in another unit, and with exchanged axes.
 pub fn start_positions(pose: Pose) -> impl Iterator<Item = Candidate> {
     let at = move |cause, value, x, y| {
-        let change = Change { start: Some(Pose { x, y, ..pose }), ..Change::default() };
+        let start = Some(Start { pose: Pose { x, y, ..pose }, is_found: false });
+        let change = Change { start, ..Change::default() };
         Candidate { cause, change, value }
     };
     let exchanged = at(Cause::StartAxes, 0.0, pose.y, pose.x);
@@ -421,8 +424,8 @@ fn poses_around(candidate: &Candidate, fineness: i32) -> Option<Vec<Candidate>> 
     };
     match (candidate.change.moved, candidate.change.start) {
         (Some((time, pose)), _) => Some(around(pose).map(|pose| moved_to(time, pose)).collect()),
-        (None, Some(pose)) if candidate.cause == Cause::StartPose => {
-            Some(around(pose).map(start_at).collect())
+        (None, Some(start)) if candidate.cause == Cause::StartPose => {
+            Some(around(start.pose).map(start_at).collect())
         }
         _ => None,
     }
@@ -434,7 +437,7 @@ pub fn moves_around(time: f64, pose: Pose) -> impl Iterator<Item = Candidate> {
     let at = move |turn: f64| Pose { heading: pose.heading + turn.to_radians(), ..pose };
     let turned = TURNS.into_iter().skip(1).map(at);
     let all = TURNS.into_iter().flat_map(move |turn| starts_around(at(turn)));
-    let moved = all.filter_map(|it| it.change.start);
+    let moved = all.filter_map(|it| it.change.start).map(|start| start.pose);
     turned.chain(moved).map(move |pose| moved_to(time, pose))
 }
 
@@ -448,11 +451,6 @@ impl Candidate {
     /// Whether its value is one of many.
     pub fn is_varied(&self) -> bool {
         VARIED.iter().any(|varied| varied.cause == self.cause)
-    }
-
-    /// Whether it has numbers that were fitted to the log.
-    pub fn is_fitted(&self) -> bool {
-        self.cause == Cause::WallShifted || self.is_varied()
     }
 
     /// Causes of one kind have similar effects, which many drives do not tell apart.
@@ -477,6 +475,7 @@ impl Candidate {
     /// Whether its start differs from that of the log, or it has none.
     pub fn is_elsewhere(&self, start: Option<Pose>) -> bool {
         let (Some(to), Some(from)) = (self.change.start, start) else { return true };
+        let to = to.pose;
         let turn = sonarfix_sim::angle::wrap(to.heading - from.heading).abs();
         (to.x - from.x).hypot(to.y - from.y) > ELSEWHERE || turn > ELSEWHERE
     }
@@ -495,20 +494,21 @@ impl Candidate {
     pub fn cost(&self) -> f64 {
         match self.cause {
             Cause::TravelUnit | Cause::WallShifted => 10.0,
-            Cause::WallRemoved | Cause::WallAdded | Cause::StartAxes => 12.0,
+            Cause::WallRemoved | Cause::WallAdded | Cause::StartAxes | Cause::RangeClock => 12.0,
             Cause::StartPose => 15.0,
             Cause::Moved => 25.0,
             Cause::RangeUnit => 3.0,
             Cause::WheelsSwapped if self.change.wheels.iter().any(|by| *by < 0.0) => 4.0,
             // A robot that hardly moves, by its log, can follow any ranges.
             Cause::RightTravel | Cause::LeftTravel | Cause::Travel => {
-                5.0 + 40.0 * self.value.ln().abs()
+                let slower = (-self.value.ln()).max(0.0);
+                5.0 + 40.0 * self.value.ln().abs() + 40.0 * slower.powi(2)
             }
             Cause::TrackWidth => 5.0 + 20.0 * self.value.ln().abs(),
             Cause::RangeScale => 5.0 + unusual(self.value.ln(), 0.15),
-            Cause::RangeOffset | Cause::MountAhead | Cause::MountLeft => {
-                5.0 + unusual(self.value, 0.1)
-            }
+            // A mount that was measured wrongly is more frequent than a ranger with an offset.
+            Cause::MountAhead | Cause::MountLeft => 3.5 + unusual(self.value, 0.1),
+            Cause::RangeOffset => 6.5 + unusual(self.value, 0.1),
             _ if self.is_varied() => 5.0,
             _ => 1.0,
         }
@@ -523,7 +523,10 @@ impl Candidate {
             Cause::LeftTravel | Cause::Travel => {
                 (self.value - 1.0, 3.0 * f64::from(prior.scale_left))
             }
-            Cause::TrackWidth => (self.value - 1.0, 3.0 * f64::from(prior.track_width.0) / width),
+            Cause::TrackWidth => {
+                let prior = 3.0 * f64::from(prior.track_width.0) / width;
+                (self.value - 1.0, prior.min(MEASURED))
+            }
             Cause::BearingOffset | Cause::StartHeading => (self.value, 6.0),
             Cause::BearingScale => (self.value - 1.0, 0.08),
             Cause::RangeScale | Cause::MapScale | Cause::MapScaleX | Cause::MapScaleY => {

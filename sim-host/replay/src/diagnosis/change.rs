@@ -12,8 +12,17 @@ use crate::log::Record;
 use crate::wheels;
 
 /// Deviations of a start that the search has found: metres, radians.
-const FOUND_POSITION: f64 = 0.1;
-const FOUND_HEADING: f64 = 0.1;
+const FOUND: [f64; 2] = [0.1, 0.1];
+/// A smaller factor of the travel is another unit.
+const LEAST_TRAVEL: f64 = 0.1;
+
+/// Another start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Start {
+    pub pose: Pose,
+    /// Whether the search has found it; otherwise it is as accurate as the log says.
+    pub is_found: bool,
+}
 
 /// A change; by default none. Factors multiply what the robot file, the map or the log states.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,7 +50,7 @@ pub struct Change {
     /// Added to the mount of each ranger, metres ahead and to the left.
     pub mount: [f64; 2],
     /// The start, if it is another.
-    pub start: Option<Pose>,
+    pub start: Option<Start>,
     /// The time at which the robot was carried to another pose, and that pose.
     pub moved: Option<(f64, Pose)>,
     /// Of the start's heading.
@@ -88,6 +97,19 @@ impl Change {
         let mut changed = *robot;
         let width = &mut changed.localizer.drive.track_width;
         *width = single(f64::from(width.0) * self.track_width, Metres);
+        // A wheel that is slower than its counts is no more accurate than they are.
+        let by = 0.5 * self.wheels.iter().map(|by| by.abs()).sum::<f64>();
+        if (LEAST_TRAVEL..1.0).contains(&by) {
+            let drive = &mut changed.localizer.drive;
+            let noises = [
+                &mut drive.wheel_noise.0.0,
+                &mut drive.scale_walk.0,
+                &mut drive.track_width_walk.0.0,
+            ];
+            for noise in noises {
+                *noise = single(f64::from(*noise) / by.sqrt(), |noise| noise);
+            }
+        }
         let [ahead, left] = self.mount;
         for ranger in changed.localizer.rangers.iter_mut() {
             let Point { x, y } = ranger.mount;
@@ -127,7 +149,7 @@ impl Change {
         }
         if let Some((time, pose)) = self.moved {
             let at = records.iter().position(|record| record.time() >= time);
-            let (position_deviation, heading_deviation) = (FOUND_POSITION, FOUND_HEADING);
+            let [position_deviation, heading_deviation] = FOUND;
             let moved = Record::Pose { time, pose, position_deviation, heading_deviation };
             records.insert(at.unwrap_or(records.len()), moved);
         }
@@ -189,21 +211,17 @@ impl Change {
             }
             Record::Skip { time } => Record::Skip { time: self.range_time(time, begin) },
             Record::Start { time, pose, position_deviation, heading_deviation } => {
-                let (pose, is_known) = self.pose(pose);
-                let [position_deviation, heading_deviation] = if is_known {
-                    [position_deviation, heading_deviation]
-                } else {
-                    [FOUND_POSITION, FOUND_HEADING]
-                };
+                let pose = self.pose(pose);
+                let stated = [position_deviation, heading_deviation];
+                let [position_deviation, heading_deviation] = self.found().unwrap_or(stated);
                 Record::Start { time, pose, position_deviation, heading_deviation }
             }
             Record::Resume { time, mut state, mut deviation } => {
                 let [x, y, heading, ..] = state;
-                let (pose, is_known) = self.pose(Pose { x, y, heading });
+                let pose = self.pose(Pose { x, y, heading });
                 state[..3].copy_from_slice(&[pose.x, pose.y, pose.heading]);
-                if !is_known {
-                    let found = [FOUND_POSITION, FOUND_POSITION, FOUND_HEADING];
-                    deviation[..3].copy_from_slice(&found);
+                if let Some([position, heading]) = self.found() {
+                    deviation[..3].copy_from_slice(&[position, position, heading]);
                 }
                 Record::Resume { time, state, deviation }
             }
@@ -220,10 +238,15 @@ impl Change {
         Record::Wheels { time, right: by_right * right, left: by_left * left }
     }
 
-    /// The start, and whether it is as accurate as the log says.
-    fn pose(&self, pose: Pose) -> (Pose, bool) {
+    /// The start.
+    fn pose(&self, pose: Pose) -> Pose {
         let heading = self.heading * pose.heading + self.heading_offset;
-        self.start.map_or((Pose { heading, ..pose }, true), |start| (start, false))
+        self.start.map_or(Pose { heading, ..pose }, |start| start.pose)
+    }
+
+    /// The deviations of a start that the search has found.
+    fn found(&self) -> Option<[f64; 2]> {
+        self.start.filter(|start| start.is_found).map(|_| FOUND)
     }
 }
 

@@ -16,6 +16,8 @@ const FOREIGN: f64 = 0.1;
 /// The least variance of an innovation, m²: 2 cm. A wall of a map is not known better, and a narrower density would reward
 /// a sure filter, not a right one.
 const LEAST_VARIANCE: f64 = 4e-4;
+/// Deviations of the innovations, compared with those that the localizer expects. The most probable one is taken.
+const ACCURACIES: [f64; 9] = [1.25, 1.0, 0.82, 0.67, 0.55, 0.45, 0.37, 0.3, 0.25];
 /// An echo that is e times as probable as by chance is explained.
 const EXPLAINED: f64 = 1.0;
 
@@ -45,6 +47,8 @@ pub struct Echo {
     /// Seconds since the start.
     pub time: f64,
     pub weight: f64,
+    /// The same of the range in the log, at each of the [`ACCURACIES`].
+    weights: [f64; ACCURACIES.len()],
     /// Whether a wall was expected, so that the range could be compared.
     pub is_compared: bool,
     /// The last estimate before it; `None` before the first encoder record.
@@ -63,6 +67,8 @@ pub struct Evidence {
     ticks: u64,
     /// Of the ranger, metres.
     max_range: f64,
+    /// By which the ranges of the log were multiplied.
+    range_factor: f64,
     /// The last estimate, and whether its verdict is not `Lost`.
     pose: Option<Pose>,
     is_sure: bool,
@@ -86,7 +92,14 @@ impl Evidence {
     pub fn none(records: &[Record]) -> Self {
         let echo = |record: &Record| match record {
             Record::Range { time, range: Some(_), .. } => {
-                Some(Echo { time: *time, weight: FOREIGN.ln(), is_compared: true, pose: None })
+                let weight = FOREIGN.ln();
+                Some(Echo {
+                    time: *time,
+                    weight,
+                    weights: [weight; ACCURACIES.len()],
+                    is_compared: true,
+                    pose: None,
+                })
             }
             _ => None,
         };
@@ -94,11 +107,12 @@ impl Evidence {
         Self { recorded: echoes.len(), echoes, ..Self::default() }
     }
 
-    /// Replays records. `None` if they hold no start, or the localizer rejects it.
+    /// Replays records, whose ranges are those of the log times a factor. `None` if they hold no start, or the localizer rejects it.
     pub fn of(
         robot: &RobotConfig,
         walls: &[Wall],
         records: impl Iterator<Item = Record>,
+        range_factor: f64,
     ) -> Option<Self> {
         // A search would find the pose again, and hide what is wrong.
         let robot = RobotConfig { start: StartPose::Known, ..*robot };
@@ -107,7 +121,7 @@ impl Evidence {
         let prior = [prior.scale_right, prior.scale_left, prior.track_width.0, prior.range_scale];
         let prior = prior.map(f64::from);
         let track_width = robot.localizer.drive.track_width.0.into();
-        let mut evidence = Self { max_range, prior, track_width, ..Self::default() };
+        let mut evidence = Self { max_range, range_factor, prior, track_width, ..Self::default() };
         let (mut too_fast, mut recorded) = (0, 0);
         let mut session =
             Session::<std::io::BufReader<Empty>, _>::new(&robot, walls, None, &mut evidence);
@@ -144,7 +158,11 @@ impl Evidence {
     pub fn total(&self) -> f64 {
         #[expect(clippy::cast_precision_loss, reason = "numbers of echoes")]
         let untaken = (self.count() - self.echoes.len()) as f64;
-        let echoes = self.echoes.iter().map(|echo| echo.weight).sum::<f64>();
+        let total = |accuracy: usize| {
+            let weights = self.echoes.iter().filter_map(|echo| echo.weights.get(accuracy));
+            weights.sum::<f64>()
+        };
+        let echoes = (0..ACCURACIES.len()).map(total).fold(f64::NEG_INFINITY, f64::max);
         let prior = -0.5 * self.strains().map(|strain| strain * strain).sum::<f64>();
         echoes + untaken * FOREIGN.ln() + prior
     }
@@ -236,21 +254,88 @@ impl Recorder for Evidence {
 
     fn fix(&mut self, make: impl FnOnce() -> FixRecord) {
         let record = make();
-        if record.range.is_none() {
-            return;
-        }
-        let density = match (record.innovation, record.innovation_variance) {
+        let Some(range) = record.range else { return };
+        let innovation = match (record.innovation, record.innovation_variance) {
             (Some(innovation), Some(variance)) if variance < self.most_variance() => {
-                let variance = variance.max(LEAST_VARIANCE);
-                let exponent = -0.5 * innovation * innovation / variance;
-                exponent.exp() / (std::f64::consts::TAU * variance).sqrt()
+                Some((innovation, variance.max(LEAST_VARIANCE)))
             }
-            _ => 0.0,
+            _ => None,
         };
-        let weight = (FOREIGN + (1.0 - FOREIGN) * density * self.max_range).ln();
-        // A localizer that has lost the pose follows any range.
-        let weight = if self.is_sure { weight } else { weight.min(0.0) };
+        let weight = |accuracy: f64, width: f64| {
+            let density = innovation.map_or(0.0, |(innovation, variance)| {
+                density(innovation, accuracy * accuracy * variance)
+            });
+            let weight = (FOREIGN + (1.0 - FOREIGN) * density * width).ln();
+            // A localizer that has lost the pose follows any range.
+            if self.is_sure { weight } else { weight.min(0.0) }
+        };
+        // The likelihood is that of the range in the log, whose errors are those of the changed range divided by the factor; those
+        // of the pose and the map, about half of them, are not. Longer ranges are no evidence. A number beyond the longest range
+        // is no range in metres, which nothing else explains.
+        let is_in_range = range <= self.range_factor * self.max_range;
+        let factor = if is_in_range { self.range_factor.sqrt().min(1.0) } else { 1.0 };
+        let weights = ACCURACIES.map(|accuracy| weight(accuracy, factor * self.max_range));
+        let weight = weight(1.0, self.max_range);
         let is_compared = record.innovation.is_some();
-        self.echoes.push(Echo { time: record.time, weight, is_compared, pose: self.pose });
+        self.echoes.push(Echo { time: record.time, weight, weights, is_compared, pose: self.pose });
+    }
+}
+
+/// The density of a normal distribution.
+fn density(value: f64, variance: f64) -> f64 {
+    (-0.5 * value * value / variance).exp() / (std::f64::consts::TAU * variance).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use sonarfix_sim::trace::Outcome;
+
+    use super::*;
+
+    /// A hundred echoes with innovations of one size, metres, of ranges that were multiplied by a factor.
+    fn evidence(innovation: f64, range_factor: f64) -> Evidence {
+        let new = Evidence { max_range: 2.5, range_factor, is_sure: true, ..Evidence::default() };
+        (0_u8..100).fold(new, |mut evidence, ping| {
+            let sign = if ping % 2 == 0 { 1.0 } else { -1.0 };
+            evidence.fix(|| FixRecord {
+                time: f64::from(ping),
+                wall: None,
+                ranger: 0,
+                sonar: [0.0; 2],
+                direction: 0.0,
+                bearing: 0.0,
+                range: Some(0.8),
+                source: None,
+                why: None,
+                outcome: Outcome::Accepted,
+                association: None,
+                reason: String::new(),
+                innovation: Some(sign * innovation),
+                innovation_variance: Some(LEAST_VARIANCE),
+            });
+            evidence
+        })
+    }
+
+    #[test]
+    fn a_factor_that_shortens_ranges_must_explain_them_better() {
+        let (as_is, halved) = (evidence(0.01, 1.0), evidence(0.01, 0.5));
+        assert!(halved.gain(&as_is) < -20.0, "{}", halved.gain(&as_is));
+        // Twice the length is no evidence, neither for nor against it.
+        assert!(evidence(0.01, 2.0).gain(&as_is).abs() < 1e-9);
+        assert!((halved.explained() - as_is.explained()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn numbers_beyond_the_longest_range_are_no_ranges_in_metres() {
+        let centimetres = evidence(0.01, 0.01);
+        assert!(centimetres.gain(&evidence(0.01, 1.0)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn accurate_ranges_show_mistakes_that_are_smaller_than_their_noise() {
+        // Both are within one deviation of the robot file.
+        let gain = evidence(0.005, 1.0).gain(&evidence(0.015, 1.0));
+        assert!(gain > 60.0, "{gain}");
     }
 }

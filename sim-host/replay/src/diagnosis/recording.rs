@@ -26,6 +26,8 @@ pub struct Entry {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Skipped {
     pub lines: u64,
+    /// Those whose range is a number that programs write instead of no echo.
+    pub placeholders: u64,
     /// The first of them, and what is wrong with it.
     pub first: Option<(u64, Malformed)>,
 }
@@ -33,6 +35,7 @@ pub struct Skipped {
 impl Skipped {
     fn add(&mut self, line: u64, malformed: Malformed) {
         self.lines += 1;
+        self.placeholders += u64::from(is_placeholder(&malformed));
         // A checksum of other lines is the mark of an edited log: what was edited says more.
         let is_better = |(_, first): &(u64, Malformed)| {
             *first == Malformed::Changed && malformed != Malformed::Changed
@@ -41,6 +44,12 @@ impl Skipped {
             self.first = Some((line, malformed));
         }
     }
+}
+
+/// Whether a range is a number that programs write instead of no echo.
+fn is_placeholder(malformed: &Malformed) -> bool {
+    let Malformed::Field { field: "range", text, .. } = malformed else { return false };
+    text.trim().parse().is_ok_and(|value: f64| [0.0, -1.0].contains(&value))
 }
 
 /// What is read of a log.
@@ -141,4 +150,25 @@ fn way(entries: &[Entry]) -> Vec<f64> {
         way
     };
     entries.iter().map(add).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_torn_line_that_ends_in_a_zero_is_no_number_instead_of_an_echo() {
+        let mut skipped = Skipped::default();
+        let range = |text: &str| Malformed::Field {
+            field: "range",
+            text: text.to_owned(),
+            rule: "a positive number",
+        };
+        skipped.add(2, range("0."));
+        skipped.add(3, Malformed::Missing("time"));
+        skipped.add(4, Malformed::UnknownKind("ran".to_owned()));
+        assert_eq!((skipped.placeholders, skipped.lines), (1, 3));
+        skipped.add(5, range("-1"));
+        assert_eq!(skipped.placeholders, 2);
+    }
 }

@@ -219,7 +219,7 @@ fn place(candidate: &Candidate, walls: &[Wall]) -> Words {
             "exchange them in the start record".to_owned(),
         ),
         Cause::StartPose => {
-            let start = candidate.change.start.unwrap_or_default();
+            let start = candidate.change.start.map(|start| start.pose).unwrap_or_default();
             (
                 "start_pose",
                 "the robot starts elsewhere than the start record says".to_owned(),
