@@ -15,7 +15,7 @@ const TRACES: [(&str, &str); 6] = [
         "gyro",
         "crates/sonarfix-map/scenarios/classroom.toml --gyro mpu6050 --heading-slips 10 --absolute heading --seconds 30",
     ),
-    ("absolute", "tests/golden/absolute.toml --seconds 40"),
+    ("absolute", "tests/golden/absolute.toml --seconds 50"),
     (
         "light",
         "crates/sonarfix-map/scenarios/classroom.toml --sensor vl53l1x --seed 31 --seconds 30",

@@ -34,7 +34,7 @@ use sonarfix::health::DEGRADED_WITHOUT_ODOMETRY;
 use sonarfix::localizer::{Localizer, Mode};
 use sonarfix::map::{Map, MapError};
 use sonarfix_hal::config::{RobotConfig, Unsupported};
-use sonarfix_hal::robot::{EVALUATIONS_PER_MILLISECOND, Faults, Hardware, Report, Settings};
+use sonarfix_hal::robot::{EVALUATIONS_PER_MILLISECOND, Faults, Hardware, PACE, Report, Settings};
 use sonarfix_link::baked::BakedError;
 use sonarfix_link::message::{self, Hello, LoopStatus, ResetCause};
 use sonarfix_link::{Frame, SessionCommand, Telemetry};
@@ -155,8 +155,8 @@ impl<'m, F: NorFlash> App<'m, F> {
         }
     }
 
-    /// Handles what is due at `now`: at most one command, one poll of the loop, and telemetry. It never waits, except
-    /// for the flash when a record is written.
+    /// Handles what is due at `now`: at most one command and one poll of the loop, or the telemetry of the last poll, so that none takes as
+    /// long as all of them. It never waits, except for the flash when a record is written.
     ///
     /// A `now` that leaps ahead or back is counted as a fault of the clock and has no other effect, unless the next poll
     /// confirms it: then the loop continues at the new time. The motors are off while each poll has another time.
@@ -179,6 +179,16 @@ impl<'m, F: NorFlash> App<'m, F> {
             Reading::SetBack => {
                 hardware.set_clock(now);
                 self.set_clock(now);
+            }
+        }
+        if let State::Running(running) = &mut self.state
+            && running.is_unsent
+        {
+            running.send(&self.search, &mut self.wire, link);
+            // An executor that polls less often than asked for must not lose every second poll.
+            if since(now, self.time) <= PACE {
+                self.time = now;
+                return self.at_rest;
             }
         }
         let frame = self.wire.next(link);
@@ -253,7 +263,7 @@ impl<'m, F: NorFlash> App<'m, F> {
                 self.expected = check.next_poll(now, poll.hardware);
             }
             State::Running(running) => {
-                if running.poll(poll, &mut self.search, &mut self.wire) {
+                if running.poll(poll, &mut self.search) {
                     running.wrote(now);
                     self.owes_record = true;
                 }
@@ -310,7 +320,7 @@ impl<'m, F: NorFlash> App<'m, F> {
     ///
     /// Polls at other times do nothing, so that the results do not depend on them.
     pub fn next_poll(&self, hardware: &mut impl Hardware) -> Instant {
-        if self.wire.is_unread() {
+        if self.is_unsent() || self.wire.is_unread() {
             return self.time;
         }
         let next = match &self.state {
@@ -320,10 +330,16 @@ impl<'m, F: NorFlash> App<'m, F> {
         next.min(self.rests_until)
     }
 
+    /// Whether the next poll has to send the telemetry of the last one.
+    fn is_unsent(&self) -> bool {
+        matches!(&self.state, State::Running(running) if running.is_unsent)
+    }
+
     /// As [`Self::next_poll`], but `None` while a ping is in flight ([`Robot::idle_until`](sonarfix_hal::robot::Robot::idle_until)): for a simulator.
     pub fn idle_until(&self, hardware: &mut impl Hardware) -> Option<Instant> {
         match &self.state {
             State::Waiting(_) => Some(self.next_poll(hardware)),
+            State::Running(_) if self.is_unsent() => Some(self.time),
             State::Running(running) => {
                 running.robot.idle_until(hardware).map(|until| until.min(self.rests_until))
             }

@@ -309,8 +309,8 @@ impl<'m> Robot<'m> {
         Ok(())
     }
 
-    /// Handles what is due at `now`: the end of one ping, or one tick, or a slice of the choice of a wall, or the start of one
-    /// ping. It never waits. Of several that are due, the next poll handles the next one, so that no poll takes as long
+    /// Handles what is due at `now`: one measurement from outside, or the end of one ping, or one tick, or a slice of the choice of a
+    /// wall, or the start of one ping. It never waits. Of several that are due, the next poll handles the next one, so that no poll takes as long
     /// as all of them.
     ///
     /// A `now` before that of an earlier call is counted as a fault and has no other effect.
@@ -354,12 +354,14 @@ impl<'m> Robot<'m> {
         if let Some(yaw) = &mut self.yaw {
             yaw.sample(poll);
         }
-        // What has arrived since the last step, before there is another one.
-        report.absolute = [self.take_absolute(), self.take_absolute()];
-        self.finish_ping(poll, report);
-        self.sample_encoders(poll, report);
-        self.choose_bearing(poll, report);
-        self.start_ping(poll, report);
+        // What was made in the last step, before there is another one.
+        report.absolute = self.take_absolute();
+        if report.absolute.is_none() {
+            self.finish_ping(poll, report);
+            self.sample_encoders(poll, report);
+            self.choose_bearing(poll, report);
+            self.start_ping(poll, report);
+        }
         report.faults = poll.faults;
         if let Some(search) = poll.search.as_deref_mut() {
             self.work_on(search, report);

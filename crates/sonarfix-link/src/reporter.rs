@@ -66,7 +66,7 @@ impl Reporter {
 
     /// Passes the messages of one poll of the loop to `outlet`. `localizer` is that of the loop, after the poll.
     pub fn report(&mut self, report: &Report, localizer: &Localizer, outlet: &mut impl Outlet) {
-        for result in report.absolute.iter().flatten() {
+        if let Some(result) = &report.absolute {
             outlet.send_built(|| Telemetry::Absolute(*result));
         }
         if let Some(heard) = &report.ping_result {
@@ -104,11 +104,8 @@ impl Reporter {
         self.last.at
     }
 
-    /// The travel of a step, after the gyro at its end and what was measured from outside during it.
+    /// The travel of a step, after the gyro at its end.
     fn odometry(&mut self, step: Option<&robot::Step>, outlet: &mut impl Outlet) {
-        if let Some(result) = step.and_then(|step| step.absolute.as_ref()) {
-            outlet.send_built(|| Telemetry::Absolute(*result));
-        }
         // Travel that was not taken has changed nothing; it is repeated, or counted as a fault.
         if let Some(step) = step.filter(|step| step.result == StepResult::Accepted) {
             self.last = Odometry {

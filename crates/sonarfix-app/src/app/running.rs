@@ -28,6 +28,8 @@ pub(super) struct Running<'m> {
     pub report: Report,
     /// Whether it is known to be empty.
     pub is_report_empty: bool,
+    /// Whether its telemetry is to be sent.
+    pub is_unsent: bool,
 }
 
 impl<'m> Running<'m> {
@@ -35,21 +37,29 @@ impl<'m> Running<'m> {
     #[inline]
     pub fn rest(&mut self, now: Instant, hardware: &mut impl Hardware) -> bool {
         let rests = self.robot.rest(now, hardware);
-        if rests && !self.is_report_empty {
-            (self.report, self.is_report_empty) = (Report::default(), true);
+        if rests {
+            self.clear_report();
         }
         rests
     }
 
-    /// Polls the loop and sends its telemetry; returns whether a record is due.
+    /// Empties the report, in a poll in which the loop does nothing.
+    #[inline]
+    pub fn clear_report(&mut self) {
+        if !self.is_report_empty {
+            (self.report, self.is_report_empty) = (Report::default(), true);
+        }
+    }
+
+    /// Polls the loop; returns whether a record is due. The next poll sends the telemetry of one that has worked, so that none takes as
+    /// long as both.
     #[inline(never)]
     pub fn poll(
         &mut self,
         poll: &mut Poll<impl Hardware, impl Link>,
         search: &mut PoseSearch<'m>,
-        wire: &mut Wire,
     ) -> bool {
-        let Poll { now, hardware, link, polled } = poll;
+        let Poll { now, hardware, polled, .. } = poll;
         let now = *now;
         if self.rest(now, *hardware) {
             return false;
@@ -61,11 +71,8 @@ impl<'m> Running<'m> {
         let localizer = self.robot.localizer();
         let verdict = localizer.health().verdict;
         polled.verdict = (verdict != before).then_some(verdict);
-        self.reporter.report(report, localizer, &mut wire.outlet(*link));
+        self.is_unsent = report.has_worked() && !report.is_choosing;
         let mode = self.robot.mode();
-        if report.tick.is_some() && mode != Mode::Tracking {
-            search.report(mode, &mut self.reporter, &mut wire.outlet(*link));
-        }
         if has_rolled(report) {
             self.save_policy.rolled(now);
             self.has_rolled = true;
@@ -74,6 +81,19 @@ impl<'m> Running<'m> {
         let is_tracking = mode == Mode::Tracking;
         polled.is_on_time = report.tick.is_some() && report.faults.deadlines == 0;
         report.tick.is_some() && is_tracking && self.save_policy.is_due(now, localizer)
+    }
+
+    /// Sends the telemetry of the last poll, whose report is empty afterwards.
+    #[inline(never)]
+    pub fn send(&mut self, search: &PoseSearch<'m>, wire: &mut Wire, link: &mut impl Link) {
+        let report = &self.report;
+        self.reporter.report(report, self.robot.localizer(), &mut wire.outlet(link));
+        let mode = self.robot.mode();
+        if report.tick.is_some() && mode != Mode::Tracking {
+            search.report(mode, &mut self.reporter, &mut wire.outlet(link));
+        }
+        self.clear_report();
+        self.is_unsent = false;
     }
 
     /// Notes that a record of the present state is written.

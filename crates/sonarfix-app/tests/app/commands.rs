@@ -45,7 +45,8 @@ fn it_starts_only_on_command_and_with_map_configuration_and_pose() {
     assert_eq!(bench.order(&Command::SetPose(start())), DONE);
     assert!(!bench.poll().is_running);
     assert_eq!(bench.order(&Command::Start), DONE);
-    let messages = bench.wait(3_000);
+    // The estimate of a tick is sent by the next poll.
+    let messages = bench.wait(3_001);
     let ticks = messages.iter().filter(|message| matches!(message, Telemetry::Estimate(_))).count();
     // The simulated sonar answers at once, so it delays no tick.
     assert_eq!(ticks, 30);

@@ -25,9 +25,8 @@ pub struct Report {
     /// A ping was started, at the bearing of the servo, which differs from that of the choice by the
     /// resolution of the PWM.
     pub pinged: Option<Aim>,
-    /// Heading and position from outside that were passed to the localizer before everything else, because they were made in
-    /// its last step. Those of the steps of this poll are in [`Step::absolute`].
-    pub absolute: [Option<AbsoluteResult>; 2],
+    /// A heading, position or pose from outside, made in the last step of the localizer, which was passed to it.
+    pub absolute: Option<AbsoluteResult>,
     /// The new mode, if it has changed.
     pub mode: Option<Mode>,
     /// The faults of this poll.
@@ -41,8 +40,7 @@ impl Report {
             self;
         (*ping_result, *swept, *tick) = (None, None, None);
         (*is_choosing, *aimed, *pinged, *mode) = (false, None, None, None);
-        let [first, second] = absolute;
-        (*first, *second) = (None, None);
+        *absolute = None;
         *faults = Faults::default();
     }
 
@@ -61,16 +59,7 @@ impl Report {
             || self.tick.is_some()
             || self.aimed.is_some()
             || self.mode.is_some()
-            || self.absolute != [None; 2]
-    }
-
-    /// The headings and positions from outside that were passed to the localizer, in this order.
-    pub fn absolutes(&self) -> impl Iterator<Item = &AbsoluteResult> {
-        let pinged = self.ping_result.as_ref().and_then(|result| result.step.as_ref());
-        let swept = self.swept.as_ref().and_then(SweepResult::step);
-        let ticked = self.tick.as_ref().and_then(|tick| tick.step.as_ref());
-        let steps = [pinged, swept, ticked].into_iter().flatten();
-        self.absolute.iter().flatten().chain(steps.filter_map(|step| step.absolute.as_ref()))
+            || self.absolute.is_some()
     }
 
     /// Whether a ping has ended.

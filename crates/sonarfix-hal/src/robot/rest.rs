@@ -47,6 +47,9 @@ impl Robot<'_> {
 
     /// The next instant at which a poll has something to do besides a ping in flight.
     pub(super) fn next_deadline(&self, hardware: &mut impl Hardware) -> Instant {
+        if self.waiting.is_due(self.localizer().time()) {
+            return AT_ONCE;
+        }
         let next = match self.cycle {
             // Ticks are delayed until it has ended.
             Cycle::Listening { .. } => NEVER,

@@ -5,8 +5,6 @@ use sonarfix::geometry::units::Instant;
 use sonarfix::localizer::OdometryError;
 use sonarfix::sensor::gyro::TurnReading;
 
-use super::AbsoluteResult;
-
 /// Travel of both wheels, passed to the localizer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -19,8 +17,6 @@ pub struct Step {
     pub turn: Option<TurnReading>,
     /// The localizer's response.
     pub result: StepResult,
-    /// A heading or position from outside that was made during the travel, passed to the localizer after it.
-    pub absolute: Option<AbsoluteResult>,
 }
 
 /// The localizer's response to a step. No encoder edge is lost without a report: the travel of a step is

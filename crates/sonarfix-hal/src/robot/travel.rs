@@ -66,8 +66,7 @@ impl<'m> Robot<'m> {
             yaw.settle(reading);
         }
         poll.faults.travel += u32::from(matches!(result, StepResult::Discarded(_)));
-        let step = step.insert(Step { at, travel, turn: reading, result, absolute: None });
-        step.absolute = self.take_absolute();
+        *step = Some(Step { at, travel, turn: reading, result });
     }
 
     /// Whether the wheels can have travelled so far since the localizer's last step. Each of the two positions is

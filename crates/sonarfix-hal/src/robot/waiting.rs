@@ -49,6 +49,11 @@ impl Waiting {
         Ok(())
     }
 
+    /// Whether one was made up to `now`.
+    pub fn is_due(&self, now: Instant) -> bool {
+        [self.heading, self.position].into_iter().flatten().any(|(at, _)| at <= now)
+    }
+
     /// Takes one that was made up to `now`.
     pub fn take(&mut self, now: Instant) -> Option<Timed> {
         let is_due = |slot: &mut Timed| slot.0 <= now;

@@ -28,11 +28,10 @@ fn position(x: f32) -> AbsoluteMeasurement {
 }
 
 fn results(reports: &[(u64, Report)]) -> Vec<AbsoluteResult> {
-    reports.iter().flat_map(|(_, report)| report.absolutes().copied()).collect()
+    reports.iter().flat_map(|(_, report)| report.absolute).collect()
 }
 
-/// It is used with the step in which it was made, whether a tick or an echo ends that; of two, the second is used in the
-/// next poll.
+/// It is used after the step in which it was made, whether a tick or an echo ends that, one in a poll.
 #[test]
 fn a_measurement_waits_for_its_step() {
     let (walls, world) = (walls(), World::new(DRIVE, TICK, 0));

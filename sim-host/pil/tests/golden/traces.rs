@@ -72,7 +72,7 @@ fn the_trace_of_a_gyro_contains_a_slip_and_headings() {
     let (mut status, mut used) = (None, 0);
     execute("gyro.golden", |session| {
         status = session.localizer().and_then(Localizer::gyro);
-        used += session.report().absolutes().filter(|result| result.fix.is_used()).count();
+        used += session.report().absolute.iter().filter(|result| result.fix.is_used()).count();
     });
     let status = status.unwrap();
     assert!((1..10).contains(&status.slips) && status.conflicts == 0, "{status:?}");
@@ -90,7 +90,7 @@ fn this_computer_computes_the_bits_of_headings_and_poses() {
 fn the_trace_of_headings_and_poses_contains_each_outcome() {
     let mut counts = [0; 4];
     execute("absolute.golden", |session| {
-        for result in session.report().absolutes() {
+        if let Some(result) = &session.report().absolute {
             let at = match result.fix {
                 AbsoluteFix::Accepted(_) => 0,
                 AbsoluteFix::Downweighted(_) => 1,

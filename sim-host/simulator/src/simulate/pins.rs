@@ -358,7 +358,7 @@ impl<'a> SimulatedHardware<'a> {
         if report.tick.is_some() || report.ping_result.is_some() || report.swept.is_some() {
             self.score.arrive(self.plant.state());
         }
-        for result in report.absolutes() {
+        if let Some(result) = &report.absolute {
             self.score.absolute(result.measured_at, &result.measurement, &result.fix, recorder);
         }
         if let Some(heard) = &report.ping_result {
