@@ -181,15 +181,10 @@ impl<'m, F: NorFlash> App<'m, F> {
                 self.set_clock(now);
             }
         }
-        if let State::Running(running) = &mut self.state
-            && running.is_unsent
-        {
-            running.send(&self.search, &mut self.wire, link);
-            // An executor that polls less often than asked for must not lose every second poll.
-            if since(now, self.time) <= PACE {
-                self.time = now;
-                return self.at_rest;
-            }
+        // An executor that polls less often than asked for must not lose every second poll.
+        if self.send_telemetry(link) && since(now, self.time) <= PACE {
+            self.time = now;
+            return self.at_rest;
         }
         let frame = self.wire.next(link);
         if let State::Running(running) = &mut self.state
@@ -241,6 +236,17 @@ impl<'m, F: NorFlash> App<'m, F> {
         };
         self.rests_until = self.next_deadline(now);
         polled
+    }
+
+    /// Sends the telemetry of the last poll, if there is some; returns whether there was.
+    #[inline]
+    fn send_telemetry(&mut self, link: &mut impl Link) -> bool {
+        let State::Running(running) = &mut self.state else { return false };
+        let is_unsent = running.is_unsent;
+        if is_unsent {
+            running.send(&self.search, &mut self.wire, link);
+        }
+        is_unsent
     }
 
     /// Polls the loop, or the devices of a waiting robot.

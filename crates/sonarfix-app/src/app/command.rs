@@ -74,6 +74,8 @@ impl<'m, F: NorFlash> App<'m, F> {
         link: &mut impl Link,
         command: &Command,
     ) -> CommandResult {
+        // Before the command changes what it describes.
+        self.send_telemetry(link);
         let mut poll = Poll { now, hardware, link, polled: Polled::default() };
         let (result, began) = self.execute(&mut poll, command);
         if let Some(began) = began {

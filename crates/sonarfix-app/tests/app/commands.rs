@@ -1,7 +1,7 @@
 //! Effects of commands, also after a power cycle.
 
 use sonarfix::filter::ekf::StandardDeviations;
-use sonarfix::geometry::units::{Duration, Metres, MetresPerSecond, Radians};
+use sonarfix::geometry::units::{Duration, Instant, Metres, MetresPerSecond, Radians};
 use sonarfix::localizer::Start;
 use sonarfix::sensor::absolute::AbsoluteMeasurement;
 use sonarfix_hal::config::RobotConfig;
@@ -353,4 +353,29 @@ fn a_heading_is_taken_by_a_running_loop() {
     }
     assert_eq!(bench.order(&heading(here, 0)), DONE);
     assert_eq!(bench.order(&heading(here, 0)), refused(CommandError::Occupied));
+}
+
+/// What a poll did is reported before a command of the program around the application changes it.
+#[test]
+fn telemetry_of_a_poll_precedes_that_of_a_command_after_it() {
+    let baked = Baked::new(&config());
+    let mut bench = Bench::switched_on(&baked, SimFlash::new());
+    assert_eq!(bench.order(&Command::SetPose(start())), DONE);
+    assert_eq!(bench.order(&Command::Start), DONE);
+    bench.wait(1_000);
+    for command in [Command::SetPose(start()), Command::Stop] {
+        while bench.app.report().unwrap().tick.is_none() {
+            let _ = bench.poll();
+        }
+        bench.received();
+        let now = Instant::from_ticks(bench.now);
+        let Bench { app, hardware, line, .. } = &mut bench;
+        assert_eq!(app.command(now, hardware, line, &command), DONE);
+        let messages = bench.received();
+        let place = |is: fn(&Telemetry) -> bool| messages.iter().position(is);
+        let estimate = place(|it| matches!(it, Telemetry::Estimate(_)));
+        let pose_set = place(|it| matches!(it, Telemetry::PoseSet(_)));
+        assert!(estimate.is_some() && pose_set.is_none_or(|at| at > estimate.unwrap()));
+        assert_eq!(pose_set.is_some(), command != Command::Stop, "{messages:?}");
+    }
 }
