@@ -126,6 +126,8 @@ pub(super) struct Journal<F> {
     region: Range<u32>,
     /// `None` before the first search, after an error, and without a journal.
     view: Option<View>,
+    /// Whether a search has found that nothing was ever written.
+    is_new: bool,
 }
 
 impl<F: NorFlash> Journal<F> {
@@ -139,7 +141,7 @@ impl<F: NorFlash> Journal<F> {
             assert!(F::ERASE_SIZE >= SECTOR_MIN, "a sector is too short");
             assert!(HEADER as usize == HEAD + TAIL, "a header has no payload");
         }
-        let journal = Self { flash, region, view: None };
+        let journal = Self { flash, region, view: None, is_new: false };
         let Range { start, end } = journal.region;
         let size = Self::sector_size();
         let is_whole = start.is_multiple_of(size) && end.is_multiple_of(size);
@@ -242,7 +244,7 @@ impl<F: NorFlash> Journal<F> {
 
     /// Finds the active sector and its records, unless that has been done.
     fn search(&mut self) -> Result<(), StoreError> {
-        if self.view.is_some() {
+        if self.view.is_some() || self.is_new {
             return Ok(());
         }
         let mut active: Option<(u32, Entry)> = None;
@@ -254,7 +256,9 @@ impl<F: NorFlash> Journal<F> {
             }
         }
         let Some((sector, header)) = active else {
-            return if self.is_new()? { Ok(()) } else { Err(StoreError::Corrupt) };
+            // It takes long to read all of a flash: the first write does not do it again.
+            self.is_new = self.is_blank_but_for_a_header()?;
+            return if self.is_new { Ok(()) } else { Err(StoreError::Corrupt) };
         };
         let mut view = self.view_of(sector, &header)?;
         let next = self.next_sector(sector);
@@ -269,7 +273,7 @@ impl<F: NorFlash> Journal<F> {
     }
 
     /// Whether nothing was ever written, except perhaps a part of the first header.
-    fn is_new(&mut self) -> Result<bool, StoreError> {
+    fn is_blank_but_for_a_header(&mut self) -> Result<bool, StoreError> {
         let Range { start, end } = self.region;
         self.is_blank(start + HEADER..end)
     }
@@ -373,6 +377,7 @@ impl<F: NorFlash> Journal<F> {
     fn renew(&mut self) -> Result<(), StoreError> {
         // The view is invalid until the copy is complete: an error leads to another search.
         let old = self.view.take();
+        self.is_new = false;
         let (sector, sequence) = match old {
             Some(view) => (self.next_sector(view.sector), view.sequence.saturating_add(1)),
             None => (self.region.start, 1),

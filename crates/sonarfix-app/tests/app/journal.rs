@@ -1,12 +1,12 @@
 //! Sectors that are exactly full, partly new or followed by foreign bytes.
 
-use embedded_storage::nor_flash::ReadNorFlash;
+use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use sonarfix::filter::ekf::{StandardDeviations, StateEstimate};
 use sonarfix::map::image::checksum;
 use sonarfix_app::store::{Saved, Store};
 use sonarfix_link::baked;
 
-use crate::flash::{SECTOR, SECTORS, SimFlash};
+use crate::flash::{FlashError, SECTOR, SECTORS, SimFlash};
 
 /// Bytes of a record in flash, and of a sector's header.
 const RECORD: usize = 92;
@@ -122,4 +122,50 @@ fn a_payload_of_the_greatest_length_counts() {
         let expected = record(if counts { 8 } else { 7 });
         assert_eq!(store(flash).load(), Ok(Some(expected)), "{length}");
     }
+}
+
+/// A flash that counts the bytes that are read.
+struct Counting(SimFlash, usize);
+
+impl ErrorType for Counting {
+    type Error = FlashError;
+}
+
+impl ReadNorFlash for Counting {
+    const READ_SIZE: usize = SimFlash::READ_SIZE;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
+        self.1 += bytes.len();
+        self.0.read(offset, bytes)
+    }
+
+    fn capacity(&self) -> usize {
+        self.0.capacity()
+    }
+}
+
+impl NorFlash for Counting {
+    const WRITE_SIZE: usize = SimFlash::WRITE_SIZE;
+    const ERASE_SIZE: usize = SimFlash::ERASE_SIZE;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
+        self.0.erase(from, to)
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
+        self.0.write(offset, bytes)
+    }
+}
+
+/// All of a new flash is read once, at the start, and not again by the first record, which a command may write while the robot drives.
+#[test]
+fn the_first_record_does_not_read_all_of_a_new_flash() {
+    let flash = Counting(SimFlash::new(), 0);
+    let mut store = Store::new(flash, 0..(SECTOR * SECTORS) as u32).unwrap();
+    store.open().unwrap();
+    assert!(store.flash().1 >= SECTOR * SECTORS);
+    store.flash_mut().1 = 0;
+    store.save(&record(1)).unwrap();
+    assert!(store.flash().1 < 300, "{} bytes", store.flash().1);
+    assert_eq!(store.load(), Ok(Some(record(1))));
 }
