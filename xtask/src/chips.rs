@@ -44,8 +44,8 @@ const TABLES: [(&str, &str, &str); 4] = [
     (
         "Polls",
         "## The longest poll\n\nInstructions of the longest poll of each scenario, interrupts included: application with drivers and link, and\n\
-         inputs of the motor code. The search works between two polls, after the motor code. That of a robot that drives makes a slice of the choice of a wall, or takes a ping. *Waiting* is without motors: the poll after a reset reads the store, one that stores the first record in a\n\
-         new flash reads all of it, another one starts the loop. The functions of the boot ROM are not counted: erasures and writes of the\n\
+         inputs of the motor code. The search works between two polls, after the motor code. That of a robot that drives makes a slice of the choice of a wall, or takes a ping. *Waiting* is without motors: the poll after a reset reads the store, all of it if\n\
+         nothing was written, and another one starts the loop. The functions of the boot ROM are not counted: erasures and writes of the\n\
          flash have no instructions.",
         "| scenario | polls | driving | waiting |\n|---|---:|---:|---:|\n",
     ),
