@@ -28,7 +28,7 @@ fn position(x: f32) -> AbsoluteMeasurement {
 }
 
 fn results(reports: &[(u64, Report)]) -> Vec<AbsoluteResult> {
-    reports.iter().flat_map(|(_, report)| report.absolute).collect()
+    reports.iter().filter_map(|(_, report)| report.absolute).collect()
 }
 
 /// It is used after the step in which it was made, whether a tick or an echo ends that, one in a poll.
