@@ -242,7 +242,7 @@ impl<'m, F: NorFlash> App<'m, F> {
     #[inline]
     fn send_telemetry(&mut self, link: &mut impl Link) -> bool {
         let State::Running(running) = &mut self.state else { return false };
-        let is_unsent = running.is_unsent;
+        let is_unsent = running.is_unsent();
         if is_unsent {
             running.send(&self.search, &mut self.wire, link);
         }
@@ -338,7 +338,7 @@ impl<'m, F: NorFlash> App<'m, F> {
 
     /// Whether the next poll has to send the telemetry of the last one.
     fn is_unsent(&self) -> bool {
-        matches!(&self.state, State::Running(running) if running.is_unsent)
+        matches!(&self.state, State::Running(running) if running.is_unsent())
     }
 
     /// As [`Self::next_poll`], but `None` while a ping is in flight ([`Robot::idle_until`](sonarfix_hal::robot::Robot::idle_until)): for a simulator.

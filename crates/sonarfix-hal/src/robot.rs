@@ -311,7 +311,7 @@ impl<'m> Robot<'m> {
 
     /// Handles what is due at `now`: one measurement from outside, or the end of one ping, or one tick, or a slice of the choice of a
     /// wall, or the start of one ping. It never waits. Of several that are due, the next poll handles the next one, so that no poll takes as long
-    /// as all of them.
+    /// as all of them; a measurement from outside does not displace the rest in a loop that is polled less often than every [`PACE`].
     ///
     /// A `now` before that of an earlier call is counted as a fault and has no other effect.
     ///
@@ -354,9 +354,11 @@ impl<'m> Robot<'m> {
         if let Some(yaw) = &mut self.yaw {
             yaw.sample(poll);
         }
-        // What was made in the last step, before there is another one.
+        // What was made in the last step, before there is another one; alone, if the loop is polled often enough that nothing is late by it.
+        let is_prompt = self.is_prompt(poll.now);
         report.absolute = self.take_absolute();
-        if report.absolute.is_none() {
+        let is_alone = is_prompt || self.waiting.is_due(self.localizer().time());
+        if report.absolute.is_none() || !is_alone {
             self.finish_ping(poll, report);
             self.sample_encoders(poll, report);
             self.choose_bearing(poll, report);

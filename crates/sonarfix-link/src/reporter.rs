@@ -64,6 +64,17 @@ impl Reporter {
         (Self { last, next: 0, gyro_due: at }, Telemetry::Initialized(began))
     }
 
+    /// Whether the report of a poll of the loop can have messages.
+    #[must_use]
+    pub fn has_messages(report: &Report) -> bool {
+        report.absolute.is_some()
+            || report.ping_result.is_some()
+            || report.swept.is_some()
+            || report.tick.is_some()
+            || matches!(report.aimed, Some(Err(_)))
+            || report.mode.is_some()
+    }
+
     /// Passes the messages of one poll of the loop to `outlet`. `localizer` is that of the loop, after the poll.
     pub fn report(&mut self, report: &Report, localizer: &Localizer, outlet: &mut impl Outlet) {
         if let Some(result) = &report.absolute {

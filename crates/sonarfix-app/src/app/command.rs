@@ -488,7 +488,6 @@ impl<'m, F: NorFlash> App<'m, F> {
             has_been_blind: false,
             report: Report::default(),
             is_report_empty: true,
-            is_unsent: false,
         });
         Ok(())
     }

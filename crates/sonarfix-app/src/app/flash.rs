@@ -126,10 +126,9 @@ impl<F: NorFlash> App<'_, F> {
         self.board.resets >= boots::MAX_RESETS
     }
 
-    /// Writes pending records to the flash, as far as the write limit permits, in a poll in which the loop does not work.
+    /// Writes pending records to the flash, as far as the write limit permits.
     pub(super) fn write_pending(&mut self, now: Instant, polled: &mut Polled) {
-        let is_busy = matches!(&self.state, State::Running(running) if running.report.has_worked());
-        if self.ignores_store() || is_busy {
+        if self.ignores_store() {
             return;
         }
         let reserve = u8::from(!self.is_running());

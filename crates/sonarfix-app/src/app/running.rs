@@ -28,8 +28,6 @@ pub(super) struct Running<'m> {
     pub report: Report,
     /// Whether it is known to be empty.
     pub is_report_empty: bool,
-    /// Whether its telemetry is to be sent.
-    pub is_unsent: bool,
 }
 
 impl<'m> Running<'m> {
@@ -71,7 +69,6 @@ impl<'m> Running<'m> {
         let localizer = self.robot.localizer();
         let verdict = localizer.health().verdict;
         polled.verdict = (verdict != before).then_some(verdict);
-        self.is_unsent = report.has_worked() && !report.is_choosing;
         let mode = self.robot.mode();
         if has_rolled(report) {
             self.save_policy.rolled(now);
@@ -81,6 +78,12 @@ impl<'m> Running<'m> {
         let is_tracking = mode == Mode::Tracking;
         polled.is_on_time = report.tick.is_some() && report.faults.deadlines == 0;
         report.tick.is_some() && is_tracking && self.save_policy.is_due(now, localizer)
+    }
+
+    /// Whether telemetry of the last poll is to be sent.
+    #[inline]
+    pub fn is_unsent(&self) -> bool {
+        !self.is_report_empty && Reporter::has_messages(&self.report)
     }
 
     /// Sends the telemetry of the last poll, whose report is empty afterwards.
@@ -93,7 +96,6 @@ impl<'m> Running<'m> {
             search.report(mode, &mut self.reporter, &mut wire.outlet(link));
         }
         self.clear_report();
-        self.is_unsent = false;
     }
 
     /// Notes that a record of the present state is written.

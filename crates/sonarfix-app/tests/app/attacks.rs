@@ -13,17 +13,9 @@ use sonarfix_link::message::{CommandError, CommandResult, ImageStatus};
 use sonarfix_link::{Command, Telemetry, baked};
 
 use crate::flash::{SECTOR, SECTORS, SimFlash};
-use crate::rig::{Baked, Bench, config, loop_status, start};
+use crate::rig::{Baked, Bench, config, loop_status, running, start};
 
 const DONE: CommandResult = CommandResult::Done;
-
-/// A robot whose loop runs.
-fn running(baked: &Baked) -> Bench<'_> {
-    let mut bench = Bench::switched_on(baked, SimFlash::new());
-    assert_eq!(bench.order(&Command::SetPose(start())), DONE);
-    assert_eq!(bench.order(&Command::Start), DONE);
-    bench
-}
 
 /// Drives both wheels so many ticks ahead, at 0.2 m/s.
 fn drive(bench: &mut Bench, ticks: u16) {

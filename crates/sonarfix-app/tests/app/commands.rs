@@ -9,7 +9,7 @@ use sonarfix_link::message::{CommandError, CommandResult, ImageStatus};
 use sonarfix_link::{Command, Telemetry, baked};
 
 use crate::flash::SimFlash;
-use crate::rig::{Baked, Bench, config, loop_status, start};
+use crate::rig::{Baked, Bench, config, loop_status, running, start};
 
 const DONE: CommandResult = CommandResult::Done;
 
@@ -359,9 +359,7 @@ fn a_heading_is_taken_by_a_running_loop() {
 #[test]
 fn telemetry_of_a_poll_precedes_that_of_a_command_after_it() {
     let baked = Baked::new(&config());
-    let mut bench = Bench::switched_on(&baked, SimFlash::new());
-    assert_eq!(bench.order(&Command::SetPose(start())), DONE);
-    assert_eq!(bench.order(&Command::Start), DONE);
+    let mut bench = running(&baked);
     bench.wait(1_000);
     for command in [Command::SetPose(start()), Command::Stop] {
         while bench.app.report().unwrap().tick.is_none() {

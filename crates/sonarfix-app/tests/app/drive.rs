@@ -5,8 +5,7 @@ use sonarfix_hal::config::MotorPolicy;
 use sonarfix_link::message::{CommandError, CommandResult};
 use sonarfix_link::{Command, Motion};
 
-use crate::flash::SimFlash;
-use crate::rig::{Baked, Bench, config, start};
+use crate::rig::{self, Baked, Bench, config};
 
 const DONE: CommandResult = CommandResult::Done;
 /// The longest time between two polls of a board whose motors are enabled, µs.
@@ -20,10 +19,7 @@ const AHEAD: Motion = Motion { speed: MetresPerSecond(0.2), turn: RadiansPerSeco
 
 /// A robot whose loop runs and whose motors are enabled.
 fn running(baked: &Baked) -> Bench<'_> {
-    let mut bench = Bench::switched_on(baked, SimFlash::new());
-    for command in [Command::SetPose(start()), Command::Start] {
-        assert_eq!(bench.order(&command), DONE);
-    }
+    let mut bench = rig::running(baked);
     bench.wait(200);
     assert!(bench.poll().may_drive);
     assert_eq!(bench.app.motion(), None);

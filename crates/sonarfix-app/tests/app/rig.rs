@@ -420,6 +420,15 @@ impl<'m> Bench<'m> {
     }
 }
 
+/// A robot whose loop runs.
+pub fn running(baked: &Baked) -> Bench<'_> {
+    let mut bench = Bench::switched_on(baked, SimFlash::new());
+    for command in [Command::SetPose(start()), Command::Start] {
+        assert_eq!(bench.order(&command), CommandResult::Done);
+    }
+    bench
+}
+
 /// The last loop status among these messages.
 pub fn loop_status(messages: &[Telemetry]) -> LoopStatus {
     let found = messages.iter().rev().find_map(|message| match message {

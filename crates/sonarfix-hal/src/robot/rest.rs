@@ -63,6 +63,11 @@ impl Robot<'_> {
         self.yaw.as_ref().map_or(next, |yaw| next.min(yaw.next()))
     }
 
+    /// Whether a poll follows the last one so soon that another may follow for what this one leaves.
+    pub(super) fn is_prompt(&self, now: Instant) -> bool {
+        since(now, self.time) <= PACE
+    }
+
     /// Whether polls before the next deadline have nothing to do. A search works at every poll.
     pub(super) fn can_rest(&self) -> bool {
         self.odometer.has_begun() && self.mode() == Mode::Tracking

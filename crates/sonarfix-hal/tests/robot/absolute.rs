@@ -98,3 +98,22 @@ fn a_resting_loop_wakes_up() {
     let reports = run(&world, &mut robot, &mut pins, [now * 1_000]);
     assert_eq!(results(&reports).len(), 1);
 }
+
+/// A loop that is polled once a tick has a measurement and the tick in one poll, so that it loses neither.
+#[test]
+fn a_loop_that_is_polled_once_a_tick_loses_no_tick() {
+    let (walls, world) = (walls(), World::new(DRIVE, TICK, 0));
+    let settings = Settings::default();
+    let period = settings.encoder_period.ticks();
+    let every_minute = PingSchedule::Every(Duration::from_ticks(60_000_000));
+    let mut robot = robot(&walls, TICK, every_minute, settings);
+    let mut pins = pins(&world, ServoTiming::SG90);
+    run(&world, &mut robot, &mut pins, millis(0, 1_001));
+    for tick in 0..50 {
+        assert_eq!(robot.absolute(robot.localizer().time(), &heading()), Ok(()));
+        let reports = run(&world, &mut robot, &mut pins, [1_000_000 + (tick + 1) * period]);
+        assert!(results(&reports)[0].fix.is_used());
+        let [(_, Report { tick: Some(tick), .. })] = &reports[..] else { panic!("{reports:?}") };
+        assert_eq!((tick.skipped, tick.lateness.to_micros()), (0, 0));
+    }
+}

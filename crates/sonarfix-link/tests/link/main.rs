@@ -6,6 +6,7 @@ mod baked;
 mod damage;
 mod golden;
 mod messages;
+mod reporter;
 mod session;
 mod sizes;
 mod streams;
