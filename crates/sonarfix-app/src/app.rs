@@ -110,6 +110,8 @@ pub struct App<'m, F: NorFlash> {
     expected: Instant,
     /// What such a poll returns.
     at_rest: Polled,
+    /// Whether the latest poll was that of a command to a running loop.
+    has_answered: bool,
     /// Whether the store has been read. The first poll does it, because during construction the stack holds copies of
     /// the application.
     is_store_loaded: bool,
@@ -150,13 +152,14 @@ impl<'m, F: NorFlash> App<'m, F> {
             rests_until: now,
             expected: now,
             at_rest: Polled::default(),
+            has_answered: false,
             is_store_loaded: false,
             unsupported: None,
         }
     }
 
-    /// Handles what is due at `now`: at most one command and one poll of the loop, or the telemetry of the last poll, so that none takes as
-    /// long as all of them. It never waits, except for the flash when a record is written.
+    /// Handles what is due at `now`: a command, or one poll of the loop, or the telemetry of the last poll, so that none takes as
+    /// long as all of them; after a command, the loop is polled before the next one. It never waits, except for the flash when a record is written.
     ///
     /// A `now` that leaps ahead or back is counted as a fault of the clock and has no other effect, unless the next poll
     /// confirms it: then the loop continues at the new time. The motors are off while each poll has another time.
@@ -186,7 +189,8 @@ impl<'m, F: NorFlash> App<'m, F> {
             self.time = now;
             return self.at_rest;
         }
-        let frame = self.wire.next(link);
+        let frame = if self.has_answered { None } else { self.wire.next(link) };
+        self.has_answered = frame.is_some() && self.is_running();
         if let State::Running(running) = &mut self.state
             && frame.is_none()
             && now >= self.time
@@ -209,6 +213,7 @@ impl<'m, F: NorFlash> App<'m, F> {
         link: &mut impl Link,
     ) -> Polled {
         let was_running = self.is_running();
+        let is_prompt = since(now, self.time) <= PACE;
         let mut poll = Poll { now, hardware, link, polled: Polled::default() };
         if !self.is_store_loaded {
             self.is_store_loaded = true;
@@ -219,7 +224,10 @@ impl<'m, F: NorFlash> App<'m, F> {
             self.heard = now;
             self.answer(&mut poll, frame);
         }
-        self.poll_state(&mut poll);
+        match &mut self.state {
+            State::Running(running) if frame.is_some() && is_prompt => running.clear_report(),
+            _ => self.poll_state(&mut poll),
+        }
         let Poll { link, mut polled, .. } = poll;
         self.write_pending(now, &mut polled);
         self.send_periodic(now, link);
@@ -295,7 +303,9 @@ impl<'m, F: NorFlash> App<'m, F> {
 
     /// Sends the messages that are due periodically.
     fn send_periodic(&mut self, now: Instant, link: &mut impl Link) {
-        let is_busy = matches!(&self.state, State::Running(running) if running.report.has_worked());
+        let has_worked =
+            matches!(&self.state, State::Running(running) if running.report.has_worked());
+        let is_busy = self.has_answered || has_worked;
         if self.wire.is_hello_due(now, is_busy) {
             let hello = self.hello();
             self.wire.send(&Telemetry::Hello(hello), link);
@@ -326,7 +336,7 @@ impl<'m, F: NorFlash> App<'m, F> {
     ///
     /// Polls at other times do nothing, so that the results do not depend on them.
     pub fn next_poll(&self, hardware: &mut impl Hardware) -> Instant {
-        if self.is_unsent() || self.wire.is_unread() {
+        if self.is_unsent() || self.has_answered || self.wire.is_unread() {
             return self.time;
         }
         let next = match &self.state {
@@ -345,7 +355,7 @@ impl<'m, F: NorFlash> App<'m, F> {
     pub fn idle_until(&self, hardware: &mut impl Hardware) -> Option<Instant> {
         match &self.state {
             State::Waiting(_) => Some(self.next_poll(hardware)),
-            State::Running(_) if self.is_unsent() => Some(self.time),
+            State::Running(_) if self.is_unsent() || self.has_answered => Some(self.time),
             State::Running(running) => {
                 running.robot.idle_until(hardware).map(|until| until.min(self.rests_until))
             }

@@ -252,13 +252,14 @@ impl<'m> Robot<'m> {
     /// step is returned, `None` if a counter cannot be read. A ping in flight is aborted.
     ///
     /// # Errors
-    /// [`EkfError`], by what is wrong with the pose or its deviations.
+    /// [`EkfError`], by what is wrong with the pose or its deviations; nothing has changed.
     pub fn set_pose(
         &mut self,
         now: Instant,
         start: &Start,
         hardware: &mut impl Hardware,
     ) -> Result<Option<Step>, EkfError> {
+        start.check()?;
         self.rests_until = AT_ONCE;
         let poll = &mut Poll::new(now, hardware, None);
         self.odometer.begin(poll);

@@ -6,6 +6,7 @@
 use core::marker::PhantomData;
 
 use cobs::{DecodeResult, DecoderState};
+use postcard::Deserializer;
 use sonarfix::map::image::checksum as crc32;
 
 use crate::counters::ReceiverCounters;
@@ -28,7 +29,6 @@ pub struct Receiver<M> {
 enum Skipped {
     Corrupt,
     Foreign,
-    Undecodable,
 }
 
 impl<M: Message> Default for Receiver<M> {
@@ -70,14 +70,15 @@ impl<M: Message> Receiver<M> {
             return None;
         };
         let body = self.body.get(..length).unwrap_or_default();
-        let result = end.and_then(|()| decode(body));
-        increment(match &result {
-            Ok(_) => &mut self.counters.frames,
-            Err(Skipped::Corrupt) => &mut self.counters.corrupt,
-            Err(Skipped::Foreign) => &mut self.counters.foreign,
-            Err(Skipped::Undecodable) => &mut self.counters.undecodable,
+        let checked = end.and_then(|()| checked(body));
+        let frame = checked.as_ref().ok().and_then(Checked::decoded);
+        increment(match (&checked, &frame) {
+            (Ok(_), Some(_)) => &mut self.counters.frames,
+            (Ok(_), None) => &mut self.counters.undecodable,
+            (Err(Skipped::Corrupt), _) => &mut self.counters.corrupt,
+            (Err(Skipped::Foreign), _) => &mut self.counters.foreign,
         });
-        result.ok()
+        frame
     }
 
     /// The numbers of frames read and skipped.
@@ -98,8 +99,16 @@ fn increment(counter: &mut u32) {
     *counter = counter.saturating_add(1);
 }
 
-/// Decodes the bytes between two delimiters. The checksum is verified before any other field is used.
-fn decode<M: Message>(body: &[u8]) -> Result<Frame<M>, Skipped> {
+/// The bytes of a frame with a valid checksum, of this version and kind.
+struct Checked<'b, M> {
+    sequence: u16,
+    checksum: u32,
+    message: &'b [u8],
+    kind: PhantomData<M>,
+}
+
+/// Checks the bytes between two delimiters. The checksum is verified before any other field is used.
+fn checked<M: Message>(body: &[u8]) -> Result<Checked<'_, M>, Skipped> {
     let (content, checksum) = body.split_last_chunk::<CHECKSUM>().ok_or(Skipped::Corrupt)?;
     let checksum = u32::from_le_bytes(*checksum);
     let (header, message) = content.split_first_chunk::<HEADER>().ok_or(Skipped::Corrupt)?;
@@ -110,15 +119,21 @@ fn decode<M: Message>(body: &[u8]) -> Result<Frame<M>, Skipped> {
     if version != VERSION || kind != M::KIND {
         return Err(Skipped::Foreign);
     }
-    match postcard::take_from_bytes(message) {
-        Ok((message, [])) => {
-            Ok(Frame { sequence: u16::from_le_bytes([low, high]), checksum, message })
+    let sequence = u16::from_le_bytes([low, high]);
+    Ok(Checked { sequence, checksum, message, kind: PhantomData })
+}
+
+impl<M: Message> Checked<'_, M> {
+    /// The frame, if it holds a message and nothing after it. A message can be as large as a configuration: it is not copied.
+    #[inline]
+    fn decoded(&self) -> Option<Frame<M>> {
+        let Self { sequence, checksum, .. } = *self;
+        let mut bytes = Deserializer::from_bytes(self.message);
+        let message = M::deserialize(&mut bytes);
+        let is_whole = matches!(bytes.finalize(), Ok([]));
+        match message {
+            Ok(message) if is_whole => Some(Frame { sequence, checksum, message }),
+            _ => Some(Frame { sequence, checksum, message: M::substitute(self.message)? }),
         }
-        _ => match M::substitute(message) {
-            Some(message) => {
-                Ok(Frame { sequence: u16::from_le_bytes([low, high]), checksum, message })
-            }
-            None => Err(Skipped::Undecodable),
-        },
     }
 }

@@ -81,16 +81,16 @@ impl Reporter {
             outlet.send_built(|| Telemetry::Absolute(*result));
         }
         if let Some(heard) = &report.ping_result {
-            self.odometry(heard.step.as_ref(), outlet);
+            self.step(heard.step.as_ref(), outlet);
             self.ping(heard, outlet);
         }
         if let Some(swept) = &report.swept {
-            self.odometry(swept.step(), outlet);
+            self.step(swept.step(), outlet);
             let (at, (bearing, outcome)) = (self.last.at, swept.ping());
             outlet.send_built(|| Telemetry::Sweep(Sweep { at, bearing, outcome }));
         }
         if let Some(tick) = &report.tick {
-            self.odometry(tick.step.as_ref(), outlet);
+            self.step(tick.step.as_ref(), outlet);
             outlet.send_built(|| Telemetry::Estimate(estimate(localizer)));
             self.gyro(localizer, outlet);
         }
@@ -115,8 +115,8 @@ impl Reporter {
         self.last.at
     }
 
-    /// The travel of a step, after the gyro at its end.
-    fn odometry(&mut self, step: Option<&robot::Step>, outlet: &mut impl Outlet) {
+    /// Passes the messages of a step to `outlet`, if there was one: the turn that was measured, then the travel.
+    pub fn step(&mut self, step: Option<&robot::Step>, outlet: &mut impl Outlet) {
         // Travel that was not taken has changed nothing; it is repeated, or counted as a fault.
         if let Some(step) = step.filter(|step| step.result == StepResult::Accepted) {
             self.last = Odometry {

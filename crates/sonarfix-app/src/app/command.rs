@@ -4,30 +4,28 @@
 //! flash, and whatever it accepts can start.
 
 use embedded_storage::nor_flash::NorFlash;
-use sonarfix::geometry::units::{Duration, Instant, Metres, Radians};
+use sonarfix::geometry::units::{Instant, Metres, Radians};
 use sonarfix::localizer::{Localizer, Mode, Start, StartError};
 use sonarfix::map::Map;
 use sonarfix::map::image::checksum as crc32;
 use sonarfix::sensor::absolute::AbsoluteMeasurement;
 use sonarfix_hal::config::{Feature, NotLinked, RobotConfig, Unsupported};
 use sonarfix_hal::encoder::Wheels;
-use sonarfix_hal::robot::{Hardware, Report, Robot, Settings, Tick};
+use sonarfix_hal::robot::{Hardware, Report, Robot, Settings};
 use sonarfix_link::baked::BakedError;
 use sonarfix_link::message::{CommandError, CommandResult};
-use sonarfix_link::reporter;
 use sonarfix_link::{Command, Frame, Motion, Reporter, SessionCommand, Telemetry, baked};
 
+use super::running::PoseSet;
 use super::{App, Link, Poll, Polled, Running, State};
 use crate::check::Check;
 use crate::flash_contents;
 use crate::store::{MAX_HEADING_DEVIATION, MAX_POSITION_DEVIATION, Resumed, SavePolicy, Saved};
 
-/// What follows a command that was executed. The loop begins in [`App::answer`], after the stack frame of the command
-/// has been released.
+/// What follows a command that was executed.
 enum Next {
     Nothing,
-    Report(Telemetry),
-    /// Begin, or begin again, from here.
+    /// Begin the loop, or begin it again, from here; after the stack frame of the command has been released.
     Begin(Resumed),
 }
 
@@ -94,7 +92,6 @@ impl<'m, F: NorFlash> App<'m, F> {
         let next = self.act(poll, command);
         let message = next.and_then(|next| match next {
             Next::Nothing => Ok(None),
-            Next::Report(message) => Ok(Some(message)),
             Next::Begin(known) => self.begin(poll.now, &known).map(Some),
         });
         match (message, command) {
@@ -199,22 +196,15 @@ impl<'m, F: NorFlash> App<'m, F> {
         if !is_known {
             return Err(CommandError::Pose);
         }
-        let known = self.known_now().ok_or(CommandError::NoConfiguration)?.at(start);
-        self.check_start(now, &known)?;
         let State::Running(running) = &mut self.state else {
+            let known = self.known.ok_or(CommandError::NoConfiguration)?.at(start);
             return self.replace(poll, known).map(|()| Next::Nothing);
         };
         let step =
             running.robot.set_pose(now, start, poll.hardware).map_err(|_| CommandError::Pose)?;
         running.origin = running.origin.at(start);
-        if step.is_some() {
-            let lateness = Duration::from_ticks(0);
-            let tick = Tick { step, lateness, held: false, skipped: 0 };
-            let report = Report { tick: Some(tick), ..Report::default() };
-            let localizer = running.robot.localizer();
-            running.reporter.report(&report, localizer, &mut self.wire.outlet(poll.link));
-        }
-        Ok(Next::Report(running.reporter.pose_set(running.robot.localizer())))
+        running.pose_set = Some(PoseSet { step });
+        Ok(Next::Nothing)
     }
 
     #[inline(never)]
@@ -340,8 +330,9 @@ impl<'m, F: NorFlash> App<'m, F> {
             return self.replace(poll, known).map(|()| Next::Nothing);
         };
         self.search.begin(poll.now, &mut running.robot);
-        let (mode, localizer) = (running.robot.mode(), running.robot.localizer());
-        Ok(Next::Report(reporter::mode_changed(mode, localizer)))
+        running.report.mode = Some(running.robot.mode());
+        running.is_report_empty = false;
+        Ok(Next::Nothing)
     }
 
     /// Passes a heading, position or pose that was measured at the time `at` to a running loop ([`Robot::absolute`]).
@@ -486,6 +477,7 @@ impl<'m, F: NorFlash> App<'m, F> {
             searches: false,
             has_rolled: false,
             has_been_blind: false,
+            pose_set: None,
             report: Report::default(),
             is_report_empty: true,
         });

@@ -4,6 +4,7 @@ use sonarfix::geometry::units::{Instant, Metres};
 use sonarfix::localizer::Mode;
 use sonarfix_hal::robot::{Hardware, Report, Robot, Step};
 use sonarfix_link::Reporter;
+use sonarfix_link::reporter::Outlet;
 
 use super::poll::Poll;
 use super::search::PoseSearch;
@@ -24,10 +25,18 @@ pub(super) struct Running<'m> {
     pub has_rolled: bool,
     /// Whether the wheels could not be observed at a time since, when they may have rolled.
     pub has_been_blind: bool,
+    /// The replacement of the pose by a command, whose messages are to be sent.
+    pub pose_set: Option<PoseSet>,
     /// The report of the last poll. It is stored here and not returned, because it is half a kilobyte.
     pub report: Report,
     /// Whether it is known to be empty.
     pub is_report_empty: bool,
+}
+
+/// The replacement of the pose of a running loop.
+pub(super) struct PoseSet {
+    /// The step before it.
+    pub step: Option<Step>,
 }
 
 impl<'m> Running<'m> {
@@ -83,13 +92,17 @@ impl<'m> Running<'m> {
     /// Whether telemetry of the last poll is to be sent.
     #[inline]
     pub fn is_unsent(&self) -> bool {
-        !self.is_report_empty && Reporter::has_messages(&self.report)
+        self.pose_set.is_some() || (!self.is_report_empty && Reporter::has_messages(&self.report))
     }
 
     /// Sends the telemetry of the last poll, whose report is empty afterwards.
     #[inline(never)]
     pub fn send(&mut self, search: &PoseSearch<'m>, wire: &mut Wire, link: &mut impl Link) {
         let report = &self.report;
+        if let Some(PoseSet { step }) = self.pose_set.take() {
+            self.reporter.step(step.as_ref(), &mut wire.outlet(link));
+            wire.outlet(link).send_built(|| self.reporter.pose_set(self.robot.localizer()));
+        }
         self.reporter.report(report, self.robot.localizer(), &mut wire.outlet(link));
         let mode = self.robot.mode();
         if report.tick.is_some() && mode != Mode::Tracking {

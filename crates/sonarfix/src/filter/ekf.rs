@@ -277,16 +277,7 @@ impl Ekf {
         position: Metres,
         heading: Radians,
     ) -> Result<(), EkfError> {
-        if !pose.is_finite() || !position.is_finite() || !heading.is_finite() {
-            return Err(EkfError::NotFinite);
-        }
-        if position < Metres(0.0) || heading < Radians(0.0) {
-            return Err(EkfError::NegativeVariance);
-        }
-        let block = PoseBlock::independent(position, heading);
-        if !block.is_valid() {
-            return Err(EkfError::VarianceTooLarge);
-        }
+        let block = pose_block(pose, position, heading)?;
         let p = &mut self.p_without_walk;
         p.pose = block;
         p.range_scale.forget_pose();
@@ -336,6 +327,25 @@ impl Ekf {
 #[cold]
 fn invalid(p: &Covariance) -> EkfError {
     if p.has_negative_variance() { EkfError::Indefinite } else { EkfError::VarianceTooLarge }
+}
+
+/// P of a pose that was measured independently, with independent errors of these standard deviations.
+///
+/// # Errors
+/// Those of [`Ekf::set_pose`].
+pub(crate) fn pose_block(
+    pose: Pose,
+    position: Metres,
+    heading: Radians,
+) -> Result<PoseBlock, EkfError> {
+    if !pose.is_finite() || !position.is_finite() || !heading.is_finite() {
+        return Err(EkfError::NotFinite);
+    }
+    if position < Metres(0.0) || heading < Radians(0.0) {
+        return Err(EkfError::NegativeVariance);
+    }
+    let block = PoseBlock::independent(position, heading);
+    if block.is_valid() { Ok(block) } else { Err(EkfError::VarianceTooLarge) }
 }
 
 #[cfg(test)]

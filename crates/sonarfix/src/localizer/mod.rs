@@ -19,7 +19,7 @@ use crate::aim::{Aim, Choice, NoAim, Situation, Standing};
 use crate::association::history::History;
 use crate::association::visibility::max_heading_deviation_of;
 use crate::config::{Config, ConfigError, Policy, RangerId};
-use crate::filter::ekf::{Ekf, EkfError, StandardDeviations, StateEstimate};
+use crate::filter::ekf::{Ekf, EkfError, StandardDeviations, StateEstimate, pose_block};
 use crate::filter::gyro_fusion::GyroFusion;
 use crate::geometry::pose::Pose;
 use crate::geometry::units::{Duration, Instant, Metres, Radians};
@@ -47,6 +47,16 @@ pub struct Start {
     pub position_deviation: Metres,
     /// Standard deviation of the heading.
     pub heading_deviation: Radians,
+}
+
+impl Start {
+    /// Checks that [`Localizer::set_pose`] will take it.
+    ///
+    /// # Errors
+    /// [`EkfError`], by what is wrong with the pose or its deviations.
+    pub fn check(&self) -> Result<(), EkfError> {
+        pose_block(self.pose, self.position_deviation, self.heading_deviation).map(drop)
+    }
 }
 
 /// Reason for which a localizer cannot be constructed.
