@@ -110,7 +110,7 @@ pub struct App<'m, F: NorFlash> {
     expected: Instant,
     /// What such a poll returns.
     at_rest: Polled,
-    /// Whether the latest poll was that of a command to a running loop.
+    /// Whether the latest poll handled a command in place of the loop.
     has_answered: bool,
     /// Whether the store has been read. The first poll does it, because during construction the stack holds copies of
     /// the application.
@@ -189,8 +189,8 @@ impl<'m, F: NorFlash> App<'m, F> {
             self.time = now;
             return self.at_rest;
         }
-        let frame = if self.has_answered { None } else { self.wire.next(link) };
-        self.has_answered = frame.is_some() && self.is_running();
+        let has_answered = core::mem::take(&mut self.has_answered);
+        let frame = if has_answered { None } else { self.wire.next(link) };
         if let State::Running(running) = &mut self.state
             && frame.is_none()
             && now >= self.time
@@ -213,7 +213,6 @@ impl<'m, F: NorFlash> App<'m, F> {
         link: &mut impl Link,
     ) -> Polled {
         let was_running = self.is_running();
-        let is_prompt = since(now, self.time) <= PACE;
         let mut poll = Poll { now, hardware, link, polled: Polled::default() };
         if !self.is_store_loaded {
             self.is_store_loaded = true;
@@ -225,7 +224,12 @@ impl<'m, F: NorFlash> App<'m, F> {
             self.answer(&mut poll, frame);
         }
         match &mut self.state {
-            State::Running(running) if frame.is_some() && is_prompt => running.clear_report(),
+            State::Running(running)
+                if was_running && frame.is_some() && running.robot.is_prompt() =>
+            {
+                running.clear_report();
+                self.has_answered = true;
+            }
             _ => self.poll_state(&mut poll),
         }
         let Poll { link, mut polled, .. } = poll;

@@ -26,7 +26,8 @@
 //! # Time
 //! [`Robot::poll`] never waits and reads no clock. It may be called at any rate, and late: deadlines stay on their
 //! grid, and a late one is handled once. A poll handles one of the things that are due (the end of a ping before a
-//! tick, a tick before the choice of a wall), and leaves the others to the next polls.
+//! tick, a tick before the choice of a wall), and leaves the others to the next polls. The end of a ping at a wall takes two: the travel, then the
+//! range.
 //!
 //! An echo belongs to the instant of its reflection, which has passed when the echo arrives. Both counters are
 //! therefore read at the trigger and again when the echo is read. The position of the wheels at the reflection is
@@ -89,6 +90,7 @@ use odometer::Odometer;
 use poll::Poll;
 pub use report::{PingResult, Report, Tick};
 pub use rest::PACE;
+use rest::PROMPT;
 use schedule::Schedule;
 pub use settings::{EVALUATIONS_PER_MILLISECOND, Settings, SettingsError, Stamp};
 pub use step::{Step, StepResult};
@@ -152,7 +154,8 @@ use yaw::YawLedger;
 /// robot.poll(at(303), &mut devices); // ends the trigger pulse
 /// echo.rose(at(304)); // the interrupt stamps the edges of the echo,
 /// echo.fell(at(310));
-/// let result = robot.poll(at(311), &mut devices).ping_result; // and the loop reads them
+/// robot.poll(at(311), &mut devices); // and the loop reads them: the travel up to the reflection,
+/// let result = robot.poll(at(311), &mut devices).ping_result; // then the range
 /// assert!(matches!(result.and_then(|result| result.fix), Some(Fix::Accepted(_))));
 /// # channel.done();
 /// # pin.done();
@@ -173,6 +176,10 @@ pub struct Robot<'m> {
     rests_until: Instant,
     /// Whether the previous poll found something to do.
     has_worked: bool,
+    /// Whether the previous poll asked for another one at once.
+    has_asked: bool,
+    /// Whether such a poll came within [`PROMPT`](rest::PROMPT), the last time that there was one.
+    is_prompt: bool,
     /// The end of the ping in flight, which [`Self::rest`] has read for the next poll.
     ping_end: Option<PingEnd>,
     faults: Faults,
@@ -213,6 +220,8 @@ impl<'m> Robot<'m> {
             time: start,
             rests_until: AT_ONCE,
             has_worked: true,
+            has_asked: false,
+            is_prompt: false,
             ping_end: None,
             faults: Faults::default(),
             yaw,
@@ -312,7 +321,8 @@ impl<'m> Robot<'m> {
 
     /// Handles what is due at `now`: one measurement from outside, or the end of one ping, or one tick, or a slice of the choice of a
     /// wall, or the start of one ping. It never waits. Of several that are due, the next poll handles the next one, so that no poll takes as long
-    /// as all of them; a measurement from outside does not displace the rest in a loop that is polled less often than every [`PACE`].
+    /// as all of them; in a loop that is not polled again soon ([`Self::is_prompt`]), a poll handles a measurement from outside, or a range,
+    /// with the rest.
     ///
     /// A `now` before that of an earlier call is counted as a fault and has no other effect.
     ///
@@ -355,10 +365,12 @@ impl<'m> Robot<'m> {
         if let Some(yaw) = &mut self.yaw {
             yaw.sample(poll);
         }
-        // What was made in the last step, before there is another one; alone, if the loop is polled often enough that nothing is late by it.
-        let is_prompt = self.is_prompt(poll.now);
+        if self.has_asked {
+            self.is_prompt = since(poll.now, self.time) <= PROMPT;
+        }
+        // What was made in the last step, before there is another one; alone, if another poll follows.
         report.absolute = self.take_absolute();
-        let is_alone = is_prompt || self.waiting.is_due(self.localizer().time());
+        let is_alone = self.is_prompt || self.waiting.is_due(self.localizer().time());
         if report.absolute.is_none() || !is_alone {
             self.finish_ping(poll, report);
             self.sample_encoders(poll, report);
@@ -373,6 +385,7 @@ impl<'m> Robot<'m> {
         self.has_worked = report.has_worked();
         self.rests_until =
             if self.can_rest() { self.next_deadline(poll.hardware) } else { AT_ONCE };
+        self.has_asked = self.rests_until == AT_ONCE;
     }
 
     /// What determines the pose.
@@ -385,6 +398,12 @@ impl<'m> Robot<'m> {
     #[must_use]
     pub fn localizer(&self) -> &Localizer<'m> {
         self.tracker.localizer()
+    }
+
+    /// Whether a poll comes soon after one that asked for another at once. If so, what is due in one poll is divided into several.
+    #[must_use]
+    pub fn is_prompt(&self) -> bool {
+        self.is_prompt
     }
 
     /// Whether both encoders have been read since the loop started.

@@ -68,6 +68,7 @@ impl Reporter {
     #[must_use]
     pub fn has_messages(report: &Report) -> bool {
         report.absolute.is_some()
+            || report.reached.is_some()
             || report.ping_result.is_some()
             || report.swept.is_some()
             || report.tick.is_some()
@@ -80,8 +81,8 @@ impl Reporter {
         if let Some(result) = &report.absolute {
             outlet.send_built(|| Telemetry::Absolute(*result));
         }
+        self.step(report.reached.as_ref(), outlet);
         if let Some(heard) = &report.ping_result {
-            self.step(heard.step.as_ref(), outlet);
             self.ping(heard, outlet);
         }
         if let Some(swept) = &report.swept {

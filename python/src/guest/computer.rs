@@ -125,8 +125,8 @@ impl Beside<'_, '_, RobotOnWires<'_>> {
 impl Controller for Beside<'_, '_, RobotOnWires<'_>> {
     fn poll(&mut self, sensors: &Sensors, report: &mut Report) -> Result<Actuators> {
         let actuators = self.inner.poll(sensors, report)?;
+        self.step(report.reached.as_ref())?;
         if let Some(heard) = &report.ping_result {
-            self.step(heard.step.as_ref())?;
             if heard.fix.is_some() {
                 let range = heard.outcome.ok().map(|echo| echo.range);
                 self.guest.borrow_mut().fix(&heard.aim, range)?;

@@ -145,5 +145,5 @@ fn has_rolled(report: &Report) -> bool {
         })
     };
     rolled(report.tick.as_ref().and_then(|tick| tick.step.as_ref()))
-        || rolled(report.ping_result.as_ref().and_then(|heard| heard.step.as_ref()))
+        || rolled(report.reached.as_ref())
 }

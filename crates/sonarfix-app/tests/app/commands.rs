@@ -369,6 +369,7 @@ fn telemetry_of_a_poll_precedes_that_of_a_command_after_it() {
         let now = Instant::from_ticks(bench.now);
         let Bench { app, hardware, line, .. } = &mut bench;
         assert_eq!(app.command(now, hardware, line, &command), DONE);
+        let _ = bench.poll();
         let messages = bench.received();
         let place = |is: fn(&Telemetry) -> bool| messages.iter().position(is);
         let estimate = place(|it| matches!(it, Telemetry::Estimate(_)));

@@ -6,7 +6,7 @@ use sonarfix::geometry::units::Instant;
 
 use super::odometer::Reading;
 use super::tracker::Sweep;
-use crate::ranger::Outcome;
+use crate::ranger::{Echo, Outcome};
 
 /// The state of a measurement cycle.
 ///
@@ -20,7 +20,8 @@ use crate::ranger::Outcome;
 ///   └────────────────────────── echo, no echo, failure, or timeout ──────────────────────────────┘
 /// ```
 ///
-/// While it listens the encoders are not sampled (see [`robot`](super)).
+/// While it listens the encoders are not sampled (see [`robot`](super)). After the echo of a wall the travel up to the reflection is passed
+/// to the localizer, and the range in the next poll: *Reached*, which is not shown.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Cycle {
     /// Waits for the next cycle.
@@ -43,6 +44,13 @@ pub(super) enum Cycle {
         target: Target<Reason>,
         /// The choice of the wall along its bearing, a slice in each poll, once it is ready.
         along: Option<Choice>,
+    },
+    /// The travel up to the reflection was passed to the localizer; the range is not yet.
+    Reached {
+        /// What was measured.
+        aim: Aim,
+        /// The echo.
+        echo: Echo,
     },
     /// A ping is in flight.
     Listening {
@@ -78,7 +86,8 @@ impl Target<Aim> {
 }
 
 impl Cycle {
-    pub fn is_listening(&self) -> bool {
-        matches!(self, Self::Listening { .. })
+    /// Whether a ping is in flight, or its range is still to be taken. Ticks are delayed until then.
+    pub fn has_ping(&self) -> bool {
+        matches!(self, Self::Listening { .. } | Self::Reached { .. })
     }
 }

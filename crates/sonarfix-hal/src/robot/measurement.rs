@@ -14,12 +14,20 @@ use crate::ranger::{Echo, NoEcho, Outcome, Ranger, TriggerError};
 use crate::time::{AT_ONCE, since};
 
 impl<'m> Robot<'m> {
-    /// Reads the outcome of the ping in flight.
+    /// Reads the outcome of the ping in flight, or takes the range of which the travel was taken in the last poll.
     pub(super) fn finish_ping(
         &mut self,
         poll: &mut Poll<'_, 'm, impl Hardware>,
         report: &mut Report,
     ) {
+        match self.cycle {
+            Cycle::Reached { aim, echo } => self.fuse(poll, &aim, Ok(echo), report),
+            Cycle::Listening { .. } => self.listen(poll, report),
+            _ => {}
+        }
+    }
+
+    fn listen(&mut self, poll: &mut Poll<'_, 'm, impl Hardware>, report: &mut Report) {
         let now = poll.now;
         let Cycle::Listening { target, from, polled } = &mut self.cycle else {
             return;
@@ -38,33 +46,53 @@ impl<'m> Robot<'m> {
         let outcome = outcome.and_then(|echo| in_time(echo, from.at, now));
         poll.faults.ranger += u32::from(outcome.err().is_some_and(NoEcho::is_fault));
         match target {
-            Target::Wall(aim) => self.fuse(poll, &aim, &from, outcome, &mut report.ping_result),
+            Target::Wall(aim) => self.hear(poll, &aim, &from, outcome, report),
             Target::Sweep(sweep) => {
                 self.take_sweep(poll, sweep, &from, outcome, &mut report.swept);
+                self.end_cycle(now, true);
             }
         }
-        self.end_cycle(now, true);
     }
 
-    /// Passes the travel up to the instant of the echo to the localizer, then the range.
+    /// Passes the travel up to the reflection at a wall to the localizer, and the range in the next poll, so that none takes as long as
+    /// both; in the same one, if the loop is polled rarely.
     #[inline(never)]
-    fn fuse(
+    fn hear(
         &mut self,
         poll: &mut Poll<'_, 'm, impl Hardware>,
         aim: &Aim,
         from: &Reading,
         outcome: Outcome,
-        result: &mut Option<PingResult>,
+        report: &mut Report,
     ) {
-        let result = result.insert(PingResult { aim: *aim, outcome, step: None, fix: None });
-        if let Ok(echo) = outcome
-            && !self.reach(poll, from, &echo, &mut result.step)
-        {
-            self.tracker.localizer_mut().skip();
-            return;
+        if let Ok(echo) = outcome {
+            if !self.reach(poll, from, &echo, &mut report.reached) {
+                self.tracker.localizer_mut().skip();
+                report.ping_result = Some(PingResult { aim: *aim, outcome, fix: None });
+                self.end_cycle(poll.now, true);
+                return;
+            }
+            if self.is_prompt {
+                self.cycle = Cycle::Reached { aim: *aim, echo };
+                return;
+            }
         }
+        self.fuse(poll, aim, outcome, report);
+    }
+
+    /// Passes the range to the localizer, which ends the measurement cycle.
+    #[inline(never)]
+    fn fuse(
+        &mut self,
+        poll: &mut Poll<'_, 'm, impl Hardware>,
+        aim: &Aim,
+        outcome: Outcome,
+        report: &mut Report,
+    ) {
         let range = outcome.ok().map(|echo| echo.range);
-        result.fix = Some(self.tracker.fix(aim, range, poll.search.as_deref_mut()));
+        let fix = self.tracker.fix(aim, range, poll.search.as_deref_mut());
+        report.ping_result = Some(PingResult { aim: *aim, outcome, fix: Some(fix) });
+        self.end_cycle(poll.now, true);
     }
 
     /// Passes the travel up to the instant of the echo to the localizer. Returns whether the counters could be read.

@@ -12,6 +12,8 @@ use crate::ranger::Outcome;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use]
 pub struct Report {
+    /// The step of the wheels up to the reflection at a wall, whose range is taken in the same or the next poll.
+    pub reached: Option<Step>,
     /// The result of a ping that has ended.
     pub ping_result: Option<PingResult>,
     /// The result of a ping of the search's sweep that has ended.
@@ -36,9 +38,19 @@ pub struct Report {
 impl Report {
     /// Empties it in place: only the discriminants are written, of half a kilobyte.
     pub(super) fn clear(&mut self) {
-        let Self { ping_result, swept, tick, is_choosing, aimed, pinged, absolute, mode, faults } =
-            self;
-        (*ping_result, *swept, *tick) = (None, None, None);
+        let Self {
+            reached,
+            ping_result,
+            swept,
+            tick,
+            is_choosing,
+            aimed,
+            pinged,
+            absolute,
+            mode,
+            faults,
+        } = self;
+        (*reached, *ping_result, *swept, *tick) = (None, None, None, None);
         (*is_choosing, *aimed, *pinged, *mode) = (false, None, None, None);
         *absolute = None;
         *faults = Faults::default();
@@ -62,9 +74,9 @@ impl Report {
             || self.absolute.is_some()
     }
 
-    /// Whether a ping has ended.
+    /// Whether the echo of a ping, or its end, was handled.
     pub(super) fn has_ended_ping(&self) -> bool {
-        self.ping_result.is_some() || self.swept.is_some()
+        self.reached.is_some() || self.ping_result.is_some() || self.swept.is_some()
     }
 }
 
@@ -90,9 +102,6 @@ pub struct PingResult {
     pub aim: Aim,
     /// The echo, or why there is none.
     pub outcome: Outcome,
-    /// The step of the wheels up to the reflection; `None` without an echo, or if a counter could not be
-    /// read.
-    pub step: Option<Step>,
-    /// The localizer's response; `None` if there was an echo but no step.
+    /// The localizer's response; `None` if there was an echo but a counter could not be read.
     pub fix: Option<Fix>,
 }

@@ -11,6 +11,9 @@ use crate::time::{AT_ONCE, NEVER, after, since};
 
 /// Period of the polls of a loop whose next deadline is not known.
 pub const PACE: Duration = Duration::from_ticks(1_000);
+/// An executor that polls within this time when it is asked to poll at once is prompt: between the two polls there may be one that
+/// sends telemetry. Chosen, between the longest polls of a Cortex-M0+ and a period of the encoders.
+pub(super) const PROMPT: Duration = Duration::from_ticks(5_000);
 
 impl Robot<'_> {
     /// Whether a poll at `now` has nothing to do. If so, it is done: [`Self::poll`] need not be called, and would return
@@ -53,7 +56,7 @@ impl Robot<'_> {
         let next = match self.cycle {
             // Ticks are delayed until it has ended.
             Cycle::Listening { .. } => NEVER,
-            Cycle::Choosing { .. } => AT_ONCE,
+            Cycle::Choosing { .. } | Cycle::Reached { .. } => AT_ONCE,
             Cycle::Idle { until } => until.min(self.ticks.next()),
             Cycle::Turning { ranger, target, .. } => {
                 let ready_at = can_ping_at(self.localizer().config(), ranger, &target, hardware);
@@ -61,11 +64,6 @@ impl Robot<'_> {
             }
         };
         self.yaw.as_ref().map_or(next, |yaw| next.min(yaw.next()))
-    }
-
-    /// Whether a poll follows the last one so soon that another may follow for what this one leaves.
-    pub(super) fn is_prompt(&self, now: Instant) -> bool {
-        since(now, self.time) <= PACE
     }
 
     /// Whether polls before the next deadline have nothing to do. A search works at every poll.
@@ -97,6 +95,7 @@ impl Robot<'_> {
     /// The next instant at which a poll has something to do; `None` while a ping is in flight, when the loop
     /// should be polled at the rate that the ranger requires. For an executor that sleeps, and for a simulator.
     pub fn idle_until(&self, hardware: &mut impl Hardware) -> Option<Instant> {
-        (!self.cycle.is_listening()).then(|| self.next_deadline(hardware))
+        let is_listening = matches!(self.cycle, Cycle::Listening { .. });
+        (!is_listening).then(|| self.next_deadline(hardware))
     }
 }

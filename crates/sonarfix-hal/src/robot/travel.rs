@@ -21,7 +21,7 @@ impl<'m> Robot<'m> {
         poll: &mut Poll<'_, 'm, impl Hardware>,
         report: &mut Report,
     ) {
-        if self.cycle.is_listening() || report.has_ended_ping() {
+        if self.cycle.has_ping() || report.has_ended_ping() {
             return;
         }
         let now = poll.now;

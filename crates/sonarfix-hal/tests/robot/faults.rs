@@ -334,7 +334,7 @@ fn faulty_rangers_are_counted_and_time_out() {
         for time in millis(0, 2_990) {
             world.advance(time);
             let report = robot.poll(Instant::from_ticks(time), &mut devices);
-            heard.extend(report.ping_result.map(|heard| (heard.outcome, heard.step)));
+            heard.extend(report.ping_result.map(|heard| (heard.outcome, report.reached)));
             ticks += u32::from(report.tick.is_some());
         }
         assert_eq!(robot.faults().ranger, 5, "{kind:?}");

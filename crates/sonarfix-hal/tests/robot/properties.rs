@@ -116,7 +116,9 @@ proptest! {
         prop_assert!(flights.len() - heard.len() <= 1);
         for ((index, heard), (sent, back)) in heard.into_iter().zip(flights) {
             let reflected = sent.midpoint(back);
-            let step = heard.step.unwrap();
+            // The travel is taken in the same poll as the range, or in one before.
+            let index = reports[..=index].iter().rposition(|(_, it)| it.reached.is_some()).unwrap();
+            let step = reports[index].1.reached.unwrap();
             prop_assert_eq!(step.at, Instant::from_ticks(reflected));
             prop_assert!(matches!(heard.fix, Some(Fix::Accepted(_))), "{heard:?}");
             if step.result != StepResult::Accepted {
@@ -229,7 +231,7 @@ fn naive_stamps_are_those_of_the_arrival() {
     let (reports, _) = reports_with(UNPACED, naive, drive, TICK);
     let mut heard = 0;
     for (now, report) in &reports {
-        if let Some(step) = report.ping_result.and_then(|heard| heard.step) {
+        if let Some(step) = report.reached {
             assert_eq!(step.at, Instant::from_ticks(*now));
             heard += 1;
         }

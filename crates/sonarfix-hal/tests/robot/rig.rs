@@ -320,7 +320,7 @@ pub fn run(
 /// Every step of the wheels.
 pub fn steps(reports: &[(u64, Report)]) -> impl Iterator<Item = Step> {
     reports.iter().flat_map(|(_, report)| {
-        let of_echo = report.ping_result.and_then(|heard| heard.step);
+        let of_echo = report.reached;
         let of_tick = report.tick.and_then(|tick| tick.step);
         [of_echo, of_tick].into_iter().flatten()
     })

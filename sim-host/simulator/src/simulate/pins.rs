@@ -355,7 +355,8 @@ impl<'a> SimulatedHardware<'a> {
 
     fn record(&mut self, report: &Report, localizer: &Localizer, recorder: &mut impl Recorder) {
         self.score.faults(report.faults);
-        if report.tick.is_some() || report.ping_result.is_some() || report.swept.is_some() {
+        let has_heard = report.reached.is_some() || report.ping_result.is_some();
+        if report.tick.is_some() || has_heard || report.swept.is_some() {
             self.score.arrive(self.plant.state());
         }
         if let Some(result) = &report.absolute {
