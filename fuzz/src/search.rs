@@ -18,14 +18,12 @@ const EVALUATIONS: u16 = 600;
 pub fn search(bytes: &[u8]) {
     let mut bytes = Bytes::new(bytes);
     let walls = walls(&mut bytes);
-    let persistence = u16::from(bytes.byte() % 32);
-    let parameters = SearchParameters { persistence, ..SearchParameters::default() };
     let mut config = Config::for_track_width(Metres(0.2));
     config.rangers.first.mount = Point::new(bytes.number(0.1), bytes.number(0.1));
     if config.check().is_err() {
         return;
     }
-    let mut search = Search::<40, 4>::new(&config.rangers.first, Map::new(&walls), parameters);
+    let mut search = Search::<40, 4>::new(&config.rangers.first, Map::new(&walls), SearchParameters::default());
     let mut evaluations = EVALUATIONS;
     while !bytes.is_empty() {
         call(&mut search, &mut bytes, &mut evaluations);
