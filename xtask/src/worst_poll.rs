@@ -31,7 +31,7 @@ impl Args {
 
 /// A core: its name, the value of `--machine`, and the limit of a poll, instructions.
 const CORES: [(&str, &str, u64); 2] =
-    [("Cortex-M4F", "m4f", 35_000), ("Cortex-M0+", "m0plus", 130_000)];
+    [("Cortex-M4F", "m4f", 10_000), ("Cortex-M0+", "m0plus", 130_000)];
 
 /// What runs, and the arguments of `sonarfix pil`; `C` is `classroom`, `T` the folder of the tests' scenarios.
 const SCENARIOS: [(&str, &str); 26] = [
