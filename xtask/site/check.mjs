@@ -150,13 +150,22 @@ function playPort() {
 // The other end of the port of the page: functions that take bytes and signals.
 let otherEnd = null;
 
+// What the command `sonarfix` prints, up to the pattern.
+async function printedBy(command, stream, expected) {
+  let printed = "";
+  const ended = once(command, "exit").then(([code]) => {
+    throw new Error(`sonarfix has ended with ${code}, and has printed ${printed}`);
+  });
+  ended.catch(() => {}); // after the pattern, or in the race below
+  while (!expected.test(printed)) printed += (await Promise.race([once(stream, "data"), ended]))[0];
+  return printed.match(expected);
+}
+
 // A virtual robot that stands; it prints its socket and its pose.
 async function startRobot() {
   const robot = spawn(join(modules, "sonarfix"), ["virtual-robot", join(modules, "live-robot/scenario.toml"), "--tcp", "0", "--stand"]);
   const expected = /tcp:127\.0\.0\.1:(\d+)[^]*set-pose (\S+) (\S+) (\S+)\n/;
-  let printed = "";
-  while (!expected.test(printed)) printed += (await once(robot.stdout, "data"))[0];
-  const [, port, x, y, heading] = printed.match(expected);
+  const [, port, x, y, heading] = await printedBy(robot, robot.stdout, expected);
   return { robot, socket: connect(Number(port), "127.0.0.1"), pose: { x, y, heading } };
 }
 
@@ -304,9 +313,8 @@ async function useComparison(page, where) {
 async function startServer() {
   const options = ["--serve", "--speed", "20", "--beside", "drive.csv"];
   const server = spawn(join(modules, "sonarfix"), ["run", "scenario.toml", ...options], { cwd: reports });
-  let printed = "";
-  while (!/^open \S+\n/m.test(printed)) printed += (await once(server.stderr, "data"))[0];
-  return { server, address: printed.match(/^open (\S+)\n/m)[1] };
+  const [, address] = await printedBy(server, server.stderr, /^open (\S+)\n/m);
+  return { server, address };
 }
 
 // Both runs of a page that is served are at the same time.
