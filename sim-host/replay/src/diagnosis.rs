@@ -252,8 +252,9 @@ impl<'a> Trial<'a> {
     fn named(&self, tried: &[Tried], as_is: &Evidence) -> Named {
         // A start near that of the log gains only by its larger deviation.
         let start = self.start();
+        let of_heading = self.heading_deviation();
         let is_enough = |it: &&Tried| {
-            let is_unusual = !it.candidate.is_usual(self.robot);
+            let is_unusual = !it.candidate.is_usual(self.robot, of_heading);
             is_unusual && it.candidate.is_elsewhere(start) && it.is_enough(as_is)
         };
         let named: Vec<_> = tried.iter().filter(is_enough).collect();
@@ -302,6 +303,15 @@ impl<'a> Trial<'a> {
         self.entries.iter().find_map(|entry| match entry.record {
             Record::Start { pose, .. } => Some(pose),
             Record::Resume { state: [x, y, heading, ..], .. } => Some(Pose { x, y, heading }),
+            _ => None,
+        })
+    }
+
+    /// The standard deviation of the heading in the start record, radians.
+    fn heading_deviation(&self) -> Option<f64> {
+        self.entries.iter().find_map(|entry| match entry.record {
+            Record::Start { heading_deviation, .. } => Some(heading_deviation),
+            Record::Resume { deviation: [_, _, heading, ..], .. } => Some(heading),
             _ => None,
         })
     }

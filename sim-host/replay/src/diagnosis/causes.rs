@@ -514,8 +514,9 @@ impl Candidate {
         }
     }
 
-    /// Whether the value is so near to what the robot file states that the localizer estimates it by itself.
-    pub fn is_usual(&self, robot: &RobotConfig) -> bool {
+    /// Whether the value is so near to what the robot file or the start record states that the localizer estimates it by itself;
+    /// `of_heading`: the deviation of the heading in the start record, radians.
+    pub fn is_usual(&self, robot: &RobotConfig, of_heading: Option<f64>) -> bool {
         let prior = &robot.localizer.prior;
         let width = f64::from(robot.localizer.drive.track_width.0);
         let permitted = match self.cause {
@@ -527,7 +528,11 @@ impl Candidate {
                 let prior = 3.0 * f64::from(prior.track_width.0) / width;
                 (self.value - 1.0, prior.min(MEASURED))
             }
-            Cause::BearingOffset | Cause::StartHeading => (self.value, 6.0),
+            Cause::BearingOffset => (self.value, 6.0),
+            Cause::StartHeading => {
+                let expected = 4.0 * of_heading.unwrap_or(0.0).to_degrees();
+                (self.value, expected.clamp(6.0, 15.0))
+            }
             Cause::BearingScale => (self.value - 1.0, 0.08),
             Cause::RangeScale | Cause::MapScale | Cause::MapScaleX | Cause::MapScaleY => {
                 (self.value - 1.0, (3.0 * f64::from(prior.range_scale)).max(0.03))
