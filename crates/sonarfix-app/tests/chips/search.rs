@@ -44,7 +44,8 @@ pub fn find_from_nothing(world: &World, robot: &str, motion: Option<Motion>) -> 
             done(pico.order(&Command::Drive(motion)));
         }
         pico.run(80, &[]);
-        let unique = pico.messages().into_iter().find_map(|message| match message {
+        // Of all messages: the wait for an acknowledgement drops those before it.
+        let unique = pico.heard.iter().find_map(|message| match message {
             Telemetry::ModeChanged(it) if it.mode == Mode::Provisional => Some(it.estimate),
             _ => None,
         });
