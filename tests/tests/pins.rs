@@ -117,10 +117,11 @@ fn the_classroom_is_crossed() {
     assert!(summary.nees_mean < 7.0 + 4.0 * SAMPLING, "{}", summary.nees_mean);
 }
 
-/// One run in some hundred is wrong by 5 cm for a while, which 200 runs show as 0.8 mm.
+/// One run in some hundred is wrong by 5 cm for a while, which 200 runs show as 0.8 mm and 1,000 as 0.3 mm. 4,000 runs from these seeds and
+/// as many from 700000 give 7.8 mm.
 #[test]
 fn the_classroom_is_crossed_accurately() {
-    let rms = classroom(5 * CLASSROOM_RUNS, |_| ()).rms_path;
+    let rms = classroom(10 * CLASSROOM_RUNS, |_| ()).rms_path;
     let position = rms.x.hypot(rms.y);
     assert!(position < 0.008, "{position}");
 }
