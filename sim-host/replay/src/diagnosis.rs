@@ -104,10 +104,8 @@ pub fn diagnose(
         add_unexplained(&visible, is_right, &mut findings);
         let causes = whole.causes(&as_is);
         let are_none = causes.findings.is_empty();
-        // A wrong bearing explains the ranges of a servo that does not turn.
-        let is_of_bearing =
-            causes.findings.first().is_some_and(|it| it.cause.starts_with("bearing"));
-        findings.extend(visible.constant_bearing().filter(|_| is_of_bearing));
+        // Some cause explains the ranges of a servo that does not turn by chance.
+        findings.extend(visible.constant_bearing().filter(|_| !are_none));
         add(causes, &mut findings);
         if are_none && !is_right && !findings.iter().any(|it| it.cause == RANGE_NOISE) {
             findings.extend(visible.unexplained().or_else(|| report::unexplained(&as_is, walls)));
