@@ -71,6 +71,7 @@ pub struct Board {
 }
 
 /// The application.
+#[expect(clippy::struct_excessive_bools, reason = "independent facts, each with a name")]
 pub struct App<'m, F: NorFlash> {
     board: Board,
     map: Result<(Map<'m>, u32), MapError>,
