@@ -90,7 +90,6 @@ use odometer::Odometer;
 use poll::Poll;
 pub use report::{PingResult, Report, Tick};
 pub use rest::PACE;
-use rest::PROMPT;
 use schedule::Schedule;
 pub use settings::{EVALUATIONS_PER_MILLISECOND, Settings, SettingsError, Stamp};
 pub use step::{Step, StepResult};
@@ -178,7 +177,7 @@ pub struct Robot<'m> {
     has_worked: bool,
     /// Whether the previous poll asked for another one at once.
     has_asked: bool,
-    /// Whether such a poll came within [`PROMPT`](rest::PROMPT), the last time that there was one.
+    /// Whether such a poll came within `PROMPT`, the last time that there was one.
     is_prompt: bool,
     /// The end of the ping in flight, which [`Self::rest`] has read for the next poll.
     ping_end: Option<PingEnd>,
@@ -365,9 +364,7 @@ impl<'m> Robot<'m> {
         if let Some(yaw) = &mut self.yaw {
             yaw.sample(poll);
         }
-        if self.has_asked {
-            self.is_prompt = since(poll.now, self.time) <= PROMPT;
-        }
+        self.judge_executor(poll.now);
         // What was made in the last step, before there is another one; alone, if another poll follows.
         report.absolute = self.take_absolute();
         let is_alone = self.is_prompt || self.waiting.is_due(self.localizer().time());
