@@ -92,7 +92,7 @@ const EMULATED: [Emulated; 4] = [
         has: "core, interrupts, SysTick, USART2, clock and PWM of the motors (TIM5, TIM3). In a room (`cargo xtask chips`) the machine stops before each access of the core to what it \
             lacks, and is fed: counts of the encoders (TIM1, TIM8), flags of the stamps of edges (TIM5; their times are written to its capture registers), servo (TIM10), trigger and enable pin \
             (GPIOA, GPIOB), watchdog, causes of a reset, flash controller, store and its power cuts",
-        lacks: "levels of pins, filters and input stages of the timers, I²C devices, crystal, voltage detector, backup registers; erasures and writes of the flash take no time; an overflow of the stack ends QEMU",
+        lacks: "levels of pins, filters and input stages of the timers, the timers of the second ranger (TIM12, TIM11), I²C devices, crystal, voltage detector, backup registers; erasures and writes of the flash take no time; an overflow of the stack ends QEMU",
     },
     Emulated {
         board: "nucleo_f446re",
