@@ -34,7 +34,7 @@ use sonarfix::health::DEGRADED_WITHOUT_ODOMETRY;
 use sonarfix::localizer::{Localizer, Mode};
 use sonarfix::map::{Map, MapError};
 use sonarfix_hal::config::{RobotConfig, Unsupported};
-use sonarfix_hal::robot::{EVALUATIONS_PER_MILLISECOND, Faults, Hardware, PACE, Report, Settings};
+use sonarfix_hal::robot::{EVALUATIONS_PER_MILLISECOND, Faults, Hardware, Report, Settings};
 use sonarfix_link::baked::BakedError;
 use sonarfix_link::message::{self, Hello, LoopStatus, ResetCause};
 use sonarfix_link::{Frame, SessionCommand, Telemetry};
@@ -186,7 +186,7 @@ impl<'m, F: NorFlash> App<'m, F> {
             }
         }
         // An executor that polls less often than asked for must not lose every second poll.
-        if self.send_telemetry(link) && since(now, self.time) <= PACE {
+        if self.send_telemetry(link) && self.is_prompt() {
             self.time = now;
             return self.at_rest;
         }
@@ -220,18 +220,9 @@ impl<'m, F: NorFlash> App<'m, F> {
             poll.polled.saved = self.load_store(now, poll.hardware).err().map(Err);
             poll.polled.unsupported = self.unsupported;
         }
-        if let Some(frame) = frame {
-            self.heard = now;
-            self.answer(&mut poll, frame);
-        }
-        match &mut self.state {
-            State::Running(running)
-                if was_running && frame.is_some() && running.robot.is_prompt() =>
-            {
-                running.clear_report();
-                self.has_answered = true;
-            }
-            _ => self.poll_state(&mut poll),
+        self.has_answered = frame.is_some_and(|frame| self.take_command(&mut poll, frame));
+        if !self.has_answered {
+            self.poll_state(&mut poll);
         }
         let Poll { link, mut polled, .. } = poll;
         self.write_pending(now, &mut polled);
@@ -249,6 +240,31 @@ impl<'m, F: NorFlash> App<'m, F> {
         };
         self.rests_until = self.next_deadline(now);
         polled
+    }
+
+    /// Executes a command; returns whether it takes the place of the loop in this poll.
+    fn take_command(
+        &mut self,
+        poll: &mut Poll<impl Hardware, impl Link>,
+        frame: &Frame<SessionCommand>,
+    ) -> bool {
+        self.heard = poll.now;
+        let was_running = self.is_running();
+        if let State::Running(running) = &mut self.state {
+            running.clear_report();
+        }
+        self.answer(poll, frame);
+        if was_running && self.is_prompt() {
+            return true;
+        }
+        // Before the loop changes what it describes.
+        self.send_telemetry(poll.link);
+        false
+    }
+
+    /// Whether the loop runs, and is polled at once when it asks for it.
+    fn is_prompt(&self) -> bool {
+        matches!(&self.state, State::Running(running) if running.robot.is_prompt())
     }
 
     /// Sends the telemetry of the last poll, if there is some; returns whether there was.

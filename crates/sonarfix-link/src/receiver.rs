@@ -70,8 +70,8 @@ impl<M: Message> Receiver<M> {
             return None;
         };
         let body = self.body.get(..length).unwrap_or_default();
-        let checked = end.and_then(|()| checked(body));
-        let frame = checked.as_ref().ok().and_then(Checked::decoded);
+        let checked = end.and_then(|()| checked::<M>(body));
+        let frame = checked.as_ref().ok().and_then(decoded);
         increment(match (&checked, &frame) {
             (Ok(_), Some(_)) => &mut self.counters.frames,
             (Ok(_), None) => &mut self.counters.undecodable,
@@ -99,16 +99,8 @@ fn increment(counter: &mut u32) {
     *counter = counter.saturating_add(1);
 }
 
-/// The bytes of a frame with a valid checksum, of this version and kind.
-struct Checked<'b, M> {
-    sequence: u16,
-    checksum: u32,
-    message: &'b [u8],
-    kind: PhantomData<M>,
-}
-
 /// Checks the bytes between two delimiters. The checksum is verified before any other field is used.
-fn checked<M: Message>(body: &[u8]) -> Result<Checked<'_, M>, Skipped> {
+fn checked<M: Message>(body: &[u8]) -> Result<Frame<&[u8]>, Skipped> {
     let (content, checksum) = body.split_last_chunk::<CHECKSUM>().ok_or(Skipped::Corrupt)?;
     let checksum = u32::from_le_bytes(*checksum);
     let (header, message) = content.split_first_chunk::<HEADER>().ok_or(Skipped::Corrupt)?;
@@ -119,21 +111,18 @@ fn checked<M: Message>(body: &[u8]) -> Result<Checked<'_, M>, Skipped> {
     if version != VERSION || kind != M::KIND {
         return Err(Skipped::Foreign);
     }
-    let sequence = u16::from_le_bytes([low, high]);
-    Ok(Checked { sequence, checksum, message, kind: PhantomData })
+    Ok(Frame { sequence: u16::from_le_bytes([low, high]), checksum, message })
 }
 
-impl<M: Message> Checked<'_, M> {
-    /// The frame, if it holds a message and nothing after it. A message can be as large as a configuration: it is not copied.
-    #[inline]
-    fn decoded(&self) -> Option<Frame<M>> {
-        let Self { sequence, checksum, .. } = *self;
-        let mut bytes = Deserializer::from_bytes(self.message);
-        let message = M::deserialize(&mut bytes);
-        let is_whole = matches!(bytes.finalize(), Ok([]));
-        match message {
-            Ok(message) if is_whole => Some(Frame { sequence, checksum, message }),
-            _ => Some(Frame { sequence, checksum, message: M::substitute(self.message)? }),
-        }
+/// The frame, if its bytes are those of a message and nothing else. A message can be as large as a configuration: it is decoded in place.
+#[inline]
+fn decoded<M: Message>(frame: &Frame<&[u8]>) -> Option<Frame<M>> {
+    let Frame { sequence, checksum, message: bytes } = *frame;
+    let mut deserializer = Deserializer::from_bytes(bytes);
+    let message = M::deserialize(&mut deserializer);
+    let is_whole = matches!(deserializer.finalize(), Ok([]));
+    match message {
+        Ok(message) if is_whole => Some(Frame { sequence, checksum, message }),
+        _ => Some(Frame { sequence, checksum, message: M::substitute(bytes)? }),
     }
 }

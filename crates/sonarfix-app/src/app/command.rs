@@ -330,8 +330,7 @@ impl<'m, F: NorFlash> App<'m, F> {
             return self.replace(poll, known).map(|()| Next::Nothing);
         };
         self.search.begin(poll.now, &mut running.robot);
-        running.report.mode = Some(running.robot.mode());
-        running.is_report_empty = false;
+        running.report_mode();
         Ok(Next::Nothing)
     }
 

@@ -58,6 +58,11 @@ impl<'m> Running<'m> {
         }
     }
 
+    /// Reports the mode, which a command has changed.
+    pub fn report_mode(&mut self) {
+        (self.report.mode, self.is_report_empty) = (Some(self.robot.mode()), false);
+    }
+
     /// Polls the loop; returns whether a record is due. The next poll sends the telemetry of one that has worked, so that none takes as
     /// long as both.
     #[inline(never)]

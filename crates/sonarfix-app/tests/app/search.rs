@@ -77,6 +77,43 @@ fn a_pose_ends_the_search_and_a_command_begins_it() {
     assert_eq!(mode(&bench), Some(Mode::Searching));
 }
 
+/// An executor that polls at once when it is asked to, and one that polls once a tick.
+#[test]
+fn a_new_pose_and_a_search_are_reported_once_to_each_executor() {
+    for period in [1_000, 100_000] {
+        let baked = searching();
+        let mut bench = Bench::switched_on(&baked, SimFlash::new());
+        assert_eq!(bench.order(&Command::Start), CommandResult::Done);
+        let mut polled = |bench: &mut Bench, polls: u32| {
+            for _ in 0..polls {
+                bench.set_now(bench.now() + period - 1_000);
+                bench.roll(3, 3);
+                let _ = bench.poll();
+            }
+            bench.received()
+        };
+        polled(&mut bench, 30);
+        let frames = [here(), Command::Search].map(|command| bench.frame(&command));
+        bench.garble(&frames[0]);
+        let messages = polled(&mut bench, 30);
+        let set: Vec<_> = messages
+            .iter()
+            .filter_map(|message| match message {
+                Telemetry::PoseSet(estimate) => Some(estimate.state.pose()),
+                _ => None,
+            })
+            .collect();
+        assert_eq!(set, [Pose::new(1.0, 1.0, Radians(0.0))], "{period}");
+        bench.garble(&frames[1]);
+        let messages = polled(&mut bench, 30);
+        let modes = messages.iter().filter_map(|message| match message {
+            Telemetry::ModeChanged(changed) => Some(changed.mode),
+            _ => None,
+        });
+        assert_eq!(modes.collect::<Vec<_>>(), [Mode::Searching], "{period}");
+    }
+}
+
 #[test]
 fn after_a_power_loss_on_the_way_it_searches() {
     let baked = searching();
