@@ -34,7 +34,9 @@ use sonarfix::health::DEGRADED_WITHOUT_ODOMETRY;
 use sonarfix::localizer::{Localizer, Mode};
 use sonarfix::map::{Map, MapError};
 use sonarfix_hal::config::{RobotConfig, Unsupported};
-use sonarfix_hal::robot::{EVALUATIONS_PER_MILLISECOND, Faults, Hardware, Report, Settings};
+use sonarfix_hal::robot::{
+    EVALUATIONS_PER_MILLISECOND, Faults, Hardware, PROMPT, Report, Settings,
+};
 use sonarfix_link::baked::BakedError;
 use sonarfix_link::message::{self, Hello, LoopStatus, ResetCause};
 use sonarfix_link::{Frame, SessionCommand, Telemetry};
@@ -186,7 +188,7 @@ impl<'m, F: NorFlash> App<'m, F> {
             }
         }
         // An executor that polls less often than asked for must not lose every second poll.
-        if self.send_telemetry(link) && self.is_prompt() {
+        if self.send_telemetry(link) && since(now, self.time) <= PROMPT {
             self.time = now;
             return self.at_rest;
         }
@@ -254,17 +256,13 @@ impl<'m, F: NorFlash> App<'m, F> {
             running.clear_report();
         }
         self.answer(poll, frame);
-        if was_running && self.is_prompt() {
+        let is_prompt = matches!(&self.state, State::Running(running) if running.robot.is_prompt());
+        if was_running && is_prompt {
             return true;
         }
         // Before the loop changes what it describes.
         self.send_telemetry(poll.link);
         false
-    }
-
-    /// Whether the loop runs, and is polled at once when it asks for it.
-    fn is_prompt(&self) -> bool {
-        matches!(&self.state, State::Running(running) if running.robot.is_prompt())
     }
 
     /// Sends the telemetry of the last poll, if there is some; returns whether there was.

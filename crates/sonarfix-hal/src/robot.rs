@@ -89,7 +89,7 @@ pub use hardware::{Devices, Hardware, WithGyro, WithRangers};
 use odometer::Odometer;
 use poll::Poll;
 pub use report::{PingResult, Report, Tick};
-pub use rest::PACE;
+pub use rest::{PACE, PROMPT};
 use schedule::Schedule;
 pub use settings::{EVALUATIONS_PER_MILLISECOND, Settings, SettingsError, Stamp};
 pub use step::{Step, StepResult};
@@ -177,7 +177,7 @@ pub struct Robot<'m> {
     has_worked: bool,
     /// Whether the previous poll asked for another one at once.
     has_asked: bool,
-    /// Whether such a poll came within `PROMPT`, the last time that there was one.
+    /// Whether such a poll came within [`PROMPT`], the last time that there was one.
     is_prompt: bool,
     /// The end of the ping in flight, which [`Self::rest`] has read for the next poll.
     ping_end: Option<PingEnd>,

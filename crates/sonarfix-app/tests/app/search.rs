@@ -84,7 +84,7 @@ fn a_new_pose_and_a_search_are_reported_once_to_each_executor() {
         let baked = searching();
         let mut bench = Bench::switched_on(&baked, SimFlash::new());
         assert_eq!(bench.order(&Command::Start), CommandResult::Done);
-        let mut polled = |bench: &mut Bench, polls: u32| {
+        let polled = |bench: &mut Bench, polls: u32| {
             for _ in 0..polls {
                 bench.set_now(bench.now() + period - 1_000);
                 bench.roll(3, 3);

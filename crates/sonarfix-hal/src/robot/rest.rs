@@ -13,7 +13,7 @@ use crate::time::{AT_ONCE, NEVER, after, since};
 pub const PACE: Duration = Duration::from_ticks(1_000);
 /// An executor that polls within this time when it is asked to poll at once is prompt: between the two polls there may be one that
 /// sends telemetry. Chosen, between the longest polls of a Cortex-M0+ and a period of the encoders.
-const PROMPT: Duration = Duration::from_ticks(5_000);
+pub const PROMPT: Duration = Duration::from_ticks(5_000);
 
 impl Robot<'_> {
     /// Whether a poll at `now` has nothing to do. If so, it is done: [`Self::poll`] need not be called, and would return
