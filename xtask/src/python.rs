@@ -9,8 +9,8 @@ use std::time::Instant;
 
 use anyhow::{Context, ensure};
 
-use crate::cargo;
 use crate::workspace::Workspace;
+use crate::{cargo, symbols};
 
 /// Largest wheel, bytes.
 const MOST_BYTES: u64 = 15_000_000;
@@ -34,10 +34,8 @@ pub fn check(args: Args) -> anyhow::Result<()> {
     for task in ["fmt --all --check", "clippy --release -- -D warnings"] {
         cargo::check(Workspace::Python.cargo(task))?;
     }
-    let tools = Environment::new("tools")?;
-    let requirements = source().join("requirements.txt");
-    tools.run("pip", &["install", "--quiet", "--requirement"], &[&requirements])?;
-    let wheel = wheel(&tools)?;
+    let tools = tools()?;
+    let wheel = wheel(cargo::root())?;
     first_lines(&wheel)?;
     let install = ["install", "--quiet", "--no-deps", "--force-reinstall"];
     tools.run("pip", &install, &[&wheel])?;
@@ -90,15 +88,26 @@ impl Environment {
     }
 }
 
-/// Builds the wheel for the oldest Linux that maturin supports, by zig as the linker.
-fn wheel(tools: &Environment) -> anyhow::Result<PathBuf> {
+/// The environment of the checks, with what they need.
+fn tools() -> anyhow::Result<Environment> {
+    let tools = Environment::new("tools")?;
+    let requirements = source().join("requirements.txt");
+    tools.run("pip", &["install", "--quiet", "--requirement"], &[&requirements])?;
+    Ok(tools)
+}
+
+/// Builds the wheel of the sources in `root` for the oldest Linux that maturin supports, by zig as the linker. It replaces the last one.
+pub fn wheel(root: &Path) -> anyhow::Result<PathBuf> {
     let wheels = folder().join("wheels");
     if wheels.exists() {
         std::fs::remove_dir_all(&wheels)?;
     }
-    let mut command = tools.command("maturin")?;
+    let mut command = tools()?.command("maturin")?;
     command.args(["build", "--release", "--locked", "--zig", "--compatibility", "manylinux2014"]);
     command.arg("--out").arg(&wheels).env("CARGO_TARGET_DIR", folder());
+    command.current_dir(root.join(Workspace::Python.path()));
+    cargo::reproducible(&mut command, root, &[])?;
+    symbols::same_in_every_folder(&mut command, root)?;
     cargo::check(command)?;
     let found = std::fs::read_dir(&wheels)?.next().context("maturin has written no wheel")??;
     let bytes = found.metadata()?.len();

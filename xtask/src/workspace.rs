@@ -45,7 +45,12 @@ impl Workspace {
 
     /// The folder with its `Cargo.toml`.
     pub fn folder(self) -> PathBuf {
-        cargo::root().join(match self {
+        cargo::root().join(self.path())
+    }
+
+    /// The same from the top of the repository.
+    pub fn path(self) -> &'static str {
+        match self {
             Self::Main => "",
             Self::C => "c",
             Self::Firmware => "firmware",
@@ -54,7 +59,7 @@ impl Workspace {
             Self::Fuzz => "fuzz",
             Self::Python => "python",
             Self::Ros => "ros",
-        })
+        }
     }
 
     /// Where it is built. Each has a folder of its own below `target`, so that none waits for the lock of another.

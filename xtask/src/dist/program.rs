@@ -8,13 +8,13 @@ use anyhow::{Context, ensure};
 
 use sonarfix_boards::uf2;
 
-use crate::cargo;
 use crate::workspace::Workspace;
+use crate::{cargo, symbols};
 
 /// Where the program is built and checked.
-const HOST: &str = "x86_64-unknown-linux-musl";
+pub const HOST: &str = "x86_64-unknown-linux-musl";
 /// The targets: static programs, linked without a C compiler.
-const TARGETS: [&str; 2] = [HOST, "aarch64-unknown-linux-musl"];
+pub const TARGETS: [&str; 2] = [HOST, "aarch64-unknown-linux-musl"];
 /// The most bytes of an archive and of a program.
 const MOST_ARCHIVE: u64 = 25_000_000;
 const MOST_PROGRAM: u64 = 11_000_000;
@@ -23,12 +23,13 @@ const SHELLS: [&str; 4] = ["bash", "zsh", "fish", "powershell"];
 /// Writes an archive for each target into a folder, with the programs of the boards.
 pub fn archives(out: &Path, firmware: &[PathBuf]) -> anyhow::Result<()> {
     // Completions and manual pages are those of the program of this PC.
-    let host = build(HOST, cargo::root())?;
+    let host = build(&COMMAND, HOST, cargo::root())?;
     TARGETS.iter().try_for_each(|target| archive(target, &host, out, firmware))
 }
 
 fn archive(target: &str, host: &Path, out: &Path, firmware: &[PathBuf]) -> anyhow::Result<()> {
-    let program = if target == HOST { host.to_owned() } else { build(target, cargo::root())? };
+    let program =
+        if target == HOST { host.to_owned() } else { build(&COMMAND, target, cargo::root())? };
     let name = format!("sonarfix-{}-{target}", env!("CARGO_PKG_VERSION"));
     let folder = out.join(&name);
     if folder.exists() {
@@ -63,31 +64,56 @@ fn archive(target: &str, host: &Path, out: &Path, firmware: &[PathBuf]) -> anyho
     }
     let packed = out.join(format!("{name}.tar.gz"));
     pack(out, &name, &packed)?;
-    for (file, most) in [(&folder.join("sonarfix"), MOST_PROGRAM), (&packed, MOST_ARCHIVE)] {
-        let bytes = fs::metadata(file)?.len();
-        eprintln!("{}: {bytes} bytes", file.display());
-        ensure!(bytes <= most, "{} has more than {most} bytes", file.display());
-    }
+    bounded(&folder.join("sonarfix"), MOST_PROGRAM)?;
+    bounded(&packed, MOST_ARCHIVE)
+}
+
+/// Prints the size of a file, and fails if it is larger than that.
+fn bounded(file: &Path, most: u64) -> anyhow::Result<()> {
+    let bytes = fs::metadata(file)?.len();
+    eprintln!("{}: {bytes} bytes", file.display());
+    ensure!(bytes <= most, "{} has more than {most} bytes", file.display());
     Ok(())
 }
 
-/// Builds the program from the sources in `root`.
-fn build(target: &str, root: &Path) -> anyhow::Result<PathBuf> {
+/// A static program of a release.
+pub struct Program {
+    pub workspace: Workspace,
+    /// The package, and its profile.
+    pub package: &'static str,
+    pub profile: &'static str,
+    pub file: &'static str,
+    /// Further flags of the compiler.
+    pub flags: &'static [&'static str],
+}
+
+const COMMAND: Program = Program {
+    workspace: Workspace::Main,
+    package: "sonarfix-cli",
+    profile: "dist",
+    file: "sonarfix",
+    // A panic ends the program (Cargo.toml), and a backtrace without symbols has no use.
+    flags: &["-Cforce-unwind-tables=no"],
+};
+
+/// Builds a program from the sources in `root`.
+pub fn build(program: &Program, target: &str, root: &Path) -> anyhow::Result<PathBuf> {
+    let Program { workspace, package, profile, file, flags } = program;
     let mut rustup = Command::new("rustup");
     rustup.args(["target", "add", target]);
     cargo::check(rustup)?;
     let folder = cargo::target_folder().join("static");
     let mut command = cargo::command(&format!(
-        "build --locked --package sonarfix-cli --profile dist --target {target}"
+        "build --locked --package {package} --profile {profile} --target {target}"
     ));
-    command.current_dir(root).env("CARGO_TARGET_DIR", &folder);
-    // A panic ends the program (Cargo.toml), and a backtrace without symbols has no use.
-    cargo::reproducible(&mut command, root, &["-Cforce-unwind-tables=no"])?;
+    command.current_dir(root.join(workspace.path())).env("CARGO_TARGET_DIR", &folder);
+    cargo::reproducible(&mut command, root, flags)?;
+    symbols::same_in_every_folder(&mut command, root)?;
     // The linker of Rust, which knows every processor.
     let linker = format!("CARGO_TARGET_{}_LINKER", target.replace('-', "_").to_uppercase());
     command.env(linker, "rust-lld");
     cargo::check(command)?;
-    Ok(folder.join(target).join("dist/sonarfix"))
+    Ok(folder.join(target).join(profile).join(file))
 }
 
 /// Packs a folder; the archive has the same bytes for the same files.
@@ -99,16 +125,19 @@ pub fn pack(parent: &Path, name: &str, packed: &Path) -> anyhow::Result<()> {
     cargo::check(tar)
 }
 
+/// Runs a program in a root that has nothing but a folder.
+pub fn alone(folder: &Path, program: &str, arguments: &[&str]) -> anyhow::Result<()> {
+    let mut command = Command::new("unshare");
+    command.args(["--map-root-user", "chroot"]).arg(folder).arg(program).args(arguments);
+    command.stdin(Stdio::null());
+    cargo::check(command)
+}
+
 /// Checks the archive of this PC: the program runs in a root that has nothing else, and a build of the same sources in another
 /// folder has the same bytes.
 pub fn check(out: &Path, copy: &Path) -> anyhow::Result<()> {
     let folder = out.join(format!("sonarfix-{}-{HOST}", env!("CARGO_PKG_VERSION")));
-    let alone = |arguments: &[&str]| {
-        let mut command = Command::new("unshare");
-        command.args(["--map-root-user", "chroot"]).arg(&folder).arg("/sonarfix").args(arguments);
-        command.stdin(Stdio::null());
-        cargo::check(command)
-    };
+    let alone = |arguments: &[&str]| alone(&folder, "/sonarfix", arguments);
     alone(&["paper", "--out", "/report"])?;
     ensure!(folder.join("report/report.html").is_file(), "`sonarfix paper` wrote no report");
     alone(&["init", "/robot", "--board", "pico"])?;
@@ -121,7 +150,7 @@ pub fn check(out: &Path, copy: &Path) -> anyhow::Result<()> {
         fs::remove_dir_all(folder.join(made))?;
     }
     let first = fs::read(folder.join("sonarfix"))?;
-    let second = fs::read(build(HOST, copy)?)?;
+    let second = fs::read(build(&COMMAND, HOST, copy)?)?;
     ensure!(first == second, "the program of another folder has other bytes");
     Ok(())
 }
