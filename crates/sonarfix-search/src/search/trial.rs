@@ -160,8 +160,8 @@ impl Trial {
     /// wanted final score would have. Earlier stages are less sharp and ask for less.
     fn least_sum(&self, pings: usize) -> f32 {
         let (share, slack) = match self.stage {
-            Stage::Coarse => (0.5, 0.3),
-            Stage::Step(0) => (0.7, 0.15),
+            Stage::Coarse => (0.5, 0.0),
+            Stage::Step(0) => (0.7, 0.0),
             Stage::Step(_) | Stage::Fine => (0.9, 0.1),
         };
         let rate = share * self.least / count(pings) - slack;
