@@ -16,7 +16,7 @@ use sonarfix_map::{CLASSROOM, FileError, Scenario};
 use sonarfix_sim::progress::Progress;
 use sonarfix_sim::simulate::SimulationError;
 
-use crate::sweeping_robot::drive;
+use crate::sweeping_robot::{Drive, drive};
 
 /// The path: figures of eight of 8.8 m, with turns both ways.
 const PATH: &str = "start = [1.2, 0.7]
@@ -139,70 +139,101 @@ pub fn trials(
 /// # Errors
 /// [`CalibrationStudyError`].
 pub fn trial(seed: u64, metres: f64, errors: Errors) -> Result<Trial, CalibrationStudyError> {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0xCA11_B8A7);
-    let errors = errors.drawn(&mut rng);
-    let mut scenario = Scenario::parse(&text(metres), "classroom.toml", Path::new(""))?;
-    let robot = scenario.robot;
-    let truth = &mut scenario.truth;
-    [truth.scale_right, truth.scale_left] = errors.wheels;
-    truth.track_width = f64::from(robot.localizer.drive.track_width.0) * (1.0 + errors.track);
-    truth.range_scale = errors.range;
-    #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
-    let [mount, offset, scale] =
-        [errors.mount, errors.bearing, 1.0 + errors.servo].map(|value| value as f32);
-    let true_robot = &mut scenario.robot;
-    let at = true_robot.localizer.rangers.first.mount;
-    true_robot.localizer.rangers.first.mount = Point::new(at.x.0 + mount, at.y.0 - mount);
-    for pulse in &mut true_robot.rangers.first.servo_pulses {
-        pulse.bearing = Radians(offset + scale * pulse.bearing.0);
-    }
-    let width = scenario.truth.track_width;
-    let (mut drive, simulation) = drive(scenario, robot, seed)?;
-    drive.recording.cut(metres);
-    let floor = simulation.scenario.floor.named_walls();
-    let walls: Vec<Wall> =
-        floor.iter().filter_map(|wall| Wall::new(wall.from(), wall.to())).collect();
-    let nominal = log::nominal(&robot, true);
-    let outcome = calibrate(&drive.recording, &walls, &nominal)
-        .map(|found| compare(&found, &errors, simulation.range_scale(), width, metres, &nominal));
-    Ok(Trial { seed, outcome })
+    let robot = Simulated::new(seed, metres, errors)?;
+    Ok(Trial { seed, outcome: robot.calibrated().map(|found| robot.compare(&found)) })
 }
 
-fn compare(
-    found: &Calibration,
-    errors: &Errors,
+/// A simulated robot after its drive.
+#[derive(Debug, Clone)]
+pub struct Simulated {
+    /// What it recorded, and its true poses.
+    pub drive: Drive,
+    /// The map.
+    pub walls: Vec<Wall>,
+    /// Its file.
+    pub nominal: Nominal,
+    /// How much the file differs from the truth.
+    pub errors: Errors,
     range_scale: f64,
     track_width: f64,
     metres: f64,
-    nominal: &Nominal,
-) -> Vec<Compared> {
-    let [ahead, left] = nominal.mount;
-    let wheel = if metres < LONG { 0.005 } else { 0.003 };
-    let truths = [
-        (Name::Right, "right wheel", errors.wheels[0], wheel),
-        (Name::Left, "left wheel", errors.wheels[1], wheel),
-        (Name::Track, "track width", track_width / nominal.track_width - 1.0, 0.01),
-        (Name::RangeScale, "range", range_scale, 0.002),
-        (Name::MountAhead, "mount ahead", ahead + errors.mount, 0.003),
-        (Name::MountLeft, "mount left", left - errors.mount, 0.003),
-    ];
-    let mut compared: Vec<Compared> = Vec::new();
-    for (name, label, truth, limit) in truths {
-        if let Some(estimate) = found.estimates.iter().find(|estimate| estimate.name == name) {
-            let (error, deviation) = (estimate.value - truth, estimate.deviation);
-            compared.push(Compared { name: label, error, deviation, limit });
+}
+
+impl Simulated {
+    /// Simulates a drive.
+    ///
+    /// # Errors
+    /// [`CalibrationStudyError`].
+    pub fn new(seed: u64, metres: f64, errors: Errors) -> Result<Self, CalibrationStudyError> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0xCA11_B8A7);
+        let errors = errors.drawn(&mut rng);
+        let mut scenario = Scenario::parse(&text(metres), "classroom.toml", Path::new(""))?;
+        let robot = scenario.robot;
+        let truth = &mut scenario.truth;
+        [truth.scale_right, truth.scale_left] = errors.wheels;
+        truth.track_width = f64::from(robot.localizer.drive.track_width.0) * (1.0 + errors.track);
+        truth.range_scale = errors.range;
+        #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
+        let [mount, offset, scale] =
+            [errors.mount, errors.bearing, 1.0 + errors.servo].map(|value| value as f32);
+        let true_robot = &mut scenario.robot;
+        let at = true_robot.localizer.rangers.first.mount;
+        true_robot.localizer.rangers.first.mount = Point::new(at.x.0 + mount, at.y.0 - mount);
+        for pulse in &mut true_robot.rangers.first.servo_pulses {
+            pulse.bearing = Radians(offset + scale * pulse.bearing.0);
         }
+        let track_width = scenario.truth.track_width;
+        let (mut drive, simulation) = drive(scenario, robot, seed)?;
+        drive.recording.cut(metres);
+        let floor = simulation.scenario.floor.named_walls();
+        let walls: Vec<Wall> =
+            floor.iter().filter_map(|wall| Wall::new(wall.from(), wall.to())).collect();
+        let nominal = log::nominal(&robot, true);
+        let range_scale = simulation.range_scale();
+        Ok(Self { drive, walls, nominal, errors, range_scale, track_width, metres })
     }
-    if let Some(bearings) = &found.bearings {
-        let limit = 0.5_f64.to_radians();
-        let (error, deviation) = (bearings.offset - errors.bearing, bearings.offset_deviation);
-        compared.push(Compared { name: "bearing", error, deviation, limit });
-        // Half a degree at 90°.
-        let (error, deviation) = (bearings.scale - 1.0 - errors.servo, bearings.scale_deviation);
-        let limit = limit / std::f64::consts::FRAC_PI_2;
-        compared.push(Compared { name: "servo scale", error, deviation, limit });
+
+    /// Its calibration.
+    ///
+    /// # Errors
+    /// [`CalibrateError`].
+    pub fn calibrated(&self) -> Result<Calibration, CalibrateError> {
+        calibrate(&self.drive.recording, &self.walls, &self.nominal)
     }
-    compared
+
+    /// Compares a calibration with the truth.
+    #[must_use]
+    pub fn compare(&self, found: &Calibration) -> Vec<Compared> {
+        let (errors, nominal) = (&self.errors, &self.nominal);
+        let [ahead, left] = nominal.mount;
+        let wheel = if self.metres < LONG { 0.005 } else { 0.003 };
+        let truths = [
+            (Name::Right, "right wheel", errors.wheels[0], wheel),
+            (Name::Left, "left wheel", errors.wheels[1], wheel),
+            (Name::Track, "track width", self.track_width / nominal.track_width - 1.0, 0.01),
+            (Name::RangeScale, "range", self.range_scale, 0.002),
+            (Name::MountAhead, "mount ahead", ahead + errors.mount, 0.003),
+            (Name::MountLeft, "mount left", left - errors.mount, 0.003),
+        ];
+        let mut compared: Vec<Compared> = Vec::new();
+        for (name, label, truth, limit) in truths {
+            if let Some(estimate) = found.estimates.iter().find(|estimate| estimate.name == name) {
+                let (error, deviation) = (estimate.value - truth, estimate.deviation);
+                compared.push(Compared { name: label, error, deviation, limit });
+            }
+        }
+        if let Some(bearings) = &found.bearings {
+            let limit = 0.5_f64.to_radians();
+            let (error, deviation) = (bearings.offset - errors.bearing, bearings.offset_deviation);
+            compared.push(Compared { name: "bearing", error, deviation, limit });
+            // Half a degree at 90°.
+            let (error, deviation) =
+                (bearings.scale - 1.0 - errors.servo, bearings.scale_deviation);
+            let limit = limit / std::f64::consts::FRAC_PI_2;
+            compared.push(Compared { name: "servo scale", error, deviation, limit });
+        }
+        compared
+    }
 }
 
 /// The classroom's robot in a smaller room, with the path of the study.
