@@ -14,13 +14,10 @@ use crate::constants::{COUNT, Name};
 use crate::fit::Fit;
 use crate::problem::PosePrior;
 use crate::recording::Recording;
+use crate::reflector::Reflector;
 use crate::solve::{SolveError, covariance, solve};
 use crate::wall::Wall;
 
-/// Common scale of wheels and ranges from which further attempts start.
-const SCALE: f64 = 0.02;
-/// Standard deviation of the range scale below which the first attempt is the only one.
-const CERTAIN_SCALE: f64 = 0.002;
 /// Assumed where a half alone has no solution.
 const UNKNOWN_SCATTER: f64 = 3.0;
 
@@ -34,33 +31,9 @@ pub fn calibrate(
     nominal: &Nominal,
 ) -> Result<Calibration, CalibrateError> {
     let (chain, start) = Chain::of(recording)?;
-    let attempt = |scale: f64| -> Result<(Fit, Option<Bearings>), CalibrateError> {
-        let mut fit = Fit::new(recording, &chain, walls, nominal, start)?;
-        for name in [Name::Right, Name::Left, Name::RangeScale] {
-            fit.state.constants.set(name, scale);
-        }
-        let bearings = fit.run()?;
-        Ok((fit, bearings))
-    };
-    if walls.is_empty() {
-        let (fit, bearings) = attempt(0.0)?;
-        return fit.finish(bearings);
-    }
-    // Where opposite walls are seldom in reach, lengths have a common scale that is nearly free. Starts on both sides of
-    // the nominal one find a second minimum if there is one.
-    let mut best = attempt(0.0);
-    let is_certain = best.as_ref().is_ok_and(|(fit, _)| fit.scale_deviation() < CERTAIN_SCALE);
-    for scale in [SCALE, -SCALE] {
-        if is_certain {
-            break;
-        }
-        let Ok(other) = attempt(scale) else { continue };
-        best = match best {
-            Ok(best) if other.0.counted().0 <= best.0.counted().0 => Ok(best),
-            _ => Ok(other),
-        };
-    }
-    let (fit, bearings) = best?;
+    let reflectors = Reflector::of_walls(walls);
+    let mut fit = Fit::new(recording, &chain, &reflectors, nominal, start)?;
+    let bearings = fit.run()?;
     fit.finish(bearings)
 }
 
@@ -141,12 +114,12 @@ impl Fit<'_> {
     fn residuals(&self) -> Vec<Residual> {
         let problem = &self.problem;
         let associated = problem.matches.iter().enumerate();
-        let residuals = associated.filter_map(|(k, wall)| {
-            let wall = (*wall)?;
-            let term = problem.range_term(&self.state, k, wall)?;
+        let residuals = associated.filter_map(|(k, reflector)| {
+            let reflector = (*reflector)?;
+            let term = problem.range_term(&self.state, k, reflector)?;
             let time = problem.recording.pings[problem.chain.pings[k].index].time;
             let value = -term.residual;
-            Some(Residual { time, value, normalized: value / term.deviation, wall })
+            Some(Residual { time, value, normalized: value / term.deviation, reflector })
         });
         residuals.collect()
     }

@@ -123,8 +123,8 @@ pub struct Residual {
     pub value: f64,
     /// In standard deviations.
     pub normalized: f64,
-    /// The wall.
-    pub wall: usize,
+    /// Its reflector: the walls of the map in their order, then their corners.
+    pub reflector: usize,
 }
 
 /// A calibration.

@@ -19,8 +19,9 @@ use crate::noise;
 use crate::odometry::{compose, integrate, turned, wrap};
 use crate::problem::{PosePrior, Problem, State};
 use crate::recording::{Recording, StartPose};
+use crate::reflector::{Gate, Reflector, associate};
 use crate::solve::{SolveError, covariance, solve};
-use crate::wall::{Gate, Wall, associate, sonar};
+use crate::wall::sonar;
 
 /// Shortest drive, metres.
 const SHORTEST: f64 = 3.0;
@@ -61,7 +62,7 @@ impl<'a> Fit<'a> {
     pub(crate) fn new(
         recording: &'a Recording,
         chain: &'a Chain,
-        walls: &'a [Wall],
+        reflectors: &'a [Reflector],
         nominal: &'a Nominal,
         start: StartPose,
     ) -> Result<Self, CalibrateError> {
@@ -70,7 +71,7 @@ impl<'a> Fit<'a> {
             return Err(CalibrateError::TooShort(distance));
         }
         let echoes = chain.pings.iter().any(|event| recording.pings[event.index].range.is_some());
-        let has_ranges = echoes && !walls.is_empty();
+        let has_ranges = echoes && !reflectors.is_empty();
         let has_references = !recording.references.is_empty();
         if !has_ranges && !has_references {
             return Err(CalibrateError::NothingMeasured);
@@ -82,7 +83,7 @@ impl<'a> Fit<'a> {
         let problem = Problem {
             recording,
             chain,
-            walls,
+            reflectors,
             matches: vec![None; chain.pings.len()],
             noise: nominal.noise,
             priors,
@@ -184,14 +185,6 @@ impl<'a> Fit<'a> {
         self.refine(&[ROUNDS[1], ROUNDS[2]])
     }
 
-    /// Standard deviation of the range scale.
-    pub(crate) fn scale_deviation(&self) -> f64 {
-        let name = Name::RangeScale as usize;
-        let covariance = covariance(&self.problem, &self.state).ok();
-        covariance
-            .map_or(f64::INFINITY, |covariance| covariance.constants[(name, name)].max(0.0).sqrt())
-    }
-
     /// Predicts poses by odometry from the one before.
     fn predict(&mut self, poses: Range<usize>) {
         let drive = self.state.constants.drive();
@@ -236,12 +229,12 @@ impl<'a> Fit<'a> {
             let (at, direction) = sonar(&pose, ping.bearing, constants);
             let range = ping.range? - constants.get(Name::RangeOffset);
             let gate = Gate { range: widest, cone: self.cone };
-            let wall = associate(problem.walls, at, direction, range, scale, gate)?;
-            let term = problem.range_term(&self.state, k, wall)?;
+            let reflector = associate(problem.reflectors, at, direction, range, scale, gate)?;
+            let term = problem.range_term(&self.state, k, reflector)?;
             let spread = problem.variance(covariance, event.pose, &term) + term.deviation.powi(2);
             let limit = COMPATIBLE * spread.sqrt();
             used = used.max(limit.min(widest));
-            (term.residual.abs() <= limit).then_some(wall)
+            (term.residual.abs() <= limit).then_some(reflector)
         });
         self.problem.matches = matches.collect();
         used
@@ -278,19 +271,20 @@ impl<'a> Fit<'a> {
             before = Some(ping.bearing);
             let (pose, ..) = problem.pose_at(&self.state, event);
             let (at, direction) = sonar(&pose, ping.bearing, constants);
-            let feet =
-                problem.walls.iter().enumerate().map(|(i, wall)| (i, wall.foot(at, direction)));
-            let ahead =
-                feet.filter(|(i, foot)| problem.walls[*i].has(foot) && foot.off_axis.abs() < ASIDE);
-            let first = ahead.min_by(|a, b| a.1.signed.abs().total_cmp(&b.1.signed.abs()));
-            let Some((wall, foot)) = first else { continue };
-            let inside =
-                foot.along > FROM_END && foot.along < problem.walls[wall].length() - FROM_END;
-            let distance = foot.signed.abs();
+            let walls = problem.reflectors.iter().enumerate().filter_map(|(i, reflector)| {
+                let Reflector::Wall(wall) = reflector else { return None };
+                Some((i, wall, reflector.view(at, direction)))
+            });
+            let ahead = walls.filter(|(.., view)| view.answers && view.off_axis.abs() < ASIDE);
+            let first = ahead.min_by(|a, b| a.2.distance.total_cmp(&b.2.distance));
+            let Some((reflector, wall, view)) = first else { continue };
+            let foot = wall.foot(at, direction);
+            let inside = foot.along > FROM_END && foot.along < wall.length() - FROM_END;
+            let distance = view.distance;
             if !inside || distance < nearest + 0.05 || distance > 0.8 * farthest {
                 continue;
             }
-            let term = problem.range_term(&self.state, k, wall);
+            let term = problem.range_term(&self.state, k, reflector);
             let answered = term.is_some_and(|term| term.residual.abs() < 5.0 * term.deviation);
             // Another object was nearer: the wall had no chance.
             let is_hidden = term.is_some_and(|term| term.residual > 5.0 * term.deviation);
@@ -335,7 +329,8 @@ impl<'a> Fit<'a> {
             if ping.range.is_none() {
                 continue;
             }
-            let term = problem.matches[k].and_then(|wall| problem.range_term(&self.state, k, wall));
+            let term = problem.matches[k]
+                .and_then(|reflector| problem.range_term(&self.state, k, reflector));
             if term.is_some_and(|term| term.residual.abs() <= noise::INLIER * term.deviation) {
                 inliers += 1;
                 expected += 1;
@@ -343,13 +338,11 @@ impl<'a> Fit<'a> {
             }
             let (pose, ..) = problem.pose_at(&self.state, event);
             let (at, direction) = sonar(&pose, ping.bearing, &self.state.constants);
-            let has_wall = problem.walls.iter().any(|wall| {
-                let foot = wall.foot(at, direction);
-                wall.has(&foot)
-                    && foot.off_axis.abs() < 0.15
-                    && foot.signed.abs() < self.nominal.reach[1]
+            let has_reflector = problem.reflectors.iter().any(|reflector| {
+                let view = reflector.view(at, direction);
+                view.answers && view.off_axis.abs() < 0.15 && view.distance < self.nominal.reach[1]
             });
-            expected += usize::from(has_wall);
+            expected += usize::from(has_reflector);
         }
         (inliers, expected)
     }

@@ -10,7 +10,8 @@
 //! | [`log`] | reads it from a log |
 //! | [`chain_of_poses`] | the poses, the travel between them, the pings of each |
 //! | [`odometry`] | the motion by a travel, its derivatives and noise |
-//! | [`wall`] | which wall a ping comes from |
+//! | [`wall`] | a wall, and the sonar beside it |
+//! | [`reflector`] | which wall or corner a ping comes from |
 //! | [`constants`] | the constants and their priors |
 //! | [`problem`] | residuals and derivatives |
 //! | [`chain`] | normal equations of a chain, their solution and covariance |
@@ -35,6 +36,7 @@ pub mod noise;
 pub mod odometry;
 pub mod problem;
 pub mod recording;
+pub mod reflector;
 pub mod robot_edit;
 pub mod solve;
 pub mod turned;

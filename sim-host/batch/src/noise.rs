@@ -54,10 +54,11 @@ pub fn estimate(problem: &Problem, state: &State, covariance: &Covariance) -> No
 fn ranges(problem: &Problem, state: &State, covariance: &Covariance) -> Group {
     let mut group = Group::default();
     for (k, event) in problem.chain.pings.iter().enumerate() {
-        let Some(wall) = problem.matches[k].filter(|_| problem.window.contains(&event.pose)) else {
+        let Some(reflector) = problem.matches[k].filter(|_| problem.window.contains(&event.pose))
+        else {
             continue;
         };
-        let Some(term) = problem.range_term(state, k, wall) else { continue };
+        let Some(term) = problem.range_term(state, k, reflector) else { continue };
         let normalized = term.residual / term.deviation;
         if normalized.abs() > INLIER {
             continue;

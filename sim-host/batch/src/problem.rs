@@ -14,7 +14,8 @@ use crate::chain_of_poses::{Chain, Event};
 use crate::constants::{COUNT, Constants, Name, Priors};
 use crate::odometry::{Edge, compose, integrate, wrap};
 use crate::recording::{Recording, ReferencePose};
-use crate::wall::{Wall, sonar};
+use crate::reflector::Reflector;
+use crate::wall::sonar;
 
 /// A row of derivatives by the constants.
 pub type Row = SVector<f64, COUNT>;
@@ -76,9 +77,9 @@ pub struct Problem<'a> {
     pub recording: &'a Recording,
     /// Its chain of poses.
     pub chain: &'a Chain,
-    /// The map.
-    pub walls: &'a [Wall],
-    /// The wall of each ping of the chain; `None`: not used.
+    /// What of the map can answer.
+    pub reflectors: &'a [Reflector],
+    /// The reflector of each ping of the chain; `None`: not used.
     pub matches: Vec<Option<usize>>,
     /// Noises.
     pub noise: Noise,
@@ -150,40 +151,38 @@ impl Problem<'_> {
         (pose, by_pose, by_constants)
     }
 
-    /// The term of ping `k` of the chain with a wall.
+    /// The term of ping `k` of the chain with a reflector.
     #[must_use]
-    pub fn range_term(&self, state: &State, k: usize, wall: usize) -> Option<RangeTerm> {
+    pub fn range_term(&self, state: &State, k: usize, reflector: usize) -> Option<RangeTerm> {
         let event = &self.chain.pings[k];
         let ping = &self.recording.pings[event.index];
         let measured = ping.range?;
         let constants = &state.constants;
         let (pose, by_pose, of_pose) = self.pose_at(state, event);
         let (at, direction) = sonar(&pose, ping.bearing, constants);
-        let foot = self.walls[wall].foot(at, direction);
-        let towards = foot.signed.signum();
-        let (stretch, slope) =
-            (1.0 + constants.get(Name::RangeScale), constants.get(Name::OffAxis));
-        let distance = foot.signed.abs();
+        let view = self.reflectors[reflector].view(at, direction);
+        let stretch = 1.0 + constants.get(Name::RangeScale);
+        let (aside, off_axis) = (view.off_axis.signum(), view.off_axis.abs());
+        let slope = constants.get(Name::OffAxis) * aside;
         let expected =
-            stretch * distance + constants.get(Name::RangeOffset) + slope * foot.off_axis.abs();
-        let normal = foot.normal * (towards * stretch);
+            stretch * view.distance + constants.get(Name::RangeOffset) + slope * view.off_axis;
+        let by_position = view.away * stretch + view.turned * slope;
         let (sin, cos) = pose.z.sin_cos();
         let arm = at - Vector2::new(pose.x, pose.y);
-        let turned = Vector2::new(-arm.y, arm.x);
-        let by_heading = normal.dot(&turned) + slope * foot.off_axis.signum();
-        let by_event = Vector3::new(normal.x, normal.y, by_heading);
+        let by_heading = by_position.dot(&Vector2::new(-arm.y, arm.x)) + slope;
+        let by_event = Vector3::new(by_position.x, by_position.y, by_heading);
         let mut by_constants = of_pose.tr_mul(&by_event);
-        by_constants[Name::RangeScale as usize] = distance;
-        by_constants[Name::MountAhead as usize] = normal.dot(&Vector2::new(cos, sin));
-        by_constants[Name::MountLeft as usize] = normal.dot(&Vector2::new(-sin, cos));
+        by_constants[Name::RangeScale as usize] = view.distance;
+        by_constants[Name::MountAhead as usize] = by_position.dot(&Vector2::new(cos, sin));
+        by_constants[Name::MountLeft as usize] = by_position.dot(&Vector2::new(-sin, cos));
         by_constants[Name::RangeOffset as usize] = 1.0;
-        by_constants[Name::OffAxis as usize] = foot.off_axis.abs();
+        by_constants[Name::OffAxis as usize] = off_axis;
         Some(RangeTerm {
             residual: expected - measured,
             deviation: self.noise.of_range(expected),
             by_pose: by_pose.tr_mul(&by_event),
             by_constants,
-            off_axis: foot.off_axis,
+            off_axis: view.off_axis,
             expected,
         })
     }
@@ -274,9 +273,9 @@ impl Problem<'_> {
             }
         }
         for (k, event) in self.chain.pings.iter().enumerate() {
-            if let Some(wall) = self.matches[k]
+            if let Some(reflector) = self.matches[k]
                 && self.window.contains(&event.pose)
-                && let Some(term) = self.range_term(state, k, wall)
+                && let Some(term) = self.range_term(state, k, reflector)
             {
                 cost += self.add_range(event.pose, &term, &mut normal);
             }

@@ -1,4 +1,4 @@
-//! A wall of the map, and which wall a ping came from.
+//! A wall of the map, and the sonar beside it.
 
 use nalgebra::{Vector2, Vector3};
 
@@ -24,15 +24,6 @@ pub struct Foot {
     pub along: f64,
     /// Angle of the beam's axis off the direction to the foot, radians.
     pub off_axis: f64,
-}
-
-/// What a ping can be associated with.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Gate {
-    /// Largest difference between range and distance, metres.
-    pub range: f64,
-    /// Largest angle off the axis, radians.
-    pub cone: f64,
 }
 
 impl Wall {
@@ -70,13 +61,6 @@ impl Wall {
         let off_axis = wrap(direction - towards.y.atan2(towards.x));
         Foot { signed, normal, along: self.along.dot(&relative), off_axis }
     }
-
-    /// Whether a foot is on the wall, to 5 cm.
-    #[must_use]
-    pub fn has(&self, foot: &Foot) -> bool {
-        const BEYOND: f64 = 0.05;
-        foot.along >= -BEYOND && foot.along <= self.length + BEYOND
-    }
 }
 
 /// Position and direction of the sonar of a robot at a pose, with a commanded bearing.
@@ -86,26 +70,4 @@ pub fn sonar(pose: &Vector3<f64>, bearing: f64, constants: &Constants) -> (Vecto
     let (ahead, left) = (constants.get(Name::MountAhead), constants.get(Name::MountLeft));
     let at = Vector2::new(pose.x + cos * ahead - sin * left, pose.y + sin * ahead + cos * left);
     (at, pose.z + constants.bearing(bearing))
-}
-
-/// The wall whose expected range is nearest to the measured one, within the gate.
-#[must_use]
-pub fn associate(
-    walls: &[Wall],
-    at: Vector2<f64>,
-    direction: f64,
-    range: f64,
-    scale: f64,
-    gate: Gate,
-) -> Option<usize> {
-    let mut best: Option<(usize, f64)> = None;
-    for (index, wall) in walls.iter().enumerate() {
-        let foot = wall.foot(at, direction);
-        let error = (foot.signed.abs() * scale - range).abs();
-        let fits = wall.has(&foot) && foot.off_axis.abs() <= gate.cone && error <= gate.range;
-        if fits && best.is_none_or(|(_, least)| error < least) {
-            best = Some((index, error));
-        }
-    }
-    best.map(|(index, _)| index)
 }

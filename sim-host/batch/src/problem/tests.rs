@@ -3,6 +3,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::chain_of_poses::Spacing;
 use crate::recording::{Ping, Reading};
+use crate::wall::Wall;
 
 const H: f64 = 1e-6;
 
@@ -70,7 +71,10 @@ proptest! {
     ) {
         let recording = recording(&steps, bearing);
         let chain = Chain::build(&recording, 0.0, Spacing::CALIBRATION).unwrap();
-        let walls = [Wall::new([-9.0, -1.0], [9.0, -1.5]).unwrap()];
+        // Two walls and their corner.
+        let ends = [([-9.0, -1.0], [9.0, -1.5]), ([9.0, -1.5], [9.5, 4.5])];
+        let reflectors = Reflector::of_walls(&ends.map(|(from, to)| Wall::new(from, to).unwrap()));
+        prop_assert_eq!(reflectors.len(), 3);
         let mut constants = Constants::nominal(0.12, [0.0, 0.0]);
         constants.values = values;
         let pose = Vector3::new(x, y, heading);
@@ -81,7 +85,7 @@ proptest! {
         let problem = Problem {
             recording: &recording,
             chain: &chain,
-            walls: &walls,
+            reflectors: &reflectors,
             matches: vec![Some(0); chain.pings.len()],
             noise: Noise { wheel: 0.01, range: 0.01, range_per_metre: 0.0, position: 0.01, heading: 0.01 },
             priors: Priors::fixed_at(&constants),
@@ -91,11 +95,13 @@ proptest! {
         };
         let k = chain.pings.len() / 2;
         let at = chain.pings[k].pose;
-        let term = problem.range_term(&state, k, 0).unwrap();
-        // Where the wall is straight ahead the off-axis bias has a kink, behind the robot its angle jumps.
-        if term.off_axis.abs() > 1e-3 && term.off_axis.abs() < 3.1 {
-            let residual = |state: &State| problem.range_term(state, k, 0).unwrap().residual;
-            check(&state, at, term.by_pose.as_slice(), term.by_constants.as_slice(), residual)?;
+        for reflector in 0..reflectors.len() {
+            let term = problem.range_term(&state, k, reflector).unwrap();
+            // Where the reflector is straight ahead the off-axis bias has a kink, behind the robot its angle jumps.
+            if term.off_axis.abs() > 1e-3 && term.off_axis.abs() < 3.1 {
+                let residual = |state: &State| problem.range_term(state, k, reflector).unwrap().residual;
+                check(&state, at, term.by_pose.as_slice(), term.by_constants.as_slice(), residual)?;
+            }
         }
         let edge = problem.edge_term(&state, 1).unwrap();
         let reference = problem.reference_term(&state, 1).unwrap();
