@@ -45,6 +45,18 @@ const WIDE: f64 = 0.6;
 /// The same once the bearings are known.
 const NARROW: f64 = 0.45;
 
+/// Deviation of the wheels' difference while the window grows from a given one.
+const NEAR_START: f64 = 0.03;
+
+/// What the growth starts from, apart from the robot file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Start {
+    /// True bearing of a command of zero, radians.
+    pub(crate) bearing: f64,
+    /// Difference of the wheels' scales; `None`: only the prior bounds it.
+    pub(crate) wheel_difference: Option<f64>,
+}
+
 /// The estimation in progress.
 pub(crate) struct Fit<'a> {
     pub(crate) problem: Problem<'a>,
@@ -56,6 +68,8 @@ pub(crate) struct Fit<'a> {
     pub(crate) turned: [f64; 2],
     /// Whether wheel difference and track width are not separated.
     pub(crate) is_joint: bool,
+    /// Priors of the constants once the window is the whole recording.
+    priors: Priors,
 }
 
 impl<'a> Fit<'a> {
@@ -101,10 +115,24 @@ impl<'a> Fit<'a> {
             has_references,
             turned: [0.0; 2],
             is_joint: false,
+            priors,
         })
     }
 
-    /// Estimates everything, and checks the result.
+    /// Sets what the growth starts from. A narrower prior around it takes the place of the prior until the window is the whole
+    /// recording: the first step would otherwise return to the mean of the prior.
+    pub(crate) fn start_from(&mut self, start: Start) {
+        self.state.constants.bearing_offset = start.bearing;
+        if let Some(difference) = start.wheel_difference {
+            for (name, share) in [(Name::Right, 0.5), (Name::Left, -0.5)] {
+                self.state.constants.set(name, share * difference);
+            }
+            self.problem.priors.means = self.state.constants.values;
+            self.problem.priors.wheel_difference = NEAR_START;
+        }
+    }
+
+    /// Estimates everything.
     pub(crate) fn run(&mut self) -> Result<Option<Bearings>, CalibrateError> {
         if self.has_references {
             self.follow_references();
@@ -121,7 +149,6 @@ impl<'a> Fit<'a> {
             }
         }
         self.fit_noise()?;
-        self.check()?;
         Ok(bearings)
     }
 
@@ -148,6 +175,7 @@ impl<'a> Fit<'a> {
             known = end;
             self.refine(&ROUNDS)?;
         }
+        self.problem.priors = self.priors;
         self.refine(&[ROUNDS[1], ROUNDS[2], ROUNDS[2]])
     }
 
@@ -347,7 +375,21 @@ impl<'a> Fit<'a> {
         (inliers, expected)
     }
 
-    fn check(&self) -> Result<(), CalibrateError> {
+    /// Negative logarithm of the likelihood with the noises of the robot file, for the comparison of solutions: those noises are the
+    /// same for all, and an echo without a reflector costs as much as one far from it.
+    pub(crate) fn loss(&self) -> f64 {
+        let mut problem = self.problem.clone();
+        problem.noise = self.nominal.noise;
+        problem.kernel = noise::INLIER;
+        let unmatched = problem.chain.pings.iter().zip(&problem.matches).filter(|(event, of)| {
+            of.is_none() && problem.recording.pings[event.index].range.is_some()
+        });
+        #[expect(clippy::cast_precision_loss, reason = "numbers of pings")]
+        let unmatched = unmatched.count() as f64;
+        problem.linearize(&self.state).1 + unmatched * 0.5 * problem.kernel.powi(2)
+    }
+
+    pub(crate) fn check(&self) -> Result<(), CalibrateError> {
         if self.has_ranges {
             let (inliers, expected) = self.counted();
             if expected == 0 || share(inliers, expected) < FEWEST_INLIERS {

@@ -334,10 +334,11 @@ mod tests {
         }
     }
 
+    /// From the robot file alone the estimate ends in a wrong minimum for each of them.
     #[test]
-    fn wheels_that_are_ten_per_cent_wrong_are_found_or_refused() {
-        for trial in trials(70_100, 3, 20.0, Errors::GROSS, &|| ()).unwrap() {
-            let Ok(compared) = trial.outcome else { continue };
+    fn wheels_that_are_ten_per_cent_wrong_are_found_from_several_starts() {
+        for seed in [330_001, 330_017] {
+            let compared = trial(seed, 20.0, Errors::GROSS).unwrap().outcome.unwrap();
             for Compared { name, error, deviation, limit } in compared {
                 assert!(
                     error.abs() <= 2.0 * limit.max(2.0 * deviation),
