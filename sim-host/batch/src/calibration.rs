@@ -47,19 +47,19 @@ pub enum CalibrateError {
         100.0 * share(*inliers, *expected), 100.0 * FEWEST_INLIERS
     )]
     FewInliers {
-        /// Echoes within three deviations of their wall.
+        /// Echoes within three deviations of their reflector.
         inliers: usize,
-        /// Echoes for which the map has a wall.
+        /// Echoes for which the map has a reflector.
         expected: usize,
     },
     /// The path has left the map.
     #[error(
-        "only {inliers} of {echoes} echoes are those of a wall of the map ({:.0} %, needed: {:.0} %): the estimated path is \
+        "only {inliers} of {echoes} echoes are those of a wall or corner of the map ({:.0} %, needed: {:.0} %): the estimated path is \
          not in the room. Check map, start pose and robot file",
         100.0 * share(*inliers, *echoes), 100.0 * FEWEST_EXPLAINED
     )]
     Unexplained {
-        /// Echoes within three deviations of their wall.
+        /// Echoes within three deviations of their reflector.
         inliers: usize,
         /// All echoes.
         echoes: usize,
@@ -142,9 +142,9 @@ pub struct Calibration {
     pub trajectory: Vec<(f64, Vector3<f64>, Vector3<f64>)>,
     /// Residuals of the associated ranges.
     pub residuals: Vec<Residual>,
-    /// Echoes within three deviations of their wall.
+    /// Echoes within three deviations of their reflector.
     pub inliers: usize,
-    /// Echoes for which the map has a wall.
+    /// Echoes for which the map has a reflector.
     pub expected: usize,
     /// Poses compared with the reference stream.
     pub referenced: usize,

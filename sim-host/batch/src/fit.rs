@@ -2,7 +2,7 @@
 //!
 //! A loss that forgets outliers has wrong minima, whose likelihood can be higher than that of the right one. The estimate
 //! therefore grows. A window from the start is extended by at most 15 % of its length, so that it predicts the poses beyond
-//! it. In three rounds its pings are associated again with the walls, each round with a narrower kernel.
+//! it. In three rounds its pings are associated again with the reflectors, each round with a narrower kernel.
 
 #![expect(clippy::indexing_slicing, reason = "matches have the length of the chain")]
 
@@ -40,7 +40,7 @@ const SAME_WHEELS: f64 = 0.005;
 const ROUNDS: [f64; 3] = [0.30, 0.15, 0.08];
 /// Largest innovation of an echo that is associated, in its standard deviations.
 const COMPATIBLE: f64 = 4.0;
-/// Angle off the axis at which an echo can still be a wall's, radians: servo and mount may be wrong by 15°.
+/// Angle off the axis at which an echo can still be a reflector's, radians: servo and mount may be wrong by 15°.
 const WIDE: f64 = 0.6;
 /// The same once the bearings are known.
 const NARROW: f64 = 0.45;
@@ -241,7 +241,7 @@ impl<'a> Fit<'a> {
         Ok(())
     }
 
-    /// Associates each ping with the wall whose expected range is nearest, within [`COMPATIBLE`] deviations of the
+    /// Associates each ping with the reflector whose expected range is nearest, within [`COMPATIBLE`] deviations of the
     /// innovation, and `widest` metres at most. Returns the widest gate used.
     fn associate(&mut self, widest: f64, covariance: &Covariance) -> f64 {
         let problem = &self.problem;
@@ -348,7 +348,7 @@ impl<'a> Fit<'a> {
         (8.0 * self.problem.noise.of_range(1.0)).clamp(0.05, 0.3)
     }
 
-    /// Numbers of inliers, and of echoes for which the map has a wall that is not hidden.
+    /// Numbers of inliers, and of echoes for which the map has a reflector.
     pub(crate) fn counted(&self) -> (usize, usize) {
         let problem = &self.problem;
         let (mut inliers, mut expected) = (0, 0);

@@ -203,7 +203,7 @@ fn estimates(found: &Calibration, robot: &RobotConfig) -> Table {
     let row = |estimate: &Estimate| {
         let Shown { label, value, interval } = shown(estimate, robot);
         let determined = match estimate.determined {
-            Determined::Yes => "",
+            Determined::Yes => "yes",
             Determined::Jointly => "only together with the others of the drive",
             Determined::No => "not by this recording",
         };
@@ -248,7 +248,7 @@ fn estimates(found: &Calibration, robot: &RobotConfig) -> Table {
 fn statement(found: &Calibration) -> String {
     let [left, right] = found.turned.map(f64::to_degrees);
     let mut lines = vec![format!(
-        "{:.1} m, turns of {left:.0}° to the left and {right:.0}° to the right; {} of {} echoes from walls fit; \
+        "{:.1} m, turns of {left:.0}° to the left and {right:.0}° to the right; {} of {} echoes of walls and corners fit; \
          {} reference poses",
         found.distance, found.inliers, found.expected, found.referenced
     )];
@@ -276,7 +276,8 @@ fn statement(found: &Calibration) -> String {
     let unknown: Vec<&str> = unknown.map(|estimate| estimate.name.label()).collect();
     if !unknown.is_empty() {
         lines.push(format!(
-            "Not determined: {}. The robot file keeps its value.",
+            "Not determined: {}. The robot file keeps its value. Drive figures of eight where opposite walls are within \
+             reach: 20 m, for the track width 60 m.",
             unknown.join(", ")
         ));
     }
