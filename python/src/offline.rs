@@ -147,7 +147,7 @@ pub fn replay<'py>(
         let cone = robot.localizer.rangers.first.cone;
         let mut trace = floor.map_or_else(Trace::default, |floor| Trace::of(&floor, cone));
         let mut skipped = Vec::new();
-        let with = Replay { robot: &robot, walls: &walls, strict };
+        let with = Replay { robot: &robot, walls: &walls, strict, pings_per_scan: 1 };
         let reference = reference.as_deref().map(open).transpose()?;
         let mut report = |complaint: &Complaint| skipped.push(complaint.to_string());
         let summary = with.run(open(&log)?, reference, &mut trace, &mut report);

@@ -135,7 +135,7 @@ fn replay(
     let reference = args.reference.clone().or_else(|| usual.exists().then_some(usual));
     let reference = reference.as_deref().map(open).transpose()?;
     let walls = floor.walls();
-    let replay = Replay { robot, walls: &walls, strict: false };
+    let replay = Replay { robot, walls: &walls, strict: false, pings_per_scan: 1 };
     let summary = replay.run(open(&args.file)?, reference, recorder, &mut |_| {});
     summary.with_context(|| args.file.display().to_string())
 }

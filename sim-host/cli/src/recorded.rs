@@ -104,7 +104,7 @@ fn replayed(file: &Path, sources: Sources<'_>) -> anyhow::Result<Run> {
     let reference = file.with_file_name("reference.csv");
     let truth = reference.exists().then(|| open(&reference)).transpose()?;
     let walls = floor.walls();
-    let replay = Replay { robot: &robot, walls: &walls, strict: false };
+    let replay = Replay { robot: &robot, walls: &walls, strict: false, pings_per_scan: 1 };
     let mut thinned = Thinned::new(&floor, robot.localizer.rangers.first.cone, CAPACITY);
     let mut statistics = RunStatistics::default();
     replay

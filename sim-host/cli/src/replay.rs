@@ -11,6 +11,7 @@ use sonarfix_map::{MapFile, robot_file};
 use sonarfix_plan::overrides::PolicyName;
 use sonarfix_replay::diagnosis::Diagnosis;
 use sonarfix_replay::fault::Complaint;
+use sonarfix_replay::scan::MOST_PINGS_PER_SCAN;
 use sonarfix_replay::thinned::{CAPACITY, Thinned};
 use sonarfix_replay::{ByVerdict, Figures, Replay, Summary};
 use sonarfix_report::{Report, Table};
@@ -44,6 +45,9 @@ pub struct Args {
     /// The policy that chooses the wall to measure; by default that of the robot file.
     #[arg(long, value_enum)]
     policy: Option<PolicyName>,
+    /// Takes up to N ranges of a scan while the pose is known, each at another wall, as a sonar that sweeps has time for.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_PINGS_PER_SCAN)))]
+    pings_per_scan: u32,
     /// Ends the replay at the first malformed line.
     #[arg(long)]
     strict: bool,
@@ -72,7 +76,8 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         robot.localizer.policy = policy.into();
     }
     let walls = floor.walls();
-    let with = Replay { robot: &robot, walls: &walls, strict: args.strict };
+    let pings_per_scan = args.pings_per_scan;
+    let with = Replay { robot: &robot, walls: &walls, strict: args.strict, pings_per_scan };
     let title = format!("Sonarfix: {}", args.log.display());
     let scene = serve::scene(title, "recording", &floor, &robot);
     if let Some(mut paced) =
@@ -285,10 +290,18 @@ fn verdicts(s: &Summary) -> Table {
     Table {
         title: "Position error by verdict".to_owned(),
         note: format!(
-            "shares are of the time; first lost (half a metre off, or verdict lost) {}\nrefused: {}",
+            "shares are of the time; first lost (half a metre off, or verdict lost) {}\n\
+             longest beyond 0.5 m and not reported as lost {}\nrefused: {}",
             consistency.first_loss.map_or_else(
                 || "never".to_owned(),
                 |loss| format!("after {:.1} m, {:.1} s", loss.distance, loss.time)
+            ),
+            consistency.longest_wrong.map_or_else(
+                || "never".to_owned(),
+                |longest| format!(
+                    "{:.1} s, {:.1} m, from {:.1} s on",
+                    longest.seconds, longest.distance, longest.since
+                )
             ),
             refusals.collect::<Vec<_>>().join(", ")
         ),

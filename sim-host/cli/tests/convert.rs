@@ -434,7 +434,8 @@ fn replay(folder: &Path) -> Summary {
     let robot = robot_file::read(&folder.join("robot.toml")).unwrap();
     let walls = floor.walls();
     let open = |name: &str| std::io::BufReader::new(fs::File::open(folder.join(name)).unwrap());
-    let replay = sonarfix_replay::Replay { robot: &robot, walls: &walls, strict: true };
+    let replay =
+        sonarfix_replay::Replay { robot: &robot, walls: &walls, strict: true, pings_per_scan: 1 };
     let mut report = |complaint: &Complaint| panic!("{complaint}");
     replay.run(open("log.csv"), Some(open("reference.csv")), &mut (), &mut report).unwrap()
 }

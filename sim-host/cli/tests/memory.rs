@@ -28,7 +28,7 @@ fn replay(seconds: u32) {
     let mut trace = Thinned::new(&floor, robot.localizer.rangers.first.cone, CAPACITY);
     let log = Endless::new(seconds, |s| second(s, Sonar::Scans).0);
     let reference = Endless::new(seconds, |s| second(s, Sonar::Scans).1);
-    let replay = Replay { robot: &robot, walls: &walls, strict: true };
+    let replay = Replay { robot: &robot, walls: &walls, strict: true, pings_per_scan: 1 };
     let summary = replay.run(log, Some(reference), &mut trace, &mut |_| {}).unwrap();
     assert_eq!(summary.encoder_records, u64::from(seconds) * 10);
     assert!(summary.position_rms.unwrap() < 0.01, "{summary:?}");

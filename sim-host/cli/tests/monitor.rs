@@ -106,7 +106,7 @@ fn log(received: &[Received]) -> Vec<u8> {
 /// The replay of a log, which must have no malformed line.
 fn replay(log: &[u8], scenario: &Scenario) -> (Trace, Summary) {
     let walls = scenario.floor.walls();
-    let replay = Replay { robot: &scenario.robot, walls: &walls, strict: true };
+    let replay = Replay { robot: &scenario.robot, walls: &walls, strict: true, pings_per_scan: 1 };
     let mut trace = Trace::default();
     let mut report = |complaint: &Complaint| panic!("{complaint}");
     let summary = replay.run(log, None::<&[u8]>, &mut trace, &mut report).unwrap();

@@ -129,7 +129,7 @@ fn replayed(
     };
     let walls = floor.walls();
     let mut run = Thinned::new(floor, robot.localizer.rangers.first.cone, CAPACITY);
-    let replay = Replay { robot, walls: &walls, strict: false };
+    let replay = Replay { robot, walls: &walls, strict: false, pings_per_scan: 1 };
     replay
         .run(recording.text.as_bytes(), None::<&[u8]>, &mut run, &mut |_| {})
         .with_context(|| recording.name.clone())?;

@@ -15,6 +15,7 @@
 //! | [`log`], `lines` | the log format, and lines that may be damaged |
 //! | `reference` | the true poses, read in step with the log |
 //! | `session` | the replay itself |
+//! | `measured` | walls that were measured in a scan |
 //! | `estimators` | navigator, search and dead reckoning |
 //! | `wheels` | travel between two readings of the encoders |
 //! | `gap` | periods in which a robot could not read its encoders |
@@ -34,6 +35,7 @@ pub mod find;
 mod gap;
 pub mod lines;
 pub mod log;
+mod measured;
 mod median;
 mod reference;
 mod replay;
@@ -48,4 +50,4 @@ pub use estimators::Searches;
 pub use lines::{LONGEST, Lines};
 pub use reference::HEADER as REFERENCE_HEADER;
 pub use replay::{Replay, Summary};
-pub use score::{ByVerdict, Consistency, Figures, FiguresByVerdict, Loss, Score, Verdicts};
+pub use score::{ByVerdict, Consistency, Delay, Figures, FiguresByVerdict, Loss, Score, Verdicts};

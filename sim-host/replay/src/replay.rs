@@ -27,6 +27,9 @@ pub struct Replay<'a> {
     pub walls: &'a [Wall],
     /// Whether a malformed line ends the replay.
     pub strict: bool,
+    /// The most ranges that are taken of one scan while the pose is known, each at another wall: 1 to
+    /// [`MOST_PINGS_PER_SCAN`](crate::scan::MOST_PINGS_PER_SCAN).
+    pub pings_per_scan: u32,
 }
 
 /// The result of a replay. Lengths in metres, angles in radians, times in seconds since the start.
@@ -131,7 +134,8 @@ impl Replay<'_> {
     ) -> Result<Summary, ReplayError> {
         let mut complaints = Complaints { strict: self.strict, in_log: 0, in_reference: 0, report };
         let reference = reference.map(Reference::open).transpose()?;
-        let mut session = Session::new(self.robot, self.walls, reference, recorder);
+        let mut session = Session::new(self.robot, self.walls, reference, recorder)
+            .with_pings_per_scan(self.pings_per_scan);
         let mut lines = Lines::of(log);
         reference::expect_header(&mut lines, Source::Log, log::HEADER)?;
         loop {

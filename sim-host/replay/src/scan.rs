@@ -7,7 +7,7 @@ use sonarfix_sim::angle;
 /// Duration of a measurement of a sonar that sweeps, microseconds: an HC-SR04 on an SG90.
 const PING_PERIOD: i64 = 120_000;
 /// Largest number of pings that one scan stands for: half a turn in steps of 20°.
-const PINGS_A_SCAN: i64 = 9;
+pub const MOST_PINGS_PER_SCAN: u32 = 9;
 
 /// The pings of a sonar that sweeps while scans are recorded.
 #[derive(Debug, Clone, Copy, Default)]
@@ -19,8 +19,9 @@ pub struct Sweep {
 impl Sweep {
     /// How many pings a scan at this time stands for, microseconds: those since the last one.
     pub fn pings_until(&mut self, time: i64) -> u32 {
-        let pings = ((time - self.until) / PING_PERIOD).clamp(0, PINGS_A_SCAN);
-        self.until = if pings < PINGS_A_SCAN { self.until + pings * PING_PERIOD } else { time };
+        let most = i64::from(MOST_PINGS_PER_SCAN);
+        let pings = ((time - self.until) / PING_PERIOD).clamp(0, most);
+        self.until = if pings < most { self.until + pings * PING_PERIOD } else { time };
         u32::try_from(pings).unwrap_or(0)
     }
 }
@@ -149,6 +150,17 @@ mod tests {
         assert_eq!(heard(0.65), Some(2.0));
         assert_eq!(heard(0.9), None);
         assert_eq!(heard(0.2), None);
+    }
+
+    #[test]
+    fn a_scan_stands_for_the_pings_since_the_last_one() {
+        let mut sweep = Sweep { until: 1_000_000 };
+        assert_eq!(sweep.pings_until(1_250_000), 2);
+        // 10 ms were left over.
+        assert_eq!(sweep.pings_until(1_350_000), 0);
+        assert_eq!(sweep.pings_until(1_360_000), 1);
+        assert_eq!(sweep.pings_until(9_000_000), MOST_PINGS_PER_SCAN);
+        assert_eq!(sweep.pings_until(9_119_999), 0, "what is above the limit is dropped");
     }
 
     #[test]

@@ -77,6 +77,9 @@ pub struct Score {
     beyond_three_sigma_at: Option<f64>,
     diverged_at: Option<f64>,
     first_loss: Option<Loss>,
+    /// Since when the position has been wrong without the verdict `Lost`.
+    wrong_since: Option<Loss>,
+    longest_wrong: Option<Delay>,
     by_verdict: [Errors; 3],
     /// Time of the latest row, seconds since the start.
     latest: f64,
@@ -118,9 +121,35 @@ impl Score {
         } else {
             self.within.add(verdict, seconds);
         }
+        if is_astray && verdict != Verdict::Lost {
+            let since = *self.wrong_since.get_or_insert(Loss { time, distance });
+            self.note_wrong(since, time, distance);
+        } else {
+            self.wrong_since = None;
+        }
         if distance_squared(estimate, error) > THREE_SIGMA {
             self.beyond_three_sigma += 1;
             self.beyond_three_sigma_at.get_or_insert(time);
+        }
+    }
+
+    /// Takes the verdict between two rows: `Lost` ends the time in which a wrong position was not reported.
+    pub fn note_verdict(&mut self, (time, distance): (f64, f64), verdict: Verdict) {
+        if verdict == Verdict::Lost
+            && let Some(since) = self.wrong_since.take()
+        {
+            self.note_wrong(since, time, distance);
+        }
+    }
+
+    fn note_wrong(&mut self, since: Loss, time: f64, distance: f64) {
+        let delay = Delay {
+            since: since.time,
+            seconds: time - since.time,
+            distance: distance - since.distance,
+        };
+        if self.longest_wrong.is_none_or(|longest| longest.seconds < delay.seconds) {
+            self.longest_wrong = Some(delay);
         }
     }
 
@@ -158,6 +187,7 @@ impl Score {
             beyond_half_a_metre: self.beyond.over(all),
             diverged_at: self.diverged_at,
             first_loss: self.first_loss,
+            longest_wrong: self.longest_wrong,
             errors: self.errors(),
             beyond_three_sigma_at: self.beyond_three_sigma_at,
             beyond_three_sigma: (self.rows() > 0).then(|| share(self.beyond_three_sigma)),
@@ -171,6 +201,17 @@ pub struct Loss {
     /// Seconds since the start.
     pub time: f64,
     /// Distance travelled until then, metres.
+    pub distance: f64,
+}
+
+/// How long, and how far, the position was wrong before the verdict was `Lost` or the position right again.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Delay {
+    /// Seconds since the start at its first row of the reference.
+    pub since: f64,
+    /// Seconds that it lasted.
+    pub seconds: f64,
+    /// Distance travelled meanwhile, metres.
     pub distance: f64,
 }
 
@@ -238,6 +279,8 @@ pub struct Consistency {
     pub diverged_at: Option<f64>,
     /// When the estimate was first lost.
     pub first_loss: Option<Loss>,
+    /// The longest time with the position error above half a metre without the verdict `Lost`; `None` if there was none.
+    pub longest_wrong: Option<Delay>,
     /// Errors by verdict.
     pub errors: FiguresByVerdict,
     /// When the position error first left the 99.73 % ellipse.
@@ -358,6 +401,37 @@ mod tests {
         let found = only_the_verdict.consistency();
         assert_eq!(found.first_loss, Some(Loss { time: 5.0, distance: 3.0 }));
         assert_eq!((found.diverged_at, found.errors.tracking), (None, None));
+    }
+
+    /// Wrong from 2 s on, reported as lost at 6.5 s between two rows; wrong again for a second; the end of the log ends the
+    /// last stretch.
+    #[test]
+    fn a_late_verdict_is_measured_in_seconds_and_metres() {
+        let truth = Pose::default();
+        let mut score = Score::default();
+        let add = |score: &mut Score, time, error, verdict| {
+            let estimate = Estimate { verdict, ..estimate(error, 0.0) };
+            score.add((time, 0.25 * time), &estimate, &truth, &truth);
+        };
+        add(&mut score, 1.0, 0.1, Verdict::Tracking);
+        assert_eq!(score.consistency().longest_wrong, None);
+        add(&mut score, 2.0, 0.7, Verdict::Tracking);
+        add(&mut score, 5.0, 2.0, Verdict::Degraded);
+        score.note_verdict((5.5, 1.375), Verdict::Degraded);
+        score.note_verdict((6.5, 1.625), Verdict::Lost);
+        let late = Delay { since: 2.0, seconds: 4.5, distance: 1.125 };
+        assert_eq!(score.consistency().longest_wrong, Some(late));
+        add(&mut score, 7.0, 2.0, Verdict::Lost);
+        add(&mut score, 8.0, 0.6, Verdict::Degraded);
+        add(&mut score, 9.0, 0.6, Verdict::Degraded);
+        add(&mut score, 10.0, 0.4, Verdict::Degraded);
+        // The last row was right: the verdict ends nothing.
+        score.note_verdict((40.0, 10.0), Verdict::Lost);
+        assert_eq!(score.consistency().longest_wrong, Some(late));
+        add(&mut score, 50.0, 0.6, Verdict::Degraded);
+        add(&mut score, 60.0, 0.6, Verdict::Degraded);
+        let late = Delay { since: 50.0, seconds: 10.0, distance: 2.5 };
+        assert_eq!(score.consistency().longest_wrong, Some(late));
     }
 
     #[test]

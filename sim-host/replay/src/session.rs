@@ -25,6 +25,7 @@ use crate::estimators::{Estimators, Searches};
 use crate::fault::{Fault, ReplayError};
 use crate::gap::Gap;
 use crate::log::Record;
+use crate::measured::Measured;
 use crate::reference::{Reference, micros, seconds};
 use crate::scan::{Cone, Scan, Sweep};
 use crate::score::{Score, Verdicts};
@@ -72,11 +73,12 @@ enum Echo {
         wall: Option<u32>,
         ranger: RangerId,
     },
-    /// Of a scan one range is used, if one is due; during a search, several are.
+    /// Of a scan ranges are used if one is due, and during a search.
     Scan {
         scan: Scan,
         is_due: bool,
-        swept: u32,
+        /// For how many the sonar has had time.
+        pings: u32,
     },
     /// There was no measurable wall.
     Skip,
@@ -149,7 +151,9 @@ pub struct Session<'a, R, V> {
     beams: usize,
     /// Time from which the next scan is used.
     next_fix: i64,
-    /// The pings of a robot that searches.
+    /// The most ranges that are taken of a scan while the pose is known.
+    pings_per_scan: u32,
+    /// The pings of a robot that takes several of a scan.
     sweep: Sweep,
     score: Score,
     tally: Tally,
@@ -178,10 +182,16 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
             pending: Vec::new(),
             beams: 0,
             next_fix: 0,
+            pings_per_scan: 1,
             sweep: Sweep::default(),
             score: Score::default(),
             tally: Tally::default(),
         }
+    }
+
+    /// With the most ranges that are taken of a scan while the pose is known.
+    pub fn with_pings_per_scan(self, pings_per_scan: u32) -> Self {
+        Self { pings_per_scan, ..self }
     }
 
     /// Processes the next record of the log.
@@ -233,7 +243,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
             }
             Record::Skip { time } => self.hold(micros(time), Echo::Skip),
             Record::Scan { time, scan } => {
-                self.hold(micros(time), Echo::Scan { scan, is_due: true, swept: 0 })
+                self.hold(micros(time), Echo::Scan { scan, is_due: true, pings: 0 })
             }
             Record::Pose { time, pose, position_deviation, heading_deviation } => {
                 let [x, y, heading, position, deviation] =
@@ -397,10 +407,12 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         }
         let beams = echo.beams();
         let is_searching = self.estimators.as_ref().is_some_and(Estimators::is_searching);
-        if let Echo::Scan { is_due, swept, .. } = &mut echo {
+        if let Echo::Scan { is_due, pings, .. } = &mut echo {
             *is_due = time >= self.next_fix;
-            *swept = if is_searching { self.sweep.pings_until(time) } else { 0 };
-            if !*is_due && *swept == 0 {
+            // A single range at the `fix_period` takes no time of the sweep.
+            let takes_several = is_searching || *is_due && self.pings_per_scan > 1;
+            *pings = if takes_several { self.sweep.pings_until(time) } else { 0 };
+            if !*is_due && *pings == 0 {
                 return Ok(());
             }
         }
@@ -478,7 +490,11 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
                         sweep(estimators, echo, &self.robot.localizer.rangers.first);
                     }
                     Echo::Scan { is_due: false, .. } => {}
-                    _ => self.measure(estimators, &measurement),
+                    Echo::Scan { scan, pings, .. } => {
+                        let pings = (*pings).min(self.pings_per_scan);
+                        self.measure_scan(estimators, &measurement, scan, pings);
+                    }
+                    _ => _ = self.measure(estimators, &measurement),
                 }
                 self.update(estimators, measurement.time);
             } else if let Some(row) = row {
@@ -529,7 +545,9 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         let mut before = estimators.localizer().health().verdict;
         while let Some(time) = estimators.miss(gap, until) {
             let now = estimators.localizer().health().verdict;
-            self.tally.verdicts.note(estimators.since_start(time), before, now);
+            let since_start = estimators.since_start(time);
+            self.tally.verdicts.note(since_start, before, now);
+            self.score.note_verdict((since_start, self.tally.distance), now);
             before = now;
             let truth = self.reference.as_ref().and_then(|r| r.pose_at(time));
             self.recorder.tick(|| estimators.tick(estimators.since_start(time), truth));
@@ -541,27 +559,52 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
         let before = estimators.localizer().health().verdict;
         estimators.update();
         let now = estimators.localizer().health().verdict;
-        self.tally.verdicts.note(estimators.since_start(time), before, now);
+        let since_start = estimators.since_start(time);
+        self.tally.verdicts.note(since_start, before, now);
+        self.score.note_verdict((since_start, self.tally.distance), now);
     }
 
-    /// Measures as the robot would have, or with the recorded bearing.
-    fn measure(&mut self, estimators: &mut Estimators, pending: &Pending) {
-        let navigator = &mut estimators.navigator;
-        let localizer = navigator.localizer();
-        let pose = localizer.pose();
+    /// Measures walls in a scan, at least one and at most `pings`, as long as the pose is known. Each ping is chosen with what
+    /// the ones before have told, and at another wall. Where no wall can be measured, each counts as a cycle without one, as it
+    /// would on the robot.
+    fn measure_scan(
+        &mut self,
+        estimators: &mut Estimators,
+        pending: &Pending,
+        scan: &Scan,
+        pings: u32,
+    ) {
+        let sonar = self.robot.localizer.rangers.first;
+        let mut measured: Option<Measured> = None;
+        for ping in 0..pings.max(1) {
+            if ping > 0 {
+                self.update(estimators, pending.time);
+                if estimators.is_searching() {
+                    return;
+                }
+            }
+            if let Some(measured) = &mut measured {
+                let Some(aim) = measured.next_aim(estimators.localizer()) else { return };
+                let measurement = measurement(estimators, pending.time, &sonar);
+                let range = scan.earliest(&Cone::of(&sonar, aim.bearing));
+                self.fix(estimators, Measurement { range, ..measurement }, &aim);
+            } else {
+                let first = self.measure(estimators, pending);
+                measured = first.map(|first| Measured::new(first, sonar.cone));
+            }
+        }
+    }
+
+    /// Measures as the robot would have, or with the recorded bearing; returns the aim, if there was a wall.
+    fn measure(&mut self, estimators: &mut Estimators, pending: &Pending) -> Option<Aim> {
         let sonar = match pending.echo {
             Echo::At { ranger, .. } => self.robot.localizer.rangers.get(ranger),
             _ => None,
         };
         let sonar = sonar.unwrap_or(&self.robot.localizer.rangers.first);
-        let mount = pose.to_map(sonar.mount);
-        let mut measurement = Measurement {
-            time: seconds(pending.time - estimators.epoch),
-            sonar: [mount.x.0.into(), mount.y.0.into()],
-            heading: pose.heading.radians().0.into(),
-            range: None,
-            source: None,
-        };
+        let mut measurement = measurement(estimators, pending.time, sonar);
+        let navigator = &mut estimators.navigator;
+        let localizer = navigator.localizer();
         #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
         let aim = match &pending.echo {
             Echo::At { bearing, wall: None, ranger, .. } => {
@@ -597,7 +640,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
                 self.tally.fixes.refused += 1;
                 *self.tally.refusals.entry(no_aim.to_string()).or_default() += 1;
                 self.recorder.fix(|| observe::no_aim_record(measurement, no_aim));
-                return;
+                return None;
             }
         };
         measurement.range = match &pending.echo {
@@ -605,9 +648,17 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
             Echo::Skip | Echo::Absolute { .. } | Echo::Pose(_) | Echo::Mode { .. } => None,
             Echo::Scan { scan, .. } => scan.earliest(&Cone::of(sonar, aim.bearing)),
         };
+        self.fix(estimators, measurement, &aim);
+        Some(aim)
+    }
+
+    /// Passes the range of a ping to the localizer.
+    fn fix(&mut self, estimators: &mut Estimators, measurement: Measurement, aim: &Aim) {
+        let navigator = &mut estimators.navigator;
+        let before = navigator.localizer().health().verdict;
         #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
         let range = measurement.range.map(|range| Metres(range as f32));
-        let fix = navigator.fix(&aim, range, estimators.search.as_deref_mut());
+        let fix = navigator.fix(aim, range, estimators.search.as_deref_mut());
         let localizer = navigator.localizer();
         let now = localizer.health().verdict;
         self.tally.verdicts.note(measurement.time, before, now);
@@ -622,7 +673,7 @@ impl<'a, R: BufRead, V: Recorder> Session<'a, R, V> {
             _ => fixes.refused += 1,
         }
         self.recorder.fix(|| {
-            let record = observe::fix_record(measurement, &aim, &fix, localizer);
+            let record = observe::fix_record(measurement, aim, &fix, localizer);
             FixRecord { why: record.why.filter(|_| aim.why != UNKNOWN), ..record }
         });
     }
@@ -659,6 +710,19 @@ impl Echo {
     }
 }
 
+/// A ping of a sonar at the estimated pose, without its range.
+fn measurement(estimators: &Estimators, time: i64, sonar: &RangerParameters) -> Measurement {
+    let pose = estimators.localizer().pose();
+    let mount = pose.to_map(sonar.mount);
+    Measurement {
+        time: seconds(time - estimators.epoch),
+        sonar: [mount.x.0.into(), mount.y.0.into()],
+        heading: pose.heading.radians().0.into(),
+        range: None,
+        source: None,
+    }
+}
+
 /// The pings of a robot that searches.
 fn sweep(estimators: &mut Estimators, echo: &Echo, sonar: &RangerParameters) {
     match echo {
@@ -667,8 +731,8 @@ fn sweep(estimators: &mut Estimators, echo: &Echo, sonar: &RangerParameters) {
             let range = range.map(|range| single([range])).map(|[range]| Metres(range));
             estimators.swept(Radians(bearing), range);
         }
-        Echo::Scan { scan, swept, .. } => {
-            for _ in 0..*swept {
+        Echo::Scan { scan, pings, .. } => {
+            for _ in 0..*pings {
                 let Some(bearing) = estimators.sweep() else { return };
                 let range = scan.specular(&Cone::of(sonar, bearing)).map(|range| single([range]));
                 estimators.swept(bearing, range.map(|[range]| Metres(range)));

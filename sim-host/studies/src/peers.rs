@@ -111,7 +111,7 @@ pub fn of_recordings(data: &Path) -> Result<Vec<Row>, PeerError> {
         let (robot, floor) = recordings::read(folder, robot)?;
         let walls = floor.walls();
         let mut beside = Beside::new(&robot.localizer, segments(&walls), 0);
-        recordings::replay(folder, &robot, &walls, &mut beside)?;
+        recordings::replay(folder, &robot, &walls, 1, &mut beside)?;
         Ok(beside.compared())
     };
     let mut rows: Vec<Row> = discover::discover(data)?

@@ -26,21 +26,25 @@ pub struct Findings {
     pub rows: Vec<Row>,
     /// What conversions reported, with the name of the recording.
     pub reports: Vec<(String, Vec<String>)>,
+    /// The most ranges that were taken of a scan while the pose was known.
+    pub pings_per_scan: u32,
     /// Files that contain no recording that can be replayed, and why.
     pub others: Vec<(String, &'static str)>,
 }
 
-/// Replays all recordings of a folder. An error of one recording is a row.
+/// Replays all recordings of a folder, with at most so many ranges of a scan while the pose is known. An error of one recording is a row.
 ///
 /// # Errors
 /// If the folder cannot be read, or no temporary folder can be created.
-pub fn findings(data: &Path) -> io::Result<Findings> {
+pub fn findings(data: &Path, pings_per_scan: u32) -> io::Result<Findings> {
     let found = discover::discover(data)?;
+    let replay = |recording| replays::replay(recording, pings_per_scan);
     let replayed: Vec<(Vec<Row>, Vec<String>)> =
-        found.recordings.par_iter().map(replays::replay).collect::<io::Result<_>>()?;
+        found.recordings.par_iter().map(replay).collect::<io::Result<_>>()?;
     let name = |recording: &Recording| recording.name.clone();
     let reports = found.recordings.iter().map(name);
     let (rows, reports_of): (Vec<_>, Vec<_>) = replayed.into_iter().unzip();
     let reports = reports.zip(reports_of).filter(|(_, reports)| !reports.is_empty()).collect();
-    Ok(Findings { rows: rows.into_iter().flatten().collect(), reports, others: found.others })
+    let rows = rows.into_iter().flatten().collect();
+    Ok(Findings { rows, reports, pings_per_scan, others: found.others })
 }

@@ -78,7 +78,7 @@ fn search(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) {
 
 fn replay_with(folder: &Path, cone: Option<f32>) -> Result<Summary, String> {
     let (robot, floor) = read(folder, "robot.toml")?;
-    replay(folder, &with_cone(robot, cone), &floor.walls(), &mut ())
+    replay(folder, &with_cone(robot, cone), &floor.walls(), 1, &mut ())
 }
 
 /// A robot file of a folder, and its map.
@@ -88,17 +88,18 @@ pub(crate) fn read(folder: &Path, robot: &str) -> Result<(RobotConfig, Floor), S
     Ok((robot_file::read(&folder.join(robot)).map_err(text)?, floor))
 }
 
-/// Replays the log of a folder, with its reference if there is one.
+/// Replays the log of a folder, with its reference if there is one, and at most so many ranges of a scan.
 pub(crate) fn replay(
     folder: &Path,
     robot: &RobotConfig,
     walls: &[Wall],
+    pings_per_scan: u32,
     recorder: &mut impl Recorder,
 ) -> Result<Summary, String> {
     let open = |name: &str| File::open(folder.join(name)).map(BufReader::new);
     let log = open("log.csv").map_err(|error| error.to_string())?;
     let reference = open("reference.csv").ok();
-    let replay = Replay { robot, walls, strict: false };
+    let replay = Replay { robot, walls, strict: false, pings_per_scan };
     replay.run(log, reference, recorder, &mut |_| {}).map_err(|error| error.to_string())
 }
 

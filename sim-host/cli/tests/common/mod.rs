@@ -199,13 +199,27 @@ pub struct Replayed {
 }
 
 pub fn try_replay(log: &[u8], reference: &str, strict: bool) -> Result<Replayed, ReplayError> {
+    replay_with(log, reference, strict, 1)
+}
+
+/// A replay with at most so many ranges of a scan.
+pub fn replay_scans(log: &str, reference: &str, pings_per_scan: u32) -> Replayed {
+    replay_with(log.as_bytes(), reference, false, pings_per_scan).unwrap()
+}
+
+fn replay_with(
+    log: &[u8],
+    reference: &str,
+    strict: bool,
+    pings_per_scan: u32,
+) -> Result<Replayed, ReplayError> {
     let floor = Floor::parse(MAP, "map.toml").unwrap();
     let robot = robot_file::parse(ROBOT, "robot.toml").unwrap();
     let walls = floor.walls();
     let mut trace = Thinned::new(&floor, robot.localizer.rangers.first.cone, 1000);
     let mut complaints = Vec::new();
     let mut report = |complaint: &Complaint| complaints.push(complaint.to_string());
-    let replay = Replay { robot: &robot, walls: &walls, strict };
+    let replay = Replay { robot: &robot, walls: &walls, strict, pings_per_scan };
     let reference = (!reference.is_empty()).then_some(reference.as_bytes());
     let summary = replay.run(log, reference, &mut trace, &mut report)?;
     Ok(Replayed { summary, trace, complaints })

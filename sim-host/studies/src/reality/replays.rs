@@ -46,7 +46,7 @@ const KEPT: usize = 5;
 ///
 /// # Errors
 /// If no temporary folder can be created. What is wrong with the recording is in its rows.
-pub fn replay(recording: &Recording) -> io::Result<(Vec<Row>, Vec<String>)> {
+pub fn replay(recording: &Recording, pings_per_scan: u32) -> io::Result<(Vec<Row>, Vec<String>)> {
     let folder = tempfile::tempdir()?;
     let mut reports = Vec::new();
     let mut more = 0_u64;
@@ -75,7 +75,8 @@ pub fn replay(recording: &Recording) -> io::Result<(Vec<Row>, Vec<String>)> {
     let mut rows = Vec::new();
     for (robot, file) in robots {
         for (policy, name) in POLICIES {
-            rows.push(row(robot, name, replay_with(folder.path(), file, policy)));
+            let outcome = replay_with(folder.path(), file, policy, pings_per_scan);
+            rows.push(row(robot, name, outcome));
         }
     }
     Ok((rows, reports))
@@ -104,11 +105,16 @@ fn convert(format: &Format, to: &Path, report: &mut dyn FnMut(String)) -> Result
     converted.map_err(|error| error.to_string())
 }
 
-fn replay_with(folder: &Path, robot: &str, policy: Policy) -> Result<Summary, String> {
+fn replay_with(
+    folder: &Path,
+    robot: &str,
+    policy: Policy,
+    pings_per_scan: u32,
+) -> Result<Summary, String> {
     check_reference(folder)?;
     let (mut robot, floor) = recordings::read(folder, robot)?;
     robot.localizer.policy = policy;
-    recordings::replay(folder, &robot, &floor.walls(), &mut ())
+    recordings::replay(folder, &robot, &floor.walls(), pings_per_scan, &mut ())
 }
 
 fn check_reference(folder: &Path) -> Result<(), String> {
