@@ -37,11 +37,11 @@ impl Measured {
         }
     }
 
-    /// Whether two pings measure two walls. In the cone of a ping the same return is the nearest, whichever wall was meant:
-    /// another segment of its line, or a wall behind it.
+    /// Whether two pings measure two walls. A return in the cones of both may be the nearest of both, whichever wall was meant:
+    /// that of another segment of the same line, of a wall behind it, or of a corner between them.
     fn are_apart(&self, one: &Aim, other: &Aim) -> bool {
         let turn = angle::wrap(f64::from((one.bearing - other.bearing).0)).abs();
-        one.wall != other.wall && turn > f64::from(self.cone.0)
+        one.wall != other.wall && turn > 2.0 * f64::from(self.cone.0)
     }
 }
 

@@ -147,3 +147,22 @@ The outcomes of all measurement cycles, and the reasons of refusals. *Accepted* 
     }
     table
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_page_states_how_many_ranges_a_scan_gives() {
+        let page = |pings_per_scan| {
+            let (rows, reports, others) = (Vec::new(), Vec::new(), Vec::new());
+            markdown(&Findings { rows, reports, pings_per_scan, others })
+        };
+        assert!(page(1).contains("A scan gives one range per measurement cycle (0.8 s): the\n"));
+        assert!(
+            page(3)
+                .contains("A scan gives up to 3 ranges per measurement cycle (0.8 s), as many\n")
+        );
+        assert!(page(3).contains("every time at another wall. A robot that is lost\n[searches]"));
+    }
+}
