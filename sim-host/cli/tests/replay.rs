@@ -5,8 +5,9 @@ use std::fmt::Write;
 
 use proptest::prelude::*;
 use sonarfix_replay::fault::ReplayError;
+use sonarfix_sim::trace::Calibration;
 
-use crate::common::{Sonar, recording, replay, try_replay};
+use crate::common::{Sonar, recording, replay, replay_scans, try_replay};
 
 const SECONDS: u32 = 60;
 
@@ -37,6 +38,68 @@ fn exact_scans_lead_to_the_exact_pose() {
     // One range in 400 ms of three scans per second: every second or third scan is used.
     let fixes = s.fixes.accepted + s.fixes.refused;
     assert!(fixes <= u64::from(SECONDS) * 5 / 2 + 1, "{fixes} fixes");
+}
+
+/// Recorded before a scan could give more: the estimates are those of a replay that takes one range.
+#[test]
+fn one_ping_per_scan_has_the_recorded_bits() {
+    let (log, reference) = recording(SECONDS, Sonar::Scans);
+    let s = replay(&log, &reference).summary;
+    // The estimates are `f32`, and every bit of them is in the `f64`.
+    let bits = |it: &Calibration| {
+        [it.scale_right, it.scale_left, it.track_width].map(|value| f64::to_bits(value) >> 29)
+    };
+    let found = (bits(&s.calibration), bits(&s.final_deviation));
+    let values = [25_639_744_214, 8_417_188_608, 8_561_412_379];
+    let deviations = [8_491_699_456, 8_489_347_664, 8_484_600_075];
+    assert_eq!(found, (values, deviations));
+    assert_eq!((s.fixes.accepted, s.fixes.gated, s.fixes.refused), (148, 0, 0));
+}
+
+#[test]
+fn several_pings_of_a_scan_are_at_different_walls_and_fit_into_its_time() {
+    let (log, reference) = recording(SECONDS, Sonar::Scans);
+    let one = replay(&log, &reference).summary;
+    for most in [2, 3, 9] {
+        let replayed = replay_scans(&log, &reference, most);
+        let s = &replayed.summary;
+        assert_eq!((s.fixes.gated, &replayed.complaints), (0, &vec![]), "{:?}", s.fixes);
+        assert!(s.position_rms < one.position_rms, "{:?} {:?}", s.position_rms, one.position_rms);
+        let fixes = &replayed.trace.trace().fixes;
+        let mut counts = Vec::new();
+        let mut last = 0.0;
+        for scan in fixes.chunk_by(|one, other| one.time.to_bits() == other.time.to_bits()) {
+            let mut walls: Vec<_> = scan.iter().map(|fix| fix.wall).collect();
+            walls.sort_unstable();
+            walls.dedup();
+            assert_eq!(walls.len(), scan.len(), "a wall twice at {} s", scan[0].time);
+            // A ping takes 120 ms; up to that much may be left of the time before.
+            let elapsed = scan[0].time - last;
+            assert!(scan.len() as f64 * 0.12 < elapsed + 0.12, "{} in {elapsed} s", scan.len());
+            last = scan[0].time;
+            counts.push(scan.len());
+        }
+        let largest = counts.iter().copied().max().unwrap();
+        assert_eq!(largest, most.min(4) as usize, "the box has four walls");
+    }
+}
+
+/// Far outside of the room there is no wall. A robot with a sonar finds that out at each ping, however seldom its recording
+/// has a scan.
+#[test]
+fn without_a_wall_each_ping_of_a_scan_counts() {
+    let mut log = "sonarfix-log,1\nstart,0,50,1.2,0,0.02,0.5\nticks,0,0,0\n".to_owned();
+    for second in 1..=20 {
+        writeln!(log, "scan,{second},-3.1,0.5,{}", "1.5 ".repeat(12)).unwrap();
+        writeln!(log, "ticks,{second}.5,0,0").unwrap();
+    }
+    let of = |most| replay_scans(&log, "", most).summary;
+    let (one, four, nine) = (of(1), of(4), of(9));
+    // A second has time for eight pings of 120 ms; the rest is left to the next one.
+    assert_eq!([&one, &four, &nine].map(|s| s.fixes.refused), [20, 80, 166]);
+    assert_eq!((one.refusals.len(), one.fixes.accepted + nine.fixes.accepted), (1, 0));
+    // After 30 such cycles the verdict is `Lost`: the fourth of the eighth scan, the sixth of the fourth.
+    assert_eq!([&one, &four, &nine].map(|s| s.health.lost_at), [None, Some(8.0), Some(4.0)]);
 }
 
 #[test]

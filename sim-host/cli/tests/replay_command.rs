@@ -28,6 +28,24 @@ fn sonarfix(dir: &Path, args: &[&str]) -> Output {
 }
 
 #[test]
+fn a_number_of_pings_that_is_no_scan_s_is_refused_with_the_limits() {
+    let (log, reference) = recording(5, Sonar::Scans);
+    let dir = folder(&log, &reference);
+    for wrong in ["0", "10", "two"] {
+        let output = sonarfix(dir.path(), &["replay", "log.csv", "--pings-per-scan", wrong]);
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert!(!output.status.success() && stderr.contains("--pings-per-scan <N>"), "{stderr}");
+        assert!(wrong == "two" || stderr.contains("is not in 1..=9"), "{stderr}");
+    }
+    let fixes = |most| {
+        let args = ["replay", "log.csv", "--json", "--pings-per-scan", most];
+        let found: Value = serde_json::from_slice(&sonarfix(dir.path(), &args).stdout).unwrap();
+        found["fixes"]["accepted"].as_u64().unwrap()
+    };
+    assert!(fixes("3") > 2 * fixes("1"), "{} {}", fixes("3"), fixes("1"));
+}
+
+#[test]
 fn files_beside_the_log_are_found_and_the_json_has_its_keys() {
     let (log, reference) = recording(20, Sonar::Scans);
     let dir = folder(&log, &reference);
