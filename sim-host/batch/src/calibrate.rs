@@ -45,15 +45,20 @@ pub fn calibrate(
     let reflectors = Reflector::of_walls(walls);
     // With a reference there is one minimum.
     let starts = if recording.references.is_empty() { STARTS.len() } else { 1 };
-    let mut best: Result<Attempt, CalibrateError> = Err(CalibrateError::NothingMeasured);
-    for &from in &STARTS[..starts] {
-        let fit = Fit::new(recording, &chain, &reflectors, nominal, start)?;
-        let next = Attempt::of(fit, from);
+    let attempt =
+        |from| Attempt::of(Fit::new(recording, &chain, &reflectors, nominal, start)?, from);
+    let mut best = attempt(STARTS[0]);
+    for &from in &STARTS[1..starts] {
+        let next = attempt(from);
+        // A bearing that the recording does not determine stays that of the start.
+        if from.bearing != 0.0 && next.as_ref().is_ok_and(|next| next.bearings.is_none()) {
+            continue;
+        }
         let is_confirmed = best.as_ref().is_ok_and(|best| best.is_confirmed_by(&next));
         best = match (best, next) {
-            (Ok(best), Ok(next)) if next.loss >= best.loss => Ok(best),
-            (Ok(best), Err(_)) => Ok(best),
-            (_, next) => next,
+            (Ok(best), Ok(next)) if next.loss < best.loss => Ok(next),
+            (Err(_), Ok(next)) => Ok(next),
+            (best, _) => best,
         };
         if is_confirmed {
             break;

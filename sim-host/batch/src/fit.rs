@@ -348,7 +348,8 @@ impl<'a> Fit<'a> {
         (8.0 * self.problem.noise.of_range(1.0)).clamp(0.05, 0.3)
     }
 
-    /// Numbers of inliers, and of echoes for which the map has a reflector.
+    /// Numbers of inliers, and of echoes that the map should explain. Echoes of corners count as neither: they answer less often, and not
+    /// to light, and in a wrong map some echo is always as far as a corner.
     pub(crate) fn counted(&self) -> (usize, usize) {
         let problem = &self.problem;
         let (mut inliers, mut expected) = (0, 0);
@@ -357,22 +358,28 @@ impl<'a> Fit<'a> {
             if ping.range.is_none() {
                 continue;
             }
-            let term = problem.matches[k]
-                .and_then(|reflector| problem.range_term(&self.state, k, reflector));
-            if term.is_some_and(|term| term.residual.abs() <= noise::INLIER * term.deviation) {
-                inliers += 1;
-                expected += 1;
+            if let Some(reflector) = problem.matches[k].filter(|of| self.is_inlier(k, *of)) {
+                let of_wall = usize::from(problem.reflectors[reflector].is_wall());
+                inliers += of_wall;
+                expected += of_wall;
                 continue;
             }
             let (pose, ..) = problem.pose_at(&self.state, event);
             let (at, direction) = sonar(&pose, ping.bearing, &self.state.constants);
-            let has_reflector = problem.reflectors.iter().any(|reflector| {
+            let has_wall = problem.reflectors.iter().any(|reflector| {
                 let view = reflector.view(at, direction);
-                view.answers && view.off_axis.abs() < 0.15 && view.distance < self.nominal.reach[1]
+                let is_near = view.off_axis.abs() < 0.15 && view.distance < self.nominal.reach[1];
+                reflector.is_wall() && view.answers && is_near
             });
-            expected += usize::from(has_reflector);
+            expected += usize::from(has_wall);
         }
         (inliers, expected)
+    }
+
+    /// Whether ping `k` of the chain is within three deviations of a reflector.
+    fn is_inlier(&self, k: usize, reflector: usize) -> bool {
+        let term = self.problem.range_term(&self.state, k, reflector);
+        term.is_some_and(|term| term.residual.abs() <= noise::INLIER * term.deviation)
     }
 
     /// Negative logarithm of the likelihood with the noises of the robot file, for the comparison of solutions: those noises are the

@@ -71,6 +71,12 @@ impl Reflector {
         reflectors
     }
 
+    /// Whether it is a wall.
+    #[must_use]
+    pub fn is_wall(&self) -> bool {
+        matches!(self, Self::Wall(_))
+    }
+
     /// The reflector from a sonar whose axis has this direction.
     #[must_use]
     pub fn view(&self, sonar: Vector2<f64>, direction: f64) -> View {

@@ -248,8 +248,7 @@ fn estimates(found: &Calibration, robot: &RobotConfig) -> Table {
 fn statement(found: &Calibration) -> String {
     let [left, right] = found.turned.map(f64::to_degrees);
     let mut lines = vec![format!(
-        "{:.1} m, turns of {left:.0}° to the left and {right:.0}° to the right; {} of {} echoes of walls and corners fit; \
-         {} reference poses",
+        "{:.1} m, turns of {left:.0}° to the left and {right:.0}° to the right; {} of {} echoes from walls fit; {} reference poses",
         found.distance, found.inliers, found.expected, found.referenced
     )];
     let noise = &found.noise;
