@@ -11,6 +11,7 @@ use sonarfix::geometry::units::Radians;
 use sonarfix_batch::calibrate::{CalibrateError, Calibration, Nominal, calibrate};
 use sonarfix_batch::constants::Name;
 use sonarfix_batch::log;
+use sonarfix_batch::recording::Recording;
 use sonarfix_batch::wall::Wall;
 use sonarfix_map::{CLASSROOM, FileError, Scenario};
 use sonarfix_sim::progress::Progress;
@@ -144,16 +145,13 @@ pub fn trial(seed: u64, metres: f64, errors: Errors) -> Result<Trial, Calibratio
 }
 
 /// A simulated robot after its drive.
-#[derive(Debug, Clone)]
-pub struct Simulated {
-    /// What it recorded, and its true poses.
-    pub drive: Drive,
-    /// The map.
-    pub walls: Vec<Wall>,
+struct Simulated {
+    recording: Recording,
+    walls: Vec<Wall>,
     /// Its file.
-    pub nominal: Nominal,
+    nominal: Nominal,
     /// How much the file differs from the truth.
-    pub errors: Errors,
+    errors: Errors,
     range_scale: f64,
     track_width: f64,
     metres: f64,
@@ -161,10 +159,7 @@ pub struct Simulated {
 
 impl Simulated {
     /// Simulates a drive.
-    ///
-    /// # Errors
-    /// [`CalibrationStudyError`].
-    pub fn new(seed: u64, metres: f64, errors: Errors) -> Result<Self, CalibrationStudyError> {
+    fn new(seed: u64, metres: f64, errors: Errors) -> Result<Self, CalibrationStudyError> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0xCA11_B8A7);
         let errors = errors.drawn(&mut rng);
         let mut scenario = Scenario::parse(&text(metres), "classroom.toml", Path::new(""))?;
@@ -183,27 +178,22 @@ impl Simulated {
             pulse.bearing = Radians(offset + scale * pulse.bearing.0);
         }
         let track_width = scenario.truth.track_width;
-        let (mut drive, simulation) = drive(scenario, robot, seed)?;
-        drive.recording.cut(metres);
+        let (Drive { mut recording, .. }, simulation) = drive(scenario, robot, seed)?;
+        recording.cut(metres);
         let floor = simulation.scenario.floor.named_walls();
         let walls: Vec<Wall> =
             floor.iter().filter_map(|wall| Wall::new(wall.from(), wall.to())).collect();
         let nominal = log::nominal(&robot, true);
         let range_scale = simulation.range_scale();
-        Ok(Self { drive, walls, nominal, errors, range_scale, track_width, metres })
+        Ok(Self { recording, walls, nominal, errors, range_scale, track_width, metres })
     }
 
-    /// Its calibration.
-    ///
-    /// # Errors
-    /// [`CalibrateError`].
-    pub fn calibrated(&self) -> Result<Calibration, CalibrateError> {
-        calibrate(&self.drive.recording, &self.walls, &self.nominal)
+    fn calibrated(&self) -> Result<Calibration, CalibrateError> {
+        calibrate(&self.recording, &self.walls, &self.nominal)
     }
 
     /// Compares a calibration with the truth.
-    #[must_use]
-    pub fn compare(&self, found: &Calibration) -> Vec<Compared> {
+    fn compare(&self, found: &Calibration) -> Vec<Compared> {
         let (errors, nominal) = (&self.errors, &self.nominal);
         let [ahead, left] = nominal.mount;
         let wheel = if self.metres < LONG { 0.005 } else { 0.003 };

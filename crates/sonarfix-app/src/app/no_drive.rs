@@ -9,7 +9,7 @@ use super::command::refused;
 use crate::time::NEVER;
 
 #[derive(Default)]
-pub(super) struct Drive;
+pub(super) struct Drive {}
 
 #[expect(clippy::unused_self, reason = "those of a commanded motion depend on it")]
 impl Drive {
