@@ -5,6 +5,9 @@ use std::fmt;
 use crate::floor::{Floor, NamedWall};
 use crate::geometry::{Point, Segment};
 
+/// From an addition to all walls but its own, metres.
+const CLEARANCE: f64 = 0.3;
+
 /// What stands at a wall, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Addition {
@@ -71,12 +74,80 @@ impl fmt::Display for Addition {
     }
 }
 
+/// An addition at a place of a wall.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlacedAddition {
+    /// What it is.
+    pub addition: Addition,
+    /// The wall at which it stands.
+    pub wall: usize,
+    /// The place of its middle there, metres.
+    pub at: Point,
+    /// Its faces, each from end to end, metres.
+    pub faces: Vec<[Point; 2]>,
+}
+
+impl PlacedAddition {
+    /// An addition so many metres along a wall, on its left (1) or right (−1) side; `None` where it is not within the wall, or
+    /// where another wall is near.
+    pub(crate) fn new(
+        addition: Addition,
+        wall: usize,
+        along: f64,
+        side: f64,
+        walls: &[Segment],
+    ) -> Option<Self> {
+        let own = walls.get(wall)?;
+        let at = own.at(along);
+        let faces = addition.faces(at, own, side);
+        let end = along.min(own.length() - along);
+        let is_placed = end >= 0.5 * addition.width() && is_clear(&faces, wall, walls);
+        let ends = |face: &Segment| [face.from, face.to];
+        is_placed.then(|| Self { addition, wall, at, faces: faces.iter().map(ends).collect() })
+    }
+
+    /// Its faces.
+    pub(crate) fn segments(&self) -> impl Iterator<Item = Segment> {
+        self.faces.iter().map(|[from, to]| Segment { from: *from, to: *to })
+    }
+
+    /// A floor with it in its map.
+    #[must_use]
+    pub fn on(&self, floor: &Floor) -> Floor {
+        with_faces(floor, self.segments(), "addition")
+    }
+}
+
+/// Whether nothing but its own wall is near an addition.
+fn is_clear(faces: &[Segment], own: usize, walls: &[Segment]) -> bool {
+    let others = walls.iter().enumerate().filter(|(wall, _)| *wall != own);
+    let mut all = others.flat_map(|(_, wall)| faces.iter().map(move |face| face.distance(*wall)));
+    all.all(|distance| distance >= CLEARANCE)
+}
+
+/// An addition at places along all walls, on both sides of each, at most so many metres apart.
+#[must_use]
+pub fn along_walls(floor: &Floor, addition: Addition, apart: f64) -> Vec<PlacedAddition> {
+    let walls: Vec<Segment> = floor.named_walls().iter().map(NamedWall::segment).collect();
+    let places = walls.iter().enumerate().flat_map(|(wall, segment)| {
+        let length = segment.length();
+        let step = length / (length / apart).ceil();
+        let all = std::iter::successors(Some(0.5 * step), move |along| Some(along + step));
+        all.take_while(move |along| *along < length).map(move |along| (wall, along))
+    });
+    let both = places.flat_map(|(wall, along)| [1.0, -1.0].map(|side| (wall, along, side)));
+    both.filter_map(|(wall, along, side)| {
+        PlacedAddition::new(addition, wall, along, side, &walls)
+    })
+    .collect()
+}
+
 /// A floor with faces in its map, whose names begin with `name`.
-pub(crate) fn with_faces(floor: &Floor, faces: &[Segment], name: &str) -> Floor {
+fn with_faces(floor: &Floor, faces: impl IntoIterator<Item = Segment>, name: &str) -> Floor {
     let mut walls = floor.named_walls().to_vec();
-    for (n, Segment { from, to }) in faces.iter().enumerate() {
+    for (n, Segment { from, to }) in faces.into_iter().enumerate() {
         // Faces have a length and lie near the map.
-        walls.extend(NamedWall::new(format!("{name} {n}"), *from, *to));
+        walls.extend(NamedWall::new(format!("{name} {n}"), from, to));
     }
     Floor::new(walls)
 }
@@ -99,5 +170,5 @@ pub fn with_cabinet(floor: &Floor, near: [f64; 2]) -> Option<Floor> {
     let wall = segments.iter().min_by(|one, other| distance(one).total_cmp(&distance(other)))?;
     let at = wall.at(wall.place(near)[0].clamp(0.0, wall.length()));
     let faces = Addition::USUAL.faces(at, wall, inside(wall, &segments));
-    Some(with_faces(floor, &faces, "cabinet"))
+    Some(with_faces(floor, faces, "cabinet"))
 }

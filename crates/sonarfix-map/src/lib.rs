@@ -49,7 +49,7 @@ mod symmetry;
 mod text_lines;
 mod wall_file;
 
-pub use addition::{Addition, with_cabinet};
+pub use addition::{Addition, PlacedAddition, along_walls, with_cabinet};
 pub use bake::{BakeError, bake};
 pub use clearance::Collision;
 pub use documentation::{documentation, with_comments};
@@ -71,7 +71,7 @@ pub use scenario::upsets::{HeadingSlip, Upset, Upsets};
 pub use scenario::{Run, Scenario, scenario_keys};
 pub use simplify::{Limits, Simplified, simplify};
 pub use sonar_model::{SonarModel, SonarName};
-pub use symmetry::{Motion as SymmetryMotion, Remedy, Symmetry, symmetries};
+pub use symmetry::{Motion as SymmetryMotion, Symmetry, symmetries};
 
 /// The text of the reference scenario, with the conditions of the paper.
 pub const PAPER: &str = include_str!("../scenarios/paper.toml");

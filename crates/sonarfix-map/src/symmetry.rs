@@ -7,7 +7,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::fmt;
 
-use crate::addition::{Addition, inside, with_faces};
+use crate::addition::{Addition, PlacedAddition, inside};
 use crate::bake::{BakeError, bake};
 use crate::floor::Floor;
 use crate::geometry::{Point, Segment, distance, wrap};
@@ -33,8 +33,6 @@ const STRIDE: usize = 7_919;
 /// Walls on which an addition is tried, the longest, and its places on each: parts of the wall.
 const PLACED_ON: usize = 12;
 const PARTS: [f64; 7] = [0.5, 0.3, 0.7, 0.4, 0.6, 0.2, 0.8];
-/// From an addition to all walls but its own, metres.
-const CLEARANCE: f64 = 0.3;
 
 /// A motion by which the map repeats itself.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,20 +42,7 @@ pub struct Symmetry {
     /// The share of the walls that it moves onto walls: the smaller one of two directions.
     pub share: f64,
     /// The smallest addition that ends every repetition of the whole map.
-    pub remedy: Option<Remedy>,
-}
-
-/// What ends every repetition of the whole map, if it is mapped.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Remedy {
-    /// What it is.
-    pub addition: Addition,
-    /// The wall at which it stands.
-    pub wall: usize,
-    /// The place of its middle there, metres.
-    pub at: Point,
-    /// Its faces, each from end to end, metres.
-    pub faces: Vec<[Point; 2]>,
+    pub remedy: Option<PlacedAddition>,
 }
 
 /// A turn, or a shift without a turn.
@@ -82,14 +67,20 @@ impl Symmetry {
     }
 }
 
+impl fmt::Display for Motion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Turn { by, about: [x, y] } => {
+                write!(f, "rotated by {:.0}° about ({x:.1}, {y:.1}) m", by.to_degrees())
+            }
+            Self::Shift([x, y]) => write!(f, "shifted by ({x:.1}, {y:.1}) m"),
+        }
+    }
+}
+
 impl fmt::Display for Symmetry {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.motion {
-            Motion::Turn { by, about: [x, y] } => {
-                write!(f, "rotated by {:.0}° about ({x:.1}, {y:.1}) m ", by.to_degrees())?;
-            }
-            Motion::Shift([x, y]) => write!(f, "shifted by ({x:.1}, {y:.1}) m ")?,
-        }
+        write!(f, "{} ", self.motion)?;
         if self.is_whole() {
             return f.write_str("this map is itself: a lost robot cannot tell the two apart");
         }
@@ -138,43 +129,31 @@ fn remedy(
     motions: &[(Rigid, f64)],
     floor: &Floor,
     walls: &[Segment],
-) -> Result<Option<Remedy>, BakeError> {
+) -> Result<Option<PlacedAddition>, BakeError> {
     let mut longest: Vec<(usize, &Segment)> = walls.iter().enumerate().collect();
     longest.sort_by(|(_, one), (_, other)| other.length().total_cmp(&one.length()));
     longest.truncate(PLACED_ON);
     for addition in Addition::BY_SIZE {
-        let mut best: Option<(f64, Remedy, Vec<Segment>)> = None;
+        let mut best: Option<(f64, PlacedAddition)> = None;
         for (wall, segment) in &longest {
             for part in PARTS {
-                let along = part * segment.length();
-                let at = segment.at(along);
-                let faces = addition.faces(at, segment, inside(segment, walls));
-                let end = along.min(segment.length() - along);
-                if end < 0.5 * addition.width() || !is_clear(&faces, *wall, walls) {
-                    continue;
-                }
+                let (along, side) = (part * segment.length(), inside(segment, walls));
+                let placed = PlacedAddition::new(addition, *wall, along, side, walls);
+                let Some(placed) = placed else { continue };
+                let faces: Vec<Segment> = placed.segments().collect();
                 let difference = difference(motions, &faces, walls);
                 // The first of equal ones.
-                if best.as_ref().is_none_or(|(most, ..)| difference > most + 1e-6) {
-                    let ends = faces.iter().map(|face| [face.from, face.to]).collect();
-                    let remedy = Remedy { addition, wall: *wall, at, faces: ends };
-                    best = Some((difference, remedy, faces));
+                if best.as_ref().is_none_or(|(most, _)| difference > most + 1e-6) {
+                    best = Some((difference, placed));
                 }
             }
         }
-        let Some((_, remedy, faces)) = best else { continue };
-        if !repeats(motions, &with_faces(floor, &faces, "addition"))? {
+        let Some((_, remedy)) = best else { continue };
+        if !repeats(motions, &remedy.on(floor))? {
             return Ok(Some(remedy));
         }
     }
     Ok(None)
-}
-
-/// Whether nothing but its own wall is near an addition.
-fn is_clear(faces: &[Segment], own: usize, walls: &[Segment]) -> bool {
-    let others = walls.iter().enumerate().filter(|(wall, _)| *wall != own);
-    let mut all = others.flat_map(|(_, wall)| faces.iter().map(move |face| face.distance(*wall)));
-    all.all(|distance| distance >= CLEARANCE)
 }
 
 /// Distance of an addition's images from walls and addition, the mean over its faces, of the motion with the least, metres.
@@ -253,6 +232,14 @@ fn turned([x, y]: Point, by: f64) -> Point {
 }
 
 impl Motion {
+    /// The motion that moves one pose (x, y, heading) onto another, or its inverse.
+    #[must_use]
+    pub fn between(one: [f64; 3], other: [f64; 3]) -> Self {
+        let turn = wrap(other[2] - one[2]);
+        let [x, y] = turned([one[0], one[1]], turn);
+        Rigid { turn, shift: [other[0] - x, other[1] - y] }.motion()
+    }
+
     /// The images of a pose (x, y, heading) under the motion and under its inverse.
     #[must_use]
     pub fn images(&self, [x, y, heading]: [f64; 3]) -> [[f64; 3]; 2] {

@@ -10,7 +10,7 @@ use std::path::Path;
 
 use proptest::prelude::*;
 use sonarfix_map::{
-    Addition, CLASSROOM, Floor, NamedWall, Remedy, Scenario, Symmetry, SymmetryMotion, symmetries,
+    Addition, CLASSROOM, Floor, NamedWall, PlacedAddition, Scenario, Symmetry, SymmetryMotion, symmetries,
 };
 
 type Point = [f64; 2];
@@ -92,7 +92,7 @@ fn the_message_names_the_motion() {
 }
 
 /// Whether an addition begins at its wall, at right angles to it, and is as deep as it says.
-fn is_attached(remedy: &Remedy, walls: &[[Point; 2]]) -> bool {
+fn is_attached(remedy: &PlacedAddition, walls: &[[Point; 2]]) -> bool {
     let (from, to) = (walls[remedy.wall][0], walls[remedy.wall][1]);
     let length = (to[0] - from[0]).hypot(to[1] - from[1]);
     let tangent = [(to[0] - from[0]) / length, (to[1] - from[1]) / length];
@@ -114,7 +114,7 @@ fn is_attached(remedy: &Remedy, walls: &[[Point; 2]]) -> bool {
         && (0.0..=length).contains(&middle)
 }
 
-fn remedy(walls: &[[Point; 2]]) -> Remedy {
+fn remedy(walls: &[[Point; 2]]) -> PlacedAddition {
     let remedy = found(walls)[0].remedy.clone().unwrap();
     assert!(is_attached(&remedy, walls), "{remedy:?}");
     remedy
@@ -139,7 +139,7 @@ fn a_short_board_breaks_the_symmetry_of_a_room() {
 /// In larger rooms an addition has to be larger, and in a hall none of those that are tried is large enough.
 #[test]
 fn an_addition_grows_with_the_room() {
-    let depth = |remedy: &Remedy| match remedy.addition {
+    let depth = |remedy: &PlacedAddition| match remedy.addition {
         Addition::Board { depth } | Addition::Cabinet { depth, .. } => depth,
     };
     let rooms = [(6.0, 8.0), (12.0, 10.0), (14.0, 18.0), (26.0, 32.0)];
@@ -156,7 +156,7 @@ fn an_addition_grows_with_the_room() {
 fn an_addition_stands_where_it_differs_most_from_its_image() {
     let mut room = rectangle(6.0, 8.0);
     let remedy_of = |room: &[[Point; 2]]| {
-        let Remedy { at, faces, .. } = remedy(room);
+        let PlacedAddition { at, faces, .. } = remedy(room);
         let [[from, to]] = faces[..] else { panic!("{faces:?}") };
         assert!((from[0] - at[0]).hypot(from[1] - at[1]) < 1e-12, "{from:?} {at:?}");
         assert!((1.0..5.0).contains(&to[0]) || (to[0] - 3.0).abs() < (from[0] - 3.0).abs());

@@ -14,8 +14,10 @@
 //! | [`route`] | a path on the command line |
 //! | [`bare`] | the scenario of a map without a robot |
 //! | [`overrides`], [`edit`] | a scenario changed by options, and by keys of its file |
+//! | [`anywhere`] | starts without a pose anywhere on a map: how long the search takes, what it confuses, which board helps |
 //! | [`trial`], [`starts`] | starts without a pose: from where the search finds it, and after how many metres |
 
+pub mod anywhere;
 pub mod bare;
 pub mod edit;
 mod forecast;

@@ -102,10 +102,10 @@ pub struct Heard {
 /// # Errors
 /// [`TrialError`], if the map cannot be used.
 pub fn trial(scenario: Scenario, seed: u64, seconds: f64) -> Result<Trial, TrialError> {
-    observed_trial(scenario, seed, seconds, |_| false)
+    observed_trial(scenario, seed, seconds, |_, _| false)
 }
 
-/// The same, and every ping goes to an observer. The trial goes on after a unique answer, of which the result tells, as long as the
+/// The same, and every ping goes to an observer, with the search that has taken it. The trial goes on after a unique answer, of which the result tells, as long as the
 /// observer returns `true`.
 ///
 /// # Errors
@@ -114,7 +114,7 @@ pub fn observed_trial(
     scenario: Scenario,
     seed: u64,
     seconds: f64,
-    observer: impl FnMut(Heard) -> bool,
+    observer: impl FnMut(Heard, &Search<'_>) -> bool,
 ) -> Result<Trial, TrialError> {
     let mut rng = stream(seed, 0);
     let errors = wheel_errors(&mut rng);
@@ -133,8 +133,22 @@ pub fn trial_from(
     start: f64,
     seconds: f64,
 ) -> Result<Trial, TrialError> {
+    observed_trial_from(scenario, seed, start, seconds, |_, _| false)
+}
+
+/// The same, observed as by [`observed_trial`].
+///
+/// # Errors
+/// As of [`trial`].
+pub fn observed_trial_from(
+    scenario: Scenario,
+    seed: u64,
+    start: f64,
+    seconds: f64,
+    observer: impl FnMut(Heard, &Search<'_>) -> bool,
+) -> Result<Trial, TrialError> {
     let errors = wheel_errors(&mut stream(seed, 0));
-    drive(scenario, seed, errors, start, seconds, |_| false)
+    drive(scenario, seed, errors, start, seconds, observer)
 }
 
 /// Errors of the right and of the left wheel.
@@ -148,7 +162,7 @@ fn drive(
     errors: [f64; 2],
     start: f64,
     seconds: f64,
-    mut observer: impl FnMut(Heard) -> bool,
+    mut observer: impl FnMut(Heard, &Search<'_>) -> bool,
 ) -> Result<Trial, TrialError> {
     [scenario.truth.scale_right, scenario.truth.scale_left] = errors;
     // There is no estimate to follow.
@@ -190,7 +204,8 @@ fn drive(
             }
         }
         let pose = drive.plant.pose();
-        is_observed = observer(Heard { time: time - start, pose, travel, bearing, range });
+        let heard = Heard { time: time - start, pose, travel, bearing, range };
+        is_observed = observer(heard, &drive.search);
         time += PERIOD;
     }
     Ok(unique.unwrap_or_else(|| drive.result(seed, None)))
@@ -321,7 +336,9 @@ fn errors(hypothesis: &Hypothesis, truth: &Pose) -> (f64, f64) {
     differences(&pose_of(hypothesis), truth)
 }
 
-fn pose_of(hypothesis: &Hypothesis) -> Pose {
+/// The pose of a hypothesis.
+#[must_use]
+pub fn pose_of(hypothesis: &Hypothesis) -> Pose {
     let found = hypothesis.pose;
     Pose { x: found.x.0.into(), y: found.y.0.into(), heading: found.heading.radians().0.into() }
 }
@@ -331,7 +348,7 @@ fn differences(found: &Pose, other: &Pose) -> (f64, f64) {
     (position, angle::wrap(found.heading - other.heading).abs())
 }
 
-fn stream(seed: u64, number: u64) -> ChaCha8Rng {
+pub(crate) fn stream(seed: u64, number: u64) -> ChaCha8Rng {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     // Apart from the streams of a run and of a floor plan.
     rng.set_stream(100 + number);

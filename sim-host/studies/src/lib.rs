@@ -5,6 +5,7 @@
 //! | [`calibration`] | `docs/calibrate.md` |
 //! | [`fault_campaign`] | none: `docs/faults.md` describes it |
 //! | [`fault_table`], [`fault_search`], [`fault_rangers`] | `docs/faults.md` |
+//! | [`find_forecast`] | `docs/search.md` |
 //! | [`floor_plan`] | `docs/floor-plans.md` |
 //! | [`health_page`], [`kidnapped`] | `docs/health.md` |
 //! | [`peers`] | `docs/peers.md` |
@@ -19,6 +20,7 @@ pub mod fault_campaign;
 pub mod fault_rangers;
 pub mod fault_search;
 pub mod fault_table;
+pub mod find_forecast;
 pub mod floor_plan;
 pub mod health_page;
 pub mod kidnapped;

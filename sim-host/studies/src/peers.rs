@@ -165,7 +165,7 @@ pub fn search(
         let walls = segments(&simulation.scenario.floor.walls());
         let mut filter = ParticleFilter::anywhere(&config, walls, seed);
         let (mut found, mut sure_since) = (None, None);
-        let trial = observed_trial(scenario, seed, seconds, |heard| {
+        let trial = observed_trial(scenario, seed, seconds, |heard, _| {
             if found.is_none() {
                 let [advance, turn] = heard.travel;
                 filter.drive(advance, turn);

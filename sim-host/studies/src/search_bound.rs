@@ -130,7 +130,7 @@ fn bounded(scenario: Scenario, seed: u64, seconds: f64) -> Result<Bounded, Trial
     let simulation = Simulation::new(scenario.clone());
     let mut posterior = Posterior::new(&simulation);
     let mut found = None;
-    let trial = observed_trial(scenario, seed, seconds, |heard| {
+    let trial = observed_trial(scenario, seed, seconds, |heard, _| {
         if found.is_none() {
             let (time, truth) = (heard.time, heard.pose);
             posterior.add(heard);

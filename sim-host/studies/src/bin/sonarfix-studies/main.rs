@@ -6,6 +6,7 @@ extern crate sonarfix_terminal;
 mod calibration;
 mod faults;
 mod find;
+mod find_forecast;
 mod floor_plans;
 mod health;
 mod peers;
@@ -36,6 +37,8 @@ enum Command {
     Faults(faults::Args),
     /// Measures how simulated robots without a start pose find it.
     Find(find::Args),
+    /// Compares the forecast of `sonarfix map check --starts` with simulated searches in floor plans.
+    FindForecast(find_forecast::Args),
     /// Compares two measurement policies on random floor plans; prints markdown.
     FloorPlans(floor_plans::Args),
     /// Measures the reliability of the health verdict; prints markdown.
@@ -71,6 +74,7 @@ fn execute(command: Command) -> anyhow::Result<()> {
         Command::Calibration(args) => calibration::execute(&args),
         Command::Faults(args) => faults::execute(&args),
         Command::Find(args) => find::execute(&args),
+        Command::FindForecast(args) => find_forecast::execute(&args),
         Command::FloorPlans(args) => floor_plans::execute(&args),
         Command::Health(args) => health::execute(&args),
         Command::Peers(args) => peers::execute(&args),

@@ -1,0 +1,180 @@
+//! What a map leads to when a robot starts anywhere on it without a pose: how long the search takes, where its answer is not
+//! unique, and which board would change that.
+//!
+//! Each start is a trial of [`crate::trial`] from a random place: the robot drives to random places, on the shortest way that
+//! keeps off the walls, among random furniture that the map does not have.
+//!
+//! | module | what |
+//! |---|---|
+//! | `free_space` | where a robot may be |
+//! | `route`, `wander` | ways between places, and a drive over random ones |
+//! | `furniture` | what stands beside a drive |
+//! | `start` | one start |
+//! | `confusion` | the poses that are confused |
+//! | `separation`, `landmark` | what a sweep tells between two poses, and the board that helps most |
+
+mod confusion;
+mod free_space;
+mod furniture;
+mod landmark;
+mod route;
+mod separation;
+mod start;
+mod wander;
+
+use rayon::prelude::*;
+use serde::Serialize;
+use sonarfix_map::{PathError, PathPlan, Scenario};
+use sonarfix_sim::progress::Progress;
+
+pub use confusion::Confusion;
+pub use landmark::Landmark;
+pub use start::{Outcome, Start};
+
+use crate::trial::TrialError;
+use start::Place;
+
+/// Why there is no forecast.
+#[derive(Debug, thiserror::Error)]
+pub enum AnywhereError {
+    /// A trial failed.
+    #[error(transparent)]
+    Trial(#[from] TrialError),
+    /// The robot's speed or turn rate is invalid.
+    #[error(transparent)]
+    Path(#[from] PathError),
+    /// The robot has no place.
+    #[error(
+        "no place between the walls is {0:.2} m away from all of them, half the width of the robot: check the unit of the \
+         map and the robot's track_width"
+    )]
+    NoPlace(f64),
+}
+
+/// Which starts are simulated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// How many.
+    pub starts: u32,
+    /// Longest time of driving, seconds.
+    pub seconds: f64,
+    /// The seed of the first one; the others count up from it.
+    pub seed: u64,
+    /// Pieces of furniture that the map does not have, on 10 m², before those are left out that do not fit.
+    pub furniture: f64,
+}
+
+impl Settings {
+    /// The runs that a forecast with a board takes at most.
+    #[must_use]
+    pub fn runs(&self) -> u32 {
+        self.starts.saturating_mul(4)
+    }
+}
+
+/// The furniture of the usual forecast, pieces on 10 m².
+pub const FURNITURE: f64 = 1.0;
+
+/// Times and shares of many starts.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Times {
+    /// Longest time of driving, seconds.
+    pub seconds: f64,
+    /// Starts.
+    pub starts: usize,
+    /// Share with a unique and right answer.
+    pub right: f64,
+    /// Share with a unique and wrong answer.
+    pub wrong: f64,
+    /// Seconds within which half of the starts had the right answer; `None` if fewer had.
+    pub median_seconds: Option<f64>,
+    /// The same for nine in ten.
+    pub most_seconds: Option<f64>,
+}
+
+impl Times {
+    /// Those of starts; `None` without one.
+    #[must_use]
+    pub fn new(starts: &[Start], seconds: f64) -> Option<Self> {
+        let right = starts.iter().filter(|start| start.outcome == Outcome::Right);
+        let wrong = starts.iter().filter(|start| start.outcome == Outcome::Wrong).count();
+        Self::of(right.filter_map(|start| start.after).collect(), wrong, starts.len(), seconds)
+    }
+
+    /// Those of so many starts, of which these were right after as many seconds.
+    #[must_use]
+    pub fn of(mut right: Vec<f64>, wrong: usize, starts: usize, seconds: f64) -> Option<Self> {
+        if starts == 0 {
+            return None;
+        }
+        right.sort_by(f64::total_cmp);
+        let within = |tenths: usize| right.get((tenths * starts).div_ceil(10) - 1).copied();
+        #[expect(clippy::cast_precision_loss, reason = "far fewer than 2^53 starts")]
+        let share = |part: usize| part as f64 / starts as f64;
+        Some(Self {
+            seconds,
+            starts,
+            right: share(right.len()),
+            wrong: share(wrong),
+            median_seconds: within(5),
+            most_seconds: within(9),
+        })
+    }
+
+    /// Share without a unique answer.
+    #[must_use]
+    pub fn unanswered(&self) -> f64 {
+        1.0 - self.right - self.wrong
+    }
+}
+
+/// The forecast for starts anywhere.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Anywhere {
+    /// Times and shares.
+    #[serde(flatten)]
+    pub times: Times,
+    /// Which poses the starts without a right answer confused.
+    pub confused: Vec<Confusion>,
+    /// A board that helps.
+    pub landmark: Option<Landmark>,
+    /// The starts.
+    pub places: Vec<Start>,
+}
+
+impl Anywhere {
+    /// Simulates starts of a scenario's robot anywhere on its map, and looks for a board that helps, clear of `path`. The scenario's
+    /// path and obstacles are not used otherwise. `None` if it was interrupted before the first start was finished.
+    ///
+    /// # Errors
+    /// [`AnywhereError`], if the map cannot be used.
+    pub fn new(
+        scenario: &Scenario,
+        path: Option<&PathPlan>,
+        settings: &Settings,
+        progress: &impl Progress,
+    ) -> Result<Option<Self>, AnywhereError> {
+        let place = Place::new(scenario, scenario.floor.clone())?;
+        let seeds: Vec<u64> = (settings.seed..).take(settings.starts as usize).collect();
+        let places = simulate(&place, &seeds, settings, progress)?;
+        let Some(times) = Times::new(&places, settings.seconds) else { return Ok(None) };
+        let landmark = landmark::best(&place, &places, path, settings, progress)?;
+        Ok(Some(Self { times, confused: confusion::all(&places), landmark, places }))
+    }
+}
+
+/// The starts of these seeds, in their order; fewer if it was interrupted.
+fn simulate(
+    place: &Place<'_>,
+    seeds: &[u64],
+    settings: &Settings,
+    progress: &impl Progress,
+) -> Result<Vec<Start>, AnywhereError> {
+    let seeds = seeds.par_iter().filter(|_| !progress.is_interrupted());
+    let one = |seed: &u64| {
+        let start = place.start(*seed, settings)?;
+        progress.finished();
+        Ok(start)
+    };
+    seeds.map(one).collect()
+}
