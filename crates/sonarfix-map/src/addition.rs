@@ -136,10 +136,8 @@ pub fn along_walls(floor: &Floor, addition: Addition, apart: f64) -> Vec<PlacedA
         all.take_while(move |along| *along < length).map(move |along| (wall, along))
     });
     let both = places.flat_map(|(wall, along)| [1.0, -1.0].map(|side| (wall, along, side)));
-    both.filter_map(|(wall, along, side)| {
-        PlacedAddition::new(addition, wall, along, side, &walls)
-    })
-    .collect()
+    both.filter_map(|(wall, along, side)| PlacedAddition::new(addition, wall, along, side, &walls))
+        .collect()
 }
 
 /// A floor with faces in its map, whose names begin with `name`.

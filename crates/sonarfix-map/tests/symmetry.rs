@@ -10,7 +10,8 @@ use std::path::Path;
 
 use proptest::prelude::*;
 use sonarfix_map::{
-    Addition, CLASSROOM, Floor, NamedWall, PlacedAddition, Scenario, Symmetry, SymmetryMotion, symmetries,
+    Addition, CLASSROOM, Floor, NamedWall, PlacedAddition, Scenario, Symmetry, SymmetryMotion,
+    symmetries,
 };
 
 type Point = [f64; 2];

@@ -88,7 +88,13 @@ pub const EXAMPLES: [(&str, &[&str]); 34] = [
             "sonarfix flash robot --board esp32c6 --dry-run",
         ],
     ),
-    ("map check", &["sonarfix map check map.toml"]),
+    (
+        "map check",
+        &[
+            "sonarfix map check map.toml",
+            "sonarfix map check map.toml --robot robot.toml --starts 60 --out starts.svg",
+        ],
+    ),
     ("map bake", &["sonarfix map bake map.toml --out map.bin"]),
     ("map draw", &["sonarfix map draw map.toml --out map.svg"]),
     ("map simplify", &["sonarfix map simplify map.csv --out simple.csv"]),

@@ -22,6 +22,7 @@ mod goto;
 mod init;
 mod map;
 mod map_exchange;
+mod map_starts;
 mod measure;
 mod merge;
 mod monitor;

@@ -11,8 +11,10 @@ use sonarfix_map::{
     robot_file, simplify, symmetries,
 };
 use sonarfix_new_robot::flash;
+use sonarfix_plan::anywhere::Anywhere;
 
 use crate::map_exchange;
+use crate::map_starts::{self, Forecast};
 use crate::warnings::Warning;
 use sonarfix_terminal::json;
 use sonarfix_terminal::output::check_file;
@@ -38,13 +40,15 @@ struct Source {
 
 #[derive(Debug, Subcommand)]
 enum Task {
-    /// Checks a map; prints the defects by wall.
+    /// Checks a map; prints the defects by wall, and with --starts how well a robot finds its pose on it.
     Check {
         #[command(flatten)]
         from: Source,
         /// The robot whose sonar measures the walls; by default the scenario's, or a typical one.
         #[arg(long, value_name = "ROBOT.toml")]
         robot: Option<PathBuf>,
+        #[command(flatten)]
+        starts: map_starts::Args,
         /// Prints the findings as JSON.
         #[arg(long)]
         json: bool,
@@ -110,7 +114,10 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         check_file("--out", out)?;
     }
     match &args.task {
-        Task::Check { from, robot, json } => check(&from.read()?, robot.as_deref(), *json),
+        Task::Check { from, robot, starts, json } => {
+            starts.check()?;
+            check(&from.read()?, robot.as_deref(), starts, *json)
+        }
         Task::Bake { from, out, json } => write_image(&from.read()?, out, *json),
         Task::Draw { from, out, grid } => draw(&from.read()?, &from.title(), out, *grid),
         Task::Simplify { from, out, tolerance, shortest, json } => {
@@ -204,7 +211,7 @@ impl Checked {
         ))
     }
 
-    fn json<'a>(&self, map: &'a MapFile) -> JsonCheck<'a> {
+    fn json<'a>(&self, map: &'a MapFile, forecast: Option<&'a Forecast>) -> JsonCheck<'a> {
         let wall = |index: usize| map.floor.named_walls().get(index).map_or("", NamedWall::name);
         let finding = |it: &Finding| JsonFinding {
             severity: severity(it),
@@ -221,6 +228,7 @@ impl Checked {
             symmetries: self.symmetries.iter().map(ToString::to_string).collect(),
             remedy: self.remedy(map),
             warnings: self.improbable.iter().map(Warning::from).collect(),
+            starts: forecast.map(|forecast| &forecast.anywhere),
         }
     }
 }
@@ -237,6 +245,9 @@ struct JsonCheck<'a> {
     remedy: Option<String>,
     /// Improbable values.
     warnings: Vec<Warning>,
+    /// With `--starts`, what starts anywhere lead to.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    starts: Option<&'a Anywhere>,
 }
 
 #[derive(Serialize)]
@@ -256,14 +267,24 @@ fn severity(finding: &Finding) -> &'static str {
     }
 }
 
-fn check(map: &MapFile, robot: Option<&Path>, is_json: bool) -> anyhow::Result<()> {
+fn check(
+    map: &MapFile,
+    robot: Option<&Path>,
+    starts: &map_starts::Args,
+    is_json: bool,
+) -> anyhow::Result<()> {
     let checked = Checked::of(map, robot)?;
-    if is_json {
-        json::print(&checked.json(map))?;
-    } else {
+    if !is_json {
         checked.print(map);
     }
-    anyhow::ensure!(checked.errors() == 0, "the map has errors");
+    let is_usable = checked.errors() == 0;
+    let forecast = if is_usable { starts.forecast(map, robot)? } else { None };
+    if is_json {
+        json::print(&checked.json(map, forecast.as_ref()))?;
+    } else if let Some(forecast) = &forecast {
+        forecast.print(map);
+    }
+    anyhow::ensure!(is_usable, "the map has errors");
     Ok(())
 }
 

@@ -136,30 +136,45 @@ pub struct Anywhere {
     pub times: Times,
     /// Which poses the starts without a right answer confused.
     pub confused: Vec<Confusion>,
-    /// A board that helps.
+    /// A board that helps, if one was looked for and found.
     pub landmark: Option<Landmark>,
     /// The starts.
     pub places: Vec<Start>,
 }
 
 impl Anywhere {
-    /// Simulates starts of a scenario's robot anywhere on its map, and looks for a board that helps, clear of `path`. The scenario's
-    /// path and obstacles are not used otherwise. `None` if it was interrupted before the first start was finished.
+    /// Simulates starts of a scenario's robot anywhere on its map; path and obstacles of the scenario are not used. `None` if it was
+    /// interrupted before the first start was finished.
     ///
     /// # Errors
     /// [`AnywhereError`], if the map cannot be used.
     pub fn new(
         scenario: &Scenario,
-        path: Option<&PathPlan>,
         settings: &Settings,
         progress: &impl Progress,
     ) -> Result<Option<Self>, AnywhereError> {
         let place = Place::new(scenario, scenario.floor.clone())?;
         let seeds: Vec<u64> = (settings.seed..).take(settings.starts as usize).collect();
         let places = simulate(&place, &seeds, settings, progress)?;
-        let Some(times) = Times::new(&places, settings.seconds) else { return Ok(None) };
-        let landmark = landmark::best(&place, &places, path, settings, progress)?;
-        Ok(Some(Self { times, confused: confusion::all(&places), landmark, places }))
+        let times = Times::new(&places, settings.seconds);
+        let confused = confusion::all(&places);
+        Ok(times.map(|times| Self { times, confused, landmark: None, places }))
+    }
+
+    /// Looks for a board that helps, clear of a path; `scenario` and `settings` are those of the starts.
+    ///
+    /// # Errors
+    /// As of [`Anywhere::new`].
+    pub fn with_landmark(
+        self,
+        scenario: &Scenario,
+        path: Option<&PathPlan>,
+        settings: &Settings,
+        progress: &impl Progress,
+    ) -> Result<Self, AnywhereError> {
+        let place = Place::new(scenario, scenario.floor.clone())?;
+        let landmark = landmark::best(&place, &self.places, path, settings, progress)?;
+        Ok(Self { landmark, ..self })
     }
 }
 

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use sonarfix_map::{FileError, Floor, Scenario};
+use sonarfix_hal::config::RobotConfig;
+use sonarfix_map::{FileError, Floor, Scenario, SonarModel, SonarName};
 
 /// The tables of a scenario that describe a robot of the size that drives through doors.
 pub const ROBOT: &str = include_str!("robot.toml");
@@ -56,4 +57,15 @@ pub fn text() -> String {
 pub fn scenario(floor: Floor, name: String) -> Result<Scenario, FileError> {
     let whole = Scenario::parse(&text(), "the robot of a map", Path::new(""))?;
     Ok(Scenario { floor, name, ..whole })
+}
+
+/// Replaces the robot of a scenario: the simulated one has its track width, and the sonar that its driver is for; an ideal one if
+/// none is simulated.
+pub fn fit(scenario: &mut Scenario, robot: RobotConfig) {
+    let kind = robot.rangers.first.kind;
+    let is_this = |model: &SonarModel| model.ranger.is_some_and(|ranger| ranger.kind == kind);
+    let model = SonarModel::ALL.into_iter().filter(is_this).find_map(|model| model.simulated);
+    scenario.hardware.sonar = model.unwrap_or(SonarName::Ideal);
+    scenario.truth.track_width = robot.localizer.drive.track_width.0.into();
+    scenario.robot = robot;
 }

@@ -322,11 +322,16 @@ fn step_of(axis: &Axis, value: f64) -> u8 {
     (share(axis, axis.place(value)) * f64::from(STEPS)).round() as u8
 }
 
-/// An interpolated colour.
+/// The colour of a step.
 fn step_colour(step: u8) -> String {
+    colour_at(f64::from(step) / f64::from(STEPS))
+}
+
+/// The interpolated colour at a share of the scale, from 0, the best, to 1.
+pub(crate) fn colour_at(share: f64) -> String {
     let intervals = COLOURS.len() - 1;
     #[expect(clippy::cast_precision_loss, reason = "some colours")]
-    let place = f64::from(step) / f64::from(STEPS) * intervals as f64;
+    let place = share * intervals as f64;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index")]
     let below = (place as usize).min(intervals - 1);
     #[expect(clippy::cast_precision_loss, reason = "some colours")]

@@ -18,6 +18,7 @@
 //! | [`comparison`] | the page of two runs side by side |
 //! | `palette` | one colour per role, in figures and player |
 //! | [`map`] | the drawing of a map |
+//! | [`starts_map`] | a map with starts without a pose, what they confuse, and a board |
 //! | `page`, `escape` | tables, figures and data as HTML |
 //! | [`Table`] | a table of numbers |
 //! | [`residuals`] | the figure of a calibration |
@@ -35,6 +36,7 @@ mod page;
 mod palette;
 mod points;
 pub mod residuals;
+pub mod starts_map;
 pub mod sweep;
 mod table;
 

@@ -28,7 +28,7 @@ const LETTER: f64 = 0.56;
 #[must_use]
 pub fn svg(title: &str, floor: &Floor, grid: Option<Grid>) -> String {
     let frame = Frame::around(floor);
-    let mut svg = frame.open(title);
+    let mut svg = frame.open(title, [0.0, 0.0]);
     frame.axes(&mut svg);
     if let Some(grid) = grid {
         frame.grid(&mut svg, &grid);
@@ -45,7 +45,7 @@ pub fn svg(title: &str, floor: &Floor, grid: Option<Grid>) -> String {
 }
 
 /// The transformation from map to drawing.
-struct Frame {
+pub(crate) struct Frame {
     x: Range<f64>,
     y: Range<f64>,
     /// Pixels per metre.
@@ -53,7 +53,7 @@ struct Frame {
 }
 
 impl Frame {
-    fn around(floor: &Floor) -> Self {
+    pub fn around(floor: &Floor) -> Self {
         let ends = || floor.named_walls().iter().flat_map(|wall| [wall.from(), wall.to()]);
         let x = span(ends().map(|[x, _]| x));
         let y = span(ends().map(|[_, y]| y));
@@ -71,15 +71,23 @@ impl Frame {
         (self.y.end - self.y.start) * self.scale
     }
 
+    /// The place of a legend: its left upper corner.
+    pub fn legend(&self) -> (f64, f64) {
+        let (left, top, _, bottom) = MARGIN;
+        (left, top + self.height() + bottom)
+    }
+
     /// The position of a map point in the drawing; the y axis is inverted.
-    fn at(&self, [x, y]: [f64; 2]) -> (f64, f64) {
+    pub fn at(&self, [x, y]: [f64; 2]) -> (f64, f64) {
         let (left, top, ..) = MARGIN;
         (left + (x - self.x.start) * self.scale, top + (self.y.end - y) * self.scale)
     }
 
-    fn open(&self, title: &str) -> String {
+    /// The begin of the drawing, with room for a legend of this width and height below the map.
+    pub fn open(&self, title: &str, legend: [f64; 2]) -> String {
         let (left, top, right, bottom) = MARGIN;
-        let (wide, high) = (left + self.width() + right, top + self.height() + bottom);
+        let wide = left + self.width().max(legend[0]) + right;
+        let high = top + self.height() + bottom + legend[1];
         let (title, paper, ink) = (escape(title), hex(Role::Paper), hex(Role::Ink));
         format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{wide:.0}\" height=\"{high:.0}\" \
@@ -91,7 +99,7 @@ impl Frame {
     }
 
     /// The frame, with ticks in metres.
-    fn axes(&self, svg: &mut String) {
+    pub fn axes(&self, svg: &mut String) {
         let (left, top, ..) = MARGIN;
         let (wide, high, line) = (self.width(), self.height(), hex(Role::Grid));
         put(
@@ -152,7 +160,7 @@ impl Frame {
     }
 
     /// All walls as one path, thinner where there are many.
-    fn walls(&self, svg: &mut String, walls: &[NamedWall]) {
+    pub fn walls(&self, svg: &mut String, walls: &[NamedWall]) {
         let width = match walls.len() {
             0..=100 => 3.0,
             101..=2_000 => 1.5,
@@ -205,7 +213,7 @@ impl Frame {
     }
 
     /// A scale bar of a round length, about a fifth of the drawing wide.
-    fn scale_bar(&self, svg: &mut String) {
+    pub fn scale_bar(&self, svg: &mut String) {
         let (left, top, ..) = MARGIN;
         let metres = round_below(0.25 * (self.x.end - self.x.start));
         let (wide, y) = (metres * self.scale, top + self.height() + 42.0);
@@ -242,12 +250,12 @@ fn span(values: impl Iterator<Item = f64>) -> Range<f64> {
     least - short..most + short
 }
 
-fn hex(role: Role) -> String {
+pub(crate) fn hex(role: Role) -> String {
     let colour = role.rgb();
     format!("#{:02x}{:02x}{:02x}", colour.0, colour.1, colour.2)
 }
 
 /// Appends to a string, which does not fail.
-fn put(text: &mut String, more: std::fmt::Arguments<'_>) {
+pub(crate) fn put(text: &mut String, more: std::fmt::Arguments<'_>) {
     let _ = text.write_fmt(more);
 }

@@ -47,39 +47,51 @@ pub enum CompareError {
     Forecast(#[from] AnywhereError),
 }
 
-/// Compares forecasts with so many trials in each plan. The seeds of a forecast are `settings.seed` and those after it.
+/// Which forecasts are compared with which searches.
+#[derive(Debug, Clone, Copy)]
+pub struct Comparison {
+    /// The starts of each forecast; its seeds are the same in all plans.
+    pub forecast: Settings,
+    /// Searches in each plan, of at most as many seconds.
+    pub trials: u32,
+    /// Whether boards are proposed, and the searches repeated with them.
+    pub boards: bool,
+}
+
+/// Compares forecasts with searches in each plan.
 ///
 /// # Errors
 /// [`CompareError`] of the first plan that cannot be used.
 pub fn floor_plans(
     plans: &Plans,
-    trials: u32,
-    settings: &Settings,
+    comparison: &Comparison,
     progress: &impl Progress,
 ) -> Result<Vec<Compared>, CompareError> {
-    let compared = plans.each(progress, |scenario, seed| {
-        Ok(compared(&scenario, seed, trials, settings))
-    })?;
+    let compared =
+        plans.each(progress, |scenario, seed| Ok(compared(&scenario, seed, comparison)))?;
     compared.into_iter().filter_map(Result::transpose).collect()
 }
 
 fn compared(
     scenario: &Scenario,
     seed: u64,
-    trials: u32,
-    settings: &Settings,
+    comparison: &Comparison,
 ) -> Result<Option<Compared>, CompareError> {
+    let Comparison { forecast: settings, trials, boards } = comparison;
     let map = bare::scenario(scenario.floor.clone(), scenario.name.clone())
         .map_err(TrialError::Scenario)?;
-    let anywhere = Anywhere::new(&map, Some(scenario.path.plan()), settings, &|| ())?;
-    let Some(anywhere) = anywhere else { return Ok(None) };
-    let Some(simulated) = simulated(scenario, seed, trials, settings.seconds)? else {
+    let Some(mut anywhere) = Anywhere::new(&map, settings, &|| ())? else { return Ok(None) };
+    let Some(simulated) = simulated(scenario, seed, *trials, settings.seconds)? else {
         return Ok(None);
     };
+    if *boards {
+        let path = Some(scenario.path.plan());
+        anywhere = anywhere.with_landmark(&map, path, settings, &|| ())?;
+    }
     let with_board = anywhere.landmark.as_ref().map(|landmark| {
         let floor = landmark.place.on(&scenario.floor);
         let scenario = Scenario { floor, ..scenario.clone() };
-        self::simulated(&scenario, seed, trials, settings.seconds)
+        self::simulated(&scenario, seed, *trials, settings.seconds)
     });
     Ok(Some(Compared {
         seed,
@@ -133,8 +145,8 @@ pub struct Summary {
     pub without: [f64; 3],
     /// Plans where a tenth of the starts or more were without a right answer: forecast and simulated, only forecast, only simulated.
     pub hard: [usize; 3],
-    /// What the boards change.
-    pub boards: Boards,
+    /// What the boards change; `None` without one.
+    pub boards: Option<Boards>,
 }
 
 /// What the proposed boards change, over the plans that got one.
@@ -196,7 +208,7 @@ impl Agreement {
 }
 
 impl Boards {
-    fn new(plans: &[Compared]) -> Self {
+    fn new(plans: &[Compared]) -> Option<Self> {
         let with: Vec<(&Times, &Times, &Times)> = plans
             .iter()
             .filter_map(|plan| {
@@ -213,13 +225,13 @@ impl Boards {
         let is_better = |(before, after, _): &&(&Times, &Times, &Times)| {
             median(after) < median(before) || without(after) < without(before)
         };
-        Self {
+        (!with.is_empty()).then(|| Self {
             plans: with.len(),
             median: means(median),
             most: means(most),
             without: means(without),
             better: with.iter().filter(is_better).count(),
-        }
+        })
     }
 }
 

@@ -40,7 +40,8 @@ impl FreeSpace {
         let world = World::new(floor);
         for (cell, part) in parts.iter().enumerate() {
             let is_open = part.is_some_and(|part| open.get(part) == Some(&true));
-            if is_open && !is_enclosed(&world, space.centre(cell))
+            if is_open
+                && !is_enclosed(&world, space.centre(cell))
                 && let Some(free) = is_free.get_mut(cell)
             {
                 *free = false;
@@ -175,9 +176,8 @@ impl FreeSpace {
         }
         let largest = sizes.iter().copied().max().unwrap_or(0);
         #[expect(clippy::cast_precision_loss, reason = "some hundred thousand cells")]
-        let is_large = |size: usize| {
-            size == largest || size as f64 * self.cell * self.cell >= LEAST_PART
-        };
+        let is_large =
+            |size: usize| size == largest || size as f64 * self.cell * self.cell >= LEAST_PART;
         for part in &mut self.part {
             *part = part.filter(|part| sizes.get(*part).is_some_and(|size| is_large(*size)));
         }

@@ -81,7 +81,8 @@ impl Piece {
         let off = distance(foot, at);
         let normal = [(at[0] - foot[0]) / off, (at[1] - foot[1]) / off];
         let tangent = [-normal[1], normal[0]];
-        let (along, across) = if is_along || !is_turned { (length, depth) } else { (depth, length) };
+        let (along, across) =
+            if is_along || !is_turned { (length, depth) } else { (depth, length) };
         let from_wall = if is_along { GAP + 0.5 * across } else { off };
         let point = |t: f64, n: f64| {
             [0, 1].map(|axis: usize| {

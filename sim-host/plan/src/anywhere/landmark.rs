@@ -65,9 +65,8 @@ pub(super) fn best(
     progress: &impl Progress,
 ) -> Result<Option<Landmark>, AnywhereError> {
     let mut slowest: Vec<(u64, &Start)> = (settings.seed..).zip(starts).collect();
-    slowest.sort_by(|(_, one), (_, other)| {
-        settings.lost_by(other).total_cmp(&settings.lost_by(one))
-    });
+    slowest
+        .sort_by(|(_, one), (_, other)| settings.lost_by(other).total_cmp(&settings.lost_by(one)));
     slowest.truncate(starts.len().div_ceil(2));
     let without: f64 = slowest.iter().map(|(_, start)| settings.lost_by(start)).sum();
     let seeds: Vec<u64> = slowest.iter().map(|(seed, _)| *seed).collect();
@@ -139,9 +138,10 @@ fn is_placeable(
     let passage = PASSAGE * 2.0 * place.clearance();
     let ahead = world.on_axis(end, direction(board.at, end));
     let leaves_room = ahead.is_none_or(|(_, wall)| distance(end, wall) >= passage);
-    let faces = board.faces.iter().filter_map(|[from, to]| {
-        NamedWall::new("board".to_owned(), *from, *to).ok()
-    });
+    let faces = board
+        .faces
+        .iter()
+        .filter_map(|[from, to]| NamedWall::new("board".to_owned(), *from, *to).ok());
     let faces = Floor::new(faces.collect());
     let is_clear =
         path.is_none_or(|path| Collision::first(path, &faces, place.clearance()).is_none());

@@ -72,8 +72,7 @@ fn cells(space: &FreeSpace, from: usize, to: usize) -> Vec<usize> {
     let Some(part) = space.part(from).filter(|part| space.part(to) == Some(*part)) else {
         return Vec::new();
     };
-    let remaining =
-        |cell: usize| distance(space.centre(cell), space.centre(to)) / space.cell();
+    let remaining = |cell: usize| distance(space.centre(cell), space.centre(to)) / space.cell();
     // For each cell the length of the way to it, and the cell before it.
     let mut known: Vec<Option<(f64, usize)>> = Vec::new();
     known.resize(space.cells(), None);

@@ -40,9 +40,8 @@ impl Ears {
         let (right, left) = (f64::from(right.0), f64::from(left.0));
         let bearings = std::iter::successors(Some(right), |bearing| Some(bearing + STEP));
         let bearings = bearings.take_while(|bearing| *bearing <= left);
-        let each = bearings.map(|bearing| {
-            odds(&self.heard(truth, bearing), &self.heard(other, bearing))
-        });
+        let each =
+            bearings.map(|bearing| odds(&self.heard(truth, bearing), &self.heard(other, bearing)));
         PINGS_A_STEP * each.sum::<f64>()
     }
 

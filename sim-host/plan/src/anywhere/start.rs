@@ -132,8 +132,7 @@ fn record(doubts: &mut Vec<Doubt>, heard: &Heard, search: &Search<'_>) {
         }
         _ => return,
     };
-    let rivals: Vec<Pose> =
-        poses.into_iter().filter(|pose| !are_one(pose, &heard.pose)).collect();
+    let rivals: Vec<Pose> = poses.into_iter().filter(|pose| !are_one(pose, &heard.pose)).collect();
     if !rivals.is_empty() {
         doubts.push(Doubt { time: heard.time, truth: heard.pose, rivals });
     }

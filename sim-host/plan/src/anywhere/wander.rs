@@ -46,11 +46,7 @@ pub(super) fn drive(
 }
 
 /// A random free cell with this property and, if one is drawn soon, with room around it.
-fn roomy(
-    space: &FreeSpace,
-    rng: &mut ChaCha8Rng,
-    is: impl Fn(usize) -> bool,
-) -> Option<usize> {
+fn roomy(space: &FreeSpace, rng: &mut ChaCha8Rng, is: impl Fn(usize) -> bool) -> Option<usize> {
     let free = space.free();
     let mut found = None;
     for _ in 0..DRAWS {

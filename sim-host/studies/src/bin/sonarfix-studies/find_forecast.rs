@@ -2,7 +2,7 @@
 
 use sonarfix_plan::anywhere::{FURNITURE, Settings, Times};
 use sonarfix_report::Table;
-use sonarfix_studies::find_forecast::{self, Agreement, Compared, Summary};
+use sonarfix_studies::find_forecast::{self, Agreement, Boards, Compared, Comparison, Summary};
 use sonarfix_studies::floor_plan::Kind;
 use sonarfix_studies::search_study::Plans;
 use sonarfix_terminal::progress::Runs;
@@ -30,6 +30,9 @@ pub struct Args {
     /// Pieces of furniture on 10 m² that the forecast assumes.
     #[arg(long, default_value_t = FURNITURE)]
     furniture: f64,
+    /// Proposes a board in each plan, and repeats the searches with it.
+    #[arg(long)]
+    boards: bool,
     /// Prints every plan.
     #[arg(long)]
     plans: bool,
@@ -49,14 +52,15 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     );
     let kind = args.homes.then_some(Kind::Home);
     let plans = Plans { first: args.seed, trials: args.floor_plans, kind, walls: None };
-    let settings = Settings {
+    let forecast = Settings {
         starts: args.starts,
         seconds: args.seconds,
         seed: args.seed.wrapping_add(FORECAST),
         furniture: args.furniture,
     };
     let runs = Runs::new(args.floor_plans);
-    let compared = find_forecast::floor_plans(&plans, args.trials, &settings, &runs)?;
+    let comparison = Comparison { forecast, trials: args.trials, boards: args.boards };
+    let compared = find_forecast::floor_plans(&plans, &comparison, &runs)?;
     runs.end()?;
     let summary = Summary::new(&compared);
     if args.json {
@@ -121,20 +125,13 @@ fn summary_table(summary: &Summary, args: &Args) -> Table {
         String::new(),
         format!("{correlation:.2}"),
     ];
-    let ([both, only_forecast, only_simulated], boards) = (summary.hard, &summary.boards);
-    let seconds = |[before, after, forecast]: [f64; 3]| {
-        format!("{before:.1} s to {after:.1} s (forecast {forecast:.1} s)")
-    };
-    let [before, after, forecast_with] = boards.without.map(percent);
-    let note = format!(
+    let [both, only_forecast, only_simulated] = summary.hard;
+    let hard = format!(
         "A tenth of the starts without an answer: {both} plans forecast and simulated, {only_forecast} only forecast, \
-         {only_simulated} only simulated.\nBoards in {} plans, better in {}: median {}, nine in ten {}, without an answer {before} to \
-         {after} (forecast {forecast_with}).",
-        boards.plans,
-        boards.better,
-        seconds(boards.median),
-        seconds(boards.most),
+         {only_simulated} only simulated."
     );
+    let boards = summary.boards.as_ref().map(boards_note);
+    let note = [Some(hard), boards].into_iter().flatten().collect::<Vec<_>>().join("\n");
     Table {
         title: format!("{} plans, searches of at most {} s", summary.plans, args.seconds),
         note,
@@ -147,4 +144,18 @@ fn summary_table(summary: &Summary, args: &Args) -> Table {
             without,
         ],
     }
+}
+
+fn boards_note(boards: &Boards) -> String {
+    let seconds = |[before, after, forecast]: [f64; 3]| {
+        format!("{before:.1} s to {after:.1} s (forecast {forecast:.1} s)")
+    };
+    let [before, after, forecast] = boards.without.map(percent);
+    format!(
+        "Boards in {} plans, better in {}: median {}, nine in ten {}, without a right answer {before} to {after} (forecast {forecast}).",
+        boards.plans,
+        boards.better,
+        seconds(boards.median),
+        seconds(boards.most),
+    )
 }
