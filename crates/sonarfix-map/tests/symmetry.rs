@@ -137,6 +137,21 @@ fn a_short_board_breaks_the_symmetry_of_a_room() {
     }
 }
 
+/// Boards stand on both sides of a wall, in a room all inside that are clear of its other walls.
+#[test]
+fn boards_along_walls_are_clear_of_other_walls() {
+    let board = Addition::Board { depth: 0.4 };
+    let boards = along_walls(&floor(&rectangle(2.0, 0.6)), board, 0.5);
+    // Inside there are 20 cm to the wall opposite.
+    let is_outside = |[x, y]: Point| x < 0.0 || x > 2.0 || y < 0.0 || y > 0.6;
+    assert!(boards.iter().all(|board| is_outside(board.faces[0][1])), "{boards:?}");
+    let room = rectangle(2.0, 3.0);
+    let boards = along_walls(&floor(&room), board, 0.5);
+    assert!(boards.iter().all(|board| is_attached(board, &room)), "{boards:?}");
+    // Four places on a short wall and six on a long one, on both sides; inside, those at the corners are near another wall.
+    assert_eq!(boards.len(), 2 * (4 + 6 + 2 + 4));
+}
+
 /// In larger rooms an addition has to be larger, and in a hall none of those that are tried is large enough.
 #[test]
 fn an_addition_grows_with_the_room() {
@@ -204,6 +219,22 @@ proptest! {
         let share = symmetries(&floor(&with)).unwrap();
         prop_assert!(!share.iter().any(Symmetry::is_whole), "{share:?}");
         prop_assert!(is_attached(remedy, &all), "{remedy:?}");
+    }
+
+    /// The motion between two poses, or its inverse, moves one onto the other.
+    #[test]
+    fn a_motion_between_two_poses_has_one_as_the_image_of_the_other(
+        one in [-5.0..5.0, -5.0..5.0, -3.0..3.0], other in [-5.0..5.0, -5.0..5.0, -3.0..3.0],
+    ) {
+        let motion = SymmetryMotion::between(one, other);
+        let is_other = |image: &[f64; 3]| {
+            (image[0] - other[0]).hypot(image[1] - other[1]) < 1e-6
+                && (image[2] - other[2]).sin().abs() < 1e-6
+        };
+        // Below 0.02 rad it is a shift.
+        let is_turned = (one[2] - other[2]).abs() > 0.03;
+        prop_assume!(is_turned);
+        prop_assert!(motion.images(one).iter().any(is_other), "{motion}: {one:?} {other:?}");
     }
 
     /// A room that is not symmetric is not, in any direction.

@@ -22,6 +22,7 @@ mod link_command;
 mod live;
 mod map_command;
 mod map_exchange;
+mod map_starts;
 mod measure;
 mod monitor;
 mod plan;

@@ -75,6 +75,9 @@ impl Settings {
 /// The furniture of the usual forecast, pieces on 10 m².
 pub const FURNITURE: f64 = 1.0;
 
+/// Share of the starts without a right answer from which on a board is looked for.
+const TOLERATED: f64 = 0.05;
+
 /// Times and shares of many starts.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Times {
@@ -161,7 +164,8 @@ impl Anywhere {
         Ok(times.map(|times| Self { times, confused, landmark: None, places }))
     }
 
-    /// Looks for a board that helps, clear of a path; `scenario` and `settings` are those of the starts.
+    /// Looks for a board that helps, clear of a path, if more than 5 % of the starts have no right answer; `scenario` and `settings`
+    /// are those of the starts.
     ///
     /// # Errors
     /// As of [`Anywhere::new`].
@@ -172,6 +176,9 @@ impl Anywhere {
         settings: &Settings,
         progress: &impl Progress,
     ) -> Result<Self, AnywhereError> {
+        if self.times.right >= 1.0 - TOLERATED {
+            return Ok(self);
+        }
         let place = Place::new(scenario, scenario.floor.clone())?;
         let landmark = landmark::best(&place, &self.places, path, settings, progress)?;
         Ok(Self { landmark, ..self })

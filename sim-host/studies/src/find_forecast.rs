@@ -143,7 +143,7 @@ pub struct Summary {
     pub most: Agreement,
     /// Share of the starts without a right answer: forecast, simulated, and rank correlation.
     pub without: [f64; 3],
-    /// Plans where a tenth of the starts or more were without a right answer: forecast and simulated, only forecast, only simulated.
+    /// Plans where a tenth of the starts or more are without a right answer: forecast, simulated, and in both.
     pub hard: [usize; 3],
     /// What the boards change; `None` without one.
     pub boards: Option<Boards>,
@@ -154,14 +154,23 @@ pub struct Summary {
 pub struct Boards {
     /// Plans with a board.
     pub plans: usize,
-    /// Mean over these plans of the median time: without and with the board as simulated, and with it as forecast, seconds.
-    pub median: [f64; 3],
-    /// The same of the time of nine in ten.
-    pub most: [f64; 3],
-    /// The same of the share without a right answer.
-    pub without: [f64; 3],
-    /// Plans in which the simulated median or the share without an answer became better.
+    /// Of the median time, seconds.
+    pub median: Change,
+    /// Of the time within which nine in ten have the answer, seconds.
+    pub most: Change,
+    /// Of the share without a right answer.
+    pub without: Change,
+    /// Plans in which fewer simulated searches are without a right answer, or as many and the median is sooner.
     pub better: usize,
+}
+
+/// Means over the plans, each as forecast and as simulated.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Change {
+    /// Without the board.
+    pub before: [f64; 2],
+    /// With it.
+    pub after: [f64; 2],
 }
 
 impl Summary {
@@ -186,9 +195,9 @@ impl Summary {
                 rank_correlation(&without),
             ],
             hard: [
-                count(&|one, other| one && other),
-                count(&|one, other| one && !other),
-                count(&|one, other| !one && other),
+                count(&|forecast, _| forecast),
+                count(&|_, simulated| simulated),
+                count(&|forecast, simulated| forecast && simulated),
             ],
             boards: Boards::new(plans),
         }
@@ -209,27 +218,30 @@ impl Agreement {
 
 impl Boards {
     fn new(plans: &[Compared]) -> Option<Self> {
-        let with: Vec<(&Times, &Times, &Times)> = plans
+        let with: Vec<(&Compared, &Landmark, &Times)> = plans
             .iter()
-            .filter_map(|plan| {
-                Some((&plan.simulated, plan.with_board.as_ref()?, &plan.landmark.as_ref()?.times))
-            })
+            .filter_map(|plan| Some((plan, plan.landmark.as_ref()?, plan.with_board.as_ref()?)))
             .collect();
-        let means = |of: fn(&Times) -> f64| {
-            [
-                mean(with.iter().map(|(before, ..)| of(before))),
-                mean(with.iter().map(|(_, after, _)| of(after))),
-                mean(with.iter().map(|(.., forecast)| of(forecast))),
-            ]
+        let change = |of: fn(&Times) -> f64| Change {
+            before: [
+                mean(with.iter().map(|(plan, ..)| of(&plan.forecast))),
+                mean(with.iter().map(|(plan, ..)| of(&plan.simulated))),
+            ],
+            after: [
+                mean(with.iter().map(|(_, board, _)| of(&board.times))),
+                mean(with.iter().map(|(.., simulated)| of(simulated))),
+            ],
         };
-        let is_better = |(before, after, _): &&(&Times, &Times, &Times)| {
-            median(after) < median(before) || without(after) < without(before)
+        let is_better = |(plan, _, after): &&(&Compared, &Landmark, &Times)| {
+            let before = &plan.simulated;
+            without(after) < without(before)
+                || (without(after) <= without(before) && median(after) < median(before))
         };
         (!with.is_empty()).then(|| Self {
             plans: with.len(),
-            median: means(median),
-            most: means(most),
-            without: means(without),
+            median: change(median),
+            most: change(most),
+            without: change(without),
             better: with.iter().filter(is_better).count(),
         })
     }

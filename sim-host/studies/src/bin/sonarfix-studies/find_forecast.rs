@@ -2,7 +2,9 @@
 
 use sonarfix_plan::anywhere::{FURNITURE, Settings, Times};
 use sonarfix_report::Table;
-use sonarfix_studies::find_forecast::{self, Agreement, Boards, Compared, Comparison, Summary};
+use sonarfix_studies::find_forecast::{
+    self, Agreement, Boards, Change, Compared, Comparison, Summary,
+};
 use sonarfix_studies::floor_plan::Kind;
 use sonarfix_studies::search_study::Plans;
 use sonarfix_terminal::progress::Runs;
@@ -125,10 +127,9 @@ fn summary_table(summary: &Summary, args: &Args) -> Table {
         String::new(),
         format!("{correlation:.2}"),
     ];
-    let [both, only_forecast, only_simulated] = summary.hard;
+    let [forecast, simulated, both] = summary.hard;
     let hard = format!(
-        "A tenth of the starts without an answer: {both} plans forecast and simulated, {only_forecast} only forecast, \
-         {only_simulated} only simulated."
+        "A tenth of the starts or more without a right answer: {forecast} plans forecast, {simulated} simulated, {both} in both."
     );
     let boards = summary.boards.as_ref().map(boards_note);
     let note = [Some(hard), boards].into_iter().flatten().collect::<Vec<_>>().join("\n");
@@ -147,15 +148,18 @@ fn summary_table(summary: &Summary, args: &Args) -> Table {
 }
 
 fn boards_note(boards: &Boards) -> String {
-    let seconds = |[before, after, forecast]: [f64; 3]| {
-        format!("{before:.1} s to {after:.1} s (forecast {forecast:.1} s)")
+    let change = |of: &Change, text: &dyn Fn(f64) -> String| {
+        let ([forecast, simulated], [forecast_with, simulated_with]) =
+            (of.before.map(text), of.after.map(text));
+        format!("{simulated} to {simulated_with} (forecast {forecast} to {forecast_with})")
     };
-    let [before, after, forecast] = boards.without.map(percent);
+    let seconds = |seconds: f64| format!("{seconds:.1} s");
     format!(
-        "Boards in {} plans, better in {}: median {}, nine in ten {}, without a right answer {before} to {after} (forecast {forecast}).",
+        "Boards in {} plans, better in {}: median {}, nine in ten {}, without a right answer {}.",
         boards.plans,
         boards.better,
-        seconds(boards.median),
-        seconds(boards.most),
+        change(&boards.median, &seconds),
+        change(&boards.most, &seconds),
+        change(&boards.without, &percent),
     )
 }
