@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use sonarfix_map::{MapFile, Scenario, robot_file};
 use sonarfix_plan::anywhere::{
-    Anywhere, Confusion, FURNITURE, Landmark, Outcome, Settings, Start, Times,
+    Anywhere, Confusion, FURNITURE, Landmarks, Outcome, Settings, Start, Times,
 };
 use sonarfix_plan::bare;
 use sonarfix_report::Table;
@@ -13,7 +13,7 @@ use sonarfix_terminal::output::check_file;
 use sonarfix_terminal::progress::Runs;
 
 /// Confusions that are printed.
-const SHOWN: usize = 8;
+const SHOWN: usize = 5;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -58,7 +58,8 @@ impl Args {
         let path = map.scenario.as_ref().map(|scenario| scenario.path.plan());
         let runs = Runs::new(settings.runs());
         let anywhere = Anywhere::new(&scenario, &settings, &runs)?;
-        let anywhere = anywhere.map(|found| found.with_landmark(&scenario, path, &settings, &runs));
+        let anywhere =
+            anywhere.map(|found| found.with_landmarks(&scenario, path, &settings, &runs));
         let anywhere = anywhere.transpose()?;
         runs.end()?;
         let forecast = anywhere.map(|anywhere| Forecast { anywhere, furniture });
@@ -91,7 +92,7 @@ pub struct Forecast {
 impl Forecast {
     /// As text.
     pub fn print(&self, map: &MapFile) {
-        let Anywhere { times, confused, landmark, .. } = &self.anywhere;
+        let Anywhere { times, confused, landmarks, .. } = &self.anywhere;
         println!("{}", self.table().text());
         for confusion in confused.iter().take(SHOWN) {
             println!("confused: {}", confusion_text(confusion));
@@ -99,15 +100,17 @@ impl Forecast {
         if confused.len() > SHOWN {
             println!("and {} more", confused.len() - SHOWN);
         }
-        if let Some(landmark) = landmark {
-            println!("{}", advice(landmark, times, map));
+        if let Some(landmarks) = landmarks {
+            println!("{}", advice(landmarks, times, map));
         }
     }
 
     fn table(&self) -> Table {
-        let Anywhere { times, landmark, .. } = &self.anywhere;
-        let rows =
-            [("as it is", Some(times)), ("with the board", landmark.as_ref().map(|it| &it.times))];
+        let Anywhere { times, landmarks, .. } = &self.anywhere;
+        let rows = [
+            ("as it is", Some(times)),
+            ("with the boards", landmarks.as_ref().map(|it| &it.times)),
+        ];
         let rows = rows.into_iter().filter_map(|(name, times)| Some(row(name, times?)));
         Table {
             title: "Starts without a pose, anywhere".to_owned(),
@@ -124,21 +127,24 @@ impl Forecast {
     }
 
     fn drawing<'a>(&self, map: &'a MapFile) -> StartsMap<'a> {
-        let Anywhere { times, confused, landmark, places } = &self.anywhere;
+        let Anywhere { times, confused, landmarks, places } = &self.anywhere;
         let dot = |start: &Start| Dot {
             at: start.at,
             after: start.after,
             is_wrong: start.outcome == Outcome::Wrong,
         };
         let pairs = confused.iter().flat_map(|confusion| &confusion.pairs);
-        let board = landmark.as_ref();
+        let boards = landmarks.as_ref();
         StartsMap {
             title: format!("Starts without a pose: {}", summary(times)),
             floor: &map.floor,
             starts: places.iter().map(dot).collect(),
             seconds: times.seconds,
             confused: pairs.map(|pair| pair.map(|[x, y, _]| [x, y])).collect(),
-            board: board.map(|it| (it.board, format!("a board here: {}", summary(&it.times)))),
+            boards: boards.map_or_else(Vec::new, |it| it.boards.clone()),
+            effect: boards.map_or_else(String::new, |it| {
+                format!("proposed boards of 40 cm: {}", summary(&it.times))
+            }),
         }
     }
 }
@@ -182,13 +188,17 @@ fn confusion_text(confusion: &Confusion) -> String {
     format!("{}, in {} {starts}{example}", confusion.motion, confusion.starts)
 }
 
-/// What the board is, and what it changes.
-fn advice(landmark: &Landmark, without: &Times, map: &MapFile) -> String {
-    let [[x0, y0], [x1, y1]] = landmark.board;
-    let (addition, wall) = (landmark.place.addition, map.quoted(landmark.place.wall));
-    let (before, after) = (summary(without), summary(&landmark.times));
+/// What the boards are, and what they change.
+fn advice(landmarks: &Landmarks, without: &Times, map: &MapFile) -> String {
+    let boards = landmarks.places.iter().zip(&landmarks.boards);
+    let each = boards.map(|(place, [[x0, y0], [x1, y1]])| {
+        let (addition, wall) = (place.addition, map.quoted(place.wall));
+        format!("{addition} on {wall}, from ({x0:.2}, {y0:.2}) to ({x1:.2}, {y1:.2}) m")
+    });
+    let each: Vec<String> = each.collect();
+    let (before, after) = (summary(without), summary(&landmarks.times));
     format!(
-        "{addition} on {wall}, from ({x0:.2}, {y0:.2}) to ({x1:.2}, {y1:.2}) m, mapped and not hidden by furniture: {after}, \
-         instead of {before}"
+        "{}, mapped and not hidden by furniture: {after}, instead of {before}",
+        each.join(", and ")
     )
 }

@@ -67,16 +67,19 @@ fn a_square_room_is_not_unique_and_a_board_makes_it_so() {
         let from_middle = |pose: &Value| (number(&pose[0]) - 2.0).hypot(number(&pose[1]) - 2.0);
         assert!((from_middle(&pair[0]) - from_middle(&pair[1])).abs() < 0.3, "{pair}");
     }
-    let board = &starts["landmark"]["board"];
+    let board = &starts["landmarks"]["boards"][0];
     let [at, end] = [&board[0], &board[1]].map(|it| [number(&it[0]), number(&it[1])]);
     assert!((at[0] - end[0]).hypot(at[1] - end[1]) - 0.4 < 1e-6, "{board}");
     assert!(at.iter().any(|place| place.abs() < 1e-6 || (place - 4.0).abs() < 1e-6), "{board}");
     assert!(end.iter().all(|place| (0.3..=3.7).contains(place)), "{board}");
-    let with_board = &starts["landmark"];
-    assert!(number(&with_board["right"]) > 0.7 && number(&with_board["wrong"]) < 1e-9, "{starts}");
+    let with_boards = &starts["landmarks"];
+    assert!(
+        number(&with_boards["right"]) > 0.7 && number(&with_boards["wrong"]) < 1e-9,
+        "{starts}"
+    );
     let svg = fs::read_to_string(dir.join("starts.svg")).unwrap();
     assert!(svg.starts_with("<svg") && svg.ends_with("</svg>\n") && !svg.contains("NaN"), "{svg}");
-    for legend in ["no unique answer", "places that are confused", "a board here"] {
+    for legend in ["no unique answer", "places that are confused", "proposed boards of 40 cm"] {
         assert!(svg.contains(legend), "{legend} is missing");
     }
 }

@@ -1,5 +1,5 @@
 //! What a map leads to when a robot starts anywhere on it without a pose: how long the search takes, where its answer is not
-//! unique, and which board would change that.
+//! unique, and which boards would change that.
 //!
 //! Each start is a trial of [`crate::trial`] from a random place: the robot drives to random places, on the shortest way that
 //! keeps off the walls, among random furniture that the map does not have.
@@ -11,7 +11,7 @@
 //! | `furniture` | what stands beside a drive |
 //! | `start` | one start |
 //! | `confusion` | the poses that are confused |
-//! | `separation`, `landmark` | what a sweep tells between two poses, and the board that helps most |
+//! | `separation`, `landmark` | what a sweep tells between two poses, and the boards that help most |
 
 mod confusion;
 mod free_space;
@@ -24,11 +24,11 @@ mod wander;
 
 use rayon::prelude::*;
 use serde::Serialize;
-use sonarfix_map::{PathError, PathPlan, Scenario};
+use sonarfix_map::{PathError, PathPlan, Scenario, symmetries};
 use sonarfix_sim::progress::Progress;
 
 pub use confusion::Confusion;
-pub use landmark::Landmark;
+pub use landmark::Landmarks;
 pub use start::{Outcome, Start};
 
 use crate::trial::TrialError;
@@ -65,15 +65,17 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// The runs that a forecast with a board takes at most.
+    /// The runs that a forecast with boards takes at most.
     #[must_use]
     pub fn runs(&self) -> u32 {
-        self.starts.saturating_mul(4)
+        // Each board is chosen from three by half of the starts, and confirmed by as many as there are.
+        let each = self.starts.saturating_add(self.starts.div_ceil(2).saturating_mul(3));
+        self.starts.saturating_add(each.saturating_mul(landmark::MOST_BOARDS))
     }
 }
 
 /// The furniture of the usual forecast, pieces on 10 m².
-pub const FURNITURE: f64 = 1.0;
+pub const FURNITURE: f64 = 1.8;
 
 /// Share of the starts without a right answer from which on a board is looked for.
 const TOLERATED: f64 = 0.05;
@@ -124,6 +126,12 @@ impl Times {
         })
     }
 
+    /// Whether so many starts have the right answer that no board is looked for.
+    #[must_use]
+    pub fn suffices(&self) -> bool {
+        self.right >= 1.0 - TOLERATED
+    }
+
     /// Share without a unique answer.
     #[must_use]
     pub fn unanswered(&self) -> f64 {
@@ -139,8 +147,8 @@ pub struct Anywhere {
     pub times: Times,
     /// Which poses the starts without a right answer confused.
     pub confused: Vec<Confusion>,
-    /// A board that helps, if one was looked for and found.
-    pub landmark: Option<Landmark>,
+    /// Boards that help, if they were looked for and found.
+    pub landmarks: Option<Landmarks>,
     /// The starts.
     pub places: Vec<Start>,
 }
@@ -160,28 +168,29 @@ impl Anywhere {
         let seeds: Vec<u64> = (settings.seed..).take(settings.starts as usize).collect();
         let places = simulate(&place, &seeds, settings, progress)?;
         let times = Times::new(&places, settings.seconds);
-        let confused = confusion::all(&places);
-        Ok(times.map(|times| Self { times, confused, landmark: None, places }))
+        let symmetries = symmetries(&scenario.floor).map_err(TrialError::Bake)?;
+        let confused = confusion::all(&places, &symmetries);
+        Ok(times.map(|times| Self { times, confused, landmarks: None, places }))
     }
 
-    /// Looks for a board that helps, clear of a path, if more than 5 % of the starts have no right answer; `scenario` and `settings`
+    /// Looks for boards that help, clear of a path, if more than 5 % of the starts have no right answer; `scenario` and `settings`
     /// are those of the starts.
     ///
     /// # Errors
     /// As of [`Anywhere::new`].
-    pub fn with_landmark(
+    pub fn with_landmarks(
         self,
         scenario: &Scenario,
         path: Option<&PathPlan>,
         settings: &Settings,
         progress: &impl Progress,
     ) -> Result<Self, AnywhereError> {
-        if self.times.right >= 1.0 - TOLERATED {
+        if self.times.suffices() {
             return Ok(self);
         }
         let place = Place::new(scenario, scenario.floor.clone())?;
-        let landmark = landmark::best(&place, &self.places, path, settings, progress)?;
-        Ok(Self { landmark, ..self })
+        let landmarks = landmark::fewest(&place, &self.places, path, settings, progress)?;
+        Ok(Self { landmarks, ..self })
     }
 }
 

@@ -18,7 +18,7 @@
 //! | [`comparison`] | the page of two runs side by side |
 //! | `palette` | one colour per role, in figures and player |
 //! | [`map`] | the drawing of a map |
-//! | [`starts_map`] | a map with starts without a pose, what they confuse, and a board |
+//! | [`starts_map`] | a map with starts without a pose, what they confuse, and boards |
 //! | `page`, `escape` | tables, figures and data as HTML |
 //! | [`Table`] | a table of numbers |
 //! | [`residuals`] | the figure of a calibration |

@@ -1,4 +1,4 @@
-//! A map with starts without a pose, as SVG: how long each takes, which places are confused, and a board that helps.
+//! A map with starts without a pose, as SVG: how long each takes, which places are confused, and boards that help.
 
 use sonarfix_map::Floor;
 
@@ -40,8 +40,10 @@ pub struct StartsMap<'a> {
     pub seconds: f64,
     /// Places that are confused, metres.
     pub confused: Vec<[[f64; 2]; 2]>,
-    /// A proposed board, from end to end, metres, and what is said of it.
-    pub board: Option<([[f64; 2]; 2], String)>,
+    /// Proposed boards, each from end to end, metres.
+    pub boards: Vec<[[f64; 2]; 2]>,
+    /// What they change.
+    pub effect: String,
 }
 
 impl StartsMap<'_> {
@@ -72,7 +74,7 @@ impl StartsMap<'_> {
                 ),
             );
         }
-        if let Some(([from, to], _)) = &self.board {
+        for [from, to] in &self.boards {
             let ((x1, y1), (x2, y2)) = (frame.at(*from), frame.at(*to));
             put(
                 &mut svg,
@@ -119,8 +121,8 @@ impl StartsMap<'_> {
         if !self.confused.is_empty() {
             rows.push((link("M-8 0H8"), "places that are confused".to_owned()));
         }
-        if let Some((_, text)) = &self.board {
-            rows.push((board("M-8 0H8"), text.clone()));
+        if !self.boards.is_empty() {
+            rows.push((board("M-8 0H8"), self.effect.clone()));
         }
         rows
     }

@@ -5,7 +5,7 @@
 
 use serde::Serialize;
 use sonarfix_map::Scenario;
-use sonarfix_plan::anywhere::{Anywhere, AnywhereError, Confusion, Landmark, Settings, Times};
+use sonarfix_plan::anywhere::{Anywhere, AnywhereError, Confusion, Landmarks, Settings, Times};
 use sonarfix_plan::bare;
 use sonarfix_plan::trial::{Trial, TrialError, trial};
 use sonarfix_sim::progress::Progress;
@@ -30,10 +30,10 @@ pub struct Compared {
     pub simulated: Times,
     /// What the forecast says is confused, and in how many starts.
     pub confused: Vec<Confusion>,
-    /// The proposed board, with its forecast.
-    pub landmark: Option<Landmark>,
-    /// The same searches with that board.
-    pub with_board: Option<Times>,
+    /// The proposed boards, with their forecast.
+    pub landmarks: Option<Landmarks>,
+    /// The same searches with these boards.
+    pub with_boards: Option<Times>,
 }
 
 /// Why a plan cannot be compared.
@@ -86,10 +86,11 @@ fn compared(
     };
     if *boards {
         let path = Some(scenario.path.plan());
-        anywhere = anywhere.with_landmark(&map, path, settings, &|| ())?;
+        anywhere = anywhere.with_landmarks(&map, path, settings, &|| ())?;
     }
-    let with_board = anywhere.landmark.as_ref().map(|landmark| {
-        let floor = landmark.place.on(&scenario.floor);
+    let with_boards = anywhere.landmarks.as_ref().map(|landmarks| {
+        let boards = landmarks.places.iter();
+        let floor = boards.fold(scenario.floor.clone(), |floor, board| board.on(&floor));
         let scenario = Scenario { floor, ..scenario.clone() };
         self::simulated(&scenario, seed, *trials, settings.seconds)
     });
@@ -99,8 +100,8 @@ fn compared(
         forecast: anywhere.times,
         simulated,
         confused: anywhere.confused,
-        landmark: anywhere.landmark,
-        with_board: with_board.transpose()?.flatten(),
+        landmarks: anywhere.landmarks,
+        with_boards: with_boards.transpose()?.flatten(),
     }))
 }
 
@@ -145,14 +146,14 @@ pub struct Summary {
     pub without: [f64; 3],
     /// Plans where a tenth of the starts or more are without a right answer: forecast, simulated, and in both.
     pub hard: [usize; 3],
-    /// What the boards change; `None` without one.
+    /// What the boards change; `None` without any.
     pub boards: Option<Boards>,
 }
 
-/// What the proposed boards change, over the plans that got one.
+/// What the proposed boards change, over the plans that got some.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Boards {
-    /// Plans with a board.
+    /// Plans with boards.
     pub plans: usize,
     /// Of the median time, seconds.
     pub median: Change,
@@ -167,9 +168,9 @@ pub struct Boards {
 /// Means over the plans, each as forecast and as simulated.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Change {
-    /// Without the board.
+    /// Without the boards.
     pub before: [f64; 2],
-    /// With it.
+    /// With them.
     pub after: [f64; 2],
 }
 
@@ -218,9 +219,9 @@ impl Agreement {
 
 impl Boards {
     fn new(plans: &[Compared]) -> Option<Self> {
-        let with: Vec<(&Compared, &Landmark, &Times)> = plans
+        let with: Vec<(&Compared, &Landmarks, &Times)> = plans
             .iter()
-            .filter_map(|plan| Some((plan, plan.landmark.as_ref()?, plan.with_board.as_ref()?)))
+            .filter_map(|plan| Some((plan, plan.landmarks.as_ref()?, plan.with_boards.as_ref()?)))
             .collect();
         let change = |of: fn(&Times) -> f64| Change {
             before: [
@@ -232,7 +233,7 @@ impl Boards {
                 mean(with.iter().map(|(.., simulated)| of(simulated))),
             ],
         };
-        let is_better = |(plan, _, after): &&(&Compared, &Landmark, &Times)| {
+        let is_better = |(plan, _, after): &&(&Compared, &Landmarks, &Times)| {
             let before = &plan.simulated;
             without(after) < without(before)
                 || (without(after) <= without(before) && median(after) < median(before))

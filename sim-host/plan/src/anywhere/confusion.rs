@@ -1,7 +1,8 @@
-//! Which poses a search confuses: motions of the map that furniture, or a difference out of reach, does not show.
+//! Which poses a search confuses: by the symmetries of the map, and by motions that furniture, or a difference out of reach, does not
+//! show.
 
 use serde::Serialize;
-use sonarfix_map::SymmetryMotion;
+use sonarfix_map::{Symmetry, SymmetryMotion};
 use sonarfix_sim::angle;
 use sonarfix_sim::trace::Pose;
 
@@ -9,7 +10,7 @@ use super::start::{Outcome, Start};
 
 /// A pose is the image of another one within these errors, metres and radians: a search that is not sure of its pose knows it only
 /// roughly.
-const ALIKE: (f64, f64) = (0.5, 0.26);
+const ALIKE: (f64, f64) = (0.8, 0.26);
 
 /// Poses that are confused, with the motion that moves one onto the other.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -28,35 +29,79 @@ fn as_text<S: serde::Serializer>(motion: &SymmetryMotion, to: S) -> Result<S::Ok
 }
 
 /// What the starts without a right answer confused at last, the most frequent first.
-pub(super) fn all(starts: &[Start]) -> Vec<Confusion> {
-    let mut found: Vec<Confusion> = Vec::new();
+pub(super) fn all(starts: &[Start], symmetries: &[Symmetry]) -> Vec<Confusion> {
+    let group = |motion| Confusion { motion, starts: 0, pairs: Vec::new() };
+    let mut found: Vec<Confusion> = symmetries.iter().map(|it| group(it.motion)).collect();
+    let known = found.len();
     for start in starts.iter().filter(|start| start.outcome != Outcome::Right) {
         let Some(last) = start.doubts.last() else { continue };
         let truth = numbers(&last.truth);
         for rival in last.rivals.iter().map(numbers) {
-            let is_this = |confusion: &&mut Confusion| {
-                confusion.motion.images(truth).iter().any(|image| are_alike(image, &rival))
+            let is_image = |it: &&mut Confusion| {
+                it.motion.images(truth).iter().any(|image| are_alike(image, &rival))
             };
-            if let Some(known) = found.iter_mut().find(is_this) {
-                // One start may have two hypotheses near each other.
-                if known.pairs.last().is_none_or(|[of, _]| *of != truth) {
-                    known.starts += 1;
-                    known.pairs.push([truth, rival]);
-                }
+            if let Some(confusion) = found.iter_mut().find(is_image) {
+                confusion.add(truth, rival);
             } else {
-                let motion = SymmetryMotion::between(truth, untwisted(truth, rival));
-                found.push(Confusion { motion, starts: 1, pairs: vec![[truth, rival]] });
+                let mut confusion = group(motion([truth, rival]));
+                confusion.add(truth, rival);
+                found.push(confusion);
             }
         }
     }
+    for confusion in found.iter_mut().skip(known) {
+        confusion.motion = typical(&confusion.pairs).unwrap_or(confusion.motion);
+    }
+    found.retain(|confusion| confusion.starts > 0);
     found.sort_by_key(|confusion| std::cmp::Reverse(confusion.starts));
     found
 }
 
-/// A pose with the heading of another one, if they differ by less than the errors.
-fn untwisted(truth: [f64; 3], [x, y, heading]: [f64; 3]) -> [f64; 3] {
+impl Confusion {
+    /// Adds the poses of a start, once: a search may have two hypotheses near each other.
+    fn add(&mut self, truth: [f64; 3], rival: [f64; 3]) {
+        if self.pairs.last().is_none_or(|[of, _]| *of != truth) {
+            self.starts += 1;
+            self.pairs.push([truth, rival]);
+        }
+    }
+}
+
+/// The motion between two poses; a shift, if their headings differ by less than the errors.
+fn motion([truth, [x, y, heading]]: [[f64; 3]; 2]) -> SymmetryMotion {
     let is_parallel = angle::wrap(heading - truth[2]).abs() < ALIKE.1;
-    [x, y, if is_parallel { truth[2] } else { heading }]
+    SymmetryMotion::between(truth, [x, y, if is_parallel { truth[2] } else { heading }])
+}
+
+/// The median of the motions between poses, number by number.
+fn typical(pairs: &[[[f64; 3]; 2]]) -> Option<SymmetryMotion> {
+    let motions: Vec<SymmetryMotion> = pairs.iter().map(|pair| motion(*pair)).collect();
+    let median = |of: &dyn Fn(&SymmetryMotion) -> Option<f64>| {
+        let mut values: Vec<f64> = motions.iter().filter_map(of).collect();
+        values.sort_by(f64::total_cmp);
+        values.get(values.len() / 2).copied()
+    };
+    Some(match motions.first()? {
+        SymmetryMotion::Turn { .. } => {
+            let turn = |of: fn(f64, [f64; 2]) -> f64| {
+                median(&|motion| match motion {
+                    SymmetryMotion::Turn { by, about } => Some(of(*by, *about)),
+                    SymmetryMotion::Shift(_) => None,
+                })
+            };
+            let about = [turn(|_, about| about[0])?, turn(|_, about| about[1])?];
+            SymmetryMotion::Turn { by: turn(|by, _| by)?, about }
+        }
+        SymmetryMotion::Shift(_) => {
+            let shift = |of: fn([f64; 2]) -> f64| {
+                median(&|motion| match motion {
+                    SymmetryMotion::Shift(by) => Some(of(*by)),
+                    SymmetryMotion::Turn { .. } => None,
+                })
+            };
+            SymmetryMotion::Shift([shift(|[x, _]| x)?, shift(|[_, y]| y)?])
+        }
+    })
 }
 
 fn numbers(pose: &Pose) -> [f64; 3] {

@@ -11,6 +11,8 @@ const MOST_CELLS: f64 = 250_000.0;
 pub(super) const ROOMY: f64 = 0.4;
 /// Area of the smallest part in which a robot starts, m²: smaller ones are the insides of furniture.
 const LEAST_PART: f64 = 1.0;
+/// A place is near the free cells within this, metres: the error of an uncertain pose.
+const BESIDE: f64 = 0.2;
 /// Directions in which a place that is not enclosed is tested, and in how many of them it must have a wall.
 const DIRECTIONS: u8 = 16;
 const ENCLOSED: usize = 14;
@@ -193,6 +195,14 @@ impl FreeSpace {
     /// The connected part of a cell, if it is free.
     pub fn part(&self, cell: usize) -> Option<usize> {
         self.part.get(cell).copied().flatten()
+    }
+
+    /// Whether a free cell is within [`BESIDE`] of a point, in one of eight directions.
+    pub fn is_near(&self, [x, y]: Point) -> bool {
+        let steps = [-BESIDE, 0.0, BESIDE];
+        steps
+            .iter()
+            .any(|dx| steps.iter().any(|dy| self.part(self.cell_at([x + dx, y + dy])).is_some()))
     }
 
     /// Distance of a cell from the nearest wall, at most [`ROOMY`], metres.

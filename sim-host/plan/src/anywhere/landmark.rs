@@ -1,4 +1,4 @@
-//! A board that makes the map unique, or the answer sooner: chosen by what it tells between the poses that starts confused, then by
+//! Boards that make the map unique, or the answer sooner: chosen by what they tell between the poses that starts confused, then by
 //! simulation.
 
 use rayon::prelude::*;
@@ -29,18 +29,20 @@ const LEAD: f64 = 24.0;
 const GAINED: f64 = 0.5;
 /// Pings of a sweep.
 const SWEEP: f64 = 21.0;
+/// Boards that are proposed at most.
+pub(super) const MOST_BOARDS: u32 = 3;
 /// A board that does not save this share of the time, of the slower half of the starts, is not proposed.
 const WORTHWHILE: f64 = 0.1;
 
-/// A board and what it changes.
+/// Boards, and what they change.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Landmark {
-    /// Its ends: at the wall, and in the room, metres.
-    pub board: [[f64; 2]; 2],
-    /// Where it stands.
+pub struct Landmarks {
+    /// The ends of each: at the wall, and in the room, metres.
+    pub boards: Vec<[[f64; 2]; 2]>,
+    /// Where they stand.
     #[serde(skip)]
-    pub place: PlacedAddition,
-    /// What other starts lead to with it.
+    pub places: Vec<PlacedAddition>,
+    /// What other starts lead to with them.
     #[serde(flatten)]
     pub times: Times,
 }
@@ -53,45 +55,88 @@ struct Doubts<'a> {
     evidence: Vec<Vec<f64>>,
 }
 
-/// The best board, clear of a path; `None` if none helps, or it was interrupted.
+/// The fewest boards, clear of a path, with which nearly all starts have the right answer, or those that help most; `None` if none
+/// does, or it was interrupted.
 ///
 /// # Errors
 /// [`AnywhereError`], if the map cannot be used.
-pub(super) fn best(
+pub(super) fn fewest(
     place: &Place<'_>,
     starts: &[Start],
     path: Option<&PathPlan>,
     settings: &Settings,
     progress: &impl Progress,
-) -> Result<Option<Landmark>, AnywhereError> {
-    let mut slowest: Vec<(u64, &Start)> = (settings.seed..).zip(starts).collect();
-    slowest
-        .sort_by(|(_, one), (_, other)| settings.lost_by(other).total_cmp(&settings.lost_by(one)));
-    slowest.truncate(starts.len().div_ceil(2));
-    let without: f64 = slowest.iter().map(|(_, start)| settings.lost_by(start)).sum();
-    let seeds: Vec<u64> = slowest.iter().map(|(seed, _)| *seed).collect();
+) -> Result<Option<Landmarks>, AnywhereError> {
+    let mut found: Option<Landmarks> = None;
+    let (mut floor, mut starts) = (place.floor.clone(), Seeded::new(starts, settings.seed));
+    for _ in 0..MOST_BOARDS {
+        let place = Place::new(place.scenario, floor.clone())?;
+        let Some(board) = best(&place, &starts, path, settings, progress)? else { break };
+        floor = board.on(&floor);
+        // Others than those by which it was chosen.
+        let first = starts.first.wrapping_add(u64::from(settings.starts));
+        let seeds: Vec<u64> = (first..).take(settings.starts as usize).collect();
+        let with = Place::new(place.scenario, floor.clone())?;
+        let others = simulate(&with, &seeds, settings, progress)?;
+        let Some(times) = Times::new(&others, settings.seconds) else { break };
+        if settings.lost_by(&others) >= settings.lost_by(&starts.all) {
+            break;
+        }
+        let mut places = found.map_or_else(Vec::new, |found| found.places);
+        places.push(board);
+        let boards = places.iter().filter_map(|board| board.faces.first().copied()).collect();
+        found = Some(Landmarks { boards, places, times });
+        if times.suffices() {
+            break;
+        }
+        starts = Seeded { all: others, first };
+    }
+    Ok(found)
+}
+
+/// Starts, and the seed of the first one.
+struct Seeded {
+    all: Vec<Start>,
+    first: u64,
+}
+
+impl Seeded {
+    fn new(all: &[Start], first: u64) -> Self {
+        Self { all: all.to_vec(), first }
+    }
+
+    /// The slower half of them, with their seeds.
+    fn slower(&self, settings: &Settings) -> (Vec<Start>, Vec<u64>) {
+        let mut all: Vec<(u64, &Start)> = (self.first..).zip(&self.all).collect();
+        all.sort_by(|(_, one), (_, other)| settings.lost(other).total_cmp(&settings.lost(one)));
+        all.truncate(self.all.len().div_ceil(2));
+        all.into_iter().map(|(seed, start)| (start.clone(), seed)).unzip()
+    }
+}
+
+/// The board that saves the most time of the slower half of the starts; `None` if none saves enough.
+fn best(
+    place: &Place<'_>,
+    starts: &Seeded,
+    path: Option<&PathPlan>,
+    settings: &Settings,
+    progress: &impl Progress,
+) -> Result<Option<PlacedAddition>, AnywhereError> {
+    let (slower, seeds) = starts.slower(settings);
     let mut best: Option<(f64, PlacedAddition)> = None;
-    for board in finalists(place, starts, path, settings) {
+    for board in finalists(place, &starts.all, path, settings) {
         let with = Place::new(place.scenario, board.on(&place.floor))?;
         let simulated = simulate(&with, &seeds, settings, progress)?;
         if simulated.len() < seeds.len() {
             return Ok(None);
         }
-        let lost: f64 = simulated.iter().map(|start| settings.lost_by(start)).sum();
+        let lost = settings.lost_by(&simulated);
         if best.as_ref().is_none_or(|(least, _)| lost < *least) {
             best = Some((lost, board));
         }
     }
-    let Some((_, board)) = best.filter(|(lost, _)| *lost < (1.0 - WORTHWHILE) * without) else {
-        return Ok(None);
-    };
-    // Others than those by which it was chosen.
-    let first = settings.seed.wrapping_add(u64::from(settings.starts));
-    let seeds: Vec<u64> = (first..).take(settings.starts as usize).collect();
-    let with = Place::new(place.scenario, board.on(&place.floor))?;
-    let times = Times::new(&simulate(&with, &seeds, settings, progress)?, settings.seconds);
-    let Some((times, face)) = times.zip(board.faces.first().copied()) else { return Ok(None) };
-    Ok(Some(Landmark { board: face, place: board, times }))
+    let most = (1.0 - WORTHWHILE) * settings.lost_by(&slower);
+    Ok(best.filter(|(lost, _)| *lost < most).map(|(_, board)| board))
 }
 
 /// The boards that end most of the confusions, apart from each other.
@@ -153,9 +198,7 @@ impl<'a> Doubts<'a> {
         let evidence = start.doubts.iter().map(|doubt| {
             doubt.rivals.iter().map(|rival| ears.evidence(&doubt.truth, rival)).collect()
         });
-        let is_right = start.outcome == Outcome::Right;
-        let end = start.after.filter(|_| is_right).unwrap_or(settings.seconds);
-        Self { start, end, evidence: evidence.collect() }
+        Self { start, end: settings.lost(start), evidence: evidence.collect() }
     }
 
     /// The seconds of confusion that a board is expected to save, `with` which the sonar hears.
@@ -169,10 +212,11 @@ impl<'a> Doubts<'a> {
                 }
                 with.evidence(&doubt.truth, rival) - without
             });
-            let gain = gains.fold(f64::INFINITY, f64::min).max(0.0);
+            // Some of several hypotheses are those of a bad fit, which end by themselves.
+            let gain = gains.sum::<f64>() / count(without);
             let seconds = (doubt.time - last).min(2.0);
             last = doubt.time;
-            lead += GAINED * gain * seconds / (SWEEP * PERIOD);
+            lead += GAINED * gain.max(0.0) * seconds / (SWEEP * PERIOD);
             if lead >= LEAD {
                 return (self.end - doubt.time).max(0.0);
             }
@@ -181,10 +225,19 @@ impl<'a> Doubts<'a> {
     }
 }
 
+#[expect(clippy::cast_precision_loss, reason = "some hypotheses")]
+fn count(of: &[f64]) -> f64 {
+    of.len() as f64
+}
+
 impl Settings {
     /// The time that a start costs: until the right answer, or all of it.
-    fn lost_by(&self, start: &Start) -> f64 {
+    fn lost(&self, start: &Start) -> f64 {
         let is_right = start.outcome == Outcome::Right;
         start.after.filter(|_| is_right).unwrap_or(self.seconds)
+    }
+
+    fn lost_by(&self, starts: &[Start]) -> f64 {
+        starts.iter().map(|start| self.lost(start)).sum()
     }
 }

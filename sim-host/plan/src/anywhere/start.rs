@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use sonarfix_map::{Floor, Scenario};
-use sonarfix_search::search::{Answer, Search};
+use sonarfix_search::search::{Answer, Hypothesis, Search};
 use sonarfix_sim::trace::Pose;
 use sonarfix_sim::world::World;
 use sonarfix_sim::world::segment::Segment;
@@ -18,6 +18,8 @@ const DRIVE: u64 = 10;
 const FURNITURE: u64 = 11;
 /// Area that the furniture of [`Settings::furniture`] stands on, m².
 const TEN: f64 = 10.0;
+/// Mean score of a ping from which on a hypothesis explains what is heard: that of the navigator.
+const FITTING: f32 = 0.2;
 /// Seconds from one record of the hypotheses to the next.
 const RECORDED: f64 = 1.0;
 
@@ -109,7 +111,7 @@ impl<'a> Place<'a> {
         let mut doubts: Vec<Doubt> = Vec::new();
         let seconds = settings.seconds;
         let trial = observed_trial_from(scenario, seed, 0.0, seconds, |heard, search| {
-            record(&mut doubts, &heard, search);
+            self.record(&mut doubts, &heard, search);
             false
         })?;
         let outcome = match trial.unique_after {
@@ -119,21 +121,24 @@ impl<'a> Place<'a> {
         };
         Ok(Start { at: [at.x, at.y, at.heading], outcome, after: trial.unique_after, doubts })
     }
-}
 
-/// Records the answers that are wrong, about once a second, and a wrong unique one.
-fn record(doubts: &mut Vec<Doubt>, heard: &Heard, search: &Search<'_>) {
-    let poses = match search.answer() {
-        Answer::Unique(found) => vec![pose_of(&found)],
-        Answer::Several(count)
-            if doubts.last().is_none_or(|last| heard.time >= last.time + RECORDED) =>
-        {
-            search.hypotheses().take(count).map(|found| pose_of(&found)).collect()
+    /// Records the answers that are wrong, about once a second, and a wrong unique one.
+    fn record(&self, doubts: &mut Vec<Doubt>, heard: &Heard, search: &Search<'_>) {
+        let answers: Vec<Hypothesis> = match search.answer() {
+            Answer::Unique(found) => vec![found],
+            Answer::Several(count)
+                if doubts.last().is_none_or(|last| heard.time >= last.time + RECORDED) =>
+            {
+                search.hypotheses().take(count).collect()
+            }
+            _ => return,
+        };
+        let is_rival =
+            |pose: &Pose| !are_one(pose, &heard.pose) && self.space.is_near([pose.x, pose.y]);
+        let fitting = answers.iter().filter(|found| found.fit >= FITTING);
+        let rivals: Vec<Pose> = fitting.map(pose_of).filter(is_rival).collect();
+        if !rivals.is_empty() {
+            doubts.push(Doubt { time: heard.time, truth: heard.pose, rivals });
         }
-        _ => return,
-    };
-    let rivals: Vec<Pose> = poses.into_iter().filter(|pose| !are_one(pose, &heard.pose)).collect();
-    if !rivals.is_empty() {
-        doubts.push(Doubt { time: heard.time, truth: heard.pose, rivals });
     }
 }

@@ -32,7 +32,7 @@ pub struct Args {
     /// Pieces of furniture on 10 m² that the forecast assumes.
     #[arg(long, default_value_t = FURNITURE)]
     furniture: f64,
-    /// Proposes a board in each plan, and repeats the searches with it.
+    /// Proposes boards where many starts have no answer, and repeats the searches with them.
     #[arg(long)]
     boards: bool,
     /// Prints every plan.
@@ -88,8 +88,8 @@ fn times(times: &Times) -> String {
 
 fn plan_table(plans: &[Compared]) -> Table {
     let row = |plan: &Compared| {
-        let with = plan.landmark.as_ref().map_or("-".to_owned(), |board| times(&board.times));
-        let simulated = plan.with_board.as_ref().map_or("-".to_owned(), times);
+        let with = plan.landmarks.as_ref().map_or("-".to_owned(), |board| times(&board.times));
+        let simulated = plan.with_boards.as_ref().map_or("-".to_owned(), times);
         vec![
             plan.seed.to_string(),
             plan.walls.to_string(),
@@ -102,7 +102,7 @@ fn plan_table(plans: &[Compared]) -> Table {
     Table {
         title: "Plans".to_owned(),
         note: "median, nine in ten, share without a right answer".to_owned(),
-        columns: ["seed", "walls", "forecast", "simulated", "forecast with board", "simulated"]
+        columns: ["seed", "walls", "forecast", "simulated", "forecast with boards", "simulated"]
             .map(str::to_owned)
             .into(),
         rows: plans.iter().map(row).collect(),
