@@ -11,8 +11,10 @@
 //! | `furniture` | what stands beside a drive |
 //! | `start` | one start |
 //! | `confusion` | the poses that are confused |
-//! | `separation`, `landmark` | what a sweep tells between two poses, and the boards that help most |
+//! | `separation`, `candidates` | what a sweep tells between two poses, and the boards that tell most |
+//! | `landmark` | the best of them by simulation |
 
+mod candidates;
 mod confusion;
 mod free_space;
 mod furniture;

@@ -55,31 +55,15 @@ impl StartsMap<'_> {
         #[expect(clippy::cast_precision_loss, reason = "some rows")]
         let mut svg = frame.open(&self.title, [WIDTH, ROW * legend.len() as f64]);
         frame.axes(&mut svg);
-        for [from, to] in &self.confused {
-            let ((x1, y1), (x2, y2)) = (frame.at(*from), frame.at(*to));
-            put(&mut svg, format_args!("{}\n", link(&format!("M{x1:.1} {y1:.1}L{x2:.1} {y2:.1}"))));
+        for ends in &self.confused {
+            put(&mut svg, format_args!("{}\n", link(&line(&frame, ends))));
         }
         frame.walls(&mut svg, self.floor.named_walls());
         for dot in &self.starts {
-            let (x, y) = frame.at([dot.at[0], dot.at[1]]);
-            let (sin, cos) = dot.at[2].sin_cos();
-            put(
-                &mut svg,
-                format_args!(
-                    "<g transform=\"translate({x:.1} {y:.1})\"><path d=\"M0 0L{:.1} {:.1}\" stroke=\"{}\"/>{}</g>\n",
-                    AHEAD * cos,
-                    -AHEAD * sin,
-                    hex(Role::Ink),
-                    self.sign(dot),
-                ),
-            );
+            self.dot(&mut svg, &frame, dot);
         }
-        for [from, to] in &self.boards {
-            let ((x1, y1), (x2, y2)) = (frame.at(*from), frame.at(*to));
-            put(
-                &mut svg,
-                format_args!("{}\n", board(&format!("M{x1:.1} {y1:.1}L{x2:.1} {y2:.1}"))),
-            );
+        for ends in &self.boards {
+            put(&mut svg, format_args!("{}\n", board(&line(&frame, ends))));
         }
         frame.scale_bar(&mut svg);
         let (left, top) = frame.legend();
@@ -95,6 +79,21 @@ impl StartsMap<'_> {
         }
         svg.push_str("</svg>\n");
         svg
+    }
+
+    /// A start, with a line in the direction of its heading.
+    fn dot(&self, svg: &mut String, frame: &Frame, dot: &Dot) {
+        let (x, y) = frame.at([dot.at[0], dot.at[1]]);
+        let (sin, cos) = dot.at[2].sin_cos();
+        let (ink, sign) = (hex(Role::Ink), self.sign(dot));
+        put(
+            svg,
+            format_args!(
+                "<g transform=\"translate({x:.1} {y:.1})\"><path d=\"M0 0L{:.1} {:.1}\" stroke=\"{ink}\"/>{sign}</g>\n",
+                AHEAD * cos,
+                -AHEAD * sin,
+            ),
+        );
     }
 
     /// The sign of a start at the origin.
@@ -126,6 +125,12 @@ impl StartsMap<'_> {
         }
         rows
     }
+}
+
+/// A straight line as a path.
+fn line(frame: &Frame, [from, to]: &[[f64; 2]; 2]) -> String {
+    let ((x1, y1), (x2, y2)) = (frame.at(*from), frame.at(*to));
+    format!("M{x1:.1} {y1:.1}L{x2:.1} {y2:.1}")
 }
 
 fn answered(class: f64) -> String {
