@@ -11,7 +11,7 @@ use std::path::Path;
 use proptest::prelude::*;
 use sonarfix_map::{
     Addition, CLASSROOM, Floor, NamedWall, PlacedAddition, Scenario, Symmetry, SymmetryMotion,
-    symmetries,
+    along_walls, symmetries,
 };
 
 type Point = [f64; 2];

@@ -74,6 +74,16 @@ impl Settings {
         let each = self.starts.saturating_add(self.starts.div_ceil(2).saturating_mul(3));
         self.starts.saturating_add(each.saturating_mul(landmark::MOST_BOARDS))
     }
+
+    /// The time that a start costs: until the right answer, or all of it.
+    fn lost(&self, start: &Start) -> f64 {
+        let is_right = start.outcome == Outcome::Right;
+        start.after.filter(|_| is_right).unwrap_or(self.seconds)
+    }
+
+    fn lost_by(&self, starts: &[Start]) -> f64 {
+        starts.iter().map(|start| self.lost(start)).sum()
+    }
 }
 
 /// The furniture of the usual forecast, pieces on 10 m².

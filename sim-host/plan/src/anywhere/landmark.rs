@@ -5,7 +5,7 @@ use sonarfix_map::{PathPlan, PlacedAddition};
 use sonarfix_sim::progress::Progress;
 
 use super::candidates::finalists;
-use super::start::{Outcome, Place, Start};
+use super::start::{Place, Start};
 use super::{AnywhereError, Settings, Times, simulate};
 
 /// Boards that are proposed at most.
@@ -108,16 +108,4 @@ fn best(
     }
     let most = (1.0 - WORTHWHILE) * settings.lost_by(&slower);
     Ok(best.filter(|(lost, _)| *lost < most).map(|(_, board)| board))
-}
-
-impl Settings {
-    /// The time that a start costs: until the right answer, or all of it.
-    fn lost(&self, start: &Start) -> f64 {
-        let is_right = start.outcome == Outcome::Right;
-        start.after.filter(|_| is_right).unwrap_or(self.seconds)
-    }
-
-    fn lost_by(&self, starts: &[Start]) -> f64 {
-        starts.iter().map(|start| self.lost(start)).sum()
-    }
 }
