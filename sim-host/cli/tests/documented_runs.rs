@@ -50,7 +50,7 @@ const GIVEN: [(&str, &[&str]); 14] = [
 
 /// A command that is run in another way, and why.
 #[rustfmt::skip]
-const SMALL: [(&str, &str, &str); 7] = [
+const SMALL: [(&str, &str, &str); 8] = [
     ("pil paper", "pil paper --machine host --seconds 1", EMULATED),
     ("pil SCENARIO --seconds 60 --machine m0plus", "pil SCENARIO --seconds 1 --machine host", EMULATED),
     ("flash robot --board pico", "flash robot --board pico --program FLASH/pico.uf2 --to FLASH/drive", BOARD),
@@ -60,11 +60,12 @@ const SMALL: [(&str, &str, &str); 7] = [
      "command --port PORT goto 2.5 1.5 2.5 4 1 4 --map map.toml --robot robot.toml --seconds 2", MINUTES),
     ("command --port PORT patrol 1 1 2.5 1 2.5 4 --pause 5 --rounds 3",
      "command --port PORT patrol 1 1 2.5 1 2.5 4 --pause 5 --rounds 3 --seconds 2", MINUTES),
+    ("map check map.toml --starts 60 --out starts.svg", "map check map.toml --starts 2 --seconds 5 --out starts.svg", MINUTES),
 ];
 const EMULATED: &str = "the program of the emulated core is built and run by `cargo xtask pil`";
 const BOARD: &str =
     "it needs the drive of a board and the program of a release, which are made here";
-const MINUTES: &str = "the robot drives for half a minute and more";
+const MINUTES: &str = "the robot drives for half a minute and more, or many do";
 
 /// A command that is not run, and why.
 const NEVER: [(&str, &str); 1] = [(
