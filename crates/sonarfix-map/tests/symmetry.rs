@@ -143,7 +143,7 @@ fn boards_along_walls_are_clear_of_other_walls() {
     let board = Addition::Board { depth: 0.4 };
     let boards = along_walls(&floor(&rectangle(2.0, 0.6)), board, 0.5);
     // Inside there are 20 cm to the wall opposite.
-    let is_outside = |[x, y]: Point| x < 0.0 || x > 2.0 || y < 0.0 || y > 0.6;
+    let is_outside = |[x, y]: Point| !(0.0..=2.0).contains(&x) || !(0.0..=0.6).contains(&y);
     assert!(boards.iter().all(|board| is_outside(board.faces[0][1])), "{boards:?}");
     let room = rectangle(2.0, 3.0);
     let boards = along_walls(&floor(&room), board, 0.5);
