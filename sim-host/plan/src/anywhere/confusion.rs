@@ -60,7 +60,8 @@ pub(super) fn all(starts: &[Start], symmetries: &[Symmetry]) -> Vec<Confusion> {
 impl Confusion {
     /// Adds the poses of a start, once: a search may have two hypotheses near each other.
     fn add(&mut self, truth: [f64; 3], rival: [f64; 3]) {
-        if self.pairs.last().is_none_or(|[of, _]| *of != truth) {
+        let bits = |pose: &[f64; 3]| pose.map(f64::to_bits);
+        if self.pairs.last().is_none_or(|[of, _]| bits(of) != bits(&truth)) {
             self.starts += 1;
             self.pairs.push([truth, rival]);
         }
