@@ -10,6 +10,7 @@ use sonarfix_studies::search_study::Plans;
 use sonarfix_terminal::progress::Runs;
 
 #[derive(Debug, clap::Args)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub struct Args {
     /// Number of floor plans.
     #[arg(long, default_value_t = 20)]
