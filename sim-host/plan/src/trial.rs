@@ -10,7 +10,9 @@ use serde::Serialize;
 use sonarfix::geometry::units::{Metres, Radians};
 use sonarfix::map::{Map, MapError};
 use sonarfix_hal::robot::EVALUATIONS_PER_MILLISECOND;
-use sonarfix_map::{BakeError, FileError, Follow, PathError, Scenario, Symmetry, symmetries};
+use sonarfix_map::{
+    BakeError, FileError, Floor, Follow, PathError, Scenario, Symmetry, symmetries,
+};
 use sonarfix_search::search::{Answer, Hypothesis, Search, SearchParameters};
 use sonarfix_sim::angle;
 use sonarfix_sim::plant::Plant;
@@ -118,9 +120,8 @@ pub fn observed_trial(
 ) -> Result<Trial, TrialError> {
     let mut rng = stream(seed, 0);
     let errors = wheel_errors(&mut rng);
-    let spare = scenario.path.duration() - seconds;
-    let start = if spare > 1.0 { rng.random_range(0.0..spare) } else { 0.0 };
-    drive(scenario, seed, errors, start, seconds, observer)
+    let start = random_start(&scenario, seconds, &mut rng);
+    drive(&Simulation::new(searching(scenario, errors)), seed, start, seconds, observer)
 }
 
 /// As [`trial`], from a given time of the path on.
@@ -148,7 +149,38 @@ pub fn observed_trial_from(
     observer: impl FnMut(Heard, &Search<'_>) -> bool,
 ) -> Result<Trial, TrialError> {
     let errors = wheel_errors(&mut stream(seed, 0));
-    drive(scenario, seed, errors, start, seconds, observer)
+    drive(&Simulation::new(searching(scenario, errors)), seed, start, seconds, observer)
+}
+
+/// As [`trial`], of a robot that has the map of another place: no answer is right.
+///
+/// # Errors
+/// As of [`trial`].
+pub fn trial_elsewhere(
+    scenario: Scenario,
+    map: &Floor,
+    seed: u64,
+    seconds: f64,
+) -> Result<Trial, TrialError> {
+    let mut rng = stream(seed, 0);
+    let errors = wheel_errors(&mut rng);
+    let start = random_start(&scenario, seconds, &mut rng);
+    let robot = scenario.robot;
+    let simulation = Simulation::new(searching(scenario, errors)).believing(robot, map.walls());
+    drive(&simulation, seed, start, seconds, |_, _| false)
+}
+
+/// A random time of the path with so many seconds left.
+fn random_start(scenario: &Scenario, seconds: f64, rng: &mut ChaCha8Rng) -> f64 {
+    let spare = scenario.path.duration() - seconds;
+    if spare > 1.0 { rng.random_range(0.0..spare) } else { 0.0 }
+}
+
+/// The scenario of a robot that searches, with these wheel errors. There is no estimate to follow.
+fn searching(mut scenario: Scenario, errors: [f64; 2]) -> Scenario {
+    [scenario.truth.scale_right, scenario.truth.scale_left] = errors;
+    scenario.follow = Follow::Truth;
+    scenario
 }
 
 /// Errors of the right and of the left wheel.
@@ -157,17 +189,12 @@ fn wheel_errors(rng: &mut ChaCha8Rng) -> [f64; 2] {
 }
 
 fn drive(
-    mut scenario: Scenario,
+    simulation: &Simulation,
     seed: u64,
-    errors: [f64; 2],
     start: f64,
     seconds: f64,
     mut observer: impl FnMut(Heard, &Search<'_>) -> bool,
 ) -> Result<Trial, TrialError> {
-    [scenario.truth.scale_right, scenario.truth.scale_left] = errors;
-    // There is no estimate to follow.
-    scenario.follow = Follow::Truth;
-    let simulation = Simulation::new(scenario);
     let image = simulation.baked_map()?;
     let config = simulation.config();
     let mut drive = Drive {
@@ -178,7 +205,7 @@ fn drive(
         ),
         plant: Plant::new(&simulation.scenario, simulation.range_scale()),
         track_width: config.drive.track_width.0.into(),
-        simulation: &simulation,
+        simulation,
         wheels: stream(seed, 1),
         slips: stream(seed, 4),
         noise: stream(seed, 2),

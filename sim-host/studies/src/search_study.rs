@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use serde::Serialize;
 use sonarfix_map::{Floor, NamedWall, Scenario};
-use sonarfix_plan::trial::{Trial, TrialError, trial};
+use sonarfix_plan::trial::{Trial, TrialError, trial, trial_elsewhere};
 use sonarfix_sim::progress::Progress;
 
 use crate::floor_plan::{FloorPlan, Kind};
@@ -19,6 +19,8 @@ pub struct Plans {
     pub kind: Option<Kind>,
     /// Walls of each map: those of other plans stand far beside a plan, and a plan with more is left out.
     pub walls: Option<usize>,
+    /// Whether the robot has the map of another plan of the same kind.
+    pub is_elsewhere: bool,
 }
 
 impl Plans {
@@ -68,6 +70,18 @@ const APART: f64 = 60.0;
 /// Seeds of the plans beside a plan, from its own.
 const BESIDE: u64 = 1_000_000;
 
+/// Another plan of this kind than that of the seed.
+fn another(seed: u64, kind: Kind) -> FloorPlan {
+    let mut number = seed.wrapping_add(BESIDE);
+    loop {
+        let plan = FloorPlan::new(number);
+        if plan.kind == kind {
+            return plan;
+        }
+        number = number.wrapping_add(1);
+    }
+}
+
 /// A floor with walls of other plans beside it, as many as make it `count`.
 fn filled(floor: &Floor, seed: u64, count: usize) -> Result<Floor, TrialError> {
     let mut walls = floor.named_walls().to_vec();
@@ -96,7 +110,14 @@ pub fn floor_plans(
     seconds: f64,
     progress: &impl Progress,
 ) -> Result<Vec<Trial>, TrialError> {
-    plans.each(progress, |scenario, seed| trial(scenario, seed, seconds))
+    plans.each(progress, |scenario, seed| {
+        if !plans.is_elsewhere {
+            return trial(scenario, seed, seconds);
+        }
+        let kind = FloorPlan::new(seed).kind;
+        let other = another(seed, kind).scenario()?;
+        trial_elsewhere(scenario, &other.floor, seed, seconds)
+    })
 }
 
 /// Trials in one scenario.
@@ -203,7 +224,8 @@ mod tests {
     /// A plan keeps its walls, and those of other plans stand out of the sonar's range.
     #[test]
     fn a_map_is_filled_with_other_plans_beside_the_plan() -> Result<(), TrialError> {
-        let plans = Plans { first: 43_000, trials: 3, kind: None, walls: Some(200) };
+        let plans =
+            Plans { first: 43_000, trials: 3, kind: None, walls: Some(200), is_elsewhere: false };
         for (seed, scenario) in plans.scenarios()? {
             let own = FloorPlan::new(seed).scenario()?.floor;
             let (own, all) = (own.named_walls(), scenario.floor.named_walls());
@@ -219,7 +241,8 @@ mod tests {
 
     #[test]
     fn plans_with_more_walls_are_left_out() -> Result<(), TrialError> {
-        let plans = Plans { first: 43_000, trials: 3, kind: None, walls: Some(30) };
+        let plans =
+            Plans { first: 43_000, trials: 3, kind: None, walls: Some(30), is_elsewhere: false };
         for (seed, scenario) in plans.scenarios()? {
             assert!(FloorPlan::new(seed).scenario()?.floor.named_walls().len() <= 30);
             assert_eq!(scenario.floor.named_walls().len(), 30);
@@ -230,7 +253,8 @@ mod tests {
     /// No cycle is longer than all together, and none begins before there are twelve pings, of which each takes 4,800 evaluations.
     #[test]
     fn the_longest_cycle_is_one_of_all() -> Result<(), TrialError> {
-        let plans = Plans { first: 43_000, trials: 2, kind: None, walls: None };
+        let plans =
+            Plans { first: 43_000, trials: 2, kind: None, walls: None, is_elsewhere: false };
         for trial in floor_plans(&plans, 10.0, &|| ())? {
             assert!(trial.cycles > 1 && trial.longest_cycle > 0, "{trial:?}");
             assert!(trial.longest_cycle < trial.evaluations, "{trial:?}");

@@ -38,8 +38,11 @@ pub struct Args {
     /// Walls of the map of each floor plan: those of other plans stand beside it, and a plan with more is left out.
     #[arg(long, requires = "floor_plans", value_parser = clap::value_parser!(u16).range(1..))]
     walls: Option<u16>,
+    /// Gives each robot the map of another floor plan of the same kind: every answer is wrong.
+    #[arg(long, requires = "floor_plans", conflicts_with = "walls")]
+    other_map: bool,
     /// Computes for each trial how soon its pings allow to find the pose: a grid of poses, with the odometry known exactly.
-    #[arg(long, requires = "floor_plans")]
+    #[arg(long, requires = "floor_plans", conflicts_with = "other_map")]
     bound: bool,
     /// Prints every trial.
     #[arg(long)]
@@ -56,7 +59,8 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         (_, Some(trials)) => {
             let kind = args.homes.then_some(Kind::Home);
             let walls = args.walls.map(usize::from);
-            let plans = Plans { first: args.seed, trials, kind, walls };
+            let is_elsewhere = args.other_map;
+            let plans = Plans { first: args.seed, trials, kind, walls, is_elsewhere };
             if args.bound {
                 return bound(&plans, args, runs);
             }

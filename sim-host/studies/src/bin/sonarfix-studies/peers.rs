@@ -57,7 +57,8 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         known.push(peers::rooms(cell, seeds, &progress)?);
     }
     let searched = [("all kinds", None), ("homes", Some(Kind::Home))].map(|(name, kind)| {
-        let plans = Plans { first: args.seed, trials: args.trials, kind, walls: None };
+        let plans =
+            Plans { first: args.seed, trials: args.trials, kind, walls: None, is_elsewhere: false };
         Ok::<_, peers::PeerError>(Searched {
             name,
             found: peers::search(&plans, args.seconds, &progress)?,
