@@ -6,8 +6,8 @@ use sonarfix_sim::trace::Pose;
 use sonarfix_sim::world::World;
 use sonarfix_sim::world::segment::{direction, distance};
 
-use super::Settings;
 use super::separation::Ears;
+use super::settings::Settings;
 use super::start::{Place, Start};
 use crate::trial::PERIOD;
 

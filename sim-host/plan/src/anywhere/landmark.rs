@@ -5,11 +5,10 @@ use sonarfix_map::{PathPlan, PlacedAddition};
 use sonarfix_sim::progress::Progress;
 
 use super::candidates::finalists;
+use super::settings::{AnywhereError, MOST_BOARDS, Settings};
 use super::start::{Place, Start};
-use super::{AnywhereError, Settings, Times, simulate};
+use super::times::{Times, simulate};
 
-/// Boards that are proposed at most.
-pub(super) const MOST_BOARDS: u32 = 3;
 /// A board that does not save this share of the time, of the slower half of the starts, is not proposed.
 const WORTHWHILE: f64 = 0.1;
 

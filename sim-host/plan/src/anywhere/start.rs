@@ -8,7 +8,8 @@ use sonarfix_sim::world::World;
 use sonarfix_sim::world::segment::Segment;
 
 use super::free_space::FreeSpace;
-use super::{AnywhereError, Settings, furniture, wander};
+use super::settings::{AnywhereError, Settings};
+use super::{furniture, wander};
 use crate::trial::{Heard, are_one, observed_trial_from, pose_of, stream};
 
 /// From a wheel to the side of the robot, metres: the robot of the floor plans has a clearance of 20 cm.
@@ -140,5 +141,18 @@ impl<'a> Place<'a> {
         if !rivals.is_empty() {
             doubts.push(Doubt { time: heard.time, truth: heard.pose, rivals });
         }
+    }
+}
+
+impl Settings {
+    /// The time that a start costs: until the right answer, or all of it.
+    pub(super) fn lost(&self, start: &Start) -> f64 {
+        let is_right = start.outcome == Outcome::Right;
+        start.after.filter(|_| is_right).unwrap_or(self.seconds)
+    }
+
+    /// The same of all of them.
+    pub(super) fn lost_by(&self, starts: &[Start]) -> f64 {
+        starts.iter().map(|start| self.lost(start)).sum()
     }
 }
