@@ -141,7 +141,7 @@ impl Forecast {
             starts: places.iter().map(dot).collect(),
             seconds: times.seconds,
             confused: pairs.map(|pair| pair.map(|[x, y, _]| [x, y])).collect(),
-            boards: boards.map_or_else(Vec::new, |it| it.boards.clone()),
+            boards: boards.map_or_else(Vec::new, |it| it.ends().collect()),
             effect: boards.map_or_else(String::new, |it| {
                 format!("proposed boards of 40 cm: {}", summary(&it.times))
             }),
@@ -181,16 +181,16 @@ fn summary(times: &Times) -> String {
 fn confusion_text(confusion: &Confusion) -> String {
     let pose =
         |[x, y, heading]: [f64; 3]| format!("({x:.1}, {y:.1}) m at {:.0}°", heading.to_degrees());
-    let starts = if confusion.starts == 1 { "start" } else { "starts" };
+    let starts = if confusion.pairs.len() == 1 { "start" } else { "starts" };
     let example = confusion.pairs.first().map_or_else(String::new, |[one, other]| {
         format!(", as {} and {}", pose(*one), pose(*other))
     });
-    format!("{}, in {} {starts}{example}", confusion.motion, confusion.starts)
+    format!("{}, in {} {starts}{example}", confusion.motion, confusion.pairs.len())
 }
 
 /// What the boards are, and what they change.
 fn advice(landmarks: &Landmarks, without: &Times, map: &MapFile) -> String {
-    let boards = landmarks.places.iter().zip(&landmarks.boards);
+    let boards = landmarks.boards.iter().zip(landmarks.ends());
     let each = boards.map(|(place, [[x0, y0], [x1, y1]])| {
         let (addition, wall) = (place.addition, map.quoted(place.wall));
         format!("{addition} on {wall}, from ({x0:.2}, {y0:.2}) to ({x1:.2}, {y1:.2}) m")

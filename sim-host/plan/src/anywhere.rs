@@ -13,7 +13,7 @@
 //! | `start` | one start |
 //! | `times` | many starts, their times and shares |
 //! | `confusion` | the poses that are confused |
-//! | `separation`, `candidates` | what a sweep tells between two poses, and the boards that tell most |
+//! | `separation`, `candidates` | the log odds of a sweep between two poses, and the boards that add most to them |
 //! | `landmark` | the best of them by simulation |
 
 mod candidates;

@@ -107,7 +107,7 @@ pub fn trial(scenario: Scenario, seed: u64, seconds: f64) -> Result<Trial, Trial
     observed_trial(scenario, seed, seconds, |_, _| false)
 }
 
-/// The same, and every ping goes to an observer, with the search that has taken it. The trial goes on after a unique answer, of which the result tells, as long as the
+/// The same, and every ping goes to an observer, with the search that has taken it. The trial goes on after a unique answer, which the result contains, as long as the
 /// observer returns `true`.
 ///
 /// # Errors

@@ -1,7 +1,7 @@
 //! The forecast of `sonarfix map check --starts` beside simulated searches in the same floor plans.
 //!
-//! The forecast knows the map and the path that a board must leave free, and neither the furniture that is not in the map, nor the
-//! errors of the robot, nor where it drives. The searches are those of [`crate::search_study`].
+//! The forecast has the map and the path that a board must leave free. It has neither the furniture that is not in the map, nor the
+//! errors of the robot, nor the way that it drives. The searches are those of [`crate::search_study`].
 
 use serde::Serialize;
 use sonarfix_map::Scenario;
@@ -89,7 +89,7 @@ fn compared(
         anywhere = anywhere.with_landmarks(&map, path, settings, &|| ())?;
     }
     let with_boards = anywhere.landmarks.as_ref().map(|landmarks| {
-        let boards = landmarks.places.iter();
+        let boards = landmarks.boards.iter();
         let floor = boards.fold(scenario.floor.clone(), |floor, board| board.on(&floor));
         let scenario = Scenario { floor, ..scenario.clone() };
         self::simulated(&scenario, seed, *trials, settings.seconds)

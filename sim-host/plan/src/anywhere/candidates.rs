@@ -1,4 +1,4 @@
-//! Places of a board, chosen by what it tells between the poses that starts confused.
+//! Places of a board, chosen by the log odds that it adds between the poses that starts confused.
 
 use rayon::prelude::*;
 use sonarfix_map::{Addition, Collision, Floor, NamedWall, PathPlan, PlacedAddition, along_walls};
@@ -6,10 +6,11 @@ use sonarfix_sim::trace::Pose;
 use sonarfix_sim::world::World;
 use sonarfix_sim::world::segment::{direction, distance};
 
-use super::separation::Ears;
+use super::separation::Sweeps;
 use super::settings::Settings;
 use super::start::{Place, Start};
 use crate::trial::PERIOD;
+use sonarfix_search::search::SearchParameters;
 
 /// The board: metres from the wall.
 const BOARD: Addition = Addition::Board { depth: 0.4 };
@@ -20,18 +21,20 @@ const PASSAGE: f64 = 2.0;
 /// Boards that are simulated, and their distance from each other, metres.
 const FINALISTS: usize = 3;
 const FINALISTS_APART: f64 = 1.0;
-/// Lead of a unique answer (`docs/search.md`), and the share of the expected log odds that a search gets: pings that are no news
-/// do not count, and furniture hides walls.
-const LEAD: f64 = 24.0;
+/// The share of the expected log odds that a search gets: only novel pings count, and furniture hides walls.
 const GAINED: f64 = 0.5;
 /// Pings of a sweep.
 const SWEEP: f64 = 21.0;
-/// The confusions of one start, and how long they last.
-struct Doubts<'a> {
+/// Seconds that one ambiguity lasts at most: two periods of the record.
+const LONGEST: f64 = 2.0;
+
+/// The ambiguities of one start, and how long they last.
+struct Ambiguities<'a> {
     start: &'a Start,
+    /// Seconds of search.
     end: f64,
-    /// For each doubt and each of its rivals the evidence of a sweep without a board.
-    evidence: Vec<Vec<f64>>,
+    /// For each ambiguity and each of its wrong hypotheses the log odds of a sweep without a board.
+    log_odds: Vec<Vec<f64>>,
 }
 
 /// The boards that end most of the confusions, apart from each other.
@@ -41,16 +44,18 @@ pub(super) fn finalists(
     path: Option<&PathPlan>,
     settings: &Settings,
 ) -> Vec<PlacedAddition> {
-    let ears = Ears::new(place.scenario, &place.floor);
-    let doubts: Vec<Doubts> =
-        starts.par_iter().map(|start| Doubts::new(start, &ears, settings)).collect();
+    let sweeps = Sweeps::new(place.scenario, &place.floor);
+    let each = starts.par_iter().map(|start| Ambiguities::new(start, &sweeps, settings));
+    let ambiguities: Vec<Ambiguities> = each.collect();
+    // The lead of a unique answer (`docs/search.md`).
+    let lead = f64::from(SearchParameters::default().odds);
     let world = World::new(&place.floor);
     let boards = along_walls(&place.floor, BOARD, APART);
     let boards = boards.into_par_iter().filter(|board| is_placeable(board, place, &world, path));
     let mut scored: Vec<(f64, PlacedAddition)> = boards
         .map(|board| {
-            let with = Ears::new(place.scenario, &board.on(&place.floor));
-            let saved = doubts.iter().map(|doubts| doubts.saved(&board, &with)).sum();
+            let with = Sweeps::new(place.scenario, &board.on(&place.floor));
+            let saved = ambiguities.iter().map(|of| of.saved(&board, &with, lead)).sum();
             (saved, board)
         })
         .filter(|(saved, _)| *saved > 0.0)
@@ -88,32 +93,33 @@ fn is_placeable(
     is_inside && leaves_room && is_clear
 }
 
-impl<'a> Doubts<'a> {
-    fn new(start: &'a Start, ears: &Ears, settings: &Settings) -> Self {
-        let evidence = start.doubts.iter().map(|doubt| {
-            doubt.rivals.iter().map(|rival| ears.evidence(&doubt.truth, rival)).collect()
-        });
-        Self { start, end: settings.lost(start), evidence: evidence.collect() }
+impl<'a> Ambiguities<'a> {
+    fn new(start: &'a Start, sweeps: &Sweeps, settings: &Settings) -> Self {
+        let log_odds = start
+            .ambiguities
+            .iter()
+            .map(|at| at.wrong.iter().map(|wrong| sweeps.log_odds(&at.truth, wrong)).collect());
+        Self { start, end: settings.search_time(start), log_odds: log_odds.collect() }
     }
 
-    /// The seconds of confusion that a board is expected to save, `with` which the sonar hears.
-    fn saved(&self, board: &PlacedAddition, with: &Ears) -> f64 {
-        let is_heard = |pose: &Pose| distance([pose.x, pose.y], board.at) <= with.reach();
+    /// The seconds of search that a board is expected to save, by the sweeps `with` it: until it has added so much to the lead.
+    fn saved(&self, board: &PlacedAddition, with: &Sweeps, needed: f64) -> f64 {
+        let is_in_reach = |pose: &Pose| distance([pose.x, pose.y], board.at) <= with.reach();
         let (mut lead, mut last) = (0.0, 0.0);
-        for (doubt, without) in self.start.doubts.iter().zip(&self.evidence) {
-            let gains = doubt.rivals.iter().zip(without).map(|(rival, without)| {
-                if !is_heard(&doubt.truth) && !is_heard(rival) {
+        for (at, without) in self.start.ambiguities.iter().zip(&self.log_odds) {
+            let gains = at.wrong.iter().zip(without).map(|(wrong, without)| {
+                if !is_in_reach(&at.truth) && !is_in_reach(wrong) {
                     return 0.0;
                 }
-                with.evidence(&doubt.truth, rival) - without
+                with.log_odds(&at.truth, wrong) - without
             });
-            // Some of several hypotheses are those of a bad fit, which end by themselves.
+            // The mean, because some of several hypotheses fit badly, and later pings end them without a board.
             let gain = gains.sum::<f64>() / count(without);
-            let seconds = (doubt.time - last).min(2.0);
-            last = doubt.time;
+            let seconds = (at.time - last).min(LONGEST);
+            last = at.time;
             lead += GAINED * gain.max(0.0) * seconds / (SWEEP * PERIOD);
-            if lead >= LEAD {
-                return (self.end - doubt.time).max(0.0);
+            if lead >= needed {
+                return (self.end - at.time).max(0.0);
             }
         }
         0.0

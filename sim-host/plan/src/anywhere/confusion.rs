@@ -8,8 +8,8 @@ use sonarfix_sim::trace::Pose;
 
 use super::start::{Outcome, Start};
 
-/// A pose is the image of another one within these errors, metres and radians: a search that is not sure of its pose knows it only
-/// roughly.
+/// A pose is the image of another one within these errors, metres and radians: the hypotheses of a search without a unique answer are
+/// inexact.
 const ALIKE: (f64, f64) = (0.8, 0.26);
 
 /// Poses that are confused, with the motion that moves one onto the other.
@@ -18,9 +18,7 @@ pub struct Confusion {
     /// The motion.
     #[serde(serialize_with = "as_text")]
     pub motion: SymmetryMotion,
-    /// In how many starts without a right answer the search had both poses at the end.
-    pub starts: usize,
-    /// The true pose and the other one of each of these starts: metres, radians.
+    /// For each start without a right answer at whose end both poses were hypotheses, the true one and the other one: metres, radians.
     pub pairs: Vec<[[f64; 3]; 2]>,
 }
 
@@ -30,40 +28,39 @@ fn as_text<S: serde::Serializer>(motion: &SymmetryMotion, to: S) -> Result<S::Ok
 
 /// What the starts without a right answer confused at last, the most frequent first.
 pub(super) fn all(starts: &[Start], symmetries: &[Symmetry]) -> Vec<Confusion> {
-    let group = |motion| Confusion { motion, starts: 0, pairs: Vec::new() };
+    let group = |motion| Confusion { motion, pairs: Vec::new() };
     let mut found: Vec<Confusion> = symmetries.iter().map(|it| group(it.motion)).collect();
-    let known = found.len();
+    let of_symmetries = found.len();
     for start in starts.iter().filter(|start| start.outcome != Outcome::Right) {
-        let Some(last) = start.doubts.last() else { continue };
+        let Some(last) = start.ambiguities.last() else { continue };
         let truth = numbers(&last.truth);
-        for rival in last.rivals.iter().map(numbers) {
+        for other in last.wrong.iter().map(numbers) {
             let is_image = |it: &&mut Confusion| {
-                it.motion.images(truth).iter().any(|image| are_alike(image, &rival))
+                it.motion.images(truth).iter().any(|image| are_alike(image, &other))
             };
             if let Some(confusion) = found.iter_mut().find(is_image) {
-                confusion.add(truth, rival);
+                confusion.add(truth, other);
             } else {
-                let mut confusion = group(motion([truth, rival]));
-                confusion.add(truth, rival);
+                let mut confusion = group(motion([truth, other]));
+                confusion.add(truth, other);
                 found.push(confusion);
             }
         }
     }
-    for confusion in found.iter_mut().skip(known) {
+    for confusion in found.iter_mut().skip(of_symmetries) {
         confusion.motion = typical(&confusion.pairs).unwrap_or(confusion.motion);
     }
-    found.retain(|confusion| confusion.starts > 0);
-    found.sort_by_key(|confusion| std::cmp::Reverse(confusion.starts));
+    found.retain(|confusion| !confusion.pairs.is_empty());
+    found.sort_by_key(|confusion| std::cmp::Reverse(confusion.pairs.len()));
     found
 }
 
 impl Confusion {
     /// Adds the poses of a start, once: a search may have two hypotheses near each other.
-    fn add(&mut self, truth: [f64; 3], rival: [f64; 3]) {
+    fn add(&mut self, truth: [f64; 3], other: [f64; 3]) {
         let bits = |pose: &[f64; 3]| pose.map(f64::to_bits);
         if self.pairs.last().is_none_or(|[of, _]| bits(of) != bits(&truth)) {
-            self.starts += 1;
-            self.pairs.push([truth, rival]);
+            self.pairs.push([truth, other]);
         }
     }
 }

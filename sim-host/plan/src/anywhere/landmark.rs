@@ -15,14 +15,27 @@ const WORTHWHILE: f64 = 0.1;
 /// Boards, and what they change.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Landmarks {
-    /// The ends of each: at the wall, and in the room, metres.
-    pub boards: Vec<[[f64; 2]; 2]>,
-    /// Where they stand.
-    #[serde(skip)]
-    pub places: Vec<PlacedAddition>,
+    /// The boards; in JSON the ends of each: at the wall, and in the room, metres.
+    #[serde(serialize_with = "as_ends")]
+    pub boards: Vec<PlacedAddition>,
     /// What other starts lead to with them.
     #[serde(flatten)]
     pub times: Times,
+}
+
+impl Landmarks {
+    /// The ends of each board: at the wall, and in the room, metres.
+    pub fn ends(&self) -> impl Iterator<Item = [[f64; 2]; 2]> {
+        ends(&self.boards)
+    }
+}
+
+fn ends(boards: &[PlacedAddition]) -> impl Iterator<Item = [[f64; 2]; 2]> {
+    boards.iter().filter_map(|board| board.faces.first().copied())
+}
+
+fn as_ends<S: serde::Serializer>(boards: &[PlacedAddition], to: S) -> Result<S::Ok, S::Error> {
+    to.collect_seq(ends(boards))
 }
 
 /// The fewest boards, clear of a path, with which nearly all starts have the right answer, or those that help most; `None` if none
@@ -49,13 +62,12 @@ pub(super) fn fewest(
         let with = Place::new(place.scenario, floor.clone())?;
         let others = simulate(&with, &seeds, settings, progress)?;
         let Some(times) = Times::new(&others, settings.seconds) else { break };
-        if settings.lost_by(&others) >= settings.lost_by(&starts.all) {
+        if settings.total_search_time(&others) >= settings.total_search_time(&starts.all) {
             break;
         }
-        let mut places = found.map_or_else(Vec::new, |found| found.places);
-        places.push(board);
-        let boards = places.iter().filter_map(|board| board.faces.first().copied()).collect();
-        found = Some(Landmarks { boards, places, times });
+        let mut boards = found.map_or_else(Vec::new, |found| found.boards);
+        boards.push(board);
+        found = Some(Landmarks { boards, times });
         if times.suffices() {
             break;
         }
@@ -78,7 +90,9 @@ impl Seeded {
     /// The slower half of them, with their seeds.
     fn slower(&self, settings: &Settings) -> (Vec<Start>, Vec<u64>) {
         let mut all: Vec<(u64, &Start)> = (self.first..).zip(&self.all).collect();
-        all.sort_by(|(_, one), (_, other)| settings.lost(other).total_cmp(&settings.lost(one)));
+        all.sort_by(|(_, one), (_, other)| {
+            settings.search_time(other).total_cmp(&settings.search_time(one))
+        });
         all.truncate(self.all.len().div_ceil(2));
         all.into_iter().map(|(seed, start)| (start.clone(), seed)).unzip()
     }
@@ -100,11 +114,11 @@ fn best(
         if simulated.len() < seeds.len() {
             return Ok(None);
         }
-        let lost = settings.lost_by(&simulated);
-        if best.as_ref().is_none_or(|(least, _)| lost < *least) {
-            best = Some((lost, board));
+        let seconds = settings.total_search_time(&simulated);
+        if best.as_ref().is_none_or(|(least, _)| seconds < *least) {
+            best = Some((seconds, board));
         }
     }
-    let most = (1.0 - WORTHWHILE) * settings.lost_by(&slower);
-    Ok(best.filter(|(lost, _)| *lost < most).map(|(_, board)| board))
+    let most = (1.0 - WORTHWHILE) * settings.total_search_time(&slower);
+    Ok(best.filter(|(seconds, _)| *seconds < most).map(|(_, board)| board))
 }

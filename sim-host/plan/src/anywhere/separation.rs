@@ -1,4 +1,4 @@
-//! What a sweep at one pose tells against another pose: expected log odds, by what the sonar of the simulation hears there.
+//! The expected log odds of a sweep at one pose against another pose, by the echoes that the simulated sonar may receive at both.
 
 use sonarfix_map::{Floor, Scenario};
 use sonarfix_sim::angle;
@@ -15,14 +15,14 @@ const ALIKE: f64 = 0.15;
 const CLUTTER: f64 = 0.2;
 
 /// The range of an echo, metres, `None` without one, and its probability.
-type Heard = (Option<f64>, f64);
+type Echo = (Option<f64>, f64);
 
-/// What a robot's sonar hears on a floor.
-pub(super) struct Ears {
+/// The sweeps of a robot's sonar on a floor.
+pub(super) struct Sweeps {
     simulation: Simulation,
 }
 
-impl Ears {
+impl Sweeps {
     pub fn new(scenario: &Scenario, floor: &Floor) -> Self {
         let mut scenario = Scenario { floor: floor.clone(), ..scenario.clone() };
         scenario.surroundings.obstacles.clear();
@@ -35,18 +35,18 @@ impl Ears {
     }
 
     /// Expected log odds of the true pose against another one after a sweep.
-    pub fn evidence(&self, truth: &Pose, other: &Pose) -> f64 {
+    pub fn log_odds(&self, truth: &Pose, other: &Pose) -> f64 {
         let (right, left) = self.simulation.config().rangers.first.servo;
         let (right, left) = (f64::from(right.0), f64::from(left.0));
         let bearings = std::iter::successors(Some(right), |bearing| Some(bearing + STEP));
         let bearings = bearings.take_while(|bearing| *bearing <= left);
-        let each =
-            bearings.map(|bearing| odds(&self.heard(truth, bearing), &self.heard(other, bearing)));
+        let each = bearings
+            .map(|bearing| log_odds(&self.echoes(truth, bearing), &self.echoes(other, bearing)));
         PINGS_A_STEP * each.sum::<f64>()
     }
 
-    /// The echoes of a ping by their probability to be the first one that is heard.
-    fn heard(&self, pose: &Pose, bearing: f64) -> Vec<Heard> {
+    /// The echoes of a ping, each with the probability that it is the first that is received.
+    fn echoes(&self, pose: &Pose, bearing: f64) -> Vec<Echo> {
         let at = self.simulation.sonar_at(pose);
         let direction = angle::wrap(pose.heading + bearing);
         let (world, sensor) = (self.simulation.world(), self.simulation.sensor());
@@ -55,13 +55,13 @@ impl Ears {
         }
         let ping = Ping { time: 0.0, sonar_after: &|_| at, direction };
         let mut silent = 1.0;
-        let mut heard: Vec<Heard> = Vec::new();
+        let mut echoes: Vec<Echo> = Vec::new();
         for reflector in world.reflectors(&ping, sensor) {
-            heard.push((Some(reflector.distance), silent * reflector.audible));
+            echoes.push((Some(reflector.distance), silent * reflector.audible));
             silent *= 1.0 - reflector.audible;
         }
-        heard.push((None, silent));
-        heard
+        echoes.push((None, silent));
+        echoes
     }
 }
 
@@ -71,14 +71,14 @@ fn lit(world: &World, at: [f64; 2], direction: f64) -> Option<f64> {
     Some((hit[0] - at[0]).hypot(hit[1] - at[1]))
 }
 
-/// The expected log odds of what is heard at the true pose.
-fn odds(truth: &[Heard], other: &[Heard]) -> f64 {
-    let probability = |of: &[Heard], range: Option<f64>| {
-        let is_alike = |heard: Option<f64>| match (heard, range) {
+/// The expected log odds of a ping at the true pose.
+fn log_odds(truth: &[Echo], other: &[Echo]) -> f64 {
+    let probability = |of: &[Echo], range: Option<f64>| {
+        let is_alike = |echo: Option<f64>| match (echo, range) {
             (Some(one), Some(other)) => (one - other).abs() < ALIKE,
             (one, other) => one.is_none() && other.is_none(),
         };
-        let mass: f64 = of.iter().filter(|(heard, _)| is_alike(*heard)).map(|(_, p)| p).sum();
+        let mass: f64 = of.iter().filter(|(echo, _)| is_alike(*echo)).map(|(_, p)| p).sum();
         (1.0 - CLUTTER) * mass + CLUTTER
     };
     let each = truth.iter().map(|(range, share)| {

@@ -17,9 +17,9 @@ const BESIDE_WHEEL: f64 = 0.085;
 /// The random streams of a start, beside those of a trial.
 const DRIVE: u64 = 10;
 const FURNITURE: u64 = 11;
-/// Area that the furniture of [`Settings::furniture`] stands on, m².
-const TEN: f64 = 10.0;
-/// Mean score of a ping from which on a hypothesis explains what is heard: that of the navigator.
+/// The area that [`Settings::furniture`] counts pieces on, m².
+const FURNISHED_AREA: f64 = 10.0;
+/// Mean score of a ping from which on a hypothesis explains the pings: that of the navigator.
 const FITTING: f32 = 0.2;
 /// Seconds from one record of the hypotheses to the next.
 const RECORDED: f64 = 1.0;
@@ -45,19 +45,19 @@ pub struct Start {
     pub outcome: Outcome,
     /// Seconds until the unique answer.
     pub after: Option<f64>,
-    /// What was confused meanwhile, about once a second.
+    /// When several poses explained the pings, about once a second.
     #[serde(skip)]
-    pub(super) doubts: Vec<Doubt>,
+    pub(super) ambiguities: Vec<Ambiguity>,
 }
 
-/// A moment at which several poses explain the pings.
+/// A time at which several poses explain the pings.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Doubt {
+pub(super) struct Ambiguity {
     /// Seconds since the start.
     pub time: f64,
     pub truth: Pose,
-    /// The wrong ones of the answers.
-    pub rivals: Vec<Pose>,
+    /// The hypotheses that are wrong.
+    pub wrong: Vec<Pose>,
 }
 
 /// What all starts on a map have in common.
@@ -99,7 +99,7 @@ impl<'a> Place<'a> {
         let plan = self.scenario.path.plan();
         let drive = wander::drive(&self.space, plan, settings.seconds, &mut stream(seed, DRIVE))?;
         scenario.path = drive.ok_or(AnywhereError::NoPlace(self.clearance))?;
-        let pieces = settings.furniture * self.space.area() / TEN;
+        let pieces = settings.furniture * self.space.area() / FURNISHED_AREA;
         let rng = &mut stream(seed, FURNITURE);
         scenario.surroundings.obstacles = furniture::beside(
             &scenario.path,
@@ -109,10 +109,10 @@ impl<'a> Place<'a> {
             rng,
         );
         let at = scenario.path.pose_at(0.0);
-        let mut doubts: Vec<Doubt> = Vec::new();
+        let mut ambiguities: Vec<Ambiguity> = Vec::new();
         let seconds = settings.seconds;
-        let trial = observed_trial_from(scenario, seed, 0.0, seconds, |heard, search| {
-            self.record(&mut doubts, &heard, search);
+        let trial = observed_trial_from(scenario, seed, 0.0, seconds, |ping, search| {
+            self.record(&mut ambiguities, &ping, search);
             false
         })?;
         let outcome = match trial.unique_after {
@@ -120,39 +120,39 @@ impl<'a> Place<'a> {
             Some(_) => Outcome::Wrong,
             None => Outcome::None,
         };
-        Ok(Start { at: [at.x, at.y, at.heading], outcome, after: trial.unique_after, doubts })
+        Ok(Start { at: [at.x, at.y, at.heading], outcome, after: trial.unique_after, ambiguities })
     }
 
-    /// Records the answers that are wrong, about once a second, and a wrong unique one.
-    fn record(&self, doubts: &mut Vec<Doubt>, heard: &Heard, search: &Search<'_>) {
+    /// Records the hypotheses that are wrong, about once a second, and a wrong unique answer.
+    fn record(&self, ambiguities: &mut Vec<Ambiguity>, ping: &Heard, search: &Search<'_>) {
         let answers: Vec<Hypothesis> = match search.answer() {
             Answer::Unique(found) => vec![found],
             Answer::Several(count)
-                if doubts.last().is_none_or(|last| heard.time >= last.time + RECORDED) =>
+                if ambiguities.last().is_none_or(|last| ping.time >= last.time + RECORDED) =>
             {
                 search.hypotheses().take(count).collect()
             }
             _ => return,
         };
-        let is_rival =
-            |pose: &Pose| !are_one(pose, &heard.pose) && self.space.is_near([pose.x, pose.y]);
+        let is_wrong =
+            |pose: &Pose| !are_one(pose, &ping.pose) && self.space.is_near([pose.x, pose.y]);
         let fitting = answers.iter().filter(|found| found.fit >= FITTING);
-        let rivals: Vec<Pose> = fitting.map(pose_of).filter(is_rival).collect();
-        if !rivals.is_empty() {
-            doubts.push(Doubt { time: heard.time, truth: heard.pose, rivals });
+        let wrong: Vec<Pose> = fitting.map(pose_of).filter(is_wrong).collect();
+        if !wrong.is_empty() {
+            ambiguities.push(Ambiguity { time: ping.time, truth: ping.pose, wrong });
         }
     }
 }
 
 impl Settings {
-    /// The time that a start costs: until the right answer, or all of it.
-    pub(super) fn lost(&self, start: &Start) -> f64 {
+    /// Seconds of search of a start: until the right answer, or all of them.
+    pub(super) fn search_time(&self, start: &Start) -> f64 {
         let is_right = start.outcome == Outcome::Right;
         start.after.filter(|_| is_right).unwrap_or(self.seconds)
     }
 
-    /// The same of all of them.
-    pub(super) fn lost_by(&self, starts: &[Start]) -> f64 {
-        starts.iter().map(|start| self.lost(start)).sum()
+    /// The sum of the seconds of search.
+    pub(super) fn total_search_time(&self, starts: &[Start]) -> f64 {
+        starts.iter().map(|start| self.search_time(start)).sum()
     }
 }
