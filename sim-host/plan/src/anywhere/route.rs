@@ -1,8 +1,7 @@
 //! The shortest way between two places of the free space that keeps off the walls where there is room.
 
-use std::cmp::Ordering;
-use std::collections::BinaryHeap;
-
+use petgraph::algo::astar;
+use petgraph::graph::{DiGraph, NodeIndex};
 use sonarfix_sim::world::segment::{Point, distance};
 
 use super::free_space::{FreeSpace, ROOMY};
@@ -10,31 +9,45 @@ use super::free_space::{FreeSpace, ROOMY};
 /// How much longer a way may be that is at a distance of [`ROOMY`] from the walls, in place of one at the walls.
 const DETOUR: f64 = 3.0;
 
-/// A cell that a way has reached; the first one of a heap is that of the shortest way.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Reached {
-    /// Length of the way to it and, at least, from it to the end.
-    length: f64,
-    cell: usize,
+/// The steps between the cells of a free space.
+pub(super) struct Steps {
+    /// The node of each cell has its number; a step has its length in cells, longer at the walls.
+    graph: DiGraph<(), f64>,
 }
 
-impl Eq for Reached {}
-
-impl Ord for Reached {
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.length.total_cmp(&self.length).then(other.cell.cmp(&self.cell))
+impl Steps {
+    /// The steps from each free cell to those around it in its part.
+    pub fn new(space: &FreeSpace) -> Self {
+        let free = (0..space.cells()).filter(|cell| space.part(*cell).is_some());
+        let steps = free.flat_map(|cell| {
+            let is_one_part = move |next: usize| space.part(next) == space.part(cell);
+            let around = space.neighbours(cell).filter(move |(next, _)| is_one_part(*next));
+            around.map(move |(next, length)| {
+                let nearness = 1.0 - space.room(next) / ROOMY;
+                (NodeIndex::new(cell), NodeIndex::new(next), length * (1.0 + DETOUR * nearness))
+            })
+        });
+        let mut graph = DiGraph::new();
+        for _ in 0..space.cells() {
+            graph.add_node(());
+        }
+        graph.extend_with_edges(steps);
+        Self { graph }
     }
-}
 
-impl PartialOrd for Reached {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
+    /// The cells of the shortest way; none if there is no way.
+    fn cells(&self, space: &FreeSpace, from: usize, to: usize) -> Vec<usize> {
+        let [from, to] = [from, to].map(NodeIndex::new);
+        let end = space.centre(to.index());
+        let remaining = |cell: NodeIndex| distance(space.centre(cell.index()), end) / space.cell();
+        let way = astar(&self.graph, from, |cell| cell == to, |step| *step.weight(), remaining);
+        way.map_or_else(Vec::new, |(_, cells)| cells.into_iter().map(NodeIndex::index).collect())
     }
 }
 
 /// The corners of the way from one cell to another, without the first; none if there is no way.
-pub(super) fn corners(space: &FreeSpace, from: usize, to: usize) -> Vec<Point> {
-    let cells = cells(space, from, to);
+pub(super) fn corners(space: &FreeSpace, steps: &Steps, from: usize, to: usize) -> Vec<Point> {
+    let cells = steps.cells(space, from, to);
     let mut corners = Vec::new();
     let mut here = 0;
     while here + 1 < cells.len() {
@@ -65,52 +78,4 @@ fn is_clear(space: &FreeSpace, from: usize, to: usize, least: f64) -> bool {
         let at = [start[0] + part * (end[0] - start[0]), start[1] + part * (end[1] - start[1])];
         space.room(space.cell_at(at)) >= least
     })
-}
-
-/// The cells of the shortest way, found by A*.
-fn cells(space: &FreeSpace, from: usize, to: usize) -> Vec<usize> {
-    let Some(part) = space.part(from).filter(|part| space.part(to) == Some(*part)) else {
-        return Vec::new();
-    };
-    let remaining = |cell: usize| distance(space.centre(cell), space.centre(to)) / space.cell();
-    // For each cell the length of the way to it, and the cell before it.
-    let mut known: Vec<Option<(f64, usize)>> = Vec::new();
-    known.resize(space.cells(), None);
-    let mut pending = BinaryHeap::from([Reached { length: remaining(from), cell: from }]);
-    if let Some(first) = known.get_mut(from) {
-        *first = Some((0.0, from));
-    }
-    while let Some(Reached { length, cell }) = pending.pop() {
-        if cell == to {
-            break;
-        }
-        let Some((so_far, _)) = known.get(cell).copied().flatten() else { continue };
-        if length > so_far + remaining(cell) + 1e-9 {
-            continue;
-        }
-        for (next, step) in space.neighbours(cell) {
-            if space.part(next) != Some(part) {
-                continue;
-            }
-            let nearness = 1.0 - space.room(next) / ROOMY;
-            let by_here = so_far + step * (1.0 + DETOUR * nearness);
-            let Some(entry) = known.get_mut(next) else { continue };
-            if entry.is_none_or(|(length, _)| by_here < length) {
-                *entry = Some((by_here, cell));
-                pending.push(Reached { length: by_here + remaining(next), cell: next });
-            }
-        }
-    }
-    back_from(to, from, &known)
-}
-
-/// The cells from the first to the last, each of which is known with the one before it.
-fn back_from(last: usize, first: usize, known: &[Option<(f64, usize)>]) -> Vec<usize> {
-    let before = |cell: &usize| {
-        let (_, before) = known.get(*cell).copied().flatten()?;
-        (*cell != first).then_some(before)
-    };
-    let mut cells: Vec<usize> = std::iter::successors(Some(last), before).collect();
-    cells.reverse();
-    cells
 }

@@ -8,6 +8,7 @@ use sonarfix_sim::world::World;
 use sonarfix_sim::world::segment::Segment;
 
 use super::free_space::FreeSpace;
+use super::route::Steps;
 use super::settings::{AnywhereError, Settings};
 use super::{furniture, wander};
 use crate::trial::{Heard, are_one, observed_trial_from, pose_of, stream};
@@ -65,6 +66,7 @@ pub(super) struct Place<'a> {
     pub scenario: &'a Scenario,
     pub floor: Floor,
     pub space: FreeSpace,
+    steps: Steps,
     walls: Vec<Segment>,
     clearance: f64,
 }
@@ -82,7 +84,8 @@ impl<'a> Place<'a> {
             return Err(AnywhereError::NoPlace(clearance));
         }
         let walls = World::new(&floor).walls().to_vec();
-        Ok(Self { scenario, floor, space, walls, clearance })
+        let steps = Steps::new(&space);
+        Ok(Self { scenario, floor, space, steps, walls, clearance })
     }
 
     /// From the centre of the robot to its side, metres.
@@ -97,7 +100,8 @@ impl<'a> Place<'a> {
     pub fn start(&self, seed: u64, settings: &Settings) -> Result<Start, AnywhereError> {
         let mut scenario = Scenario { floor: self.floor.clone(), ..self.scenario.clone() };
         let plan = self.scenario.path.plan();
-        let drive = wander::drive(&self.space, plan, settings.seconds, &mut stream(seed, DRIVE))?;
+        let rng = &mut stream(seed, DRIVE);
+        let drive = wander::drive(&self.space, &self.steps, plan, settings.seconds, rng)?;
         scenario.path = drive.ok_or(AnywhereError::NoPlace(self.clearance))?;
         let pieces = settings.furniture * self.space.area() / FURNISHED_AREA;
         let rng = &mut stream(seed, FURNITURE);

@@ -6,7 +6,7 @@ use sonarfix_map::{Path, PathError, PathPlan};
 use sonarfix_sim::world::segment::{Point, distance};
 
 use super::free_space::{FreeSpace, ROOMY};
-use super::route;
+use super::route::{self, Steps};
 
 /// Minimum distance of two corners, metres.
 const SHORTEST: f64 = 0.3;
@@ -21,6 +21,7 @@ const MOST_TARGETS: usize = 1_000;
 /// [`PathError`], if speed or turn rate are invalid.
 pub(super) fn drive(
     space: &FreeSpace,
+    steps: &Steps,
     plan: &PathPlan,
     seconds: f64,
     rng: &mut ChaCha8Rng,
@@ -34,7 +35,7 @@ pub(super) fn drive(
                 && distance(space.centre(cell), space.centre(here)) >= SHORTEST
         };
         let Some(target) = roomy(space, rng, is_apart) else { return Ok(None) };
-        corners.extend(route::corners(space, here, target));
+        corners.extend(route::corners(space, steps, here, target));
         here = target;
         let plan = PathPlan { start, corners: corners.clone(), laps: 1, ..plan.clone() };
         let path = Path::new(plan)?;
