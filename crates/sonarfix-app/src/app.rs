@@ -12,7 +12,7 @@
 //! its motor driver by [`Polled::may_drive`].
 //!
 //! This file composes; `running` polls the loop; `command` executes commands; `flash` decides what is read from the store and
-//! written to it; `search` has the search for the pose; `drive` has the motion that the PC commands; `wire` reads the link and
+//! written to it; `search` has the search for the pose; `drive` has the motion for the motor code; `wire` reads the link and
 //! schedules telemetry. The deadline check is [`Polled::is_on_time`].
 
 mod clock;
@@ -300,6 +300,9 @@ impl<'m, F: NorFlash> App<'m, F> {
                     running.wrote(now);
                     self.owes_record = true;
                 }
+                if let Some((config, _)) = &self.config {
+                    self.drive.observe(&running.report, running.robot.mode(), config);
+                }
             }
         }
     }
@@ -400,8 +403,9 @@ impl<'m, F: NorFlash> App<'m, F> {
         self.can_see_wheels(config) && config.motors.permits(localizer, now, self.heard)
     }
 
-    /// The motion that the PC commands ([`Command::Drive`](sonarfix_link::Command::Drive)), after each poll. `None`: nothing
-    /// is commanded, the command was not renewed in time, or the motors may not be enabled; then the motor code stops the
+    /// The motion that the PC commands ([`Command::Drive`](sonarfix_link::Command::Drive)), after each poll; else, while the robot
+    /// searches for its pose, that of its configuration ([`StartPose::Exploring`](sonarfix_hal::config::StartPose)). `None`: there is
+    /// neither, the command was not renewed in time, or the motors may not be enabled; then the motor code stops the
     /// robot, or drives it by its own rules.
     ///
     /// A board that enables its motors polls at least every 10 ms, and when [`Self::next_poll`] asks for it, which is also

@@ -5,6 +5,7 @@
 //! | [`wheel`] | ticks of an encoder, a wheel speed | the duty of the motor |
 //! | [`pursuit`] | the estimate, a route | the motion, and why the robot stands |
 //! | [`obstacles`] | pings, the map | the distance of an unmapped object ahead, for [`pursuit`] |
+//! | [`search_motion`] | the pings of a search, the travel of the wheels | the motion of a robot that searches for its pose |
 //!
 //! # Features
 //! - `defmt`: derives `defmt::Format` for the public types.
@@ -16,6 +17,7 @@ use sonarfix::geometry::numeric::{at_least, at_most};
 
 pub mod obstacles;
 pub mod pursuit;
+pub mod search_motion;
 pub mod wheel;
 
 /// The value within ± the limit.

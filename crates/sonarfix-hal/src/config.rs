@@ -38,6 +38,9 @@ const LONGEST_ENCODER_PERIOD: Duration = Duration::from_ticks(1_000_000);
 /// Longest time of a ping, a servo or the link, as in robot files: what takes longer never ends for a robot that drives.
 const LONGEST_TIME: Duration = Duration::from_ticks(3_600_000_000);
 
+/// The bearing to which a robot that drives ahead must be able to look on both sides, radians: 45°.
+const LOOKS_ASIDE: f32 = core::f32::consts::FRAC_PI_4;
+
 /// The configuration of a robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -60,6 +63,28 @@ pub struct RobotConfig {
     pub start: StartPose,
 }
 
+/// How a robot moves by itself while it searches for its pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct SearchMotion {
+    /// The motion.
+    pub kind: SearchMotionKind,
+    /// The least range of an echo ahead with which the robot drives on, from the sonar.
+    pub bumper: Metres,
+}
+
+/// The kinds of [`SearchMotion`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum SearchMotionKind {
+    /// It turns once on the spot.
+    Spin,
+    /// It drives ahead where the sonar finds free floor, and turns where it does not.
+    Ahead,
+}
+
 /// Whether a robot needs to know where it starts.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -73,13 +98,20 @@ pub enum StartPose {
         /// The region in which it starts without a pose; anywhere on the map if there is none.
         region: Option<Region>,
     },
+    /// The same, and it moves by itself while it searches and nobody else drives it (feature `drive`).
+    Exploring {
+        /// As of [`Self::Unknown`].
+        region: Option<Region>,
+        /// The motion.
+        motion: SearchMotion,
+    },
 }
 
 impl StartPose {
     /// Whether the robot searches for a pose that it does not have.
     #[must_use]
     pub fn is_unknown(&self) -> bool {
-        matches!(self, Self::Unknown { .. })
+        *self != Self::Known
     }
 
     /// The region in which a robot without a pose starts, if it is limited.
@@ -87,7 +119,16 @@ impl StartPose {
     pub fn region(&self) -> Option<Region> {
         match self {
             Self::Known => None,
-            Self::Unknown { region } => *region,
+            Self::Unknown { region } | Self::Exploring { region, .. } => *region,
+        }
+    }
+
+    /// How the robot moves by itself while it searches, if it does.
+    #[must_use]
+    pub fn motion(&self) -> Option<SearchMotion> {
+        match self {
+            Self::Known | Self::Unknown { .. } => None,
+            Self::Exploring { motion, .. } => Some(*motion),
         }
     }
 }
@@ -355,7 +396,20 @@ impl RobotConfig {
         let ends = !timeout.is_zero() && timeout <= LONGEST_TIME;
         require("motors.link_timeout", ends, "longer than zero, and at most 1 h")?;
         let region = self.start.region().is_none_or(|region| region.is_valid());
-        require("start.region", region, "a rectangle from its smaller to its larger coordinates")
+        require("start.region", region, "a rectangle from its smaller to its larger coordinates")?;
+        self.check_search_motion()
+    }
+
+    /// A robot that drives ahead must be able to look ahead, and to both sides.
+    fn check_search_motion(&self) -> Result<(), RobotConfigError> {
+        let Some(SearchMotion { kind, bumper }) = self.start.motion() else { return Ok(()) };
+        let is_length = bumper.0 > 0.0 && bumper.is_finite();
+        require("start.motion.bumper", is_length, "a positive, finite length")?;
+        let (right, left) = self.localizer.rangers.first.servo;
+        let looks = right.0 <= -LOOKS_ASIDE && left.0 >= LOOKS_ASIDE;
+        let can_move = kind == SearchMotionKind::Spin || looks;
+        let rule = "\"spin\" with a servo that does not reach 45 degrees to both sides";
+        require("start.motion.kind", can_move, rule)
     }
 
     /// The geometry of both wheels.
@@ -411,7 +465,8 @@ impl RobotConfig {
             }
             Feature::Gyro => localizer.gyro.is_some(),
             Feature::Rangers => localizer.rangers.are_several(),
-            Feature::Absolute | Feature::Drive => false,
+            Feature::Absolute => false,
+            Feature::Drive => self.start.motion().is_some(),
             Feature::Informative => localizer.policy == Policy::Informative,
             Feature::Mount => localizer.prior.mount.0 > 0.0,
             Feature::Search => self.start.is_unknown(),

@@ -13,8 +13,11 @@ use std::path::Path;
 use sonarfix::aim::Policy;
 use sonarfix::config::Rangers;
 use sonarfix::geometry::pose::Point;
+use sonarfix::geometry::units::Metres;
 use sonarfix::sensor::gyro::GyroParameters;
-use sonarfix_hal::config::{RobotConfig, RobotConfigError, StartPose};
+use sonarfix_hal::config::{
+    RobotConfig, RobotConfigError, SearchMotion, SearchMotionKind, StartPose,
+};
 use sonarfix_search::search::Region;
 
 use crate::document::{Document, Node, Table};
@@ -37,6 +40,9 @@ static ROBOT: Section<RobotConfig> = Section { name: "robot", usual, keys: &[
         [searches](search.md#in-the-robots-loop) for it. A robot with a known start stays lost")),
     optional(Key::new("start_region", Value::Own("a table of `from` and `to`", read_region, |c| c.start.region().map(|region| REGION.inline(&region))),
         "where on the map a robot without a pose starts, with `start = \"unknown\"`. Anywhere without this key")),
+    optional(Key::new("search_motion", Value::Own("a table of `kind` and `bumper_distance`", read_motion, |c| c.start.motion().map(|motion| MOTION.inline(&motion))),
+        "how the robot moves by itself [while it searches](driving.md#a-robot-that-searches) and no motion is commanded, with `start = \"unknown\"`. Not \
+        at all without this key. The board's program needs the feature `drive`, and a motor code that obeys it")),
     Key::new("drive", Value::Table(&DRIVE), "wheels and encoders"),
     Key::new("sonar", Value::Tables(sonar::read, sonar::text), "ranger and servo"),
     Key::new("prior", Value::Table(&PRIOR), "how wrong the calibration may be"),
@@ -55,6 +61,16 @@ static REGION: Section<Region> = Section {
     Key::new("from", Value::Pair(&LENGTH, ("-8000 m", "8000 m"), |r| [&mut r.from.x.0, &mut r.from.y.0]),
         "the corner with the smaller coordinates, on the map"),
     Key::new("to", Value::Pair(&LENGTH, ("-8000 m", "8000 m"), |r| [&mut r.to.x.0, &mut r.to.y.0]), "the corner with the larger ones"),
+] };
+
+#[rustfmt::skip]
+static MOTION: Section<SearchMotion> = Section {
+    name: "search_motion", usual: || SearchMotion { kind: SearchMotionKind::Ahead, bumper: Metres(0.3) }, keys: &[
+    Key::new("kind", Value::Word(&["spin", "ahead"], |m| usize::from(m.kind == SearchMotionKind::Ahead), |m, word| {
+        m.kind = if word == 0 { SearchMotionKind::Spin } else { SearchMotionKind::Ahead };
+    }), "once around on the spot, or ahead where the sonar finds free floor"),
+    optional(number("bumper_distance", &LENGTH, ("5 cm", "5 m"), |m| &mut m.bumper.0,
+        "least range of an echo ahead, from the sonar, with which the robot drives on. Half of its width, and what it needs to stop")),
 ] };
 
 #[rustfmt::skip]
@@ -199,6 +215,8 @@ fn key_of(error: RobotConfigError) -> &'static str {
     match error.field {
         "servo_pulses" => "sonar.servo_pulses",
         "start.region" => "start_region",
+        "start.motion.kind" => "search_motion.kind",
+        "start.motion.bumper" => "search_motion.bumper_distance",
         same => same,
     }
 }
@@ -212,11 +230,22 @@ fn read_region(node: Node<'_>, config: &mut RobotConfig) {
     }
 }
 
+/// After the region, whose row is before.
+fn read_motion(node: Node<'_>, config: &mut RobotConfig) {
+    if config.start.is_unknown() {
+        let (region, motion) = (config.start.region(), MOTION.read(node, (MOTION.usual)()));
+        config.start = StartPose::Exploring { region, motion };
+    } else {
+        node.report("needs start = \"unknown\"");
+    }
+}
+
 /// The tables of `docs/formats.md`.
 pub(crate) fn rows() -> Vec<(&'static str, String)> {
     let main = [&ROBOT, &DRIVE, &PRIOR, &GATING, &ECHO, &SCHEDULE, &MOTORS].map(Section::rows);
     let others = [
         REGION.rows(),
+        MOTION.rows(),
         WHEEL.rows(),
         SONAR.rows(),
         PULSE.rows(),

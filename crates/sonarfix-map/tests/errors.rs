@@ -7,7 +7,9 @@ use proptest::prelude::*;
 use sonarfix::config::{LightBeam, PingSchedule, RangerId, Ranging, ServoTiming};
 use sonarfix::geometry::pose::Point;
 use sonarfix::geometry::units::{Duration, Metres, Radians};
-use sonarfix_hal::config::{MotorPolicy, RangerConfig, RobotConfig, StartPose, WheelConfig};
+use sonarfix_hal::config::{
+    MotorPolicy, RangerConfig, RobotConfig, SearchMotion, SearchMotionKind, StartPose, WheelConfig,
+};
 use sonarfix_hal::ranger::{PulseTiming, RangerKind};
 use sonarfix_map::{
     CLASSROOM, Fault, FaultKind, Fidelity, FileError, Floor, Follow, Mistake, PAPER, Scenario,
@@ -883,6 +885,24 @@ fn a_time_of_flight_ranger_has_a_beam() {
     }
 }
 
+/// A robot that moves by itself must not know where it is, and one that drives ahead must see what is there.
+#[test]
+fn a_motion_of_a_search_needs_a_search_and_a_sonar_that_turns() {
+    let classroom = Scenario::parse(CLASSROOM, "classroom.toml", Path::new("")).unwrap().robot;
+    let mut robot = classroom;
+    let motion = SearchMotion { kind: SearchMotionKind::Ahead, bumper: Metres(0.3) };
+    robot.start = StartPose::Exploring { region: None, motion };
+    let text = robot_text(&robot);
+    let known = text.replace("start = \"unknown\"", "start = \"known\"");
+    let error = robot_file::parse(&known, "known.toml").unwrap_err().to_string();
+    assert!(error.contains("needs start = \"unknown\""), "{error}");
+    robot.localizer.rangers.first.servo = (Radians(-1.5), Radians(0.5));
+    let error = robot.check().unwrap_err();
+    assert_eq!(error.field, "start.motion.kind");
+    let error = robot_file::parse(&robot_text(&robot), "narrow.toml").unwrap_err().to_string();
+    assert!(error.contains("45 degrees"), "{error}");
+}
+
 /// A written file is read back: every number, except for the last bits of angles, which are in degrees.
 #[test]
 fn a_robot_that_is_written_is_read_back() {
@@ -906,11 +926,19 @@ fn a_robot_that_is_written_is_read_back() {
     let mut searching = odd;
     searching.motors.lost = true;
     searching.start = StartPose::Unknown { region: Some(region) };
+    let mut exploring = searching;
+    let motion = SearchMotion { kind: SearchMotionKind::Ahead, bumper: Metres(0.45) };
+    exploring.start = StartPose::Exploring { region: Some(region), motion };
+    let mut spinning = searching;
+    let motion = SearchMotion { kind: SearchMotionKind::Spin, bumper: Metres(0.3) };
+    spinning.start = StartPose::Exploring { region: None, motion };
     let mut fixed = classroom;
     fixed.localizer.rangers.first.servo = (Radians(-1.25), Radians(-1.25));
     fixed.localizer.rangers.first.timing.servo = ServoTiming::INSTANT;
     fixed.rangers.first.servo_pulses = RangerConfig::NO_PULSES;
-    for robot in [classroom, odd, lit, searching, fixed, parse(PAPER).unwrap().robot] {
+    for robot in
+        [classroom, odd, lit, searching, exploring, spinning, fixed, parse(PAPER).unwrap().robot]
+    {
         let text = robot_text(&robot);
         let mut read = robot_file::parse(&text, "written.toml").unwrap();
         let near = |a: Radians, b: Radians| (a - b).abs() < Radians(1e-6);

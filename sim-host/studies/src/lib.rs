@@ -12,7 +12,7 @@
 //! | [`reality`] | `docs/reality.md` |
 //! | [`recordings`] | none: a table of recordings with their robot files |
 //! | [`rooms`] | `docs/rooms.md` |
-//! | [`search_study`] | `docs/search.md` |
+//! | [`search_motion`], [`search_study`] | `docs/search.md` |
 //! | [`sonar_model`] | `docs/sonar-model.md` |
 
 pub mod calibration;
@@ -30,6 +30,7 @@ pub mod recordings;
 pub mod relocalization;
 pub mod rooms;
 pub mod search_bound;
+pub mod search_motion;
 pub mod search_study;
 pub mod sonar_model;
 pub mod surveys;

@@ -6,10 +6,11 @@ use std::process::{Command, Output, Stdio};
 const CLASSROOM: &str = "../../crates/sonarfix-map/scenarios/classroom.toml";
 
 /// Every subcommand, with arguments for the shortest output.
-const PRINTING: [&[&str]; 13] = [
+const PRINTING: [&[&str]; 14] = [
     &["find-forecast", "--floor-plans", "1", "--starts", "2", "--trials", "2"],
     &["find", "--floor-plans", "1", "--walls", "30", "--seconds", "5"],
     &["relocalize", "--runs", "1", "--seconds", "5"],
+    &["search-motion", "--runs", "1", "--seconds", "5"],
     &["calibration", "--runs", "1", "--metres", "5"],
     &["surveys", "room", "--runs", "1"],
     // These need recordings.

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use anyhow::{anyhow, bail, ensure};
 use sonarfix::geometry::units::{Duration, Instant};
-use sonarfix::localizer::{Mode, Start};
+use sonarfix::localizer::{Localizer, Mode, Start};
 use sonarfix_app::store::Store;
 use sonarfix_app::{App, Board, FlashContents, Link};
 use sonarfix_hal::robot::PACE;
@@ -166,6 +166,18 @@ impl<'p> VirtualRobot<'p> {
     #[must_use]
     pub fn pose(&self) -> Pose {
         self.hardware.pose()
+    }
+
+    /// What determines its pose, while its loop runs.
+    #[must_use]
+    pub fn mode(&self) -> Option<Mode> {
+        self.app.navigation_mode()
+    }
+
+    /// Its localizer, while its loop runs.
+    #[must_use]
+    pub fn localizer(&self) -> Option<&Localizer<'p>> {
+        self.app.localizer()
     }
 
     /// Takes bytes from its link.

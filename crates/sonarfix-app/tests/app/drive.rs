@@ -1,10 +1,11 @@
-//! The motion that the PC commands, and its dead-man.
+//! The motion that the PC commands, and its dead-man; that of a robot that searches.
 
 use sonarfix::geometry::units::{Duration, Metres, MetresPerSecond, RadiansPerSecond};
-use sonarfix_hal::config::MotorPolicy;
+use sonarfix_hal::config::{MotorPolicy, RobotConfig, SearchMotion, SearchMotionKind, StartPose};
 use sonarfix_link::message::{CommandError, CommandResult};
 use sonarfix_link::{Command, Motion};
 
+use crate::flash::SimFlash;
 use crate::rig::{self, Baked, Bench, config};
 
 const DONE: CommandResult = CommandResult::Done;
@@ -148,4 +149,71 @@ fn a_clock_that_is_set_back_ends_the_motion() {
     assert_eq!(bench.app.motion(), None);
     assert_eq!(bench.order(&Command::Drive(AHEAD)), DONE);
     assert_eq!(bench.app.motion(), Some(AHEAD));
+}
+
+/// A robot without a pose that moves like this while it searches.
+fn searching(kind: SearchMotionKind) -> Baked {
+    let motion = SearchMotion { kind, bumper: Metres(0.3) };
+    let start = StartPose::Exploring { region: None, motion };
+    Baked::new(&RobotConfig { start, ..config() })
+}
+
+fn started(baked: &Baked) -> Bench<'_> {
+    let mut bench = Bench::switched_on(baked, SimFlash::new());
+    assert_eq!(bench.order(&Command::Start), DONE);
+    bench
+}
+
+/// No wall answers. The motion is there from the first poll on, at rest; a command is obeyed first, and a pose ends it.
+#[test]
+fn a_robot_that_searches_drives_ahead_until_it_has_a_pose() {
+    let baked = searching(SearchMotionKind::Ahead);
+    let mut bench = started(&baked);
+    bench.wait(200);
+    assert_eq!(bench.app.motion(), Some(Motion::default()));
+    for _ in 0..100 {
+        bench.wait(100);
+    }
+    let ahead = bench.app.motion().unwrap();
+    assert!(ahead.speed.0 > 0.0 && ahead.turn.0 == 0.0, "{ahead:?}");
+    assert_eq!(bench.order(&Command::Drive(motion(0.0, 0.5))), DONE);
+    assert_eq!(bench.app.motion(), Some(motion(0.0, 0.5)));
+    bench.wait(400);
+    assert_eq!(bench.app.motion(), Some(ahead));
+    assert_eq!(bench.order(&Command::SetPose(rig::start())), DONE);
+    bench.wait(100);
+    assert_eq!(bench.app.motion(), None);
+}
+
+/// The wheels do not turn, as if they were blocked: it asks for the turn as long as it searches.
+#[test]
+fn a_robot_that_searches_turns_on_the_spot() {
+    let baked = searching(SearchMotionKind::Spin);
+    let mut bench = started(&baked);
+    bench.wait(3_000);
+    let turn = bench.app.motion().unwrap();
+    assert!(turn.speed.0 == 0.0 && turn.turn.0 > 0.0, "{turn:?}");
+    assert_eq!(bench.order(&Command::Stop), DONE);
+    assert_eq!(bench.app.motion(), None);
+}
+
+#[test]
+fn a_robot_whose_file_asks_for_no_motion_has_none() {
+    let baked = Baked::new(&RobotConfig { start: StartPose::Unknown { region: None }, ..config() });
+    let mut bench = started(&baked);
+    bench.wait(5_000);
+    assert_eq!(bench.app.motion(), None);
+}
+
+/// A sonar that does not respond finds no free floor.
+#[test]
+fn a_robot_without_a_sonar_does_not_drive() {
+    let baked = searching(SearchMotionKind::Ahead);
+    let mut bench = Bench::switched_on(&baked, SimFlash::new());
+    bench.hardware.ranger.is_there = false;
+    assert_eq!(bench.order(&Command::Start), DONE);
+    for _ in 0..100 {
+        bench.wait(100);
+        assert!(bench.app.motion().is_none_or(|motion| motion == Motion::default()));
+    }
 }

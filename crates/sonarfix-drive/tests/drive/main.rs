@@ -4,4 +4,5 @@
 mod motor;
 mod obstacles;
 mod pursuit;
+mod search_motion;
 mod wheel;

@@ -18,7 +18,7 @@ pub enum Feature {
     Informative,
     /// The search for an unknown pose.
     Search,
-    /// A motion that a PC commands.
+    /// A motion for the motor code: commanded by a PC, or of a robot that searches.
     Drive,
     /// The place of the first ranger as two states.
     Mount,

@@ -20,7 +20,9 @@ use sonarfix::localizer::{
 use sonarfix::map::WallId;
 use sonarfix::sensor::absolute::{AbsoluteMeasurement, PoseNoise, PositionNoise};
 use sonarfix::sensor::gyro::{GyroParameters, TurnReading, TurnRefusal};
-use sonarfix_hal::config::{MotorPolicy, RangerConfig, RobotConfig, StartPose, Unsupported};
+use sonarfix_hal::config::{
+    MotorPolicy, RangerConfig, RobotConfig, SearchMotion, SearchMotionKind, StartPose, Unsupported,
+};
 use sonarfix_hal::ranger::{Celsius, Echo, NoEcho, Outcome, PulseTiming, RangerKind};
 use sonarfix_hal::robot::{AbsoluteResult, EncoderFaults, Faults};
 use sonarfix_hal::servo::{MeasuredPulse, SettingError};
@@ -496,9 +498,13 @@ pub fn config(source: &mut impl Source) -> RobotConfig {
     config.motors = MotorPolicy { lost, dead_encoder, lost_link, link_timeout: source.duration() };
     let mut corner = || Point::new(source.single(), source.single());
     let region = Region { from: corner(), to: corner() };
-    config.start = match source.pick(3) {
+    config.start = match source.pick(4) {
         0 => StartPose::Unknown { region: Some(region) },
         1 => StartPose::Unknown { region: None },
+        2 => StartPose::Exploring {
+            region: Some(region),
+            motion: SearchMotion { kind: SearchMotionKind::Ahead, bumper: Metres(source.single()) },
+        },
         _ => StartPose::Known,
     };
     config

@@ -14,6 +14,7 @@ mod reality;
 mod recordings;
 mod relocalize;
 mod rooms;
+mod search_motion;
 mod sonar_model;
 mod surveys;
 
@@ -53,6 +54,8 @@ enum Command {
     Relocalize(relocalize::Args),
     /// Measures consistency and verdicts in generated rooms; prints markdown.
     Rooms(rooms::Args),
+    /// Measures how robots find their pose that move by themselves while they search for it.
+    SearchMotion(search_motion::Args),
     /// Compares the simulated NXT sonar with recorded sweeps; prints markdown.
     SonarModel(sonar_model::Args),
     /// Measures the accuracy of `sonarfix survey` on simulated robots; prints markdown.
@@ -82,6 +85,7 @@ fn execute(command: Command) -> anyhow::Result<()> {
         Command::Recordings(args) => recordings::execute(&args),
         Command::Relocalize(args) => relocalize::execute(&args),
         Command::Rooms(args) => rooms::execute(&args),
+        Command::SearchMotion(args) => search_motion::execute(&args),
         Command::SonarModel(args) => sonar_model::execute(&args),
         Command::Surveys(args) => surveys::execute(&args),
     }
