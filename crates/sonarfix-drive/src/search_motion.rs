@@ -12,7 +12,7 @@
 //!
 //! ```text
 //!               two ends of the sweep          free travel is used up
-//!   Looking ────────────────────────▶ Driving ────────────────────────▶ Turning
+//!   Sweeping ───────────────────────▶ Driving ────────────────────────▶ Turning
 //!      ▲                                                                   │
 //!      └───────────────────────────────────────────────────────────────────┘
 //!                                      70°
@@ -21,10 +21,10 @@
 //! It turns to the side whose nearest echo is farther, and on to the same side if nothing was free there.
 //!
 //! **What the sonar does not detect, the robot hits**: soft and thin objects, edges above or below the beam, and what stands between two
-//! bearings of a sweep. Behind the robot nothing is looked at; it never drives backwards.
+//! bearings of a sweep. Nothing is measured behind the robot; it never drives backwards.
 //!
 //! # Non-finite policy
-//! A bearing, range or travel that is not finite ends the free travel: the robot stands and looks again.
+//! A bearing, range or travel that is not finite ends the free travel: the robot stands until the next sweep is complete.
 
 use sonarfix::filter::motion::WheelTravel;
 use sonarfix::geometry::numeric::at_most;
@@ -59,7 +59,7 @@ impl Speeds {
     }
 }
 
-/// The turn after which the robot looks again: not a divisor of a full one.
+/// The turn after which the robot stands for a sweep: not a divisor of a full one.
 const TURN: f32 = 70.0 * core::f32::consts::PI / 180.0;
 /// One full turn on the spot.
 const FULL_TURN: f32 = 2.0 * core::f32::consts::PI;
@@ -71,7 +71,7 @@ const BESIDE: f32 = 0.26;
 const PARALLEL: f32 = 0.035;
 /// The least distance from a wall beside the robot, as a part of the bumper distance.
 const ASIDE: f32 = 0.6;
-/// Ends of the sweep after which every bearing was looked at.
+/// Ends of the sweep after which it is complete.
 const ENDS: u8 = 2;
 
 /// Travel without a ping, metres, after which the robot stands.
@@ -125,8 +125,8 @@ pub struct SearchMover {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum State {
-    /// It stands until the sonar has looked everywhere.
-    Looking,
+    /// It stands until a sweep is complete.
+    Sweeping,
     Driving,
     /// It turns by this angle more, radians.
     Turning(f32),
@@ -177,7 +177,7 @@ impl SearchMover {
             bumper: motion.bumper.0,
             spins,
             speeds,
-            state: if spins { State::Turning(FULL_TURN) } else { State::Looking },
+            state: if spins { State::Turning(FULL_TURN) } else { State::Sweeping },
             sweeps: [Sweep::EMPTY; 2],
             bearing: f32::NAN,
             is_leftward: None,
@@ -193,7 +193,7 @@ impl SearchMover {
     /// A ping that a fault has ended is none.
     pub fn ping(&mut self, bearing: Radians, range: Option<Metres>) {
         if !bearing.is_finite() || range.is_some_and(|range| !range.is_finite()) {
-            self.look_again();
+            self.sweep_again();
             return;
         }
         self.blind = 0.0;
@@ -218,14 +218,14 @@ impl SearchMover {
         let turn = (travel.right.0 - travel.left.0) / track_width.0;
         let advance = travel.distance().0;
         if !turn.is_finite() || !advance.is_finite() {
-            self.look_again();
+            self.sweep_again();
             return;
         }
         self.turned += turn;
         if let State::Turning(left) = &mut self.state {
             *left -= if self.was_left { turn } else { -turn };
             if *left <= 0.0 {
-                self.look_again();
+                self.sweep_again();
             }
             return;
         }
@@ -235,7 +235,7 @@ impl SearchMover {
             sweep.free -= advance;
         }
         if self.turned.abs() > STRAIGHT || self.blind > BLIND {
-            self.look_again();
+            self.sweep_again();
         }
         self.decide();
     }
@@ -245,7 +245,7 @@ impl SearchMover {
     pub fn motion(&self) -> Motion {
         let Speeds { ahead, turn } = self.speeds;
         match self.state {
-            State::Looking | State::Done => Motion::default(),
+            State::Sweeping | State::Done => Motion::default(),
             State::Driving => Motion { speed: ahead, ..Motion::default() },
             State::Turning(_) => {
                 let turn = if self.was_left { turn.0 } else { -turn.0 };
@@ -254,9 +254,9 @@ impl SearchMover {
         }
     }
 
-    /// Drives once the sonar has looked everywhere, and turns where the free travel is used up.
+    /// Drives once a sweep is complete, and turns where the free travel is used up.
     fn decide(&mut self) {
-        if self.state == State::Looking && self.ends >= ENDS {
+        if self.state == State::Sweeping && self.ends >= ENDS {
             self.state = State::Driving;
         }
         let [present, before] = &self.sweeps;
@@ -271,8 +271,8 @@ impl SearchMover {
     }
 
     /// Forgets the echoes: the robot stands until there are new ones. One that has turned once around stays there.
-    fn look_again(&mut self) {
-        self.state = if self.spins { State::Done } else { State::Looking };
+    fn sweep_again(&mut self) {
+        self.state = if self.spins { State::Done } else { State::Sweeping };
         self.sweeps = [Sweep::EMPTY; 2];
         self.ends = 0;
         self.turned = 0.0;

@@ -38,8 +38,8 @@ const LONGEST_ENCODER_PERIOD: Duration = Duration::from_ticks(1_000_000);
 /// Longest time of a ping, a servo or the link, as in robot files: what takes longer never ends for a robot that drives.
 const LONGEST_TIME: Duration = Duration::from_ticks(3_600_000_000);
 
-/// The bearing to which a robot that drives ahead must be able to look on both sides, radians: 45°.
-const LOOKS_ASIDE: f32 = core::f32::consts::FRAC_PI_4;
+/// The bearing to which the sonar of a robot that drives ahead must turn on both sides, radians: 45°.
+const LEAST_SWEEP: f32 = core::f32::consts::FRAC_PI_4;
 
 /// The configuration of a robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -400,14 +400,14 @@ impl RobotConfig {
         self.check_search_motion()
     }
 
-    /// A robot that drives ahead must be able to look ahead, and to both sides.
+    /// The sonar of a robot that drives ahead must turn ahead, and to both sides.
     fn check_search_motion(&self) -> Result<(), RobotConfigError> {
         let Some(SearchMotion { kind, bumper }) = self.start.motion() else { return Ok(()) };
         let is_length = bumper.0 > 0.0 && bumper.is_finite();
         require("start.motion.bumper", is_length, "a positive, finite length")?;
         let (right, left) = self.localizer.rangers.first.servo;
-        let looks = right.0 <= -LOOKS_ASIDE && left.0 >= LOOKS_ASIDE;
-        let can_move = kind == SearchMotionKind::Spin || looks;
+        let is_wide = right.0 <= -LEAST_SWEEP && left.0 >= LEAST_SWEEP;
+        let can_move = kind == SearchMotionKind::Spin || is_wide;
         let rule = "\"spin\" with a servo that does not reach 45 degrees to both sides";
         require("start.motion.kind", can_move, rule)
     }

@@ -16,7 +16,7 @@ use sonarfix_virtual_robot::robot::{Parts, VirtualRobot};
 use crate::floor_plan::FloorPlan;
 use crate::search_study::Plans;
 
-/// Time between two looks at the robot, µs.
+/// Time between two records of the pose, µs.
 const STEP: u64 = 20_000;
 
 /// The outcome of one trial, which ends with the first pose.

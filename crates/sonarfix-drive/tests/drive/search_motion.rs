@@ -147,9 +147,9 @@ fn in_a_square() -> World {
     World::new(walls, [2.0, 2.0], 0.0)
 }
 
-/// It stands until the sonar has looked everywhere, and ends at the bumper distance before the wall.
+/// It stands until a sweep is complete, and ends at the bumper distance before the wall.
 #[test]
-fn it_looks_before_it_drives_and_stops_at_the_bumper_distance() {
+fn it_sweeps_before_it_drives_and_stops_at_the_bumper_distance() {
     let mut world = in_a_square();
     let mut mover = mover(SearchMotionKind::Ahead);
     let mut pings = 0;
@@ -177,7 +177,7 @@ fn it_does_not_drive_without_pings() {
 
 /// A person turns a robot that drives: what is ahead is not known any more.
 #[test]
-fn it_looks_again_after_a_turn_that_it_has_not_made() {
+fn it_sweeps_again_after_a_turn_that_it_has_not_made() {
     let mut world = in_a_square();
     let mut mover = mover(SearchMotionKind::Ahead);
     while world.step(&mut mover).speed.0 == 0.0 {}
