@@ -190,7 +190,7 @@ impl SearchMover {
     }
 
     /// Takes a ping of the sweep: its bearing in the robot frame, and the range from the sonar, as it was measured; `None` without an echo.
-    /// A ping that a fault has ended is none.
+    /// One without a result, because the ranger has a fault, is not passed.
     pub fn ping(&mut self, bearing: Radians, range: Option<Metres>) {
         if !bearing.is_finite() || range.is_some_and(|range| !range.is_finite()) {
             self.sweep_again();

@@ -98,7 +98,8 @@ pub enum StartPose {
         /// The region in which it starts without a pose; anywhere on the map if there is none.
         region: Option<Region>,
     },
-    /// The same, and it moves by itself while it searches and nobody else drives it (feature `drive`).
+    /// The same, and it moves by itself while it searches and nobody else drives it (feature `drive`). A variant of its own, so that the
+    /// bytes of the other configurations are those of earlier versions.
     Exploring {
         /// As of [`Self::Unknown`].
         region: Option<Region>,

@@ -67,9 +67,8 @@ pub fn floor_plans(
     comparison: &Comparison,
     progress: &impl Progress,
 ) -> Result<Vec<Compared>, CompareError> {
-    let compared =
-        plans.each(progress, |scenario, seed| Ok(compared(&scenario, seed, comparison)))?;
-    compared.into_iter().filter_map(Result::transpose).collect()
+    let compared = plans.each(progress, |scenario, seed| compared(&scenario, seed, comparison))?;
+    Ok(compared.into_iter().flatten().collect())
 }
 
 fn compared(

@@ -72,7 +72,7 @@ pub struct Quantiles {
 impl Quantiles {
     /// Of the times of `trials`, and whether what is found then is right.
     #[expect(clippy::cast_precision_loss, reason = "far fewer than 2^53 trials")]
-    fn new(trials: &[(Option<f64>, bool)]) -> Self {
+    pub(crate) fn new(trials: &[(Option<f64>, bool)]) -> Self {
         let mut right: Vec<f64> =
             trials.iter().filter(|trial| trial.1).filter_map(|trial| trial.0).collect();
         right.sort_by(f64::total_cmp);

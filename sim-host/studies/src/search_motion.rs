@@ -1,7 +1,6 @@
 //! Robots that move by themselves while they search for their pose, in floor plans: the shipped application drives, by its
 //! configuration and its sonar alone, from the place where it is switched on.
 
-use rayon::prelude::*;
 use serde::Serialize;
 use sonarfix::geometry::units::Metres;
 use sonarfix::localizer::{Localizer, Mode};
@@ -13,7 +12,7 @@ use sonarfix_sim::trace::Pose;
 use sonarfix_sim::world::segment::{Segment, distance};
 use sonarfix_virtual_robot::robot::{Parts, VirtualRobot};
 
-use crate::floor_plan::FloorPlan;
+use crate::search_bound::Quantiles;
 use crate::search_study::Plans;
 
 /// Time between two records of the pose, µs.
@@ -44,17 +43,7 @@ pub fn floor_plans(
     seconds: f64,
     progress: &impl Progress,
 ) -> anyhow::Result<Vec<Trial>> {
-    let seeds = (0..u64::MAX).map(|n| plans.first.wrapping_add(n)).map(FloorPlan::new);
-    let plans: Vec<FloorPlan> = seeds
-        .filter(|plan| plans.kind.is_none_or(|kind| plan.kind == kind))
-        .take(plans.trials as usize)
-        .collect();
-    let one = |plan: FloorPlan| {
-        let trial = trial(plan.scenario()?, plan.seed, kind, seconds);
-        progress.finished();
-        trial
-    };
-    plans.into_par_iter().filter(|_| !progress.is_interrupted()).map(one).collect()
+    plans.each(progress, |scenario, seed| trial(scenario, seed, kind, seconds))
 }
 
 /// One trial.
@@ -133,12 +122,8 @@ pub struct Summary {
     pub trials: usize,
     /// Share with a right pose.
     pub right: f64,
-    /// Share with a wrong pose.
-    pub wrong: f64,
-    /// Seconds within which half of the trials have a right pose; `None` if fewer have one.
-    pub half: Option<f64>,
-    /// The same of 80 %.
-    pub four_fifths: Option<f64>,
+    /// When they have it, and the share with a wrong pose.
+    pub found: Quantiles,
     /// Distance driven, mean, metres.
     pub metres: f64,
     /// Share in which an obstacle was nearer than 10 cm to the middle of the axle: the robot touched it.
@@ -153,16 +138,11 @@ impl Summary {
         let count = trials.len() as f64;
         let share =
             |is: &dyn Fn(&Trial) -> bool| trials.iter().filter(|it| is(it)).count() as f64 / count;
-        let right = trials.iter().filter(|trial| trial.is_right);
-        let mut times: Vec<f64> = right.filter_map(|trial| trial.found_after).collect();
-        times.sort_by(f64::total_cmp);
-        let within = |percent: usize| times.get(trials.len() * percent / 100).copied();
+        let found: Vec<_> = trials.iter().map(|it| (it.found_after, it.is_right)).collect();
         Self {
             trials: trials.len(),
             right: share(&|trial| trial.is_right),
-            wrong: share(&|trial| trial.found_after.is_some() && !trial.is_right),
-            half: within(50),
-            four_fifths: within(80),
+            found: Quantiles::new(&found),
             metres: trials.iter().map(|trial| trial.metres).sum::<f64>() / count,
             touched: share(&|trial| trial.nearest < RADIUS),
         }
@@ -217,9 +197,9 @@ mod tests {
         ];
         let summary = Summary::new(&trials);
         let percent = |share: f64| format!("{:.0} %", 100.0 * share);
-        let shares = [summary.right, summary.wrong, summary.touched].map(percent);
+        let shares = [summary.right, summary.found.wrong, summary.touched].map(percent);
         assert_eq!(shares, ["50 %", "25 %", "25 %"]);
-        assert_eq!((summary.half, summary.four_fifths), (None, None));
-        assert_eq!(Summary::new(&trials[..2]).half, Some(4.0));
+        assert_eq!((summary.found.half, summary.found.four_fifths), (None, None));
+        assert_eq!(Summary::new(&trials[..2]).found.half, Some(4.0));
     }
 }

@@ -49,12 +49,12 @@ impl Plans {
     /// What is computed of each plan with its seed, on all cores.
     ///
     /// # Errors
-    /// [`TrialError`] of the first plan that cannot be used.
-    pub(crate) fn each<T: Send>(
+    /// Of the first plan that cannot be used.
+    pub(crate) fn each<T: Send, E: From<TrialError> + Send>(
         &self,
         progress: &impl Progress,
-        of: impl Fn(Scenario, u64) -> Result<T, TrialError> + Sync + Send,
-    ) -> Result<Vec<T>, TrialError> {
+        of: impl Fn(Scenario, u64) -> Result<T, E> + Sync + Send,
+    ) -> Result<Vec<T>, E> {
         let one = |(seed, scenario)| {
             let result = of(scenario, seed);
             progress.finished();

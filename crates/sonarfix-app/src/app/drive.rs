@@ -53,8 +53,10 @@ impl Drive {
             return;
         };
         let track_width = config.localizer.drive.track_width;
-        let speeds = Speeds::within(config.localizer.max_wheel_speed, track_width);
-        let mover = self.search.get_or_insert_with(|| SearchMover::new(motion, speeds));
+        let mover = self.search.get_or_insert_with(|| {
+            let speeds = Speeds::within(config.localizer.max_wheel_speed, track_width);
+            SearchMover::new(motion, speeds)
+        });
         let mut roll = |step: Option<&Step>| {
             // The next step contains the travel of one that was deferred.
             let step = step.filter(|step| !matches!(step.result, StepResult::Deferred(_)));

@@ -97,9 +97,9 @@ fn summary_table(summary: &Summary, seconds: f64) -> Table {
         columns: ["", "value"].map(str::to_owned).into(),
         rows: vec![
             row("found, right", percent(summary.right)),
-            row("found, wrong", percent(summary.wrong)),
-            row("half of the trials within", time(summary.half)),
-            row("80 % within", time(summary.four_fifths)),
+            row("found, wrong", percent(summary.found.wrong)),
+            row("half of the trials within", time(summary.found.half)),
+            row("80 % within", time(summary.found.four_fifths)),
             row("driven, mean", format!("{:.1} m", summary.metres)),
             row("came nearer than 10 cm to an obstacle", percent(summary.touched)),
         ],
