@@ -9,7 +9,7 @@ pub use crate::calibration::{
     BOTH_WAYS, CalibrateError, Calibration, Determined, Estimate, FEWEST_EXPLAINED, FEWEST_INLIERS,
     Nominal, Residual,
 };
-use crate::chain_of_poses::Chain;
+use crate::chain_of_poses::{Chain, Spacing};
 use crate::constants::{COUNT, Name};
 use crate::fit::{Fit, Start};
 use crate::problem::PosePrior;
@@ -17,15 +17,17 @@ use crate::recording::Recording;
 use crate::reflector::Reflector;
 use crate::solve::{SolveError, covariance, solve};
 use crate::wall::Wall;
+use crate::wheel_noise::Estimated;
 
-/// What the estimates start from: the robot file, a servo horn fitted 8° aside, and wheels that differ by 12 %. Where one of them ends
-/// in a wrong minimum, another does not.
-const STARTS: [Start; 5] = [
-    Start { bearing: 0.0, wheel_difference: None },
-    Start { bearing: 0.14, wheel_difference: None },
-    Start { bearing: -0.14, wheel_difference: None },
-    Start { bearing: 0.0, wheel_difference: Some(0.12) },
-    Start { bearing: 0.0, wheel_difference: Some(-0.12) },
+/// What the estimates start from: the robot file, noisy wheels, a servo horn fitted 8° aside, and wheels that differ by 12 %. Where one
+/// of them ends in a wrong minimum, another does not.
+const STARTS: [Start; 6] = [
+    Start { bearing: 0.0, wheel_difference: None, wheel_noise: 0.0 },
+    Start { bearing: 0.0, wheel_difference: None, wheel_noise: 0.015 },
+    Start { bearing: 0.14, wheel_difference: None, wheel_noise: 0.0 },
+    Start { bearing: -0.14, wheel_difference: None, wheel_noise: 0.0 },
+    Start { bearing: 0.0, wheel_difference: Some(0.12), wheel_noise: 0.0 },
+    Start { bearing: 0.0, wheel_difference: Some(-0.12), wheel_noise: 0.0 },
 ];
 /// Difference of the losses of two starts that have ended in the same minimum.
 const SAME: f64 = 1.0;
@@ -41,7 +43,8 @@ pub fn calibrate(
     walls: &[Wall],
     nominal: &Nominal,
 ) -> Result<Calibration, CalibrateError> {
-    let (chain, start) = Chain::of(recording)?;
+    let (chain, start) = Chain::of(recording, Spacing::CALIBRATION)?;
+    let (at_echoes, _) = Chain::of(recording, Spacing::AT_ECHOES)?;
     let reflectors = Reflector::of_walls(walls);
     // With a reference there is one minimum.
     let starts = if recording.references.is_empty() { STARTS.len() } else { 1 };
@@ -49,7 +52,8 @@ pub fn calibrate(
         |from| Attempt::of(Fit::new(recording, &chain, &reflectors, nominal, start)?, from);
     let mut best = attempt(STARTS[0]);
     for &from in &STARTS[1..starts] {
-        let next = attempt(from);
+        let known = best.as_ref().map_or(0.0, |best| best.fit.problem.noise.wheel.turn);
+        let next = attempt(Start { wheel_noise: from.wheel_noise.max(known), ..from });
         // A bearing that the recording does not determine stays that of the start.
         if from.bearing != 0.0 && next.as_ref().is_ok_and(|next| next.bearings.is_none()) {
             continue;
@@ -64,9 +68,11 @@ pub fn calibrate(
             break;
         }
     }
-    let best = best?;
+    let mut best = best?;
     best.fit.check()?;
-    best.fit.finish(best.bearings)
+    let wheel_noise = best.fit.finish_at_echoes(&at_echoes)?;
+    best.fit.check()?;
+    best.fit.finish(best.bearings, wheel_noise)
 }
 
 /// The solution from one start.
@@ -80,8 +86,20 @@ impl<'a> Attempt<'a> {
     fn of(mut fit: Fit<'a>, from: Start) -> Result<Self, CalibrateError> {
         fit.start_from(from);
         let bearings = fit.run()?;
-        let loss = fit.loss();
-        Ok(Self { fit, bearings, loss })
+        let grown = Self { loss: fit.loss()?, fit, bearings };
+        if grown.fit.has_references {
+            return Ok(grown);
+        }
+        let retraced = grown.retraced();
+        Ok(retraced.ok().filter(|retraced| retraced.loss < grown.loss).unwrap_or(grown))
+    }
+
+    /// The solution about the poses that its constants lead to.
+    fn retraced(&self) -> Result<Self, CalibrateError> {
+        let mut fit = self.fit.clone();
+        fit.retrace()?;
+        let bearings = fit.settle()?;
+        Ok(Self { loss: fit.loss()?, fit, bearings })
     }
 
     /// Whether another start has ended in the same minimum, and the solution there is plausible.
@@ -108,7 +126,11 @@ impl Fit<'_> {
         Ok((state.constants.values, variances))
     }
 
-    fn finish(self, bearings: Option<Bearings>) -> Result<Calibration, CalibrateError> {
+    fn finish(
+        self,
+        bearings: Option<Bearings>,
+        wheel_noise: Estimated,
+    ) -> Result<Calibration, CalibrateError> {
         let covariance = covariance(&self.problem, &self.state).map_err(SolveError::from)?;
         let distances = &self.problem.chain.distances;
         let distance = distances.last().copied().unwrap_or(0.0);
@@ -146,6 +168,7 @@ impl Fit<'_> {
             constants: self.state.constants,
             bearings,
             noise: self.problem.noise,
+            wheel_noise,
             trajectory: trajectory.collect(),
             residuals: self.residuals(),
             inliers,

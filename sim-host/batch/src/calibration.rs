@@ -7,6 +7,7 @@ use crate::constants::{Constants, Name};
 use crate::problem::Noise;
 use crate::recording::RecordingError;
 use crate::solve::SolveError;
+use crate::wheel_noise::Estimated;
 
 /// The robot as its file describes it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -139,6 +140,8 @@ pub struct Calibration {
     pub bearings: Option<Bearings>,
     /// Noises of the inliers.
     pub noise: Noise,
+    /// The noise of the wheels, with its parts and intervals.
+    pub wheel_noise: Estimated,
     /// Smoothed poses: time, pose, standard deviations.
     pub trajectory: Vec<(f64, Vector3<f64>, Vector3<f64>)>,
     /// Residuals of the associated ranges.

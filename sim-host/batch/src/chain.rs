@@ -59,6 +59,15 @@ pub struct Covariance {
     pub constants: DMatrix<f64>,
 }
 
+/// The minimum of the quadratic cost whose normal equations these are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Minimum {
+    /// How much lower the cost is there than where the equations were linearized.
+    pub decrease: f64,
+    /// Natural logarithm of the determinant of the matrix.
+    pub log_determinant: f64,
+}
+
 struct Eliminated {
     /// Inverses of the pivots.
     inverse: Vec<Matrix3<f64>>,
@@ -89,6 +98,10 @@ impl Normal {
     /// [`Singular`].
     pub fn solve(&self, damping: f64) -> Result<Step, Singular> {
         let done = self.eliminate(damping)?;
+        Ok(self.substitute(&done))
+    }
+
+    fn substitute(&self, done: &Eliminated) -> Step {
         let mut rhs = self.constants.clone();
         for (border, pose) in self.border.iter().zip(&done.poses) {
             rhs -= border.tr_mul(pose);
@@ -96,7 +109,7 @@ impl Normal {
         let constants = done.schur.solve(&rhs);
         let poses =
             done.poses.iter().zip(&done.border).map(|(pose, border)| pose - border * &constants);
-        Ok(Step { poses: poses.collect(), constants })
+        Step { poses: poses.collect(), constants }
     }
 
     /// The covariance: blocks of the inverse.
@@ -126,6 +139,20 @@ impl Normal {
             }
         }
         Ok(Covariance { poses, neighbours, cross, constants })
+    }
+
+    /// What the marginal likelihood needs of the equations.
+    ///
+    /// # Errors
+    /// [`Singular`].
+    pub fn minimum(&self) -> Result<Minimum, Singular> {
+        let done = self.eliminate(0.0)?;
+        let step = self.substitute(&done);
+        let of_poses: f64 = self.poses.iter().zip(&step.poses).map(|(one, by)| one.dot(by)).sum();
+        let decrease = 0.5 * (of_poses + self.constants.dot(&step.constants));
+        let pivots = done.inverse.iter().map(|inverse| -inverse.determinant().ln());
+        let log_determinant = pivots.sum::<f64>() + done.schur.ln_determinant();
+        Ok(Minimum { decrease, log_determinant })
     }
 
     fn eliminate(&self, damping: f64) -> Result<Eliminated, Singular> {
@@ -240,6 +267,10 @@ mod tests {
             }
             let exact = damped.cholesky().unwrap().solve(&rhs);
             let step = normal.solve(damping).unwrap();
+            let minimum = normal.minimum().unwrap();
+            let factor = dense.clone().cholesky().unwrap();
+            prop_assert!((minimum.log_determinant - factor.ln_determinant()).abs() < 1e-8);
+            prop_assert!((minimum.decrease - 0.5 * rhs.dot(&factor.solve(&rhs))).abs() < 1e-8);
             for i in 0..count {
                 prop_assert!((step.poses[i] - exact.fixed_rows::<3>(3 * i)).norm() < 1e-8);
             }

@@ -2,7 +2,7 @@
 //! belong to each.
 
 use crate::odometry::Travel;
-use crate::recording::{Reading, Recording, RecordingError, StartPose};
+use crate::recording::{Ping, Reading, Recording, RecordingError, StartPose};
 
 /// When a new pose begins.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -11,11 +11,15 @@ pub struct Spacing {
     pub travel: f64,
     /// After this difference of the wheels' travel, metres.
     pub turn: f64,
+    /// At each echo, too. Otherwise the noise of the wheels between a pose and an echo counts as noise of the range.
+    pub at_echoes: bool,
 }
 
 impl Spacing {
     /// That of a calibration; the turn is about 10° of a small robot.
-    pub const CALIBRATION: Self = Self { travel: 0.05, turn: 0.02 };
+    pub const CALIBRATION: Self = Self { travel: 0.05, turn: 0.02, at_echoes: false };
+    /// The same with a pose at each echo.
+    pub const AT_ECHOES: Self = Self { at_echoes: true, ..Self::CALIBRATION };
 }
 
 /// Something that happened at a time between two poses.
@@ -49,7 +53,10 @@ impl Chain {
     ///
     /// # Errors
     /// [`RecordingError`] of the first defect.
-    pub fn of(recording: &Recording) -> Result<(Self, StartPose), RecordingError> {
+    pub fn of(
+        recording: &Recording,
+        spacing: Spacing,
+    ) -> Result<(Self, StartPose), RecordingError> {
         recording.check()?;
         let start = match (recording.start, recording.references.first()) {
             (Some(start), _) => start,
@@ -58,7 +65,7 @@ impl Chain {
             }
             (None, None) => return Err(RecordingError::NoStart),
         };
-        let chain = Self::build(recording, start.time, Spacing::CALIBRATION)
+        let chain = Self::build(recording, start.time, spacing)
             .ok_or(RecordingError::NoTravel)?;
         Ok((chain, start))
     }
@@ -73,39 +80,21 @@ impl Chain {
         if readings.len() < 2 {
             return None;
         }
-        let mut chain = Self::default();
         let mut pings = recording.pings.iter().enumerate().peekable();
         while pings.next_if(|(_, ping)| ping.time < begin.time).is_some() {}
-        chain.times.push(begin.time);
-        chain.distances.push(0.0);
-        chain.turns.push(0.0);
-        let mut steps: Vec<Travel> = Vec::new();
-        let (mut distance, mut turns) = (0.0, 0.0);
+        let mut builder = Builder::new(begin.time, spacing);
         for (one, next) in readings.iter().zip(readings.iter().skip(1)) {
+            let mut passed = 0.0;
             while let Some((index, ping)) = pings.next_if(|(_, ping)| ping.time < next.time) {
-                let mut part = steps.clone();
-                push(&mut part, travel(one, next, (ping.time - one.time) / (next.time - one.time)));
-                chain.pings.push(Event { index, pose: chain.times.len() - 1, steps: part });
+                let share = (ping.time - one.time) / (next.time - one.time);
+                builder.roll(travel(one, next, share - passed));
+                passed = share;
+                builder.ping(index, ping);
             }
-            let step = travel(one, next, 1.0);
-            push(&mut steps, step);
-            let [right, left] = step;
-            distance += f64::midpoint(right.abs(), left.abs());
-            turns += (right - left).abs();
-            let sum = |of: fn(&Travel) -> f64| steps.iter().map(of).sum::<f64>().abs();
-            let long = sum(|[right, left]| f64::midpoint(*right, *left)) >= spacing.travel;
-            let is_last = next.time >= end.time;
-            if long
-                || sum(|[right, left]| right - left) >= spacing.turn
-                || (is_last && !steps.is_empty())
-            {
-                chain.edges.push(std::mem::take(&mut steps));
-                chain.times.push(next.time);
-                chain.distances.push(distance);
-                chain.turns.push(turns);
-            }
+            builder.roll(travel(one, next, 1.0 - passed));
+            builder.read(next.time, next.time >= end.time);
         }
-        Some(chain)
+        Some(builder.chain)
     }
 
     /// Number of poses.
@@ -118,6 +107,58 @@ impl Chain {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.times.is_empty()
+    }
+}
+
+/// A chain that grows.
+struct Builder {
+    chain: Chain,
+    spacing: Spacing,
+    /// Travel since the last pose.
+    steps: Vec<Travel>,
+    distance: f64,
+    turns: f64,
+}
+
+impl Builder {
+    fn new(begin: f64, spacing: Spacing) -> Self {
+        let chain =
+            Chain { times: vec![begin], distances: vec![0.0], turns: vec![0.0], ..Chain::default() };
+        Self { chain, spacing, steps: Vec::new(), distance: 0.0, turns: 0.0 }
+    }
+
+    /// The wheels roll.
+    fn roll(&mut self, step: Travel) {
+        push(&mut self.steps, step);
+        let [right, left] = step;
+        self.distance += f64::midpoint(right.abs(), left.abs());
+        self.turns += (right - left).abs();
+    }
+
+    /// A ping here.
+    fn ping(&mut self, index: usize, ping: &Ping) {
+        if self.spacing.at_echoes && ping.range.is_some() && !self.steps.is_empty() {
+            self.end_edge(ping.time);
+        }
+        let pose = self.chain.times.len() - 1;
+        self.chain.pings.push(Event { index, pose, steps: self.steps.clone() });
+    }
+
+    /// A reading of the encoders here: a new pose if it is far from the last, or the end of the recording.
+    fn read(&mut self, time: f64, is_last: bool) {
+        let sum = |of: fn(&Travel) -> f64| self.steps.iter().map(of).sum::<f64>().abs();
+        let is_long = sum(|[right, left]| f64::midpoint(*right, *left)) >= self.spacing.travel;
+        let has_turned = sum(|[right, left]| right - left) >= self.spacing.turn;
+        if is_long || has_turned || (is_last && !self.steps.is_empty()) {
+            self.end_edge(time);
+        }
+    }
+
+    fn end_edge(&mut self, time: f64) {
+        self.chain.edges.push(std::mem::take(&mut self.steps));
+        self.chain.times.push(time);
+        self.chain.distances.push(self.distance);
+        self.chain.turns.push(self.turns);
     }
 }
 

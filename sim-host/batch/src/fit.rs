@@ -1,12 +1,11 @@
 //! The estimation in progress.
 //!
-//! A loss that forgets outliers has wrong minima, whose likelihood can be higher than that of the right one. The estimate
-//! therefore grows. A window from the start is extended by at most 15 % of its length, so that it predicts the poses beyond
-//! it. In three rounds its pings are associated again with the reflectors, each round with a narrower kernel.
+//! The window of the estimate grows over the recording (`growth`). In three rounds its pings are associated again with the
+//! reflectors, each round with a narrower kernel.
 
 #![expect(clippy::indexing_slicing, reason = "matches have the length of the chain")]
 
-use std::ops::Range;
+use nalgebra::Vector3;
 
 use crate::bearings::{self, Bearings, WallPing};
 use crate::calibration::{
@@ -16,18 +15,18 @@ use crate::chain::Covariance;
 use crate::chain_of_poses::Chain;
 use crate::constants::{Constants, Name, Priors};
 use crate::noise;
-use crate::odometry::{compose, integrate, turned, wrap};
-use crate::problem::{PosePrior, Problem, State};
+use crate::odometry::{WheelNoise, turned, wrap};
+use crate::problem::{Noise, PosePrior, Problem, State};
 use crate::recording::{Recording, StartPose};
 use crate::reflector::{Gate, Reflector, associate};
 use crate::solve::{SolveError, covariance, solve};
 use crate::wall::sonar;
+use crate::wheel_noise;
 
 /// Shortest drive, metres.
 const SHORTEST: f64 = 3.0;
-/// Largest noise of a wheel: as a multiple of the robot file's, and of at least 4 mm/√m.
-const NOISIEST: f64 = 3.0;
-const NOISE_FLOOR: f64 = 0.004;
+/// Largest noise of a wheel, m/√m: twice that of a bad floor.
+const NOISIEST: f64 = 0.04;
 /// Standard deviations of the wheel difference and of the relative track width below which straight legs separate them
 /// even if the robot turns to one side only.
 const SEPARATE: [f64; 2] = [0.003, 0.01];
@@ -37,7 +36,7 @@ const IMPLAUSIBLE: f64 = 3.0;
 const SAME_WHEELS: f64 = 0.005;
 
 /// Gate of the association, metres, and the same as the kernel's width; narrowed in rounds.
-const ROUNDS: [f64; 3] = [0.30, 0.15, 0.08];
+pub(crate) const ROUNDS: [f64; 3] = [0.30, 0.15, 0.08];
 /// Largest innovation of an echo that is associated, in its standard deviations.
 const COMPATIBLE: f64 = 4.0;
 /// Angle off the axis at which an echo can still be a reflector's, radians: servo and mount may be wrong by 15°.
@@ -55,9 +54,12 @@ pub(crate) struct Start {
     pub(crate) bearing: f64,
     /// Difference of the wheels' scales; `None`: only the prior bounds it.
     pub(crate) wheel_difference: Option<f64>,
+    /// Least noise of the wheels that the growth assumes at first, m/√m.
+    pub(crate) wheel_noise: f64,
 }
 
 /// The estimation in progress.
+#[derive(Clone)]
 pub(crate) struct Fit<'a> {
     pub(crate) problem: Problem<'a>,
     pub(crate) state: State,
@@ -69,7 +71,7 @@ pub(crate) struct Fit<'a> {
     /// Whether wheel difference and track width are not separated.
     pub(crate) is_joint: bool,
     /// Priors of the constants once the window is the whole recording.
-    priors: Priors,
+    pub(crate) priors: Priors,
 }
 
 impl<'a> Fit<'a> {
@@ -123,6 +125,8 @@ impl<'a> Fit<'a> {
     /// recording: the first step would otherwise return to the mean of the prior.
     pub(crate) fn start_from(&mut self, start: Start) {
         self.state.constants.bearing_offset = start.bearing;
+        let noise = start.wheel_noise.max(self.nominal.noise.wheel.turn);
+        self.problem.noise.wheel = WheelNoise::independent(noise);
         if let Some(difference) = start.wheel_difference {
             for (name, share) in [(Name::Right, 0.5), (Name::Left, -0.5)] {
                 self.state.constants.set(name, share * difference);
@@ -141,6 +145,11 @@ impl<'a> Fit<'a> {
             self.grow()?;
         }
         self.separate()?;
+        self.settle()
+    }
+
+    /// Estimates bearings and noises about the poses so far.
+    pub(crate) fn settle(&mut self) -> Result<Option<Bearings>, CalibrateError> {
         let mut bearings = None;
         if self.has_ranges {
             for _ in 0..2 {
@@ -150,33 +159,6 @@ impl<'a> Fit<'a> {
         }
         self.fit_noise()?;
         Ok(bearings)
-    }
-
-    /// Grows the window over the whole recording: by a share of the distance and of the turns in it, because those
-    /// determine how well the motion beyond is predicted.
-    fn grow(&mut self) -> Result<(), CalibrateError> {
-        const GROWTH: f64 = 0.15;
-        const DISTANCE: f64 = 0.08;
-        // 20° of a robot with a track width of 12 cm.
-        let turn = 0.35 * self.nominal.track_width;
-        let chain = self.problem.chain;
-        let count = chain.len();
-        let mut known = 1;
-        while known < count {
-            let until = |values: &[f64], least: f64| {
-                let reached = values[known - 1];
-                let limit = reached + least.max(GROWTH * reached);
-                values.partition_point(|&value| value <= limit)
-            };
-            let end = until(&chain.distances, DISTANCE).min(until(&chain.turns, turn));
-            let end = end.max(known + 1).min(count);
-            self.predict(known..end);
-            self.problem.window = 0..end;
-            known = end;
-            self.refine(&ROUNDS)?;
-        }
-        self.problem.priors = self.priors;
-        self.refine(&[ROUNDS[1], ROUNDS[2], ROUNDS[2]])
     }
 
     /// Starts at the poses of the reference stream, and between and beyond them by odometry.
@@ -213,19 +195,8 @@ impl<'a> Fit<'a> {
         self.refine(&[ROUNDS[1], ROUNDS[2]])
     }
 
-    /// Predicts poses by odometry from the one before.
-    fn predict(&mut self, poses: Range<usize>) {
-        let drive = self.state.constants.drive();
-        for i in poses {
-            let motion = integrate(&self.problem.chain.edges[i - 1], &drive);
-            let (mut pose, _) = compose(&self.state.poses[i - 1], &motion.pose);
-            pose.z = wrap(pose.z);
-            self.state.poses[i] = pose;
-        }
-    }
-
     /// Associates and solves, once for each gate.
-    fn refine(&mut self, gates: &[f64]) -> Result<(), CalibrateError> {
+    pub(crate) fn refine(&mut self, gates: &[f64]) -> Result<(), CalibrateError> {
         const ITERATIONS: usize = 8;
         let covariance = covariance(&self.problem, &self.state).map_err(SolveError::from)?;
         for &gate in gates {
@@ -269,7 +240,7 @@ impl<'a> Fit<'a> {
     }
 
     /// Estimates the line of the bearings from answers and missing answers of isolated walls.
-    fn fit_bearings(&mut self) -> Option<Bearings> {
+    pub(crate) fn fit_bearings(&mut self) -> Option<Bearings> {
         const ENOUGH: f64 = 0.02;
         if !self.nominal.has_servo {
             return None;
@@ -343,6 +314,30 @@ impl<'a> Fit<'a> {
         Ok(())
     }
 
+    /// Continues with a chain that has a pose at each echo, and estimates the noises there.
+    pub(crate) fn finish_at_echoes(
+        &mut self,
+        chain: &'a Chain,
+    ) -> Result<wheel_noise::Estimated, CalibrateError> {
+        self.state.poses = interpolated(self.problem.chain, &self.state.poses, &chain.times);
+        self.problem.chain = chain;
+        self.problem.window = 0..chain.len();
+        for _ in 0..2 {
+            solve(&self.problem, &mut self.state, 10)?;
+            let covariance = covariance(&self.problem, &self.state).map_err(SolveError::from)?;
+            if self.has_ranges {
+                self.associate(self.gate(), &covariance);
+            }
+            let wheel = wheel_noise::of_wheels(&self.problem, &self.state)?.value;
+            self.problem.noise = Noise {
+                wheel: WheelNoise::independent(wheel),
+                ..noise::estimate(&self.problem, &self.state, &covariance)
+            };
+        }
+        solve(&self.problem, &mut self.state, 10)?;
+        Ok(wheel_noise::estimate(&self.problem, &self.state)?)
+    }
+
     /// The final gate: eight deviations, at least 5 cm.
     fn gate(&self) -> f64 {
         (8.0 * self.problem.noise.of_range(1.0)).clamp(0.05, 0.3)
@@ -382,18 +377,18 @@ impl<'a> Fit<'a> {
         term.is_some_and(|term| term.residual.abs() <= noise::INLIER * term.deviation)
     }
 
-    /// Negative logarithm of the likelihood with the noises of the robot file, for the comparison of solutions: those noises are the
-    /// same for all, and an echo without a reflector costs as much as one far from it.
-    pub(crate) fn loss(&self) -> f64 {
+    /// Negative logarithm of the marginal likelihood, for the comparison of solutions: with the noise of the wheels that each has, and
+    /// the other noises of the robot file, which are the same for all. An echo without a reflector costs as much as one far from it.
+    pub(crate) fn loss(&self) -> Result<f64, SolveError> {
         let mut problem = self.problem.clone();
-        problem.noise = self.nominal.noise;
+        problem.noise = Noise { wheel: problem.noise.wheel, ..self.nominal.noise };
         problem.kernel = noise::INLIER;
         let unmatched = problem.chain.pings.iter().zip(&problem.matches).filter(|(event, of)| {
             of.is_none() && problem.recording.pings[event.index].range.is_some()
         });
         #[expect(clippy::cast_precision_loss, reason = "numbers of pings")]
         let unmatched = unmatched.count() as f64;
-        problem.linearize(&self.state).1 + unmatched * 0.5 * problem.kernel.powi(2)
+        Ok(problem.marginal(&self.state)? + unmatched * 0.5 * problem.kernel.powi(2))
     }
 
     pub(crate) fn check(&self) -> Result<(), CalibrateError> {
@@ -415,11 +410,27 @@ impl<'a> Fit<'a> {
                 return Err(CalibrateError::Implausible(name));
             }
         }
-        let wheel = self.problem.noise.wheel;
-        if wheel > NOISIEST * self.nominal.noise.wheel.max(NOISE_FLOOR) {
+        let wheel = self.problem.noise.wheel.turn;
+        if wheel > NOISIEST.max(self.nominal.noise.wheel.turn) {
             Err(CalibrateError::NoisyWheels(wheel * 1e3))
         } else {
             Ok(())
         }
     }
+}
+
+/// The poses of a chain at other times within it, in order.
+fn interpolated(chain: &Chain, poses: &[Vector3<f64>], times: &[f64]) -> Vec<Vector3<f64>> {
+    let at = |time: &f64| {
+        let next = chain.times.partition_point(|other| other < time).min(poses.len() - 1);
+        let one = next.saturating_sub(1);
+        let span = chain.times[next] - chain.times[one];
+        let share = if span > 0.0 { (time - chain.times[one]) / span } else { 1.0 };
+        let mut by = poses[next] - poses[one];
+        by.z = wrap(by.z);
+        let mut pose = poses[one] + by * share;
+        pose.z = wrap(pose.z);
+        pose
+    };
+    times.iter().map(at).collect()
 }

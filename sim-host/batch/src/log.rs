@@ -14,6 +14,7 @@ use sonarfix::config::{PingSchedule, RangerId};
 use sonarfix::geometry::units::Radians;
 
 use crate::calibration::Nominal;
+use crate::odometry::WheelNoise;
 use crate::problem::Noise;
 use crate::recording::{Ping, Reading, Recording, ReferencePose, StartPose};
 
@@ -56,7 +57,7 @@ pub fn nominal(robot: &RobotConfig, has_servo: bool) -> Nominal {
         mount: [x.0.into(), y.0.into()],
         reach: [sonar.min_range.0.into(), sonar.max_range.0.into()],
         noise: Noise {
-            wheel: f64::from(drive.wheel_noise.0.0).max(1e-4),
+            wheel: WheelNoise::independent(f64::from(drive.wheel_noise.0.0).max(1e-4)),
             range: f64::from(sonar.noise.floor.0).max(1e-4),
             range_per_metre: sonar.noise.per_metre.into(),
             position,

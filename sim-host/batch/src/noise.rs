@@ -8,6 +8,7 @@
 )]
 
 use crate::chain::Covariance;
+use crate::odometry::WheelNoise;
 use crate::problem::{Noise, Problem, State};
 
 /// Residuals beyond this many deviations are outliers.
@@ -43,7 +44,7 @@ pub fn estimate(problem: &Problem, state: &State, covariance: &Covariance) -> No
     let range = ranges(problem, state, covariance).factor();
     let [position, heading] = references(problem, state, covariance).map(|group| group.factor());
     Noise {
-        wheel: (noise.wheel * wheel).clamp(1e-5, 0.1),
+        wheel: WheelNoise::independent((noise.wheel.turn * wheel).clamp(1e-5, 0.1)),
         range: (noise.range * range).clamp(2e-4, 0.2),
         range_per_metre: noise.range_per_metre * range,
         position: (noise.position * position).clamp(1e-5, 1.0),

@@ -2,7 +2,7 @@
 
 #![expect(clippy::indexing_slicing, reason = "matrices of a fixed size")]
 
-use nalgebra::{Matrix3, Matrix3x2, Vector3};
+use nalgebra::{Matrix3, Vector3};
 
 /// Wheel travel of one encoder interval, right and left, metres by the nominal wheels.
 pub type Travel = [f64; 2];
@@ -20,6 +20,61 @@ pub struct Drive {
     pub track: f64,
 }
 
+/// Noise of the wheels' travel, metres per square root of a metre. Each part is the noise that two independent wheels have whose
+/// distance, or whose turns, are as noisy; with independent wheels both are equal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WheelNoise {
+    /// That of the distance: the mean of both wheels.
+    pub distance: f64,
+    /// That of the turns: the difference of both wheels.
+    pub turn: f64,
+}
+
+impl WheelNoise {
+    /// That of independent wheels.
+    #[must_use]
+    pub const fn independent(noise: f64) -> Self {
+        Self { distance: noise, turn: noise }
+    }
+}
+
+/// The covariance of a motion by the noise of the wheels: coefficients of the squares of both parts and of their product.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MotionNoise {
+    distance: Matrix3<f64>,
+    turn: Matrix3<f64>,
+    mixed: Matrix3<f64>,
+}
+
+impl MotionNoise {
+    /// That of no motion.
+    fn none() -> Self {
+        Self { distance: Matrix3::zeros(), turn: Matrix3::zeros(), mixed: Matrix3::zeros() }
+    }
+
+    /// The covariance with a noise of the wheels.
+    #[must_use]
+    pub fn covariance(&self, noise: WheelNoise) -> Matrix3<f64> {
+        let WheelNoise { distance, turn } = noise;
+        self.distance * distance.powi(2) + self.turn * turn.powi(2) + self.mixed * (distance * turn)
+    }
+
+    /// After a step that carries the motion so far, with the derivatives by distance and turn of each wheel times the root of
+    /// its travel.
+    fn after(&self, carry: &Matrix3<f64>, wheels: [[Vector3<f64>; 2]; 2]) -> Self {
+        let carried = |part: &Matrix3<f64>| carry * part * carry.transpose();
+        let [mut distance, mut turn, mut mixed] =
+            [&self.distance, &self.turn, &self.mixed].map(carried);
+        for [by_distance, by_turn] in wheels {
+            let cross = by_distance * by_turn.transpose();
+            distance += by_distance * by_distance.transpose();
+            turn += by_turn * by_turn.transpose();
+            mixed += cross + cross.transpose();
+        }
+        Self { distance, turn, mixed }
+    }
+}
+
 /// The motion over some encoder intervals, in the frame of its start.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
@@ -27,8 +82,8 @@ pub struct Motion {
     pub pose: Vector3<f64>,
     /// Its derivatives by the three relative errors (right, left, track).
     pub by_drive: Matrix3<f64>,
-    /// Its covariance for travel noise of 1 m/√m of each wheel.
-    pub covariance: Matrix3<f64>,
+    /// Its covariance.
+    pub noise: MotionNoise,
 }
 
 /// The motion between two poses of a trajectory as a residual, with its information and its derivatives by both poses.
@@ -45,13 +100,13 @@ pub struct Edge {
 }
 
 impl Motion {
-    /// Compares the motion with two poses. `wheel_noise` is the travel noise of each wheel, m/√m; `floor` are standard
-    /// deviations of x, y and heading that a step has besides. `None` if the covariance is singular.
+    /// Compares the motion with two poses. `floor` are standard deviations of x, y and heading that a step has besides the noise of
+    /// the wheels. `None` if the covariance is singular.
     #[must_use]
     pub fn between(
         &self,
         [from, to]: [&Vector3<f64>; 2],
-        wheel_noise: f64,
+        noise: WheelNoise,
         floor: [f64; 3],
     ) -> Option<Edge> {
         let (sin, cos) = from.z.sin_cos();
@@ -62,7 +117,7 @@ impl Motion {
         let mut by_from = -back;
         by_from[(0, 2)] = relative.y;
         by_from[(1, 2)] = -relative.x;
-        let mut covariance = self.covariance * wheel_noise.powi(2);
+        let mut covariance = self.noise.covariance(noise);
         for (k, floor) in floor.iter().enumerate() {
             covariance[(k, k)] += floor * floor;
         }
@@ -77,7 +132,7 @@ pub fn integrate(steps: &[Travel], drive: &Drive) -> Motion {
     let width = drive.track_width * (1.0 + drive.track);
     let mut pose: Vector3<f64> = Vector3::zeros();
     let mut by_drive = Matrix3::zeros();
-    let mut covariance = Matrix3::zeros();
+    let mut noise = MotionNoise::none();
     for &[nominal_right, nominal_left] in steps {
         let (right, left) =
             (nominal_right * (1.0 + drive.right), nominal_left * (1.0 + drive.left));
@@ -91,20 +146,23 @@ pub fn integrate(steps: &[Travel], drive: &Drive) -> Motion {
             let aside = 0.5 * chord * by_turn;
             Vector3::new(by_chord * cos - aside * sin, by_chord * sin + aside * cos, by_turn)
         };
-        let (by_right, by_left) = (column(0.5, 1.0 / width), column(0.5, -1.0 / width));
         let by_track = column(0.0, -turn / (1.0 + drive.track));
         let carry = Matrix3::new(1.0, 0.0, -chord * sin, 0.0, 1.0, chord * cos, 0.0, 0.0, 1.0);
-        let here =
-            Matrix3::from_columns(&[by_right * nominal_right, by_left * nominal_left, by_track]);
-        by_drive = carry * by_drive + here;
-        let noise = Matrix3x2::from_columns(&[
-            by_right * nominal_right.abs().sqrt(),
-            by_left * nominal_left.abs().sqrt(),
+        let (by_distance, by_turn) = (column(0.5, 0.0), column(0.0, 1.0 / width));
+        let here = Matrix3::from_columns(&[
+            (by_distance + by_turn) * nominal_right,
+            (by_distance - by_turn) * nominal_left,
+            by_track,
         ]);
-        covariance = carry * covariance * carry.transpose() + noise * noise.transpose();
+        by_drive = carry * by_drive + here;
+        let (of_right, of_left) = (nominal_right.abs().sqrt(), nominal_left.abs().sqrt());
+        noise = noise.after(
+            &carry,
+            [[by_distance * of_right, by_turn * of_right], [by_distance * of_left, by_turn * -of_left]],
+        );
         pose += Vector3::new(chord * cos, chord * sin, turn);
     }
-    Motion { pose, by_drive, covariance }
+    Motion { pose, by_drive, noise }
 }
 
 /// A pose composed with a motion that starts there, and the derivative by the motion.
@@ -187,6 +245,18 @@ mod tests {
         assert!((motion.pose.z - std::f64::consts::TAU).abs() < 1e-9);
         let rolled = std::f64::consts::TAU;
         let heading = (0.56 * rolled + 0.44 * rolled) / 0.12_f64.powi(2);
-        assert!((motion.covariance[(2, 2)] - heading).abs() < 1e-6 * heading);
+        let covariance = motion.noise.covariance(WheelNoise::independent(1.0));
+        assert!((covariance[(2, 2)] - heading).abs() < 1e-6 * heading);
+    }
+
+    /// On a straight leg the noise of the distance is that along it, and the noise of the turns that of the heading.
+    #[test]
+    fn a_straight_leg_separates_the_noises_of_distance_and_turns() {
+        let steps = vec![[0.01, 0.01]; 100];
+        let noise = integrate(&steps, &drive(0.0, 0.0, 0.0)).noise;
+        let covariance = noise.covariance(WheelNoise { distance: 0.02, turn: 0.003 });
+        assert!((covariance[(0, 0)] - 0.02_f64.powi(2) / 2.0).abs() < 1e-12);
+        assert!((covariance[(2, 2)] - 2.0 * (0.003_f64 / 0.12).powi(2)).abs() < 1e-12);
+        assert!(covariance[(0, 2)].abs() < 1e-12);
     }
 }

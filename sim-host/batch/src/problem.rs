@@ -9,10 +9,10 @@ use std::ops::Range;
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector2, Vector3};
 
-use crate::chain::{Covariance, Normal};
+use crate::chain::{Covariance, Minimum, Normal, Singular};
 use crate::chain_of_poses::{Chain, Event};
 use crate::constants::{COUNT, Constants, Name, Priors};
-use crate::odometry::{Edge, compose, integrate, wrap};
+use crate::odometry::{Edge, WheelNoise, compose, integrate, wrap};
 use crate::recording::{Recording, ReferencePose};
 use crate::reflector::Reflector;
 use crate::wall::sonar;
@@ -22,16 +22,17 @@ pub type Row = SVector<f64, COUNT>;
 /// Derivatives of a pose residual by the constants.
 pub type Rows = SMatrix<f64, 3, COUNT>;
 
-/// Lateral and other noise of an edge that does not come from the wheels, metres and radians.
-const EDGE_FLOOR: [f64; 3] = [1e-4, 1e-4, 1e-4];
+/// Noise of an edge that does not come from the wheels: ahead, aside (metres) and of the heading (radians). It keeps the
+/// covariance of a single step regular, and must be far below the noise of good wheels on the shortest edges.
+const EDGE_FLOOR: [f64; 3] = [2e-5, 1e-4, 2e-5];
 /// Normalized edge residual beyond which it counts linearly (Huber), so that a slip does not bend the rest.
 const HUBER: f64 = 4.0;
 
 /// Standard deviations of the measurements.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
-    /// Of a wheel's travel, metres per square root of a metre.
-    pub wheel: f64,
+    /// Of the wheels' travel.
+    pub wheel: WheelNoise,
     /// Of a range, metres, at zero range.
     pub range: f64,
     /// Its growth with the range.
@@ -282,6 +283,21 @@ impl Problem<'_> {
         }
         self.fix(&mut normal);
         (normal, cost)
+    }
+
+    /// Negative logarithm of the likelihood of the recording by the noises, up to a constant: poses and constants are integrated
+    /// out by Laplace's method (Tierney and Kadane 1986) about the minimum of the cost near a state. For a linear problem this
+    /// is the likelihood of the innovations of a Kalman filter (Schweppe 1965).
+    ///
+    /// # Errors
+    /// [`Singular`].
+    pub fn marginal(&self, state: &State) -> Result<f64, Singular> {
+        let (normal, cost) = self.linearize(state);
+        let Minimum { decrease, log_determinant } = normal.minimum()?;
+        let edges = self.window.start..self.window.end.saturating_sub(1);
+        let informations = edges.filter_map(|i| self.edge_term(state, i)).map(|term| term.information);
+        let of_edges: f64 = informations.map(|information| information.determinant().ln()).sum();
+        Ok(cost - decrease + 0.5 * (log_determinant - of_edges))
     }
 
     /// The weight of a range, and its share of the cost (Geman–McClure).

@@ -13,6 +13,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use sonarfix_batch::calibrate::{CalibrateError, Calibration, Determined, Nominal, calibrate};
 use sonarfix_batch::constants::Name;
+use sonarfix_batch::odometry::WheelNoise;
 use sonarfix_batch::problem::Noise;
 use sonarfix_batch::recording::{
     Ping, Reading, Recording, RecordingError, ReferencePose, StartPose,
@@ -25,7 +26,7 @@ const NOMINAL: Nominal = Nominal {
     mount: [0.06, 0.0],
     reach: [0.1, 3.5],
     noise: Noise {
-        wheel: 0.003,
+        wheel: WheelNoise::independent(0.003),
         range: 0.003,
         range_per_metre: 0.001,
         position: 0.005,

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::Vector3;
 use sonarfix_batch::calibrate::{Calibration, Determined, Nominal, calibrate};
 use sonarfix_batch::constants::Name;
+use sonarfix_batch::odometry::WheelNoise;
 use sonarfix_batch::problem::Noise;
 use sonarfix_batch::recording::{Reading, Recording, ReferencePose};
 
@@ -29,7 +30,7 @@ const NOMINAL: Nominal = Nominal {
     mount: [0.0, 0.0],
     reach: [0.0, 1.0],
     noise: Noise {
-        wheel: 0.001,
+        wheel: WheelNoise::independent(0.001),
         range: 0.01,
         range_per_metre: 0.0,
         position: 0.002,

@@ -11,7 +11,7 @@ use nalgebra::{Matrix3, Matrix3x2, Vector2, Vector3};
 use sonarfix_batch::calibration::Nominal;
 use sonarfix_batch::chain::Normal;
 use sonarfix_batch::chain_of_poses::{Chain, Event};
-use sonarfix_batch::odometry::{Drive, Edge, compose, integrate, wrap};
+use sonarfix_batch::odometry::{Drive, Edge, WheelNoise, compose, integrate, wrap};
 use sonarfix_batch::recording::Recording;
 
 use crate::line::Line;
@@ -49,8 +49,8 @@ pub struct Robot {
     pub track_width: f64,
     /// Nominal position of the sonar: ahead, left, metres.
     pub mount: [f64; 2],
-    /// Noise of a wheel's travel, m/√m.
-    pub wheel_noise: f64,
+    /// Noise of the wheels' travel.
+    pub wheel_noise: WheelNoise,
     /// Shortest and longest range, metres.
     pub reach: [f64; 2],
 }

@@ -142,9 +142,8 @@ impl<'a> Track<'a> {
         let of_track = by.column(2) * spread[TRACK].1;
         self.covariances[k] = carry * self.covariances[k - 1] * carry.transpose()
             + rotation
-                * motion.covariance
+                * motion.noise.covariance(self.problem.robot.wheel_noise)
                 * rotation.transpose()
-                * self.problem.robot.wheel_noise.powi(2)
             + of_difference * of_difference.transpose()
             + of_track * of_track.transpose();
         self.known = k + 1;

@@ -87,7 +87,7 @@ proptest! {
             chain: &chain,
             reflectors: &reflectors,
             matches: vec![Some(0); chain.pings.len()],
-            noise: Noise { wheel: 0.01, range: 0.01, range_per_metre: 0.0, position: 0.01, heading: 0.01 },
+            noise: Noise { wheel: WheelNoise::independent(0.01), range: 0.01, range_per_metre: 0.0, position: 0.01, heading: 0.01 },
             priors: Priors::fixed_at(&constants),
             window: 0..chain.len(),
             first: PosePrior { pose, position: 0.1, heading: 0.1 },

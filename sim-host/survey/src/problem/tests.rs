@@ -1,5 +1,6 @@
 use proptest::prelude::*;
 use sonarfix_batch::chain_of_poses::Spacing;
+use sonarfix_batch::odometry::WheelNoise;
 use sonarfix_batch::recording::{Ping, Reading};
 
 use super::*;
@@ -45,10 +46,10 @@ proptest! {
         constants in prop::array::uniform7(-0.01..0.01_f64),
     ) {
         let recording = recording(&steps, &bearings);
-        let spacing = Spacing { travel: 0.2, turn: 0.03 };
+        let spacing = Spacing { travel: 0.2, turn: 0.03, at_echoes: false };
         let chain = Chain::build(&recording, 0.0, spacing).unwrap();
         let robot =
-            Robot { track_width: 0.12, mount: [0.06, 0.01], wheel_noise: 3e-3, reach: [0.1, 3.0] };
+            Robot { track_width: 0.12, mount: [0.06, 0.01], wheel_noise: WheelNoise::independent(3e-3), reach: [0.1, 3.0] };
         let lines = vec![Line { angle: 0.02, offset: 1.2 }, Line { angle: 0.1, offset: 1.19 }];
         let mut noise = noise.into_iter().cycle();
         let mut state = State { poses: vec![Vector3::zeros(); chain.len()], constants, lines };

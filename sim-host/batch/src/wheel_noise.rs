@@ -1,0 +1,176 @@
+//! Estimates the noise of the wheels: the maximum of the marginal likelihood by its logarithm, and the curvature there.
+//!
+//! The minimum of the cost alone cannot determine it, because smoothed poses follow the ranges: the noise of the wheels would be
+//! too small, and zero the best. The marginal likelihood integrates the poses out ([`Problem::marginal`]).
+
+use nalgebra::{SMatrix, SVector};
+
+use crate::odometry::WheelNoise;
+use crate::problem::{Problem, State};
+use crate::solve::{SolveError, solve};
+
+/// Ranges beyond this many deviations are left out. Nearer ones have their full weight: the weights of a robust loss take
+/// information from the normal ones, too, and the noise of the wheels would be too small.
+const OUTLIER: f64 = 4.0;
+/// A kernel so wide that the loss of a range is its square.
+const QUADRATIC: f64 = 1e3;
+/// Deviation of the logarithm of the noise by the prior around that of the robot file: a factor of ten.
+const PRIOR: f64 = 2.3;
+/// Deviation of the logarithms of its two parts by the prior around their common value: a factor of three.
+const PRIOR_OF_PARTS: f64 = 1.1;
+/// Half of a 95 % interval, in standard deviations.
+const INTERVAL: f64 = 1.96;
+
+/// A noise: its logarithm is normal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noisy {
+    /// The most likely value, m/√m.
+    pub value: f64,
+    /// Standard deviation of its natural logarithm.
+    pub deviation: f64,
+}
+
+impl Noisy {
+    /// The interval that has the true value with a probability of 95 %, m/√m.
+    #[must_use]
+    pub fn interval(&self) -> [f64; 2] {
+        let factor = (INTERVAL * self.deviation).exp();
+        [self.value / factor, self.value * factor]
+    }
+}
+
+/// The estimated noise of the wheels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimated {
+    /// Of each wheel, if the wheels are independent.
+    pub wheel: Noisy,
+    /// Of the distance.
+    pub distance: Noisy,
+    /// Of the turns.
+    pub turn: Noisy,
+}
+
+/// Estimates the noise of each wheel at a solution.
+///
+/// # Errors
+/// [`SolveError`].
+pub fn of_wheels(problem: &Problem, state: &State) -> Result<Noisy, SolveError> {
+    Ok(Likelihood::at(problem, state)?.of_wheels()?.1)
+}
+
+/// Estimates the noise of the wheels and its parts at a solution.
+///
+/// # Errors
+/// [`SolveError`].
+pub fn estimate(problem: &Problem, state: &State) -> Result<Estimated, SolveError> {
+    let (likelihood, wheel) = Likelihood::at(problem, state)?.of_wheels()?;
+    let [distance, turn] = likelihood.of_parts(wheel.value)?;
+    Ok(Estimated { wheel, distance, turn })
+}
+
+/// The marginal likelihood by the noise of the wheels, about a solution.
+struct Likelihood<'a> {
+    problem: Problem<'a>,
+    state: State,
+}
+
+impl<'a> Likelihood<'a> {
+    fn at(problem: &Problem<'a>, state: &State) -> Result<Self, SolveError> {
+        let mut problem = problem.clone();
+        problem.kernel = QUADRATIC;
+        let is_inlier = |k: usize, reflector: usize| {
+            let term = problem.range_term(state, k, reflector);
+            term.is_some_and(|term| term.residual.abs() <= OUTLIER * term.deviation)
+        };
+        let matches = problem.matches.iter().enumerate();
+        let matches = matches.map(|(k, of)| of.filter(|reflector| is_inlier(k, *reflector)));
+        problem.matches = matches.collect();
+        Ok(Self { problem, state: state.clone() })
+    }
+
+    /// Negative logarithm with a noise.
+    fn negative(&self, wheel: WheelNoise) -> Result<f64, SolveError> {
+        let mut problem = self.problem.clone();
+        problem.noise.wheel = wheel;
+        Ok(problem.marginal(&self.state)?)
+    }
+
+    /// The maximum with independent wheels, and the likelihood about the solution there.
+    fn of_wheels(mut self) -> Result<(Self, Noisy), SolveError> {
+        const ROUNDS: usize = 3;
+        const SAME: f64 = 0.01;
+        let prior = self.problem.noise.wheel.turn.ln();
+        let mut wheel = Noisy { value: prior.exp(), deviation: PRIOR };
+        for _ in 0..ROUNDS {
+            solve(&self.problem, &mut self.state, 5)?;
+            let start = SVector::<f64, 1>::new(wheel.value.ln());
+            let (at, covariance) = maximum(start, |at| {
+                let loss = self.negative(WheelNoise::independent(at[0].exp()))?;
+                Ok(loss + 0.5 * ((at[0] - prior) / PRIOR).powi(2))
+            })?;
+            let change = (at[0] - start[0]).abs();
+            wheel = Noisy { value: at[0].exp(), deviation: covariance[(0, 0)].sqrt() };
+            self.problem.noise.wheel = WheelNoise::independent(wheel.value);
+            if change < SAME {
+                break;
+            }
+        }
+        Ok((self, wheel))
+    }
+
+    /// The maximum by both parts, about that with independent wheels.
+    fn of_parts(&self, wheel: f64) -> Result<[Noisy; 2], SolveError> {
+        let prior = wheel.ln();
+        let (at, covariance) = maximum(SVector::<f64, 2>::repeat(prior), |at| {
+            let loss = self.negative(WheelNoise { distance: at[0].exp(), turn: at[1].exp() })?;
+            Ok(loss + 0.5 * (at.add_scalar(-prior) / PRIOR_OF_PARTS).norm_squared())
+        })?;
+        let of = |k: usize| Noisy { value: at[k].exp(), deviation: covariance[(k, k)].sqrt() };
+        Ok([of(0), of(1)])
+    }
+}
+
+/// The minimum of a loss by logarithms of noises, and the inverse of its curvature there. Newton's method with differences.
+fn maximum<const N: usize>(
+    start: SVector<f64, N>,
+    loss: impl Fn(&SVector<f64, N>) -> Result<f64, SolveError>,
+) -> Result<(SVector<f64, N>, SMatrix<f64, N, N>), SolveError> {
+    const ITERATIONS: usize = 12;
+    const H: f64 = 0.05;
+    /// Longest step.
+    const STEP: f64 = 0.7;
+    const CONVERGED: f64 = 0.01;
+    let unit = |k: usize| SVector::<f64, N>::from_fn(|i, _| if i == k { H } else { 0.0 });
+    let mut at = start;
+    let mut covariance = SMatrix::<f64, N, N>::identity();
+    for _ in 0..ITERATIONS {
+        let here = loss(&at)?;
+        let mut gradient = SVector::<f64, N>::zeros();
+        let mut curvature = SMatrix::<f64, N, N>::zeros();
+        for i in 0..N {
+            let (more, less) = (loss(&(at + unit(i)))?, loss(&(at - unit(i)))?);
+            gradient[i] = (more - less) / (2.0 * H);
+            curvature[(i, i)] = (more + less - 2.0 * here) / (H * H);
+            for j in 0..i {
+                let corner = |a: f64, b: f64| loss(&(at + unit(i) * a + unit(j) * b));
+                let mixed = corner(1.0, 1.0)? + corner(-1.0, -1.0)? - corner(1.0, -1.0)? - corner(-1.0, 1.0)?;
+                curvature[(i, j)] = mixed / (4.0 * H * H);
+                curvature[(j, i)] = curvature[(i, j)];
+            }
+        }
+        // Far from the maximum the loss can be concave: along its gradient.
+        let step = match curvature.cholesky() {
+            Some(factor) => {
+                covariance = factor.inverse();
+                -factor.solve(&gradient)
+            }
+            None => -gradient,
+        };
+        let step = step * (STEP / step.norm().max(STEP));
+        at += step;
+        if step.norm() < CONVERGED {
+            break;
+        }
+    }
+    Ok((at, covariance))
+}
