@@ -31,6 +31,8 @@ const STARTS: [Start; 6] = [
 ];
 /// Difference of the losses of two starts that have ended in the same minimum.
 const SAME: f64 = 1.0;
+/// How often the poses are found again, at most, while this makes them more likely.
+const RETRACED: usize = 3;
 /// Assumed where a half alone has no solution.
 const UNKNOWN_SCATTER: f64 = 3.0;
 
@@ -90,8 +92,14 @@ impl<'a> Attempt<'a> {
         if grown.fit.has_references {
             return Ok(grown);
         }
-        let retraced = grown.retraced();
-        Ok(retraced.ok().filter(|retraced| retraced.loss < grown.loss).unwrap_or(grown))
+        let mut best = grown;
+        for _ in 0..RETRACED {
+            match best.retraced() {
+                Ok(next) if next.loss < best.loss - SAME => best = next,
+                _ => break,
+            }
+        }
+        Ok(best)
     }
 
     /// The solution about the poses that its constants lead to.

@@ -65,8 +65,7 @@ impl Chain {
             }
             (None, None) => return Err(RecordingError::NoStart),
         };
-        let chain = Self::build(recording, start.time, spacing)
-            .ok_or(RecordingError::NoTravel)?;
+        let chain = Self::build(recording, start.time, spacing).ok_or(RecordingError::NoTravel)?;
         Ok((chain, start))
     }
 
@@ -122,8 +121,12 @@ struct Builder {
 
 impl Builder {
     fn new(begin: f64, spacing: Spacing) -> Self {
-        let chain =
-            Chain { times: vec![begin], distances: vec![0.0], turns: vec![0.0], ..Chain::default() };
+        let chain = Chain {
+            times: vec![begin],
+            distances: vec![0.0],
+            turns: vec![0.0],
+            ..Chain::default()
+        };
         Self { chain, spacing, steps: Vec::new(), distance: 0.0, turns: 0.0 }
     }
 

@@ -97,7 +97,8 @@ impl Fit<'_> {
                 self.problem.priors = Priors::fixed_at(&self.state.constants);
                 self.problem.window = from - 1..to;
                 self.refine(&ROUNDS)?;
-                let covariance = covariance(&self.problem, &self.state).map_err(SolveError::from)?;
+                let covariance =
+                    covariance(&self.problem, &self.state).map_err(SolveError::from)?;
                 before = covariance.poses.last().map_or(before, deviations);
             }
             from = to;

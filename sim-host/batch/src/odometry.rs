@@ -158,7 +158,10 @@ pub fn integrate(steps: &[Travel], drive: &Drive) -> Motion {
         let (of_right, of_left) = (nominal_right.abs().sqrt(), nominal_left.abs().sqrt());
         noise = noise.after(
             &carry,
-            [[by_distance * of_right, by_turn * of_right], [by_distance * of_left, by_turn * -of_left]],
+            [
+                [by_distance * of_right, by_turn * of_right],
+                [by_distance * of_left, by_turn * -of_left],
+            ],
         );
         pose += Vector3::new(chord * cos, chord * sin, turn);
     }

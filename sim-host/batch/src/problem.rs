@@ -295,7 +295,8 @@ impl Problem<'_> {
         let (normal, cost) = self.linearize(state);
         let Minimum { decrease, log_determinant } = normal.minimum()?;
         let edges = self.window.start..self.window.end.saturating_sub(1);
-        let informations = edges.filter_map(|i| self.edge_term(state, i)).map(|term| term.information);
+        let informations =
+            edges.filter_map(|i| self.edge_term(state, i)).map(|term| term.information);
         let of_edges: f64 = informations.map(|information| information.determinant().ln()).sum();
         Ok(cost - decrease + 0.5 * (log_determinant - of_edges))
     }

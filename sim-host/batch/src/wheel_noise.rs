@@ -153,7 +153,9 @@ fn maximum<const N: usize>(
             curvature[(i, i)] = (more + less - 2.0 * here) / (H * H);
             for j in 0..i {
                 let corner = |a: f64, b: f64| loss(&(at + unit(i) * a + unit(j) * b));
-                let mixed = corner(1.0, 1.0)? + corner(-1.0, -1.0)? - corner(1.0, -1.0)? - corner(-1.0, 1.0)?;
+                let mixed = corner(1.0, 1.0)? + corner(-1.0, -1.0)?
+                    - corner(1.0, -1.0)?
+                    - corner(-1.0, 1.0)?;
                 curvature[(i, j)] = mixed / (4.0 * H * H);
                 curvature[(j, i)] = curvature[(i, j)];
             }

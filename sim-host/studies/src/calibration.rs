@@ -13,11 +13,13 @@ use sonarfix_batch::constants::Name;
 use sonarfix_batch::log;
 use sonarfix_batch::recording::Recording;
 use sonarfix_batch::wall::Wall;
-use sonarfix_map::{CLASSROOM, FileError, Scenario};
+use sonarfix_map::{CLASSROOM, FileError, Scenario, Upsets};
 use sonarfix_sim::progress::Progress;
 use sonarfix_sim::simulate::SimulationError;
 
 use crate::sweeping_robot::{Drive, drive};
+
+pub mod wheel_noise;
 
 /// The path: figures of eight of 8.8 m, with turns both ways.
 const PATH: &str = "start = [1.2, 0.7]
@@ -126,9 +128,19 @@ pub fn trials(
     errors: Errors,
     progress: &impl Progress,
 ) -> Result<Vec<Trial>, CalibrationStudyError> {
+    each_seed(first, count, progress, |seed| trial(seed, metres, errors))
+}
+
+/// Runs a trial for each seed in parallel; after an interruption those that have begun.
+fn each_seed<T: Send>(
+    first: u64,
+    count: u32,
+    progress: &impl Progress,
+    trial: impl Fn(u64) -> Result<T, CalibrationStudyError> + Sync,
+) -> Result<Vec<T>, CalibrationStudyError> {
     let seeds: Vec<u64> = (0..u64::from(count)).map(|n| first.wrapping_add(n)).collect();
     let run = |&seed: &u64| {
-        let trial = trial(seed, metres, errors);
+        let trial = trial(seed);
         progress.finished();
         trial
     };
@@ -140,7 +152,7 @@ pub fn trials(
 /// # Errors
 /// [`CalibrationStudyError`].
 pub fn trial(seed: u64, metres: f64, errors: Errors) -> Result<Trial, CalibrationStudyError> {
-    let robot = Simulated::new(seed, metres, errors)?;
+    let robot = Simulated::new(seed, metres, errors, None)?;
     Ok(Trial { seed, outcome: robot.calibrated().map(|found| robot.compare(&found)) })
 }
 
@@ -158,8 +170,13 @@ struct Simulated {
 }
 
 impl Simulated {
-    /// Simulates a drive.
-    fn new(seed: u64, metres: f64, errors: Errors) -> Result<Self, CalibrationStudyError> {
+    /// Simulates a drive; with a noise of the wheels, m/√m, its wheels have no other random error.
+    fn new(
+        seed: u64,
+        metres: f64,
+        errors: Errors,
+        wheel_noise: Option<f64>,
+    ) -> Result<Self, CalibrationStudyError> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0xCA11_B8A7);
         let errors = errors.drawn(&mut rng);
         let mut scenario = Scenario::parse(&text(metres), "classroom.toml", Path::new(""))?;
@@ -176,6 +193,10 @@ impl Simulated {
         true_robot.localizer.rangers.first.mount = Point::new(at.x.0 + mount, at.y.0 - mount);
         for pulse in &mut true_robot.rangers.first.servo_pulses {
             pulse.bearing = Radians(offset + scale * pulse.bearing.0);
+        }
+        if let Some(noise) = wheel_noise {
+            scenario.truth.wheel_noise = noise;
+            scenario.upsets = Upsets::default();
         }
         let track_width = scenario.truth.track_width;
         let (Drive { mut recording, .. }, simulation) = drive(scenario, robot, seed)?;

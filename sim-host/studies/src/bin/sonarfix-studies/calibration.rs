@@ -1,6 +1,6 @@
 //! `sonarfix-studies calibration`: the accuracy of `sonarfix calibrate` on simulated robots.
 
-use sonarfix_studies::calibration::{self, Errors};
+use sonarfix_studies::calibration::{self, Errors, wheel_noise};
 
 use sonarfix_terminal::progress::Runs;
 
@@ -18,11 +18,17 @@ pub struct Args {
     /// Wheels 10 % wrong instead of 3 % and 2 %.
     #[arg(long)]
     gross: bool,
+    /// True noises of the wheels, mm/√m: how exactly these are found, instead of the constants.
+    #[arg(long, value_delimiter = ',', value_name = "MM", conflicts_with = "gross")]
+    wheel_noise: Vec<f64>,
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
-    let errors = if args.gross { Errors::GROSS } else { Errors::BUILDER };
     anyhow::ensure!(args.runs > 0, "--runs must be at least 1");
+    if !args.wheel_noise.is_empty() {
+        return wheel_noises(args);
+    }
+    let errors = if args.gross { Errors::GROSS } else { Errors::BUILDER };
     let sets = u32::try_from(args.metres.len())?;
     let progress = Runs::new(args.runs.saturating_mul(sets));
     let mut rows = Vec::new();
@@ -35,5 +41,29 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     }
     progress.end()?;
     print!("{}", calibration::page(&rows));
+    Ok(())
+}
+
+/// The accuracy of the noise of the wheels.
+fn wheel_noises(args: &Args) -> anyhow::Result<()> {
+    let is_possible = |noise: &f64| (0.1..=40.0).contains(noise);
+    anyhow::ensure!(
+        args.wheel_noise.iter().all(is_possible),
+        "--wheel-noise must be 0.1 to 40 mm/√m"
+    );
+    let sets = u32::try_from(args.metres.len() * args.wheel_noise.len())?;
+    let progress = Runs::new(args.runs.saturating_mul(sets));
+    let mut rows = Vec::new();
+    for &metres in &args.metres {
+        for millimetres in &args.wheel_noise {
+            let truth = 1e-3 * millimetres;
+            let row = wheel_noise::trials(args.seed, args.runs, metres, truth, &progress)?;
+            if !row.outcomes.is_empty() {
+                rows.push(row);
+            }
+        }
+    }
+    progress.end()?;
+    print!("{}", wheel_noise::page(&rows));
     Ok(())
 }
