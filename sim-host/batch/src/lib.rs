@@ -17,9 +17,11 @@
 //! | [`chain`] | normal equations of a chain, their solution and covariance |
 //! | [`solve`] | Levenberg–Marquardt |
 //! | [`noise`] | noises from the residuals |
+//! | [`wheel_noise`] | noise of the wheels from the marginal likelihood |
 //! | [`bearings`] | bearings of the servo, from answers and missing answers |
 //! | [`calibration`] | what a calibration needs, and what it results in |
-//! | `fit` | windows, association, checks |
+//! | `fit` | association, checks |
+//! | `growth` | how the window grows |
 //! | [`calibrate`] | the calibration: attempts, intervals |
 //! | [`robot_edit`] | what was found, in the text of a robot file |
 //! | [`turned`] | a wheel that was turned by hand |

@@ -18,6 +18,8 @@ const QUADRATIC: f64 = 1e3;
 const PRIOR: f64 = 2.3;
 /// Deviation of the logarithms of its two parts by the prior around their common value: a factor of three.
 const PRIOR_OF_PARTS: f64 = 1.1;
+/// Deviation of the logarithm up to which a recording determines a noise: its interval then reaches from 0.4 to 2.7 times the value.
+const DETERMINED: f64 = 0.5;
 /// Half of a 95 % interval, in standard deviations.
 const INTERVAL: f64 = 1.96;
 
@@ -36,6 +38,12 @@ impl Noisy {
     pub fn interval(&self) -> [f64; 2] {
         let factor = (INTERVAL * self.deviation).exp();
         [self.value / factor, self.value * factor]
+    }
+
+    /// Whether the recording determines it.
+    #[must_use]
+    pub fn is_determined(&self) -> bool {
+        self.deviation <= DETERMINED
     }
 }
 

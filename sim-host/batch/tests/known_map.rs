@@ -34,6 +34,8 @@ const NOMINAL: Nominal = Nominal {
     },
     has_servo: true,
 };
+/// True noise of the wheels, m/√m.
+const WHEEL_NOISE: f64 = 0.002;
 const ROOM: [f64; 2] = [4.0, 3.5];
 
 fn walls() -> Vec<Wall> {
@@ -93,7 +95,7 @@ fn record(robot: &Robot, metres: f64, seed: u64) -> Recording {
             let arc = 0.5 * turn * WIDTH * (1.0 + robot.track);
             for (k, rolled) in [advance + arc, advance - arc].into_iter().enumerate() {
                 let nominal = rolled / (1.0 + robot.wheels[k]);
-                travel[k] += nominal + 0.002 * nominal.abs().sqrt() * normal();
+                travel[k] += nominal + WHEEL_NOISE * nominal.abs().sqrt() * normal();
             }
             recording.readings.push(Reading { time, travel });
             bearing += step;
@@ -164,6 +166,10 @@ fn intervals_contain_the_truth() {
             inside += u32::from(error.abs() <= 1.96 * deviation);
             assert!(error.abs() <= 4.5 * deviation, "seed {seed}, {name:?}: {error} ± {deviation}");
         }
+        let wheel = found.wheel_noise.wheel;
+        let error = (wheel.value / WHEEL_NOISE).ln();
+        assert!(error.abs() <= 4.5 * wheel.deviation, "seed {seed}: {wheel:?}");
+        assert!(wheel.deviation < 0.25, "seed {seed}: {wheel:?}");
         let bearings = found.bearings.unwrap();
         assert!(
             (bearings.offset - ROBOT.bearing).abs() < 4.0 * bearings.offset_deviation + 2e-3,

@@ -330,7 +330,11 @@ impl Survey {
 /// The chain of a recording: a pose every 20 cm or 15°.
 #[must_use]
 pub fn chain(recording: &Recording, from: f64, robot: &Robot) -> Option<Chain> {
-    Chain::build(recording, from, Spacing { travel: 0.2, turn: 0.26 * robot.track_width, at_echoes: false })
+    Chain::build(
+        recording,
+        from,
+        Spacing { travel: 0.2, turn: 0.26 * robot.track_width, at_echoes: false },
+    )
 }
 
 /// The map of a recording in its order. `known` is one more attempt: wheel difference and error of the track width.

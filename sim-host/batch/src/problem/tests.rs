@@ -1,3 +1,4 @@
+use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 
 use super::*;
@@ -114,5 +115,110 @@ proptest! {
             let residual = |state: &State| problem.reference_term(state, 1).unwrap().residual[row];
             check(&state, 1, &of_pose(&reference.by_pose), &of(&reference.by_constants), residual)?;
         }
+    }
+}
+
+/// A problem of some steps beside two walls, at the poses that odometry predicts.
+fn predicted<'a>(
+    recording: &'a Recording,
+    chain: &'a Chain,
+    reflectors: &'a [Reflector],
+) -> (Problem<'a>, State) {
+    let constants = Constants::nominal(0.12, [0.05, 0.01]);
+    let pose = Vector3::new(0.4, 0.3, 0.2);
+    let mut poses = vec![pose];
+    for edge in &chain.edges {
+        let motion = integrate(edge, &constants.drive());
+        poses.push(compose(poses.last().unwrap(), &motion.pose).0);
+    }
+    let noise = Noise {
+        wheel: WheelNoise::independent(0.006),
+        range: 0.002,
+        range_per_metre: 0.0,
+        position: 0.01,
+        heading: 0.01,
+    };
+    let problem = Problem {
+        recording,
+        chain,
+        reflectors,
+        matches: (0..chain.pings.len()).map(|k| Some(k % 2)).collect(),
+        noise,
+        priors: Priors::of_a_builder(&constants, true, false),
+        window: 0..chain.len(),
+        first: PosePrior { pose, position: 0.02, heading: 0.03 },
+        kernel: 1e6,
+    };
+    (problem, State { poses, constants })
+}
+
+/// Negative logarithm of the density of the ranges, without a constant, from their dense covariance: start pose, constants and the
+/// noise of each edge are independent, and poses and ranges are linear in them.
+fn dense_likelihood(problem: &Problem, state: &State) -> f64 {
+    let count = problem.chain.len();
+    let sources = 3 + COUNT + 3 * (count - 1);
+    let mut variances = DMatrix::zeros(sources, sources);
+    let PosePrior { position, heading, .. } = problem.first;
+    for (k, deviation) in [position, position, heading].into_iter().enumerate() {
+        variances[(k, k)] = deviation.powi(2);
+    }
+    for (k, deviation) in problem.priors.deviations.iter().enumerate() {
+        variances[(3 + k, 3 + k)] = deviation.powi(2);
+    }
+    let mut poses = vec![DMatrix::zeros(3, sources)];
+    poses[0].view_mut((0, 0), (3, 3)).fill_with_identity();
+    for i in 0..count - 1 {
+        let EdgeTerm { information, by_from, by_to, by_constants, .. } =
+            problem.edge_term(state, i).unwrap();
+        let at = 3 + COUNT + 3 * i;
+        variances.view_mut((at, at), (3, 3)).copy_from(&information.try_inverse().unwrap());
+        let mut next = -(by_from * &poses[i]);
+        let mut constants = next.view_mut((0, 3), (3, COUNT));
+        constants -= by_constants;
+        next.view_mut((0, at), (3, 3)).fill_with_identity();
+        poses.push(DMatrix::from_iterator(
+            3,
+            sources,
+            (by_to.try_inverse().unwrap() * next).iter().copied(),
+        ));
+    }
+    let terms = (0..problem.chain.pings.len()).filter_map(|k| {
+        let term = problem.range_term(state, k, problem.matches[k]?)?;
+        let mut row = term.by_pose.transpose() * &poses[problem.chain.pings[k].pose];
+        let mut constants = row.view_mut((0, 3), (1, COUNT));
+        constants += term.by_constants.transpose();
+        Some((row, term.residual, term.deviation))
+    });
+    let terms: Vec<_> = terms.collect();
+    let rows: Vec<_> = terms.iter().map(|(row, ..)| row.row(0).into_owned()).collect();
+    let by_sources = DMatrix::from_rows(&rows);
+    let mut covariance = &by_sources * variances * by_sources.transpose();
+    for (k, (.., deviation)) in terms.iter().enumerate() {
+        covariance[(k, k)] += deviation.powi(2);
+    }
+    let residuals =
+        DVector::from_iterator(terms.len(), terms.iter().map(|(_, residual, _)| *residual));
+    let factor = covariance.cholesky().unwrap();
+    0.5 * (residuals.dot(&factor.solve(&residuals)) + factor.ln_determinant())
+}
+
+/// By the noise of the wheels the marginal likelihood changes as the density of the ranges does.
+#[test]
+fn marginal_likelihood_is_the_density_of_the_ranges() {
+    let steps: Vec<[f64; 2]> =
+        (0..24).map(|n| if n % 8 < 5 { [0.02, 0.021] } else { [0.02, -0.018] }).collect();
+    let mut recording = recording(&steps, 0.3);
+    recording.references.clear();
+    let chain = Chain::build(&recording, 0.0, Spacing::AT_ECHOES).unwrap();
+    let ends = [([-9.0, -0.7], [9.0, -0.5]), ([1.4, -4.5], [1.5, 4.5])];
+    let reflectors = ends.map(|(from, to)| Reflector::Wall(Wall::new(from, to).unwrap()));
+    let (mut problem, state) = predicted(&recording, &chain, &reflectors);
+    let mut differences = Vec::new();
+    for (distance, turn) in [(0.001, 0.001), (0.006, 0.006), (0.02, 0.02), (0.003, 0.015)] {
+        problem.noise.wheel = WheelNoise { distance, turn };
+        differences.push(problem.marginal(&state).unwrap() - dense_likelihood(&problem, &state));
+    }
+    for difference in &differences {
+        assert!((difference - differences[0]).abs() < 1e-5, "{differences:?}");
     }
 }
