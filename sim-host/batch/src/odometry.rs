@@ -7,6 +7,10 @@ use nalgebra::{Matrix3, Vector3};
 /// Wheel travel of one encoder interval, right and left, metres by the nominal wheels.
 pub type Travel = [f64; 2];
 
+/// Share of the noise of a wheel's travel that the wheel beside it has: a wheel at rest is turned on its place, and slips. Without it
+/// the noises of distance and turns would be one there, and their ratio known exactly.
+const BESIDE: f64 = 0.05;
+
 /// Relative errors of the nominal drive.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Drive {
@@ -155,7 +159,10 @@ pub fn integrate(steps: &[Travel], drive: &Drive) -> Motion {
             by_track,
         ]);
         by_drive = carry * by_drive + here;
-        let (of_right, of_left) = (nominal_right.abs().sqrt(), nominal_left.abs().sqrt());
+        let of =
+            |own: f64, other: f64| ((own.abs() + BESIDE * other.abs()) / (1.0 + BESIDE)).sqrt();
+        let (of_right, of_left) =
+            (of(nominal_right, nominal_left), of(nominal_left, nominal_right));
         noise = noise.after(
             &carry,
             [

@@ -3,6 +3,8 @@
 //! The minimum of the cost alone cannot determine it, because smoothed poses follow the ranges: the noise of the wheels would be
 //! too small, and zero the best. The marginal likelihood integrates the poses out ([`Problem::marginal`]).
 
+#![expect(clippy::indexing_slicing, reason = "vectors and matrices of a fixed size")]
+
 use nalgebra::{SMatrix, SVector};
 
 use crate::odometry::WheelNoise;
@@ -63,7 +65,7 @@ pub struct Estimated {
 /// # Errors
 /// [`SolveError`].
 pub fn of_wheels(problem: &Problem, state: &State) -> Result<Noisy, SolveError> {
-    Ok(Likelihood::at(problem, state)?.of_wheels()?.1)
+    Likelihood::at(problem, state).of_wheels()
 }
 
 /// Estimates the noise of the wheels and its parts at a solution.
@@ -71,8 +73,9 @@ pub fn of_wheels(problem: &Problem, state: &State) -> Result<Noisy, SolveError> 
 /// # Errors
 /// [`SolveError`].
 pub fn estimate(problem: &Problem, state: &State) -> Result<Estimated, SolveError> {
-    let (likelihood, wheel) = Likelihood::at(problem, state)?.of_wheels()?;
-    let [distance, turn] = likelihood.of_parts(wheel.value)?;
+    let mut likelihood = Likelihood::at(problem, state);
+    let wheel = likelihood.of_wheels()?;
+    let [distance, turn] = likelihood.of_parts()?;
     Ok(Estimated { wheel, distance, turn })
 }
 
@@ -83,7 +86,7 @@ struct Likelihood<'a> {
 }
 
 impl<'a> Likelihood<'a> {
-    fn at(problem: &Problem<'a>, state: &State) -> Result<Self, SolveError> {
+    fn at(problem: &Problem<'a>, state: &State) -> Self {
         let mut problem = problem.clone();
         problem.kernel = QUADRATIC;
         let is_inlier = |k: usize, reflector: usize| {
@@ -93,48 +96,49 @@ impl<'a> Likelihood<'a> {
         let matches = problem.matches.iter().enumerate();
         let matches = matches.map(|(k, of)| of.filter(|reflector| is_inlier(k, *reflector)));
         problem.matches = matches.collect();
-        Ok(Self { problem, state: state.clone() })
+        Self { problem, state: state.clone() }
     }
 
-    /// Negative logarithm with a noise.
-    fn negative(&self, wheel: WheelNoise) -> Result<f64, SolveError> {
-        let mut problem = self.problem.clone();
-        problem.noise.wheel = wheel;
-        Ok(problem.marginal(&self.state)?)
+    /// The maximum with independent wheels.
+    fn of_wheels(&mut self) -> Result<Noisy, SolveError> {
+        let [wheel] = self.maximize(PRIOR, |at| WheelNoise::independent(at[0].exp()))?;
+        Ok(wheel)
     }
 
-    /// The maximum with independent wheels, and the likelihood about the solution there.
-    fn of_wheels(mut self) -> Result<(Self, Noisy), SolveError> {
-        const ROUNDS: usize = 3;
+    /// The maximum by distance and turns.
+    fn of_parts(&mut self) -> Result<[Noisy; 2], SolveError> {
+        self.maximize(PRIOR_OF_PARTS, |at| WheelNoise { distance: at[0].exp(), turn: at[1].exp() })
+    }
+
+    /// The maximum by the logarithms of noises, with a prior around the present noise. The problem is solved again at each maximum,
+    /// until it stays.
+    fn maximize<const N: usize>(
+        &mut self,
+        prior: f64,
+        noise: impl Fn(&SVector<f64, N>) -> WheelNoise,
+    ) -> Result<[Noisy; N], SolveError> {
+        const ROUNDS: usize = 4;
+        const ITERATIONS: usize = 20;
         const SAME: f64 = 0.01;
-        let prior = self.problem.noise.wheel.turn.ln();
-        let mut wheel = Noisy { value: prior.exp(), deviation: PRIOR };
+        let mean = self.problem.noise.wheel.turn.ln();
+        let mut found = SVector::<f64, N>::repeat(mean);
+        let mut covariance = SMatrix::<f64, N, N>::identity() * prior.powi(2);
         for _ in 0..ROUNDS {
-            solve(&self.problem, &mut self.state, 5)?;
-            let start = SVector::<f64, 1>::new(wheel.value.ln());
-            let (at, covariance) = maximum(start, |at| {
-                let loss = self.negative(WheelNoise::independent(at[0].exp()))?;
-                Ok(loss + 0.5 * ((at[0] - prior) / PRIOR).powi(2))
+            solve(&self.problem, &mut self.state, ITERATIONS)?;
+            let before = found;
+            (found, covariance) = maximum(found, |at| {
+                let mut problem = self.problem.clone();
+                problem.noise.wheel = noise(at);
+                let loss = problem.marginal(&self.state)?;
+                Ok(loss + 0.5 * (at.add_scalar(-mean) / prior).norm_squared())
             })?;
-            let change = (at[0] - start[0]).abs();
-            wheel = Noisy { value: at[0].exp(), deviation: covariance[(0, 0)].sqrt() };
-            self.problem.noise.wheel = WheelNoise::independent(wheel.value);
-            if change < SAME {
+            self.problem.noise.wheel = noise(&found);
+            if (found - before).norm() < SAME {
                 break;
             }
         }
-        Ok((self, wheel))
-    }
-
-    /// The maximum by both parts, about that with independent wheels.
-    fn of_parts(&self, wheel: f64) -> Result<[Noisy; 2], SolveError> {
-        let prior = wheel.ln();
-        let (at, covariance) = maximum(SVector::<f64, 2>::repeat(prior), |at| {
-            let loss = self.negative(WheelNoise { distance: at[0].exp(), turn: at[1].exp() })?;
-            Ok(loss + 0.5 * (at.add_scalar(-prior) / PRIOR_OF_PARTS).norm_squared())
-        })?;
-        let of = |k: usize| Noisy { value: at[k].exp(), deviation: covariance[(k, k)].sqrt() };
-        Ok([of(0), of(1)])
+        let of = |k: usize| Noisy { value: found[k].exp(), deviation: covariance[(k, k)].sqrt() };
+        Ok(std::array::from_fn(of))
     }
 }
 
