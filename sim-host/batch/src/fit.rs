@@ -26,7 +26,7 @@ use crate::wheel_noise;
 /// Shortest drive, metres.
 const SHORTEST: f64 = 3.0;
 /// Largest noise of a wheel, m/√m: twice that of a bad floor.
-const NOISIEST: f64 = 0.04;
+pub(crate) const NOISIEST: f64 = 0.04;
 /// Standard deviations of the wheel difference and of the relative track width below which straight legs separate them
 /// even if the robot turns to one side only.
 const SEPARATE: [f64; 2] = [0.003, 0.01];
@@ -240,7 +240,7 @@ impl<'a> Fit<'a> {
     }
 
     /// Estimates the line of the bearings from answers and missing answers of isolated walls.
-    pub(crate) fn fit_bearings(&mut self) -> Option<Bearings> {
+    fn fit_bearings(&mut self) -> Option<Bearings> {
         const ENOUGH: f64 = 0.02;
         if !self.nominal.has_servo {
             return None;

@@ -13,7 +13,7 @@ use nalgebra::Matrix3;
 use crate::calibration::CalibrateError;
 use crate::chain::Covariance;
 use crate::constants::Priors;
-use crate::fit::{Fit, ROUNDS};
+use crate::fit::{Fit, NOISIEST, ROUNDS};
 use crate::noise;
 use crate::odometry::{WheelNoise, compose, integrate, wrap};
 use crate::problem::PosePrior;
@@ -28,8 +28,6 @@ const DISTANCE: f64 = 0.08;
 const PREDICTABLE: [f64; 2] = [0.05, 0.1];
 /// Distance from which on the noise of the wheels is estimated while the window grows, metres.
 const NOISE_FROM: f64 = 1.5;
-/// Largest noise of the wheels assumed meanwhile, m/√m.
-const NOISIEST: f64 = 0.04;
 
 impl Fit<'_> {
     /// Grows the window over the whole recording.

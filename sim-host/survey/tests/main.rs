@@ -3,12 +3,17 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use nalgebra::{Vector2, Vector3};
+use sonarfix_batch::odometry::WheelNoise;
 use sonarfix_batch::recording::{Ping, Reading, Recording, StartPose};
 use sonarfix_survey::problem::Robot;
 use sonarfix_survey::survey::{Motion, SurveyError, reversed, survey};
 
-const ROBOT: Robot =
-    Robot { track_width: 0.16, mount: [0.05, 0.0], wheel_noise: 1e-3, reach: [0.05, 3.0] };
+const ROBOT: Robot = Robot {
+    track_width: 0.16,
+    mount: [0.05, 0.0],
+    wheel_noise: WheelNoise::independent(1e-3),
+    reach: [0.05, 3.0],
+};
 /// The room.
 const SIZE: [f64; 2] = [4.0, 3.0];
 /// Half of the cone.
