@@ -36,7 +36,8 @@ const RETRACED: usize = 3;
 /// Assumed where a half alone has no solution.
 const UNKNOWN_SCATTER: f64 = 3.0;
 
-/// Estimates the calibration, from several starts until two of them agree: the solution with the highest likelihood counts.
+/// Estimates the calibration, from several starts until two of them agree: the solution with the highest likelihood counts, of those
+/// whose wheels are within the limit of their noise, if there are any.
 ///
 /// # Errors
 /// [`CalibrateError`], also if the result is not trustworthy.
@@ -54,7 +55,7 @@ pub fn calibrate(
         |from| Attempt::of(Fit::new(recording, &chain, &reflectors, nominal, start)?, from);
     let mut best = attempt(STARTS[0]);
     for &from in &STARTS[1..starts] {
-        let known = best.as_ref().map_or(0.0, |best| best.fit.problem.noise.wheel.turn);
+        let known = best.as_ref().map_or(0.0, Attempt::known_noise);
         let next = attempt(Start { wheel_noise: from.wheel_noise.max(known), ..from });
         // A bearing that the recording does not determine stays that of the start.
         if from.bearing != 0.0 && next.as_ref().is_ok_and(|next| next.bearings.is_none()) {
@@ -62,7 +63,7 @@ pub fn calibrate(
         }
         let is_confirmed = best.as_ref().is_ok_and(|best| best.is_confirmed_by(&next));
         best = match (best, next) {
-            (Ok(best), Ok(next)) if next.loss < best.loss => Ok(next),
+            (Ok(best), Ok(next)) if next.is_better_than(&best, 0.0) => Ok(next),
             (Err(_), Ok(next)) => Ok(next),
             (best, _) => best,
         };
@@ -95,7 +96,7 @@ impl<'a> Attempt<'a> {
         let mut best = grown;
         for _ in 0..RETRACED {
             match best.retraced() {
-                Ok(next) if next.loss < best.loss - SAME => best = next,
+                Ok(next) if next.is_better_than(&best, SAME) => best = next,
                 _ => break,
             }
         }
@@ -108,6 +109,22 @@ impl<'a> Attempt<'a> {
         fit.retrace()?;
         let bearings = fit.settle()?;
         Ok(Self { loss: fit.loss()?, fit, bearings })
+    }
+
+    /// Whether this solution counts, and not another: its likelihood is higher by a margin. A solution with wheels beyond the limit of
+    /// their noise never counts where another is within it: its poses follow any echoes.
+    fn is_better_than(&self, other: &Self, margin: f64) -> bool {
+        match (self.fit.is_too_noisy(), other.fit.is_too_noisy()) {
+            (false, true) => true,
+            (true, false) => false,
+            _ => self.loss < other.loss - margin,
+        }
+    }
+
+    /// The noise of the wheels that the next starts assume at least, m/√m. That of a failed start would make their gates too wide for
+    /// the right reflectors.
+    fn known_noise(&self) -> f64 {
+        if self.fit.is_too_noisy() { 0.0 } else { self.fit.problem.noise.wheel.turn }
     }
 
     /// Whether another start has ended in the same minimum, and the solution there is plausible.

@@ -410,12 +410,15 @@ impl<'a> Fit<'a> {
                 return Err(CalibrateError::Implausible(name));
             }
         }
-        let wheel = self.problem.noise.wheel.turn;
-        if wheel > NOISIEST.max(self.nominal.noise.wheel.turn) {
-            Err(CalibrateError::NoisyWheels(wheel * 1e3))
-        } else {
-            Ok(())
+        if self.is_too_noisy() {
+            return Err(CalibrateError::NoisyWheels(self.problem.noise.wheel.turn * 1e3));
         }
+        Ok(())
+    }
+
+    /// Whether the noise of the wheels is beyond the limit up to which a drive fits its model.
+    pub(crate) fn is_too_noisy(&self) -> bool {
+        self.problem.noise.wheel.turn > NOISIEST.max(self.nominal.noise.wheel.turn)
     }
 }
 

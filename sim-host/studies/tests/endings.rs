@@ -99,13 +99,14 @@ fn a_narrow_office_is_drawn() {
 
 /// Commands with more runs than anyone waits for, and what their output must begin with.
 #[cfg(unix)]
-const LONG: [(&[&str], &str); 7] = [
+const LONG: [(&[&str], &str); 8] = [
     (&["floor-plans", "--plans", "1000000", "--runs", "1"], "# "),
     (&["faults", "--runs", "4000000"], "# Effects"),
     (&["find", CLASSROOM, "--runs", "1000000", "--seconds", "5"], ""),
     (&["relocalize", "--runs", "1000000", "--seconds", "5"], ""),
     (&["health", "--runs", "1000000"], "# Reliability"),
     (&["calibration", "--runs", "1000000", "--metres", "5"], ""),
+    (&["calibration", "--wheel-noise", "2", "--runs", "1000000", "--metres", "5"], ""),
     (&["surveys", "room", "--runs", "1000000"], ""),
 ];
 
