@@ -1,8 +1,13 @@
 //! The chain of poses of a recording: a pose every few centimetres, the wheel travel between them, and the pings that
 //! belong to each.
 
-use crate::odometry::Travel;
+#![expect(clippy::indexing_slicing, reason = "the edges' times have the length of the edges")]
+
+use crate::odometry::{Travel, noisy_distances};
 use crate::recording::{Ping, Reading, Recording, RecordingError, StartPose};
+
+/// Distance over which the mean speed of the wheels is formed, metres.
+const STEADY: f64 = 0.1;
 
 /// When a new pose begins.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,6 +45,8 @@ pub struct Chain {
     pub times: Vec<f64>,
     /// Wheel travel from each pose to the next.
     pub edges: Vec<Vec<Travel>>,
+    /// For each edge, the distances that both wheels roll at their mean speed around it, as multiples of those measured.
+    pub steadiness: Vec<[f64; 2]>,
     /// The pings between start and end.
     pub pings: Vec<Event>,
     /// Mean of the distances that both wheels have rolled until each pose, metres.
@@ -86,14 +93,16 @@ impl Chain {
             let mut passed = 0.0;
             while let Some((index, ping)) = pings.next_if(|(_, ping)| ping.time < next.time) {
                 let share = (ping.time - one.time) / (next.time - one.time);
-                builder.roll(travel(one, next, share - passed));
+                builder.roll([one, next], share - passed);
                 passed = share;
                 builder.ping(index, ping);
             }
-            builder.roll(travel(one, next, 1.0 - passed));
+            builder.roll([one, next], 1.0 - passed);
             builder.read(next.time, next.time >= end.time);
         }
-        Some(builder.chain)
+        let Builder { mut chain, moving, .. } = builder;
+        chain.steadiness = steadiness(&chain.edges, &moving);
+        Some(chain)
     }
 
     /// Number of poses.
@@ -117,6 +126,8 @@ struct Builder {
     steps: Vec<Travel>,
     distance: f64,
     turns: f64,
+    /// Of each edge, and of the one that grows, the time in which the robot moves, seconds.
+    moving: Vec<f64>,
 }
 
 impl Builder {
@@ -127,13 +138,19 @@ impl Builder {
             turns: vec![0.0],
             ..Chain::default()
         };
-        Self { chain, spacing, steps: Vec::new(), distance: 0.0, turns: 0.0 }
+        Self { chain, spacing, steps: Vec::new(), distance: 0.0, turns: 0.0, moving: vec![0.0] }
     }
 
-    /// The wheels roll.
-    fn roll(&mut self, step: Travel) {
+    /// The wheels roll a share of the travel between two readings.
+    fn roll(&mut self, [one, next]: [&Reading; 2], share: f64) {
+        let step = travel(one, next, share);
         push(&mut self.steps, step);
         let [right, left] = step;
+        if right.abs() + left.abs() > 0.0
+            && let Some(moving) = self.moving.last_mut()
+        {
+            *moving += share * (next.time - one.time);
+        }
         self.distance += f64::midpoint(right.abs(), left.abs());
         self.turns += (right - left).abs();
     }
@@ -159,10 +176,42 @@ impl Builder {
 
     fn end_edge(&mut self, time: f64) {
         self.chain.edges.push(std::mem::take(&mut self.steps));
+        self.moving.push(0.0);
         self.chain.times.push(time);
         self.chain.distances.push(self.distance);
         self.chain.turns.push(self.turns);
     }
+}
+
+/// See [`Chain::steadiness`]. The variance of an edge must not depend on its own noise: edges whose wheels measure too little would
+/// count more, and scales and track width would be biased. As in a generalized linear model, it is that of the expected distance
+/// (Wedderburn, *Biometrika* 61, 1974): that at the mean speed in the edges around it.
+fn steadiness(edges: &[Vec<Travel>], moving: &[f64]) -> Vec<[f64; 2]> {
+    // Of the sum, because the magnitudes of short steps would have the mean of their noise, too.
+    let rolled: Vec<Travel> =
+        edges.iter().map(|steps| sum(steps, |step| step).map(f64::abs)).collect();
+    let of = |i: usize| {
+        let mut around = i..i + 1;
+        loop {
+            let [right, left] = sum(&rolled[around.clone()], |distance| distance);
+            if right + left >= 2.0 * STEADY || around.len() == edges.len() {
+                let seconds = moving[around].iter().sum::<f64>();
+                let share = if seconds > 0.0 { moving[i] / seconds } else { 0.0 };
+                let expected = noisy_distances([right * share, left * share]);
+                let measured = noisy_distances(sum(&edges[i], f64::abs));
+                let ratio =
+                    |k: usize| if measured[k] > 0.0 { expected[k] / measured[k] } else { 1.0 };
+                return [ratio(0), ratio(1)];
+            }
+            around = around.start.saturating_sub(1)..(around.end + 1).min(edges.len());
+        }
+    };
+    (0..edges.len()).map(of).collect()
+}
+
+/// The sums of a function of the travel of each wheel.
+fn sum(steps: &[Travel], of: fn(f64) -> f64) -> [f64; 2] {
+    steps.iter().fold([0.0, 0.0], |sums, step| [sums[0] + of(step[0]), sums[1] + of(step[1])])
 }
 
 fn travel(one: &Reading, next: &Reading, share: f64) -> Travel {
@@ -176,5 +225,25 @@ fn push(steps: &mut Vec<Travel>, step: Travel) {
     let [right, left] = step;
     if right.abs() + left.abs() > 0.0 {
         steps.push(step);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Wheels at a steady speed that measure more and less in turns: each edge has the variance of the same distance.
+    #[test]
+    fn the_expected_distance_does_not_depend_on_the_noise_of_an_edge() {
+        let edges: Vec<Vec<Travel>> = (0..60)
+            .map(|n| vec![if n % 2 == 0 { [0.012, -0.008] } else { [0.008, -0.012] }])
+            .collect();
+        let moving = vec![0.1; edges.len()];
+        for (edge, by) in edges.iter().zip(steadiness(&edges, &moving)) {
+            let expected = noisy_distances(edge[0]);
+            for k in 0..2 {
+                assert!((by[k] * expected[k] - 0.01).abs() < 0.0005, "{by:?}");
+            }
+        }
     }
 }

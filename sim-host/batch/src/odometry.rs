@@ -42,41 +42,82 @@ impl WheelNoise {
     }
 }
 
-/// The covariance of a motion by the noise of the wheels: coefficients of the squares of both parts and of their product.
+/// The covariance of a motion by the noise of a wheel: coefficients of the squares of both parts and of their product.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MotionNoise {
+struct Parts {
     distance: Matrix3<f64>,
     turn: Matrix3<f64>,
     mixed: Matrix3<f64>,
 }
 
-impl MotionNoise {
-    /// That of no motion.
+impl Parts {
     fn none() -> Self {
         Self { distance: Matrix3::zeros(), turn: Matrix3::zeros(), mixed: Matrix3::zeros() }
     }
 
-    /// The covariance with a noise of the wheels.
-    #[must_use]
-    pub fn covariance(&self, noise: WheelNoise) -> Matrix3<f64> {
+    fn covariance(&self, noise: WheelNoise) -> Matrix3<f64> {
         let WheelNoise { distance, turn } = noise;
         self.distance * distance.powi(2) + self.turn * turn.powi(2) + self.mixed * (distance * turn)
     }
 
-    /// After a step that carries the motion so far, with the derivatives by distance and turn of each wheel times the root of
-    /// its travel.
-    fn after(&self, carry: &Matrix3<f64>, wheels: [[Vector3<f64>; 2]; 2]) -> Self {
-        let carried = |part: &Matrix3<f64>| carry * part * carry.transpose();
-        let [mut distance, mut turn, mut mixed] =
-            [&self.distance, &self.turn, &self.mixed].map(carried);
-        for [by_distance, by_turn] in wheels {
-            let cross = by_distance * by_turn.transpose();
-            distance += by_distance * by_distance.transpose();
-            turn += by_turn * by_turn.transpose();
-            mixed += cross + cross.transpose();
-        }
-        Self { distance, turn, mixed }
+    /// The derivative of the covariance by the logarithm of the track width: only turns depend on it.
+    fn by_track(&self, noise: WheelNoise) -> Matrix3<f64> {
+        let WheelNoise { distance, turn } = noise;
+        self.turn * (-2.0 * turn.powi(2)) - self.mixed * (distance * turn)
     }
+
+    /// After a step that carries the motion so far, with its derivatives by distance and turn of the wheel.
+    fn after(&self, carry: &Matrix3<f64>, [by_distance, by_turn]: [Vector3<f64>; 2]) -> Self {
+        let carried = |part: &Matrix3<f64>| carry * part * carry.transpose();
+        let cross = by_distance * by_turn.transpose();
+        Self {
+            distance: carried(&self.distance) + by_distance * by_distance.transpose(),
+            turn: carried(&self.turn) + by_turn * by_turn.transpose(),
+            mixed: carried(&self.mixed) + cross + cross.transpose(),
+        }
+    }
+
+    fn scaled(&self, by: f64) -> Self {
+        Self { distance: self.distance * by, turn: self.turn * by, mixed: self.mixed * by }
+    }
+}
+
+/// The covariance of a motion by the noise of both wheels, right and left.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MotionNoise([Parts; 2]);
+
+impl MotionNoise {
+    /// The covariance with a noise of the wheels.
+    #[must_use]
+    pub fn covariance(&self, noise: WheelNoise) -> Matrix3<f64> {
+        let [right, left] = &self.0;
+        right.covariance(noise) + left.covariance(noise)
+    }
+
+    /// The derivatives of the covariance by the three relative errors (right, left, track).
+    #[must_use]
+    pub fn by_drive(&self, noise: WheelNoise, drive: &Drive) -> [Matrix3<f64>; 3] {
+        let [right, left] = &self.0;
+        [
+            right.covariance(noise) * (2.0 / (1.0 + drive.right)),
+            left.covariance(noise) * (2.0 / (1.0 + drive.left)),
+            (right.by_track(noise) + left.by_track(noise)) / (1.0 + drive.track),
+        ]
+    }
+
+    /// That of wheels which roll these multiples of the distances, right and left.
+    #[must_use]
+    pub fn scaled(&self, [by_right, by_left]: [f64; 2]) -> Self {
+        let [right, left] = &self.0;
+        Self([right.scaled(by_right), left.scaled(by_left)])
+    }
+}
+
+/// The distances whose noise both wheels have, of distances that they roll.
+#[must_use]
+pub fn noisy_distances([right, left]: [f64; 2]) -> [f64; 2] {
+    let of = |own: f64, other: f64| (own.abs() + BESIDE * other.abs()) / (1.0 + BESIDE);
+    [of(right, left), of(left, right)]
 }
 
 /// The motion over some encoder intervals, in the frame of its start.
@@ -136,7 +177,7 @@ pub fn integrate(steps: &[Travel], drive: &Drive) -> Motion {
     let width = drive.track_width * (1.0 + drive.track);
     let mut pose: Vector3<f64> = Vector3::zeros();
     let mut by_drive = Matrix3::zeros();
-    let mut noise = MotionNoise::none();
+    let mut noise = MotionNoise([Parts::none(); 2]);
     for &[nominal_right, nominal_left] in steps {
         let (right, left) =
             (nominal_right * (1.0 + drive.right), nominal_left * (1.0 + drive.left));
@@ -159,17 +200,15 @@ pub fn integrate(steps: &[Travel], drive: &Drive) -> Motion {
             by_track,
         ]);
         by_drive = carry * by_drive + here;
-        let of =
-            |own: f64, other: f64| ((own.abs() + BESIDE * other.abs()) / (1.0 + BESIDE)).sqrt();
-        let (of_right, of_left) =
-            (of(nominal_right, nominal_left), of(nominal_left, nominal_right));
-        noise = noise.after(
-            &carry,
-            [
-                [by_distance * of_right, by_turn * of_right],
-                [by_distance * of_left, by_turn * -of_left],
-            ],
-        );
+        // The noise is that of the measured travel, in nominal metres.
+        let [of_right, of_left] = noisy_distances([nominal_right, nominal_left]).map(f64::sqrt);
+        let (of_right, of_left) = (of_right * (1.0 + drive.right), of_left * (1.0 + drive.left));
+        let wheels = [
+            [by_distance * of_right, by_turn * of_right],
+            [by_distance * of_left, by_turn * -of_left],
+        ];
+        let [right, left] = wheels;
+        noise = MotionNoise([noise.0[0].after(&carry, right), noise.0[1].after(&carry, left)]);
         pose += Vector3::new(chord * cos, chord * sin, turn);
     }
     Motion { pose, by_drive, noise }
@@ -268,5 +307,15 @@ mod tests {
         assert!((covariance[(0, 0)] - 0.02_f64.powi(2) / 2.0).abs() < 1e-12);
         assert!((covariance[(2, 2)] - 2.0 * (0.003_f64 / 0.12).powi(2)).abs() < 1e-12);
         assert!(covariance[(0, 2)].abs() < 1e-12);
+    }
+    /// The encoder of a wheel that is larger than the nominal one has the same noise, and the noise of the motion is larger.
+    #[test]
+    fn the_noise_is_that_of_the_measured_travel() {
+        let steps = vec![[0.01, 0.01]; 100];
+        let covariance =
+            |drive| integrate(&steps, &drive).noise.covariance(WheelNoise::independent(0.01));
+        let ratio =
+            covariance(drive(0.1, 0.1, 0.0))[(0, 0)] / covariance(drive(0.0, 0.0, 0.0))[(0, 0)];
+        assert!((ratio - 1.21).abs() < 1e-9, "{ratio}");
     }
 }

@@ -49,6 +49,17 @@ impl Noise {
     pub fn of_range(&self, range: f64) -> f64 {
         self.range.hypot(self.range_per_metre * range)
     }
+
+    /// With another noise of the wheels, and that of the ranges times a factor.
+    #[must_use]
+    pub fn with(&self, wheel: WheelNoise, of_ranges: f64) -> Self {
+        Self {
+            wheel,
+            range: self.range * of_ranges,
+            range_per_metre: self.range_per_metre * of_ranges,
+            ..*self
+        }
+    }
 }
 
 /// Unknowns.
@@ -124,6 +135,8 @@ pub struct EdgeTerm {
     pub by_to: Matrix3<f64>,
     /// Derivatives by the constants.
     pub by_constants: Rows,
+    /// What the covariance adds to them in the gradient of the cost.
+    pub of_covariance: Rows,
 }
 
 /// Residual and derivatives of a reference pose.
@@ -201,13 +214,20 @@ impl Problem<'_> {
     /// The term of the edge after a pose.
     #[must_use]
     pub fn edge_term(&self, state: &State, i: usize) -> Option<EdgeTerm> {
-        let motion = integrate(&self.chain.edges[i], &state.constants.drive());
+        let drive = state.constants.drive();
+        let mut motion = integrate(&self.chain.edges[i], &drive);
+        motion.noise = motion.noise.scaled(self.chain.steadiness[i]);
         let poses = [&state.poses[i], &state.poses[i + 1]];
         let edge = motion.between(poses, self.noise.wheel, EDGE_FLOOR)?;
         let mut by_constants = Rows::zeros();
         by_constants.fixed_columns_mut::<3>(0).copy_from(&-motion.by_drive);
         let Edge { residual, information, by_from, by_to } = edge;
-        Some(EdgeTerm { residual, information, by_from, by_to, by_constants })
+        let mut of_covariance = Rows::zeros();
+        let weighted = information * residual;
+        for (k, by) in motion.noise.by_drive(self.noise.wheel, &drive).iter().enumerate() {
+            of_covariance.set_column(k, &(by * weighted * -0.5));
+        }
+        Some(EdgeTerm { residual, information, by_from, by_to, by_constants, of_covariance })
     }
 
     /// The term of a pose with the reference stream; `None` outside of the stream.
@@ -328,13 +348,14 @@ impl Problem<'_> {
         let i = at - self.window.start;
         let (from, to) =
             (term.by_from.transpose() * information, term.by_to.transpose() * information);
-        let constants = term.by_constants.transpose() * information;
+        let by_constants = term.by_constants + term.of_covariance;
+        let constants = by_constants.transpose() * information;
         normal.diagonal[i] += from * term.by_from;
         normal.diagonal[i + 1] += to * term.by_to;
         normal.beside[i] += from * term.by_to;
-        normal.border[i] += from * term.by_constants;
-        normal.border[i + 1] += to * term.by_constants;
-        normal.corner += constants * term.by_constants;
+        normal.border[i] += from * by_constants;
+        normal.border[i + 1] += to * by_constants;
+        normal.corner += constants * by_constants;
         normal.poses[i] -= from * term.residual;
         normal.poses[i + 1] -= to * term.residual;
         normal.constants -= constants * term.residual;

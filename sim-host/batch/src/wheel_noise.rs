@@ -1,7 +1,9 @@
 //! Estimates the noise of the wheels: the maximum of the marginal likelihood by its logarithm, and the curvature there.
 //!
 //! The minimum of the cost alone cannot determine it, because smoothed poses follow the ranges: the noise of the wheels would be
-//! too small, and zero the best. The marginal likelihood integrates the poses out ([`Problem::marginal`]).
+//! too small, and zero the best. The marginal likelihood integrates the poses out ([`Problem::marginal`]). The noise of the ranges is
+//! a coordinate of the maximum, because both noises share what the ranges of neighbouring pings differ by: with that of the
+//! ranges held, the interval of that of the wheels would be too narrow.
 
 #![expect(clippy::indexing_slicing, reason = "vectors and matrices of a fixed size")]
 
@@ -101,38 +103,44 @@ impl<'a> Likelihood<'a> {
 
     /// The maximum with independent wheels.
     fn of_wheels(&mut self) -> Result<Noisy, SolveError> {
-        let [wheel] = self.maximize(PRIOR, |at| WheelNoise::independent(at[0].exp()))?;
+        let [wheel, _] = self.maximize(PRIOR, |at| WheelNoise::independent(at[0].exp()))?;
         Ok(wheel)
     }
 
     /// The maximum by distance and turns.
     fn of_parts(&mut self) -> Result<[Noisy; 2], SolveError> {
-        self.maximize(PRIOR_OF_PARTS, |at| WheelNoise { distance: at[0].exp(), turn: at[1].exp() })
+        let noise = |at: &SVector<f64, 3>| WheelNoise { distance: at[0].exp(), turn: at[1].exp() };
+        let [distance, turn, _] = self.maximize(PRIOR_OF_PARTS, noise)?;
+        Ok([distance, turn])
     }
 
-    /// The maximum by the logarithms of noises, with a prior around the present noise. The problem is solved again at each maximum,
-    /// until it stays.
+    /// The maximum by the logarithms of noises of the wheels, with a prior around the present noise, and of the factor of the noise of
+    /// the ranges. The problem is solved again at each maximum, until it stays.
     fn maximize<const N: usize>(
         &mut self,
         prior: f64,
-        noise: impl Fn(&SVector<f64, N>) -> WheelNoise,
+        wheel: impl Fn(&SVector<f64, N>) -> WheelNoise,
     ) -> Result<[Noisy; N], SolveError> {
         const ROUNDS: usize = 4;
         const ITERATIONS: usize = 20;
         const SAME: f64 = 0.01;
-        let mean = self.problem.noise.wheel.turn.ln();
-        let mut found = SVector::<f64, N>::repeat(mean);
-        let mut covariance = SMatrix::<f64, N, N>::identity() * prior.powi(2);
+        let present = self.problem.noise;
+        let noise = |at: &SVector<f64, N>| present.with(wheel(at), at[N - 1].exp());
+        let split = |k: usize, value: f64, other: f64| if k == N - 1 { value } else { other };
+        let mean = SVector::<f64, N>::from_fn(|k, _| split(k, 0.0, present.wheel.turn.ln()));
+        let prior = SVector::<f64, N>::from_fn(|k, _| split(k, PRIOR, prior));
+        let mut found = mean;
+        let mut covariance = SMatrix::<f64, N, N>::identity();
         for _ in 0..ROUNDS {
             solve(&self.problem, &mut self.state, ITERATIONS)?;
             let before = found;
             (found, covariance) = maximum(found, |at| {
                 let mut problem = self.problem.clone();
-                problem.noise.wheel = noise(at);
-                let loss = problem.marginal(&self.state)?;
-                Ok(loss + 0.5 * (at.add_scalar(-mean) / prior).norm_squared())
+                problem.noise = noise(at);
+                let of_prior = 0.5 * (at - mean).component_div(&prior).norm_squared();
+                Ok(problem.marginal(&self.state)? + of_ranges(&problem, &self.state) + of_prior)
             })?;
-            self.problem.noise.wheel = noise(&found);
+            self.problem.noise = noise(&found);
             if (found - before).norm() < SAME {
                 break;
             }
@@ -140,6 +148,13 @@ impl<'a> Likelihood<'a> {
         let of = |k: usize| Noisy { value: found[k].exp(), deviation: covariance[(k, k)].sqrt() };
         Ok(std::array::from_fn(of))
     }
+}
+
+/// The sum of the logarithms of the ranges' deviations, which [`Problem::marginal`] leaves out.
+fn of_ranges(problem: &Problem, state: &State) -> f64 {
+    let matches = problem.matches.iter().enumerate();
+    let terms = matches.filter_map(|(k, of)| problem.range_term(state, k, (*of)?));
+    terms.map(|term| term.deviation.ln()).sum()
 }
 
 /// The minimum of a loss by logarithms of noises, and the inverse of its curvature there. Newton's method with differences.

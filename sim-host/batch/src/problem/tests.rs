@@ -222,3 +222,34 @@ fn marginal_likelihood_is_the_density_of_the_ranges() {
         assert!((difference - differences[0]).abs() < 1e-5, "{differences:?}");
     }
 }
+
+/// The covariance of the wheels' travel depends on the constants, too: without its derivative, straight legs, whose turns are noise
+/// alone, would widen the track.
+#[test]
+fn the_gradient_by_the_drive_is_that_of_the_cost() {
+    const H: f64 = 1e-5;
+    let steps = [[0.02, 0.021], [0.018, 0.021], [0.02, -0.018], [0.021, 0.02]].repeat(4);
+    let mut recording = recording(&steps, 0.3);
+    recording.references.clear();
+    let chain = Chain::build(&recording, 0.0, Spacing::AT_ECHOES).unwrap();
+    let (mut problem, mut state) = predicted(&recording, &chain, &[]);
+    problem.matches.fill(None);
+    let drive = state.constants.drive();
+    for (i, edge) in chain.edges.iter().enumerate() {
+        let noise = 0.002 * f64::from(u8::try_from(i % 3).unwrap());
+        let rolled: Vec<_> =
+            edge.iter().map(|[right, left]| [right + noise, left - noise]).collect();
+        state.poses[i + 1] = compose(&state.poses[i], &integrate(&rolled, &drive).pose).0;
+    }
+    let (normal, _) = problem.linearize(&state);
+    for name in [Name::Right, Name::Left, Name::Track] {
+        let cost = |by: f64| {
+            let mut state = state.clone();
+            state.constants.values[name as usize] += by;
+            problem.linearize(&state).1
+        };
+        let (slope, found) = ((cost(H) - cost(-H)) / (2.0 * H), -normal.constants[name as usize]);
+        // The covariance's derivative through the arc of an edge is left out.
+        assert!((slope - found).abs() < 0.05 * slope.abs(), "{name:?}: {slope} {found}");
+    }
+}
