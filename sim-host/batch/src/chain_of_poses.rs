@@ -3,10 +3,12 @@
 
 #![expect(clippy::indexing_slicing, reason = "the edges' times have the length of the edges")]
 
+use std::ops::Range;
+
 use crate::odometry::{Travel, noisy_distances};
 use crate::recording::{Ping, Reading, Recording, RecordingError, StartPose};
 
-/// Distance over which the mean speed of the wheels is formed, metres.
+/// Distance over which the mean speed of the wheels is formed, metres: the length of a block.
 const STEADY: f64 = 0.1;
 
 /// When a new pose begins.
@@ -45,7 +47,7 @@ pub struct Chain {
     pub times: Vec<f64>,
     /// Wheel travel from each pose to the next.
     pub edges: Vec<Vec<Travel>>,
-    /// For each edge, the distances that both wheels roll at their mean speed around it, as multiples of those measured.
+    /// For each edge, the distances that both wheels roll at their mean speed in its block, as multiples of those measured.
     pub steadiness: Vec<[f64; 2]>,
     /// The pings between start and end.
     pub pings: Vec<Event>,
@@ -185,28 +187,36 @@ impl Builder {
 
 /// See [`Chain::steadiness`]. The variance of an edge must not depend on its own noise: edges whose wheels measure too little would
 /// count more, and scales and track width would be biased. As in a generalized linear model, it is that of the expected distance
-/// (Wedderburn, *Biometrika* 61, 1974): that at the mean speed in the edges around it.
+/// (Wedderburn, *Biometrika* 61, 1974): that at the mean speed in its block of edges. Blocks do not overlap, so that the expected distances
+/// have the sum of the measured ones.
 fn steadiness(edges: &[Vec<Travel>], moving: &[f64]) -> Vec<[f64; 2]> {
     // Of the sum, because the magnitudes of short steps would have the mean of their noise, too.
     let rolled: Vec<Travel> =
         edges.iter().map(|steps| sum(steps, |step| step).map(f64::abs)).collect();
-    let of = |i: usize| {
-        let mut around = i..i + 1;
-        loop {
-            let [right, left] = sum(&rolled[around.clone()], |distance| distance);
-            if right + left >= 2.0 * STEADY || around.len() == edges.len() {
-                let seconds = moving[around].iter().sum::<f64>();
-                let share = if seconds > 0.0 { moving[i] / seconds } else { 0.0 };
-                let expected = noisy_distances([right * share, left * share]);
-                let measured = noisy_distances(sum(&edges[i], f64::abs));
-                let ratio =
-                    |k: usize| if measured[k] > 0.0 { expected[k] / measured[k] } else { 1.0 };
-                return [ratio(0), ratio(1)];
-            }
-            around = around.start.saturating_sub(1)..(around.end + 1).min(edges.len());
-        }
-    };
-    (0..edges.len()).map(of).collect()
+    let mut by = Vec::with_capacity(edges.len());
+    while by.len() < edges.len() {
+        let block = block(&rolled, by.len());
+        let distances = sum(&rolled[block.clone()], |distance| distance);
+        let seconds: f64 = moving[block.clone()].iter().sum();
+        by.extend(block.map(|i| {
+            let share = if seconds > 0.0 { moving[i] / seconds } else { 0.0 };
+            let expected = noisy_distances(distances.map(|distance| distance * share));
+            let measured = noisy_distances(sum(&edges[i], f64::abs));
+            let ratio = |k: usize| if measured[k] > 0.0 { expected[k] / measured[k] } else { 1.0 };
+            [ratio(0), ratio(1)]
+        }));
+    }
+    by
+}
+
+/// The edges from one on in which both wheels roll [`STEADY`] in the mean, or the rest.
+fn block(rolled: &[Travel], from: usize) -> Range<usize> {
+    let mut distance = 0.0;
+    let reached = rolled[from..].iter().position(|[right, left]| {
+        distance += f64::midpoint(*right, *left);
+        distance >= STEADY
+    });
+    from..reached.map_or(rolled.len(), |last| from + last + 1)
 }
 
 /// The sums of a function of the travel of each wheel.
@@ -244,6 +254,22 @@ mod tests {
             for k in 0..2 {
                 assert!((by[k] * expected[k] - 0.01).abs() < 0.0005, "{by:?}");
             }
+        }
+    }
+
+    /// A robot that drives fast and turns slowly. Windows about each edge would give the edges of the turn the distances of the
+    /// fast ones beside them, and the sum would be too large.
+    #[test]
+    fn the_expected_distances_have_the_sum_of_the_measured_ones() {
+        let edge = |n: usize| if (n / 20) % 2 == 0 { [0.02, 0.02] } else { [0.004, -0.004] };
+        let edges: Vec<Vec<Travel>> = (0..400).map(|n| vec![edge(n)]).collect();
+        let moving = vec![0.1; edges.len()];
+        let by = steadiness(&edges, &moving);
+        for k in 0..2 {
+            let measured = |n: usize| noisy_distances(edge(n))[k];
+            let expected: f64 = (0..edges.len()).map(|n| by[n][k] * measured(n)).sum();
+            let sum: f64 = (0..edges.len()).map(measured).sum();
+            assert!((expected / sum - 1.0).abs() < 1e-9, "{expected} and {sum}");
         }
     }
 }
