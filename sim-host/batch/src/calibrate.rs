@@ -78,6 +78,22 @@ pub fn calibrate(
     best.fit.finish(best.bearings, wheel_noise)
 }
 
+/// How badly a recording fits the map, for the comparison of start poses: the loss from the robot file with this bearing of the servo's
+/// zero, radians.
+pub(crate) fn loss(
+    recording: &Recording,
+    walls: &[Wall],
+    nominal: &Nominal,
+    bearing: f64,
+) -> Result<f64, CalibrateError> {
+    let (chain, start) = Chain::of(recording, Spacing::CALIBRATION)?;
+    let reflectors = Reflector::of_walls(walls);
+    let mut fit = Fit::new(recording, &chain, &reflectors, nominal, start)?;
+    fit.start_from(Start { bearing, ..STARTS[0] });
+    fit.run()?;
+    Ok(fit.loss()?)
+}
+
 /// The solution from one start.
 struct Attempt<'a> {
     fit: Fit<'a>,

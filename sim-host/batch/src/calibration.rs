@@ -38,6 +38,12 @@ pub enum CalibrateError {
         "the log has no echo and there is no reference: nothing measures the wheels. Record ranges, or pass the true poses"
     )]
     NothingMeasured,
+    /// The search finds no pose.
+    #[error(
+        "the log has no start pose, and the search finds none in its first 90 s: pass the start (x, y in metres, heading in \
+         degrees), or check map and robot file"
+    )]
+    NoPose,
     /// Too short.
     #[error("the robot drives only {0:.1} m: at least 3 m are needed")]
     TooShort(f64),

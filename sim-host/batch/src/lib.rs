@@ -23,6 +23,7 @@
 //! | `fit` | association, checks |
 //! | `growth` | how the window grows |
 //! | [`calibrate`] | the calibration: attempts, intervals |
+//! | [`unknown_start`] | the calibration of a recording without a start pose |
 //! | [`robot_edit`] | what was found, in the text of a robot file |
 //! | [`turned`] | a wheel that was turned by hand |
 
@@ -43,5 +44,6 @@ pub mod reflector;
 pub mod robot_edit;
 pub mod solve;
 pub mod turned;
+pub mod unknown_start;
 pub mod wall;
 pub mod wheel_noise;

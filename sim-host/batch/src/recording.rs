@@ -99,6 +99,21 @@ impl Recording {
         self.pings.retain(|ping| ping.time <= end);
     }
 
+    /// Whether it has neither a start pose nor a reference that has one.
+    #[must_use]
+    pub fn has_no_start(&self) -> bool {
+        self.start.is_none() && self.references.is_empty()
+    }
+
+    /// The recording from a time on.
+    #[must_use]
+    pub fn after(&self, time: f64) -> Self {
+        let mut after = self.clone();
+        after.readings.retain(|reading| reading.time >= time);
+        after.pings.retain(|ping| ping.time >= time);
+        after
+    }
+
     /// Checks values and order.
     ///
     /// # Errors

@@ -6,11 +6,13 @@
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "all of this file is a test")]
 
 use std::f64::consts::{FRAC_PI_2, PI};
+use std::path::Path;
 
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
+use sonarfix::geometry::pose::Point;
 use sonarfix_batch::calibrate::{CalibrateError, Calibration, Determined, Nominal, calibrate};
 use sonarfix_batch::constants::Name;
 use sonarfix_batch::odometry::WheelNoise;
@@ -18,7 +20,10 @@ use sonarfix_batch::problem::Noise;
 use sonarfix_batch::recording::{
     Ping, Reading, Recording, RecordingError, ReferencePose, StartPose,
 };
+use sonarfix_batch::unknown_start::calibrate_from_search;
 use sonarfix_batch::wall::Wall;
+use sonarfix_map::{CLASSROOM, Scenario};
+use sonarfix_replay::find::Find;
 
 const WIDTH: f64 = 0.12;
 const NOMINAL: Nominal = Nominal {
@@ -39,7 +44,11 @@ const WHEEL_NOISE: f64 = 0.002;
 const ROOM: [f64; 2] = [4.0, 3.5];
 
 fn walls() -> Vec<Wall> {
-    let [x, y] = ROOM;
+    room(ROOM)
+}
+
+/// The walls of a rectangular room, metres.
+fn room([x, y]: [f64; 2]) -> Vec<Wall> {
     let corners = [[0.0, 0.0], [x, 0.0], [x, y], [0.0, y], [0.0, 0.0]];
     corners.windows(2).map(|ends| Wall::new(ends[0], ends[1]).unwrap()).collect()
 }
@@ -274,6 +283,60 @@ fn a_path_beside_the_map_is_refused() {
     };
     let refused = calibrate(&record(&exact, 12.0, 6), &corner, &NOMINAL);
     assert!(matches!(refused, Err(CalibrateError::Unexplained { .. })), "{refused:?}");
+}
+
+/// A calibration of a recording without its start, in a room.
+fn without_start(recording: Recording, walls: &[Wall]) -> Result<Calibration, CalibrateError> {
+    #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
+    let point = |[x, y]: [f64; 2]| Point::new(x as f32, y as f32);
+    let map: Vec<sonarfix::map::Wall> = walls
+        .iter()
+        .map(|wall| {
+            let [from, to] = wall.ends().map(point);
+            sonarfix::map::Wall::new(from, to).unwrap()
+        })
+        .collect();
+    // The robot of the scenario has the dimensions of `NOMINAL`.
+    let robot = Scenario::parse(CLASSROOM, "classroom.toml", Path::new("")).unwrap().robot;
+    let recording = Recording { start: None, ..recording };
+    calibrate_from_search(&recording, walls, &NOMINAL, &Find { robot: &robot, walls: &map })
+}
+
+/// The room is the same turned by 180°: either pose has the same constants.
+#[test]
+fn a_recording_without_a_start_begins_where_the_search_finds_the_pose() {
+    for bearing in [0.0, 0.157] {
+        let robot = Robot { bearing, ..ROBOT };
+        let found = without_start(record(&robot, 24.0, 8), &walls()).unwrap();
+        for (name, error, deviation) in errors(&found, &robot) {
+            assert!(error.abs() <= 4.5 * deviation, "{name:?}: {error} ± {deviation}");
+        }
+        let offset = found.bearings.unwrap().offset;
+        assert!((offset - bearing).abs() < 0.01, "{bearing}: {offset}");
+        assert!(found.trajectory[0].0 > 10.0, "the search takes its time");
+    }
+}
+
+/// Rooms of other sizes have the same corners: the search finds one that fits, and its walls determine the constants.
+#[test]
+fn another_room_does_not_mislead_a_calibration_from_the_search() {
+    for (seed, size) in (8..).zip([[8.0, 7.0], [5.0, 3.5], [4.0, 3.0]]) {
+        if let Ok(found) = without_start(record(&ROBOT, 16.0, seed), &room(size)) {
+            for (name, error, deviation) in errors(&found, &ROBOT) {
+                assert!(error.abs() <= 5.0 * deviation, "{size:?} {name:?}: {error} ± {deviation}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_recording_without_a_start_that_is_too_short_for_the_search_has_no_pose() {
+    let refused = |recording| without_start(recording, &walls()).map(|found| found.distance);
+    let mut short = record(&ROBOT, 4.0, 7);
+    short.cut(0.2);
+    assert_eq!(refused(short.clone()), Err(CalibrateError::NoPose));
+    short.pings.clear();
+    assert_eq!(refused(short), Err(CalibrateError::NothingMeasured));
 }
 
 #[test]

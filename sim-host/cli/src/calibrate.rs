@@ -12,12 +12,14 @@ use sonarfix_batch::log;
 use sonarfix_batch::noise::INLIER;
 use sonarfix_batch::recording::StartPose;
 use sonarfix_batch::robot_edit;
+use sonarfix_batch::unknown_start::calibrate_from_search;
 use sonarfix_batch::wall::Wall;
 use sonarfix_batch::wheel_noise::{Estimated, Noisy};
 use sonarfix_hal::config::RobotConfig;
 use sonarfix_map::{Floor, MapFile, robot_file};
 use sonarfix_replay::REFERENCE_HEADER;
 use sonarfix_replay::diagnosis::Diagnosis;
+use sonarfix_replay::find::Find;
 use sonarfix_report::Table;
 use sonarfix_report::residuals::{Residual, residuals};
 use sonarfix_sim::trace::Pose;
@@ -46,6 +48,9 @@ pub struct Args {
     /// The start pose, instead of that of the log: metres and degrees.
     #[arg(long, value_name = "X,Y,HEADING", value_delimiter = ',', allow_hyphen_values = true)]
     start: Option<Vec<f64>>,
+    /// Searches for the pose in the first 90 s, instead of taking the start pose of the log; also without this option if it has none.
+    #[arg(long, conflicts_with_all = ["start", "reference"])]
+    search: bool,
     /// The robot file to write, with the calibration.
     #[arg(long, value_name = "ROBOT.toml")]
     out: Option<PathBuf>,
@@ -79,8 +84,15 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let read = read_log(args, &robot)?;
     let floor = floor(args)?;
     let nominal = log::nominal(&robot, !read.has_scans);
-    let found = calibrate(&read.recording, &fitted_walls(floor.as_ref()), &nominal);
+    let fitted = fitted_walls(floor.as_ref());
     let walls = floor.map(|floor| floor.walls()).unwrap_or_default();
+    let is_searched = args.search || read.recording.has_no_start();
+    let found = if is_searched {
+        let find = Find { robot: &robot, walls: &walls };
+        calibrate_from_search(&read.recording, &fitted, &nominal, &find)
+    } else {
+        calibrate(&read.recording, &fitted, &nominal)
+    };
     let diagnosis = diagnosis::diagnose(&args.log, &robot, &walls, given_start(args)?)?;
     let found = found.inspect_err(|_| eprint!("{}", diagnosis::paragraphs(&diagnosis)));
     let found = found.with_context(|| args.log.display().to_string())?;
@@ -106,7 +118,10 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         sonarfix_terminal::json::print(&Json::of(&found, &diagnosis))
     } else {
         println!("{}", estimates(&found, &robot).text());
-        println!("\n{}", statement(&found));
+        println!("\n{}", statement(&found, &robot));
+        if is_searched {
+            println!("{}", searched(&found));
+        }
         print!("{}", diagnosis::paragraphs(&diagnosis));
         Ok(())
     }
@@ -246,7 +261,7 @@ fn estimates(found: &Calibration, robot: &RobotConfig) -> Table {
 }
 
 /// What was used, and what the recording cannot tell.
-fn statement(found: &Calibration) -> String {
+fn statement(found: &Calibration, robot: &RobotConfig) -> String {
     let [left, right] = found.turned.map(f64::to_degrees);
     let mut lines = vec![format!(
         "{:.1} m, turns of {left:.0}° to the left and {right:.0}° to the right; {} of {} echoes from walls fit; {} reference poses",
@@ -254,6 +269,7 @@ fn statement(found: &Calibration) -> String {
     )];
     let noise = &found.noise;
     lines.push(wheel_noise(&found.wheel_noise));
+    lines.extend(judged(&found.wheel_noise.wheel, robot));
     if found.expected > 0 {
         let per_metre = 1e3 * noise.range_per_metre;
         lines.push(format!("range noise {:.2} mm and {per_metre:.2} mm/m", 1e3 * noise.range));
@@ -291,6 +307,15 @@ fn statement(found: &Calibration) -> String {
     lines.join("\n")
 }
 
+/// Where a calibration from the search begins.
+fn searched(found: &Calibration) -> String {
+    let start = found.trajectory.first().map(|(time, pose, _)| {
+        let heading = pose.z.to_degrees();
+        format!(": {:.2} m, {:.2} m, {heading:.0} deg at {time:.1} s", pose.x, pose.y)
+    });
+    format!("it begins at a pose that the search has found{}", start.unwrap_or_default())
+}
+
 /// The noise of the wheels and its parts, with their intervals.
 fn wheel_noise(found: &Estimated) -> String {
     let shown = |noise: &Noisy| {
@@ -305,6 +330,23 @@ fn wheel_noise(found: &Estimated) -> String {
         shown(&found.distance),
         shown(&found.turn)
     )
+}
+
+/// Whether the noise of the robot file is outside of the interval.
+fn judged(found: &Noisy, robot: &RobotConfig) -> Option<String> {
+    let [least, most] = found.interval();
+    let file = f64::from(robot.localizer.drive.wheel_noise.0.0);
+    let (size, consequence) = match file {
+        file if file < least => {
+            ("small", "its filter is too sure of the pose, and refuses right ranges")
+        }
+        file if file > most => ("large", "its filter follows the ranges more than it needs to"),
+        _ => return None,
+    };
+    let stated = format!("wheel_noise = \"{:.1} mm/sqrt(m)\"", 1e3 * file);
+    found
+        .is_determined()
+        .then(|| format!("{stated} in the robot file is too {size}: {consequence}"))
 }
 
 /// The result in SI units.

@@ -90,6 +90,16 @@ fn the_robot_file_is_corrected_and_keeps_its_comments() {
     let summary: serde_json::Value = serde_json::from_slice(&replay.stdout).unwrap();
     assert!(summary["position_rms"].as_f64().unwrap() < 0.02, "{summary}");
 
+    // Without a start pose the calibration begins where the search finds it.
+    let without_start = log().replace("start,0,1.5,1.5,0,0.01,0.01\n", "");
+    fs::write(path("nowhere.csv"), without_start).unwrap();
+    let searched = sonarfix(&["calibrate", "nowhere.csv", "--out", "searched.toml"]);
+    assert!(searched.status.success(), "{}", String::from_utf8_lossy(&searched.stderr));
+    let message = String::from_utf8_lossy(&searched.stdout).into_owned();
+    assert!(message.contains("it begins at a pose that the search has found"), "{message}");
+    let robot = sonarfix_map::robot_file::read(&path("searched.toml")).unwrap();
+    assert!((f64::from(robot.right_wheel.signed_travel().0) / 1e-5 - 1.02).abs() < 2e-3);
+
     // A recording without a map has nothing that measures the wheels.
     fs::remove_file(path("map.toml")).unwrap();
     let refused = sonarfix(&["calibrate", "log.csv"]);

@@ -124,7 +124,8 @@ impl Find<'_> {
     }
 
     /// Searches through some records.
-    pub(crate) fn run_records<'r>(&self, records: impl Iterator<Item = &'r Record>) -> Found {
+    #[must_use]
+    pub fn run_records<'r>(&self, records: impl Iterator<Item = &'r Record>) -> Found {
         let mut run = Run::new(self.robot, self.walls);
         records.for_each(|record| run.take(record));
         run.end(0)

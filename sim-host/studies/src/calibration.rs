@@ -12,8 +12,11 @@ use sonarfix_batch::calibrate::{CalibrateError, Calibration, Nominal, calibrate}
 use sonarfix_batch::constants::Name;
 use sonarfix_batch::log;
 use sonarfix_batch::recording::Recording;
+use sonarfix_batch::unknown_start::calibrate_from_search;
 use sonarfix_batch::wall::Wall;
+use sonarfix_hal::config::RobotConfig;
 use sonarfix_map::{CLASSROOM, FileError, Scenario, Upsets};
+use sonarfix_replay::find::Find;
 use sonarfix_sim::progress::Progress;
 use sonarfix_sim::simulate::SimulationError;
 
@@ -126,9 +129,10 @@ pub fn trials(
     count: u32,
     metres: f64,
     errors: Errors,
+    from: From,
     progress: &impl Progress,
 ) -> Result<Vec<Trial>, CalibrationStudyError> {
-    each_seed(first, count, progress, |seed| trial(seed, metres, errors))
+    each_seed(first, count, progress, |seed| trial(seed, metres, errors, from))
 }
 
 /// Runs a trial for each seed in parallel; after an interruption those that have begun.
@@ -151,15 +155,32 @@ fn each_seed<T: Send>(
 ///
 /// # Errors
 /// [`CalibrationStudyError`].
-pub fn trial(seed: u64, metres: f64, errors: Errors) -> Result<Trial, CalibrationStudyError> {
+pub fn trial(
+    seed: u64,
+    metres: f64,
+    errors: Errors,
+    from: From,
+) -> Result<Trial, CalibrationStudyError> {
     let robot = Simulated::new(seed, metres, errors, None)?;
-    Ok(Trial { seed, outcome: robot.calibrated().map(|found| robot.compare(&found)) })
+    Ok(Trial { seed, outcome: robot.calibrated(from).map(|found| robot.compare(&found)) })
+}
+
+/// What a calibration begins from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum From {
+    /// The start pose.
+    Start,
+    /// The poses that the search finds.
+    Search,
 }
 
 /// A simulated robot after its drive.
 struct Simulated {
     recording: Recording,
     walls: Vec<Wall>,
+    /// The map as the robot has it.
+    map: Vec<sonarfix::map::Wall>,
+    robot: RobotConfig,
     /// Its file.
     nominal: Nominal,
     /// How much the file differs from the truth.
@@ -204,13 +225,21 @@ impl Simulated {
         let floor = simulation.scenario.floor.named_walls();
         let walls: Vec<Wall> =
             floor.iter().filter_map(|wall| Wall::new(wall.from(), wall.to())).collect();
+        let map = simulation.scenario.floor.walls();
         let nominal = log::nominal(&robot, true);
         let range_scale = simulation.range_scale();
-        Ok(Self { recording, walls, nominal, errors, range_scale, track_width, metres })
+        Ok(Self { recording, walls, map, robot, nominal, errors, range_scale, track_width, metres })
     }
 
-    fn calibrated(&self) -> Result<Calibration, CalibrateError> {
-        calibrate(&self.recording, &self.walls, &self.nominal)
+    /// The calibration from the start pose, or from those that the search finds.
+    fn calibrated(&self, from: From) -> Result<Calibration, CalibrateError> {
+        let Self { recording, walls, nominal, robot, map, .. } = self;
+        match from {
+            From::Start => calibrate(recording, walls, nominal),
+            From::Search => {
+                calibrate_from_search(recording, walls, nominal, &Find { robot, walls: map })
+            }
+        }
     }
 
     /// Compares a calibration with the truth.
@@ -331,7 +360,7 @@ mod tests {
 
     #[test]
     fn simulated_robots_are_calibrated_within_their_intervals() {
-        let trials = trials(70_000, 4, 20.0, Errors::BUILDER, &|| ()).unwrap();
+        let trials = trials(70_000, 4, 20.0, Errors::BUILDER, From::Start, &|| ()).unwrap();
         for trial in trials {
             let compared = trial.outcome.unwrap();
             assert!(compared.len() >= 6, "{compared:?}");
@@ -349,7 +378,7 @@ mod tests {
     #[test]
     fn wheels_that_are_ten_per_cent_wrong_are_found_from_several_starts() {
         for seed in [330_001, 330_017] {
-            let compared = trial(seed, 20.0, Errors::GROSS).unwrap().outcome.unwrap();
+            let compared = trial(seed, 20.0, Errors::GROSS, From::Start).unwrap().outcome.unwrap();
             for Compared { name, error, deviation, limit } in compared {
                 assert!(
                     error.abs() <= 2.0 * limit.max(2.0 * deviation),

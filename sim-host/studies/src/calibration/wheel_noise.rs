@@ -6,7 +6,7 @@ use sonarfix_batch::calibrate::CalibrateError;
 use sonarfix_batch::wheel_noise::{Estimated, Noisy};
 use sonarfix_sim::progress::Progress;
 
-use super::{CalibrationStudyError, Errors, Simulated, each_seed};
+use super::{CalibrationStudyError, Errors, From, Simulated, each_seed};
 
 /// Largest relative error of a good estimate.
 const LIMIT: f64 = 0.25;
@@ -35,7 +35,7 @@ pub fn trials(
 ) -> Result<Row, CalibrationStudyError> {
     let outcomes = each_seed(first, count, progress, |seed| {
         let robot = Simulated::new(seed, metres, Errors::BUILDER, Some(truth))?;
-        Ok(robot.calibrated().map(|found| found.wheel_noise))
+        Ok(robot.calibrated(From::Start).map(|found| found.wheel_noise))
     })?;
     Ok(Row { metres, truth, outcomes })
 }

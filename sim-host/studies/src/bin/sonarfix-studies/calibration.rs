@@ -1,6 +1,6 @@
 //! `sonarfix-studies calibration`: the accuracy of `sonarfix calibrate` on simulated robots.
 
-use sonarfix_studies::calibration::{self, Errors, wheel_noise};
+use sonarfix_studies::calibration::{self, Errors, From, wheel_noise};
 
 use sonarfix_terminal::progress::Runs;
 
@@ -21,6 +21,9 @@ pub struct Args {
     /// True noises of the wheels, mm/√m: how exactly these are found, instead of the constants.
     #[arg(long, value_delimiter = ',', value_name = "MM", conflicts_with = "gross")]
     wheel_noise: Vec<f64>,
+    /// Without the start pose: from the poses that the search finds.
+    #[arg(long, conflicts_with = "wheel_noise")]
+    unknown_start: bool,
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
@@ -29,11 +32,12 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
         return wheel_noises(args);
     }
     let errors = if args.gross { Errors::GROSS } else { Errors::BUILDER };
+    let from = if args.unknown_start { From::Search } else { From::Start };
     let sets = u32::try_from(args.metres.len())?;
     let progress = Runs::new(args.runs.saturating_mul(sets));
     let mut rows = Vec::new();
     for &metres in &args.metres {
-        let trials = calibration::trials(args.seed, args.runs, metres, errors, &progress)?;
+        let trials = calibration::trials(args.seed, args.runs, metres, errors, from, &progress)?;
         // An interruption may come before the first trial of a distance.
         if !trials.is_empty() {
             rows.push((metres, trials));
