@@ -11,7 +11,7 @@ pub use crate::calibration::{
 };
 use crate::chain_of_poses::{Chain, Spacing};
 use crate::constants::{COUNT, Name};
-use crate::fit::{Fit, Start};
+use crate::fit::{Fit, ROUNDS, Start};
 use crate::problem::PosePrior;
 use crate::recording::Recording;
 use crate::reflector::Reflector;
@@ -33,6 +33,9 @@ const STARTS: [Start; 6] = [
 const SAME: f64 = 1.0;
 /// How often the poses are found again, at most, while this makes them more likely.
 const RETRACED: usize = 3;
+/// The gates of each such attempt, metres. Through a wide one the echoes of an object beside a wall, whose range changes as the robot
+/// drives, lead the poses away; a narrow one loses a pose that odometry predicts badly.
+const RETRACED_WITH: [&[f64]; 3] = [&ROUNDS, &[0.04, 0.04], &[0.02, 0.02]];
 /// Assumed where a half alone has no solution.
 const UNKNOWN_SCATTER: f64 = 3.0;
 
@@ -111,18 +114,25 @@ impl<'a> Attempt<'a> {
         }
         let mut best = grown;
         for _ in 0..RETRACED {
-            match best.retraced() {
-                Ok(next) if next.is_better_than(&best, SAME) => best = next,
-                _ => break,
+            let mut is_better = false;
+            for gates in RETRACED_WITH {
+                if let Ok(next) = best.retraced(gates)
+                    && next.is_better_than(&best, SAME)
+                {
+                    (best, is_better) = (next, true);
+                }
+            }
+            if !is_better {
+                break;
             }
         }
         Ok(best)
     }
 
     /// The solution about the poses that its constants lead to.
-    fn retraced(&self) -> Result<Self, CalibrateError> {
+    fn retraced(&self, gates: &[f64]) -> Result<Self, CalibrateError> {
         let mut fit = self.fit.clone();
-        fit.retrace()?;
+        fit.retrace(gates)?;
         let bearings = fit.settle()?;
         Ok(Self { loss: fit.loss()?, fit, bearings })
     }

@@ -46,7 +46,7 @@ impl Fit<'_> {
             };
             let end = until(&chain.distances, DISTANCE).min(until(&chain.turns, turn));
             let end = end.max(known + 1).min(count);
-            self.track(known..end, before)?;
+            self.track(known..end, before, &ROUNDS)?;
             self.problem.window = 0..end;
             known = end;
             self.refine(&ROUNDS)?;
@@ -59,12 +59,12 @@ impl Fit<'_> {
     }
 
     /// Finds the poses again, from the start, with the constants that the growth has found: at its beginning it knew them less, and
-    /// may have taken wrong reflectors.
-    pub(crate) fn retrace(&mut self) -> Result<(), CalibrateError> {
+    /// may have taken wrong reflectors. Associates with these gates.
+    pub(crate) fn retrace(&mut self, gates: &[f64]) -> Result<(), CalibrateError> {
         let count = self.problem.chain.len();
         let PosePrior { position, heading, .. } = self.problem.first;
         self.problem.matches.fill(None);
-        self.track(1..count, [position, heading])?;
+        self.track(1..count, [position, heading], gates)?;
         self.problem.window = 0..count;
         self.refine(&[ROUNDS[1], ROUNDS[2], ROUNDS[2]])
     }
@@ -82,7 +82,12 @@ impl Fit<'_> {
 
     /// Finds poses beyond the window: by odometry as far as it predicts them, then corrected by their echoes with the constants
     /// so far, and so on.
-    fn track(&mut self, poses: Range<usize>, mut before: [f64; 2]) -> Result<(), CalibrateError> {
+    fn track(
+        &mut self,
+        poses: Range<usize>,
+        mut before: [f64; 2],
+        gates: &[f64],
+    ) -> Result<(), CalibrateError> {
         let (first, priors) = (self.problem.first, self.problem.priors);
         let mut from = poses.start;
         while from < poses.end {
@@ -94,7 +99,7 @@ impl Fit<'_> {
                     PosePrior { pose: self.state.poses[from - 1], position, heading };
                 self.problem.priors = Priors::fixed_at(&self.state.constants);
                 self.problem.window = from - 1..to;
-                self.refine(&ROUNDS)?;
+                self.refine(gates)?;
                 let covariance =
                     covariance(&self.problem, &self.state).map_err(SolveError::from)?;
                 before = covariance.poses.last().map_or(before, deviations);
