@@ -1,5 +1,6 @@
 //! `sonarfix calibrate`: the calibration of a robot from a recording.
 
+use std::fmt;
 use std::io::{BufReader, Write};
 use std::path::PathBuf;
 
@@ -114,13 +115,14 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
             .map_err(|error| anyhow::anyhow!("cannot draw the figure: {error}"))?;
         sonarfix_files::write(out, svg)?;
     }
+    let begin = Begin::of(&found).filter(|_| is_searched);
     if args.json {
-        sonarfix_terminal::json::print(&Json::of(&found, &diagnosis))
+        sonarfix_terminal::json::print(&Json::of(&found, begin, &diagnosis))
     } else {
         println!("{}", estimates(&found, &robot).text());
         println!("\n{}", statement(&found, &robot));
-        if is_searched {
-            println!("{}", searched(&found));
+        if let Some(begin) = begin {
+            println!("{begin}");
         }
         print!("{}", diagnosis::paragraphs(&diagnosis));
         Ok(())
@@ -307,13 +309,31 @@ fn statement(found: &Calibration, robot: &RobotConfig) -> String {
     lines.join("\n")
 }
 
-/// Where a calibration from the search begins.
-fn searched(found: &Calibration) -> String {
-    let start = found.trajectory.first().map(|(time, pose, _)| {
-        let heading = pose.z.to_degrees();
-        format!(": {:.2} m, {:.2} m, {heading:.0} deg at {time:.1} s", pose.x, pose.y)
-    });
-    format!("it begins at a pose that the search has found{}", start.unwrap_or_default())
+/// The pose that the search has found, in SI units: the calibration begins there.
+#[derive(Debug, Clone, Copy, Serialize)]
+struct Begin {
+    time: f64,
+    x: f64,
+    y: f64,
+    heading: f64,
+}
+
+impl Begin {
+    fn of(found: &Calibration) -> Option<Self> {
+        let (time, pose, _) = found.trajectory.first()?;
+        Some(Self { time: *time, x: pose.x, y: pose.y, heading: pose.z })
+    }
+}
+
+impl fmt::Display for Begin {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { time, x, y, heading } = self;
+        let degrees = heading.to_degrees();
+        write!(
+            f,
+            "it begins at {time:.1} s, where the search finds {x:.2} m, {y:.2} m, {degrees:.0} deg"
+        )
+    }
 }
 
 /// The noise of the wheels and its parts, with their intervals.
@@ -352,6 +372,7 @@ fn judged(found: &Noisy, robot: &RobotConfig) -> Option<String> {
 /// The result in SI units.
 #[derive(Serialize)]
 struct Json<'a> {
+    begin: Option<Begin>,
     estimates: Vec<JsonEstimate>,
     bearing_offset: Option<[f64; 2]>,
     bearing_scale: Option<[f64; 2]>,
@@ -392,7 +413,7 @@ impl JsonNoise {
 }
 
 impl<'a> Json<'a> {
-    fn of(found: &Calibration, diagnosis: &'a Diagnosis) -> Self {
+    fn of(found: &Calibration, begin: Option<Begin>, diagnosis: &'a Diagnosis) -> Self {
         let estimates = found.estimates.iter().map(|estimate| JsonEstimate {
             name: estimate.name.label(),
             value: estimate.value,
@@ -406,6 +427,7 @@ impl<'a> Json<'a> {
         });
         let bearings = found.bearings.as_ref();
         Self {
+            begin,
             estimates: estimates.collect(),
             bearing_offset: bearings.map(|b| [b.offset, b.offset_deviation]),
             bearing_scale: bearings.map(|b| [b.scale, b.scale_deviation]),

@@ -96,7 +96,7 @@ fn the_robot_file_is_corrected_and_keeps_its_comments() {
     let searched = sonarfix(&["calibrate", "nowhere.csv", "--out", "searched.toml"]);
     assert!(searched.status.success(), "{}", String::from_utf8_lossy(&searched.stderr));
     let message = String::from_utf8_lossy(&searched.stdout).into_owned();
-    assert!(message.contains("it begins at a pose that the search has found"), "{message}");
+    assert!(message.contains("where the search finds"), "{message}");
     let robot = sonarfix_map::robot_file::read(&path("searched.toml")).unwrap();
     assert!((f64::from(robot.right_wheel.signed_travel().0) / 1e-5 - 1.02).abs() < 2e-3);
 
