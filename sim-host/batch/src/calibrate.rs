@@ -33,8 +33,8 @@ const STARTS: [Start; 6] = [
 const SAME: f64 = 1.0;
 /// How often the poses are found again, at most, while this makes them more likely.
 const RETRACED: usize = 3;
-/// The gates of each such attempt, metres. Through a wide one the echoes of an object beside a wall, whose range changes as the robot
-/// drives, lead the poses away; a narrow one loses a pose that odometry predicts badly.
+/// The gates of each such attempt, metres. Through a wide gate the echoes of an object beside a wall are associated with the wall, and the
+/// poses follow its ranges as the robot drives; with a narrow one poses that odometry predicts badly find no wall.
 const RETRACED_WITH: [&[f64]; 3] = [&ROUNDS, &[0.04, 0.04], &[0.02, 0.02]];
 /// Assumed where a half alone has no solution.
 const UNKNOWN_SCATTER: f64 = 3.0;
