@@ -261,7 +261,8 @@ mod tests {
     /// fast ones beside them, and the sum would be too large.
     #[test]
     fn the_expected_distances_have_the_sum_of_the_measured_ones() {
-        let edge = |n: usize| if (n / 20) % 2 == 0 { [0.02, 0.02] } else { [0.004, -0.004] };
+        let edge =
+            |n: usize| if (n / 20).is_multiple_of(2) { [0.02, 0.02] } else { [0.004, -0.004] };
         let edges: Vec<Vec<Travel>> = (0..400).map(|n| vec![edge(n)]).collect();
         let moving = vec![0.1; edges.len()];
         let by = steadiness(&edges, &moving);
