@@ -6,6 +6,8 @@ use sonarfix_batch::calibrate::CalibrateError;
 use sonarfix_batch::wheel_noise::{Estimated, Noisy};
 use sonarfix_sim::progress::Progress;
 
+use crate::floor_plan::compare::quantile;
+
 use super::{CalibrationStudyError, Errors, From, Simulated, each_seed};
 
 /// Largest relative error of a good estimate.
@@ -64,7 +66,7 @@ pub fn page(rows: &[Row]) -> String {
             "| {:.0} m | {:.1} mm/√m | {:.2} mm/√m | {within:.1} % | {:.1} % | {:.1} % | {:.1} % | {} of {} |",
             row.metres,
             1e3 * truth,
-            1e3 * median(of_wheels),
+            1e3 * quantile(of_wheels, 0.5),
             inside(|found| found.wheel),
             inside(|found| found.distance),
             inside(|found| found.turn),
@@ -81,12 +83,6 @@ fn share<T>(values: &[T], has: impl Fn(&T) -> bool) -> f64 {
     let (part, all) =
         (values.iter().filter(|value| has(value)).count() as f64, values.len().max(1) as f64);
     100.0 * part / all
-}
-
-/// The value in the middle; of an even number the upper one. NaN without values.
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 #[cfg(test)]
