@@ -32,6 +32,8 @@ use sonarfix_terminal::output::{check_file, open};
 const SHOWN: usize = 10;
 /// Half of a 95 % interval, in standard deviations.
 const INTERVAL: f64 = 1.96;
+/// A wheel noise so many times the upper limit of its interval is too large.
+const AMPLE: f64 = 2.0;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -271,7 +273,8 @@ fn statement(found: &Calibration, robot: &RobotConfig) -> String {
     )];
     let noise = &found.noise;
     lines.push(wheel_noise(&found.wheel_noise));
-    lines.extend(judged(&found.wheel_noise.wheel, robot));
+    let file = f64::from(robot.localizer.drive.wheel_noise.0.0);
+    lines.extend(judged(&found.wheel_noise.wheel, file));
     if found.expected > 0 {
         let per_metre = 1e3 * noise.range_per_metre;
         lines.push(format!("range noise {:.2} mm and {per_metre:.2} mm/m", 1e3 * noise.range));
@@ -352,15 +355,16 @@ fn wheel_noise(found: &Estimated) -> String {
     )
 }
 
-/// Whether the noise of the robot file is outside of the interval.
-fn judged(found: &Noisy, robot: &RobotConfig) -> Option<String> {
+/// Whether the noise of the robot file, m/√m, is below the interval, or far above it: a filter needs some more than the recording shows.
+fn judged(found: &Noisy, file: f64) -> Option<String> {
     let [least, most] = found.interval();
-    let file = f64::from(robot.localizer.drive.wheel_noise.0.0);
     let (size, consequence) = match file {
         file if file < least => {
             ("small", "its filter is too sure of the pose, and refuses right ranges")
         }
-        file if file > most => ("large", "its filter follows the ranges more than it needs to"),
+        file if file > AMPLE * most => {
+            ("large", "its filter follows the ranges more than it needs to")
+        }
         _ => return None,
     };
     let stated = format!("wheel_noise = \"{:.1} mm/sqrt(m)\"", 1e3 * file);
@@ -443,5 +447,23 @@ impl<'a> Json<'a> {
             distance: found.distance,
             diagnosis,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wheel_noise_that_contradicts_the_recording_is_named() {
+        // An interval of 1.6 to 2.4 mm/√m.
+        let found = Noisy { value: 0.002, deviation: 0.1 };
+        let small = judged(&found, 0.001).unwrap();
+        assert!(
+            small.starts_with("wheel_noise = \"1.0 mm/sqrt(m)\" in the robot file is too small")
+        );
+        assert!(judged(&found, 0.01).unwrap().contains("too large"));
+        assert_eq!(judged(&found, 0.003), None);
+        assert_eq!(judged(&Noisy { deviation: 0.6, ..found }, 1e-5), None);
     }
 }
