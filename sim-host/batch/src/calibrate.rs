@@ -19,13 +19,16 @@ use crate::solve::{SolveError, covariance, solve};
 use crate::wall::Wall;
 use crate::wheel_noise::Estimated;
 
-/// What the estimates start from: the robot file, noisy wheels, a servo horn fitted 8° aside, and wheels that differ by 12 %. Where one
+/// Bearing of the zero of a servo whose horn is fitted aside, radians: 8°.
+pub(crate) const ASIDE: f64 = 0.14;
+
+/// What the estimates start from: the robot file, noisy wheels, a servo horn fitted aside, and wheels that differ by 12 %. Where one
 /// of them ends in a wrong minimum, another does not.
 const STARTS: [Start; 6] = [
     Start { bearing: 0.0, wheel_difference: None, wheel_noise: 0.0 },
     Start { bearing: 0.0, wheel_difference: None, wheel_noise: 0.015 },
-    Start { bearing: 0.14, wheel_difference: None, wheel_noise: 0.0 },
-    Start { bearing: -0.14, wheel_difference: None, wheel_noise: 0.0 },
+    Start { bearing: ASIDE, wheel_difference: None, wheel_noise: 0.0 },
+    Start { bearing: -ASIDE, wheel_difference: None, wheel_noise: 0.0 },
     Start { bearing: 0.0, wheel_difference: Some(0.12), wheel_noise: 0.0 },
     Start { bearing: 0.0, wheel_difference: Some(-0.12), wheel_noise: 0.0 },
 ];

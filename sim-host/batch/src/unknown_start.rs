@@ -8,7 +8,7 @@ use sonarfix::config::RangerId;
 use sonarfix_replay::find::Find;
 use sonarfix_replay::log::Record;
 
-use crate::calibrate::{calibrate, loss};
+use crate::calibrate::{ASIDE, calibrate, loss};
 use crate::calibration::{CalibrateError, Calibration, Nominal};
 use crate::odometry::wrap;
 use crate::recording::{Recording, StartPose};
@@ -16,8 +16,8 @@ use crate::wall::Wall;
 
 /// Times from the beginning of the recording in which the pose is searched, seconds, until one leads to a calibration.
 const SEARCHED: [f64; 3] = [20.0, 40.0, 90.0];
-/// Bearings of the servo's zero that the search assumes, radians: a horn is fitted 8° aside at most.
-const BEARINGS: [f64; 3] = [0.0, 0.14, -0.14];
+/// Bearings of the servo's zero that the search assumes, radians.
+const BEARINGS: [f64; 3] = [0.0, ASIDE, -ASIDE];
 /// Standard deviations of a pose that was found with wrong constants, at least: metres and radians.
 const DEVIATIONS: [f64; 2] = [0.1, 0.1];
 /// Differences below which two poses are one: metres and radians.

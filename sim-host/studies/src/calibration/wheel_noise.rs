@@ -20,7 +20,7 @@ pub struct Row {
     pub metres: f64,
     /// True noise of each wheel, m/√m.
     pub truth: f64,
-    /// The estimate of each drive, or why there is none.
+    /// The estimate of each drive, or the error.
     pub outcomes: Vec<Result<Estimated, CalibrateError>>,
 }
 

@@ -11,8 +11,9 @@ use sonarfix_studies::search_bound::{self, Bounded, Quantiles, Times};
 use sonarfix_studies::search_study::{self, Plans, Summary};
 use sonarfix_terminal::progress::Runs;
 
+use crate::output::{self, Output};
+
 #[derive(Debug, clap::Args)]
-#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub struct Args {
     /// A scenario (docs/formats.md).
     #[arg(required_unless_present = "floor_plans")]
@@ -44,12 +45,8 @@ pub struct Args {
     /// Computes for each trial how soon its pings allow to find the pose: a grid of poses, with the odometry known exactly.
     #[arg(long, requires = "floor_plans", conflicts_with = "other_map")]
     bound: bool,
-    /// Prints every trial.
-    #[arg(long)]
-    trials: bool,
-    /// Prints JSON instead of a table.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    output: Output,
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
@@ -79,15 +76,8 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     runs.end()?;
     anyhow::ensure!(!trials.is_empty(), "at least 1 trial is needed");
     let summary = Summary::new(&trials);
-    if args.json {
-        let answer = serde_json::json!({ "summary": summary, "trials": trials });
-        return sonarfix_terminal::json::print(&answer);
-    }
-    if args.trials {
-        println!("{}\n", trial_table(&trials).text());
-    }
-    println!("{}", summary_table(&summary, args.seconds).text());
-    Ok(())
+    let table = |summary: &_| summary_table(summary, args.seconds);
+    args.output.print(("summary", &summary), &trials, table, trial_table)
 }
 
 /// The trials, each with its bound.
@@ -96,24 +86,14 @@ fn bound(plans: &Plans, args: &Args, runs: Runs) -> anyhow::Result<()> {
     runs.end()?;
     anyhow::ensure!(!trials.is_empty(), "at least 1 trial is needed");
     let times = Times::new(&trials);
-    if args.json {
-        let answer = serde_json::json!({ "times": times, "trials": trials });
-        return sonarfix_terminal::json::print(&answer);
-    }
-    if args.trials {
-        println!("{}\n", bound_table(&trials).text());
-    }
-    println!("{}", times_table(&times, args.seconds).text());
-    Ok(())
+    let table = |times: &_| times_table(times, args.seconds);
+    args.output.print(("times", &times), &trials, table, bound_table)
 }
 
 fn bound_table(trials: &[Bounded]) -> Table {
     let row = |bounded: &Bounded| {
-        let possible = bounded.possible_after.map_or("-".to_owned(), |after| {
-            format!("{after:.1} s{}", if bounded.is_right { "" } else { ", wrong" })
-        });
-        let found = bounded.trial.unique_after;
-        let found = found.map_or("-".to_owned(), |after| format!("{after:.1} s"));
+        let possible = output::found(bounded.possible_after, bounded.is_right);
+        let found = output::found(bounded.trial.unique_after, true);
         vec![bounded.trial.seed.to_string(), possible, found]
     };
     Table {

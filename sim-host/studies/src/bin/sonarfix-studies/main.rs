@@ -9,6 +9,7 @@ mod find;
 mod find_forecast;
 mod floor_plans;
 mod health;
+mod output;
 mod peers;
 mod reality;
 mod recordings;

@@ -5,6 +5,8 @@ use sonarfix_studies::relocalization::{self, Summary, Trial, Upset};
 
 use sonarfix_terminal::progress::Runs;
 
+use crate::output::Output;
+
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Number of trials, each in a floor plan of its own.
@@ -22,12 +24,8 @@ pub struct Args {
     /// Starts with a pose, and lets a wheel slip after 30 s, which turns the odometry by so much.
     #[arg(long, value_name = "DEGREES", conflicts_with = "kidnapped")]
     slipped: Option<f64>,
-    /// Prints every trial.
-    #[arg(long)]
-    trials: bool,
-    /// Prints JSON instead of a table.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    output: Output,
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
@@ -42,16 +40,8 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     runs.end()?;
     anyhow::ensure!(!trials.is_empty(), "no floor plan of these seeds is large enough");
     let summary = Summary::new(&trials);
-    if args.json {
-        return sonarfix_terminal::json::print(
-            &serde_json::json!({ "summary": summary, "trials": trials }),
-        );
-    }
-    if args.trials {
-        println!("{}\n", trial_table(&trials).text());
-    }
-    println!("{}", summary_table(&summary, args.seconds).text());
-    Ok(())
+    let table = |summary: &_| summary_table(summary, args.seconds);
+    args.output.print(("summary", &summary), &trials, table, trial_table)
 }
 
 fn trial_table(trials: &[Trial]) -> Table {

@@ -8,6 +8,8 @@ use sonarfix_studies::search_motion::{self, Summary, Trial};
 use sonarfix_studies::search_study::Plans;
 use sonarfix_terminal::progress::Runs;
 
+use crate::output::{self, Output};
+
 /// The motions, as in a robot file.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Motion {
@@ -33,12 +35,8 @@ pub struct Args {
     /// Takes only homes among the floor plans.
     #[arg(long)]
     homes: bool,
-    /// Prints every trial.
-    #[arg(long)]
-    trials: bool,
-    /// Prints JSON instead of a table.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    output: Output,
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
@@ -56,22 +54,13 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let trials = search_motion::floor_plans(&plans, kind, args.seconds, &runs)?;
     runs.end()?;
     let summary = Summary::new(&trials);
-    if args.json {
-        let answer = serde_json::json!({ "summary": summary, "trials": trials });
-        return sonarfix_terminal::json::print(&answer);
-    }
-    if args.trials {
-        println!("{}\n", trial_table(&trials).text());
-    }
-    println!("{}", summary_table(&summary, args.seconds).text());
-    Ok(())
+    let table = |summary: &_| summary_table(summary, args.seconds);
+    args.output.print(("summary", &summary), &trials, table, trial_table)
 }
 
 fn trial_table(trials: &[Trial]) -> Table {
     let row = |trial: &Trial| {
-        let found = trial.found_after.map_or("-".to_owned(), |after| {
-            format!("{after:.1} s{}", if trial.is_right { "" } else { ", wrong" })
-        });
+        let found = output::found(trial.found_after, trial.is_right);
         vec![
             trial.seed.to_string(),
             found,
