@@ -134,7 +134,7 @@ impl<'a> Likelihood<'a> {
         for _ in 0..ROUNDS {
             solve(&self.problem, &mut self.state, ITERATIONS)?;
             let before = found;
-            (found, covariance) = maximum(found, |at| {
+            (found, covariance) = minimum(found, |at| {
                 let mut problem = self.problem.clone();
                 problem.noise = noise(at);
                 let of_prior = 0.5 * (at - mean).component_div(&prior).norm_squared();
@@ -158,7 +158,7 @@ fn of_ranges(problem: &Problem, state: &State) -> f64 {
 }
 
 /// The minimum of a loss by logarithms of noises, and the inverse of its curvature there. Newton's method with differences.
-fn maximum<const N: usize>(
+fn minimum<const N: usize>(
     start: SVector<f64, N>,
     loss: impl Fn(&SVector<f64, N>) -> Result<f64, SolveError>,
 ) -> Result<(SVector<f64, N>, SMatrix<f64, N, N>), SolveError> {
