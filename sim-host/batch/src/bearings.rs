@@ -41,6 +41,8 @@ pub struct Bearings {
     pub offset_deviation: f64,
     /// Standard deviation of the scale.
     pub scale_deviation: f64,
+    /// Standard deviation of the half-angle, radians.
+    pub cone_deviation: f64,
 }
 
 /// Distance to which the cone refers, metres.
@@ -68,6 +70,7 @@ pub fn fit(pings: &[WallPing]) -> Option<Bearings> {
     };
     whole.offset_deviation *= scatter(|half| (half.offset, half.offset_deviation));
     whole.scale_deviation *= scatter(|half| (half.scale, half.scale_deviation));
+    whole.cone_deviation *= scatter(|half| (half.half_cone, half.cone_deviation));
     Some(whole)
 }
 
@@ -114,6 +117,7 @@ fn maximum(pings: &[WallPing]) -> Option<Bearings> {
         half_cone: at[3],
         offset_deviation: deviation(0)?,
         scale_deviation: deviation(1)?,
+        cone_deviation: deviation(3)?,
     };
     let is_plausible = fitted.half_cone > 0.0 && fitted.scale > 0.5 && fitted.scale < 2.0;
     is_plausible.then_some(fitted)

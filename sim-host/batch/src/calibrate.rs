@@ -225,6 +225,7 @@ impl Fit<'_> {
             wheel_noise,
             trajectory: trajectory.collect(),
             residuals: self.residuals(),
+            echoes: self.echoes(bearings.map(|found| found.half_cone)),
             inliers,
             expected,
             referenced: if self.has_references { referenced } else { 0 },

@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use crate::bearings::Bearings;
 use crate::constants::{Constants, Name};
+use crate::echoes::Echoes;
 use crate::problem::Noise;
 use crate::recording::RecordingError;
 use crate::solve::SolveError;
@@ -18,6 +19,8 @@ pub struct Nominal {
     pub mount: [f64; 2],
     /// Shortest and longest range, metres.
     pub reach: [f64; 2],
+    /// Range up to which the sonar hardly misses an echo, metres: what it returns is counted beyond.
+    pub sure_within: f64,
     /// Noises.
     pub noise: Noise,
     /// Whether the recording's pings are those of a sonar on a servo, whose missing echoes are evidence of its bearing.
@@ -152,6 +155,8 @@ pub struct Calibration {
     pub trajectory: Vec<(f64, Vector3<f64>, Vector3<f64>)>,
     /// Residuals of the associated ranges.
     pub residuals: Vec<Residual>,
+    /// What the sonar measures at square and at oblique walls.
+    pub echoes: Echoes,
     /// Echoes within three deviations of their wall.
     pub inliers: usize,
     /// Echoes for which the map has a wall.

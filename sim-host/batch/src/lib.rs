@@ -19,6 +19,7 @@
 //! | [`noise`] | noises from the residuals |
 //! | [`wheel_noise`] | noise of the wheels from the marginal likelihood |
 //! | [`bearings`] | bearings of the servo, from answers and missing answers |
+//! | [`echoes`] | what the sonar measures at square and at oblique walls |
 //! | [`calibration`] | what a calibration needs, and what it results in |
 //! | `fit` | association, checks |
 //! | `growth` | how the window grows |
@@ -33,6 +34,7 @@ pub mod calibration;
 pub mod chain;
 pub mod chain_of_poses;
 pub mod constants;
+pub mod echoes;
 mod fit;
 mod growth;
 pub mod log;

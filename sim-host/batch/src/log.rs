@@ -56,6 +56,7 @@ pub fn nominal(robot: &RobotConfig, has_servo: bool) -> Nominal {
         track_width: drive.track_width.0.into(),
         mount: [x.0.into(), y.0.into()],
         reach: [sonar.min_range.0.into(), sonar.max_range.0.into()],
+        sure_within: robot.localizer.echo.sure_within.0.into(),
         noise: Noise {
             wheel: WheelNoise::independent(f64::from(drive.wheel_noise.0.0).max(1e-4)),
             range: f64::from(sonar.noise.floor.0).max(1e-4),

@@ -74,7 +74,16 @@ impl Reflector {
     /// Whether it is a wall.
     #[must_use]
     pub fn is_wall(&self) -> bool {
-        matches!(self, Self::Wall(_))
+        self.wall().is_some()
+    }
+
+    /// Its wall, if it is one.
+    #[must_use]
+    pub fn wall(&self) -> Option<&Wall> {
+        match self {
+            Self::Wall(wall) => Some(wall),
+            Self::Corner(_) => None,
+        }
     }
 
     /// The reflector from a sonar whose axis has this direction.

@@ -61,6 +61,20 @@ impl Wall {
         let off_axis = wrap(direction - towards.y.atan2(towards.x));
         Foot { signed, normal, along: self.along.dot(&relative), off_axis }
     }
+
+    /// Distance at which a ray in this direction meets the wall, metres; `None` if it does not.
+    #[must_use]
+    pub fn met(&self, from: Vector2<f64>, direction: f64) -> Option<f64> {
+        let foot = self.foot(from, direction);
+        let cosine = foot.off_axis.cos();
+        if cosine < 1e-6 {
+            return None;
+        }
+        let distance = foot.signed.abs() / cosine;
+        let ray = Vector2::new(direction.cos(), direction.sin());
+        let along = foot.along + distance * self.along.dot(&ray);
+        (0.0..=self.length).contains(&along).then_some(distance)
+    }
 }
 
 /// Position and direction of the sonar of a robot at a pose, with a commanded bearing.

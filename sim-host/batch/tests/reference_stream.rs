@@ -29,6 +29,7 @@ const NOMINAL: Nominal = Nominal {
     track_width: 0.2,
     mount: [0.0, 0.0],
     reach: [0.0, 1.0],
+    sure_within: 0.0,
     noise: Noise {
         wheel: WheelNoise::independent(0.001),
         range: 0.01,

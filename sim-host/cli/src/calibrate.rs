@@ -28,6 +28,8 @@ use sonarfix_sim::trace::Pose;
 use crate::diagnosis;
 use sonarfix_terminal::output::{check_file, open};
 
+mod echoes;
+
 /// Maximum number of skipped lines that are printed.
 const SHOWN: usize = 10;
 /// Half of a 95 % interval, in standard deviations.
@@ -252,7 +254,11 @@ fn estimates(found: &Calibration, robot: &RobotConfig) -> Table {
             format!("{:+.2}", 100.0 * (bearings.scale - 1.0)),
             100.0 * bearings.scale_deviation,
         );
-        push("half cone (deg)", format!("{:.1}", degrees(bearings.half_cone)), 0.0);
+        push(
+            "half cone (deg)",
+            format!("{:.1}", degrees(bearings.half_cone)),
+            degrees(bearings.cone_deviation),
+        );
     }
     Table {
         title: "Calibration".to_owned(),
@@ -279,6 +285,7 @@ fn statement(found: &Calibration, robot: &RobotConfig) -> String {
         let per_metre = 1e3 * noise.range_per_metre;
         lines.push(format!("range noise {:.2} mm and {per_metre:.2} mm/m", 1e3 * noise.range));
     }
+    lines.extend(echoes::lines(&found.echoes, &robot.localizer.echo));
     if found.referenced > 0 {
         let (position, heading) = (1e3 * noise.position, noise.heading.to_degrees());
         lines.push(format!("reference noise {position:.2} mm and {heading:.3}°"));
@@ -380,6 +387,8 @@ struct Json<'a> {
     estimates: Vec<JsonEstimate>,
     bearing_offset: Option<[f64; 2]>,
     bearing_scale: Option<[f64; 2]>,
+    half_cone: Option<[f64; 2]>,
+    echoes: echoes::Json,
     wheel_noise: JsonNoise,
     wheel_noise_of_distance: JsonNoise,
     wheel_noise_of_turns: JsonNoise,
@@ -435,6 +444,8 @@ impl<'a> Json<'a> {
             estimates: estimates.collect(),
             bearing_offset: bearings.map(|b| [b.offset, b.offset_deviation]),
             bearing_scale: bearings.map(|b| [b.scale, b.scale_deviation]),
+            half_cone: bearings.map(|b| [b.half_cone, b.cone_deviation]),
+            echoes: echoes::Json::of(&found.echoes),
             wheel_noise: JsonNoise::of(&found.wheel_noise.wheel),
             wheel_noise_of_distance: JsonNoise::of(&found.wheel_noise.distance),
             wheel_noise_of_turns: JsonNoise::of(&found.wheel_noise.turn),

@@ -20,8 +20,10 @@ use sonarfix_replay::find::Find;
 use sonarfix_sim::progress::Progress;
 use sonarfix_sim::simulate::SimulationError;
 
+use crate::rooms::Sensor;
 use crate::sweeping_robot::{Drive, drive};
 
+pub mod echoes;
 pub mod wheel_noise;
 
 /// The path: figures of eight of 8.8 m, with turns both ways.
@@ -99,6 +101,13 @@ pub struct Compared {
     pub limit: f64,
 }
 
+impl Compared {
+    /// The error in deviations, without a sign.
+    fn deviations(&self) -> f64 {
+        (self.error / self.deviation).abs()
+    }
+}
+
 /// A trial.
 #[derive(Debug, Clone)]
 pub struct Trial {
@@ -161,7 +170,7 @@ pub fn trial(
     errors: Errors,
     from: From,
 ) -> Result<Trial, CalibrationStudyError> {
-    let robot = Simulated::new(seed, metres, errors, None)?;
+    let robot = Simulated::new(seed, metres, errors, Variant::default())?;
     Ok(Trial { seed, outcome: robot.calibrated(from).map(|found| robot.compare(&found)) })
 }
 
@@ -172,6 +181,15 @@ pub enum From {
     Start,
     /// The poses that the search finds.
     Search,
+}
+
+/// How a robot differs from that of the classroom, apart from its errors.
+#[derive(Debug, Clone, Copy, Default)]
+struct Variant {
+    /// Noise of the wheels, m/√m, which then have no other random error.
+    wheel_noise: Option<f64>,
+    /// Its sensor.
+    sensor: Option<Sensor>,
 }
 
 /// A simulated robot after its drive.
@@ -191,16 +209,16 @@ struct Simulated {
 }
 
 impl Simulated {
-    /// Simulates a drive; with a noise of the wheels, m/√m, its wheels have no other random error.
+    /// Simulates a drive.
     fn new(
         seed: u64,
         metres: f64,
         errors: Errors,
-        wheel_noise: Option<f64>,
+        Variant { wheel_noise, sensor }: Variant,
     ) -> Result<Self, CalibrationStudyError> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0xCA11_B8A7);
         let errors = errors.drawn(&mut rng);
-        let mut scenario = Scenario::parse(&text(metres), "classroom.toml", Path::new(""))?;
+        let mut scenario = Scenario::parse(&text(metres, sensor), "classroom.toml", Path::new(""))?;
         let robot = scenario.robot;
         let truth = &mut scenario.truth;
         [truth.scale_right, truth.scale_left] = errors.wheels;
@@ -220,7 +238,8 @@ impl Simulated {
             scenario.upsets = Upsets::default();
         }
         let track_width = scenario.truth.track_width;
-        let (Drive { mut recording, .. }, simulation) = drive(scenario, robot, seed)?;
+        let (Drive { mut recording, .. }, simulation) =
+            drive(scenario, robot, sensor.and_then(Sensor::simulated), seed)?;
         recording.cut(metres);
         let floor = simulation.scenario.floor.named_walls();
         let walls: Vec<Wall> =
@@ -276,12 +295,19 @@ impl Simulated {
     }
 }
 
-/// The classroom's robot in a smaller room, with the path of the study.
-fn text(metres: f64) -> String {
+/// The classroom's robot in a smaller room, with the path of the study, and another sensor.
+fn text(metres: f64, sensor: Option<Sensor>) -> String {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some laps")]
     let laps = (metres / LAP).ceil().max(1.0) as u32;
     let mut text = String::new();
+    let mut is_of_sensor = false;
     for line in CLASSROOM.lines() {
+        if line.starts_with('[') {
+            is_of_sensor = ["[robot.sonar]", "[sensor]"].contains(&line);
+        }
+        if sensor.is_some() && is_of_sensor {
+            continue;
+        }
         let key = line.split('=').next().unwrap_or_default().trim();
         match key {
             "start" if line.contains('[') => text.push_str(PATH),
@@ -297,6 +323,7 @@ fn text(metres: f64) -> String {
             }
         }
     }
+    text.push_str(sensor.map_or("", Sensor::tables));
     WALLS.iter().fold(text, |text, (from, to)| text.replace(from, to))
 }
 
@@ -321,8 +348,7 @@ pub fn page(rows: &[(f64, Vec<Trial>)]) -> String {
             let all = found.iter().copied().flatten().filter(|compared| compared.name == name);
             page.push_str(&row(*metres, name, &all.copied().collect::<Vec<_>>()));
         }
-        let normed = |compared: &Compared| (compared.error / compared.deviation).abs();
-        let worst = found.iter().copied().flatten().map(normed).fold(0.0, f64::max);
+        let worst = found.iter().copied().flatten().map(Compared::deviations).fold(0.0, f64::max);
         let count = trials.len();
         let _ = writeln!(page, "| {metres:.0} m | refused | | {refused} of {count} | | | |");
         let _ = writeln!(page, "| {metres:.0} m | largest error | | {worst:.1} deviations | | | |");

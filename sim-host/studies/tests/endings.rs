@@ -99,7 +99,7 @@ fn a_narrow_office_is_drawn() {
 
 /// Commands with more runs than anyone waits for, and what their output must begin with.
 #[cfg(unix)]
-const LONG: [(&[&str], &str); 9] = [
+const LONG: [(&[&str], &str); 10] = [
     (&["floor-plans", "--plans", "1000000", "--runs", "1"], "# "),
     (&["faults", "--runs", "4000000"], "# Effects"),
     (&["find", CLASSROOM, "--runs", "1000000", "--seconds", "5"], ""),
@@ -108,6 +108,7 @@ const LONG: [(&[&str], &str); 9] = [
     (&["calibration", "--runs", "1000000", "--metres", "5"], ""),
     (&["calibration", "--wheel-noise", "2", "--runs", "1000000", "--metres", "5"], ""),
     (&["calibration", "--unknown-start", "--runs", "1000000", "--metres", "5"], ""),
+    (&["calibration", "--echoes", "--runs", "1000000", "--metres", "5"], ""),
     (&["surveys", "room", "--runs", "1000000"], ""),
 ];
 

@@ -8,7 +8,7 @@ use sonarfix_sim::progress::Progress;
 
 use crate::floor_plan::compare::quantile;
 
-use super::{CalibrationStudyError, Errors, From, Simulated, each_seed};
+use super::{CalibrationStudyError, Errors, From, Simulated, Variant, each_seed};
 
 /// Largest relative error of a good estimate.
 const LIMIT: f64 = 0.25;
@@ -35,8 +35,9 @@ pub fn trials(
     truth: f64,
     progress: &impl Progress,
 ) -> Result<Row, CalibrationStudyError> {
+    let variant = Variant { wheel_noise: Some(truth), ..Variant::default() };
     let outcomes = each_seed(first, count, progress, |seed| {
-        let robot = Simulated::new(seed, metres, Errors::BUILDER, Some(truth))?;
+        let robot = Simulated::new(seed, metres, Errors::BUILDER, variant)?;
         Ok(robot.calibrated(From::Start).map(|found| found.wheel_noise))
     })?;
     Ok(Row { metres, truth, outcomes })

@@ -35,7 +35,7 @@ impl Sensor {
     }
 
     /// Its tables of a scenario.
-    pub(super) fn tables(self) -> &'static str {
+    pub(crate) fn tables(self) -> &'static str {
         match self {
             Self::HcSr04 => include_str!("sensors/hc_sr04.toml"),
             Self::Nxt => include_str!("sensors/nxt.toml"),
@@ -46,7 +46,7 @@ impl Sensor {
     }
 
     /// Its simulation, where scenarios have no name for it.
-    pub(super) fn simulated(self) -> Option<SensorModel> {
+    pub(crate) fn simulated(self) -> Option<SensorModel> {
         (self == Self::Ev3).then(SensorModel::ev3)
     }
 }

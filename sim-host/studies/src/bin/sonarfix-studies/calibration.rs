@@ -1,6 +1,6 @@
 //! `sonarfix-studies calibration`: the accuracy of `sonarfix calibrate` on simulated robots.
 
-use sonarfix_studies::calibration::{self, Errors, From, wheel_noise};
+use sonarfix_studies::calibration::{self, Errors, From, echoes, wheel_noise};
 
 use sonarfix_terminal::progress::Runs;
 
@@ -24,12 +24,18 @@ pub struct Args {
     /// Without the start pose: from the poses that the search finds.
     #[arg(long, conflicts_with = "wheel_noise")]
     unknown_start: bool,
+    /// With four sonars: what is found of their echoes, instead of the constants.
+    #[arg(long, conflicts_with_all = ["gross", "wheel_noise", "unknown_start"])]
+    echoes: bool,
 }
 
 pub fn execute(args: &Args) -> anyhow::Result<()> {
     anyhow::ensure!(args.runs > 0, "--runs must be at least 1");
     if !args.wheel_noise.is_empty() {
         return wheel_noises(args);
+    }
+    if args.echoes {
+        return echoes_of_sensors(args);
     }
     let errors = if args.gross { Errors::GROSS } else { Errors::BUILDER };
     let from = if args.unknown_start { From::Search } else { From::Start };
@@ -69,5 +75,24 @@ fn wheel_noises(args: &Args) -> anyhow::Result<()> {
     }
     progress.end()?;
     print!("{}", wheel_noise::page(&rows));
+    Ok(())
+}
+
+/// What is found of the echoes of each sensor.
+fn echoes_of_sensors(args: &Args) -> anyhow::Result<()> {
+    let &[metres] = args.metres.as_slice() else {
+        anyhow::bail!("--echoes needs one distance, for example --metres 20");
+    };
+    let sensors = u32::try_from(echoes::SENSORS.len())?;
+    let progress = Runs::new(args.runs.saturating_mul(sensors));
+    let mut rows = Vec::new();
+    for sensor in echoes::SENSORS {
+        let row = echoes::trials(args.seed, args.runs, metres, sensor, &progress)?;
+        if !row.outcomes.is_empty() {
+            rows.push(row);
+        }
+    }
+    progress.end()?;
+    print!("{}", echoes::page(&rows));
     Ok(())
 }
