@@ -16,6 +16,8 @@ use std::path::Path;
 use discover::Recording;
 use rayon::prelude::*;
 
+use crate::recordings;
+
 pub use replays::Row;
 pub(crate) use replays::replay_converted;
 
@@ -24,6 +26,8 @@ pub(crate) use replays::replay_converted;
 pub struct Findings {
     /// A row for each recording, robot file and policy, in the order of the names.
     pub rows: Vec<Row>,
+    /// A row for each recording with a robot file of its own.
+    pub own: Vec<recordings::Row>,
     /// What conversions reported, with the name of the recording.
     pub reports: Vec<(String, Vec<String>)>,
     /// The most ranges that were taken of a scan while the pose was known.
@@ -46,5 +50,6 @@ pub fn findings(data: &Path, pings_per_scan: u32) -> io::Result<Findings> {
     let (rows, reports_of): (Vec<_>, Vec<_>) = replayed.into_iter().unzip();
     let reports = reports.zip(reports_of).filter(|(_, reports)| !reports.is_empty()).collect();
     let rows = rows.into_iter().flatten().collect();
-    Ok(Findings { rows, reports, pings_per_scan, others: found.others })
+    let own = recordings::rows(data, &[])?;
+    Ok(Findings { rows, own, reports, pings_per_scan, others: found.others })
 }

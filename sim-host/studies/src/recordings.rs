@@ -59,9 +59,13 @@ pub(crate) fn folders(data: &Path) -> io::Result<Vec<(String, PathBuf)>> {
     Ok(found.into_iter().map(|folder| (name(&folder), folder)).collect())
 }
 
+/// Whether a folder has a log with robot file and map.
+pub(crate) fn is_recording(folder: &Path) -> bool {
+    ["log.csv", "robot.toml", "map.toml"].iter().all(|name| folder.join(name).is_file())
+}
+
 fn search(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) {
-    let has = |name: &str| folder.join(name).is_file();
-    if has("log.csv") && has("robot.toml") && has("map.toml") {
+    if is_recording(folder) {
         found.push(folder.to_owned());
     }
     // A folder that cannot be read has no recordings.

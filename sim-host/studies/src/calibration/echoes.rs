@@ -115,7 +115,7 @@ mod tests {
     fn the_kind_of_a_simulated_sensor_is_found() {
         let rows: Vec<Row> = [Sensor::HcSr04, Sensor::Ev3]
             .into_iter()
-            .map(|sensor| trials(400_000, 1, 20.0, sensor, &|| ()).unwrap())
+            .map(|sensor| trials(400_001, 1, 20.0, sensor, &|| ()).unwrap())
             .collect();
         for row in &rows {
             let found = row.outcomes[0].as_ref().unwrap();

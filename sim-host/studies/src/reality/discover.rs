@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 use sonarfix_replay::convert::{carmen, given};
 
+use crate::recordings::is_recording;
+
 /// How deep folders are searched.
 const DEEPEST: usize = 6;
 
@@ -53,7 +55,7 @@ pub struct Found {
     pub others: Vec<(String, &'static str)>,
 }
 
-/// Finds the recordings.
+/// Finds the recordings, but for those with a robot file of their own ([`crate::recordings`]).
 ///
 /// # Errors
 /// If the folder cannot be read. A file in it that cannot be read is no recording.
@@ -83,7 +85,7 @@ fn search(data: &Path, folder: &Path, depth: usize, found: &mut Found) -> io::Re
         found.others.push((here, "wheel speeds without ranges"));
     } else if ends("_metadata.csv") {
         found.others.push((here, "encoders and poses without ranges"));
-    } else {
+    } else if !is_recording(folder) {
         for path in paths.iter().filter(|path| path.is_file()) {
             if let Some(format) = log(path, &paths) {
                 found.recordings.push(Recording { name: stem(&named(path)).to_owned(), format });
@@ -155,6 +157,10 @@ mod tests {
         write("arena/first/a_motors.txt", "M 1\n");
         write("arena/first/a_scan.txt", "S 1\n");
         write("sweeps/sweeps.csv", "team\n");
+        // A recording with a robot file of its own.
+        write("nxt/log.csv", "sonarfix-log,1\n");
+        write("nxt/robot.toml", "");
+        write("nxt/map.toml", "");
         let found = discover(dir.path()).unwrap();
         let at = |name: &str| dir.path().join(name);
         let expected = [
