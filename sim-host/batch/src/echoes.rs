@@ -12,29 +12,8 @@
 //! or something else. The shares of these four are the maximum of the likelihood of a mixture (expectation–maximization: Dempster, Laird and
 //! Rubin 1977), for each of some half-angles.
 //!
-//! Only pings whose wall stands alone count, whatever they return: the axis and 15° to either side meet it first, the foot is
-//! on it, and no other reflector of the map is as near within 70° of the axis.
+//! The pings are those at walls that stand alone (`lone_walls`).
 
-use nalgebra::Vector2;
-
-use crate::calibration::{Nominal, share};
-use crate::constants::Name;
-use crate::fit::Fit;
-use crate::reflector::Reflector;
-use crate::wall::{Wall, sonar};
-
-/// Angle to either side of the axis in which nothing but the wall may be, radians: 15°.
-const BESIDE: f64 = 0.262;
-/// Angle off the axis up to which another reflector could return the echo, radians: 70°.
-const ASIDE: f64 = 1.22;
-/// How much farther another reflector must be than the wall on the axis, metres.
-const FARTHER: f64 = 0.15;
-/// Distance of the foot from the ends of the wall, metres.
-const FROM_END: f64 = 0.15;
-/// Angle between axis and normal up to which a wall is square to the sonar if its cone is not known, radians: 8°.
-const SQUARE: f64 = 0.14;
-/// The same as a part of the half-angle of the cone.
-const INSIDE: f64 = 0.6;
 /// Angles between axis and normal of an oblique wall, radians: 15° to 55°.
 const OBLIQUE: [f64; 2] = [0.262, 0.96];
 /// Deviations within which a range is that of the wall.
@@ -61,7 +40,15 @@ pub struct Share {
     pub deviation: f64,
 }
 
-/// What pings at a wall square to the sonar return, apart from its range, beyond [`Nominal::sure_within`].
+impl Share {
+    /// Half of its 95 % interval.
+    #[must_use]
+    pub fn half_interval(&self) -> f64 {
+        1.96 * self.deviation
+    }
+}
+
+/// What pings at a wall square to the sonar return, apart from its range, beyond the range up to which the sonar hardly misses an echo.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Square {
     /// Their number.
@@ -144,6 +131,17 @@ pub(crate) struct AtWall {
     pub(crate) noise: f64,
 }
 
+/// What of the sensor is known.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Limits {
+    /// Angle between axis and normal up to which a wall is square to the sonar, radians.
+    pub(crate) square: f64,
+    /// Range up to which the sonar hardly misses an echo, metres.
+    pub(crate) sure_within: f64,
+    /// Longest range, metres.
+    pub(crate) farthest: f64,
+}
+
 /// What a share is counted of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Returned {
@@ -184,10 +182,10 @@ impl AtWall {
 }
 
 impl Echoes {
-    /// From pings at walls that stand alone. A wall is square to the sonar up to the angle `square`, radians.
-    pub(crate) fn of(pings: &[AtWall], square: f64, nominal: &Nominal) -> Self {
+    /// From pings at walls that stand alone.
+    pub(crate) fn of(pings: &[AtWall], limits: &Limits) -> Self {
         let is_square =
-            |ping: &&AtWall| ping.angle <= square && ping.distance >= nominal.sure_within;
+            |ping: &&AtWall| ping.angle <= limits.square && ping.distance >= limits.sure_within;
         let returned: Vec<Returned> =
             pings.iter().filter(is_square).map(AtWall::returned).collect();
         let [least, most] = OBLIQUE;
@@ -203,14 +201,17 @@ impl Echoes {
                 short: share_of(&returned, Returned::Shorter),
                 long: share_of(&returned, Returned::Longer),
             }),
-            oblique: (oblique.len() >= FEWEST).then(|| distances(&oblique, nominal.reach[1])),
+            oblique: (oblique.len() >= FEWEST).then(|| distances(&oblique, limits.farthest)),
         }
     }
 }
 
 /// A share with its deviation: that of independent pings, or that of the blocks if it is larger.
 fn share_of(returned: &[Returned], what: Returned) -> Share {
-    let of = |some: &[Returned]| share(some.iter().filter(|one| **one == what).count(), some.len());
+    #[expect(clippy::cast_precision_loss, reason = "numbers of pings")]
+    let of = |some: &[Returned]| {
+        some.iter().filter(|one| **one == what).count() as f64 / some.len() as f64
+    };
     #[expect(clippy::cast_precision_loss, reason = "numbers of pings")]
     let count = returned.len() as f64;
     let value = of(returned);
@@ -297,60 +298,6 @@ impl Mixture {
     }
 }
 
-impl Fit<'_> {
-    /// What the recording says of the sonar's echoes, with the half-angle of its cone if it is known, radians.
-    pub(crate) fn echoes(&self, half_cone: Option<f64>) -> Echoes {
-        let square = half_cone.map_or(SQUARE, |half| INSIDE * half);
-        Echoes::of(&self.at_walls(), square, self.nominal)
-    }
-
-    /// The pings at walls that stand alone.
-    fn at_walls(&self) -> Vec<AtWall> {
-        let (problem, constants) = (&self.problem, &self.state.constants);
-        let walls: Vec<&Wall> = problem.reflectors.iter().filter_map(Reflector::wall).collect();
-        let [nearest, farthest] = self.nominal.reach;
-        let pings = problem.chain.pings.iter().filter_map(|event| {
-            let ping = problem.recording.pings.get(event.index)?;
-            let (pose, ..) = problem.pose_at(&self.state, event);
-            let (at, direction) = sonar(&pose, ping.bearing, constants);
-            let (index, ahead) = first_met(&walls, at, direction)?;
-            let beside = [direction - BESIDE, direction + BESIDE];
-            let is_wide = |ray| first_met(&walls, at, ray).is_some_and(|(other, _)| other == index);
-            let wall = *walls.get(index)?;
-            let foot = wall.foot(at, direction);
-            let distance = foot.signed.abs();
-            let is_in_reach = distance > nearest + 0.05 && ahead < 0.8 * farthest;
-            let is_inside = foot.along > FROM_END && foot.along < wall.length() - FROM_END;
-            let is_alone = problem.reflectors.iter().all(|other| {
-                let view = other.view(at, direction);
-                other.wall().is_some_and(|other| std::ptr::eq(other, wall))
-                    || !view.answers
-                    || view.off_axis.abs() > ASIDE
-                    || view.distance > ahead + FARTHER
-            });
-            let is_clear = is_in_reach && is_inside && is_alone && beside.into_iter().all(is_wide);
-            let stretch = 1.0 + constants.get(Name::RangeScale);
-            let range =
-                ping.range.map(|range| (range - constants.get(Name::RangeOffset)) / stretch);
-            is_clear.then(|| AtWall {
-                distance,
-                angle: foot.off_axis.abs(),
-                range,
-                bias: constants.get(Name::OffAxis),
-                noise: problem.noise.of_range(distance),
-            })
-        });
-        pings.collect()
-    }
-}
-
-/// The first wall that a ray meets, and its distance along the ray, metres.
-fn first_met(walls: &[&Wall], from: Vector2<f64>, direction: f64) -> Option<(usize, f64)> {
-    let met =
-        walls.iter().enumerate().filter_map(|(k, wall)| Some((k, wall.met(from, direction)?)));
-    met.min_by(|one, other| one.1.total_cmp(&other.1))
-}
-
 #[cfg(test)]
 mod tests {
     use rand::{Rng, RngExt, SeedableRng};
@@ -358,23 +305,8 @@ mod tests {
     use rand_distr::StandardNormal;
 
     use super::*;
-    use crate::odometry::WheelNoise;
-    use crate::problem::Noise;
 
-    const NOMINAL: Nominal = Nominal {
-        track_width: 0.12,
-        mount: [0.06, 0.0],
-        reach: [0.1, 3.5],
-        sure_within: 0.0,
-        noise: Noise {
-            wheel: WheelNoise::independent(0.003),
-            range: 0.003,
-            range_per_metre: 0.001,
-            position: 0.005,
-            heading: 0.01,
-        },
-        has_servo: true,
-    };
+    const LIMITS: Limits = Limits { square: 0.14, sure_within: 0.0, farthest: 3.5 };
 
     /// A ping at a wall up to 55° off its normal.
     fn at_wall(rng: &mut impl Rng) -> AtWall {
@@ -402,7 +334,7 @@ mod tests {
                 AtWall { range: Some(ping.distance / off.cos() + 0.005 * noise), ..ping }
             })
             .collect();
-        Echoes::of(&pings, SQUARE, &NOMINAL).oblique.unwrap()
+        Echoes::of(&pings, &LIMITS).oblique.unwrap()
     }
 
     #[test]
@@ -436,7 +368,7 @@ mod tests {
         let found = oblique(1, [0.01, 0.0, 0.0], 0.0);
         assert_eq!(found.source(), None, "{found:?}");
         let pings = [at_wall(&mut ChaCha8Rng::seed_from_u64(0)); FEWEST - 1];
-        assert_eq!(Echoes::of(&pings, 1.0, &NOMINAL), Echoes::default());
+        assert_eq!(Echoes::of(&pings, &Limits { square: 1.0, ..LIMITS }), Echoes::default());
     }
 
     /// The shares of independent pings, and of pings of which 40 in a row meet one object.

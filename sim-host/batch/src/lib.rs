@@ -19,6 +19,7 @@
 //! | [`noise`] | noises from the residuals |
 //! | [`wheel_noise`] | noise of the wheels from the marginal likelihood |
 //! | [`bearings`] | bearings of the servo, from answers and missing answers |
+//! | `lone_walls` | pings at walls that stand alone |
 //! | [`echoes`] | what the sonar measures at square and at oblique walls |
 //! | [`calibration`] | what a calibration needs, and what it results in |
 //! | `fit` | association, checks |
@@ -38,6 +39,7 @@ pub mod echoes;
 mod fit;
 mod growth;
 pub mod log;
+mod lone_walls;
 pub mod noise;
 pub mod odometry;
 pub mod problem;

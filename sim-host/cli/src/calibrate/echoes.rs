@@ -4,8 +4,6 @@ use serde::Serialize;
 use sonarfix::config::EchoParameters;
 use sonarfix_batch::echoes::{Echoes, Oblique, Share, Source, Square};
 
-use super::INTERVAL;
-
 /// The lines about the echoes, beside what the robot file has of them.
 pub fn lines(echoes: &Echoes, file: &EchoParameters) -> Vec<String> {
     let mut lines = Vec::new();
@@ -17,7 +15,7 @@ pub fn lines(echoes: &Echoes, file: &EchoParameters) -> Vec<String> {
 
 fn of_square(square: &Square, file: &EchoParameters) -> String {
     let shown = |share: &Share, file: f32| {
-        let [value, half] = [share.value, INTERVAL * share.deviation].map(|share| 100.0 * share);
+        let [value, half] = [share.value, share.half_interval()].map(|share| 100.0 * share);
         format!("{value:.1} ± {half:.1} % (robot file: {:.1} %)", 100.0 * file)
     };
     format!(
