@@ -1580,6 +1580,15 @@ typedef struct {
    That part.
    */
   sonarfix_region_t start_region;
+  /*
+   How the robot moves by itself while it searches: a sonarfix_search_motion_t. The program obeys the motion of the outputs.
+   */
+  int32_t search_motion;
+  /*
+   Ahead: the least range of an echo ahead, from the sonar, with which the robot drives on, metres. Half of its width, and what it
+   needs to stop.
+   */
+  float bumper_distance_m;
 } sonarfix_robot_config_t;
 
 /*
@@ -1704,6 +1713,28 @@ typedef struct {
 } sonarfix_ranger_output_t;
 
 /*
+ How a robot is to move.
+ */
+typedef struct {
+  /*
+   Speed ahead, metres per second; negative: backwards.
+   */
+  float speed_m_per_s;
+  /*
+   Turn rate, counter-clockwise, radians per second.
+   */
+  float turn_rad_per_s;
+  /*
+   The speed of the right wheel at this motion, metres per second.
+   */
+  float right_m_per_s;
+  /*
+   The speed of the left wheel at this motion, metres per second.
+   */
+  float left_m_per_s;
+} sonarfix_motion_t;
+
+/*
  What to do after a poll.
  */
 typedef struct {
@@ -1740,6 +1771,10 @@ typedef struct {
    */
   sonarfix_fix_t fix;
   /*
+   The motion that was commanded over the link, else that of a robot that searches, if has_motion is not zero; otherwise at rest.
+   */
+  sonarfix_motion_t motion;
+  /*
    How many of the received bytes were taken.
    */
   size_t received_taken;
@@ -1755,6 +1790,10 @@ typedef struct {
    Not zero if the motors may be enabled.
    */
   uint8_t may_drive;
+  /*
+   Not zero if the robot is to move by motion. Zero: it stands, or drives by the rules of the program.
+   */
+  uint8_t has_motion;
   /*
    Not zero if a deadline was met: the condition for feeding a watchdog.
    */

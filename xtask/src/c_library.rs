@@ -94,6 +94,7 @@ fn on_this_computer(args: &Args, traces: &[PathBuf]) -> anyhow::Result<()> {
         host.run_example()?;
     }
     let host = Host::build("release", "full")?;
+    host.turn_while_searching()?;
     for trace in traces {
         host.replay(trace)?;
     }

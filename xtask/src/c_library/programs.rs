@@ -55,6 +55,11 @@ impl Host {
         Ok(())
     }
 
+    /// A robot that turns while it searches.
+    pub fn turn_while_searching(&self) -> anyhow::Result<()> {
+        self.run("cc", C, "tests/motion.c", &[]).map(drop)
+    }
+
     pub fn replay(&self, trace: &Path) -> anyhow::Result<()> {
         let options = format!("{C} {}", traced(trace));
         self.run("cc", &options, "tests/replay.c tests/replay_pc.c tests/trace.S", &[]).map(drop)

@@ -4,7 +4,9 @@
 
 use sonarfix::config::{Rangers, ServoTiming};
 use sonarfix::geometry::units::{Duration, Metres, Radians};
-use sonarfix_hal::config::{MotorPolicy, RangerConfig, RobotConfig, StartPose, WheelConfig};
+use sonarfix_hal::config::{
+    MotorPolicy, RangerConfig, RobotConfig, SearchMotion, SearchMotionKind, StartPose, WheelConfig,
+};
 use sonarfix_hal::ranger::{Celsius, PulseTiming, RangerKind};
 use sonarfix_hal::servo::MeasuredPulse;
 use sonarfix_link::baked;
@@ -32,6 +34,20 @@ pub enum sonarfix_driver_t {
 }
 
 use sonarfix_driver_t::*;
+
+/// How a robot moves by itself while it searches for its pose and no motion is commanded over the link.
+#[repr(i32)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum sonarfix_search_motion_t {
+    /// It stands.
+    SONARFIX_SEARCH_MOTION_NONE = 0,
+    /// It turns once on the spot.
+    SONARFIX_SEARCH_MOTION_SPIN = 1,
+    /// It drives ahead where the sonar finds free floor, and turns where it does not. What the sonar does not detect, it hits.
+    SONARFIX_SEARCH_MOTION_AHEAD = 2,
+}
+
+use sonarfix_search_motion_t::*;
 
 /// The drivers of a ranger and of its servo.
 #[repr(C)]
@@ -99,6 +115,11 @@ pub struct sonarfix_robot_config_t {
     pub has_start_region: u8,
     /// That part.
     pub start_region: sonarfix_region_t,
+    /// How the robot moves by itself while it searches: a sonarfix_search_motion_t. The program obeys the motion of the outputs.
+    pub search_motion: i32,
+    /// Ahead: the least range of an echo ahead, from the sonar, with which the robot drives on, metres. Half of its width, and what it
+    /// needs to stop.
+    pub bumper_distance_m: f32,
 }
 
 const NO_REGION: sonarfix_region_t =
@@ -194,6 +215,7 @@ impl From<&RobotConfig> for sonarfix_robot_config_t {
         let region = config.start.region();
         let start_region = region.as_ref().map_or(NO_REGION, sonarfix_region_t::from);
         let MotorPolicy { lost, dead_encoder, lost_link, link_timeout } = config.motors;
+        let search_motion = config.start.motion();
         Self {
             localizer: (&config.localizer).into(),
             right_wheel: (&config.right_wheel).into(),
@@ -207,6 +229,12 @@ impl From<&RobotConfig> for sonarfix_robot_config_t {
             searches: u8::from(config.start.is_unknown()),
             has_start_region: u8::from(region.is_some()),
             start_region,
+            search_motion: match search_motion.map(|motion| motion.kind) {
+                None => SONARFIX_SEARCH_MOTION_NONE,
+                Some(SearchMotionKind::Spin) => SONARFIX_SEARCH_MOTION_SPIN,
+                Some(SearchMotionKind::Ahead) => SONARFIX_SEARCH_MOTION_AHEAD,
+            } as i32,
+            bumper_distance_m: search_motion.map_or(BUMPER_DISTANCE, |motion| motion.bumper.0),
         }
     }
 }
@@ -245,7 +273,15 @@ impl sonarfix_robot_config_t {
             return Ok(StartPose::Known);
         }
         let region = (self.has_start_region != 0).then_some(&self.start_region);
-        Ok(StartPose::Unknown { region: region.map(sonarfix_region_t::region).transpose()? })
+        let region = region.map(sonarfix_region_t::region).transpose()?;
+        let kind = match self.search_motion {
+            0 => return Ok(StartPose::Unknown { region }),
+            1 => SearchMotionKind::Spin,
+            2 => SearchMotionKind::Ahead,
+            _ => return Err(sonarfix_status_t::SONARFIX_ERROR_VALUE),
+        };
+        let motion = SearchMotion { kind, bumper: Metres(self.bumper_distance_m) };
+        Ok(StartPose::Exploring { region, motion })
     }
 }
 
@@ -275,6 +311,9 @@ pub unsafe extern "C" fn sonarfix_robot_config_default(
         })
     }
 }
+
+/// The bumper distance of a robot that does not move while it searches, metres: that of a robot file without one.
+const BUMPER_DISTANCE: f32 = 0.3;
 
 /// Limit of the servo to either side, radians: its pulses are then between 0.5 and 2.5 ms.
 const SERVO_LIMIT: f32 = 1.5;

@@ -3,16 +3,17 @@
 #![expect(unsafe_code, reason = "exports functions to C")]
 
 use sonarfix::geometry::pose::Pose;
-use sonarfix::geometry::units::{Instant, Radians};
+use sonarfix::geometry::units::{Instant, Metres, Radians};
 use sonarfix::localizer::Localizer;
 use sonarfix_app::{Link, Polled};
 use sonarfix_hal::robot::Report;
+use sonarfix_link::Motion;
 use sonarfix_link::frame::TELEMETRY_FRAME_MAX;
 
 use super::commands::sonarfix_command_result_t;
 use super::devices::Signals;
 use super::held::{Core, parts, sonarfix_robot_t};
-use super::signals::{self, sonarfix_inputs_t, sonarfix_outputs_t};
+use super::signals::{self, sonarfix_inputs_t, sonarfix_motion_t, sonarfix_outputs_t};
 use crate::aim::sonarfix_aim_t;
 use crate::fix::{sonarfix_fix_t, sonarfix_outcome_t};
 use crate::memory::{give, slice, slice_mut, value};
@@ -117,6 +118,19 @@ pub unsafe extern "C" fn sonarfix_robot_work(
 }
 
 impl Core {
+    /// The motion of the robot, if there is one.
+    #[cfg(feature = "drive")]
+    fn motion(&self) -> Option<Motion> {
+        self.app.motion()
+    }
+
+    /// Without the feature no motion is commanded, and a robot that searches stands.
+    #[cfg(not(feature = "drive"))]
+    #[expect(clippy::unused_self, reason = "as with the feature")]
+    fn motion(&self) -> Option<Motion> {
+        None
+    }
+
     fn poll(&mut self, now: Instant, signals: &Signals, link: &mut Bytes) -> sonarfix_outputs_t {
         let polled = self.app.poll(now, &mut self.devices, link);
         let report = self.app.report().copied().unwrap_or_default();
@@ -141,6 +155,10 @@ impl Core {
         let aim = ended.map(|(aim, _)| aim).or(report.pinged);
         let fix = ended.map(|(_, fix)| fix.into());
         let (is_running, may_drive) = (self.app.is_running(), polled.may_drive);
+        let motion = self.motion();
+        let configuration = self.app.configuration();
+        let track_width =
+            configuration.map_or(Metres(0.0), |config| config.localizer.drive.track_width);
         sonarfix_outputs_t {
             pose: localizer.map_or(nowhere, Localizer::pose).into(),
             verdict: verdict.unwrap_or(sonarfix_verdict_t::SONARFIX_VERDICT_LOST),
@@ -148,10 +166,12 @@ impl Core {
             command: sonarfix_command_result_t::SONARFIX_COMMAND_NONE,
             aim: aim.map_or(sonarfix_aim_t::of_sweep(Radians(0.0)), Into::into),
             fix: fix.unwrap_or(sonarfix_fix_t::of(sonarfix_outcome_t::SONARFIX_OUTCOME_OTHER)),
+            motion: sonarfix_motion_t::of(motion, track_width),
             received_taken: 0,
             to_send: 0,
             is_running: u8::from(is_running),
             may_drive: u8::from(may_drive && is_running),
+            has_motion: u8::from(motion.is_some()),
             is_on_time: u8::from(polled.is_on_time),
             has_worked: u8::from(!report.is_empty()),
             has_pinged: u8::from(report.pinged.is_some()),

@@ -2,6 +2,7 @@
 
 use sonarfix::config::MAX_RANGERS;
 use sonarfix::geometry::units::{Instant, Metres};
+use sonarfix_link::Motion;
 use sonarfix_pil::wires::{Actuators, Counted, EchoSignals, FULL_DUTY, GyroSignal, Sensors};
 
 use super::commands::sonarfix_command_result_t;
@@ -156,6 +157,38 @@ pub struct sonarfix_ranger_output_t {
     pub starts: u8,
 }
 
+/// How a robot is to move.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct sonarfix_motion_t {
+    /// Speed ahead, metres per second; negative: backwards.
+    pub speed_m_per_s: f32,
+    /// Turn rate, counter-clockwise, radians per second.
+    pub turn_rad_per_s: f32,
+    /// The speed of the right wheel at this motion, metres per second.
+    pub right_m_per_s: f32,
+    /// The speed of the left wheel at this motion, metres per second.
+    pub left_m_per_s: f32,
+}
+
+impl sonarfix_motion_t {
+    const NONE: Self =
+        Self { speed_m_per_s: 0.0, turn_rad_per_s: 0.0, right_m_per_s: 0.0, left_m_per_s: 0.0 };
+
+    /// The motion of a robot with this track width; at rest without one.
+    pub(super) fn of(motion: Option<Motion>, track_width: Metres) -> Self {
+        motion.map_or(Self::NONE, |motion| {
+            let [right, left] = motion.wheels(track_width);
+            Self {
+                speed_m_per_s: motion.speed.0,
+                turn_rad_per_s: motion.turn.0,
+                right_m_per_s: right.0,
+                left_m_per_s: left.0,
+            }
+        })
+    }
+}
+
 /// What to do after a poll.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -176,6 +209,8 @@ pub struct sonarfix_outputs_t {
     pub aim: sonarfix_aim_t,
     /// What the localizer did with the ping that this poll has ended, if has_fix is not zero.
     pub fix: sonarfix_fix_t,
+    /// The motion that was commanded over the link, else that of a robot that searches, if has_motion is not zero; otherwise at rest.
+    pub motion: sonarfix_motion_t,
     /// How many of the received bytes were taken.
     pub received_taken: usize,
     /// How many bytes are to be sent.
@@ -184,6 +219,8 @@ pub struct sonarfix_outputs_t {
     pub is_running: u8,
     /// Not zero if the motors may be enabled.
     pub may_drive: u8,
+    /// Not zero if the robot is to move by motion. Zero: it stands, or drives by the rules of the program.
+    pub has_motion: u8,
     /// Not zero if a deadline was met: the condition for feeding a watchdog.
     pub is_on_time: u8,
     /// Not zero if the poll has done anything in the loop: the estimate may have changed.
