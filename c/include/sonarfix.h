@@ -672,6 +672,35 @@ typedef int32_t sonarfix_driver_t;
 #endif // __cplusplus
 
 /*
+ How a robot moves by itself while it searches for its pose and no motion is commanded over the link.
+ */
+enum sonarfix_search_motion_t
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /*
+   It stands.
+   */
+  SONARFIX_SEARCH_MOTION_NONE = 0,
+  /*
+   It turns once on the spot.
+   */
+  SONARFIX_SEARCH_MOTION_SPIN = 1,
+  /*
+   It drives ahead where the sonar finds free floor, and turns where it does not. What the sonar does not detect, it hits.
+   */
+  SONARFIX_SEARCH_MOTION_AHEAD = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum sonarfix_search_motion_t sonarfix_search_motion_t;
+#else
+typedef int32_t sonarfix_search_motion_t;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/*
  How the wall is chosen among those that can be measured.
  */
 enum sonarfix_policy_t
