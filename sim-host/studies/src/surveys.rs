@@ -261,8 +261,14 @@ pub fn page(trials: &[Trial]) -> String {
         };
     }
     page.push('\n');
+    page.push_str(&summary(trials));
+    page
+}
+
+/// What the drives amount to, as a table.
+#[must_use]
+pub fn summary(trials: &[Trial]) -> String {
     let scores: Vec<&Score> =
         trials.iter().filter_map(|trial| trial.outcome.as_ref().ok()).collect();
-    page.push_str(&score::summary(trials.len(), &scores));
-    page
+    score::summary(trials.len(), &scores)
 }

@@ -7,6 +7,7 @@ pub mod drawing;
 pub mod evidence;
 pub mod line;
 pub mod map_text;
+pub mod novel;
 pub mod problem;
 pub mod propose;
 mod select;

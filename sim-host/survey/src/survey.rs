@@ -5,6 +5,7 @@ use sonarfix_batch::chain_of_poses::{Chain, Spacing};
 use sonarfix_batch::odometry::wrap;
 use sonarfix_batch::recording::{Reading, Recording, RecordingError, StartPose};
 
+use crate::novel::novel;
 use crate::problem::{DIFFERENCE, Robot, TRACK};
 use crate::track::Track;
 use crate::walls::{MappedWall, walls};
@@ -149,6 +150,7 @@ impl Motion {
 /// [`SurveyError`].
 pub fn survey(recording: &Recording, robot: Robot) -> Result<Survey, SurveyError> {
     recording.check()?;
+    let recording = &novel(recording, robot.track_width);
     let first = recording.readings.first().ok_or(RecordingError::NoTravel)?;
     let origin =
         StartPose { time: first.time, pose: Vector3::zeros(), position: 0.0, heading: 0.0 };

@@ -8,6 +8,7 @@ use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::trace::Pose;
 use sonarfix_survey::survey::Survey;
 
+use crate::floor_plan::compare::quantile;
 use crate::sweeping_robot::Drive;
 
 /// Distance between the samples of a wall, metres.
@@ -311,27 +312,64 @@ fn corners(walls: &[Surface], map: &Survey) -> Option<f64> {
     errors.get(errors.len() / 2).copied()
 }
 
-/// What all drives amount to.
+/// What all drives amount to, as a table.
 pub(super) fn summary(drives: usize, scores: &[&Score]) -> String {
     let count = |is: &dyn Fn(&Score) -> bool| scores.iter().filter(|score| is(score)).count();
     let sure = count(&|score| score.is_sure);
-    let mut text = String::new();
-    // Writing to a String does not fail.
-    let _ = writeln!(
-        text,
-        "{} drives, {} maps, {sure} sure. All walls found: {} of the sure ones; at least 70 % of the hearable length and a path \
-         of at most 5 cm RMS: {}; invented at most 10 %: {}. Path wrong by more than 10 cm: {} sure, {} unsure. Localized \
-         on the sure maps: {} with at most 20 mm, {} with at most 30 mm, {} lost.",
-        drives,
-        scores.len(),
-        count(&|score| score.is_sure && score.walls[0] == score.walls[1]),
-        count(&|score| score.is_sure && score.share() >= 0.7 && score.path[0] <= 0.05),
-        count(&|score| score.is_sure && score.invented <= 0.1),
-        count(&|score| score.is_sure && score.is_wrong()),
-        count(&|score| !score.is_sure && score.is_wrong()),
-        count(&|score| score.is_sure && score.localized.0 <= 0.02),
-        count(&|score| score.is_sure && score.localized.0 <= 0.03),
-        count(&|score| score.is_sure && score.localized.1),
-    );
-    text
+    // Median and extreme: the quantiles 0.5 and `worst`.
+    let over_sure = |of: &dyn Fn(&Score) -> f64, worst: f64, decimals: usize| {
+        let of_sure = scores.iter().filter(|score| score.is_sure).map(|score| of(score));
+        let values: Vec<f64> = of_sure.collect();
+        let [median, extreme] = [0.5, worst].map(|share| quantile(values.clone(), share));
+        format!("{median:.decimals$}; {extreme:.decimals$}")
+    };
+    let rows = [
+        ("maps; sure ones".to_owned(), format!("{}; {sure}", scores.len())),
+        (
+            "path wrong by more than 10 cm: sure maps; unsure ones".to_owned(),
+            format!(
+                "{}; {}",
+                count(&|score| score.is_sure && score.is_wrong()),
+                count(&|score| !score.is_sure && score.is_wrong())
+            ),
+        ),
+        (
+            "sure maps with all walls; with at least 70 % of the hearable length".to_owned(),
+            format!(
+                "{}; {}",
+                count(&|score| score.is_sure && score.walls[0] == score.walls[1]),
+                count(&|score| score.is_sure && score.share() >= 0.7)
+            ),
+        ),
+        (
+            "their hearable length found, median; least, %".to_owned(),
+            over_sure(&|score| 100.0 * score.share(), 0.0, 0),
+        ),
+        (
+            "their path, RMS, median; largest, cm".to_owned(),
+            over_sure(&|score| 100.0 * score.path[0], 1.0, 1),
+        ),
+        (
+            "their walls' offset, RMS, median; largest, cm".to_owned(),
+            over_sure(&|score| 100.0 * score.offset[0], 1.0, 1),
+        ),
+        (
+            "their invented length, median; largest, %".to_owned(),
+            over_sure(&|score| 100.0 * score.invented, 1.0, 0),
+        ),
+        (
+            "localized on them, RMS, median; largest, mm".to_owned(),
+            over_sure(&|score| 1e3 * score.localized.0, 1.0, 0),
+        ),
+        (
+            "lost on them at the end".to_owned(),
+            count(&|score| score.is_sure && score.localized.1).to_string(),
+        ),
+    ];
+    let mut table = format!("| of {drives} drives | |\n|---|---|\n");
+    for (what, value) in rows {
+        // Writing to a String does not fail.
+        let _ = writeln!(table, "| {what} | {value} |");
+    }
+    table
 }

@@ -28,6 +28,9 @@ pub struct Args {
     /// Seed of the first drive; the others count up from it.
     #[arg(long, default_value_t = 20_000)]
     seed: u64,
+    /// Prints what the drives amount to, without a row for each.
+    #[arg(long)]
+    summary: bool,
     /// Writes log, robot file and true map of the first drive into a folder, and maps nothing.
     #[arg(long, value_name = "FOLDER")]
     record: Option<PathBuf>,
@@ -47,6 +50,6 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let progress = Runs::new(args.runs);
     let trials = surveys::trials(place, args.seed, args.runs, &progress)?;
     progress.end()?;
-    print!("{}", surveys::page(&trials));
+    print!("{}", if args.summary { surveys::summary(&trials) } else { surveys::page(&trials) });
     Ok(())
 }
