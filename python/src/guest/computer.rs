@@ -126,11 +126,9 @@ impl Controller for Beside<'_, '_, RobotOnWires<'_>> {
     fn poll(&mut self, sensors: &Sensors, report: &mut Report) -> Result<Actuators> {
         let actuators = self.inner.poll(sensors, report)?;
         self.step(report.reached.as_ref())?;
-        if let Some(heard) = &report.ping_result {
-            if heard.fix.is_some() {
-                let range = heard.outcome.ok().map(|echo| echo.range);
-                self.guest.borrow_mut().fix(&heard.aim, range)?;
-            }
+        if let Some(heard) = report.ping_result.as_ref().filter(|heard| heard.fix.is_some()) {
+            let range = heard.outcome.ok().map(|echo| echo.range);
+            self.guest.borrow_mut().fix(&heard.aim, range)?;
         }
         if let Some(swept) = &report.swept {
             self.step(swept.step())?;
