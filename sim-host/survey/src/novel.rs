@@ -1,22 +1,41 @@
 //! Which pings count. A sonar that sweeps fast pings the same places from the same place again and again: an object that is no wall would
-//! return as many echoes as a drive along a wall does. As in the search (docs/search.md), a ping is novel if none was sent from within 20 cm
-//! of driving in a direction within 10°.
+//! return as many echoes as a drive along a wall does. A ping is novel if none was sent from within 20 cm of driving and 10° of turning in a
+//! direction within 10°. The search has the same rule without the turns (docs/search.md): a survey estimates the track width from them.
 
 use sonarfix_batch::odometry::wrap;
 use sonarfix_batch::recording::Recording;
 
 /// Distance driven, metres.
 const NEAR: f64 = 0.2;
-/// Difference of the directions, radians: slightly less than 10°, the step of the sweep.
+/// Difference of headings and of directions, radians: slightly less than 10°, the step of the sweep.
 const SIMILAR: f64 = 0.17;
+
+/// A ping that counts, by the encoders.
+struct Kept {
+    /// Distance driven, metres.
+    driven: f64,
+    /// Heading, and direction of the axis, radians.
+    heading: f64,
+    direction: f64,
+}
+
+impl Kept {
+    fn is_near(&self, later: &Self) -> bool {
+        later.driven - self.driven < NEAR
+    }
+
+    fn is_like(&self, later: &Self) -> bool {
+        (later.heading - self.heading).abs() < SIMILAR
+            && wrap(later.direction - self.direction).abs() < SIMILAR
+    }
+}
 
 /// The recording with the novel pings alone. Headings are those of the encoders of a robot with this track width, metres.
 #[must_use]
 pub fn novel(recording: &Recording, track_width: f64) -> Recording {
     let mut steps = recording.readings.iter().zip(recording.readings.iter().skip(1)).peekable();
     let (mut driven, mut heading) = (0.0, 0.0);
-    // Distance and direction of each ping that counts.
-    let mut kept: Vec<(f64, f64)> = Vec::new();
+    let mut kept: Vec<Kept> = Vec::new();
     let mut novel = recording.clone();
     novel.pings.retain(|ping| {
         while let Some((from, to)) = steps.next_if(|(_, to)| to.time <= ping.time) {
@@ -27,11 +46,11 @@ pub fn novel(recording: &Recording, track_width: f64) -> Recording {
             driven += f64::midpoint(right, left).abs();
             heading += (right - left) / track_width;
         }
-        let direction = heading + ping.bearing;
-        let mut near = kept.iter().rev().take_while(|(at, _)| driven - at < NEAR);
-        let is_novel = near.all(|(_, other)| wrap(direction - other).abs() >= SIMILAR);
+        let this = Kept { driven, heading, direction: heading + ping.bearing };
+        let is_novel =
+            !kept.iter().rev().take_while(|it| it.is_near(&this)).any(|it| it.is_like(&this));
         if is_novel {
-            kept.push((driven, direction));
+            kept.push(this);
         }
         is_novel
     });
@@ -67,6 +86,9 @@ mod tests {
         // The direction is that in the room: a robot that turns by 1 rad/m pings another one after 17 cm.
         assert_eq!(pings(&[0.0], 1.0).len(), 6);
         assert_eq!(pings(&[0.0], 4.0).len(), 21);
+        // A sonar that turns back as the robot turns on pings one direction at other headings.
+        let back: Vec<f64> = (0..=100).map(|k| -0.04 * f64::from(k)).collect();
+        assert_eq!(pings(&back, 4.0).len(), 21);
     }
 
     #[test]
