@@ -23,7 +23,8 @@ pub struct Drive {
 }
 
 /// Drives along the scenario's path. The software is configured as `robot`, whose mount and servo may differ from those
-/// of the scenario's robot, and its sensor from that of the scenario. It has no map and no pose: its map is one wall far away, so that it sweeps all the time.
+/// of the scenario's robot, and its sensor from that of the scenario. It has no map and no pose: its map is one wall far away, so long that
+/// no place along it is unique, so that it sweeps all the time.
 ///
 /// # Errors
 /// [`SimulationError`], if the robot does not start.
@@ -38,7 +39,7 @@ pub fn drive(
     scenario.robot.start = robot.start;
     scenario.start.is_unknown = true;
     let begin = scenario.path.pose_at(0.0);
-    let far = Wall::new(Point::new(FAR, FAR), Point::new(FAR, FAR + 1.0)).into_iter().collect();
+    let far = Wall::new(Point::new(FAR, 0.0), Point::new(FAR, FAR)).into_iter().collect();
     let simulation = Simulation::new(scenario).believing(robot, far);
     let simulation = match sensor {
         Some(sensor) => simulation.heard_by(sensor),
