@@ -1,12 +1,12 @@
 //! Which pings count. A sonar that sweeps fast pings the same places from the same place again and again: an object that is no wall would
-//! return as many echoes as a drive along a wall does. A ping is novel if none was sent from within 10 cm of driving and 10° of turning in a
+//! return as many echoes as a drive along a wall does. A ping is novel if none was sent from within 20 cm of driving and 10° of turning in a
 //! direction within 10°. The search has a similar rule without the turns (docs/search.md), from which a survey estimates the track width.
 
 use sonarfix_batch::odometry::wrap;
 use sonarfix_batch::recording::Recording;
 
 /// Distance driven, metres.
-const NEAR: f64 = 0.1;
+const NEAR: f64 = 0.2;
 /// Difference of headings and of directions, radians: slightly less than 10°, the step of the sweep.
 const SIMILAR: f64 = 0.17;
 
@@ -76,15 +76,15 @@ mod tests {
     }
 
     #[test]
-    fn one_direction_counts_once_in_10_cm() {
+    fn one_direction_counts_once_in_20_cm() {
         let pings = |bearings: &[f64], turn| novel(&drive(bearings, turn), 0.12).pings;
         let ahead = pings(&[0.0], 0.0);
-        assert!((10..=11).contains(&ahead.len()), "{ahead:?}");
-        // A sweep that takes 11 cm repeats nothing.
-        let sweep: Vec<f64> = (0..11).map(|k| 0.1746 * f64::from(k)).collect();
+        assert!((5..=6).contains(&ahead.len()), "{ahead:?}");
+        // A sweep that takes 21 cm repeats nothing.
+        let sweep: Vec<f64> = (0..21).map(|k| 0.1746 * f64::from(k)).collect();
         assert!(pings(&sweep, 0.0).len() > 95);
-        // The direction is that in the room: a robot that turns by 2 rad/m pings another one after 9 cm.
-        assert_eq!(pings(&[0.0], 2.0).len(), 12);
+        // The direction is that in the room: a robot that turns by 1 rad/m pings another one after 17 cm.
+        assert_eq!(pings(&[0.0], 1.0).len(), 6);
         assert_eq!(pings(&[0.0], 4.0).len(), 21);
         // A sonar that turns back as the robot turns on pings one direction at other headings.
         let back: Vec<f64> = (0..=100).map(|k| -0.04 * f64::from(k)).collect();
