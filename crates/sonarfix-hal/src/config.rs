@@ -74,6 +74,11 @@ pub struct SearchMotion {
     pub bumper: Metres,
 }
 
+impl SearchMotion {
+    /// The bumper distance of a configuration that does not state one: half of the width of a small robot, and what it needs to stop.
+    pub const BUMPER: Metres = Metres(0.3);
+}
+
 /// The kinds of [`SearchMotion`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -13,7 +13,6 @@ use std::path::Path;
 use sonarfix::aim::Policy;
 use sonarfix::config::Rangers;
 use sonarfix::geometry::pose::Point;
-use sonarfix::geometry::units::Metres;
 use sonarfix::sensor::gyro::GyroParameters;
 use sonarfix_hal::config::{
     RobotConfig, RobotConfigError, SearchMotion, SearchMotionKind, StartPose,
@@ -65,7 +64,7 @@ static REGION: Section<Region> = Section {
 
 #[rustfmt::skip]
 static MOTION: Section<SearchMotion> = Section {
-    name: "search_motion", usual: || SearchMotion { kind: SearchMotionKind::Ahead, bumper: Metres(0.3) }, keys: &[
+    name: "search_motion", usual: || SearchMotion { kind: SearchMotionKind::Ahead, bumper: SearchMotion::BUMPER }, keys: &[
     Key::new("kind", Value::Word(&["spin", "ahead"], |m| usize::from(m.kind == SearchMotionKind::Ahead), |m, word| {
         m.kind = if word == 0 { SearchMotionKind::Spin } else { SearchMotionKind::Ahead };
     }), "once around on the spot, or ahead where the sonar finds free floor"),

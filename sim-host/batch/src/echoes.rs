@@ -83,9 +83,16 @@ pub struct Oblique {
     pub perpendicular: f64,
     /// Share of these along the axis.
     pub axis: f64,
-    /// Share of these at the nearest point of a cone; 0 if no cone is much more likely than none.
-    pub cone: f64,
-    /// Half-angle of that cone, radians; 0 without one.
+    /// Those at the nearest point of a cone, if one is much more likely than none.
+    pub cone: Option<Cone>,
+}
+
+/// A cone whose nearest point some echoes come from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cone {
+    /// Their share of the wall's echoes.
+    pub share: f64,
+    /// Its half-angle, radians.
     pub half_angle: f64,
 }
 
@@ -101,7 +108,7 @@ impl Oblique {
         let shares = [
             (self.perpendicular, Source::Perpendicular),
             (self.axis, Source::Axis),
-            (self.cone, Source::Cone),
+            (self.cone.map_or(0.0, |cone| cone.share), Source::Cone),
         ];
         shares.into_iter().find(|(share, _)| *share > 0.5).map(|(_, source)| source)
     }
@@ -232,7 +239,7 @@ fn distances(echoes: &[AtWall], reach: f64) -> Oblique {
     let mut best = Mixture::maximum(echoes, reach, None);
     for degrees in HALF_ANGLES {
         let with = Mixture::maximum(echoes, reach, Some(f64::from(degrees).to_radians()));
-        let needed = if best.half_angle > 0.0 { 0.0 } else { DECISIVE };
+        let needed = if best.half_angle.is_some() { 0.0 } else { DECISIVE };
         if with.likelihood > best.likelihood + needed {
             best = with;
         }
@@ -245,8 +252,7 @@ fn distances(echoes: &[AtWall], reach: f64) -> Oblique {
         of_wall,
         perpendicular: part(perpendicular),
         axis: part(axis),
-        cone: part(cone),
-        half_angle: best.half_angle,
+        cone: best.half_angle.map(|half_angle| Cone { share: part(cone), half_angle }),
     }
 }
 
@@ -255,8 +261,7 @@ struct Mixture {
     likelihood: f64,
     /// Perpendicular, axis, cone, other.
     shares: [f64; 4],
-    /// 0 without a cone.
-    half_angle: f64,
+    half_angle: Option<f64>,
 }
 
 impl Mixture {
@@ -294,7 +299,7 @@ impl Mixture {
             let all: f64 = sums.iter().sum();
             shares = sums.map(|sum| sum / all);
         }
-        Self { likelihood, shares, half_angle: half_angle.unwrap_or(0.0) }
+        Self { likelihood, shares, half_angle }
     }
 }
 
@@ -351,12 +356,14 @@ mod tests {
                 let found = oblique(seed, shares, half);
                 assert_eq!(found.source(), source, "{shares:?}: {found:?}");
                 let all: f64 = shares.iter().sum();
-                let is = [found.perpendicular, found.axis, found.cone];
+                let cone = found.cone.map_or(0.0, |cone| cone.share);
+                let is = [found.perpendicular, found.axis, cone];
                 for (is, share) in is.into_iter().zip(shares) {
                     assert!((is - share / all).abs() < 0.08, "{shares:?}: {found:?}");
                 }
                 assert!((found.of_wall - all).abs() < 0.08, "{found:?}");
                 if shares[2] > 0.0 {
+                    let found = found.cone.unwrap();
                     assert!((found.half_angle - half).abs() < 0.04, "{found:?}");
                 }
             }

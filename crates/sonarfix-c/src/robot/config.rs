@@ -234,7 +234,7 @@ impl From<&RobotConfig> for sonarfix_robot_config_t {
                 Some(SearchMotionKind::Spin) => SONARFIX_SEARCH_MOTION_SPIN,
                 Some(SearchMotionKind::Ahead) => SONARFIX_SEARCH_MOTION_AHEAD,
             } as i32,
-            bumper_distance_m: search_motion.map_or(BUMPER_DISTANCE, |motion| motion.bumper.0),
+            bumper_distance_m: search_motion.map_or(SearchMotion::BUMPER, |motion| motion.bumper).0,
         }
     }
 }
@@ -311,9 +311,6 @@ pub unsafe extern "C" fn sonarfix_robot_config_default(
         })
     }
 }
-
-/// The bumper distance of a robot that does not move while it searches, metres: that of a robot file without one.
-const BUMPER_DISTANCE: f32 = 0.3;
 
 /// Limit of the servo to either side, radians: its pulses are then between 0.5 and 2.5 ms.
 const SERVO_LIMIT: f32 = 1.5;

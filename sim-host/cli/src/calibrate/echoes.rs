@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use sonarfix::config::EchoParameters;
-use sonarfix_batch::echoes::{Echoes, Oblique, Share, Source, Square};
+use sonarfix_batch::echoes::{Cone, Echoes, Oblique, Share, Source, Square};
 
 /// The lines about the echoes, beside what the robot file has of them.
 pub fn lines(echoes: &Echoes, file: &EchoParameters) -> Vec<String> {
@@ -29,15 +29,10 @@ fn of_square(square: &Square, file: &EchoParameters) -> String {
 
 fn of_oblique(oblique: &Oblique) -> String {
     let percent = |share: f64| 100.0 * share;
-    let cone = if oblique.cone > 0.0 {
-        let degrees = oblique.half_angle.to_degrees();
-        format!(
-            ", {:.0} % at the nearest point of a cone of ± {degrees:.0}°",
-            percent(oblique.cone)
-        )
-    } else {
-        String::new()
-    };
+    let cone = oblique.cone.map_or_else(String::new, |Cone { share, half_angle }| {
+        let degrees = half_angle.to_degrees();
+        format!(", {:.0} % at the nearest point of a cone of ± {degrees:.0}°", percent(share))
+    });
     format!(
         "{} echoes at walls 15° to 55° off their normal, {:.0} % of them of the wall: of these {:.0} % at the perpendicular distance, \
          {:.0} % along the axis{cone}",
@@ -54,7 +49,7 @@ fn consequence(oblique: &Oblique) -> Option<String> {
         Source::Perpendicular => return None,
         Source::Axis => ("the distance along its axis", "5 deg".to_owned()),
         Source::Cone => {
-            let most = format!("{:.0} deg", oblique.half_angle.to_degrees());
+            let most = format!("{:.0} deg", oblique.cone?.half_angle.to_degrees());
             ("the nearest point of its cone", most)
         }
     };
@@ -86,8 +81,8 @@ struct JsonOblique {
     of_wall: f64,
     perpendicular: f64,
     axis: f64,
-    cone: f64,
-    half_angle: f64,
+    /// Share and half-angle.
+    cone: Option<[f64; 2]>,
     source: Option<&'static str>,
 }
 
@@ -106,8 +101,7 @@ impl Json {
                 of_wall: oblique.of_wall,
                 perpendicular: oblique.perpendicular,
                 axis: oblique.axis,
-                cone: oblique.cone,
-                half_angle: oblique.half_angle,
+                cone: oblique.cone.map(|cone| [cone.share, cone.half_angle]),
                 source: oblique.source().map(|source| match source {
                     Source::Perpendicular => "perpendicular",
                     Source::Axis => "axis",
@@ -127,8 +121,7 @@ mod tests {
         of_wall: 0.9,
         perpendicular: 0.1,
         axis: 0.0,
-        cone: 0.9,
-        half_angle: 0.262,
+        cone: Some(Cone { share: 0.9, half_angle: 0.262 }),
     };
 
     #[test]
@@ -138,7 +131,7 @@ mod tests {
         assert_eq!(shown.len(), 2, "{shown:?}");
         assert!(shown[0].ends_with("90 % at the nearest point of a cone of ± 15°"), "{shown:?}");
         assert!(shown[1].contains("half_angle = \"15 deg\""), "{shown:?}");
-        let usual = Oblique { perpendicular: 1.0, cone: 0.0, half_angle: 0.0, ..OBLIQUE };
+        let usual = Oblique { perpendicular: 1.0, cone: None, ..OBLIQUE };
         let shown =
             lines(&Echoes { square: None, oblique: Some(usual) }, &EchoParameters::default());
         assert_eq!(shown.len(), 1, "{shown:?}");
