@@ -121,7 +121,13 @@ pub fn observed_trial(
     let mut rng = stream(seed, 0);
     let errors = wheel_errors(&mut rng);
     let start = random_start(&scenario, seconds, &mut rng);
-    drive(&Simulation::new(searching(scenario, errors)), seed, start, seconds, observer)
+    drive(
+        &Simulation::new(searching(scenario, errors)),
+        seed,
+        SetDown::driving(start),
+        seconds,
+        observer,
+    )
 }
 
 /// As [`trial`], from a given time of the path on.
@@ -149,7 +155,13 @@ pub fn observed_trial_from(
     observer: impl FnMut(Heard, &Search<'_>) -> bool,
 ) -> Result<Trial, TrialError> {
     let errors = wheel_errors(&mut stream(seed, 0));
-    drive(&Simulation::new(searching(scenario, errors)), seed, start, seconds, observer)
+    drive(
+        &Simulation::new(searching(scenario, errors)),
+        seed,
+        SetDown::driving(start),
+        seconds,
+        observer,
+    )
 }
 
 /// As [`trial`], of a robot that has the map of another place: no answer is right.
@@ -167,7 +179,47 @@ pub fn trial_elsewhere(
     let start = random_start(&scenario, seconds, &mut rng);
     let robot = scenario.robot;
     let simulation = Simulation::new(searching(scenario, errors)).believing(robot, map.walls());
-    drive(&simulation, seed, start, seconds, |_, _| false)
+    drive(&simulation, seed, SetDown::driving(start), seconds, |_, _| false)
+}
+
+/// As [`trial`], of a robot that stands where it was set down and sweeps.
+///
+/// # Errors
+/// As of [`trial`].
+pub fn trial_standing(scenario: Scenario, seed: u64, seconds: f64) -> Result<Trial, TrialError> {
+    observed_trial_standing(scenario, seed, seconds, |_, _| false)
+}
+
+/// The same, observed as by [`observed_trial`].
+///
+/// # Errors
+/// As of [`trial`].
+pub fn observed_trial_standing(
+    scenario: Scenario,
+    seed: u64,
+    seconds: f64,
+    observer: impl FnMut(Heard, &Search<'_>) -> bool,
+) -> Result<Trial, TrialError> {
+    let mut rng = stream(seed, 0);
+    let errors = wheel_errors(&mut rng);
+    let start = random_start(&scenario, seconds, &mut rng);
+    let set_down = SetDown { at: start, stands: true };
+    drive(&Simulation::new(searching(scenario, errors)), seed, set_down, seconds, observer)
+}
+
+/// Where a robot is set down.
+#[derive(Debug, Clone, Copy)]
+struct SetDown {
+    /// The time of the path, seconds.
+    at: f64,
+    /// Whether it stays there.
+    stands: bool,
+}
+
+impl SetDown {
+    fn driving(at: f64) -> Self {
+        Self { at, stands: false }
+    }
 }
 
 /// A random time of the path with so many seconds left.
@@ -191,10 +243,11 @@ fn wheel_errors(rng: &mut ChaCha8Rng) -> [f64; 2] {
 fn drive(
     simulation: &Simulation,
     seed: u64,
-    start: f64,
+    set_down: SetDown,
     seconds: f64,
     mut observer: impl FnMut(Heard, &Search<'_>) -> bool,
 ) -> Result<Trial, TrialError> {
+    let SetDown { at: start, stands } = set_down;
     let image = simulation.baked_map()?;
     let config = simulation.config();
     let mut drive = Drive {
@@ -223,7 +276,8 @@ fn drive(
     let mut unique = None;
     let mut is_observed = true;
     while time < end && (unique.is_none() || is_observed) {
-        let Measured { travel, bearing, range } = drive.ping(time);
+        let Measured { travel, bearing, range } =
+            drive.ping(time, if stands { start } else { time });
         if unique.is_none() {
             drive.note_twins(&symmetries);
             if let Answer::Unique(hypothesis) = drive.search.answer() {
@@ -264,10 +318,11 @@ struct Measured {
 }
 
 impl Drive<'_> {
-    /// Drives on to a time, pings and searches.
+    /// Drives on to a time of the path, pings and searches.
     #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
-    fn ping(&mut self, time: f64) -> Measured {
-        let [right, left] = self.plant.drive_to(time, &mut self.wheels, &mut self.slips).measured;
+    fn ping(&mut self, time: f64, of_path: f64) -> Measured {
+        let [right, left] =
+            self.plant.drive_to(of_path, &mut self.wheels, &mut self.slips).measured;
         let turn = (right - left) / self.track_width;
         let advance = f64::midpoint(right, left);
         self.metres += advance.abs();

@@ -21,6 +21,7 @@ pub mod fault_rangers;
 pub mod fault_search;
 pub mod fault_table;
 pub mod find_forecast;
+pub mod find_standing;
 pub mod floor_plan;
 pub mod health_page;
 pub mod kidnapped;

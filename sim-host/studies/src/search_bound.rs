@@ -9,7 +9,10 @@ use std::f64::consts::TAU;
 
 use serde::Serialize;
 use sonarfix_map::Scenario;
-use sonarfix_plan::trial::{Heard, Trial, TrialError, are_one, observed_trial};
+use sonarfix_plan::trial::{
+    Heard, Trial, TrialError, are_one, observed_trial, observed_trial_standing,
+};
+use sonarfix_search::search::Search;
 use sonarfix_sim::progress::Progress;
 use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::trace::Pose;
@@ -127,10 +130,31 @@ impl Times {
 }
 
 fn bounded(scenario: Scenario, seed: u64, seconds: f64) -> Result<Bounded, TrialError> {
+    bounded_by(scenario, |scenario, observer| observed_trial(scenario, seed, seconds, observer))
+}
+
+/// One trial of a robot that stands, with its bound.
+///
+/// # Errors
+/// [`TrialError`], if the map cannot be used.
+pub fn standing(scenario: Scenario, seed: u64, seconds: f64) -> Result<Bounded, TrialError> {
+    bounded_by(scenario, |scenario, observer| {
+        observed_trial_standing(scenario, seed, seconds, observer)
+    })
+}
+
+/// A trial that an observer of its pings watches, with its bound.
+fn bounded_by(
+    scenario: Scenario,
+    trial: impl FnOnce(
+        Scenario,
+        &mut dyn FnMut(Heard, &Search<'_>) -> bool,
+    ) -> Result<Trial, TrialError>,
+) -> Result<Bounded, TrialError> {
     let simulation = Simulation::new(scenario.clone());
     let mut posterior = Posterior::new(&simulation);
     let mut found = None;
-    let trial = observed_trial(scenario, seed, seconds, |heard, _| {
+    let trial = trial(scenario, &mut |heard, _| {
         if found.is_none() {
             let (time, truth) = (heard.time, heard.pose);
             posterior.add(heard);

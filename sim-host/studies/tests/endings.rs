@@ -6,9 +6,10 @@ use std::process::{Command, Output, Stdio};
 const CLASSROOM: &str = "../../crates/sonarfix-map/scenarios/classroom.toml";
 
 /// Every subcommand, with arguments for the shortest output.
-const PRINTING: [&[&str]; 14] = [
+const PRINTING: [&[&str]; 15] = [
     &["find-forecast", "--floor-plans", "1", "--starts", "2", "--trials", "2"],
     &["find", "--floor-plans", "1", "--walls", "30", "--seconds", "5"],
+    &["find-standing", "--runs", "1", "--seconds", "2"],
     &["relocalize", "--runs", "1", "--seconds", "5"],
     &["search-motion", "--runs", "1", "--seconds", "5"],
     &["calibration", "--runs", "1", "--metres", "5"],

@@ -14,6 +14,10 @@ use super::{Search, at_least_one, largest};
 /// that no wall explains come in groups.
 const UNTRUSTED: f32 = 0.4;
 const TRUSTED: f32 = 0.6;
+/// The odds that a robot needs which has not driven yet, as a share of those after that: its odometry adds no errors that pings share.
+/// Chosen on seeds from 30000 (rooms) and 300000 (floor plans) of `sonarfix-studies find-standing`: with half of them, 1 of 800 answers
+/// in furnished plans was wrong, with two thirds none.
+const AT_REST: f32 = 2.0 / 3.0;
 /// So many global checks are made before an answer since the last rival, the last one with a clear lead.
 const CHECKS: u8 = 3;
 /// A global check is made at least once in so many cycles.
@@ -56,7 +60,8 @@ impl<const PINGS: usize, const HYPOTHESES: usize> Search<'_, PINGS, HYPOTHESES> 
             self.is_check_due = true;
             return;
         };
-        let odds = self.parameters.odds;
+        let share = if self.window.is_at_rest() { AT_REST } else { 1.0 };
+        let odds = share * self.parameters.odds;
         let least = best.evidence - 0.5 * odds;
         let rivals = self.bank.entries().iter().filter(|entry| entry.evidence > least).count();
         let spread = &best.spread;

@@ -137,7 +137,7 @@ proptest! {
         best in entry(), leads in prop::collection::vec(0.0_f32..60.0, 0..3), other in entry(),
         fresh in prop_oneof![0_u16..10, 0_u16..40], taken in 0_u16..500, cycles in 0_u32..50, are_separate in any::<bool>(),
         (is_checked, was_unique, checks) in (any::<bool>(), any::<bool>(), 0_u8..5),
-        is_sharp_entry in any::<bool>(),
+        (is_sharp_entry, is_at_rest) in (any::<bool>(), any::<bool>()),
     ) {
         let walls = room();
         let mut search = search(&walls);
@@ -162,9 +162,11 @@ proptest! {
         let before = if was_unique { Decision::Unique(best) } else { Decision::Several(3) };
         search.answer = before;
         search.work = Work::None;
+        search.window.drive(if is_at_rest { 0.19 } else { 0.21 }, 0.0);
 
         let parameters = search.parameters;
-        let odds = f64::from(parameters.odds);
+        // A robot that has not driven needs two thirds of the odds.
+        let odds = f64::from(parameters.odds) * if is_at_rest { 2.0 / 3.0 } else { 1.0 };
         let evidence: Vec<f64> = bank.iter().map(|entry| f64::from(entry.evidence)).collect();
         let (variance, axis) = largest_of(&best.spread);
         let sharpness = (

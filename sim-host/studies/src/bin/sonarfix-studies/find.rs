@@ -90,7 +90,7 @@ fn bound(plans: &Plans, args: &Args, runs: Runs) -> anyhow::Result<()> {
     args.output.print(("times", &times), &trials, table, bound_table)
 }
 
-fn bound_table(trials: &[Bounded]) -> Table {
+pub fn bound_table(trials: &[Bounded]) -> Table {
     let row = |bounded: &Bounded| {
         let possible = output::found(bounded.possible_after, bounded.is_right);
         let found = output::found(bounded.trial.unique_after, true);

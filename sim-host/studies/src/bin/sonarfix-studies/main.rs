@@ -7,6 +7,7 @@ mod calibration;
 mod faults;
 mod find;
 mod find_forecast;
+mod find_standing;
 mod floor_plans;
 mod health;
 mod output;
@@ -41,6 +42,8 @@ enum Command {
     Find(find::Args),
     /// Compares the forecast of `sonarfix map check --starts` with simulated searches in floor plans.
     FindForecast(find_forecast::Args),
+    /// Measures how simulated robots that stand and sweep find their pose, beside what their pings allow.
+    FindStanding(find_standing::Args),
     /// Compares two measurement policies on random floor plans; prints markdown.
     FloorPlans(floor_plans::Args),
     /// Measures the reliability of the health verdict; prints markdown.
@@ -79,6 +82,7 @@ fn execute(command: Command) -> anyhow::Result<()> {
         Command::Faults(args) => faults::execute(&args),
         Command::Find(args) => find::execute(&args),
         Command::FindForecast(args) => find_forecast::execute(&args),
+        Command::FindStanding(args) => find_standing::execute(&args),
         Command::FloorPlans(args) => floor_plans::execute(&args),
         Command::Health(args) => health::execute(&args),
         Command::Peers(args) => peers::execute(&args),

@@ -1,0 +1,80 @@
+//! `sonarfix-studies find-standing`: robots that stand and sweep, without a start pose.
+
+use anyhow::Context;
+use sonarfix_report::Table;
+use sonarfix_studies::find_standing::{self, Summary};
+use sonarfix_studies::floor_plan::Kind;
+use sonarfix_studies::rooms::Family;
+use sonarfix_studies::search_bound::Bounded;
+use sonarfix_studies::search_study::Plans;
+use sonarfix_terminal::progress::Runs;
+
+use crate::find::bound_table;
+use crate::output::Output;
+
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Number of trials, each in a room or floor plan of its own.
+    #[arg(long, default_value_t = 20)]
+    runs: u32,
+    /// Seed of the first; the others count up from it.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Longest duration of a trial, which ends with the first pose and its bound.
+    #[arg(long, default_value_t = 5.0)]
+    seconds: f64,
+    /// Empty rooms of this family, by its name in docs/rooms.md with hyphens for blanks, instead of furnished floor plans.
+    #[arg(long)]
+    family: Option<String>,
+    /// Takes only homes among the floor plans.
+    #[arg(long, conflicts_with = "family")]
+    homes: bool,
+    #[command(flatten)]
+    output: Output,
+}
+
+pub fn execute(args: &Args) -> anyhow::Result<()> {
+    anyhow::ensure!(args.seconds > 0.0, "--seconds must be positive");
+    anyhow::ensure!(args.runs > 0, "at least 1 trial is needed");
+    let family = args.family.as_deref().map(family_of).transpose()?;
+    let runs = Runs::new(args.runs);
+    let trials = if let Some(family) = family {
+        find_standing::rooms(family, args.seed, args.runs, args.seconds, &runs)?
+    } else {
+        let kind = args.homes.then_some(Kind::Home);
+        let (first, trials) = (args.seed, args.runs);
+        let plans = Plans { first, trials, kind, walls: None, is_elsewhere: false };
+        find_standing::floor_plans(&plans, args.seconds, &runs)?
+    };
+    runs.end()?;
+    let summary = Summary::new(&trials);
+    let table = |summary: &_| summary_table(summary, args.seconds);
+    args.output
+        .print(("summary", &summary), &trials, table, |trials: &[Bounded]| bound_table(trials))
+}
+
+fn family_of(name: &str) -> anyhow::Result<Family> {
+    let one_word = |family: Family| family.name().replace(' ', "-");
+    let found = Family::ALL.into_iter().find(|family| one_word(*family) == name);
+    found.with_context(|| {
+        let names = Family::ALL.map(one_word).join(", ");
+        format!("there is no family {name}; there are {names}")
+    })
+}
+
+fn summary_table(summary: &Summary, seconds: f64) -> Table {
+    let row = |name: &str, share: f64| vec![name.to_owned(), format!("{:.1} %", 100.0 * share)];
+    Table {
+        title: format!("{} trials of at most {seconds} s", summary.trials),
+        note: String::new(),
+        columns: ["", "value"].map(str::to_owned).into(),
+        rows: vec![
+            row("right within 3 s", summary.right_within_3),
+            row("right", summary.right),
+            row("wrong", summary.wrong),
+            row("best hypothesis right at the end", summary.best_is_right),
+            row("possible within 3 s", summary.possible_within_3),
+            row("possible, but wrong", summary.possible_wrong),
+        ],
+    }
+}
