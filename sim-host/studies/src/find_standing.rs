@@ -1,12 +1,12 @@
-//! Robots without a start pose that stand and sweep: in empty rooms of a family, or in furnished floor plans. Each trial has the bound
-//! of its pings beside it.
+//! Robots without a start pose that stand and sweep: in empty rooms of a family, each trial with the bound of its pings, or in furnished
+//! floor plans.
 
 use std::path::Path;
 
 use rayon::prelude::*;
 use serde::Serialize;
 use sonarfix_map::Scenario;
-use sonarfix_plan::trial::TrialError;
+use sonarfix_plan::trial::{Trial, TrialError, trial_standing};
 use sonarfix_sim::progress::Progress;
 
 use crate::rooms::{Cell, Family, Objects, Robot, Sensor};
@@ -44,8 +44,8 @@ pub fn floor_plans(
     plans: &Plans,
     seconds: f64,
     progress: &impl Progress,
-) -> Result<Vec<Bounded>, TrialError> {
-    plans.each(progress, |scenario, seed| standing(scenario, seed, seconds))
+) -> Result<Vec<Trial>, TrialError> {
+    plans.each(progress, |scenario, seed| trial_standing(scenario, seed, seconds))
 }
 
 /// The time of a standing fix, seconds: two sweeps.
@@ -64,31 +64,45 @@ pub struct Summary {
     pub wrong: f64,
     /// Share whose best hypothesis is right at the end, unique or not.
     pub best_is_right: f64,
-    /// Share of which the pings of three seconds allow the right pose with odds of 1,000 to 1.
-    pub possible_within_3: f64,
-    /// Share of which they, or later ones, give a wrong pose with these odds.
-    pub possible_wrong: f64,
+    /// Share of which the pings of three seconds allow the right pose with odds of 1,000 to 1; `None` without a bound.
+    pub possible_within_3: Option<f64>,
+    /// Share of which the pings give a wrong pose with these odds.
+    pub possible_wrong: Option<f64>,
 }
 
 impl Summary {
     /// The summary of some trials.
     #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "far fewer than 2^53 trials")]
-    pub fn new(trials: &[Bounded]) -> Self {
-        let share = |is: &dyn Fn(&Bounded) -> bool| {
-            trials.iter().filter(|it| is(it)).count() as f64 / trials.len() as f64
-        };
-        let is_soon = |after: Option<f64>| after.is_some_and(|after| after <= SOON);
+    pub fn new(trials: &[Trial]) -> Self {
         Self {
             trials: trials.len(),
-            right_within_3: share(&|it| it.trial.is_right && is_soon(it.trial.unique_after)),
-            right: share(&|it| it.trial.is_right),
-            wrong: share(&|it| it.trial.unique_after.is_some() && !it.trial.is_right),
-            best_is_right: share(&|it| it.trial.rank == Some(0)),
-            possible_within_3: share(&|it| it.is_right && is_soon(it.possible_after)),
-            possible_wrong: share(&|it| it.possible_after.is_some() && !it.is_right),
+            right_within_3: share(trials, |it| it.is_right && is_soon(it.unique_after)),
+            right: share(trials, |it| it.is_right),
+            wrong: share(trials, |it| it.unique_after.is_some() && !it.is_right),
+            best_is_right: share(trials, |it| it.rank == Some(0)),
+            possible_within_3: None,
+            possible_wrong: None,
         }
     }
+
+    /// The summary of some trials with their bound.
+    #[must_use]
+    pub fn bounded(trials: &[Bounded]) -> Self {
+        let possible = share(trials, |it| it.is_right && is_soon(it.possible_after));
+        let wrong = share(trials, |it| it.possible_after.is_some() && !it.is_right);
+        let searches: Vec<Trial> = trials.iter().map(|bounded| bounded.trial).collect();
+        let [possible_within_3, possible_wrong] = [possible, wrong].map(Some);
+        Self { possible_within_3, possible_wrong, ..Self::new(&searches) }
+    }
+}
+
+fn is_soon(after: Option<f64>) -> bool {
+    after.is_some_and(|after| after <= SOON)
+}
+
+#[expect(clippy::cast_precision_loss, reason = "far fewer than 2^53 trials")]
+fn share<T>(trials: &[T], is: impl Fn(&&T) -> bool) -> f64 {
+    trials.iter().filter(is).count() as f64 / trials.len() as f64
 }
 
 #[cfg(test)]
@@ -99,10 +113,10 @@ mod tests {
     #[test]
     fn standing_robots_are_found_where_no_wall_looks_like_another() {
         let slanted = rooms(Family::Slanted, 31_000, 12, 4.0, &|| ()).unwrap();
-        let summary = Summary::new(&slanted);
-        assert!(summary.right >= 0.4 && summary.possible_within_3 >= 0.7, "{summary:?}");
+        let summary = Summary::bounded(&slanted);
+        assert!(summary.right >= 0.4 && summary.possible_within_3 >= Some(0.7), "{summary:?}");
         assert!(slanted.iter().all(|it| it.trial.metres < 1e-9), "{slanted:?}");
-        let square = Summary::new(&rooms(Family::Symmetric, 31_000, 12, 4.0, &|| ()).unwrap());
+        let square = Summary::bounded(&rooms(Family::Symmetric, 31_000, 12, 4.0, &|| ()).unwrap());
         assert!(square.right + square.wrong < 1e-9, "{square:?}");
     }
 }

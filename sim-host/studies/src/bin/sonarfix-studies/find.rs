@@ -129,7 +129,7 @@ fn point(text: &str) -> anyhow::Result<[f64; 2]> {
     Ok([number(x)?, number(y)?])
 }
 
-fn trial_table(trials: &[Trial]) -> Table {
+pub fn trial_table(trials: &[Trial]) -> Table {
     let row = |trial: &Trial| {
         let answer = match (trial.unique_after, trial.is_right) {
             (Some(after), true) => format!("right after {after:.1} s"),

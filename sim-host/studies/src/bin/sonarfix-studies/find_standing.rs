@@ -5,11 +5,10 @@ use sonarfix_report::Table;
 use sonarfix_studies::find_standing::{self, Summary};
 use sonarfix_studies::floor_plan::Kind;
 use sonarfix_studies::rooms::Family;
-use sonarfix_studies::search_bound::Bounded;
 use sonarfix_studies::search_study::Plans;
 use sonarfix_terminal::progress::Runs;
 
-use crate::find::bound_table;
+use crate::find::{bound_table, trial_table};
 use crate::output::Output;
 
 #[derive(Debug, clap::Args)]
@@ -20,10 +19,10 @@ pub struct Args {
     /// Seed of the first; the others count up from it.
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Longest duration of a trial, which ends with the first pose and its bound.
+    /// Longest duration of a trial.
     #[arg(long, default_value_t = 5.0)]
     seconds: f64,
-    /// Empty rooms of this family, by its name in docs/rooms.md with hyphens for blanks, instead of furnished floor plans.
+    /// Empty rooms of this family, each trial with the bound of its pings, by its name in docs/rooms.md with hyphens for blanks, instead of furnished floor plans.
     #[arg(long)]
     family: Option<String>,
     /// Takes only homes among the floor plans.
@@ -38,19 +37,19 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     anyhow::ensure!(args.runs > 0, "at least 1 trial is needed");
     let family = args.family.as_deref().map(family_of).transpose()?;
     let runs = Runs::new(args.runs);
-    let trials = if let Some(family) = family {
-        find_standing::rooms(family, args.seed, args.runs, args.seconds, &runs)?
-    } else {
-        let kind = args.homes.then_some(Kind::Home);
-        let (first, trials) = (args.seed, args.runs);
-        let plans = Plans { first, trials, kind, walls: None, is_elsewhere: false };
-        find_standing::floor_plans(&plans, args.seconds, &runs)?
-    };
-    runs.end()?;
-    let summary = Summary::new(&trials);
     let table = |summary: &_| summary_table(summary, args.seconds);
-    args.output
-        .print(("summary", &summary), &trials, table, |trials: &[Bounded]| bound_table(trials))
+    if let Some(family) = family {
+        let trials = find_standing::rooms(family, args.seed, args.runs, args.seconds, &runs)?;
+        runs.end()?;
+        let summary = Summary::bounded(&trials);
+        return args.output.print(("summary", &summary), &trials, table, bound_table);
+    }
+    let kind = args.homes.then_some(Kind::Home);
+    let (first, trials) = (args.seed, args.runs);
+    let plans = Plans { first, trials, kind, walls: None, is_elsewhere: false };
+    let trials = find_standing::floor_plans(&plans, args.seconds, &runs)?;
+    runs.end()?;
+    args.output.print(("summary", &Summary::new(&trials)), &trials, table, trial_table)
 }
 
 fn family_of(name: &str) -> anyhow::Result<Family> {
@@ -64,17 +63,18 @@ fn family_of(name: &str) -> anyhow::Result<Family> {
 
 fn summary_table(summary: &Summary, seconds: f64) -> Table {
     let row = |name: &str, share: f64| vec![name.to_owned(), format!("{:.1} %", 100.0 * share)];
+    let mut rows = vec![
+        row("right within 3 s", summary.right_within_3),
+        row("right", summary.right),
+        row("wrong", summary.wrong),
+        row("best hypothesis right at the end", summary.best_is_right),
+    ];
+    rows.extend(summary.possible_within_3.map(|share| row("possible within 3 s", share)));
+    rows.extend(summary.possible_wrong.map(|share| row("possible, but wrong", share)));
     Table {
         title: format!("{} trials of at most {seconds} s", summary.trials),
         note: String::new(),
         columns: ["", "value"].map(str::to_owned).into(),
-        rows: vec![
-            row("right within 3 s", summary.right_within_3),
-            row("right", summary.right),
-            row("wrong", summary.wrong),
-            row("best hypothesis right at the end", summary.best_is_right),
-            row("possible within 3 s", summary.possible_within_3),
-            row("possible, but wrong", summary.possible_wrong),
-        ],
+        rows,
     }
 }
