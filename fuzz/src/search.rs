@@ -23,7 +23,8 @@ pub fn search(bytes: &[u8]) {
     if config.check().is_err() {
         return;
     }
-    let mut search = Search::<40, 4>::new(&config.rangers.first, Map::new(&walls), SearchParameters::default());
+    let mut search =
+        Search::<40, 4>::new(&config.rangers.first, Map::new(&walls), SearchParameters::default());
     let mut evaluations = EVALUATIONS;
     while !bytes.is_empty() {
         call(&mut search, &mut bytes, &mut evaluations);

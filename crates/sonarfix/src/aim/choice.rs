@@ -3,6 +3,8 @@
 //! A choice is the longest work of a robot's loop, and its cost grows with the walls that are near. It is therefore divided into
 //! slices, between which the loop does what else is due. The estimate may change in between; a candidate has the score of its slice.
 
+use core::marker::PhantomData;
+
 use super::ranking::Ranked;
 use super::{Aim, Along, BearingRule, ByPolicy, NoAim, Planner, Policy, Situation, Standing};
 use crate::association::history::Slot;
@@ -116,7 +118,7 @@ impl<'a> Situation<'a> {
     /// # Errors
     /// [`NoAim`] if no wall can be measured, or the robot has no such ranger.
     pub fn at(&self, ranger: RangerId, bearing: Radians) -> Result<Aim, NoAim> {
-        self.decide_for(Choice::new(ranger), Along(bearing))
+        self.decide_by::<Along>(Choice::along(ranger, bearing))
     }
 
     /// Makes a whole choice.
@@ -124,11 +126,11 @@ impl<'a> Situation<'a> {
     /// # Errors
     /// [`NoAim`] if no wall can be measured, or the robot has no such ranger.
     pub fn decide(&self, choice: Choice) -> Result<Aim, NoAim> {
-        self.decide_for(choice, ByPolicy)
+        self.decide_by::<ByPolicy>(choice)
     }
 
-    fn decide_for<P: BearingRule>(&self, mut choice: Choice, pointer: P) -> Result<Aim, NoAim> {
-        let mut planner = self.planner(&choice, pointer)?;
+    fn decide_by<P: BearingRule>(&self, mut choice: Choice) -> Result<Aim, NoAim> {
+        let mut planner = self.planner::<P>(&choice)?;
         loop {
             if let Some(end) = planner.proceed(&mut choice, u32::MAX) {
                 return end;
@@ -139,17 +141,13 @@ impl<'a> Situation<'a> {
     /// Makes a slice of a choice; returns its result after the last one.
     pub fn proceed(&self, choice: &mut Choice) -> Option<Result<Aim, NoAim>> {
         match choice.along {
-            None => self.proceed_for(choice, ByPolicy),
-            Some(bearing) => self.proceed_for(choice, Along(bearing)),
+            None => self.proceed_by::<ByPolicy>(choice),
+            Some(_) => self.proceed_by::<Along>(choice),
         }
     }
 
-    fn proceed_for<P: BearingRule>(
-        &self,
-        choice: &mut Choice,
-        pointer: P,
-    ) -> Option<Result<Aim, NoAim>> {
-        match self.planner(choice, pointer) {
+    fn proceed_by<P: BearingRule>(&self, choice: &mut Choice) -> Option<Result<Aim, NoAim>> {
+        match self.planner::<P>(choice) {
             Ok(mut planner) => {
                 if choice.is_daring {
                     planner.drop_margins();
@@ -161,13 +159,9 @@ impl<'a> Situation<'a> {
     }
 
     /// The planner of a choice; none if the robot has no such ranger, or it is not to be tried, because it has failed.
-    fn planner<P: BearingRule>(
-        &self,
-        choice: &Choice,
-        pointer: P,
-    ) -> Result<Planner<'a, P>, NoAim> {
+    fn planner<P: BearingRule>(&self, choice: &Choice) -> Result<Planner<'a, P>, NoAim> {
         let Situation { config, map, ekf, history, now, policy } = *self;
-        let &Choice { ranger, standing, .. } = choice;
+        let &Choice { ranger, standing, along, .. } = choice;
         let is_one_of_several = P::CHOOSES && config.rangers.are_several();
         let rests = is_one_of_several && history.rests(ranger, config, now);
         let sonar = config.rangers.get(ranger).filter(|_| !rests).ok_or(NoAim::NoWall)?;
@@ -187,7 +181,8 @@ impl<'a> Situation<'a> {
             policy,
             ranger,
             sonar,
-            pointer,
+            along: along.unwrap_or(Radians(0.0)),
+            rule: PhantomData,
             slot,
             works,
             view,

@@ -91,7 +91,7 @@ impl<P: BearingRule> Planner<'_, P> {
     #[inline(never)]
     fn numbered(&self, number: u32) -> Ray {
         let (current, rest) = self.standing();
-        let (bearing, until_ping) = if let Some(bearing) = self.pointer.bearing() {
+        let (bearing, until_ping) = if let Some(bearing) = self.given_bearing() {
             (bearing, 0.0)
         } else if number >= FAN {
             (current, rest)

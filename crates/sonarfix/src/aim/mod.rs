@@ -26,6 +26,8 @@ mod gain;
 mod light;
 mod ranking;
 
+use core::marker::PhantomData;
+
 use crate::association::visibility::{Beam, Sight, Viewpoint};
 use crate::config::{Config, MAX_RANGERS, RangerId, RangerParameters};
 use crate::filter::ekf::Ekf;
@@ -146,7 +148,10 @@ struct Planner<'a, P> {
     policy: Policy,
     ranger: RangerId,
     sonar: &'a RangerParameters,
-    pointer: P,
+    /// The bearing, if the planner does not choose it. A field in both cases: what does not depend on the rule is then the same code,
+    /// which the compiler merges.
+    along: Radians,
+    rule: PhantomData<P>,
     slot: Slot,
     /// Probability that the ranger works.
     works: f32,
@@ -174,43 +179,36 @@ struct Pointing {
 }
 
 /// What determines the bearing of a ping.
-trait BearingRule: Copy {
+trait BearingRule {
     /// Whether the planner chooses it.
     const CHOOSES: bool;
-    /// The bearing, if the planner does not choose it.
-    fn bearing(self) -> Option<Radians>;
 }
 
 /// The planner, by the policy.
-#[derive(Clone, Copy)]
 struct ByPolicy;
 
-/// Whatever has turned the servo to this bearing.
-#[derive(Clone, Copy)]
-struct Along(Radians);
+/// Whatever has turned the servo.
+struct Along;
 
 impl BearingRule for ByPolicy {
     const CHOOSES: bool = true;
-
-    fn bearing(self) -> Option<Radians> {
-        None
-    }
 }
 
 impl BearingRule for Along {
     const CHOOSES: bool = false;
-
-    fn bearing(self) -> Option<Radians> {
-        Some(self.0)
-    }
 }
 
 impl<P: BearingRule> Planner<'_, P> {
+    /// The bearing, if the planner does not choose it.
+    fn given_bearing(&self) -> Option<Radians> {
+        (!P::CHOOSES).then_some(self.along)
+    }
+
     /// A wall as a candidate, if it can be measured: with the servo turned to it, or along the bearing that it has.
     #[inline(never)]
     fn by_sound(&self, id: WallId, wall: &Wall) -> Option<Candidate> {
         let (expected, on_wall) = self.view.expected_range(wall).ok()?;
-        let (pointing, is_seen) = if let Some(bearing) = self.pointer.bearing() {
+        let (pointing, is_seen) = if let Some(bearing) = self.given_bearing() {
             let off = self.view.off_square(&expected, bearing);
             (Pointing { bearing, off, until_ping: 0.0 }, self.view.may_answer(off))
         } else {
