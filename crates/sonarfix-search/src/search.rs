@@ -18,7 +18,6 @@ mod cycle;
 mod decision;
 mod lines;
 mod parameters;
-mod ranked;
 mod refine;
 mod score;
 mod state;

@@ -3,10 +3,9 @@
 use heapless::Vec;
 
 use super::candidates::Placement;
-use super::ranked::insert_ranked;
 use super::refine::Spread;
 use super::window::{Bend, Station};
-use sonarfix::geometry::list::remove_at;
+use sonarfix::geometry::list::{insert_in_order, remove_at};
 use sonarfix::geometry::numeric::at_least;
 use sonarfix::geometry::vector::Vector;
 
@@ -162,7 +161,7 @@ impl<const HYPOTHESES: usize> Bank<HYPOTHESES> {
             }
         }
         self.remove(is_same);
-        insert_ranked(&mut self.entries, entry, |entry| entry.evidence);
+        insert_in_order(&mut self.entries, entry, |one, other| one.evidence > other.evidence);
     }
 
     /// Moves all placements to a new reference of the odometry frame, of which `bend` is taken out.

@@ -4,10 +4,9 @@
 
 use heapless::Vec;
 
-use super::ranked::insert_ranked;
 use super::window::Ping;
 use sonarfix::geometry::elementary::sqrt;
-use sonarfix::geometry::list::remove_at;
+use sonarfix::geometry::list::{insert_in_order, remove_at};
 use sonarfix::geometry::trig::sin_cos;
 use sonarfix::geometry::units::Radians;
 use sonarfix::geometry::vector::Vector;
@@ -168,7 +167,7 @@ impl Lines {
                 _ => return,
             }
         }
-        insert_ranked(&mut self.found, line, |line| line.support);
+        insert_in_order(&mut self.found, line, |one, other| one.support > other.support);
     }
 
     /// Fits a line to its pings by one Gauss–Newton step: ranges to 3 cm, and beams that on the mean

@@ -10,7 +10,7 @@ use heapless::Vec;
 
 use crate::config::RangerParameters;
 use crate::geometry::elementary::sqrt;
-use crate::geometry::list::{insert_at, remove_at};
+use crate::geometry::list::{insert_in_order, remove_at};
 use crate::geometry::trig::sin_cos;
 use crate::geometry::units::Metres;
 use crate::geometry::vector::Vector;
@@ -299,16 +299,7 @@ fn insert(into: &mut Vec<Reflector, REFLECTORS>, reflector: Reflector) {
             remove_at(into, at);
         }
     }
-    if into.is_full() {
-        match into.last() {
-            Some(last) if reflector.is_before(last) => {
-                into.pop();
-            }
-            _ => return,
-        }
-    }
-    let at = into.iter().position(|other| reflector.is_before(other));
-    insert_at(into, at.unwrap_or(into.len()), reflector);
+    insert_in_order(into, reflector, Reflector::is_before);
 }
 
 impl Reflector {

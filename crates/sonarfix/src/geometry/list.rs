@@ -8,16 +8,26 @@ use core::mem::{swap, take};
 
 use heapless::Vec;
 
-/// Inserts an element at a place from 0 to the length of a list, which is not full; otherwise nothing is inserted.
-pub fn insert_at<T, const N: usize>(list: &mut Vec<T, N>, at: usize, element: T) {
+/// Inserts an element into a list that is in order: before the first one that it precedes. From a full list the last one drops out
+/// instead, unless the element does not precede it.
+pub fn insert_in_order<T, const N: usize>(
+    list: &mut Vec<T, N>,
+    element: T,
+    precedes: impl Fn(&T, &T) -> bool,
+) {
+    if list.is_full() {
+        if !list.last().is_some_and(|last| precedes(&element, last)) {
+            return;
+        }
+        list.pop();
+    }
     if list.push(element).is_err() {
         return;
     }
-    let mut rest = list.get_mut(at..).unwrap_or_default();
+    let mut rest = list.as_mut_slice();
     while let Some((last, before)) = take(&mut rest).split_last_mut() {
-        if let Some(previous) = before.last_mut() {
-            swap(previous, last);
-        }
+        let Some(previous) = before.last_mut().filter(|it| precedes(last, it)) else { return };
+        swap(previous, last);
         rest = before;
     }
 }
@@ -63,17 +73,24 @@ mod tests {
     }
 
     #[test]
-    fn an_element_is_inserted_at_its_place_unless_the_list_is_full() {
-        for (before, at, after) in [
-            (&[][..], 0, &[9][..]),
-            (&[1, 2, 3], 0, &[9, 1, 2, 3]),
-            (&[1, 2, 3], 2, &[1, 2, 9, 3]),
-            (&[1, 2, 3], 3, &[1, 2, 3, 9]),
-            (&[1, 2, 3, 4], 1, &[1, 2, 3, 4]),
+    fn an_element_is_inserted_in_order_and_the_last_drops_out_of_a_full_list() {
+        // By tens: equal elements stay in the order in which they came.
+        let precedes = |one: &u8, other: &u8| one / 10 < other / 10;
+        for (before, element, after) in [
+            (&[][..], 9, &[9][..]),
+            (&[10, 20, 30], 5, &[5, 10, 20, 30]),
+            (&[10, 20, 30], 21, &[10, 20, 21, 30]),
+            (&[10, 20, 30], 39, &[10, 20, 30, 39]),
+            (&[10, 20, 30, 40], 15, &[10, 15, 20, 30]),
+            (&[10, 20, 30, 40], 35, &[10, 20, 30, 35]),
+            (&[10, 20, 30, 40], 41, &[10, 20, 30, 40]),
         ] {
             let mut list = list(before);
-            insert_at(&mut list, at, 9);
+            insert_in_order(&mut list, element, precedes);
             assert_eq!(list, after);
         }
+        let mut none: Vec<u8, 0> = Vec::new();
+        insert_in_order(&mut none, 9, precedes);
+        assert!(none.is_empty());
     }
 }
