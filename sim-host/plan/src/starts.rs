@@ -5,7 +5,7 @@ use serde::Serialize;
 use sonarfix_map::{Movement, Path, PathError, PathPlan, PathPose, Scenario};
 use sonarfix_sim::progress::Progress;
 
-use crate::trial::{Trial, TrialError, trial_from};
+use crate::trial::{SetDown, Trial, TrialError, trial};
 
 /// The starts on one leg of the path, or on all of it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -70,7 +70,7 @@ impl Starts {
         scenario.path = back_and_forth(&lap, lap.duration() + seconds)?;
         let made = (0..starts).into_par_iter().filter(|_| !progress.is_interrupted()).map(|n| {
             let time = interval * (f64::from(n) + 0.5);
-            let trial = trial_from(scenario.clone(), n.into(), time, seconds)?;
+            let trial = trial(scenario.clone(), n.into(), SetDown::At(time), seconds)?;
             progress.finished();
             Ok(Start { time, trial })
         });

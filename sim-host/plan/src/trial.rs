@@ -98,13 +98,29 @@ pub struct Heard {
     pub range: Option<f64>,
 }
 
-/// Simulates one trial of at most `seconds`: the seed chooses the wheel errors and the place on the
+/// Where a robot without a pose is set down, and what it does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum SetDown {
+    /// Anywhere on its path; it drives on.
+    Anywhere,
+    /// Where its path is at this time, seconds; it drives on.
+    At(f64),
+    /// Anywhere on its path, where it stands.
+    Standing,
+}
+
+/// Simulates one trial of at most `seconds`: the seed chooses the wheel errors and, unless it is given, the place on the
 /// path.
 ///
 /// # Errors
 /// [`TrialError`], if the map cannot be used.
-pub fn trial(scenario: Scenario, seed: u64, seconds: f64) -> Result<Trial, TrialError> {
-    observed_trial(scenario, seed, seconds, |_, _| false)
+pub fn trial(
+    scenario: Scenario,
+    seed: u64,
+    set_down: SetDown,
+    seconds: f64,
+) -> Result<Trial, TrialError> {
+    observed_trial(scenario, seed, set_down, seconds, |_, _| false)
 }
 
 /// The same, and every ping goes to an observer, with the search that has taken it. The trial goes on after a unique answer, which the result contains, as long as the
@@ -115,56 +131,21 @@ pub fn trial(scenario: Scenario, seed: u64, seconds: f64) -> Result<Trial, Trial
 pub fn observed_trial(
     scenario: Scenario,
     seed: u64,
+    set_down: SetDown,
     seconds: f64,
     observer: impl FnMut(Heard, &Search<'_>) -> bool,
 ) -> Result<Trial, TrialError> {
     let mut rng = stream(seed, 0);
     let errors = wheel_errors(&mut rng);
-    let start = random_start(&scenario, seconds, &mut rng);
-    drive(
-        &Simulation::new(searching(scenario, errors)),
-        seed,
-        SetDown::driving(start),
-        seconds,
-        observer,
-    )
+    let start = match set_down {
+        SetDown::At(time) => time,
+        SetDown::Anywhere | SetDown::Standing => random_start(&scenario, seconds, &mut rng),
+    };
+    let until = if set_down == SetDown::Standing { start } else { f64::INFINITY };
+    drive(&Simulation::new(searching(scenario, errors)), seed, (start, until), seconds, observer)
 }
 
-/// As [`trial`], from a given time of the path on.
-///
-/// # Errors
-/// As of [`trial`].
-pub fn trial_from(
-    scenario: Scenario,
-    seed: u64,
-    start: f64,
-    seconds: f64,
-) -> Result<Trial, TrialError> {
-    observed_trial_from(scenario, seed, start, seconds, |_, _| false)
-}
-
-/// The same, observed as by [`observed_trial`].
-///
-/// # Errors
-/// As of [`trial`].
-pub fn observed_trial_from(
-    scenario: Scenario,
-    seed: u64,
-    start: f64,
-    seconds: f64,
-    observer: impl FnMut(Heard, &Search<'_>) -> bool,
-) -> Result<Trial, TrialError> {
-    let errors = wheel_errors(&mut stream(seed, 0));
-    drive(
-        &Simulation::new(searching(scenario, errors)),
-        seed,
-        SetDown::driving(start),
-        seconds,
-        observer,
-    )
-}
-
-/// As [`trial`], of a robot that has the map of another place: no answer is right.
+/// As [`trial`], of a robot that is set down anywhere, with the map of another place: no answer is right.
 ///
 /// # Errors
 /// As of [`trial`].
@@ -179,47 +160,7 @@ pub fn trial_elsewhere(
     let start = random_start(&scenario, seconds, &mut rng);
     let robot = scenario.robot;
     let simulation = Simulation::new(searching(scenario, errors)).believing(robot, map.walls());
-    drive(&simulation, seed, SetDown::driving(start), seconds, |_, _| false)
-}
-
-/// As [`trial`], of a robot that stands where it was set down and sweeps.
-///
-/// # Errors
-/// As of [`trial`].
-pub fn trial_standing(scenario: Scenario, seed: u64, seconds: f64) -> Result<Trial, TrialError> {
-    observed_trial_standing(scenario, seed, seconds, |_, _| false)
-}
-
-/// The same, observed as by [`observed_trial`].
-///
-/// # Errors
-/// As of [`trial`].
-pub fn observed_trial_standing(
-    scenario: Scenario,
-    seed: u64,
-    seconds: f64,
-    observer: impl FnMut(Heard, &Search<'_>) -> bool,
-) -> Result<Trial, TrialError> {
-    let mut rng = stream(seed, 0);
-    let errors = wheel_errors(&mut rng);
-    let start = random_start(&scenario, seconds, &mut rng);
-    let set_down = SetDown { at: start, stands: true };
-    drive(&Simulation::new(searching(scenario, errors)), seed, set_down, seconds, observer)
-}
-
-/// Where a robot is set down.
-#[derive(Debug, Clone, Copy)]
-struct SetDown {
-    /// The time of the path, seconds.
-    at: f64,
-    /// Whether it stays there.
-    stands: bool,
-}
-
-impl SetDown {
-    fn driving(at: f64) -> Self {
-        Self { at, stands: false }
-    }
+    drive(&simulation, seed, (start, f64::INFINITY), seconds, |_, _| false)
 }
 
 /// A random time of the path with so many seconds left.
@@ -240,14 +181,14 @@ fn wheel_errors(rng: &mut ChaCha8Rng) -> [f64; 2] {
     [(); 2].map(|()| rng.random_range(-WHEEL_ERROR..WHEEL_ERROR))
 }
 
+/// Drives from one time of the path until another, and searches for so many seconds.
 fn drive(
     simulation: &Simulation,
     seed: u64,
-    set_down: SetDown,
+    (start, until): (f64, f64),
     seconds: f64,
     mut observer: impl FnMut(Heard, &Search<'_>) -> bool,
 ) -> Result<Trial, TrialError> {
-    let SetDown { at: start, stands } = set_down;
     let image = simulation.baked_map()?;
     let config = simulation.config();
     let mut drive = Drive {
@@ -258,6 +199,7 @@ fn drive(
         ),
         plant: Plant::new(&simulation.scenario, simulation.range_scale()),
         track_width: config.drive.track_width.0.into(),
+        until,
         simulation,
         wheels: stream(seed, 1),
         slips: stream(seed, 4),
@@ -276,8 +218,7 @@ fn drive(
     let mut unique = None;
     let mut is_observed = true;
     while time < end && (unique.is_none() || is_observed) {
-        let Measured { travel, bearing, range } =
-            drive.ping(time, if stands { start } else { time });
+        let Measured { travel, bearing, range } = drive.ping(time);
         if unique.is_none() {
             drive.note_twins(&symmetries);
             if let Answer::Unique(hypothesis) = drive.search.answer() {
@@ -296,6 +237,8 @@ struct Drive<'a> {
     simulation: &'a Simulation,
     search: Search<'a>,
     plant: Plant<'a>,
+    /// The time of the path at which the robot stops, seconds.
+    until: f64,
     track_width: f64,
     wheels: ChaCha8Rng,
     slips: ChaCha8Rng,
@@ -318,11 +261,11 @@ struct Measured {
 }
 
 impl Drive<'_> {
-    /// Drives on to a time of the path, pings and searches.
+    /// Drives on to a time, pings and searches.
     #[expect(clippy::cast_possible_truncation, reason = "the robot computes in f32")]
-    fn ping(&mut self, time: f64, of_path: f64) -> Measured {
-        let [right, left] =
-            self.plant.drive_to(of_path, &mut self.wheels, &mut self.slips).measured;
+    fn ping(&mut self, time: f64) -> Measured {
+        let driven = time.min(self.until);
+        let [right, left] = self.plant.drive_to(driven, &mut self.wheels, &mut self.slips).measured;
         let turn = (right - left) / self.track_width;
         let advance = f64::midpoint(right, left);
         self.metres += advance.abs();

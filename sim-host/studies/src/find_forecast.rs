@@ -7,7 +7,7 @@ use serde::Serialize;
 use sonarfix_map::Scenario;
 use sonarfix_plan::anywhere::{Anywhere, AnywhereError, Confusion, Landmarks, Settings, Times};
 use sonarfix_plan::bare;
-use sonarfix_plan::trial::{Trial, TrialError, trial};
+use sonarfix_plan::trial::{SetDown, Trial, TrialError, trial};
 use sonarfix_sim::progress::Progress;
 
 use crate::search_study::Plans;
@@ -112,7 +112,7 @@ fn simulated(
     seconds: f64,
 ) -> Result<Option<Times>, TrialError> {
     let seeds = (first..).take(trials as usize);
-    let trials = seeds.map(|seed| trial(scenario.clone(), seed, seconds));
+    let trials = seeds.map(|seed| trial(scenario.clone(), seed, SetDown::Anywhere, seconds));
     let trials: Vec<Trial> = trials.collect::<Result<_, _>>()?;
     let right = trials.iter().filter(|trial| trial.is_right).filter_map(|trial| trial.unique_after);
     let wrong = trials.iter().filter(|t| t.unique_after.is_some() && !t.is_right).count();

@@ -6,11 +6,11 @@ use std::path::Path;
 use rayon::prelude::*;
 use serde::Serialize;
 use sonarfix_map::Scenario;
-use sonarfix_plan::trial::{Trial, TrialError, trial_standing};
+use sonarfix_plan::trial::{SetDown, Trial, TrialError, trial};
 use sonarfix_sim::progress::Progress;
 
 use crate::rooms::{Cell, Family, Objects, Robot, Sensor};
-use crate::search_bound::{Bounded, standing};
+use crate::search_bound::{Bounded, bounded};
 use crate::search_study::Plans;
 
 /// Trials in empty rooms of a family, with an HC-SR04: each robot stands anywhere on the path of its room.
@@ -29,9 +29,9 @@ pub fn rooms(
     let seeds = (0..u64::from(trials)).into_par_iter().map(|n| first.wrapping_add(n));
     let one = |seed| {
         let scenario = Scenario::parse(&cell.toml(seed), "room.toml", Path::new(""))?;
-        let bounded = standing(scenario, seed, seconds);
+        let trial = bounded(scenario, seed, SetDown::Standing, seconds);
         progress.finished();
-        bounded
+        trial
     };
     seeds.filter(|_| !progress.is_interrupted()).map(one).collect()
 }
@@ -45,7 +45,7 @@ pub fn floor_plans(
     seconds: f64,
     progress: &impl Progress,
 ) -> Result<Vec<Trial>, TrialError> {
-    plans.each(progress, |scenario, seed| trial_standing(scenario, seed, seconds))
+    plans.each(progress, |scenario, seed| trial(scenario, seed, SetDown::Standing, seconds))
 }
 
 /// The time of a standing fix, seconds: two sweeps.

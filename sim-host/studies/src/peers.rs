@@ -22,7 +22,7 @@ use serde::Serialize;
 use sonarfix::geometry::pose::Point;
 use sonarfix::map::Wall;
 use sonarfix_map::{FileError, Scenario};
-use sonarfix_plan::trial::{TrialError, are_one, observed_trial};
+use sonarfix_plan::trial::{SetDown, TrialError, are_one, observed_trial};
 use sonarfix_sim::progress::Progress;
 use sonarfix_sim::simulate::{Simulation, SimulationError};
 
@@ -165,7 +165,7 @@ pub fn search(
         let walls = segments(&simulation.scenario.floor.walls());
         let mut filter = ParticleFilter::anywhere(&config, walls, seed);
         let (mut found, mut sure_since) = (None, None);
-        let trial = observed_trial(scenario, seed, seconds, |heard, _| {
+        let trial = observed_trial(scenario, seed, SetDown::Anywhere, seconds, |heard, _| {
             if found.is_none() {
                 let [advance, turn] = heard.travel;
                 filter.drive(advance, turn);

@@ -9,10 +9,7 @@ use std::f64::consts::TAU;
 
 use serde::Serialize;
 use sonarfix_map::Scenario;
-use sonarfix_plan::trial::{
-    Heard, Trial, TrialError, are_one, observed_trial, observed_trial_standing,
-};
-use sonarfix_search::search::Search;
+use sonarfix_plan::trial::{Heard, SetDown, Trial, TrialError, are_one, observed_trial};
 use sonarfix_sim::progress::Progress;
 use sonarfix_sim::simulate::Simulation;
 use sonarfix_sim::trace::Pose;
@@ -56,7 +53,7 @@ pub fn floor_plans(
     seconds: f64,
     progress: &impl Progress,
 ) -> Result<Vec<Bounded>, TrialError> {
-    plans.each(progress, |scenario, seed| bounded(scenario, seed, seconds))
+    plans.each(progress, |scenario, seed| bounded(scenario, seed, SetDown::Anywhere, seconds))
 }
 
 /// The time within which a share of the trials is found right; `None` if fewer are.
@@ -129,32 +126,20 @@ impl Times {
     }
 }
 
-fn bounded(scenario: Scenario, seed: u64, seconds: f64) -> Result<Bounded, TrialError> {
-    bounded_by(scenario, |scenario, observer| observed_trial(scenario, seed, seconds, observer))
-}
-
-/// One trial of a robot that stands, with its bound.
+/// One trial with its bound.
 ///
 /// # Errors
 /// [`TrialError`], if the map cannot be used.
-pub fn standing(scenario: Scenario, seed: u64, seconds: f64) -> Result<Bounded, TrialError> {
-    bounded_by(scenario, |scenario, observer| {
-        observed_trial_standing(scenario, seed, seconds, observer)
-    })
-}
-
-/// A trial that an observer of its pings watches, with its bound.
-fn bounded_by(
+pub fn bounded(
     scenario: Scenario,
-    trial: impl FnOnce(
-        Scenario,
-        &mut dyn FnMut(Heard, &Search<'_>) -> bool,
-    ) -> Result<Trial, TrialError>,
+    seed: u64,
+    set_down: SetDown,
+    seconds: f64,
 ) -> Result<Bounded, TrialError> {
     let simulation = Simulation::new(scenario.clone());
     let mut posterior = Posterior::new(&simulation);
     let mut found = None;
-    let trial = trial(scenario, &mut |heard, _| {
+    let trial = observed_trial(scenario, seed, set_down, seconds, |heard, _| {
         if found.is_none() {
             let (time, truth) = (heard.time, heard.pose);
             posterior.add(heard);

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use serde::Serialize;
 use sonarfix_map::{Floor, NamedWall, Scenario};
-use sonarfix_plan::trial::{Trial, TrialError, trial, trial_elsewhere};
+use sonarfix_plan::trial::{SetDown, Trial, TrialError, trial, trial_elsewhere};
 use sonarfix_sim::progress::Progress;
 
 use crate::floor_plan::{FloorPlan, Kind};
@@ -112,7 +112,7 @@ pub fn floor_plans(
 ) -> Result<Vec<Trial>, TrialError> {
     plans.each(progress, |scenario, seed| {
         if !plans.is_elsewhere {
-            return trial(scenario, seed, seconds);
+            return trial(scenario, seed, SetDown::Anywhere, seconds);
         }
         let kind = FloorPlan::new(seed).kind;
         let other = another(seed, kind).scenario()?;
@@ -133,7 +133,7 @@ pub fn scenario(
 ) -> Result<Vec<Trial>, TrialError> {
     let seeds = (0..u64::from(trials)).into_par_iter().map(|n| first.wrapping_add(n));
     let one = |seed| {
-        let trial = trial(scenario.clone(), seed, seconds);
+        let trial = trial(scenario.clone(), seed, SetDown::Anywhere, seconds);
         progress.finished();
         trial
     };

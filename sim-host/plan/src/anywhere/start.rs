@@ -11,7 +11,7 @@ use super::free_space::FreeSpace;
 use super::route::Steps;
 use super::settings::{AnywhereError, Settings};
 use super::{furniture, wander};
-use crate::trial::{Heard, are_one, observed_trial_from, pose_of, stream};
+use crate::trial::{Heard, SetDown, are_one, observed_trial, pose_of, stream};
 
 /// From a wheel to the side of the robot, metres: the robot of the floor plans has a clearance of 20 cm.
 const BESIDE_WHEEL: f64 = 0.085;
@@ -115,7 +115,7 @@ impl<'a> Place<'a> {
         let at = scenario.path.pose_at(0.0);
         let mut ambiguities: Vec<Ambiguity> = Vec::new();
         let seconds = settings.seconds;
-        let trial = observed_trial_from(scenario, seed, 0.0, seconds, |ping, search| {
+        let trial = observed_trial(scenario, seed, SetDown::At(0.0), seconds, |ping, search| {
             self.record(&mut ambiguities, &ping, search);
             false
         })?;

@@ -1,6 +1,5 @@
 //! `sonarfix-studies find-standing`: robots that stand and sweep, without a start pose.
 
-use anyhow::Context;
 use sonarfix_report::Table;
 use sonarfix_studies::find_standing::{self, Summary};
 use sonarfix_studies::floor_plan::Kind;
@@ -10,6 +9,7 @@ use sonarfix_terminal::progress::Runs;
 
 use crate::find::{bound_table, trial_table};
 use crate::output::Output;
+use crate::rooms::named;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -22,7 +22,7 @@ pub struct Args {
     /// Longest duration of a trial.
     #[arg(long, default_value_t = 5.0)]
     seconds: f64,
-    /// Empty rooms of this family, each trial with the bound of its pings, by its name in docs/rooms.md with hyphens for blanks, instead of furnished floor plans.
+    /// Empty rooms of this family, by its name in docs/rooms.md, instead of furnished floor plans; each trial has the bound of its pings.
     #[arg(long)]
     family: Option<String>,
     /// Takes only homes among the floor plans.
@@ -35,7 +35,8 @@ pub struct Args {
 pub fn execute(args: &Args) -> anyhow::Result<()> {
     anyhow::ensure!(args.seconds > 0.0, "--seconds must be positive");
     anyhow::ensure!(args.runs > 0, "at least 1 trial is needed");
-    let family = args.family.as_deref().map(family_of).transpose()?;
+    let family = args.family.as_ref().map(|wanted| named(wanted, &Family::ALL, Family::name));
+    let family = family.transpose()?;
     let runs = Runs::new(args.runs);
     let table = |summary: &_| summary_table(summary, args.seconds);
     if let Some(family) = family {
@@ -50,15 +51,6 @@ pub fn execute(args: &Args) -> anyhow::Result<()> {
     let trials = find_standing::floor_plans(&plans, args.seconds, &runs)?;
     runs.end()?;
     args.output.print(("summary", &Summary::new(&trials)), &trials, table, trial_table)
-}
-
-fn family_of(name: &str) -> anyhow::Result<Family> {
-    let one_word = |family: Family| family.name().replace(' ', "-");
-    let found = Family::ALL.into_iter().find(|family| one_word(*family) == name);
-    found.with_context(|| {
-        let names = Family::ALL.map(one_word).join(", ");
-        format!("there is no family {name}; there are {names}")
-    })
 }
 
 fn summary_table(summary: &Summary, seconds: f64) -> Table {

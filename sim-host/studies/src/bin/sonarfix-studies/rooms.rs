@@ -95,12 +95,17 @@ fn chosen<T: Copy>(
     if names.is_empty() {
         return Ok(all.to_vec());
     }
-    let named = |wanted: &String| {
-        let found = all.iter().copied().find(|one| name(*one).eq_ignore_ascii_case(wanted));
-        found.with_context(|| {
-            let known: Vec<&str> = all.iter().map(|one| name(*one)).collect();
-            format!("there is no \"{wanted}\": choose one of {}", known.join(", "))
-        })
+    names.iter().map(|wanted| named(wanted, all, name)).collect()
+}
+
+/// The one of this name, in which hyphens may stand for blanks.
+pub fn named<T: Copy>(wanted: &str, all: &[T], name: fn(T) -> &'static str) -> anyhow::Result<T> {
+    let is_wanted = |of: &str| {
+        of.eq_ignore_ascii_case(wanted) || of.replace(' ', "-").eq_ignore_ascii_case(wanted)
     };
-    names.iter().map(named).collect()
+    let found = all.iter().copied().find(|one| is_wanted(name(*one)));
+    found.with_context(|| {
+        let known: Vec<&str> = all.iter().map(|one| name(*one)).collect();
+        format!("there is no \"{wanted}\": choose one of {}", known.join(", "))
+    })
 }
