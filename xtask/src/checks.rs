@@ -20,6 +20,13 @@ pub const NO_STD_CRATES: [&str; 9] = [
 /// Cortex-M4F, and Cortex-M0+ without FPU or atomics.
 const TARGETS: [&str; 2] = ["thumbv7em-none-eabihf", "thumbv6m-none-eabi"];
 
+/// Formatting of every workspace.
+pub fn format() -> anyhow::Result<()> {
+    Workspace::ALL
+        .into_iter()
+        .try_for_each(|workspace| cargo::check(workspace.cargo("fmt --all --check")))
+}
+
 /// Builds the documentation.
 pub fn docs() -> anyhow::Result<()> {
     let mut command = cargo::command("doc --workspace --no-deps --all-features");

@@ -69,7 +69,7 @@ enum Command {
 
 #[derive(Debug, Clone, PartialEq, Eq, Subcommand)]
 enum Task {
-    /// Formatting.
+    /// Formatting of every workspace.
     Format,
     /// Clippy, warnings are errors.
     Lint,
@@ -246,7 +246,7 @@ fn bless(args: &BlessArgs) -> anyhow::Result<()> {
 
 fn run(task: Task) -> anyhow::Result<()> {
     match task {
-        Task::Format => cargo::run("fmt --all --check"),
+        Task::Format => checks::format(),
         Task::Lint => cargo::run("clippy --workspace --all-targets --all-features -- -D warnings"),
         Task::Circles => circles::check(),
         Task::TestHost => cargo::run("test"),
