@@ -120,6 +120,8 @@ fn loaded(arguments: &str) -> anyhow::Result<()> {
 /// core; prints the table of costs.
 pub fn check() -> anyhow::Result<()> {
     sonarfix("paper --carrier uart --seconds 60")?;
+    // For the files that are written below: with CARGO_TARGET_DIR, cargo makes no folder `target` here.
+    std::fs::create_dir_all("target")?;
     // Two robots of one program: wheels, servo, encoder period and ping schedule differ.
     bake("firmware/robot.toml", "target/reference.bin")?;
     bake("tests/robots/coarse.toml", "target/coarse.bin")?;
