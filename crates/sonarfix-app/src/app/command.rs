@@ -48,9 +48,7 @@ impl<'m, F: NorFlash> App<'m, F> {
         let mut began = None;
         let mut session = self.wire.session;
         let answer = session.answer(frame, self.next_session(poll.now), |command| {
-            let (result, message) = self.execute(poll, command);
-            began = message;
-            result
+            self.execute(poll, command, &mut began)
         });
         self.wire.session = session;
         if let Telemetry::Ack(ack) = answer {
@@ -75,7 +73,8 @@ impl<'m, F: NorFlash> App<'m, F> {
         // Before the command changes what it describes.
         self.send_telemetry(link);
         let mut poll = Poll { now, hardware, link, polled: Polled::default() };
-        let (result, began) = self.execute(&mut poll, command);
+        let mut began = None;
+        let result = self.execute(&mut poll, command, &mut began);
         if let Some(began) = began {
             self.wire.send(&began, poll.link);
         }
@@ -83,23 +82,26 @@ impl<'m, F: NorFlash> App<'m, F> {
         result
     }
 
-    /// Executes a command; returns its result, and the telemetry of a loop that starts.
+    /// Executes a command; returns its result. The telemetry of a loop that starts goes to `began`, without a copy on the stack.
     fn execute(
         &mut self,
         poll: &mut Poll<impl Hardware, impl Link>,
         command: &Command,
-    ) -> (CommandResult, Option<Telemetry>) {
-        let next = self.act(poll, command);
-        let message = next.and_then(|next| match next {
-            Next::Nothing => Ok(None),
-            Next::Begin(known) => self.begin(poll.now, &known).map(Some),
-        });
-        match (message, command) {
-            (Err(error), _) => (CommandResult::Refused(error), None),
-            (Ok(began), Command::MapChecksum) => {
-                (CommandResult::Map(flash_contents::map_status(&self.map)), began)
+        began: &mut Option<Telemetry>,
+    ) -> CommandResult {
+        let done = match &self.act(poll, command) {
+            Ok(Next::Begin(known)) => {
+                self.begin(poll.now, known).map(|message| *began = Some(message))
             }
-            (Ok(began), _) => (CommandResult::Done, began),
+            Ok(Next::Nothing) => Ok(()),
+            Err(error) => Err(*error),
+        };
+        match (done, command) {
+            (Err(error), _) => CommandResult::Refused(error),
+            (Ok(()), Command::MapChecksum) => {
+                CommandResult::Map(flash_contents::map_status(&self.map))
+            }
+            (Ok(()), _) => CommandResult::Done,
         }
     }
 
