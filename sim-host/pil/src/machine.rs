@@ -106,9 +106,11 @@ impl Machine {
     }
 }
 
-/// The repository around this program or the current folder; a released program has none, and contains no path of its build.
+/// The repository around this program, the current folder or the package that cargo runs: with `CARGO_TARGET_DIR` the program is
+/// elsewhere. A released program has none, and contains no path of its build.
 fn repository() -> PathBuf {
-    let places = [std::env::current_exe(), std::env::current_dir()];
+    let package = std::env::var_os("CARGO_MANIFEST_DIR").map(PathBuf::from);
+    let places = [std::env::current_exe().ok(), std::env::current_dir().ok(), package];
     let folders = places.iter().flatten().flat_map(|place| place.ancestors());
     let mut repositories = folders.filter(|it| it.join("firmware/emulated/Cargo.toml").exists());
     repositories.next().unwrap_or(Path::new(".")).to_owned()
